@@ -1,0 +1,223 @@
+//! The validated content of `campaign.toml`.
+
+use std::path::PathBuf;
+
+use crate::ingest::Quantity;
+
+/// A validated campaign. Paths are absolute or relative to the working directory (already joined with `dir`).
+#[derive(Debug, Clone)]
+pub struct Campaign {
+    pub dir: PathBuf,
+    pub name: String,
+    pub robot: Option<RobotSection>,
+    pub postures: Vec<Posture>,
+    pub points: Vec<Point>,
+    pub frfs: Vec<FrfFile>,
+    pub tool: Option<Tool>,
+    pub dynamometer: Dynamometer,
+    pub cuts: Vec<Cut>,
+    pub lobes: Option<LobesSection>,
+    /// Workpiece material, for reports.
+    pub material: Option<String>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct RobotSection {
+    /// Built-in name (`irb6640`) or path of a robot file.
+    pub model: String,
+    /// Relative standard deviation of each link's mass (and inertia with it); `None`: masses are exact.
+    pub mass_tolerance: Option<f64>,
+    /// Standard deviation of the logarithm of a joint stiffness about the robot file's value.
+    pub stiffness_tolerance: f64,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Posture {
+    pub id: String,
+    pub joints_deg: Vec<f64>,
+}
+
+/// The body of the robot that a measurement point sits on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum BodyRef {
+    Base,
+    /// 1-based link number; its frame is DH frame i.
+    Link(usize),
+    /// Origin at the tool centre point, axes of the tool.
+    Tool,
+}
+
+/// In which frame X, Y, Z of the FRF files are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AxesRef {
+    Base,
+    /// The frame of the point's body.
+    Body,
+    Tool,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Point {
+    pub node: i64,
+    pub body: BodyRef,
+    pub position_m: [f64; 3],
+    pub axes: AxesRef,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrfFile {
+    pub file: PathBuf,
+    /// Index into `Campaign::postures`.
+    pub posture: usize,
+    pub quantity: Option<Quantity>,
+    pub force_level_n: Option<f64>,
+    /// Line of `campaign.toml`, for messages.
+    pub line: usize,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ToolKind {
+    Endmill,
+    Drill,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tool {
+    pub kind: ToolKind,
+    pub diameter_mm: f64,
+    pub teeth: usize,
+    pub helix_deg: f64,
+    /// Drills: half of the point angle.
+    pub half_point_angle_deg: Option<f64>,
+    /// Drills: web thickness.
+    pub web_thickness_mm: Option<f64>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Dynamometer {
+    /// Rows of A in F_tool = A F_recorded; identity where the campaign does not say.
+    pub tool_from_dyno: [[f64; 3]; 3],
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Process {
+    Milling,
+    Drilling,
+}
+
+/// Immersion angles from +y, clockwise, rad; 0 ≤ start < exit ≤ 2π.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Immersion {
+    pub start_rad: f64,
+    pub exit_rad: f64,
+}
+
+impl Immersion {
+    pub const SLOT: Immersion = Immersion {
+        start_rad: 0.0,
+        exit_rad: std::f64::consts::PI,
+    };
+}
+
+/// What was cut: geometry and feed of one record.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum CutGeometry {
+    Milling {
+        feed_per_tooth_mm: f64,
+        axial_depth_mm: f64,
+        immersion: Immersion,
+    },
+    Drilling {
+        feed_per_rev_mm: f64,
+        /// Zero: drilled into the full.
+        pilot_diameter_mm: f64,
+        /// Depth at full diameter.
+        hole_depth_mm: Option<f64>,
+    },
+}
+
+impl CutGeometry {
+    pub fn process(&self) -> Process {
+        match self {
+            CutGeometry::Milling { .. } => Process::Milling,
+            CutGeometry::Drilling { .. } => Process::Drilling,
+        }
+    }
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cut {
+    pub id: String,
+    pub file: PathBuf,
+    pub spindle_rpm: f64,
+    pub geometry: CutGeometry,
+    /// Position in the sequence in which the cuts were made.
+    pub order: Option<i64>,
+    /// Overrides the detected steady window, s of the record's time axis.
+    pub steady_s: Option<[f64; 2]>,
+    /// Line of `campaign.toml`, for messages.
+    pub line: usize,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LobeSource {
+    Model,
+    Measured,
+    Modes,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LobeMethod {
+    ZeroOrder,
+    MultiFrequency,
+    SemiDiscretisation,
+    FrequencyDomain,
+}
+
+/// Degree of freedom of a mode in the `[[lobes.mode]]` table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LobeAxis {
+    X,
+    Y,
+    Z,
+    Theta,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LobeMode {
+    pub axis: LobeAxis,
+    pub frequency_hz: f64,
+    pub damping_ratio: f64,
+    /// N/m; for theta N·m/rad.
+    pub stiffness_n_per_m: f64,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Redundancy {
+    /// Index into `Campaign::postures`.
+    pub posture: usize,
+    pub step_deg: f64,
+    pub forbidden_deg: Vec<[f64; 2]>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct LobesSection {
+    pub process: Process,
+    pub source: LobeSource,
+    pub method: LobeMethod,
+    pub ktc_n_per_mm2: Option<f64>,
+    pub krc_n_per_mm2: Option<f64>,
+    pub kac_n_per_mm2: Option<f64>,
+    pub teeth: Option<usize>,
+    pub immersion: Option<Immersion>,
+    pub half_point_angle_deg: Option<f64>,
+    pub feed_per_rev_mm: Option<f64>,
+    /// From, to, step.
+    pub spindle_rpm: [f64; 3],
+    pub modes: Vec<LobeMode>,
+    pub redundancy: Option<Redundancy>,
+}

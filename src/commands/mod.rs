@@ -1,0 +1,90 @@
+//! The command line: one file a subcommand, each reads its arguments, calls the library and hands back
+//! an [`Outcome`]. Nothing is computed here.
+
+use std::path::PathBuf;
+
+use clap::{Parser, Subcommand, ValueEnum};
+
+use crate::Result;
+
+mod calibrate;
+mod cfc;
+mod compare;
+mod demo;
+mod inspect;
+mod lobes;
+mod modal;
+mod model;
+mod report;
+mod thesis;
+
+/// What a command has to say: the document of the contract, and the same for a person.
+pub struct Outcome {
+    /// Printed with `--json`.
+    pub json: serde_json::Value,
+    /// Printed without.
+    pub text: String,
+}
+
+#[derive(Parser)]
+#[command(name = "lobestone", version, about, long_about = None)]
+pub struct Cli {
+    /// Print one JSON document on stdout and nothing else there.
+    #[arg(long, global = true)]
+    pub json: bool,
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// Which side of a campaign a command looks at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Domain {
+    Structure,
+    Cutting,
+}
+
+#[derive(Subcommand)]
+pub enum Command {
+    /// Say what measurement files are: format, channels, units, quality.
+    Inspect(inspect::Args),
+    /// Cutting force coefficients from dynamometer records.
+    Cfc(cfc::Args),
+    /// Modal parameters from FRFs.
+    Modal(modal::Args),
+    /// What the robot model says, before and after calibration.
+    Model(model::Args),
+    /// Tune the model to the measured FRFs.
+    Calibrate(calibrate::Args),
+    /// Model against measurement: where it fails.
+    Compare(compare::Args),
+    /// Stability lobes.
+    Lobes(lobes::Args),
+    /// HTML and PNG report of a campaign.
+    Report(report::Args),
+    /// The source thesis put right: published model, measurement and this model side by side.
+    Thesis(thesis::Args),
+    /// The whole story on built-in campaigns.
+    Demo(demo::Args),
+}
+
+/// A campaign folder.
+#[derive(clap::Args)]
+pub struct CampaignArg {
+    /// The campaign folder (with campaign.toml in it).
+    pub dir: PathBuf,
+}
+
+pub fn run(cli: Cli) -> Result<Outcome> {
+    match cli.command {
+        Command::Inspect(args) => inspect::run(args),
+        Command::Cfc(args) => cfc::run(args),
+        Command::Modal(args) => modal::run(args),
+        Command::Model(args) => model::run(args),
+        Command::Calibrate(args) => calibrate::run(args),
+        Command::Compare(args) => compare::run(args),
+        Command::Lobes(args) => lobes::run(args),
+        Command::Report(args) => report::run(args),
+        Command::Thesis(args) => thesis::run(args),
+        Command::Demo(args) => demo::run(args),
+    }
+}

@@ -1,0 +1,1 @@
+//! Cutting forces: geometry, force models, regression of the coefficients.

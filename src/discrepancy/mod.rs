@@ -1,0 +1,1 @@
+//! Where the model fails: comparison of model and measurement.

@@ -1,0 +1,1 @@
+//! Fits models to measurements: parameters with priors, solvers, uncertainty.

@@ -1,0 +1,20 @@
+//! Lobestone fits physical models of machining robots to measurements and shows where they fail.
+//!
+//! Data flows one way: [`ingest`] → [`campaign`] → [`robot`] and [`cutting`] → [`identify`] →
+//! [`discrepancy`] → [`lobes`] → [`report`]. A module knows nothing of the ones after it.
+
+pub mod campaign;
+pub mod commands;
+pub mod cutting;
+pub mod discrepancy;
+pub mod error;
+pub mod identify;
+pub mod ingest;
+pub mod lobes;
+pub mod modal;
+pub mod progress;
+pub mod report;
+pub mod robot;
+pub mod signal;
+
+pub use error::{Error, InputError, Result};

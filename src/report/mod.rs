@@ -1,0 +1,1 @@
+//! Draws what the floors below computed; computes nothing itself.

@@ -1,0 +1,4 @@
+//! The robot as a structure: kinematics, a chain of compliant elements, frequency response.
+
+pub mod spec;
+pub use spec::*;

@@ -1,0 +1,1 @@
+//! Signals: drift of charge amplifiers, steady windows, spectra.

@@ -1,4 +1,23 @@
 //! The robot as a structure: kinematics, a chain of compliant elements, frequency response.
+//!
+//! The chain uses relative coordinates: every compliant element (a joint's rotation, half a link that bends,
+//! a rocking base) has its own coordinates and its own stiffness, so the stiffness matrix is block diagonal and
+//! positive definite at every posture. Masses see the elements before them through rigid-body Jacobians.
 
+pub mod beam;
+pub mod chain;
+pub mod dh;
+pub mod dual;
+pub mod export;
+#[cfg(test)]
+pub(crate) mod fixture;
+pub mod frf;
+pub mod model;
 pub mod spec;
+
+pub use chain::{Body, Branch, Chain, Element, Place, Slot, System};
+pub use dh::Kinematics;
+pub use dual::Dual;
+pub use frf::{FrfBasis, ModalBasis};
+pub use model::{Baseline, RobotModel};
 pub use spec::*;

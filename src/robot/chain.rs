@@ -1,0 +1,301 @@
+//! An open chain of compliant elements in relative coordinates, and its mass, stiffness and damping matrices with
+//! their derivatives.
+//!
+//! Twists are (v, ω) in base axes. Coordinate ξ_e of an element turns or shifts everything behind it on the chain, so
+//! a body's twist at its centre of mass is Σ over elements before it of S_e moved there (v += ω × r) times ξ_e, and
+//! M = Σ Jᵀ diag(m I, R I_b Rᵀ) J, K = blockdiag(K_e) (link–joint–link reduction after Klimchik et al. 2014, with
+//! the lever arms kept).
+
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6xX, Point3, Vector3, Vector6};
+
+use super::dual::Dual;
+
+/// Where on the chain something sits: it moves with every element at an earlier or equal place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Place {
+    /// 0 is the base, i the link behind joint i.
+    pub link: usize,
+    pub slot: Slot,
+}
+
+/// The order of things along one link.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Slot {
+    /// The joint in front of the link: its rotation, its tilt; at link 0 the rocking of the base.
+    Joint,
+    /// First half of the link as a beam.
+    FirstHalf,
+    /// The link's own body.
+    Body,
+    /// Second half of the link as a beam.
+    SecondHalf,
+    /// The link's far end: next joint axis, or flange and tool.
+    End,
+}
+
+impl Place {
+    pub fn new(link: usize, slot: Slot) -> Self {
+        Place { link, slot }
+    }
+}
+
+/// A compliant element: `directions` are unit twists at `at`, one a coordinate; its stiffness is
+/// `stiffness` × `shape`.
+#[derive(Debug, Clone)]
+pub struct Element {
+    pub place: Place,
+    pub at: Point3<f64>,
+    pub directions: Vec<Vector6<f64>>,
+    /// Symmetric positive definite, as many rows as directions.
+    pub shape: DMatrix<f64>,
+    pub stiffness: Dual,
+    /// Viscous damping of the element: `damping` × identity.
+    pub damping: Option<Dual>,
+}
+
+/// A rigid body: `scale` multiplies its mass and inertia together.
+#[derive(Debug, Clone)]
+pub struct Body {
+    pub place: Place,
+    pub com: Point3<f64>,
+    pub mass_kg: f64,
+    /// About the centre of mass, base axes.
+    pub inertia_kg_m2: Matrix3<f64>,
+    pub scale: Dual,
+}
+
+/// A point mass on spring and viscous damper that hangs on the chain and moves along `directions` relative to it
+/// (rigidly otherwise). Its damper is its own; the chain's modal damping does not know of it.
+#[derive(Debug, Clone)]
+pub struct Branch {
+    pub place: Place,
+    pub at: Point3<f64>,
+    pub directions: Vec<Vector3<f64>>,
+    pub mass_kg: Dual,
+    pub stiffness_n_per_m: Dual,
+    pub damping_ns_per_m: Dual,
+    /// True if what is measured or hit at `at` is the branch's mass (a flexible tool), not the chain.
+    pub carries_tool_point: bool,
+}
+
+/// Everything that makes up the structure at one posture.
+#[derive(Debug, Clone)]
+pub struct Chain {
+    pub elements: Vec<Element>,
+    pub bodies: Vec<Body>,
+    pub branches: Vec<Branch>,
+    /// One damping ratio for all modes of the chain without its branches; zero where the elements carry dampers.
+    pub modal_damping_ratio: Dual,
+}
+
+/// Matrices of a chain: the coordinates of the elements come first, those of the branches after them.
+#[derive(Debug, Clone)]
+pub struct System {
+    /// Number of element coordinates.
+    pub chain_count: usize,
+    pub stiffness: DMatrix<f64>,
+    pub mass: DMatrix<f64>,
+    /// Mass of the chain alone, `chain_count` square: what modal damping is defined on.
+    pub chain_mass: DMatrix<f64>,
+    pub viscous: Option<DMatrix<f64>>,
+    pub modal_damping_ratio: Dual,
+    /// One entry a parameter.
+    pub derivatives: Vec<SystemDerivative>,
+}
+
+/// Derivative of a [`System`] with respect to one parameter; `None` where it is zero.
+#[derive(Debug, Clone, Default)]
+pub struct SystemDerivative {
+    pub stiffness: Option<DMatrix<f64>>,
+    pub mass: Option<DMatrix<f64>>,
+    pub chain_mass: Option<DMatrix<f64>>,
+    pub viscous: Option<DMatrix<f64>>,
+}
+
+fn add_scaled(
+    target: &mut Option<DMatrix<f64>>,
+    size: usize,
+    corner: usize,
+    block: &DMatrix<f64>,
+    factor: f64,
+) {
+    if factor == 0.0 {
+        return;
+    }
+    let matrix = target.get_or_insert_with(|| DMatrix::zeros(size, size));
+    let (rows, columns) = block.shape();
+    let mut view = matrix.view_mut((corner, corner), (rows, columns));
+    view += block * factor;
+}
+
+impl Chain {
+    fn chain_count(&self) -> usize {
+        self.elements.iter().map(|e| e.directions.len()).sum()
+    }
+
+    fn branch_count(&self) -> usize {
+        self.branches.iter().map(|b| b.directions.len()).sum()
+    }
+
+    /// Total number of coordinates.
+    pub fn coordinate_count(&self) -> usize {
+        self.chain_count() + self.branch_count()
+    }
+
+    /// Twist (6 × coordinates) of a point that moves with the chain at `place`; branch coordinates are zero.
+    pub fn jacobian(&self, point: Point3<f64>, place: Place) -> Matrix6xX<f64> {
+        let mut jacobian = Matrix6xX::zeros(self.coordinate_count());
+        let mut column = 0;
+        for element in &self.elements {
+            if element.place <= place {
+                let r = point - element.at;
+                for (i, direction) in element.directions.iter().enumerate() {
+                    let omega: Vector3<f64> = direction.fixed_rows::<3>(3).into_owned();
+                    let v: Vector3<f64> = direction.fixed_rows::<3>(0) + omega.cross(&r);
+                    let mut target = jacobian.column_mut(column + i);
+                    target.fixed_rows_mut::<3>(0).copy_from(&v);
+                    target.fixed_rows_mut::<3>(3).copy_from(&omega);
+                }
+            }
+            column += element.directions.len();
+        }
+        jacobian
+    }
+
+    /// Displacement per coordinate along `direction` of a point at `place`, a row as long as there are coordinates.
+    /// A point at the tool follows a flexible tool where there is one.
+    pub fn output_row(
+        &self,
+        point: Point3<f64>,
+        place: Place,
+        at_tool_point: bool,
+        direction: &Vector3<f64>,
+    ) -> DVector<f64> {
+        let jacobian = self.jacobian(point, place);
+        let mut row = jacobian.fixed_rows::<3>(0).transpose() * direction;
+        if at_tool_point {
+            let mut column = self.chain_count();
+            for branch in &self.branches {
+                for own in &branch.directions {
+                    if branch.carries_tool_point {
+                        row[column] = own.dot(direction);
+                    }
+                    column += 1;
+                }
+            }
+        }
+        row
+    }
+
+    /// Mass, stiffness and damping matrices and their derivatives with respect to `parameter_count` parameters.
+    pub fn system(&self, parameter_count: usize) -> System {
+        let chain_count = self.chain_count();
+        let n = self.coordinate_count();
+        let mut stiffness = None;
+        let mut mass = None;
+        let mut chain_mass = None;
+        let mut viscous = None;
+        let mut derivatives = vec![SystemDerivative::default(); parameter_count];
+
+        let mut corner = 0;
+        for element in &self.elements {
+            add_scaled(&mut stiffness, n, corner, &element.shape, element.stiffness.value);
+            for (p, derivative) in derivatives.iter_mut().enumerate() {
+                add_scaled(
+                    &mut derivative.stiffness,
+                    n,
+                    corner,
+                    &element.shape,
+                    element.stiffness.derivative(p),
+                );
+            }
+            if let Some(damping) = &element.damping {
+                let identity = DMatrix::identity(element.directions.len(), element.directions.len());
+                add_scaled(&mut viscous, n, corner, &identity, damping.value);
+                for (p, derivative) in derivatives.iter_mut().enumerate() {
+                    add_scaled(
+                        &mut derivative.viscous,
+                        n,
+                        corner,
+                        &identity,
+                        damping.derivative(p),
+                    );
+                }
+            }
+            corner += element.directions.len();
+        }
+
+        for body in &self.bodies {
+            let jacobian = self.jacobian(body.com, body.place);
+            let chain = jacobian.columns(0, chain_count);
+            let v = chain.fixed_rows::<3>(0);
+            let w = chain.fixed_rows::<3>(3);
+            let block: DMatrix<f64> =
+                v.transpose() * v * body.mass_kg + w.transpose() * body.inertia_kg_m2 * w;
+            add_scaled(&mut mass, n, 0, &block, body.scale.value);
+            add_scaled(&mut chain_mass, chain_count, 0, &block, body.scale.value);
+            for (p, derivative) in derivatives.iter_mut().enumerate() {
+                let slope = body.scale.derivative(p);
+                add_scaled(&mut derivative.mass, n, 0, &block, slope);
+                add_scaled(&mut derivative.chain_mass, chain_count, 0, &block, slope);
+            }
+        }
+
+        let mut column = chain_count;
+        for branch in &self.branches {
+            let count = branch.directions.len();
+            let mut motion = self
+                .jacobian(branch.at, branch.place)
+                .fixed_rows::<3>(0)
+                .into_owned();
+            for (i, direction) in branch.directions.iter().enumerate() {
+                motion.column_mut(column + i).copy_from(direction);
+            }
+            let block: DMatrix<f64> = motion.transpose() * &motion;
+            let identity = DMatrix::identity(count, count);
+            add_scaled(&mut mass, n, 0, &block, branch.mass_kg.value);
+            add_scaled(
+                &mut stiffness,
+                n,
+                column,
+                &identity,
+                branch.stiffness_n_per_m.value,
+            );
+            add_scaled(&mut viscous, n, column, &identity, branch.damping_ns_per_m.value);
+            for (p, derivative) in derivatives.iter_mut().enumerate() {
+                add_scaled(&mut derivative.mass, n, 0, &block, branch.mass_kg.derivative(p));
+                let k = branch.stiffness_n_per_m.derivative(p);
+                add_scaled(&mut derivative.stiffness, n, column, &identity, k);
+                let c = branch.damping_ns_per_m.derivative(p);
+                add_scaled(&mut derivative.viscous, n, column, &identity, c);
+            }
+            column += count;
+        }
+
+        System {
+            chain_count,
+            stiffness: stiffness.unwrap_or_else(|| DMatrix::zeros(n, n)),
+            mass: mass.unwrap_or_else(|| DMatrix::zeros(n, n)),
+            chain_mass: chain_mass.unwrap_or_else(|| DMatrix::zeros(chain_count, chain_count)),
+            viscous,
+            modal_damping_ratio: self.modal_damping_ratio.clone(),
+            derivatives,
+        }
+    }
+
+    /// Static compliance (6×6, displacement and rotation per force and moment, base axes) of a point on the chain.
+    pub fn compliance(&self, point: Point3<f64>, place: Place) -> crate::Result<nalgebra::Matrix6<f64>> {
+        let jacobian = self.jacobian(point, place);
+        let system = self.system(0);
+        let n = system.chain_count;
+        let cholesky = system
+            .stiffness
+            .view((0, 0), (n, n))
+            .into_owned()
+            .cholesky()
+            .ok_or_else(|| crate::Error::computation("the stiffness matrix is not positive definite"))?;
+        let transposed = jacobian.columns(0, n).transpose();
+        let compliance = jacobian.columns(0, n) * cholesky.solve(&transposed);
+        Ok(nalgebra::Matrix6::from_iterator(compliance.iter().copied()))
+    }
+}

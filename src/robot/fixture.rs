@@ -1,0 +1,54 @@
+//! The IRB 6640 of the source thesis, for the tests of this floor (the robot file itself is read one floor up).
+
+use super::spec::*;
+
+pub fn irb6640() -> RobotSpec {
+    let joint = |d_m: f64, a_m: f64, alpha_deg: f64, offset_deg: f64, compliance: f64| JointSpec {
+        d_m,
+        a_m,
+        alpha_rad: alpha_deg.to_radians(),
+        offset_rad: offset_deg.to_radians(),
+        compliance_rad_per_nm: compliance,
+        limits_rad: None,
+    };
+    let link = |mass_kg: f64, inertia_kg_m2: [f64; 3], section: Option<(f64, f64)>| LinkSpec {
+        mass_kg,
+        inertia_kg_m2,
+        com_m: None,
+        section: section.map(|(outer_diameter_m, wall_m)| BeamSection {
+            outer_diameter_m,
+            wall_m,
+        }),
+    };
+    RobotSpec {
+        name: "ABB IRB 6640-205/2.75".into(),
+        joints: vec![
+            joint(0.7682, 0.3242, -90.0, 0.0, 0.66e-6),
+            joint(0.0, 1.2844, 0.0, -90.0, 0.51e-6),
+            joint(0.0, 0.1784, -90.0, 0.0, 0.48e-6),
+            joint(1.1454, 0.0, -90.0, 180.0, 0.18e-5),
+            joint(0.0, 0.0, 90.0, 0.0, 0.42e-5),
+            joint(0.1996, 0.0, 0.0, 0.0, 0.20e-5),
+        ],
+        links: vec![
+            link(478.1478155, [37.86, 37.77, 3.67], Some((0.45, 0.03))),
+            link(154.2855258, [47.06, 28.67, 51.04], Some((0.30, 0.02))),
+            link(213.9519076, [6.74, 7.76, 6.61], Some((0.30, 0.02))),
+            link(186.6735005, [31.28, 30.66, 1.89], Some((0.24, 0.018))),
+            link(26.32104143, [0.107, 0.219, 0.209], None),
+            link(60.0, [2.7375, 2.7375, 1.875], Some((0.16, 0.02))),
+        ],
+        tool: ToolFrame {
+            tcp_in_flange_m: [0.1989, 0.0, 0.5599],
+            tilt_about_flange_y_rad: 45f64.to_radians(),
+        },
+    }
+}
+
+/// The four tap-test postures, degrees.
+pub const TAP_POSTURES: [[f64; 6]; 4] = [
+    [135.0, -2.0, 53.0, 83.0, 30.0, -117.0],
+    [135.0, 20.0, 26.0, 30.0, 80.0, -150.0],
+    [153.0, 23.0, 20.0, -18.0, 87.0, 161.0],
+    [161.0, 3.0, 47.0, -68.0, 46.0, 123.0],
+];

@@ -1,1 +1,13 @@
-//! Fits models to measurements: parameters with priors, solvers, uncertainty.
+//! Fits models to measurements: parameters with priors, the least-squares solver, uncertainty.
+
+pub mod calibrate;
+pub mod frf_data;
+pub mod levenberg_marquardt;
+pub mod parameters;
+pub mod structure;
+
+pub use calibrate::{Calibration, Estimate, Options};
+pub use frf_data::FrfData;
+pub use levenberg_marquardt::{Fit, LeastSquares, Linearisation, minimise};
+pub use parameters::{Parameter, Prior, Scale};
+pub use structure::StructureModel;

@@ -1,0 +1,208 @@
+//! Tunes the structural model to measured FRFs: maximum a posteriori, staged so that no peak is trapped beside the
+//! one it belongs to, repeated from other starting points where the fit is not as good as the noise allows.
+
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::frf_data::FrfData;
+use super::levenberg_marquardt::{Fit, Stopping, minimise};
+use super::structure::{FrfProblem, Misfit, StructureModel};
+use crate::progress::Progress;
+use crate::{Error, Result};
+
+/// One fitted parameter in natural units.
+#[derive(Debug, Clone, Serialize)]
+pub struct Estimate {
+    pub name: String,
+    pub value: f64,
+    pub unit: &'static str,
+    pub std_error: f64,
+    pub initial: f64,
+    /// True where the estimate stopped at the end of its allowed range.
+    pub at_bound: bool,
+}
+
+/// How to calibrate.
+#[derive(Debug, Clone, Copy)]
+pub struct Options {
+    /// Further starting points, tried where the first fit leaves more than noise.
+    pub extra_starts: usize,
+    /// Seed of those starting points.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Options {
+            extra_starts: 6,
+            seed: 1,
+        }
+    }
+}
+
+/// A calibrated model.
+#[derive(Debug, Clone)]
+pub struct Calibration {
+    pub parameters: Vec<Estimate>,
+    /// On the solver's scale.
+    pub theta: Vec<f64>,
+    /// Covariance on the solver's scale, scaled up where the misfit exceeds the noise.
+    pub covariance: nalgebra::DMatrix<f64>,
+    /// Weighted misfit per real residual: 1 where only noise is left.
+    pub reduced_chi2: f64,
+    pub iterations: usize,
+    pub converged: bool,
+    /// Starting points tried.
+    pub starts: usize,
+    /// How many of them came to the answer given here (within 0.1 % of its misfit).
+    pub starts_agreeing: usize,
+}
+
+/// Misfit above which noise alone is not credible any more and further starting points are tried.
+const SUSPICIOUS_CHI2: f64 = 1.15;
+/// Lines used to get near the answer: every how many.
+const COARSE_STRIDE: usize = 4;
+
+/// Log magnitude first, then the complex values on few lines: gets into the right basin.
+fn approach(model: &StructureModel, data: &FrfData, start: &[f64]) -> Result<(Fit, usize)> {
+    let bounds = model.bounds();
+    let stride = coarse_stride(data);
+    let rough = Stopping {
+        max_iterations: 40,
+        relative_decrease: 1e-4,
+    };
+    let log = FrfProblem {
+        model,
+        data,
+        misfit: Misfit::LogMagnitude,
+        stride,
+    };
+    let near = minimise(&log, start, &bounds, rough)?;
+    let complex = FrfProblem {
+        model,
+        data,
+        misfit: Misfit::Complex,
+        stride,
+    };
+    let fit = minimise(&complex, &near.theta, &bounds, rough)?;
+    let iterations = near.iterations + fit.iterations;
+    Ok((fit, iterations))
+}
+
+fn coarse_stride(data: &FrfData) -> usize {
+    let lines = data
+        .blocks
+        .iter()
+        .map(|b| b.frequency_hz.len())
+        .min()
+        .unwrap_or(0);
+    // Thinned measurements are left alone: a resonance needs its few lines.
+    if lines >= 200 { COARSE_STRIDE } else { 1 }
+}
+
+/// Refines from a point that is already in the right basin, on all lines.
+pub fn refine(model: &StructureModel, data: &FrfData, start: &[f64]) -> Result<Fit> {
+    let problem = FrfProblem {
+        model,
+        data,
+        misfit: Misfit::Complex,
+        stride: 1,
+    };
+    minimise(&problem, start, &model.bounds(), Stopping::default())
+}
+
+/// Calibrates `model` to `data`.
+pub fn calibrate(model: &StructureModel, data: &FrfData, options: Options) -> Result<Calibration> {
+    let nominal = model.nominal_theta();
+    let (first, mut iterations) = approach(model, data, &nominal)?;
+    let mut best = refine(model, data, &first.theta)?;
+    iterations += best.iterations;
+    let mut starts = 1;
+    let mut agreeing = 1;
+    let residual_count = (2 * data.value_count()) as f64;
+    let chi2 = |fit: &Fit| 2.0 * fit.cost / (residual_count - model.parameters.len() as f64).max(1.0);
+
+    if chi2(&best) > SUSPICIOUS_CHI2 && options.extra_starts > 0 {
+        let points = starting_points(model, &nominal, options);
+        let progress = Progress::new("calibrating from further starting points", points.len());
+        let mut fits: Vec<Fit> = points
+            .par_iter()
+            .filter_map(|start| {
+                let fit = approach(model, data, start).ok().map(|(fit, _)| fit);
+                progress.step();
+                fit
+            })
+            .collect();
+        starts += points.len();
+        fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        // Costs of the coarse fits are comparable with each other and with the first one's.
+        agreeing = 0;
+        let winner = fits.first().filter(|fit| fit.cost < first.cost * (1.0 - 1e-3));
+        if let Some(winner) = winner {
+            let fine = refine(model, data, &winner.theta)?;
+            iterations += fine.iterations;
+            if fine.cost < best.cost {
+                best = fine;
+            }
+        }
+        let lowest = fits.iter().map(|f| f.cost).fold(first.cost, f64::min);
+        agreeing += fits.iter().filter(|f| f.cost < lowest * 1.001).count();
+        agreeing += usize::from(first.cost < lowest * 1.001);
+    }
+
+    let reduced_chi2 = chi2(&best);
+    let covariance = best
+        .hessian
+        .clone()
+        .cholesky()
+        .ok_or_else(|| {
+            Error::computation("the data do not determine the parameters (singular information matrix)")
+        })?
+        .inverse()
+        * reduced_chi2.max(1.0);
+    let parameters = model
+        .parameters
+        .iter()
+        .enumerate()
+        .map(|(i, p)| Estimate {
+            name: p.name.clone(),
+            value: p.natural(best.theta[i]),
+            unit: p.unit,
+            std_error: p.natural_std(best.theta[i], covariance[(i, i)].sqrt()),
+            initial: p.nominal,
+            at_bound: best.at_bound.contains(&i),
+        })
+        .collect();
+    Ok(Calibration {
+        parameters,
+        theta: best.theta,
+        covariance,
+        reduced_chi2,
+        iterations,
+        converged: best.converged,
+        starts,
+        starts_agreeing: agreeing,
+    })
+}
+
+/// Draws from the priors, twice as wide, within the bounds.
+fn starting_points(model: &StructureModel, nominal: &[f64], options: Options) -> Vec<Vec<f64>> {
+    let mut random = ChaCha8Rng::seed_from_u64(options.seed);
+    (0..options.extra_starts)
+        .map(|_| {
+            model
+                .parameters
+                .iter()
+                .zip(nominal)
+                .map(|(p, t)| {
+                    // Uniform on ±√3·2σ has the standard deviation 2σ and no far tails.
+                    let half = p.prior.map_or(0.1, |prior| prior.std) * 2.0 * 3f64.sqrt();
+                    let [low, high] = p.internal_bounds();
+                    (t + half * random.random_range(-1.0..1.0)).clamp(low, high)
+                })
+                .collect()
+        })
+        .collect()
+}

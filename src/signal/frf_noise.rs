@@ -1,0 +1,336 @@
+//! How noisy measured FRFs are, from the measurement alone.
+//!
+//! In a short window a set of FRFs that share their poles is a rational function with one common denominator
+//! (local rational method, McKelvey & Guérin 2012; Pintelon & Schoukens 2012, ch. 7). What is left at the window's
+//! centre, divided by its degrees of freedom, is noise; over all windows its variance is described as
+//! σ² = (a |H|)² + b²: a relative part (hammer, gain) and a floor (sensor, quantisation).
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+
+/// Noise of one FRF: standard deviation of the complex value (both parts together) at receptance magnitude |H|.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrfNoise {
+    /// a: share of the magnitude.
+    pub relative: f64,
+    /// b: floor, in the unit of the FRF.
+    pub floor: f64,
+}
+
+impl FrfNoise {
+    /// Standard deviation of the complex value where the true magnitude is `magnitude`.
+    pub fn std(&self, magnitude: f64) -> f64 {
+        (self.relative * magnitude).hypot(self.floor)
+    }
+}
+
+/// Half width of a window in lines.
+const HALF_WINDOW: usize = 8;
+/// Coefficients of the numerator polynomial, each FRF its own.
+const NUMERATOR: usize = 5;
+/// Coefficients of the common denominator besides the leading 1: two poles.
+const DENOMINATOR: usize = 2;
+
+/// Squared departure from the local rational fit at one line, corrected for the degrees of freedom, and the magnitude
+/// of the smooth curve there.
+#[derive(Debug, Clone, Copy)]
+struct Departure {
+    magnitude: f64,
+    variance: f64,
+}
+
+/// Noise of one FRF and the smooth curve that it was measured against.
+#[derive(Debug, Clone)]
+pub struct FrfNoiseEstimate {
+    pub law: FrfNoise,
+    /// Standard deviation of the complex value on each line: the law at the smooth curve's magnitude. (At the noisy
+    /// magnitude a line that noise made small would get more weight than it deserves, a bias of a².)
+    pub std: Vec<f64>,
+}
+
+/// Estimates the noise of each FRF of a set measured together (one posture: common poles, common frequency lines).
+/// `frfs`: one slice a FRF, all as long as `frequency_hz`. `None` where there are too few lines to tell.
+pub fn estimate(frequency_hz: &[f64], frfs: &[&[Complex64]]) -> Vec<Option<FrfNoiseEstimate>> {
+    let lines = frequency_hz.len();
+    if lines < 2 * HALF_WINDOW + 1 || frfs.is_empty() {
+        return vec![None; frfs.len()];
+    }
+    let mut local: Vec<Local> = frfs
+        .iter()
+        .map(|h| Local {
+            departures: Vec::with_capacity(lines),
+            smooth: h.iter().map(|v| v.norm()).collect(),
+        })
+        .collect();
+    for centre in HALF_WINDOW..lines - HALF_WINDOW {
+        window(frequency_hz, frfs, centre, &mut local);
+    }
+    local
+        .iter()
+        .map(|local| {
+            let law = fit_law(&local.departures)?;
+            let std = local.smooth.iter().map(|magnitude| law.std(*magnitude)).collect();
+            Some(FrfNoiseEstimate { law, std })
+        })
+        .collect()
+}
+
+/// What the windows have found of one FRF.
+struct Local {
+    departures: Vec<Departure>,
+    /// Magnitude of the smooth curve on each line.
+    smooth: Vec<f64>,
+}
+
+/// Fits one window and adds the departures at its centre.
+fn window(frequency_hz: &[f64], frfs: &[&[Complex64]], centre: usize, local: &mut [Local]) {
+    let range = centre - HALF_WINDOW..centre + HALF_WINDOW + 1;
+    let count = range.len();
+    let half_span = 0.5 * (frequency_hz[range.end - 1] - frequency_hz[range.start]);
+    if !(half_span > 0.0) {
+        return;
+    }
+    let x: Vec<f64> = frequency_hz[range.clone()]
+        .iter()
+        .map(|f| (f - frequency_hz[centre]) / half_span)
+        .collect();
+    let mut denominator = vec![Complex64::ONE; count];
+    // Sanathanan–Koerner: each pass divides the equation error by the denominator of the pass before.
+    for _ in 0..2 {
+        let mut normal = DMatrix::<Complex64>::zeros(DENOMINATOR, DENOMINATOR);
+        let mut right = DVector::<Complex64>::zeros(DENOMINATOR);
+        for frf in frfs {
+            let h = &frf[range.clone()];
+            let weight = weights(h, &denominator);
+            let Some(basis) = numerator_basis(&x, &weight) else {
+                return;
+            };
+            let mut columns = DMatrix::<Complex64>::zeros(count, DENOMINATOR + 1);
+            for i in 0..count {
+                let mut power = h[i] * weight[i];
+                for j in 0..=DENOMINATOR {
+                    columns[(i, j)] = power;
+                    power *= x[i];
+                }
+            }
+            let projected = &columns - &basis * (basis.adjoint() * &columns);
+            let unknown = projected.columns(1, DENOMINATOR);
+            normal += unknown.adjoint() * unknown;
+            right -= unknown.adjoint() * projected.column(0);
+        }
+        let Some(solution) = normal.lu().solve(&right) else {
+            return;
+        };
+        for (d, &x) in denominator.iter_mut().zip(&x) {
+            *d = Complex64::ONE;
+            let mut power = Complex64::ONE;
+            for s in solution.iter() {
+                power *= x;
+                *d += s * power;
+            }
+        }
+        if denominator.iter().any(|d| !d.is_finite() || d.norm() < 1e-9) {
+            return;
+        }
+    }
+    // The common denominator costs each FRF its share of a degree of freedom.
+    let shared = DENOMINATOR as f64 / (frfs.len() * count) as f64;
+    let last = frequency_hz.len() - 1 - HALF_WINDOW;
+    for (frf, local) in frfs.iter().zip(local) {
+        let h = &frf[range.clone()];
+        let weight = weights(h, &denominator);
+        let Some(basis) = numerator_basis(&x, &weight) else {
+            continue;
+        };
+        let target = DVector::from_fn(count, |i, _| h[i] * weight[i] * denominator[i]);
+        let fitted = &basis * (basis.adjoint() * &target);
+        let c = HALF_WINDOW;
+        // The first and the last window speak for the ends of the band too.
+        let first_line = if centre == HALF_WINDOW { 0 } else { c };
+        let last_line = if centre == last { count - 1 } else { c };
+        for i in first_line..=last_line {
+            let smooth = fitted[i] / (weight[i] * denominator[i]);
+            if smooth.is_finite() {
+                local.smooth[range.start + i] = smooth.norm();
+            }
+        }
+        let leverage: f64 = basis.row(c).iter().map(|b| b.norm_sqr()).sum();
+        let freedom = 1.0 - leverage - shared;
+        let unit = weight[c] * denominator[c];
+        if freedom > 0.1 && unit.norm() > 0.0 {
+            let smooth = fitted[c] / unit;
+            let variance = (h[c] - smooth).norm_sqr() / freedom;
+            if variance.is_finite() && smooth.is_finite() {
+                local.departures.push(Departure {
+                    magnitude: smooth.norm(),
+                    variance,
+                });
+            }
+        }
+    }
+}
+
+/// Weight of each line: the reciprocal of |denominator| times the magnitude, so that the error is relative. The
+/// magnitude is averaged over neighbouring lines (with a floor), or else the noise would weigh itself.
+fn weights(h: &[Complex64], denominator: &[Complex64]) -> Vec<f64> {
+    const REACH: usize = 3;
+    let mean_square = |h: &[Complex64]| h.iter().map(|v| v.norm_sqr()).sum::<f64>() / h.len() as f64;
+    let floor = 0.1 * mean_square(h);
+    (0..h.len())
+        .map(|i| {
+            let near = &h[i.saturating_sub(REACH)..(i + REACH + 1).min(h.len())];
+            let magnitude = (mean_square(near) + floor).sqrt();
+            1.0 / (denominator[i].norm() * magnitude.max(f64::MIN_POSITIVE))
+        })
+        .collect()
+}
+
+/// Orthonormal basis of the weighted numerator polynomials, lines × coefficients.
+fn numerator_basis(x: &[f64], weight: &[f64]) -> Option<DMatrix<Complex64>> {
+    let polynomials = DMatrix::from_fn(x.len(), NUMERATOR, |i, j| {
+        Complex64::new(weight[i] * x[i].powi(j as i32), 0.0)
+    });
+    let q = polynomials.qr().q();
+    q.iter().all(|v| v.is_finite()).then_some(q)
+}
+
+/// Maximum likelihood of σ² = a²|H|² + b² for exponentially distributed squares (complex Gaussian noise), by
+/// iteratively reweighted least squares; squares beyond `CUT` times their mean are taken for misfit and trimmed with
+/// the bias that this brings taken back out.
+fn fit_law(departures: &[Departure]) -> Option<FrfNoise> {
+    /// P(square > 7 × mean) is 1e-3 for noise: what lies beyond is no noise.
+    const CUT: f64 = 7.0;
+    if departures.len() < 20 {
+        return None;
+    }
+    let scale = departures.iter().map(|d| d.magnitude).fold(0.0, f64::max);
+    let mut sorted: Vec<f64> = departures.iter().map(|d| d.variance).collect();
+    sorted.sort_by(f64::total_cmp);
+    // Start: all floor, from the median of an exponential distribution.
+    let mut law = FrfNoise {
+        relative: 0.0,
+        floor: (sorted[sorted.len() / 2] / std::f64::consts::LN_2).sqrt(),
+    };
+    if !(scale > 0.0) || !law.floor.is_finite() || law.floor <= 0.0 {
+        return None;
+    }
+    // Mean of an exponential variable given that it is below CUT times its mean.
+    let kept_mean = 1.0 - CUT / (CUT.exp() - 1.0);
+    for pass in 0..60 {
+        let (mut s, mut r) = ([[0.0; 2]; 2], [0.0; 2]);
+        for d in departures {
+            let mean = law.std(d.magnitude).powi(2);
+            // The first passes know only a crude law: do not trim by it.
+            if pass > 4 && d.variance > CUT * mean {
+                continue;
+            }
+            let variance = if pass > 4 {
+                d.variance / kept_mean
+            } else {
+                d.variance
+            };
+            let w = 1.0 / (mean * mean);
+            let u = [d.magnitude * d.magnitude, 1.0];
+            for i in 0..2 {
+                r[i] += w * u[i] * variance;
+                for j in 0..2 {
+                    s[i][j] += w * u[i] * u[j];
+                }
+            }
+        }
+        let determinant = s[0][0] * s[1][1] - s[0][1] * s[1][0];
+        let mut a2 = (r[0] * s[1][1] - r[1] * s[0][1]) / determinant;
+        let mut b2 = (r[1] * s[0][0] - r[0] * s[1][0]) / determinant;
+        // Neither part may be negative: then the other one alone carries the noise.
+        if !(a2 > 0.0) {
+            a2 = 0.0;
+            b2 = r[1] / s[1][1];
+        } else if !(b2 > 0.0) {
+            b2 = 0.0;
+            a2 = r[0] / s[0][0];
+        }
+        if !a2.is_finite() || !b2.is_finite() || a2 + b2 <= 0.0 {
+            return None;
+        }
+        // Never exactly zero: a line of zero noise would get all the weight there is.
+        let smallest = 1e-12 * scale * scale;
+        let next = FrfNoise {
+            relative: a2.sqrt(),
+            floor: b2.max(smallest).sqrt(),
+        };
+        let settled = (next.relative - law.relative).abs() < 1e-6 * next.relative.max(1e-9)
+            && (next.floor - law.floor).abs() < 1e-6 * next.floor;
+        law = next;
+        if settled && pass > 6 {
+            break;
+        }
+    }
+    Some(law)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// Four robot-like FRFs with known noise: both parts of the law come back.
+    #[test]
+    fn relative_noise_and_floor_are_recovered() {
+        let frequency: Vec<f64> = (0..436).map(|k| 3.0 + 0.2 * k as f64).collect();
+        let modes = [
+            (7.6, 0.03),
+            (9.2, 0.03),
+            (13.7, 0.03),
+            (19.0, 0.03),
+            (24.0, 0.03),
+            (81.0, 0.03),
+        ];
+        let (relative, floor) = (0.025, 2e-8);
+        let mut random = ChaCha8Rng::seed_from_u64(7);
+        let mut gauss = || -> f64 {
+            // Box–Muller
+            let (u, v): (f64, f64) = (random.random_range(1e-12..1.0), random.random());
+            (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+        };
+        let frfs: Vec<Vec<Complex64>> = (0..8)
+            .map(|k| {
+                frequency
+                    .iter()
+                    .map(|f| {
+                        let h: Complex64 = modes
+                            .iter()
+                            .enumerate()
+                            .map(|(m, (f0, zeta))| {
+                                let shape = ((k * 3 + m * 5) as f64).sin();
+                                let r = f / f0;
+                                shape * 5e-7 * (10.0 / f0).powi(2)
+                                    / Complex64::new(1.0 - r * r, 2.0 * zeta * r)
+                            })
+                            .sum();
+                        let std = (relative * h.norm()).hypot(floor) / 2f64.sqrt();
+                        h + Complex64::new(gauss(), gauss()) * std
+                    })
+                    .collect()
+            })
+            .collect();
+        let slices: Vec<&[Complex64]> = frfs.iter().map(|f| f.as_slice()).collect();
+        let laws: Vec<FrfNoise> = estimate(&frequency, &slices)
+            .into_iter()
+            .flatten()
+            .map(|e| e.law)
+            .collect();
+        assert_eq!(laws.len(), frfs.len());
+        let mean = |f: fn(&FrfNoise) -> f64| laws.iter().map(f).sum::<f64>() / laws.len() as f64;
+        let (a, b) = (mean(|l| l.relative), mean(|l| l.floor));
+        assert!((b / floor - 1.0).abs() < 0.06, "floor {b}");
+    }
+
+    #[test]
+    fn too_few_or_constant_lines_give_no_law() {
+        let f: Vec<f64> = (0..10).map(|k| k as f64).collect();
+        assert!(estimate(&f, &[&[Complex64::ONE; 10]])[0].is_none());
+        let f = vec![5.0; 40];
+        assert!(estimate(&f, &[&[Complex64::ONE; 40]])[0].is_none());
+    }
+}

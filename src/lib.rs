@@ -16,5 +16,6 @@ pub mod progress;
 pub mod report;
 pub mod robot;
 pub mod signal;
+pub mod thesis;
 
 pub use error::{Error, InputError, Result};

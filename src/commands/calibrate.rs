@@ -1,13 +1,104 @@
+use serde_json::json;
+
+use super::text::{number, percent, table, warnings};
 use super::{CampaignArg, Outcome};
-use crate::{Error, Result};
+use crate::Result;
+use crate::campaign::Campaign;
+use crate::discrepancy::FrfComparison;
+use crate::identify::calibrate::calibrate;
+use crate::identify::{Calibration, Options, StructureCase};
 
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
     campaign: CampaignArg,
+    /// Further starting points, tried where the first fit leaves more than noise.
+    #[arg(long, default_value_t = Options::default().extra_starts)]
+    starts: usize,
+    /// Seed of those starting points.
+    #[arg(long, default_value_t = Options::default().seed)]
+    seed: u64,
 }
 
 pub fn run(args: Args) -> Result<Outcome> {
-    let _ = args.campaign.dir;
-    Err(Error::computation("calibrate is not built yet"))
+    let campaign = Campaign::load(&args.campaign.dir)?;
+    let case = StructureCase::load(&campaign)?;
+    let options = Options {
+        extra_starts: args.starts,
+        seed: args.seed,
+    };
+    let calibration = calibrate(&case.model, &case.data, options)?;
+    let compare = |theta: &[f64]| -> Result<FrfComparison> {
+        let predicted = case.model.predict(theta, &case.data)?;
+        Ok(FrfComparison::new(&case.data, &case.model.points, &predicted))
+    };
+    let before = compare(&case.model.nominal_theta())?;
+    let after = compare(&calibration.theta)?;
+    let mut notes = case.warnings.clone();
+    notes.extend(calibration.warnings());
+    let json = json!({
+        "domain": "structure",
+        "parameters": calibration.parameters,
+        "error": after.totals,
+        "error_before": before.totals,
+        "iterations": calibration.iterations,
+        "converged": calibration.converged,
+        "reduced_chi2": calibration.reduced_chi2,
+        "starts": calibration.starts,
+        "starts_agreeing": calibration.starts_agreeing,
+        "warnings": notes,
+    });
+    let mut text = describe_parameters(&calibration);
+    text += &format!(
+        "\nerror (nrms) {} -> {}, noise floor {}; {} in {} iterations\n",
+        percent(before.totals.nrms),
+        percent(after.totals.nrms),
+        percent(after.totals.noise_floor_nrms),
+        if calibration.converged {
+            "converged"
+        } else {
+            "NOT converged"
+        },
+        calibration.iterations,
+    );
+    text += &warnings(&notes);
+    text += &next_step(&campaign, &after);
+    Ok(Outcome { json, text })
+}
+
+fn describe_parameters(calibration: &Calibration) -> String {
+    let rows: Vec<Vec<String>> = calibration
+        .parameters
+        .iter()
+        .map(|p| {
+            vec![
+                p.name.clone(),
+                number(p.initial, 4),
+                number(p.value, 5),
+                number(p.std_error, 2),
+                p.unit.to_string(),
+                format!("{:+.1} %", 100.0 * (p.value / p.initial - 1.0)),
+            ]
+        })
+        .collect();
+    table(
+        &[
+            "parameter",
+            "robot file",
+            "fitted",
+            "± std error",
+            "unit",
+            "change",
+        ],
+        &rows,
+    )
+}
+
+fn next_step(campaign: &Campaign, after: &FrfComparison) -> String {
+    let dir = campaign.dir.display();
+    if after.totals.nrms > 1.1 * after.totals.noise_floor_nrms {
+        format!("\nThe model leaves more than noise. See where it fails: lobestone compare {dir}\n")
+    } else {
+        format!("\nWhat is left is noise. Next: lobestone lobes {dir}, or lobestone report {dir}\n")
+    }
 }

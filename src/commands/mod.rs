@@ -16,6 +16,7 @@ mod lobes;
 mod modal;
 mod model;
 mod report;
+mod text;
 mod thesis;
 
 /// What a command has to say: the document of the contract, and the same for a person.

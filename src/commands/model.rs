@@ -1,13 +1,129 @@
+use serde_json::{Value, json};
+
+use super::text::{number, table, warnings};
 use super::{CampaignArg, Outcome};
-use crate::{Error, Result};
+use crate::campaign::Campaign;
+use crate::identify::case::structure_model;
+use crate::identify::{Options, StructureCase, StructureModel, calibrate::calibrate};
+use crate::robot::{Dual, PostureReport, export};
+use crate::{InputError, Result};
 
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
     campaign: CampaignArg,
+    /// Add the 6n×6n stiffness and mass matrices in centre-of-mass coordinates (k_c, m_c).
+    #[arg(long)]
+    matrices: bool,
+    /// Let the links bend with this Young's modulus (rigid links if left out; --matrices takes 200e9 then).
+    #[arg(long, value_name = "PA")]
+    young_pa: Option<f64>,
 }
 
+/// Young's modulus of the links where the matrices need one and nobody has said: steel.
+const STEEL_PA: f64 = 200e9;
+
 pub fn run(args: Args) -> Result<Outcome> {
-    let _ = args.campaign.dir;
-    Err(Error::computation("model is not built yet"))
+    if let Some(young) = args.young_pa.filter(|y| !(*y > 0.0 && y.is_finite())) {
+        return Err(InputError::new(format!("{young} is no Young's modulus"))
+            .key("--young-pa")
+            .remedy("give pascals, e.g. 200e9")
+            .into());
+    }
+    let campaign = Campaign::load(&args.campaign.dir)?;
+    let model = structure_model(&campaign)?;
+    let nominal = postures(&campaign, &model, &model.nominal_theta(), &args)?;
+    let mut json = json!({ "robot": model.robot.spec.name, "postures": nominal });
+    let mut text = format!(
+        "{}, as the robot file has it\n{}",
+        model.robot.spec.name,
+        describe(&nominal)
+    );
+    if !campaign.frfs.is_empty() {
+        let case = StructureCase::load(&campaign)?;
+        let calibration = calibrate(&case.model, &case.data, Options::default())?;
+        let after = postures(&campaign, &case.model, &calibration.theta, &args)?;
+        text += "\nafter calibration on the measured FRFs\n";
+        text += &describe(&after);
+        text += &warnings(&case.warnings);
+        json["calibrated_postures"] = after.into();
+        json["warnings"] = case.warnings.into();
+    }
+    Ok(Outcome { json, text })
+}
+
+fn postures(campaign: &Campaign, model: &StructureModel, theta: &[f64], args: &Args) -> Result<Vec<Value>> {
+    let mut baseline = model.baseline(theta, false);
+    baseline.young_pa = args.young_pa.map(Dual::constant);
+    campaign
+        .postures
+        .iter()
+        .map(|posture| {
+            let kinematics = model.robot.kinematics(&posture.joints_deg)?;
+            let report = PostureReport::new(&model.robot, &kinematics, &baseline)?;
+            let mut value = json!({
+                "id": posture.id,
+                "natural_frequencies_hz": report.natural_frequencies_hz,
+                "tcp_m": report.tcp_m,
+                "tool_axis": report.tool_axis,
+                "tcp_stiffness_n_per_m": axes(report.tcp_stiffness_n_per_m),
+                "flange_stiffness_n_per_m": axes(report.flange_stiffness_n_per_m),
+            });
+            if args.matrices {
+                let mut bending = baseline.clone();
+                bending.young_pa.get_or_insert_with(|| Dual::constant(STEEL_PA));
+                let form = export::centre_of_mass_form(&model.robot.chain(&kinematics, &bending))?;
+                value["k_c"] = rows(&form.stiffness);
+                value["m_c"] = rows(&form.mass);
+            }
+            Ok(value)
+        })
+        .collect()
+}
+
+fn axes([x, y, z]: [f64; 3]) -> Value {
+    json!({ "x": x, "y": y, "z": z })
+}
+
+fn rows(matrix: &nalgebra::DMatrix<f64>) -> Value {
+    matrix
+        .row_iter()
+        .map(|row| row.iter().copied().collect::<Vec<f64>>())
+        .collect::<Vec<_>>()
+        .into()
+}
+
+fn describe(postures: &[Value]) -> String {
+    let stiffness = |p: &Value, key: &str, axis: &str| number(p[key][axis].as_f64().unwrap_or(0.0) / 1e6, 4);
+    let rows: Vec<Vec<String>> = postures
+        .iter()
+        .map(|p| {
+            let frequencies: Vec<String> = p["natural_frequencies_hz"]
+                .as_array()
+                .into_iter()
+                .flatten()
+                .take(6)
+                .map(|f| format!("{:.2}", f.as_f64().unwrap_or(0.0)))
+                .collect();
+            let mut row = vec![p["id"].as_str().unwrap_or("").to_string()];
+            for key in ["tcp_stiffness_n_per_m", "flange_stiffness_n_per_m"] {
+                for axis in ["x", "y", "z"] {
+                    row.push(stiffness(p, key, axis));
+                }
+            }
+            row.push(frequencies.join(" "));
+            row
+        })
+        .collect();
+    let header = [
+        "posture",
+        "tool Kx",
+        "Ky",
+        "Kz MN/m",
+        "flange Kx",
+        "Ky",
+        "Kz MN/m",
+        "natural frequencies Hz",
+    ];
+    table(&header, &rows)
 }

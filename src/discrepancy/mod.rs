@@ -1,1 +1,5 @@
 //! Where the model fails: comparison of model and measurement.
+
+pub mod compare;
+
+pub use compare::{Band, FrfComparison, held_out_nrms};

@@ -60,6 +60,29 @@ pub struct Calibration {
     pub starts_agreeing: usize,
 }
 
+impl Calibration {
+    /// What the user should know of the fit before believing it.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if !self.converged {
+            warnings.push("the fit did not converge: treat the parameters with care".to_string());
+        }
+        for p in self.parameters.iter().filter(|p| p.at_bound) {
+            warnings.push(format!(
+                "{} stopped at the end of its range ({:.4e} {}): the model or the robot file is wrong there",
+                p.name, p.value, p.unit
+            ));
+        }
+        if self.starts > 1 && self.starts_agreeing < 2 {
+            warnings.push(format!(
+                "only one of {} starting points led to this fit: there may be a better one (try --starts 20)",
+                self.starts
+            ));
+        }
+        warnings
+    }
+}
+
 /// Misfit above which noise alone is not credible any more and further starting points are tried.
 const SUSPICIOUS_CHI2: f64 = 1.15;
 /// Lines used to get near the answer: every how many.

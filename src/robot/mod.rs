@@ -13,6 +13,7 @@ pub mod export;
 pub(crate) mod fixture;
 pub mod frf;
 pub mod model;
+pub mod posture_report;
 pub mod spec;
 
 pub use chain::{Body, Branch, Chain, Element, Place, Slot, System};
@@ -20,4 +21,5 @@ pub use dh::Kinematics;
 pub use dual::Dual;
 pub use frf::{FrfBasis, ModalBasis};
 pub use model::{Baseline, RobotModel};
+pub use posture_report::PostureReport;
 pub use spec::*;

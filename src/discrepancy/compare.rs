@@ -1,0 +1,280 @@
+//! Model against measured FRFs: totals, and by posture, direction, point and band.
+
+use num_complex::Complex64;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::Result;
+use crate::campaign::Point;
+use crate::identify::calibrate::refine;
+use crate::identify::{FrfData, StructureModel};
+use crate::progress::Progress;
+
+/// Error over everything compared.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ErrorTotals {
+    /// sqrt(Σ|model − measured|² / Σ|measured|²).
+    pub nrms: f64,
+    /// Mean of |20 log10(|model| / |measured|)|, dB.
+    pub mean_abs_db: f64,
+    /// nrms of a perfect model: the measurement's own noise.
+    pub noise_floor_nrms: f64,
+}
+
+/// Error within a frequency band.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Band {
+    pub from_hz: f64,
+    pub to_hz: f64,
+    pub nrms: f64,
+    pub noise_floor_nrms: f64,
+}
+
+/// Error of one group of FRFs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Group {
+    pub name: String,
+    pub nrms: f64,
+}
+
+/// The error map: postures × directions × bands, nrms; `None` where nothing was measured.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ErrorMap {
+    pub postures: Vec<String>,
+    pub directions: Vec<String>,
+    /// Edges, Hz: one more than there are bands.
+    pub band_edges_hz: Vec<f64>,
+    /// `[posture][direction][band]`.
+    pub nrms: Vec<Vec<Vec<Option<f64>>>>,
+}
+
+/// Model against measurement, FRFs as receptance on the measured lines.
+#[derive(Debug, Clone)]
+pub struct FrfComparison {
+    pub totals: ErrorTotals,
+    pub by_posture: Vec<Group>,
+    /// Response axis, reference axis: `XX`, `XY`, …
+    pub by_direction: Vec<Group>,
+    /// Node number of the response.
+    pub by_point: Vec<Group>,
+    pub by_band: Vec<Band>,
+    pub map: ErrorMap,
+    /// Each FRF's own nrms, worst first.
+    pub by_frf: Vec<Group>,
+}
+
+/// Sums behind an nrms.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    error: f64,
+    noise: f64,
+    signal: f64,
+}
+
+impl Sums {
+    fn add(&mut self, other: Sums) {
+        self.error += other.error;
+        self.noise += other.noise;
+        self.signal += other.signal;
+    }
+
+    fn nrms(&self) -> f64 {
+        ratio(self.error, self.signal)
+    }
+
+    fn floor(&self) -> f64 {
+        ratio(self.noise, self.signal)
+    }
+}
+
+fn ratio(part: f64, whole: f64) -> f64 {
+    if whole > 0.0 { (part / whole).sqrt() } else { 0.0 }
+}
+
+/// Sums by name, in order of first appearance.
+#[derive(Default)]
+struct Groups(Vec<(String, Sums)>);
+
+impl Groups {
+    fn add(&mut self, name: &str, sums: Sums) {
+        match self.0.iter_mut().find(|(n, _)| n == name) {
+            Some((_, s)) => s.add(sums),
+            None => self.0.push((name.to_string(), sums)),
+        }
+    }
+
+    fn finish(self) -> Vec<Group> {
+        self.0
+            .into_iter()
+            .map(|(name, s)| Group { name, nrms: s.nrms() })
+            .collect()
+    }
+}
+
+/// Number of bands the measured range is divided into, equal on a logarithmic scale.
+const BANDS: usize = 10;
+
+fn band_edges_hz(data: &FrfData) -> Vec<f64> {
+    let all = || data.blocks.iter().flat_map(|b| b.frequency_hz.iter().copied());
+    let high = all().fold(0.0, f64::max);
+    let low = all().filter(|f| *f > 0.0).fold(high, f64::min).max(1e-3 * high);
+    let ratio = (high / low).max(1.0 + 1e-9);
+    (0..=BANDS)
+        .map(|i| low * ratio.powf(i as f64 / BANDS as f64))
+        .collect()
+}
+
+fn band_of(edges: &[f64], frequency_hz: f64) -> usize {
+    edges[1..edges.len() - 1]
+        .iter()
+        .take_while(|e| frequency_hz >= **e)
+        .count()
+}
+
+impl FrfComparison {
+    /// `predicted`: in the order of `data.frfs()`, on the same lines.
+    pub fn new(data: &FrfData, points: &[Point], predicted: &[Vec<Complex64>]) -> Self {
+        let edges = band_edges_hz(data);
+        let mut total = Sums::default();
+        let (mut decibel, mut decibel_count) = (0.0, 0usize);
+        let (mut by_posture, mut by_direction, mut by_point) =
+            (Groups::default(), Groups::default(), Groups::default());
+        let mut bands = vec![Sums::default(); BANDS];
+        let mut by_frf = Vec::new();
+        let mut cells: Vec<(String, String, usize, Sums)> = Vec::new();
+        for ((block, frf), model) in data.frfs().zip(predicted) {
+            let posture = &data.posture_ids[frf.posture];
+            let direction = format!("{}{}", frf.response.axis.letter(), frf.reference.axis.letter());
+            let mut own = Sums::default();
+            let mut own_bands = vec![Sums::default(); BANDS];
+            for (k, (h, m)) in frf.receptance.iter().zip(model).enumerate() {
+                let line = Sums {
+                    error: (m - h).norm_sqr(),
+                    noise: frf.noise_std[k].powi(2),
+                    signal: h.norm_sqr(),
+                };
+                own.add(line);
+                own_bands[band_of(&edges, block.frequency_hz[k])].add(line);
+                if h.norm() > 0.0 && m.norm() > 0.0 {
+                    decibel += (20.0 * (m.norm() / h.norm()).log10()).abs();
+                    decibel_count += 1;
+                }
+            }
+            total.add(own);
+            by_posture.add(posture, own);
+            by_direction.add(&direction, own);
+            by_point.add(&points[frf.response.point].node.to_string(), own);
+            by_frf.push(Group {
+                name: frf.name.clone(),
+                nrms: own.nrms(),
+            });
+            for (band, sums) in own_bands.iter().enumerate() {
+                bands[band].add(*sums);
+                cells.push((posture.clone(), direction.clone(), band, *sums));
+            }
+        }
+        by_frf.sort_by(|a, b| b.nrms.total_cmp(&a.nrms));
+        let by_posture = by_posture.finish();
+        let by_direction = by_direction.finish();
+        let map = error_map(&by_posture, &by_direction, &edges, &cells);
+        FrfComparison {
+            totals: ErrorTotals {
+                nrms: total.nrms(),
+                mean_abs_db: if decibel_count > 0 {
+                    decibel / decibel_count as f64
+                } else {
+                    0.0
+                },
+                noise_floor_nrms: total.floor(),
+            },
+            by_posture,
+            by_direction,
+            by_point: by_point.finish(),
+            by_band: bands
+                .iter()
+                .enumerate()
+                .filter(|(_, s)| s.signal > 0.0)
+                .map(|(i, s)| Band {
+                    from_hz: edges[i],
+                    to_hz: edges[i + 1],
+                    nrms: s.nrms(),
+                    noise_floor_nrms: s.floor(),
+                })
+                .collect(),
+            map,
+            by_frf,
+        }
+    }
+}
+
+fn error_map(
+    postures: &[Group],
+    directions: &[Group],
+    edges: &[f64],
+    cells: &[(String, String, usize, Sums)],
+) -> ErrorMap {
+    let mut sums = vec![vec![vec![Sums::default(); BANDS]; directions.len()]; postures.len()];
+    for (posture, direction, band, cell) in cells {
+        let p = postures.iter().position(|g| g.name == *posture);
+        let d = directions.iter().position(|g| g.name == *direction);
+        if let (Some(p), Some(d)) = (p, d) {
+            sums[p][d][*band].add(*cell);
+        }
+    }
+    let nrms = |s: &Sums| (s.signal > 0.0).then(|| s.nrms());
+    ErrorMap {
+        postures: postures.iter().map(|g| g.name.clone()).collect(),
+        directions: directions.iter().map(|g| g.name.clone()).collect(),
+        band_edges_hz: edges.to_vec(),
+        nrms: sums
+            .iter()
+            .map(|p| p.iter().map(|d| d.iter().map(nrms).collect()).collect())
+            .collect(),
+    }
+}
+
+/// nrms on postures that were left out of the fit, one posture at a time, each fit started from `theta`.
+/// `None` with fewer than two measured postures.
+pub fn held_out_nrms(model: &StructureModel, data: &FrfData, theta: &[f64]) -> Result<Option<f64>> {
+    let postures = data.measured_postures();
+    if postures.len() < 2 {
+        return Ok(None);
+    }
+    let progress = Progress::new("held-out fits", postures.len());
+    let sums: Vec<Sums> = postures
+        .par_iter()
+        .map(|&left_out| {
+            let fit = refine(model, &data.filtered(|p| p != left_out), theta)?;
+            let rest = data.filtered(|p| p == left_out);
+            let predicted = model.predict(&fit.theta, &rest)?;
+            let mut sums = Sums::default();
+            for ((_, frf), model) in rest.frfs().zip(&predicted) {
+                for (h, m) in frf.receptance.iter().zip(model) {
+                    sums.error += (m - h).norm_sqr();
+                    sums.signal += h.norm_sqr();
+                }
+            }
+            progress.step();
+            Ok(sums)
+        })
+        .collect::<Result<_>>()?;
+    let mut total = Sums::default();
+    for s in sums {
+        total.add(s);
+    }
+    Ok(Some(total.nrms()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_cover_the_range_without_gaps() {
+        let edges = [3.0, 6.0, 12.0, 24.0];
+        assert_eq!(band_of(&edges, 3.0), 0);
+        assert_eq!(band_of(&edges, 5.99), 0);
+        assert_eq!(band_of(&edges, 6.0), 1);
+        assert_eq!(band_of(&edges, 24.0), 2);
+    }
+}

@@ -6,7 +6,7 @@ use super::bounds::Bounds;
 use super::document::{Document, Section};
 use super::lobes_section::{self, immersion};
 use super::schema::*;
-use super::suggest::{closest, shown};
+use super::suggest::shown;
 use super::{ROBOT_KEY, campaign_file, paths};
 use crate::ingest::Quantity;
 use crate::robot::RobotSpec;
@@ -269,9 +269,14 @@ fn frfs(dir: &Path, top: &Section<'_>, postures: &[Posture]) -> Result<Vec<FrfFi
 pub(super) fn posture_ref(section: &Section<'_>, postures: &[Posture]) -> Result<usize> {
     let id = section.required("posture", section.text("posture")?, "\"p1\"")?;
     postures.iter().position(|p| p.id == id).ok_or_else(|| {
-        let remedy = match closest(id, postures.iter().map(|p| p.id.as_str())) {
-            Some(near) => format!("did you mean {near:?}?"),
-            None => format!("add a [[posture]] with id = {:?}", shown(id)),
+        // Ids are alike (p1, p2): a guess would often be another posture.
+        let some: Vec<&str> = postures.iter().take(10).map(|p| p.id.as_str()).collect();
+        let remedy = match some[..] {
+            [] => format!("add a [[posture]] with id = {:?}", shown(id)),
+            _ => format!(
+                "name one that is there ({}), or add it as a [[posture]]",
+                shown(&some.join(", "))
+            ),
         };
         section
             .error(

@@ -9,7 +9,8 @@ mod load;
 mod lobes_section;
 pub mod paths;
 pub mod schema;
-mod suggest;
+mod section;
+pub mod suggest;
 
 pub use frf_set::{FrfSet, MeasuredDof, MeasuredFrf};
 pub use schema::*;

@@ -67,8 +67,24 @@ fn missing_remedy(dir: &Path, text: &str) -> String {
         .collect();
     // The order of a directory is the file system's affair; the message is not.
     there.sort();
+    // The same name with another ending, or a slip; but `p2` for a missing `p1` is another measurement.
+    let digits = |name: &str| name.chars().filter(char::is_ascii_digit).collect::<String>();
     let wanted = relative.file_name().and_then(|n| n.to_str()).unwrap_or("");
-    match closest(wanted, there.iter().map(String::as_str)) {
+    let stem = |name: &str| Path::new(name).file_stem().map(|s| s.to_owned());
+    let near = there
+        .iter()
+        .find(|name| !wanted.is_empty() && stem(name) == stem(wanted))
+        .map(String::as_str)
+        .or_else(|| {
+            closest(
+                wanted,
+                there
+                    .iter()
+                    .map(String::as_str)
+                    .filter(|n| digits(n) == digits(wanted)),
+            )
+        });
+    match near {
         Some(near) => format!("did you mean {}?", shown(&folder.join(near).to_string_lossy())),
         None => "copy the file there, or correct the path (it counts from the folder of campaign.toml)"
             .to_string(),
@@ -139,6 +155,8 @@ mod tests {
         let remedy = |text| inside(&c, text).unwrap_err().remedy.unwrap();
         assert_eq!(remedy("frf/P1.uff"), "did you mean frf/p1.uff?");
         assert_eq!(remedy("frf\\p1.uff"), "write it with forward slashes: frf/p1.uff");
+        assert_eq!(remedy("frf/p1.csv"), "did you mean frf/p1.uff?");
+        assert!(remedy("frf/p2.uff").starts_with("copy the file"));
         assert!(remedy("frf/other.csv").starts_with("copy the file"));
     }
 }

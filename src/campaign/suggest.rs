@@ -1,12 +1,22 @@
 //! What the writer may have meant.
 
-/// The candidate nearest to `word`, if one is near enough to be a slip of the finger.
+/// The candidate nearest to `word`, if one is near enough to be a slip of the finger or only has more
+/// behind it: most often the unit (`helix` for `helix_deg`).
 pub fn closest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     // A longer word is no slip, and the distance costs length × length.
     if word.len() > 64 {
         return None;
     }
     let word = word.to_lowercase();
+    let candidates: Vec<&str> = candidates.into_iter().collect();
+    let unit_left_out = |candidate: &&&str| {
+        candidate
+            .strip_prefix(word.as_str())
+            .is_some_and(|rest| rest.starts_with('_'))
+    };
+    if let Some(longer) = candidates.iter().find(unit_left_out) {
+        return Some(longer);
+    }
     candidates
         .into_iter()
         .map(|candidate| (distance(&word, &candidate.to_lowercase()), candidate))
@@ -55,6 +65,7 @@ mod tests {
         assert_eq!(closest("feeed_per_tooth_mm", keys), Some("feed_per_tooth_mm"));
         assert_eq!(closest("Feed_per_rev_mm", keys), Some("feed_per_rev_mm"));
         assert_eq!(closest("fiel", keys), Some("file"));
+        assert_eq!(closest("feed_per_tooth", keys), Some("feed_per_tooth_mm"));
         assert_eq!(closest("operator", keys), None);
         assert_eq!(closest(&"x".repeat(100_000), keys), None);
     }

@@ -5,6 +5,7 @@ use std::path::Path;
 use super::spec::*;
 use crate::campaign::bounds::Bounds;
 use crate::campaign::document::{Document, Section};
+use crate::campaign::suggest::closest;
 use crate::campaign::{ROBOT_KEY, campaign_file, paths};
 use crate::{InputError, Result};
 
@@ -39,11 +40,17 @@ impl RobotSpec {
         }
         let path = paths::inside(campaign_dir, model).map_err(|found| {
             let names = BUILT_IN.map(|(name, _)| name).join(", ");
-            let remedy = found.remedy.as_deref().unwrap_or_default();
+            let remedy = match closest(model, BUILT_IN.map(|(name, _)| name)) {
+                Some(near) => format!("did you mean {near}?"),
+                None => format!(
+                    "built-in robots: {names}; else {}",
+                    found.remedy.unwrap_or_default()
+                ),
+            };
             InputError::new(format!("no built-in robot, and as a file: {}", found.problem))
                 .file(campaign_file(campaign_dir))
                 .key(ROBOT_KEY)
-                .remedy(format!("{remedy} (built-in robots: {names})"))
+                .remedy(remedy)
         })?;
         parse(&Document::read(&path)?)
     }

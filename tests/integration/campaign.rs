@@ -10,114 +10,7 @@ use lobestone::{Error, InputError};
 use proptest::prelude::*;
 
 /// Every key of the contract.
-const FULL: &str = r#"schema = "lobestone/campaign/1"
-name = "cell 7, spring check"
-
-[robot]
-model = "irb6640"
-mass_tolerance = 0.05
-stiffness_tolerance = 0.4
-
-[[posture]]
-id = "p1"
-joints_deg = [135.0, -2.0, 53.0, 83.0, 30.0, -117.0]
-
-[[posture]]
-id = "p2"
-joints_deg = [135, 20, 26, 30, 80, -150]
-
-[[point]]
-node = 1
-body = "tool"
-position_m = [0.0, 0.0, 0.0]
-axes = "base"
-
-[[point]]
-node = 12
-body = "link6"
-position_m = [0.0, 0.1, 0.0]
-axes = "body"
-
-[[frf]]
-file = "frf/p1.uff"
-posture = "p1"
-
-[[frf]]
-file = "frf/p2.csv"
-posture = "p2"
-quantity = "accelerance"
-force_level_n = 200.0
-
-[tool]
-kind = "drill"
-diameter_mm = 9.5
-teeth = 2
-helix_deg = 30.0
-half_point_angle_deg = 67.5
-web_thickness_mm = 1.425
-
-[material]
-name = "Ti-6Al-4V"
-
-[dynamometer]
-tool_from_dyno = [[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
-
-[[cut]]
-id = "01"
-file = "force/cut01.txt"
-process = "milling"
-spindle_rpm = 1200.0
-feed_per_tooth_mm = 0.05
-axial_depth_mm = 2.0
-immersion = "slot"
-order = 3
-steady_s = [1.2, 2.6]
-outcome = "chatter"
-
-[[cut]]
-id = "02"
-file = "force/cut02.txt"
-process = "milling"
-spindle_rpm = 1200
-feed_per_tooth_mm = 0.05
-axial_depth_mm = 2.0
-start_deg = 0.0
-exit_deg = 90.0
-
-[[cut]]
-id = "03"
-file = "force/cut01.txt"
-process = "drilling"
-spindle_rpm = 1010.0
-feed_per_rev_mm = 0.05
-pilot_diameter_mm = 3.5
-hole_depth_mm = 8.3
-
-[lobes]
-process = "milling"
-source = "model"
-method = "semi-discretisation"
-ktc_n_per_mm2 = 1014.2
-krc_n_per_mm2 = 619.9
-kac_n_per_mm2 = 58.2
-teeth = 2
-radial_ratio = 0.25
-cut = "down"
-half_point_angle_deg = 67.5
-feed_per_rev_mm = 0.1
-spindle_rpm = [100.0, 1500.0, 1.0]
-
-[[lobes.mode]]
-axis = "x"
-frequency_hz = 603.0
-damping_ratio = 0.039
-stiffness_n_per_m = 5.59e6
-
-[lobes.redundancy]
-posture = "p2"
-step_deg = 5.0
-forbidden_deg = [[200.0, 240.0]]
-"#;
+const FULL: &str = include_str!("../data/campaign_full.toml");
 
 /// A folder with the files that `FULL` names.
 fn folder(toml: impl AsRef<[u8]>) -> tempfile::TempDir {
@@ -244,445 +137,106 @@ fn what_may_be_left_out_has_its_default() {
 
 /// One slip each: what to replace in `FULL`, by what, the key that the error must name, and words of the message.
 /// The line must be the one where the replacement stands (its first line that differs), unless given.
+#[rustfmt::skip]
 const SLIPS: &[(&str, &str, &str, &str)] = &[
     // Names.
     ("name = \"cell", "nmae = \"cell", "nmae", "did you mean name?"),
     ("[material]", "[materials]", "materials", "did you mean material?"),
-    (
-        "helix_deg",
-        "helix",
-        "tool.helix",
-        "take it out; [tool] knows kind, diameter_mm",
-    ),
-    (
-        "axial_depth_mm = 2.0\nimm",
-        "axial_dept_mm = 2.0\nimm",
-        "cut[0].axial_dept_mm",
-        "did you mean axial_depth_mm?",
-    ),
-    (
-        "step_deg",
-        "steps_deg",
-        "lobes.redundancy.steps_deg",
-        "did you mean step_deg?",
-    ),
-    (
-        "axis = \"x\"",
-        "axes = \"x\"",
-        "lobes.mode[0].axes",
-        "did you mean axis?",
-    ),
-    (
-        "id = \"02\"",
-        "id = \"02\"\nid = \"02\"",
-        "cut[1].id",
-        "duplicate key",
-    ),
+    ("helix_deg", "helix", "tool.helix", "did you mean helix_deg?"),
+    ("axial_depth_mm = 2.0\nimm", "axial_dept_mm = 2.0\nimm", "cut[0].axial_dept_mm", "did you mean axial_depth_mm?"),
+    ("step_deg", "steps_deg", "lobes.redundancy.steps_deg", "did you mean step_deg?"),
+    ("axis = \"x\"", "axes = \"x\"", "lobes.mode[0].axes", "did you mean axis?"),
+    ("id = \"02\"", "id = \"02\"\nid = \"02\"", "cut[1].id", "duplicate key"),
     ("[material]", "[tool]", "tool", "duplicate key"),
     // Schema.
-    (
-        "lobestone/campaign/1",
-        "lobestone/campaign/2",
-        "schema",
-        "is not a form this program reads",
-    ),
-    (
-        "\"lobestone/campaign/1\"",
-        "1",
-        "schema",
-        "must be text in quotes, not a whole number",
-    ),
+    ("lobestone/campaign/1", "lobestone/campaign/2", "schema", "is not a form this program reads"),
+    ("\"lobestone/campaign/1\"", "1", "schema", "must be text in quotes, not a whole number"),
     // Syntax.
-    (
-        "teeth = 2\nhelix",
-        "teeth = two\nhelix",
-        "tool.teeth",
-        "not valid TOML",
-    ),
-    (
-        "diameter_mm = 9.5",
-        "diameter_mm = 9,5",
-        "tool.diameter_mm",
-        "not valid TOML",
-    ),
+    ("teeth = 2\nhelix", "teeth = two\nhelix", "tool.teeth", "not valid TOML"),
+    ("diameter_mm = 9.5", "diameter_mm = 9,5", "tool.diameter_mm", "not valid TOML"),
     ("id = \"p2\"", "id = \"p2", "posture[1].id", "not valid TOML"),
     ("[dynamometer]", "[dynamometer", "dynamometer", "not valid TOML"),
     // Types.
-    (
-        "diameter_mm = 9.5",
-        "diameter_mm = \"9.5\"",
-        "tool.diameter_mm",
-        "take the quotes off",
-    ),
-    (
-        "teeth = 2\nhelix",
-        "teeth = 2.0\nhelix",
-        "tool.teeth",
-        "must be a whole number",
-    ),
-    (
-        "[material]\nname = \"Ti-6Al-4V\"",
-        "material = \"steel\"",
-        "tool.material",
-        "unknown key",
-    ),
+    ("diameter_mm = 9.5", "diameter_mm = \"9.5\"", "tool.diameter_mm", "take the quotes off"),
+    ("teeth = 2\nhelix", "teeth = 2.0\nhelix", "tool.teeth", "must be a whole number"),
+    ("[material]\nname = \"Ti-6Al-4V\"", "material = \"steel\"", "tool.material", "unknown key"),
     ("[tool]", "[[tool]]", "tool", "may stand only once"),
     ("id = \"01\"", "id = 1", "cut[0].id", "must be text in quotes"),
     ("id = \"01\"", "id = \" \"", "cut[0].id", "is empty"),
-    (
-        "order = 3",
-        "order = true",
-        "cut[0].order",
-        "must be a whole number, not true or false",
-    ),
-    (
-        "kind = \"drill\"",
-        "kind = \"dril\"",
-        "tool.kind",
-        "did you mean \"drill\"?",
-    ),
+    ("order = 3", "order = true", "cut[0].order", "must be a whole number, not true or false"),
+    ("kind = \"drill\"", "kind = \"dril\"", "tool.kind", "did you mean \"drill\"?"),
     // Robot.
     ("irb6640", "irb664", "robot.model", "no built-in robot"),
-    (
-        "irb6640",
-        "../robot.toml",
-        "robot.model",
-        "leaves the campaign folder",
-    ),
-    (
-        "mass_tolerance = 0.05",
-        "mass_tolerance = -0.05",
-        "robot.mass_tolerance",
-        "at least 0 and at most 1",
-    ),
-    (
-        "stiffness_tolerance = 0.4",
-        "stiffness_tolerance = 0",
-        "robot.stiffness_tolerance",
-        "above 0",
-    ),
+    ("irb6640", "../robot.toml", "robot.model", "leaves the campaign folder"),
+    ("mass_tolerance = 0.05", "mass_tolerance = -0.05", "robot.mass_tolerance", "at least 0 and at most 1"),
+    ("stiffness_tolerance = 0.4", "stiffness_tolerance = 0", "robot.stiffness_tolerance", "above 0"),
     // Postures and points.
-    (
-        "id = \"p2\"",
-        "id = \"p1\"",
-        "posture[1].id",
-        "p1 is taken by posture[0]",
-    ),
-    (
-        "[135, 20, 26, 30, 80, -150]",
-        "[135, 20, 26, 30, 80]",
-        "posture[1].joints_deg",
-        "has 5 angles, but the robot has 6",
-    ),
-    (
-        "[135, 20,",
-        "[135, nan,",
-        "posture[1].joints_deg[1]",
-        "is nan, not a finite number",
-    ),
-    (
-        "[135, 20,",
-        "[135, \"20\",",
-        "posture[1].joints_deg[1]",
-        "take the quotes off",
-    ),
-    (
-        "joints_deg = [135, 20, 26, 30, 80, -150]\n",
-        "",
-        "posture[1].joints_deg",
-        "missing@13",
-    ),
+    ("id = \"p2\"", "id = \"p1\"", "posture[1].id", "p1 is taken by posture[0]"),
+    ("[135, 20, 26, 30, 80, -150]", "[135, 20, 26, 30, 80]", "posture[1].joints_deg", "has 5 angles, but the robot has 6"),
+    ("[135, 20,", "[135, nan,", "posture[1].joints_deg[1]", "is nan, not a finite number"),
+    ("[135, 20,", "[135, \"20\",", "posture[1].joints_deg[1]", "take the quotes off"),
+    ("joints_deg = [135, 20, 26, 30, 80, -150]\n", "", "posture[1].joints_deg", "missing@13"),
     ("node = 12", "node = 1", "point[1].node", "1 is taken by point[0]"),
-    (
-        "\"link6\"",
-        "\"link7\"",
-        "point[1].body",
-        "the robot has no body \"link7\"",
-    ),
-    (
-        "\"link6\"",
-        "\"link06\"",
-        "point[1].body",
-        "\"link1\" to \"link6\"",
-    ),
-    (
-        "[0.0, 0.1, 0.0]",
-        "[0.0, 0.1]",
-        "point[1].position_m",
-        "has 2 numbers, must have 3",
-    ),
-    (
-        "axes = \"body\"",
-        "axes = \"world\"",
-        "point[1].axes",
-        "\"base\", \"body\", \"tool\"",
-    ),
+    ("\"link6\"", "\"link7\"", "point[1].body", "the robot has no body \"link7\""),
+    ("\"link6\"", "\"link06\"", "point[1].body", "\"link1\" to \"link6\""),
+    ("[0.0, 0.1, 0.0]", "[0.0, 0.1]", "point[1].position_m", "has 2 numbers, must have 3"),
+    ("axes = \"body\"", "axes = \"world\"", "point[1].axes", "\"base\", \"body\", \"tool\""),
     // Files.
-    (
-        "frf/p2.csv",
-        "frf/p2.uff",
-        "frf[1].file",
-        "did you mean frf/p1.uff?",
-    ),
+    ("frf/p2.csv", "frf/p2.uff", "frf[1].file", "did you mean frf/p2.csv?"),
     ("frf/p2.csv", "/etc/passwd", "frf[1].file", "is an absolute path"),
-    (
-        "frf/p2.csv",
-        "../p2.csv",
-        "frf[1].file",
-        "leaves the campaign folder",
-    ),
+    ("frf/p2.csv", "../p2.csv", "frf[1].file", "leaves the campaign folder"),
     ("frf/p2.csv", "frf", "frf[1].file", "is not a file"),
-    (
-        "force/cut02.txt",
-        "force/nothing/here.txt",
-        "cut[1].file",
-        "does not exist",
-    ),
-    (
-        "posture = \"p2\"\nquan",
-        "posture = \"p3\"\nquan",
-        "frf[1].posture",
-        "did you mean",
-    ),
-    (
-        "\"accelerance\"",
-        "\"inertance\"",
-        "frf[1].quantity",
-        "\"receptance\", \"mobility\"",
-    ),
-    (
-        "force_level_n = 200.0",
-        "force_level_n = 0.0",
-        "frf[1].force_level_n",
-        "above 0",
-    ),
+    ("force/cut02.txt", "force/nothing/here.txt", "cut[1].file", "does not exist"),
+    ("posture = \"p2\"\nquan", "posture = \"p3\"\nquan", "frf[1].posture", "name one that is there (p1, p2)"),
+    ("\"accelerance\"", "\"inertance\"", "frf[1].quantity", "\"receptance\", \"mobility\""),
+    ("force_level_n = 200.0", "force_level_n = 0.0", "frf[1].force_level_n", "above 0"),
     // Tool and dynamometer.
-    (
-        "teeth = 2\nhelix",
-        "teeth = 0\nhelix",
-        "tool.teeth",
-        "from 1 to 1000",
-    ),
-    (
-        "diameter_mm = 9.5",
-        "diameter_mm = -9.5",
-        "tool.diameter_mm",
-        "is -9.5, out of range",
-    ),
+    ("teeth = 2\nhelix", "teeth = 0\nhelix", "tool.teeth", "from 1 to 1000"),
+    ("diameter_mm = 9.5", "diameter_mm = -9.5", "tool.diameter_mm", "is -9.5, out of range"),
     ("diameter_mm = 9.5\n", "", "tool.diameter_mm", "missing@39"),
-    (
-        "kind = \"drill\"",
-        "kind = \"endmill\"",
-        "tool.half_point_angle_deg",
-        "belongs to a drill@44",
-    ),
-    (
-        "half_point_angle_deg = 67.5\nweb",
-        "half_point_angle_deg = 118.0\nweb",
-        "tool.half_point_angle_deg",
-        "at most 90",
-    ),
-    (
-        "web_thickness_mm = 1.425",
-        "web_thickness_mm = 9.5",
-        "tool.web_thickness_mm",
-        "below 9.5",
-    ),
-    (
-        "[0.0, 0.0, 1.0]]",
-        "[0.0, 0.0, 2.0]]",
-        "dynamometer.tool_from_dyno",
-        "would stretch the forces",
-    ),
-    (
-        "[[0.0, -1.0, 0.0], ",
-        "[[0.0, -1.0], ",
-        "dynamometer.tool_from_dyno[0]",
-        "has 2 numbers, must have 3",
-    ),
-    (
-        ", [0.0, 0.0, 1.0]]",
-        "]",
-        "dynamometer.tool_from_dyno",
-        "has 2 rows, must have 3",
-    ),
-    (
-        "[[0.0, -1.0, 0.0], ",
-        "[[0.0, -1.0, inf], ",
-        "dynamometer.tool_from_dyno[0][2]",
-        "not a finite number",
-    ),
+    ("kind = \"drill\"", "kind = \"endmill\"", "tool.half_point_angle_deg", "belongs to a drill@44"),
+    ("half_point_angle_deg = 67.5\nweb", "half_point_angle_deg = 118.0\nweb", "tool.half_point_angle_deg", "at most 90"),
+    ("web_thickness_mm = 1.425", "web_thickness_mm = 9.5", "tool.web_thickness_mm", "below 9.5"),
+    ("[0.0, 0.0, 1.0]]", "[0.0, 0.0, 2.0]]", "dynamometer.tool_from_dyno", "would stretch the forces"),
+    ("[[0.0, -1.0, 0.0], ", "[[0.0, -1.0], ", "dynamometer.tool_from_dyno[0]", "has 2 numbers, must have 3"),
+    (", [0.0, 0.0, 1.0]]", "]", "dynamometer.tool_from_dyno", "has 2 rows, must have 3"),
+    ("[[0.0, -1.0, 0.0], ", "[[0.0, -1.0, inf], ", "dynamometer.tool_from_dyno[0][2]", "not a finite number"),
     // Cuts.
     ("id = \"02\"", "id = \"01\"", "cut[1].id", "01 is taken by cut[0]"),
-    (
-        "spindle_rpm = 1200.0",
-        "spindle_rpm = 0",
-        "cut[0].spindle_rpm",
-        "above 0",
-    ),
+    ("spindle_rpm = 1200.0", "spindle_rpm = 0", "cut[0].spindle_rpm", "above 0"),
     ("spindle_rpm = 1200.0\n", "", "cut[0].spindle_rpm", "missing@53"),
-    (
-        "feed_per_tooth_mm = 0.05\naxial_depth_mm = 2.0\nimm",
-        "feed_per_tooth_mm = -0.05\naxial_depth_mm = 2.0\nimm",
-        "cut[0].feed_per_tooth_mm",
-        "above 0",
-    ),
-    (
-        "axial_depth_mm = 2.0\nimm",
-        "axial_depth_mm = inf\nimm",
-        "cut[0].axial_depth_mm",
-        "not a finite number",
-    ),
+    ("feed_per_tooth_mm = 0.05\naxial_depth_mm = 2.0\nimm", "feed_per_tooth_mm = -0.05\naxial_depth_mm = 2.0\nimm", "cut[0].feed_per_tooth_mm", "above 0"),
+    ("axial_depth_mm = 2.0\nimm", "axial_depth_mm = inf\nimm", "cut[0].axial_depth_mm", "not a finite number"),
     ("immersion = \"slot\"\n", "", "cut[0].immersion", "missing@53"),
-    (
-        "immersion = \"slot\"",
-        "immersion = \"half\"",
-        "cut[0].immersion",
-        "one of \"slot\"",
-    ),
-    (
-        "start_deg = 0.0",
-        "start_deg = 90.0",
-        "cut[1].exit_deg",
-        "starts at 90 and ends at 90@73",
-    ),
-    (
-        "exit_deg = 90.0",
-        "exit_deg = 270.0",
-        "cut[1].exit_deg",
-        "at most 180",
-    ),
+    ("immersion = \"slot\"", "immersion = \"half\"", "cut[0].immersion", "it must be \"slot\""),
+    ("start_deg = 0.0", "start_deg = 90.0", "cut[1].exit_deg", "starts at 90 and ends at 90@73"),
+    ("exit_deg = 90.0", "exit_deg = 270.0", "cut[1].exit_deg", "at most 180"),
     ("exit_deg = 90.0\n", "", "cut[1].exit_deg", "missing@65"),
-    (
-        "start_deg = 0.0",
-        "immersion = \"slot\"",
-        "cut[1].exit_deg",
-        "said twice, by immersion and by@73",
-    ),
-    (
-        "[1.2, 2.6]",
-        "[2.6, 1.2]",
-        "cut[0].steady_s",
-        "starts at 2.6 s and ends at 1.2 s",
-    ),
-    (
-        "outcome = \"chatter\"",
-        "outcome = \"loud\"",
-        "cut[0].outcome",
-        "\"stable\", \"chatter\"",
-    ),
-    (
-        "process = \"drilling\"",
-        "process = \"milling\"",
-        "cut[2].feed_per_rev_mm",
-        "belongs to drilling@80",
-    ),
+    ("start_deg = 0.0", "immersion = \"slot\"", "cut[1].exit_deg", "said twice, by immersion and by@73"),
+    ("[1.2, 2.6]", "[2.6, 1.2]", "cut[0].steady_s", "starts at 2.6 s and ends at 1.2 s"),
+    ("outcome = \"chatter\"", "outcome = \"loud\"", "cut[0].outcome", "\"stable\", \"chatter\""),
+    ("process = \"drilling\"", "process = \"milling\"", "cut[2].feed_per_rev_mm", "belongs to drilling@80"),
     ("process = \"drilling\"\n", "", "cut[2].process", "missing@75"),
-    (
-        "feed_per_rev_mm = 0.05",
-        "feed_per_rev_mm = 0",
-        "cut[2].feed_per_rev_mm",
-        "above 0",
-    ),
-    (
-        "pilot_diameter_mm = 3.5",
-        "pilot_diameter_mm = 9.5",
-        "cut[2].pilot_diameter_mm",
-        "the tool's diameter is 9.5",
-    ),
-    (
-        "hole_depth_mm = 8.3",
-        "hole_depth_mm = -8.3",
-        "cut[2].hole_depth_mm",
-        "above 0",
-    ),
+    ("feed_per_rev_mm = 0.05", "feed_per_rev_mm = 0", "cut[2].feed_per_rev_mm", "above 0"),
+    ("pilot_diameter_mm = 3.5", "pilot_diameter_mm = 9.5", "cut[2].pilot_diameter_mm", "the tool's diameter is 9.5"),
+    ("hole_depth_mm = 8.3", "hole_depth_mm = -8.3", "cut[2].hole_depth_mm", "above 0"),
     // Lobes.
-    (
-        "source = \"model\"",
-        "source = \"modell\"",
-        "lobes.source",
-        "did you mean \"model\"?",
-    ),
-    (
-        "\"semi-discretisation\"",
-        "\"frequency-domain\"",
-        "lobes.method",
-        "\"zero-order\"",
-    ),
-    (
-        "ktc_n_per_mm2 = 1014.2",
-        "ktc_n_per_mm2 = -1014.2",
-        "lobes.ktc_n_per_mm2",
-        "above 0",
-    ),
-    (
-        "radial_ratio = 0.25",
-        "radial_ratio = 1.5",
-        "lobes.radial_ratio",
-        "at most 1",
-    ),
+    ("source = \"model\"", "source = \"modell\"", "lobes.source", "did you mean \"model\"?"),
+    ("\"semi-discretisation\"", "\"frequency-domain\"", "lobes.method", "\"zero-order\""),
+    ("ktc_n_per_mm2 = 1014.2", "ktc_n_per_mm2 = -1014.2", "lobes.ktc_n_per_mm2", "above 0"),
+    ("radial_ratio = 0.25", "radial_ratio = 1.5", "lobes.radial_ratio", "at most 1"),
     ("cut = \"down\"\n", "", "lobes.cut", "missing@84"),
     ("radial_ratio = 0.25\n", "", "lobes.cut", "needs radial_ratio"),
-    (
-        "cut = \"down\"",
-        "cut = \"climb\"",
-        "lobes.cut",
-        "\"up\", \"down\"",
-    ),
-    (
-        "[100.0, 1500.0, 1.0]",
-        "[0.0, 1500.0, 1.0]",
-        "lobes.spindle_rpm",
-        "starts at 0 rpm",
-    ),
-    (
-        "[100.0, 1500.0, 1.0]",
-        "[1500.0, 100.0, 1.0]",
-        "lobes.spindle_rpm",
-        "runs backwards",
-    ),
-    (
-        "[100.0, 1500.0, 1.0]",
-        "[100.0, 1500.0, 0.0]",
-        "lobes.spindle_rpm",
-        "has the step 0",
-    ),
-    (
-        "[100.0, 1500.0, 1.0]",
-        "[100.0, 1500.0, 1e-9]",
-        "lobes.spindle_rpm",
-        "more than a million speeds",
-    ),
-    (
-        "damping_ratio = 0.039",
-        "damping_ratio = 1.0",
-        "lobes.mode[0].damping_ratio",
-        "above 0 and below 1",
-    ),
-    (
-        "axis = \"x\"",
-        "axis = \"theta\"",
-        "lobes.mode[0].axis",
-        "\"x\", \"y\"",
-    ),
-    (
-        "posture = \"p2\"\nstep",
-        "posture = \"tap\"\nstep",
-        "lobes.redundancy.posture",
-        "add a [[posture]] with id = \"tap\"",
-    ),
-    (
-        "[[200.0, 240.0]]",
-        "[[240.0, 200.0]]",
-        "lobes.redundancy.forbidden_deg[0]",
-        "from the smaller to the larger",
-    ),
-    (
-        "[[200.0, 240.0]]",
-        "[200.0, 240.0]",
-        "lobes.redundancy.forbidden_deg",
-        "must be a list of numbers",
-    ),
+    ("cut = \"down\"", "cut = \"climb\"", "lobes.cut", "\"up\", \"down\""),
+    ("[100.0, 1500.0, 1.0]", "[0.0, 1500.0, 1.0]", "lobes.spindle_rpm", "starts at 0 rpm"),
+    ("[100.0, 1500.0, 1.0]", "[1500.0, 100.0, 1.0]", "lobes.spindle_rpm", "runs backwards"),
+    ("[100.0, 1500.0, 1.0]", "[100.0, 1500.0, 0.0]", "lobes.spindle_rpm", "has the step 0"),
+    ("[100.0, 1500.0, 1.0]", "[100.0, 1500.0, 1e-9]", "lobes.spindle_rpm", "more than a million speeds"),
+    ("damping_ratio = 0.039", "damping_ratio = 1.0", "lobes.mode[0].damping_ratio", "above 0 and below 1"),
+    ("axis = \"x\"", "axis = \"theta\"", "lobes.mode[0].axis", "\"x\", \"y\""),
+    ("posture = \"p2\"\nstep", "posture = \"tap\"\nstep", "lobes.redundancy.posture", "name one that is there (p1, p2)"),
+    ("[[200.0, 240.0]]", "[[240.0, 200.0]]", "lobes.redundancy.forbidden_deg[0]", "from the smaller to the larger"),
+    ("[[200.0, 240.0]]", "[200.0, 240.0]", "lobes.redundancy.forbidden_deg[0]", "must be a list of numbers"),
 ];
 
 #[test]

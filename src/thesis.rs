@@ -132,7 +132,11 @@ const RECURRING_BANDS: [(f64, f64); 2] = [(32.0, 37.0), (47.0, 49.0)];
 
 /// Works out all tables.
 pub fn case_study() -> Result<CaseStudy> {
-    let section = RobotSection { model: "irb6640".into(), mass_tolerance: None, stiffness_tolerance: 0.3 };
+    let section = RobotSection {
+        model: "irb6640".into(),
+        mass_tolerance: None,
+        stiffness_tolerance: 0.3,
+    };
     let spec = RobotSpec::load(&section.model, std::path::Path::new("."))?;
     let model = StructureModel::new(RobotModel::new(spec), Vec::new(), &section);
     let modal: Vec<ModalRow> = rows(MODAL)?;
@@ -274,8 +278,10 @@ fn unexplained(model: &StructureModel, theta: &[f64]) -> Result<Vec<Unexplained>
     Ok(RECURRING_BANDS
         .iter()
         .map(|&(from_hz, to_hz)| {
-            let inside: Vec<&MinimumRow> =
-                minima.iter().filter(|m| (from_hz..=to_hz).contains(&m.frequency_hz)).collect();
+            let inside: Vec<&MinimumRow> = minima
+                .iter()
+                .filter(|m| (from_hz..=to_hz).contains(&m.frequency_hz))
+                .collect();
             let mut configurations: Vec<String> = inside.iter().map(|m| m.configuration.clone()).collect();
             configurations.dedup();
             let distance = |f: f64| (from_hz - f).max(f - to_hz).max(0.0);
@@ -284,7 +290,13 @@ fn unexplained(model: &StructureModel, theta: &[f64]) -> Result<Vec<Unexplained>
                 .copied()
                 .min_by(|a, b| distance(*a).total_cmp(&distance(*b)))
                 .unwrap_or(0.0);
-            Unexplained { from_hz, to_hz, minima: inside.len(), configurations, nearest_model_hz }
+            Unexplained {
+                from_hz,
+                to_hz,
+                minima: inside.len(),
+                configurations,
+                nearest_model_hz,
+            }
         })
         .collect())
 }
@@ -307,8 +319,16 @@ mod tests {
             assert!(row.published_model.unwrap() > 1.9 * row.measured.unwrap());
         }
         // Fit on configurations 1-3, prediction of 4: the honest figures, not a target.
-        assert!(study.fitted_frequency_error < 0.06, "{}", study.fitted_frequency_error);
-        assert!(study.predicted_frequency_error < 0.20, "{}", study.predicted_frequency_error);
+        assert!(
+            study.fitted_frequency_error < 0.06,
+            "{}",
+            study.fitted_frequency_error
+        );
+        assert!(
+            study.predicted_frequency_error < 0.20,
+            "{}",
+            study.predicted_frequency_error
+        );
         // Nothing in the model vibrates in the two recurring bands.
         for band in &study.unexplained {
             assert!(band.minima > 0);

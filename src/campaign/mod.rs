@@ -1,6 +1,24 @@
 //! A campaign folder: what was measured, where, and on what. SI values keep the unit of the file in their name.
 
-pub mod frf_set;
+use std::path::{Path, PathBuf};
+
+pub mod bounds;
+pub mod document;
+mod frf_set;
+mod load;
+mod lobes_section;
+pub mod paths;
 pub mod schema;
-pub use frf_set::*;
+mod section;
+pub mod suggest;
+
+pub use frf_set::{FrfSet, MeasuredDof, MeasuredFrf};
 pub use schema::*;
+
+/// Key of an error that is about the reference to a robot file, not about the file.
+pub(crate) const ROBOT_KEY: &str = "robot.model";
+
+/// The file that makes a folder a campaign.
+pub fn campaign_file(dir: &Path) -> PathBuf {
+    dir.join("campaign.toml")
+}

@@ -146,6 +146,13 @@ impl CutGeometry {
     }
 }
 
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum CutOutcome {
+    Stable,
+    Chatter,
+}
+
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cut {
     pub id: String,
@@ -156,6 +163,8 @@ pub struct Cut {
     pub order: Option<i64>,
     /// Overrides the detected steady window, s of the record's time axis.
     pub steady_s: Option<[f64; 2]>,
+    /// How the cut went, where someone listened.
+    pub outcome: Option<CutOutcome>,
     /// Line of `campaign.toml`, for messages.
     pub line: usize,
 }

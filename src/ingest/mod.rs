@@ -116,3 +116,10 @@ impl TimeRecord {
         self.len() == 0
     }
 }
+
+/// Stub of this branch: the readers come with the ingest branch.
+pub fn read_frfs(path: &std::path::Path) -> crate::Result<(Vec<FrfRecord>, Vec<String>)> {
+    Err(crate::InputError::new("no reader for FRF files yet")
+        .file(path)
+        .into())
+}

@@ -9,6 +9,7 @@ pub mod chain;
 pub mod dh;
 pub mod dual;
 pub mod export;
+pub mod file;
 #[cfg(test)]
 pub(crate) mod fixture;
 pub mod frf;

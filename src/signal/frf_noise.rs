@@ -323,6 +323,7 @@ mod tests {
         assert_eq!(laws.len(), frfs.len());
         let mean = |f: fn(&FrfNoise) -> f64| laws.iter().map(f).sum::<f64>() / laws.len() as f64;
         let (a, b) = (mean(|l| l.relative), mean(|l| l.floor));
+        assert!((a / relative - 1.0).abs() < 0.1, "relative {a}");
         assert!((b / floor - 1.0).abs() < 0.06, "floor {b}");
     }
 

@@ -1,0 +1,472 @@
+//! `campaign.toml` to a validated [`Campaign`].
+
+use std::path::{Path, PathBuf};
+
+use super::bounds::Bounds;
+use super::document::{Document, Section};
+use super::lobes_section::{self, immersion};
+use super::schema::*;
+use super::suggest::shown;
+use super::{ROBOT_KEY, campaign_file, paths};
+use crate::ingest::Quantity;
+use crate::robot::RobotSpec;
+use crate::{Error, InputError, Result};
+
+const SCHEMA: &str = "lobestone/campaign/1";
+
+const TOP: [&str; 11] = [
+    "schema",
+    "name",
+    "robot",
+    "posture",
+    "point",
+    "frf",
+    "tool",
+    "material",
+    "dynamometer",
+    "cut",
+    "lobes",
+];
+
+const CUT: [&str; 15] = [
+    "id",
+    "file",
+    "process",
+    "spindle_rpm",
+    "feed_per_tooth_mm",
+    "axial_depth_mm",
+    "immersion",
+    "start_deg",
+    "exit_deg",
+    "feed_per_rev_mm",
+    "pilot_diameter_mm",
+    "hole_depth_mm",
+    "order",
+    "steady_s",
+    "outcome",
+];
+
+pub(super) const PROCESSES: [(&str, Process); 2] =
+    [("milling", Process::Milling), ("drilling", Process::Drilling)];
+
+impl Campaign {
+    /// Reads and validates the campaign in folder `dir`.
+    ///
+    /// Measurement files are looked for but not read.
+    ///
+    /// # Errors
+    /// One [`InputError`] with file, key, line and remedy for the first thing that is wrong.
+    pub fn load(dir: &Path) -> Result<Campaign> {
+        let file = campaign_file(dir);
+        if !file.is_file() {
+            return Err(no_campaign(dir, &file).into());
+        }
+        Document::read(&file)?.parse(&TOP, |top| read(dir, top))
+    }
+}
+
+fn no_campaign(dir: &Path, file: &Path) -> InputError {
+    let error = InputError::new("there is no such file").file(file);
+    if dir.is_file() {
+        return InputError::new("is a file, not a campaign folder")
+            .file(dir)
+            .remedy("give the folder that holds campaign.toml");
+    }
+    if !dir.is_dir() {
+        return InputError::new("there is no such folder")
+            .file(dir)
+            .remedy("give the campaign's folder: the one that holds campaign.toml");
+    }
+    error.remedy(format!(
+        "a campaign is a folder with a campaign.toml in it; start one with the line schema = {SCHEMA:?}"
+    ))
+}
+
+fn read(dir: &Path, top: &Section<'_>) -> Result<Campaign> {
+    schema(top)?;
+    let name = top.text("name")?.map_or_else(|| folder_name(dir), str::to_string);
+    let robot = robot(dir, top)?;
+    let joints = robot.as_ref().map(|(_, spec)| spec.joints.len());
+    let postures = postures(top, joints)?;
+    let points = points(top, joints)?;
+    let frfs = frfs(dir, top, &postures)?;
+    let tool = tool(top)?;
+    let dynamometer = dynamometer(top)?;
+    let cuts = cuts(dir, top, tool.as_ref())?;
+    let lobes = lobes_section::read(top, &postures, robot.is_some(), !frfs.is_empty())?;
+    let material = match top.section("material", &["name"])? {
+        Some(material) => Some(
+            material
+                .required("name", material.text("name")?, "\"Ti-6Al-4V\"")?
+                .to_string(),
+        ),
+        None => None,
+    };
+    Ok(Campaign {
+        dir: dir.to_path_buf(),
+        name,
+        robot: robot.map(|(section, _)| section),
+        postures,
+        points,
+        frfs,
+        tool,
+        dynamometer,
+        cuts,
+        lobes,
+        material,
+    })
+}
+
+fn schema(top: &Section<'_>) -> Result<()> {
+    let schema = top.required("schema", top.text("schema")?, &format!("{SCHEMA:?}"))?;
+    if schema == SCHEMA {
+        return Ok(());
+    }
+    Err(top
+        .error(
+            "schema",
+            format!("{:?} is not a form this program reads", shown(schema)),
+        )
+        .remedy(format!("write schema = {SCHEMA:?}"))
+        .into())
+}
+
+fn folder_name(dir: &Path) -> String {
+    let full = dir.canonicalize().unwrap_or_else(|_| dir.to_path_buf());
+    full.file_name()
+        .map_or_else(|| "campaign".to_string(), |n| n.to_string_lossy().into_owned())
+}
+
+/// The section and the robot itself: postures and points are checked against its joints.
+fn robot(dir: &Path, top: &Section<'_>) -> Result<Option<(RobotSection, RobotSpec)>> {
+    let Some(robot) = top.section("robot", &["model", "mass_tolerance", "stiffness_tolerance"])? else {
+        return Ok(None);
+    };
+    let model = robot.required("model", robot.text("model")?, "\"irb6640\"")?;
+    let spec = RobotSpec::load(model, dir).map_err(|error| match error {
+        // What is wrong with the reference (not with the robot file) stands in this file, on a line known here.
+        Error::Input(e) if e.key.as_deref() == Some(ROBOT_KEY) => {
+            let line = robot.error("model", "").line;
+            Error::from(e.line(line))
+        }
+        other => other,
+    })?;
+    // No tolerance is what `0` says too.
+    let mass_tolerance = robot
+        .number("mass_tolerance", Bounds::closed(0.0, 1.0))?
+        .filter(|t| *t > 0.0);
+    let stiffness_tolerance = robot
+        .number("stiffness_tolerance", Bounds::above_up_to(0.0, 5.0))?
+        .unwrap_or(0.3);
+    let section = RobotSection {
+        model: model.to_string(),
+        mass_tolerance,
+        stiffness_tolerance,
+    };
+    Ok(Some((section, spec)))
+}
+
+fn postures(top: &Section<'_>, joints: Option<usize>) -> Result<Vec<Posture>> {
+    let mut out: Vec<Posture> = Vec::new();
+    for section in top.sections("posture", &["id", "joints_deg"])? {
+        let id = section.required("id", section.text("id")?, "\"p1\"")?.to_string();
+        if let Some(first) = out.iter().position(|p| p.id == id) {
+            return Err(duplicate(&section, "id", &id, &format!("posture[{first}]")));
+        }
+        let joints_deg = section.required("joints_deg", section.numbers("joints_deg")?, "[0.0, 0.0, …]")?;
+        // Without a robot at least all postures have to be of one and the same.
+        let (wanted, whose) = match (joints, out.first()) {
+            (Some(n), _) => (n, "the robot has"),
+            (None, Some(first)) => (first.joints_deg.len(), "posture[0] has"),
+            (None, None) => (joints_deg.len().max(1), "a posture has at least"),
+        };
+        if joints_deg.len() != wanted {
+            return Err(section
+                .error(
+                    "joints_deg",
+                    format!("has {} angles, but {whose} {wanted} joints", joints_deg.len()),
+                )
+                .remedy("give one angle in degrees for each joint, base first")
+                .into());
+        }
+        out.push(Posture { id, joints_deg });
+    }
+    Ok(out)
+}
+
+fn points(top: &Section<'_>, joints: Option<usize>) -> Result<Vec<Point>> {
+    let mut out: Vec<Point> = Vec::new();
+    for section in top.sections("point", &["node", "body", "position_m", "axes"])? {
+        let node = section.required("node", section.whole("node", i64::MIN, i64::MAX)?, "1")?;
+        if let Some(first) = out.iter().position(|p| p.node == node) {
+            return Err(duplicate(
+                &section,
+                "node",
+                &node.to_string(),
+                &format!("point[{first}]"),
+            ));
+        }
+        let text = section.required("body", section.text("body")?, "\"tool\"")?;
+        let body = body(text, joints).ok_or_else(|| {
+            let links = joints.unwrap_or(6);
+            section
+                .error("body", format!("the robot has no body {:?}", shown(text)))
+                .remedy(format!("\"base\", \"link1\" to \"link{links}\", or \"tool\""))
+        })?;
+        let axes = [
+            ("base", AxesRef::Base),
+            ("body", AxesRef::Body),
+            ("tool", AxesRef::Tool),
+        ];
+        let position_m = section.array("position_m", "[0.0, 0.0, 0.0]")?;
+        out.push(Point {
+            node,
+            body,
+            position_m: section.required("position_m", position_m, "[0.0, 0.0, 0.0]")?,
+            axes: section.required("axes", section.choice("axes", &axes)?, "\"base\"")?,
+        });
+    }
+    Ok(out)
+}
+
+/// `base`, `link1` …, `tool`.
+fn body(text: &str, joints: Option<usize>) -> Option<BodyRef> {
+    match text {
+        "base" => Some(BodyRef::Base),
+        "tool" => Some(BodyRef::Tool),
+        _ => {
+            let digits = text.strip_prefix("link")?;
+            let number: usize = digits.parse().ok()?;
+            // `link+1` and `link01` parse as numbers, but are not how a link is called.
+            let plain = number.to_string() == digits;
+            let there = number >= 1 && joints.is_none_or(|n| number <= n);
+            (plain && there).then_some(BodyRef::Link(number))
+        }
+    }
+}
+
+fn frfs(dir: &Path, top: &Section<'_>, postures: &[Posture]) -> Result<Vec<FrfFile>> {
+    let quantities = [
+        ("receptance", Quantity::Receptance),
+        ("mobility", Quantity::Mobility),
+        ("accelerance", Quantity::Accelerance),
+        ("acceleration", Quantity::Accelerance),
+    ];
+    let mut out = Vec::new();
+    for section in top.sections("frf", &["file", "posture", "quantity", "force_level_n"])? {
+        out.push(FrfFile {
+            file: file(dir, &section, "\"frf/p1.uff\"")?,
+            posture: posture_ref(&section, postures)?,
+            quantity: section.choice("quantity", &quantities)?,
+            force_level_n: section.number("force_level_n", Bounds::POSITIVE)?,
+            line: section.line(),
+        });
+    }
+    Ok(out)
+}
+
+/// Index of the posture that the key `posture` of a section names.
+pub(super) fn posture_ref(section: &Section<'_>, postures: &[Posture]) -> Result<usize> {
+    let id = section.required("posture", section.text("posture")?, "\"p1\"")?;
+    postures.iter().position(|p| p.id == id).ok_or_else(|| {
+        // Ids are alike (p1, p2): a guess would often be another posture.
+        let some: Vec<&str> = postures.iter().take(10).map(|p| p.id.as_str()).collect();
+        let remedy = match some[..] {
+            [] => format!("add a [[posture]] with id = {:?}", shown(id)),
+            _ => format!(
+                "name one that is there ({}), or add it as a [[posture]]",
+                shown(&some.join(", "))
+            ),
+        };
+        section
+            .error(
+                "posture",
+                format!("there is no [[posture]] with the id {:?}", shown(id)),
+            )
+            .remedy(remedy)
+            .into()
+    })
+}
+
+fn file(dir: &Path, section: &Section<'_>, example: &str) -> Result<PathBuf> {
+    let text = section.required("file", section.text("file")?, example)?;
+    paths::inside(dir, text).map_err(|found| {
+        let mut error = section.error("file", found.problem);
+        error.remedy = found.remedy;
+        error.into()
+    })
+}
+
+fn tool(top: &Section<'_>) -> Result<Option<Tool>> {
+    let keys = [
+        "kind",
+        "diameter_mm",
+        "teeth",
+        "helix_deg",
+        "half_point_angle_deg",
+        "web_thickness_mm",
+    ];
+    let Some(tool) = top.section("tool", &keys)? else {
+        return Ok(None);
+    };
+    let kinds = [("endmill", ToolKind::Endmill), ("drill", ToolKind::Drill)];
+    let kind = tool.required("kind", tool.choice("kind", &kinds)?, "\"endmill\" or \"drill\"")?;
+    let diameter_mm = tool.required(
+        "diameter_mm",
+        tool.number("diameter_mm", Bounds::POSITIVE)?,
+        "16.0",
+    )?;
+    let teeth = tool.required("teeth", tool.whole("teeth", 1, 1000)?, "4")?;
+    if kind == ToolKind::Endmill {
+        for key in ["half_point_angle_deg", "web_thickness_mm"] {
+            if tool.has(key) {
+                return Err(tool
+                    .error(key, "belongs to a drill, and this tool is an endmill")
+                    .remedy("take it out, or write kind = \"drill\"")
+                    .into());
+            }
+        }
+    }
+    Ok(Some(Tool {
+        kind,
+        diameter_mm,
+        teeth: teeth as usize,
+        helix_deg: tool
+            .number("helix_deg", Bounds::open(-90.0, 90.0))?
+            .unwrap_or(0.0),
+        half_point_angle_deg: tool.number("half_point_angle_deg", Bounds::above_up_to(0.0, 90.0))?,
+        web_thickness_mm: tool.number("web_thickness_mm", Bounds::open(0.0, diameter_mm))?,
+    }))
+}
+
+fn dynamometer(top: &Section<'_>) -> Result<Dynamometer> {
+    let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let key = "tool_from_dyno";
+    let Some(section) = top.section("dynamometer", &[key])? else {
+        return Ok(Dynamometer {
+            tool_from_dyno: identity,
+        });
+    };
+    let example = "[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]";
+    let rows = section.required(key, section.rows::<3>(key, example)?, example)?;
+    let count = rows.len();
+    let tool_from_dyno: [[f64; 3]; 3] = rows.try_into().map_err(|_| {
+        section
+            .error(key, format!("has {count} rows, must have 3"))
+            .remedy(format!("write it as {key} = {example}"))
+    })?;
+    let a = nalgebra::Matrix3::from_row_iterator(tool_from_dyno.iter().flatten().copied());
+    // A turn or a turn with a reflection (reaction forces, left-handed channels): A Aᵀ = 1.
+    let off = (a * a.transpose() - nalgebra::Matrix3::identity()).amax();
+    if off.is_nan() || off > 1e-3 {
+        return Err(section
+            .error(key, "its rows are not at right angles and of length 1, so it would stretch the forces")
+            .remedy("row 1 holds tool x in dynamometer axes, row 2 tool y, row 3 tool z; gain factors belong into the force files")
+            .into());
+    }
+    Ok(Dynamometer { tool_from_dyno })
+}
+
+fn cuts(dir: &Path, top: &Section<'_>, tool: Option<&Tool>) -> Result<Vec<Cut>> {
+    let mut out: Vec<Cut> = Vec::new();
+    for section in top.sections("cut", &CUT)? {
+        let Some(tool) = tool else {
+            return Err(top
+                .error("tool", "missing: there are cuts, but no tool")
+                .remedy("add a [tool] section with kind, diameter_mm and teeth")
+                .into());
+        };
+        let id = section.required("id", section.text("id")?, "\"01\"")?.to_string();
+        if let Some(first) = out.iter().position(|c| c.id == id) {
+            return Err(duplicate(&section, "id", &id, &format!("cut[{first}]")));
+        }
+        let outcomes = [("stable", CutOutcome::Stable), ("chatter", CutOutcome::Chatter)];
+        out.push(Cut {
+            file: file(dir, &section, "\"force/cut01.txt\"")?,
+            geometry: geometry(&section, tool)?,
+            spindle_rpm: section.required(
+                "spindle_rpm",
+                section.number("spindle_rpm", Bounds::POSITIVE)?,
+                "1200.0",
+            )?,
+            order: section.whole("order", i64::MIN, i64::MAX)?,
+            steady_s: steady(&section)?,
+            outcome: section.choice("outcome", &outcomes)?,
+            line: section.line(),
+            id,
+        });
+    }
+    Ok(out)
+}
+
+fn geometry(cut: &Section<'_>, tool: &Tool) -> Result<CutGeometry> {
+    let process = cut.required(
+        "process",
+        cut.choice("process", &PROCESSES)?,
+        "\"milling\" or \"drilling\"",
+    )?;
+    let milling = [
+        "feed_per_tooth_mm",
+        "axial_depth_mm",
+        "immersion",
+        "start_deg",
+        "exit_deg",
+    ];
+    let drilling = ["feed_per_rev_mm", "pilot_diameter_mm", "hole_depth_mm"];
+    let (this, other, strangers) = match process {
+        Process::Milling => ("milling", "drilling", &drilling[..]),
+        Process::Drilling => ("drilling", "milling", &milling[..]),
+    };
+    if let Some(key) = strangers.iter().find(|key| cut.has(key)) {
+        return Err(cut
+            .error(key, format!("belongs to {other}, and this cut is {this}"))
+            .remedy(format!("take it out, or write process = {other:?}"))
+            .into());
+    }
+    let number = |key: &str, bounds, example| cut.required(key, cut.number(key, bounds)?, example);
+    Ok(match process {
+        Process::Milling => CutGeometry::Milling {
+            feed_per_tooth_mm: number("feed_per_tooth_mm", Bounds::POSITIVE, "0.05")?,
+            axial_depth_mm: number("axial_depth_mm", Bounds::POSITIVE, "2.0")?,
+            immersion: cut.required(
+                "immersion",
+                immersion(cut)?,
+                "\"slot\" (or start_deg and exit_deg)",
+            )?,
+        },
+        Process::Drilling => CutGeometry::Drilling {
+            feed_per_rev_mm: number("feed_per_rev_mm", Bounds::POSITIVE, "0.1")?,
+            pilot_diameter_mm: match cut.number("pilot_diameter_mm", Bounds::NOT_NEGATIVE)? {
+                Some(pilot) if pilot >= tool.diameter_mm => {
+                    return Err(cut
+                        .error(
+                            "pilot_diameter_mm",
+                            format!("is {pilot}, but the tool's diameter is {}", tool.diameter_mm),
+                        )
+                        .remedy("the pilot hole must be smaller than the tool; 0 where there is none")
+                        .into());
+                }
+                pilot => pilot.unwrap_or(0.0),
+            },
+            hole_depth_mm: cut.number("hole_depth_mm", Bounds::POSITIVE)?,
+        },
+    })
+}
+
+fn steady(cut: &Section<'_>) -> Result<Option<[f64; 2]>> {
+    let steady = cut.array("steady_s", "[1.2, 2.6]")?;
+    if let Some([from, to]) = steady.filter(|[from, to]| from >= to) {
+        return Err(cut
+            .error("steady_s", format!("starts at {from} s and ends at {to} s"))
+            .remedy("first the start, then the end of the steady window, in seconds of the record")
+            .into());
+    }
+    Ok(steady)
+}
+
+fn duplicate(section: &Section<'_>, key: &str, value: &str, first: &str) -> Error {
+    section
+        .error(key, format!("{} is taken by {first}", shown(value)))
+        .remedy(format!("give each its own {key}"))
+        .into()
+}

@@ -1,0 +1,304 @@
+//! The `[lobes]` section, and how deep a milling cutter is immersed.
+
+use std::f64::consts::PI;
+
+use super::bounds::Bounds;
+use super::document::Section;
+use super::load::{PROCESSES, posture_ref};
+use super::schema::*;
+use crate::Result;
+
+const LOBES: [&str; 17] = [
+    "process",
+    "source",
+    "method",
+    "ktc_n_per_mm2",
+    "krc_n_per_mm2",
+    "kac_n_per_mm2",
+    "teeth",
+    "immersion",
+    "start_deg",
+    "exit_deg",
+    "radial_ratio",
+    "cut",
+    "half_point_angle_deg",
+    "feed_per_rev_mm",
+    "spindle_rpm",
+    "mode",
+    "redundancy",
+];
+
+/// More speeds than this are a slip in the step.
+const MOST_SPEEDS: f64 = 1e6;
+
+/// Keys and tables of a source or process that is not chosen may stay, so that one can switch between them.
+pub(super) fn read(
+    top: &Section<'_>,
+    postures: &[Posture],
+    has_robot: bool,
+    has_frfs: bool,
+) -> Result<Option<LobesSection>> {
+    let Some(lobes) = top.section("lobes", &LOBES)? else {
+        return Ok(None);
+    };
+    let process = lobes.required(
+        "process",
+        lobes.choice("process", &PROCESSES)?,
+        "\"milling\" or \"drilling\"",
+    )?;
+    let modes = modes(&lobes, process)?;
+    let source = source(&lobes, has_robot, has_frfs, !modes.is_empty())?;
+    let redundancy = match lobes.section("redundancy", &["posture", "step_deg", "forbidden_deg"])? {
+        Some(section) => Some(redundancy(&section, postures)?),
+        None => None,
+    };
+    let method = method(&lobes, process)?;
+    Ok(Some(LobesSection {
+        process,
+        source,
+        method,
+        ktc_n_per_mm2: lobes.number("ktc_n_per_mm2", Bounds::POSITIVE)?,
+        krc_n_per_mm2: lobes.number("krc_n_per_mm2", Bounds::ANY)?,
+        kac_n_per_mm2: lobes.number("kac_n_per_mm2", Bounds::ANY)?,
+        teeth: lobes.whole("teeth", 1, 1000)?.map(|n| n as usize),
+        immersion: immersion(&lobes)?,
+        half_point_angle_deg: lobes.number("half_point_angle_deg", Bounds::above_up_to(0.0, 90.0))?,
+        feed_per_rev_mm: lobes.number("feed_per_rev_mm", Bounds::POSITIVE)?,
+        spindle_rpm: speeds(&lobes)?,
+        modes,
+        redundancy,
+    }))
+}
+
+fn source(lobes: &Section<'_>, has_robot: bool, has_frfs: bool, has_modes: bool) -> Result<LobeSource> {
+    let words = [
+        ("model", LobeSource::Model),
+        ("measured", LobeSource::Measured),
+        ("modes", LobeSource::Modes),
+    ];
+    let source = lobes.required(
+        "source",
+        lobes.choice("source", &words)?,
+        "\"model\", \"measured\" or \"modes\"",
+    )?;
+    let (there, wanted) = match source {
+        LobeSource::Model => (has_robot, "[robot]"),
+        LobeSource::Measured => (has_frfs, "[[frf]]"),
+        LobeSource::Modes => (has_modes, "[[lobes.mode]]"),
+    };
+    if there {
+        return Ok(source);
+    }
+    Err(lobes
+        .error("source", format!("this source needs {wanted}, and there is none"))
+        .remedy(format!(
+            "add {wanted}, or choose another source: \"model\", \"measured\", \"modes\""
+        ))
+        .into())
+}
+
+fn method(lobes: &Section<'_>, process: Process) -> Result<LobeMethod> {
+    let milling = [
+        ("zero-order", LobeMethod::ZeroOrder),
+        ("multi-frequency", LobeMethod::MultiFrequency),
+        ("semi-discretisation", LobeMethod::SemiDiscretisation),
+        ("semi-discretization", LobeMethod::SemiDiscretisation),
+    ];
+    let drilling = [("frequency-domain", LobeMethod::FrequencyDomain)];
+    let (words, usual) = match process {
+        Process::Milling => (&milling[..], LobeMethod::ZeroOrder),
+        Process::Drilling => (&drilling[..], LobeMethod::FrequencyDomain),
+    };
+    Ok(lobes.choice("method", words)?.unwrap_or(usual))
+}
+
+fn speeds(lobes: &Section<'_>) -> Result<[f64; 3]> {
+    let key = "spindle_rpm";
+    let example = "[100.0, 1500.0, 1.0]";
+    let speeds @ [from, to, step] = lobes.required(key, lobes.array(key, example)?, example)?;
+    let problem = if from <= 0.0 {
+        format!("starts at {from} rpm; it must be above 0")
+    } else if to < from {
+        format!("runs backwards from {from} to {to} rpm")
+    } else if step <= 0.0 {
+        format!("has the step {step}; it must be above 0")
+    } else if (to - from) / step > MOST_SPEEDS {
+        "holds more than a million speeds".to_string()
+    } else {
+        return Ok(speeds);
+    };
+    Err(lobes
+        .error(key, problem)
+        .remedy(format!("from, to, step in rpm: {key} = {example}"))
+        .into())
+}
+
+fn modes(lobes: &Section<'_>, process: Process) -> Result<Vec<LobeMode>> {
+    let axes = [
+        ("x", LobeAxis::X),
+        ("y", LobeAxis::Y),
+        ("z", LobeAxis::Z),
+        ("theta", LobeAxis::Theta),
+    ];
+    let axes = match process {
+        Process::Milling => &axes[..2],
+        Process::Drilling => &axes[..],
+    };
+    let keys = ["axis", "frequency_hz", "damping_ratio", "stiffness_n_per_m"];
+    let mut out = Vec::new();
+    for mode in lobes.sections("mode", &keys)? {
+        let number = |key: &str, bounds, example| mode.required(key, mode.number(key, bounds)?, example);
+        out.push(LobeMode {
+            axis: mode.required("axis", mode.choice("axis", axes)?, "\"x\"")?,
+            frequency_hz: number("frequency_hz", Bounds::POSITIVE, "603.0")?,
+            damping_ratio: number("damping_ratio", Bounds::open(0.0, 1.0), "0.039")?,
+            stiffness_n_per_m: number("stiffness_n_per_m", Bounds::POSITIVE, "5.59e6")?,
+        });
+    }
+    Ok(out)
+}
+
+fn redundancy(section: &Section<'_>, postures: &[Posture]) -> Result<Redundancy> {
+    let posture = posture_ref(section, postures)?;
+    let step_deg = section.number("step_deg", Bounds::closed(0.01, 180.0))?;
+    let forbidden_deg = section
+        .rows::<2>("forbidden_deg", "[[200.0, 240.0]]")?
+        .unwrap_or_default();
+    for (i, [from, to]) in forbidden_deg.iter().enumerate() {
+        let inside = Bounds::closed(-360.0, 720.0);
+        if from >= to || to - from > 360.0 || !inside.contain(*from) || !inside.contain(*to) {
+            let mut error = section
+                .error(
+                    "forbidden_deg",
+                    format!("the band from {from} to {to} degrees is none"),
+                )
+                .remedy(
+                    "from the smaller to the larger angle; a band through zero is written [350.0, 370.0]",
+                );
+            error.key = error.key.map(|key| format!("{key}[{i}]"));
+            return Err(error.into());
+        }
+    }
+    Ok(Redundancy {
+        posture,
+        step_deg: section.required("step_deg", step_deg, "5.0")?,
+        forbidden_deg,
+    })
+}
+
+/// Immersion from `immersion = "slot"`, from `start_deg` and `exit_deg`, or (in `[lobes]`) from `radial_ratio`
+/// with `cut`; `None` where none of them stands.
+pub(super) fn immersion(section: &Section<'_>) -> Result<Option<Immersion>> {
+    let angles = ["start_deg", "exit_deg"].into_iter().find(|key| section.has(key));
+    let ratio = section.has("radial_ratio").then_some("radial_ratio");
+    let slot = section.has("immersion").then_some("immersion");
+    let given: Vec<&str> = [slot, angles, ratio].into_iter().flatten().collect();
+    if let [first, second, ..] = given[..] {
+        return Err(section
+            .error(
+                second,
+                format!("the immersion is said twice, by {first} and by {second}"),
+            )
+            .remedy("keep one of the two")
+            .into());
+    }
+    if section.has("cut") && ratio.is_none() {
+        return Err(section
+            .error("cut", "needs radial_ratio")
+            .remedy("add radial_ratio = 0.5 (width of cut over tool diameter), or take it out")
+            .into());
+    }
+    match given.first() {
+        None => Ok(None),
+        Some(&"immersion") => section.choice("immersion", &[("slot", Immersion::SLOT)]),
+        Some(&"radial_ratio") => by_ratio(section).map(Some),
+        Some(_) => by_angles(section).map(Some),
+    }
+}
+
+fn by_angles(section: &Section<'_>) -> Result<Immersion> {
+    // Behind the cutter (180° … 360°) the chip thickness c sin φ is negative: there is nothing to cut.
+    let angle =
+        |key: &str, example| section.required(key, section.number(key, Bounds::closed(0.0, 180.0))?, example);
+    let start = angle("start_deg", "0.0")?;
+    let exit = angle("exit_deg", "180.0")?;
+    if start >= exit {
+        return Err(section
+            .error(
+                "exit_deg",
+                format!("the cut starts at {start} and ends at {exit} degrees"),
+            )
+            .remedy("start_deg must be below exit_deg; angles from +y, clockwise")
+            .into());
+    }
+    Ok(Immersion {
+        start_rad: start.to_radians(),
+        exit_rad: exit.to_radians(),
+    })
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Direction {
+    Up,
+    Down,
+}
+
+fn by_ratio(section: &Section<'_>) -> Result<Immersion> {
+    let ratio = section.number("radial_ratio", Bounds::above_up_to(0.0, 1.0))?;
+    let ratio = section.required("radial_ratio", ratio, "0.5")?;
+    let words = [("up", Direction::Up), ("down", Direction::Down)];
+    let direction = section.required("cut", section.choice("cut", &words)?, "\"up\" or \"down\"")?;
+    Ok(radial_immersion(ratio, direction))
+}
+
+/// Immersion for a width of cut of `ratio` times the diameter (0 < ratio ≤ 1).
+///
+/// A tooth at φ (from +y, clockwise) is at (sin φ, cos φ) and moves along (cos φ, −sin φ); the chip is c sin φ thick
+/// with the feed along +x. Up-milling begins at φ = 0, where tooth and feed point the same way and the chip is
+/// thin; down-milling ends at φ = π (Altintas, Manufacturing Automation, 2012, §2.6).
+fn radial_immersion(ratio: f64, direction: Direction) -> Immersion {
+    // Clamped: the cosine of a rounded 1 − 2·1 must not leave [−1, 1].
+    let swept = (1.0 - 2.0 * ratio).clamp(-1.0, 1.0).acos();
+    match direction {
+        Direction::Up => Immersion {
+            start_rad: 0.0,
+            exit_rad: swept,
+        },
+        Direction::Down => Immersion {
+            start_rad: PI - swept,
+            exit_rad: PI,
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use approx::assert_relative_eq;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn half_immersion_is_a_quarter_turn() {
+        let up = radial_immersion(0.5, Direction::Up);
+        assert_relative_eq!(up.exit_rad, PI / 2.0, epsilon = 1e-15);
+        let down = radial_immersion(0.5, Direction::Down);
+        assert_relative_eq!(down.start_rad, PI / 2.0, epsilon = 1e-15);
+        assert_eq!(radial_immersion(1.0, Direction::Up), Immersion::SLOT);
+        assert_eq!(radial_immersion(1.0, Direction::Down), Immersion::SLOT);
+    }
+
+    proptest! {
+        /// The teeth sweep a strip of the given width (across the feed), thin chip first in up-milling.
+        #[test]
+        fn the_swept_strip_is_as_wide_as_the_cut(ratio in 1e-6f64..=1.0) {
+            for direction in [Direction::Up, Direction::Down] {
+                let im = radial_immersion(ratio, direction);
+                let width = (im.start_rad.cos() - im.exit_rad.cos()) / 2.0;
+                prop_assert!((width - ratio).abs() < 1e-12, "{direction:?} {width}");
+                let entry_thinner = im.start_rad.sin() <= im.exit_rad.sin() + 1e-12;
+                prop_assert_eq!(entry_thinner, direction == Direction::Up || ratio > 1.0 - 1e-9);
+            }
+        }
+    }
+}

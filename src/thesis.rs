@@ -112,7 +112,10 @@ struct MinimumRow {
 }
 
 fn rows<T: DeserializeOwned>(table: &str) -> Result<Vec<T>> {
-    csv::Reader::from_reader(table.as_bytes())
+    // Notes at the end of a row hold commas of their own.
+    csv::ReaderBuilder::new()
+        .flexible(true)
+        .from_reader(table.as_bytes())
         .deserialize()
         .collect::<std::result::Result<_, _>>()
         .map_err(|e| Error::computation(format!("a built-in table is damaged: {e}")))

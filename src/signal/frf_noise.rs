@@ -29,7 +29,9 @@ const HALF_WINDOW: usize = 8;
 /// Coefficients of the numerator polynomial, each FRF its own.
 const NUMERATOR: usize = 5;
 /// Coefficients of the common denominator besides the leading 1: two poles.
-const DENOMINATOR: usize = 2;
+const DENOMINATOR: usize = 3;
+/// Output-error steps after the linear start.
+const GAUSS_NEWTON_STEPS: usize = 4;
 
 /// Squared departure from the local rational fit at one line, corrected for the degrees of freedom, and the magnitude
 /// of the smooth curve there.
@@ -82,10 +84,96 @@ struct Local {
     smooth: Vec<f64>,
 }
 
-/// Fits one window and adds the departures at its centre.
+/// One FRF within a window for a given denominator: the best numerator and what is left.
+struct Projection {
+    /// Orthonormal basis of numerator polynomials over the denominator, weighted: lines × coefficients.
+    basis: DMatrix<Complex64>,
+    weight: Vec<f64>,
+    /// Weighted smooth curve.
+    fitted: DVector<Complex64>,
+    /// Weighted measurement less the smooth curve.
+    residual: DVector<Complex64>,
+    /// Derivatives of the smooth curve with respect to the denominator's coefficients, numerator projected out.
+    slopes: DMatrix<Complex64>,
+}
+
+impl Projection {
+    fn new(x: &[f64], h: &[Complex64], denominator: &[Complex64]) -> Option<Self> {
+        let weight = weights(h);
+        let count = x.len();
+        let polynomials = DMatrix::from_fn(count, NUMERATOR, |i, j| {
+            weight[i] * x[i].powi(j as i32) / denominator[i]
+        });
+        let basis = polynomials.qr().q();
+        if basis.iter().any(|v| !v.is_finite()) {
+            return None;
+        }
+        let target = DVector::from_fn(count, |i, _| h[i] * weight[i]);
+        let fitted = &basis * (basis.adjoint() * &target);
+        let residual = &target - &fitted;
+        let slopes = DMatrix::from_fn(count, DENOMINATOR, |i, j| {
+            -fitted[i] * x[i].powi(j as i32 + 1) / denominator[i]
+        });
+        let slopes = &slopes - &basis * (basis.adjoint() * &slopes);
+        Some(Projection {
+            basis,
+            weight,
+            fitted,
+            residual,
+            slopes,
+        })
+    }
+}
+
+/// 1 + d₁x + d₂x² on every line; `None` where it has a root (nearly) on the frequency axis.
+fn denominator_values(x: &[f64], coefficients: &DVector<Complex64>) -> Option<Vec<Complex64>> {
+    let value = |x: &f64| {
+        Complex64::ONE + coefficients.iter().rev().fold(Complex64::ZERO, |sum, d| (sum + d) * *x)
+    };
+    let values: Vec<Complex64> = x.iter().map(value).collect();
+    values
+        .iter()
+        .all(|d| d.is_finite() && d.norm() > 1e-9)
+        .then_some(values)
+}
+
+fn project_all(x: &[f64], set: &[&[Complex64]], denominator: &[Complex64]) -> Option<Vec<Projection>> {
+    set.iter().map(|h| Projection::new(x, h, denominator)).collect()
+}
+
+fn cost(projections: &[Projection]) -> f64 {
+    projections.iter().map(|p| p.residual.norm_squared()).sum()
+}
+
+/// Linear start of the denominator: equation error divided by the denominator of the pass before
+/// (Sanathanan & Koerner 1963).
+fn start(x: &[f64], set: &[&[Complex64]]) -> Option<DVector<Complex64>> {
+    let count = x.len();
+    let mut coefficients = DVector::zeros(DENOMINATOR);
+    for _ in 0..2 {
+        let denominator = denominator_values(x, &coefficients)?;
+        let mut normal = DMatrix::<Complex64>::zeros(DENOMINATOR, DENOMINATOR);
+        let mut right = DVector::<Complex64>::zeros(DENOMINATOR);
+        for h in set {
+            let basis = Projection::new(x, h, &denominator)?.basis;
+            let weight = weights(h);
+            let columns = DMatrix::from_fn(count, DENOMINATOR + 1, |i, j| {
+                h[i] * weight[i] * x[i].powi(j as i32) / denominator[i]
+            });
+            let projected = &columns - &basis * (basis.adjoint() * &columns);
+            let unknown = projected.columns(1, DENOMINATOR);
+            normal += unknown.adjoint() * unknown;
+            right -= unknown.adjoint() * projected.column(0);
+        }
+        coefficients = normal.lu().solve(&right)?;
+    }
+    Some(coefficients)
+}
+
+/// Fits one window and adds the departures at its centre. The linear start is biased by the noise in the regressors,
+/// so Gauss–Newton steps on the output error follow (variable projection, Golub & Pereyra 1973).
 fn window(frequency_hz: &[f64], frfs: &[&[Complex64]], centre: usize, local: &mut [Local]) {
     let range = centre - HALF_WINDOW..centre + HALF_WINDOW + 1;
-    let count = range.len();
     let half_span = 0.5 * (frequency_hz[range.end - 1] - frequency_hz[range.start]);
     if !(half_span > 0.0) {
         return;
@@ -94,104 +182,79 @@ fn window(frequency_hz: &[f64], frfs: &[&[Complex64]], centre: usize, local: &mu
         .iter()
         .map(|f| (f - frequency_hz[centre]) / half_span)
         .collect();
-    let mut denominator = vec![Complex64::ONE; count];
-    // Sanathanan–Koerner: each pass divides the equation error by the denominator of the pass before.
-    for _ in 0..2 {
-        let mut normal = DMatrix::<Complex64>::zeros(DENOMINATOR, DENOMINATOR);
+    let set: Vec<&[Complex64]> = frfs.iter().map(|h| &h[range.clone()]).collect();
+    let Some(mut coefficients) = start(&x, &set) else {
+        return;
+    };
+    let Some(mut projections) = denominator_values(&x, &coefficients).and_then(|d| project_all(&x, &set, &d))
+    else {
+        return;
+    };
+    let mut information = DMatrix::<Complex64>::zeros(DENOMINATOR, DENOMINATOR);
+    for _ in 0..GAUSS_NEWTON_STEPS {
+        information.fill(Complex64::ZERO);
         let mut right = DVector::<Complex64>::zeros(DENOMINATOR);
-        for frf in frfs {
-            let h = &frf[range.clone()];
-            let weight = weights(h, &denominator);
-            let Some(basis) = numerator_basis(&x, &weight) else {
-                return;
-            };
-            let mut columns = DMatrix::<Complex64>::zeros(count, DENOMINATOR + 1);
-            for i in 0..count {
-                let mut power = h[i] * weight[i];
-                for j in 0..=DENOMINATOR {
-                    columns[(i, j)] = power;
-                    power *= x[i];
-                }
-            }
-            let projected = &columns - &basis * (basis.adjoint() * &columns);
-            let unknown = projected.columns(1, DENOMINATOR);
-            normal += unknown.adjoint() * unknown;
-            right -= unknown.adjoint() * projected.column(0);
+        for p in &projections {
+            information += p.slopes.adjoint() * &p.slopes;
+            right += p.slopes.adjoint() * &p.residual;
         }
-        let Some(solution) = normal.lu().solve(&right) else {
-            return;
+        let Some(step) = information.clone().lu().solve(&right) else {
+            break;
         };
-        for (d, &x) in denominator.iter_mut().zip(&x) {
-            *d = Complex64::ONE;
-            let mut power = Complex64::ONE;
-            for s in solution.iter() {
-                power *= x;
-                *d += s * power;
-            }
+        let trial = &coefficients + step;
+        let Some(next) = denominator_values(&x, &trial).and_then(|d| project_all(&x, &set, &d)) else {
+            break;
+        };
+        let (before, after) = (cost(&projections), cost(&next));
+        if !(after < before) {
+            break;
         }
-        if denominator.iter().any(|d| !d.is_finite() || d.norm() < 1e-9) {
-            return;
+        coefficients = trial;
+        projections = next;
+        if after > 0.999 * before {
+            break;
         }
     }
-    // The common denominator costs each FRF its share of a degree of freedom.
-    let shared = DENOMINATOR as f64 / (frfs.len() * count) as f64;
+    let inverse = information.try_inverse();
     let last = frequency_hz.len() - 1 - HALF_WINDOW;
-    for (frf, local) in frfs.iter().zip(local) {
-        let h = &frf[range.clone()];
-        let weight = weights(h, &denominator);
-        let Some(basis) = numerator_basis(&x, &weight) else {
-            continue;
-        };
-        let target = DVector::from_fn(count, |i, _| h[i] * weight[i] * denominator[i]);
-        let fitted = &basis * (basis.adjoint() * &target);
-        let c = HALF_WINDOW;
+    let c = HALF_WINDOW;
+    for (p, local) in projections.iter().zip(local) {
         // The first and the last window speak for the ends of the band too.
         let first_line = if centre == HALF_WINDOW { 0 } else { c };
-        let last_line = if centre == last { count - 1 } else { c };
+        let last_line = if centre == last { x.len() - 1 } else { c };
         for i in first_line..=last_line {
-            let smooth = fitted[i] / (weight[i] * denominator[i]);
+            let smooth = p.fitted[i].norm() / p.weight[i];
             if smooth.is_finite() {
-                local.smooth[range.start + i] = smooth.norm();
+                local.smooth[range.start + i] = smooth;
             }
         }
-        let leverage: f64 = basis.row(c).iter().map(|b| b.norm_sqr()).sum();
-        let freedom = 1.0 - leverage - shared;
-        let unit = weight[c] * denominator[c];
-        if freedom > 0.1 && unit.norm() > 0.0 {
-            let smooth = fitted[c] / unit;
-            let variance = (h[c] - smooth).norm_sqr() / freedom;
-            if variance.is_finite() && smooth.is_finite() {
-                local.departures.push(Departure {
-                    magnitude: smooth.norm(),
-                    variance,
-                });
-            }
+        // Degrees of freedom that the numerator and the common denominator take from this line.
+        let own: f64 = p.basis.row(c).iter().map(|b| b.norm_sqr()).sum();
+        let shared = inverse.as_ref().map_or(0.0, |inverse| {
+            let row = p.slopes.row(c);
+            (row * inverse * row.adjoint())[(0, 0)].re
+        });
+        let freedom = 1.0 - own - shared;
+        let variance = p.residual[c].norm_sqr() / (p.weight[c].powi(2) * freedom);
+        let magnitude = p.fitted[c].norm() / p.weight[c];
+        if freedom > 0.1 && variance.is_finite() && magnitude.is_finite() {
+            local.departures.push(Departure { magnitude, variance });
         }
     }
 }
 
-/// Weight of each line: the reciprocal of |denominator| times the magnitude, so that the error is relative. The
-/// magnitude is averaged over neighbouring lines (with a floor), or else the noise would weigh itself.
-fn weights(h: &[Complex64], denominator: &[Complex64]) -> Vec<f64> {
+/// Weight of each line: the reciprocal of the magnitude, so that the error is relative. The magnitude is averaged
+/// over neighbouring lines (with a floor), or else the noise would weigh itself.
+fn weights(h: &[Complex64]) -> Vec<f64> {
     const REACH: usize = 3;
     let mean_square = |h: &[Complex64]| h.iter().map(|v| v.norm_sqr()).sum::<f64>() / h.len() as f64;
     let floor = 0.1 * mean_square(h);
     (0..h.len())
         .map(|i| {
             let near = &h[i.saturating_sub(REACH)..(i + REACH + 1).min(h.len())];
-            let magnitude = (mean_square(near) + floor).sqrt();
-            1.0 / (denominator[i].norm() * magnitude.max(f64::MIN_POSITIVE))
+            1.0 / (mean_square(near) + floor).sqrt().max(f64::MIN_POSITIVE)
         })
         .collect()
-}
-
-/// Orthonormal basis of the weighted numerator polynomials, lines × coefficients.
-fn numerator_basis(x: &[f64], weight: &[f64]) -> Option<DMatrix<Complex64>> {
-    let polynomials = DMatrix::from_fn(x.len(), NUMERATOR, |i, j| {
-        Complex64::new(weight[i] * x[i].powi(j as i32), 0.0)
-    });
-    let q = polynomials.qr().q();
-    q.iter().all(|v| v.is_finite()).then_some(q)
 }
 
 /// Maximum likelihood of σ² = a²|H|² + b² for exponentially distributed squares (complex Gaussian noise), by

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 pub mod bounds;
 pub mod document;
-mod frf_set;
+pub mod frf_set;
 mod load;
 mod lobes_section;
 pub mod paths;

@@ -148,10 +148,8 @@ mod tests {
                 mean[1][j] += (ft * s - fr * c) * dphi * teeth as f64 / (2.0 * PI);
             }
         }
-        for i in 0..2 {
-            for j in 0..2 {
-                assert_relative_eq!(force.matrix_n_per_m2[i][j], mean[i][j], max_relative = 1e-6);
-            }
+        for (got, expected) in force.matrix_n_per_m2.iter().flatten().zip(mean.iter().flatten()) {
+            assert_relative_eq!(got, expected, max_relative = 1e-6);
         }
     }
 

@@ -16,6 +16,7 @@ mod arcs;
 pub mod force;
 pub mod frf;
 pub mod sampled;
+pub mod setup;
 pub mod solve;
 pub mod thesis;
 

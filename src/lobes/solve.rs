@@ -142,7 +142,7 @@ impl<'a> StabilitySolver<'a> {
     }
 
     /// A peak of a curve of this solver, moved to the true tip between the neighbouring speeds.
-    pub fn refined(&self, curve: &LobeCurve, peak: Peak) -> Peak {
+    fn refined(&self, curve: &LobeCurve, peak: Peak) -> Peak {
         let at = curve.spindle_rpm.partition_point(|n| *n < peak.spindle_rpm);
         let neighbour = |i: usize| curve.spindle_rpm.get(i).copied().unwrap_or(peak.spindle_rpm);
         let (low, high) = (neighbour(at.saturating_sub(1)), neighbour(at + 1));

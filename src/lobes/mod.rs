@@ -1,1 +1,27 @@
-//! Stability lobes.
+//! Stability lobes: the width of cut at which regenerative chatter starts, against spindle speed.
+//!
+//! The cutting force answers the change of the tool's displacement since the tooth before,
+//! F = b D (r(t) − r(t − T)), T = 60/(N n), and the structure answers the force, r = Φ(iω) F.
+//! At the limit a vibration at ω neither grows nor decays: det(I − b (1 − e^{−iωT}) D Φ) = 0.
+//! For each eigenvalue λ of D Φ that is b (1 − e^{−iωT}) = 1/λ =: g, hence (with g_R > 0)
+//!
+//! - b = ½ g_R (1 + (g_I/g_R)²) = 1/(2 Re λ),
+//! - ωT = 2πk + ε with ε = 2 atan2(g_R, g_I) = 2 atan2(Re λ, −Im λ) in (0, 2π), k = 0, 1, 2, … the lobe.
+//!
+//! [`force`] builds D for a process, [`frf`] says what Φ is, [`solve`] finds the smallest b at a speed.
+//!
+//! Where nothing limits the cut at a speed within the band of the FRF, the limit is `None` (`null` in JSON).
+
+mod arcs;
+pub mod force;
+pub mod frf;
+pub mod sampled;
+pub mod setup;
+pub mod solve;
+pub mod thesis;
+
+pub use force::RegenerativeForce;
+pub use frf::{AxisMode, DirectFrf, ModalFrf, Mode};
+pub use sampled::SampledFrf;
+pub use solve::{AbsoluteLimit, Limit, LobeCurve, Peak, StabilitySolver, peak_near, peaks, speed_grid};
+pub use thesis::{ThesisLobes, thesis_lobes};

@@ -1,0 +1,127 @@
+//! What a campaign's `[lobes]` table asks for, as a force and an FRF.
+
+use super::force::RegenerativeForce;
+use super::frf::{AxisMode, ModalFrf};
+use crate::campaign::{Campaign, LobeAxis, LobeMethod, LobesSection, Process};
+use crate::{Error, InputError, Result};
+
+/// Cutting coefficients that lobes need, N/mm².
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LobeCoefficients {
+    pub ktc_n_per_mm2: f64,
+    pub krc_n_per_mm2: f64,
+}
+
+impl LobeCoefficients {
+    /// The ones the `[lobes]` table gives; `None` where it leaves one out (then they come from the cuts).
+    pub fn given(section: &LobesSection) -> Option<Self> {
+        Some(LobeCoefficients {
+            ktc_n_per_mm2: section.ktc_n_per_mm2?,
+            krc_n_per_mm2: section.krc_n_per_mm2?,
+        })
+    }
+}
+
+/// The regenerative force of the campaign's `[lobes]` table and `[tool]`.
+///
+/// # Errors
+/// Where the table lacks something the process needs, or asks for a method that is not here.
+pub fn force_of(
+    campaign: &Campaign,
+    section: &LobesSection,
+    coefficients: LobeCoefficients,
+) -> Result<RegenerativeForce> {
+    let lacks = |key: &str, problem: &str, remedy: &str| -> Error {
+        InputError::new(problem)
+            .file(campaign.dir.join("campaign.toml"))
+            .key(key)
+            .remedy(remedy)
+            .into()
+    };
+    let tool = campaign.tool.as_ref();
+    let teeth = section.teeth.or(tool.map(|t| t.teeth)).ok_or_else(|| {
+        lacks(
+            "lobes.teeth",
+            "the number of teeth is not known",
+            "give it here or in [tool]",
+        )
+    })?;
+    let LobeCoefficients {
+        ktc_n_per_mm2,
+        krc_n_per_mm2,
+    } = coefficients;
+    match section.process {
+        Process::Milling => {
+            if section.method != LobeMethod::ZeroOrder {
+                return Err(lacks(
+                    "lobes.method",
+                    "this method is not built yet",
+                    "use method = \"zero-order\"",
+                ));
+            }
+            let immersion = section.immersion.ok_or_else(|| {
+                lacks(
+                    "lobes.immersion",
+                    "milling lobes need the immersion",
+                    "give immersion = \"slot\", start_deg and exit_deg, or radial_ratio with cut = \"up\" or \"down\"",
+                )
+            })?;
+            RegenerativeForce::milling_zero_order(ktc_n_per_mm2, krc_n_per_mm2, teeth, immersion)
+        }
+        Process::Drilling => {
+            let half_point_angle_deg = section
+                .half_point_angle_deg
+                .or(tool.and_then(|t| t.half_point_angle_deg))
+                .ok_or_else(|| {
+                    lacks(
+                        "lobes.half_point_angle_deg",
+                        "drilling lobes need the half point angle",
+                        "give it here or in [tool]; a 135° point has 67.5",
+                    )
+                })?;
+            RegenerativeForce::drilling_lateral(
+                ktc_n_per_mm2,
+                krc_n_per_mm2,
+                half_point_angle_deg.to_radians(),
+                teeth,
+            )
+        }
+    }
+}
+
+/// The lateral (x, y) modes of the `[[lobes.mode]]` table. Modes in z and theta belong to the axial–torsional block
+/// and are left out.
+///
+/// # Errors
+/// Where the table has no lateral mode, or one that is no damped mode.
+pub fn frf_of_modes(campaign: &Campaign, section: &LobesSection) -> Result<ModalFrf> {
+    let lateral: Vec<AxisMode> = section
+        .modes
+        .iter()
+        .filter_map(|mode| {
+            let axis = match mode.axis {
+                LobeAxis::X => 0,
+                LobeAxis::Y => 1,
+                LobeAxis::Z | LobeAxis::Theta => return None,
+            };
+            Some(AxisMode {
+                axis,
+                frequency_hz: mode.frequency_hz,
+                damping_ratio: mode.damping_ratio,
+                stiffness_n_per_m: mode.stiffness_n_per_m,
+            })
+        })
+        .collect();
+    if lateral.is_empty() {
+        return Err(
+            InputError::new("source = \"modes\" needs at least one mode in x or y")
+                .file(campaign.dir.join("campaign.toml"))
+                .key("lobes.mode")
+                .remedy(
+                    "add a [[lobes.mode]] table with axis, frequency_hz, damping_ratio and stiffness_n_per_m",
+                )
+                .into(),
+        );
+    }
+    ModalFrf::from_axis_modes(&lateral)
+}

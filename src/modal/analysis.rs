@@ -21,6 +21,12 @@ const NEIGHBOURS: usize = 2;
 const MAX_DAMPING: f64 = 0.5;
 /// A damping estimate scattering by more than this part of itself is no finding (where lines are not too coarse).
 const MAX_RELATIVE_STD: f64 = 0.7;
+/// Where lines are coarse the damping hangs on one or two of them, and leakage between lines comes on top of
+/// the noise: an allowance of this part of the line spacing on the half-power width. (Three measured
+/// free–free beam records at 0.05–0.2 lines in the band differ from each other by about this much.)
+const LEAKAGE_LINES: f64 = 0.02;
+/// Modes of one FRF closer than this part of their half-width are one.
+const SAME_WIDTHS: f64 = 0.1;
 /// Fewer lines than this inside the half-power band are worth a warning.
 const FINE_LINES: f64 = 3.0;
 
@@ -67,7 +73,7 @@ pub fn analyse_frf(
     if result.conjugated {
         curve.conjugate();
         result.warnings.push(
-            "the phase is conjugated (convention e^(-iωt), or the channels' sign): taken as e^(+iωt)".into(),
+            "the phase is conjugated (sign convention e^(-iωt)): the FRF was turned to e^(+iωt)".into(),
         );
     }
     // What still turns the wrong way would have negative damping.
@@ -87,21 +93,34 @@ pub fn analyse_frf(
         .iter()
         .map(|p| Start::new(&curve, p, noise_std[p.index]))
         .collect();
-    for index in 0..starts.len() {
-        match mode_at(&curve, &starts, index, noise_std[starts[index].peak.index]) {
-            Ok(mode) => {
-                quality_warnings(&curve, &mode, &mut result.warnings);
-                result.modes.push(mode);
+    let mut refused = Vec::new();
+    for (index, start) in starts.iter().enumerate() {
+        match mode_at(&curve, &starts, index, noise_std[start.peak.index]) {
+            Ok(mode) => result.modes.push(mode),
+            Err(why) => {
+                refused.push(format!("{:.2} Hz ({why})", curve.frequency_hz[start.peak.index]));
             }
-            Err(why) => result.warnings.push(format!(
-                "the peak at {:.2} Hz is not reported as a mode: {why}",
-                curve.frequency_hz[starts[index].peak.index]
-            )),
         }
     }
     result
         .modes
         .sort_by(|a, b| a.best().frequency_hz.total_cmp(&b.best().frequency_hz));
+    // Two peaks whose fits ended in the same pole are one mode.
+    result.modes.dedup_by(|b, a| {
+        let (first, second) = (a.best(), b.best());
+        let width = first.damping_ratio.min(second.damping_ratio) * first.frequency_hz;
+        let same = second.frequency_hz - first.frequency_hz < SAME_WIDTHS * width;
+        if same && b.significance > a.significance {
+            std::mem::swap(a, b);
+        }
+        same
+    });
+    if !refused.is_empty() {
+        result
+            .warnings
+            .push(format!("peaks not reported as modes: {}", refused.join(", ")));
+    }
+    quality_warnings(&result.modes, &mut result.warnings);
     Ok(result)
 }
 
@@ -198,10 +217,27 @@ fn mode_at(
     let Some(best) = estimates.first().filter(|e| e.method == Method::LocalFit) else {
         return Err(why);
     };
+    // A neighbour's flank can pull the simpler methods off their peak: what contradicts the local fit is
+    // another mode's, or nobody's.
+    let best = best.clone();
+    let half_width_hz = best.damping_ratio * best.frequency_hz;
+    let methods = estimates.len();
+    estimates.retain(|e| {
+        (e.frequency_hz - best.frequency_hz).abs() <= 0.5 * half_width_hz.max(line_hz)
+            && (0.5..=2.0).contains(&(e.damping_ratio / best.damping_ratio))
+    });
+    let contradicted = estimates.len() < methods;
     let lines_in_half_power_band = 2.0 * best.damping_ratio * best.frequency_hz / line_hz;
+    if lines_in_half_power_band < FINE_LINES {
+        let leakage = LEAKAGE_LINES * line_hz / (2.0 * best.frequency_hz);
+        for estimate in &mut estimates {
+            estimate.damping_std = estimate.damping_std.map(|std| std.hypot(leakage));
+        }
+    }
     Ok(FrfMode {
         lines_in_half_power_band,
         significance: start.peak.significance,
+        contradicted,
         estimates,
     })
 }
@@ -231,7 +267,7 @@ fn judge(
         ));
     }
     if frequency_std_hz > (damping_ratio * frequency_hz).max(0.5 * line_hz) {
-        return Err(format!("its frequency is uncertain by ±{frequency_std_hz:.2} Hz"));
+        return Err("its lines do not determine its frequency".into());
     }
     // Height of the mode at the line nearest to it, against the noise.
     let u = super::curve::detuning(curve.frequency_hz[peak.index], frequency_hz);
@@ -389,7 +425,7 @@ fn noise_weights(y: &[Complex64], solution: &Solution) -> Option<Vec<f64>> {
             (spp * sr - sp * spr) / determinant,
             (s1 * spr - sp * sr) / determinant,
         );
-        if !(b > 0.0) {
+        if b.is_nan() || b <= 0.0 {
             return None;
         }
         // A hundredth of the mean square is taken as constant: no line has all the weight.
@@ -400,29 +436,53 @@ fn noise_weights(y: &[Complex64], solution: &Solution) -> Option<Vec<f64>> {
     (largest.is_finite() && largest > 0.0).then(|| weights.iter().map(|w| w / largest).collect())
 }
 
-fn quality_warnings(curve: &Curve, mode: &FrfMode, warnings: &mut Vec<String>) {
-    let best = mode.best();
-    if mode.lines_in_half_power_band < FINE_LINES {
-        let spacing = 2.0 * best.damping_ratio * best.frequency_hz / mode.lines_in_half_power_band;
-        let uncertain = match best.damping_std {
-            Some(std) if std < best.damping_ratio => {
-                format!(
-                    "its damping is uncertain by {:.0} %",
-                    100.0 * std / best.damping_ratio
-                )
-            }
-            _ => "its damping is not known".into(),
-        };
+fn quality_warnings(modes: &[FrfMode], warnings: &mut Vec<String>) {
+    let coarse: Vec<String> = modes
+        .iter()
+        .filter(|m| m.lines_in_half_power_band < FINE_LINES)
+        .map(|m| {
+            let best = m.best();
+            let known = match best.damping_std {
+                Some(std) if std < best.damping_ratio => {
+                    format!(
+                        "damping uncertain by {:.0} %",
+                        (100.0 * std / best.damping_ratio).ceil()
+                    )
+                }
+                _ => "damping unknown".into(),
+            };
+            format!(
+                "{:.2} Hz ({:.2} lines, {known})",
+                best.frequency_hz, m.lines_in_half_power_band
+            )
+        })
+        .collect();
+    if !coarse.is_empty() {
         warnings.push(format!(
-            "too coarse lines for the mode at {:.2} Hz: {:.2} lines of {:.3} Hz inside the half-power band; {uncertain}",
-            best.frequency_hz, mode.lines_in_half_power_band, spacing
+            "too coarse lines, fewer than {FINE_LINES:.0} inside the half-power band: {}",
+            coarse.join(", ")
         ));
     }
-    let _ = curve;
-    if mode.estimates.iter().any(|e| e.one_sided) {
+    let contradicted: Vec<String> = modes
+        .iter()
+        .filter(|m| m.contradicted)
+        .map(|m| format!("{:.2} Hz", m.best().frequency_hz))
+        .collect();
+    if !contradicted.is_empty() {
         warnings.push(format!(
-            "half-power at {:.2} Hz: the crossing was measured on one side only, the other is the fitted curve's",
-            best.frequency_hz
+            "circle fit or half-power contradict the local fit (close modes or coarse lines) and are left out: {}",
+            contradicted.join(", ")
+        ));
+    }
+    let one_sided: Vec<String> = modes
+        .iter()
+        .filter_map(|m| m.estimates.iter().find(|e| e.one_sided))
+        .map(|e| format!("{:.2} Hz", e.frequency_hz))
+        .collect();
+    if !one_sided.is_empty() {
+        warnings.push(format!(
+            "half-power crossing measured on one side only, the other is the fitted curve's: {}",
+            one_sided.join(", ")
         ));
     }
 }

@@ -64,7 +64,7 @@ fn fit_lines(curve: &Curve, lines: std::ops::Range<usize>, start: (f64, f64)) ->
         .map(|y| ((y - circle.centre).norm() - circle.radius).powi(2))
         .sum();
     let roundness = (radial / free as f64).sqrt() / circle.radius;
-    if !(roundness < 0.5) {
+    if roundness.is_nan() || roundness > 0.5 {
         return None;
     }
     let sweep = Sweep::fit(f, &angles(y, circle.centre), start)?;
@@ -237,7 +237,7 @@ impl Circle {
         let n = points.len() as f64;
         let mean = points.iter().sum::<Complex64>() / n;
         let scale = (points.iter().map(|p| (p - mean).norm_sqr()).sum::<f64>() / n).sqrt();
-        if !(scale > 0.0 && scale.is_finite()) {
+        if !scale.is_finite() || scale <= 0.0 {
             return None;
         }
         let local: Vec<Complex64> = points.iter().map(|p| (p - mean) / scale).collect();

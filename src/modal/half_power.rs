@@ -183,7 +183,7 @@ fn crossings(q: &Vector3<f64>, centre: f64, scale: f64) -> Option<(f64, f64, [f6
     }
     let product = (a * c).sqrt();
     let least = b + 2.0 * product;
-    if !(least > 0.0) {
+    if least.is_nan() || least <= 0.0 {
         return None;
     }
     let s0 = product / c;

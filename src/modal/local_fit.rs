@@ -1,7 +1,7 @@
 //! A few poles and a residual, fitted to the complex mobility around them by least squares.
 //!
-//! Model per curve m: `Y_m(f) = Σ_j R_jm / (ζ_j + i u_j(f)) + c_0m + c_1m t`, t linear in frequency, every
-//! R and c complex. The poles are shared by all curves. R and c enter linearly and are projected out
+//! Model per curve m: `Y_m(f) = Σ_j R_jm / (ζ_j + i u_j(f)) + c_0m + c_1m t + …`, t linear in frequency,
+//! every R and c complex. The poles are shared by all curves. R and c enter linearly and are projected out
 //! (variable projection: Golub & Pereyra 1973, with Kaufman's 1975 Jacobian), the poles are found by
 //! Levenberg–Marquardt. Standard deviations come from the residual's covariance at the solution.
 
@@ -12,6 +12,8 @@ use super::curve::detuning;
 
 /// With fewer lines than this nothing is concluded about how the noise is spread over them.
 pub(super) const FEW_LINES: usize = 24;
+/// From this many curves on their scatter is worth asking.
+const SEVERAL_CURVES: usize = 4;
 const MAX_ITERATIONS: usize = 60;
 /// Smallest damping ratio the search may reach; below it a line spectrum cannot tell.
 const MIN_DAMPING: f64 = 1e-7;
@@ -32,7 +34,7 @@ pub(super) struct Problem<'a> {
     pub line_weight: Vec<f64>,
     /// 1/σ of each curve, up to a common factor.
     pub curve_weight: Vec<f64>,
-    /// 0: none, 1: constant, 2: constant and slope.
+    /// Terms of the polynomial that stands for all other modes (2: constant and slope).
     pub residual_terms: usize,
 }
 
@@ -133,24 +135,26 @@ pub(super) fn fit(problem: &Problem, start: &[Pole]) -> Option<Solution> {
     let inverse = current.normal.clone().try_inverse()?;
     let leverage = leverage(&current, &inverse);
     let mut covariance = &inverse * variance;
-    if problem.frequency_hz.len() < FEW_LINES {
+    // The plain covariance holds for noise that is alike on all lines and independent between curves.
+    if problem.curves.len() >= SEVERAL_CURVES {
+        // Scatter between the curves: each curve's own pull on the poles (cluster-robust, Liang & Zeger 1986).
+        raise(
+            &mut covariance,
+            &(&inverse * scatter_of_curves(&current) * &inverse),
+        );
+    } else if problem.frequency_hz.len() < FEW_LINES {
         // Too few lines to learn from them how the noise is spread. Where it sits on the peak, the plain
         // estimate is too small; the one that takes each line's own residual (MacKinnon & White 1985, HC2)
-        // is not: the larger of the two, parameter by parameter.
-        let sandwich = &inverse * scatter(&current, &leverage) * &inverse;
-        for j in 0..parameters {
-            let factor = (sandwich[(j, j)] / covariance[(j, j)]).max(1.0).sqrt();
-            if factor.is_finite() {
-                covariance.row_mut(j).scale_mut(factor);
-                covariance.column_mut(j).scale_mut(factor);
-            }
-        }
+        // is not.
+        raise(
+            &mut covariance,
+            &(&inverse * scatter_of_lines(&current, &leverage) * &inverse),
+        );
     }
-    for j in 0..poles.len() {
+    for (j, pole) in poles.iter().enumerate() {
         // From ln ζ to ζ.
-        let zeta = poles[j].damping_ratio;
-        covariance.row_mut(2 * j + 1).scale_mut(zeta);
-        covariance.column_mut(2 * j + 1).scale_mut(zeta);
+        covariance.row_mut(2 * j + 1).scale_mut(pole.damping_ratio);
+        covariance.column_mut(2 * j + 1).scale_mut(pole.damping_ratio);
     }
     covariance.iter().all(|c| c.is_finite()).then(|| Solution {
         residues: current
@@ -197,8 +201,31 @@ fn leverage(at: &Linearised, inverse: &DMatrix<f64>) -> Vec<f64> {
         .collect()
 }
 
+/// Raises standard deviations to those of another estimate of the covariance where these are larger.
+fn raise(covariance: &mut DMatrix<f64>, other: &DMatrix<f64>) {
+    for j in 0..covariance.nrows() {
+        let factor = (other[(j, j)] / covariance[(j, j)]).max(1.0).sqrt();
+        if factor.is_finite() {
+            covariance.row_mut(j).scale_mut(factor);
+            covariance.column_mut(j).scale_mut(factor);
+        }
+    }
+}
+
+/// Σ g gᵀ over the curves' gradients, for the mean's one degree of freedom.
+fn scatter_of_curves(at: &Linearised) -> DMatrix<f64> {
+    let parameters = at.gradient.len();
+    let mut sum = DMatrix::zeros(parameters, parameters);
+    for (jacobian, residual) in at.jacobian.iter().zip(&at.residual) {
+        let g = DVector::from_fn(parameters, |a, _| jacobian[a].dotc(residual).re);
+        sum += &g * g.transpose();
+    }
+    let curves = at.jacobian.len() as f64;
+    sum * (curves / (curves - 1.0).max(1.0))
+}
+
 /// Jᵀ diag(|r|²/2(1 − h)) J: the gradient's covariance from each line's own residual.
-fn scatter(at: &Linearised, leverage: &[f64]) -> DMatrix<f64> {
+fn scatter_of_lines(at: &Linearised, leverage: &[f64]) -> DMatrix<f64> {
     let mut sum = DMatrix::zeros(at.gradient.len(), at.gradient.len());
     for (jacobian, residual) in at.jacobian.iter().zip(&at.residual) {
         for (k, h) in leverage.iter().enumerate() {
@@ -225,8 +252,7 @@ fn linearise(problem: &Problem, poles: &[Pole]) -> Option<Linearised> {
     let mut basis = DMatrix::from_fn(n, columns, |k, j| {
         let value = match j.checked_sub(poles.len()) {
             None => shape(k, &poles[j]),
-            Some(0) => Complex64::new(1.0, 0.0),
-            Some(_) => Complex64::new((f[k] - first) / half_span - 1.0, 0.0),
+            Some(power) => Complex64::new(((f[k] - first) / half_span - 1.0).powi(power as i32), 0.0),
         };
         value * problem.line_weight[k]
     });

@@ -1,4 +1,4 @@
-//! Bias and scatter of every method on synthetic single modes.
+//! Bias and scatter of every method on synthetic single modes, and the marks they must reach.
 
 use super::synthetic::{Mode, Synthetic};
 use super::{Method, Settings, analyse_frf};
@@ -59,6 +59,84 @@ fn score(f0: f64, zeta: f64, step: f64, of_peak: f64, of_local: f64) -> [Score; 
         s.claimed = (s.claimed / n).sqrt();
     }
     scores
+}
+
+/// Half of the noise cases are constant, half in proportion to the magnitude.
+const NOISES: [(f64, f64); 2] = [(0.02, 0.0), (0.0, 0.02)];
+
+#[test]
+fn damping_is_right_within_two_per_cent_at_two_per_cent_noise() {
+    for (of_peak, of_local) in NOISES {
+        for (f0, zeta, step) in [
+            (5.0, 0.05, 0.05),
+            (8.0, 0.03, 0.05),
+            (8.0, 0.05, 0.1),
+            (20.0, 0.01, 0.05),
+            (20.0, 0.03, 0.1),
+            (20.0, 0.05, 0.25),
+            (60.0, 0.005, 0.05),
+            (60.0, 0.02, 0.25),
+            (60.0, 0.05, 0.25),
+        ] {
+            let lines = 2.0 * zeta * f0 / step;
+            let case = format!("{f0} Hz, ζ {zeta}, {step} Hz lines, noise {of_peak}/{of_local}");
+            let [local, circle, half] = score(f0, zeta, step, of_peak, of_local);
+            for s in [&local, &circle, &half] {
+                assert_eq!((s.found, s.wrong_count), (DRAWS as usize, 0), "{case}");
+                assert!(s.bias.abs() < 0.01, "{case}: {s:?}");
+            }
+            assert!(
+                local.rms < 0.015 && circle.rms < 0.02 && half.rms < 0.025,
+                "{case}: {local:?} {circle:?} {half:?}"
+            );
+            // Enough lines: not one draw is further off than 2 % (the bound of Cramér and Rao is
+            // σ_ζ/ζ = σ √(4/(π lines)): 0.4 % at 24 lines, so five of them).
+            if lines >= 24.0 {
+                assert!(
+                    local.worst < 0.02 && circle.worst < 0.025,
+                    "{case}: {local:?} {circle:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn where_lines_are_few_the_standard_deviation_says_so() {
+    for (f0, zeta, step) in [
+        (8.0, 0.02, 0.25),
+        (20.0, 0.01, 0.25),
+        (5.0, 0.03, 0.1),
+        (5.0, 0.01, 0.25),
+    ] {
+        let [local, ..] = score(f0, zeta, step, 0.02, 0.0);
+        assert_eq!(local.found, DRAWS as usize);
+        assert!(
+            local.claimed > 0.7 * local.rms && local.claimed < 2.0 * local.rms,
+            "{f0} {zeta} {step}: {local:?}"
+        );
+    }
+}
+
+#[test]
+fn standard_deviations_cover_the_truth() {
+    let mut covered = [0; 2];
+    let mut found = [0; 2];
+    for (of_peak, of_local) in NOISES {
+        for f0 in [8.0, 20.0, 60.0] {
+            for zeta in [0.01, 0.03] {
+                let scores = score(f0, zeta, 0.05, of_peak, of_local);
+                for method in 0..2 {
+                    covered[method] += scores[method].covered;
+                    found[method] += scores[method].found;
+                }
+            }
+        }
+    }
+    for method in 0..2 {
+        let part = covered[method] as f64 / found[method] as f64;
+        assert!((0.60..0.76).contains(&part), "{:?}: {part:.3}", METHODS[method]);
+    }
 }
 
 #[test]

@@ -8,13 +8,12 @@
 use num_complex::Complex64;
 use serde::Serialize;
 
-use crate::Result;
-
 mod analysis;
 mod circle_fit;
 mod curve;
 mod global;
 mod half_power;
+mod joint_fit;
 mod local_fit;
 #[cfg(test)]
 mod marks;
@@ -23,7 +22,7 @@ mod peaks;
 mod synthetic;
 
 pub use analysis::analyse_frf;
-pub use global::global;
+pub use global::{SetMember, global};
 
 /// How a modal parameter was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
@@ -85,6 +84,8 @@ pub struct FrfMode {
     pub lines_in_half_power_band: f64,
     /// Prominence of the peak over the noise's standard deviation.
     pub significance: f64,
+    /// A simpler method gave another answer than the local fit and was left out.
+    pub contradicted: bool,
 }
 
 impl FrfMode {
@@ -111,7 +112,7 @@ pub struct GlobalMode {
     /// From the estimates' own standard deviations and their scatter over the FRFs.
     pub frequency_std_hz: f64,
     pub damping_std: f64,
-    /// Number of FRFs in which the mode was found.
+    /// Number of FRFs in which the mode stands out of the noise.
     pub found_in: usize,
 }
 
@@ -121,4 +122,136 @@ pub struct GlobalModes {
     /// Ascending in frequency.
     pub modes: Vec<GlobalMode>,
     pub warnings: Vec<String>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::synthetic::{Mode, Synthetic};
+    use super::*;
+
+    const MODES: [Mode; 3] = [
+        Mode {
+            frequency_hz: 3.6,
+            damping_ratio: 0.03,
+            constant: 0.01,
+        },
+        Mode {
+            frequency_hz: 12.0,
+            damping_ratio: 0.03,
+            constant: -0.01,
+        },
+        Mode {
+            frequency_hz: 40.0,
+            damping_ratio: 0.02,
+            constant: 0.02,
+        },
+    ];
+
+    fn analyse(case: Synthetic) -> FrfModes {
+        let (f, h) = case.frf();
+        analyse_frf(&f, &h, &Settings::default()).unwrap()
+    }
+
+    #[test]
+    fn a_conjugated_frf_is_turned_and_that_is_said() {
+        let (f, mut h) = Synthetic::new(3.0, 90.0, 0.1, &MODES)
+            .with_noise(0.0, 0.02, 3)
+            .frf();
+        let right = analyse_frf(&f, &h, &Settings::default()).unwrap();
+        h.iter_mut().for_each(|h| *h = h.conj());
+        let turned = analyse_frf(&f, &h, &Settings::default()).unwrap();
+        assert!(!right.conjugated && turned.conjugated);
+        assert!(turned.warnings.iter().any(|w| w.contains("conjugated")));
+        assert_eq!(right.modes.len(), 3);
+        for (a, b) in right.modes.iter().zip(&turned.modes) {
+            approx::assert_relative_eq!(
+                a.best().damping_ratio,
+                b.best().damping_ratio,
+                max_relative = 1e-6
+            );
+        }
+    }
+
+    #[test]
+    fn a_mode_of_negative_damping_is_named_and_left_out() {
+        let unstable = Mode::new(25.0, -0.02, 0.01);
+        let modes: Vec<Mode> = MODES.into_iter().chain([unstable]).collect();
+        let found = analyse(Synthetic::new(3.0, 90.0, 0.1, &modes).with_noise(0.0, 0.02, 3));
+        assert_eq!(found.modes.len(), 3);
+        assert!(
+            found
+                .warnings
+                .iter()
+                .any(|w| w.contains("25.0") && w.contains("negative damping")),
+            "{:?}",
+            found.warnings
+        );
+    }
+
+    #[test]
+    fn nothing_is_found_in_noise_or_in_a_line() {
+        for seed in 0..20 {
+            // Only the foot of a far mode, under 20 % noise.
+            let found = analyse(
+                Synthetic::new(0.0, 90.0, 0.1, &[Mode::new(900.0, 0.02, 1.0)]).with_noise(0.2, 0.0, seed),
+            );
+            assert!(found.modes.is_empty(), "seed {seed}: {:?}", found.modes);
+        }
+        // A free mass, with its infinite receptance at 0 Hz.
+        let f: Vec<f64> = (0..400).map(|k| 0.1 * f64::from(k)).collect();
+        let h: Vec<Complex64> = f.iter().map(|f| Complex64::new(-1.0 / (f * f), 0.0)).collect();
+        assert!(
+            analyse_frf(&f, &h, &Settings::default())
+                .unwrap()
+                .modes
+                .is_empty()
+        );
+    }
+
+    #[test]
+    fn modes_outside_the_band_are_not_reported() {
+        let (f, h) = Synthetic::new(3.0, 90.0, 0.1, &MODES).frf();
+        let settings = Settings {
+            band_hz: Some([5.0, 30.0]),
+        };
+        let found = analyse_frf(&f, &h, &settings).unwrap();
+        assert_eq!(found.modes.len(), 1);
+        approx::assert_relative_eq!(found.modes[0].best().frequency_hz, 12.0, max_relative = 1e-4);
+    }
+
+    #[test]
+    fn the_modal_constant_is_that_of_the_mode() {
+        let found = analyse(Synthetic::new(3.0, 90.0, 0.1, &MODES));
+        for (found, mode) in found.modes.iter().zip(&MODES) {
+            let constant = found.best().modal_constant.unwrap();
+            approx::assert_relative_eq!(constant.re, mode.constant, max_relative = 0.01);
+            assert!(constant.im.abs() < 0.01 * mode.constant.abs());
+        }
+    }
+
+    #[test]
+    fn lines_too_coarse_for_the_damping_are_said() {
+        let found =
+            analyse(Synthetic::new(3.0, 90.0, 0.5, &[Mode::new(12.3, 0.01, 1.0)]).with_noise(0.02, 0.0, 5));
+        assert_eq!(found.modes.len(), 1);
+        let best = found.modes[0].best();
+        assert!((best.damping_ratio - 0.01).abs() < 4.0 * best.damping_std.unwrap());
+        assert!(
+            found.warnings.iter().any(|w| w.contains("too coarse lines")),
+            "{:?}",
+            found.warnings
+        );
+    }
+
+    #[test]
+    fn constant_zero_and_short_curves_are_no_trouble() {
+        for n in [0, 1, 5, 9, 300] {
+            let f: Vec<f64> = (0..n).map(f64::from).collect();
+            for value in [0.0, 1.0, 1e-300, 1e300] {
+                let h = vec![Complex64::new(value, value); f.len()];
+                let found = analyse_frf(&f, &h, &Settings::default()).unwrap();
+                assert!(found.modes.is_empty());
+            }
+        }
+    }
 }

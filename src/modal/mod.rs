@@ -1,1 +1,257 @@
-//! Modal parameters from measured FRFs.
+//! Modal parameters from measured FRFs: peaks, then half-power, circle fit and a local rational fit at each
+//! peak, then all FRFs of a posture together.
+//!
+//! Nothing is returned that was not found: a mode needs a peak that stands out of the noise, lies inside the
+//! band, turns the right way round in the complex plane and whose fit converges there. What the lines cannot
+//! tell is said in the standard deviation and in a warning.
+
+use num_complex::Complex64;
+use serde::Serialize;
+
+mod analysis;
+mod circle_fit;
+mod curve;
+mod global;
+mod half_power;
+mod joint_fit;
+mod local_fit;
+#[cfg(test)]
+mod marks;
+mod peaks;
+#[cfg(test)]
+mod synthetic;
+
+pub use analysis::analyse_frf;
+pub use global::{SetMember, global};
+
+/// How a modal parameter was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Poles and residual terms fitted to the complex mobility around the peak.
+    LocalFit,
+    /// Angular sweep on the Nyquist circle of the mobility.
+    CircleFit,
+    /// Half-power width of |mobility|, crossings interpolated.
+    HalfPower,
+}
+
+impl Method {
+    pub fn id(self) -> &'static str {
+        match self {
+            Method::LocalFit => "local-fit",
+            Method::CircleFit => "circle-fit",
+            Method::HalfPower => "half-power",
+        }
+    }
+}
+
+/// What to look at.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Settings {
+    /// From, to in Hz; everything that was measured where `None`.
+    pub band_hz: Option<[f64; 2]>,
+}
+
+/// One mode by one method.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ModeEstimate {
+    pub method: Method,
+    /// Undamped natural frequency.
+    pub frequency_hz: f64,
+    /// Viscous damping ratio, > 0.
+    pub damping_ratio: f64,
+    /// From the residual of the fit; `None` where there were only just enough lines.
+    pub frequency_std_hz: Option<f64>,
+    pub damping_std: Option<f64>,
+    /// Circle fit: standard deviation of ζ over the point pairs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub damping_spread: Option<f64>,
+    /// Modal constant φ_out φ_in for mass-normalised modes, 1/kg (complex: real for a real mode).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub modal_constant: Option<Complex64>,
+    /// Half-power: only one crossing was measured, the other is the fitted curve's.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub one_sided: bool,
+}
+
+/// One mode of one FRF.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrfMode {
+    /// Best method first (local fit, circle fit, half-power); never empty.
+    pub estimates: Vec<ModeEstimate>,
+    /// Spectral lines in the half-power band, 2ζf₀/Δf.
+    pub lines_in_half_power_band: f64,
+    /// Prominence of the peak over the noise's standard deviation.
+    pub significance: f64,
+    /// A simpler method gave another answer than the local fit and was left out.
+    pub contradicted: bool,
+}
+
+impl FrfMode {
+    pub fn best(&self) -> &ModeEstimate {
+        &self.estimates[0]
+    }
+}
+
+/// All modes of one FRF.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FrfModes {
+    /// Ascending in frequency.
+    pub modes: Vec<FrfMode>,
+    /// The FRF was recorded with the sign convention e^{−iωt} and was turned before the analysis.
+    pub conjugated: bool,
+    pub warnings: Vec<String>,
+}
+
+/// One mode of a set of FRFs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GlobalMode {
+    pub frequency_hz: f64,
+    pub damping_ratio: f64,
+    /// From the estimates' own standard deviations and their scatter over the FRFs.
+    pub frequency_std_hz: f64,
+    pub damping_std: f64,
+    /// Number of FRFs in which the mode stands out of the noise.
+    pub found_in: usize,
+}
+
+/// All modes of a set of FRFs.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct GlobalModes {
+    /// Ascending in frequency.
+    pub modes: Vec<GlobalMode>,
+    pub warnings: Vec<String>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::synthetic::{Mode, Synthetic};
+    use super::*;
+
+    const MODES: [Mode; 3] = [
+        Mode {
+            frequency_hz: 3.6,
+            damping_ratio: 0.03,
+            constant: 0.01,
+        },
+        Mode {
+            frequency_hz: 12.0,
+            damping_ratio: 0.03,
+            constant: -0.01,
+        },
+        Mode {
+            frequency_hz: 40.0,
+            damping_ratio: 0.02,
+            constant: 0.02,
+        },
+    ];
+
+    fn analyse(case: Synthetic) -> FrfModes {
+        let (f, h) = case.frf();
+        analyse_frf(&f, &h, &Settings::default()).unwrap()
+    }
+
+    #[test]
+    fn a_conjugated_frf_is_turned_and_that_is_said() {
+        let (f, mut h) = Synthetic::new(3.0, 90.0, 0.1, &MODES)
+            .with_noise(0.0, 0.02, 3)
+            .frf();
+        let right = analyse_frf(&f, &h, &Settings::default()).unwrap();
+        h.iter_mut().for_each(|h| *h = h.conj());
+        let turned = analyse_frf(&f, &h, &Settings::default()).unwrap();
+        assert!(!right.conjugated && turned.conjugated);
+        assert!(turned.warnings.iter().any(|w| w.contains("conjugated")));
+        assert_eq!(right.modes.len(), 3);
+        for (a, b) in right.modes.iter().zip(&turned.modes) {
+            approx::assert_relative_eq!(
+                a.best().damping_ratio,
+                b.best().damping_ratio,
+                max_relative = 1e-6
+            );
+        }
+    }
+
+    #[test]
+    fn a_mode_of_negative_damping_is_named_and_left_out() {
+        let unstable = Mode::new(25.0, -0.02, 0.01);
+        let modes: Vec<Mode> = MODES.into_iter().chain([unstable]).collect();
+        let found = analyse(Synthetic::new(3.0, 90.0, 0.1, &modes).with_noise(0.0, 0.02, 3));
+        assert_eq!(found.modes.len(), 3);
+        assert!(
+            found
+                .warnings
+                .iter()
+                .any(|w| w.contains("25.0") && w.contains("negative damping")),
+            "{:?}",
+            found.warnings
+        );
+    }
+
+    #[test]
+    fn nothing_is_found_in_noise_or_in_a_line() {
+        for seed in 0..20 {
+            // Only the foot of a far mode, under 20 % noise.
+            let found = analyse(
+                Synthetic::new(0.0, 90.0, 0.1, &[Mode::new(900.0, 0.02, 1.0)]).with_noise(0.2, 0.0, seed),
+            );
+            assert!(found.modes.is_empty(), "seed {seed}: {:?}", found.modes);
+        }
+        // A free mass, with its infinite receptance at 0 Hz.
+        let f: Vec<f64> = (0..400).map(|k| 0.1 * f64::from(k)).collect();
+        let h: Vec<Complex64> = f.iter().map(|f| Complex64::new(-1.0 / (f * f), 0.0)).collect();
+        assert!(
+            analyse_frf(&f, &h, &Settings::default())
+                .unwrap()
+                .modes
+                .is_empty()
+        );
+    }
+
+    #[test]
+    fn modes_outside_the_band_are_not_reported() {
+        let (f, h) = Synthetic::new(3.0, 90.0, 0.1, &MODES).frf();
+        let settings = Settings {
+            band_hz: Some([5.0, 30.0]),
+        };
+        let found = analyse_frf(&f, &h, &settings).unwrap();
+        assert_eq!(found.modes.len(), 1);
+        approx::assert_relative_eq!(found.modes[0].best().frequency_hz, 12.0, max_relative = 1e-4);
+    }
+
+    #[test]
+    fn the_modal_constant_is_that_of_the_mode() {
+        let found = analyse(Synthetic::new(3.0, 90.0, 0.1, &MODES));
+        for (found, mode) in found.modes.iter().zip(&MODES) {
+            let constant = found.best().modal_constant.unwrap();
+            approx::assert_relative_eq!(constant.re, mode.constant, max_relative = 0.01);
+            assert!(constant.im.abs() < 0.01 * mode.constant.abs());
+        }
+    }
+
+    #[test]
+    fn lines_too_coarse_for_the_damping_are_said() {
+        let found =
+            analyse(Synthetic::new(3.0, 90.0, 0.5, &[Mode::new(12.3, 0.01, 1.0)]).with_noise(0.02, 0.0, 5));
+        assert_eq!(found.modes.len(), 1);
+        let best = found.modes[0].best();
+        assert!((best.damping_ratio - 0.01).abs() < 4.0 * best.damping_std.unwrap());
+        assert!(
+            found.warnings.iter().any(|w| w.contains("too coarse lines")),
+            "{:?}",
+            found.warnings
+        );
+    }
+
+    #[test]
+    fn constant_zero_and_short_curves_are_no_trouble() {
+        for n in [0, 1, 5, 9, 300] {
+            let f: Vec<f64> = (0..n).map(f64::from).collect();
+            for value in [0.0, 1.0, 1e-300, 1e300] {
+                let h = vec![Complex64::new(value, value); f.len()];
+                let found = analyse_frf(&f, &h, &Settings::default()).unwrap();
+                assert!(found.modes.is_empty());
+            }
+        }
+    }
+}

@@ -105,15 +105,12 @@ impl ModalFrf {
                 "lobes: the residual flexibility is not finite",
             ));
         }
-        let frequencies = || modes.iter().map(|m| m.omega_n_rad_per_s / TAU);
-        let (Some(lowest), Some(highest)) = (frequencies().reduce(f64::min), frequencies().reduce(f64::max))
-        else {
-            return Err(Error::computation("lobes need at least one mode"));
-        };
+        let band_hz = band_around(modes.iter().map(|m| m.omega_n_rad_per_s / TAU))
+            .ok_or_else(|| Error::computation("lobes need at least one mode"))?;
         Ok(ModalFrf {
             modes,
             residual_m_per_n,
-            band_hz: (lowest / BELOW_LOWEST_MODE, highest * ABOVE_HIGHEST_MODE),
+            band_hz,
         })
     }
 
@@ -157,23 +154,39 @@ impl DirectFrf for ModalFrf {
         self.band_hz
     }
 
-    /// Even steps of phase around every mode, and a coarse geometric grid between.
     fn seed_grid_hz(&self) -> Vec<f64> {
-        const COARSE: usize = 64;
-        let (low, high) = self.band_hz;
-        let ratio = (high / low).ln();
-        let mut grid: Vec<f64> = (1..COARSE)
-            .map(|i| low * (ratio * i as f64 / COARSE as f64).exp())
-            .collect();
-        for mode in &self.modes {
-            let f = mode.omega_n_rad_per_s / TAU;
-            grid.extend((-8..=8).map(|step| {
-                let phase = f64::from(step) * std::f64::consts::PI / 18.0;
-                f * (1.0 + mode.damping_ratio * phase.tan())
-            }));
-        }
-        within_band(grid, low, high)
+        let resonances = self
+            .modes
+            .iter()
+            .map(|m| (m.omega_n_rad_per_s / TAU, m.damping_ratio));
+        resonance_grid(resonances, self.band_hz)
     }
+}
+
+/// Even steps of phase around every resonance (frequency in Hz, damping ratio), and a coarse geometric grid between.
+pub(super) fn resonance_grid(
+    resonances: impl Iterator<Item = (f64, f64)>,
+    (low, high): (f64, f64),
+) -> Vec<f64> {
+    const COARSE: usize = 64;
+    let ratio = (high / low).ln();
+    let mut grid: Vec<f64> = (1..COARSE)
+        .map(|i| low * (ratio * i as f64 / COARSE as f64).exp())
+        .collect();
+    for (f, damping_ratio) in resonances {
+        grid.extend((-8..=8).map(|step| {
+            let phase = f64::from(step) * std::f64::consts::PI / 18.0;
+            f * (1.0 + damping_ratio * phase.tan())
+        }));
+    }
+    within_band(grid, low, high)
+}
+
+/// The band in which chatter is sought around modes at these frequencies (Hz); `None` without any.
+pub(super) fn band_around(frequencies_hz: impl Iterator<Item = f64> + Clone) -> Option<(f64, f64)> {
+    let lowest = frequencies_hz.clone().reduce(f64::min)?;
+    let highest = frequencies_hz.reduce(f64::max)?;
+    Some((lowest / BELOW_LOWEST_MODE, highest * ABOVE_HIGHEST_MODE))
 }
 
 /// Ascending, without near doubles, both ends of the band included.

@@ -15,6 +15,8 @@
 mod arcs;
 pub mod force;
 pub mod frf;
+pub mod measured;
+pub mod robot;
 pub mod sampled;
 pub mod setup;
 pub mod solve;
@@ -22,6 +24,7 @@ pub mod thesis;
 
 pub use force::RegenerativeForce;
 pub use frf::{AxisMode, DirectFrf, ModalFrf, Mode};
+pub use robot::RobotFrf;
 pub use sampled::SampledFrf;
 pub use solve::{AbsoluteLimit, Limit, LobeCurve, Peak, StabilitySolver, peak_near, peaks, speed_grid};
 pub use thesis::{ThesisLobes, thesis_lobes};

@@ -128,7 +128,11 @@ impl Projection {
 /// 1 + d₁x + d₂x² on every line; `None` where it has a root (nearly) on the frequency axis.
 fn denominator_values(x: &[f64], coefficients: &DVector<Complex64>) -> Option<Vec<Complex64>> {
     let value = |x: &f64| {
-        Complex64::ONE + coefficients.iter().rev().fold(Complex64::ZERO, |sum, d| (sum + d) * *x)
+        Complex64::ONE
+            + coefficients
+                .iter()
+                .rev()
+                .fold(Complex64::ZERO, |sum, d| (sum + d) * *x)
     };
     let values: Vec<Complex64> = x.iter().map(value).collect();
     values

@@ -28,10 +28,11 @@ pub fn significant(value: f64, digits: usize) -> String {
     }
 }
 
-/// A fixed number of decimals with a true minus sign; `–` where there is no number.
+/// A fixed number of decimals with a true minus sign, a power of ten from 10¹⁵ on; `–` where there is no number.
 pub fn decimals(value: f64, decimals: usize) -> String {
-    if !value.is_finite() {
-        return MISSING.to_owned();
+    if !value.is_finite() || value.abs() >= 1e15 {
+        // Hundreds of digits help nobody.
+        return significant(value, 3);
     }
     let text = format!("{value:.decimals$}");
     // "-0.00" says nothing that "0.00" does not.
@@ -214,6 +215,7 @@ mod tests {
         assert_eq!(percent(0.00021), "0.021 %");
         assert_eq!(percent(3.5), "350 %");
         assert_eq!(percent(-0.0), "0.00 %");
+        assert_eq!(percent(1e300), "1.00·10³⁰² %");
         assert_eq!(percent(f64::NAN), MISSING);
     }
 }

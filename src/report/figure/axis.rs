@@ -106,7 +106,8 @@ impl Axis {
         let low = if low > 0.0 { low } else { 1e-3 };
         let high = high.max(low);
         // At least a third of a decade on screen.
-        let shortfall = ((1.0 / 3.0 - (high / low).log10()) / 2.0).max(0.02);
+        let decades = high.log10() - low.log10();
+        let shortfall = ((1.0 / 3.0 - decades) / 2.0).max(0.03 * decades);
         let (low, high) = (low * 10f64.powf(-shortfall), high * 10f64.powf(shortfall));
         let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
         let span = high.log10() - low.log10();

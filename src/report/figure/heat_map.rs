@@ -118,7 +118,7 @@ impl HeatMap {
     fn written(&self, value: f64) -> String {
         match self.format {
             CellFormat::Percent => percent(value),
-            CellFormat::Significant(digits) => significant(value, digits),
+            CellFormat::Significant(digits) => significant(value, digits.min(6)),
         }
     }
 
@@ -211,12 +211,10 @@ impl HeatMap {
         for i in 0..steps {
             let share = f64::from(i) / f64::from(steps);
             let y = sheet.top + length * (1.0 - share);
-            canvas.rect(
-                (x, y - length / f64::from(steps)),
-                (x + width, y),
-                style::ramp(share),
-                1.0,
-            );
+            // Each stripe reaches a pixel into the one below, or rounding would leave white seams.
+            let foot = (y + 1.0).min(sheet.top + length);
+            let head = y - length / f64::from(steps);
+            canvas.rect((x, head), (x + width, foot), style::ramp(share), 1.0);
         }
         let corners = [
             (x, sheet.top),
@@ -240,7 +238,7 @@ impl HeatMap {
             canvas.line((x + width, y), (x + width + 5.0, y), style::FRAME);
             let value = match self.format {
                 CellFormat::Percent => format!("{} %", significant(tick.at, 3).trim_end_matches(".0")),
-                CellFormat::Significant(digits) => significant(tick.at, digits.max(2)),
+                CellFormat::Significant(digits) => significant(tick.at, digits.clamp(2, 6)),
             };
             canvas.text((x + width + 9.0, y), &value, style::TICK);
         }

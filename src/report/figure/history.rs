@@ -130,7 +130,7 @@ impl HistoryFigure {
             panel.markers(canvas, inside.clone(), (Marker::Disc, SIGN), FIT.color, 0.0);
             // The larger number right above its point, the smaller left below: falling lines leave both free.
             for ((i, inside), (_, outside)) in inside.zip(outside).filter(|_| room >= 48.0) {
-                let fit_above = !(outside >= inside);
+                let fit_above = inside > outside || outside.is_nan();
                 for (value, above, color) in
                     [(inside, fit_above, FIT.color), (outside, !fit_above, style::INK)]
                 {

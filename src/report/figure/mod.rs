@@ -20,6 +20,8 @@ mod regression;
 mod side_by_side;
 
 #[cfg(test)]
+mod samples;
+#[cfg(test)]
 mod tests;
 
 pub use force_record::{ForceChannel, ForceRecord};

@@ -216,11 +216,8 @@ impl Panel {
                 leave = leave.min(distance / direction);
             }
         }
-        if !(enter <= leave) {
-            return None;
-        }
         let at = |t: f64| (a.0 + t * dx, a.1 + t * dy);
-        Some((at(enter), if leave >= 1.0 { b } else { at(leave) }))
+        (enter <= leave).then(|| (at(enter), if leave >= 1.0 { b } else { at(leave) }))
     }
 }
 

@@ -102,17 +102,13 @@ impl ParameterFigure {
                 canvas.rect((left, y), (right, y + ROW), Color(246, 247, 249), 1.0);
             }
             panel.grid(canvas);
-            for (i, row) in rows.iter().enumerate() {
-                draw_row(canvas, &panel, row, top + ROW * (i as f64 + 0.5));
-            }
             if let Some(zero) = panel.x_at(0.0) {
                 canvas.line((zero, top), (zero, bottom), Stroke::solid(style::INK, 1.6));
             }
-            Panel {
-                y: Axis::categories("", &[]).with_ticks(&[], |_| String::new()),
-                ..panel
+            for (i, row) in rows.iter().enumerate() {
+                draw_row(canvas, &panel, row, top + ROW * (i as f64 + 0.5));
             }
-            .frame(canvas);
+            panel.frame(canvas);
         })
     }
 }

@@ -1,317 +1,11 @@
 //! Every figure on plausible and on odd data. `LOBESTONE_GALLERY=dir cargo test gallery` keeps the images to look at.
 
 use std::collections::HashSet;
-use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
+use super::samples::{frf_figure, gallery, jitter};
 use super::*;
-
-/// A deterministic stand-in for noise, −1 … 1.
-fn jitter(i: usize) -> f64 {
-    let x = (i as f64 * 12.9898).sin() * 43758.5453;
-    2.0 * (x - x.floor()) - 1.0
-}
-
-/// Receptance of a few modes (frequency in Hz, damping ratio, stiffness in N/m), plus noise.
-fn frf(label: &str, modes: &[(f64, f64, f64)], noise: f64) -> FrfCurve {
-    let frequency_hz: Vec<f64> = (0..436).map(|i| 6.0 + 0.125 * i as f64).collect();
-    let value = frequency_hz.iter().enumerate().map(|(i, f)| {
-        let sum: Complex64 = modes
-            .iter()
-            .map(|(f0, zeta, k)| {
-                let r = f / f0;
-                Complex64::new(1.0, 0.0) / (k * Complex64::new(1.0 - r * r, 2.0 * zeta * r))
-            })
-            .sum();
-        sum + noise * Complex64::new(jitter(2 * i), jitter(2 * i + 1))
-    });
-    FrfCurve {
-        label: label.into(),
-        value: value.collect(),
-        frequency_hz,
-    }
-}
-
-fn frf_figure() -> FrfFigure {
-    let truth = [
-        (11.3, 0.03, 1.2e6),
-        (17.9, 0.025, 3.0e6),
-        (34.1, 0.02, 8.0e6),
-        (48.0, 0.03, 1.5e7),
-    ];
-    let nominal = [(13.0, 0.02, 1.5e6), (19.5, 0.02, 3.6e6), (37.0, 0.02, 1.0e7)];
-    FrfFigure {
-        title: "Posture p1, response 1X to force 1X: measured against model".into(),
-        quantity: "Receptance".into(),
-        unit: "m/N".into(),
-        measured: Some(frf("measured", &truth, 4e-9)),
-        models: vec![
-            frf("model, nominal (nrms 92 %)", &nominal, 0.0),
-            frf("model, calibrated (nrms 11 %)", &truth[..3], 0.0),
-        ],
-        noise: Some(NoiseLevel {
-            label: "noise level".into(),
-            frequency_hz: vec![6.0, 60.5],
-            magnitude: vec![4e-9, 4e-9],
-        }),
-    }
-}
-
-fn nyquist() -> NyquistFigure {
-    let frf = frf_figure();
-    NyquistFigure {
-        title: "Posture p1, 1X/1X in the complex plane".into(),
-        unit: "m/N".into(),
-        measured: frf.measured,
-        models: frf.models,
-    }
-}
-
-fn heat_map(rows: usize, columns: usize) -> HeatMap {
-    let value = |r: usize, c: usize| Some(0.04 + 0.5 * (jitter(7 * r + 31 * c) * 0.5 + 0.5).powi(2));
-    let mut values: Vec<Vec<_>> = (0..rows)
-        .map(|r| (0..columns).map(|c| value(r, c)).collect())
-        .collect();
-    if let Some(cell) = values.get_mut(1).and_then(|row| row.get_mut(2)) {
-        *cell = None;
-    }
-    HeatMap {
-        title: "Calibrated model against measurement: error by posture and direction".into(),
-        row_label: "Posture".into(),
-        column_label: "Response / excitation".into(),
-        rows: (0..rows).map(|r| format!("p{}", r + 1)).collect(),
-        columns: (0..columns)
-            .map(|c| format!("{0}X/{0}{1}", c / 3 + 1, ["X", "Y", "Z"][c % 3]))
-            .collect(),
-        values,
-        value_label: "Error nrms".into(),
-        ..Default::default()
-    }
-}
-
-fn parameters() -> ParameterFigure {
-    let row = |i: usize| ParameterRow {
-        name: format!("joint {} stiffness", i + 1),
-        unit: "N·m/rad".into(),
-        nominal: 2.5e6 / (i + 1) as f64,
-        before: Some(Estimate {
-            value: 2.5e6 / (i + 1) as f64,
-            std_error: None,
-        }),
-        after: Some(Estimate {
-            value: 2.5e6 / (i + 1) as f64 * (1.0 + 0.3 * jitter(i)),
-            std_error: Some(2.5e6 / (i + 1) as f64 * (0.002 + 0.03 * i as f64 * 0.4)),
-        }),
-    };
-    let mut rows: Vec<_> = (0..6).map(row).collect();
-    rows.push(ParameterRow {
-        name: "damping ratio".into(),
-        nominal: 0.02,
-        before: Some(Estimate {
-            value: 0.02,
-            std_error: None,
-        }),
-        after: Some(Estimate {
-            value: 0.0263,
-            std_error: Some(0.0004),
-        }),
-        ..Default::default()
-    });
-    ParameterFigure {
-        title: "Parameters before and after calibration".into(),
-        before_label: "nominal".into(),
-        after_label: "calibrated".into(),
-        rows,
-    }
-}
-
-fn force_record() -> ForceRecord {
-    let rate = 10_000.0;
-    let channel = |label: &str, mean: f64, slope: f64| {
-        let samples = (0..40_000).map(|i| {
-            let t = i as f64 / rate;
-            let cutting = (1.0..3.2).contains(&t);
-            let drift = 3.0 + slope * t;
-            let teeth = mean * (1.0 + 0.8 * (2.0 * PI * 120.0 * t).sin());
-            drift + 2.0 * jitter(i) + if cutting { teeth } else { 0.0 }
-        });
-        ForceChannel {
-            label: label.into(),
-            unit: "N".into(),
-            start_s: 0.0,
-            sample_interval_s: 1.0 / rate,
-            samples: samples.collect(),
-            drift: vec![(0.0, 3.0), (4.0, 3.0 + 4.0 * slope)],
-            steady_level: Some(mean + 3.0 + 2.0 * slope),
-        }
-    };
-    ForceRecord {
-        title: "Cut 03: 1200 rpm, 0.10 mm per tooth".into(),
-        channels: vec![
-            channel("Fx", 60.0, 6.0),
-            channel("Fy", -110.0, -9.0),
-            channel("Fz", 25.0, 2.0),
-        ],
-        air_s: vec![(0.0, 0.95), (3.3, 4.0)],
-        steady_s: Some((1.2, 2.9)),
-    }
-}
-
-fn regression() -> RegressionFigure {
-    let series = |label: &str, intercept: f64, slope: f64, k: usize| RegressionSeries {
-        label: label.into(),
-        points: (0..5)
-            .map(|i| {
-                let x = 0.03 + 0.03 * i as f64;
-                let y = intercept + slope * x + 3.0 * jitter(i + 10 * k);
-                RegressionPoint {
-                    x,
-                    y,
-                    std_error: Some(4.0),
-                    excluded: i == 4 && k == 1,
-                }
-            })
-            .collect(),
-        line: Some((intercept, slope)),
-    };
-    RegressionFigure {
-        title: "Average cutting force over feed, slot milling, 60 m/min".into(),
-        x_label: "Feed per tooth (mm)".into(),
-        y_label: "Average force (N)".into(),
-        series: vec![
-            series("Fx: R² = 0.991", -22.0, -520.0, 0),
-            series("Fy: R² = 0.998", 31.0, 1480.0, 1),
-            series("Fz: R² = 0.962", 4.0, 170.0, 2),
-        ],
-    }
-}
-
-fn lobe_curve(label: &str, least: f64, frequency_hz: f64) -> LobeCurve {
-    let spindle_rpm: Vec<f64> = (100..=1500).map(f64::from).collect();
-    let depth = |n: f64| {
-        let waves = 60.0 * frequency_hz / (2.0 * n);
-        let phase = waves - waves.floor();
-        least * (1.0 + 0.02 * n / 10.0 * (PI * phase).sin().abs().powi(2) / (0.03 + (1.0 - phase)))
-    };
-    let depth_limit_mm = spindle_rpm
-        .iter()
-        .map(|n| (!(700.0..740.0).contains(n)).then(|| depth(*n)))
-        .collect();
-    LobeCurve {
-        label: label.into(),
-        spindle_rpm,
-        depth_limit_mm,
-    }
-}
-
-fn lobes() -> LobesFigure {
-    LobesFigure {
-        title: "Stability lobes at the four thesis postures, slot milling".into(),
-        curves: vec![
-            lobe_curve("p1, before calibration", 0.55, 13.0),
-            lobe_curve("p1, calibrated", 0.42, 11.3),
-            lobe_curve("p2, calibrated", 0.61, 17.9),
-            lobe_curve("p3, calibrated", 0.75, 24.0),
-        ],
-        absolute_limit_mm: Some(0.42),
-        markers: vec![
-            LobeMarker {
-                spindle_rpm: 400.0,
-                depth_mm: 0.3,
-                outcome: LobeOutcome::Stable,
-            },
-            LobeMarker {
-                spindle_rpm: 900.0,
-                depth_mm: 1.2,
-                outcome: LobeOutcome::Chatter,
-            },
-            LobeMarker {
-                spindle_rpm: 1300.0,
-                depth_mm: 0.6,
-                outcome: LobeOutcome::Recommended,
-            },
-        ],
-        depth_cap_mm: None,
-    }
-}
-
-fn side_by_side() -> SideBySide {
-    let values = |scale: f64, k: usize| -> Vec<_> {
-        (0..6)
-            .map(|i| Some(scale * 10f64.powf(0.5 * jitter(i) + 0.1 * jitter(i + 20 * k))))
-            .collect()
-    };
-    let mut measured = values(1000.0, 1);
-    measured[4] = None;
-    SideBySide {
-        title: "Static stiffness at the flange (tables 5 and 6)".into(),
-        y_label: "Stiffness (N/mm)".into(),
-        groups: ["A, X", "A, Y", "A, Z", "B, X", "B, Y", "B, Z"]
-            .map(|s| format!("posture {s}"))
-            .to_vec(),
-        series: vec![
-            BarSeries {
-                label: "published model".into(),
-                values: values(1200.0, 0),
-            },
-            BarSeries {
-                label: "measured".into(),
-                values: measured,
-            },
-            BarSeries {
-                label: "ours, nominal".into(),
-                values: values(1150.0, 2),
-            },
-            BarSeries {
-                label: "ours, calibrated".into(),
-                values: values(1020.0, 1),
-            },
-        ],
-        log: true,
-    }
-}
-
-fn history() -> HistoryFigure {
-    let revision = |label: &str, fit, held_out| Revision {
-        label: label.into(),
-        fit_nrms: fit,
-        held_out_nrms: Some(held_out),
-    };
-    HistoryFigure {
-        title: "Error by revision of the model".into(),
-        revisions: vec![
-            revision("0 baseline", 0.412, 0.447),
-            revision("1 + base-compliance", 0.183, 0.201),
-            revision("2 + tool-flexibility", 0.0212, 0.0224),
-        ],
-        noise_floor_nrms: Some(0.0201),
-    }
-}
-
-fn gallery() -> Vec<(&'static str, Result<Vec<u8>, Error>)> {
-    let linear = SideBySide {
-        log: false,
-        ..side_by_side()
-    };
-    let mut flat_history = history();
-    flat_history.revisions.pop();
-    vec![
-        ("frf", frf_figure().png()),
-        ("nyquist", nyquist().png()),
-        ("heat_map", heat_map(6, 9).png()),
-        ("heat_map_large", heat_map(40, 36).png()),
-        ("heat_map_small", heat_map(2, 3).png()),
-        ("parameters", parameters().png()),
-        ("force_record", force_record().png()),
-        ("regression", regression().png()),
-        ("lobes", lobes().png()),
-        ("side_by_side", side_by_side().png()),
-        ("side_by_side_linear", linear.png()),
-        ("history", history().png()),
-        ("history_linear", flat_history.png()),
-    ]
-}
 
 /// Width, height and number of distinct colours.
 fn decoded(png: &[u8]) -> (u32, u32, usize) {
@@ -319,7 +13,8 @@ fn decoded(png: &[u8]) -> (u32, u32, usize) {
     let mut reader = png::Decoder::new(png).read_info().unwrap();
     let mut pixels = vec![0; reader.output_buffer_size()];
     let info = reader.next_frame(&mut pixels).unwrap();
-    let colours: HashSet<&[u8]> = pixels.chunks_exact(3).collect();
+    // Every seventh pixel tells a figure from a blank sheet.
+    let colours: HashSet<&[u8]> = pixels.chunks_exact(3).step_by(7).collect();
     (info.width, info.height, colours.len())
 }
 
@@ -339,5 +34,363 @@ fn the_gallery_is_valid_not_blank_and_small() {
             std::fs::create_dir_all(folder).unwrap();
             std::fs::write(folder.join(format!("{name}.png")), png).unwrap();
         }
+    }
+}
+
+const LONG: &str = "a name out of a file that never ends, with µ, ζ, \u{4e2d}\u{6587}, \t tabs and <tags>, until nobody reads on ";
+
+/// What goes wrong in files: nothing, one value, all the same, zeros, no numbers, absurd sizes.
+fn odd_values() -> Vec<Vec<f64>> {
+    vec![
+        vec![],
+        vec![3.0],
+        vec![2.0; 30],
+        vec![0.0; 30],
+        vec![f64::NAN; 30],
+        vec![f64::INFINITY, f64::NEG_INFINITY, f64::NAN, 1.0],
+        vec![1e-300, 1e300, -1e300, 5e-324, f64::MAX, f64::MIN],
+        vec![-5.0, -4.0, 0.0, 1e-12, 1e12],
+        vec![1e9, 1e9 + 1e-6, 1e9 + 2e-6],
+        (0..150).map(|i| 10f64.powf(30.0 * jitter(i))).collect(),
+    ]
+}
+
+/// A figure, or an error that says which figure it is; never a panic, never an empty image.
+fn sound(name: &str, result: Result<Vec<u8>, Error>) {
+    match result {
+        Ok(png) => {
+            let (width, height, colours) = decoded(&png);
+            assert!(
+                width >= 1000 && (140..4000).contains(&height) && colours > 20,
+                "{name}: {width} × {height}, {colours} colours"
+            );
+        }
+        Err(error) => assert!(error.to_string().contains("nothing to draw"), "{name}: {error}"),
+    }
+}
+
+fn odd_curves(xs: &[f64], ys: &[f64]) -> Vec<Result<Vec<u8>, Error>> {
+    let curve = FrfCurve {
+        label: LONG.into(),
+        frequency_hz: xs.to_vec(),
+        value: ys
+            .iter()
+            .zip(ys.iter().rev())
+            .map(|(a, b)| Complex64::new(*a, *b))
+            .collect(),
+    };
+    let noise = NoiseLevel {
+        frequency_hz: xs.to_vec(),
+        magnitude: ys.to_vec(),
+        ..Default::default()
+    };
+    let frf = FrfFigure {
+        measured: Some(curve.clone()),
+        models: vec![curve.clone(); 4],
+        noise: Some(noise),
+        ..Default::default()
+    };
+    let nyquist = NyquistFigure {
+        models: vec![curve],
+        ..Default::default()
+    };
+    let first = |v: &[f64]| v.first().copied().unwrap_or(f64::NAN);
+    let lobes = LobesFigure {
+        curves: vec![LobeCurve {
+            spindle_rpm: xs.to_vec(),
+            depth_limit_mm: ys.iter().map(|y| Some(*y)).collect(),
+            ..Default::default()
+        }],
+        absolute_limit_mm: ys.last().copied(),
+        markers: vec![LobeMarker {
+            spindle_rpm: first(xs),
+            depth_mm: first(ys),
+            outcome: LobeOutcome::Stable,
+        }],
+        depth_cap_mm: xs.last().copied(),
+        ..Default::default()
+    };
+    vec![frf.png(), nyquist.png(), lobes.png()]
+}
+
+fn odd_points(xs: &[f64], ys: &[f64]) -> Vec<Result<Vec<u8>, Error>> {
+    let pairs = || xs.iter().copied().zip(ys.iter().copied()).take(30);
+    let first = |v: &[f64]| v.first().copied().unwrap_or(f64::NAN);
+    let points = pairs().map(|(x, y)| RegressionPoint {
+        x,
+        y,
+        std_error: Some(x),
+        excluded: false,
+    });
+    let series = RegressionSeries {
+        points: points.collect(),
+        line: Some((first(ys), first(xs))),
+        ..Default::default()
+    };
+    let regression = RegressionFigure {
+        series: vec![series],
+        ..Default::default()
+    };
+    let revisions = pairs().map(|(x, y)| Revision {
+        label: LONG.into(),
+        fit_nrms: x,
+        held_out_nrms: Some(y),
+    });
+    let history = HistoryFigure {
+        title: LONG.into(),
+        revisions: revisions.collect(),
+        noise_floor_nrms: ys.last().copied(),
+    };
+    let rows = pairs().map(|(x, y)| ParameterRow {
+        name: LONG.into(),
+        unit: "N".into(),
+        nominal: x,
+        before: Some(Estimate {
+            value: y,
+            std_error: Some(x),
+        }),
+        after: None,
+    });
+    let parameters = ParameterFigure {
+        rows: rows.collect(),
+        ..Default::default()
+    };
+    vec![regression.png(), history.png(), parameters.png()]
+}
+
+#[test]
+fn odd_numbers_never_panic() {
+    let all = odd_values();
+    for (i, xs) in all.iter().enumerate() {
+        // Each kind against itself, its third neighbour and plain numbers: all pairs would take a minute.
+        for j in HashSet::from([i, (i + 3) % all.len(), 2]) {
+            let ys = &all[j];
+            for (k, result) in odd_curves(xs, ys)
+                .into_iter()
+                .chain(odd_points(xs, ys))
+                .enumerate()
+            {
+                sound(&format!("x {i}, y {j}, figure {k}"), result);
+            }
+        }
+    }
+}
+
+#[test]
+fn odd_records_never_panic() {
+    for (i, values) in odd_values().into_iter().enumerate() {
+        for interval in [1e-4, 0.0, -1.0, f64::NAN, 1e250, 1e-250] {
+            let channel = ForceChannel {
+                label: LONG.into(),
+                sample_interval_s: interval,
+                samples: values.clone(),
+                drift: values.iter().map(|v| (*v, *v)).collect(),
+                steady_level: values.last().copied(),
+                ..Default::default()
+            };
+            let record = ForceRecord {
+                title: LONG.into(),
+                channels: vec![channel; 2],
+                air_s: vec![(f64::NAN, 1.0), (5.0, -5.0)],
+                steady_s: Some((values.first().copied().unwrap_or(0.0), 0.0)),
+            };
+            sound(&format!("values {i}, interval {interval}"), record.png());
+        }
+    }
+}
+
+#[test]
+fn odd_tables_and_bars_never_panic() {
+    for (i, values) in odd_values().into_iter().enumerate() {
+        let cells: Vec<Option<f64>> = values.iter().map(|v| Some(*v)).take(100).collect();
+        for format in [
+            CellFormat::Percent,
+            CellFormat::Significant(0),
+            CellFormat::Significant(99),
+        ] {
+            let map = HeatMap {
+                title: LONG.repeat(50),
+                rows: vec![LONG.into(); 3],
+                columns: vec![LONG.into(); cells.len()],
+                // One row too few, one value too few: what is missing stays empty.
+                values: vec![cells.clone(), cells.iter().copied().skip(1).collect()],
+                format,
+                range: Some((values.first().copied().unwrap_or(1.0), 1.0)),
+                ..Default::default()
+            };
+            sound(&format!("map {i} {format:?}"), map.png());
+        }
+        for log in [true, false] {
+            let bars = SideBySide {
+                title: LONG.repeat(50),
+                y_label: LONG.into(),
+                groups: vec![LONG.into(); cells.len().min(60)],
+                series: vec![
+                    BarSeries {
+                        label: LONG.into(),
+                        values: cells.clone()
+                    };
+                    4
+                ],
+                log,
+            };
+            sound(&format!("bars {i} {log}"), bars.png());
+        }
+    }
+}
+
+#[test]
+fn an_empty_figure_is_an_error_that_names_it() {
+    let title = || "cut 07".to_owned();
+    let results = [
+        FrfFigure {
+            title: title(),
+            ..Default::default()
+        }
+        .png(),
+        NyquistFigure {
+            title: title(),
+            ..Default::default()
+        }
+        .png(),
+        HeatMap {
+            title: title(),
+            ..Default::default()
+        }
+        .png(),
+        ParameterFigure {
+            title: title(),
+            ..Default::default()
+        }
+        .png(),
+        ForceRecord {
+            title: title(),
+            ..Default::default()
+        }
+        .png(),
+        RegressionFigure {
+            title: title(),
+            ..Default::default()
+        }
+        .png(),
+        LobesFigure {
+            title: title(),
+            ..Default::default()
+        }
+        .png(),
+        SideBySide {
+            title: title(),
+            ..Default::default()
+        }
+        .png(),
+        HistoryFigure {
+            title: title(),
+            ..Default::default()
+        }
+        .png(),
+    ];
+    for result in results {
+        let message = result.unwrap_err().to_string();
+        assert!(message.contains("\"cut 07\" has nothing to draw"), "{message}");
+    }
+}
+
+#[test]
+fn the_same_numbers_give_the_same_bytes() {
+    assert_eq!(frf_figure().png().unwrap(), frf_figure().png().unwrap());
+}
+
+/// Share of the image that has exactly this colour.
+fn share_of(png: &[u8], wanted: canvas::Color) -> f64 {
+    let mut reader = png::Decoder::new(png).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size()];
+    reader.next_frame(&mut pixels).unwrap();
+    let same = pixels
+        .chunks_exact(3)
+        .filter(|p| *p == [wanted.0, wanted.1, wanted.2])
+        .count();
+    same as f64 / (pixels.len() / 3) as f64
+}
+
+#[test]
+fn a_cell_has_the_colour_of_its_value() {
+    let map = |value| {
+        let map = HeatMap {
+            rows: vec!["r".into()],
+            columns: vec!["c".into()],
+            values: vec![vec![Some(value)]],
+            range: Some((0.0, 1.0)),
+            ..Default::default()
+        };
+        map.png().unwrap()
+    };
+    let (low, high) = (style::ramp(0.0), style::ramp(1.0));
+    assert!(share_of(&map(0.0), low) > 0.3 && share_of(&map(0.0), high) < 0.01);
+    assert!(share_of(&map(1.0), high) > 0.3 && share_of(&map(1.0), low) < 0.01);
+}
+
+/// The gallery as a report, to look at in a browser (kept with `LOBESTONE_GALLERY`).
+#[test]
+fn the_gallery_makes_a_report_of_bearable_size() {
+    use crate::report::{Block, Column, Figure, Page, Section, Table};
+    let figures = gallery().into_iter().map(|(name, png)| {
+        Block::Figure(Figure {
+            file_name: name.into(),
+            alt: format!("Sample figure {name}"),
+            caption:
+                "What is to be seen, said in one sentence: the calibrated model follows the first two modes."
+                    .into(),
+            png: png.unwrap(),
+        })
+    });
+    let table = Table {
+        caption: "Joint stiffness".into(),
+        columns: vec![
+            Column::text("Parameter"),
+            Column::number("Nominal"),
+            Column::number("Calibrated"),
+            Column::text("Remark"),
+        ],
+        rows: (1..=6)
+            .map(|i| {
+                let value = 2.5e6 / f64::from(i);
+                let calibrated = crate::report::number::plus_minus(0.9 * value, 0.002 * value, "N·m/rad");
+                let nominal = crate::report::number::format_si(value, "N·m/rad", 4);
+                vec![format!("joint {i}"), nominal, calibrated, "prior ± 30 %".into()]
+            })
+            .collect(),
+        notes: vec!["Errors are one standard deviation.".into()],
+    };
+    let summary = Section {
+        title: "Summary".into(),
+        lead: "The calibrated model explains the measurement down to 11 %; the noise alone is 2 %.".into(),
+        blocks: vec![
+            Block::KeyValues(vec![
+                ("Robot".into(), "irb6640".into()),
+                ("Postures".into(), "p1, p2, p3, p4".into()),
+                ("Error before → after".into(), "92 % → 11 %".into()),
+            ]),
+            Block::Paragraph(
+                "Modes at 32–37 Hz and 47–49 Hz are not explained by joint compliance alone. ".repeat(3),
+            ),
+            Block::Warning("Cut 12 has no air segment: its drift was not taken off <b>.".into()),
+            Block::Table(table),
+            Block::Pre("$ lobestone calibrate cell7\nnrms 92.1 % → 11.3 %".into()),
+        ],
+        ..Default::default()
+    };
+    let all = Section {
+        title: "All figures".into(),
+        blocks: figures.collect(),
+        ..Default::default()
+    };
+    let page = Page {
+        title: "Cell 7, spring check".into(),
+        subtitle: "Campaign report, 4 postures, 36 FRFs, 16 cuts".into(),
+        sections: vec![summary, all],
+    };
+    assert!(page.html().unwrap().len() < 2_000_000);
+    if let Some(folder) = std::env::var_os("LOBESTONE_GALLERY") {
+        page.write(std::path::Path::new(&folder)).unwrap();
     }
 }

@@ -1,0 +1,44 @@
+//! Figures: each takes plain numbers and gives the bytes of a PNG image.
+//!
+//! The caller computes nothing graphical, a figure nothing physical. Numbers that are not finite are
+//! left out; a figure with nothing left to show is an error that names it. Text uses an embedded font
+//! (DejaVu Sans, see `fonts/LICENSE.txt`), so no system font is needed.
+
+mod axis;
+mod canvas;
+mod panel;
+mod style;
+
+mod force_record;
+mod frf;
+mod heat_map;
+mod history;
+mod lobes;
+mod nyquist;
+mod parameters;
+mod regression;
+mod side_by_side;
+
+#[cfg(test)]
+mod samples;
+#[cfg(test)]
+mod tests;
+
+pub use force_record::{ForceChannel, ForceRecord};
+pub use frf::{FrfCurve, FrfFigure, NoiseLevel};
+pub use heat_map::{CellFormat, HeatMap};
+pub use history::{HistoryFigure, Revision};
+pub use lobes::{LobeCurve, LobeMarker, LobeOutcome, LobesFigure};
+pub use nyquist::NyquistFigure;
+pub use parameters::{Estimate, ParameterFigure, ParameterRow};
+pub use regression::{RegressionFigure, RegressionPoint, RegressionSeries};
+pub use side_by_side::{BarSeries, SideBySide};
+
+use crate::Error;
+
+/// All figures are this wide.
+const WIDTH: u32 = 1200;
+
+fn nothing_to_draw(title: &str, what: &str) -> Error {
+    Error::computation(format!("figure \"{title}\" has nothing to draw: {what}"))
+}

@@ -1,0 +1,125 @@
+//! Average force over feed with the fitted straight lines.
+
+use super::axis::{Axis, extent, usable};
+use super::canvas::{Marker, paint};
+use super::frf::or;
+use super::panel::{Header, Panel, Swatch};
+use super::{WIDTH, nothing_to_draw, style};
+use crate::Result;
+
+#[derive(Debug, Clone, Copy, Default)]
+pub struct RegressionPoint {
+    pub x: f64,
+    pub y: f64,
+    pub std_error: Option<f64>,
+    /// Left out of the fit: drawn as a cross.
+    pub excluded: bool,
+}
+
+#[derive(Debug, Clone, Default)]
+pub struct RegressionSeries {
+    /// Such as `Fx, R² = 0.998`.
+    pub label: String,
+    pub points: Vec<RegressionPoint>,
+    /// (intercept, slope) of the fitted line in the units of the axes.
+    pub line: Option<(f64, f64)>,
+}
+
+#[derive(Debug, Clone, Default)]
+pub struct RegressionFigure {
+    pub title: String,
+    /// With unit, such as `Feed per tooth (mm)`.
+    pub x_label: String,
+    pub y_label: String,
+    pub series: Vec<RegressionSeries>,
+}
+
+impl RegressionFigure {
+    /// # Errors
+    /// No series with a finite point.
+    pub fn png(&self) -> Result<Vec<u8>> {
+        let points = || {
+            self.series
+                .iter()
+                .flat_map(|s| &s.points)
+                .filter(|p| usable(p.x) && usable(p.y))
+        };
+        let Some(xs) = extent(points().map(|p| p.x)) else {
+            return Err(nothing_to_draw(&self.title, "no series has a finite point"));
+        };
+        // From zero: the intercept is the edge force, half of what is looked for.
+        let x = Axis::from_zero(&self.x_label, xs, 8);
+        let bars = points().flat_map(|p| {
+            let error = p.std_error.filter(|e| usable(*e)).unwrap_or(0.0);
+            [p.y - error, p.y + error]
+        });
+        let lines = self.series.iter().filter_map(|s| s.line);
+        let ends =
+            lines.flat_map(|(intercept, slope)| [intercept + slope * x.low, intercept + slope * x.high]);
+        let ys = extent(bars.chain(ends).chain([0.0])).unwrap_or((0.0, 1.0));
+        let y = Axis::padded(&self.y_label, ys, 0.06, 7);
+
+        let left = Panel::left_margin(&[&y]);
+        let right = f64::from(WIDTH) - Panel::RIGHT_MARGIN;
+        let excluded = points().any(|p| p.excluded);
+        let legend = self.series.iter().enumerate().map(|(i, s)| {
+            let stroke = style::series(i);
+            let sign = style::series_marker(i);
+            let swatch = match s.line {
+                Some(_) => Swatch::LineAndSign(stroke, sign, SIGN),
+                None => Swatch::Sign(sign, SIGN, stroke.color),
+            };
+            (swatch, or(&s.label, "series").to_owned())
+        });
+        let crosses = excluded.then(|| {
+            (
+                Swatch::Sign(Marker::Cross, SIGN, style::MUTED),
+                "left out of the fit".to_owned(),
+            )
+        });
+        let header = Header::new(
+            &self.title,
+            &legend.chain(crosses).collect::<Vec<_>>(),
+            left,
+            right,
+        );
+        let top = header.bottom();
+        let panel = Panel {
+            left,
+            top,
+            right,
+            bottom: top + 480.0,
+            x,
+            y,
+            x_labels: true,
+        };
+
+        paint(WIDTH, (panel.bottom + Panel::BOTTOM_MARGIN) as u32, |canvas| {
+            header.draw(canvas);
+            panel.grid(canvas);
+            panel.curve(canvas, [(panel.x.low, 0.0), (panel.x.high, 0.0)], style::FRAME);
+            for (i, series) in self.series.iter().enumerate() {
+                let stroke = style::series(i);
+                if let Some((intercept, slope)) = series.line {
+                    let at = |x: f64| (x, intercept + slope * x);
+                    panel.curve(canvas, [at(panel.x.low), at(panel.x.high)], stroke);
+                }
+                for point in &series.points {
+                    let error = point.std_error.filter(|e| usable(*e)).unwrap_or(0.0);
+                    if !point.excluded {
+                        panel.error_bar(canvas, point.x, (point.y - error, point.y + error), stroke.color);
+                    }
+                    let sign = if point.excluded {
+                        Marker::Cross
+                    } else {
+                        style::series_marker(i)
+                    };
+                    panel.markers(canvas, [(point.x, point.y)], (sign, SIGN), stroke.color, 0.0);
+                }
+            }
+            panel.frame(canvas);
+        })
+    }
+}
+
+const SIGN: f64 = 9.0;

@@ -1,0 +1,396 @@
+//! Every figure on plausible and on odd data. `LOBESTONE_GALLERY=dir cargo test gallery` keeps the images to look at.
+
+use std::collections::HashSet;
+
+use num_complex::Complex64;
+
+use super::samples::{frf_figure, gallery, jitter};
+use super::*;
+
+/// Width, height and number of distinct colours.
+fn decoded(png: &[u8]) -> (u32, u32, usize) {
+    assert!(png.starts_with(b"\x89PNG\r\n\x1a\n"));
+    let mut reader = png::Decoder::new(png).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size()];
+    let info = reader.next_frame(&mut pixels).unwrap();
+    // Every seventh pixel tells a figure from a blank sheet.
+    let colours: HashSet<&[u8]> = pixels.chunks_exact(3).step_by(7).collect();
+    (info.width, info.height, colours.len())
+}
+
+#[test]
+fn the_gallery_is_valid_not_blank_and_small() {
+    let keep = std::env::var_os("LOBESTONE_GALLERY").map(std::path::PathBuf::from);
+    for (name, png) in gallery() {
+        let png = png.unwrap();
+        let (width, height, colours) = decoded(&png);
+        assert!(
+            (1000..=1400).contains(&width) && (250..1400).contains(&height),
+            "{name}: {width} × {height}"
+        );
+        assert!(colours > 60, "{name}: {colours} colours");
+        assert!(png.len() < 200_000, "{name}: {} bytes", png.len());
+        if let Some(folder) = &keep {
+            std::fs::create_dir_all(folder).unwrap();
+            std::fs::write(folder.join(format!("{name}.png")), png).unwrap();
+        }
+    }
+}
+
+const LONG: &str = "a name out of a file that never ends, with µ, ζ, \u{4e2d}\u{6587}, \t tabs and <tags>, until nobody reads on ";
+
+/// What goes wrong in files: nothing, one value, all the same, zeros, no numbers, absurd sizes.
+fn odd_values() -> Vec<Vec<f64>> {
+    vec![
+        vec![],
+        vec![3.0],
+        vec![2.0; 30],
+        vec![0.0; 30],
+        vec![f64::NAN; 30],
+        vec![f64::INFINITY, f64::NEG_INFINITY, f64::NAN, 1.0],
+        vec![1e-300, 1e300, -1e300, 5e-324, f64::MAX, f64::MIN],
+        vec![-5.0, -4.0, 0.0, 1e-12, 1e12],
+        vec![1e9, 1e9 + 1e-6, 1e9 + 2e-6],
+        (0..150).map(|i| 10f64.powf(30.0 * jitter(i))).collect(),
+    ]
+}
+
+/// A figure, or an error that says which figure it is; never a panic, never an empty image.
+fn sound(name: &str, result: Result<Vec<u8>, Error>) {
+    match result {
+        Ok(png) => {
+            let (width, height, colours) = decoded(&png);
+            assert!(
+                width >= 1000 && (140..4000).contains(&height) && colours > 20,
+                "{name}: {width} × {height}, {colours} colours"
+            );
+        }
+        Err(error) => assert!(error.to_string().contains("nothing to draw"), "{name}: {error}"),
+    }
+}
+
+fn odd_curves(xs: &[f64], ys: &[f64]) -> Vec<Result<Vec<u8>, Error>> {
+    let curve = FrfCurve {
+        label: LONG.into(),
+        frequency_hz: xs.to_vec(),
+        value: ys
+            .iter()
+            .zip(ys.iter().rev())
+            .map(|(a, b)| Complex64::new(*a, *b))
+            .collect(),
+    };
+    let noise = NoiseLevel {
+        frequency_hz: xs.to_vec(),
+        magnitude: ys.to_vec(),
+        ..Default::default()
+    };
+    let frf = FrfFigure {
+        measured: Some(curve.clone()),
+        models: vec![curve.clone(); 4],
+        noise: Some(noise),
+        ..Default::default()
+    };
+    let nyquist = NyquistFigure {
+        models: vec![curve],
+        ..Default::default()
+    };
+    let first = |v: &[f64]| v.first().copied().unwrap_or(f64::NAN);
+    let lobes = LobesFigure {
+        curves: vec![LobeCurve {
+            spindle_rpm: xs.to_vec(),
+            depth_limit_mm: ys.iter().map(|y| Some(*y)).collect(),
+            ..Default::default()
+        }],
+        absolute_limit_mm: ys.last().copied(),
+        markers: vec![LobeMarker {
+            spindle_rpm: first(xs),
+            depth_mm: first(ys),
+            outcome: LobeOutcome::Stable,
+        }],
+        depth_cap_mm: xs.last().copied(),
+        ..Default::default()
+    };
+    vec![frf.png(), nyquist.png(), lobes.png()]
+}
+
+fn odd_points(xs: &[f64], ys: &[f64]) -> Vec<Result<Vec<u8>, Error>> {
+    let pairs = || xs.iter().copied().zip(ys.iter().copied()).take(30);
+    let first = |v: &[f64]| v.first().copied().unwrap_or(f64::NAN);
+    let points = pairs().map(|(x, y)| RegressionPoint {
+        x,
+        y,
+        std_error: Some(x),
+        excluded: false,
+    });
+    let series = RegressionSeries {
+        points: points.collect(),
+        line: Some((first(ys), first(xs))),
+        ..Default::default()
+    };
+    let regression = RegressionFigure {
+        series: vec![series],
+        ..Default::default()
+    };
+    let revisions = pairs().map(|(x, y)| Revision {
+        label: LONG.into(),
+        fit_nrms: x,
+        held_out_nrms: Some(y),
+    });
+    let history = HistoryFigure {
+        title: LONG.into(),
+        revisions: revisions.collect(),
+        noise_floor_nrms: ys.last().copied(),
+    };
+    let rows = pairs().map(|(x, y)| ParameterRow {
+        name: LONG.into(),
+        unit: "N".into(),
+        nominal: x,
+        before: Some(Estimate {
+            value: y,
+            std_error: Some(x),
+        }),
+        after: None,
+    });
+    let parameters = ParameterFigure {
+        rows: rows.collect(),
+        ..Default::default()
+    };
+    vec![regression.png(), history.png(), parameters.png()]
+}
+
+#[test]
+fn odd_numbers_never_panic() {
+    let all = odd_values();
+    for (i, xs) in all.iter().enumerate() {
+        // Each kind against itself, its third neighbour and plain numbers: all pairs would take a minute.
+        for j in HashSet::from([i, (i + 3) % all.len(), 2]) {
+            let ys = &all[j];
+            for (k, result) in odd_curves(xs, ys)
+                .into_iter()
+                .chain(odd_points(xs, ys))
+                .enumerate()
+            {
+                sound(&format!("x {i}, y {j}, figure {k}"), result);
+            }
+        }
+    }
+}
+
+#[test]
+fn odd_records_never_panic() {
+    for (i, values) in odd_values().into_iter().enumerate() {
+        for interval in [1e-4, 0.0, -1.0, f64::NAN, 1e250, 1e-250] {
+            let channel = ForceChannel {
+                label: LONG.into(),
+                sample_interval_s: interval,
+                samples: values.clone(),
+                drift: values.iter().map(|v| (*v, *v)).collect(),
+                steady_level: values.last().copied(),
+                ..Default::default()
+            };
+            let record = ForceRecord {
+                title: LONG.into(),
+                channels: vec![channel; 2],
+                air_s: vec![(f64::NAN, 1.0), (5.0, -5.0)],
+                steady_s: Some((values.first().copied().unwrap_or(0.0), 0.0)),
+            };
+            sound(&format!("values {i}, interval {interval}"), record.png());
+        }
+    }
+}
+
+#[test]
+fn odd_tables_and_bars_never_panic() {
+    for (i, values) in odd_values().into_iter().enumerate() {
+        let cells: Vec<Option<f64>> = values.iter().map(|v| Some(*v)).take(100).collect();
+        for format in [
+            CellFormat::Percent,
+            CellFormat::Significant(0),
+            CellFormat::Significant(99),
+        ] {
+            let map = HeatMap {
+                title: LONG.repeat(50),
+                rows: vec![LONG.into(); 3],
+                columns: vec![LONG.into(); cells.len()],
+                // One row too few, one value too few: what is missing stays empty.
+                values: vec![cells.clone(), cells.iter().copied().skip(1).collect()],
+                format,
+                range: Some((values.first().copied().unwrap_or(1.0), 1.0)),
+                ..Default::default()
+            };
+            sound(&format!("map {i} {format:?}"), map.png());
+        }
+        for log in [true, false] {
+            let bars = SideBySide {
+                title: LONG.repeat(50),
+                y_label: LONG.into(),
+                groups: vec![LONG.into(); cells.len().min(60)],
+                series: vec![
+                    BarSeries {
+                        label: LONG.into(),
+                        values: cells.clone()
+                    };
+                    4
+                ],
+                log,
+            };
+            sound(&format!("bars {i} {log}"), bars.png());
+        }
+    }
+}
+
+#[test]
+fn an_empty_figure_is_an_error_that_names_it() {
+    let title = || "cut 07".to_owned();
+    let results = [
+        FrfFigure {
+            title: title(),
+            ..Default::default()
+        }
+        .png(),
+        NyquistFigure {
+            title: title(),
+            ..Default::default()
+        }
+        .png(),
+        HeatMap {
+            title: title(),
+            ..Default::default()
+        }
+        .png(),
+        ParameterFigure {
+            title: title(),
+            ..Default::default()
+        }
+        .png(),
+        ForceRecord {
+            title: title(),
+            ..Default::default()
+        }
+        .png(),
+        RegressionFigure {
+            title: title(),
+            ..Default::default()
+        }
+        .png(),
+        LobesFigure {
+            title: title(),
+            ..Default::default()
+        }
+        .png(),
+        SideBySide {
+            title: title(),
+            ..Default::default()
+        }
+        .png(),
+        HistoryFigure {
+            title: title(),
+            ..Default::default()
+        }
+        .png(),
+    ];
+    for result in results {
+        let message = result.unwrap_err().to_string();
+        assert!(message.contains("\"cut 07\" has nothing to draw"), "{message}");
+    }
+}
+
+#[test]
+fn the_same_numbers_give_the_same_bytes() {
+    assert_eq!(frf_figure().png().unwrap(), frf_figure().png().unwrap());
+}
+
+/// Share of the image that has exactly this colour.
+fn share_of(png: &[u8], wanted: canvas::Color) -> f64 {
+    let mut reader = png::Decoder::new(png).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size()];
+    reader.next_frame(&mut pixels).unwrap();
+    let same = pixels
+        .chunks_exact(3)
+        .filter(|p| *p == [wanted.0, wanted.1, wanted.2])
+        .count();
+    same as f64 / (pixels.len() / 3) as f64
+}
+
+#[test]
+fn a_cell_has_the_colour_of_its_value() {
+    let map = |value| {
+        let map = HeatMap {
+            rows: vec!["r".into()],
+            columns: vec!["c".into()],
+            values: vec![vec![Some(value)]],
+            range: Some((0.0, 1.0)),
+            ..Default::default()
+        };
+        map.png().unwrap()
+    };
+    let (low, high) = (style::ramp(0.0), style::ramp(1.0));
+    assert!(share_of(&map(0.0), low) > 0.3 && share_of(&map(0.0), high) < 0.01);
+    assert!(share_of(&map(1.0), high) > 0.3 && share_of(&map(1.0), low) < 0.01);
+}
+
+/// The gallery as a report, to look at in a browser (kept with `LOBESTONE_GALLERY`).
+#[test]
+fn the_gallery_makes_a_report_of_bearable_size() {
+    use crate::report::{Block, Column, Figure, Page, Section, Table};
+    let figures = gallery().into_iter().map(|(name, png)| {
+        Block::Figure(Figure {
+            file_name: name.into(),
+            alt: format!("Sample figure {name}"),
+            caption:
+                "What is to be seen, said in one sentence: the calibrated model follows the first two modes."
+                    .into(),
+            png: png.unwrap(),
+        })
+    });
+    let table = Table {
+        caption: "Joint stiffness".into(),
+        columns: vec![
+            Column::text("Parameter"),
+            Column::number("Nominal"),
+            Column::number("Calibrated"),
+            Column::text("Remark"),
+        ],
+        rows: (1..=6)
+            .map(|i| {
+                let value = 2.5e6 / f64::from(i);
+                let calibrated = crate::report::number::plus_minus(0.9 * value, 0.002 * value, "N·m/rad");
+                let nominal = crate::report::number::format_si(value, "N·m/rad", 4);
+                vec![format!("joint {i}"), nominal, calibrated, "prior ± 30 %".into()]
+            })
+            .collect(),
+        notes: vec!["Errors are one standard deviation.".into()],
+    };
+    let summary = Section {
+        title: "Summary".into(),
+        lead: "The calibrated model explains the measurement down to 11 %; the noise alone is 2 %.".into(),
+        blocks: vec![
+            Block::KeyValues(vec![
+                ("Robot".into(), "irb6640".into()),
+                ("Postures".into(), "p1, p2, p3, p4".into()),
+                ("Error before → after".into(), "92 % → 11 %".into()),
+            ]),
+            Block::Paragraph(
+                "Modes at 32–37 Hz and 47–49 Hz are not explained by joint compliance alone. ".repeat(3),
+            ),
+            Block::Warning("Cut 12 has no air segment: its drift was not taken off <b>.".into()),
+            Block::Table(table),
+            Block::Pre("$ lobestone calibrate cell7\nnrms 92.1 % → 11.3 %".into()),
+        ],
+        ..Default::default()
+    };
+    let all = Section {
+        title: "All figures".into(),
+        blocks: figures.collect(),
+        ..Default::default()
+    };
+    let page = Page {
+        title: "Cell 7, spring check".into(),
+        subtitle: "Campaign report, 4 postures, 36 FRFs, 16 cuts".into(),
+        sections: vec![summary, all],
+    };
+    assert!(page.html().unwrap().len() < 2_000_000);
+    if let Some(folder) = std::env::var_os("LOBESTONE_GALLERY") {
+        page.write(std::path::Path::new(&folder)).unwrap();
+    }
+}

@@ -1,0 +1,221 @@
+//! Numbers as people read them: significant digits, SI prefixes, value ± standard error.
+
+/// What stands for a number that does not exist (NaN, infinite, not measured).
+pub const MISSING: &str = "–";
+
+/// `value` with `digits` significant digits: `1234.5678` → `1235`, `0.00012345` → `1.23·10⁻⁴` (3 digits).
+///
+/// Plain notation between 10⁻³ and 10⁶, a power of ten outside.
+pub fn significant(value: f64, digits: usize) -> String {
+    let digits = digits.clamp(1, 15);
+    if !value.is_finite() {
+        return MISSING.to_owned();
+    }
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    // Let the formatter round first: 9.996 to three digits is 10.0, one order up.
+    let scientific = format!("{value:.*e}", digits - 1);
+    let Some((mantissa, exponent)) = scientific.split_once('e') else {
+        return scientific;
+    };
+    let exponent: i32 = exponent.parse().unwrap_or(0);
+    if (-3..6).contains(&exponent) {
+        let decimals = (digits as i32 - 1 - exponent).max(0) as usize;
+        minus(&format!("{value:.decimals$}"))
+    } else {
+        format!("{}·10{}", minus(mantissa), superscript(exponent))
+    }
+}
+
+/// A fixed number of decimals with a true minus sign, a power of ten from 10¹⁵ on; `–` where there is no number.
+pub fn decimals(value: f64, decimals: usize) -> String {
+    if !value.is_finite() || value.abs() >= 1e15 {
+        // Hundreds of digits help nobody.
+        return significant(value, 3);
+    }
+    let text = format!("{value:.decimals$}");
+    // "-0.00" says nothing that "0.00" does not.
+    let is_zero = text.chars().all(|c| matches!(c, '-' | '0' | '.'));
+    if is_zero {
+        text.trim_start_matches('-').to_owned()
+    } else {
+        minus(&text)
+    }
+}
+
+/// A ratio as percent: `0.1234` → `12.3 %`.
+pub fn percent(ratio: f64) -> String {
+    let value = 100.0 * ratio;
+    if !value.is_finite() {
+        return MISSING.to_owned();
+    }
+    let places = match value.abs() {
+        v if v >= 99.95 => 0,
+        v if v >= 9.995 => 1,
+        v if v >= 0.9995 || v == 0.0 => 2,
+        _ => 3,
+    };
+    format!("{} %", decimals(value, places))
+}
+
+/// `value` with an SI prefix on `unit`: `2.53e6, "N/m"` → `2.53 MN/m`.
+///
+/// Units that bear no prefix (none, degrees, percent, `kg`, anything already prefixed by the lab) keep their number.
+pub fn format_si(value: f64, unit: &str, digits: usize) -> String {
+    let (scaled, prefix) = match value.is_finite() && takes_prefix(unit) {
+        true => si_prefix(value, digits),
+        false => (value, ""),
+    };
+    join(&significant(scaled, digits), &format!("{prefix}{unit}"))
+}
+
+/// `value ± standard error`, the value cut to the error's second digit: `(1.23456e6, 2.1e3)` → `1.2346 ± 0.0021 MN·m/rad`.
+pub fn plus_minus(value: f64, std_error: f64, unit: &str) -> String {
+    if !value.is_finite() {
+        return MISSING.to_owned();
+    }
+    if !std_error.is_finite() || std_error <= 0.0 {
+        return format_si(value, unit, 4);
+    }
+    let (scaled, prefix) = match takes_prefix(unit) {
+        true => si_prefix(value.abs().max(std_error), 4),
+        false => (value, ""),
+    };
+    let factor = match takes_prefix(unit) && value.abs().max(std_error) > 0.0 {
+        true => scaled / value.abs().max(std_error),
+        false => 1.0,
+    };
+    let (value, error) = (value * factor, std_error * factor);
+    let order = error.log10().floor() as i32;
+    let unit = format!("{prefix}{unit}");
+    if !(-6..6).contains(&order) {
+        return join(
+            &format!("{} ± {}", significant(value, 4), significant(error, 2)),
+            &unit,
+        );
+    }
+    let places = (1 - order).max(0) as usize;
+    join(
+        &format!("{} ± {}", decimals(value, places), decimals(error, places)),
+        &unit,
+    )
+}
+
+fn join(number: &str, unit: &str) -> String {
+    match unit {
+        "" => number.to_owned(),
+        // A no-break space keeps number and unit on one line.
+        _ => format!("{number}\u{a0}{unit}"),
+    }
+}
+
+/// Whether a prefix may be put before the unit: only SI units the toolkit itself writes.
+fn takes_prefix(unit: &str) -> bool {
+    ["N", "m", "Pa", "Hz", "s", "W", "J"]
+        .iter()
+        .any(|base| match unit.strip_prefix(base) {
+            // "m" is the metre, "mm" is not; "N·m/rad" and "m/N" are fine. A power of the unit is not:
+            // 10⁶ m² is no "Mm²".
+            Some(rest) => {
+                !rest.starts_with(|c: char| c.is_alphanumeric() || c == '²' || c == '³' || c == '^')
+            }
+            None => false,
+        })
+}
+
+fn si_prefix(value: f64, digits: usize) -> (f64, &'static str) {
+    const PREFIXES: [(i32, &str); 9] = [
+        (-12, "p"),
+        (-9, "n"),
+        (-6, "µ"),
+        (-3, "m"),
+        (0, ""),
+        (3, "k"),
+        (6, "M"),
+        (9, "G"),
+        (12, "T"),
+    ];
+    if value == 0.0 {
+        return (value, "");
+    }
+    // The exponent after rounding, so that 999.9996 becomes 1.000 k and not 1000.
+    let exponent = format!("{value:.*e}", digits.clamp(1, 15) - 1)
+        .split_once('e')
+        .and_then(|(_, exponent)| exponent.parse::<i32>().ok())
+        .unwrap_or(0);
+    let step = exponent.div_euclid(3) * 3;
+    match PREFIXES.iter().find(|(power, _)| *power == step) {
+        Some((power, prefix)) => (value / 10f64.powi(*power), prefix),
+        None => (value, ""),
+    }
+}
+
+/// `-12` → `⁻¹²`.
+pub fn superscript(exponent: i32) -> String {
+    const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+    exponent
+        .to_string()
+        .chars()
+        .map(|c| {
+            c.to_digit(10)
+                .and_then(|d| DIGITS.get(d as usize).copied())
+                .unwrap_or('⁻')
+        })
+        .collect()
+}
+
+fn minus(text: &str) -> String {
+    text.replacen('-', "−", 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn significant_digits_round_across_the_decade() {
+        assert_eq!(significant(1234.5678, 3), "1235");
+        assert_eq!(significant(9.996, 3), "10.0");
+        assert_eq!(significant(-0.012345, 3), "−0.0123");
+        assert_eq!(significant(1.2345e-4, 3), "1.23·10⁻⁴");
+        assert_eq!(significant(-2.5e12, 2), "−2.5·10¹²");
+        assert_eq!(significant(0.0, 3), "0");
+        assert_eq!(significant(f64::NAN, 3), MISSING);
+        assert_eq!(significant(f64::INFINITY, 0), MISSING);
+    }
+
+    #[test]
+    fn prefixes_go_only_where_they_mean_something() {
+        assert_eq!(format_si(2.531e6, "N·m/rad", 3), "2.53\u{a0}MN·m/rad");
+        assert_eq!(format_si(3.1e-7, "m/N", 2), "310\u{a0}nm/N");
+        assert_eq!(format_si(999.9996, "N", 4), "1.000\u{a0}kN");
+        assert_eq!(format_si(1250.0, "kg", 4), "1250\u{a0}kg");
+        assert_eq!(format_si(0.012, "mm", 2), "0.012\u{a0}mm");
+        assert_eq!(format_si(0.012, "", 2), "0.012");
+        assert_eq!(format_si(0.0, "Hz", 2), "0\u{a0}Hz");
+    }
+
+    #[test]
+    fn the_error_sets_the_digits_of_the_value() {
+        assert_eq!(
+            plus_minus(1.23456e6, 2.1e3, "N·m/rad"),
+            "1.2346 ± 0.0021\u{a0}MN·m/rad"
+        );
+        assert_eq!(plus_minus(-1014.23, 12.3, "N/mm²"), "−1.014 ± 0.012\u{a0}kN/mm²");
+        assert_eq!(plus_minus(0.02, 0.3, ""), "0.02 ± 0.30");
+        assert_eq!(plus_minus(5.0, f64::NAN, "kg"), "5.000\u{a0}kg");
+        assert_eq!(plus_minus(f64::NAN, 1.0, "kg"), MISSING);
+        assert_eq!(plus_minus(0.0, 2.0, "N"), "0.0 ± 2.0\u{a0}N");
+    }
+
+    #[test]
+    fn percentages_keep_three_digits() {
+        assert_eq!(percent(0.1234), "12.3 %");
+        assert_eq!(percent(0.00021), "0.021 %");
+        assert_eq!(percent(3.5), "350 %");
+        assert_eq!(percent(-0.0), "0.00 %");
+        assert_eq!(percent(1e300), "1.00·10³⁰² %");
+        assert_eq!(percent(f64::NAN), MISSING);
+    }
+}

@@ -1,0 +1,444 @@
+//! The report as one HTML file: text, tables and figures in sections, nothing loaded from elsewhere.
+//!
+//! Every text is escaped by the template engine; names out of measurement files may hold anything.
+
+use std::collections::HashSet;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use minijinja::syntax::SyntaxConfig;
+use minijinja::{Environment, Value, context};
+
+use crate::{Error, Result};
+
+/// Name of the HTML file in the report's folder.
+pub const HTML_NAME: &str = "report.html";
+
+#[derive(Debug, Clone, Default)]
+pub struct Page {
+    pub title: String,
+    pub subtitle: String,
+    pub sections: Vec<Section>,
+}
+
+#[derive(Debug, Clone, Default)]
+pub struct Section {
+    /// Anchor in the page; made from the title where empty.
+    pub id: String,
+    pub title: String,
+    /// One plain sentence that says what the section shows; left out where empty.
+    pub lead: String,
+    pub blocks: Vec<Block>,
+}
+
+#[derive(Debug, Clone)]
+pub enum Block {
+    Paragraph(String),
+    Figure(Figure),
+    Table(Table),
+    Warning(String),
+    /// Name and value, one a line.
+    KeyValues(Vec<(String, String)>),
+    /// Shown as it is, in a fixed-width font.
+    Pre(String),
+}
+
+#[derive(Debug, Clone, Default)]
+pub struct Figure {
+    /// Name of the image beside the page; anything but letters, digits, `-` and `_` is replaced, `.png` added.
+    pub file_name: String,
+    /// What a reader who cannot see the image should know.
+    pub alt: String,
+    pub caption: String,
+    /// A whole PNG file, as the functions of [`super::figure`] return it.
+    pub png: Vec<u8>,
+}
+
+#[derive(Debug, Clone, Default)]
+pub struct Table {
+    pub caption: String,
+    pub columns: Vec<Column>,
+    /// The first cell of a row is its heading. Missing cells stay empty, surplus ones are dropped.
+    pub rows: Vec<Vec<String>>,
+    pub notes: Vec<String>,
+}
+
+#[derive(Debug, Clone, Default)]
+pub struct Column {
+    pub name: String,
+    /// Set flush right.
+    pub numeric: bool,
+}
+
+impl Column {
+    pub fn text(name: impl Into<String>) -> Self {
+        Column {
+            name: name.into(),
+            numeric: false,
+        }
+    }
+
+    pub fn number(name: impl Into<String>) -> Self {
+        Column {
+            name: name.into(),
+            numeric: true,
+        }
+    }
+}
+
+/// What [`Page::write`] left on the disk.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Written {
+    pub html: PathBuf,
+    /// In the order of the page.
+    pub images: Vec<PathBuf>,
+}
+
+impl Page {
+    /// The page as HTML text with all images inside.
+    ///
+    /// # Errors
+    /// The template engine's, which would be a fault of this program.
+    pub fn html(&self) -> Result<String> {
+        let failed = |error: minijinja::Error| Error::computation(format!("report template: {error:#}"));
+        let mut engine = Environment::new();
+        let syntax = SyntaxConfig::builder()
+            .trim_blocks(true)
+            .lstrip_blocks(true)
+            .build()
+            .map_err(failed)?;
+        engine.set_syntax(syntax);
+        // The name's ending turns escaping on.
+        engine
+            .add_template("report.html", include_str!("template.html"))
+            .map_err(failed)?;
+        let mut ids = Names::default();
+        let mut files = Names::default();
+        let sections = self.sections.iter().map(|section| {
+            let wanted = if section.id.trim().is_empty() {
+                &section.title
+            } else {
+                &section.id
+            };
+            context! {
+                id => ids.unique(&slug(wanted, "section")),
+                title => section.title.as_str(),
+                lead => section.lead.as_str(),
+                blocks => section.blocks.iter().map(|block| block.value(&mut files)).collect::<Vec<_>>(),
+            }
+        });
+        let sections: Vec<Value> = sections.collect();
+        let version = env!("CARGO_PKG_VERSION");
+        let page =
+            context! { title => self.title.as_str(), subtitle => self.subtitle.as_str(), sections, version };
+        engine
+            .get_template("report.html")
+            .and_then(|template| template.render(page))
+            .map_err(failed)
+    }
+
+    /// Writes the images and then `report.html` into `folder`, each file whole or not at all.
+    ///
+    /// # Errors
+    /// What the file system refuses, naming the file.
+    pub fn write(&self, folder: &Path) -> Result<Written> {
+        std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, e))?;
+        let html = self.html()?;
+        let mut files = Names::default();
+        let mut images = vec![];
+        for block in self.sections.iter().flat_map(|section| &section.blocks) {
+            if let Block::Figure(figure) = block {
+                let path = folder.join(figure.unique_name(&mut files));
+                write_atomically(&path, &figure.png)?;
+                images.push(path);
+            }
+        }
+        let path = folder.join(HTML_NAME);
+        write_atomically(&path, html.as_bytes())?;
+        Ok(Written { html: path, images })
+    }
+}
+
+impl Block {
+    fn value(&self, files: &mut Names) -> Value {
+        match self {
+            Block::Paragraph(text) => context! { kind => "paragraph", text },
+            Block::Warning(text) => context! { kind => "warning", text },
+            Block::Pre(text) => context! { kind => "pre", text },
+            Block::KeyValues(pairs) => {
+                let pairs = pairs.iter().map(|(name, value)| context! { name, value });
+                context! { kind => "key_values", pairs => pairs.collect::<Vec<_>>() }
+            }
+            Block::Table(table) => table.value(),
+            Block::Figure(figure) => {
+                let (width, height) = png_size(&figure.png);
+                context! {
+                    kind => "figure",
+                    file => figure.unique_name(files),
+                    alt => if figure.alt.is_empty() { &figure.caption } else { &figure.alt },
+                    caption => figure.caption.as_str(),
+                    width,
+                    height,
+                    // Base64 has no character that HTML knows, so it need not be escaped.
+                    data => Value::from_safe_string(base64(&figure.png)),
+                }
+            }
+        }
+    }
+}
+
+impl Table {
+    fn value(&self) -> Value {
+        let columns = self
+            .columns
+            .iter()
+            .map(|c| context! { name => c.name.as_str(), numeric => c.numeric });
+        let rows = self.rows.iter().map(|row| {
+            let cells = self.columns.iter().enumerate().map(|(i, column)| {
+                let text = row.get(i).map_or("", String::as_str);
+                context! { text, numeric => column.numeric }
+            });
+            cells.collect::<Vec<_>>()
+        });
+        context! {
+            kind => "table",
+            caption => self.caption.as_str(),
+            columns => columns.collect::<Vec<_>>(),
+            rows => rows.collect::<Vec<_>>(),
+            notes => self.notes.clone(),
+        }
+    }
+}
+
+impl Figure {
+    fn unique_name(&self, files: &mut Names) -> String {
+        let stem = self.file_name.trim_end_matches(".png");
+        files.unique(&slug(stem, "figure")) + ".png"
+    }
+}
+
+/// Hands out each name once: the second `a` becomes `a-2`.
+#[derive(Default)]
+struct Names(HashSet<String>);
+
+impl Names {
+    fn unique(&mut self, wanted: &str) -> String {
+        let mut name = wanted.to_owned();
+        let mut number = 2;
+        while !self.0.insert(name.clone()) {
+            name = format!("{wanted}-{number}");
+            number += 1;
+        }
+        name
+    }
+}
+
+/// Lower-case letters, digits, `-` and `_`, at most 80 of them: good for file names and anchors everywhere.
+fn slug(text: &str, otherwise: &str) -> String {
+    let mut slug = String::new();
+    for c in text.trim().chars().take(80) {
+        match c.to_ascii_lowercase() {
+            c if c.is_ascii_alphanumeric() || c == '_' => slug.push(c),
+            _ if !slug.is_empty() && !slug.ends_with('-') => slug.push('-'),
+            _ => {}
+        }
+    }
+    let slug = slug.trim_end_matches('-');
+    if slug.is_empty() {
+        otherwise.to_owned()
+    } else {
+        slug.to_owned()
+    }
+}
+
+/// Writes beside the target and renames: a reader sees the old file or the new one, never half of it.
+fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let mut file = tempfile::Builder::new();
+    // Temporary files are private by default; a report is to be read by whoever may read the folder.
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        file.permissions(std::fs::Permissions::from_mode(0o644));
+    }
+    let mut file = file
+        .prefix(".report")
+        .tempfile_in(folder)
+        .map_err(|e| Error::io(folder, e))?;
+    file.write_all(bytes).map_err(|e| Error::io(path, e))?;
+    file.persist(path).map_err(|e| Error::io(path, e.error))?;
+    Ok(())
+}
+
+/// Width and height out of the IHDR chunk; zeros where there is none.
+fn png_size(png: &[u8]) -> (u32, u32) {
+    let number = |at: usize| {
+        let bytes = png.get(at..at + 4)?.try_into().ok()?;
+        Some(u32::from_be_bytes(bytes))
+    };
+    (number(16).unwrap_or(0), number(20).unwrap_or(0))
+}
+
+/// RFC 4648, section 4, with padding.
+fn base64(bytes: &[u8]) -> String {
+    const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for chunk in bytes.chunks(3) {
+        let byte = |i: usize| u32::from(chunk.get(i).copied().unwrap_or(0));
+        let word = byte(0) << 16 | byte(1) << 8 | byte(2);
+        for i in 0..4 {
+            if i <= chunk.len() {
+                let letter = ALPHABET[(word >> (18 - 6 * i) & 63) as usize];
+                text.push(char::from(letter));
+            } else {
+                text.push('=');
+            }
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::figure::HeatMap;
+
+    fn page(name: &str) -> Page {
+        let map = HeatMap {
+            title: name.to_owned(),
+            rows: vec![name.to_owned()],
+            columns: vec!["1X".to_owned()],
+            values: vec![vec![Some(0.5)]],
+            ..Default::default()
+        };
+        let figure = Figure {
+            file_name: name.to_owned(),
+            alt: name.to_owned(),
+            caption: name.to_owned(),
+            png: map.png().unwrap(),
+        };
+        let table = Table {
+            caption: name.to_owned(),
+            columns: vec![Column::text(name), Column::number("value")],
+            rows: vec![vec![name.to_owned(), "1.5".to_owned()], vec!["short".to_owned()]],
+            notes: vec![name.to_owned()],
+        };
+        let section = |id: &str| Section {
+            id: id.to_owned(),
+            title: name.to_owned(),
+            lead: name.to_owned(),
+            blocks: vec![
+                Block::Paragraph(name.to_owned()),
+                Block::Figure(figure.clone()),
+                Block::Table(table.clone()),
+                Block::Warning(name.to_owned()),
+                Block::KeyValues(vec![(name.to_owned(), name.to_owned())]),
+                Block::Pre(name.to_owned()),
+            ],
+        };
+        Page {
+            title: name.to_owned(),
+            subtitle: name.to_owned(),
+            sections: vec![section(""), section("errors")],
+        }
+    }
+
+    #[test]
+    fn names_cannot_become_markup() {
+        let name = "\"><script>alert('x')</script><img src=x onerror=alert(1)>{{ 7*7 }}&amp;";
+        let html = page(name).html().unwrap();
+        assert!(!html.contains("<script"), "the page itself has no script either");
+        assert!(!html.contains("<img src=x"));
+        assert!(html.contains("&lt;script&gt;"));
+        assert!(
+            html.contains("{{ 7*7 }}&amp;amp;"),
+            "text is never taken for a template"
+        );
+    }
+
+    #[test]
+    fn the_page_is_whole_and_needs_nothing_else() {
+        let html = page("cell 7").html().unwrap();
+        assert!(html.starts_with("<!DOCTYPE html>"));
+        assert!(html.contains("<html lang=\"en\">") && html.trim_end().ends_with("</html>"));
+        assert!(html.contains("scope=\"col\"") && html.contains("scope=\"row\""));
+        assert!(html.contains("href=\"#cell-7\"") && html.contains("id=\"cell-7\""));
+        assert_eq!(html.matches("src=\"data:image/png;base64,iVBORw0KGgo").count(), 2);
+        assert_eq!(html.matches("src=").count(), 2);
+        for outside in ["http:", "https:", "url(", "@import", "<link"] {
+            assert!(!html.contains(outside), "{outside}");
+        }
+        assert!(html.len() < 200_000);
+    }
+
+    #[test]
+    fn images_stay_in_the_folder_under_names_of_their_own() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("out/deep");
+        let written = page("../../etc/p1 Ü.png").write(&target).unwrap();
+        assert_eq!(written.html, target.join("report.html"));
+        assert_eq!(
+            written.images,
+            [target.join("etc-p1.png"), target.join("etc-p1-2.png")]
+        );
+        let mut names: Vec<_> = std::fs::read_dir(&target)
+            .unwrap()
+            .map(|f| f.unwrap().file_name())
+            .collect();
+        names.sort();
+        assert_eq!(
+            names,
+            ["etc-p1-2.png", "etc-p1.png", "report.html"],
+            "no temporary file is left"
+        );
+        let html = std::fs::read_to_string(&written.html).unwrap();
+        assert!(html.contains("href=\"etc-p1-2.png\""));
+        // A second time over the first.
+        assert_eq!(page("../../etc/p1 Ü.png").write(&target).unwrap(), written);
+    }
+
+    #[test]
+    fn a_folder_that_cannot_be_made_is_named() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let error = page("x")
+            .write(&file.path().join("below"))
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("below"), "{error}");
+    }
+
+    #[test]
+    fn base64_as_in_rfc_4648() {
+        let pairs = [
+            ("", ""),
+            ("f", "Zg=="),
+            ("fo", "Zm8="),
+            ("foo", "Zm9v"),
+            ("foobar", "Zm9vYmFy"),
+        ];
+        for (plain, encoded) in pairs {
+            assert_eq!(base64(plain.as_bytes()), encoded);
+        }
+        assert_eq!(base64(&[255, 254, 253]), "//79");
+    }
+
+    #[test]
+    fn an_empty_page_and_a_broken_image_still_render() {
+        assert!(Page::default().html().is_ok());
+        let blocks = vec![Block::Figure(Figure {
+            png: vec![1, 2, 3],
+            ..Default::default()
+        })];
+        let section = Section {
+            blocks,
+            ..Default::default()
+        };
+        let html = Page {
+            sections: vec![section],
+            ..Default::default()
+        }
+        .html()
+        .unwrap();
+        assert!(html.contains("href=\"figure.png\""));
+    }
+}

@@ -3,6 +3,7 @@
 //! Data flows one way: [`ingest`] → [`campaign`] → [`robot`] and [`cutting`] → [`identify`] →
 //! [`discrepancy`] → [`lobes`] → [`report`]. A module knows nothing of the ones after it.
 
+pub mod analysis;
 pub mod campaign;
 pub mod commands;
 pub mod cutting;

@@ -10,6 +10,8 @@ use crate::campaign::RobotSection;
 use crate::identify::modal_table::{self, StrongestMode};
 use crate::identify::{Estimate, StructureModel};
 use crate::ingest::Axis;
+use crate::lobes::thesis::thesis_force;
+use crate::lobes::{AbsoluteLimit, Peak, RobotFrf, StabilitySolver, peak_near, speed_grid, thesis_lobes};
 use crate::robot::{PostureReport, RobotModel, RobotSpec};
 use crate::{Error, Result};
 
@@ -68,6 +70,32 @@ pub struct CaseStudy {
     pub fitted_frequency_error: f64,
     pub predicted_frequency_error: f64,
     pub unexplained: Vec<Unexplained>,
+    /// Table 30.
+    pub lobes: Vec<LobeRow>,
+}
+
+/// Table 30 for one configuration: tips of the stability envelope and the absolute limit.
+#[derive(Debug, Clone, serde::Serialize)]
+pub struct LobeRow {
+    pub configuration: u32,
+    /// The commercial program on the measured FRFs.
+    pub commercial: Vec<Peak>,
+    /// The thesis's own program.
+    pub published_program: Vec<Peak>,
+    /// This program on FRFs rebuilt from the measured minima of the real part.
+    pub from_measurements: LobeTips,
+    /// This program on the robot model, published compliances, nothing tuned.
+    pub from_model_before: LobeTips,
+    /// The same after calibration on the modal table of configurations 1–3.
+    pub from_model_after: LobeTips,
+}
+
+/// Tips of an envelope near 60 f/(N k) for k = 2 and 1 of the dominant mode, and its least depth.
+#[derive(Debug, Clone, serde::Serialize)]
+pub struct LobeTips {
+    pub second_region: Option<Peak>,
+    pub first_region: Option<Peak>,
+    pub absolute_limit: Option<AbsoluteLimit>,
 }
 
 #[derive(Deserialize)]
@@ -220,6 +248,7 @@ pub fn case_study() -> Result<CaseStudy> {
         fitted_frequency_error: rms(fit_sum),
         predicted_frequency_error: rms(prediction_sum),
         unexplained: unexplained(&model, &fit.theta)?,
+        lobes: lobe_rows(&model, &nominal, &fit.theta)?,
     })
 }
 
@@ -268,6 +297,53 @@ fn static_rows(model: &StructureModel, nominal: &[f64], fitted: &[f64]) -> Resul
         }
     }
     Ok(result)
+}
+
+/// Speeds of the lobes, rpm: from, to, step.
+const SPINDLE_RPM: [f64; 3] = [100.0, 1500.0, 1.0];
+
+fn lobe_rows(model: &StructureModel, nominal: &[f64], fitted: &[f64]) -> Result<Vec<LobeRow>> {
+    thesis_lobes()?
+        .into_iter()
+        .map(|row| {
+            let of_model = |theta: &[f64]| model_tips(model, theta, row.configuration);
+            Ok(LobeRow {
+                configuration: row.configuration,
+                from_model_before: of_model(nominal)?,
+                from_model_after: of_model(fitted)?,
+                from_measurements: LobeTips {
+                    second_region: Some(row.second_region),
+                    first_region: Some(row.first_region),
+                    absolute_limit: Some(row.absolute_limit),
+                },
+                commercial: row.commercial,
+                published_program: row.published_program,
+            })
+        })
+        .collect()
+}
+
+/// The envelope of the robot model at a configuration: deepest tips within 10 % of where the dominant mode puts them.
+fn model_tips(model: &StructureModel, theta: &[f64], configuration: u32) -> Result<LobeTips> {
+    let force = thesis_force()?;
+    let kinematics = model
+        .robot
+        .kinematics(&posture_deg(&configuration.to_string())?)?;
+    let chain = model.robot.chain(&kinematics, &model.baseline(theta, false));
+    let frf = RobotFrf::new(&model.robot, &kinematics, &chain)?;
+    let solver = StabilitySolver::new(force, &frf);
+    let curve = solver.curve(&speed_grid(SPINDLE_RPM)?);
+    let absolute_limit = solver.absolute_limit();
+    // The mode that sets the absolute limit dominates; its chatter frequency lies a little above its own.
+    let tip = |k: f64| {
+        let expected = 60.0 * absolute_limit?.chatter_hz / (force.teeth as f64 * k);
+        peak_near(&curve, [0.9 * expected, 1.1 * expected])
+    };
+    Ok(LobeTips {
+        second_region: tip(2.0),
+        first_region: tip(1.0),
+        absolute_limit,
+    })
 }
 
 fn unexplained(model: &StructureModel, theta: &[f64]) -> Result<Vec<Unexplained>> {

@@ -3,10 +3,10 @@ use serde_json::json;
 use super::text::{number, percent, table, warnings};
 use super::{CampaignArg, Outcome};
 use crate::Result;
+use crate::analysis::StructureAnalysis;
 use crate::campaign::Campaign;
 use crate::discrepancy::FrfComparison;
-use crate::identify::calibrate::calibrate;
-use crate::identify::{Calibration, Options, StructureCase};
+use crate::identify::{Calibration, Options};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -22,20 +22,18 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
-    let case = StructureCase::load(&campaign)?;
     let options = Options {
         extra_starts: args.starts,
         seed: args.seed,
     };
-    let calibration = calibrate(&case.model, &case.data, options)?;
-    let compare = |theta: &[f64]| -> Result<FrfComparison> {
-        let predicted = case.model.predict(theta, &case.data)?;
-        Ok(FrfComparison::new(&case.data, &case.model.points, &predicted))
-    };
-    let before = compare(&case.model.nominal_theta())?;
-    let after = compare(&calibration.theta)?;
-    let mut notes = case.warnings.clone();
-    notes.extend(calibration.warnings());
+    let analysis = StructureAnalysis::run(&campaign, options)?;
+    let StructureAnalysis {
+        calibration,
+        before,
+        after,
+        warnings: notes,
+        ..
+    } = &analysis;
     let json = json!({
         "domain": "structure",
         "parameters": calibration.parameters,
@@ -48,7 +46,7 @@ pub fn run(args: Args) -> Result<Outcome> {
         "starts_agreeing": calibration.starts_agreeing,
         "warnings": notes,
     });
-    let mut text = describe_parameters(&calibration);
+    let mut text = describe_parameters(calibration);
     text += &format!(
         "\nerror (nrms) {} -> {}, noise floor {}; {} in {} iterations\n",
         percent(before.totals.nrms),
@@ -61,8 +59,8 @@ pub fn run(args: Args) -> Result<Outcome> {
         },
         calibration.iterations,
     );
-    text += &warnings(&notes);
-    text += &next_step(&campaign, &after);
+    text += &warnings(notes);
+    text += &next_step(&campaign, after);
     Ok(Outcome { json, text })
 }
 

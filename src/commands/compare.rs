@@ -3,11 +3,11 @@ use serde_json::{Map, Value, json};
 use super::text::{number, percent, table, warnings};
 use super::{CampaignArg, Outcome};
 use crate::Result;
+use crate::analysis::StructureAnalysis;
 use crate::campaign::Campaign;
 use crate::discrepancy::compare::Group;
 use crate::discrepancy::{FrfComparison, held_out_nrms};
-use crate::identify::calibrate::calibrate;
-use crate::identify::{Options, StructureCase};
+use crate::identify::Options;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -17,13 +17,15 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
-    let case = StructureCase::load(&campaign)?;
-    let calibration = calibrate(&case.model, &case.data, Options::default())?;
-    let predicted = case.model.predict(&calibration.theta, &case.data)?;
-    let comparison = FrfComparison::new(&case.data, &case.model.points, &predicted);
+    let analysis = StructureAnalysis::run(&campaign, Options::default())?;
+    let StructureAnalysis {
+        case,
+        calibration,
+        after: comparison,
+        warnings: notes,
+        ..
+    } = &analysis;
     let held_out = held_out_nrms(&case.model, &case.data, &calibration.theta)?;
-    let mut notes = case.warnings.clone();
-    notes.extend(calibration.warnings());
     let mut error = json!(comparison.totals);
     error["held_out_nrms"] = json!(held_out);
     let json = json!({
@@ -40,7 +42,7 @@ pub fn run(args: Args) -> Result<Outcome> {
     });
     Ok(Outcome {
         json,
-        text: describe(&comparison, held_out, &notes),
+        text: describe(comparison, held_out, notes),
     })
 }
 

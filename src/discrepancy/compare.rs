@@ -82,8 +82,10 @@ impl Sums {
         ratio(self.error, self.signal)
     }
 
+    /// The measurement's noise. What a model of a handful of parameters leaves over bounds it from above, and where
+    /// resonances are sharp against the lines that bound is tighter than the estimate from the scatter.
     fn floor(&self) -> f64 {
-        ratio(self.noise, self.signal)
+        ratio(self.noise.min(self.error), self.signal)
     }
 }
 

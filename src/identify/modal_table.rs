@@ -34,10 +34,12 @@ pub struct Prediction {
 const FREQUENCY_STD: f64 = 0.02;
 /// Relative standard deviation of a tabulated peak: damping and noise both scale it.
 const PEAK_STD: f64 = 0.3;
-/// A model mode further away than this factor is not taken for the tabulated one.
-const SEARCH_FACTOR: f64 = 1.5;
+/// How far an uncalibrated model may be off, as standard deviations of the logarithm: frequencies half the stiffness
+/// tolerance, peaks as much as damping and shape leave open. Decides which of the model's modes a row means.
+const PAIRING_FREQUENCY_STD: f64 = 0.15;
+const PAIRING_PEAK_STD: f64 = 0.7;
 
-/// The model's strongest mode near each row's frequency, with derivatives.
+/// The model's counterpart of each row, with derivatives: the mode that comes nearest in frequency and strength.
 pub fn predict(model: &StructureModel, theta: &[f64], rows: &[StrongestMode]) -> Result<Vec<Prediction>> {
     rows.iter().map(|row| predict_row(model, theta, row)).collect()
 }
@@ -53,23 +55,19 @@ fn predict_row(model: &StructureModel, theta: &[f64], row: &StrongestMode) -> Re
     // Participation of each mode: with xᵀKx = 1 its square is the modal compliance 1/k.
     let participation: DVector<f64> = modes.shapes.transpose() * &output;
     let frequency = |k: usize| 1.0 / (std::f64::consts::TAU * modes.inverse_omega2[k].sqrt());
-    let candidates = || (0..participation.len()).filter(|&k| modes.inverse_omega2[k] > 0.0);
-    let near = |k: &usize| {
-        let ratio = frequency(*k) / row.frequency_hz;
-        ratio < SEARCH_FACTOR && ratio > 1.0 / SEARCH_FACTOR
-    };
-    let strength = |k: &usize| participation[*k].powi(2);
-    let strongest = candidates()
-        .filter(near)
-        .max_by(|a, b| strength(a).total_cmp(&strength(b)))
-        .or_else(|| candidates().max_by(|a, b| strength(a).total_cmp(&strength(b))))
-        .ok_or_else(|| crate::Error::computation("the model has no mode"))?;
-
-    let k = strongest;
-    let mu = modes.inverse_omega2[k];
     let zeta = &baseline.damping_ratio;
-    let compliance = participation[k].powi(2);
-    let peak = compliance / (4.0 * zeta.value * (1.0 - zeta.value));
+    let peak = |k: usize| participation[k].powi(2) / (4.0 * zeta.value * (1.0 - zeta.value));
+    let distance = |k: &usize| {
+        let f = (frequency(*k) / row.frequency_hz).ln() / PAIRING_FREQUENCY_STD;
+        let p = (peak(*k) / row.peak_real_m_per_n).ln() / PAIRING_PEAK_STD;
+        f * f + p * p
+    };
+    let k = (0..participation.len())
+        .filter(|&k| modes.inverse_omega2[k] > 0.0 && participation[k] != 0.0)
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        .ok_or_else(|| crate::Error::computation("the model has no mode at the tool point"))?;
+
+    let mu = modes.inverse_omega2[k];
     let (mut ln_frequency_slope, mut ln_peak_slope) = (Vec::new(), Vec::new());
     for (p, derivative) in system.derivatives.iter().enumerate() {
         let n = participation.len();
@@ -94,7 +92,7 @@ fn predict_row(model: &StructureModel, theta: &[f64], row: &StrongestMode) -> Re
     }
     Ok(Prediction {
         frequency_hz: frequency(k),
-        peak_real_m_per_n: peak,
+        peak_real_m_per_n: peak(k),
         ln_frequency_slope,
         ln_peak_slope,
     })

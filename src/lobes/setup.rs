@@ -22,6 +22,21 @@ impl LobeCoefficients {
     }
 }
 
+/// Ktc and Krc identified from the campaign's own cuts.
+pub fn coefficients_from_cuts(
+    campaign: &Campaign,
+    _section: &LobesSection,
+    _warnings: &mut Vec<String>,
+) -> Result<LobeCoefficients> {
+    Err(
+        InputError::new("cutting coefficients from the campaign's own cuts are not built yet")
+            .file(campaign.dir.join("campaign.toml"))
+            .key("lobes.ktc_n_per_mm2")
+            .remedy("give ktc_n_per_mm2 and krc_n_per_mm2")
+            .into(),
+    )
+}
+
 /// The regenerative force of the campaign's `[lobes]` table and `[tool]`.
 ///
 /// # Errors

@@ -287,33 +287,22 @@ fn time_axis(
     header: &Header,
     notes: &mut Notes,
 ) -> Result<(f64, f64), InputError> {
-    let (start, end) = (seconds[0], seconds[seconds.len() - 1]);
-    let span = end - start;
-    let mean = span / (seconds.len() - 1) as f64;
-    let mut steps: Vec<f64> = seconds.windows(2).map(|w| w[1] - w[0]).collect();
-    let middle = steps.len() / 2;
-    let (_, &mut median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
-    // With a coarse clock (several samples per printed time) single steps say nothing, the mean does.
-    let coarse = resolution > 0.2 * mean.abs();
-    let own = if coarse { mean } else { median };
+    let start = seconds[0];
+    let (own, rounding_s) = own_step(seconds, resolution);
     if !(own.is_finite() && own > 0.0) {
         let error = InputError::new("the time column does not rise").line(header.data_line);
         return match header_rate {
-            Some(rate) if coarse => {
+            Some(rate) if seconds.is_sorted() && resolution * rate > 1.0 => {
                 notes.file("the printed time is too coarse: time from the sampling rate");
                 Ok((rate, start))
             }
-            _ => Err(error.remedy("the first column must be time, rising from row to row")),
+            _ => Err(error.remedy("the time column must rise from row to row")),
         };
     }
-    let rounding = if coarse {
-        resolution / span
-    } else {
-        resolution / own
-    };
-    let step = match header_rate {
+    let rounding = rounding_s / (own * (seconds.len() - 1) as f64);
+    let rate = match header_rate {
         // Within the rounding of the printed time the header is the sharper witness.
-        Some(rate) if (own * rate - 1.0).abs() <= (1e-3_f64).max(rounding) => 1.0 / rate,
+        Some(rate) if (own * rate - 1.0).abs() <= (1e-3_f64).max(2.0 * rounding) => rate,
         other => {
             if let Some(rate) = other {
                 notes.file(format!(
@@ -321,31 +310,46 @@ fn time_axis(
                     1.0 / own
                 ));
             }
-            sharpened(own, mean, resolution, seconds.len())
+            rounded_rate(own, rounding)
         }
     };
-    let rate = match header_rate {
-        Some(rate) if (step * rate - 1.0).abs() < 1e-12 => rate,
-        _ => 1.0 / step,
-    };
-    report_gaps(seconds, step, resolution, notes);
+    report_gaps(seconds, 1.0 / rate, rounding_s, notes);
     Ok((rate, start))
 }
 
-/// A step that was read from rounded times: the mean over the record where no samples are missing, and a whole
-/// number of hertz where the rounding allows it.
-fn sharpened(own: f64, mean: f64, resolution: f64, samples: usize) -> f64 {
-    let step = if (mean - own).abs() <= resolution.max(1e-9 * own) {
-        mean
-    } else {
-        own
-    };
-    let slack = (resolution / (step * samples as f64)).max(1e-9) * 2.0;
+/// Step of the time column and what rounding of the printed times is left in it. Where nearly all steps agree the
+/// printing is exact and the median is the step; else times were rounded and the mean over steps without gaps is.
+fn own_step(seconds: &[f64], resolution: f64) -> (f64, f64) {
+    let mut steps: Vec<f64> = seconds.windows(2).map(|w| w[1] - w[0]).collect();
+    let middle = steps.len() / 2;
+    let (_, &mut median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
+    let agreeing = steps
+        .iter()
+        .filter(|s| (**s - median).abs() <= 1e-3 * median)
+        .count();
+    if 10 * agreeing >= 9 * steps.len() {
+        return (median, 0.0);
+    }
+    let mean = steps.iter().sum::<f64>() / steps.len() as f64;
+    let usual = 1.5 * median.max(mean.min(2.0 * resolution)) + 1.01 * resolution;
+    let without_gaps: Vec<f64> = steps
+        .into_iter()
+        .filter(|s| (-1.01 * resolution..=usual).contains(s))
+        .collect();
+    (
+        without_gaps.iter().sum::<f64>() / without_gaps.len() as f64,
+        resolution,
+    )
+}
+
+/// Rate of a step: a whole number of hertz where the rounding of the times allows it.
+fn rounded_rate(step: f64, rounding: f64) -> f64 {
     let rate = 1.0 / step;
+    let slack = 2.0 * rounding.max(1e-9);
     if rate >= 1.0 && (rate.round() / rate - 1.0).abs() <= slack {
-        1.0 / rate.round()
+        rate.round()
     } else {
-        step
+        rate
     }
 }
 

@@ -1,5 +1,7 @@
 //! FRFs as text: the campaign's FRF CSV, plain `Hz Re Im`, and CutPro-style `.frf`.
 
+use std::collections::HashMap;
+
 use num_complex::Complex64;
 
 use super::InputError;
@@ -98,6 +100,7 @@ pub(super) fn read_table(
         return Err(InputError::new("the first column is not the frequency").line(names_line));
     };
     let mut parts: Vec<Parts> = Vec::new();
+    let mut index: HashMap<&str, usize> = HashMap::new();
     for (at, column) in columns.iter().enumerate().skip(1) {
         let name = match column {
             Column::Re(n) | Column::Im(n) | Column::Magnitude(n) => n,
@@ -112,7 +115,7 @@ pub(super) fn read_table(
                 );
             }
         };
-        let i = parts.iter().position(|p| p.name == *name).unwrap_or(parts.len());
+        let i = *index.entry(name).or_insert(parts.len());
         if i == parts.len() {
             let name = name.clone();
             parts.push(Parts {

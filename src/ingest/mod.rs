@@ -18,6 +18,8 @@ mod number;
 mod quality;
 mod split_comma;
 mod table;
+#[cfg(test)]
+mod tests;
 mod text;
 mod uff;
 pub mod units;

@@ -62,7 +62,12 @@ pub fn scan(bytes: &[u8], start: usize, decimal: u8) -> Option<(f64, usize)> {
             mantissa as f64 * scale
         }
     } else {
-        slow(&bytes[start..mantissa_end], decimal, exponent)?
+        let plain = decimal == b'.' && !matches!(bytes.get(mantissa_end), Some(b'd' | b'D'));
+        let text = plain
+            .then(|| std::str::from_utf8(&bytes[start..end]).ok())
+            .flatten();
+        text.and_then(|t| t.parse().ok())
+            .or_else(|| slow(&bytes[start..mantissa_end], decimal, exponent))?
     };
     // The slow way reads the sign itself.
     Some((if negative { -value.abs() } else { value }, end))

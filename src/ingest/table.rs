@@ -83,13 +83,14 @@ impl Header {
         } else {
             above.pop();
         }
+        // Each row has its time in two tokens then; a single long row is only a bad one.
         let between_commas = delimiter == Delimiter::Byte(b',')
             && !names.is_empty()
             && !data.contains(&b'.')
             && !data.contains(&b'"')
             && Lines::new(data)
-                .take(1000)
-                .any(|l| split_line(&decode(l), delimiter).len() > names.len());
+                .take(20)
+                .all(|l| l.trim_ascii().is_empty() || count_fields(l) > names.len());
         let decimal = match delimiter {
             Delimiter::Byte(b',') if between_commas || quoted_commas(data) => b',',
             Delimiter::Byte(b',') => b'.',
@@ -150,7 +151,8 @@ impl Header {
             return self.read_quoted(data, notes);
         }
         let width = Lines::new(data).next().map_or(1, |l| l.len() + 1).max(1);
-        let rows = data.len() / width + 16;
+        // A row takes two bytes a column at least: what a header announces cannot claim memory.
+        let rows = (data.len() / width).min(data.len() / (2 * self.columns.max(1))) + 16;
         let mut columns: Vec<Vec<f64>> = (0..self.columns).map(|_| Vec::with_capacity(rows)).collect();
         let mut at = 0;
         let mut line = self.data_line;
@@ -316,6 +318,10 @@ fn is_field_end(byte: Option<&u8>, delimiter: Delimiter) -> bool {
         None | Some(b'\n' | b'\r') => true,
         Some(&b) => delimiter == Delimiter::Byte(b),
     }
+}
+
+fn count_fields(line: &[u8]) -> usize {
+    split_line(&decode(line), Delimiter::Byte(b',')).len()
 }
 
 /// True for a line of numbers and separators only.

@@ -73,10 +73,25 @@ impl<'a> Iterator for Lines<'a> {
     }
 }
 
+/// Different remarks kept; a file that gives more is broken through and through.
+const REMARKS_AT_MOST: usize = 100;
+/// Records named in one remark.
+const NAMED_AT_MOST: usize = 4;
+
 /// Warnings about a file. The same remark about many records becomes one line.
 #[derive(Debug, Default)]
 pub struct Notes {
-    remarks: Vec<(String, Vec<String>)>,
+    remarks: Vec<Remark>,
+    left_out: usize,
+}
+
+#[derive(Debug)]
+struct Remark {
+    text: String,
+    /// The first subjects.
+    subjects: Vec<String>,
+    last: String,
+    count: usize,
 }
 
 impl Notes {
@@ -87,27 +102,47 @@ impl Notes {
 
     /// A remark about one record or channel.
     pub fn about(&mut self, subject: &str, remark: impl Into<String>) {
-        let remark = remark.into();
-        let at = match self.remarks.iter().position(|(r, _)| *r == remark) {
-            Some(at) => at,
-            None => {
-                self.remarks.push((remark, Vec::new()));
-                self.remarks.len() - 1
+        let text = remark.into();
+        let at = self
+            .remarks
+            .iter()
+            .position(|r| r.text == text)
+            .unwrap_or(self.remarks.len());
+        if at == REMARKS_AT_MOST {
+            self.left_out += 1;
+            return;
+        }
+        if at == self.remarks.len() {
+            self.remarks.push(Remark {
+                text,
+                subjects: Vec::new(),
+                last: String::new(),
+                count: 0,
+            });
+        }
+        let remark = &mut self.remarks[at];
+        if !subject.is_empty() && remark.last != subject {
+            remark.count += 1;
+            remark.last = subject.to_owned();
+            if remark.subjects.len() < NAMED_AT_MOST {
+                remark.subjects.push(subject.to_owned());
             }
-        };
-        let subjects = &mut self.remarks[at].1;
-        if !subject.is_empty() && !subjects.iter().any(|s| s == subject) {
-            subjects.push(subject.to_owned());
         }
     }
 
     pub fn into_warnings(self) -> Vec<String> {
-        let line = |(remark, subjects): (String, Vec<String>)| match subjects.len() {
-            0 => remark,
-            1..=4 => format!("{}: {remark}", subjects.join(", ")),
-            n => format!("{} and {} more: {remark}", subjects[..3].join(", "), n - 3),
+        let line = |remark: Remark| match remark.count {
+            0 => remark.text,
+            n if n <= NAMED_AT_MOST => format!("{}: {}", remark.subjects.join(", "), remark.text),
+            n => format!(
+                "{} and {} more: {}",
+                remark.subjects[..3].join(", "),
+                n - 3,
+                remark.text
+            ),
         };
-        self.remarks.into_iter().map(line).collect()
+        let more = (self.left_out > 0).then(|| format!("{} further warnings", self.left_out));
+        self.remarks.into_iter().map(line).chain(more).collect()
     }
 }
 

@@ -353,9 +353,8 @@ fn read_ascii(
         }
         if !push_free(line, &mut numbers) {
             numbers.truncate(before_line);
-            if !push_columns(line, &columns, &mut numbers)
-                && !(line_before_end || push_split(line, &mut numbers))
-            {
+            let read = push_columns(line, &columns, &mut numbers) || push_split(line, &mut numbers);
+            if !(read || line_before_end) {
                 return Err(InputError::new(format!(
                     "not numbers of a dataset 58: {:?}",
                     clip(&decode(line))

@@ -6,6 +6,10 @@
 mod binary;
 mod dataset58;
 mod interpret;
+#[cfg(test)]
+mod round_trip;
+#[cfg(test)]
+mod tests;
 mod write;
 
 use super::number;

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use super::bounds::Bounds;
 use super::document::{Document, Section};
 use super::lobes_section::{self, immersion};
+use super::robot_spec::RobotSpec;
 use super::schema::*;
 use super::suggest::shown;
 use super::{ROBOT_KEY, campaign_file, paths};
 use crate::ingest::Quantity;
-use crate::robot::RobotSpec;
 use crate::{Error, InputError, Result};
 
 const SCHEMA: &str = "lobestone/campaign/1";

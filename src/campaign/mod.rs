@@ -8,6 +8,8 @@ pub mod frf_set;
 mod load;
 mod lobes_section;
 pub mod paths;
+pub mod robot_file;
+pub mod robot_spec;
 pub mod schema;
 mod section;
 pub mod suggest;

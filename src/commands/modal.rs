@@ -8,7 +8,8 @@ use rayon::prelude::*;
 use serde_json::json;
 
 use super::Outcome;
-use crate::ingest::{FrfRecord, Quantity};
+use crate::campaign::Campaign;
+use crate::ingest::{FrfRecord, Quantity, read_frfs};
 use crate::modal::{self, FrfModes, GlobalModes, SetMember, Settings};
 use crate::{Error, InputError, Result};
 
@@ -248,61 +249,21 @@ fn receptance(record: &FrfRecord) -> Vec<Complex64> {
         .collect()
 }
 
-/// Stand-in for `crate::ingest::read_frfs`: the FRF CSV of campaign.md only.
-fn read_frfs(path: &Path) -> Result<(Vec<FrfRecord>, Vec<String>)> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, e))?;
-    let bad = |line: usize, problem: &str| InputError::new(problem).file(path).line(line);
-    let header: Vec<&str> = text.lines().next().unwrap_or_default().split(',').collect();
-    let record = |column: &str| FrfRecord {
-        name: column.trim_start_matches("re(").trim_end_matches(')').to_string(),
-        response: None,
-        reference: None,
-        quantity: None,
-        frequency_hz: Vec::new(),
-        value: Vec::new(),
-        coherence: None,
-    };
-    let mut records: Vec<FrfRecord> = header.iter().skip(1).step_by(2).map(|c| record(c)).collect();
-    if header.len() != 2 * records.len() + 1 || records.is_empty() {
-        return Err(bad(1, "not an FRF CSV header").into());
-    }
-    for (k, line) in text.lines().enumerate().skip(1) {
-        let row: Vec<f64> = line
-            .split(',')
-            .map(|t| t.trim().parse().map_err(|_| bad(k + 1, "not a number").into()))
-            .collect::<Result<_>>()?;
-        let Some((f, values)) = row.split_first().filter(|_| row.len() == header.len()) else {
-            return Err(bad(k + 1, "wrong number of columns").into());
-        };
-        for (record, pair) in records.iter_mut().zip(values.chunks_exact(2)) {
-            record.frequency_hz.push(*f);
-            record.value.push(Complex64::new(pair[0], pair[1]));
-        }
-    }
-    Ok((records, Vec::new()))
-}
-
-/// FRFs of a campaign, one set a posture. Stand-in for `Campaign::load(dir)?.load_frfs()`: every CSV in the
-/// folder is a posture.
+/// FRFs of a campaign, one set a posture.
 fn read_campaign(dir: &Path, warnings: &mut Vec<String>) -> Result<Vec<Input>> {
-    let entries = std::fs::read_dir(dir).map_err(|e| Error::io(dir, e))?;
-    let mut files: Vec<PathBuf> = entries
-        .filter_map(|e| e.ok().map(|e| e.path()))
-        .filter(|p| p.extension().is_some_and(|e| e == "csv"))
-        .collect();
-    files.sort();
-    let mut inputs = Vec::new();
-    for file in files {
-        let posture = file
-            .file_stem()
-            .map_or_else(String::new, |s| s.to_string_lossy().into_owned());
-        let of_file = read_file(&file, warnings)?;
-        inputs.extend(of_file.into_iter().map(|input| Input {
-            set: posture.clone(),
-            ..input
-        }));
-    }
-    Ok(inputs)
+    let campaign = Campaign::load(dir)?;
+    let (set, read_warnings) = campaign.load_frfs()?;
+    warnings.extend(read_warnings);
+    Ok(set
+        .frfs
+        .into_iter()
+        .map(|frf| Input {
+            name: frf.name,
+            set: campaign.postures[frf.posture].id.clone(),
+            frequency_hz: frf.frequency_hz,
+            receptance_m_per_n: frf.receptance_m_per_n,
+        })
+        .collect())
 }
 
 #[cfg(test)]

@@ -1,7 +1,257 @@
 //! Reads lab files into SI records. Nothing outside this module knows a file format.
+//!
+//! [`read_file`] says what a file is and gives all it holds; [`read_frfs`] and [`read_time`] give the one thing a
+//! caller wants and an error that says what the file holds instead.
+
+use std::path::{Path, PathBuf};
 
 use num_complex::Complex64;
 use serde::Serialize;
+
+use crate::{Error, InputError, Result};
+
+mod checks;
+mod detect;
+mod force;
+mod frf_text;
+mod number;
+mod quality;
+mod split_comma;
+mod table;
+#[cfg(test)]
+mod tests;
+mod text;
+mod uff;
+pub mod units;
+
+pub use quality::quality_warnings;
+pub use uff::{
+    Abscissa, ByteOrder, Dataset58, Encoding58, EntityDof, Ordinate, UnitAxis, frf_dataset, time_datasets,
+    uff58_bytes, write_datasets58, write_uff58,
+};
+
+use detect::Detected;
+use text::Notes;
+
+/// How a file is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Format {
+    /// Universal file, dataset 58.
+    Uff58,
+    /// Universal file, dataset 58b (binary).
+    Uff58b,
+    /// `frequency_hz,re(1X/1X),im(1X/1X),…` and relatives.
+    FrfCsv,
+    /// Three columns Hz, Re, Im without names.
+    FrfText,
+    /// CutPro-style `.frf`.
+    CutproFrf,
+    /// DynoWare export or text with header lines like it.
+    DynoWare,
+    /// Time series with column names.
+    TimeCsv,
+}
+
+impl std::fmt::Display for Format {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Format::Uff58 => "UFF 58",
+            Format::Uff58b => "UFF 58b",
+            Format::FrfCsv => "FRF CSV",
+            Format::FrfText => "FRF text",
+            Format::CutproFrf => "CutPro FRF",
+            Format::DynoWare => "DynoWare export",
+            Format::TimeCsv => "time CSV",
+        })
+    }
+}
+
+/// All that a measurement file holds; a universal file may hold several kinds at once.
+#[derive(Debug, Clone, Default)]
+pub struct Contents {
+    pub frfs: Vec<FrfRecord>,
+    /// One record for each time axis.
+    pub times: Vec<TimeRecord>,
+    /// Spectra and other functions that nothing here computes with, as they stand in the file.
+    pub others: Vec<OtherRecord>,
+}
+
+/// A function that is neither FRF nor time signal; units of the file.
+#[derive(Debug, Clone)]
+pub struct OtherRecord {
+    /// Such as `power spectral density`.
+    pub kind: &'static str,
+    pub name: String,
+    pub abscissa: Vec<f64>,
+    pub abscissa_unit: String,
+    pub value: Vec<Complex64>,
+    pub unit: String,
+}
+
+/// A file that was read.
+#[derive(Debug, Clone)]
+pub struct MeasurementFile {
+    pub path: PathBuf,
+    pub format: Format,
+    /// Why it was taken for this format.
+    pub why: String,
+    pub contents: Contents,
+    /// What was assumed, contradicted or left out.
+    pub warnings: Vec<String>,
+}
+
+impl Contents {
+    /// `3 FRFs, 1 time record, 2 × coherence`.
+    pub fn describe(&self) -> String {
+        let mut parts = Vec::new();
+        if !self.frfs.is_empty() {
+            parts.push(count(self.frfs.len(), "FRF"));
+        }
+        if !self.times.is_empty() {
+            parts.push(count(self.times.len(), "time record"));
+        }
+        let mut kinds: Vec<&str> = self.others.iter().map(|o| o.kind).collect();
+        kinds.sort_unstable();
+        for group in kinds.chunk_by(|a, b| a == b) {
+            parts.push(format!("{} × {}", group.len(), group[0]));
+        }
+        if parts.is_empty() {
+            "nothing usable".into()
+        } else {
+            parts.join(", ")
+        }
+    }
+}
+
+/// `1 FRF`, `2 FRFs`.
+fn count(n: usize, what: &str) -> String {
+    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
+}
+
+/// Reads a measurement file of any known format, decided by its content.
+///
+/// # Errors
+/// The operating system's; an unknown or unreadable format, or a damaged file, with file, line and remedy.
+pub fn read_file(path: &Path) -> Result<MeasurementFile> {
+    let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
+    let is_dwd_named = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("dwd"));
+    let mut notes = Notes::default();
+    let (format, why, contents) = read_bytes(&bytes, is_dwd_named, &mut notes).map_err(|e| e.file(path))?;
+    Ok(MeasurementFile {
+        path: path.to_path_buf(),
+        format,
+        why,
+        contents,
+        warnings: notes.into_warnings(),
+    })
+}
+
+/// As [`read_file`], on bytes.
+fn read_bytes(
+    bytes: &[u8],
+    is_dwd_named: bool,
+    notes: &mut Notes,
+) -> std::result::Result<(Format, String, Contents), InputError> {
+    let bytes = &*text::without_byte_order_mark(bytes);
+    let (detected, format, why) = detect::detect(bytes, is_dwd_named)?;
+    let frfs = |frfs| Contents {
+        frfs,
+        ..Contents::default()
+    };
+    Ok(match detected {
+        Detected::Universal => {
+            let (summary, contents) = uff::contents(bytes, notes)?;
+            let skipped: Vec<String> = summary.skipped.iter().map(u32::to_string).collect();
+            let (format, count) = match (summary.ascii, summary.binary) {
+                (ascii, 0) => (Format::Uff58, count(ascii, "ASCII dataset")),
+                (0, binary) => (Format::Uff58b, count(binary, "binary dataset")),
+                (ascii, binary) => (
+                    Format::Uff58b,
+                    format!(
+                        "{}, {}",
+                        count(ascii, "ASCII dataset"),
+                        count(binary, "binary dataset")
+                    ),
+                ),
+            };
+            let rest = if skipped.is_empty() {
+                String::new()
+            } else {
+                format!(", skipped {}", skipped.join(", "))
+            };
+            (format, format!("{why}; {count}{rest}"), contents)
+        }
+        Detected::Cutpro(labels) => (format, why, frfs(frf_text::read_cutpro(bytes, &labels, notes)?)),
+        Detected::FrfTable(header) => (format, why, frfs(frf_text::read_table(bytes, &header, notes)?)),
+        Detected::PlainFrf(header) => {
+            notes.file("no column names: taken as frequency in Hz, real and imaginary part");
+            (
+                format,
+                why,
+                frfs(frf_text::read_plain(bytes, &header, None, 1.0, notes)?),
+            )
+        }
+        Detected::TimeTable(header) => {
+            let times = vec![force::read(bytes, &header, notes)?];
+            (
+                format,
+                why,
+                Contents {
+                    times,
+                    ..Contents::default()
+                },
+            )
+        }
+    })
+}
+
+/// FRFs of a file, and its warnings.
+///
+/// # Errors
+/// As [`read_file`], and a file without FRFs.
+pub fn read_frfs(path: &Path) -> Result<(Vec<FrfRecord>, Vec<String>)> {
+    let file = read_file(path)?;
+    if file.contents.frfs.is_empty() {
+        return Err(no_such(&file, "FRF", "give a UFF 58 file or a CSV with FRFs"));
+    }
+    Ok((file.contents.frfs, file.warnings))
+}
+
+/// The time record of a file, and its warnings.
+///
+/// # Errors
+/// As [`read_file`], and a file without time signals or with several that do not share one time axis.
+pub fn read_time(path: &Path) -> Result<(TimeRecord, Vec<String>)> {
+    let mut file = read_file(path)?;
+    match (file.contents.times.pop(), file.contents.times.len()) {
+        (Some(record), 0) => Ok((record, file.warnings)),
+        (None, _) => Err(no_such(
+            &file,
+            "time signal",
+            "give a DynoWare export or a CSV with a time column",
+        )),
+        (Some(_), more) => Err(InputError::new(format!(
+            "{} time records with different time axes",
+            more + 1
+        ))
+        .file(path)
+        .remedy("keep the channels of one record in one file")
+        .into()),
+    }
+}
+
+fn no_such(file: &MeasurementFile, what: &str, remedy: &str) -> Error {
+    let mut problem = format!(
+        "no {what} in this {} file, but {}",
+        file.format,
+        file.contents.describe()
+    );
+    if let Some(first) = file.warnings.first() {
+        problem.push_str(&format!(" ({first})"));
+    }
+    InputError::new(problem).file(&file.path).remedy(remedy).into()
+}
 
 /// What an FRF's response is: displacement, velocity or acceleration per newton.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, serde::Deserialize)]
@@ -53,6 +303,36 @@ impl std::fmt::Display for Dof {
     }
 }
 
+impl std::str::FromStr for Dof {
+    type Err = InputError;
+
+    /// Node, optional sign, axis letter: `1X`, `12-Z`, `1+x`.
+    fn from_str(text: &str) -> std::result::Result<Self, InputError> {
+        let wrong = || {
+            InputError::new(format!("{text:?} is no degree of freedom"))
+                .remedy("write node, optional sign and axis: 1X, 12-Z")
+        };
+        let text = text.trim();
+        let digits = text.chars().take_while(char::is_ascii_digit).count();
+        let (node, rest) = text.split_at_checked(digits).ok_or_else(wrong)?;
+        let (negative, letter) = match rest.strip_prefix('-') {
+            Some(letter) => (true, letter),
+            None => (false, rest.strip_prefix('+').unwrap_or(rest)),
+        };
+        let axis = match letter {
+            "X" | "x" => Axis::X,
+            "Y" | "y" => Axis::Y,
+            "Z" | "z" => Axis::Z,
+            _ => return Err(wrong()),
+        };
+        Ok(Dof {
+            node: node.parse().map_err(|_| wrong())?,
+            axis,
+            negative,
+        })
+    }
+}
+
 /// One frequency response function, in SI per newton, in the quantity of the file.
 #[derive(Debug, Clone)]
 pub struct FrfRecord {
@@ -80,6 +360,19 @@ pub struct Channel {
     pub role: ChannelRole,
     /// Samples in SI (N, N·m, m/s², m, …; volts and unknown units as they stand).
     pub samples: Vec<f64>,
+}
+
+impl Channel {
+    /// What the samples are and their SI unit; the file's own label where it is not understood.
+    pub fn quantity_and_unit(&self) -> (&'static str, &str) {
+        let by_role = match self.role {
+            ChannelRole::ForceX | ChannelRole::ForceY | ChannelRole::ForceZ => Some(("force", "N")),
+            ChannelRole::TorqueZ => Some(("moment", "N·m")),
+            ChannelRole::Other => None,
+        };
+        let by_unit = units::parse(&self.file_unit).and_then(|u| u.dimension.describe());
+        by_unit.or(by_role).unwrap_or(("unknown", &self.file_unit))
+    }
 }
 
 /// What a channel records, decided from its name and unit.
@@ -115,11 +408,4 @@ impl TimeRecord {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
-}
-
-/// Stub of this branch: the readers come with the ingest branch.
-pub fn read_frfs(path: &std::path::Path) -> crate::Result<(Vec<FrfRecord>, Vec<String>)> {
-    Err(crate::InputError::new("no reader for FRF files yet")
-        .file(path)
-        .into())
 }

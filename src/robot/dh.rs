@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-use super::spec::{JointSpec, RobotSpec};
+use crate::campaign::robot_spec::{JointSpec, RobotSpec};
 
 /// Frames of a robot at one posture, base frame coordinates, m.
 #[derive(Debug, Clone)]
@@ -84,7 +84,7 @@ impl Kinematics {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::spec::ToolFrame;
+    use crate::campaign::robot_spec::ToolFrame;
     use proptest::prelude::*;
 
     fn planar(lengths: &[f64]) -> RobotSpec {

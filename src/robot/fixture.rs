@@ -1,6 +1,6 @@
 //! The IRB 6640 of the source thesis, for the tests of this floor (the robot file itself is read one floor up).
 
-use super::spec::*;
+use crate::campaign::robot_spec::*;
 
 pub fn irb6640() -> RobotSpec {
     let joint = |d_m: f64, a_m: f64, alpha_deg: f64, offset_deg: f64, compliance: f64| JointSpec {

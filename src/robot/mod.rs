@@ -9,18 +9,17 @@ pub mod chain;
 pub mod dh;
 pub mod dual;
 pub mod export;
-pub mod file;
+
 #[cfg(test)]
 pub(crate) mod fixture;
 pub mod frf;
 pub mod model;
 pub mod posture_report;
-pub mod spec;
 
+pub use crate::campaign::robot_spec::*;
 pub use chain::{Body, Branch, Chain, Element, Place, Slot, System};
 pub use dh::Kinematics;
 pub use dual::Dual;
 pub use frf::{FrfBasis, ModalBasis};
 pub use model::{Baseline, RobotModel};
 pub use posture_report::PostureReport;
-pub use spec::*;

@@ -6,7 +6,7 @@ use super::beam;
 use super::chain::{Body, Chain, Element, Place, Slot};
 use super::dh::Kinematics;
 use super::dual::Dual;
-use super::spec::RobotSpec;
+use crate::campaign::robot_spec::RobotSpec;
 use crate::campaign::{AxesRef, BodyRef, Point};
 use crate::ingest::Axis;
 use crate::{InputError, Result};
@@ -214,9 +214,9 @@ impl RobotModel {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::campaign::robot_spec::{BeamSection, JointSpec, LinkSpec, ToolFrame};
     use crate::robot::fixture::{TAP_POSTURES, irb6640};
     use crate::robot::frf::natural_frequencies_hz;
-    use crate::robot::spec::{BeamSection, JointSpec, LinkSpec, ToolFrame};
     use crate::robot::{FrfBasis, ModalBasis};
     use approx::assert_relative_eq;
     use proptest::prelude::*;

@@ -2,4 +2,5 @@
 
 mod campaign;
 mod contract;
+mod inspect;
 mod modal;

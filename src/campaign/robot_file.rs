@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use super::spec::*;
-use crate::campaign::bounds::Bounds;
-use crate::campaign::document::{Document, Section};
-use crate::campaign::suggest::closest;
-use crate::campaign::{ROBOT_KEY, campaign_file, paths};
+use super::bounds::Bounds;
+use super::document::{Document, Section};
+use super::robot_spec::*;
+use super::suggest::closest;
+use super::{ROBOT_KEY, campaign_file, paths};
 use crate::{InputError, Result};
 
 /// Built-in models: name and robot file.

@@ -1,0 +1,177 @@
+//! Which format a file has, by what stands in it.
+
+use super::force;
+use super::frf_text;
+use super::table::Header;
+use super::text::{self, Lines};
+use super::uff;
+use super::{Format, InputError};
+
+/// What was decided, and what the reader needs to know of it.
+pub(super) enum Detected {
+    Universal,
+    Cutpro(Vec<String>),
+    FrfTable(Header),
+    PlainFrf(Header),
+    TimeTable(Header),
+}
+
+/// How many bytes decide whether a file is text.
+const LOOK_AT: usize = 8192;
+
+/// Decides the format. The error of an unreadable format says what it is and how to export it.
+pub(super) fn detect(bytes: &[u8], is_dwd_named: bool) -> Result<(Detected, Format, String), InputError> {
+    if bytes.trim_ascii().is_empty() {
+        return Err(InputError::new("the file is empty"));
+    }
+    if let Some((what, remedy)) = foreign(bytes) {
+        return Err(InputError::new(format!("{what}, which is not read here")).remedy(remedy));
+    }
+    // First, for a 58b is text and binary at once.
+    if uff::looks_like(bytes) {
+        return Ok((
+            Detected::Universal,
+            Format::Uff58,
+            "starts with \"-1\" and a dataset number".into(),
+        ));
+    }
+    let head = &bytes[..bytes.len().min(LOOK_AT)];
+    let odd = head.iter().filter(|b| **b < 9 || (14..32).contains(*b)).count();
+    if odd > 0 {
+        let (what, remedy) = if is_dwd_named || mentions(head, b"DynoWare") || mentions(head, b"Kistler") {
+            (
+                "a DynoWare .dwd recording: an undocumented binary format",
+                "in DynoWare: File, Export, with header, as text",
+            )
+        } else {
+            (
+                "a binary file of unknown format",
+                "export it as UFF 58, CSV or tab separated text",
+            )
+        };
+        return Err(InputError::new(what).remedy(remedy));
+    }
+    if let Some(problem) = foreign_text(bytes) {
+        return Err(problem);
+    }
+    if let Some(labels) = frf_text::cutpro_labels(bytes) {
+        let why = "three numbers and the labels Freq, Real, Imag on the first line".to_owned();
+        return Ok((Detected::Cutpro(labels), Format::CutproFrf, why));
+    }
+    let Some(header) = Header::find(bytes) else {
+        return Err(
+            InputError::new("text without rows of numbers, no format known here")
+                .remedy("FRFs are read from UFF 58 and CSV, forces from DynoWare exports and CSV"),
+        );
+    };
+    let how = header.describe();
+    if frf_text::is_frf_table(&header) {
+        let why = format!("column names of FRFs ({}), {how}", abbreviated(&header.names));
+        return Ok((Detected::FrfTable(header), Format::FrfCsv, why));
+    }
+    if force::is_time_table(&header) {
+        let dynoware = header.lines.iter().any(|l| l.contains("DynoWare"))
+            || header.entry(&["sampling rate"]).is_some() && !header.units.is_empty();
+        let (format, what) = if dynoware {
+            (Format::DynoWare, "DynoWare-like header lines")
+        } else {
+            (Format::TimeCsv, "a time column")
+        };
+        let why = format!("{what} and column names ({}), {how}", abbreviated(&header.names));
+        return Ok((Detected::TimeTable(header), format, why));
+    }
+    if frf_text::is_plain_frf(&header) {
+        let why = format!("three columns of numbers, taken as Hz, Re, Im; {how}");
+        return Ok((Detected::PlainFrf(header), Format::FrfText, why));
+    }
+    let (problem, line) = if header.names.is_empty() {
+        (
+            format!("{} columns of numbers without names", header.columns),
+            header.data_line,
+        )
+    } else {
+        (
+            format!("columns of unknown meaning ({})", abbreviated(&header.names)),
+            header.data_line.saturating_sub(1),
+        )
+    };
+    Err(InputError::new(problem)
+        .line(line.max(1))
+        .remedy("put a line of column names on top: frequency_hz,re,im or time_s,fx_n,fy_n,fz_n"))
+}
+
+fn abbreviated(names: &[String]) -> String {
+    let few: Vec<&str> = names.iter().take(4).map(String::as_str).collect();
+    let more = if names.len() > 4 { ", …" } else { "" };
+    few.join(", ") + more
+}
+
+fn mentions(head: &[u8], word: &[u8]) -> bool {
+    head.windows(word.len()).any(|w| w == word)
+}
+
+/// Formats of others by their first bytes: what it is, and how to get at the data.
+fn foreign(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
+    let starts = |magic: &[u8]| bytes.starts_with(magic);
+    Some(if starts(b"TDSm") || starts(b"TDSh") {
+        (
+            "a National Instruments TDMS file",
+            "open it in Excel (TDM importer), DIAdem or LabVIEW and save as CSV or UFF 58",
+        )
+    } else if starts(b"MATLAB 5.0 MAT-file") || starts(b"MATLAB 7.") {
+        (
+            "a MATLAB MAT-file",
+            "in MATLAB: writematrix or writetable to CSV, columns time_s,fx_n,… or frequency_hz,re,im",
+        )
+    } else if starts(b"\x89HDF\r\n\x1a\n") || bytes.get(512..520) == Some(b"\x89HDF\r\n\x1a\n") {
+        (
+            "an HDF5 file (also MAT v7.3)",
+            "export the data as CSV, columns time_s,fx_n,… or frequency_hz,re,im",
+        )
+    } else if starts(b"PK\x03\x04") {
+        (
+            "a zip archive or spreadsheet (xlsx, ods)",
+            "save the sheet as CSV, or unpack the archive",
+        )
+    } else if starts(b"\xD0\xCF\x11\xE0\xA1\xB1\x1A\xE1") {
+        ("an old Office document (xls)", "save the sheet as CSV")
+    } else if starts(b"\x1F\x8B") || starts(b"7z\xBC\xAF") || starts(b"\xFD7zXZ") || starts(b"BZh") {
+        ("a compressed file", "unpack it first")
+    } else if starts(b"PAR1") {
+        ("a Parquet file", "export it as CSV")
+    } else if starts(b"RIFF") {
+        (
+            "a WAV sound file",
+            "export it as CSV with columns time_s and one per channel, in physical units",
+        )
+    } else if starts(b"%PDF") || starts(b"\x89PNG") || starts(b"\xFF\xD8\xFF") {
+        (
+            "a document or image",
+            "give the measurement file it was made from",
+        )
+    } else {
+        return None;
+    })
+}
+
+/// Text formats that are recognised and not read.
+fn foreign_text(bytes: &[u8]) -> Option<InputError> {
+    let first = text::decode(Lines::new(bytes).find(|l| !l.trim_ascii().is_empty())?);
+    let first = first.trim();
+    if first.starts_with("LabVIEW Measurement") {
+        return Some(
+            InputError::new("a LabVIEW measurement file (.lvm), which is not read here")
+                .remedy("save as CSV or tab separated text with one header line: time_s,fx_n,fy_n,fz_n"),
+        );
+    }
+    if first.starts_with('(') && first.ends_with("j)") {
+        return Some(
+            InputError::new(
+                "complex numbers as Python prints them, one per line: the frequency axis is missing",
+            )
+            .line(1)
+            .remedy("write a CSV with the columns frequency_hz,re,im"),
+        );
+    }
+    None
+}

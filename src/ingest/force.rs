@@ -1,0 +1,390 @@
+//! Time records from text: DynoWare exports and plain force tables. Channel roles, units, time axis.
+
+use super::InputError;
+use super::number;
+use super::table::{Header, Table};
+use super::text::Notes;
+use super::units::{self, Dimension, Unit};
+use super::{Channel, ChannelRole, TimeRecord};
+
+/// True where the table is a time record: a time column, or a sampling rate above it.
+pub(super) fn is_time_table(header: &Header) -> bool {
+    time_column(header).is_some() || (!header.names.is_empty() && sampling_rate(header).is_some())
+}
+
+/// Reads the rows and makes them a time record in SI.
+pub(super) fn read(bytes: &[u8], header: &Header, notes: &mut Notes) -> Result<TimeRecord, InputError> {
+    let rate = sampling_rate(header);
+    let mut table = header.read(bytes, rate, notes)?;
+    check_numbers(&table, header)?;
+    let (time, resolution) = match time_column(header) {
+        Some(at) => {
+            let unit = column_unit(header, at).filter(|u| u.dimension == Dimension::TIME);
+            let factor = unit.map_or(1.0, |u| u.factor);
+            let resolution = time_resolution(bytes, header, at) * factor;
+            let mut seconds = std::mem::take(&mut table.columns[at]);
+            seconds.iter_mut().for_each(|t| *t *= factor);
+            (Some((at, seconds)), resolution)
+        }
+        None => (None, 0.0),
+    };
+    let samples = table.columns.iter().map(Vec::len).max().unwrap_or(0);
+    if samples < 2 {
+        return Err(InputError::new("a time record of less than two samples").line(header.data_line));
+    }
+    let (sample_rate_hz, start_s) = match &time {
+        Some((_, seconds)) => time_axis(seconds, resolution, rate, header, notes)?,
+        None => {
+            let rate = rate.ok_or_else(|| no_time(header))?;
+            notes.file("no time column: time from the sampling rate, starting at 0 s");
+            (rate, 0.0)
+        }
+    };
+    if !(sample_rate_hz.is_finite() && start_s.is_finite()) {
+        return Err(InputError::new("time values beyond the range of numbers").line(header.data_line));
+    }
+    let skip = time.map(|(at, _)| at);
+    let columns = table
+        .columns
+        .into_iter()
+        .enumerate()
+        .filter(|(i, _)| Some(*i) != skip);
+    let channels = columns
+        .map(|(i, values)| channel(header, i, values, notes))
+        .collect::<Result<Vec<Channel>, _>>()?;
+    if channels.is_empty() {
+        return Err(InputError::new("a time column and no channel beside it").line(header.data_line));
+    }
+    let mut seen: Vec<ChannelRole> = Vec::new();
+    for channel in channels.iter().filter(|c| c.role != ChannelRole::Other) {
+        if seen.contains(&channel.role) {
+            notes.about(
+                &channel.name,
+                "a second channel for the same force: the first one is used",
+            );
+        }
+        seen.push(channel.role);
+    }
+    Ok(TimeRecord {
+        sample_rate_hz,
+        start_s,
+        channels,
+    })
+}
+
+fn no_time(header: &Header) -> InputError {
+    InputError::new("no time column and no sampling rate")
+        .line(header.data_line.saturating_sub(1).max(1))
+        .remedy("name a column `time_s` or add a line `Sampling rate [Hz]:,10000` above the names")
+}
+
+fn check_numbers(table: &Table, header: &Header) -> Result<(), InputError> {
+    for (i, column) in table.columns.iter().enumerate() {
+        if let Some(row) = column.iter().position(|v| !v.is_finite()) {
+            let name = header
+                .names
+                .get(i)
+                .map_or_else(|| format!("column {}", i + 1), |n| format!("channel {n}"));
+            return Err(InputError::new(format!("{name} has no valid number in data row {}", row + 1))
+                .line(header.data_line + row)
+                .remedy("a record with missing samples cannot be used: export it again or cut the row range out"));
+        }
+    }
+    Ok(())
+}
+
+fn time_column(header: &Header) -> Option<usize> {
+    header.names.iter().position(|name| {
+        let (base, _) = split_unit(name);
+        let base = base.to_lowercase();
+        [
+            "time", "t", "zeit", "temps", "tiempo", "tempo", "cas", "čas", "x_value",
+        ]
+        .contains(&base.as_str())
+            || base.starts_with("time ")
+    })
+}
+
+/// `Sampling rate [Hz]:,10000` and its relatives.
+fn sampling_rate(header: &Header) -> Option<f64> {
+    let rate = [
+        "sampling rate",
+        "sample rate",
+        "sampling frequency",
+        "abtastrate",
+        "sampling_rate",
+        "sample_rate",
+    ];
+    let (key, value) = header.entry(&rate)?;
+    let unit = key
+        .split(['[', '('])
+        .nth(1)
+        .and_then(|u| u.split([']', ')']).next())
+        .map(str::trim);
+    // The unit may stand behind the value too.
+    let mut words = value.split_whitespace();
+    let word = words.next()?;
+    let number = number::field(word.as_bytes(), b'.').or_else(|| number::field(word.as_bytes(), b','))?;
+    let factor = unit
+        .or(words.next())
+        .and_then(units::frequency_factor)
+        .unwrap_or(1.0);
+    let rate = number * factor;
+    (rate.is_finite() && rate > 0.0).then_some(rate)
+}
+
+/// Name and unit of `Fx [N]`, `Fx (N)`, `fx_n`, `Fx`.
+fn split_unit(name: &str) -> (&str, Option<Unit>) {
+    let name = name.trim();
+    for (open, close) in [('[', ']'), ('(', ')')] {
+        if let Some((base, rest)) = name.split_once(open)
+            && let Some((unit, _)) = rest.split_once(close)
+        {
+            return (base.trim(), units::parse(unit));
+        }
+    }
+    for (at, _) in name.match_indices('_') {
+        if let Some(unit) = units::parse_suffix(&name[at + 1..]) {
+            return (&name[..at], Some(unit));
+        }
+    }
+    (name, None)
+}
+
+fn column_unit(header: &Header, at: usize) -> Option<Unit> {
+    let from_line = header.units.get(at).and_then(|label| units::parse(label));
+    from_line.or_else(|| header.names.get(at).and_then(|name| split_unit(name).1))
+}
+
+/// Role by name (`Fx`, `FX1`, `AFx`, `force_x`, `Mz`, `torque`) where the unit does not speak against it.
+pub(super) fn role_of(name: &str, unit: Option<Unit>) -> ChannelRole {
+    let base = split_unit(name).0.to_lowercase();
+    let letters: String = base.chars().filter(|c| c.is_alphanumeric()).collect();
+    // Two digits (`Fx12`) are the sum of two of four sensors, not the whole force.
+    let bare = letters.trim_end_matches(|c: char| c.is_ascii_digit());
+    if letters.len() - bare.len() > 1 {
+        return ChannelRole::Other;
+    }
+    let role = match bare {
+        "fx" | "afx" | "forcex" | "xforce" | "kraftx" => ChannelRole::ForceX,
+        "fy" | "afy" | "forcey" | "yforce" | "krafty" => ChannelRole::ForceY,
+        "fz" | "afz" | "forcez" | "zforce" | "kraftz" | "thrust" | "thrustforce" => ChannelRole::ForceZ,
+        "mz" | "amz" | "momentz" | "torquez" | "torque" | "drehmoment" | "mzmoment" => ChannelRole::TorqueZ,
+        _ => return ChannelRole::Other,
+    };
+    let expected = if role == ChannelRole::TorqueZ {
+        Dimension::MOMENT
+    } else {
+        Dimension::FORCE
+    };
+    match unit {
+        Some(unit) if unit.dimension != expected && unit.dimension != Dimension::VOLTAGE => {
+            ChannelRole::Other
+        }
+        _ => role,
+    }
+}
+
+fn channel(
+    header: &Header,
+    at: usize,
+    mut samples: Vec<f64>,
+    notes: &mut Notes,
+) -> Result<Channel, InputError> {
+    let name = header
+        .names
+        .get(at)
+        .cloned()
+        .unwrap_or_else(|| format!("column {}", at + 1));
+    let unit = column_unit(header, at);
+    let role = role_of(&name, unit);
+    let label = header.units.get(at).cloned();
+    let file_unit = label.unwrap_or_else(|| {
+        let (_, unit) = split_unit(&name);
+        let in_brackets = name
+            .split_once(['[', '('])
+            .map(|(_, u)| u.trim_end_matches([']', ')']).to_owned());
+        in_brackets
+            .or_else(|| unit.and_then(|u| suffix_label(&name, u)))
+            .unwrap_or_default()
+    });
+    match unit {
+        Some(unit) => {
+            if (unit.factor - 1.0).abs() > 1e-12 {
+                samples.iter_mut().for_each(|v| *v *= unit.factor);
+            }
+            if unit.dimension == Dimension::VOLTAGE && role != ChannelRole::Other {
+                notes.about(
+                    &name,
+                    "a force in volts: values as they stand, check that they are newtons",
+                );
+            }
+        }
+        None if role == ChannelRole::TorqueZ => notes.about(&name, "no unit that is understood: N·m assumed"),
+        None if role != ChannelRole::Other => notes.about(&name, "no unit that is understood: N assumed"),
+        None => {}
+    }
+    if samples.iter().any(|v| !v.is_finite()) {
+        return Err(
+            InputError::new(format!("channel {name}: values beyond the range of numbers"))
+                .line(header.data_line),
+        );
+    }
+    Ok(Channel {
+        name,
+        file_unit,
+        role,
+        samples,
+    })
+}
+
+/// The unit of `fx_n` as people write it.
+fn suffix_label(name: &str, unit: Unit) -> Option<String> {
+    match unit.dimension.describe() {
+        Some((_, si)) if (unit.factor - 1.0).abs() < 1e-12 => Some(si.to_owned()),
+        _ => name.split_once('_').map(|(_, suffix)| suffix.to_owned()),
+    }
+}
+
+/// Resolution of the printed time: a unit in the last place of the coarsest of the first, middle and last rows.
+fn time_resolution(bytes: &[u8], header: &Header, column: usize) -> f64 {
+    let data = bytes.get(header.data_at..).unwrap_or_default();
+    if header.decimal_comma_between_commas {
+        return 1e-6;
+    }
+    let places = |from: usize| {
+        let rest = &data[from..];
+        let start = if from == 0 {
+            0
+        } else {
+            rest.iter().position(|b| *b == b'\n')? + 1
+        };
+        let line = super::text::Lines::new(&rest[start..]).next()?;
+        let line = super::text::decode(line);
+        let field = super::table::split_line(&line, header.delimiter)
+            .into_iter()
+            .nth(column)?;
+        let (mantissa, exponent) = field.split_once(['e', 'E']).unwrap_or((&field, "0"));
+        let fraction = mantissa
+            .split(char::from(header.decimal))
+            .nth(1)
+            .map_or(0, str::len) as i32;
+        Some(exponent.parse::<i32>().ok()?.saturating_sub(fraction))
+    };
+    let coarsest = [0, data.len() / 2, data.len().saturating_sub(200)]
+        .into_iter()
+        .filter_map(places)
+        .max();
+    10_f64.powi(coarsest.unwrap_or(-9).clamp(-12, 3))
+}
+
+/// Sampling rate and start from the time column, checked against the rate of the header. The column is what was
+/// measured: a header describes the recording, an export may be decimated.
+fn time_axis(
+    seconds: &[f64],
+    resolution: f64,
+    header_rate: Option<f64>,
+    header: &Header,
+    notes: &mut Notes,
+) -> Result<(f64, f64), InputError> {
+    let start = seconds[0];
+    let (own, rounding_s) = own_step(seconds, resolution);
+    if !(own.is_finite() && own > 0.0) {
+        let error = InputError::new("the time column does not rise").line(header.data_line);
+        return match header_rate {
+            Some(rate) if seconds.is_sorted() && resolution * rate > 1.0 => {
+                notes.file("the printed time is too coarse: time from the sampling rate");
+                Ok((rate, start))
+            }
+            _ => Err(error.remedy("the time column must rise from row to row")),
+        };
+    }
+    let rounding = rounding_s / (own * (seconds.len() - 1) as f64);
+    let rate = match header_rate {
+        // Within the rounding of the printed time the header is the sharper witness.
+        Some(rate) if (own * rate - 1.0).abs() <= (1e-3_f64).max(2.0 * rounding) => rate,
+        other => {
+            if let Some(rate) = other {
+                notes.file(format!(
+                    "the header says {rate} Hz, the time column {:.6} Hz: the time column is taken",
+                    1.0 / own
+                ));
+            }
+            rounded_rate(own, rounding)
+        }
+    };
+    report_gaps(seconds, 1.0 / rate, rounding_s, notes);
+    Ok((rate, start))
+}
+
+/// Step of the time column and what rounding of the printed times is left in it. Where nearly all steps agree the
+/// printing is exact and the median is the step; else times were rounded and the mean over steps without gaps is.
+fn own_step(seconds: &[f64], resolution: f64) -> (f64, f64) {
+    let mut steps: Vec<f64> = seconds.windows(2).map(|w| w[1] - w[0]).collect();
+    let middle = steps.len() / 2;
+    let (_, &mut median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
+    let agreeing = steps
+        .iter()
+        .filter(|s| (**s - median).abs() <= 1e-3 * median)
+        .count();
+    if 10 * agreeing >= 9 * steps.len() {
+        return (median, 0.0);
+    }
+    let mean = steps.iter().sum::<f64>() / steps.len() as f64;
+    let usual = 1.5 * median.max(mean.min(2.0 * resolution)) + 1.01 * resolution;
+    let without_gaps: Vec<f64> = steps
+        .into_iter()
+        .filter(|s| (-1.01 * resolution..=usual).contains(s))
+        .collect();
+    (
+        without_gaps.iter().sum::<f64>() / without_gaps.len() as f64,
+        resolution,
+    )
+}
+
+/// Rate of a step: a whole number of hertz where the rounding of the times allows it.
+fn rounded_rate(step: f64, rounding: f64) -> f64 {
+    let rate = 1.0 / step;
+    let slack = 2.0 * rounding.max(1e-9);
+    if rate >= 1.0 && (rate.round() / rate - 1.0).abs() <= slack {
+        rate.round()
+    } else {
+        rate
+    }
+}
+
+/// Says where samples are missing or time runs backwards.
+fn report_gaps(seconds: &[f64], step: f64, resolution: f64, notes: &mut Notes) {
+    let slack = 0.5 * step + 1.01 * resolution;
+    let (mut missing, mut gaps, mut first, mut backwards) = (0.0, 0, None, 0);
+    for pair in seconds.windows(2) {
+        let jump = pair[1] - pair[0];
+        if jump > step + slack {
+            missing += (jump / step).round() - 1.0;
+            gaps += 1;
+            first = first.or(Some(pair[0]));
+        } else if jump < -1.01 * resolution.max(1e-12) {
+            backwards += 1;
+        }
+    }
+    if let Some(first) = first {
+        notes.file(format!(
+            "{missing:.0} samples dropped at {gaps} places (the first after {first:.6} s): times behind them are early"
+        ));
+    }
+    if backwards > 0 {
+        notes.file(format!("the time column runs backwards at {backwards} places"));
+    }
+}
+
+/// True where values lie on an even grid within 2 % of the step, or within six printed digits.
+pub(super) fn is_uniform(values: &[f64], step: f64) -> bool {
+    let Some(&start) = values.first() else {
+        return false;
+    };
+    let digits = 1e-5 * values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    values
+        .iter()
+        .enumerate()
+        .all(|(i, v)| (start + step * i as f64 - v).abs() <= 0.02 * step + digits)
+}

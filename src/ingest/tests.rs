@@ -1,0 +1,400 @@
+//! Text formats, detection and robustness, on small files of the shapes that labs deliver.
+
+use proptest::prelude::*;
+
+use super::*;
+
+/// The promise to every caller: equal lengths, ascending frequencies, no number that is none.
+pub(super) fn assert_sound(contents: &Contents) {
+    for frf in &contents.frfs {
+        assert_eq!(frf.frequency_hz.len(), frf.value.len());
+        assert!(frf.frequency_hz.windows(2).all(|w| w[0] < w[1]));
+        assert!(frf.frequency_hz.iter().all(|f| f.is_finite() && *f >= 0.0));
+        assert!(frf.value.iter().all(|v| v.is_finite()));
+        assert!(
+            frf.coherence
+                .iter()
+                .all(|c| c.len() == frf.value.len() && c.iter().all(|v| (0.0..=1.0).contains(v)))
+        );
+    }
+    for record in &contents.times {
+        assert!(
+            record.sample_rate_hz.is_finite() && record.sample_rate_hz > 0.0 && record.start_s.is_finite()
+        );
+        for channel in &record.channels {
+            assert_eq!(channel.samples.len(), record.len());
+            assert!(channel.samples.iter().all(|v| v.is_finite()));
+        }
+        let _ = quality_warnings(record);
+    }
+    for other in &contents.others {
+        assert!(other.abscissa.iter().all(|v| v.is_finite()) && other.value.iter().all(|v| v.is_finite()));
+    }
+}
+
+fn read(bytes: impl AsRef<[u8]>) -> (Format, Contents, Vec<String>) {
+    let mut notes = Notes::default();
+    let (format, _, contents) =
+        read_bytes(bytes.as_ref(), false, &mut notes).unwrap_or_else(|e| panic!("{e}"));
+    assert_sound(&contents);
+    (format, contents, notes.into_warnings())
+}
+
+fn problem(bytes: impl AsRef<[u8]>) -> String {
+    read_bytes(bytes.as_ref(), false, &mut Notes::default())
+        .map(|r| r.1)
+        .unwrap_err()
+        .to_string()
+}
+
+fn time(bytes: impl AsRef<[u8]>) -> (TimeRecord, Vec<String>) {
+    let (_, mut contents, warnings) = read(bytes);
+    assert_eq!((contents.times.len(), contents.frfs.len()), (1, 0));
+    (contents.times.remove(0), warnings)
+}
+
+/// The twenty header lines of DynoWare 2.5, names and units, with one separator.
+fn dynoware(separator: char, rows: &str) -> String {
+    let text = "DynoWare,Version 2.5.1.2\nPath:,C:\\Messung\nFilename:,cut7.dwd\nConfig ID:,a.cfg\nSetup ID:,0\n\
+        Manipulated:,0\nFilename 1:, \nFilename 2:, \nDate:, \nTime:, \nSampling rate [Hz]:,10000\n\
+        Measuring time [s]:,50\nDelay time [s]:,0\nCycle time [s]:,0\nCycles:,1\nSamples per channel:,500001\n\
+        Cycle interval:,0\nCycle No:,1\nTime,AFx,FY2,Mz,kladivo\ns,kN,N,Nm,V\n";
+    text.replace(',', &separator.to_string()) + rows
+}
+
+#[test]
+fn dynoware_exports() {
+    let rows = "8.0000,0.001,-2.5,1.25,0.1\n8.0001,0.002,-3.5,1.5,0.2\n8.0002,0.003,-4.5,1.75,0.3\n";
+    for (separator, decimal) in [(',', '.'), (';', '.'), (';', ','), ('\t', '.'), ('\t', ',')] {
+        let rows: String = rows
+            .chars()
+            .map(|c| match c {
+                ',' => separator,
+                '.' => decimal,
+                c => c,
+            })
+            .collect();
+        for end in ["\n", "\r\n"] {
+            let text = dynoware(separator, &rows).replace('\n', end);
+            let (format, contents, warnings) = read(&text);
+            assert!(warnings.is_empty(), "{warnings:?}");
+            assert_eq!(format, Format::DynoWare);
+            let record = &contents.times[0];
+            assert_eq!(
+                (record.sample_rate_hz, record.start_s, record.len()),
+                (1e4, 8.0, 3)
+            );
+            assert_eq!(record.channels[0].samples, [1.0, 2.0, 3.0], "kN");
+            assert_eq!(record.channels[1].samples, [-2.5, -3.5, -4.5]);
+            let roles: Vec<ChannelRole> = record.channels.iter().map(|c| c.role).collect();
+            use ChannelRole::*;
+            assert_eq!(roles, [ForceX, ForceY, TorqueZ, Other]);
+        }
+    }
+}
+
+#[test]
+fn latin_1_paths_and_byte_order_marks() {
+    let text = dynoware(',', "0.0,1,2,3,4\n0.0001,1,2,3,4\n");
+    let latin: Vec<u8> = text
+        .replace("Messung", "@")
+        .bytes()
+        .map(|b| if b == b'@' { 0xFC } else { b })
+        .collect();
+    let marked = [&b"\xEF\xBB\xBF"[..], text.as_bytes()].concat();
+    let wide: Vec<u8> = [0xFF, 0xFE]
+        .into_iter()
+        .chain(text.encode_utf16().flat_map(u16::to_le_bytes))
+        .collect();
+    for bytes in [latin, marked, wide] {
+        assert_eq!(time(bytes).0.len(), 2);
+    }
+}
+
+#[test]
+fn short_headers_and_plain_tables() {
+    let german = "Name:;cut 01\nDate:;2021-03-16 10:07:47\nSampling rate [Hz]:;5000\nNumber of channels:;3\n\
+        Time;Fx;Fy;Fz\ns;N;N;N\n0,0000;-24,89;-26,34;-7,633\n0,0002;-37,38;11,94;-2,800\n0,0004;-18,87;-1,57;-7\n";
+    let (record, warnings) = time(german);
+    assert!(warnings.is_empty(), "{warnings:?}");
+    assert_eq!(record.sample_rate_hz, 5000.0);
+    assert_eq!(
+        record.channel(ChannelRole::ForceY).unwrap().samples,
+        [-26.34, 11.94, -1.57]
+    );
+    let plain = "time_s,fx_n,fy_kn,mz_nm,ax_g\n0.0000,1,2,3,1\n0.0010,1,2,3,1\n0.0020,1,2,3,1\n";
+    let (record, warnings) = time(plain);
+    assert!(warnings.is_empty(), "{warnings:?}");
+    assert_eq!(record.sample_rate_hz, 1000.0);
+    let first: Vec<f64> = record.channels.iter().map(|c| c.samples[0]).collect();
+    assert_eq!(first, [1.0, 2000.0, 3.0, 9.80665]);
+    let units: Vec<&str> = record.channels.iter().map(|c| c.quantity_and_unit().1).collect();
+    assert_eq!(units, ["N", "N", "N·m", "m/s²"]);
+    let blanks = "t [ms]  Fx [lbf]  Mz [in-lbf]\n 0.0 1 1\n 0.5 1 1\n 1.0 1 1\n";
+    let (record, _) = time(blanks);
+    assert_eq!(record.sample_rate_hz, 2000.0);
+    approx::assert_relative_eq!(record.channels[0].samples[0], 4.4482216152605);
+    approx::assert_relative_eq!(record.channels[1].samples[0], 0.1129848290276167);
+    let quoted = "\"time_s\",\"fx_n\"\n\"0,000\",\"1,5\"\n\"0,001\",\"2,5\"\n\"0,002\",\"3,5\"\n";
+    assert_eq!(time(quoted).0.channels[0].samples, [1.5, 2.5, 3.5]);
+    let no_time = "Sampling rate [kHz]:,2\nFx,Fy\nN,N\n1,2\n3,4\n5,6\n";
+    let (record, warnings) = time(no_time);
+    assert_eq!((record.sample_rate_hz, warnings.len()), (2000.0, 1));
+}
+
+#[test]
+fn units_that_are_missing_or_wrong_are_said() {
+    let (record, warnings) = time("time_s,Fx,Fy [g],Fz [V],Fx12 [N]\n0,1,2,3,4\n1,1,2,3,4\n2,1,2,3,4\n");
+    use ChannelRole::*;
+    let roles: Vec<ChannelRole> = record.channels.iter().map(|c| c.role).collect();
+    assert_eq!(roles, [ForceX, Other, ForceZ, Other]);
+    assert!(
+        warnings
+            .iter()
+            .any(|w| w == "Fx: no unit that is understood: N assumed"),
+        "{warnings:?}"
+    );
+    assert!(
+        warnings.iter().any(|w| w.starts_with("Fz [V]: a force in volts")),
+        "{warnings:?}"
+    );
+}
+
+#[test]
+fn decimal_commas_between_commas() {
+    let rows = "0,000000,0,013079,-0,000435965,0,1,5\n0,000100,0,012,-0,0004,0,1,6\n0,000200,0,0125,0,0,1,7\n\
+        0,000300,0,013,-0,0005,0,1,6\n";
+    let text = dynoware(',', rows).replace("kN,N,Nm,V", "N,N,Nm,V");
+    let (record, warnings) = time(text);
+    assert_eq!(record.channels[0].samples, [0.013079, 0.012, 0.0125, 0.013]);
+    assert_eq!(record.channels[1].samples, [-0.000435965, -0.0004, 0.0, -0.0005]);
+    assert_eq!(record.channels[3].samples, [1.5, 1.6, 1.7, 1.6]);
+    assert!(
+        warnings
+            .iter()
+            .any(|w| w.contains("decimal commas between commas")),
+        "{warnings:?}"
+    );
+}
+
+/// A table at 1 kHz with one channel, times made by `at`.
+fn clock(samples: usize, at: impl Fn(usize) -> String) -> String {
+    (0..samples).fold(String::from("time_s,fx_n\n"), |text, i| {
+        text + &format!("{},{}\n", at(i), i % 7)
+    })
+}
+
+#[test]
+fn the_time_column_is_checked() {
+    let (record, warnings) = time(clock(100, |i| {
+        format!("{:.3}", (if i < 50 { i } else { i + 3 }) as f64 * 1e-3)
+    }));
+    assert_eq!(record.sample_rate_hz, 1000.0);
+    assert!(
+        warnings.len() == 1 && warnings[0].starts_with("3 samples dropped at 1 places"),
+        "{warnings:?}"
+    );
+    // 12.8 kHz printed with four digits: single steps are 0 or 0.1 ms.
+    let (record, warnings) = time(clock(5000, |i| format!("{:.4}", i as f64 / 12800.0)));
+    approx::assert_relative_eq!(record.sample_rate_hz, 12800.0, max_relative = 3e-4);
+    assert!(warnings.is_empty(), "{warnings:?}");
+    // The header describes the recording; this export kept every second sample.
+    let text = dynoware(
+        ',',
+        "0.0000,1,1,1,1\n0.0002,2,2,2,2\n0.0004,3,3,3,3\n0.0006,4,4,4,4\n",
+    );
+    let (record, warnings) = time(text);
+    assert_eq!(record.sample_rate_hz, 5000.0);
+    assert!(
+        warnings.iter().any(|w| w.contains("the time column is taken")),
+        "{warnings:?}"
+    );
+    assert!(problem(clock(10, |_| "1.0".into())).contains("does not rise"));
+}
+
+#[test]
+fn bad_rows_name_their_line() {
+    let rows = |bad: &str| format!("time_s,fx_n\n0,1\n1,1\n2,1\n3,1\n{bad}\n5,1\n");
+    for bad in ["4", "4,x", "4,1,1", "4,1.0.0", "4;1"] {
+        let error = read_bytes(rows(bad).as_bytes(), false, &mut Notes::default()).unwrap_err();
+        assert_eq!(error.line, Some(6), "{bad}: {error}");
+    }
+    assert!(problem(rows("4,NaN")).contains("no valid number"));
+    assert!(problem(rows("4,")).contains("no valid number"));
+    let (record, warnings) = time("time_s,fx_n\n0,1\n1,1\n2,1\n3,1\n4");
+    assert_eq!((record.len(), warnings.len()), (4, 1));
+}
+
+#[test]
+fn frf_tables() {
+    let (format, contents, warnings) = read(
+        "frequency_hz,re(1X/1X),im(1X/1X),re(2-Z/1Y),im(2-Z/1Y)\n1,1e-6,-2e-7,3,4\n1.5,5,6,7,8\n2,1,1,1,1\n",
+    );
+    assert!(warnings.is_empty() && format == Format::FrfCsv, "{warnings:?}");
+    assert_eq!(contents.frfs[1].name, "2-Z/1Y");
+    assert_eq!(
+        contents.frfs[1].response,
+        Some(Dof {
+            node: 2,
+            axis: Axis::Z,
+            negative: true
+        })
+    );
+    assert_eq!(contents.frfs[0].value[0], Complex64::new(1e-6, -2e-7));
+    assert_eq!(contents.frfs[0].quantity, None);
+    let (_, contents, _) = read("frequency_hz;re;im\n1,5;2,5;-3,5\n2;4;5\n3;6;7\n");
+    assert_eq!(
+        (contents.frfs[0].frequency_hz[0], contents.frfs[0].value[0].im),
+        (1.5, -3.5)
+    );
+    let (_, contents, _) = read("frequency_hz\tmagnitude\tphase_deg\n1\t2\t90\n2\t2\t180\n3\t1\t-90\n");
+    approx::assert_relative_eq!(contents.frfs[0].value[0].im, 2.0);
+    approx::assert_relative_eq!(contents.frfs[0].value[1].re, -2.0);
+    let (_, contents, warnings) = read("frequency_hz,re,im\n0,nan,0\n1,1,1\n2,1,1\n3,,1\n");
+    assert_eq!((contents.frfs[0].frequency_hz.len(), warnings.len()), (2, 1));
+    let (format, contents, _) = read("0.0 2.04e-03 0.0\n0.5 1e-6 -1e-8\n1.0 2e-6 -2e-8\n");
+    assert_eq!((format, contents.frfs[0].value.len()), (Format::FrfText, 3));
+    for (text, what) in [
+        ("frequency_hz,re,re\n1,1,1\n2,1,1\n", "twice"),
+        (
+            "frequency_hz,re(1X/1X),im(1X/1Y)\n1,1,1\n2,1,1\n",
+            "do not make an FRF",
+        ),
+        (
+            "frequency_hz,re,im,depth\n1,1,1,1\n2,1,1,1\n",
+            "not part of an FRF",
+        ),
+        ("1 2 3 4\n1 2 3 4\n2 3 4 5\n", "without names"),
+        ("3 2 3\n1 2 3\n2 3 4\n", "does not rise"),
+    ] {
+        assert!(problem(text).contains(what), "{text}: {}", problem(text));
+    }
+}
+
+#[test]
+fn cutpro_files() {
+    let text = "0.0\t2.04e-01\t0.0\tFreq\tHz\tReal\tmm/N\tImag\tmm/N\n0.5\t2e-4\t-1e-5\n1.0\t3e-4\t-2e-5\n";
+    let (format, contents, warnings) = read(text);
+    let frf = &contents.frfs[0];
+    assert_eq!(
+        (format, frf.quantity),
+        (Format::CutproFrf, Some(Quantity::Receptance))
+    );
+    approx::assert_relative_eq!(frf.value[1].re, 2e-7, max_relative = 1e-12);
+    assert_eq!(frf.frequency_hz, [0.0, 0.5, 1.0]);
+    assert!(
+        warnings.iter().any(|w| w.contains("0 Hz line is invalid")),
+        "{warnings:?}"
+    );
+}
+
+#[test]
+fn foreign_formats_are_named_with_a_way_out() {
+    for (bytes, what) in [
+        (&b"TDSm\x0e\0\0\0"[..], "TDMS"),
+        (b"MATLAB 5.0 MAT-file, Platform", "MAT-file"),
+        (b"\x89HDF\r\n\x1a\n\0", "HDF5"),
+        (b"PK\x03\x04\x14", "xlsx"),
+        (b"LabVIEW Measurement\t\nWriter_Version\t2\n", "lvm"),
+        (b"(-0.07+2.6e-08j)\n(-0.17-0.1j)\n", "frequency axis is missing"),
+        (b"\x00\x01 Kistler DynoWare \x02", ".dwd"),
+        (b"\x00\x01\x02", "unknown format"),
+        (b"", "empty"),
+        (b"hello world\n", "no format known"),
+    ] {
+        let error = read_bytes(bytes, false, &mut Notes::default()).unwrap_err();
+        assert!(error.problem.contains(what), "{error}");
+        assert!(error.remedy.is_some() || what == "empty", "{error}");
+    }
+    assert!(
+        read_bytes(b"\x00\x01\x02", true, &mut Notes::default())
+            .unwrap_err()
+            .problem
+            .contains(".dwd")
+    );
+}
+
+#[test]
+fn degrees_of_freedom_as_text() {
+    for (text, node, axis, negative, shown) in [
+        ("1X", 1, Axis::X, false, "1X"),
+        ("12-Z", 12, Axis::Z, true, "12-Z"),
+        ("3+y", 3, Axis::Y, false, "3Y"),
+    ] {
+        let dof: Dof = text.parse().unwrap();
+        assert_eq!(
+            (dof, dof.to_string().as_str()),
+            (Dof { node, axis, negative }, shown)
+        );
+    }
+    for text in ["", "X", "1", "1W", "1--X", "99999999999999999999X", "1XX"] {
+        assert!(text.parse::<Dof>().is_err(), "{text}");
+    }
+}
+
+fn small_files() -> impl Strategy<Value = Vec<u8>> {
+    prop::sample::select(vec![
+        dynoware(',', "0.0,1,2,3,4\n0.0001,1.5,2,3,4\n0.0002,1,2,3,4\n").into_bytes(),
+        dynoware(
+            ',',
+            "0,000000,0,5,1,2,3,0\n0,000100,0,5,1,2,3,0\n0,000200,0,1,2,3,0\n",
+        )
+        .into_bytes(),
+        dynoware(';', "0,0;1;2;3;4\n0,0001;1,5;2;3;4\n0,0002;1;2;3;4\n").into_bytes(),
+        b"time_s,fx_n,fy_n\n0.0,1,2\n0.1,3,4\n0.2,5,6\n0.3,5,6\n".to_vec(),
+        b"frequency_hz,re(1X/1X),im(1X/1X)\n1,1,-1\n2,2,-2\n3,3,-3\n".to_vec(),
+        b"\"frequency_hz\";\"magnitude\";\"phase_deg\"\n\"1,5\";\"2\";\"3\"\n\"2\";\"2\";\"3\"\n".to_vec(),
+        b"0.0 2.0e-07 0.0 Freq Hz Real m/N Imag m/N\n0.5 2e-4 -1e-5\n1.0 3e-4 -2e-5\n".to_vec(),
+        b"0.0 2.04e-03 0.0\n0.5 1e-6 -1e-8\n1.0 2e-6 -2e-8\n".to_vec(),
+    ])
+}
+
+proptest! {
+    #[test]
+    fn arbitrary_bytes_do_no_harm(bytes in prop::collection::vec(any::<u8>(), 0..600)) {
+        if let Ok((_, _, contents)) = read_bytes(&bytes, false, &mut Notes::default()) {
+            assert_sound(&contents);
+        }
+    }
+
+    #[test]
+    fn arbitrary_text_does_no_harm(text in "(([0-9]{1,3}|[-+.,;\t eE\"]|time|freq|re|im|-1|58|\n){0,60})") {
+        if let Ok((_, _, contents)) = read_bytes(text.as_bytes(), false, &mut Notes::default()) {
+            assert_sound(&contents);
+        }
+    }
+
+    #[test]
+    fn damaged_text_files_do_no_harm(
+        mut bytes in small_files(),
+        keep in 0.0..1.0_f64,
+        hits in prop::collection::vec((any::<prop::sample::Index>(), prop::sample::select(b"\0\xFF,;.-+eE9\n\" 0nN".to_vec())), 0..6),
+    ) {
+        bytes.truncate((bytes.len() as f64 * keep) as usize + 1);
+        for (at, byte) in hits {
+            let at = at.index(bytes.len());
+            bytes[at] = byte;
+        }
+        if let Ok((_, _, contents)) = read_bytes(&bytes, false, &mut Notes::default()) {
+            assert_sound(&contents);
+        }
+    }
+
+    /// Numbers printed with any separator come back exactly.
+    #[test]
+    fn tables_come_back(
+        rows in prop::collection::vec((-1e6..1e6_f64, -1e-6..1e-6_f64), 2..40),
+        (separator, decimal) in prop::sample::select(vec![(',', '.'), (';', ','), ('\t', ','), ('\t', '.'), (';', '.')]),
+    ) {
+        let number = |v: f64| format!("{v}").replace('.', &decimal.to_string());
+        let mut text = format!("time_s{separator}fx_n{separator}fy_n\n");
+        for (i, (x, y)) in rows.iter().enumerate() {
+            let time = number(i as f64 / 128.0);
+            text += &format!("{time}{separator}{}{separator}{}\n", number(*x), number(*y));
+        }
+        let (record, _) = time(&text);
+        prop_assert_eq!(record.sample_rate_hz, 128.0);
+        let read: Vec<(f64, f64)> = record.channels[0].samples.iter().copied().zip(record.channels[1].samples.iter().copied()).collect();
+        prop_assert_eq!(read, rows);
+    }
+}

@@ -1,0 +1,132 @@
+//! `lobestone inspect`: the JSON of the contract, the text for people, and errors that name the file.
+
+use std::path::Path;
+
+use assert_cmd::Command;
+use lobestone::ingest::{ByteOrder, Encoding58, FrfRecord, Quantity, write_uff58};
+use num_complex::Complex64;
+use serde_json::Value;
+
+fn inspect(folder: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
+    Command::cargo_bin("lobestone")
+        .unwrap()
+        .current_dir(folder)
+        .arg("inspect")
+        .args(arguments)
+        .assert()
+}
+
+fn document(folder: &Path, arguments: &[&str]) -> Value {
+    let assert = inspect(folder, &[arguments, &["--json"]].concat())
+        .success()
+        .stderr("");
+    serde_json::from_slice(&assert.get_output().stdout).unwrap()
+}
+
+fn write_files(folder: &Path) {
+    let frf = FrfRecord {
+        name: "1X/1X".into(),
+        response: "1X".parse().ok(),
+        reference: "1X".parse().ok(),
+        quantity: Some(Quantity::Accelerance),
+        frequency_hz: (0..50).map(|i| 3.0 + 0.5 * f64::from(i)).collect(),
+        value: (0..50)
+            .map(|i| Complex64::new(-1e-3, 1e-4 * f64::from(i)))
+            .collect(),
+        coherence: None,
+    };
+    let encoding = Encoding58 {
+        binary: Some(ByteOrder::Big),
+        double: true,
+    };
+    write_uff58(&folder.join("frf.uff"), &[frf], encoding).unwrap();
+    let header = "Sampling rate [Hz]:;1000\nTime;Fx;Fy;Mz\ns;N;kN;Nm\n";
+    let row = |i: usize| format!("0,{i:03};{};{i};1,5\n", i % 3);
+    let rows: String = (0..100).map(row).collect();
+    std::fs::write(folder.join("cut.txt"), header.to_owned() + &rows).unwrap();
+    std::fs::write(
+        folder.join("tap.csv"),
+        "time_s,hammer_n,acc_g\n0,1,1\n0.1,2,1\n0.2,3,2\n",
+    )
+    .unwrap();
+    std::fs::write(folder.join("rec.dwd"), b"\x01\x00\x02\x00Kistler").unwrap();
+}
+
+#[test]
+fn json_as_the_contract_says() {
+    let folder = tempfile::tempdir().unwrap();
+    write_files(folder.path());
+    let document = document(folder.path(), &["frf.uff", "cut.txt", "tap.csv"]);
+    let files = document["files"].as_array().unwrap();
+    let kinds: Vec<&str> = files.iter().map(|f| f["kind"].as_str().unwrap()).collect();
+    assert_eq!(kinds, ["frf", "force", "time"]);
+    let formats: Vec<&str> = files.iter().map(|f| f["format"].as_str().unwrap()).collect();
+    assert_eq!(formats, ["UFF 58b", "DynoWare export", "time CSV"]);
+    assert_eq!(files[0]["path"], "frf.uff");
+    for file in files {
+        assert!(file["warnings"].is_array());
+        for channel in file["channels"].as_array().unwrap() {
+            assert!(
+                channel["name"].is_string() && channel["role"].is_string(),
+                "{channel}"
+            );
+        }
+    }
+    let frf = &files[0]["channels"][0];
+    assert_eq!(
+        (&frf["quantity"], &frf["lines"], &frf["from_hz"]),
+        (&"accelerance".into(), &50.into(), &3.0.into())
+    );
+    let roles: Vec<&str> = files[1]["channels"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|c| c["role"].as_str().unwrap())
+        .collect();
+    assert_eq!(roles, ["force-x", "force-y", "torque-z"]);
+    let torque = &files[1]["channels"][2];
+    assert_eq!(
+        (&torque["unit"], &torque["sample_rate_hz"]),
+        (&"N·m".into(), &1000.0.into())
+    );
+    assert_eq!(files[2]["channels"][1]["unit"], "m/s²");
+}
+
+#[test]
+fn text_names_format_channels_and_warnings() {
+    let folder = tempfile::tempdir().unwrap();
+    write_files(folder.path());
+    let assert = inspect(folder.path(), &["cut.txt"]).success();
+    let text = String::from_utf8_lossy(&assert.get_output().stdout).into_owned();
+    for part in [
+        "cut.txt",
+        "semicolon separated, decimal comma",
+        "force-x",
+        "N (file: kN)",
+        "1000 Hz",
+        "warning: Mz: the same value",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+}
+
+#[test]
+fn an_unreadable_file_fails_and_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    write_files(folder.path());
+    let failed = |arguments: &[&str]| {
+        let assert = inspect(folder.path(), arguments).code(1).stdout("");
+        String::from_utf8_lossy(&assert.get_output().stderr).into_owned()
+    };
+    let error = failed(&["frf.uff", "rec.dwd"]);
+    assert!(
+        error.contains("rec.dwd") && error.contains("DynoWare") && error.contains("remedy"),
+        "{error}"
+    );
+    let both = failed(&["rec.dwd", "missing.uff", "cut.txt"]);
+    assert!(
+        both.contains("2 of 3") && both.contains("rec.dwd") && both.contains("missing.uff"),
+        "{both}"
+    );
+    inspect(folder.path(), &[]).code(2);
+}

@@ -116,3 +116,7 @@ impl TimeRecord {
         self.len() == 0
     }
 }
+
+// STAND-IN, dropped at merge.
+mod standin;
+pub use standin::read_time;

@@ -66,9 +66,10 @@ impl Campaign {
                 spindle_rpm: number(t, "spindle_rpm").unwrap_or(0.0),
                 geometry,
                 order: t.get("order").and_then(|v| v.as_integer()),
-                steady_s: t.get("steady_s").and_then(|v| v.as_array()).and_then(|v| {
-                    Some([as_number(v.first()?)?, as_number(v.get(1)?)?])
-                }),
+                steady_s: t
+                    .get("steady_s")
+                    .and_then(|v| v.as_array())
+                    .and_then(|v| Some([as_number(v.first()?)?, as_number(v.get(1)?)?])),
                 line: 0,
             });
         }
@@ -83,7 +84,11 @@ impl Campaign {
             dynamometer: Dynamometer { tool_from_dyno },
             cuts,
             lobes: None,
-            material: table.get("material").and_then(|v| v.get("name")).and_then(|v| v.as_str()).map(str::to_string),
+            material: table
+                .get("material")
+                .and_then(|v| v.get("name"))
+                .and_then(|v| v.as_str())
+                .map(str::to_string),
         })
     }
 }

@@ -70,7 +70,10 @@ pub(crate) fn robust_std(values: &[f64]) -> f64 {
 
 /// Straight line through points (x, y) by least squares: (value at mean x, slope, mean x).
 /// A single point, or all points at one x, give slope 0.
-pub(crate) fn line(x: impl Iterator<Item = f64> + Clone, y: impl Iterator<Item = f64> + Clone) -> (f64, f64, f64) {
+pub(crate) fn line(
+    x: impl Iterator<Item = f64> + Clone,
+    y: impl Iterator<Item = f64> + Clone,
+) -> (f64, f64, f64) {
     let n = x.clone().count().max(1) as f64;
     let x_mean = x.clone().sum::<f64>() / n;
     let y_mean = y.clone().sum::<f64>() / n;

@@ -53,6 +53,9 @@ impl DriftLine {
 const SPIKE_SIGMA: f64 = 6.0;
 /// Blocks that each air segment is cut into to see how far its noise is from white.
 const BLOCKS_PER_SEGMENT: usize = 8;
+/// Scatter of block means over that of white noise from which on the air is called bent: chance stays below
+/// it (14 degrees of freedom, one in ten thousand).
+const BEND_RATIO: f64 = 3.0;
 
 /// Fits the zero line of a channel to its air segments. Without air there is no line: offset and slope
 /// are zero and the flags say so. With air on one side only the line is extrapolated, its uncertainty with it.
@@ -78,16 +81,16 @@ pub fn fit_drift(samples: &[f64], sample_rate_hz: f64, start_s: f64, air: &Air) 
     }
     // Least squares, dropping spikes, until nothing more is dropped.
     for _ in 0..5 {
-        let (offset, slope, reference) = line(
-            kept.iter().map(|&i| time(i)),
-            kept.iter().map(|&i| samples[i]),
-        );
+        let (offset, slope, reference) =
+            line(kept.iter().map(|&i| time(i)), kept.iter().map(|&i| samples[i]));
         (drift.offset, drift.slope_per_s, drift.reference_s) = (offset, slope, reference);
         let residual: Vec<f64> = kept.iter().map(|&i| samples[i] - drift.at(time(i))).collect();
         let limit = SPIKE_SIGMA * robust_std(&residual);
         let before = kept.len();
         let centre = super::median(&residual);
-        let mut good = residual.iter().map(|r| limit == 0.0 || (r - centre).abs() <= limit);
+        let mut good = residual
+            .iter()
+            .map(|r| limit == 0.0 || (r - centre).abs() <= limit);
         kept.retain(|_| good.next().unwrap_or(true));
         if kept.len() == before || kept.len() < 2 {
             break;
@@ -98,7 +101,13 @@ pub fn fit_drift(samples: &[f64], sample_rate_hz: f64, start_s: f64, air: &Air) 
 }
 
 /// Standard errors from block means, since hum and bend make neighbouring samples alike.
-fn uncertainty(drift: &mut DriftLine, samples: &[f64], kept: &[usize], air: &Air, time: &impl Fn(usize) -> f64) {
+fn uncertainty(
+    drift: &mut DriftLine,
+    samples: &[f64],
+    kept: &[usize],
+    air: &Air,
+    time: &impl Fn(usize) -> f64,
+) {
     let residual = |i: usize| samples[i] - drift.at(time(i));
     let sample_variance = kept.iter().map(|&i| residual(i).powi(2)).sum::<f64>() / kept.len() as f64;
     let (mut square_sum, mut block_count, mut block_len) = (0.0, 0usize, 0.0);
@@ -109,7 +118,11 @@ fn uncertainty(drift: &mut DriftLine, samples: &[f64], kept: &[usize], air: &Air
             .map(|&i| residual(i))
             .collect();
         let blocks = Blocks::new(&values, values.len() as f64 / BLOCKS_PER_SEGMENT as f64);
-        square_sum += blocks.mean.iter().map(|m| m * m * blocks.samples_per_block).sum::<f64>();
+        square_sum += blocks
+            .mean
+            .iter()
+            .map(|m| m * m * blocks.samples_per_block)
+            .sum::<f64>();
         block_count += blocks.len();
         block_len += values.len() as f64;
     }
@@ -122,7 +135,7 @@ fn uncertainty(drift: &mut DriftLine, samples: &[f64], kept: &[usize], air: &Air
     let n = kept.len() as f64;
     let sxx: f64 = kept.iter().map(|&i| (time(i) - drift.reference_s).powi(2)).sum();
     let mean_block_len = block_len / block_count.max(1) as f64;
-    if mean_block_len > 0.0 {
+    if mean_block_len > 0.0 && per_sample > BEND_RATIO * sample_variance {
         drift.bend = ((per_sample - sample_variance) / mean_block_len).max(0.0).sqrt();
     }
     drift.offset_std = (per_sample / n).sqrt();
@@ -183,7 +196,12 @@ mod tests {
 
     #[test]
     fn a_bent_drift_is_seen_and_no_air_is_said() {
-        let bent = fit_drift(&record(3, 0.5, |t| 300.0 * (1.0 - (-t / 2.0).exp())), RATE, 0.0, &air());
+        let bent = fit_drift(
+            &record(3, 0.5, |t| 300.0 * (1.0 - (-t / 2.0).exp())),
+            RATE,
+            0.0,
+            &air(),
+        );
         assert!(bent.bend > 2.0, "{bent:?}");
         let straight = fit_drift(&record(3, 0.5, |_| 0.0), RATE, 0.0, &air());
         assert!(straight.bend < 0.2, "{straight:?}");

@@ -44,7 +44,10 @@ const SAME_STATE: f64 = 0.35;
 pub fn find_phases(channels: &[&[f64]], spindle: Spindle, entry_samples: Option<f64>) -> Option<Phases> {
     let samples = channels.iter().map(|c| c.len()).min()?;
     let per_block = block_length(samples, spindle)?;
-    let blocks: Vec<Blocks> = channels.iter().map(|c| Blocks::new(&c[..samples], per_block)).collect();
+    let blocks: Vec<Blocks> = channels
+        .iter()
+        .map(|c| Blocks::new(&c[..samples], per_block))
+        .collect();
     let count = blocks.first()?.len();
     if count < 2 * MIN_STATE_BLOCKS {
         return None;
@@ -133,18 +136,25 @@ fn departure(blocks: &[Blocks], count: usize, from_end: bool) -> usize {
     let mut previous_departed = false;
     for k in seed..count {
         let recent = &accepted[accepted.len().saturating_sub(trail)..];
-        let departed = blocks.iter().zip(&limits).any(|(b, &(sigma, of_range, fluctuation))| {
-            let x = recent.iter().map(|&i| i as f64);
-            let (mean, slope, centre) = line(x.clone(), recent.iter().map(|&i| b.mean[at(i)]));
-            let sxx: f64 = x.map(|v| (v - centre).powi(2)).sum();
-            let ahead = k as f64 - centre;
-            let spread = 1.0 + 1.0 / recent.len() as f64 + if sxx > 0.0 { ahead * ahead / sxx } else { 0.0 };
-            let jump = (b.mean[at(k)] - mean - slope * ahead).abs();
-            let std: Vec<f64> = recent.iter().map(|&i| b.std_dev[at(i)]).collect();
-            let (usual, now) = (median(&std), b.std_dev[at(k)]);
-            let louder = usual > 0.0 && (now / usual).ln().abs() > fluctuation;
-            jump > (DEPARTURE_SIGMA * sigma * spread.sqrt()).max(of_range).max(f64::MIN_POSITIVE) || louder
-        });
+        let departed = blocks
+            .iter()
+            .zip(&limits)
+            .any(|(b, &(sigma, of_range, fluctuation))| {
+                let x = recent.iter().map(|&i| i as f64);
+                let (mean, slope, centre) = line(x.clone(), recent.iter().map(|&i| b.mean[at(i)]));
+                let sxx: f64 = x.map(|v| (v - centre).powi(2)).sum();
+                let ahead = k as f64 - centre;
+                let spread =
+                    1.0 + 1.0 / recent.len() as f64 + if sxx > 0.0 { ahead * ahead / sxx } else { 0.0 };
+                let jump = (b.mean[at(k)] - mean - slope * ahead).abs();
+                let std: Vec<f64> = recent.iter().map(|&i| b.std_dev[at(i)]).collect();
+                let (usual, now) = (median(&std), b.std_dev[at(k)]);
+                let louder = usual > 0.0 && (now / usual).ln().abs() > fluctuation;
+                jump > (DEPARTURE_SIGMA * sigma * spread.sqrt())
+                    .max(of_range)
+                    .max(f64::MIN_POSITIVE)
+                    || louder
+            });
         match (departed, previous_departed) {
             (true, true) => return k - 1,
             (true, false) => {}
@@ -167,7 +177,11 @@ fn air_states(blocks: &[Blocks], count: usize, start_end: usize, last_start: usi
     let end = last_start..(last_start + near).min(count);
     let (m_from, m_to) = (start_end.min(last_start), start_end.max(last_start));
     let quarter = (m_to - m_from) / 4;
-    let middle = if m_to > m_from { m_from + quarter..(m_to - quarter).max(m_from + quarter + 1) } else { start.clone() };
+    let middle = if m_to > m_from {
+        m_from + quarter..(m_to - quarter).max(m_from + quarter + 1)
+    } else {
+        start.clone()
+    };
     let of = |r: &Range<usize>, pick: fn(&Blocks) -> &Vec<f64>| -> Vec<f64> {
         let part = |b: &Blocks| pick(b).get(r.clone()).map_or(0.0, median);
         blocks.iter().map(part).collect()
@@ -198,7 +212,12 @@ fn air_states(blocks: &[Blocks], count: usize, start_end: usize, last_start: usi
         .map(|b| (quantile(&b.mean, 0.95) - quantile(&b.mean, 0.05)).max(f64::MIN_POSITIVE))
         .collect();
     let distance = |a: &[f64], b: &[f64]| -> f64 {
-        a.iter().zip(b).zip(&scale).map(|((a, b), s)| ((a - b) / s).powi(2)).sum::<f64>().sqrt()
+        a.iter()
+            .zip(b)
+            .zip(&scale)
+            .map(|((a, b), s)| ((a - b) / s).powi(2))
+            .sum::<f64>()
+            .sqrt()
     };
     let (s, m, e) = (level(&start), level(&middle), level(&end));
     let (sm, em, se) = (distance(&s, &m), distance(&e, &m), distance(&s, &e));
@@ -239,7 +258,10 @@ fn steady_blocks(blocks: &[Blocks], cut: Range<usize>) -> Range<usize> {
                 let off = |i: usize| b.mean[i] - fit.0 - fit.1 * (i as f64 - fit.2);
                 let residual: Vec<f64> = core.clone().map(off).collect();
                 scatter = robust_std(&residual);
-                kept = core.clone().filter(|&i| scatter == 0.0 || off(i).abs() <= 4.0 * scatter).collect();
+                kept = core
+                    .clone()
+                    .filter(|&i| scatter == 0.0 || off(i).abs() <= 4.0 * scatter)
+                    .collect();
                 if kept.len() < 3 {
                     kept = core.clone().collect();
                 }

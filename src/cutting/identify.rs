@@ -1,13 +1,12 @@
 //! From a campaign's records to its cutting force coefficients.
 
-use std::collections::BTreeMap;
-
 use rayon::prelude::*;
 
 use super::average_force::{ForceAxis, average_row};
 use super::group::{Group, Rows, distinct, observations};
 use super::outlier::misfits;
-use super::record::{Average, CutAnalysis, NO_AIR, analyse_cut};
+use super::record::{Average, CutAnalysis, analyse_cut};
+use super::warnings;
 use crate::campaign::{Campaign, CutGeometry, Process};
 use crate::progress::Progress;
 use crate::{Error, Result, ingest};
@@ -89,7 +88,7 @@ pub fn from_analyses(
     }
     turn_torque(&mut cuts, &mut warnings);
     let counted = without_duplicates(campaign, &cuts, &mut warnings);
-    record_warnings(&cuts, &mut warnings);
+    warnings.extend(warnings::of_records(&cuts));
 
     let (mut groups, mut pooled) = (Vec::new(), Vec::new());
     for process in [Process::Milling, Process::Drilling] {
@@ -98,21 +97,14 @@ pub fn from_analyses(
         let Some(all) = Group::fit(&of_process, &rows, options.nonnegative_edges)? else {
             continue;
         };
-        missing_cells(campaign, &of_process, process, &mut warnings);
+        warnings.extend(warnings::of_plan(campaign, &of_process, process));
         for set in by_speed(&of_process, &mut warnings) {
             groups.extend(Group::fit(&set, &rows, options.nonnegative_edges)?);
         }
-        for misfit in misfits(&observations(&of_process, &rows)) {
-            let unit = misfit.axis.unit();
-            warnings.push(format!(
-                "cut {} does not fit the others: {} {:.2} {unit} measured, {:.2} {unit} from the other cuts",
-                campaign.cuts[misfit.cut].id,
-                misfit.axis.label(),
-                misfit.measured,
-                misfit.predicted
-            ));
-        }
-        fit_warnings(&all, &groups, &mut warnings);
+        let misfits = misfits(&observations(&of_process, &rows));
+        warnings.extend(misfits.iter().map(|m| warnings::of_misfit(campaign, m)));
+        let by_speed: Vec<&Group> = groups.iter().filter(|g| g.process == process).collect();
+        warnings.extend(warnings::of_fits(&all, &by_speed));
         pooled.push(all);
     }
     if groups.is_empty() {
@@ -183,39 +175,6 @@ fn without_duplicates<'a>(
     kept
 }
 
-/// Notices of all records, one sentence a kind.
-fn record_warnings(cuts: &[CutAnalysis], warnings: &mut Vec<String>) {
-    let mut by_kind: BTreeMap<&str, Vec<(&str, &str)>> = BTreeMap::new();
-    for cut in cuts {
-        for notice in &cut.notices {
-            by_kind
-                .entry(notice.kind)
-                .or_default()
-                .push((&cut.id, &notice.detail));
-        }
-    }
-    for (kind, told) in by_kind {
-        let list: Vec<String> = told
-            .iter()
-            .map(|(id, detail)| {
-                if detail.is_empty() {
-                    (*id).to_string()
-                } else {
-                    format!("{id} ({detail})")
-                }
-            })
-            .collect();
-        let mut ids: Vec<&str> = told.iter().map(|(id, _)| *id).collect();
-        ids.dedup();
-        let who = if ids.len() == cuts.len() && kind == NO_AIR {
-            "all cuts".to_string()
-        } else {
-            format!("cut {}", list.join(", "))
-        };
-        warnings.push(format!("{who}: {kind}"));
-    }
-}
-
 /// One set per cutting speed that has two feeds or more; the cuts at other speeds together, if they have.
 fn by_speed<'a>(cuts: &[&'a CutAnalysis], warnings: &mut Vec<String>) -> Vec<Vec<&'a CutAnalysis>> {
     let speeds = distinct(cuts.iter().map(|c| c.cutting_speed_m_per_min));
@@ -250,134 +209,6 @@ fn by_speed<'a>(cuts: &[&'a CutAnalysis], warnings: &mut Vec<String>) -> Vec<Vec
         sets.push(rest);
     }
     sets
-}
-
-/// Cells of a speed × feed plan that stayed empty, where there clearly was a plan.
-fn missing_cells(campaign: &Campaign, cuts: &[&CutAnalysis], process: Process, warnings: &mut Vec<String>) {
-    let speeds = distinct(cuts.iter().map(|c| c.spindle_rpm));
-    let feeds = distinct(cuts.iter().map(|c| c.feed_mm));
-    if speeds.len() < 2 || feeds.len() < 2 {
-        return;
-    }
-    let near = |a: f64, b: f64| (a - b).abs() <= 2e-3 * b.abs();
-    let mut empty = Vec::new();
-    for rpm in &speeds {
-        for feed in &feeds {
-            if !cuts
-                .iter()
-                .any(|c| near(c.spindle_rpm, *rpm) && near(c.feed_mm, *feed))
-            {
-                empty.push(format!("{rpm} rpm with {feed} mm"));
-            }
-        }
-    }
-    // More than a quarter empty: no such plan.
-    if empty.is_empty() || 4 * empty.len() > speeds.len() * feeds.len() {
-        return;
-    }
-    let per = match process {
-        Process::Milling => "tooth",
-        Process::Drilling => "revolution",
-    };
-    let listed = campaign
-        .cuts
-        .iter()
-        .filter(|c| c.geometry.process() == process)
-        .count();
-    warnings.push(format!(
-        "the plan of {} speeds and {} feeds per {per} has no usable cut at {} ({listed} cuts listed): errors grow most for the edge coefficients",
-        speeds.len(),
-        feeds.len(),
-        empty.join(", ")
-    ));
-}
-
-/// What the regression itself has to say.
-fn fit_warnings(all: &Group, groups: &[Group], warnings: &mut Vec<String>) {
-    let mine: Vec<&Group> = groups.iter().filter(|g| g.process == all.process).collect();
-    let told = |g: &Group| format!("{} m/min", speed_text(g));
-    for group in mine
-        .iter()
-        .copied()
-        .chain((!mine.iter().any(|g| g.cuts == all.cuts)).then_some(all))
-    {
-        for set in &group.inseparable {
-            let why = if set.len() == 1 {
-                "is not determined: no record carries it".to_string()
-            } else if group.feeds < 2 {
-                "cannot be separated with one feed: cut at two feeds or more (best three, wide apart)"
-                    .to_string()
-            } else {
-                "cannot be separated by these cuts".to_string()
-            };
-            warnings.push(format!("{}: {} {why}", told(group), set.join(" and ")));
-        }
-        for c in &group.coefficients {
-            let (Some(value), Some(error)) = (c.value, c.std_error) else {
-                if c.constraint_active {
-                    warnings.push(format!(
-                        "{}: {} is held at zero by the constraint",
-                        told(group),
-                        c.label
-                    ));
-                }
-                continue;
-            };
-            if value < -2.0 * error {
-                let remedy = if c.edge {
-                    "physically implausible; drift or a missing effect is likely, --nonnegative-edges holds it at zero"
-                } else {
-                    "check tool_from_dyno and the immersion angles"
-                };
-                warnings.push(format!(
-                    "{}: {} = {value:.2} {} is negative: {remedy}",
-                    told(group),
-                    c.label,
-                    c.unit
-                ));
-            } else if !c.edge && error > 0.5 * value.abs() {
-                warnings.push(format!(
-                    "{}: {} = {value:.1} ± {error:.1} {}: feeds too few or too close",
-                    told(group),
-                    c.label,
-                    c.unit
-                ));
-            }
-        }
-    }
-    let two_feeds: Vec<String> = mine.iter().filter(|g| g.feeds == 2).map(|g| told(g)).collect();
-    if !two_feeds.is_empty() {
-        warnings.push(format!(
-            "{}: two feeds only: a line always fits them, so nothing checks the model there",
-            two_feeds.join(", ")
-        ));
-    }
-    for &axis in ForceAxis::of(all.process) {
-        let a = axis.index();
-        let on_axis = || all.points.iter().filter(|p| p.axis == axis);
-        let size =
-            (on_axis().map(|p| p.measured.powi(2)).sum::<f64>() / on_axis().count().max(1) as f64).sqrt();
-        let extra = all.extra_scatter[a];
-        if all.chi2_per_dof[a].is_some_and(|c| c > 4.0) && extra > 0.02 * size {
-            warnings.push(format!(
-                "{}: the averages of all cuts scatter by {:.2} {} ({:.0} %) more than their errors: one set of coefficients does not hold for all; compare the speeds, and look at runout, wear and drift",
-                axis.label(),
-                extra,
-                axis.unit(),
-                100.0 * extra / size
-            ));
-        }
-    }
-}
-
-/// `58.3` or `45.1–81.4`, m/min.
-pub(crate) fn speed_text(group: &Group) -> String {
-    let [low, high] = group.cutting_speed_range_m_per_min;
-    if high - low <= 2e-3 * high {
-        format!("{:.1}", group.cutting_speed_m_per_min)
-    } else {
-        format!("{low:.1}–{high:.1}")
-    }
 }
 
 impl CfcResult {

@@ -7,6 +7,7 @@ mod identify;
 mod outlier;
 mod record;
 mod regression;
+mod warnings;
 
 pub use average_force::{
     CoefficientKind, DRILLING_COEFFICIENTS, DrillGeometry, ForceAxis, MILLING_COEFFICIENTS, average_row,
@@ -15,8 +16,9 @@ pub use average_force::{
 pub use constrained::{Constrained, nonnegative_least_squares};
 pub(crate) use group::by_axis;
 pub use group::{Coefficient, Group, RegressionPoint};
+pub(crate) use identify::depth_mm;
 pub use identify::{CfcOptions, CfcResult, from_analyses, identify_forces};
-pub(crate) use identify::{depth_mm, speed_text};
 pub use outlier::{Misfit, misfits};
 pub use record::{Average, ChannelAnalysis, CutAnalysis, Notice, Trace, analyse_cut};
 pub use regression::{Fit, Observation, fit};
+pub(crate) use warnings::speed_text;

@@ -29,8 +29,8 @@ pub struct Phases {
 
 /// Too few blocks for a state to be told from noise.
 const MIN_STATE_BLOCKS: usize = 4;
-/// More blocks than this are merged: the resolution would not be used.
-const MAX_BLOCKS: f64 = 600.0;
+/// More blocks than this are merged: finer ones would make a drill's slow entry too gentle to notice.
+const MAX_BLOCKS: f64 = 250.0;
 /// A block departs when its mean leaves the local line by this many standard deviations…
 const DEPARTURE_SIGMA: f64 = 6.0;
 /// …and by this part of the channel's range (slow bends of the drift stay below it).
@@ -70,17 +70,17 @@ pub fn find_phases(channels: &[&[f64]], spindle: Spindle, entry_samples: Option<
             .filter(|r| r.len() as f64 >= 2.0 * per_block),
     };
     let cutting = sample(lo as f64)..sample(hi as f64);
-    let end_guard = if after { 2.0 * per_block } else { 0.0 };
-    let by_geometry = entry_samples.filter(|_| before).and_then(|entry| {
-        // The contact itself may have been noticed one block early or late.
-        let start = cutting.start as f64 + 1.03 * entry + 2.0 * per_block;
-        let end = cutting.end as f64 - end_guard;
-        (end - start > 2.0 * per_block).then_some(start..end)
-    });
-    let span = by_geometry.unwrap_or_else(|| {
-        let steady = steady_blocks(&blocks, lo..hi);
-        steady.start as f64 * per_block..steady.end as f64 * per_block
-    });
+    let contact = cutting.start as f64;
+    let full = entry_samples
+        .filter(|_| before)
+        .map(|entry| {
+            // The contact may have been noticed a block early.
+            let start = contact + 1.03 * entry + guard * per_block;
+            (start / per_block).ceil() as usize
+        })
+        .filter(|&start| start + MIN_STATE_BLOCKS < hi);
+    let found = steady_blocks(&blocks, full.unwrap_or(lo)..hi);
+    let span = found.start as f64 * per_block..found.end as f64 * per_block;
     let steady = whole_revolutions(span, spindle.samples_per_revolution, samples);
     (!steady.is_empty()).then_some(Phases { air, cutting, steady })
 }
@@ -114,53 +114,93 @@ fn block_length(samples: usize, spindle: Spindle) -> Option<f64> {
     (per_block >= 2.0).then_some(per_block)
 }
 
+/// Blocks behind a line that a departure is judged by.
+const TRAIL: usize = 12;
+/// Blocks whose mean residual shows a slow departure, such as a drill's entry.
+const AHEAD: usize = 6;
+/// A slow departure must reach this part of the channel's range.
+const SLOW_DEPARTURE_OF_RANGE: f64 = 0.05;
+
+/// What counts as a departure in one channel.
+struct Limits<'a> {
+    blocks: &'a Blocks,
+    /// Noise of block means.
+    sigma: f64,
+    range: f64,
+    /// Change of the logarithm of the fluctuation.
+    fluctuation: f64,
+}
+
+impl<'a> Limits<'a> {
+    fn new(blocks: &'a Blocks) -> Self {
+        // From neighbours; the lower quartile, since inside the cut they differ more.
+        let steps: Vec<f64> = blocks.mean.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+        Limits {
+            blocks,
+            sigma: quantile(&steps, 0.25) / (0.3186 * std::f64::consts::SQRT_2),
+            range: quantile(&blocks.mean, 0.95) - quantile(&blocks.mean, 0.05),
+            fluctuation: 0.25f64.max(DEPARTURE_SIGMA / (2.0 * blocks.samples_per_block).sqrt()),
+        }
+    }
+
+    /// Does the mean over positions `tested` leave the line through the `trail` positions, by more than chance
+    /// and more than `of_range` of the channel's range? Positions are turned into block numbers by `at`.
+    fn leaves(
+        &self,
+        at: &impl Fn(usize) -> usize,
+        trail: &[usize],
+        tested: Range<usize>,
+        of_range: f64,
+    ) -> bool {
+        let x = trail.iter().map(|&i| i as f64);
+        let (mean, slope, centre) = line(x.clone(), trail.iter().map(|&i| self.blocks.mean[at(i)]));
+        let sxx: f64 = x.map(|v| (v - centre).powi(2)).sum();
+        let n = tested.len().max(1) as f64;
+        let ahead = 0.5 * (tested.start + tested.end - 1) as f64 - centre;
+        let now = tested.map(|i| self.blocks.mean[at(i)]).sum::<f64>() / n;
+        let lever = if sxx > 0.0 { ahead * ahead / sxx } else { 0.0 };
+        let spread = (1.0 / n + 1.0 / trail.len().max(1) as f64 + lever).sqrt();
+        let limit = (DEPARTURE_SIGMA * self.sigma * spread).max(of_range * self.range);
+        (now - mean - slope * ahead).abs() > limit.max(f64::MIN_POSITIVE)
+    }
+
+    fn changes_loudness(&self, at: &impl Fn(usize) -> usize, trail: &[usize], k: usize) -> bool {
+        let std: Vec<f64> = trail.iter().map(|&i| self.blocks.std_dev[at(i)]).collect();
+        let (usual, now) = (median(&std), self.blocks.std_dev[at(k)]);
+        usual > 0.0 && (now / usual).ln().abs() > self.fluctuation
+    }
+}
+
 /// Number of blocks, counted from one end, that continue the state found at that end. Followed by a line
 /// through the latest blocks, so that a slow bend of the drift does not count; two blocks in a row must
 /// depart, so that a spike does not.
 fn departure(blocks: &[Blocks], count: usize, from_end: bool) -> usize {
     let at = |i: usize| if from_end { count - 1 - i } else { i };
-    let seed = MIN_STATE_BLOCKS.max(count / 50);
-    let trail = (count / 20).max(12);
-    let limits: Vec<(f64, f64, f64)> = blocks
-        .iter()
-        .map(|b| {
-            // Noise of block means from neighbours; the lower quartile, since inside the cut they scatter more.
-            let steps: Vec<f64> = b.mean.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
-            let sigma = quantile(&steps, 0.25) / (0.3186 * std::f64::consts::SQRT_2);
-            let range = quantile(&b.mean, 0.95) - quantile(&b.mean, 0.05);
-            let fluctuation = 0.25f64.max(DEPARTURE_SIGMA / (2.0 * b.samples_per_block).sqrt());
-            (sigma, DEPARTURE_OF_RANGE * range, fluctuation)
-        })
-        .collect();
-    let mut accepted: Vec<usize> = (0..seed.min(count)).collect();
+    let seed = MIN_STATE_BLOCKS.max(count / 50).min(count);
+    let limits: Vec<Limits> = blocks.iter().map(Limits::new).collect();
+    let mut accepted: Vec<usize> = (0..seed).collect();
     let mut previous_departed = false;
     for k in seed..count {
-        let recent = &accepted[accepted.len().saturating_sub(trail)..];
-        let departed = blocks
+        let trail = &accepted[accepted.len().saturating_sub(TRAIL)..];
+        let departed = limits
             .iter()
-            .zip(&limits)
-            .any(|(b, &(sigma, of_range, fluctuation))| {
-                let x = recent.iter().map(|&i| i as f64);
-                let (mean, slope, centre) = line(x.clone(), recent.iter().map(|&i| b.mean[at(i)]));
-                let sxx: f64 = x.map(|v| (v - centre).powi(2)).sum();
-                let ahead = k as f64 - centre;
-                let spread =
-                    1.0 + 1.0 / recent.len() as f64 + if sxx > 0.0 { ahead * ahead / sxx } else { 0.0 };
-                let jump = (b.mean[at(k)] - mean - slope * ahead).abs();
-                let std: Vec<f64> = recent.iter().map(|&i| b.std_dev[at(i)]).collect();
-                let (usual, now) = (median(&std), b.std_dev[at(k)]);
-                let louder = usual > 0.0 && (now / usual).ln().abs() > fluctuation;
-                jump > (DEPARTURE_SIGMA * sigma * spread.sqrt())
-                    .max(of_range)
-                    .max(f64::MIN_POSITIVE)
-                    || louder
-            });
-        match (departed, previous_departed) {
-            (true, true) => return k - 1,
-            (true, false) => {}
-            (false, _) => accepted.push(k),
+            .any(|l| l.leaves(&at, trail, k..k + 1, DEPARTURE_OF_RANGE) || l.changes_loudness(&at, trail, k));
+        if departed && previous_departed {
+            return k - 1;
         }
         previous_departed = departed;
+        if departed {
+            continue;
+        }
+        accepted.push(k);
+        // A slow departure hides in a line that follows it: look at several blocks ahead of the line.
+        let tested = (k + 1).saturating_sub(AHEAD)..k + 1;
+        let behind = accepted.partition_point(|&i| i < tested.start);
+        let trail = &accepted[behind.saturating_sub(2 * TRAIL)..behind];
+        let slow = |l: &Limits| l.leaves(&at, trail, tested.clone(), SLOW_DEPARTURE_OF_RANGE);
+        if trail.len() >= seed && limits.iter().any(slow) {
+            return tested.start;
+        }
     }
     count
 }
@@ -241,14 +281,14 @@ fn air_states(blocks: &[Blocks], count: usize, start_end: usize, last_start: usi
 fn steady_blocks(blocks: &[Blocks], cut: Range<usize>) -> Range<usize> {
     let length = cut.len();
     let core = cut.start + 3 * length / 10..(cut.end - 3 * length / 10).max(cut.start + 3 * length / 10 + 1);
-    struct Limits<'a> {
+    struct Core<'a> {
         blocks: &'a Blocks,
         line: (f64, f64, f64),
         mean_tolerance: f64,
         std_dev: f64,
         std_tolerance: f64,
     }
-    let limits: Vec<Limits> = blocks
+    let cores: Vec<Core> = blocks
         .iter()
         .map(|b| {
             let (mut kept, mut fit): (Vec<usize>, _) = (core.clone().collect(), (0.0, 0.0, 0.0));
@@ -269,7 +309,7 @@ fn steady_blocks(blocks: &[Blocks], cut: Range<usize>) -> Range<usize> {
             let level = quantile(&b.mean, 0.98) - quantile(&b.mean, 0.02);
             let std: Vec<f64> = core.clone().map(|i| b.std_dev[i]).collect();
             let std_dev = median(&std);
-            Limits {
+            Core {
                 blocks: b,
                 line: fit,
                 mean_tolerance: (5.0 * scatter).max(0.01 * level),
@@ -279,7 +319,7 @@ fn steady_blocks(blocks: &[Blocks], cut: Range<usize>) -> Range<usize> {
         })
         .collect();
     let fits = |i: usize| {
-        limits.iter().all(|l| {
+        cores.iter().all(|l| {
             let expected = l.line.0 + l.line.1 * (i as f64 - l.line.2);
             (l.blocks.mean[i] - expected).abs() <= l.mean_tolerance
                 && (l.blocks.std_dev[i] - l.std_dev).abs() <= l.std_tolerance

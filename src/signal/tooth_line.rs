@@ -18,9 +18,10 @@ pub struct ToothLine {
 }
 
 impl ToothLine {
-    /// A clear line exists, and the clearest of the spindle's own multiples is small beside it.
+    /// A clear line exists, and none of the spindle's own multiples rises from the noise. (Chatter, too, is a
+    /// clear line off the comb, but beside it.)
     pub fn speed_is_doubtful(&self) -> bool {
-        self.strongest_to_noise > 30.0 && self.nominal_to_noise < 0.2 * self.strongest_to_noise
+        self.strongest_to_noise > 30.0 && self.nominal_to_noise < 8.0
     }
 }
 
@@ -65,7 +66,8 @@ pub fn tooth_line(samples: &[f64], sample_rate_hz: f64, spindle_hz: f64, teeth: 
             .map_or(0.0, |part| part.iter().copied().fold(0.0, f64::max))
     };
     // Nominal speeds are good to about half a percent; the window's own line is four bins wide.
-    let nominal = (1..=4 * teeth.max(1))
+    let nominal = (1..=teeth.max(1))
+        .chain([2 * teeth.max(1)])
         .map(|k| k as f64 * spindle_hz)
         .filter(|hz| MAINS_HZ.iter().all(|m| (m - hz).abs() > 4.0 * resolution_hz))
         .map(|hz| peak(hz, (0.005 * hz).max(1.5 * resolution_hz).min(0.2 * spindle_hz)))

@@ -269,7 +269,7 @@ fn phases(
     let found = find_phases(&carrying, spindle, entry);
     let Some([from, to]) = cut.steady_s else {
         let found = found.ok_or_else(|| {
-            InputError::new("no steady cut found: the record holds too few revolutions")
+            InputError::new("no steady cut found in the record")
                 .file(&cut.file)
                 .remedy("record longer, or give steady_s = [from, to] for this cut")
         })?;

@@ -222,9 +222,9 @@ fn coupled_sets(null: &[Vec<f64>], unknowns: usize) -> Vec<Vec<usize>> {
         seen[first] = true;
         let mut next = 0;
         while let Some(&i) = set.get(next) {
-            for j in 0..unknowns {
-                if !seen[j] && projector(i, j).abs() > 1e-6 {
-                    seen[j] = true;
+            for (j, seen) in seen.iter_mut().enumerate() {
+                if !*seen && projector(i, j).abs() > 1e-6 {
+                    *seen = true;
                     set.push(j);
                 }
             }

@@ -104,7 +104,10 @@ pub(super) fn of_fits(all: &Group, groups: &[&Group]) -> Vec<String> {
     let mut lacking: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for group in &listed {
         for set in &group.inseparable {
-            let names = set.join(" and ");
+            let names = match set.split_last() {
+                Some((last, rest)) if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
+                _ => set.concat(),
+            };
             let what = if set.len() == 1 {
                 format!("{names} is not determined: no record carries it")
             } else if group.feeds < 2 {

@@ -5,7 +5,8 @@
 pub struct Blocks {
     /// Mean of each block, in the unit of the channel.
     pub mean: Vec<f64>,
-    /// Standard deviation within each block, in the unit of the channel.
+    /// Standard deviation within each block less what the drift from block to block makes, in the unit of the
+    /// channel.
     pub std_dev: Vec<f64>,
     /// Block length in samples; not a whole number in general.
     pub samples_per_block: f64,
@@ -27,6 +28,12 @@ impl Blocks {
             let m = block.iter().sum::<f64>() / n;
             mean.push(m);
             std_dev.push((block.iter().map(|v| (v - m).powi(2)).sum::<f64>() / n).sqrt());
+        }
+        // A ramp of height d within a block has variance d²/12.
+        for i in 1..count.saturating_sub(1) {
+            let ramp = 0.5 * (mean[i + 1] - mean[i - 1]);
+            let variance = std_dev[i] * std_dev[i];
+            std_dev[i] = (variance - ramp * ramp / 12.0).max(0.01 * variance).sqrt();
         }
         Blocks {
             mean,
@@ -97,6 +104,16 @@ mod tests {
         assert_eq!(blocks.len(), 100);
         assert!(blocks.mean.iter().all(|m| (m - 5.0).abs() < 0.05));
         assert!(blocks.std_dev.iter().all(|s| (s - 2f64.sqrt()).abs() < 0.05));
+    }
+
+    #[test]
+    fn a_ramp_is_no_fluctuation() {
+        let blocks = Blocks::new(&(0..1000).map(|i| i as f64).collect::<Vec<_>>(), 100.0);
+        assert!(
+            blocks.std_dev[1..9]
+                .iter()
+                .all(|s| *s < 0.4 * 100.0 / 12f64.sqrt())
+        );
     }
 
     #[test]

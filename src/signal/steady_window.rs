@@ -38,9 +38,12 @@ const DEPARTURE_OF_RANGE: f64 = 0.02;
 /// Two states differ in kind when their distance is beyond this part of the largest distance.
 const SAME_STATE: f64 = 0.35;
 
+/// Air before and air after have the same noise, up to this ratio of energies.
+const QUIET: f64 = 1.6;
+
 /// Finds the phases of a record from its channels (all of one length; those that carry the cutting force).
 /// `entry_samples`: travel from first contact to full engagement where geometry tells it (drilling);
-/// otherwise entry is detected. `None` where the record holds less than a few revolutions.
+/// otherwise entry is detected. `None` where the record holds less than a few revolutions, or no steady cut.
 pub fn find_phases(channels: &[&[f64]], spindle: Spindle, entry_samples: Option<f64>) -> Option<Phases> {
     let samples = channels.iter().map(|c| c.len()).min()?;
     let per_block = block_length(samples, spindle)?;
@@ -54,13 +57,17 @@ pub fn find_phases(channels: &[&[f64]], spindle: Spindle, entry_samples: Option<
     }
     let start_end = departure(&blocks, count, false);
     let last_start = count - departure(&blocks, count, true);
-    let (before, after) = air_states(&blocks, count, start_end, last_start);
+    let entry_blocks = entry_samples.map(|entry| entry / per_block);
+    let (before, after) = air_states(&blocks, count, start_end, last_start, entry_blocks);
 
     // Guard blocks: the departure is noticed a little late.
     let sample = |block: f64| ((block * per_block).round().max(0.0) as usize).min(samples);
     let guard = 2.0;
     let lo = if before { start_end } else { 0 };
     let hi = if after { last_start } else { count };
+    if lo + MIN_STATE_BLOCKS > hi {
+        return None;
+    }
     let air = Air {
         before: before
             .then(|| 0..sample(lo as f64 - guard))
@@ -206,7 +213,13 @@ fn departure(blocks: &[Blocks], count: usize, from_end: bool) -> usize {
 }
 
 /// Are the states at the start and at the end of the record air?
-fn air_states(blocks: &[Blocks], count: usize, start_end: usize, last_start: usize) -> (bool, bool) {
+fn air_states(
+    blocks: &[Blocks],
+    count: usize,
+    start_end: usize,
+    last_start: usize,
+    entry_blocks: Option<f64>,
+) -> (bool, bool) {
     if start_end >= count || last_start == 0 {
         // One state from end to end: the campaign says that it is a cut.
         return (false, false);
@@ -227,7 +240,7 @@ fn air_states(blocks: &[Blocks], count: usize, start_end: usize, last_start: usi
         blocks.iter().map(part).collect()
     };
 
-    // Tooth-passing energy first: drift does not touch it.
+    // Milling: tooth-passing energy first, drift does not touch it. (A drill has none, and its entry is a ramp.)
     let energy = |r: &Range<usize>| of(r, |b| &b.std_dev);
     let quietest: Vec<f64> = blocks
         .iter()
@@ -240,8 +253,9 @@ fn air_states(blocks: &[Blocks], count: usize, start_end: usize, last_start: usi
     let (ls, lm, le) = (loudness(&start), loudness(&middle), loudness(&end));
     let loudest = ls.max(lm).max(le);
     let least = ls.min(lm).min(le);
-    if loudest > 2.0 * least {
-        let quiet = |l: f64| l - least < SAME_STATE * (loudest - least);
+    if entry_blocks.is_none() && loudest > 2.0 * least {
+        // The passage in or out may be the loudest part: air is as quiet as the quietest, not just quieter.
+        let quiet = |l: f64| l < QUIET * least;
         return (quiet(ls), quiet(le));
     }
 
@@ -262,18 +276,26 @@ fn air_states(blocks: &[Blocks], count: usize, start_end: usize, last_start: usi
     let (s, m, e) = (level(&start), level(&middle), level(&end));
     let (sm, em, se) = (distance(&s, &m), distance(&e, &m), distance(&s, &e));
     let largest = sm.max(em).max(se);
-    if sm < SAME_STATE * largest {
-        return (false, true);
+    if m_to - m_from >= MIN_STATE_BLOCKS {
+        if sm < SAME_STATE * largest {
+            return (false, true);
+        }
+        if em < SAME_STATE * largest {
+            return (true, false);
+        }
+        if se < sm.max(em) {
+            return (true, true);
+        }
     }
-    if em < SAME_STATE * largest {
-        return (true, false);
-    }
-    if se < sm.min(em) || m_to - m_from > count / 4 {
-        return (true, true);
-    }
-    // The middle is only the passage between two states: the one nearer zero is the air.
-    let zero = vec![0.0; s.len()];
-    let start_is_air = distance(&s, &zero) < distance(&e, &zero);
+    // The middle lies between the two states: the passage into the cut or out of it. Where entry is known to
+    // take long, a short passage is an exit; otherwise the state nearer zero is the air.
+    let start_is_air = match entry_blocks {
+        Some(entry) if entry >= 2.0 * MIN_STATE_BLOCKS as f64 => (m_to - m_from) as f64 > 0.4 * entry,
+        _ => {
+            let zero = vec![0.0; s.len()];
+            distance(&s, &zero) < distance(&e, &zero)
+        }
+    };
     (start_is_air, !start_is_air)
 }
 
@@ -494,5 +516,28 @@ mod tests {
         assert!(whole_revolutions(10.0..15.0, 10.0, 100).is_empty());
         assert!(whole_revolutions(90.0..200.0, 20.0, 100).is_empty());
         assert!(whole_revolutions(0.0..1.0, 0.0, 1).is_empty());
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn no_record_makes_it_panic_and_what_it_finds_lies_inside(
+            levels in proptest::collection::vec((-1e3..1e3f64, 1usize..400), 0..12),
+            turn in 0.0..300.0f64,
+            teeth in 0usize..7,
+            entry in proptest::option::of(-10.0..3000.0f64),
+            seed in 0u64..1000,
+        ) {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let data: Vec<f64> = levels
+                .iter()
+                .flat_map(|&(level, n)| (0..n).map(|_| level + rng.random_range(-1.0..1.0)).collect::<Vec<_>>())
+                .collect();
+            let spindle = Spindle { samples_per_revolution: turn, teeth };
+            if let Some(p) = find_phases(&[&data, &data], spindle, entry) {
+                proptest::prop_assert!(!p.steady.is_empty() && p.steady.end <= data.len());
+                proptest::prop_assert!(p.air.before.is_none_or(|r| r.end <= p.steady.start));
+                proptest::prop_assert!(p.air.after.is_none_or(|r| r.start >= p.steady.end));
+            }
+        }
     }
 }

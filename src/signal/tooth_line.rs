@@ -18,10 +18,11 @@ pub struct ToothLine {
 }
 
 impl ToothLine {
-    /// A clear line exists, and none of the spindle's own multiples rises from the noise. (Chatter, too, is a
+    /// A clear line exists, and none of the spindle's own multiples rises from the noise and the skirts of that
+    /// line. (Chatter, too, is a
     /// clear line off the comb, but beside it.)
     pub fn speed_is_doubtful(&self) -> bool {
-        self.strongest_to_noise > 30.0 && self.nominal_to_noise < 8.0
+        self.strongest_to_noise > 30.0 && self.nominal_to_noise < (0.03 * self.strongest_to_noise).max(8.0)
     }
 }
 
@@ -85,9 +86,23 @@ pub fn tooth_line(samples: &[f64], sample_rate_hz: f64, spindle_hz: f64, teeth: 
         .max_by(|a, b| a.1.total_cmp(b.1))?;
     Some(ToothLine {
         nominal_to_noise: nominal / noise,
-        strongest_hz: at as f64 * resolution_hz,
+        strongest_hz: (at as f64 + peak_shift(&amplitude, at)) * resolution_hz,
         strongest_to_noise: strongest / noise,
     })
+}
+
+/// Where a peak lies between lines: the top of the parabola through the logarithms of three neighbours, in lines.
+fn peak_shift(amplitude: &[f64], at: usize) -> f64 {
+    let log = |i: usize| amplitude.get(i).map(|a| a.max(f64::MIN_POSITIVE).ln());
+    let (Some(left), Some(top), Some(right)) = (at.checked_sub(1).and_then(log), log(at), log(at + 1)) else {
+        return 0.0;
+    };
+    let bend = left - 2.0 * top + right;
+    if bend < 0.0 {
+        (0.5 * (left - right) / bend).clamp(-0.5, 0.5)
+    } else {
+        0.0
+    }
 }
 
 #[cfg(test)]
@@ -114,7 +129,7 @@ mod tests {
         // Off by 7 %: no line on the nominal comb.
         let wrong = tooth_line(&cut(128.9, 5.0), 5000.0, 20.0, 6).unwrap();
         assert!(wrong.speed_is_doubtful(), "{wrong:?}");
-        assert!((wrong.strongest_hz - 128.9).abs() < 1.0);
+        assert!((wrong.strongest_hz - 128.9).abs() < 0.1);
     }
 
     #[test]

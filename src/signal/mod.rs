@@ -2,6 +2,7 @@
 
 mod blocks;
 mod drift;
+mod end_states;
 mod steady_window;
 mod tooth_line;
 

@@ -1,13 +1,211 @@
+use std::fmt::Write;
+
+use serde_json::json;
+
 use super::{CampaignArg, Outcome};
-use crate::{Error, Result};
+use crate::Result;
+use crate::campaign::Campaign;
+use crate::cutting::{
+    self, CfcOptions, CfcResult, CutAnalysis, ForceAxis, Group, by_axis, depth_mm, speed_text,
+};
 
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
     campaign: CampaignArg,
+    /// Hold edge coefficients at zero or above.
+    #[arg(long)]
+    nonnegative_edges: bool,
 }
 
 pub fn run(args: Args) -> Result<Outcome> {
-    let _ = args.campaign.dir;
-    Err(Error::computation("cfc is not built yet"))
+    let campaign = Campaign::load(&args.campaign.dir)?;
+    let options = CfcOptions {
+        nonnegative_edges: args.nonnegative_edges,
+    };
+    let result = cutting::identify_forces(&campaign, options)?;
+    Ok(Outcome {
+        json: document(&campaign, &result),
+        text: text(&campaign, &result),
+    })
+}
+
+fn document(campaign: &Campaign, result: &CfcResult) -> serde_json::Value {
+    let groups = |list: &[Group]| list.iter().map(Group::to_json).collect::<Vec<_>>();
+    let process = result.pooled.first().map(|g| g.process);
+    json!({
+        "campaign": campaign.name,
+        "groups": groups(&result.groups),
+        "pooled": groups(&result.pooled),
+        "r2": process.map(|p| by_axis(p, &result.r2())),
+        "cuts": result.cuts.iter().map(cut_document).collect::<Vec<_>>(),
+        "warnings": result.warnings,
+    })
+}
+
+fn cut_document(cut: &CutAnalysis) -> serde_json::Value {
+    let mut averages = serde_json::Map::new();
+    for axis in ForceAxis::ALL {
+        if let Some(average) = cut.averages[axis.index()] {
+            averages.insert(axis.label().to_lowercase(), json!(average));
+        }
+    }
+    json!({
+        "id": cut.id,
+        "process": cut.process,
+        "spindle_rpm": cut.spindle_rpm,
+        "cutting_speed_m_per_min": cut.cutting_speed_m_per_min,
+        "feed_mm": cut.feed_mm,
+        "record_s": cut.record_s,
+        "air_before_s": cut.air_before_s,
+        "air_after_s": cut.air_after_s,
+        "steady_s": cut.steady_s,
+        "steady_given": cut.steady_given,
+        "revolutions": cut.revolutions,
+        "drift": cut.channels.iter().map(|c| json!({"channel": c.name, "line": c.drift})).collect::<Vec<_>>(),
+        "averages": averages,
+        "tooth_line": cut.tooth_line,
+    })
+}
+
+fn text(campaign: &Campaign, result: &CfcResult) -> String {
+    let mut out = format!("Cutting force coefficients: {}\n", campaign.name);
+    for pooled in &result.pooled {
+        let groups: Vec<&Group> = result
+            .groups
+            .iter()
+            .filter(|g| g.process == pooled.process)
+            .collect();
+        let _ = writeln!(out, "\n{}", coefficient_table(&groups, pooled));
+        let _ = writeln!(out, "{}", cut_table(campaign, result, pooled));
+    }
+    if result.warnings.is_empty() {
+        out.push_str("No warnings.\n");
+    } else {
+        out.push_str("Warnings\n");
+        for warning in &result.warnings {
+            let _ = writeln!(out, "  - {}", warning.replace('\n', "\n    "));
+        }
+    }
+    out
+}
+
+fn coefficient_table(groups: &[&Group], pooled: &Group) -> String {
+    let mut header = vec!["speed m/min".to_string(), "cuts".into(), "feeds".into()];
+    header.extend(
+        pooled
+            .coefficients
+            .iter()
+            .map(|c| format!("{} {}", c.label, c.unit)),
+    );
+    let axes = ForceAxis::of(pooled.process);
+    header.extend(axes.iter().map(|a| format!("R² {}", a.label())));
+    let mut rows = vec![header];
+    let alone = groups.len() == 1 && groups[0].cuts == pooled.cuts;
+    for (group, name) in groups
+        .iter()
+        .map(|g| (*g, speed_text(g)))
+        .chain((!alone).then(|| (pooled, "all together".to_string())))
+    {
+        let mut row = vec![name, group.cuts.len().to_string(), group.feeds.to_string()];
+        row.extend(group.coefficients.iter().map(|c| match (c.value, c.std_error) {
+            _ if c.constraint_active => "0 (held)".to_string(),
+            (Some(value), Some(error)) => with_error(value, error),
+            (Some(value), None) => format!("{value:.4}"),
+            (None, _) => "–".to_string(),
+        }));
+        row.extend(
+            axes.iter()
+                .map(|a| group.r2[a.index()].map_or("–".to_string(), |r| format!("{r:.4}"))),
+        );
+        rows.push(row);
+    }
+    let title = match pooled.process {
+        crate::campaign::Process::Milling => "Milling: coefficient ± standard error",
+        crate::campaign::Process::Drilling => "Drilling: coefficient ± standard error",
+    };
+    format!("{title}\n{}", table(&rows))
+}
+
+fn cut_table(campaign: &Campaign, result: &CfcResult, pooled: &Group) -> String {
+    let axes = ForceAxis::of(pooled.process);
+    let mut header: Vec<String> = ["cut", "rpm", "feed mm", "depth mm", "steady s", "turns", "air"]
+        .map(String::from)
+        .into();
+    for axis in axes {
+        header.push(format!("{} {}", axis.label(), axis.unit()));
+        header.push("off %".into());
+    }
+    let mut rows = vec![header];
+    for cut in result.cuts.iter().filter(|c| c.process == pooled.process) {
+        let air = match (cut.air_before_s.is_some(), cut.air_after_s.is_some()) {
+            (true, true) => "both",
+            (true, false) => "before",
+            (false, true) => "after",
+            (false, false) => "none",
+        };
+        let mut row = vec![
+            cut.id.clone(),
+            format!("{}", cut.spindle_rpm),
+            format!("{}", cut.feed_mm),
+            depth_mm(&campaign.cuts[cut.cut].geometry).map_or("–".into(), |d| d.to_string()),
+            format!("{:.2}–{:.2}", cut.steady_s[0], cut.steady_s[1]),
+            format!("{:.0}", cut.revolutions),
+            air.to_string(),
+        ];
+        for axis in axes {
+            let Some(average) = cut.averages[axis.index()] else {
+                row.extend(["–".to_string(), "–".to_string()]);
+                continue;
+            };
+            row.push(with_error(average.value, average.std_error));
+            let point = pooled.points.iter().find(|p| p.cut == cut.id && p.axis == *axis);
+            row.push(point.filter(|p| p.fitted != 0.0).map_or("–".into(), |p| {
+                format!("{:+.1}", 100.0 * (p.measured - p.fitted) / p.fitted.abs())
+            }));
+        }
+        rows.push(row);
+    }
+    format!(
+        "Cuts: averages over whole turns in tool axes; \"off\" is against the fit to all cuts together\n{}",
+        table(&rows)
+    )
+}
+
+/// `929.8 ± 0.5`: decimals by the error, which keeps two figures.
+fn with_error(value: f64, error: f64) -> String {
+    let decimals = if error > 0.0 && error.is_finite() {
+        (1.0 - error.log10().floor()).clamp(0.0, 4.0) as usize
+    } else {
+        4
+    };
+    format!("{value:.decimals$} ± {error:.decimals$}")
+}
+
+/// Columns aligned to the right, the first to the left.
+fn table(rows: &[Vec<String>]) -> String {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let width = |j: usize| {
+        rows.iter()
+            .filter_map(|r| r.get(j))
+            .map(|c| c.chars().count())
+            .max()
+            .unwrap_or(0)
+    };
+    let widths: Vec<usize> = (0..columns).map(width).collect();
+    let mut out = String::new();
+    for row in rows {
+        let mut line = String::from(" ");
+        for (j, (cell, width)) in row.iter().zip(&widths).enumerate() {
+            let pad = " ".repeat(width - cell.chars().count());
+            let _ = if j == 0 {
+                write!(line, " {cell}{pad}")
+            } else {
+                write!(line, "  {pad}{cell}")
+            };
+        }
+        out.push_str(line.trim_end());
+        out.push('\n');
+    }
+    out
 }

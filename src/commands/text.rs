@@ -1,6 +1,7 @@
 //! Plain-text tables for the terminal.
 
-/// A table with a header; the first column is left-aligned, the others right-aligned.
+/// A table with a header; the first column and those without a heading (bars, remarks) are left-aligned, the others
+/// right-aligned.
 pub fn table(header: &[&str], rows: &[Vec<String>]) -> String {
     let columns = header.len();
     let width = |c: usize| {
@@ -13,19 +14,20 @@ pub fn table(header: &[&str], rows: &[Vec<String>]) -> String {
         for (c, width) in widths.iter().enumerate() {
             let cell = cells.get(c).map(String::as_str).unwrap_or("");
             let padding = " ".repeat(width - cell.chars().count());
-            if c == 0 {
+            if c > 0 {
+                out += "  ";
+            }
+            if c == 0 || header[c].is_empty() {
                 out += cell;
                 out += &padding;
             } else {
-                out += "  ";
                 out += &padding;
                 out += cell;
             }
         }
         out.trim_end().to_string() + "\n"
     };
-    let header: Vec<String> = header.iter().map(|h| h.to_string()).collect();
-    let mut out = line(&header);
+    let mut out = line(&header.iter().map(|h| h.to_string()).collect::<Vec<_>>());
     for row in rows {
         out += &line(row);
     }

@@ -3,6 +3,7 @@
 use super::force::RegenerativeForce;
 use super::frf::{AxisMode, ModalFrf};
 use crate::campaign::{Campaign, LobeAxis, LobeMethod, LobesSection, Process};
+use crate::cutting::{CfcOptions, identify_forces};
 use crate::{Error, InputError, Result};
 
 /// Cutting coefficients that lobes need, N/mm².
@@ -22,19 +23,66 @@ impl LobeCoefficients {
     }
 }
 
-/// Ktc and Krc identified from the campaign's own cuts.
+/// Ktc and Krc identified from the campaign's own cuts of the same process, all speeds pooled.
+///
+/// A drilling regression gives the force normal to the lip, Kfc; its part in the plane of the lobes is Kfc cos κ
+/// (κ: half point angle), the axial part Kfc sin κ.
+///
+/// # Errors
+/// No cuts of that process, or cuts that do not determine the coefficients.
 pub fn coefficients_from_cuts(
     campaign: &Campaign,
-    _section: &LobesSection,
-    _warnings: &mut Vec<String>,
+    section: &LobesSection,
+    warnings: &mut Vec<String>,
 ) -> Result<LobeCoefficients> {
-    Err(
-        InputError::new("cutting coefficients from the campaign's own cuts are not built yet")
+    let lacks = |problem: String| -> Error {
+        InputError::new(problem)
             .file(campaign.dir.join("campaign.toml"))
             .key("lobes.ktc_n_per_mm2")
-            .remedy("give ktc_n_per_mm2 and krc_n_per_mm2")
-            .into(),
-    )
+            .remedy("give ktc_n_per_mm2 and krc_n_per_mm2, or add cuts at two feeds or more")
+            .into()
+    };
+    if campaign.cuts.is_empty() {
+        return Err(lacks(
+            "the coefficients are not given and the campaign has no cuts".into(),
+        ));
+    }
+    let cuts = identify_forces(campaign, CfcOptions::default())?;
+    warnings.extend(cuts.warnings.iter().cloned());
+    let group = cuts
+        .pooled
+        .iter()
+        .find(|group| group.process == section.process)
+        .ok_or_else(|| lacks("the campaign has no cuts of the lobes' process".into()))?;
+    let value = |label: &str| {
+        group
+            .coefficient(label)
+            .and_then(|c| c.value)
+            .ok_or_else(|| lacks(format!("the campaign's cuts do not determine {label}")))
+    };
+    let krc_n_per_mm2 = match section.process {
+        Process::Milling => value("Krc")?,
+        Process::Drilling => value("Kfc")? * half_point_angle_rad(campaign, section)?.cos(),
+    };
+    Ok(LobeCoefficients {
+        ktc_n_per_mm2: value("Ktc")?,
+        krc_n_per_mm2,
+    })
+}
+
+fn half_point_angle_rad(campaign: &Campaign, section: &LobesSection) -> Result<f64> {
+    let tool = campaign.tool.as_ref();
+    section
+        .half_point_angle_deg
+        .or(tool.and_then(|t| t.half_point_angle_deg))
+        .map(f64::to_radians)
+        .ok_or_else(|| {
+            InputError::new("drilling lobes need the half point angle")
+                .file(campaign.dir.join("campaign.toml"))
+                .key("lobes.half_point_angle_deg")
+                .remedy("give it here or in [tool]; a 135° point has 67.5")
+                .into()
+        })
 }
 
 /// The regenerative force of the campaign's `[lobes]` table and `[tool]`.
@@ -83,24 +131,12 @@ pub fn force_of(
             })?;
             RegenerativeForce::milling_zero_order(ktc_n_per_mm2, krc_n_per_mm2, teeth, immersion)
         }
-        Process::Drilling => {
-            let half_point_angle_deg = section
-                .half_point_angle_deg
-                .or(tool.and_then(|t| t.half_point_angle_deg))
-                .ok_or_else(|| {
-                    lacks(
-                        "lobes.half_point_angle_deg",
-                        "drilling lobes need the half point angle",
-                        "give it here or in [tool]; a 135° point has 67.5",
-                    )
-                })?;
-            RegenerativeForce::drilling_lateral(
-                ktc_n_per_mm2,
-                krc_n_per_mm2,
-                half_point_angle_deg.to_radians(),
-                teeth,
-            )
-        }
+        Process::Drilling => RegenerativeForce::drilling_lateral(
+            ktc_n_per_mm2,
+            krc_n_per_mm2,
+            half_point_angle_rad(campaign, section)?,
+            teeth,
+        ),
     }
 }
 

@@ -95,7 +95,9 @@ impl Mul for &Dual {
 impl Div for &Dual {
     type Output = Dual;
     fn div(self, other: &Dual) -> Dual {
-        self * &other.recip()
+        let inverse = 1.0 / other.value;
+        let value = self.value * inverse;
+        self.combine(other, value, inverse, -value * inverse)
     }
 }
 

@@ -1,2 +1,13 @@
 //! Signals: drift of charge amplifiers, steady windows, spectra.
+
+mod blocks;
+mod drift;
+mod end_states;
 pub mod frf_noise;
+mod steady_window;
+mod tooth_line;
+
+pub use blocks::{Blocks, median, quantile};
+pub use drift::{Air, DriftLine, fit_drift};
+pub use steady_window::{Phases, Spindle, find_phases, whole_revolutions};
+pub use tooth_line::{ToothLine, tooth_line};

@@ -1,6 +1,7 @@
 //! Integration tests, in one binary so that they link once.
 
 mod campaign;
+mod cfc;
 mod contract;
 mod inspect;
 mod modal;

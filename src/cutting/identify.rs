@@ -1,0 +1,238 @@
+//! From a campaign's records to its cutting force coefficients.
+
+use rayon::prelude::*;
+
+use super::average_force::{ForceAxis, average_row};
+use super::group::{Group, Rows, distinct, observations};
+use super::outlier::misfits;
+use super::record::{Average, CutAnalysis, Notice, READER, analyse_cut};
+use super::warnings;
+use crate::campaign::{Campaign, CutGeometry, Process};
+use crate::progress::Progress;
+use crate::{Error, Result, ingest};
+
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct CfcOptions {
+    /// Edge coefficients are held at zero or above.
+    pub nonnegative_edges: bool,
+}
+
+/// What the dynamometer records say.
+#[derive(Debug, Clone)]
+pub struct CfcResult {
+    /// Every usable cut, in the campaign's order.
+    pub cuts: Vec<CutAnalysis>,
+    /// One per process and cutting speed where the feeds at that speed suffice; otherwise speeds are pooled.
+    pub groups: Vec<Group>,
+    /// All cuts of a process together, one group per process.
+    pub pooled: Vec<Group>,
+    pub warnings: Vec<String>,
+}
+
+/// Reads every cut's record (in parallel, one record in memory per thread) and fits the coefficients.
+/// A cut that cannot be used is left out with a warning that names it.
+///
+/// # Errors
+/// No cuts, no tool, or not one usable record.
+pub fn identify_forces(campaign: &Campaign, options: CfcOptions) -> Result<CfcResult> {
+    if campaign.cuts.is_empty() {
+        return Err(Error::computation(format!(
+            "{}: the campaign has no [[cut]]: nothing to identify cutting forces from",
+            campaign.dir.display()
+        )));
+    }
+    let progress = Progress::new("force records", campaign.cuts.len());
+    let outcomes: Vec<Result<CutAnalysis>> = (0..campaign.cuts.len())
+        .into_par_iter()
+        .map(|i| {
+            let outcome = read_cut(campaign, i);
+            progress.step();
+            outcome
+        })
+        .collect();
+    from_analyses(campaign, outcomes, options)
+}
+
+fn read_cut(campaign: &Campaign, index: usize) -> Result<CutAnalysis> {
+    let (record, reader_warnings) = ingest::read_time(&campaign.cuts[index].file)?;
+    let mut analysis = analyse_cut(campaign, index, &record)?;
+    let noticed = |detail| Notice { kind: READER, detail };
+    analysis.notices.extend(reader_warnings.into_iter().map(noticed));
+    Ok(analysis)
+}
+
+/// The part after the records are read: regression and warnings.
+pub fn from_analyses(
+    campaign: &Campaign,
+    outcomes: Vec<Result<CutAnalysis>>,
+    options: CfcOptions,
+) -> Result<CfcResult> {
+    let mut warnings = Vec::new();
+    let (mut cuts, mut first_error, mut rows) = (Vec::new(), None, Rows::new());
+    for (cut, outcome) in campaign.cuts.iter().zip(outcomes) {
+        let usable = outcome.and_then(|analysis| {
+            add_rows(campaign, &analysis, &mut rows)?;
+            Ok(analysis)
+        });
+        match usable {
+            Ok(analysis) => cuts.push(analysis),
+            Err(error) => {
+                warnings.push(format!("cut {} is left out: {error}", cut.id));
+                first_error.get_or_insert(error);
+            }
+        }
+    }
+    if cuts.is_empty() {
+        let cause = first_error.map_or_else(String::new, |e| format!("; the first: {e}"));
+        return Err(Error::computation(format!(
+            "none of the {} cuts can be used{cause}",
+            campaign.cuts.len()
+        )));
+    }
+    turn_torque(&mut cuts, &mut warnings);
+    let counted = without_duplicates(campaign, &cuts, &mut warnings);
+    warnings.extend(warnings::of_records(&cuts));
+
+    let (mut groups, mut pooled) = (Vec::new(), Vec::new());
+    for process in [Process::Milling, Process::Drilling] {
+        let of_process: Vec<&CutAnalysis> =
+            counted.iter().copied().filter(|c| c.process == process).collect();
+        let Some(all) = Group::fit(&of_process, &rows, options.nonnegative_edges)? else {
+            continue;
+        };
+        warnings.extend(warnings::of_plan(campaign, &of_process, process));
+        for set in by_speed(&of_process, &mut warnings) {
+            groups.extend(Group::fit(&set, &rows, options.nonnegative_edges)?);
+        }
+        let misfits = misfits(&observations(&of_process, &rows));
+        warnings.extend(misfits.iter().map(|m| warnings::of_misfit(campaign, m)));
+        let by_speed: Vec<&Group> = groups.iter().filter(|g| g.process == process).collect();
+        warnings.extend(warnings::of_fits(&all, &by_speed));
+        pooled.push(all);
+    }
+    if groups.is_empty() {
+        return Err(Error::computation(
+            "no cut holds an average on an axis that carries coefficients: check that Fx, Fy, Fz (drilling: Fz, Mz) are recorded",
+        ));
+    }
+    Ok(CfcResult {
+        cuts,
+        groups,
+        pooled,
+        warnings,
+    })
+}
+
+fn add_rows(campaign: &Campaign, analysis: &CutAnalysis, rows: &mut Rows) -> Result<()> {
+    let Some(tool) = campaign.tool.as_ref() else {
+        return Err(Error::computation(
+            "[tool] is missing: cutting forces need its teeth and diameter",
+        ));
+    };
+    for &axis in ForceAxis::of(analysis.process) {
+        let row = average_row(tool, &campaign.cuts[analysis.cut].geometry, axis)?;
+        rows.insert((analysis.cut, axis), row);
+    }
+    Ok(())
+}
+
+/// Torque opposes rotation; where all of it is negative the amplifier counts it the other way round.
+fn turn_torque(cuts: &mut [CutAnalysis], warnings: &mut Vec<String>) {
+    let torque = ForceAxis::Mz.index();
+    let drilled = || {
+        cuts.iter()
+            .filter(|c| c.process == Process::Drilling)
+            .filter_map(|c| c.averages[torque])
+    };
+    if drilled().count() == 0 || !drilled().all(|t| t.value < 0.0) {
+        return;
+    }
+    for average in cuts.iter_mut().filter_map(|c| c.averages[torque].as_mut()) {
+        average.value = -average.value;
+    }
+    warnings.push("Mz is negative in every hole: it is taken as counted the other way round".into());
+}
+
+/// The same record twice would count double; a repeated cut is welcome.
+fn without_duplicates<'a>(
+    campaign: &Campaign,
+    cuts: &'a [CutAnalysis],
+    warnings: &mut Vec<String>,
+) -> Vec<&'a CutAnalysis> {
+    let mut kept: Vec<&CutAnalysis> = Vec::new();
+    for cut in cuts {
+        let same_data = |a: &CutAnalysis| {
+            campaign.cuts[a.cut].file == campaign.cuts[cut.cut].file
+                || (a.averages == cut.averages
+                    && a.steady_s == cut.steady_s
+                    && a.spindle_rpm == cut.spindle_rpm)
+        };
+        match kept.iter().find(|a| same_data(a)) {
+            Some(first) => warnings.push(format!(
+                "cut {} holds the same data as cut {} and is not counted again: one of the two has a wrong file",
+                cut.id, first.id
+            )),
+            None => kept.push(cut),
+        }
+    }
+    kept
+}
+
+/// One set per cutting speed that has two feeds or more; the cuts at other speeds together, if they have.
+fn by_speed<'a>(cuts: &[&'a CutAnalysis], warnings: &mut Vec<String>) -> Vec<Vec<&'a CutAnalysis>> {
+    let speeds = distinct(cuts.iter().map(|c| c.cutting_speed_m_per_min));
+    let (mut sets, mut rest): (Vec<Vec<&CutAnalysis>>, Vec<&CutAnalysis>) = (Vec::new(), Vec::new());
+    for speed in &speeds {
+        let same = |c: &&&CutAnalysis| (c.cutting_speed_m_per_min - speed).abs() <= 2e-3 * speed;
+        let set: Vec<&CutAnalysis> = cuts.iter().filter(same).copied().collect();
+        if distinct(set.iter().map(|c| c.feed_mm)).len() >= 2 {
+            sets.push(set);
+        } else {
+            rest.extend(set);
+        }
+    }
+    if rest.is_empty() {
+        return sets;
+    }
+    rest.sort_by_key(|c| c.cut);
+    let ids: Vec<&str> = rest.iter().map(|c| c.id.as_str()).collect();
+    let enough = distinct(rest.iter().map(|c| c.feed_mm)).len() >= 2;
+    if enough && speeds.len() > 1 {
+        warnings.push(format!(
+            "cut {}: one feed only at its speed; these cuts are taken as one group over their speeds",
+            ids.join(", ")
+        ));
+    } else if !sets.is_empty() {
+        warnings.push(format!(
+            "cut {}: one feed only at its speed, so that cutting and edge parts cannot be separated there; used in the pooled fit alone",
+            ids.join(", ")
+        ));
+    }
+    if enough || sets.is_empty() {
+        sets.push(rest);
+    }
+    sets
+}
+
+impl CfcResult {
+    /// The pooled fit's R² by axis (x, y, z, torque) of the first process.
+    pub fn r2(&self) -> [Option<f64>; 4] {
+        self.pooled.first().map_or([None; 4], |g| g.r2)
+    }
+
+    /// An average by cut and axis.
+    pub fn average(&self, cut: usize, axis: ForceAxis) -> Option<Average> {
+        self.cuts
+            .iter()
+            .find(|c| c.cut == cut)
+            .and_then(|c| c.averages[axis.index()])
+    }
+}
+
+/// Depth that a cut is known by: axial depth (milling), hole depth (drilling), mm.
+pub(crate) fn depth_mm(geometry: &CutGeometry) -> Option<f64> {
+    match *geometry {
+        CutGeometry::Milling { axial_depth_mm, .. } => Some(axial_depth_mm),
+        CutGeometry::Drilling { hole_depth_mm, .. } => hole_depth_mm,
+    }
+}

@@ -1,0 +1,216 @@
+//! What a technician should know about the records and the regression, in plain words.
+
+use std::collections::BTreeMap;
+
+use super::average_force::ForceAxis;
+use super::group::{Group, distinct};
+use super::outlier::Misfit;
+use super::record::{CutAnalysis, NO_AIR};
+use crate::campaign::{Campaign, Process};
+
+/// Notices of all records, one sentence a kind.
+pub(super) fn of_records(cuts: &[CutAnalysis]) -> Vec<String> {
+    let mut by_kind: BTreeMap<&str, Vec<(&str, &str)>> = BTreeMap::new();
+    for cut in cuts {
+        for notice in &cut.notices {
+            by_kind
+                .entry(notice.kind)
+                .or_default()
+                .push((&cut.id, &notice.detail));
+        }
+    }
+    let sentence = |(kind, told): (&str, Vec<(&str, &str)>)| {
+        let mut ids: Vec<&str> = told.iter().map(|(id, _)| *id).collect();
+        ids.dedup();
+        if kind == NO_AIR && ids.len() == cuts.len() {
+            return format!("all cuts: {kind}");
+        }
+        let one = |(id, detail): &(&str, &str)| match *detail {
+            "" => id.to_string(),
+            detail => format!("{id} ({detail})"),
+        };
+        let list = match told.first() {
+            // Many of a kind: the first tells what it looks like.
+            Some((id, detail)) if ids.len() > 4 && !detail.is_empty() => {
+                format!("{} (e.g. {id}: {detail})", ids.join(", "))
+            }
+            _ => told.iter().map(one).collect::<Vec<_>>().join(", "),
+        };
+        format!("cut {list}: {kind}")
+    };
+    by_kind.into_iter().map(sentence).collect()
+}
+
+/// Cells of a speed × feed plan that stayed empty, where there clearly was a plan.
+pub(super) fn of_plan(campaign: &Campaign, cuts: &[&CutAnalysis], process: Process) -> Option<String> {
+    let speeds = distinct(cuts.iter().map(|c| c.spindle_rpm));
+    let feeds = distinct(cuts.iter().map(|c| c.feed_mm));
+    if speeds.len() < 2 || feeds.len() < 2 {
+        return None;
+    }
+    let near = |a: f64, b: f64| (a - b).abs() <= 2e-3 * b.abs();
+    let mut empty = Vec::new();
+    for rpm in &speeds {
+        for feed in &feeds {
+            if !cuts
+                .iter()
+                .any(|c| near(c.spindle_rpm, *rpm) && near(c.feed_mm, *feed))
+            {
+                empty.push(format!("{rpm} rpm with {feed} mm"));
+            }
+        }
+    }
+    // More than a quarter empty: no such plan.
+    if empty.is_empty() || 4 * empty.len() > speeds.len() * feeds.len() {
+        return None;
+    }
+    let per = match process {
+        Process::Milling => "tooth",
+        Process::Drilling => "revolution",
+    };
+    let listed = campaign
+        .cuts
+        .iter()
+        .filter(|c| c.geometry.process() == process)
+        .count();
+    Some(format!(
+        "the plan of {} speeds and {} feeds per {per} has no usable cut at {} ({listed} cuts listed): errors grow most for the edge coefficients",
+        speeds.len(),
+        feeds.len(),
+        empty.join(", ")
+    ))
+}
+
+/// A cut that the others do not predict.
+pub(super) fn of_misfit(campaign: &Campaign, misfit: &Misfit) -> String {
+    let unit = misfit.axis.unit();
+    format!(
+        "cut {} does not fit the others: {} {:.2} {unit} measured, {:.2} {unit} from the other cuts; check its feed, \
+         speed, depth and file",
+        campaign.cuts[misfit.cut].id,
+        misfit.axis.label(),
+        misfit.measured,
+        misfit.predicted
+    )
+}
+
+/// What the regressions themselves have to say: `all` cuts of a process, and its groups by speed.
+pub(super) fn of_fits(all: &Group, groups: &[&Group]) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let pooled_too = !groups.iter().any(|g| g.cuts == all.cuts);
+    let listed: Vec<&Group> = groups.iter().copied().chain(pooled_too.then_some(all)).collect();
+
+    // One sentence for all groups that lack the same.
+    let mut lacking: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for group in &listed {
+        for set in &group.inseparable {
+            let names = match set.split_last() {
+                Some((last, rest)) if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
+                _ => set.concat(),
+            };
+            let what = if set.len() == 1 {
+                format!("{names} is not determined: no record carries it")
+            } else if group.feeds < 2 {
+                format!(
+                    "{names} cannot be separated with one feed: cut at two feeds or more (best three, wide apart)"
+                )
+            } else {
+                format!("{names} cannot be separated by these cuts")
+            };
+            lacking.entry(what).or_default().push(speed_text(group));
+        }
+    }
+    for (what, speeds) in lacking {
+        warnings.push(format!("at {} m/min: {what}", speeds.join(", ")));
+    }
+    for j in 0..all.coefficients.len() {
+        of_coefficient(&listed, j, &mut warnings);
+    }
+    let two_feeds: Vec<String> = groups
+        .iter()
+        .filter(|g| g.feeds == 2)
+        .map(|g| speed_text(g))
+        .collect();
+    if !two_feeds.is_empty() {
+        warnings.push(format!(
+            "at {} m/min: two feeds only, which a line always fits: nothing checks the model there",
+            two_feeds.join(", ")
+        ));
+    }
+    for &axis in ForceAxis::of(all.process) {
+        let a = axis.index();
+        let on_axis = || all.points.iter().filter(|p| p.axis == axis);
+        let square_sum: f64 = on_axis().map(|p| p.measured.powi(2)).sum();
+        let size = (square_sum / on_axis().count().max(1) as f64).sqrt();
+        let extra = all.extra_scatter[a];
+        if all.chi2_per_dof[a].is_some_and(|c| c > 4.0) && extra > 0.02 * size {
+            warnings.push(format!(
+                "{}: the averages of all cuts scatter by {extra:.2} {} ({:.0} %) more than their errors: one set of \
+                 coefficients does not hold for all of them; compare the speeds, and look at wear and drift",
+                axis.label(),
+                axis.unit(),
+                100.0 * extra / size
+            ));
+        }
+    }
+    warnings
+}
+
+/// What is implausible or poorly known about one coefficient, over the groups.
+fn of_coefficient(groups: &[&Group], j: usize, warnings: &mut Vec<String>) {
+    let (mut negative, mut poor, mut held) = (Vec::new(), Vec::new(), Vec::new());
+    for group in groups {
+        let (speed, c) = (speed_text(group), &group.coefficients[j]);
+        match (c.value, c.std_error) {
+            _ if c.constraint_active => held.push(speed),
+            (Some(value), Some(error)) if value < -2.0 * error => {
+                negative.push(format!("{value:.2} at {speed}"));
+            }
+            (Some(value), Some(error)) if !c.edge && error > 0.5 * value.abs() => {
+                poor.push(format!("{value:.1} ± {error:.1} at {speed}"));
+            }
+            _ => {}
+        }
+    }
+    let Some(c) = groups.first().map(|g| &g.coefficients[j]) else {
+        return;
+    };
+    if !negative.is_empty() {
+        let remedy = if c.edge {
+            "no edge pulls; look at drift and at effects the model lacks, or hold it at zero with --nonnegative-edges"
+        } else {
+            "check tool_from_dyno and the immersion angles"
+        };
+        warnings.push(format!(
+            "{} is negative ({} m/min; {}): {remedy}",
+            c.label,
+            negative.join(", "),
+            c.unit
+        ));
+    }
+    if !poor.is_empty() {
+        warnings.push(format!(
+            "{} is poorly known ({} m/min; {}): feeds too few or too close, or its force too small",
+            c.label,
+            poor.join(", "),
+            c.unit
+        ));
+    }
+    if !held.is_empty() {
+        warnings.push(format!(
+            "{} is held at zero by the constraint at {} m/min",
+            c.label,
+            held.join(", ")
+        ));
+    }
+}
+
+/// `58.3` or `45.1–81.4`, m/min.
+pub(crate) fn speed_text(group: &Group) -> String {
+    let [low, high] = group.cutting_speed_range_m_per_min;
+    if high - low <= 2e-3 * high {
+        format!("{:.1}", group.cutting_speed_m_per_min)
+    } else {
+        format!("{low:.1}–{high:.1}")
+    }
+}

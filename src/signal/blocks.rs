@@ -1,0 +1,133 @@
+//! A record cut into blocks of whole tool revolutions, and order statistics.
+
+/// Mean and fluctuation of each consecutive block of a channel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Blocks {
+    /// Mean of each block, in the unit of the channel.
+    pub mean: Vec<f64>,
+    /// Standard deviation within each block less what the drift from block to block makes, in the unit of the
+    /// channel.
+    pub std_dev: Vec<f64>,
+    /// Block length in samples; not a whole number in general.
+    pub samples_per_block: f64,
+}
+
+impl Blocks {
+    /// Cuts `samples` into `floor(len / samples_per_block)` blocks; a rest at the end is left out.
+    pub fn new(samples: &[f64], samples_per_block: f64) -> Blocks {
+        let count = if samples_per_block >= 1.0 {
+            (samples.len() as f64 / samples_per_block + 1e-9).floor() as usize
+        } else {
+            0
+        };
+        let edge = |i: usize| ((i as f64 * samples_per_block).round() as usize).min(samples.len());
+        let (mut mean, mut std_dev) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        for i in 0..count {
+            let block = &samples[edge(i)..edge(i + 1)];
+            let n = block.len().max(1) as f64;
+            let m = block.iter().sum::<f64>() / n;
+            mean.push(m);
+            std_dev.push((block.iter().map(|v| (v - m).powi(2)).sum::<f64>() / n).sqrt());
+        }
+        // A ramp of height d within a block has variance d²/12.
+        for i in 1..count.saturating_sub(1) {
+            let ramp = 0.5 * (mean[i + 1] - mean[i - 1]);
+            let variance = std_dev[i] * std_dev[i];
+            std_dev[i] = (variance - ramp * ramp / 12.0).max(0.01 * variance).sqrt();
+        }
+        Blocks {
+            mean,
+            std_dev,
+            samples_per_block,
+        }
+    }
+
+    pub fn len(&self) -> usize {
+        self.mean.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.mean.is_empty()
+    }
+}
+
+/// The `q` quantile (0..1) of `values`, interpolated; 0 where there are none.
+pub fn quantile(values: &[f64], q: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let Some(last) = sorted.len().checked_sub(1) else {
+        return 0.0;
+    };
+    let at = q.clamp(0.0, 1.0) * last as f64;
+    let low = at.floor() as usize;
+    let high = (low + 1).min(last);
+    sorted[low] + (at - low as f64) * (sorted[high] - sorted[low])
+}
+
+pub fn median(values: &[f64]) -> f64 {
+    quantile(values, 0.5)
+}
+
+/// Standard deviation from the median absolute deviation (normal consistency factor 1.4826).
+pub(crate) fn robust_std(values: &[f64]) -> f64 {
+    let centre = median(values);
+    let deviation: Vec<f64> = values.iter().map(|v| (v - centre).abs()).collect();
+    1.4826 * median(&deviation)
+}
+
+/// Straight line through points (x, y) by least squares: (value at mean x, slope, mean x).
+/// A single point, or all points at one x, give slope 0.
+pub(crate) fn line(
+    x: impl Iterator<Item = f64> + Clone,
+    y: impl Iterator<Item = f64> + Clone,
+) -> (f64, f64, f64) {
+    let n = x.clone().count().max(1) as f64;
+    let x_mean = x.clone().sum::<f64>() / n;
+    let y_mean = y.clone().sum::<f64>() / n;
+    let sxx: f64 = x.clone().map(|v| (v - x_mean).powi(2)).sum();
+    let sxy: f64 = x.zip(y).map(|(a, b)| (a - x_mean) * (b - y_mean)).sum();
+    let slope = if sxx > 0.0 { sxy / sxx } else { 0.0 };
+    (y_mean, slope, x_mean)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_of_a_sine_over_whole_periods_have_its_mean_and_rms() {
+        let period = 33.3;
+        let samples: Vec<f64> = (0..3330)
+            .map(|i| 5.0 + 2.0 * (std::f64::consts::TAU * i as f64 / period).sin())
+            .collect();
+        let blocks = Blocks::new(&samples, period);
+        assert_eq!(blocks.len(), 100);
+        assert!(blocks.mean.iter().all(|m| (m - 5.0).abs() < 0.05));
+        assert!(blocks.std_dev.iter().all(|s| (s - 2f64.sqrt()).abs() < 0.05));
+    }
+
+    #[test]
+    fn a_ramp_is_no_fluctuation() {
+        let blocks = Blocks::new(&(0..1000).map(|i| i as f64).collect::<Vec<_>>(), 100.0);
+        assert!(
+            blocks.std_dev[1..9]
+                .iter()
+                .all(|s| *s < 0.4 * 100.0 / 12f64.sqrt())
+        );
+    }
+
+    #[test]
+    fn quantiles_interpolate_and_empty_input_is_harmless() {
+        assert_eq!(quantile(&[3.0, 1.0, 2.0], 0.25), 1.5);
+        assert_eq!(median(&[]), 0.0);
+        assert!(Blocks::new(&[], 10.0).is_empty());
+        assert!(Blocks::new(&[1.0], 0.0).is_empty());
+    }
+
+    #[test]
+    fn a_line_is_found_exactly() {
+        let x = [1.0, 2.0, 4.0];
+        let (y, slope, at) = line(x.iter().copied(), x.iter().map(|v| 3.0 * v + 1.0));
+        assert!((y - (3.0 * at + 1.0)).abs() < 1e-12 && (slope - 3.0).abs() < 1e-12);
+    }
+}

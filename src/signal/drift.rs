@@ -1,0 +1,211 @@
+//! Drift of a charge amplifier: a line through the air before and after the cut.
+//!
+//! The line is never fitted to the cut itself: there, drift and a constant force look alike.
+
+use std::ops::Range;
+
+use super::blocks::{Blocks, line, robust_std};
+
+/// Sample ranges in which the tool cut nothing.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Air {
+    pub before: Option<Range<usize>>,
+    pub after: Option<Range<usize>>,
+}
+
+impl Air {
+    fn ranges(&self) -> impl Iterator<Item = &Range<usize>> {
+        self.before.iter().chain(&self.after)
+    }
+}
+
+/// The zero line of one channel, in the channel's unit against the record's own time axis.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct DriftLine {
+    /// Value at `reference_s`.
+    pub offset: f64,
+    pub slope_per_s: f64,
+    /// Mean time of the air samples, s.
+    pub reference_s: f64,
+    pub air_before: bool,
+    pub air_after: bool,
+    /// Standard deviation of the fitted value at `reference_s`, from the scatter of block means.
+    pub offset_std: f64,
+    pub slope_std_per_s: f64,
+    /// By how much the air bends away from the line (rms of block means less their noise);
+    /// 0 for a drift that is a line.
+    pub bend: f64,
+}
+
+impl DriftLine {
+    pub fn at(&self, time_s: f64) -> f64 {
+        self.offset + self.slope_per_s * (time_s - self.reference_s)
+    }
+
+    /// Standard deviation of [`DriftLine::at`].
+    pub fn std_at(&self, time_s: f64) -> f64 {
+        self.offset_std
+            .hypot(self.slope_std_per_s * (time_s - self.reference_s))
+    }
+}
+
+/// Samples further than this many robust standard deviations from the line are spikes.
+const SPIKE_SIGMA: f64 = 6.0;
+/// Blocks that each air segment is cut into to see how far its noise is from white.
+const BLOCKS_PER_SEGMENT: usize = 8;
+/// Scatter of block means over that of white noise from which on the air is called bent: chance stays below
+/// it (14 degrees of freedom, one in ten thousand).
+const BEND_RATIO: f64 = 3.0;
+
+/// Fits the zero line of a channel to its air segments. Without air there is no line: offset and slope
+/// are zero and the flags say so. With air on one side only the line is extrapolated, its uncertainty with it.
+pub fn fit_drift(samples: &[f64], sample_rate_hz: f64, start_s: f64, air: &Air) -> DriftLine {
+    let mut drift = DriftLine {
+        offset: 0.0,
+        slope_per_s: 0.0,
+        reference_s: start_s,
+        air_before: air.before.is_some(),
+        air_after: air.after.is_some(),
+        offset_std: 0.0,
+        slope_std_per_s: 0.0,
+        bend: 0.0,
+    };
+    let time = |i: usize| start_s + i as f64 / sample_rate_hz;
+    let mut kept: Vec<usize> = air
+        .ranges()
+        .flat_map(|r| r.clone())
+        .filter(|&i| i < samples.len())
+        .collect();
+    if kept.len() < 2 {
+        return drift;
+    }
+    // Least squares, dropping spikes, until nothing more is dropped.
+    for _ in 0..5 {
+        let (offset, slope, reference) =
+            line(kept.iter().map(|&i| time(i)), kept.iter().map(|&i| samples[i]));
+        (drift.offset, drift.slope_per_s, drift.reference_s) = (offset, slope, reference);
+        let residual: Vec<f64> = kept.iter().map(|&i| samples[i] - drift.at(time(i))).collect();
+        let limit = SPIKE_SIGMA * robust_std(&residual);
+        let before = kept.len();
+        let centre = super::median(&residual);
+        let mut good = residual
+            .iter()
+            .map(|r| limit == 0.0 || (r - centre).abs() <= limit);
+        kept.retain(|_| good.next().unwrap_or(true));
+        if kept.len() == before || kept.len() < 2 {
+            break;
+        }
+    }
+    uncertainty(&mut drift, samples, &kept, air, &time);
+    drift
+}
+
+/// Standard errors from block means, since hum and bend make neighbouring samples alike.
+fn uncertainty(
+    drift: &mut DriftLine,
+    samples: &[f64],
+    kept: &[usize],
+    air: &Air,
+    time: &impl Fn(usize) -> f64,
+) {
+    let residual = |i: usize| samples[i] - drift.at(time(i));
+    let sample_variance = kept.iter().map(|&i| residual(i).powi(2)).sum::<f64>() / kept.len() as f64;
+    let (mut square_sum, mut block_count, mut block_len) = (0.0, 0usize, 0.0);
+    for range in air.ranges() {
+        let values: Vec<f64> = kept
+            .iter()
+            .filter(|i| range.contains(i))
+            .map(|&i| residual(i))
+            .collect();
+        let blocks = Blocks::new(&values, values.len() as f64 / BLOCKS_PER_SEGMENT as f64);
+        square_sum += blocks
+            .mean
+            .iter()
+            .map(|m| m * m * blocks.samples_per_block)
+            .sum::<f64>();
+        block_count += blocks.len();
+        block_len += values.len() as f64;
+    }
+    // Two degrees of freedom went into the line.
+    let per_sample = if block_count > 2 {
+        (square_sum / (block_count - 2) as f64).max(sample_variance)
+    } else {
+        sample_variance
+    };
+    let n = kept.len() as f64;
+    let sxx: f64 = kept.iter().map(|&i| (time(i) - drift.reference_s).powi(2)).sum();
+    let mean_block_len = block_len / block_count.max(1) as f64;
+    if mean_block_len > 0.0 && per_sample > BEND_RATIO * sample_variance {
+        drift.bend = ((per_sample - sample_variance) / mean_block_len).max(0.0).sqrt();
+    }
+    drift.offset_std = (per_sample / n).sqrt();
+    drift.slope_std_per_s = if sxx > 0.0 { (per_sample / sxx).sqrt() } else { 0.0 };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    const RATE: f64 = 1000.0;
+
+    fn record(seed: u64, noise: f64, bend: impl Fn(f64) -> f64) -> Vec<f64> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        (0..3000)
+            .map(|i| {
+                let t = i as f64 / RATE;
+                let cut = if (1.0..2.5).contains(&t) { 200.0 } else { 0.0 };
+                let gauss: f64 = (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
+                12.0 + 3.0 * t + bend(t) + cut + noise * gauss
+            })
+            .collect()
+    }
+
+    fn air() -> Air {
+        Air {
+            before: Some(0..1000),
+            after: Some(2500..3000),
+        }
+    }
+
+    #[test]
+    fn the_line_comes_from_the_air_alone_and_spikes_do_not_move_it() {
+        let mut samples = record(1, 0.0, |_| 0.0);
+        samples[17] = 5000.0;
+        samples[2800] = -9000.0;
+        // A touch of scatter: with none at all there is no scale to call a spike by.
+        for (i, v) in samples.iter_mut().enumerate() {
+            *v += if i % 2 == 0 { 1e-6 } else { -1e-6 };
+        }
+        let drift = fit_drift(&samples, RATE, 5.0, &air());
+        assert!((drift.slope_per_s - 3.0).abs() < 1e-6, "{drift:?}");
+        assert!((drift.at(5.0 + 1.75) - (12.0 + 3.0 * 1.75)).abs() < 1e-5);
+    }
+
+    #[test]
+    fn the_standard_error_covers_the_truth_about_as_often_as_it_should() {
+        let mut inside = 0;
+        for seed in 0..200 {
+            let drift = fit_drift(&record(seed, 2.0, |_| 0.0), RATE, 0.0, &air());
+            let error = drift.at(1.75) - (12.0 + 3.0 * 1.75);
+            inside += usize::from(error.abs() < 2.0 * drift.std_at(1.75));
+        }
+        assert!((180..=200).contains(&inside), "{inside} of 200 within two sigma");
+    }
+
+    #[test]
+    fn a_bent_drift_is_seen_and_no_air_is_said() {
+        let bent = fit_drift(
+            &record(3, 0.5, |t| 300.0 * (1.0 - (-t / 2.0).exp())),
+            RATE,
+            0.0,
+            &air(),
+        );
+        assert!(bent.bend > 2.0, "{bent:?}");
+        let straight = fit_drift(&record(3, 0.5, |_| 0.0), RATE, 0.0, &air());
+        assert!(straight.bend < 0.2, "{straight:?}");
+        let none = fit_drift(&record(3, 0.5, |_| 0.0), RATE, 0.0, &Air::default());
+        assert!(!none.air_before && !none.air_after && none.at(1.0) == 0.0);
+    }
+}

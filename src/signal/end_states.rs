@@ -1,0 +1,194 @@
+//! The states at the two ends of a record: how far each reaches, and whether it is air.
+
+use std::ops::Range;
+
+use super::blocks::{Blocks, line, median, quantile};
+use super::steady_window::MIN_STATE_BLOCKS;
+
+/// A block departs when its mean leaves the local line by this many standard deviations…
+const DEPARTURE_SIGMA: f64 = 6.0;
+/// …and by this part of the channel's range (slow bends of the drift stay below it).
+const DEPARTURE_OF_RANGE: f64 = 0.02;
+/// Two states differ in kind when their distance is beyond this part of the largest distance.
+const SAME_STATE: f64 = 0.35;
+
+/// Air before and air after have the same noise, up to this ratio of energies.
+const QUIET: f64 = 1.6;
+
+/// Blocks behind a line that a departure is judged by.
+const TRAIL: usize = 12;
+/// Blocks whose mean residual shows a slow departure, such as a drill's entry.
+const AHEAD: usize = 6;
+/// A slow departure must reach this part of the channel's range.
+const SLOW_DEPARTURE_OF_RANGE: f64 = 0.05;
+
+/// What counts as a departure in one channel.
+struct Limits<'a> {
+    blocks: &'a Blocks,
+    /// Noise of block means.
+    sigma: f64,
+    range: f64,
+    /// Change of the logarithm of the fluctuation.
+    fluctuation: f64,
+}
+
+impl<'a> Limits<'a> {
+    fn new(blocks: &'a Blocks) -> Self {
+        // From neighbours; the lower quartile, since inside the cut they differ more.
+        let steps: Vec<f64> = blocks.mean.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+        Limits {
+            blocks,
+            sigma: quantile(&steps, 0.25) / (0.3186 * std::f64::consts::SQRT_2),
+            range: quantile(&blocks.mean, 0.95) - quantile(&blocks.mean, 0.05),
+            fluctuation: 0.25f64.max(DEPARTURE_SIGMA / (2.0 * blocks.samples_per_block).sqrt()),
+        }
+    }
+
+    /// Does the mean over positions `tested` leave the line through the `trail` positions, by more than chance
+    /// and more than `of_range` of the channel's range? Positions are turned into block numbers by `at`.
+    fn leaves(
+        &self,
+        at: &impl Fn(usize) -> usize,
+        trail: &[usize],
+        tested: Range<usize>,
+        of_range: f64,
+    ) -> bool {
+        let x = trail.iter().map(|&i| i as f64);
+        let (mean, slope, centre) = line(x.clone(), trail.iter().map(|&i| self.blocks.mean[at(i)]));
+        let sxx: f64 = x.map(|v| (v - centre).powi(2)).sum();
+        let n = tested.len().max(1) as f64;
+        let ahead = 0.5 * (tested.start + tested.end - 1) as f64 - centre;
+        let now = tested.map(|i| self.blocks.mean[at(i)]).sum::<f64>() / n;
+        let lever = if sxx > 0.0 { ahead * ahead / sxx } else { 0.0 };
+        let spread = (1.0 / n + 1.0 / trail.len().max(1) as f64 + lever).sqrt();
+        let limit = (DEPARTURE_SIGMA * self.sigma * spread).max(of_range * self.range);
+        (now - mean - slope * ahead).abs() > limit.max(f64::MIN_POSITIVE)
+    }
+
+    fn changes_loudness(&self, at: &impl Fn(usize) -> usize, trail: &[usize], k: usize) -> bool {
+        let std: Vec<f64> = trail.iter().map(|&i| self.blocks.std_dev[at(i)]).collect();
+        let (usual, now) = (median(&std), self.blocks.std_dev[at(k)]);
+        usual > 0.0 && (now / usual).ln().abs() > self.fluctuation
+    }
+}
+
+/// Number of blocks, counted from one end, that continue the state found at that end. Followed by a line
+/// through the latest blocks, so that a slow bend of the drift does not count; two blocks in a row must
+/// depart, so that a spike does not.
+pub(super) fn departure(blocks: &[Blocks], count: usize, from_end: bool) -> usize {
+    let at = |i: usize| if from_end { count - 1 - i } else { i };
+    let seed = MIN_STATE_BLOCKS.max(count / 50).min(count);
+    let limits: Vec<Limits> = blocks.iter().map(Limits::new).collect();
+    let mut accepted: Vec<usize> = (0..seed).collect();
+    let mut previous_departed = false;
+    for k in seed..count {
+        let trail = &accepted[accepted.len().saturating_sub(TRAIL)..];
+        let departed = limits
+            .iter()
+            .any(|l| l.leaves(&at, trail, k..k + 1, DEPARTURE_OF_RANGE) || l.changes_loudness(&at, trail, k));
+        if departed && previous_departed {
+            return k - 1;
+        }
+        previous_departed = departed;
+        if departed {
+            continue;
+        }
+        accepted.push(k);
+        // A slow departure hides in a line that follows it: look at several blocks ahead of the line.
+        let tested = (k + 1).saturating_sub(AHEAD)..k + 1;
+        let behind = accepted.partition_point(|&i| i < tested.start);
+        let trail = &accepted[behind.saturating_sub(2 * TRAIL)..behind];
+        let slow = |l: &Limits| l.leaves(&at, trail, tested.clone(), SLOW_DEPARTURE_OF_RANGE);
+        if trail.len() >= seed && limits.iter().any(slow) {
+            return tested.start;
+        }
+    }
+    count
+}
+
+/// Are the states at the start and at the end of the record air?
+pub(super) fn air_states(
+    blocks: &[Blocks],
+    count: usize,
+    start_end: usize,
+    last_start: usize,
+    entry_blocks: Option<f64>,
+) -> (bool, bool) {
+    if start_end >= count || last_start == 0 {
+        // One state from end to end: the campaign says that it is a cut.
+        return (false, false);
+    }
+    // Near its inner boundary a state is least moved by drift.
+    let near = (count / 10).max(MIN_STATE_BLOCKS);
+    let start = start_end.saturating_sub(near)..start_end;
+    let end = last_start..(last_start + near).min(count);
+    let (m_from, m_to) = (start_end.min(last_start), start_end.max(last_start));
+    let quarter = (m_to - m_from) / 4;
+    let middle = if m_to > m_from {
+        m_from + quarter..(m_to - quarter).max(m_from + quarter + 1)
+    } else {
+        start.clone()
+    };
+    let of = |r: &Range<usize>, pick: fn(&Blocks) -> &Vec<f64>| -> Vec<f64> {
+        let part = |b: &Blocks| pick(b).get(r.clone()).map_or(0.0, median);
+        blocks.iter().map(part).collect()
+    };
+
+    // Milling: tooth-passing energy first, drift does not touch it. (A drill has none, and its entry is a ramp.)
+    let energy = |r: &Range<usize>| of(r, |b| &b.std_dev);
+    let quietest: Vec<f64> = blocks
+        .iter()
+        .map(|b| quantile(&b.std_dev, 0.05).max(f64::MIN_POSITIVE))
+        .collect();
+    let loudness = |r: &Range<usize>| -> f64 {
+        let e = energy(r);
+        e.iter().zip(&quietest).map(|(s, q)| (s / q).powi(2)).sum::<f64>() / e.len().max(1) as f64
+    };
+    let (ls, lm, le) = (loudness(&start), loudness(&middle), loudness(&end));
+    let loudest = ls.max(lm).max(le);
+    let least = ls.min(lm).min(le);
+    if entry_blocks.is_none() && loudest > 2.0 * least {
+        // The passage in or out may be the loudest part: air is as quiet as the quietest, not just quieter.
+        let quiet = |l: f64| l < QUIET * least;
+        return (quiet(ls), quiet(le));
+    }
+
+    // Otherwise the level.
+    let level = |r: &Range<usize>| of(r, |b| &b.mean);
+    let scale: Vec<f64> = blocks
+        .iter()
+        .map(|b| (quantile(&b.mean, 0.95) - quantile(&b.mean, 0.05)).max(f64::MIN_POSITIVE))
+        .collect();
+    let distance = |a: &[f64], b: &[f64]| -> f64 {
+        a.iter()
+            .zip(b)
+            .zip(&scale)
+            .map(|((a, b), s)| ((a - b) / s).powi(2))
+            .sum::<f64>()
+            .sqrt()
+    };
+    let (s, m, e) = (level(&start), level(&middle), level(&end));
+    let (sm, em, se) = (distance(&s, &m), distance(&e, &m), distance(&s, &e));
+    let largest = sm.max(em).max(se);
+    if m_to - m_from >= MIN_STATE_BLOCKS {
+        if sm < SAME_STATE * largest {
+            return (false, true);
+        }
+        if em < SAME_STATE * largest {
+            return (true, false);
+        }
+        if se < sm.max(em) {
+            return (true, true);
+        }
+    }
+    // The middle lies between the two states: the passage into the cut or out of it. Where entry is known to
+    // take long, a short passage is an exit; otherwise the state nearer zero is the air.
+    let start_is_air = match entry_blocks {
+        Some(entry) if entry >= 2.0 * MIN_STATE_BLOCKS as f64 => (m_to - m_from) as f64 > 0.4 * entry,
+        _ => {
+            let zero = vec![0.0; s.len()];
+            distance(&s, &zero) < distance(&e, &zero)
+        }
+    };
+    (start_is_air, !start_is_air)
+}

@@ -1,0 +1,356 @@
+//! Where in a record the tool cuts air, enters, cuts steadily and leaves.
+//!
+//! The record is looked at in blocks of whole tool revolutions: their means show the force level, their
+//! fluctuation the tooth-passing energy. From each end, the state found there is followed until blocks stop
+//! fitting it; the states are then told apart by fluctuation (milling) or level (drilling). Inside the cut,
+//! the steady part is grown outwards from its middle until entry or exit shows.
+
+use std::ops::Range;
+
+use super::blocks::{Blocks, line, median, quantile, robust_std};
+use super::drift::Air;
+use super::end_states::{air_states, departure};
+
+/// What turns, and how the record is sampled.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spindle {
+    pub samples_per_revolution: f64,
+    pub teeth: usize,
+}
+
+/// The parts of a record, as sample ranges.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Phases {
+    pub air: Air,
+    /// First contact to last.
+    pub cutting: Range<usize>,
+    /// Full engagement, a whole number of revolutions.
+    pub steady: Range<usize>,
+}
+
+/// Too few blocks for a state to be told from noise.
+pub(super) const MIN_STATE_BLOCKS: usize = 4;
+/// More blocks than this are merged: finer ones would make a drill's slow entry too gentle to notice.
+const MAX_BLOCKS: f64 = 250.0;
+/// Finds the phases of a record from its channels (all of one length; those that carry the cutting force).
+/// `entry_samples`: travel from first contact to full engagement where geometry tells it (drilling);
+/// otherwise entry is detected. `None` where the record holds less than a few revolutions, or no steady cut.
+pub fn find_phases(channels: &[&[f64]], spindle: Spindle, entry_samples: Option<f64>) -> Option<Phases> {
+    let samples = channels.iter().map(|c| c.len()).min()?;
+    let per_block = block_length(samples, spindle)?;
+    let blocks: Vec<Blocks> = channels
+        .iter()
+        .map(|c| Blocks::new(&c[..samples], per_block))
+        .collect();
+    let count = blocks.first()?.len();
+    if count < 2 * MIN_STATE_BLOCKS {
+        return None;
+    }
+    let start_end = departure(&blocks, count, false);
+    let last_start = count - departure(&blocks, count, true);
+    let entry_blocks = entry_samples.map(|entry| entry / per_block);
+    let (before, after) = air_states(&blocks, count, start_end, last_start, entry_blocks);
+
+    // Guard blocks: the departure is noticed a little late.
+    let sample = |block: f64| ((block * per_block).round().max(0.0) as usize).min(samples);
+    let guard = 2.0;
+    let lo = if before { start_end } else { 0 };
+    let hi = if after { last_start } else { count };
+    if lo + MIN_STATE_BLOCKS > hi {
+        return None;
+    }
+    let air = Air {
+        before: before
+            .then(|| 0..sample(lo as f64 - guard))
+            .filter(|r| r.len() as f64 >= 2.0 * per_block),
+        after: after
+            .then(|| sample(hi as f64 + guard)..samples)
+            .filter(|r| r.len() as f64 >= 2.0 * per_block),
+    };
+    let cutting = sample(lo as f64)..sample(hi as f64);
+    let contact = cutting.start as f64;
+    let full = entry_samples
+        .filter(|_| before)
+        .map(|entry| {
+            // The contact may have been noticed a block early.
+            let start = contact + 1.03 * entry + guard * per_block;
+            (start / per_block).ceil() as usize
+        })
+        .filter(|&start| start + MIN_STATE_BLOCKS < hi);
+    let found = steady_blocks(&blocks, full.unwrap_or(lo)..hi);
+    let span = found.start as f64 * per_block..found.end as f64 * per_block;
+    let steady = whole_revolutions(span, spindle.samples_per_revolution, samples);
+    (!steady.is_empty()).then_some(Phases { air, cutting, steady })
+}
+
+/// The largest whole number of revolutions inside `span`, centred in it, rounded to samples. Less than one
+/// revolution gives an empty range.
+pub fn whole_revolutions(span: Range<f64>, samples_per_revolution: f64, samples: usize) -> Range<usize> {
+    let (from, to) = (span.start.max(0.0), span.end.min(samples as f64));
+    let turns = ((to - from) / samples_per_revolution + 1e-6).floor();
+    if !turns.is_finite() || turns < 1.0 {
+        return 0..0;
+    }
+    let length = (turns * samples_per_revolution).round() as usize;
+    let start = (from + 0.5 * (to - from - turns * samples_per_revolution)).round() as usize;
+    let end = (start + length).min(samples);
+    end - length.min(end)..end
+}
+
+/// One revolution, or several where there are very many, or a tooth period where there are few.
+fn block_length(samples: usize, spindle: Spindle) -> Option<f64> {
+    let turn = spindle.samples_per_revolution;
+    if !turn.is_finite() || turn < 2.0 {
+        return None;
+    }
+    let turns = samples as f64 / turn;
+    let per_block = if turns < 24.0 {
+        turn / spindle.teeth.max(1) as f64
+    } else {
+        turn * (turns / MAX_BLOCKS).ceil().max(1.0)
+    };
+    (per_block >= 2.0).then_some(per_block)
+}
+
+/// Grows the steady part from the central blocks of the cut outwards.
+fn steady_blocks(blocks: &[Blocks], cut: Range<usize>) -> Range<usize> {
+    let length = cut.len();
+    let core = cut.start + 3 * length / 10..(cut.end - 3 * length / 10).max(cut.start + 3 * length / 10 + 1);
+    struct Core<'a> {
+        blocks: &'a Blocks,
+        line: (f64, f64, f64),
+        mean_tolerance: f64,
+        std_dev: f64,
+        std_tolerance: f64,
+    }
+    let cores: Vec<Core> = blocks
+        .iter()
+        .map(|b| {
+            let (mut kept, mut fit): (Vec<usize>, _) = (core.clone().collect(), (0.0, 0.0, 0.0));
+            let mut scatter = 0.0;
+            for _ in 0..3 {
+                fit = line(kept.iter().map(|&i| i as f64), kept.iter().map(|&i| b.mean[i]));
+                let off = |i: usize| b.mean[i] - fit.0 - fit.1 * (i as f64 - fit.2);
+                let residual: Vec<f64> = core.clone().map(off).collect();
+                scatter = robust_std(&residual);
+                kept = core
+                    .clone()
+                    .filter(|&i| scatter == 0.0 || off(i).abs() <= 4.0 * scatter)
+                    .collect();
+                if kept.len() < 3 {
+                    kept = core.clone().collect();
+                }
+            }
+            let level = quantile(&b.mean, 0.98) - quantile(&b.mean, 0.02);
+            let std: Vec<f64> = core.clone().map(|i| b.std_dev[i]).collect();
+            let std_dev = median(&std);
+            Core {
+                blocks: b,
+                line: fit,
+                mean_tolerance: (5.0 * scatter).max(0.01 * level),
+                std_dev,
+                std_tolerance: (5.0 * robust_std(&std)).max(0.1 * std_dev),
+            }
+        })
+        .collect();
+    let fits = |i: usize| {
+        cores.iter().all(|l| {
+            let expected = l.line.0 + l.line.1 * (i as f64 - l.line.2);
+            (l.blocks.mean[i] - expected).abs() <= l.mean_tolerance
+                && (l.blocks.std_dev[i] - l.std_dev).abs() <= l.std_tolerance
+        })
+    };
+    // Two misfits in a row end the steady part; one more block is given up as a guard.
+    let grow = |candidates: &mut dyn Iterator<Item = usize>| -> Option<usize> {
+        let (mut last_good, mut misfits) = (None, 0);
+        for i in candidates {
+            if fits(i) {
+                (last_good, misfits) = (Some(i), 0);
+            } else {
+                misfits += 1;
+                if misfits == 2 {
+                    break;
+                }
+            }
+        }
+        last_good
+    };
+    let start = match grow(&mut (cut.start..core.start).rev()) {
+        Some(i) => (i + 1).min(core.start),
+        None => core.start,
+    };
+    let end = match grow(&mut (core.end..cut.end)) {
+        Some(i) => i.max(core.end),
+        None => core.end,
+    };
+    start..end
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use std::f64::consts::TAU;
+
+    const RATE: f64 = 2000.0;
+
+    /// What a made record looks like; times in s.
+    #[derive(Clone, Copy)]
+    struct Made {
+        air_to: f64,
+        steady: (f64, f64),
+        air_from: f64,
+        end: f64,
+        ripple: f64,
+        noise: f64,
+        drift: f64,
+    }
+
+    const MILLING: Made = Made {
+        air_to: 0.8,
+        steady: (1.1, 2.5),
+        air_from: 2.8,
+        end: 3.3,
+        ripple: 40.0,
+        noise: 4.0,
+        drift: 20.0,
+    };
+
+    fn make(m: Made, seed: u64) -> Vec<Vec<f64>> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let channel = |level: f64, rng: &mut ChaCha8Rng| {
+            (0..(m.end * RATE) as usize)
+                .map(|i| {
+                    let t = i as f64 / RATE;
+                    let engaged = if t < m.air_to || t > m.air_from {
+                        0.0
+                    } else if t < m.steady.0 {
+                        (t - m.air_to) / (m.steady.0 - m.air_to)
+                    } else if t > m.steady.1 {
+                        (m.air_from - t) / (m.air_from - m.steady.1)
+                    } else {
+                        1.0
+                    };
+                    let gauss: f64 = (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
+                    engaged * (level + m.ripple * (TAU * 80.0 * t).sin())
+                        + m.drift * t
+                        + 3.0 * (TAU * 50.0 * t).sin()
+                        + m.noise * gauss
+                })
+                .collect()
+        };
+        vec![channel(150.0, &mut rng), channel(-60.0, &mut rng)]
+    }
+
+    fn phases(data: &[Vec<f64>], entry: Option<f64>) -> Phases {
+        let channels: Vec<&[f64]> = data.iter().map(Vec::as_slice).collect();
+        let spindle = Spindle {
+            samples_per_revolution: RATE / 20.0,
+            teeth: 4,
+        };
+        find_phases(&channels, spindle, entry).unwrap()
+    }
+
+    fn seconds(r: &Range<usize>) -> (f64, f64) {
+        (r.start as f64 / RATE, r.end as f64 / RATE)
+    }
+
+    #[test]
+    fn milling_phases_are_found_under_drift_hum_and_noise() {
+        for seed in 0..20 {
+            for drift in [0.0, 20.0, -100.0] {
+                let p = phases(&make(Made { drift, ..MILLING }, seed), None);
+                let before = seconds(p.air.before.as_ref().unwrap());
+                let after = seconds(p.air.after.as_ref().unwrap());
+                let steady = seconds(&p.steady);
+                assert!(before.1 > 0.6 && before.1 <= 0.8, "seed {seed}: {before:?}");
+                assert!(after.0 >= 2.8 && after.0 < 3.0, "seed {seed}: {after:?}");
+                assert!(steady.0 >= 1.08 && steady.0 < 1.4, "seed {seed}: {steady:?}");
+                assert!(steady.1 <= 2.52 && steady.1 > 2.2, "seed {seed}: {steady:?}");
+                assert_eq!(p.steady.len() % 100, 0, "whole revolutions");
+            }
+        }
+    }
+
+    #[test]
+    fn missing_air_is_noticed_on_either_side() {
+        for seed in 0..10 {
+            let data = make(MILLING, seed);
+            let cut = |from: f64, to: f64| -> Vec<Vec<f64>> {
+                let range = (from * RATE) as usize..(to * RATE) as usize;
+                data.iter().map(|c| c[range.clone()].to_vec()).collect()
+            };
+            let no_before = phases(&cut(1.3, 3.3), None);
+            assert!(no_before.air.before.is_none() && no_before.air.after.is_some());
+            let no_after = phases(&cut(0.0, 2.3), None);
+            assert!(no_after.air.before.is_some() && no_after.air.after.is_none());
+            let neither = phases(&cut(1.3, 2.3), None);
+            assert_eq!(neither.air, Air::default());
+            assert!(neither.steady.len() >= 1500, "{neither:?}");
+        }
+    }
+
+    #[test]
+    fn drilling_without_ripple_is_found_by_level_and_entry_by_geometry() {
+        let drilling = Made {
+            ripple: 0.0,
+            noise: 1.0,
+            steady: (1.5, 2.79),
+            ..MILLING
+        };
+        for seed in 0..10 {
+            let p = phases(&make(drilling, seed), Some(0.7 * RATE));
+            let steady = seconds(&p.steady);
+            assert!(p.air.before.is_some() && p.air.after.is_some());
+            assert!(steady.0 >= 1.5 && steady.0 < 1.8, "{steady:?}");
+            assert!(steady.1 <= 2.79 && steady.1 > 2.5, "{steady:?}");
+        }
+    }
+
+    #[test]
+    fn a_record_too_short_or_without_channels_gives_nothing() {
+        let spindle = Spindle {
+            samples_per_revolution: 100.0,
+            teeth: 2,
+        };
+        assert_eq!(find_phases(&[], spindle, None), None);
+        assert_eq!(find_phases(&[&[1.0; 150]], spindle, None), None);
+        let broken = Spindle {
+            samples_per_revolution: f64::NAN,
+            teeth: 0,
+        };
+        assert_eq!(find_phases(&[&[1.0; 5000]], broken, None), None);
+    }
+
+    #[test]
+    fn whole_revolutions_are_whole_and_inside() {
+        assert_eq!(whole_revolutions(10.0..45.0, 10.0, 100), 13..43);
+        assert!(whole_revolutions(10.0..15.0, 10.0, 100).is_empty());
+        assert!(whole_revolutions(90.0..200.0, 20.0, 100).is_empty());
+        assert!(whole_revolutions(0.0..1.0, 0.0, 1).is_empty());
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn no_record_makes_it_panic_and_what_it_finds_lies_inside(
+            levels in proptest::collection::vec((-1e3..1e3f64, 1usize..400), 0..12),
+            turn in 0.0..300.0f64,
+            teeth in 0usize..7,
+            entry in proptest::option::of(-10.0..3000.0f64),
+            seed in 0u64..1000,
+        ) {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let data: Vec<f64> = levels
+                .iter()
+                .flat_map(|&(level, n)| (0..n).map(|_| level + rng.random_range(-1.0..1.0)).collect::<Vec<_>>())
+                .collect();
+            let spindle = Spindle { samples_per_revolution: turn, teeth };
+            if let Some(p) = find_phases(&[&data, &data], spindle, entry) {
+                proptest::prop_assert!(!p.steady.is_empty() && p.steady.end <= data.len());
+                proptest::prop_assert!(p.air.before.is_none_or(|r| r.end <= p.steady.start));
+                proptest::prop_assert!(p.air.after.is_none_or(|r| r.start >= p.steady.end));
+            }
+        }
+    }
+}

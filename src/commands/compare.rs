@@ -5,9 +5,10 @@ use super::{CampaignArg, Outcome};
 use crate::Result;
 use crate::analysis::StructureAnalysis;
 use crate::campaign::Campaign;
+use crate::discrepancy::FrfComparison;
 use crate::discrepancy::compare::Group;
-use crate::discrepancy::{FrfComparison, held_out_nrms};
 use crate::identify::Options;
+use crate::identify::extend::held_out;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -25,7 +26,7 @@ pub fn run(args: Args) -> Result<Outcome> {
         warnings: notes,
         ..
     } = &analysis;
-    let held_out = held_out_nrms(&case.model, &case.data, &calibration.theta)?;
+    let held_out = held_out(&case.model, &case.data, &calibration.theta, 1)?.map(|h| h.nrms());
     let mut error = json!(comparison.totals);
     error["held_out_nrms"] = json!(held_out);
     let json = json!({

@@ -11,6 +11,7 @@ mod calibrate;
 mod cfc;
 mod compare;
 mod demo;
+mod diagnose;
 mod inspect;
 mod lobes;
 mod modal;
@@ -58,6 +59,8 @@ pub enum Command {
     Calibrate(calibrate::Args),
     /// Model against measurement: where it fails.
     Compare(compare::Args),
+    /// Which physical effect the model lacks.
+    Diagnose(diagnose::Args),
     /// Stability lobes.
     Lobes(lobes::Args),
     /// HTML and PNG report of a campaign.
@@ -83,6 +86,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Model(args) => model::run(args),
         Command::Calibrate(args) => calibrate::run(args),
         Command::Compare(args) => compare::run(args),
+        Command::Diagnose(args) => diagnose::run(args),
         Command::Lobes(args) => lobes::run(args),
         Command::Report(args) => report::run(args),
         Command::Thesis(args) => thesis::run(args),

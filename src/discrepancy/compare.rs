@@ -1,14 +1,10 @@
 //! Model against measured FRFs: totals, and by posture, direction, point and band.
 
 use num_complex::Complex64;
-use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::Result;
 use crate::campaign::Point;
-use crate::identify::calibrate::refine;
-use crate::identify::{FrfData, StructureModel};
-use crate::progress::Progress;
+use crate::identify::FrfData;
 
 /// Error over everything compared.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -233,38 +229,6 @@ fn error_map(
             .map(|p| p.iter().map(|d| d.iter().map(nrms).collect()).collect())
             .collect(),
     }
-}
-
-/// nrms on postures that were left out of the fit, one posture at a time, each fit started from `theta`.
-/// `None` with fewer than two measured postures.
-pub fn held_out_nrms(model: &StructureModel, data: &FrfData, theta: &[f64]) -> Result<Option<f64>> {
-    let postures = data.measured_postures();
-    if postures.len() < 2 {
-        return Ok(None);
-    }
-    let progress = Progress::new("held-out fits", postures.len());
-    let sums: Vec<Sums> = postures
-        .par_iter()
-        .map(|&left_out| {
-            let fit = refine(model, &data.filtered(|p| p != left_out), theta)?;
-            let rest = data.filtered(|p| p == left_out);
-            let predicted = model.predict(&fit.theta, &rest)?;
-            let mut sums = Sums::default();
-            for ((_, frf), model) in rest.frfs().zip(&predicted) {
-                for (h, m) in frf.receptance.iter().zip(model) {
-                    sums.error += (m - h).norm_sqr();
-                    sums.signal += h.norm_sqr();
-                }
-            }
-            progress.step();
-            Ok(sums)
-        })
-        .collect::<Result<_>>()?;
-    let mut total = Sums::default();
-    for s in sums {
-        total.add(s);
-    }
-    Ok(Some(total.nrms()))
 }
 
 #[cfg(test)]

@@ -1,5 +1,8 @@
-//! Where the model fails: comparison of model and measurement.
+//! Where the model fails, and which physical effect it lacks.
 
 pub mod compare;
+pub mod diagnose;
+pub mod next_measurement;
 
-pub use compare::{Band, FrfComparison, held_out_nrms};
+pub use compare::{Band, FrfComparison};
+pub use diagnose::{Candidate, Diagnosis, Verdict, diagnose};

@@ -1,6 +1,7 @@
 //! Tunes the structural model to measured FRFs: maximum a posteriori, staged so that no peak is trapped beside the
 //! one it belongs to, repeated from other starting points where the fit is not as good as the noise allows.
 
+use nalgebra::DMatrix;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -49,7 +50,7 @@ pub struct Calibration {
     /// On the solver's scale.
     pub theta: Vec<f64>,
     /// Covariance on the solver's scale, scaled up where the misfit exceeds the noise.
-    pub covariance: nalgebra::DMatrix<f64>,
+    pub covariance: DMatrix<f64>,
     /// Weighted misfit per real residual: 1 where only noise is left.
     pub reduced_chi2: f64,
     pub iterations: usize,
@@ -176,28 +177,8 @@ pub fn calibrate(model: &StructureModel, data: &FrfData, options: Options) -> Re
     }
 
     let reduced_chi2 = chi2(&best);
-    let covariance = best
-        .hessian
-        .clone()
-        .cholesky()
-        .ok_or_else(|| {
-            Error::computation("the data do not determine the parameters (singular information matrix)")
-        })?
-        .inverse()
-        * reduced_chi2.max(1.0);
-    let parameters = model
-        .parameters
-        .iter()
-        .enumerate()
-        .map(|(i, p)| Estimate {
-            name: p.name.clone(),
-            value: p.natural(best.theta[i]),
-            unit: p.unit,
-            std_error: p.natural_std(best.theta[i], covariance[(i, i)].sqrt()),
-            initial: p.nominal,
-            at_bound: best.at_bound.contains(&i),
-        })
-        .collect();
+    let covariance = covariance(&best, reduced_chi2)?;
+    let parameters = estimates(model, &best, reduced_chi2)?;
     Ok(Calibration {
         parameters,
         theta: best.theta,
@@ -208,6 +189,41 @@ pub fn calibrate(model: &StructureModel, data: &FrfData, options: Options) -> Re
         starts,
         starts_agreeing: agreeing,
     })
+}
+
+/// Covariance on the solver's scale, widened where the misfit exceeds the noise.
+fn covariance(fit: &Fit, reduced_chi2: f64) -> Result<DMatrix<f64>> {
+    // Solved on unit diagonal: the parameters' information differs by many orders of magnitude.
+    let n = fit.hessian.nrows();
+    let scale: Vec<f64> = (0..n).map(|i| fit.hessian[(i, i)].sqrt()).collect();
+    let scaled = DMatrix::from_fn(n, n, |i, j| fit.hessian[(i, j)] / (scale[i] * scale[j]));
+    let inverse = scaled
+        .cholesky()
+        .ok_or_else(|| {
+            Error::computation("the data do not determine the parameters (singular information matrix)")
+        })?
+        .inverse();
+    Ok(DMatrix::from_fn(n, n, |i, j| {
+        inverse[(i, j)] / (scale[i] * scale[j]) * reduced_chi2.max(1.0)
+    }))
+}
+
+/// The fitted parameters in natural units with standard errors.
+pub fn estimates(model: &StructureModel, fit: &Fit, reduced_chi2: f64) -> Result<Vec<Estimate>> {
+    let covariance = covariance(fit, reduced_chi2)?;
+    Ok(model
+        .parameters
+        .iter()
+        .enumerate()
+        .map(|(i, p)| Estimate {
+            name: p.name.clone(),
+            value: p.natural(fit.theta[i]),
+            unit: p.unit,
+            std_error: p.natural_std(fit.theta[i], covariance[(i, i)].sqrt()),
+            initial: p.nominal,
+            at_bound: fit.at_bound.contains(&i),
+        })
+        .collect())
 }
 
 /// Draws from the priors, twice as wide, within the bounds.

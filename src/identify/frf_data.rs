@@ -1,5 +1,7 @@
 //! Measured FRFs arranged for fitting: grouped by what the model has to be set up for once.
 
+use std::sync::Arc;
+
 use num_complex::Complex64;
 use rayon::prelude::*;
 
@@ -48,7 +50,7 @@ pub struct FrfBlock {
 /// All FRFs of a campaign.
 #[derive(Debug, Clone)]
 pub struct FrfData {
-    pub blocks: Vec<FrfBlock>,
+    pub blocks: Vec<Arc<FrfBlock>>,
     pub posture_ids: Vec<String>,
 }
 
@@ -117,13 +119,13 @@ impl FrfData {
         set_lowness(&mut blocks);
         blocks.par_iter_mut().for_each(estimate_noise);
         let posture_ids = campaign.postures.iter().map(|p| p.id.clone()).collect();
+        let blocks = blocks.into_iter().map(Arc::new).collect();
         Ok(FrfData { blocks, posture_ids })
     }
 
     pub fn frfs(&self) -> impl Iterator<Item = (&FrfBlock, &FrfDatum)> {
-        self.blocks
-            .iter()
-            .flat_map(|b| b.frfs.iter().map(move |f| (b, f)))
+        let blocks = self.blocks.iter().map(Arc::as_ref);
+        blocks.flat_map(|b: &FrfBlock| b.frfs.iter().map(move |f| (b, f)))
     }
 
     /// Postures that have FRFs, in campaign order.

@@ -2,6 +2,7 @@
 
 pub mod calibrate;
 pub mod case;
+pub mod extend;
 pub mod frf_data;
 pub mod levenberg_marquardt;
 pub mod modal_table;

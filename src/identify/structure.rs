@@ -561,6 +561,7 @@ mod tests {
                     frfs,
                 }
             })
+            .map(std::sync::Arc::new)
             .collect();
         FrfData {
             blocks,

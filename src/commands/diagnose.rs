@@ -1,0 +1,147 @@
+use serde_json::{Map, Value, json};
+
+use super::text::{number, percent, table, warnings};
+use super::{CampaignArg, Outcome};
+use crate::Result;
+use crate::campaign::Campaign;
+use crate::discrepancy::{Candidate, Diagnosis, Verdict, diagnose};
+use crate::effects::Instance;
+use crate::identify::{Options, StructureCase};
+
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    campaign: CampaignArg,
+}
+
+pub fn run(args: Args) -> Result<Outcome> {
+    let campaign = Campaign::load(&args.campaign.dir)?;
+    let case = StructureCase::load(&campaign)?;
+    let diagnosis = diagnose(&case.model, &case.data, Options::default())?;
+    let json = json!({
+        "domain": "structure",
+        "verdict": diagnosis.verdict,
+        "effect": diagnosis.effect.map(|i| i.effect.id()),
+        "site": diagnosis.effect.and_then(|i| i.site.label()),
+        "confidence": diagnosis.confidence,
+        "companion": diagnosis.companion,
+        "candidates": diagnosis.candidates.iter().map(candidate).collect::<Vec<_>>(),
+        "indistinguishable": diagnosis.indistinguishable,
+        "next_measurement": diagnosis.next_measurement,
+        "baseline": {
+            "nrms": diagnosis.baseline.nrms,
+            "held_out_nrms": diagnosis.baseline.held_out.map(|h| h.nrms()),
+            "noise_floor_nrms": diagnosis.baseline.noise_floor_nrms,
+            "reduced_chi2": diagnosis.baseline.reduced_chi2,
+        },
+        "not_tried": diagnosis.not_tried.iter().map(|(e, why)| json!({ "effect": e, "why": why })).collect::<Vec<_>>(),
+        "warnings": case.warnings,
+    });
+    let text = describe(&campaign, &diagnosis) + &warnings(&case.warnings);
+    Ok(Outcome { json, text })
+}
+
+/// The effect's own parameters by the keys of the contract; `name[0]`, `name[1]`, … become one list.
+fn parameters(candidate: &Candidate) -> Value {
+    let mut map = Map::new();
+    for p in &candidate.parameters {
+        let key = p.name.rsplit('.').next().unwrap_or(&p.name);
+        match key.split_once('[') {
+            Some((list, _)) => {
+                let entry = map.entry(list.to_string()).or_insert_with(|| json!([]));
+                if let Some(values) = entry.as_array_mut() {
+                    values.push(json!(p.value));
+                }
+            }
+            None => {
+                map.insert(key.to_string(), json!(p.value));
+            }
+        }
+    }
+    let Instance { effect, variant, .. } = candidate.instance;
+    if let Some((key, value)) = effect.variant_label(variant) {
+        map.insert(key.to_string(), json!(value));
+    }
+    map.into()
+}
+
+fn candidate(c: &Candidate) -> Value {
+    json!({
+        "effect": c.instance.effect.id(),
+        "site": c.instance.site.label(),
+        "nrms": c.nrms,
+        "held_out_nrms": c.held_out.map(|h| h.nrms()),
+        "delta_bic": c.delta_bic,
+        "p_value": c.p_value,
+        "reduced_chi2": c.reduced_chi2,
+        "at_bound": c.at_bound,
+        "parameters": parameters(c),
+        "parameter_std_errors": c.parameters.iter().map(|p| json!({ "name": p.name, "value": p.value, "std_error": p.std_error, "unit": p.unit })).collect::<Vec<_>>(),
+    })
+}
+
+/// Candidates shown to a person; all are in the JSON.
+const SHOWN: usize = 8;
+
+fn describe(campaign: &Campaign, d: &Diagnosis) -> String {
+    let mut text = format!(
+        "model as it stands: error (nrms) {}, noise floor {}, {:.2} times the noise variance\n\n",
+        percent(d.baseline.nrms),
+        percent(d.baseline.noise_floor_nrms),
+        d.baseline.reduced_chi2,
+    );
+    let sure = format!("confidence {:.0} %", 100.0 * d.confidence);
+    text += &match (d.verdict, d.effect) {
+        (Verdict::Effect, Some(instance)) => format!(
+            "MISSING: {} ({sure})\n  {}\n  How it shows: {}\n",
+            instance.label(),
+            instance.effect.explanation(),
+            instance.effect.fingerprint()
+        ),
+        (Verdict::None, _) => format!("NOTHING is missing: what is left looks like noise ({sure})\n"),
+        _ => format!("UNKNOWN: what is left is real, but no effect of the library explains it ({sure})\n"),
+    };
+    if let Some(companion) = &d.companion {
+        text += &format!("  A second effect is likely besides: {companion}\n");
+    }
+    if !d.indistinguishable.is_empty() {
+        text += &format!(
+            "  This data cannot tell it from: {}\n",
+            d.indistinguishable.join(", ")
+        );
+    }
+    let rows: Vec<Vec<String>> = d
+        .candidates
+        .iter()
+        .take(SHOWN)
+        .map(|c| {
+            vec![
+                c.instance.label(),
+                percent(c.nrms),
+                c.held_out.map_or("–".into(), |h| percent(h.nrms())),
+                number(c.delta_bic, 4),
+                if c.p_value < 1e-12 {
+                    "< 1e-12".into()
+                } else {
+                    number(c.p_value, 2)
+                },
+                number(c.reduced_chi2, 3),
+                if c.at_bound { "at the end of its range" } else { "" }.into(),
+            ]
+        })
+        .collect();
+    let header = ["candidate", "nrms", "held out", "ΔBIC", "p", "χ²/dof", ""];
+    text += &format!(
+        "\n{}\nNext measurement: {}\n",
+        table(&header, &rows),
+        d.next_measurement
+    );
+    if let Some(instance) = d.effect {
+        text += &format!(
+            "Next: lobestone add {} {}\n",
+            campaign.dir.display(),
+            instance.label()
+        );
+    }
+    text
+}

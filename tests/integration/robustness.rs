@@ -225,7 +225,7 @@ fn spoil(file: &Path, how: &str) {
             std::fs::write(file, junk).unwrap();
         }
         "prose" => std::fs::write(file, "Dear all, the data follow.\n").unwrap(),
-        _ => std::fs::write(file, "frequency_hz,re(1X/1X),im(1X/1X)\n3,nan,inf\n4,1,2\n").unwrap(),
+        _ => std::fs::write(file, "frequency_hz,re(1X/1X),im(1X/1X)\n3,nan,inf\n4,nan,2\n").unwrap(),
     }
 }
 

@@ -4,6 +4,8 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use crate::campaign::{Campaign, FrfSet, MeasuredDof};
+use crate::effects::DataSummary;
+use crate::ingest::Axis;
 use crate::robot::Kinematics;
 use crate::robot::RobotModel;
 use crate::signal::frf_noise;
@@ -16,9 +18,12 @@ pub struct FrfDatum {
     pub posture: usize,
     pub response: MeasuredDof,
     pub reference: MeasuredDof,
-    /// Index into the block's outputs.
-    pub out: usize,
+    /// Indices into the block's outputs of the response point's x, y and z.
+    pub response_outputs: [usize; 3],
+    /// Index into the block's outputs of the reference.
     pub input: usize,
+    /// −1 where one of response and reference is along a negative axis.
+    pub sign: f64,
     /// m/N, on the block's lines.
     pub receptance: Vec<Complex64>,
     /// Standard deviation of the complex value on each line, m/N, greater than zero.
@@ -30,10 +35,13 @@ pub struct FrfDatum {
 pub struct FrfBlock {
     pub posture: usize,
     pub force_level_n: Option<f64>,
+    /// 0 at the highest force level of the campaign, 1 at the lowest, logarithmic between.
+    pub lowness: f64,
     pub kinematics: Kinematics,
     pub frequency_hz: Vec<f64>,
-    /// Degrees of freedom that occur as response or reference.
-    pub outputs: Vec<MeasuredDof>,
+    /// Point (index into the campaign's points) and axis of what the model has to give: the references, and all three
+    /// axes of every response point (a turned sensor mixes them).
+    pub outputs: Vec<(usize, Axis)>,
     pub frfs: Vec<FrfDatum>,
 }
 
@@ -70,6 +78,7 @@ impl FrfData {
                     blocks.push(FrfBlock {
                         posture: frf.posture,
                         force_level_n: frf.force_level_n,
+                        lowness: 0.0,
                         kinematics,
                         frequency_hz: frf.frequency_hz.clone(),
                         outputs: Vec::new(),
@@ -79,25 +88,33 @@ impl FrfData {
                     &mut blocks[last]
                 }
             };
-            let mut index = |dof: MeasuredDof| match block.outputs.iter().position(|o| *o == dof) {
-                Some(i) => i,
-                None => {
-                    block.outputs.push(dof);
+            let mut index = |point: usize, axis: Axis| {
+                let known = block.outputs.iter().position(|o| *o == (point, axis));
+                known.unwrap_or_else(|| {
+                    block.outputs.push((point, axis));
                     block.outputs.len() - 1
-                }
+                })
             };
-            let (out, input) = (index(frf.response), index(frf.reference));
+            let response_outputs = Axis::ALL.map(|axis| index(frf.response.point, axis));
+            let input = index(frf.reference.point, frf.reference.axis);
+            let sign = if frf.response.negative == frf.reference.negative {
+                1.0
+            } else {
+                -1.0
+            };
             block.frfs.push(FrfDatum {
                 name: frf.name,
                 posture: frf.posture,
                 response: frf.response,
                 reference: frf.reference,
-                out,
+                response_outputs,
                 input,
+                sign,
                 noise_std: Vec::new(),
                 receptance: frf.receptance_m_per_n,
             });
         }
+        set_lowness(&mut blocks);
         blocks.par_iter_mut().for_each(estimate_noise);
         let posture_ids = campaign.postures.iter().map(|p| p.id.clone()).collect();
         Ok(FrfData { blocks, posture_ids })
@@ -125,6 +142,20 @@ impl FrfData {
         }
     }
 
+    /// What effects need to know of the data.
+    pub fn summary(&self) -> DataSummary {
+        let lines = || self.blocks.iter().flat_map(|b| b.frequency_hz.iter().copied());
+        let mut levels: Vec<f64> = self.blocks.iter().map(|b| b.lowness).collect();
+        levels.sort_by(f64::total_cmp);
+        levels.dedup();
+        DataSummary {
+            force_levels: levels.len(),
+            postures: self.measured_postures().len(),
+            lowest_hz: lines().fold(f64::INFINITY, f64::min),
+            highest_hz: lines().fold(0.0, f64::max),
+        }
+    }
+
     /// Number of complex values.
     pub fn value_count(&self) -> usize {
         self.frfs().map(|(_, f)| f.receptance.len()).sum()
@@ -141,6 +172,20 @@ impl FrfData {
             (noise / signal).sqrt()
         } else {
             0.0
+        }
+    }
+}
+
+fn set_lowness(blocks: &mut [FrfBlock]) {
+    let levels = || blocks.iter().filter_map(|b| b.force_level_n);
+    let (low, high) = (
+        levels().fold(f64::INFINITY, f64::min),
+        levels().fold(0.0, f64::max),
+    );
+    if high > low && low > 0.0 {
+        for block in blocks.iter_mut() {
+            let level = block.force_level_n.unwrap_or(high);
+            block.lowness = (high / level).ln() / (high / low).ln();
         }
     }
 }

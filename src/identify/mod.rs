@@ -5,12 +5,11 @@ pub mod case;
 pub mod frf_data;
 pub mod levenberg_marquardt;
 pub mod modal_table;
-pub mod parameters;
 pub mod structure;
 
+pub use crate::parameter::{Parameter, Prior, Scale};
 pub use calibrate::{Calibration, Estimate, Options};
 pub use case::StructureCase;
 pub use frf_data::FrfData;
 pub use levenberg_marquardt::{Fit, LeastSquares, Linearisation, minimise};
-pub use parameters::{Parameter, Prior, Scale};
 pub use structure::StructureModel;

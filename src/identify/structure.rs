@@ -1,26 +1,39 @@
 //! The structural model as a function of its parameters, and its misfit to measured FRFs.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::frf_data::{FrfBlock, FrfData};
+use super::frf_data::{FrfBlock, FrfData, FrfDatum};
 use super::levenberg_marquardt::{LeastSquares, Linearisation};
-use super::parameters::{Parameter, Prior, Scale};
 use crate::Result;
 use crate::campaign::{Point, RobotSection};
+use crate::effects::{ChannelFilter, DataSummary, Instance, Setting};
+use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::frf::Response;
 use crate::robot::model::NOMINAL_DAMPING_RATIO;
-use crate::robot::{Baseline, Dual, FrfBasis, RobotModel};
+use crate::robot::{Baseline, Chain, Dual, FrfBasis, Kinematics, RobotModel};
 
 /// Robot, measurement points and the list of what may be tuned.
 #[derive(Debug, Clone)]
 pub struct StructureModel {
     pub robot: RobotModel,
     pub points: Vec<Point>,
+    /// Those of the baseline, then those of each added effect.
     pub parameters: Vec<Parameter>,
     /// Whether link masses are among the parameters (after the joints and the damping ratio).
     tunes_masses: bool,
+    /// In the order in which they were added.
+    effects: Vec<AddedEffect>,
+}
+
+/// An effect in the model and where its parameters stand in the list.
+#[derive(Debug, Clone)]
+pub struct AddedEffect {
+    pub instance: Instance,
+    pub parameters: Range<usize>,
 }
 
 /// Standard deviation of the logarithm of the damping ratio about its nominal 3 %: robots show 1–6 %.
@@ -76,7 +89,27 @@ impl StructureModel {
             points,
             parameters,
             tunes_masses: section.mass_tolerance.is_some(),
+            effects: Vec::new(),
         }
+    }
+
+    /// The same model with one more effect; its parameters come last.
+    pub fn with_effect(&self, instance: Instance, data: &DataSummary) -> Self {
+        let mut model = self.clone();
+        let first = model.parameters.len();
+        for mut parameter in instance.effect.parameters(&self.robot.spec, data) {
+            parameter.name = format!("{}.{}", instance.label(), parameter.name);
+            model.parameters.push(parameter);
+        }
+        model.effects.push(AddedEffect {
+            instance,
+            parameters: first..model.parameters.len(),
+        });
+        model
+    }
+
+    pub fn effects(&self) -> &[AddedEffect] {
+        &self.effects
     }
 
     /// Nominal values on the solver's scale.
@@ -88,20 +121,22 @@ impl StructureModel {
         self.parameters.iter().map(Parameter::internal_bounds).collect()
     }
 
-    /// The model's quantities at `theta` (solver's scale), with derivatives if asked for.
+    /// Parameter `i` in natural units as a variable of the solver's scale.
+    fn value(&self, theta: &[f64], i: usize, with_derivatives: bool) -> Dual {
+        let natural = self.parameters[i].natural(theta[i]);
+        if !with_derivatives {
+            return Dual::constant(natural);
+        }
+        let variable = Dual::variable(theta[i], i, theta.len());
+        match self.parameters[i].scale {
+            Scale::Logarithmic => variable.chain(natural, natural),
+            Scale::Linear => variable,
+        }
+    }
+
+    /// The baseline's quantities at `theta` (solver's scale), with derivatives if asked for.
     pub fn baseline(&self, theta: &[f64], with_derivatives: bool) -> Baseline {
-        let count = theta.len();
-        let value = |i: usize| {
-            let natural = self.parameters[i].natural(theta[i]);
-            if !with_derivatives {
-                return Dual::constant(natural);
-            }
-            let variable = Dual::variable(theta[i], i, count);
-            match self.parameters[i].scale {
-                Scale::Logarithmic => variable.chain(natural, natural),
-                Scale::Linear => variable,
-            }
-        };
+        let value = |i: usize| self.value(theta, i, with_derivatives);
         let joints = self.robot.joint_count();
         let links = &self.robot.spec.links;
         let mass_scale = links.iter().enumerate().map(|(i, link)| {
@@ -119,16 +154,62 @@ impl StructureModel {
         }
     }
 
+    /// The chain at a posture with all effects. `lowness`: see [`Setting`].
+    pub fn chain(
+        &self,
+        theta: &[f64],
+        kinematics: &Kinematics,
+        lowness: f64,
+        with_derivatives: bool,
+    ) -> Chain {
+        let mut chain = self
+            .robot
+            .chain(kinematics, &self.baseline(theta, with_derivatives));
+        let setting = Setting {
+            robot: &self.robot,
+            kinematics,
+            lowness,
+        };
+        let mut order: Vec<&AddedEffect> = self.effects.iter().collect();
+        order.sort_by_key(|added| added.instance.effect.order());
+        for added in order {
+            let values = self.values(theta, added, with_derivatives);
+            let Instance {
+                effect,
+                site,
+                variant,
+            } = added.instance;
+            effect.apply(site, variant, &values, &setting, &mut chain);
+        }
+        chain
+    }
+
+    fn values(&self, theta: &[f64], added: &AddedEffect, with_derivatives: bool) -> Vec<Dual> {
+        added
+            .parameters
+            .clone()
+            .map(|i| self.value(theta, i, with_derivatives))
+            .collect()
+    }
+
+    fn filter(&self, theta: &[f64], with_derivatives: bool) -> ChannelFilter {
+        let mut filter = ChannelFilter::faithful();
+        for added in &self.effects {
+            let values = self.values(theta, added, with_derivatives);
+            added.instance.effect.filter(&values, &mut filter);
+        }
+        filter
+    }
+
     fn basis(&self, theta: &[f64], block: &FrfBlock, with_derivatives: bool) -> Result<FrfBasis> {
-        let baseline = self.baseline(theta, with_derivatives);
-        let chain = self.robot.chain(&block.kinematics, &baseline);
+        let chain = self.chain(theta, &block.kinematics, block.lowness, with_derivatives);
         let rows: Vec<DVector<f64>> = block
             .outputs
             .iter()
-            .map(|dof| {
-                let point = &self.points[dof.point];
+            .map(|(point, axis)| {
+                let point = &self.points[*point];
                 self.robot
-                    .output_row(&chain, &block.kinematics, point, dof.axis, dof.negative)
+                    .output_row(&chain, &block.kinematics, point, *axis, false)
             })
             .collect();
         let count = if with_derivatives { theta.len() } else { 0 };
@@ -137,23 +218,95 @@ impl StructureModel {
 
     /// Predicted receptances, m/N, in the order of `data.frfs()`.
     pub fn predict(&self, theta: &[f64], data: &FrfData) -> Result<Vec<Vec<Complex64>>> {
+        let filter = self.filter(theta, false);
         let per_block: Vec<Vec<Vec<Complex64>>> = data
             .blocks
             .par_iter()
             .map(|block| {
                 let basis = self.basis(theta, block, false)?;
+                let channels = Channels::new(&filter);
                 let mut response = Response::default();
                 let mut columns = vec![Vec::with_capacity(block.frequency_hz.len()); block.frfs.len()];
                 for f in &block.frequency_hz {
-                    basis.solve(std::f64::consts::TAU * f, &mut response)?;
+                    let omega = std::f64::consts::TAU * f;
+                    basis.solve(omega, &mut response)?;
                     for (frf, column) in block.frfs.iter().zip(&mut columns) {
-                        column.push(basis.receptance(&response, frf.out, frf.input));
+                        column.push(channels.measured(omega, frf, &basis, &response));
                     }
                 }
                 Ok(columns)
             })
             .collect::<Result<_>>()?;
         Ok(per_block.into_iter().flatten().collect())
+    }
+}
+
+/// The channel filter arranged for evaluation: per measured axis the true axes that it is made of.
+struct Channels {
+    terms: [Vec<(usize, Dual)>; 3],
+    delay_s: Dual,
+}
+
+impl Channels {
+    fn new(filter: &ChannelFilter) -> Self {
+        let matters = |d: &Dual| d.value != 0.0 || d.gradient.iter().any(|g| *g != 0.0);
+        let terms = [0, 1, 2].map(|i| {
+            let row = filter.mixing[i].iter().enumerate();
+            row.filter(|(_, d)| matters(d))
+                .map(|(j, d)| (j, d.clone()))
+                .collect()
+        });
+        Channels {
+            terms,
+            delay_s: filter.delay_s.clone(),
+        }
+    }
+
+    /// e^{−iωτ} with the sign of the FRF's axes.
+    fn factor(&self, omega: f64, frf: &FrfDatum) -> Complex64 {
+        Complex64::from_polar(frf.sign, -omega * self.delay_s.value)
+    }
+
+    /// What the file shows at `omega`, m/N.
+    fn measured(&self, omega: f64, frf: &FrfDatum, basis: &FrfBasis, response: &Response) -> Complex64 {
+        let terms = &self.terms[frf.response.axis.index()];
+        let sum: Complex64 = terms
+            .iter()
+            .map(|(j, weight)| basis.receptance(response, frf.response_outputs[*j], frf.input) * weight.value)
+            .sum();
+        self.factor(omega, frf) * sum
+    }
+
+    /// Derivatives of [`Self::measured`] (given as `measured`) into `slope`, one a parameter. `slopes`: those of the true
+    /// receptances for this FRF's input, parameters × outputs.
+    fn slopes(
+        &self,
+        omega: f64,
+        frf: &FrfDatum,
+        measured: Complex64,
+        (basis, response): (&FrfBasis, &Response),
+        true_slope: impl Fn(usize, usize) -> Complex64,
+        slope: &mut [Complex64],
+    ) {
+        let terms = &self.terms[frf.response.axis.index()];
+        let factor = self.factor(omega, frf);
+        for (p, s) in slope.iter_mut().enumerate() {
+            *s = terms
+                .iter()
+                .map(|(j, weight)| true_slope(p, frf.response_outputs[*j]) * weight.value)
+                .sum::<Complex64>()
+                * factor;
+            let late = self.delay_s.derivative(p);
+            if late != 0.0 {
+                *s -= Complex64::new(0.0, omega * late) * measured;
+            }
+        }
+        for (j, weight) in terms.iter().filter(|(_, w)| !w.gradient.is_empty()) {
+            let h = basis.receptance(response, frf.response_outputs[*j], frf.input) * factor;
+            for (s, g) in slope.iter_mut().zip(&weight.gradient) {
+                *s += h * *g;
+            }
+        }
     }
 }
 
@@ -225,6 +378,7 @@ impl FrfProblem<'_> {
             .par_iter()
             .map(|block| self.model.basis(theta, block, with_derivatives))
             .collect::<Result<_>>()?;
+        let channels = Channels::new(&self.model.filter(theta, with_derivatives));
         let tasks: Vec<(usize, usize)> = self
             .data
             .blocks
@@ -237,7 +391,7 @@ impl FrfProblem<'_> {
             .collect();
         let parts: Vec<Partial> = tasks
             .par_iter()
-            .map(|&(b, chunk)| self.chunk(&bases[b], &self.data.blocks[b], chunk, count))
+            .map(|&(b, chunk)| self.chunk(&bases[b], &channels, &self.data.blocks[b], chunk, count))
             .collect::<Result<_>>()?;
         let mut total = Partial::zero(count);
         for part in &parts {
@@ -257,7 +411,14 @@ impl FrfProblem<'_> {
         Ok(total)
     }
 
-    fn chunk(&self, basis: &FrfBasis, block: &FrfBlock, chunk: usize, count: usize) -> Result<Partial> {
+    fn chunk(
+        &self,
+        basis: &FrfBasis,
+        channels: &Channels,
+        block: &FrfBlock,
+        chunk: usize,
+        count: usize,
+    ) -> Result<Partial> {
         let mut partial = Partial::zero(count);
         let mut response = Response::default();
         let outputs = basis.output_count();
@@ -270,7 +431,8 @@ impl FrfProblem<'_> {
         let mut real = vec![0.0; count];
         let lines = (chunk * CHUNK..(chunk + 1) * CHUNK).map(|k| k * self.stride);
         for line in lines.take_while(|l| *l < block.frequency_hz.len()) {
-            basis.solve(std::f64::consts::TAU * block.frequency_hz[line], &mut response)?;
+            let omega = std::f64::consts::TAU * block.frequency_hz[line];
+            basis.solve(omega, &mut response)?;
             for p in 0..count {
                 for (i, input) in inputs.iter().enumerate() {
                     let start = (p * inputs.len() + i) * outputs;
@@ -278,14 +440,13 @@ impl FrfProblem<'_> {
                 }
             }
             for frf in &block.frfs {
-                let model = basis.receptance(&response, frf.out, frf.input);
+                let model = channels.measured(omega, frf, basis, &response);
                 let measured = frf.receptance[line];
                 let std = frf.noise_std[line];
                 if count > 0 {
                     let i = inputs.iter().position(|x| *x == frf.input).unwrap_or(0);
-                    for (p, s) in slope.iter_mut().enumerate() {
-                        *s = slopes[(p * inputs.len() + i) * outputs + frf.out];
-                    }
+                    let true_slope = |p: usize, out: usize| slopes[(p * inputs.len() + i) * outputs + out];
+                    channels.slopes(omega, frf, model, (basis, &response), true_slope, &mut slope);
                 }
                 match self.misfit {
                     Misfit::Complex => {
@@ -334,5 +495,123 @@ impl LeastSquares for FrfProblem<'_> {
             gradient,
             hessian,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::campaign::{AxesRef, BodyRef, MeasuredDof};
+    use crate::effects;
+    use crate::ingest::Axis;
+    use crate::robot::fixture::{TAP_POSTURES, irb6640};
+
+    fn model() -> StructureModel {
+        let section = RobotSection {
+            model: "irb6640".into(),
+            mass_tolerance: Some(0.05),
+            stiffness_tolerance: 0.3,
+        };
+        let point = |node, body| Point {
+            node,
+            body,
+            position_m: [0.0; 3],
+            axes: AxesRef::Base,
+        };
+        let points = vec![point(1, BodyRef::Tool), point(2, BodyRef::Link(3))];
+        StructureModel::new(RobotModel::new(irb6640()), points, &section)
+    }
+
+    /// Two postures at two levels; a few lines; noise of 1 % of the magnitude.
+    fn data(model: &StructureModel) -> FrfData {
+        let blocks = TAP_POSTURES[..2]
+            .iter()
+            .enumerate()
+            .map(|(posture, q)| {
+                let outputs: Vec<(usize, Axis)> = [0, 1]
+                    .into_iter()
+                    .flat_map(|p| Axis::ALL.map(|a| (p, a)))
+                    .collect();
+                let dof = |point, axis| MeasuredDof {
+                    point,
+                    axis,
+                    negative: false,
+                };
+                let frfs = [(0, Axis::X, 0), (0, Axis::Y, 1), (1, Axis::Z, 1)]
+                    .into_iter()
+                    .map(|(point, axis, input)| FrfDatum {
+                        name: String::new(),
+                        posture,
+                        response: dof(point, axis),
+                        reference: dof(0, Axis::ALL[input]),
+                        response_outputs: [3 * point, 3 * point + 1, 3 * point + 2],
+                        input,
+                        sign: if point == 1 { -1.0 } else { 1.0 },
+                        receptance: vec![Complex64::new(1e-6, -2e-6); 5],
+                        noise_std: vec![1e-8; 5],
+                    })
+                    .collect();
+                FrfBlock {
+                    posture,
+                    force_level_n: None,
+                    lowness: posture as f64,
+                    kinematics: model.robot.kinematics(q).unwrap(),
+                    frequency_hz: vec![6.0, 9.0, 14.0, 22.0, 47.0],
+                    outputs,
+                    frfs,
+                }
+            })
+            .collect();
+        FrfData {
+            blocks,
+            posture_ids: vec!["a".into(), "b".into()],
+        }
+    }
+
+    /// Every effect's derivatives, and those of the baseline beside it, against central differences of the cost.
+    #[test]
+    fn gradients_of_all_effects_agree_with_differences() {
+        let bare = model();
+        let data = data(&bare);
+        let summary = data.summary();
+        let resonator = effects::find(&bare.robot.spec, "local-resonator@link-3");
+        for instance in effects::instances(&bare.robot.spec) {
+            for also in [None, resonator.first()] {
+                let mut model = bare.with_effect(instance, &summary);
+                if let Some(also) = also {
+                    model = model.with_effect(*also, &summary);
+                }
+                let mut theta = model.nominal_theta();
+                for (i, t) in theta.iter_mut().enumerate() {
+                    *t += 0.01 * (1.0 + i as f64).sin();
+                }
+                for misfit in [Misfit::Complex, Misfit::LogMagnitude] {
+                    let problem = FrfProblem {
+                        model: &model,
+                        data: &data,
+                        misfit,
+                        stride: 1,
+                    };
+                    let here = problem.linearise(&theta).unwrap();
+                    for p in 0..theta.len() {
+                        let h = 1e-6 * theta[p].abs().max(1e-3);
+                        let at = |sign: f64| {
+                            let mut t = theta.clone();
+                            t[p] += sign * h;
+                            problem.cost(&t).unwrap()
+                        };
+                        let difference = (at(1.0) - at(-1.0)) / (2.0 * h);
+                        let scale = (here.hessian[(p, p)] * here.cost).sqrt() + here.gradient[p].abs();
+                        let rounding = 1e-13 * here.cost / h;
+                        assert!(
+                            (here.gradient[p] - difference).abs() < 2e-5 * scale + 10.0 * rounding,
+                            "{instance:?} {misfit:?} {}: {} {difference}",
+                            model.parameters[p].name,
+                            here.gradient[p]
+                        );
+                    }
+                }
+            }
+        }
     }
 }

@@ -39,10 +39,24 @@ impl Place {
     }
 }
 
+/// What an element stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// Rotation of this joint (1-based) about its own axis.
+    Joint(usize),
+    /// Tilt of a joint's bearing.
+    Bearing,
+    /// Half of a link as a beam.
+    Beam,
+    /// Rocking of the base.
+    Base,
+}
+
 /// A compliant element: `directions` are unit twists at `at`, one a coordinate; its stiffness is
 /// `stiffness` × `shape`.
 #[derive(Debug, Clone)]
 pub struct Element {
+    pub role: Role,
     pub place: Place,
     pub at: Point3<f64>,
     pub directions: Vec<Vector6<f64>>,

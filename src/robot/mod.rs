@@ -17,7 +17,7 @@ pub mod model;
 pub mod posture_report;
 
 pub use crate::campaign::robot_spec::*;
-pub use chain::{Body, Branch, Chain, Element, Place, Slot, System};
+pub use chain::{Body, Branch, Chain, Element, Place, Role, Slot, System};
 pub use dh::Kinematics;
 pub use dual::Dual;
 pub use frf::{FrfBasis, ModalBasis};

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Point3, Vector3, Vector6};
 
 use super::beam;
-use super::chain::{Body, Chain, Element, Place, Slot};
+use super::chain::{Body, Chain, Element, Place, Role, Slot};
 use super::dh::Kinematics;
 use super::dual::Dual;
 use crate::campaign::robot_spec::RobotSpec;
@@ -96,6 +96,7 @@ impl RobotModel {
         for i in 1..=n {
             let axis = kinematics.joint_axis(i);
             elements.push(Element {
+                role: Role::Joint(i),
                 place: Place::new(i, Slot::Joint),
                 at: kinematics.joint_origin(i),
                 directions: vec![Vector6::new(0.0, 0.0, 0.0, axis.x, axis.y, axis.z)],
@@ -130,7 +131,7 @@ impl RobotModel {
     }
 
     /// The two beam halves of link `i`; none where the link has no section or no length.
-    fn link_halves(&self, kinematics: &Kinematics, i: usize, young: &Dual) -> Vec<Element> {
+    pub fn link_halves(&self, kinematics: &Kinematics, i: usize, young: &Dual) -> Vec<Element> {
         let (start, end) = kinematics.link_ends(i);
         let length_m = (end - start).norm();
         let Some(section) = self.spec.links[i - 1].section.filter(|_| length_m > 1e-9) else {
@@ -153,6 +154,7 @@ impl RobotModel {
                     })
                     .collect();
                 Element {
+                    role: Role::Beam,
                     place: Place::new(i, slot),
                     at: to,
                     directions,

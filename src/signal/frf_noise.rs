@@ -5,6 +5,8 @@
 //! centre, divided by its degrees of freedom, is noise; over all windows its variance is described as
 //! σ² = (a |H|)² + b²: a relative part (hammer, gain) and a floor (sensor, quantisation).
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
@@ -26,6 +28,8 @@ impl FrfNoise {
 
 /// Half width of a window in lines.
 const HALF_WINDOW: usize = 8;
+/// Lines from one window to the next.
+const STEP: usize = 2;
 /// Coefficients of the numerator polynomial, each FRF its own.
 const NUMERATOR: usize = 5;
 /// Coefficients of the common denominator besides the leading 1: two poles.
@@ -64,8 +68,17 @@ pub fn estimate(frequency_hz: &[f64], frfs: &[&[Complex64]]) -> Vec<Option<FrfNo
             smooth: h.iter().map(|v| v.norm()).collect(),
         })
         .collect();
-    for centre in HALF_WINDOW..lines - HALF_WINDOW {
-        window(frequency_hz, frfs, centre, &mut local);
+    let last = lines - 1 - HALF_WINDOW;
+    for centre in (HALF_WINDOW..=last).step_by(STEP) {
+        // The lines that this window speaks for: its own and those up to the next; the first and the last window
+        // speak for the ends of the band too.
+        let from = if centre == HALF_WINDOW { 0 } else { centre };
+        let to = if centre + STEP > last {
+            centre + HALF_WINDOW + 1
+        } else {
+            centre + STEP
+        };
+        window(frequency_hz, frfs, centre, from..to, &mut local);
     }
     local
         .iter()
@@ -84,44 +97,46 @@ struct Local {
     smooth: Vec<f64>,
 }
 
-/// One FRF within a window for a given denominator: the best numerator and what is left.
+/// A window of all FRFs for a given denominator: the best numerators and what is left.
 struct Projection {
     /// Orthonormal basis of numerator polynomials over the denominator, weighted: lines × coefficients.
     basis: DMatrix<Complex64>,
-    weight: Vec<f64>,
-    /// Weighted smooth curve.
-    fitted: DVector<Complex64>,
-    /// Weighted measurement less the smooth curve.
-    residual: DVector<Complex64>,
-    /// Derivatives of the smooth curve with respect to the denominator's coefficients, numerator projected out.
-    slopes: DMatrix<Complex64>,
+    /// Weighted smooth curves, lines × FRFs.
+    fitted: DMatrix<Complex64>,
+    /// Weighted measurements less the smooth curves, lines × FRFs.
+    residual: DMatrix<Complex64>,
 }
 
 impl Projection {
-    fn new(x: &[f64], h: &[Complex64], denominator: &[Complex64]) -> Option<Self> {
-        let weight = weights(h);
-        let count = x.len();
-        let polynomials = DMatrix::from_fn(count, NUMERATOR, |i, j| {
+    /// `targets`: weighted measurements, lines × FRFs.
+    fn new(
+        x: &[f64],
+        weight: &[f64],
+        targets: &DMatrix<Complex64>,
+        denominator: &[Complex64],
+    ) -> Option<Self> {
+        let polynomials = DMatrix::from_fn(x.len(), NUMERATOR, |i, j| {
             weight[i] * x[i].powi(j as i32) / denominator[i]
         });
         let basis = polynomials.qr().q();
         if basis.iter().any(|v| !v.is_finite()) {
             return None;
         }
-        let target = DVector::from_fn(count, |i, _| h[i] * weight[i]);
-        let fitted = &basis * (basis.adjoint() * &target);
-        let residual = &target - &fitted;
-        let slopes = DMatrix::from_fn(count, DENOMINATOR, |i, j| {
-            -fitted[i] * x[i].powi(j as i32 + 1) / denominator[i]
-        });
-        let slopes = &slopes - &basis * (basis.adjoint() * &slopes);
+        let fitted = &basis * (basis.adjoint() * targets);
+        let residual = targets - &fitted;
         Some(Projection {
             basis,
-            weight,
             fitted,
             residual,
-            slopes,
         })
+    }
+
+    /// Derivatives of one smooth curve with respect to the denominator's coefficients, numerator projected out.
+    fn slopes(&self, x: &[f64], denominator: &[Complex64], frf: usize) -> DMatrix<Complex64> {
+        let slopes = DMatrix::from_fn(x.len(), DENOMINATOR, |i, j| {
+            -self.fitted[(i, frf)] * x[i].powi(j as i32 + 1) / denominator[i]
+        });
+        &slopes - &self.basis * (self.basis.adjoint() * &slopes)
     }
 }
 
@@ -141,28 +156,19 @@ fn denominator_values(x: &[f64], coefficients: &DVector<Complex64>) -> Option<Ve
         .then_some(values)
 }
 
-fn project_all(x: &[f64], set: &[&[Complex64]], denominator: &[Complex64]) -> Option<Vec<Projection>> {
-    set.iter().map(|h| Projection::new(x, h, denominator)).collect()
-}
-
-fn cost(projections: &[Projection]) -> f64 {
-    projections.iter().map(|p| p.residual.norm_squared()).sum()
-}
-
 /// Linear start of the denominator: equation error divided by the denominator of the pass before
 /// (Sanathanan & Koerner 1963).
-fn start(x: &[f64], set: &[&[Complex64]]) -> Option<DVector<Complex64>> {
-    let count = x.len();
+fn start(x: &[f64], weight: &[f64], targets: &DMatrix<Complex64>) -> Option<DVector<Complex64>> {
+    let (count, frfs) = targets.shape();
     let mut coefficients = DVector::zeros(DENOMINATOR);
     for _ in 0..2 {
         let denominator = denominator_values(x, &coefficients)?;
+        let basis = Projection::new(x, weight, targets, &denominator)?.basis;
         let mut normal = DMatrix::<Complex64>::zeros(DENOMINATOR, DENOMINATOR);
         let mut right = DVector::<Complex64>::zeros(DENOMINATOR);
-        for h in set {
-            let basis = Projection::new(x, h, &denominator)?.basis;
-            let weight = weights(h);
+        for frf in 0..frfs {
             let columns = DMatrix::from_fn(count, DENOMINATOR + 1, |i, j| {
-                h[i] * weight[i] * x[i].powi(j as i32) / denominator[i]
+                targets[(i, frf)] * x[i].powi(j as i32) / denominator[i]
             });
             let projected = &columns - &basis * (basis.adjoint() * &columns);
             let unknown = projected.columns(1, DENOMINATOR);
@@ -176,7 +182,13 @@ fn start(x: &[f64], set: &[&[Complex64]]) -> Option<DVector<Complex64>> {
 
 /// Fits one window and adds the departures at its centre. The linear start is biased by the noise in the regressors,
 /// so Gauss–Newton steps on the output error follow (variable projection, Golub & Pereyra 1973).
-fn window(frequency_hz: &[f64], frfs: &[&[Complex64]], centre: usize, local: &mut [Local]) {
+fn window(
+    frequency_hz: &[f64],
+    frfs: &[&[Complex64]],
+    centre: usize,
+    lines: Range<usize>,
+    local: &mut [Local],
+) {
     let range = centre - HALF_WINDOW..centre + HALF_WINDOW + 1;
     let half_span = 0.5 * (frequency_hz[range.end - 1] - frequency_hz[range.start]);
     if !(half_span > 0.0) {
@@ -187,76 +199,88 @@ fn window(frequency_hz: &[f64], frfs: &[&[Complex64]], centre: usize, local: &mu
         .map(|f| (f - frequency_hz[centre]) / half_span)
         .collect();
     let set: Vec<&[Complex64]> = frfs.iter().map(|h| &h[range.clone()]).collect();
-    let Some(mut coefficients) = start(&x, &set) else {
+    let weight = weights(&set);
+    let targets = DMatrix::from_fn(x.len(), set.len(), |i, frf| set[frf][i] * weight[i]);
+    let Some(mut coefficients) = start(&x, &weight, &targets) else {
         return;
     };
-    let Some(mut projections) = denominator_values(&x, &coefficients).and_then(|d| project_all(&x, &set, &d))
-    else {
+    let Some(mut denominator) = denominator_values(&x, &coefficients) else {
+        return;
+    };
+    let Some(mut projection) = Projection::new(&x, &weight, &targets, &denominator) else {
         return;
     };
     let mut information = DMatrix::<Complex64>::zeros(DENOMINATOR, DENOMINATOR);
     for _ in 0..GAUSS_NEWTON_STEPS {
         information.fill(Complex64::ZERO);
         let mut right = DVector::<Complex64>::zeros(DENOMINATOR);
-        for p in &projections {
-            information += p.slopes.adjoint() * &p.slopes;
-            right += p.slopes.adjoint() * &p.residual;
+        for frf in 0..set.len() {
+            let slopes = projection.slopes(&x, &denominator, frf);
+            information += slopes.adjoint() * &slopes;
+            right += slopes.adjoint() * projection.residual.column(frf);
         }
         let Some(step) = information.clone().lu().solve(&right) else {
             break;
         };
         let trial = &coefficients + step;
-        let Some(next) = denominator_values(&x, &trial).and_then(|d| project_all(&x, &set, &d)) else {
+        let Some(values) = denominator_values(&x, &trial) else {
             break;
         };
-        let (before, after) = (cost(&projections), cost(&next));
+        let Some(next) = Projection::new(&x, &weight, &targets, &values) else {
+            break;
+        };
+        let (before, after) = (projection.residual.norm_squared(), next.residual.norm_squared());
         if !(after < before) {
             break;
         }
-        coefficients = trial;
-        projections = next;
-        if after > 0.999 * before {
+        (coefficients, denominator, projection) = (trial, values, next);
+        if after > 0.99 * before {
             break;
         }
     }
     let inverse = information.try_inverse();
-    let last = frequency_hz.len() - 1 - HALF_WINDOW;
     let c = HALF_WINDOW;
-    for (p, local) in projections.iter().zip(local) {
-        // The first and the last window speak for the ends of the band too.
-        let first_line = if centre == HALF_WINDOW { 0 } else { c };
-        let last_line = if centre == last { x.len() - 1 } else { c };
-        for i in first_line..=last_line {
-            let smooth = p.fitted[i].norm() / p.weight[i];
-            if smooth.is_finite() {
-                local.smooth[range.start + i] = smooth;
-            }
-        }
-        // Degrees of freedom that the numerator and the common denominator take from this line.
-        let own: f64 = p.basis.row(c).iter().map(|b| b.norm_sqr()).sum();
+    // Degrees of freedom that numerator and common denominator take from the centre line.
+    let own: f64 = projection.basis.row(c).iter().map(|b| b.norm_sqr()).sum();
+    for (frf, local) in local.iter_mut().enumerate() {
         let shared = inverse.as_ref().map_or(0.0, |inverse| {
-            let row = p.slopes.row(c);
+            let slopes = projection.slopes(&x, &denominator, frf);
+            let row = slopes.row(c);
             (row * inverse * row.adjoint())[(0, 0)].re
         });
         let freedom = 1.0 - own - shared;
-        let variance = p.residual[c].norm_sqr() / (p.weight[c].powi(2) * freedom);
-        let magnitude = p.fitted[c].norm() / p.weight[c];
+        let variance = projection.residual[(c, frf)].norm_sqr() / (weight[c].powi(2) * freedom);
+        let magnitude = projection.fitted[(c, frf)].norm() / weight[c];
         if freedom > 0.1 && variance.is_finite() && magnitude.is_finite() {
             local.departures.push(Departure { magnitude, variance });
+        }
+        for line in lines.clone() {
+            let i = line - range.start;
+            let smooth = projection.fitted[(i, frf)].norm() / weight[i];
+            if smooth.is_finite() {
+                local.smooth[line] = smooth;
+            }
         }
     }
 }
 
-/// Weight of each line: the reciprocal of the magnitude, so that the error is relative. The magnitude is averaged
-/// over neighbouring lines (with a floor), or else the noise would weigh itself.
-fn weights(h: &[Complex64]) -> Vec<f64> {
-    const REACH: usize = 3;
-    let mean_square = |h: &[Complex64]| h.iter().map(|v| v.norm_sqr()).sum::<f64>() / h.len() as f64;
-    let floor = 0.1 * mean_square(h);
-    (0..h.len())
+/// Weight of each line, one for all FRFs of the set: the reciprocal of the magnitude, so that the error is relative.
+/// The magnitude is averaged over the set and over neighbouring lines (with a floor), or else the noise would weigh
+/// itself.
+fn weights(set: &[&[Complex64]]) -> Vec<f64> {
+    const REACH: usize = 2;
+    let lines = set[0].len();
+    let mut power = vec![0.1; lines];
+    for h in set {
+        let mean = h.iter().map(|v| v.norm_sqr()).sum::<f64>() / lines as f64;
+        for (p, v) in power.iter_mut().zip(h.iter()) {
+            *p += v.norm_sqr() / (mean.max(f64::MIN_POSITIVE) * set.len() as f64);
+        }
+    }
+    (0..lines)
         .map(|i| {
-            let near = &h[i.saturating_sub(REACH)..(i + REACH + 1).min(h.len())];
-            1.0 / (mean_square(near) + floor).sqrt().max(f64::MIN_POSITIVE)
+            let near = &power[i.saturating_sub(REACH)..(i + REACH + 1).min(lines)];
+            (near.len() as f64 / near.iter().sum::<f64>()).sqrt()
         })
         .collect()
 }

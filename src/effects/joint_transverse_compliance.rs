@@ -1,0 +1,64 @@
+use super::*;
+use crate::parameter::{Prior, Scale};
+use crate::robot::{Element, Place, Role, Slot};
+use nalgebra::{DMatrix, Vector6};
+
+/// A joint's bearing tilts about both axes normal to the joint's own.
+pub struct JointTransverseCompliance;
+
+impl StructuralEffect for JointTransverseCompliance {
+    fn id(&self) -> &'static str {
+        "joint-transverse-compliance"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "The bearing of this joint tilts: besides turning about its own axis the joint gives way about both axes normal to \
+         it."
+    }
+
+    fn fingerprint(&self) -> &'static str {
+        "Soft in directions that no gear can move; the error follows the bearing when the arm changes posture and is seen \
+         at every point behind the joint."
+    }
+
+    /// At joint 1 this is the rocking of the base by another name; a wrist's last joint carries little behind it.
+    fn sites(&self, robot: &RobotSpec) -> Vec<Site> {
+        (2..robot.joints.len()).map(Site::Joint).collect()
+    }
+
+    fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
+        vec![Parameter {
+            name: "transverse_nm_per_rad".into(),
+            unit: "N·m/rad",
+            scale: Scale::Logarithmic,
+            nominal: 3e6,
+            prior: Some(Prior {
+                mean: 3e6f64.ln(),
+                std: 2.0,
+            }),
+            bounds: [2e4, 1e9],
+        }]
+    }
+
+    fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
+        vec![vec![7e5], vec![1.5e7]]
+    }
+
+    fn apply(&self, site: Site, _variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {
+        let Site::Joint(i) = site else { return };
+        let frame = &setting.kinematics.frames[i - 1];
+        let tilt = |axis: nalgebra::Vector3<f64>| {
+            let a = frame.rotation * axis;
+            Vector6::new(0.0, 0.0, 0.0, a.x, a.y, a.z)
+        };
+        chain.elements.push(Element {
+            role: Role::Bearing,
+            place: Place::new(i, Slot::Joint),
+            at: setting.kinematics.joint_origin(i),
+            directions: vec![tilt(nalgebra::Vector3::x()), tilt(nalgebra::Vector3::y())],
+            shape: DMatrix::identity(2, 2),
+            stiffness: values[0].clone(),
+            damping: None,
+        });
+    }
+}

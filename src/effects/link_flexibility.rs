@@ -1,0 +1,59 @@
+use super::*;
+use crate::parameter::{Prior, Scale};
+
+/// Links bend: every link a beam of its section, one common Young's modulus.
+pub struct LinkFlexibility;
+
+impl StructuralEffect for LinkFlexibility {
+    fn id(&self) -> &'static str {
+        "link-flexibility"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "The links are not rigid: each bends, twists and stretches as a hollow beam of its section, all with one Young's \
+         modulus."
+    }
+
+    fn fingerprint(&self) -> &'static str {
+        "All modes shift down a little at every posture, the highest most, and the tool gets softer even where the joints \
+         are stiff."
+    }
+
+    fn sites(&self, _robot: &RobotSpec) -> Vec<Site> {
+        vec![Site::Everywhere]
+    }
+
+    fn obstacle(&self, robot: &RobotSpec, _data: &DataSummary) -> Option<String> {
+        robot
+            .links
+            .iter()
+            .all(|l| l.section.is_none())
+            .then(|| "the robot file gives no link a section".to_string())
+    }
+
+    fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
+        vec![Parameter {
+            name: "young_pa".into(),
+            unit: "Pa",
+            scale: Scale::Logarithmic,
+            nominal: 200e9,
+            prior: Some(Prior {
+                mean: 150e9f64.ln(),
+                std: 2.0,
+            }),
+            bounds: [2e9, 2e13],
+        }]
+    }
+
+    fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
+        vec![vec![70e9], vec![500e9]]
+    }
+
+    fn apply(&self, _site: Site, _variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {
+        for i in 1..=setting.robot.joint_count() {
+            chain
+                .elements
+                .extend(setting.robot.link_halves(setting.kinematics, i, &values[0]));
+        }
+    }
+}

@@ -1,0 +1,61 @@
+use super::*;
+use crate::parameter::{Prior, Scale};
+use crate::robot::{Body, Place, Slot};
+use nalgebra::{Matrix3, Point3};
+
+/// Mass on the flange that the model does not have.
+pub struct Payload;
+
+/// Where the mass sits: outside the flange along its z, m.
+const OUTSIDE_FLANGE_M: f64 = 0.05;
+
+impl StructuralEffect for Payload {
+    fn id(&self) -> &'static str {
+        "payload"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "There is mass on the flange that the model does not have: a dress pack, a spindle, a tool changer."
+    }
+
+    fn fingerprint(&self) -> &'static str {
+        "All modes that move the flange are too high in the model, at every posture, while the static stiffness is right."
+    }
+
+    fn sites(&self, _robot: &RobotSpec) -> Vec<Site> {
+        vec![Site::Everywhere]
+    }
+
+    fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
+        vec![Parameter {
+            name: "mass_kg".into(),
+            unit: "kg",
+            scale: Scale::Logarithmic,
+            nominal: 20.0,
+            prior: Some(Prior {
+                mean: 15f64.ln(),
+                std: 1.5,
+            }),
+            bounds: [0.05, 1000.0],
+        }]
+    }
+
+    fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
+        vec![vec![5.0], vec![60.0]]
+    }
+
+    fn order(&self) -> u8 {
+        0
+    }
+
+    fn apply(&self, _site: Site, _variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {
+        let n = setting.robot.joint_count();
+        chain.bodies.push(Body {
+            place: Place::new(n, Slot::Body),
+            com: setting.kinematics.frames[n] * Point3::new(0.0, 0.0, OUTSIDE_FLANGE_M),
+            mass_kg: 1.0,
+            inertia_kg_m2: Matrix3::zeros(),
+            scale: values[0].clone(),
+        });
+    }
+}

@@ -1,0 +1,42 @@
+use super::*;
+use crate::parameter::{Prior, Scale};
+
+/// Response channel late against the force channel: factor exp(−iωτ).
+pub struct TimeDelay;
+
+impl StructuralEffect for TimeDelay {
+    fn id(&self) -> &'static str {
+        "time-delay"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "The response channel is late against the force channel (different filters, a trigger skew, a vibrometer's delay)."
+    }
+
+    fn fingerprint(&self) -> &'static str {
+        "Magnitudes fit, phase does not: its error grows in proportion to frequency, the same in every FRF."
+    }
+
+    fn sites(&self, _robot: &RobotSpec) -> Vec<Site> {
+        vec![Site::Everywhere]
+    }
+
+    fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
+        vec![Parameter {
+            name: "delay_s".into(),
+            unit: "s",
+            scale: Scale::Linear,
+            nominal: 2e-4,
+            prior: Some(Prior { mean: 0.0, std: 3e-3 }),
+            bounds: [-0.02, 0.02],
+        }]
+    }
+
+    fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
+        vec![vec![2e-3], vec![-5e-4]]
+    }
+
+    fn filter(&self, values: &[Dual], filter: &mut ChannelFilter) {
+        filter.delay_s = &filter.delay_s + &values[0];
+    }
+}

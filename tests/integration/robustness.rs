@@ -261,7 +261,7 @@ fn a_file_that_may_not_be_read() {
     use std::os::unix::fs::PermissionsExt;
     let campaign = copy_of("frf-9112");
     let file = campaign.path().join("frf/p3.uff");
-    std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0)).unwrap();
+    std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o000)).unwrap();
     // The superuser may read everything.
     if std::fs::read(&file).is_err() {
         assert!(survives(&["calibrate", path(campaign.path())], "p3.uff").is_none());

@@ -81,7 +81,17 @@ impl Campaign {
             }
             let mut facts = FileFacts::default();
             for record in records {
-                set.frfs.push(self.measured(i, frf, record, &mut facts)?);
+                let measured = self.measured(i, frf, record, &mut facts)?;
+                // A dead channel is no rigid structure: it must neither be fitted nor give endless stability.
+                if measured.receptance_m_per_n.iter().all(|h| *h == Complex64::ZERO) {
+                    facts.dead.push(measured.name);
+                } else {
+                    set.frfs.push(measured);
+                }
+            }
+            if facts.dead.len() == records.len() {
+                let problem = "is zero on every line: a dead channel";
+                return Err(self.complaint(i, "file", problem, "measure it again, or take this [[frf]] out"));
             }
             warnings.extend(facts.warnings(frf));
         }
@@ -206,6 +216,8 @@ struct FileFacts {
     /// Quantity of the file and of the campaign.
     contradiction: Option<(Quantity, Quantity)>,
     static_lines: bool,
+    /// Names of FRFs that are zero on every line.
+    dead: Vec<String>,
 }
 
 impl FileFacts {
@@ -221,6 +233,12 @@ impl FileFacts {
         }
         if self.static_lines {
             out.push(format!("{file}: the line at 0 Hz is left out"));
+        }
+        if !self.dead.is_empty() {
+            let names = self.dead.join(", ");
+            out.push(format!(
+                "{file}: {names}: zero on every line (a dead channel), left out"
+            ));
         }
         out
     }

@@ -9,7 +9,7 @@ use super::record::{Average, CutAnalysis, Notice, READER, analyse_cut};
 use super::warnings;
 use crate::campaign::{Campaign, CutGeometry, Process};
 use crate::progress::Progress;
-use crate::{Error, Result, ingest};
+use crate::{Error, InputError, Result, ingest};
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct CfcOptions {
@@ -36,10 +36,13 @@ pub struct CfcResult {
 /// No cuts, no tool, or not one usable record.
 pub fn identify_forces(campaign: &Campaign, options: CfcOptions) -> Result<CfcResult> {
     if campaign.cuts.is_empty() {
-        return Err(Error::computation(format!(
-            "{}: the campaign has no [[cut]]: nothing to identify cutting forces from",
-            campaign.dir.display()
-        )));
+        return Err(
+            InputError::new("the campaign has no [[cut]]: nothing to identify cutting forces from")
+                .file(campaign.dir.join("campaign.toml"))
+                .key("cut")
+                .remedy("add [[cut]] tables that name the force records")
+                .into(),
+        );
     }
     let progress = Progress::new("force records", campaign.cuts.len());
     let outcomes: Vec<Result<CutAnalysis>> = (0..campaign.cuts.len())

@@ -5,3 +5,7 @@ mod cfc;
 mod contract;
 mod inspect;
 mod modal;
+mod robustness;
+mod schema;
+mod structure;
+mod support;

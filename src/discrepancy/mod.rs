@@ -2,4 +2,4 @@
 
 pub mod compare;
 
-pub use compare::{Band, FrfComparison, held_out_nrms};
+pub use compare::{Band, FrfComparison, FrfError, held_out_nrms};

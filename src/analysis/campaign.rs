@@ -76,12 +76,12 @@ impl<'a> CampaignFindings<'a> {
             return Ok(self);
         }
         if errors.is_empty() {
-            return Err(
-                InputError::new("nothing to report: no FRFs, no cuts, no lobes and no robot with postures")
-                    .file(self.campaign.dir.join("campaign.toml"))
-                    .remedy("add [[frf]] or [[cut]] tables")
-                    .into(),
-            );
+            return Err(InputError::new(
+                "nothing to report: no FRFs, no cuts, no lobes and no robot with postures",
+            )
+            .file(self.campaign.dir.join("campaign.toml"))
+            .remedy("add [[frf]] or [[cut]] tables")
+            .into());
         }
         Err(Error::computation(format!(
             "nothing can be reported:\n{}",
@@ -128,8 +128,11 @@ impl<'a> CampaignFindings<'a> {
 impl StructureFindings {
     pub fn run(campaign: &Campaign) -> Result<Self> {
         let analysis = StructureAnalysis::run(campaign, Options::default())?;
-        let held_out_nrms =
-            held_out_nrms(&analysis.case.model, &analysis.case.data, &analysis.calibration.theta)?;
+        let held_out_nrms = held_out_nrms(
+            &analysis.case.model,
+            &analysis.case.data,
+            &analysis.calibration.theta,
+        )?;
         Ok(StructureFindings {
             analysis,
             held_out_nrms,

@@ -1,38 +1,81 @@
-//! The fitted force model as a line over feed, where it is one.
+//! The fitted force model as lines over feed.
 
-use crate::cutting::{ForceAxis, Group};
+use crate::campaign::{Campaign, CutGeometry};
+use crate::cutting::{ForceAxis, Group, RegressionPoint};
 
-/// Intercept and slope of the fitted average force over feed (N and N/mm; for torque N·m and N·m/mm).
-///
-/// `None` where the cuts differ in more than feed (depth, immersion), so that no single line holds, or have one feed only.
-pub fn feed_line(group: &Group, axis: ForceAxis) -> Option<(f64, f64)> {
-    let points: Vec<(f64, f64)> = group
-        .points
-        .iter()
-        .filter(|p| p.axis == axis)
-        .map(|p| (p.feed_mm, p.fitted))
-        .collect();
-    let by_feed = |a: &&(f64, f64), b: &&(f64, f64)| a.0.total_cmp(&b.0);
+/// Cuts that differ in nothing but feed (and speed), along one axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FeedLine<'a> {
+    /// What sets them apart from the others, such as `pilot hole 5 mm`.
+    pub what: String,
+    pub points: Vec<&'a RegressionPoint>,
+    /// Intercept and slope of the fitted average (N and N/mm; for torque N·m and N·m/mm); `None` with one feed only.
+    pub line: Option<(f64, f64)>,
+}
+
+/// One line for each set of cuts of the same geometry, in order of appearance.
+pub fn feed_lines<'a>(campaign: &Campaign, group: &'a Group, axis: ForceAxis) -> Vec<FeedLine<'a>> {
+    let mut lines: Vec<FeedLine> = Vec::new();
+    for point in group.points.iter().filter(|p| p.axis == axis) {
+        let cut = campaign.cuts.iter().find(|c| c.id == point.cut);
+        let what = cut.map_or_else(String::new, |c| describe(&c.geometry));
+        match lines.iter_mut().find(|l| l.what == what) {
+            Some(line) => line.points.push(point),
+            None => lines.push(FeedLine {
+                what,
+                points: vec![point],
+                line: None,
+            }),
+        }
+    }
+    for line in &mut lines {
+        line.line = through(&line.points);
+    }
+    lines
+}
+
+/// The geometry but for its feed.
+fn describe(geometry: &CutGeometry) -> String {
+    match geometry {
+        CutGeometry::Milling {
+            axial_depth_mm,
+            immersion,
+            ..
+        } => {
+            let degrees = |rad: f64| (rad.to_degrees() * 10.0).round() / 10.0;
+            let (start, exit) = (degrees(immersion.start_rad), degrees(immersion.exit_rad));
+            format!("depth {axial_depth_mm} mm, immersion {start}–{exit}°")
+        }
+        CutGeometry::Drilling {
+            pilot_diameter_mm, ..
+        } if *pilot_diameter_mm > 0.0 => format!("pilot hole {pilot_diameter_mm} mm"),
+        CutGeometry::Drilling { .. } => "no pilot hole".into(),
+    }
+}
+
+/// The force models are linear in feed at a given geometry: two feeds give the line. Where the points are not on it
+/// after all there is none.
+fn through(points: &[&RegressionPoint]) -> Option<(f64, f64)> {
+    let by_feed = |a: &&&RegressionPoint, b: &&&RegressionPoint| a.feed_mm.total_cmp(&b.feed_mm);
     let (low, high) = (points.iter().min_by(by_feed)?, points.iter().max_by(by_feed)?);
-    if !(high.0 > low.0) {
+    if !(high.feed_mm > low.feed_mm) {
         return None;
     }
-    let slope = (high.1 - low.1) / (high.0 - low.0);
-    let intercept = low.1 - slope * low.0;
-    let scale = points.iter().map(|p| p.1.abs()).fold(0.0, f64::max);
+    let slope = (high.fitted - low.fitted) / (high.feed_mm - low.feed_mm);
+    let intercept = low.fitted - slope * low.feed_mm;
+    let scale = points.iter().map(|p| p.fitted.abs()).fold(0.0, f64::max);
     points
         .iter()
-        .all(|(feed, force)| (intercept + slope * feed - force).abs() <= 1e-6 * scale)
+        .all(|p| (intercept + slope * p.feed_mm - p.fitted).abs() <= 1e-6 * scale)
         .then_some((intercept, slope))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::Process;
-    use crate::cutting::RegressionPoint;
+    use crate::campaign::Immersion;
 
-    fn group(points: &[(f64, f64)]) -> Group {
+    fn points(values: &[(f64, f64)]) -> Vec<RegressionPoint> {
         let point = |&(feed_mm, fitted): &(f64, f64)| RegressionPoint {
             cut: "1".into(),
             axis: ForceAxis::Z,
@@ -41,29 +84,38 @@ mod tests {
             std_error: 1.0,
             fitted,
         };
-        Group {
-            process: Process::Milling,
-            cutting_speed_m_per_min: 60.0,
-            cutting_speed_range_m_per_min: [60.0; 2],
-            cuts: vec![],
-            feeds: points.len(),
-            coefficients: vec![],
-            inseparable: vec![],
-            r2: [None; 4],
-            chi2_per_dof: [None; 4],
-            extra_scatter: [0.0; 4],
-            points: points.iter().map(point).collect(),
-        }
+        values.iter().map(point).collect()
+    }
+
+    fn line(values: &[(f64, f64)]) -> Option<(f64, f64)> {
+        through(&points(values).iter().collect::<Vec<_>>())
     }
 
     #[test]
     fn a_line_is_drawn_only_where_there_is_one() {
-        let (intercept, slope) = feed_line(&group(&[(0.1, 5.0), (0.2, 7.0), (0.05, 4.0)]), ForceAxis::Z).unwrap();
+        let (intercept, slope) = line(&[(0.1, 5.0), (0.2, 7.0), (0.05, 4.0)]).unwrap();
         approx::assert_relative_eq!(intercept, 3.0, max_relative = 1e-12);
         approx::assert_relative_eq!(slope, 20.0, max_relative = 1e-12);
-        // Two depths of cut: two lines.
-        assert_eq!(feed_line(&group(&[(0.1, 5.0), (0.2, 7.0), (0.15, 12.0)]), ForceAxis::Z), None);
-        assert_eq!(feed_line(&group(&[(0.1, 5.0), (0.1, 5.0)]), ForceAxis::Z), None);
-        assert_eq!(feed_line(&group(&[]), ForceAxis::Z), None);
+        assert_eq!(line(&[(0.1, 5.0), (0.2, 7.0), (0.15, 12.0)]), None);
+        assert_eq!(line(&[(0.1, 5.0), (0.1, 5.0)]), None);
+        assert_eq!(line(&[]), None);
+    }
+
+    #[test]
+    fn geometries_are_told_apart_by_all_but_feed() {
+        let drilling = |pilot_diameter_mm, feed_per_rev_mm| CutGeometry::Drilling {
+            feed_per_rev_mm,
+            pilot_diameter_mm,
+            hole_depth_mm: None,
+        };
+        assert_eq!(describe(&drilling(5.0, 0.1)), describe(&drilling(5.0, 0.2)));
+        assert_eq!(describe(&drilling(5.0, 0.1)), "pilot hole 5 mm");
+        assert_eq!(describe(&drilling(0.0, 0.1)), "no pilot hole");
+        let milling = CutGeometry::Milling {
+            feed_per_tooth_mm: 0.1,
+            axial_depth_mm: 2.0,
+            immersion: Immersion::SLOT,
+        };
+        assert_eq!(describe(&milling), "depth 2 mm, immersion 0–180°");
     }
 }

@@ -34,10 +34,12 @@ pub struct ThesisFindings {
 }
 
 fn range(ratios: impl Iterator<Item = f64>) -> Option<Range> {
-    ratios.filter(|r| r.is_finite()).fold(None, |range, r| match range {
-        None => Some([r, r]),
-        Some([low, high]) => Some([low.min(r), high.max(r)]),
-    })
+    ratios
+        .filter(|r| r.is_finite())
+        .fold(None, |range, r| match range {
+            None => Some([r, r]),
+            Some([low, high]) => Some([low.min(r), high.max(r)]),
+        })
 }
 
 fn over_measured(rows: &[Row], value: impl Fn(&Row) -> Option<f64>) -> Option<Range> {
@@ -81,7 +83,9 @@ impl ThesisFindings {
             predicted_after: over_measured(&study.frequencies, |r| predicted(r).then_some(r.after)),
             predicted_before: over_measured(&study.frequencies, |r| predicted(r).then_some(r.before)),
             receptance_after: over_measured(&study.receptances, |r| r.fitted.then_some(r.after)),
-            predicted_receptance_after: over_measured(&study.receptances, |r| predicted(r).then_some(r.after)),
+            predicted_receptance_after: over_measured(&study.receptances, |r| {
+                predicted(r).then_some(r.after)
+            }),
             speed_second_region: speeds(0),
             speed_first_region: speeds(1),
             depth: range(depth),

@@ -74,9 +74,18 @@ pub fn run(args: Args) -> Result<Outcome> {
     let of = |command: &str, campaign: &Campaign| format!("lobestone {command} {}", campaign.dir.display());
     let mut story = Story::default();
 
-    story.step("inspect", of("inspect", &first) + "/frf/*.uff", || inspect(&first), Clone::clone)?;
-    let structure =
-        story.step("calibrate", of("calibrate", &first), || StructureFindings::run(&first), calibrated)?;
+    story.step(
+        "inspect",
+        of("inspect", &first) + "/frf/*.uff",
+        || inspect(&first),
+        Clone::clone,
+    )?;
+    let structure = story.step(
+        "calibrate",
+        of("calibrate", &first),
+        || StructureFindings::run(&first),
+        calibrated,
+    )?;
     let postures = story.step(
         "model",
         of("model", &first),
@@ -91,9 +100,18 @@ pub fn run(args: Args) -> Result<Outcome> {
         coefficients,
     )?;
     let lobes = story.step("lobes", of("lobes", &first), || LobeFindings::run(&first), lobes)?;
-    let unexplained =
-        story.step("compare", of("compare", &second), || StructureFindings::run(&second), compared)?;
-    let thesis = story.step("thesis", "lobestone thesis".into(), ThesisFindings::run, case_study)?;
+    let unexplained = story.step(
+        "compare",
+        of("compare", &second),
+        || StructureFindings::run(&second),
+        compared,
+    )?;
+    let thesis = story.step(
+        "thesis",
+        "lobestone thesis".into(),
+        ThesisFindings::run,
+        case_study,
+    )?;
 
     let findings = CampaignFindings {
         campaign: &first,
@@ -103,14 +121,25 @@ pub fn run(args: Args) -> Result<Outcome> {
         cutting: Some(Ok(cutting)),
         lobes: Some(Ok(lobes)),
     };
+    let rows: Vec<pages::StepRow> = story
+        .steps
+        .iter()
+        .map(|s| [s.name.to_string(), s.summary.clone(), s.command.clone()])
+        .collect();
     let files = story.step(
         "report",
         of("report", &first) + " --thesis",
         || {
-            let page = pages::demo_page(&findings, &unexplained, &thesis);
+            let page = pages::demo_page(&findings, &unexplained, &thesis, &rows);
             pages::write(&page, &findings, &dir.join("report"))
         },
-        |files| format!("{} figures in one page: {}", files.images.len(), files.html.display()),
+        |files| {
+            format!(
+                "{} figures in one page: {}",
+                files.images.len(),
+                files.html.display()
+            )
+        },
     )?;
 
     let mut json = report::document(&files);
@@ -129,10 +158,12 @@ fn prepare(dir: &Path) -> Result<()> {
         let mut entries = std::fs::read_dir(dir).map_err(|e| Error::io(dir, e))?;
         let is_demo = std::fs::read_to_string(&marker).is_ok_and(|text| text == MARKER_TEXT);
         if entries.next().is_some() && !is_demo {
-            return Err(InputError::new("the folder holds something that is not a demo; nothing was touched")
-                .file(dir)
-                .remedy("name a folder that does not exist: lobestone demo FOLDER")
-                .into());
+            return Err(InputError::new(
+                "the folder holds something that is not a demo; nothing was touched",
+            )
+            .file(dir)
+            .remedy("name a folder that does not exist: lobestone demo FOLDER")
+            .into());
         }
     }
     std::fs::create_dir_all(dir).map_err(|e| Error::io(dir, e))?;
@@ -164,7 +195,9 @@ fn inspect(campaign: &Campaign) -> Result<String> {
 
 fn calibrated(s: &StructureFindings) -> String {
     let (before, after) = (&s.analysis.before.totals, &s.analysis.after.totals);
-    let held_out = s.held_out_nrms.map_or(String::new(), |h| format!("; {} on postures left out", percent(h)));
+    let held_out = s.held_out_nrms.map_or(String::new(), |h| {
+        format!("; {} on postures left out", percent(h))
+    });
     format!(
         "error {} before, {} after; the noise is {}{held_out}",
         percent(before.nrms),
@@ -178,9 +211,15 @@ fn modelled(postures: &[PostureFindings]) -> String {
         return "no posture".into();
     };
     let lowest = |report: &crate::robot::PostureReport| {
-        report.natural_frequencies_hz.first().map_or("–".into(), |f| number(*f, 3))
+        report
+            .natural_frequencies_hz
+            .first()
+            .map_or("–".into(), |f| number(*f, 3))
     };
-    let after = first.calibrated.as_ref().map_or(String::new(), |c| format!(", {} calibrated", lowest(c)));
+    let after = first
+        .calibrated
+        .as_ref()
+        .map_or(String::new(), |c| format!(", {} calibrated", lowest(c)));
     format!(
         "lowest natural frequency at {}: {} Hz as in the robot file{after}",
         first.id,
@@ -202,7 +241,14 @@ fn coefficients(result: &CfcResult) -> String {
             .coefficients
             .iter()
             .filter(|c| !c.edge)
-            .filter_map(|c| Some(format!("{} {} ± {}", c.label, number(c.value?, 4), number(c.std_error?, 2))))
+            .filter_map(|c| {
+                Some(format!(
+                    "{} {} ± {}",
+                    c.label,
+                    number(c.value?, 4),
+                    number(c.std_error?, 2)
+                ))
+            })
             .collect();
         format!("{} N/mm² from {} cuts", values.join(", "), group.cuts.len())
     };
@@ -211,7 +257,9 @@ fn coefficients(result: &CfcResult) -> String {
 
 fn lobes(lobes: &LobeFindings) -> String {
     let limit = |analysis: &LobeAnalysis| {
-        analysis.absolute().map_or("no limit".into(), |a| format!("{} mm", number(a.depth_mm, 3)))
+        analysis
+            .absolute()
+            .map_or("no limit".into(), |a| format!("{} mm", number(a.depth_mm, 3)))
     };
     let measured = match &lobes.measured {
         Some(Ok(measured)) => format!(", {} from the measured FRFs", limit(measured)),
@@ -219,8 +267,13 @@ fn lobes(lobes: &LobeFindings) -> String {
     };
     let best = lobes.asked.best().first().map_or(String::new(), |(case, peak)| {
         let place = case.posture.as_deref().unwrap_or("the modes");
-        let depth = peak.depth_mm.map_or("no limit".into(), |d| format!("{} mm", number(d, 3)));
-        format!("; best speed {} rpm at {place} ({depth})", number(peak.spindle_rpm, 4))
+        let depth = peak
+            .depth_mm
+            .map_or("no limit".into(), |d| format!("{} mm", number(d, 3)));
+        format!(
+            "; best speed {} rpm at {place} ({depth})",
+            number(peak.spindle_rpm, 4)
+        )
     });
     format!(
         "drilling is stable at any speed below {} (model){measured}{best}",

@@ -57,7 +57,11 @@ fn describe(files: &ReportFiles) -> String {
         files.images.len()
     );
     if let Some(folder) = files.tables.first().and_then(|t| t.parent()) {
-        text += &format!("tables   {} Parquet files in {}\n", files.tables.len(), folder.display());
+        text += &format!(
+            "tables   {} Parquet files in {}\n",
+            files.tables.len(),
+            folder.display()
+        );
     }
     text
 }

@@ -50,6 +50,16 @@ pub struct FrfError {
     pub band_nrms: Vec<Option<f64>>,
 }
 
+impl FrfError {
+    /// What is left of the error when the noise is taken off, as an nrms: 0 where only noise is left. A small FRF that
+    /// drowns in noise has a large nrms and says nothing of the model.
+    pub fn beyond_noise(&self) -> f64 {
+        (self.nrms.powi(2) - self.noise_floor_nrms.powi(2))
+            .max(0.0)
+            .sqrt()
+    }
+}
+
 /// The error map: postures × directions × bands, nrms; `None` where nothing was measured.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ErrorMap {
@@ -279,7 +289,11 @@ fn error_map(
         band_edges_hz: edges.to_vec(),
         nrms: sums
             .iter()
-            .map(|p| p.iter().map(|d| d.iter().map(Sums::measured_nrms).collect()).collect())
+            .map(|p| {
+                p.iter()
+                    .map(|d| d.iter().map(Sums::measured_nrms).collect())
+                    .collect()
+            })
             .collect(),
     }
 }

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::parts::{count, failed, paragraph};
 use super::{
-    Block, Page, Section, cutting_section, lobes_section, modal_section, structure_section, thesis_section,
+    Block, Column, Page, Section, Table, cutting_section, lobes_section, modal_section, structure_section,
+    thesis_section,
 };
 use crate::Result;
 use crate::analysis::{CampaignFindings, StructureFindings, ThesisFindings};
@@ -54,11 +55,15 @@ pub fn page(findings: &CampaignFindings, thesis: Option<&ThesisFindings>) -> Pag
     }
 }
 
+/// A step of the demo as its page tells it: name, what it found, what to type for the same.
+pub type StepRow = [String; 3];
+
 /// The demo's page: a campaign that the model explains, one that it does not, and the case study.
 pub fn demo_page(
     findings: &CampaignFindings,
     unexplained: &StructureFindings,
     thesis: &ThesisFindings,
+    steps: &[StepRow],
 ) -> Page {
     let mut page = page(findings, None);
     page.title = "Lobestone demo".into();
@@ -66,20 +71,52 @@ pub fn demo_page(
     for section in &mut page.sections {
         section.title = format!("First cell: {}", lower_first(&section.title));
     }
+    page.sections.insert(0, demo_story(steps));
     page.sections.extend(second_cell(unexplained));
     page.sections.push(thesis_section::section(thesis));
     page
 }
 
+fn demo_story(steps: &[StepRow]) -> Section {
+    let intro = "Both campaigns are simulated, so that what the program finds can be checked against what was put in. The \
+                 first cell is a robot whose joints are up to 27 % off its data sheet, with noise on the FRFs, and a \
+                 series of milling cuts with a drifting dynamometer: the model can explain all of it. In the second cell \
+                 something was added that the model does not have, and the program is not told what.";
+    Section {
+        id: "story".into(),
+        title: "The story".into(),
+        lead:
+            "Raw files in; calibrated model, cutting coefficients, stability lobes and an honest error out."
+                .into(),
+        blocks: vec![
+            paragraph(intro),
+            Block::Table(Table {
+                caption: "What each step found, and the command that does the same on files of your own"
+                    .into(),
+                columns: vec![
+                    Column::text("step"),
+                    Column::text("found"),
+                    Column::text("command"),
+                ],
+                rows: steps.iter().map(|row| row.to_vec()).collect(),
+                notes: vec![],
+            }),
+        ],
+    }
+}
+
 fn lower_first(title: &str) -> String {
     let mut letters = title.chars();
-    letters.next().map_or(String::new(), |c| c.to_lowercase().chain(letters).collect())
+    letters
+        .next()
+        .map_or(String::new(), |c| c.to_lowercase().chain(letters).collect())
 }
 
 fn second_cell(structure: &StructureFindings) -> Vec<Section> {
     let mut frfs = structure_section::frf_section(structure);
     frfs.title = "Second cell: model against measured FRFs".into();
-    frfs.blocks.insert(0, paragraph(structure_section::summary(structure)));
+    frfs.blocks
+        .insert(0, paragraph(structure_section::summary(structure)));
     let mut map = structure_section::map_section(structure);
     map.title = "Second cell: where the error is".into();
     let mut sections = vec![frfs, map];
@@ -128,7 +165,7 @@ fn parts(findings: &CampaignFindings) -> Vec<Section> {
         None => {}
     }
     match &findings.cutting {
-        Some(Ok(result)) => sections.extend(cutting_section::sections(result)),
+        Some(Ok(result)) => sections.extend(cutting_section::sections(findings.campaign, result)),
         Some(Err(error)) => sections.push(failed("records", "Force records", error)),
         None => {}
     }
@@ -142,11 +179,18 @@ fn parts(findings: &CampaignFindings) -> Vec<Section> {
 
 fn summary(findings: &CampaignFindings) -> Section {
     let mut blocks = Vec::new();
-    blocks.extend(findings.structure().map(|s| paragraph(structure_section::summary(s))));
+    blocks.extend(
+        findings
+            .structure()
+            .map(|s| paragraph(structure_section::summary(s))),
+    );
     blocks.extend(findings.modal().and_then(modal_section::summary).map(paragraph));
     blocks.extend(findings.cutting().map(|c| paragraph(cutting_section::summary(c))));
     blocks.extend(findings.lobes().map(|l| paragraph(lobes_section::summary(l))));
-    let lost = findings.errors().into_iter().map(|e| Block::Warning(format!("A part is missing from this report. {e}")));
+    let lost = findings
+        .errors()
+        .into_iter()
+        .map(|e| Block::Warning(format!("A part is missing from this report. {e}")));
     blocks.extend(lost);
     blocks.extend(warnings(findings).into_iter().map(Block::Warning));
     Section {

@@ -1,11 +1,13 @@
 //! Cutting forces: records, averages, regression, coefficients.
 
-use super::figure::{ForceChannel, ForceRecord, HeatMap, RegressionFigure, RegressionPoint, RegressionSeries};
+use super::figure::{
+    ForceChannel, ForceRecord, HeatMap, RegressionFigure, RegressionPoint, RegressionSeries,
+};
 use super::number::{decimals, percent, significant};
-use super::parts::{count, figure, paragraph};
+use super::parts::{count, figure, listed, setting, with_error};
 use super::{Block, Column, Section, Table};
-use crate::analysis::regression_line::feed_line;
-use crate::campaign::Process;
+use crate::analysis::regression_line::{FeedLine, feed_lines};
+use crate::campaign::{Campaign, Process};
 use crate::cutting::{CfcResult, Coefficient, CutAnalysis, ForceAxis, Group};
 
 pub fn summary(result: &CfcResult) -> String {
@@ -74,13 +76,15 @@ fn misfits(group: &Group) -> Vec<Misfit> {
 }
 
 fn worst(group: &Group) -> Option<Misfit> {
-    misfits(group).into_iter().max_by(|a, b| a.share.abs().total_cmp(&b.share.abs()))
+    misfits(group)
+        .into_iter()
+        .max_by(|a, b| a.share.abs().total_cmp(&b.share.abs()))
 }
 
-pub fn sections(result: &CfcResult) -> Vec<Section> {
+pub fn sections(campaign: &Campaign, result: &CfcResult) -> Vec<Section> {
     let mut sections = vec![records(result)];
     for pooled in &result.pooled {
-        sections.push(regression(result, pooled));
+        sections.push(regression(campaign, result, pooled));
     }
     sections
 }
@@ -98,7 +102,10 @@ fn records(result: &CfcResult) -> Section {
             shown.push((cut, "The cut whose averages the force model misses most"));
         }
     }
-    let mut blocks: Vec<Block> = shown.into_iter().map(|(cut, why)| record_figure(cut, why)).collect();
+    let mut blocks: Vec<Block> = shown
+        .into_iter()
+        .map(|(cut, why)| record_figure(cut, why))
+        .collect();
     blocks.push(cut_table(result));
     Section {
         id: "records".into(),
@@ -120,11 +127,16 @@ fn record_figure(cut: &CutAnalysis, why: &str) -> Block {
         };
         let middle_s = 0.5 * (cut.steady_s[0] + cut.steady_s[1]);
         ForceChannel {
-            label: channel.name.clone(),
+            label: channel.axis.label().into(),
             unit: channel.axis.unit().into(),
             start_s: trace.time_s.first().map_or(0.0, |t| t - 0.25 * stretch_s),
             sample_interval_s: 0.5 * stretch_s,
-            samples: trace.min.iter().zip(&trace.max).flat_map(|(a, b)| [*a, *b]).collect(),
+            samples: trace
+                .min
+                .iter()
+                .zip(&trace.max)
+                .flat_map(|(a, b)| [*a, *b])
+                .collect(),
             drift: cut.record_s.iter().map(|t| (*t, channel.drift.at(*t))).collect(),
             steady_level: Some(channel.average.value + channel.drift.at(middle_s)),
         }
@@ -132,27 +144,42 @@ fn record_figure(cut: &CutAnalysis, why: &str) -> Block {
     let drawing = ForceRecord {
         title: format!("Cut {}: record, drift and steady window", cut.id),
         channels: channels.collect(),
-        air_s: [cut.air_before_s, cut.air_after_s].into_iter().flatten().map(|[a, b]| (a, b)).collect(),
+        air_s: [cut.air_before_s, cut.air_after_s]
+            .into_iter()
+            .flatten()
+            .map(|[a, b]| (a, b))
+            .collect(),
         steady_s: Some((cut.steady_s[0], cut.steady_s[1])),
     };
     let caption = format!(
         "{why}: cut {}, {} rpm, feed {} mm. Steady window {}–{} s ({} turns, {}).",
         cut.id,
-        significant(cut.spindle_rpm, 5),
-        significant(cut.feed_mm, 3),
+        setting(cut.spindle_rpm),
+        setting(cut.feed_mm),
         decimals(cut.steady_s[0], 2),
         decimals(cut.steady_s[1], 2),
         decimals(cut.revolutions, 0),
-        if cut.steady_given { "given in the campaign" } else { "found by the program" },
+        if cut.steady_given {
+            "given in the campaign"
+        } else {
+            "found by the program"
+        },
     );
-    figure(format!("record-{}", cut.id), &drawing.title.clone(), caption, drawing.png())
+    figure(
+        format!("record-{}", cut.id),
+        &drawing.title.clone(),
+        caption,
+        drawing.png(),
+    )
 }
 
 fn cut_table(result: &CfcResult) -> Block {
-    let axes = || ForceAxis::ALL.into_iter().filter(|a| {
-        let used = |p: &Group| ForceAxis::of(p.process).contains(a);
-        result.pooled.iter().any(used)
-    });
+    let axes = || {
+        ForceAxis::ALL.into_iter().filter(|a| {
+            let used = |p: &Group| ForceAxis::of(p.process).contains(a);
+            result.pooled.iter().any(used)
+        })
+    };
     let mut columns = vec![
         Column::text("cut"),
         Column::number("rpm"),
@@ -167,8 +194,8 @@ fn cut_table(result: &CfcResult) -> Block {
     let rows = result.cuts.iter().map(|cut| {
         let mut row = vec![
             cut.id.clone(),
-            significant(cut.spindle_rpm, 5),
-            significant(cut.feed_mm, 3),
+            setting(cut.spindle_rpm),
+            setting(cut.feed_mm),
             decimals(cut.revolutions, 0),
             match (cut.air_before_s, cut.air_after_s) {
                 (Some(_), Some(_)) => "both ends",
@@ -200,22 +227,15 @@ fn cut_table(result: &CfcResult) -> Block {
     })
 }
 
-fn regression(result: &CfcResult, pooled: &Group) -> Section {
+fn regression(campaign: &Campaign, result: &CfcResult, pooled: &Group) -> Section {
     let name = process(pooled.process);
     let mut blocks = Vec::new();
     let axes = ForceAxis::of(pooled.process);
     for unit in ["N", "N·m"] {
         let of_unit: Vec<ForceAxis> = axes.iter().copied().filter(|a| a.unit() == unit).collect();
         if !of_unit.is_empty() {
-            blocks.push(line_figure(pooled, &of_unit, unit));
+            blocks.push(line_figure(campaign, pooled, &of_unit, unit));
         }
-    }
-    let drawn = axes.iter().any(|axis| feed_line(pooled, *axis).is_some());
-    if !drawn {
-        blocks.push(paragraph(
-            "No lines are drawn: the cuts differ in more than feed, so one line does not hold for all. The misfit of \
-             each cut is below.",
-        ));
     }
     blocks.push(coefficient_table(result, pooled));
     blocks.extend(misfit_map(pooled));
@@ -229,35 +249,60 @@ fn regression(result: &CfcResult, pooled: &Group) -> Section {
     }
 }
 
-fn line_figure(pooled: &Group, axes: &[ForceAxis], unit: &str) -> Block {
-    let series = axes.iter().map(|&axis| {
-        let points = pooled.points.iter().filter(|p| p.axis == axis).map(|p| RegressionPoint {
-            x: p.feed_mm,
-            y: p.measured,
-            std_error: Some(p.std_error),
-            excluded: false,
-        });
+fn line_figure(campaign: &Campaign, pooled: &Group, axes: &[ForceAxis], unit: &str) -> Block {
+    let mut series = Vec::new();
+    for &axis in axes {
         let r2 = pooled.r2[axis.index()].map_or(String::new(), |r| format!(", R² = {}", decimals(r, 4)));
-        RegressionSeries {
-            label: format!("{}{r2}", axis.label()),
-            points: points.collect(),
-            line: feed_line(pooled, axis),
-        }
-    });
+        let lines = feed_lines(campaign, pooled, axis);
+        let several = lines.len() > 1;
+        series.extend(lines.into_iter().map(|FeedLine { what, points, line }| {
+            RegressionSeries {
+                label: if several {
+                    format!("{}, {what}", axis.label())
+                } else {
+                    format!("{}{r2}", axis.label())
+                },
+                points: points
+                    .iter()
+                    .map(|p| RegressionPoint {
+                        x: p.feed_mm,
+                        y: p.measured,
+                        std_error: Some(p.std_error),
+                        excluded: false,
+                    })
+                    .collect(),
+                line,
+            }
+        }));
+    }
     let feed = match pooled.process {
         Process::Milling => "Feed per tooth (mm)",
         Process::Drilling => "Feed per revolution (mm)",
     };
     let quantity = if unit == "N" { "force" } else { "torque" };
     let drawing = RegressionFigure {
-        title: format!("Average {quantity} against feed, all cuts of {} together", process(pooled.process)),
+        title: format!(
+            "Average {quantity} against feed, all cuts of {} together",
+            process(pooled.process)
+        ),
         x_label: feed.into(),
         y_label: format!("Average {quantity} ({unit})"),
-        series: series.collect(),
+        series,
     };
+    let r2: Vec<String> = axes
+        .iter()
+        .filter_map(|a| {
+            Some(format!(
+                "R² of {} {}",
+                a.label(),
+                decimals(pooled.r2[a.index()]?, 4)
+            ))
+        })
+        .collect();
     let caption = format!(
-        "Average {quantity} in tool axes against feed: signs are the cuts (standard errors mostly smaller than the \
-         sign), lines the fitted force model."
+        "Average {quantity} in tool axes against feed: signs are the cuts with their standard errors (most are smaller \
+         than the sign), lines the fitted force model. {}.",
+        listed(&r2)
     );
     figure(
         format!("regression-{}-{quantity}", process(pooled.process)),
@@ -273,14 +318,22 @@ fn coefficient_table(result: &CfcResult, pooled: &Group) -> Block {
         Column::number("cuts"),
         Column::number("feeds"),
     ];
-    columns.extend(pooled.coefficients.iter().map(|c| Column::number(format!("{} {}", c.label, c.unit))));
+    columns.extend(
+        pooled
+            .coefficients
+            .iter()
+            .map(|c| Column::number(format!("{} {}", c.label, c.unit))),
+    );
     let axes = ForceAxis::of(pooled.process);
     columns.extend(axes.iter().map(|a| Column::number(format!("R² {}", a.label()))));
     let groups = result.groups.iter().filter(|g| g.process == pooled.process);
     let row = |group: &Group, name: String| {
         let mut row = vec![name, group.cuts.len().to_string(), group.feeds.to_string()];
         row.extend(group.coefficients.iter().map(value_text));
-        row.extend(axes.iter().map(|a| group.r2[a.index()].map_or("–".into(), |r| decimals(r, 4))));
+        row.extend(
+            axes.iter()
+                .map(|a| group.r2[a.index()].map_or("–".into(), |r| decimals(r, 4))),
+        );
         row
     };
     let mut rows: Vec<Vec<String>> = groups
@@ -293,8 +346,8 @@ fn coefficient_table(result: &CfcResult, pooled: &Group) -> Block {
         columns,
         rows,
         notes: vec![
-            "K.c: cutting coefficients (grow with the chip); K.e: edge coefficients (rubbing, present at any feed). t, \
-             r, a: tangential, radial, axial."
+            "K.c: cutting coefficients (their force grows with the chip); K.e: edge coefficients (rubbing, the same at \
+             any feed). Tangential t, radial r, axial a; drilling: f along the feed."
                 .into(),
         ],
     })
@@ -307,7 +360,10 @@ fn misfit_map(pooled: &Group) -> Option<Block> {
     }
     let axes = ForceAxis::of(pooled.process);
     let value = |cut: &String, axis: &ForceAxis| {
-        misfits.iter().find(|m| m.cut == *cut && m.axis == *axis).map(|m| m.share.abs())
+        misfits
+            .iter()
+            .find(|m| m.cut == *cut && m.axis == *axis)
+            .map(|m| m.share.abs())
     };
     let drawing = HeatMap {
         title: "Misfit of each cut's average force".into(),
@@ -315,7 +371,11 @@ fn misfit_map(pooled: &Group) -> Option<Block> {
         column_label: "Axis".into(),
         rows: pooled.cuts.clone(),
         columns: axes.iter().map(|a| a.label().to_string()).collect(),
-        values: pooled.cuts.iter().map(|c| axes.iter().map(|a| value(c, a)).collect()).collect(),
+        values: pooled
+            .cuts
+            .iter()
+            .map(|c| axes.iter().map(|a| value(c, a)).collect())
+            .collect(),
         value_label: "misfit / largest average of the axis".into(),
         ..Default::default()
     };
@@ -335,13 +395,4 @@ fn value_text(coefficient: &Coefficient) -> String {
         (Some(value), None) => significant(value, 4),
         (None, _) => "not determined".into(),
     }
-}
-
-/// `929.8 ± 0.5`: decimals by the error, which keeps two figures.
-fn with_error(value: f64, error: f64) -> String {
-    if !(error > 0.0 && error.is_finite()) {
-        return significant(value, 5);
-    }
-    let places = (1.0 - error.log10().floor()).clamp(0.0, 4.0) as usize;
-    format!("{} ± {}", decimals(value, places), decimals(error, places))
 }

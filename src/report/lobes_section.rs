@@ -2,7 +2,7 @@
 
 use super::figure::{LobeCurve, LobeMarker, LobeOutcome, LobesFigure};
 use super::number::{decimals, percent, significant};
-use super::parts::{count, figure, paragraph};
+use super::parts::{figure, paragraph};
 use super::structure_section::NOISE_LIKE;
 use super::{Block, Column, Section, Table};
 use crate::analysis::{LobeAnalysis, LobeFindings, StructureFindings};
@@ -30,12 +30,16 @@ pub fn summary(findings: &LobeFindings) -> String {
         ),
     };
     if let Some((case, peak)) = analysis.best().first() {
-        let place = case.posture.as_ref().map(|p| format!(" at {p}")).unwrap_or_default();
+        let place = case
+            .posture
+            .as_ref()
+            .map(|p| format!(" at {p}"))
+            .unwrap_or_default();
         let depth = peak.depth_mm.map_or("without limit".to_string(), |d| {
             format!("with a limit of {} mm", significant(d, 3))
         });
         text += &format!(
-            " The best speed between {} and {} rpm is {} rpm{place}, {depth}.",
+            " The deepest tip of a lobe between {} and {} rpm is at {} rpm{place}, {depth}.",
             analysis.spindle_rpm[0],
             analysis.spindle_rpm[1],
             decimals(peak.spindle_rpm, 0)
@@ -90,7 +94,7 @@ pub fn section(findings: &LobeFindings, structure: Option<&StructureFindings>) -
         Some(Ok(measured)) => {
             blocks.push(paragraph(
                 "The same cut on the FRFs as measured, with no model in between. Measured FRFs end at their last line \
-                 and carry noise; where both agree, the model may be trusted for lobes.",
+                 and carry noise; where both curves agree, the lobes do not hang on the model.",
             ));
             blocks.extend(figures(measured, "lobes-measured", "measured FRFs: "));
         }
@@ -141,7 +145,7 @@ fn figures(analysis: &LobeAnalysis, file: &str, prefix: &str) -> Vec<Block> {
                     Some(LobeMarker {
                         spindle_rpm: peak.spindle_rpm,
                         depth_mm: peak.depth_mm?,
-                        outcome: LobeOutcome::Recommended,
+                        outcome: LobeOutcome::Tip,
                     })
                 })
                 .take(MARKED);
@@ -212,7 +216,7 @@ fn best(analysis: &LobeAnalysis) -> Block {
     let rows: Vec<Vec<String>> = rows.collect();
     let [from, to, _] = analysis.spindle_rpm;
     Block::Table(Table {
-        caption: format!("Best speeds between {from} and {to} rpm: {}", count(rows.len(), "tip", "tips")),
+        caption: format!("Deepest tips between {from} and {to} rpm"),
         columns: vec![
             Column::text("posture"),
             Column::number("speed (rpm)"),
@@ -221,8 +225,9 @@ fn best(analysis: &LobeAnalysis) -> Block {
         ],
         rows,
         notes: vec![
-            "Tips are narrow: a spindle or a frequency that is a few per cent off falls from the tip into the next \
-             lobe. Stay well below and try the speed."
+            "Only tips within the range: a curve that still rises at the end of the range is deeper there.".into(),
+            "Many tips are narrow: with a speed or a frequency a few per cent off the limit may be far lower. Stay well \
+             below it and try the speed."
                 .into(),
         ],
     })

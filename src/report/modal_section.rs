@@ -1,7 +1,7 @@
 //! Modes of the measured FRFs.
 
-use super::number::{decimals, percent};
-use super::parts::count;
+use super::number::decimals;
+use super::parts::{count, with_error};
 use super::{Block, Column, Section, Table};
 use crate::analysis::ModalAnalysis;
 
@@ -33,8 +33,8 @@ pub fn section(analysis: &ModalAnalysis) -> Section {
         for mode in &posture.modes {
             rows.push(vec![
                 posture.posture.clone(),
-                format!("{} ± {}", decimals(mode.frequency_hz, 3), decimals(mode.frequency_std_hz, 3)),
-                format!("{} ± {}", percent(mode.damping_ratio), percent(mode.damping_std)),
+                with_error(mode.frequency_hz, mode.frequency_std_hz),
+                with_error(100.0 * mode.damping_ratio, 100.0 * mode.damping_std),
                 format!("{} of {}", mode.found_in, posture.frfs),
             ]);
         }
@@ -44,13 +44,20 @@ pub fn section(analysis: &ModalAnalysis) -> Section {
         columns: vec![
             Column::text("posture"),
             Column::number("frequency (Hz)"),
-            Column::number("damping ratio"),
+            Column::number("damping ratio (%)"),
             Column::number("seen in FRFs"),
         ],
         rows,
         notes: vec!["± is one standard deviation.".into()],
     })];
-    blocks.extend(analysis.warnings.iter().take(MOST_WARNINGS).cloned().map(Block::Warning));
+    blocks.extend(
+        analysis
+            .warnings
+            .iter()
+            .take(MOST_WARNINGS)
+            .cloned()
+            .map(Block::Warning),
+    );
     if analysis.warnings.len() > MOST_WARNINGS {
         let rest = analysis.warnings.len() - MOST_WARNINGS;
         blocks.push(Block::Paragraph(format!(

@@ -16,10 +16,7 @@ pub const NOISE_LIKE: f64 = 1.1;
 /// What a reader must know of the fit, in plain words.
 pub fn summary(findings: &StructureFindings) -> String {
     let data = &findings.analysis.case.data;
-    let (before, after) = (
-        &findings.analysis.before.totals,
-        &findings.analysis.after.totals,
-    );
+    let (before, after) = (&findings.analysis.before.totals, &findings.analysis.after.totals);
     let mut text = format!(
         "{} at {} were compared with the model of the {}. With the values of the robot file the error (nrms) was {}; \
          after calibration it is {}. The noise of the measurement itself amounts to {}.",
@@ -44,9 +41,10 @@ fn verdict(findings: &StructureFindings) -> String {
     let after = &findings.analysis.after;
     let times = |nrms: f64, floor: f64| if floor > 0.0 { nrms / floor } else { f64::INFINITY };
     let total = times(after.totals.nrms, after.totals.noise_floor_nrms);
-    let worst_band = after.by_band.iter().max_by(|a, b| {
-        times(a.nrms, a.noise_floor_nrms).total_cmp(&times(b.nrms, b.noise_floor_nrms))
-    });
+    let worst_band = after
+        .by_band
+        .iter()
+        .max_by(|a, b| times(a.nrms, a.noise_floor_nrms).total_cmp(&times(b.nrms, b.noise_floor_nrms)));
     let band_text = worst_band.map(|b| {
         let (from, to) = (significant(b.from_hz, 3), significant(b.to_hz, 3));
         let times = significant(times(b.nrms, b.noise_floor_nrms), 2);
@@ -75,26 +73,52 @@ fn verdict(findings: &StructureFindings) -> String {
 }
 
 pub fn sections(findings: &StructureFindings) -> Vec<Section> {
-    vec![frf_section(findings), map_section(findings), parameter_section(findings)]
+    vec![
+        frf_section(findings),
+        map_section(findings),
+        parameter_section(findings),
+    ]
 }
 
 /// Model against measurement as curves.
 pub fn frf_section(findings: &StructureFindings) -> Section {
     let errors = &findings.analysis.after.frf_errors;
     let mut order: Vec<usize> = (0..errors.len()).collect();
-    order.sort_by(|&a, &b| errors[b].nrms.total_cmp(&errors[a].nrms));
-    let best = order.last().copied();
-    let worst: Vec<usize> = order.iter().copied().take(WORST_SHOWN).filter(|i| Some(*i) != best).collect();
+    order.sort_by(|&a, &b| errors[b].beyond_noise().total_cmp(&errors[a].beyond_noise()));
+    let best = order
+        .iter()
+        .copied()
+        .min_by(|&a, &b| errors[a].nrms.total_cmp(&errors[b].nrms));
+    let worst: Vec<usize> = order
+        .iter()
+        .copied()
+        .take(WORST_SHOWN)
+        .filter(|i| Some(*i) != best)
+        .collect();
     let mut blocks = Vec::new();
     if let Some(best) = best {
-        blocks.push(frf_figure(findings, best, "frf-best", "The FRF that the calibrated model meets best"));
+        blocks.push(frf_figure(
+            findings,
+            best,
+            "frf-best",
+            "The FRF that the calibrated model meets best",
+        ));
     }
     for (rank, &index) in worst.iter().enumerate() {
-        let place = ["The FRF with the largest error", "Second largest error", "Third largest error"]
-            .get(rank)
-            .copied()
-            .unwrap_or("A large error");
-        blocks.push(frf_figure(findings, index, &format!("frf-worst-{}", rank + 1), place));
+        let place = [
+            "The FRF with most error beyond its noise",
+            "Second most error beyond noise",
+            "Third most error beyond noise",
+        ]
+        .get(rank)
+        .copied()
+        .unwrap_or("Much error beyond noise");
+        blocks.push(frf_figure(
+            findings,
+            index,
+            &format!("frf-worst-{}", rank + 1),
+            place,
+        ));
     }
     blocks.push(frf_table(findings, &order));
     Section {
@@ -155,8 +179,11 @@ fn frf_figure(findings: &StructureFindings, index: usize, file: &str, place: &st
 
 /// FRF names often hold the posture already.
 fn frf_name(posture: &str, name: &str) -> String {
-    if name.split_whitespace().next() == Some(posture) {
-        format!("Posture {name}")
+    if name.split_once(' ').is_some_and(|(first, _)| first == posture) {
+        format!(
+            "Posture {posture}, {}",
+            name.trim_start_matches(posture).trim_start()
+        )
     } else {
         format!("Posture {posture}, {name}")
     }
@@ -166,7 +193,11 @@ fn frf_table(findings: &StructureFindings, order: &[usize]) -> Block {
     let (before, after) = (&findings.analysis.before, &findings.analysis.after);
     let row = |&index: &usize| {
         let (b, a) = (before.frf_errors.get(index)?, after.frf_errors.get(index)?);
-        let times = if a.noise_floor_nrms > 0.0 { a.nrms / a.noise_floor_nrms } else { f64::NAN };
+        let times = if a.noise_floor_nrms > 0.0 {
+            a.nrms / a.noise_floor_nrms
+        } else {
+            f64::NAN
+        };
         Some(vec![
             frf_name(&a.posture, &a.name),
             percent(b.nrms),
@@ -176,14 +207,15 @@ fn frf_table(findings: &StructureFindings, order: &[usize]) -> Block {
         ])
     };
     let mut notes = vec![
-        "Error: root of the summed squared differences over the summed squared measurement (nrms).".to_string(),
+        "Error: root of the summed squared differences over the summed squared measurement (nrms)."
+            .to_string(),
         "× noise: 1 where only noise is left.".to_string(),
     ];
     if order.len() > LISTED {
-        notes.push(format!("The worst {LISTED} of {}.", order.len()));
+        notes.push(format!("The first {LISTED} of {}.", order.len()));
     }
     Block::Table(Table {
-        caption: "FRFs by error, worst first".into(),
+        caption: "FRFs by error beyond noise, worst first".into(),
         columns: vec![
             Column::text("FRF (response/force)"),
             Column::number("robot file"),
@@ -226,13 +258,25 @@ pub fn map_section(findings: &StructureFindings) -> Section {
     let mut blocks = vec![figure(
         "error-posture-direction",
         "Error of the calibrated model by posture and direction",
-        "Error of the calibrated model by posture and direction, all frequencies together. A direction that is much \
-         worse than the others points to what is missing.",
+        "Error of the calibrated model by posture and direction, all frequencies together. A posture or a \
+         direction that is much worse than the others is where to look first.",
         by_direction.png(),
     )];
     for (file, title, row_label, rows, values) in [
-        ("error-posture-band", "posture", "Posture", &map.postures, &map.posture_band),
-        ("error-direction-band", "direction", "Direction", &map.directions, &map.direction_band),
+        (
+            "error-posture-band",
+            "posture",
+            "Posture",
+            &map.postures,
+            &map.posture_band,
+        ),
+        (
+            "error-direction-band",
+            "direction",
+            "Direction",
+            &map.directions,
+            &map.direction_band,
+        ),
     ] {
         let drawing = heat(
             &format!("Calibrated model: error by {title} and frequency band"),
@@ -245,15 +289,16 @@ pub fn map_section(findings: &StructureFindings) -> Section {
         blocks.push(figure(
             file,
             &drawing.title.clone(),
-            format!(
-                "Error of the calibrated model by {title} and frequency band. Where the robot hardly moves (between \
-                 and above resonances) noise is a larger share of the signal."
-            ),
+            format!("Error of the calibrated model by {title} and frequency band."),
             drawing.png(),
         ));
     }
     let rows = after.by_band.iter().map(|b| {
-        let times = if b.noise_floor_nrms > 0.0 { b.nrms / b.noise_floor_nrms } else { f64::NAN };
+        let times = if b.noise_floor_nrms > 0.0 {
+            b.nrms / b.noise_floor_nrms
+        } else {
+            f64::NAN
+        };
         vec![
             format!("{}–{} Hz", significant(b.from_hz, 3), significant(b.to_hz, 3)),
             percent(b.nrms),
@@ -275,7 +320,8 @@ pub fn map_section(findings: &StructureFindings) -> Section {
     Section {
         id: "error-map".into(),
         title: "Where the error is".into(),
-        lead: "Dark cells are where the calibrated model and the measurement differ most.".into(),
+        lead: "Dark cells are where the calibrated model and the measurement differ most for their size. Where the robot \
+               hardly moves that may be noise alone: the table at the end says.".into(),
         blocks,
     }
 }
@@ -311,11 +357,18 @@ pub fn parameter_section(findings: &StructureFindings) -> Section {
     let fit = format!(
         "The fit {} after {} from {}. Weighted misfit per residual (reduced χ²): {}; 1 would be noise alone. Standard \
          errors include that misfit and what was assumed beforehand of each parameter, not what the model lacks.",
-        if calibration.converged { "converged" } else { "did NOT converge" },
+        if calibration.converged {
+            "converged"
+        } else {
+            "did NOT converge"
+        },
         count(calibration.iterations, "iteration", "iterations"),
         match calibration.starts {
             1 => "one starting point".to_string(),
-            n => format!("{n} starting points ({} of them led here)", calibration.starts_agreeing),
+            n => format!(
+                "{n} starting points ({} of them led here)",
+                calibration.starts_agreeing
+            ),
         },
         significant(calibration.reduced_chi2, 3),
     );
@@ -327,7 +380,8 @@ pub fn parameter_section(findings: &StructureFindings) -> Section {
             figure(
                 "parameters",
                 "Deviation of each parameter from the robot file, with standard error",
-                "Deviation of each parameter from the robot file; the line through the bar's end is one standard error.",
+                "Deviation of each parameter from the robot file. The thin line at the end of a bar spans one standard \
+                 error to either side; it may be too short to see.",
                 drawing.png(),
             ),
             Block::Table(Table {
@@ -357,19 +411,33 @@ pub fn posture_section(postures: &[PostureFindings]) -> Section {
     let mega = |v: f64| significant(v / 1e6, 4);
     let mut rows = Vec::new();
     for posture in postures {
-        let states = [("robot file", Some(&posture.nominal)), ("calibrated", posture.calibrated.as_ref())];
+        let states = [
+            ("robot file", Some(&posture.nominal)),
+            ("calibrated", posture.calibrated.as_ref()),
+        ];
         for (state, report) in states.into_iter().filter_map(|(s, r)| Some((s, r?))) {
             let mut row = vec![posture.id.clone(), state.to_string()];
             row.extend(report.tcp_stiffness_n_per_m.map(mega));
             row.extend(report.flange_stiffness_n_per_m.map(mega));
-            let frequencies: Vec<String> =
-                report.natural_frequencies_hz.iter().take(6).map(|f| decimals(*f, 1)).collect();
+            let frequencies: Vec<String> = report
+                .natural_frequencies_hz
+                .iter()
+                .take(6)
+                .map(|f| decimals(*f, 1))
+                .collect();
             row.push(frequencies.join("  "));
             rows.push(row);
         }
     }
     let mut columns = vec![Column::text("posture"), Column::text("state")];
-    let numbers = ["tool Kx", "tool Ky", "tool Kz", "flange Kx", "flange Ky", "flange Kz"];
+    let numbers = [
+        "tool Kx",
+        "tool Ky",
+        "tool Kz",
+        "flange Kx",
+        "flange Ky",
+        "flange Kz",
+    ];
     columns.extend(numbers.map(|name| Column::number(name)));
     columns.push(Column::text("first natural frequencies (Hz)"));
     let ids: Vec<String> = postures.iter().map(|p| p.id.clone()).collect();

@@ -37,7 +37,10 @@ pub fn tables(findings: &CampaignFindings) -> Result<Vec<ResultTable>> {
     }
     if let Some(lobes) = findings.lobes() {
         let measured = lobes.measured.as_ref().and_then(|m| m.as_ref().ok());
-        frames.push(("lobes", lobe_curves([Some(&lobes.asked), measured].into_iter().flatten())));
+        frames.push((
+            "lobes",
+            lobe_curves([Some(&lobes.asked), measured].into_iter().flatten()),
+        ));
     }
     let mut tables = Vec::new();
     for (name, frame) in frames {
@@ -47,7 +50,9 @@ pub fn tables(findings: &CampaignFindings) -> Result<Vec<ResultTable>> {
             continue;
         }
         let mut bytes = Vec::new();
-        ParquetWriter::new(&mut bytes).finish(&mut frame).map_err(failed)?;
+        ParquetWriter::new(&mut bytes)
+            .finish(&mut frame)
+            .map_err(failed)?;
         tables.push(ResultTable { name, bytes });
     }
     Ok(tables)
@@ -73,7 +78,9 @@ type Analysis = crate::analysis::StructureAnalysis;
 
 fn frf_errors(analysis: &Analysis) -> PolarsResult<DataFrame> {
     let (before, after) = (&analysis.before.frf_errors, &analysis.after.frf_errors);
-    let text = |f: fn(&crate::discrepancy::FrfError) -> &String| after.iter().map(|e| f(e).clone()).collect::<Vec<_>>();
+    let text = |f: fn(&crate::discrepancy::FrfError) -> &String| {
+        after.iter().map(|e| f(e).clone()).collect::<Vec<_>>()
+    };
     df!(
         "posture" => text(|e| &e.posture),
         "frf" => text(|e| &e.name),
@@ -88,9 +95,12 @@ fn frf_errors(analysis: &Analysis) -> PolarsResult<DataFrame> {
 fn band_errors(analysis: &Analysis) -> PolarsResult<DataFrame> {
     let edges = &analysis.after.map.band_edges_hz;
     let (mut posture, mut frf, mut direction) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut from_hz, mut to_hz, mut before_nrms, mut after_nrms) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let (mut from_hz, mut to_hz, mut before_nrms, mut after_nrms) =
+        (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for (before, after) in analysis.before.frf_errors.iter().zip(&analysis.after.frf_errors) {
-        let bands = edges.windows(2).zip(before.band_nrms.iter().zip(&after.band_nrms));
+        let bands = edges
+            .windows(2)
+            .zip(before.band_nrms.iter().zip(&after.band_nrms));
         for (edge, (b, a)) in bands.filter(|(_, (_, a))| a.is_some()) {
             posture.push(after.posture.clone());
             frf.push(after.name.clone());
@@ -148,8 +158,16 @@ fn modes(modal: &crate::analysis::ModalAnalysis) -> PolarsResult<DataFrame> {
 fn cut_averages(result: &CfcResult) -> PolarsResult<DataFrame> {
     let cuts = &result.cuts;
     let average = |axis: ForceAxis| move |c: &crate::cutting::CutAnalysis| c.averages[axis.index()];
-    let value = |axis| cuts.iter().map(move |c| average(axis)(c).map(|a| a.value)).collect::<Vec<_>>();
-    let error = |axis| cuts.iter().map(move |c| average(axis)(c).and_then(|a| finite(a.std_error))).collect::<Vec<_>>();
+    let value = |axis| {
+        cuts.iter()
+            .map(move |c| average(axis)(c).map(|a| a.value))
+            .collect::<Vec<_>>()
+    };
+    let error = |axis| {
+        cuts.iter()
+            .map(move |c| average(axis)(c).and_then(|a| finite(a.std_error)))
+            .collect::<Vec<_>>()
+    };
     let fitted = |axis: ForceAxis| {
         let points = || result.pooled.iter().flat_map(|g| &g.points);
         let of_cut = |id: &str| points().find(|p| p.cut == id && p.axis == axis).map(|p| p.fitted);
@@ -199,7 +217,9 @@ fn coefficients(result: &CfcResult) -> PolarsResult<DataFrame> {
     )
 }
 
-fn lobe_curves<'a>(analyses: impl Iterator<Item = &'a crate::analysis::LobeAnalysis>) -> PolarsResult<DataFrame> {
+fn lobe_curves<'a>(
+    analyses: impl Iterator<Item = &'a crate::analysis::LobeAnalysis>,
+) -> PolarsResult<DataFrame> {
     let (mut source, mut posture, mut rpm) = (Vec::new(), Vec::new(), Vec::new());
     let (mut depth, mut chatter) = (Vec::new(), Vec::new());
     for analysis in analyses {

@@ -31,9 +31,11 @@ pub fn section(findings: &ThesisFindings) -> Section {
         "Frequency of the strongest mode in each direction.",
         true,
     ));
-    blocks.push(row_table("Frequency of the strongest mode (tables 9 and 15)", &study.frequencies, |v| {
-        decimals(v, 2)
-    }));
+    blocks.push(row_table(
+        "Frequency of the strongest mode (tables 9 and 15)",
+        &study.frequencies,
+        |v| decimals(v, 2),
+    ));
     blocks.push(paragraph(frequency_text(findings)));
     blocks.push(row_table(
         "Largest real part of the receptance at that mode (µm/N)",
@@ -48,15 +50,27 @@ pub fn section(findings: &ThesisFindings) -> Section {
     Section {
         id: "thesis".into(),
         title: "The source thesis put right (ABB IRB 6640)".into(),
-        lead: "Published model, measurement and this program side by side, with what remains unexplained.".into(),
+        lead: "Published model, measurement and this program side by side, with what remains unexplained."
+            .into(),
         blocks,
     }
 }
 
 /// `1.06 to 1.18`, or one number where both are the same.
 fn range([low, high]: Range) -> String {
-    let (low, high) = (decimals(low, 2), decimals(high, 2));
-    if low == high { low } else { format!("{low} to {high}") }
+    let text = |v: f64| {
+        if v < 10.0 {
+            decimals(v, 2)
+        } else {
+            significant(v, 3)
+        }
+    };
+    let (low, high) = (text(low), text(high));
+    if low == high {
+        low
+    } else {
+        format!("{low} to {high}")
+    }
 }
 
 fn maybe(value: Option<Range>) -> String {
@@ -71,10 +85,13 @@ fn static_text(findings: &ThesisFindings) -> String {
         maybe(findings.static_after),
     );
     if findings.static_got_worse() {
-        text += " So calibrating on the modal tables pulls the static stiffness away from its own measurement: the \
-                 fit buys its frequencies with joints that are too stiff. Static and modal measurements do not agree \
-                 on one set of joint stiffnesses in this model; at least one thing is missing or wrong in the model, \
-                 in the masses, or in one of the two measurements.";
+        text += " So calibrating on the modal tables pulls the static stiffness, which the fit did not see, away from \
+                 its measurement.";
+        if findings.static_after.is_some_and(|[low, _]| low > 1.0) {
+            text += " The fit buys its frequencies with joints stiffer than the static measurement shows.";
+        }
+        text += " In this model one set of joint stiffnesses does not meet both measurements: something is missing or \
+                 wrong in the model, in its masses, or in one of the two measurements.";
     } else {
         text += " Calibrating on the modal tables brought the static stiffness, which it did not see, no further from \
                  its measurement.";
@@ -84,17 +101,28 @@ fn static_text(findings: &ThesisFindings) -> String {
 
 fn frequency_text(findings: &ThesisFindings) -> String {
     let study = &findings.study;
+    let mut predicted: Vec<String> = Vec::new();
+    for row in study.frequencies.iter().filter(|r| !r.fitted) {
+        if !predicted.contains(&row.posture) {
+            predicted.push(row.posture.clone());
+        }
+    }
     format!(
         "Frequencies, model over measurement: as published {}, ours before {}. After the fit the error (rms) is {} on \
-         the configurations that were fitted and {} on configuration 4, which was predicted: there the model gives {} \
+         the configurations that were fitted and {} on configuration {}, which was predicted: there the model gives {} \
          times the measured frequency, against {} before the fit.{}",
         maybe(findings.frequency_published),
         maybe(findings.frequency_before),
         percent(study.fitted_frequency_error),
         percent(study.predicted_frequency_error),
+        listed(&predicted),
         maybe(findings.predicted_after),
         maybe(findings.predicted_before),
-        if study.converged { "" } else { " The fit did NOT converge." },
+        if study.converged {
+            ""
+        } else {
+            " The fit did NOT converge."
+        },
     )
 }
 
@@ -112,6 +140,7 @@ fn unexplained_text(findings: &ThesisFindings) -> String {
         .study
         .unexplained
         .iter()
+        .filter(|band| !(band.from_hz..=band.to_hz).contains(&band.nearest_model_hz))
         .map(|band| {
             format!(
                 "{} minima of the real part at {}–{} Hz (configurations {}), while the model's nearest mode is at {} Hz",
@@ -123,10 +152,13 @@ fn unexplained_text(findings: &ThesisFindings) -> String {
             )
         })
         .collect();
+    if bands.is_empty() {
+        return "The calibrated model has a mode in each band where the thesis measured resonances again and again.".into();
+    }
     format!(
-        "Not explained: the thesis measured {}. A chain of rigid links on six joint springs has no mode there, \
-         calibrated or not. Something that it lacks (bending links, bearings that tilt, the spindle's holder, the base) \
-         must move there; the public tables do not say which.",
+        "Not explained: the thesis measured {}. Rigid links on joint springs, as calibrated here, have no mode \
+         there. Something that this model lacks (bending links, bearings that tilt, the spindle's holder, the base) may \
+         move there; the public tables do not say which.",
         bands.join(", and "),
     )
 }
@@ -162,7 +194,11 @@ fn value_figure(
         ],
         log,
     };
-    let caption = if log { format!("{caption} The scale is logarithmic.") } else { caption.to_string() };
+    let caption = if log {
+        format!("{caption} The scale is logarithmic.")
+    } else {
+        caption.to_string()
+    };
     figure(file, title, caption, drawing.png())
 }
 
@@ -179,7 +215,9 @@ fn static_figure(findings: &ThesisFindings) -> Block {
 }
 
 fn ratio(value: Option<f64>, measured: Option<f64>) -> String {
-    value.zip(measured).map_or("–".into(), |(v, m)| decimals(v / m, 2))
+    value
+        .zip(measured)
+        .map_or("–".into(), |(v, m)| decimals(v / m, 2))
 }
 
 fn row_table(caption: &str, rows: &[Row], text: impl Fn(f64) -> String) -> Block {
@@ -221,9 +259,11 @@ fn row_table(caption: &str, rows: &[Row], text: impl Fn(f64) -> String) -> Block
 }
 
 fn static_table(findings: &ThesisFindings) -> Block {
-    row_table("Static stiffness at the flange (tables 5 and 6), N/µm", &findings.study.static_stiffness, |v| {
-        significant(v * 1e-6, 4)
-    })
+    row_table(
+        "Static stiffness at the flange (tables 5 and 6), N/µm",
+        &findings.study.static_stiffness,
+        |v| significant(v * 1e-6, 4),
+    )
 }
 
 fn parameter_table(findings: &ThesisFindings) -> Block {
@@ -249,7 +289,9 @@ fn parameter_table(findings: &ThesisFindings) -> Block {
 
 fn peak(peak: Option<Peak>) -> String {
     let depth = |depth: Option<f64>| depth.map_or("no limit".into(), |d| decimals(d, 3));
-    peak.map_or("–".into(), |p| format!("{} / {}", decimals(p.spindle_rpm, 0), depth(p.depth_mm)))
+    peak.map_or("–".into(), |p| {
+        format!("{} / {}", decimals(p.spindle_rpm, 0), depth(p.depth_mm))
+    })
 }
 
 fn lobe_table(findings: &ThesisFindings) -> Block {
@@ -269,12 +311,16 @@ fn lobe_table(findings: &ThesisFindings) -> Block {
                 format!("{c}: {name}"),
                 peak(tips.second_region),
                 peak(tips.first_region),
-                tips.absolute_limit.map_or("–".into(), |a| decimals(a.depth_mm, 4)),
+                tips.absolute_limit
+                    .map_or("–".into(), |a| decimals(a.depth_mm, 4)),
             ]
         };
         rows.push(theirs("the thesis's own program", &row.published_program));
         rows.push(theirs("commercial program, measured FRFs", &row.commercial));
-        rows.push(ours("ours, FRFs rebuilt from the measured minima", &row.from_measurements));
+        rows.push(ours(
+            "ours, FRFs rebuilt from the measured minima",
+            &row.from_measurements,
+        ));
         rows.push(ours("ours, model before", &row.from_model_before));
         rows.push(ours("ours, model after", &row.from_model_after));
     }
@@ -294,7 +340,7 @@ fn lobe_table(findings: &ThesisFindings) -> Block {
 fn lobe_text(findings: &ThesisFindings) -> String {
     format!(
         "Depths: the thesis's own program gave {} times the commercial program's depths; ours, from FRFs rebuilt out of \
-         the measured minima, are of the commercial size (theirs are {} times ours). Speeds do not agree: the \
+         the measured minima, are of the commercial program's order (theirs are {} times ours). Speeds do not agree: the \
          commercial program's tips lie at {} times our speeds in the second region and at {} times in the first. Tips \
          of a single mode must lie near 60 f/(N k), with N = {} teeth and k waves between two teeth, which is where ours \
          are. The two programs therefore cannot have used the same number of teeth, the same mode or the same \

@@ -3,5 +3,7 @@
 mod campaign;
 mod cfc;
 mod contract;
+mod demo;
 mod inspect;
 mod modal;
+mod report;

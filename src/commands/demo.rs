@@ -271,7 +271,7 @@ fn lobes(lobes: &LobeFindings) -> String {
             .depth_mm
             .map_or("no limit".into(), |d| format!("{} mm", number(d, 3)));
         format!(
-            "; best speed {} rpm at {place} ({depth})",
+            "; deepest tip of a lobe at {} rpm and {place} ({depth})",
             number(peak.spindle_rpm, 4)
         )
     });
@@ -297,9 +297,14 @@ fn compared(s: &StructureFindings) -> String {
 
 fn case_study(t: &ThesisFindings) -> String {
     format!(
-        "frequencies of the IRB 6640 within {} (fitted) and {} (predicted), rms; two bands of resonances stay unexplained",
+        "frequencies of the IRB 6640 within {} (fitted) and {} (predicted), rms; {} measured bands of resonances stay unexplained",
         percent(t.study.fitted_frequency_error),
-        percent(t.study.predicted_frequency_error)
+        percent(t.study.predicted_frequency_error),
+        t.study
+            .unexplained
+            .iter()
+            .filter(|b| !(b.from_hz..=b.to_hz).contains(&b.nearest_model_hz))
+            .count(),
     )
 }
 

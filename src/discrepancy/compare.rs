@@ -51,12 +51,14 @@ pub struct FrfError {
 }
 
 impl FrfError {
-    /// What is left of the error when the noise is taken off, as an nrms: 0 where only noise is left. A small FRF that
-    /// drowns in noise has a large nrms and says nothing of the model.
-    pub fn beyond_noise(&self) -> f64 {
-        (self.nrms.powi(2) - self.noise_floor_nrms.powi(2))
-            .max(0.0)
-            .sqrt()
+    /// Error over noise: 1 where only noise is left. A small FRF that drowns in noise has a large nrms, which says
+    /// nothing of the model; this does.
+    pub fn times_noise(&self) -> f64 {
+        if self.noise_floor_nrms > 0.0 {
+            self.nrms / self.noise_floor_nrms
+        } else {
+            f64::INFINITY
+        }
     }
 }
 
@@ -71,6 +73,8 @@ pub struct ErrorMap {
     pub nrms: Vec<Vec<Vec<Option<f64>>>>,
     /// All bands together: `[posture][direction]`.
     pub posture_direction: Vec<Vec<Option<f64>>>,
+    /// The same, error over noise: 1 where only noise is left.
+    pub posture_direction_times_noise: Vec<Vec<Option<f64>>>,
     /// All directions together: `[posture][band]`.
     pub posture_band: Vec<Vec<Option<f64>>>,
     /// All postures together: `[direction][band]`.
@@ -116,6 +120,12 @@ impl Sums {
     /// `None` where nothing was measured.
     fn measured_nrms(&self) -> Option<f64> {
         (self.signal > 0.0).then(|| self.nrms())
+    }
+
+    /// Error over noise; `None` where nothing was measured.
+    fn times_noise(&self) -> Option<f64> {
+        let floor = self.floor();
+        (self.signal > 0.0 && floor > 0.0).then(|| self.nrms() / floor)
     }
 
     /// The measurement's noise. What a model of a handful of parameters leaves over bounds it from above, and where
@@ -269,21 +279,16 @@ fn error_map(
             sums[p][d][*band].add(*cell);
         }
     }
-    let together = |rows: usize, columns: usize, cell: &dyn Fn(usize, usize) -> Vec<Sums>| {
-        let nrms = |row, column| {
-            let mut total = Sums::default();
-            cell(row, column).into_iter().for_each(|s| total.add(s));
-            total.measured_nrms()
-        };
-        (0..rows)
-            .map(|r| (0..columns).map(|c| nrms(r, c)).collect())
-            .collect()
-    };
     let (np, nd) = (postures.len(), directions.len());
     ErrorMap {
-        posture_direction: together(np, nd, &|p, d| sums[p][d].clone()),
-        posture_band: together(np, BANDS, &|p, b| sums[p].iter().map(|d| d[b]).collect()),
-        direction_band: together(nd, BANDS, &|d, b| sums.iter().map(|p| p[d][b]).collect()),
+        posture_direction: together(np, nd, Sums::measured_nrms, |p, d| sums[p][d].clone()),
+        posture_direction_times_noise: together(np, nd, Sums::times_noise, |p, d| sums[p][d].clone()),
+        posture_band: together(np, BANDS, Sums::measured_nrms, |p, b| {
+            sums[p].iter().map(|d| d[b]).collect()
+        }),
+        direction_band: together(nd, BANDS, Sums::measured_nrms, |d, b| {
+            sums.iter().map(|p| p[d][b]).collect()
+        }),
         postures: postures.iter().map(|g| g.name.clone()).collect(),
         directions: directions.iter().map(|g| g.name.clone()).collect(),
         band_edges_hz: edges.to_vec(),
@@ -296,6 +301,23 @@ fn error_map(
             })
             .collect(),
     }
+}
+
+/// A table of `value` over the sums of each cell.
+fn together(
+    rows: usize,
+    columns: usize,
+    value: fn(&Sums) -> Option<f64>,
+    cell: impl Fn(usize, usize) -> Vec<Sums>,
+) -> Vec<Vec<Option<f64>>> {
+    let of_cell = |row, column| {
+        let mut total = Sums::default();
+        cell(row, column).into_iter().for_each(|s| total.add(s));
+        value(&total)
+    };
+    (0..rows)
+        .map(|r| (0..columns).map(|c| of_cell(r, c)).collect())
+        .collect()
 }
 
 /// nrms on postures that were left out of the fit, one posture at a time, each fit started from `theta`.

@@ -313,11 +313,7 @@ fn line_figure(campaign: &Campaign, pooled: &Group, axes: &[ForceAxis], unit: &s
 }
 
 fn coefficient_table(result: &CfcResult, pooled: &Group) -> Block {
-    let mut columns = vec![
-        Column::text("cutting speed"),
-        Column::number("cuts"),
-        Column::number("feeds"),
-    ];
+    let mut columns = vec![Column::text("cutting speed"), Column::number("cuts / feeds")];
     columns.extend(
         pooled
             .coefficients
@@ -328,7 +324,7 @@ fn coefficient_table(result: &CfcResult, pooled: &Group) -> Block {
     columns.extend(axes.iter().map(|a| Column::number(format!("R² {}", a.label()))));
     let groups = result.groups.iter().filter(|g| g.process == pooled.process);
     let row = |group: &Group, name: String| {
-        let mut row = vec![name, group.cuts.len().to_string(), group.feeds.to_string()];
+        let mut row = vec![name, format!("{} / {}", group.cuts.len(), group.feeds)];
         row.extend(group.coefficients.iter().map(value_text));
         row.extend(
             axes.iter()

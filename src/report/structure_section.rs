@@ -1,6 +1,8 @@
 //! The robot model against measured FRFs: FRFs, error map, parameters.
 
-use super::figure::{self, FrfCurve, FrfFigure, HeatMap, NoiseLevel, ParameterFigure, ParameterRow};
+use super::figure::{
+    self, CellFormat, FrfCurve, FrfFigure, HeatMap, NoiseLevel, ParameterFigure, ParameterRow,
+};
 use super::number::{decimals, percent, plus_minus, significant};
 use super::parts::{count, figure, listed, paragraph};
 use super::{Block, Column, Section, Table};
@@ -84,7 +86,7 @@ pub fn sections(findings: &StructureFindings) -> Vec<Section> {
 pub fn frf_section(findings: &StructureFindings) -> Section {
     let errors = &findings.analysis.after.frf_errors;
     let mut order: Vec<usize> = (0..errors.len()).collect();
-    order.sort_by(|&a, &b| errors[b].beyond_noise().total_cmp(&errors[a].beyond_noise()));
+    order.sort_by(|&a, &b| errors[b].times_noise().total_cmp(&errors[a].times_noise()));
     let best = order
         .iter()
         .copied()
@@ -106,13 +108,13 @@ pub fn frf_section(findings: &StructureFindings) -> Section {
     }
     for (rank, &index) in worst.iter().enumerate() {
         let place = [
-            "The FRF with most error beyond its noise",
-            "Second most error beyond noise",
-            "Third most error beyond noise",
+            "The FRF with most error against its noise",
+            "Second most error against noise",
+            "Third most error against noise",
         ]
         .get(rank)
         .copied()
-        .unwrap_or("Much error beyond noise");
+        .unwrap_or("Much error against noise");
         blocks.push(frf_figure(
             findings,
             index,
@@ -215,7 +217,7 @@ fn frf_table(findings: &StructureFindings, order: &[usize]) -> Block {
         notes.push(format!("The first {LISTED} of {}.", order.len()));
     }
     Block::Table(Table {
-        caption: "FRFs by error beyond noise, worst first".into(),
+        caption: "FRFs by error against noise, worst first".into(),
         columns: vec![
             Column::text("FRF (response/force)"),
             Column::number("robot file"),
@@ -258,10 +260,28 @@ pub fn map_section(findings: &StructureFindings) -> Section {
     let mut blocks = vec![figure(
         "error-posture-direction",
         "Error of the calibrated model by posture and direction",
-        "Error of the calibrated model by posture and direction, all frequencies together. A posture or a \
-         direction that is much worse than the others is where to look first.",
+        "Error of the calibrated model by posture and direction, all frequencies together.",
         by_direction.png(),
     )];
+    let against_noise = HeatMap {
+        value_label: "error / noise".into(),
+        format: CellFormat::Significant(2),
+        range: Some((1.0, largest(&map.posture_direction_times_noise).max(2.0))),
+        ..heat(
+            "Calibrated model: error in multiples of the noise",
+            "Posture",
+            "Direction (response, force)",
+            &map.postures,
+            &map.directions,
+            map.posture_direction_times_noise.clone(),
+        )
+    };
+    blocks.push(figure(
+        "error-times-noise",
+        "Error of the calibrated model in multiples of the noise, by posture and direction",
+        "The same in multiples of the measurement's noise: 1 is noise alone. What is dark here is where to look first.",
+        against_noise.png(),
+    ));
     for (file, title, row_label, rows, values) in [
         (
             "error-posture-band",
@@ -324,6 +344,10 @@ pub fn map_section(findings: &StructureFindings) -> Section {
                hardly moves that may be noise alone: the table at the end says.".into(),
         blocks,
     }
+}
+
+fn largest(values: &[Vec<Option<f64>>]) -> f64 {
+    values.iter().flatten().flatten().copied().fold(0.0, f64::max)
 }
 
 /// What was tuned.

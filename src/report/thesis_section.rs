@@ -233,7 +233,7 @@ fn row_table(caption: &str, rows: &[Row], text: impl Fn(f64) -> String) -> Block
             ratio(Some(row.before), row.measured),
             ratio(Some(row.after), row.measured),
             match (row.measured, row.fitted) {
-                (None, _) => "not measured",
+                (None, _) => "",
                 (_, true) => "fitted",
                 (_, false) => "predicted",
             }

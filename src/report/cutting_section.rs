@@ -8,7 +8,7 @@ use super::parts::{count, figure, listed, setting, with_error};
 use super::{Block, Column, Section, Table};
 use crate::analysis::regression_line::{FeedLine, feed_lines};
 use crate::campaign::{Campaign, Process};
-use crate::cutting::{CfcResult, Coefficient, CutAnalysis, ForceAxis, Group};
+use crate::cutting::{CfcResult, Coefficient, CutAnalysis, ForceAxis, Group, speed_text};
 
 pub fn summary(result: &CfcResult) -> String {
     let mut text = String::new();
@@ -25,6 +25,7 @@ pub fn summary(result: &CfcResult) -> String {
             process(pooled.process),
             coefficients.join(", ")
         );
+        text += &over_speeds(result, pooled).unwrap_or_default();
         if let Some(worst) = worst(pooled) {
             text += &format!(
                 "The average force that the force model misses most is {} of cut {}, by {} of the largest {} average \
@@ -38,6 +39,25 @@ pub fn summary(result: &CfcResult) -> String {
         }
     }
     text.trim_end().to_string()
+}
+
+/// How far the leading coefficient differs between cutting speeds.
+fn over_speeds(result: &CfcResult, pooled: &Group) -> Option<String> {
+    let label = pooled.coefficients.iter().find(|c| !c.edge)?.label;
+    let of_speed = |g: &Group| Some((g.coefficient(label)?.value?, speed_text(g)));
+    let groups = result.groups.iter().filter(|g| g.process == pooled.process);
+    let mut values: Vec<(f64, String)> = groups.filter_map(of_speed).collect();
+    values.sort_by(|a, b| a.0.total_cmp(&b.0));
+    match values.as_slice() {
+        [least, .., largest] => Some(format!(
+            "Speed by speed, {label} lies between {} (at {} m/min) and {} N/mm² (at {} m/min). ",
+            significant(least.0, 4),
+            least.1,
+            significant(largest.0, 4),
+            largest.1
+        )),
+        _ => None,
+    }
 }
 
 fn process(process: Process) -> &'static str {
@@ -328,13 +348,13 @@ fn coefficient_table(result: &CfcResult, pooled: &Group) -> Block {
         row.extend(group.coefficients.iter().map(value_text));
         row.extend(
             axes.iter()
-                .map(|a| group.r2[a.index()].map_or("–".into(), |r| decimals(r, 4))),
+                .map(|a| group.r2[a.index()].map_or("–".into(), |r| decimals(r, 3))),
         );
         row
     };
     let mut rows: Vec<Vec<String>> = groups
         .filter(|g| g.cuts != pooled.cuts)
-        .map(|g| row(g, format!("{} m/min", crate::cutting::speed_text(g))))
+        .map(|g| row(g, format!("{} m/min", speed_text(g))))
         .collect();
     rows.push(row(pooled, "all together".into()));
     Block::Table(Table {

@@ -341,7 +341,7 @@ pub fn map_section(findings: &StructureFindings) -> Section {
         id: "error-map".into(),
         title: "Where the error is".into(),
         lead: "Dark cells are where the calibrated model and the measurement differ most for their size. Where the robot \
-               hardly moves that may be noise alone: the table at the end says.".into(),
+               hardly moves that may be noise alone: the second map, in multiples of the noise, says.".into(),
         blocks,
     }
 }
@@ -462,7 +462,7 @@ pub fn posture_section(postures: &[PostureFindings]) -> Section {
         "flange Ky",
         "flange Kz",
     ];
-    columns.extend(numbers.map(|name| Column::number(name)));
+    columns.extend(numbers.map(Column::number));
     columns.push(Column::text("first natural frequencies (Hz)"));
     let ids: Vec<String> = postures.iter().map(|p| p.id.clone()).collect();
     let lead = match ids.len() {

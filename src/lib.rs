@@ -4,6 +4,7 @@
 //! [`discrepancy`] → [`lobes`] → [`report`]. A module knows nothing of the ones after it.
 
 pub mod analysis;
+pub mod builtin;
 pub mod campaign;
 pub mod commands;
 pub mod cutting;

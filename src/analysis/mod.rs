@@ -1,7 +1,14 @@
 //! Whole analyses of a campaign, as the commands and the report need them: each floor below called in its order.
 
+pub mod campaign;
 pub mod lobes;
+pub mod modal;
+pub mod regression_line;
 pub mod structure;
+pub mod thesis_findings;
 
+pub use campaign::{CampaignFindings, LobeFindings, PostureFindings, StructureFindings};
 pub use lobes::{LobeAnalysis, LobeCase};
+pub use modal::{ModalAnalysis, PostureModes};
 pub use structure::StructureAnalysis;
+pub use thesis_findings::ThesisFindings;

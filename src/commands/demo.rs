@@ -1,9 +1,321 @@
-use super::Outcome;
-use crate::{Error, Result};
+//! `lobestone demo [DIR]`: the whole story on the built-in campaigns, each step as the command of its name does it.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use serde::Serialize;
+use serde_json::json;
+
+use super::text::{number, percent};
+use super::{Outcome, report};
+use crate::analysis::{
+    CampaignFindings, LobeAnalysis, LobeFindings, ModalAnalysis, PostureFindings, StructureFindings,
+    ThesisFindings,
+};
+use crate::builtin::{FIRST_CELL, SECOND_CELL};
+use crate::campaign::Campaign;
+use crate::cutting::{CfcOptions, CfcResult, identify_forces};
+use crate::report::campaign as pages;
+use crate::{Error, InputError, Result, ingest};
 
 #[derive(clap::Args)]
-pub struct Args {}
+pub struct Args {
+    /// Folder to work in; made if it does not exist.
+    #[arg(default_value = "lobestone-demo")]
+    dir: PathBuf,
+}
 
-pub fn run(_args: Args) -> Result<Outcome> {
-    Err(Error::computation("demo is not built yet"))
+/// Tells a demo folder from somebody's work.
+const MARKER: &str = "README.txt";
+const MARKER_TEXT: &str = "Written by `lobestone demo`. The campaigns in this folder are simulated; each run of the \
+demo writes them and the report anew.\n";
+
+/// One step of the story.
+#[derive(Debug, Serialize)]
+struct Step {
+    name: &'static str,
+    /// What to type for the same on a campaign of one's own.
+    command: String,
+    summary: String,
+    seconds: f64,
+}
+
+/// Runs steps and keeps their story.
+#[derive(Default)]
+struct Story {
+    steps: Vec<Step>,
+}
+
+impl Story {
+    fn step<T>(
+        &mut self,
+        name: &'static str,
+        command: String,
+        work: impl FnOnce() -> Result<T>,
+        summary: impl FnOnce(&T) -> String,
+    ) -> Result<T> {
+        let started = Instant::now();
+        let done = work()?;
+        self.steps.push(Step {
+            name,
+            command,
+            summary: summary(&done),
+            seconds: started.elapsed().as_secs_f64(),
+        });
+        Ok(done)
+    }
+}
+
+pub fn run(args: Args) -> Result<Outcome> {
+    let dir = &args.dir;
+    prepare(dir)?;
+    let first = Campaign::load(&FIRST_CELL.write(dir)?)?;
+    let second = Campaign::load(&SECOND_CELL.write(dir)?)?;
+    let of = |command: &str, campaign: &Campaign| format!("lobestone {command} {}", campaign.dir.display());
+    let mut story = Story::default();
+
+    story.step(
+        "inspect",
+        of("inspect", &first) + "/frf/*.uff",
+        || inspect(&first),
+        Clone::clone,
+    )?;
+    let structure = story.step(
+        "calibrate",
+        of("calibrate", &first),
+        || StructureFindings::run(&first),
+        calibrated,
+    )?;
+    let postures = story.step(
+        "model",
+        of("model", &first),
+        || PostureFindings::run(&first, Some(&structure)),
+        |postures| modelled(postures),
+    )?;
+    let modal = story.step("modal", of("modal", &first), || ModalAnalysis::run(&first), modes)?;
+    let cutting = story.step(
+        "cfc",
+        of("cfc", &first),
+        || identify_forces(&first, CfcOptions::default()),
+        coefficients,
+    )?;
+    let lobes = story.step("lobes", of("lobes", &first), || LobeFindings::run(&first), lobes)?;
+    let unexplained = story.step(
+        "compare",
+        of("compare", &second),
+        || StructureFindings::run(&second),
+        compared,
+    )?;
+    let thesis = story.step(
+        "thesis",
+        "lobestone thesis".into(),
+        ThesisFindings::run,
+        case_study,
+    )?;
+
+    let findings = CampaignFindings {
+        campaign: &first,
+        structure: Some(Ok(structure)),
+        postures: Some(Ok(postures)),
+        modal: Some(Ok(modal)),
+        cutting: Some(Ok(cutting)),
+        lobes: Some(Ok(lobes)),
+    };
+    let rows: Vec<pages::StepRow> = story
+        .steps
+        .iter()
+        .map(|s| [s.name.to_string(), s.summary.clone(), s.command.clone()])
+        .collect();
+    let files = story.step(
+        "report",
+        of("report", &first) + " --thesis",
+        || {
+            let page = pages::demo_page(&findings, &unexplained, &thesis, &rows);
+            pages::write(&page, &findings, &dir.join("report"))
+        },
+        |files| {
+            format!(
+                "{} figures in one page: {}",
+                files.images.len(),
+                files.html.display()
+            )
+        },
+    )?;
+
+    let mut json = report::document(&files);
+    json["steps"] = json!(story.steps);
+    json["dir"] = json!(dir);
+    Ok(Outcome {
+        text: describe(&story.steps, &files.html),
+        json,
+    })
+}
+
+/// Makes the folder, or takes one that an earlier demo made.
+fn prepare(dir: &Path) -> Result<()> {
+    let marker = dir.join(MARKER);
+    if dir.exists() {
+        let mut entries = std::fs::read_dir(dir).map_err(|e| Error::io(dir, e))?;
+        let is_demo = std::fs::read_to_string(&marker).is_ok_and(|text| text == MARKER_TEXT);
+        if entries.next().is_some() && !is_demo {
+            return Err(InputError::new(
+                "the folder holds something that is not a demo; nothing was touched",
+            )
+            .file(dir)
+            .remedy("name a folder that does not exist: lobestone demo FOLDER")
+            .into());
+        }
+    }
+    std::fs::create_dir_all(dir).map_err(|e| Error::io(dir, e))?;
+    std::fs::write(&marker, MARKER_TEXT).map_err(|e| Error::io(&marker, e))
+}
+
+fn inspect(campaign: &Campaign) -> Result<String> {
+    let mut text = Vec::new();
+    if let Some(frf) = campaign.frfs.first() {
+        let file = ingest::read_file(&frf.file)?;
+        text.push(format!(
+            "{} FRF files ({}), {} FRFs in the first",
+            campaign.frfs.len(),
+            file.format,
+            file.contents.frfs.len()
+        ));
+    }
+    if let Some(cut) = campaign.cuts.first() {
+        let file = ingest::read_file(&cut.file)?;
+        let channels = file.contents.times.first().map_or(0, |t| t.channels.len());
+        text.push(format!(
+            "{} force records ({}), {channels} channels in the first",
+            campaign.cuts.len(),
+            file.format
+        ));
+    }
+    Ok(text.join("; "))
+}
+
+fn calibrated(s: &StructureFindings) -> String {
+    let (before, after) = (&s.analysis.before.totals, &s.analysis.after.totals);
+    let held_out = s.held_out_nrms.map_or(String::new(), |h| {
+        format!("; {} on postures left out", percent(h))
+    });
+    format!(
+        "error {} before, {} after; the noise is {}{held_out}",
+        percent(before.nrms),
+        percent(after.nrms),
+        percent(after.noise_floor_nrms),
+    )
+}
+
+fn modelled(postures: &[PostureFindings]) -> String {
+    let Some(first) = postures.first() else {
+        return "no posture".into();
+    };
+    let lowest = |report: &crate::robot::PostureReport| {
+        report
+            .natural_frequencies_hz
+            .first()
+            .map_or("–".into(), |f| number(*f, 3))
+    };
+    let after = first
+        .calibrated
+        .as_ref()
+        .map_or(String::new(), |c| format!(", {} calibrated", lowest(c)));
+    format!(
+        "lowest natural frequency at {}: {} Hz as in the robot file{after}",
+        first.id,
+        lowest(&first.nominal)
+    )
+}
+
+fn modes(modal: &ModalAnalysis) -> String {
+    format!(
+        "{} modes found in the measured FRFs of {} postures, no model used",
+        modal.mode_count(),
+        modal.postures.len()
+    )
+}
+
+fn coefficients(result: &CfcResult) -> String {
+    let of_group = |group: &crate::cutting::Group| {
+        let values: Vec<String> = group
+            .coefficients
+            .iter()
+            .filter(|c| !c.edge)
+            .filter_map(|c| {
+                Some(format!(
+                    "{} {} ± {}",
+                    c.label,
+                    number(c.value?, 4),
+                    number(c.std_error?, 2)
+                ))
+            })
+            .collect();
+        format!("{} N/mm² from {} cuts", values.join(", "), group.cuts.len())
+    };
+    result.pooled.iter().map(of_group).collect::<Vec<_>>().join("; ")
+}
+
+fn lobes(lobes: &LobeFindings) -> String {
+    let limit = |analysis: &LobeAnalysis| {
+        analysis
+            .absolute()
+            .map_or("no limit".into(), |a| format!("{} mm", number(a.depth_mm, 3)))
+    };
+    let measured = match &lobes.measured {
+        Some(Ok(measured)) => format!(", {} from the measured FRFs", limit(measured)),
+        _ => String::new(),
+    };
+    let best = lobes.asked.best().first().map_or(String::new(), |(case, peak)| {
+        let place = case.posture.as_deref().unwrap_or("the modes");
+        let depth = peak
+            .depth_mm
+            .map_or("no limit".into(), |d| format!("{} mm", number(d, 3)));
+        format!(
+            "; deepest tip of a lobe at {} rpm and {place} ({depth})",
+            number(peak.spindle_rpm, 4)
+        )
+    });
+    format!(
+        "drilling is stable at any speed below {} (model){measured}{best}",
+        limit(&lobes.asked)
+    )
+}
+
+fn compared(s: &StructureFindings) -> String {
+    let after = &s.analysis.after.totals;
+    let what = if after.nrms > 1.1 * after.noise_floor_nrms {
+        "the model lacks something, or the measurement is wrong"
+    } else {
+        "nothing but noise is left"
+    };
+    format!(
+        "another cell: {} after calibration, noise {}: {what}",
+        percent(after.nrms),
+        percent(after.noise_floor_nrms)
+    )
+}
+
+fn case_study(t: &ThesisFindings) -> String {
+    format!(
+        "frequencies of the IRB 6640 within {} (fitted) and {} (predicted), rms; {} measured bands of resonances stay unexplained",
+        percent(t.study.fitted_frequency_error),
+        percent(t.study.predicted_frequency_error),
+        t.study
+            .unexplained
+            .iter()
+            .filter(|b| !(b.from_hz..=b.to_hz).contains(&b.nearest_model_hz))
+            .count(),
+    )
+}
+
+fn describe(steps: &[Step], html: &Path) -> String {
+    let mut text = String::from("Lobestone demo: simulated campaigns, every step as its command does it\n");
+    for step in steps {
+        text += &format!(
+            "\n{:<10} {}\n{:<10} {} ({:.1} s)\n",
+            step.name, step.summary, "", step.command, step.seconds
+        );
+    }
+    let total: f64 = steps.iter().map(|s| s.seconds).sum();
+    text + &format!("\nDone in {total:.1} s. Now open {}\n", html.display())
 }

@@ -1,13 +1,67 @@
+use std::path::PathBuf;
+
+use serde_json::{Value, json};
+
+use super::text::warnings;
 use super::{CampaignArg, Outcome};
-use crate::{Error, Result};
+use crate::Result;
+use crate::analysis::{CampaignFindings, ThesisFindings};
+use crate::campaign::Campaign;
+use crate::report::campaign::{self, ReportFiles};
 
 #[derive(clap::Args)]
 pub struct Args {
     #[command(flatten)]
     campaign: CampaignArg,
+    /// Where to write [default: the folder report in the campaign's folder].
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+    /// Add the case study of the IRB 6640 (as the command thesis).
+    #[arg(long)]
+    thesis: bool,
 }
 
 pub fn run(args: Args) -> Result<Outcome> {
-    let _ = args.campaign.dir;
-    Err(Error::computation("report is not built yet"))
+    let campaign = Campaign::load(&args.campaign.dir)?;
+    let findings = CampaignFindings::run(&campaign)?;
+    let thesis = args.thesis.then(ThesisFindings::run).transpose()?;
+    let folder = args.out.unwrap_or_else(|| campaign.dir.join("report"));
+    let page = campaign::page(&findings, thesis.as_ref());
+    let files = campaign::write(&page, &findings, &folder)?;
+    let missing = findings.errors();
+    let mut json = document(&files);
+    json["missing"] = json!(missing);
+    let missing: Vec<String> = missing
+        .into_iter()
+        .map(|e| format!("a part is missing from the report: {e}"))
+        .collect();
+    Ok(Outcome {
+        json,
+        text: describe(&files) + &warnings(&missing),
+    })
+}
+
+/// `html`, `images` and, where they were built in, `tables`.
+pub fn document(files: &ReportFiles) -> Value {
+    let mut json = json!({ "html": files.html, "images": files.images });
+    if cfg!(feature = "parquet") {
+        json["tables"] = json!(files.tables);
+    }
+    json
+}
+
+fn describe(files: &ReportFiles) -> String {
+    let mut text = format!(
+        "report   {}\nfigures  {} PNG files beside it\n",
+        files.html.display(),
+        files.images.len()
+    );
+    if let Some(folder) = files.tables.first().and_then(|t| t.parent()) {
+        text += &format!(
+            "tables   {} Parquet files in {}\n",
+            files.tables.len(),
+            folder.display()
+        );
+    }
+    text
 }

@@ -33,6 +33,31 @@ pub struct Group {
     pub nrms: f64,
 }
 
+/// Error of one FRF.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FrfError {
+    pub name: String,
+    pub posture: String,
+    /// Response axis, reference axis.
+    pub direction: String,
+    pub nrms: f64,
+    pub noise_floor_nrms: f64,
+    /// One a band of the error map; `None` where nothing was measured.
+    pub band_nrms: Vec<Option<f64>>,
+}
+
+impl FrfError {
+    /// Error over noise: 1 where only noise is left. A small FRF that drowns in noise has a large nrms, which says
+    /// nothing of the model; this does.
+    pub fn times_noise(&self) -> f64 {
+        if self.noise_floor_nrms > 0.0 {
+            self.nrms / self.noise_floor_nrms
+        } else {
+            f64::INFINITY
+        }
+    }
+}
+
 /// The error map: postures × directions × bands, nrms; `None` where nothing was measured.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ErrorMap {
@@ -42,6 +67,14 @@ pub struct ErrorMap {
     pub band_edges_hz: Vec<f64>,
     /// `[posture][direction][band]`.
     pub nrms: Vec<Vec<Vec<Option<f64>>>>,
+    /// All bands together: `[posture][direction]`.
+    pub posture_direction: Vec<Vec<Option<f64>>>,
+    /// The same, error over noise: 1 where only noise is left.
+    pub posture_direction_times_noise: Vec<Vec<Option<f64>>>,
+    /// All directions together: `[posture][band]`.
+    pub posture_band: Vec<Vec<Option<f64>>>,
+    /// All postures together: `[direction][band]`.
+    pub direction_band: Vec<Vec<Option<f64>>>,
 }
 
 /// Model against measurement, FRFs as receptance on the measured lines.
@@ -57,6 +90,8 @@ pub struct FrfComparison {
     pub map: ErrorMap,
     /// Each FRF's own nrms, worst first.
     pub by_frf: Vec<Group>,
+    /// In the order of the data.
+    pub frf_errors: Vec<FrfError>,
 }
 
 /// Sums behind an nrms.
@@ -78,10 +113,19 @@ impl Sums {
         ratio(self.error, self.signal)
     }
 
-    /// The measurement's noise. What a model of a handful of parameters leaves over bounds it from above, and where
-    /// resonances are sharp against the lines that bound is tighter than the estimate from the scatter.
+    /// `None` where nothing was measured.
+    fn measured_nrms(&self) -> Option<f64> {
+        (self.signal > 0.0).then(|| self.nrms())
+    }
+
+    /// Error over noise; `None` where nothing was measured.
+    fn times_noise(&self) -> Option<f64> {
+        let floor = self.floor();
+        (self.signal > 0.0 && floor > 0.0).then(|| self.nrms() / floor)
+    }
+
     fn floor(&self) -> f64 {
-        ratio(self.noise.min(self.error), self.signal)
+        ratio(self.noise, self.signal)
     }
 }
 
@@ -139,6 +183,7 @@ impl FrfComparison {
             (Groups::default(), Groups::default(), Groups::default());
         let mut bands = vec![Sums::default(); BANDS];
         let mut by_frf = Vec::new();
+        let mut frf_errors = Vec::new();
         let mut cells: Vec<(String, String, usize, Sums)> = Vec::new();
         for ((block, frf), model) in data.frfs().zip(predicted) {
             let posture = &data.posture_ids[frf.posture];
@@ -165,6 +210,14 @@ impl FrfComparison {
             by_frf.push(Group {
                 name: frf.name.clone(),
                 nrms: own.nrms(),
+            });
+            frf_errors.push(FrfError {
+                name: frf.name.clone(),
+                posture: posture.clone(),
+                direction: direction.clone(),
+                nrms: own.nrms(),
+                noise_floor_nrms: own.floor(),
+                band_nrms: own_bands.iter().map(Sums::measured_nrms).collect(),
             });
             for (band, sums) in own_bands.iter().enumerate() {
                 bands[band].add(*sums);
@@ -201,6 +254,7 @@ impl FrfComparison {
                 .collect(),
             map,
             by_frf,
+            frf_errors,
         }
     }
 }
@@ -219,16 +273,45 @@ fn error_map(
             sums[p][d][*band].add(*cell);
         }
     }
-    let nrms = |s: &Sums| (s.signal > 0.0).then(|| s.nrms());
+    let (np, nd) = (postures.len(), directions.len());
     ErrorMap {
+        posture_direction: together(np, nd, Sums::measured_nrms, |p, d| sums[p][d].clone()),
+        posture_direction_times_noise: together(np, nd, Sums::times_noise, |p, d| sums[p][d].clone()),
+        posture_band: together(np, BANDS, Sums::measured_nrms, |p, b| {
+            sums[p].iter().map(|d| d[b]).collect()
+        }),
+        direction_band: together(nd, BANDS, Sums::measured_nrms, |d, b| {
+            sums.iter().map(|p| p[d][b]).collect()
+        }),
         postures: postures.iter().map(|g| g.name.clone()).collect(),
         directions: directions.iter().map(|g| g.name.clone()).collect(),
         band_edges_hz: edges.to_vec(),
         nrms: sums
             .iter()
-            .map(|p| p.iter().map(|d| d.iter().map(nrms).collect()).collect())
+            .map(|p| {
+                p.iter()
+                    .map(|d| d.iter().map(Sums::measured_nrms).collect())
+                    .collect()
+            })
             .collect(),
     }
+}
+
+/// A table of `value` over the sums of each cell.
+fn together(
+    rows: usize,
+    columns: usize,
+    value: fn(&Sums) -> Option<f64>,
+    cell: impl Fn(usize, usize) -> Vec<Sums>,
+) -> Vec<Vec<Option<f64>>> {
+    let of_cell = |row, column| {
+        let mut total = Sums::default();
+        cell(row, column).into_iter().for_each(|s| total.add(s));
+        value(&total)
+    };
+    (0..rows)
+        .map(|r| (0..columns).map(|c| of_cell(r, c)).collect())
+        .collect()
 }
 
 #[cfg(test)]

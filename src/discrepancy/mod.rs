@@ -4,5 +4,5 @@ pub mod compare;
 pub mod diagnose;
 pub mod next_measurement;
 
-pub use compare::{Band, FrfComparison};
+pub use compare::{Band, FrfComparison, FrfError};
 pub use diagnose::{Candidate, Diagnosis, Verdict, diagnose};

@@ -1,10 +1,20 @@
 //! Draws what the floors below computed; computes nothing itself.
 //!
 //! [`figure`] turns plain numbers into PNG images, [`number`] into readable text, and [`page`] puts
-//! both into one HTML file that needs nothing beside itself.
+//! both into one HTML file that needs nothing beside itself. [`campaign`] says what stands on that page, one
+//! `*_section` a part; [`tables`] writes the same numbers for other programs.
 
+pub mod campaign;
+pub mod cutting_section;
 pub mod figure;
+pub mod lobes_section;
+pub mod modal_section;
 pub mod number;
 pub mod page;
+mod parts;
+pub mod structure_section;
+#[cfg(feature = "parquet")]
+pub mod tables;
+pub mod thesis_section;
 
 pub use page::{Block, Column, Figure, Page, Section, Table, Written};

@@ -44,7 +44,7 @@ pub fn decimals(value: f64, decimals: usize) -> String {
     }
 }
 
-/// A ratio as percent: `0.1234` → `12.3 %`.
+/// A ratio as percent: `0.1234` → `12.3 %` (with a no-break space).
 pub fn percent(ratio: f64) -> String {
     let value = 100.0 * ratio;
     if !value.is_finite() {
@@ -56,7 +56,7 @@ pub fn percent(ratio: f64) -> String {
         v if v >= 0.9995 || v == 0.0 => 2,
         _ => 3,
     };
-    format!("{} %", decimals(value, places))
+    format!("{}\u{a0}%", decimals(value, places))
 }
 
 /// `value` with an SI prefix on `unit`: `2.53e6, "N/m"` → `2.53 MN/m`.
@@ -211,11 +211,11 @@ mod tests {
 
     #[test]
     fn percentages_keep_three_digits() {
-        assert_eq!(percent(0.1234), "12.3 %");
-        assert_eq!(percent(0.00021), "0.021 %");
-        assert_eq!(percent(3.5), "350 %");
-        assert_eq!(percent(-0.0), "0.00 %");
-        assert_eq!(percent(1e300), "1.00·10³⁰² %");
+        assert_eq!(percent(0.1234), "12.3\u{a0}%");
+        assert_eq!(percent(0.00021), "0.021\u{a0}%");
+        assert_eq!(percent(3.5), "350\u{a0}%");
+        assert_eq!(percent(-0.0), "0.00\u{a0}%");
+        assert_eq!(percent(1e300), "1.00·10³⁰²\u{a0}%");
         assert_eq!(percent(f64::NAN), MISSING);
     }
 }

@@ -252,7 +252,7 @@ fn slug(text: &str, otherwise: &str) -> String {
 }
 
 /// Writes beside the target and renames: a reader sees the old file or the new one, never half of it.
-fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
+pub(crate) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     let folder = path.parent().unwrap_or(Path::new("."));
     let mut file = tempfile::Builder::new();
     // Temporary files are private by default; a report is to be read by whoever may read the folder.

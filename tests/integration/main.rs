@@ -3,8 +3,10 @@
 mod campaign;
 mod cfc;
 mod contract;
+mod demo;
 mod inspect;
 mod modal;
+mod report;
 mod robustness;
 mod schema;
 mod structure;

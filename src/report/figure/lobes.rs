@@ -22,6 +22,8 @@ pub enum LobeOutcome {
     Chatter,
     /// Where to cut.
     Recommended,
+    /// The tip of a lobe; nobody has said that it is wise to cut there.
+    Tip,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -150,6 +152,7 @@ impl LobesFigure {
             (LobeOutcome::Stable, "stable cut"),
             (LobeOutcome::Chatter, "cut with chatter"),
             (LobeOutcome::Recommended, "recommended"),
+            (LobeOutcome::Tip, "deepest tips"),
         ];
         let present = outcomes
             .into_iter()
@@ -166,6 +169,6 @@ fn sign(outcome: LobeOutcome) -> (Marker, f64, Color) {
     match outcome {
         LobeOutcome::Stable => (Marker::Ring, 11.0, style::INK),
         LobeOutcome::Chatter => (Marker::Cross, 11.0, style::RED),
-        LobeOutcome::Recommended => (Marker::Diamond, 13.0, style::INK),
+        LobeOutcome::Recommended | LobeOutcome::Tip => (Marker::Diamond, 13.0, style::INK),
     }
 }

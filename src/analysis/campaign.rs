@@ -1,0 +1,197 @@
+//! Everything that can be said about a campaign, each part on its own: one that fails takes no other with it.
+
+use super::{LobeAnalysis, ModalAnalysis, StructureAnalysis};
+use crate::campaign::{Campaign, LobeSource};
+use crate::cutting::{CfcOptions, CfcResult, identify_forces};
+use crate::identify::case::structure_model;
+use crate::identify::extend::held_out;
+use crate::identify::{Options, StructureModel};
+use crate::robot::PostureReport;
+use crate::{Error, InputError, Result};
+
+/// The parts that a campaign holds; `None` where it holds nothing of the kind.
+pub struct CampaignFindings<'a> {
+    pub campaign: &'a Campaign,
+    pub structure: Option<Result<StructureFindings>>,
+    /// The robot at the campaign's postures.
+    pub postures: Option<Result<Vec<PostureFindings>>>,
+    pub modal: Option<Result<ModalAnalysis>>,
+    pub cutting: Option<Result<CfcResult>>,
+    pub lobes: Option<Result<LobeFindings>>,
+}
+
+/// Model against FRFs.
+pub struct StructureFindings {
+    pub analysis: StructureAnalysis,
+    /// nrms on postures that were left out of the fit.
+    pub held_out_nrms: Option<f64>,
+}
+
+/// One posture as the robot file has it and calibrated.
+#[derive(Debug, Clone)]
+pub struct PostureFindings {
+    pub id: String,
+    pub nominal: PostureReport,
+    pub calibrated: Option<PostureReport>,
+}
+
+pub struct LobeFindings {
+    /// What the campaign asks for.
+    pub asked: LobeAnalysis,
+    /// Where that is the model: the same force on the measured FRFs, or why that cannot be had.
+    pub measured: Option<Result<LobeAnalysis>>,
+}
+
+impl<'a> CampaignFindings<'a> {
+    /// Works out all parts.
+    ///
+    /// # Errors
+    /// The campaign holds nothing to work on, or every part failed.
+    pub fn run(campaign: &'a Campaign) -> Result<Self> {
+        let structure = (!campaign.frfs.is_empty()).then(|| StructureFindings::run(campaign));
+        let calibrated = structure.as_ref().and_then(|s| s.as_ref().ok());
+        let postures = (campaign.robot.is_some() && !campaign.postures.is_empty())
+            .then(|| PostureFindings::run(campaign, calibrated));
+        let findings = CampaignFindings {
+            campaign,
+            postures,
+            structure,
+            modal: (!campaign.frfs.is_empty()).then(|| ModalAnalysis::run(campaign)),
+            cutting: (!campaign.cuts.is_empty()).then(|| identify_forces(campaign, CfcOptions::default())),
+            lobes: campaign.lobes.is_some().then(|| LobeFindings::run(campaign)),
+        };
+        findings.checked()
+    }
+
+    fn checked(self) -> Result<Self> {
+        let errors = self.errors();
+        let worked = [
+            self.structure.as_ref().is_some_and(Result::is_ok),
+            self.postures.as_ref().is_some_and(Result::is_ok),
+            self.modal.as_ref().is_some_and(Result::is_ok),
+            self.cutting.as_ref().is_some_and(Result::is_ok),
+            self.lobes.as_ref().is_some_and(Result::is_ok),
+        ];
+        if worked.contains(&true) {
+            return Ok(self);
+        }
+        if errors.is_empty() {
+            return Err(InputError::new(
+                "nothing to report: no FRFs, no cuts, no lobes and no robot with postures",
+            )
+            .file(self.campaign.dir.join("campaign.toml"))
+            .remedy("add [[frf]] or [[cut]] tables")
+            .into());
+        }
+        Err(Error::computation(format!(
+            "nothing can be reported:\n{}",
+            errors.join("\n")
+        )))
+    }
+
+    /// What failed and why, each message once.
+    pub fn errors(&self) -> Vec<String> {
+        let errors = [
+            self.structure.as_ref().and_then(|r| r.as_ref().err()),
+            self.postures.as_ref().and_then(|r| r.as_ref().err()),
+            self.modal.as_ref().and_then(|r| r.as_ref().err()),
+            self.cutting.as_ref().and_then(|r| r.as_ref().err()),
+            self.lobes.as_ref().and_then(|r| r.as_ref().err()),
+        ];
+        let mut messages: Vec<String> = Vec::new();
+        for message in errors.into_iter().flatten().map(ToString::to_string) {
+            if !messages.contains(&message) {
+                messages.push(message);
+            }
+        }
+        messages
+    }
+
+    /// The structural part where it succeeded.
+    pub fn structure(&self) -> Option<&StructureFindings> {
+        self.structure.as_ref().and_then(|r| r.as_ref().ok())
+    }
+
+    pub fn cutting(&self) -> Option<&CfcResult> {
+        self.cutting.as_ref().and_then(|r| r.as_ref().ok())
+    }
+
+    pub fn lobes(&self) -> Option<&LobeFindings> {
+        self.lobes.as_ref().and_then(|r| r.as_ref().ok())
+    }
+
+    pub fn modal(&self) -> Option<&ModalAnalysis> {
+        self.modal.as_ref().and_then(|r| r.as_ref().ok())
+    }
+}
+
+impl StructureFindings {
+    pub fn run(campaign: &Campaign) -> Result<Self> {
+        let analysis = StructureAnalysis::run(campaign, Options::default())?;
+        let held_out_nrms = held_out(
+            &analysis.case.model,
+            &analysis.case.data,
+            &analysis.calibration.theta,
+            1,
+        )?
+        .map(|h| h.nrms());
+        Ok(StructureFindings {
+            analysis,
+            held_out_nrms,
+        })
+    }
+}
+
+impl PostureFindings {
+    pub fn run(campaign: &Campaign, structure: Option<&StructureFindings>) -> Result<Vec<PostureFindings>> {
+        let model = structure_model(campaign)?;
+        let nominal = posture_reports(campaign, &model, &model.nominal_theta())?;
+        let mut calibrated: Vec<Option<PostureReport>> = match structure {
+            Some(s) => posture_reports(campaign, &s.analysis.case.model, &s.analysis.calibration.theta)?
+                .into_iter()
+                .map(Some)
+                .collect(),
+            None => vec![None; nominal.len()],
+        };
+        Ok(campaign
+            .postures
+            .iter()
+            .zip(nominal)
+            .zip(&mut calibrated)
+            .map(|((posture, nominal), calibrated)| PostureFindings {
+                id: posture.id.clone(),
+                nominal,
+                calibrated: calibrated.take(),
+            })
+            .collect())
+    }
+}
+
+fn posture_reports(campaign: &Campaign, model: &StructureModel, theta: &[f64]) -> Result<Vec<PostureReport>> {
+    let baseline = model.baseline(theta, false);
+    campaign
+        .postures
+        .iter()
+        .map(|posture| {
+            let kinematics = model.robot.kinematics(&posture.joints_deg)?;
+            PostureReport::new(&model.robot, &kinematics, &baseline)
+        })
+        .collect()
+}
+
+impl LobeFindings {
+    pub fn run(campaign: &Campaign) -> Result<Self> {
+        let asked = LobeAnalysis::run(campaign)?;
+        let measured = (asked.source == LobeSource::Model && !campaign.frfs.is_empty())
+            .then(|| LobeAnalysis::run(&with_source(campaign, LobeSource::Measured)));
+        Ok(LobeFindings { asked, measured })
+    }
+}
+
+fn with_source(campaign: &Campaign, source: LobeSource) -> Campaign {
+    let mut other = campaign.clone();
+    if let Some(section) = other.lobes.as_mut() {
+        section.source = source;
+    }
+    other
+}

@@ -1,0 +1,414 @@
+//! Cutting forces: records, averages, regression, coefficients.
+
+use super::figure::{
+    ForceChannel, ForceRecord, HeatMap, RegressionFigure, RegressionPoint, RegressionSeries,
+};
+use super::number::{decimals, percent, significant};
+use super::parts::{count, figure, listed, setting, with_error};
+use super::{Block, Column, Section, Table};
+use crate::analysis::regression_line::{FeedLine, feed_lines};
+use crate::campaign::{Campaign, Process};
+use crate::cutting::{CfcResult, Coefficient, CutAnalysis, ForceAxis, Group, speed_text};
+
+pub fn summary(result: &CfcResult) -> String {
+    let mut text = String::new();
+    for pooled in &result.pooled {
+        let coefficients: Vec<String> = pooled
+            .coefficients
+            .iter()
+            .filter(|c| !c.edge)
+            .map(|c| format!("{} {} {}", c.label, value_text(c), c.unit))
+            .collect();
+        text += &format!(
+            "{} of {} gave {}. ",
+            count(pooled.cuts.len(), "record", "records"),
+            process(pooled.process),
+            coefficients.join(", ")
+        );
+        text += &over_speeds(result, pooled).unwrap_or_default();
+        if let Some(worst) = worst(pooled) {
+            text += &format!(
+                "The average force that the force model misses most is {} of cut {}, by {} of the largest {} average \
+                 ({} times its own standard error). ",
+                worst.axis.label(),
+                worst.cut,
+                percent(worst.share.abs()),
+                worst.axis.label(),
+                significant(worst.sigmas.abs(), 2),
+            );
+        }
+    }
+    text.trim_end().to_string()
+}
+
+/// How far the leading coefficient differs between cutting speeds.
+fn over_speeds(result: &CfcResult, pooled: &Group) -> Option<String> {
+    let label = pooled.coefficients.iter().find(|c| !c.edge)?.label;
+    let of_speed = |g: &Group| Some((g.coefficient(label)?.value?, speed_text(g)));
+    let groups = result.groups.iter().filter(|g| g.process == pooled.process);
+    let mut values: Vec<(f64, String)> = groups.filter_map(of_speed).collect();
+    values.sort_by(|a, b| a.0.total_cmp(&b.0));
+    match values.as_slice() {
+        [least, .., largest] => Some(format!(
+            "Speed by speed, {label} lies between {} (at {} m/min) and {} N/mm² (at {} m/min). ",
+            significant(least.0, 4),
+            least.1,
+            significant(largest.0, 4),
+            largest.1
+        )),
+        _ => None,
+    }
+}
+
+fn process(process: Process) -> &'static str {
+    match process {
+        Process::Milling => "milling",
+        Process::Drilling => "drilling",
+    }
+}
+
+/// The misfit of one average.
+struct Misfit {
+    cut: String,
+    axis: ForceAxis,
+    /// Of the largest average of that axis.
+    share: f64,
+    /// In standard errors of the average.
+    sigmas: f64,
+}
+
+fn misfits(group: &Group) -> Vec<Misfit> {
+    let largest = |axis: ForceAxis| {
+        let of_axis = group.points.iter().filter(|p| p.axis == axis);
+        of_axis.map(|p| p.measured.abs()).fold(0.0, f64::max)
+    };
+    group
+        .points
+        .iter()
+        .map(|p| Misfit {
+            cut: p.cut.clone(),
+            axis: p.axis,
+            share: (p.measured - p.fitted) / largest(p.axis),
+            sigmas: (p.measured - p.fitted) / p.std_error,
+        })
+        .filter(|m| m.share.is_finite() && m.sigmas.is_finite())
+        .collect()
+}
+
+fn worst(group: &Group) -> Option<Misfit> {
+    misfits(group)
+        .into_iter()
+        .max_by(|a, b| a.share.abs().total_cmp(&b.share.abs()))
+}
+
+pub fn sections(campaign: &Campaign, result: &CfcResult) -> Vec<Section> {
+    let mut sections = vec![records(result)];
+    for pooled in &result.pooled {
+        sections.push(regression(campaign, result, pooled));
+    }
+    sections
+}
+
+/// The first record, and that of the cut which fits worst.
+fn records(result: &CfcResult) -> Section {
+    let mut shown: Vec<(&CutAnalysis, &str)> = Vec::new();
+    if let Some(first) = result.cuts.first() {
+        shown.push((first, "The first cut"));
+    }
+    for pooled in &result.pooled {
+        let id = worst(pooled).map(|w| w.cut);
+        let cut = result.cuts.iter().find(|c| Some(&c.id) == id.as_ref());
+        if let Some(cut) = cut.filter(|c| shown.iter().all(|(s, _)| s.id != c.id)) {
+            shown.push((cut, "The cut whose averages the force model misses most"));
+        }
+    }
+    let mut blocks: Vec<Block> = shown
+        .into_iter()
+        .map(|(cut, why)| record_figure(cut, why))
+        .collect();
+    blocks.push(cut_table(result));
+    Section {
+        id: "records".into(),
+        title: "Force records".into(),
+        lead: "What the dynamometer recorded, in its own axes. The drift line goes through the air before and after \
+               the cut; forces are averaged over the steady window, over whole turns of the tool."
+            .into(),
+        blocks,
+    }
+}
+
+fn record_figure(cut: &CutAnalysis, why: &str) -> Block {
+    let channels = cut.channels.iter().map(|channel| {
+        let trace = &channel.trace;
+        // Two points a stretch: its least and its largest value.
+        let stretch_s = match trace.time_s.as_slice() {
+            [first, .., last] => (last - first) / (trace.time_s.len() - 1) as f64,
+            _ => 0.0,
+        };
+        let middle_s = 0.5 * (cut.steady_s[0] + cut.steady_s[1]);
+        ForceChannel {
+            label: channel.axis.label().into(),
+            unit: channel.axis.unit().into(),
+            start_s: trace.time_s.first().map_or(0.0, |t| t - 0.25 * stretch_s),
+            sample_interval_s: 0.5 * stretch_s,
+            samples: trace
+                .min
+                .iter()
+                .zip(&trace.max)
+                .flat_map(|(a, b)| [*a, *b])
+                .collect(),
+            drift: cut.record_s.iter().map(|t| (*t, channel.drift.at(*t))).collect(),
+            steady_level: Some(channel.average.value + channel.drift.at(middle_s)),
+        }
+    });
+    let drawing = ForceRecord {
+        title: format!("Cut {}: record, drift and steady window", cut.id),
+        channels: channels.collect(),
+        air_s: [cut.air_before_s, cut.air_after_s]
+            .into_iter()
+            .flatten()
+            .map(|[a, b]| (a, b))
+            .collect(),
+        steady_s: Some((cut.steady_s[0], cut.steady_s[1])),
+    };
+    let caption = format!(
+        "{why}: cut {}, {} rpm, feed {} mm. Steady window {}–{} s ({} turns, {}).",
+        cut.id,
+        setting(cut.spindle_rpm),
+        setting(cut.feed_mm),
+        decimals(cut.steady_s[0], 2),
+        decimals(cut.steady_s[1], 2),
+        decimals(cut.revolutions, 0),
+        if cut.steady_given {
+            "given in the campaign"
+        } else {
+            "found by the program"
+        },
+    );
+    figure(
+        format!("record-{}", cut.id),
+        &drawing.title.clone(),
+        caption,
+        drawing.png(),
+    )
+}
+
+fn cut_table(result: &CfcResult) -> Block {
+    let axes = || {
+        ForceAxis::ALL.into_iter().filter(|a| {
+            let used = |p: &Group| ForceAxis::of(p.process).contains(a);
+            result.pooled.iter().any(used)
+        })
+    };
+    let mut columns = vec![
+        Column::text("cut"),
+        Column::number("rpm"),
+        Column::number("feed mm"),
+        Column::number("turns"),
+        Column::text("air"),
+    ];
+    for axis in axes() {
+        columns.push(Column::number(format!("{} {}", axis.label(), axis.unit())));
+        columns.push(Column::number("off"));
+    }
+    let rows = result.cuts.iter().map(|cut| {
+        let mut row = vec![
+            cut.id.clone(),
+            setting(cut.spindle_rpm),
+            setting(cut.feed_mm),
+            decimals(cut.revolutions, 0),
+            match (cut.air_before_s, cut.air_after_s) {
+                (Some(_), Some(_)) => "both ends",
+                (Some(_), None) => "before",
+                (None, Some(_)) => "after",
+                (None, None) => "none",
+            }
+            .to_string(),
+        ];
+        for axis in axes() {
+            let point = result
+                .pooled
+                .iter()
+                .flat_map(|g| &g.points)
+                .find(|p| p.cut == cut.id && p.axis == axis);
+            row.push(cut.averages[axis.index()].map_or("–".into(), |a| with_error(a.value, a.std_error)));
+            row.push(point.filter(|p| p.fitted != 0.0).map_or("–".into(), |p| {
+                let off = 100.0 * (p.measured - p.fitted) / p.fitted.abs();
+                format!("{} %", decimals(off, 1))
+            }));
+        }
+        row
+    });
+    Block::Table(Table {
+        caption: "Average forces in tool axes ± standard error".into(),
+        columns,
+        rows: rows.collect(),
+        notes: vec!["off: measured against the force model fitted to all cuts together.".into()],
+    })
+}
+
+fn regression(campaign: &Campaign, result: &CfcResult, pooled: &Group) -> Section {
+    let name = process(pooled.process);
+    let mut blocks = Vec::new();
+    let axes = ForceAxis::of(pooled.process);
+    for unit in ["N", "N·m"] {
+        let of_unit: Vec<ForceAxis> = axes.iter().copied().filter(|a| a.unit() == unit).collect();
+        if !of_unit.is_empty() {
+            blocks.push(line_figure(campaign, pooled, &of_unit, unit));
+        }
+    }
+    blocks.push(coefficient_table(result, pooled));
+    blocks.extend(misfit_map(pooled));
+    Section {
+        id: format!("regression-{name}"),
+        title: format!("Force coefficients, {name}"),
+        lead: "Average forces against feed: the slope is the cutting part, what is left at zero feed the edge part. R² \
+               near 1 says that a line holds, not that it is the right line."
+            .into(),
+        blocks,
+    }
+}
+
+fn line_figure(campaign: &Campaign, pooled: &Group, axes: &[ForceAxis], unit: &str) -> Block {
+    let mut series = Vec::new();
+    for &axis in axes {
+        let r2 = pooled.r2[axis.index()].map_or(String::new(), |r| format!(", R² = {}", decimals(r, 4)));
+        let lines = feed_lines(campaign, pooled, axis);
+        let several = lines.len() > 1;
+        series.extend(lines.into_iter().map(|FeedLine { what, points, line }| {
+            RegressionSeries {
+                label: if several {
+                    format!("{}, {what}", axis.label())
+                } else {
+                    format!("{}{r2}", axis.label())
+                },
+                points: points
+                    .iter()
+                    .map(|p| RegressionPoint {
+                        x: p.feed_mm,
+                        y: p.measured,
+                        std_error: Some(p.std_error),
+                        excluded: false,
+                    })
+                    .collect(),
+                line,
+            }
+        }));
+    }
+    let feed = match pooled.process {
+        Process::Milling => "Feed per tooth (mm)",
+        Process::Drilling => "Feed per revolution (mm)",
+    };
+    let quantity = if unit == "N" { "force" } else { "torque" };
+    let drawing = RegressionFigure {
+        title: format!(
+            "Average {quantity} against feed, all cuts of {} together",
+            process(pooled.process)
+        ),
+        x_label: feed.into(),
+        y_label: format!("Average {quantity} ({unit})"),
+        series,
+    };
+    let r2: Vec<String> = axes
+        .iter()
+        .filter_map(|a| {
+            Some(format!(
+                "R² of {} {}",
+                a.label(),
+                decimals(pooled.r2[a.index()]?, 4)
+            ))
+        })
+        .collect();
+    let caption = format!(
+        "Average {quantity} in tool axes against feed: signs are the cuts with their standard errors (most are smaller \
+         than the sign), lines the fitted force model. {}.",
+        listed(&r2)
+    );
+    figure(
+        format!("regression-{}-{quantity}", process(pooled.process)),
+        &drawing.title.clone(),
+        caption,
+        drawing.png(),
+    )
+}
+
+fn coefficient_table(result: &CfcResult, pooled: &Group) -> Block {
+    let mut columns = vec![Column::text("cutting speed"), Column::number("cuts / feeds")];
+    columns.extend(
+        pooled
+            .coefficients
+            .iter()
+            .map(|c| Column::number(format!("{} {}", c.label, c.unit))),
+    );
+    let axes = ForceAxis::of(pooled.process);
+    columns.extend(axes.iter().map(|a| Column::number(format!("R² {}", a.label()))));
+    let groups = result.groups.iter().filter(|g| g.process == pooled.process);
+    let row = |group: &Group, name: String| {
+        let mut row = vec![name, format!("{} / {}", group.cuts.len(), group.feeds)];
+        row.extend(group.coefficients.iter().map(value_text));
+        row.extend(
+            axes.iter()
+                .map(|a| group.r2[a.index()].map_or("–".into(), |r| decimals(r, 3))),
+        );
+        row
+    };
+    let mut rows: Vec<Vec<String>> = groups
+        .filter(|g| g.cuts != pooled.cuts)
+        .map(|g| row(g, format!("{} m/min", speed_text(g))))
+        .collect();
+    rows.push(row(pooled, "all together".into()));
+    Block::Table(Table {
+        caption: "Coefficients ± standard error".into(),
+        columns,
+        rows,
+        notes: vec![
+            "K.c: cutting coefficients (their force grows with the chip); K.e: edge coefficients (rubbing, the same at \
+             any feed). Tangential t, radial r, axial a; drilling: f along the feed."
+                .into(),
+        ],
+    })
+}
+
+fn misfit_map(pooled: &Group) -> Option<Block> {
+    let misfits = misfits(pooled);
+    if pooled.cuts.len() < 2 {
+        return None;
+    }
+    let axes = ForceAxis::of(pooled.process);
+    let value = |cut: &String, axis: &ForceAxis| {
+        misfits
+            .iter()
+            .find(|m| m.cut == *cut && m.axis == *axis)
+            .map(|m| m.share.abs())
+    };
+    let drawing = HeatMap {
+        title: "Misfit of each cut's average force".into(),
+        row_label: "Cut".into(),
+        column_label: "Axis".into(),
+        rows: pooled.cuts.clone(),
+        columns: axes.iter().map(|a| a.label().to_string()).collect(),
+        values: pooled
+            .cuts
+            .iter()
+            .map(|c| axes.iter().map(|a| value(c, a)).collect())
+            .collect(),
+        value_label: "misfit / largest average of the axis".into(),
+        ..Default::default()
+    };
+    Some(figure(
+        format!("misfit-{}", process(pooled.process)),
+        "Misfit of each cut's average force",
+        "How far each cut's average lies from the fitted force model, as a share of the largest average of that axis. \
+         The colours run to the largest misfit, however small it is.",
+        drawing.png(),
+    ))
+}
+
+fn value_text(coefficient: &Coefficient) -> String {
+    match (coefficient.value, coefficient.std_error) {
+        _ if coefficient.constraint_active => "0 (held)".into(),
+        (Some(value), Some(error)) => with_error(value, error),
+        (Some(value), None) => significant(value, 4),
+        (None, _) => "not determined".into(),
+    }
+}

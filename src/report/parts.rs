@@ -1,0 +1,105 @@
+//! Small things that all sections of a report use.
+
+use super::number::{decimals, significant};
+use super::{Block, Figure, Section};
+use crate::Result;
+
+/// A figure, or a warning in its place that says why there is none.
+pub fn figure(
+    file_name: impl Into<String>,
+    alt: &str,
+    caption: impl Into<String>,
+    png: Result<Vec<u8>>,
+) -> Block {
+    match png {
+        Ok(png) => Block::Figure(Figure {
+            file_name: file_name.into(),
+            alt: alt.to_string(),
+            caption: caption.into(),
+            png,
+        }),
+        Err(error) => Block::Warning(format!("This figure is missing. {error}")),
+    }
+}
+
+pub fn paragraph(text: impl Into<String>) -> Block {
+    Block::Paragraph(text.into())
+}
+
+/// The section of a part that failed.
+pub fn failed(id: &str, title: &str, error: &crate::Error) -> Section {
+    Section {
+        id: id.into(),
+        title: title.into(),
+        lead: String::new(),
+        blocks: vec![Block::Warning(format!(
+            "This part could not be worked out. {error}"
+        ))],
+    }
+}
+
+/// `3 cuts`, `1 cut`.
+pub fn count(number: usize, one: &str, many: &str) -> String {
+    match number {
+        1 => format!("1 {one}"),
+        n => format!("{n} {many}"),
+    }
+}
+
+/// `a`, `a and b`, `a, b and c`.
+pub fn listed(items: &[String]) -> String {
+    match items {
+        [] => String::new(),
+        [one] => one.clone(),
+        [most @ .., last] => format!("{} and {last}", most.join(", ")),
+    }
+}
+
+/// `929.8 ± 0.5`: decimals by the error, which keeps two figures.
+pub fn with_error(value: f64, error: f64) -> String {
+    if !(error > 0.0 && error.is_finite()) {
+        return significant(value, 5);
+    }
+    let places = (1.0 - error.log10().floor()).clamp(0.0, 4.0) as usize;
+    format!("{} ± {}", decimals(value, places), decimals(error, places))
+}
+
+/// A setting as somebody wrote it: `1160`, `0.05`.
+pub fn setting(value: f64) -> String {
+    if value.is_finite() && value.abs() < 1e9 {
+        // Display gives the shortest form that reads back the same.
+        format!("{value}")
+    } else {
+        significant(value, 5)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lists_read_as_people_write_them() {
+        let items = |n: usize| {
+            ["a", "b", "c"][..n]
+                .iter()
+                .map(|s| s.to_string())
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(listed(&items(0)), "");
+        assert_eq!(listed(&items(1)), "a");
+        assert_eq!(listed(&items(2)), "a and b");
+        assert_eq!(listed(&items(3)), "a, b and c");
+        assert_eq!(count(1, "cut", "cuts"), "1 cut");
+        assert_eq!(count(0, "cut", "cuts"), "0 cuts");
+    }
+
+    #[test]
+    fn settings_and_values_keep_their_digits() {
+        assert_eq!(setting(1160.0), "1160");
+        assert_eq!(setting(0.05), "0.05");
+        assert_eq!(with_error(929.782, 0.59), "929.78 ± 0.59");
+        assert_eq!(with_error(929.782, 5.9), "929.8 ± 5.9");
+        assert_eq!(with_error(929.782, f64::NAN), "929.78");
+    }
+}

@@ -1,0 +1,487 @@
+//! The robot model against measured FRFs: FRFs, error map, parameters.
+
+use super::figure::{
+    self, CellFormat, FrfCurve, FrfFigure, HeatMap, NoiseLevel, ParameterFigure, ParameterRow,
+};
+use super::number::{decimals, percent, plus_minus, significant};
+use super::parts::{count, figure, listed, paragraph};
+use super::{Block, Column, Section, Table};
+use crate::analysis::{PostureFindings, StructureFindings};
+
+/// FRFs shown as figures: the worst and the best.
+const WORST_SHOWN: usize = 3;
+/// FRFs listed.
+const LISTED: usize = 12;
+/// Up to this many times the noise an error is called noise.
+pub const NOISE_LIKE: f64 = 1.1;
+
+/// What a reader must know of the fit, in plain words.
+pub fn summary(findings: &StructureFindings) -> String {
+    let data = &findings.analysis.case.data;
+    let (before, after) = (&findings.analysis.before.totals, &findings.analysis.after.totals);
+    let mut text = format!(
+        "{} at {} were compared with the model of the {}. With the values of the robot file the error (nrms) was {}; \
+         after calibration it is {}. The noise of the measurement itself amounts to {}.",
+        count(data.frfs().count(), "measured FRF", "measured FRFs"),
+        count(data.measured_postures().len(), "posture", "postures"),
+        findings.analysis.case.model.robot.spec.name,
+        percent(before.nrms),
+        percent(after.nrms),
+        percent(after.noise_floor_nrms),
+    );
+    if let Some(held_out) = findings.held_out_nrms {
+        text += &format!(
+            " Postures that were left out of the fit are predicted with an error of {}.",
+            percent(held_out)
+        );
+    }
+    text + " " + &verdict(findings)
+}
+
+/// Is what is left noise?
+fn verdict(findings: &StructureFindings) -> String {
+    let after = &findings.analysis.after;
+    let times = |nrms: f64, floor: f64| if floor > 0.0 { nrms / floor } else { f64::INFINITY };
+    let total = times(after.totals.nrms, after.totals.noise_floor_nrms);
+    let worst_band = after
+        .by_band
+        .iter()
+        .max_by(|a, b| times(a.nrms, a.noise_floor_nrms).total_cmp(&times(b.nrms, b.noise_floor_nrms)));
+    let band_text = worst_band.map(|b| {
+        let (from, to) = (significant(b.from_hz, 3), significant(b.to_hz, 3));
+        let times = significant(times(b.nrms, b.noise_floor_nrms), 2);
+        (format!("{from}–{to} Hz"), times, b)
+    });
+    if total <= NOISE_LIKE {
+        let mut text = String::from(
+            "What is left is as large as the noise: taken together, these FRFs show nothing that the model lacks.",
+        );
+        if let Some((band, ratio, b)) = band_text
+            && times(b.nrms, b.noise_floor_nrms) > 1.5
+        {
+            text += &format!(" Only the band {band} stands out with {ratio} times its noise.");
+        }
+        return text;
+    }
+    let mut text = format!(
+        "What is left is {} times the noise, so it is not noise: either the model lacks something that these FRFs \
+         show, or the measurement has a systematic error.",
+        significant(total, 2)
+    );
+    if let Some((band, ratio, _)) = band_text {
+        text += &format!(" It stands out most at {band} ({ratio} times the noise there).");
+    }
+    text + " Parameters of a model that does not fit are not the robot's: they bend to make up for what is missing."
+}
+
+pub fn sections(findings: &StructureFindings) -> Vec<Section> {
+    vec![
+        frf_section(findings),
+        map_section(findings),
+        parameter_section(findings),
+    ]
+}
+
+/// Model against measurement as curves.
+pub fn frf_section(findings: &StructureFindings) -> Section {
+    let errors = &findings.analysis.after.frf_errors;
+    let mut order: Vec<usize> = (0..errors.len()).collect();
+    order.sort_by(|&a, &b| errors[b].times_noise().total_cmp(&errors[a].times_noise()));
+    let best = order
+        .iter()
+        .copied()
+        .min_by(|&a, &b| errors[a].nrms.total_cmp(&errors[b].nrms));
+    let worst: Vec<usize> = order
+        .iter()
+        .copied()
+        .take(WORST_SHOWN)
+        .filter(|i| Some(*i) != best)
+        .collect();
+    let mut blocks = Vec::new();
+    if let Some(best) = best {
+        blocks.push(frf_figure(
+            findings,
+            best,
+            "frf-best",
+            "The FRF that the calibrated model meets best",
+        ));
+    }
+    for (rank, &index) in worst.iter().enumerate() {
+        let place = [
+            "The FRF with most error against its noise",
+            "Second most error against noise",
+            "Third most error against noise",
+        ]
+        .get(rank)
+        .copied()
+        .unwrap_or("Much error against noise");
+        blocks.push(frf_figure(
+            findings,
+            index,
+            &format!("frf-worst-{}", rank + 1),
+            place,
+        ));
+    }
+    blocks.push(frf_table(findings, &order));
+    Section {
+        id: "frfs".into(),
+        title: "Model against measured FRFs".into(),
+        lead: "Receptance: how far the robot moves for each newton, over frequency. Points are measured, the dashed \
+               line is the model as the robot file has it, the solid line the calibrated model."
+            .into(),
+        blocks,
+    }
+}
+
+fn frf_figure(findings: &StructureFindings, index: usize, file: &str, place: &str) -> Block {
+    let analysis = &findings.analysis;
+    let (Some((block, frf)), Some(before), Some(after)) = (
+        analysis.case.data.frfs().nth(index),
+        analysis.before.frf_errors.get(index),
+        analysis.after.frf_errors.get(index),
+    ) else {
+        return paragraph("");
+    };
+    let curve = |label: String, value: &[num_complex::Complex64]| FrfCurve {
+        label,
+        frequency_hz: block.frequency_hz.clone(),
+        value: value.to_vec(),
+    };
+    let name = frf_name(&after.posture, &after.name);
+    let models = [
+        ("robot file", &analysis.nominal, before.nrms),
+        ("calibrated", &analysis.calibrated, after.nrms),
+    ];
+    let drawing = FrfFigure {
+        title: format!("{name}: model against measurement"),
+        quantity: "Receptance".into(),
+        unit: "m/N".into(),
+        measured: Some(curve("measured".into(), &frf.receptance)),
+        models: models
+            .into_iter()
+            .filter_map(|(label, predicted, nrms)| {
+                let label = format!("model, {label} (error {})", percent(nrms));
+                Some(curve(label, predicted.get(index)?))
+            })
+            .collect(),
+        noise: Some(NoiseLevel {
+            label: "noise level".into(),
+            frequency_hz: block.frequency_hz.clone(),
+            magnitude: frf.noise_std.clone(),
+        }),
+    };
+    let caption = format!(
+        "{place}: {name}. Error {} before and {} after calibration; its noise is {}.",
+        percent(before.nrms),
+        percent(after.nrms),
+        percent(after.noise_floor_nrms),
+    );
+    figure(file, &drawing.title.clone(), caption, drawing.png())
+}
+
+/// FRF names often hold the posture already.
+fn frf_name(posture: &str, name: &str) -> String {
+    if name.split_once(' ').is_some_and(|(first, _)| first == posture) {
+        format!(
+            "Posture {posture}, {}",
+            name.trim_start_matches(posture).trim_start()
+        )
+    } else {
+        format!("Posture {posture}, {name}")
+    }
+}
+
+fn frf_table(findings: &StructureFindings, order: &[usize]) -> Block {
+    let (before, after) = (&findings.analysis.before, &findings.analysis.after);
+    let row = |&index: &usize| {
+        let (b, a) = (before.frf_errors.get(index)?, after.frf_errors.get(index)?);
+        let times = if a.noise_floor_nrms > 0.0 {
+            a.nrms / a.noise_floor_nrms
+        } else {
+            f64::NAN
+        };
+        Some(vec![
+            frf_name(&a.posture, &a.name),
+            percent(b.nrms),
+            percent(a.nrms),
+            percent(a.noise_floor_nrms),
+            significant(times, 2),
+        ])
+    };
+    let mut notes = vec![
+        "Error: root of the summed squared differences over the summed squared measurement (nrms)."
+            .to_string(),
+        "× noise: 1 where only noise is left.".to_string(),
+    ];
+    if order.len() > LISTED {
+        notes.push(format!("The first {LISTED} of {}.", order.len()));
+    }
+    Block::Table(Table {
+        caption: "FRFs by error against noise, worst first".into(),
+        columns: vec![
+            Column::text("FRF (response/force)"),
+            Column::number("robot file"),
+            Column::number("calibrated"),
+            Column::number("noise"),
+            Column::number("× noise"),
+        ],
+        rows: order.iter().take(LISTED).filter_map(row).collect(),
+        notes,
+    })
+}
+
+/// Where the error sits.
+pub fn map_section(findings: &StructureFindings) -> Section {
+    let after = &findings.analysis.after;
+    let map = &after.map;
+    let bands: Vec<String> = map
+        .band_edges_hz
+        .windows(2)
+        .map(|w| format!("{}–{}", significant(w[0], 2), significant(w[1], 2)))
+        .collect();
+    let heat = |title: &str, row: &str, column: &str, rows: &[String], columns: &[String], values| HeatMap {
+        title: title.into(),
+        row_label: row.into(),
+        column_label: column.into(),
+        rows: rows.to_vec(),
+        columns: columns.to_vec(),
+        values,
+        value_label: "error (nrms)".into(),
+        ..Default::default()
+    };
+    let by_direction = heat(
+        "Calibrated model: error by posture and direction",
+        "Posture",
+        "Direction (response, force)",
+        &map.postures,
+        &map.directions,
+        map.posture_direction.clone(),
+    );
+    let mut blocks = vec![figure(
+        "error-posture-direction",
+        "Error of the calibrated model by posture and direction",
+        "Error of the calibrated model by posture and direction, all frequencies together.",
+        by_direction.png(),
+    )];
+    let against_noise = HeatMap {
+        value_label: "error / noise".into(),
+        format: CellFormat::Significant(2),
+        range: Some((1.0, largest(&map.posture_direction_times_noise).max(2.0))),
+        ..heat(
+            "Calibrated model: error in multiples of the noise",
+            "Posture",
+            "Direction (response, force)",
+            &map.postures,
+            &map.directions,
+            map.posture_direction_times_noise.clone(),
+        )
+    };
+    blocks.push(figure(
+        "error-times-noise",
+        "Error of the calibrated model in multiples of the noise, by posture and direction",
+        "The same in multiples of the measurement's noise: 1 is noise alone. What is dark here is where to look first.",
+        against_noise.png(),
+    ));
+    for (file, title, row_label, rows, values) in [
+        (
+            "error-posture-band",
+            "posture",
+            "Posture",
+            &map.postures,
+            &map.posture_band,
+        ),
+        (
+            "error-direction-band",
+            "direction",
+            "Direction",
+            &map.directions,
+            &map.direction_band,
+        ),
+    ] {
+        let drawing = heat(
+            &format!("Calibrated model: error by {title} and frequency band"),
+            row_label,
+            "Band (Hz)",
+            rows,
+            &bands,
+            values.clone(),
+        );
+        blocks.push(figure(
+            file,
+            &drawing.title.clone(),
+            format!("Error of the calibrated model by {title} and frequency band."),
+            drawing.png(),
+        ));
+    }
+    let rows = after.by_band.iter().map(|b| {
+        let times = if b.noise_floor_nrms > 0.0 {
+            b.nrms / b.noise_floor_nrms
+        } else {
+            f64::NAN
+        };
+        vec![
+            format!("{}–{} Hz", significant(b.from_hz, 3), significant(b.to_hz, 3)),
+            percent(b.nrms),
+            percent(b.noise_floor_nrms),
+            significant(times, 2),
+        ]
+    });
+    blocks.push(Block::Table(Table {
+        caption: "Error by frequency band, all FRFs together".into(),
+        columns: vec![
+            Column::text("band"),
+            Column::number("error"),
+            Column::number("noise"),
+            Column::number("× noise"),
+        ],
+        rows: rows.collect(),
+        notes: vec![],
+    }));
+    Section {
+        id: "error-map".into(),
+        title: "Where the error is".into(),
+        lead: "Dark cells are where the calibrated model and the measurement differ most for their size. Where the robot \
+               hardly moves that may be noise alone: the second map, in multiples of the noise, says.".into(),
+        blocks,
+    }
+}
+
+fn largest(values: &[Vec<Option<f64>>]) -> f64 {
+    values.iter().flatten().flatten().copied().fold(0.0, f64::max)
+}
+
+/// What was tuned.
+pub fn parameter_section(findings: &StructureFindings) -> Section {
+    let calibration = &findings.analysis.calibration;
+    let rows = calibration.parameters.iter().map(|p| ParameterRow {
+        name: p.name.clone(),
+        unit: unit(p.unit).to_string(),
+        nominal: p.initial,
+        before: None,
+        after: Some(figure::Estimate {
+            value: p.value,
+            std_error: Some(p.std_error).filter(|s| s.is_finite()),
+        }),
+    });
+    let drawing = ParameterFigure {
+        title: "Calibrated parameters against the robot file, with standard errors".into(),
+        before_label: "robot file".into(),
+        after_label: "calibrated".into(),
+        rows: rows.collect(),
+    };
+    let table = calibration.parameters.iter().map(|p| {
+        vec![
+            p.name.clone(),
+            super::number::format_si(p.initial, unit(p.unit), 4),
+            plus_minus(p.value, p.std_error, unit(p.unit)),
+            format!("{} %", decimals(100.0 * (p.value / p.initial - 1.0), 1)),
+            if p.at_bound { "at the end of its range" } else { "" }.to_string(),
+        ]
+    });
+    let fit = format!(
+        "The fit {} after {} from {}. Weighted misfit per residual (reduced χ²): {}; 1 would be noise alone. Standard \
+         errors include that misfit and what was assumed beforehand of each parameter, not what the model lacks.",
+        if calibration.converged {
+            "converged"
+        } else {
+            "did NOT converge"
+        },
+        count(calibration.iterations, "iteration", "iterations"),
+        match calibration.starts {
+            1 => "one starting point".to_string(),
+            n => format!(
+                "{n} starting points ({} of them led here)",
+                calibration.starts_agreeing
+            ),
+        },
+        significant(calibration.reduced_chi2, 3),
+    );
+    Section {
+        id: "parameters".into(),
+        title: "Parameters".into(),
+        lead: "What calibration made of the robot file's values.".into(),
+        blocks: vec![
+            figure(
+                "parameters",
+                "Deviation of each parameter from the robot file, with standard error",
+                "Deviation of each parameter from the robot file. The thin line at the end of a bar spans one standard \
+                 error to either side; it may be too short to see.",
+                drawing.png(),
+            ),
+            Block::Table(Table {
+                caption: "Parameters".into(),
+                columns: vec![
+                    Column::text("parameter"),
+                    Column::number("robot file"),
+                    Column::number("calibrated ± standard error"),
+                    Column::number("change"),
+                    Column::text(""),
+                ],
+                rows: table.collect(),
+                notes: vec![],
+            }),
+            paragraph(fit),
+        ],
+    }
+}
+
+/// A bare number bears no unit in print.
+fn unit(unit: &str) -> &str {
+    if unit == "1" { "" } else { unit }
+}
+
+/// Natural frequencies and static stiffness at the campaign's postures.
+pub fn posture_section(postures: &[PostureFindings]) -> Section {
+    let mega = |v: f64| significant(v / 1e6, 4);
+    let mut rows = Vec::new();
+    for posture in postures {
+        let states = [
+            ("robot file", Some(&posture.nominal)),
+            ("calibrated", posture.calibrated.as_ref()),
+        ];
+        for (state, report) in states.into_iter().filter_map(|(s, r)| Some((s, r?))) {
+            let mut row = vec![posture.id.clone(), state.to_string()];
+            row.extend(report.tcp_stiffness_n_per_m.map(mega));
+            row.extend(report.flange_stiffness_n_per_m.map(mega));
+            let frequencies: Vec<String> = report
+                .natural_frequencies_hz
+                .iter()
+                .take(6)
+                .map(|f| decimals(*f, 1))
+                .collect();
+            row.push(frequencies.join("  "));
+            rows.push(row);
+        }
+    }
+    let mut columns = vec![Column::text("posture"), Column::text("state")];
+    let numbers = [
+        "tool Kx",
+        "tool Ky",
+        "tool Kz",
+        "flange Kx",
+        "flange Ky",
+        "flange Kz",
+    ];
+    columns.extend(numbers.map(Column::number));
+    columns.push(Column::text("first natural frequencies (Hz)"));
+    let ids: Vec<String> = postures.iter().map(|p| p.id.clone()).collect();
+    let lead = match ids.len() {
+        0..=8 => format!("What the model says of {}.", listed(&ids)),
+        n => format!("What the model says of the {n} postures."),
+    };
+    Section {
+        id: "postures".into(),
+        title: "The robot at the postures".into(),
+        lead,
+        blocks: vec![Block::Table(Table {
+            caption: "Static stiffness (MN/m) and natural frequencies".into(),
+            columns,
+            rows,
+            notes: vec![
+                "Stiffness in base axes, force and displacement at the same point and in the same direction; the \
+                 other directions are free to move."
+                    .into(),
+            ],
+        })],
+    }
+}

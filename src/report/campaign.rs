@@ -187,6 +187,11 @@ fn summary(findings: &CampaignFindings) -> Section {
     blocks.extend(findings.modal().and_then(modal_section::summary).map(paragraph));
     blocks.extend(findings.cutting().map(|c| paragraph(cutting_section::summary(c))));
     blocks.extend(findings.lobes().map(|l| paragraph(lobes_section::summary(l))));
+    if blocks.is_empty() {
+        blocks.push(paragraph(
+            "Nothing measured is in this report: it says what the robot file says.",
+        ));
+    }
     let lost = findings
         .errors()
         .into_iter()

@@ -188,7 +188,7 @@ fn a_campaign_with_nothing_in_it_is_told_so() {
 #[cfg(feature = "parquet")]
 #[test]
 fn tables_read_back_as_they_were_computed() {
-    use polars::prelude::{ParquetReader, SerReader};
+    use polars::prelude::{ChunkAgg, ParquetReader, SerReader};
 
     let (_folder, dir) = small_campaign();
     let json = json_of(&["report", text(&dir), "--json"]);

@@ -442,7 +442,8 @@ fn confidence(
                 .filter(|c| c.instance != winner.instance && !c.at_bound)
                 .map(|c| weight(c).min(1.0))
                 .sum();
-            let beaten = (-winner.delta_bic / TEMPER).exp().min(1.0);
+            // What the model without any effect would weigh.
+            let beaten = (winner.delta_bic / (2.0 * TEMPER)).exp().min(1.0);
             let left = if with_companion {
                 0.92
             } else {

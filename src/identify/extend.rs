@@ -8,9 +8,9 @@ use super::structure::{FrfProblem, Misfit, StructureModel};
 use crate::Result;
 
 /// Complex values a screening fit works on, about: enough to tell effects apart, few enough to try many starts.
-const SCREENING_VALUES: usize = 8000;
+const SCREENING_VALUES: usize = 5000;
 /// Starts that get more than a look at their cost.
-const SERIOUS_STARTS: usize = 3;
+const SERIOUS_STARTS: usize = 2;
 
 /// Every how many lines screening fits use.
 pub fn screening_stride(data: &FrfData) -> usize {

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::Path;
 
-use assert_cmd::Command;
+use crate::support::program;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
@@ -138,8 +138,7 @@ fn write_campaign(dir: &Path, cuts: &[MadeCut], k: &[f64; 6]) {
 }
 
 fn cfc(dir: &Path, more: &[&str]) -> Value {
-    let output = Command::cargo_bin("lobestone")
-        .unwrap()
+    let output = program()
         .args(["cfc", "--json"])
         .args(more)
         .arg(dir)
@@ -275,8 +274,7 @@ fn an_unusable_record_is_left_out_by_name_and_nothing_but_such_is_an_error() {
     for cut in plan() {
         std::fs::write(dir.path().join(&cut.file), "time_s,fx_n,fy_n,fz_n\n").unwrap();
     }
-    let output = Command::cargo_bin("lobestone")
-        .unwrap()
+    let output = program()
         .args(["cfc", "--json"])
         .arg(dir.path())
         .output()
@@ -308,7 +306,7 @@ fn the_answer_does_not_depend_on_the_number_of_threads() {
     let dir = tempfile::tempdir().unwrap();
     write_campaign(dir.path(), &plan(), &TRUTH);
     let out = |threads: &str| {
-        let mut command = Command::cargo_bin("lobestone").unwrap();
+        let mut command = program();
         command
             .env("RAYON_NUM_THREADS", threads)
             .args(["cfc", "--json"])

@@ -1,12 +1,9 @@
 //! Exit statuses and streams of the command line.
 
-use assert_cmd::Command;
+use crate::support::program;
 
 #[test]
 fn wrong_usage_is_status_two() {
-    Command::cargo_bin("lobestone")
-        .unwrap()
-        .arg("no-such-command")
-        .assert()
-        .code(2);
+    let status = program().arg("no-such-command").output().unwrap().status;
+    assert_eq!(status.code(), Some(2));
 }

@@ -1,26 +1,27 @@
 //! `lobestone inspect`: the JSON of the contract, the text for people, and errors that name the file.
 
 use std::path::Path;
+use std::process::Output;
 
-use assert_cmd::Command;
+use crate::support::program;
 use lobestone::ingest::{ByteOrder, Encoding58, FrfRecord, Quantity, write_uff58};
 use num_complex::Complex64;
 use serde_json::Value;
 
-fn inspect(folder: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
-    Command::cargo_bin("lobestone")
-        .unwrap()
+fn inspect(folder: &Path, arguments: &[&str]) -> Output {
+    program()
         .current_dir(folder)
         .arg("inspect")
         .args(arguments)
-        .assert()
+        .output()
+        .unwrap()
 }
 
 fn document(folder: &Path, arguments: &[&str]) -> Value {
-    let assert = inspect(folder, &[arguments, &["--json"]].concat())
-        .success()
-        .stderr("");
-    serde_json::from_slice(&assert.get_output().stdout).unwrap()
+    let output = inspect(folder, &[arguments, &["--json"]].concat());
+    assert!(output.status.success());
+    assert_eq!(String::from_utf8_lossy(&output.stderr), "");
+    serde_json::from_slice(&output.stdout).unwrap()
 }
 
 fn write_files(folder: &Path) {
@@ -96,8 +97,9 @@ fn json_as_the_contract_says() {
 fn text_names_format_channels_and_warnings() {
     let folder = tempfile::tempdir().unwrap();
     write_files(folder.path());
-    let assert = inspect(folder.path(), &["cut.txt"]).success();
-    let text = String::from_utf8_lossy(&assert.get_output().stdout).into_owned();
+    let output = inspect(folder.path(), &["cut.txt"]);
+    assert!(output.status.success());
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
     for part in [
         "cut.txt",
         "semicolon separated, decimal comma",
@@ -115,8 +117,10 @@ fn an_unreadable_file_fails_and_is_named() {
     let folder = tempfile::tempdir().unwrap();
     write_files(folder.path());
     let failed = |arguments: &[&str]| {
-        let assert = inspect(folder.path(), arguments).code(1).stdout("");
-        String::from_utf8_lossy(&assert.get_output().stderr).into_owned()
+        let output = inspect(folder.path(), arguments);
+        assert_eq!(output.status.code(), Some(1));
+        assert_eq!(String::from_utf8_lossy(&output.stdout), "");
+        String::from_utf8_lossy(&output.stderr).into_owned()
     };
     let error = failed(&["frf.uff", "rec.dwd"]);
     assert!(
@@ -128,5 +132,5 @@ fn an_unreadable_file_fails_and_is_named() {
         both.contains("2 of 3") && both.contains("rec.dwd") && both.contains("missing.uff"),
         "{both}"
     );
-    inspect(folder.path(), &[]).code(2);
+    assert_eq!(inspect(folder.path(), &[]).status.code(), Some(2));
 }

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::Path;
 
-use assert_cmd::Command;
+use crate::support::program;
 use num_complex::Complex64;
 use serde_json::Value;
 
@@ -27,8 +27,7 @@ fn write_csv(path: &Path, modes: &[(f64, f64)], conjugated: bool) {
 }
 
 fn json_of(arguments: &[&str]) -> Value {
-    let output = Command::cargo_bin("lobestone")
-        .unwrap()
+    let output = program()
         .arg("modal")
         .arg("--json")
         .args(arguments)
@@ -104,9 +103,9 @@ fn a_band_leaves_out_the_modes_outside_and_conjugated_phase_is_said() {
 
 #[test]
 fn a_band_that_is_none_is_wrong_usage() {
-    let run = Command::cargo_bin("lobestone")
-        .unwrap()
+    let run = program()
         .args(["modal", "--band", "60:3", "x.csv"])
-        .assert();
-    run.code(2);
+        .output()
+        .unwrap();
+    assert_eq!(run.status.code(), Some(2));
 }

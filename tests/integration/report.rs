@@ -2,17 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use assert_cmd::Command;
+use crate::support::program;
 use lobestone::builtin::FIRST_CELL;
 use serde_json::Value;
 use tempfile::TempDir;
 
 pub fn run(arguments: &[&str]) -> std::process::Output {
-    Command::cargo_bin("lobestone")
-        .unwrap()
-        .args(arguments)
-        .output()
-        .unwrap()
+    program().args(arguments).output().unwrap()
 }
 
 pub fn json_of(arguments: &[&str]) -> Value {

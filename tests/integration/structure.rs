@@ -184,8 +184,7 @@ fn drilling_coefficients() {
 fn results_do_not_depend_on_threads() {
     let folder = blind("frf-9112");
     let with = |threads: &str| {
-        let output = assert_cmd::Command::cargo_bin("lobestone")
-            .unwrap()
+        let output = crate::support::program()
             .env("RAYON_NUM_THREADS", threads)
             .args(["calibrate", folder.to_str().unwrap(), "--json"])
             .output()

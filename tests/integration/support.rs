@@ -1,8 +1,8 @@
 //! Running the program, and the practice campaigns under `tests/data/blind`.
 
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
-use assert_cmd::Command;
 use serde_json::Value;
 
 /// What a run of the program left behind.
@@ -12,12 +12,13 @@ pub struct Run {
     pub stderr: String,
 }
 
+/// The program, ready for arguments.
+pub fn program() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_lobestone"))
+}
+
 pub fn lobestone(arguments: &[&str]) -> Run {
-    let output = Command::cargo_bin("lobestone")
-        .unwrap()
-        .args(arguments)
-        .output()
-        .unwrap();
+    let output = program().args(arguments).output().unwrap();
     Run {
         status: output.status.code(),
         stdout: String::from_utf8(output.stdout).expect("stdout is UTF-8"),

@@ -1,7 +1,7 @@
 use serde_json::{Map, Value, json};
 
 use super::text::{number, percent, table, warnings};
-use super::{CampaignArg, Outcome};
+use super::{CampaignArg, Domain, Outcome, structure_only};
 use crate::Result;
 use crate::analysis::StructureAnalysis;
 use crate::campaign::Campaign;
@@ -14,9 +14,13 @@ use crate::identify::extend::held_out;
 pub struct Args {
     #[command(flatten)]
     campaign: CampaignArg,
+    /// Side of the campaign to look at.
+    #[arg(long, value_enum)]
+    domain: Option<Domain>,
 }
 
 pub fn run(args: Args) -> Result<Outcome> {
+    structure_only(args.domain)?;
     let campaign = Campaign::load(&args.campaign.dir)?;
     let analysis = StructureAnalysis::run(&campaign, Options::default())?;
     let StructureAnalysis {

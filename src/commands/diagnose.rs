@@ -1,7 +1,7 @@
 use serde_json::{Map, Value, json};
 
 use super::text::{number, percent, table, warnings};
-use super::{CampaignArg, Outcome};
+use super::{CampaignArg, Domain, Outcome, structure_only};
 use crate::Result;
 use crate::campaign::Campaign;
 use crate::discrepancy::{Candidate, Diagnosis, Verdict, diagnose};
@@ -12,9 +12,13 @@ use crate::identify::{Options, StructureCase};
 pub struct Args {
     #[command(flatten)]
     campaign: CampaignArg,
+    /// Side of the campaign to look at.
+    #[arg(long, value_enum)]
+    domain: Option<Domain>,
 }
 
 pub fn run(args: Args) -> Result<Outcome> {
+    structure_only(args.domain)?;
     let campaign = Campaign::load(&args.campaign.dir)?;
     let case = StructureCase::load(&campaign)?;
     let diagnosis = diagnose(&case.model, &case.data, Options::default())?;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Parser, Subcommand, ValueEnum};
 
-use crate::Result;
+use crate::{InputError, Result};
 
 mod calibrate;
 mod cfc;
@@ -69,6 +69,19 @@ pub enum Command {
     Thesis(thesis::Args),
     /// The whole story on built-in campaigns.
     Demo(demo::Args),
+}
+
+/// Refuses the side that a command does not serve yet.
+fn structure_only(domain: Option<Domain>) -> Result<()> {
+    match domain {
+        Some(Domain::Cutting) => Err(InputError::new(
+            "force records cannot be compared waveform by waveform yet",
+        )
+        .key("--domain")
+        .remedy("use `lobestone cfc` for the cutting side; leave --domain out or give structure for the FRFs")
+        .into()),
+        _ => Ok(()),
+    }
 }
 
 /// A campaign folder.

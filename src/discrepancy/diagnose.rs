@@ -86,7 +86,7 @@ const STRONG_BIC: f64 = 10.0;
 /// Rivals within this difference of −2 ln L of the best cannot be told from it.
 const INDISTINGUISHABLE: f64 = 12.0;
 /// Candidates whose combination with every other one is tried where none explains the data alone.
-const PAIR_LEADERS: usize = 4;
+const PAIR_LEADERS: usize = 3;
 /// Share of the excess misfit that one effect must explain to be the verdict although more is left.
 const LARGE_SHARE: f64 = 0.9;
 
@@ -395,22 +395,34 @@ fn best_pair(
         .take(PAIR_LEADERS)
         .filter_map(|(i, c)| kept.iter().find(|t| t.instance == c.instance).map(|t| (i, t)))
         .collect();
-    let tasks: Vec<(usize, &Tried, Instance)> = leaders
-        .iter()
-        .flat_map(|(i, t)| instances.iter().map(move |second| (*i, *t, *second)))
-        .filter(|(_, t, second)| t.instance.label() != second.label())
-        .collect();
-    let progress = Progress::new("trying pairs of effects", tasks.len());
-    let pairs: Vec<Option<(usize, Instance, f64)>> = tasks
-        .par_iter()
-        .map(|(i, leader, second)| {
-            let pair = extend(&leader.model, *second, std::slice::from_ref(&leader.fit.theta));
-            progress.step();
-            let pair = pair.filter(|p| p.fit.at_bound.is_empty())?;
-            Some((*i, *second, pair.chi2() / freedom(&pair.model)))
-        })
-        .collect();
-    let (first, second, rest) = pairs.into_iter().flatten().min_by(|a, b| a.2.total_cmp(&b.2))?;
+    let progress = Progress::new("trying pairs of effects", leaders.len() * instances.len());
+    let mut best: Option<(usize, Instance, f64)> = None;
+    for (i, leader) in leaders {
+        let seconds: Vec<Instance> = instances
+            .iter()
+            .copied()
+            .filter(|s| s.label() != leader.instance.label())
+            .collect();
+        let pairs: Vec<Option<(usize, Instance, f64)>> = seconds
+            .par_iter()
+            .map(|second| {
+                let pair = extend(&leader.model, *second, std::slice::from_ref(&leader.fit.theta));
+                progress.step();
+                let pair = pair.filter(|p| p.fit.at_bound.is_empty())?;
+                Some((i, *second, pair.chi2() / freedom(&pair.model)))
+            })
+            .collect();
+        for pair in pairs.into_iter().flatten() {
+            if best.is_none_or(|b| pair.2 < b.2) {
+                best = Some(pair);
+            }
+        }
+        // Two effects that leave only noise are the answer; other leaders cannot do better.
+        if best.is_some_and(|b| b.2 <= NOISE_CHI2) {
+            break;
+        }
+    }
+    let (first, second, rest) = best?;
     // The stronger of the two alone is named first.
     let other = candidates
         .iter()

@@ -74,6 +74,13 @@ impl Calibration {
                 p.name, p.value, p.unit
             ));
         }
+        if self.reduced_chi2 > FAR_ABOVE_NOISE {
+            warnings.push(format!(
+                "the calibrated model leaves {:.1} times the variance of the noise: physics is missing, or a file is not \
+                 what campaign.toml says (units, quantity, posture, node); standard errors are widened accordingly",
+                self.reduced_chi2
+            ));
+        }
         if self.starts > 1 && self.starts_agreeing < 2 {
             warnings.push(format!(
                 "only one of {} starting points led to this fit: there may be a better one (try --starts 20)",
@@ -84,6 +91,8 @@ impl Calibration {
     }
 }
 
+/// Misfit from which on the user is told.
+const FAR_ABOVE_NOISE: f64 = 1.5;
 /// Misfit above which noise alone is not credible any more and further starting points are tried.
 const SUSPICIOUS_CHI2: f64 = 1.15;
 /// Lines used to get near the answer: every how many.

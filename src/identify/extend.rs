@@ -12,6 +12,9 @@ const SCREENING_VALUES: usize = 5000;
 /// Starts that get more than a look at their cost.
 const SERIOUS_STARTS: usize = 2;
 
+/// ½χ² per complex value from which on log magnitudes are fitted first.
+const TRAP_MISFIT: f64 = 3.0;
+
 /// Every how many lines screening fits use.
 pub fn screening_stride(data: &FrfData) -> usize {
     (data.value_count() / SCREENING_VALUES).clamp(1, 6)
@@ -53,33 +56,57 @@ pub fn screen(
         .collect();
     // The most promising by either measure: a start may have its peaks in the right places and still a large misfit.
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut serious: Vec<Vec<f64>> = starts.iter().take(SERIOUS_STARTS).map(|s| s.2.clone()).collect();
+    let direct: Vec<Vec<f64>> = starts.iter().take(SERIOUS_STARTS).map(|s| s.2.clone()).collect();
+    let lowest = starts.first().map_or(f64::INFINITY, |s| s.0);
     starts.sort_by(|a, b| a.1.total_cmp(&b.1));
-    for (_, _, start) in starts.iter().take(SERIOUS_STARTS) {
-        if !serious.contains(start) {
-            serious.push(start.clone());
-        }
-    }
-    let short = Stopping {
-        max_iterations: 12,
+    // Peaks beside their places are a danger only where the misfit is far above noise.
+    let values = data.value_count() as f64 / stride as f64;
+    let staged = if lowest > TRAP_MISFIT * values {
+        SERIOUS_STARTS
+    } else {
+        0
+    };
+    let look = Stopping {
+        max_iterations: 6,
         relative_decrease: 1e-3,
     };
-    let mut best: Option<Fit> = None;
+    let mut fits = Vec::new();
     let mut failure = None;
-    for start in &serious {
-        let direct = minimise(&complex, start, &bounds, short);
-        let staged = minimise(&log, start, &bounds, short)
-            .and_then(|near| minimise(&complex, &near.theta, &bounds, short));
-        for fit in [direct, staged] {
-            match fit {
-                Ok(fit) if best.as_ref().is_none_or(|b| fit.cost < b.cost) => best = Some(fit),
-                Ok(_) => {}
-                Err(error) => failure = Some(error),
-            }
+    let mut keep = |fit: Result<Fit>| match fit {
+        Ok(fit) => fits.push(fit),
+        Err(error) => failure = Some(error),
+    };
+    for start in &direct {
+        keep(minimise(&complex, start, &bounds, look));
+    }
+    for (_, _, start) in starts.iter().take(staged) {
+        let near = minimise(
+            &log,
+            start,
+            &bounds,
+            Stopping {
+                max_iterations: 10,
+                ..look
+            },
+        );
+        keep(near.and_then(|near| minimise(&complex, &near.theta, &bounds, look)));
+    }
+    fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    let settle = Stopping {
+        max_iterations: 40,
+        relative_decrease: 1e-6,
+    };
+    let mut best: Option<Fit> = None;
+    // The runner-up goes to the end too where it is close: the leader of a short look need not win.
+    let close = |fit: &&Fit| fit.cost < 1.5 * fits[0].cost;
+    for fit in fits.iter().take(2).filter(close) {
+        let settled = minimise(&complex, &fit.theta, &bounds, settle)?;
+        if best.as_ref().is_none_or(|b| settled.cost < b.cost) {
+            best = Some(settled);
         }
     }
     match (best, failure) {
-        (Some(best), _) => minimise(&complex, &best.theta, &bounds, Stopping::default()),
+        (Some(best), _) => Ok(best),
         (None, Some(error)) => Err(error),
         (None, None) => Err(crate::Error::computation("no starting point for the effect")),
     }

@@ -84,9 +84,13 @@ pub fn natural_frequencies_hz(system: &System) -> Result<Vec<f64>> {
 /// A system in its modal basis, ready to give receptances between chosen outputs at any frequency.
 #[derive(Debug, Clone)]
 pub struct FrfBasis {
+    /// Coordinates that move with mass: vibrating modes of the chain, then branches.
     n: usize,
     /// Outputs in the basis, one column an output: n × outputs.
     rows: DMatrix<f64>,
+    /// Static compliance of the massless combinations of coordinates between the outputs, m/N. They have neither
+    /// inertia nor modal damping, so that leaving them out of the dynamics is exact.
+    massless: Option<DMatrix<f64>>,
     dynamics: Dynamics,
     derivatives: Vec<BasisDerivative>,
 }
@@ -108,6 +112,16 @@ struct BasisDerivative {
     stiffness: DMatrix<f64>,
     mass: DMatrix<f64>,
     damping: DMatrix<f64>,
+    massless: Option<MasslessDerivative>,
+}
+
+/// What the massless part adds to a derivative.
+#[derive(Debug, Clone)]
+struct MasslessDerivative {
+    /// Coupling of each output's massless part with the moving coordinates, n × outputs.
+    coupling: DMatrix<f64>,
+    /// Between the outputs' massless parts, outputs × outputs.
+    own: DMatrix<f64>,
 }
 
 /// Responses of all outputs at one frequency: Z⁻¹ rᵀ in the basis, n × outputs.
@@ -127,25 +141,47 @@ impl FrfBasis {
             &system.stiffness.view((0, 0), (chain, chain)).into_owned(),
             &system.chain_mass,
         )?;
-        let mut basis = DMatrix::zeros(n, n);
-        basis.view_mut((0, 0), (chain, chain)).copy_from(&modes.shapes);
-        for i in chain..n {
-            let k = system.stiffness[(i, i)];
+        // Modes come with the lowest frequency first, so the massless ones stand last. Dampers in the elements damp
+        // them and branches load them with mass: then they stay.
+        let branches = n - chain;
+        let moving = if branches > 0 || system.viscous.is_some() {
+            chain
+        } else {
+            modes.inverse_omega2.iter().filter(|mu| **mu > 0.0).count()
+        };
+        let total = n;
+        let n = moving + branches;
+        let mut basis = DMatrix::zeros(total, n);
+        basis
+            .view_mut((0, 0), (chain, moving))
+            .copy_from(&modes.shapes.columns(0, moving));
+        for i in 0..branches {
+            let k = system.stiffness[(chain + i, chain + i)];
             if !(k > 0.0) {
                 return Err(Error::computation("a branch has no stiffness"));
             }
-            basis[(i, i)] = 1.0 / k.sqrt();
+            basis[(chain + i, moving + i)] = 1.0 / k.sqrt();
         }
+        let mut still = DMatrix::zeros(total, chain - moving);
+        still
+            .view_mut((0, 0), (chain, chain - moving))
+            .copy_from(&modes.shapes.columns(moving, chain - moving));
         let mut rows = DMatrix::zeros(n, outputs.len());
+        let mut still_rows = DMatrix::zeros(chain - moving, outputs.len());
         for (j, output) in outputs.iter().enumerate() {
             rows.set_column(j, &(basis.transpose() * output));
+            still_rows.set_column(j, &(still.transpose() * output));
         }
+        let massless = (moving < chain).then(|| still_rows.transpose() * &still_rows);
 
         let zeta = system.modal_damping_ratio.value;
-        let root: Vec<f64> = modes.inverse_omega2.iter().map(|mu| mu.sqrt()).collect();
-        let dynamics = if n == chain && system.viscous.is_none() {
+        let root: Vec<f64> = modes.inverse_omega2[..moving]
+            .iter()
+            .map(|mu| mu.sqrt())
+            .collect();
+        let dynamics = if branches == 0 && system.viscous.is_none() {
             Dynamics::Diagonal {
-                mu: modes.inverse_omega2.clone(),
+                mu: modes.inverse_omega2[..moving].to_vec(),
                 damping: root.iter().map(|s| 2.0 * zeta * s).collect(),
             }
         } else {
@@ -173,13 +209,14 @@ impl FrfBasis {
                 let mass = project(&derivative.mass);
                 let mut damping = project(&derivative.viscous);
                 let zeta_slope = system.modal_damping_ratio.derivative(p);
+                let moving_shapes = modes.shapes.columns(0, moving);
                 let chain_mass = derivative
                     .chain_mass
                     .as_ref()
-                    .map(|m| modes.shapes.transpose() * m * &modes.shapes);
-                for i in 0..chain {
+                    .map(|m| moving_shapes.transpose() * m * moving_shapes);
+                for i in 0..moving {
                     damping[(i, i)] += 2.0 * root[i] * zeta_slope;
-                    for j in 0..chain {
+                    for j in 0..moving {
                         // Modal damping is C K⁻¹ C = 4ζ² M; its differential in the basis gives this closed form.
                         let sum = root[i] + root[j];
                         if sum > 0.0 {
@@ -189,16 +226,29 @@ impl FrfBasis {
                         }
                     }
                 }
+                let massless = derivative
+                    .stiffness
+                    .as_ref()
+                    .filter(|_| moving < chain)
+                    .map(|dk| {
+                        let reach = dk * &still * &still_rows;
+                        MasslessDerivative {
+                            coupling: basis.transpose() * &reach,
+                            own: still_rows.transpose() * still.transpose() * &reach,
+                        }
+                    });
                 BasisDerivative {
                     stiffness,
                     mass,
                     damping,
+                    massless,
                 }
             })
             .collect();
         Ok(FrfBasis {
             n,
             rows,
+            massless,
             dynamics,
             derivatives,
         })
@@ -248,12 +298,14 @@ impl FrfBasis {
     /// Receptance of output `out` per force along output `input`, m/N, at the frequency last solved.
     pub fn receptance(&self, response: &Response, out: usize, input: usize) -> Complex64 {
         let column = &response.columns[input * self.n..(input + 1) * self.n];
-        self.rows
+        let moving: Complex64 = self
+            .rows
             .column(out)
             .iter()
             .zip(column)
             .map(|(r, u)| u * *r)
-            .sum()
+            .sum();
+        moving + self.massless.as_ref().map_or(0.0, |m| m[(out, input)])
     }
 
     /// dH/dp = −u_outᵀ (dZ/dp) u_in for parameter `parameter` and every output, into `slopes` (length: outputs),
@@ -282,13 +334,27 @@ impl FrfBasis {
                 response.product[i] += Complex64::new(k[i] - omega * omega * m[i], omega * c[i]) * u;
             }
         }
+        if let Some(massless) = &derivative.massless {
+            for (p, c) in response
+                .product
+                .iter_mut()
+                .zip(massless.coupling.column(input).iter())
+            {
+                *p += *c;
+            }
+        }
         for (out, slope) in slopes.iter_mut().enumerate() {
             let u_out = &response.columns[out * n..(out + 1) * n];
-            *slope = -u_out
-                .iter()
-                .zip(&response.product)
-                .map(|(a, b)| a * b)
-                .sum::<Complex64>();
+            let moving: Complex64 = u_out.iter().zip(&response.product).map(|(a, b)| a * b).sum();
+            *slope = -moving;
+            if let Some(massless) = &derivative.massless {
+                let coupled: Complex64 = u_in
+                    .iter()
+                    .zip(massless.coupling.column(out).iter())
+                    .map(|(u, c)| u * *c)
+                    .sum();
+                *slope -= coupled + massless.own[(out, input)];
+            }
         }
     }
 

@@ -4,6 +4,7 @@ mod campaign;
 mod cfc;
 mod contract;
 mod demo;
+mod diagnose;
 mod inspect;
 mod modal;
 mod report;

@@ -288,7 +288,6 @@ fn milling_lobes() {
 }
 
 #[test]
-#[ignore = "the report command is being built: take this line away when it is there"]
 fn report() {
     let campaign = copy_of("frf-9112");
     let document = document(&["report", path(campaign.path())]);
@@ -297,7 +296,6 @@ fn report() {
 }
 
 #[test]
-#[ignore = "the demo command is being built: take this line away when it is there"]
 fn demo() {
     let folder = tempfile::tempdir().unwrap();
     let document = document(&["demo", path(folder.path())]);

@@ -378,6 +378,9 @@ fn judge(
     })
 }
 
+/// Adds an effect to a model and refits it from the given points of the parameters in front; `None` if that fails.
+type Extend<'a> = dyn Fn(&StructureModel, Instance, &[Vec<f64>]) -> Option<Tried> + Sync + 'a;
+
 /// The pair of effects that explains most: index of its stronger member among `candidates`, label of the other one, and
 /// the misfit per degree of freedom that the pair leaves.
 fn best_pair(
@@ -385,7 +388,7 @@ fn best_pair(
     kept: &[Tried],
     instances: &[Instance],
     credible: &dyn Fn(&Candidate) -> bool,
-    extend: &(dyn Fn(&StructureModel, Instance, &[Vec<f64>]) -> Option<Tried> + Sync),
+    extend: &Extend,
     freedom: &(dyn Fn(&StructureModel) -> f64 + Sync),
 ) -> Option<(usize, String, f64)> {
     let leaders: Vec<(usize, &Tried)> = candidates

@@ -7,6 +7,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use crate::campaign::RobotSection;
+use crate::identify::calibrate::estimates;
 use crate::identify::modal_table::{self, StrongestMode};
 use crate::identify::{Estimate, StructureModel};
 use crate::ingest::Axis;
@@ -225,20 +226,8 @@ pub fn case_study() -> Result<CaseStudy> {
     }
     let rms = |(sum, count): (f64, usize)| (sum / count.max(1) as f64).sqrt();
 
-    let (std, at_bound) = uncertainty(&fit);
-    let parameters = model
-        .parameters
-        .iter()
-        .enumerate()
-        .map(|(i, p)| Estimate {
-            name: p.name.clone(),
-            value: p.natural(fit.theta[i]),
-            unit: p.unit,
-            std_error: p.natural_std(fit.theta[i], std[i]),
-            initial: p.nominal,
-            at_bound: at_bound.contains(&i),
-        })
-        .collect();
+    // The table's standard deviations are assumed, not estimated: no widening by the misfit.
+    let parameters = estimates(&model, &fit, 1.0)?;
     Ok(CaseStudy {
         static_stiffness: static_rows(&model, &nominal, &fit.theta)?,
         frequencies,
@@ -250,15 +239,6 @@ pub fn case_study() -> Result<CaseStudy> {
         unexplained: unexplained(&model, &fit.theta)?,
         lobes: lobe_rows(&model, &nominal, &fit.theta)?,
     })
-}
-
-fn uncertainty(fit: &crate::identify::Fit) -> (Vec<f64>, Vec<usize>) {
-    let count = fit.theta.len();
-    let std = match fit.hessian.clone().cholesky() {
-        Some(cholesky) => cholesky.inverse().diagonal().iter().map(|v| v.sqrt()).collect(),
-        None => vec![f64::INFINITY; count],
-    };
-    (std, fit.at_bound.clone())
 }
 
 fn strongest_mode(model: &StructureModel, row: &ModalRow) -> Result<StrongestMode> {

@@ -227,7 +227,7 @@ pub fn case_study() -> Result<CaseStudy> {
     let rms = |(sum, count): (f64, usize)| (sum / count.max(1) as f64).sqrt();
 
     // The table's standard deviations are assumed, not estimated: no widening by the misfit.
-    let parameters = estimates(&model, &fit, 1.0)?;
+    let parameters = estimates(&model.parameters, &fit, 1.0)?;
     Ok(CaseStudy {
         static_stiffness: static_rows(&model, &nominal, &fit.theta)?,
         frequencies,

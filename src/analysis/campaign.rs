@@ -4,7 +4,7 @@ use super::{LobeAnalysis, ModalAnalysis, StructureAnalysis};
 use crate::campaign::{Campaign, LobeSource};
 use crate::cutting::{CfcOptions, CfcResult, identify_forces};
 use crate::identify::case::structure_model;
-use crate::identify::extend::held_out;
+use crate::identify::structure_study::held_out_postures;
 use crate::identify::{Options, StructureModel};
 use crate::robot::PostureReport;
 use crate::{Error, InputError, Result};
@@ -128,11 +128,10 @@ impl<'a> CampaignFindings<'a> {
 impl StructureFindings {
     pub fn run(campaign: &Campaign) -> Result<Self> {
         let analysis = StructureAnalysis::run(campaign, Options::default())?;
-        let held_out_nrms = held_out(
+        let held_out_nrms = held_out_postures(
             &analysis.case.model,
             &analysis.case.data,
             &analysis.calibration.theta,
-            1,
         )?
         .map(|h| h.nrms());
         Ok(StructureFindings {

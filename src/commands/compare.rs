@@ -8,7 +8,7 @@ use crate::campaign::Campaign;
 use crate::discrepancy::FrfComparison;
 use crate::discrepancy::compare::Group;
 use crate::identify::Options;
-use crate::identify::extend::held_out;
+use crate::identify::structure_study::held_out_postures;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -30,7 +30,7 @@ pub fn run(args: Args) -> Result<Outcome> {
         warnings: notes,
         ..
     } = &analysis;
-    let held_out = held_out(&case.model, &case.data, &calibration.theta, 1)?.map(|h| h.nrms());
+    let held_out = held_out_postures(&case.model, &case.data, &calibration.theta)?.map(|h| h.nrms());
     let mut error = json!(comparison.totals);
     error["held_out_nrms"] = json!(held_out);
     let json = json!({

@@ -4,9 +4,9 @@ use super::text::{number, percent, table, warnings};
 use super::{CampaignArg, Domain, Outcome, structure_only};
 use crate::Result;
 use crate::campaign::Campaign;
-use crate::discrepancy::{Candidate, Diagnosis, Verdict, diagnose};
+use crate::discrepancy::{Candidate, Diagnosis, Verdict, diagnose, next_measurement};
 use crate::effects::Instance;
-use crate::identify::{Options, StructureCase};
+use crate::identify::{Options, StructureCase, StructureModel, StructureStudy};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -21,32 +21,35 @@ pub fn run(args: Args) -> Result<Outcome> {
     structure_only(args.domain)?;
     let campaign = Campaign::load(&args.campaign.dir)?;
     let case = StructureCase::load(&campaign)?;
-    let diagnosis = diagnose(&case.model, &case.data, Options::default())?;
+    let study = StructureStudy::new(&case.model.robot.spec, case.data, Options::default());
+    let diagnosis = diagnose(&study, &case.model)?;
+    let next_measurement = next_measurement::advise(&study.data, &diagnosis)?;
     let json = json!({
         "domain": "structure",
         "verdict": diagnosis.verdict,
-        "effect": diagnosis.effect.map(|i| i.effect.id()),
-        "site": diagnosis.effect.and_then(|i| i.site.label()),
+        "effect": diagnosis.winner().map(|c| &c.name.effect),
+        "site": diagnosis.winner().and_then(|c| c.name.site.as_ref()),
         "confidence": diagnosis.confidence,
         "companion": diagnosis.companion,
         "candidates": diagnosis.candidates.iter().map(candidate).collect::<Vec<_>>(),
         "indistinguishable": diagnosis.indistinguishable,
-        "next_measurement": diagnosis.next_measurement,
+        "next_measurement": next_measurement,
         "baseline": {
-            "nrms": diagnosis.baseline.nrms,
+            "nrms": diagnosis.baseline.residual.nrms,
             "held_out_nrms": diagnosis.baseline.held_out.map(|h| h.nrms()),
-            "noise_floor_nrms": diagnosis.baseline.noise_floor_nrms,
+            "noise_floor_nrms": study.data.noise_floor_nrms(),
             "reduced_chi2": diagnosis.baseline.reduced_chi2,
+            "independent_share": diagnosis.baseline.residual.independent_share,
         },
         "not_tried": diagnosis.not_tried.iter().map(|(e, why)| json!({ "effect": e, "why": why })).collect::<Vec<_>>(),
         "warnings": case.warnings,
     });
-    let text = describe(&campaign, &diagnosis) + &warnings(&case.warnings);
+    let text = describe(&campaign, &study, &diagnosis, &next_measurement) + &warnings(&case.warnings);
     Ok(Outcome { json, text })
 }
 
 /// The effect's own parameters by the keys of the contract; `name[0]`, `name[1]`, … become one list.
-fn parameters(candidate: &Candidate) -> Value {
+fn parameters<M, I>(candidate: &Candidate<M, I>) -> Value {
     let mut map = Map::new();
     for p in &candidate.parameters {
         let key = p.name.rsplit('.').next().unwrap_or(&p.name);
@@ -62,23 +65,23 @@ fn parameters(candidate: &Candidate) -> Value {
             }
         }
     }
-    let Instance { effect, variant, .. } = candidate.instance;
-    if let Some((key, value)) = effect.variant_label(variant) {
-        map.insert(key.to_string(), json!(value));
+    if let Some((key, value)) = &candidate.name.variant {
+        map.insert(key.clone(), json!(value));
     }
     map.into()
 }
 
-fn candidate(c: &Candidate) -> Value {
+fn candidate<M, I>(c: &Candidate<M, I>) -> Value {
     json!({
-        "effect": c.instance.effect.id(),
-        "site": c.instance.site.label(),
+        "effect": c.name.effect,
+        "site": c.name.site,
         "nrms": c.nrms,
         "held_out_nrms": c.held_out.map(|h| h.nrms()),
         "delta_bic": c.delta_bic,
         "p_value": c.p_value,
         "reduced_chi2": c.reduced_chi2,
         "at_bound": c.at_bound,
+        "refined": c.refined,
         "parameters": parameters(c),
         "parameter_std_errors": c.parameters.iter().map(|p| json!({ "name": p.name, "value": p.value, "std_error": p.std_error, "unit": p.unit })).collect::<Vec<_>>(),
     })
@@ -87,20 +90,25 @@ fn candidate(c: &Candidate) -> Value {
 /// Candidates shown to a person; all are in the JSON.
 const SHOWN: usize = 8;
 
-fn describe(campaign: &Campaign, d: &Diagnosis) -> String {
+fn describe(
+    campaign: &Campaign,
+    study: &StructureStudy,
+    d: &Diagnosis<StructureModel, Instance>,
+    next_measurement: &str,
+) -> String {
     let mut text = format!(
         "model as it stands: error (nrms) {}, noise floor {}, {:.2} times the noise variance\n\n",
-        percent(d.baseline.nrms),
-        percent(d.baseline.noise_floor_nrms),
+        percent(d.baseline.residual.nrms),
+        percent(study.data.noise_floor_nrms()),
         d.baseline.reduced_chi2,
     );
     let sure = format!("confidence {:.0} %", 100.0 * d.confidence);
-    text += &match (d.verdict, d.effect) {
-        (Verdict::Effect, Some(instance)) => format!(
+    text += &match (d.verdict, d.winner()) {
+        (Verdict::Effect, Some(winner)) => format!(
             "MISSING: {} ({sure})\n  {}\n  How it shows: {}\n",
-            instance.label(),
-            instance.effect.explanation(),
-            instance.effect.fingerprint()
+            winner.label(),
+            winner.instance.effect.explanation(),
+            winner.instance.effect.fingerprint()
         ),
         (Verdict::None, _) => format!("NOTHING is missing: what is left looks like noise ({sure})\n"),
         _ => format!("UNKNOWN: what is left is real, but no effect of the library explains it ({sure})\n"),
@@ -120,7 +128,7 @@ fn describe(campaign: &Campaign, d: &Diagnosis) -> String {
         .take(SHOWN)
         .map(|c| {
             vec![
-                c.instance.label(),
+                c.label(),
                 percent(c.nrms),
                 c.held_out.map_or("–".into(), |h| percent(h.nrms())),
                 number(c.delta_bic, 4),
@@ -138,13 +146,13 @@ fn describe(campaign: &Campaign, d: &Diagnosis) -> String {
     text += &format!(
         "\n{}\nNext measurement: {}\n",
         table(&header, &rows),
-        d.next_measurement
+        next_measurement
     );
-    if let Some(instance) = d.effect {
+    if let Some(winner) = d.winner() {
         text += &format!(
             "Next: lobestone add {} {}\n",
             campaign.dir.display(),
-            instance.label()
+            winner.label()
         );
     }
     text

@@ -1,37 +1,26 @@
 //! Which physical effect is missing: every effect of the library is added in turn, refitted together with the baseline
-//! from several starting points, and judged by likelihood, by postures left out of the fit, and by whether what it
-//! leaves over is noise.
+//! from several starting points, and judged by likelihood, by folds left out of the fit, and by whether what it leaves
+//! over is noise. The same loop for every [`Study`].
 
 use rayon::prelude::*;
-use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::next_measurement;
+use super::verdict::{self, Verdict};
 use crate::Result;
-use crate::effects::{self, Instance};
-use crate::identify::calibrate::{calibrate, estimates};
-use crate::identify::extend::{HeldOut, held_out, screen, screening_stride};
-use crate::identify::levenberg_marquardt::Fit;
-use crate::identify::{Calibration, Estimate, FrfData, Options, StructureModel};
+use crate::identify::calibrate::{Calibration, Estimate, estimates, scattered_starts};
+use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
+use crate::identify::study::{
+    EffectName, Effort, Extent, HeldOut, Residual, Study, Tried, View, held_out, own_starts, screen, try_effect,
+};
 use crate::progress::Progress;
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Verdict {
-    /// A known effect is missing.
-    Effect,
-    /// What is left looks like noise.
-    None,
-    /// What is left is real, and nothing in the library explains it.
-    Unknown,
-}
 
 /// One effect at one site, tried.
 #[derive(Debug, Clone)]
-pub struct Candidate {
-    pub instance: Instance,
+pub struct Candidate<M, I> {
+    pub instance: I,
+    pub name: EffectName,
     pub nrms: f64,
-    /// On postures left out of the fit; `None` with one posture.
+    /// On folds left out of the fit; `None` with one fold.
     pub held_out: Option<HeldOut>,
     /// BIC with the effect less BIC without: below zero the effect pays for its parameters.
     pub delta_bic: f64,
@@ -43,441 +32,400 @@ pub struct Candidate {
     pub parameters: Vec<Estimate>,
     /// One of them stopped at the end of its range: evidence against.
     pub at_bound: bool,
+    /// Fitted on all data; otherwise on the coarse view only, far behind the leaders there.
+    pub refined: bool,
     pub theta: Vec<f64>,
+    pub model: M,
+}
+
+impl<M, I> Candidate<M, I> {
+    pub fn label(&self) -> String {
+        self.name.label()
+    }
 }
 
 /// The answer.
 #[derive(Debug, Clone)]
-pub struct Diagnosis {
+pub struct Diagnosis<M, I> {
     pub verdict: Verdict,
-    /// The effect that is missing, if one is.
-    pub effect: Option<Instance>,
+    /// Index among the candidates of the effect that is missing, if one is.
+    pub effect: Option<usize>,
     /// Probability that the verdict is right.
     pub confidence: f64,
     /// Best first, one for each effect and site.
-    pub candidates: Vec<Candidate>,
+    pub candidates: Vec<Candidate<M, I>>,
     /// `effect@site` of rivals that this data cannot tell from the verdict.
     pub indistinguishable: Vec<String>,
-    /// What to measure next, in a sentence.
-    pub next_measurement: String,
     /// The second effect, where two together explain what one alone does not.
     pub companion: Option<String>,
     pub baseline: Baseline,
-    /// Effects that this robot or this data cannot show, with the reason.
+    /// Effects that this data cannot show, with the reason.
     pub not_tried: Vec<(String, String)>,
+}
+
+impl<M, I> Diagnosis<M, I> {
+    pub fn winner(&self) -> Option<&Candidate<M, I>> {
+        self.effect.map(|w| &self.candidates[w])
+    }
 }
 
 /// The model as it stands.
 #[derive(Debug, Clone)]
 pub struct Baseline {
     pub calibration: Calibration,
-    pub nrms: f64,
-    pub noise_floor_nrms: f64,
+    pub theta: Vec<f64>,
+    pub residual: Residual,
     pub held_out: Option<HeldOut>,
     pub reduced_chi2: f64,
 }
 
-/// A misfit per degree of freedom up to which the rest is called noise. The noise itself is known to a few per cent only.
-const NOISE_CHI2: f64 = 1.12;
-/// Corrected p-value below which an improvement is not chance.
-const SIGNIFICANT_P: f64 = 1e-3;
-/// An effect must improve BIC by this much: "very strong" evidence (Kass & Raftery 1995).
-const STRONG_BIC: f64 = 10.0;
-/// Rivals within this difference of −2 ln L of the best cannot be told from it.
-const INDISTINGUISHABLE: f64 = 12.0;
+/// Candidates that are refined on all data.
+const REFINED: usize = 6;
+/// Candidates that are fitted again from the best one's baseline.
+const SHARED: usize = 6;
 /// Candidates whose combination with every other one is tried where none explains the data alone.
 const PAIR_LEADERS: usize = 3;
-/// Share of the excess misfit that one effect must explain to be the verdict although more is left.
-const LARGE_SHARE: f64 = 0.9;
+/// Pairs that are followed to their end.
+const PAIRS_SETTLED: usize = 4;
+/// Further starting points for the best candidate where it leaves more than noise.
+const RESCUE_STARTS: usize = 4;
 
-/// A tried extension before it is judged: −2 ln L on the screened lines and the fit.
-struct Tried {
-    instance: Instance,
-    model: StructureModel,
-    fit: Fit,
+const REFINE: Stopping = Stopping {
+    max_iterations: 25,
+    relative_decrease: 1e-6,
+};
+const REFIT_WITHOUT_FOLD: Stopping = Stopping {
+    max_iterations: 4,
+    relative_decrease: 1e-4,
+};
+
+/// Diagnoses `model` (with the effects it already has).
+pub fn diagnose<S: Study>(study: &S, model: &S::Model) -> Result<Diagnosis<S::Model, S::Instance>> {
+    Engine::new(study, model)?.run()
 }
 
-impl Tried {
-    fn chi2(&self) -> f64 {
-        2.0 * self.fit.cost
-    }
+type TriedOf<S> = Tried<<S as Study>::Model, <S as Study>::Instance>;
+type CandidateOf<S> = Candidate<<S as Study>::Model, <S as Study>::Instance>;
+
+struct Engine<'a, S: Study> {
+    study: &'a S,
+    model: &'a S::Model,
+    calibration: Calibration,
+    hints: S::Hints,
+    instances: Vec<S::Instance>,
+    not_tried: Vec<(String, String)>,
+    base_count: usize,
 }
 
-/// Diagnoses `model` (with the effects it already has) on `data`.
-pub fn diagnose(model: &StructureModel, data: &FrfData, options: Options) -> Result<Diagnosis> {
-    let calibration = calibrate(model, data, options)?;
-    let stride = screening_stride(data);
-    let freedom = |m: &StructureModel| (2 * screened_values(data, stride)) as f64 - m.parameters.len() as f64;
-    let summary = data.summary();
-    let spec = &model.robot.spec;
+/// What candidates are measured by.
+struct Evidence {
+    base_chi2: f64,
+    coarse_base_chi2: f64,
+    /// Divides differences of χ²: the misfit that remains, and the values that are not independent.
+    scale: f64,
+    /// Independent real values.
+    effective: f64,
+    tests: usize,
+}
 
-    let (mut instances, mut not_tried) = (Vec::new(), Vec::new());
-    for instance in effects::instances(spec) {
-        if model.effects().iter().any(|added| added.instance == instance) {
-            continue;
-        }
-        match instance.effect.obstacle(spec, &summary) {
-            Some(reason) => not_tried.push((instance.label(), reason)),
-            None => instances.push(instance),
-        }
-    }
-    not_tried.dedup();
-
-    let bases = vec![calibration.theta.clone(), model.nominal_theta()];
-    let peaks = residual_peaks_hz(model, data, &calibration.theta)?;
-    let extend = |from: &StructureModel, instance: Instance, bases: &[Vec<f64>]| -> Option<Tried> {
-        let model = from.with_effect(instance, &summary);
-        let own = effect_starts(&model, instance, &peaks, &summary);
-        let fit = screen(&model, data, stride, bases, &own).ok()?;
-        Some(Tried { instance, model, fit })
-    };
-    let progress = Progress::new("trying effects", instances.len());
-    let mut tried: Vec<Tried> = instances
-        .par_iter()
-        .filter_map(|instance| {
-            let tried = extend(model, *instance, &bases);
-            progress.step();
-            tried
+impl<'a, S: Study> Engine<'a, S> {
+    fn new(study: &'a S, model: &'a S::Model) -> Result<Self> {
+        let calibration = study.calibrate(model)?;
+        let (instances, not_tried) = study.instances(model);
+        let hints = study.hints(model, &calibration.theta)?;
+        Ok(Engine {
+            study,
+            model,
+            calibration,
+            hints,
+            instances,
+            not_tried,
+            base_count: study.parameters(model).len(),
         })
-        .collect();
-    drop(progress);
+    }
 
-    // The rivals' solutions are starting points too, for the baseline and for each other.
-    let base_count = model.parameters.len();
-    tried.sort_by(|a, b| a.chi2().total_cmp(&b.chi2()));
-    let mut base = screen_baseline(model, data, stride, &calibration.theta)?;
-    if let Some(best) = tried.first() {
-        let from_best = screen_baseline(model, data, stride, &best.fit.theta[..base_count])?;
-        if from_best.cost < base.cost {
-            base = from_best;
+    fn label(&self, instance: &S::Instance) -> String {
+        self.study.name(instance).label()
+    }
+
+    fn freedom(&self, model: &S::Model, extent: Extent) -> f64 {
+        let values = self.study.real_values(extent) as f64;
+        (values - self.study.parameters(model).len() as f64).max(1.0)
+    }
+
+    fn reduced_chi2(&self, tried: &TriedOf<S>) -> f64 {
+        2.0 * tried.fit.cost / self.freedom(&tried.model, Extent::Full)
+    }
+
+    fn minimise(&self, model: &S::Model, view: View, start: &[f64], stopping: Stopping) -> Result<Fit> {
+        let bounds = self.study.bounds(model);
+        minimise(&self.study.problem(model, view), start, &bounds, stopping)
+    }
+
+    fn run(self) -> Result<Diagnosis<S::Model, S::Instance>> {
+        let (study, model) = (self.study, self.model);
+        let coarse_base = self.minimise(model, View::COARSE, &self.calibration.theta, REFINE)?;
+        let (tried, base_start) = self.screen_all(&coarse_base)?;
+
+        let mut base = self.minimise(model, View::FULL, &self.calibration.theta, REFINE)?;
+        if let Some(start) = base_start {
+            let other = self.minimise(model, View::FULL, &start, REFINE)?;
+            if other.cost < base.cost {
+                base = other;
+            }
         }
-        let shared = vec![best.fit.theta[..base_count].to_vec(), base.theta.clone()];
-        let again: Vec<Option<Tried>> = tried
-            .par_iter()
-            .take(2 * PAIR_LEADERS)
-            .map(|t| extend(model, t.instance, &shared))
+        let mut refined = self.refine(&tried)?;
+        if let Some(better) = refined.first().map(|best| self.rescue(best)).transpose()?.flatten() {
+            refined[0] = better;
+        }
+
+        let base_reduced = 2.0 * base.cost / self.freedom(model, Extent::Full);
+        let base_residual = study.residual(model, &base.theta)?;
+        // Where even the best explanation leaves more than noise, that rest scales what counts as chance, and its
+        // correlation from value to value says how many of them are independent.
+        let (best_reduced, best_residual) = match refined.first() {
+            Some(best) if best.fit.cost < base.cost => (
+                self.reduced_chi2(best),
+                study.residual(&best.model, &best.fit.theta)?,
+            ),
+            _ => (base_reduced, base_residual),
+        };
+        let share = best_residual.independent_share.min(1.0);
+        let evidence = Evidence {
+            base_chi2: 2.0 * base.cost,
+            coarse_base_chi2: 2.0 * coarse_base.cost,
+            scale: best_reduced.max(1.0) / share,
+            effective: study.real_values(Extent::Full) as f64 * share,
+            tests: self.instances.len(),
+        };
+        let labels: Vec<String> = refined.iter().map(|t| self.label(&t.instance)).collect();
+        let rest = tried.iter().filter(|t| !labels.contains(&self.label(&t.instance)));
+        let all: Vec<(&TriedOf<S>, bool)> = refined
+            .iter()
+            .map(|t| (t, true))
+            .chain(rest.map(|t| (t, false)))
             .collect();
-        for (t, again) in tried.iter_mut().zip(again) {
+        let mut candidates: Vec<CandidateOf<S>> = all
+            .par_iter()
+            .map(|(t, refined)| self.judge(t, *refined, &evidence))
+            .collect::<Result<_>>()?;
+        candidates.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic));
+        let baseline = Baseline {
+            held_out: held_out(study, model, &base.theta, Extent::Coarse, REFIT_WITHOUT_FOLD)?,
+            residual: base_residual,
+            reduced_chi2: base_reduced,
+            theta: base.theta,
+            calibration: self.calibration.clone(),
+        };
+
+        let credible: Vec<bool> = candidates
+            .iter()
+            .map(|c| verdict::credible(c, &baseline))
+            .collect();
+        let winner = credible.iter().position(|c| *c);
+        let pair = match winner {
+            Some(w) if !verdict::is_noise(candidates[w].reduced_chi2) => {
+                self.best_pair(&candidates, &credible)?
+            }
+            _ => None,
+        };
+        let decision = verdict::decide(&candidates, &credible, &baseline, pair, evidence.scale);
+        Ok(Diagnosis {
+            verdict: decision.verdict,
+            effect: decision.effect,
+            confidence: decision.confidence,
+            indistinguishable: decision.indistinguishable,
+            companion: decision.companion,
+            candidates,
+            baseline,
+            not_tried: self.not_tried,
+        })
+    }
+
+    /// Every effect on the coarse view, best first, one for each effect and site; and a better starting point for the
+    /// baseline, if one turned up.
+    #[allow(clippy::type_complexity)]
+    fn screen_all(&self, base: &Fit) -> Result<(Vec<TriedOf<S>>, Option<Vec<f64>>)> {
+        let (study, model) = (self.study, self.model);
+        let bases = [base.theta.clone(), study.nominal_theta(model)];
+        let progress = Progress::new("trying effects", self.instances.len());
+        let mut tried: Vec<TriedOf<S>> = self
+            .instances
+            .par_iter()
+            .filter_map(|instance| {
+                let tried = try_effect(study, model, instance, &bases, &self.hints, Effort::Staged);
+                progress.step();
+                tried
+            })
+            .collect();
+        drop(progress);
+        let by_cost = |a: &TriedOf<S>, b: &TriedOf<S>| a.fit.cost.total_cmp(&b.fit.cost);
+        tried.sort_by(by_cost);
+        // One for each effect and site: its best discrete choice.
+        let mut labels = Vec::new();
+        tried.retain(|t| {
+            let label = self.label(&t.instance);
+            let new = !labels.contains(&label);
+            labels.push(label);
+            new
+        });
+        let Some(best) = tried.first() else {
+            return Ok((tried, None));
+        };
+        // The rivals' solutions are starting points too, for the baseline and for each other.
+        let best_front = best.fit.theta[..self.base_count].to_vec();
+        let from_best = self.minimise(model, View::COARSE, &best_front, REFINE)?;
+        let base_start = (from_best.cost < base.cost * (1.0 - 1e-3)).then_some(from_best.theta);
+        let shared = [best_front];
+        let again: Vec<Option<TriedOf<S>>> = tried
+            .par_iter()
+            .skip(1)
+            .take(SHARED)
+            .map(|t| try_effect(study, model, &t.instance, &shared, &self.hints, Effort::Direct))
+            .collect();
+        for (t, again) in tried.iter_mut().skip(1).zip(again) {
             if let Some(again) = again.filter(|a| a.fit.cost < t.fit.cost) {
                 *t = again;
             }
         }
-        tried.sort_by(|a, b| a.chi2().total_cmp(&b.chi2()));
-    }
-    // One for each effect and site: its best discrete choice.
-    let mut kept: Vec<Tried> = Vec::new();
-    let tests = tried.len();
-    for t in tried {
-        if !kept.iter().any(|k| k.instance.label() == t.instance.label()) {
-            kept.push(t);
-        }
+        tried.sort_by(by_cost);
+        Ok((tried, base_start))
     }
 
-    let base_chi2 = 2.0 * base.cost;
-    let base_reduced = base_chi2 / freedom(model);
-    // Where even the best explanation leaves more than noise, that rest scales what counts as chance.
-    let best_reduced = kept
-        .first()
-        .map_or(base_reduced, |t| t.chi2() / freedom(&t.model));
-    let scale = best_reduced.min(base_reduced).max(1.0);
-    let effective = 2.0 * screened_values(data, stride) as f64;
-    let base_held_out = held_out(model, data, &base.theta, stride)?;
-    let mut candidates: Vec<Candidate> = kept
-        .par_iter()
-        .map(|t| judge(t, data, stride, base_count, base_chi2, scale, effective, tests))
-        .collect::<Result<_>>()?;
-    candidates.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic));
-
-    let comparison = |theta: &[f64]| -> Result<(f64, f64)> {
-        let predicted = model.predict(theta, data)?;
-        let c = super::FrfComparison::new(data, &model.points, &predicted);
-        Ok((c.totals.nrms, c.totals.noise_floor_nrms))
-    };
-    let (nrms, noise_floor_nrms) = comparison(&calibration.theta)?;
-    let baseline = Baseline {
-        calibration,
-        nrms,
-        noise_floor_nrms,
-        held_out: base_held_out,
-        reduced_chi2: base_reduced,
-    };
-
-    let credible = |c: &Candidate| {
-        let improves = match (&c.held_out, &baseline.held_out) {
-            (Some(with), Some(without)) => with.chi2 < without.chi2,
-            _ => true,
-        };
-        c.p_value < SIGNIFICANT_P && c.delta_bic < -STRONG_BIC && improves && !c.at_bound
-    };
-    let mut companion = None;
-    let winner = candidates.iter().position(credible);
-    let mut verdict = Verdict::None;
-    let mut effect = None;
-    if let Some(w) = winner {
-        let excess = (base_reduced - 1.0).max(1e-9);
-        let explained = (base_reduced - candidates[w].reduced_chi2) / excess;
-        if candidates[w].reduced_chi2 <= NOISE_CHI2 {
-            (verdict, effect) = (Verdict::Effect, Some(w));
-        } else if let Some((leader, second, rest)) =
-            best_pair(&candidates, &kept, &instances, &credible, &extend, &freedom)
-        {
-            if rest <= NOISE_CHI2 || explained >= LARGE_SHARE {
-                (verdict, effect) = (Verdict::Effect, Some(leader));
-                companion = Some(second);
-            } else {
-                verdict = Verdict::Unknown;
-            }
-        } else {
-            verdict = if explained >= LARGE_SHARE {
-                Verdict::Effect
-            } else {
-                Verdict::Unknown
-            };
-            effect = (verdict == Verdict::Effect).then_some(w);
-        }
-    } else if base_reduced > NOISE_CHI2 {
-        verdict = Verdict::Unknown;
-    }
-
-    let indistinguishable: Vec<String> = effect
-        .map(|w| {
-            let reference = candidates[w].delta_bic;
-            let rivals = candidates.iter().enumerate().filter(|(i, c)| {
-                *i != w && credible(c) && (c.delta_bic - reference).abs() * scale < INDISTINGUISHABLE
-            });
-            rivals.map(|(_, c)| c.instance.label()).collect()
-        })
-        .unwrap_or_default();
-    let confidence = confidence(
-        verdict,
-        effect.map(|w| &candidates[w]),
-        &candidates,
-        base_reduced,
-        companion.is_some(),
-    );
-    let next_measurement =
-        next_measurement::advise(model, data, &candidates, effect, verdict, &indistinguishable)?;
-    Ok(Diagnosis {
-        verdict,
-        effect: effect.map(|w| candidates[w].instance),
-        confidence,
-        candidates,
-        indistinguishable,
-        next_measurement,
-        companion,
-        baseline,
-        not_tried,
-    })
-}
-
-fn screened_values(data: &FrfData, stride: usize) -> usize {
-    data.frfs()
-        .map(|(_, f)| f.receptance.len().div_ceil(stride))
-        .sum()
-}
-
-fn screen_baseline(model: &StructureModel, data: &FrfData, stride: usize, start: &[f64]) -> Result<Fit> {
-    use crate::identify::levenberg_marquardt::{Stopping, minimise};
-    use crate::identify::structure::{FrfProblem, Misfit};
-    let problem = FrfProblem {
-        model,
-        data,
-        misfit: Misfit::Complex,
-        stride,
-    };
-    minimise(&problem, start, &model.bounds(), Stopping::default())
-}
-
-/// Starting points for the last effect of `model`, solver's scale.
-fn effect_starts(
-    model: &StructureModel,
-    instance: Instance,
-    peaks_hz: &[f64],
-    summary: &effects::DataSummary,
-) -> Vec<Vec<f64>> {
-    let own = model
-        .effects()
-        .last()
-        .map_or(0..0, |added| added.parameters.clone());
-    let parameters = &model.parameters[own];
-    let nominal: Vec<f64> = parameters.iter().map(|p| p.nominal).collect();
-    let further = instance.effect.starts(&model.robot.spec, summary, peaks_hz);
-    std::iter::once(nominal)
-        .chain(further)
-        .map(|start| {
-            let pairs = parameters.iter().zip(start);
-            pairs
-                .map(|(p, v)| p.internal(v.clamp(p.bounds[0], p.bounds[1])))
-                .collect()
-        })
-        .collect()
-}
-
-/// Frequencies at which the weighted residual is largest, most prominent first.
-pub fn residual_peaks_hz(model: &StructureModel, data: &FrfData, theta: &[f64]) -> Result<Vec<f64>> {
-    const PEAKS: usize = 4;
-    const BINS: usize = 60;
-    let summary = data.summary();
-    let ratio = (summary.highest_hz / summary.lowest_hz).ln();
-    let mut bins = vec![(0.0, 0usize); BINS];
-    let predicted = model.predict(theta, data)?;
-    for ((block, frf), model) in data.frfs().zip(&predicted) {
-        for (k, f) in block.frequency_hz.iter().enumerate() {
-            let position = (f / summary.lowest_hz).ln() / ratio * BINS as f64;
-            let bin = &mut bins[(position.max(0.0) as usize).min(BINS - 1)];
-            bin.0 += (model[k] - frf.receptance[k]).norm_sqr() / frf.noise_std[k].powi(2);
-            bin.1 += 1;
-        }
-    }
-    let level: Vec<f64> = bins
-        .iter()
-        .map(|(s, n)| if *n > 0 { s / *n as f64 } else { 0.0 })
-        .collect();
-    let mut peaks: Vec<usize> = (0..BINS)
-        .filter(|&i| {
-            let left = if i > 0 { level[i - 1] } else { 0.0 };
-            let right = level.get(i + 1).copied().unwrap_or(0.0);
-            level[i] > left && level[i] >= right && level[i] > 1.5
-        })
-        .collect();
-    peaks.sort_by(|a, b| level[*b].total_cmp(&level[*a]));
-    let centre = |i: usize| summary.lowest_hz * (ratio * (i as f64 + 0.5) / BINS as f64).exp();
-    Ok(peaks.into_iter().take(PEAKS).map(centre).collect())
-}
-
-#[allow(clippy::too_many_arguments)]
-fn judge(
-    tried: &Tried,
-    data: &FrfData,
-    stride: usize,
-    base_count: usize,
-    base_chi2: f64,
-    scale: f64,
-    effective: f64,
-    tests: usize,
-) -> Result<Candidate> {
-    let Tried { instance, model, fit } = tried;
-    let extra = (model.parameters.len() - base_count) as f64;
-    let gain = ((base_chi2 - tried.chi2()) / scale).max(0.0);
-    let single = ChiSquared::new(extra).map_or(1.0, |d| d.sf(gain));
-    let predicted = model.predict(&fit.theta, data)?;
-    let comparison = super::FrfComparison::new(data, &model.points, &predicted);
-    let freedom = effective - model.parameters.len() as f64;
-    let all = estimates(model, fit, tried.chi2() / freedom)?;
-    let own = base_count..model.parameters.len();
-    Ok(Candidate {
-        instance: *instance,
-        nrms: comparison.totals.nrms,
-        held_out: held_out(model, data, &fit.theta, stride)?,
-        delta_bic: extra * effective.ln() - gain,
-        p_value: (single * tests as f64).min(1.0),
-        reduced_chi2: tried.chi2() / freedom,
-        at_bound: own.clone().any(|i| fit.at_bound.contains(&i)),
-        parameters: all[own].to_vec(),
-        theta: fit.theta.clone(),
-    })
-}
-
-/// Adds an effect to a model and refits it from the given points of the parameters in front; `None` if that fails.
-type Extend<'a> = dyn Fn(&StructureModel, Instance, &[Vec<f64>]) -> Option<Tried> + Sync + 'a;
-
-/// The pair of effects that explains most: index of its stronger member among `candidates`, label of the other one, and
-/// the misfit per degree of freedom that the pair leaves.
-fn best_pair(
-    candidates: &[Candidate],
-    kept: &[Tried],
-    instances: &[Instance],
-    credible: &dyn Fn(&Candidate) -> bool,
-    extend: &Extend,
-    freedom: &(dyn Fn(&StructureModel) -> f64 + Sync),
-) -> Option<(usize, String, f64)> {
-    let leaders: Vec<(usize, &Tried)> = candidates
-        .iter()
-        .enumerate()
-        .filter(|(_, c)| credible(c))
-        .take(PAIR_LEADERS)
-        .filter_map(|(i, c)| kept.iter().find(|t| t.instance == c.instance).map(|t| (i, t)))
-        .collect();
-    let progress = Progress::new("trying pairs of effects", leaders.len() * instances.len());
-    let mut best: Option<(usize, Instance, f64)> = None;
-    for (i, leader) in leaders {
-        let seconds: Vec<Instance> = instances
-            .iter()
-            .copied()
-            .filter(|s| s.label() != leader.instance.label())
-            .collect();
-        let pairs: Vec<Option<(usize, Instance, f64)>> = seconds
+    /// The leaders, fitted to all data, best first.
+    fn refine(&self, tried: &[TriedOf<S>]) -> Result<Vec<TriedOf<S>>> {
+        let mut refined: Vec<TriedOf<S>> = tried
             .par_iter()
-            .map(|second| {
-                let pair = extend(&leader.model, *second, std::slice::from_ref(&leader.fit.theta));
-                progress.step();
-                let pair = pair.filter(|p| p.fit.at_bound.is_empty())?;
-                Some((i, *second, pair.chi2() / freedom(&pair.model)))
+            .take(REFINED)
+            .map(|t| {
+                let fit = self.minimise(&t.model, View::FULL, &t.fit.theta, REFINE)?;
+                Ok(Tried { fit, ..t.clone() })
+            })
+            .collect::<Result<_>>()?;
+        refined.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
+        Ok(refined)
+    }
+
+    /// Where the best candidate leaves more than noise it may only be stuck: a better fit from further starting points.
+    fn rescue(&self, best: &TriedOf<S>) -> Result<Option<TriedOf<S>>> {
+        if verdict::is_noise(self.reduced_chi2(best)) {
+            return Ok(None);
+        }
+        let (study, model) = (self.study, self.model);
+        let own = own_starts(study, &best.model, self.base_count, &best.instance, &self.hints);
+        let front = scattered_starts(study.parameters(model), RESCUE_STARTS, 1);
+        let fits: Vec<Fit> = front
+            .par_iter()
+            .filter_map(|base| {
+                let base = std::slice::from_ref(base);
+                screen(study, &best.model, base, &own, Effort::Staged).ok()
             })
             .collect();
-        for pair in pairs.into_iter().flatten() {
-            if best.is_none_or(|b| pair.2 < b.2) {
-                best = Some(pair);
+        let coarse = self.minimise(&best.model, View::COARSE, &best.fit.theta, REFINE)?;
+        let lowest = fits.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
+        let Some(lowest) = lowest.filter(|l| l.cost < coarse.cost * (1.0 - 1e-3)) else {
+            return Ok(None);
+        };
+        let fit = self.minimise(&best.model, View::FULL, &lowest.theta, REFINE)?;
+        let better = fit.cost < best.fit.cost;
+        Ok(better.then(|| Tried { fit, ..best.clone() }))
+    }
+
+    fn judge(&self, tried: &TriedOf<S>, refined: bool, evidence: &Evidence) -> Result<CandidateOf<S>> {
+        let study = self.study;
+        let Tried { instance, model, fit } = tried;
+        let extra = (study.parameters(model).len() - self.base_count) as f64;
+        let chi2 = 2.0 * fit.cost;
+        let (gain, reduced_chi2) = if refined {
+            (evidence.base_chi2 - chi2, self.reduced_chi2(tried))
+        } else {
+            // Value for value the coarse view says the same as the whole.
+            let share = study.real_values(Extent::Full) as f64 / study.real_values(Extent::Coarse) as f64;
+            let gain = (evidence.coarse_base_chi2 - chi2) * share;
+            (gain, chi2 / self.freedom(model, Extent::Coarse))
+        };
+        let gain = (gain / evidence.scale).max(0.0);
+        let single = ChiSquared::new(extra).map_or(1.0, |d| d.sf(gain));
+        let all = estimates(study.parameters(model), fit, reduced_chi2)?;
+        let own = self.base_count..all.len();
+        Ok(Candidate {
+            instance: instance.clone(),
+            name: study.name(instance),
+            nrms: study.residual(model, &fit.theta)?.nrms,
+            held_out: held_out(study, model, &fit.theta, Extent::Coarse, REFIT_WITHOUT_FOLD)?,
+            delta_bic: extra * evidence.effective.ln() - gain,
+            p_value: (single * evidence.tests as f64).min(1.0),
+            reduced_chi2,
+            at_bound: own.clone().any(|i| fit.at_bound.contains(&i)),
+            parameters: all[own].to_vec(),
+            refined,
+            theta: fit.theta.clone(),
+            model: model.clone(),
+        })
+    }
+
+    /// The pair of effects that explains most.
+    fn best_pair(
+        &self,
+        candidates: &[CandidateOf<S>],
+        credible: &[bool],
+    ) -> Result<Option<verdict::Pair>> {
+        let study = self.study;
+        let leaders: Vec<usize> = (0..candidates.len())
+            .filter(|i| credible[*i])
+            .take(PAIR_LEADERS)
+            .collect();
+        let progress = Progress::new("trying pairs of effects", leaders.len() * self.instances.len());
+        let mut best: Option<verdict::Pair> = None;
+        for first in leaders {
+            let leader = &candidates[first];
+            let bases = [leader.theta.clone()];
+            let hints = study.hints(&leader.model, &leader.theta)?;
+            let seconds: Vec<&S::Instance> = self
+                .instances
+                .iter()
+                .filter(|s| self.label(s) != leader.label())
+                .collect();
+            let mut pairs: Vec<TriedOf<S>> = seconds
+                .par_iter()
+                .filter_map(|second| {
+                    let pair = try_effect(study, &leader.model, second, &bases, &hints, Effort::Look);
+                    progress.step();
+                    pair
+                })
+                .collect();
+            pairs.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
+            pairs.truncate(PAIRS_SETTLED);
+            let settled: Vec<TriedOf<S>> = pairs
+                .into_par_iter()
+                .map(|pair| {
+                    let near = self.minimise(&pair.model, View::COARSE, &pair.fit.theta, REFINE)?;
+                    let fit = self.minimise(&pair.model, View::FULL, &near.theta, REFINE)?;
+                    Ok(Tried { fit, ..pair })
+                })
+                .collect::<Result<_>>()?;
+            for pair in settled.iter().filter(|p| p.fit.at_bound.is_empty()) {
+                let reduced_chi2 = self.reduced_chi2(pair);
+                if best.as_ref().is_none_or(|b| reduced_chi2 < b.reduced_chi2) {
+                    let label = self.label(&pair.instance);
+                    // The stronger of the two alone is named first.
+                    let other = candidates.iter().position(|c| c.label() == label);
+                    let (stronger, other) = match other {
+                        Some(other) if other < first && credible[other] => (other, leader.label()),
+                        _ => (first, label),
+                    };
+                    best = Some(verdict::Pair {
+                        stronger,
+                        other,
+                        reduced_chi2,
+                    });
+                }
+            }
+            // Two effects that leave only noise are the answer; other leaders cannot do better.
+            if best.as_ref().is_some_and(|b| verdict::is_noise(b.reduced_chi2)) {
+                break;
             }
         }
-        // Two effects that leave only noise are the answer; other leaders cannot do better.
-        if best.is_some_and(|b| b.2 <= NOISE_CHI2) {
-            break;
-        }
-    }
-    let (first, second, rest) = best?;
-    // The stronger of the two alone is named first.
-    let other = candidates
-        .iter()
-        .position(|c| c.instance.label() == second.label());
-    match other {
-        Some(other) if other < first && credible(&candidates[other]) => {
-            Some((other, candidates[first].instance.label(), rest))
-        }
-        _ => Some((first, second.label(), rest)),
-    }
-}
-
-/// Probability that the verdict is right. The evidence ratio of the best against its rivals is tempered, because
-/// model error is not noise; what stays unexplained takes confidence away.
-fn confidence(
-    verdict: Verdict,
-    winner: Option<&Candidate>,
-    candidates: &[Candidate],
-    base_reduced: f64,
-    with_companion: bool,
-) -> f64 {
-    const TEMPER: f64 = 6.0;
-    let most = 0.98;
-    match (verdict, winner) {
-        (Verdict::Effect, Some(winner)) => {
-            let weight = |c: &Candidate| (-(c.delta_bic - winner.delta_bic) / (2.0 * TEMPER)).exp();
-            let rivals: f64 = candidates
-                .iter()
-                .filter(|c| c.instance != winner.instance && !c.at_bound)
-                .map(|c| weight(c).min(1.0))
-                .sum();
-            // What the model without any effect would weigh.
-            let beaten = (winner.delta_bic / (2.0 * TEMPER)).exp().min(1.0);
-            let left = if with_companion {
-                0.92
-            } else {
-                (NOISE_CHI2 / winner.reduced_chi2).min(1.0)
-            };
-            (most / (1.0 + rivals + beaten) * left).clamp(0.05, most)
-        }
-        (Verdict::None, _) => {
-            let best = candidates.first().map_or(1.0, |c| c.p_value);
-            // p-values near the threshold leave doubt; so does a rest above noise.
-            let calm = (best / (best + 0.05)).max(0.5);
-            (0.95 * calm.max(0.7) * (1.05 / base_reduced).min(1.0)).clamp(0.3, 0.97)
-        }
-        _ => {
-            // The further the rest stands above noise, the surer it is real.
-            let rest = candidates
-                .first()
-                .map_or(base_reduced, |c| c.reduced_chi2.min(base_reduced));
-            (0.5 + 0.45 * (1.0 - (NOISE_CHI2 / rest).min(1.0)).sqrt()).clamp(0.5, 0.95)
-        }
+        Ok(best)
     }
 }

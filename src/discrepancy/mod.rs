@@ -3,6 +3,8 @@
 pub mod compare;
 pub mod diagnose;
 pub mod next_measurement;
+pub mod verdict;
 
 pub use compare::{Band, FrfComparison, FrfError};
-pub use diagnose::{Candidate, Diagnosis, Verdict, diagnose};
+pub use diagnose::{Candidate, Diagnosis, diagnose};
+pub use verdict::Verdict;

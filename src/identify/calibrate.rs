@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::frf_data::FrfData;
 use super::levenberg_marquardt::{Fit, Stopping, minimise};
 use super::structure::{FrfProblem, Misfit, StructureModel};
+use crate::parameter::Parameter;
 use crate::progress::Progress;
 use crate::{Error, Result};
 
@@ -158,7 +159,7 @@ pub fn calibrate(model: &StructureModel, data: &FrfData, options: Options) -> Re
     let chi2 = |fit: &Fit| 2.0 * fit.cost / (residual_count - model.parameters.len() as f64).max(1.0);
 
     if chi2(&best) > SUSPICIOUS_CHI2 && options.extra_starts > 0 {
-        let points = starting_points(model, &nominal, options);
+        let points = scattered_starts(&model.parameters, options.extra_starts, options.seed);
         let progress = Progress::new("calibrating from further starting points", points.len());
         let mut fits: Vec<Fit> = points
             .par_iter()
@@ -187,7 +188,7 @@ pub fn calibrate(model: &StructureModel, data: &FrfData, options: Options) -> Re
 
     let reduced_chi2 = chi2(&best);
     let covariance = covariance(&best, reduced_chi2)?;
-    let parameters = estimates(model, &best, reduced_chi2)?;
+    let parameters = estimates(&model.parameters, &best, reduced_chi2)?;
     Ok(Calibration {
         parameters,
         theta: best.theta,
@@ -218,10 +219,9 @@ fn covariance(fit: &Fit, reduced_chi2: f64) -> Result<DMatrix<f64>> {
 }
 
 /// The fitted parameters in natural units with standard errors.
-pub fn estimates(model: &StructureModel, fit: &Fit, reduced_chi2: f64) -> Result<Vec<Estimate>> {
+pub fn estimates(parameters: &[Parameter], fit: &Fit, reduced_chi2: f64) -> Result<Vec<Estimate>> {
     let covariance = covariance(fit, reduced_chi2)?;
-    Ok(model
-        .parameters
+    Ok(parameters
         .iter()
         .enumerate()
         .map(|(i, p)| Estimate {
@@ -235,22 +235,18 @@ pub fn estimates(model: &StructureModel, fit: &Fit, reduced_chi2: f64) -> Result
         .collect())
 }
 
-/// Draws from the priors, twice as wide, within the bounds.
-fn starting_points(model: &StructureModel, nominal: &[f64], options: Options) -> Vec<Vec<f64>> {
-    let mut random = ChaCha8Rng::seed_from_u64(options.seed);
-    (0..options.extra_starts)
+/// Draws from the priors, twice as wide, within the bounds; on the solver's scale.
+pub fn scattered_starts(parameters: &[Parameter], count: usize, seed: u64) -> Vec<Vec<f64>> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    (0..count)
         .map(|_| {
-            model
-                .parameters
-                .iter()
-                .zip(nominal)
-                .map(|(p, t)| {
-                    // Uniform on ±√3·2σ has the standard deviation 2σ and no far tails.
-                    let half = p.prior.map_or(0.1, |prior| prior.std) * 2.0 * 3f64.sqrt();
-                    let [low, high] = p.internal_bounds();
-                    (t + half * random.random_range(-1.0..1.0)).clamp(low, high)
-                })
-                .collect()
+            let draw = |p: &Parameter| {
+                // Uniform on ±√3·2σ has the standard deviation 2σ and no far tails.
+                let half = p.prior.map_or(0.1, |prior| prior.std) * 2.0 * 3f64.sqrt();
+                let [low, high] = p.internal_bounds();
+                (p.internal(p.nominal) + half * random.random_range(-1.0..1.0)).clamp(low, high)
+            };
+            parameters.iter().map(draw).collect()
         })
         .collect()
 }

@@ -144,6 +144,35 @@ impl FrfData {
         }
     }
 
+    /// Every `stride`-th line, and of the FRFs of each response point and axis every `every`-th reference in turn, so that
+    /// all points, axes and references stay represented.
+    pub fn thinned(&self, stride: usize, every: usize) -> FrfData {
+        let thin = |block: &Arc<FrfBlock>| {
+            let mut block = block.as_ref().clone();
+            let mut responses: Vec<(MeasuredDof, usize)> = Vec::new();
+            block.frfs.retain(|frf| {
+                let index = responses.iter().position(|(dof, _)| *dof == frf.response);
+                let index = index.unwrap_or_else(|| {
+                    // The first reference that is kept differs from response to response.
+                    responses.push((frf.response, responses.len() % every));
+                    responses.len() - 1
+                });
+                responses[index].1 += 1;
+                responses[index].1 % every == 0
+            });
+            block.frequency_hz = block.frequency_hz.iter().step_by(stride).copied().collect();
+            for frf in &mut block.frfs {
+                frf.receptance = frf.receptance.iter().step_by(stride).copied().collect();
+                frf.noise_std = frf.noise_std.iter().step_by(stride).copied().collect();
+            }
+            Arc::new(block)
+        };
+        FrfData {
+            blocks: self.blocks.iter().map(thin).filter(|b| !b.frfs.is_empty()).collect(),
+            posture_ids: self.posture_ids.clone(),
+        }
+    }
+
     /// What effects need to know of the data.
     pub fn summary(&self) -> DataSummary {
         let lines = || self.blocks.iter().flat_map(|b| b.frequency_hz.iter().copied());

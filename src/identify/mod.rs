@@ -2,11 +2,12 @@
 
 pub mod calibrate;
 pub mod case;
-pub mod extend;
 pub mod frf_data;
 pub mod levenberg_marquardt;
 pub mod modal_table;
 pub mod structure;
+pub mod structure_study;
+pub mod study;
 
 pub use crate::parameter::{Parameter, Prior, Scale};
 pub use calibrate::{Calibration, Estimate, Options};
@@ -14,3 +15,5 @@ pub use case::StructureCase;
 pub use frf_data::FrfData;
 pub use levenberg_marquardt::{Fit, LeastSquares, Linearisation, minimise};
 pub use structure::StructureModel;
+pub use structure_study::StructureStudy;
+pub use study::{EffectName, HeldOut, Study};

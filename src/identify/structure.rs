@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use faer::linalg::matmul::matmul;
+use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use rayon::prelude::*;
@@ -12,7 +14,7 @@ use crate::Result;
 use crate::campaign::{Point, RobotSection};
 use crate::effects::{ChannelFilter, DataSummary, Instance, Setting};
 use crate::parameter::{Parameter, Prior, Scale};
-use crate::robot::frf::Response;
+use crate::robot::frf::{Response, Slopes};
 use crate::robot::model::NOMINAL_DAMPING_RATIO;
 use crate::robot::{Baseline, Chain, Dual, FrfBasis, Kinematics, RobotModel};
 
@@ -245,20 +247,26 @@ impl StructureModel {
 struct Channels {
     terms: [Vec<(usize, Dual)>; 3],
     delay_s: Dual,
+    /// The channels show what is there: nothing to be mixed or delayed.
+    faithful: bool,
 }
 
 impl Channels {
     fn new(filter: &ChannelFilter) -> Self {
         let matters = |d: &Dual| d.value != 0.0 || d.gradient.iter().any(|g| *g != 0.0);
-        let terms = [0, 1, 2].map(|i| {
+        let terms: [Vec<(usize, Dual)>; 3] = [0, 1, 2].map(|i| {
             let row = filter.mixing[i].iter().enumerate();
             row.filter(|(_, d)| matters(d))
                 .map(|(j, d)| (j, d.clone()))
                 .collect()
         });
+        let one = Dual::constant(1.0);
+        let faithful = !matters(&filter.delay_s)
+            && (0..3).all(|i| terms[i].len() == 1 && terms[i][0].0 == i && terms[i][0].1 == one);
         Channels {
             terms,
             delay_s: filter.delay_s.clone(),
+            faithful,
         }
     }
 
@@ -269,6 +277,10 @@ impl Channels {
 
     /// What the file shows at `omega`, m/N.
     fn measured(&self, omega: f64, frf: &FrfDatum, basis: &FrfBasis, response: &Response) -> Complex64 {
+        if self.faithful {
+            let out = frf.response_outputs[frf.response.axis.index()];
+            return basis.receptance(response, out, frf.input) * frf.sign;
+        }
         let terms = &self.terms[frf.response.axis.index()];
         let sum: Complex64 = terms
             .iter()
@@ -288,6 +300,13 @@ impl Channels {
         true_slope: impl Fn(usize, usize) -> Complex64,
         slope: &mut [Complex64],
     ) {
+        if self.faithful {
+            let out = frf.response_outputs[frf.response.axis.index()];
+            for (p, s) in slope.iter_mut().enumerate() {
+                *s = true_slope(p, out) * frf.sign;
+            }
+            return;
+        }
         let terms = &self.terms[frf.response.axis.index()];
         let factor = self.factor(omega, frf);
         for (p, s) in slope.iter_mut().enumerate() {
@@ -356,16 +375,21 @@ impl Partial {
         self.hessian += &other.hessian;
     }
 
-    /// Adds a real residual with its derivatives.
-    fn push(&mut self, residual: f64, slope: &[f64]) {
-        self.cost += 0.5 * residual * residual;
-        for (i, a) in slope.iter().enumerate() {
-            self.gradient[i] += a * residual;
-            // Lower triangle, column by column.
-            for (j, b) in slope.iter().enumerate().skip(i) {
-                self.hessian[(j, i)] += a * b;
-            }
+    /// Adds residuals with their derivatives (residuals × parameters, column by column).
+    fn push(&mut self, residual: &[f64], jacobian: &[f64]) {
+        self.cost += 0.5 * residual.iter().map(|r| r * r).sum::<f64>();
+        let count = self.gradient.len();
+        if count == 0 {
+            return;
         }
+        let jacobian = MatRef::from_column_major_slice(jacobian, residual.len(), count);
+        let residual = MatRef::from_column_major_slice(residual, residual.len(), 1);
+        let add = |target: &mut [f64], columns: usize, right: MatRef<f64>| {
+            let target = MatMut::from_column_major_slice_mut(target, count, columns);
+            matmul(target, Accum::Add, jacobian.transpose(), right, 1.0, Par::Seq);
+        };
+        add(self.gradient.as_mut_slice(), 1, residual);
+        add(self.hessian.as_mut_slice(), count, jacobian);
     }
 }
 
@@ -397,7 +421,6 @@ impl FrfProblem<'_> {
         for part in &parts {
             total.add(part);
         }
-        total.hessian.fill_upper_triangle_with_lower_triangle();
         for (i, (parameter, t)) in self.model.parameters.iter().zip(theta).enumerate() {
             if let Some(prior) = parameter.prior {
                 let residual = (t - prior.mean) / prior.std;
@@ -421,59 +444,65 @@ impl FrfProblem<'_> {
     ) -> Result<Partial> {
         let mut partial = Partial::zero(count);
         let mut response = Response::default();
-        let outputs = basis.output_count();
         let mut inputs: Vec<usize> = block.frfs.iter().map(|f| f.input).collect();
         inputs.sort_unstable();
         inputs.dedup();
-        // slopes[p][input][out], flat
-        let mut slopes = vec![Complex64::ZERO; count * inputs.len() * outputs];
+        let mut slopes = Slopes::of_inputs(inputs);
         let mut slope = vec![Complex64::ZERO; count];
-        let mut real = vec![0.0; count];
+        // Residuals of one line and their derivatives, column by column: real parts, then imaginary parts.
+        let rows = match self.misfit {
+            Misfit::Complex => 2 * block.frfs.len(),
+            Misfit::LogMagnitude => block.frfs.len(),
+        };
+        let mut residual = vec![0.0; rows];
+        let mut jacobian = vec![0.0; rows * count];
         let lines = (chunk * CHUNK..(chunk + 1) * CHUNK).map(|k| k * self.stride);
         for line in lines.take_while(|l| *l < block.frequency_hz.len()) {
             let omega = std::f64::consts::TAU * block.frequency_hz[line];
             basis.solve(omega, &mut response)?;
-            for p in 0..count {
-                for (i, input) in inputs.iter().enumerate() {
-                    let start = (p * inputs.len() + i) * outputs;
-                    basis.sensitivities(&mut response, p, *input, &mut slopes[start..start + outputs]);
-                }
+            if count > 0 {
+                basis.slopes(&response, &mut slopes);
             }
-            for frf in &block.frfs {
+            for (k, frf) in block.frfs.iter().enumerate() {
                 let model = channels.measured(omega, frf, basis, &response);
                 let measured = frf.receptance[line];
                 let std = frf.noise_std[line];
                 if count > 0 {
-                    let i = inputs.iter().position(|x| *x == frf.input).unwrap_or(0);
-                    let true_slope = |p: usize, out: usize| slopes[(p * inputs.len() + i) * outputs + out];
+                    let i = slopes.inputs.iter().position(|x| *x == frf.input).unwrap_or(0);
+                    let true_slope = |p: usize, out: usize| slopes.at(p, i, out);
                     channels.slopes(omega, frf, model, (basis, &response), true_slope, &mut slope);
                 }
                 match self.misfit {
                     Misfit::Complex => {
                         // Each of the two parts has half the variance.
                         let weight = std::f64::consts::SQRT_2 / std;
-                        let residual = (model - measured) * weight;
-                        for (r, s) in real.iter_mut().zip(&slope) {
-                            *r = s.re * weight;
+                        let difference = (model - measured) * weight;
+                        residual[2 * k] = difference.re;
+                        residual[2 * k + 1] = difference.im;
+                        for (p, s) in slope.iter().enumerate() {
+                            jacobian[rows * p + 2 * k] = s.re * weight;
+                            jacobian[rows * p + 2 * k + 1] = s.im * weight;
                         }
-                        partial.push(residual.re, &real);
-                        for (r, s) in real.iter_mut().zip(&slope) {
-                            *r = s.im * weight;
-                        }
-                        partial.push(residual.im, &real);
                     }
                     Misfit::LogMagnitude => {
                         let (m, h) = (measured.norm(), model.norm());
-                        if m > 0.0 && h > 0.0 {
-                            let weight = 1.0 / LOG_TOLERANCE.hypot(std / m);
-                            for (r, s) in real.iter_mut().zip(&slope) {
-                                *r = (model.conj() * s).re / (h * h) * weight;
-                            }
-                            partial.push((h / m).ln() * weight, &real);
+                        let weight = if m > 0.0 && h > 0.0 {
+                            1.0 / LOG_TOLERANCE.hypot(std / m)
+                        } else {
+                            0.0
+                        };
+                        residual[k] = if weight > 0.0 { (h / m).ln() * weight } else { 0.0 };
+                        for (p, s) in slope.iter().enumerate() {
+                            jacobian[rows * p + k] = if weight > 0.0 {
+                                (model.conj() * s).re / (h * h) * weight
+                            } else {
+                                0.0
+                            };
                         }
                     }
                 }
             }
+            partial.push(&residual, &jacobian);
         }
         Ok(partial)
     }

@@ -5,7 +5,8 @@
 //! modal damping is diagonal, 1 + 2iζω√μ − ω²μ, and H = Σ (r_out·x)(r_in·x)/(…): the modal sum including all residual
 //! compliance. Branches and viscous dampers couple the modes; then the small complex system is solved as it stands.
 
-use faer::prelude::*;
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
@@ -92,7 +93,7 @@ pub struct FrfBasis {
     /// inertia nor modal damping, so that leaving them out of the dynamics is exact.
     massless: Option<DMatrix<f64>>,
     dynamics: Dynamics,
-    derivatives: Vec<BasisDerivative>,
+    derivatives: Derivatives,
 }
 
 #[derive(Debug, Clone)]
@@ -106,30 +107,61 @@ enum Dynamics {
     },
 }
 
-/// Derivative of stiffness, mass and damping in the basis.
+/// Derivatives of the basis' matrices, stacked so that one product serves all parameters: entry (i, j) of parameter p's
+/// matrix stands at i + n (p + parameters · j).
 #[derive(Debug, Clone)]
-struct BasisDerivative {
-    stiffness: DMatrix<f64>,
-    mass: DMatrix<f64>,
-    damping: DMatrix<f64>,
-    massless: Option<MasslessDerivative>,
+struct Derivatives {
+    count: usize,
+    stiffness: Vec<f64>,
+    /// Empty where no parameter changes the mass.
+    mass: Vec<f64>,
+    damping: Vec<f64>,
+    massless: Option<MasslessDerivatives>,
 }
 
-/// What the massless part adds to a derivative.
+/// What the massless part adds to the derivatives.
 #[derive(Debug, Clone)]
-struct MasslessDerivative {
-    /// Coupling of each output's massless part with the moving coordinates, n × outputs.
-    coupling: DMatrix<f64>,
-    /// Between the outputs' massless parts, outputs × outputs.
-    own: DMatrix<f64>,
+struct MasslessDerivatives {
+    /// Coupling of each output's massless part with the moving coordinates: entry i + n (p + parameters · output).
+    coupling: Vec<Complex64>,
+    /// Between the outputs' massless parts: entry out + outputs (p + parameters · input).
+    own: Vec<f64>,
 }
 
-/// Responses of all outputs at one frequency: Z⁻¹ rᵀ in the basis, n × outputs.
+/// Responses of all outputs at one frequency: Z⁻¹ rᵀ in the basis, n × outputs, column by column.
 #[derive(Debug, Clone, Default)]
 pub struct Response {
     omega: f64,
     columns: Vec<Complex64>,
+    dynamic: Vec<Complex64>,
+}
+
+/// Derivatives of receptances at one frequency, with the room to work them out again at the next.
+#[derive(Debug, Clone, Default)]
+pub struct Slopes {
+    /// Which outputs are hit.
+    pub inputs: Vec<usize>,
+    /// [input + inputs · (parameter + parameters · output)]
+    values: Vec<Complex64>,
+    parameters: usize,
+    forces: Vec<Complex64>,
+    dynamic: Vec<Complex64>,
     product: Vec<Complex64>,
+}
+
+impl Slopes {
+    /// For forces along the given outputs.
+    pub fn of_inputs(inputs: Vec<usize>) -> Self {
+        Slopes {
+            inputs,
+            ..Slopes::default()
+        }
+    }
+
+    /// dH/dp, m/N per unit of the parameter, of output `out` per force along the `input`-th of the inputs.
+    pub fn at(&self, parameter: usize, input: usize, out: usize) -> Complex64 {
+        self.values[input + self.inputs.len() * (parameter + self.parameters * out)]
+    }
 }
 
 impl FrfBasis {
@@ -200,51 +232,62 @@ impl FrfBasis {
             Some(matrix) => basis.transpose() * matrix * &basis,
             None => DMatrix::zeros(n, n),
         };
-        let derivatives = system
-            .derivatives
-            .iter()
-            .enumerate()
-            .map(|(p, derivative)| {
-                let stiffness = project(&derivative.stiffness);
-                let mass = project(&derivative.mass);
-                let mut damping = project(&derivative.viscous);
-                let zeta_slope = system.modal_damping_ratio.derivative(p);
-                let moving_shapes = modes.shapes.columns(0, moving);
-                let chain_mass = derivative
-                    .chain_mass
-                    .as_ref()
-                    .map(|m| moving_shapes.transpose() * m * moving_shapes);
-                for i in 0..moving {
-                    damping[(i, i)] += 2.0 * root[i] * zeta_slope;
-                    for j in 0..moving {
-                        // Modal damping is C K⁻¹ C = 4ζ² M; its differential in the basis gives this closed form.
-                        let sum = root[i] + root[j];
-                        if sum > 0.0 {
-                            let dm = chain_mass.as_ref().map_or(0.0, |m| m[(i, j)]);
-                            damping[(i, j)] +=
-                                2.0 * zeta * (dm + root[i] * root[j] * stiffness[(i, j)]) / sum;
-                        }
+        let count = system.derivatives.len();
+        let outputs = outputs.len();
+        let changes_mass = system.derivatives.iter().any(|d| d.mass.is_some());
+        let mut derivatives = Derivatives {
+            count,
+            stiffness: vec![0.0; n * n * count],
+            mass: vec![0.0; if changes_mass { n * n * count } else { 0 }],
+            damping: vec![0.0; n * n * count],
+            massless: (moving < chain && count > 0).then(|| MasslessDerivatives {
+                coupling: vec![Complex64::ZERO; n * count * outputs],
+                own: vec![0.0; outputs * count * outputs],
+            }),
+        };
+        let moving_shapes = modes.shapes.columns(0, moving);
+        for (p, derivative) in system.derivatives.iter().enumerate() {
+            let stiffness = project(&derivative.stiffness);
+            let mass = project(&derivative.mass);
+            let mut damping = project(&derivative.viscous);
+            let zeta_slope = system.modal_damping_ratio.derivative(p);
+            let chain_mass = derivative
+                .chain_mass
+                .as_ref()
+                .map(|m| moving_shapes.transpose() * m * moving_shapes);
+            for i in 0..moving {
+                damping[(i, i)] += 2.0 * root[i] * zeta_slope;
+                for j in 0..moving {
+                    // Modal damping is C K⁻¹ C = 4ζ² M; its differential in the basis gives this closed form.
+                    let sum = root[i] + root[j];
+                    if sum > 0.0 {
+                        let dm = chain_mass.as_ref().map_or(0.0, |m| m[(i, j)]);
+                        damping[(i, j)] += 2.0 * zeta * (dm + root[i] * root[j] * stiffness[(i, j)]) / sum;
                     }
                 }
-                let massless = derivative
-                    .stiffness
-                    .as_ref()
-                    .filter(|_| moving < chain)
-                    .map(|dk| {
-                        let reach = dk * &still * &still_rows;
-                        MasslessDerivative {
-                            coupling: basis.transpose() * &reach,
-                            own: still_rows.transpose() * still.transpose() * &reach,
-                        }
-                    });
-                BasisDerivative {
-                    stiffness,
-                    mass,
-                    damping,
-                    massless,
+            }
+            for j in 0..n {
+                let at = n * (p + count * j)..n * (p + count * j) + n;
+                derivatives.stiffness[at.clone()].copy_from_slice(stiffness.column(j).as_slice());
+                derivatives.damping[at.clone()].copy_from_slice(damping.column(j).as_slice());
+                if changes_mass {
+                    derivatives.mass[at].copy_from_slice(mass.column(j).as_slice());
                 }
-            })
-            .collect();
+            }
+            if let (Some(massless), Some(dk)) = (&mut derivatives.massless, &derivative.stiffness) {
+                let reach = dk * &still * &still_rows;
+                let coupling = basis.transpose() * &reach;
+                let own = still_rows.transpose() * still.transpose() * &reach;
+                for out in 0..outputs {
+                    for i in 0..n {
+                        massless.coupling[i + n * (p + count * out)] = coupling[(i, out)].into();
+                    }
+                    for other in 0..outputs {
+                        massless.own[other + outputs * (p + count * out)] = own[(other, out)];
+                    }
+                }
+            }
+        }
         Ok(FrfBasis {
             n,
             rows,
@@ -273,17 +316,16 @@ impl FrfBasis {
                 }
             }
             Dynamics::Full { mass, damping } => {
-                let z = Mat::from_fn(n, n, |i, j| {
-                    let k = if i == j { 1.0 } else { 0.0 };
-                    Complex64::new(k - omega * omega * mass[(i, j)], omega * damping[(i, j)])
-                });
-                let right = Mat::from_fn(n, self.rows.ncols(), |i, j| {
-                    Complex64::new(self.rows[(i, j)], 0.0)
-                });
-                let solution = z.partial_piv_lu().solve(&right);
-                for j in 0..self.rows.ncols() {
-                    response.columns.extend((0..n).map(|i| solution[(i, j)]));
-                }
+                let stiffness = |i: usize| if i / n == i % n { 1.0 } else { 0.0 };
+                let entries = mass.iter().zip(damping.iter()).enumerate();
+                response.dynamic.clear();
+                response.dynamic.extend(
+                    entries.map(|(i, (m, c))| Complex64::new(stiffness(i) - omega * omega * m, omega * c)),
+                );
+                response
+                    .columns
+                    .extend(self.rows.iter().map(|r| Complex64::new(*r, 0.0)));
+                solve_in_place(n, &mut response.dynamic, &mut response.columns);
             }
         }
         if response.columns.iter().any(|v| !v.is_finite()) {
@@ -298,62 +340,86 @@ impl FrfBasis {
     /// Receptance of output `out` per force along output `input`, m/N, at the frequency last solved.
     pub fn receptance(&self, response: &Response, out: usize, input: usize) -> Complex64 {
         let column = &response.columns[input * self.n..(input + 1) * self.n];
-        let moving: Complex64 = self
-            .rows
-            .column(out)
-            .iter()
-            .zip(column)
-            .map(|(r, u)| u * *r)
-            .sum();
+        let row = &self.rows.as_slice()[out * self.n..(out + 1) * self.n];
+        let moving: Complex64 = row.iter().zip(column).map(|(r, u)| u * *r).sum();
         moving + self.massless.as_ref().map_or(0.0, |m| m[(out, input)])
     }
 
-    /// dH/dp = −u_outᵀ (dZ/dp) u_in for parameter `parameter` and every output, into `slopes` (length: outputs),
-    /// for a force along output `input`.
-    pub fn sensitivities(
-        &self,
-        response: &mut Response,
-        parameter: usize,
-        input: usize,
-        slopes: &mut [Complex64],
-    ) {
-        let n = self.n;
+    /// dH/dp = −u_outᵀ (dZ/dp) u_in for every parameter, every output and the inputs of `slopes`, at the frequency last
+    /// solved.
+    pub fn slopes(&self, response: &Response, slopes: &mut Slopes) {
+        let (n, count, outputs) = (self.n, self.derivatives.count, self.rows.ncols());
+        let inputs = slopes.inputs.len();
         let omega = response.omega;
-        let derivative = &self.derivatives[parameter];
-        response.product.clear();
-        response.product.resize(n, Complex64::ZERO);
-        let u_in = &response.columns[input * n..(input + 1) * n];
-        for j in 0..n {
-            let u = u_in[j];
-            let (k, m, c) = (
-                derivative.stiffness.column(j),
-                derivative.mass.column(j),
-                derivative.damping.column(j),
+        let Derivatives {
+            stiffness,
+            mass,
+            damping,
+            massless,
+            ..
+        } = &self.derivatives;
+        slopes.parameters = count;
+        slopes.forces.clear();
+        for input in &slopes.inputs {
+            slopes
+                .forces
+                .extend_from_slice(&response.columns[input * n..(input + 1) * n]);
+        }
+        slopes.dynamic.clear();
+        let stiff_and_damped = stiffness.iter().zip(damping);
+        slopes
+            .dynamic
+            .extend(stiff_and_damped.map(|(k, c)| Complex64::new(*k, omega * c)));
+        for (z, m) in slopes.dynamic.iter_mut().zip(mass) {
+            z.re -= omega * omega * m;
+        }
+        let forces = MatRef::from_column_major_slice(&slopes.forces, n, inputs);
+        let one = Complex64::new(1.0, 0.0);
+        // u_inᵀ dZ for all parameters: inputs × (parameters · n), which read the other way is (inputs · parameters) × n.
+        slopes.product.resize(inputs * count * n, Complex64::ZERO);
+        matmul(
+            MatMut::from_column_major_slice_mut(&mut slopes.product, inputs, count * n),
+            Accum::Replace,
+            forces.transpose(),
+            MatRef::from_column_major_slice(&slopes.dynamic, n, count * n),
+            one,
+            Par::Seq,
+        );
+        if let Some(massless) = massless {
+            for j in 0..n {
+                for p in 0..count {
+                    for (i, input) in slopes.inputs.iter().enumerate() {
+                        slopes.product[i + inputs * (p + count * j)] +=
+                            massless.coupling[j + n * (p + count * input)];
+                    }
+                }
+            }
+        }
+        slopes.values.resize(inputs * count * outputs, Complex64::ZERO);
+        matmul(
+            MatMut::from_column_major_slice_mut(&mut slopes.values, inputs * count, outputs),
+            Accum::Replace,
+            MatRef::from_column_major_slice(&slopes.product, inputs * count, n),
+            MatRef::from_column_major_slice(&response.columns, n, outputs),
+            -one,
+            Par::Seq,
+        );
+        if let Some(massless) = massless {
+            matmul(
+                MatMut::from_column_major_slice_mut(&mut slopes.values, inputs, count * outputs),
+                Accum::Add,
+                forces.transpose(),
+                MatRef::from_column_major_slice(&massless.coupling, n, count * outputs),
+                -one,
+                Par::Seq,
             );
-            for i in 0..n {
-                response.product[i] += Complex64::new(k[i] - omega * omega * m[i], omega * c[i]) * u;
-            }
-        }
-        if let Some(massless) = &derivative.massless {
-            for (p, c) in response
-                .product
-                .iter_mut()
-                .zip(massless.coupling.column(input).iter())
-            {
-                *p += *c;
-            }
-        }
-        for (out, slope) in slopes.iter_mut().enumerate() {
-            let u_out = &response.columns[out * n..(out + 1) * n];
-            let moving: Complex64 = u_out.iter().zip(&response.product).map(|(a, b)| a * b).sum();
-            *slope = -moving;
-            if let Some(massless) = &derivative.massless {
-                let coupled: Complex64 = u_in
-                    .iter()
-                    .zip(massless.coupling.column(out).iter())
-                    .map(|(u, c)| u * *c)
-                    .sum();
-                *slope -= coupled + massless.own[(out, input)];
+            for out in 0..outputs {
+                for p in 0..count {
+                    for (i, input) in slopes.inputs.iter().enumerate() {
+                        slopes.values[i + inputs * (p + count * out)] -=
+                            massless.own[out + outputs * (p + count * input)];
+                    }
+                }
             }
         }
     }
@@ -363,5 +429,70 @@ impl FrfBasis {
         let mut response = Response::default();
         self.solve(omega, &mut response)?;
         Ok(self.receptance(&response, out, input))
+    }
+}
+
+/// Solves A X = B by elimination with partial pivoting; A (n × n) is destroyed, B becomes X, both column by column. A
+/// singular A leaves values that are not finite. (The systems are so small, and solved so often, that a library's
+/// blocking and memory take longer than the arithmetic.)
+fn solve_in_place(n: usize, a: &mut [Complex64], b: &mut [Complex64]) {
+    for k in 0..n {
+        let size = |i: usize| a[i + n * k].l1_norm();
+        let pivot = (k + 1..n).fold(k, |best, i| if size(i) > size(best) { i } else { best });
+        if pivot != k {
+            (k..n).for_each(|j| a.swap(k + n * j, pivot + n * j));
+            b.chunks_exact_mut(n).for_each(|column| column.swap(k, pivot));
+        }
+        let inverse = a[k + n * k].inv();
+        let (left, right) = a.split_at_mut(n * (k + 1));
+        let factors = &mut left[n * k + k + 1..];
+        factors.iter_mut().for_each(|f| *f *= inverse);
+        for column in right.chunks_exact_mut(n).chain(b.chunks_exact_mut(n)) {
+            let top = column[k];
+            for (x, f) in column[k + 1..].iter_mut().zip(factors.iter()) {
+                *x -= f * top;
+            }
+        }
+        left[n * k + k] = inverse;
+    }
+    for column in b.chunks_exact_mut(n) {
+        for k in (0..n).rev() {
+            let value = column[k] * a[k + n * k];
+            column[k] = value;
+            for (x, f) in column[..k].iter_mut().zip(&a[n * k..]) {
+                *x -= f * value;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_systems_are_solved() {
+        // The first pivot is zero: rows must be exchanged.
+        let entry = |i: usize, j: usize| {
+            if (i, j) == (0, 0) {
+                Complex64::ZERO
+            } else {
+                Complex64::new(1.0 / (1.0 + (i * i + 2 * j) as f64), (i as f64 - 0.3 * j as f64).sin())
+            }
+        };
+        let (n, m) = (5, 2);
+        let x = |j: usize, c: usize| Complex64::new(j as f64 - 1.5, c as f64 + 0.5);
+        let mut a: Vec<Complex64> = (0..n * n).map(|k| entry(k % n, k / n)).collect();
+        let mut b: Vec<Complex64> = (0..n * m)
+            .map(|k| (0..n).map(|j| entry(k % n, j) * x(j, k / n)).sum())
+            .collect();
+        solve_in_place(n, &mut a, &mut b);
+        for (k, value) in b.iter().enumerate() {
+            assert!((value - x(k % n, k / n)).norm() < 1e-11, "{value}");
+        }
+        let mut singular = vec![Complex64::ZERO; 4];
+        let mut right = vec![Complex64::new(1.0, 0.0); 2];
+        solve_in_place(2, &mut singular, &mut right);
+        assert!(right.iter().any(|v| !v.is_finite()));
     }
 }

@@ -398,9 +398,10 @@ mod tests {
             let omega = std::f64::consts::TAU * 13.0;
             let mut response = crate::robot::frf::Response::default();
             basis.solve(omega, &mut response).unwrap();
+            let mut slopes = crate::robot::frf::Slopes::of_inputs(vec![2, 0]);
+            basis.slopes(&response, &mut slopes);
             for p in 0..count {
-                let mut slopes = [num_complex::Complex64::ZERO; 3];
-                basis.sensitivities(&mut response, p, 0, &mut slopes);
+                let slopes = [0, 1, 2].map(|out| slopes.at(p, 1, out));
                 let h = 1e-6 * theta[p].abs();
                 let shifted = |sign: f64| {
                     let mut t = theta.clone();

@@ -1,0 +1,236 @@
+//! FRFs and a structural model as a [`Study`].
+
+use num_complex::Complex64;
+
+use super::calibrate::{Calibration, Options, calibrate};
+use super::frf_data::FrfData;
+use super::structure::{FrfProblem, Misfit, StructureModel};
+use super::levenberg_marquardt::Stopping;
+use super::study::{EffectName, Extent, HeldOut, Measure, Residual, Study, View, held_out};
+use crate::Result;
+use crate::campaign::robot_spec::RobotSpec;
+use crate::effects::{self, DataSummary, Instance};
+use crate::parameter::Parameter;
+
+/// A campaign's FRFs, arranged for the loop.
+#[derive(Debug, Clone)]
+pub struct StructureStudy {
+    pub data: FrfData,
+    pub options: Options,
+    coarse: FrfData,
+    /// Postures that are left out in turn, and the data without each.
+    postures: Vec<usize>,
+    coarse_without: Vec<FrfData>,
+    full_without: Vec<FrfData>,
+    summary: DataSummary,
+    robot: RobotSpec,
+}
+
+/// Lines between those that the coarse view keeps, at most.
+const LARGEST_STRIDE: usize = 6;
+/// Complex values the coarse view has, about: enough to tell effects apart, few enough to try many starts.
+const COARSE_VALUES: usize = 2500;
+
+impl StructureStudy {
+    pub fn new(robot: &RobotSpec, data: FrfData, options: Options) -> Self {
+        let share = data.value_count().div_ceil(COARSE_VALUES);
+        // A resonance needs its few lines: measurements with coarse lines are left alone.
+        let lines = data.blocks.iter().map(|b| b.frequency_hz.len()).min().unwrap_or(0);
+        let stride = share.min(LARGEST_STRIDE).min((lines / 60).max(1));
+        let every = (share / stride).clamp(1, 3);
+        let coarse = data.thinned(stride, every);
+        let postures = data.measured_postures();
+        let without = |data: &FrfData| -> Vec<FrfData> {
+            postures.iter().map(|&p| data.filtered(|q| q != p)).collect()
+        };
+        StructureStudy {
+            coarse_without: without(&coarse),
+            full_without: without(&data),
+            summary: data.summary(),
+            robot: robot.clone(),
+            coarse,
+            postures,
+            data,
+            options,
+        }
+    }
+
+    fn view(&self, view: View) -> &FrfData {
+        match (view.extent, view.left_out) {
+            (Extent::Coarse, None) => &self.coarse,
+            (Extent::Full, None) => &self.data,
+            (Extent::Coarse, Some(fold)) => &self.coarse_without[fold],
+            (Extent::Full, Some(fold)) => &self.full_without[fold],
+        }
+    }
+}
+
+impl Study for StructureStudy {
+    type Model = StructureModel;
+    type Instance = Instance;
+    type Problem<'a> = FrfProblem<'a>;
+    type Hints = Vec<f64>;
+
+    fn parameters<'m>(&self, model: &'m StructureModel) -> &'m [Parameter] {
+        &model.parameters
+    }
+
+    fn instances(&self, model: &StructureModel) -> (Vec<Instance>, Vec<(String, String)>) {
+        let spec = &model.robot.spec;
+        let (mut tried, mut not_tried) = (Vec::new(), Vec::new());
+        for instance in effects::instances(spec) {
+            let label = instance.label();
+            if model.effects().iter().any(|added| added.instance.label() == label) {
+                continue;
+            }
+            match instance.effect.obstacle(spec, &self.summary) {
+                Some(reason) => not_tried.push((label, reason)),
+                None => tried.push(instance),
+            }
+        }
+        not_tried.dedup();
+        (tried, not_tried)
+    }
+
+    fn name(&self, instance: &Instance) -> EffectName {
+        let variant = instance.effect.variant_label(instance.variant);
+        EffectName {
+            effect: instance.effect.id().into(),
+            site: instance.site.label(),
+            variant: variant.map(|(key, value)| (key.into(), value.into())),
+        }
+    }
+
+    fn extend(&self, model: &StructureModel, instance: &Instance) -> StructureModel {
+        model.with_effect(*instance, &self.summary)
+    }
+
+    /// Frequencies at which the weighted residual is largest, most prominent first.
+    fn hints(&self, model: &StructureModel, theta: &[f64]) -> Result<Vec<f64>> {
+        residual_peaks_hz(model, &self.data, theta)
+    }
+
+    fn starts(&self, instance: &Instance, peaks_hz: &Vec<f64>) -> Vec<Vec<f64>> {
+        instance.effect.starts(&self.robot, &self.summary, peaks_hz)
+    }
+
+    fn problem<'a>(&'a self, model: &'a StructureModel, view: View) -> FrfProblem<'a> {
+        FrfProblem {
+            model,
+            data: self.view(view),
+            misfit: match view.measure {
+                Measure::Rough => Misfit::LogMagnitude,
+                Measure::Likelihood => Misfit::Complex,
+            },
+            stride: 1,
+        }
+    }
+
+    fn real_values(&self, extent: Extent) -> usize {
+        let view = View {
+            extent,
+            ..View::FULL
+        };
+        2 * self.view(view).value_count()
+    }
+
+    fn folds(&self) -> usize {
+        self.postures.len()
+    }
+
+    fn predict_fold(&self, model: &StructureModel, theta: &[f64], fold: usize) -> Result<HeldOut> {
+        let own = self.data.filtered(|p| p == self.postures[fold]);
+        let predicted = model.predict(theta, &own)?;
+        let mut sums = HeldOut::default();
+        for ((_, frf), model) in own.frfs().zip(&predicted) {
+            for ((h, m), std) in frf.receptance.iter().zip(model).zip(&frf.noise_std) {
+                let square = (m - h).norm_sqr();
+                sums.error += square;
+                sums.signal += h.norm_sqr();
+                sums.chi2 += square / (std * std);
+            }
+        }
+        Ok(sums)
+    }
+
+    fn residual(&self, model: &StructureModel, theta: &[f64]) -> Result<Residual> {
+        let predicted = model.predict(theta, &self.data)?;
+        let (mut error, mut signal, mut weighted, mut values) = (0.0, 0.0, 0.0, 0);
+        // Σ r̄(k) r(k + lag) over all FRFs, normalised by lag 0.
+        let mut lags = [0.0; CORRELATION_LAGS + 1];
+        for ((_, frf), model) in self.data.frfs().zip(&predicted) {
+            let difference = |k: usize| model[k] - frf.receptance[k];
+            let whitened: Vec<Complex64> = (0..model.len())
+                .map(|k| difference(k) / frf.noise_std[k])
+                .collect();
+            error += (0..model.len()).map(|k| difference(k).norm_sqr()).sum::<f64>();
+            signal += frf.receptance.iter().map(|h| h.norm_sqr()).sum::<f64>();
+            weighted += whitened.iter().map(|r| r.norm_sqr()).sum::<f64>();
+            values += model.len();
+            for (lag, sum) in lags.iter_mut().enumerate() {
+                let pairs = whitened.iter().zip(whitened.iter().skip(lag));
+                *sum += pairs.map(|(a, b)| (a.conj() * b).re).sum::<f64>();
+            }
+        }
+        let chance = 2.0 / (values.max(1) as f64).sqrt();
+        let correlation: f64 = (1..lags.len())
+            .map(|lag| lags[lag] / lags[0].max(f64::MIN_POSITIVE))
+            .take_while(|r| *r > chance)
+            .sum();
+        Ok(Residual {
+            nrms: (error / signal.max(f64::MIN_POSITIVE)).sqrt(),
+            chi2_per_value: weighted / values.max(1) as f64,
+            independent_share: 1.0 / (1.0 + 2.0 * correlation),
+        })
+    }
+
+    fn calibrate(&self, model: &StructureModel) -> Result<Calibration> {
+        calibrate(model, &self.data, self.options)
+    }
+}
+
+/// Error on postures left out one at a time, refitted from `theta` on all lines of the others. `None` with fewer than two
+/// measured postures.
+pub fn held_out_postures(model: &StructureModel, data: &FrfData, theta: &[f64]) -> Result<Option<HeldOut>> {
+    let study = StructureStudy::new(&model.robot.spec, data.clone(), Options::default());
+    let stopping = Stopping {
+        max_iterations: 30,
+        relative_decrease: 1e-6,
+    };
+    held_out(&study, model, theta, Extent::Full, stopping)
+}
+
+/// Neighbouring lines over which the residual's correlation is summed.
+const CORRELATION_LAGS: usize = 40;
+
+/// Frequencies at which the weighted residual is largest, most prominent first.
+pub fn residual_peaks_hz(model: &StructureModel, data: &FrfData, theta: &[f64]) -> Result<Vec<f64>> {
+    const PEAKS: usize = 4;
+    const BINS: usize = 60;
+    let summary = data.summary();
+    let ratio = (summary.highest_hz / summary.lowest_hz).ln();
+    let mut bins = vec![(0.0, 0usize); BINS];
+    let predicted = model.predict(theta, data)?;
+    for ((block, frf), model) in data.frfs().zip(&predicted) {
+        for (k, f) in block.frequency_hz.iter().enumerate() {
+            let position = (f / summary.lowest_hz).ln() / ratio * BINS as f64;
+            let bin = &mut bins[(position.max(0.0) as usize).min(BINS - 1)];
+            bin.0 += (model[k] - frf.receptance[k]).norm_sqr() / frf.noise_std[k].powi(2);
+            bin.1 += 1;
+        }
+    }
+    let level: Vec<f64> = bins
+        .iter()
+        .map(|(s, n)| if *n > 0 { s / *n as f64 } else { 0.0 })
+        .collect();
+    let mut peaks: Vec<usize> = (0..BINS)
+        .filter(|&i| {
+            let left = if i > 0 { level[i - 1] } else { 0.0 };
+            let right = level.get(i + 1).copied().unwrap_or(0.0);
+            level[i] > left && level[i] >= right && level[i] > 1.5
+        })
+        .collect();
+    peaks.sort_by(|a, b| level[*b].total_cmp(&level[*a]));
+    let centre = |i: usize| summary.lowest_hz * (ratio * (i as f64 + 0.5) / BINS as f64).exp();
+    Ok(peaks.into_iter().take(PEAKS).map(centre).collect())
+}

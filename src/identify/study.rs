@@ -1,0 +1,338 @@
+//! What the loop "fit, compare, add an effect, fit again" needs to know of a model and its data, and the fits it is made
+//! of. Structure and cutting forces are two studies; the loop is one.
+
+use rayon::prelude::*;
+
+use super::calibrate::Calibration;
+use super::levenberg_marquardt::{Fit, LeastSquares, Stopping, minimise};
+use crate::parameter::Parameter;
+use crate::{Error, Result};
+
+/// How much of the data a fit uses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Extent {
+    /// A share of the data that shows every effect, for trying many starting points.
+    Coarse,
+    /// Everything.
+    Full,
+}
+
+/// What is compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Measure {
+    /// A smooth misfit for far away, where a model's peak stands beside the measured one.
+    Rough,
+    /// The likelihood.
+    Likelihood,
+}
+
+/// A view of a study's data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct View {
+    pub extent: Extent,
+    pub measure: Measure,
+    /// A fold (posture, cut) that is left out.
+    pub left_out: Option<usize>,
+}
+
+impl View {
+    pub const COARSE: View = View {
+        extent: Extent::Coarse,
+        measure: Measure::Likelihood,
+        left_out: None,
+    };
+    pub const FULL: View = View {
+        extent: Extent::Full,
+        ..View::COARSE
+    };
+}
+
+/// How an effect at a site is called.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct EffectName {
+    pub effect: String,
+    /// `None` where the effect has no place of its own.
+    pub site: Option<String>,
+    /// A discrete choice as key and value (`direction`, `y`).
+    pub variant: Option<(String, String)>,
+}
+
+impl EffectName {
+    /// `effect@site`, or the bare id; the discrete choice is not part of it.
+    pub fn label(&self) -> String {
+        match &self.site {
+            Some(site) => format!("{}@{site}", self.effect),
+            None => self.effect.clone(),
+        }
+    }
+}
+
+/// What a model's residual says about itself.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Residual {
+    /// sqrt(Σ|model − measured|² / Σ|measured|²).
+    pub nrms: f64,
+    /// Σ r²/σ² per real value.
+    pub chi2_per_value: f64,
+    /// Share of the values that counts as independent, from the correlation of neighbours in the weighted residual:
+    /// 1 for white noise.
+    pub independent_share: f64,
+}
+
+/// A model that effects can be added to, and the data it is fitted to.
+pub trait Study: Sync {
+    /// A model: its last parameters are those of the effect added last.
+    type Model: Clone + Send + Sync;
+    /// An effect at a site, with its discrete choice.
+    type Instance: Clone + Send + Sync;
+    type Problem<'a>: LeastSquares + Sync
+    where
+        Self: 'a;
+    /// What effects need for finding their starting points at a fit.
+    type Hints: Sync;
+
+    fn parameters<'m>(&self, model: &'m Self::Model) -> &'m [Parameter];
+
+    /// Every instance that could be added to `model`, and the effects this data cannot show with the reason.
+    fn instances(&self, model: &Self::Model) -> (Vec<Self::Instance>, Vec<(String, String)>);
+
+    fn name(&self, instance: &Self::Instance) -> EffectName;
+
+    fn extend(&self, model: &Self::Model, instance: &Self::Instance) -> Self::Model;
+
+    /// What the residual of `model` at `theta` suggests.
+    fn hints(&self, model: &Self::Model, theta: &[f64]) -> Result<Self::Hints>;
+
+    /// Starting points for the effect's own parameters, natural values.
+    fn starts(&self, instance: &Self::Instance, hints: &Self::Hints) -> Vec<Vec<f64>>;
+
+    fn problem<'a>(&'a self, model: &'a Self::Model, view: View) -> Self::Problem<'a>;
+
+    /// Real values in a view.
+    fn real_values(&self, extent: Extent) -> usize;
+
+    /// Postures or cuts; numbered from 0.
+    fn folds(&self) -> usize;
+
+    /// How well `theta` predicts one fold, on all of its data.
+    fn predict_fold(&self, model: &Self::Model, theta: &[f64], fold: usize) -> Result<HeldOut>;
+
+    fn residual(&self, model: &Self::Model, theta: &[f64]) -> Result<Residual>;
+
+    /// The fair fit of a model as it stands.
+    fn calibrate(&self, model: &Self::Model) -> Result<Calibration>;
+
+    fn nominal_theta(&self, model: &Self::Model) -> Vec<f64> {
+        let parameters = self.parameters(model).iter();
+        parameters.map(|p| p.internal(p.nominal)).collect()
+    }
+
+    fn bounds(&self, model: &Self::Model) -> Vec<[f64; 2]> {
+        self.parameters(model)
+            .iter()
+            .map(Parameter::internal_bounds)
+            .collect()
+    }
+}
+
+/// Sums behind held-out errors of one fit.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct HeldOut {
+    /// Σ|model − measured|² and Σ|measured|² on folds left out of the fit.
+    pub error: f64,
+    pub signal: f64,
+    /// Σ|model − measured|²/σ² there.
+    pub chi2: f64,
+}
+
+impl HeldOut {
+    pub fn nrms(&self) -> f64 {
+        if self.signal > 0.0 {
+            (self.error / self.signal).sqrt()
+        } else {
+            0.0
+        }
+    }
+}
+
+/// Leaves out one fold at a time, refits from `theta` on the rest and predicts the fold left out. `None` with fewer than
+/// two folds.
+pub fn held_out<S: Study>(
+    study: &S,
+    model: &S::Model,
+    theta: &[f64],
+    extent: Extent,
+    stopping: Stopping,
+) -> Result<Option<HeldOut>> {
+    if study.folds() < 2 {
+        return Ok(None);
+    }
+    let bounds = study.bounds(model);
+    let folds: Vec<HeldOut> = (0..study.folds())
+        .into_par_iter()
+        .map(|fold| {
+            let view = View {
+                extent,
+                left_out: Some(fold),
+                ..View::FULL
+            };
+            let fit = minimise(&study.problem(model, view), theta, &bounds, stopping)?;
+            study.predict_fold(model, &fit.theta, fold)
+        })
+        .collect::<Result<_>>()?;
+    let total = folds.iter().fold(HeldOut::default(), |sum, fold| HeldOut {
+        error: sum.error + fold.error,
+        signal: sum.signal + fold.signal,
+        chi2: sum.chi2 + fold.chi2,
+    });
+    Ok(Some(total))
+}
+
+/// Weighted squares per real value from which on the rough misfit is fitted first: peaks may stand beside their places.
+const TRAP_MISFIT: f64 = 3.0;
+
+/// How hard a fit of an effect is tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Effort {
+    /// A few steps from the best starting point.
+    Look,
+    /// To the end, from every base that starts near enough.
+    Direct,
+    /// Besides, the rough misfit leads from every base where the likelihood's starting points are all far off.
+    Staged,
+}
+
+const LOOK: Stopping = Stopping {
+    max_iterations: 6,
+    relative_decrease: 1e-3,
+};
+const SETTLE: Stopping = Stopping {
+    max_iterations: 20,
+    relative_decrease: 1e-4,
+};
+
+/// Fits the effect added last to `model` on the coarse view, without being trapped by where the fit without it stood.
+/// `bases`: points for the parameters in front of the effect's; `own`: points for its own; both on the solver's scale.
+pub fn screen<S: Study>(
+    study: &S,
+    model: &S::Model,
+    bases: &[Vec<f64>],
+    own: &[Vec<f64>],
+    effort: Effort,
+) -> Result<Fit> {
+    let bounds = study.bounds(model);
+    let likelihood = study.problem(model, View::COARSE);
+    let rough = study.problem(
+        model,
+        View {
+            measure: Measure::Rough,
+            ..View::COARSE
+        },
+    );
+    let lowest = |problem: &S::Problem<'_>, base: &[f64]| -> Option<(f64, Vec<f64>)> {
+        let starts = own.iter().map(|own| [base, own.as_slice()].concat());
+        starts
+            .map(|start| (problem.cost(&start).unwrap_or(f64::INFINITY), start))
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+    };
+    let mut fits = Vec::new();
+    let mut failure = None;
+    let mut keep = |fit: Result<Fit>| match fit {
+        Ok(fit) => fits.push(fit),
+        Err(error) => failure = Some(error),
+    };
+    let direct: Vec<(f64, Vec<f64>)> = bases.iter().filter_map(|b| lowest(&likelihood, b)).collect();
+    let best = direct.iter().map(|d| d.0).fold(f64::INFINITY, f64::min);
+    // A base that starts hopelessly high needs the rough misfit first.
+    for (_, start) in direct.iter().filter(|d| d.0 <= 3.0 * best) {
+        keep(minimise(&likelihood, start, &bounds, LOOK));
+    }
+    if effort == Effort::Staged && 2.0 * best > TRAP_MISFIT * study.real_values(Extent::Coarse) as f64 {
+        for base in bases {
+            if let Some((_, start)) = lowest(&rough, base) {
+                let longer = Stopping {
+                    max_iterations: 10,
+                    ..LOOK
+                };
+                let near = minimise(&rough, &start, &bounds, longer);
+                keep(near.and_then(|near| minimise(&likelihood, &near.theta, &bounds, LOOK)));
+            }
+        }
+    }
+    fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    if effort == Effort::Look && !fits.is_empty() {
+        return Ok(fits.swap_remove(0));
+    }
+    let mut best: Option<Fit> = None;
+    // The runner-up goes to the end too where it is close: the leader of a short look need not win.
+    let close = |fit: &&Fit| fit.cost < 1.5 * fits[0].cost;
+    for fit in fits.iter().take(2).filter(close) {
+        let settled = minimise(&likelihood, &fit.theta, &bounds, SETTLE)?;
+        if best.as_ref().is_none_or(|b| settled.cost < b.cost) {
+            best = Some(settled);
+        }
+    }
+    match (best, failure) {
+        (Some(best), _) => Ok(best),
+        (None, Some(error)) => Err(error),
+        (None, None) => Err(Error::computation("no starting point for the effect")),
+    }
+}
+
+/// Starting points of an effect's own parameters on the solver's scale: the nominal values, what the effect proposes, and
+/// near both ends of the range, where an effect that is hardly there begins.
+pub fn own_starts<S: Study>(
+    study: &S,
+    extended: &S::Model,
+    count_before: usize,
+    instance: &S::Instance,
+    hints: &S::Hints,
+) -> Vec<Vec<f64>> {
+    let parameters = &study.parameters(extended)[count_before..];
+    let nominal: Vec<f64> = parameters.iter().map(|p| p.nominal).collect();
+    let mut starts: Vec<Vec<f64>> = std::iter::once(nominal)
+        .chain(study.starts(instance, hints))
+        .map(|start| {
+            let pairs = parameters.iter().zip(start);
+            pairs
+                .map(|(p, v)| p.internal(v.clamp(p.bounds[0], p.bounds[1])))
+                .collect()
+        })
+        .collect();
+    if let [only] = parameters {
+        let [low, high] = only.internal_bounds();
+        if low.is_finite() && high.is_finite() {
+            starts.extend([0.05, 0.95].map(|share| vec![low + share * (high - low)]));
+        }
+    }
+    starts
+}
+
+/// An effect tried: the model with it and its fit.
+#[derive(Debug, Clone)]
+pub struct Tried<M, I> {
+    pub instance: I,
+    pub model: M,
+    pub fit: Fit,
+}
+
+/// Adds `instance` to `model` and fits it on the coarse view from the given points of the parameters in front; `None` if
+/// no start leads to a fit.
+pub fn try_effect<S: Study>(
+    study: &S,
+    model: &S::Model,
+    instance: &S::Instance,
+    bases: &[Vec<f64>],
+    hints: &S::Hints,
+    effort: Effort,
+) -> Option<Tried<S::Model, S::Instance>> {
+    let extended = study.extend(model, instance);
+    let before = study.parameters(model).len();
+    let own = own_starts(study, &extended, before, instance, hints);
+    let fit = screen(study, &extended, bases, &own, effort).ok()?;
+    Some(Tried {
+        instance: instance.clone(),
+        model: extended,
+        fit,
+    })
+}

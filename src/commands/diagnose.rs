@@ -24,6 +24,8 @@ pub fn run(args: Args) -> Result<Outcome> {
     let diagnosis = diagnose(&case.model, &case.data, Options::default())?;
     let json = json!({
         "domain": "structure",
+        "revision": case.revision(),
+        "effects": case.effects(),
         "verdict": diagnosis.verdict,
         "effect": diagnosis.effect.map(|i| i.effect.id()),
         "site": diagnosis.effect.and_then(|i| i.site.label()),
@@ -41,7 +43,9 @@ pub fn run(args: Args) -> Result<Outcome> {
         "not_tried": diagnosis.not_tried.iter().map(|(e, why)| json!({ "effect": e, "why": why })).collect::<Vec<_>>(),
         "warnings": case.warnings,
     });
-    let text = describe(&campaign, &diagnosis) + &warnings(&case.warnings);
+    let text = format!("model: {}\n", case.model_description())
+        + &describe(&campaign, &diagnosis)
+        + &warnings(&case.warnings);
     Ok(Outcome { json, text })
 }
 

@@ -113,7 +113,7 @@ pub fn diagnose(model: &StructureModel, data: &FrfData, options: Options) -> Res
 
     let (mut instances, mut not_tried) = (Vec::new(), Vec::new());
     for instance in effects::instances(spec) {
-        if model.effects().iter().any(|added| added.instance == instance) {
+        if model.has(&instance.label()) {
             continue;
         }
         match instance.effect.obstacle(spec, &summary) {
@@ -289,7 +289,7 @@ fn screen_baseline(model: &StructureModel, data: &FrfData, stride: usize, start:
 }
 
 /// Starting points for the last effect of `model`, solver's scale.
-fn effect_starts(
+pub fn effect_starts(
     model: &StructureModel,
     instance: Instance,
     peaks_hz: &[f64],

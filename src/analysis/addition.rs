@@ -6,6 +6,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::campaign::Campaign;
 use crate::discrepancy::FrfComparison;
 use crate::discrepancy::compare::ErrorTotals;
+use crate::discrepancy::correlation::lines_together;
 use crate::discrepancy::diagnose::{effect_starts, residual_peaks_hz};
 use crate::effects::{self, Instance};
 use crate::identify::calibrate::{calibrate, refine};
@@ -22,6 +23,8 @@ pub struct Fitted {
     pub totals: ErrorTotals,
     /// On postures left out of the fit; `None` with one posture.
     pub held_out: Option<HeldOut>,
+    /// How many neighbouring lines err together: 1 where only noise is left.
+    pub lines_together: f64,
 }
 
 impl Fitted {
@@ -34,6 +37,7 @@ impl Fitted {
             calibration,
             totals,
             held_out,
+            lines_together: lines_together(data, &predicted),
         })
     }
 
@@ -110,7 +114,7 @@ impl Addition {
                 ))
                 .into());
         }
-        let before = calibrate(&case.model, data, options)?;
+        let before = calibrate(&case.model, data, case.options(options))?;
         let (instance, model, fit) = best_variant(&case.model, data, &before, &instances)?;
         let after = calibrate(&model.with_start(fit.theta), data, options)?;
         let before = fair(&case.model, data, before, &after, options)?;
@@ -197,11 +201,13 @@ fn fair(
 ///
 /// An effect that is not there makes predictions worse on average; that its k parameters improve the held-out −2 ln L by
 /// more than the (1 − p) quantile of χ²(k) is less likely than p. Where more than noise is left, that rest is the
-/// measure of chance. The held-out nrms, which weighs lines by size instead of by noise, must not rise either.
+/// measure of chance, and lines that err together count once. The held-out nrms, which weighs lines by size instead of by
+/// noise, must fall too.
 fn progress(before: &Fitted, after: &Fitted) -> Option<bool> {
     let (was, is) = (before.held_out?, after.held_out?);
     let parameters = after.model.parameters.len() - before.model.parameters.len();
     let threshold = ChiSquared::new(parameters as f64).map_or(0.0, |d| d.inverse_cdf(1.0 - CHANCE));
-    let gain = 2.0 * (was.chi2 - is.chi2) / after.calibration.reduced_chi2.max(1.0);
+    let chance = after.calibration.reduced_chi2.max(1.0) * after.lines_together;
+    let gain = 2.0 * (was.chi2 - is.chi2) / chance;
     Some(gain > threshold && is.nrms() < was.nrms())
 }

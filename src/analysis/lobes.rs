@@ -147,7 +147,7 @@ fn from_model(campaign: &Campaign, warnings: &mut Vec<String>) -> Result<Vec<Str
         (model, theta, "robot model, not calibrated".to_string())
     } else {
         let case = StructureCase::load(campaign)?;
-        let calibration = calibrate(&case.model, &case.data, Options::default())?;
+        let calibration = calibrate(&case.model, &case.data, case.options(Options::default()))?;
         let description = match case.effects().is_empty() {
             true => "calibrated robot model".to_string(),
             false => format!("calibrated robot model ({})", case.model_description()),

@@ -25,7 +25,7 @@ pub struct StructureAnalysis {
 impl StructureAnalysis {
     pub fn run(campaign: &Campaign, options: Options) -> Result<Self> {
         let case = StructureCase::load(campaign)?;
-        let calibration = calibrate(&case.model, &case.data, options)?;
+        let calibration = calibrate(&case.model, &case.data, case.options(options))?;
         let nominal = case
             .baseline
             .predict(&case.baseline.nominal_theta(), &case.data)?;

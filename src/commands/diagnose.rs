@@ -21,7 +21,7 @@ pub fn run(args: Args) -> Result<Outcome> {
     structure_only(args.domain)?;
     let campaign = Campaign::load(&args.campaign.dir)?;
     let case = StructureCase::load(&campaign)?;
-    let diagnosis = diagnose(&case.model, &case.data, Options::default())?;
+    let diagnosis = diagnose(&case.model, &case.data, case.options(Options::default()))?;
     let json = json!({
         "domain": "structure",
         "revision": case.revision(),

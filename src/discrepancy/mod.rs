@@ -1,6 +1,7 @@
 //! Where the model fails, and which physical effect it lacks.
 
 pub mod compare;
+pub mod correlation;
 pub mod diagnose;
 pub mod next_measurement;
 

@@ -26,7 +26,7 @@ pub struct Estimate {
 }
 
 /// How to calibrate.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
     /// Further starting points, tried where the first fit leaves more than noise.
     pub extra_starts: usize,

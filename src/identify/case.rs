@@ -1,5 +1,6 @@
 //! A campaign's structural side, loaded and ready to be fitted.
 
+use super::calibrate::Options;
 use super::frf_data::FrfData;
 use super::structure::StructureModel;
 use crate::campaign::{Campaign, RobotSection};
@@ -19,6 +20,8 @@ pub struct StructureCase {
     pub data: FrfData,
     /// What was added so far, oldest first; the first is the baseline. Empty where nothing was.
     pub revisions: Vec<Revision>,
+    /// Whether the model starts from a solution that was found on these very data.
+    settled: bool,
     pub warnings: Vec<String>,
 }
 
@@ -53,10 +56,12 @@ impl StructureCase {
         let revisions: Vec<Revision> = log.revisions(Domain::Structure).cloned().collect();
         let (set, mut warnings) = campaign.load_frfs()?;
         let data = FrfData::new(campaign, &baseline.robot, set)?;
+        let mut settled = false;
         let model = match revisions.last() {
             Some(current) => {
-                // A baseline is only a starting point; whose data it was fitted to does not matter.
-                if current.revision > 0 && current.data != structure_fingerprint(campaign)? {
+                settled = current.data == structure_fingerprint(campaign)?;
+                // Of a baseline only the starting point is taken; whose data it was fitted to does not matter.
+                if current.revision > 0 && !settled {
                     warnings.push(format!(
                         "revision {} was made with other data (robot, postures, points or FRF files changed since): its \
                          effects stay in the model and are fitted anew, but the errors in its history no longer compare; \
@@ -74,8 +79,21 @@ impl StructureCase {
             baseline,
             data,
             revisions,
+            settled,
             warnings,
         })
+    }
+
+    /// How to calibrate this case where `wanted` was asked for. Further starting points were tried when the revision was
+    /// made; the same ones again would lead to the same answer, so that only others are.
+    pub fn options(&self, wanted: Options) -> Options {
+        match self.settled && wanted == Options::default() {
+            true => Options {
+                extra_starts: 0,
+                ..wanted
+            },
+            false => wanted,
+        }
     }
 
     /// Number of the current revision; `None` where nothing was ever added.

@@ -50,7 +50,7 @@ impl BuiltinCampaign {
             let path = folder.join(name);
             let below = path.parent().unwrap_or(&folder);
             std::fs::create_dir_all(below).map_err(|e| Error::io(below, e))?;
-            crate::report::page::write_atomically(&path, content)?;
+            crate::files::write_atomically(&path, content)?;
         }
         Ok(folder)
     }

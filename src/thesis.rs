@@ -256,7 +256,11 @@ fn static_rows(model: &StructureModel, nominal: &[f64], fitted: &[f64]) -> Resul
     for row in rows::<StaticRow>(STATIC_STIFFNESS)? {
         let kinematics = model.robot.kinematics(&posture_deg(&row.posture)?)?;
         let stiffness = |theta: &[f64]| -> Result<[f64; 3]> {
-            let report = PostureReport::new(&model.robot, &kinematics, &model.baseline(theta, false))?;
+            let report = PostureReport::new(
+                &model.robot,
+                &kinematics,
+                &model.chain(theta, &kinematics, 0.0, false),
+            )?;
             Ok(report.flange_stiffness_n_per_m)
         };
         let (before, after) = (stiffness(nominal)?, stiffness(fitted)?);
@@ -331,7 +335,11 @@ fn unexplained(model: &StructureModel, theta: &[f64]) -> Result<Vec<Unexplained>
     let mut model_hz = Vec::new();
     for id in ["1", "2", "3", "4"] {
         let kinematics = model.robot.kinematics(&posture_deg(id)?)?;
-        let report = PostureReport::new(&model.robot, &kinematics, &model.baseline(theta, false))?;
+        let report = PostureReport::new(
+            &model.robot,
+            &kinematics,
+            &model.chain(theta, &kinematics, 0.0, false),
+        )?;
         model_hz.extend(report.natural_frequencies_hz);
     }
     Ok(RECURRING_BANDS

@@ -167,13 +167,13 @@ impl PostureFindings {
 }
 
 fn posture_reports(campaign: &Campaign, model: &StructureModel, theta: &[f64]) -> Result<Vec<PostureReport>> {
-    let baseline = model.baseline(theta, false);
     campaign
         .postures
         .iter()
         .map(|posture| {
             let kinematics = model.robot.kinematics(&posture.joints_deg)?;
-            PostureReport::new(&model.robot, &kinematics, &baseline)
+            let chain = model.chain(theta, &kinematics, 0.0, false);
+            PostureReport::new(&model.robot, &kinematics, &chain)
         })
         .collect()
 }

@@ -144,13 +144,17 @@ fn from_model(campaign: &Campaign, warnings: &mut Vec<String>) -> Result<Vec<Str
         warnings.push("the campaign has no FRFs: lobes are those of the uncalibrated robot file".into());
         let model = structure_model(campaign)?;
         let theta = model.nominal_theta();
-        (model, theta, "robot model, not calibrated")
+        (model, theta, "robot model, not calibrated".to_string())
     } else {
         let case = StructureCase::load(campaign)?;
-        let calibration = calibrate(&case.model, &case.data, Options::default())?;
+        let calibration = calibrate(&case.model, &case.data, case.options(Options::default()))?;
+        let description = match case.effects().is_empty() {
+            true => "calibrated robot model".to_string(),
+            false => format!("calibrated robot model ({})", case.model_description()),
+        };
         warnings.extend(case.warnings);
         warnings.extend(calibration.warnings());
-        (case.model, calibration.theta, "calibrated robot model")
+        (case.model, calibration.theta, description)
     };
     if campaign.postures.is_empty() {
         return Err(InputError::new("lobes from the model need at least one posture")
@@ -159,17 +163,16 @@ fn from_model(campaign: &Campaign, warnings: &mut Vec<String>) -> Result<Vec<Str
             .remedy("add a [[posture]] table with id and joints_deg")
             .into());
     }
-    let baseline = model.baseline(&theta, false);
     campaign
         .postures
         .iter()
         .map(|posture| {
             let kinematics = model.robot.kinematics(&posture.joints_deg)?;
-            let chain = model.robot.chain(&kinematics, &baseline);
+            let chain = model.chain(&theta, &kinematics, 0.0, false);
             Ok(Structure {
                 posture: Some(posture.id.clone()),
                 frf: Box::new(RobotFrf::new(&model.robot, &kinematics, &chain)?),
-                description: description.to_string(),
+                description: description.clone(),
             })
         })
         .collect()

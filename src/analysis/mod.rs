@@ -1,5 +1,6 @@
 //! Whole analyses of a campaign, as the commands and the report need them: each floor below called in its order.
 
+pub mod addition;
 pub mod campaign;
 pub mod lobes;
 pub mod modal;
@@ -7,6 +8,7 @@ pub mod regression_line;
 pub mod structure;
 pub mod thesis_findings;
 
+pub use addition::Addition;
 pub use campaign::{CampaignFindings, LobeFindings, PostureFindings, StructureFindings};
 pub use lobes::{LobeAnalysis, LobeCase};
 pub use modal::{ModalAnalysis, PostureModes};

@@ -8,7 +8,8 @@ use crate::discrepancy::FrfComparison;
 use crate::identify::calibrate::calibrate;
 use crate::identify::{Calibration, Options, StructureCase};
 
-/// The robot model of a campaign against its FRFs, as the robot file has it and calibrated.
+/// The robot model of a campaign against its FRFs: as the robot file has it, and calibrated with the effects that were
+/// added.
 pub struct StructureAnalysis {
     pub case: StructureCase,
     pub calibration: Calibration,
@@ -24,8 +25,10 @@ pub struct StructureAnalysis {
 impl StructureAnalysis {
     pub fn run(campaign: &Campaign, options: Options) -> Result<Self> {
         let case = StructureCase::load(campaign)?;
-        let calibration = calibrate(&case.model, &case.data, options)?;
-        let nominal = case.model.predict(&case.model.nominal_theta(), &case.data)?;
+        let calibration = calibrate(&case.model, &case.data, case.options(options))?;
+        let nominal = case
+            .baseline
+            .predict(&case.baseline.nominal_theta(), &case.data)?;
         let calibrated = case.model.predict(&calibration.theta, &case.data)?;
         let before = FrfComparison::new(&case.data, &case.model.points, &nominal);
         let after = FrfComparison::new(&case.data, &case.model.points, &calibrated);

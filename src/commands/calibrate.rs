@@ -6,7 +6,7 @@ use crate::Result;
 use crate::analysis::StructureAnalysis;
 use crate::campaign::Campaign;
 use crate::discrepancy::FrfComparison;
-use crate::identify::{Calibration, Options};
+use crate::identify::{Calibration, Options, StructureModel};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -28,6 +28,7 @@ pub fn run(args: Args) -> Result<Outcome> {
     };
     let analysis = StructureAnalysis::run(&campaign, options)?;
     let StructureAnalysis {
+        case,
         calibration,
         before,
         after,
@@ -36,6 +37,8 @@ pub fn run(args: Args) -> Result<Outcome> {
     } = &analysis;
     let json = json!({
         "domain": "structure",
+        "revision": case.revision(),
+        "effects": case.effects(),
         "parameters": calibration.parameters,
         "error": after.totals,
         "error_before": before.totals,
@@ -46,7 +49,8 @@ pub fn run(args: Args) -> Result<Outcome> {
         "starts_agreeing": calibration.starts_agreeing,
         "warnings": notes,
     });
-    let mut text = describe_parameters(calibration);
+    let mut text = format!("model: {}\n\n", case.model_description());
+    text += &describe_parameters(&case.model, calibration);
     text += &format!(
         "\nerror (nrms) {} -> {}, noise floor {}; {} in {} iterations\n",
         percent(before.totals.nrms),
@@ -64,18 +68,28 @@ pub fn run(args: Args) -> Result<Outcome> {
     Ok(Outcome { json, text })
 }
 
-fn describe_parameters(calibration: &Calibration) -> String {
+/// The fitted parameters as a table. Of an effect the robot file says nothing.
+pub fn describe_parameters(model: &StructureModel, calibration: &Calibration) -> String {
     let rows: Vec<Vec<String>> = calibration
         .parameters
         .iter()
-        .map(|p| {
+        .enumerate()
+        .map(|(i, p)| {
+            let of_robot = i < model.baseline_parameter_count();
+            let (initial, change) = match of_robot {
+                true => (
+                    number(p.initial, 4),
+                    format!("{:+.1} %", 100.0 * (p.value / p.initial - 1.0)),
+                ),
+                false => ("–".into(), "–".into()),
+            };
             vec![
                 p.name.clone(),
-                number(p.initial, 4),
+                initial,
                 number(p.value, 5),
                 number(p.std_error, 2),
                 p.unit.to_string(),
-                format!("{:+.1} %", 100.0 * (p.value / p.initial - 1.0)),
+                change,
             ]
         })
         .collect();
@@ -95,7 +109,10 @@ fn describe_parameters(calibration: &Calibration) -> String {
 fn next_step(campaign: &Campaign, after: &FrfComparison) -> String {
     let dir = campaign.dir.display();
     if after.totals.nrms > 1.1 * after.totals.noise_floor_nrms {
-        format!("\nThe model leaves more than noise. See where it fails: lobestone compare {dir}\n")
+        format!(
+            "\nThe model leaves more than noise. See where it fails: lobestone compare {dir}; what is missing: \
+             lobestone diagnose {dir}\n"
+        )
     } else {
         format!("\nWhat is left is noise. Next: lobestone lobes {dir}, or lobestone report {dir}\n")
     }

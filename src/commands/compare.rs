@@ -1,6 +1,6 @@
 use serde_json::{Map, Value, json};
 
-use super::text::{number, percent, table, warnings};
+use super::text::{bar, number, percent, table, warnings};
 use super::{CampaignArg, Domain, Outcome, structure_only};
 use crate::Result;
 use crate::analysis::StructureAnalysis;
@@ -35,6 +35,8 @@ pub fn run(args: Args) -> Result<Outcome> {
     error["held_out_nrms"] = json!(held_out);
     let json = json!({
         "domain": "structure",
+        "revision": case.revision(),
+        "effects": case.effects(),
         "error": error,
         "by_posture": object(&comparison.by_posture),
         "by_direction": object(&comparison.by_direction),
@@ -47,19 +49,13 @@ pub fn run(args: Args) -> Result<Outcome> {
     });
     Ok(Outcome {
         json,
-        text: describe(comparison, held_out, notes),
+        text: format!("model: {}\n", case.model_description()) + &describe(comparison, held_out, notes),
     })
 }
 
 fn object(groups: &[Group]) -> Value {
     let map: Map<String, Value> = groups.iter().map(|g| (g.name.clone(), json!(g.nrms))).collect();
     map.into()
-}
-
-/// A bar as long as the share of `largest`.
-fn bar(value: f64, largest: f64) -> String {
-    let share = if largest > 0.0 { value / largest } else { 0.0 };
-    "#".repeat((20.0 * share).round() as usize)
 }
 
 fn describe(comparison: &FrfComparison, held_out: Option<f64>, notes: &[String]) -> String {

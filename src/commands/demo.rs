@@ -12,10 +12,11 @@ use crate::analysis::{
     CampaignFindings, LobeAnalysis, LobeFindings, ModalAnalysis, PostureFindings, StructureFindings,
     ThesisFindings,
 };
-use crate::builtin::{FIRST_CELL, SECOND_CELL};
+use crate::builtin::{BuiltinCampaign, FIRST_CELL, SECOND_CELL};
 use crate::campaign::Campaign;
 use crate::cutting::{CfcOptions, CfcResult, identify_forces};
 use crate::report::campaign as pages;
+use crate::revision::log_file;
 use crate::{Error, InputError, Result, ingest};
 
 #[derive(clap::Args)]
@@ -69,8 +70,8 @@ impl Story {
 pub fn run(args: Args) -> Result<Outcome> {
     let dir = &args.dir;
     prepare(dir)?;
-    let first = Campaign::load(&FIRST_CELL.write(dir)?)?;
-    let second = Campaign::load(&SECOND_CELL.write(dir)?)?;
+    let first = fresh(&FIRST_CELL, dir)?;
+    let second = fresh(&SECOND_CELL, dir)?;
     let of = |command: &str, campaign: &Campaign| format!("lobestone {command} {}", campaign.dir.display());
     let mut story = Story::default();
 
@@ -168,6 +169,16 @@ fn prepare(dir: &Path) -> Result<()> {
     }
     std::fs::create_dir_all(dir).map_err(|e| Error::io(dir, e))?;
     std::fs::write(&marker, MARKER_TEXT).map_err(|e| Error::io(&marker, e))
+}
+
+/// A built-in campaign as it came, whatever was added to its model since the last demo.
+fn fresh(campaign: &BuiltinCampaign, dir: &Path) -> Result<Campaign> {
+    let folder = campaign.write(dir)?;
+    let log = log_file(&folder);
+    if log.exists() {
+        std::fs::remove_file(&log).map_err(|e| Error::io(&log, e))?;
+    }
+    Campaign::load(&folder)
 }
 
 fn inspect(campaign: &Campaign) -> Result<String> {

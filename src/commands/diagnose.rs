@@ -21,11 +21,13 @@ pub fn run(args: Args) -> Result<Outcome> {
     structure_only(args.domain)?;
     let campaign = Campaign::load(&args.campaign.dir)?;
     let case = StructureCase::load(&campaign)?;
-    let study = StructureStudy::new(&case.model.robot.spec, case.data, Options::default());
+    let study = case.study(Options::default());
     let diagnosis = diagnose(&study, &case.model)?;
     let next_measurement = next_measurement::advise(&study.data, &diagnosis)?;
     let json = json!({
         "domain": "structure",
+        "revision": case.revision(),
+        "effects": case.effects(),
         "verdict": diagnosis.verdict,
         "effect": diagnosis.winner().map(|c| &c.name.effect),
         "site": diagnosis.winner().and_then(|c| c.name.site.as_ref()),
@@ -44,7 +46,9 @@ pub fn run(args: Args) -> Result<Outcome> {
         "not_tried": diagnosis.not_tried.iter().map(|(e, why)| json!({ "effect": e, "why": why })).collect::<Vec<_>>(),
         "warnings": case.warnings,
     });
-    let text = describe(&campaign, &study, &diagnosis, &next_measurement) + &warnings(&case.warnings);
+    let text = format!("model: {}\n", case.model_description())
+        + &describe(&campaign, &study, &diagnosis, &next_measurement)
+        + &warnings(&case.warnings);
     Ok(Outcome { json, text })
 }
 

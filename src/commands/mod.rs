@@ -7,11 +7,13 @@ use clap::{Parser, Subcommand, ValueEnum};
 
 use crate::{InputError, Result};
 
+mod add;
 mod calibrate;
 mod cfc;
 mod compare;
 mod demo;
 mod diagnose;
+mod history;
 mod inspect;
 mod lobes;
 mod modal;
@@ -19,6 +21,7 @@ mod model;
 mod report;
 mod text;
 mod thesis;
+mod undo;
 
 /// What a command has to say: the document of the contract, and the same for a person.
 pub struct Outcome {
@@ -61,6 +64,12 @@ pub enum Command {
     Compare(compare::Args),
     /// Which physical effect the model lacks.
     Diagnose(diagnose::Args),
+    /// Add an effect to the model, refit everything, record a revision.
+    Add(add::Args),
+    /// The error falling, revision by revision.
+    History(history::Args),
+    /// Take the last revision back.
+    Undo(undo::Args),
     /// Stability lobes.
     Lobes(lobes::Args),
     /// HTML and PNG report of a campaign.
@@ -100,6 +109,9 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Calibrate(args) => calibrate::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Diagnose(args) => diagnose::run(args),
+        Command::Add(args) => add::run(args),
+        Command::History(args) => history::run(args),
+        Command::Undo(args) => undo::run(args),
         Command::Lobes(args) => lobes::run(args),
         Command::Report(args) => report::run(args),
         Command::Thesis(args) => thesis::run(args),

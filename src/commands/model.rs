@@ -5,7 +5,7 @@ use super::{CampaignArg, Outcome};
 use crate::campaign::Campaign;
 use crate::identify::case::structure_model;
 use crate::identify::{Options, StructureCase, StructureModel, calibrate::calibrate};
-use crate::robot::{Dual, PostureReport, export};
+use crate::robot::{Baseline, Dual, PostureReport, export};
 use crate::{InputError, Result};
 
 #[derive(clap::Args)]
@@ -32,7 +32,8 @@ pub fn run(args: Args) -> Result<Outcome> {
     }
     let campaign = Campaign::load(&args.campaign.dir)?;
     let model = structure_model(&campaign)?;
-    let nominal = postures(&campaign, &model, &model.nominal_theta(), &args)?;
+    let mut left_out = Vec::new();
+    let nominal = postures(&campaign, &model, &model.nominal_theta(), &args, &mut left_out)?;
     let mut json = json!({ "robot": model.robot.spec.name, "postures": nominal });
     let mut text = format!(
         "{}, as the robot file has it\n{}",
@@ -41,26 +42,57 @@ pub fn run(args: Args) -> Result<Outcome> {
     );
     if !campaign.frfs.is_empty() {
         let case = StructureCase::load(&campaign)?;
-        let calibration = calibrate(&case.model, &case.data, Options::default())?;
-        let after = postures(&campaign, &case.model, &calibration.theta, &args)?;
-        text += "\nafter calibration on the measured FRFs\n";
+        let calibration = calibrate(&case.model, &case.data, case.options(Options::default()))?;
+        let after = postures(&campaign, &case.model, &calibration.theta, &args, &mut left_out)?;
+        text += &format!(
+            "\nafter calibration on the measured FRFs ({})\n",
+            case.model_description()
+        );
         text += &describe(&after);
-        text += &warnings(&case.warnings);
+        let mut notes = case.warnings.clone();
+        notes.extend(left_out);
+        text += &warnings(&notes);
         json["calibrated_postures"] = after.into();
-        json["warnings"] = case.warnings.into();
+        json["revision"] = case.revision().into();
+        json["effects"] = case.effects().into();
+        json["warnings"] = notes.into();
     }
     Ok(Outcome { json, text })
 }
 
-fn postures(campaign: &Campaign, model: &StructureModel, theta: &[f64], args: &Args) -> Result<Vec<Value>> {
+/// Young's modulus that the user asked for, where the model does not bring its own.
+fn young_pa(model: &StructureModel, args: &Args) -> Result<Option<f64>> {
+    if !model.has("link-flexibility") {
+        return Ok(args.young_pa);
+    }
+    match args.young_pa {
+        Some(_) => Err(InputError::new(
+            "link-flexibility is in this campaign's model, with a fitted modulus",
+        )
+        .key("--young-pa")
+        .remedy("leave it out")
+        .into()),
+        None => Ok(None),
+    }
+}
+
+/// `left_out`: what the matrices cannot hold is said there.
+fn postures(
+    campaign: &Campaign,
+    model: &StructureModel,
+    theta: &[f64],
+    args: &Args,
+    left_out: &mut Vec<String>,
+) -> Result<Vec<Value>> {
     let mut baseline = model.baseline(theta, false);
-    baseline.young_pa = args.young_pa.map(Dual::constant);
+    baseline.young_pa = young_pa(model, args)?.map(Dual::constant);
     campaign
         .postures
         .iter()
         .map(|posture| {
             let kinematics = model.robot.kinematics(&posture.joints_deg)?;
-            let report = PostureReport::new(&model.robot, &kinematics, &baseline)?;
+            let chain = |baseline: &Baseline| model.chain_on(baseline, theta, &kinematics, 0.0, false);
+            let report = PostureReport::new(&model.robot, &kinematics, &chain(&baseline))?;
             let mut value = json!({
                 "id": posture.id,
                 "natural_frequencies_hz": report.natural_frequencies_hz,
@@ -71,8 +103,21 @@ fn postures(campaign: &Campaign, model: &StructureModel, theta: &[f64], args: &A
             });
             if args.matrices {
                 let mut bending = baseline.clone();
-                bending.young_pa.get_or_insert_with(|| Dual::constant(STEEL_PA));
-                let form = export::centre_of_mass_form(&model.robot.chain(&kinematics, &bending))?;
+                if !model.has("link-flexibility") {
+                    bending.young_pa.get_or_insert_with(|| Dual::constant(STEEL_PA));
+                }
+                let mut chain = chain(&bending);
+                // The form has six coordinates for each link and none for what is hung on one.
+                let links = model.robot.chain(&kinematics, &baseline).bodies.len();
+                if chain.bodies.len() > links || !chain.branches.is_empty() {
+                    let note =
+                        "k_c and m_c are those of the links: added masses and resonators are not in them";
+                    if left_out.is_empty() {
+                        left_out.push(note.into());
+                    }
+                    chain.bodies.truncate(links);
+                }
+                let form = export::centre_of_mass_form(&chain)?;
                 value["k_c"] = rows(&form.stiffness);
                 value["m_c"] = rows(&form.mass);
             }

@@ -53,6 +53,12 @@ pub fn percent(share: f64) -> String {
     format!("{} %", number(100.0 * share, 3))
 }
 
+/// A bar as long as the share of `largest`.
+pub fn bar(value: f64, largest: f64) -> String {
+    let share = if largest > 0.0 { value / largest } else { 0.0 };
+    "#".repeat((20.0 * share).round() as usize)
+}
+
 /// Lines that begin with `warning:`.
 pub fn warnings(warnings: &[String]) -> String {
     warnings.iter().map(|w| format!("warning: {w}\n")).collect()

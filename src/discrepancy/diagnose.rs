@@ -7,10 +7,10 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::verdict::{self, Verdict};
 use crate::Result;
-use crate::identify::calibrate::{Calibration, Estimate, estimates, scattered_starts};
+use crate::identify::calibrate::{Calibration, Estimate, estimates};
 use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
 use crate::identify::study::{
-    EffectName, Effort, Extent, HeldOut, Residual, Study, Tried, View, held_out, own_starts, screen, try_effect,
+    EffectName, Effort, Extent, HeldOut, Residual, Study, Tried, View, held_out, rescue, try_effect,
 };
 use crate::progress::Progress;
 
@@ -41,6 +41,11 @@ pub struct Candidate<M, I> {
 impl<M, I> Candidate<M, I> {
     pub fn label(&self) -> String {
         self.name.label()
+    }
+
+    /// Share of the misfit above noise that the effect takes away.
+    pub fn share_explained(&self, baseline: &Baseline) -> f64 {
+        (baseline.reduced_chi2 - self.reduced_chi2) / (baseline.reduced_chi2 - 1.0).max(1e-9)
     }
 }
 
@@ -84,11 +89,11 @@ const REFINED: usize = 6;
 /// Candidates that are fitted again from the best one's baseline.
 const SHARED: usize = 6;
 /// Candidates whose combination with every other one is tried where none explains the data alone.
-const PAIR_LEADERS: usize = 3;
+const PAIR_LEADERS: usize = 2;
+/// Share of the excess misfit that one effect of a pair must explain alone: where none does, the search is hopeless.
+const PAIR_SHARE: f64 = 0.3;
 /// Pairs that are followed to their end.
 const PAIRS_SETTLED: usize = 4;
-/// Further starting points for the best candidate where it leaves more than noise.
-const RESCUE_STARTS: usize = 4;
 
 const REFINE: Stopping = Stopping {
     max_iterations: 25,
@@ -175,8 +180,12 @@ impl<'a, S: Study> Engine<'a, S> {
             }
         }
         let mut refined = self.refine(&tried)?;
-        if let Some(better) = refined.first().map(|best| self.rescue(best)).transpose()?.flatten() {
-            refined[0] = better;
+        if let Some(best) = refined
+            .first_mut()
+            .filter(|b| !verdict::is_noise(self.reduced_chi2(b)))
+            && let Some(fit) = rescue(study, model, best, &self.hints, REFINE)?
+        {
+            best.fit = fit;
         }
 
         let base_reduced = 2.0 * base.cost / self.freedom(model, Extent::Full);
@@ -199,7 +208,9 @@ impl<'a, S: Study> Engine<'a, S> {
             tests: self.instances.len(),
         };
         let labels: Vec<String> = refined.iter().map(|t| self.label(&t.instance)).collect();
-        let rest = tried.iter().filter(|t| !labels.contains(&self.label(&t.instance)));
+        let rest = tried
+            .iter()
+            .filter(|t| !labels.contains(&self.label(&t.instance)));
         let all: Vec<(&TriedOf<S>, bool)> = refined
             .iter()
             .map(|t| (t, true))
@@ -224,7 +235,10 @@ impl<'a, S: Study> Engine<'a, S> {
             .collect();
         let winner = credible.iter().position(|c| *c);
         let pair = match winner {
-            Some(w) if !verdict::is_noise(candidates[w].reduced_chi2) => {
+            Some(w)
+                if !verdict::is_noise(candidates[w].reduced_chi2)
+                    && candidates[w].share_explained(&baseline) > PAIR_SHARE =>
+            {
                 self.best_pair(&candidates, &credible)?
             }
             _ => None,
@@ -306,31 +320,6 @@ impl<'a, S: Study> Engine<'a, S> {
         Ok(refined)
     }
 
-    /// Where the best candidate leaves more than noise it may only be stuck: a better fit from further starting points.
-    fn rescue(&self, best: &TriedOf<S>) -> Result<Option<TriedOf<S>>> {
-        if verdict::is_noise(self.reduced_chi2(best)) {
-            return Ok(None);
-        }
-        let (study, model) = (self.study, self.model);
-        let own = own_starts(study, &best.model, self.base_count, &best.instance, &self.hints);
-        let front = scattered_starts(study.parameters(model), RESCUE_STARTS, 1);
-        let fits: Vec<Fit> = front
-            .par_iter()
-            .filter_map(|base| {
-                let base = std::slice::from_ref(base);
-                screen(study, &best.model, base, &own, Effort::Staged).ok()
-            })
-            .collect();
-        let coarse = self.minimise(&best.model, View::COARSE, &best.fit.theta, REFINE)?;
-        let lowest = fits.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
-        let Some(lowest) = lowest.filter(|l| l.cost < coarse.cost * (1.0 - 1e-3)) else {
-            return Ok(None);
-        };
-        let fit = self.minimise(&best.model, View::FULL, &lowest.theta, REFINE)?;
-        let better = fit.cost < best.fit.cost;
-        Ok(better.then(|| Tried { fit, ..best.clone() }))
-    }
-
     fn judge(&self, tried: &TriedOf<S>, refined: bool, evidence: &Evidence) -> Result<CandidateOf<S>> {
         let study = self.study;
         let Tried { instance, model, fit } = tried;
@@ -365,11 +354,7 @@ impl<'a, S: Study> Engine<'a, S> {
     }
 
     /// The pair of effects that explains most.
-    fn best_pair(
-        &self,
-        candidates: &[CandidateOf<S>],
-        credible: &[bool],
-    ) -> Result<Option<verdict::Pair>> {
+    fn best_pair(&self, candidates: &[CandidateOf<S>], credible: &[bool]) -> Result<Option<verdict::Pair>> {
         let study = self.study;
         let leaders: Vec<usize> = (0..candidates.len())
             .filter(|i| credible[*i])

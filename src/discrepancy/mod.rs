@@ -2,6 +2,7 @@
 
 pub mod compare;
 pub mod diagnose;
+pub mod extension;
 pub mod next_measurement;
 pub mod verdict;
 

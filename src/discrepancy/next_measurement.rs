@@ -16,7 +16,12 @@ use crate::robot::{FrfBasis, Place, Slot};
 pub fn advise(data: &FrfData, diagnosis: &Diagnosis<StructureModel, Instance>) -> Result<String> {
     match (diagnosis.verdict, diagnosis.winner()) {
         (Verdict::Effect, Some(winner)) => {
-            let others = || diagnosis.candidates.iter().filter(|c| c.label() != winner.label());
+            let others = || {
+                diagnosis
+                    .candidates
+                    .iter()
+                    .filter(|c| c.label() != winner.label())
+            };
             let rival = |c: &&Candidate<_, _>| diagnosis.indistinguishable.contains(&c.label());
             let Some(second) = others().find(rival).or_else(|| others().next()) else {
                 return Ok("none needed".into());

@@ -79,8 +79,7 @@ pub fn decide<M, I>(
     };
     match credible.iter().position(|c| *c) {
         Some(w) => {
-            let excess = (baseline.reduced_chi2 - 1.0).max(1e-9);
-            let explained = (baseline.reduced_chi2 - candidates[w].reduced_chi2) / excess;
+            let explained = candidates[w].share_explained(baseline);
             decision.verdict = Verdict::Effect;
             if is_noise(candidates[w].reduced_chi2) {
                 decision.effect = Some(w);
@@ -100,7 +99,8 @@ pub fn decide<M, I>(
     }
     if let Some(w) = decision.effect {
         let reference = candidates[w].delta_bic;
-        let close = |c: &Candidate<M, I>| (c.delta_bic - reference).abs() * scale.max(1.0) < INDISTINGUISHABLE;
+        let close =
+            |c: &Candidate<M, I>| (c.delta_bic - reference).abs() * scale.max(1.0) < INDISTINGUISHABLE;
         let rivals = candidates.iter().zip(credible).enumerate();
         decision.indistinguishable = rivals
             .filter(|(i, (c, credible))| *i != w && **credible && close(c))

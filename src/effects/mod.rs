@@ -19,9 +19,12 @@ mod link_flexibility;
 mod load_dependent_stiffness;
 mod local_resonator;
 mod payload;
+mod request;
 mod sensor_misalignment;
 mod time_delay;
 mod tool_flexibility;
+
+pub use request::requested;
 
 /// Where an effect sits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -158,6 +161,14 @@ impl Instance {
         match self.site.label() {
             Some(site) => format!("{}@{site}", self.effect.id()),
             None => self.effect.id().to_string(),
+        }
+    }
+
+    /// For people: the label, and the discrete choice where there is one.
+    pub fn title(&self) -> String {
+        match self.effect.variant_label(self.variant) {
+            Some((key, value)) => format!("{} ({key} {value})", self.label()),
+            None => self.label(),
         }
     }
 }

@@ -27,7 +27,7 @@ pub struct Estimate {
 }
 
 /// How to calibrate.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
     /// Further starting points, tried where the first fit leaves more than noise.
     pub extra_starts: usize,
@@ -99,6 +99,23 @@ const SUSPICIOUS_CHI2: f64 = 1.15;
 /// Lines used to get near the answer: every how many.
 const COARSE_STRIDE: usize = 4;
 
+/// On few lines from a point that is in the right basin already: log magnitudes could only lead out of it.
+fn resume(model: &StructureModel, data: &FrfData, start: &[f64]) -> Result<(Fit, usize)> {
+    let complex = FrfProblem {
+        model,
+        data,
+        misfit: Misfit::Complex,
+        stride: coarse_stride(data),
+    };
+    let rough = Stopping {
+        max_iterations: 40,
+        relative_decrease: 1e-4,
+    };
+    let fit = minimise(&complex, start, &model.bounds(), rough)?;
+    let iterations = fit.iterations;
+    Ok((fit, iterations))
+}
+
 /// Log magnitude first, then the complex values on few lines: gets into the right basin.
 fn approach(model: &StructureModel, data: &FrfData, start: &[f64]) -> Result<(Fit, usize)> {
     let bounds = model.bounds();
@@ -147,10 +164,13 @@ pub fn refine(model: &StructureModel, data: &FrfData, start: &[f64]) -> Result<F
     minimise(&problem, start, &model.bounds(), Stopping::default())
 }
 
-/// Calibrates `model` to `data`.
+/// Calibrates `model` to `data`, from the solution that the model brings along where it has one.
 pub fn calibrate(model: &StructureModel, data: &FrfData, options: Options) -> Result<Calibration> {
     let nominal = model.nominal_theta();
-    let (first, mut iterations) = approach(model, data, &nominal)?;
+    let (first, mut iterations) = match model.start() {
+        Some(start) => resume(model, data, start)?,
+        None => approach(model, data, &nominal)?,
+    };
     let mut best = refine(model, data, &first.theta)?;
     iterations += best.iterations;
     let mut starts = 1;

@@ -1,16 +1,28 @@
 //! A campaign's structural side, loaded and ready to be fitted.
 
+use super::calibrate::Options;
 use super::frf_data::FrfData;
 use super::structure::StructureModel;
+use super::structure_study::StructureStudy;
 use crate::campaign::{Campaign, RobotSection};
+use crate::effects::{self, Instance};
+use crate::revision::{Domain, RecordedEffect, Revision, RevisionLog, log_file, structure_fingerprint};
 use crate::robot::{RobotModel, RobotSpec};
 use crate::{InputError, Result};
 
 /// Model, data and what was noticed while reading them.
 #[derive(Debug, Clone)]
 pub struct StructureCase {
+    /// The campaign's current model: the baseline with the effects that were added, starting from where the last
+    /// revision stood.
     pub model: StructureModel,
+    /// The model as the robot file has it, without effects.
+    pub baseline: StructureModel,
     pub data: FrfData,
+    /// What was added so far, oldest first; the first is the baseline. Empty where nothing was.
+    pub revisions: Vec<Revision>,
+    /// Whether the model starts from a solution that was found on these very data.
+    settled: bool,
     pub warnings: Vec<String>,
 }
 
@@ -25,7 +37,7 @@ pub fn robot_section(campaign: &Campaign) -> Result<&RobotSection> {
     })
 }
 
-/// The robot model of a campaign, uncalibrated.
+/// The robot model of a campaign, uncalibrated and without effects.
 pub fn structure_model(campaign: &Campaign) -> Result<StructureModel> {
     let section = robot_section(campaign)?;
     let spec = RobotSpec::load(&section.model, &campaign.dir)?;
@@ -37,14 +49,139 @@ pub fn structure_model(campaign: &Campaign) -> Result<StructureModel> {
 }
 
 impl StructureCase {
+    /// # Errors
+    /// FRFs or robot file that cannot be read, a broken revision log, or one with effects that are none of this robot.
     pub fn load(campaign: &Campaign) -> Result<Self> {
-        let model = structure_model(campaign)?;
-        let (set, warnings) = campaign.load_frfs()?;
-        let data = FrfData::new(campaign, &model.robot, set)?;
+        let baseline = structure_model(campaign)?;
+        let log = RevisionLog::load(&campaign.dir)?;
+        let revisions: Vec<Revision> = log.revisions(Domain::Structure).cloned().collect();
+        let (set, mut warnings) = campaign.load_frfs()?;
+        let data = FrfData::new(campaign, &baseline.robot, set)?;
+        let mut settled = false;
+        let model = match revisions.last() {
+            Some(current) => {
+                settled = current.data == structure_fingerprint(campaign)?;
+                // Of a baseline only the starting point is taken; whose data it was fitted to does not matter.
+                if current.revision > 0 && !settled {
+                    warnings.push(format!(
+                        "revision {} was made with other data (robot, postures, points or FRF files changed since): its \
+                         effects stay in the model and are fitted anew, but the errors in its history no longer compare; \
+                         `lobestone undo {dir}` takes it back, `lobestone add {dir} …` adds it again",
+                        current.revision,
+                        dir = campaign.dir.display()
+                    ));
+                }
+                with_revision(campaign, &baseline, &data, current)?
+            }
+            None => baseline.clone(),
+        };
         Ok(StructureCase {
             model,
+            baseline,
             data,
+            revisions,
+            settled,
             warnings,
         })
     }
+
+    /// How to calibrate this case where `wanted` was asked for. Further starting points were tried when the revision was
+    /// made; the same ones again would lead to the same answer, so that only others are.
+    pub fn options(&self, wanted: Options) -> Options {
+        match self.settled && wanted == Options::default() {
+            true => Options {
+                extra_starts: 0,
+                ..wanted
+            },
+            false => wanted,
+        }
+    }
+
+    /// The case as the loop works on it.
+    pub fn study(&self, wanted: Options) -> StructureStudy {
+        StructureStudy::new(&self.model.robot.spec, self.data.clone(), self.options(wanted))
+    }
+
+    /// Number of the current revision; `None` where nothing was ever added.
+    pub fn revision(&self) -> Option<usize> {
+        self.revisions.last().map(|r| r.revision)
+    }
+
+    /// `effect@site` of what is in the model beside the baseline.
+    pub fn effects(&self) -> Vec<String> {
+        let effects = self.model.effects().iter();
+        effects.map(|added| added.instance.label()).collect()
+    }
+
+    /// What the model is, for people: `baseline + payload + local-resonator@link-3 (direction y), revision 2`.
+    pub fn model_description(&self) -> String {
+        let mut text = "baseline".to_string();
+        for added in self.model.effects() {
+            text += &format!(" + {}", added.instance.title());
+        }
+        match self.revision().filter(|r| *r > 0) {
+            Some(revision) => format!("{text}, revision {revision}"),
+            None => format!("{text}, no effect added"),
+        }
+    }
+}
+
+/// How an instance stands in the log.
+pub fn recorded_effect(instance: &Instance) -> RecordedEffect {
+    let variant = instance.effect.variant_label(instance.variant);
+    RecordedEffect {
+        effect: instance.label(),
+        variant: variant.map(|(_, value)| value.to_string()),
+    }
+}
+
+/// The model of a revision, starting from where that stood.
+fn with_revision(
+    campaign: &Campaign,
+    baseline: &StructureModel,
+    data: &FrfData,
+    revision: &Revision,
+) -> Result<StructureModel> {
+    let summary = data.summary();
+    let spec = &baseline.robot.spec;
+    let mut model = baseline.clone();
+    for (i, recorded) in revision.effects.iter().enumerate() {
+        let wrong = |problem: String| {
+            InputError::new(problem)
+                .file(log_file(&campaign.dir))
+                .key(format!("revisions[{}].effects[{i}]", revision.revision))
+        };
+        let instance = effects::find(spec, &recorded.effect)
+            .into_iter()
+            .find(|instance| recorded_effect(instance) == *recorded)
+            .ok_or_else(|| {
+                let variant = recorded.variant.as_ref();
+                let choice = variant.map_or(String::new(), |v| format!(" ({v})"));
+                wrong(format!(
+                    "this robot has no effect {}{choice}",
+                    crate::campaign::suggest::shown(&recorded.effect)
+                ))
+                .remedy("was the robot changed? undo the revision with `lobestone undo DIR`")
+            })?;
+        if let Some(obstacle) = instance.effect.obstacle(spec, &summary) {
+            return Err(wrong(format!(
+                "{} is in the model, but cannot be any more: {obstacle}",
+                recorded.effect
+            ))
+            .remedy("were files taken away? undo the revision with `lobestone undo DIR`")
+            .into());
+        }
+        model = model.with_effect(instance, &summary);
+    }
+    // By name: a tolerance that campaign.toml got since brings parameters that the revision did not have.
+    let start = model
+        .parameters
+        .iter()
+        .map(|parameter| {
+            let known = revision.parameters.iter().find(|r| r.name == parameter.name);
+            let value = known.map_or(parameter.nominal, |r| r.value);
+            parameter.internal(value.clamp(parameter.bounds[0], parameter.bounds[1]))
+        })
+        .collect();
+    Ok(model.with_start(start))
 }

@@ -168,7 +168,12 @@ impl FrfData {
             Arc::new(block)
         };
         FrfData {
-            blocks: self.blocks.iter().map(thin).filter(|b| !b.frfs.is_empty()).collect(),
+            blocks: self
+                .blocks
+                .iter()
+                .map(thin)
+                .filter(|b| !b.frfs.is_empty())
+                .collect(),
             posture_ids: self.posture_ids.clone(),
         }
     }

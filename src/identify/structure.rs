@@ -29,6 +29,8 @@ pub struct StructureModel {
     tunes_masses: bool,
     /// In the order in which they were added.
     effects: Vec<AddedEffect>,
+    /// A solution found earlier, solver's scale: where fits start.
+    start: Option<Vec<f64>>,
 }
 
 /// An effect in the model and where its parameters stand in the list.
@@ -92,7 +94,23 @@ impl StructureModel {
             parameters,
             tunes_masses: section.mass_tolerance.is_some(),
             effects: Vec::new(),
+            start: None,
         }
+    }
+
+    /// The same model with a solution found earlier (solver's scale) to start from.
+    pub fn with_start(&self, theta: Vec<f64>) -> Self {
+        let bounds = self.bounds();
+        let inside = theta.iter().zip(&bounds).map(|(t, b)| t.clamp(b[0], b[1]));
+        StructureModel {
+            start: (theta.len() == bounds.len()).then(|| inside.collect()),
+            ..self.clone()
+        }
+    }
+
+    /// A solution found earlier, solver's scale; effects added since stand at their nominal values.
+    pub fn start(&self) -> Option<&[f64]> {
+        self.start.as_deref()
     }
 
     /// The same model with one more effect; its parameters come last.
@@ -101,6 +119,9 @@ impl StructureModel {
         let first = model.parameters.len();
         for mut parameter in instance.effect.parameters(&self.robot.spec, data) {
             parameter.name = format!("{}.{}", instance.label(), parameter.name);
+            if let Some(start) = &mut model.start {
+                start.push(parameter.internal(parameter.nominal));
+            }
             model.parameters.push(parameter);
         }
         model.effects.push(AddedEffect {
@@ -112,6 +133,18 @@ impl StructureModel {
 
     pub fn effects(&self) -> &[AddedEffect] {
         &self.effects
+    }
+
+    /// Whether `effect@site` is in the model, with whatever discrete choice.
+    pub fn has(&self, label: &str) -> bool {
+        self.effects.iter().any(|added| added.instance.label() == label)
+    }
+
+    /// Number of parameters of the baseline; those of the effects come after them.
+    pub fn baseline_parameter_count(&self) -> usize {
+        self.effects
+            .first()
+            .map_or(self.parameters.len(), |added| added.parameters.start)
     }
 
     /// Nominal values on the solver's scale.
@@ -164,9 +197,20 @@ impl StructureModel {
         lowness: f64,
         with_derivatives: bool,
     ) -> Chain {
-        let mut chain = self
-            .robot
-            .chain(kinematics, &self.baseline(theta, with_derivatives));
+        let baseline = self.baseline(theta, with_derivatives);
+        self.chain_on(&baseline, theta, kinematics, lowness, with_derivatives)
+    }
+
+    /// As [`Self::chain`], on a baseline that was changed by hand.
+    pub fn chain_on(
+        &self,
+        baseline: &Baseline,
+        theta: &[f64],
+        kinematics: &Kinematics,
+        lowness: f64,
+        with_derivatives: bool,
+    ) -> Chain {
+        let mut chain = self.robot.chain(kinematics, baseline);
         let setting = Setting {
             robot: &self.robot,
             kinematics,

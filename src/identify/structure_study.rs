@@ -4,8 +4,8 @@ use num_complex::Complex64;
 
 use super::calibrate::{Calibration, Options, calibrate};
 use super::frf_data::FrfData;
-use super::structure::{FrfProblem, Misfit, StructureModel};
 use super::levenberg_marquardt::Stopping;
+use super::structure::{FrfProblem, Misfit, StructureModel};
 use super::study::{EffectName, Extent, HeldOut, Measure, Residual, Study, View, held_out};
 use crate::Result;
 use crate::campaign::robot_spec::RobotSpec;
@@ -35,7 +35,12 @@ impl StructureStudy {
     pub fn new(robot: &RobotSpec, data: FrfData, options: Options) -> Self {
         let share = data.value_count().div_ceil(COARSE_VALUES);
         // A resonance needs its few lines: measurements with coarse lines are left alone.
-        let lines = data.blocks.iter().map(|b| b.frequency_hz.len()).min().unwrap_or(0);
+        let lines = data
+            .blocks
+            .iter()
+            .map(|b| b.frequency_hz.len())
+            .min()
+            .unwrap_or(0);
         let stride = share.min(LARGEST_STRIDE).min((lines / 60).max(1));
         let every = (share / stride).clamp(1, 3);
         let coarse = data.thinned(stride, every);
@@ -80,7 +85,7 @@ impl Study for StructureStudy {
         let (mut tried, mut not_tried) = (Vec::new(), Vec::new());
         for instance in effects::instances(spec) {
             let label = instance.label();
-            if model.effects().iter().any(|added| added.instance.label() == label) {
+            if model.has(&label) {
                 continue;
             }
             match instance.effect.obstacle(spec, &self.summary) {
@@ -105,6 +110,10 @@ impl Study for StructureStudy {
         model.with_effect(*instance, &self.summary)
     }
 
+    fn starting_from(&self, model: &StructureModel, theta: Vec<f64>) -> StructureModel {
+        model.with_start(theta)
+    }
+
     /// Frequencies at which the weighted residual is largest, most prominent first.
     fn hints(&self, model: &StructureModel, theta: &[f64]) -> Result<Vec<f64>> {
         residual_peaks_hz(model, &self.data, theta)
@@ -127,10 +136,7 @@ impl Study for StructureStudy {
     }
 
     fn real_values(&self, extent: Extent) -> usize {
-        let view = View {
-            extent,
-            ..View::FULL
-        };
+        let view = View { extent, ..View::FULL };
         2 * self.view(view).value_count()
     }
 

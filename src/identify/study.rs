@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::calibrate::Calibration;
+use super::calibrate::{Calibration, scattered_starts};
 use super::levenberg_marquardt::{Fit, LeastSquares, Stopping, minimise};
 use crate::parameter::Parameter;
 use crate::{Error, Result};
@@ -99,6 +99,9 @@ pub trait Study: Sync {
     fn name(&self, instance: &Self::Instance) -> EffectName;
 
     fn extend(&self, model: &Self::Model, instance: &Self::Instance) -> Self::Model;
+
+    /// The same model, whose fits start from `theta`.
+    fn starting_from(&self, model: &Self::Model, theta: Vec<f64>) -> Self::Model;
 
     /// What the residual of `model` at `theta` suggests.
     fn hints(&self, model: &Self::Model, theta: &[f64]) -> Result<Self::Hints>;
@@ -335,4 +338,36 @@ pub fn try_effect<S: Study>(
         model: extended,
         fit,
     })
+}
+
+/// The effect added last may be stuck beside its best fit: from further starting points a better one, if there is any.
+/// `tried` is fitted on all data; `model` is the one without the effect.
+pub fn rescue<S: Study>(
+    study: &S,
+    model: &S::Model,
+    tried: &Tried<S::Model, S::Instance>,
+    hints: &S::Hints,
+    stopping: Stopping,
+) -> Result<Option<Fit>> {
+    /// Starting points, and their seed.
+    const STARTS: (usize, u64) = (4, 1);
+    let parameters = study.parameters(model);
+    let own = own_starts(study, &tried.model, parameters.len(), &tried.instance, hints);
+    let fits: Vec<Fit> = scattered_starts(parameters, STARTS.0, STARTS.1)
+        .par_iter()
+        .filter_map(|base| {
+            let base = std::slice::from_ref(base);
+            screen(study, &tried.model, base, &own, Effort::Staged).ok()
+        })
+        .collect();
+    let bounds = study.bounds(&tried.model);
+    let fit =
+        |view: View, start: &[f64]| minimise(&study.problem(&tried.model, view), start, &bounds, stopping);
+    let coarse = fit(View::COARSE, &tried.fit.theta)?;
+    let lowest = fits.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
+    let Some(lowest) = lowest.filter(|l| l.cost < coarse.cost * (1.0 - 1e-3)) else {
+        return Ok(None);
+    };
+    let better = fit(View::FULL, &lowest.theta)?;
+    Ok((better.cost < tried.fit.cost).then_some(better))
 }

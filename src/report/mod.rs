@@ -7,6 +7,7 @@
 pub mod campaign;
 pub mod cutting_section;
 pub mod figure;
+pub mod history_section;
 pub mod lobes_section;
 pub mod modal_section;
 pub mod number;

@@ -3,12 +3,12 @@
 //! Every text is escaped by the template engine; names out of measurement files may hold anything.
 
 use std::collections::HashSet;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use minijinja::syntax::SyntaxConfig;
 use minijinja::{Environment, Value, context};
 
+use crate::files::write_atomically;
 use crate::{Error, Result};
 
 /// Name of the HTML file in the report's folder.
@@ -249,25 +249,6 @@ fn slug(text: &str, otherwise: &str) -> String {
     } else {
         slug.to_owned()
     }
-}
-
-/// Writes beside the target and renames: a reader sees the old file or the new one, never half of it.
-pub(crate) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let mut file = tempfile::Builder::new();
-    // Temporary files are private by default; a report is to be read by whoever may read the folder.
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        file.permissions(std::fs::Permissions::from_mode(0o644));
-    }
-    let mut file = file
-        .prefix(".report")
-        .tempfile_in(folder)
-        .map_err(|e| Error::io(folder, e))?;
-    file.write_all(bytes).map_err(|e| Error::io(path, e))?;
-    file.persist(path).map_err(|e| Error::io(path, e.error))?;
-    Ok(())
 }
 
 /// Width and height out of the IHDR chunk; zeros where there is none.

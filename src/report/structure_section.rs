@@ -5,7 +5,7 @@ use super::figure::{
 };
 use super::number::{decimals, percent, plus_minus, significant};
 use super::parts::{count, figure, listed, paragraph};
-use super::{Block, Column, Section, Table};
+use super::{Block, Column, Section, Table, history_section};
 use crate::analysis::{PostureFindings, StructureFindings};
 
 /// FRFs shown as figures: the worst and the best.
@@ -29,6 +29,14 @@ pub fn summary(findings: &StructureFindings) -> String {
         percent(after.nrms),
         percent(after.noise_floor_nrms),
     );
+    let added = findings.analysis.case.model.effects();
+    if !added.is_empty() {
+        let names: Vec<String> = added.iter().map(|a| a.instance.title()).collect();
+        text += &format!(
+            " The calibrated model has what was added to it: {}.",
+            listed(&names)
+        );
+    }
     if let Some(held_out) = findings.held_out_nrms {
         text += &format!(
             " Postures that were left out of the fit are predicted with an error of {}.",
@@ -75,11 +83,10 @@ fn verdict(findings: &StructureFindings) -> String {
 }
 
 pub fn sections(findings: &StructureFindings) -> Vec<Section> {
-    vec![
-        frf_section(findings),
-        map_section(findings),
-        parameter_section(findings),
-    ]
+    let mut sections = vec![frf_section(findings), map_section(findings)];
+    sections.extend(history_section::section(findings));
+    sections.push(parameter_section(findings));
+    sections
 }
 
 /// Model against measurement as curves.
@@ -353,28 +360,41 @@ fn largest(values: &[Vec<Option<f64>>]) -> f64 {
 /// What was tuned.
 pub fn parameter_section(findings: &StructureFindings) -> Section {
     let calibration = &findings.analysis.calibration;
-    let rows = calibration.parameters.iter().map(|p| ParameterRow {
-        name: p.name.clone(),
-        unit: unit(p.unit).to_string(),
-        nominal: p.initial,
-        before: None,
-        after: Some(figure::Estimate {
-            value: p.value,
-            std_error: Some(p.std_error).filter(|s| s.is_finite()),
-        }),
-    });
+    // Of an effect the robot file says nothing: its parameters deviate from nothing.
+    let of_robot = findings.analysis.case.model.baseline_parameter_count();
+    let rows = calibration
+        .parameters
+        .iter()
+        .take(of_robot)
+        .map(|p| ParameterRow {
+            name: p.name.clone(),
+            unit: unit(p.unit).to_string(),
+            nominal: p.initial,
+            before: None,
+            after: Some(figure::Estimate {
+                value: p.value,
+                std_error: Some(p.std_error).filter(|s| s.is_finite()),
+            }),
+        });
     let drawing = ParameterFigure {
         title: "Calibrated parameters against the robot file, with standard errors".into(),
         before_label: "robot file".into(),
         after_label: "calibrated".into(),
         rows: rows.collect(),
     };
-    let table = calibration.parameters.iter().map(|p| {
+    let table = calibration.parameters.iter().enumerate().map(|(i, p)| {
+        let (initial, change) = match i < of_robot {
+            true => (
+                super::number::format_si(p.initial, unit(p.unit), 4),
+                format!("{} %", decimals(100.0 * (p.value / p.initial - 1.0), 1)),
+            ),
+            false => ("–".into(), "–".into()),
+        };
         vec![
             p.name.clone(),
-            super::number::format_si(p.initial, unit(p.unit), 4),
+            initial,
             plus_minus(p.value, p.std_error, unit(p.unit)),
-            format!("{} %", decimals(100.0 * (p.value / p.initial - 1.0), 1)),
+            change,
             if p.at_bound { "at the end of its range" } else { "" }.to_string(),
         ]
     });

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 
 use polars::prelude::{DataFrame, ParquetWriter, PolarsResult, df};
 
-use super::page::write_atomically;
 use crate::analysis::CampaignFindings;
 use crate::cutting::{CfcResult, ForceAxis};
+use crate::files::write_atomically;
 use crate::{Error, Result};
 
 /// A table ready to be written.

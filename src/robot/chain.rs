@@ -79,7 +79,7 @@ pub struct Body {
 }
 
 /// A point mass on spring and viscous damper that hangs on the chain and moves along `directions` relative to it
-/// (rigidly otherwise). Its damper is its own; the chain's modal damping does not know of it.
+/// (rigidly otherwise). Its damper is its own.
 #[derive(Debug, Clone)]
 pub struct Branch {
     pub place: Place,
@@ -98,7 +98,7 @@ pub struct Chain {
     pub elements: Vec<Element>,
     pub bodies: Vec<Body>,
     pub branches: Vec<Branch>,
-    /// One damping ratio for all modes of the chain without its branches; zero where the elements carry dampers.
+    /// One damping ratio for all modes of the chain (its branches' masses held fast to it); zero where the elements carry dampers.
     pub modal_damping_ratio: Dual,
 }
 
@@ -109,7 +109,7 @@ pub struct System {
     pub chain_count: usize,
     pub stiffness: DMatrix<f64>,
     pub mass: DMatrix<f64>,
-    /// Mass of the chain alone, `chain_count` square: what modal damping is defined on.
+    /// Mass of the chain with the branches' masses held fast to it, `chain_count` square: what modal damping is defined on.
     pub chain_mass: DMatrix<f64>,
     pub viscous: Option<DMatrix<f64>>,
     pub modal_damping_ratio: Dual,
@@ -266,8 +266,11 @@ impl Chain {
                 motion.column_mut(column + i).copy_from(direction);
             }
             let block: DMatrix<f64> = motion.transpose() * &motion;
+            // Modal damping is that of the chain with the branch's mass held fast to it.
+            let held: DMatrix<f64> = block.view((0, 0), (chain_count, chain_count)).into_owned();
             let identity = DMatrix::identity(count, count);
             add_scaled(&mut mass, n, 0, &block, branch.mass_kg.value);
+            add_scaled(&mut chain_mass, chain_count, 0, &held, branch.mass_kg.value);
             add_scaled(
                 &mut stiffness,
                 n,
@@ -277,7 +280,9 @@ impl Chain {
             );
             add_scaled(&mut viscous, n, column, &identity, branch.damping_ns_per_m.value);
             for (p, derivative) in derivatives.iter_mut().enumerate() {
-                add_scaled(&mut derivative.mass, n, 0, &block, branch.mass_kg.derivative(p));
+                let m = branch.mass_kg.derivative(p);
+                add_scaled(&mut derivative.mass, n, 0, &block, m);
+                add_scaled(&mut derivative.chain_mass, chain_count, 0, &held, m);
                 let k = branch.stiffness_n_per_m.derivative(p);
                 add_scaled(&mut derivative.stiffness, n, column, &identity, k);
                 let c = branch.damping_ns_per_m.derivative(p);

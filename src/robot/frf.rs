@@ -477,7 +477,10 @@ mod tests {
             if (i, j) == (0, 0) {
                 Complex64::ZERO
             } else {
-                Complex64::new(1.0 / (1.0 + (i * i + 2 * j) as f64), (i as f64 - 0.3 * j as f64).sin())
+                Complex64::new(
+                    1.0 / (1.0 + (i * i + 2 * j) as f64),
+                    (i as f64 - 0.3 * j as f64).sin(),
+                )
             }
         };
         let (n, m) = (5, 2);

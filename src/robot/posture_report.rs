@@ -1,12 +1,12 @@
 //! What the model says of one posture: frequencies, tool point, static stiffness.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use super::chain::Chain;
 use super::dh::Kinematics;
 use super::frf::natural_frequencies_hz;
-use super::model::{Baseline, RobotModel};
-use crate::Result;
+use super::model::RobotModel;
+use crate::{Error, Result};
 
 /// Frequencies in Hz, ascending; stiffness 1/C_ii in base axes, N/m.
 #[derive(Debug, Clone)]
@@ -19,19 +19,31 @@ pub struct PostureReport {
 }
 
 impl PostureReport {
-    pub fn new(robot: &RobotModel, kinematics: &Kinematics, baseline: &Baseline) -> Result<Self> {
-        let chain = robot.chain(kinematics, baseline);
+    /// Of a chain at its posture, with whatever effects it has. The tool point moves with a flexible tool where there is
+    /// one; the flange does not.
+    ///
+    /// # Errors
+    /// A chain whose stiffness is not positive definite.
+    pub fn new(robot: &RobotModel, kinematics: &Kinematics, chain: &Chain) -> Result<Self> {
         let place = robot.flange_place();
-        let stiffness = |chain: &Chain, point: Point3<f64>| -> Result<[f64; 3]> {
-            let compliance = chain.compliance(point, place)?;
-            Ok([0, 1, 2].map(|i| 1.0 / compliance[(i, i)]))
+        let system = chain.system(0);
+        let cholesky = system
+            .stiffness
+            .clone()
+            .cholesky()
+            .ok_or_else(|| Error::computation("the stiffness matrix is not positive definite"))?;
+        let stiffness = |point: Point3<f64>, at_tool_point: bool| {
+            [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| {
+                let row = chain.output_row(point, place, at_tool_point, &axis);
+                1.0 / row.dot(&cholesky.solve(&row))
+            })
         };
         Ok(PostureReport {
-            natural_frequencies_hz: natural_frequencies_hz(&chain.system(0))?,
+            natural_frequencies_hz: natural_frequencies_hz(&system)?,
             tcp_m: kinematics.tcp().coords.into(),
             tool_axis: kinematics.tool_axis().into(),
-            tcp_stiffness_n_per_m: stiffness(&chain, kinematics.tcp())?,
-            flange_stiffness_n_per_m: stiffness(&chain, kinematics.flange())?,
+            tcp_stiffness_n_per_m: stiffness(kinematics.tcp(), true),
+            flange_stiffness_n_per_m: stiffness(kinematics.flange(), false),
         })
     }
 }

@@ -305,6 +305,14 @@ fn fit_law(departures: &[Departure]) -> Option<FrfNoise> {
     if !(scale > 0.0) || !law.floor.is_finite() || law.floor <= 0.0 {
         return None;
     }
+    // Where the FRF is smallest the median says what the floor is, whatever the reweighting makes of it: a floor that
+    // has come out far too low would trim all that speaks against it.
+    let mut smallest_first: Vec<&Departure> = departures.iter().collect();
+    smallest_first.sort_by(|a, b| a.magnitude.total_cmp(&b.magnitude));
+    smallest_first.truncate((departures.len() / 5).max(10));
+    let low_square = smallest_first[smallest_first.len() / 2].magnitude.powi(2);
+    smallest_first.sort_by(|a, b| a.variance.total_cmp(&b.variance));
+    let low_variance = smallest_first[smallest_first.len() / 2].variance / std::f64::consts::LN_2;
     // Mean of an exponential variable given that it is below CUT times its mean.
     let kept_mean = 1.0 - CUT / (CUT.exp() - 1.0);
     for pass in 0..60 {
@@ -340,6 +348,7 @@ fn fit_law(departures: &[Departure]) -> Option<FrfNoise> {
             b2 = 0.0;
             a2 = r[0] / s[0][0];
         }
+        b2 = b2.max(0.5 * (low_variance - a2 * low_square));
         if !a2.is_finite() || !b2.is_finite() || a2 + b2 <= 0.0 {
             return None;
         }

@@ -8,6 +8,7 @@ mod diagnose;
 mod inspect;
 mod modal;
 mod report;
+mod revisions;
 mod robustness;
 mod schema;
 mod structure;

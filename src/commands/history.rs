@@ -1,0 +1,106 @@
+use serde_json::{Value, json};
+
+use super::text::{bar, percent, table, warnings};
+use super::{CampaignArg, Domain, Outcome, structure_only};
+use crate::Result;
+use crate::campaign::Campaign;
+use crate::revision::{self, Revision, RevisionLog, structure_fingerprint};
+
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    campaign: CampaignArg,
+    /// Side of the campaign to look at.
+    #[arg(long, value_enum)]
+    domain: Option<Domain>,
+}
+
+pub fn run(args: Args) -> Result<Outcome> {
+    structure_only(args.domain)?;
+    let campaign = Campaign::load(&args.campaign.dir)?;
+    let log = RevisionLog::load(&campaign.dir)?;
+    let revisions: Vec<&Revision> = log.revisions(revision::Domain::Structure).collect();
+    let undone: Vec<&Revision> = log.undone(revision::Domain::Structure).collect();
+    let dir = campaign.dir.display();
+    let Some(current) = revisions.last() else {
+        return Ok(Outcome {
+            json: json!({ "domain": "structure", "revisions": [], "noise_floor_nrms": null, "undone": [], "warnings": [] }),
+            text: format!(
+                "no effect was added to this campaign's model yet\n\nSee what is missing: lobestone diagnose {dir}; then \
+                 lobestone add {dir} EFFECT[@SITE]\n"
+            ),
+        });
+    };
+    let fingerprint = structure_fingerprint(&campaign)?;
+    let old: Vec<String> = revisions
+        .iter()
+        .filter(|r| r.data != fingerprint)
+        .map(|r| r.revision.to_string())
+        .collect();
+    let notes = match old.is_empty() {
+        true => Vec::new(),
+        false => vec![format!(
+            "made with other data than there is now: revision {}; those errors do not compare with new ones (undo with \
+             `lobestone undo {dir}` and add again)",
+            old.join(", ")
+        )],
+    };
+    let json = json!({
+        "domain": "structure",
+        "revisions": revisions.iter().map(|r| document(r, &fingerprint)).collect::<Vec<_>>(),
+        "noise_floor_nrms": current.noise_floor_nrms,
+        "undone": undone.iter().map(|r| document(r, &fingerprint)).collect::<Vec<_>>(),
+        "warnings": notes,
+    });
+    let mut text = describe(&revisions);
+    if !undone.is_empty() {
+        let titles: Vec<String> = undone.iter().map(|r| r.title()).collect();
+        text += &format!("undone: {}\n", titles.join(", "));
+    }
+    text += &warnings(&notes);
+    Ok(Outcome { json, text })
+}
+
+/// One revision for other programs.
+pub fn document(revision: &Revision, fingerprint: &str) -> Value {
+    json!({
+        "revision": revision.revision,
+        "effects": revision.labels(),
+        "variants": revision.effects.iter().map(|e| &e.variant).collect::<Vec<_>>(),
+        "nrms": revision.nrms,
+        "held_out_nrms": revision.held_out_nrms,
+        "noise_floor_nrms": revision.noise_floor_nrms,
+        "reduced_chi2": revision.reduced_chi2,
+        "progress": revision.progress,
+        "parameters": revision.parameters,
+        "when": revision.when,
+        "same_data": revision.data == fingerprint,
+    })
+}
+
+fn describe(revisions: &[&Revision]) -> String {
+    let largest = revisions.iter().map(|r| r.nrms).fold(0.0, f64::max);
+    let rows: Vec<Vec<String>> = revisions
+        .iter()
+        .map(|r| {
+            let mut bar = bar(r.nrms, largest);
+            if r.progress == Some(false) {
+                bar += "  not progress";
+            }
+            let times = match r.noise_floor_nrms > 0.0 {
+                true => format!("{:.2}", r.nrms / r.noise_floor_nrms),
+                false => "–".into(),
+            };
+            vec![
+                r.title(),
+                percent(r.nrms),
+                r.held_out_nrms.map_or("–".into(), percent),
+                percent(r.noise_floor_nrms),
+                times,
+                bar,
+            ]
+        })
+        .collect();
+    let header = ["revision", "nrms", "held out", "noise", "× noise", ""];
+    table(&header, &rows)
+}

@@ -1,0 +1,130 @@
+//! An effect added to a model: everything refitted together, before and after compared on folds left out of the fit.
+
+use rayon::prelude::*;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::verdict::is_noise;
+use crate::identify::Calibration;
+use crate::identify::levenberg_marquardt::{Stopping, minimise};
+use crate::identify::study::{
+    Effort, Extent, HeldOut, Residual, Study, Tried, View, held_out, rescue, try_effect,
+};
+use crate::{Error, Result};
+
+/// A model fitted to all data.
+#[derive(Debug, Clone)]
+pub struct Fitted<M> {
+    pub model: M,
+    pub calibration: Calibration,
+    pub residual: Residual,
+    /// On folds left out of the fit; `None` with one fold.
+    pub held_out: Option<HeldOut>,
+}
+
+/// What adding an effect does.
+#[derive(Debug, Clone)]
+pub struct Extension<M, I> {
+    pub instance: I,
+    /// The model as it stood, fitted to the same data.
+    pub before: Fitted<M>,
+    pub after: Fitted<M>,
+    /// Whether the held-out error fell by more than chance would let it; `None` with one fold.
+    pub progress: Option<bool>,
+}
+
+/// Chance that an effect which is not there would be called progress.
+const CHANCE: f64 = 1e-3;
+
+const REFINE: Stopping = Stopping {
+    max_iterations: 40,
+    relative_decrease: 1e-8,
+};
+const REFIT_WITHOUT_FOLD: Stopping = Stopping {
+    max_iterations: 15,
+    relative_decrease: 1e-6,
+};
+
+impl<M> Fitted<M> {
+    fn new<S: Study<Model = M>>(study: &S, model: M, calibration: Calibration) -> Result<Self> {
+        let theta = &calibration.theta;
+        Ok(Fitted {
+            residual: study.residual(&model, theta)?,
+            held_out: held_out(study, &model, theta, Extent::Full, REFIT_WITHOUT_FOLD)?,
+            model,
+            calibration,
+        })
+    }
+
+    pub fn held_out_nrms(&self) -> Option<f64> {
+        self.held_out.map(|h| h.nrms())
+    }
+}
+
+impl<M, I> Extension<M, I> {
+    /// Adds to `model` that one of `instances` (an effect's discrete choices at one site) which fits best.
+    ///
+    /// # Errors
+    /// No form of the effect could be fitted.
+    pub fn new<S>(study: &S, model: &M, instances: &[I]) -> Result<Self>
+    where
+        S: Study<Model = M, Instance = I>,
+        M: Clone + Send + Sync,
+        I: Clone + Send + Sync,
+    {
+        let mut before = study.calibrate(model)?;
+        let hints = study.hints(model, &before.theta)?;
+        let bases = [before.theta.clone(), study.nominal_theta(model)];
+        let tried: Vec<Tried<M, I>> = instances
+            .par_iter()
+            .filter_map(|instance| try_effect(study, model, instance, &bases, &hints, Effort::Staged))
+            .collect();
+        let mut best = tried
+            .into_iter()
+            .min_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost))
+            .ok_or_else(|| Error::computation("no form of the effect could be fitted"))?;
+        let bounds = study.bounds(&best.model);
+        let problem = study.problem(&best.model, View::FULL);
+        best.fit = minimise(&problem, &best.fit.theta, &bounds, REFINE)?;
+        drop(problem);
+        let freedom = study.real_values(Extent::Full) as f64 - best.fit.theta.len() as f64;
+        if !is_noise(2.0 * best.fit.cost / freedom.max(1.0))
+            && let Some(fit) = rescue(study, model, &best, &hints, REFINE)?
+        {
+            best.fit = fit;
+        }
+        let after = study.calibrate(&study.starting_from(&best.model, best.fit.theta.clone()))?;
+
+        // The fit without the effect, also tried from where the one with it put the common parameters: a trapped
+        // `before` would make any effect look good.
+        let common = after.theta[..before.theta.len()].to_vec();
+        let again = study.calibrate(&study.starting_from(model, common))?;
+        if again.reduced_chi2 < 0.999 * before.reduced_chi2 {
+            before = again;
+        }
+        let before = Fitted::new(study, model.clone(), before)?;
+        let after = Fitted::new(study, best.model, after)?;
+        Ok(Extension {
+            progress: progress::<S>(study, &before, &after),
+            instance: best.instance,
+            before,
+            after,
+        })
+    }
+}
+
+/// Whether the error on folds left out of the fit fell by more than chance.
+///
+/// An effect that is not there makes predictions worse on average; that its k parameters improve the held-out −2 ln L by
+/// more than the (1 − p) quantile of χ²(k) is less likely than p. Where more than noise is left, that rest is the
+/// measure of chance, and values that err together count once. The held-out nrms, which weighs values by size instead of
+/// by noise, must fall too.
+fn progress<S: Study>(study: &S, before: &Fitted<S::Model>, after: &Fitted<S::Model>) -> Option<bool> {
+    let (was, is) = (before.held_out?, after.held_out?);
+    let count = |f: &Fitted<S::Model>| study.parameters(&f.model).len();
+    let parameters = (count(after) - count(before)) as f64;
+    let threshold = ChiSquared::new(parameters).map_or(0.0, |d| d.inverse_cdf(1.0 - CHANCE));
+    let chance = after.calibration.reduced_chi2.max(1.0) / after.residual.independent_share.min(1.0);
+    // HeldOut.chi2 sums squares of complex values over their whole variance: half of −2 ln L.
+    let gain = 2.0 * (was.chi2 - is.chi2) / chance;
+    Some(gain > threshold && is.nrms() < was.nrms())
+}

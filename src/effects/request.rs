@@ -1,0 +1,115 @@
+//! What a user means by `EFFECT[@SITE]`.
+
+use super::{DataSummary, Instance, STRUCTURAL, Site, StructuralEffect, find};
+use crate::campaign::robot_spec::RobotSpec;
+use crate::campaign::suggest::{closest, shown};
+use crate::{InputError, Result};
+
+/// The instances (one for each discrete choice) of an effect that a user asked for.
+///
+/// # Errors
+/// One that says what there is where the effect or its site is none, or a site is missing; the reason where this robot
+/// or this data cannot show the effect.
+pub fn requested(robot: &RobotSpec, data: &DataSummary, name: &str) -> Result<Vec<Instance>> {
+    let wrong = |problem: String, remedy: String| InputError::new(problem).key("EFFECT").remedy(remedy);
+    let (id, site) = match name.split_once('@') {
+        Some((id, site)) => (id, Some(site)),
+        None => (name, None),
+    };
+    let Some(effect) = STRUCTURAL.into_iter().find(|e| e.id() == id) else {
+        let ids = STRUCTURAL.map(|e| e.id());
+        let near = closest(id, ids).map_or(String::new(), |near| format!("did you mean {near}? "));
+        let remedy = format!("{near}there are: {}", ids.join(", "));
+        return Err(wrong(format!("there is no effect \"{}\"", shown(id)), remedy).into());
+    };
+    let found = find(robot, name);
+    if found.is_empty() {
+        let (problem, remedy) = no_such_site(effect, site, &effect.sites(robot));
+        return Err(wrong(problem, remedy).into());
+    }
+    if let Some(obstacle) = effect.obstacle(robot, data) {
+        let remedy = "measure what it needs, or see what `lobestone diagnose DIR` proposes".to_string();
+        return Err(wrong(format!("this campaign cannot show {name}: {obstacle}"), remedy).into());
+    }
+    Ok(found)
+}
+
+fn no_such_site(effect: &dyn StructuralEffect, site: Option<&str>, sites: &[Site]) -> (String, String) {
+    let id = effect.id();
+    let named: Vec<String> = sites
+        .iter()
+        .filter_map(|s| Some(format!("{id}@{}", s.label()?)))
+        .collect();
+    match site {
+        _ if sites.is_empty() => (
+            format!("{id} has no place on this robot"),
+            "see what `lobestone diagnose DIR` proposes".into(),
+        ),
+        Some(site) if named.is_empty() => (
+            format!("{id} sits nowhere in particular, so not at \"{}\"", shown(site)),
+            format!("write {id}"),
+        ),
+        Some(site) => (
+            format!("{id} cannot sit at \"{}\"", shown(site)),
+            format!("on this robot there are: {}", named.join(", ")),
+        ),
+        None => (
+            format!("{id} needs a site"),
+            format!("on this robot there are: {}", named.join(", ")),
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::fixture::irb6640;
+
+    const DATA: DataSummary = DataSummary {
+        force_levels: 1,
+        postures: 4,
+        lowest_hz: 3.0,
+        highest_hz: 80.0,
+    };
+
+    #[test]
+    fn names_mean_instances() {
+        let robot = irb6640();
+        for (name, count) in [
+            ("payload", 1),
+            ("joint-transverse-compliance@joint-3", 1),
+            ("local-resonator@link-2", 3),
+        ] {
+            let found = requested(&robot, &DATA, name).unwrap();
+            assert_eq!(found.len(), count, "{name}");
+            assert!(found.iter().all(|i| i.label() == name));
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_what_there_is() {
+        let robot = irb6640();
+        for (name, problem, remedy) in [
+            ("payloud", "no effect \"payloud\"", "did you mean payload?"),
+            ("", "no effect \"\"", "time-delay, sensor-misalignment"),
+            ("local-resonator", "needs a site", "local-resonator@link-3"),
+            (
+                "local-resonator@link-9",
+                "cannot sit at \"link-9\"",
+                "local-resonator@link-3",
+            ),
+            ("payload@link-2", "nowhere in particular", "write payload"),
+            (
+                "amplitude-dependent-stiffness@joint-1",
+                "two hammer levels",
+                "measure",
+            ),
+        ] {
+            let error = requested(&robot, &DATA, name).unwrap_err().to_string();
+            assert!(
+                error.contains(problem) && error.contains(remedy),
+                "{name}: {error}"
+            );
+        }
+    }
+}

@@ -1,0 +1,460 @@
+//! The revision log: `lobestone/revisions.json` in the campaign's folder.
+//!
+//! Written beside itself, flushed and renamed, so that whoever reads it at whatever moment reads the old log or the new
+//! one. Writers take turns by a lock of the operating system on `revisions.lock`, which a killed process cannot leave
+//! behind, and refuse to write where the log is no longer the one that they started from.
+
+use std::fs::{File, TryLockError};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::{Domain, Revision};
+use crate::files::write_durably;
+use crate::{Error, InputError, Result};
+
+const SCHEMA: &str = "lobestone/revisions/1";
+/// What the program keeps of a campaign, beside the measurements.
+const FOLDER: &str = "lobestone";
+/// Beginning of the names of files that are not yet the log.
+const TEMPORARY: &str = ".revisions-";
+
+const REMEDY: &str = "take back what was changed in it by hand, or delete the file: the model starts from the baseline \
+                      then, and campaign.toml and the measurements are not touched";
+
+/// Where a campaign's log is, whether or not there is one.
+pub fn log_file(campaign_dir: &Path) -> PathBuf {
+    campaign_dir.join(FOLDER).join("revisions.json")
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Document {
+    schema: String,
+    revisions: Vec<Revision>,
+    /// What was taken back, oldest first.
+    #[serde(default)]
+    undone: Vec<Revision>,
+}
+
+impl Document {
+    fn empty() -> Self {
+        Document {
+            schema: SCHEMA.into(),
+            revisions: Vec::new(),
+            undone: Vec::new(),
+        }
+    }
+}
+
+/// All revisions of a campaign.
+#[derive(Debug, Clone)]
+pub struct RevisionLog {
+    campaign_dir: PathBuf,
+    document: Document,
+}
+
+impl RevisionLog {
+    /// The log of a campaign; empty where there is none yet.
+    ///
+    /// # Errors
+    /// A log that cannot be read or is not what this program writes, with file and line or key.
+    pub fn load(campaign_dir: &Path) -> Result<Self> {
+        Ok(RevisionLog {
+            campaign_dir: campaign_dir.to_path_buf(),
+            document: read(&log_file(campaign_dir))?,
+        })
+    }
+
+    /// The revisions of one side, oldest first; the baseline is the first.
+    pub fn revisions(&self, domain: Domain) -> impl DoubleEndedIterator<Item = &Revision> {
+        self.document.revisions.iter().filter(move |r| r.domain == domain)
+    }
+
+    /// What was undone on one side, oldest first.
+    pub fn undone(&self, domain: Domain) -> impl Iterator<Item = &Revision> {
+        self.document.undone.iter().filter(move |r| r.domain == domain)
+    }
+
+    /// The model as it stands; `None` where nothing was recorded.
+    pub fn current(&self, domain: Domain) -> Option<&Revision> {
+        self.revisions(domain).next_back()
+    }
+
+    /// Adds a revision; its number is set here. `baseline`: what to record as revision 0 where none of this side is
+    /// there yet (or only a baseline, which then is replaced: the data may have changed since).
+    ///
+    /// # Errors
+    /// Another process changed the log since it was loaded, or the file system refuses.
+    pub fn append(&mut self, baseline: Revision, mut revision: Revision) -> Result<usize> {
+        let domain = revision.domain;
+        self.change(|document| {
+            let own = |r: &Revision| r.domain == domain;
+            if document.revisions.iter().filter(|r| own(r)).count() <= 1 {
+                document.revisions.retain(|r| !own(r));
+                document.revisions.push(Revision {
+                    revision: 0,
+                    ..baseline
+                });
+            }
+            revision.revision = document.revisions.iter().filter(|r| own(r)).count();
+            let number = revision.revision;
+            document.revisions.push(revision);
+            Ok(number)
+        })
+    }
+
+    /// Takes the last revision of one side back (it stays in the file, among the undone) and returns it.
+    ///
+    /// # Errors
+    /// There is no added effect to undo; another process changed the log since it was loaded; the file system refuses.
+    pub fn undo(&mut self, domain: Domain) -> Result<Revision> {
+        if self.current(domain).is_none_or(|r| r.revision == 0) {
+            return Err(
+                InputError::new("nothing to undo: no effect was added to this campaign's model")
+                    .file(log_file(&self.campaign_dir))
+                    .remedy("see `lobestone history DIR`; add one with `lobestone add DIR EFFECT[@SITE]`")
+                    .into(),
+            );
+        }
+        self.change(|document| {
+            let last = document.revisions.iter().rposition(|r| r.domain == domain);
+            let undone = match last {
+                Some(last) => document.revisions.remove(last),
+                None => return Err(Error::computation("the log lost its last revision")),
+            };
+            document.undone.push(undone.clone());
+            Ok(undone)
+        })
+    }
+
+    /// Changes the file, alone and only if it still is the one that was loaded.
+    fn change<T>(&mut self, change: impl FnOnce(&mut Document) -> Result<T>) -> Result<T> {
+        let path = log_file(&self.campaign_dir);
+        let folder = self.campaign_dir.join(FOLDER);
+        std::fs::create_dir_all(&folder).map_err(|e| Error::io(&folder, e))?;
+        let _lock = lock(&folder.join("revisions.lock"))?;
+        if read(&path)? != self.document {
+            return Err(InputError::new(
+                "another lobestone changed this log in the meantime; nothing was written",
+            )
+            .file(&path)
+            .remedy("see `lobestone history DIR`, then run the command again")
+            .into());
+        }
+        let mut document = self.document.clone();
+        let result = change(&mut document)?;
+        // What killed processes left behind: nobody else writes while the lock is held.
+        let left = std::fs::read_dir(&folder).into_iter().flatten().flatten();
+        for entry in left.filter(|e| e.file_name().to_string_lossy().starts_with(TEMPORARY)) {
+            let _ = std::fs::remove_file(entry.path());
+        }
+        let mut text = serde_json::to_string_pretty(&document)
+            .map_err(|e| Error::computation(format!("the revision cannot be written: {e}")))?;
+        text.push('\n');
+        write_durably(&path, text.as_bytes(), TEMPORARY)?;
+        self.document = document;
+        Ok(result)
+    }
+}
+
+/// Held until it is dropped, or until the process ends however it ends.
+fn lock(path: &Path) -> Result<Option<File>> {
+    let file = File::options()
+        .create(true)
+        .append(true)
+        .open(path)
+        .map_err(|e| Error::io(path, e))?;
+    match file.try_lock() {
+        Ok(()) => return Ok(Some(file)),
+        Err(TryLockError::WouldBlock) => {}
+        // Some network file systems know no locks; the comparison with what was loaded must do there.
+        Err(TryLockError::Error(e)) if e.kind() == std::io::ErrorKind::Unsupported => return Ok(None),
+        Err(TryLockError::Error(e)) => return Err(Error::io(path, e)),
+    }
+    // Others hold it for the time of one small write.
+    file.lock().map_err(|e| Error::io(path, e))?;
+    Ok(Some(file))
+}
+
+fn read(path: &Path) -> Result<Document> {
+    let bytes = match std::fs::read(path) {
+        Ok(bytes) => bytes,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Document::empty()),
+        Err(e) => return Err(Error::io(path, e)),
+    };
+    let wrong = |problem: String| InputError::new(problem).file(path).remedy(REMEDY);
+    // The schema first: of a later version nothing else may be known.
+    #[derive(Deserialize)]
+    struct Head {
+        schema: Option<String>,
+    }
+    let syntax = |e: serde_json::Error| {
+        let line = Some(e.line()).filter(|l| *l > 0);
+        wrong(format!("no revision log: {e}")).line(line)
+    };
+    let head: Head = serde_json::from_slice(&bytes).map_err(syntax)?;
+    if head.schema.as_deref() != Some(SCHEMA) {
+        let found = head.schema.unwrap_or_else(|| "none".into());
+        return Err(
+            wrong(format!("the schema is {found}, this version reads {SCHEMA}"))
+                .key("schema")
+                .into(),
+        );
+    }
+    let document: Document = serde_json::from_slice(&bytes).map_err(syntax)?;
+    check(&document).map_err(|(key, problem)| wrong(problem).key(key))?;
+    Ok(document)
+}
+
+/// Key and problem of the first thing that this program would not have written.
+fn check(document: &Document) -> std::result::Result<(), (String, String)> {
+    let mut last: [Option<&Revision>; 2] = [None, None];
+    for (i, revision) in document.revisions.iter().enumerate() {
+        let wrong = |key: &str, problem: String| Err((format!("revisions[{i}].{key}"), problem));
+        let side = match revision.domain {
+            Domain::Structure => 0,
+            Domain::Cutting => 1,
+        };
+        let before = last[side].replace(revision);
+        let expected = before.map_or(0, |b| b.revision + 1);
+        if revision.revision != expected {
+            return wrong(
+                "revision",
+                format!("{} where {expected} comes next", revision.revision),
+            );
+        }
+        let kept = before.map_or(&[][..], |b| &b.effects);
+        if revision.effects.len() != expected || !revision.effects.starts_with(kept) {
+            return wrong(
+                "effects",
+                "a revision has the effects of the one before it and one more".into(),
+            );
+        }
+        for (key, value) in [
+            ("nrms", Some(revision.nrms)),
+            ("held_out_nrms", revision.held_out_nrms),
+            ("noise_floor_nrms", Some(revision.noise_floor_nrms)),
+            ("reduced_chi2", Some(revision.reduced_chi2)),
+        ] {
+            if value.is_some_and(|v| !(v >= 0.0 && v.is_finite())) {
+                return wrong(key, "no number that can be".into());
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::revision::{RecordedEffect, RecordedParameter};
+
+    fn revision(labels: &[&str], nrms: f64) -> Revision {
+        Revision {
+            revision: 0,
+            domain: Domain::Structure,
+            effects: labels
+                .iter()
+                .map(|l| RecordedEffect {
+                    effect: l.to_string(),
+                    variant: l.starts_with("local").then(|| "y".to_string()),
+                })
+                .collect(),
+            parameters: vec![RecordedParameter {
+                name: "joint-1.stiffness".into(),
+                value: 0.1 + 0.2,
+                unit: "N·m/rad".into(),
+                std_error: None,
+                initial: 1.5e6,
+            }],
+            nrms,
+            held_out_nrms: Some(1.1 * nrms),
+            noise_floor_nrms: 0.03,
+            reduced_chi2: 1.0,
+            progress: Some(true),
+            when: "2025-01-01T00:00:00Z".into(),
+            data: "0123456789abcdef".into(),
+        }
+    }
+
+    /// Adds one effect to what is there.
+    fn add(log: &mut RevisionLog, label: &str) -> Result<usize> {
+        let before: Vec<String> = log
+            .current(Domain::Structure)
+            .map(|r| r.labels().iter().map(|l| l.to_string()).collect())
+            .unwrap_or_default();
+        let labels: Vec<&str> = before.iter().map(String::as_str).chain([label]).collect();
+        log.append(revision(&[], 0.5), revision(&labels, 0.1))
+    }
+
+    fn numbers(dir: &Path) -> Vec<usize> {
+        let log = RevisionLog::load(dir).unwrap();
+        log.revisions(Domain::Structure).map(|r| r.revision).collect()
+    }
+
+    #[test]
+    fn what_was_appended_is_read_and_what_was_undone_is_kept() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut log = RevisionLog::load(dir.path()).unwrap();
+        assert!(log.current(Domain::Structure).is_none());
+        assert_eq!(add(&mut log, "payload").unwrap(), 1);
+        assert_eq!(add(&mut log, "local-resonator@link-3").unwrap(), 2);
+        let read = RevisionLog::load(dir.path()).unwrap();
+        assert_eq!(read.document, log.document);
+        assert_eq!(numbers(dir.path()), [0, 1, 2]);
+        assert!(read.current(Domain::Cutting).is_none());
+
+        let undone = log.undo(Domain::Structure).unwrap();
+        assert_eq!(undone.labels(), ["payload", "local-resonator@link-3"]);
+        assert_eq!(add(&mut log, "time-delay").unwrap(), 2);
+        log.undo(Domain::Structure).unwrap();
+        log.undo(Domain::Structure).unwrap();
+        let error = log.undo(Domain::Structure).unwrap_err().to_string();
+        assert!(error.contains("nothing to undo"), "{error}");
+        let read = RevisionLog::load(dir.path()).unwrap();
+        assert_eq!(numbers(dir.path()), [0]);
+        assert_eq!(read.undone(Domain::Structure).count(), 3);
+    }
+
+    #[test]
+    fn a_baseline_alone_gives_way_to_a_new_one() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut log = RevisionLog::load(dir.path()).unwrap();
+        add(&mut log, "payload").unwrap();
+        log.undo(Domain::Structure).unwrap();
+        log.append(revision(&[], 0.7), revision(&["time-delay"], 0.1))
+            .unwrap();
+        let first = log.revisions(Domain::Structure).next().unwrap();
+        assert_eq!((first.revision, first.nrms), (0, 0.7));
+        assert_eq!(numbers(dir.path()), [0, 1]);
+    }
+
+    /// Killed before the rename: a part of the new log lies beside the old one.
+    #[test]
+    fn a_killed_writer_leaves_the_old_log() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut log = RevisionLog::load(dir.path()).unwrap();
+        add(&mut log, "payload").unwrap();
+        let file = log_file(dir.path());
+        let whole = std::fs::read(&file).unwrap();
+        let left = file.with_file_name(".revisions-Ab12Cd");
+        std::fs::write(&left, &whole[..whole.len() / 2]).unwrap();
+        assert_eq!(numbers(dir.path()), [0, 1]);
+        add(&mut log, "time-delay").unwrap();
+        assert_eq!(numbers(dir.path()), [0, 1, 2]);
+        assert!(!left.exists());
+        let mut names: Vec<_> = std::fs::read_dir(file.parent().unwrap())
+            .unwrap()
+            .map(|e| e.unwrap().file_name())
+            .collect();
+        names.sort();
+        assert_eq!(names, ["revisions.json", "revisions.lock"]);
+    }
+
+    #[test]
+    fn a_reader_never_sees_half_a_log() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut log = RevisionLog::load(dir.path()).unwrap();
+        let done = std::sync::atomic::AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                for _ in 0..20 {
+                    add(&mut log, "payload").unwrap();
+                    log.undo(Domain::Structure).unwrap();
+                }
+                done.store(true, std::sync::atomic::Ordering::Relaxed);
+            });
+            while !done.load(std::sync::atomic::Ordering::Relaxed) {
+                assert!(numbers(dir.path()).len() <= 2);
+            }
+        });
+    }
+
+    /// Every writer that was told "done" finds its revision in the log; the others were told that they were late.
+    #[test]
+    fn writers_at_the_same_time_lose_nothing() {
+        let dir = tempfile::tempdir().unwrap();
+        let results: Vec<bool> = std::thread::scope(|scope| {
+            let tasks: Vec<_> = (0..8)
+                .map(|i| {
+                    let dir = dir.path();
+                    scope.spawn(move || {
+                        let mut done = 0;
+                        let mut late = 0;
+                        while done < 3 {
+                            let mut log = RevisionLog::load(dir).unwrap();
+                            std::thread::yield_now();
+                            match add(&mut log, &format!("payload@joint-{i}")) {
+                                Ok(_) => done += 1,
+                                Err(e) => {
+                                    assert!(e.to_string().contains("in the meantime"), "{e}");
+                                    late += 1;
+                                }
+                            }
+                        }
+                        late > 0
+                    })
+                })
+                .collect();
+            tasks.into_iter().map(|t| t.join().unwrap()).collect()
+        });
+        assert_eq!(results.len(), 8);
+        assert_eq!(numbers(dir.path()), (0..=24).collect::<Vec<_>>());
+        let log = RevisionLog::load(dir.path()).unwrap();
+        let last = log.current(Domain::Structure).unwrap();
+        for i in 0..8 {
+            let own = format!("payload@joint-{i}");
+            assert_eq!(last.labels().iter().filter(|l| **l == own).count(), 3);
+        }
+    }
+
+    /// A lock file that a killed process left is only a file.
+    #[test]
+    fn a_lock_file_left_behind_blocks_nobody() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut log = RevisionLog::load(dir.path()).unwrap();
+        let folder = dir.path().join(FOLDER);
+        std::fs::create_dir(&folder).unwrap();
+        std::fs::write(folder.join("revisions.lock"), "4711").unwrap();
+        assert_eq!(add(&mut log, "payload").unwrap(), 1);
+    }
+
+    #[test]
+    fn a_spoilt_log_is_one_clear_error() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut log = RevisionLog::load(dir.path()).unwrap();
+        add(&mut log, "payload").unwrap();
+        let file = log_file(dir.path());
+        let good = std::fs::read_to_string(&file).unwrap();
+        let spoilt = |from: &str, to: &str| {
+            assert!(good.contains(from), "{from}");
+            good.replacen(from, to, 1)
+        };
+        for (text, expected) in [
+            (good[..good.len() / 2].to_string(), "revisions.json:"),
+            (String::new(), "no revision log"),
+            ("[]".into(), "no revision log"),
+            (spoilt("revisions/1", "revisions/9"), "schema"),
+            (spoilt("\"nrms\"", "\"nmrs\""), "nmrs"),
+            (
+                spoilt("\"revision\": 1", "\"revision\": 4"),
+                "revisions[1].revision",
+            ),
+            (spoilt("0.5", "-0.5"), "revisions[0].nrms"),
+            (spoilt("0.5", "1e999"), "no revision log"),
+            (
+                spoilt("\"effects\": []", "\"effects\": [{\"effect\": \"x\"}]"),
+                "revisions[0].effects",
+            ),
+        ] {
+            std::fs::write(&file, &text).unwrap();
+            let error = RevisionLog::load(dir.path()).unwrap_err().to_string();
+            assert!(error.contains("revisions.json"), "{error}");
+            assert!(error.contains(expected), "{expected}: {error}");
+            assert!(error.contains("remedy"), "{error}");
+        }
+        // And nothing is written over it.
+        assert!(add(&mut log, "time-delay").is_err());
+    }
+}

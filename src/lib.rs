@@ -20,6 +20,7 @@ pub mod progress;
 pub mod report;
 pub mod robot;
 pub mod signal;
+pub mod simulate;
 pub mod thesis;
 
 pub use error::{Error, InputError, Result};

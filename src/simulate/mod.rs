@@ -17,6 +17,7 @@ use crate::{Error, InputError, Result};
 pub mod draw;
 mod files;
 pub mod foreign;
+mod imitation;
 mod magnitude;
 mod postures;
 pub mod random;

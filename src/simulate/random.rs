@@ -51,6 +51,8 @@ pub fn scenario(seed: u64) -> StructureScenario {
     scenario.effects = if what < NONE {
         Vec::new()
     } else if what < NONE + UNKNOWN {
+        // At full size: a faint one looks like any faint effect of the library.
+        scenario.visibility_sigmas = None;
         vec![request(foreign.id())]
     } else if what < NONE + UNKNOWN + TWO {
         vec![request(first.id()), request(second.id())]

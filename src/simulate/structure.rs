@@ -9,6 +9,7 @@ use serde_json::{Map, Value, json};
 
 use super::draw::{Draws, Purpose};
 use super::files::{self, FrfEntry, FrfFormat};
+use super::imitation::{self, Imitation};
 use super::postures::{self, PostureScheme};
 use super::request::{EffectRequest, HiddenEffect};
 use super::visibility::{self, Truth, Visibility};
@@ -410,6 +411,15 @@ pub fn simulate(scenario: &StructureScenario, robot: &LabRobot) -> Result<LabCam
         .map(|i| visibility::of(&truth, &hidden, i, &data, stride))
         .collect::<Result<_>>()?;
 
+    // A foreign effect stands last; with what is hidden besides it in the model, how near does the library come?
+    let imitation = match hidden.last() {
+        Some(last) if last.foreign => {
+            let (model, theta) = truth.with(&hidden[..hidden.len() - 1]);
+            Some(imitation::nearest(&model, &theta, &truth.summary, &data, stride)?)
+        }
+        _ => None,
+    };
+
     let mut measured = Vec::new();
     let mut entries = Vec::new();
     let mut draws = Draws::new(scenario.seed, Purpose::Noise);
@@ -474,7 +484,7 @@ pub fn simulate(scenario: &StructureScenario, robot: &LabRobot) -> Result<LabCam
     all.extend(measured);
     Ok(LabCampaign {
         files: all,
-        truth: truth_document(scenario, &lab, &hidden, &seen),
+        truth: truth_document(scenario, &lab, &hidden, &seen, imitation),
     })
 }
 
@@ -493,6 +503,7 @@ fn truth_document(
     lab: &TrueRobot,
     hidden: &[HiddenEffect],
     seen: &[Visibility],
+    imitation: Option<Imitation>,
 ) -> Value {
     let described: Vec<Value> = hidden.iter().zip(seen).map(|(h, v)| described(h, v)).collect();
     let main = described
@@ -508,6 +519,7 @@ fn truth_document(
         "site": main["site"],
         "parameters": main["parameters"],
         "visibility": main["visibility"],
+        "nearest_library_effect": imitation,
         "also": described.get(1..).unwrap_or_default(),
         "joint_stiffness": lab.joint_stiffness_nm_per_rad,
         "zeta": lab.damping_ratio,

@@ -61,7 +61,7 @@ pub fn fill(
 }
 
 /// Misfit Σ|ΔH|²/σ² of a model against noise-free data.
-fn misfit(model: &StructureModel, theta: &[f64], data: &FrfData) -> Result<f64> {
+pub fn misfit(model: &StructureModel, theta: &[f64], data: &FrfData) -> Result<f64> {
     let predicted = model.predict(theta, data)?;
     Ok(data
         .frfs()

@@ -10,5 +10,6 @@ mod modal;
 mod report;
 mod robustness;
 mod schema;
+mod simulate;
 mod structure;
 mod support;

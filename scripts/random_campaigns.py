@@ -36,7 +36,8 @@ def main():
     arguments.add_argument("--count", type=int, default=50)
     arguments.add_argument("--first-seed", type=int, default=1000)
     arguments.add_argument("--lobestone", default=str(ROOT / "target/release/lobestone"))
-    arguments.add_argument("--lines-hz", type=float, help="spacing of the spectral lines (default: as simulate has it)")
+    arguments.add_argument("--lines-hz", type=float, help="spacing of the spectral lines, to try this script quickly: with coarse "
+                           "lines the noise is estimated badly and verdicts with it (default: as simulate has it)")
     arguments.add_argument("--report", type=pathlib.Path, default=ROOT / "reports/diagnosis_confusion.md")
     arguments.add_argument("--keep", type=pathlib.Path, help="keep the campaigns in this folder")
     options = arguments.parse_args()

@@ -104,7 +104,19 @@ pub fn drawn(effect: &str, parameter: &Parameter, draws: &mut Draws) -> f64 {
         Times(low, high) => parameter.nominal * draws.log_uniform(low, high),
         Either(most) => draws.uniform(-most, most),
     };
-    value.clamp(parameter.bounds[0], parameter.bounds[1])
+    kept_inside(parameter, value)
+}
+
+/// A factor from the ends of a logarithmic range: a fit that arrives at an end holds that against the effect, so no
+/// truth may stand there.
+const MARGIN: f64 = 1.2;
+
+fn kept_inside(parameter: &Parameter, value: f64) -> f64 {
+    let [low, high] = parameter.bounds;
+    match parameter.scale {
+        Scale::Logarithmic => value.clamp(low * MARGIN, high / MARGIN),
+        Scale::Linear => value.clamp(low, high),
+    }
 }
 
 /// The value that belongs to an effect of this size, within the parameter's bounds.
@@ -114,7 +126,7 @@ pub fn at_size(effect: &str, parameter: &Parameter, value: f64, size: f64) -> f6
         Ratio => value.powf(size),
         Not => value,
     };
-    sized.clamp(parameter.bounds[0], parameter.bounds[1])
+    kept_inside(parameter, sized)
 }
 
 /// Whether the parameter follows the size of its effect at all.

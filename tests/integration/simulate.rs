@@ -380,7 +380,7 @@ fn wrong_wishes_are_refused_plainly() {
         (vec!["--lines-hz", "50"], "--lines-hz"),
         (vec!["--lines-hz", "0"], "--lines-hz"),
         (vec!["--lines-hz", "0.0002"], "--lines-hz"),
-        (vec!["--noise", "-1"], "--noise"),
+        (vec!["--noise=-1"], "--noise"),
         (vec!["--noise", "inf"], "--noise"),
         (vec!["--postures", "0"], "--postures"),
         (vec!["--mass-error", "2"], "--mass-error"),

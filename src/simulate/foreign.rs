@@ -245,3 +245,50 @@ impl StructuralEffect for ToolAxialFlexibility {
         });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::fixture::{TAP_POSTURES, irb6640};
+    use crate::robot::{Baseline, FrfBasis, RobotModel};
+    use num_complex::Complex64;
+
+    /// Receptance of the tool point along base y at 3 Hz, joint stiffnesses times `factor`.
+    fn receptance(factor: f64, viscoelastic: Option<[f64; 2]>) -> Complex64 {
+        let model = RobotModel::new(irb6640());
+        let kinematics = model.kinematics(&TAP_POSTURES[0]).unwrap();
+        let mut baseline = Baseline::nominal(&model.spec);
+        baseline.damping_ratio = Dual::constant(1e-4);
+        for stiffness in &mut baseline.joint_stiffness_nm_per_rad {
+            *stiffness = stiffness.scale(factor);
+        }
+        let mut chain = model.chain(&kinematics, &baseline);
+        if let Some(values) = viscoelastic {
+            let setting = Setting {
+                robot: &model,
+                kinematics: &kinematics,
+                lowness: 0.0,
+            };
+            let values = values.map(Dual::constant);
+            ViscoelasticJoints.apply(Site::Everywhere, 0, &values, &setting, &mut chain);
+        }
+        let row = chain.output_row(kinematics.tcp(), model.flange_place(), true, &Vector3::y());
+        let basis = FrfBasis::new(&chain.system(0), &[row]).unwrap();
+        basis.receptance_at(std::f64::consts::TAU * 3.0, 0, 0).unwrap()
+    }
+
+    /// Far below its relaxation a standard linear solid is two springs in series, far above it the first spring alone;
+    /// between, by the correspondence principle, one complex spring.
+    #[test]
+    fn viscoelastic_joints_are_a_standard_linear_solid() {
+        let close = |a: Complex64, b: Complex64| (a - b).norm() < 0.01 * b.norm();
+        let ratio = 2.0;
+        let slow = receptance(1.0, Some([ratio, 1e3]));
+        assert!(close(slow, receptance(ratio / (1.0 + ratio), None)), "{slow}");
+        let fast = receptance(1.0, Some([ratio, 1e-2]));
+        assert!(close(fast, receptance(1.0, None)), "{fast}");
+        // At the relaxation frequency the loss is largest: well off the real axis.
+        let between = receptance(1.0, Some([ratio, 3.0]));
+        assert!(between.im < -0.05 * between.norm(), "{between}");
+    }
+}

@@ -22,13 +22,14 @@ mod magnitude;
 mod postures;
 pub mod random;
 mod request;
+mod scenario;
 pub mod structure;
 mod visibility;
 
 pub use files::FrfFormat;
 pub use postures::PostureScheme;
 pub use request::EffectRequest;
-pub use structure::{Kind, Layout, StructureScenario};
+pub use scenario::{Kind, Layout, StructureScenario};
 pub use visibility::Visibility;
 
 /// A simulated campaign, not yet on disk.

@@ -4,7 +4,7 @@ use super::FrfFormat;
 use super::draw::{Draws, Purpose};
 use super::foreign::FOREIGN;
 use super::request::EffectRequest;
-use super::structure::{Kind, Layout, StructureScenario};
+use super::scenario::{Kind, Layout, StructureScenario};
 use crate::effects::STRUCTURAL;
 use crate::ingest::Quantity;
 

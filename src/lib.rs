@@ -22,6 +22,7 @@ pub mod report;
 pub mod revision;
 pub mod robot;
 pub mod signal;
+pub mod simulate;
 pub mod thesis;
 
 pub use error::{Error, InputError, Result};

@@ -19,6 +19,7 @@ mod lobes;
 mod modal;
 mod model;
 mod report;
+mod simulate;
 mod text;
 mod thesis;
 mod undo;
@@ -74,6 +75,8 @@ pub enum Command {
     Lobes(lobes::Args),
     /// HTML and PNG report of a campaign.
     Report(report::Args),
+    /// A virtual lab: write a campaign with chosen (or random) physics and noise, and its truth.
+    Simulate(Box<simulate::Args>),
     /// The source thesis put right: published model, measurement and this model side by side.
     Thesis(thesis::Args),
     /// The whole story on built-in campaigns.
@@ -114,6 +117,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Undo(args) => undo::run(args),
         Command::Lobes(args) => lobes::run(args),
         Command::Report(args) => report::run(args),
+        Command::Simulate(args) => simulate::run(*args),
         Command::Thesis(args) => thesis::run(args),
         Command::Demo(args) => demo::run(args),
     }

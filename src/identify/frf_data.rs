@@ -5,7 +5,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use crate::campaign::{Campaign, FrfSet, MeasuredDof};
+use crate::campaign::{Campaign, FrfSet, MeasuredDof, MeasuredFrf, Posture};
 use crate::effects::DataSummary;
 use crate::ingest::Axis;
 use crate::robot::Kinematics;
@@ -66,8 +66,20 @@ impl FrfData {
                 .remedy("add [[frf]] tables that name the measured FRF files")
                 .into());
         }
+        let mut data = Self::arrange(&campaign.postures, model, set.frfs)?;
+        data.blocks
+            .par_iter_mut()
+            .for_each(|block| estimate_noise(Arc::make_mut(block)));
+        Ok(data)
+    }
+
+    /// Groups FRFs into blocks; their noise is not known yet (`noise_std` stays empty).
+    ///
+    /// # Errors
+    /// A posture that does not fit the robot.
+    pub fn arrange(postures: &[Posture], model: &RobotModel, frfs: Vec<MeasuredFrf>) -> Result<Self> {
         let mut blocks: Vec<FrfBlock> = Vec::new();
-        for frf in set.frfs {
+        for frf in frfs {
             let found = blocks.iter_mut().find(|b| {
                 b.posture == frf.posture
                     && b.force_level_n == frf.force_level_n
@@ -76,7 +88,7 @@ impl FrfData {
             let block = match found {
                 Some(block) => block,
                 None => {
-                    let kinematics = model.kinematics(&campaign.postures[frf.posture].joints_deg)?;
+                    let kinematics = model.kinematics(&postures[frf.posture].joints_deg)?;
                     blocks.push(FrfBlock {
                         posture: frf.posture,
                         force_level_n: frf.force_level_n,
@@ -117,8 +129,7 @@ impl FrfData {
             });
         }
         set_lowness(&mut blocks);
-        blocks.par_iter_mut().for_each(estimate_noise);
-        let posture_ids = campaign.postures.iter().map(|p| p.id.clone()).collect();
+        let posture_ids = postures.iter().map(|p| p.id.clone()).collect();
         let blocks = blocks.into_iter().map(Arc::new).collect();
         Ok(FrfData { blocks, posture_ids })
     }

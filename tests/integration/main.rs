@@ -11,5 +11,6 @@ mod report;
 mod revisions;
 mod robustness;
 mod schema;
+mod simulate;
 mod structure;
 mod support;

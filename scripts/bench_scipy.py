@@ -1,7 +1,11 @@
 #!/usr/bin/env python3
-"""The same calibration with numpy and scipy, timed beside `lobestone calibrate` in one run.
+"""The same fit with numpy and scipy, timed beside `lobestone` in one run.
 
-    python3 scripts/bench_scipy.py [CAMPAIGN] [--lobestone PATH] [--repeat N]
+    python3 scripts/bench_scipy.py [CAMPAIGN] [--effect base-compliance] [--lobestone PATH] [--repeat N]
+
+Without --effect: the calibration, beside `lobestone calibrate`. With it: the fit of one candidate effect together with
+the baseline, from nominal values, beside `lobestone calibrate --from-nominal` on a copy of the campaign that has the
+effect in its model (put there by `lobestone add`, not timed).
 
 An independent check as well: kinematics, mass and stiffness matrices, modal damping, FRFs and the fit are written
 here from the formulas (docs/physics.md), sharing no code with the program. Both fit the six joint stiffnesses and
@@ -14,7 +18,9 @@ Campaigns: receptance, mobility or accelerance in evenly spaced ASCII UFF 58; po
 import argparse
 import json
 import pathlib
+import shutil
 import subprocess
+import tempfile
 import time
 import tomllib
 
@@ -23,6 +29,7 @@ from scipy.linalg import eigh
 from scipy.optimize import least_squares
 
 HERE = pathlib.Path(__file__).resolve().parent.parent
+ROCKING = 1e7  # where the fit of the base's rocking stiffness starts, N·m/rad
 ORDER = {8: 0, 11: 1, 12: 2}  # times (i omega)^order against receptance
 
 
@@ -38,27 +45,31 @@ def transform(q, joint):
 class Posture:
     """Mass matrix and tool Jacobian of the chain of joint springs at one posture: constant during the fit."""
 
-    def __init__(self, robot, joints_deg):
+    def __init__(self, robot, joints_deg, rocking):
         frames = [np.eye(4)]
         for q, joint in zip(joints_deg, robot["joint"]):
             frames.append(frames[-1] @ transform(q, joint))
         n = len(robot["joint"])
         axes = [f[:3, 2] for f in frames[:n]]
         origins = [f[:3, 3] for f in frames[:n]]
+        if rocking:  # the base turns about its x and y axes: two more joints before the first
+            axes = [np.array([1.0, 0, 0]), np.array([0, 1.0, 0])] + axes
+            origins = [np.zeros(3)] * 2 + origins
+        extra = 2 if rocking else 0
         tool = frames[-1] @ np.append(robot["tool"]["tcp_in_flange_m"], 1.0)
         tcp = tool[:3]
         jacobian = lambda p, upto: np.array(
-            [np.cross(axes[j], p - origins[j]) if j < upto else np.zeros(3) for j in range(n)]
+            [np.cross(axes[j], p - origins[j]) if j < upto + extra else np.zeros(3) for j in range(n + extra)]
         ).T
         self.tool_jacobian = jacobian(tcp, n)
-        self.mass = np.zeros((n, n))
+        self.mass = np.zeros((n + extra, n + extra))
         for i, link in enumerate(robot["link"]):
             if i + 1 < n:
-                com = 0.5 * (origins[i] + origins[i + 1])
+                com = 0.5 * (frames[i][:3, 3] + frames[i + 1][:3, 3])
             else:
                 com = 0.5 * (frames[-1][:3, 3] + tcp)
             jv = jacobian(com, i + 1)
-            jw = np.array([axes[j] if j <= i else np.zeros(3) for j in range(n)]).T
+            jw = np.array([axes[j] if j <= i + extra else np.zeros(3) for j in range(n + extra)]).T
             rotation = frames[i + 1][:3, :3]
             inertia = rotation @ np.diag(link["inertia_kg_m2"]) @ rotation.T
             self.mass += link["mass_kg"] * jv.T @ jv + jw.T @ inertia @ jw
@@ -94,24 +105,31 @@ def noise_std(measured, truth):
     return np.sqrt(np.mean(np.abs(measured) ** 2, axis=1, keepdims=True))
 
 
-def calibrate(folder):
+def calibrate(folder, effect):
     """Fits the campaign in `folder`; ({name: value}, function evaluations)."""
     truth = folder.parent / "truth" / f"{folder.name}.json"
     campaign = tomllib.loads((folder / "campaign.toml").read_text())
     robot = tomllib.loads((HERE / "datasets/irb6640/robot.toml").read_text())
-    postures = {p["id"]: Posture(robot, p["joints_deg"]) for p in campaign["posture"]}
+    postures = {p["id"]: Posture(robot, p["joints_deg"], effect is not None) for p in campaign["posture"]}
     blocks = []
     for entry in campaign["frf"]:
         frfs = list(read_uff(folder / entry["file"]))
         measured = np.array([h for *_, h in frfs])
         std = noise_std(measured, truth)
         blocks.append((postures[entry["posture"]], 2 * np.pi * frfs[0][2], [f[:2] for f in frfs], measured, std))
+    names = [f"joint-{i + 1}.stiffness" for i in range(len(robot["joint"]))]
     nominal = np.array([1.0 / j["compliance_rad_per_nm"] for j in robot["joint"]])
+    if effect:
+        names, nominal = ["base-compliance.rocking_nm_per_rad"] + names, np.append(ROCKING, nominal)
+
+    def springs(theta):
+        k = nominal * np.exp(theta[:-1])
+        return np.append(k[0], k) if effect else k
 
     def misfit(theta, log):
         out = []
         for posture, omega, dofs, measured, std in blocks:
-            h = posture.receptance(nominal * np.exp(theta[:-1]), 0.03 * np.exp(theta[-1]), omega)
+            h = posture.receptance(springs(theta), 0.03 * np.exp(theta[-1]), omega)
             model = np.array([h[:, a, b] for a, b in dofs])
             if log:
                 out.append(np.log(np.abs(model) / np.abs(measured)).ravel())
@@ -123,7 +141,7 @@ def calibrate(folder):
     # As in the program: log magnitude first, which leads the peaks onto each other, then complex values.
     near = least_squares(misfit, np.zeros(len(nominal) + 1), args=(True,), x_scale="jac", ftol=1e-4)
     fit = least_squares(misfit, near.x, args=(False,), x_scale="jac", ftol=1e-12, xtol=1e-12)
-    values = {f"joint-{i + 1}.stiffness": v for i, v in enumerate(nominal * np.exp(fit.x[:-1]))}
+    values = dict(zip(names, nominal * np.exp(fit.x[:-1])))
     values["damping-ratio"] = 0.03 * np.exp(fit.x[-1])
     evaluations = (near.nfev + near.njev * len(near.x)) + (fit.nfev + fit.njev * len(fit.x))
     return values, evaluations
@@ -141,15 +159,21 @@ def timed(work, repeat):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("campaign", nargs="?", type=pathlib.Path, default=HERE / "tests/data/blind/frf-9000")
+    parser.add_argument("--effect", choices=["base-compliance"], help="fit this candidate instead of the baseline")
     parser.add_argument("--lobestone", type=pathlib.Path, default=HERE / "target/release/lobestone")
     parser.add_argument("--repeat", type=int, default=3, help="runs of each; the fastest counts")
     args = parser.parse_args()
 
-    command = [args.lobestone, "calibrate", args.campaign, "--json"]
-    ours_s, ours = timed(
-        lambda: json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout), args.repeat
-    )
-    theirs_s, (theirs, evaluations) = timed(lambda: calibrate(args.campaign), args.repeat)
+    with tempfile.TemporaryDirectory() as scratch:
+        campaign = pathlib.Path(scratch) / "campaign"
+        shutil.copytree(args.campaign, campaign)
+        run = lambda *words: subprocess.run([args.lobestone, *words, "--json"], check=True, capture_output=True, text=True)
+        if args.effect:
+            run("add", campaign, args.effect)
+        ours_s, ours = timed(
+            lambda: json.loads(run("calibrate", campaign, "--from-nominal", "--starts", "0").stdout), args.repeat
+        )
+    theirs_s, (theirs, evaluations) = timed(lambda: calibrate(args.campaign, args.effect), args.repeat)
 
     print(f"{'parameter':<20}{'lobestone':>14}{'± std error':>13}{'scipy':>14}{'difference':>12}{'std errors':>12}")
     worst = 0.0

@@ -24,7 +24,10 @@ pub struct StructureAnalysis {
 
 impl StructureAnalysis {
     pub fn run(campaign: &Campaign, options: Options) -> Result<Self> {
-        let case = StructureCase::load(campaign)?;
+        Self::of(StructureCase::load(campaign)?, options)
+    }
+
+    pub fn of(case: StructureCase, options: Options) -> Result<Self> {
         let calibration = calibrate(&case.model, &case.data, case.options(options))?;
         let nominal = case
             .baseline

@@ -6,7 +6,7 @@ use crate::Result;
 use crate::analysis::StructureAnalysis;
 use crate::campaign::Campaign;
 use crate::discrepancy::FrfComparison;
-use crate::identify::{Calibration, Options, StructureModel};
+use crate::identify::{Calibration, Options, StructureCase, StructureModel};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -18,6 +18,9 @@ pub struct Args {
     /// Seed of those starting points.
     #[arg(long, default_value_t = Options::default().seed)]
     seed: u64,
+    /// Start from the robot file's values, not from where the last revision stood.
+    #[arg(long)]
+    from_nominal: bool,
 }
 
 pub fn run(args: Args) -> Result<Outcome> {
@@ -26,7 +29,11 @@ pub fn run(args: Args) -> Result<Outcome> {
         extra_starts: args.starts,
         seed: args.seed,
     };
-    let analysis = StructureAnalysis::run(&campaign, options)?;
+    let mut case = StructureCase::load(&campaign)?;
+    if args.from_nominal {
+        case.forget_start();
+    }
+    let analysis = StructureAnalysis::of(case, options)?;
     let StructureAnalysis {
         case,
         calibration,

@@ -99,6 +99,16 @@ const SUSPICIOUS_CHI2: f64 = 1.15;
 /// Lines used to get near the answer: every how many.
 const COARSE_STRIDE: usize = 4;
 
+/// When to stop on few lines.
+const ROUGH: Stopping = Stopping {
+    max_iterations: 40,
+    relative_decrease: 1e-4,
+};
+/// Iterations of a look at a further starting point.
+const LOOK_ITERATIONS: usize = 10;
+/// Times the lowest misfit from which on a starting point is given up after the look.
+const HOPELESS: f64 = 1.5;
+
 /// On few lines from a point that is in the right basin already: log magnitudes could only lead out of it.
 fn resume(model: &StructureModel, data: &FrfData, start: &[f64]) -> Result<(Fit, usize)> {
     let complex = FrfProblem {
@@ -107,23 +117,20 @@ fn resume(model: &StructureModel, data: &FrfData, start: &[f64]) -> Result<(Fit,
         misfit: Misfit::Complex,
         stride: coarse_stride(data),
     };
-    let rough = Stopping {
-        max_iterations: 40,
-        relative_decrease: 1e-4,
-    };
-    let fit = minimise(&complex, start, &model.bounds(), rough)?;
+    let fit = minimise(&complex, start, &model.bounds(), ROUGH)?;
     let iterations = fit.iterations;
     Ok((fit, iterations))
 }
 
 /// Log magnitude first, then the complex values on few lines: gets into the right basin.
-fn approach(model: &StructureModel, data: &FrfData, start: &[f64]) -> Result<(Fit, usize)> {
+fn approach(
+    model: &StructureModel,
+    data: &FrfData,
+    start: &[f64],
+    rough: Stopping,
+) -> Result<(Fit, usize)> {
     let bounds = model.bounds();
     let stride = coarse_stride(data);
-    let rough = Stopping {
-        max_iterations: 40,
-        relative_decrease: 1e-4,
-    };
     let log = FrfProblem {
         model,
         data,
@@ -169,7 +176,7 @@ pub fn calibrate(model: &StructureModel, data: &FrfData, options: Options) -> Re
     let nominal = model.nominal_theta();
     let (first, mut iterations) = match model.start() {
         Some(start) => resume(model, data, start)?,
-        None => approach(model, data, &nominal)?,
+        None => approach(model, data, &nominal, ROUGH)?,
     };
     let mut best = refine(model, data, &first.theta)?;
     iterations += best.iterations;
@@ -181,13 +188,24 @@ pub fn calibrate(model: &StructureModel, data: &FrfData, options: Options) -> Re
     if chi2(&best) > SUSPICIOUS_CHI2 && options.extra_starts > 0 {
         let points = scattered_starts(&model.parameters, options.extra_starts, options.seed);
         let progress = Progress::new("calibrating from further starting points", points.len());
-        let mut fits: Vec<Fit> = points
+        let look = Stopping {
+            max_iterations: LOOK_ITERATIONS,
+            ..ROUGH
+        };
+        let looks: Vec<Fit> = points
             .par_iter()
             .filter_map(|start| {
-                let fit = approach(model, data, start).ok().map(|(fit, _)| fit);
+                let fit = approach(model, data, start, look).ok().map(|(fit, _)| fit);
                 progress.step();
                 fit
             })
+            .collect();
+        // Starts that a look leaves far behind the others would only end beside the answer.
+        let lowest = looks.iter().map(|f| f.cost).fold(first.cost, f64::min);
+        let mut fits: Vec<Fit> = looks
+            .par_iter()
+            .filter(|look| look.cost < HOPELESS * lowest)
+            .filter_map(|look| resume(model, data, &look.theta).ok().map(|(fit, _)| fit))
             .collect();
         starts += points.len();
         fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));

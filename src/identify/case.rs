@@ -97,6 +97,12 @@ impl StructureCase {
         }
     }
 
+    /// Makes fits start from the nominal values, not from where the last revision stood.
+    pub fn forget_start(&mut self) {
+        self.model = self.model.without_start();
+        self.settled = false;
+    }
+
     /// The case as the loop works on it.
     pub fn study(&self, wanted: Options) -> StructureStudy {
         StructureStudy::new(&self.model.robot.spec, self.data.clone(), self.options(wanted))

@@ -108,6 +108,14 @@ impl StructureModel {
         }
     }
 
+    /// The same model, whose fits start from the nominal values.
+    pub fn without_start(&self) -> Self {
+        StructureModel {
+            start: None,
+            ..self.clone()
+        }
+    }
+
     /// A solution found earlier, solver's scale; effects added since stand at their nominal values.
     pub fn start(&self) -> Option<&[f64]> {
         self.start.as_deref()

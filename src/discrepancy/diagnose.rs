@@ -86,6 +86,8 @@ pub struct Baseline {
 
 /// Candidates that are refined on all data.
 const REFINED: usize = 6;
+/// Misfit per degree of freedom of the baseline below which what is missing is faint.
+const FAINT: f64 = 1.5;
 /// Candidates that are fitted again from the best one's baseline.
 const SHARED: usize = 6;
 /// Candidates whose combination with every other one is tried where none explains the data alone.
@@ -221,7 +223,7 @@ impl<'a, S: Study> Engine<'a, S> {
             .map(|(t, refined)| self.judge(t, *refined, &evidence))
             .collect::<Result<_>>()?;
         candidates.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic));
-        let baseline = Baseline {
+        let mut baseline = Baseline {
             held_out: held_out(study, model, &base.theta, Extent::Coarse, REFIT_WITHOUT_FOLD)?,
             residual: base_residual,
             reduced_chi2: base_reduced,
@@ -229,6 +231,9 @@ impl<'a, S: Study> Engine<'a, S> {
             calibration: self.calibration.clone(),
         };
 
+        if base_reduced < FAINT {
+            self.held_out_on_all(&mut baseline, &mut candidates)?;
+        }
         let credible: Vec<bool> = candidates
             .iter()
             .map(|c| verdict::credible(c, &baseline))
@@ -253,6 +258,26 @@ impl<'a, S: Study> Engine<'a, S> {
             candidates,
             baseline,
             not_tried: self.not_tried,
+        })
+    }
+
+    /// Faint effects change held-out errors by less than the scatter that refits on the coarse view bring along: there the
+    /// refits of whatever else speaks for an effect use all data.
+    fn held_out_on_all(&self, baseline: &mut Baseline, candidates: &mut [CandidateOf<S>]) -> Result<()> {
+        let study = self.study;
+        let in_question: Vec<&mut CandidateOf<S>> = candidates
+            .iter_mut()
+            .filter(|c| c.refined && verdict::significant(c))
+            .collect();
+        if in_question.is_empty() {
+            return Ok(());
+        }
+        let all =
+            |model: &S::Model, theta: &[f64]| held_out(study, model, theta, Extent::Full, REFIT_WITHOUT_FOLD);
+        baseline.held_out = all(self.model, &baseline.theta)?;
+        in_question.into_par_iter().try_for_each(|c| {
+            c.held_out = all(&c.model, &c.theta)?;
+            Ok(())
         })
     }
 

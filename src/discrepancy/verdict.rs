@@ -31,14 +31,18 @@ pub fn is_noise(reduced_chi2: f64) -> bool {
     reduced_chi2 <= NOISE_CHI2
 }
 
-/// Whether a candidate improves the fit by more than chance, on the data and on folds left out, with parameters that are
-/// not stuck at the end of their range.
+/// Whether a candidate improves the fit by more than chance, with parameters that are not stuck at the end of their range.
+pub fn significant<M, I>(c: &Candidate<M, I>) -> bool {
+    c.p_value < SIGNIFICANT_P && c.delta_bic < -STRONG_BIC && !c.at_bound
+}
+
+/// Whether a candidate is significant and improves the prediction of folds left out.
 pub fn credible<M, I>(c: &Candidate<M, I>, baseline: &Baseline) -> bool {
     let improves = match (&c.held_out, &baseline.held_out) {
         (Some(with), Some(without)) => with.chi2 < without.chi2,
         _ => true,
     };
-    c.p_value < SIGNIFICANT_P && c.delta_bic < -STRONG_BIC && improves && !c.at_bound
+    improves && significant(c)
 }
 
 /// Two effects that explain the data together.

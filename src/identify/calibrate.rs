@@ -123,12 +123,7 @@ fn resume(model: &StructureModel, data: &FrfData, start: &[f64]) -> Result<(Fit,
 }
 
 /// Log magnitude first, then the complex values on few lines: gets into the right basin.
-fn approach(
-    model: &StructureModel,
-    data: &FrfData,
-    start: &[f64],
-    rough: Stopping,
-) -> Result<(Fit, usize)> {
+fn approach(model: &StructureModel, data: &FrfData, start: &[f64], rough: Stopping) -> Result<(Fit, usize)> {
     let bounds = model.bounds();
     let stride = coarse_stride(data);
     let log = FrfProblem {

@@ -209,34 +209,36 @@ pub fn held_out_postures(model: &StructureModel, data: &FrfData, theta: &[f64]) 
 /// Neighbouring lines over which the residual's correlation is summed.
 const CORRELATION_LAGS: usize = 40;
 
-/// Frequencies at which the weighted residual is largest, most prominent first.
+/// Frequencies at which the weighted residual is largest, most prominent first. What neighbouring lines have in common
+/// is counted: noise has nothing, however well its size is known.
 pub fn residual_peaks_hz(model: &StructureModel, data: &FrfData, theta: &[f64]) -> Result<Vec<f64>> {
-    const PEAKS: usize = 4;
-    const BINS: usize = 60;
+    const PEAKS: usize = 5;
+    const BINS: usize = 90;
+    /// Standard deviations of pure noise that a peak stands above.
+    const CHANCE: f64 = 4.0;
     let summary = data.summary();
     let ratio = (summary.highest_hz / summary.lowest_hz).ln();
     let mut bins = vec![(0.0, 0usize); BINS];
     let predicted = model.predict(theta, data)?;
     for ((block, frf), model) in data.frfs().zip(&predicted) {
-        for (k, f) in block.frequency_hz.iter().enumerate() {
+        let weighted = |k: usize| (model[k] - frf.receptance[k]) / frf.noise_std[k];
+        for (k, f) in block.frequency_hz.iter().enumerate().skip(1) {
             let position = (f / summary.lowest_hz).ln() / ratio * BINS as f64;
             let bin = &mut bins[(position.max(0.0) as usize).min(BINS - 1)];
-            bin.0 += (model[k] - frf.receptance[k]).norm_sqr() / frf.noise_std[k].powi(2);
+            bin.0 += (weighted(k).conj() * weighted(k - 1)).re;
             bin.1 += 1;
         }
     }
-    let level: Vec<f64> = bins
-        .iter()
-        .map(|(s, n)| if *n > 0 { s / *n as f64 } else { 0.0 })
-        .collect();
+    // The product of two independent unit complex values has variance ½ in each part.
+    let level = |i: usize| bins[i].0 / (0.5 * bins[i].1.max(1) as f64).sqrt();
     let mut peaks: Vec<usize> = (0..BINS)
         .filter(|&i| {
-            let left = if i > 0 { level[i - 1] } else { 0.0 };
-            let right = level.get(i + 1).copied().unwrap_or(0.0);
-            level[i] > left && level[i] >= right && level[i] > 1.5
+            let left = if i > 0 { level(i - 1) } else { 0.0 };
+            let right = if i + 1 < BINS { level(i + 1) } else { 0.0 };
+            level(i) > left && level(i) >= right && level(i) > CHANCE
         })
         .collect();
-    peaks.sort_by(|a, b| level[*b].total_cmp(&level[*a]));
+    peaks.sort_by(|a, b| level(*b).total_cmp(&level(*a)));
     let centre = |i: usize| summary.lowest_hz * (ratio * (i as f64 + 0.5) / BINS as f64).exp();
     Ok(peaks.into_iter().take(PEAKS).map(centre).collect())
 }

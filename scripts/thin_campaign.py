@@ -61,6 +61,14 @@ def thin_uff(text, every, references):
     return "".join(out)
 
 
+def thin(source, target, args):
+    """Only ASCII files can be thinned; others are copied as they are where nothing but postures is left out."""
+    if args.every == 1 and not args.references:
+        shutil.copyfile(source, target)
+    else:
+        target.write_text(thin_uff(source.read_text(), args.every, args.references))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("source", type=pathlib.Path)
@@ -80,7 +88,7 @@ def main():
         target = args.target / file
         target.parent.mkdir(parents=True, exist_ok=True)
         if table.startswith("[[frf]]"):
-            target.write_text(thin_uff((args.source / file).read_text(), args.every, args.references))
+            thin(args.source / file, target, args)
         else:
             shutil.copy(args.source / file, target)
 

@@ -85,7 +85,7 @@ pub struct Baseline {
 }
 
 /// Candidates that are refined on all data.
-const REFINED: usize = 6;
+const REFINED: usize = 8;
 /// Misfit per degree of freedom of the baseline below which what is missing is faint.
 const FAINT: f64 = 1.5;
 /// Candidates that are fitted again from the best one's baseline.
@@ -130,8 +130,8 @@ struct Evidence {
     coarse_base_chi2: f64,
     /// Divides differences of χ²: the misfit that remains, and the values that are not independent.
     scale: f64,
-    /// Independent real values.
-    effective: f64,
+    /// Share of the values that are independent.
+    share: f64,
     tests: usize,
 }
 
@@ -206,7 +206,7 @@ impl<'a, S: Study> Engine<'a, S> {
             base_chi2: 2.0 * base.cost,
             coarse_base_chi2: 2.0 * coarse_base.cost,
             scale: best_reduced.max(1.0) / share,
-            effective: study.real_values(Extent::Full) as f64 * share,
+            share,
             tests: self.instances.len(),
         };
         let labels: Vec<String> = refined.iter().map(|t| self.label(&t.instance)).collect();
@@ -350,13 +350,14 @@ impl<'a, S: Study> Engine<'a, S> {
         let Tried { instance, model, fit } = tried;
         let extra = (study.parameters(model).len() - self.base_count) as f64;
         let chi2 = 2.0 * fit.cost;
-        let (gain, reduced_chi2) = if refined {
-            (evidence.base_chi2 - chi2, self.reduced_chi2(tried))
+        // On the coarse view the evidence is that of the coarse view: scaled up, chance would look like an effect.
+        let (gain, reduced_chi2, values) = if refined {
+            let gain = evidence.base_chi2 - chi2;
+            (gain, self.reduced_chi2(tried), study.real_values(Extent::Full))
         } else {
-            // Value for value the coarse view says the same as the whole.
-            let share = study.real_values(Extent::Full) as f64 / study.real_values(Extent::Coarse) as f64;
-            let gain = (evidence.coarse_base_chi2 - chi2) * share;
-            (gain, chi2 / self.freedom(model, Extent::Coarse))
+            let gain = evidence.coarse_base_chi2 - chi2;
+            let reduced = chi2 / self.freedom(model, Extent::Coarse);
+            (gain, reduced, study.real_values(Extent::Coarse))
         };
         let gain = (gain / evidence.scale).max(0.0);
         let single = ChiSquared::new(extra).map_or(1.0, |d| d.sf(gain));
@@ -367,7 +368,7 @@ impl<'a, S: Study> Engine<'a, S> {
             name: study.name(instance),
             nrms: study.residual(model, &fit.theta)?.nrms,
             held_out: held_out(study, model, &fit.theta, Extent::Coarse, REFIT_WITHOUT_FOLD)?,
-            delta_bic: extra * evidence.effective.ln() - gain,
+            delta_bic: extra * (evidence.share * values as f64).ln() - gain,
             p_value: (single * evidence.tests as f64).min(1.0),
             reduced_chi2,
             at_bound: own.clone().any(|i| fit.at_bound.contains(&i)),

@@ -41,7 +41,7 @@ pub fn starts(data: &DataSummary, peaks_hz: &[f64], mass_kg: f64) -> Vec<Vec<f64
         .copied()
         .chain(between)
         // A faint branch is found from a small mass only, a heavy one from a large.
-        .flat_map(|f| [1.0, 0.1, 0.01].map(|share| vec![share * mass_kg, f, 0.04]))
+        .flat_map(|f| [1.0, 0.05].map(|share| vec![share * mass_kg, f, 0.04]))
         .collect()
 }
 

@@ -205,6 +205,15 @@ pub enum Effort {
     Staged,
 }
 
+/// Starting points that get a step.
+const MOST_STARTS: usize = 12;
+/// Times the lowest misfit from which on a starting point is not followed directly.
+const HOPELESS: f64 = 3.0;
+
+const STEP: Stopping = Stopping {
+    max_iterations: 1,
+    relative_decrease: 1e-3,
+};
 const LOOK: Stopping = Stopping {
     max_iterations: 6,
     relative_decrease: 1e-3,
@@ -244,11 +253,24 @@ pub fn screen<S: Study>(
         Ok(fit) => fits.push(fit),
         Err(error) => failure = Some(error),
     };
-    let direct: Vec<(f64, Vec<f64>)> = bases.iter().filter_map(|b| lowest(&likelihood, b)).collect();
-    let best = direct.iter().map(|d| d.0).fold(f64::INFINITY, f64::min);
-    // A base that starts hopelessly high needs the rough misfit first.
-    for (_, start) in direct.iter().filter(|d| d.0 <= 3.0 * best) {
-        keep(minimise(&likelihood, start, &bounds, LOOK));
+    let mut starts: Vec<(f64, Vec<f64>)> = bases
+        .iter()
+        .flat_map(|base| own.iter().map(move |own| [base.as_slice(), own].concat()))
+        .map(|start| (likelihood.cost(&start).unwrap_or(f64::INFINITY), start))
+        .collect();
+    starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let best = starts.first().map_or(f64::INFINITY, |s| s.0);
+    starts.truncate(MOST_STARTS);
+    // A start close to where the effect vanishes costs little and promises nothing: one step tells (it is a score test
+    // there). A start that is hopelessly high needs the rough misfit first.
+    let mut steps: Vec<Fit> = starts
+        .iter()
+        .filter(|s| s.0 <= HOPELESS * best)
+        .filter_map(|(_, start)| minimise(&likelihood, start, &bounds, STEP).ok())
+        .collect();
+    steps.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    for step in steps.iter().take(if effort == Effort::Look { 1 } else { 2 }) {
+        keep(minimise(&likelihood, &step.theta, &bounds, LOOK));
     }
     if effort == Effort::Staged && 2.0 * best > TRAP_MISFIT * study.real_values(Extent::Coarse) as f64 {
         for base in bases {

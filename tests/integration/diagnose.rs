@@ -47,6 +47,65 @@ fn a_hidden_effect_is_named_with_its_parameters() {
     }
 }
 
+/// A posture or two of campaigns that an independent program made: a site among three, a flexible arm (many coordinates),
+/// a rocking base seen from the tool only.
+#[test]
+fn effects_with_and_without_a_site_are_named() {
+    for (name, key) in [
+        ("frf-9007", "frequency_hz"),
+        ("frf-9001", "young_pa"),
+        ("frf-9113", "rocking_nm_per_rad"),
+    ] {
+        let found = verdict(name);
+        let truth = truth(name);
+        assert_eq!(found["verdict"], "effect", "{name}");
+        assert_eq!(found["effect"], truth["effect"], "{name}");
+        assert_eq!(found["site"], truth["site"], "{name}");
+        assert!(found["confidence"].as_f64().unwrap() > 0.9, "{name}");
+        let best = &found["candidates"][0];
+        let value = best["parameters"][key].as_f64().unwrap();
+        let expected = truth["parameters"][key].as_f64().unwrap();
+        assert!((value / expected - 1.0).abs() < 0.02, "{name}: {value}, {expected}");
+    }
+}
+
+#[test]
+fn physics_that_the_library_does_not_have_is_unknown() {
+    let found = verdict("frf-9011");
+    assert_eq!(found["verdict"], "unknown");
+    assert!(found["effect"].is_null());
+    assert!(found["confidence"].as_f64().unwrap() > 0.5);
+}
+
+/// Diagnose, add, diagnose, add, diagnose: two hidden effects are found one after the other, and then nothing.
+#[test]
+fn two_effects_are_found_one_after_the_other() {
+    let dir = crate::support::copy_of("frf-9302");
+    let path = dir.path().to_str().unwrap();
+    let truth = truth("frf-9302");
+    let mut hidden = vec![
+        truth["effect"].as_str().unwrap().to_string(),
+        truth["also"][0]["effect"].as_str().unwrap().to_string(),
+    ];
+    let mut error = f64::INFINITY;
+    for _ in 0..2 {
+        let found = document(&["diagnose", path]);
+        assert_eq!(found["verdict"], "effect");
+        let effect = found["effect"].as_str().unwrap();
+        let at = hidden.iter().position(|h| h == effect).expect(effect);
+        hidden.remove(at);
+        let added = document(&["add", path, effect]);
+        assert_eq!(added["progress"], true);
+        let nrms = added["after"]["held_out_nrms"].as_f64().unwrap();
+        assert!(nrms < error && nrms < added["before"]["held_out_nrms"].as_f64().unwrap());
+        error = nrms;
+    }
+    let last = document(&["diagnose", path]);
+    assert_eq!(last["verdict"], "none");
+    let history = document(&["history", path]);
+    assert_eq!(history["revisions"].as_array().unwrap().len(), 3);
+}
+
 #[test]
 fn the_cutting_side_is_refused_plainly() {
     let dir = blind("frf-9112");

@@ -92,8 +92,7 @@ pub fn sections(findings: &StructureFindings) -> Vec<Section> {
 /// Model against measurement as curves.
 pub fn frf_section(findings: &StructureFindings) -> Section {
     let errors = &findings.analysis.after.frf_errors;
-    let mut order: Vec<usize> = (0..errors.len()).collect();
-    order.sort_by(|&a, &b| errors[b].times_noise().total_cmp(&errors[a].times_noise()));
+    let order = findings.analysis.after.worst_first();
     let best = order
         .iter()
         .copied()

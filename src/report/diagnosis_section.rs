@@ -132,11 +132,11 @@ fn candidate_chart(findings: &DiagnosisFindings) -> Block {
         title: "Error of the model with each effect added".into(),
         y_label: "Error nrms (%)".into(),
         groups: std::iter::once("model now".to_string())
-            .chain(
-                shown
-                    .iter()
-                    .map(|c| format!("+ {}", c.label().replace('@', " @"))),
-            )
+            // Spaces, so that long names break into lines.
+            .chain(shown.iter().map(|c| {
+                let site = c.name.site.as_ref().map_or(String::new(), |s| format!(" {s}"));
+                c.name.effect.replace('-', " ") + &site
+            }))
             .collect(),
         series: vec![
             BarSeries {

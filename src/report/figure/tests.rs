@@ -222,6 +222,7 @@ fn odd_tables_and_bars_never_panic() {
         }
         for log in [true, false] {
             let bars = SideBySide {
+                level: Some((LONG.into(), values.first().copied().unwrap_or(1.0))),
                 title: LONG.repeat(50),
                 y_label: LONG.into(),
                 groups: vec![LONG.into(); cells.len().min(60)],

@@ -111,9 +111,9 @@ pub struct FrfComparison {
 /// Sums behind an nrms.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Sums {
-    error: f64,
-    noise: f64,
-    signal: f64,
+    pub error: f64,
+    pub noise: f64,
+    pub signal: f64,
     /// Σ|model − measured|²/σ²: as large as `values` where only noise is left.
     pub weighted: f64,
     pub values: usize,

@@ -15,7 +15,7 @@ fn compare_says_where() {
     let compared = document(&["compare", dir]);
 
     let peaks = compared["residual_peaks"].as_array().unwrap();
-    assert!(!peaks.is_empty() && peaks.len() <= 4);
+    assert!(!peaks.is_empty() && peaks.len() <= 5);
     for (peak, hz) in peaks
         .iter()
         .zip(compared["residual_peaks_hz"].as_array().unwrap())

@@ -1,6 +1,6 @@
 //! Everything that can be said about a campaign, each part on its own: one that fails takes no other with it.
 
-use super::{LobeAnalysis, ModalAnalysis, StructureAnalysis};
+use super::{DiagnosisFindings, LobeAnalysis, ModalAnalysis, StructureAnalysis};
 use crate::campaign::{Campaign, LobeSource};
 use crate::cutting::{CfcOptions, CfcResult, identify_forces};
 use crate::identify::case::structure_model;
@@ -13,6 +13,8 @@ use crate::{Error, InputError, Result};
 pub struct CampaignFindings<'a> {
     pub campaign: &'a Campaign,
     pub structure: Option<Result<StructureFindings>>,
+    /// What the model lacks, where that was asked for.
+    pub diagnosis: Option<Result<DiagnosisFindings>>,
     /// The robot at the campaign's postures.
     pub postures: Option<Result<Vec<PostureFindings>>>,
     pub modal: Option<Result<ModalAnalysis>>,
@@ -43,18 +45,24 @@ pub struct LobeFindings {
 }
 
 impl<'a> CampaignFindings<'a> {
-    /// Works out all parts.
+    /// Works out all parts; `diagnosis`, which takes longest, where wanted.
     ///
     /// # Errors
     /// The campaign holds nothing to work on, or every part failed.
-    pub fn run(campaign: &'a Campaign) -> Result<Self> {
-        let structure = (!campaign.frfs.is_empty()).then(|| StructureFindings::run(campaign));
+    pub fn run(campaign: &'a Campaign, diagnosis: bool) -> Result<Self> {
+        // FRFs without a robot are to be had, too: for their modes.
+        let modelled = !campaign.frfs.is_empty() && campaign.robot.is_some();
+        let structure = modelled.then(|| StructureFindings::run(campaign));
         let calibrated = structure.as_ref().and_then(|s| s.as_ref().ok());
+        // Where nothing can be calibrated nothing can be diagnosed, for the same reason.
+        let diagnosis =
+            (diagnosis && calibrated.is_some()).then(|| DiagnosisFindings::run(campaign, Options::default()));
         let postures = (campaign.robot.is_some() && !campaign.postures.is_empty())
             .then(|| PostureFindings::run(campaign, calibrated));
         let findings = CampaignFindings {
             campaign,
             postures,
+            diagnosis,
             structure,
             modal: (!campaign.frfs.is_empty()).then(|| ModalAnalysis::run(campaign)),
             cutting: (!campaign.cuts.is_empty()).then(|| identify_forces(campaign, CfcOptions::default())),
@@ -91,15 +99,30 @@ impl<'a> CampaignFindings<'a> {
 
     /// What failed and why, each message once.
     pub fn errors(&self) -> Vec<String> {
+        self.messages(|_| true)
+    }
+
+    /// What failed because a file does not say what it should or cannot be read, each message once.
+    pub fn input_errors(&self) -> Vec<String> {
+        self.messages(|e| matches!(e, Error::Input(_) | Error::Io { .. }))
+    }
+
+    fn messages(&self, wanted: fn(&Error) -> bool) -> Vec<String> {
         let errors = [
             self.structure.as_ref().and_then(|r| r.as_ref().err()),
+            self.diagnosis.as_ref().and_then(|r| r.as_ref().err()),
             self.postures.as_ref().and_then(|r| r.as_ref().err()),
             self.modal.as_ref().and_then(|r| r.as_ref().err()),
             self.cutting.as_ref().and_then(|r| r.as_ref().err()),
             self.lobes.as_ref().and_then(|r| r.as_ref().err()),
         ];
         let mut messages: Vec<String> = Vec::new();
-        for message in errors.into_iter().flatten().map(ToString::to_string) {
+        for message in errors
+            .into_iter()
+            .flatten()
+            .filter(|e| wanted(e))
+            .map(ToString::to_string)
+        {
             if !messages.contains(&message) {
                 messages.push(message);
             }
@@ -110,6 +133,10 @@ impl<'a> CampaignFindings<'a> {
     /// The structural part where it succeeded.
     pub fn structure(&self) -> Option<&StructureFindings> {
         self.structure.as_ref().and_then(|r| r.as_ref().ok())
+    }
+
+    pub fn diagnosis(&self) -> Option<&DiagnosisFindings> {
+        self.diagnosis.as_ref().and_then(|r| r.as_ref().ok())
     }
 
     pub fn cutting(&self) -> Option<&CfcResult> {

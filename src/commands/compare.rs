@@ -5,10 +5,10 @@ use super::{CampaignArg, Domain, Outcome, structure_only};
 use crate::Result;
 use crate::analysis::StructureAnalysis;
 use crate::campaign::Campaign;
-use crate::discrepancy::FrfComparison;
-use crate::discrepancy::compare::Group;
+use crate::discrepancy::compare::{ErrorMap, Group};
+use crate::discrepancy::{FrfComparison, FrfError};
 use crate::identify::Options;
-use crate::identify::structure_study::held_out_postures;
+use crate::identify::structure_study::{ResidualPeak, held_out_postures, residual_peaks};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -33,6 +33,7 @@ pub fn run(args: Args) -> Result<Outcome> {
     let held_out = held_out_postures(&case.model, &case.data, &calibration.theta)?.map(|h| h.nrms());
     let mut error = json!(comparison.totals);
     error["held_out_nrms"] = json!(held_out);
+    let peaks = residual_peaks(&analysis.calibrated, &case.data);
     let json = json!({
         "domain": "structure",
         "revision": case.revision(),
@@ -43,13 +44,28 @@ pub fn run(args: Args) -> Result<Outcome> {
         "by_point": object(&comparison.by_point),
         "by_band": comparison.by_band,
         "map": comparison.map,
-        "worst_frfs": comparison.by_frf.iter().take(10).collect::<Vec<_>>(),
+        "residual_peaks_hz": peaks.iter().map(|p| p.frequency_hz).collect::<Vec<_>>(),
+        "residual_peaks": peaks,
+        "worst_frfs": comparison.worst_first().iter().take(10).map(|&i| frf(&comparison.frf_errors[i])).collect::<Vec<_>>(),
         "converged": calibration.converged,
         "warnings": notes,
     });
     Ok(Outcome {
         json,
-        text: format!("model: {}\n", case.model_description()) + &describe(comparison, held_out, notes),
+        text: format!("model: {}\n", case.model_description())
+            + &describe(comparison, held_out, &peaks, notes),
+    })
+}
+
+fn frf(error: &FrfError) -> Value {
+    json!({
+        "name": error.name,
+        "posture": error.posture,
+        "direction": error.direction,
+        "nrms": error.nrms,
+        "noise_floor_nrms": error.noise_floor_nrms,
+        "times_noise": error.times_noise(),
+        "worst_line": error.worst_line,
     })
 }
 
@@ -58,7 +74,12 @@ fn object(groups: &[Group]) -> Value {
     map.into()
 }
 
-fn describe(comparison: &FrfComparison, held_out: Option<f64>, notes: &[String]) -> String {
+fn describe(
+    comparison: &FrfComparison,
+    held_out: Option<f64>,
+    peaks: &[ResidualPeak],
+    notes: &[String],
+) -> String {
     let t = &comparison.totals;
     let mut text = format!(
         "calibrated model against measured FRFs\n  error (nrms)    {}\n  noise floor     {}\n  mean |dB|       {}\n",
@@ -72,6 +93,7 @@ fn describe(comparison: &FrfComparison, held_out: Option<f64>, notes: &[String])
             percent(held_out)
         );
     }
+    text += &dominant(peaks);
     for (title, groups) in [
         ("posture", &comparison.by_posture),
         ("direction", &comparison.by_direction),
@@ -108,5 +130,97 @@ fn describe(comparison: &FrfComparison, held_out: Option<f64>, notes: &[String])
         "\n{}",
         table(&["band Hz", "nrms", "noise", "times noise", ""], &rows)
     );
+    text += &format!("\n{}", grid(&comparison.map));
+    text += &format!("\n{}", worst(comparison));
     text + &warnings(notes)
+}
+
+/// The residual's dominant frequencies, in one line.
+pub fn dominant(peaks: &[ResidualPeak]) -> String {
+    let parts: Vec<String> = peaks
+        .iter()
+        .map(|p| format!("{} Hz ({:.1} × noise)", number(p.frequency_hz, 3), p.times_noise))
+        .collect();
+    match parts.is_empty() {
+        true => "  the residual stands out at no frequency\n".into(),
+        false => format!("  residual stands out at {}\n", parts.join(", ")),
+    }
+}
+
+/// Times noise from which on a character of the error map is used.
+const SHADES: [(f64, char); 5] = [(0.0, '·'), (1.5, '░'), (3.0, '▒'), (10.0, '▓'), (30.0, '█')];
+/// Directions beside each other, so that a line fits a terminal of 80 columns.
+const DIRECTIONS_A_LINE: usize = 5;
+
+/// The error map at a glance: a row a posture, a block a direction, a character a band.
+fn grid(map: &ErrorMap) -> String {
+    let shade = |value: &Option<f64>| match value {
+        None => ' ',
+        Some(v) => SHADES
+            .iter()
+            .rev()
+            .find(|(from, _)| v >= from)
+            .map_or('·', |s| s.1),
+    };
+    let bands = map.band_edges_hz.len().saturating_sub(1);
+    let width = map.postures.iter().map(|p| p.chars().count()).max().unwrap_or(0);
+    let ends = [map.band_edges_hz.first(), map.band_edges_hz.last()].map(|f| number(*f.unwrap_or(&0.0), 3));
+    let mut text = format!(
+        "  error map: a character a band, {} to {} Hz from left to right; times noise: · below 1.5, ░ from 1.5, ▒ from 3, \
+         ▓ from 10, █ from 30\n",
+        ends[0], ends[1]
+    );
+    for first in (0..map.directions.len()).step_by(DIRECTIONS_A_LINE) {
+        let directions = first..(first + DIRECTIONS_A_LINE).min(map.directions.len());
+        let names = directions
+            .clone()
+            .map(|d| format!("  {:<bands$}", map.directions[d]));
+        text += format!("  {:width$}{}", "", names.collect::<String>()).trim_end();
+        text += "\n";
+        for (posture, cells) in map.postures.iter().zip(&map.times_noise) {
+            let blocks = directions
+                .clone()
+                .map(|d| "  ".to_string() + &cells[d].iter().map(shade).collect::<String>());
+            text += format!("  {posture:<width$}{}", blocks.collect::<String>()).trim_end();
+            text += "\n";
+        }
+    }
+    text
+}
+
+/// FRFs in the table of the worst.
+const WORST_SHOWN: usize = 5;
+
+fn worst(comparison: &FrfComparison) -> String {
+    let row = |&i: &usize| {
+        let error = &comparison.frf_errors[i];
+        let mut row = vec![error.name.clone(), format!("{:.1}", error.times_noise())];
+        row.extend(error.worst_line.iter().flat_map(|line| {
+            [
+                line.frequency_hz,
+                line.measured_m_per_n * 1e6,
+                line.model_m_per_n * 1e6,
+                line.noise_m_per_n * 1e6,
+            ]
+            .map(|v| number(v, 3))
+        }));
+        row
+    };
+    let rows: Vec<Vec<String>> = comparison
+        .worst_first()
+        .iter()
+        .take(WORST_SHOWN)
+        .map(row)
+        .collect();
+    table(
+        &[
+            "worst FRFs",
+            "times noise",
+            "worst at Hz",
+            "measured µm/N",
+            "model µm/N",
+            "noise µm/N",
+        ],
+        &rows,
+    )
 }

@@ -9,12 +9,13 @@ use serde_json::json;
 use super::text::{number, percent};
 use super::{Outcome, report};
 use crate::analysis::{
-    CampaignFindings, LobeAnalysis, LobeFindings, ModalAnalysis, PostureFindings, StructureFindings,
-    ThesisFindings,
+    Addition, CampaignFindings, DiagnosisFindings, LobeAnalysis, LobeFindings, ModalAnalysis,
+    PostureFindings, StructureFindings, ThesisFindings,
 };
 use crate::builtin::{BuiltinCampaign, FIRST_CELL, SECOND_CELL};
 use crate::campaign::Campaign;
 use crate::cutting::{CfcOptions, CfcResult, identify_forces};
+use crate::identify::{Options, StructureCase};
 use crate::report::campaign as pages;
 use crate::revision::log_file;
 use crate::{Error, InputError, Result, ingest};
@@ -107,6 +108,27 @@ pub fn run(args: Args) -> Result<Outcome> {
         || StructureFindings::run(&second),
         compared,
     )?;
+    let diagnosis = story.step(
+        "diagnose",
+        of("diagnose", &second),
+        || DiagnosisFindings::run(&second, Options::default()),
+        crate::report::diagnosis_section::summary,
+    )?;
+    let missing = diagnosis.diagnosis.winner().map(|w| w.label());
+    let missing =
+        missing.ok_or_else(|| Error::computation("the built-in second cell shows no missing effect"))?;
+    story.step(
+        "add",
+        of("add", &second) + " " + &missing,
+        || Addition::run(&second, &missing, Options::default()),
+        added,
+    )?;
+    let extended = story.step(
+        "history",
+        of("history", &second),
+        || StructureCase::load(&second),
+        history,
+    )?;
     let thesis = story.step(
         "thesis",
         "lobestone thesis".into(),
@@ -117,6 +139,7 @@ pub fn run(args: Args) -> Result<Outcome> {
     let findings = CampaignFindings {
         campaign: &first,
         structure: Some(Ok(structure)),
+        diagnosis: None,
         postures: Some(Ok(postures)),
         modal: Some(Ok(modal)),
         cutting: Some(Ok(cutting)),
@@ -131,7 +154,13 @@ pub fn run(args: Args) -> Result<Outcome> {
         "report",
         of("report", &first) + " --thesis",
         || {
-            let page = pages::demo_page(&findings, &unexplained, &thesis, &rows);
+            let second = pages::SecondCell {
+                campaign: &second,
+                before: &unexplained,
+                diagnosis: &diagnosis,
+                after: &extended,
+            };
+            let page = pages::demo_page(&findings, &second, &thesis, &rows);
             pages::write(&page, &findings, &dir.join("report"))
         },
         |files| {
@@ -304,6 +333,28 @@ fn compared(s: &StructureFindings) -> String {
         percent(after.nrms),
         percent(after.noise_floor_nrms)
     )
+}
+
+fn added(addition: &Addition) -> String {
+    let held_out = addition.extension.after.held_out_nrms();
+    format!(
+        "error {} before, {} after; the noise is {}{}",
+        percent(addition.extension.before.residual.nrms),
+        percent(addition.totals.nrms),
+        percent(addition.totals.noise_floor_nrms),
+        held_out.map_or(String::new(), |h| format!(
+            "; {} on postures left out",
+            percent(h)
+        )),
+    )
+}
+
+fn history(case: &StructureCase) -> String {
+    let revisions = case.revisions.iter();
+    let errors: Vec<String> = revisions
+        .map(|r| format!("{}: {}", r.title(), percent(r.nrms)))
+        .collect();
+    errors.join(", ")
 }
 
 fn case_study(t: &ThesisFindings) -> String {

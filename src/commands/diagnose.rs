@@ -3,10 +3,11 @@ use serde_json::{Map, Value, json};
 use super::text::{number, percent, table, warnings};
 use super::{CampaignArg, Domain, Outcome, structure_only};
 use crate::Result;
+use crate::analysis::DiagnosisFindings;
 use crate::campaign::Campaign;
-use crate::discrepancy::{Candidate, Diagnosis, Verdict, diagnose, next_measurement};
-use crate::effects::Instance;
-use crate::identify::{Options, StructureCase, StructureModel, StructureStudy};
+use crate::discrepancy::explained::{Explained, NamedPart};
+use crate::discrepancy::{Candidate, Verdict};
+use crate::identify::Options;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -20,10 +21,13 @@ pub struct Args {
 pub fn run(args: Args) -> Result<Outcome> {
     structure_only(args.domain)?;
     let campaign = Campaign::load(&args.campaign.dir)?;
-    let case = StructureCase::load(&campaign)?;
-    let study = case.study(Options::default());
-    let diagnosis = diagnose(&study, &case.model)?;
-    let next_measurement = next_measurement::advise(&study.data, &diagnosis)?;
+    let findings = DiagnosisFindings::run(&campaign, Options::default())?;
+    let DiagnosisFindings {
+        case,
+        diagnosis,
+        next_measurement,
+        ..
+    } = &findings;
     let json = json!({
         "domain": "structure",
         "revision": case.revision(),
@@ -35,11 +39,14 @@ pub fn run(args: Args) -> Result<Outcome> {
         "companion": diagnosis.companion,
         "candidates": diagnosis.candidates.iter().map(candidate).collect::<Vec<_>>(),
         "indistinguishable": diagnosis.indistinguishable,
+        "explains": explains(&findings),
+        "residual_peaks_hz": findings.residual_peaks.iter().map(|p| p.frequency_hz).collect::<Vec<_>>(),
+        "residual_peaks": findings.residual_peaks,
         "next_measurement": next_measurement,
         "baseline": {
             "nrms": diagnosis.baseline.residual.nrms,
             "held_out_nrms": diagnosis.baseline.held_out.map(|h| h.nrms()),
-            "noise_floor_nrms": study.data.noise_floor_nrms(),
+            "noise_floor_nrms": case.data.noise_floor_nrms(),
             "reduced_chi2": diagnosis.baseline.reduced_chi2,
             "independent_share": diagnosis.baseline.residual.independent_share,
         },
@@ -47,7 +54,7 @@ pub fn run(args: Args) -> Result<Outcome> {
         "warnings": case.warnings,
     });
     let text = format!("model: {}\n", case.model_description())
-        + &describe(&campaign, &study, &diagnosis, &next_measurement)
+        + &describe(&campaign, &findings)
         + &warnings(&case.warnings);
     Ok(Outcome { json, text })
 }
@@ -94,16 +101,47 @@ fn candidate<M, I>(c: &Candidate<M, I>) -> Value {
 /// Candidates shown to a person; all are in the JSON.
 const SHOWN: usize = 8;
 
-fn describe(
-    campaign: &Campaign,
-    study: &StructureStudy,
-    d: &Diagnosis<StructureModel, Instance>,
-    next_measurement: &str,
-) -> String {
+/// What the missing effect (the leading candidate where none explains the rest) takes away of the residual, and where.
+fn explains(findings: &DiagnosisFindings) -> Value {
+    let (Some(leading), Some(candidate)) = (&findings.leading, findings.leader()) else {
+        return Value::Null;
+    };
+    let Explained {
+        total,
+        by_posture,
+        by_direction,
+        by_point,
+        by_band,
+        taken_from,
+        left_at,
+    } = &leading.explained;
+    let object = |parts: &[NamedPart]| -> Value {
+        let map: Map<String, Value> = parts.iter().map(|p| (p.name.clone(), json!(p.part))).collect();
+        map.into()
+    };
+    let mut json = json!(total);
+    json["effect"] = json!(candidate.name.effect);
+    json["site"] = json!(candidate.name.site);
+    json["by_posture"] = object(by_posture);
+    json["by_direction"] = object(by_direction);
+    json["by_point"] = object(by_point);
+    json["by_band"] = json!(by_band);
+    json["taken_from"] = json!(taken_from);
+    json["left_at"] = json!(left_at);
+    json
+}
+
+fn describe(campaign: &Campaign, findings: &DiagnosisFindings) -> String {
+    let DiagnosisFindings {
+        case,
+        diagnosis: d,
+        next_measurement,
+        ..
+    } = findings;
     let mut text = format!(
         "model as it stands: error (nrms) {}, noise floor {}, {:.2} times the noise variance\n\n",
         percent(d.baseline.residual.nrms),
-        percent(study.data.noise_floor_nrms()),
+        percent(case.data.noise_floor_nrms()),
         d.baseline.reduced_chi2,
     );
     let sure = format!("confidence {:.0} %", 100.0 * d.confidence);
@@ -117,6 +155,14 @@ fn describe(
         (Verdict::None, _) => format!("NOTHING is missing: what is left looks like noise ({sure})\n"),
         _ => format!("UNKNOWN: what is left is real, but no effect of the library explains it ({sure})\n"),
     };
+    text += &super::compare::dominant(&findings.residual_peaks);
+    if let (Some(leading), Some(candidate)) = (&findings.leading, findings.leader()) {
+        let who = match d.verdict {
+            Verdict::Unknown => format!("The best candidate, {},", candidate.label()),
+            _ => "It".into(),
+        };
+        text += &format!("  {}\n", leading.explained.sentence(&who));
+    }
     if let Some(companion) = &d.companion {
         text += &format!("  A second effect is likely besides: {companion}\n");
     }

@@ -4,10 +4,10 @@ use serde_json::{Value, json};
 
 use super::text::warnings;
 use super::{CampaignArg, Outcome};
-use crate::Result;
 use crate::analysis::{CampaignFindings, ThesisFindings};
 use crate::campaign::Campaign;
 use crate::report::campaign::{self, ReportFiles};
+use crate::{Error, Result};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -19,11 +19,27 @@ pub struct Args {
     /// Add the case study of the IRB 6640 (as the command thesis).
     #[arg(long)]
     thesis: bool,
+    /// Leave out which physics is missing (what `diagnose` does takes most of the time).
+    #[arg(long)]
+    no_diagnosis: bool,
+    /// Write the report although parts of it are missing because their files cannot be used.
+    #[arg(long)]
+    partial: bool,
 }
 
 pub fn run(args: Args) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
-    let findings = CampaignFindings::run(&campaign)?;
+    let findings = CampaignFindings::run(&campaign, !args.no_diagnosis)?;
+    let unusable = findings.input_errors();
+    if !args.partial && !unusable.is_empty() {
+        // A report that lost a part must not take the place of a whole one without anybody noticing.
+        return Err(Error::computation(format!(
+            "{}\nNo report was written, and an earlier one is as it was. To write it without what failed: lobestone report \
+             {} --partial",
+            unusable.join("\n"),
+            campaign.dir.display()
+        )));
+    }
     let thesis = args.thesis.then(ThesisFindings::run).transpose()?;
     let folder = args.out.unwrap_or_else(|| campaign.dir.join("report"));
     let page = campaign::page(&findings, thesis.as_ref());

@@ -44,6 +44,20 @@ pub struct FrfError {
     pub noise_floor_nrms: f64,
     /// One a band of the error map; `None` where nothing was measured.
     pub band_nrms: Vec<Option<f64>>,
+    /// The line on which the error stands highest above the noise.
+    pub worst_line: Option<WorstLine>,
+}
+
+/// The line of an FRF on which model and measurement differ most against the noise; magnitudes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct WorstLine {
+    pub frequency_hz: f64,
+    pub measured_m_per_n: f64,
+    pub model_m_per_n: f64,
+    /// Standard deviation of the complex value there.
+    pub noise_m_per_n: f64,
+    /// |model − measured| / noise.
+    pub times_noise: f64,
 }
 
 impl FrfError {
@@ -71,6 +85,8 @@ pub struct ErrorMap {
     pub posture_direction: Vec<Vec<Option<f64>>>,
     /// The same, error over noise: 1 where only noise is left.
     pub posture_direction_times_noise: Vec<Vec<Option<f64>>>,
+    /// Error over noise, `[posture][direction][band]`.
+    pub times_noise: Vec<Vec<Vec<Option<f64>>>>,
     /// All directions together: `[posture][band]`.
     pub posture_band: Vec<Vec<Option<f64>>>,
     /// All postures together: `[direction][band]`.
@@ -88,28 +104,43 @@ pub struct FrfComparison {
     pub by_point: Vec<Group>,
     pub by_band: Vec<Band>,
     pub map: ErrorMap,
-    /// Each FRF's own nrms, worst first.
-    pub by_frf: Vec<Group>,
     /// In the order of the data.
     pub frf_errors: Vec<FrfError>,
 }
 
 /// Sums behind an nrms.
 #[derive(Debug, Clone, Copy, Default)]
-struct Sums {
-    error: f64,
-    noise: f64,
-    signal: f64,
+pub(super) struct Sums {
+    pub error: f64,
+    pub noise: f64,
+    pub signal: f64,
+    /// Σ|model − measured|²/σ²: as large as `values` where only noise is left.
+    pub weighted: f64,
+    pub values: usize,
 }
 
 impl Sums {
-    fn add(&mut self, other: Sums) {
+    pub fn of_line(model: Complex64, measured: Complex64, noise_std: f64) -> Self {
+        let error = (model - measured).norm_sqr();
+        let noise = noise_std.powi(2);
+        Sums {
+            error,
+            noise,
+            signal: measured.norm_sqr(),
+            weighted: error / noise,
+            values: 1,
+        }
+    }
+
+    pub fn add(&mut self, other: Sums) {
         self.error += other.error;
         self.noise += other.noise;
         self.signal += other.signal;
+        self.weighted += other.weighted;
+        self.values += other.values;
     }
 
-    fn nrms(&self) -> f64 {
+    pub fn nrms(&self) -> f64 {
         ratio(self.error, self.signal)
     }
 
@@ -119,7 +150,7 @@ impl Sums {
     }
 
     /// Error over noise; `None` where nothing was measured.
-    fn times_noise(&self) -> Option<f64> {
+    pub fn times_noise(&self) -> Option<f64> {
         let floor = self.floor();
         (self.signal > 0.0 && floor > 0.0).then(|| self.nrms() / floor)
     }
@@ -154,9 +185,9 @@ impl Groups {
 }
 
 /// Number of bands the measured range is divided into, equal on a logarithmic scale.
-const BANDS: usize = 10;
+pub(super) const BANDS: usize = 10;
 
-fn band_edges_hz(data: &FrfData) -> Vec<f64> {
+pub(super) fn band_edges_hz(data: &FrfData) -> Vec<f64> {
     let all = || data.blocks.iter().flat_map(|b| b.frequency_hz.iter().copied());
     let high = all().fold(0.0, f64::max);
     let low = all().filter(|f| *f > 0.0).fold(high, f64::min).max(1e-3 * high);
@@ -166,7 +197,7 @@ fn band_edges_hz(data: &FrfData) -> Vec<f64> {
         .collect()
 }
 
-fn band_of(edges: &[f64], frequency_hz: f64) -> usize {
+pub(super) fn band_of(edges: &[f64], frequency_hz: f64) -> usize {
     edges[1..edges.len() - 1]
         .iter()
         .take_while(|e| frequency_hz >= **e)
@@ -174,6 +205,14 @@ fn band_of(edges: &[f64], frequency_hz: f64) -> usize {
 }
 
 impl FrfComparison {
+    /// Numbers of the FRFs in the data, most error against noise first.
+    pub fn worst_first(&self) -> Vec<usize> {
+        let errors = &self.frf_errors;
+        let mut order: Vec<usize> = (0..errors.len()).collect();
+        order.sort_by(|&a, &b| errors[b].times_noise().total_cmp(&errors[a].times_noise()));
+        order
+    }
+
     /// `predicted`: in the order of `data.frfs()`, on the same lines.
     pub fn new(data: &FrfData, points: &[Point], predicted: &[Vec<Complex64>]) -> Self {
         let edges = band_edges_hz(data);
@@ -182,20 +221,26 @@ impl FrfComparison {
         let (mut by_posture, mut by_direction, mut by_point) =
             (Groups::default(), Groups::default(), Groups::default());
         let mut bands = vec![Sums::default(); BANDS];
-        let mut by_frf = Vec::new();
         let mut frf_errors = Vec::new();
         let mut cells: Vec<(String, String, usize, Sums)> = Vec::new();
         for ((block, frf), model) in data.frfs().zip(predicted) {
             let posture = &data.posture_ids[frf.posture];
             let direction = format!("{}{}", frf.response.axis.letter(), frf.reference.axis.letter());
             let mut own = Sums::default();
+            let mut worst_line: Option<WorstLine> = None;
             let mut own_bands = vec![Sums::default(); BANDS];
             for (k, (h, m)) in frf.receptance.iter().zip(model).enumerate() {
-                let line = Sums {
-                    error: (m - h).norm_sqr(),
-                    noise: frf.noise_std[k].powi(2),
-                    signal: h.norm_sqr(),
-                };
+                let line = Sums::of_line(*m, *h, frf.noise_std[k]);
+                let times_noise = (line.error / line.noise).sqrt();
+                if worst_line.is_none_or(|w| times_noise > w.times_noise) {
+                    worst_line = Some(WorstLine {
+                        frequency_hz: block.frequency_hz[k],
+                        measured_m_per_n: h.norm(),
+                        model_m_per_n: m.norm(),
+                        noise_m_per_n: frf.noise_std[k],
+                        times_noise,
+                    });
+                }
                 own.add(line);
                 own_bands[band_of(&edges, block.frequency_hz[k])].add(line);
                 if h.norm() > 0.0 && m.norm() > 0.0 {
@@ -207,10 +252,6 @@ impl FrfComparison {
             by_posture.add(posture, own);
             by_direction.add(&direction, own);
             by_point.add(&points[frf.response.point].node.to_string(), own);
-            by_frf.push(Group {
-                name: frf.name.clone(),
-                nrms: own.nrms(),
-            });
             frf_errors.push(FrfError {
                 name: frf.name.clone(),
                 posture: posture.clone(),
@@ -218,13 +259,13 @@ impl FrfComparison {
                 nrms: own.nrms(),
                 noise_floor_nrms: own.floor(),
                 band_nrms: own_bands.iter().map(Sums::measured_nrms).collect(),
+                worst_line,
             });
             for (band, sums) in own_bands.iter().enumerate() {
                 bands[band].add(*sums);
                 cells.push((posture.clone(), direction.clone(), band, *sums));
             }
         }
-        by_frf.sort_by(|a, b| b.nrms.total_cmp(&a.nrms));
         let by_posture = by_posture.finish();
         let by_direction = by_direction.finish();
         let map = error_map(&by_posture, &by_direction, &edges, &cells);
@@ -253,7 +294,6 @@ impl FrfComparison {
                 })
                 .collect(),
             map,
-            by_frf,
             frf_errors,
         }
     }
@@ -286,15 +326,16 @@ fn error_map(
         postures: postures.iter().map(|g| g.name.clone()).collect(),
         directions: directions.iter().map(|g| g.name.clone()).collect(),
         band_edges_hz: edges.to_vec(),
-        nrms: sums
-            .iter()
-            .map(|p| {
-                p.iter()
-                    .map(|d| d.iter().map(Sums::measured_nrms).collect())
-                    .collect()
-            })
-            .collect(),
+        nrms: cell_values(&sums, Sums::measured_nrms),
+        times_noise: cell_values(&sums, Sums::times_noise),
     }
+}
+
+fn cell_values(sums: &[Vec<Vec<Sums>>], value: fn(&Sums) -> Option<f64>) -> Vec<Vec<Vec<Option<f64>>>> {
+    let of_direction = |bands: &Vec<Sums>| bands.iter().map(value).collect();
+    sums.iter()
+        .map(|p| p.iter().map(of_direction).collect())
+        .collect()
 }
 
 /// A table of `value` over the sums of each cell.

@@ -2,10 +2,12 @@
 
 pub mod compare;
 pub mod diagnose;
+pub mod explained;
 pub mod extension;
 pub mod next_measurement;
 pub mod verdict;
 
 pub use compare::{Band, FrfComparison, FrfError};
 pub use diagnose::{Candidate, Diagnosis, diagnose};
+pub use explained::Explained;
 pub use verdict::Verdict;

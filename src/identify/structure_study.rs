@@ -116,7 +116,8 @@ impl Study for StructureStudy {
 
     /// Frequencies at which the weighted residual is largest, most prominent first.
     fn hints(&self, model: &StructureModel, theta: &[f64]) -> Result<Vec<f64>> {
-        residual_peaks_hz(model, &self.data, theta)
+        let peaks = residual_peaks(&model.predict(theta, &self.data)?, &self.data);
+        Ok(peaks.iter().map(|p| p.frequency_hz).collect())
     }
 
     fn starts(&self, instance: &Instance, peaks_hz: &Vec<f64>) -> Vec<Vec<f64>> {
@@ -209,28 +210,43 @@ pub fn held_out_postures(model: &StructureModel, data: &FrfData, theta: &[f64]) 
 /// Neighbouring lines over which the residual's correlation is summed.
 const CORRELATION_LAGS: usize = 40;
 
+/// A frequency around which the residual stands out.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct ResidualPeak {
+    pub frequency_hz: f64,
+    /// Root mean square of |model − measured|/σ around there, over all FRFs: 1 is noise.
+    pub times_noise: f64,
+}
+
 /// Frequencies at which the weighted residual is largest, most prominent first. What neighbouring lines have in common
-/// is counted: noise has nothing, however well its size is known.
-pub fn residual_peaks_hz(model: &StructureModel, data: &FrfData, theta: &[f64]) -> Result<Vec<f64>> {
+/// is counted: noise has nothing, however well its size is known. `predicted` in the order of `data.frfs()`.
+pub fn residual_peaks(predicted: &[Vec<Complex64>], data: &FrfData) -> Vec<ResidualPeak> {
     const PEAKS: usize = 5;
     const BINS: usize = 90;
     /// Standard deviations of pure noise that a peak stands above.
     const CHANCE: f64 = 4.0;
+    #[derive(Clone, Copy, Default)]
+    struct Bin {
+        /// Σ of the real part of r̄(k) r(k − 1).
+        shared: f64,
+        squares: f64,
+        lines: usize,
+    }
     let summary = data.summary();
     let ratio = (summary.highest_hz / summary.lowest_hz).ln();
-    let mut bins = vec![(0.0, 0usize); BINS];
-    let predicted = model.predict(theta, data)?;
-    for ((block, frf), model) in data.frfs().zip(&predicted) {
+    let mut bins = vec![Bin::default(); BINS];
+    for ((block, frf), model) in data.frfs().zip(predicted) {
         let weighted = |k: usize| (model[k] - frf.receptance[k]) / frf.noise_std[k];
         for (k, f) in block.frequency_hz.iter().enumerate().skip(1) {
             let position = (f / summary.lowest_hz).ln() / ratio * BINS as f64;
             let bin = &mut bins[(position.max(0.0) as usize).min(BINS - 1)];
-            bin.0 += (weighted(k).conj() * weighted(k - 1)).re;
-            bin.1 += 1;
+            bin.shared += (weighted(k).conj() * weighted(k - 1)).re;
+            bin.squares += weighted(k).norm_sqr();
+            bin.lines += 1;
         }
     }
     // The product of two independent unit complex values has variance ½ in each part.
-    let level = |i: usize| bins[i].0 / (0.5 * bins[i].1.max(1) as f64).sqrt();
+    let level = |i: usize| bins[i].shared / (0.5 * bins[i].lines.max(1) as f64).sqrt();
     let mut peaks: Vec<usize> = (0..BINS)
         .filter(|&i| {
             let left = if i > 0 { level(i - 1) } else { 0.0 };
@@ -239,6 +255,9 @@ pub fn residual_peaks_hz(model: &StructureModel, data: &FrfData, theta: &[f64]) 
         })
         .collect();
     peaks.sort_by(|a, b| level(*b).total_cmp(&level(*a)));
-    let centre = |i: usize| summary.lowest_hz * (ratio * (i as f64 + 0.5) / BINS as f64).exp();
-    Ok(peaks.into_iter().take(PEAKS).map(centre).collect())
+    let peak = |i: usize| ResidualPeak {
+        frequency_hz: summary.lowest_hz * (ratio * (i as f64 + 0.5) / BINS as f64).exp(),
+        times_noise: (bins[i].squares / bins[i].lines.max(1) as f64).sqrt(),
+    };
+    peaks.into_iter().take(PEAKS).map(peak).collect()
 }

@@ -4,11 +4,13 @@ use std::path::{Path, PathBuf};
 
 use super::parts::{count, failed, paragraph};
 use super::{
-    Block, Column, Page, Section, Table, cutting_section, lobes_section, modal_section, structure_section,
-    thesis_section,
+    Block, Column, Page, Section, Table, cutting_section, diagnosis_section, error_map_section,
+    history_section, lobes_section, modal_section, structure_section, thesis_section,
 };
 use crate::Result;
-use crate::analysis::{CampaignFindings, StructureFindings, ThesisFindings};
+use crate::analysis::{CampaignFindings, DiagnosisFindings, StructureFindings, ThesisFindings};
+use crate::campaign::Campaign;
+use crate::identify::StructureCase;
 
 /// Folder of the tables beside the page.
 #[cfg(feature = "parquet")]
@@ -58,10 +60,20 @@ pub fn page(findings: &CampaignFindings, thesis: Option<&ThesisFindings>) -> Pag
 /// A step of the demo as its page tells it: name, what it found, what to type for the same.
 pub type StepRow = [String; 3];
 
+/// The demo's second campaign.
+pub struct SecondCell<'a> {
+    pub campaign: &'a Campaign,
+    /// The model without what is missing.
+    pub before: &'a StructureFindings,
+    pub diagnosis: &'a DiagnosisFindings,
+    /// With the revision that added it.
+    pub after: &'a StructureCase,
+}
+
 /// The demo's page: a campaign that the model explains, one that it does not, and the case study.
 pub fn demo_page(
     findings: &CampaignFindings,
-    unexplained: &StructureFindings,
+    second: &SecondCell,
     thesis: &ThesisFindings,
     steps: &[StepRow],
 ) -> Page {
@@ -72,7 +84,7 @@ pub fn demo_page(
         section.title = format!("First cell: {}", lower_first(&section.title));
     }
     page.sections.insert(0, demo_story(steps));
-    page.sections.extend(second_cell(unexplained));
+    page.sections.extend(second_cell(second));
     page.sections.push(thesis_section::section(thesis));
     page
 }
@@ -81,7 +93,8 @@ fn demo_story(steps: &[StepRow]) -> Section {
     let intro = "Both campaigns are simulated, so that what the program finds can be checked against what was put in. The \
                  first cell is a robot whose joints are up to 27 % off its data sheet, with noise on the FRFs, and a \
                  series of milling cuts with a drifting dynamometer: the model can explain all of it. In the second cell \
-                 something was added that the model does not have, and the program is not told what.";
+                 something was added that the model does not have, and the program is not told what: it finds the missing \
+                 physics, adds it to the model, and the error falls.";
     Section {
         id: "story".into(),
         title: "The story".into(),
@@ -112,14 +125,19 @@ fn lower_first(title: &str) -> String {
         .map_or(String::new(), |c| c.to_lowercase().chain(letters).collect())
 }
 
-fn second_cell(structure: &StructureFindings) -> Vec<Section> {
-    let mut frfs = structure_section::frf_section(structure);
-    frfs.title = "Second cell: model against measured FRFs".into();
+fn second_cell(cell: &SecondCell) -> Vec<Section> {
+    let mut frfs = structure_section::frf_section(cell.before);
     frfs.blocks
-        .insert(0, paragraph(structure_section::summary(structure)));
-    let mut map = structure_section::map_section(structure);
-    map.title = "Second cell: where the error is".into();
-    let mut sections = vec![frfs, map];
+        .insert(0, paragraph(structure_section::summary(cell.before)));
+    let mut sections = vec![
+        frfs,
+        error_map_section::map_section(cell.before),
+        diagnosis_section::section(cell.campaign, cell.diagnosis),
+    ];
+    sections.extend(history_section::section(cell.after));
+    for section in &mut sections {
+        section.title = format!("Second cell: {}", lower_first(&section.title));
+    }
     for section in &mut sections {
         section.id = format!("second-{}", section.id);
         for block in &mut section.blocks {
@@ -154,6 +172,11 @@ fn parts(findings: &CampaignFindings) -> Vec<Section> {
         Some(Err(error)) => sections.push(failed("frfs", "Model against measured FRFs", error)),
         None => {}
     }
+    match &findings.diagnosis {
+        Some(Ok(diagnosis)) => sections.push(diagnosis_section::section(findings.campaign, diagnosis)),
+        Some(Err(error)) => sections.push(failed(diagnosis_section::ID, diagnosis_section::TITLE, error)),
+        None => {}
+    }
     match &findings.postures {
         Some(Ok(postures)) => sections.push(structure_section::posture_section(postures)),
         Some(Err(error)) => sections.push(failed("postures", "The robot at the postures", error)),
@@ -183,6 +206,11 @@ fn summary(findings: &CampaignFindings) -> Section {
         findings
             .structure()
             .map(|s| paragraph(structure_section::summary(s))),
+    );
+    blocks.extend(
+        findings
+            .diagnosis()
+            .map(|d| paragraph(diagnosis_section::summary(d))),
     );
     blocks.extend(findings.modal().and_then(modal_section::summary).map(paragraph));
     blocks.extend(findings.cutting().map(|c| paragraph(cutting_section::summary(c))));

@@ -4,12 +4,11 @@ use super::figure::{self, HistoryFigure};
 use super::number::{percent, significant};
 use super::parts::{figure, listed, paragraph};
 use super::{Block, Column, Section, Table};
-use crate::analysis::StructureFindings;
+use crate::identify::StructureCase;
 use crate::revision::Revision;
 
 /// `None` where no effect was ever added.
-pub fn section(findings: &StructureFindings) -> Option<Section> {
-    let case = &findings.analysis.case;
+pub fn section(case: &StructureCase) -> Option<Section> {
     let revisions = &case.revisions;
     let current = revisions.last()?;
     let drawing = HistoryFigure {

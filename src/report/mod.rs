@@ -6,6 +6,8 @@
 
 pub mod campaign;
 pub mod cutting_section;
+pub mod diagnosis_section;
+pub mod error_map_section;
 pub mod figure;
 pub mod history_section;
 pub mod lobes_section;

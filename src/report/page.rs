@@ -137,13 +137,16 @@ impl Page {
             .map_err(failed)
     }
 
-    /// Writes the images and then `report.html` into `folder`, each file whole or not at all.
+    /// Writes the images and then `report.html` into `folder`, each file whole or not at all. Images of an earlier page
+    /// there that this one does not have are removed, if they are still as that page shows them.
     ///
     /// # Errors
     /// What the file system refuses, naming the file.
     pub fn write(&self, folder: &Path) -> Result<Written> {
         std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, e))?;
         let html = self.html()?;
+        let path = folder.join(HTML_NAME);
+        let earlier = std::fs::read_to_string(&path).unwrap_or_default();
         let mut files = Names::default();
         let mut images = vec![];
         for block in self.sections.iter().flat_map(|section| &section.blocks) {
@@ -153,10 +156,43 @@ impl Page {
                 images.push(path);
             }
         }
-        let path = folder.join(HTML_NAME);
         write_atomically(&path, html.as_bytes())?;
+        for stale in images_of(&earlier, folder) {
+            if !images.contains(&stale) {
+                std::fs::remove_file(&stale).map_err(|e| Error::io(&stale, e))?;
+            }
+        }
         Ok(Written { html: path, images })
     }
+}
+
+/// Files in `folder` that hold what the page `html` of this program shows under their name.
+fn images_of(html: &str, folder: &Path) -> Vec<PathBuf> {
+    /// Around the content and the name of an image, as the template writes them.
+    const MARKS: [&str; 4] = [
+        "src=\"data:image/png;base64,",
+        "\"",
+        "class=\"file\" href=\"",
+        "\"",
+    ];
+    let mut found = Vec::new();
+    for figure in html.split("<figure").skip(1) {
+        let between = |from: &str, to: &str| {
+            let rest = &figure[figure.find(from)? + from.len()..];
+            rest.get(..rest.find(to)?)
+        };
+        let (Some(data), Some(name)) = (between(MARKS[0], MARKS[1]), between(MARKS[2], MARKS[3])) else {
+            continue;
+        };
+        let plain = name
+            .strip_suffix(".png")
+            .is_some_and(|stem| slug(stem, "") == stem);
+        let path = folder.join(name);
+        if plain && std::fs::read(&path).is_ok_and(|png| base64(&png) == data) {
+            found.push(path);
+        }
+    }
+    found
 }
 
 impl Block {
@@ -376,6 +412,25 @@ mod tests {
         assert!(html.contains("href=\"etc-p1-2.png\""));
         // A second time over the first.
         assert_eq!(page("../../etc/p1 Ü.png").write(&target).unwrap(), written);
+    }
+
+    #[test]
+    fn images_that_the_new_page_lacks_are_removed_unless_they_are_somebodys() {
+        let folder = tempfile::tempdir().unwrap();
+        let files = |name: &str| folder.path().join(name);
+        page("old").write(folder.path()).unwrap();
+        std::fs::write(files("mine.png"), "a photograph").unwrap();
+        // Painted over since: somebody's now.
+        std::fs::write(files("old-2.png"), "changed").unwrap();
+        page("new").write(folder.path()).unwrap();
+        assert!(files("new.png").exists() && files("new-2.png").exists());
+        assert!(!files("old.png").exists());
+        assert!(files("old-2.png").exists() && files("mine.png").exists());
+        // A page that is none of ours names files, too.
+        std::fs::create_dir(files("below")).unwrap();
+        std::fs::write(files("secret.png"), "").unwrap();
+        let foreign = "<figure><img src=\"data:image/png;base64,\"><a class=\"file\" href=\"../secret.png\">x</a></figure>";
+        assert!(images_of(foreign, &files("below")).is_empty());
     }
 
     #[test]

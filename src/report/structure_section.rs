@@ -1,11 +1,9 @@
 //! The robot model against measured FRFs: FRFs, error map, parameters.
 
-use super::figure::{
-    self, CellFormat, FrfCurve, FrfFigure, HeatMap, NoiseLevel, ParameterFigure, ParameterRow,
-};
+use super::figure::{self, FrfCurve, FrfFigure, NoiseLevel, ParameterFigure, ParameterRow};
 use super::number::{decimals, percent, plus_minus, significant};
 use super::parts::{count, figure, listed, paragraph};
-use super::{Block, Column, Section, Table, history_section};
+use super::{Block, Column, Section, Table, error_map_section, history_section};
 use crate::analysis::{PostureFindings, StructureFindings};
 
 /// FRFs shown as figures: the worst and the best.
@@ -83,8 +81,8 @@ fn verdict(findings: &StructureFindings) -> String {
 }
 
 pub fn sections(findings: &StructureFindings) -> Vec<Section> {
-    let mut sections = vec![frf_section(findings), map_section(findings)];
-    sections.extend(history_section::section(findings));
+    let mut sections = vec![frf_section(findings), error_map_section::map_section(findings)];
+    sections.extend(history_section::section(&findings.analysis.case));
     sections.push(parameter_section(findings));
     sections
 }
@@ -92,8 +90,7 @@ pub fn sections(findings: &StructureFindings) -> Vec<Section> {
 /// Model against measurement as curves.
 pub fn frf_section(findings: &StructureFindings) -> Section {
     let errors = &findings.analysis.after.frf_errors;
-    let mut order: Vec<usize> = (0..errors.len()).collect();
-    order.sort_by(|&a, &b| errors[b].times_noise().total_cmp(&errors[a].times_noise()));
+    let order = findings.analysis.after.worst_first();
     let best = order
         .iter()
         .copied()
@@ -187,7 +184,7 @@ fn frf_figure(findings: &StructureFindings, index: usize, file: &str, place: &st
 }
 
 /// FRF names often hold the posture already.
-fn frf_name(posture: &str, name: &str) -> String {
+pub(super) fn frf_name(posture: &str, name: &str) -> String {
     if name.split_once(' ').is_some_and(|(first, _)| first == posture) {
         format!(
             "Posture {posture}, {}",
@@ -235,126 +232,6 @@ fn frf_table(findings: &StructureFindings, order: &[usize]) -> Block {
         rows: order.iter().take(LISTED).filter_map(row).collect(),
         notes,
     })
-}
-
-/// Where the error sits.
-pub fn map_section(findings: &StructureFindings) -> Section {
-    let after = &findings.analysis.after;
-    let map = &after.map;
-    let bands: Vec<String> = map
-        .band_edges_hz
-        .windows(2)
-        .map(|w| format!("{}–{}", significant(w[0], 2), significant(w[1], 2)))
-        .collect();
-    let heat = |title: &str, row: &str, column: &str, rows: &[String], columns: &[String], values| HeatMap {
-        title: title.into(),
-        row_label: row.into(),
-        column_label: column.into(),
-        rows: rows.to_vec(),
-        columns: columns.to_vec(),
-        values,
-        value_label: "error (nrms)".into(),
-        ..Default::default()
-    };
-    let by_direction = heat(
-        "Calibrated model: error by posture and direction",
-        "Posture",
-        "Direction (response, force)",
-        &map.postures,
-        &map.directions,
-        map.posture_direction.clone(),
-    );
-    let mut blocks = vec![figure(
-        "error-posture-direction",
-        "Error of the calibrated model by posture and direction",
-        "Error of the calibrated model by posture and direction, all frequencies together.",
-        by_direction.png(),
-    )];
-    let against_noise = HeatMap {
-        value_label: "error / noise".into(),
-        format: CellFormat::Significant(2),
-        range: Some((1.0, largest(&map.posture_direction_times_noise).max(2.0))),
-        ..heat(
-            "Calibrated model: error in multiples of the noise",
-            "Posture",
-            "Direction (response, force)",
-            &map.postures,
-            &map.directions,
-            map.posture_direction_times_noise.clone(),
-        )
-    };
-    blocks.push(figure(
-        "error-times-noise",
-        "Error of the calibrated model in multiples of the noise, by posture and direction",
-        "The same in multiples of the measurement's noise: 1 is noise alone. What is dark here is where to look first.",
-        against_noise.png(),
-    ));
-    for (file, title, row_label, rows, values) in [
-        (
-            "error-posture-band",
-            "posture",
-            "Posture",
-            &map.postures,
-            &map.posture_band,
-        ),
-        (
-            "error-direction-band",
-            "direction",
-            "Direction",
-            &map.directions,
-            &map.direction_band,
-        ),
-    ] {
-        let drawing = heat(
-            &format!("Calibrated model: error by {title} and frequency band"),
-            row_label,
-            "Band (Hz)",
-            rows,
-            &bands,
-            values.clone(),
-        );
-        blocks.push(figure(
-            file,
-            &drawing.title.clone(),
-            format!("Error of the calibrated model by {title} and frequency band."),
-            drawing.png(),
-        ));
-    }
-    let rows = after.by_band.iter().map(|b| {
-        let times = if b.noise_floor_nrms > 0.0 {
-            b.nrms / b.noise_floor_nrms
-        } else {
-            f64::NAN
-        };
-        vec![
-            format!("{}–{} Hz", significant(b.from_hz, 3), significant(b.to_hz, 3)),
-            percent(b.nrms),
-            percent(b.noise_floor_nrms),
-            significant(times, 2),
-        ]
-    });
-    blocks.push(Block::Table(Table {
-        caption: "Error by frequency band, all FRFs together".into(),
-        columns: vec![
-            Column::text("band"),
-            Column::number("error"),
-            Column::number("noise"),
-            Column::number("× noise"),
-        ],
-        rows: rows.collect(),
-        notes: vec![],
-    }));
-    Section {
-        id: "error-map".into(),
-        title: "Where the error is".into(),
-        lead: "Dark cells are where the calibrated model and the measurement differ most for their size. Where the robot \
-               hardly moves that may be noise alone: the second map, in multiples of the noise, says.".into(),
-        blocks,
-    }
-}
-
-fn largest(values: &[Vec<Option<f64>>]) -> f64 {
-    values.iter().flatten().flatten().copied().fold(0.0, f64::max)
 }
 
 /// What was tuned.

@@ -183,6 +183,7 @@ fn value_figure(
         values: rows.iter().map(|r| value(r).map(|v| v * scale)).collect(),
     };
     let drawing = SideBySide {
+        level: None,
         title: title.into(),
         y_label: y_label.into(),
         groups: rows.iter().map(|r| row_name(r)).collect(),

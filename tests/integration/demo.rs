@@ -20,6 +20,9 @@ fn the_demo_tells_the_whole_story() {
         "model",
         "calibrate",
         "compare",
+        "diagnose",
+        "add",
+        "history",
         "modal",
         "cfc",
         "lobes",
@@ -46,13 +49,29 @@ fn the_demo_tells_the_whole_story() {
     }
     the_thesis_in_the_page_is_that_of_the_command(&html);
 
-    // The campaigns work with every command as they lie there.
-    let compared = json_of(&["compare", dir.join("second-cell").to_str().unwrap(), "--json"]);
-    let error = &compared["error"];
+    for section in [
+        "second-frfs",
+        "second-error-map",
+        "second-missing-physics",
+        "second-history",
+    ] {
+        assert!(html.contains(&format!("<section id=\"{section}\">")), "{section}");
+    }
+
+    // The campaigns work with every command as they lie there; the second one with the effect that the story added.
+    let second = dir.join("second-cell");
+    let history = json_of(&["history", second.to_str().unwrap(), "--json"]);
+    let revisions = history["revisions"].as_array().unwrap();
+    let floor = history["noise_floor_nrms"].as_f64().unwrap();
+    let nrms = |i: usize| revisions[i]["nrms"].as_f64().unwrap();
+    assert_eq!(revisions.len(), 2);
+    // What was put in: datasets/README.md.
+    assert_eq!(revisions[1]["effects"], serde_json::json!(["tool-flexibility"]));
     assert!(
-        error["nrms"].as_f64().unwrap() > 5.0 * error["noise_floor_nrms"].as_f64().unwrap(),
+        nrms(0) > 5.0 * floor,
         "the second cell holds what the model cannot explain"
     );
+    assert!(nrms(1) < 1.1 * floor, "until it is added");
     let cfc = json_of(&["cfc", dir.join("first-cell").to_str().unwrap(), "--json"]);
     // What was put in: datasets/README.md.
     let ktc = cfc["pooled"][0]["ktc_n_per_mm2"]["value"].as_f64().unwrap();

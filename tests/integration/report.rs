@@ -2,8 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::support::program;
+use crate::support::{copy_of, document, program};
+use lobestone::Error;
+use lobestone::analysis::CampaignFindings;
 use lobestone::builtin::FIRST_CELL;
+use lobestone::campaign::Campaign;
+use lobestone::report::campaign::page;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -87,6 +91,7 @@ fn a_report_is_one_page_with_its_figures_beside_it() {
         "summary",
         "frfs",
         "error-map",
+        "missing-physics",
         "parameters",
         "modes",
         "records",
@@ -116,30 +121,118 @@ fn a_report_is_one_page_with_its_figures_beside_it() {
 fn the_folder_can_be_chosen() {
     let (folder, dir) = small_campaign();
     let out = folder.path().join("elsewhere/cell");
-    let json = json_of(&["report", text(&dir), "--out", text(&out), "--json"]);
+    let json = json_of(&[
+        "report",
+        text(&dir),
+        "--no-diagnosis",
+        "--out",
+        text(&out),
+        "--json",
+    ]);
     assert_eq!(json["html"], text(&out.join("report.html")));
     assert!(!dir.join("report").exists());
 }
 
 #[test]
-fn one_broken_part_does_not_take_the_others_with_it() {
+fn a_broken_file_stops_the_report_unless_a_partial_one_is_wanted() {
     let (_folder, dir) = small_campaign();
+    let whole = json_of(&["report", text(&dir), "--no-diagnosis", "--json"]);
+    let html = PathBuf::from(whole["html"].as_str().unwrap());
+    let before = std::fs::read(&html).unwrap();
     for cut in ["01", "02", "03", "04"] {
         std::fs::write(dir.join(format!("force/cut{cut}.txt")), "no measurement at all\n").unwrap();
     }
-    let json = json_of(&["report", text(&dir), "--json"]);
-    let html = std::fs::read_to_string(json["html"].as_str().unwrap()).unwrap();
-    assert!(html.contains("<section id=\"frfs\">"));
-    assert!(html.contains("This part could not be worked out."));
-    assert!(html.contains("cut01.txt"), "the error names the file");
+    let refused = run(&["report", text(&dir), "--no-diagnosis"]);
+    assert_eq!(refused.status.code(), Some(1));
+    let message = String::from_utf8_lossy(&refused.stderr).to_string();
+    assert!(
+        message.contains("cut01.txt") && message.contains("--partial"),
+        "{message}"
+    );
+    assert_eq!(std::fs::read(&html).unwrap(), before, "the whole report stays");
+    for image in whole["images"].as_array().unwrap() {
+        assert!(Path::new(image.as_str().unwrap()).exists());
+    }
+
+    let json = json_of(&["report", text(&dir), "--no-diagnosis", "--partial", "--json"]);
+    let page = std::fs::read_to_string(&html).unwrap();
+    assert!(page.contains("<section id=\"frfs\">"));
+    assert!(page.contains("This part could not be worked out."));
+    assert!(page.contains("cut01.txt"), "the error names the file");
     assert_eq!(json["missing"].as_array().unwrap().len(), 1);
+    assert!(
+        !dir.join("report/record-01.png").exists(),
+        "figures of the earlier report go"
+    );
+}
+
+#[test]
+fn a_diagnosis_that_fails_takes_nothing_else_with_it() {
+    let (_folder, dir) = small_campaign();
+    let campaign = Campaign::load(&dir).unwrap();
+    let mut findings = CampaignFindings::run(&campaign, false).unwrap();
+    findings.diagnosis = Some(Err(Error::computation("no effect could be tried")));
+    assert!(findings.input_errors().is_empty());
+    assert_eq!(findings.errors().len(), 1);
+    let html = page(&findings, None).html().unwrap();
+    assert!(html.contains("<section id=\"missing-physics\">"));
+    assert!(html.contains("This part could not be worked out. no effect could be tried"));
+    assert!(html.contains("<section id=\"frfs\">") && html.contains("<section id=\"regression-milling\">"));
+}
+
+/// A cell with something hidden in it: what is missing, drawn and said as `diagnose` says it.
+#[test]
+fn the_report_says_which_physics_is_missing() {
+    let copy = copy_of("frf-9114");
+    let dir = text(copy.path());
+    let found = document(&["diagnose", dir]);
+    let json = json_of(&["report", dir, "--json"]);
+    let html = std::fs::read_to_string(json["html"].as_str().unwrap()).unwrap();
+    let start = html.find("<section id=\"missing-physics\">").unwrap();
+    let section = &html[start..start + html[start..].find("</section>").unwrap()];
+    let effect = found["effect"].as_str().unwrap();
+    let stated = format!(
+        "The model lacks {effect} (confidence {:.0} %)",
+        100.0 * found["confidence"].as_f64().unwrap()
+    );
+    assert!(section.contains(&stated), "{stated}");
+    let best = found["candidates"][0]["nrms"].as_f64().unwrap();
+    assert!(section.contains(&lobestone::report::number::percent(best)));
+    // The template engine writes a slash as an entity.
+    assert!(
+        section
+            .replace("&#x2f;", "/")
+            .contains(&format!("lobestone add {dir} {effect}"))
+    );
+    let drawn = [
+        "missing-candidates",
+        "missing-map",
+        "missing-frf-1",
+        "missing-frf-2",
+        "missing-frf-3",
+    ];
+    for name in drawn {
+        let file = copy.path().join("report").join(format!("{name}.png"));
+        assert!(section.contains(&format!("{name}.png")));
+        assert_png(&file);
+    }
+
+    let without = json_of(&["report", dir, "--no-diagnosis", "--json"]);
+    let html = std::fs::read_to_string(without["html"].as_str().unwrap()).unwrap();
+    assert!(!html.contains("missing-physics"));
+    for name in drawn {
+        assert!(
+            !copy.path().join("report").join(format!("{name}.png")).exists(),
+            "{name}"
+        );
+    }
 }
 
 #[test]
 fn what_cannot_be_reported_leaves_the_earlier_report_alone() {
     let (_folder, dir) = small_campaign();
     let html = dir.join("report/report.html");
-    assert!(run(&["report", text(&dir)]).status.success());
+    assert!(run(&["report", text(&dir), "--no-diagnosis"]).status.success());
     let before = std::fs::read(&html).unwrap();
     let modified = std::fs::metadata(&html).unwrap().modified().unwrap();
 
@@ -187,7 +280,7 @@ fn tables_read_back_as_they_were_computed() {
     use polars::prelude::{ChunkAgg, ParquetReader, SerReader};
 
     let (_folder, dir) = small_campaign();
-    let json = json_of(&["report", text(&dir), "--json"]);
+    let json = json_of(&["report", text(&dir), "--no-diagnosis", "--json"]);
     let tables = json["tables"].as_array().unwrap();
     let frame = |name: &str| {
         let path = tables

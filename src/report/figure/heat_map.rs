@@ -33,6 +33,12 @@ pub struct HeatMap {
     pub format: CellFormat,
     /// Values at the ends of the colour scale; from 0 to the largest value if None.
     pub range: Option<(f64, f64)>,
+    /// A logarithmic colour scale; needs a `range` above zero.
+    pub log: bool,
+    /// Further tables of the same rows and columns, drawn beside the first on the same colour scale.
+    pub beside: Vec<Vec<Vec<Option<f64>>>>,
+    /// One a table, above it; none needed for a single table.
+    pub table_titles: Vec<String>,
 }
 
 impl HeatMap {
@@ -44,7 +50,11 @@ impl HeatMap {
             let what = format!("{rows} × {columns} cells cannot be told apart (400 × 300 at most)");
             return Err(nothing_to_draw(&self.title, &what));
         }
-        let cells = (0..rows).flat_map(|r| (0..columns).filter_map(move |c| self.value(r, c)));
+        let tables: Vec<Cells> = std::iter::once(&self.values)
+            .chain(&self.beside)
+            .map(|v| Cells(v))
+            .collect();
+        let cells = tables.iter().flat_map(|t| t.all(rows, columns));
         let Some((least, largest)) = extent(cells) else {
             return Err(nothing_to_draw(&self.title, "no cell has a finite value"));
         };
@@ -53,6 +63,7 @@ impl HeatMap {
             .filter(|(low, high)| usable(*low) && usable(*high) && high > low);
         let (low, high) = given.unwrap_or((least.min(0.0), largest));
         let high = if high > low { high } else { low + 1.0 };
+        let log = self.log && low > 0.0;
 
         let widest = self
             .rows
@@ -62,13 +73,16 @@ impl HeatMap {
             .min(300.0);
         let left = widest + 58.0;
         let right = f64::from(WIDTH) - 160.0;
-        let cell_width = (right - left) / columns as f64;
+        let gaps = GAP * (tables.len() - 1) as f64;
+        let table_width = (right - left - gaps) / tables.len() as f64;
+        let cell_width = table_width / columns as f64;
         // Few rows are drawn taller, so that the colour scale beside them has room.
         let cell_height = (840.0 / rows as f64)
             .min((190.0 / rows as f64).max(46.0))
             .max(6.0);
         let header = Header::new(&self.title, &[], left.min(58.0), f64::from(WIDTH) - 30.0);
-        let top = header.bottom() + 6.0;
+        let titled = self.table_titles.iter().any(|t| !t.is_empty());
+        let top = header.bottom() + if titled { 24.0 } else { 6.0 };
         let bottom = top + cell_height * rows as f64;
         let flat = self
             .columns
@@ -90,14 +104,28 @@ impl HeatMap {
             cell_height,
             low,
             high,
+            log,
         };
         // The colour scale needs some height, however few rows there are.
         let height = (bottom + below + 40.0).max(top + 250.0);
 
         paint(WIDTH, height as u32, |canvas| {
             header.draw(canvas);
-            self.draw_cells(canvas, &sheet);
-            self.draw_names(canvas, &sheet, flat);
+            for (i, cells) in tables.iter().enumerate() {
+                let left = left + (table_width + GAP) * i as f64;
+                let sheet = Sheet {
+                    left,
+                    right: left + table_width,
+                    ..sheet
+                };
+                self.draw_cells(canvas, &sheet, cells);
+                self.draw_names(canvas, &sheet, flat, i == 0);
+                if let Some(title) = self.table_titles.get(i) {
+                    let middle = (0.5 * (sheet.left + sheet.right), top - 13.0);
+                    let title = style::AXIS.fit(title, table_width);
+                    canvas.text(middle, &title, style::AXIS.align(Align::Center));
+                }
+            }
             let middle = (0.5 * (left + right), bottom + below + 16.0);
             canvas.text(middle, &self.column_label, style::AXIS.align(Align::Center));
             let row_title = style::AXIS.fit(&self.row_label, height - top);
@@ -110,11 +138,6 @@ impl HeatMap {
         })
     }
 
-    fn value(&self, row: usize, column: usize) -> Option<f64> {
-        let value = *self.values.get(row)?.get(column)?;
-        value.filter(|v| usable(*v))
-    }
-
     fn written(&self, value: f64) -> String {
         match self.format {
             CellFormat::Percent => percent(value),
@@ -122,10 +145,9 @@ impl HeatMap {
         }
     }
 
-    fn draw_cells(&self, canvas: &Canvas, sheet: &Sheet) {
-        let texts =
-            (0..self.rows.len()).flat_map(|r| (0..self.columns.len()).filter_map(move |c| self.value(r, c)));
-        let widest = texts
+    fn draw_cells(&self, canvas: &Canvas, sheet: &Sheet, cells: &Cells) {
+        let widest = cells
+            .all(self.rows.len(), self.columns.len())
             .map(|v| style::TICK.width(&self.written(v)))
             .fold(0.0, f64::max);
         let with_numbers = widest + 8.0 <= sheet.cell_width && sheet.cell_height >= 17.0;
@@ -134,11 +156,11 @@ impl HeatMap {
                 let (x, y) = sheet.corner(row, column);
                 let far = (x + sheet.cell_width, y + sheet.cell_height);
                 let middle = (x + 0.5 * sheet.cell_width, y + 0.5 * sheet.cell_height);
-                let Some(value) = self.value(row, column) else {
+                let Some(value) = cells.value(row, column) else {
                     canvas.text(middle, "–", style::TICK.align(Align::Center).color(style::GREY));
                     continue;
                 };
-                let color = style::ramp((value - sheet.low) / (sheet.high - sheet.low));
+                let color = style::ramp(sheet.share(value));
                 canvas.rect((x, y), far, color, 1.0);
                 if with_numbers {
                     let ink = if color.lightness() > 0.52 {
@@ -170,10 +192,11 @@ impl HeatMap {
         canvas.polyline(&corners, style::FRAME);
     }
 
-    fn draw_names(&self, canvas: &Canvas, sheet: &Sheet, flat: bool) {
+    fn draw_names(&self, canvas: &Canvas, sheet: &Sheet, flat: bool, with_rows: bool) {
         // Where cells are smaller than letters, every second, third, … name.
         let every = (15.0 / sheet.cell_height).ceil() as usize;
-        for (row, name) in self.rows.iter().enumerate().step_by(every.max(1)) {
+        let rows = if with_rows { self.rows.as_slice() } else { &[] };
+        for (row, name) in rows.iter().enumerate().step_by(every.max(1)) {
             let (x, y) = sheet.corner(row, 0);
             let name = style::TICK.fit(name, 300.0);
             canvas.text(
@@ -229,11 +252,16 @@ impl HeatMap {
         } else {
             1.0
         };
-        let axis = Axis::linear("", (sheet.low * unit, sheet.high * unit), 6);
-        for tick in &axis.ticks {
-            let Some(share) = axis.fraction(tick.at) else {
+        let ends = (sheet.low * unit, sheet.high * unit);
+        let axis = match sheet.log {
+            true => Axis::log("", ends),
+            false => Axis::linear("", ends, 6),
+        };
+        for tick in axis.ticks.iter().filter(|t| !sheet.log || !t.label.is_empty()) {
+            let share = sheet.share(tick.at / unit);
+            if !(-1e-9..=1.0 + 1e-9).contains(&share) {
                 continue;
-            };
+            }
             let y = sheet.top + length * (1.0 - share);
             canvas.line((x + width, y), (x + width + 5.0, y), style::FRAME);
             let value = match self.format {
@@ -257,9 +285,35 @@ struct Sheet {
     cell_height: f64,
     low: f64,
     high: f64,
+    log: bool,
+}
+
+/// Between two tables.
+const GAP: f64 = 18.0;
+
+/// A table of values.
+struct Cells<'a>(&'a [Vec<Option<f64>>]);
+
+impl Cells<'_> {
+    fn value(&self, row: usize, column: usize) -> Option<f64> {
+        let value = *self.0.get(row)?.get(column)?;
+        value.filter(|v| usable(*v))
+    }
+
+    fn all(&self, rows: usize, columns: usize) -> impl Iterator<Item = f64> + '_ {
+        (0..rows).flat_map(move |r| (0..columns).filter_map(move |c| self.value(r, c)))
+    }
 }
 
 impl Sheet {
+    /// Place on the colour scale; 0 and 1 are its ends.
+    fn share(&self, value: f64) -> f64 {
+        match self.log {
+            true => (value.max(f64::MIN_POSITIVE) / self.low).ln() / (self.high / self.low).ln(),
+            false => (value - self.low) / (self.high - self.low),
+        }
+    }
+
     fn corner(&self, row: usize, column: usize) -> (f64, f64) {
         (
             self.left + self.cell_width * column as f64,

@@ -89,6 +89,29 @@ pub fn heat_map(rows: usize, columns: usize) -> HeatMap {
     }
 }
 
+/// Two tables on one logarithmic colour scale.
+pub fn heat_map_pair() -> HeatMap {
+    let before = heat_map(24, 10);
+    let times = |factor: f64| {
+        let row = |row: &Vec<Option<f64>>| {
+            row.iter()
+                .map(|v| v.map(|v| (1.0 + factor * v).powi(2)))
+                .collect()
+        };
+        before.values.iter().map(row).collect::<Vec<_>>()
+    };
+    HeatMap {
+        values: times(10.0),
+        beside: vec![times(1.0)],
+        table_titles: vec!["before".into(), "after".into()],
+        value_label: "error / noise".into(),
+        format: CellFormat::Significant(2),
+        range: Some((1.0, 40.0)),
+        log: true,
+        ..before
+    }
+}
+
 pub fn parameters() -> ParameterFigure {
     let row = |i: usize| ParameterRow {
         name: format!("joint {} stiffness", i + 1),
@@ -268,6 +291,7 @@ pub fn side_by_side() -> SideBySide {
             },
         ],
         log: true,
+        level: Some(("least that can be measured".into(), 500.0)),
     }
 }
 
@@ -301,6 +325,7 @@ pub fn gallery() -> Vec<(&'static str, Result<Vec<u8>, Error>)> {
         ("nyquist", nyquist().png()),
         ("heat_map", heat_map(6, 9).png()),
         ("heat_map_large", heat_map(40, 36).png()),
+        ("heat_map_pair", heat_map_pair().png()),
         ("heat_map_small", heat_map(2, 3).png()),
         ("parameters", parameters().png()),
         ("force_record", force_record().png()),

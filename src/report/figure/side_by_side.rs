@@ -24,6 +24,8 @@ pub struct SideBySide {
     pub series: Vec<BarSeries>,
     /// Logarithmic values: zeros and negative ones are then left out.
     pub log: bool,
+    /// A level to compare with, and what it is.
+    pub level: Option<(String, f64)>,
 }
 
 const PLOT_HEIGHT: f64 = 420.0;
@@ -46,6 +48,11 @@ impl SideBySide {
                 .flat_map(|s| s.values.iter().take(count))
                 .filter_map(|v| *v)
         };
+        let level = self
+            .level
+            .as_ref()
+            .filter(|(_, v)| usable(*v) && (*v > 0.0 || !self.log));
+        let shown = || values().chain(level.map(|(_, v)| *v));
         // Numbers stand above their bars: lying if all of them fit, else upright, with room for the highest.
         let bar = Self::bar_width(f64::from(WIDTH) - 130.0, count, self.series.len());
         let longest = values()
@@ -54,7 +61,7 @@ impl SideBySide {
         let lying = longest <= bar - 3.0;
         let headroom = if lying { 24.0 } else { longest + 14.0 } / PLOT_HEIGHT;
         let y = match self.log {
-            true => positive_extent(values()).map(|(low, high)| {
+            true => positive_extent(shown()).map(|(low, high)| {
                 let low = 0.7 * low;
                 Axis::log(
                     &self.y_label,
@@ -64,7 +71,7 @@ impl SideBySide {
                     ),
                 )
             }),
-            false => extent(values()).map(|(low, high)| {
+            false => extent(shown()).map(|(low, high)| {
                 let room = headroom * (high.max(0.0) - low.min(0.0));
                 let (low, high) = (
                     if low < 0.0 { low - room } else { low },
@@ -92,7 +99,13 @@ impl SideBySide {
                 or(&series.label, "series").to_owned(),
             )
         });
-        let header = Header::new(&self.title, &legend.collect::<Vec<_>>(), left, right);
+        let level_legend = level.map(|(name, _)| (Swatch::Line(style::LEVEL), name.clone()));
+        let header = Header::new(
+            &self.title,
+            &legend.chain(level_legend).collect::<Vec<_>>(),
+            left,
+            right,
+        );
         let top = header.bottom();
         let below = match flat {
             true => 20.0 + 17.0 * names.iter().map(Vec::len).max().unwrap_or(1) as f64,
@@ -128,6 +141,9 @@ impl SideBySide {
             }
             for group in 0..count {
                 self.draw_group(canvas, &panel, group, lying);
+            }
+            if let Some(at) = level.and_then(|(_, v)| panel.y_at(*v)) {
+                canvas.line((left, at), (right, at), style::LEVEL);
             }
             for (group, lines) in names.iter().enumerate() {
                 let middle = left + room * (group as f64 + 0.5);

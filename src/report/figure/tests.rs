@@ -216,12 +216,16 @@ fn odd_tables_and_bars_never_panic() {
                 values: vec![cells.clone(), cells.iter().copied().skip(1).collect()],
                 format,
                 range: Some((values.first().copied().unwrap_or(1.0), 1.0)),
+                log: true,
+                beside: vec![vec![cells.clone()], vec![]],
+                table_titles: vec![LONG.into(); 2],
                 ..Default::default()
             };
             sound(&format!("map {i} {format:?}"), map.png());
         }
         for log in [true, false] {
             let bars = SideBySide {
+                level: Some((LONG.into(), values.first().copied().unwrap_or(1.0))),
                 title: LONG.repeat(50),
                 y_label: LONG.into(),
                 groups: vec![LONG.into(); cells.len().min(60)],

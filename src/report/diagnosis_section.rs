@@ -1,0 +1,350 @@
+//! Which physics the model lacks: verdict, candidates, and what the missing effect takes away.
+
+use num_complex::Complex64;
+
+use super::error_map_section::times_noise_map;
+use super::figure::{BarSeries, FrfCurve, FrfFigure, NoiseLevel, SideBySide};
+use super::number::{decimals, percent, significant};
+use super::parts::{figure, listed, paragraph, with_error};
+use super::structure_section::frf_name;
+use super::{Block, Column, Section, Table};
+use crate::analysis::DiagnosisFindings;
+use crate::analysis::diagnosis::Leading;
+use crate::campaign::Campaign;
+use crate::discrepancy::explained::Part;
+use crate::discrepancy::{Candidate, Verdict};
+use crate::effects::Instance;
+use crate::identify::StructureModel;
+
+pub const ID: &str = "missing-physics";
+pub const TITLE: &str = "Which physics is missing";
+
+/// Candidates shown.
+const LISTED: usize = 8;
+/// FRFs drawn.
+const FRFS_DRAWN: usize = 3;
+
+type StructureCandidate = Candidate<StructureModel, Instance>;
+
+/// The verdict in plain words.
+pub fn summary(findings: &DiagnosisFindings) -> String {
+    let d = &findings.diagnosis;
+    let sure = format!("confidence {:.0} %", 100.0 * d.confidence);
+    let mut text = match (d.verdict, d.winner()) {
+        (Verdict::Effect, Some(winner)) => format!(
+            "The model lacks {} ({sure}). {}",
+            winner.instance.title(),
+            winner.instance.effect.explanation()
+        ),
+        (Verdict::None, _) => {
+            format!("The model lacks nothing that these FRFs show: what is left looks like noise ({sure}).")
+        }
+        _ => format!(
+            "The model lacks something that no effect of the library explains ({sure}): what is left is real, but of a kind \
+             that this program does not know."
+        ),
+    };
+    if let Some(companion) = &d.companion {
+        text += &format!(" A second effect is likely besides: {companion}.");
+    }
+    text
+}
+
+/// The verdict and what it rests on.
+pub fn section(campaign: &Campaign, findings: &DiagnosisFindings) -> Section {
+    let d = &findings.diagnosis;
+    let mut blocks = vec![paragraph(summary(findings))];
+    if let Some(winner) = d.winner() {
+        blocks.push(paragraph(format!(
+            "How it shows: {}",
+            winner.instance.effect.fingerprint()
+        )));
+    }
+    if let (Some(leading), Some(candidate)) = (&findings.leading, findings.leader()) {
+        let who = match d.verdict {
+            Verdict::Unknown => format!("The best candidate, {},", candidate.instance.title()),
+            _ => "It".into(),
+        };
+        blocks.push(paragraph(leading.explained.sentence(&who)));
+    }
+    if !d.indistinguishable.is_empty() {
+        blocks.push(Block::Warning(format!(
+            "These data cannot tell it from {}.",
+            listed(&d.indistinguishable)
+        )));
+    }
+    blocks.push(paragraph(format!(
+        "Next measurement: {}.",
+        findings.next_measurement
+    )));
+    if let Some(winner) = d.winner() {
+        blocks.push(paragraph("To add it to the model and fit everything anew:"));
+        blocks.push(Block::Pre(format!(
+            "lobestone add {} {}",
+            campaign.dir.display(),
+            winner.label()
+        )));
+    }
+    if !d.candidates.is_empty() {
+        blocks.push(candidate_chart(findings));
+        blocks.push(candidate_table(findings));
+    }
+    if let (Some(leading), Some(candidate)) = (&findings.leading, findings.leader()) {
+        blocks.push(maps(findings, leading, candidate));
+        blocks.push(parts_table(leading, candidate));
+        for (rank, index) in findings
+            .now
+            .worst_first()
+            .into_iter()
+            .take(FRFS_DRAWN)
+            .enumerate()
+        {
+            blocks.extend(frf(findings, leading, candidate, rank, index));
+        }
+    }
+    if !d.not_tried.is_empty() {
+        let reasons: Vec<String> = d
+            .not_tried
+            .iter()
+            .map(|(e, why)| format!("{e} ({why})"))
+            .collect();
+        blocks.push(paragraph(format!("Not tried: {}.", reasons.join("; "))));
+    }
+    Section {
+        id: ID.into(),
+        title: TITLE.into(),
+        lead: "Each effect of the library is added to the model in turn and fitted together with everything else. One that is \
+               really missing brings the error down to the noise, also at postures that the fit has not seen."
+            .into(),
+        blocks,
+    }
+}
+
+fn candidate_chart(findings: &DiagnosisFindings) -> Block {
+    let d = &findings.diagnosis;
+    let shown: Vec<&StructureCandidate> = d.candidates.iter().take(LISTED).collect();
+    let percents = |first: Option<f64>, rest: Vec<Option<f64>>| {
+        let all = std::iter::once(first).chain(rest);
+        all.map(|v| v.map(|v| 100.0 * v)).collect::<Vec<_>>()
+    };
+    let held_out = |h: &Option<crate::identify::study::HeldOut>| h.map(|h| h.nrms());
+    let drawing = SideBySide {
+        title: "Error of the model with each effect added".into(),
+        y_label: "Error nrms (%)".into(),
+        groups: std::iter::once("model now".to_string())
+            // Spaces, so that long names break into lines.
+            .chain(shown.iter().map(|c| {
+                let site = c.name.site.as_ref().map_or(String::new(), |s| format!(" {s}"));
+                c.name.effect.replace('-', " ") + &site
+            }))
+            .collect(),
+        series: vec![
+            BarSeries {
+                label: "fitted postures".into(),
+                values: percents(
+                    Some(d.baseline.residual.nrms),
+                    shown.iter().map(|c| Some(c.nrms)).collect(),
+                ),
+            },
+            BarSeries {
+                label: "postures left out of the fit".into(),
+                values: percents(
+                    held_out(&d.baseline.held_out),
+                    shown.iter().map(|c| held_out(&c.held_out)).collect(),
+                ),
+            },
+        ],
+        log: true,
+        level: Some(("noise floor".into(), 100.0 * findings.now.totals.noise_floor_nrms)),
+    };
+    figure(
+        "missing-candidates",
+        "Error of the model now and with each candidate effect, against the noise floor",
+        "Error of the model as it is and with each candidate added, on postures that were fitted and on postures left out of \
+         the fit. The missing effect is the one that reaches the noise floor (dotted).",
+        drawing.png(),
+    )
+}
+
+fn candidate_table(findings: &DiagnosisFindings) -> Block {
+    let all = &findings.diagnosis.candidates;
+    let row = |c: &StructureCandidate| {
+        let parameters: Vec<String> = c
+            .parameters
+            .iter()
+            .map(|p| {
+                let name = p.name.rsplit('.').next().unwrap_or(&p.name);
+                format!("{name} {}", value(p.value, p.std_error))
+            })
+            .collect();
+        vec![
+            c.instance.title(),
+            percent(c.nrms),
+            c.held_out.map_or("–".into(), |h| percent(h.nrms())),
+            significant(c.delta_bic, 3),
+            if c.p_value < 1e-12 {
+                "< 1e-12".into()
+            } else {
+                significant(c.p_value, 2)
+            },
+            significant(c.reduced_chi2, 3),
+            parameters.join(", "),
+            if c.at_bound { "at the end of its range" } else { "" }.into(),
+        ]
+    };
+    let mut notes = vec![
+        "ΔBIC: below zero the effect pays for its parameters. p: chance of such an improvement where the effect is not there, \
+         corrected for the number of candidates. χ²/dof: squared error over squared noise; 1 is noise alone."
+            .into(),
+    ];
+    if all.len() > LISTED {
+        notes.push(format!("The first {LISTED} of {}.", all.len()));
+    }
+    Block::Table(Table {
+        caption: "Candidates, best first".into(),
+        columns: vec![
+            Column::text("effect"),
+            Column::number("error"),
+            Column::number("held-out error"),
+            Column::number("ΔBIC"),
+            Column::number("p"),
+            Column::number("χ²/dof"),
+            Column::text("parameters"),
+            Column::text(""),
+        ],
+        rows: all.iter().take(LISTED).map(row).collect(),
+        notes,
+    })
+}
+
+/// A parameter of any size with its standard error.
+fn value(value: f64, std_error: f64) -> String {
+    match value.abs() {
+        size if (0.1..1e5).contains(&size) => with_error(value, std_error),
+        _ if std_error.is_finite() => format!("{value:.3e} ± {std_error:.0e}"),
+        _ => format!("{value:.3e}"),
+    }
+}
+
+fn maps(findings: &DiagnosisFindings, leading: &Leading, candidate: &StructureCandidate) -> Block {
+    let with = format!("with {}", candidate.label());
+    let drawing = times_noise_map(
+        "Error in multiples of the noise, before and after",
+        &[("model now", &findings.now.map), (&with, &leading.comparison.map)],
+    );
+    figure(
+        "missing-map",
+        "Error map before and after the effect is added",
+        format!(
+            "Error in multiples of the noise by posture, direction and frequency band: the model as it is (left) and with \
+             {} (right), on one colour scale. 1 is noise alone.",
+            candidate.instance.title()
+        ),
+        drawing.png(),
+    )
+}
+
+fn parts_table(leading: &Leading, candidate: &StructureCandidate) -> Block {
+    let explained = &leading.explained;
+    let times = |v: Option<f64>| v.map_or("–".into(), |v| significant(v, 2));
+    let row = |name: String, part: &Part| {
+        vec![
+            name,
+            format!("{} → {}", percent(part.nrms_before), percent(part.nrms_after)),
+            format!(
+                "{} → {}",
+                times(part.times_noise_before),
+                times(part.times_noise_after)
+            ),
+            part.share
+                .map_or("–".into(), |s| format!("{} %", decimals(100.0 * s, 1))),
+            format!("{} %", decimals(100.0 * part.of_all, 1)),
+        ]
+    };
+    let mut rows = vec![row("everything".into(), &explained.total)];
+    for (kind, parts) in [
+        ("posture", &explained.by_posture),
+        ("direction", &explained.by_direction),
+        ("node", &explained.by_point),
+    ] {
+        rows.extend(parts.iter().map(|p| row(format!("{kind} {}", p.name), &p.part)));
+    }
+    rows.extend(explained.by_band.iter().map(|b| {
+        let name = format!("{}–{} Hz", significant(b.from_hz, 3), significant(b.to_hz, 3));
+        row(name, &b.part)
+    }));
+    Block::Table(Table {
+        caption: format!("What {} takes away, and where", candidate.instance.title()),
+        columns: vec![
+            Column::text("where"),
+            Column::number("error"),
+            Column::number("× noise"),
+            Column::number("taken away there"),
+            Column::number("of all it takes away"),
+        ],
+        rows,
+        notes: vec![
+            "Taken away there: share of the squared error above noise (each difference divided by its noise) that is gone; – \
+             where there was only noise."
+                .into(),
+        ],
+    })
+}
+
+fn frf(
+    findings: &DiagnosisFindings,
+    leading: &Leading,
+    candidate: &StructureCandidate,
+    rank: usize,
+    index: usize,
+) -> Option<Block> {
+    let (block, frf) = findings.case.data.frfs().nth(index)?;
+    let (now, with) = (
+        findings.now.frf_errors.get(index)?,
+        leading.comparison.frf_errors.get(index)?,
+    );
+    let curve = |label: String, value: &[Complex64]| FrfCurve {
+        label,
+        frequency_hz: block.frequency_hz.clone(),
+        value: value.to_vec(),
+    };
+    let name = frf_name(&now.posture, &now.name);
+    let drawing = FrfFigure {
+        title: format!("{name}: what {} changes", candidate.label()),
+        quantity: "Receptance".into(),
+        unit: "m/N".into(),
+        measured: Some(curve("measured".into(), &frf.receptance)),
+        models: vec![
+            curve(
+                format!("model now (error {})", percent(now.nrms)),
+                findings.predicted.get(index)?,
+            ),
+            curve(
+                format!("with {} (error {})", candidate.label(), percent(with.nrms)),
+                leading.predicted.get(index)?,
+            ),
+        ],
+        noise: Some(NoiseLevel {
+            label: "noise level".into(),
+            frequency_hz: block.frequency_hz.clone(),
+            magnitude: frf.noise_std.clone(),
+        }),
+    };
+    let place = [
+        "The FRF with most error against its noise",
+        "Second most",
+        "Third most",
+    ]
+    .get(rank)
+    .copied()
+    .unwrap_or("Much error against noise");
+    let caption = format!(
+        "{place}: {name}. Error {} now, {} with {}; its noise is {}.",
+        percent(now.nrms),
+        percent(with.nrms),
+        candidate.instance.title(),
+        percent(now.noise_floor_nrms)
+    );
+    let file = format!("missing-frf-{}", rank + 1);
+    Some(figure(file, &drawing.title.clone(), caption, drawing.png()))
+}

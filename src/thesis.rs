@@ -16,6 +16,8 @@ use crate::lobes::{AbsoluteLimit, Peak, RobotFrf, StabilitySolver, peak_near, sp
 use crate::robot::{PostureReport, RobotModel, RobotSpec};
 use crate::{Error, Result};
 
+pub mod real_case;
+
 const STATIC_STIFFNESS: &str = include_str!("../datasets/irb6640/static_stiffness.csv");
 const FREQUENCIES: &str = include_str!("../datasets/irb6640/frequencies_published_model.csv");
 const MODAL: &str = include_str!("../datasets/irb6640/modal_measured.csv");
@@ -137,7 +139,9 @@ struct ModalRow {
 #[derive(Deserialize)]
 struct MinimumRow {
     configuration: String,
+    axis: String,
     frequency_hz: f64,
+    real_receptance_m_per_n: f64,
 }
 
 fn rows<T: DeserializeOwned>(table: &str) -> Result<Vec<T>> {
@@ -248,6 +252,24 @@ fn strongest_mode(model: &StructureModel, row: &ModalRow) -> Result<StrongestMod
         frequency_hz: row.frequency_hz,
         peak_real_m_per_n: row.peak_real_receptance_m_per_n,
     })
+}
+
+#[allow(clippy::type_complexity)]
+fn tables(model: &StructureModel) -> Result<(Vec<crate::robot::Kinematics>, Vec<(usize, StrongestMode)>, Vec<(usize, Axis, Vec<crate::identify::resonance_study::Minimum>)>)> {
+    let ids = ["1", "2", "3", "4"];
+    let kinematics = ids.iter().map(|id| model.robot.kinematics(&posture_deg(id)?)).collect::<Result<Vec<_>>>()?;
+    let index = |id: &str| ids.iter().position(|i| *i == id).unwrap();
+    let strongest = rows::<ModalRow>(MODAL)?.iter().map(|r| Ok((index(&r.configuration), strongest_mode(model, r)?))).collect::<Result<Vec<_>>>()?;
+    let mut lists: Vec<(usize, Axis, Vec<crate::identify::resonance_study::Minimum>)> = Vec::new();
+    for row in rows::<MinimumRow>(MINIMA)? {
+        let key = (index(&row.configuration), if row.axis == "Y" { Axis::Y } else { Axis::X });
+        let m = crate::identify::resonance_study::Minimum { frequency_hz: row.frequency_hz, real_m_per_n: row.real_receptance_m_per_n };
+        match lists.iter_mut().find(|(c, a, _)| (*c, *a) == key) {
+            Some((_, _, l)) => l.push(m),
+            None => lists.push((key.0, key.1, vec![m])),
+        }
+    }
+    Ok((kinematics, strongest, lists))
 }
 
 /// Flange stiffness at all postures, measured at A and B.

@@ -52,7 +52,7 @@ fn predict_row(model: &StructureModel, theta: &[f64], row: &StrongestMode) -> Re
         let p = (mode.peak_real_m_per_n(row.axis) / row.peak_real_m_per_n).ln() / PAIRING_PEAK_STD;
         f * f + p * p
     };
-    let mode = posture_modes(model, theta, &row.kinematics, true)?
+    let mode = posture_modes(model, theta, &row.kinematics, f64::INFINITY, true)?
         .into_iter()
         .filter(|mode| mode.compliance_m_per_n[axis] > 0.0)
         .min_by(|a, b| distance(a).total_cmp(&distance(b)))

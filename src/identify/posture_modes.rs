@@ -40,11 +40,15 @@ impl PostureMode {
     }
 }
 
-/// All vibration modes at a posture, lowest first. Effects that only change channels do not show here.
+/// The vibration modes at a posture below `highest_hz`, lowest first. Effects that only change channels do not show here.
+///
+/// # Errors
+/// A chain whose stiffness is not positive definite.
 pub fn posture_modes(
     model: &StructureModel,
     theta: &[f64],
     kinematics: &Kinematics,
+    highest_hz: f64,
     with_derivatives: bool,
 ) -> Result<Vec<PostureMode>> {
     let chain = model.chain(theta, kinematics, 0.0, with_derivatives);
@@ -53,6 +57,7 @@ pub fn posture_modes(
     let modes = ModalBasis::new(&system.stiffness, &system.mass)?;
     let (shapes, mu) = (&modes.shapes, &modes.inverse_omega2);
     let n = mu.len();
+    let least = (std::f64::consts::TAU * highest_hz).powi(-2).max(0.0);
     let outputs = [Vector3::x(), Vector3::y(), Vector3::z()]
         .map(|axis| chain.output_row(kinematics.tcp(), model.robot.flange_place(), true, &axis));
     // Participation of each mode: with xᵀKx = 1 its square is the modal compliance 1/k.
@@ -61,14 +66,16 @@ pub fn posture_modes(
     let size = system.chain_count;
     let on_chain = |matrix: &DMatrix<f64>, x: &DVector<f64>| -> DVector<f64> {
         let mut result = DVector::zeros(n);
-        result.rows_mut(0, size).copy_from(&(matrix.view((0, 0), (size, size)) * x.rows(0, size)));
+        result
+            .rows_mut(0, size)
+            .copy_from(&(matrix.view((0, 0), (size, size)) * x.rows(0, size)));
         result
     };
     let times = |matrix: &Option<DMatrix<f64>>, x: &DVector<f64>| -> DVector<f64> {
         matrix.as_ref().map_or_else(|| DVector::zeros(n), |m| m * x)
     };
     (0..n)
-        .filter(|&k| mu[k] > 0.0)
+        .filter(|&k| mu[k] > least)
         .map(|k| {
             let x: DVector<f64> = shapes.column(k).into_owned();
             let strained = on_chain(&system.stiffness, &x);
@@ -100,7 +107,10 @@ pub fn posture_modes(
                 });
                 let dx = shapes * &weights;
                 let share_slope = 2.0 * dx.dot(&strained)
-                    + derivative.stiffness.as_ref().map_or(0.0, |dk| x.dot(&on_chain(dk, &x)));
+                    + derivative
+                        .stiffness
+                        .as_ref()
+                        .map_or(0.0, |dk| x.dot(&on_chain(dk, &x)));
                 let loss_slope = 2.0 * dx.dot(&damped) + x.dot(&times(&derivative.viscous, &x));
                 mode.ln_frequency_slope.push(-0.5 * mu_slope / mu[k]);
                 mode.damping_slope.push(
@@ -144,11 +154,16 @@ mod tests {
 
     #[test]
     fn slopes_agree_with_differences() {
-        for effect in ["local-resonator@link-3", "joint-transverse-compliance@joint-3", "payload"] {
+        for effect in [
+            "local-resonator@link-3",
+            "joint-transverse-compliance@joint-3",
+            "payload",
+        ] {
             let model = model(effect);
             let theta = model.nominal_theta();
             let kinematics = model.robot.kinematics(&TAP_POSTURES[0]).unwrap();
-            let modes = |t: &[f64], slopes| posture_modes(&model, t, &kinematics, slopes).unwrap();
+            let modes =
+                |t: &[f64], slopes| posture_modes(&model, t, &kinematics, f64::INFINITY, slopes).unwrap();
             let here = modes(&theta, true);
             for p in 0..theta.len() {
                 let h = 1e-6 * (1.0 + theta[p].abs());
@@ -160,7 +175,10 @@ mod tests {
                 for ((u, d), x) in at(1.0).iter().zip(&at(-1.0)).zip(&here) {
                     let close = |difference: f64, slope: f64| {
                         let error = (difference / (2.0 * h) - slope).abs();
-                        assert!(error < 2e-4 * (0.1 + slope.abs()), "{effect} {p}: {error} {slope}");
+                        assert!(
+                            error < 2e-4 * (0.1 + slope.abs()),
+                            "{effect} {p}: {error} {slope}"
+                        );
                     };
                     close((u.frequency_hz / d.frequency_hz).ln(), x.ln_frequency_slope[p]);
                     close(u.damping_ratio - d.damping_ratio, x.damping_slope[p]);
@@ -173,34 +191,46 @@ mod tests {
         }
     }
 
-    /// A resonator's mode: frequency and damping from the eigenproblem of the whole agree with the peak of the FRF.
+    /// A mode of the whole with its branch: frequency, damping and compliance agree with the real part of the full FRF.
     #[test]
     fn a_branch_shows_as_the_full_frf_has_it() {
-        let model = model("local-resonator@link-3");
-        let mut theta = model.nominal_theta();
-        let last = theta.len() - 3;
-        theta[last] = 20f64.ln();
-        theta[last + 1] = 40f64.ln();
-        theta[last + 2] = 0.02f64.ln();
+        let model = model("tool-flexibility");
+        let theta = model.nominal_theta();
         let kinematics = model.robot.kinematics(&TAP_POSTURES[0]).unwrap();
-        let modes = posture_modes(&model, &theta, &kinematics, false).unwrap();
-        let mode = modes
+        let modes = posture_modes(&model, &theta, &kinematics, 100.0, false).unwrap();
+        let tool: Vec<&PostureMode> = modes
             .iter()
-            .filter(|m| (30.0..60.0).contains(&m.frequency_hz))
-            .max_by(|a, b| a.compliance_m_per_n[0].total_cmp(&b.compliance_m_per_n[0]))
-            .unwrap();
+            .filter(|m| (35.0..75.0).contains(&m.frequency_hz))
+            .collect();
+        let axis = 0;
+        let most = |m: &&&PostureMode| m.compliance_m_per_n[axis];
+        let mode = *tool.iter().max_by(|a, b| most(a).total_cmp(&most(b))).unwrap();
         let chain = model.chain(&theta, &kinematics, 0.0, false);
         let row = chain.output_row(kinematics.tcp(), model.robot.flange_place(), true, &Vector3::x());
         let basis = FrfBasis::new(&chain.system(0), &[row]).unwrap();
         let real = |f: f64| basis.receptance_at(std::f64::consts::TAU * f, 0, 0).unwrap().re;
         let grid: Vec<f64> = (0..4000)
-            .map(|i| mode.frequency_hz * (0.9 + 0.2 * i as f64 / 4000.0))
+            .map(|i| mode.frequency_hz * (0.95 + 0.1 * i as f64 / 4000.0))
             .collect();
-        let lowest = grid.iter().copied().min_by(|a, b| real(*a).total_cmp(&real(*b))).unwrap();
-        let highest = grid.iter().copied().max_by(|a, b| real(*a).total_cmp(&real(*b))).unwrap();
-        assert!((lowest / mode.minimum_hz() - 1.0).abs() < 0.005, "{lowest} {mode:?}");
+        let lowest = grid
+            .iter()
+            .copied()
+            .min_by(|a, b| real(*a).total_cmp(&real(*b)))
+            .unwrap();
+        let highest = grid
+            .iter()
+            .copied()
+            .max_by(|a, b| real(*a).total_cmp(&real(*b)))
+            .unwrap();
+        assert!(
+            (lowest / mode.minimum_hz() - 1.0).abs() < 0.01,
+            "{lowest} {tool:?}"
+        );
         // Between the two extremes of a lone mode the real part falls by 1/(2kζ(1−ζ²)).
         let fall = (real(highest) - real(lowest)) * 2.0 * mode.damping_ratio;
-        assert!((fall / mode.compliance_m_per_n[0] - 1.0).abs() < 0.05, "{fall} {mode:?}");
+        assert!(
+            (fall / mode.compliance_m_per_n[axis] - 1.0).abs() < 0.1,
+            "{fall} {tool:?}"
+        );
     }
 }

@@ -109,7 +109,7 @@ fn explanations(case: &RealCase) -> Block {
             Column::number("variance left (1 is noise)"),
             Column::number("misfit held out"),
             Column::number("resonances with a mode"),
-            Column::number(&format!("of those at {}", bands.join("; "))),
+            Column::number(format!("of those at {}", bands.join("; "))),
             Column::number("static stiffness, model / measured"),
             Column::number("weight"),
             Column::text("parameters"),

@@ -21,6 +21,7 @@ impl RealCase {
                 answer.push(self.band_text(best, band, check));
             }
         }
+        answer.push(self.open_text());
         answer.push(self.rigid_text());
         answer.push(self.widened_text());
         answer.extend(self.next_text());
@@ -42,8 +43,8 @@ impl RealCase {
                 left(best)
             ),
             (Verdict::Unknown, Some(best)) => format!(
-                "Verdict: unknown (confidence {confidence:.2}). Something real is missing, and no single effect of the \
-                 library explains the tables; the best one, {}, {}.",
+                "Verdict: unknown (confidence {confidence:.2}). What is left is more than the assumed accuracy allows, and no \
+                 single effect of the library takes it away; the best one, {}, {}.",
                 best.name,
                 left(best)
             ),
@@ -107,6 +108,23 @@ impl RealCase {
             best.name,
             met(&self.baseline),
         )
+    }
+
+    /// Resonances that the best explanation has no mode for.
+    fn open_text(&self) -> String {
+        let open: Vec<String> = self
+            .resonances
+            .iter()
+            .filter(|r| !r.best_met)
+            .map(|r| format!("{} {} {:.1}", r.configuration, r.axis, r.frequency_hz))
+            .collect();
+        match open.as_slice() {
+            [] => "Every measured resonance finds a mode in the best explanation.".into(),
+            open => format!(
+                "Without a mode even in the best explanation (configuration, axis, Hz): {}.",
+                open.join("; ")
+            ),
+        }
     }
 
     fn rigid_text(&self) -> String {
@@ -189,6 +207,11 @@ impl RealCase {
             "Which mode belongs to which resonance was left open, and a model mode that no list names costs nothing: this \
              favours models with many modes."
                 .to_string(),
+            format!(
+                "Such tables have many nearly equal best fits: {} of {} starting points led the rigid model to the one given \
+                 here. The order of the rivals is no firmer than that.",
+                self.starts_agreeing, self.starts
+            ),
             "Link masses and inertias are the published ones. An error there moves all frequencies and would be taken for \
              an effect."
                 .to_string(),

@@ -43,6 +43,9 @@ pub struct RealCase {
     pub baseline: Explanation,
     /// Joint stiffnesses and damping there.
     pub baseline_parameters: Vec<Estimate>,
+    /// Starting points of that fit, and how many of them led to it.
+    pub starts: usize,
+    pub starts_agreeing: usize,
     /// Best first.
     pub candidates: Vec<Explanation>,
     /// Explanations whose BIC is within "very strong" of the best one's and better than none.
@@ -72,6 +75,8 @@ pub struct MeasuredResonance {
     /// Distance in standard deviations, frequency and size together.
     pub baseline_distance: f64,
     pub best_distance: f64,
+    /// Whether the best candidate has a mode within four standard deviations.
+    pub best_met: bool,
 }
 
 /// One way to explain the tables.
@@ -301,7 +306,20 @@ pub fn real_case(model: &StructureModel) -> Result<RealCase> {
             best_hz: after.frequency_hz,
             baseline_distance: before.distance2.sqrt(),
             best_distance: after.distance2.sqrt(),
+            best_met: after.is_there(),
         });
+    // The reason is the same at every site.
+    let mut not_tried: Vec<(String, String)> = diagnosis
+        .not_tried
+        .iter()
+        .map(|(label, reason)| {
+            (
+                label.split('@').next().unwrap_or(label).to_string(),
+                reason.clone(),
+            )
+        })
+        .collect();
+    not_tried.dedup();
     Ok(RealCase {
         verdict: diagnosis.verdict,
         confidence: diagnosis.confidence,
@@ -310,10 +328,12 @@ pub fn real_case(model: &StructureModel) -> Result<RealCase> {
         peak_std: PEAK_STD,
         depth_std: DEPTH_STD,
         baseline_parameters: base.calibration.parameters.clone(),
+        starts: base.calibration.starts,
+        starts_agreeing: base.calibration.starts_agreeing,
         baseline_modes_hz: modes_hz(model, &base.theta)?,
         best_modes_hz: modes_hz(&best.model, &best.theta)?,
         widened: widened(model)?,
-        not_tried: diagnosis.not_tried.clone(),
+        not_tried,
         baseline,
         candidates,
         rivals,

@@ -16,6 +16,11 @@ use crate::lobes::{AbsoluteLimit, Peak, RobotFrf, StabilitySolver, peak_near, sp
 use crate::robot::{PostureReport, RobotModel, RobotSpec};
 use crate::{Error, Result};
 
+mod answer;
+pub mod real_case;
+
+pub use real_case::{RealCase, real_case};
+
 const STATIC_STIFFNESS: &str = include_str!("../datasets/irb6640/static_stiffness.csv");
 const FREQUENCIES: &str = include_str!("../datasets/irb6640/frequencies_published_model.csv");
 const MODAL: &str = include_str!("../datasets/irb6640/modal_measured.csv");
@@ -43,7 +48,7 @@ pub struct Row {
     pub fitted: bool,
 }
 
-/// A group of measured resonances that the calibrated model has no mode for.
+/// A group of measured resonances for which the model calibrated on the strongest modes has no mode.
 #[derive(Debug, Clone, serde::Serialize)]
 pub struct Unexplained {
     pub from_hz: f64,
@@ -71,6 +76,8 @@ pub struct CaseStudy {
     pub fitted_frequency_error: f64,
     pub predicted_frequency_error: f64,
     pub unexplained: Vec<Unexplained>,
+    /// What the loop proposes for them.
+    pub real_case: RealCase,
     /// Table 30.
     pub lobes: Vec<LobeRow>,
 }
@@ -162,15 +169,20 @@ pub fn posture_deg(id: &str) -> Result<[f64; 6]> {
 /// Bands in which the thesis measured resonances again and again, Hz.
 const RECURRING_BANDS: [(f64, f64); 2] = [(32.0, 37.0), (47.0, 49.0)];
 
-/// Works out all tables.
-pub fn case_study() -> Result<CaseStudy> {
+/// The built-in robot with the published compliances.
+fn untuned_model() -> Result<StructureModel> {
     let section = RobotSection {
         model: "irb6640".into(),
         mass_tolerance: None,
         stiffness_tolerance: 0.3,
     };
     let spec = RobotSpec::load(&section.model, std::path::Path::new("."))?;
-    let model = StructureModel::new(RobotModel::new(spec), Vec::new(), &section);
+    Ok(StructureModel::new(RobotModel::new(spec), Vec::new(), &section))
+}
+
+/// Works out all tables.
+pub fn case_study() -> Result<CaseStudy> {
+    let model = untuned_model()?;
     let modal: Vec<ModalRow> = rows(MODAL)?;
     let strongest = modal
         .iter()
@@ -237,6 +249,7 @@ pub fn case_study() -> Result<CaseStudy> {
         fitted_frequency_error: rms(fit_sum),
         predicted_frequency_error: rms(prediction_sum),
         unexplained: unexplained(&model, &fit.theta)?,
+        real_case: real_case(&model)?,
         lobes: lobe_rows(&model, &nominal, &fit.theta)?,
     })
 }

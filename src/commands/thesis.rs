@@ -4,7 +4,8 @@ use super::Outcome;
 use super::text::{number, percent, table};
 use crate::Result;
 use crate::lobes::Peak;
-use crate::thesis::{CaseStudy, LobeTips, Row, case_study};
+use crate::thesis::real_case::Explanation;
+use crate::thesis::{CaseStudy, LobeTips, RealCase, Row, case_study};
 
 #[derive(clap::Args)]
 pub struct Args {}
@@ -80,6 +81,67 @@ fn tips(name: &str, tips: &LobeTips) -> Vec<String> {
     ]
 }
 
+/// The loop on the tables: every explanation, then the answer in words.
+fn real_case(case: &RealCase) -> String {
+    let row = |e: &Explanation| {
+        let parameters: Vec<String> = e
+            .parameters
+            .iter()
+            .map(|p| {
+                let name = p.name.rsplit('.').next().unwrap_or_default();
+                format!("{name} {}", number(p.value, 3))
+            })
+            .collect();
+        let bands: Vec<String> = e
+            .bands
+            .iter()
+            .map(|b| format!("{}/{}", b.met, b.measured))
+            .collect();
+        let [low, high] = e.static_ratio;
+        vec![
+            e.name.clone(),
+            format!("{:+.1}", e.delta_bic),
+            format!("{:.0e}", e.p_value),
+            format!("{:.1}", e.reduced_chi2),
+            format!("{:.0}", e.held_out_chi2),
+            format!("{}/{}", e.met, case.resonances.len()),
+            bands.join(", "),
+            format!("{low:.2}-{high:.2}"),
+            format!("{:.2}", e.weight),
+            if e.at_bound { "at its bound" } else { "" }.to_string(),
+            parameters.join(", "),
+        ]
+    };
+    let header = [
+        "explanation",
+        "BIC",
+        "p",
+        "variance",
+        "held out",
+        "met",
+        "by band",
+        "static/meas.",
+        "weight",
+        "",
+        "parameters",
+    ];
+    let rows: Vec<Vec<String>> = std::iter::once(&case.baseline)
+        .chain(&case.candidates)
+        .map(row)
+        .collect();
+    let mut text = format!(
+        "\nWhich effect is missing there? The loop on both tables, all four configurations\n{}",
+        table(&header, &rows)
+    );
+    for paragraph in case.answer().iter().chain(&case.caveats()) {
+        text += &format!("  - {paragraph}\n");
+    }
+    for (effect, reason) in &case.not_tried {
+        text += &format!("  not tried: {effect}: {reason}\n");
+    }
+    text
+}
+
 fn describe(study: &CaseStudy) -> String {
     let mut text = String::from(
         "The source thesis put right (ABB IRB 6640)\n\nStatic stiffness at the flange, tables 5 and 6\n",
@@ -119,7 +181,7 @@ fn describe(study: &CaseStudy) -> String {
             &parameters
         )
     );
-    text += "\nNot explained by any rigid-link model, calibrated or not\n";
+    text += "\nNot explained by the rigid-link model, before or after calibration on the strongest modes\n";
     for band in &study.unexplained {
         text += &format!(
             "  {} minima of the real part at {}-{} Hz, configurations {}; the model's nearest mode is at {:.1} Hz\n",
@@ -130,6 +192,7 @@ fn describe(study: &CaseStudy) -> String {
             band.nearest_model_hz,
         );
     }
+    text += &real_case(&study.real_case);
     text += "\nDrilling lobes, table 30: tips of the envelope (rpm / mm) and absolute limit (mm)\n";
     let mut lobes = Vec::new();
     for row in &study.lobes {

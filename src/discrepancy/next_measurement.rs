@@ -6,11 +6,10 @@ use super::diagnose::{Candidate, Diagnosis};
 use super::verdict::Verdict;
 use crate::Result;
 use crate::effects::Instance;
-use crate::identify::frf_data::FrfBlock;
 use crate::identify::{FrfData, StructureModel};
 use crate::ingest::Axis;
 use crate::robot::frf::Response;
-use crate::robot::{FrfBasis, Place, Slot};
+use crate::robot::{FrfBasis, Kinematics, Place, Slot};
 
 /// What to measure next, in a sentence.
 pub fn advise(data: &FrfData, diagnosis: &Diagnosis<StructureModel, Instance>) -> Result<String> {
@@ -57,22 +56,82 @@ fn most_different(
     a: &Candidate<StructureModel, Instance>,
     b: &Candidate<StructureModel, Instance>,
 ) -> Result<String> {
-    let outputs = 3 * (a.model.robot.joint_count() + 1);
-    let mut best: Option<(f64, String)> = None;
     let mut seen = Vec::new();
+    let mut lookouts = Vec::new();
     for block in &data.blocks {
-        if seen.contains(&block.posture) {
-            continue;
+        if !seen.contains(&block.posture) {
+            seen.push(block.posture);
+            lookouts.push(Lookout {
+                posture: &data.posture_ids[block.posture],
+                kinematics: &block.kinematics,
+                lowness: block.lowness,
+                frequency_hz: block.frequency_hz.iter().copied().step_by(LINE_STEP).collect(),
+            });
         }
-        seen.push(block.posture);
+    }
+    let greatest = greatest_difference(&lookouts, (&a.model, &a.theta), (&b.model, &b.theta), 0.0)?;
+    let otherwise = "repeat the measurement at another posture";
+    Ok(greatest.map_or(otherwise.into(), |d| d.sentence()))
+}
+
+/// A posture at which one could measure, and the lines that are looked at there.
+#[derive(Debug, Clone)]
+pub struct Lookout<'a> {
+    pub posture: &'a str,
+    pub kinematics: &'a Kinematics,
+    /// See [`crate::effects::Setting`].
+    pub lowness: f64,
+    pub frequency_hz: Vec<f64>,
+}
+
+/// An FRF on which two explanations differ.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Difference {
+    pub posture: String,
+    /// In words: `the tool point`, `the far end of link 3`.
+    pub point: String,
+    /// Base axis of the response, and of the hit at the tool point.
+    pub response: char,
+    pub hit: char,
+    /// Rms difference over the first one's rms.
+    pub relative: f64,
+}
+
+impl Difference {
+    pub fn sentence(&self) -> String {
+        format!(
+            "measure {} in base {}, hitting the tool in {}, at posture {}: the two explanations differ by {:.0} % there",
+            self.point,
+            self.response,
+            self.hit,
+            self.posture,
+            100.0 * self.relative
+        )
+    }
+}
+
+/// The FRF (response at the tool point or a link's far end, hit at the tool) on which two models differ most. FRFs whose
+/// rms is below `least_share` of the largest one's are passed over: they drown in noise. `None` without lines.
+///
+/// # Errors
+/// A model that has no response.
+pub fn greatest_difference(
+    lookouts: &[Lookout],
+    (a, theta_a): (&StructureModel, &[f64]),
+    (b, theta_b): (&StructureModel, &[f64]),
+    least_share: f64,
+) -> Result<Option<Difference>> {
+    let outputs = 3 * (a.robot.joint_count() + 1);
+    let mut all: Vec<(f64, Difference)> = Vec::new();
+    for lookout in lookouts {
         let (first, second) = (
-            point_basis(&a.model, &a.theta, block)?,
-            point_basis(&b.model, &b.theta, block)?,
+            point_basis(a, theta_a, lookout)?,
+            point_basis(b, theta_b, lookout)?,
         );
         // Outputs: tool, then the far end of each link; three axes each. Hit at the tool, in three axes.
         let mut sums = vec![(0.0, 0.0); 3 * outputs];
         let (mut ra, mut rb) = (Response::default(), Response::default());
-        for f in block.frequency_hz.iter().step_by(LINE_STEP) {
+        for f in &lookout.frequency_hz {
             let omega = std::f64::consts::TAU * f;
             first.solve(omega, &mut ra)?;
             second.solve(omega, &mut rb)?;
@@ -86,35 +145,37 @@ fn most_different(
         }
         for (i, (difference, size)) in sums.into_iter().enumerate() {
             let (out, input) = (i / 3, i % 3);
-            let relative = if size > 0.0 {
-                f64::sqrt(difference / size)
-            } else {
-                0.0
+            let point = match out / 3 {
+                0 => "the tool point".into(),
+                link => format!("the far end of link {link}"),
             };
-            if best.as_ref().is_none_or(|(least, _)| relative > *least) {
-                let point = if out < 3 {
-                    "the tool point".into()
+            let difference = Difference {
+                posture: lookout.posture.into(),
+                point,
+                response: Axis::ALL[out % 3].letter(),
+                hit: Axis::ALL[input].letter(),
+                relative: if size > 0.0 {
+                    f64::sqrt(difference / size)
                 } else {
-                    format!("the far end of link {}", out / 3)
-                };
-                let posture = &data.posture_ids[block.posture];
-                let (r, i) = (Axis::ALL[out % 3].letter(), Axis::ALL[input].letter());
-                let text = format!(
-                    "measure {point} in base {r}, hitting the tool in {i}, at posture {posture}: the two explanations \
-                     differ by {:.0} % there",
-                    100.0 * relative
-                );
-                best = Some((relative, text));
-            }
+                    0.0
+                },
+            };
+            all.push((size.sqrt(), difference));
         }
     }
-    let otherwise = "repeat the measurement at another posture";
-    Ok(best.map_or(otherwise.into(), |(_, text)| text))
+    let largest = all.iter().map(|(size, _)| *size).fold(0.0, f64::max);
+    let mut best: Option<Difference> = None;
+    for (_, difference) in all.into_iter().filter(|(size, _)| *size >= least_share * largest) {
+        if best.as_ref().is_none_or(|b| difference.relative > b.relative) {
+            best = Some(difference);
+        }
+    }
+    Ok(best)
 }
 
-fn point_basis(model: &StructureModel, theta: &[f64], block: &FrfBlock) -> Result<FrfBasis> {
-    let chain = model.chain(theta, &block.kinematics, block.lowness, false);
-    let kinematics = &block.kinematics;
+fn point_basis(model: &StructureModel, theta: &[f64], lookout: &Lookout) -> Result<FrfBasis> {
+    let kinematics = lookout.kinematics;
+    let chain = model.chain(theta, kinematics, lookout.lowness, false);
     let mut rows: Vec<DVector<f64>> = Vec::new();
     let mut push = |point, place, tool| {
         for axis in 0..3 {

@@ -20,7 +20,7 @@ const NOISE_CHI2: f64 = 1.12;
 /// Corrected p-value below which an improvement is not chance.
 const SIGNIFICANT_P: f64 = 1e-3;
 /// An effect must improve BIC by this much: "very strong" evidence (Kass & Raftery 1995).
-const STRONG_BIC: f64 = 10.0;
+pub const STRONG_BIC: f64 = 10.0;
 /// Rivals within this difference of −2 ln L of the best cannot be told from it.
 const INDISTINGUISHABLE: f64 = 12.0;
 /// Share of the excess misfit that one effect must explain to be the verdict although more is left.
@@ -33,7 +33,7 @@ pub fn is_noise(reduced_chi2: f64) -> bool {
 
 /// Whether a candidate improves the fit by more than chance, with parameters that are not stuck at the end of their range.
 pub fn significant<M, I>(c: &Candidate<M, I>) -> bool {
-    c.p_value < SIGNIFICANT_P && c.delta_bic < -STRONG_BIC && !c.at_bound
+    is_convincing(c.p_value, c.delta_bic) && !c.at_bound
 }
 
 /// Whether a candidate is significant and improves the prediction of folds left out.
@@ -43,6 +43,11 @@ pub fn credible<M, I>(c: &Candidate<M, I>, baseline: &Baseline) -> bool {
         _ => true,
     };
     improves && significant(c)
+}
+
+/// Whether an improvement is more than chance: corrected p-value and BIC difference.
+pub fn is_convincing(p_value: f64, delta_bic: f64) -> bool {
+    p_value < SIGNIFICANT_P && delta_bic < -STRONG_BIC
 }
 
 /// Two effects that explain the data together.
@@ -115,15 +120,21 @@ pub fn decide<M, I>(
     decision
 }
 
+/// Weight of an explanation against another whose BIC is lower by `delta_bic`: exp(−Δ/2) tempered, because model error is
+/// not noise.
+pub fn evidence_weight(delta_bic: f64) -> f64 {
+    const TEMPER: f64 = 6.0;
+    (-delta_bic / (2.0 * TEMPER)).exp()
+}
+
 /// Probability that the verdict is right. The evidence ratio of the best against its rivals is tempered, because model
 /// error is not noise; what stays unexplained takes confidence away.
 fn confidence<M, I>(decision: &Decision, candidates: &[Candidate<M, I>], base_reduced: f64) -> f64 {
-    const TEMPER: f64 = 6.0;
     let most = 0.98;
     match (decision.verdict, decision.effect) {
         (Verdict::Effect, Some(w)) => {
             let winner = &candidates[w];
-            let weight = |c: &Candidate<M, I>| (-(c.delta_bic - winner.delta_bic) / (2.0 * TEMPER)).exp();
+            let weight = |c: &Candidate<M, I>| evidence_weight(c.delta_bic - winner.delta_bic);
             let rivals: f64 = candidates
                 .iter()
                 .enumerate()
@@ -131,7 +142,7 @@ fn confidence<M, I>(decision: &Decision, candidates: &[Candidate<M, I>], base_re
                 .map(|(_, c)| weight(c).min(1.0))
                 .sum();
             // What the model without any effect would weigh.
-            let beaten = (winner.delta_bic / (2.0 * TEMPER)).exp().min(1.0);
+            let beaten = evidence_weight(-winner.delta_bic).min(1.0);
             let left = if decision.companion.is_some() {
                 0.92
             } else {

@@ -5,6 +5,8 @@ pub mod case;
 pub mod frf_data;
 pub mod levenberg_marquardt;
 pub mod modal_table;
+pub mod posture_modes;
+pub mod resonance_study;
 pub mod structure;
 pub mod structure_study;
 pub mod study;

@@ -4,10 +4,11 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::levenberg_marquardt::{Fit, LeastSquares, Linearisation, Stopping, minimise};
+use super::posture_modes::{PostureMode, posture_modes};
 use super::structure::StructureModel;
 use crate::Result;
 use crate::ingest::Axis;
-use crate::robot::{Kinematics, ModalBasis};
+use crate::robot::Kinematics;
 
 /// One row of the table: the strongest mode of the direct receptance at the tool centre point along a base axis.
 #[derive(Debug, Clone)]
@@ -31,9 +32,9 @@ pub struct Prediction {
 
 /// Relative standard deviation of a tabulated frequency: posture angles in whole degrees and one table row for a mode
 /// that two axes see 0.1–0.6 Hz apart.
-const FREQUENCY_STD: f64 = 0.02;
+pub const FREQUENCY_STD: f64 = 0.02;
 /// Relative standard deviation of a tabulated peak: damping and noise both scale it.
-const PEAK_STD: f64 = 0.3;
+pub const PEAK_STD: f64 = 0.3;
 /// How far an uncalibrated model may be off, as standard deviations of the logarithm: frequencies half the stiffness
 /// tolerance, peaks as much as damping and shape leave open. Decides which of the model's modes a row means.
 const PAIRING_FREQUENCY_STD: f64 = 0.15;
@@ -45,56 +46,24 @@ pub fn predict(model: &StructureModel, theta: &[f64], rows: &[StrongestMode]) ->
 }
 
 fn predict_row(model: &StructureModel, theta: &[f64], row: &StrongestMode) -> Result<Prediction> {
-    let baseline = model.baseline(theta, true);
-    let chain = model.robot.chain(&row.kinematics, &baseline);
-    let system = chain.system(theta.len());
-    let modes = ModalBasis::new(&system.stiffness, &system.mass)?;
-    let mut direction = nalgebra::Vector3::zeros();
-    direction[row.axis.index()] = 1.0;
-    let output = chain.output_row(row.kinematics.tcp(), model.robot.flange_place(), true, &direction);
-    // Participation of each mode: with xᵀKx = 1 its square is the modal compliance 1/k.
-    let participation: DVector<f64> = modes.shapes.transpose() * &output;
-    let frequency = |k: usize| 1.0 / (std::f64::consts::TAU * modes.inverse_omega2[k].sqrt());
-    let zeta = &baseline.damping_ratio;
-    let peak = |k: usize| participation[k].powi(2) / (4.0 * zeta.value * (1.0 - zeta.value));
-    let distance = |k: &usize| {
-        let f = (frequency(*k) / row.frequency_hz).ln() / PAIRING_FREQUENCY_STD;
-        let p = (peak(*k) / row.peak_real_m_per_n).ln() / PAIRING_PEAK_STD;
+    let axis = row.axis.index();
+    let distance = |mode: &PostureMode| {
+        let f = (mode.frequency_hz / row.frequency_hz).ln() / PAIRING_FREQUENCY_STD;
+        let p = (mode.peak_real_m_per_n(row.axis) / row.peak_real_m_per_n).ln() / PAIRING_PEAK_STD;
         f * f + p * p
     };
-    let k = (0..participation.len())
-        .filter(|&k| modes.inverse_omega2[k] > 0.0 && participation[k] != 0.0)
+    let mode = posture_modes(model, theta, &row.kinematics, f64::INFINITY, true)?
+        .into_iter()
+        .filter(|mode| mode.compliance_m_per_n[axis] > 0.0)
         .min_by(|a, b| distance(a).total_cmp(&distance(b)))
         .ok_or_else(|| crate::Error::computation("the model has no mode at the tool point"))?;
-
-    let mu = modes.inverse_omega2[k];
-    let (mut ln_frequency_slope, mut ln_peak_slope) = (Vec::new(), Vec::new());
-    for (p, derivative) in system.derivatives.iter().enumerate() {
-        let n = participation.len();
-        let column = |matrix: &Option<DMatrix<f64>>| match matrix {
-            Some(m) => modes.shapes.transpose() * (m * modes.shapes.column(k)),
-            None => DVector::zeros(n),
-        };
-        let (dk, dm) = (column(&derivative.stiffness), column(&derivative.mass));
-        // dμ = xᵀ(dM − μ dK)x; dx = Σ x_l x_lᵀ(dM − μ dK)x/(μ − μ_l) − ½ x xᵀdK x (Fox & Kapoor 1968, K-normalised).
-        let mu_slope = dm[k] - mu * dk[k];
-        let mut participation_slope = -0.5 * participation[k] * dk[k];
-        for l in (0..n).filter(|l| *l != k) {
-            let gap = mu - modes.inverse_omega2[l];
-            if gap.abs() > 1e-9 * mu {
-                participation_slope += participation[l] * (dm[l] - mu * dk[l]) / gap;
-            }
-        }
-        let dz = zeta.derivative(p);
-        ln_frequency_slope.push(-0.5 * mu_slope / mu);
-        ln_peak_slope
-            .push(2.0 * participation_slope / participation[k] - dz / zeta.value + dz / (1.0 - zeta.value));
-    }
+    let zeta = mode.damping_ratio;
+    let slopes = mode.ln_compliance_slope[axis].iter().zip(&mode.damping_slope);
     Ok(Prediction {
-        frequency_hz: frequency(k),
-        peak_real_m_per_n: peak(k),
-        ln_frequency_slope,
-        ln_peak_slope,
+        frequency_hz: mode.frequency_hz,
+        peak_real_m_per_n: mode.peak_real_m_per_n(row.axis),
+        ln_peak_slope: slopes.map(|(c, dz)| c - dz / zeta + dz / (1.0 - zeta)).collect(),
+        ln_frequency_slope: mode.ln_frequency_slope,
     })
 }
 

@@ -15,6 +15,7 @@ pub mod modal_section;
 pub mod number;
 pub mod page;
 mod parts;
+mod real_case_section;
 pub mod structure_section;
 #[cfg(feature = "parquet")]
 pub mod tables;

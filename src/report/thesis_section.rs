@@ -3,6 +3,7 @@
 use super::figure::{BarSeries, SideBySide};
 use super::number::{decimals, format_si, percent, significant};
 use super::parts::{figure, listed, paragraph};
+use super::real_case_section;
 use super::{Block, Column, Section, Table};
 use crate::analysis::ThesisFindings;
 use crate::analysis::thesis_findings::Range;
@@ -45,6 +46,7 @@ pub fn section(findings: &ThesisFindings) -> Section {
     blocks.push(paragraph(receptance_text(findings)));
     blocks.push(paragraph(unexplained_text(findings)));
     blocks.push(parameter_table(findings));
+    blocks.extend(real_case_section::blocks(&study.real_case));
     blocks.push(lobe_table(findings));
     blocks.push(paragraph(lobe_text(findings)));
     Section {
@@ -156,9 +158,8 @@ fn unexplained_text(findings: &ThesisFindings) -> String {
         return "The calibrated model has a mode in each band where the thesis measured resonances again and again.".into();
     }
     format!(
-        "Not explained: the thesis measured {}. Rigid links on joint springs, as calibrated here, have no mode \
-         there. Something that this model lacks (bending links, bearings that tilt, the spindle's holder, the base) may \
-         move there; the public tables do not say which.",
+        "Not explained: the thesis measured {}. Rigid links on joint springs, calibrated on the strongest modes, \
+         have no mode there. What may move there, as far as the public tables tell, is worked out below.",
         bands.join(", and "),
     )
 }

@@ -17,6 +17,7 @@ mod lobes;
 mod nyquist;
 mod parameters;
 mod regression;
+mod resonances;
 mod side_by_side;
 
 #[cfg(test)]
@@ -32,6 +33,7 @@ pub use lobes::{LobeCurve, LobeMarker, LobeOutcome, LobesFigure};
 pub use nyquist::NyquistFigure;
 pub use parameters::{Estimate, ParameterFigure, ParameterRow};
 pub use regression::{RegressionFigure, RegressionPoint, RegressionSeries};
+pub use resonances::{ResonanceFigure, ResonanceRow};
 pub use side_by_side::{BarSeries, SideBySide};
 
 use crate::Error;

@@ -312,6 +312,26 @@ pub fn history() -> HistoryFigure {
     }
 }
 
+pub fn resonances() -> ResonanceFigure {
+    let row = |i: usize| ResonanceRow {
+        label: format!("{} {}", i / 2 + 1, ["X", "Y"][i % 2]),
+        measured_hz: [7.0, 12.4, 19.5, 34.0, 47.8]
+            .iter()
+            .map(|f| f + 0.6 * jitter(i + *f as usize))
+            .map(|f| (f, [f - 0.6, f + 0.4]))
+            .collect(),
+        before_hz: vec![6.8, 8.0, 12.9, 19.0, 25.0],
+        after_hz: vec![6.7, 7.9, 12.5, 19.3, 33.5, 48.2, 55.0],
+    };
+    ResonanceFigure {
+        title: "Measured resonances and the model's modes".into(),
+        before_label: "modes, rigid links".into(),
+        after_label: "modes with link-flexibility".into(),
+        rows: (0..8).map(row).collect(),
+        bands_hz: vec![(32.0, 37.0), (47.0, 49.0)],
+    }
+}
+
 pub fn gallery() -> Vec<(&'static str, Result<Vec<u8>, Error>)> {
     let linear = SideBySide {
         log: false,
@@ -323,6 +343,7 @@ pub fn gallery() -> Vec<(&'static str, Result<Vec<u8>, Error>)> {
     vec![
         ("frf", frf_figure().png()),
         ("nyquist", nyquist().png()),
+        ("resonances", resonances().png()),
         ("heat_map", heat_map(6, 9).png()),
         ("heat_map_large", heat_map(40, 36).png()),
         ("heat_map_pair", heat_map_pair().png()),

@@ -1,11 +1,13 @@
 //! Where the model fails, and which physical effect it lacks.
 
 pub mod compare;
+pub mod compare_cutting;
 pub mod diagnose;
 pub mod extension;
 pub mod next_measurement;
 pub mod verdict;
 
+pub use compare_cutting::CuttingComparison;
 pub use compare::{Band, FrfComparison, FrfError};
 pub use diagnose::{Candidate, Diagnosis, diagnose};
 pub use verdict::Verdict;

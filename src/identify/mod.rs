@@ -2,9 +2,13 @@
 
 pub mod calibrate;
 pub mod case;
+pub mod cutting_data;
+pub mod cutting_model;
+pub mod cutting_problem;
 pub mod frf_data;
 pub mod levenberg_marquardt;
 pub mod modal_table;
+pub mod off_comb;
 pub mod structure;
 pub mod structure_study;
 pub mod study;
@@ -12,6 +16,9 @@ pub mod study;
 pub use crate::parameter::{Parameter, Prior, Scale};
 pub use calibrate::{Calibration, Estimate, Options};
 pub use case::StructureCase;
+pub use cutting_data::CuttingData;
+pub use cutting_model::CuttingModel;
+pub use cutting_problem::{CutFit, CuttingProblem};
 pub use frf_data::FrfData;
 pub use levenberg_marquardt::{Fit, LeastSquares, Linearisation, minimise};
 pub use structure::StructureModel;

@@ -14,3 +14,4 @@ mod schema;
 mod simulate;
 mod structure;
 mod support;
+mod waveform;

@@ -429,7 +429,7 @@ mod tests {
 
     /// Slices of the depth and a fine turn of the tool, tooth by tooth: nothing in common with the quadrature but physics.
     fn brute_force(cut: &MillingCut, law: ChipLaw, orders: usize) -> UnitForces {
-        let (steps, slices) = (7200, 60);
+        let (steps, slices) = (3600, 300);
         let mut unit = MillingCut::nothing(orders);
         let [offset, angle] = law.runout.unwrap_or([0.0; 2]);
         let radius = |j: usize, z: f64| {

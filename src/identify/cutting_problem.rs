@@ -1,0 +1,507 @@
+//! Misfit of the cutting model to force records. What belongs to one cut alone is fitted to that cut at every evaluation
+//! and does not stand among the parameters: the phase of the tool (drilling: the moment of first contact), and each
+//! channel's zero line with the amplitude of its transient (variable projection, Golub & Pereyra 1973).
+
+use std::f64::consts::{SQRT_2, TAU};
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use super::cutting_data::{CutData, CutKind, CuttingData, ForceChannel};
+use super::cutting_model::{CuttingModel, Forces, drilling_forces, milling_forces, vibration_amplitudes};
+use super::levenberg_marquardt::{LeastSquares, Linearisation};
+use crate::Result;
+use crate::effects::cutting::CutPhysics;
+
+/// A limit cycle's amplitude repeats this well (standard deviation of its logarithm).
+const VIBRATION_LOG_STD: f64 = 0.25;
+/// Standard deviation of the logarithm of its frequency from cut to cut.
+const FREQUENCY_LOG_STD: f64 = 0.05;
+/// A zero-line column that the others explain up to this share of its length is left out.
+const COLLINEAR: f64 = 1e-7;
+
+/// Misfit of a model to the records plus the priors on its parameters.
+pub struct CuttingProblem<'a> {
+    pub model: &'a CuttingModel,
+    pub data: &'a CuttingData,
+}
+
+/// The model in one cut after what belongs to the cut alone is fitted.
+#[derive(Debug, Clone)]
+pub struct CutFit {
+    /// Phase, rad (milling), or first contact, s from the middle of the record (drilling).
+    pub placement: f64,
+    /// Σ r² of the cut.
+    pub chi2: f64,
+    pub channels: [Option<ChannelFit>; 4],
+}
+
+/// The model on one recorded channel.
+#[derive(Debug, Clone)]
+pub struct ChannelFit {
+    /// Orders 1..=K at the cut's phase, N.
+    pub orders: Vec<Complex64>,
+    /// Force by block, N (N·m).
+    pub level: Vec<f64>,
+    /// Fitted zero line by block, what a leak takes away included.
+    pub zero: Vec<f64>,
+}
+
+/// Sums over residuals.
+struct Sums {
+    cost: f64,
+    gradient: DVector<f64>,
+    hessian: DMatrix<f64>,
+    /// Of the placement with itself and with each parameter.
+    placement: f64,
+    coupling: DVector<f64>,
+}
+
+impl Sums {
+    fn zero(count: usize) -> Self {
+        Sums {
+            cost: 0.0,
+            gradient: DVector::zeros(count),
+            hessian: DMatrix::zeros(count, count),
+            placement: 0.0,
+            coupling: DVector::zeros(count),
+        }
+    }
+
+    /// Adds residuals with their derivatives (one row a parameter) and that by the placement.
+    fn push(&mut self, residual: &[f64], slopes: &[Vec<f64>], placement: &[f64]) {
+        self.cost += 0.5 * dot(residual, residual);
+        if slopes.is_empty() {
+            return;
+        }
+        self.placement += dot(placement, placement);
+        for (i, a) in slopes.iter().enumerate() {
+            self.gradient[i] += dot(a, residual);
+            self.coupling[i] += dot(a, placement);
+            for (j, b) in slopes.iter().enumerate().take(i + 1) {
+                self.hessian[(i, j)] += dot(a, b);
+            }
+        }
+    }
+
+    /// Takes the placement out: it is at its optimum, so only the curvature changes (Schur complement).
+    fn eliminate_placement(&mut self) {
+        if self.placement > 0.0 {
+            let n = self.gradient.len();
+            for i in 0..n {
+                for j in 0..=i {
+                    self.hessian[(i, j)] -= self.coupling[i] * self.coupling[j] / self.placement;
+                }
+            }
+        }
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+/// A channel's zero line: an orthonormal basis of what it may be, in weighted levels.
+struct ZeroLine {
+    basis: Vec<Vec<f64>>,
+    weight: Vec<f64>,
+    /// Weighted recorded level.
+    recorded: Vec<f64>,
+    /// Loss of a leaking amplifier, weighted, per unit of its rate; empty without.
+    loss: Vec<f64>,
+    rate: f64,
+    rate_gradient: Vec<f64>,
+    /// Transient: derivative of its weighted column by τ, the gradient of τ, and 1/length of its orthogonal rest.
+    transient: Option<(Vec<f64>, Vec<f64>, f64)>,
+}
+
+impl ZeroLine {
+    fn new(cut: &CutData, physics: &CutPhysics, channel: &ForceChannel, index: usize) -> ZeroLine {
+        let weight: Vec<f64> = channel.level_std.iter().map(|s| 1.0 / s).collect();
+        let time: Vec<f64> = cut.block_s.iter().map(|b| 0.5 * (b[0] + b[1])).collect();
+        let weighted = |f: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            weight.iter().enumerate().map(|(b, w)| w * f(b)).collect()
+        };
+        let mut line = ZeroLine {
+            basis: Vec::new(),
+            recorded: weighted(&|b| channel.level[b]),
+            loss: Vec::new(),
+            rate: 0.0,
+            rate_gradient: Vec::new(),
+            transient: None,
+            weight: weight.clone(),
+        };
+        line.add_column(weighted(&|_| 1.0));
+        line.add_column(weighted(&|b| time[b]));
+        if let Some(rates) = &physics.leak_per_s {
+            // What leaks of a straight zero line is a parabola.
+            line.add_column(weighted(&|b| time[b] * time[b]));
+            line.loss = weighted(&|b| channel.integral[b]);
+            line.rate = rates[index].value;
+            line.rate_gradient.clone_from(&rates[index].gradient);
+        }
+        if let Some(taus) = &physics.transient_s {
+            let tau = &taus[index];
+            let start = time.first().copied().unwrap_or(0.0);
+            let since = |b: usize| (time[b] - start) / tau.value;
+            if let Some(rest) = line.add_column(weighted(&|b| (-since(b)).exp())) {
+                let slope = weighted(&|b| (-since(b)).exp() * since(b) / tau.value);
+                line.transient = Some((slope, tau.gradient.clone(), 1.0 / rest));
+            }
+        }
+        line
+    }
+
+    /// Length of what is new in the column; `None` where there is nothing new.
+    fn add_column(&mut self, mut column: Vec<f64>) -> Option<f64> {
+        let before = dot(&column, &column).sqrt();
+        for _ in 0..2 {
+            self.project(&mut column);
+        }
+        let rest = dot(&column, &column).sqrt();
+        if !(rest > COLLINEAR * before) {
+            return None;
+        }
+        column.iter_mut().for_each(|v| *v /= rest);
+        self.basis.push(column);
+        Some(rest)
+    }
+
+    /// Takes out of a weighted vector what the zero line can be.
+    fn project(&self, vector: &mut [f64]) {
+        for q in &self.basis {
+            let share = dot(q, vector);
+            for (v, q) in vector.iter_mut().zip(q) {
+                *v -= share * q;
+            }
+        }
+    }
+
+    /// Weighted model − recorded for force levels `level`, zero line fitted.
+    fn residual(&self, level: &[f64]) -> Vec<f64> {
+        let mut residual = self.raw(level);
+        self.project(&mut residual);
+        residual
+    }
+
+    fn raw(&self, level: &[f64]) -> Vec<f64> {
+        let mut raw: Vec<f64> =
+            level.iter().zip(&self.weight).zip(&self.recorded).map(|((l, w), r)| l * w - r).collect();
+        for (v, loss) in raw.iter_mut().zip(&self.loss) {
+            *v -= self.rate * loss;
+        }
+        raw
+    }
+
+    /// Derivatives of the residual by the parameters; `slope(p)`: those of the force levels.
+    fn slopes<'a>(&self, level: &[f64], count: usize, slope: impl Fn(usize) -> std::borrow::Cow<'a, [f64]>) -> Vec<Vec<f64>> {
+        // Amplitude of the transient: its orthogonal rest is the last of the basis.
+        let transient = self.transient.as_ref().zip(self.basis.last()).map(|((column, gradient, per_length), q)| {
+            let raw = self.raw(level);
+            (column, gradient, -dot(q, &raw) * per_length)
+        });
+        (0..count)
+            .map(|p| {
+                let mut own: Vec<f64> = slope(p).iter().zip(&self.weight).map(|(s, w)| s * w).collect();
+                let rate = self.rate_gradient.get(p).copied().unwrap_or(0.0);
+                for (v, loss) in own.iter_mut().zip(&self.loss) {
+                    *v -= rate * loss;
+                }
+                if let Some((column, gradient, amplitude)) = &transient {
+                    let g = gradient.get(p).copied().unwrap_or(0.0) * amplitude;
+                    for (v, c) in own.iter_mut().zip(*column) {
+                        *v += g * c;
+                    }
+                }
+                self.project(&mut own);
+                own
+            })
+            .collect()
+    }
+
+    /// Fitted zero line by block, in the channel's unit.
+    fn zero(&self, level: &[f64]) -> Vec<f64> {
+        let raw = self.raw(level);
+        let mut rest = raw.clone();
+        self.project(&mut rest);
+        raw.iter()
+            .zip(&rest)
+            .zip(&self.weight)
+            .enumerate()
+            .map(|(b, ((raw, rest), w))| {
+                let lost = self.loss.get(b).map_or(0.0, |l| self.rate * l);
+                (rest - raw - lost) / w
+            })
+            .collect()
+    }
+}
+
+impl CuttingProblem<'_> {
+    /// The model in every cut.
+    pub fn fits(&self, theta: &[f64]) -> Result<Vec<CutFit>> {
+        self.data.cuts.par_iter().map(|cut| Ok(self.evaluate(cut, theta, false)?.1)).collect()
+    }
+
+    fn evaluate(&self, cut: &CutData, theta: &[f64], derivatives: bool) -> Result<(Sums, CutFit)> {
+        let count = if derivatives { theta.len() } else { 0 };
+        let physics = self.model.physics(theta, cut, derivatives);
+        let lines: [Option<ZeroLine>; 4] = std::array::from_fn(|i| {
+            cut.channels[i].as_ref().map(|channel| ZeroLine::new(cut, &physics, channel, i))
+        });
+        let mut sums = Sums::zero(count);
+        let (forces, placement) = match &cut.kind {
+            CutKind::Milling { cut: milling, unit } => {
+                let forces = milling_forces(&physics, cut, milling, unit, &self.data.dyno_from_tool, count);
+                let step = if physics.runout.is_some() { 1 } else { milling.teeth };
+                let phase = best_phase(cut, &forces, step);
+                (forces, phase)
+            }
+            CutKind::Drilling { cut: drill, contact_s } => {
+                let at = |contact: f64| drilling_forces(&physics, cut, drill, contact, 0);
+                let contact = best_contact(&lines, *contact_s, at);
+                (drilling_forces(&physics, cut, drill, contact, count), contact)
+            }
+        };
+        let mut fit = CutFit {
+            placement,
+            chi2: 0.0,
+            channels: [None, None, None, None],
+        };
+        for (i, (channel, line)) in cut.channels.iter().zip(&lines).enumerate() {
+            let (Some(channel), Some(line)) = (channel, line) else { continue };
+            let orders = push_orders(&mut sums, channel, &forces, i, placement, count);
+            let level = levels(cut, &forces.value[i]);
+            let residual = line.residual(&level);
+            let slopes = line.slopes(&level, count, |p| levels(cut, &forces.slope[p][i]));
+            let by_placement = match cut.kind {
+                CutKind::Drilling { .. } if derivatives => {
+                    let slope = || std::borrow::Cow::Borrowed(forces.contact_slope[i].as_slice());
+                    let mut own: Vec<f64> = slope().iter().zip(&line.weight).map(|(s, w)| s * w).collect();
+                    line.project(&mut own);
+                    own
+                }
+                _ => vec![0.0; residual.len()],
+            };
+            sums.push(&residual, &slopes, &by_placement);
+            fit.channels[i] = Some(ChannelFit {
+                orders,
+                zero: line.zero(&level),
+                level: level.into_owned(),
+            });
+        }
+        self.push_vibration(&mut sums, cut, &physics, count);
+        fit.chi2 = 2.0 * sums.cost;
+        if derivatives {
+            sums.eliminate_placement();
+        }
+        Ok((sums, fit))
+    }
+
+    /// Lines off the comb: logarithms of their amplitudes against the model's, noise included on both sides.
+    fn push_vibration(&self, sums: &mut Sums, cut: &CutData, physics: &CutPhysics, count: usize) {
+        let Some(seen) = &cut.vibration else { return };
+        let model = vibration_amplitudes(physics, cut, &self.data.dyno_from_tool);
+        let mut push = |residual: f64, slope: &dyn Fn(usize) -> f64| {
+            let slopes: Vec<Vec<f64>> = (0..count).map(|p| vec![slope(p)]).collect();
+            sums.push(&[residual], &slopes, &[0.0]);
+        };
+        if let Some(vibration) = &physics.vibration {
+            let f = &vibration.frequency_hz;
+            push((f.value / seen.frequency_hz).ln() / FREQUENCY_LOG_STD, &|p| {
+                f.derivative(p) / f.value / FREQUENCY_LOG_STD
+            });
+        }
+        for line in &seen.lines {
+            for (channel, amplitude, noise) in &line.channels {
+                let predicted = model.as_ref().map(|m| &m[(line.shift + super::off_comb::MOST_SHIFT) as usize][*channel]);
+                let value = predicted.map_or(0.0, |p| p.value);
+                let square = value * value + noise * noise;
+                let residual = (0.5 * square.ln() - amplitude.ln()) / VIBRATION_LOG_STD;
+                push(residual, &|p| {
+                    predicted.map_or(0.0, |d| value * d.derivative(p) / square / VIBRATION_LOG_STD)
+                });
+            }
+        }
+    }
+
+    fn total(&self, theta: &[f64], derivatives: bool) -> Result<Sums> {
+        let parts: Vec<Sums> = self
+            .data
+            .cuts
+            .par_iter()
+            .map(|cut| Ok(self.evaluate(cut, theta, derivatives)?.0))
+            .collect::<Result<_>>()?;
+        let mut total = Sums::zero(if derivatives { theta.len() } else { 0 });
+        for part in &parts {
+            total.cost += part.cost;
+            total.gradient += &part.gradient;
+            total.hessian += &part.hessian;
+        }
+        for (i, (parameter, t)) in self.model.parameters.iter().zip(theta).enumerate() {
+            if let Some(prior) = parameter.prior {
+                let residual = (t - prior.mean) / prior.std;
+                total.cost += 0.5 * residual * residual;
+                if derivatives {
+                    total.gradient[i] += residual / prior.std;
+                    total.hessian[(i, i)] += 1.0 / (prior.std * prior.std);
+                }
+            }
+        }
+        total.hessian.fill_upper_triangle_with_lower_triangle();
+        Ok(total)
+    }
+}
+
+impl LeastSquares for CuttingProblem<'_> {
+    fn cost(&self, theta: &[f64]) -> Result<f64> {
+        Ok(self.total(theta, false)?.cost)
+    }
+
+    fn linearise(&self, theta: &[f64]) -> Result<Linearisation> {
+        let total = self.total(theta, true)?;
+        Ok(Linearisation {
+            cost: total.cost,
+            gradient: total.gradient,
+            hessian: total.hessian,
+        })
+    }
+}
+
+/// Force level of each block: the mean over the orders (milling) during the cut, or as it stands (drilling).
+fn levels<'a>(cut: &CutData, forces: &'a [f64]) -> std::borrow::Cow<'a, [f64]> {
+    match cut.kind {
+        CutKind::Drilling { .. } => forces.into(),
+        CutKind::Milling { .. } => {
+            let mean = forces.first().copied().unwrap_or(0.0);
+            (0..cut.block_s.len()).map(|b| if cut.steady.contains(&b) { mean } else { 0.0 }).collect::<Vec<f64>>().into()
+        }
+    }
+}
+
+/// Adds the orders of a channel; gives the model's orders at the phase.
+fn push_orders(
+    sums: &mut Sums,
+    channel: &ForceChannel,
+    forces: &Forces,
+    index: usize,
+    phase: f64,
+    count: usize,
+) -> Vec<Complex64> {
+    let orders = channel.orders.len();
+    if orders == 0 {
+        return Vec::new();
+    }
+    let turn: Vec<Complex64> = (1..=orders).map(|n| Complex64::from_polar(1.0, -(n as f64) * phase)).collect();
+    let at = |set: &[Vec<f64>; 4], n: usize| Complex64::new(set[index][2 * n + 1], set[index][2 * n + 2]) * turn[n];
+    let model: Vec<Complex64> = (0..orders).map(|n| at(&forces.value, n)).collect();
+    // Real and imaginary part have half the variance each.
+    let weighted = |value: &dyn Fn(usize) -> Complex64| -> Vec<f64> {
+        let mut flat = Vec::with_capacity(2 * orders);
+        for n in 0..orders {
+            let v = value(n) * (SQRT_2 / channel.order_std[n]);
+            flat.extend([v.re, v.im]);
+        }
+        flat
+    };
+    let residual = weighted(&|n| model[n] - channel.orders[n]);
+    let slopes: Vec<Vec<f64>> = (0..count).map(|p| weighted(&|n| at(&forces.slope[p], n))).collect();
+    let by_phase =
+        if count > 0 { weighted(&|n| model[n] * Complex64::new(0.0, -((n + 1) as f64))) } else { Vec::new() };
+    sums.push(&residual, &slopes, &by_phase);
+    model
+}
+
+/// Phase at which model and record agree best; the model has orders at multiples of `step` only.
+fn best_phase(cut: &CutData, forces: &Forces, step: usize) -> f64 {
+    let most = cut.orders / step;
+    // Σ |C e^{−inx} − D|²/σ² is least where Re Σ C* D/σ² e^{inx} is largest.
+    let mut product = vec![Complex64::ZERO; most];
+    for (i, channel) in cut.channels.iter().enumerate() {
+        let Some(channel) = channel else { continue };
+        for (k, p) in product.iter_mut().enumerate() {
+            let n = (k + 1) * step;
+            let Some(recorded) = channel.orders.get(n - 1) else { continue };
+            let model = Complex64::new(forces.value[i][2 * n - 1], forces.value[i][2 * n]);
+            *p += model.conj() * recorded / channel.order_std[n - 1].powi(2);
+        }
+    }
+    // In units of the step's period.
+    let agreement = |x: f64| {
+        let z = Complex64::from_polar(1.0, x);
+        product.iter().rev().fold(Complex64::ZERO, |s, p| (s + p) * z).re
+    };
+    let grid = 6 * most.max(8);
+    let spacing = TAU / grid as f64;
+    let mut best = (f64::NEG_INFINITY, 0.0);
+    for k in 0..grid {
+        let value = agreement(k as f64 * spacing);
+        if value > best.0 {
+            best = (value, k as f64 * spacing);
+        }
+    }
+    let mut x = best.1;
+    for _ in 0..20 {
+        let (mut first, mut second) = (0.0, 0.0);
+        for (k, p) in product.iter().enumerate() {
+            let n = (k + 1) as f64;
+            let turned = p * Complex64::from_polar(1.0, n * x);
+            first -= n * turned.im;
+            second -= n * n * turned.re;
+        }
+        let move_by = if second < 0.0 { -first / second } else { spacing * first.signum() * 0.25 };
+        let move_by = move_by.clamp(-0.5 * spacing, 0.5 * spacing);
+        x += move_by;
+        if move_by.abs() < 1e-13 {
+            break;
+        }
+    }
+    x / step as f64
+}
+
+/// First contact at which model and record agree best, within `range` (s).
+fn best_contact(lines: &[Option<ZeroLine>; 4], range: [f64; 2], forces: impl Fn(f64) -> Forces) -> f64 {
+    // Cost, its slope and its Gauss–Newton curvature.
+    let at = |contact: f64| {
+        let f = forces(contact);
+        let (mut cost, mut slope, mut curvature) = (0.0, 0.0, 0.0);
+        for (i, line) in lines.iter().enumerate() {
+            let Some(line) = line else { continue };
+            let residual = line.residual(&f.value[i]);
+            let mut by: Vec<f64> = f.contact_slope[i].iter().zip(&line.weight).map(|(s, w)| s * w).collect();
+            line.project(&mut by);
+            cost += 0.5 * dot(&residual, &residual);
+            slope += dot(&residual, &by);
+            curvature += dot(&by, &by);
+        }
+        (cost, slope, curvature)
+    };
+    const GRID: usize = 60;
+    let spacing = (range[1] - range[0]).max(1e-6) / GRID as f64;
+    let mut best = (f64::INFINITY, range[0]);
+    for k in 0..=GRID {
+        let contact = range[0] + k as f64 * spacing;
+        let cost = at(contact).0;
+        if cost < best.0 {
+            best = (cost, contact);
+        }
+    }
+    let (mut low, mut high) = (best.1 - spacing, best.1 + spacing);
+    let mut x = best.1;
+    for _ in 0..60 {
+        let (_, slope, curvature) = at(x);
+        if slope > 0.0 {
+            high = x;
+        } else {
+            low = x;
+        }
+        let newton = x - slope / curvature.max(f64::MIN_POSITIVE);
+        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        let moved = (next - x).abs();
+        x = next;
+        if moved < 1e-12 {
+            break;
+        }
+    }
+    x
+}

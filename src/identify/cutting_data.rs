@@ -380,7 +380,10 @@ fn force_channel(
     let (mut level, mut level_std, mut lost) = (Vec::new(), Vec::new(), Vec::new());
     for (b, [from, to]) in window.blocks.iter().enumerate() {
         let std = if window.is_cut(b) { spectrum.sample_std.max(air_std) } else { air_std.max(1e-12) };
-        let hum: f64 = hum.iter().map(|(hz, a)| leak(*a, *hz, (to - from) / rate)).sum();
+        let mut hum: f64 = hum.iter().map(|(hz, a)| leak(*a, *hz, (to - from) / rate)).sum();
+        if window.is_cut(b) {
+            hum = hum.max(lines_in_mean(spectrum, rate, (to - from) / rate));
+        }
         level.push(mean_between(values, *from, *to));
         level_std.push((std * std / (to - from) + hum).sqrt());
         lost.push(mean_between(&integral, *from + 0.5, *to + 0.5));
@@ -410,6 +413,24 @@ fn force_channel(
         && positive(&channel.order_std)
         && channel.orders.iter().all(|c| c.is_finite()))
     .then_some(channel)
+}
+
+/// Variance that lines above the noise (vibration, hum) leave in a mean over `length_s`. Slower than that is no line but a
+/// level that changes, which the model has to explain.
+fn lines_in_mean(spectrum: &crate::signal::OrderSpectrum, rate: f64, length_s: f64) -> f64 {
+    let floor = spectrum.sample_std.powi(2) * spectrum.line_hz / rate;
+    let first = (1.0 / (length_s * spectrum.line_hz)).ceil() as usize;
+    spectrum
+        .rest
+        .iter()
+        .enumerate()
+        .skip(first.max(1))
+        .filter(|(_, a)| **a * **a > 10.0 * floor)
+        .map(|(j, a)| {
+            let x = std::f64::consts::PI * j as f64 * spectrum.line_hz * length_s;
+            2.0 * (a * x.sin() / x).powi(2)
+        })
+        .sum()
 }
 
 /// Torque opposes rotation; where all of it is negative the amplifier counts it the other way round.

@@ -57,7 +57,12 @@ pub fn find_vibration(
     let local = |j: usize| median(&strength[j.saturating_sub(40)..(j + 41).min(count)]).max(1.0);
     let allowed = |j: usize| {
         let hz = j as f64 * line_hz;
+        // Orders beyond half the sampling rate fold back among the lines.
+        let folded = |m: f64| {
+            beside((m * sample_rate_hz - hz).abs(), spindle_hz).min(beside(m * sample_rate_hz + hz, spindle_hz))
+        };
         hz < 0.45 * sample_rate_hz
+            && folded(1.0).min(folded(2.0)) > 1.5 * line_hz
             && beside(hz, tooth_hz) > (BESIDE_COMB * tooth_hz).max(3.0 * line_hz)
             && beside(hz, spindle_hz) > 2.5 * line_hz.min(0.1 * spindle_hz)
     };

@@ -95,6 +95,15 @@ fn report(name: &str, dir: &Path) {
         (from..model.parameters.len()).map(of).collect::<Vec<_>>().join(" ")
     };
     println!("   {}", show(&base, &first, 0));
+    for c in data.cuts.iter().filter(|c| c.vibration.is_some()) {
+        let v = c.vibration.as_ref().unwrap();
+        println!("   cut {} line {:.1} Hz", c.id, v.frequency_hz);
+        if std::env::var("LINES").is_ok() {
+            for l in &v.lines {
+                println!("      shift {} {:?}", l.shift, l.channels);
+            }
+        }
+    }
     let fits = CuttingProblem { model: &base, data: &data }.fits(&first.theta).unwrap();
     let worst: Vec<String> = fits
         .iter()

@@ -158,12 +158,13 @@ impl MillingCut {
         let weights = self.depth_weights(&depth_nodes, orders, step);
         let turn: Vec<Complex64> =
             nodes.iter().map(|(phi, _)| Complex64::from_polar(1.0, -(step as f64) * phi)).collect();
+        let directions: Vec<(f64, f64)> = nodes.iter().map(|(phi, _)| phi.sin_cos()).collect();
         for (q, &z) in depth_nodes.iter().enumerate() {
             let residues: Vec<Vec<Complex64>> = self.tooth_sums(&nodes, z, law, derivatives, parts);
             let mut carrier: Vec<Complex64> = nodes.iter().map(|(_, w)| Complex64::from(w / TAU)).collect();
             for (at, n) in (0..=orders).step_by(step).enumerate() {
                 let teeth = &residues[n % residues.len()];
-                add_order(&mut sampled, &nodes, &carrier, teeth, parts, n, weights[at][q]);
+                add_order(&mut sampled, &directions, &carrier, teeth, parts, n, weights[at][q]);
                 carrier.iter_mut().zip(&turn).for_each(|(c, t)| *c *= t);
             }
         }
@@ -205,16 +206,17 @@ impl MillingCut {
     ) -> Vec<Vec<Complex64>> {
         let residues = if law.runout.is_some() { self.teeth } else { 1 };
         let mut sums = vec![vec![Complex64::ZERO; nodes.len() * parts]; residues];
+        // Tooth j is ahead of tooth 0.
+        let ahead = |m: usize| Complex64::from_polar(1.0, TAU * m as f64 / self.teeth as f64);
+        let ahead: Vec<Complex64> = (0..self.teeth).map(ahead).collect();
         for (k, &(phi, width)) in nodes.iter().enumerate() {
             let chips = self.chips(phi, width, z, law, derivatives);
             let weight = if chips.len() == 1 { self.teeth as f64 } else { 1.0 };
             for (r, sum) in sums.iter_mut().enumerate() {
                 for (j, chip) in chips.iter().enumerate() {
-                    // Tooth j is ahead of tooth 0.
-                    let angle = TAU * ((r * j) % self.teeth) as f64 / self.teeth as f64;
-                    let ahead = Complex64::from_polar(weight, angle);
+                    let turn = ahead[(r * j) % self.teeth] * weight;
                     for part in 0..parts {
-                        sum[k * parts + part] += ahead * chip.part[part];
+                        sum[k * parts + part] += turn * chip.part[part];
                     }
                 }
             }
@@ -257,11 +259,12 @@ impl MillingCut {
     }
 }
 
-/// Adds one depth node's share of order `n`. `carrier`: quadrature weight × e^{−inφ} / 2π a node; `teeth`: the sum over the
+/// Adds one depth node's share of order `n`. `directions`: sin φ and cos φ a node; `carrier`: quadrature
+/// weight × e^{−inφ} / 2π; `teeth`: the sum over the
 /// teeth, `[node · parts + part]`.
 fn add_order(
     sampled: &mut SampledForces,
-    nodes: &[(f64, f64)],
+    directions: &[(f64, f64)],
     carrier: &[Complex64],
     teeth: &[Complex64],
     parts: usize,
@@ -270,8 +273,7 @@ fn add_order(
 ) {
     // Per part of the force (cutting, edge and their slopes): ∫ part · {cos φ, sin φ, 1} e^{−inφ} dφ.
     let mut sums = [[Complex64::ZERO; 3]; Chip::PARTS];
-    for (k, ((phi, _), carrier)) in nodes.iter().zip(carrier).enumerate() {
-        let (sin, cos) = phi.sin_cos();
+    for (k, ((sin, cos), carrier)) in directions.iter().zip(carrier).enumerate() {
         for (sum, tooth) in sums.iter_mut().zip(&teeth[k * parts..(k + 1) * parts]) {
             let value = carrier * tooth;
             sum[0] += value * cos;

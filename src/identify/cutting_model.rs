@@ -7,7 +7,7 @@ use num_complex::Complex64;
 use super::cutting_data::{CutData, CutKind, CuttingData};
 use super::off_comb::MOST_SHIFT;
 use crate::campaign::Process;
-use crate::cutting::waveform::{ChipLaw, DrillTerm, DrillingCut, MillingCut, UnitForces, directional_orders};
+use crate::cutting::waveform::{ChipLaw, DrillTerm, DrillingCut, LineForces, MillingCut, UnitForces};
 use crate::cutting::{ForceAxis, coefficients_of};
 use crate::effects::cutting::{CutPhysics, CuttingInstance, Mixing};
 use crate::parameter::{Parameter, Prior, Scale};
@@ -282,7 +282,11 @@ fn recorded(unit: &[Vec<Complex64>; 3], dyno_from_tool: &[[f64; 3]; 3]) -> [Vec<
     })
 }
 
-/// Forces of a milling cut on the recorded channels, phase zero, up to and with crosstalk.
+/// Amplitude (N) that a vibration puts on each recorded channel at the lines shifted by −2..2 tooth-passing frequencies.
+pub(super) type LineAmplitudes = Vec<[Dual; 3]>;
+
+/// Forces of a milling cut on the recorded channels, phase zero, up to and with crosstalk; and the lines of a vibration
+/// where the cut has one. (Runout is left out of a vibrating cut.)
 pub(super) fn milling_forces(
     physics: &CutPhysics,
     cut: &CutData,
@@ -290,8 +294,9 @@ pub(super) fn milling_forces(
     unit: &UnitForces,
     dyno_from_tool: &[[f64; 3]; 3],
     parameters: usize,
-) -> Forces {
+) -> (Forces, Option<LineAmplitudes>) {
     let mut forces = Forces::zero(2 * cut.orders + 1, parameters);
+    let mut lines = None;
     let add_units = |forces: &mut Forces, unit: &UnitForces| {
         for (k, unit) in unit.iter().enumerate() {
             for (channel, part) in recorded(unit, dyno_from_tool).iter().enumerate() {
@@ -299,7 +304,40 @@ pub(super) fn milling_forces(
             }
         }
     };
-    if physics.size_exponent.is_none() && physics.runout.is_none() {
+    // By something that the unit forces depend on: only a slope, the value does not change with the derivative.
+    let add_slopes = |forces: &mut Forces, slope: &UnitForces, by: &Dual| {
+        for (k, unit) in slope.iter().enumerate() {
+            let weight = Dual {
+                value: 0.0,
+                gradient: by.gradient.iter().map(|g| g * physics.coefficient[k].value).collect(),
+            };
+            for (channel, part) in recorded(unit, dyno_from_tool).iter().enumerate() {
+                forces.add(channel, &weight, part);
+            }
+        }
+    };
+    if let Some(change) = chip_change(physics, cut, milling) {
+        let exponent = physics.size_exponent.as_ref().map(|p| p.value);
+        let vibrating =
+            milling.vibrating(cut.orders, exponent, [change[0].value, change[1].value], MOST_SHIFT as usize);
+        add_units(&mut forces, &vibrating.unit);
+        if parameters > 0 {
+            let own = [physics.size_exponent.as_ref(), Some(&change[0]), Some(&change[1])];
+            for (slope, by) in vibrating.slopes.iter().zip(own) {
+                if let Some(by) = by {
+                    add_slopes(&mut forces, slope, by);
+                }
+            }
+        }
+        lines = Some(
+            (0..vibrating.lines.len())
+                .map(|r| {
+                    let slopes = [&vibrating.line_slopes[0][r], &vibrating.line_slopes[1][r]];
+                    line_amplitudes(physics, &vibrating.lines[r], slopes, &change, dyno_from_tool)
+                })
+                .collect(),
+        );
+    } else if physics.size_exponent.is_none() && physics.runout.is_none() {
         add_units(&mut forces, unit);
     } else {
         let law = ChipLaw {
@@ -314,16 +352,8 @@ pub(super) fn milling_forces(
             physics.runout.as_ref().map(|r| &r.angle_rad),
         ];
         for (slope, by) in sampled.slopes.iter().zip(own) {
-            let (Some(slope), Some(by)) = (slope, by) else { continue };
-            for (k, unit) in slope.iter().enumerate() {
-                // Only a slope: the value does not change with the derivative.
-                let weight = Dual {
-                    value: 0.0,
-                    gradient: by.gradient.iter().map(|g| g * physics.coefficient[k].value).collect(),
-                };
-                for (channel, part) in recorded(unit, dyno_from_tool).iter().enumerate() {
-                    forces.add(channel, &weight, part);
-                }
+            if let (Some(slope), Some(by)) = (slope, by) {
+                add_slopes(&mut forces, slope, by);
             }
         }
     }
@@ -336,7 +366,7 @@ pub(super) fn milling_forces(
     if let Some(crosstalk) = &physics.crosstalk {
         forces.mix(crosstalk);
     }
-    forces
+    (forces, lines)
 }
 
 /// Thrust and torque of each block with the first contact at `contact_s`.
@@ -384,51 +414,49 @@ pub(super) fn drilling_forces(
     forces
 }
 
-/// Amplitude (N) that a vibration puts on each recorded channel at the lines shifted by −2..2 tooth-passing frequencies.
-pub(super) fn vibration_amplitudes(
-    physics: &CutPhysics,
-    cut: &CutData,
-    dyno_from_tool: &[[f64; 3]; 3],
-) -> Option<Vec<[Dual; 3]>> {
-    let (Some(vibration), CutKind::Milling { cut: milling, .. }) = (&physics.vibration, &cut.kind) else {
-        return None;
-    };
-    let k = &physics.coefficient;
-    // For unit Ktc, Krc and Kac apart, so that their derivatives come along.
-    let parts: Vec<_> = (0..3)
-        .map(|c| directional_orders(milling, std::array::from_fn(|i| f64::from(u8::from(i == c))), MOST_SHIFT as usize))
-        .collect();
-    // The wave left by the tooth before: Δ = d (1 − e^{−iωT}).
+/// Change of the chip's boundary from one tooth to the next in a vibrating cut, along x and y, mm: d (1 − e^{−iωT}).
+fn chip_change(physics: &CutPhysics, cut: &CutData, milling: &MillingCut) -> Option<[Dual; 2]> {
+    let vibration = physics.vibration.as_ref()?;
     let tooth_hz = cut.spindle_hz() * milling.teeth as f64;
     let seen = cut.vibration.as_ref().map_or(vibration.frequency_hz.value, |v| v.frequency_hz);
     let regeneration = 2.0 * (std::f64::consts::PI * seen / tooth_hz).sin().abs();
     let angle = &vibration.direction_rad;
     let (s, c) = angle.value.sin_cos();
-    let direction = [angle.chain(c, -s), angle.chain(s, c)];
     let amplitude = vibration.amplitude_mm.scale(regeneration);
-    let zero = Dual::constant(0.0);
-    Some(
-        (0..parts[0].len())
-            .map(|r| {
-                std::array::from_fn(|channel| {
-                    // Real and imaginary part of the channel's force for the unit direction.
-                    let (mut re, mut im) = (zero.clone(), zero.clone());
-                    for (part, coefficient) in parts.iter().zip(k) {
-                        for (d, along) in direction.iter().enumerate() {
-                            let unit: Complex64 =
-                                (0..3).map(|axis| part[r][axis][d] * dyno_from_tool[channel][axis]).sum();
-                            let weight = coefficient * along;
-                            re = &re + &weight.scale(unit.re);
-                            im = &im + &weight.scale(unit.im);
-                        }
-                    }
-                    let square = &(&re * &re) + &(&im * &im);
-                    let size = if square.value > 0.0 { square.sqrt() } else { zero.clone() };
-                    &size * &amplitude
-                })
-            })
-            .collect(),
-    )
+    Some([&amplitude * &angle.chain(c, -s), &amplitude * &angle.chain(s, c)])
+}
+
+/// Amplitudes of one line on the recorded x, y, z. `slopes`: of the unit forces by the change of the chip along x and y.
+fn line_amplitudes(
+    physics: &CutPhysics,
+    line: &LineForces,
+    slopes: [&LineForces; 2],
+    change: &[Dual; 2],
+    dyno_from_tool: &[[f64; 3]; 3],
+) -> [Dual; 3] {
+    let seen = |forces: &LineForces, k: usize, channel: usize| -> Complex64 {
+        (0..3).map(|axis| forces[k][axis] * dyno_from_tool[channel][axis]).sum()
+    };
+    std::array::from_fn(|channel| {
+        // Real and imaginary part, with derivatives by the coefficients and by the change of the chip.
+        let mut parts = [Dual::constant(0.0), Dual::constant(0.0)];
+        for (k, coefficient) in physics.coefficient.iter().enumerate() {
+            let mut terms = vec![(coefficient.clone(), seen(line, k, channel))];
+            for (slope, by) in slopes.iter().zip(change) {
+                let weight = Dual {
+                    value: 0.0,
+                    gradient: by.gradient.iter().map(|g| g * coefficient.value).collect(),
+                };
+                terms.push((weight, seen(slope, k, channel)));
+            }
+            for (weight, unit) in terms {
+                parts[0] = &parts[0] + &weight.scale(unit.re);
+                parts[1] = &parts[1] + &weight.scale(unit.im);
+            }
+        }
+        let square = &(&parts[0] * &parts[0]) + &(&parts[1] * &parts[1]);
+        if square.value > 0.0 { square.sqrt() } else { Dual::constant(0.0) }
+    })
 }
 
 /// Coefficients that the mean steady forces suggest, zero lines through the air; pulled towards an edge coefficient of

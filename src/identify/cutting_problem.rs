@@ -9,7 +9,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::cutting_data::{CutData, CutKind, CuttingData, ForceChannel};
-use super::cutting_model::{CuttingModel, Forces, drilling_forces, milling_forces, vibration_amplitudes};
+use super::cutting_model::{CuttingModel, Forces, LineAmplitudes, drilling_forces, milling_forces};
 use super::levenberg_marquardt::{LeastSquares, Linearisation};
 use crate::Result;
 use crate::effects::cutting::CutPhysics;
@@ -250,17 +250,17 @@ impl CuttingProblem<'_> {
             cut.channels[i].as_ref().map(|channel| ZeroLine::new(cut, &physics, channel, i))
         });
         let mut sums = Sums::zero(count);
-        let (forces, placement) = match &cut.kind {
+        let (forces, lines_off_comb, placement) = match &cut.kind {
             CutKind::Milling { cut: milling, unit } => {
-                let forces = milling_forces(&physics, cut, milling, unit, &self.data.dyno_from_tool, count);
+                let (forces, lines) = milling_forces(&physics, cut, milling, unit, &self.data.dyno_from_tool, count);
                 let step = if physics.runout.is_some() { 1 } else { milling.teeth };
                 let phase = best_phase(cut, &forces, step);
-                (forces, phase)
+                (forces, lines, phase)
             }
             CutKind::Drilling { cut: drill, contact_s } => {
                 let at = |contact: f64| drilling_forces(&physics, cut, drill, contact, 0);
                 let contact = best_contact(&lines, *contact_s, at);
-                (drilling_forces(&physics, cut, drill, contact, count), contact)
+                (drilling_forces(&physics, cut, drill, contact, count), None, contact)
             }
         };
         let mut fit = CutFit {
@@ -290,39 +290,12 @@ impl CuttingProblem<'_> {
                 level: level.into_owned(),
             });
         }
-        self.push_vibration(&mut sums, cut, &physics, count);
+        push_vibration(&mut sums, cut, &physics, lines_off_comb.as_ref(), count);
         fit.chi2 = 2.0 * sums.cost;
         if derivatives {
             sums.eliminate_placement();
         }
         Ok((sums, fit))
-    }
-
-    /// Lines off the comb: logarithms of their amplitudes against the model's, noise included on both sides.
-    fn push_vibration(&self, sums: &mut Sums, cut: &CutData, physics: &CutPhysics, count: usize) {
-        let Some(seen) = &cut.vibration else { return };
-        let model = vibration_amplitudes(physics, cut, &self.data.dyno_from_tool);
-        let mut push = |residual: f64, slope: &dyn Fn(usize) -> f64| {
-            let slopes: Vec<Vec<f64>> = (0..count).map(|p| vec![slope(p)]).collect();
-            sums.push(&[residual], &slopes, &[0.0]);
-        };
-        if let Some(vibration) = &physics.vibration {
-            let f = &vibration.frequency_hz;
-            push((f.value / seen.frequency_hz).ln() / FREQUENCY_LOG_STD, &|p| {
-                f.derivative(p) / f.value / FREQUENCY_LOG_STD
-            });
-        }
-        for line in &seen.lines {
-            for (channel, amplitude, noise) in &line.channels {
-                let predicted = model.as_ref().map(|m| &m[(line.shift + super::off_comb::MOST_SHIFT) as usize][*channel]);
-                let value = predicted.map_or(0.0, |p| p.value);
-                let square = value * value + noise * noise;
-                let residual = (0.5 * square.ln() - amplitude.ln()) / VIBRATION_LOG_STD;
-                push(residual, &|p| {
-                    predicted.map_or(0.0, |d| value * d.derivative(p) / square / VIBRATION_LOG_STD)
-                });
-            }
-        }
     }
 
     fn total(&self, theta: &[f64], derivatives: bool) -> Result<Sums> {
@@ -365,6 +338,38 @@ impl LeastSquares for CuttingProblem<'_> {
             gradient: total.gradient,
             hessian: total.hessian,
         })
+    }
+}
+
+/// Lines off the comb: logarithms of their amplitudes against the model's, noise included on both sides.
+fn push_vibration(
+    sums: &mut Sums,
+    cut: &CutData,
+    physics: &CutPhysics,
+    model: Option<&LineAmplitudes>,
+    count: usize,
+) {
+    let Some(seen) = &cut.vibration else { return };
+    let mut push = |residual: f64, slope: &dyn Fn(usize) -> f64| {
+        let slopes: Vec<Vec<f64>> = (0..count).map(|p| vec![slope(p)]).collect();
+        sums.push(&[residual], &slopes, &[0.0]);
+    };
+    if let Some(vibration) = &physics.vibration {
+        let f = &vibration.frequency_hz;
+        push((f.value / seen.frequency_hz).ln() / FREQUENCY_LOG_STD, &|p| {
+            f.derivative(p) / f.value / FREQUENCY_LOG_STD
+        });
+    }
+    for line in &seen.lines {
+        for (channel, amplitude, noise) in &line.channels {
+            let predicted = model.map(|m| &m[(line.shift + super::off_comb::MOST_SHIFT) as usize][*channel]);
+            let value = predicted.map_or(0.0, |p| p.value);
+            let square = value * value + noise * noise;
+            let residual = (0.5 * square.ln() - amplitude.ln()) / VIBRATION_LOG_STD;
+            push(residual, &|p| {
+                predicted.map_or(0.0, |d| value * d.derivative(p) / square / VIBRATION_LOG_STD)
+            });
+        }
     }
 }
 

@@ -96,16 +96,10 @@ impl MillingCut {
         Complex64::from_polar(self.axial_depth_mm * sinc, -half)
     }
 
-    /// N a ⟨f(sin φ, cos φ)⟩ at order `n` (a multiple of the teeth), helix included: N for a force density in N/mm.
-    pub(super) fn immersion_integral(&self, n: i64, f: &dyn Fn(f64, f64) -> f64) -> Complex64 {
-        let Immersion { start_rad, exit_rad } = self.immersion;
+    /// [`Self::helix`] at orders of either sign.
+    pub(super) fn helix_at(&self, n: i64) -> Complex64 {
         let helix = self.helix(n.unsigned_abs() as usize);
-        let helix = if n < 0 { helix.conj() } else { helix };
-        let sum: Complex64 = gauss_legendre(start_rad, exit_rad, 48)
-            .iter()
-            .map(|(phi, w)| Complex64::from_polar(f(phi.sin(), phi.cos()) * w / TAU, -(n as f64) * phi))
-            .sum();
-        sum * helix * self.teeth as f64
+        if n < 0 { helix.conj() } else { helix }
     }
 
     /// Closed form for h = c sin φ and a force linear in h. All teeth are alike, so only multiples of their number appear.

@@ -4,11 +4,11 @@
 //! (order 1 = once a revolution): the helix is then a factor, a phase is a factor, sensor dynamics are a factor,
 //! and the integrals over the immersion have closed forms wherever the force is linear in the chip thickness.
 
-mod directional;
 mod drilling;
 mod milling;
 mod quadrature;
+mod vibrating;
 
-pub use directional::directional_orders;
 pub use drilling::{DrillTerm, DrillingCut};
 pub use milling::{ChipLaw, MillingCut, SampledForces, UNIT_COUNT, UnitForces};
+pub use vibrating::{LineForces, VibratingForces};

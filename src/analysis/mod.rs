@@ -2,6 +2,7 @@
 
 pub mod addition;
 pub mod campaign;
+pub mod cutting;
 pub mod lobes;
 pub mod modal;
 pub mod regression_line;
@@ -10,6 +11,7 @@ pub mod thesis_findings;
 
 pub use addition::Addition;
 pub use campaign::{CampaignFindings, LobeFindings, PostureFindings, StructureFindings};
+pub use cutting::CuttingAnalysis;
 pub use lobes::{LobeAnalysis, LobeCase};
 pub use modal::{ModalAnalysis, PostureModes};
 pub use structure::StructureAnalysis;

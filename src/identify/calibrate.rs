@@ -235,7 +235,7 @@ pub fn calibrate(model: &StructureModel, data: &FrfData, options: Options) -> Re
 }
 
 /// Covariance on the solver's scale, widened where the misfit exceeds the noise.
-fn covariance(fit: &Fit, reduced_chi2: f64) -> Result<DMatrix<f64>> {
+pub(super) fn covariance(fit: &Fit, reduced_chi2: f64) -> Result<DMatrix<f64>> {
     // Solved on unit diagonal: the parameters' information differs by many orders of magnitude.
     let n = fit.hessian.nrows();
     let scale: Vec<f64> = (0..n).map(|i| fit.hessian[(i, i)].sqrt()).collect();

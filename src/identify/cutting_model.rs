@@ -35,7 +35,7 @@ pub struct AddedCuttingEffect {
 
 /// A coefficient's prior is this many times wider than the largest coefficient: it only keeps the fit finite where the
 /// data say nothing.
-const PRIOR_WIDTH: f64 = 20.0;
+const PRIOR_WIDTH: f64 = 3.0;
 /// Edge coefficients are some hundredths of a millimetre times the cutting coefficients.
 const EDGE_MM: f64 = 0.05;
 

@@ -284,6 +284,10 @@ impl CuttingProblem<'_> {
                 _ => vec![0.0; residual.len()],
             };
             sums.push(&residual, &slopes, &by_placement);
+            if physics.transient_s.is_some() {
+                // A free amplitude fits noise too: it costs what a parameter costs in BIC, over the levels it is fitted to.
+                sums.cost += 0.5 * (level.len().max(1) as f64).ln();
+            }
             fit.channels[i] = Some(ChannelFit {
                 orders,
                 zero: line.zero(&level),
@@ -365,7 +369,9 @@ fn push_vibration(
             let predicted = model.map(|m| &m[(line.shift + super::off_comb::MOST_SHIFT) as usize][*channel]);
             let value = predicted.map_or(0.0, |p| p.value);
             let square = value * value + noise * noise;
-            let residual = (0.5 * square.ln() - amplitude.ln()) / VIBRATION_LOG_STD;
+            let seen = amplitude.max(1e-3 * noise).max(f64::MIN_POSITIVE);
+            let square = square.max(f64::MIN_POSITIVE);
+            let residual = (0.5 * square.ln() - seen.ln()) / VIBRATION_LOG_STD;
             push(residual, &|p| {
                 predicted.map_or(0.0, |d| value * d.derivative(p) / square / VIBRATION_LOG_STD)
             });

@@ -123,7 +123,7 @@ fn report(name: &str, dir: &Path) {
             println!("   {instance:?} failed");
             continue;
         };
-        let extra = (model.parameters.len() - base.parameters.len()) + model.nuisances_per_channel() * data.channel_count();
+        let extra = model.parameters.len() - base.parameters.len();
         let delta = 2.0 * (fit.cost - first.cost) + extra as f64 * dof.ln();
         rows.push((delta, model, fit, instance, clock.elapsed().as_secs_f64()));
     }
@@ -140,4 +140,32 @@ fn report(name: &str, dir: &Path) {
         );
     }
     println!("   total {:.2} s", clock.elapsed().as_secs_f64());
+    let clock = std::time::Instant::now();
+    let study = lobestone::identify::CuttingStudy::new(data.clone());
+    match lobestone::discrepancy::diagnose(&study, &base) {
+        Ok(d) => {
+            println!(
+                "   VERDICT {:?} {} confidence {:.2}, indistinguishable {:?}, companion {:?}, {:.2} s",
+                d.verdict,
+                d.winner().map_or("-".into(), |c| c.label()),
+                d.confidence,
+                d.indistinguishable,
+                d.companion,
+                clock.elapsed().as_secs_f64()
+            );
+            for c in d.candidates.iter().take(3) {
+                println!(
+                    "      {:26} dBIC {:.1} p {:.2e} chi2 {:.3} held-out {:.4} (base {:.4}) bound {}",
+                    c.label(),
+                    c.delta_bic,
+                    c.p_value,
+                    c.reduced_chi2,
+                    c.held_out.map_or(f64::NAN, |h| h.nrms()),
+                    d.baseline.held_out.map_or(f64::NAN, |h| h.nrms()),
+                    c.at_bound
+                );
+            }
+        }
+        Err(e) => println!("   diagnose failed: {e}"),
+    }
 }

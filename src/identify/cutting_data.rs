@@ -206,7 +206,7 @@ fn cut_data(campaign: &Campaign, index: usize, record: &TimeRecord) -> Result<Cu
         None => 0,
     };
     let mut spectra = Vec::new();
-    let channels = std::array::from_fn(|i| {
+    let mut channels: [Option<ForceChannel>; 4] = std::array::from_fn(|i| {
         let axis = ForceAxis::ALL[i];
         // A drill puts nothing on the lateral channels; what they show is its wobble.
         if milling.is_none() && !ForceAxis::of(Process::Drilling).contains(&axis) {
@@ -253,6 +253,13 @@ fn cut_data(campaign: &Campaign, index: usize, record: &TimeRecord) -> Result<Cu
         CutKind::Milling { cut: m, .. } => find_vibration(&spectra, rate, cut.spindle_rpm / 60.0, m.teeth),
         CutKind::Drilling { .. } => None,
     };
+    if let (Some(vibration), CutKind::Milling { cut: m, .. }) = (&vibration, &kind) {
+        for (i, channel) in channels.iter_mut().enumerate() {
+            if let Some(channel) = channel {
+                widen_for_vibration(channel, vibration, i, m.teeth, window.steady_blocks());
+            }
+        }
+    }
     Ok(CutData {
         cut: index,
         id: cut.id.clone(),
@@ -413,6 +420,36 @@ fn force_channel(
         && positive(&channel.order_std)
         && channel.orders.iter().all(|c| c.is_finite()))
     .then_some(channel)
+}
+
+/// A limit cycle's amplitude wanders by about this share while it lasts.
+const VIBRATION_WANDERS: f64 = 0.25;
+
+/// Where a tooth leaves the cut in every swing, the vibration changes the orders of tooth passing as well, by about what it
+/// puts on the lines beside its own; and it does so no more steadily than its amplitude is.
+fn widen_for_vibration(
+    channel: &mut ForceChannel,
+    vibration: &OffComb,
+    index: usize,
+    teeth: usize,
+    steady: Range<usize>,
+) {
+    let beside: Vec<f64> = vibration
+        .lines
+        .iter()
+        .filter(|l| l.shift != 0)
+        .flat_map(|l| l.channels.iter().filter(|c| c.0 == index))
+        .map(|(_, amplitude, noise)| (amplitude * amplitude - noise * noise).max(0.0))
+        .collect();
+    if beside.is_empty() {
+        return;
+    }
+    // Mean square amplitude of the lines; a coefficient is half an amplitude.
+    let power = beside.iter().sum::<f64>() / beside.len() as f64;
+    let variance = VIBRATION_WANDERS.powi(2) * power / 4.0;
+    let widen = |std: &mut f64| *std = (*std * *std + variance).sqrt();
+    channel.order_std.iter_mut().skip(teeth - 1).step_by(teeth).for_each(widen);
+    channel.level_std[steady].iter_mut().for_each(widen);
 }
 
 /// Variance that lines above the noise (vibration, hum) leave in a mean over `length_s`. Slower than that is no line but a

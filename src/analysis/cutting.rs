@@ -28,21 +28,30 @@ impl CuttingAnalysis {
     pub fn run(campaign: &Campaign) -> Result<Self> {
         let processes = processes(campaign);
         let Some(&process) = processes.first() else {
-            return Err(InputError::new("the campaign has no [[cut]]: no force records to compare")
-                .file(campaign.dir.join("campaign.toml"))
-                .key("cut")
-                .remedy("add [[cut]] tables that name the force records")
-                .into());
+            return Err(
+                InputError::new("the campaign has no [[cut]]: no force records to compare")
+                    .file(campaign.dir.join("campaign.toml"))
+                    .key("cut")
+                    .remedy("add [[cut]] tables that name the force records")
+                    .into(),
+            );
         };
         let data = CuttingData::load(campaign, process)?;
         let model = CuttingModel::new(&data, true)?;
         let calibration = calibrate_cutting(&model, &data)?;
-        let fits = CuttingProblem { model: &model, data: &data }.fits(&calibration.theta)?;
+        let fits = CuttingProblem {
+            model: &model,
+            data: &data,
+        }
+        .fits(&calibration.theta)?;
         let comparison = CuttingComparison::new(&data, &fits);
         let held_out_nrms = held_out_cuts(&model, &data, &calibration.theta)?.map(|h| h.nrms());
         let mut warnings = data.warnings.clone();
         if let Some(other) = processes.get(1) {
-            warnings.push(format!("the {} cuts are not compared: one process at a time", name_of(*other)));
+            warnings.push(format!(
+                "the {} cuts are not compared: one process at a time",
+                name_of(*other)
+            ));
         }
         warnings.extend(warnings_of(&calibration));
         Ok(CuttingAnalysis {
@@ -85,14 +94,20 @@ fn warnings_of(calibration: &Calibration) -> Vec<String> {
 /// chi2_per_value, converged}`; null where the waveform does not determine a coefficient. One entry a group, null where
 /// its waveforms cannot be fitted.
 pub fn waveform_groups(campaign: &Campaign, result: &CfcResult) -> Vec<Value> {
-    let loaded: Vec<(Process, Option<CuttingData>)> =
-        processes(campaign).into_iter().map(|p| (p, CuttingData::load(campaign, p).ok())).collect();
+    let loaded: Vec<(Process, Option<CuttingData>)> = processes(campaign)
+        .into_iter()
+        .map(|p| (p, CuttingData::load(campaign, p).ok()))
+        .collect();
     result
         .groups
         .iter()
         .map(|group| {
-            let data = loaded.iter().find(|(p, _)| *p == group.process).and_then(|(_, d)| d.as_ref());
-            data.and_then(|data| waveform_group(data, group).ok()).unwrap_or(Value::Null)
+            let data = loaded
+                .iter()
+                .find(|(p, _)| *p == group.process)
+                .and_then(|(_, d)| d.as_ref());
+            data.and_then(|data| waveform_group(data, group).ok())
+                .unwrap_or(Value::Null)
         })
         .collect()
 }
@@ -101,7 +116,11 @@ fn waveform_group(data: &CuttingData, group: &Group) -> Result<Value> {
     let own = data.filtered(|i| group.cuts.contains(&data.cuts[i].id));
     let model = CuttingModel::new(&own, true)?;
     let calibration = calibrate_cutting(&model, &own)?;
-    let fits = CuttingProblem { model: &model, data: &own }.fits(&calibration.theta)?;
+    let fits = CuttingProblem {
+        model: &model,
+        data: &own,
+    }
+    .fits(&calibration.theta)?;
     let totals = CuttingComparison::new(&own, &fits).totals;
     let mut map = Map::new();
     for (parameter, estimate) in model.parameters.iter().zip(&calibration.parameters) {
@@ -109,7 +128,11 @@ fn waveform_group(data: &CuttingData, group: &Group) -> Result<Value> {
         let prior = parameter.prior.map_or(f64::INFINITY, |p| p.std);
         let Estimate { value, std_error, .. } = estimate;
         let known = *std_error < 0.1 * prior;
-        let entry = if known { json!({"value": value, "std_error": std_error}) } else { Value::Null };
+        let entry = if known {
+            json!({"value": value, "std_error": std_error})
+        } else {
+            Value::Null
+        };
         map.insert(parameter.name.clone(), entry);
     }
     map.insert("nrms".into(), json!(totals.nrms));

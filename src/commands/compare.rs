@@ -73,7 +73,10 @@ fn describe_cutting(analysis: &CuttingAnalysis) -> String {
         percent(c.totals.noise_floor_nrms),
     );
     if let Some(held_out) = analysis.held_out_nrms {
-        text += &format!("  held-out nrms   {} (on cuts left out of the fit)\n", percent(held_out));
+        text += &format!(
+            "  held-out nrms   {} (on cuts left out of the fit)\n",
+            percent(held_out)
+        );
     }
     text += &group_tables(&[
         ("axis", &c.by_axis),

@@ -83,12 +83,22 @@ impl CuttingComparison {
                 chi2_per_value: fit.chi2 / cut.value_count().max(1) as f64,
             });
         }
-        let whole = |part: f64| if total.signal > 0.0 { (part / total.signal).sqrt() } else { 0.0 };
+        let whole = |part: f64| {
+            if total.signal > 0.0 {
+                (part / total.signal).sqrt()
+            } else {
+                0.0
+            }
+        };
         let milling = data.process == Process::Milling;
         CuttingComparison {
             totals: ErrorTotals {
                 nrms: total.nrms(),
-                mean_abs_db: if decibel.1 > 0 { decibel.0 / decibel.1 as f64 } else { 0.0 },
+                mean_abs_db: if decibel.1 > 0 {
+                    decibel.0 / decibel.1 as f64
+                } else {
+                    0.0
+                },
                 noise_floor_nrms: total.floor(),
             },
             by_cut: by_cut.finish(),

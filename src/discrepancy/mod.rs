@@ -7,7 +7,7 @@ pub mod extension;
 pub mod next_measurement;
 pub mod verdict;
 
-pub use compare_cutting::CuttingComparison;
 pub use compare::{Band, FrfComparison, FrfError};
+pub use compare_cutting::CuttingComparison;
 pub use diagnose::{Candidate, Diagnosis, diagnose};
 pub use verdict::Verdict;

@@ -9,8 +9,10 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::cutting_data::{CutData, CutKind, CuttingData, ForceChannel};
-use super::cutting_model::{CuttingModel, Forces, LineAmplitudes, drilling_forces, milling_forces};
+use super::cutting_forces::{Forces, LineAmplitudes, drilling_forces, milling_forces};
+use super::cutting_model::CuttingModel;
 use super::levenberg_marquardt::{LeastSquares, Linearisation};
+use super::zero_line::{ZeroLine, dot};
 use crate::Result;
 use crate::effects::cutting::CutPhysics;
 
@@ -18,8 +20,6 @@ use crate::effects::cutting::CutPhysics;
 const VIBRATION_LOG_STD: f64 = 0.25;
 /// Standard deviation of the logarithm of its frequency from cut to cut.
 const FREQUENCY_LOG_STD: f64 = 0.05;
-/// A zero-line column that the others explain up to this share of its length is left out.
-const COLLINEAR: f64 = 1e-7;
 
 /// Misfit of a model to the records plus the priors on its parameters.
 pub struct CuttingProblem<'a> {
@@ -98,169 +98,48 @@ impl Sums {
     }
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
-}
-
-/// A channel's zero line: an orthonormal basis of what it may be, in weighted levels.
-struct ZeroLine {
-    basis: Vec<Vec<f64>>,
-    weight: Vec<f64>,
-    /// Weighted recorded level.
-    recorded: Vec<f64>,
-    /// Loss of a leaking amplifier, weighted, per unit of its rate; empty without.
-    loss: Vec<f64>,
-    rate: f64,
-    rate_gradient: Vec<f64>,
-    /// Transient: derivative of its weighted column by τ, the gradient of τ, and 1/length of its orthogonal rest.
-    transient: Option<(Vec<f64>, Vec<f64>, f64)>,
-}
-
-impl ZeroLine {
-    fn new(cut: &CutData, physics: &CutPhysics, channel: &ForceChannel, index: usize) -> ZeroLine {
-        let weight: Vec<f64> = channel.level_std.iter().map(|s| 1.0 / s).collect();
-        let time: Vec<f64> = cut.block_s.iter().map(|b| 0.5 * (b[0] + b[1])).collect();
-        let weighted = |f: &dyn Fn(usize) -> f64| -> Vec<f64> {
-            weight.iter().enumerate().map(|(b, w)| w * f(b)).collect()
-        };
-        let mut line = ZeroLine {
-            basis: Vec::new(),
-            recorded: weighted(&|b| channel.level[b]),
-            loss: Vec::new(),
-            rate: 0.0,
-            rate_gradient: Vec::new(),
-            transient: None,
-            weight: weight.clone(),
-        };
-        line.add_column(weighted(&|_| 1.0));
-        line.add_column(weighted(&|b| time[b]));
-        if let Some(rates) = &physics.leak_per_s {
-            // What leaks of a straight zero line is a parabola.
-            line.add_column(weighted(&|b| time[b] * time[b]));
-            line.loss = weighted(&|b| channel.integral[b]);
-            line.rate = rates[index].value;
-            line.rate_gradient.clone_from(&rates[index].gradient);
-        }
-        if let Some(taus) = &physics.transient_s {
-            let tau = &taus[index];
-            let start = time.first().copied().unwrap_or(0.0);
-            let since = |b: usize| (time[b] - start) / tau.value;
-            if let Some(rest) = line.add_column(weighted(&|b| (-since(b)).exp())) {
-                let slope = weighted(&|b| (-since(b)).exp() * since(b) / tau.value);
-                line.transient = Some((slope, tau.gradient.clone(), 1.0 / rest));
-            }
-        }
-        line
-    }
-
-    /// Length of what is new in the column; `None` where there is nothing new.
-    fn add_column(&mut self, mut column: Vec<f64>) -> Option<f64> {
-        let before = dot(&column, &column).sqrt();
-        for _ in 0..2 {
-            self.project(&mut column);
-        }
-        let rest = dot(&column, &column).sqrt();
-        if !(rest > COLLINEAR * before) {
-            return None;
-        }
-        column.iter_mut().for_each(|v| *v /= rest);
-        self.basis.push(column);
-        Some(rest)
-    }
-
-    /// Takes out of a weighted vector what the zero line can be.
-    fn project(&self, vector: &mut [f64]) {
-        for q in &self.basis {
-            let share = dot(q, vector);
-            for (v, q) in vector.iter_mut().zip(q) {
-                *v -= share * q;
-            }
-        }
-    }
-
-    /// Weighted model − recorded for force levels `level`, zero line fitted.
-    fn residual(&self, level: &[f64]) -> Vec<f64> {
-        let mut residual = self.raw(level);
-        self.project(&mut residual);
-        residual
-    }
-
-    fn raw(&self, level: &[f64]) -> Vec<f64> {
-        let mut raw: Vec<f64> =
-            level.iter().zip(&self.weight).zip(&self.recorded).map(|((l, w), r)| l * w - r).collect();
-        for (v, loss) in raw.iter_mut().zip(&self.loss) {
-            *v -= self.rate * loss;
-        }
-        raw
-    }
-
-    /// Derivatives of the residual by the parameters; `slope(p)`: those of the force levels.
-    fn slopes<'a>(&self, level: &[f64], count: usize, slope: impl Fn(usize) -> std::borrow::Cow<'a, [f64]>) -> Vec<Vec<f64>> {
-        // Amplitude of the transient: its orthogonal rest is the last of the basis.
-        let transient = self.transient.as_ref().zip(self.basis.last()).map(|((column, gradient, per_length), q)| {
-            let raw = self.raw(level);
-            (column, gradient, -dot(q, &raw) * per_length)
-        });
-        (0..count)
-            .map(|p| {
-                let mut own: Vec<f64> = slope(p).iter().zip(&self.weight).map(|(s, w)| s * w).collect();
-                let rate = self.rate_gradient.get(p).copied().unwrap_or(0.0);
-                for (v, loss) in own.iter_mut().zip(&self.loss) {
-                    *v -= rate * loss;
-                }
-                if let Some((column, gradient, amplitude)) = &transient {
-                    let g = gradient.get(p).copied().unwrap_or(0.0) * amplitude;
-                    for (v, c) in own.iter_mut().zip(*column) {
-                        *v += g * c;
-                    }
-                }
-                self.project(&mut own);
-                own
-            })
-            .collect()
-    }
-
-    /// Fitted zero line by block, in the channel's unit.
-    fn zero(&self, level: &[f64]) -> Vec<f64> {
-        let raw = self.raw(level);
-        let mut rest = raw.clone();
-        self.project(&mut rest);
-        raw.iter()
-            .zip(&rest)
-            .zip(&self.weight)
-            .enumerate()
-            .map(|(b, ((raw, rest), w))| {
-                let lost = self.loss.get(b).map_or(0.0, |l| self.rate * l);
-                (rest - raw - lost) / w
-            })
-            .collect()
-    }
-}
-
 impl CuttingProblem<'_> {
     /// The model in every cut.
     pub fn fits(&self, theta: &[f64]) -> Result<Vec<CutFit>> {
-        self.data.cuts.par_iter().map(|cut| Ok(self.evaluate(cut, theta, false)?.1)).collect()
+        self.data
+            .cuts
+            .par_iter()
+            .map(|cut| Ok(self.evaluate(cut, theta, false)?.1))
+            .collect()
     }
 
     fn evaluate(&self, cut: &CutData, theta: &[f64], derivatives: bool) -> Result<(Sums, CutFit)> {
         let count = if derivatives { theta.len() } else { 0 };
         let physics = self.model.physics(theta, cut, derivatives);
         let lines: [Option<ZeroLine>; 4] = std::array::from_fn(|i| {
-            cut.channels[i].as_ref().map(|channel| ZeroLine::new(cut, &physics, channel, i))
+            cut.channels[i]
+                .as_ref()
+                .map(|channel| ZeroLine::new(cut, &physics, channel, i))
         });
         let mut sums = Sums::zero(count);
         let (forces, lines_off_comb, placement) = match &cut.kind {
             CutKind::Milling { cut: milling, unit } => {
-                let (forces, lines) = milling_forces(&physics, cut, milling, unit, &self.data.dyno_from_tool, count);
-                let step = if physics.runout.is_some() { 1 } else { milling.teeth };
+                let (forces, lines) =
+                    milling_forces(&physics, cut, milling, unit, &self.data.dyno_from_tool, count);
+                let step = if physics.runout.is_some() {
+                    1
+                } else {
+                    milling.teeth
+                };
                 let phase = best_phase(cut, &forces, step);
                 (forces, lines, phase)
             }
-            CutKind::Drilling { cut: drill, contact_s } => {
+            CutKind::Drilling {
+                cut: drill,
+                contact_s,
+            } => {
                 let at = |contact: f64| drilling_forces(&physics, cut, drill, contact, 0);
                 let contact = best_contact(&lines, *contact_s, at);
-                (drilling_forces(&physics, cut, drill, contact, count), None, contact)
+                (
+                    drilling_forces(&physics, cut, drill, contact, count),
+                    None,
+                    contact,
+                )
             }
         };
         let mut fit = CutFit {
@@ -269,7 +148,9 @@ impl CuttingProblem<'_> {
             channels: [None, None, None, None],
         };
         for (i, (channel, line)) in cut.channels.iter().zip(&lines).enumerate() {
-            let (Some(channel), Some(line)) = (channel, line) else { continue };
+            let (Some(channel), Some(line)) = (channel, line) else {
+                continue;
+            };
             let orders = push_orders(&mut sums, channel, &forces, i, placement, count);
             let level = levels(cut, &forces.value[i]);
             let residual = line.residual(&level);
@@ -385,7 +266,10 @@ fn levels<'a>(cut: &CutData, forces: &'a [f64]) -> std::borrow::Cow<'a, [f64]> {
         CutKind::Drilling { .. } => forces.into(),
         CutKind::Milling { .. } => {
             let mean = forces.first().copied().unwrap_or(0.0);
-            (0..cut.block_s.len()).map(|b| if cut.steady.contains(&b) { mean } else { 0.0 }).collect::<Vec<f64>>().into()
+            (0..cut.block_s.len())
+                .map(|b| if cut.steady.contains(&b) { mean } else { 0.0 })
+                .collect::<Vec<f64>>()
+                .into()
         }
     }
 }
@@ -403,8 +287,12 @@ fn push_orders(
     if orders == 0 {
         return Vec::new();
     }
-    let turn: Vec<Complex64> = (1..=orders).map(|n| Complex64::from_polar(1.0, -(n as f64) * phase)).collect();
-    let at = |set: &[Vec<f64>; 4], n: usize| Complex64::new(set[index][2 * n + 1], set[index][2 * n + 2]) * turn[n];
+    let turn: Vec<Complex64> = (1..=orders)
+        .map(|n| Complex64::from_polar(1.0, -(n as f64) * phase))
+        .collect();
+    let at = |set: &[Vec<f64>; 4], n: usize| {
+        Complex64::new(set[index][2 * n + 1], set[index][2 * n + 2]) * turn[n]
+    };
     let model: Vec<Complex64> = (0..orders).map(|n| at(&forces.value, n)).collect();
     // Real and imaginary part have half the variance each.
     let weighted = |value: &dyn Fn(usize) -> Complex64| -> Vec<f64> {
@@ -416,9 +304,14 @@ fn push_orders(
         flat
     };
     let residual = weighted(&|n| model[n] - channel.orders[n]);
-    let slopes: Vec<Vec<f64>> = (0..count).map(|p| weighted(&|n| at(&forces.slope[p], n))).collect();
-    let by_phase =
-        if count > 0 { weighted(&|n| model[n] * Complex64::new(0.0, -((n + 1) as f64))) } else { Vec::new() };
+    let slopes: Vec<Vec<f64>> = (0..count)
+        .map(|p| weighted(&|n| at(&forces.slope[p], n)))
+        .collect();
+    let by_phase = if count > 0 {
+        weighted(&|n| model[n] * Complex64::new(0.0, -((n + 1) as f64)))
+    } else {
+        Vec::new()
+    };
     sums.push(&residual, &slopes, &by_phase);
     model
 }
@@ -432,7 +325,9 @@ fn best_phase(cut: &CutData, forces: &Forces, step: usize) -> f64 {
         let Some(channel) = channel else { continue };
         for (k, p) in product.iter_mut().enumerate() {
             let n = (k + 1) * step;
-            let Some(recorded) = channel.orders.get(n - 1) else { continue };
+            let Some(recorded) = channel.orders.get(n - 1) else {
+                continue;
+            };
             let model = Complex64::new(forces.value[i][2 * n - 1], forces.value[i][2 * n]);
             *p += model.conj() * recorded / channel.order_std[n - 1].powi(2);
         }
@@ -460,7 +355,11 @@ fn best_phase(cut: &CutData, forces: &Forces, step: usize) -> f64 {
             first -= n * turned.im;
             second -= n * n * turned.re;
         }
-        let move_by = if second < 0.0 { -first / second } else { spacing * first.signum() * 0.25 };
+        let move_by = if second < 0.0 {
+            -first / second
+        } else {
+            spacing * first.signum() * 0.25
+        };
         let move_by = move_by.clamp(-0.5 * spacing, 0.5 * spacing);
         x += move_by;
         if move_by.abs() < 1e-13 {
@@ -479,7 +378,11 @@ fn best_contact(lines: &[Option<ZeroLine>; 4], range: [f64; 2], forces: impl Fn(
         for (i, line) in lines.iter().enumerate() {
             let Some(line) = line else { continue };
             let residual = line.residual(&f.value[i]);
-            let mut by: Vec<f64> = f.contact_slope[i].iter().zip(&line.weight).map(|(s, w)| s * w).collect();
+            let mut by: Vec<f64> = f.contact_slope[i]
+                .iter()
+                .zip(&line.weight)
+                .map(|(s, w)| s * w)
+                .collect();
             line.project(&mut by);
             cost += 0.5 * dot(&residual, &residual);
             slope += dot(&residual, &by);
@@ -507,7 +410,11 @@ fn best_contact(lines: &[Option<ZeroLine>; 4], range: [f64; 2], forces: impl Fn(
             low = x;
         }
         let newton = x - slope / curvature.max(f64::MIN_POSITIVE);
-        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        let next = if newton > low && newton < high {
+            newton
+        } else {
+            0.5 * (low + high)
+        };
         let moved = (next - x).abs();
         x = next;
         if moved < 1e-12 {

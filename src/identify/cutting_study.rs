@@ -26,9 +26,13 @@ const FOLDS: usize = 5;
 impl CuttingStudy {
     pub fn new(data: CuttingData) -> Self {
         let count = FOLDS.min(data.cuts.len());
-        let folds: Vec<Vec<usize>> =
-            (0..count).map(|k| (k..data.cuts.len()).step_by(count).collect()).collect();
-        let without = folds.iter().map(|fold| data.filtered(|i| !fold.contains(&i))).collect();
+        let folds: Vec<Vec<usize>> = (0..count)
+            .map(|k| (k..data.cuts.len()).step_by(count).collect())
+            .collect();
+        let without = folds
+            .iter()
+            .map(|fold| data.filtered(|i| !fold.contains(&i)))
+            .collect();
         CuttingStudy { data, folds, without }
     }
 }
@@ -48,7 +52,11 @@ impl Study for CuttingStudy {
         let (mut tried, mut not_tried) = (Vec::new(), Vec::new());
         for instance in instances() {
             let label = instance.label();
-            if model.effects().iter().any(|added| added.instance.label() == label) {
+            if model
+                .effects()
+                .iter()
+                .any(|added| added.instance.label() == label)
+            {
                 continue;
             }
             match instance.effect.obstacle(&summary) {
@@ -71,6 +79,10 @@ impl Study for CuttingStudy {
 
     fn extend(&self, model: &CuttingModel, instance: &CuttingInstance) -> CuttingModel {
         model.with_effect(*instance, &self.data)
+    }
+
+    fn starting_from(&self, model: &CuttingModel, theta: Vec<f64>) -> CuttingModel {
+        model.with_start(theta)
     }
 
     fn hints(&self, model: &CuttingModel, _theta: &[f64]) -> Result<CuttingSummary> {
@@ -104,7 +116,11 @@ impl Study for CuttingStudy {
     }
 
     fn residual(&self, model: &CuttingModel, theta: &[f64]) -> Result<Residual> {
-        let fits = CuttingProblem { model, data: &self.data }.fits(theta)?;
+        let fits = CuttingProblem {
+            model,
+            data: &self.data,
+        }
+        .fits(theta)?;
         let sums = sums(&self.data, &fits);
         Ok(Residual {
             nrms: sums.nrms(),
@@ -118,9 +134,15 @@ impl Study for CuttingStudy {
     }
 }
 
-/// Fits `model` to `data` from its nominal values (those of the mean forces: the misfit is nearly quadratic around them).
+/// Fits `model` to `data` from its start. (A baseline's nominal values are those of the mean forces: the misfit is nearly
+/// quadratic around them.)
 pub fn calibrate_cutting(model: &CuttingModel, data: &CuttingData) -> Result<Calibration> {
-    let fit = minimise(&CuttingProblem { model, data }, &model.nominal_theta(), &model.bounds(), Stopping::default())?;
+    let fit = minimise(
+        &CuttingProblem { model, data },
+        &model.start(),
+        &model.bounds(),
+        Stopping::default(),
+    )?;
     calibration(model, data, fit)
 }
 
@@ -167,12 +189,18 @@ fn independent_share(data: &CuttingData, fits: &[CutFit]) -> f64 {
     let mut add = |series: &[f64]| {
         count += series.len();
         for (lag, sum) in lags.iter_mut().enumerate() {
-            *sum += series.iter().zip(series.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>();
+            *sum += series
+                .iter()
+                .zip(series.iter().skip(lag))
+                .map(|(a, b)| a * b)
+                .sum::<f64>();
         }
     };
     for (cut, fit) in data.cuts.iter().zip(fits) {
         for (channel, fit) in cut.channels.iter().zip(&fit.channels) {
-            let (Some(channel), Some(fit)) = (channel, fit) else { continue };
+            let (Some(channel), Some(fit)) = (channel, fit) else {
+                continue;
+            };
             let order = |part: fn(&num_complex::Complex64) -> f64| -> Vec<f64> {
                 let pairs = fit.orders.iter().zip(&channel.orders).zip(&channel.order_std);
                 pairs.map(|((m, d), s)| part(&(m - d)) / s).collect()

@@ -33,7 +33,10 @@ const ABOVE_NOISE: f64 = 25.0;
 
 /// The tool axes that the recorded channels of a cut determine.
 pub fn axis_waves(data: &CuttingData, cut: &CutData, fit: &CutFit) -> Vec<AxisWaves> {
-    ForceAxis::ALL.into_iter().filter_map(|axis| one_axis(data, cut, fit, axis)).collect()
+    ForceAxis::ALL
+        .into_iter()
+        .filter_map(|axis| one_axis(data, cut, fit, axis))
+        .collect()
 }
 
 /// Recorded channel, the model on it, and its weight in the tool axis.
@@ -46,7 +49,10 @@ fn one_axis(data: &CuttingData, cut: &CutData, fit: &CutFit, axis: ForceAxis) ->
     } else {
         let row = data.tool_from_dyno[i];
         let largest = row.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-        (0..3).filter(|j| row[*j].abs() > 1e-9 * largest).map(|j| (j, row[j])).collect()
+        (0..3)
+            .filter(|j| row[*j].abs() > 1e-9 * largest)
+            .map(|j| (j, row[j]))
+            .collect()
     };
     let parts: Vec<Part> = weights
         .iter()
@@ -81,9 +87,23 @@ fn level(process: Process, cut: &CutData, parts: &[Part]) -> WaveSums {
     let n = cut.steady.len().max(1) as f64;
     let (mut error, mut signal, mut noise) = (Vec::new(), Vec::new(), 0.0);
     for b in cut.steady.clone() {
-        error.push(parts.iter().map(|(c, f, a)| a * (f.level[b] + f.zero[b] - c.level[b])).sum::<f64>());
-        signal.push(parts.iter().map(|(c, f, a)| a * (c.level[b] - f.zero[b])).sum::<f64>());
-        noise += parts.iter().map(|(c, _, a)| (a * c.level_std[b]).powi(2)).sum::<f64>() / n;
+        error.push(
+            parts
+                .iter()
+                .map(|(c, f, a)| a * (f.level[b] + f.zero[b] - c.level[b]))
+                .sum::<f64>(),
+        );
+        signal.push(
+            parts
+                .iter()
+                .map(|(c, f, a)| a * (c.level[b] - f.zero[b]))
+                .sum::<f64>(),
+        );
+        noise += parts
+            .iter()
+            .map(|(c, _, a)| (a * c.level_std[b]).powi(2))
+            .sum::<f64>()
+            / n;
     }
     let mean = |v: &[f64]| v.iter().sum::<f64>() / n;
     let square = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>() / n;

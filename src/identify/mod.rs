@@ -3,10 +3,13 @@
 pub mod calibrate;
 pub mod case;
 pub mod cutting_data;
+mod cutting_forces;
 pub mod cutting_model;
 pub mod cutting_problem;
 pub mod cutting_study;
 pub mod cutting_waves;
+mod cutting_windows;
+mod force_channel;
 pub mod frf_data;
 pub mod levenberg_marquardt;
 pub mod modal_table;
@@ -14,6 +17,7 @@ pub mod off_comb;
 pub mod structure;
 pub mod structure_study;
 pub mod study;
+mod zero_line;
 
 pub use crate::parameter::{Parameter, Prior, Scale};
 pub use calibrate::{Calibration, Estimate, Options};

@@ -49,7 +49,10 @@ pub fn find_vibration(
     let beside = |hz: f64, spacing: f64| (hz / spacing - (hz / spacing).round()).abs() * spacing;
     let strength: Vec<f64> = (0..count)
         .map(|j| {
-            let sum: f64 = spectra.iter().map(|(_, s, _)| (s.rest[j] / floor(s).max(1e-300)).powi(2)).sum();
+            let sum: f64 = spectra
+                .iter()
+                .map(|(_, s, _)| (s.rest[j] / floor(s).max(1e-300)).powi(2))
+                .sum();
             sum / spectra.len() as f64
         })
         .collect();
@@ -59,14 +62,17 @@ pub fn find_vibration(
         let hz = j as f64 * line_hz;
         // Orders beyond half the sampling rate fold back among the lines.
         let folded = |m: f64| {
-            beside((m * sample_rate_hz - hz).abs(), spindle_hz).min(beside(m * sample_rate_hz + hz, spindle_hz))
+            beside((m * sample_rate_hz - hz).abs(), spindle_hz)
+                .min(beside(m * sample_rate_hz + hz, spindle_hz))
         };
         hz < 0.45 * sample_rate_hz
             && folded(1.0).min(folded(2.0)) > 1.5 * line_hz
             && beside(hz, tooth_hz) > (BESIDE_COMB * tooth_hz).max(3.0 * line_hz)
             && beside(hz, spindle_hz) > 2.5 * line_hz.min(0.1 * spindle_hz)
     };
-    let mut candidates: Vec<usize> = (1..count).filter(|&j| strength[j] > STANDS_OUT && allowed(j)).collect();
+    let mut candidates: Vec<usize> = (1..count)
+        .filter(|&j| strength[j] > STANDS_OUT && allowed(j))
+        .collect();
     candidates.retain(|&j| strength[j] > STANDS_OUT * local(j));
     candidates.sort_by(|a, b| strength[*b].total_cmp(&strength[*a]));
     // A line that the air shows as well is hum, not cutting.

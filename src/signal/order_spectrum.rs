@@ -39,7 +39,12 @@ pub fn highest_order(samples_per_revolution: f64, wanted: usize) -> usize {
 
 /// `samples`: the steady window, its zero line taken off; `samples_per_revolution` is not a whole number in general and
 /// the last revolution may end within a sample. `None` where there are less than three revolutions.
-pub fn order_spectrum(samples: &[f64], sample_rate_hz: f64, samples_per_revolution: f64, orders: usize) -> Option<OrderSpectrum> {
+pub fn order_spectrum(
+    samples: &[f64],
+    sample_rate_hz: f64,
+    samples_per_revolution: f64,
+    orders: usize,
+) -> Option<OrderSpectrum> {
     let revolutions = (samples.len() as f64 / samples_per_revolution + 1e-6).floor();
     if !(revolutions >= 3.0) {
         return None;
@@ -69,7 +74,10 @@ pub fn order_spectrum(samples: &[f64], sample_rate_hz: f64, samples_per_revoluti
         .map(|(i, v)| {
             let turn = phase(i).conj();
             // Horner from the highest order.
-            let sum = coefficient.iter().rev().fold(Complex64::ZERO, |s, c| (s + c) * turn);
+            let sum = coefficient
+                .iter()
+                .rev()
+                .fold(Complex64::ZERO, |s, c| (s + c) * turn);
             v - 2.0 * sum.re
         })
         .collect();
@@ -85,14 +93,20 @@ pub fn order_spectrum(samples: &[f64], sample_rate_hz: f64, samples_per_revoluti
         let range = (from.ceil().max(1.0) as usize)..(to.floor() as usize + 1).min(rest.len());
         let lines = range.len().max(2) as f64;
         // One line of each neighbourhood, the order's own, was taken away.
-        rest.get(range).map_or(0.0, |r| r.iter().map(|a| a * a).sum::<f64>()) / (lines - 1.0)
+        rest.get(range)
+            .map_or(0.0, |r| r.iter().map(|a| a * a).sum::<f64>())
+            / (lines - 1.0)
     };
     let own: Vec<f64> = (1..=orders).map(|n| power(n as f64)).collect();
     let std = (0..orders)
         .map(|n| {
             let pool = &own[n.saturating_sub(POOLED)..(n + POOLED + 1).min(orders)];
             let around = median(pool);
-            let variance = if own[n] > STANDS_OUT * around { own[n] } else { around };
+            let variance = if own[n] > STANDS_OUT * around {
+                own[n]
+            } else {
+                around
+            };
             variance.sqrt()
         })
         .collect();
@@ -190,7 +204,8 @@ mod tests {
                     let theta = TAU * i as f64 / per_turn;
                     let gauss: f64 = (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
                     let x = i as f64 / 6000.0;
-                    80.0 * x + 40.0 * x * x + 300.0 * (4.0 * theta).cos() - 20.0 * (17.0 * theta).sin() + sigma * gauss
+                    80.0 * x + 40.0 * x * x + 300.0 * (4.0 * theta).cos() - 20.0 * (17.0 * theta).sin()
+                        + sigma * gauss
                 })
                 .collect();
             let s = order_spectrum(&samples, rate, per_turn, 40).unwrap();
@@ -212,7 +227,9 @@ mod tests {
     fn fractional_means_and_hum() {
         assert!((mean_between(&[1.0, 2.0, 3.0], 0.5, 2.5) - 2.0).abs() < 1e-12);
         assert_eq!(mean_between(&[], 0.0, 1.0), 0.0);
-        let hum: Vec<f64> = (0..2000).map(|i| 3.0 * (TAU * 50.0 * i as f64 / 5000.0 + 0.4).cos()).collect();
+        let hum: Vec<f64> = (0..2000)
+            .map(|i| 3.0 * (TAU * 50.0 * i as f64 / 5000.0 + 0.4).cos())
+            .collect();
         assert!((line_amplitude(&hum, 5000.0, 50.0) - 3.0).abs() < 0.05);
         assert!(line_amplitude(&hum, 5000.0, 120.0) < 0.3);
     }

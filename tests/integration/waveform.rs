@@ -10,7 +10,9 @@ use lobestone::identify::cutting_data::processes;
 use lobestone::identify::cutting_study::calibrate_cutting;
 use lobestone::identify::levenberg_marquardt::Stopping;
 use lobestone::identify::off_comb::{OffComb, VibrationLine};
-use lobestone::identify::{CuttingData, CuttingModel, CuttingProblem, CuttingStudy, Fit, LeastSquares, minimise};
+use lobestone::identify::{
+    CuttingData, CuttingModel, CuttingProblem, CuttingStudy, Fit, LeastSquares, minimise,
+};
 
 fn fit(model: &CuttingModel, data: &CuttingData, start: &[f64], iterations: u64) -> Option<Fit> {
     let stopping = Stopping {
@@ -20,13 +22,24 @@ fn fit(model: &CuttingModel, data: &CuttingData, start: &[f64], iterations: u64)
     minimise(&CuttingProblem { model, data }, start, &model.bounds(), stopping).ok()
 }
 
-fn extended(base: &CuttingModel, data: &CuttingData, theta: &[f64], instance: CuttingInstance) -> Option<(CuttingModel, Fit)> {
+fn extended(
+    base: &CuttingModel,
+    data: &CuttingData,
+    theta: &[f64],
+    instance: CuttingInstance,
+) -> Option<(CuttingModel, Fit)> {
     let model = base.with_effect(instance, data);
     let own = base.parameters.len();
     let summary = base.summary(data);
     let mut starts = vec![model.nominal_theta()[own..].to_vec()];
     for natural in instance.effect.starts(instance.variant, &summary) {
-        starts.push(model.parameters[own..].iter().zip(natural).map(|(p, v)| p.internal(v)).collect());
+        starts.push(
+            model.parameters[own..]
+                .iter()
+                .zip(natural)
+                .map(|(p, v)| p.internal(v))
+                .collect(),
+        );
     }
     let problem = CuttingProblem { model: &model, data };
     let mut ranked: Vec<(f64, Vec<f64>)> = starts
@@ -37,9 +50,17 @@ fn extended(base: &CuttingModel, data: &CuttingData, theta: &[f64], instance: Cu
         })
         .collect();
     ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut looks: Vec<Fit> = ranked.iter().take(4).filter_map(|s| fit(&model, data, &s.1, 5)).collect();
+    let mut looks: Vec<Fit> = ranked
+        .iter()
+        .take(4)
+        .filter_map(|s| fit(&model, data, &s.1, 5))
+        .collect();
     looks.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    let best = looks.iter().take(2).filter_map(|l| fit(&model, data, &l.theta, 40)).min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+    let best = looks
+        .iter()
+        .take(2)
+        .filter_map(|l| fit(&model, data, &l.theta, 40))
+        .min_by(|a, b| a.cost.total_cmp(&b.cost))?;
     Some((model, best))
 }
 
@@ -64,18 +85,31 @@ fn undisturbed_records_are_fitted_to_their_noise() {
         let (data, model) = loaded(name);
         let calibration = calibrate_cutting(&model, &data).unwrap();
         assert!(calibration.converged);
-        assert!((0.85..1.15).contains(&calibration.reduced_chi2), "{name}: {}", calibration.reduced_chi2);
+        assert!(
+            (0.85..1.15).contains(&calibration.reduced_chi2),
+            "{name}: {}",
+            calibration.reduced_chi2
+        );
         let truth = truth(name);
         let mut edge_count = 0;
         for p in &calibration.parameters {
             let label: String = p.name[..1].to_uppercase() + &p.name[1..3];
             let value = truth["true_coefficients"][&label].as_f64().unwrap();
             let off = (p.value - value).abs();
-            assert!(off < 4.0 * p.std_error, "{name} {label}: {} ± {} for {value}", p.value, p.std_error);
+            assert!(
+                off < 4.0 * p.std_error,
+                "{name} {label}: {} ± {} for {value}",
+                p.value,
+                p.std_error
+            );
             let edge = p.unit == "N/mm";
             edge_count += usize::from(edge);
             // An edge coefficient next to zero has no relative error worth the name.
-            let tolerance = if edge { 0.05 * value.abs().max(1.0) } else { 0.01 * value };
+            let tolerance = if edge {
+                0.05 * value.abs().max(1.0)
+            } else {
+                0.01 * value
+            };
             assert!(off < tolerance, "{name} {label}: {} for {value}", p.value);
         }
         assert_eq!(edge_count, edges);
@@ -102,7 +136,9 @@ fn with_vibration(data: &CuttingData) -> CuttingData {
         let mut own = (**cut).clone();
         let lines = (-2..=2).map(|shift: i64| VibrationLine {
             shift,
-            channels: (0..3).map(|c| (c, 20.0 / (1.0 + shift.abs() as f64), 0.5)).collect(),
+            channels: (0..3)
+                .map(|c| (c, 20.0 / (1.0 + shift.abs() as f64), 0.5))
+                .collect(),
         });
         own.vibration = Some(OffComb {
             frequency_hz: 431.0,
@@ -113,11 +149,18 @@ fn with_vibration(data: &CuttingData) -> CuttingData {
     }
     let base = CuttingModel::new(&data, true).unwrap();
     let model = base.with_effect(find("chatter")[0], &data);
-    let fits = CuttingProblem { model: &model, data: &data }.fits(&model.nominal_theta()).unwrap();
+    let fits = CuttingProblem {
+        model: &model,
+        data: &data,
+    }
+    .fits(&model.nominal_theta())
+    .unwrap();
     for (cut, fit) in data.cuts.iter_mut().zip(fits).take(2) {
         let mut own = (**cut).clone();
         for (channel, fit) in own.channels.iter_mut().zip(fit.channels) {
-            let (Some(channel), Some(fit)) = (channel, fit) else { continue };
+            let (Some(channel), Some(fit)) = (channel, fit) else {
+                continue;
+            };
             channel.orders = fit.orders;
             channel.level = fit.level.iter().zip(&fit.zero).map(|(l, z)| l + z).collect();
         }
@@ -135,7 +178,11 @@ fn gradients_of_all_effects_equal_differences() {
         let plain = plain.filtered(|i| i < 4);
         for instance in instances() {
             let chatter = instance.label() == "chatter";
-            let data = if chatter { with_vibration(&plain) } else { plain.clone() };
+            let data = if chatter {
+                with_vibration(&plain)
+            } else {
+                plain.clone()
+            };
             let base = CuttingModel::new(&data, instance.label() != "edge-force").unwrap();
             let mut summary = base.summary(&data);
             // The few cuts of this test are enough for a gradient.
@@ -146,7 +193,10 @@ fn gradients_of_all_effects_equal_differences() {
                 continue;
             }
             let model = base.with_effect(instance, &data);
-            let problem = CuttingProblem { model: &model, data: &data };
+            let problem = CuttingProblem {
+                model: &model,
+                data: &data,
+            };
             let mut theta = model.nominal_theta();
             for (i, t) in theta.iter_mut().enumerate() {
                 // Off the nominal values, where nothing is special.
@@ -161,9 +211,17 @@ fn gradients_of_all_effects_equal_differences() {
                     problem.cost(&moved).unwrap()
                 };
                 let difference = (at(1.0) - at(-1.0)) / (2.0 * h);
-                let scale = gradient[i].abs().max(difference.abs()).max(1e-6 * at(0.0) / h * 1e-3);
+                let scale = gradient[i]
+                    .abs()
+                    .max(difference.abs())
+                    .max(1e-6 * at(0.0) / h * 1e-3);
                 let off = (gradient[i] - difference).abs() / scale.max(1e-9);
-                assert!(off < 2e-2, "{name} {instance:?} {}: {} {difference}", p.name, gradient[i]);
+                assert!(
+                    off < 2e-2,
+                    "{name} {instance:?} {}: {} {difference}",
+                    p.name,
+                    gradient[i]
+                );
             }
         }
     }
@@ -171,21 +229,34 @@ fn gradients_of_all_effects_equal_differences() {
 
 #[test]
 fn compare_says_where_the_waveform_is_off() {
-    for (name, axes) in [("force-9400", &["Fx", "Fy", "Fz"][..]), ("force-9439", &["Fz", "Mz"][..])] {
+    for (name, axes) in [
+        ("force-9400", &["Fx", "Fy", "Fz"][..]),
+        ("force-9439", &["Fz", "Mz"][..]),
+    ] {
         let dir = blind(name);
         let document = document(&["compare", dir.to_str().unwrap(), "--domain", "cutting"]);
         assert_eq!(document["domain"], "cutting");
         let error = &document["error"];
         let number = |v: &serde_json::Value| v.as_f64().unwrap();
-        assert!(number(&error["nrms"]) < 1.1 * number(&error["noise_floor_nrms"]), "{error}");
-        assert!(number(&error["held_out_nrms"]) < 1.2 * number(&error["noise_floor_nrms"]), "{error}");
+        assert!(
+            number(&error["nrms"]) < 1.1 * number(&error["noise_floor_nrms"]),
+            "{error}"
+        );
+        assert!(
+            number(&error["held_out_nrms"]) < 1.2 * number(&error["noise_floor_nrms"]),
+            "{error}"
+        );
         assert!(error["mean_abs_db"].is_number());
         for axis in axes {
             assert!(document["by_axis"][axis].is_number(), "{}", document["by_axis"]);
         }
         // The drilled holes of this campaign share one speed.
         for (key, least) in [("by_cut", 4), ("by_speed", 1), ("by_feed", 2)] {
-            assert!(document[key].as_object().is_some_and(|o| o.len() >= least), "{key}: {}", document[key]);
+            assert!(
+                document[key].as_object().is_some_and(|o| o.len() >= least),
+                "{key}: {}",
+                document[key]
+            );
         }
     }
 }
@@ -201,9 +272,18 @@ fn a_cut_that_does_not_fit_is_named_by_its_error() {
     }
     spoilt.cuts[1] = std::sync::Arc::new(own);
     let calibration = calibrate_cutting(&model, &spoilt).unwrap();
-    let fits = CuttingProblem { model: &model, data: &spoilt }.fits(&calibration.theta).unwrap();
+    let fits = CuttingProblem {
+        model: &model,
+        data: &spoilt,
+    }
+    .fits(&calibration.theta)
+    .unwrap();
     let comparison = CuttingComparison::new(&spoilt, &fits);
-    let worst = comparison.cuts.iter().max_by(|a, b| a.chi2_per_value.total_cmp(&b.chi2_per_value)).unwrap();
+    let worst = comparison
+        .cuts
+        .iter()
+        .max_by(|a, b| a.chi2_per_value.total_cmp(&b.chi2_per_value))
+        .unwrap();
     assert_eq!(worst.cut, spoilt.cuts[1].id);
     assert!(worst.chi2_per_value > 3.0, "{worst:?}");
 }
@@ -226,9 +306,14 @@ fn cfc_gives_the_waveforms_coefficients_beside_those_of_the_means() {
 #[test]
 #[ignore = "prints a table for campaigns outside the project"]
 fn ranking() {
-    let Ok(folder) = std::env::var("PRACTICE") else { return };
+    let Ok(folder) = std::env::var("PRACTICE") else {
+        return;
+    };
     let only = std::env::var("ONLY").unwrap_or_default();
-    let mut names: Vec<_> = std::fs::read_dir(&folder).unwrap().map(|e| e.unwrap().path()).collect();
+    let mut names: Vec<_> = std::fs::read_dir(&folder)
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .collect();
     names.sort();
     for dir in names.iter().filter(|d| d.join("campaign.toml").exists()) {
         let name = dir.file_name().unwrap().to_string_lossy().to_string();
@@ -242,7 +327,9 @@ fn ranking() {
 fn report(name: &str, dir: &Path) {
     let clock = std::time::Instant::now();
     let Ok(campaign) = Campaign::load(dir) else { return };
-    let Some(&process) = processes(&campaign).first() else { return };
+    let Some(&process) = processes(&campaign).first() else {
+        return;
+    };
     let data = CuttingData::load(&campaign, process).unwrap();
     let loaded = clock.elapsed().as_secs_f64();
     let base = CuttingModel::new(&data, true).unwrap();
@@ -266,10 +353,20 @@ fn report(name: &str, dir: &Path) {
         let inverse = fit.hessian.clone().cholesky().map(|c| c.inverse());
         let of = |i: usize| {
             let p = &model.parameters[i];
-            let std = inverse.as_ref().map_or(f64::NAN, |m| p.natural_std(fit.theta[i], m[(i, i)].sqrt()));
-            format!("{}={:.4}±{:.4}", p.name.rsplit('.').next().unwrap(), p.natural(fit.theta[i]), std)
+            let std = inverse
+                .as_ref()
+                .map_or(f64::NAN, |m| p.natural_std(fit.theta[i], m[(i, i)].sqrt()));
+            format!(
+                "{}={:.4}±{:.4}",
+                p.name.rsplit('.').next().unwrap(),
+                p.natural(fit.theta[i]),
+                std
+            )
         };
-        (from..model.parameters.len()).map(of).collect::<Vec<_>>().join(" ")
+        (from..model.parameters.len())
+            .map(of)
+            .collect::<Vec<_>>()
+            .join(" ")
     };
     println!("   {}", show(&base, &first, 0));
     for c in data.cuts.iter().filter(|c| c.vibration.is_some()) {
@@ -281,7 +378,12 @@ fn report(name: &str, dir: &Path) {
             }
         }
     }
-    let fits = CuttingProblem { model: &base, data: &data }.fits(&first.theta).unwrap();
+    let fits = CuttingProblem {
+        model: &base,
+        data: &data,
+    }
+    .fits(&first.theta)
+    .unwrap();
     let worst: Vec<String> = fits
         .iter()
         .zip(&data.cuts)
@@ -313,11 +415,22 @@ fn report(name: &str, dir: &Path) {
                 let mut text = format!("      cut {} {:.2}:", c.id, f.chi2 / c.value_count() as f64);
                 for (ch, m) in c.channels.iter().zip(&f.channels) {
                     let (Some(ch), Some(m)) = (ch, m) else { continue };
-                    let z = |n: usize| 2.0 * (m.orders[n] - ch.orders[n]).norm_sqr() / ch.order_std[n].powi(2);
+                    let z =
+                        |n: usize| 2.0 * (m.orders[n] - ch.orders[n]).norm_sqr() / ch.order_std[n].powi(2);
                     let orders: f64 = (0..ch.orders.len()).map(z).sum();
-                    let worst = (0..ch.orders.len()).max_by(|a, b| z(*a).total_cmp(&z(*b))).unwrap_or(0);
-                    let level: f64 = (0..ch.level.len()).map(|b| ((m.level[b] + m.zero[b] - ch.level[b]) / ch.level_std[b]).powi(2)).sum();
-                    text += &format!(" orders {orders:.0}/{} (worst {} {:.0}) level {level:.0}/{};", 2 * ch.orders.len(), worst + 1, z(worst), ch.level.len());
+                    let worst = (0..ch.orders.len())
+                        .max_by(|a, b| z(*a).total_cmp(&z(*b)))
+                        .unwrap_or(0);
+                    let level: f64 = (0..ch.level.len())
+                        .map(|b| ((m.level[b] + m.zero[b] - ch.level[b]) / ch.level_std[b]).powi(2))
+                        .sum();
+                    text += &format!(
+                        " orders {orders:.0}/{} (worst {} {:.0}) level {level:.0}/{};",
+                        2 * ch.orders.len(),
+                        worst + 1,
+                        z(worst),
+                        ch.level.len()
+                    );
                 }
                 println!("{text}");
             }

@@ -31,7 +31,10 @@ impl DrillingCut {
     /// As [`DrillGeometry::new`]; a feed that is not positive.
     pub fn new(tool: &Tool, geometry: &CutGeometry, spindle_rpm: f64) -> Result<DrillingCut> {
         let drill = DrillGeometry::new(tool, geometry)?;
-        let CutGeometry::Drilling { pilot_diameter_mm, .. } = *geometry else {
+        let CutGeometry::Drilling {
+            pilot_diameter_mm, ..
+        } = *geometry
+        else {
             return Err(Error::computation("not a drilling cut"));
         };
         let feed_mm_per_s = drill.feed_per_rev_mm * spindle_rpm / 60.0;
@@ -119,8 +122,18 @@ mod tests {
     fn means_are_the_integrals_and_slopes_their_differences() {
         let hole = hole(0.0);
         let entry = hole.entry_s();
-        for term in [DrillTerm::Thrust, DrillTerm::Torque, DrillTerm::Chisel, DrillTerm::Margin] {
-            for (from, to) in [(0.1, 0.3), (0.45, 0.55), (0.4 + 0.8 * entry, 0.4 + 1.3 * entry), (2.0, 2.2)] {
+        for term in [
+            DrillTerm::Thrust,
+            DrillTerm::Torque,
+            DrillTerm::Chisel,
+            DrillTerm::Margin,
+        ] {
+            for (from, to) in [
+                (0.1, 0.3),
+                (0.45, 0.55),
+                (0.4 + 0.8 * entry, 0.4 + 1.3 * entry),
+                (2.0, 2.2),
+            ] {
                 let contact = 0.4;
                 let steps = 20_000;
                 let numeric: f64 = (0..steps)
@@ -131,11 +144,18 @@ mod tests {
                     .sum::<f64>()
                     / steps as f64;
                 let (mean, slope) = hole.mean(term, from, to, contact);
-                assert!((mean - numeric).abs() < 1e-4 * (1.0 + numeric.abs()), "{term:?}: {mean} {numeric}");
+                assert!(
+                    (mean - numeric).abs() < 1e-4 * (1.0 + numeric.abs()),
+                    "{term:?}: {mean} {numeric}"
+                );
                 let h = 1e-6;
-                let difference =
-                    (hole.mean(term, from, to, contact + h).0 - hole.mean(term, from, to, contact - h).0) / (2.0 * h);
-                assert!((slope - difference).abs() < 1e-5 * (1.0 + difference.abs()), "{term:?}: {slope} {difference}");
+                let difference = (hole.mean(term, from, to, contact + h).0
+                    - hole.mean(term, from, to, contact - h).0)
+                    / (2.0 * h);
+                assert!(
+                    (slope - difference).abs() < 1e-5 * (1.0 + difference.abs()),
+                    "{term:?}: {slope} {difference}"
+                );
             }
         }
     }

@@ -92,7 +92,11 @@ impl MillingCut {
     /// a ∫ e^{−inψz} dz over the engaged depth: what the helix makes of order n, mm.
     fn helix(&self, n: usize) -> Complex64 {
         let half = 0.5 * n as f64 * self.lag_rad;
-        let sinc = if half.abs() < 1e-6 { 1.0 - half * half / 6.0 } else { half.sin() / half };
+        let sinc = if half.abs() < 1e-6 {
+            1.0 - half * half / 6.0
+        } else {
+            half.sin() / half
+        };
         Complex64::from_polar(self.axial_depth_mm * sinc, -half)
     }
 
@@ -150,15 +154,25 @@ impl MillingCut {
         let step = if law.runout.is_some() { 1 } else { self.teeth };
         let parts = if derivatives { Chip::PARTS } else { Chip::VALUES };
         let weights = self.depth_weights(&depth_nodes, orders, step);
-        let turn: Vec<Complex64> =
-            nodes.iter().map(|(phi, _)| Complex64::from_polar(1.0, -(step as f64) * phi)).collect();
+        let turn: Vec<Complex64> = nodes
+            .iter()
+            .map(|(phi, _)| Complex64::from_polar(1.0, -(step as f64) * phi))
+            .collect();
         let directions: Vec<(f64, f64)> = nodes.iter().map(|(phi, _)| phi.sin_cos()).collect();
         for (q, &z) in depth_nodes.iter().enumerate() {
             let residues: Vec<Vec<Complex64>> = self.tooth_sums(&nodes, z, law, derivatives, parts);
             let mut carrier: Vec<Complex64> = nodes.iter().map(|(_, w)| Complex64::from(w / TAU)).collect();
             for (at, n) in (0..=orders).step_by(step).enumerate() {
                 let teeth = &residues[n % residues.len()];
-                add_order(&mut sampled, &directions, &carrier, teeth, parts, n, weights[at][q]);
+                add_order(
+                    &mut sampled,
+                    &directions,
+                    &carrier,
+                    teeth,
+                    parts,
+                    n,
+                    weights[at][q],
+                );
                 carrier.iter_mut().zip(&turn).for_each(|(c, t)| *c *= t);
             }
         }
@@ -175,16 +189,27 @@ impl MillingCut {
         let lagrange: Vec<Vec<f64>> = (0..depth_nodes.len())
             .map(|q| {
                 let others = || depth_nodes.iter().enumerate().filter(move |(p, _)| *p != q);
-                let at = |z: f64| others().map(|(_, x)| (z - x) / (depth_nodes[q] - x)).product::<f64>();
-                fine.iter().map(|&(z, w)| self.axial_depth_mm * w * at(z)).collect()
+                let at = |z: f64| {
+                    others()
+                        .map(|(_, x)| (z - x) / (depth_nodes[q] - x))
+                        .product::<f64>()
+                };
+                fine.iter()
+                    .map(|&(z, w)| self.axial_depth_mm * w * at(z))
+                    .collect()
             })
             .collect();
         (0..=orders)
             .step_by(step)
             .map(|n| {
-                let lag: Vec<Complex64> =
-                    fine.iter().map(|(z, _)| Complex64::from_polar(1.0, -(n as f64) * self.lag_rad * z)).collect();
-                lagrange.iter().map(|l| l.iter().zip(&lag).map(|(l, e)| e * *l).sum()).collect()
+                let lag: Vec<Complex64> = fine
+                    .iter()
+                    .map(|(z, _)| Complex64::from_polar(1.0, -(n as f64) * self.lag_rad * z))
+                    .collect();
+                lagrange
+                    .iter()
+                    .map(|l| l.iter().zip(&lag).map(|(l, e)| e * *l).sum())
+                    .collect()
             })
             .collect()
     }
@@ -244,10 +269,29 @@ impl MillingCut {
                 }
                 // The tooth leaves the cut within a quadrature cell: the share of it that is engaged.
                 let rise = (periods * c * phi.cos()).abs() * width;
-                let inside = if rise > 0.0 { 0.5 + h / rise } else { f64::from(h > 0.0) };
-                let engaged = if law.runout.is_some() { inside.clamp(0.0, 1.0) } else { 1.0 };
-                let edge_slope = if law.runout.is_some() && inside > 0.0 && inside < 1.0 { 1.0 / rise } else { 0.0 };
-                Chip::new(h, engaged, edge_slope, [by_offset, by_angle], law.exponent, derivatives)
+                let inside = if rise > 0.0 {
+                    0.5 + h / rise
+                } else {
+                    f64::from(h > 0.0)
+                };
+                let engaged = if law.runout.is_some() {
+                    inside.clamp(0.0, 1.0)
+                } else {
+                    1.0
+                };
+                let edge_slope = if law.runout.is_some() && inside > 0.0 && inside < 1.0 {
+                    1.0 / rise
+                } else {
+                    0.0
+                };
+                Chip::new(
+                    h,
+                    engaged,
+                    edge_slope,
+                    [by_offset, by_angle],
+                    law.exponent,
+                    derivatives,
+                )
             })
             .collect()
     }
@@ -329,7 +373,11 @@ impl Chip {
         if h > 0.0 {
             let reference = ChipLaw::REFERENCE_MM;
             let p = exponent.unwrap_or(0.0);
-            let size = if exponent.is_some() { (h / reference).powf(-p) } else { 1.0 };
+            let size = if exponent.is_some() {
+                (h / reference).powf(-p)
+            } else {
+                1.0
+            };
             part[Chip::CUTTING] = h * size;
             slope = (1.0 - p) * size;
             if derivatives && exponent.is_some() {
@@ -400,8 +448,12 @@ mod tests {
             let phi = phi_deg.to_radians();
             let inside = (30.0..130.0).contains(&phi_deg);
             let wave = |c: &[Complex64]| -> f64 {
-                let sum: Complex64 =
-                    c.iter().enumerate().skip(1).map(|(n, c)| c * Complex64::from_polar(2.0, n as f64 * phi)).sum();
+                let sum: Complex64 = c
+                    .iter()
+                    .enumerate()
+                    .skip(1)
+                    .map(|(n, c)| c * Complex64::from_polar(2.0, n as f64 * phi))
+                    .sum();
                 c[0].re + sum.re
             };
             let tangential = if inside { 2.5 * 0.12 * phi.sin() } else { 0.0 };
@@ -413,11 +465,25 @@ mod tests {
 
     #[test]
     fn quadrature_equals_the_closed_form_where_there_is_one() {
-        for cut in [cut(6, 0.0, 180.0, 0.225), cut(3, 90.0, 180.0, 0.5), cut(2, 20.0, 75.0, 2.0)] {
+        for cut in [
+            cut(6, 0.0, 180.0, 0.225),
+            cut(3, 90.0, 180.0, 0.5),
+            cut(2, 20.0, 75.0, 2.0),
+        ] {
             let closed = cut.closed_form(96);
-            let plain = cut.sampled(96, ChipLaw { exponent: Some(0.0), runout: None }, false);
+            let plain = cut.sampled(
+                96,
+                ChipLaw {
+                    exponent: Some(0.0),
+                    runout: None,
+                },
+                false,
+            );
             assert!(worst(&closed, &plain.unit) < 1e-11);
-            let concentric = ChipLaw { exponent: None, runout: Some([0.0, 1.0]) };
+            let concentric = ChipLaw {
+                exponent: None,
+                runout: Some([0.0, 1.0]),
+            };
             let run = cut.sampled(96, concentric, false);
             assert!(worst(&closed, &run.unit) < 2e-3, "{}", worst(&closed, &run.unit));
         }
@@ -428,9 +494,8 @@ mod tests {
         let (steps, slices) = (3600, 300);
         let mut unit = MillingCut::nothing(orders);
         let [offset, angle] = law.runout.unwrap_or([0.0; 2]);
-        let radius = |j: usize, z: f64| {
-            offset * (angle - TAU * j as f64 / cut.teeth as f64 + cut.lag_rad * z).cos()
-        };
+        let radius =
+            |j: usize, z: f64| offset * (angle - TAU * j as f64 / cut.teeth as f64 + cut.lag_rad * z).cos();
         let mut wave = vec![[[0.0f64; 3]; 6]; steps];
         for (i, w) in wave.iter_mut().enumerate() {
             let theta = TAU * i as f64 / steps as f64;
@@ -443,7 +508,9 @@ mod tests {
                         continue;
                     }
                     let h = (1..=cut.teeth)
-                        .map(|m| m as f64 * cut.feed_per_tooth_mm * phi.sin() + radius(j, z) - radius(j + m, z))
+                        .map(|m| {
+                            m as f64 * cut.feed_per_tooth_mm * phi.sin() + radius(j, z) - radius(j + m, z)
+                        })
                         .fold(f64::INFINITY, f64::min);
                     if h <= 0.0 {
                         continue;
@@ -462,7 +529,8 @@ mod tests {
         }
         for n in 0..=orders {
             for (i, w) in wave.iter().enumerate() {
-                let e = Complex64::from_polar(1.0 / steps as f64, -TAU * ((n * i) % steps) as f64 / steps as f64);
+                let e =
+                    Complex64::from_polar(1.0 / steps as f64, -TAU * ((n * i) % steps) as f64 / steps as f64);
                 for k in 0..6 {
                     for axis in 0..3 {
                         unit[k][axis][n] += e * w[k][axis];
@@ -475,8 +543,14 @@ mod tests {
 
     #[test]
     fn runout_and_size_effect_equal_brute_force_slices() {
-        for (cut, offset) in [(cut(6, 90.0, 180.0, 0.225), 0.02), (cut(3, 0.0, 180.0, 0.9), 0.05)] {
-            let law = ChipLaw { exponent: Some(0.25), runout: Some([offset, 1.1]) };
+        for (cut, offset) in [
+            (cut(6, 90.0, 180.0, 0.225), 0.02),
+            (cut(3, 0.0, 180.0, 0.9), 0.05),
+        ] {
+            let law = ChipLaw {
+                exponent: Some(0.25),
+                runout: Some([offset, 1.1]),
+            };
             let fine = brute_force(&cut, law, 24);
             let fast = cut.sampled(96, law, false);
             for k in 0..6 {
@@ -494,12 +568,16 @@ mod tests {
     #[test]
     fn slopes_by_the_chip_law_equal_differences() {
         let cut = cut(4, 0.0, 140.0, 0.4);
-        let law = |p: f64, offset: f64, angle: f64| ChipLaw { exponent: Some(p), runout: Some([offset, angle]) };
+        let law = |p: f64, offset: f64, angle: f64| ChipLaw {
+            exponent: Some(p),
+            runout: Some([offset, angle]),
+        };
         let at = cut.sampled(20, law(0.2, 0.01, 0.7), true);
         for (i, h) in [(0, 1e-6), (1, 1e-8), (2, 1e-6)] {
             let shifted = |sign: f64| {
                 let d = |k: usize| if k == i { sign * h } else { 0.0 };
-                cut.sampled(20, law(0.2 + d(0), 0.01 + d(1), 0.7 + d(2)), false).unit
+                cut.sampled(20, law(0.2 + d(0), 0.01 + d(1), 0.7 + d(2)), false)
+                    .unit
             };
             let (up, down) = (shifted(1.0), shifted(-1.0));
             let slope = at.slopes[i].as_ref().unwrap();

@@ -43,12 +43,18 @@ mod tests {
     fn polynomials_and_oscillations_are_integrated_exactly() {
         for n in [1, 2, 5, 40] {
             let degree = 2 * n as i32 - 1;
-            let sum: f64 = gauss_legendre(1.0, 3.0, n).iter().map(|(x, w)| w * x.powi(degree.min(20))).sum();
+            let sum: f64 = gauss_legendre(1.0, 3.0, n)
+                .iter()
+                .map(|(x, w)| w * x.powi(degree.min(20)))
+                .sum();
             let d = degree.min(20) + 1;
             let exact = (3f64.powi(d) - 1.0) / f64::from(d);
             assert!((sum / exact - 1.0).abs() < 1e-12, "{n}: {sum} {exact}");
         }
-        let sum: f64 = gauss_legendre(0.0, PI, 192).iter().map(|(x, w)| w * (97.0 * x).sin()).sum();
+        let sum: f64 = gauss_legendre(0.0, PI, 192)
+            .iter()
+            .map(|(x, w)| w * (97.0 * x).sin())
+            .sum();
         assert!((sum - 2.0 / 97.0).abs() < 1e-11, "{sum}");
     }
 }

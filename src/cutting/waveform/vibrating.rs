@@ -34,18 +34,35 @@ const PHASES: usize = 24;
 /// What one angle of immersion contributes; see [`contributions`].
 const PARTS: usize = 13;
 /// Cutting and edge part of the mean, its slopes by p, Δx and Δy, of the lines and their slopes by Δx and Δy.
-const PAIRS: [(usize, Option<usize>); 7] =
-    [(0, Some(1)), (2, None), (3, Some(5)), (4, Some(6)), (7, Some(8)), (9, Some(11)), (10, Some(12))];
+const PAIRS: [(usize, Option<usize>); 7] = [
+    (0, Some(1)),
+    (2, None),
+    (3, Some(5)),
+    (4, Some(6)),
+    (7, Some(8)),
+    (9, Some(11)),
+    (10, Some(12)),
+];
 
 impl MillingCut {
     /// `change_mm`: amplitude Δx, Δy of the change of the chip's boundary from one tooth to the next.
-    pub fn vibrating(&self, orders: usize, exponent: Option<f64>, change_mm: [f64; 2], most: usize) -> VibratingForces {
+    pub fn vibrating(
+        &self,
+        orders: usize,
+        exponent: Option<f64>,
+        change_mm: [f64; 2],
+        most: usize,
+    ) -> VibratingForces {
         let span = self.immersion.exit_rad - self.immersion.start_rad;
         let count = 60 + (0.5 * orders as f64 * span).ceil() as usize;
         let nodes = gauss_legendre(self.immersion.start_rad, self.immersion.exit_rad, count);
-        let parts: Vec<[f64; PARTS]> =
-            nodes.iter().map(|(phi, _)| contributions(self.feed_per_tooth_mm, exponent, change_mm, *phi)).collect();
-        let nothing = || -> UnitForces { std::array::from_fn(|_| std::array::from_fn(|_| vec![Complex64::ZERO; orders + 1])) };
+        let parts: Vec<[f64; PARTS]> = nodes
+            .iter()
+            .map(|(phi, _)| contributions(self.feed_per_tooth_mm, exponent, change_mm, *phi))
+            .collect();
+        let nothing = || -> UnitForces {
+            std::array::from_fn(|_| std::array::from_fn(|_| vec![Complex64::ZERO; orders + 1]))
+        };
         let mut all = VibratingForces {
             unit: nothing(),
             slopes: Box::new([nothing(), nothing(), nothing()]),
@@ -87,7 +104,10 @@ impl MillingCut {
         for ((phi, weight), part) in nodes.iter().zip(parts) {
             let (sin, cos) = phi.sin_cos();
             let carrier = Complex64::from_polar(weight / TAU, -(n as f64) * phi);
-            for (sum, value) in sums.iter_mut().zip([part[cutting], edge.map_or(0.0, |e| part[e])]) {
+            for (sum, value) in sums
+                .iter_mut()
+                .zip([part[cutting], edge.map_or(0.0, |e| part[e])])
+            {
                 let value = carrier * value;
                 sum[0] += value * cos;
                 sum[1] += value * sin;
@@ -122,7 +142,11 @@ fn contributions(feed_mm: f64, exponent: Option<f64>, [dx, dy]: [f64; 2], phi: f
         if own <= 0.0 {
             continue;
         }
-        let size = if exponent.is_some() { (own / ChipLaw::REFERENCE_MM).powf(-p) } else { 1.0 };
+        let size = if exponent.is_some() {
+            (own / ChipLaw::REFERENCE_MM).powf(-p)
+        } else {
+            1.0
+        };
         let share = 1.0 / PHASES as f64;
         chip += share * own * size;
         by_p -= share * own * size * (own / ChipLaw::REFERENCE_MM).ln();
@@ -179,9 +203,13 @@ mod tests {
         let small = 1e-6;
         // Σ over the teeth of a slot without helix, N/2π · α with αxx = −πKr, αxy = −π, αyx = π, αyy = −πKr, halved
         // (Altintas's factor ½ is taken out): references.md, D.
-        for (direction, want) in [([small, 0.0], [0.0, 1.5 / 2.0, -1.5 / 2.0]), ([0.0, small], [-1.5 / 2.0, 0.0, 0.0])] {
+        for (direction, want) in [
+            ([small, 0.0], [0.0, 1.5 / 2.0, -1.5 / 2.0]),
+            ([0.0, small], [-1.5 / 2.0, 0.0, 0.0]),
+        ] {
             let line = &slot().vibrating(0, None, direction, 0).lines[0];
-            let close = |got: Complex64, want: f64| assert!((got.re / small - want).abs() < 2e-3, "{got} {want}");
+            let close =
+                |got: Complex64, want: f64| assert!((got.re / small - want).abs() < 2e-3, "{got} {want}");
             close(line[0][0], want[0]);
             close(line[0][1], want[1]);
             if direction[0] > 0.0 {
@@ -194,7 +222,12 @@ mod tests {
     fn without_vibration_the_orders_are_the_closed_form() {
         let closed = slot().closed_form(30);
         let still = slot().vibrating(30, None, [1e-12, 0.0], 0);
-        for (a, b) in closed.iter().flatten().flatten().zip(still.unit.iter().flatten().flatten()) {
+        for (a, b) in closed
+            .iter()
+            .flatten()
+            .flatten()
+            .zip(still.unit.iter().flatten().flatten())
+        {
             assert!((a - b).norm() < 1e-6);
         }
     }

@@ -28,7 +28,13 @@ impl CuttingEffect for Chatter {
     fn parameters(&self, _variant: usize, data: &CuttingSummary) -> Vec<Parameter> {
         let frequency = data.vibration_hz.unwrap_or(500.0);
         vec![
-            logarithmic("frequency_hz", "Hz", frequency, 0.5, [0.5 * frequency, 2.0 * frequency]),
+            logarithmic(
+                "frequency_hz",
+                "Hz",
+                frequency,
+                0.5,
+                [0.5 * frequency, 2.0 * frequency],
+            ),
             logarithmic("amplitude_per_feed", "1", 0.1, 2.0, [1e-5, 10.0]),
             linear("direction_deg", "deg", 45.0, 180.0, 0.0, [-360.0, 360.0]),
         ]
@@ -36,9 +42,15 @@ impl CuttingEffect for Chatter {
 
     fn starts(&self, _variant: usize, data: &CuttingSummary) -> Vec<Vec<f64>> {
         let frequency = data.vibration_hz.unwrap_or(500.0);
-        [(0.03, 0.0), (0.03, 90.0), (0.03, 135.0), (0.3, 20.0), (0.3, 110.0)]
-            .map(|(a, d)| vec![frequency, a, d])
-            .to_vec()
+        [
+            (0.03, 0.0),
+            (0.03, 90.0),
+            (0.03, 135.0),
+            (0.3, 20.0),
+            (0.3, 110.0),
+        ]
+        .map(|(a, d)| vec![frequency, a, d])
+        .to_vec()
     }
 
     fn apply(&self, _variant: usize, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {

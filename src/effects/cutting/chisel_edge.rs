@@ -19,8 +19,9 @@ impl CuttingEffect for ChiselEdge {
 
     fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
         drilling_only(data).or_else(|| {
-            (data.full_holes == 0 || data.pilot_holes == 0)
-                .then(|| "needs both full and pilot holes: with one kind it is other thrust coefficients".to_string())
+            (data.full_holes == 0 || data.pilot_holes == 0).then(|| {
+                "needs both full and pilot holes: with one kind it is other thrust coefficients".to_string()
+            })
         })
     }
 
@@ -28,7 +29,13 @@ impl CuttingEffect for ChiselEdge {
         // About the thrust of a chip as wide as the chisel, ten times as hard to cut.
         let nominal = data.cutting_scale_n_per_mm2.max(1.0);
         vec![
-            logarithmic("coefficient_n", "N", nominal, 2.0, [1e-3 * nominal, 100.0 * nominal]),
+            logarithmic(
+                "coefficient_n",
+                "N",
+                nominal,
+                2.0,
+                [1e-3 * nominal, 100.0 * nominal],
+            ),
             linear("exponent", "1", 0.8, 0.4, 0.8, [-0.5, 3.0]),
         ]
     }

@@ -27,7 +27,13 @@ impl CuttingEffect for DynamometerResonance {
         let highest = data.highest_hz.max(50.0);
         let nominal = 0.5 * highest;
         let frequency = |i: usize| {
-            logarithmic(format!("frequency_hz[{i}]"), "Hz", nominal, 2.0, [0.03 * highest, 8.0 * highest])
+            logarithmic(
+                format!("frequency_hz[{i}]"),
+                "Hz",
+                nominal,
+                2.0,
+                [0.03 * highest, 8.0 * highest],
+            )
         };
         let damping = |i: usize| logarithmic(format!("zeta[{i}]"), "1", 0.04, 1.0, [1e-3, 1.0]);
         (0..3).map(frequency).chain((0..3).map(damping)).collect()

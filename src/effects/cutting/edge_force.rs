@@ -18,7 +18,8 @@ impl CuttingEffect for EdgeForce {
     }
 
     fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
-        data.has_edge.then(|| "the baseline has edge coefficients already".to_string())
+        data.has_edge
+            .then(|| "the baseline has edge coefficients already".to_string())
     }
 
     fn parameters(&self, _variant: usize, data: &CuttingSummary) -> Vec<Parameter> {
@@ -29,7 +30,16 @@ impl CuttingEffect for EdgeForce {
         };
         names
             .iter()
-            .map(|name| linear(*name, "N/mm", 0.2 * scale, 3.0 * scale, 0.0, [-20.0 * scale, 20.0 * scale]))
+            .map(|name| {
+                linear(
+                    *name,
+                    "N/mm",
+                    0.2 * scale,
+                    3.0 * scale,
+                    0.0,
+                    [-20.0 * scale, 20.0 * scale],
+                )
+            })
             .collect()
     }
 

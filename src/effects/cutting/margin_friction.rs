@@ -23,7 +23,14 @@ impl CuttingEffect for MarginFriction {
 
     fn parameters(&self, _variant: usize, data: &CuttingSummary) -> Vec<Parameter> {
         let scale = 0.02 * data.cutting_scale_n_per_mm2.max(1.0);
-        vec![linear("k_margin_n_per_mm", "N/mm", 0.05 * scale, scale, 0.0, [-10.0 * scale, 10.0 * scale])]
+        vec![linear(
+            "k_margin_n_per_mm",
+            "N/mm",
+            0.05 * scale,
+            scale,
+            0.0,
+            [-10.0 * scale, 10.0 * scale],
+        )]
     }
 
     fn apply(&self, _variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {

@@ -225,7 +225,14 @@ pub(crate) fn unit_mixing() -> Mixing {
     [0, 1, 2].map(|i| [0, 1, 2].map(|j| Dual::constant(f64::from(u8::from(i == j)))))
 }
 
-fn linear(name: impl Into<String>, unit: &'static str, nominal: f64, std: f64, mean: f64, bounds: [f64; 2]) -> Parameter {
+fn linear(
+    name: impl Into<String>,
+    unit: &'static str,
+    nominal: f64,
+    std: f64,
+    mean: f64,
+    bounds: [f64; 2],
+) -> Parameter {
     Parameter {
         name: name.into(),
         unit,
@@ -236,7 +243,13 @@ fn linear(name: impl Into<String>, unit: &'static str, nominal: f64, std: f64, m
     }
 }
 
-fn logarithmic(name: impl Into<String>, unit: &'static str, nominal: f64, std: f64, bounds: [f64; 2]) -> Parameter {
+fn logarithmic(
+    name: impl Into<String>,
+    unit: &'static str,
+    nominal: f64,
+    std: f64,
+    bounds: [f64; 2],
+) -> Parameter {
     Parameter {
         name: name.into(),
         unit,
@@ -251,7 +264,8 @@ fn logarithmic(name: impl Into<String>, unit: &'static str, nominal: f64, std: f
 }
 
 fn milling_only(data: &CuttingSummary) -> Option<String> {
-    (data.process != Process::Milling).then(|| "milling only: it shows in the waveform over a revolution".to_string())
+    (data.process != Process::Milling)
+        .then(|| "milling only: it shows in the waveform over a revolution".to_string())
 }
 
 fn drilling_only(data: &CuttingSummary) -> Option<String> {

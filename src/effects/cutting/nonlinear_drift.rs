@@ -46,7 +46,9 @@ impl CuttingEffect for NonlinearDrift {
 
     fn starts(&self, _variant: usize, data: &CuttingSummary) -> Vec<Vec<f64>> {
         let count = channels(data.process).count();
-        [0.2, 3.0].map(|share| vec![(share * data.longest_record_s).clamp(0.2, 100.0); count]).to_vec()
+        [0.2, 3.0]
+            .map(|share| vec![(share * data.longest_record_s).clamp(0.2, 100.0); count])
+            .to_vec()
     }
 
     fn nuisances_per_channel(&self, variant: usize) -> usize {
@@ -58,7 +60,9 @@ impl CuttingEffect for NonlinearDrift {
         let first = channels(setting.process).start;
         let by_channel = |missing: f64, f: &dyn Fn(&Dual) -> Dual| {
             std::array::from_fn(|i| {
-                i.checked_sub(first).and_then(|k| values.get(k)).map_or(Dual::constant(missing), f)
+                i.checked_sub(first)
+                    .and_then(|k| values.get(k))
+                    .map_or(Dual::constant(missing), f)
             })
         };
         if variant == 0 {

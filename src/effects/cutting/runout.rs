@@ -18,13 +18,21 @@ impl CuttingEffect for RunoutEffect {
     }
 
     fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
-        milling_only(data).or_else(|| (data.teeth < 2).then(|| "a single tooth has no runout against others".to_string()))
+        milling_only(data)
+            .or_else(|| (data.teeth < 2).then(|| "a single tooth has no runout against others".to_string()))
     }
 
     fn parameters(&self, _variant: usize, data: &CuttingSummary) -> Vec<Parameter> {
         vec![
             logarithmic("offset_mm", "mm", 0.01, 1.5, [1e-4, 1.0]),
-            linear("angle_deg", "deg", 0.3 * 360.0 / data.teeth as f64, 360.0, 0.0, [-720.0, 720.0]),
+            linear(
+                "angle_deg",
+                "deg",
+                0.3 * 360.0 / data.teeth as f64,
+                360.0,
+                0.0,
+                [-720.0, 720.0],
+            ),
         ]
     }
 
@@ -32,7 +40,10 @@ impl CuttingEffect for RunoutEffect {
         let pitch_deg = 360.0 / data.teeth as f64;
         let offsets = [0.1, 0.3, 0.8].map(|share| (share * data.smallest_feed_mm).clamp(0.002, 0.2));
         let angles = [0.05, 0.4, 0.75];
-        offsets.iter().flat_map(|o| angles.map(|a| vec![*o, a * pitch_deg])).collect()
+        offsets
+            .iter()
+            .flat_map(|o| angles.map(|a| vec![*o, a * pitch_deg]))
+            .collect()
     }
 
     fn apply(&self, _variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {

@@ -52,7 +52,10 @@ pub struct SampledForces {
 
 /// Axial positions at which runout is sampled for each this much lag, rad.
 const LAG_PER_NODE_RAD: f64 = 0.25;
-const MOST_NODES: usize = 12;
+/// Besides, one for each radian by which the moment when a tooth leaves the cut wanders over the depth at this order: what
+/// the edge puts on higher ones is little.
+const WANDERING_ORDER: f64 = 24.0;
+const MOST_NODES: usize = 16;
 
 impl MillingCut {
     /// `None` for a drilling cut.
@@ -142,7 +145,11 @@ impl MillingCut {
         let count = 40 + (0.5 * orders as f64 * span).ceil() as usize;
         let nodes = gauss_legendre(self.immersion.start_rad, self.immersion.exit_rad, count);
         let depths = match law.runout {
-            Some(_) => (2 + (self.lag_rad.abs() / LAG_PER_NODE_RAD).ceil() as usize).min(MOST_NODES),
+            Some([offset, _]) => {
+                let lag = self.lag_rad.abs();
+                let wander = WANDERING_ORDER * lag * (offset / self.feed_per_tooth_mm).abs().min(1.0);
+                (2 + (lag / LAG_PER_NODE_RAD + wander).ceil() as usize).min(MOST_NODES)
+            }
             None => 1,
         };
         let depth_nodes: Vec<f64> = gauss_legendre(0.0, 1.0, depths).iter().map(|n| n.0).collect();
@@ -491,7 +498,7 @@ mod tests {
 
     /// Slices of the depth and a fine turn of the tool, tooth by tooth: nothing in common with the quadrature but physics.
     fn brute_force(cut: &MillingCut, law: ChipLaw, orders: usize) -> UnitForces {
-        let (steps, slices) = (3600, 300);
+        let (steps, slices) = (14400, 240);
         let mut unit = MillingCut::nothing(orders);
         let [offset, angle] = law.runout.unwrap_or([0.0; 2]);
         let radius =
@@ -558,7 +565,7 @@ mod tests {
                 for axis in 0..3 {
                     for n in 0..=24 {
                         let off = (fine[k][axis][n] - fast.unit[k][axis][n]).norm() / scale;
-                        assert!(off < 2e-3, "k {k} axis {axis} order {n}: {off}");
+                        assert!(off < 5e-4, "k {k} axis {axis} order {n}: {off}");
                     }
                 }
             }

@@ -51,17 +51,10 @@ fn document(campaign: &Campaign, result: &CfcResult, waveforms: &[serde_json::Va
     })
 }
 
-/// A group with what its whole waveforms say under `waveform`, which also fills in coefficients that the mean forces
-/// cannot separate (marked `"from": "waveform"`).
+/// A group with what its whole waveforms say under `waveform`. The coefficients of the mean forces stay what they are: what
+/// they cannot separate is null there even where the waveform's shape can.
 fn with_waveform(group: &Group, waveform: &serde_json::Value) -> serde_json::Value {
     let mut json = group.to_json();
-    for c in &group.coefficients {
-        let known = &waveform[c.key];
-        if c.value.is_none() && known.is_object() {
-            json[c.key] = known.clone();
-            json[c.key]["from"] = json!("waveform");
-        }
-    }
     json["waveform"] = waveform.clone();
     json
 }

@@ -4,6 +4,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::cutting_windows::Windows;
@@ -11,7 +12,7 @@ pub use super::force_channel::ForceChannel;
 use super::force_channel::{force_channel, sample_std, widen_for_vibration};
 use super::off_comb::{OffComb, find_vibration};
 use crate::campaign::{Campaign, Process};
-use crate::cutting::waveform::{DrillingCut, MillingCut, UnitForces};
+use crate::cutting::waveform::{DrillTerm, DrillingCut, MillingCut, UnitForces};
 use crate::cutting::{ForceAxis, analyse_cut, feed_mm};
 use crate::effects::cutting::{CutSetting, CuttingSummary};
 use crate::ingest::{ChannelRole, TimeRecord};
@@ -60,6 +61,62 @@ pub struct CutData {
 impl CutData {
     pub fn spindle_hz(&self) -> f64 {
         self.spindle_rpm / 60.0
+    }
+
+    /// Narrows the range of the first contact (drilling): where a zero line and the shape of entry and hole, each of a
+    /// size of its own, fit the levels best, and a margin for what effects add to the shape.
+    fn narrow_contact(&mut self) {
+        let CutKind::Drilling {
+            cut: drill,
+            contact_s,
+        } = &self.kind
+        else {
+            return;
+        };
+        let block = self.block_s.first().map_or(0.0, |b| b[1] - b[0]);
+        let misfit = |contact: f64| -> f64 {
+            let terms = [
+                (ForceAxis::Z, DrillTerm::Thrust),
+                (ForceAxis::Mz, DrillTerm::Torque),
+            ];
+            let channels = terms.iter().filter_map(|(axis, term)| {
+                let channel = self.channels[axis.index()].as_ref()?;
+                let shape = |b: usize| {
+                    let [from, to] = self.block_s[b];
+                    if b < self.steady.end {
+                        drill.mean(*term, from, to, contact).0
+                    } else {
+                        0.0
+                    }
+                };
+                let basis = DMatrix::from_fn(channel.level.len(), 3, |b, k| {
+                    let value = [1.0, 0.5 * (self.block_s[b][0] + self.block_s[b][1]), shape(b)][k];
+                    value / channel.level_std[b]
+                });
+                let level = DVector::from_fn(channel.level.len(), |b, _| {
+                    channel.level[b] / channel.level_std[b]
+                });
+                let solution = (basis.transpose() * &basis)
+                    .cholesky()?
+                    .solve(&(basis.transpose() * &level));
+                Some((level - basis * solution).norm_squared())
+            });
+            channels.sum()
+        };
+        let [low, high] = *contact_s;
+        let steps = ((high - low) / block.max(1e-3)).ceil().clamp(20.0, 200.0);
+        let at = |k: f64| low + (high - low) * k / steps;
+        let best = (0..=steps as usize)
+            .map(|k| (misfit(at(k as f64)), at(k as f64)))
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map_or(low, |best| best.1);
+        let margin = 0.15 * drill.entry_s() + 3.0 * block;
+        let range = [(best - margin).max(low), (best + margin).min(high)];
+        if range[1] > range[0]
+            && let CutKind::Drilling { contact_s, .. } = &mut self.kind
+        {
+            *contact_s = range;
+        }
     }
 
     /// Numbers compared in this cut, less the zero lines and the phase (or contact) fitted to it.
@@ -293,7 +350,7 @@ fn cut_data(campaign: &Campaign, index: usize, record: &TimeRecord) -> Result<Cu
             }
         }
     }
-    Ok(CutData {
+    let mut data = CutData {
         cut: index,
         id: cut.id.clone(),
         spindle_rpm: cut.spindle_rpm,
@@ -312,7 +369,9 @@ fn cut_data(campaign: &Campaign, index: usize, record: &TimeRecord) -> Result<Cu
         block_s: window.block_s(record),
         steady: window.steady_blocks(),
         vibration,
-    })
+    };
+    data.narrow_contact();
+    Ok(data)
 }
 
 /// Torque opposes rotation; where all of it is negative the amplifier counts it the other way round.

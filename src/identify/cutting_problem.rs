@@ -390,7 +390,7 @@ fn best_contact(lines: &[Option<ZeroLine>; 4], range: [f64; 2], forces: impl Fn(
         }
         (cost, slope, curvature)
     };
-    const GRID: usize = 60;
+    const GRID: usize = 12;
     let spacing = (range[1] - range[0]).max(1e-6) / GRID as f64;
     let mut best = (f64::INFINITY, range[0]);
     for k in 0..=GRID {
@@ -417,7 +417,7 @@ fn best_contact(lines: &[Option<ZeroLine>; 4], range: [f64; 2], forces: impl Fn(
         };
         let moved = (next - x).abs();
         x = next;
-        if moved < 1e-12 {
+        if moved < 1e-10 {
             break;
         }
     }

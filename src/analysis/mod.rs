@@ -3,6 +3,7 @@
 pub mod addition;
 pub mod campaign;
 pub mod diagnosis;
+pub mod cutting;
 pub mod lobes;
 pub mod modal;
 pub mod regression_line;
@@ -12,6 +13,7 @@ pub mod thesis_findings;
 pub use addition::Addition;
 pub use campaign::{CampaignFindings, LobeFindings, PostureFindings, StructureFindings};
 pub use diagnosis::DiagnosisFindings;
+pub use cutting::CuttingAnalysis;
 pub use lobes::{LobeAnalysis, LobeCase};
 pub use modal::{ModalAnalysis, PostureModes};
 pub use structure::StructureAnalysis;

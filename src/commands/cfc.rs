@@ -4,6 +4,7 @@ use serde_json::json;
 
 use super::{CampaignArg, Outcome};
 use crate::Result;
+use crate::analysis::cutting::waveform_groups;
 use crate::campaign::Campaign;
 use crate::cutting::{
     self, CfcOptions, CfcResult, CutAnalysis, ForceAxis, Group, by_axis, depth_mm, speed_text,
@@ -24,23 +25,38 @@ pub fn run(args: Args) -> Result<Outcome> {
         nonnegative_edges: args.nonnegative_edges,
     };
     let result = cutting::identify_forces(&campaign, options)?;
+    let waveforms = waveform_groups(&campaign, &result);
     Ok(Outcome {
-        json: document(&campaign, &result),
+        json: document(&campaign, &result, &waveforms),
         text: text(&campaign, &result),
     })
 }
 
-fn document(campaign: &Campaign, result: &CfcResult) -> serde_json::Value {
+fn document(campaign: &Campaign, result: &CfcResult, waveforms: &[serde_json::Value]) -> serde_json::Value {
     let groups = |list: &[Group]| list.iter().map(Group::to_json).collect::<Vec<_>>();
+    let with_waveforms = result
+        .groups
+        .iter()
+        .zip(waveforms)
+        .map(|(group, waveform)| with_waveform(group, waveform))
+        .collect::<Vec<_>>();
     let process = result.pooled.first().map(|g| g.process);
     json!({
         "campaign": campaign.name,
-        "groups": groups(&result.groups),
+        "groups": with_waveforms,
         "pooled": groups(&result.pooled),
         "r2": process.map(|p| by_axis(p, &result.r2())),
         "cuts": result.cuts.iter().map(cut_document).collect::<Vec<_>>(),
         "warnings": result.warnings,
     })
+}
+
+/// A group with what its whole waveforms say under `waveform`. The coefficients of the mean forces stay what they are: what
+/// they cannot separate is null there even where the waveform's shape can.
+fn with_waveform(group: &Group, waveform: &serde_json::Value) -> serde_json::Value {
+    let mut json = group.to_json();
+    json["waveform"] = waveform.clone();
+    json
 }
 
 fn cut_document(cut: &CutAnalysis) -> serde_json::Value {

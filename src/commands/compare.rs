@@ -1,11 +1,12 @@
 use serde_json::{Map, Value, json};
 
 use super::text::{bar, number, percent, table, warnings};
-use super::{CampaignArg, Domain, Outcome, structure_only};
+use super::{CampaignArg, Domain, Outcome};
 use crate::Result;
-use crate::analysis::StructureAnalysis;
+use crate::analysis::{CuttingAnalysis, StructureAnalysis};
 use crate::campaign::Campaign;
 use crate::discrepancy::compare::{ErrorMap, Group};
+use crate::discrepancy::compare_cutting::Harmonic;
 use crate::discrepancy::{FrfComparison, FrfError};
 use crate::identify::Options;
 use crate::identify::structure_study::{ResidualPeak, held_out_postures, residual_peaks};
@@ -20,9 +21,100 @@ pub struct Args {
 }
 
 pub fn run(args: Args) -> Result<Outcome> {
-    structure_only(args.domain)?;
     let campaign = Campaign::load(&args.campaign.dir)?;
-    let analysis = StructureAnalysis::run(&campaign, Options::default())?;
+    let both = !campaign.frfs.is_empty() && !campaign.cuts.is_empty();
+    match args.domain {
+        Some(Domain::Structure) => structure(&campaign),
+        Some(Domain::Cutting) => cutting(&campaign),
+        None if both => {
+            let (structure, cutting) = (structure(&campaign)?, cutting(&campaign)?);
+            Ok(Outcome {
+                json: json!({"structure": structure.json, "cutting": cutting.json}),
+                text: format!("{}\n{}", structure.text, cutting.text),
+            })
+        }
+        None if campaign.frfs.is_empty() && !campaign.cuts.is_empty() => cutting(&campaign),
+        None => structure(&campaign),
+    }
+}
+
+fn cutting(campaign: &Campaign) -> Result<Outcome> {
+    let analysis = CuttingAnalysis::run(campaign)?;
+    let c = &analysis.comparison;
+    let mut error = json!(c.totals);
+    error["held_out_nrms"] = json!(analysis.held_out_nrms);
+    let json = json!({
+        "domain": "cutting",
+        "process": analysis.data.process,
+        "error": error,
+        "by_cut": object(&c.by_cut),
+        "by_axis": object(&c.by_axis),
+        "by_speed": object(&c.by_speed),
+        "by_feed": object(&c.by_feed),
+        "by_harmonic": c.by_harmonic,
+        "cuts": c.cuts,
+        "parameters": analysis.calibration.parameters,
+        "chi2_per_value": analysis.calibration.reduced_chi2,
+        "converged": analysis.calibration.converged,
+        "warnings": analysis.warnings,
+    });
+    Ok(Outcome {
+        json,
+        text: describe_cutting(&analysis),
+    })
+}
+
+fn describe_cutting(analysis: &CuttingAnalysis) -> String {
+    let c = &analysis.comparison;
+    let mut text = format!(
+        "fitted waveform against measured forces (steady cut, averaged over revolutions)\n  error (nrms)    {}\n  \
+         noise floor     {}\n",
+        percent(c.totals.nrms),
+        percent(c.totals.noise_floor_nrms),
+    );
+    if let Some(held_out) = analysis.held_out_nrms {
+        text += &format!(
+            "  held-out nrms   {} (on cuts left out of the fit)\n",
+            percent(held_out)
+        );
+    }
+    text += &group_tables(&[
+        ("axis", &c.by_axis),
+        ("speed m/min", &c.by_speed),
+        ("feed mm", &c.by_feed),
+    ]);
+    let rows: Vec<Vec<String>> = c
+        .cuts
+        .iter()
+        .map(|cut| {
+            let times = cut.chi2_per_value.sqrt();
+            vec![
+                cut.cut.clone(),
+                percent(cut.nrms),
+                percent(cut.noise_floor_nrms),
+                format!("{times:.1}"),
+            ]
+        })
+        .collect();
+    text += &format!("\n{}", table(&["cut", "nrms", "noise", "misfit / noise"], &rows));
+    let mut strongest: Vec<&Harmonic> = c.by_harmonic.iter().collect();
+    strongest.sort_by(|a, b| (b.nrms - b.noise_floor_nrms).total_cmp(&(a.nrms - a.noise_floor_nrms)));
+    let rows: Vec<Vec<String>> = strongest
+        .iter()
+        .take(6)
+        .map(|h| vec![h.order.to_string(), percent(h.nrms), percent(h.noise_floor_nrms)])
+        .collect();
+    if !rows.is_empty() {
+        text += &format!(
+            "\norders of rotation with most error (share of the whole signal)\n{}",
+            table(&["order", "nrms", "noise"], &rows)
+        );
+    }
+    text + &warnings(&analysis.warnings)
+}
+
+fn structure(campaign: &Campaign) -> Result<Outcome> {
+    let analysis = StructureAnalysis::run(campaign, Options::default())?;
     let StructureAnalysis {
         case,
         calibration,
@@ -74,6 +166,20 @@ fn object(groups: &[Group]) -> Value {
     map.into()
 }
 
+/// A table with bars for each kind of group.
+fn group_tables(kinds: &[(&str, &Vec<Group>)]) -> String {
+    let mut text = String::new();
+    for (title, groups) in kinds {
+        let largest = groups.iter().map(|g| g.nrms).fold(0.0, f64::max);
+        let rows: Vec<Vec<String>> = groups
+            .iter()
+            .map(|g| vec![g.name.clone(), percent(g.nrms), bar(g.nrms, largest)])
+            .collect();
+        text += &format!("\n{}", table(&[title, "nrms", ""], &rows));
+    }
+    text
+}
+
 fn describe(
     comparison: &FrfComparison,
     held_out: Option<f64>,
@@ -94,18 +200,11 @@ fn describe(
         );
     }
     text += &dominant(peaks);
-    for (title, groups) in [
+    text += &group_tables(&[
         ("posture", &comparison.by_posture),
         ("direction", &comparison.by_direction),
         ("node", &comparison.by_point),
-    ] {
-        let largest = groups.iter().map(|g| g.nrms).fold(0.0, f64::max);
-        let rows: Vec<Vec<String>> = groups
-            .iter()
-            .map(|g| vec![g.name.clone(), percent(g.nrms), bar(g.nrms, largest)])
-            .collect();
-        text += &format!("\n{}", table(&[title, "nrms", ""], &rows));
-    }
+    ]);
     let excess = |nrms: f64, floor: f64| if floor > 0.0 { nrms / floor } else { 0.0 };
     let largest = comparison
         .by_band

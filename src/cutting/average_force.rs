@@ -249,7 +249,7 @@ pub fn feed_mm(geometry: &CutGeometry) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::campaign::ToolKind;
     use approx::assert_relative_eq;

@@ -8,7 +8,10 @@ mod outlier;
 mod record;
 mod regression;
 mod warnings;
+pub mod waveform;
 
+#[cfg(test)]
+pub(crate) use average_force::tests::drill as test_drill;
 pub use average_force::{
     CoefficientKind, DRILLING_COEFFICIENTS, DrillGeometry, ForceAxis, MILLING_COEFFICIENTS, average_row,
     coefficients_of, cutting_speed_m_per_min, feed_mm,

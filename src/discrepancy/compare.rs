@@ -155,7 +155,7 @@ impl Sums {
         (self.signal > 0.0 && floor > 0.0).then(|| self.nrms() / floor)
     }
 
-    fn floor(&self) -> f64 {
+    pub(super) fn floor(&self) -> f64 {
         ratio(self.noise, self.signal)
     }
 }
@@ -166,17 +166,17 @@ fn ratio(part: f64, whole: f64) -> f64 {
 
 /// Sums by name, in order of first appearance.
 #[derive(Default)]
-struct Groups(Vec<(String, Sums)>);
+pub(super) struct Groups(Vec<(String, Sums)>);
 
 impl Groups {
-    fn add(&mut self, name: &str, sums: Sums) {
+    pub(super) fn add(&mut self, name: &str, sums: Sums) {
         match self.0.iter_mut().find(|(n, _)| n == name) {
             Some((_, s)) => s.add(sums),
             None => self.0.push((name.to_string(), sums)),
         }
     }
 
-    fn finish(self) -> Vec<Group> {
+    pub(super) fn finish(self) -> Vec<Group> {
         self.0
             .into_iter()
             .map(|(name, s)| Group { name, nrms: s.nrms() })

@@ -1,6 +1,7 @@
 //! Where the model fails, and which physical effect it lacks.
 
 pub mod compare;
+pub mod compare_cutting;
 pub mod diagnose;
 pub mod explained;
 pub mod extension;
@@ -8,6 +9,7 @@ pub mod next_measurement;
 pub mod verdict;
 
 pub use compare::{Band, FrfComparison, FrfError};
+pub use compare_cutting::CuttingComparison;
 pub use diagnose::{Candidate, Diagnosis, diagnose};
 pub use explained::Explained;
 pub use verdict::Verdict;

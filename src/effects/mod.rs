@@ -13,6 +13,7 @@ use crate::robot::{Chain, Dual, Kinematics, RobotModel};
 mod amplitude_dependent_stiffness;
 mod base_compliance;
 mod branch;
+pub mod cutting;
 mod joint_damping;
 mod joint_transverse_compliance;
 mod link_flexibility;

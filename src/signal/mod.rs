@@ -4,10 +4,13 @@ mod blocks;
 mod drift;
 mod end_states;
 pub mod frf_noise;
+mod order_spectrum;
 mod steady_window;
 mod tooth_line;
 
+pub(crate) use blocks::line;
 pub use blocks::{Blocks, median, quantile};
 pub use drift::{Air, DriftLine, fit_drift};
+pub use order_spectrum::{OrderSpectrum, highest_order, line_amplitude, mean_between, order_spectrum};
 pub use steady_window::{Phases, Spindle, find_phases, whole_revolutions};
 pub use tooth_line::{ToothLine, tooth_line};

@@ -15,3 +15,4 @@ mod simulate;
 mod structure;
 mod support;
 mod where_it_fails;
+mod waveform;

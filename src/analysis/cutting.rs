@@ -1,0 +1,143 @@
+//! A campaign's force records: the waveform model fitted and compared, and its coefficients beside those of the mean forces.
+
+use serde_json::{Map, Value, json};
+
+use crate::campaign::{Campaign, Process};
+use crate::cutting::{CfcResult, Group};
+use crate::discrepancy::CuttingComparison;
+use crate::identify::cutting_data::processes;
+use crate::identify::cutting_problem::CuttingProblem;
+use crate::identify::cutting_study::{calibrate_cutting, held_out_cuts};
+use crate::identify::{Calibration, CuttingData, CuttingModel, Estimate};
+use crate::{InputError, Result};
+
+/// The cutting model of a campaign's main process against its force records.
+pub struct CuttingAnalysis {
+    pub data: CuttingData,
+    pub model: CuttingModel,
+    pub calibration: Calibration,
+    pub comparison: CuttingComparison,
+    /// nrms on cuts that were left out of the fit.
+    pub held_out_nrms: Option<f64>,
+    pub warnings: Vec<String>,
+}
+
+impl CuttingAnalysis {
+    /// # Errors
+    /// No cuts, or none that can be used.
+    pub fn run(campaign: &Campaign) -> Result<Self> {
+        let processes = processes(campaign);
+        let Some(&process) = processes.first() else {
+            return Err(
+                InputError::new("the campaign has no [[cut]]: no force records to compare")
+                    .file(campaign.dir.join("campaign.toml"))
+                    .key("cut")
+                    .remedy("add [[cut]] tables that name the force records")
+                    .into(),
+            );
+        };
+        let data = CuttingData::load(campaign, process)?;
+        let model = CuttingModel::new(&data, true)?;
+        let calibration = calibrate_cutting(&model, &data)?;
+        let fits = CuttingProblem {
+            model: &model,
+            data: &data,
+        }
+        .fits(&calibration.theta)?;
+        let comparison = CuttingComparison::new(&data, &fits);
+        let held_out_nrms = held_out_cuts(&model, &data, &calibration.theta)?.map(|h| h.nrms());
+        let mut warnings = data.warnings.clone();
+        if let Some(other) = processes.get(1) {
+            warnings.push(format!(
+                "the {} cuts are not compared: one process at a time",
+                name_of(*other)
+            ));
+        }
+        warnings.extend(warnings_of(&calibration));
+        Ok(CuttingAnalysis {
+            data,
+            model,
+            calibration,
+            comparison,
+            held_out_nrms,
+            warnings,
+        })
+    }
+}
+
+fn name_of(process: Process) -> &'static str {
+    match process {
+        Process::Milling => "milling",
+        Process::Drilling => "drilling",
+    }
+}
+
+/// Misfit from which on the user is told.
+const FAR_ABOVE_NOISE: f64 = 1.5;
+
+fn warnings_of(calibration: &Calibration) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if !calibration.converged {
+        warnings.push("the fit did not converge: treat the coefficients with care".to_string());
+    }
+    if calibration.reduced_chi2 > FAR_ABOVE_NOISE {
+        warnings.push(format!(
+            "the fitted waveform leaves {:.1} times the variance of the noise: physics is missing, or campaign.toml is not \
+             what was cut (immersion, depth, speed, axes); standard errors are widened accordingly",
+            calibration.reduced_chi2
+        ));
+    }
+    warnings
+}
+
+/// Coefficients of each of `result`'s groups from the whole waveform: `{key: {value, std_error}, nrms, noise_floor_nrms,
+/// chi2_per_value, converged}`; null where the waveform does not determine a coefficient. One entry a group, null where
+/// its waveforms cannot be fitted.
+pub fn waveform_groups(campaign: &Campaign, result: &CfcResult) -> Vec<Value> {
+    let loaded: Vec<(Process, Option<CuttingData>)> = processes(campaign)
+        .into_iter()
+        .map(|p| (p, CuttingData::load(campaign, p).ok()))
+        .collect();
+    result
+        .groups
+        .iter()
+        .map(|group| {
+            let data = loaded
+                .iter()
+                .find(|(p, _)| *p == group.process)
+                .and_then(|(_, d)| d.as_ref());
+            data.and_then(|data| waveform_group(data, group).ok())
+                .unwrap_or(Value::Null)
+        })
+        .collect()
+}
+
+fn waveform_group(data: &CuttingData, group: &Group) -> Result<Value> {
+    let own = data.filtered(|i| group.cuts.contains(&data.cuts[i].id));
+    let model = CuttingModel::new(&own, true)?;
+    let calibration = calibrate_cutting(&model, &own)?;
+    let fits = CuttingProblem {
+        model: &model,
+        data: &own,
+    }
+    .fits(&calibration.theta)?;
+    let totals = CuttingComparison::new(&own, &fits).totals;
+    let mut map = Map::new();
+    for (parameter, estimate) in model.parameters.iter().zip(&calibration.parameters) {
+        // What the prior says and the data do not is no answer.
+        let prior = parameter.prior.map_or(f64::INFINITY, |p| p.std);
+        let Estimate { value, std_error, .. } = estimate;
+        let known = *std_error < 0.1 * prior;
+        let entry = if known {
+            json!({"value": value, "std_error": std_error})
+        } else {
+            Value::Null
+        };
+        map.insert(parameter.name.clone(), entry);
+    }
+    map.insert("nrms".into(), json!(totals.nrms));
+    map.insert("noise_floor_nrms".into(), json!(totals.noise_floor_nrms));
+    map.insert("chi2_per_value".into(), json!(calibration.reduced_chi2));
+    map.insert("converged".into(), json!(calibration.converged));
+    Ok(Value::Object(map))
+}

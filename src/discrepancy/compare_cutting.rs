@@ -1,0 +1,122 @@
+//! Model against force records: the steady waveform averaged over tool revolutions, in tool axes; totals, and by cut,
+//! axis, speed, feed, order in the sequence and harmonic.
+
+use serde::Serialize;
+
+use super::compare::{ErrorTotals, Group, Groups, Sums};
+use crate::campaign::Process;
+use crate::identify::cutting_data::CuttingData;
+use crate::identify::cutting_problem::CutFit;
+use crate::identify::cutting_waves::axis_waves;
+
+/// Model against the steady waveforms.
+#[derive(Debug, Clone)]
+pub struct CuttingComparison {
+    pub totals: ErrorTotals,
+    pub by_cut: Vec<Group>,
+    pub by_axis: Vec<Group>,
+    /// Cutting speed, m/min.
+    pub by_speed: Vec<Group>,
+    /// Feed per tooth (milling) or revolution (drilling), mm.
+    pub by_feed: Vec<Group>,
+    /// Milling: order of the tool's rotation, 0 the mean.
+    pub by_harmonic: Vec<Harmonic>,
+    pub cuts: Vec<CutError>,
+}
+
+/// Error of one order of rotation over all cuts and axes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Harmonic {
+    pub order: usize,
+    /// Relative to the whole signal, so that the squares of all orders add up to that of the total.
+    pub nrms: f64,
+    pub noise_floor_nrms: f64,
+}
+
+/// Error of one cut.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CutError {
+    pub cut: String,
+    pub nrms: f64,
+    pub noise_floor_nrms: f64,
+    /// Weighted misfit per number compared, entry, air and lines off the comb included: 1 where only noise is left.
+    pub chi2_per_value: f64,
+}
+
+impl CuttingComparison {
+    /// `fits`: the model in each cut, in the order of `data.cuts`.
+    pub fn new(data: &CuttingData, fits: &[CutFit]) -> Self {
+        let mut total = Sums::default();
+        let mut decibel = (0.0, 0usize);
+        let [mut by_cut, mut by_axis, mut by_speed, mut by_feed] = std::array::from_fn(|_| Groups::default());
+        let mut harmonics: Vec<Sums> = Vec::new();
+        let mut cuts = Vec::new();
+        for (cut, fit) in data.cuts.iter().zip(fits) {
+            let mut own = Sums::default();
+            for axis in axis_waves(data, cut, fit) {
+                let mut sums = Sums::default();
+                for (n, wave) in axis.orders.iter().enumerate() {
+                    let s = Sums {
+                        error: wave.error,
+                        noise: wave.noise,
+                        signal: wave.signal,
+                        ..Sums::default()
+                    };
+                    sums.add(s);
+                    if harmonics.len() <= n {
+                        harmonics.push(Sums::default());
+                    }
+                    harmonics[n].add(s);
+                }
+                decibel.0 += axis.decibel.0;
+                decibel.1 += axis.decibel.1;
+                by_axis.add(axis.axis.label(), sums);
+                by_speed.add(&format!("{:.1}", cut.cutting_speed_m_per_min), sums);
+                by_feed.add(&format!("{}", cut.feed_mm), sums);
+                own.add(sums);
+            }
+            by_cut.add(&cut.id, own);
+            total.add(own);
+            cuts.push(CutError {
+                cut: cut.id.clone(),
+                nrms: own.nrms(),
+                noise_floor_nrms: own.floor(),
+                chi2_per_value: fit.chi2 / cut.value_count().max(1) as f64,
+            });
+        }
+        let whole = |part: f64| {
+            if total.signal > 0.0 {
+                (part / total.signal).sqrt()
+            } else {
+                0.0
+            }
+        };
+        let milling = data.process == Process::Milling;
+        CuttingComparison {
+            totals: ErrorTotals {
+                nrms: total.nrms(),
+                mean_abs_db: if decibel.1 > 0 {
+                    decibel.0 / decibel.1 as f64
+                } else {
+                    0.0
+                },
+                noise_floor_nrms: total.floor(),
+            },
+            by_cut: by_cut.finish(),
+            by_axis: by_axis.finish(),
+            by_speed: by_speed.finish(),
+            by_feed: by_feed.finish(),
+            by_harmonic: harmonics
+                .iter()
+                .enumerate()
+                .filter(|_| milling)
+                .map(|(order, s)| Harmonic {
+                    order,
+                    nrms: whole(s.error),
+                    noise_floor_nrms: whole(s.noise),
+                })
+                .collect(),
+            cuts,
+        }
+    }
+}

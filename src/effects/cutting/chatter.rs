@@ -1,0 +1,65 @@
+use super::*;
+
+/// A self-excited vibration off the tooth-passing comb.
+pub struct Chatter;
+
+impl CuttingEffect for Chatter {
+    fn id(&self) -> &'static str {
+        "chatter"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "The tool vibrates against the workpiece at a frequency of its own in some cuts, regenerating through the wave left \
+         by the tooth before. Its amplitude is taken in proportion to the feed, repeatable within a quarter."
+    }
+
+    fn fingerprint(&self) -> &'static str {
+        "Lines beside the tooth-passing comb, at one frequency and that shifted by the tooth-passing frequency."
+    }
+
+    fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
+        milling_only(data).or_else(|| {
+            data.vibration_hz
+                .is_none()
+                .then(|| "no line off the tooth-passing comb stands above the noise".to_string())
+        })
+    }
+
+    fn parameters(&self, _variant: usize, data: &CuttingSummary) -> Vec<Parameter> {
+        let frequency = data.vibration_hz.unwrap_or(500.0);
+        vec![
+            logarithmic(
+                "frequency_hz",
+                "Hz",
+                frequency,
+                0.5,
+                [0.5 * frequency, 2.0 * frequency],
+            ),
+            logarithmic("amplitude_per_feed", "1", 0.1, 2.0, [1e-5, 10.0]),
+            linear("direction_deg", "deg", 45.0, 180.0, 0.0, [-360.0, 360.0]),
+        ]
+    }
+
+    fn starts(&self, _variant: usize, data: &CuttingSummary) -> Vec<Vec<f64>> {
+        let frequency = data.vibration_hz.unwrap_or(500.0);
+        [
+            (0.03, 0.0),
+            (0.03, 90.0),
+            (0.03, 135.0),
+            (0.3, 20.0),
+            (0.3, 110.0),
+        ]
+        .map(|(a, d)| vec![frequency, a, d])
+        .to_vec()
+    }
+
+    fn apply(&self, _variant: usize, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
+        if setting.has_vibration {
+            physics.vibration = Some(Vibration {
+                frequency_hz: values[0].clone(),
+                amplitude_mm: values[1].scale(setting.feed_mm),
+                direction_rad: values[2].scale(1f64.to_radians()),
+            });
+        }
+    }
+}

@@ -1,0 +1,51 @@
+use super::*;
+
+/// The chisel edge indents: thrust ∝ feed^n in holes without pilot.
+pub struct ChiselEdge;
+
+impl CuttingEffect for ChiselEdge {
+    fn id(&self) -> &'static str {
+        "chisel-edge"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "In a hole without pilot the chisel edge presses into the material rather than cutting it: a thrust \
+         coefficient · feed^exponent (feed in mm per revolution) with next to no torque."
+    }
+
+    fn fingerprint(&self) -> &'static str {
+        "Full holes need more thrust than pilot holes predict, from the first contact on, while the torque agrees."
+    }
+
+    fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
+        drilling_only(data).or_else(|| {
+            (data.full_holes == 0 || data.pilot_holes == 0).then(|| {
+                "needs both full and pilot holes: with one kind it is other thrust coefficients".to_string()
+            })
+        })
+    }
+
+    fn parameters(&self, _variant: usize, data: &CuttingSummary) -> Vec<Parameter> {
+        // About the thrust of a chip as wide as the chisel, ten times as hard to cut.
+        let nominal = data.cutting_scale_n_per_mm2.max(1.0);
+        vec![
+            logarithmic(
+                "coefficient_n",
+                "N",
+                nominal,
+                2.0,
+                [1e-3 * nominal, 100.0 * nominal],
+            ),
+            linear("exponent", "1", 0.8, 0.4, 0.8, [-0.5, 3.0]),
+        ]
+    }
+
+    fn starts(&self, _variant: usize, data: &CuttingSummary) -> Vec<Vec<f64>> {
+        vec![vec![0.1 * data.cutting_scale_n_per_mm2.max(1.0), 0.6]]
+    }
+
+    fn apply(&self, _variant: usize, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
+        let power = values[1].scale(setting.feed_mm.max(1e-9).ln()).exp();
+        physics.chisel_thrust_n = Some(&values[0] * &power);
+    }
+}

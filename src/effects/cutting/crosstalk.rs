@@ -1,0 +1,44 @@
+use super::*;
+
+/// Force channels leak into each other.
+pub struct Crosstalk;
+
+/// Off-diagonal elements as (row, column).
+const LEAKS: [(usize, usize); 6] = [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)];
+
+impl CuttingEffect for Crosstalk {
+    fn id(&self) -> &'static str {
+        "crosstalk"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "Each recorded channel shows a few per cent of the forces on the other two (plate stiffness, amplifier, cable): \
+         recorded = M true with ones on the diagonal."
+    }
+
+    fn fingerprint(&self) -> &'static str {
+        "One axis shows a small copy of another's waveform, at all speeds and feeds; up and down milling together make it \
+         plain."
+    }
+
+    fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
+        milling_only(data).or_else(|| {
+            (!data.channels[..3].iter().all(|c| *c)).then(|| "needs the three force channels".to_string())
+        })
+    }
+
+    fn parameters(&self, _variant: usize, _data: &CuttingSummary) -> Vec<Parameter> {
+        LEAKS
+            .iter()
+            .map(|(i, j)| linear(format!("matrix[{i}][{j}]"), "1", 0.0, 0.06, 0.0, [-0.5, 0.5]))
+            .collect()
+    }
+
+    fn apply(&self, _variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
+        let mut mixing = unit_mixing();
+        for ((i, j), value) in LEAKS.iter().zip(values) {
+            mixing[*i][*j] = value.clone();
+        }
+        physics.crosstalk = Some(mixing);
+    }
+}

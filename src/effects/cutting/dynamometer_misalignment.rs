@@ -1,0 +1,53 @@
+use super::*;
+
+/// The dynamometer is tilted about its x or y axis.
+pub struct DynamometerMisalignment;
+
+impl CuttingEffect for DynamometerMisalignment {
+    fn id(&self) -> &'static str {
+        "dynamometer-misalignment"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "The dynamometer is tilted about its own x or y axis: the axial channel shows a share of a lateral force and the \
+         other way round. (A turn about the tool's axis is exactly another set of coefficients and cannot be seen.)"
+    }
+
+    fn fingerprint(&self) -> &'static str {
+        "The axial channel and one lateral channel carry equal and opposite shares of each other."
+    }
+
+    fn variants(&self) -> usize {
+        2
+    }
+
+    fn variant_label(&self, variant: usize) -> Option<(&'static str, &'static str)> {
+        ["x", "y"].get(variant).map(|axis| ("axis", *axis))
+    }
+
+    fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
+        milling_only(data).or_else(|| {
+            (!data.channels[..3].iter().all(|c| *c)).then(|| "needs the three force channels".to_string())
+        })
+    }
+
+    fn parameters(&self, _variant: usize, _data: &CuttingSummary) -> Vec<Parameter> {
+        vec![linear("angle_deg", "deg", 1.0, 6.0, 0.0, [-45.0, 45.0])]
+    }
+
+    fn starts(&self, _variant: usize, _data: &CuttingSummary) -> Vec<Vec<f64>> {
+        vec![vec![-4.0], vec![4.0]]
+    }
+
+    fn apply(&self, variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
+        let angle = values[0].scale(1f64.to_radians());
+        let (s, c) = angle.value.sin_cos();
+        let (sin, cos) = (angle.chain(s, c), angle.chain(c, -s));
+        let mut tilt = unit_mixing();
+        // Right-handed about the axis: (y, z) for x, (z, x) for y.
+        let (a, b) = if variant == 0 { (1, 2) } else { (2, 0) };
+        (tilt[a][a], tilt[b][b]) = (cos.clone(), cos);
+        (tilt[a][b], tilt[b][a]) = (sin.scale(-1.0), sin);
+        physics.tilt = Some(tilt);
+    }
+}

@@ -1,0 +1,59 @@
+use super::*;
+
+/// Rubbing of the edge, for a baseline that was fitted without.
+pub struct EdgeForce;
+
+impl CuttingEffect for EdgeForce {
+    fn id(&self) -> &'static str {
+        "edge-force"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "The edge rubs and ploughs: a force per edge length that does not depend on the chip thickness, for a baseline that \
+         has none."
+    }
+
+    fn fingerprint(&self) -> &'static str {
+        "Forces do not go to zero with the feed."
+    }
+
+    fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
+        data.has_edge
+            .then(|| "the baseline has edge coefficients already".to_string())
+    }
+
+    fn parameters(&self, _variant: usize, data: &CuttingSummary) -> Vec<Parameter> {
+        let scale = 0.05 * data.cutting_scale_n_per_mm2.max(1.0);
+        let names: &[&str] = match data.process {
+            Process::Milling => &["kte_n_per_mm", "kre_n_per_mm", "kae_n_per_mm"],
+            Process::Drilling => &["kte_n_per_mm", "kfe_n_per_mm"],
+        };
+        names
+            .iter()
+            .map(|name| {
+                linear(
+                    *name,
+                    "N/mm",
+                    0.2 * scale,
+                    3.0 * scale,
+                    0.0,
+                    [-20.0 * scale, 20.0 * scale],
+                )
+            })
+            .collect()
+    }
+
+    fn order(&self) -> u8 {
+        0
+    }
+
+    fn apply(&self, _variant: usize, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
+        let edges: &[usize] = match setting.process {
+            Process::Milling => &[3, 4, 5],
+            Process::Drilling => &[1, 3],
+        };
+        for (value, &edge) in values.iter().zip(edges) {
+            physics.coefficient[edge] = &physics.coefficient[edge] + value;
+        }
+    }
+}

@@ -1,0 +1,39 @@
+use super::*;
+
+/// The drill's margins rub in the hole: torque grows with depth.
+pub struct MarginFriction;
+
+impl CuttingEffect for MarginFriction {
+    fn id(&self) -> &'static str {
+        "margin-friction"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "The drill's margins and the chips in its flutes rub on the wall of the hole: a friction force on the \
+         circumference that grows with the depth at full diameter, seen as torque."
+    }
+
+    fn fingerprint(&self) -> &'static str {
+        "Torque climbs steadily while the hole gets deeper; thrust does not."
+    }
+
+    fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
+        drilling_only(data).or_else(|| (!data.channels[3]).then(|| "needs the torque".to_string()))
+    }
+
+    fn parameters(&self, _variant: usize, data: &CuttingSummary) -> Vec<Parameter> {
+        let scale = 0.02 * data.cutting_scale_n_per_mm2.max(1.0);
+        vec![linear(
+            "k_margin_n_per_mm",
+            "N/mm",
+            0.05 * scale,
+            scale,
+            0.0,
+            [-10.0 * scale, 10.0 * scale],
+        )]
+    }
+
+    fn apply(&self, _variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
+        physics.margin_n_per_mm = Some(values[0].clone());
+    }
+}

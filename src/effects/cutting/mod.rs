@@ -1,0 +1,273 @@
+//! The library of physical effects that a baseline cutting force model may lack: one file an effect, one registry.
+//!
+//! An effect states its parameters and writes them into the [`CutPhysics`] of a cut. The way from the chip to the file
+//! is the same whatever effects there are, in this order:
+//!
+//! 1. geometry: chip thickness, with [`runout`](Runout);
+//! 2. force law: coefficients of this cut (speed, wear), size effect, chisel and margin of a drill;
+//! 3. frame: the dynamometer's tilt against the tool;
+//! 4. sensor dynamics, channel by channel;
+//! 5. crosstalk between the channels;
+//! 6. drift of each channel.
+//!
+//! Chatter adds lines off the tooth-passing comb. Derivatives come with the [`Dual`] numbers that all is written in.
+
+use std::fmt;
+
+use crate::campaign::Process;
+use crate::parameter::{Parameter, Prior, Scale};
+use crate::robot::Dual;
+
+mod chatter;
+mod chisel_edge;
+mod crosstalk;
+mod dynamometer_misalignment;
+mod dynamometer_resonance;
+mod edge_force;
+mod margin_friction;
+mod nonlinear_drift;
+mod runout;
+mod size_effect;
+mod speed_dependence;
+mod tool_wear;
+
+/// What is known of a campaign's cuts when an effect is asked for its parameters, starts, or whether this data can show it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CuttingSummary {
+    pub process: Process,
+    pub teeth: usize,
+    pub cuts: usize,
+    /// Different positions in the sequence of cuts; 0 where the campaign does not say.
+    pub sequence_length: usize,
+    /// Slowest and fastest cut.
+    pub speed_m_per_min: [f64; 2],
+    /// Different chip thicknesses at full engagement.
+    pub feeds: usize,
+    pub smallest_feed_mm: f64,
+    /// Recorded channels x, y, z, torque that every cut has.
+    pub channels: [bool; 4],
+    /// Highest frequency that the order spectra hold, Hz; 0 where there are none.
+    pub highest_hz: f64,
+    /// Air before and after the cut, in every record.
+    pub air_on_both_sides: bool,
+    pub full_holes: usize,
+    pub pilot_holes: usize,
+    /// The baseline has edge coefficients.
+    pub has_edge: bool,
+    /// Middle of the lines found off the comb, Hz; `None` where there are none.
+    pub vibration_hz: Option<f64>,
+    pub longest_record_s: f64,
+    /// Largest cutting coefficient of the baseline, N/mm²: sets scales.
+    pub cutting_scale_n_per_mm2: f64,
+}
+
+/// What a cut's forces are made with; effects change it. Lengths mm, forces N, coefficients N/mm² and N/mm.
+#[derive(Debug, Clone)]
+pub struct CutPhysics {
+    /// Of this cut: milling Ktc Krc Kac Kte Kre Kae; drilling Ktc Kte Kfc Kfe.
+    pub coefficient: Vec<Dual>,
+    /// p in K ∝ (h / 0.1 mm)^−p.
+    pub size_exponent: Option<Dual>,
+    pub runout: Option<Runout>,
+    /// Thrust of the chisel edge in a full hole, N.
+    pub chisel_thrust_n: Option<Dual>,
+    /// Friction force on the circumference for each mm of depth, N.
+    pub margin_n_per_mm: Option<Dual>,
+    /// Rotation of the recorded x, y, z forces.
+    pub tilt: Option<Mixing>,
+    /// Natural frequency (Hz) and damping ratio of each channel.
+    pub dynamics: Option<[[Dual; 2]; 3]>,
+    /// Recorded x, y, z as mixtures of what the channels should show.
+    pub crosstalk: Option<Mixing>,
+    /// Additive transients exp(−t/τ) of free amplitude, by channel: τ, s.
+    pub transient_s: Option<[Dual; 4]>,
+    /// Leaking charge amplifiers, by channel: 1/τ, 1/s.
+    pub leak_per_s: Option<[Dual; 4]>,
+    pub vibration: Option<Vibration>,
+}
+
+/// Rows of a 3×3 matrix.
+pub type Mixing = [[Dual; 3]; 3];
+
+/// The tool's axis beside the spindle's.
+#[derive(Debug, Clone)]
+pub struct Runout {
+    pub offset_mm: Dual,
+    /// From tooth 0.
+    pub angle_rad: Dual,
+}
+
+/// A self-excited vibration of the tool against the workpiece, in cuts whose records show one.
+#[derive(Debug, Clone)]
+pub struct Vibration {
+    pub frequency_hz: Dual,
+    /// Amplitude, mm.
+    pub amplitude_mm: Dual,
+    /// From x towards y.
+    pub direction_rad: Dual,
+}
+
+/// The cut that an effect is applied to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CutSetting {
+    pub process: Process,
+    /// 0 at the first cut of the sequence, 1 at the last.
+    pub progress: f64,
+    /// Cutting speed over the geometric mean of the slowest and fastest cut.
+    pub speed_ratio: f64,
+    /// Per tooth (milling), per revolution (drilling).
+    pub feed_mm: f64,
+    pub has_vibration: bool,
+}
+
+/// One physical effect on cutting forces or their measurement.
+pub trait CuttingEffect: Sync {
+    /// As in the contract: `tool-wear`.
+    fn id(&self) -> &'static str;
+
+    /// The physics in plain words, one or two sentences.
+    fn explanation(&self) -> &'static str;
+
+    /// How it shows in force records, one sentence.
+    fn fingerprint(&self) -> &'static str;
+
+    /// Discrete choices.
+    fn variants(&self) -> usize {
+        1
+    }
+
+    /// Name of a discrete choice as (key, value) for the JSON; `None` where there is no choice.
+    fn variant_label(&self, _variant: usize) -> Option<(&'static str, &'static str)> {
+        None
+    }
+
+    /// Why this campaign cannot show the effect; `None` if it can.
+    fn obstacle(&self, data: &CuttingSummary) -> Option<String>;
+
+    /// Tunable quantities. `nominal` is the first starting value.
+    fn parameters(&self, variant: usize, data: &CuttingSummary) -> Vec<Parameter>;
+
+    /// Further starting points, natural values in the order of the parameters.
+    fn starts(&self, _variant: usize, _data: &CuttingSummary) -> Vec<Vec<f64>> {
+        Vec::new()
+    }
+
+    /// Free amplitudes for each cut and channel that are fitted along without standing in the list of parameters.
+    fn nuisances_per_channel(&self, _variant: usize) -> usize {
+        0
+    }
+
+    /// Effects with lower order are applied first (edge coefficients are there before they wear).
+    fn order(&self) -> u8 {
+        1
+    }
+
+    fn apply(&self, variant: usize, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics);
+}
+
+/// All cutting effects.
+pub const CUTTING: [&dyn CuttingEffect; 12] = [
+    &size_effect::SizeEffect,
+    &runout::RunoutEffect,
+    &tool_wear::ToolWear,
+    &speed_dependence::SpeedDependence,
+    &crosstalk::Crosstalk,
+    &dynamometer_misalignment::DynamometerMisalignment,
+    &dynamometer_resonance::DynamometerResonance,
+    &nonlinear_drift::NonlinearDrift,
+    &chatter::Chatter,
+    &chisel_edge::ChiselEdge,
+    &margin_friction::MarginFriction,
+    &edge_force::EdgeForce,
+];
+
+/// An effect and its discrete choice: what is added to a model.
+#[derive(Clone, Copy)]
+pub struct CuttingInstance {
+    pub effect: &'static dyn CuttingEffect,
+    pub variant: usize,
+}
+
+impl CuttingInstance {
+    /// The id; the discrete choice is not part of it.
+    pub fn label(&self) -> String {
+        self.effect.id().to_string()
+    }
+}
+
+impl fmt::Debug for CuttingInstance {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}#{}", self.effect.id(), self.variant)
+    }
+}
+
+impl PartialEq for CuttingInstance {
+    fn eq(&self, other: &Self) -> bool {
+        self.effect.id() == other.effect.id() && self.variant == other.variant
+    }
+}
+
+/// Every instance, discrete choices included.
+pub fn instances() -> Vec<CuttingInstance> {
+    CUTTING
+        .into_iter()
+        .flat_map(|effect| (0..effect.variants()).map(move |variant| CuttingInstance { effect, variant }))
+        .collect()
+}
+
+/// Instances (one for each discrete choice) of an effect; empty if there is none of that name.
+pub fn find(name: &str) -> Vec<CuttingInstance> {
+    instances().into_iter().filter(|i| i.label() == name).collect()
+}
+
+/// Unit matrix.
+pub(crate) fn unit_mixing() -> Mixing {
+    [0, 1, 2].map(|i| [0, 1, 2].map(|j| Dual::constant(f64::from(u8::from(i == j)))))
+}
+
+fn linear(
+    name: impl Into<String>,
+    unit: &'static str,
+    nominal: f64,
+    std: f64,
+    mean: f64,
+    bounds: [f64; 2],
+) -> Parameter {
+    Parameter {
+        name: name.into(),
+        unit,
+        scale: Scale::Linear,
+        nominal,
+        prior: Some(Prior { mean, std }),
+        bounds,
+    }
+}
+
+fn logarithmic(
+    name: impl Into<String>,
+    unit: &'static str,
+    nominal: f64,
+    std: f64,
+    bounds: [f64; 2],
+) -> Parameter {
+    Parameter {
+        name: name.into(),
+        unit,
+        scale: Scale::Logarithmic,
+        nominal,
+        prior: Some(Prior {
+            mean: nominal.ln(),
+            std,
+        }),
+        bounds,
+    }
+}
+
+fn milling_only(data: &CuttingSummary) -> Option<String> {
+    (data.process != Process::Milling)
+        .then(|| "milling only: it shows in the waveform over a revolution".to_string())
+}
+
+fn drilling_only(data: &CuttingSummary) -> Option<String> {
+    (data.process != Process::Drilling).then(|| "drilling only".to_string())
+}

@@ -1,0 +1,74 @@
+use super::*;
+
+/// The zero line is no line: an exponential transient is added, or the charge amplifier leaks.
+pub struct NonlinearDrift;
+
+/// Milling: x, y, z; drilling: thrust and torque.
+fn channels(process: Process) -> std::ops::Range<usize> {
+    match process {
+        Process::Milling => 0..3,
+        Process::Drilling => 2..4,
+    }
+}
+
+impl CuttingEffect for NonlinearDrift {
+    fn id(&self) -> &'static str {
+        "nonlinear-drift"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "The zero line of a channel bends. Either a transient is added that decays exponentially (warming up; its size is \
+         free in every cut and channel), or the charge amplifier leaks, which is a high-pass on the force."
+    }
+
+    fn fingerprint(&self) -> &'static str {
+        "The air before and after the cut does not lie on one line, and the level during the cut bends with it."
+    }
+
+    fn variants(&self) -> usize {
+        2
+    }
+
+    fn variant_label(&self, variant: usize) -> Option<(&'static str, &'static str)> {
+        ["additive", "leak"].get(variant).map(|kind| ("kind", *kind))
+    }
+
+    fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
+        (!data.air_on_both_sides).then(|| "needs air before and after the cut".to_string())
+    }
+
+    fn parameters(&self, _variant: usize, data: &CuttingSummary) -> Vec<Parameter> {
+        let nominal = data.longest_record_s.clamp(0.5, 20.0);
+        channels(data.process)
+            .map(|i| logarithmic(format!("tau_s[{i}]"), "s", nominal, 1.5, [0.1, 1000.0]))
+            .collect()
+    }
+
+    fn starts(&self, _variant: usize, data: &CuttingSummary) -> Vec<Vec<f64>> {
+        let count = channels(data.process).count();
+        [0.2, 3.0]
+            .map(|share| vec![(share * data.longest_record_s).clamp(0.2, 100.0); count])
+            .to_vec()
+    }
+
+    fn nuisances_per_channel(&self, variant: usize) -> usize {
+        // The transient's amplitude; what a leak makes of the drift line.
+        if variant == 0 { 1 } else { 0 }
+    }
+
+    fn apply(&self, variant: usize, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
+        let first = channels(setting.process).start;
+        let by_channel = |missing: f64, f: &dyn Fn(&Dual) -> Dual| {
+            std::array::from_fn(|i| {
+                i.checked_sub(first)
+                    .and_then(|k| values.get(k))
+                    .map_or(Dual::constant(missing), f)
+            })
+        };
+        if variant == 0 {
+            physics.transient_s = Some(by_channel(1.0, &|tau| tau.clone()));
+        } else {
+            physics.leak_per_s = Some(by_channel(0.0, &|tau| tau.recip()));
+        }
+    }
+}

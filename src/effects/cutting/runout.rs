@@ -1,0 +1,55 @@
+use super::*;
+
+/// The tool's axis lies beside the spindle's: every tooth has its own radius.
+pub struct RunoutEffect;
+
+impl CuttingEffect for RunoutEffect {
+    fn id(&self) -> &'static str {
+        "runout"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "The tool's axis lies beside the spindle's axis, so that every tooth cuts a chip of its own thickness and some may \
+         miss the cut. The direction is counted from one of the teeth; which one, forces cannot tell."
+    }
+
+    fn fingerprint(&self) -> &'static str {
+        "Lines at once per revolution and its multiples beside the tooth-passing comb, the stronger the smaller the feed."
+    }
+
+    fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
+        milling_only(data)
+            .or_else(|| (data.teeth < 2).then(|| "a single tooth has no runout against others".to_string()))
+    }
+
+    fn parameters(&self, _variant: usize, data: &CuttingSummary) -> Vec<Parameter> {
+        vec![
+            logarithmic("offset_mm", "mm", 0.01, 1.5, [1e-4, 1.0]),
+            linear(
+                "angle_deg",
+                "deg",
+                0.3 * 360.0 / data.teeth as f64,
+                360.0,
+                0.0,
+                [-720.0, 720.0],
+            ),
+        ]
+    }
+
+    fn starts(&self, _variant: usize, data: &CuttingSummary) -> Vec<Vec<f64>> {
+        let pitch_deg = 360.0 / data.teeth as f64;
+        let offsets = [0.1, 0.3, 0.8].map(|share| (share * data.smallest_feed_mm).clamp(0.002, 0.2));
+        let angles = [0.05, 0.4, 0.75];
+        offsets
+            .iter()
+            .flat_map(|o| angles.map(|a| vec![*o, a * pitch_deg]))
+            .collect()
+    }
+
+    fn apply(&self, _variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
+        physics.runout = Some(Runout {
+            offset_mm: values[0].clone(),
+            angle_rad: values[1].scale(1f64.to_radians()),
+        });
+    }
+}

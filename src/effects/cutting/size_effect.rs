@@ -1,0 +1,37 @@
+use super::*;
+
+/// Cutting coefficients rise as the chip gets thin: K ∝ (h / 0.1 mm)^−p.
+pub struct SizeEffect;
+
+impl CuttingEffect for SizeEffect {
+    fn id(&self) -> &'static str {
+        "size-effect"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "Thin chips cost more force per area than thick ones (edge radius, ploughing, strain-rate hardening): the cutting \
+         coefficients grow as a power of the inverse chip thickness, referred to 0.1 mm."
+    }
+
+    fn fingerprint(&self) -> &'static str {
+        "Force against feed bends downwards, and within a revolution the thin ends of each chip are higher than a force \
+         linear in chip thickness."
+    }
+
+    fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
+        let flat = data.process == Process::Drilling && data.feeds < 3;
+        flat.then(|| "needs three feeds: with fewer it is other cutting and edge coefficients".to_string())
+    }
+
+    fn parameters(&self, _variant: usize, _data: &CuttingSummary) -> Vec<Parameter> {
+        vec![linear("p", "1", 0.15, 0.3, 0.0, [-0.5, 0.8])]
+    }
+
+    fn starts(&self, _variant: usize, _data: &CuttingSummary) -> Vec<Vec<f64>> {
+        vec![vec![0.35]]
+    }
+
+    fn apply(&self, _variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
+        physics.size_exponent = Some(values[0].clone());
+    }
+}

@@ -1,0 +1,43 @@
+use super::*;
+
+/// Cutting coefficients fall with cutting speed: K ∝ v^−q.
+pub struct SpeedDependence;
+
+impl CuttingEffect for SpeedDependence {
+    fn id(&self) -> &'static str {
+        "speed-dependence"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "The material softens as cutting gets faster and hotter (or hardens): the cutting coefficients follow a power of \
+         the cutting speed; they are given at the geometric mean of the slowest and fastest cut."
+    }
+
+    fn fingerprint(&self) -> &'static str {
+        "Forces at one feed differ between speeds by one factor, the same on all axes."
+    }
+
+    fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
+        let [slow, fast] = data.speed_m_per_min;
+        (fast < 1.05 * slow).then(|| "all cuts were made at one speed".to_string())
+    }
+
+    fn parameters(&self, _variant: usize, _data: &CuttingSummary) -> Vec<Parameter> {
+        vec![linear("q", "1", 0.1, 0.4, 0.0, [-2.0, 2.0])]
+    }
+
+    fn starts(&self, _variant: usize, _data: &CuttingSummary) -> Vec<Vec<f64>> {
+        vec![vec![-0.1], vec![0.4]]
+    }
+
+    fn apply(&self, _variant: usize, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
+        let cutting: &[usize] = match setting.process {
+            Process::Milling => &[0, 1, 2],
+            Process::Drilling => &[0, 2],
+        };
+        let factor = values[0].scale(-setting.speed_ratio.ln()).exp();
+        for &k in cutting {
+            physics.coefficient[k] = &physics.coefficient[k] * &factor;
+        }
+    }
+}

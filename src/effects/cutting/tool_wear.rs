@@ -1,0 +1,51 @@
+use super::*;
+
+/// Edge coefficients grow along the sequence of cuts.
+pub struct ToolWear;
+
+impl CuttingEffect for ToolWear {
+    fn id(&self) -> &'static str {
+        "tool-wear"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "The edge wears from cut to cut: the edge coefficients grow linearly over the sequence of cuts. `growth` is their \
+         ratio at the last cut to the first, in each direction."
+    }
+
+    fn fingerprint(&self) -> &'static str {
+        "Forces rise with the order in which the cuts were made, by the same amount at every feed."
+    }
+
+    fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
+        (data.sequence_length < 3)
+            .then(|| "the campaign does not say in which order the cuts were made (order = n)".to_string())
+            .or_else(|| (!data.has_edge).then(|| "the baseline has no edge coefficients".to_string()))
+    }
+
+    fn parameters(&self, _variant: usize, data: &CuttingSummary) -> Vec<Parameter> {
+        let directions: &[&str] = match data.process {
+            Process::Milling => &["t", "r", "a"],
+            Process::Drilling => &["t", "f"],
+        };
+        directions
+            .iter()
+            .map(|d| linear(format!("growth[{d}]"), "1", 1.5, 1.5, 1.0, [-5.0, 30.0]))
+            .collect()
+    }
+
+    fn order(&self) -> u8 {
+        2
+    }
+
+    fn apply(&self, _variant: usize, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
+        let edges: &[usize] = match setting.process {
+            Process::Milling => &[3, 4, 5],
+            Process::Drilling => &[1, 3],
+        };
+        for (growth, &edge) in values.iter().zip(edges) {
+            let factor = &Dual::constant(1.0 - setting.progress) + &growth.scale(setting.progress);
+            physics.coefficient[edge] = &physics.coefficient[edge] * &factor;
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! Lines of a steady cut that belong to no order of the spindle: vibration of the tool against the workpiece.
+
+use crate::signal::{OrderSpectrum, line_amplitude, median};
+
+/// What one cut shows off the comb.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OffComb {
+    /// The strongest line, Hz.
+    pub frequency_hz: f64,
+    /// It and the lines shifted from it by multiples of the tooth-passing frequency.
+    pub lines: Vec<VibrationLine>,
+}
+
+/// One line on all channels.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VibrationLine {
+    /// Multiple of the tooth-passing frequency by which it is shifted.
+    pub shift: i64,
+    /// By recorded channel (index, amplitude, what noise alone would show), N.
+    pub channels: Vec<(usize, f64, f64)>,
+}
+
+impl OffComb {
+    pub fn value_count(&self) -> usize {
+        1 + self.lines.iter().map(|l| l.channels.len()).sum::<usize>()
+    }
+}
+
+/// A line this many times the power of its surroundings, averaged over the channels, is no chance (some 10⁴ lines).
+const STANDS_OUT: f64 = 30.0;
+/// Nearer to the tooth-passing comb than this share of its spacing it may be the modulation of a cut that is not steady.
+const BESIDE_COMB: f64 = 0.12;
+/// Lines to each side that a growing vibration spreads over.
+const SPREAD: usize = 4;
+/// Highest multiple of the tooth-passing frequency by which lines are followed.
+pub const MOST_SHIFT: i64 = 2;
+
+/// `spectra`: recorded channel, its spectrum, and a stretch of air.
+pub fn find_vibration(
+    spectra: &[(usize, OrderSpectrum, Vec<f64>)],
+    sample_rate_hz: f64,
+    spindle_hz: f64,
+    teeth: usize,
+) -> Option<OffComb> {
+    let (_, first, _) = spectra.first()?;
+    let (count, line_hz) = (first.rest.len(), first.line_hz);
+    let tooth_hz = spindle_hz * teeth as f64;
+    let floor = |s: &OrderSpectrum| s.sample_std * (line_hz / sample_rate_hz).sqrt();
+    let beside = |hz: f64, spacing: f64| (hz / spacing - (hz / spacing).round()).abs() * spacing;
+    let strength: Vec<f64> = (0..count)
+        .map(|j| {
+            let sum: f64 = spectra
+                .iter()
+                .map(|(_, s, _)| (s.rest[j] / floor(s).max(1e-300)).powi(2))
+                .sum();
+            sum / spectra.len() as f64
+        })
+        .collect();
+    // Surroundings: the median of forty lines to each side.
+    let local = |j: usize| median(&strength[j.saturating_sub(40)..(j + 41).min(count)]).max(1.0);
+    let allowed = |j: usize| {
+        let hz = j as f64 * line_hz;
+        // Orders beyond half the sampling rate fold back among the lines.
+        let folded = |m: f64| {
+            beside((m * sample_rate_hz - hz).abs(), spindle_hz)
+                .min(beside(m * sample_rate_hz + hz, spindle_hz))
+        };
+        hz < 0.45 * sample_rate_hz
+            && folded(1.0).min(folded(2.0)) > 1.5 * line_hz
+            && beside(hz, tooth_hz) > (BESIDE_COMB * tooth_hz).max(3.0 * line_hz)
+            && beside(hz, spindle_hz) > 2.5 * line_hz.min(0.1 * spindle_hz)
+    };
+    let mut candidates: Vec<usize> = (1..count)
+        .filter(|&j| strength[j] > STANDS_OUT && allowed(j))
+        .collect();
+    candidates.retain(|&j| strength[j] > STANDS_OUT * local(j));
+    candidates.sort_by(|a, b| strength[*b].total_cmp(&strength[*a]));
+    // A line that the air shows as well is hum, not cutting.
+    let cutting = |j: usize| {
+        spectra.iter().any(|(_, s, air)| {
+            let cut = 2.0 * s.rest[j];
+            cut > 4.0 * line_amplitude(air, sample_rate_hz, j as f64 * line_hz) && s.rest[j] > 3.0 * floor(s)
+        })
+    };
+    let peak = candidates.into_iter().find(|j| cutting(*j))?;
+    let frequency_hz = centre(&strength, peak) * line_hz;
+    let lines = (-MOST_SHIFT..=MOST_SHIFT)
+        .filter_map(|shift| {
+            let hz = (frequency_hz + shift as f64 * tooth_hz).abs();
+            let j = (hz / line_hz).round() as usize;
+            let inside = j > SPREAD + 2 && j + SPREAD < count && hz < 0.4 * sample_rate_hz;
+            let clear = beside(hz, spindle_hz) > 1.5 * line_hz;
+            (inside && clear).then(|| VibrationLine {
+                shift,
+                channels: spectra
+                    .iter()
+                    .map(|(channel, s, _)| {
+                        let power: f64 = s.rest[j - SPREAD..=j + SPREAD].iter().map(|a| a * a).sum();
+                        let noise = (2 * SPREAD + 1) as f64 * floor(s).powi(2);
+                        (*channel, 2.0 * power.sqrt(), 2.0 * noise.sqrt())
+                    })
+                    .collect(),
+            })
+        })
+        .collect();
+    Some(OffComb { frequency_hz, lines })
+}
+
+/// Centre of the power around a peak, in lines.
+fn centre(strength: &[f64], peak: usize) -> f64 {
+    let range = peak.saturating_sub(SPREAD)..(peak + SPREAD + 1).min(strength.len());
+    let (mut sum, mut moment) = (0.0, 0.0);
+    for j in range {
+        sum += strength[j];
+        moment += strength[j] * j as f64;
+    }
+    if sum > 0.0 { moment / sum } else { peak as f64 }
+}

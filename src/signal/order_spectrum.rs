@@ -1,0 +1,236 @@
+//! A steady record as Fourier coefficients over the orders of a rotation, with their noise, and what lies between the
+//! orders.
+//!
+//! Projecting the whole window on an order is the same as averaging the waveform over the revolutions first. The noise
+//! of a coefficient is what the neighbouring lines that belong to no order show: the scatter from revolution to
+//! revolution.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+use realfft::RealFftPlanner;
+
+use super::blocks::median;
+
+/// One channel over a steady window.
+#[derive(Debug, Clone)]
+pub struct OrderSpectrum {
+    /// Orders 1..=K: x(θ) = … + 2 Re Σ c_n e^{inθ}, θ = 0 at the window's first sample.
+    pub coefficient: Vec<Complex64>,
+    /// Standard deviation of each complex coefficient (root of E|noise|²).
+    pub std: Vec<f64>,
+    /// Standard deviation of a sample's white noise.
+    pub sample_std: f64,
+    /// |amplitude| of what is left without the orders, on lines `line_hz` apart: x(t) = … + 2 Re Σ X_j e^{iω_j t}.
+    pub rest: Vec<f64>,
+    pub line_hz: f64,
+}
+
+/// Neighbouring orders whose scatter is pooled, to each side.
+const POOLED: usize = 8;
+/// An order whose neighbourhood holds this many times the power of the orders around it keeps its own.
+const STANDS_OUT: f64 = 2.0;
+
+/// Highest order worth keeping: `wanted`, or what the sampling shows.
+pub fn highest_order(samples_per_revolution: f64, wanted: usize) -> usize {
+    wanted.min((0.45 * samples_per_revolution).floor().max(0.0) as usize)
+}
+
+/// `samples`: the steady window, its zero line taken off; `samples_per_revolution` is not a whole number in general and
+/// the last revolution may end within a sample. `None` where there are less than three revolutions.
+pub fn order_spectrum(
+    samples: &[f64],
+    sample_rate_hz: f64,
+    samples_per_revolution: f64,
+    orders: usize,
+) -> Option<OrderSpectrum> {
+    let revolutions = (samples.len() as f64 / samples_per_revolution + 1e-6).floor();
+    if !(revolutions >= 3.0) {
+        return None;
+    }
+    let length = revolutions * samples_per_revolution;
+    let count = (length.ceil() as usize).min(samples.len());
+    // The last sample counts as far as the revolution reaches into it.
+    let last = (length - (count as f64 - 1.0)).clamp(0.0, 1.0);
+    let weight = |i: usize| if i + 1 == count { last } else { 1.0 };
+    let trend = Trend::new(&samples[..count], revolutions as usize, samples_per_revolution);
+    let value: Vec<f64> = (0..count).map(|i| samples[i] - trend.at(i)).collect();
+
+    let mut coefficient = vec![Complex64::ZERO; orders];
+    let step = TAU / samples_per_revolution;
+    let phase = |i: usize| Complex64::from_polar(1.0, -step * (i as f64 % samples_per_revolution));
+    for (i, v) in value.iter().enumerate() {
+        let turn = phase(i);
+        let mut power = Complex64::from(v * weight(i) / length);
+        for c in &mut coefficient {
+            power *= turn;
+            *c += power;
+        }
+    }
+    let mut rest: Vec<f64> = value
+        .iter()
+        .enumerate()
+        .map(|(i, v)| {
+            let turn = phase(i).conj();
+            // Horner from the highest order.
+            let sum = coefficient
+                .iter()
+                .rev()
+                .fold(Complex64::ZERO, |s, c| (s + c) * turn);
+            v - 2.0 * sum.re
+        })
+        .collect();
+    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(count);
+    let mut spectrum = transform.make_output_vec();
+    transform.process(&mut rest, &mut spectrum).ok()?;
+    let rest: Vec<f64> = spectrum.iter().map(|c| c.norm() / count as f64).collect();
+    let line_hz = sample_rate_hz / count as f64;
+
+    let lines_per_order = revolutions * count as f64 / length;
+    let power = |n: f64| -> f64 {
+        let (from, to) = ((n - 0.5) * lines_per_order, (n + 0.5) * lines_per_order);
+        let range = (from.ceil().max(1.0) as usize)..(to.floor() as usize + 1).min(rest.len());
+        let lines = range.len().max(2) as f64;
+        // One line of each neighbourhood, the order's own, was taken away.
+        rest.get(range)
+            .map_or(0.0, |r| r.iter().map(|a| a * a).sum::<f64>())
+            / (lines - 1.0)
+    };
+    let own: Vec<f64> = (1..=orders).map(|n| power(n as f64)).collect();
+    let std = (0..orders)
+        .map(|n| {
+            let pool = &own[n.saturating_sub(POOLED)..(n + POOLED + 1).min(orders)];
+            let around = median(pool);
+            let variance = if own[n] > STANDS_OUT * around {
+                own[n]
+            } else {
+                around
+            };
+            variance.sqrt()
+        })
+        .collect();
+    // |X|² is exponentially distributed where there is noise only: its median is ln 2 of its mean.
+    let squares: Vec<f64> = rest.iter().skip(1).map(|a| a * a).collect();
+    let sample_std = (median(&squares) / std::f64::consts::LN_2 * count as f64).sqrt();
+    Some(OrderSpectrum {
+        coefficient,
+        std,
+        sample_std,
+        rest,
+        line_hz,
+    })
+}
+
+/// Polynomial through the means of the revolutions: what moves so slowly is drift, and would leak into all orders. (The
+/// samples themselves would not do: a polynomial takes a little out of every wave.)
+struct Trend {
+    coefficient: DVector<f64>,
+    scale: f64,
+}
+
+impl Trend {
+    fn new(samples: &[f64], revolutions: usize, samples_per_revolution: f64) -> Trend {
+        let terms = 1 + (revolutions / 4).min(3);
+        let scale = 2.0 / samples.len().max(2) as f64;
+        let edge = |r: usize| r as f64 * samples_per_revolution;
+        let mean = DVector::from_fn(revolutions, |r, _| mean_between(samples, edge(r), edge(r + 1)));
+        let basis = DMatrix::from_fn(revolutions, terms, |r, k| {
+            ((edge(r) + 0.5 * samples_per_revolution) * scale - 1.0).powi(k as i32)
+        });
+        let coefficient = (basis.transpose() * &basis)
+            .cholesky()
+            .map_or_else(|| DVector::zeros(terms), |c| c.solve(&(basis.transpose() * mean)));
+        Trend { coefficient, scale }
+    }
+
+    fn at(&self, i: usize) -> f64 {
+        let x = (i as f64 + 0.5) * self.scale - 1.0;
+        self.coefficient.iter().rev().fold(0.0, |s, c| s * x + c)
+    }
+}
+
+/// Mean of `samples` between two positions that need not be whole: a sample counts by the share of it that lies inside.
+pub fn mean_between(samples: &[f64], from: f64, to: f64) -> f64 {
+    let (from, to) = (from.max(0.0), to.min(samples.len() as f64));
+    if !(to > from) {
+        return 0.0;
+    }
+    let (first, last) = (from.floor() as usize, (to.ceil() as usize).min(samples.len()));
+    let mut sum = 0.0;
+    for (i, v) in samples.iter().enumerate().take(last).skip(first) {
+        let share = (to.min(i as f64 + 1.0) - from.max(i as f64)).max(0.0);
+        sum += v * share;
+    }
+    sum / (to - from)
+}
+
+/// Amplitude of a line at `hz` in `samples`, less what noise alone would show; a straight line is taken out first.
+pub fn line_amplitude(samples: &[f64], sample_rate_hz: f64, hz: f64) -> f64 {
+    let n = samples.len();
+    if n < 16 {
+        return 0.0;
+    }
+    let index = || (0..n).map(|i| i as f64);
+    let (mean, slope, centre) = super::blocks::line(index(), samples.iter().copied());
+    let (mut sum, mut window, mut square) = (Complex64::ZERO, 0.0, 0.0);
+    for (i, v) in samples.iter().enumerate() {
+        let hann = 0.5 - 0.5 * (TAU * (i as f64 + 0.5) / n as f64).cos();
+        let value = v - mean - slope * (i as f64 - centre);
+        sum += Complex64::from_polar(hann * value, -TAU * hz * i as f64 / sample_rate_hz);
+        window += hann;
+        square += value * value;
+    }
+    let power = 4.0 * sum.norm_sqr() / (window * window);
+    // Hann-windowed white noise: E|2S/W|² = 4 σ² Σw²/W² = 6 σ²/n.
+    let noise = 6.0 * square / (n * n) as f64;
+    (power - noise).max(0.0).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn lines_noise_and_drift_are_told_apart() {
+        let (rate, per_turn, sigma) = (5000.0, 137.3, 2.0);
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let mut coverage = Vec::new();
+        for _ in 0..20 {
+            let samples: Vec<f64> = (0..6000)
+                .map(|i| {
+                    let theta = TAU * i as f64 / per_turn;
+                    let gauss: f64 = (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
+                    let x = i as f64 / 6000.0;
+                    80.0 * x + 40.0 * x * x + 300.0 * (4.0 * theta).cos() - 20.0 * (17.0 * theta).sin()
+                        + sigma * gauss
+                })
+                .collect();
+            let s = order_spectrum(&samples, rate, per_turn, 40).unwrap();
+            assert!((s.sample_std / sigma - 1.0).abs() < 0.05, "{}", s.sample_std);
+            for n in 1..=40 {
+                let truth = match n {
+                    4 => Complex64::new(150.0, 0.0),
+                    17 => Complex64::new(0.0, 10.0),
+                    _ => Complex64::ZERO,
+                };
+                coverage.push(((s.coefficient[n - 1] - truth).norm() / s.std[n - 1]).powi(2));
+            }
+        }
+        let mean = coverage.iter().sum::<f64>() / coverage.len() as f64;
+        assert!((0.85..1.15).contains(&mean), "{mean}");
+    }
+
+    #[test]
+    fn fractional_means_and_hum() {
+        assert!((mean_between(&[1.0, 2.0, 3.0], 0.5, 2.5) - 2.0).abs() < 1e-12);
+        assert_eq!(mean_between(&[], 0.0, 1.0), 0.0);
+        let hum: Vec<f64> = (0..2000)
+            .map(|i| 3.0 * (TAU * 50.0 * i as f64 / 5000.0 + 0.4).cos())
+            .collect();
+        assert!((line_amplitude(&hum, 5000.0, 50.0) - 3.0).abs() < 0.05);
+        assert!(line_amplitude(&hum, 5000.0, 120.0) < 0.3);
+    }
+}

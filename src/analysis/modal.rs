@@ -50,6 +50,7 @@ impl ModalAnalysis {
                         frequency_hz: &frf.frequency_hz,
                         receptance_m_per_n: &frf.receptance_m_per_n,
                         modes,
+                        dofs: None,
                     })
                     .collect();
                 if members.is_empty() {

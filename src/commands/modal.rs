@@ -104,6 +104,7 @@ pub fn run(args: Args) -> Result<Outcome> {
                     frequency_hz: &input.frequency_hz,
                     receptance_m_per_n: &input.receptance_m_per_n,
                     modes,
+                    dofs: None,
                 })
                 .collect();
             Ok((set, modal::global(&of_set, &settings)?))

@@ -24,7 +24,6 @@ const SEEN: f64 = 30.0;
 /// A group of modes and the window that it was fitted in.
 pub(super) struct Group {
     pub window_hz: [f64; 2],
-    pub fixed: Vec<Pole>,
     pub solution: Solution,
 }
 
@@ -91,7 +90,6 @@ pub(super) fn refine(data: &[Data], candidates: &[Pole], search: bool, changes: 
         }
         result.push(Group {
             window_hz,
-            fixed: fit.fixed,
             solution,
         });
         before = after;
@@ -218,7 +216,7 @@ impl Fit<'_> {
             }
         }
         // Nothing left that could pay for a mode.
-        if most.0 < 0.2 * self.wanted(solution) {
+        if most.0 < 0.4 * self.wanted(solution) {
             return None;
         }
         let centre = rest[most.1].0;
@@ -228,22 +226,20 @@ impl Fit<'_> {
             let damping: Vec<f64> = solution.poles.iter().map(|p| p.damping_ratio).collect();
             crate::signal::median(&damping)
         };
-        let more = [1.0 - usual, 1.0, 1.0 + usual]
-            .into_iter()
-            .filter_map(|factor| {
-                let mut poles = solution.poles.clone();
-                poles.push(Pole {
-                    frequency_hz: centre * factor,
-                    damping_ratio: usual,
-                });
-                self.fit(&poles)
-            })
-            .min_by(|a, b| a.misfit.total_cmp(&b.misfit))?;
-        let fall = solution.misfit - more.misfit;
-        let sane = (0..more.poles.len()).all(|j| self.sane(&more, j));
-        let added = more.poles[more.poles.len() - 1];
-        let alike = (usual / 4.0..usual * 4.0).contains(&added.damping_ratio);
-        (sane && alike && fall > 1.5 * self.wanted(&more)).then_some(more)
+        // A pole on top of another one is a saddle: beside it the search begins on either slope.
+        [1.0, 1.0 - usual, 1.0 + usual].into_iter().find_map(|factor| {
+            let mut poles = solution.poles.clone();
+            poles.push(Pole {
+                frequency_hz: centre * factor,
+                damping_ratio: usual,
+            });
+            let more = self.fit(&poles)?;
+            let fall = solution.misfit - more.misfit;
+            let sane = (0..more.poles.len()).all(|j| self.sane(&more, j));
+            let added = more.poles[more.poles.len() - 1];
+            let alike = (usual / 4.0..usual * 4.0).contains(&added.damping_ratio);
+            (sane && alike && fall > 1.5 * self.wanted(&more)).then_some(more)
+        })
     }
 }
 

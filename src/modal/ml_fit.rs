@@ -17,7 +17,7 @@ use super::local_fit::Pole;
 
 /// Lower residual, then upper ones.
 pub(super) const RESIDUAL_TERMS: usize = 4;
-const MAX_ITERATIONS: usize = 50;
+const MAX_ITERATIONS: usize = 30;
 const MIN_DAMPING: f64 = 1e-7;
 /// A relative fall of the misfit below this ends the search.
 const SETTLED: f64 = 1e-9;
@@ -90,29 +90,39 @@ impl Solution {
     }
 }
 
-/// Values of the linear model (poles free and fixed, then residual terms) on given lines.
-pub(super) fn synthesis(frequency_hz: &[f64], poles: &[Pole], linear: &[f64], centre_hz: f64) -> Vec<Complex64> {
-    frequency_hz
-        .iter()
-        .map(|&f| {
-            let mut sum = Complex64::ZERO;
-            for (pole, x) in poles.iter().zip(linear.chunks_exact(2)) {
-                let [a, b] = shapes(f, pole);
-                sum += a * x[0] + b * x[1];
-            }
-            let terms = residual_terms(f, centre_hz);
-            for (term, x) in terms.iter().zip(&linear[2 * poles.len()..]) {
-                sum += term * *x;
-            }
-            sum
-        })
-        .collect()
+/// What all FRFs on the same lines share: f/f₀ and 1/(1 − r² + 2iζr) by pole, then line; residual terms by line.
+struct Axis {
+    ratio: Vec<Vec<f64>>,
+    shape: Vec<Vec<Complex64>>,
+    terms: Vec<[Complex64; RESIDUAL_TERMS]>,
 }
 
-fn shapes(f: f64, pole: &Pole) -> [Complex64; 2] {
-    let r = f / pole.frequency_hz;
-    let g = 1.0 / Complex64::new(1.0 - r * r, 2.0 * pole.damping_ratio * r);
-    [g, g * Complex64::new(0.0, r)]
+impl Axis {
+    fn new<'a>(frequency_hz: &[f64], poles: impl Iterator<Item = &'a Pole>, centre_hz: f64) -> Axis {
+        let mut axis = Axis {
+            ratio: Vec::new(),
+            shape: Vec::new(),
+            terms: frequency_hz.iter().map(|&f| residual_terms(f, centre_hz)).collect(),
+        };
+        for pole in poles {
+            let ratio: Vec<f64> = frequency_hz.iter().map(|f| f / pole.frequency_hz).collect();
+            let shape = ratio.iter().map(|r| {
+                let (re, im) = (1.0 - r * r, 2.0 * pole.damping_ratio * r);
+                let size = 1.0 / (re * re + im * im);
+                Complex64::new(re * size, -im * size)
+            });
+            axis.shape.push(shape.collect());
+            axis.ratio.push(ratio);
+        }
+        axis
+    }
+}
+
+/// Which FRFs have the same lines: by FRF, the index of the first one with them.
+fn same_lines(frfs: &[NoisyFrf]) -> Vec<usize> {
+    (0..frfs.len())
+        .map(|m| (0..m).find(|&k| frfs[k].frequency_hz == frfs[m].frequency_hz).unwrap_or(m))
+        .collect()
 }
 
 /// 1/ω², 1, iω, ω², scaled to one at the centre.
@@ -134,7 +144,7 @@ struct Linearised {
 }
 
 /// Frequency at which the residual terms have unit size.
-pub(super) fn centre_hz(frfs: &[NoisyFrf]) -> f64 {
+fn centre_hz(frfs: &[NoisyFrf]) -> f64 {
     let first = frfs.iter().filter_map(|c| c.frequency_hz.first()).fold(f64::INFINITY, |m, f| m.min(*f));
     let last = frfs.iter().filter_map(|c| c.frequency_hz.last()).fold(0.0, |m: f64, f| m.max(*f));
     (first.max(1e-3 * last) * last).sqrt()
@@ -150,9 +160,12 @@ pub(super) fn fit(frfs: &[NoisyFrf], start: &[Pole], fixed: &[Pole]) -> Option<S
     if frfs.iter().any(|c| 2 * c.frequency_hz.len() <= linear) {
         return None;
     }
-    let centre = centre_hz(frfs);
+    let lines = Lines {
+        axis_of: same_lines(frfs),
+        centre_hz: centre_hz(frfs),
+    };
     let mut poles = start.to_vec();
-    let mut current = linearise(frfs, &poles, fixed, centre)?;
+    let mut current = linearise(frfs, &poles, fixed, &lines)?;
     let mut lambda = 1e-4;
     let mut converged = parameters == 0;
     for _ in 0..MAX_ITERATIONS {
@@ -176,7 +189,7 @@ pub(super) fn fit(frfs: &[NoisyFrf], start: &[Pole], fixed: &[Pole]) -> Option<S
             })
             .collect();
         let sane = trial.iter().all(|p| p.frequency_hz > 0.0 && p.damping_ratio < 0.9);
-        match if sane { linearise(frfs, &trial, fixed, centre) } else { None } {
+        match if sane { linearise(frfs, &trial, fixed, &lines) } else { None } {
             Some(next) if next.misfit <= current.misfit => {
                 converged = current.misfit - next.misfit <= SETTLED * current.misfit + 1e-3;
                 poles = trial;
@@ -206,11 +219,23 @@ pub(super) fn fit(frfs: &[NoisyFrf], start: &[Pole], fixed: &[Pole]) -> Option<S
     })
 }
 
+struct Lines {
+    axis_of: Vec<usize>,
+    centre_hz: f64,
+}
+
 /// Solves for the linear parameters of every FRF and builds the normal equations of the poles.
-fn linearise(frfs: &[NoisyFrf], poles: &[Pole], fixed: &[Pole], centre_hz: f64) -> Option<Linearised> {
+fn linearise(frfs: &[NoisyFrf], poles: &[Pole], fixed: &[Pole], lines: &Lines) -> Option<Linearised> {
+    let axes: Vec<Option<Axis>> = (0..frfs.len())
+        .map(|m| {
+            let own = lines.axis_of[m] == m;
+            own.then(|| Axis::new(frfs[m].frequency_hz, poles.iter().chain(fixed), lines.centre_hz))
+        })
+        .collect();
     let each: Vec<Option<(f64, DMatrix<f64>, DVector<f64>, FrfSolution)>> = frfs
         .par_iter()
-        .map(|frf| linearise_one(frf, poles, fixed, centre_hz))
+        .zip(&lines.axis_of)
+        .map(|(frf, &axis)| linearise_one(frf, poles, axes[axis].as_ref()?))
         .collect();
     let parameters = 2 * poles.len();
     let mut sum = Linearised {
@@ -230,34 +255,42 @@ fn linearise(frfs: &[NoisyFrf], poles: &[Pole], fixed: &[Pole], centre_hz: f64) 
     sum.misfit.is_finite().then_some(sum)
 }
 
+/// Writes the weighted real and imaginary parts of a function of the line into a column.
+fn put(column: &mut [f64], weight: &[f64], value: impl Fn(usize) -> Complex64) {
+    for (k, (pair, w)) in column.chunks_exact_mut(2).zip(weight).enumerate() {
+        let value = value(k);
+        pair[0] = value.re * w;
+        pair[1] = value.im * w;
+    }
+}
+
 fn linearise_one(
     frf: &NoisyFrf,
     poles: &[Pole],
-    fixed: &[Pole],
-    centre_hz: f64,
+    axis: &Axis,
 ) -> Option<(f64, DMatrix<f64>, DVector<f64>, FrfSolution)> {
     let lines = frf.frequency_hz.len();
-    let modes = poles.len() + fixed.len();
+    let modes = axis.shape.len();
     let columns = 2 * modes + RESIDUAL_TERMS;
-    let mut basis = DMatrix::<f64>::zeros(2 * lines, columns);
-    let mut target = DVector::<f64>::zeros(2 * lines);
-    let put = |matrix: &mut DMatrix<f64>, k: usize, column: usize, value: Complex64| {
-        matrix[(2 * k, column)] = value.re;
-        matrix[(2 * k + 1, column)] = value.im;
-    };
-    for (k, &f) in frf.frequency_hz.iter().enumerate() {
-        let weight = std::f64::consts::SQRT_2 / frf.sigma[k];
-        for (j, pole) in poles.iter().chain(fixed).enumerate() {
-            let [a, b] = shapes(f, pole);
-            put(&mut basis, k, 2 * j, a * weight);
-            put(&mut basis, k, 2 * j + 1, b * weight);
+    // A complex standard deviation of σ is σ/√2 in each part.
+    let weight: Vec<f64> = frf.sigma.iter().map(|s| std::f64::consts::SQRT_2 / s).collect();
+    let mut values = vec![0.0; 2 * lines * columns];
+    for (column, out) in values.chunks_exact_mut(2 * lines).enumerate() {
+        match column.checked_sub(2 * modes) {
+            None => {
+                let (shape, ratio) = (&axis.shape[column / 2], &axis.ratio[column / 2]);
+                if column % 2 == 0 {
+                    put(out, &weight, |k| shape[k]);
+                } else {
+                    put(out, &weight, |k| Complex64::new(-shape[k].im * ratio[k], shape[k].re * ratio[k]));
+                }
+            }
+            Some(term) => put(out, &weight, |k| axis.terms[k][term]),
         }
-        for (j, term) in residual_terms(f, centre_hz).into_iter().enumerate() {
-            put(&mut basis, k, 2 * modes + j, term * weight);
-        }
-        target[2 * k] = frf.receptance[k].re * weight;
-        target[2 * k + 1] = frf.receptance[k].im * weight;
     }
+    let mut basis = DMatrix::from_vec(2 * lines, columns, values);
+    let mut target = DVector::<f64>::zeros(2 * lines);
+    put(target.as_mut_slice(), &weight, |k| frf.receptance[k]);
     // Unit columns: the Gram matrix is then as well scaled as it can be.
     let norms: Vec<f64> = basis.column_iter().map(|c| c.norm()).collect();
     if norms.iter().any(|n| !(n.is_finite() && *n > 0.0)) {
@@ -276,23 +309,23 @@ fn linearise_one(
     residual = &target - &basis * &x;
 
     let parameters = 2 * poles.len();
-    let mut slopes = DMatrix::<f64>::zeros(2 * lines, parameters);
-    for (k, &f) in frf.frequency_hz.iter().enumerate() {
-        let weight = std::f64::consts::SQRT_2 / frf.sigma[k];
-        for (j, pole) in poles.iter().enumerate() {
-            let r = f / pole.frequency_hz;
-            let zeta = pole.damping_ratio;
-            let g = 1.0 / Complex64::new(1.0 - r * r, 2.0 * zeta * r);
-            let (a, b) = (x[2 * j] / norms[2 * j], x[2 * j + 1] / norms[2 * j + 1]);
-            let numerator = Complex64::new(a, b * r);
-            // r falls by r with ln f₀.
-            let by_frequency =
-                -g * g * Complex64::new(2.0 * r * r, -2.0 * zeta * r) * numerator + g * Complex64::new(0.0, -b * r);
-            let by_damping = -g * g * Complex64::new(0.0, 2.0 * zeta * r) * numerator;
-            put(&mut slopes, k, 2 * j, by_frequency * weight);
-            put(&mut slopes, k, 2 * j + 1, by_damping * weight);
-        }
+    let mut values = vec![0.0; 2 * lines * parameters];
+    for (column, out) in values.chunks_exact_mut(2 * lines).enumerate() {
+        let j = column / 2;
+        let (shape, ratio, zeta) = (&axis.shape[j], &axis.ratio[j], poles[j].damping_ratio);
+        let (a, b) = (x[2 * j] / norms[2 * j], x[2 * j + 1] / norms[2 * j + 1]);
+        put(out, &weight, |k| {
+            let (g, r) = (shape[k], ratio[k]);
+            let squared = g * g * Complex64::new(a, b * r);
+            if column % 2 == 0 {
+                // r falls by r with ln f₀.
+                g * Complex64::new(0.0, -b * r) - squared * Complex64::new(2.0 * r * r, -2.0 * zeta * r)
+            } else {
+                -squared * Complex64::new(0.0, 2.0 * zeta * r)
+            }
+        });
     }
+    let slopes = DMatrix::from_vec(2 * lines, parameters, values);
     let cross = &transposed * &slopes;
     let solved = cholesky.solve(&cross);
     let slopes_t = slopes.transpose();
@@ -303,10 +336,7 @@ fn linearise_one(
     let solution = FrfSolution {
         linear: &scale * x,
         residual: (0..lines)
-            .map(|k| {
-                let weight = std::f64::consts::SQRT_2 / frf.sigma[k];
-                Complex64::new(residual[2 * k], residual[2 * k + 1]) / weight
-            })
+            .map(|k| Complex64::new(residual[2 * k], residual[2 * k + 1]) / weight[k])
             .collect(),
         linear_covariance: &scale * cholesky.inverse() * &scale,
         linear_by_poles: &scale * solved,
@@ -323,7 +353,7 @@ mod tests {
     #[test]
     fn exact_data_with_modes_outside_the_band_come_out_close_to_exact() {
         let modes = [
-            Mode::new(1.0, 0.02, 0.01),
+            Mode::new(0.4, 0.02, 0.01),
             Mode::new(12.0, 0.03, 0.01),
             Mode::new(12.5, 0.02, -0.02),
             Mode::new(400.0, 0.02, 30.0),

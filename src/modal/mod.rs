@@ -12,6 +12,8 @@ mod analysis;
 mod circle_fit;
 mod curve;
 mod global;
+#[cfg(test)]
+mod global_marks;
 mod half_power;
 mod joint_fit;
 mod local_fit;

@@ -86,7 +86,7 @@ pub(super) struct ShapeData<'a> {
     pub weight: Vec<f64>,
 }
 
-/// Reads the poles of all orders. The second part holds the candidates' poles in the order of `candidates`.
+/// Reads the poles of all orders.
 pub(super) fn read(orders: &[Order], shapes: Option<&ShapeData>, references: usize) -> Stabilisation {
     let mut levels: Vec<Vec<Link>> = Vec::with_capacity(orders.len());
     let mut chains = 0;
@@ -140,7 +140,7 @@ pub(super) fn read(orders: &[Order], shapes: Option<&ShapeData>, references: usi
                 })
             })
             .collect(),
-        candidates: candidates(members, levels.last().map_or(0, Vec::len)),
+        candidates: candidates(members),
     }
 }
 
@@ -181,7 +181,7 @@ fn likeness(a: &Link, b: &Link) -> Option<f64> {
     Some(mac(a.residues.as_ref()?, b.residues.as_ref()?))
 }
 
-fn candidates(chains: Vec<Vec<&Link>>, _last: usize) -> Vec<Candidate> {
+fn candidates(chains: Vec<Vec<&Link>>) -> Vec<Candidate> {
     let mut long: Vec<Vec<&Link>> = chains.into_iter().filter(|c| c.len() >= ORDERS).collect();
     // The longest first: what is nearly the same joins it.
     long.sort_by_key(|c| std::cmp::Reverse(c.len()));

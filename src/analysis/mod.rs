@@ -9,6 +9,6 @@ pub mod thesis_findings;
 
 pub use campaign::{CampaignFindings, LobeFindings, PostureFindings, StructureFindings};
 pub use lobes::{LobeAnalysis, LobeCase};
-pub use modal::{ModalAnalysis, PostureModes};
+pub use modal::{ModalAnalysis, SetModes};
 pub use structure::StructureAnalysis;
 pub use thesis_findings::ThesisFindings;

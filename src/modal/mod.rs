@@ -11,10 +11,12 @@ use serde::Serialize;
 mod analysis;
 mod circle_fit;
 mod curve;
+mod from_hits;
 mod global;
 #[cfg(test)]
 mod global_marks;
 mod half_power;
+mod hits;
 mod joint_fit;
 mod local_fit;
 mod lscf;
@@ -22,13 +24,17 @@ mod lscf;
 mod marks;
 mod ml_fit;
 mod peaks;
+pub mod quality;
 pub mod shape;
 pub mod stabilisation;
+pub mod tracking;
 #[cfg(test)]
 mod synthetic;
 
 pub use analysis::analyse_frf;
+pub use from_hits::{Estimator, TapFrfs, TapRecord, TapSettings, frfs_from_hits};
 pub use global::{SetMember, global};
+pub use hits::Hit;
 
 /// How a modal parameter was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
@@ -107,7 +113,10 @@ pub struct FrfModes {
     pub modes: Vec<FrfMode>,
     /// The FRF was recorded with the sign convention e^{−iωt} and was turned before the analysis.
     pub conjugated: bool,
+    /// What changes the result.
     pub warnings: Vec<String>,
+    /// What is usual and worth knowing: peaks that are no modes, coarse lines, methods that disagree.
+    pub remarks: Vec<String>,
 }
 
 /// One mode of a set of FRFs.
@@ -272,9 +281,9 @@ mod tests {
         let best = found.modes[0].best();
         assert!((best.damping_ratio - 0.01).abs() < 4.0 * best.damping_std.unwrap());
         assert!(
-            found.warnings.iter().any(|w| w.contains("too coarse lines")),
+            found.remarks.iter().any(|w| w.contains("too coarse lines")),
             "{:?}",
-            found.warnings
+            found.remarks
         );
     }
 

@@ -18,6 +18,7 @@ mod nyquist;
 mod parameters;
 mod regression;
 mod side_by_side;
+mod stabilisation;
 
 #[cfg(test)]
 mod samples;
@@ -33,6 +34,7 @@ pub use nyquist::NyquistFigure;
 pub use parameters::{Estimate, ParameterFigure, ParameterRow};
 pub use regression::{RegressionFigure, RegressionPoint, RegressionSeries};
 pub use side_by_side::{BarSeries, SideBySide};
+pub use stabilisation::{StabilisationFigure, StabilisationPole};
 
 use crate::Error;
 

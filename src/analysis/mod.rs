@@ -15,6 +15,6 @@ pub use campaign::{CampaignFindings, LobeFindings, PostureFindings, StructureFin
 pub use diagnosis::DiagnosisFindings;
 pub use cutting::CuttingAnalysis;
 pub use lobes::{LobeAnalysis, LobeCase};
-pub use modal::{ModalAnalysis, PostureModes};
+pub use modal::{ModalAnalysis, SetModes};
 pub use structure::StructureAnalysis;
 pub use thesis_findings::ThesisFindings;

@@ -1,78 +1,436 @@
-//! Modes of a campaign's FRFs, posture by posture.
+//! Modes of measured FRFs, set by set: of a campaign (one set a posture), of FRF files and of raw tap tests (one set
+//! a file).
 
+use std::f64::consts::TAU;
+use std::path::Path;
+
+use num_complex::Complex64;
 use rayon::prelude::*;
 
 use crate::campaign::Campaign;
-use crate::modal::{self, GlobalMode, SetMember, Settings};
-use crate::{Error, Result};
+use crate::ingest::units::{self, Dimension};
+use crate::ingest::{self, Channel, FrfRecord, Quantity, TimeRecord};
+use crate::modal::quality::{self, Quality, Verdict};
+use crate::modal::{self, FrfModes, GlobalModes, Hit, SetMember, Settings, TapRecord, TapSettings};
+use crate::{Error, InputError, Result};
 
-/// Modes of one posture, all its FRFs together.
+/// One FRF to analyse.
 #[derive(Debug, Clone)]
-pub struct PostureModes {
-    pub posture: String,
-    /// FRFs measured there.
-    pub frfs: usize,
-    pub modes: Vec<GlobalMode>,
+pub struct FrfInput {
+    pub name: String,
+    /// Posture or file: FRFs of one set share their modes.
+    pub set: String,
+    /// Response and reference, as text that is equal where the degree of freedom is.
+    pub dofs: Option<[String; 2]>,
+    pub frequency_hz: Vec<f64>,
+    pub receptance_m_per_n: Vec<Complex64>,
+    pub coherence: Option<Vec<f64>>,
+    /// What an exponential window added to ζω of every mode; taken out of the results.
+    pub added_decay_per_s: f64,
 }
 
+/// One FRF and what was found in it.
 #[derive(Debug, Clone)]
+pub struct AnalysedFrf {
+    pub input: FrfInput,
+    pub modes: FrfModes,
+    pub quality: Quality,
+}
+
+/// One posture or file.
+#[derive(Debug, Clone)]
+pub struct SetModes {
+    pub set: String,
+    pub frfs: Vec<AnalysedFrf>,
+    /// Degrees of freedom by the numbers that [`modal::GlobalMode::shape`] uses.
+    pub dofs: Vec<String>,
+    pub global: GlobalModes,
+    pub verdict: Verdict,
+    /// The verdict in words.
+    pub why: String,
+}
+
+#[derive(Debug, Clone, Default)]
 pub struct ModalAnalysis {
-    /// Postures that have FRFs, in the campaign's order.
-    pub postures: Vec<PostureModes>,
+    /// In the order of the inputs; sets without FRFs are left out.
+    pub sets: Vec<SetModes>,
+    /// Hits of the raw records among the inputs, by file.
+    pub hits: Vec<(String, Vec<Hit>)>,
     pub warnings: Vec<String>,
 }
 
 impl ModalAnalysis {
+    /// All FRFs of a campaign, one set a posture.
+    ///
     /// # Errors
     /// The FRFs cannot be read, there are none, or a posture's cannot be analysed.
     pub fn run(campaign: &Campaign) -> Result<Self> {
-        let (set, mut warnings) = campaign.load_frfs()?;
-        if set.frfs.is_empty() {
-            return Err(Error::computation("the campaign has no FRFs"));
-        }
-        let settings = Settings { band_hz: None };
-        let found = set
+        Self::of_campaign(campaign, &Settings::default())
+    }
+
+    /// As [`ModalAnalysis::run`], within a band.
+    ///
+    /// # Errors
+    /// As [`ModalAnalysis::run`].
+    pub fn of_campaign(campaign: &Campaign, settings: &Settings) -> Result<Self> {
+        let (set, warnings) = campaign.load_frfs()?;
+        let dof = |d: &crate::campaign::MeasuredDof| {
+            let sign = if d.negative { "-" } else { "" };
+            format!("{}{sign}{}", campaign.points[d.point].node, d.axis.letter())
+        };
+        let inputs = set
             .frfs
-            .par_iter()
-            .map(|frf| modal::analyse_frf(&frf.frequency_hz, &frf.receptance_m_per_n, &settings))
-            .collect::<Result<Vec<_>>>()?;
-        let of_postures = campaign
-            .postures
-            .par_iter()
-            .enumerate()
-            .map(|(index, posture)| {
-                let members: Vec<SetMember> = set
-                    .frfs
-                    .iter()
-                    .zip(&found)
-                    .filter(|(frf, _)| frf.posture == index)
-                    .map(|(frf, modes)| SetMember {
-                        frequency_hz: &frf.frequency_hz,
-                        receptance_m_per_n: &frf.receptance_m_per_n,
-                        modes,
-                    })
-                    .collect();
-                if members.is_empty() {
-                    return Ok(None);
-                }
-                let global = modal::global(&members, &settings)?;
-                let modes = PostureModes {
-                    posture: posture.id.clone(),
-                    frfs: members.len(),
-                    modes: global.modes,
-                };
-                Ok(Some((modes, global.warnings)))
+            .into_iter()
+            .map(|frf| FrfInput {
+                dofs: Some([dof(&frf.response), dof(&frf.reference)]),
+                set: campaign.postures[frf.posture].id.clone(),
+                name: frf.name,
+                frequency_hz: frf.frequency_hz,
+                receptance_m_per_n: frf.receptance_m_per_n,
+                coherence: frf.coherence,
+                added_decay_per_s: 0.0,
             })
-            .collect::<Result<Vec<_>>>()?;
-        let mut postures = Vec::new();
-        for (modes, notes) in of_postures.into_iter().flatten() {
-            warnings.extend(notes.into_iter().map(|w| format!("{}: {w}", modes.posture)));
-            postures.push(modes);
+            .collect();
+        Self::of(inputs, warnings, settings)
+    }
+
+    /// FRF files and raw tap tests, one set a file.
+    ///
+    /// # Errors
+    /// A file that cannot be read or holds neither FRFs nor hits.
+    pub fn of_files(files: &[impl AsRef<Path>], settings: &Settings, taps: &TapSettings) -> Result<Self> {
+        let mut inputs = Vec::new();
+        let mut warnings = Vec::new();
+        let mut hits = Vec::new();
+        for file in files {
+            inputs.extend(read(file.as_ref(), taps, &mut hits, &mut warnings)?);
         }
-        Ok(ModalAnalysis { postures, warnings })
+        let mut analysis = Self::of(inputs, warnings, settings)?;
+        analysis.hits = hits;
+        Ok(analysis)
+    }
+
+    /// # Errors
+    /// No FRFs, or frequencies that are not ascending.
+    pub fn of(inputs: Vec<FrfInput>, warnings: Vec<String>, settings: &Settings) -> Result<Self> {
+        if inputs.is_empty() {
+            return Err(Error::computation("there are no FRFs in what was given"));
+        }
+        let mut names: Vec<String> = Vec::new();
+        let mut sets: Vec<Vec<FrfInput>> = Vec::new();
+        for input in inputs {
+            match names.iter().position(|n| *n == input.set) {
+                Some(k) => sets[k].push(input),
+                None => {
+                    names.push(input.set.clone());
+                    sets.push(vec![input]);
+                }
+            }
+        }
+        let sets = names
+            .into_par_iter()
+            .zip(sets)
+            .map(|(name, inputs)| analyse_set(name, inputs, settings))
+            .collect::<Result<Vec<_>>>()?;
+        let mut analysis = ModalAnalysis {
+            sets,
+            hits: Vec::new(),
+            warnings,
+        };
+        for set in &analysis.sets {
+            analysis.warnings.extend(set_warnings(set));
+        }
+        Ok(analysis)
     }
 
     pub fn mode_count(&self) -> usize {
-        self.postures.iter().map(|p| p.modes.len()).sum()
+        self.sets.iter().map(|s| s.global.modes.len()).sum()
+    }
+}
+
+fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Settings) -> Result<SetModes> {
+    let single: Vec<FrfModes> = inputs
+        .par_iter()
+        .map(|input| modal::analyse_frf(&input.frequency_hz, &input.receptance_m_per_n, settings))
+        .collect::<Result<_>>()?;
+    let mut dofs: Vec<String> = inputs.iter().filter_map(|i| i.dofs.as_ref()).flatten().cloned().collect();
+    dofs.sort();
+    dofs.dedup();
+    let number = |name: &String| dofs.binary_search(name).ok();
+    let members: Vec<SetMember> = inputs
+        .iter()
+        .zip(&single)
+        .map(|(input, modes)| SetMember {
+            frequency_hz: &input.frequency_hz,
+            receptance_m_per_n: &input.receptance_m_per_n,
+            modes,
+            dofs: input.dofs.as_ref().and_then(|[a, b]| Some([number(a)?, number(b)?])),
+        })
+        .collect();
+    let mut global = modal::global(&members, settings)?;
+    let mirror = |k: usize| {
+        let [response, reference] = inputs[k].dofs.as_ref()?;
+        if response == reference {
+            return None;
+        }
+        let other = inputs.iter().position(|i| {
+            i.dofs.as_ref().is_some_and(|[a, b]| a == reference && b == response)
+        })?;
+        global.reconstructions[other].as_ref()
+    };
+    let qualities: Vec<Quality> = inputs
+        .iter()
+        .enumerate()
+        .map(|(k, input)| {
+            quality::judge(
+                &input.frequency_hz,
+                &input.receptance_m_per_n,
+                input.coherence.as_deref(),
+                global.reconstructions[k].as_ref(),
+                mirror(k),
+            )
+        })
+        .collect();
+    let (verdict, why) = quality::of_set(&qualities.iter().collect::<Vec<_>>());
+    // A record's window is the same for all its FRFs.
+    let added = inputs.iter().map(|i| i.added_decay_per_s).fold(0.0, f64::max);
+    let mut lost = Vec::new();
+    if added > 0.0 {
+        let without = |f: f64, zeta: f64| zeta - added / (TAU * f);
+        global.modes.retain_mut(|mode| {
+            mode.damping_ratio = without(mode.frequency_hz, mode.damping_ratio);
+            let left = mode.damping_ratio > 0.0;
+            if !left {
+                lost.push(format!("{:.2} Hz", mode.frequency_hz));
+            }
+            left
+        });
+        if !lost.is_empty() {
+            global.warnings.push(format!(
+                "no damping is left when the window's is taken out (left out): {}",
+                lost.join(", ")
+            ));
+        }
+    }
+    let frfs = inputs
+        .into_iter()
+        .zip(single)
+        .zip(qualities)
+        .map(|((input, mut modes), quality)| {
+            for mode in &mut modes.modes {
+                for e in &mut mode.estimates {
+                    e.damping_ratio -= input.added_decay_per_s / (TAU * e.frequency_hz);
+                }
+                mode.estimates.retain(|e| e.damping_ratio > 0.0);
+            }
+            modes.modes.retain(|m| !m.estimates.is_empty());
+            AnalysedFrf { input, modes, quality }
+        })
+        .collect();
+    Ok(SetModes {
+        set,
+        frfs,
+        dofs,
+        global,
+        verdict,
+        why,
+    })
+}
+
+/// What is worth saying of a set, one line for each kind of trouble.
+fn set_warnings(set: &SetModes) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for frf in &set.frfs {
+        lines.extend(frf.modes.warnings.iter().map(|w| format!("{} {}: {w}", set.set, frf.input.name)));
+    }
+    // A whole set with the same trouble is one line.
+    let conjugated: Vec<&AnalysedFrf> = set.frfs.iter().filter(|f| f.modes.conjugated).collect();
+    if conjugated.len() > 3 {
+        lines.retain(|l| !l.contains("conjugated"));
+        lines.push(format!(
+            "{}: the phase of {} of {} FRFs is conjugated (sign convention e^(-iωt)): they were turned to e^(+iωt)",
+            set.set,
+            conjugated.len(),
+            set.frfs.len()
+        ));
+    }
+    lines.extend(set.global.warnings.iter().map(|w| format!("{}: {w}", set.set)));
+    let refused = set.frfs.iter().filter(|f| f.modes.remarks.iter().any(|r| r.contains("not reported"))).count();
+    if refused > 0 {
+        lines.push(format!("{}: {refused} FRFs have peaks that are no modes (which: --json)", set.set));
+    }
+    if set.verdict != Verdict::Good {
+        let worst: Vec<String> = set
+            .frfs
+            .iter()
+            .filter(|f| f.quality.verdict != Verdict::Good)
+            .take(4)
+            .map(|f| format!("{} ({})", f.input.name, f.quality.reasons.join(", ")))
+            .collect();
+        lines.push(format!("{}: {}: {}", set.set, set.why, worst.join("; ")));
+    }
+    lines
+}
+
+/// FRFs of one file: as they stand there, or from the hits of a raw record.
+fn read(
+    path: &Path,
+    taps: &TapSettings,
+    hits: &mut Vec<(String, Vec<Hit>)>,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<FrfInput>> {
+    let set = path.display().to_string();
+    let file = ingest::read_file(path)?;
+    warnings.extend(file.warnings.iter().map(|w| format!("{set}: {w}")));
+    if !file.contents.frfs.is_empty() {
+        let unsaid = file.contents.frfs.iter().filter(|r| r.quantity.is_none()).count();
+        if unsaid > 0 {
+            warnings.push(format!(
+                "{set}: the file does not say what its {unsaid} FRFs are; taken as receptance (m/N)"
+            ));
+        }
+        return Ok(file.contents.frfs.into_iter().map(|r| frf_input(&set, r)).collect());
+    }
+    if file.contents.times.is_empty() {
+        return Err(InputError::new(format!(
+            "neither FRFs nor a raw tap test in this {} file, but {}",
+            file.format,
+            file.contents.describe()
+        ))
+        .file(path)
+        .remedy("give a UFF 58 file or a CSV with FRFs, or a time record of hammer and sensors")
+        .into());
+    }
+    let mut inputs = Vec::new();
+    for record in &file.contents.times {
+        inputs.extend(from_taps(&set, path, record, taps, hits, warnings)?);
+    }
+    Ok(inputs)
+}
+
+fn frf_input(set: &str, record: FrfRecord) -> FrfInput {
+    FrfInput {
+        set: set.to_owned(),
+        receptance_m_per_n: receptance(&record.frequency_hz, &record.value, record.quantity),
+        dofs: record.response.zip(record.reference).map(|(a, b)| [a.to_string(), b.to_string()]),
+        name: record.name,
+        frequency_hz: record.frequency_hz,
+        coherence: record.coherence,
+        added_decay_per_s: 0.0,
+    }
+}
+
+/// H = V/(iω) = A/(iω)². The 0 Hz line of a mobility or accelerance says nothing about receptance; it comes
+/// out as not finite and the analysis leaves it out anyway.
+fn receptance(frequency_hz: &[f64], value: &[Complex64], quantity: Option<Quantity>) -> Vec<Complex64> {
+    let order = match quantity {
+        None | Some(Quantity::Receptance) => return value.to_vec(),
+        Some(Quantity::Mobility) => 1,
+        Some(Quantity::Accelerance) => 2,
+    };
+    let lines = frequency_hz.iter().zip(value);
+    lines.map(|(f, v)| v / Complex64::new(0.0, TAU * f).powi(order)).collect()
+}
+
+/// The hammer's channel: the only one in newtons, or else the only one that is called so.
+fn hammer<'a>(record: &'a TimeRecord, path: &Path) -> Result<&'a Channel> {
+    let in_newtons = |c: &&Channel| units::parse(&c.file_unit).is_some_and(|u| u.dimension == Dimension::FORCE);
+    let called = |c: &&Channel| {
+        let name = c.name.to_lowercase();
+        ["hammer", "force", "impact", "kladivo", "kraft"].iter().any(|w| name.contains(w))
+    };
+    let by = |test: &dyn Fn(&&Channel) -> bool| -> Vec<&'a Channel> { record.channels.iter().filter(|c| test(c)).collect() };
+    let (newtons, named) = (by(&in_newtons), by(&called));
+    match (newtons.as_slice(), named.as_slice()) {
+        ([one], _) | ([], [one]) => Ok(one),
+        _ => {
+            let names: Vec<&str> = record.channels.iter().map(|c| c.name.as_str()).collect();
+            let both: Vec<&&Channel> = newtons.iter().filter(|c| called(c)).collect();
+            match both.as_slice() {
+                [one] => Ok(one),
+                _ => Err(InputError::new(format!(
+                    "a time record without exactly one hammer channel ({})",
+                    names.join(", ")
+                ))
+                .file(path)
+                .remedy("give the hammer's channel the unit N, or call it force; cutting forces go to `lobestone cfc`")
+                .into()),
+            }
+        }
+    }
+}
+
+fn from_taps(
+    set: &str,
+    path: &Path,
+    record: &TimeRecord,
+    taps: &TapSettings,
+    hits: &mut Vec<(String, Vec<Hit>)>,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<FrfInput>> {
+    let hammer = hammer(record, path)?;
+    let sensors: Vec<(&Channel, Quantity)> = record
+        .channels
+        .iter()
+        .filter(|c| !std::ptr::eq(*c, hammer))
+        .filter_map(|c| {
+            let motion = units::parse(&c.file_unit).and_then(|u| u.dimension.motion());
+            if motion.is_none() {
+                warnings.push(format!(
+                    "{set}: channel {} ({}) is no displacement, velocity or acceleration: left out",
+                    c.name, c.file_unit
+                ));
+            }
+            Some((c, motion?))
+        })
+        .collect();
+    if sensors.is_empty() {
+        return Err(InputError::new("a tap record without a response channel")
+            .file(path)
+            .remedy("give the sensors' channels a unit: m/s² or g, m/s, m or µm")
+            .into());
+    }
+    let responses: Vec<&[f64]> = sensors.iter().map(|(c, _)| c.samples.as_slice()).collect();
+    let tap = TapRecord {
+        sample_rate_hz: record.sample_rate_hz,
+        force_n: &hammer.samples,
+        responses: &responses,
+    };
+    let found = modal::frfs_from_hits(&tap, taps).map_err(|e| match e {
+        Error::Input(e) => (*e).file(path).into(),
+        other => other,
+    })?;
+    warnings.extend(found.warnings.iter().map(|w| format!("{set}: {w}")));
+    hits.push((set.to_owned(), found.hits));
+    Ok(sensors
+        .iter()
+        .enumerate()
+        .map(|(k, (channel, quantity))| FrfInput {
+            name: format!("{}/{}", channel.name, hammer.name),
+            set: set.to_owned(),
+            dofs: None,
+            receptance_m_per_n: receptance(&found.frequency_hz, &found.frf[k], Some(*quantity)),
+            frequency_hz: found.frequency_hz.clone(),
+            coherence: found.coherence.as_ref().map(|c| c[k].clone()),
+            added_decay_per_s: found.added_decay_per_s,
+        })
+        .collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn accelerance_and_mobility_become_receptance() {
+        let f = 10.0;
+        let omega = TAU * f;
+        let of = |value: Complex64, quantity| receptance(&[f], &[value], quantity)[0].re;
+        let a = of(Complex64::new(-omega * omega * 2e-6, 0.0), Some(Quantity::Accelerance));
+        let v = of(Complex64::new(0.0, omega * 2e-6), Some(Quantity::Mobility));
+        let x = of(Complex64::new(2e-6, 0.0), None);
+        for value in [a, v, x] {
+            approx::assert_relative_eq!(value, 2e-6, max_relative = 1e-12);
+        }
     }
 }

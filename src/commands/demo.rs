@@ -271,7 +271,7 @@ fn modes(modal: &ModalAnalysis) -> String {
     format!(
         "{} modes found in the measured FRFs of {} postures, no model used",
         modal.mode_count(),
-        modal.postures.len()
+        modal.sets.len()
     )
 }
 

@@ -1,30 +1,49 @@
-//! `lobestone modal FILE…|DIR`: modal parameters of FRFs.
+//! `lobestone modal FILE…|DIR`: modal parameters of FRFs and raw tap tests.
 
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use num_complex::Complex64;
-use rayon::prelude::*;
+use clap::ValueEnum;
 use serde_json::json;
 
 use super::Outcome;
+use crate::analysis::{ModalAnalysis, SetModes};
 use crate::campaign::Campaign;
-use crate::ingest::{FrfRecord, Quantity, read_frfs};
-use crate::modal::{self, FrfModes, GlobalModes, SetMember, Settings};
-use crate::{Error, InputError, Result};
+use crate::modal::{Estimator, Settings, TapSettings};
+use crate::{InputError, Result};
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// FRF files (UFF 58, CSV), or one campaign folder.
+    /// FRF files (UFF 58, CSV, …), time records of tap tests (hammer and sensors), or one campaign folder.
     #[arg(required = true, value_name = "FILE|DIR")]
     paths: Vec<PathBuf>,
     /// Look at this band only, Hz.
     #[arg(long, value_name = "LO:HI", value_parser = band)]
     band: Option<[f64; 2]>,
+    /// Tap tests: how FRFs are averaged.
+    #[arg(long, value_enum, default_value = "h1")]
+    estimator: EstimatorArg,
+    /// Tap tests: length of a block, s (from the distance of the hits where left out).
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    block_s: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum EstimatorArg {
+    H1,
+    H2,
+    Hv,
 }
 
 /// Warnings shown to a person; all are in the JSON.
 const MOST_WARNINGS: usize = 20;
+
+fn seconds(text: &str) -> std::result::Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|s: &f64| s.is_finite() && *s > 0.0)
+        .ok_or_else(|| "give seconds, such as 4.0".into())
+}
 
 fn band(text: &str) -> std::result::Result<[f64; 2], String> {
     let number = |t: &str| {
@@ -42,20 +61,19 @@ fn band(text: &str) -> std::result::Result<[f64; 2], String> {
     }
 }
 
-/// One FRF to analyse, with the set (posture or file) it belongs to.
-struct Input {
-    name: String,
-    set: String,
-    frequency_hz: Vec<f64>,
-    receptance_m_per_n: Vec<Complex64>,
-}
-
 pub fn run(args: Args) -> Result<Outcome> {
     let settings = Settings { band_hz: args.band };
-    let mut warnings = Vec::new();
+    let taps = TapSettings {
+        estimator: match args.estimator {
+            EstimatorArg::H1 => Estimator::H1,
+            EstimatorArg::H2 => Estimator::H2,
+            EstimatorArg::Hv => Estimator::Hv,
+        },
+        block_s: args.block_s,
+    };
     let campaign = args.paths.iter().any(|p| p.is_dir());
-    let inputs = match args.paths.as_slice() {
-        [dir] if campaign => read_campaign(dir, &mut warnings)?,
+    let analysis = match args.paths.as_slice() {
+        [dir] if campaign => ModalAnalysis::of_campaign(&Campaign::load(dir)?, &settings)?,
         _ if campaign => {
             return Err(
                 InputError::new("a campaign folder cannot be mixed with other paths")
@@ -63,107 +81,130 @@ pub fn run(args: Args) -> Result<Outcome> {
                     .into(),
             );
         }
-        files => {
-            let mut inputs = Vec::new();
-            for file in files {
-                inputs.extend(read_file(file, &mut warnings)?);
-            }
-            inputs
-        }
+        files => ModalAnalysis::of_files(files, &settings, &taps)?,
     };
-    if inputs.is_empty() {
-        return Err(Error::computation("there are no FRFs in what was given"));
-    }
-
-    let found: Vec<FrfModes> = inputs
-        .par_iter()
-        .map(|input| modal::analyse_frf(&input.frequency_hz, &input.receptance_m_per_n, &settings))
-        .collect::<Result<_>>()?;
-    for (input, found) in inputs.iter().zip(&found) {
-        warnings.extend(
-            found
-                .warnings
-                .iter()
-                .map(|w| format!("{} {}: {w}", input.set, input.name)),
-        );
-    }
-    let mut sets: Vec<&str> = Vec::new();
-    for input in &inputs {
-        if !sets.contains(&input.set.as_str()) {
-            sets.push(&input.set);
-        }
-    }
-    let globals: Vec<(&str, GlobalModes)> = sets
-        .into_par_iter()
-        .map(|set| {
-            let of_set: Vec<SetMember> = inputs
-                .iter()
-                .zip(&found)
-                .filter(|(input, _)| input.set == set)
-                .map(|(input, modes)| SetMember {
-                    frequency_hz: &input.frequency_hz,
-                    receptance_m_per_n: &input.receptance_m_per_n,
-                    modes,
-                })
-                .collect();
-            Ok((set, modal::global(&of_set, &settings)?))
-        })
-        .collect::<Result<_>>()?;
-    for (set, global) in &globals {
-        warnings.extend(global.warnings.iter().map(|w| format!("{set}: {w}")));
-    }
-    let text = text(&inputs, &found, &globals, &warnings);
     Ok(Outcome {
-        json: document(&inputs, &found, &globals, &warnings, campaign),
-        text,
+        json: document(&analysis, campaign),
+        text: text(&analysis),
     })
 }
 
-fn document(
-    inputs: &[Input],
-    found: &[FrfModes],
-    globals: &[(&str, GlobalModes)],
-    warnings: &[String],
-    campaign: bool,
-) -> serde_json::Value {
+fn document(analysis: &ModalAnalysis, campaign: bool) -> serde_json::Value {
     // The set is a posture in a campaign, else a file.
     let set_key = if campaign { "posture" } else { "file" };
-    let frfs: Vec<_> = inputs
-        .iter()
-        .zip(found)
-        .map(|(input, found)| {
-            let modes: Vec<_> = found.modes.iter().flat_map(|m| &m.estimates).collect();
-            json!({ "name": input.name, set_key: input.set, "modes": modes, "warnings": found.warnings })
-        })
-        .collect();
-    let global: Vec<_> = globals
-        .iter()
-        .flat_map(|(set, global)| global.modes.iter().map(move |mode| (set, mode)))
-        .map(|(set, mode)| {
+    let mut frfs = Vec::new();
+    let mut global = Vec::new();
+    let mut sets = Vec::new();
+    for set in &analysis.sets {
+        for frf in &set.frfs {
+            let modes: Vec<_> = frf.modes.modes.iter().flat_map(|m| &m.estimates).collect();
+            frfs.push(json!({
+                "name": frf.input.name,
+                set_key: set.set,
+                "modes": modes,
+                "warnings": frf.modes.warnings.iter().chain(&frf.modes.remarks).collect::<Vec<_>>(),
+                "quality": frf.quality,
+            }));
+        }
+        for mode in &set.global.modes {
             let mut value = json!(mode);
-            value[set_key] = json!(set);
-            value
-        })
+            value[set_key] = json!(set.set);
+            let shape: Vec<_> = mode
+                .shape
+                .iter()
+                .map(|(dof, z)| {
+                    let name = match set.dofs.is_empty() {
+                        true => set.frfs.get(*dof).map(|f| &f.input.name),
+                        false => set.dofs.get(*dof),
+                    };
+                    json!({ "dof": name, "re": z.re, "im": z.im })
+                })
+                .collect();
+            value["shape"] = json!(shape);
+            let constants = set.frfs.iter().zip(&mode.constants);
+            value["modal_constants"] = constants
+                .filter_map(|(frf, c)| {
+                    let (value, std) = (*c)?;
+                    Some(json!({ "frf": frf.input.name, "re_per_kg": value.re, "im_per_kg": value.im, "std_per_kg": std }))
+                })
+                .collect();
+            global.push(value);
+        }
+        sets.push(json!({
+            set_key: set.set,
+            "verdict": set.verdict,
+            "why": set.why,
+            "mac": set.global.mac,
+            "stabilisation": set.global.stabilisation,
+        }));
+    }
+    let hits: Vec<_> = analysis
+        .hits
+        .iter()
+        .map(|(file, hits)| json!({ "file": file, "hits": hits }))
         .collect();
-    json!({ "frfs": frfs, "global": global, "warnings": warnings })
+    json!({ "frfs": frfs, "global": global, "sets": sets, "hits": hits, "warnings": analysis.warnings })
 }
 
-fn text(
-    inputs: &[Input],
-    found: &[FrfModes],
-    globals: &[(&str, GlobalModes)],
-    warnings: &[String],
-) -> String {
+fn text(analysis: &ModalAnalysis) -> String {
     let mut out = String::new();
     // Writing to a String cannot fail.
-    for (input, found) in inputs.iter().zip(found) {
-        let _ = writeln!(out, "{} {}", input.set, input.name);
-        if found.modes.is_empty() {
+    for (file, hits) in &analysis.hits {
+        let _ = writeln!(out, "{file}: hits");
+        for (k, hit) in hits.iter().enumerate() {
+            let what = hit.left_out.as_ref().map_or("used".into(), |why| format!("left out: {why}"));
+            let _ = writeln!(out, "  {:>3}  {:8.3} s  {:9.1} N  {what}", k + 1, hit.time_s, hit.peak_n);
+        }
+    }
+    for set in &analysis.sets {
+        single(set, &mut out);
+    }
+    for set in &analysis.sets {
+        let _ = writeln!(out, "\n{}: all FRFs together ({})", set.set, set.why);
+        let _ = writeln!(out, "      f Hz      ±     ζ %      ±  found in  collinear");
+        for mode in &set.global.modes {
+            let collinear = mode.complexity.map_or("–".into(), |c| format!("{:.3}", c.mpc));
+            let _ = writeln!(
+                out,
+                "  {:8.3} {} {:7.3} {}  {:<8}  {collinear}",
+                mode.frequency_hz,
+                deviation(Some(mode.frequency_std_hz), 1.0),
+                100.0 * mode.damping_ratio,
+                deviation(Some(mode.damping_std), 100.0),
+                mode.found_in,
+            );
+        }
+        let left: Vec<_> = set.global.stabilisation.candidates.iter().filter(|c| !c.chosen).collect();
+        for candidate in left.iter().take(5) {
+            let _ = writeln!(out, "    not taken: {:.2} Hz, {}", candidate.frequency_hz, candidate.why);
+        }
+    }
+    if !analysis.warnings.is_empty() {
+        let _ = writeln!(out, "\nwarnings");
+        for warning in analysis.warnings.iter().take(MOST_WARNINGS) {
+            let _ = writeln!(out, "  {warning}");
+        }
+        if analysis.warnings.len() > MOST_WARNINGS {
+            let _ = writeln!(
+                out,
+                "  … and {} more: see --json",
+                analysis.warnings.len() - MOST_WARNINGS
+            );
+        }
+    }
+    out
+}
+
+/// Modes of the single FRFs of a set.
+fn single(set: &SetModes, out: &mut String) {
+    for frf in &set.frfs {
+        let _ = writeln!(out, "{} {}", set.set, frf.input.name);
+        if frf.modes.modes.is_empty() {
             let _ = writeln!(out, "  no modes found");
             continue;
         }
         let _ = writeln!(out, "      f Hz      ±     ζ %      ±  method      lines in band");
-        for mode in &found.modes {
+        for mode in &frf.modes.modes {
             for (k, e) in mode.estimates.iter().enumerate() {
                 let lines = if k == 0 {
                     format!("{:.1}", mode.lines_in_half_power_band)
@@ -182,88 +223,10 @@ fn text(
             }
         }
     }
-    for (set, global) in globals {
-        let _ = writeln!(out, "\n{set}: all FRFs together");
-        let _ = writeln!(out, "      f Hz      ±     ζ %      ±  found in");
-        for mode in &global.modes {
-            let _ = writeln!(
-                out,
-                "  {:8.3} {} {:7.3} {}  {}",
-                mode.frequency_hz,
-                deviation(Some(mode.frequency_std_hz), 1.0),
-                100.0 * mode.damping_ratio,
-                deviation(Some(mode.damping_std), 100.0),
-                mode.found_in,
-            );
-        }
-    }
-    if !warnings.is_empty() {
-        let _ = writeln!(out, "\nwarnings");
-        for warning in warnings.iter().take(MOST_WARNINGS) {
-            let _ = writeln!(out, "  {warning}");
-        }
-        if warnings.len() > MOST_WARNINGS {
-            let _ = writeln!(out, "  … and {} more: see --json", warnings.len() - MOST_WARNINGS);
-        }
-    }
-    out
 }
 
 fn deviation(std: Option<f64>, scale: f64) -> String {
     std.map_or("     –".into(), |s| format!("{:6.3}", s * scale))
-}
-
-/// FRFs of one file, one set a file.
-fn read_file(path: &Path, warnings: &mut Vec<String>) -> Result<Vec<Input>> {
-    let set = path.display().to_string();
-    let (records, file_warnings) = read_frfs(path)?;
-    warnings.extend(file_warnings.into_iter().map(|w| format!("{set}: {w}")));
-    let unsaid = records.iter().filter(|r| r.quantity.is_none()).count();
-    if unsaid > 0 {
-        warnings.push(format!(
-            "{set}: the file does not say what its {unsaid} FRFs are; taken as receptance (m/N)"
-        ));
-    }
-    Ok(records
-        .into_iter()
-        .map(|record| Input {
-            set: set.clone(),
-            receptance_m_per_n: receptance(&record),
-            name: record.name,
-            frequency_hz: record.frequency_hz,
-        })
-        .collect())
-}
-
-/// H = V/(iω) = A/(iω)². The 0 Hz line of a mobility or accelerance says nothing about receptance; it comes
-/// out as not finite and the analysis leaves it out anyway.
-fn receptance(record: &FrfRecord) -> Vec<Complex64> {
-    let order = match record.quantity {
-        None | Some(Quantity::Receptance) => return record.value.clone(),
-        Some(Quantity::Mobility) => 1,
-        Some(Quantity::Accelerance) => 2,
-    };
-    let lines = record.frequency_hz.iter().zip(&record.value);
-    lines
-        .map(|(f, v)| v / Complex64::new(0.0, std::f64::consts::TAU * f).powi(order))
-        .collect()
-}
-
-/// FRFs of a campaign, one set a posture.
-fn read_campaign(dir: &Path, warnings: &mut Vec<String>) -> Result<Vec<Input>> {
-    let campaign = Campaign::load(dir)?;
-    let (set, read_warnings) = campaign.load_frfs()?;
-    warnings.extend(read_warnings);
-    Ok(set
-        .frfs
-        .into_iter()
-        .map(|frf| Input {
-            name: frf.name,
-            set: campaign.postures[frf.posture].id.clone(),
-            frequency_hz: frf.frequency_hz,
-            receptance_m_per_n: frf.receptance_m_per_n,
-        })
-        .collect())
 }
 
 #[cfg(test)]
@@ -276,24 +239,5 @@ mod tests {
         for wrong in ["", "3", "60:3", "3:inf", "-1:5", "a:b", "3:3"] {
             assert!(band(wrong).is_err(), "{wrong}");
         }
-    }
-
-    #[test]
-    fn accelerance_and_mobility_become_receptance() {
-        let f = 10.0;
-        let omega = std::f64::consts::TAU * f;
-        let mut record = FrfRecord {
-            name: "1X/1X".into(),
-            response: None,
-            reference: None,
-            quantity: Some(Quantity::Accelerance),
-            frequency_hz: vec![f],
-            value: vec![Complex64::new(-omega * omega * 2e-6, 0.0)],
-            coherence: None,
-        };
-        approx::assert_relative_eq!(receptance(&record)[0].re, 2e-6, max_relative = 1e-12);
-        record.quantity = Some(Quantity::Mobility);
-        record.value = vec![Complex64::new(0.0, omega * 2e-6)];
-        approx::assert_relative_eq!(receptance(&record)[0].re, 2e-6, max_relative = 1e-12);
     }
 }

@@ -14,6 +14,7 @@ pub(super) enum Detected {
     FrfTable(Header),
     PlainFrf(Header),
     TimeTable(Header),
+    Tdms,
 }
 
 /// How many bytes decide whether a file is text.
@@ -23,6 +24,9 @@ const LOOK_AT: usize = 8192;
 pub(super) fn detect(bytes: &[u8], is_dwd_named: bool) -> Result<(Detected, Format, String), InputError> {
     if bytes.trim_ascii().is_empty() {
         return Err(InputError::new("the file is empty"));
+    }
+    if bytes.starts_with(b"TDSm") {
+        return Ok((Detected::Tdms, Format::Tdms, "begins with TDSm".into()));
     }
     if let Some((what, remedy)) = foreign(bytes) {
         return Err(InputError::new(format!("{what}, which is not read here")).remedy(remedy));
@@ -113,10 +117,10 @@ fn mentions(head: &[u8], word: &[u8]) -> bool {
 /// Formats of others by their first bytes: what it is, and how to get at the data.
 fn foreign(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
     let starts = |magic: &[u8]| bytes.starts_with(magic);
-    Some(if starts(b"TDSm") || starts(b"TDSh") {
+    Some(if starts(b"TDSh") {
         (
-            "a National Instruments TDMS file",
-            "open it in Excel (TDM importer), DIAdem or LabVIEW and save as CSV or UFF 58",
+            "the index of a National Instruments TDMS file",
+            "give the .tdms file itself",
         )
     } else if starts(b"MATLAB 5.0 MAT-file") || starts(b"MATLAB 7.") {
         (

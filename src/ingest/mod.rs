@@ -20,6 +20,7 @@ mod split_comma;
 mod table;
 #[cfg(test)]
 mod tests;
+mod tdms;
 mod text;
 mod uff;
 pub mod units;
@@ -51,6 +52,8 @@ pub enum Format {
     DynoWare,
     /// Time series with column names.
     TimeCsv,
+    /// National Instruments TDMS.
+    Tdms,
 }
 
 impl std::fmt::Display for Format {
@@ -63,6 +66,7 @@ impl std::fmt::Display for Format {
             Format::CutproFrf => "CutPro FRF",
             Format::DynoWare => "DynoWare export",
             Format::TimeCsv => "time CSV",
+            Format::Tdms => "TDMS",
         })
     }
 }
@@ -160,6 +164,17 @@ fn read_bytes(
         ..Contents::default()
     };
     Ok(match detected {
+        Detected::Tdms => {
+            let times = tdms::read(bytes, notes)?;
+            (
+                format,
+                why,
+                Contents {
+                    times,
+                    ..Contents::default()
+                },
+            )
+        }
         Detected::Universal => {
             let (summary, contents) = uff::contents(bytes, notes)?;
             let skipped: Vec<String> = summary.skipped.iter().map(u32::to_string).collect();

@@ -117,10 +117,10 @@ pub fn analyse_frf(
     });
     if !refused.is_empty() {
         result
-            .warnings
+            .remarks
             .push(format!("peaks not reported as modes: {}", refused.join(", ")));
     }
-    quality_warnings(&result.modes, &mut result.warnings);
+    quality_remarks(&result.modes, &mut result.remarks);
     Ok(result)
 }
 
@@ -436,7 +436,7 @@ fn noise_weights(y: &[Complex64], solution: &Solution) -> Option<Vec<f64>> {
     (largest.is_finite() && largest > 0.0).then(|| weights.iter().map(|w| w / largest).collect())
 }
 
-fn quality_warnings(modes: &[FrfMode], warnings: &mut Vec<String>) {
+fn quality_remarks(modes: &[FrfMode], remarks: &mut Vec<String>) {
     let coarse: Vec<String> = modes
         .iter()
         .filter(|m| m.lines_in_half_power_band < FINE_LINES)
@@ -458,7 +458,7 @@ fn quality_warnings(modes: &[FrfMode], warnings: &mut Vec<String>) {
         })
         .collect();
     if !coarse.is_empty() {
-        warnings.push(format!(
+        remarks.push(format!(
             "too coarse lines, fewer than {FINE_LINES:.0} inside the half-power band: {}",
             coarse.join(", ")
         ));
@@ -469,7 +469,7 @@ fn quality_warnings(modes: &[FrfMode], warnings: &mut Vec<String>) {
         .map(|m| format!("{:.2} Hz", m.best().frequency_hz))
         .collect();
     if !contradicted.is_empty() {
-        warnings.push(format!(
+        remarks.push(format!(
             "circle fit or half-power contradict the local fit (close modes or coarse lines) and are left out: {}",
             contradicted.join(", ")
         ));
@@ -480,7 +480,7 @@ fn quality_warnings(modes: &[FrfMode], warnings: &mut Vec<String>) {
         .map(|e| format!("{:.2} Hz", e.frequency_hz))
         .collect();
     if !one_sided.is_empty() {
-        warnings.push(format!(
+        remarks.push(format!(
             "half-power crossing measured on one side only, the other is the fitted curve's: {}",
             one_sided.join(", ")
         ));

@@ -1,49 +1,33 @@
-//! Modes of a set of FRFs (one structure in one state), from the modes of each.
+//! Modes of a set of FRFs (one structure in one state), all FRFs together.
 //!
-//! Estimates are clustered in frequency, at most one from each FRF in a cluster, nearest pairs first.
-//! A cluster's frequency and damping are means weighted with the inverse variance, outliers left out; the
-//! standard deviation is the estimates' own or their scatter, whichever is larger (Birge 1932).
+//! Noise of every FRF → poles of many orders ([`super::lscf`]) → the ones that stay ([`super::stabilisation`]), with
+//! the peaks of the single FRFs as a safety net → maximum-likelihood refinement with needless poles taken out
+//! ([`super::joint_fit`]) → noise again, from what the fit leaves over, and a last refinement.
 
+use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-use super::curve::Curve;
-use super::joint_fit::{self, CurveSet};
+use super::curve::{Curve, MIN_LINES};
+use super::joint_fit::{self, Change, Data, Group};
 use super::local_fit::Pole;
-use super::{FrfModes, GlobalMode, GlobalModes, ModeEstimate, Settings};
+use super::lscf::{self, Row};
+use super::stabilisation::{self, Candidate, ShapeData, Stabilisation};
+use super::{FrfModes, GlobalMode, GlobalModes, Reconstruction, Settings, ml_fit, shape};
 use crate::Result;
+use crate::signal::frf_noise;
 
-/// Clusters join while their centres are no further apart than this part of the half-power half-width …
-const JOIN_WIDTHS: f64 = 0.35;
-/// … or this many standard deviations of their difference, but never further than `MOST_WIDTHS`.
-const JOIN_SIGMA: f64 = 3.0;
-const MOST_WIDTHS: f64 = 1.0;
-/// Estimates further than this from the centre, in robust standard deviations, are outliers.
-const OUTLIER_SIGMA: f64 = 4.0;
-/// In sets of at least this many FRFs a mode seen by one of them alone is not reported.
+/// Poles of the highest order: at least, and at most.
+const POLES: [usize; 2] = [40, 80];
+/// More references than this are not taken together.
+const MAX_REFERENCES: usize = 6;
+/// In sets of at least this many FRFs a mode seen by one of them alone must stand out far.
 const SET: usize = 4;
-
-#[derive(Clone, Copy)]
-struct Member {
-    frf: usize,
-    frequency_hz: f64,
-    damping_ratio: f64,
-    frequency_std_hz: f64,
-    damping_std: f64,
-}
-
-impl Member {
-    fn new(frf: usize, e: &ModeEstimate) -> Member {
-        let width = e.damping_ratio * e.frequency_hz;
-        Member {
-            frf,
-            frequency_hz: e.frequency_hz,
-            damping_ratio: e.damping_ratio,
-            // Not known is not exact.
-            frequency_std_hz: e.frequency_std_hz.unwrap_or(0.3 * width),
-            damping_std: e.damping_std.unwrap_or(0.5 * e.damping_ratio),
-        }
-    }
-}
+const FAR: f64 = 100.0;
+/// Below this many lines in the half-power band the record's leakage counts, see `analysis`.
+const LEAKAGE_BELOW_LINES: f64 = 1.0;
+const LEAKAGE_LINES: f64 = 0.02;
+/// Modes with fewer lines in the half-power band are named.
+const FINE_LINES: f64 = 3.0;
 
 /// One FRF of a set, with what was found in it.
 #[derive(Clone, Copy)]
@@ -53,227 +37,488 @@ pub struct SetMember<'a> {
     /// As given to [`super::analyse_frf`], m/N.
     pub receptance_m_per_n: &'a [Complex64],
     pub modes: &'a FrfModes,
+    /// Response and reference, as numbers that are equal where the degree of freedom is; `None` where not known.
+    pub dofs: Option<[usize; 2]>,
 }
 
-/// Combines the modes of several FRFs of the same structure in the same posture: clusters of the single
-/// FRFs' modes, then one fit of common poles to all FRFs. FRFs that are not on common lines cannot be fitted
-/// together; then the clusters' weighted means stand, and a warning says so.
+/// Modes common to several FRFs of the same structure in the same state. The FRFs may have lines of their own.
 ///
 /// # Errors
 /// As [`super::analyse_frf`].
 pub fn global(frfs: &[SetMember], settings: &Settings) -> Result<GlobalModes> {
-    let members = frfs.iter().enumerate().flat_map(|(frf, found)| {
-        found
-            .modes
-            .modes
-            .iter()
-            .map(move |mode| Member::new(frf, mode.best()))
-    });
-    let mut clustered: Vec<GlobalMode> = clusters(members.collect())
-        .iter()
-        .map(|cluster| combine(cluster))
-        .collect();
-    clustered.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
     let mut result = GlobalModes::default();
-    if frfs.len() < 2 {
-        result.modes = clustered;
+    let (data, of_member) = prepare(frfs, settings, &mut result.warnings)?;
+    result.reconstructions = vec![None; frfs.len()];
+    let Some(band_hz) = band(&data) else {
         return Ok(result);
-    }
-
-    let curves = frfs
-        .iter()
-        .map(|frf| {
-            let mut curve =
-                Curve::from_receptance(frf.frequency_hz, frf.receptance_m_per_n, settings.band_hz)?;
-            if frf.modes.conjugated {
-                curve.conjugate();
-            }
-            Ok(curve)
-        })
-        .collect::<Result<Vec<Curve>>>()?;
-    let common = curves.windows(2).all(|w| w[0].frequency_hz == w[1].frequency_hz);
-    if !common {
-        result.warnings.push(
-            "the FRFs are not on common lines: the global modes are means over the single FRFs' modes".into(),
-        );
-        report(clustered, frfs.len(), &mut result);
-        return Ok(result);
-    }
-    let set = CurveSet {
-        frequency_hz: &curves[0].frequency_hz,
-        mobility: curves.iter().map(|c| c.mobility.as_slice()).collect(),
     };
-    let poles: Vec<Pole> = clustered
+    let members: Vec<&SetMember> = of_member.iter().map(|&m| &frfs[m]).collect();
+    let single = single_peaks(&members);
+    let rows = rows(&data, &members);
+    let references = rows.first().map_or(1, |r| r.receptance.len());
+    let lines = data.iter().map(|d| d.frequency_hz.len()).min().unwrap_or(0);
+    let wanted_poles = (2 * single.len() + 20).clamp(POLES[0], POLES[1]).min(lines / 3);
+    let orders = lscf::poles(&rows, band_hz, (wanted_poles / references).max(2));
+    let mut diagram = stabilisation::read(&orders, shape_data(&data).as_ref(), references);
+
+    let mut start: Vec<Pole> = diagram
+        .candidates
         .iter()
-        .map(|m| Pole {
-            frequency_hz: m.frequency_hz,
-            damping_ratio: m.damping_ratio,
+        .map(|c| Pole {
+            frequency_hz: c.frequency_hz,
+            damping_ratio: c.damping_ratio,
         })
         .collect();
-    for (group, fitted) in joint_fit::refine(&set, &poles) {
-        match fitted {
-            Some(modes) => {
-                let lost: Vec<String> = group
-                    .iter()
-                    .map(|&i| &clustered[i])
-                    .filter(|m| m.found_in >= 2 && !modes.iter().any(|j| near(m, &j.pole)))
-                    .map(|m| format!("{:.2} Hz (in {} FRFs)", m.frequency_hz, m.found_in))
-                    .collect();
-                if !lost.is_empty() {
-                    result.warnings.push(format!(
-                        "modes of single FRFs that all FRFs together do not confirm: {}",
-                        lost.join(", ")
-                    ));
-                }
-                let modes = modes.into_iter().filter(|m| m.seen_in > 0).map(|m| GlobalMode {
-                    frequency_hz: m.pole.frequency_hz,
-                    damping_ratio: m.pole.damping_ratio,
-                    frequency_std_hz: m.frequency_std_hz,
-                    damping_std: m.damping_std,
-                    found_in: m.seen_in,
-                });
-                result.modes.extend(modes);
-            }
-            None => report(
-                group.into_iter().map(|i| clustered[i].clone()),
-                frfs.len(),
-                &mut result,
-            ),
+    for pole in single {
+        let near = |p: &Pole| {
+            (p.frequency_hz - pole.frequency_hz).abs() < 0.7 * pole.frequency_hz * p.damping_ratio.max(pole.damping_ratio)
+        };
+        if !start.iter().any(near) {
+            start.push(pole);
+            diagram.candidates.push(Candidate {
+                frequency_hz: pole.frequency_hz,
+                damping_ratio: pole.damping_ratio,
+                orders: 0,
+                chosen: false,
+                why: "a peak of single FRFs that no order holds".into(),
+            });
         }
     }
-    result
-        .modes
-        .sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+    start.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+    let mut changes = Vec::new();
+    let mut data = data;
+    let Some(groups) = solve(&mut data, &start, &mut changes) else {
+        result
+            .warnings
+            .push("the FRFs together do not determine common poles: no global modes".into());
+        result.stabilisation = diagram;
+        return Ok(result);
+    };
+    collect(&groups, &data, &members, &of_member, &mut result);
+    explain(&mut diagram, &result.modes, &changes);
+    result.stabilisation = diagram;
+    coarse_lines(&data, &mut result);
     Ok(result)
 }
 
-/// Within the half-power band.
-fn near(mode: &GlobalMode, pole: &Pole) -> bool {
-    let width = mode.frequency_hz * mode.damping_ratio.max(pole.damping_ratio);
-    (mode.frequency_hz - pole.frequency_hz).abs() < width
-}
-
-/// Clusters as they are, but for those of a single FRF in a larger set.
-fn report(clustered: impl IntoIterator<Item = GlobalMode>, frfs: usize, result: &mut GlobalModes) {
-    for mode in clustered {
-        if frfs >= SET && mode.found_in < 2 {
-            result.warnings.push(format!(
-                "a mode at {:.2} Hz is seen in one FRF only and is left out of the global table",
-                mode.frequency_hz
-            ));
+/// The FRFs within the band with their noise, and which member each is.
+fn prepare(frfs: &[SetMember], settings: &Settings, warnings: &mut Vec<String>) -> Result<(Vec<Data>, Vec<usize>)> {
+    // An FRF in which no mode says which way it turns goes with the others.
+    let [mut turned, mut straight] = [0, 0];
+    for frf in frfs.iter().filter(|f| !f.modes.modes.is_empty()) {
+        *if frf.modes.conjugated { &mut turned } else { &mut straight } += 1;
+    }
+    if turned > 0 && straight > 0 {
+        warnings.push(format!(
+            "{turned} FRFs of the set are conjugated and {straight} are not: they come from different systems, or a peak is misread"
+        ));
+    }
+    let mut data = Vec::new();
+    let mut of_member = Vec::new();
+    for (m, frf) in frfs.iter().enumerate() {
+        let mut curve = Curve::from_receptance(frf.frequency_hz, frf.receptance_m_per_n, settings.band_hz)?;
+        if curve.len() < MIN_LINES || curve.mobility.iter().all(|y| *y == Complex64::ZERO) {
+            continue;
+        }
+        let conjugated = if frf.modes.modes.is_empty() {
+            turned > straight
         } else {
-            result.modes.push(mode);
+            frf.modes.conjugated
+        };
+        if conjugated {
+            curve.conjugate();
         }
+        let receptance = curve
+            .frequency_hz
+            .iter()
+            .zip(&curve.mobility)
+            .map(|(f, y)| y / Complex64::new(0.0, std::f64::consts::TAU * f))
+            .collect();
+        data.push(Data {
+            frequency_hz: curve.frequency_hz,
+            receptance,
+            sigma: Vec::new(),
+        });
+        of_member.push(m);
+    }
+    estimate_noise(&mut data);
+    Ok((data, of_member))
+}
+
+/// Noise of each FRF, from those on the same lines together.
+fn estimate_noise(data: &mut [Data]) {
+    let mut todo: Vec<usize> = (0..data.len()).collect();
+    while let Some(&first) = todo.first() {
+        let (same, other): (Vec<usize>, Vec<usize>) =
+            todo.iter().partition(|&&k| data[k].frequency_hz == data[first].frequency_hz);
+        let curves: Vec<&[Complex64]> = same.iter().map(|&k| data[k].receptance.as_slice()).collect();
+        let estimates = frf_noise::estimate(&data[first].frequency_hz, &curves);
+        for (&k, estimate) in same.iter().zip(estimates) {
+            let size = rms(&data[k].receptance);
+            let floor = |h: Complex64| (1e-6 * h.norm()).max(1e-9 * size);
+            data[k].sigma = match estimate {
+                Some(e) => e.std.iter().zip(&data[k].receptance).map(|(s, h)| s.max(floor(*h))).collect(),
+                // Too few lines to tell: relative noise, as of a hammer; the residual scales it later.
+                None => data[k].receptance.iter().map(|h| (0.02 * h.norm()).max(1e-3 * size)).collect(),
+            };
+        }
+        todo = other;
     }
 }
 
-/// Joins the nearest clusters first, as long as they are near and share no FRF.
-fn clusters(members: Vec<Member>) -> Vec<Vec<Member>> {
-    let mut clusters: Vec<Vec<Member>> = members.into_iter().map(|m| vec![m]).collect();
-    clusters.sort_by(|a, b| a[0].frequency_hz.total_cmp(&b[0].frequency_hz));
-    loop {
-        // In ascending order only neighbours can be nearest; but two neighbours may share an FRF and the next
-        // one may not, hence the small look-ahead.
-        const LOOK_AHEAD: usize = 4;
-        let mut nearest: Option<(f64, usize, usize)> = None;
-        for a in 0..clusters.len() {
-            for b in a + 1..clusters.len().min(a + 1 + LOOK_AHEAD) {
-                if let Some(distance) = distance(&clusters[a], &clusters[b])
-                    && nearest.is_none_or(|(least, ..)| distance < least)
-                {
-                    nearest = Some((distance, a, b));
+fn rms(values: &[Complex64]) -> f64 {
+    (values.iter().map(|v| v.norm_sqr()).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
+fn band(data: &[Data]) -> Option<[f64; 2]> {
+    let first = data.iter().filter_map(|d| d.frequency_hz.first()).copied().reduce(f64::min)?;
+    let last = data.iter().filter_map(|d| d.frequency_hz.last()).copied().reduce(f64::max)?;
+    (last > first).then_some([first, last])
+}
+
+/// Poles of the single FRFs, one for each place: the best determined first.
+fn single_peaks(members: &[&SetMember]) -> Vec<Pole> {
+    let mut all: Vec<(f64, Pole)> = members
+        .iter()
+        .flat_map(|m| &m.modes.modes)
+        .map(|mode| {
+            let best = mode.best();
+            let pole = Pole {
+                frequency_hz: best.frequency_hz,
+                damping_ratio: best.damping_ratio,
+            };
+            (best.damping_std.map_or(1.0, |s| s / best.damping_ratio), pole)
+        })
+        .collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut kept: Vec<Pole> = Vec::new();
+    for (_, pole) in all {
+        let width = |p: &Pole| p.frequency_hz * p.damping_ratio.max(pole.damping_ratio);
+        if !kept.iter().any(|p| (p.frequency_hz - pole.frequency_hz).abs() < width(p)) {
+            kept.push(pole);
+        }
+    }
+    kept
+}
+
+/// Rows of the matrix fraction: one a response with all references where the set is a full grid on common lines,
+/// else one an FRF. References are the shorter side of the grid (by reciprocity either side will do).
+fn rows<'a>(data: &'a [Data], members: &[&SetMember]) -> Vec<Row<'a>> {
+    if let Some(grid) = full_grid(data, members) {
+        return grid
+            .into_iter()
+            .map(|row| {
+                let lines = data[row[0]].frequency_hz.len();
+                let weight = (0..lines).map(|k| {
+                    let log: f64 = row.iter().map(|&m| weight(&data[m], k).ln()).sum();
+                    (log / row.len() as f64).exp()
+                });
+                Row {
+                    frequency_hz: &data[row[0]].frequency_hz,
+                    weight: weight.collect(),
+                    receptance: row.iter().map(|&m| data[m].receptance.as_slice()).collect(),
                 }
-            }
-        }
-        let Some((_, a, b)) = nearest else { return clusters };
-        let other = clusters.remove(b);
-        clusters[a].extend(other);
-        clusters.sort_by(|a, b| centre(a).0.total_cmp(&centre(b).0));
+            })
+            .collect();
     }
+    data.iter()
+        .map(|d| Row {
+            frequency_hz: &d.frequency_hz,
+            receptance: vec![&d.receptance],
+            weight: (0..d.frequency_hz.len()).map(|k| weight(d, k)).collect(),
+        })
+        .collect()
 }
 
-/// Weighted centre, its standard deviation, and the half-power half-width, all in Hz.
-fn centre(cluster: &[Member]) -> (f64, f64, f64) {
-    let (mean, std) = weighted(cluster.iter().map(|m| (m.frequency_hz, m.frequency_std_hz)));
-    let (zeta, _) = weighted(cluster.iter().map(|m| (m.damping_ratio, m.damping_std)));
-    (mean, std, zeta * mean)
+/// 1/σ, but never more than a thousandfold precision: exact data must not rest on a few lines.
+fn weight(data: &Data, k: usize) -> f64 {
+    1.0 / data.sigma[k].max(1e-3 * data.receptance[k].norm())
 }
 
-/// Distance in half-widths; `None` where the clusters must not join.
-fn distance(a: &[Member], b: &[Member]) -> Option<f64> {
-    if a.iter().any(|m| b.iter().any(|n| n.frf == m.frf)) {
+/// Indices of the FRFs by response, then reference.
+fn full_grid(data: &[Data], members: &[&SetMember]) -> Option<Vec<Vec<usize>>> {
+    let dofs: Vec<[usize; 2]> = members.iter().map(|m| m.dofs).collect::<Option<_>>()?;
+    let sorted = |side: usize| {
+        let mut ids: Vec<usize> = dofs.iter().map(|d| d[side]).collect();
+        ids.sort_unstable();
+        ids.dedup();
+        ids
+    };
+    let (responses, references) = (sorted(0), sorted(1));
+    let (long, short, long_ids, short_ids) = if references.len() <= responses.len() {
+        (0, 1, responses, references)
+    } else {
+        (1, 0, references, responses)
+    };
+    let complete = dofs.len() == long_ids.len() * short_ids.len();
+    if !complete || short_ids.len() < 2 || short_ids.len() > MAX_REFERENCES {
         return None;
     }
-    let ((fa, sa, wa), (fb, sb, wb)) = (centre(a), centre(b));
-    let width = wa.min(wb);
-    let apart = (fa - fb).abs();
-    let near = (JOIN_WIDTHS * width).max((JOIN_SIGMA * sa.hypot(sb)).min(MOST_WIDTHS * wa.max(wb)));
-    (apart <= near).then(|| apart / width.max(1e-6 * fa))
+    if data.windows(2).any(|w| w[0].frequency_hz != w[1].frequency_hz) {
+        return None;
+    }
+    long_ids
+        .iter()
+        .map(|l| {
+            let row = short_ids.iter().map(|s| dofs.iter().position(|d| d[long] == *l && d[short] == *s));
+            row.collect()
+        })
+        .collect()
 }
 
-/// Mean with inverse-variance weights and its standard deviation. Standard deviations far below the others'
-/// are raised: a lucky residual must not outvote the rest.
-fn weighted(samples: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
-    let samples: Vec<(f64, f64)> = samples.collect();
-    let floor = 0.3 * median(samples.iter().map(|s| s.1));
-    let weight = |std: f64| std.max(floor).max(1e-12).powi(-2);
-    let total: f64 = samples.iter().map(|s| weight(s.1)).sum();
-    let mean = samples.iter().map(|s| s.0 * weight(s.1)).sum::<f64>() / total;
-    (mean, total.powf(-0.5))
+/// All FRFs on common lines with common weights, `None` where they have lines of their own.
+fn shape_data(data: &[Data]) -> Option<ShapeData<'_>> {
+    if data.windows(2).any(|w| w[0].frequency_hz != w[1].frequency_hz) {
+        return None;
+    }
+    let lines = data.first()?.frequency_hz.len();
+    let weight = (0..lines).map(|k| (data.iter().map(|d| weight(d, k).ln()).sum::<f64>() / data.len() as f64).exp());
+    Some(ShapeData {
+        frequency_hz: &data[0].frequency_hz,
+        weight: weight.collect(),
+        receptance: data.iter().map(|d| d.receptance.as_slice()).collect(),
+    })
 }
 
-fn combine(cluster: &[Member]) -> GlobalMode {
-    let (frequency_hz, frequency_std_hz) = robust_mean(
-        cluster
-            .iter()
-            .map(|m| (m.frequency_hz, m.frequency_std_hz))
-            .collect(),
-    );
-    let (damping_ratio, damping_std) =
-        robust_mean(cluster.iter().map(|m| (m.damping_ratio, m.damping_std)).collect());
-    GlobalMode {
-        frequency_hz,
-        damping_ratio,
-        frequency_std_hz,
-        damping_std,
-        found_in: cluster.len(),
+/// Refinement with search, noise from the rest, refinement without search.
+fn solve(data: &mut [Data], start: &[Pole], changes: &mut Vec<Change>) -> Option<Vec<Group>> {
+    let mut groups = joint_fit::refine(data, start, true, changes)?;
+    for pass in 0..2 {
+        renew_noise(data, &groups);
+        let mut poles: Vec<Pole> = groups.iter().flat_map(|g| g.solution.poles.iter().copied()).collect();
+        poles.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+        // The first noise may have been wrong, and with it what was needless: search once more.
+        groups = joint_fit::refine(data, &poles, pass == 0, changes)?;
+    }
+    Some(groups)
+}
+
+/// Noise of each FRF from what the fit leaves over.
+fn renew_noise(data: &mut [Data], groups: &[Group]) {
+    for (m, d) in data.iter_mut().enumerate() {
+        let mut left_over = Vec::with_capacity(d.frequency_hz.len());
+        for group in groups {
+            let found = &group.solution.frfs[m];
+            let from = d.frequency_hz.partition_point(|&f| f < group.window_hz[0]);
+            // The poles are shared by all FRFs and cost each of them next to nothing.
+            let freedom = (1.0 - found.leverage).max(0.05);
+            left_over.extend(found.residual.iter().enumerate().map(|(k, r)| {
+                let fitted = (d.receptance[from + k] - r).norm();
+                (fitted, r.norm_sqr() / freedom)
+            }));
+        }
+        let size = rms(&d.receptance);
+        match frf_noise::law_of_residual(left_over.iter().copied()) {
+            Some(law) => {
+                for (sigma, (fitted, _)) in d.sigma.iter_mut().zip(&left_over) {
+                    *sigma = law.std(*fitted).max(1e-7 * fitted).max(1e-10 * size);
+                }
+            }
+            None => {
+                let level = left_over.iter().zip(&d.sigma).map(|((_, r), s)| r / (s * s)).sum::<f64>();
+                let scale = (level / left_over.len().max(1) as f64).sqrt().max(1e-6);
+                d.sigma.iter_mut().for_each(|s| *s *= scale);
+            }
+        }
     }
 }
 
-/// Weighted mean without outliers, and its standard deviation with the Birge ratio where the scatter is
-/// larger than the estimates' own standard deviations say.
-fn robust_mean(samples: Vec<(f64, f64)>) -> (f64, f64) {
-    let middle = median(samples.iter().map(|s| s.0));
-    let scatter = 1.4826 * median(samples.iter().map(|s| (s.0 - middle).abs()));
-    let kept: Vec<(f64, f64)> = samples
+fn collect(groups: &[Group], data: &[Data], members: &[&SetMember], of_member: &[usize], result: &mut GlobalModes) {
+    let count = result.reconstructions.len();
+    for group in groups {
+        let solution = &group.solution;
+        if !solution.converged {
+            result.warnings.push(format!(
+                "the common fit between {:.1} and {:.1} Hz did not converge",
+                group.window_hz[0],
+                group.window_hz[1].min(data.iter().filter_map(|d| d.frequency_hz.last()).fold(0.0, |m: f64, f| m.max(*f)))
+            ));
+        }
+        // What the fit leaves beyond the noise widens the standard deviations.
+        let level = (solution.misfit / solution.degrees_of_freedom as f64).max(1.0).sqrt();
+        for (j, pole) in solution.poles.iter().enumerate() {
+            let (found_in, best) = joint_fit::seen_in(solution, j);
+            if found_in == 0 || (data.len() >= SET && found_in < 2 && best < FAR) {
+                result.warnings.push(format!(
+                    "a mode at {:.2} Hz is seen in {found_in} of {} FRFs only, hardly above the noise, and is left out",
+                    pole.frequency_hz,
+                    data.len()
+                ));
+                continue;
+            }
+            let mut constants = vec![None; count];
+            for m in 0..data.len() {
+                let (value, std) = solution.constant(m, j);
+                constants[of_member[m]] = Some((value, level * std));
+            }
+            let line_hz = data
+                .iter()
+                .map(|d| joint_fit::spacing_hz(&d.frequency_hz, pole.frequency_hz))
+                .fold(f64::INFINITY, f64::min);
+            let lines_in_half_power_band = 2.0 * pole.damping_ratio * pole.frequency_hz / line_hz;
+            let mut damping_std = level * solution.damping_std(j);
+            if lines_in_half_power_band < LEAKAGE_BELOW_LINES {
+                damping_std = damping_std.hypot(LEAKAGE_LINES * line_hz / (2.0 * pole.frequency_hz));
+            }
+            let shape = shape_of(solution, j, members);
+            result.modes.push(GlobalMode {
+                frequency_hz: pole.frequency_hz,
+                damping_ratio: pole.damping_ratio,
+                frequency_std_hz: level * solution.frequency_std_hz(j),
+                damping_std,
+                found_in,
+                lines_in_half_power_band,
+                complexity: shape::complexity(&shape.iter().map(|s| s.1).collect::<Vec<_>>()),
+                shape,
+                constants,
+            });
+        }
+    }
+    result.modes.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+    let residues: Vec<Vec<Complex64>> = result
+        .modes
         .iter()
-        .copied()
-        .filter(|s| samples.len() < 4 || (s.0 - middle).abs() <= OUTLIER_SIGMA * s.1.max(scatter))
+        .map(|m| m.constants.iter().flatten().map(|c| c.0).collect())
         .collect();
-    let kept = if kept.is_empty() { samples } else { kept };
-    let (mean, std) = weighted(kept.iter().copied());
-    if kept.len() < 2 {
-        return (mean, std);
-    }
-    let floor = 0.3 * median(kept.iter().map(|s| s.1));
-    let chi2: f64 = kept
+    result.mac = residues
         .iter()
-        .map(|s| ((s.0 - mean) / s.1.max(floor).max(1e-12)).powi(2))
-        .sum();
-    let birge = (chi2 / (kept.len() - 1) as f64).sqrt();
-    (mean, std * birge.max(1.0))
-}
-
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    match values.len() {
-        0 => 0.0,
-        n if n % 2 == 1 => values[n / 2],
-        n => 0.5 * (values[n / 2 - 1] + values[n / 2]),
+        .map(|a| residues.iter().map(|b| shape::mac(a, b)).collect())
+        .collect();
+    for (m, d) in data.iter().enumerate() {
+        let mut fitted = Vec::with_capacity(d.frequency_hz.len());
+        for group in groups {
+            let found = &group.solution.frfs[m];
+            let from = d.frequency_hz.partition_point(|&f| f < group.window_hz[0]);
+            fitted.extend(found.residual.iter().enumerate().map(|(k, r)| d.receptance[from + k] - r));
+        }
+        let error: f64 = fitted.iter().zip(&d.receptance).map(|(a, b)| (a - b).norm_sqr()).sum();
+        let noise: f64 = d.sigma.iter().map(|s| s * s).sum();
+        let total: f64 = d.receptance.iter().map(|h| h.norm_sqr()).sum();
+        result.reconstructions[of_member[m]] = Some(Reconstruction {
+            error_nrms: (error / total).sqrt(),
+            noise_nrms: (noise / total).sqrt(),
+            frequency_hz: d.frequency_hz.clone(),
+            measured_m_per_n: d.receptance.clone(),
+            fitted_m_per_n: fitted,
+        });
     }
 }
 
+/// Shape by response (or by FRF where degrees of freedom are not known), largest component 1.
+fn shape_of(solution: &ml_fit::Solution, mode: usize, members: &[&SetMember]) -> Vec<(usize, Complex64)> {
+    let constant = |m: usize| solution.constant(m, mode).0;
+    let dofs: Option<Vec<[usize; 2]>> = members.iter().map(|m| m.dofs).collect();
+    let Some(dofs) = dofs else {
+        let all: Vec<Complex64> = (0..members.len()).map(constant).collect();
+        return shape::normalised(&all).into_iter().enumerate().collect();
+    };
+    let unique = |side: usize| {
+        let mut ids: Vec<usize> = dofs.iter().map(|d| d[side]).collect();
+        ids.sort_unstable();
+        ids.dedup();
+        ids
+    };
+    // A roving hammer moves the excitation: then the references carry the shape.
+    let (side, other) = if unique(1).len() > unique(0).len() { (1, 0) } else { (0, 1) };
+    let (ids, others) = (unique(side), unique(other));
+    let mut matrix = DMatrix::zeros(ids.len(), others.len());
+    let mut filled = 0;
+    for (m, dof) in dofs.iter().enumerate() {
+        let at = (ids.iter().position(|i| *i == dof[side]), others.iter().position(|i| *i == dof[other]));
+        if let (Some(i), Some(j)) = at {
+            matrix[(i, j)] = constant(m);
+            filled += 1;
+        }
+    }
+    if filled == ids.len() * others.len()
+        && let Some(shape) = shape::from_residues(&matrix)
+    {
+        return ids.into_iter().zip(shape).collect();
+    }
+    // Gaps in the grid: the column that shows the mode best.
+    let best = (0..others.len()).max_by(|&a, &b| matrix.column(a).norm().total_cmp(&matrix.column(b).norm()));
+    let column: Vec<Complex64> = best.map_or(Vec::new(), |b| matrix.column(b).iter().copied().collect());
+    ids.into_iter().zip(shape::normalised(&column)).collect()
+}
+
+/// Says of every candidate what became of it.
+fn explain(diagram: &mut Stabilisation, modes: &[GlobalMode], changes: &[Change]) {
+    let near = |a: f64, b: &Pole| (a / b.frequency_hz - 1.0).abs() < 0.7 * b.damping_ratio.max(0.003);
+    for change in changes {
+        if let Change::Added(pole) = change {
+            diagram.candidates.push(Candidate {
+                frequency_hz: pole.frequency_hz,
+                damping_ratio: pole.damping_ratio,
+                orders: 0,
+                chosen: false,
+                why: "what the fit left over has a resonance here".into(),
+            });
+        }
+    }
+    let mut owner: Vec<bool> = vec![false; modes.len()];
+    for candidate in &mut diagram.candidates {
+        let mode = modes
+            .iter()
+            .enumerate()
+            .filter(|(k, m)| {
+                let width = m.frequency_hz * m.damping_ratio.max(0.003);
+                !owner[*k] && (m.frequency_hz - candidate.frequency_hz).abs() < width
+            })
+            .min_by(|(_, a), (_, b)| {
+                let distance = |m: &GlobalMode| (m.frequency_hz - candidate.frequency_hz).abs();
+                distance(a).total_cmp(&distance(b))
+            });
+        if let Some((k, mode)) = mode {
+            owner[k] = true;
+            candidate.chosen = true;
+            candidate.why.push_str(&format!("; taken, seen in {} FRFs", mode.found_in));
+            continue;
+        }
+        let why = changes
+            .iter()
+            .rev()
+            .find_map(|change| match change {
+                Change::Needless(p) if near(candidate.frequency_hz, p) => {
+                    Some("left out: the FRFs are described as well without it")
+                }
+                Change::NotDetermined(p) if near(candidate.frequency_hz, p) => {
+                    Some("left out: the lines do not determine it")
+                }
+                _ => None,
+            })
+            .unwrap_or("left out: joined another mode, or hardly above the noise");
+        candidate.why.push_str("; ");
+        candidate.why.push_str(why);
+    }
+    diagram.candidates.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+}
+
+/// One line for the whole set.
+fn coarse_lines(data: &[Data], result: &mut GlobalModes) {
+    let coarse: Vec<String> = result
+        .modes
+        .iter()
+        .filter(|m| m.lines_in_half_power_band < FINE_LINES)
+        .map(|m| {
+            format!(
+                "at {} Hz lines the damping of the {:.1} Hz mode is uncertain to {:.0} %",
+                data.iter()
+                    .map(|d| joint_fit::spacing_hz(&d.frequency_hz, m.frequency_hz))
+                    .fold(f64::INFINITY, f64::min)
+                    * 1000.0
+                    / 1000.0,
+                m.frequency_hz,
+                (100.0 * m.damping_std / m.damping_ratio).ceil()
+            )
+        })
+        .collect();
+    if !coarse.is_empty() {
+        result.warnings.push(format!(
+            "fewer than {FINE_LINES:.0} lines in the half-power band: {}",
+            coarse.join("; ")
+        ));
+    }
+}
 #[cfg(test)]
 mod tests {
     use super::super::analyse_frf;
@@ -311,6 +556,7 @@ mod tests {
                 frequency_hz: f,
                 receptance_m_per_n: h,
                 modes,
+                dofs: None,
             })
             .collect();
         global(&members, &settings).unwrap()
@@ -343,7 +589,7 @@ mod tests {
     }
 
     #[test]
-    fn frfs_on_different_lines_are_averaged_and_that_is_said() {
+    fn frfs_may_have_lines_of_their_own() {
         let modes = [Mode::new(12.0, 0.03, 1.0)];
         let frfs = vec![
             Synthetic::new(3.0, 60.0, 0.2, &modes)
@@ -354,24 +600,7 @@ mod tests {
                 .frf(),
         ];
         let found = global_of(&frfs);
-        assert!(found.warnings[0].contains("common lines"), "{:?}", found.warnings);
         assert_eq!(found.modes.len(), 1);
         assert!((found.modes[0].damping_ratio - 0.03).abs() < 4.0 * found.modes[0].damping_std);
-    }
-
-    #[test]
-    fn an_outlier_does_not_move_the_mean() {
-        let samples = vec![(1.0, 0.01), (1.01, 0.01), (0.99, 0.01), (1.0, 0.01), (3.0, 0.01)];
-        let (mean, std) = robust_mean(samples);
-        approx::assert_relative_eq!(mean, 1.0, epsilon = 1e-9);
-        assert!(std < 0.01);
-    }
-
-    #[test]
-    fn scatter_beyond_the_claimed_deviations_widens_the_result() {
-        let (mean, std) = robust_mean(vec![(1.0, 0.001), (1.1, 0.001), (0.9, 0.001)]);
-        approx::assert_relative_eq!(mean, 1.0, epsilon = 1e-9);
-        // Sample standard deviation 0.1 over √3.
-        approx::assert_relative_eq!(std, 0.1 / 3f64.sqrt(), max_relative = 1e-6);
     }
 }

@@ -1,255 +1,264 @@
-//! One set of poles for all FRFs of a set.
-//!
-//! The candidates of the single FRFs are fitted to all curves at once, group by group of neighbouring modes.
-//! A pole that the curves do not need is taken out, and one is added where what the fit leaves over has a
-//! resonance of its own: two modes closer than their widths show as one peak in every single FRF, but move
-//! with different shapes, so together the FRFs tell them apart.
+//! Poles of a whole set: groups of neighbouring candidates are refined together by [`super::ml_fit`]; a pole that the
+//! FRFs do not need is taken out, one is added where the rest has a resonance of its own.
 
 use num_complex::Complex64;
 
-use super::local_fit::{self, Pole, Problem, Solution};
+use super::local_fit::Pole;
+use super::ml_fit::{self, NoisyFrf, Solution};
+use super::stabilisation::MAX_DAMPING;
 
-/// A gap of this many half-widths (of both modes together) separates groups.
-const GROUP_GAP: f64 = 4.0;
-const MAX_GROUP: usize = 8;
-/// Half-widths beyond the outermost poles that take part, and lines at least.
-const REACH: f64 = 5.0;
-const REACH_LINES: usize = 4;
-/// A pole stays if without it the misfit grows by this many times what chance allows …
-const NEEDED: f64 = 4.0;
-/// … and one is added only if the misfit falls by more.
-const WANTED: f64 = 8.0;
-const MAX_ADDED: usize = 3;
-const MAX_DAMPING: f64 = 0.3;
+/// Modes refined together at most: the normal equations grow with the square.
+const MAX_GROUP: usize = 12;
+/// Neighbours beyond a group's edge that take part with fixed poles.
+const FIXED_NEIGHBOURS: usize = 3;
+const MAX_ADDED: usize = 4;
+/// Misfit that one real parameter explains by chance has mean 1 and variance 2; this many standard deviations …
+const CHANCE_SIGMA: f64 = 8.0;
+/// … and a constant for having looked at every frequency.
+const LOOKED_EVERYWHERE: f64 = 20.0;
+/// Fewer lines in the half-power band than this: the damping may stay uncertain.
+const COARSE_LINES: f64 = 1.0;
+/// Squared size over uncertainty (two degrees of freedom) from which an FRF shows a mode: five standard deviations.
+const SEEN: f64 = 30.0;
 
-/// Curves on common lines.
-pub(super) struct CurveSet<'a> {
-    pub frequency_hz: &'a [f64],
-    pub mobility: Vec<&'a [Complex64]>,
+/// A group of modes and the window that it was fitted in.
+pub(super) struct Group {
+    pub window_hz: [f64; 2],
+    pub solution: Solution,
 }
 
-pub(super) struct JointMode {
-    pub pole: Pole,
-    pub frequency_std_hz: f64,
-    pub damping_std: f64,
-    /// Curves in which the mode's peak stands five standard deviations out of the residual.
-    pub seen_in: usize,
+/// Why a pole went out or came in.
+pub(super) enum Change {
+    /// The FRFs are described as well without it.
+    Needless(Pole),
+    /// Outside the band, too much damping, or not determined.
+    NotDetermined(Pole),
+    Added(Pole),
 }
 
-/// `None` for a group that cannot be fitted jointly; its candidates then stand as they are.
-pub(super) fn refine(set: &CurveSet, candidates: &[Pole]) -> Vec<(Vec<usize>, Option<Vec<JointMode>>)> {
-    let groups = groups(candidates);
-    (0..groups.len())
-        .map(|g| {
-            let group = &groups[g];
-            let poles: Vec<Pole> = group.iter().map(|&i| candidates[i]).collect();
-            // The window ends half-way to the next group.
-            let edge = |other: Option<&Vec<usize>>, last: bool| {
-                let other = candidates[*if last { other?.last()? } else { other?.first()? }];
-                let own = if last { poles[0] } else { poles[poles.len() - 1] };
-                Some(0.5 * (other.frequency_hz + own.frequency_hz))
-            };
-            let below = g
-                .checked_sub(1)
-                .and_then(|k| edge(groups.get(k), true))
-                .unwrap_or(0.0);
-            let above = edge(groups.get(g + 1), false).unwrap_or(f64::INFINITY);
-            (group.clone(), fit_group(set, &poles, [below, above]))
+/// One FRF with its noise.
+pub(super) struct Data {
+    pub frequency_hz: Vec<f64>,
+    pub receptance: Vec<Complex64>,
+    /// sqrt(E|e|²), > 0.
+    pub sigma: Vec<f64>,
+}
+
+impl Data {
+    fn window(&self, [low, high]: [f64; 2]) -> Option<NoisyFrf<'_>> {
+        let from = self.frequency_hz.partition_point(|&f| f < low);
+        let to = self.frequency_hz.partition_point(|&f| f < high);
+        (to > from).then(|| NoisyFrf {
+            frequency_hz: &self.frequency_hz[from..to],
+            receptance: &self.receptance[from..to],
+            sigma: &self.sigma[from..to],
         })
-        .collect()
+    }
 }
 
-/// Indices of candidates (ascending in frequency) that are fitted together.
-fn groups(candidates: &[Pole]) -> Vec<Vec<usize>> {
-    let mut groups: Vec<Vec<usize>> = Vec::new();
-    let width = |p: &Pole| p.damping_ratio * p.frequency_hz;
-    for (i, pole) in candidates.iter().enumerate() {
-        let joins = i > 0 && {
-            let last = &candidates[i - 1];
-            pole.frequency_hz - last.frequency_hz < GROUP_GAP * (width(pole) + width(last))
-        };
-        match groups.last_mut() {
-            Some(group) if joins && group.len() < MAX_GROUP => group.push(i),
-            _ => groups.push(vec![i]),
-        }
-    }
-    groups
-}
-
-fn fit_group(set: &CurveSet, start: &[Pole], limits_hz: [f64; 2]) -> Option<Vec<JointMode>> {
-    let f = set.frequency_hz;
-    let (first, last) = (start.first()?, start.last()?);
-    let low = first.frequency_hz * (1.0 - REACH * first.damping_ratio);
-    let high = last.frequency_hz * (1.0 + REACH * last.damping_ratio);
-    let index = |hz: f64| f.partition_point(|&x| x < hz);
-    let from = index(low.max(limits_hz[0])).min(index(first.frequency_hz).saturating_sub(REACH_LINES));
-    let to = index(high.min(limits_hz[1]))
-        .max(index(last.frequency_hz) + REACH_LINES)
-        .min(f.len());
-    let window = f.get(from..to)?;
-    let mut group = Group {
-        problem: Problem {
-            frequency_hz: window,
-            curves: set.mobility.iter().map(|y| &y[from..to]).collect(),
-            line_weight: vec![1.0; window.len()],
-            curve_weight: Vec::new(),
-            residual_terms: 3,
-        },
-    };
-    // First weights: curves of equal size. Then by what each leaves over.
-    let size = |y: &[Complex64]| (y.iter().map(|y| y.norm_sqr()).sum::<f64>() / y.len() as f64).sqrt();
-    let sizes: Vec<f64> = group.problem.curves.iter().map(|y| size(y)).collect();
-    let largest = sizes.iter().fold(0.0, |m: f64, s| m.max(*s));
-    if largest <= 0.0 || !largest.is_finite() {
-        return None;
-    }
-    group.problem.curve_weight = sizes.iter().map(|s| 1.0 / s.max(1e-9 * largest)).collect();
-
-    let mut solution = group.fit(start)?;
-    for _ in 0..2 {
-        group.reweight(&solution);
-        solution = group.fit(&solution.poles)?;
-    }
-    solution = group.without_needless(solution);
-    for _ in 0..MAX_ADDED {
-        match group.with_one_more(&solution) {
-            Some(more) => {
-                group.reweight(&more);
-                let refined = group.fit(&more.poles)?;
-                solution = group.without_needless(refined);
-            }
-            None => break,
-        }
-    }
-    Some(group.modes(&solution))
-}
-
-struct Group<'a> {
-    problem: Problem<'a>,
-}
-
-impl Group<'_> {
-    fn fit(&self, poles: &[Pole]) -> Option<Solution> {
-        local_fit::fit(&self.problem, poles)
-    }
-
-    fn line_hz(&self) -> f64 {
-        let f = self.problem.frequency_hz;
-        f.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min)
-    }
-
-    /// Each curve's weight from its residual.
-    fn reweight(&mut self, solution: &Solution) {
-        let rms: Vec<f64> = solution
-            .residual
+/// Refines all candidates (ascending in frequency). With `search` poles are taken out and added, else only moved.
+/// `None` where a group cannot be fitted.
+pub(super) fn refine(data: &[Data], candidates: &[Pole], search: bool, changes: &mut Vec<Change>) -> Option<Vec<Group>> {
+    let groups = groups(candidates);
+    let middle = |a: &[Pole], b: &[Pole]| Some(0.5 * (a.last()?.frequency_hz + b.first()?.frequency_hz));
+    let mut result = Vec::with_capacity(groups.len());
+    let mut before = 0;
+    for (g, group) in groups.iter().enumerate() {
+        let low = if g == 0 { 0.0 } else { middle(groups[g - 1], group)? };
+        let high = groups.get(g + 1).map_or(Some(f64::INFINITY), |next| middle(group, next))?;
+        let after = before + group.len();
+        let fixed: Vec<Pole> = candidates[before.saturating_sub(FIXED_NEIGHBOURS)..before]
             .iter()
-            .map(|r| (r.iter().map(|r| r.norm_sqr()).sum::<f64>() / r.len().max(1) as f64).sqrt())
+            .chain(&candidates[after..(after + FIXED_NEIGHBOURS).min(candidates.len())])
+            .copied()
             .collect();
-        let largest = rms.iter().fold(0.0, |m: f64, s| m.max(*s));
-        // One curve without any noise must not take all the weight.
-        if largest > 0.0 {
-            self.problem.curve_weight = rms.iter().map(|s| 1.0 / s.max(1e-3 * largest)).collect();
+        let window_hz = [low, high];
+        let frfs: Option<Vec<NoisyFrf>> = data.iter().map(|d| d.window(window_hz)).collect();
+        let fit = Fit { frfs: frfs?, fixed };
+        let mut solution = fit.fit(group)?;
+        if search {
+            solution = fit.without_needless(solution, changes);
+            for _ in 0..MAX_ADDED {
+                match fit.with_one_more(&solution) {
+                    Some(more) => {
+                        changes.push(Change::Added(more.poles[more.poles.len() - 1]));
+                        solution = fit.without_needless(more, changes);
+                    }
+                    None => break,
+                }
+            }
         }
+        result.push(Group {
+            window_hz,
+            solution,
+        });
+        before = after;
+    }
+    Some(result)
+}
+
+/// Splits at the widest gaps until no group is too large.
+fn groups(candidates: &[Pole]) -> Vec<&[Pole]> {
+    let mut todo = vec![candidates];
+    let mut done = Vec::new();
+    while let Some(group) = todo.pop() {
+        if group.len() <= MAX_GROUP {
+            done.push(group);
+            continue;
+        }
+        // Not at the very ends, or a hundred modes would make a hundred groups.
+        let quarter = group.len() / 4;
+        let at = (quarter.max(1)..group.len() - quarter)
+            .max_by(|&a, &b| {
+                let gap = |k: usize| (group[k].frequency_hz / group[k - 1].frequency_hz).ln();
+                gap(a).total_cmp(&gap(b))
+            })
+            .unwrap_or(group.len() / 2);
+        let (below, above) = group.split_at(at);
+        todo.push(above);
+        todo.push(below);
+    }
+    done
+}
+
+struct Fit<'a> {
+    frfs: Vec<NoisyFrf<'a>>,
+    fixed: Vec<Pole>,
+}
+
+impl Fit<'_> {
+    fn fit(&self, poles: &[Pole]) -> Option<Solution> {
+        ml_fit::fit(&self.frfs, poles, &self.fixed)
     }
 
-    /// Real parameters that one pole brings: its own two and a complex residue a curve.
-    fn cost_of_a_pole(&self) -> f64 {
-        2.0 * self.problem.curves.len() as f64 + 2.0
+    /// Misfit that a mode must explain to be one, for noise as large as the fit leaves.
+    fn wanted(&self, solution: &Solution) -> f64 {
+        let k = 2.0 * self.frfs.len() as f64 + 2.0;
+        let level = (solution.misfit / solution.degrees_of_freedom as f64).max(1.0);
+        level * (k + CHANCE_SIGMA * (2.0 * k).sqrt() + LOOKED_EVERYWHERE)
     }
 
-    fn misfit(solution: &Solution) -> f64 {
-        solution.variance * solution.degrees_of_freedom as f64
+    fn line_hz(&self, frequency_hz: f64) -> f64 {
+        self.frfs.iter().map(|c| spacing_hz(c.frequency_hz, frequency_hz)).fold(f64::INFINITY, f64::min)
     }
 
-    /// Is each pole one that these lines determine?
+    /// Do the lines determine this pole?
     fn sane(&self, solution: &Solution, j: usize) -> bool {
         let pole = solution.poles[j];
-        let f = self.problem.frequency_hz;
-        let line_hz = self.line_hz();
+        let line_hz = self.line_hz(pole.frequency_hz);
         let width = pole.damping_ratio * pole.frequency_hz;
-        let inside = pole.frequency_hz >= f[1] && pole.frequency_hz <= f[f.len() - 2];
+        let inside = self
+            .frfs
+            .iter()
+            .any(|c| c.frequency_hz[0] <= pole.frequency_hz && c.frequency_hz[c.frequency_hz.len() - 1] >= pole.frequency_hz);
+        let coarse = 2.0 * width < COARSE_LINES * line_hz;
+        let level = (solution.misfit / solution.degrees_of_freedom as f64).max(1.0).sqrt();
         inside
             && pole.damping_ratio < MAX_DAMPING
-            && solution.frequency_std_hz(j) < 0.3 * width.max(line_hz)
-            && solution.damping_std(j) < 0.5 * pole.damping_ratio
+            && level * solution.frequency_std_hz(j) < 0.3 * width.max(line_hz)
+            && (coarse || level * solution.damping_std(j) < 0.4 * pole.damping_ratio)
     }
 
     /// Takes out the least needed pole until all are needed.
-    fn without_needless(&self, mut solution: Solution) -> Solution {
-        while solution.poles.len() > 1 {
-            let trials = (0..solution.poles.len()).filter_map(|j| {
+    fn without_needless(&self, mut solution: Solution, changes: &mut Vec<Change>) -> Solution {
+        loop {
+            let wanted = self.wanted(&solution);
+            let mut least: Option<(f64, usize, Solution)> = None;
+            for j in 0..solution.poles.len() {
+                let sane = self.sane(&solution, j);
+                // With the other poles held the growth is an upper bound of the true one: most need no fit.
+                let evidence: f64 = (0..self.frfs.len()).map(|m| solution.evidence(m, j)).sum();
+                if sane && evidence > 4.0 * wanted {
+                    continue;
+                }
                 let mut rest = solution.poles.clone();
                 rest.remove(j);
-                let without = self.fit(&rest)?;
-                let growth = (Self::misfit(&without) - Self::misfit(&solution)) / solution.variance;
-                let wanted = if self.sane(&solution, j) {
-                    NEEDED * self.cost_of_a_pole()
-                } else {
-                    f64::INFINITY
-                };
-                (growth < wanted).then_some((growth, without))
-            });
-            match trials.min_by(|a, b| a.0.total_cmp(&b.0)) {
-                Some((_, without)) => solution = without,
-                None => break,
+                let Some(without) = self.fit(&rest) else { continue };
+                let growth = if sane { without.misfit - solution.misfit } else { f64::NEG_INFINITY };
+                if growth < wanted && least.as_ref().is_none_or(|(g, ..)| growth < *g) {
+                    least = Some((growth, j, without));
+                }
+            }
+            match least {
+                Some((growth, j, without)) => {
+                    let pole = solution.poles[j];
+                    changes.push(if growth.is_finite() {
+                        Change::Needless(pole)
+                    } else {
+                        Change::NotDetermined(pole)
+                    });
+                    solution = without;
+                }
+                None => return solution,
             }
         }
-        solution
     }
 
-    /// Adds a pole where the residual is largest, if that explains much of it.
+    /// Adds a pole where the rest is largest, if that explains much of it.
     fn with_one_more(&self, solution: &Solution) -> Option<Solution> {
-        let f = self.problem.frequency_hz;
-        let left_over: Vec<f64> = (0..f.len())
-            .map(|k| {
-                let curves = solution.residual.iter().zip(&self.problem.curve_weight);
-                curves.map(|(r, w)| (r[k] * w).norm_sqr()).sum()
-            })
-            .collect();
-        let around = |k: usize| left_over[k - 2..=k + 2].iter().sum::<f64>();
-        let most = (2..f.len().checked_sub(2)?).max_by(|&a, &b| around(a).total_cmp(&around(b)))?;
-        let mut damping: Vec<f64> = solution.poles.iter().map(|p| p.damping_ratio).collect();
-        damping.sort_by(f64::total_cmp);
-        let usual = damping[damping.len() / 2];
-        let more = [f[most] - usual * f[most], f[most], f[most] + usual * f[most]]
-            .into_iter()
-            .filter_map(|frequency_hz| {
-                let mut poles = solution.poles.clone();
-                poles.push(Pole {
-                    frequency_hz,
-                    damping_ratio: usual,
-                });
-                self.fit(&poles)
-            })
-            .min_by(|a, b| a.variance.total_cmp(&b.variance))?;
-        let fall = (Self::misfit(solution) - Self::misfit(&more)) / more.variance;
-        let all_sane = (0..more.poles.len()).all(|j| self.sane(&more, j));
-        let added = more.poles[more.poles.len() - 1].damping_ratio;
-        let alike = (usual / 3.0..usual * 3.0).contains(&added);
-        (all_sane && alike && fall > WANTED * self.cost_of_a_pole()).then_some(more)
+        // Rest by frequency, over all FRFs; FRFs may have lines of their own.
+        let mut rest: Vec<(f64, f64)> = Vec::new();
+        for (frf, found) in self.frfs.iter().zip(&solution.frfs) {
+            let lines = frf.frequency_hz.iter().zip(frf.sigma).zip(&found.residual);
+            rest.extend(lines.map(|((f, s), r)| (*f, (r / s).norm_sqr() - 1.0)));
+        }
+        rest.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let near = 5 * self.frfs.len();
+        if rest.len() < 2 * near {
+            return None;
+        }
+        let mut sum: f64 = rest[..near].iter().map(|r| r.1).sum();
+        let mut most = (sum, near / 2);
+        for k in near..rest.len() {
+            sum += rest[k].1 - rest[k - near].1;
+            if sum > most.0 {
+                most = (sum, k - near / 2);
+            }
+        }
+        // Nothing left that could pay for a mode.
+        if most.0 < 0.4 * self.wanted(solution) {
+            return None;
+        }
+        let centre = rest[most.1].0;
+        let usual = if solution.poles.is_empty() {
+            0.02
+        } else {
+            let damping: Vec<f64> = solution.poles.iter().map(|p| p.damping_ratio).collect();
+            crate::signal::median(&damping)
+        };
+        // A pole on top of another one is a saddle: beside it the search begins on either slope.
+        [1.0, 1.0 - usual, 1.0 + usual].into_iter().find_map(|factor| {
+            let mut poles = solution.poles.clone();
+            poles.push(Pole {
+                frequency_hz: centre * factor,
+                damping_ratio: usual,
+            });
+            let more = self.fit(&poles)?;
+            let fall = solution.misfit - more.misfit;
+            let sane = (0..more.poles.len()).all(|j| self.sane(&more, j));
+            let added = more.poles[more.poles.len() - 1];
+            let alike = (usual / 4.0..usual * 4.0).contains(&added.damping_ratio);
+            (sane && alike && fall > 1.5 * self.wanted(&more)).then_some(more)
+        })
     }
+}
 
-    fn modes(&self, solution: &Solution) -> Vec<JointMode> {
-        (0..solution.poles.len())
-            .filter(|&j| self.sane(solution, j))
-            .map(|j| {
-                let pole = solution.poles[j];
-                let seen = solution
-                    .residues
-                    .iter()
-                    .zip(&solution.residual)
-                    .filter(|(residues, residual)| {
-                        let noise =
-                            residual.iter().map(|r| r.norm_sqr()).sum::<f64>() / residual.len() as f64;
-                        (residues[j] / pole.damping_ratio).norm() > 5.0 * noise.sqrt()
-                    });
-                JointMode {
-                    pole,
-                    frequency_std_hz: solution.frequency_std_hz(j),
-                    damping_std: solution.damping_std(j),
-                    seen_in: seen.count(),
-                }
-            })
-            .collect()
+/// FRFs of the group that show the mode, and the squared size over uncertainty in the one that shows it best.
+pub(super) fn seen_in(solution: &Solution, mode: usize) -> (usize, f64) {
+    let level = (solution.misfit / solution.degrees_of_freedom as f64).max(1.0);
+    let evidence: Vec<f64> = (0..solution.frfs.len()).map(|m| solution.evidence(m, mode) / level).collect();
+    (
+        evidence.iter().filter(|e| **e > SEEN).count(),
+        evidence.iter().fold(0.0, |m: f64, e| m.max(*e)),
+    )
+}
+
+/// Distance of neighbouring lines at a frequency, Hz.
+pub(super) fn spacing_hz(frequency_hz: &[f64], at_hz: f64) -> f64 {
+    let n = frequency_hz.len();
+    if n < 2 {
+        return f64::INFINITY;
     }
+    let k = frequency_hz.partition_point(|&f| f < at_hz).clamp(1, n - 1);
+    frequency_hz[k] - frequency_hz[k - 1]
 }

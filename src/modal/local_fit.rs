@@ -50,7 +50,6 @@ pub(super) struct Solution {
     pub leverage: Vec<f64>,
     /// Variance of one real component of the weighted residual.
     pub variance: f64,
-    pub degrees_of_freedom: usize,
 }
 
 impl Solution {
@@ -177,7 +176,6 @@ pub(super) fn fit(problem: &Problem, start: &[Pole]) -> Option<Solution> {
         covariance,
         leverage,
         variance,
-        degrees_of_freedom,
     })
 }
 

@@ -11,18 +11,30 @@ use serde::Serialize;
 mod analysis;
 mod circle_fit;
 mod curve;
+mod from_hits;
 mod global;
+#[cfg(test)]
+mod global_marks;
 mod half_power;
+mod hits;
 mod joint_fit;
 mod local_fit;
+mod lscf;
 #[cfg(test)]
 mod marks;
+mod ml_fit;
 mod peaks;
+pub mod quality;
+pub mod shape;
+pub mod stabilisation;
+pub mod tracking;
 #[cfg(test)]
 mod synthetic;
 
 pub use analysis::analyse_frf;
+pub use from_hits::{Estimator, TapFrfs, TapRecord, TapSettings, frfs_from_hits};
 pub use global::{SetMember, global};
+pub use hits::Hit;
 
 /// How a modal parameter was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
@@ -101,7 +113,10 @@ pub struct FrfModes {
     pub modes: Vec<FrfMode>,
     /// The FRF was recorded with the sign convention e^{−iωt} and was turned before the analysis.
     pub conjugated: bool,
+    /// What changes the result.
     pub warnings: Vec<String>,
+    /// What is usual and worth knowing: peaks that are no modes, coarse lines, methods that disagree.
+    pub remarks: Vec<String>,
 }
 
 /// One mode of a set of FRFs.
@@ -109,11 +124,35 @@ pub struct FrfModes {
 pub struct GlobalMode {
     pub frequency_hz: f64,
     pub damping_ratio: f64,
-    /// From the estimates' own standard deviations and their scatter over the FRFs.
+    /// From the noise that the common fit leaves (Cramér–Rao), raised where it leaves more than noise.
     pub frequency_std_hz: f64,
     pub damping_std: f64,
     /// Number of FRFs in which the mode stands out of the noise.
     pub found_in: usize,
+    /// Spectral lines in the half-power band, 2ζf₀/Δf.
+    pub lines_in_half_power_band: f64,
+    /// How far the shape is from a standing wave; `None` for a single degree of freedom.
+    pub complexity: Option<shape::Complexity>,
+    /// Degree of freedom (as in [`SetMember::dofs`], or the FRF's index) and component; the largest is 1.
+    #[serde(skip)]
+    pub shape: Vec<(usize, Complex64)>,
+    /// By FRF: modal constant φ_out φ_in, 1/kg, and the standard deviation of its real and imaginary part; `None` for
+    /// an FRF that took no part.
+    #[serde(skip)]
+    pub constants: Vec<Option<(Complex64, f64)>>,
+}
+
+/// What the common modes say of one FRF.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reconstruction {
+    /// sqrt(Σ|fitted − measured|² / Σ|measured|²).
+    pub error_nrms: f64,
+    /// The same for the noise alone.
+    pub noise_nrms: f64,
+    pub frequency_hz: Vec<f64>,
+    /// Turned where it was conjugated.
+    pub measured_m_per_n: Vec<Complex64>,
+    pub fitted_m_per_n: Vec<Complex64>,
 }
 
 /// All modes of a set of FRFs.
@@ -121,6 +160,11 @@ pub struct GlobalMode {
 pub struct GlobalModes {
     /// Ascending in frequency.
     pub modes: Vec<GlobalMode>,
+    /// MAC of every two modes, from their residues in all FRFs.
+    pub mac: Vec<Vec<f64>>,
+    pub stabilisation: stabilisation::Stabilisation,
+    /// By FRF; `None` for one that took no part (too few lines, zero).
+    pub reconstructions: Vec<Option<Reconstruction>>,
     pub warnings: Vec<String>,
 }
 
@@ -237,9 +281,9 @@ mod tests {
         let best = found.modes[0].best();
         assert!((best.damping_ratio - 0.01).abs() < 4.0 * best.damping_std.unwrap());
         assert!(
-            found.warnings.iter().any(|w| w.contains("too coarse lines")),
+            found.remarks.iter().any(|w| w.contains("too coarse lines")),
             "{:?}",
-            found.warnings
+            found.remarks
         );
     }
 

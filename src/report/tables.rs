@@ -140,12 +140,12 @@ fn finite(value: f64) -> Option<f64> {
 
 fn modes(modal: &crate::analysis::ModalAnalysis) -> PolarsResult<DataFrame> {
     let all: Vec<_> = modal
-        .postures
+        .sets
         .iter()
-        .flat_map(|p| p.modes.iter().map(move |m| (p, m)))
+        .flat_map(|p| p.global.modes.iter().map(move |m| (p, m)))
         .collect();
     df!(
-        "posture" => all.iter().map(|(p, _)| p.posture.clone()).collect::<Vec<_>>(),
+        "posture" => all.iter().map(|(p, _)| p.set.clone()).collect::<Vec<_>>(),
         "frequency_hz" => all.iter().map(|(_, m)| m.frequency_hz).collect::<Vec<_>>(),
         "frequency_std_hz" => all.iter().map(|(_, m)| finite(m.frequency_std_hz)).collect::<Vec<_>>(),
         "damping_ratio" => all.iter().map(|(_, m)| m.damping_ratio).collect::<Vec<_>>(),

@@ -90,6 +90,17 @@ pub fn estimate(frequency_hz: &[f64], frfs: &[&[Complex64]]) -> Vec<Option<FrfNo
         .collect()
 }
 
+/// Noise law of an FRF from what a fit leaves over: `left_over` gives the fitted magnitude and the squared residual
+/// (corrected for the degrees of freedom that the fit took) of each line. `None` for too few lines.
+pub fn law_of_residual(left_over: impl IntoIterator<Item = (f64, f64)>) -> Option<FrfNoise> {
+    let departures: Vec<Departure> = left_over
+        .into_iter()
+        .filter(|(magnitude, variance)| magnitude.is_finite() && variance.is_finite())
+        .map(|(magnitude, variance)| Departure { magnitude, variance })
+        .collect();
+    fit_law(&departures)
+}
+
 /// What the windows have found of one FRF.
 struct Local {
     departures: Vec<Departure>,

@@ -19,6 +19,7 @@ mod parameters;
 mod regression;
 mod resonances;
 mod side_by_side;
+mod stabilisation;
 
 #[cfg(test)]
 mod samples;
@@ -35,6 +36,7 @@ pub use parameters::{Estimate, ParameterFigure, ParameterRow};
 pub use regression::{RegressionFigure, RegressionPoint, RegressionSeries};
 pub use resonances::{ResonanceFigure, ResonanceRow};
 pub use side_by_side::{BarSeries, SideBySide};
+pub use stabilisation::{StabilisationFigure, StabilisationPole};
 
 use crate::Error;
 

@@ -1,0 +1,111 @@
+#!/usr/bin/env python3
+"""Side by side with sdypy-EMA (PyPI: `pip install sdypy-EMA`), in one run on the same files.
+
+Makes robot-like sets of FRFs (seven modes from 6 to 60 Hz, two of them closer than their widths, 12 responses at 3
+references), with and without noise, and prints the errors of both programs and the time both take.
+
+sdypy-EMA is given what it needs and lobestone finds by itself: the approximate frequencies of the modes. Its time is
+that of its computation alone (poles, selection, residues), lobestone's that of the whole process, reading included.
+
+usage: python3 scripts/compare_sdypy_ema.py [path of the lobestone binary]
+"""
+
+import contextlib
+import io
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from sdypy import EMA
+
+POLES = [(6.4, 0.03), (8.2, 0.028), (13.8, 0.03), (14.05, 0.0256), (19.3, 0.025), (33.0, 0.02), (56.0, 0.018)]
+RESPONSES, REFERENCES = 12, 3
+DRAWS = 5
+
+
+def make(noise, seed):
+    fixed = np.random.default_rng(4)
+    shape = fixed.uniform(0.3, 1, (len(POLES), RESPONSES)) * fixed.choice([-1, 1], (len(POLES), RESPONSES))
+    random = np.random.default_rng(seed)
+    f = np.arange(0.25, 70.0 + 1e-9, 0.25)
+    w = 2 * np.pi * f
+    h = np.zeros((RESPONSES, REFERENCES, f.size), complex)
+    for (f0, zeta), phi in zip(POLES, shape):
+        w0 = 2 * np.pi * f0
+        h += 0.005 * np.outer(phi, phi[:REFERENCES])[:, :, None] / (w0**2 - w**2 + 2j * zeta * w0 * w)
+    e = random.standard_normal(h.shape) + 1j * random.standard_normal(h.shape)
+    return f, h + noise * abs(h) * e / np.sqrt(2)
+
+
+def write_csv(path, f, h):
+    names, columns = ["frequency_hz"], [f]
+    for i in range(RESPONSES):
+        for j in range(REFERENCES):
+            dofs = f"{i // 3 + 1}{'XYZ'[i % 3]}/{j // 3 + 1}{'XYZ'[j % 3]}"
+            names += [f"re({dofs})", f"im({dofs})"]
+            columns += [h[i, j].real, h[i, j].imag]
+    np.savetxt(path, np.array(columns).T, delimiter=",", header=",".join(names), comments="", fmt="%.17g")
+
+
+def lobestone(binary, path):
+    began = time.perf_counter()
+    run = subprocess.run([binary, "--json", "modal", "--band", "3:70", path], capture_output=True, check=True)
+    took = time.perf_counter() - began
+    return [(m["frequency_hz"], m["damping_ratio"]) for m in json.loads(run.stdout)["global"]], took
+
+
+def sdypy(f, h):
+    frf = h.reshape(-1, f.size)
+    began = time.perf_counter()
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        model = EMA.Model(frf, f, lower=3, upper=70, pol_order_high=60, frf_type="receptance")
+        model.get_poles()
+        # Its defaults (50 Hz windows, 0.1 % and 5 %) are for modes in the kilohertz.
+        model.select_closest_poles([p[0] for p in POLES], f_window=1, fn_temp=0.01, xi_temp=0.1)
+        model.get_constants()
+    took = time.perf_counter() - began
+    return list(zip(model.nat_freq, model.nat_xi)), took
+
+
+def errors(found):
+    """Largest relative errors in f and ζ over the modes, per cent; None where a mode is missing."""
+    worst = [0.0, 0.0]
+    found = sorted(found)
+    if len(found) != len(POLES):
+        return None
+    for (f, zeta), (f0, zeta0) in zip(found, POLES):
+        worst = [max(worst[0], abs(f / f0 - 1)), max(worst[1], abs(zeta / zeta0 - 1))]
+    return [100 * w for w in worst]
+
+
+def main():
+    root = Path(__file__).resolve().parent.parent
+    binary = sys.argv[1] if len(sys.argv) > 1 else str(root / "target/release/lobestone")
+    print(f"{len(POLES)} modes, {RESPONSES}x{REFERENCES} FRFs, 0.25 Hz lines; largest error over the modes, mean of draws")
+    print(f"{'noise':>6} {'program':>10} {'f %':>9} {'zeta %':>9} {'time s':>8} {'sets with all modes':>20}")
+    ratios = []
+    with tempfile.TemporaryDirectory() as folder:
+        for noise in (0.0, 0.02, 0.05):
+            rows = {"lobestone": [], "sdypy-EMA": []}
+            for seed in range(DRAWS):
+                f, h = make(noise, seed)
+                path = f"{folder}/set.csv"
+                write_csv(path, f, h)
+                for name, (found, took) in (("lobestone", lobestone(binary, path)), ("sdypy-EMA", sdypy(f, h))):
+                    rows[name].append((errors(found), took))
+            times = {}
+            for name, row in rows.items():
+                whole = [r[0] for r in row if r[0] is not None]
+                mean = np.mean(whole, axis=0) if whole else [np.nan, np.nan]
+                times[name] = np.median([r[1] for r in row])
+                print(f"{100 * noise:5.0f}% {name:>10} {mean[0]:9.4f} {mean[1]:9.3f} {times[name]:8.3f} {len(whole):>14} of {DRAWS}")
+            ratios.append(times["sdypy-EMA"] / times["lobestone"])
+    print("time ratio sdypy-EMA / lobestone:", ", ".join(f"{r:.1f}" for r in ratios))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,495 @@
+//! FRFs from raw tap tests: hits are found and judged, windowed, averaged.
+//!
+//! A force window leaves only the contact; where the response has not died out at the end of the block, the same
+//! exponential window on force and response ends it. Multiplying both by e^(−t/τ) shifts every pole by −1/τ
+//! (McConnell & Varoto 2008, ch. 5), so the damping that it adds is known: ζ_true = ζ_fit − 1/(τ ω).
+
+use num_complex::Complex64;
+use realfft::RealFftPlanner;
+
+use super::hits::{self, Hit};
+use crate::signal::{median, quantile};
+use crate::{InputError, Result};
+
+/// The window ends the response at this part of its size …
+const END_LEVEL: f64 = 0.01;
+/// … where it has not fallen below this by itself.
+const DIED_OUT: f64 = 0.02;
+/// Force power below this part of its largest excites nothing.
+const EXCITED: f64 = 0.01;
+/// A hit whose misfit to the others' FRF is this many times the usual one, and this large, is inconsistent.
+const INCONSISTENT: [f64; 2] = [6.0, 0.05];
+
+/// Estimator of the FRF from averaged spectra.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Estimator {
+    /// S_xf/S_ff: noise on the response averages out.
+    #[default]
+    H1,
+    /// S_xx/S_fx: noise on the force averages out.
+    H2,
+    /// Geometric mean of both, with the phase of either.
+    Hv,
+}
+
+/// A raw record of one hammer and several sensors.
+#[derive(Debug, Clone, Copy)]
+pub struct TapRecord<'a> {
+    pub sample_rate_hz: f64,
+    pub force_n: &'a [f64],
+    /// Same length as the force, any unit.
+    pub responses: &'a [&'a [f64]],
+}
+
+/// How to make FRFs of hits.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct TapSettings {
+    pub estimator: Estimator,
+    /// Length of a block; from the distance of the hits where `None`.
+    pub block_s: Option<f64>,
+}
+
+/// FRFs of one record.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TapFrfs {
+    /// From 0 Hz up to where the hammer still excites.
+    pub frequency_hz: Vec<f64>,
+    /// By response: response unit per newton.
+    pub frf: Vec<Vec<Complex64>>,
+    /// By response, 0..1; `None` with a single hit, where it is one by definition.
+    pub coherence: Option<Vec<Vec<f64>>>,
+    pub hits: Vec<Hit>,
+    pub block_s: f64,
+    /// 1/τ of the exponential window (0 without one): what it adds to ζω of every mode.
+    pub added_decay_per_s: f64,
+    pub warnings: Vec<String>,
+}
+
+struct Block {
+    hit: usize,
+    force: Vec<Complex64>,
+    responses: Vec<Vec<Complex64>>,
+}
+
+/// FRFs from a record of hits.
+///
+/// # Errors
+/// Channels of different length, no hit, or no good one.
+pub fn frfs_from_hits(record: &TapRecord, settings: &TapSettings) -> Result<TapFrfs> {
+    let samples = record.force_n.len();
+    if record.responses.iter().any(|r| r.len() != samples) || !(record.sample_rate_hz > 0.0) {
+        return Err(InputError::new("the channels of a tap record are not of one length and rate").into());
+    }
+    let finite = record.responses.iter().chain([&record.force_n]).all(|c| c.iter().all(|x| x.is_finite()));
+    if !finite {
+        return Err(InputError::new("the tap record holds values that are not numbers").into());
+    }
+    let mut warnings = Vec::new();
+    let baseline = median(record.force_n);
+    let mut force: Vec<f64> = record.force_n.iter().map(|f| f - baseline).collect();
+    let (low, high) = force.iter().fold((0.0f64, 0.0f64), |(l, h), &f| (l.min(f), h.max(f)));
+    if -low > high {
+        warnings.push("the hammer pushes in the negative direction: its sign is kept in the FRFs".into());
+        force.iter_mut().for_each(|f| *f = -*f);
+    }
+    let mut found = hits::find(&force, record.responses, record.sample_rate_hz, settings.block_s);
+    if found.hits.is_empty() {
+        return Err(InputError::new("no hit found in the force channel")
+            .remedy("check which channel is the hammer; a hit must stand ten times out of its noise")
+            .into());
+    }
+    let sign = if -low > high { -1.0 } else { 1.0 };
+    let decay_per_s = added_decay(record, &found);
+    let blocks = spectra(record, &force, sign, &found, decay_per_s);
+    let kept = consistent(&blocks, &mut found.hits);
+    let good: Vec<&Block> = blocks.iter().filter(|b| kept.contains(&b.hit)).collect();
+    let left_out: Vec<String> = found
+        .hits
+        .iter()
+        .enumerate()
+        .filter_map(|(k, h)| Some(format!("hit {} at {:.2} s: {}", k + 1, h.time_s, h.left_out.as_ref()?)))
+        .collect();
+    if good.is_empty() {
+        return Err(InputError::new(format!("no good hit: {}", left_out.join("; ")))
+            .remedy("tap again: single, clean hits, with the response died out before the next")
+            .into());
+    }
+    if !left_out.is_empty() {
+        warnings.push(format!(
+            "{} of {} hits left out: {}",
+            left_out.len(),
+            found.hits.len(),
+            left_out.join("; ")
+        ));
+    }
+    if good.len() == 1 {
+        warnings.push("a single good hit: no coherence, noise is not averaged".into());
+    }
+    if decay_per_s > 0.0 {
+        warnings.push(format!(
+            "the responses have not died out after {:.2} s: exponential window, adds {:.2}/s to ζω, taken out of the \
+             damping ratios",
+            found.block as f64 / record.sample_rate_hz,
+            decay_per_s
+        ));
+    }
+    let lines = excited_lines(&good);
+    let resolution_hz = record.sample_rate_hz / found.block as f64;
+    let (mut frf, mut coherence) = (Vec::new(), Vec::new());
+    for response in 0..record.responses.len() {
+        let (h, gamma2) = average(&good, response, lines, settings.estimator);
+        frf.push(h);
+        coherence.push(gamma2);
+    }
+    Ok(TapFrfs {
+        frequency_hz: (0..lines).map(|k| k as f64 * resolution_hz).collect(),
+        frf,
+        coherence: (good.len() > 1).then_some(coherence),
+        hits: found.hits,
+        block_s: found.block as f64 / record.sample_rate_hz,
+        added_decay_per_s: decay_per_s,
+        warnings,
+    })
+}
+
+/// 1/τ that ends the slowest response, 0 where all die out.
+fn added_decay(record: &TapRecord, found: &hits::Hits) -> f64 {
+    let mut worst: f64 = 0.0;
+    for hit in found.hits.iter().filter(|h| h.left_out.is_none()) {
+        for response in record.responses {
+            let to = (hit.from + found.block).min(response.len());
+            let after = &response[hit.contact[1].min(to)..to];
+            let quarter = after.len() / 8;
+            if quarter < 4 {
+                continue;
+            }
+            let size = |s: &[f64]| {
+                let mean = s.iter().sum::<f64>() / s.len() as f64;
+                (s.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / s.len() as f64).sqrt()
+            };
+            // What was there before the hit is noise and does not die out.
+            let noise = size(&response[hit.from..hit.contact[0].max(hit.from + 2)]);
+            let (first, last) = (size(&after[..quarter]), size(&after[after.len() - quarter..]));
+            let left = (last * last - noise * noise).max(0.0).sqrt();
+            if first > 0.0 {
+                worst = worst.max(left / first);
+            }
+        }
+    }
+    if worst < DIED_OUT {
+        return 0.0;
+    }
+    let length_s = found.block as f64 / record.sample_rate_hz;
+    (worst / END_LEVEL).ln() / length_s
+}
+
+fn spectra(record: &TapRecord, force: &[f64], sign: f64, found: &hits::Hits, decay_per_s: f64) -> Vec<Block> {
+    let mut planner = RealFftPlanner::<f64>::new();
+    let plan = planner.plan_fft_forward(found.block);
+    let rate = record.sample_rate_hz;
+    let transform = |mut samples: Vec<f64>| {
+        let mut out = plan.make_output_vec();
+        // Lengths are those of the plan.
+        let done = plan.process(&mut samples, &mut out);
+        debug_assert!(done.is_ok());
+        out
+    };
+    found
+        .hits
+        .iter()
+        .enumerate()
+        .filter(|(_, hit)| hit.left_out.is_none())
+        .map(|(index, hit)| {
+            let origin = hit.contact[0] - hit.from;
+            let fade = |k: usize| (-decay_per_s * (k as f64 - origin as f64).max(0.0) / rate).exp();
+            // The contact and as much again on either side, with a raised-cosine edge.
+            let margin = (hit.contact[1] - hit.contact[0] + 1).max(4);
+            let (open, close) = (hit.contact[0].saturating_sub(margin), hit.contact[1] + margin);
+            let edge = margin as f64;
+            let windowed = (0..found.block).map(|k| {
+                let at = hit.from + k;
+                let outside = open.saturating_sub(at).max(at.saturating_sub(close)) as f64;
+                let window = 0.5 * (1.0 + (std::f64::consts::PI * (outside / edge).min(1.0)).cos());
+                force.get(at).map_or(0.0, |f| sign * f * window * fade(k))
+            });
+            let force = transform(windowed.collect());
+            let responses = record
+                .responses
+                .iter()
+                .map(|r| {
+                    // Offset of the sensor: what it shows before the hit.
+                    let before = &r[hit.from..hit.contact[0].max(hit.from + 1)];
+                    let offset = before.iter().sum::<f64>() / before.len() as f64;
+                    let block = (0..found.block).map(|k| r.get(hit.from + k).map_or(0.0, |x| (x - offset) * fade(k)));
+                    transform(block.collect())
+                })
+                .collect();
+            Block {
+                hit: index,
+                force,
+                responses,
+            }
+        })
+        .collect()
+}
+
+/// Indices of the hits that agree with the others; the rest is marked.
+fn consistent(blocks: &[Block], hits: &mut [Hit]) -> Vec<usize> {
+    let all: Vec<usize> = blocks.iter().map(|b| b.hit).collect();
+    if blocks.len() < 3 {
+        return all;
+    }
+    let everything: Vec<&Block> = blocks.iter().collect();
+    let lines = excited_lines(&everything);
+    let misfit: Vec<f64> = blocks
+        .iter()
+        .map(|block| {
+            let others: Vec<&Block> = blocks.iter().filter(|b| b.hit != block.hit).collect();
+            (0..block.responses.len())
+                .map(|r| {
+                    // The median over the others, line by line: one bad hit among them does not count.
+                    let (mut error, mut total) = (0.0, 0.0);
+                    for k in 1..lines {
+                        let part = |of: fn(Complex64) -> f64| {
+                            let values: Vec<f64> =
+                                others.iter().map(|b| of(b.responses[r][k] / b.force[k])).collect();
+                            median(&values)
+                        };
+                        let usual = Complex64::new(part(|z| z.re), part(|z| z.im));
+                        error += (block.responses[r][k] - usual * block.force[k]).norm_sqr();
+                        total += block.responses[r][k].norm_sqr();
+                    }
+                    if total > 0.0 { error / total } else { 0.0 }
+                })
+                .fold(0.0, f64::max)
+        })
+        .collect();
+    let usual = quantile(&misfit, 0.4);
+    let mut kept = Vec::new();
+    for (block, misfit) in blocks.iter().zip(&misfit) {
+        if *misfit > (INCONSISTENT[0] * usual).max(INCONSISTENT[1]) {
+            hits[block.hit].left_out = Some(format!(
+                "inconsistent: its response differs from what the other hits predict by {:.0} %",
+                100.0 * misfit.sqrt().min(9.99)
+            ));
+        } else {
+            kept.push(block.hit);
+        }
+    }
+    // Where most disagree nobody can say which are right.
+    if 2 * kept.len() <= blocks.len() {
+        for block in blocks {
+            hits[block.hit].left_out = None;
+        }
+        return all;
+    }
+    kept
+}
+
+/// Lines from 0 Hz that the hammer excites.
+fn excited_lines(blocks: &[&Block]) -> usize {
+    let count = blocks.first().map_or(0, |b| b.force.len());
+    let power: Vec<f64> = (0..count).map(|k| blocks.iter().map(|b| b.force[k].norm_sqr()).sum()).collect();
+    let largest = power.iter().copied().fold(0.0, f64::max);
+    // The first line at which the smoothed force has fallen: beyond it only side lobes.
+    let reach = (count / 200).max(2);
+    for k in 0..count {
+        let near = &power[k.saturating_sub(reach)..(k + reach + 1).min(count)];
+        if near.iter().sum::<f64>() < EXCITED * largest * near.len() as f64 {
+            return k.max(8).min(count);
+        }
+    }
+    count
+}
+
+fn average(blocks: &[&Block], response: usize, lines: usize, estimator: Estimator) -> (Vec<Complex64>, Vec<f64>) {
+    (0..lines)
+        .map(|k| {
+            let (mut sff, mut sxx, mut sxf) = (0.0, 0.0, Complex64::ZERO);
+            for block in blocks {
+                let (f, x) = (block.force[k], block.responses[response][k]);
+                sff += f.norm_sqr();
+                sxx += x.norm_sqr();
+                sxf += x * f.conj();
+            }
+            let h1 = sxf / sff;
+            // S_xx/S_fx with S_fx = conj(S_xf).
+            let h2 = if sxf.norm_sqr() > 0.0 { sxx / sxf.conj() } else { Complex64::ZERO };
+            let h = match estimator {
+                Estimator::H1 => h1,
+                Estimator::H2 => h2,
+                Estimator::Hv => Complex64::from_polar((h1.norm() * h2.norm()).sqrt(), h1.arg()),
+            };
+            let gamma2 = if sff * sxx > 0.0 { (sxf.norm_sqr() / (sff * sxx)).min(1.0) } else { 0.0 };
+            (if h.re.is_finite() && h.im.is_finite() { h } else { Complex64::ZERO }, gamma2)
+        })
+        .unzip()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::modal::{Settings, analyse_frf};
+
+    const RATE_HZ: f64 = 2000.0;
+    const F0_HZ: f64 = 12.0;
+    const MASS_KG: f64 = 50.0;
+
+    struct Bench {
+        force: Vec<f64>,
+        acceleration: Vec<f64>,
+    }
+
+    /// Half-sine hits of 4 ms on a mass on a spring: exact acceleration by its impulse response, and noise.
+    fn bench(zeta: f64, hits: &[(f64, f64)], length_s: f64) -> Bench {
+        let n = (length_s * RATE_HZ) as usize;
+        let mut force = vec![0.0; n];
+        for &(at_s, peak_n) in hits {
+            let from = (at_s * RATE_HZ) as usize;
+            for k in 0..8 {
+                force[from + k] += peak_n * (std::f64::consts::PI * (k as f64 + 0.5) / 8.0).sin();
+            }
+        }
+        let (w0, dt) = (std::f64::consts::TAU * F0_HZ, 1.0 / RATE_HZ);
+        let (mut x, mut v) = (0.0f64, 0.0f64);
+        let mut acceleration = Vec::with_capacity(n);
+        // Many small steps: the error of the integration is far below the marks.
+        const STEPS: usize = 40;
+        for f in &force {
+            let a = |x: f64, v: f64| f / MASS_KG - 2.0 * zeta * w0 * v - w0 * w0 * x;
+            acceleration.push(a(x, v));
+            for _ in 0..STEPS {
+                let h = dt / STEPS as f64;
+                let middle = (x + 0.5 * h * v, v + 0.5 * h * a(x, v));
+                (x, v) = (x + h * middle.1, v + h * a(middle.0, middle.1));
+            }
+        }
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        for (f, a) in force.iter_mut().zip(&mut acceleration) {
+            *f += random.random_range(-0.2..0.2);
+            *a += random.random_range(-0.002..0.002);
+        }
+        Bench { force, acceleration }
+    }
+
+    fn frfs(bench: &Bench) -> Result<TapFrfs> {
+        let record = TapRecord {
+            sample_rate_hz: RATE_HZ,
+            force_n: &bench.force,
+            responses: &[&bench.acceleration],
+        };
+        frfs_from_hits(&record, &TapSettings::default())
+    }
+
+    /// Frequency and damping of the mode, window taken out.
+    fn mode(found: &TapFrfs) -> (f64, f64) {
+        let receptance: Vec<Complex64> = found
+            .frequency_hz
+            .iter()
+            .zip(&found.frf[0])
+            .map(|(f, h)| -h / (std::f64::consts::TAU * f).powi(2))
+            .collect();
+        let settings = Settings {
+            band_hz: Some([3.0, 60.0]),
+        };
+        let modes = analyse_frf(&found.frequency_hz, &receptance, &settings).unwrap().modes;
+        assert_eq!(modes.len(), 1, "{modes:?}");
+        let best = modes[0].best();
+        let added = found.added_decay_per_s / (std::f64::consts::TAU * best.frequency_hz);
+        (best.frequency_hz, best.damping_ratio - added)
+    }
+
+    #[test]
+    fn clean_hits_give_the_mode_and_full_coherence() {
+        let found = frfs(&bench(0.03, &[(1.0, 300.0), (5.0, 250.0), (9.1, 320.0), (13.0, 280.0)], 17.0)).unwrap();
+        assert_eq!(found.hits.iter().filter(|h| h.left_out.is_none()).count(), 4, "{:?}", found.hits);
+        let (f, zeta) = mode(&found);
+        assert!((f / F0_HZ - 1.0).abs() < 2e-3 && (zeta / 0.03 - 1.0).abs() < 0.02, "{f} {zeta}");
+        let gamma2 = &found.coherence.as_ref().unwrap()[0];
+        let at = found.frequency_hz.iter().position(|f| *f > F0_HZ).unwrap();
+        assert!(gamma2[at] > 0.99);
+        // Inertia line of accelerance far above the mode.
+        let high = found.frequency_hz.iter().position(|f| *f > 90.0).unwrap();
+        assert!((found.frf[0][high].norm() * MASS_KG - 1.0).abs() < 0.05);
+    }
+
+    #[test]
+    fn the_damping_of_the_exponential_window_is_taken_back_out() {
+        // Blocks of two seconds: at ζ = 0.5 % the response is still at half its size.
+        let found = frfs(&bench(0.005, &[(1.0, 300.0), (3.1, 300.0), (5.2, 300.0)], 7.4)).unwrap();
+        assert!(found.added_decay_per_s > 0.5, "{}", found.added_decay_per_s);
+        assert!(found.warnings.iter().any(|w| w.contains("exponential window")));
+        let (f, zeta) = mode(&found);
+        // What one hit left moving when the next came cannot be taken out; it is a few per cent here.
+        assert!((f / F0_HZ - 1.0).abs() < 3e-3 && (zeta / 0.005 - 1.0).abs() < 0.25, "{f} {zeta}");
+    }
+
+    #[test]
+    fn bad_hits_are_named_and_left_out() {
+        let clean = [(1.0, 300.0), (5.0, 250.0), (9.0, 320.0), (13.0, 280.0), (17.0, 290.0)];
+        let faulty = |change: &dyn Fn(&mut Bench), extra: &[(f64, f64)]| {
+            let hits: Vec<(f64, f64)> = clean.iter().chain(extra).copied().collect();
+            let mut bench = bench(0.03, &hits, 21.0);
+            change(&mut bench);
+            let found = frfs(&bench).unwrap();
+            let faults: Vec<(usize, String)> = found
+                .hits
+                .iter()
+                .enumerate()
+                .filter_map(|(k, h)| Some((k, h.left_out.clone()?)))
+                .collect();
+            let (f, zeta) = mode(&found);
+            assert!((f / F0_HZ - 1.0).abs() < 3e-3 && (zeta / 0.03 - 1.0).abs() < 0.03, "{f} {zeta}");
+            faults
+        };
+        let nothing = |_: &mut Bench| {};
+        assert!(faulty(&nothing, &[]).is_empty());
+        let cases: [(&str, Vec<(usize, String)>); 4] = [
+            ("double hit", faulty(&nothing, &[(5.03, 100.0)])),
+            (
+                "force is clipped",
+                faulty(&|b| b.force.iter_mut().for_each(|f| *f = f.min(300.0)), &[]),
+            ),
+            (
+                "late bump",
+                faulty(
+                    &|b| {
+                        for k in 0..600 {
+                            let t = k as f64 / RATE_HZ;
+                            b.acceleration[(11.5 * RATE_HZ) as usize + k] += 4.0 * (t * 200.0).sin() * (-t * 8.0).exp();
+                        }
+                    },
+                    &[],
+                ),
+            ),
+            (
+                "inconsistent",
+                faulty(
+                    &|b| {
+                        let from = (13.0 * RATE_HZ) as usize;
+                        b.acceleration[from - 10..from + 7000].iter_mut().for_each(|a| *a *= -0.6);
+                    },
+                    &[],
+                ),
+            ),
+        ];
+        for ((expected, faults), index) in cases.iter().zip([1, 2, 2, 3]) {
+            assert_eq!(faults.len(), 1, "{expected}: {faults:?}");
+            assert_eq!(faults[0].0, index, "{expected}: {faults:?}");
+            assert!(faults[0].1.contains(expected), "{expected}: {faults:?}");
+        }
+    }
+
+    #[test]
+    fn silence_is_an_error_and_not_an_frf() {
+        let silent = Bench {
+            force: vec![0.0; 1000],
+            acceleration: vec![0.0; 1000],
+        };
+        assert!(frfs(&silent).unwrap_err().to_string().contains("no hit"));
+    }
+}

@@ -1,0 +1,166 @@
+//! Is an FRF, is a set of FRFs, good enough to trust its modes?
+
+use num_complex::Complex64;
+use serde::Serialize;
+
+use super::Reconstruction;
+
+/// Noise against the FRF's size up to which it is good, and from which it is bad.
+const NOISE: [f64; 2] = [0.1, 0.5];
+/// Part of the FRF that the common modes leave unexplained beyond its noise: good up to, bad from.
+const UNEXPLAINED: [f64; 2] = [0.1, 0.4];
+/// Power-weighted coherence: good from, bad below.
+const COHERENCE: [f64; 2] = [0.9, 0.6];
+/// Difference of an FRF and its mirror over their size beyond noise: good up to, bad from.
+const RECIPROCITY: [f64; 2] = [0.1, 0.4];
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    Good,
+    Doubtful,
+    Bad,
+}
+
+/// What speaks for and against an FRF.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Quality {
+    pub verdict: Verdict,
+    /// sqrt(Σσ²/Σ|H|²) in the band.
+    pub noise_nrms: Option<f64>,
+    /// sqrt(Σ|H − modes|²/Σ|H|²).
+    pub reconstruction_nrms: Option<f64>,
+    /// Mean over the lines, weighted with |H|².
+    pub coherence: Option<f64>,
+    /// Against the mirrored FRF, where it was measured too.
+    pub reciprocity_nrms: Option<f64>,
+    /// What is wrong, in words; empty for a good one.
+    pub reasons: Vec<String>,
+}
+
+/// Judges one FRF. `coherence` is on the FRF's own lines; `mirror` the FRF with response and reference exchanged.
+pub fn judge(
+    frequency_hz: &[f64],
+    receptance_m_per_n: &[Complex64],
+    coherence: Option<&[f64]>,
+    fit: Option<&Reconstruction>,
+    mirror: Option<&Reconstruction>,
+) -> Quality {
+    let mut quality = Quality {
+        verdict: Verdict::Good,
+        noise_nrms: fit.map(|f| f.noise_nrms),
+        reconstruction_nrms: fit.map(|f| f.error_nrms),
+        coherence: coherence.and_then(|c| weighted(c, frequency_hz, receptance_m_per_n, fit)),
+        reciprocity_nrms: None,
+        reasons: Vec::new(),
+    };
+    let mut note = |value: f64, limits: [f64; 2], what: String| {
+        // Limits that fall are those of something that should be large.
+        let (good, bad) = if limits[0] <= limits[1] {
+            (value <= limits[0], value > limits[1])
+        } else {
+            (value >= limits[0], value < limits[1])
+        };
+        if !good {
+            quality.verdict = quality.verdict.max(if bad { Verdict::Bad } else { Verdict::Doubtful });
+            quality.reasons.push(what);
+        }
+    };
+    if let Some(noise) = quality.noise_nrms {
+        note(noise, NOISE, format!("noise of {:.0} %", 100.0 * noise));
+    }
+    if let Some(fit) = fit {
+        let beyond = (fit.error_nrms.powi(2) - fit.noise_nrms.powi(2)).max(0.0).sqrt();
+        note(beyond, UNEXPLAINED, format!("{:.0} % is no common mode and no noise", 100.0 * beyond));
+    } else {
+        quality.verdict = Verdict::Bad;
+        quality.reasons.push("zero, or too few lines".into());
+        return quality;
+    }
+    if let Some(mean) = quality.coherence {
+        note(mean, COHERENCE, format!("coherence of {mean:.2}"));
+    }
+    if let (Some(fit), Some(mirror)) = (fit, mirror)
+        && fit.frequency_hz == mirror.frequency_hz
+    {
+        let (mut difference, mut size) = (0.0, 0.0);
+        for (a, b) in fit.measured_m_per_n.iter().zip(&mirror.measured_m_per_n) {
+            difference += (a - b).norm_sqr();
+            size += 0.5 * (a.norm_sqr() + b.norm_sqr());
+        }
+        let noise = fit.noise_nrms.powi(2) + mirror.noise_nrms.powi(2);
+        let beyond = (difference / size - noise).max(0.0).sqrt();
+        if beyond.is_finite() {
+            quality.reciprocity_nrms = Some((difference / size).sqrt());
+            note(beyond, RECIPROCITY, format!("reciprocity fails by {:.0} %", 100.0 * beyond));
+        }
+    }
+    quality
+}
+
+fn weighted(coherence: &[f64], f: &[f64], h: &[Complex64], fit: Option<&Reconstruction>) -> Option<f64> {
+    let band = fit.map_or([0.0, f64::INFINITY], |r| {
+        [r.frequency_hz[0], r.frequency_hz.last().copied().unwrap_or(f64::INFINITY)]
+    });
+    let (mut sum, mut total) = (0.0, 0.0);
+    for ((c, f), h) in coherence.iter().zip(f).zip(h) {
+        if *f >= band[0] && *f <= band[1] && *f > 0.0 && h.norm_sqr().is_finite() {
+            sum += c * h.norm_sqr();
+            total += h.norm_sqr();
+        }
+    }
+    (total > 0.0).then(|| sum / total)
+}
+
+/// One sentence about a set.
+pub fn of_set(qualities: &[&Quality]) -> (Verdict, String) {
+    let count = |v: Verdict| qualities.iter().filter(|q| q.verdict == v).count();
+    let (good, doubtful, bad) = (count(Verdict::Good), count(Verdict::Doubtful), count(Verdict::Bad));
+    let all = qualities.len();
+    let verdict = if 2 * bad > all || all == 0 {
+        Verdict::Bad
+    } else if bad > 0 || 2 * doubtful > all {
+        Verdict::Doubtful
+    } else {
+        Verdict::Good
+    };
+    (verdict, format!("{good} of {all} FRFs good, {doubtful} doubtful, {bad} bad"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fit(error: f64, noise: f64, factor: f64) -> Reconstruction {
+        let h = vec![Complex64::from(factor); 4];
+        Reconstruction {
+            error_nrms: error,
+            noise_nrms: noise,
+            frequency_hz: vec![1.0, 2.0, 3.0, 4.0],
+            measured_m_per_n: h.clone(),
+            fitted_m_per_n: h,
+        }
+    }
+
+    #[test]
+    fn every_fault_is_named() {
+        let f = [1.0, 2.0, 3.0, 4.0];
+        let h = [Complex64::ONE; 4];
+        let of = |coherence: Option<&[f64]>, r: Option<&Reconstruction>, m: Option<&Reconstruction>| {
+            judge(&f, &h, coherence, r, m)
+        };
+        let good = fit(0.03, 0.03, 1.0);
+        assert_eq!(of(Some(&[0.99; 4]), Some(&good), Some(&good)).verdict, Verdict::Good);
+        let cases = [
+            (of(None, Some(&fit(0.6, 0.6, 1.0)), None), "noise"),
+            (of(None, Some(&fit(0.6, 0.03, 1.0)), None), "no common mode"),
+            (of(Some(&[0.3; 4]), Some(&good), None), "coherence"),
+            (of(None, Some(&good), Some(&fit(0.03, 0.03, 2.0))), "reciprocity"),
+            (of(None, None, None), "too few lines"),
+        ];
+        for (quality, expected) in cases {
+            assert_eq!(quality.verdict, Verdict::Bad, "{quality:?}");
+            assert!(quality.reasons[0].contains(expected), "{quality:?}");
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! Stabilisation diagram: poles over the model order, on top of the sum of the measured FRFs.
+
+use super::axis::{Axis, extent, positive_extent, usable};
+use super::canvas::{Marker, paint};
+use super::panel::{Header, Panel, Swatch};
+use super::{WIDTH, nothing_to_draw, style};
+use crate::Result;
+
+/// One pole of one order.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StabilisationPole {
+    pub frequency_hz: f64,
+    pub order: usize,
+    /// Frequency, damping and shape stay from the order below.
+    pub stable: bool,
+}
+
+#[derive(Debug, Clone, Default)]
+pub struct StabilisationFigure {
+    pub title: String,
+    pub poles: Vec<StabilisationPole>,
+    /// Modes that were taken, Hz.
+    pub chosen_hz: Vec<f64>,
+    /// Frequency and size (any unit) of the measurement, drawn behind on a log scale.
+    pub measured: Vec<(f64, f64)>,
+}
+
+impl StabilisationFigure {
+    /// # Errors
+    /// No pole with a finite frequency.
+    pub fn png(&self) -> Result<Vec<u8>> {
+        let frequencies = self.measured.iter().map(|m| m.0).chain(self.poles.iter().map(|p| p.frequency_hz));
+        let orders = self.poles.iter().map(|p| p.order as f64);
+        let (Some(frequencies), Some((_, highest))) = (extent(frequencies.filter(|f| usable(*f))), extent(orders)) else {
+            return Err(nothing_to_draw(&self.title, "no poles"));
+        };
+        let x = Axis::linear("Frequency (Hz)", frequencies, 10);
+        let y = Axis::from_zero("Model order", (0.0, highest), 8);
+        let left = Panel::left_margin(&[&y]);
+        let right = f64::from(WIDTH) - 40.0;
+        let (stable, other) = (style::BLUE, style::GREY);
+        let legend = [
+            (Swatch::Sign(Marker::Disc, 3.0, stable), "stable in frequency, damping and shape".to_string()),
+            (Swatch::Sign(Marker::Ring, 3.0, other), "other poles".to_string()),
+            (Swatch::Line(style::LEVEL), "modes taken; behind: sum of the FRFs (log)".to_string()),
+        ];
+        let header = Header::new(&self.title, &legend, left, right);
+        let top = header.bottom();
+        let panel = Panel {
+            left,
+            top,
+            right,
+            bottom: top + 520.0,
+            x,
+            y,
+            x_labels: true,
+        };
+        // The measurement's own log scale, mapped to the orders' axis.
+        let sizes = positive_extent(self.measured.iter().map(|m| m.1));
+        let behind = sizes.map(|(low, high)| {
+            let (low, span) = (low.ln(), (high / low).ln().max(1e-9));
+            let top = panel.y.high;
+            self.measured
+                .iter()
+                .filter(|m| m.1 > 0.0)
+                .map(|m| (m.0, top * (m.1.ln() - low) / span))
+                .collect::<Vec<_>>()
+        });
+        paint(WIDTH, (panel.bottom + Panel::BOTTOM_MARGIN) as u32, |canvas| {
+            header.draw(canvas);
+            panel.grid(canvas);
+            if let Some(points) = behind {
+                panel.curve(canvas, points, style::FRAME);
+            }
+            for f in &self.chosen_hz {
+                panel.curve(canvas, [(*f, 0.0), (*f, panel.y.high)], style::LEVEL);
+            }
+            for (is_stable, marker, color) in [(false, Marker::Ring, other), (true, Marker::Disc, stable)] {
+                let points = self.poles.iter().filter(|p| p.stable == is_stable);
+                panel.markers(canvas, points.map(|p| (p.frequency_hz, p.order as f64)), (marker, 3.0), color, 3.0);
+            }
+            panel.frame(canvas);
+        })
+    }
+}

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use lobestone::lobes::{ModalFrf, Mode, RegenerativeForce, StabilitySolver, speed_grid};
+use lobestone::lobes::{ModalFrf, Mode, RegenerativeForce, SpeedLimit, StabilitySolver, speed_grid};
 
 fn robot() -> ModalFrf {
     let modes = (0..12)

@@ -6,7 +6,7 @@ use crate::identify::case::structure_model;
 use crate::identify::{Options, StructureCase};
 use crate::lobes::measured::measured_structures;
 use crate::lobes::setup::{LobeCoefficients, coefficients_from_cuts, force_of, frf_of_modes};
-use crate::lobes::{AbsoluteLimit, DirectFrf, LobeCurve, Peak, RobotFrf, StabilitySolver, speed_grid};
+use crate::lobes::{AbsoluteLimit, DirectFrf, LobeCurve, Peak, RobotFrf, SpeedLimit, StabilitySolver, speed_grid};
 use crate::{InputError, Result};
 
 /// Best speeds that are listed.

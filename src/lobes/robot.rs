@@ -77,7 +77,7 @@ impl DirectFrf for RobotFrf {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lobes::{ModalFrf, Mode, RegenerativeForce, StabilitySolver, speed_grid};
+    use crate::lobes::{ModalFrf, Mode, RegenerativeForce, SpeedLimit, StabilitySolver, speed_grid};
     use crate::robot::fixture::{TAP_POSTURES, irb6640};
     use crate::robot::{Baseline, ModalBasis};
 

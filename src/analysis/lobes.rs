@@ -5,8 +5,13 @@ use crate::identify::calibrate::calibrate;
 use crate::identify::case::structure_model;
 use crate::identify::{Options, StructureCase};
 use crate::lobes::measured::measured_structures;
-use crate::lobes::setup::{LobeCoefficients, coefficients_from_cuts, force_of, frf_of_modes};
-use crate::lobes::{AbsoluteLimit, DirectFrf, LobeCurve, Peak, RobotFrf, SpeedLimit, StabilitySolver, speed_grid};
+use crate::lobes::setup::{Cut, LobeCoefficients, coefficients_from_cuts, cut_of, frf_of_modes};
+use crate::lobes::{
+    AbsoluteLimit, DirectFrf, LobeCurve, MultiFrequency, Peak, RobotFrf, SemiDiscretisation, SpeedLimit,
+    StabilitySolver, StateSpace, speed_grid,
+};
+use super::redundancy::{self, RedundancyAnalysis};
+use crate::identify::structure::StructureModel;
 use crate::{InputError, Result};
 
 /// Best speeds that are listed.
@@ -37,6 +42,8 @@ pub struct LobeAnalysis {
     pub teeth: usize,
     pub spindle_rpm: [f64; 3],
     pub cases: Vec<LobeCase>,
+    /// Where the campaign asks for the surface over the redundancy angle: its angles are the cases.
+    pub redundancy: Option<RedundancyAnalysis>,
     pub warnings: Vec<String>,
 }
 
@@ -44,7 +51,60 @@ pub struct LobeAnalysis {
 struct Structure {
     posture: Option<String>,
     frf: Box<dyn DirectFrf>,
+    /// The same as first-order equations; only where the method steps through time.
+    states: Option<StateSpace>,
     description: String,
+}
+
+impl Structure {
+    fn method(&self, cut: &Cut) -> Box<dyn SpeedLimit + '_> {
+        let frf = self.frf.as_ref();
+        match (cut, &self.states) {
+            (Cut::Averaged(force), _) => Box::new(StabilitySolver::new(*force, frf)),
+            (Cut::Periodic(force), Some(states)) => Box::new(SemiDiscretisation::new(*force, states.clone(), frf)),
+            (Cut::Periodic(force), None) => Box::new(MultiFrequency::new(*force, frf)),
+        }
+    }
+
+    fn case(self, cut: &Cut, speeds: &[f64]) -> LobeCase {
+        let method = self.method(cut);
+        let curve = method.curve(speeds);
+        let (absolute, best) = (method.absolute_limit().or(curve.least()), method.best(&curve, BEST));
+        drop(method);
+        LobeCase {
+            posture: self.posture,
+            angle_deg: None,
+            description: self.description,
+            band_hz: self.frf.band_hz(),
+            absolute,
+            best,
+            curve,
+        }
+    }
+}
+
+/// The robot model that lobes are computed from.
+pub(super) struct ModelState {
+    pub model: StructureModel,
+    pub theta: Vec<f64>,
+    pub description: String,
+}
+
+impl ModelState {
+    fn robot_frf(&self, joints_deg: &[f64]) -> Result<RobotFrf> {
+        let kinematics = self.model.robot.kinematics(joints_deg)?;
+        let chain = self.model.chain(&self.theta, &kinematics, 0.0, false);
+        RobotFrf::new(&self.model.robot, &kinematics, &chain)
+    }
+
+    /// The tool point's FRF, as a modal sum where the modes are not coupled.
+    pub fn frf(&self, joints_deg: &[f64]) -> Result<Box<dyn DirectFrf>> {
+        let frf = self.robot_frf(joints_deg)?;
+        Ok(match frf.modal()? {
+            Some(modal) => Box::new(modal),
+            None => Box::new(frf),
+        })
+    }
 }
 
 impl LobeAnalysis {
@@ -58,45 +118,47 @@ impl LobeAnalysis {
                 .remedy("add one with process, source and spindle_rpm = [from, to, step]")
         })?;
         let mut warnings = Vec::new();
-        if section.redundancy.is_some() {
-            warnings
-                .push("lobes.redundancy is not built yet: the measured postures are drawn instead".into());
-        }
         let coefficients = match LobeCoefficients::given(section) {
             Some(given) => given,
             None => coefficients_from_cuts(campaign, section, &mut warnings)?,
         };
-        let force = force_of(campaign, section, coefficients)?;
+        let cut = cut_of(campaign, section, coefficients)?;
+        let speeds = speed_grid(section.spindle_rpm)?;
+        let mut surface = None;
         let structures = match section.source {
             LobeSource::Modes => from_modes(campaign, section)?,
-            LobeSource::Model => from_model(campaign, &mut warnings)?,
-            LobeSource::Measured => from_measured(campaign, &mut warnings)?,
+            LobeSource::Model => {
+                let state = model_state(campaign, &mut warnings)?;
+                match &section.redundancy {
+                    Some(wanted) => {
+                        let force = cut.average();
+                        let swept = redundancy::sweep(campaign, section, wanted, &state, force, &speeds)?;
+                        surface = Some(swept);
+                        Vec::new()
+                    }
+                    None => at_postures(campaign, section, &state)?,
+                }
+            }
+            LobeSource::Measured => from_measured(campaign, section, &mut warnings)?,
         };
-        let speeds = speed_grid(section.spindle_rpm)?;
+        if section.redundancy.is_some() && surface.is_none() {
+            warnings.push("lobes.redundancy needs source = \"model\": there is no surface over the angle".into());
+        }
+        let (redundancy, swept) = surface.unzip();
         let cases = structures
             .into_iter()
-            .map(|structure| {
-                let solver = StabilitySolver::new(force, structure.frf.as_ref());
-                let curve = solver.curve(&speeds);
-                LobeCase {
-                    posture: structure.posture,
-                    angle_deg: None,
-                    description: structure.description,
-                    band_hz: structure.frf.band_hz(),
-                    absolute: solver.absolute_limit(),
-                    best: solver.best(&curve, BEST),
-                    curve,
-                }
-            })
+            .map(|structure| structure.case(&cut, &speeds))
+            .chain(swept.unwrap_or_default())
             .collect();
         Ok(LobeAnalysis {
             process: section.process,
             source: section.source,
             method: section.method,
             coefficients,
-            teeth: force.teeth,
+            teeth: cut.average().teeth,
             spindle_rpm: section.spindle_rpm,
             cases,
+            redundancy,
             warnings,
         })
     }
@@ -133,13 +195,18 @@ fn from_modes(campaign: &Campaign, section: &LobesSection) -> Result<Vec<Structu
     }
     Ok(vec![Structure {
         posture: None,
+        states: steps_through_time(section).then(|| StateSpace::from(&frf)),
         frf: Box::new(frf),
         description,
     }])
 }
 
-/// The robot model at every posture, calibrated where the campaign has FRFs.
-fn from_model(campaign: &Campaign, warnings: &mut Vec<String>) -> Result<Vec<Structure>> {
+fn steps_through_time(section: &LobesSection) -> bool {
+    section.method == LobeMethod::SemiDiscretisation
+}
+
+/// The robot model, calibrated where the campaign has FRFs.
+fn model_state(campaign: &Campaign, warnings: &mut Vec<String>) -> Result<ModelState> {
     let (model, theta, description) = if campaign.frfs.is_empty() {
         warnings.push("the campaign has no FRFs: lobes are those of the uncalibrated robot file".into());
         let model = structure_model(campaign)?;
@@ -163,22 +230,45 @@ fn from_model(campaign: &Campaign, warnings: &mut Vec<String>) -> Result<Vec<Str
             .remedy("add a [[posture]] table with id and joints_deg")
             .into());
     }
+    Ok(ModelState {
+        model,
+        theta,
+        description,
+    })
+}
+
+/// The robot model at every posture.
+fn at_postures(campaign: &Campaign, section: &LobesSection, state: &ModelState) -> Result<Vec<Structure>> {
     campaign
         .postures
         .iter()
         .map(|posture| {
-            let kinematics = model.robot.kinematics(&posture.joints_deg)?;
-            let chain = model.chain(&theta, &kinematics, 0.0, false);
+            let states = match steps_through_time(section) {
+                true => Some(state.robot_frf(&posture.joints_deg)?.state_space()?),
+                false => None,
+            };
             Ok(Structure {
                 posture: Some(posture.id.clone()),
-                frf: Box::new(RobotFrf::new(&model.robot, &kinematics, &chain)?),
-                description: description.clone(),
+                frf: state.frf(&posture.joints_deg)?,
+                states,
+                description: state.description.clone(),
             })
         })
         .collect()
 }
 
-fn from_measured(campaign: &Campaign, warnings: &mut Vec<String>) -> Result<Vec<Structure>> {
+fn from_measured(
+    campaign: &Campaign,
+    section: &LobesSection,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<Structure>> {
+    if steps_through_time(section) {
+        return Err(InputError::new("semi-discretisation needs modes, and measured FRFs are none")
+            .file(campaign.dir.join("campaign.toml"))
+            .key("lobes.method")
+            .remedy("use method = \"multi-frequency\" on the measured FRFs, or source = \"model\" or \"modes\"")
+            .into());
+    }
     let (set, read_warnings) = campaign.load_frfs()?;
     warnings.extend(read_warnings);
     let structures = measured_structures(campaign, &set)?;
@@ -190,6 +280,7 @@ fn from_measured(campaign: &Campaign, warnings: &mut Vec<String>) -> Result<Vec<
             Structure {
                 posture: Some(posture),
                 frf: Box::new(s.frf),
+                states: None,
                 description: "measured FRFs".to_string(),
             }
         })

@@ -3,6 +3,7 @@
 pub mod addition;
 pub mod campaign;
 pub mod lobes;
+mod redundancy;
 pub mod modal;
 pub mod regression_line;
 pub mod structure;
@@ -11,6 +12,7 @@ pub mod thesis_findings;
 pub use addition::Addition;
 pub use campaign::{CampaignFindings, LobeFindings, PostureFindings, StructureFindings};
 pub use lobes::{LobeAnalysis, LobeCase};
+pub use redundancy::RedundancyAnalysis;
 pub use modal::{ModalAnalysis, PostureModes};
 pub use structure::StructureAnalysis;
 pub use thesis_findings::ThesisFindings;

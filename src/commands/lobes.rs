@@ -5,8 +5,9 @@ use serde_json::{Value, json};
 use super::text::{number, table, warnings};
 use super::{CampaignArg, Outcome};
 use crate::Result;
-use crate::analysis::LobeAnalysis;
-use crate::campaign::{Campaign, Process};
+use crate::analysis::{LobeAnalysis, RedundancyAnalysis};
+use crate::campaign::{Campaign, LobeMethod, Process};
+use crate::lobes::redundancy::AngleStatus;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -53,6 +54,7 @@ fn document(analysis: &LobeAnalysis) -> Value {
                 "angle_deg": case.angle_deg,
                 "spindle_rpm": peak.spindle_rpm,
                 "depth_mm": peak.depth_mm,
+                "at_range_end": peak.at_range_end,
             })
         })
         .collect();
@@ -68,13 +70,78 @@ fn document(analysis: &LobeAnalysis) -> Value {
         "absolute_limit_mm": absolute.map(|a| a.depth_mm),
         "absolute_limit_hz": absolute.map(|a| a.chatter_hz),
         "best": best,
+        "redundancy": analysis.redundancy.as_ref().map(redundancy),
         "warnings": analysis.warnings,
     })
 }
 
+fn redundancy(found: &RedundancyAnalysis) -> Value {
+    let r = &found.recommendation;
+    json!({
+        "posture": found.posture,
+        "step_deg": found.step_deg,
+        "angles": found.angles,
+        "recommended": {
+            "spindle_rpm": r.point.spindle_rpm,
+            "angle_deg": r.point.angle_deg,
+            "depth_mm": r.point.depth_mm,
+            "speed_margin": r.speed_margin,
+            "tip_depth_mm": r.tip_depth_mm,
+            "absolute_limit_mm": r.absolute_limit.map(|a| a.depth_mm),
+            "joints_deg": r.posture.joints_deg,
+            "limit_margin_deg": r.posture.limit_margin_deg,
+            "singularity_margin": r.posture.singularity_margin,
+        },
+        "enumeration": r.enumeration,
+        "swarm": r.swarm,
+        "agree": r.agree,
+    })
+}
+
+fn redundancy_text(found: &RedundancyAnalysis) -> String {
+    let r = &found.recommendation;
+    let count = |status| found.angles.iter().filter(|a| a.status == status).count();
+    let joints: Vec<String> = r
+        .posture
+        .joints_deg
+        .iter()
+        .flatten()
+        .map(|j| format!("{j:.2}"))
+        .collect();
+    let margin = |v: Option<f64>, unit: &str| v.map_or("–".into(), |v| format!("{v:.2}{unit}"));
+    format!(
+        "\nTool of {} turned about its axis in steps of {}°: {} angles usable, {} forbidden, {} out of reach\n\
+         Recommended: {:.1} rpm at {:.1}°, safe to {:.4} mm with the speed off by up to {:.0} %\n\
+         Joints: {} degrees; nearest limit {} away, singularity margin {} of 1\n\
+         Enumeration {:.4} mm, particle swarm {:.4} mm: {}\n",
+        found.posture,
+        found.step_deg,
+        count(AngleStatus::Reachable),
+        count(AngleStatus::Forbidden),
+        count(AngleStatus::Unreachable),
+        r.point.spindle_rpm,
+        r.point.angle_deg,
+        r.point.depth_mm,
+        100.0 * r.speed_margin,
+        joints.join(", "),
+        margin(r.posture.limit_margin_deg, "°"),
+        margin(r.posture.singularity_margin, ""),
+        r.enumeration.depth_mm,
+        r.swarm.depth_mm,
+        if r.agree { "they agree" } else { "they disagree; the deeper one is given" },
+    )
+}
+
 fn text(analysis: &LobeAnalysis) -> String {
     let (process, depth) = match analysis.process {
-        Process::Milling => ("milling, zero-order", "axial depth of cut"),
+        Process::Milling => (
+            match analysis.method {
+                LobeMethod::MultiFrequency => "milling, multi-frequency",
+                LobeMethod::SemiDiscretisation => "milling, semi-discretisation",
+                LobeMethod::ZeroOrder | LobeMethod::FrequencyDomain => "milling, zero-order",
+            },
+            "axial depth of cut",
+        ),
         Process::Drilling => (
             "drilling, lateral",
             "radial width of cut, (diameter − pilot diameter)/2",
@@ -86,7 +153,9 @@ fn text(analysis: &LobeAnalysis) -> String {
         number(analysis.coefficients.ktc_n_per_mm2, 4),
         number(analysis.coefficients.krc_n_per_mm2, 4),
     );
-    for case in &analysis.cases {
+    // Over the redundancy angle all cases are alike.
+    let shown = if analysis.redundancy.is_some() { 1 } else { analysis.cases.len() };
+    for case in analysis.cases.iter().take(shown) {
         let (low, high) = case.band_hz;
         let posture = case
             .posture
@@ -129,13 +198,19 @@ fn text(analysis: &LobeAnalysis) -> String {
         "\nBest speeds between {from} and {to} rpm (steps of {step})\n{}",
         table(&header, &rows)
     );
+    if analysis.best().iter().any(|(_, peak)| peak.at_range_end) {
+        out += "A speed at the end of the range is the deepest there: the curve may rise further beyond it.\n";
+    }
+    if let Some(found) = &analysis.redundancy {
+        out += &redundancy_text(found);
+    }
     out + &warnings(&analysis.warnings)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::{Dynamometer, LobeAxis, LobeMethod, LobeMode, LobeSource, LobesSection};
+    use crate::campaign::{Dynamometer, LobeAxis, LobeMode, LobeSource, LobesSection};
     use approx::assert_relative_eq;
 
     fn campaign(source: LobeSource) -> Campaign {
@@ -167,6 +242,7 @@ mod tests {
                 teeth: Some(2),
                 immersion: None,
                 half_point_angle_deg: Some(67.5),
+                process_damping_n_per_m: None,
                 feed_per_rev_mm: None,
                 spindle_rpm: [100.0, 900.0, 1.0],
                 modes: vec![

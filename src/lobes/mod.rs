@@ -20,6 +20,7 @@ pub mod frf;
 pub mod measured;
 pub mod multi_frequency;
 pub mod periodic_force;
+pub mod redundancy;
 pub mod robot;
 pub mod sampled;
 pub mod semi_discretisation;

@@ -13,6 +13,7 @@ pub mod modal_section;
 pub mod number;
 pub mod page;
 mod parts;
+mod redundancy_section;
 pub mod structure_section;
 #[cfg(feature = "parquet")]
 pub mod tables;

@@ -1,5 +1,5 @@
 use super::*;
-use crate::lobes::curve::{LobeCurve, Peak, peak_near, peaks, speed_grid};
+use crate::lobes::curve::{LobeCurve, peak_near, peaks, speed_grid};
 use crate::campaign::Immersion;
 use crate::lobes::frf::{AxisMode, ModalFrf, Mode};
 use crate::lobes::sampled::SampledFrf;

@@ -92,7 +92,10 @@ fn main() {
             limits = surface();
             seconds = seconds.min(start.elapsed().as_secs_f64());
         }
-        println!("{}", serde_json::json!({"seconds": seconds, "absolute_limit_mm": limits}));
+        println!(
+            "{}",
+            serde_json::json!({"seconds": seconds, "absolute_limit_mm": limits})
+        );
         return;
     }
     benches();

@@ -1,21 +1,25 @@
 //! The lobes that a campaign's `[lobes]` table asks for.
 
+use super::redundancy::{self, RedundancyAnalysis};
 use crate::campaign::{Campaign, LobeMethod, LobeSource, LobesSection, Process};
 use crate::identify::calibrate::calibrate;
 use crate::identify::case::structure_model;
+use crate::identify::structure::StructureModel;
 use crate::identify::{Options, StructureCase};
+use crate::lobes::band::{self, LobeBand};
 use crate::lobes::measured::measured_structures;
 use crate::lobes::setup::{Cut, LobeCoefficients, coefficients_from_cuts, cut_of, frf_of_modes};
 use crate::lobes::{
     AbsoluteLimit, DirectFrf, LobeCurve, MultiFrequency, Peak, RobotFrf, SemiDiscretisation, SpeedLimit,
     StabilitySolver, StateSpace, speed_grid,
 };
-use super::redundancy::{self, RedundancyAnalysis};
-use crate::identify::structure::StructureModel;
 use crate::{InputError, Result};
 
 /// Best speeds that are listed.
 pub const BEST: usize = 10;
+/// Draws of the parameters for the band.
+const DRAWS: usize = 100;
+const SEED: u64 = 5;
 
 /// Lobes of one structure.
 #[derive(Debug, Clone)]
@@ -30,6 +34,8 @@ pub struct LobeCase {
     pub curve: LobeCurve,
     pub absolute: Option<AbsoluteLimit>,
     pub best: Vec<Peak>,
+    /// From the uncertainty of the calibrated parameters; averaged forces only.
+    pub band: Option<LobeBand>,
 }
 
 /// All lobes of a campaign.
@@ -53,6 +59,8 @@ struct Structure {
     frf: Box<dyn DirectFrf>,
     /// The same as first-order equations; only where the method steps through time.
     states: Option<StateSpace>,
+    /// The same structure with parameters drawn from their uncertainty.
+    variants: Vec<Box<dyn DirectFrf>>,
     description: String,
 }
 
@@ -61,7 +69,9 @@ impl Structure {
         let frf = self.frf.as_ref();
         match (cut, &self.states) {
             (Cut::Averaged(force), _) => Box::new(StabilitySolver::new(*force, frf)),
-            (Cut::Periodic(force), Some(states)) => Box::new(SemiDiscretisation::new(*force, states.clone(), frf)),
+            (Cut::Periodic(force), Some(states)) => {
+                Box::new(SemiDiscretisation::new(*force, states.clone(), frf))
+            }
             (Cut::Periodic(force), None) => Box::new(MultiFrequency::new(*force, frf)),
         }
     }
@@ -69,8 +79,22 @@ impl Structure {
     fn case(self, cut: &Cut, speeds: &[f64]) -> LobeCase {
         let method = self.method(cut);
         let curve = method.curve(speeds);
-        let (absolute, best) = (method.absolute_limit().or(curve.least()), method.best(&curve, BEST));
+        let (absolute, mut best) = (
+            method.absolute_limit().or(curve.least()),
+            method.best(&curve, BEST),
+        );
         drop(method);
+        let band = match cut {
+            Cut::Averaged(force) if !self.variants.is_empty() => {
+                let tips: Vec<f64> = best.iter().map(|p| p.spindle_rpm).collect();
+                let at_tips = band::band(*force, &self.variants, &tips);
+                for (peak, lower) in best.iter_mut().zip(at_tips.lower_mm) {
+                    peak.lower_quantile_mm = lower;
+                }
+                Some(band::band(*force, &self.variants, speeds))
+            }
+            _ => None,
+        };
         LobeCase {
             posture: self.posture,
             angle_deg: None,
@@ -78,6 +102,7 @@ impl Structure {
             band_hz: self.frf.band_hz(),
             absolute,
             best,
+            band,
             curve,
         }
     }
@@ -87,19 +112,33 @@ impl Structure {
 pub(super) struct ModelState {
     pub model: StructureModel,
     pub theta: Vec<f64>,
+    /// Parameters drawn from their uncertainty; none without a calibration.
+    pub draws: Vec<Vec<f64>>,
     pub description: String,
 }
 
 impl ModelState {
-    fn robot_frf(&self, joints_deg: &[f64]) -> Result<RobotFrf> {
+    fn robot_frf(&self, theta: &[f64], joints_deg: &[f64]) -> Result<RobotFrf> {
         let kinematics = self.model.robot.kinematics(joints_deg)?;
-        let chain = self.model.chain(&self.theta, &kinematics, 0.0, false);
+        let chain = self.model.chain(theta, &kinematics, 0.0, false);
         RobotFrf::new(&self.model.robot, &kinematics, &chain)
     }
 
     /// The tool point's FRF, as a modal sum where the modes are not coupled.
     pub fn frf(&self, joints_deg: &[f64]) -> Result<Box<dyn DirectFrf>> {
-        let frf = self.robot_frf(joints_deg)?;
+        self.frf_with(&self.theta, joints_deg)
+    }
+
+    /// The same for each draw of the parameters.
+    pub fn variants(&self, joints_deg: &[f64]) -> Result<Vec<Box<dyn DirectFrf>>> {
+        self.draws
+            .iter()
+            .map(|theta| self.frf_with(theta, joints_deg))
+            .collect()
+    }
+
+    fn frf_with(&self, theta: &[f64], joints_deg: &[f64]) -> Result<Box<dyn DirectFrf>> {
+        let frf = self.robot_frf(theta, joints_deg)?;
         Ok(match frf.modal()? {
             Some(modal) => Box::new(modal),
             None => Box::new(frf),
@@ -142,7 +181,8 @@ impl LobeAnalysis {
             LobeSource::Measured => from_measured(campaign, section, &mut warnings)?,
         };
         if section.redundancy.is_some() && surface.is_none() {
-            warnings.push("lobes.redundancy needs source = \"model\": there is no surface over the angle".into());
+            warnings
+                .push("lobes.redundancy needs source = \"model\": there is no surface over the angle".into());
         }
         let (redundancy, swept) = surface.unzip();
         let cases = structures
@@ -197,6 +237,7 @@ fn from_modes(campaign: &Campaign, section: &LobesSection) -> Result<Vec<Structu
         posture: None,
         states: steps_through_time(section).then(|| StateSpace::from(&frf)),
         frf: Box::new(frf),
+        variants: Vec::new(),
         description,
     }])
 }
@@ -207,11 +248,16 @@ fn steps_through_time(section: &LobesSection) -> bool {
 
 /// The robot model, calibrated where the campaign has FRFs.
 fn model_state(campaign: &Campaign, warnings: &mut Vec<String>) -> Result<ModelState> {
-    let (model, theta, description) = if campaign.frfs.is_empty() {
+    let (model, theta, draws, description) = if campaign.frfs.is_empty() {
         warnings.push("the campaign has no FRFs: lobes are those of the uncalibrated robot file".into());
         let model = structure_model(campaign)?;
         let theta = model.nominal_theta();
-        (model, theta, "robot model, not calibrated".to_string())
+        (
+            model,
+            theta,
+            Vec::new(),
+            "robot model, not calibrated".to_string(),
+        )
     } else {
         let case = StructureCase::load(campaign)?;
         let calibration = calibrate(&case.model, &case.data, case.options(Options::default()))?;
@@ -221,7 +267,14 @@ fn model_state(campaign: &Campaign, warnings: &mut Vec<String>) -> Result<ModelS
         };
         warnings.extend(case.warnings);
         warnings.extend(calibration.warnings());
-        (case.model, calibration.theta, description)
+        let drawn = band::draws(
+            &calibration.theta,
+            &calibration.covariance,
+            &case.model.bounds(),
+            DRAWS,
+            SEED,
+        )?;
+        (case.model, calibration.theta, drawn, description)
     };
     if campaign.postures.is_empty() {
         return Err(InputError::new("lobes from the model need at least one posture")
@@ -233,6 +286,7 @@ fn model_state(campaign: &Campaign, warnings: &mut Vec<String>) -> Result<ModelS
     Ok(ModelState {
         model,
         theta,
+        draws,
         description,
     })
 }
@@ -244,13 +298,18 @@ fn at_postures(campaign: &Campaign, section: &LobesSection, state: &ModelState) 
         .iter()
         .map(|posture| {
             let states = match steps_through_time(section) {
-                true => Some(state.robot_frf(&posture.joints_deg)?.state_space()?),
+                true => Some(
+                    state
+                        .robot_frf(&state.theta, &posture.joints_deg)?
+                        .state_space()?,
+                ),
                 false => None,
             };
             Ok(Structure {
                 posture: Some(posture.id.clone()),
                 frf: state.frf(&posture.joints_deg)?,
                 states,
+                variants: state.variants(&posture.joints_deg)?,
                 description: state.description.clone(),
             })
         })
@@ -281,6 +340,7 @@ fn from_measured(
                 posture: Some(posture),
                 frf: Box::new(s.frf),
                 states: None,
+                variants: Vec::new(),
                 description: "measured FRFs".to_string(),
             }
         })

@@ -3,8 +3,8 @@
 pub mod addition;
 pub mod campaign;
 pub mod lobes;
-mod redundancy;
 pub mod modal;
+mod redundancy;
 pub mod regression_line;
 pub mod structure;
 pub mod thesis_findings;
@@ -12,7 +12,7 @@ pub mod thesis_findings;
 pub use addition::Addition;
 pub use campaign::{CampaignFindings, LobeFindings, PostureFindings, StructureFindings};
 pub use lobes::{LobeAnalysis, LobeCase};
-pub use redundancy::RedundancyAnalysis;
 pub use modal::{ModalAnalysis, PostureModes};
+pub use redundancy::RedundancyAnalysis;
 pub use structure::StructureAnalysis;
 pub use thesis_findings::ThesisFindings;

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::lobes::{BEST, LobeCase, ModelState};
 use crate::campaign::{Campaign, LobeMethod, LobesSection, Redundancy};
+use crate::lobes::band::{QUANTILES, quantile_mm};
 use crate::lobes::redundancy::{
     AnglePosture, AngleStatus, LimitAtAngle, Recommendation, RedundancySweep, SPEED_MARGIN, agree,
     by_enumeration, by_swarm, margin_mm,
@@ -57,7 +58,10 @@ pub(super) fn sweep(
     force: RegenerativeForce,
     speeds: &[f64],
 ) -> Result<(RedundancyAnalysis, Vec<LobeCase>)> {
-    if !matches!(section.method, LobeMethod::ZeroOrder | LobeMethod::FrequencyDomain) {
+    if !matches!(
+        section.method,
+        LobeMethod::ZeroOrder | LobeMethod::FrequencyDomain
+    ) {
         return Err(InputError::new(
             "the surface over the redundancy angle is built with the zero-order method only",
         )
@@ -96,6 +100,7 @@ pub(super) fn sweep(
                 absolute: solver.absolute_limit(),
                 best: solver.best(&curve, BEST),
                 curve,
+                band: None,
             })
         })
         .collect::<Result<Vec<LobeCase>>>()?;
@@ -104,7 +109,11 @@ pub(super) fn sweep(
         state,
         force,
     };
-    let curves: Vec<(f64, &LobeCurve)> = usable.iter().zip(&cases).map(|(a, c)| (a.angle_deg, &c.curve)).collect();
+    let curves: Vec<(f64, &LobeCurve)> = usable
+        .iter()
+        .zip(&cases)
+        .map(|(a, c)| (a.angle_deg, &c.curve))
+        .collect();
     let enumeration = by_enumeration(&curves, redundancy.step_deg, &surface).ok_or_else(|| {
         Error::from(
             InputError::new("no redundancy angle can be used: all are forbidden or out of reach")
@@ -114,12 +123,22 @@ pub(super) fn sweep(
         )
     })?;
     let swarm = by_swarm([speeds[0], speeds[speeds.len() - 1]], &surface)?;
-    let point = if swarm.depth_mm > enumeration.depth_mm { swarm } else { enumeration };
+    let point = if swarm.depth_mm > enumeration.depth_mm {
+        swarm
+    } else {
+        enumeration
+    };
     let there = sweep.between(point.angle_deg);
     let frf = state.frf(&there.joints_deg.unwrap_or_default())?;
     let solver = StabilitySolver::new(force, frf.as_ref());
+    let uncertain: Vec<f64> = state
+        .variants(&there.joints_deg.unwrap_or_default())?
+        .iter()
+        .map(|frf| margin_mm(&StabilitySolver::new(force, frf.as_ref()), point.spindle_rpm))
+        .collect();
     let recommendation = Recommendation {
         point,
+        lower_quantile_mm: quantile_mm(uncertain, QUANTILES[0]),
         tip_depth_mm: solver.limit_at(point.spindle_rpm).map(|l| l.depth_mm),
         posture: there,
         absolute_limit: solver.absolute_limit(),

@@ -37,7 +37,9 @@ pub(super) fn greatest<T: ComplexField<RealField = f64> + Into<Complex64> + Copy
         return Ok(Vec::new());
     }
     // No structured operator is likely to be blind to this direction (golden-ratio sequence).
-    let start = DVector::from_fn(n, |i, _| T::from_real(0.5 + ((i as f64 + 1.0) * 0.618_033_988_749_895).fract()));
+    let start = DVector::from_fn(n, |i, _| {
+        T::from_real(0.5 + ((i as f64 + 1.0) * 0.618_033_988_749_895).fract())
+    });
     let mut basis: Vec<DVector<T>> = vec![start.unscale(start.norm())];
     let mut hessenberg: Vec<Vec<T>> = Vec::new();
     let mut next_check = 16.min(n);
@@ -58,14 +60,19 @@ pub(super) fn greatest<T: ComplexField<RealField = f64> + Into<Complex64> + Copy
         let size = k + 1;
         let exhausted = size == n || !(rest > 1e-13 * scale);
         if size >= next_check || exhausted {
-            let matrix = DMatrix::from_fn(size, size, |i, j| hessenberg[j].get(i).copied().unwrap_or(T::zero()));
+            let matrix = DMatrix::from_fn(size, size, |i, j| {
+                hessenberg[j].get(i).copied().unwrap_or(T::zero())
+            });
             let values = eigenvalues(&matrix)?;
             if exhausted {
                 return Ok(values);
             }
             let largest = values.iter().map(|l| l.norm()).fold(0.0, f64::max);
             let wanted = values.iter().filter(|l| l.norm() >= share * largest);
-            if wanted.clone().all(|l| residual(&matrix, *l, rest) <= TOLERANCE * l.norm()) {
+            if wanted
+                .clone()
+                .all(|l| residual(&matrix, *l, rest) <= TOLERANCE * l.norm())
+            {
                 return Ok(values);
             }
             next_check = (size + size / 2).min(n);
@@ -116,7 +123,13 @@ mod tests {
         let n = 200;
         let value = |i: usize| 0.85f64.powi(i as i32) * if i % 3 == 1 { -1.0 } else { 1.0 };
         let transform = DMatrix::from_fn(n, n, |i, j| {
-            if i == j { 1.0 } else if j > i { 0.3 / (1.0 + (j - i) as f64) } else { 0.0 }
+            if i == j {
+                1.0
+            } else if j > i {
+                0.3 / (1.0 + (j - i) as f64)
+            } else {
+                0.0
+            }
         });
         let inverse = transform.clone().try_inverse().unwrap();
         let matrix = &transform * DMatrix::from_diagonal(&DVector::from_fn(n, |i, _| value(i))) * inverse;

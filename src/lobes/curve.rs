@@ -61,7 +61,13 @@ pub trait SpeedLimit: Sync {
         found.truncate(count);
         found
             .into_iter()
-            .map(|peak| if peak.at_range_end { peak } else { self.refined(curve, peak) })
+            .map(|peak| {
+                if peak.at_range_end {
+                    peak
+                } else {
+                    self.refined(curve, peak)
+                }
+            })
             .collect()
     }
 
@@ -132,6 +138,8 @@ pub struct Peak {
     pub depth_mm: Option<f64>,
     /// The deepest point is an end of the range of speeds: it may be deeper still beyond.
     pub at_range_end: bool,
+    /// The 5 % quantile of the limit at this speed over the model's uncertainty, where it is known: the depth to use.
+    pub lower_quantile_mm: Option<f64>,
 }
 
 impl Peak {
@@ -140,6 +148,7 @@ impl Peak {
             spindle_rpm,
             depth_mm,
             at_range_end: false,
+            lower_quantile_mm: None,
         }
     }
 }
@@ -225,5 +234,6 @@ fn peak_at(curve: &LobeCurve, index: usize) -> Peak {
         spindle_rpm: curve.spindle_rpm[index],
         depth_mm: curve.depth_limit_mm[index],
         at_range_end: index == 0 || index + 1 == curve.spindle_rpm.len(),
+        lower_quantile_mm: None,
     }
 }

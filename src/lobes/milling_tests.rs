@@ -21,12 +21,14 @@ fn down(radial_ratio: f64) -> Immersion {
 fn modes(modes: &[(usize, f64, f64, f64)]) -> ModalFrf {
     let modes: Vec<AxisMode> = modes
         .iter()
-        .map(|&(axis, frequency_hz, damping_ratio, stiffness_n_per_m)| AxisMode {
-            axis,
-            frequency_hz,
-            damping_ratio,
-            stiffness_n_per_m,
-        })
+        .map(
+            |&(axis, frequency_hz, damping_ratio, stiffness_n_per_m)| AxisMode {
+                axis,
+                frequency_hz,
+                damping_ratio,
+                stiffness_n_per_m,
+            },
+        )
         .collect();
     ModalFrf::from_axis_modes(&modes).unwrap()
 }
@@ -64,7 +66,10 @@ fn check(name: &str, force: PeriodicForce, frf: &ModalFrf, rows: &[(f64, f64)]) 
                 limit.depth_mm
             );
         }
-        assert!((semi.depth_mm / multi.depth_mm - 1.0).abs() < 0.01, "{name}, {rpm} rpm");
+        assert!(
+            (semi.depth_mm / multi.depth_mm - 1.0).abs() < 0.01,
+            "{name}, {rpm} rpm"
+        );
     }
 }
 
@@ -96,7 +101,9 @@ fn the_zero_order_solution_misses_the_flip_lobe() {
         assert!((limit / least - 1.0).abs() < 0.01, "{ratio}: {limit}");
     }
     let force = PeriodicForce::new(600.0, 200.0, 2, down(0.05), None).unwrap();
-    let zero = StabilitySolver::new(force.average(), &frf).limit_at(18000.0).unwrap();
+    let zero = StabilitySolver::new(force.average(), &frf)
+        .limit_at(18000.0)
+        .unwrap();
     // On the steep flank of a lobe; 4.957 where every root is met to 1e-11.
     assert!(zero.depth_mm > 4.8, "{}", zero.depth_mm);
     check("A, flip", force, &frf, &[(18000.0, 1.30)]);
@@ -112,9 +119,18 @@ fn two_modes_an_axis_are_within_a_hundredth_of_the_table() {
     // references.md says 0.882 at 5000 rpm, which no method here gives: converged multi-frequency solutions (15 to 70
     // lines) give 0.871, and multipliers counted by the argument principle on the exact characteristic function put the
     // boundary between 0.868 and 0.873.
-    let rows = [(5000.0, 0.871), (8000.0, 1.137), (10000.0, 1.566), (12000.0, 0.915), (14000.0, 4.958)];
+    let rows = [
+        (5000.0, 0.871),
+        (8000.0, 1.137),
+        (10000.0, 1.566),
+        (12000.0, 0.915),
+        (14000.0, 4.958),
+    ];
     check("B", force, &case_b(), &rows);
-    let zero = StabilitySolver::new(force.average(), &case_b()).absolute_limit().unwrap().depth_mm;
+    let zero = StabilitySolver::new(force.average(), &case_b())
+        .absolute_limit()
+        .unwrap()
+        .depth_mm;
     assert!((zero / 0.957 - 1.0).abs() < 0.01, "{zero}");
 }
 
@@ -131,11 +147,19 @@ fn altintas_and_budaks_case_is_within_a_hundredth_of_the_table() {
         let limit = zero.limit_at(rpm).unwrap().depth_mm;
         assert!((limit / expected - 1.0).abs() < 0.01, "{rpm}: {limit}");
     }
-    let rows = [(5000.0, 1.104), (8000.0, 1.101), (10000.0, 1.367), (12000.0, 4.289)];
+    let rows = [
+        (5000.0, 1.104),
+        (8000.0, 1.101),
+        (10000.0, 1.367),
+        (12000.0, 4.289),
+    ];
     check("C", force, &frf, &rows);
     // Three teeth in a slot: the coefficients are nearly constant, and zero order is nearly exact.
     let slot = PeriodicForce::new(600.0, 42.0, 3, Immersion::SLOT, None).unwrap();
-    let least = StabilitySolver::new(slot.average(), &frf).absolute_limit().unwrap().depth_mm;
+    let least = StabilitySolver::new(slot.average(), &frf)
+        .absolute_limit()
+        .unwrap()
+        .depth_mm;
     assert!((least / 0.777 - 1.0).abs() < 0.01, "{least}");
 }
 
@@ -147,7 +171,12 @@ fn halving_the_time_step_moves_the_limit_by_less_than_half_a_hundredth() {
     let fine = SemiDiscretisation::new(force, StateSpace::from(&frf), &frf).with_steps_per_wave(48.0);
     for rpm in [6000.0, 9500.0, 13000.0] {
         let (a, b) = (coarse.limit_at(rpm).unwrap(), fine.limit_at(rpm).unwrap());
-        assert!((a.depth_mm / b.depth_mm - 1.0).abs() < 0.005, "{rpm}: {} {}", a.depth_mm, b.depth_mm);
+        assert!(
+            (a.depth_mm / b.depth_mm - 1.0).abs() < 0.005,
+            "{rpm}: {} {}",
+            a.depth_mm,
+            b.depth_mm
+        );
     }
 }
 
@@ -162,7 +191,12 @@ fn a_residual_acts_as_a_stiff_mode() {
     let multi = MultiFrequency::new(force, &with_residual);
     for rpm in [4000.0, 9000.0] {
         let (a, b) = (semi.limit_at(rpm).unwrap(), multi.limit_at(rpm).unwrap());
-        assert!((a.depth_mm / b.depth_mm - 1.0).abs() < 0.01, "{rpm}: {} {}", a.depth_mm, b.depth_mm);
+        assert!(
+            (a.depth_mm / b.depth_mm - 1.0).abs() < 0.01,
+            "{rpm}: {} {}",
+            a.depth_mm,
+            b.depth_mm
+        );
     }
 }
 
@@ -181,7 +215,12 @@ fn process_damping_raises_the_limit_at_low_speed() {
         [1500.0, 12000.0]
             .map(|rpm| {
                 let (a, b) = (semi.limit_at(rpm).unwrap(), multi.limit_at(rpm).unwrap());
-                assert!((a.depth_mm / b.depth_mm - 1.0).abs() < 0.01, "{rpm}: {} {}", a.depth_mm, b.depth_mm);
+                assert!(
+                    (a.depth_mm / b.depth_mm - 1.0).abs() < 0.01,
+                    "{rpm}: {} {}",
+                    a.depth_mm,
+                    b.depth_mm
+                );
                 a.depth_mm
             })
             .to_vec()

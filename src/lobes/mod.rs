@@ -14,10 +14,13 @@
 
 mod arcs;
 mod arnoldi;
+pub mod band;
 pub mod curve;
 pub mod force;
 pub mod frf;
 pub mod measured;
+#[cfg(test)]
+mod milling_tests;
 pub mod multi_frequency;
 pub mod periodic_force;
 pub mod redundancy;
@@ -28,9 +31,8 @@ pub mod setup;
 pub mod solve;
 pub mod state_space;
 pub mod thesis;
-#[cfg(test)]
-mod milling_tests;
 
+pub use band::LobeBand;
 pub use curve::{AbsoluteLimit, Limit, LobeCurve, Peak, SpeedLimit, peak_near, peaks, speed_grid};
 pub use force::RegenerativeForce;
 pub use frf::{AxisMode, DirectFrf, ModalFrf, Mode};

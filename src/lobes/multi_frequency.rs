@@ -134,7 +134,11 @@ impl<'a> MultiFrequency<'a> {
             return [[Complex64::ZERO; 2]; 2];
         }
         let h = self.frf.receptance(f.abs().max(low.min(1e-3 * high)));
-        if f < 0.0 { h.map(|row| row.map(|v| v.conj())) } else { h }
+        if f < 0.0 {
+            h.map(|row| row.map(|v| v.conj()))
+        } else {
+            h
+        }
     }
 
     fn matrix(&self, theta: f64, at: &Speed) -> DMatrix<Complex64> {
@@ -183,7 +187,10 @@ impl<'a> MultiFrequency<'a> {
             if theta > PI { TAU - theta } else { theta }
         });
         let even = (1..EVEN_STEPS).map(|i| PI * i as f64 / EVEN_STEPS as f64);
-        let mut angles: Vec<f64> = folded.chain(even).filter(|t| *t > 1e-3 && *t < PI - 1e-3).collect();
+        let mut angles: Vec<f64> = folded
+            .chain(even)
+            .filter(|t| *t > 1e-3 && *t < PI - 1e-3)
+            .collect();
         angles.extend([1e-3, PI]);
         angles.sort_by(f64::total_cmp);
         angles.dedup_by(|b, a| *b - *a < 2e-3);
@@ -235,7 +242,11 @@ impl<'a> MultiFrequency<'a> {
         } = *crossing;
         for iteration in 0..40 {
             let share = la.im / (la.im - lb.im);
-            let share = if iteration % 3 == 2 { 0.5 } else { share.clamp(0.02, 0.98) };
+            let share = if iteration % 3 == 2 {
+                0.5
+            } else {
+                share.clamp(0.02, 0.98)
+            };
             let theta = a + share * (b - a);
             let lambda = self.node(theta, at).nearest(la + (lb - la) * share)?;
             if lambda.im.abs() <= 1e-7 * lambda.norm() || b - a <= 1e-12 {

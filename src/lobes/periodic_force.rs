@@ -52,8 +52,9 @@ impl PeriodicForce {
     ) -> Result<Self> {
         let average = RegenerativeForce::milling_zero_order(ktc_n_per_mm2, krc_n_per_mm2, teeth, immersion)?;
         if let Some(d) = damping {
-            let sound = d.coefficient_n_per_m >= 0.0 && d.coefficient_n_per_m.is_finite();
-            if !sound || !(d.tool_diameter_mm > 0.0 && d.tool_diameter_mm.is_finite()) {
+            let coefficient = d.coefficient_n_per_m >= 0.0 && d.coefficient_n_per_m.is_finite();
+            let diameter = d.tool_diameter_mm > 0.0 && d.tool_diameter_mm.is_finite();
+            if !(coefficient && diameter) {
                 return Err(Error::computation(format!(
                     "process damping needs a coefficient of 0 N/m or more and a tool diameter, not {} N/m and {} mm",
                     d.coefficient_n_per_m, d.tool_diameter_mm
@@ -155,13 +156,7 @@ impl PeriodicForce {
 }
 
 /// ½ \[\[−Kt s − Kr (1 − c), −Kt (1 + c) − Kr s\], \[Kt (1 − c) − Kr s, Kt s − Kr (1 + c)\]\] with s, c = sin, cos 2φ.
-fn directional(
-    kt: f64,
-    kr: f64,
-    one: Complex64,
-    s: Complex64,
-    c: Complex64,
-) -> [[Complex64; 2]; 2] {
+fn directional(kt: f64, kr: f64, one: Complex64, s: Complex64, c: Complex64) -> [[Complex64; 2]; 2] {
     [
         [-kt * s - kr * (one - c), -kt * (one + c) - kr * s],
         [kt * (one - c) - kr * s, kt * s - kr * (one + c)],

@@ -187,6 +187,8 @@ pub struct Recommendation {
     pub point: SurfacePoint,
     /// The limit at exactly that speed.
     pub tip_depth_mm: Option<f64>,
+    /// The 5 % quantile of `point.depth_mm` over the model's uncertainty, mm; `None` without a calibration.
+    pub lower_quantile_mm: Option<f64>,
     pub posture: AnglePosture,
     pub absolute_limit: Option<AbsoluteLimit>,
     /// Best of the enumeration, refined.
@@ -207,7 +209,11 @@ pub trait LimitAtAngle: Sync {
 pub fn margin_mm(method: &dyn SpeedLimit, spindle_rpm: f64) -> f64 {
     (-MARGIN_STEPS..=MARGIN_STEPS)
         .map(|i| spindle_rpm * (1.0 + SPEED_MARGIN * f64::from(i) / f64::from(MARGIN_STEPS)))
-        .map(|n| method.limit_at(n).map_or(DEEPEST_MM, |l| l.depth_mm.min(DEEPEST_MM)))
+        .map(|n| {
+            method
+                .limit_at(n)
+                .map_or(DEEPEST_MM, |l| l.depth_mm.min(DEEPEST_MM))
+        })
         .fold(f64::INFINITY, f64::min)
 }
 
@@ -245,14 +251,23 @@ pub fn by_enumeration(
     }
     cells.sort_by(|a, b| b.depth_mm.total_cmp(&a.depth_mm));
     cells.truncate(REFINED);
-    let range = curves.first().map(|(_, c)| (c.spindle_rpm[0], c.spindle_rpm[c.spindle_rpm.len() - 1]))?;
+    let range = curves
+        .first()
+        .map(|(_, c)| (c.spindle_rpm[0], c.spindle_rpm[c.spindle_rpm.len() - 1]))?;
     let step_rpm = curves
         .first()
         .and_then(|(_, c)| Some(c.spindle_rpm.get(1)? - c.spindle_rpm[0]))
         .unwrap_or(1.0);
     cells
         .par_iter()
-        .filter_map(|cell| refine(*cell, [step_deg, step_rpm.max(0.002 * cell.spindle_rpm)], range, surface))
+        .filter_map(|cell| {
+            refine(
+                *cell,
+                [step_deg, step_rpm.max(0.002 * cell.spindle_rpm)],
+                range,
+                surface,
+            )
+        })
         .max_by(|a, b| a.depth_mm.total_cmp(&b.depth_mm))
 }
 
@@ -271,18 +286,27 @@ fn refine(
     let [mut angle_step, mut speed_step] = steps;
     for _ in 0..14 {
         loop {
-            let tried = [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)]
-                .iter()
-                .filter_map(|(da, dn)| {
-                    let angle_deg = (best.angle_deg + da * angle_step).rem_euclid(360.0);
-                    let spindle_rpm = (best.spindle_rpm + dn * speed_step).clamp(low, high);
-                    Some(SurfacePoint {
-                        spindle_rpm,
-                        angle_deg,
-                        depth_mm: depth(angle_deg, spindle_rpm)?,
-                    })
+            let tried = [
+                (1.0, 0.0),
+                (-1.0, 0.0),
+                (0.0, 1.0),
+                (0.0, -1.0),
+                (1.0, 1.0),
+                (1.0, -1.0),
+                (-1.0, 1.0),
+                (-1.0, -1.0),
+            ]
+            .iter()
+            .filter_map(|(da, dn)| {
+                let angle_deg = (best.angle_deg + da * angle_step).rem_euclid(360.0);
+                let spindle_rpm = (best.spindle_rpm + dn * speed_step).clamp(low, high);
+                Some(SurfacePoint {
+                    spindle_rpm,
+                    angle_deg,
+                    depth_mm: depth(angle_deg, spindle_rpm)?,
                 })
-                .max_by(|a, b| a.depth_mm.total_cmp(&b.depth_mm));
+            })
+            .max_by(|a, b| a.depth_mm.total_cmp(&b.depth_mm));
             match tried {
                 Some(point) if point.depth_mm > best.depth_mm * (1.0 + 1e-9) => best = point,
                 _ => break,
@@ -323,7 +347,10 @@ impl CostFunction for SwarmProblem<'_> {
 /// # Errors
 /// Where the swarm finds no usable angle.
 pub fn by_swarm(rpm_range: [f64; 2], surface: &dyn LimitAtAngle) -> Result<SurfacePoint> {
-    let bounds = (vec![0.0, rpm_range[0]], vec![360.0, rpm_range[1].max(rpm_range[0] * (1.0 + 1e-9))]);
+    let bounds = (
+        vec![0.0, rpm_range[0]],
+        vec![360.0, rpm_range[1].max(rpm_range[0] * (1.0 + 1e-9))],
+    );
     let solver = ParticleSwarm::new(bounds, PARTICLES).with_rng_generator(ChaCha8Rng::seed_from_u64(SEED));
     let result = Executor::new(SwarmProblem { surface }, solver)
         .configure(|state: PopulationState<Particle<Vec<f64>, f64>, f64>| state.max_iters(GENERATIONS))
@@ -353,7 +380,14 @@ mod tests {
 
     fn limited() -> RobotModel {
         let mut spec = irb6640();
-        let limits = [[-180.0, 180.0], [-65.0, 85.0], [-180.0, 70.0], [-300.0, 300.0], [-120.0, 120.0], [-360.0, 360.0]];
+        let limits = [
+            [-180.0, 180.0],
+            [-65.0, 85.0],
+            [-180.0, 70.0],
+            [-300.0, 300.0],
+            [-120.0, 120.0],
+            [-360.0, 360.0],
+        ];
         for (joint, limits) in spec.joints.iter_mut().zip(limits) {
             joint.limits_rad = Some(limits.map(f64::to_radians));
         }
@@ -378,13 +412,24 @@ mod tests {
                         .fold(0.0, |worst: f64, d| worst.max(d.abs()))
                 })
             };
-            let nearest = sweep.angles.iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap();
-            assert!(off(nearest) < 4.0, "{posture:?}: {nearest:?} off by {}", off(nearest));
+            let nearest = sweep
+                .angles
+                .iter()
+                .min_by(|a, b| off(a).total_cmp(&off(b)))
+                .unwrap();
+            assert!(
+                off(nearest) < 4.0,
+                "{posture:?}: {nearest:?} off by {}",
+                off(nearest)
+            );
             angles.push(nearest.angle_deg);
         }
         for pair in angles.windows(2) {
             let turned = (pair[1] - pair[0]).rem_euclid(360.0);
-            assert!((turned - 90.0).abs() < 4.0 || (turned - 270.0).abs() < 4.0, "{angles:?}");
+            assert!(
+                (turned - 90.0).abs() < 4.0 || (turned - 270.0).abs() < 4.0,
+                "{angles:?}"
+            );
         }
     }
 
@@ -448,7 +493,10 @@ mod tests {
         assert!(agree(&first, &second), "{first:?} {second:?}");
         for p in [first, second] {
             assert!((p.depth_mm - 4.0).abs() < 0.01, "{p:?}");
-            assert!((p.angle_deg - 213.3).abs() < 5.0 && (p.spindle_rpm - 371.7).abs() < 5.0, "{p:?}");
+            assert!(
+                (p.angle_deg - 213.3).abs() < 5.0 && (p.spindle_rpm - 371.7).abs() < 5.0,
+                "{p:?}"
+            );
         }
     }
 }

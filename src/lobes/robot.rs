@@ -147,7 +147,11 @@ mod tests {
             damping_ns_per_m: Dual::constant(120.0),
             carries_tool_point: true,
         });
-        let chains = [robot.chain(&kinematics, &rigid), robot.chain(&kinematics, &bending), coupled];
+        let chains = [
+            robot.chain(&kinematics, &rigid),
+            robot.chain(&kinematics, &bending),
+            coupled,
+        ];
         for (case, chain) in chains.iter().enumerate() {
             let frf = RobotFrf::new(&robot, &kinematics, chain).unwrap();
             let states = frf.state_space().unwrap();

@@ -109,11 +109,7 @@ impl Cut {
 ///
 /// # Errors
 /// Where the table lacks something the process needs, or asks for a method that is not here.
-pub fn cut_of(
-    campaign: &Campaign,
-    section: &LobesSection,
-    coefficients: LobeCoefficients,
-) -> Result<Cut> {
+pub fn cut_of(campaign: &Campaign, section: &LobesSection, coefficients: LobeCoefficients) -> Result<Cut> {
     let lacks = |key: &str, problem: &str, remedy: &str| -> Error {
         InputError::new(problem)
             .file(campaign.dir.join("campaign.toml"))

@@ -46,7 +46,10 @@ impl From<&ModalFrf> for StateSpace {
             input,
             output,
             residual_m_per_n: *frf.residual_m_per_n(),
-            highest_hz: modes.iter().map(|m| m.omega_n_rad_per_s / TAU).fold(0.0, f64::max),
+            highest_hz: modes
+                .iter()
+                .map(|m| m.omega_n_rad_per_s / TAU)
+                .fold(0.0, f64::max),
         }
     }
 }
@@ -67,7 +70,11 @@ impl StateSpace {
         let modes = ModalBasis::new(&chain_stiffness, &system.chain_mass)?;
         let slowest = modes.inverse_omega2.first().copied().unwrap_or(0.0);
         let least = slowest / (STATES_UP_TO * STATES_UP_TO);
-        let kept = modes.inverse_omega2.iter().filter(|mu| **mu > 0.0 && **mu >= least).count();
+        let kept = modes
+            .inverse_omega2
+            .iter()
+            .filter(|mu| **mu > 0.0 && **mu >= least)
+            .count();
         // In this basis the stiffness is the identity.
         let m = kept + total - chain;
         let mut basis = DMatrix::zeros(total, m);
@@ -144,12 +151,16 @@ mod tests {
             damping_ratio: 0.03,
             stiffness_n_per_m,
         };
-        let frf = ModalFrf::from_axis_modes(&[mode(0, 12.0, 1e6), mode(1, 15.0, 2e6), mode(0, 40.0, 8e6)]).unwrap();
+        let frf =
+            ModalFrf::from_axis_modes(&[mode(0, 12.0, 1e6), mode(1, 15.0, 2e6), mode(0, 40.0, 8e6)]).unwrap();
         let states = StateSpace::from(&frf);
         for f in [1.0, 11.9, 15.2, 70.0] {
             let (a, b) = (frf.receptance(f), states.receptance(f).unwrap());
             for (a, b) in a.iter().flatten().zip(b.iter().flatten()) {
-                assert!((a - b).norm() < 1e-10 * frf.receptance(f)[0][0].norm(), "{f}: {a} {b}");
+                assert!(
+                    (a - b).norm() < 1e-10 * frf.receptance(f)[0][0].norm(),
+                    "{f}: {a} {b}"
+                );
             }
         }
     }

@@ -6,9 +6,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::curve::{AbsoluteLimit, LobeCurve, Peak, SpeedLimit, peaks, speed_grid};
 use super::force::RegenerativeForce;
 use super::frf::{AxisMode, ModalFrf};
-use super::curve::{AbsoluteLimit, LobeCurve, Peak, SpeedLimit, peaks, speed_grid};
 use super::solve::StabilitySolver;
 use crate::{Error, Result};
 

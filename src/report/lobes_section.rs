@@ -3,8 +3,8 @@
 use super::figure::{LobeCurve, LobeMarker, LobeOutcome, LobesFigure};
 use super::number::{decimals, percent, significant};
 use super::parts::{figure, paragraph};
-use super::structure_section::NOISE_LIKE;
 use super::redundancy_section;
+use super::structure_section::NOISE_LIKE;
 use super::{Block, Column, Section, Table};
 use crate::analysis::{LobeAnalysis, LobeFindings, StructureFindings};
 use crate::campaign::{LobeMethod, LobeSource, Process};
@@ -44,7 +44,11 @@ pub fn summary(findings: &LobeFindings) -> String {
             analysis.spindle_rpm[0],
             analysis.spindle_rpm[1],
             decimals(peak.spindle_rpm, 0),
-            if peak.at_range_end { " (the end of the range; it may be deeper beyond)" } else { "" }
+            if peak.at_range_end {
+                " (the end of the range; it may be deeper beyond)"
+            } else {
+                ""
+            }
         );
     }
     text
@@ -221,6 +225,7 @@ fn best(analysis: &LobeAnalysis) -> Block {
             case.posture.clone().unwrap_or_else(|| "modes".into()),
             decimals(peak.spindle_rpm, 1),
             peak.depth_mm.map_or("no limit".into(), |d| significant(d, 3)),
+            peak.lower_quantile_mm.map_or("–".into(), |d| significant(d, 3)),
             gain.map_or("–".into(), |g| decimals(g, 1)),
         ]
     });
@@ -232,6 +237,7 @@ fn best(analysis: &LobeAnalysis) -> Block {
             Column::text("posture"),
             Column::number("speed (rpm)"),
             Column::number("limit (mm)"),
+            Column::number("5 % quantile (mm)"),
             Column::number("× absolute limit"),
         ],
         rows,

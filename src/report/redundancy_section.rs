@@ -42,31 +42,45 @@ pub fn blocks(analysis: &LobeAnalysis, found: &RedundancyAnalysis) -> Vec<Block>
             .to_string(),
         map.png(),
     ));
-    let joints: Vec<String> = r.posture.joints_deg.iter().flatten().map(|j| decimals(*j, 2)).collect();
+    let joints: Vec<String> = r
+        .posture
+        .joints_deg
+        .iter()
+        .flatten()
+        .map(|j| decimals(*j, 2))
+        .collect();
     let optional = |v: Option<f64>, digits| v.map_or("–".to_string(), |v| decimals(v, digits));
     let rows = [
         ("joint angles (°)", joints.join(", ")),
         ("nearest joint limit (°)", optional(r.posture.limit_margin_deg, 1)),
-        ("singularity margin (0 to 1)", optional(r.posture.singularity_margin, 2)),
+        (
+            "singularity margin (0 to 1)",
+            optional(r.posture.singularity_margin, 2),
+        ),
         ("limit with speed margin (mm)", significant(r.point.depth_mm, 3)),
+        (
+            "5 % quantile of it over the model's uncertainty (mm)",
+            r.lower_quantile_mm.map_or("–".into(), |d| significant(d, 3)),
+        ),
         (
             "limit at exactly that speed (mm)",
             r.tip_depth_mm.map_or("no limit".into(), |d| significant(d, 3)),
         ),
         (
             "absolute limit at that angle (mm)",
-            r.absolute_limit.map_or("no limit".into(), |a| significant(a.depth_mm, 3)),
+            r.absolute_limit
+                .map_or("no limit".into(), |a| significant(a.depth_mm, 3)),
         ),
-        (
-            "by enumeration (mm)",
-            significant(r.enumeration.depth_mm, 4),
-        ),
+        ("by enumeration (mm)", significant(r.enumeration.depth_mm, 4)),
         ("by particle swarm (mm)", significant(r.swarm.depth_mm, 4)),
     ];
     blocks.push(Block::Table(Table {
         caption: "The recommended place".into(),
         columns: vec![Column::text("quantity"), Column::text("value")],
-        rows: rows.into_iter().map(|(name, value)| vec![name.to_string(), value]).collect(),
+        rows: rows
+            .into_iter()
+            .map(|(name, value)| vec![name.to_string(), value])
+            .collect(),
         notes: vec![],
     }));
     blocks
@@ -93,7 +107,10 @@ fn heat_map(analysis: &LobeAnalysis, found: &RedundancyAnalysis) -> HeatMap {
     // Single deep tips must not wash out the rest.
     let top = finite.get(finite.len().saturating_sub(1) * 97 / 100).copied();
     HeatMap {
-        title: format!("Depth limit over spindle speed and redundancy angle, posture {}", found.posture),
+        title: format!(
+            "Depth limit over spindle speed and redundancy angle, posture {}",
+            found.posture
+        ),
         row_label: "Redundancy angle (°)".into(),
         column_label: "Spindle speed (rpm)".into(),
         rows: angles.iter().map(|a| decimals(*a, 0)).collect(),

@@ -97,10 +97,7 @@ impl<'a> InverseKinematics<'a> {
     pub fn tool_pose(&self, tool: &Isometry3<f64>, reference_rad: &[f64; 6]) -> Vec<IkSolution> {
         let frame = &self.spec.tool;
         let tilt = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), frame.tilt_about_flange_y_rad);
-        let in_flange = Isometry3::from_parts(
-            Translation3::from(Vector3::from(frame.tcp_in_flange_m)),
-            tilt,
-        );
+        let in_flange = Isometry3::from_parts(Translation3::from(Vector3::from(frame.tcp_in_flange_m)), tilt);
         self.flange_pose(&(tool * in_flange.inverse()), reference_rad)
     }
 
@@ -132,8 +129,8 @@ impl<'a> InverseKinematics<'a> {
             let upper = joints[1].a_m;
             // Fore arm from joint 3 to the wrist, before joint 3 turns it.
             let fore = Vector2::new(joints[2].a_m, -joints[3].d_m * sine(2));
-            let cosine = (target.norm_squared() - upper * upper - fore.norm_squared())
-                / (2.0 * upper * fore.norm());
+            let cosine =
+                (target.norm_squared() - upper * upper - fore.norm_squared()) / (2.0 * upper * fore.norm());
             if !(cosine.abs() <= 1.0) {
                 continue;
             }
@@ -141,15 +138,13 @@ impl<'a> InverseKinematics<'a> {
             for elbow in [false, true] {
                 let theta3 = (if elbow { -bent } else { bent }) - fore.y.atan2(fore.x);
                 let (s3, c3) = theta3.sin_cos();
-                let reach = Vector2::new(
-                    upper + c3 * fore.x - s3 * fore.y,
-                    s3 * fore.x + c3 * fore.y,
-                );
+                let reach = Vector2::new(upper + c3 * fore.x - s3 * fore.y, s3 * fore.x + c3 * fore.y);
                 let theta2 = target.y.atan2(target.x) - reach.y.atan2(reach.x);
                 let to_wrist = first
                     * joint_transform(&joints[1], theta2 - joints[1].offset_rad)
                     * joint_transform(&joints[2], theta3 - joints[2].offset_rad);
-                let untwisted = rotation * Rotation3::from_axis_angle(&Vector3::x_axis(), -joints[5].alpha_rad);
+                let untwisted =
+                    rotation * Rotation3::from_axis_angle(&Vector3::x_axis(), -joints[5].alpha_rad);
                 let m = Rotation3::from(to_wrist.rotation).inverse() * untwisted;
                 let m = m.matrix();
                 let cosine5 = -sine(3) * sine(4) * m[(2, 2)];

@@ -26,9 +26,13 @@ const MATTERS: f64 = 0.03;
 const SHARE: f64 = 0.03;
 /// Even steps of θ beside those that resonances ask for.
 const EVEN_STEPS: usize = 32;
-/// An eigenvalue may move by this share of itself between neighbouring θ.
+/// An eigenvalue may move by this share of itself between neighbouring θ …
 const STEP: f64 = 0.4;
-const MAX_HALVINGS: usize = 6;
+/// … and by this share of its distance to the next one, or two that pass each other would be taken for each other, …
+const SEPARATION: f64 = 0.5;
+/// … unless it moves by less than this share of itself.
+const SMALL_STEP: f64 = 0.01;
+const MAX_HALVINGS: usize = 9;
 
 /// The multi-frequency solution for one force on one structure.
 pub struct MultiFrequency<'a> {
@@ -211,9 +215,13 @@ impl<'a> MultiFrequency<'a> {
                 .filter(|l| l.norm() >= floor)
                 .filter_map(|l| Some((*l, b.nearest(*l)?)))
                 .collect();
-            let jumps = pairs
-                .iter()
-                .any(|(l, m)| (m - l).norm() > STEP * l.norm() && (l.re > floor || m.re > floor));
+            let jumps = pairs.iter().any(|(l, m)| {
+                let moved = (m - l).norm();
+                let next = b.lambda.iter().filter(|o| *o != m).map(|o| (o - l).norm());
+                let room = next.fold(f64::INFINITY, f64::min);
+                let unclear = moved > STEP * l.norm() || moved > SEPARATION * room;
+                unclear && moved > SMALL_STEP * l.norm() && (l.re > floor || m.re > floor)
+            });
             if jumps && depth < MAX_HALVINGS {
                 let middle = self.node(0.5 * (a.theta + b.theta), at);
                 pending.push((middle.clone(), b, depth + 1));

@@ -20,7 +20,7 @@ use super::periodic_force::PeriodicForce;
 use super::state_space::StateSpace;
 
 /// Steps on one wave of the highest frequency that matters.
-const STEPS_PER_WAVE: f64 = 24.0;
+const STEPS_PER_WAVE: f64 = 36.0;
 const FEWEST_STEPS: usize = 40;
 /// The search climbs from this share of the depth below which even the averaged force could not chatter …
 const FIRST_DEPTH: f64 = 0.3;

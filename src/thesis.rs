@@ -12,7 +12,9 @@ use crate::identify::modal_table::{self, StrongestMode};
 use crate::identify::{Estimate, StructureModel};
 use crate::ingest::Axis;
 use crate::lobes::thesis::thesis_force;
-use crate::lobes::{AbsoluteLimit, Peak, RobotFrf, StabilitySolver, peak_near, speed_grid, thesis_lobes};
+use crate::lobes::{
+    AbsoluteLimit, Peak, RobotFrf, SpeedLimit, StabilitySolver, peak_near, speed_grid, thesis_lobes,
+};
 use crate::robot::{PostureReport, RobotModel, RobotSpec};
 use crate::{Error, Result};
 

@@ -8,8 +8,8 @@ use crate::discrepancy::CuttingComparison;
 use crate::identify::cutting_data::processes;
 use crate::identify::cutting_problem::CuttingProblem;
 use crate::identify::cutting_study::{calibrate_cutting, held_out_cuts};
-use crate::identify::{Calibration, CuttingData, CuttingModel, Estimate};
-use crate::{InputError, Result};
+use crate::identify::{Calibration, CuttingCase, CuttingData, CuttingModel, Estimate};
+use crate::Result;
 
 /// The cutting model of a campaign's main process against its force records.
 pub struct CuttingAnalysis {
@@ -26,33 +26,15 @@ impl CuttingAnalysis {
     /// # Errors
     /// No cuts, or none that can be used.
     pub fn run(campaign: &Campaign) -> Result<Self> {
-        let processes = processes(campaign);
-        let Some(&process) = processes.first() else {
-            return Err(
-                InputError::new("the campaign has no [[cut]]: no force records to compare")
-                    .file(campaign.dir.join("campaign.toml"))
-                    .key("cut")
-                    .remedy("add [[cut]] tables that name the force records")
-                    .into(),
-            );
-        };
-        let data = CuttingData::load(campaign, process)?;
-        let model = CuttingModel::new(&data, true)?;
+        let CuttingCase {
+            model,
+            data,
+            mut warnings,
+            ..
+        } = CuttingCase::load(campaign)?;
         let calibration = calibrate_cutting(&model, &data)?;
-        let fits = CuttingProblem {
-            model: &model,
-            data: &data,
-        }
-        .fits(&calibration.theta)?;
-        let comparison = CuttingComparison::new(&data, &fits);
+        let comparison = cutting_comparison(&model, &data, &calibration.theta)?;
         let held_out_nrms = held_out_cuts(&model, &data, &calibration.theta)?.map(|h| h.nrms());
-        let mut warnings = data.warnings.clone();
-        if let Some(other) = processes.get(1) {
-            warnings.push(format!(
-                "the {} cuts are not compared: one process at a time",
-                name_of(*other)
-            ));
-        }
         warnings.extend(warnings_of(&calibration));
         Ok(CuttingAnalysis {
             data,
@@ -65,11 +47,14 @@ impl CuttingAnalysis {
     }
 }
 
-fn name_of(process: Process) -> &'static str {
-    match process {
-        Process::Milling => "milling",
-        Process::Drilling => "drilling",
-    }
+/// A cutting model at `theta` against the records.
+pub fn cutting_comparison(
+    model: &CuttingModel,
+    data: &CuttingData,
+    theta: &[f64],
+) -> Result<CuttingComparison> {
+    let fits = CuttingProblem { model, data }.fits(theta)?;
+    Ok(CuttingComparison::new(data, &fits))
 }
 
 /// Misfit from which on the user is told.
@@ -116,12 +101,7 @@ fn waveform_group(data: &CuttingData, group: &Group) -> Result<Value> {
     let own = data.filtered(|i| group.cuts.contains(&data.cuts[i].id));
     let model = CuttingModel::new(&own, true)?;
     let calibration = calibrate_cutting(&model, &own)?;
-    let fits = CuttingProblem {
-        model: &model,
-        data: &own,
-    }
-    .fits(&calibration.theta)?;
-    let totals = CuttingComparison::new(&own, &fits).totals;
+    let totals = cutting_comparison(&model, &own, &calibration.theta)?.totals;
     let mut map = Map::new();
     for (parameter, estimate) in model.parameters.iter().zip(&calibration.parameters) {
         // What the prior says and the data do not is no answer.

@@ -8,7 +8,7 @@ use super::load::{PROCESSES, posture_ref};
 use super::schema::*;
 use crate::Result;
 
-const LOBES: [&str; 17] = [
+const LOBES: [&str; 18] = [
     "process",
     "source",
     "method",
@@ -21,6 +21,7 @@ const LOBES: [&str; 17] = [
     "exit_deg",
     "radial_ratio",
     "cut",
+    "process_damping_n_per_m",
     "half_point_angle_deg",
     "feed_per_rev_mm",
     "spindle_rpm",
@@ -62,6 +63,7 @@ pub(super) fn read(
         kac_n_per_mm2: lobes.number("kac_n_per_mm2", Bounds::ANY)?,
         teeth: lobes.whole("teeth", 1, 1000)?.map(|n| n as usize),
         immersion: immersion(&lobes)?,
+        process_damping_n_per_m: lobes.number("process_damping_n_per_m", Bounds::NOT_NEGATIVE)?,
         half_point_angle_deg: lobes.number("half_point_angle_deg", Bounds::above_up_to(0.0, 90.0))?,
         feed_per_rev_mm: lobes.number("feed_per_rev_mm", Bounds::POSITIVE)?,
         spindle_rpm: speeds(&lobes)?,

@@ -223,6 +223,8 @@ pub struct LobesSection {
     pub kac_n_per_mm2: Option<f64>,
     pub teeth: Option<usize>,
     pub immersion: Option<Immersion>,
+    /// Milling, methods other than zero-order: see [`crate::lobes::ProcessDamping`].
+    pub process_damping_n_per_m: Option<f64>,
     pub half_point_angle_deg: Option<f64>,
     pub feed_per_rev_mm: Option<f64>,
     /// From, to, step.

@@ -1,7 +1,7 @@
 use serde_json::{Map, Value, json};
 
 use super::text::{bar, number, percent, table, warnings};
-use super::{CampaignArg, Domain, Outcome};
+use super::{CampaignArg, Domain, Outcome, by_domain};
 use crate::Result;
 use crate::analysis::{CuttingAnalysis, StructureAnalysis};
 use crate::campaign::Campaign;
@@ -22,20 +22,7 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
-    let both = !campaign.frfs.is_empty() && !campaign.cuts.is_empty();
-    match args.domain {
-        Some(Domain::Structure) => structure(&campaign),
-        Some(Domain::Cutting) => cutting(&campaign),
-        None if both => {
-            let (structure, cutting) = (structure(&campaign)?, cutting(&campaign)?);
-            Ok(Outcome {
-                json: json!({"structure": structure.json, "cutting": cutting.json}),
-                text: format!("{}\n{}", structure.text, cutting.text),
-            })
-        }
-        None if campaign.frfs.is_empty() && !campaign.cuts.is_empty() => cutting(&campaign),
-        None => structure(&campaign),
-    }
+    by_domain(&campaign, args.domain, structure, cutting)
 }
 
 fn cutting(campaign: &Campaign) -> Result<Outcome> {

@@ -1,13 +1,15 @@
 use serde_json::{Map, Value, json};
 
 use super::text::{number, percent, table, warnings};
-use super::{CampaignArg, Domain, Outcome, structure_only};
+use super::{CampaignArg, Domain, Outcome, by_domain};
 use crate::Result;
 use crate::analysis::DiagnosisFindings;
 use crate::campaign::Campaign;
 use crate::discrepancy::explained::{Explained, NamedPart};
-use crate::discrepancy::{Candidate, Verdict};
-use crate::identify::Options;
+use crate::analysis::cutting::cutting_comparison;
+use crate::discrepancy::diagnose::Baseline;
+use crate::discrepancy::{Candidate, Diagnosis, Verdict, diagnose, next_measurement};
+use crate::identify::{CuttingCase, CuttingStudy, Options};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -19,9 +21,57 @@ pub struct Args {
 }
 
 pub fn run(args: Args) -> Result<Outcome> {
-    structure_only(args.domain)?;
     let campaign = Campaign::load(&args.campaign.dir)?;
-    let findings = DiagnosisFindings::run(&campaign, Options::default())?;
+    by_domain(&campaign, args.domain, structure, cutting)
+}
+
+fn cutting(campaign: &Campaign) -> Result<Outcome> {
+    let case = CuttingCase::load(campaign)?;
+    let study = CuttingStudy::new(case.data.clone());
+    let d = diagnose(&study, &case.model)?;
+    let now = cutting_comparison(&case.model, &case.data, &d.baseline.theta)?;
+    let noise_floor_nrms = now.totals.noise_floor_nrms;
+    let next_measurement = next_measurement::advise_cutting(&d);
+    let json = json!({
+        "domain": "cutting",
+        "process": case.data.process,
+        "revision": case.revision(),
+        "effects": case.effects(),
+        "verdict": d.verdict,
+        "effect": d.winner().map(|c| &c.name.effect),
+        "site": Value::Null,
+        "confidence": d.confidence,
+        "companion": d.companion,
+        "candidates": d.candidates.iter().map(candidate).collect::<Vec<_>>(),
+        "indistinguishable": d.indistinguishable,
+        "next_measurement": next_measurement,
+        "baseline": baseline(&d.baseline, noise_floor_nrms),
+        "not_tried": d.not_tried.iter().map(|(e, why)| json!({ "effect": e, "why": why })).collect::<Vec<_>>(),
+        "warnings": case.warnings,
+    });
+    let added = case.effects();
+    let mut text = format!("model: baseline{}\n", added.iter().map(|e| format!(" + {e}")).collect::<String>());
+    text += &as_it_stands(&d.baseline, noise_floor_nrms);
+    text += &answer(&d, |c| (c.instance.effect.explanation(), c.instance.effect.fingerprint()));
+    text += &rest(campaign, &d, &next_measurement);
+    Ok(Outcome {
+        json,
+        text: text + &warnings(&case.warnings),
+    })
+}
+
+fn baseline(b: &Baseline, noise_floor_nrms: f64) -> Value {
+    json!({
+        "nrms": b.residual.nrms,
+        "held_out_nrms": b.held_out.map(|h| h.nrms()),
+        "noise_floor_nrms": noise_floor_nrms,
+        "reduced_chi2": b.reduced_chi2,
+        "independent_share": b.residual.independent_share,
+    })
+}
+
+fn structure(campaign: &Campaign) -> Result<Outcome> {
+    let findings = DiagnosisFindings::run(campaign, Options::default())?;
     let DiagnosisFindings {
         case,
         diagnosis,
@@ -43,18 +93,12 @@ pub fn run(args: Args) -> Result<Outcome> {
         "residual_peaks_hz": findings.residual_peaks.iter().map(|p| p.frequency_hz).collect::<Vec<_>>(),
         "residual_peaks": findings.residual_peaks,
         "next_measurement": next_measurement,
-        "baseline": {
-            "nrms": diagnosis.baseline.residual.nrms,
-            "held_out_nrms": diagnosis.baseline.held_out.map(|h| h.nrms()),
-            "noise_floor_nrms": case.data.noise_floor_nrms(),
-            "reduced_chi2": diagnosis.baseline.reduced_chi2,
-            "independent_share": diagnosis.baseline.residual.independent_share,
-        },
+        "baseline": baseline(&diagnosis.baseline, case.data.noise_floor_nrms()),
         "not_tried": diagnosis.not_tried.iter().map(|(e, why)| json!({ "effect": e, "why": why })).collect::<Vec<_>>(),
         "warnings": case.warnings,
     });
     let text = format!("model: {}\n", case.model_description())
-        + &describe(&campaign, &findings)
+        + &describe(campaign, &findings)
         + &warnings(&case.warnings);
     Ok(Outcome { json, text })
 }
@@ -138,23 +182,8 @@ fn describe(campaign: &Campaign, findings: &DiagnosisFindings) -> String {
         next_measurement,
         ..
     } = findings;
-    let mut text = format!(
-        "model as it stands: error (nrms) {}, noise floor {}, {:.2} times the noise variance\n\n",
-        percent(d.baseline.residual.nrms),
-        percent(case.data.noise_floor_nrms()),
-        d.baseline.reduced_chi2,
-    );
-    let sure = format!("confidence {:.0} %", 100.0 * d.confidence);
-    text += &match (d.verdict, d.winner()) {
-        (Verdict::Effect, Some(winner)) => format!(
-            "MISSING: {} ({sure})\n  {}\n  How it shows: {}\n",
-            winner.label(),
-            winner.instance.effect.explanation(),
-            winner.instance.effect.fingerprint()
-        ),
-        (Verdict::None, _) => format!("NOTHING is missing: what is left looks like noise ({sure})\n"),
-        _ => format!("UNKNOWN: what is left is real, but no effect of the library explains it ({sure})\n"),
-    };
+    let mut text = as_it_stands(&d.baseline, case.data.noise_floor_nrms());
+    text += &answer(d, |c| (c.instance.effect.explanation(), c.instance.effect.fingerprint()));
     text += &super::compare::dominant(&findings.residual_peaks);
     if let (Some(leading), Some(candidate)) = (&findings.leading, findings.leader()) {
         let who = match d.verdict {
@@ -163,6 +192,40 @@ fn describe(campaign: &Campaign, findings: &DiagnosisFindings) -> String {
         };
         text += &format!("  {}\n", leading.explained.sentence(&who));
     }
+    text + &rest(campaign, d, next_measurement)
+}
+
+fn as_it_stands(baseline: &Baseline, noise_floor_nrms: f64) -> String {
+    format!(
+        "model as it stands: error (nrms) {}, noise floor {}, {:.2} times the noise variance\n\n",
+        percent(baseline.residual.nrms),
+        percent(noise_floor_nrms),
+        baseline.reduced_chi2,
+    )
+}
+
+/// The verdict; `plainly` gives an effect's explanation and its fingerprint.
+fn answer<M, I>(
+    d: &Diagnosis<M, I>,
+    plainly: impl Fn(&Candidate<M, I>) -> (&'static str, &'static str),
+) -> String {
+    let sure = format!("confidence {:.0} %", 100.0 * d.confidence);
+    match (d.verdict, d.winner()) {
+        (Verdict::Effect, Some(winner)) => {
+            let (explanation, fingerprint) = plainly(winner);
+            format!(
+                "MISSING: {} ({sure})\n  {explanation}\n  How it shows: {fingerprint}\n",
+                winner.label()
+            )
+        }
+        (Verdict::None, _) => format!("NOTHING is missing: what is left looks like noise ({sure})\n"),
+        _ => format!("UNKNOWN: what is left is real, but no effect of the library explains it ({sure})\n"),
+    }
+}
+
+/// Rivals, candidates and what to do next.
+fn rest<M, I>(campaign: &Campaign, d: &Diagnosis<M, I>, next_measurement: &str) -> String {
+    let mut text = String::new();
     if let Some(companion) = &d.companion {
         text += &format!("  A second effect is likely besides: {companion}\n");
     }

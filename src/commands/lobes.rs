@@ -5,8 +5,9 @@ use serde_json::{Value, json};
 use super::text::{number, table, warnings};
 use super::{CampaignArg, Outcome};
 use crate::Result;
-use crate::analysis::LobeAnalysis;
-use crate::campaign::{Campaign, Process};
+use crate::analysis::{LobeAnalysis, RedundancyAnalysis};
+use crate::campaign::{Campaign, LobeMethod, Process};
+use crate::lobes::redundancy::AngleStatus;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -37,6 +38,8 @@ fn document(analysis: &LobeAnalysis) -> Value {
                 "spindle_rpm": case.curve.spindle_rpm,
                 "depth_limit_mm": case.curve.depth_limit_mm,
                 "chatter_hz": case.curve.chatter_hz,
+                "depth_p05_mm": case.band.as_ref().map(|b| &b.lower_mm),
+                "depth_p95_mm": case.band.as_ref().map(|b| &b.upper_mm),
                 "absolute_limit_mm": case.absolute.map(|a| a.depth_mm),
                 "absolute_limit_hz": case.absolute.map(|a| a.chatter_hz),
                 "frf": case.description,
@@ -53,6 +56,8 @@ fn document(analysis: &LobeAnalysis) -> Value {
                 "angle_deg": case.angle_deg,
                 "spindle_rpm": peak.spindle_rpm,
                 "depth_mm": peak.depth_mm,
+                "recommended_depth_mm": peak.lower_quantile_mm,
+                "at_range_end": peak.at_range_end,
             })
         })
         .collect();
@@ -68,13 +73,84 @@ fn document(analysis: &LobeAnalysis) -> Value {
         "absolute_limit_mm": absolute.map(|a| a.depth_mm),
         "absolute_limit_hz": absolute.map(|a| a.chatter_hz),
         "best": best,
+        "redundancy": analysis.redundancy.as_ref().map(redundancy),
         "warnings": analysis.warnings,
     })
 }
 
+fn redundancy(found: &RedundancyAnalysis) -> Value {
+    let r = &found.recommendation;
+    json!({
+        "posture": found.posture,
+        "step_deg": found.step_deg,
+        "angles": found.angles,
+        "recommended": {
+            "spindle_rpm": r.point.spindle_rpm,
+            "angle_deg": r.point.angle_deg,
+            "depth_mm": r.point.depth_mm,
+            "speed_margin": r.speed_margin,
+            "recommended_depth_mm": r.lower_quantile_mm,
+            "tip_depth_mm": r.tip_depth_mm,
+            "absolute_limit_mm": r.absolute_limit.map(|a| a.depth_mm),
+            "joints_deg": r.posture.joints_deg,
+            "limit_margin_deg": r.posture.limit_margin_deg,
+            "singularity_margin": r.posture.singularity_margin,
+        },
+        "enumeration": r.enumeration,
+        "swarm": r.swarm,
+        "agree": r.agree,
+    })
+}
+
+fn redundancy_text(found: &RedundancyAnalysis) -> String {
+    let r = &found.recommendation;
+    let count = |status| found.angles.iter().filter(|a| a.status == status).count();
+    let joints: Vec<String> = r
+        .posture
+        .joints_deg
+        .iter()
+        .flatten()
+        .map(|j| format!("{j:.2}"))
+        .collect();
+    let margin = |v: Option<f64>, unit: &str| v.map_or("–".to_string(), |v| format!("{v:.3}{unit}"));
+    format!(
+        "\nTool of {} turned about its axis in steps of {}°: {} angles usable, {} forbidden, {} out of reach\n\
+         Recommended: {:.1} rpm at {:.1}°, safe to {:.4} mm with the speed off by up to {:.0} % (5 % quantile over the model's uncertainty: {})\n\
+         Joints: {} degrees; nearest limit {} away, singularity margin {} of 1\n\
+         Enumeration {:.4} mm, particle swarm {:.4} mm: {}\n",
+        found.posture,
+        found.step_deg,
+        count(AngleStatus::Reachable),
+        count(AngleStatus::Forbidden),
+        count(AngleStatus::Unreachable),
+        r.point.spindle_rpm,
+        r.point.angle_deg,
+        r.point.depth_mm,
+        100.0 * r.speed_margin,
+        margin(r.lower_quantile_mm, " mm"),
+        joints.join(", "),
+        margin(r.posture.limit_margin_deg, "°"),
+        margin(r.posture.singularity_margin, ""),
+        r.enumeration.depth_mm,
+        r.swarm.depth_mm,
+        if r.agree {
+            "they agree"
+        } else {
+            "they disagree; the deeper one is given"
+        },
+    )
+}
+
 fn text(analysis: &LobeAnalysis) -> String {
     let (process, depth) = match analysis.process {
-        Process::Milling => ("milling, zero-order", "axial depth of cut"),
+        Process::Milling => (
+            match analysis.method {
+                LobeMethod::MultiFrequency => "milling, multi-frequency",
+                LobeMethod::SemiDiscretisation => "milling, semi-discretisation",
+                LobeMethod::ZeroOrder | LobeMethod::FrequencyDomain => "milling, zero-order",
+            },
+            "axial depth of cut",
+        ),
         Process::Drilling => (
             "drilling, lateral",
             "radial width of cut, (diameter − pilot diameter)/2",
@@ -86,7 +162,13 @@ fn text(analysis: &LobeAnalysis) -> String {
         number(analysis.coefficients.ktc_n_per_mm2, 4),
         number(analysis.coefficients.krc_n_per_mm2, 4),
     );
-    for case in &analysis.cases {
+    // Over the redundancy angle all cases are alike.
+    let shown = if analysis.redundancy.is_some() {
+        1
+    } else {
+        analysis.cases.len()
+    };
+    for case in analysis.cases.iter().take(shown) {
         let (low, high) = case.band_hz;
         let posture = case
             .posture
@@ -120,22 +202,37 @@ fn text(analysis: &LobeAnalysis) -> String {
                 optional(case.angle_deg, 1, "–"),
                 format!("{:.1}", peak.spindle_rpm),
                 optional(peak.depth_mm, 4, "no limit"),
+                optional(peak.lower_quantile_mm, 4, "–"),
                 optional(gain, 1, "–"),
             ]
         })
         .collect();
-    let header = ["posture", "angle °", "speed rpm", "limit mm", "× always safe"];
+    let header = [
+        "posture",
+        "angle °",
+        "speed rpm",
+        "limit mm",
+        "5 % mm",
+        "× always safe",
+    ];
     out += &format!(
         "\nBest speeds between {from} and {to} rpm (steps of {step})\n{}",
         table(&header, &rows)
     );
+    if analysis.best().iter().any(|(_, peak)| peak.at_range_end) {
+        out +=
+            "A speed at the end of the range is the deepest there: the curve may rise further beyond it.\n";
+    }
+    if let Some(found) = &analysis.redundancy {
+        out += &redundancy_text(found);
+    }
     out + &warnings(&analysis.warnings)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::{Dynamometer, LobeAxis, LobeMethod, LobeMode, LobeSource, LobesSection};
+    use crate::campaign::{Dynamometer, LobeAxis, LobeMode, LobeSource, LobesSection};
     use approx::assert_relative_eq;
 
     fn campaign(source: LobeSource) -> Campaign {
@@ -167,6 +264,7 @@ mod tests {
                 teeth: Some(2),
                 immersion: None,
                 half_point_angle_deg: Some(67.5),
+                process_damping_n_per_m: None,
                 feed_per_rev_mm: None,
                 spindle_rpm: [100.0, 900.0, 1.0],
                 modes: vec![
@@ -224,5 +322,84 @@ mod tests {
         lacking.lobes = None;
         let message = outcome(&lacking).err().unwrap().to_string();
         assert!(message.contains("no [lobes] table"), "{message}");
+    }
+
+    /// The methods of a milling campaign: all three answer, and differ little in a slot with three teeth.
+    #[test]
+    fn every_milling_method_answers() {
+        let mut milling = campaign(LobeSource::Modes);
+        let lobes = milling.lobes.as_mut().unwrap();
+        lobes.process = Process::Milling;
+        lobes.teeth = Some(3);
+        lobes.immersion = Some(crate::campaign::Immersion::SLOT);
+        lobes.spindle_rpm = [200.0, 400.0, 20.0];
+        lobes.modes.truncate(2);
+        let mut limits = Vec::new();
+        for method in [
+            LobeMethod::ZeroOrder,
+            LobeMethod::MultiFrequency,
+            LobeMethod::SemiDiscretisation,
+        ] {
+            milling.lobes.as_mut().unwrap().method = method;
+            let Outcome { json, .. } = outcome(&milling).unwrap();
+            assert_eq!(json["method"], serde_json::to_value(method).unwrap());
+            limits.push(json["curves"][0]["depth_limit_mm"][4].as_f64().unwrap());
+            assert!(json["absolute_limit_mm"].as_f64().unwrap() > 0.0);
+        }
+        assert_relative_eq!(limits[1], limits[2], max_relative = 0.01);
+        assert_relative_eq!(limits[0], limits[1], max_relative = 0.1);
+        let lobes = milling.lobes.as_mut().unwrap();
+        lobes.process_damping_n_per_m = Some(1e5);
+        let message = outcome(&milling).err().unwrap().to_string();
+        assert!(message.contains("tool.diameter_mm"), "{message}");
+        milling.lobes.as_mut().unwrap().method = LobeMethod::ZeroOrder;
+        let message = outcome(&milling).err().unwrap().to_string();
+        assert!(message.contains("lobes.process_damping_n_per_m"), "{message}");
+    }
+
+    #[test]
+    fn the_surface_over_the_angle_recommends_a_place() {
+        let mut turned = campaign(LobeSource::Model);
+        turned.robot = Some(crate::campaign::RobotSection {
+            model: "irb6640".into(),
+            mass_tolerance: None,
+            stiffness_tolerance: 0.3,
+        });
+        turned.postures.push(crate::campaign::Posture {
+            id: "p1".into(),
+            joints_deg: vec![135.0, -2.0, 53.0, 83.0, 30.0, -117.0],
+        });
+        let lobes = turned.lobes.as_mut().unwrap();
+        lobes.spindle_rpm = [150.0, 600.0, 2.0];
+        lobes.redundancy = Some(crate::campaign::Redundancy {
+            posture: 0,
+            step_deg: 20.0,
+            forbidden_deg: vec![[170.0, 230.0]],
+        });
+        let Outcome { json, text } = outcome(&turned).unwrap();
+        let found = &json["redundancy"];
+        let angles = found["angles"].as_array().unwrap();
+        assert_eq!(angles.len(), 18);
+        let usable = angles.iter().filter(|a| a["status"] == "reachable").count();
+        assert_eq!(json["curves"].as_array().unwrap().len(), usable);
+        assert!(angles.iter().filter(|a| a["status"] == "forbidden").count() <= 3);
+        assert!(json["curves"][0]["angle_deg"].is_number() && json["best"][0]["angle_deg"].is_number());
+        assert_eq!(found["agree"], true, "{found}");
+        let place = &found["recommended"];
+        let angle = place["angle_deg"].as_f64().unwrap();
+        assert!(!(170.0..=230.0).contains(&angle), "{place}");
+        assert!(place["depth_mm"].as_f64() <= place["tip_depth_mm"].as_f64());
+        assert_eq!(place["joints_deg"].as_array().unwrap().len(), 6);
+        assert!(text.contains("they agree"), "{text}");
+        turned
+            .lobes
+            .as_mut()
+            .unwrap()
+            .redundancy
+            .as_mut()
+            .unwrap()
+            .forbidden_deg = vec![[0.0, 360.0]];
+        let message = outcome(&turned).err().unwrap().to_string();
+        assert!(message.contains("no redundancy angle can be used"), "{message}");
     }
 }

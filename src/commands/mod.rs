@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Parser, Subcommand, ValueEnum};
 
+use crate::campaign::Campaign;
 use crate::{InputError, Result};
 
 mod add;
@@ -81,6 +82,29 @@ pub enum Command {
     Thesis(thesis::Args),
     /// The whole story on built-in campaigns.
     Demo(demo::Args),
+}
+
+/// A command on the side of the campaign that was asked for; without that on what the campaign holds, both sides as two
+/// documents under `structure` and `cutting`.
+fn by_domain(
+    campaign: &Campaign,
+    domain: Option<Domain>,
+    structure: impl Fn(&Campaign) -> Result<Outcome>,
+    cutting: impl Fn(&Campaign) -> Result<Outcome>,
+) -> Result<Outcome> {
+    match domain {
+        Some(Domain::Structure) => structure(campaign),
+        Some(Domain::Cutting) => cutting(campaign),
+        None if campaign.cuts.is_empty() => structure(campaign),
+        None if campaign.frfs.is_empty() => cutting(campaign),
+        None => {
+            let (structure, cutting) = (structure(campaign)?, cutting(campaign)?);
+            Ok(Outcome {
+                json: serde_json::json!({ "structure": structure.json, "cutting": cutting.json }),
+                text: format!("{}\n{}", structure.text, cutting.text),
+            })
+        }
+    }
 }
 
 /// Refuses the side that a command does not serve yet.

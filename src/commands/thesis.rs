@@ -62,10 +62,12 @@ fn peak(peak: Option<Peak>) -> String {
         Some(Peak {
             spindle_rpm,
             depth_mm: Some(depth),
+            ..
         }) => format!("{spindle_rpm:.0} / {depth:.3}"),
         Some(Peak {
             spindle_rpm,
             depth_mm: None,
+            ..
         }) => format!("{spindle_rpm:.0} / no limit"),
         None => "–".into(),
     }

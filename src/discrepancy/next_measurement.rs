@@ -47,6 +47,37 @@ pub fn advise(data: &FrfData, diagnosis: &Diagnosis<StructureModel, Instance>) -
     }
 }
 
+/// What to cut next, in a sentence.
+pub fn advise_cutting<M, I>(diagnosis: &Diagnosis<M, I>) -> String {
+    let rival = diagnosis.indistinguishable.first();
+    match (diagnosis.verdict, diagnosis.winner()) {
+        (Verdict::Effect, Some(winner)) => {
+            let test = match winner.name.effect.as_str() {
+                "size-effect" => "the same cut at a quarter and at four times the feed",
+                "runout" => "the same cut with the tool turned by half a pitch in its holder",
+                "tool-wear" => "the first cut repeated now, and once more with a new tool",
+                "speed-dependence" => "the same cut at half and at twice the cutting speed",
+                "crosstalk" => "a known static load along one axis at a time",
+                "dynamometer-misalignment" => "a known static load along the tool axis",
+                "dynamometer-resonance" => "a tap test of the dynamometer with the workpiece on it",
+                "nonlinear-drift" => "a minute of record without cutting, before and after a cut",
+                "chatter" => "the same cut at half the depth, and at a speed a tenth higher",
+                "chisel-edge" => "the same hole with a pilot hole as wide as the chisel edge",
+                "margin-friction" => "a hole twice as deep, and the drill turning in the finished hole",
+                _ => "the same cut at another feed and another speed",
+            };
+            match rival {
+                Some(rival) => format!("{test}: it tells {} from {rival}", winner.label()),
+                None => format!("{test}: it confirms {}", winner.label()),
+            }
+        }
+        (Verdict::Unknown, _) => {
+            "the cut with the largest misfit once more, and once at half its feed: what repeats is physics".into()
+        }
+        _ => "none needed for this model; other feeds and speeds would test it further".into(),
+    }
+}
+
 /// Lines between those compared.
 const LINE_STEP: usize = 8;
 

@@ -2,6 +2,7 @@
 
 pub mod calibrate;
 pub mod case;
+pub mod cutting_case;
 pub mod cutting_data;
 mod cutting_forces;
 pub mod cutting_model;
@@ -24,6 +25,7 @@ mod zero_line;
 pub use crate::parameter::{Parameter, Prior, Scale};
 pub use calibrate::{Calibration, Estimate, Options};
 pub use case::StructureCase;
+pub use cutting_case::CuttingCase;
 pub use cutting_data::CuttingData;
 pub use cutting_model::CuttingModel;
 pub use cutting_problem::{CutFit, CuttingProblem};

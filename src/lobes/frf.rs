@@ -128,6 +128,11 @@ impl ModalFrf {
     pub fn modes(&self) -> &[Mode] {
         &self.modes
     }
+
+    /// Static flexibility of what is not among the modes.
+    pub fn residual_m_per_n(&self) -> &[[f64; 2]; 2] {
+        &self.residual_m_per_n
+    }
 }
 
 impl DirectFrf for ModalFrf {

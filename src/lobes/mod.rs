@@ -13,18 +13,34 @@
 //! Where nothing limits the cut at a speed within the band of the FRF, the limit is `None` (`null` in JSON).
 
 mod arcs;
+mod arnoldi;
+pub mod band;
+pub mod curve;
 pub mod force;
 pub mod frf;
 pub mod measured;
+#[cfg(test)]
+mod milling_tests;
+pub mod multi_frequency;
+pub mod periodic_force;
+pub mod redundancy;
 pub mod robot;
 pub mod sampled;
+pub mod semi_discretisation;
 pub mod setup;
 pub mod solve;
+pub mod state_space;
 pub mod thesis;
 
+pub use band::LobeBand;
+pub use curve::{AbsoluteLimit, Limit, LobeCurve, Peak, SpeedLimit, peak_near, peaks, speed_grid};
 pub use force::RegenerativeForce;
 pub use frf::{AxisMode, DirectFrf, ModalFrf, Mode};
+pub use multi_frequency::MultiFrequency;
+pub use periodic_force::{PeriodicForce, ProcessDamping};
 pub use robot::RobotFrf;
 pub use sampled::SampledFrf;
-pub use solve::{AbsoluteLimit, Limit, LobeCurve, Peak, StabilitySolver, peak_near, peaks, speed_grid};
+pub use semi_discretisation::SemiDiscretisation;
+pub use solve::StabilitySolver;
+pub use state_space::StateSpace;
 pub use thesis::{ThesisLobes, thesis_lobes};

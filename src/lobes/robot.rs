@@ -2,12 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::Vector3;
+use nalgebra::{DVector, Vector3};
 use num_complex::Complex64;
 
-use super::frf::{DirectFrf, Receptance, band_around, resonance_grid};
+use super::frf::{DirectFrf, ModalFrf, Mode, Receptance, band_around, resonance_grid};
+use super::state_space::StateSpace;
 use crate::robot::frf::{Response, natural_frequencies_hz};
-use crate::robot::{Chain, FrfBasis, Kinematics, RobotModel};
+use crate::robot::{Chain, FrfBasis, Kinematics, ModalBasis, RobotModel, System};
 use crate::{Error, Result};
 
 /// Receptance of the tool centre point in the plane normal to the tool axis. First axis: the base's x projected into
@@ -17,6 +18,8 @@ pub struct RobotFrf {
     basis: FrfBasis,
     resonances: Vec<(f64, f64)>,
     band_hz: (f64, f64),
+    system: System,
+    rows: [DVector<f64>; 2],
 }
 
 /// The two axes of the lobes' plane for a tool axis that points from the spindle to the workpiece.
@@ -34,10 +37,8 @@ pub fn lobe_axes(tool_axis: Vector3<f64>) -> [Vector3<f64>; 2] {
 
 impl RobotFrf {
     pub fn new(robot: &RobotModel, kinematics: &Kinematics, chain: &Chain) -> Result<Self> {
-        let rows: Vec<_> = lobe_axes(kinematics.tool_axis())
-            .iter()
-            .map(|axis| chain.output_row(kinematics.tcp(), robot.flange_place(), true, axis))
-            .collect();
+        let rows = lobe_axes(kinematics.tool_axis())
+            .map(|axis| chain.output_row(kinematics.tcp(), robot.flange_place(), true, &axis));
         let system = chain.system(0);
         let basis = FrfBasis::new(&system, &rows)?;
         let frequencies = natural_frequencies_hz(&system)?;
@@ -51,7 +52,44 @@ impl RobotFrf {
             basis,
             resonances,
             band_hz,
+            system,
+            rows,
         })
+    }
+
+    /// The same structure as first-order equations, for methods that step through time.
+    pub fn state_space(&self) -> Result<StateSpace> {
+        StateSpace::of_system(&self.system, &self.rows)
+    }
+
+    /// The same FRF as a modal sum, which is quicker; `None` where modes are coupled (dampers, branches).
+    pub fn modal(&self) -> Result<Option<ModalFrf>> {
+        let system = &self.system;
+        let zeta = system.modal_damping_ratio.value;
+        if system.viscous.is_some() || system.chain_count < system.stiffness.nrows() || !(zeta > 0.0) {
+            return Ok(None);
+        }
+        let basis = ModalBasis::new(&system.stiffness, &system.mass)?;
+        let mut residual = [[0.0; 2]; 2];
+        let mut modes = Vec::new();
+        for (i, mu) in basis.inverse_omega2.iter().enumerate() {
+            let along = [0, 1].map(|a: usize| self.rows[a].dot(&basis.shapes.column(i)));
+            if *mu > 0.0 {
+                let omega_n_rad_per_s = 1.0 / mu.sqrt();
+                modes.push(Mode {
+                    omega_n_rad_per_s,
+                    damping_ratio: zeta,
+                    shape: along.map(|v| v * omega_n_rad_per_s),
+                });
+            } else {
+                for (a, row) in residual.iter_mut().enumerate() {
+                    for (b, value) in row.iter_mut().enumerate() {
+                        *value += along[a] * along[b];
+                    }
+                }
+            }
+        }
+        ModalFrf::from_mode_shapes(modes, residual).map(Some)
     }
 }
 
@@ -77,9 +115,9 @@ impl DirectFrf for RobotFrf {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lobes::{ModalFrf, Mode, RegenerativeForce, StabilitySolver, speed_grid};
+    use crate::lobes::{RegenerativeForce, SpeedLimit, StabilitySolver, speed_grid};
     use crate::robot::fixture::{TAP_POSTURES, irb6640};
-    use crate::robot::{Baseline, ModalBasis};
+    use crate::robot::{Baseline, Dual};
 
     #[test]
     fn a_vertical_tool_has_the_base_axes() {
@@ -87,29 +125,62 @@ mod tests {
         assert!((x - Vector3::x()).norm() < 1e-12 && (y - Vector3::y()).norm() < 1e-12);
     }
 
-    /// The same modes given as shapes lead to the same lobes.
+    /// The same structure as modal sum and as state space: rigid links, bending links, and with a damper and a branch.
     #[test]
-    fn robot_and_mode_shapes_agree() {
+    fn modal_sum_and_state_space_are_the_same_structure() {
         let robot = RobotModel::new(irb6640());
         let kinematics = robot.kinematics(&TAP_POSTURES[0]).unwrap();
-        let baseline = Baseline::nominal(&robot.spec);
-        let chain = robot.chain(&kinematics, &baseline);
-        let frf = RobotFrf::new(&robot, &kinematics, &chain).unwrap();
-        let system = chain.system(0);
-        let modes = ModalBasis::new(&system.stiffness, &system.mass).unwrap();
-        let rows = lobe_axes(kinematics.tool_axis())
-            .map(|d| chain.output_row(kinematics.tcp(), robot.flange_place(), true, &d));
-        let shapes = (0..6)
-            .map(|k| {
-                let omega = 1.0 / modes.inverse_omega2[k].sqrt();
-                Mode {
-                    omega_n_rad_per_s: omega,
-                    damping_ratio: baseline.damping_ratio.value,
-                    shape: [0, 1].map(|a| rows[a].dot(&modes.shapes.column(k)) * omega),
+        let rigid = Baseline::nominal(&robot.spec);
+        let mut bending = rigid.clone();
+        bending.young_pa = Some(Dual::constant(200e9));
+        let mut coupled = robot.chain(&kinematics, &rigid);
+        coupled.modal_damping_ratio = Dual::constant(0.0);
+        for element in &mut coupled.elements {
+            element.damping = Some(Dual::constant(1500.0));
+        }
+        coupled.branches.push(crate::robot::Branch {
+            place: robot.flange_place(),
+            at: kinematics.tcp(),
+            directions: vec![Vector3::x(), Vector3::y()],
+            mass_kg: Dual::constant(9.0),
+            stiffness_n_per_m: Dual::constant(9e5),
+            damping_ns_per_m: Dual::constant(120.0),
+            carries_tool_point: true,
+        });
+        let chains = [
+            robot.chain(&kinematics, &rigid),
+            robot.chain(&kinematics, &bending),
+            coupled,
+        ];
+        for (case, chain) in chains.iter().enumerate() {
+            let frf = RobotFrf::new(&robot, &kinematics, chain).unwrap();
+            let states = frf.state_space().unwrap();
+            let modal = frf.modal().unwrap();
+            assert_eq!(modal.is_some(), case < 2);
+            for f in [0.5, 7.6, 12.0, 23.0, 60.0] {
+                let exact = frf.receptance(f);
+                let scale = exact[0][0].norm() + exact[1][1].norm();
+                let stepped = states.receptance(f).unwrap();
+                for (a, b) in exact.iter().flatten().zip(stepped.iter().flatten()) {
+                    assert!((a - b).norm() < 1e-4 * scale, "case {case}, {f} Hz: {a} {b}");
                 }
-            })
-            .collect();
-        let modal = ModalFrf::from_mode_shapes(shapes, [[0.0; 2]; 2]).unwrap();
+                if let Some(modal) = &modal {
+                    for (a, b) in exact.iter().flatten().zip(modal.receptance(f).iter().flatten()) {
+                        assert!((a - b).norm() < 1e-9 * scale, "case {case}, {f} Hz: {a} {b}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// The modal sum leads to the same lobes.
+    #[test]
+    fn robot_and_modal_sum_have_the_same_lobes() {
+        let robot = RobotModel::new(irb6640());
+        let kinematics = robot.kinematics(&TAP_POSTURES[0]).unwrap();
+        let chain = robot.chain(&kinematics, &Baseline::nominal(&robot.spec));
+        let frf = RobotFrf::new(&robot, &kinematics, &chain).unwrap();
+        let modal = frf.modal().unwrap().unwrap();
         let force = RegenerativeForce::drilling_lateral(1014.2, 619.9, 1.178, 2).unwrap();
         let speeds = speed_grid([100.0, 900.0, 10.0]).unwrap();
         let ours = StabilitySolver::new(force, &frf).curve(&speeds);

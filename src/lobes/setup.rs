@@ -2,6 +2,7 @@
 
 use super::force::RegenerativeForce;
 use super::frf::{AxisMode, ModalFrf};
+use super::periodic_force::{PeriodicForce, ProcessDamping};
 use crate::campaign::{Campaign, LobeAxis, LobeMethod, LobesSection, Process};
 use crate::cutting::{CfcOptions, identify_forces};
 use crate::{Error, InputError, Result};
@@ -85,15 +86,30 @@ fn half_point_angle_rad(campaign: &Campaign, section: &LobesSection) -> Result<f
         })
 }
 
+/// The force of a cut, as the method wants it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Cut {
+    /// Zero-order milling, and drilling.
+    Averaged(RegenerativeForce),
+    /// Milling with its true dependence on time.
+    Periodic(PeriodicForce),
+}
+
+impl Cut {
+    /// The force averaged over a revolution.
+    pub fn average(&self) -> RegenerativeForce {
+        match self {
+            Cut::Averaged(force) => *force,
+            Cut::Periodic(force) => force.average(),
+        }
+    }
+}
+
 /// The regenerative force of the campaign's `[lobes]` table and `[tool]`.
 ///
 /// # Errors
 /// Where the table lacks something the process needs, or asks for a method that is not here.
-pub fn force_of(
-    campaign: &Campaign,
-    section: &LobesSection,
-    coefficients: LobeCoefficients,
-) -> Result<RegenerativeForce> {
+pub fn cut_of(campaign: &Campaign, section: &LobesSection, coefficients: LobeCoefficients) -> Result<Cut> {
     let lacks = |key: &str, problem: &str, remedy: &str| -> Error {
         InputError::new(problem)
             .file(campaign.dir.join("campaign.toml"))
@@ -115,13 +131,6 @@ pub fn force_of(
     } = coefficients;
     match section.process {
         Process::Milling => {
-            if section.method != LobeMethod::ZeroOrder {
-                return Err(lacks(
-                    "lobes.method",
-                    "this method is not built yet",
-                    "use method = \"zero-order\"",
-                ));
-            }
             let immersion = section.immersion.ok_or_else(|| {
                 lacks(
                     "lobes.immersion",
@@ -129,14 +138,40 @@ pub fn force_of(
                     "give immersion = \"slot\", start_deg and exit_deg, or radial_ratio with cut = \"up\" or \"down\"",
                 )
             })?;
-            RegenerativeForce::milling_zero_order(ktc_n_per_mm2, krc_n_per_mm2, teeth, immersion)
+            let averaged = section.method == LobeMethod::ZeroOrder;
+            let damping = match section.process_damping_n_per_m.filter(|c| *c > 0.0) {
+                None => None,
+                Some(_) if averaged => {
+                    return Err(lacks(
+                        "lobes.process_damping_n_per_m",
+                        "the zero-order method has no process damping",
+                        "use method = \"multi-frequency\" or \"semi-discretisation\", or take it out",
+                    ));
+                }
+                Some(coefficient_n_per_m) => Some(ProcessDamping {
+                    coefficient_n_per_m,
+                    tool_diameter_mm: tool.map(|t| t.diameter_mm).ok_or_else(|| {
+                        lacks(
+                            "tool.diameter_mm",
+                            "process damping needs the cutting speed, and the tool's diameter is not known",
+                            "add a [tool] table",
+                        )
+                    })?,
+                }),
+            };
+            let force = PeriodicForce::new(ktc_n_per_mm2, krc_n_per_mm2, teeth, immersion, damping)?;
+            Ok(match averaged {
+                true => Cut::Averaged(force.average()),
+                false => Cut::Periodic(force),
+            })
         }
         Process::Drilling => RegenerativeForce::drilling_lateral(
             ktc_n_per_mm2,
             krc_n_per_mm2,
             half_point_angle_rad(campaign, section)?,
             teeth,
-        ),
+        )
+        .map(Cut::Averaged),
     }
 }
 

@@ -2,47 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use rayon::prelude::*;
-use serde::Serialize;
-
 use super::arcs::{self, Arc, parabola_real};
+use super::curve::{AbsoluteLimit, Limit, SpeedLimit, golden_maximum};
 use super::force::RegenerativeForce;
 use super::frf::DirectFrf;
-use crate::{Error, Result};
-
-/// Where chatter starts at one spindle speed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Limit {
-    /// Width of cut b: axial depth in milling, (diameter − pilot diameter)/2 in drilling.
-    pub depth_mm: f64,
-    pub chatter_hz: f64,
-    /// Whole waves between two teeth, k in ωT = 2πk + ε.
-    pub lobe: u32,
-}
-
-/// The limit over spindle speeds; all three as long. `None` (JSON `null`): nothing limits the cut at that speed
-/// within the band of the FRF.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct LobeCurve {
-    pub spindle_rpm: Vec<f64>,
-    pub depth_limit_mm: Vec<Option<f64>>,
-    pub chatter_hz: Vec<Option<f64>>,
-}
-
-/// The depth below which no speed whatever chatters.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct AbsoluteLimit {
-    pub depth_mm: f64,
-    pub chatter_hz: f64,
-}
-
-/// A local maximum of the limit over speed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Peak {
-    pub spindle_rpm: f64,
-    /// `None`: unlimited around this speed.
-    pub depth_mm: Option<f64>,
-}
 
 /// Solves det(I − b (1 − e^{−iωT}) D Φ) = 0 along the lobes of one force on one structure.
 pub struct StabilitySolver<'a> {
@@ -69,95 +32,6 @@ impl<'a> StabilitySolver<'a> {
             force,
             frf,
             arcs: arcs::build(&force, frf, halvings),
-        }
-    }
-
-    /// The smallest b at a speed (> 0), `None` where no lobe passes over it within the band.
-    pub fn limit_at(&self, spindle_rpm: f64) -> Option<Limit> {
-        let period_s = 60.0 / (self.force.teeth as f64 * spindle_rpm);
-        if !(period_s.is_finite() && period_s > 0.0) {
-            return None;
-        }
-        let mut best = Best {
-            re_lambda: 0.0,
-            frequency_hz: 0.0,
-        };
-        // Greatest Re λ first: as soon as a root beats what an arc could give at best, all later arcs are beaten.
-        for arc in &self.arcs {
-            if arc.bound <= best.re_lambda {
-                break;
-            }
-            self.visit(arc, period_s, &mut best);
-        }
-        (best.re_lambda > 0.0).then(|| Limit {
-            depth_mm: depth_mm(best.re_lambda),
-            chatter_hz: best.frequency_hz,
-            lobe: (best.frequency_hz * period_s) as u32,
-        })
-    }
-
-    /// The limit at each speed, in parallel.
-    pub fn curve(&self, spindle_rpm: &[f64]) -> LobeCurve {
-        let limits: Vec<Option<Limit>> = spindle_rpm
-            .par_iter()
-            .with_min_len(32)
-            .map(|n| self.limit_at(*n))
-            .collect();
-        LobeCurve {
-            spindle_rpm: spindle_rpm.to_vec(),
-            depth_limit_mm: limits.iter().map(|l| l.map(|l| l.depth_mm)).collect(),
-            chatter_hz: limits.iter().map(|l| l.map(|l| l.chatter_hz)).collect(),
-        }
-    }
-
-    /// The minimum of b over all frequencies: some speed of every lobe reaches it. `None`: always stable.
-    pub fn absolute_limit(&self) -> Option<AbsoluteLimit> {
-        let mut best = Best {
-            re_lambda: 0.0,
-            frequency_hz: 0.0,
-        };
-        for arc in &self.arcs {
-            if arc.bound <= best.re_lambda {
-                break;
-            }
-            let (s, re_lambda) = golden_maximum(0.0, 1.0, |s| arc.exact(&self.force, self.frf, s).re);
-            best.offer(re_lambda, arc.frequency_hz(s));
-        }
-        (best.re_lambda > 0.0).then(|| AbsoluteLimit {
-            depth_mm: depth_mm(best.re_lambda),
-            chatter_hz: best.frequency_hz,
-        })
-    }
-
-    /// The `count` deepest peaks of a curve of this solver, deepest first, each moved to the true tip between its
-    /// neighbouring speeds. Where the curve has no peak inside, its deepest end stands for it.
-    pub fn best(&self, curve: &LobeCurve, count: usize) -> Vec<Peak> {
-        let mut found = peaks(curve);
-        if found.is_empty() {
-            found.extend(peak_near(curve, [f64::NEG_INFINITY, f64::INFINITY]));
-        }
-        found.sort_by(|a, b| depth_order(b.depth_mm).total_cmp(&depth_order(a.depth_mm)));
-        found.truncate(count);
-        found.iter().map(|peak| self.refined(curve, *peak)).collect()
-    }
-
-    /// A peak of a curve of this solver, moved to the true tip between the neighbouring speeds.
-    fn refined(&self, curve: &LobeCurve, peak: Peak) -> Peak {
-        let at = curve.spindle_rpm.partition_point(|n| *n < peak.spindle_rpm);
-        let neighbour = |i: usize| curve.spindle_rpm.get(i).copied().unwrap_or(peak.spindle_rpm);
-        let (low, high) = (neighbour(at.saturating_sub(1)), neighbour(at + 1));
-        if peak.depth_mm.is_none() {
-            return peak;
-        }
-        let depth = |n: f64| self.limit_at(n).map_or(f64::INFINITY, |l| l.depth_mm);
-        let (spindle_rpm, depth_mm) = golden_maximum(low, high, depth);
-        if depth_mm.is_finite() && Some(depth_mm) >= peak.depth_mm {
-            Peak {
-                spindle_rpm,
-                depth_mm: Some(depth_mm),
-            }
-        } else {
-            peak
         }
     }
 
@@ -216,6 +90,55 @@ impl<'a> StabilitySolver<'a> {
             }
             whole += 1.0;
         }
+    }
+}
+
+impl SpeedLimit for StabilitySolver<'_> {
+    /// `None` where no lobe passes over the speed within the band of the FRF.
+    fn limit_at(&self, spindle_rpm: f64) -> Option<Limit> {
+        let period_s = 60.0 / (self.force.teeth as f64 * spindle_rpm);
+        if !(period_s.is_finite() && period_s > 0.0) {
+            return None;
+        }
+        let mut best = Best {
+            re_lambda: 0.0,
+            frequency_hz: 0.0,
+        };
+        // Greatest Re λ first: as soon as a root beats what an arc could give at best, all later arcs are beaten.
+        for arc in &self.arcs {
+            if arc.bound <= best.re_lambda {
+                break;
+            }
+            self.visit(arc, period_s, &mut best);
+        }
+        (best.re_lambda > 0.0).then(|| Limit {
+            depth_mm: depth_mm(best.re_lambda),
+            chatter_hz: best.frequency_hz,
+            lobe: (best.frequency_hz * period_s) as u32,
+        })
+    }
+
+    /// The minimum of b over all frequencies: some speed of every lobe reaches it. `None`: always stable.
+    fn absolute_limit(&self) -> Option<AbsoluteLimit> {
+        let mut best = Best {
+            re_lambda: 0.0,
+            frequency_hz: 0.0,
+        };
+        for arc in &self.arcs {
+            if arc.bound <= best.re_lambda {
+                break;
+            }
+            let (s, re_lambda) = golden_maximum(0.0, 1.0, 48, |s| arc.exact(&self.force, self.frf, s).re);
+            best.offer(re_lambda, arc.frequency_hz(s));
+        }
+        (best.re_lambda > 0.0).then(|| AbsoluteLimit {
+            depth_mm: depth_mm(best.re_lambda),
+            chatter_hz: best.frequency_hz,
+        })
+    }
+
+    fn speeds_per_task(&self) -> usize {
+        32
     }
 }
 
@@ -296,90 +219,6 @@ fn root(
         };
     }
     None
-}
-
-/// Greatest value of a function with one maximum between `low` and `high`: place and value (golden section, with
-/// the ends looked at too).
-fn golden_maximum(low: f64, high: f64, f: impl Fn(f64) -> f64) -> (f64, f64) {
-    const SHRINK: f64 = 0.618_033_988_749_894_9;
-    let (mut a, mut b) = (low, high);
-    let (mut x1, mut x2) = (b - SHRINK * (b - a), a + SHRINK * (b - a));
-    let (mut f1, mut f2) = (f(x1), f(x2));
-    // 0.618^48 < 1e-10 of the interval.
-    for _ in 0..48 {
-        if f1 >= f2 {
-            (b, x2, f2) = (x2, x1, f1);
-            x1 = b - SHRINK * (b - a);
-            f1 = f(x1);
-        } else {
-            (a, x1, f1) = (x1, x2, f2);
-            x2 = a + SHRINK * (b - a);
-            f2 = f(x2);
-        }
-    }
-    let inner = if f1 >= f2 { (x1, f1) } else { (x2, f2) };
-    [(low, f(low)), (high, f(high))]
-        .into_iter()
-        .fold(inner, |best, end| if end.1 > best.1 { end } else { best })
-}
-
-/// Speeds from, to, step (rpm): `from`, `from + step`, … up to `to` (included within a millionth of a step).
-///
-/// # Errors
-/// Where that is no ascending grid of positive speeds, or more than ten million of them.
-pub fn speed_grid(from_to_step: [f64; 3]) -> Result<Vec<f64>> {
-    let [from, to, step] = from_to_step;
-    let count = ((to - from) / step + 1e-6).floor();
-    if !(from > 0.0 && to >= from && step > 0.0 && to.is_finite() && count < 1e7) {
-        return Err(Error::computation(format!(
-            "lobes: from {from} to {to} rpm in steps of {step} is no grid of spindle speeds; \
-             give [from, to, step] with 0 < from ≤ to and a positive step"
-        )));
-    }
-    Ok((0..=count as usize).map(|i| from + step * i as f64).collect())
-}
-
-/// Unlimited counts as deepest.
-fn depth_order(depth_mm: Option<f64>) -> f64 {
-    depth_mm.unwrap_or(f64::INFINITY)
-}
-
-/// Local maxima of a curve inside its speed range, ascending in speed; a stretch of equal depth (or without limit)
-/// counts once, at its middle.
-pub fn peaks(curve: &LobeCurve) -> Vec<Peak> {
-    let depth: Vec<f64> = curve.depth_limit_mm.iter().map(|d| depth_order(*d)).collect();
-    let mut found = Vec::new();
-    let mut start = 1;
-    while start + 1 < depth.len() {
-        let mut end = start;
-        while end + 1 < depth.len() && depth[end + 1] == depth[start] {
-            end += 1;
-        }
-        let falls = end + 1 < depth.len() && depth[end + 1] < depth[start];
-        if depth[start - 1] < depth[start] && falls {
-            found.push(peak_at(curve, (start + end) / 2));
-        }
-        start = end + 1;
-    }
-    found
-}
-
-/// The deepest point of a curve between two speeds (both included); `None` where the curve has no speed there.
-pub fn peak_near(curve: &LobeCurve, rpm_range: [f64; 2]) -> Option<Peak> {
-    let deepest = (0..curve.spindle_rpm.len())
-        .filter(|i| (rpm_range[0]..=rpm_range[1]).contains(&curve.spindle_rpm[*i]))
-        .max_by(|i, j| {
-            let order = |i: &usize| depth_order(curve.depth_limit_mm[*i]);
-            order(i).total_cmp(&order(j))
-        })?;
-    Some(peak_at(curve, deepest))
-}
-
-fn peak_at(curve: &LobeCurve, index: usize) -> Peak {
-    Peak {
-        spindle_rpm: curve.spindle_rpm[index],
-        depth_mm: curve.depth_limit_mm[index],
-    }
 }
 
 #[cfg(test)]

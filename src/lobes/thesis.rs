@@ -6,9 +6,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::curve::{AbsoluteLimit, LobeCurve, Peak, SpeedLimit, peaks, speed_grid};
 use super::force::RegenerativeForce;
 use super::frf::{AxisMode, ModalFrf};
-use super::solve::{AbsoluteLimit, LobeCurve, Peak, StabilitySolver, peaks, speed_grid};
+use super::solve::StabilitySolver;
 use crate::{Error, Result};
 
 const MINIMA: &str = include_str!("../../datasets/irb6640/real_part_minima_measured.csv");
@@ -165,10 +166,7 @@ pub fn thesis_lobes() -> Result<Vec<ThesisLobes>> {
                     .ok_or_else(|| missing("stability peak"))
             };
             let rows = || published.iter().filter(|row| row.configuration == configuration);
-            let peak = |spindle_rpm, depth_mm| Peak {
-                spindle_rpm,
-                depth_mm: Some(depth_mm),
-            };
+            let peak = |spindle_rpm, depth_mm| Peak::new(spindle_rpm, Some(depth_mm));
             Ok(ThesisLobes {
                 configuration,
                 dominant_hz,

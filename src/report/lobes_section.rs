@@ -3,10 +3,11 @@
 use super::figure::{LobeCurve, LobeMarker, LobeOutcome, LobesFigure};
 use super::number::{decimals, percent, significant};
 use super::parts::{figure, paragraph};
+use super::redundancy_section;
 use super::structure_section::NOISE_LIKE;
 use super::{Block, Column, Section, Table};
 use crate::analysis::{LobeAnalysis, LobeFindings, StructureFindings};
-use crate::campaign::{LobeSource, Process};
+use crate::campaign::{LobeMethod, LobeSource, Process};
 
 /// Curves in one figure.
 const CURVES: usize = 6;
@@ -39,10 +40,15 @@ pub fn summary(findings: &LobeFindings) -> String {
             format!("with a limit of {} mm", significant(d, 3))
         });
         text += &format!(
-            " The deepest tip of a lobe between {} and {} rpm is at {} rpm{place}, {depth}.",
+            " The deepest place between {} and {} rpm is at {} rpm{place}, {depth}{}.",
             analysis.spindle_rpm[0],
             analysis.spindle_rpm[1],
-            decimals(peak.spindle_rpm, 0)
+            decimals(peak.spindle_rpm, 0),
+            if peak.at_range_end {
+                " (the end of the range; it may be deeper beyond)"
+            } else {
+                ""
+            }
         );
     }
     text
@@ -50,7 +56,11 @@ pub fn summary(findings: &LobeFindings) -> String {
 
 fn process(analysis: &LobeAnalysis) -> &'static str {
     match analysis.process {
-        Process::Milling => "milling",
+        Process::Milling => match analysis.method {
+            LobeMethod::MultiFrequency => "milling, multi-frequency",
+            LobeMethod::SemiDiscretisation => "milling, semi-discretisation",
+            LobeMethod::ZeroOrder | LobeMethod::FrequencyDomain => "milling, zero-order",
+        },
         Process::Drilling => "drilling, lateral",
     }
 }
@@ -87,8 +97,13 @@ pub fn section(findings: &LobeFindings, structure: Option<&StructureFindings>) -
     {
         blocks.push(Block::Warning(warning));
     }
-    blocks.extend(figures(analysis, "lobes", ""));
-    blocks.push(limits(findings));
+    match &analysis.redundancy {
+        Some(found) => blocks.extend(redundancy_section::blocks(analysis, found)),
+        None => {
+            blocks.extend(figures(analysis, "lobes", ""));
+            blocks.push(limits(findings));
+        }
+    }
     blocks.push(best(analysis));
     match &findings.measured {
         Some(Ok(measured)) => {
@@ -210,6 +225,7 @@ fn best(analysis: &LobeAnalysis) -> Block {
             case.posture.clone().unwrap_or_else(|| "modes".into()),
             decimals(peak.spindle_rpm, 1),
             peak.depth_mm.map_or("no limit".into(), |d| significant(d, 3)),
+            peak.lower_quantile_mm.map_or("–".into(), |d| significant(d, 3)),
             gain.map_or("–".into(), |g| decimals(g, 1)),
         ]
     });
@@ -221,11 +237,12 @@ fn best(analysis: &LobeAnalysis) -> Block {
             Column::text("posture"),
             Column::number("speed (rpm)"),
             Column::number("limit (mm)"),
+            Column::number("5 % quantile (mm)"),
             Column::number("× absolute limit"),
         ],
         rows,
         notes: vec![
-            "Only tips within the range: a curve that still rises at the end of the range is deeper there.".into(),
+            "An end of the range is listed where it is deeper than every tip: the curve may rise further beyond it.".into(),
             "Many tips are narrow: with a speed or a frequency a few per cent off the limit may be far lower. Stay well \
              below it and try the speed."
                 .into(),

@@ -16,6 +16,7 @@ pub mod number;
 pub mod page;
 mod parts;
 mod real_case_section;
+mod redundancy_section;
 pub mod structure_section;
 #[cfg(feature = "parquet")]
 pub mod tables;

@@ -229,6 +229,9 @@ fn mac(set: &SetModes) -> Option<Block> {
         value_label: "MAC".into(),
         format: CellFormat::Significant(2),
         range: Some((0.0, 1.0)),
+        log: false,
+        beside: Vec::new(),
+        table_titles: Vec::new(),
     };
     Some(figure(
         "modal-mac",

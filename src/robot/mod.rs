@@ -13,6 +13,7 @@ pub mod export;
 #[cfg(test)]
 pub(crate) mod fixture;
 pub mod frf;
+pub mod inverse;
 pub mod model;
 pub mod posture_report;
 
@@ -21,5 +22,6 @@ pub use chain::{Body, Branch, Chain, Element, Place, Role, Slot, System};
 pub use dh::Kinematics;
 pub use dual::Dual;
 pub use frf::{FrfBasis, ModalBasis};
+pub use inverse::{IkBranch, IkSolution, InverseKinematics};
 pub use model::{Baseline, RobotModel};
 pub use posture_report::PostureReport;

@@ -1,5 +1,6 @@
 use super::*;
 use crate::campaign::Immersion;
+use crate::lobes::curve::{LobeCurve, peak_near, peaks, speed_grid};
 use crate::lobes::frf::{AxisMode, ModalFrf, Mode};
 use crate::lobes::sampled::SampledFrf;
 use approx::assert_relative_eq;

@@ -1,0 +1,163 @@
+//! What the uncertainty of a model's parameters leaves open of its lobes: quantiles over draws.
+
+use nalgebra::{DMatrix, DVector};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::curve::SpeedLimit;
+use super::force::RegenerativeForce;
+use super::frf::DirectFrf;
+use super::solve::StabilitySolver;
+use crate::{Error, Result};
+
+/// The band's lower and upper quantile.
+pub const QUANTILES: [f64; 2] = [0.05, 0.95];
+
+/// Quantiles of the limit at each speed, mm; `None` where that share of the draws has no limit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LobeBand {
+    pub lower_mm: Vec<Option<f64>>,
+    pub upper_mm: Vec<Option<f64>>,
+}
+
+/// Normal draws about `mean` with a covariance, within bounds; the same for the same seed.
+///
+/// # Errors
+/// A covariance that is not one.
+pub fn draws(
+    mean: &[f64],
+    covariance: &DMatrix<f64>,
+    bounds: &[[f64; 2]],
+    count: usize,
+    seed: u64,
+) -> Result<Vec<Vec<f64>>> {
+    let n = mean.len();
+    // On unit diagonal: parameters differ by many orders of magnitude.
+    let std: Vec<f64> = (0..n).map(|i| covariance[(i, i)].sqrt()).collect();
+    let scaled = DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] / (std[i] * std[j]));
+    let lower = scaled
+        .cholesky()
+        .ok_or_else(|| Error::computation("lobes: the parameters' covariance is not positive definite"))?
+        .l();
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    // Box & Muller (1958).
+    let mut normal = || -> f64 {
+        let (u, v): (f64, f64) = (1.0 - random.random::<f64>(), random.random());
+        (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+    };
+    Ok((0..count)
+        .map(|_| {
+            let z = DVector::from_fn(n, |_, _| normal());
+            let step = &lower * z;
+            (0..n)
+                .map(|i| (mean[i] + std[i] * step[i]).clamp(bounds[i][0], bounds[i][1]))
+                .collect()
+        })
+        .collect())
+}
+
+/// The quantile of values where unlimited counts as infinite (linear between order statistics).
+pub fn quantile_mm(mut values: Vec<f64>, share: f64) -> Option<f64> {
+    if values.is_empty() {
+        return None;
+    }
+    values.sort_by(f64::total_cmp);
+    let place = share * (values.len() - 1) as f64;
+    let (low, high) = (values[place.floor() as usize], values[place.ceil() as usize]);
+    let value = if low == high {
+        low
+    } else {
+        low + (high - low) * place.fract()
+    };
+    value.is_finite().then_some(value)
+}
+
+/// The band over the speeds, one structure a draw.
+pub fn band(force: RegenerativeForce, structures: &[Box<dyn DirectFrf>], spindle_rpm: &[f64]) -> LobeBand {
+    let limits: Vec<Vec<f64>> = structures
+        .par_iter()
+        .map(|frf| {
+            let solver = StabilitySolver::new(force, frf.as_ref());
+            spindle_rpm
+                .iter()
+                .map(|n| solver.limit_at(*n).map_or(f64::INFINITY, |l| l.depth_mm))
+                .collect()
+        })
+        .collect();
+    let [lower_mm, upper_mm] = QUANTILES.map(|share| {
+        (0..spindle_rpm.len())
+            .map(|i| quantile_mm(limits.iter().map(|l| l[i]).collect(), share))
+            .collect()
+    });
+    LobeBand { lower_mm, upper_mm }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lobes::frf::{AxisMode, ModalFrf};
+
+    #[test]
+    fn draws_have_the_covariance_asked_for() {
+        let covariance = DMatrix::from_row_slice(2, 2, &[4e-6, 1e-3, 1e-3, 1.0]);
+        let free = [[f64::NEG_INFINITY, f64::INFINITY]; 2];
+        let drawn = draws(&[1.0, -3.0], &covariance, &free, 20_000, 1).unwrap();
+        let mean = |f: &dyn Fn(&[f64]) -> f64| drawn.iter().map(|d| f(d)).sum::<f64>() / drawn.len() as f64;
+        let (a, b) = (mean(&|d| d[0]), mean(&|d| d[1]));
+        assert!((a - 1.0).abs() < 1e-4 && (b + 3.0).abs() < 0.03, "{a} {b}");
+        let cov = [
+            mean(&|d| (d[0] - a).powi(2)) / 4e-6,
+            mean(&|d| (d[1] - b).powi(2)),
+            mean(&|d| (d[0] - a) * (d[1] - b)) / 1e-3,
+        ];
+        assert!(cov.iter().all(|c| (c - 1.0).abs() < 0.05), "{cov:?}");
+        assert_eq!(
+            drawn[..5],
+            draws(&[1.0, -3.0], &covariance, &free, 5, 1).unwrap()[..]
+        );
+        let bounded = draws(&[1.0, -3.0], &covariance, &[[0.999, 1.001], [-3.0, -2.9]], 50, 1).unwrap();
+        assert!(
+            bounded
+                .iter()
+                .all(|d| (0.999..=1.001).contains(&d[0]) && (-3.0..=-2.9).contains(&d[1]))
+        );
+    }
+
+    #[test]
+    fn quantiles_with_unlimited_draws() {
+        let values: Vec<f64> = (0..=100).map(f64::from).collect();
+        assert_eq!(quantile_mm(values.clone(), 0.05), Some(5.0));
+        assert_eq!(quantile_mm(vec![1.0, f64::INFINITY, f64::INFINITY], 0.95), None);
+        assert_eq!(quantile_mm(vec![1.0, f64::INFINITY, 1.0, 1.0], 0.05), Some(1.0));
+        assert_eq!(quantile_mm(vec![], 0.5), None);
+    }
+
+    /// Stiffness off by a factor moves the limit by that factor: the band at any speed is the one of the factor.
+    #[test]
+    fn the_band_of_a_scaled_structure_is_known() {
+        let structures: Vec<Box<dyn DirectFrf>> = (0..=100)
+            .map(|i| {
+                let factor = 1.0 + 0.002 * f64::from(i);
+                let mode = |axis, frequency_hz| AxisMode {
+                    axis,
+                    frequency_hz,
+                    damping_ratio: 0.03,
+                    stiffness_n_per_m: 1e6 * factor,
+                };
+                let frf = ModalFrf::from_axis_modes(&[mode(0, 12.0), mode(1, 15.0)]).unwrap();
+                Box::new(frf) as Box<dyn DirectFrf>
+            })
+            .collect();
+        let force = RegenerativeForce::drilling_lateral(1014.2, 619.9, 1.178, 2).unwrap();
+        let speeds = [150.0, 300.0, 420.0];
+        let found = band(force, &structures, &speeds);
+        let solver = StabilitySolver::new(force, structures[0].as_ref());
+        for (i, n) in speeds.iter().enumerate() {
+            let least = solver.limit_at(*n).unwrap().depth_mm;
+            assert!((found.lower_mm[i].unwrap() / least - 1.01).abs() < 1e-9);
+            assert!((found.upper_mm[i].unwrap() / least - 1.19).abs() < 1e-9);
+        }
+    }
+}

@@ -2,6 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
+use crate::Result;
 use crate::campaign::{Campaign, Process};
 use crate::cutting::{CfcResult, Group};
 use crate::discrepancy::CuttingComparison;
@@ -9,7 +10,6 @@ use crate::identify::cutting_data::processes;
 use crate::identify::cutting_problem::CuttingProblem;
 use crate::identify::cutting_study::{calibrate_cutting, held_out_cuts};
 use crate::identify::{Calibration, CuttingCase, CuttingData, CuttingModel, Estimate};
-use crate::Result;
 
 /// The cutting model of a campaign's main process against its force records.
 pub struct CuttingAnalysis {

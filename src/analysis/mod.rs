@@ -2,8 +2,8 @@
 
 pub mod addition;
 pub mod campaign;
-pub mod diagnosis;
 pub mod cutting;
+pub mod diagnosis;
 pub mod lobes;
 pub mod modal;
 mod redundancy;
@@ -13,8 +13,8 @@ pub mod thesis_findings;
 
 pub use addition::Addition;
 pub use campaign::{CampaignFindings, LobeFindings, PostureFindings, StructureFindings};
-pub use diagnosis::DiagnosisFindings;
 pub use cutting::CuttingAnalysis;
+pub use diagnosis::DiagnosisFindings;
 pub use lobes::{LobeAnalysis, LobeCase};
 pub use modal::{ModalAnalysis, SetModes};
 pub use redundancy::RedundancyAnalysis;

@@ -153,7 +153,12 @@ fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Settings) -> Resul
         .par_iter()
         .map(|input| modal::analyse_frf(&input.frequency_hz, &input.receptance_m_per_n, settings))
         .collect::<Result<_>>()?;
-    let mut dofs: Vec<String> = inputs.iter().filter_map(|i| i.dofs.as_ref()).flatten().cloned().collect();
+    let mut dofs: Vec<String> = inputs
+        .iter()
+        .filter_map(|i| i.dofs.as_ref())
+        .flatten()
+        .cloned()
+        .collect();
     dofs.sort();
     dofs.dedup();
     let number = |name: &String| dofs.binary_search(name).ok();
@@ -164,7 +169,10 @@ fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Settings) -> Resul
             frequency_hz: &input.frequency_hz,
             receptance_m_per_n: &input.receptance_m_per_n,
             modes,
-            dofs: input.dofs.as_ref().and_then(|[a, b]| Some([number(a)?, number(b)?])),
+            dofs: input
+                .dofs
+                .as_ref()
+                .and_then(|[a, b]| Some([number(a)?, number(b)?])),
         })
         .collect();
     let mut global = modal::global(&members, settings)?;
@@ -174,7 +182,9 @@ fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Settings) -> Resul
             return None;
         }
         let other = inputs.iter().position(|i| {
-            i.dofs.as_ref().is_some_and(|[a, b]| a == reference && b == response)
+            i.dofs
+                .as_ref()
+                .is_some_and(|[a, b]| a == reference && b == response)
         })?;
         global.reconstructions[other].as_ref()
     };
@@ -224,7 +234,11 @@ fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Settings) -> Resul
                 mode.estimates.retain(|e| e.damping_ratio > 0.0);
             }
             modes.modes.retain(|m| !m.estimates.is_empty());
-            AnalysedFrf { input, modes, quality }
+            AnalysedFrf {
+                input,
+                modes,
+                quality,
+            }
         })
         .collect();
     Ok(SetModes {
@@ -241,7 +255,12 @@ fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Settings) -> Resul
 fn set_warnings(set: &SetModes) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for frf in &set.frfs {
-        lines.extend(frf.modes.warnings.iter().map(|w| format!("{} {}: {w}", set.set, frf.input.name)));
+        lines.extend(
+            frf.modes
+                .warnings
+                .iter()
+                .map(|w| format!("{} {}: {w}", set.set, frf.input.name)),
+        );
     }
     // A whole set with the same trouble is one line.
     let conjugated: Vec<&AnalysedFrf> = set.frfs.iter().filter(|f| f.modes.conjugated).collect();
@@ -255,9 +274,16 @@ fn set_warnings(set: &SetModes) -> Vec<String> {
         ));
     }
     lines.extend(set.global.warnings.iter().map(|w| format!("{}: {w}", set.set)));
-    let refused = set.frfs.iter().filter(|f| f.modes.remarks.iter().any(|r| r.contains("not reported"))).count();
+    let refused = set
+        .frfs
+        .iter()
+        .filter(|f| f.modes.remarks.iter().any(|r| r.contains("not reported")))
+        .count();
     if refused > 0 {
-        lines.push(format!("{}: {refused} FRFs have peaks that are no modes (which: --json)", set.set));
+        lines.push(format!(
+            "{}: {refused} FRFs have peaks that are no modes (which: --json)",
+            set.set
+        ));
     }
     if set.verdict != Verdict::Good {
         let worst: Vec<String> = set
@@ -289,7 +315,12 @@ fn read(
                 "{set}: the file does not say what its {unsaid} FRFs are; taken as receptance (m/N)"
             ));
         }
-        return Ok(file.contents.frfs.into_iter().map(|r| frf_input(&set, r)).collect());
+        return Ok(file
+            .contents
+            .frfs
+            .into_iter()
+            .map(|r| frf_input(&set, r))
+            .collect());
     }
     if file.contents.times.is_empty() {
         return Err(InputError::new(format!(
@@ -312,7 +343,10 @@ fn frf_input(set: &str, record: FrfRecord) -> FrfInput {
     FrfInput {
         set: set.to_owned(),
         receptance_m_per_n: receptance(&record.frequency_hz, &record.value, record.quantity),
-        dofs: record.response.zip(record.reference).map(|(a, b)| [a.to_string(), b.to_string()]),
+        dofs: record
+            .response
+            .zip(record.reference)
+            .map(|(a, b)| [a.to_string(), b.to_string()]),
         name: record.name,
         frequency_hz: record.frequency_hz,
         coherence: record.coherence,
@@ -329,17 +363,24 @@ fn receptance(frequency_hz: &[f64], value: &[Complex64], quantity: Option<Quanti
         Some(Quantity::Accelerance) => 2,
     };
     let lines = frequency_hz.iter().zip(value);
-    lines.map(|(f, v)| v / Complex64::new(0.0, TAU * f).powi(order)).collect()
+    lines
+        .map(|(f, v)| v / Complex64::new(0.0, TAU * f).powi(order))
+        .collect()
 }
 
 /// The hammer's channel: the only one in newtons, or else the only one that is called so.
 fn hammer<'a>(record: &'a TimeRecord, path: &Path) -> Result<&'a Channel> {
-    let in_newtons = |c: &&Channel| units::parse(&c.file_unit).is_some_and(|u| u.dimension == Dimension::FORCE);
+    let in_newtons =
+        |c: &&Channel| units::parse(&c.file_unit).is_some_and(|u| u.dimension == Dimension::FORCE);
     let called = |c: &&Channel| {
         let name = c.name.to_lowercase();
-        ["hammer", "force", "impact", "kladivo", "kraft"].iter().any(|w| name.contains(w))
+        ["hammer", "force", "impact", "kladivo", "kraft"]
+            .iter()
+            .any(|w| name.contains(w))
     };
-    let by = |test: &dyn Fn(&&Channel) -> bool| -> Vec<&'a Channel> { record.channels.iter().filter(|c| test(c)).collect() };
+    let by = |test: &dyn Fn(&&Channel) -> bool| -> Vec<&'a Channel> {
+        record.channels.iter().filter(|c| test(c)).collect()
+    };
     let (newtons, named) = (by(&in_newtons), by(&called));
     match (newtons.as_slice(), named.as_slice()) {
         ([one], _) | ([], [one]) => Ok(one),
@@ -426,7 +467,10 @@ mod tests {
         let f = 10.0;
         let omega = TAU * f;
         let of = |value: Complex64, quantity| receptance(&[f], &[value], quantity)[0].re;
-        let a = of(Complex64::new(-omega * omega * 2e-6, 0.0), Some(Quantity::Accelerance));
+        let a = of(
+            Complex64::new(-omega * omega * 2e-6, 0.0),
+            Some(Quantity::Accelerance),
+        );
         let v = of(Complex64::new(0.0, omega * 2e-6), Some(Quantity::Mobility));
         let x = of(Complex64::new(2e-6, 0.0), None);
         for value in [a, v, x] {

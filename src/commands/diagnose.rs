@@ -4,10 +4,10 @@ use super::text::{number, percent, table, warnings};
 use super::{CampaignArg, Domain, Outcome, by_domain};
 use crate::Result;
 use crate::analysis::DiagnosisFindings;
-use crate::campaign::Campaign;
-use crate::discrepancy::explained::{Explained, NamedPart};
 use crate::analysis::cutting::cutting_comparison;
+use crate::campaign::Campaign;
 use crate::discrepancy::diagnose::Baseline;
+use crate::discrepancy::explained::{Explained, NamedPart};
 use crate::discrepancy::{Candidate, Diagnosis, Verdict, diagnose, next_measurement};
 use crate::identify::{CuttingCase, CuttingStudy, Options};
 
@@ -50,9 +50,14 @@ fn cutting(campaign: &Campaign) -> Result<Outcome> {
         "warnings": case.warnings,
     });
     let added = case.effects();
-    let mut text = format!("model: baseline{}\n", added.iter().map(|e| format!(" + {e}")).collect::<String>());
+    let mut text = format!(
+        "model: baseline{}\n",
+        added.iter().map(|e| format!(" + {e}")).collect::<String>()
+    );
     text += &as_it_stands(&d.baseline, noise_floor_nrms);
-    text += &answer(&d, |c| (c.instance.effect.explanation(), c.instance.effect.fingerprint()));
+    text += &answer(&d, |c| {
+        (c.instance.effect.explanation(), c.instance.effect.fingerprint())
+    });
     text += &rest(campaign, &d, &next_measurement);
     Ok(Outcome {
         json,
@@ -183,7 +188,9 @@ fn describe(campaign: &Campaign, findings: &DiagnosisFindings) -> String {
         ..
     } = findings;
     let mut text = as_it_stands(&d.baseline, case.data.noise_floor_nrms());
-    text += &answer(d, |c| (c.instance.effect.explanation(), c.instance.effect.fingerprint()));
+    text += &answer(d, |c| {
+        (c.instance.effect.explanation(), c.instance.effect.fingerprint())
+    });
     text += &super::compare::dominant(&findings.residual_peaks);
     if let (Some(leading), Some(candidate)) = (&findings.leading, findings.leader()) {
         let who = match d.verdict {

@@ -152,8 +152,17 @@ fn text(analysis: &ModalAnalysis) -> String {
     for (file, hits) in &analysis.hits {
         let _ = writeln!(out, "{file}: hits");
         for (k, hit) in hits.iter().enumerate() {
-            let what = hit.left_out.as_ref().map_or("used".into(), |why| format!("left out: {why}"));
-            let _ = writeln!(out, "  {:>3}  {:8.3} s  {:9.1} N  {what}", k + 1, hit.time_s, hit.peak_n);
+            let what = hit
+                .left_out
+                .as_ref()
+                .map_or("used".into(), |why| format!("left out: {why}"));
+            let _ = writeln!(
+                out,
+                "  {:>3}  {:8.3} s  {:9.1} N  {what}",
+                k + 1,
+                hit.time_s,
+                hit.peak_n
+            );
         }
     }
     for set in &analysis.sets {
@@ -174,9 +183,19 @@ fn text(analysis: &ModalAnalysis) -> String {
                 mode.found_in,
             );
         }
-        let left: Vec<_> = set.global.stabilisation.candidates.iter().filter(|c| !c.chosen).collect();
+        let left: Vec<_> = set
+            .global
+            .stabilisation
+            .candidates
+            .iter()
+            .filter(|c| !c.chosen)
+            .collect();
         for candidate in left.iter().take(5) {
-            let _ = writeln!(out, "    not taken: {:.2} Hz, {}", candidate.frequency_hz, candidate.why);
+            let _ = writeln!(
+                out,
+                "    not taken: {:.2} Hz, {}",
+                candidate.frequency_hz, candidate.why
+            );
         }
     }
     if !analysis.warnings.is_empty() {

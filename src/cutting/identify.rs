@@ -87,10 +87,11 @@ pub fn from_analyses(
     }
     if cuts.is_empty() {
         let cause = first_error.map_or_else(String::new, |e| format!("; the first: {e}"));
-        return Err(Error::computation(format!(
-            "none of the {} cuts can be used{cause}",
-            campaign.cuts.len()
-        )));
+        let problem = format!("none of the {} cuts can be used{cause}", campaign.cuts.len());
+        return Err(InputError::new(problem)
+            .file(campaign.dir.join("campaign.toml"))
+            .key("cut")
+            .into());
     }
     turn_torque(&mut cuts, &mut warnings);
     let counted = without_duplicates(campaign, &cuts, &mut warnings);

@@ -72,7 +72,8 @@ pub fn advise_cutting<M, I>(diagnosis: &Diagnosis<M, I>) -> String {
             }
         }
         (Verdict::Unknown, _) => {
-            "the cut with the largest misfit once more, and once at half its feed: what repeats is physics".into()
+            "the cut with the largest misfit once more, and once at half its feed: what repeats is physics"
+                .into()
         }
         _ => "none needed for this model; other feeds and speeds would test it further".into(),
     }

@@ -36,11 +36,13 @@ impl CuttingCase {
     pub fn load(campaign: &Campaign) -> Result<Self> {
         let processes = processes(campaign);
         let Some(&process) = processes.first() else {
-            return Err(InputError::new("the campaign has no [[cut]]: no force records to compare")
-                .file(campaign.dir.join("campaign.toml"))
-                .key("cut")
-                .remedy("add [[cut]] tables that name the force records")
-                .into());
+            return Err(
+                InputError::new("the campaign has no [[cut]]: no force records to compare")
+                    .file(campaign.dir.join("campaign.toml"))
+                    .key("cut")
+                    .remedy("add [[cut]] tables that name the force records")
+                    .into(),
+            );
         };
         let data = CuttingData::load(campaign, process)?;
         let mut warnings = data.warnings.clone();

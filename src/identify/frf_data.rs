@@ -169,7 +169,7 @@ impl FrfData {
                     responses.len() - 1
                 });
                 responses[index].1 += 1;
-                responses[index].1 % every == 0
+                responses[index].1.is_multiple_of(every)
             });
             block.frequency_hz = block.frequency_hz.iter().step_by(stride).copied().collect();
             for frf in &mut block.frfs {

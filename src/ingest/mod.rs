@@ -18,9 +18,9 @@ mod number;
 mod quality;
 mod split_comma;
 mod table;
+mod tdms;
 #[cfg(test)]
 mod tests;
-mod tdms;
 mod text;
 mod uff;
 pub mod units;

@@ -64,7 +64,11 @@ impl<'a> Reader<'a> {
     fn integer(&mut self, size: usize) -> Result<u64, InputError> {
         let part = self.take(size)?;
         let shift = |sum: u64, b: &u8| sum << 8 | u64::from(*b);
-        Ok(if self.big { part.iter().fold(0, shift) } else { part.iter().rev().fold(0, shift) })
+        Ok(if self.big {
+            part.iter().fold(0, shift)
+        } else {
+            part.iter().rev().fold(0, shift)
+        })
     }
 
     fn u32(&mut self) -> Result<u32, InputError> {
@@ -127,10 +131,16 @@ pub(super) fn read(bytes: &[u8], notes: &mut Notes) -> Result<Vec<TimeRecord>, I
     let mut list: Vec<usize> = Vec::new();
     let mut at = 0;
     while at + LEAD_IN <= bytes.len() {
-        let mut lead = Reader { bytes, at, big: false };
+        let mut lead = Reader {
+            bytes,
+            at,
+            big: false,
+        };
         if lead.take(4)? != b"TDSm" {
-            return Err(InputError::new(format!("no TDMS segment begins at byte {at}: the file is damaged"))
-                .remedy("copy it again from where it was recorded"));
+            return Err(InputError::new(format!(
+                "no TDMS segment begins at byte {at}: the file is damaged"
+            ))
+            .remedy("copy it again from where it was recorded"));
         }
         let flags = lead.u32()?;
         lead.big = flags & BIG_ENDIAN != 0;
@@ -142,9 +152,15 @@ pub(super) fn read(bytes: &[u8], notes: &mut Notes) -> Result<Vec<TimeRecord>, I
         let unfinished = next == u64::MAX;
         let end = match unfinished {
             true => bytes.len(),
-            false => usize::try_from(next).ok().and_then(|n| from.checked_add(n)).ok_or_else(cut)?,
+            false => usize::try_from(next)
+                .ok()
+                .and_then(|n| from.checked_add(n))
+                .ok_or_else(cut)?,
         };
-        let raw_at = usize::try_from(raw).ok().and_then(|r| from.checked_add(r)).ok_or_else(cut)?;
+        let raw_at = usize::try_from(raw)
+            .ok()
+            .and_then(|r| from.checked_add(r))
+            .ok_or_else(cut)?;
         if unfinished || end > bytes.len() {
             notes.file("the last TDMS segment is not complete: what is there of it was read");
         }
@@ -195,8 +211,10 @@ fn metadata(
             SAME_AS_BEFORE => object.has_data = true,
             length => {
                 if flags & DAQMX != 0 || length == 0x1269 || length == 0x126A {
-                    return Err(InputError::new("a TDMS file with unscaled DAQmx data, which is not read here")
-                        .remedy("in LabVIEW or DIAdem: save the scaled data"));
+                    return Err(InputError::new(
+                        "a TDMS file with unscaled DAQmx data, which is not read here",
+                    )
+                    .remedy("in LabVIEW or DIAdem: save the scaled data"));
                 }
                 object.kind = reader.u32()?;
                 reader.u32()?;
@@ -221,13 +239,7 @@ fn metadata(
     Ok(())
 }
 
-fn data(
-    raw: &[u8],
-    flags: u32,
-    big: bool,
-    list: &[usize],
-    objects: &mut [Object],
-) -> Result<(), InputError> {
+fn data(raw: &[u8], flags: u32, big: bool, list: &[usize], objects: &mut [Object]) -> Result<(), InputError> {
     let mut sizes = Vec::with_capacity(list.len());
     for &index in list {
         match size_of_kind(objects[index].kind) {
@@ -249,7 +261,9 @@ fn data(
     let chunk: usize = list
         .iter()
         .zip(&sizes)
-        .try_fold(0usize, |sum, (i, size)| sum.checked_add(objects[*i].count.checked_mul(*size)?))
+        .try_fold(0usize, |sum, (i, size)| {
+            sum.checked_add(objects[*i].count.checked_mul(*size)?)
+        })
         .ok_or_else(cut)?;
     if chunk == 0 {
         return Ok(());
@@ -262,7 +276,9 @@ fn data(
                 let mut at = 0;
                 for (&index, &size) in list.iter().zip(&sizes) {
                     let object = &mut objects[index];
-                    object.samples.push(number(&values[at..at + size], object.kind, big));
+                    object
+                        .samples
+                        .push(number(&values[at..at + size], object.kind, big));
                     at += size;
                 }
             }
@@ -275,7 +291,9 @@ fn data(
             if object.samples.len() + own.len() / size > MOST_SAMPLES {
                 return Err(cut());
             }
-            object.samples.extend(own.chunks_exact(size).map(|b| number(b, object.kind, big)));
+            object
+                .samples
+                .extend(own.chunks_exact(size).map(|b| number(b, object.kind, big)));
             at += length;
         }
     }
@@ -286,7 +304,13 @@ fn records(objects: Vec<Object>, notes: &mut Notes) -> Result<Vec<TimeRecord>, I
     let mut records: Vec<TimeRecord> = Vec::new();
     for object in objects {
         // /'group'/'channel'
-        let name = object.path.rsplit("/'").next().unwrap_or_default().trim_end_matches('\'').to_owned();
+        let name = object
+            .path
+            .rsplit("/'")
+            .next()
+            .unwrap_or_default()
+            .trim_end_matches('\'')
+            .to_owned();
         if let Some(why) = object.unreadable {
             notes.about(&name, why);
         }
@@ -329,7 +353,9 @@ fn records(objects: Vec<Object>, notes: &mut Notes) -> Result<Vec<TimeRecord>, I
         };
         let rate = 1.0 / step;
         let same = records.iter_mut().find(|r| {
-            (r.sample_rate_hz / rate - 1.0).abs() < 1e-9 && r.len() == channel.samples.len() && r.start_s == start_s
+            (r.sample_rate_hz / rate - 1.0).abs() < 1e-9
+                && r.len() == channel.samples.len()
+                && r.start_s == start_s
         });
         match same {
             Some(record) => record.channels.push(channel),
@@ -341,8 +367,10 @@ fn records(objects: Vec<Object>, notes: &mut Notes) -> Result<Vec<TimeRecord>, I
         }
     }
     if records.is_empty() {
-        return Err(InputError::new("a TDMS file without waveforms (channels with a sampling interval)")
-            .remedy("save the channels as waveforms, or export a CSV with a time column"));
+        return Err(
+            InputError::new("a TDMS file without waveforms (channels with a sampling interval)")
+                .remedy("save the channels as waveforms, or export a CSV with a time column"),
+        );
     }
     Ok(records)
 }
@@ -355,7 +383,11 @@ mod tests {
     fn file(interleaved: bool, big: bool) -> Vec<u8> {
         let int = |v: u64, size: usize| {
             let bytes = v.to_le_bytes()[..size].to_vec();
-            if big { bytes.into_iter().rev().collect() } else { bytes }
+            if big {
+                bytes.into_iter().rev().collect()
+            } else {
+                bytes
+            }
         };
         let text = |t: &str| [int(t.len() as u64, 4), t.as_bytes().to_vec()].concat();
         let double = |v: f64| int(v.to_bits(), 8);
@@ -366,9 +398,17 @@ mod tests {
             meta.extend([text("wf_increment"), int(0xA, 4), double(0.001)].concat());
             meta.extend([text("unit_string"), int(0x20, 4), text(unit)].concat());
         }
-        let values = if interleaved { [1.0, 10.0, 2.0, 20.0, 3.0, 30.0] } else { [1.0, 2.0, 3.0, 10.0, 20.0, 30.0] };
+        let values = if interleaved {
+            [1.0, 10.0, 2.0, 20.0, 3.0, 30.0]
+        } else {
+            [1.0, 2.0, 3.0, 10.0, 20.0, 30.0]
+        };
         let raw: Vec<u8> = values.iter().flat_map(|v| double(*v)).collect();
-        let flags = META | NEW_LIST | RAW | if interleaved { INTERLEAVED } else { 0 } | if big { BIG_ENDIAN } else { 0 };
+        let flags = META
+            | NEW_LIST
+            | RAW
+            | if interleaved { INTERLEAVED } else { 0 }
+            | if big { BIG_ENDIAN } else { 0 };
         let mut bytes = b"TDSm".to_vec();
         bytes.extend(flags.to_le_bytes());
         bytes.extend(int(4713, 4));

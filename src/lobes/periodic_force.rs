@@ -205,7 +205,7 @@ mod tests {
                 let turn = Complex64::new(0.0, -TAU * k as f64 * phase).exp() / f64::from(steps);
                 for tooth in 0..3 {
                     let phi = TAU * (phase + f64::from(tooth)) / 3.0;
-                    if phi < 0.4 || phi > 2.1 {
+                    if !(0.4..=2.1).contains(&phi) {
                         continue;
                     }
                     let (s, c) = phi.sin_cos();

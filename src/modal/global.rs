@@ -71,7 +71,8 @@ pub fn global(frfs: &[SetMember], settings: &Settings) -> Result<GlobalModes> {
         .collect();
     for pole in single {
         let near = |p: &Pole| {
-            (p.frequency_hz - pole.frequency_hz).abs() < 0.7 * pole.frequency_hz * p.damping_ratio.max(pole.damping_ratio)
+            (p.frequency_hz - pole.frequency_hz).abs()
+                < 0.7 * pole.frequency_hz * p.damping_ratio.max(pole.damping_ratio)
         };
         if !start.iter().any(near) {
             start.push(pole);
@@ -102,11 +103,19 @@ pub fn global(frfs: &[SetMember], settings: &Settings) -> Result<GlobalModes> {
 }
 
 /// The FRFs within the band with their noise, and which member each is.
-fn prepare(frfs: &[SetMember], settings: &Settings, warnings: &mut Vec<String>) -> Result<(Vec<Data>, Vec<usize>)> {
+fn prepare(
+    frfs: &[SetMember],
+    settings: &Settings,
+    warnings: &mut Vec<String>,
+) -> Result<(Vec<Data>, Vec<usize>)> {
     // An FRF in which no mode says which way it turns goes with the others.
     let [mut turned, mut straight] = [0, 0];
     for frf in frfs.iter().filter(|f| !f.modes.modes.is_empty()) {
-        *if frf.modes.conjugated { &mut turned } else { &mut straight } += 1;
+        *if frf.modes.conjugated {
+            &mut turned
+        } else {
+            &mut straight
+        } += 1;
     }
     if turned > 0 && straight > 0 {
         warnings.push(format!(
@@ -149,17 +158,27 @@ fn prepare(frfs: &[SetMember], settings: &Settings, warnings: &mut Vec<String>) 
 fn estimate_noise(data: &mut [Data]) {
     let mut todo: Vec<usize> = (0..data.len()).collect();
     while let Some(&first) = todo.first() {
-        let (same, other): (Vec<usize>, Vec<usize>) =
-            todo.iter().partition(|&&k| data[k].frequency_hz == data[first].frequency_hz);
+        let (same, other): (Vec<usize>, Vec<usize>) = todo
+            .iter()
+            .partition(|&&k| data[k].frequency_hz == data[first].frequency_hz);
         let curves: Vec<&[Complex64]> = same.iter().map(|&k| data[k].receptance.as_slice()).collect();
         let estimates = frf_noise::estimate(&data[first].frequency_hz, &curves);
         for (&k, estimate) in same.iter().zip(estimates) {
             let size = rms(&data[k].receptance);
             let floor = |h: Complex64| (1e-6 * h.norm()).max(1e-9 * size);
             data[k].sigma = match estimate {
-                Some(e) => e.std.iter().zip(&data[k].receptance).map(|(s, h)| s.max(floor(*h))).collect(),
+                Some(e) => e
+                    .std
+                    .iter()
+                    .zip(&data[k].receptance)
+                    .map(|(s, h)| s.max(floor(*h)))
+                    .collect(),
                 // Too few lines to tell: relative noise, as of a hammer; the residual scales it later.
-                None => data[k].receptance.iter().map(|h| (0.02 * h.norm()).max(1e-3 * size)).collect(),
+                None => data[k]
+                    .receptance
+                    .iter()
+                    .map(|h| (0.02 * h.norm()).max(1e-3 * size))
+                    .collect(),
             };
         }
         todo = other;
@@ -171,8 +190,16 @@ fn rms(values: &[Complex64]) -> f64 {
 }
 
 fn band(data: &[Data]) -> Option<[f64; 2]> {
-    let first = data.iter().filter_map(|d| d.frequency_hz.first()).copied().reduce(f64::min)?;
-    let last = data.iter().filter_map(|d| d.frequency_hz.last()).copied().reduce(f64::max)?;
+    let first = data
+        .iter()
+        .filter_map(|d| d.frequency_hz.first())
+        .copied()
+        .reduce(f64::min)?;
+    let last = data
+        .iter()
+        .filter_map(|d| d.frequency_hz.last())
+        .copied()
+        .reduce(f64::max)?;
     (last > first).then_some([first, last])
 }
 
@@ -194,7 +221,10 @@ fn single_peaks(members: &[&SetMember]) -> Vec<Pole> {
     let mut kept: Vec<Pole> = Vec::new();
     for (_, pole) in all {
         let width = |p: &Pole| p.frequency_hz * p.damping_ratio.max(pole.damping_ratio);
-        if !kept.iter().any(|p| (p.frequency_hz - pole.frequency_hz).abs() < width(p)) {
+        if !kept
+            .iter()
+            .any(|p| (p.frequency_hz - pole.frequency_hz).abs() < width(p))
+        {
             kept.push(pole);
         }
     }
@@ -260,7 +290,9 @@ fn full_grid(data: &[Data], members: &[&SetMember]) -> Option<Vec<Vec<usize>>> {
     long_ids
         .iter()
         .map(|l| {
-            let row = short_ids.iter().map(|s| dofs.iter().position(|d| d[long] == *l && d[short] == *s));
+            let row = short_ids
+                .iter()
+                .map(|s| dofs.iter().position(|d| d[long] == *l && d[short] == *s));
             row.collect()
         })
         .collect()
@@ -272,7 +304,8 @@ fn shape_data(data: &[Data]) -> Option<ShapeData<'_>> {
         return None;
     }
     let lines = data.first()?.frequency_hz.len();
-    let weight = (0..lines).map(|k| (data.iter().map(|d| weight(d, k).ln()).sum::<f64>() / data.len() as f64).exp());
+    let weight =
+        (0..lines).map(|k| (data.iter().map(|d| weight(d, k).ln()).sum::<f64>() / data.len() as f64).exp());
     Some(ShapeData {
         frequency_hz: &data[0].frequency_hz,
         weight: weight.collect(),
@@ -285,7 +318,10 @@ fn solve(data: &mut [Data], start: &[Pole], changes: &mut Vec<Change>) -> Option
     let mut groups = joint_fit::refine(data, start, true, changes)?;
     for pass in 0..2 {
         renew_noise(data, &groups);
-        let mut poles: Vec<Pole> = groups.iter().flat_map(|g| g.solution.poles.iter().copied()).collect();
+        let mut poles: Vec<Pole> = groups
+            .iter()
+            .flat_map(|g| g.solution.poles.iter().copied())
+            .collect();
         poles.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
         // The first noise may have been wrong, and with it what was needless: search once more.
         groups = joint_fit::refine(data, &poles, pass == 0, changes)?;
@@ -315,7 +351,11 @@ fn renew_noise(data: &mut [Data], groups: &[Group]) {
                 }
             }
             None => {
-                let level = left_over.iter().zip(&d.sigma).map(|((_, r), s)| r / (s * s)).sum::<f64>();
+                let level = left_over
+                    .iter()
+                    .zip(&d.sigma)
+                    .map(|((_, r), s)| r / (s * s))
+                    .sum::<f64>();
                 let scale = (level / left_over.len().max(1) as f64).sqrt().max(1e-6);
                 d.sigma.iter_mut().for_each(|s| *s *= scale);
             }
@@ -323,7 +363,13 @@ fn renew_noise(data: &mut [Data], groups: &[Group]) {
     }
 }
 
-fn collect(groups: &[Group], data: &[Data], members: &[&SetMember], of_member: &[usize], result: &mut GlobalModes) {
+fn collect(
+    groups: &[Group],
+    data: &[Data],
+    members: &[&SetMember],
+    of_member: &[usize],
+    result: &mut GlobalModes,
+) {
     let count = result.reconstructions.len();
     for group in groups {
         let solution = &group.solution;
@@ -331,11 +377,17 @@ fn collect(groups: &[Group], data: &[Data], members: &[&SetMember], of_member: &
             result.warnings.push(format!(
                 "the common fit between {:.1} and {:.1} Hz did not converge",
                 group.window_hz[0],
-                group.window_hz[1].min(data.iter().filter_map(|d| d.frequency_hz.last()).fold(0.0, |m: f64, f| m.max(*f)))
+                group.window_hz[1].min(
+                    data.iter()
+                        .filter_map(|d| d.frequency_hz.last())
+                        .fold(0.0, |m: f64, f| m.max(*f))
+                )
             ));
         }
         // What the fit leaves beyond the noise widens the standard deviations.
-        let level = (solution.misfit / solution.degrees_of_freedom as f64).max(1.0).sqrt();
+        let level = (solution.misfit / solution.degrees_of_freedom as f64)
+            .max(1.0)
+            .sqrt();
         for (j, pole) in solution.poles.iter().enumerate() {
             let (found_in, best) = joint_fit::seen_in(solution, j);
             if found_in == 0 || (data.len() >= SET && found_in < 2 && best < FAR) {
@@ -374,7 +426,9 @@ fn collect(groups: &[Group], data: &[Data], members: &[&SetMember], of_member: &
             });
         }
     }
-    result.modes.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+    result
+        .modes
+        .sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
     let residues: Vec<Vec<Complex64>> = result
         .modes
         .iter()
@@ -389,9 +443,19 @@ fn collect(groups: &[Group], data: &[Data], members: &[&SetMember], of_member: &
         for group in groups {
             let found = &group.solution.frfs[m];
             let from = d.frequency_hz.partition_point(|&f| f < group.window_hz[0]);
-            fitted.extend(found.residual.iter().enumerate().map(|(k, r)| d.receptance[from + k] - r));
+            fitted.extend(
+                found
+                    .residual
+                    .iter()
+                    .enumerate()
+                    .map(|(k, r)| d.receptance[from + k] - r),
+            );
         }
-        let error: f64 = fitted.iter().zip(&d.receptance).map(|(a, b)| (a - b).norm_sqr()).sum();
+        let error: f64 = fitted
+            .iter()
+            .zip(&d.receptance)
+            .map(|(a, b)| (a - b).norm_sqr())
+            .sum();
         let noise: f64 = d.sigma.iter().map(|s| s * s).sum();
         let total: f64 = d.receptance.iter().map(|h| h.norm_sqr()).sum();
         result.reconstructions[of_member[m]] = Some(Reconstruction {
@@ -419,12 +483,19 @@ fn shape_of(solution: &ml_fit::Solution, mode: usize, members: &[&SetMember]) ->
         ids
     };
     // A roving hammer moves the excitation: then the references carry the shape.
-    let (side, other) = if unique(1).len() > unique(0).len() { (1, 0) } else { (0, 1) };
+    let (side, other) = if unique(1).len() > unique(0).len() {
+        (1, 0)
+    } else {
+        (0, 1)
+    };
     let (ids, others) = (unique(side), unique(other));
     let mut matrix = DMatrix::zeros(ids.len(), others.len());
     let mut filled = 0;
     for (m, dof) in dofs.iter().enumerate() {
-        let at = (ids.iter().position(|i| *i == dof[side]), others.iter().position(|i| *i == dof[other]));
+        let at = (
+            ids.iter().position(|i| *i == dof[side]),
+            others.iter().position(|i| *i == dof[other]),
+        );
         if let (Some(i), Some(j)) = at {
             matrix[(i, j)] = constant(m);
             filled += 1;
@@ -471,7 +542,9 @@ fn explain(diagram: &mut Stabilisation, modes: &[GlobalMode], changes: &[Change]
         if let Some((k, mode)) = mode {
             owner[k] = true;
             candidate.chosen = true;
-            candidate.why.push_str(&format!("; taken, seen in {} FRFs", mode.found_in));
+            candidate
+                .why
+                .push_str(&format!("; taken, seen in {} FRFs", mode.found_in));
             continue;
         }
         let why = changes
@@ -490,7 +563,9 @@ fn explain(diagram: &mut Stabilisation, modes: &[GlobalMode], changes: &[Change]
         candidate.why.push_str("; ");
         candidate.why.push_str(why);
     }
-    diagram.candidates.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+    diagram
+        .candidates
+        .sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
 }
 
 /// One line for the whole set.

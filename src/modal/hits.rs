@@ -58,15 +58,28 @@ pub(super) fn find(force_n: &[f64], responses: &[&[f64]], sample_rate_hz: f64, b
     let pulses = pulses(force_n, sample_rate_hz);
     let hardest = pulses.iter().map(|p| p.peak_n).fold(0.0, f64::max);
     let strong: Vec<&Pulse> = pulses.iter().filter(|p| p.peak_n >= OWN_HIT * hardest).collect();
-    let Some(first) = strong.first() else { return Hits::default() };
+    let Some(first) = strong.first() else {
+        return Hits::default();
+    };
     let block = match block_s {
         Some(s) => (s * sample_rate_hz) as usize,
         None => {
-            let gaps: Vec<f64> = strong.windows(2).map(|w| (w[1].peak_at - w[0].peak_at) as f64).collect();
+            let gaps: Vec<f64> = strong
+                .windows(2)
+                .map(|w| (w[1].peak_at - w[0].peak_at) as f64)
+                .collect();
             let to_end = (force_n.len() - first.peak_at) as f64;
             // Rebounds make short gaps, so not the median: two thirds of the way up.
-            let usual = if gaps.is_empty() { to_end } else { crate::signal::quantile(&gaps, 0.67) };
-            let shortest = gaps.iter().copied().filter(|g| *g > 0.6 * usual).fold(usual, f64::min);
+            let usual = if gaps.is_empty() {
+                to_end
+            } else {
+                crate::signal::quantile(&gaps, 0.67)
+            };
+            let shortest = gaps
+                .iter()
+                .copied()
+                .filter(|g| *g > 0.6 * usual)
+                .fold(usual, f64::min);
             (0.95 * shortest) as usize
         }
     }
@@ -174,7 +187,11 @@ fn pulses(force_n: &[f64], sample_rate_hz: f64) -> Vec<Pulse> {
 
 /// Several samples in a row at exactly the extreme value.
 fn clipped(samples: &[f64]) -> bool {
-    let (low, high) = samples.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &x| (l.min(x), h.max(x)));
+    let (low, high) = samples
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &x| {
+            (l.min(x), h.max(x))
+        });
     if !(high > low) {
         return false;
     }

@@ -58,14 +58,25 @@ impl Data {
 
 /// Refines all candidates (ascending in frequency). With `search` poles are taken out and added, else only moved.
 /// `None` where a group cannot be fitted.
-pub(super) fn refine(data: &[Data], candidates: &[Pole], search: bool, changes: &mut Vec<Change>) -> Option<Vec<Group>> {
+pub(super) fn refine(
+    data: &[Data],
+    candidates: &[Pole],
+    search: bool,
+    changes: &mut Vec<Change>,
+) -> Option<Vec<Group>> {
     let groups = groups(candidates);
     let middle = |a: &[Pole], b: &[Pole]| Some(0.5 * (a.last()?.frequency_hz + b.first()?.frequency_hz));
     let mut result = Vec::with_capacity(groups.len());
     let mut before = 0;
     for (g, group) in groups.iter().enumerate() {
-        let low = if g == 0 { 0.0 } else { middle(groups[g - 1], group)? };
-        let high = groups.get(g + 1).map_or(Some(f64::INFINITY), |next| middle(group, next))?;
+        let low = if g == 0 {
+            0.0
+        } else {
+            middle(groups[g - 1], group)?
+        };
+        let high = groups
+            .get(g + 1)
+            .map_or(Some(f64::INFINITY), |next| middle(group, next))?;
         let after = before + group.len();
         let fixed: Vec<Pole> = candidates[before.saturating_sub(FIXED_NEIGHBOURS)..before]
             .iter()
@@ -88,10 +99,7 @@ pub(super) fn refine(data: &[Data], candidates: &[Pole], search: bool, changes: 
                 }
             }
         }
-        result.push(Group {
-            window_hz,
-            solution,
-        });
+        result.push(Group { window_hz, solution });
         before = after;
     }
     Some(result)
@@ -139,7 +147,10 @@ impl Fit<'_> {
     }
 
     fn line_hz(&self, frequency_hz: f64) -> f64 {
-        self.frfs.iter().map(|c| spacing_hz(c.frequency_hz, frequency_hz)).fold(f64::INFINITY, f64::min)
+        self.frfs
+            .iter()
+            .map(|c| spacing_hz(c.frequency_hz, frequency_hz))
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// Do the lines determine this pole?
@@ -147,12 +158,14 @@ impl Fit<'_> {
         let pole = solution.poles[j];
         let line_hz = self.line_hz(pole.frequency_hz);
         let width = pole.damping_ratio * pole.frequency_hz;
-        let inside = self
-            .frfs
-            .iter()
-            .any(|c| c.frequency_hz[0] <= pole.frequency_hz && c.frequency_hz[c.frequency_hz.len() - 1] >= pole.frequency_hz);
+        let inside = self.frfs.iter().any(|c| {
+            c.frequency_hz[0] <= pole.frequency_hz
+                && c.frequency_hz[c.frequency_hz.len() - 1] >= pole.frequency_hz
+        });
         let coarse = 2.0 * width < COARSE_LINES * line_hz;
-        let level = (solution.misfit / solution.degrees_of_freedom as f64).max(1.0).sqrt();
+        let level = (solution.misfit / solution.degrees_of_freedom as f64)
+            .max(1.0)
+            .sqrt();
         inside
             && pole.damping_ratio < MAX_DAMPING
             && level * solution.frequency_std_hz(j) < 0.3 * width.max(line_hz)
@@ -174,7 +187,11 @@ impl Fit<'_> {
                 let mut rest = solution.poles.clone();
                 rest.remove(j);
                 let Some(without) = self.fit(&rest) else { continue };
-                let growth = if sane { without.misfit - solution.misfit } else { f64::NEG_INFINITY };
+                let growth = if sane {
+                    without.misfit - solution.misfit
+                } else {
+                    f64::NEG_INFINITY
+                };
                 if growth < wanted && least.as_ref().is_none_or(|(g, ..)| growth < *g) {
                     least = Some((growth, j, without));
                 }
@@ -246,7 +263,9 @@ impl Fit<'_> {
 /// FRFs of the group that show the mode, and the squared size over uncertainty in the one that shows it best.
 pub(super) fn seen_in(solution: &Solution, mode: usize) -> (usize, f64) {
     let level = (solution.misfit / solution.degrees_of_freedom as f64).max(1.0);
-    let evidence: Vec<f64> = (0..solution.frfs.len()).map(|m| solution.evidence(m, mode) / level).collect();
+    let evidence: Vec<f64> = (0..solution.frfs.len())
+        .map(|m| solution.evidence(m, mode) / level)
+        .collect();
     (
         evidence.iter().filter(|e| **e > SEEN).count(),
         evidence.iter().fold(0.0, |m: f64, e| m.max(*e)),

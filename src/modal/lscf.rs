@@ -135,7 +135,10 @@ fn poles_of_order(
     let inner = normal.view((references, references), (size, size)).into_owned();
     let right = -normal.view((references, 0), (size, references)).into_owned();
     let coefficients = inner.lu().solve(&right)?;
-    if coefficients.iter().any(|c| !c.re.is_finite() || !c.im.is_finite()) {
+    if coefficients
+        .iter()
+        .any(|c| !c.re.is_finite() || !c.im.is_finite())
+    {
         return None;
     }
     // With w = 1/z the polynomial is monic: wⁿ + A₁ wⁿ⁻¹ + … + Aₙ.
@@ -162,7 +165,11 @@ fn poles_of_order(
             }
             let turn = z.arg().rem_euclid(TAU);
             // The gap of the circle is split between the two ends of the band.
-            let turn = if turn > TAU * 0.5 * (1.0 + ARC) { turn - TAU } else { turn };
+            let turn = if turn > TAU * 0.5 * (1.0 + ARC) {
+                turn - TAU
+            } else {
+                turn
+            };
             let per_radian = span / (TAU * ARC);
             let damped_hz = band_hz[0] + turn * per_radian;
             let decay_hz = -z.norm().ln() * per_radian;
@@ -199,10 +206,10 @@ mod tests {
         let orders = poles(&[row], [3.0, 60.0], 14);
         let last = &orders.last().unwrap().poles;
         for mode in &modes {
-            let found = last
-                .iter()
-                .any(|p| (p.frequency_hz / mode.frequency_hz - 1.0).abs() < 1e-3
-                    && (p.damping_ratio / mode.damping_ratio - 1.0).abs() < 0.05);
+            let found = last.iter().any(|p| {
+                (p.frequency_hz / mode.frequency_hz - 1.0).abs() < 1e-3
+                    && (p.damping_ratio / mode.damping_ratio - 1.0).abs() < 0.05
+            });
             assert!(found, "{} Hz in {last:?}", mode.frequency_hz);
         }
     }

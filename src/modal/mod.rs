@@ -27,9 +27,9 @@ mod peaks;
 pub mod quality;
 pub mod shape;
 pub mod stabilisation;
-pub mod tracking;
 #[cfg(test)]
 mod synthetic;
+pub mod tracking;
 
 pub use analysis::analyse_frf;
 pub use from_hits::{Estimator, TapFrfs, TapRecord, TapSettings, frfs_from_hits};

@@ -62,7 +62,9 @@ pub fn judge(
             (value >= limits[0], value < limits[1])
         };
         if !good {
-            quality.verdict = quality.verdict.max(if bad { Verdict::Bad } else { Verdict::Doubtful });
+            quality.verdict = quality
+                .verdict
+                .max(if bad { Verdict::Bad } else { Verdict::Doubtful });
             quality.reasons.push(what);
         }
     };
@@ -71,7 +73,11 @@ pub fn judge(
     }
     if let Some(fit) = fit {
         let beyond = (fit.error_nrms.powi(2) - fit.noise_nrms.powi(2)).max(0.0).sqrt();
-        note(beyond, UNEXPLAINED, format!("{:.0} % is no common mode and no noise", 100.0 * beyond));
+        note(
+            beyond,
+            UNEXPLAINED,
+            format!("{:.0} % is no common mode and no noise", 100.0 * beyond),
+        );
     } else {
         quality.verdict = Verdict::Bad;
         quality.reasons.push("zero, or too few lines".into());
@@ -92,7 +98,11 @@ pub fn judge(
         let beyond = (difference / size - noise).max(0.0).sqrt();
         if beyond.is_finite() {
             quality.reciprocity_nrms = Some((difference / size).sqrt());
-            note(beyond, RECIPROCITY, format!("reciprocity fails by {:.0} %", 100.0 * beyond));
+            note(
+                beyond,
+                RECIPROCITY,
+                format!("reciprocity fails by {:.0} %", 100.0 * beyond),
+            );
         }
     }
     quality
@@ -100,7 +110,10 @@ pub fn judge(
 
 fn weighted(coherence: &[f64], f: &[f64], h: &[Complex64], fit: Option<&Reconstruction>) -> Option<f64> {
     let band = fit.map_or([0.0, f64::INFINITY], |r| {
-        [r.frequency_hz[0], r.frequency_hz.last().copied().unwrap_or(f64::INFINITY)]
+        [
+            r.frequency_hz[0],
+            r.frequency_hz.last().copied().unwrap_or(f64::INFINITY),
+        ]
     });
     let (mut sum, mut total) = (0.0, 0.0);
     for ((c, f), h) in coherence.iter().zip(f).zip(h) {
@@ -115,7 +128,11 @@ fn weighted(coherence: &[f64], f: &[f64], h: &[Complex64], fit: Option<&Reconstr
 /// One sentence about a set.
 pub fn of_set(qualities: &[&Quality]) -> (Verdict, String) {
     let count = |v: Verdict| qualities.iter().filter(|q| q.verdict == v).count();
-    let (good, doubtful, bad) = (count(Verdict::Good), count(Verdict::Doubtful), count(Verdict::Bad));
+    let (good, doubtful, bad) = (
+        count(Verdict::Good),
+        count(Verdict::Doubtful),
+        count(Verdict::Bad),
+    );
     let all = qualities.len();
     let verdict = if 2 * bad > all || all == 0 {
         Verdict::Bad
@@ -124,7 +141,10 @@ pub fn of_set(qualities: &[&Quality]) -> (Verdict, String) {
     } else {
         Verdict::Good
     };
-    (verdict, format!("{good} of {all} FRFs good, {doubtful} doubtful, {bad} bad"))
+    (
+        verdict,
+        format!("{good} of {all} FRFs good, {doubtful} doubtful, {bad} bad"),
+    )
 }
 
 #[cfg(test)]
@@ -150,7 +170,10 @@ mod tests {
             judge(&f, &h, coherence, r, m)
         };
         let good = fit(0.03, 0.03, 1.0);
-        assert_eq!(of(Some(&[0.99; 4]), Some(&good), Some(&good)).verdict, Verdict::Good);
+        assert_eq!(
+            of(Some(&[0.99; 4]), Some(&good), Some(&good)).verdict,
+            Verdict::Good
+        );
         let cases = [
             (of(None, Some(&fit(0.6, 0.6, 1.0)), None), "noise"),
             (of(None, Some(&fit(0.6, 0.03, 1.0)), None), "no common mode"),

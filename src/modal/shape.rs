@@ -6,7 +6,10 @@ use num_complex::Complex64;
 /// Modal assurance criterion |φᴴψ|²/(φᴴφ ψᴴψ), 0..1 (Allemang & Brown 1982). Zero where either is all zero.
 pub fn mac(a: &[Complex64], b: &[Complex64]) -> f64 {
     let inner: Complex64 = a.iter().zip(b).map(|(a, b)| a.conj() * b).sum();
-    let (aa, bb): (f64, f64) = (a.iter().map(|a| a.norm_sqr()).sum(), b.iter().map(|b| b.norm_sqr()).sum());
+    let (aa, bb): (f64, f64) = (
+        a.iter().map(|a| a.norm_sqr()).sum(),
+        b.iter().map(|b| b.norm_sqr()).sum(),
+    );
     let product = aa * bb;
     if product > 0.0 && product.is_finite() {
         (inner.norm_sqr() / product).min(1.0)
@@ -64,7 +67,11 @@ pub fn from_residues(residues: &DMatrix<Complex64>) -> Option<Vec<Complex64>> {
     let svd = residues.clone().svd(true, false);
     let best = svd.singular_values.imax();
     let u = svd.u?;
-    let shape: Vec<Complex64> = u.column(best).iter().map(|u| u * svd.singular_values[best]).collect();
+    let shape: Vec<Complex64> = u
+        .column(best)
+        .iter()
+        .map(|u| u * svd.singular_values[best])
+        .collect();
     Some(normalised(&shape))
 }
 
@@ -93,7 +100,10 @@ mod tests {
         let a = shape(&[(1.0, 0.0), (-0.5, 0.2), (0.3, 0.0)]);
         let b: Vec<Complex64> = a.iter().map(|z| z * Complex64::new(0.3, -2.0)).collect();
         approx::assert_relative_eq!(mac(&a, &b), 1.0, max_relative = 1e-12);
-        let orthogonal = mac(&shape(&[(1.0, 0.0), (1.0, 0.0)]), &shape(&[(1.0, 0.0), (-1.0, 0.0)]));
+        let orthogonal = mac(
+            &shape(&[(1.0, 0.0), (1.0, 0.0)]),
+            &shape(&[(1.0, 0.0), (-1.0, 0.0)]),
+        );
         assert!(orthogonal < 1e-15);
         assert_eq!(mac(&shape(&[(0.0, 0.0)]), &shape(&[(1.0, 0.0)])), 0.0);
     }

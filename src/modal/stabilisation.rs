@@ -91,7 +91,12 @@ pub(super) fn read(orders: &[Order], shapes: Option<&ShapeData>, references: usi
     let mut levels: Vec<Vec<Link>> = Vec::with_capacity(orders.len());
     let mut chains = 0;
     for (index, order) in orders.iter().enumerate() {
-        let poles: Vec<Pole> = order.poles.iter().copied().filter(|p| p.damping_ratio < MAX_DAMPING).collect();
+        let poles: Vec<Pole> = order
+            .poles
+            .iter()
+            .copied()
+            .filter(|p| p.damping_ratio < MAX_DAMPING)
+            .collect();
         let residues = shapes.and_then(|s| residues(s, &poles));
         let mut level: Vec<Link> = poles
             .iter()
@@ -205,8 +210,10 @@ fn candidates(chains: Vec<Vec<&Link>>) -> Vec<Candidate> {
         .map(|chain| {
             // The upper half of the orders: low ones are biased by what they cannot follow.
             let upper = &chain[chain.len() / 2..];
-            let frequency_hz = crate::signal::median(&upper.iter().map(|l| l.pole.frequency_hz).collect::<Vec<_>>());
-            let damping_ratio = crate::signal::median(&upper.iter().map(|l| l.pole.damping_ratio).collect::<Vec<_>>());
+            let frequency_hz =
+                crate::signal::median(&upper.iter().map(|l| l.pole.frequency_hz).collect::<Vec<_>>());
+            let damping_ratio =
+                crate::signal::median(&upper.iter().map(|l| l.pole.damping_ratio).collect::<Vec<_>>());
             let full = chain.iter().filter(|l| l.stability == Stability::Full).count();
             Candidate {
                 frequency_hz,
@@ -256,7 +263,13 @@ fn residues(data: &ShapeData, poles: &[Pole]) -> Option<Vec<Vec<Complex64>>> {
     for j in 0..columns {
         gram[(j, j)] += 1e-12;
     }
-    let target = DMatrix::from_fn(f.len(), data.receptance.len(), |k, m| data.receptance[m][k] * data.weight[k]);
+    let target = DMatrix::from_fn(f.len(), data.receptance.len(), |k, m| {
+        data.receptance[m][k] * data.weight[k]
+    });
     let x = gram.cholesky()?.solve(&(adjoint * target));
-    Some((0..poles.len()).map(|j| x.row(j).iter().copied().collect()).collect())
+    Some(
+        (0..poles.len())
+            .map(|j| x.row(j).iter().copied().collect())
+            .collect(),
+    )
 }

@@ -58,7 +58,10 @@ pub fn pair(first: &[GlobalMode], second: &[GlobalMode]) -> Vec<Pair> {
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut pairs: Vec<Pair> = Vec::new();
     for (_, candidate) in all {
-        if !pairs.iter().any(|p| p.first == candidate.first || p.second == candidate.second) {
+        if !pairs
+            .iter()
+            .any(|p| p.first == candidate.first || p.second == candidate.second)
+        {
             pairs.push(candidate);
         }
     }
@@ -93,7 +96,11 @@ pub fn track(sets: &[&GlobalModes]) -> Vec<Track> {
         }
     }
     let frequency = |t: &Track| {
-        let first = t.mode_of_set.iter().enumerate().find_map(|(s, m)| Some((s, (*m)?)));
+        let first = t
+            .mode_of_set
+            .iter()
+            .enumerate()
+            .find_map(|(s, m)| Some((s, (*m)?)));
         first.map_or(0.0, |(s, m)| sets[s].modes[m].frequency_hz)
     };
     tracks.sort_by(|a, b| frequency(a).total_cmp(&frequency(b)));
@@ -113,7 +120,11 @@ mod tests {
             found_in: 3,
             lines_in_half_power_band: 4.0,
             complexity: None,
-            shape: shape.iter().enumerate().map(|(k, x)| (k, Complex64::from(*x))).collect(),
+            shape: shape
+                .iter()
+                .enumerate()
+                .map(|(k, x)| (k, Complex64::from(*x)))
+                .collect(),
             constants: Vec::new(),
         }
     }
@@ -131,7 +142,12 @@ mod tests {
         let first = set(vec![mode(7.0, x), mode(7.3, y), mode(20.0, z)]);
         let second = set(vec![mode(7.1, y), mode(7.4, x), mode(21.0, z), mode(80.0, x)]);
         let tracks = track(&[&first, &second]);
-        let expected = [[Some(0), Some(1)], [Some(1), Some(0)], [Some(2), Some(2)], [None, Some(3)]];
+        let expected = [
+            [Some(0), Some(1)],
+            [Some(1), Some(0)],
+            [Some(2), Some(2)],
+            [None, Some(3)],
+        ];
         assert_eq!(tracks.len(), expected.len());
         for (track, expected) in tracks.iter().zip(expected) {
             assert_eq!(track.mode_of_set, expected);

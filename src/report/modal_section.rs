@@ -105,7 +105,12 @@ fn tracked(analysis: &ModalAnalysis) -> Option<Block> {
         return None;
     }
     let mut columns = vec![Column::text("mode")];
-    columns.extend(analysis.sets.iter().map(|s| Column::number(format!("{} (Hz, %)", s.set))));
+    columns.extend(
+        analysis
+            .sets
+            .iter()
+            .map(|s| Column::number(format!("{} (Hz, %)", s.set))),
+    );
     let cell = |track: &Track, set: usize| {
         track.mode_of_set[set].map_or("–".to_string(), |m| {
             let mode = &analysis.sets[set].global.modes[m];
@@ -128,7 +133,9 @@ fn tracked(analysis: &ModalAnalysis) -> Option<Block> {
                 row
             })
             .collect(),
-        notes: vec!["Paired by frequency and shape; the order of close modes may change between postures.".into()],
+        notes: vec![
+            "Paired by frequency and shape; the order of close modes may change between postures.".into(),
+        ],
     }))
 }
 
@@ -215,7 +222,12 @@ fn reconstruction(set: &SetModes) -> Option<Block> {
 }
 
 fn mac(set: &SetModes) -> Option<Block> {
-    let names: Vec<String> = set.global.modes.iter().map(|m| format!("{} Hz", decimals(m.frequency_hz, 1))).collect();
+    let names: Vec<String> = set
+        .global
+        .modes
+        .iter()
+        .map(|m| format!("{} Hz", decimals(m.frequency_hz, 1)))
+        .collect();
     if names.len() < 2 {
         return None;
     }
@@ -225,7 +237,12 @@ fn mac(set: &SetModes) -> Option<Block> {
         column_label: "Mode".into(),
         rows: names.clone(),
         columns: names,
-        values: set.global.mac.iter().map(|row| row.iter().map(|m| Some(*m)).collect()).collect(),
+        values: set
+            .global
+            .mac
+            .iter()
+            .map(|row| row.iter().map(|m| Some(*m)).collect())
+            .collect(),
         value_label: "MAC".into(),
         format: CellFormat::Significant(2),
         range: Some((0.0, 1.0)),

@@ -65,7 +65,10 @@ fn effects_with_and_without_a_site_are_named() {
         let best = &found["candidates"][0];
         let value = best["parameters"][key].as_f64().unwrap();
         let expected = truth["parameters"][key].as_f64().unwrap();
-        assert!((value / expected - 1.0).abs() < 0.02, "{name}: {value}, {expected}");
+        assert!(
+            (value / expected - 1.0).abs() < 0.02,
+            "{name}: {value}, {expected}"
+        );
     }
 }
 
@@ -106,10 +109,27 @@ fn two_effects_are_found_one_after_the_other() {
     assert_eq!(history["revisions"].as_array().unwrap().len(), 3);
 }
 
+/// Force records of an independent program, under names that say nothing.
 #[test]
-fn the_cutting_side_is_refused_plainly() {
+fn cutting_campaigns_are_diagnosed_by_the_same_loop() {
+    for name in ["force-9400", "force-9439"] {
+        let found = verdict(name);
+        let truth = truth(name);
+        assert_eq!(found["domain"], "cutting");
+        match truth["effect"].as_str().unwrap() {
+            "none" => assert_eq!(found["verdict"], "none", "{name}"),
+            hidden => {
+                assert_eq!(found["verdict"], "effect", "{name}");
+                assert_eq!(found["effect"], hidden, "{name}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_side_that_the_campaign_does_not_have_is_refused_plainly() {
     let dir = blind("frf-9112");
     let run = crate::support::lobestone(&["diagnose", dir.to_str().unwrap(), "--domain", "cutting"]);
     assert_eq!(run.status, Some(1));
-    assert!(run.stderr.contains("--domain"), "{}", run.stderr);
+    assert!(run.stderr.contains("no [[cut]]"), "{}", run.stderr);
 }

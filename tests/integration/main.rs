@@ -14,5 +14,5 @@ mod schema;
 mod simulate;
 mod structure;
 mod support;
-mod where_it_fails;
 mod waveform;
+mod where_it_fails;

@@ -34,6 +34,9 @@ fn survives(arguments: &[&str], culprit: &str) -> Option<Value> {
     }
 }
 
+/// What a small measurement does not show.
+const MAY_BE_ABSENT: [&str; 4] = ["held_out_nrms", "coherence", "reciprocity_nrms", "complexity"];
+
 /// serde writes numbers that are not finite as null.
 fn no_nulls(value: &Value, absent: bool, context: &str) {
     match value {
@@ -41,7 +44,7 @@ fn no_nulls(value: &Value, absent: bool, context: &str) {
         Value::Array(values) => values.iter().for_each(|v| no_nulls(v, false, context)),
         Value::Object(values) => values
             .iter()
-            .filter(|(key, _)| *key != "held_out_nrms")
+            .filter(|(key, _)| !MAY_BE_ABSENT.contains(&key.as_str()))
             .for_each(|(_, v)| no_nulls(v, false, context)),
         _ => {}
     }

@@ -29,9 +29,15 @@ impl StabilisationFigure {
     /// # Errors
     /// No pole with a finite frequency.
     pub fn png(&self) -> Result<Vec<u8>> {
-        let frequencies = self.measured.iter().map(|m| m.0).chain(self.poles.iter().map(|p| p.frequency_hz));
+        let frequencies = self
+            .measured
+            .iter()
+            .map(|m| m.0)
+            .chain(self.poles.iter().map(|p| p.frequency_hz));
         let orders = self.poles.iter().map(|p| p.order as f64);
-        let (Some(frequencies), Some((_, highest))) = (extent(frequencies.filter(|f| usable(*f))), extent(orders)) else {
+        let (Some(frequencies), Some((_, highest))) =
+            (extent(frequencies.filter(|f| usable(*f))), extent(orders))
+        else {
             return Err(nothing_to_draw(&self.title, "no poles"));
         };
         let x = Axis::linear("Frequency (Hz)", frequencies, 10);
@@ -40,9 +46,15 @@ impl StabilisationFigure {
         let right = f64::from(WIDTH) - 40.0;
         let (stable, other) = (style::BLUE, style::GREY);
         let legend = [
-            (Swatch::Sign(Marker::Disc, 3.0, stable), "stable in frequency, damping and shape".to_string()),
+            (
+                Swatch::Sign(Marker::Disc, 3.0, stable),
+                "stable in frequency, damping and shape".to_string(),
+            ),
             (Swatch::Sign(Marker::Ring, 3.0, other), "other poles".to_string()),
-            (Swatch::Line(style::LEVEL), "modes taken; behind: sum of the FRFs (log)".to_string()),
+            (
+                Swatch::Line(style::LEVEL),
+                "modes taken; behind: sum of the FRFs (log)".to_string(),
+            ),
         ];
         let header = Header::new(&self.title, &legend, left, right);
         let top = header.bottom();
@@ -77,7 +89,13 @@ impl StabilisationFigure {
             }
             for (is_stable, marker, color) in [(false, Marker::Ring, other), (true, Marker::Disc, stable)] {
                 let points = self.poles.iter().filter(|p| p.stable == is_stable);
-                panel.markers(canvas, points.map(|p| (p.frequency_hz, p.order as f64)), (marker, 3.0), color, 3.0);
+                panel.markers(
+                    canvas,
+                    points.map(|p| (p.frequency_hz, p.order as f64)),
+                    (marker, 3.0),
+                    color,
+                    3.0,
+                );
             }
             panel.frame(canvas);
         })

@@ -29,7 +29,9 @@ fn the_gallery_is_valid_not_blank_and_small() {
             "{name}: {width} × {height}"
         );
         assert!(colours > 60, "{name}: {colours} colours");
-        assert!(png.len() < 200_000, "{name}: {} bytes", png.len());
+        // Two maps beside each other have the cells of two.
+        let most = if name.ends_with("_pair") { 300_000 } else { 200_000 };
+        assert!(png.len() < most, "{name}: {} bytes", png.len());
         if let Some(folder) = &keep {
             std::fs::create_dir_all(folder).unwrap();
             std::fs::write(folder.join(format!("{name}.png")), png).unwrap();

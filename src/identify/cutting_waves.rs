@@ -90,13 +90,13 @@ fn level(process: Process, cut: &CutData, parts: &[Part]) -> WaveSums {
         error.push(
             parts
                 .iter()
-                .map(|(c, f, a)| a * (f.level[b] + f.zero[b] - c.level[b]))
+                .map(|(c, f, a)| a * (f.level[b] + f.reference[b] - c.level[b]))
                 .sum::<f64>(),
         );
         signal.push(
             parts
                 .iter()
-                .map(|(c, f, a)| a * (c.level[b] - f.zero[b]))
+                .map(|(c, f, a)| a * (c.level[b] - f.reference[b]))
                 .sum::<f64>(),
         );
         noise += parts

@@ -119,6 +119,17 @@ impl CutData {
         }
     }
 
+    /// Mean steady level of a channel above its first blocks.
+    fn mean_above_air(&self, channel: usize) -> Option<f64> {
+        let level = &self.channels[channel].as_ref()?.level;
+        let of = |r: Range<usize>| {
+            let n = r.len().max(1) as f64;
+            level.get(r).map_or(0.0, |l| l.iter().sum::<f64>() / n)
+        };
+        let before = self.steady.start.min(5);
+        Some(of(self.steady.clone()) - if before > 0 { of(0..before) } else { 0.0 })
+    }
+
     /// Numbers compared in this cut, less the zero lines and the phase (or contact) fitted to it.
     pub fn value_count(&self) -> usize {
         let channels = self.channels.iter().flatten();
@@ -137,6 +148,8 @@ pub struct CuttingData {
     /// F_tool = A F_recorded, and its inverse.
     pub tool_from_dyno: [[f64; 3]; 3],
     pub dyno_from_tool: [[f64; 3]; 3],
+    /// What a torque counts as where forces and torques are added up, N per N·m: thrusts and torques are equally large then.
+    pub force_per_torque: f64,
     pub summary: CuttingSummary,
     /// Cuts left out, with the reason.
     pub warnings: Vec<String>,
@@ -212,7 +225,18 @@ impl CuttingData {
                     .key("dynamometer.tool_from_dyno")
             })?;
         let summary = summary(campaign, process, &cuts);
+        let size = |axis: ForceAxis| -> f64 {
+            let means = cuts.iter().filter_map(|c| c.mean_above_air(axis.index()));
+            means.map(|m| m * m).sum::<f64>().sqrt()
+        };
+        let (thrust, torque) = (size(ForceAxis::Z), size(ForceAxis::Mz));
+        let force_per_torque = if thrust > 0.0 && torque > 0.0 {
+            thrust / torque
+        } else {
+            1.0
+        };
         Ok(CuttingData {
+            force_per_torque,
             process,
             cuts: cuts.into_iter().map(Arc::new).collect(),
             tool_from_dyno,
@@ -377,16 +401,7 @@ fn cut_data(campaign: &Campaign, index: usize, record: &TimeRecord) -> Result<Cu
 /// Torque opposes rotation; where all of it is negative the amplifier counts it the other way round.
 fn turn_torque(cuts: &mut [CutData]) {
     let torque = ForceAxis::Mz.index();
-    let mean = |cut: &CutData| {
-        let channel = cut.channels[torque].as_ref()?;
-        let of = |r: Range<usize>| {
-            let n = r.len().max(1) as f64;
-            channel.level.get(r).map_or(0.0, |l| l.iter().sum::<f64>() / n)
-        };
-        let before = cut.steady.start.min(5);
-        Some(of(cut.steady.clone()) - if before > 0 { of(0..before) } else { 0.0 })
-    };
-    let means: Vec<f64> = cuts.iter().filter_map(mean).collect();
+    let means: Vec<f64> = cuts.iter().filter_map(|c| c.mean_above_air(torque)).collect();
     if means.is_empty() || means.iter().any(|m| *m >= 0.0) {
         return;
     }

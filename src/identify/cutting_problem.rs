@@ -44,8 +44,10 @@ pub struct ChannelFit {
     pub orders: Vec<Complex64>,
     /// Force by block, N (N·m).
     pub level: Vec<f64>,
-    /// Fitted zero line by block, what a leak takes away included.
+    /// Zero line by block fitted along with the force, what a leak takes away included.
     pub zero: Vec<f64>,
+    /// Zero line to judge the force model by: through the air alone where that can be said, else `zero`.
+    pub reference: Vec<f64>,
 }
 
 /// Sums over residuals.
@@ -147,6 +149,10 @@ impl CuttingProblem<'_> {
             chi2: 0.0,
             channels: [None, None, None, None],
         };
+        let is_air = |b: usize| match cut.kind {
+            CutKind::Milling { .. } => !cut.steady.contains(&b),
+            CutKind::Drilling { .. } => cut.block_s[b][1] < placement || b >= cut.steady.end,
+        };
         for (i, (channel, line)) in cut.channels.iter().zip(&lines).enumerate() {
             let (Some(channel), Some(line)) = (channel, line) else {
                 continue;
@@ -171,6 +177,7 @@ impl CuttingProblem<'_> {
             }
             fit.channels[i] = Some(ChannelFit {
                 orders,
+                reference: line.through_air(cut, is_air).unwrap_or_else(|| line.zero(&level)),
                 zero: line.zero(&level),
                 level: level.into_owned(),
             });

@@ -7,7 +7,7 @@ use super::cutting_problem::{ChannelFit, CutFit};
 use crate::campaign::Process;
 use crate::cutting::ForceAxis;
 
-/// Mean squares over the waveform, N² (N²·m²).
+/// Mean squares over the waveform, N²; torques as [`CuttingData::force_per_torque`] times themselves.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct WaveSums {
     /// Of model − record.
@@ -45,7 +45,8 @@ type Part<'a> = (&'a ForceChannel, &'a ChannelFit, f64);
 fn one_axis(data: &CuttingData, cut: &CutData, fit: &CutFit, axis: ForceAxis) -> Option<AxisWaves> {
     let i = axis.index();
     let weights: Vec<(usize, f64)> = if axis == ForceAxis::Mz {
-        vec![(i, 1.0)]
+        // Force and torque in one sum: each relative to its own size.
+        vec![(i, data.force_per_torque)]
     } else {
         let row = data.tool_from_dyno[i];
         let largest = row.iter().fold(0.0f64, |m, v| m.max(v.abs()));
@@ -90,13 +91,13 @@ fn level(process: Process, cut: &CutData, parts: &[Part]) -> WaveSums {
         error.push(
             parts
                 .iter()
-                .map(|(c, f, a)| a * (f.level[b] + f.zero[b] - c.level[b]))
+                .map(|(c, f, a)| a * (f.level[b] + f.reference[b] - c.level[b]))
                 .sum::<f64>(),
         );
         signal.push(
             parts
                 .iter()
-                .map(|(c, f, a)| a * (c.level[b] - f.zero[b]))
+                .map(|(c, f, a)| a * (c.level[b] - f.reference[b]))
                 .sum::<f64>(),
         );
         noise += parts

@@ -142,6 +142,33 @@ impl ZeroLine {
             .collect()
     }
 
+    /// The straight line through the blocks of air alone, in the channel's unit: what a model without drift effects says the
+    /// zero is. Fitted along with the force, a line hides part of what the force model lacks. `None` where a drift effect
+    /// is in the model, whose size takes all levels to tell, or where a side has no air.
+    pub(super) fn through_air(&self, cut: &CutData, is_air: impl Fn(usize) -> bool) -> Option<Vec<f64>> {
+        if self.transient.is_some() || !self.loss.is_empty() {
+            return None;
+        }
+        let middle = |b: usize| 0.5 * (cut.block_s[b][0] + cut.block_s[b][1]);
+        let air: Vec<usize> = (0..cut.block_s.len()).filter(|b| is_air(*b)).collect();
+        let sides = [
+            air.iter().any(|b| *b < cut.steady.start),
+            air.iter().any(|b| *b >= cut.steady.end),
+        ];
+        if air.len() < 4 || sides != [true, true] {
+            return None;
+        }
+        let (offset, slope, at) = crate::signal::line(
+            air.iter().map(|b| middle(*b)),
+            air.iter().map(|b| self.recorded[*b] / self.weight[*b]),
+        );
+        Some(
+            (0..cut.block_s.len())
+                .map(|b| offset + slope * (middle(b) - at))
+                .collect(),
+        )
+    }
+
     /// Fitted zero line by block, in the channel's unit.
     pub(super) fn zero(&self, level: &[f64]) -> Vec<f64> {
         let raw = self.raw(level);

@@ -1,56 +1,154 @@
 //! An effect added to a campaign's model: everything refitted together, judged on postures left out, recorded.
 
+use super::cutting::cutting_comparison;
 use crate::campaign::Campaign;
 use crate::discrepancy::FrfComparison;
 use crate::discrepancy::compare::ErrorTotals;
 use crate::discrepancy::extension::{Extension, Fitted};
+use crate::effects::cutting::{self, CuttingInstance};
 use crate::effects::{self, Instance};
 use crate::identify::case::recorded_effect;
-use crate::identify::{Options, StructureCase, StructureModel};
-use crate::revision::{self, Domain, RecordedParameter, Revision, RevisionLog, structure_fingerprint};
+use crate::identify::cutting_case::recorded_cutting_effect;
+use crate::identify::study::Residual;
+use crate::identify::{
+    Calibration, CuttingCase, CuttingModel, CuttingStudy, Options, StructureCase, StructureModel,
+};
+use crate::revision::{
+    self, Domain, RecordedEffect, RecordedParameter, Revision, RevisionLog, cutting_fingerprint,
+    structure_fingerprint,
+};
 use crate::{InputError, Result};
 
 /// A fit as it stands in the log.
-fn recorded(
-    fitted: &Fitted<StructureModel>,
-    noise_floor_nrms: f64,
-    progress: Option<bool>,
-    when: &str,
-    fingerprint: &str,
-) -> Revision {
-    let calibration = &fitted.calibration;
-    let parameters = calibration.parameters.iter().map(|p| RecordedParameter {
-        name: p.name.clone(),
-        value: p.value,
-        unit: p.unit.to_string(),
-        std_error: Some(p.std_error).filter(|s| s.is_finite()),
-        initial: p.initial,
-    });
-    let effects = fitted.model.effects().iter();
-    Revision {
-        // The log numbers them.
-        revision: 0,
-        domain: Domain::Structure,
-        effects: effects.map(|added| recorded_effect(&added.instance)).collect(),
-        parameters: parameters.collect(),
-        nrms: fitted.residual.nrms,
-        held_out_nrms: fitted.held_out_nrms(),
-        noise_floor_nrms,
-        reduced_chi2: calibration.reduced_chi2,
-        progress,
-        when: when.to_string(),
-        data: fingerprint.to_string(),
+struct Entry<'a> {
+    domain: Domain,
+    calibration: &'a Calibration,
+    residual: Residual,
+    held_out_nrms: Option<f64>,
+    effects: Vec<RecordedEffect>,
+}
+
+impl Entry<'_> {
+    fn of<'a, M>(domain: Domain, fitted: &'a Fitted<M>, effects: Vec<RecordedEffect>) -> Entry<'a> {
+        Entry {
+            domain,
+            calibration: &fitted.calibration,
+            residual: fitted.residual,
+            held_out_nrms: fitted.held_out_nrms(),
+            effects,
+        }
+    }
+
+    fn revision(
+        self,
+        noise_floor_nrms: f64,
+        progress: Option<bool>,
+        when: &str,
+        fingerprint: &str,
+    ) -> Revision {
+        let parameters = self.calibration.parameters.iter().map(|p| RecordedParameter {
+            name: p.name.clone(),
+            value: p.value,
+            unit: p.unit.to_string(),
+            std_error: Some(p.std_error).filter(|s| s.is_finite()),
+            initial: p.initial,
+        });
+        Revision {
+            // The log numbers them.
+            revision: 0,
+            domain: self.domain,
+            effects: self.effects,
+            parameters: parameters.collect(),
+            nrms: self.residual.nrms,
+            held_out_nrms: self.held_out_nrms,
+            noise_floor_nrms,
+            reduced_chi2: self.calibration.reduced_chi2,
+            progress,
+            when: when.to_string(),
+            data: fingerprint.to_string(),
+        }
     }
 }
 
 /// What adding an effect did.
-pub struct Addition {
+pub struct Addition<M = StructureModel, I = Instance> {
     /// Number of the new revision.
     pub revision: usize,
-    pub extension: Extension<StructureModel, Instance>,
+    pub extension: Extension<M, I>,
     /// Error with the effect.
     pub totals: ErrorTotals,
+    /// `effect@site` of all that is in the model now.
+    pub effects: Vec<String>,
     pub warnings: Vec<String>,
+}
+
+impl Addition<CuttingModel, CuttingInstance> {
+    /// Adds a cutting effect to the campaign's model of its force records, refits everything and records the revision.
+    ///
+    /// # Errors
+    /// No such effect, one that is in the model already or that these records cannot show; a fit that fails; a log that
+    /// is broken or was changed meanwhile. Nothing is recorded then.
+    pub fn run_cutting(campaign: &Campaign, name: &str) -> Result<Self> {
+        let mut log = RevisionLog::load(&campaign.dir)?;
+        let case = CuttingCase::load(campaign)?;
+        let fingerprint = cutting_fingerprint(campaign)?;
+        let instances = cutting::find(name);
+        let wrong = |problem: String| {
+            InputError::new(problem).key("EFFECT").remedy(format!(
+                "see what is missing with `lobestone diagnose {}`",
+                campaign.dir.display()
+            ))
+        };
+        if case.effects().iter().any(|e| e == name) {
+            return Err(wrong(format!("{name} is in the model already")).into());
+        }
+        let summary = case.model.summary(&case.data);
+        match instances.first().map(|i| i.effect.obstacle(&summary)) {
+            None => return Err(wrong(format!("there is no cutting effect {name}")).into()),
+            Some(Some(obstacle)) => {
+                return Err(wrong(format!("this campaign cannot show {name}: {obstacle}")).into());
+            }
+            Some(None) => {}
+        }
+        let study = CuttingStudy::new(case.data.clone());
+        let extension = Extension::new(&study, &case.model, &instances)?;
+        let Extension {
+            before,
+            after,
+            progress,
+            ..
+        } = &extension;
+        let totals = cutting_comparison(&after.model, &case.data, &after.calibration.theta)?.totals;
+        let noise = totals.noise_floor_nrms;
+        let recorded = |fitted: &Fitted<CuttingModel>| -> Vec<RecordedEffect> {
+            let effects = fitted.model.effects().iter();
+            effects
+                .map(|added| recorded_cutting_effect(&added.instance))
+                .collect()
+        };
+        let when = revision::now();
+        let entry = |fitted, progress| {
+            Entry::of(Domain::Cutting, fitted, recorded(fitted)).revision(
+                noise,
+                progress,
+                &when,
+                &fingerprint,
+            )
+        };
+        let revision = log.append(entry(before, None), entry(after, *progress))?;
+        let mut warnings = case.warnings.clone();
+        if !after.calibration.converged {
+            warnings.push("the fit did not converge: treat the parameters with care".into());
+        }
+        let effects = after.model.effects().iter();
+        Ok(Addition {
+            revision,
+            totals,
+            effects: effects.map(|added| added.instance.label()).collect(),
+            warnings,
+            extension,
+        })
+    }
 }
 
 impl Addition {
@@ -87,11 +185,18 @@ impl Addition {
         let totals = FrfComparison::new(data, &after.model.points, &predicted).totals;
         let noise_floor_nrms = totals.noise_floor_nrms;
 
+        let recorded = |fitted: &Fitted<StructureModel>| -> Vec<RecordedEffect> {
+            let effects = fitted.model.effects().iter();
+            effects.map(|added| recorded_effect(&added.instance)).collect()
+        };
         let when = revision::now();
-        let revision = log.append(
-            recorded(before, noise_floor_nrms, None, &when, &fingerprint),
-            recorded(after, noise_floor_nrms, *progress, &when, &fingerprint),
-        )?;
+        let entry = |fitted, progress| {
+            let entry = Entry::of(Domain::Structure, fitted, recorded(fitted));
+            entry.revision(noise_floor_nrms, progress, &when, &fingerprint)
+        };
+        let revision = log.append(entry(before, None), entry(after, *progress))?;
+        let effects = after.model.effects().iter();
+        let effects = effects.map(|added| added.instance.label()).collect();
         let mut warnings = case.warnings.clone();
         warnings.extend(extension.after.calibration.warnings());
         if extension.progress.is_none() {
@@ -105,6 +210,7 @@ impl Addition {
             revision,
             extension,
             totals,
+            effects,
             warnings,
         })
     }

@@ -1,13 +1,14 @@
 use serde_json::{Value, json};
 
 use super::calibrate::describe_parameters;
-use super::text::{percent, warnings};
+use super::text::{number, percent, table, warnings};
 use super::{CampaignArg, Outcome};
 use crate::Result;
 use crate::analysis::Addition;
 use crate::campaign::Campaign;
 use crate::discrepancy::extension::{Extension, Fitted};
-use crate::identify::{Options, StructureModel};
+use crate::effects::cutting;
+use crate::identify::{Calibration, Options};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -20,25 +21,76 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
+    if !cutting::find(&args.effect).is_empty() {
+        let addition = Addition::run_cutting(&campaign, &args.effect)?;
+        let Extension { instance, after, .. } = &addition.extension;
+        let variant = instance.effect.variant_label(instance.variant);
+        let parameters = describe_estimates(&after.calibration);
+        let plain = Plain {
+            title: instance.label(),
+            explanation: instance.effect.explanation(),
+            parameters,
+            folds: "cuts",
+        };
+        return Ok(Outcome {
+            json: document("cutting", instance.effect.id(), None, variant, &addition),
+            text: describe(&campaign, &addition, &plain),
+        });
+    }
     let addition = Addition::run(&campaign, &args.effect, Options::default())?;
+    let Extension { instance, after, .. } = &addition.extension;
+    let variant = instance.effect.variant_label(instance.variant);
+    let plain = Plain {
+        title: instance.title(),
+        explanation: instance.effect.explanation(),
+        parameters: describe_parameters(&after.model, &after.calibration),
+        folds: "postures",
+    };
+    Ok(Outcome {
+        json: document(
+            "structure",
+            instance.effect.id(),
+            instance.site.label(),
+            variant,
+            &addition,
+        ),
+        text: describe(&campaign, &addition, &plain),
+    })
+}
+
+/// What a person is told of the effect.
+struct Plain {
+    title: String,
+    explanation: &'static str,
+    /// A table.
+    parameters: String,
+    /// What is left out for the held-out error.
+    folds: &'static str,
+}
+
+fn document<M, I>(
+    domain: &str,
+    effect: &str,
+    site: Option<String>,
+    variant: Option<(&str, &str)>,
+    addition: &Addition<M, I>,
+) -> Value {
     let Extension {
-        instance,
         before,
         after,
         progress,
+        ..
     } = &addition.extension;
     let calibration = &after.calibration;
     let mut error = json!(addition.totals);
     error["held_out_nrms"] = json!(after.held_out_nrms());
-    let effects = after.model.effects().iter().map(|added| added.instance.label());
-    let variant = instance.effect.variant_label(instance.variant);
-    let json = json!({
-        "domain": "structure",
+    json!({
+        "domain": domain,
         "revision": addition.revision,
-        "effect": instance.effect.id(),
-        "site": instance.site.label(),
+        "effect": effect,
+        "site": site,
         "variant": variant.map(|(key, value)| json!({ key: value })),
-        "effects": effects.collect::<Vec<_>>(),
+        "effects": addition.effects,
         "parameters": calibration.parameters,
         "error": error,
         "iterations": calibration.iterations,
@@ -50,12 +102,26 @@ pub fn run(args: Args) -> Result<Outcome> {
         "after": side(after),
         "progress": progress,
         "warnings": addition.warnings,
-    });
-    let text = describe(&campaign, &addition);
-    Ok(Outcome { json, text })
+    })
 }
 
-fn side(fitted: &Fitted<StructureModel>) -> Value {
+fn describe_estimates(calibration: &Calibration) -> String {
+    let rows: Vec<Vec<String>> = calibration
+        .parameters
+        .iter()
+        .map(|p| {
+            vec![
+                p.name.clone(),
+                number(p.value, 5),
+                number(p.std_error, 2),
+                p.unit.to_string(),
+            ]
+        })
+        .collect();
+    table(&["parameter", "fitted", "± std error", "unit"], &rows)
+}
+
+fn side<M>(fitted: &Fitted<M>) -> Value {
     json!({
         "nrms": fitted.residual.nrms,
         "held_out_nrms": fitted.held_out_nrms(),
@@ -63,26 +129,26 @@ fn side(fitted: &Fitted<StructureModel>) -> Value {
     })
 }
 
-fn describe(campaign: &Campaign, addition: &Addition) -> String {
+fn describe<M, I>(campaign: &Campaign, addition: &Addition<M, I>, plain: &Plain) -> String {
     let Addition {
         revision,
         extension,
         totals,
         warnings: notes,
+        ..
     } = addition;
     let Extension {
-        instance,
         before,
         after,
         progress,
+        ..
     } = extension;
     let dir = campaign.dir.display();
     let mut text = format!(
         "revision {revision}: + {}\n  {}\n\n",
-        instance.title(),
-        instance.effect.explanation()
+        plain.title, plain.explanation
     );
-    text += &describe_parameters(&after.model, &after.calibration);
+    text += &plain.parameters;
     text += &format!(
         "\nerror (nrms)    {} -> {}, noise floor {}\n",
         percent(before.residual.nrms),
@@ -91,17 +157,19 @@ fn describe(campaign: &Campaign, addition: &Addition) -> String {
     );
     if let (Some(was), Some(is)) = (before.held_out_nrms(), after.held_out_nrms()) {
         text += &format!(
-            "held-out error  {} -> {} (on postures left out of the fit)\n",
+            "held-out error  {} -> {} (on {} left out of the fit)\n",
             percent(was),
-            percent(is)
+            percent(is),
+            plain.folds
         );
     }
     text += &warnings(notes);
     text += "\n";
     text += &match progress {
         Some(false) => format!(
-            "THIS IS NOT PROGRESS: the error on postures left out of the fit did not fall by more than chance would let \
-             it. The revision is recorded all the same; undo it with: lobestone undo {dir}\n"
+            "THIS IS NOT PROGRESS: the error on {} left out of the fit did not fall by more than chance would let \
+             it. The revision is recorded all the same; undo it with: lobestone undo {dir}\n",
+            plain.folds
         ),
         _ if totals.nrms > 1.1 * totals.noise_floor_nrms => {
             format!("More than noise is left. See what else is missing: lobestone diagnose {dir}\n")

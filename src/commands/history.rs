@@ -1,10 +1,10 @@
 use serde_json::{Value, json};
 
 use super::text::{bar, percent, table, warnings};
-use super::{CampaignArg, Domain, Outcome, structure_only};
+use super::{CampaignArg, Domain, Outcome, side};
 use crate::Result;
 use crate::campaign::Campaign;
-use crate::revision::{self, Revision, RevisionLog, structure_fingerprint};
+use crate::revision::{Revision, RevisionLog, fingerprint};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -16,22 +16,22 @@ pub struct Args {
 }
 
 pub fn run(args: Args) -> Result<Outcome> {
-    structure_only(args.domain)?;
     let campaign = Campaign::load(&args.campaign.dir)?;
+    let domain = side(&campaign, args.domain);
     let log = RevisionLog::load(&campaign.dir)?;
-    let revisions: Vec<&Revision> = log.revisions(revision::Domain::Structure).collect();
-    let undone: Vec<&Revision> = log.undone(revision::Domain::Structure).collect();
+    let revisions: Vec<&Revision> = log.revisions(domain).collect();
+    let undone: Vec<&Revision> = log.undone(domain).collect();
     let dir = campaign.dir.display();
     let Some(current) = revisions.last() else {
         return Ok(Outcome {
-            json: json!({ "domain": "structure", "revisions": [], "noise_floor_nrms": null, "undone": [], "warnings": [] }),
+            json: json!({ "domain": domain, "revisions": [], "noise_floor_nrms": null, "undone": [], "warnings": [] }),
             text: format!(
                 "no effect was added to this campaign's model yet\n\nSee what is missing: lobestone diagnose {dir}; then \
                  lobestone add {dir} EFFECT[@SITE]\n"
             ),
         });
     };
-    let fingerprint = structure_fingerprint(&campaign)?;
+    let fingerprint = fingerprint(&campaign, domain)?;
     let old: Vec<String> = revisions
         .iter()
         .filter(|r| r.data != fingerprint)
@@ -46,7 +46,7 @@ pub fn run(args: Args) -> Result<Outcome> {
         )],
     };
     let json = json!({
-        "domain": "structure",
+        "domain": domain,
         "revisions": revisions.iter().map(|r| document(r, &fingerprint)).collect::<Vec<_>>(),
         "noise_floor_nrms": current.noise_floor_nrms,
         "undone": undone.iter().map(|r| document(r, &fingerprint)).collect::<Vec<_>>(),

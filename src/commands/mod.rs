@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use clap::{Parser, Subcommand, ValueEnum};
 
+use crate::Result;
 use crate::campaign::Campaign;
-use crate::{InputError, Result};
 
 mod add;
 mod calibrate;
@@ -107,16 +107,12 @@ fn by_domain(
     }
 }
 
-/// Refuses the side that a command does not serve yet.
-fn structure_only(domain: Option<Domain>) -> Result<()> {
+/// The side whose revisions are meant: the one asked for, else that which the campaign holds (both: the structure).
+fn side(campaign: &Campaign, domain: Option<Domain>) -> crate::revision::Domain {
     match domain {
-        Some(Domain::Cutting) => Err(InputError::new(
-            "force records cannot be compared waveform by waveform yet",
-        )
-        .key("--domain")
-        .remedy("use `lobestone cfc` for the cutting side; leave --domain out or give structure for the FRFs")
-        .into()),
-        _ => Ok(()),
+        Some(Domain::Cutting) => crate::revision::Domain::Cutting,
+        None if campaign.frfs.is_empty() && !campaign.cuts.is_empty() => crate::revision::Domain::Cutting,
+        _ => crate::revision::Domain::Structure,
     }
 }
 

@@ -2,10 +2,10 @@ use serde_json::json;
 
 use super::history::document;
 use super::text::percent;
-use super::{CampaignArg, Domain, Outcome, structure_only};
+use super::{CampaignArg, Domain, Outcome, side};
 use crate::Result;
 use crate::campaign::Campaign;
-use crate::revision::{self, RevisionLog, structure_fingerprint};
+use crate::revision::{RevisionLog, fingerprint};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -17,15 +17,15 @@ pub struct Args {
 }
 
 pub fn run(args: Args) -> Result<Outcome> {
-    structure_only(args.domain)?;
     let campaign = Campaign::load(&args.campaign.dir)?;
+    let domain = side(&campaign, args.domain);
     let mut log = RevisionLog::load(&campaign.dir)?;
-    let undone = log.undo(revision::Domain::Structure)?;
-    let current = log.current(revision::Domain::Structure);
+    let undone = log.undo(domain)?;
+    let current = log.current(domain);
     let labels = current.map(|r| r.labels()).unwrap_or_default();
     let json = json!({
-        "domain": "structure",
-        "undone": document(&undone, &structure_fingerprint(&campaign)?),
+        "domain": domain,
+        "undone": document(&undone, &fingerprint(&campaign, domain)?),
         "revision": current.map(|r| r.revision),
         "effects": labels,
     });

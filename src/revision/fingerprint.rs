@@ -3,6 +3,7 @@
 use std::fmt::Debug;
 use std::path::Path;
 
+use super::Domain;
 use crate::campaign::Campaign;
 use crate::{Error, Result};
 
@@ -65,6 +66,32 @@ pub fn structure_fingerprint(campaign: &Campaign) -> Result<String> {
         hash.file(&frf.file)?;
     }
     Ok(format!("{:016x}", hash.0))
+}
+
+/// Fingerprint of all that the fit of the force records rests on: tool, dynamometer, cuts and the content of the records.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn cutting_fingerprint(campaign: &Campaign) -> Result<String> {
+    let mut hash = Fnv::new();
+    hash.value(&campaign.tool);
+    hash.value(&campaign.dynamometer);
+    for cut in &campaign.cuts {
+        hash.value(&(cut.spindle_rpm, &cut.geometry, cut.order, cut.steady_s));
+        hash.file(&cut.file)?;
+    }
+    Ok(format!("{:016x}", hash.0))
+}
+
+/// Fingerprint of one side of a campaign.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn fingerprint(campaign: &Campaign, domain: Domain) -> Result<String> {
+    match domain {
+        Domain::Structure => structure_fingerprint(campaign),
+        Domain::Cutting => cutting_fingerprint(campaign),
+    }
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ mod clock;
 mod fingerprint;
 mod log;
 
-pub use fingerprint::structure_fingerprint;
+pub use fingerprint::{cutting_fingerprint, fingerprint, structure_fingerprint};
 pub use log::{RevisionLog, log_file};
 
 use serde::{Deserialize, Serialize};

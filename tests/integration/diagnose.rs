@@ -133,3 +133,19 @@ fn a_side_that_the_campaign_does_not_have_is_refused_plainly() {
     assert_eq!(run.status, Some(1));
     assert!(run.stderr.contains("no [[cut]]"), "{}", run.stderr);
 }
+
+/// A cutting effect that is not there: added, judged by cuts left out, called what it is, and taken back.
+#[test]
+fn a_wrong_cutting_effect_is_no_progress() {
+    let dir = crate::support::copy_of("force-9439");
+    let path = dir.path().to_str().unwrap();
+    let added = document(&["add", path, "tool-wear"]);
+    assert_eq!(added["domain"], "cutting");
+    assert_eq!(added["progress"], false);
+    assert_eq!(added["effects"], serde_json::json!(["tool-wear"]));
+    let history = document(&["history", path]);
+    assert_eq!(history["revisions"].as_array().unwrap().len(), 2);
+    assert_eq!(document(&["diagnose", path])["effects"], added["effects"]);
+    assert_eq!(document(&["undo", path])["revision"], 0);
+    assert_eq!(document(&["compare", path])["domain"], "cutting");
+}

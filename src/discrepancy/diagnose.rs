@@ -10,7 +10,8 @@ use crate::Result;
 use crate::identify::calibrate::{Calibration, Estimate, estimates};
 use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
 use crate::identify::study::{
-    EffectName, Effort, Extent, HeldOut, Residual, Study, Tried, View, held_out, rescue, try_effect,
+    EffectName, Effort, Extent, HeldOut, OUT_OF_RACE, Residual, Study, Tried, View, held_out, rescue,
+    try_effect, try_effects,
 };
 use crate::progress::Progress;
 
@@ -84,7 +85,7 @@ pub struct Baseline {
     pub reduced_chi2: f64,
 }
 
-/// Candidates that are refined on all data.
+/// Candidates that are refined on all data, at most.
 const REFINED: usize = 8;
 /// Misfit per degree of freedom of the baseline below which what is missing is faint.
 const FAINT: f64 = 1.5;
@@ -288,15 +289,8 @@ impl<'a, S: Study> Engine<'a, S> {
         let (study, model) = (self.study, self.model);
         let bases = [base.theta.clone(), study.nominal_theta(model)];
         let progress = Progress::new("trying effects", self.instances.len());
-        let mut tried: Vec<TriedOf<S>> = self
-            .instances
-            .par_iter()
-            .filter_map(|instance| {
-                let tried = try_effect(study, model, instance, &bases, &self.hints, Effort::Staged);
-                progress.step();
-                tried
-            })
-            .collect();
+        let step = || progress.step();
+        let mut tried = try_effects(study, model, &self.instances, &bases, &self.hints, step);
         drop(progress);
         let by_cost = |a: &TriedOf<S>, b: &TriedOf<S>| a.fit.cost.total_cmp(&b.fit.cost);
         tried.sort_by(by_cost);
@@ -331,11 +325,13 @@ impl<'a, S: Study> Engine<'a, S> {
         Ok((tried, base_start))
     }
 
-    /// The leaders, fitted to all data, best first.
+    /// The leaders of `tried` (best first), fitted to all data, best first.
     fn refine(&self, tried: &[TriedOf<S>]) -> Result<Vec<TriedOf<S>>> {
+        let lowest = tried.first().map_or(0.0, |t| t.fit.cost);
         let mut refined: Vec<TriedOf<S>> = tried
             .par_iter()
             .take(REFINED)
+            .filter(|t| t.fit.cost <= OUT_OF_RACE * lowest)
             .map(|t| {
                 let fit = self.minimise(&t.model, View::FULL, &t.fit.theta, REFINE)?;
                 Ok(Tried { fit, ..t.clone() })

@@ -72,7 +72,10 @@ struct LevenbergMarquardt {
     growth: f64,
     /// Largest diagonal of the Hessian seen so far (column scaling).
     scaling: DVector<f64>,
+    /// At the current point; `None` until it is needed.
     here: Option<Linearisation>,
+    /// The first trial of an iteration is linearised at once: most are accepted, and then nothing is worked out twice.
+    speculative: bool,
     converged: bool,
 }
 
@@ -136,7 +139,6 @@ impl<O: LeastSquares> Solver<O, LmState> for LevenbergMarquardt {
         let mut theta = state.take_param().unwrap_or_default();
         self.clip(&mut theta);
         let here = problem.problem("linearise_count", |p| Ok(p.linearise(&theta)?))?;
-        self.scaling = here.hessian.diagonal().map(|d| d.max(f64::MIN_POSITIVE));
         let cost = here.cost;
         self.here = Some(here);
         Ok((state.param(theta).cost(cost), None))
@@ -148,12 +150,16 @@ impl<O: LeastSquares> Solver<O, LmState> for LevenbergMarquardt {
         mut state: LmState,
     ) -> std::result::Result<(LmState, Option<KV>), ArgminError> {
         let theta = state.take_param().unwrap_or_default();
-        let Some(here) = self.here.take() else {
-            return Ok((state.param(theta), None));
+        let here = match self.here.take() {
+            Some(here) => here,
+            None => problem.problem("linearise_count", |p| Ok(p.linearise(&theta)?))?,
         };
+        for (s, d) in self.scaling.iter_mut().zip(here.hessian.diagonal().iter()) {
+            *s = s.max(*d);
+        }
         let free = self.free(&theta, &here.gradient);
         let mut next = None;
-        for _ in 0..MAX_TRIALS {
+        for number in 0..MAX_TRIALS {
             let Some((step, promised)) = self.step(&here, &free) else {
                 self.damping = (self.damping * 10.0).max(1e-6);
                 continue;
@@ -169,28 +175,32 @@ impl<O: LeastSquares> Solver<O, LmState> for LevenbergMarquardt {
             let taken = DVector::from_iterator(theta.len(), trial.iter().zip(&theta).map(|(a, b)| a - b));
             let promised = predicted_decrease(&here, &taken).max(f64::MIN_POSITIVE);
             // A trial point where the model has no answer counts as infinitely bad.
-            let cost = problem.problem("cost_count", |p| Ok(p.cost(&trial).unwrap_or(f64::INFINITY)))?;
+            let there = if self.speculative && number == 0 {
+                problem.problem("linearise_count", |p| Ok(p.linearise(&trial).ok()))?
+            } else {
+                None
+            };
+            let cost = match &there {
+                Some(there) => there.cost,
+                None if self.speculative && number == 0 => f64::INFINITY,
+                None => problem.problem("cost_count", |p| Ok(p.cost(&trial).unwrap_or(f64::INFINITY)))?,
+            };
             let gain = (here.cost - cost) / promised;
             if cost.is_finite() && cost < here.cost && gain > 1e-4 {
                 self.damping *= (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / 3.0);
                 self.growth = 2.0;
-                next = Some(trial);
+                next = Some((trial, cost, there));
                 break;
             }
             self.damping *= self.growth;
             self.growth *= 2.0;
         }
         match next {
-            Some(trial) => {
-                let there = problem.problem("linearise_count", |p| Ok(p.linearise(&trial)?))?;
-                for (s, d) in self.scaling.iter_mut().zip(there.hessian.diagonal().iter()) {
-                    *s = s.max(*d);
-                }
-                if here.cost - there.cost <= self.relative_decrease * here.cost && self.damping <= 1.0 {
+            Some((trial, cost, there)) => {
+                if here.cost - cost <= self.relative_decrease * here.cost && self.damping <= 1.0 {
                     self.converged = true;
                 }
-                let cost = there.cost;
-                self.here = Some(there);
+                self.here = there;
                 Ok((state.param(trial).cost(cost), None))
             }
             None => {
@@ -226,34 +236,12 @@ pub fn minimise<P: LeastSquares>(
     bounds: &[[f64; 2]],
     stopping: Stopping,
 ) -> Result<Fit> {
-    let solver = LevenbergMarquardt {
-        bounds: bounds.to_vec(),
-        relative_decrease: stopping.relative_decrease,
-        damping: 1e-3,
-        growth: 2.0,
-        scaling: DVector::zeros(start.len()),
-        here: None,
-        converged: false,
-    };
-    let result = Executor::new(problem, solver)
-        .configure(|state| {
-            state
-                .param(start.to_vec())
-                .max_iters(stopping.max_iterations as u64)
-        })
-        .timer(false)
-        .run()
-        .map_err(|error| match error.downcast::<Error>() {
-            Ok(ours) => ours,
-            Err(other) => Error::computation(format!("the fit failed: {other}")),
-        })?;
-    let iterations = result.state.get_iter() as usize;
-    let solver = result.solver;
-    let theta = result
-        .state
-        .best_param
-        .or(result.state.param)
-        .ok_or_else(|| Error::computation("the fit returned no parameters"))?;
+    let Descent {
+        theta,
+        iterations,
+        solver,
+        ..
+    } = descend(problem, start, bounds, stopping, true)?;
     let here = match solver.here {
         Some(here) => here,
         None => problem.linearise(&theta)?,
@@ -272,6 +260,67 @@ pub fn minimise<P: LeastSquares>(
         iterations,
         converged: solver.converged,
         at_bound,
+    })
+}
+
+/// One step from `start`: where it leads and the cost (½ Σ r²) there, without the derivatives there.
+pub fn one_step<P: LeastSquares>(problem: &P, start: &[f64], bounds: &[[f64; 2]]) -> Result<(f64, Vec<f64>)> {
+    let stopping = Stopping {
+        max_iterations: 1,
+        ..Stopping::default()
+    };
+    let descent = descend(problem, start, bounds, stopping, false)?;
+    Ok((descent.cost, descent.theta))
+}
+
+struct Descent {
+    theta: Vec<f64>,
+    cost: f64,
+    iterations: usize,
+    solver: LevenbergMarquardt,
+}
+
+fn descend<P: LeastSquares>(
+    problem: &P,
+    start: &[f64],
+    bounds: &[[f64; 2]],
+    stopping: Stopping,
+    speculative: bool,
+) -> Result<Descent> {
+    let solver = LevenbergMarquardt {
+        bounds: bounds.to_vec(),
+        relative_decrease: stopping.relative_decrease,
+        damping: 1e-3,
+        growth: 2.0,
+        scaling: DVector::from_element(start.len(), f64::MIN_POSITIVE),
+        here: None,
+        speculative,
+        converged: false,
+    };
+    let result = Executor::new(problem, solver)
+        .configure(|state| {
+            state
+                .param(start.to_vec())
+                .max_iters(stopping.max_iterations as u64)
+        })
+        .timer(false)
+        .run()
+        .map_err(|error| match error.downcast::<Error>() {
+            Ok(ours) => ours,
+            Err(other) => Error::computation(format!("the fit failed: {other}")),
+        })?;
+    let iterations = result.state.get_iter() as usize;
+    let cost = result.state.best_cost;
+    let theta = result
+        .state
+        .best_param
+        .or(result.state.param)
+        .ok_or_else(|| Error::computation("the fit returned no parameters"))?;
+    Ok(Descent {
+        theta,
+        cost,
+        iterations,
+        solver: result.solver,
     })
 }
 

@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 
 use super::calibrate::{Calibration, scattered_starts};
-use super::levenberg_marquardt::{Fit, LeastSquares, Stopping, minimise};
+use super::levenberg_marquardt::{Fit, LeastSquares, Stopping, minimise, one_step};
 use crate::parameter::Parameter;
 use crate::{Error, Result};
 
@@ -206,14 +206,10 @@ pub enum Effort {
 }
 
 /// Starting points that get a step.
-const MOST_STARTS: usize = 12;
+const MOST_STARTS: usize = 8;
 /// Times the lowest misfit from which on a starting point is not followed directly.
 const HOPELESS: f64 = 3.0;
 
-const STEP: Stopping = Stopping {
-    max_iterations: 1,
-    relative_decrease: 1e-3,
-};
 const LOOK: Stopping = Stopping {
     max_iterations: 6,
     relative_decrease: 1e-3,
@@ -232,6 +228,21 @@ pub fn screen<S: Study>(
     own: &[Vec<f64>],
     effort: Effort,
 ) -> Result<Fit> {
+    let mut fits = look(study, model, bases, own, effort)?;
+    if effort == Effort::Look {
+        return Ok(fits.swap_remove(0));
+    }
+    settle(study, model, &fits)
+}
+
+/// The first steps of [`screen`]: where short fits from the most promising starting points lead, best first; at least one.
+fn look<S: Study>(
+    study: &S,
+    model: &S::Model,
+    bases: &[Vec<f64>],
+    own: &[Vec<f64>],
+    effort: Effort,
+) -> Result<Vec<Fit>> {
     let bounds = study.bounds(model);
     let likelihood = study.problem(model, View::COARSE);
     let rough = study.problem(
@@ -263,45 +274,52 @@ pub fn screen<S: Study>(
     starts.truncate(MOST_STARTS);
     // A start close to where the effect vanishes costs little and promises nothing: one step tells (it is a score test
     // there). A start that is hopelessly high needs the rough misfit first.
-    let mut steps: Vec<Fit> = starts
+    let mut steps: Vec<(f64, Vec<f64>)> = starts
         .iter()
         .filter(|s| s.0 <= HOPELESS * best)
-        .filter_map(|(_, start)| minimise(&likelihood, start, &bounds, STEP).ok())
+        .filter_map(|(_, start)| one_step(&likelihood, start, &bounds).ok())
         .collect();
-    steps.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    for step in steps.iter().take(if effort == Effort::Look { 1 } else { 2 }) {
-        keep(minimise(&likelihood, &step.theta, &bounds, LOOK));
+    steps.sort_by(|a, b| a.0.total_cmp(&b.0));
+    for (_, step) in steps.iter().take(if effort == Effort::Look { 1 } else { 2 }) {
+        keep(minimise(&likelihood, step, &bounds, LOOK));
     }
     if effort == Effort::Staged && 2.0 * best > TRAP_MISFIT * study.real_values(Extent::Coarse) as f64 {
-        for base in bases {
-            if let Some((_, start)) = lowest(&rough, base) {
-                let longer = Stopping {
-                    max_iterations: 10,
-                    ..LOOK
-                };
-                let near = minimise(&rough, &start, &bounds, longer);
-                keep(near.and_then(|near| minimise(&likelihood, &near.theta, &bounds, LOOK)));
-            }
+        let longer = Stopping {
+            max_iterations: 10,
+            ..LOOK
+        };
+        let near = bases
+            .iter()
+            .filter_map(|base| lowest(&rough, base))
+            .filter_map(|(_, start)| minimise(&rough, &start, &bounds, longer).ok())
+            .min_by(|a, b| a.cost.total_cmp(&b.cost));
+        if let Some(near) = near {
+            keep(minimise(&likelihood, &near.theta, &bounds, LOOK));
         }
     }
     fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    if effort == Effort::Look && !fits.is_empty() {
-        return Ok(fits.swap_remove(0));
+    if fits.is_empty() {
+        return Err(failure.unwrap_or_else(|| Error::computation("no starting point for the effect")));
     }
-    let mut best: Option<Fit> = None;
-    // The runner-up goes to the end too where it is close: the leader of a short look need not win.
-    let close = |fit: &&Fit| fit.cost < 1.5 * fits[0].cost;
-    for fit in fits.iter().take(2).filter(close) {
-        let settled = minimise(&likelihood, &fit.theta, &bounds, SETTLE)?;
-        if best.as_ref().is_none_or(|b| settled.cost < b.cost) {
-            best = Some(settled);
-        }
-    }
-    match (best, failure) {
-        (Some(best), _) => Ok(best),
-        (None, Some(error)) => Err(error),
-        (None, None) => Err(Error::computation("no starting point for the effect")),
-    }
+    Ok(fits)
+}
+
+/// Follows what [`look`] found to its end on the coarse view. The runner-up goes to the end too where it is close: the
+/// leader of a short look need not win.
+fn settle<S: Study>(study: &S, model: &S::Model, looks: &[Fit]) -> Result<Fit> {
+    let bounds = study.bounds(model);
+    let likelihood = study.problem(model, View::COARSE);
+    let close = |fit: &&Fit| fit.cost < 1.5 * looks[0].cost;
+    looks
+        .iter()
+        .take(2)
+        .filter(close)
+        .map(|fit| minimise(&likelihood, &fit.theta, &bounds, SETTLE))
+        .reduce(|best, next| {
+            let (best, next) = (best?, next?);
+            Ok(if next.cost < best.cost { next } else { best })
+        })
+        .unwrap_or_else(|| Err(Error::computation("no starting point for the effect")))
 }
 
 /// Starting points of an effect's own parameters on the solver's scale: the nominal values, what the effect proposes, and
@@ -360,6 +378,46 @@ pub fn try_effect<S: Study>(
         model: extended,
         fit,
     })
+}
+
+/// Times the lowest misfit from which on a candidate is out of the race: it is not followed to its end.
+pub const OUT_OF_RACE: f64 = 10.0;
+
+/// Adds each instance to `model` in turn and fits it on the coarse view from the given points of the parameters in front;
+/// those out of the race after a first look stay where that look ended. In the order of the instances, without those
+/// that no start led to a fit of. `done` is called after each.
+pub fn try_effects<S: Study>(
+    study: &S,
+    model: &S::Model,
+    instances: &[S::Instance],
+    bases: &[Vec<f64>],
+    hints: &S::Hints,
+    done: impl Fn() + Sync,
+) -> Vec<Tried<S::Model, S::Instance>> {
+    let before = study.parameters(model).len();
+    let looks: Vec<(&S::Instance, S::Model, Vec<Fit>)> = instances
+        .par_iter()
+        .filter_map(|instance| {
+            let extended = study.extend(model, instance);
+            let own = own_starts(study, &extended, before, instance, hints);
+            let looks = look(study, &extended, bases, &own, Effort::Staged);
+            done();
+            Some((instance, extended, looks.ok()?))
+        })
+        .collect();
+    let lowest = looks.iter().map(|l| l.2[0].cost).fold(f64::INFINITY, f64::min);
+    looks
+        .into_par_iter()
+        .filter_map(|(instance, model, mut looks)| {
+            let fit = if looks[0].cost <= OUT_OF_RACE * lowest {
+                settle(study, &model, &looks).ok()?
+            } else {
+                looks.swap_remove(0)
+            };
+            let instance = instance.clone();
+            Some(Tried { instance, model, fit })
+        })
+        .collect()
 }
 
 /// The effect added last may be stuck beside its best fit: from further starting points a better one, if there is any.

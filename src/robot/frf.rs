@@ -436,6 +436,16 @@ impl FrfBasis {
 /// singular A leaves values that are not finite. (The systems are so small, and solved so often, that a library's
 /// blocking and memory take longer than the arithmetic.)
 fn solve_in_place(n: usize, a: &mut [Complex64], b: &mut [Complex64]) {
+    // Six joints with one or two branches: with the size known beforehand the compiler unrolls the loops.
+    match n {
+        7 => eliminate(7, a, b),
+        8 => eliminate(8, a, b),
+        _ => eliminate(n, a, b),
+    }
+}
+
+#[inline(always)]
+fn eliminate(n: usize, a: &mut [Complex64], b: &mut [Complex64]) {
     for k in 0..n {
         let size = |i: usize| a[i + n * k].l1_norm();
         let pivot = (k + 1..n).fold(k, |best, i| if size(i) > size(best) { i } else { best });

@@ -34,6 +34,8 @@ const STEP: usize = 2;
 const NUMERATOR: usize = 5;
 /// Coefficients of the common denominator besides the leading 1: two poles.
 const DENOMINATOR: usize = 3;
+/// Share of a line that the fit may take for the curve without it still to be worth something.
+const MOST_TAKEN: f64 = 0.7;
 /// Output-error steps after the linear start.
 const GAUSS_NEWTON_STEPS: usize = 4;
 
@@ -49,8 +51,9 @@ struct Departure {
 #[derive(Debug, Clone)]
 pub struct FrfNoiseEstimate {
     pub law: FrfNoise,
-    /// Standard deviation of the complex value on each line: the law at the smooth curve's magnitude. (At the noisy
-    /// magnitude a line that noise made small would get more weight than it deserves, a bias of a².)
+    /// Standard deviation of the complex value on each line: the law at the magnitude of a smooth curve through the other
+    /// lines. (At the noisy magnitude a line that noise made small would get more weight than it deserves: every FRF
+    /// would be fitted too small by a share a², and by a third of that at a curve that the line itself has drawn.)
     pub std: Vec<f64>,
 }
 
@@ -251,15 +254,23 @@ fn window(
     }
     let inverse = information.try_inverse();
     let c = HALF_WINDOW;
-    // Degrees of freedom that numerator and common denominator take from the centre line.
-    let own: f64 = projection.basis.row(c).iter().map(|b| b.norm_sqr()).sum();
+    // Degrees of freedom that each FRF's numerator takes from a line.
+    let own: Vec<f64> = projection
+        .basis
+        .row_iter()
+        .map(|row| row.iter().map(|b| b.norm_sqr()).sum())
+        .collect();
     for (frf, local) in local.iter_mut().enumerate() {
-        let shared = inverse.as_ref().map_or(0.0, |inverse| {
-            let slopes = projection.slopes(&x, &denominator, frf);
-            let row = slopes.row(c);
-            (row * inverse * row.adjoint())[(0, 0)].re
-        });
-        let freedom = 1.0 - own - shared;
+        let slopes = projection.slopes(&x, &denominator, frf);
+        // And with them those that the common denominator takes.
+        let taken = |i: usize| {
+            let shared = inverse.as_ref().map_or(0.0, |inverse| {
+                let row = slopes.row(i);
+                (row * inverse * row.adjoint())[(0, 0)].re
+            });
+            own[i] + shared
+        };
+        let freedom = 1.0 - taken(c);
         let variance = projection.residual[(c, frf)].norm_sqr() / (weight[c].powi(2) * freedom);
         let magnitude = projection.fitted[(c, frf)].norm() / weight[c];
         if freedom > 0.1 && variance.is_finite() && magnitude.is_finite() {
@@ -267,7 +278,12 @@ fn window(
         }
         for line in lines.clone() {
             let i = line - range.start;
-            let smooth = projection.fitted[(i, frf)].norm() / weight[i];
+            // The curve as it would be without this line (the fit is nearly linear): else a line's own noise would have
+            // a say in its weight.
+            let taken = taken(i).min(MOST_TAKEN);
+            let without =
+                projection.fitted[(i, frf)] - projection.residual[(i, frf)] * (taken / (1.0 - taken));
+            let smooth = without.norm() / weight[i];
             if smooth.is_finite() {
                 local.smooth[line] = smooth;
             }

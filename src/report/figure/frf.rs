@@ -96,8 +96,10 @@ impl FrfFigure {
             or(&self.unit, "–")
         );
         let magnitude = Axis::log(&left_title, (low, high));
-        let phase = Axis::linear("Phase (°)", (-195.0, 195.0), 4)
-            .with_ticks(&[-180.0, -90.0, 0.0, 90.0, 180.0], |v| decimals(v, 0));
+        let lowest = lowest_phase(&curves);
+        let ticks = [0.0, 90.0, 180.0, 270.0, 360.0].map(|a| lowest + a);
+        let phase = Axis::linear("Phase (°)", (lowest - 15.0, lowest + 375.0), 4)
+            .with_ticks(&ticks, |v| decimals(v, 0));
         let frequency = Axis::linear("Frequency (Hz)", frequencies, 10);
 
         let left = Panel::left_margin(&[&magnitude, &phase]);
@@ -138,7 +140,7 @@ impl FrfFigure {
             }
             if let Some(measured) = &self.measured {
                 let magnitude = measured.points().map(|(f, v)| (f, v.norm()));
-                let angle = measured.points().map(|(f, v)| (f, degrees(v)));
+                let angle = measured.points().map(|(f, v)| (f, degrees(v, lowest)));
                 upper.markers(
                     canvas,
                     magnitude,
@@ -157,7 +159,7 @@ impl FrfFigure {
             for (i, model) in self.models.iter().enumerate() {
                 let stroke = style::model(i, self.models.len());
                 upper.curve(canvas, model.points().map(|(f, v)| (f, v.norm())), stroke);
-                lower.curve(canvas, broken_at_wraps(model), stroke);
+                lower.curve(canvas, broken_at_wraps(model, lowest), stroke);
             }
             upper.frame(canvas);
             lower.frame(canvas);
@@ -187,23 +189,68 @@ pub(super) fn or<'a>(text: &'a str, otherwise: &'a str) -> &'a str {
     if text.trim().is_empty() { otherwise } else { text }
 }
 
-fn degrees(value: Complex64) -> f64 {
+/// Phase of `value` in `lowest` … `lowest` + 360°.
+fn degrees(value: Complex64, lowest: f64) -> f64 {
     if value.norm() > 0.0 {
-        value.arg().to_degrees()
+        lowest + (value.arg().to_degrees() - lowest).rem_euclid(360.0)
     } else {
         f64::NAN
     }
 }
 
-/// Phase in degrees with a gap where it jumps from −180° to 180°.
-fn broken_at_wraps(curve: &FrfCurve) -> Vec<(f64, f64)> {
+/// Where the phase axis begins: a measured phase around ±180° must not jump between both edges of the figure.
+fn lowest_phase(curves: &[&FrfCurve]) -> f64 {
+    let jumps = |lowest: f64| -> usize {
+        let of = |curve: &&FrfCurve| {
+            let angles: Vec<f64> = curve.points().map(|(_, v)| degrees(v, lowest)).collect();
+            angles
+                .windows(2)
+                .filter(|pair| (pair[1] - pair[0]).abs() > 180.0)
+                .count()
+        };
+        curves.iter().map(of).sum()
+    };
+    if jumps(-270.0) < jumps(-180.0) {
+        -270.0
+    } else {
+        -180.0
+    }
+}
+
+/// Phase in degrees with a gap where it jumps from one end of its range to the other.
+fn broken_at_wraps(curve: &FrfCurve, lowest: f64) -> Vec<(f64, f64)> {
     let mut points: Vec<(f64, f64)> = vec![];
     for (frequency, value) in curve.points() {
-        let angle = degrees(value);
+        let angle = degrees(value, lowest);
         if points.last().is_some_and(|last| (angle - last.1).abs() > 180.0) {
             points.push((frequency, f64::NAN));
         }
         points.push((frequency, angle));
     }
     points
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_phase_around_180_degrees_does_not_jump_between_the_edges() {
+        let curve = |angles: &[f64]| FrfCurve {
+            frequency_hz: (1..=angles.len()).map(|k| k as f64).collect(),
+            value: angles
+                .iter()
+                .map(|a| Complex64::from_polar(1e-6, a.to_radians()))
+                .collect(),
+            ..FrfCurve::default()
+        };
+        let beyond_resonance = curve(&[0.0, -90.0, -179.0, 179.0, -178.0, 178.0]);
+        assert_eq!(lowest_phase(&[&beyond_resonance]), -270.0);
+        assert!(
+            broken_at_wraps(&beyond_resonance, -270.0)
+                .iter()
+                .all(|p| p.1.is_finite())
+        );
+        assert_eq!(lowest_phase(&[&curve(&[0.0, 90.0, 178.0, 91.0])]), -180.0);
+    }
 }

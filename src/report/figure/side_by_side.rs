@@ -90,7 +90,7 @@ impl SideBySide {
         let names: Vec<Vec<String>> = self
             .groups
             .iter()
-            .map(|g| style::TICK.wrap(g, room - 8.0, 2))
+            .map(|g| style::TICK.wrap(g, room - 8.0, 3))
             .collect();
         let flat = room >= 44.0;
         let legend = self.series.iter().enumerate().map(|(i, series)| {

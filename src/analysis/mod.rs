@@ -6,6 +6,7 @@ pub mod cutting;
 pub mod diagnosis;
 pub mod lobes;
 pub mod modal;
+pub mod mode_comparison;
 mod redundancy;
 pub mod regression_line;
 pub mod structure;

@@ -145,7 +145,8 @@ pub struct GlobalMode {
 /// What the common modes say of one FRF.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reconstruction {
-    /// sqrt(Σ|fitted − measured|² / Σ|measured|²).
+    /// sqrt(Σ|fitted − measured|² / Σ|measured|²) of the mobility: in receptance a robot's lowest mode alone would
+    /// count, in accelerance its highest.
     pub error_nrms: f64,
     /// The same for the noise alone.
     pub noise_nrms: f64,

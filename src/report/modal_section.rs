@@ -11,7 +11,7 @@ use super::{Block, Column, Section, Table};
 use crate::analysis::ModalAnalysis;
 use crate::analysis::modal::SetModes;
 use crate::modal::stabilisation::Stability;
-use crate::modal::tracking::{self, Track};
+use crate::modal::tracking::Track;
 
 /// Warnings shown; the command `modal` tells all.
 const MOST_WARNINGS: usize = 6;
@@ -100,7 +100,7 @@ fn modes(analysis: &ModalAnalysis) -> Block {
 
 /// The same mode from posture to posture, one row a mode.
 fn tracked(analysis: &ModalAnalysis) -> Option<Block> {
-    let tracks = tracking::track(&analysis.sets.iter().map(|s| &s.global).collect::<Vec<_>>());
+    let tracks = analysis.tracks();
     if tracks.is_empty() {
         return None;
     }

@@ -9,6 +9,7 @@ pub mod modal;
 pub mod mode_comparison;
 mod redundancy;
 pub mod regression_line;
+pub mod stick_shapes;
 pub mod structure;
 pub mod thesis_findings;
 

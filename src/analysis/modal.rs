@@ -146,6 +146,11 @@ impl ModalAnalysis {
         tracking::track(&self.sets.iter().map(|s| &s.global).collect::<Vec<_>>())
     }
 
+    /// The set with the most modes.
+    pub fn richest_set(&self) -> Option<&SetModes> {
+        self.sets.iter().max_by_key(|s| s.global.modes.len())
+    }
+
     pub fn mode_count(&self) -> usize {
         self.sets.iter().map(|s| s.global.modes.len()).sum()
     }

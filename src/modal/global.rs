@@ -8,7 +8,7 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 use super::curve::{Curve, MIN_LINES};
-use super::joint_fit::{self, Change, Data, Group};
+use super::joint_fit::{self, Change, Data, Doubt, Group, Search};
 use super::local_fit::Pole;
 use super::lscf::{self, Row};
 use super::stabilisation::{self, Candidate, ShapeData, Stabilisation};
@@ -315,16 +315,23 @@ fn shape_data(data: &[Data]) -> Option<ShapeData<'_>> {
 
 /// Refinement with search, noise from the rest, refinement without search.
 fn solve(data: &mut [Data], start: &[Pole], changes: &mut Vec<Change>) -> Option<Vec<Group>> {
-    let mut groups = joint_fit::refine(data, start, true, changes)?;
-    for pass in 0..2 {
+    let mut groups = joint_fit::refine(data, start, Search::Rest, changes)?;
+    // The first noise may have been wrong, and with it what was needless: search once more.
+    for search in [Search::Pairs, Search::Nothing] {
         renew_noise(data, &groups);
         let mut poles: Vec<Pole> = groups
             .iter()
             .flat_map(|g| g.solution.poles.iter().copied())
             .collect();
         poles.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
-        // The first noise may have been wrong, and with it what was needless: search once more.
-        groups = joint_fit::refine(data, &poles, pass == 0, changes)?;
+        let mut doubts: Vec<Option<Doubt>> = groups.into_iter().map(|g| g.doubt).collect();
+        groups = joint_fit::refine(data, &poles, search, changes)?;
+        if search == Search::Nothing && doubts.len() == groups.len() {
+            for (group, doubt) in groups.iter_mut().zip(&mut doubts) {
+                let same = |d: &Doubt| d.shifts.len() == group.solution.poles.len();
+                group.doubt = doubt.take().filter(same);
+            }
+        }
     }
     Some(groups)
 }

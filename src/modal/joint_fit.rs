@@ -28,13 +28,24 @@ const ADMITTED: f64 = 1.2;
 /// As [`CHANCE_SIGMA`] and [`LOOKED_EVERYWHERE`], for a pole that may be there.
 const DOUBT_SIGMA: f64 = 3.0;
 const DOUBT_LOOKED: f64 = 6.0;
-const WORTH_A_FIT_SIGMA: f64 = 1.0;
+/// Below this a pole beside another is not worth a fit of its own.
+const WORTH_A_FIT_SIGMA: f64 = 2.0;
+
+/// What a refinement may do besides moving poles.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Search {
+    Nothing,
+    /// Take out needless poles, add one where the rest is largest.
+    Rest,
+    /// That, and look for close pairs: a second pole beside each that is there.
+    Pairs,
+}
 
 /// A group of modes and the window that it was fitted in.
 pub(super) struct Group {
     pub window_hz: [f64; 2],
     pub solution: Solution,
-    /// Found in the last refinement only.
+    /// Looked for with [`Search::Pairs`].
     pub doubt: Option<Doubt>,
 }
 
@@ -74,12 +85,11 @@ impl Data {
     }
 }
 
-/// Refines all candidates (ascending in frequency). With `search` poles are taken out and added, else only moved.
-/// `None` where a group cannot be fitted.
+/// Refines all candidates (ascending in frequency). `None` where a group cannot be fitted.
 pub(super) fn refine(
     data: &[Data],
     candidates: &[Pole],
-    search: bool,
+    search: Search,
     changes: &mut Vec<Change>,
 ) -> Option<Vec<Group>> {
     let groups = groups(candidates);
@@ -105,10 +115,11 @@ pub(super) fn refine(
         let frfs: Option<Vec<NoisyFrf>> = data.iter().map(|d| d.window(window_hz)).collect();
         let fit = Fit { frfs: frfs?, fixed };
         let mut solution = fit.fit(group)?;
-        if search {
+        let mut doubt = None;
+        if search != Search::Nothing {
             solution = fit.without_needless(solution, changes);
             for _ in 0..MAX_ADDED {
-                match fit.with_one_more(&solution) {
+                match fit.with_one_more(&solution, search, &mut doubt) {
                     Some(more) => {
                         changes.push(Change::Added(more.poles[more.poles.len() - 1]));
                         solution = fit.without_needless(more, changes);
@@ -117,7 +128,6 @@ pub(super) fn refine(
                 }
             }
         }
-        let doubt = if search { None } else { fit.doubt(&solution) };
         result.push(Group {
             window_hz,
             solution,
@@ -238,8 +248,14 @@ impl Fit<'_> {
         }
     }
 
-    /// Adds a pole where the rest is largest, or beside one that is there, if that explains enough.
-    fn with_one_more(&self, solution: &Solution) -> Option<Solution> {
+    /// Adds a pole where the rest is largest, or beside one that is there, if that explains enough; one that explains
+    /// something but not enough is a doubt.
+    fn with_one_more(
+        &self,
+        solution: &Solution,
+        search: Search,
+        doubt: &mut Option<Doubt>,
+    ) -> Option<Solution> {
         let usual = usual_damping(solution);
         let enough = |more: &Solution| {
             let fall = solution.misfit - more.misfit;
@@ -248,16 +264,24 @@ impl Fit<'_> {
             let alike = (usual / 4.0..usual * 4.0).contains(&added.damping_ratio);
             sane && alike && fall > ADMITTED * self.wanted(more)
         };
-        self.in_the_rest(solution)
+        let found = self
+            .in_the_rest(solution)
             .into_iter()
             .filter_map(|pole| self.and(solution, pole))
-            .find(enough)
-            .or_else(|| self.beside(solution).filter(enough))
+            .find(enough);
+        if found.is_some() || search != Search::Pairs {
+            return found;
+        }
+        let more = self.beside(solution)?;
+        if enough(&more) {
+            return Some(more);
+        }
+        *doubt = self.doubt(solution, &more);
+        None
     }
 
-    /// Would one more pole beside those that are there explain more than chance does?
-    fn doubt(&self, solution: &Solution) -> Option<Doubt> {
-        let more = self.beside(solution)?;
+    /// Does one more pole explain more than chance does?
+    fn doubt(&self, solution: &Solution, more: &Solution) -> Option<Doubt> {
         let pole = *more.poles.last()?;
         let inside = self.frfs.iter().any(|c| {
             c.frequency_hz[0] <= pole.frequency_hz
@@ -266,7 +290,7 @@ impl Fit<'_> {
         let fall = solution.misfit - more.misfit;
         if !inside
             || pole.damping_ratio > MAX_DAMPING
-            || fall < self.beyond_chance(&more, DOUBT_SIGMA, DOUBT_LOOKED)
+            || fall < self.beyond_chance(more, DOUBT_SIGMA, DOUBT_LOOKED)
         {
             return None;
         }

@@ -200,7 +200,12 @@ fn reconstruction(set: &SetModes) -> Vec<Block> {
     let Some((k, fit)) = median_fit(set) else {
         return Vec::new();
     };
-    let name = format!("{} {}", set.set, set.frfs[k].input.name);
+    // FRFs of a campaign have the posture in their name.
+    let own = &set.frfs[k].input.name;
+    let name = match own.starts_with(&set.set) {
+        true => own.clone(),
+        false => format!("{} {own}", set.set),
+    };
     let curve = |label: &str, value: &[Complex64]| FrfCurve {
         label: label.into(),
         frequency_hz: fit.frequency_hz.clone(),
@@ -233,7 +238,7 @@ fn reconstruction(set: &SetModes) -> Vec<Block> {
     };
     let circles = NyquistFigure {
         title: format!("Mobility of {name} in the complex plane"),
-        unit: "(m/s)/N".into(),
+        unit: "m/(N·s)".into(),
         measured: Some(mobility("measured", &fit.measured_m_per_n)),
         models: vec![mobility("from the modes", &fit.fitted_m_per_n)],
     };

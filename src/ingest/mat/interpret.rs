@@ -59,7 +59,7 @@ impl Variable {
         let dimension = self.size.iter().position(|n| *n == length)?;
         let stride: usize = self.size[..dimension].iter().product();
         let block = stride * length;
-        if block == 0 || self.re.len() % block != 0 {
+        if block == 0 || !self.re.len().is_multiple_of(block) {
             return None;
         }
         let starts: Vec<usize> = (0..self.re.len()).filter(|k| k % block < stride).collect();

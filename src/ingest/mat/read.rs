@@ -171,8 +171,11 @@ fn pairs<const N: usize>(raw: &[u8], number: impl Fn([u8; N]) -> f64) -> (Vec<f6
 mod tests {
     use super::*;
 
+    /// Name, real and imaginary part.
+    type Array<'a> = (&'a str, &'a [f64], Option<&'a [f64]>);
+
     /// A v5 file by the format's description: little-endian, one double array a variable.
-    fn v5_file(arrays: &[(&str, &[f64], Option<&[f64]>)]) -> Vec<u8> {
+    fn v5_file(arrays: &[Array]) -> Vec<u8> {
         let mut header = b"MATLAB 5.0 MAT-file".to_vec();
         header.resize(124, b' ');
         header.extend([0x00, 0x01, b'I', b'M']);

@@ -29,7 +29,7 @@ const ADMITTED: f64 = 1.2;
 const DOUBT_SIGMA: f64 = 3.0;
 const DOUBT_LOOKED: f64 = 6.0;
 /// Below this a pole beside another is not worth a fit of its own.
-const WORTH_A_FIT_SIGMA: f64 = 2.0;
+const WORTH_A_FIT_SIGMA: f64 = 1.0;
 
 /// What a refinement may do besides moving poles.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -85,7 +85,8 @@ impl Data {
     }
 }
 
-/// Refines all candidates (ascending in frequency). `None` where a group cannot be fitted.
+/// Refines all candidates (ascending in frequency). The poles of a group that cannot be fitted go out; `None` where none
+/// can.
 pub(super) fn refine(
     data: &[Data],
     candidates: &[Pole],
@@ -113,8 +114,15 @@ pub(super) fn refine(
             .collect();
         let window_hz = [low, high];
         let frfs: Option<Vec<NoisyFrf>> = data.iter().map(|d| d.window(window_hz)).collect();
-        let fit = Fit { frfs: frfs?, fixed };
-        let mut solution = fit.fit(group)?;
+        before = after;
+        let Some((fit, mut solution)) = frfs.and_then(|frfs| {
+            let fit = Fit { frfs, fixed };
+            let solution = fit.fit(group)?;
+            Some((fit, solution))
+        }) else {
+            changes.extend(group.iter().map(|pole| Change::NotDetermined(*pole)));
+            continue;
+        };
         let mut doubt = None;
         if search != Search::Nothing {
             solution = fit.without_needless(solution, changes);
@@ -133,9 +141,8 @@ pub(super) fn refine(
             solution,
             doubt,
         });
-        before = after;
     }
-    Some(result)
+    (!result.is_empty()).then_some(result)
 }
 
 /// Splits at the widest gaps until no group is too large.

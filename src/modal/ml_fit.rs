@@ -19,6 +19,8 @@ use super::local_fit::Pole;
 pub(super) const RESIDUAL_TERMS: usize = 6;
 const MAX_ITERATIONS: usize = 30;
 const MIN_DAMPING: f64 = 1e-7;
+/// Smallest eigenvalue of the residual terms' Gram matrix, with columns of unit length.
+const ROUNDING: f64 = 1e-12;
 /// A relative fall of the misfit below this ends the search.
 const SETTLED: f64 = 1e-9;
 
@@ -339,7 +341,12 @@ fn linearise_one(
         column /= *norm;
     }
     let transposed = basis.transpose();
-    let cholesky = (&transposed * &basis).cholesky()?;
+    let mut gram = &transposed * &basis;
+    // Lines near 0 Hz make the lower residual terms all alike: hold back the part of them that rounding would decide.
+    for term in 2 * modes..columns {
+        gram[(term, term)] += ROUNDING;
+    }
+    let cholesky = gram.cholesky()?;
     let mut x = cholesky.solve(&(&transposed * &target));
     let mut residual = &target - &basis * &x;
     // One step of iterative refinement: the normal equations square the condition number.

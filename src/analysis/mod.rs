@@ -14,7 +14,7 @@ pub mod thesis_findings;
 pub use addition::Addition;
 pub use campaign::{CampaignFindings, LobeFindings, PostureFindings, StructureFindings};
 pub use cutting::CuttingAnalysis;
-pub use diagnosis::DiagnosisFindings;
+pub use diagnosis::{CuttingFindings, DiagnosisFindings};
 pub use lobes::{LobeAnalysis, LobeCase};
 pub use modal::{ModalAnalysis, SetModes};
 pub use redundancy::RedundancyAnalysis;

@@ -142,6 +142,7 @@ pub fn run(args: Args) -> Result<Outcome> {
         diagnosis: None,
         postures: Some(Ok(postures)),
         modal: Some(Ok(modal)),
+        cutting_diagnosis: None,
         cutting: Some(Ok(cutting)),
         lobes: Some(Ok(lobes)),
     };

@@ -46,6 +46,8 @@ pub struct CutData {
     /// Per tooth (milling), per revolution (drilling).
     pub feed_mm: f64,
     pub setting: CutSetting,
+    /// Place in the sequence of cuts, where the campaign says it.
+    pub order: Option<i64>,
     pub kind: CutKind,
     /// Recorded x, y, z, torque; `None` where there is no usable channel or the process puts no force on it.
     pub channels: [Option<ForceChannel>; 4],
@@ -387,6 +389,7 @@ fn cut_data(campaign: &Campaign, index: usize, record: &TimeRecord) -> Result<Cu
             feed_mm: feed_mm(&cut.geometry),
             has_vibration: vibration.is_some(),
         },
+        order: campaign.cuts[index].order,
         kind,
         channels,
         orders,

@@ -21,5 +21,6 @@ pub mod structure_section;
 #[cfg(feature = "parquet")]
 pub mod tables;
 pub mod thesis_section;
+pub mod waveform_section;
 
 pub use page::{Block, Column, Figure, Page, Section, Table, Written};

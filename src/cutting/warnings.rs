@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::average_force::ForceAxis;
-use super::group::{Group, distinct};
+use super::estimate::Method;
+use super::group::{Coefficient, Group, distinct};
+use super::identify::CfcOptions;
 use super::outlier::Misfit;
 use super::record::{CutAnalysis, NO_AIR};
 use crate::campaign::{Campaign, Process};
@@ -156,13 +158,115 @@ pub(super) fn of_fits(all: &Group, groups: &[&Group]) -> Vec<String> {
     warnings
 }
 
+/// Bootstrap and regression errors further apart than this factor contradict each other.
+const ERRORS_APART: f64 = 2.5;
+/// The bootstrap's own scatter with fewer cuts allows small values.
+const CUTS_FOR_SMALL_BOOTSTRAP: usize = 10;
+/// A cut with at least this leverage decides a coefficient by itself.
+const ALONE: f64 = 0.95;
+
+/// What robust regression, bootstrap and leverage say about `all` cuts of a process and its groups.
+pub(super) fn of_methods(all: &Group, groups: &[&Group], options: CfcOptions) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let pooled_too = !groups.iter().any(|g| g.cuts == all.cuts);
+    for group in groups.iter().copied().chain(pooled_too.then_some(all)) {
+        let speed = speed_text(group);
+        let determined = || group.coefficients.iter().filter(|c| c.value.is_some());
+        if options.robust && group.method != Method::Huber && group.is_complete() {
+            warnings.push(format!(
+                "at {speed} m/min: too few cuts for robust regression (three more averages on every axis than \
+                 coefficients they carry), least squares is used there"
+            ));
+        }
+        let apart: Vec<String> = determined().filter_map(methods_apart).collect();
+        if !apart.is_empty() {
+            let (this, other, remedy) = match group.method {
+                Method::LeastSquares => (
+                    "least squares",
+                    "robust (Huber) regression",
+                    "; mend or leave out the cuts that do not fit, or use --robust",
+                ),
+                Method::Huber => ("robust (Huber) regression", "least squares", ""),
+            };
+            warnings.push(format!(
+                "at {speed} m/min: {this} and {other} disagree by more than their standard errors ({}): single cuts \
+                 pull the coefficients{remedy}",
+                apart.join(", ")
+            ));
+        }
+        let ratios: Vec<(f64, &Coefficient)> = determined()
+            .filter_map(|c| Some((c.std_error_bootstrap? / c.std_error?, c)))
+            .filter(|(ratio, _)| ratio.is_finite())
+            .collect();
+        let list = |picked: &dyn Fn(f64) -> bool| -> Vec<String> {
+            ratios
+                .iter()
+                .filter(|(ratio, _)| picked(*ratio))
+                .map(|(ratio, c)| format!("{} by {ratio:.1}", c.label))
+                .collect()
+        };
+        let larger = list(&|r| r > ERRORS_APART);
+        if !larger.is_empty() {
+            warnings.push(format!(
+                "at {speed} m/min: drawing the cuts again (bootstrap) gives larger standard errors than the regression \
+                 ({} times): the answer hangs on which cuts were made; trust the larger ones",
+                larger.join(", ")
+            ));
+        }
+        let smaller = list(&|r| r < 1.0 / ERRORS_APART);
+        // Scatter that is allowed for makes the regression's errors larger for a reason of its own.
+        let errors_suffice = group.chi2_per_dof.iter().flatten().all(|c| *c < 1.0);
+        if errors_suffice && !smaller.is_empty() && group.cuts.len() >= CUTS_FOR_SMALL_BOOTSTRAP {
+            warnings.push(format!(
+                "at {speed} m/min: drawing the cuts again (bootstrap) gives smaller standard errors than the regression \
+                 ({} times): the averages agree better than their own errors say",
+                smaller.join(", ")
+            ));
+        }
+        let alone: Vec<&str> = group
+            .influence
+            .iter()
+            .filter(|i| i.leverage >= ALONE)
+            .map(|i| i.cut.as_str())
+            .collect();
+        // With two feeds every cut is; that is told elsewhere.
+        if group.feeds > 2 && !alone.is_empty() {
+            warnings.push(format!(
+                "at {speed} m/min: cut {} alone decides part of the coefficients (leverage near 1), nothing checks it: \
+                 repeat it",
+                alone.join(", ")
+            ));
+        }
+    }
+    warnings
+}
+
+/// `Ktc 930.1 ± 0.8 against 921.0 ± 0.7 N/mm²` where the two methods differ by more than the larger standard error.
+fn methods_apart(c: &Coefficient) -> Option<String> {
+    let (value, error, other) = (c.value?, c.std_error?, c.other_method?);
+    let other_error = other.std_error?;
+    let apart = (value - other.value).abs() > error.max(other_error);
+    apart.then(|| {
+        format!(
+            "{} {value:.2} ± {error:.2} against {:.2} ± {other_error:.2} {}",
+            c.label, other.value, c.unit
+        )
+    })
+}
+
 /// What is implausible or poorly known about one coefficient, over the groups.
 fn of_coefficient(groups: &[&Group], j: usize, warnings: &mut Vec<String>) {
     let (mut negative, mut poor, mut held) = (Vec::new(), Vec::new(), Vec::new());
     for group in groups {
         let (speed, c) = (speed_text(group), &group.coefficients[j]);
         match (c.value, c.std_error) {
-            _ if c.constraint_active => held.push(speed),
+            _ if c.constraint_active => {
+                let free = c.unconstrained.map_or(String::new(), |k| {
+                    let error = k.std_error.map_or(String::new(), |e| format!(" ± {e:.2}"));
+                    format!(" (without it {:.2}{error})", k.value)
+                });
+                held.push(format!("{speed}{free}"));
+            }
             (Some(value), Some(error)) if value < -2.0 * error => {
                 negative.push(format!("{value:.2} at {speed}"));
             }
@@ -198,9 +302,10 @@ fn of_coefficient(groups: &[&Group], j: usize, warnings: &mut Vec<String>) {
     }
     if !held.is_empty() {
         warnings.push(format!(
-            "{} is held at zero by the constraint at {} m/min",
+            "{} is held at zero by the constraint at {} m/min; {}",
             c.label,
-            held.join(", ")
+            held.join(", "),
+            c.unit
         ));
     }
 }

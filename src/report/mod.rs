@@ -22,5 +22,6 @@ pub mod structure_section;
 pub mod tables;
 pub mod thesis_section;
 pub mod waveform_section;
+pub mod thesis_cutting;
 
 pub use page::{Block, Column, Figure, Page, Section, Table, Written};

@@ -2,6 +2,7 @@
 
 mod campaign;
 mod cfc;
+mod cfc_methods;
 mod contract;
 mod demo;
 mod diagnose;

@@ -24,8 +24,9 @@ pub fn run(args: Args) -> Result<Outcome> {
     let options = CfcOptions {
         nonnegative_edges: args.nonnegative_edges,
     };
-    let result = cutting::identify_forces(&campaign, options)?;
-    let waveforms = waveform_groups(&campaign, &result);
+    let mut result = cutting::identify_forces(&campaign, options)?;
+    let (waveforms, warnings) = waveform_groups(&campaign, &result);
+    result.warnings.extend(warnings);
     Ok(Outcome {
         json: document(&campaign, &result, &waveforms),
         text: text(&campaign, &result),

@@ -3,13 +3,15 @@
 use rayon::prelude::*;
 
 use super::average_force::{ForceAxis, average_row};
+use super::faults::read_record;
 use super::group::{Group, Rows, distinct, observations};
 use super::outlier::misfits;
-use super::record::{Average, CutAnalysis, Notice, READER, analyse_cut};
+use super::plausibility;
+use super::record::{Average, CutAnalysis, analyse_cut};
 use super::warnings;
 use crate::campaign::{Campaign, CutGeometry, Process};
 use crate::progress::Progress;
-use crate::{Error, InputError, Result, ingest};
+use crate::{Error, InputError, Result};
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct CfcOptions {
@@ -57,10 +59,9 @@ pub fn identify_forces(campaign: &Campaign, options: CfcOptions) -> Result<CfcRe
 }
 
 fn read_cut(campaign: &Campaign, index: usize) -> Result<CutAnalysis> {
-    let (record, reader_warnings) = ingest::read_time(&campaign.cuts[index].file)?;
+    let (record, notices) = read_record(campaign, index)?;
     let mut analysis = analyse_cut(campaign, index, &record)?;
-    let noticed = |detail| Notice { kind: READER, detail };
-    analysis.notices.extend(reader_warnings.into_iter().map(noticed));
+    analysis.notices.extend(notices);
     Ok(analysis)
 }
 
@@ -95,7 +96,7 @@ pub fn from_analyses(
     }
     turn_torque(&mut cuts, &mut warnings);
     let counted = without_duplicates(campaign, &cuts, &mut warnings);
-    warnings.extend(warnings::of_records(&cuts));
+    warnings.extend(warnings::of_records(campaign, &cuts));
 
     let (mut groups, mut pooled) = (Vec::new(), Vec::new());
     for process in [Process::Milling, Process::Drilling] {
@@ -104,6 +105,7 @@ pub fn from_analyses(
         let Some(all) = Group::fit(&of_process, &rows, options.nonnegative_edges)? else {
             continue;
         };
+        warnings.extend(plausibility::of_scales(campaign, &of_process, process));
         warnings.extend(warnings::of_plan(campaign, &of_process, process));
         for set in by_speed(&of_process, &mut warnings) {
             groups.extend(Group::fit(&set, &rows, options.nonnegative_edges)?);

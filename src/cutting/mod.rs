@@ -2,9 +2,11 @@
 
 mod average_force;
 mod constrained;
+mod faults;
 mod group;
 mod identify;
 mod outlier;
+mod plausibility;
 mod record;
 mod regression;
 mod warnings;
@@ -17,6 +19,7 @@ pub use average_force::{
     coefficients_of, cutting_speed_m_per_min, feed_mm,
 };
 pub use constrained::{Constrained, nonnegative_least_squares};
+pub use faults::read_record;
 pub(crate) use group::by_axis;
 pub use group::{Coefficient, Group, RegressionPoint};
 pub(crate) use identify::depth_mm;
@@ -24,4 +27,4 @@ pub use identify::{CfcOptions, CfcResult, from_analyses, identify_forces};
 pub use outlier::{Misfit, misfits};
 pub use record::{Average, ChannelAnalysis, CutAnalysis, Notice, Trace, analyse_cut};
 pub use regression::{Fit, Observation, fit};
-pub(crate) use warnings::speed_text;
+pub(crate) use warnings::{of_faults, speed_text};

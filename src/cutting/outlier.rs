@@ -13,7 +13,27 @@ pub struct Misfit {
     pub measured: f64,
     /// From the fit to all other cuts.
     pub predicted: f64,
+    /// All averages of the cut: axis, measured, predicted.
+    pub averages: Vec<(ForceAxis, f64, f64)>,
 }
+
+impl Misfit {
+    /// Two force axes whose averages are those predicted for each other, signs aside: swapped plugs.
+    pub fn swapped(&self) -> Option<[ForceAxis; 2]> {
+        let forces: Vec<_> = self.averages.iter().filter(|a| a.0 != ForceAxis::Mz).collect();
+        let largest = forces.iter().map(|a| a.2.abs()).fold(0.0, f64::max);
+        let is = |measured: f64, predicted: f64| (measured.abs() - predicted.abs()).abs() < ALIKE * largest;
+        forces.iter().enumerate().find_map(|(i, a)| {
+            let crossed = forces[i + 1..]
+                .iter()
+                .find(|b| is(a.1, b.2) && is(b.1, a.2) && !is(a.2, b.2));
+            crossed.map(|b| [a.0, b.0])
+        })
+    }
+}
+
+/// Averages nearer than this part of the largest are alike.
+const ALIKE: f64 = 0.08;
 
 /// Chance, over all cuts and axes together, of calling a good cut a misfit.
 const FALSE_ALARM: f64 = 0.01;
@@ -34,11 +54,15 @@ pub fn misfits(observations: &[Observation]) -> Vec<Misfit> {
         if !others.inseparable.is_empty() {
             continue;
         }
+        let predict =
+            |o: &Observation| -> f64 { o.row.iter().zip(&others.solution).map(|(r, x)| r * x).sum() };
+        let averages: Vec<(ForceAxis, f64, f64)> =
+            out.iter().map(|o| (o.axis, o.value, predict(o))).collect();
         let worst = out
             .iter()
             .filter_map(|o| {
                 let a = o.axis.index();
-                let predicted: f64 = o.row.iter().zip(&others.solution).map(|(r, x)| r * x).sum();
+                let predicted = predict(o);
                 let on_axis = rest.iter().filter(|r| r.axis == o.axis).count() as f64;
                 // Unknowns shared over the axes that carry them.
                 let axes = 1.0
@@ -66,6 +90,7 @@ pub fn misfits(observations: &[Observation]) -> Vec<Misfit> {
                         axis: o.axis,
                         measured: o.value,
                         predicted,
+                        averages: averages.clone(),
                     };
                     (off / largest, misfit)
                 })

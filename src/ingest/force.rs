@@ -1,5 +1,7 @@
 //! Time records from text: DynoWare exports and plain force tables. Channel roles, units, time axis.
 
+use std::ops::Range;
+
 use super::InputError;
 use super::number;
 use super::table::{Header, Table};
@@ -32,12 +34,12 @@ pub(super) fn read(bytes: &[u8], header: &Header, notes: &mut Notes) -> Result<T
     if samples < 2 {
         return Err(InputError::new("a time record of less than two samples").line(header.data_line));
     }
-    let (sample_rate_hz, start_s) = match &time {
+    let (sample_rate_hz, start_s, gaps) = match &time {
         Some((_, seconds)) => time_axis(seconds, resolution, rate, header, notes)?,
         None => {
             let rate = rate.ok_or_else(|| no_time(header))?;
             notes.file("no time column: time from the sampling rate, starting at 0 s");
-            (rate, 0.0)
+            (rate, 0.0, Vec::new())
         }
     };
     if !(sample_rate_hz.is_finite() && start_s.is_finite()) {
@@ -49,8 +51,12 @@ pub(super) fn read(bytes: &[u8], header: &Header, notes: &mut Notes) -> Result<T
         .into_iter()
         .enumerate()
         .filter(|(i, _)| Some(*i) != skip);
+    let mut filled = Vec::new();
     let channels = columns
-        .map(|(i, values)| channel(header, i, values, notes))
+        .map(|(i, mut values)| {
+            filled = fill(&mut values, &gaps);
+            channel(header, i, values, notes)
+        })
         .collect::<Result<Vec<Channel>, _>>()?;
     if channels.is_empty() {
         return Err(InputError::new("a time column and no channel beside it").line(header.data_line));
@@ -69,7 +75,42 @@ pub(super) fn read(bytes: &[u8], header: &Header, notes: &mut Notes) -> Result<T
         sample_rate_hz,
         start_s,
         channels,
+        filled,
     })
+}
+
+/// A place where samples are missing: those behind sample `after`, so many.
+#[derive(Debug, Clone, Copy)]
+struct Gap {
+    after: usize,
+    missing: usize,
+}
+
+/// Puts a straight line into the gaps; gives where it now runs.
+fn fill(values: &mut Vec<f64>, gaps: &[Gap]) -> Vec<Range<usize>> {
+    if gaps.is_empty() {
+        return Vec::new();
+    }
+    let missing: usize = gaps.iter().map(|g| g.missing).sum();
+    let mut whole = Vec::with_capacity(values.len() + missing);
+    let (mut filled, mut done) = (Vec::new(), 0);
+    for gap in gaps {
+        let Some([from, to]) = values
+            .get(gap.after..gap.after + 2)
+            .and_then(|v| v.first_chunk::<2>())
+        else {
+            continue;
+        };
+        whole.extend_from_slice(&values[done..=gap.after]);
+        done = gap.after + 1;
+        let start = whole.len();
+        let step = (to - from) / (gap.missing + 1) as f64;
+        whole.extend((1..=gap.missing).map(|k| from + step * k as f64));
+        filled.push(start..whole.len());
+    }
+    whole.extend_from_slice(&values[done..]);
+    *values = whole;
+    filled
 }
 
 fn no_time(header: &Header) -> InputError {
@@ -286,7 +327,7 @@ fn time_axis(
     header_rate: Option<f64>,
     header: &Header,
     notes: &mut Notes,
-) -> Result<(f64, f64), InputError> {
+) -> Result<(f64, f64, Vec<Gap>), InputError> {
     let start = seconds[0];
     let (own, rounding_s) = own_step(seconds, resolution);
     if !(own.is_finite() && own > 0.0) {
@@ -294,7 +335,7 @@ fn time_axis(
         return match header_rate {
             Some(rate) if seconds.is_sorted() && resolution * rate > 1.0 => {
                 notes.file("the printed time is too coarse: time from the sampling rate");
-                Ok((rate, start))
+                Ok((rate, start, Vec::new()))
             }
             _ => Err(error.remedy("the time column must rise from row to row")),
         };
@@ -313,8 +354,7 @@ fn time_axis(
             rounded_rate(own, rounding)
         }
     };
-    report_gaps(seconds, 1.0 / rate, rounding_s, notes);
-    Ok((rate, start))
+    Ok((rate, start, find_gaps(seconds, 1.0 / rate, rounding_s, notes)))
 }
 
 /// Step of the time column and what rounding of the printed times is left in it. Where nearly all steps agree the
@@ -353,27 +393,50 @@ fn rounded_rate(step: f64, rounding: f64) -> f64 {
     }
 }
 
-/// Says where samples are missing or time runs backwards.
-fn report_gaps(seconds: &[f64], step: f64, resolution: f64, notes: &mut Notes) {
+/// Gaps may add up to this part of a record; beyond it the time column is something else than a clock.
+const FILL_AT_MOST: f64 = 0.1;
+
+/// Where samples are missing; says so, and where time runs backwards. None are given where they cannot be filled.
+fn find_gaps(seconds: &[f64], step: f64, resolution: f64, notes: &mut Notes) -> Vec<Gap> {
     let slack = 0.5 * step + 1.01 * resolution;
-    let (mut missing, mut gaps, mut first, mut backwards) = (0.0, 0, None, 0);
-    for pair in seconds.windows(2) {
+    let (mut missing, mut gaps, mut backwards) = (0.0, Vec::new(), 0);
+    for (after, pair) in seconds.windows(2).enumerate() {
         let jump = pair[1] - pair[0];
         if jump > step + slack {
-            missing += (jump / step).round() - 1.0;
-            gaps += 1;
-            first = first.or(Some(pair[0]));
+            let count = (jump / step).round() - 1.0;
+            missing += count;
+            gaps.push(Gap {
+                after,
+                missing: count as usize,
+            });
         } else if jump < -1.01 * resolution.max(1e-12) {
             backwards += 1;
         }
     }
-    if let Some(first) = first {
-        notes.file(format!(
-            "{missing:.0} samples dropped at {gaps} places (the first after {first:.6} s): times behind them are early"
-        ));
-    }
     if backwards > 0 {
         notes.file(format!("the time column runs backwards at {backwards} places"));
+    }
+    let Some(first) = gaps.first() else { return gaps };
+    let places = if gaps.len() == 1 {
+        "at 1 place".to_owned()
+    } else {
+        format!("at {} places", gaps.len())
+    };
+    let where_from = format!(
+        "{missing:.0} samples dropped {places} (the first after {:.6} s)",
+        seconds[first.after]
+    );
+    if backwards == 0 && missing <= FILL_AT_MOST * seconds.len() as f64 {
+        notes.file(format!(
+            "{where_from}: the gaps are filled, so that times behind them are right (cfc puts the revolutions beside in their place); \
+             record to a faster disk or at a lower rate"
+        ));
+        gaps
+    } else {
+        notes.file(format!(
+            "{where_from}: too many to fill, times behind them are early; record again"
+        ));
+        Vec::new()
     }
 }
 

@@ -408,6 +408,8 @@ pub struct TimeRecord {
     /// Time of the first sample, s.
     pub start_s: f64,
     pub channels: Vec<Channel>,
+    /// Samples that the recorder dropped: stretches filled by a straight line, so that the times behind them are right.
+    pub filled: Vec<std::ops::Range<usize>>,
 }
 
 impl TimeRecord {

@@ -425,11 +425,11 @@ mod tests {
         for (found, what) in [
             (
                 warnings(|v| v.iter_mut().for_each(|v| *v = v.min(180.0))),
-                "Fx: clipped at 180 N: ",
+                "Fx: clipped at 180.0 N: ",
             ),
             (
                 warnings(|v| v[1000..1050].fill(12.0)),
-                "Fx: 50 samples stuck at 12 N from 1.0000 s",
+                "Fx: 50 samples stuck at 12.00 N from 1.0000 s",
             ),
             (warnings(|v| v.fill(1.0)), "Fx: the same value"),
             (

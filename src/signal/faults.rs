@@ -45,13 +45,14 @@ pub fn find_faults(samples: &[f64]) -> Faults {
         };
     }
     let spikes = spikes(samples);
-    if repeats_by_nature(samples) {
+    let range = extremes(samples, &spikes);
+    if repeats_by_nature(samples, range) {
         return Faults {
             spikes,
             ..Faults::default()
         };
     }
-    let clipping = clipping(samples, &spikes);
+    let clipping = clipping(samples, range);
     let clipped = |run: &Range<usize>| clipping.as_ref().is_some_and(|c| c.plateaus.contains(run));
     let stuck = runs(samples)
         .filter(|run| run.len() >= STUCK && !clipped(run))
@@ -83,8 +84,7 @@ const STRETCHES_AT_MOST: usize = 50;
 
 /// Signals of few digits repeat values by nature: nothing can be said about plateaus and rests there. A long stretch
 /// speaks for that only where its value is seen elsewhere too, as the zeros of coarse quiet air are.
-fn repeats_by_nature(samples: &[f64]) -> bool {
-    let (low, high) = extremes(samples.iter());
+fn repeats_by_nature(samples: &[f64], (low, high): (f64, f64)) -> bool {
     let (mut repeats, mut stretches) = (0, Vec::new());
     for run in runs(samples) {
         if run.len() >= STUCK {
@@ -108,22 +108,18 @@ fn repeats_by_nature(samples: &[f64]) -> bool {
     10 * (repeats + natural) > samples.len()
 }
 
-fn extremes<'a>(samples: impl Iterator<Item = &'a f64>) -> (f64, f64) {
-    samples.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+/// Least and greatest value; `spikes` do not count.
+fn extremes(samples: &[f64], spikes: &[Range<usize>]) -> (f64, f64) {
+    let starts = std::iter::once(0).chain(spikes.iter().map(|s| s.end));
+    let ends = spikes.iter().map(|s| s.start).chain([samples.len()]);
+    let sound = starts.zip(ends).flat_map(|(from, to)| &samples[from..to]);
+    sound.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
         (low.min(*v), high.max(*v))
     })
 }
 
-/// At least two plateaus at an extreme value; `spikes` do not count as extremes.
-fn clipping(samples: &[f64], spikes: &[Range<usize>]) -> Option<Clipping> {
-    let mut next = spikes.iter().peekable();
-    let sound = samples.iter().enumerate().filter_map(|(i, v)| {
-        while next.peek().is_some_and(|r| r.end <= i) {
-            next.next();
-        }
-        (!next.peek().is_some_and(|r| r.contains(&i))).then_some(v)
-    });
-    let (low, high) = extremes(sound);
+/// At least two plateaus at one of the extreme values.
+fn clipping(samples: &[f64], (low, high): (f64, f64)) -> Option<Clipping> {
     [high, low].into_iter().find_map(|level| {
         let plateaus: Vec<Range<usize>> = runs(samples)
             .filter(|run| run.len() >= PLATEAU && samples[run.start] == level)

@@ -4,7 +4,8 @@
     python3 scripts/bench_force_log.py [--mb 1000] [--repeat 3] [--lobestone PATH] [--keep FILE] [--cfc]
 
 Makes the log itself: 10 kHz, time and four channels, DynoWare header, air before and after a cut. Prints the time (best of
-the repeats), the throughput and the peak memory of each program, and their ratios. pandas only reads; `inspect` reads and
+the repeats), the throughput, the peak memory and the processor time (all cores; it says more on a busy machine) of each
+program, and their ratios. pandas only reads; `inspect` reads and
 looks for faults as well. Each run is a process of its own, start included for both. With --cfc the log is also the one
 record of a campaign.
 """
@@ -66,13 +67,13 @@ def make(file, megabytes):
 
 
 def run(command):
-    """Wall time in s and peak resident memory in MB of a process."""
+    """Wall time in s, peak resident memory in MB and processor time in s of a process."""
     started = time.perf_counter()
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     _, status, usage = os.wait4(process.pid, 0)
     if status != 0:
         sys.exit(f"failed: {' '.join(command)}")
-    return time.perf_counter() - started, usage.ru_maxrss / 1000
+    return time.perf_counter() - started, usage.ru_maxrss / 1000, usage.ru_utime + usage.ru_stime
 
 
 def main():
@@ -102,9 +103,10 @@ def main():
         results = {}
         for name, command in commands.items():
             runs = [run(command) for _ in range(options.repeat)]
-            results[name] = (min(r[0] for r in runs), max(r[1] for r in runs))
-            seconds, memory = results[name]
-            print(f"{name:18} {seconds:7.2f} s  {size / seconds:6.0f} MB/s  peak {memory:6.0f} MB")
+            results[name] = (min(r[0] for r in runs), max(r[1] for r in runs), min(r[2] for r in runs))
+            seconds, memory, busy = results[name]
+            rate = f"{seconds:7.2f} s  {size / seconds:6.0f} MB/s"
+            print(f"{name:18} {rate}  peak {memory:6.0f} MB  processor {busy:6.2f} s")
         pandas = results["pandas.read_csv"]
         ours = results["lobestone inspect"]
         print(f"inspect is {pandas[0] / ours[0]:.1f} times as fast as pandas and takes {ours[1] / pandas[1]:.2f} of its memory")

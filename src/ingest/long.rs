@@ -18,7 +18,7 @@ const PIECE: usize = 64 << 20;
 /// A file that was read, or one that is read piece by piece.
 pub(super) enum Opened {
     Read(MeasurementFile),
-    Long(LongRecord),
+    Long(Box<LongRecord>),
 }
 
 /// A time table of more than [`PIECE`] bytes.
@@ -108,7 +108,7 @@ fn open_by(path: &Path, piece: usize) -> Result<Opened> {
     {
         let (format, why, pieces, notes) = long;
         let line = pieces.header.data_line;
-        return Ok(Opened::Long(LongRecord {
+        return Ok(Opened::Long(Box::new(LongRecord {
             path: path.to_path_buf(),
             file,
             bytes,
@@ -125,7 +125,7 @@ fn open_by(path: &Path, piece: usize) -> Result<Opened> {
                 format!("reading {}", path.display()),
                 bytes.div_ceil(piece as u64) as usize,
             ),
-        }));
+        })));
     }
     file.read_to_end(&mut head).map_err(refused)?;
     let is_dwd_named = is_dwd_named(path);

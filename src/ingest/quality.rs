@@ -95,7 +95,8 @@ impl QualityCheck {
             let time = |sample: usize| piece.start_s + sample as f64 / piece.sample_rate_hz;
             let value = |sample: usize| samples[sample];
             if faults.dead && !first_piece && !samples.is_empty() {
-                found.stuck.add(&[0..samples.len()], time, value);
+                let whole = 0..samples.len();
+                found.stuck.add(std::slice::from_ref(&whole), time, value);
             }
             found.alive = true;
             found.spikes.add(&faults.spikes, time, value);

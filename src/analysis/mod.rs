@@ -2,6 +2,7 @@
 
 pub mod addition;
 pub mod campaign;
+pub mod channel_check;
 pub mod cutting;
 pub mod diagnosis;
 pub mod lobes;

@@ -30,8 +30,9 @@ pub fn run(args: Args) -> Result<Outcome> {
         nonnegative_edges: args.nonnegative_edges,
         robust: args.robust,
     };
-    let result = cutting::identify_forces(&campaign, options)?;
-    let waveforms = waveform_groups(&campaign, &result);
+    let mut result = cutting::identify_forces(&campaign, options)?;
+    let (waveforms, warnings) = waveform_groups(&campaign, &result);
+    result.warnings.extend(warnings);
     Ok(Outcome {
         json: document(&campaign, &result, &waveforms),
         text: text(&campaign, &result),

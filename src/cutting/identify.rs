@@ -3,15 +3,17 @@
 use rayon::prelude::*;
 
 use super::average_force::{ForceAxis, average_row};
+use super::faults::read_record;
 use super::group::{Group, Rows, distinct, observations};
 use super::orthogonal::{Prediction, predict};
 use super::outlier::misfits;
-use super::record::{Average, CutAnalysis, Notice, READER, analyse_cut};
+use super::plausibility;
+use super::record::{Average, CutAnalysis, analyse_cut};
 use super::series::{MaterialComparison, Series, SpeedTrends, compare, speed_trends};
 use super::warnings;
 use crate::campaign::{Campaign, CutGeometry, Process};
 use crate::progress::Progress;
-use crate::{Error, InputError, Result, ingest};
+use crate::{Error, InputError, Result};
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct CfcOptions {
@@ -67,10 +69,9 @@ pub fn identify_forces(campaign: &Campaign, options: CfcOptions) -> Result<CfcRe
 }
 
 fn read_cut(campaign: &Campaign, index: usize) -> Result<CutAnalysis> {
-    let (record, reader_warnings) = ingest::read_time(&campaign.cuts[index].file)?;
+    let (record, notices) = read_record(campaign, index)?;
     let mut analysis = analyse_cut(campaign, index, &record)?;
-    let noticed = |detail| Notice { kind: READER, detail };
-    analysis.notices.extend(reader_warnings.into_iter().map(noticed));
+    analysis.notices.extend(notices);
     Ok(analysis)
 }
 
@@ -105,7 +106,7 @@ pub fn from_analyses(
     }
     turn_torque(&mut cuts, &mut warnings);
     let counted = without_duplicates(campaign, &cuts, &mut warnings);
-    warnings.extend(warnings::of_records(&cuts));
+    warnings.extend(warnings::of_records(campaign, &cuts));
 
     let (mut groups, mut pooled) = (Vec::new(), Vec::new());
     let (mut trends, mut materials) = (Vec::new(), Vec::new());
@@ -128,9 +129,8 @@ pub fn from_analyses(
             let Some(all) = Group::fit(&one.cuts, one.material, &rows, options)? else {
                 continue;
             };
-            let mut told: Vec<String> = warnings::of_plan(campaign, &one.cuts, process)
-                .into_iter()
-                .collect();
+            let mut told = plausibility::of_scales(campaign, &one.cuts, process);
+            told.extend(warnings::of_plan(campaign, &one.cuts, process));
             let first_group = groups.len();
             for set in by_speed(&one.cuts, &mut told) {
                 groups.extend(Group::fit(&set, one.material, &rows, options)?);

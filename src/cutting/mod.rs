@@ -3,10 +3,12 @@
 mod average_force;
 mod conic;
 mod estimate;
+mod faults;
 mod group;
 mod identify;
 mod orthogonal;
 mod outlier;
+mod plausibility;
 mod record;
 mod regression;
 mod series;
@@ -22,6 +24,7 @@ pub use average_force::{
 };
 pub use conic::{ConicFit, Loss, conic_fit};
 pub use estimate::{BOOTSTRAP_CUTS, BOOTSTRAP_DRAWS, Estimate, HUBER_THRESHOLD, Method, bootstrap, estimate};
+pub use faults::read_record;
 pub(crate) use group::by_axis;
 pub use group::{Coefficient, Group, Influence, Known, RegressionPoint};
 pub(crate) use identify::depth_mm;
@@ -32,4 +35,4 @@ pub use record::{Average, ChannelAnalysis, CutAnalysis, Notice, Trace, analyse_c
 pub use regression::{Fit, Observation, fit};
 pub use series::{MaterialComparison, SpeedTrends};
 pub use trend::{Change, Reading, table_trend};
-pub(crate) use warnings::speed_text;
+pub(crate) use warnings::{of_faults, speed_text};

@@ -14,7 +14,27 @@ pub struct Misfit {
     pub measured: f64,
     /// From the fit to all other cuts.
     pub predicted: f64,
+    /// All averages of the cut: axis, measured, predicted.
+    pub averages: Vec<(ForceAxis, f64, f64)>,
 }
+
+impl Misfit {
+    /// Two force axes whose averages are those predicted for each other, signs aside: swapped plugs.
+    pub fn swapped(&self) -> Option<[ForceAxis; 2]> {
+        let forces: Vec<_> = self.averages.iter().filter(|a| a.0 != ForceAxis::Mz).collect();
+        let largest = forces.iter().map(|a| a.2.abs()).fold(0.0, f64::max);
+        let is = |measured: f64, predicted: f64| (measured.abs() - predicted.abs()).abs() < ALIKE * largest;
+        forces.iter().enumerate().find_map(|(i, a)| {
+            let crossed = forces[i + 1..]
+                .iter()
+                .find(|b| is(a.1, b.2) && is(b.1, a.2) && !is(a.2, b.2));
+            crossed.map(|b| [a.0, b.0])
+        })
+    }
+}
+
+/// Averages nearer than this part of the largest are alike.
+const ALIKE: f64 = 0.08;
 
 /// Chance, over all cuts and axes together, of calling a good cut a misfit.
 const FALSE_ALARM: f64 = 0.01;
@@ -110,18 +130,23 @@ pub fn misfits(observations: &[Observation]) -> Vec<Misfit> {
                     .then(b.1.studentized.abs().total_cmp(&a.1.studentized.abs()))
             });
         let Some((chance, worst)) = worst else { break };
+        let out: Vec<Observation> = rest.iter().filter(|o| o.cut == worst.cut).cloned().collect();
         rest.retain(|o| o.cut != worst.cut);
-        taken.push(worst);
+        let others = fit(&rest);
+        let predicted = |o: &Observation| Some((o.axis, o.value, others.as_ref()?.predict(&o.row)));
+        let averages = out.iter().filter_map(predicted).collect();
+        taken.push((worst, averages));
         if chance * (rest.len() + 1) as f64 <= FALSE_ALARM {
             last_unlikely = taken.len();
         }
     }
     taken.truncate(last_unlikely);
-    let misfit = |d: Deleted| Misfit {
+    let misfit = |(d, averages): (Deleted, Vec<(ForceAxis, f64, f64)>)| Misfit {
         cut: d.cut,
         axis: d.axis,
         measured: d.measured,
         predicted: d.predicted,
+        averages,
     };
     taken.into_iter().map(misfit).collect()
 }

@@ -7,24 +7,38 @@ use super::estimate::Method;
 use super::group::{Coefficient, Group, distinct};
 use super::identify::CfcOptions;
 use super::outlier::Misfit;
-use super::record::{CutAnalysis, NO_AIR};
+use super::plausibility::unit_slip;
+use super::record::{CutAnalysis, NO_AIR, Notice, WRONG_SPEED};
 use crate::campaign::{Campaign, Process};
 
 /// Notices of all records, one sentence a kind.
-pub(super) fn of_records(cuts: &[CutAnalysis]) -> Vec<String> {
+pub(super) fn of_records(campaign: &Campaign, cuts: &[CutAnalysis]) -> Vec<String> {
+    let common = common_speed_error(campaign, cuts);
+    let told = |notice: &&Notice| common.is_none() || notice.kind != WRONG_SPEED;
+    let notices = cuts
+        .iter()
+        .flat_map(|c| c.notices.iter().filter(told).map(|n| (c.id.as_str(), n)));
+    common
+        .iter()
+        .cloned()
+        .chain(sentences(notices, cuts.len()))
+        .collect()
+}
+
+/// As [`of_records`], for the notices that [`super::read_record`] gives of `cuts` records.
+pub(crate) fn of_faults(notices: &[(String, Notice)], cuts: usize) -> Vec<String> {
+    sentences(notices.iter().map(|(id, n)| (id.as_str(), n)), cuts)
+}
+
+fn sentences<'a>(notices: impl Iterator<Item = (&'a str, &'a Notice)>, cuts: usize) -> Vec<String> {
     let mut by_kind: BTreeMap<&str, Vec<(&str, &str)>> = BTreeMap::new();
-    for cut in cuts {
-        for notice in &cut.notices {
-            by_kind
-                .entry(notice.kind)
-                .or_default()
-                .push((&cut.id, &notice.detail));
-        }
+    for (id, notice) in notices {
+        by_kind.entry(notice.kind).or_default().push((id, &notice.detail));
     }
     let sentence = |(kind, told): (&str, Vec<(&str, &str)>)| {
         let mut ids: Vec<&str> = told.iter().map(|(id, _)| *id).collect();
         ids.dedup();
-        if kind == NO_AIR && ids.len() == cuts.len() {
+        if kind == NO_AIR && ids.len() == cuts {
             return format!("all cuts: {kind}");
         }
         let one = |(id, detail): &(&str, &str)| match *detail {
@@ -41,6 +55,31 @@ pub(super) fn of_records(cuts: &[CutAnalysis]) -> Vec<String> {
         format!("cut {list}: {kind}")
     };
     by_kind.into_iter().map(sentence).collect()
+}
+
+/// Where the tooth-passing line of every cut is off by one factor, it is not the operator's speeds that are wrong.
+fn common_speed_error(campaign: &Campaign, cuts: &[CutAnalysis]) -> Option<String> {
+    let teeth = campaign.tool.as_ref()?.teeth.max(1);
+    let milled = || cuts.iter().filter(|c| c.process == Process::Milling);
+    let factors: Vec<f64> = milled()
+        .filter_map(|c| c.tooth_line.filter(|l| l.speed_is_doubtful()).map(|l| (c, l)))
+        .map(|(c, line)| line.tooth_hz * 60.0 / (c.spindle_rpm * teeth as f64))
+        .collect();
+    let factor = crate::signal::median(&factors);
+    let same = factors.len() >= 2 && factors.len() == milled().count();
+    if !same || factors.iter().any(|f| (f / factor - 1.0).abs() > 0.01) {
+        return None;
+    }
+    let other_teeth = (teeth as f64 * factor).round();
+    let teeth_text = if (teeth as f64 * factor / other_teeth - 1.0).abs() < 0.01 {
+        format!("the tool has {other_teeth} teeth and not {teeth}, or ")
+    } else {
+        String::new()
+    };
+    Some(format!(
+        "all cuts: the tooth-passing line stands at {factor:.3} times the frequency that spindle_rpm and {teeth} teeth give: \
+         {teeth_text}the sampling rate in the files is wrong by that factor, or every spindle_rpm is"
+    ))
 }
 
 /// Cells of a speed × feed plan that stayed empty, where there clearly was a plan.
@@ -86,9 +125,21 @@ pub(super) fn of_plan(campaign: &Campaign, cuts: &[&CutAnalysis], process: Proce
 /// A cut that the others do not predict.
 pub(super) fn of_misfit(campaign: &Campaign, misfit: &Misfit) -> String {
     let unit = misfit.axis.unit();
+    let slip = match (
+        misfit.swapped(),
+        unit_slip(misfit.measured / misfit.predicted, misfit.axis),
+    ) {
+        (Some([a, b]), _) => format!(
+            " ({} and {} look swapped: plugs or column names?)",
+            a.label(),
+            b.label()
+        ),
+        (None, Some(slip)) => format!(" ({slip}?)"),
+        (None, None) => String::new(),
+    };
     format!(
-        "cut {} does not fit the others: {} {:.2} {unit} measured, {:.2} {unit} from the other cuts; check its feed, \
-         speed, depth and file",
+        "cut {} does not fit the others: {} {:.2} {unit} measured, {:.2} {unit} from the other cuts{slip}; check its feed, \
+         speed, depth, file and units",
         campaign.cuts[misfit.cut].id,
         misfit.axis.label(),
         misfit.measured,

@@ -360,6 +360,7 @@ fn records(objects: Vec<Object>, notes: &mut Notes) -> Result<Vec<TimeRecord>, I
         match same {
             Some(record) => record.channels.push(channel),
             None => records.push(TimeRecord {
+                filled: Vec::new(),
                 sample_rate_hz: rate,
                 start_s,
                 channels: vec![channel],

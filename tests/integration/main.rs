@@ -8,6 +8,7 @@ mod demo;
 mod diagnose;
 mod inspect;
 mod modal;
+mod records;
 mod report;
 mod revisions;
 mod robustness;

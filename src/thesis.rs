@@ -19,8 +19,11 @@ use crate::robot::{PostureReport, RobotModel, RobotSpec};
 use crate::{Error, Result};
 
 mod answer;
+mod cutting_reading;
+pub mod cutting_tables;
 pub mod real_case;
 
+pub use cutting_tables::{CuttingTables, cutting_tables};
 pub use real_case::{RealCase, real_case};
 
 const STATIC_STIFFNESS: &str = include_str!("../datasets/irb6640/static_stiffness.csv");
@@ -82,6 +85,8 @@ pub struct CaseStudy {
     pub real_case: RealCase,
     /// Table 30.
     pub lobes: Vec<LobeRow>,
+    /// Tables 20 and 23.
+    pub cutting: CuttingTables,
 }
 
 /// Table 30 for one configuration: tips of the stability envelope and the absolute limit.
@@ -253,6 +258,7 @@ pub fn case_study() -> Result<CaseStudy> {
         unexplained: unexplained(&model, &fit.theta)?,
         real_case: real_case(&model)?,
         lobes: lobe_rows(&model, &nominal, &fit.theta)?,
+        cutting: cutting_tables()?,
     })
 }
 

@@ -1,7 +1,7 @@
 //! Everything that can be said about a campaign, each part on its own: one that fails takes no other with it.
 
 use super::stick_shapes::{self, StickShape};
-use super::{DiagnosisFindings, LobeAnalysis, ModalAnalysis, StructureAnalysis};
+use super::{CuttingFindings, DiagnosisFindings, LobeAnalysis, ModalAnalysis, StructureAnalysis};
 use crate::campaign::{Campaign, LobeSource};
 use crate::cutting::{CfcOptions, CfcResult, identify_forces};
 use crate::identify::case::structure_model;
@@ -22,6 +22,8 @@ pub struct CampaignFindings<'a> {
     /// Shapes of the posture that shows most modes, on the robot.
     pub mode_shapes: Vec<StickShape>,
     pub cutting: Option<Result<CfcResult>>,
+    /// What the force model lacks, where that was asked for.
+    pub cutting_diagnosis: Option<Result<CuttingFindings>>,
     pub lobes: Option<Result<LobeFindings>>,
 }
 
@@ -48,18 +50,21 @@ pub struct LobeFindings {
 }
 
 impl<'a> CampaignFindings<'a> {
-    /// Works out all parts; `diagnosis`, which takes longest, where wanted.
+    /// Works out all parts; the diagnoses, which take longest, where `wanted`.
     ///
     /// # Errors
     /// The campaign holds nothing to work on, or every part failed.
-    pub fn run(campaign: &'a Campaign, diagnosis: bool) -> Result<Self> {
+    pub fn run(campaign: &'a Campaign, wanted: bool) -> Result<Self> {
         // FRFs without a robot are to be had, too: for their modes.
         let modelled = !campaign.frfs.is_empty() && campaign.robot.is_some();
         let structure = modelled.then(|| StructureFindings::run(campaign));
         let calibrated = structure.as_ref().and_then(|s| s.as_ref().ok());
         // Where nothing can be calibrated nothing can be diagnosed, for the same reason.
         let diagnosis =
-            (diagnosis && calibrated.is_some()).then(|| DiagnosisFindings::run(campaign, Options::default()));
+            (wanted && calibrated.is_some()).then(|| DiagnosisFindings::run(campaign, Options::default()));
+        let cutting = (!campaign.cuts.is_empty()).then(|| identify_forces(campaign, CfcOptions::default()));
+        let cutting_diagnosis =
+            (wanted && matches!(cutting, Some(Ok(_)))).then(|| CuttingFindings::run(campaign));
         let postures = (campaign.robot.is_some() && !campaign.postures.is_empty())
             .then(|| PostureFindings::run(campaign, calibrated));
         let modal = (!campaign.frfs.is_empty()).then(|| ModalAnalysis::run(campaign));
@@ -73,7 +78,8 @@ impl<'a> CampaignFindings<'a> {
                 _ => Vec::new(),
             },
             modal,
-            cutting: (!campaign.cuts.is_empty()).then(|| identify_forces(campaign, CfcOptions::default())),
+            cutting,
+            cutting_diagnosis,
             lobes: campaign.lobes.is_some().then(|| LobeFindings::run(campaign)),
         };
         findings.checked()
@@ -122,6 +128,7 @@ impl<'a> CampaignFindings<'a> {
             self.postures.as_ref().and_then(|r| r.as_ref().err()),
             self.modal.as_ref().and_then(|r| r.as_ref().err()),
             self.cutting.as_ref().and_then(|r| r.as_ref().err()),
+            self.cutting_diagnosis.as_ref().and_then(|r| r.as_ref().err()),
             self.lobes.as_ref().and_then(|r| r.as_ref().err()),
         ];
         let mut messages: Vec<String> = Vec::new();
@@ -149,6 +156,10 @@ impl<'a> CampaignFindings<'a> {
 
     pub fn cutting(&self) -> Option<&CfcResult> {
         self.cutting.as_ref().and_then(|r| r.as_ref().ok())
+    }
+
+    pub fn cutting_diagnosis(&self) -> Option<&CuttingFindings> {
+        self.cutting_diagnosis.as_ref().and_then(|r| r.as_ref().ok())
     }
 
     pub fn lobes(&self) -> Option<&LobeFindings> {

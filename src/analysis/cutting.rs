@@ -2,6 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
+use super::channel_check::wrong_channels;
 use crate::Result;
 use crate::campaign::{Campaign, Process};
 use crate::cutting::{CfcResult, Group};
@@ -77,13 +78,17 @@ fn warnings_of(calibration: &Calibration) -> Vec<String> {
 
 /// Coefficients of each of `result`'s groups from the whole waveform: `{key: {value, std_error}, nrms, noise_floor_nrms,
 /// chi2_per_value, converged}`; null where the waveform does not determine a coefficient. One entry a group, null where
-/// its waveforms cannot be fitted.
-pub fn waveform_groups(campaign: &Campaign, result: &CfcResult) -> Vec<Value> {
+/// its waveforms cannot be fitted. And what the waveforms say about channels that are wrong in all records.
+pub fn waveform_groups(campaign: &Campaign, result: &CfcResult) -> (Vec<Value>, Vec<String>) {
     let loaded: Vec<(Process, Option<CuttingData>)> = processes(campaign)
         .into_iter()
         .map(|p| (p, CuttingData::load(campaign, p).ok()))
         .collect();
-    result
+    let warnings = loaded
+        .iter()
+        .filter_map(|(_, data)| wrong_channels(data.as_ref()?, &result.pooled))
+        .collect();
+    let groups = result
         .groups
         .iter()
         .map(|group| {
@@ -94,7 +99,8 @@ pub fn waveform_groups(campaign: &Campaign, result: &CfcResult) -> Vec<Value> {
             data.and_then(|data| waveform_group(data, group).ok())
                 .unwrap_or(Value::Null)
         })
-        .collect()
+        .collect();
+    (groups, warnings)
 }
 
 fn waveform_group(data: &CuttingData, group: &Group) -> Result<Value> {

@@ -2,6 +2,7 @@
 
 pub mod addition;
 pub mod campaign;
+pub mod channel_check;
 pub mod cutting;
 pub mod diagnosis;
 pub mod lobes;
@@ -16,7 +17,7 @@ pub mod thesis_findings;
 pub use addition::Addition;
 pub use campaign::{CampaignFindings, LobeFindings, PostureFindings, StructureFindings};
 pub use cutting::CuttingAnalysis;
-pub use diagnosis::DiagnosisFindings;
+pub use diagnosis::{CuttingFindings, DiagnosisFindings};
 pub use lobes::{LobeAnalysis, LobeCase};
 pub use modal::{ModalAnalysis, SetModes};
 pub use redundancy::RedundancyAnalysis;

@@ -83,6 +83,9 @@ mod tests {
             measured: 0.0,
             std_error: 1.0,
             fitted,
+            leverage: 0.5,
+            studentized_residual: None,
+            weight_share: 1.0,
         };
         values.iter().map(point).collect()
     }

@@ -400,6 +400,7 @@ mod tests {
             cuts: vec![],
             lobes: None,
             material: None,
+            orthogonal: None,
         }
     }
 

@@ -14,7 +14,7 @@ use crate::{Error, InputError, Result};
 
 const SCHEMA: &str = "lobestone/campaign/1";
 
-const TOP: [&str; 11] = [
+const TOP: [&str; 12] = [
     "schema",
     "name",
     "robot",
@@ -23,12 +23,13 @@ const TOP: [&str; 11] = [
     "frf",
     "tool",
     "material",
+    "orthogonal",
     "dynamometer",
     "cut",
     "lobes",
 ];
 
-const CUT: [&str; 15] = [
+const CUT: [&str; 16] = [
     "id",
     "file",
     "process",
@@ -44,6 +45,7 @@ const CUT: [&str; 15] = [
     "order",
     "steady_s",
     "outcome",
+    "material",
 ];
 
 pub(super) const PROCESSES: [(&str, Process); 2] =
@@ -92,9 +94,8 @@ fn read(dir: &Path, top: &Section<'_>) -> Result<Campaign> {
     let frfs = frfs(dir, top, &postures)?;
     let tool = tool(top)?;
     let dynamometer = dynamometer(top)?;
-    let cuts = cuts(dir, top, tool.as_ref())?;
     let lobes = lobes_section::read(top, &postures, robot.is_some(), !frfs.is_empty())?;
-    let material = match top.section("material", &["name"])? {
+    let material: Option<String> = match top.section("material", &["name"])? {
         Some(material) => Some(
             material
                 .required("name", material.text("name")?, "\"Ti-6Al-4V\"")?
@@ -102,6 +103,7 @@ fn read(dir: &Path, top: &Section<'_>) -> Result<Campaign> {
         ),
         None => None,
     };
+    let cuts = cuts(dir, top, tool.as_ref(), material.as_deref())?;
     Ok(Campaign {
         dir: dir.to_path_buf(),
         name,
@@ -114,6 +116,7 @@ fn read(dir: &Path, top: &Section<'_>) -> Result<Campaign> {
         cuts,
         lobes,
         material,
+        orthogonal: orthogonal(top)?,
     })
 }
 
@@ -339,6 +342,43 @@ fn tool(top: &Section<'_>) -> Result<Option<Tool>> {
     }))
 }
 
+fn orthogonal(top: &Section<'_>) -> Result<Option<OrthogonalSection>> {
+    let keys = [
+        "shear_stress_mpa",
+        "friction_angle_deg",
+        "chip_ratio",
+        "shear_angle_deg",
+        "rake_deg",
+        "inclination_deg",
+    ];
+    let Some(section) = top.section("orthogonal", &keys)? else {
+        return Ok(None);
+    };
+    let ratio = section.number("chip_ratio", Bounds::POSITIVE)?;
+    let angle = section.number("shear_angle_deg", Bounds::open(0.0, 90.0))?;
+    let chip = match (ratio, angle) {
+        (Some(ratio), None) => ChipFormation::ChipRatio(ratio),
+        (None, Some(angle)) => ChipFormation::ShearAngleRad(angle.to_radians()),
+        (Some(_), Some(_)) => {
+            return Err(section
+                .error("shear_angle_deg", "given beside chip_ratio, which says the same")
+                .remedy("keep one of the two")
+                .into());
+        }
+        (None, None) => section.required("chip_ratio", None, "0.7")?,
+    };
+    let number = |key: &str, bounds: Bounds, example: &str| -> Result<f64> {
+        section.required(key, section.number(key, bounds)?, example)
+    };
+    Ok(Some(OrthogonalSection {
+        shear_stress_mpa: number("shear_stress_mpa", Bounds::POSITIVE, "613.0")?,
+        friction_angle_deg: number("friction_angle_deg", Bounds::open(0.0, 90.0), "22.6")?,
+        chip,
+        rake_deg: number("rake_deg", Bounds::open(-90.0, 90.0), "12.0")?,
+        inclination_deg: section.number("inclination_deg", Bounds::open(-90.0, 90.0))?,
+    }))
+}
+
 fn dynamometer(top: &Section<'_>) -> Result<Dynamometer> {
     let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let key = "tool_from_dyno";
@@ -367,7 +407,12 @@ fn dynamometer(top: &Section<'_>) -> Result<Dynamometer> {
     Ok(Dynamometer { tool_from_dyno })
 }
 
-fn cuts(dir: &Path, top: &Section<'_>, tool: Option<&Tool>) -> Result<Vec<Cut>> {
+fn cuts(
+    dir: &Path,
+    top: &Section<'_>,
+    tool: Option<&Tool>,
+    campaign_material: Option<&str>,
+) -> Result<Vec<Cut>> {
     let mut out: Vec<Cut> = Vec::new();
     for section in top.sections("cut", &CUT)? {
         let Some(tool) = tool else {
@@ -391,6 +436,10 @@ fn cuts(dir: &Path, top: &Section<'_>, tool: Option<&Tool>) -> Result<Vec<Cut>> 
             )?,
             order: section.whole("order", i64::MIN, i64::MAX)?,
             steady_s: steady(&section)?,
+            material: section
+                .text("material")?
+                .or(campaign_material)
+                .map(str::to_string),
             outcome: section.choice("outcome", &outcomes)?,
             line: section.line(),
             id,

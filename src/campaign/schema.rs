@@ -17,8 +17,29 @@ pub struct Campaign {
     pub dynamometer: Dynamometer,
     pub cuts: Vec<Cut>,
     pub lobes: Option<LobesSection>,
-    /// Workpiece material, for reports.
+    /// Workpiece material: of every cut that names none itself.
     pub material: Option<String>,
+    pub orthogonal: Option<OrthogonalSection>,
+}
+
+/// What orthogonal cuts of the material gave, to predict the milling coefficients from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OrthogonalSection {
+    pub shear_stress_mpa: f64,
+    pub friction_angle_deg: f64,
+    pub chip: ChipFormation,
+    /// Normal rake of the tool.
+    pub rake_deg: f64,
+    /// `None`: the tool's helix angle.
+    pub inclination_deg: Option<f64>,
+}
+
+/// How the chip forms.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ChipFormation {
+    ShearAngleRad(f64),
+    /// Uncut over cut chip thickness.
+    ChipRatio(f64),
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -163,6 +184,8 @@ pub struct Cut {
     pub order: Option<i64>,
     /// Overrides the detected steady window, s of the record's time axis.
     pub steady_s: Option<[f64; 2]>,
+    /// What was cut: the cut's own `material`, else the campaign's.
+    pub material: Option<String>,
     /// How the cut went, where someone listened.
     pub outcome: Option<CutOutcome>,
     /// Line of `campaign.toml`, for messages.

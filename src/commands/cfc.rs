@@ -7,7 +7,8 @@ use crate::Result;
 use crate::analysis::cutting::waveform_groups;
 use crate::campaign::Campaign;
 use crate::cutting::{
-    self, CfcOptions, CfcResult, CutAnalysis, ForceAxis, Group, by_axis, depth_mm, speed_text,
+    self, CfcOptions, CfcResult, Change, CutAnalysis, ForceAxis, Group, Known, MaterialComparison, Method,
+    Prediction, Reading, SpeedTrends, by_axis, coefficients_of, depth_mm, speed_text,
 };
 
 #[derive(clap::Args)]
@@ -17,15 +18,21 @@ pub struct Args {
     /// Hold edge coefficients at zero or above.
     #[arg(long)]
     nonnegative_edges: bool,
+    /// Robust (Huber) regression: a spoilt cut cannot pull the coefficients. Without it the robust answer is shown in
+    /// --json, and a warning says where the two disagree.
+    #[arg(long)]
+    robust: bool,
 }
 
 pub fn run(args: Args) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
     let options = CfcOptions {
         nonnegative_edges: args.nonnegative_edges,
+        robust: args.robust,
     };
-    let result = cutting::identify_forces(&campaign, options)?;
-    let waveforms = waveform_groups(&campaign, &result);
+    let mut result = cutting::identify_forces(&campaign, options)?;
+    let (waveforms, warnings) = waveform_groups(&campaign, &result);
+    result.warnings.extend(warnings);
     Ok(Outcome {
         json: document(&campaign, &result, &waveforms),
         text: text(&campaign, &result),
@@ -46,6 +53,9 @@ fn document(campaign: &Campaign, result: &CfcResult, waveforms: &[serde_json::Va
         "groups": with_waveforms,
         "pooled": groups(&result.pooled),
         "r2": process.map(|p| by_axis(p, &result.r2())),
+        "trends": result.trends.iter().flat_map(SpeedTrends::to_json).collect::<Vec<_>>(),
+        "materials": result.materials.iter().flat_map(MaterialComparison::to_json).collect::<Vec<_>>(),
+        "predicted": result.prediction.as_ref().map(Prediction::to_json),
         "cuts": result.cuts.iter().map(cut_document).collect::<Vec<_>>(),
         "warnings": result.warnings,
     })
@@ -87,13 +97,19 @@ fn cut_document(cut: &CutAnalysis) -> serde_json::Value {
 fn text(campaign: &Campaign, result: &CfcResult) -> String {
     let mut out = format!("Cutting force coefficients: {}\n", campaign.name);
     for pooled in &result.pooled {
-        let groups: Vec<&Group> = result
-            .groups
-            .iter()
-            .filter(|g| g.process == pooled.process)
-            .collect();
+        let groups: Vec<&Group> = result.groups.iter().filter(|g| g.is_beside(pooled)).collect();
         let _ = writeln!(out, "\n{}", coefficient_table(&groups, pooled));
+        let trends = result.trends.iter();
+        for trend in trends.filter(|t| t.process == pooled.process && t.material == pooled.material) {
+            let _ = writeln!(out, "{}", trend_table(trend));
+        }
         let _ = writeln!(out, "{}", cut_table(campaign, result, pooled));
+    }
+    for comparison in &result.materials {
+        let _ = writeln!(out, "{}", material_table(comparison));
+    }
+    if let Some(prediction) = &result.prediction {
+        let _ = writeln!(out, "{}", prediction_table(prediction));
     }
     if result.warnings.is_empty() {
         out.push_str("No warnings.\n");
@@ -136,11 +152,128 @@ fn coefficient_table(groups: &[&Group], pooled: &Group) -> String {
         );
         rows.push(row);
     }
-    let title = match pooled.process {
-        crate::campaign::Process::Milling => "Milling: coefficient ± standard error",
-        crate::campaign::Process::Drilling => "Drilling: coefficient ± standard error",
+    let process = match pooled.process {
+        crate::campaign::Process::Milling => "Milling",
+        crate::campaign::Process::Drilling => "Drilling",
     };
-    format!("{title}\n{}", table(&rows))
+    let method = match pooled.method {
+        Method::LeastSquares => "least squares",
+        Method::Huber => "robust (Huber) regression",
+    };
+    format!(
+        "{process}{}: coefficient ± standard error, {method}\n{}",
+        pooled
+            .material
+            .as_ref()
+            .map_or(String::new(), |m| format!(", {m}")),
+        table(&rows)
+    )
+}
+
+/// In words of one line each.
+fn reading(change: &Change) -> String {
+    let chance = change
+        .p_value
+        .map_or(String::new(), |p| format!(" (p {})", p_text(p)));
+    match change.reading {
+        Reading::Rises => format!("higher{chance}"),
+        Reading::Falls => format!("lower{chance}"),
+        Reading::None => format!("no more than chance{chance}"),
+        Reading::NotDetermined => "these cuts cannot tell".into(),
+    }
+}
+
+fn p_text(p: f64) -> String {
+    if p < 1e-4 {
+        "below 0.0001".into()
+    } else {
+        format!("= {p:.*}", if p < 0.01 { 4 } else { 2 })
+    }
+}
+
+fn maybe(known: Option<Known>) -> String {
+    known.map_or("–".into(), |k| {
+        k.std_error
+            .map_or_else(|| format!("{:.4}", k.value), |e| with_error(k.value, e))
+    })
+}
+
+fn trend_table(trend: &SpeedTrends) -> String {
+    let reference = trend.reference_speed_m_per_min;
+    let mut rows = vec![vec![
+        "coefficient".to_string(),
+        format!("at {reference:.1} m/min"),
+        "per doubling".into(),
+        "exponent".into(),
+        "faster is".into(),
+    ]];
+    for (kind, change) in coefficients_of(trend.process).iter().zip(&trend.changes) {
+        rows.push(vec![
+            format!("{} {}", kind.label, kind.unit),
+            maybe(change.reference),
+            maybe(change.change),
+            maybe(change.exponent()),
+            reading(change),
+        ]);
+    }
+    let [low, high] = trend.speed_range_m_per_min;
+    format!(
+        "Over cutting speed, {low:.1} to {high:.1} m/min, all cuts in one regression; \"exponent\" is m in speed^m\n{}",
+        table(&rows)
+    )
+}
+
+fn material_table(comparison: &MaterialComparison) -> String {
+    let MaterialComparison {
+        material, reference, ..
+    } = comparison;
+    let mut rows = vec![vec![
+        "coefficient".to_string(),
+        reference.clone(),
+        "difference".into(),
+        "ratio".into(),
+        format!("{material} is"),
+    ]];
+    for (kind, change) in coefficients_of(comparison.process)
+        .iter()
+        .zip(&comparison.changes)
+    {
+        rows.push(vec![
+            format!("{} {}", kind.label, kind.unit),
+            maybe(change.reference),
+            maybe(change.change),
+            maybe(change.ratio),
+            reading(change),
+        ]);
+    }
+    format!(
+        "{material} against {reference}, a common trend over speed allowed for\n{}",
+        table(&rows)
+    )
+}
+
+fn prediction_table(prediction: &Prediction) -> String {
+    let mut rows = vec![vec![
+        "coefficient".to_string(),
+        "predicted".into(),
+        "from the cuts".into(),
+        "cuts / predicted".into(),
+    ]];
+    for (label, predicted, value, std_error) in &prediction.rows {
+        rows.push(vec![
+            format!("{label} N/mm²"),
+            format!("{predicted:.0}"),
+            value.map_or("–".into(), |v| {
+                std_error.map_or_else(|| format!("{v:.1}"), |e| with_error(v, e))
+            }),
+            value.map_or("–".into(), |v| format!("{:.2}", v / predicted)),
+        ]);
+    }
+    format!(
+        "Predicted from the orthogonal database by oblique transformation (shear angle {:.1}°)\n{}",
+        prediction.predicted.shear_angle_rad.to_degrees(),
+        table(&rows)
+    )
 }
 
 fn cut_table(campaign: &Campaign, result: &CfcResult, pooled: &Group) -> String {
@@ -152,8 +285,9 @@ fn cut_table(campaign: &Campaign, result: &CfcResult, pooled: &Group) -> String 
         header.push(format!("{} {}", axis.label(), axis.unit()));
         header.push("off %".into());
     }
+    header.extend(["leverage".to_string(), "off / error".into()]);
     let mut rows = vec![header];
-    for cut in result.cuts.iter().filter(|c| c.process == pooled.process) {
+    for cut in result.cuts.iter().filter(|c| pooled.cuts.contains(&c.id)) {
         let air = match (cut.air_before_s.is_some(), cut.air_after_s.is_some()) {
             (true, true) => "both",
             (true, false) => "before",
@@ -180,10 +314,16 @@ fn cut_table(campaign: &Campaign, result: &CfcResult, pooled: &Group) -> String 
                 format!("{:+.1}", 100.0 * (p.measured - p.fitted) / p.fitted.abs())
             }));
         }
+        let influence = pooled.influence.iter().find(|i| i.cut == cut.id);
+        row.push(influence.map_or("–".into(), |i| format!("{:.2}", i.leverage)));
+        let off = influence.and_then(|i| Some((i.studentized_residual?, i.axis?)));
+        row.push(off.map_or("–".into(), |(t, axis)| format!("{} {t:+.1}", axis.label())));
         rows.push(row);
     }
     format!(
-        "Cuts: averages over whole turns in tool axes; \"off\" is against the fit to all cuts together\n{}",
+        "Cuts: averages over whole turns in tool axes; \"off\" is against the fit to all cuts together; \"leverage\" \
+         (0 to 1) is how\nmuch the cut decides by itself, \"off / error\" its worst axis against the other cuts, in \
+         standard errors\n{}",
         table(&rows)
     )
 }

@@ -39,6 +39,7 @@ fn cutting(campaign: &Campaign) -> Result<Outcome> {
         "by_axis": object(&c.by_axis),
         "by_speed": object(&c.by_speed),
         "by_feed": object(&c.by_feed),
+        "by_order": object(&c.by_order),
         "by_harmonic": c.by_harmonic,
         "cuts": c.cuts,
         "parameters": analysis.calibration.parameters,

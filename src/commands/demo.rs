@@ -143,6 +143,7 @@ pub fn run(args: Args) -> Result<Outcome> {
         postures: Some(Ok(postures)),
         mode_shapes: stick_shapes::of_richest_set(&first, &modal),
         modal: Some(Ok(modal)),
+        cutting_diagnosis: None,
         cutting: Some(Ok(cutting)),
         lobes: Some(Ok(lobes)),
     };

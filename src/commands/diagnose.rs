@@ -3,13 +3,12 @@ use serde_json::{Map, Value, json};
 use super::text::{number, percent, table, warnings};
 use super::{CampaignArg, Domain, Outcome, by_domain};
 use crate::Result;
-use crate::analysis::DiagnosisFindings;
-use crate::analysis::cutting::cutting_comparison;
+use crate::analysis::{CuttingFindings, DiagnosisFindings};
 use crate::campaign::Campaign;
 use crate::discrepancy::diagnose::Baseline;
 use crate::discrepancy::explained::{Explained, NamedPart};
-use crate::discrepancy::{Candidate, Diagnosis, Verdict, diagnose, next_measurement};
-use crate::identify::{CuttingCase, CuttingStudy, Options};
+use crate::discrepancy::{Candidate, Diagnosis, Verdict};
+use crate::identify::Options;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -26,12 +25,14 @@ pub fn run(args: Args) -> Result<Outcome> {
 }
 
 fn cutting(campaign: &Campaign) -> Result<Outcome> {
-    let case = CuttingCase::load(campaign)?;
-    let study = CuttingStudy::new(case.data.clone());
-    let d = diagnose(&study, &case.model)?;
-    let now = cutting_comparison(&case.model, &case.data, &d.baseline.theta)?;
-    let noise_floor_nrms = now.totals.noise_floor_nrms;
-    let next_measurement = next_measurement::advise_cutting(&d);
+    let CuttingFindings {
+        case,
+        diagnosis: d,
+        next_measurement,
+        now,
+        ..
+    } = CuttingFindings::run(campaign)?;
+    let noise_floor_nrms = now.comparison.totals.noise_floor_nrms;
     let json = json!({
         "domain": "cutting",
         "process": case.data.process,

@@ -5,8 +5,7 @@ use serde_json::{Value, json};
 
 use super::Outcome;
 use crate::ingest::{
-    self, Channel, ChannelRole, Dof, FrfRecord, MeasurementFile, Quantity, TimeRecord, quality_warnings,
-    units,
+    self, Channel, ChannelRole, Dof, FrfRecord, MeasurementFile, Quantity, TimeRecord, units,
 };
 use crate::{InputError, Result};
 
@@ -64,7 +63,8 @@ struct Row {
 }
 
 fn inspect(path: &Path) -> Result<Seen> {
-    let file = ingest::read_file(path)?;
+    let survey = ingest::survey(path)?;
+    let file = survey.file;
     let contents = &file.contents;
     let is_force = |record: &TimeRecord| record.channels.iter().any(|c| c.role != ChannelRole::Other);
     let kind = match (contents.frfs.is_empty(), contents.times.as_slice()) {
@@ -83,11 +83,16 @@ fn inspect(path: &Path) -> Result<Seen> {
         _ => "time",
     };
     let mut rows: Vec<Row> = contents.frfs.iter().map(frf_row).collect();
-    for record in &contents.times {
-        rows.extend(record.channels.iter().map(|channel| time_row(record, channel)));
+    for (record, samples) in contents.times.iter().zip(survey.samples) {
+        rows.extend(
+            record
+                .channels
+                .iter()
+                .map(|channel| time_row(record, channel, samples)),
+        );
     }
     let mut warnings = file.warnings.clone();
-    warnings.extend(contents.times.iter().flat_map(quality_warnings));
+    warnings.extend(survey.quality);
     if !contents.others.is_empty() {
         warnings.push(format!(
             "holds {}: only FRFs, coherences and time signals are used",
@@ -191,7 +196,7 @@ fn frf_row(frf: &FrfRecord) -> Row {
     }
 }
 
-fn time_row(record: &TimeRecord, channel: &Channel) -> Row {
+fn time_row(record: &TimeRecord, channel: &Channel, samples: usize) -> Row {
     let role = match channel.role {
         ChannelRole::ForceX => "force-x",
         ChannelRole::ForceY => "force-y",
@@ -200,7 +205,6 @@ fn time_row(record: &TimeRecord, channel: &Channel) -> Row {
         ChannelRole::Other => "other",
     };
     let (quantity, unit) = channel.quantity_and_unit();
-    let samples = channel.samples.len();
     let seconds = samples as f64 / record.sample_rate_hz;
     let converted = if unit == channel.file_unit {
         String::new()

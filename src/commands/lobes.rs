@@ -275,6 +275,7 @@ mod tests {
                 redundancy: None,
             }),
             material: None,
+            orthogonal: None,
         }
     }
 

@@ -3,9 +3,10 @@ use serde_json::json;
 use super::Outcome;
 use super::text::{number, percent, table};
 use crate::Result;
+use crate::cutting::{Known, MILLING_COEFFICIENTS};
 use crate::lobes::Peak;
 use crate::thesis::real_case::Explanation;
-use crate::thesis::{CaseStudy, LobeTips, RealCase, Row, case_study};
+use crate::thesis::{CaseStudy, CuttingTables, LobeTips, RealCase, Row, case_study};
 
 #[derive(clap::Args)]
 pub struct Args {}
@@ -226,5 +227,65 @@ fn describe(study: &CaseStudy) -> String {
         &["configuration", "second region", "first region", "absolute"],
         &lobes,
     );
+    text += &cutting(&study.cutting);
+    text
+}
+
+/// Tables 20 and 23: the rows, trends over all speeds, and what they come to.
+fn cutting(tables: &CuttingTables) -> String {
+    let mut header = vec!["material", "row", "m/min", "feeds"];
+    header.extend(MILLING_COEFFICIENTS.iter().map(|c| c.label));
+    header.push("negative");
+    let rows: Vec<Vec<String>> = tables
+        .rows
+        .iter()
+        .map(|r| {
+            let mut row = vec![
+                r.material.clone(),
+                r.graph.clone(),
+                number(r.cutting_speed_m_per_min, 3),
+                format!("{}/{}", r.feeds, r.feeds_planned),
+            ];
+            row.extend(r.coefficients.iter().map(|k| number(*k, 3)));
+            row.push(r.negative.join(" "));
+            row
+        })
+        .collect();
+    let mut text = format!(
+        "\nMilling coefficients, tables 20 and 23 (N/mm² and N/mm)\n{}",
+        table(&header, &rows)
+    );
+    let trends: Vec<Vec<String>> = tables
+        .trends
+        .iter()
+        .filter(|t| t.speeds == "all")
+        .map(|t| {
+            let known = |k: Option<Known>| {
+                k.map_or("–".into(), |k| {
+                    let error = k
+                        .std_error
+                        .map_or(String::new(), |e| format!(" ± {}", number(e, 2)));
+                    format!("{}{error}", number(k.value, 3))
+                })
+            };
+            vec![
+                t.material.clone(),
+                format!("{} {}", t.coefficient, t.unit),
+                known(t.value),
+                known(t.per_doubling),
+                t.p_value.map_or("–".into(), |p| number(p, 2)),
+            ]
+        })
+        .collect();
+    text += &format!(
+        "\nOver all cutting speeds (least squares on log2 of the speed, errors from the scatter about the line)\n{}",
+        table(
+            &["material", "coefficient", "at mean speed", "per doubling", "p"],
+            &trends
+        )
+    );
+    for paragraph in &tables.reading {
+        text += &format!("  - {paragraph}\n");
+    }
     text
 }

@@ -4,10 +4,12 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value, json};
 
-use super::average_force::{ForceAxis, coefficients_of};
-use super::constrained::nonnegative_least_squares;
+use super::average_force::{CoefficientKind, ForceAxis, coefficients_of};
+use super::estimate::{Estimate, Method, bootstrap, estimate};
+use super::identify::CfcOptions;
+use super::outlier::studentized;
 use super::record::CutAnalysis;
-use super::regression::{Fit, Observation, fit};
+use super::regression::{Fit, Observation, fit, r2};
 use crate::Result;
 use crate::campaign::Process;
 
@@ -22,8 +24,35 @@ pub struct Coefficient {
     pub value: Option<f64>,
     /// `None` too where a constraint holds the value.
     pub std_error: Option<f64>,
+    /// From drawing the cuts again; `None` with too few cuts.
+    pub std_error_bootstrap: Option<f64>,
     /// Held at zero by `--nonnegative-edges`.
     pub constraint_active: bool,
+    /// What it would be with no constraint on any coefficient; only where a constraint is active on this one.
+    pub unconstrained: Option<Known>,
+    /// By the other of the two methods; `None` where there are too few cuts for a robust one.
+    pub other_method: Option<Known>,
+}
+
+/// A value and its standard error.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Known {
+    pub value: f64,
+    pub std_error: Option<f64>,
+}
+
+/// How much one cut decides, and how it stands to the others.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Influence {
+    pub cut: String,
+    /// Largest over the axes; 1: nothing checks this cut.
+    pub leverage: f64,
+    /// Off the prediction from the other cuts, in standard errors of that difference; of the axis furthest off. `None`
+    /// where too few other cuts are left to judge.
+    pub studentized_residual: Option<f64>,
+    pub axis: Option<ForceAxis>,
+    /// What robust regression leaves of its weight, 0…1, on the axis where it leaves least; 1 with least squares.
+    pub weight_share: f64,
 }
 
 /// A point of the regression, for lists and plots.
@@ -37,12 +66,20 @@ pub struct RegressionPoint {
     pub measured: f64,
     pub std_error: f64,
     pub fitted: f64,
+    /// Diagonal of the weighted hat matrix, 0…1.
+    pub leverage: f64,
+    /// Externally studentised, the whole cut left out; `None` where too few other cuts are left.
+    pub studentized_residual: Option<f64>,
+    /// What robust regression leaves of its weight, 0…1.
+    pub weight_share: f64,
 }
 
 /// The regression over a set of cuts of one process.
 #[derive(Debug, Clone)]
 pub struct Group {
     pub process: Process,
+    /// As the campaign names it.
+    pub material: Option<String>,
     /// Mean over the cuts.
     pub cutting_speed_m_per_min: f64,
     /// Slowest and fastest cut.
@@ -51,6 +88,8 @@ pub struct Group {
     pub cuts: Vec<String>,
     /// Number of different feeds.
     pub feeds: usize,
+    /// How the coefficients were drawn from the averages.
+    pub method: Method,
     pub coefficients: Vec<Coefficient>,
     /// Names of coefficients that only a combination of is determined.
     pub inseparable: Vec<Vec<&'static str>>,
@@ -60,7 +99,12 @@ pub struct Group {
     /// Scatter of the averages beyond their own errors (N; N·m), by axis.
     pub extra_scatter: [f64; 4],
     pub points: Vec<RegressionPoint>,
+    /// By cut, as `cuts`.
+    pub influence: Vec<Influence>,
 }
+
+/// Degrees of freedom that every axis must have for a robust regression to know what is off.
+const ROBUST_DOF: f64 = 3.0 - 1e-6;
 
 /// The averages of cuts as observations, with the model's row for each.
 pub(super) fn observations(cuts: &[&CutAnalysis], rows: &Rows) -> Vec<Observation> {
@@ -89,98 +133,124 @@ impl Group {
     /// Fits one group; `None` where its cuts hold no average at all.
     ///
     /// # Errors
-    /// The constrained regression fails.
-    pub(super) fn fit(cuts: &[&CutAnalysis], rows: &Rows, nonnegative_edges: bool) -> Result<Option<Group>> {
+    /// The conic program fails.
+    pub(super) fn fit(
+        cuts: &[&CutAnalysis],
+        material: Option<&str>,
+        rows: &Rows,
+        options: CfcOptions,
+    ) -> Result<Option<Group>> {
         let observations = observations(cuts, rows);
-        let (Some(first), Some(fit)) = (cuts.first(), fit(&observations)) else {
+        let (Some(first), Some(free)) = (cuts.first(), fit(&observations)) else {
             return Ok(None);
         };
-        let kinds = coefficients_of(first.process);
+        let speeds = || cuts.iter().map(|c| c.cutting_speed_m_per_min);
         let mut group = Group {
             process: first.process,
-            cutting_speed_m_per_min: cuts.iter().map(|c| c.cutting_speed_m_per_min).sum::<f64>()
-                / cuts.len() as f64,
+            material: material.map(str::to_string),
+            cutting_speed_m_per_min: speeds().sum::<f64>() / cuts.len() as f64,
             cutting_speed_range_m_per_min: [
-                cuts.iter()
-                    .map(|c| c.cutting_speed_m_per_min)
-                    .fold(f64::INFINITY, f64::min),
-                cuts.iter()
-                    .map(|c| c.cutting_speed_m_per_min)
-                    .fold(f64::NEG_INFINITY, f64::max),
+                speeds().fold(f64::INFINITY, f64::min),
+                speeds().fold(f64::NEG_INFINITY, f64::max),
             ],
             cuts: cuts.iter().map(|c| c.id.clone()).collect(),
             feeds: distinct(cuts.iter().map(|c| c.feed_mm)).len(),
-            coefficients: kinds
-                .iter()
-                .enumerate()
-                .map(|(j, kind)| Coefficient {
-                    key: kind.key,
-                    label: kind.label,
-                    unit: kind.unit,
-                    edge: kind.edge,
-                    value: fit.value[j],
-                    std_error: fit.std_error[j],
-                    constraint_active: false,
-                })
-                .collect(),
-            inseparable: fit
+            method: Method::LeastSquares,
+            coefficients: free_coefficients(first.process, &free),
+            inseparable: free
                 .inseparable
                 .iter()
-                .map(|set| set.iter().map(|&j| kinds[j].label).collect())
+                .map(|set| {
+                    set.iter()
+                        .map(|&j| coefficients_of(first.process)[j].label)
+                        .collect()
+                })
                 .collect(),
-            r2: fit.r2,
-            chi2_per_dof: fit.chi2_per_dof,
-            extra_scatter: fit.extra_scatter,
+            r2: free.r2,
+            chi2_per_dof: free.chi2_per_dof,
+            extra_scatter: free.extra_scatter,
             points: Vec::new(),
+            influence: Vec::new(),
         };
-        let mut solution = fit.solution.clone();
-        if nonnegative_edges && fit.inseparable.is_empty() {
-            solution = group.constrain(&observations, &fit)?;
+        let (mut solution, mut share) = (free.solution.clone(), vec![1.0; observations.len()]);
+        if free.inseparable.is_empty() {
+            let chosen = group.choose(&observations, &free, options)?;
+            (solution, share) = (chosen.value, chosen.share);
         }
         group.points = observations
             .iter()
             .zip(cuts_of(&observations, cuts))
-            .map(|(o, cut)| RegressionPoint {
+            .zip(studentized(&observations))
+            .enumerate()
+            .map(|(i, ((o, cut), studentized_residual))| RegressionPoint {
                 cut: cut.map_or_else(String::new, |c| c.id.clone()),
                 axis: o.axis,
                 feed_mm: cut.map_or(0.0, |c| c.feed_mm),
                 measured: o.value,
                 std_error: o.std_error,
                 fitted: o.row.iter().zip(&solution).map(|(r, x)| r * x).sum(),
+                leverage: free.leverage[i],
+                studentized_residual,
+                weight_share: share[i],
             })
+            .collect();
+        group.influence = group
+            .cuts
+            .iter()
+            .map(|cut| influence(cut, &group.points))
             .collect();
         Ok(Some(group))
     }
 
-    /// Replaces the coefficients by those with edges ≥ 0. Errors are those of the fit without the held ones.
-    fn constrain(&mut self, observations: &[Observation], free: &Fit) -> Result<Vec<f64>> {
-        let edges: Vec<bool> = self.coefficients.iter().map(|c| c.edge).collect();
-        let constrained = nonnegative_least_squares(observations, &free.weight, &edges)?;
-        if !constrained.active.contains(&true) {
-            return Ok(free.solution.clone());
-        }
-        let kept: Vec<usize> = (0..edges.len()).filter(|&j| !constrained.active[j]).collect();
-        let reduced: Vec<Observation> = observations
+    /// Puts in the coefficients by the method that was asked for, with what the other method, a fit without
+    /// constraints and the bootstrap say. Errors are those of the fit without the held coefficients.
+    fn choose(&mut self, observations: &[Observation], free: &Fit, options: CfcOptions) -> Result<Estimate> {
+        let edges = |c: &Coefficient| options.nonnegative_edges && c.edge;
+        let bounds: Vec<bool> = self.coefficients.iter().map(edges).collect();
+        let used = |axis: &&ForceAxis| observations.iter().any(|o| o.axis == **axis);
+        let robust_possible = ForceAxis::ALL
             .iter()
-            .map(|o| Observation {
-                row: kept.iter().map(|&j| o.row[j]).collect(),
-                ..o.clone()
-            })
-            .collect();
-        let errors = fit(&reduced);
-        for (j, coefficient) in self.coefficients.iter_mut().enumerate() {
-            coefficient.value = Some(constrained.value[j]);
-            coefficient.constraint_active = constrained.active[j];
-            coefficient.std_error = kept
-                .iter()
-                .position(|&k| k == j)
-                .and_then(|k| errors.as_ref().and_then(|e| e.std_error[k]));
+            .filter(used)
+            .all(|a| free.dof[a.index()] >= ROBUST_DOF);
+        let (method, other) = match options.robust && robust_possible {
+            true => (Method::Huber, Method::LeastSquares),
+            false => (Method::LeastSquares, Method::Huber),
+        };
+        let chosen = estimate(observations, free, &bounds, method)?;
+        // Second opinions: where they fail there is none.
+        let other = robust_possible
+            .then(|| estimate(observations, free, &bounds, other).ok())
+            .flatten();
+        let unbounded = chosen
+            .active
+            .contains(&true)
+            .then(|| estimate(observations, free, &vec![false; bounds.len()], method).ok())
+            .flatten();
+        let drawn = bootstrap(observations, &chosen, &bounds, method);
+        let known = |estimate: &Estimate, j: usize| Known {
+            value: estimate.value[j],
+            std_error: estimate.std_error[j],
+        };
+        self.method = method;
+        for (j, c) in self.coefficients.iter_mut().enumerate() {
+            c.value = Some(chosen.value[j]);
+            c.std_error = chosen.std_error[j];
+            c.std_error_bootstrap = drawn.as_ref().map(|d| d[j]).filter(|_| !chosen.active[j]);
+            c.constraint_active = chosen.active[j];
+            c.unconstrained = unbounded
+                .as_ref()
+                .filter(|_| chosen.active[j])
+                .map(|e| known(e, j));
+            c.other_method = other.as_ref().map(|e| known(e, j));
         }
-        if let Some(errors) = errors {
-            (self.r2, self.chi2_per_dof, self.extra_scatter) =
-                (errors.r2, errors.chi2_per_dof, errors.extra_scatter);
-        }
-        Ok(constrained.value)
+        self.extra_scatter = chosen.extra_scatter;
+        self.r2 = r2(observations, &chosen.value);
+        Ok(chosen)
+    }
+
+    /// Whether both are of one process and one material.
+    pub fn is_beside(&self, other: &Group) -> bool {
+        self.process == other.process && self.material == other.material
     }
 
     pub fn coefficient(&self, label: &str) -> Option<&Coefficient> {
@@ -196,6 +266,7 @@ impl Group {
     pub fn to_json(&self) -> Value {
         let mut map = Map::new();
         map.insert("process".into(), json!(self.process));
+        map.insert("material".into(), json!(self.material));
         map.insert(
             "cutting_speed_m_per_min".into(),
             json!(self.cutting_speed_m_per_min),
@@ -207,12 +278,24 @@ impl Group {
         map.insert("cuts".into(), json!(self.cuts));
         map.insert("feeds".into(), json!(self.feeds));
         for c in &self.coefficients {
-            let mut entry = json!({"value": c.value, "std_error": c.std_error});
+            let mut entry = json!({
+                "value": c.value, "std_error": c.std_error, "std_error_bootstrap": c.std_error_bootstrap,
+            });
+            if let Some(other) = c.other_method {
+                let key = match self.method {
+                    Method::LeastSquares => "huber",
+                    Method::Huber => "least_squares",
+                };
+                entry[key] = json!(other);
+            }
             if c.constraint_active {
                 entry["constraint_active"] = json!(true);
+                entry["unconstrained"] = json!(c.unconstrained);
             }
             map.insert(c.key.into(), entry);
         }
+        map.insert("method".into(), json!(self.method));
+        map.insert("influence".into(), json!(self.influence));
         map.insert("inseparable".into(), json!(self.inseparable));
         map.insert("r2".into(), by_axis(self.process, &self.r2));
         map.insert("chi2_per_dof".into(), by_axis(self.process, &self.chi2_per_dof));
@@ -233,6 +316,37 @@ pub(crate) fn by_axis(process: Process, values: &[Option<f64>; 4]) -> Value {
         map["mz"] = json!(used(ForceAxis::Mz));
     }
     map
+}
+
+/// What the ordinary fit says, before constraints and second opinions.
+fn free_coefficients(process: Process, free: &Fit) -> Vec<Coefficient> {
+    let one = |(j, kind): (usize, &CoefficientKind)| Coefficient {
+        key: kind.key,
+        label: kind.label,
+        unit: kind.unit,
+        edge: kind.edge,
+        value: free.value[j],
+        std_error: free.std_error[j],
+        std_error_bootstrap: None,
+        constraint_active: false,
+        unconstrained: None,
+        other_method: None,
+    };
+    coefficients_of(process).iter().enumerate().map(one).collect()
+}
+
+fn influence(cut: &str, points: &[RegressionPoint]) -> Influence {
+    let own = || points.iter().filter(|p| p.cut == cut);
+    let worst = own()
+        .filter_map(|p| Some((p.studentized_residual?, p.axis)))
+        .max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
+    Influence {
+        cut: cut.to_string(),
+        leverage: own().map(|p| p.leverage).fold(0.0, f64::max),
+        studentized_residual: worst.map(|w| w.0),
+        axis: worst.map(|w| w.1),
+        weight_share: own().map(|p| p.weight_share).fold(1.0, f64::min),
+    }
 }
 
 fn cuts_of<'a>(observations: &[Observation], cuts: &[&'a CutAnalysis]) -> Vec<Option<&'a CutAnalysis>> {

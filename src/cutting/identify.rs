@@ -3,18 +3,24 @@
 use rayon::prelude::*;
 
 use super::average_force::{ForceAxis, average_row};
+use super::faults::read_record;
 use super::group::{Group, Rows, distinct, observations};
+use super::orthogonal::{Prediction, predict};
 use super::outlier::misfits;
-use super::record::{Average, CutAnalysis, Notice, READER, analyse_cut};
+use super::plausibility;
+use super::record::{Average, CutAnalysis, analyse_cut};
+use super::series::{MaterialComparison, Series, SpeedTrends, compare, speed_trends};
 use super::warnings;
 use crate::campaign::{Campaign, CutGeometry, Process};
 use crate::progress::Progress;
-use crate::{Error, InputError, Result, ingest};
+use crate::{Error, InputError, Result};
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct CfcOptions {
     /// Edge coefficients are held at zero or above.
     pub nonnegative_edges: bool,
+    /// Huber's robust regression where there are cuts enough; else it is the second opinion.
+    pub robust: bool,
 }
 
 /// What the dynamometer records say.
@@ -22,10 +28,16 @@ pub struct CfcOptions {
 pub struct CfcResult {
     /// Every usable cut, in the campaign's order.
     pub cuts: Vec<CutAnalysis>,
-    /// One per process and cutting speed where the feeds at that speed suffice; otherwise speeds are pooled.
+    /// One per process, material and cutting speed where the feeds at that speed suffice; otherwise speeds are pooled.
     pub groups: Vec<Group>,
-    /// All cuts of a process together, one group per process.
+    /// All cuts of a process and a material together, one group each.
     pub pooled: Vec<Group>,
+    /// What each coefficient does over cutting speed, per process and material with two speeds or more.
+    pub trends: Vec<SpeedTrends>,
+    /// Each further material against the first one of its process.
+    pub materials: Vec<MaterialComparison>,
+    /// Milling coefficients from the orthogonal database beside those of the cuts.
+    pub prediction: Option<Prediction>,
     pub warnings: Vec<String>,
 }
 
@@ -57,10 +69,9 @@ pub fn identify_forces(campaign: &Campaign, options: CfcOptions) -> Result<CfcRe
 }
 
 fn read_cut(campaign: &Campaign, index: usize) -> Result<CutAnalysis> {
-    let (record, reader_warnings) = ingest::read_time(&campaign.cuts[index].file)?;
+    let (record, notices) = read_record(campaign, index)?;
     let mut analysis = analyse_cut(campaign, index, &record)?;
-    let noticed = |detail| Notice { kind: READER, detail };
-    analysis.notices.extend(reader_warnings.into_iter().map(noticed));
+    analysis.notices.extend(notices);
     Ok(analysis)
 }
 
@@ -95,34 +106,68 @@ pub fn from_analyses(
     }
     turn_torque(&mut cuts, &mut warnings);
     let counted = without_duplicates(campaign, &cuts, &mut warnings);
-    warnings.extend(warnings::of_records(&cuts));
+    warnings.extend(warnings::of_records(campaign, &cuts));
 
     let (mut groups, mut pooled) = (Vec::new(), Vec::new());
+    let (mut trends, mut materials) = (Vec::new(), Vec::new());
     for process in [Process::Milling, Process::Drilling] {
         let of_process: Vec<&CutAnalysis> =
             counted.iter().copied().filter(|c| c.process == process).collect();
-        let Some(all) = Group::fit(&of_process, &rows, options.nonnegative_edges)? else {
-            continue;
-        };
-        warnings.extend(warnings::of_plan(campaign, &of_process, process));
-        for set in by_speed(&of_process, &mut warnings) {
-            groups.extend(Group::fit(&set, &rows, options.nonnegative_edges)?);
+        let mut series: Vec<Series> = Vec::new();
+        for cut in of_process {
+            let material = campaign.cuts[cut.cut].material.as_deref();
+            match series.iter_mut().find(|s| s.material == material) {
+                Some(one) => one.cuts.push(cut),
+                None => series.push(Series {
+                    process,
+                    material,
+                    cuts: vec![cut],
+                }),
+            }
         }
-        let misfits = misfits(&observations(&of_process, &rows));
-        warnings.extend(misfits.iter().map(|m| warnings::of_misfit(campaign, m)));
-        let by_speed: Vec<&Group> = groups.iter().filter(|g| g.process == process).collect();
-        warnings.extend(warnings::of_fits(&all, &by_speed));
-        pooled.push(all);
+        for one in &series {
+            let Some(all) = Group::fit(&one.cuts, one.material, &rows, options)? else {
+                continue;
+            };
+            let mut told = plausibility::of_scales(campaign, &one.cuts, process);
+            told.extend(warnings::of_plan(campaign, &one.cuts, process));
+            let first_group = groups.len();
+            for set in by_speed(&one.cuts, &mut told) {
+                groups.extend(Group::fit(&set, one.material, &rows, options)?);
+            }
+            let misfits = misfits(&observations(&one.cuts, &rows));
+            told.extend(misfits.iter().map(|m| warnings::of_misfit(campaign, m)));
+            let by_speed: Vec<&Group> = groups[first_group..].iter().collect();
+            told.extend(warnings::of_fits(&all, &by_speed));
+            told.extend(warnings::of_methods(&all, &by_speed, options));
+            if let Some(found) = speed_trends(campaign, one, &rows) {
+                told.extend(found.warnings());
+                trends.push(found);
+            }
+            let about = |warning: String| match one.material {
+                Some(material) if series.len() > 1 => format!("{material}: {warning}"),
+                _ => warning,
+            };
+            warnings.extend(told.into_iter().map(about));
+            pooled.push(all);
+        }
+        if let Some((first, others)) = series.split_first() {
+            materials.extend(others.iter().filter_map(|other| compare(first, other, &rows)));
+        }
     }
     if groups.is_empty() {
         return Err(Error::computation(
             "no cut holds an average on an axis that carries coefficients: check that Fx, Fy, Fz (drilling: Fz, Mz) are recorded",
         ));
     }
+    let prediction = predict(campaign, &pooled, &mut warnings);
     Ok(CfcResult {
         cuts,
         groups,
         pooled,
+        trends,
+        materials,
+        prediction,
         warnings,
     })
 }

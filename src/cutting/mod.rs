@@ -1,12 +1,18 @@
 //! Cutting forces: geometry, force models, regression of the coefficients.
 
 mod average_force;
-mod constrained;
+mod conic;
+mod estimate;
+mod faults;
 mod group;
 mod identify;
+mod orthogonal;
 mod outlier;
+mod plausibility;
 mod record;
 mod regression;
+mod series;
+mod trend;
 mod warnings;
 pub mod waveform;
 
@@ -16,12 +22,17 @@ pub use average_force::{
     CoefficientKind, DRILLING_COEFFICIENTS, DrillGeometry, ForceAxis, MILLING_COEFFICIENTS, average_row,
     coefficients_of, cutting_speed_m_per_min, feed_mm,
 };
-pub use constrained::{Constrained, nonnegative_least_squares};
+pub use conic::{ConicFit, Loss, conic_fit};
+pub use estimate::{BOOTSTRAP_CUTS, BOOTSTRAP_DRAWS, Estimate, HUBER_THRESHOLD, Method, bootstrap, estimate};
+pub use faults::read_record;
 pub(crate) use group::by_axis;
-pub use group::{Coefficient, Group, RegressionPoint};
+pub use group::{Coefficient, Group, Influence, Known, RegressionPoint};
 pub(crate) use identify::depth_mm;
 pub use identify::{CfcOptions, CfcResult, from_analyses, identify_forces};
-pub use outlier::{Misfit, misfits};
+pub use orthogonal::{ObliqueCoefficients, ObliqueEdge, Prediction};
+pub use outlier::{Misfit, misfits, studentized};
 pub use record::{Average, ChannelAnalysis, CutAnalysis, Notice, Trace, analyse_cut};
 pub use regression::{Fit, Observation, fit};
-pub(crate) use warnings::speed_text;
+pub use series::{MaterialComparison, SpeedTrends};
+pub use trend::{Change, Reading, table_trend};
+pub(crate) use warnings::{of_faults, speed_text};

@@ -4,10 +4,11 @@ use std::ops::Range;
 
 use super::average_force::{DrillGeometry, ForceAxis, cutting_speed_m_per_min, feed_mm};
 use crate::campaign::{Campaign, Cut, CutGeometry, Process, Tool};
+use crate::ingest::units::figures;
 use crate::ingest::{ChannelRole, TimeRecord};
 use crate::signal::{
-    self, Air, Blocks, DriftLine, Phases, Spindle, ToothLine, find_phases, fit_drift, tooth_line,
-    whole_revolutions,
+    self, Air, Blocks, Clipping, DriftLine, Phases, Spindle, ToothLine, find_faults, find_phases, fit_drift,
+    tooth_line, whole_revolutions,
 };
 use crate::{Error, InputError, Result};
 
@@ -85,14 +86,20 @@ pub const NO_AIR: &str = "no air cut in the record: drift and offset cannot be t
      record a second of air before and after each cut";
 pub const NO_AIR_BEFORE: &str = "no air before the cut: the zero line rests on the air after it alone";
 pub const NO_AIR_AFTER: &str = "no air after the cut: the zero line rests on the air before it alone";
-/// What the reader noticed about the file.
-pub(super) const READER: &str = "noticed while reading the file";
-const CHANNEL_MISSING: &str = "channel missing";
+const CHANNEL_MISSING: &str = "channel missing or not usable";
 const CHANNEL_DEAD: &str = "channel dead (one value throughout) and left out: check plug and amplifier";
 const CHANNEL_BROKEN: &str = "channel holds values that are no numbers and is left out";
 const BENT_DRIFT: &str = "the drift is not a line (the air bends away from it): averages may be off by more than \
-     their errors say";
-const WRONG_SPEED: &str = "the tooth-passing line is not where spindle_rpm puts it: check the spindle speed";
+     their errors say; let the amplifier warm up and reset it before each cut (`lobestone diagnose` can fit it as \
+     nonlinear-drift)";
+const STEEP_DRIFT: &str = "the zero drifts far: the line through the air is taken off; let the amplifier warm up and reset it \
+     before each cut";
+pub(super) const WRONG_SPEED: &str = "coefficients rest on a wrong spindle speed or number of teeth: correct spindle_rpm \
+     (and the feed per tooth that goes with it) or [tool] teeth";
+const CLIPPED: &str = "clipped, so that the true forces are larger: the channel is left out of this cut; choose a larger range \
+     at the amplifier and cut again";
+const CLIPPED_ELSEWHERE: &str = "clipped outside the steady window: averages are not touched, but choose a larger range at the \
+     amplifier";
 const SHORT_WINDOW: &str = "steady window shorter than 5 revolutions";
 const SPIKES: &str = "revolutions with spikes left out of the average";
 const WRONG_DURATION: &str = "the hole took another time than feed, speed and depth say: check them";
@@ -130,8 +137,31 @@ pub fn analyse_cut(campaign: &Campaign, cut_index: usize, record: &TimeRecord) -
     if usable.is_empty() {
         return Err(refuse("no usable force channel (Fx, Fy, Fz or Mz)".into()));
     }
-    let (phases, steady_given) = phases(cut, tool, record, &usable, samples_per_revolution)?;
+    // A channel that saturates shows neither air nor cut: the others tell where they are, if there are any.
+    let clippings: Vec<Option<Clipping>> = usable.iter().map(|c| find_faults(c.2).clipping).collect();
+    let (whole, cut_off): (Vec<_>, Vec<_>) = usable
+        .into_iter()
+        .zip(clippings)
+        .partition(|(_, clipping)| clipping.is_none());
+    let mut usable: Vec<UsableChannel> = whole.into_iter().map(|(channel, _)| channel).collect();
+    let all: Vec<UsableChannel> = usable
+        .iter()
+        .copied()
+        .chain(cut_off.iter().map(|(c, _)| *c))
+        .collect();
+    let telling = if usable.is_empty() { &all } else { &usable };
+    let (phases, steady_given) = phases(cut, tool, record, telling, samples_per_revolution)?;
     let steady = phases.steady.clone();
+    for (channel, clipping) in cut_off {
+        let clipping = clipping.unwrap_or_default();
+        if !is_spoilt(&channel, &clipping, &steady, record, &mut notices) {
+            usable.push(channel);
+        }
+    }
+    usable.sort_by_key(|channel| channel.0);
+    if usable.is_empty() {
+        return Err(refuse("every force channel is clipped".into()));
+    }
     let revolutions = steady.len() as f64 / samples_per_revolution;
     let seconds = |r: &Range<usize>| {
         let at = |i: usize| record.start_s + i as f64 / rate;
@@ -158,7 +188,9 @@ pub fn analyse_cut(campaign: &Campaign, cut_index: usize, record: &TimeRecord) -
             }
         })
         .collect();
-    air_notices(&phases.air, &channels, &mut notices);
+    let carrying = ForceAxis::of(cut.geometry.process());
+    let carriers: Vec<&ChannelAnalysis> = channels.iter().filter(|c| carrying.contains(&c.axis)).collect();
+    air_notices(&phases.air, &carriers, samples as f64 / rate, &mut notices);
     if revolutions < 4.999 {
         notices.push(Notice {
             kind: SHORT_WINDOW,
@@ -178,11 +210,7 @@ pub fn analyse_cut(campaign: &Campaign, cut_index: usize, record: &TimeRecord) -
     if let Some(line) = tooth_line.filter(ToothLine::speed_is_doubtful) {
         notices.push(Notice {
             kind: WRONG_SPEED,
-            detail: format!(
-                "strongest line at {:.1} Hz, which as tooth passing would be {:.0} rpm",
-                line.strongest_hz,
-                60.0 * line.strongest_hz / tool.teeth.max(1) as f64
-            ),
+            detail: wrong_speed(&line, cut.spindle_rpm, tool.teeth.max(1)),
         });
     }
     Ok(CutAnalysis {
@@ -203,6 +231,57 @@ pub fn analyse_cut(campaign: &Campaign, cut_index: usize, record: &TimeRecord) -
         tooth_line,
         notices,
     })
+}
+
+/// Part of the steady window that may be clipped without much harm.
+const CLIPPED_AT_MOST: f64 = 1e-3;
+/// Change of the zero over the record, as a part of the average force, that is worth telling.
+const STEEP: f64 = 0.75;
+
+/// Is so much of the channel clipped in the steady window that its average is wrong?
+fn is_spoilt(
+    channel: &UsableChannel,
+    clipping: &Clipping,
+    steady: &Range<usize>,
+    record: &TimeRecord,
+    notices: &mut Vec<Notice>,
+) -> bool {
+    let axis = channel.0;
+    let all: usize = clipping.plateaus.iter().map(Range::len).sum();
+    let inside = clipping.samples_in(steady);
+    let share = inside as f64 / steady.len().max(1) as f64;
+    let first = clipping.plateaus.first().map_or(0, |p| p.start);
+    let spoilt = share > CLIPPED_AT_MOST;
+    notices.push(Notice {
+        kind: if spoilt { CLIPPED } else { CLIPPED_ELSEWHERE },
+        detail: format!(
+            "{}: {all} samples at {} {} from {:.3} s on, {:.1} % of the steady window",
+            axis.label(),
+            figures(clipping.level, 4),
+            axis.unit(),
+            record.start_s + first as f64 / record.sample_rate_hz,
+            100.0 * share
+        ),
+    });
+    spoilt
+}
+
+/// `the tooth-passing line stands at 61.3 Hz, 1200 rpm × 2 teeth would put it at 40.0 Hz: …`
+fn wrong_speed(line: &ToothLine, spindle_rpm: f64, teeth: usize) -> String {
+    let hz = line.tooth_hz;
+    let as_teeth = 60.0 * hz / spindle_rpm;
+    let whole = as_teeth.round();
+    let other_tool = if whole >= 1.0 && (as_teeth - whole).abs() < 0.01 * whole && whole != teeth as f64 {
+        format!(", or the tool has {whole} teeth")
+    } else {
+        String::new()
+    };
+    format!(
+        "the tooth-passing line stands at {hz:.1} Hz, {spindle_rpm} rpm × {teeth} teeth would put it at {:.1} Hz: the spindle ran at \
+         about {:.0} rpm{other_tool}",
+        spindle_rpm / 60.0 * teeth as f64,
+        60.0 * hz / teeth as f64
+    )
 }
 
 type UsableChannel<'a> = (ForceAxis, &'a str, &'a [f64]);
@@ -356,7 +435,7 @@ fn scatter_of_mean(series: &[f64]) -> f64 {
     (variance / n * (1.0 + rho) / (1.0 - rho)).sqrt()
 }
 
-fn air_notices(air: &Air, channels: &[ChannelAnalysis], notices: &mut Vec<Notice>) {
+fn air_notices(air: &Air, channels: &[&ChannelAnalysis], record_s: f64, notices: &mut Vec<Notice>) {
     let kind = match (&air.before, &air.after) {
         (None, None) => Some(NO_AIR),
         (None, Some(_)) => Some(NO_AIR_BEFORE),
@@ -367,16 +446,41 @@ fn air_notices(air: &Air, channels: &[ChannelAnalysis], notices: &mut Vec<Notice
         kind,
         detail: String::new(),
     }));
-    let bent: Vec<String> = channels
-        .iter()
-        .filter(|c| c.drift.bend > 0.02 * c.average.value.abs())
-        .map(|c| format!("{} by {:.2} {}", c.axis.label(), c.drift.bend, c.axis.unit()))
-        .collect();
-    if !bent.is_empty() {
-        notices.push(Notice {
-            kind: BENT_DRIFT,
-            detail: bent.join(", "),
-        });
+    let is_bent = |c: &&&ChannelAnalysis| c.drift.bend > 0.02 * c.average.value.abs();
+    let bent = channels.iter().filter(is_bent).map(|c| {
+        let (label, unit) = (c.axis.label(), c.axis.unit());
+        format!("{label} by {:.2} {unit}{}", c.drift.bend, c.drift.shape())
+    });
+    // A channel that hardly carries force, or carries a ripple about zero, is measured by the others of its kind.
+    let size = |c: &ChannelAnalysis| {
+        let same = |o: &&&ChannelAnalysis| (o.axis == ForceAxis::Mz) == (c.axis == ForceAxis::Mz);
+        let forces = channels.iter().filter(same).map(|o| o.average.value.abs());
+        forces.fold(0.0, f64::max)
+    };
+    let change = |c: &ChannelAnalysis| c.drift.slope_per_s * record_s;
+    let is_steep = |c: &&&ChannelAnalysis| {
+        !is_bent(c)
+            && change(c).abs() > STEEP * size(c)
+            && c.drift.slope_per_s.abs() > 6.0 * c.drift.slope_std_per_s
+    };
+    let steep = channels.iter().filter(is_steep).map(|c| {
+        let (label, unit) = (c.axis.label(), c.axis.unit());
+        format!(
+            "{label} by {:+.2} {unit}/s, {:+.1} {unit} over the record",
+            c.drift.slope_per_s,
+            change(c)
+        )
+    });
+    for (kind, details) in [
+        (BENT_DRIFT, bent.collect::<Vec<String>>()),
+        (STEEP_DRIFT, steep.collect()),
+    ] {
+        if !details.is_empty() {
+            notices.push(Notice {
+                kind,
+                detail: details.join(", "),
+            });
+        }
     }
 }
 

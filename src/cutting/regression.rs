@@ -38,6 +38,25 @@ pub struct Fit {
     pub r2: [Option<f64>; 4],
     /// Total weight of each observation, 1/variance.
     pub weight: Vec<f64>,
+    /// Diagonal of the weighted hat matrix, 0…1 per observation: 1 means that nothing checks it.
+    pub leverage: Vec<f64>,
+    /// Σ (1 − leverage) over the observations of each axis.
+    pub dof: [f64; 4],
+    /// Of the solution, over what the data determines.
+    pub covariance: DMatrix<f64>,
+}
+
+impl Fit {
+    /// Row · solution.
+    pub fn predict(&self, row: &[f64]) -> f64 {
+        row.iter().zip(&self.solution).map(|(r, x)| r * x).sum()
+    }
+
+    /// Variance of [`Fit::predict`], from the errors of the coefficients alone.
+    pub fn prediction_variance(&self, row: &[f64]) -> f64 {
+        let row = DVector::from_column_slice(row);
+        (row.transpose() * &self.covariance * &row)[0].max(0.0)
+    }
 }
 
 /// Singular values below this part of the largest (columns of unit length) mean: not determined.
@@ -50,15 +69,8 @@ const ERROR_FLOOR: f64 = 1e-9;
 /// errors of zero this is ordinary least squares per axis. `None` without observations.
 pub fn fit(observations: &[Observation]) -> Option<Fit> {
     let unknowns = observations.first()?.row.len();
-    let size = observations
-        .iter()
-        .map(|o| o.value.abs())
-        .fold(0.0, f64::max)
-        .max(1e-300);
-    let variance: Vec<f64> = observations
-        .iter()
-        .map(|o| o.std_error.max(ERROR_FLOOR * size).powi(2))
-        .collect();
+    let size = size_of(observations);
+    let variance = measurement_variance(observations);
     let mut extra = [0.0f64; 4];
     let mut first_chi2 = None;
     let mut solved = Solved::new(observations, unknowns, &variance, &extra);
@@ -98,20 +110,39 @@ pub fn fit(observations: &[Observation]) -> Option<Fit> {
     Some(solved.into_fit(observations, extra, first_chi2.unwrap_or([None; 4])))
 }
 
+fn size_of(observations: &[Observation]) -> f64 {
+    let largest = observations.iter().map(|o| o.value.abs()).fold(0.0, f64::max);
+    largest.max(1e-300)
+}
+
+/// Squared measurement errors, each at least a rounding error of the values' size.
+pub(super) fn measurement_variance(observations: &[Observation]) -> Vec<f64> {
+    let floor = ERROR_FLOOR * size_of(observations);
+    observations
+        .iter()
+        .map(|o| o.std_error.max(floor).powi(2))
+        .collect()
+}
+
 /// Weighted least squares at given variances.
-struct Solved {
-    solution: Vec<f64>,
+pub(super) struct Solved {
+    pub(super) solution: Vec<f64>,
     residual: Vec<f64>,
     leverage: Vec<f64>,
     weight: Vec<f64>,
-    /// Variance of each coefficient on the determined space.
-    variance: Vec<f64>,
+    /// Of the coefficients, on the determined space.
+    pub(super) covariance: DMatrix<f64>,
     /// Null vectors in scaled columns.
-    null: Vec<Vec<f64>>,
+    pub(super) null: Vec<Vec<f64>>,
 }
 
 impl Solved {
-    fn new(observations: &[Observation], unknowns: usize, variance: &[f64], extra: &[f64; 4]) -> Solved {
+    pub(super) fn new(
+        observations: &[Observation],
+        unknowns: usize,
+        variance: &[f64],
+        extra: &[f64; 4],
+    ) -> Solved {
         let weight: Vec<f64> = observations
             .iter()
             .zip(variance)
@@ -137,7 +168,7 @@ impl Solved {
         let (u, v_t) = (svd.u.unwrap_or_default(), svd.v_t.unwrap_or_default());
         let largest = svd.singular_values.iter().copied().fold(0.0, f64::max);
         let mut solution = vec![0.0; unknowns];
-        let mut coefficient_variance = vec![0.0; unknowns];
+        let mut covariance = DMatrix::zeros(unknowns, unknowns);
         let mut leverage = vec![0.0; observations.len()];
         let mut null = Vec::new();
         for (k, &sigma) in svd.singular_values.iter().enumerate() {
@@ -147,12 +178,14 @@ impl Solved {
                 continue;
             }
             let along: f64 = (0..observations.len()).map(|i| u[(i, k)] * b[i]).sum::<f64>() / sigma;
-            for j in 0..unknowns {
-                if scale[j] > 0.0 {
-                    solution[j] += v[j] * along / scale[j];
-                    coefficient_variance[j] += (v[j] / sigma / scale[j]).powi(2);
-                }
+            let unscaled = DVector::from_fn(
+                unknowns,
+                |j, _| if scale[j] > 0.0 { v[j] / scale[j] } else { 0.0 },
+            );
+            for (x, d) in solution.iter_mut().zip(unscaled.iter()) {
+                *x += d * along;
             }
+            covariance += &unscaled * unscaled.transpose() / (sigma * sigma);
             for (i, h) in leverage.iter_mut().enumerate() {
                 *h += u[(i, k)].powi(2);
             }
@@ -166,7 +199,7 @@ impl Solved {
             residual,
             leverage,
             weight,
-            variance: coefficient_variance,
+            covariance,
             null,
         }
     }
@@ -175,38 +208,42 @@ impl Solved {
         let unknowns = self.solution.len();
         let touched = |v: &[f64], j: usize| v[j].powi(2) > 1e-8;
         let determined = |j: usize| !self.null.iter().any(|v| touched(v, j));
-        let mut r2 = [None; 4];
-        for axis in ForceAxis::ALL {
-            let on_axis = || {
-                observations
-                    .iter()
-                    .zip(&self.residual)
-                    .filter(|(o, _)| o.axis == axis)
-            };
-            let n = on_axis().count();
-            let mean = on_axis().map(|(o, _)| o.value).sum::<f64>() / n.max(1) as f64;
-            let total: f64 = on_axis().map(|(o, _)| (o.value - mean).powi(2)).sum();
-            let left: f64 = on_axis().map(|(_, r)| r * r).sum();
-            if n > 2 && total > 1e-12 * n as f64 * mean * mean {
-                r2[axis.index()] = Some(1.0 - left / total);
-            }
+        let mut dof = [0.0; 4];
+        for (o, leverage) in observations.iter().zip(&self.leverage) {
+            dof[o.axis.index()] += 1.0 - leverage;
         }
         Fit {
             value: (0..unknowns)
                 .map(|j| determined(j).then_some(self.solution[j]))
                 .collect(),
             std_error: (0..unknowns)
-                .map(|j| determined(j).then(|| self.variance[j].sqrt()))
+                .map(|j| determined(j).then(|| self.covariance[(j, j)].sqrt()))
                 .collect(),
             inseparable: coupled_sets(&self.null, unknowns),
+            r2: r2(observations, &self.solution),
             solution: self.solution,
             residual: self.residual,
             extra_scatter: extra.map(f64::sqrt),
             chi2_per_dof,
-            r2,
             weight: self.weight,
+            leverage: self.leverage,
+            dof,
+            covariance: self.covariance,
         }
     }
+}
+
+/// 1 − Σ residual²/Σ (value − mean)² of a solution, per axis; `None` where the averages do not vary.
+pub(super) fn r2(observations: &[Observation], solution: &[f64]) -> [Option<f64>; 4] {
+    ForceAxis::ALL.map(|axis| {
+        let on_axis = || observations.iter().filter(|o| o.axis == axis);
+        let n = on_axis().count();
+        let mean = on_axis().map(|o| o.value).sum::<f64>() / n.max(1) as f64;
+        let total: f64 = on_axis().map(|o| (o.value - mean).powi(2)).sum();
+        let fitted = |o: &Observation| o.row.iter().zip(solution).map(|(r, x)| r * x).sum::<f64>();
+        let left: f64 = on_axis().map(|o| (o.value - fitted(o)).powi(2)).sum();
+        (n > 2 && total > 1e-12 * n as f64 * mean * mean).then(|| 1.0 - left / total)
+    })
 }
 
 /// Groups of unknowns that the null space ties together: connected through the projector onto it.

@@ -3,26 +3,42 @@
 use std::collections::BTreeMap;
 
 use super::average_force::ForceAxis;
-use super::group::{Group, distinct};
+use super::estimate::Method;
+use super::group::{Coefficient, Group, distinct};
+use super::identify::CfcOptions;
 use super::outlier::Misfit;
-use super::record::{CutAnalysis, NO_AIR};
+use super::plausibility::unit_slip;
+use super::record::{CutAnalysis, NO_AIR, Notice, WRONG_SPEED};
 use crate::campaign::{Campaign, Process};
 
 /// Notices of all records, one sentence a kind.
-pub(super) fn of_records(cuts: &[CutAnalysis]) -> Vec<String> {
+pub(super) fn of_records(campaign: &Campaign, cuts: &[CutAnalysis]) -> Vec<String> {
+    let common = common_speed_error(campaign, cuts);
+    let told = |notice: &&Notice| common.is_none() || notice.kind != WRONG_SPEED;
+    let notices = cuts
+        .iter()
+        .flat_map(|c| c.notices.iter().filter(told).map(|n| (c.id.as_str(), n)));
+    common
+        .iter()
+        .cloned()
+        .chain(sentences(notices, cuts.len()))
+        .collect()
+}
+
+/// As [`of_records`], for the notices that [`super::read_record`] gives of `cuts` records.
+pub(crate) fn of_faults(notices: &[(String, Notice)], cuts: usize) -> Vec<String> {
+    sentences(notices.iter().map(|(id, n)| (id.as_str(), n)), cuts)
+}
+
+fn sentences<'a>(notices: impl Iterator<Item = (&'a str, &'a Notice)>, cuts: usize) -> Vec<String> {
     let mut by_kind: BTreeMap<&str, Vec<(&str, &str)>> = BTreeMap::new();
-    for cut in cuts {
-        for notice in &cut.notices {
-            by_kind
-                .entry(notice.kind)
-                .or_default()
-                .push((&cut.id, &notice.detail));
-        }
+    for (id, notice) in notices {
+        by_kind.entry(notice.kind).or_default().push((id, &notice.detail));
     }
     let sentence = |(kind, told): (&str, Vec<(&str, &str)>)| {
         let mut ids: Vec<&str> = told.iter().map(|(id, _)| *id).collect();
         ids.dedup();
-        if kind == NO_AIR && ids.len() == cuts.len() {
+        if kind == NO_AIR && ids.len() == cuts {
             return format!("all cuts: {kind}");
         }
         let one = |(id, detail): &(&str, &str)| match *detail {
@@ -39,6 +55,31 @@ pub(super) fn of_records(cuts: &[CutAnalysis]) -> Vec<String> {
         format!("cut {list}: {kind}")
     };
     by_kind.into_iter().map(sentence).collect()
+}
+
+/// Where the tooth-passing line of every cut is off by one factor, it is not the operator's speeds that are wrong.
+fn common_speed_error(campaign: &Campaign, cuts: &[CutAnalysis]) -> Option<String> {
+    let teeth = campaign.tool.as_ref()?.teeth.max(1);
+    let milled = || cuts.iter().filter(|c| c.process == Process::Milling);
+    let factors: Vec<f64> = milled()
+        .filter_map(|c| c.tooth_line.filter(|l| l.speed_is_doubtful()).map(|l| (c, l)))
+        .map(|(c, line)| line.tooth_hz * 60.0 / (c.spindle_rpm * teeth as f64))
+        .collect();
+    let factor = crate::signal::median(&factors);
+    let same = factors.len() >= 2 && factors.len() == milled().count();
+    if !same || factors.iter().any(|f| (f / factor - 1.0).abs() > 0.01) {
+        return None;
+    }
+    let other_teeth = (teeth as f64 * factor).round();
+    let teeth_text = if (teeth as f64 * factor / other_teeth - 1.0).abs() < 0.01 {
+        format!("the tool has {other_teeth} teeth and not {teeth}, or ")
+    } else {
+        String::new()
+    };
+    Some(format!(
+        "all cuts: the tooth-passing line stands at {factor:.3} times the frequency that spindle_rpm and {teeth} teeth give: \
+         {teeth_text}the sampling rate in the files is wrong by that factor, or every spindle_rpm is"
+    ))
 }
 
 /// Cells of a speed × feed plan that stayed empty, where there clearly was a plan.
@@ -84,9 +125,21 @@ pub(super) fn of_plan(campaign: &Campaign, cuts: &[&CutAnalysis], process: Proce
 /// A cut that the others do not predict.
 pub(super) fn of_misfit(campaign: &Campaign, misfit: &Misfit) -> String {
     let unit = misfit.axis.unit();
+    let slip = match (
+        misfit.swapped(),
+        unit_slip(misfit.measured / misfit.predicted, misfit.axis),
+    ) {
+        (Some([a, b]), _) => format!(
+            " ({} and {} look swapped: plugs or column names?)",
+            a.label(),
+            b.label()
+        ),
+        (None, Some(slip)) => format!(" ({slip}?)"),
+        (None, None) => String::new(),
+    };
     format!(
-        "cut {} does not fit the others: {} {:.2} {unit} measured, {:.2} {unit} from the other cuts; check its feed, \
-         speed, depth and file",
+        "cut {} does not fit the others: {} {:.2} {unit} measured, {:.2} {unit} from the other cuts{slip}; check its feed, \
+         speed, depth, file and units",
         campaign.cuts[misfit.cut].id,
         misfit.axis.label(),
         misfit.measured,
@@ -156,13 +209,115 @@ pub(super) fn of_fits(all: &Group, groups: &[&Group]) -> Vec<String> {
     warnings
 }
 
+/// Bootstrap and regression errors further apart than this factor contradict each other.
+const ERRORS_APART: f64 = 2.5;
+/// The bootstrap's own scatter with fewer cuts allows small values.
+const CUTS_FOR_SMALL_BOOTSTRAP: usize = 10;
+/// A cut with at least this leverage decides a coefficient by itself.
+const ALONE: f64 = 0.95;
+
+/// What robust regression, bootstrap and leverage say about `all` cuts of a process and its groups.
+pub(super) fn of_methods(all: &Group, groups: &[&Group], options: CfcOptions) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let pooled_too = !groups.iter().any(|g| g.cuts == all.cuts);
+    for group in groups.iter().copied().chain(pooled_too.then_some(all)) {
+        let speed = speed_text(group);
+        let determined = || group.coefficients.iter().filter(|c| c.value.is_some());
+        if options.robust && group.method != Method::Huber && group.is_complete() {
+            warnings.push(format!(
+                "at {speed} m/min: too few cuts for robust regression (three more averages on every axis than \
+                 coefficients they carry), least squares is used there"
+            ));
+        }
+        let apart: Vec<String> = determined().filter_map(methods_apart).collect();
+        if !apart.is_empty() {
+            let (this, other, remedy) = match group.method {
+                Method::LeastSquares => (
+                    "least squares",
+                    "robust (Huber) regression",
+                    "; mend or leave out the cuts that do not fit, or use --robust",
+                ),
+                Method::Huber => ("robust (Huber) regression", "least squares", ""),
+            };
+            warnings.push(format!(
+                "at {speed} m/min: {this} and {other} disagree by more than their standard errors ({}): single cuts \
+                 pull the coefficients{remedy}",
+                apart.join(", ")
+            ));
+        }
+        let ratios: Vec<(f64, &Coefficient)> = determined()
+            .filter_map(|c| Some((c.std_error_bootstrap? / c.std_error?, c)))
+            .filter(|(ratio, _)| ratio.is_finite())
+            .collect();
+        let list = |picked: &dyn Fn(f64) -> bool| -> Vec<String> {
+            ratios
+                .iter()
+                .filter(|(ratio, _)| picked(*ratio))
+                .map(|(ratio, c)| format!("{} by {ratio:.1}", c.label))
+                .collect()
+        };
+        let larger = list(&|r| r > ERRORS_APART);
+        if !larger.is_empty() {
+            warnings.push(format!(
+                "at {speed} m/min: drawing the cuts again (bootstrap) gives larger standard errors than the regression \
+                 ({} times): the answer hangs on which cuts were made; trust the larger ones",
+                larger.join(", ")
+            ));
+        }
+        let smaller = list(&|r| r < 1.0 / ERRORS_APART);
+        // Scatter that is allowed for makes the regression's errors larger for a reason of its own.
+        let errors_suffice = group.chi2_per_dof.iter().flatten().all(|c| *c < 1.0);
+        if errors_suffice && !smaller.is_empty() && group.cuts.len() >= CUTS_FOR_SMALL_BOOTSTRAP {
+            warnings.push(format!(
+                "at {speed} m/min: drawing the cuts again (bootstrap) gives smaller standard errors than the regression \
+                 ({} times): the averages agree better than their own errors say",
+                smaller.join(", ")
+            ));
+        }
+        let alone: Vec<&str> = group
+            .influence
+            .iter()
+            .filter(|i| i.leverage >= ALONE)
+            .map(|i| i.cut.as_str())
+            .collect();
+        // With two feeds every cut is; that is told elsewhere.
+        if group.feeds > 2 && !alone.is_empty() {
+            warnings.push(format!(
+                "at {speed} m/min: cut {} alone decides part of the coefficients (leverage near 1), nothing checks it: \
+                 repeat it",
+                alone.join(", ")
+            ));
+        }
+    }
+    warnings
+}
+
+/// `Ktc 930.1 ± 0.8 against 921.0 ± 0.7 N/mm²` where the two methods differ by more than the larger standard error.
+fn methods_apart(c: &Coefficient) -> Option<String> {
+    let (value, error, other) = (c.value?, c.std_error?, c.other_method?);
+    let other_error = other.std_error?;
+    let apart = (value - other.value).abs() > error.max(other_error);
+    apart.then(|| {
+        format!(
+            "{} {value:.2} ± {error:.2} against {:.2} ± {other_error:.2} {}",
+            c.label, other.value, c.unit
+        )
+    })
+}
+
 /// What is implausible or poorly known about one coefficient, over the groups.
 fn of_coefficient(groups: &[&Group], j: usize, warnings: &mut Vec<String>) {
     let (mut negative, mut poor, mut held) = (Vec::new(), Vec::new(), Vec::new());
     for group in groups {
         let (speed, c) = (speed_text(group), &group.coefficients[j]);
         match (c.value, c.std_error) {
-            _ if c.constraint_active => held.push(speed),
+            _ if c.constraint_active => {
+                let free = c.unconstrained.map_or(String::new(), |k| {
+                    let error = k.std_error.map_or(String::new(), |e| format!(" ± {e:.2}"));
+                    format!(" (without it {:.2}{error})", k.value)
+                });
+                held.push(format!("{speed}{free}"));
+            }
             (Some(value), Some(error)) if value < -2.0 * error => {
                 negative.push(format!("{value:.2} at {speed}"));
             }
@@ -198,9 +353,10 @@ fn of_coefficient(groups: &[&Group], j: usize, warnings: &mut Vec<String>) {
     }
     if !held.is_empty() {
         warnings.push(format!(
-            "{} is held at zero by the constraint at {} m/min",
+            "{} is held at zero by the constraint at {} m/min; {}",
             c.label,
-            held.join(", ")
+            held.join(", "),
+            c.unit
         ));
     }
 }

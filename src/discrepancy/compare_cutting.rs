@@ -21,6 +21,8 @@ pub struct CuttingComparison {
     pub by_feed: Vec<Group>,
     /// Milling: order of the tool's rotation, 0 the mean.
     pub by_harmonic: Vec<Harmonic>,
+    /// Place in the sequence of cuts, as the campaign has it; first cut first, empty where it does not say.
+    pub by_order: Vec<Group>,
     pub cuts: Vec<CutError>,
 }
 
@@ -41,6 +43,8 @@ pub struct CutError {
     pub noise_floor_nrms: f64,
     /// Weighted misfit per number compared, entry, air and lines off the comb included: 1 where only noise is left.
     pub chi2_per_value: f64,
+    /// By tool axis: error in multiples of the noise; `None` where there is no noise to compare with.
+    pub times_noise: Vec<(String, Option<f64>)>,
 }
 
 impl CuttingComparison {
@@ -48,11 +52,13 @@ impl CuttingComparison {
     pub fn new(data: &CuttingData, fits: &[CutFit]) -> Self {
         let mut total = Sums::default();
         let mut decibel = (0.0, 0usize);
-        let [mut by_cut, mut by_axis, mut by_speed, mut by_feed] = std::array::from_fn(|_| Groups::default());
+        let [mut by_cut, mut by_axis, mut by_speed, mut by_feed, mut by_order] =
+            std::array::from_fn(|_| Groups::default());
         let mut harmonics: Vec<Sums> = Vec::new();
         let mut cuts = Vec::new();
         for (cut, fit) in data.cuts.iter().zip(fits) {
             let mut own = Sums::default();
+            let mut times_noise = Vec::new();
             for axis in axis_waves(data, cut, fit) {
                 let mut sums = Sums::default();
                 for (n, wave) in axis.orders.iter().enumerate() {
@@ -73,15 +79,23 @@ impl CuttingComparison {
                 by_axis.add(axis.axis.label(), sums);
                 by_speed.add(&format!("{:.1}", cut.cutting_speed_m_per_min), sums);
                 by_feed.add(&format!("{}", cut.feed_mm), sums);
+                times_noise.push((
+                    axis.axis.label().to_string(),
+                    (sums.noise > 0.0).then(|| (sums.error / sums.noise).sqrt()),
+                ));
                 own.add(sums);
             }
             by_cut.add(&cut.id, own);
+            if let Some(order) = cut.order {
+                by_order.add(&order.to_string(), own);
+            }
             total.add(own);
             cuts.push(CutError {
                 cut: cut.id.clone(),
                 nrms: own.nrms(),
                 noise_floor_nrms: own.floor(),
                 chi2_per_value: fit.chi2 / cut.value_count().max(1) as f64,
+                times_noise,
             });
         }
         let whole = |part: f64| {
@@ -106,6 +120,11 @@ impl CuttingComparison {
             by_axis: by_axis.finish(),
             by_speed: by_speed.finish(),
             by_feed: by_feed.finish(),
+            by_order: {
+                let mut groups = by_order.finish();
+                groups.sort_by_key(|g| g.name.parse::<i64>().unwrap_or(i64::MAX));
+                groups
+            },
             by_harmonic: harmonics
                 .iter()
                 .enumerate()

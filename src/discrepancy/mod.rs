@@ -9,7 +9,7 @@ pub mod next_measurement;
 pub mod verdict;
 
 pub use compare::{Band, FrfComparison, FrfError};
-pub use compare_cutting::CuttingComparison;
+pub use compare_cutting::{CutError, CuttingComparison};
 pub use diagnose::{Candidate, Diagnosis, diagnose};
 pub use explained::Explained;
 pub use verdict::Verdict;

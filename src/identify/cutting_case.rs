@@ -28,6 +28,27 @@ pub fn recorded_cutting_effect(instance: &CuttingInstance) -> RecordedEffect {
     }
 }
 
+fn material(campaign: &Campaign, cut: usize) -> &str {
+    campaign.cuts[cut].material.as_deref().unwrap_or("no material")
+}
+
+/// The material of most cuts (the first of equals) and the names of the others; `None` where there is one only.
+fn materials(campaign: &Campaign, data: &CuttingData) -> Option<(String, String)> {
+    let mut counts: Vec<(&str, usize)> = Vec::new();
+    for cut in &data.cuts {
+        let material = material(campaign, cut.cut);
+        match counts.iter_mut().find(|c| c.0 == material) {
+            Some(one) => one.1 += 1,
+            None => counts.push((material, 1)),
+        }
+    }
+    let most = counts.iter().map(|c| c.1).max()?;
+    let main = counts.iter().position(|c| c.1 == most)?;
+    let (name, _) = counts.remove(main);
+    let others: Vec<&str> = counts.iter().map(|c| c.0).collect();
+    (!others.is_empty()).then(|| (name.to_string(), others.join(", ")))
+}
+
 impl CuttingCase {
     /// The cuts of the campaign's main process.
     ///
@@ -44,8 +65,14 @@ impl CuttingCase {
                     .into(),
             );
         };
-        let data = CuttingData::load(campaign, process)?;
+        let mut data = CuttingData::load(campaign, process)?;
         let mut warnings = data.warnings.clone();
+        if let Some((main, others)) = materials(campaign, &data) {
+            warnings.push(format!(
+                "the cuts of {others} are not compared: one material at a time, here {main}, of which most cuts are"
+            ));
+            data = data.filtered(|i| material(campaign, data.cuts[i].cut) == main);
+        }
         if let Some(other) = processes.get(1) {
             let name = match other {
                 Process::Milling => "milling",

@@ -13,12 +13,12 @@ use super::force_channel::{force_channel, sample_std, widen_for_vibration};
 use super::off_comb::{OffComb, find_vibration};
 use crate::campaign::{Campaign, Process};
 use crate::cutting::waveform::{DrillTerm, DrillingCut, MillingCut, UnitForces};
-use crate::cutting::{ForceAxis, analyse_cut, feed_mm};
+use crate::cutting::{ForceAxis, Notice, analyse_cut, feed_mm, of_faults, read_record};
 use crate::effects::cutting::{CutSetting, CuttingSummary};
 use crate::ingest::{ChannelRole, TimeRecord};
 use crate::progress::Progress;
 use crate::signal::{highest_order, line_amplitude, order_spectrum};
-use crate::{Error, InputError, Result, ingest};
+use crate::{Error, InputError, Result};
 
 /// What was cut.
 #[derive(Debug, Clone)]
@@ -46,6 +46,8 @@ pub struct CutData {
     /// Per tooth (milling), per revolution (drilling).
     pub feed_mm: f64,
     pub setting: CutSetting,
+    /// Place in the sequence of cuts, where the campaign says it.
+    pub order: Option<i64>,
     pub kind: CutKind,
     /// Recorded x, y, z, torque; `None` where there is no usable channel or the process puts no force on it.
     pub channels: [Option<ForceChannel>; 4],
@@ -189,19 +191,22 @@ impl CuttingData {
             .into());
         }
         let progress = Progress::new("force waveforms", indices.len());
-        let outcomes: Vec<Result<CutData>> = indices
+        let outcomes: Vec<Result<(CutData, Vec<Notice>)>> = indices
             .par_iter()
             .map(|&i| {
-                let (record, _) = ingest::read_time(&campaign.cuts[i].file)?;
+                let (record, notices) = read_record(campaign, i)?;
                 let outcome = cut_data(campaign, i, &record);
                 progress.step();
-                outcome
+                Ok((outcome?, notices))
             })
             .collect();
-        let (mut cuts, mut warnings) = (Vec::new(), Vec::new());
+        let (mut cuts, mut warnings, mut faults) = (Vec::new(), Vec::new(), Vec::new());
         for (&i, outcome) in indices.iter().zip(outcomes) {
             match outcome {
-                Ok(cut) => cuts.push(cut),
+                Ok((cut, notices)) => {
+                    faults.extend(notices.into_iter().map(|n| (cut.id.clone(), n)));
+                    cuts.push(cut);
+                }
                 Err(error) => warnings.push(format!("cut {} is left out: {error}", campaign.cuts[i].id)),
             }
         }
@@ -212,6 +217,7 @@ impl CuttingData {
                 warnings.first().map_or("", String::as_str)
             )));
         }
+        warnings.extend(of_faults(&faults, indices.len()));
         turn_torque(&mut cuts);
         place_in_campaign(campaign, &mut cuts);
         let tool_from_dyno = campaign.dynamometer.tool_from_dyno;
@@ -387,6 +393,7 @@ fn cut_data(campaign: &Campaign, index: usize, record: &TimeRecord) -> Result<Cu
             feed_mm: feed_mm(&cut.geometry),
             has_vibration: vibration.is_some(),
         },
+        order: campaign.cuts[index].order,
         kind,
         channels,
         orders,

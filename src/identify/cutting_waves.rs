@@ -42,11 +42,17 @@ pub fn axis_waves(data: &CuttingData, cut: &CutData, fit: &CutFit) -> Vec<AxisWa
 /// Recorded channel, the model on it, and its weight in the tool axis.
 type Part<'a> = (&'a ForceChannel, &'a ChannelFit, f64);
 
-fn one_axis(data: &CuttingData, cut: &CutData, fit: &CutFit, axis: ForceAxis) -> Option<AxisWaves> {
+/// The recorded channels that make up a tool axis; `None` where one is missing. Torques count `force_per_torque` times.
+fn parts<'a>(
+    data: &CuttingData,
+    cut: &'a CutData,
+    fit: &'a CutFit,
+    axis: ForceAxis,
+    force_per_torque: f64,
+) -> Option<Vec<Part<'a>>> {
     let i = axis.index();
     let weights: Vec<(usize, f64)> = if axis == ForceAxis::Mz {
-        // Force and torque in one sum: each relative to its own size.
-        vec![(i, data.force_per_torque)]
+        vec![(i, force_per_torque)]
     } else {
         let row = data.tool_from_dyno[i];
         let largest = row.iter().fold(0.0f64, |m, v| m.max(v.abs()));
@@ -55,10 +61,15 @@ fn one_axis(data: &CuttingData, cut: &CutData, fit: &CutFit, axis: ForceAxis) ->
             .map(|j| (j, row[j]))
             .collect()
     };
-    let parts: Vec<Part> = weights
+    weights
         .iter()
         .map(|(j, a)| Some((cut.channels[*j].as_ref()?, fit.channels[*j].as_ref()?, *a)))
-        .collect::<Option<_>>()?;
+        .collect()
+}
+
+fn one_axis(data: &CuttingData, cut: &CutData, fit: &CutFit, axis: ForceAxis) -> Option<AxisWaves> {
+    // Force and torque in one sum: each relative to its own size.
+    let parts = parts(data, cut, fit, axis, data.force_per_torque)?;
     let orders = parts.first()?.1.orders.len();
     let mut waves = AxisWaves {
         axis,
@@ -119,5 +130,87 @@ fn level(process: Process, cut: &CutData, parts: &[Part]) -> WaveSums {
             signal: square(&signal),
             noise,
         },
+    }
+}
+
+/// The course of one tool axis in one cut, measured and modelled, both above the zero line.
+#[derive(Debug, Clone)]
+pub struct Course {
+    pub axis: ForceAxis,
+    /// Milling: rotation of the tool from its position at phase 0, degrees; drilling: time from the first block, s.
+    pub x: Vec<f64>,
+    /// N (N·m), as long as `x`.
+    pub measured: Vec<f64>,
+    pub model: Vec<f64>,
+}
+
+/// Points drawn over a revolution.
+const POINTS_PER_TURN: usize = 360;
+
+/// The mean revolution (milling) or the course over the hole (drilling) of every tool axis that the recorded channels
+/// determine.
+pub fn courses(data: &CuttingData, cut: &CutData, fit: &CutFit) -> Vec<Course> {
+    ForceAxis::ALL
+        .into_iter()
+        .filter_map(|axis| {
+            let parts = parts(data, cut, fit, axis, 1.0)?;
+            Some(match data.process {
+                Process::Milling => revolution(axis, cut, &parts),
+                Process::Drilling => hole(axis, cut, &parts),
+            })
+        })
+        .collect()
+}
+
+fn revolution(axis: ForceAxis, cut: &CutData, parts: &[Part]) -> Course {
+    let steady = cut.steady.clone();
+    let n = steady.len().max(1) as f64;
+    let mean = |value: &dyn Fn(&Part, usize) -> f64| -> f64 {
+        let sum = |part: &Part| steady.clone().map(|b| value(part, b)).sum::<f64>() / n;
+        parts.iter().map(|part| part.2 * sum(part)).sum()
+    };
+    let orders = parts.first().map_or(0, |p| p.1.orders.len());
+    let turn = |level: f64, order: &dyn Fn(&Part, usize) -> Complex64| -> Vec<f64> {
+        let sums: Vec<Complex64> = (0..orders)
+            .map(|k| parts.iter().map(|part| order(part, k) * part.2).sum())
+            .collect();
+        (0..POINTS_PER_TURN)
+            .map(|i| {
+                let angle = std::f64::consts::TAU * i as f64 / POINTS_PER_TURN as f64;
+                let waves = sums.iter().enumerate();
+                level
+                    + waves
+                        .map(|(k, c)| 2.0 * (c * Complex64::from_polar(1.0, (k + 1) as f64 * angle)).re)
+                        .sum::<f64>()
+            })
+            .collect()
+    };
+    Course {
+        axis,
+        x: (0..POINTS_PER_TURN)
+            .map(|i| 360.0 * i as f64 / POINTS_PER_TURN as f64)
+            .collect(),
+        measured: turn(
+            mean(&|(channel, fit, _), b| channel.level[b] - fit.reference[b]),
+            &|(channel, ..), k| channel.orders[k],
+        ),
+        model: turn(mean(&|(_, fit, _), b| fit.level[b]), &|(_, fit, _), k| {
+            fit.orders[k]
+        }),
+    }
+}
+
+fn hole(axis: ForceAxis, cut: &CutData, parts: &[Part]) -> Course {
+    let blocks = 0..cut.block_s.len();
+    let start = cut.block_s.first().map_or(0.0, |b| b[0]);
+    let over = |value: &dyn Fn(&Part, usize) -> f64| -> Vec<f64> {
+        let sum = |b: usize| parts.iter().map(|part| part.2 * value(part, b)).sum();
+        blocks.clone().map(sum).collect()
+    };
+    Course {
+        axis,
+        x: cut.block_s.iter().map(|b| 0.5 * (b[0] + b[1]) - start).collect(),
+        measured: over(&|(channel, fit, _), b| channel.level[b] - fit.reference[b]),
+        model: over(&|(_, fit, _), b| fit.level[b]),
     }
 }

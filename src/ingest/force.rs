@@ -1,5 +1,7 @@
 //! Time records from text: DynoWare exports and plain force tables. Channel roles, units, time axis.
 
+use std::ops::Range;
+
 use super::InputError;
 use super::number;
 use super::table::{Header, Table};
@@ -14,62 +16,184 @@ pub(super) fn is_time_table(header: &Header) -> bool {
 
 /// Reads the rows and makes them a time record in SI.
 pub(super) fn read(bytes: &[u8], header: &Header, notes: &mut Notes) -> Result<TimeRecord, InputError> {
-    let rate = sampling_rate(header);
-    let mut table = header.read(bytes, rate, notes)?;
-    check_numbers(&table, header)?;
-    let (time, resolution) = match time_column(header) {
-        Some(at) => {
-            let unit = column_unit(header, at).filter(|u| u.dimension == Dimension::TIME);
-            let factor = unit.map_or(1.0, |u| u.factor);
-            let resolution = time_resolution(bytes, header, at) * factor;
-            let mut seconds = std::mem::take(&mut table.columns[at]);
-            seconds.iter_mut().for_each(|t| *t *= factor);
-            (Some((at, seconds)), resolution)
+    let mut pieces = Pieces::new(bytes, header.clone());
+    let table = header.read(bytes, pieces.rate, notes)?;
+    let record = pieces.next(table, header.data_line, notes)?;
+    pieces.finish(notes);
+    Ok(record)
+}
+
+/// A table of time signals that is read piece by piece: what one piece has to know of those before it.
+pub(super) struct Pieces {
+    pub header: Header,
+    /// Of the header lines.
+    rate: Option<f64>,
+    resolution_s: f64,
+    clock: Option<Clock>,
+    /// Last row of the piece before, time included.
+    last: Vec<f64>,
+    samples: usize,
+    lost: Lost,
+}
+
+/// How the time column runs, decided from the first piece.
+#[derive(Debug, Clone, Copy)]
+struct Clock {
+    rate_hz: f64,
+    start_s: f64,
+    /// Rounding of the printed times; `None` where they are too coarse to show gaps.
+    rounding_s: Option<f64>,
+}
+
+impl Pieces {
+    /// `head`: the file's beginning, with the first rows.
+    pub fn new(head: &[u8], header: Header) -> Self {
+        let resolution_s = time_column(&header).map_or(0.0, |at| {
+            time_resolution(head, &header, at) * time_factor(&header, at)
+        });
+        Pieces {
+            rate: sampling_rate(&header),
+            resolution_s,
+            clock: None,
+            last: Vec::new(),
+            samples: 0,
+            lost: Lost::default(),
+            header,
         }
-        None => (None, 0.0),
-    };
-    let samples = table.columns.iter().map(Vec::len).max().unwrap_or(0);
-    if samples < 2 {
-        return Err(InputError::new("a time record of less than two samples").line(header.data_line));
     }
-    let (sample_rate_hz, start_s) = match &time {
-        Some((_, seconds)) => time_axis(seconds, resolution, rate, header, notes)?,
-        None => {
-            let rate = rate.ok_or_else(|| no_time(header))?;
-            notes.file("no time column: time from the sampling rate, starting at 0 s");
-            (rate, 0.0)
+
+    /// The next rows as a record of their own; they begin at line `first_line`.
+    pub fn next(
+        &mut self,
+        mut table: Table,
+        first_line: usize,
+        notes: &mut Notes,
+    ) -> Result<TimeRecord, InputError> {
+        let header = &self.header;
+        check_numbers(&table, header, first_line)?;
+        let time_at = time_column(header);
+        if let Some(at) = time_at {
+            let factor = time_factor(header, at);
+            table.columns[at].iter_mut().for_each(|t| *t *= factor);
         }
-    };
-    if !(sample_rate_hz.is_finite() && start_s.is_finite()) {
-        return Err(InputError::new("time values beyond the range of numbers").line(header.data_line));
-    }
-    let skip = time.map(|(at, _)| at);
-    let columns = table
-        .columns
-        .into_iter()
-        .enumerate()
-        .filter(|(i, _)| Some(*i) != skip);
-    let channels = columns
-        .map(|(i, values)| channel(header, i, values, notes))
-        .collect::<Result<Vec<Channel>, _>>()?;
-    if channels.is_empty() {
-        return Err(InputError::new("a time column and no channel beside it").line(header.data_line));
-    }
-    let mut seen: Vec<ChannelRole> = Vec::new();
-    for channel in channels.iter().filter(|c| c.role != ChannelRole::Other) {
-        if seen.contains(&channel.role) {
-            notes.about(
-                &channel.name,
-                "a second channel for the same force: the first one is used",
-            );
+        let rows = table.columns.iter().map(Vec::len).max().unwrap_or(0);
+        if self.clock.is_none() && rows < 2 {
+            return Err(InputError::new("a time record of less than two samples").line(header.data_line));
         }
-        seen.push(channel.role);
+        let clock = match (self.clock, time_at) {
+            (Some(clock), _) => clock,
+            (None, Some(at)) => time_axis(&table.columns[at], self.resolution_s, self.rate, header, notes)?,
+            (None, None) => {
+                let rate_hz = self.rate.ok_or_else(|| no_time(header))?;
+                notes.file("no time column: time from the sampling rate, starting at 0 s");
+                Clock {
+                    rate_hz,
+                    start_s: 0.0,
+                    rounding_s: None,
+                }
+            }
+        };
+        if !(clock.rate_hz.is_finite() && clock.start_s.is_finite()) {
+            return Err(InputError::new("time values beyond the range of numbers").line(header.data_line));
+        }
+        self.clock = Some(clock);
+        // The last row of the piece before, so that a gap between pieces is one too.
+        let overlap = usize::from(!self.last.is_empty());
+        let next_last: Vec<f64> = table.columns.iter().filter_map(|c| c.last().copied()).collect();
+        if overlap == 1 {
+            for (column, last) in table.columns.iter_mut().zip(&self.last) {
+                column.insert(0, *last);
+            }
+        }
+        if !next_last.is_empty() {
+            self.last = next_last;
+        }
+        let gaps = match (time_at, clock.rounding_s) {
+            (Some(at), Some(rounding_s)) => {
+                self.lost
+                    .look(&table.columns[at], 1.0 / clock.rate_hz, rounding_s)
+            }
+            _ => Vec::new(),
+        };
+        let mut filled = Vec::new();
+        let columns = table.columns.into_iter().enumerate();
+        let channels = columns
+            .filter(|(i, _)| Some(*i) != time_at)
+            .map(|(i, mut values)| {
+                filled = fill(&mut values, &gaps);
+                values.drain(..overlap.min(values.len()));
+                channel(header, i, values, notes)
+            })
+            .collect::<Result<Vec<Channel>, _>>()?;
+        if channels.is_empty() {
+            return Err(InputError::new("a time column and no channel beside it").line(header.data_line));
+        }
+        filled
+            .iter_mut()
+            .for_each(|r| *r = r.start - overlap..r.end - overlap);
+        let mut seen: Vec<ChannelRole> = Vec::new();
+        for channel in channels.iter().filter(|c| c.role != ChannelRole::Other) {
+            if seen.contains(&channel.role) {
+                notes.about(
+                    &channel.name,
+                    "a second channel for the same force: the first one is used",
+                );
+            }
+            seen.push(channel.role);
+        }
+        let record = TimeRecord {
+            sample_rate_hz: clock.rate_hz,
+            start_s: clock.start_s + self.samples as f64 / clock.rate_hz,
+            channels,
+            filled,
+        };
+        self.samples += record.len();
+        Ok(record)
     }
-    Ok(TimeRecord {
-        sample_rate_hz,
-        start_s,
-        channels,
-    })
+
+    /// What the time column showed over all pieces.
+    pub fn finish(&self, notes: &mut Notes) {
+        self.lost.tell(notes);
+    }
+}
+
+fn time_factor(header: &Header, at: usize) -> f64 {
+    let unit = column_unit(header, at).filter(|u| u.dimension == Dimension::TIME);
+    unit.map_or(1.0, |u| u.factor)
+}
+
+/// A place where samples are missing: those behind sample `after`, so many.
+#[derive(Debug, Clone, Copy)]
+struct Gap {
+    after: usize,
+    missing: usize,
+}
+
+/// Puts a straight line into the gaps; gives where it now runs.
+fn fill(values: &mut Vec<f64>, gaps: &[Gap]) -> Vec<Range<usize>> {
+    if gaps.is_empty() {
+        return Vec::new();
+    }
+    let missing: usize = gaps.iter().map(|g| g.missing).sum();
+    let mut whole = Vec::with_capacity(values.len() + missing);
+    let (mut filled, mut done) = (Vec::new(), 0);
+    for gap in gaps {
+        let Some([from, to]) = values
+            .get(gap.after..gap.after + 2)
+            .and_then(|v| v.first_chunk::<2>())
+        else {
+            continue;
+        };
+        whole.extend_from_slice(&values[done..=gap.after]);
+        done = gap.after + 1;
+        let start = whole.len();
+        let step = (to - from) / (gap.missing + 1) as f64;
+        whole.extend((1..=gap.missing).map(|k| from + step * k as f64));
+        filled.push(start..whole.len());
+    }
+    whole.extend_from_slice(&values[done..]);
+    *values = whole;
+    filled
 }
 
 fn no_time(header: &Header) -> InputError {
@@ -78,16 +202,21 @@ fn no_time(header: &Header) -> InputError {
         .remedy("name a column `time_s` or add a line `Sampling rate [Hz]:,10000` above the names")
 }
 
-fn check_numbers(table: &Table, header: &Header) -> Result<(), InputError> {
+fn check_numbers(table: &Table, header: &Header, first_line: usize) -> Result<(), InputError> {
     for (i, column) in table.columns.iter().enumerate() {
         if let Some(row) = column.iter().position(|v| !v.is_finite()) {
             let name = header
                 .names
                 .get(i)
                 .map_or_else(|| format!("column {}", i + 1), |n| format!("channel {n}"));
-            return Err(InputError::new(format!("{name} has no valid number in data row {}", row + 1))
-                .line(header.data_line + row)
-                .remedy("a record with missing samples cannot be used: export it again or cut the row range out"));
+            return Err(InputError::new(format!(
+                "{name} has no valid number in data row {}",
+                first_line - header.data_line + row + 1
+            ))
+            .line(first_line + row)
+            .remedy(
+                "a record with missing samples cannot be used: export it again or cut the row range out",
+            ));
         }
     }
     Ok(())
@@ -291,15 +420,19 @@ fn time_axis(
     header_rate: Option<f64>,
     header: &Header,
     notes: &mut Notes,
-) -> Result<(f64, f64), InputError> {
-    let start = seconds[0];
+) -> Result<Clock, InputError> {
+    let start_s = seconds[0];
     let (own, rounding_s) = own_step(seconds, resolution);
     if !(own.is_finite() && own > 0.0) {
         let error = InputError::new("the time column does not rise").line(header.data_line);
         return match header_rate {
             Some(rate) if seconds.is_sorted() && resolution * rate > 1.0 => {
                 notes.file("the printed time is too coarse: time from the sampling rate");
-                Ok((rate, start))
+                Ok(Clock {
+                    rate_hz: rate,
+                    start_s,
+                    rounding_s: None,
+                })
             }
             _ => Err(error.remedy("the time column must rise from row to row")),
         };
@@ -318,8 +451,11 @@ fn time_axis(
             rounded_rate(own, rounding)
         }
     };
-    report_gaps(seconds, 1.0 / rate, rounding_s, notes);
-    Ok((rate, start))
+    Ok(Clock {
+        rate_hz: rate,
+        start_s,
+        rounding_s: Some(rounding_s),
+    })
 }
 
 /// Step of the time column and what rounding of the printed times is left in it. Where nearly all steps agree the
@@ -358,27 +494,70 @@ fn rounded_rate(step: f64, rounding: f64) -> f64 {
     }
 }
 
-/// Says where samples are missing or time runs backwards.
-fn report_gaps(seconds: &[f64], step: f64, resolution: f64, notes: &mut Notes) {
-    let slack = 0.5 * step + 1.01 * resolution;
-    let (mut missing, mut gaps, mut first, mut backwards) = (0.0, 0, None, 0);
-    for pair in seconds.windows(2) {
-        let jump = pair[1] - pair[0];
-        if jump > step + slack {
-            missing += (jump / step).round() - 1.0;
-            gaps += 1;
-            first = first.or(Some(pair[0]));
-        } else if jump < -1.01 * resolution.max(1e-12) {
-            backwards += 1;
+/// Gaps may add up to this part of a record; beyond it the time column is something else than a clock.
+const FILL_AT_MOST: f64 = 0.1;
+
+/// Samples that were lost on the way, over all pieces.
+#[derive(Debug, Default)]
+struct Lost {
+    missing: f64,
+    places: usize,
+    first_after_s: Option<f64>,
+    backwards: usize,
+    unfilled: bool,
+}
+
+impl Lost {
+    /// Where samples are missing in the times of a piece; none where they cannot be filled.
+    fn look(&mut self, seconds: &[f64], step: f64, resolution: f64) -> Vec<Gap> {
+        let slack = 0.5 * step + 1.01 * resolution;
+        let (mut missing, mut gaps, mut backwards) = (0.0, Vec::new(), 0);
+        for (after, pair) in seconds.windows(2).enumerate() {
+            let jump = pair[1] - pair[0];
+            if jump > step + slack {
+                let count = (jump / step).round() - 1.0;
+                missing += count;
+                gaps.push(Gap {
+                    after,
+                    missing: count as usize,
+                });
+            } else if jump < -1.01 * resolution.max(1e-12) {
+                backwards += 1;
+            }
         }
+        self.backwards += backwards;
+        self.missing += missing;
+        self.places += gaps.len();
+        let first = gaps.first().map(|g| seconds[g.after]);
+        self.first_after_s = self.first_after_s.or(first);
+        if gaps.is_empty() || backwards == 0 && missing <= FILL_AT_MOST * seconds.len() as f64 {
+            return gaps;
+        }
+        self.unfilled = true;
+        Vec::new()
     }
-    if let Some(first) = first {
-        notes.file(format!(
-            "{missing:.0} samples dropped at {gaps} places (the first after {first:.6} s): times behind them are early"
-        ));
-    }
-    if backwards > 0 {
-        notes.file(format!("the time column runs backwards at {backwards} places"));
+
+    fn tell(&self, notes: &mut Notes) {
+        if self.backwards > 0 {
+            notes.file(format!(
+                "the time column runs backwards at {} places",
+                self.backwards
+            ));
+        }
+        let Some(first) = self.first_after_s else { return };
+        let places = if self.places == 1 { "place" } else { "places" };
+        let what = format!(
+            "{:.0} samples dropped at {} {places} (the first after {first:.6} s)",
+            self.missing, self.places
+        );
+        notes.file(if self.unfilled {
+            format!("{what}: too many to fill, times behind them are early; record again")
+        } else {
+            format!(
+                "{what}: the gaps are filled, so that times behind them are right (cfc puts the revolutions beside in their \
+                 place); record to a faster disk or at a lower rate"
+            )
+        });
     }
 }
 

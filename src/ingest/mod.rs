@@ -14,6 +14,7 @@ mod checks;
 mod detect;
 mod force;
 mod frf_text;
+mod long;
 mod lvm;
 mod mat;
 mod number;
@@ -28,6 +29,7 @@ mod uff;
 pub mod units;
 mod waveform;
 
+pub use long::{Survey, survey};
 pub use quality::quality_warnings;
 pub use uff::{
     Abscissa, ByteOrder, Dataset58, Encoding58, EntityDof, Ordinate, UnitAxis, frf_dataset, time_datasets,
@@ -150,17 +152,10 @@ fn count(n: usize, what: &str) -> String {
 /// # Errors
 /// The operating system's; an unknown or unreadable format, or a damaged file, with file, line and remedy.
 pub fn read_file(path: &Path) -> Result<MeasurementFile> {
-    let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
-    let is_dwd_named = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("dwd"));
-    let mut notes = Notes::default();
-    let (format, why, contents) = read_bytes(&bytes, is_dwd_named, &mut notes).map_err(|e| e.file(path))?;
-    Ok(MeasurementFile {
-        path: path.to_path_buf(),
-        format,
-        why,
-        contents,
-        warnings: notes.into_warnings(),
-    })
+    match long::open(path)? {
+        long::Opened::Read(file) => Ok(file),
+        long::Opened::Long(record) => record.whole(),
+    }
 }
 
 /// As [`read_file`], on bytes.
@@ -407,6 +402,8 @@ pub struct TimeRecord {
     /// Time of the first sample, s.
     pub start_s: f64,
     pub channels: Vec<Channel>,
+    /// Samples that the recorder dropped: stretches filled by a straight line, so that the times behind them are right.
+    pub filled: Vec<std::ops::Range<usize>>,
 }
 
 impl TimeRecord {

@@ -1,46 +1,206 @@
-//! Faults that time records show: clipping, stuck samples, spikes, no air time. Few and sure: a warning that is
-//! wrong half the time is read never.
+//! Faults that time records show, in words: clipping, stuck samples, spikes, channels that are alike or far too small, drift,
+//! no air time.
 
+use std::ops::Range;
+
+use super::units::figures;
 use super::{Channel, ChannelRole, TimeRecord};
+use crate::signal::{self, DriftLine, Spindle, find_faults, find_phases, fit_drift};
 
 /// What looks wrong with a record. Works on the samples alone; dropped samples are found while reading.
 pub fn quality_warnings(record: &TimeRecord) -> Vec<String> {
-    let mut warnings = Vec::new();
-    let time = |sample: usize| record.start_s + sample as f64 / record.sample_rate_hz;
-    for channel in &record.channels {
-        let name = &channel.name;
-        let Some((low, high)) = range(&channel.samples) else {
-            continue;
-        };
-        if low == high {
-            warnings.push(format!(
-                "{name}: the same value in every sample, the channel is dead"
-            ));
-            continue;
-        }
-        if let Some(at) = clipped(&channel.samples, low, high) {
-            warnings.push(format!(
-                "{name}: clipped (first at {:.4} s): the range of the channel is too small",
-                time(at)
-            ));
-        }
-        if let Some((at, length)) = stuck(&channel.samples, low, high) {
-            warnings.push(format!(
-                "{name}: {length} samples stuck at one value from {:.4} s on",
-                time(at)
-            ));
-        }
-        let spikes = spikes(&channel.samples);
-        if let Some(first) = spikes.first() {
-            warnings.push(format!(
-                "{name}: {} single-sample spikes (first at {:.4} s)",
-                spikes.len(),
-                time(*first)
-            ));
+    let mut check = QualityCheck::default();
+    check.add(record);
+    check.warnings()
+}
+
+/// Looks at a record piece by piece, so that one of any length is looked at in little memory: samples by the piece, what
+/// needs the whole record on a thinned copy.
+#[derive(Debug, Default)]
+pub struct QualityCheck {
+    channels: Vec<Found>,
+    /// Every n-th sample.
+    thinned: Option<TimeRecord>,
+    every: usize,
+    seen: usize,
+}
+
+/// What was found in one channel so far.
+#[derive(Debug, Default)]
+struct Found {
+    alive: bool,
+    clipped: Stretches,
+    stuck: Stretches,
+    spikes: Stretches,
+    range: Option<(f64, f64)>,
+    /// Every sample so far equals that of this channel before it.
+    same_as: Option<usize>,
+}
+
+/// Places of one kind of fault.
+#[derive(Debug, Default)]
+struct Stretches {
+    count: usize,
+    samples: usize,
+    /// Time and value of the first, and its length.
+    first: Option<(f64, f64, usize)>,
+}
+
+impl Stretches {
+    fn add(&mut self, ranges: &[Range<usize>], time: impl Fn(usize) -> f64, value: impl Fn(usize) -> f64) {
+        self.count += ranges.len();
+        self.samples += ranges.iter().map(Range::len).sum::<usize>();
+        if let (None, Some(first)) = (self.first, ranges.first()) {
+            self.first = Some((time(first.start), value(first.start), first.len()));
         }
     }
-    warnings.extend(no_air(record));
-    warnings
+}
+
+/// Samples kept for what needs the whole record.
+const THINNED: usize = 1 << 19;
+
+impl QualityCheck {
+    /// For a record of about `samples` in all.
+    pub fn for_length(samples: usize) -> Self {
+        QualityCheck {
+            every: samples.div_ceil(THINNED).max(1),
+            ..Self::default()
+        }
+    }
+
+    /// The next piece, with the same channels as those before.
+    pub fn add(&mut self, piece: &TimeRecord) {
+        let every = self.every.max(1);
+        let channels = &piece.channels;
+        self.channels
+            .resize_with(channels.len().max(self.channels.len()), Found::default);
+        let first_piece = self.seen == 0;
+        for (i, channel) in channels.iter().enumerate() {
+            let samples = &channel.samples;
+            let alike = |j: usize| channels[j].role != ChannelRole::Other && channels[j].samples == *samples;
+            let twin = (channel.role != ChannelRole::Other)
+                .then(|| (0..i).find(|j| alike(*j)))
+                .flatten();
+            let found = &mut self.channels[i];
+            found.same_as = twin.filter(|j| first_piece || found.same_as == Some(*j));
+            let faults = find_faults(samples);
+            let before = found.range;
+            found.range = range(samples)
+                .into_iter()
+                .chain(before)
+                .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+            if faults.dead && found.range.is_some_and(|r| r.0 == r.1) {
+                continue;
+            }
+            let time = |sample: usize| piece.start_s + sample as f64 / piece.sample_rate_hz;
+            let value = |sample: usize| samples[sample];
+            if faults.dead && !first_piece && !samples.is_empty() {
+                let whole = 0..samples.len();
+                found.stuck.add(std::slice::from_ref(&whole), time, value);
+            }
+            found.alive = true;
+            found.spikes.add(&faults.spikes, time, value);
+            found.stuck.add(&faults.stuck, time, value);
+            if let Some(clipping) = &faults.clipping {
+                found.clipped.add(&clipping.plateaus, time, |_| clipping.level);
+            }
+        }
+        let from = self.seen.next_multiple_of(every) - self.seen;
+        let thin = |c: &Channel| {
+            c.samples
+                .iter()
+                .copied()
+                .skip(from)
+                .step_by(every)
+                .collect::<Vec<f64>>()
+        };
+        match &mut self.thinned {
+            Some(whole) => {
+                for (kept, channel) in whole.channels.iter_mut().zip(channels) {
+                    kept.samples.extend(thin(channel));
+                }
+            }
+            None => {
+                let copy = |c: &Channel| Channel {
+                    samples: thin(c),
+                    name: c.name.clone(),
+                    file_unit: c.file_unit.clone(),
+                    role: c.role,
+                };
+                self.thinned = Some(TimeRecord {
+                    sample_rate_hz: piece.sample_rate_hz / every as f64,
+                    start_s: piece.start_s,
+                    channels: channels.iter().map(copy).collect(),
+                    filled: Vec::new(),
+                });
+            }
+        }
+        self.seen += piece.len();
+    }
+
+    /// All that was found.
+    pub fn warnings(&self) -> Vec<String> {
+        let Some(record) = &self.thinned else {
+            return Vec::new();
+        };
+        let mut warnings = Vec::new();
+        for (channel, found) in record.channels.iter().zip(&self.channels) {
+            warnings.extend(found.warnings(channel, &record.channels));
+        }
+        warnings.extend(far_too_small(record, &self.channels));
+        warnings.extend(no_air(record));
+        warnings.extend(drift(record));
+        warnings
+    }
+}
+
+impl Found {
+    fn warnings(&self, channel: &Channel, all: &[Channel]) -> Vec<String> {
+        let (name, unit) = (&channel.name, channel.quantity_and_unit().1);
+        let mut warnings = Vec::new();
+        if !self.alive && self.range.is_some() {
+            return vec![format!(
+                "{name}: the same value in every sample, the channel is dead: check its plug and amplifier"
+            )];
+        }
+        if let Some(twin) = self.same_as.and_then(|j| all.get(j)) {
+            warnings.push(format!(
+                "{name}: the same samples as {}: one column was exported twice, so that a channel is missing; export again",
+                twin.name
+            ));
+        }
+        if let Some((at, level, _)) = self.clipped.first {
+            warnings.push(format!(
+                "{name}: clipped at {} {unit}: {} peaks cut off ({} samples, the first at {at:.4} s); the true values \
+                 are larger. Choose a larger range at the amplifier and measure again",
+                figures(level, 4), self.clipped.count, self.clipped.samples
+            ));
+        }
+        if let Some((at, value, length)) = self.stuck.first {
+            let more = match self.stuck.count {
+                1 => String::new(),
+                n => format!(
+                    ", and {} more stretches ({} samples in all)",
+                    n - 1,
+                    self.stuck.samples
+                ),
+            };
+            warnings.push(format!(
+                "{name}: {length} samples stuck at {} {unit} from {at:.4} s on{more}: look at plug, cable and \
+                 recorder; cfc puts the revolutions beside in their place",
+                figures(value, 4)
+            ));
+        }
+        if let Some((at, value, _)) = self.spikes.first {
+            warnings.push(format!(
+                "{name}: {} spikes of up to three samples (the first at {at:.4} s, {} {unit}): electrical \
+                 disturbance; cfc leaves them out",
+                self.spikes.count,
+                figures(value, 4)
+            ));
+        }
+        warnings
+    }
 }
 
 fn range(samples: &[f64]) -> Option<(f64, f64)> {
@@ -52,71 +212,105 @@ fn range(samples: &[f64]) -> Option<(f64, f64)> {
     )
 }
 
-/// Runs of equal samples: start and length.
-fn runs(samples: &[f64]) -> impl Iterator<Item = (usize, usize)> + '_ {
-    let mut at = 0;
-    samples.chunk_by(|a, b| a == b).map(move |run| {
-        at += run.len();
-        (at - run.len(), run.len())
-    })
-}
-
-/// Samples in a row at the extreme value that make a plateau.
-const PLATEAU: usize = 3;
-
-/// First sample of a clipped peak: at least two plateaus at an extreme value.
-fn clipped(samples: &[f64], low: f64, high: f64) -> Option<usize> {
-    // Signals of few digits repeat values by nature: nothing can be said about plateaus there.
-    let repeats = samples
-        .windows(2)
-        .filter(|w| w[0] == w[1] && w[0] != low && w[0] != high)
-        .count();
-    if 10 * repeats > samples.len() {
-        return None;
-    }
-    for extreme in [high, low] {
-        let plateaus: Vec<(usize, usize)> = runs(samples)
-            .filter(|&(at, n)| n >= PLATEAU && samples[at] == extreme)
-            .collect();
-        let total: usize = plateaus.iter().map(|p| p.1).sum();
-        // A single long one is a stuck channel rather than a peak cut off.
-        if plateaus.len() >= 2 && total >= 2 * PLATEAU {
-            return plateaus.first().map(|p| p.0);
-        }
-    }
-    None
-}
-
-/// Samples in a row without any change that mean a stuck channel.
-const STUCK: usize = 20;
-
-fn stuck(samples: &[f64], low: f64, high: f64) -> Option<(usize, usize)> {
-    let longest = runs(samples).max_by_key(|r| r.1)?;
-    let (at, length) = longest;
-    // Quiet stretches of a coarse channel repeat too; leave them out of the count of repeats.
-    let others = samples[..at].windows(2).chain(samples[at + length..].windows(2));
-    let (repeats, all) = others.fold((0, 0), |(r, n), w| (r + usize::from(w[0] == w[1]), n + 1));
-    let clipping = (samples[at] == low || samples[at] == high) && length < 2 * STUCK;
-    (length >= STUCK && !clipping && 10 * repeats < all).then_some((at, length))
-}
-
-/// Single samples far out of line with both neighbours.
-fn spikes(samples: &[f64]) -> Vec<usize> {
-    if samples.len() < 200 {
-        return Vec::new();
-    }
-    let bend = |i: usize| (samples[i] - 0.5 * (samples[i - 1] + samples[i + 1])).abs();
-    let mut bends: Vec<f64> = (1..samples.len() - 1).map(bend).collect();
-    let rank = (bends.len() as f64 * 0.998) as usize;
-    let (_, &mut usual, _) = bends.select_nth_unstable_by(rank.min(samples.len() - 3), f64::total_cmp);
-    if usual == 0.0 {
-        return Vec::new();
-    }
-    let alone = |i: &usize| {
-        let (before, after) = (samples[i - 1] - samples[*i], samples[i + 1] - samples[*i]);
-        bend(*i) > 8.0 * usual && before * after > 0.0 && before.abs().min(after.abs()) > 6.0 * usual
+fn forces(record: &TimeRecord) -> impl Iterator<Item = (usize, &Channel)> {
+    let is_force = |role| {
+        matches!(
+            role,
+            ChannelRole::ForceX | ChannelRole::ForceY | ChannelRole::ForceZ
+        )
     };
-    (1..samples.len() - 1).filter(alone).collect()
+    record
+        .channels
+        .iter()
+        .enumerate()
+        .filter(move |(_, c)| is_force(c.role))
+}
+
+/// Ratio of the spans of two force channels of one dynamometer beyond which their units differ: noise alone makes a
+/// hundredth, kN for N a thousandth.
+const SAME_UNIT: f64 = 400.0;
+
+fn far_too_small(record: &TimeRecord, found: &[Found]) -> Vec<String> {
+    let span = |i: usize| found.get(i).and_then(|f| f.range).map_or(0.0, |r| r.1 - r.0);
+    let largest = forces(record).map(|(i, _)| span(i)).fold(0.0, f64::max);
+    let small = forces(record).filter(|(i, _)| span(*i) > 0.0 && span(*i) * SAME_UNIT < largest);
+    small
+        .map(|(i, c)| {
+            format!(
+                "{}: spans {:.2e} N, {:.0} times less than the largest force channel: kN called N, or the amplifier's range is \
+                 set wrongly; correct the unit in the file",
+                c.name,
+                span(i),
+                largest / span(i)
+            )
+        })
+        .collect()
+}
+
+/// Blocks that a record is cut into to find its air without knowing the spindle.
+const DRIFT_BLOCKS: f64 = 200.0;
+/// Change of the zero over the record, as a part of the largest cutting force in it, that is worth telling.
+const DRIFT_WORTH_TELLING: f64 = 0.75;
+/// Bend of the zero off a line, as a part of the channel's own force, that is worth telling.
+const BEND_WORTH_TELLING: f64 = 0.03;
+
+/// Says which force channels drift far between the air before and after the cut, along a line or a curve.
+fn drift(record: &TimeRecord) -> Vec<String> {
+    let samples: Vec<&[f64]> = forces(record).map(|(_, c)| c.samples.as_slice()).collect();
+    let spindle = Spindle {
+        samples_per_revolution: record.len() as f64 / DRIFT_BLOCKS,
+        teeth: 1,
+    };
+    if samples.is_empty() || spindle.samples_per_revolution < 4.0 {
+        return Vec::new();
+    }
+    let Some(phases) = find_phases(&samples, spindle, None) else {
+        return Vec::new();
+    };
+    let (Some(before), Some(after)) = (&phases.air.before, &phases.air.after) else {
+        return Vec::new();
+    };
+    let length_s = record.len() as f64 / record.sample_rate_hz;
+    let lines: Vec<(&Channel, DriftLine, f64)> = forces(record)
+        .map(|(_, channel)| {
+            let drift = fit_drift(
+                &channel.samples,
+                record.sample_rate_hz,
+                record.start_s,
+                &phases.air,
+            );
+            let time = |i: usize| record.start_s + i as f64 / record.sample_rate_hz;
+            let steady = &channel.samples[phases.steady.clone()];
+            let (mean, spread) = mean_and_spread(steady);
+            let level = mean - drift.at(time((phases.steady.start + phases.steady.end) / 2));
+            (channel, drift, level.abs().max(spread))
+        })
+        .collect();
+    let largest = lines.iter().map(|l| l.2).fold(0.0, f64::max);
+    let told = lines.into_iter().filter_map(|(channel, drift, size)| {
+        let means = [before, after].map(|r| signal::mean(&channel.samples[r.clone()]));
+        let change = means[1] - means[0];
+        if drift.bend > BEND_WORTH_TELLING * size {
+            return Some(format!(
+                "{}: the zero drifts along a curve{}, {} N off the straight line through the air, {change:+.1} N over the record: \
+                 let the amplifier warm up and reset it before each cut; `lobestone diagnose` can fit it (nonlinear-drift)",
+                channel.name,
+                drift.shape(),
+                figures(drift.bend, 3)
+            ));
+        }
+        let steep = change.abs() > DRIFT_WORTH_TELLING * largest && change.abs() > 6.0 * drift.offset_std;
+        steep.then(|| {
+            format!(
+                "{}: the zero drifts along a line by {:+.2} N/s, {:+.1} N over the record, much beside the cutting force: cfc takes the \
+                 line through the air off; let the amplifier warm up and reset it before each cut",
+                channel.name,
+                drift.slope_per_s,
+                drift.slope_per_s * length_s
+            )
+        })
+    });
+    told.collect()
 }
 
 /// Pieces a force record is cut into to see when the tool cuts.
@@ -128,16 +322,7 @@ const LIKE_THE_MIDDLE: f64 = 0.7;
 
 /// Says where a force record starts or ends in the cut: there drift cannot be told from edge force.
 fn no_air(record: &TimeRecord) -> Option<String> {
-    let forces: Vec<&Channel> = record
-        .channels
-        .iter()
-        .filter(|c| {
-            matches!(
-                c.role,
-                ChannelRole::ForceX | ChannelRole::ForceY | ChannelRole::ForceZ
-            )
-        })
-        .collect();
+    let forces: Vec<&Channel> = forces(record).map(|(_, c)| c).collect();
     if forces.len() < 2 || record.len() < 20 * PIECES {
         return None;
     }
@@ -216,6 +401,7 @@ mod tests {
             sample_rate_hz: 1000.0,
             start_s: 0.0,
             channels,
+            filled: Vec::new(),
         }
     }
 
@@ -240,16 +426,16 @@ mod tests {
         for (found, what) in [
             (
                 warnings(|v| v.iter_mut().for_each(|v| *v = v.min(180.0))),
-                "Fx: clipped",
+                "Fx: clipped at 180.0 N: ",
             ),
             (
                 warnings(|v| v[1000..1050].fill(12.0)),
-                "Fx: 50 samples stuck at one value from 1.0000 s",
+                "Fx: 50 samples stuck at 12.00 N from 1.0000 s",
             ),
             (warnings(|v| v.fill(1.0)), "Fx: the same value"),
             (
                 warnings(|v| v[500] += 5000.0),
-                "Fx: 1 single-sample spikes (first at 0.5000 s)",
+                "Fx: 1 spikes of up to three samples (the first at 0.5000 s",
             ),
         ] {
             assert!(
@@ -257,6 +443,64 @@ mod tests {
                 "{what}: {found:?}"
             );
         }
+    }
+
+    #[test]
+    fn channels_that_are_alike_or_in_another_unit_are_told() {
+        let mut twice = record(0.8, 3.2);
+        twice.channels[1].samples = twice.channels[0].samples.clone();
+        let found = quality_warnings(&twice);
+        assert!(
+            found.len() == 1 && found[0].starts_with("Fy: the same samples as Fx"),
+            "{found:?}"
+        );
+        let found = warnings(|v| v.iter_mut().for_each(|v| *v /= 1000.0));
+        assert!(
+            found.len() == 1 && found[0].contains("times less than the largest"),
+            "{found:?}"
+        );
+        assert!(
+            found[0].starts_with("Fx: ") && found[0].contains("kN called N"),
+            "{found:?}"
+        );
+    }
+
+    #[test]
+    fn drift_is_told_with_its_shape_and_size() {
+        let add = |f: fn(f64) -> f64| warnings(|v| (0..v.len()).for_each(|i| v[i] += f(i as f64 * 1e-3)));
+        let found = add(|t| 60.0 * t);
+        assert!(
+            found.len() == 1 && found[0].starts_with("Fx: the zero drifts along a line by +63."),
+            "{found:?}"
+        );
+        let found = add(|t| -150.0 * (-t / 0.6).exp());
+        assert!(
+            found.len() == 1 && found[0].starts_with("Fx: the zero drifts along a curve"),
+            "{found:?}"
+        );
+        let text = found[0].split("time constant about ").nth(1).expect(&found[0]);
+        let tau: f64 = text.split(' ').next().unwrap().parse().unwrap();
+        assert!((tau / 0.6 - 1.0).abs() < 0.2, "{tau}");
+    }
+
+    /// The pieces of a long record say what the whole says.
+    #[test]
+    fn a_record_in_pieces_is_the_same_record() {
+        let mut whole = record(0.0, 3.2);
+        whole.channels[0].samples[500] += 5000.0;
+        whole.channels[1].samples[2100..2150].fill(3.3);
+        let mut check = QualityCheck::default();
+        for k in 0..4 {
+            let mut piece = whole.clone();
+            piece.start_s = k as f64;
+            for channel in &mut piece.channels {
+                channel.samples = channel.samples[1000 * k..1000 * (k + 1)].to_vec();
+            }
+            check.add(&piece);
+        }
+        let found = quality_warnings(&whole);
+        assert_eq!(found.len(), 3, "{found:?}");
+        assert_eq!(check.warnings(), found);
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! Columns of numbers under header lines: comma, semicolon, tab or blanks; decimal point or comma.
 
+use rayon::prelude::*;
+
 use super::InputError;
 use super::number;
 use super::split_comma;
@@ -150,32 +152,68 @@ impl Header {
         if data.contains(&b'"') {
             return self.read_quoted(data, notes);
         }
+        self.read_rows(data, self.data_line, true, notes)
+    }
+
+    /// Reads the rows of one piece of the file that ends with a line; its first line has number `first_line`. Only the last
+    /// piece may end within a row.
+    ///
+    /// # Errors
+    /// As [`Header::read`].
+    pub fn read_rows(
+        &self,
+        data: &[u8],
+        first_line: usize,
+        is_last: bool,
+        notes: &mut Notes,
+    ) -> Result<Table, InputError> {
+        let parts: Vec<Part> = split_at_lines(data)
+            .into_par_iter()
+            .map(|p| self.read_part(p))
+            .collect();
+        let rows = parts.iter().map(|p| p.columns.last().map_or(0, Vec::len)).sum();
+        let mut columns: Vec<Vec<f64>> = (0..self.columns).map(|_| Vec::with_capacity(rows)).collect();
+        let mut line = first_line;
+        let count = parts.len();
+        for (k, part) in parts.into_iter().enumerate() {
+            for (column, own) in columns.iter_mut().zip(&part.columns) {
+                column.extend_from_slice(own);
+            }
+            if let Some((text, rest_is_blank)) = part.bad {
+                let full = columns.last().is_some_and(|c| !c.is_empty());
+                if is_last && k + 1 == count && rest_is_blank && full {
+                    notes.file("the last row is incomplete and left out");
+                    break;
+                }
+                return Err(self.bad_row(&text, line + part.lines));
+            }
+            line += part.lines;
+        }
+        Ok(Table { columns })
+    }
+
+    fn read_part(&self, data: &[u8]) -> Part {
         let width = Lines::new(data).next().map_or(1, |l| l.len() + 1).max(1);
         // A row takes two bytes a column at least: what a header announces cannot claim memory.
         let rows = (data.len() / width).min(data.len() / (2 * self.columns.max(1))) + 16;
         let mut columns: Vec<Vec<f64>> = (0..self.columns).map(|_| Vec::with_capacity(rows)).collect();
-        let mut at = 0;
-        let mut line = self.data_line;
+        let (mut at, mut lines, mut bad) = (0, 0, None);
         while at < data.len() {
             match self.read_row(data, at, &mut columns) {
-                Row::Full(next) => at = next,
-                Row::Blank(next) => at = next,
+                Row::Full(next) | Row::Blank(next) => at = next,
                 Row::Bad => {
                     let length = data[at..].iter().position(|b| *b == b'\n');
                     let rest = length.map_or(&[][..], |l| &data[at + l..]);
                     let full = columns.last().map_or(0, Vec::len);
                     columns.iter_mut().for_each(|c| c.truncate(full));
-                    if rest.trim_ascii().is_empty() && full > 0 {
-                        notes.file("the last row is incomplete and left out");
-                        break;
-                    }
                     let text = decode(&data[at..length.map_or(data.len(), |l| at + l)]);
-                    return Err(self.bad_row(&text, line));
+                    bad = Some((text, rest.trim_ascii().is_empty()));
+                    break;
                 }
             }
-            line += 1;
+            lines += 1;
         }
-        Ok(Table { columns })
+        Part { columns, lines, bad }
     }
 
     fn bad_row(&self, text: &str, line: usize) -> InputError {
@@ -305,6 +343,37 @@ impl Header {
         }
         Ok(Table { columns })
     }
+}
+
+/// Rows that one thread read.
+struct Part {
+    columns: Vec<Vec<f64>>,
+    /// Lines read before the end or the bad row.
+    lines: usize,
+    /// A row that is none, and whether nothing follows it.
+    bad: Option<(String, bool)>,
+}
+
+/// Bytes worth a thread of their own.
+const PART: usize = 1 << 20;
+
+/// The text in parts that end with a line.
+fn split_at_lines(data: &[u8]) -> Vec<&[u8]> {
+    let (mut parts, mut rest) = (Vec::new(), data);
+    while rest.len() > 2 * PART {
+        let Some(end) = rest[PART..].iter().position(|b| *b == b'\n') else {
+            break;
+        };
+        let (part, after) = rest.split_at(PART + end + 1);
+        // What is blank to the end belongs to the row before it.
+        if after.len() <= PART && after.trim_ascii().is_empty() {
+            break;
+        }
+        parts.push(part);
+        rest = after;
+    }
+    parts.push(rest);
+    parts
 }
 
 enum Row {

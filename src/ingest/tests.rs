@@ -191,9 +191,13 @@ fn the_time_column_is_checked() {
     }));
     assert_eq!(record.sample_rate_hz, 1000.0);
     assert!(
-        warnings.len() == 1 && warnings[0].starts_with("3 samples dropped at 1 places"),
+        warnings.len() == 1 && warnings[0].starts_with("3 samples dropped at 1 place "),
         "{warnings:?}"
     );
+    // Filled by a straight line: 49 % 7 = 0 before the gap, 50 % 7 = 1 behind it.
+    assert_eq!((record.filled.len(), &record.filled[0]), (1, &(50..53)));
+    assert_eq!(record.len(), 103);
+    assert_eq!(record.channels[0].samples[49..54], [0.0, 0.25, 0.5, 0.75, 1.0]);
     // 12.8 kHz printed with four digits: single steps are 0 or 0.1 ms.
     let (record, warnings) = time(clock(5000, |i| format!("{:.4}", i as f64 / 12800.0)));
     approx::assert_relative_eq!(record.sample_rate_hz, 12800.0, max_relative = 3e-4);

@@ -289,6 +289,15 @@ pub fn frequency_factor(label: &str) -> Option<f64> {
     }
 }
 
+/// A number for people, with so many figures that count and no exponent: `18.30`, `0.01265`, `29930`.
+pub fn figures(value: f64, count: i32) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let decimals = (count - 1 - value.abs().log10().floor() as i32).clamp(0, 12) as usize;
+    format!("{value:.decimals$}")
+}
+
 /// Unit of an FRF quantity, for people.
 pub fn frf_unit(quantity: Quantity) -> &'static str {
     match quantity {

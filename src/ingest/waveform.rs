@@ -39,6 +39,7 @@ pub(super) fn put(records: &mut Vec<TimeRecord>, sample_rate_hz: f64, start_s: f
     match same {
         Some(record) => record.channels.push(channel),
         None => records.push(TimeRecord {
+            filled: Vec::new(),
             sample_rate_hz,
             start_s,
             channels: vec![channel],

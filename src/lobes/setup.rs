@@ -50,11 +50,18 @@ pub fn coefficients_from_cuts(
     }
     let cuts = identify_forces(campaign, CfcOptions::default())?;
     warnings.extend(cuts.warnings.iter().cloned());
-    let group = cuts
-        .pooled
-        .iter()
-        .find(|group| group.process == section.process)
-        .ok_or_else(|| lacks("the campaign has no cuts of the lobes' process".into()))?;
+    let of_process = || {
+        cuts.pooled
+            .iter()
+            .filter(|group| group.process == section.process)
+    };
+    let group = match of_process().count() {
+        0 => return Err(lacks("the campaign has no cuts of the lobes' process".into())),
+        1 => of_process().next(),
+        // Of several materials the campaign's own one counts.
+        _ => of_process().find(|group| group.material.is_some() && group.material == campaign.material),
+    }
+    .ok_or_else(|| lacks("the cuts are of several materials and [material] names none of them".into()))?;
     let value = |label: &str| {
         group
             .coefficient(label)

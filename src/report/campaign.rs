@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::parts::{count, failed, paragraph};
 use super::{
     Block, Column, Page, Section, Table, cutting_section, diagnosis_section, error_map_section,
-    history_section, lobes_section, modal_section, structure_section, thesis_section,
+    history_section, lobes_section, modal_section, structure_section, thesis_section, waveform_section,
 };
 use crate::Result;
 use crate::analysis::{CampaignFindings, DiagnosisFindings, StructureFindings, ThesisFindings};
@@ -192,6 +192,11 @@ fn parts(findings: &CampaignFindings) -> Vec<Section> {
         Some(Err(error)) => sections.push(failed("records", "Force records", error)),
         None => {}
     }
+    match &findings.cutting_diagnosis {
+        Some(Ok(found)) => sections.extend(waveform_section::sections(findings.campaign, found)),
+        Some(Err(error)) => sections.push(failed(waveform_section::ID, waveform_section::TITLE, error)),
+        None => {}
+    }
     match &findings.lobes {
         Some(Ok(lobes)) => sections.push(lobes_section::section(lobes, findings.structure())),
         Some(Err(error)) => sections.push(failed("lobes", "Stability lobes", error)),
@@ -214,6 +219,11 @@ fn summary(findings: &CampaignFindings) -> Section {
     );
     blocks.extend(findings.modal().and_then(modal_section::summary).map(paragraph));
     blocks.extend(findings.cutting().map(|c| paragraph(cutting_section::summary(c))));
+    blocks.extend(
+        findings
+            .cutting_diagnosis()
+            .map(|d| paragraph(waveform_section::summary(d))),
+    );
     blocks.extend(findings.lobes().map(|l| paragraph(lobes_section::summary(l))));
     if blocks.is_empty() {
         blocks.push(paragraph(

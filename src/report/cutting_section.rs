@@ -22,7 +22,7 @@ pub fn summary(result: &CfcResult) -> String {
         text += &format!(
             "{} of {} gave {}. ",
             count(pooled.cuts.len(), "record", "records"),
-            process(pooled.process),
+            series_name(result, pooled),
             coefficients.join(", ")
         );
         text += &over_speeds(result, pooled).unwrap_or_default();
@@ -45,7 +45,7 @@ pub fn summary(result: &CfcResult) -> String {
 fn over_speeds(result: &CfcResult, pooled: &Group) -> Option<String> {
     let label = pooled.coefficients.iter().find(|c| !c.edge)?.label;
     let of_speed = |g: &Group| Some((g.coefficient(label)?.value?, speed_text(g)));
-    let groups = result.groups.iter().filter(|g| g.process == pooled.process);
+    let groups = result.groups.iter().filter(|g| g.is_beside(pooled));
     let mut values: Vec<(f64, String)> = groups.filter_map(of_speed).collect();
     values.sort_by(|a, b| a.0.total_cmp(&b.0));
     match values.as_slice() {
@@ -65,6 +65,27 @@ fn process(process: Process) -> &'static str {
         Process::Milling => "milling",
         Process::Drilling => "drilling",
     }
+}
+
+/// Process, and the material where several were cut.
+fn series_name(result: &CfcResult, pooled: &Group) -> String {
+    let name = process(pooled.process);
+    let several = result
+        .pooled
+        .iter()
+        .filter(|g| g.process == pooled.process)
+        .count()
+        > 1;
+    match (&pooled.material, several) {
+        (Some(material), true) => format!("{name} of {material}"),
+        _ => name.to_string(),
+    }
+}
+
+/// The same as part of a file name.
+fn slug(result: &CfcResult, pooled: &Group) -> String {
+    let lower = series_name(result, pooled).to_lowercase();
+    lower.replace(|c: char| !c.is_ascii_alphanumeric(), "-")
 }
 
 /// The misfit of one average.
@@ -248,20 +269,19 @@ fn cut_table(result: &CfcResult) -> Block {
 }
 
 fn regression(campaign: &Campaign, result: &CfcResult, pooled: &Group) -> Section {
-    let name = process(pooled.process);
     let mut blocks = Vec::new();
     let axes = ForceAxis::of(pooled.process);
     for unit in ["N", "N·m"] {
         let of_unit: Vec<ForceAxis> = axes.iter().copied().filter(|a| a.unit() == unit).collect();
         if !of_unit.is_empty() {
-            blocks.push(line_figure(campaign, pooled, &of_unit, unit));
+            blocks.push(line_figure(campaign, result, pooled, &of_unit, unit));
         }
     }
     blocks.push(coefficient_table(result, pooled));
-    blocks.extend(misfit_map(pooled));
+    blocks.extend(misfit_map(result, pooled));
     Section {
-        id: format!("regression-{name}"),
-        title: format!("Force coefficients, {name}"),
+        id: format!("regression-{}", slug(result, pooled)),
+        title: format!("Force coefficients, {}", series_name(result, pooled)),
         lead: "Average forces against feed: the slope is the cutting part, what is left at zero feed the edge part. R² \
                near 1 says that a line holds, not that it is the right line."
             .into(),
@@ -269,7 +289,13 @@ fn regression(campaign: &Campaign, result: &CfcResult, pooled: &Group) -> Sectio
     }
 }
 
-fn line_figure(campaign: &Campaign, pooled: &Group, axes: &[ForceAxis], unit: &str) -> Block {
+fn line_figure(
+    campaign: &Campaign,
+    result: &CfcResult,
+    pooled: &Group,
+    axes: &[ForceAxis],
+    unit: &str,
+) -> Block {
     let mut series = Vec::new();
     for &axis in axes {
         let r2 = pooled.r2[axis.index()].map_or(String::new(), |r| format!(", R² = {}", decimals(r, 4)));
@@ -303,7 +329,7 @@ fn line_figure(campaign: &Campaign, pooled: &Group, axes: &[ForceAxis], unit: &s
     let drawing = RegressionFigure {
         title: format!(
             "Average {quantity} against feed, all cuts of {} together",
-            process(pooled.process)
+            series_name(result, pooled)
         ),
         x_label: feed.into(),
         y_label: format!("Average {quantity} ({unit})"),
@@ -325,7 +351,7 @@ fn line_figure(campaign: &Campaign, pooled: &Group, axes: &[ForceAxis], unit: &s
         listed(&r2)
     );
     figure(
-        format!("regression-{}-{quantity}", process(pooled.process)),
+        format!("regression-{}-{quantity}", slug(result, pooled)),
         &drawing.title.clone(),
         caption,
         drawing.png(),
@@ -342,7 +368,7 @@ fn coefficient_table(result: &CfcResult, pooled: &Group) -> Block {
     );
     let axes = ForceAxis::of(pooled.process);
     columns.extend(axes.iter().map(|a| Column::number(format!("R² {}", a.label()))));
-    let groups = result.groups.iter().filter(|g| g.process == pooled.process);
+    let groups = result.groups.iter().filter(|g| g.is_beside(pooled));
     let row = |group: &Group, name: String| {
         let mut row = vec![name, format!("{} / {}", group.cuts.len(), group.feeds)];
         row.extend(group.coefficients.iter().map(value_text));
@@ -369,7 +395,7 @@ fn coefficient_table(result: &CfcResult, pooled: &Group) -> Block {
     })
 }
 
-fn misfit_map(pooled: &Group) -> Option<Block> {
+fn misfit_map(result: &CfcResult, pooled: &Group) -> Option<Block> {
     let misfits = misfits(pooled);
     if pooled.cuts.len() < 2 {
         return None;
@@ -396,7 +422,7 @@ fn misfit_map(pooled: &Group) -> Option<Block> {
         ..Default::default()
     };
     Some(figure(
-        format!("misfit-{}", process(pooled.process)),
+        format!("misfit-{}", slug(result, pooled)),
         "Misfit of each cut's average force",
         "How far each cut's average lies from the fitted force model, as a share of the largest average of that axis. \
          The colours run to the largest misfit, however small it is.",

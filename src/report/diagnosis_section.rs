@@ -12,7 +12,7 @@ use crate::analysis::DiagnosisFindings;
 use crate::analysis::diagnosis::Leading;
 use crate::campaign::Campaign;
 use crate::discrepancy::explained::Part;
-use crate::discrepancy::{Candidate, Verdict};
+use crate::discrepancy::{Candidate, Diagnosis, Verdict};
 use crate::effects::Instance;
 use crate::identify::StructureModel;
 
@@ -28,16 +28,25 @@ type StructureCandidate = Candidate<StructureModel, Instance>;
 
 /// The verdict in plain words.
 pub fn summary(findings: &DiagnosisFindings) -> String {
-    let d = &findings.diagnosis;
+    verdict_text(&findings.diagnosis, "FRFs", |c| {
+        (c.instance.title(), c.instance.effect.explanation())
+    })
+}
+
+/// The verdict in plain words; `plainly` gives the name and the explanation of an effect, `data` says what was measured.
+pub(super) fn verdict_text<M, I>(
+    d: &Diagnosis<M, I>,
+    data: &str,
+    plainly: impl Fn(&Candidate<M, I>) -> (String, &'static str),
+) -> String {
     let sure = format!("confidence {:.0} %", 100.0 * d.confidence);
     let mut text = match (d.verdict, d.winner()) {
-        (Verdict::Effect, Some(winner)) => format!(
-            "The model lacks {} ({sure}). {}",
-            winner.instance.title(),
-            winner.instance.effect.explanation()
-        ),
+        (Verdict::Effect, Some(winner)) => {
+            let (title, explanation) = plainly(winner);
+            format!("The model lacks {title} ({sure}). {explanation}")
+        }
         (Verdict::None, _) => {
-            format!("The model lacks nothing that these FRFs show: what is left looks like noise ({sure}).")
+            format!("The model lacks nothing that these {data} show: what is left looks like noise ({sure}).")
         }
         _ => format!(
             "The model lacks something that no effect of the library explains ({sure}): what is left is real, but of a kind \
@@ -86,8 +95,13 @@ pub fn section(campaign: &Campaign, findings: &DiagnosisFindings) -> Section {
         )));
     }
     if !d.candidates.is_empty() {
-        blocks.push(candidate_chart(findings));
-        blocks.push(candidate_table(findings));
+        blocks.push(candidate_chart(
+            d,
+            findings.now.totals.noise_floor_nrms,
+            "missing-candidates",
+            "postures",
+        ));
+        blocks.push(candidate_table(d, |c| c.instance.title()));
     }
     if let (Some(leading), Some(candidate)) = (&findings.leading, findings.leader()) {
         blocks.push(maps(findings, leading, candidate));
@@ -120,9 +134,14 @@ pub fn section(campaign: &Campaign, findings: &DiagnosisFindings) -> Section {
     }
 }
 
-fn candidate_chart(findings: &DiagnosisFindings) -> Block {
-    let d = &findings.diagnosis;
-    let shown: Vec<&StructureCandidate> = d.candidates.iter().take(LISTED).collect();
+/// Error with each candidate; `folds`: what was left out in turn.
+pub(super) fn candidate_chart<M, I>(
+    d: &Diagnosis<M, I>,
+    noise_floor_nrms: f64,
+    file_name: &str,
+    folds: &str,
+) -> Block {
+    let shown: Vec<&Candidate<M, I>> = d.candidates.iter().take(LISTED).collect();
     let percents = |first: Option<f64>, rest: Vec<Option<f64>>| {
         let all = std::iter::once(first).chain(rest);
         all.map(|v| v.map(|v| 100.0 * v)).collect::<Vec<_>>()
@@ -140,14 +159,14 @@ fn candidate_chart(findings: &DiagnosisFindings) -> Block {
             .collect(),
         series: vec![
             BarSeries {
-                label: "fitted postures".into(),
+                label: format!("fitted {folds}"),
                 values: percents(
                     Some(d.baseline.residual.nrms),
                     shown.iter().map(|c| Some(c.nrms)).collect(),
                 ),
             },
             BarSeries {
-                label: "postures left out of the fit".into(),
+                label: format!("{folds} left out of the fit"),
                 values: percents(
                     held_out(&d.baseline.held_out),
                     shown.iter().map(|c| held_out(&c.held_out)).collect(),
@@ -155,20 +174,25 @@ fn candidate_chart(findings: &DiagnosisFindings) -> Block {
             },
         ],
         log: true,
-        level: Some(("noise floor".into(), 100.0 * findings.now.totals.noise_floor_nrms)),
+        level: Some(("noise floor".into(), 100.0 * noise_floor_nrms)),
     };
     figure(
-        "missing-candidates",
+        file_name,
         "Error of the model now and with each candidate effect, against the noise floor",
-        "Error of the model as it is and with each candidate added, on postures that were fitted and on postures left out of \
-         the fit. The missing effect is the one that reaches the noise floor (dotted).",
+        format!(
+            "Error of the model as it is and with each candidate added, on {folds} that were fitted and on {folds} left out of \
+             the fit. A missing effect is one that reaches the noise floor (dotted)."
+        ),
         drawing.png(),
     )
 }
 
-fn candidate_table(findings: &DiagnosisFindings) -> Block {
-    let all = &findings.diagnosis.candidates;
-    let row = |c: &StructureCandidate| {
+pub(super) fn candidate_table<M, I>(
+    d: &Diagnosis<M, I>,
+    title: impl Fn(&Candidate<M, I>) -> String,
+) -> Block {
+    let all = &d.candidates;
+    let row = |c: &Candidate<M, I>| {
         let parameters: Vec<String> = c
             .parameters
             .iter()
@@ -178,7 +202,7 @@ fn candidate_table(findings: &DiagnosisFindings) -> Block {
             })
             .collect();
         vec![
-            c.instance.title(),
+            title(c),
             percent(c.nrms),
             c.held_out.map_or("–".into(), |h| percent(h.nrms())),
             significant(c.delta_bic, 3),

@@ -4,12 +4,34 @@ use super::figure::{self, HistoryFigure};
 use super::number::{percent, significant};
 use super::parts::{figure, listed, paragraph};
 use super::{Block, Column, Section, Table};
-use crate::identify::StructureCase;
+use crate::identify::{CuttingCase, StructureCase};
 use crate::revision::Revision;
 
 /// `None` where no effect was ever added.
 pub fn section(case: &StructureCase) -> Option<Section> {
-    let revisions = &case.revisions;
+    let added = case.model.effects().iter().map(|added| {
+        let effect = added.instance.effect;
+        (added.instance.title(), effect.explanation(), effect.fingerprint())
+    });
+    of_revisions("history", &case.revisions, "postures", added)
+}
+
+/// The same of the cutting model.
+pub fn cutting_section(case: &CuttingCase) -> Option<Section> {
+    let added = case.model.effects().iter().map(|added| {
+        let effect = added.instance.effect;
+        (added.instance.label(), effect.explanation(), effect.fingerprint())
+    });
+    of_revisions("history-cutting", &case.revisions, "cuts", added)
+}
+
+/// `folds`: what is left out in turn; `added`: name, explanation and fingerprint of each effect in the model.
+fn of_revisions(
+    id: &str,
+    revisions: &[Revision],
+    folds: &str,
+    added: impl Iterator<Item = (String, &'static str, &'static str)>,
+) -> Option<Section> {
     let current = revisions.last()?;
     let drawing = HistoryFigure {
         title: "Error of the model, revision by revision".into(),
@@ -25,10 +47,12 @@ pub fn section(case: &StructureCase) -> Option<Section> {
     };
     let mut blocks = vec![
         figure(
-            "history",
+            id,
             "Error of the model after each added effect, on fitted and on held-out data",
-            "Error (nrms) of the model after each added effect, on the data that was fitted and on postures left out of \
-             the fit. No model can get below the noise floor.",
+            format!(
+                "Error (nrms) of the model after each added effect, on the data that was fitted and on {folds} left out of \
+                 the fit. No model can get below the noise floor."
+            ),
             drawing.png(),
         ),
         table(revisions),
@@ -40,25 +64,23 @@ pub fn section(case: &StructureCase) -> Option<Section> {
         .collect();
     if !suspicious.is_empty() {
         blocks.push(Block::Warning(format!(
-            "Not progress: {}. The error on postures left out of the fit did not fall by more than chance would let it.",
+            "Not progress: {}. The error on {folds} left out of the fit did not fall by more than chance would let it.",
             listed(&suspicious)
         )));
     }
-    for added in case.model.effects() {
-        let effect = added.instance.effect;
-        blocks.push(paragraph(format!(
-            "{}: {} How it shows: {}",
-            added.instance.title(),
-            effect.explanation(),
-            effect.fingerprint()
-        )));
-    }
+    blocks.extend(added.map(|(title, explanation, fingerprint)| {
+        paragraph(format!("{title}: {explanation} How it shows: {fingerprint}"))
+    }));
     Some(Section {
-        id: "history".into(),
-        title: "The error, revision by revision".into(),
-        lead: "Each revision adds one physical effect to the model and fits everything anew. An effect that is really there \
-               lowers the error on postures that the fit has not seen."
-            .into(),
+        id: id.into(),
+        title: match folds {
+            "cuts" => "The error of the force model, revision by revision".into(),
+            _ => "The error, revision by revision".into(),
+        },
+        lead: format!(
+            "Each revision adds one physical effect to the model and fits everything anew. An effect that is really there \
+             lowers the error on {folds} that the fit has not seen."
+        ),
         blocks,
     })
 }

@@ -20,6 +20,8 @@ mod redundancy_section;
 pub mod structure_section;
 #[cfg(feature = "parquet")]
 pub mod tables;
+pub mod thesis_cutting;
 pub mod thesis_section;
+pub mod waveform_section;
 
 pub use page::{Block, Column, Figure, Page, Section, Table, Written};

@@ -3,8 +3,8 @@
 use super::figure::{BarSeries, SideBySide};
 use super::number::{decimals, format_si, percent, significant};
 use super::parts::{figure, listed, paragraph};
-use super::real_case_section;
 use super::{Block, Column, Section, Table};
+use super::{real_case_section, thesis_cutting};
 use crate::analysis::ThesisFindings;
 use crate::analysis::thesis_findings::Range;
 use crate::lobes::Peak;
@@ -49,6 +49,7 @@ pub fn section(findings: &ThesisFindings) -> Section {
     blocks.extend(real_case_section::blocks(&study.real_case));
     blocks.push(lobe_table(findings));
     blocks.push(paragraph(lobe_text(findings)));
+    blocks.extend(thesis_cutting::blocks(&study.cutting));
     Section {
         id: "thesis".into(),
         title: "The source thesis put right (ABB IRB 6640)".into(),

@@ -64,6 +64,11 @@ pub fn quantile(values: &[f64], q: f64) -> f64 {
     sorted[low] + (at - low as f64) * (sorted[high] - sorted[low])
 }
 
+/// Arithmetic mean; 0 of nothing.
+pub fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
 pub fn median(values: &[f64]) -> f64 {
     quantile(values, 0.5)
 }

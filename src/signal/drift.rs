@@ -4,6 +4,8 @@
 
 use std::ops::Range;
 
+use nalgebra::{DMatrix, DVector};
+
 use super::blocks::{Blocks, line, robust_std};
 
 /// Sample ranges in which the tool cut nothing.
@@ -35,11 +37,20 @@ pub struct DriftLine {
     /// By how much the air bends away from the line (rms of block means less their noise);
     /// 0 for a drift that is a line.
     pub bend: f64,
+    /// Time constant of an exponential that explains the bend; `None` where there is no bend or another one.
+    pub time_constant_s: Option<f64>,
 }
 
 impl DriftLine {
     pub fn at(&self, time_s: f64) -> f64 {
         self.offset + self.slope_per_s * (time_s - self.reference_s)
+    }
+
+    /// How the bend looks, for people; empty where that is not known.
+    pub fn shape(&self) -> String {
+        self.time_constant_s.map_or(String::new(), |tau| {
+            format!(" (exponential, time constant about {tau:.2} s)")
+        })
     }
 
     /// Standard deviation of [`DriftLine::at`].
@@ -69,6 +80,7 @@ pub fn fit_drift(samples: &[f64], sample_rate_hz: f64, start_s: f64, air: &Air) 
         offset_std: 0.0,
         slope_std_per_s: 0.0,
         bend: 0.0,
+        time_constant_s: None,
     };
     let time = |i: usize| start_s + i as f64 / sample_rate_hz;
     let mut kept: Vec<usize> = air
@@ -111,18 +123,20 @@ fn uncertainty(
     let residual = |i: usize| samples[i] - drift.at(time(i));
     let sample_variance = kept.iter().map(|&i| residual(i).powi(2)).sum::<f64>() / kept.len() as f64;
     let (mut square_sum, mut block_count, mut block_len) = (0.0, 0usize, 0.0);
+    let mut bent: Vec<(f64, f64)> = Vec::new();
     for range in air.ranges() {
-        let values: Vec<f64> = kept
-            .iter()
-            .filter(|i| range.contains(i))
-            .map(|&i| residual(i))
-            .collect();
+        let inside: Vec<usize> = kept.iter().copied().filter(|i| range.contains(i)).collect();
+        let values: Vec<f64> = inside.iter().map(|&i| residual(i)).collect();
         let blocks = Blocks::new(&values, values.len() as f64 / BLOCKS_PER_SEGMENT as f64);
         square_sum += blocks
             .mean
             .iter()
             .map(|m| m * m * blocks.samples_per_block)
             .sum::<f64>();
+        bent.extend(blocks.mean.iter().enumerate().filter_map(|(k, mean)| {
+            let middle = ((k as f64 + 0.5) * blocks.samples_per_block) as usize;
+            Some((time(*inside.get(middle)?), *mean))
+        }));
         block_count += blocks.len();
         block_len += values.len() as f64;
     }
@@ -137,9 +151,41 @@ fn uncertainty(
     let mean_block_len = block_len / block_count.max(1) as f64;
     if mean_block_len > 0.0 && per_sample > BEND_RATIO * sample_variance {
         drift.bend = ((per_sample - sample_variance) / mean_block_len).max(0.0).sqrt();
+        drift.time_constant_s = exponential(&bent);
     }
     drift.offset_std = (per_sample / n).sqrt();
     drift.slope_std_per_s = if sxx > 0.0 { (per_sample / sxx).sqrt() } else { 0.0 };
+}
+
+/// An exponential counts where it leaves this part of the squares that a line leaves.
+const EXPLAINS: f64 = 0.2;
+/// Time constants tried, in record lengths, from shortest to longest.
+const TIME_CONSTANTS: (f64, f64, usize) = (0.03, 3.0, 60);
+
+/// Time constant of offset + slope t + amplitude e^(−t/τ) through points (time, value) off a line.
+fn exponential(points: &[(f64, f64)]) -> Option<f64> {
+    let (first, last) = (points.first()?.0, points.last()?.0);
+    let length = last - first;
+    if points.len() < 8 || !(length > 0.0) {
+        return None;
+    }
+    let value = DVector::from_iterator(points.len(), points.iter().map(|p| p.1));
+    let left = |tau: f64| -> Option<f64> {
+        let basis = DMatrix::from_fn(points.len(), 3, |i, k| {
+            let t = points[i].0 - first;
+            [1.0, t / length, (-t / tau).exp()][k]
+        });
+        let solution = basis.clone().svd(true, true).solve(&value, 1e-9).ok()?;
+        Some((&value - basis * solution).norm_squared())
+    };
+    let (short, long, count) = TIME_CONSTANTS;
+    let tau = |k: usize| length * short * (long / short).powf(k as f64 / (count - 1) as f64);
+    let (squares, best) = (0..count)
+        .filter_map(|k| Some((left(tau(k))?, k)))
+        .min_by(|a, b| a.0.total_cmp(&b.0))?;
+    // At an end of what was tried it may be anything.
+    let inside = best > 0 && best + 1 < count;
+    (inside && squares < EXPLAINS * value.norm_squared()).then(|| tau(best))
 }
 
 #[cfg(test)]
@@ -203,8 +249,13 @@ mod tests {
             &air(),
         );
         assert!(bent.bend > 2.0, "{bent:?}");
+        let tau = bent.time_constant_s.unwrap();
+        assert!((tau / 2.0 - 1.0).abs() < 0.15, "{tau}");
         let straight = fit_drift(&record(3, 0.5, |_| 0.0), RATE, 0.0, &air());
-        assert!(straight.bend < 0.2, "{straight:?}");
+        assert!(
+            straight.bend < 0.2 && straight.time_constant_s.is_none(),
+            "{straight:?}"
+        );
         let none = fit_drift(&record(3, 0.5, |_| 0.0), RATE, 0.0, &Air::default());
         assert!(!none.air_before && !none.air_after && none.at(1.0) == 0.0);
     }

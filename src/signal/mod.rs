@@ -3,14 +3,16 @@
 mod blocks;
 mod drift;
 mod end_states;
+mod faults;
 pub mod frf_noise;
 mod order_spectrum;
 mod steady_window;
 mod tooth_line;
 
 pub(crate) use blocks::line;
-pub use blocks::{Blocks, median, quantile};
+pub use blocks::{Blocks, mean, median, quantile};
 pub use drift::{Air, DriftLine, fit_drift};
+pub use faults::{Clipping, Faults, find_faults, samples_in};
 pub use order_spectrum::{OrderSpectrum, highest_order, line_amplitude, mean_between, order_spectrum};
 pub use steady_window::{Phases, Spindle, find_phases, whole_revolutions};
 pub use tooth_line::{ToothLine, tooth_line};

@@ -15,6 +15,8 @@ pub struct ToothLine {
     pub strongest_hz: f64,
     /// Its amplitude over the noise floor.
     pub strongest_to_noise: f64,
+    /// The strongest line, or that of which it is a harmonic, Hz: tooth passing.
+    pub tooth_hz: f64,
 }
 
 impl ToothLine {
@@ -28,6 +30,9 @@ impl ToothLine {
 
 /// Longest transform; a longer record is looked at from its start.
 const MAX_SAMPLES: usize = 1 << 17;
+/// A line of this part of the strongest, at a fraction of its frequency, is what the strongest is a harmonic of. (What a
+/// runout puts at once per revolution is weaker where the teeth cut at all.)
+const FUNDAMENTAL: f64 = 0.3;
 /// Mains hum and its first odd harmonic are no tooth.
 const MAINS_HZ: [f64; 4] = [50.0, 60.0, 150.0, 180.0];
 
@@ -84,10 +89,17 @@ pub fn tooth_line(samples: &[f64], sample_rate_hz: f64, spindle_hz: f64, teeth: 
             MAINS_HZ.iter().all(|m| (m - hz).abs() > 4.0 * resolution_hz)
         })
         .max_by(|a, b| a.1.total_cmp(b.1))?;
+    let strongest_hz = (at as f64 + peak_shift(&amplitude, at)) * resolution_hz;
+    let is_harmonic = |m: &usize| {
+        let hz = strongest_hz / *m as f64;
+        hz > 0.5 * spindle_hz && peak(hz, 1.5 * resolution_hz) > FUNDAMENTAL * strongest
+    };
+    let harmonic = (2..=4).rev().find(is_harmonic).unwrap_or(1);
     Some(ToothLine {
         nominal_to_noise: nominal / noise,
-        strongest_hz: (at as f64 + peak_shift(&amplitude, at)) * resolution_hz,
+        strongest_hz,
         strongest_to_noise: strongest / noise,
+        tooth_hz: strongest_hz / harmonic as f64,
     })
 }
 

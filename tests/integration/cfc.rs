@@ -34,6 +34,7 @@ struct MadeCut {
     /// Written part of the record, s.
     span_s: (f64, f64),
     dead_z: bool,
+    material: Option<&'static str>,
     file: String,
 }
 
@@ -51,6 +52,7 @@ fn plan() -> Vec<MadeCut> {
                 gain: 1.0,
                 span_s: (0.0, 3.0),
                 dead_z: false,
+                material: None,
             });
         }
     }
@@ -133,6 +135,9 @@ fn write_campaign(dir: &Path, cuts: &[MadeCut], k: &[f64; 6]) {
             cut.id, cut.file, cut.rpm, cut.feed_mm
         )
         .unwrap();
+        if let Some(material) = cut.material {
+            writeln!(toml, "material = \"{material}\"").unwrap();
+        }
     }
     std::fs::write(dir.join("campaign.toml"), toml).unwrap();
 }
@@ -299,6 +304,43 @@ fn the_edge_constraint_holds_a_negative_edge_at_zero() {
     assert_eq!(kae["constraint_active"], true);
     assert!((held["groups"][0]["ktc_n_per_mm2"]["value"].as_f64().unwrap() / 900.0 - 1.0).abs() < 0.02);
     assert!(warnings(&held).contains("Kae is held at zero"));
+}
+
+/// Cuts of two materials at both speeds and all feeds, the second with 15 % higher forces throughout.
+#[test]
+fn materials_are_fitted_apart_and_compared() {
+    let mut cuts = plan();
+    cuts.iter_mut().for_each(|c| c.material = Some("cast"));
+    for mut cut in plan() {
+        cut.id = format!("p{}", cut.id);
+        cut.file = format!("force/cut{}.csv", cut.id);
+        (cut.gain, cut.material) = (1.15, Some("printed"));
+        cuts.push(cut);
+    }
+    let document = run(&cuts);
+    let materials = |key: &str| -> Vec<&str> {
+        let list = document[key].as_array().unwrap().iter();
+        list.map(|g| g["material"].as_str().unwrap()).collect()
+    };
+    assert_eq!(materials("pooled"), ["cast", "printed"]);
+    assert_eq!(materials("groups"), ["cast", "cast", "printed", "printed"]);
+    let entries = document["materials"].as_array().unwrap();
+    assert_eq!(entries.len(), 6);
+    for entry in entries {
+        assert_eq!(
+            (&entry["material"], &entry["reference"]),
+            (&"printed".into(), &"cast".into())
+        );
+        // 15 % of a small axial edge force is within its error; the leading coefficients are not.
+        let (ratio, error) = (&entry["ratio"]["value"], &entry["ratio"]["std_error"]);
+        let off = (ratio.as_f64().unwrap() - 1.15).abs();
+        assert!(off < 4.0 * error.as_f64().unwrap(), "{entry}");
+    }
+    assert_eq!(entries[0]["reading"], "rises", "{}", entries[0]);
+    assert!(entries[0]["p_value"].as_f64().unwrap() < 1e-4);
+    for trend in document["trends"].as_array().unwrap() {
+        assert_eq!(trend["reading"], "none", "{trend}");
+    }
 }
 
 #[test]

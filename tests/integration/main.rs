@@ -2,11 +2,13 @@
 
 mod campaign;
 mod cfc;
+mod cfc_methods;
 mod contract;
 mod demo;
 mod diagnose;
 mod inspect;
 mod modal;
+mod records;
 mod report;
 mod revisions;
 mod robustness;

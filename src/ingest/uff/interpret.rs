@@ -436,6 +436,7 @@ fn time(dataset: &Dataset58, file_units: Option<FileUnits>, contents: &mut Conte
         Some(record) => record.channels.push(channel),
         None => {
             contents.times.push(TimeRecord {
+                filled: Vec::new(),
                 sample_rate_hz: rate_of_printed_step(step),
                 start_s,
                 channels: vec![channel],

@@ -366,6 +366,7 @@ fn coherence_finds_its_frf_and_times_their_record() {
         samples: vec![0.5, -0.25, 4.0, 8.0],
     };
     let record = TimeRecord {
+        filled: Vec::new(),
         sample_rate_hz: 2048.0,
         start_s: 0.25,
         channels: vec![

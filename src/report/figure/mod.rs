@@ -22,6 +22,7 @@ mod regression;
 mod resonances;
 mod side_by_side;
 mod stabilisation;
+mod waveform;
 
 #[cfg(test)]
 mod samples;
@@ -41,6 +42,7 @@ pub use regression::{RegressionFigure, RegressionPoint, RegressionSeries};
 pub use resonances::{ResonanceFigure, ResonanceRow};
 pub use side_by_side::{BarSeries, SideBySide};
 pub use stabilisation::{StabilisationFigure, StabilisationPole};
+pub use waveform::{WaveformFigure, WaveformPanel};
 
 use crate::Error;
 

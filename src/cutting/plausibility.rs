@@ -1,0 +1,195 @@
+//! Units and scales that the physics of cutting forbids: the specific cutting energy is that of some material.
+
+use super::average_force::{ForceAxis, average_row};
+use super::record::CutAnalysis;
+use crate::campaign::{Campaign, Process};
+use crate::ingest::units::figures;
+use crate::signal::median;
+
+/// Force per chip cross-section of one cut, edge forces included, N/mm².
+struct Specific {
+    /// Milling: of the force in the plane of cutting, whatever its direction; drilling: from the torque.
+    cutting: Option<f64>,
+    /// Milling: of the axial force; drilling: of the thrust.
+    axial: Option<f64>,
+}
+
+fn specific(campaign: &Campaign, cut: &CutAnalysis) -> Option<Specific> {
+    let tool = campaign.tool.as_ref()?;
+    let row = |axis| average_row(tool, &campaign.cuts[cut.cut].geometry, axis).ok();
+    let force = |axis: ForceAxis| cut.averages[axis.index()].map(|a| a.value);
+    let ratio = |axis: ForceAxis, column: usize| {
+        let per = row(axis)?[column];
+        Some(force(axis)? / per).filter(|k| k.is_finite())
+    };
+    Some(match cut.process {
+        Process::Milling => {
+            let (x, y) = (row(ForceAxis::X)?, row(ForceAxis::Y)?);
+            // Fx = a Kt + b Kr, Fy = −b Kt + a Kr: turned and stretched.
+            let stretch = (x[0].powi(2) + x[1].powi(2))
+                .max(y[0].powi(2) + y[1].powi(2))
+                .sqrt();
+            let plane = force(ForceAxis::X)
+                .zip(force(ForceAxis::Y))
+                .map(|(x, y)| x.hypot(y) / stretch);
+            Specific {
+                cutting: plane.filter(|k| k.is_finite()),
+                axial: ratio(ForceAxis::Z, 2),
+            }
+        }
+        Process::Drilling => Specific {
+            cutting: ratio(ForceAxis::Mz, 0),
+            axial: ratio(ForceAxis::Z, 2),
+        },
+    })
+}
+
+/// N/mm² that no solid worth machining stays below, and that none exceeds at chips of 0.01 mm and more.
+const ANY_MATERIAL: [f64; 2] = [10.0, 30_000.0];
+
+/// Where most materials lie, N/mm².
+const USUAL: [f64; 2] = [100.0, 10_000.0];
+
+/// Words in a material's name, and its specific cutting energy in N/mm²: Kienzle's unit forces (steel 1500–2500, cast iron
+/// 800–1500, aluminium 400–900, titanium 1300–1700, nickel alloys 2400–3500, plastics 50–200) for chips of 0.01 to 0.3 mm.
+/// The bounds are wide: only another unit leaves them.
+const MATERIALS: [(&[&str], [f64; 2]); 7] = [
+    (&["titan", "ti6al4v", "ti-6al", "ti 6al"], [1200.0, 12_000.0]),
+    (&["inconel", "nickel", "718", "waspaloy"], [1500.0, 20_000.0]),
+    (&["steel", "stahl", "42crmo4", "aisi", "c45"], [1300.0, 14_000.0]),
+    (
+        &["cast iron", "grauguss", "ggg", "en-gjl", "en-gjs"],
+        [700.0, 8000.0],
+    ),
+    (&["alumin", "6061", "7075", "6082", "2024"], [350.0, 6000.0]),
+    (&["brass", "copper", "bronze", "messing"], [300.0, 8000.0]),
+    (&["acetal", "pom", "delrin", "nylon", "plastic"], [12.0, 1500.0]),
+];
+
+/// Factors of units that get mixed up: wanted over found.
+const UNITS: [(f64, &str); 4] = [
+    (1000.0, "kN called N"),
+    (9.80665, "kgf called N"),
+    (4.448_221_6, "lbf called N"),
+    (1e-3, "N called kN"),
+];
+const TORQUE_UNITS: [(f64, &str); 5] = [
+    (0.112_984_8, "in·lbf called N·m"),
+    (0.01, "N·cm called N·m"),
+    (1e-3, "N·mm called N·m"),
+    (1000.0, "kN·m called N·m"),
+    (1.355_818, "ft·lbf called N·m"),
+];
+
+/// Warnings about scales that cannot be; `cuts` are of one material.
+pub(super) fn of_scales(campaign: &Campaign, cuts: &[&CutAnalysis], process: Process) -> Vec<String> {
+    let specific: Vec<Specific> = cuts.iter().filter_map(|c| specific(campaign, c)).collect();
+    let middle = |pick: fn(&Specific) -> Option<f64>| {
+        let values: Vec<f64> = specific.iter().filter_map(pick).map(f64::abs).collect();
+        (!values.is_empty()).then(|| median(&values))
+    };
+    let (cutting, axial) = (middle(|s| s.cutting), middle(|s| s.axial));
+    let name = cuts
+        .first()
+        .and_then(|c| campaign.cuts[c.cut].material.as_deref());
+    let material = name.unwrap_or_default().to_lowercase();
+    let known = MATERIALS
+        .iter()
+        .find(|(words, _)| words.iter().any(|w| material.contains(w)));
+    let (bounds, usual, of) = match known {
+        Some((_, bounds)) => (*bounds, *bounds, name.unwrap_or_default().to_owned()),
+        None => (ANY_MATERIAL, USUAL, "any material worth machining".to_owned()),
+    };
+    let (names, units): (&str, &[(f64, &str)]) = match process {
+        Process::Milling => ("Fx and Fy", &UNITS),
+        Process::Drilling => ("Mz", &TORQUE_UNITS),
+    };
+    let mut warnings = Vec::new();
+    if let Some(energy) = cutting.filter(|e| *e < bounds[0] || *e > bounds[1]) {
+        let side = if energy < bounds[0] { "small" } else { "large" };
+        warnings.push(format!(
+            "{names} look too {side}: the specific cutting energy comes out as {} N/mm², that of {of} lies between {} and \
+             {} N/mm²{}; check the units in the files, the amplifier's range, and teeth, depth and feed",
+            figures(energy, 3),
+            bounds[0],
+            bounds[1],
+            suspects(units, |factor| (usual[0]..=usual[1]).contains(&(energy * factor)))
+        ));
+    } else if let (Some(cutting), Some(axial)) = (cutting, axial) {
+        // A ball or a helix of 60° may press axially as hard as it cuts; a drill's thrust is about half its cutting force.
+        let limits = match process {
+            Process::Milling => [0.0, 4.0],
+            Process::Drilling => [0.12, 6.0],
+        };
+        let ratio = axial / cutting;
+        if ratio < limits[0] || ratio > limits[1] {
+            let side = if ratio > limits[1] { "large" } else { "small" };
+            warnings.push(format!(
+                "Fz looks too {side} beside {names}: {} against {} N/mm² of chip cross-section{}; check the units \
+                 and the amplifier's range of Fz",
+                figures(axial, 3),
+                figures(cutting, 3),
+                suspects(&UNITS, |factor| {
+                    let ratio = ratio * factor;
+                    ratio > limits[0].max(0.02) && ratio < limits[1]
+                })
+            ));
+        }
+    }
+    warnings.extend(small_channels(cuts));
+    warnings
+}
+
+/// `: kN called N, or lbf called N?`
+fn suspects(units: &[(f64, &str)], fits: impl Fn(f64) -> bool) -> String {
+    let names: Vec<&str> = units.iter().filter(|u| fits(u.0)).map(|u| u.1).collect();
+    if names.is_empty() {
+        String::new()
+    } else {
+        format!(": {}?", names.join(", or "))
+    }
+}
+
+/// What a misfit by this ratio (measured over predicted) would be as a slip of units; empty where it is none.
+pub(super) fn unit_slip(ratio: f64, axis: ForceAxis) -> Option<&'static str> {
+    let units: &[(f64, &str)] = if axis == ForceAxis::Mz {
+        &TORQUE_UNITS
+    } else {
+        &UNITS
+    };
+    // Feeds and wear scatter by some percent; the offset of a coarse zero more.
+    let fits = |u: &&(f64, &str)| (ratio * u.0 - 1.0).abs() < 0.12 && (u.0 - 1.0).abs() > 0.5;
+    units.iter().find(fits).map(|u| u.1)
+}
+
+/// Ratio of the spans of two force channels of one dynamometer beyond which their units differ.
+const SAME_UNIT: f64 = 400.0;
+
+fn small_channels(cuts: &[&CutAnalysis]) -> Vec<String> {
+    let mut told: Vec<(String, Vec<&str>, f64)> = Vec::new();
+    for cut in cuts {
+        let forces = || cut.channels.iter().filter(|c| c.axis != ForceAxis::Mz);
+        let span = |c: &super::record::ChannelAnalysis| {
+            let low = c.trace.min.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = c.trace.max.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            high - low
+        };
+        let largest = forces().map(span).fold(0.0, f64::max);
+        for channel in forces().filter(|c| span(c) > 0.0 && SAME_UNIT * span(c) < largest) {
+            let ratio = largest / span(channel);
+            match told.iter_mut().find(|t| t.0 == channel.name) {
+                Some(t) => t.1.push(&cut.id),
+                None => told.push((channel.name.clone(), vec![&cut.id], ratio)),
+            }
+        }
+    }
+    told.into_iter()
+        .map(|(name, ids, ratio)| {
+            format!(
+                "cut {}: {name} spans {ratio:.0} times less than the largest force channel: kN called N, or the amplifier's range is \
+                 set wrongly; correct the unit in the files",
+                ids.join(", ")
+            )
+        })
+        .collect()
+}

@@ -1,0 +1,319 @@
+//! Text logs too long to be held as text: time tables are read piece by piece.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use super::detect::{self, Detected};
+use super::force::Pieces;
+use super::quality::QualityCheck;
+use super::text::{self, Notes};
+use super::{Contents, Format, MeasurementFile, TimeRecord, read_bytes};
+use crate::progress::Progress;
+use crate::{Error, Result};
+
+/// Bytes of text held at once. A record of 50 s, 4 channels and 10 kHz is read in one piece.
+const PIECE: usize = 64 << 20;
+
+/// A file that was read, or one that is read piece by piece.
+pub(super) enum Opened {
+    Read(MeasurementFile),
+    Long(Box<LongRecord>),
+}
+
+/// A time table of more than [`PIECE`] bytes.
+pub(super) struct LongRecord {
+    path: PathBuf,
+    file: File,
+    bytes: u64,
+    piece: usize,
+    format: Format,
+    why: String,
+    pieces: Pieces,
+    /// Text read and not yet made numbers; its first line.
+    text: Vec<u8>,
+    line: usize,
+    at_end: bool,
+    /// Bytes of text for each sample, from the first piece.
+    bytes_per_sample: f64,
+    notes: Notes,
+    progress: Progress,
+}
+
+/// What a file is and what looks wrong with its time records, without their samples where there are very many.
+pub struct Survey {
+    /// The time records of a long file have their channels and no samples.
+    pub file: MeasurementFile,
+    /// Samples of each time record.
+    pub samples: Vec<usize>,
+    /// What looks wrong with the time records, see [`super::quality_warnings`].
+    pub quality: Vec<String>,
+}
+
+/// Reads a file to see what it is; a text log of any length in bounded memory.
+///
+/// # Errors
+/// As [`super::read_file`].
+pub fn survey(path: &Path) -> Result<Survey> {
+    let mut long = match open(path)? {
+        Opened::Read(file) => {
+            let times = &file.contents.times;
+            return Ok(Survey {
+                samples: times.iter().map(TimeRecord::len).collect(),
+                quality: times.iter().flat_map(super::quality_warnings).collect(),
+                file,
+            });
+        }
+        Opened::Long(long) => long,
+    };
+    let mut check: Option<QualityCheck> = None;
+    let (mut first, mut samples) = (None, 0);
+    while let Some(piece) = long.next_piece()? {
+        let expected = long.expected_samples();
+        check
+            .get_or_insert_with(|| QualityCheck::for_length(expected))
+            .add(&piece);
+        samples += piece.len();
+        first.get_or_insert_with(|| without_samples(piece));
+    }
+    Ok(Survey {
+        file: long.file_with(first.into_iter().collect()),
+        samples: vec![samples],
+        quality: check.map_or(Vec::new(), |c| c.warnings()),
+    })
+}
+
+fn without_samples(mut record: TimeRecord) -> TimeRecord {
+    record.channels.iter_mut().for_each(|c| c.samples = Vec::new());
+    record.filled = Vec::new();
+    record
+}
+
+/// Reads a file, or opens it as a long record.
+pub(super) fn open(path: &Path) -> Result<Opened> {
+    open_by(path, PIECE)
+}
+
+fn open_by(path: &Path, piece: usize) -> Result<Opened> {
+    let refused = |e| Error::io(path, e);
+    let mut file = File::open(path).map_err(refused)?;
+    let bytes = file.metadata().map_err(refused)?.len();
+    let mut head = Vec::new();
+    (&mut file)
+        .take(piece as u64)
+        .read_to_end(&mut head)
+        .map_err(refused)?;
+    if bytes > piece as u64
+        && let Some(long) = long_record(path, &mut head, bytes)
+    {
+        let (format, why, pieces, notes) = long;
+        let line = pieces.header.data_line;
+        return Ok(Opened::Long(Box::new(LongRecord {
+            path: path.to_path_buf(),
+            file,
+            bytes,
+            piece,
+            format,
+            why,
+            pieces,
+            text: head,
+            line,
+            at_end: false,
+            bytes_per_sample: 0.0,
+            notes,
+            progress: Progress::new(
+                format!("reading {}", path.display()),
+                bytes.div_ceil(piece as u64) as usize,
+            ),
+        })));
+    }
+    file.read_to_end(&mut head).map_err(refused)?;
+    let is_dwd_named = is_dwd_named(path);
+    let mut notes = Notes::default();
+    let (format, why, contents) = read_bytes(&head, is_dwd_named, &mut notes).map_err(|e| e.file(path))?;
+    Ok(Opened::Read(MeasurementFile {
+        path: path.to_path_buf(),
+        format,
+        why,
+        contents,
+        warnings: notes.into_warnings(),
+    }))
+}
+
+fn is_dwd_named(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("dwd"))
+}
+
+/// Decides from the first piece of a file whether it is a table that can be read by pieces; leaves the rows in `head`.
+fn long_record(path: &Path, head: &mut Vec<u8>, bytes: u64) -> Option<(Format, String, Pieces, Notes)> {
+    debug_assert!(bytes > head.len() as u64);
+    if head.starts_with(b"\xFF\xFE") || head.starts_with(b"\xFE\xFF") {
+        return None;
+    }
+    let whole_lines = head.iter().rposition(|b| *b == b'\n')? + 1;
+    let text = text::without_byte_order_mark(&head[..whole_lines]);
+    let mark = whole_lines - text.len();
+    let (detected, format, why) = detect::detect(&text, is_dwd_named(path)).ok()?;
+    let Detected::TimeTable(header) = detected else {
+        return None;
+    };
+    let rows = text.get(header.data_at..).unwrap_or_default();
+    if header.decimal_comma_between_commas || rows.contains(&b'"') {
+        return None;
+    }
+    let pieces = Pieces::new(&text, header);
+    let data_at = mark + pieces.header.data_at;
+    drop(text);
+    head.drain(..data_at);
+    Some((format, why, pieces, Notes::default()))
+}
+
+impl LongRecord {
+    /// The next rows; `None` at the end.
+    fn next_piece(&mut self) -> Result<Option<TimeRecord>> {
+        if self.at_end {
+            return Ok(None);
+        }
+        let refused = |e| Error::io(&self.path, e);
+        let missing = self.piece.saturating_sub(self.text.len());
+        let read = (&mut self.file).take(missing as u64).read_to_end(&mut self.text);
+        self.at_end = read.map_err(refused)? < missing;
+        let end = match self.text.iter().rposition(|b| *b == b'\n') {
+            Some(at) if !self.at_end => at + 1,
+            _ => self.text.len(),
+        };
+        let text = &self.text[..end];
+        let fail = |e: crate::InputError| Error::from(e.file(&self.path));
+        let table = self
+            .pieces
+            .header
+            .read_rows(text, self.line, self.at_end, &mut self.notes)
+            .map_err(fail)?;
+        let record = self
+            .pieces
+            .next(table, self.line, &mut self.notes)
+            .map_err(fail)?;
+        self.bytes_per_sample = end as f64 / record.len().max(1) as f64;
+        self.line += text.iter().filter(|b| **b == b'\n').count();
+        self.text.drain(..end);
+        self.progress.step();
+        if self.at_end {
+            self.pieces.finish(&mut self.notes);
+        }
+        Ok(Some(record))
+    }
+
+    /// Samples of the whole file, from its length.
+    fn expected_samples(&self) -> usize {
+        (self.bytes as f64 / self.bytes_per_sample.max(1.0)) as usize
+    }
+
+    /// All pieces in one record.
+    pub(super) fn whole(mut self) -> Result<MeasurementFile> {
+        let mut whole: Option<TimeRecord> = None;
+        while let Some(piece) = self.next_piece()? {
+            let Some(record) = &mut whole else {
+                let expected = self.expected_samples();
+                let record = whole.insert(piece);
+                for channel in &mut record.channels {
+                    channel
+                        .samples
+                        .reserve_exact((expected + expected / 50).saturating_sub(channel.samples.len()));
+                }
+                continue;
+            };
+            let at = record.len();
+            record
+                .filled
+                .extend(piece.filled.iter().map(|r| r.start + at..r.end + at));
+            for (channel, more) in record.channels.iter_mut().zip(piece.channels) {
+                channel.samples.extend(more.samples);
+            }
+        }
+        Ok(self.file_with(whole.into_iter().collect()))
+    }
+
+    fn file_with(self, times: Vec<TimeRecord>) -> MeasurementFile {
+        MeasurementFile {
+            path: self.path,
+            format: self.format,
+            why: self.why,
+            contents: Contents {
+                times,
+                ..Contents::default()
+            },
+            warnings: self.notes.into_warnings(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fmt::Write as _;
+
+    /// A log at 2 kHz with a gap wherever a piece may end, and the file it is in.
+    fn log(change: impl Fn(&mut String)) -> tempfile::NamedTempFile {
+        let mut text = String::from("Sampling rate [Hz]:,2000\nTime,Fx,Fy,Mz\nms,N,kN,Nm\n");
+        for i in (0..6000).filter(|i| i % 37 != 5) {
+            let v = f64::from(i * i % 1013);
+            let _ = writeln!(
+                text,
+                "{:.1},{:.2},{:.4},{:.3}",
+                f64::from(i) * 0.5,
+                v - 300.0,
+                v / 700.0,
+                0.1 * v
+            );
+        }
+        change(&mut text);
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        file
+    }
+
+    fn by_pieces(path: &Path, piece: usize) -> Result<MeasurementFile> {
+        match open_by(path, piece)? {
+            Opened::Long(long) => long.whole(),
+            Opened::Read(_) => panic!("read as a whole"),
+        }
+    }
+
+    #[test]
+    fn pieces_add_up_to_the_whole() {
+        let file = log(|_| ());
+        let whole = super::super::read_file(file.path()).unwrap();
+        let record = &whole.contents.times[0];
+        // Every 37th sample is missing and filled, but for the very last.
+        assert_eq!((record.len(), record.filled.len()), (5999, 162));
+        for piece in [4096, 10_000, 33_333, 100_000] {
+            let long = by_pieces(file.path(), piece).unwrap();
+            let other = &long.contents.times[0];
+            assert_eq!(other.sample_rate_hz, 2000.0);
+            assert_eq!((other.start_s, &other.filled), (record.start_s, &record.filled));
+            for (a, b) in record.channels.iter().zip(&other.channels) {
+                assert_eq!((&a.name, a.role, &a.file_unit), (&b.name, b.role, &b.file_unit));
+                assert!(a.samples == b.samples, "{piece}: {}", a.name);
+            }
+            assert_eq!(whole.warnings, long.warnings);
+        }
+    }
+
+    #[test]
+    fn errors_name_the_line_wherever_pieces_end() {
+        let spoilt = log(|text| *text = text.replacen("\n2000.0,", "\n2000.0;", 1));
+        let message = |e: Result<MeasurementFile>| e.unwrap_err().to_string();
+        let whole = message(super::super::read_file(spoilt.path()));
+        assert!(whole.contains(":3896: 4 numbers are expected"), "{whole}");
+        for piece in [4096, 50_000] {
+            assert_eq!(message(by_pieces(spoilt.path(), piece)), whole);
+        }
+        let cut_short = log(|text| text.truncate(text.len() - 9));
+        let long = by_pieces(cut_short.path(), 8192).unwrap();
+        assert!(
+            long.warnings
+                .contains(&"the last row is incomplete and left out".to_owned())
+        );
+        assert_eq!(long.contents.times[0].len(), 5998);
+    }
+}

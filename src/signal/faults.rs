@@ -1,0 +1,270 @@
+//! Faults of single samples: spikes, stuck stretches, clipped peaks. Few and sure: a warning that is wrong half the time
+//! is read never.
+
+use std::ops::Range;
+
+/// What is wrong with the samples of one channel, as sample ranges in ascending order.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Faults {
+    /// The same value in every sample: the channel is dead, and nothing else is said of it.
+    pub dead: bool,
+    /// One to three samples far out of line with those on both sides.
+    pub spikes: Vec<Range<usize>>,
+    /// Stretches without any change in a channel that else never rests.
+    pub stuck: Vec<Range<usize>>,
+    pub clipping: Option<Clipping>,
+}
+
+/// Peaks cut off at one end of the channel's range.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Clipping {
+    /// Value of the plateaus, unit of the channel.
+    pub level: f64,
+    pub plateaus: Vec<Range<usize>>,
+}
+
+impl Clipping {
+    /// Clipped samples within `window`.
+    pub fn samples_in(&self, window: &Range<usize>) -> usize {
+        samples_in(&self.plateaus, window)
+    }
+}
+
+/// Samples of `ranges` that lie in `window`.
+pub fn samples_in(ranges: &[Range<usize>], window: &Range<usize>) -> usize {
+    let inside = |r: &Range<usize>| r.end.min(window.end).saturating_sub(r.start.max(window.start));
+    ranges.iter().map(inside).sum()
+}
+
+/// Looks for all of them.
+pub fn find_faults(samples: &[f64]) -> Faults {
+    if samples.len() > 1 && samples.iter().all(|v| *v == samples[0]) {
+        return Faults {
+            dead: true,
+            ..Faults::default()
+        };
+    }
+    let spikes = spikes(samples);
+    let range = extremes(samples, &spikes);
+    if repeats_by_nature(samples, range) {
+        return Faults {
+            spikes,
+            ..Faults::default()
+        };
+    }
+    let clipping = clipping(samples, range);
+    let clipped = |run: &Range<usize>| clipping.as_ref().is_some_and(|c| c.plateaus.contains(run));
+    let stuck = runs(samples)
+        .filter(|run| run.len() >= STUCK && !clipped(run))
+        .collect();
+    Faults {
+        dead: false,
+        spikes,
+        stuck,
+        clipping,
+    }
+}
+
+/// Runs of equal samples.
+fn runs(samples: &[f64]) -> impl Iterator<Item = Range<usize>> + '_ {
+    let mut at = 0;
+    samples.chunk_by(|a, b| a == b).map(move |run| {
+        at += run.len();
+        at - run.len()..at
+    })
+}
+
+/// Samples in a row without any change that mean a stuck channel.
+const STUCK: usize = 20;
+/// Samples in a row at the extreme value that make a plateau.
+const PLATEAU: usize = 3;
+
+/// Long stretches that are looked at one by one.
+const STRETCHES_AT_MOST: usize = 50;
+
+/// Signals of few digits repeat values by nature: nothing can be said about plateaus and rests there. A long stretch
+/// speaks for that only where its value is seen elsewhere too, as the zeros of coarse quiet air are.
+fn repeats_by_nature(samples: &[f64], (low, high): (f64, f64)) -> bool {
+    let (mut repeats, mut stretches) = (0, Vec::new());
+    for run in runs(samples) {
+        if run.len() >= STUCK {
+            stretches.push(run);
+        } else if samples[run.start] != low && samples[run.start] != high {
+            repeats += run.len() - 1;
+        }
+    }
+    let held = |run: &Range<usize>| {
+        let same = samples.iter().filter(|v| **v == samples[run.start]).count();
+        500 * (same - run.len()) < samples.len()
+    };
+    let few = stretches.len() <= STRETCHES_AT_MOST;
+    let extreme = |run: &Range<usize>| samples[run.start] == low || samples[run.start] == high;
+    let longest = stretches.iter().map(Range::len).max();
+    let natural = stretches
+        .iter()
+        .filter(|run| !extreme(run) && Some(run.len()) != longest && !(few && held(run)))
+        .map(Range::len)
+        .sum::<usize>();
+    10 * (repeats + natural) > samples.len()
+}
+
+/// Least and greatest value; `spikes` do not count.
+fn extremes(samples: &[f64], spikes: &[Range<usize>]) -> (f64, f64) {
+    let starts = std::iter::once(0).chain(spikes.iter().map(|s| s.end));
+    let ends = spikes.iter().map(|s| s.start).chain([samples.len()]);
+    let sound = starts.zip(ends).flat_map(|(from, to)| &samples[from..to]);
+    sound.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+        (low.min(*v), high.max(*v))
+    })
+}
+
+/// At least two plateaus at one of the extreme values.
+fn clipping(samples: &[f64], (low, high): (f64, f64)) -> Option<Clipping> {
+    [high, low].into_iter().find_map(|level| {
+        let plateaus: Vec<Range<usize>> = runs(samples)
+            .filter(|run| run.len() >= PLATEAU && samples[run.start] == level)
+            .collect();
+        // A single long one is a stuck channel rather than a peak cut off.
+        (plateaus.len() >= 2).then_some(Clipping { level, plateaus })
+    })
+}
+
+/// Longest spike, samples; so far apart lie the neighbours it is compared with.
+const WIDEST_SPIKE: usize = 3;
+/// Times the height above both neighbours that 99.5 % of the samples stay below.
+const SPIKE: f64 = 8.0;
+
+/// Samples that stand far above (or below) those three before and three after. A step has no height in that sense, and
+/// what comes back once a revolution is the signal's own.
+fn spikes(samples: &[f64]) -> Vec<Range<usize>> {
+    let n = samples.len();
+    if n < 200 {
+        return Vec::new();
+    }
+    let height = |i: usize| {
+        let (before, after) = (
+            samples[i] - samples[i - WIDEST_SPIKE],
+            samples[i] - samples[i + WIDEST_SPIKE],
+        );
+        if before * after > 0.0 {
+            before.abs().min(after.abs())
+        } else {
+            0.0
+        }
+    };
+    let within = WIDEST_SPIKE..n - WIDEST_SPIKE;
+    let mut heights: Vec<f64> = within.clone().map(height).collect();
+    let rank = (heights.len() as f64 * 0.995) as usize;
+    let (_, &mut usual, _) = heights.select_nth_unstable_by(rank, f64::total_cmp);
+    if usual == 0.0 {
+        return Vec::new();
+    }
+    let mut found: Vec<Range<usize>> = Vec::new();
+    for i in within.filter(|i| height(*i) > SPIKE * usual) {
+        match found.last_mut() {
+            Some(last) if last.end == i => last.end = i + 1,
+            _ => found.push(i..i + 1),
+        }
+    }
+    found.retain(|spike| spike.len() <= WIDEST_SPIKE);
+    if come_back_evenly(&found) {
+        Vec::new()
+    } else {
+        found
+    }
+}
+
+fn come_back_evenly(found: &[Range<usize>]) -> bool {
+    if found.len() < 6 {
+        return false;
+    }
+    let mut gaps: Vec<usize> = found.windows(2).map(|w| w[1].start - w[0].start).collect();
+    gaps.sort_unstable();
+    let middle = gaps[gaps.len() / 2];
+    let alike = gaps
+        .iter()
+        .filter(|g| g.abs_diff(middle) <= 1 + middle / 50)
+        .count();
+    2 * alike > gaps.len()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    fn signal() -> Vec<f64> {
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        (0..4000)
+            .map(|i| 100.0 * (f64::from(i) * 0.15).sin() + random.random_range(-5.0..5.0))
+            .collect()
+    }
+
+    fn faults(change: impl Fn(&mut [f64])) -> Faults {
+        let mut samples = signal();
+        change(&mut samples);
+        find_faults(&samples)
+    }
+
+    #[test]
+    fn a_sound_signal_has_none() {
+        assert_eq!(faults(|_| ()), Faults::default());
+        assert_eq!(
+            faults(|v| v.iter_mut().for_each(|v| *v = (*v / 20.0).round())),
+            Faults::default()
+        );
+        assert_eq!(find_faults(&[]), Faults::default());
+        assert_eq!(find_faults(&[1.0]), Faults::default());
+        // A tooth that rings once a revolution is no fault.
+        assert_eq!(
+            faults(|v| v.iter_mut().step_by(400).for_each(|v| *v += 900.0)),
+            Faults::default()
+        );
+        // Neither is a step.
+        assert_eq!(
+            faults(|v| v[2000..].iter_mut().for_each(|v| *v += 2000.0)),
+            Faults::default()
+        );
+    }
+
+    #[test]
+    fn each_is_found_where_it_is() {
+        let found = faults(|v| {
+            v[700] += 700.0;
+            v[1500] -= 800.0;
+            v[1501] -= 800.0;
+        });
+        assert_eq!(found.spikes, [700..701, 1500..1502]);
+        let found = faults(|v| v[1000..1050].fill(12.5));
+        assert_eq!((found.stuck.len(), &found.stuck[0]), (1, &(1000..1050)));
+        assert_eq!(found.clipping, None);
+        assert!(faults(|v| v.fill(3.0)).dead);
+        // A spike beyond the range does not hide that the range is too small.
+        let found = faults(|v| {
+            v.iter_mut().for_each(|v| *v = v.min(80.0));
+            v[900] = 5000.0;
+        });
+        let clipping = found.clipping.unwrap();
+        assert_eq!(clipping.level, 80.0);
+        assert!(clipping.plateaus.len() > 50, "{}", clipping.plateaus.len());
+        assert!(
+            found.stuck.is_empty() && found.spikes.len() == 1 && found.spikes[0] == (900..901),
+            "{:?}",
+            found.spikes
+        );
+        let inside = clipping.plateaus[3].clone();
+        assert_eq!(clipping.samples_in(&(inside.start..inside.end)), inside.len());
+    }
+
+    /// Long plateaus are clipping too, where there are several.
+    #[test]
+    fn slow_peaks_cut_off_are_clipped_and_not_stuck() {
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let samples: Vec<f64> = (0..20_000)
+            .map(|i| (100.0 * (f64::from(i) * 0.005).sin() + random.random_range(-1.0..1.0)).min(60.0))
+            .collect();
+        let found = find_faults(&samples);
+        assert!(found.stuck.is_empty() && found.clipping.is_some());
+    }
+}

@@ -14,7 +14,7 @@ use super::lscf::{self, Row};
 use super::stabilisation::{self, Candidate, ShapeData, Stabilisation};
 use super::{FrfModes, GlobalMode, GlobalModes, Reconstruction, Settings, ml_fit, shape};
 use crate::Result;
-use crate::signal::frf_noise;
+use crate::signal::frf_noise::{self, LeftOver};
 
 /// Poles of the highest order: at least, and at most.
 const POLES: [usize; 2] = [40, 80];
@@ -336,38 +336,53 @@ fn solve(data: &mut [Data], start: &[Pole], changes: &mut Vec<Change>) -> Option
     Some(groups)
 }
 
-/// Noise of each FRF from what the fit leaves over.
+/// Noise of each FRF from what the fit leaves over. Lines whose group could not be fitted keep theirs.
 fn renew_noise(data: &mut [Data], groups: &[Group]) {
-    for (m, d) in data.iter_mut().enumerate() {
-        let mut left_over = Vec::with_capacity(d.frequency_hz.len());
-        for group in groups {
-            let found = &group.solution.frfs[m];
-            let from = d.frequency_hz.partition_point(|&f| f < group.window_hz[0]);
-            // The poles are shared by all FRFs and cost each of them next to nothing.
-            let freedom = (1.0 - found.leverage).max(0.05);
-            left_over.extend(found.residual.iter().enumerate().map(|(k, r)| {
-                let fitted = (d.receptance[from + k] - r).norm();
-                (fitted, r.norm_sqr() / freedom)
-            }));
-        }
+    let left_over: Vec<Vec<LeftOver>> = (0..data.len()).map(|m| left_over(&data[m], groups, m)).collect();
+    let laws = frf_noise::laws_of_residuals(&left_over);
+    for ((d, lines), law) in data.iter_mut().zip(&left_over).zip(laws) {
         let size = rms(&d.receptance);
-        match frf_noise::law_of_residual(left_over.iter().copied()) {
-            Some(law) => {
-                for (sigma, (fitted, _)) in d.sigma.iter_mut().zip(&left_over) {
-                    *sigma = law.std(*fitted).max(1e-7 * fitted).max(1e-10 * size);
-                }
-            }
-            None => {
-                let level = left_over
-                    .iter()
-                    .zip(&d.sigma)
-                    .map(|((_, r), s)| r / (s * s))
-                    .sum::<f64>();
-                let scale = (level / left_over.len().max(1) as f64).sqrt().max(1e-6);
-                d.sigma.iter_mut().for_each(|s| *s *= scale);
-            }
+        let fitted = lines.iter().filter(|l| l.squared.is_finite());
+        let (count, level) = fitted.zip(&d.sigma).fold((0, 0.0), |(n, sum), (line, s)| {
+            (n + 1, sum + line.squared / (s * s))
+        });
+        let scale = (level / f64::from(count.max(1))).sqrt().max(1e-6);
+        for (sigma, line) in d.sigma.iter_mut().zip(lines).filter(|(_, l)| l.squared.is_finite()) {
+            *sigma = match &law {
+                Some(law) => law
+                    .std(line.frequency_hz, line.magnitude)
+                    .max(1e-7 * line.magnitude)
+                    .max(1e-10 * size),
+                None => *sigma * scale,
+            };
         }
     }
+}
+
+/// By line of FRF m; infinite where no group covers it.
+fn left_over(data: &Data, groups: &[Group], m: usize) -> Vec<LeftOver> {
+    let mut lines: Vec<LeftOver> = data
+        .frequency_hz
+        .iter()
+        .zip(&data.receptance)
+        .map(|(&frequency_hz, h)| LeftOver {
+            frequency_hz,
+            magnitude: h.norm(),
+            squared: f64::INFINITY,
+        })
+        .collect();
+    for group in groups {
+        let found = &group.solution.frfs[m];
+        let from = data.frequency_hz.partition_point(|&f| f < group.window_hz[0]);
+        // The poles are shared by all FRFs and cost each of them next to nothing.
+        let freedom = (1.0 - found.leverage).max(0.05);
+        for (k, residual) in found.residual.iter().enumerate() {
+            let line = &mut lines[from + k];
+            line.magnitude = (data.receptance[from + k] - residual).norm();
+            line.squared = residual.norm_sqr() / freedom;
+        }
+    }
+    lines
 }
 
 fn collect(

@@ -26,6 +26,10 @@ const FAR: f64 = 100.0;
 /// Below this many lines in the half-power band the record's leakage counts, see `analysis`.
 const LEAKAGE_BELOW_LINES: f64 = 1.0;
 const LEAKAGE_LINES: f64 = 0.02;
+/// A piece of the band left with this many times the noise power is badly described.
+const MISFIT: f64 = 2.0;
+/// Lines of a piece: enough that a mode overlooked in it still stands out.
+const BLOCK: usize = 48;
 /// Modes with fewer lines in the half-power band are named.
 const FINE_LINES: f64 = 3.0;
 
@@ -336,7 +340,9 @@ fn solve(data: &mut [Data], start: &[Pole], changes: &mut Vec<Change>) -> Option
     Some(groups)
 }
 
-/// Noise of each FRF from what the fit leaves over. Lines whose group could not be fitted keep theirs.
+/// Noise of each FRF from what the fit leaves over. Lines whose group could not be fitted keep theirs. Where a piece of
+/// the band is left far worse than the rest (leakage, drifting modes, lines below the sensor's range), it is that much
+/// noisier: one bad end of the band must not decide what is needless elsewhere.
 fn renew_noise(data: &mut [Data], groups: &[Group]) {
     let left_over: Vec<Vec<LeftOver>> = (0..data.len()).map(|m| left_over(&data[m], groups, m)).collect();
     let laws = frf_noise::laws_of_residuals(&left_over);
@@ -347,7 +353,12 @@ fn renew_noise(data: &mut [Data], groups: &[Group]) {
             (n + 1, sum + line.squared / (s * s))
         });
         let scale = (level / f64::from(count.max(1))).sqrt().max(1e-6);
-        for (sigma, line) in d.sigma.iter_mut().zip(lines).filter(|(_, l)| l.squared.is_finite()) {
+        for (sigma, line) in d
+            .sigma
+            .iter_mut()
+            .zip(lines)
+            .filter(|(_, l)| l.squared.is_finite())
+        {
             *sigma = match &law {
                 Some(law) => law
                     .std(line.frequency_hz, line.magnitude)
@@ -357,6 +368,45 @@ fn renew_noise(data: &mut [Data], groups: &[Group]) {
             };
         }
     }
+    // In a few FRFs alone a mode overlooked would hide in its own misfit.
+    if data.len() < SET {
+        return;
+    }
+    for [from, to] in blocks(data) {
+        let (mut count, mut level) = (0, 0.0);
+        for (d, lines) in data.iter().zip(&left_over) {
+            for (line, sigma) in lines.iter().zip(&d.sigma) {
+                if (from..to).contains(&line.frequency_hz) && line.squared.is_finite() {
+                    level += line.squared / (sigma * sigma);
+                    count += 1;
+                }
+            }
+        }
+        let excess = level / f64::from(count.max(1));
+        if excess.is_finite() && excess > MISFIT {
+            for d in data.iter_mut() {
+                let sigmas = d.frequency_hz.iter().zip(&mut d.sigma);
+                sigmas
+                    .filter(|(f, _)| (from..to).contains(*f))
+                    .for_each(|(_, sigma)| *sigma *= excess.sqrt());
+            }
+        }
+    }
+}
+
+/// The band in pieces of at least [`BLOCK`] lines of the FRF that has most, Hz.
+fn blocks(data: &[Data]) -> Vec<[f64; 2]> {
+    let Some(finest) = data.iter().max_by_key(|d| d.frequency_hz.len()) else {
+        return Vec::new();
+    };
+    let lines = &finest.frequency_hz;
+    let count = (lines.len() / BLOCK).max(1);
+    let edge = |k: usize| match k {
+        0 => f64::NEG_INFINITY,
+        k if k == count => f64::INFINITY,
+        k => lines[k * lines.len() / count],
+    };
+    (0..count).map(|k| [edge(k), edge(k + 1)]).collect()
 }
 
 /// By line of FRF m; infinite where no group covers it.
@@ -498,37 +548,51 @@ fn collect(
         .iter()
         .map(|a| residues.iter().map(|b| shape::mac(a, b)).collect())
         .collect();
+    let where_modes_are = around(&result.modes);
     for (m, d) in data.iter().enumerate() {
-        let mut fitted = Vec::with_capacity(d.frequency_hz.len());
-        for group in groups {
-            let found = &group.solution.frfs[m];
-            let from = d.frequency_hz.partition_point(|&f| f < group.window_hz[0]);
-            fitted.extend(
-                found
-                    .residual
-                    .iter()
-                    .enumerate()
-                    .map(|(k, r)| d.receptance[from + k] - r),
-            );
-        }
-        let f = &d.frequency_hz;
-        let both = fitted.iter().zip(&d.receptance).zip(f);
-        let error: f64 = both.map(|((a, b), f)| f * f * (a - b).norm_sqr()).sum();
-        let noise: f64 = d.sigma.iter().zip(f).map(|(s, f)| (f * s).powi(2)).sum();
-        let total: f64 = d
-            .receptance
-            .iter()
-            .zip(f)
-            .map(|(h, f)| f * f * h.norm_sqr())
-            .sum();
-        result.reconstructions[of_member[m]] = Some(Reconstruction {
-            error_nrms: (error / total).sqrt(),
-            noise_nrms: (noise / total).sqrt(),
-            frequency_hz: d.frequency_hz.clone(),
-            measured_m_per_n: d.receptance.clone(),
-            fitted_m_per_n: fitted,
-        });
+        result.reconstructions[of_member[m]] = Some(reconstruction(d, groups, m, where_modes_are));
     }
+}
+
+/// The band around the modes, Hz: what lies far outside says nothing about them.
+fn around(modes: &[GlobalMode]) -> [f64; 2] {
+    const REACH: f64 = 1.5;
+    let frequencies = || modes.iter().map(|m| m.frequency_hz);
+    match (frequencies().reduce(f64::min), frequencies().reduce(f64::max)) {
+        (Some(first), Some(last)) => [first / REACH, last * REACH],
+        _ => [0.0, f64::INFINITY],
+    }
+}
+
+/// FRF m on the lines that a group covers; errors as mobility, within `band_hz`.
+fn reconstruction(d: &Data, groups: &[Group], m: usize, band_hz: [f64; 2]) -> Reconstruction {
+    let mut found = Reconstruction {
+        error_nrms: 0.0,
+        noise_nrms: 0.0,
+        frequency_hz: Vec::with_capacity(d.frequency_hz.len()),
+        measured_m_per_n: Vec::with_capacity(d.frequency_hz.len()),
+        fitted_m_per_n: Vec::with_capacity(d.frequency_hz.len()),
+    };
+    let mut total = 0.0;
+    for group in groups {
+        let from = d.frequency_hz.partition_point(|&f| f < group.window_hz[0]);
+        for (k, residual) in group.solution.frfs[m].residual.iter().enumerate() {
+            let (f, h) = (d.frequency_hz[from + k], d.receptance[from + k]);
+            found.frequency_hz.push(f);
+            found.measured_m_per_n.push(h);
+            found.fitted_m_per_n.push(h - residual);
+            if (band_hz[0]..=band_hz[1]).contains(&f) {
+                found.error_nrms += f * f * residual.norm_sqr();
+                found.noise_nrms += (f * d.sigma[from + k]).powi(2);
+                total += f * f * h.norm_sqr();
+            }
+        }
+    }
+    // Nothing measured there: nothing to be wrong about.
+    let total = if total > 0.0 { total } else { 1.0 };
+    found.error_nrms = (found.error_nrms / total).sqrt();
+    found.noise_nrms = (found.noise_nrms / total).sqrt();
+    found
 }
 
 /// Shape by response (or by FRF where degrees of freedom are not known), largest component 1.

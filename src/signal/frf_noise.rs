@@ -379,7 +379,8 @@ fn fit_laws(frfs: &[&[Departure]]) -> Vec<Option<FrfNoise>> {
             .sum();
         let found = laws.iter().flatten().count();
         let better = best.as_ref().is_none_or(|(before, other)| {
-            found >= other.iter().flatten().count() && likelihood > before + if power > 0 { LIKELIER } else { 0.0 }
+            found >= other.iter().flatten().count()
+                && likelihood > before + if power > 0 { LIKELIER } else { 0.0 }
         });
         if better {
             best = Some((likelihood, laws));
@@ -432,10 +433,7 @@ fn fit_even_law(departures: &[Departure]) -> Option<(f64, f64)> {
     let mut sorted: Vec<f64> = departures.iter().map(|d| d.variance).collect();
     sorted.sort_by(f64::total_cmp);
     // Start: all floor, from the median of an exponential distribution.
-    let (mut relative, mut floor) = (
-        0.0,
-        (sorted[sorted.len() / 2] / std::f64::consts::LN_2).sqrt(),
-    );
+    let (mut relative, mut floor) = (0.0, (sorted[sorted.len() / 2] / std::f64::consts::LN_2).sqrt());
     if !(scale > 0.0) || !floor.is_finite() || floor <= 0.0 {
         return None;
     }
@@ -489,8 +487,8 @@ fn fit_even_law(departures: &[Departure]) -> Option<(f64, f64)> {
         // Never exactly zero: a line of zero noise would get all the weight there is.
         let smallest = 1e-12 * scale * scale;
         let next = (a2.sqrt(), b2.max(smallest).sqrt());
-        let settled = (next.0 - relative).abs() < 1e-6 * next.0.max(1e-9)
-            && (next.1 - floor).abs() < 1e-6 * next.1;
+        let settled =
+            (next.0 - relative).abs() < 1e-6 * next.0.max(1e-9) && (next.1 - floor).abs() < 1e-6 * next.1;
         (relative, floor) = next;
         if settled && pass > 6 {
             break;
@@ -559,7 +557,10 @@ mod tests {
         assert_eq!(laws.len(), frfs.len());
         assert!(laws.iter().all(|l| l.power == power), "{laws:?}");
         let mean = |f: fn(&FrfNoise) -> f64| laws.iter().map(f).sum::<f64>() / laws.len() as f64;
-        let (a, b) = (mean(|l| l.relative), mean(|l| FrfNoise { relative: 0.0, ..*l }.std(16.0, 0.0)));
+        let (a, b) = (
+            mean(|l| l.relative),
+            mean(|l| FrfNoise { relative: 0.0, ..*l }.std(16.0, 0.0)),
+        );
         assert!((a / relative - 1.0).abs() < 0.1, "power {power}: relative {a}");
         assert!((b / floor - 1.0).abs() < 0.06, "power {power}: floor {b}");
     }

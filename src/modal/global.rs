@@ -4,34 +4,22 @@
 //! the peaks of the single FRFs as a safety net → maximum-likelihood refinement with needless poles taken out
 //! ([`super::joint_fit`]) → noise again, from what the fit leaves over, and a last refinement.
 
-use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 use super::curve::{Curve, MIN_LINES};
 use super::joint_fit::{self, Change, Data, Doubt, Group, Search};
 use super::local_fit::Pole;
 use super::lscf::{self, Row};
-use super::stabilisation::{self, Candidate, ShapeData, Stabilisation};
-use super::{FrfModes, GlobalMode, GlobalModes, Reconstruction, Settings, ml_fit, shape};
+use super::stabilisation::{self, Candidate, ShapeData};
+use super::{FrfModes, GlobalModes, Settings, findings, set_noise};
 use crate::Result;
-use crate::signal::frf_noise::{self, LeftOver};
 
 /// Poles of the highest order: at least, and at most.
 const POLES: [usize; 2] = [40, 80];
 /// More references than this are not taken together.
 const MAX_REFERENCES: usize = 6;
 /// In sets of at least this many FRFs a mode seen by one of them alone must stand out far.
-const SET: usize = 4;
-const FAR: f64 = 100.0;
-/// Below this many lines in the half-power band the record's leakage counts, see `analysis`.
-const LEAKAGE_BELOW_LINES: f64 = 1.0;
-const LEAKAGE_LINES: f64 = 0.02;
-/// A piece of the band left with this many times the noise power is badly described.
-const MISFIT: f64 = 2.0;
-/// Lines of a piece: enough that a mode overlooked in it still stands out.
-const BLOCK: usize = 48;
-/// Modes with fewer lines in the half-power band are named.
-const FINE_LINES: f64 = 3.0;
+pub(super) const SET: usize = 4;
 
 /// One FRF of a set, with what was found in it.
 #[derive(Clone, Copy)]
@@ -99,10 +87,10 @@ pub fn global(frfs: &[SetMember], settings: &Settings) -> Result<GlobalModes> {
         result.stabilisation = diagram;
         return Ok(result);
     };
-    collect(&groups, &data, &members, &of_member, &mut result);
-    explain(&mut diagram, &result.modes, &changes);
+    findings::collect(&groups, &data, &members, &of_member, &mut result);
+    findings::explain(&mut diagram, &result.modes, &changes);
     result.stabilisation = diagram;
-    coarse_lines(&data, &mut result);
+    findings::coarse_lines(&data, &mut result);
     Ok(result)
 }
 
@@ -154,43 +142,8 @@ fn prepare(
         });
         of_member.push(m);
     }
-    estimate_noise(&mut data);
+    set_noise::estimate(&mut data);
     Ok((data, of_member))
-}
-
-/// Noise of each FRF, from those on the same lines together.
-fn estimate_noise(data: &mut [Data]) {
-    let mut todo: Vec<usize> = (0..data.len()).collect();
-    while let Some(&first) = todo.first() {
-        let (same, other): (Vec<usize>, Vec<usize>) = todo
-            .iter()
-            .partition(|&&k| data[k].frequency_hz == data[first].frequency_hz);
-        let curves: Vec<&[Complex64]> = same.iter().map(|&k| data[k].receptance.as_slice()).collect();
-        let estimates = frf_noise::estimate(&data[first].frequency_hz, &curves);
-        for (&k, estimate) in same.iter().zip(estimates) {
-            let size = rms(&data[k].receptance);
-            let floor = |h: Complex64| (1e-6 * h.norm()).max(1e-9 * size);
-            data[k].sigma = match estimate {
-                Some(e) => e
-                    .std
-                    .iter()
-                    .zip(&data[k].receptance)
-                    .map(|(s, h)| s.max(floor(*h)))
-                    .collect(),
-                // Too few lines to tell: relative noise, as of a hammer; the residual scales it later.
-                None => data[k]
-                    .receptance
-                    .iter()
-                    .map(|h| (0.02 * h.norm()).max(1e-3 * size))
-                    .collect(),
-            };
-        }
-        todo = other;
-    }
-}
-
-fn rms(values: &[Complex64]) -> f64 {
-    (values.iter().map(|v| v.norm_sqr()).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
 fn band(data: &[Data]) -> Option<[f64; 2]> {
@@ -322,7 +275,7 @@ fn solve(data: &mut [Data], start: &[Pole], changes: &mut Vec<Change>) -> Option
     let mut groups = joint_fit::refine(data, start, Search::Rest, changes)?;
     // The first noise may have been wrong, and with it what was needless: search once more.
     for search in [Search::Pairs, Search::Nothing] {
-        renew_noise(data, &groups);
+        set_noise::renew(data, &groups);
         let mut poles: Vec<Pole> = groups
             .iter()
             .flat_map(|g| g.solution.poles.iter().copied())
@@ -340,408 +293,13 @@ fn solve(data: &mut [Data], start: &[Pole], changes: &mut Vec<Change>) -> Option
     Some(groups)
 }
 
-/// Noise of each FRF from what the fit leaves over. Lines whose group could not be fitted keep theirs. Where a piece of
-/// the band is left far worse than the rest (leakage, drifting modes, lines below the sensor's range), it is that much
-/// noisier: one bad end of the band must not decide what is needless elsewhere.
-fn renew_noise(data: &mut [Data], groups: &[Group]) {
-    let left_over: Vec<Vec<LeftOver>> = (0..data.len()).map(|m| left_over(&data[m], groups, m)).collect();
-    let laws = frf_noise::laws_of_residuals(&left_over);
-    for ((d, lines), law) in data.iter_mut().zip(&left_over).zip(laws) {
-        let size = rms(&d.receptance);
-        let fitted = lines.iter().filter(|l| l.squared.is_finite());
-        let (count, level) = fitted.zip(&d.sigma).fold((0, 0.0), |(n, sum), (line, s)| {
-            (n + 1, sum + line.squared / (s * s))
-        });
-        let scale = (level / f64::from(count.max(1))).sqrt().max(1e-6);
-        for (sigma, line) in d
-            .sigma
-            .iter_mut()
-            .zip(lines)
-            .filter(|(_, l)| l.squared.is_finite())
-        {
-            *sigma = match &law {
-                Some(law) => law
-                    .std(line.frequency_hz, line.magnitude)
-                    .max(1e-7 * line.magnitude)
-                    .max(1e-10 * size),
-                None => *sigma * scale,
-            };
-        }
-    }
-    // In a few FRFs alone a mode overlooked would hide in its own misfit.
-    if data.len() < SET {
-        return;
-    }
-    for [from, to] in blocks(data) {
-        let (mut count, mut level) = (0, 0.0);
-        for (d, lines) in data.iter().zip(&left_over) {
-            for (line, sigma) in lines.iter().zip(&d.sigma) {
-                if (from..to).contains(&line.frequency_hz) && line.squared.is_finite() {
-                    level += line.squared / (sigma * sigma);
-                    count += 1;
-                }
-            }
-        }
-        let excess = level / f64::from(count.max(1));
-        if excess.is_finite() && excess > MISFIT {
-            for d in data.iter_mut() {
-                let sigmas = d.frequency_hz.iter().zip(&mut d.sigma);
-                sigmas
-                    .filter(|(f, _)| (from..to).contains(*f))
-                    .for_each(|(_, sigma)| *sigma *= excess.sqrt());
-            }
-        }
-    }
-}
-
-/// The band in pieces of at least [`BLOCK`] lines of the FRF that has most, Hz.
-fn blocks(data: &[Data]) -> Vec<[f64; 2]> {
-    let Some(finest) = data.iter().max_by_key(|d| d.frequency_hz.len()) else {
-        return Vec::new();
-    };
-    let lines = &finest.frequency_hz;
-    let count = (lines.len() / BLOCK).max(1);
-    let edge = |k: usize| match k {
-        0 => f64::NEG_INFINITY,
-        k if k == count => f64::INFINITY,
-        k => lines[k * lines.len() / count],
-    };
-    (0..count).map(|k| [edge(k), edge(k + 1)]).collect()
-}
-
-/// By line of FRF m; infinite where no group covers it.
-fn left_over(data: &Data, groups: &[Group], m: usize) -> Vec<LeftOver> {
-    let mut lines: Vec<LeftOver> = data
-        .frequency_hz
-        .iter()
-        .zip(&data.receptance)
-        .map(|(&frequency_hz, h)| LeftOver {
-            frequency_hz,
-            magnitude: h.norm(),
-            squared: f64::INFINITY,
-        })
-        .collect();
-    for group in groups {
-        let found = &group.solution.frfs[m];
-        let from = data.frequency_hz.partition_point(|&f| f < group.window_hz[0]);
-        // The poles are shared by all FRFs and cost each of them next to nothing.
-        let freedom = (1.0 - found.leverage).max(0.05);
-        for (k, residual) in found.residual.iter().enumerate() {
-            let line = &mut lines[from + k];
-            line.magnitude = (data.receptance[from + k] - residual).norm();
-            line.squared = residual.norm_sqr() / freedom;
-        }
-    }
-    lines
-}
-
-fn collect(
-    groups: &[Group],
-    data: &[Data],
-    members: &[&SetMember],
-    of_member: &[usize],
-    result: &mut GlobalModes,
-) {
-    let count = result.reconstructions.len();
-    let mut hardly_seen = Vec::new();
-    let mut without_width = Vec::new();
-    for group in groups {
-        let solution = &group.solution;
-        if let Some(doubt) = &group.doubt {
-            result.warnings.push(format!(
-                "there may be one more mode at {:.2} Hz: the FRFs hardly tell it from its neighbour, whose standard \
-                 deviations allow for it (more response points or another hammer point would tell)",
-                doubt.pole.frequency_hz
-            ));
-        }
-        if !solution.converged {
-            result.warnings.push(format!(
-                "the common fit between {:.1} and {:.1} Hz did not converge",
-                group.window_hz[0],
-                group.window_hz[1].min(
-                    data.iter()
-                        .filter_map(|d| d.frequency_hz.last())
-                        .fold(0.0, |m: f64, f| m.max(*f))
-                )
-            ));
-        }
-        // What the fit leaves beyond the noise widens the standard deviations.
-        let level = (solution.misfit / solution.degrees_of_freedom as f64)
-            .max(1.0)
-            .sqrt();
-        for (j, pole) in solution.poles.iter().enumerate() {
-            let (found_in, best) = joint_fit::seen_in(solution, j);
-            if found_in == 0 || (data.len() >= SET && found_in < 2 && best < FAR) {
-                hardly_seen.push(format!("{:.2}", pole.frequency_hz));
-                continue;
-            }
-            let shift = group.doubt.as_ref().map_or([0.0; 2], |d| d.shifts[j]);
-            let frequency_std_hz = (level * solution.frequency_std_hz(j)).hypot(shift[0]);
-            let mut constants = vec![None; count];
-            for m in 0..data.len() {
-                let (value, std) = solution.constant(m, j);
-                constants[of_member[m]] = Some((value, level * std));
-            }
-            let line_hz = data
-                .iter()
-                .map(|d| joint_fit::spacing_hz(&d.frequency_hz, pole.frequency_hz))
-                .fold(f64::INFINITY, f64::min);
-            let lines_in_half_power_band = 2.0 * pole.damping_ratio * pole.frequency_hz / line_hz;
-            let mut damping_std = (level * solution.damping_std(j)).hypot(shift[1]);
-            if lines_in_half_power_band < LEAKAGE_BELOW_LINES {
-                damping_std = damping_std.hypot(LEAKAGE_LINES * line_hz / (2.0 * pole.frequency_hz));
-            }
-            if damping_std >= pole.damping_ratio && group.doubt.is_none() {
-                without_width.push(format!("{:.2}", pole.frequency_hz));
-                continue;
-            }
-            let shape = shape_of(solution, j, members);
-            result.modes.push(GlobalMode {
-                frequency_hz: pole.frequency_hz,
-                damping_ratio: pole.damping_ratio,
-                frequency_std_hz,
-                damping_std,
-                found_in,
-                lines_in_half_power_band,
-                complexity: shape::complexity(&shape.iter().map(|s| s.1).collect::<Vec<_>>()),
-                shape,
-                constants,
-            });
-        }
-    }
-    if !hardly_seen.is_empty() {
-        result.warnings.push(format!(
-            "hardly above the noise, in one FRF or none, and left out: {} Hz",
-            hardly_seen.join(", ")
-        ));
-    }
-    if !without_width.is_empty() {
-        result.warnings.push(format!(
-            "lines without a width that the FRFs determine (hum, a disturbance, or too coarse lines), left out: {} Hz",
-            without_width.join(", ")
-        ));
-    }
-    result
-        .modes
-        .sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
-    let complex: Vec<String> = result
-        .modes
-        .iter()
-        .filter_map(|m| {
-            let mpc = m.complexity.filter(shape::Complexity::is_low)?.mpc;
-            Some(format!("{:.2} Hz ({mpc:.2})", m.frequency_hz))
-        })
-        .collect();
-    if !complex.is_empty() {
-        result.warnings.push(format!(
-            "complex modes (phase collinearity under {}): {}: two modes taken for one, channels shifted in time, or noise",
-            shape::COLLINEAR,
-            complex.join(", ")
-        ));
-    }
-    let residues: Vec<Vec<Complex64>> = result
-        .modes
-        .iter()
-        .map(|m| m.constants.iter().flatten().map(|c| c.0).collect())
-        .collect();
-    result.mac = residues
-        .iter()
-        .map(|a| residues.iter().map(|b| shape::mac(a, b)).collect())
-        .collect();
-    let where_modes_are = around(&result.modes);
-    for (m, d) in data.iter().enumerate() {
-        result.reconstructions[of_member[m]] = Some(reconstruction(d, groups, m, where_modes_are));
-    }
-}
-
-/// The band around the modes, Hz: what lies far outside says nothing about them.
-fn around(modes: &[GlobalMode]) -> [f64; 2] {
-    const REACH: f64 = 1.5;
-    let frequencies = || modes.iter().map(|m| m.frequency_hz);
-    match (frequencies().reduce(f64::min), frequencies().reduce(f64::max)) {
-        (Some(first), Some(last)) => [first / REACH, last * REACH],
-        _ => [0.0, f64::INFINITY],
-    }
-}
-
-/// FRF m on the lines that a group covers; errors as mobility, within `band_hz`.
-fn reconstruction(d: &Data, groups: &[Group], m: usize, band_hz: [f64; 2]) -> Reconstruction {
-    let mut found = Reconstruction {
-        error_nrms: 0.0,
-        noise_nrms: 0.0,
-        frequency_hz: Vec::with_capacity(d.frequency_hz.len()),
-        measured_m_per_n: Vec::with_capacity(d.frequency_hz.len()),
-        fitted_m_per_n: Vec::with_capacity(d.frequency_hz.len()),
-    };
-    let mut total = 0.0;
-    for group in groups {
-        let from = d.frequency_hz.partition_point(|&f| f < group.window_hz[0]);
-        for (k, residual) in group.solution.frfs[m].residual.iter().enumerate() {
-            let (f, h) = (d.frequency_hz[from + k], d.receptance[from + k]);
-            found.frequency_hz.push(f);
-            found.measured_m_per_n.push(h);
-            found.fitted_m_per_n.push(h - residual);
-            if (band_hz[0]..=band_hz[1]).contains(&f) {
-                found.error_nrms += f * f * residual.norm_sqr();
-                found.noise_nrms += (f * d.sigma[from + k]).powi(2);
-                total += f * f * h.norm_sqr();
-            }
-        }
-    }
-    // Nothing measured there: nothing to be wrong about.
-    let total = if total > 0.0 { total } else { 1.0 };
-    found.error_nrms = (found.error_nrms / total).sqrt();
-    found.noise_nrms = (found.noise_nrms / total).sqrt();
-    found
-}
-
-/// Shape by response (or by FRF where degrees of freedom are not known), largest component 1.
-fn shape_of(solution: &ml_fit::Solution, mode: usize, members: &[&SetMember]) -> Vec<(usize, Complex64)> {
-    let constant = |m: usize| solution.constant(m, mode).0;
-    let dofs: Option<Vec<[usize; 2]>> = members.iter().map(|m| m.dofs).collect();
-    let Some(dofs) = dofs else {
-        let all: Vec<Complex64> = (0..members.len()).map(constant).collect();
-        return shape::normalised(&all).into_iter().enumerate().collect();
-    };
-    let unique = |side: usize| {
-        let mut ids: Vec<usize> = dofs.iter().map(|d| d[side]).collect();
-        ids.sort_unstable();
-        ids.dedup();
-        ids
-    };
-    // A roving hammer moves the excitation: then the references carry the shape.
-    let (side, other) = if unique(1).len() > unique(0).len() {
-        (1, 0)
-    } else {
-        (0, 1)
-    };
-    let (ids, others) = (unique(side), unique(other));
-    let mut matrix = DMatrix::zeros(ids.len(), others.len());
-    let mut filled = 0;
-    for (m, dof) in dofs.iter().enumerate() {
-        let at = (
-            ids.iter().position(|i| *i == dof[side]),
-            others.iter().position(|i| *i == dof[other]),
-        );
-        if let (Some(i), Some(j)) = at {
-            matrix[(i, j)] = constant(m);
-            filled += 1;
-        }
-    }
-    if filled == ids.len() * others.len()
-        && let Some(shape) = shape::from_residues(&matrix)
-    {
-        return ids.into_iter().zip(shape).collect();
-    }
-    // Gaps in the grid: the column that shows the mode best, as far as it was measured.
-    let best = (0..others.len()).max_by(|&a, &b| matrix.column(a).norm().total_cmp(&matrix.column(b).norm()));
-    let Some(best) = best else { return Vec::new() };
-    let (measured, column): (Vec<usize>, Vec<Complex64>) = dofs
-        .iter()
-        .filter(|dof| dof[other] == others[best])
-        .filter_map(|dof| ids.iter().position(|i| *i == dof[side]))
-        .map(|i| (ids[i], matrix[(i, best)]))
-        .unzip();
-    measured.into_iter().zip(shape::normalised(&column)).collect()
-}
-
-/// Says of every candidate what became of it.
-fn explain(diagram: &mut Stabilisation, modes: &[GlobalMode], changes: &[Change]) {
-    let near = |a: f64, b: &Pole| (a / b.frequency_hz - 1.0).abs() < 0.7 * b.damping_ratio.max(0.003);
-    for change in changes {
-        if let Change::Added(pole) = change {
-            diagram.candidates.push(Candidate {
-                frequency_hz: pole.frequency_hz,
-                damping_ratio: pole.damping_ratio,
-                orders: 0,
-                chosen: false,
-                why: "what the fit left over has a resonance here".into(),
-            });
-        }
-    }
-    let mut owner: Vec<bool> = vec![false; modes.len()];
-    for candidate in &mut diagram.candidates {
-        let mode = modes
-            .iter()
-            .enumerate()
-            .filter(|(k, m)| {
-                let width = m.frequency_hz * m.damping_ratio.max(0.003);
-                !owner[*k] && (m.frequency_hz - candidate.frequency_hz).abs() < width
-            })
-            .min_by(|(_, a), (_, b)| {
-                let distance = |m: &GlobalMode| (m.frequency_hz - candidate.frequency_hz).abs();
-                distance(a).total_cmp(&distance(b))
-            });
-        if let Some((k, mode)) = mode {
-            owner[k] = true;
-            candidate.chosen = true;
-            candidate
-                .why
-                .push_str(&format!("; taken, seen in {} FRFs", mode.found_in));
-            continue;
-        }
-        let why = changes
-            .iter()
-            .rev()
-            .find_map(|change| match change {
-                Change::Needless(p) if near(candidate.frequency_hz, p) => {
-                    Some("left out: the FRFs are described as well without it")
-                }
-                Change::NotDetermined(p) if near(candidate.frequency_hz, p) => {
-                    Some("left out: the lines do not determine it")
-                }
-                _ => None,
-            })
-            .unwrap_or("left out: joined another mode, or hardly above the noise");
-        candidate.why.push_str("; ");
-        candidate.why.push_str(why);
-    }
-    diagram
-        .candidates
-        .sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
-}
-
-/// Three digits, without zeros at the end.
-fn short(value: f64) -> String {
-    let places = (2.0 - value.abs().log10().floor()).clamp(0.0, 9.0) as usize;
-    let text = format!("{value:.places$}");
-    match text.contains('.') {
-        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-        false => text,
-    }
-}
-
-/// One line for the whole set.
-fn coarse_lines(data: &[Data], result: &mut GlobalModes) {
-    let coarse: Vec<String> = result
-        .modes
-        .iter()
-        .filter(|m| m.lines_in_half_power_band < FINE_LINES)
-        .map(|m| {
-            format!(
-                "at {} Hz lines the damping of the {:.1} Hz mode is uncertain to {:.0} %",
-                short(
-                    data.iter()
-                        .map(|d| joint_fit::spacing_hz(&d.frequency_hz, m.frequency_hz))
-                        .fold(f64::INFINITY, f64::min)
-                ),
-                m.frequency_hz,
-                (100.0 * m.damping_std / m.damping_ratio).ceil()
-            )
-        })
-        .collect();
-    if !coarse.is_empty() {
-        result.warnings.push(format!(
-            "fewer than {FINE_LINES:.0} lines in the half-power band: {}",
-            coarse.join("; ")
-        ));
-    }
-}
 #[cfg(test)]
 mod tests {
     use super::super::analyse_frf;
     use super::super::synthetic::{Mode, Synthetic};
     use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
 
     /// FRFs of modes with the given modal constants (one row an FRF).
     fn set(f_zeta: &[(f64, f64)], constants: &[Vec<f64>], noise: f64) -> Vec<(Vec<f64>, Vec<Complex64>)> {
@@ -806,6 +364,59 @@ mod tests {
         }
     }
 
+    /// As accelerometers on a robot give: noise even in acceleration, and lines below the sensor's range that are
+    /// nothing but rubbish far larger than the receptance.
+    #[test]
+    fn a_bad_low_end_takes_no_mode_from_the_rest() {
+        let modes = [(6.0, 0.02), (8.5, 0.02), (13.0, 0.02), (20.0, 0.015)];
+        let constants: Vec<Vec<f64>> = (0..6)
+            .map(|k| (0..4).map(|m| ((3 * k + 5 * m + 1) as f64).sin()).collect())
+            .collect();
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let mut gauss = || {
+            let (u, v): (f64, f64) = (random.random_range(1e-12..1.0), random.random());
+            Complex64::from_polar((-u.ln()).sqrt(), std::f64::consts::TAU * v)
+        };
+        let mut frfs: Vec<(Vec<f64>, Vec<Complex64>)> = constants
+            .iter()
+            .map(|row| {
+                let modes: Vec<Mode> = modes
+                    .iter()
+                    .zip(row)
+                    .map(|(&(f, z), &a)| Mode::new(f, z, a))
+                    .collect();
+                Synthetic::new(0.2, 30.0, 0.1, &modes).frf()
+            })
+            .collect();
+        for (frequency, receptance) in &mut frfs {
+            let size = super::super::set_noise::rms(receptance);
+            for (f, h) in frequency.iter().zip(receptance) {
+                *h += gauss() * 0.01 * size * (10.0 / f).powi(2);
+                if *f < 3.0 {
+                    *h += gauss() * size * (6.0 / f).powi(3);
+                }
+            }
+        }
+        let found = global_of(&frfs);
+        for (f, zeta) in modes {
+            let nearest = found
+                .modes
+                .iter()
+                .min_by(|a, b| (a.frequency_hz - f).abs().total_cmp(&(b.frequency_hz - f).abs()))
+                .unwrap();
+            assert!(
+                (nearest.frequency_hz - f).abs() < 4.0 * nearest.frequency_std_hz.max(1e-3),
+                "{nearest:?} for {f} Hz"
+            );
+            assert!(
+                (nearest.damping_ratio - zeta).abs() < 4.0 * nearest.damping_std,
+                "{nearest:?}"
+            );
+        }
+        let many = found.modes.iter().filter(|m| m.frequency_hz > 3.5).count();
+        assert_eq!(many, modes.len(), "{:?}", found.modes);
+    }
+
     #[test]
     fn a_second_mode_that_the_frfs_hardly_show_is_named_and_widens_the_first() {
         // As at a robot's tool: the second mode a tenth as strong, 1.6 half-widths above, in two driving points.
@@ -848,7 +459,7 @@ mod tests {
             (120.0, "120"),
         ];
         for (value, expected) in cases {
-            assert_eq!(short(value), expected);
+            assert_eq!(findings::short(value), expected);
         }
     }
 

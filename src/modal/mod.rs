@@ -11,6 +11,7 @@ use serde::Serialize;
 mod analysis;
 mod circle_fit;
 mod curve;
+mod findings;
 mod from_hits;
 mod global;
 #[cfg(test)]
@@ -25,6 +26,7 @@ mod marks;
 mod ml_fit;
 mod peaks;
 pub mod quality;
+mod set_noise;
 pub mod shape;
 pub mod stabilisation;
 #[cfg(test)]

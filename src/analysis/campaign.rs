@@ -1,5 +1,6 @@
 //! Everything that can be said about a campaign, each part on its own: one that fails takes no other with it.
 
+use super::stick_shapes::{self, StickShape};
 use super::{CuttingFindings, DiagnosisFindings, LobeAnalysis, ModalAnalysis, StructureAnalysis};
 use crate::campaign::{Campaign, LobeSource};
 use crate::cutting::{CfcOptions, CfcResult, identify_forces};
@@ -18,6 +19,8 @@ pub struct CampaignFindings<'a> {
     /// The robot at the campaign's postures.
     pub postures: Option<Result<Vec<PostureFindings>>>,
     pub modal: Option<Result<ModalAnalysis>>,
+    /// Shapes of the posture that shows most modes, on the robot.
+    pub mode_shapes: Vec<StickShape>,
     pub cutting: Option<Result<CfcResult>>,
     /// What the force model lacks, where that was asked for.
     pub cutting_diagnosis: Option<Result<CuttingFindings>>,
@@ -64,12 +67,17 @@ impl<'a> CampaignFindings<'a> {
             (wanted && matches!(cutting, Some(Ok(_)))).then(|| CuttingFindings::run(campaign));
         let postures = (campaign.robot.is_some() && !campaign.postures.is_empty())
             .then(|| PostureFindings::run(campaign, calibrated));
+        let modal = (!campaign.frfs.is_empty()).then(|| ModalAnalysis::run(campaign));
         let findings = CampaignFindings {
             campaign,
             postures,
             diagnosis,
             structure,
-            modal: (!campaign.frfs.is_empty()).then(|| ModalAnalysis::run(campaign)),
+            mode_shapes: match &modal {
+                Some(Ok(modal)) => stick_shapes::of_richest_set(campaign, modal),
+                _ => Vec::new(),
+            },
+            modal,
             cutting,
             cutting_diagnosis,
             lobes: campaign.lobes.is_some().then(|| LobeFindings::run(campaign)),

@@ -7,8 +7,10 @@ pub mod cutting;
 pub mod diagnosis;
 pub mod lobes;
 pub mod modal;
+pub mod mode_comparison;
 mod redundancy;
 pub mod regression_line;
+pub mod stick_shapes;
 pub mod structure;
 pub mod thesis_findings;
 

@@ -7,10 +7,11 @@ use std::path::Path;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use crate::campaign::Campaign;
+use crate::campaign::{Campaign, MeasuredDof, Point};
 use crate::ingest::units::{self, Dimension};
 use crate::ingest::{self, Channel, FrfRecord, Quantity, TimeRecord};
 use crate::modal::quality::{self, Quality, Verdict};
+use crate::modal::tracking::{self, Track};
 use crate::modal::{self, FrfModes, GlobalModes, Hit, SetMember, Settings, TapRecord, TapSettings};
 use crate::{Error, InputError, Result};
 
@@ -74,10 +75,7 @@ impl ModalAnalysis {
     /// As [`ModalAnalysis::run`].
     pub fn of_campaign(campaign: &Campaign, settings: &Settings) -> Result<Self> {
         let (set, warnings) = campaign.load_frfs()?;
-        let dof = |d: &crate::campaign::MeasuredDof| {
-            let sign = if d.negative { "-" } else { "" };
-            format!("{}{sign}{}", campaign.points[d.point].node, d.axis.letter())
-        };
+        let dof = |d: &MeasuredDof| dof_name(&campaign.points, d);
         let inputs = set
             .frfs
             .into_iter()
@@ -143,9 +141,25 @@ impl ModalAnalysis {
         Ok(analysis)
     }
 
+    /// The same mode from set to set.
+    pub fn tracks(&self) -> Vec<Track> {
+        tracking::track(&self.sets.iter().map(|s| &s.global).collect::<Vec<_>>())
+    }
+
+    /// The set with the most modes.
+    pub fn richest_set(&self) -> Option<&SetModes> {
+        self.sets.iter().max_by_key(|s| s.global.modes.len())
+    }
+
     pub fn mode_count(&self) -> usize {
         self.sets.iter().map(|s| s.global.modes.len()).sum()
     }
+}
+
+/// `1X`, `12-Z`.
+pub(super) fn dof_name(points: &[Point], dof: &MeasuredDof) -> String {
+    let sign = if dof.negative { "-" } else { "" };
+    format!("{}{sign}{}", points[dof.point].node, dof.axis.letter())
 }
 
 fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Settings) -> Result<SetModes> {
@@ -262,7 +276,27 @@ fn set_warnings(set: &SetModes) -> Vec<String> {
                 .map(|w| format!("{} {}: {w}", set.set, frf.input.name)),
         );
     }
-    // A whole set with the same trouble is one line.
+    // The same trouble in several FRFs is one line.
+    const BACKWARDS: &str = "turns the wrong way round";
+    let backwards: Vec<&str> = set
+        .frfs
+        .iter()
+        .filter(|f| f.modes.warnings.iter().any(|w| w.contains(BACKWARDS)))
+        .map(|f| f.input.name.as_str())
+        .collect();
+    if backwards.len() > 1 {
+        lines.retain(|l| !l.contains(BACKWARDS));
+        let shown = backwards.iter().take(4).copied().collect::<Vec<_>>().join(", ");
+        let more = backwards.len().saturating_sub(4);
+        lines.push(format!(
+            "{}: {} of {} FRFs have peaks that turn the wrong way round (negative damping), left out: {shown}{} (where: \
+             --json)",
+            set.set,
+            backwards.len(),
+            set.frfs.len(),
+            if more > 0 { format!(" and {more} more") } else { String::new() },
+        ));
+    }
     let conjugated: Vec<&AnalysedFrf> = set.frfs.iter().filter(|f| f.modes.conjugated).collect();
     if conjugated.len() > 3 {
         lines.retain(|l| !l.contains("conjugated"));

@@ -3,6 +3,7 @@ use serde_json::{Map, Value, json};
 use super::text::{bar, number, percent, table, warnings};
 use super::{CampaignArg, Domain, Outcome, by_domain};
 use crate::Result;
+use crate::analysis::mode_comparison::{ModePair, compare_modes};
 use crate::analysis::{CuttingAnalysis, StructureAnalysis};
 use crate::campaign::Campaign;
 use crate::discrepancy::compare::{ErrorMap, Group};
@@ -114,6 +115,12 @@ fn structure(campaign: &Campaign) -> Result<Outcome> {
     let mut error = json!(comparison.totals);
     error["held_out_nrms"] = json!(held_out);
     let peaks = residual_peaks(&analysis.calibrated, &case.data);
+    let mut notes = notes.clone();
+    // Modes are an addition: FRFs that show none are compared all the same.
+    let modes = compare_modes(&analysis).unwrap_or_else(|e| {
+        notes.push(format!("the modes cannot be compared: {e}"));
+        Vec::new()
+    });
     let json = json!({
         "domain": "structure",
         "revision": case.revision(),
@@ -124,6 +131,7 @@ fn structure(campaign: &Campaign) -> Result<Outcome> {
         "by_point": object(&comparison.by_point),
         "by_band": comparison.by_band,
         "map": comparison.map,
+        "modes": modes,
         "residual_peaks_hz": peaks.iter().map(|p| p.frequency_hz).collect::<Vec<_>>(),
         "residual_peaks": peaks,
         "worst_frfs": comparison.worst_first().iter().take(10).map(|&i| frf(&comparison.frf_errors[i])).collect::<Vec<_>>(),
@@ -133,7 +141,9 @@ fn structure(campaign: &Campaign) -> Result<Outcome> {
     Ok(Outcome {
         json,
         text: format!("model: {}\n", case.model_description())
-            + &describe(comparison, held_out, &peaks, notes),
+            + &describe(comparison, held_out, &peaks)
+            + &mode_table(&modes)
+            + &warnings(&notes),
     })
 }
 
@@ -168,12 +178,7 @@ fn group_tables(kinds: &[(&str, &Vec<Group>)]) -> String {
     text
 }
 
-fn describe(
-    comparison: &FrfComparison,
-    held_out: Option<f64>,
-    peaks: &[ResidualPeak],
-    notes: &[String],
-) -> String {
+fn describe(comparison: &FrfComparison, held_out: Option<f64>, peaks: &[ResidualPeak]) -> String {
     let t = &comparison.totals;
     let mut text = format!(
         "calibrated model against measured FRFs\n  error (nrms)    {}\n  noise floor     {}\n  mean |dB|       {}\n",
@@ -218,8 +223,46 @@ fn describe(
         table(&["band Hz", "nrms", "noise", "times noise", ""], &rows)
     );
     text += &format!("\n{}", grid(&comparison.map));
-    text += &format!("\n{}", worst(comparison));
-    text + &warnings(notes)
+    text + &format!("\n{}", worst(comparison))
+}
+
+fn mode_table(modes: &[ModePair]) -> String {
+    let optional =
+        |value: Option<f64>, digits: usize| value.map_or("–".into(), |v| format!("{v:.digits$}"));
+    let rows: Vec<Vec<String>> = modes
+        .iter()
+        .map(|m| {
+            vec![
+                m.posture.clone(),
+                format!("{:.3}±{:.3}", m.measured_hz, m.measured_std_hz),
+                optional(m.model_hz, 3),
+                optional(m.model_hz.map(|f| 100.0 * (f / m.measured_hz - 1.0)), 1),
+                format!(
+                    "{:.2}±{:.2}",
+                    100.0 * m.measured_damping,
+                    100.0 * m.measured_damping_std
+                ),
+                optional(m.model_damping.map(|d| 100.0 * d), 2),
+                optional(m.mac, 2),
+            ]
+        })
+        .collect();
+    if rows.is_empty() {
+        return String::new();
+    }
+    let header = [
+        "posture",
+        "measured Hz",
+        "model Hz",
+        "off %",
+        "measured ζ %",
+        "model ζ %",
+        "MAC",
+    ];
+    format!(
+        "\nmodes: measured, and the model's nearest\n{}",
+        table(&header, &rows)
+    )
 }
 
 /// The residual's dominant frequencies, in one line.

@@ -10,7 +10,7 @@ use super::text::{number, percent};
 use super::{Outcome, report};
 use crate::analysis::{
     Addition, CampaignFindings, DiagnosisFindings, LobeAnalysis, LobeFindings, ModalAnalysis,
-    PostureFindings, StructureFindings, ThesisFindings,
+    PostureFindings, StructureFindings, ThesisFindings, stick_shapes,
 };
 use crate::builtin::{BuiltinCampaign, FIRST_CELL, SECOND_CELL};
 use crate::campaign::Campaign;
@@ -141,6 +141,7 @@ pub fn run(args: Args) -> Result<Outcome> {
         structure: Some(Ok(structure)),
         diagnosis: None,
         postures: Some(Ok(postures)),
+        mode_shapes: stick_shapes::of_richest_set(&first, &modal),
         modal: Some(Ok(modal)),
         cutting_diagnosis: None,
         cutting: Some(Ok(cutting)),

@@ -11,7 +11,7 @@ use crate::{InputError, Result};
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// Measurement files: UFF 58, FRF CSV, DynoWare export, force CSV.
+    /// Measurement files: UFF 58, FRF CSV, DynoWare export, force CSV, TDMS, LVM, MAT.
     #[arg(required = true)]
     files: Vec<PathBuf>,
 }

@@ -7,6 +7,7 @@ use clap::ValueEnum;
 use serde_json::json;
 
 use super::Outcome;
+use super::text::table;
 use crate::analysis::{ModalAnalysis, SetModes};
 use crate::campaign::Campaign;
 use crate::modal::{Estimator, Settings, TapSettings};
@@ -143,7 +144,61 @@ fn document(analysis: &ModalAnalysis, campaign: bool) -> serde_json::Value {
         .iter()
         .map(|(file, hits)| json!({ "file": file, "hits": hits }))
         .collect();
-    json!({ "frfs": frfs, "global": global, "sets": sets, "hits": hits, "warnings": analysis.warnings })
+    let tracked: Vec<_> = analysis
+        .tracks()
+        .iter()
+        .map(|track| {
+            let modes = analysis.sets.iter().zip(&track.mode_of_set).map(|(set, mode)| {
+                let mode = (*mode).map(|k| &set.global.modes[k]);
+                json!({
+                    set_key: set.set,
+                    "frequency_hz": mode.map(|m| m.frequency_hz),
+                    "frequency_std_hz": mode.map(|m| m.frequency_std_hz),
+                    "damping_ratio": mode.map(|m| m.damping_ratio),
+                    "damping_std": mode.map(|m| m.damping_std),
+                })
+            });
+            json!({ "modes": modes.collect::<Vec<_>>() })
+        })
+        .collect();
+    json!({
+        "frfs": frfs,
+        "global": global,
+        "sets": sets,
+        "tracked": tracked,
+        "hits": hits,
+        "warnings": analysis.warnings,
+    })
+}
+
+/// One row a mode, one column a set.
+fn tracked(analysis: &ModalAnalysis) -> String {
+    let mut header = vec!["mode"];
+    header.extend(analysis.sets.iter().map(|s| s.set.as_str()));
+    let cell = |set: &SetModes, mode: Option<usize>| {
+        mode.map_or("–".to_owned(), |k| {
+            let m = &set.global.modes[k];
+            format!(
+                "{:.3}±{:.3} Hz {:.2}±{:.2} %",
+                m.frequency_hz,
+                m.frequency_std_hz,
+                100.0 * m.damping_ratio,
+                100.0 * m.damping_std
+            )
+        })
+    };
+    let rows: Vec<Vec<String>> = analysis
+        .tracks()
+        .iter()
+        .enumerate()
+        .map(|(k, track)| {
+            let cells = analysis.sets.iter().zip(&track.mode_of_set);
+            let mut row = vec![(k + 1).to_string()];
+            row.extend(cells.map(|(set, mode)| cell(set, *mode)));
+            row
+        })
+        .collect();
+    table(&header, &rows)
 }
 
 fn text(analysis: &ModalAnalysis) -> String {
@@ -172,7 +227,9 @@ fn text(analysis: &ModalAnalysis) -> String {
         let _ = writeln!(out, "\n{}: all FRFs together ({})", set.set, set.why);
         let _ = writeln!(out, "      f Hz      ±     ζ %      ±  found in  collinear");
         for mode in &set.global.modes {
-            let collinear = mode.complexity.map_or("–".into(), |c| format!("{:.3}", c.mpc));
+            let collinear = mode.complexity.map_or("–".into(), |c| {
+                format!("{:.3}{}", c.mpc, if c.is_low() { " complex" } else { "" })
+            });
             let _ = writeln!(
                 out,
                 "  {:8.3} {} {:7.3} {}  {:<8}  {collinear}",
@@ -197,6 +254,13 @@ fn text(analysis: &ModalAnalysis) -> String {
                 candidate.frequency_hz, candidate.why
             );
         }
+    }
+    if analysis.sets.len() > 1 && analysis.mode_count() > 0 {
+        let _ = writeln!(
+            out,
+            "\nthe modes from set to set (paired by frequency and shape)\n{}",
+            tracked(analysis)
+        );
     }
     if !analysis.warnings.is_empty() {
         let _ = writeln!(out, "\nwarnings");

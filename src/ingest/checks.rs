@@ -117,7 +117,11 @@ pub(super) fn on_lines(frequency_hz: &[f64], own_frequency_hz: &[f64], values: &
     let mut own = own_frequency_hz.iter().zip(values);
     let at = |f: &f64| {
         let (_, value) = own.find(|(own, _)| (**own - f).abs() <= 1e-6 * f.abs())?;
-        (-0.01..=1.01).contains(value).then(|| value.clamp(0.0, 1.0))
+        match (-0.01..=1.01).contains(value) {
+            true => Some(value.clamp(0.0, 1.0)),
+            // What an analyser writes at 0 Hz says nothing.
+            false => (*f == 0.0).then_some(0.0),
+        }
     };
     frequency_hz.iter().map(at).collect()
 }

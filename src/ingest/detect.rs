@@ -2,6 +2,8 @@
 
 use super::force;
 use super::frf_text;
+use super::lvm;
+use super::mat;
 use super::table::Header;
 use super::text::{self, Lines};
 use super::uff;
@@ -15,6 +17,9 @@ pub(super) enum Detected {
     PlainFrf(Header),
     TimeTable(Header),
     Tdms,
+    Lvm,
+    Mat5,
+    Mat73,
 }
 
 /// How many bytes decide whether a file is text.
@@ -27,6 +32,23 @@ pub(super) fn detect(bytes: &[u8], is_dwd_named: bool) -> Result<(Detected, Form
     }
     if bytes.starts_with(b"TDSm") {
         return Ok((Detected::Tdms, Format::Tdms, "begins with TDSm".into()));
+    }
+    if mat::looks_like_v5(bytes) {
+        return Ok((
+            Detected::Mat5,
+            Format::Mat5,
+            "begins with MATLAB 5.0 MAT-file".into(),
+        ));
+    }
+    if mat::looks_like_v73(bytes) {
+        return Ok((Detected::Mat73, Format::Mat73, "has the signature of HDF5".into()));
+    }
+    if lvm::looks_like(bytes) {
+        return Ok((
+            Detected::Lvm,
+            Format::Lvm,
+            "begins with LabVIEW Measurement".into(),
+        ));
     }
     if let Some((what, remedy)) = foreign(bytes) {
         return Err(InputError::new(format!("{what}, which is not read here")).remedy(remedy));
@@ -122,15 +144,10 @@ fn foreign(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
             "the index of a National Instruments TDMS file",
             "give the .tdms file itself",
         )
-    } else if starts(b"MATLAB 5.0 MAT-file") || starts(b"MATLAB 7.") {
+    } else if starts(b"MATLAB ") {
         (
-            "a MATLAB MAT-file",
-            "in MATLAB: writematrix or writetable to CSV, columns time_s,fx_n,… or frequency_hz,re,im",
-        )
-    } else if starts(b"\x89HDF\r\n\x1a\n") || bytes.get(512..520) == Some(b"\x89HDF\r\n\x1a\n") {
-        (
-            "an HDF5 file (also MAT v7.3)",
-            "export the data as CSV, columns time_s,fx_n,… or frequency_hz,re,im",
+            "a MATLAB file of unknown version, or cut off",
+            "in MATLAB: load it, then save('new.mat', '-v7')",
         )
     } else if starts(b"PK\x03\x04") {
         (
@@ -162,12 +179,6 @@ fn foreign(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
 fn foreign_text(bytes: &[u8]) -> Option<InputError> {
     let first = text::decode(Lines::new(bytes).find(|l| !l.trim_ascii().is_empty())?);
     let first = first.trim();
-    if first.starts_with("LabVIEW Measurement") {
-        return Some(
-            InputError::new("a LabVIEW measurement file (.lvm), which is not read here")
-                .remedy("save as CSV or tab separated text with one header line: time_s,fx_n,fy_n,fz_n"),
-        );
-    }
     if first.starts_with('(') && first.ends_with("j)") {
         return Some(
             InputError::new(

@@ -262,6 +262,11 @@ fn sampling_rate(header: &Header) -> Option<f64> {
     (rate.is_finite() && rate > 0.0).then_some(rate)
 }
 
+/// The unit that a channel's name gives: `fx_n`, `Fx [N]`.
+pub(super) fn unit_in_name(name: &str) -> Option<Unit> {
+    split_unit(name).1
+}
+
 /// Name and unit of `Fx [N]`, `Fx (N)`, `fx_n`, `Fx`.
 fn split_unit(name: &str) -> (&str, Option<Unit>) {
     let name = name.trim();

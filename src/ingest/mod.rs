@@ -15,6 +15,8 @@ mod detect;
 mod force;
 mod frf_text;
 mod long;
+mod lvm;
+mod mat;
 mod number;
 mod quality;
 mod split_comma;
@@ -25,6 +27,7 @@ mod tests;
 mod text;
 mod uff;
 pub mod units;
+mod waveform;
 
 pub use long::{Survey, survey};
 pub use quality::quality_warnings;
@@ -56,6 +59,12 @@ pub enum Format {
     TimeCsv,
     /// National Instruments TDMS.
     Tdms,
+    /// LabVIEW measurement file.
+    Lvm,
+    /// MATLAB, version 5 to 7.
+    Mat5,
+    /// MATLAB 7.3, or other HDF5 with plain arrays.
+    Mat73,
 }
 
 impl std::fmt::Display for Format {
@@ -69,6 +78,9 @@ impl std::fmt::Display for Format {
             Format::DynoWare => "DynoWare export",
             Format::TimeCsv => "time CSV",
             Format::Tdms => "TDMS",
+            Format::Lvm => "LabVIEW LVM",
+            Format::Mat5 => "MAT v5",
+            Format::Mat73 => "MAT v7.3",
         })
     }
 }
@@ -158,18 +170,15 @@ fn read_bytes(
         frfs,
         ..Contents::default()
     };
+    let signals = |times| Contents {
+        times,
+        ..Contents::default()
+    };
     Ok(match detected {
-        Detected::Tdms => {
-            let times = tdms::read(bytes, notes)?;
-            (
-                format,
-                why,
-                Contents {
-                    times,
-                    ..Contents::default()
-                },
-            )
-        }
+        Detected::Tdms => (format, why, signals(tdms::read(bytes, notes)?)),
+        Detected::Lvm => (format, why, signals(lvm::read(bytes, notes)?)),
+        Detected::Mat5 => (format, why, mat::read_v5(bytes, notes)?),
+        Detected::Mat73 => (format, why, mat::read_v73(bytes, notes)?),
         Detected::Universal => {
             let (summary, contents) = uff::contents(bytes, notes)?;
             let skipped: Vec<String> = summary.skipped.iter().map(u32::to_string).collect();
@@ -202,17 +211,7 @@ fn read_bytes(
                 frfs(frf_text::read_plain(bytes, &header, None, 1.0, notes)?),
             )
         }
-        Detected::TimeTable(header) => {
-            let times = vec![force::read(bytes, &header, notes)?];
-            (
-                format,
-                why,
-                Contents {
-                    times,
-                    ..Contents::default()
-                },
-            )
-        }
+        Detected::TimeTable(header) => (format, why, signals(vec![force::read(bytes, &header, notes)?])),
     })
 }
 

@@ -5,10 +5,9 @@
 
 use std::collections::HashMap;
 
-use super::force::role_of;
 use super::text::Notes;
-use super::units;
-use super::{Channel, InputError, TimeRecord};
+use super::waveform;
+use super::{InputError, TimeRecord};
 
 const LEAD_IN: usize = 28;
 const META: u32 = 1 << 1;
@@ -340,32 +339,8 @@ fn records(objects: Vec<Object>, notes: &mut Notes) -> Result<Vec<TimeRecord>, I
             notes.about(&name, "values that are not numbers: left out");
             continue;
         }
-        let unit = units::parse(&file_unit);
-        if unit.is_none() {
-            notes.about(&name, "unit unknown: values as they stand in the file");
-        }
-        let factor = unit.map_or(1.0, |u| u.factor);
-        let channel = Channel {
-            role: role_of(&name, unit),
-            name,
-            file_unit,
-            samples: object.samples.iter().map(|v| v * factor).collect(),
-        };
-        let rate = 1.0 / step;
-        let same = records.iter_mut().find(|r| {
-            (r.sample_rate_hz / rate - 1.0).abs() < 1e-9
-                && r.len() == channel.samples.len()
-                && r.start_s == start_s
-        });
-        match same {
-            Some(record) => record.channels.push(channel),
-            None => records.push(TimeRecord {
-                filled: Vec::new(),
-                sample_rate_hz: rate,
-                start_s,
-                channels: vec![channel],
-            }),
-        }
+        let channel = waveform::channel(name, file_unit, object.samples, notes);
+        waveform::put(&mut records, 1.0 / step, start_s, channel);
     }
     if records.is_empty() {
         return Err(
@@ -378,6 +353,7 @@ fn records(objects: Vec<Object>, notes: &mut Notes) -> Result<Vec<TimeRecord>, I
 
 #[cfg(test)]
 mod tests {
+    use super::super::units;
     use super::*;
 
     /// A segment of two double channels of three samples, by the specification.

@@ -297,9 +297,10 @@ fn foreign_formats_are_named_with_a_way_out() {
     for (bytes, what) in [
         (&b"TDSm\x0e\0\0\0"[..], "TDMS"),
         (b"MATLAB 5.0 MAT-file, Platform", "MAT-file"),
+        (b"MATLAB 7.3 MAT-file, Platform", "unknown version"),
         (b"\x89HDF\r\n\x1a\n\0", "HDF5"),
         (b"PK\x03\x04\x14", "xlsx"),
-        (b"LabVIEW Measurement\t\nWriter_Version\t2\n", "lvm"),
+        (b"LabVIEW Measurement\t\nWriter_Version\t2\n", "LabVIEW"),
         (b"(-0.07+2.6e-08j)\n(-0.17-0.1j)\n", "frequency axis is missing"),
         (b"\x00\x01 Kistler DynoWare \x02", ".dwd"),
         (b"\x00\x01\x02", "unknown format"),

@@ -4,30 +4,22 @@
 //! the peaks of the single FRFs as a safety net → maximum-likelihood refinement with needless poles taken out
 //! ([`super::joint_fit`]) → noise again, from what the fit leaves over, and a last refinement.
 
-use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 use super::curve::{Curve, MIN_LINES};
-use super::joint_fit::{self, Change, Data, Group};
+use super::joint_fit::{self, Change, Data, Doubt, Group, Search};
 use super::local_fit::Pole;
 use super::lscf::{self, Row};
-use super::stabilisation::{self, Candidate, ShapeData, Stabilisation};
-use super::{FrfModes, GlobalMode, GlobalModes, Reconstruction, Settings, ml_fit, shape};
+use super::stabilisation::{self, Candidate, ShapeData};
+use super::{FrfModes, GlobalModes, Settings, findings, set_noise};
 use crate::Result;
-use crate::signal::frf_noise;
 
 /// Poles of the highest order: at least, and at most.
 const POLES: [usize; 2] = [40, 80];
 /// More references than this are not taken together.
 const MAX_REFERENCES: usize = 6;
 /// In sets of at least this many FRFs a mode seen by one of them alone must stand out far.
-const SET: usize = 4;
-const FAR: f64 = 100.0;
-/// Below this many lines in the half-power band the record's leakage counts, see `analysis`.
-const LEAKAGE_BELOW_LINES: f64 = 1.0;
-const LEAKAGE_LINES: f64 = 0.02;
-/// Modes with fewer lines in the half-power band are named.
-const FINE_LINES: f64 = 3.0;
+pub(super) const SET: usize = 4;
 
 /// One FRF of a set, with what was found in it.
 #[derive(Clone, Copy)]
@@ -95,10 +87,10 @@ pub fn global(frfs: &[SetMember], settings: &Settings) -> Result<GlobalModes> {
         result.stabilisation = diagram;
         return Ok(result);
     };
-    collect(&groups, &data, &members, &of_member, &mut result);
-    explain(&mut diagram, &result.modes, &changes);
+    findings::collect(&groups, &data, &members, &of_member, &mut result);
+    findings::explain(&mut diagram, &result.modes, &changes);
     result.stabilisation = diagram;
-    coarse_lines(&data, &mut result);
+    findings::coarse_lines(&data, &mut result);
     Ok(result)
 }
 
@@ -150,43 +142,8 @@ fn prepare(
         });
         of_member.push(m);
     }
-    estimate_noise(&mut data);
+    set_noise::estimate(&mut data);
     Ok((data, of_member))
-}
-
-/// Noise of each FRF, from those on the same lines together.
-fn estimate_noise(data: &mut [Data]) {
-    let mut todo: Vec<usize> = (0..data.len()).collect();
-    while let Some(&first) = todo.first() {
-        let (same, other): (Vec<usize>, Vec<usize>) = todo
-            .iter()
-            .partition(|&&k| data[k].frequency_hz == data[first].frequency_hz);
-        let curves: Vec<&[Complex64]> = same.iter().map(|&k| data[k].receptance.as_slice()).collect();
-        let estimates = frf_noise::estimate(&data[first].frequency_hz, &curves);
-        for (&k, estimate) in same.iter().zip(estimates) {
-            let size = rms(&data[k].receptance);
-            let floor = |h: Complex64| (1e-6 * h.norm()).max(1e-9 * size);
-            data[k].sigma = match estimate {
-                Some(e) => e
-                    .std
-                    .iter()
-                    .zip(&data[k].receptance)
-                    .map(|(s, h)| s.max(floor(*h)))
-                    .collect(),
-                // Too few lines to tell: relative noise, as of a hammer; the residual scales it later.
-                None => data[k]
-                    .receptance
-                    .iter()
-                    .map(|h| (0.02 * h.norm()).max(1e-3 * size))
-                    .collect(),
-            };
-        }
-        todo = other;
-    }
-}
-
-fn rms(values: &[Complex64]) -> f64 {
-    (values.iter().map(|v| v.norm_sqr()).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
 fn band(data: &[Data]) -> Option<[f64; 2]> {
@@ -315,290 +272,34 @@ fn shape_data(data: &[Data]) -> Option<ShapeData<'_>> {
 
 /// Refinement with search, noise from the rest, refinement without search.
 fn solve(data: &mut [Data], start: &[Pole], changes: &mut Vec<Change>) -> Option<Vec<Group>> {
-    let mut groups = joint_fit::refine(data, start, true, changes)?;
-    for pass in 0..2 {
-        renew_noise(data, &groups);
+    let mut groups = joint_fit::refine(data, start, Search::Rest, changes)?;
+    // The first noise may have been wrong, and with it what was needless: search once more.
+    for search in [Search::Pairs, Search::Nothing] {
+        set_noise::renew(data, &groups);
         let mut poles: Vec<Pole> = groups
             .iter()
             .flat_map(|g| g.solution.poles.iter().copied())
             .collect();
         poles.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
-        // The first noise may have been wrong, and with it what was needless: search once more.
-        groups = joint_fit::refine(data, &poles, pass == 0, changes)?;
+        let mut doubts: Vec<Option<Doubt>> = groups.into_iter().map(|g| g.doubt).collect();
+        groups = joint_fit::refine(data, &poles, search, changes)?;
+        if search == Search::Nothing && doubts.len() == groups.len() {
+            for (group, doubt) in groups.iter_mut().zip(&mut doubts) {
+                let same = |d: &Doubt| d.shifts.len() == group.solution.poles.len();
+                group.doubt = doubt.take().filter(same);
+            }
+        }
     }
     Some(groups)
 }
 
-/// Noise of each FRF from what the fit leaves over.
-fn renew_noise(data: &mut [Data], groups: &[Group]) {
-    for (m, d) in data.iter_mut().enumerate() {
-        let mut left_over = Vec::with_capacity(d.frequency_hz.len());
-        for group in groups {
-            let found = &group.solution.frfs[m];
-            let from = d.frequency_hz.partition_point(|&f| f < group.window_hz[0]);
-            // The poles are shared by all FRFs and cost each of them next to nothing.
-            let freedom = (1.0 - found.leverage).max(0.05);
-            left_over.extend(found.residual.iter().enumerate().map(|(k, r)| {
-                let fitted = (d.receptance[from + k] - r).norm();
-                (fitted, r.norm_sqr() / freedom)
-            }));
-        }
-        let size = rms(&d.receptance);
-        match frf_noise::law_of_residual(left_over.iter().copied()) {
-            Some(law) => {
-                for (sigma, (fitted, _)) in d.sigma.iter_mut().zip(&left_over) {
-                    *sigma = law.std(*fitted).max(1e-7 * fitted).max(1e-10 * size);
-                }
-            }
-            None => {
-                let level = left_over
-                    .iter()
-                    .zip(&d.sigma)
-                    .map(|((_, r), s)| r / (s * s))
-                    .sum::<f64>();
-                let scale = (level / left_over.len().max(1) as f64).sqrt().max(1e-6);
-                d.sigma.iter_mut().for_each(|s| *s *= scale);
-            }
-        }
-    }
-}
-
-fn collect(
-    groups: &[Group],
-    data: &[Data],
-    members: &[&SetMember],
-    of_member: &[usize],
-    result: &mut GlobalModes,
-) {
-    let count = result.reconstructions.len();
-    for group in groups {
-        let solution = &group.solution;
-        if !solution.converged {
-            result.warnings.push(format!(
-                "the common fit between {:.1} and {:.1} Hz did not converge",
-                group.window_hz[0],
-                group.window_hz[1].min(
-                    data.iter()
-                        .filter_map(|d| d.frequency_hz.last())
-                        .fold(0.0, |m: f64, f| m.max(*f))
-                )
-            ));
-        }
-        // What the fit leaves beyond the noise widens the standard deviations.
-        let level = (solution.misfit / solution.degrees_of_freedom as f64)
-            .max(1.0)
-            .sqrt();
-        for (j, pole) in solution.poles.iter().enumerate() {
-            let (found_in, best) = joint_fit::seen_in(solution, j);
-            if found_in == 0 || (data.len() >= SET && found_in < 2 && best < FAR) {
-                result.warnings.push(format!(
-                    "a mode at {:.2} Hz is seen in {found_in} of {} FRFs only, hardly above the noise, and is left out",
-                    pole.frequency_hz,
-                    data.len()
-                ));
-                continue;
-            }
-            let mut constants = vec![None; count];
-            for m in 0..data.len() {
-                let (value, std) = solution.constant(m, j);
-                constants[of_member[m]] = Some((value, level * std));
-            }
-            let line_hz = data
-                .iter()
-                .map(|d| joint_fit::spacing_hz(&d.frequency_hz, pole.frequency_hz))
-                .fold(f64::INFINITY, f64::min);
-            let lines_in_half_power_band = 2.0 * pole.damping_ratio * pole.frequency_hz / line_hz;
-            let mut damping_std = level * solution.damping_std(j);
-            if lines_in_half_power_band < LEAKAGE_BELOW_LINES {
-                damping_std = damping_std.hypot(LEAKAGE_LINES * line_hz / (2.0 * pole.frequency_hz));
-            }
-            let shape = shape_of(solution, j, members);
-            result.modes.push(GlobalMode {
-                frequency_hz: pole.frequency_hz,
-                damping_ratio: pole.damping_ratio,
-                frequency_std_hz: level * solution.frequency_std_hz(j),
-                damping_std,
-                found_in,
-                lines_in_half_power_band,
-                complexity: shape::complexity(&shape.iter().map(|s| s.1).collect::<Vec<_>>()),
-                shape,
-                constants,
-            });
-        }
-    }
-    result
-        .modes
-        .sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
-    let residues: Vec<Vec<Complex64>> = result
-        .modes
-        .iter()
-        .map(|m| m.constants.iter().flatten().map(|c| c.0).collect())
-        .collect();
-    result.mac = residues
-        .iter()
-        .map(|a| residues.iter().map(|b| shape::mac(a, b)).collect())
-        .collect();
-    for (m, d) in data.iter().enumerate() {
-        let mut fitted = Vec::with_capacity(d.frequency_hz.len());
-        for group in groups {
-            let found = &group.solution.frfs[m];
-            let from = d.frequency_hz.partition_point(|&f| f < group.window_hz[0]);
-            fitted.extend(
-                found
-                    .residual
-                    .iter()
-                    .enumerate()
-                    .map(|(k, r)| d.receptance[from + k] - r),
-            );
-        }
-        let error: f64 = fitted
-            .iter()
-            .zip(&d.receptance)
-            .map(|(a, b)| (a - b).norm_sqr())
-            .sum();
-        let noise: f64 = d.sigma.iter().map(|s| s * s).sum();
-        let total: f64 = d.receptance.iter().map(|h| h.norm_sqr()).sum();
-        result.reconstructions[of_member[m]] = Some(Reconstruction {
-            error_nrms: (error / total).sqrt(),
-            noise_nrms: (noise / total).sqrt(),
-            frequency_hz: d.frequency_hz.clone(),
-            measured_m_per_n: d.receptance.clone(),
-            fitted_m_per_n: fitted,
-        });
-    }
-}
-
-/// Shape by response (or by FRF where degrees of freedom are not known), largest component 1.
-fn shape_of(solution: &ml_fit::Solution, mode: usize, members: &[&SetMember]) -> Vec<(usize, Complex64)> {
-    let constant = |m: usize| solution.constant(m, mode).0;
-    let dofs: Option<Vec<[usize; 2]>> = members.iter().map(|m| m.dofs).collect();
-    let Some(dofs) = dofs else {
-        let all: Vec<Complex64> = (0..members.len()).map(constant).collect();
-        return shape::normalised(&all).into_iter().enumerate().collect();
-    };
-    let unique = |side: usize| {
-        let mut ids: Vec<usize> = dofs.iter().map(|d| d[side]).collect();
-        ids.sort_unstable();
-        ids.dedup();
-        ids
-    };
-    // A roving hammer moves the excitation: then the references carry the shape.
-    let (side, other) = if unique(1).len() > unique(0).len() {
-        (1, 0)
-    } else {
-        (0, 1)
-    };
-    let (ids, others) = (unique(side), unique(other));
-    let mut matrix = DMatrix::zeros(ids.len(), others.len());
-    let mut filled = 0;
-    for (m, dof) in dofs.iter().enumerate() {
-        let at = (
-            ids.iter().position(|i| *i == dof[side]),
-            others.iter().position(|i| *i == dof[other]),
-        );
-        if let (Some(i), Some(j)) = at {
-            matrix[(i, j)] = constant(m);
-            filled += 1;
-        }
-    }
-    if filled == ids.len() * others.len()
-        && let Some(shape) = shape::from_residues(&matrix)
-    {
-        return ids.into_iter().zip(shape).collect();
-    }
-    // Gaps in the grid: the column that shows the mode best.
-    let best = (0..others.len()).max_by(|&a, &b| matrix.column(a).norm().total_cmp(&matrix.column(b).norm()));
-    let column: Vec<Complex64> = best.map_or(Vec::new(), |b| matrix.column(b).iter().copied().collect());
-    ids.into_iter().zip(shape::normalised(&column)).collect()
-}
-
-/// Says of every candidate what became of it.
-fn explain(diagram: &mut Stabilisation, modes: &[GlobalMode], changes: &[Change]) {
-    let near = |a: f64, b: &Pole| (a / b.frequency_hz - 1.0).abs() < 0.7 * b.damping_ratio.max(0.003);
-    for change in changes {
-        if let Change::Added(pole) = change {
-            diagram.candidates.push(Candidate {
-                frequency_hz: pole.frequency_hz,
-                damping_ratio: pole.damping_ratio,
-                orders: 0,
-                chosen: false,
-                why: "what the fit left over has a resonance here".into(),
-            });
-        }
-    }
-    let mut owner: Vec<bool> = vec![false; modes.len()];
-    for candidate in &mut diagram.candidates {
-        let mode = modes
-            .iter()
-            .enumerate()
-            .filter(|(k, m)| {
-                let width = m.frequency_hz * m.damping_ratio.max(0.003);
-                !owner[*k] && (m.frequency_hz - candidate.frequency_hz).abs() < width
-            })
-            .min_by(|(_, a), (_, b)| {
-                let distance = |m: &GlobalMode| (m.frequency_hz - candidate.frequency_hz).abs();
-                distance(a).total_cmp(&distance(b))
-            });
-        if let Some((k, mode)) = mode {
-            owner[k] = true;
-            candidate.chosen = true;
-            candidate
-                .why
-                .push_str(&format!("; taken, seen in {} FRFs", mode.found_in));
-            continue;
-        }
-        let why = changes
-            .iter()
-            .rev()
-            .find_map(|change| match change {
-                Change::Needless(p) if near(candidate.frequency_hz, p) => {
-                    Some("left out: the FRFs are described as well without it")
-                }
-                Change::NotDetermined(p) if near(candidate.frequency_hz, p) => {
-                    Some("left out: the lines do not determine it")
-                }
-                _ => None,
-            })
-            .unwrap_or("left out: joined another mode, or hardly above the noise");
-        candidate.why.push_str("; ");
-        candidate.why.push_str(why);
-    }
-    diagram
-        .candidates
-        .sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
-}
-
-/// One line for the whole set.
-fn coarse_lines(data: &[Data], result: &mut GlobalModes) {
-    let coarse: Vec<String> = result
-        .modes
-        .iter()
-        .filter(|m| m.lines_in_half_power_band < FINE_LINES)
-        .map(|m| {
-            format!(
-                "at {} Hz lines the damping of the {:.1} Hz mode is uncertain to {:.0} %",
-                data.iter()
-                    .map(|d| joint_fit::spacing_hz(&d.frequency_hz, m.frequency_hz))
-                    .fold(f64::INFINITY, f64::min)
-                    * 1000.0
-                    / 1000.0,
-                m.frequency_hz,
-                (100.0 * m.damping_std / m.damping_ratio).ceil()
-            )
-        })
-        .collect();
-    if !coarse.is_empty() {
-        result.warnings.push(format!(
-            "fewer than {FINE_LINES:.0} lines in the half-power band: {}",
-            coarse.join("; ")
-        ));
-    }
-}
 #[cfg(test)]
 mod tests {
     use super::super::analyse_frf;
     use super::super::synthetic::{Mode, Synthetic};
     use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
 
     /// FRFs of modes with the given modal constants (one row an FRF).
     fn set(f_zeta: &[(f64, f64)], constants: &[Vec<f64>], noise: f64) -> Vec<(Vec<f64>, Vec<Complex64>)> {
@@ -660,6 +361,105 @@ mod tests {
                 "{found:?} for {f} Hz"
             );
             assert!(found.damping_std < 0.05 * zeta, "{found:?}");
+        }
+    }
+
+    /// As accelerometers on a robot give: noise even in acceleration, and lines below the sensor's range that are
+    /// nothing but rubbish far larger than the receptance.
+    #[test]
+    fn a_bad_low_end_takes_no_mode_from_the_rest() {
+        let modes = [(6.0, 0.02), (8.5, 0.02), (13.0, 0.02), (20.0, 0.015)];
+        let constants: Vec<Vec<f64>> = (0..6)
+            .map(|k| (0..4).map(|m| ((3 * k + 5 * m + 1) as f64).sin()).collect())
+            .collect();
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let mut gauss = || {
+            let (u, v): (f64, f64) = (random.random_range(1e-12..1.0), random.random());
+            Complex64::from_polar((-u.ln()).sqrt(), std::f64::consts::TAU * v)
+        };
+        let mut frfs: Vec<(Vec<f64>, Vec<Complex64>)> = constants
+            .iter()
+            .map(|row| {
+                let modes: Vec<Mode> = modes
+                    .iter()
+                    .zip(row)
+                    .map(|(&(f, z), &a)| Mode::new(f, z, a))
+                    .collect();
+                Synthetic::new(0.2, 30.0, 0.1, &modes).frf()
+            })
+            .collect();
+        for (frequency, receptance) in &mut frfs {
+            let size = super::super::set_noise::rms(receptance);
+            for (f, h) in frequency.iter().zip(receptance) {
+                *h += gauss() * 0.01 * size * (10.0 / f).powi(2);
+                if *f < 3.0 {
+                    *h += gauss() * size * (6.0 / f).powi(3);
+                }
+            }
+        }
+        let found = global_of(&frfs);
+        for (f, zeta) in modes {
+            let nearest = found
+                .modes
+                .iter()
+                .min_by(|a, b| (a.frequency_hz - f).abs().total_cmp(&(b.frequency_hz - f).abs()))
+                .unwrap();
+            assert!(
+                (nearest.frequency_hz - f).abs() < 4.0 * nearest.frequency_std_hz.max(1e-3),
+                "{nearest:?} for {f} Hz"
+            );
+            assert!(
+                (nearest.damping_ratio - zeta).abs() < 4.0 * nearest.damping_std,
+                "{nearest:?}"
+            );
+        }
+        let many = found.modes.iter().filter(|m| m.frequency_hz > 3.5).count();
+        assert_eq!(many, modes.len(), "{:?}", found.modes);
+    }
+
+    #[test]
+    fn a_second_mode_that_the_frfs_hardly_show_is_named_and_widens_the_first() {
+        // As at a robot's tool: the second mode a tenth as strong, 1.6 half-widths above, in two driving points.
+        let modes = [(7.07, 0.0376), (7.5, 0.0376), (14.2, 0.0376)];
+        let mut said = 0;
+        let mut misses = 0;
+        for seed in 0..10 {
+            let frfs: Vec<_> = [vec![1.0, 0.09, 0.8], vec![0.5, 0.04, 1.0]]
+                .iter()
+                .enumerate()
+                .map(|(k, row)| {
+                    let modes: Vec<Mode> = modes
+                        .iter()
+                        .zip(row)
+                        .map(|(&(f, z), &a)| Mode::new(f, z, a))
+                        .collect();
+                    Synthetic::new(3.0, 30.0, 0.25, &modes)
+                        .with_noise(0.0, 0.03, 2 * seed + k as u64)
+                        .frf()
+                })
+                .collect();
+            let found = global_of(&frfs);
+            let first = &found.modes[0];
+            let separated = found.modes.len() == 3;
+            let named = found.warnings.iter().any(|w| w.contains("one more mode"));
+            said += usize::from(separated || named);
+            misses += usize::from((first.damping_ratio - 0.0376).abs() > 3.0 * first.damping_std);
+        }
+        assert!(said >= 7, "{said} of 10");
+        assert!(misses <= 3, "{misses} of 10");
+    }
+
+    #[test]
+    fn numbers_in_messages_have_three_digits() {
+        let cases = [
+            (0.03126, "0.0313"),
+            (0.25, "0.25"),
+            (1.0, "1"),
+            (0.1 + 0.2, "0.3"),
+            (120.0, "120"),
+        ];
+        for (value, expected) in cases {
+            assert_eq!(findings::short(value), expected);
         }
     }
 

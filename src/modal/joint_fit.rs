@@ -21,10 +21,39 @@ const COARSE_LINES: f64 = 1.0;
 /// Squared size over uncertainty (two degrees of freedom) from which an FRF shows a mode: five standard deviations.
 const SEEN: f64 = 30.0;
 
+/// Beside a pole a second one is tried this many half-widths away.
+const BESIDE_WIDTHS: f64 = 1.5;
+/// A pole comes in where it explains this times what a pole must explain to stay.
+const ADMITTED: f64 = 1.2;
+/// As [`CHANCE_SIGMA`] and [`LOOKED_EVERYWHERE`], for a pole that may be there.
+const DOUBT_SIGMA: f64 = 3.0;
+const DOUBT_LOOKED: f64 = 6.0;
+/// Below this a pole beside another is not worth a fit of its own.
+const WORTH_A_FIT_SIGMA: f64 = 1.0;
+
+/// What a refinement may do besides moving poles.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Search {
+    Nothing,
+    /// Take out needless poles, add one where the rest is largest.
+    Rest,
+    /// That, and look for close pairs: a second pole beside each that is there.
+    Pairs,
+}
+
 /// A group of modes and the window that it was fitted in.
 pub(super) struct Group {
     pub window_hz: [f64; 2],
     pub solution: Solution,
+    /// Looked for with [`Search::Pairs`].
+    pub doubt: Option<Doubt>,
+}
+
+/// One more pole would describe the FRFs better than chance does, but not well enough to be called a mode.
+pub(super) struct Doubt {
+    pub pole: Pole,
+    /// By mode of the solution: change of frequency (Hz) and damping ratio if that pole is one.
+    pub shifts: Vec<[f64; 2]>,
 }
 
 /// Why a pole went out or came in.
@@ -56,12 +85,12 @@ impl Data {
     }
 }
 
-/// Refines all candidates (ascending in frequency). With `search` poles are taken out and added, else only moved.
-/// `None` where a group cannot be fitted.
+/// Refines all candidates (ascending in frequency). The poles of a group that cannot be fitted go out; `None` where none
+/// can.
 pub(super) fn refine(
     data: &[Data],
     candidates: &[Pole],
-    search: bool,
+    search: Search,
     changes: &mut Vec<Change>,
 ) -> Option<Vec<Group>> {
     let groups = groups(candidates);
@@ -85,12 +114,20 @@ pub(super) fn refine(
             .collect();
         let window_hz = [low, high];
         let frfs: Option<Vec<NoisyFrf>> = data.iter().map(|d| d.window(window_hz)).collect();
-        let fit = Fit { frfs: frfs?, fixed };
-        let mut solution = fit.fit(group)?;
-        if search {
+        before = after;
+        let Some((fit, mut solution)) = frfs.and_then(|frfs| {
+            let fit = Fit { frfs, fixed };
+            let solution = fit.fit(group)?;
+            Some((fit, solution))
+        }) else {
+            changes.extend(group.iter().map(|pole| Change::NotDetermined(*pole)));
+            continue;
+        };
+        let mut doubt = None;
+        if search != Search::Nothing {
             solution = fit.without_needless(solution, changes);
             for _ in 0..MAX_ADDED {
-                match fit.with_one_more(&solution) {
+                match fit.with_one_more(&solution, search, &mut doubt) {
                     Some(more) => {
                         changes.push(Change::Added(more.poles[more.poles.len() - 1]));
                         solution = fit.without_needless(more, changes);
@@ -99,10 +136,13 @@ pub(super) fn refine(
                 }
             }
         }
-        result.push(Group { window_hz, solution });
-        before = after;
+        result.push(Group {
+            window_hz,
+            solution,
+            doubt,
+        });
     }
-    Some(result)
+    (!result.is_empty()).then_some(result)
 }
 
 /// Splits at the widest gaps until no group is too large.
@@ -141,9 +181,13 @@ impl Fit<'_> {
 
     /// Misfit that a mode must explain to be one, for noise as large as the fit leaves.
     fn wanted(&self, solution: &Solution) -> f64 {
+        self.beyond_chance(solution, CHANCE_SIGMA, LOOKED_EVERYWHERE)
+    }
+
+    fn beyond_chance(&self, solution: &Solution, sigma: f64, looked: f64) -> f64 {
         let k = 2.0 * self.frfs.len() as f64 + 2.0;
         let level = (solution.misfit / solution.degrees_of_freedom as f64).max(1.0);
-        level * (k + CHANCE_SIGMA * (2.0 * k).sqrt() + LOOKED_EVERYWHERE)
+        level * (k + sigma * (2.0 * k).sqrt() + looked)
     }
 
     fn line_hz(&self, frequency_hz: f64) -> f64 {
@@ -211,8 +255,97 @@ impl Fit<'_> {
         }
     }
 
-    /// Adds a pole where the rest is largest, if that explains much of it.
-    fn with_one_more(&self, solution: &Solution) -> Option<Solution> {
+    /// Adds a pole where the rest is largest, or beside one that is there, if that explains enough; one that explains
+    /// something but not enough is a doubt.
+    fn with_one_more(
+        &self,
+        solution: &Solution,
+        search: Search,
+        doubt: &mut Option<Doubt>,
+    ) -> Option<Solution> {
+        let usual = usual_damping(solution);
+        let enough = |more: &Solution| {
+            let fall = solution.misfit - more.misfit;
+            let sane = (0..more.poles.len()).all(|j| self.sane(more, j));
+            let added = more.poles[more.poles.len() - 1];
+            let alike = (usual / 4.0..usual * 4.0).contains(&added.damping_ratio);
+            sane && alike && fall > ADMITTED * self.wanted(more)
+        };
+        let found = self
+            .in_the_rest(solution)
+            .into_iter()
+            .filter_map(|pole| self.and(solution, pole))
+            .find(enough);
+        if found.is_some() || search != Search::Pairs {
+            return found;
+        }
+        let more = self.beside(solution)?;
+        if enough(&more) {
+            return Some(more);
+        }
+        *doubt = self.doubt(solution, &more);
+        None
+    }
+
+    /// Does one more pole explain more than chance does?
+    fn doubt(&self, solution: &Solution, more: &Solution) -> Option<Doubt> {
+        let pole = *more.poles.last()?;
+        let inside = self.frfs.iter().any(|c| {
+            c.frequency_hz[0] <= pole.frequency_hz
+                && c.frequency_hz[c.frequency_hz.len() - 1] >= pole.frequency_hz
+        });
+        let fall = solution.misfit - more.misfit;
+        if !inside
+            || pole.damping_ratio > MAX_DAMPING
+            || fall < self.beyond_chance(more, DOUBT_SIGMA, DOUBT_LOOKED)
+        {
+            return None;
+        }
+        let both = solution.poles.iter().zip(&more.poles);
+        Some(Doubt {
+            pole,
+            shifts: both
+                .map(|(a, b)| [b.frequency_hz - a.frequency_hz, b.damping_ratio - a.damping_ratio])
+                .collect(),
+        })
+    }
+
+    fn and(&self, solution: &Solution, pole: Pole) -> Option<Solution> {
+        let mut poles = solution.poles.clone();
+        poles.push(pole);
+        self.fit(&poles)
+    }
+
+    /// Two modes closer than their widths leave a rest that hides in the noise: a second pole is tried on either side of
+    /// each, the others held, and the place that explains most is refined.
+    fn beside(&self, solution: &Solution) -> Option<Solution> {
+        let usual = usual_damping(solution);
+        let held = |pole: &Pole| {
+            let fixed: Vec<Pole> = self
+                .fixed
+                .iter()
+                .chain(&solution.poles)
+                .chain([pole])
+                .copied()
+                .collect();
+            Some(ml_fit::fit(&self.frfs, &[], &fixed)?.misfit)
+        };
+        let trials = solution.poles.iter().flat_map(|pole| {
+            [-1.0, 1.0].map(|side| Pole {
+                frequency_hz: pole.frequency_hz * (1.0 + side * BESIDE_WIDTHS * pole.damping_ratio),
+                damping_ratio: usual,
+            })
+        });
+        let (misfit, best) = trials
+            .filter_map(|pole| Some((held(&pole)?, pole)))
+            .min_by(|a, b| a.0.total_cmp(&b.0))?;
+        // No more than noise gives to any pole: not worth a fit.
+        let by_noise = self.beyond_chance(solution, WORTH_A_FIT_SIGMA, 0.0);
+        (solution.misfit - misfit > by_noise).then(|| self.and(solution, best))?
+    }
+
+    /// Poles to try where the rest is largest; none where it could not pay for a mode.
+    fn in_the_rest(&self, solution: &Solution) -> Vec<Pole> {
         // Rest by frequency, over all FRFs; FRFs may have lines of their own.
         let mut rest: Vec<(f64, f64)> = Vec::new();
         for (frf, found) in self.frfs.iter().zip(&solution.frfs) {
@@ -222,7 +355,7 @@ impl Fit<'_> {
         rest.sort_by(|a, b| a.0.total_cmp(&b.0));
         let near = 5 * self.frfs.len();
         if rest.len() < 2 * near {
-            return None;
+            return Vec::new();
         }
         let mut sum: f64 = rest[..near].iter().map(|r| r.1).sum();
         let mut most = (sum, near / 2);
@@ -234,30 +367,26 @@ impl Fit<'_> {
         }
         // Nothing left that could pay for a mode.
         if most.0 < 0.4 * self.wanted(solution) {
-            return None;
+            return Vec::new();
         }
         let centre = rest[most.1].0;
-        let usual = if solution.poles.is_empty() {
-            0.02
-        } else {
-            let damping: Vec<f64> = solution.poles.iter().map(|p| p.damping_ratio).collect();
-            crate::signal::median(&damping)
-        };
+        let usual = usual_damping(solution);
         // A pole on top of another one is a saddle: beside it the search begins on either slope.
-        [1.0, 1.0 - usual, 1.0 + usual].into_iter().find_map(|factor| {
-            let mut poles = solution.poles.clone();
-            poles.push(Pole {
+        [1.0, 1.0 - usual, 1.0 + usual]
+            .map(|factor| Pole {
                 frequency_hz: centre * factor,
                 damping_ratio: usual,
-            });
-            let more = self.fit(&poles)?;
-            let fall = solution.misfit - more.misfit;
-            let sane = (0..more.poles.len()).all(|j| self.sane(&more, j));
-            let added = more.poles[more.poles.len() - 1];
-            let alike = (usual / 4.0..usual * 4.0).contains(&added.damping_ratio);
-            (sane && alike && fall > 1.5 * self.wanted(&more)).then_some(more)
-        })
+            })
+            .to_vec()
     }
+}
+
+fn usual_damping(solution: &Solution) -> f64 {
+    if solution.poles.is_empty() {
+        return 0.02;
+    }
+    let damping: Vec<f64> = solution.poles.iter().map(|p| p.damping_ratio).collect();
+    crate::signal::median(&damping)
 }
 
 /// FRFs of the group that show the mode, and the squared size over uncertainty in the one that shows it best.

@@ -11,6 +11,7 @@ use serde::Serialize;
 mod analysis;
 mod circle_fit;
 mod curve;
+mod findings;
 mod from_hits;
 mod global;
 #[cfg(test)]
@@ -25,6 +26,7 @@ mod marks;
 mod ml_fit;
 mod peaks;
 pub mod quality;
+mod set_noise;
 pub mod shape;
 pub mod stabilisation;
 #[cfg(test)]
@@ -145,7 +147,8 @@ pub struct GlobalMode {
 /// What the common modes say of one FRF.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reconstruction {
-    /// sqrt(Σ|fitted − measured|² / Σ|measured|²).
+    /// sqrt(Σ|fitted − measured|² / Σ|measured|²) of the mobility: in receptance a robot's lowest mode alone would
+    /// count, in accelerance its highest.
     pub error_nrms: f64,
     /// The same for the noise alone.
     pub noise_nrms: f64,

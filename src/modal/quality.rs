@@ -26,9 +26,9 @@ pub enum Verdict {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Quality {
     pub verdict: Verdict,
-    /// sqrt(Σσ²/Σ|H|²) in the band.
+    /// sqrt(Σ(ωσ)²/Σ|ωH|²) in the band.
     pub noise_nrms: Option<f64>,
-    /// sqrt(Σ|H − modes|²/Σ|H|²).
+    /// sqrt(Σ|ω(H − modes)|²/Σ|ωH|²).
     pub reconstruction_nrms: Option<f64>,
     /// Mean over the lines, weighted with |H|².
     pub coherence: Option<f64>,
@@ -90,9 +90,10 @@ pub fn judge(
         && fit.frequency_hz == mirror.frequency_hz
     {
         let (mut difference, mut size) = (0.0, 0.0);
-        for (a, b) in fit.measured_m_per_n.iter().zip(&mirror.measured_m_per_n) {
-            difference += (a - b).norm_sqr();
-            size += 0.5 * (a.norm_sqr() + b.norm_sqr());
+        let both = fit.measured_m_per_n.iter().zip(&mirror.measured_m_per_n);
+        for (f, (a, b)) in fit.frequency_hz.iter().zip(both) {
+            difference += f * f * (a - b).norm_sqr();
+            size += 0.5 * f * f * (a.norm_sqr() + b.norm_sqr());
         }
         let noise = fit.noise_nrms.powi(2) + mirror.noise_nrms.powi(2);
         let beyond = (difference / size - noise).max(0.0).sqrt();

@@ -27,6 +27,15 @@ pub struct Complexity {
     pub mpd_deg: f64,
 }
 
+/// Below this phase collinearity a mode is called complex.
+pub const COLLINEAR: f64 = 0.9;
+
+impl Complexity {
+    pub fn is_low(&self) -> bool {
+        self.mpc < COLLINEAR
+    }
+}
+
 /// Complexity of a shape; `None` for fewer than two degrees of freedom (one is always collinear with itself).
 pub fn complexity(shape: &[Complex64]) -> Option<Complexity> {
     if shape.len() < 2 {

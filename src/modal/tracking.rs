@@ -36,15 +36,35 @@ pub fn shape_mac(a: &GlobalMode, b: &GlobalMode) -> Option<f64> {
     (x.len() >= 2).then(|| mac(&x, &y))
 }
 
-/// Pairs the modes of two sets, the most alike first; each mode is used once. For comparing a measurement with a model
-/// too. Degrees of freedom must be numbered alike in both.
+/// MAC of two modes of the same FRFs, from their modal constants in those that both sets have; `None` for fewer than two.
+pub fn constants_mac(a: &GlobalMode, b: &GlobalMode) -> Option<f64> {
+    let (x, y): (Vec<Complex64>, Vec<Complex64>) = a
+        .constants
+        .iter()
+        .zip(&b.constants)
+        .filter_map(|(x, y)| Some(((*x)?.0, (*y)?.0)))
+        .unzip();
+    (x.len() >= 2).then(|| mac(&x, &y))
+}
+
+/// Pairs the modes of two sets, the most alike first; each mode is used once. Degrees of freedom must be numbered alike
+/// in both.
 pub fn pair(first: &[GlobalMode], second: &[GlobalMode]) -> Vec<Pair> {
+    pair_by(first, second, shape_mac)
+}
+
+/// As [`pair`], with another measure of likeness of the shapes (0..1).
+pub fn pair_by(
+    first: &[GlobalMode],
+    second: &[GlobalMode],
+    likeness: impl Fn(&GlobalMode, &GlobalMode) -> Option<f64>,
+) -> Vec<Pair> {
     let mut all: Vec<(f64, Pair)> = Vec::new();
     for (i, a) in first.iter().enumerate() {
         for (j, b) in second.iter().enumerate() {
             let apart = (a.frequency_hz / b.frequency_hz).ln().abs() / APART;
             if apart < 1.0 {
-                let mac = shape_mac(a, b);
+                let mac = likeness(a, b);
                 let cost = apart + SHAPE_WEIGHT * (1.0 - mac.unwrap_or(1.0));
                 let pair = Pair {
                     first: i,

@@ -183,7 +183,7 @@ fn parts(findings: &CampaignFindings) -> Vec<Section> {
         None => {}
     }
     match &findings.modal {
-        Some(Ok(modal)) => sections.push(modal_section::section(modal)),
+        Some(Ok(modal)) => sections.push(modal_section::section(modal, &findings.mode_shapes)),
         Some(Err(error)) => sections.push(failed("modes", "Modes of the measured FRFs", error)),
         None => {}
     }

@@ -3,18 +3,23 @@
 use num_complex::Complex64;
 
 use super::figure::{
-    CellFormat, FrfCurve, FrfFigure, HeatMap, NoiseLevel, StabilisationFigure, StabilisationPole,
+    CellFormat, CoherenceCurve, CoherenceFigure, FrfCurve, FrfFigure, HeatMap, ModeShapesFigure, NoiseLevel,
+    NyquistFigure, StabilisationFigure, StabilisationPole, StickPicture,
 };
 use super::number::decimals;
 use super::parts::{count, figure, with_error};
 use super::{Block, Column, Section, Table};
 use crate::analysis::ModalAnalysis;
-use crate::analysis::modal::SetModes;
+use crate::analysis::modal::{AnalysedFrf, SetModes};
+use crate::analysis::stick_shapes::StickShape;
+use crate::modal::Reconstruction;
 use crate::modal::stabilisation::Stability;
-use crate::modal::tracking::{self, Track};
+use crate::modal::tracking::Track;
 
 /// Warnings shown; the command `modal` tells all.
 const MOST_WARNINGS: usize = 6;
+/// Mode shapes drawn.
+const MOST_SHAPES: usize = 9;
 
 pub fn summary(analysis: &ModalAnalysis) -> Option<String> {
     let modes = || analysis.sets.iter().flat_map(|p| &p.global.modes);
@@ -32,15 +37,17 @@ pub fn summary(analysis: &ModalAnalysis) -> Option<String> {
     ))
 }
 
-pub fn section(analysis: &ModalAnalysis) -> Section {
+pub fn section(analysis: &ModalAnalysis, shapes: &[StickShape]) -> Section {
     let mut blocks = vec![modes(analysis)];
     if analysis.sets.len() > 1 {
         blocks.extend(tracked(analysis));
     }
     // One posture shows how it was done; all of them would be a picture book.
-    if let Some(set) = analysis.sets.iter().max_by_key(|s| s.global.modes.len()) {
+    if let Some(set) = analysis.richest_set() {
         blocks.push(stabilisation(set));
         blocks.extend(reconstruction(set));
+        blocks.extend(coherence(set));
+        blocks.extend(mode_shapes(set, shapes));
         blocks.extend(mac(set));
     }
     blocks.extend(
@@ -100,7 +107,7 @@ fn modes(analysis: &ModalAnalysis) -> Block {
 
 /// The same mode from posture to posture, one row a mode.
 fn tracked(analysis: &ModalAnalysis) -> Option<Block> {
-    let tracks = tracking::track(&analysis.sets.iter().map(|s| &s.global).collect::<Vec<_>>());
+    let tracks = analysis.tracks();
     if tracks.is_empty() {
         return None;
     }
@@ -175,7 +182,7 @@ fn stabilisation(set: &SetModes) -> Block {
 }
 
 /// The FRF that the modes describe best is the least interesting one: the median one is shown.
-fn reconstruction(set: &SetModes) -> Option<Block> {
+fn median_fit(set: &SetModes) -> Option<(usize, &Reconstruction)> {
     let mut fits: Vec<(usize, f64)> = set
         .global
         .reconstructions
@@ -184,8 +191,21 @@ fn reconstruction(set: &SetModes) -> Option<Block> {
         .filter_map(|(k, r)| Some((k, r.as_ref()?.error_nrms)))
         .collect();
     fits.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let (k, error) = *fits.get(fits.len() / 2)?;
-    let fit = set.global.reconstructions[k].as_ref()?;
+    let (k, _) = *fits.get(fits.len() / 2)?;
+    Some((k, set.global.reconstructions[k].as_ref()?))
+}
+
+/// As magnitude and phase, and as circles of the mobility.
+fn reconstruction(set: &SetModes) -> Vec<Block> {
+    let Some((k, fit)) = median_fit(set) else {
+        return Vec::new();
+    };
+    // FRFs of a campaign have the posture in their name.
+    let own = &set.frfs[k].input.name;
+    let name = match own.starts_with(&set.set) {
+        true => own.clone(),
+        false => format!("{} {own}", set.set),
+    };
     let curve = |label: &str, value: &[Complex64]| FrfCurve {
         label: label.into(),
         frequency_hz: fit.frequency_hz.clone(),
@@ -198,7 +218,7 @@ fn reconstruction(set: &SetModes) -> Option<Block> {
         .map(|(a, b)| (a - b).norm())
         .collect();
     let picture = FrfFigure {
-        title: format!("{} {}", set.set, set.frfs[k].input.name),
+        title: name.clone(),
         quantity: "Receptance".into(),
         unit: "m/N".into(),
         measured: Some(curve("measured", &fit.measured_m_per_n)),
@@ -209,14 +229,99 @@ fn reconstruction(set: &SetModes) -> Option<Block> {
             magnitude: left,
         }),
     };
-    Some(figure(
-        "modal-reconstruction",
-        "A measured FRF and what the modes make of it",
-        format!(
-            "An FRF put together from the modes: {} % is left over, its noise is {} % (the median of the set).",
-            decimals(100.0 * error, 1),
-            decimals(100.0 * fit.noise_nrms, 1)
+    let mobility = |label: &str, value: &[Complex64]| {
+        let omega = fit
+            .frequency_hz
+            .iter()
+            .map(|f| Complex64::new(0.0, std::f64::consts::TAU * f));
+        curve(label, &omega.zip(value).map(|(s, h)| s * h).collect::<Vec<_>>())
+    };
+    let circles = NyquistFigure {
+        title: format!("Mobility of {name} in the complex plane"),
+        unit: "m/(N·s)".into(),
+        measured: Some(mobility("measured", &fit.measured_m_per_n)),
+        models: vec![mobility("from the modes", &fit.fitted_m_per_n)],
+    };
+    vec![
+        figure(
+            "modal-reconstruction",
+            "A measured FRF and what the modes make of it",
+            format!(
+                "An FRF put together from the modes: {} % is left over, its noise is {} % (of the mobility; the median of \
+                 the set).",
+                decimals(100.0 * fit.error_nrms, 1),
+                decimals(100.0 * fit.noise_nrms, 1)
+            ),
+            picture.png(),
         ),
+        figure(
+            "modal-nyquist",
+            "The same FRF as mobility in the complex plane",
+            "Each mode draws a circle; a dent in it is a second mode close by, a circle that runs counter-clockwise a wrong \
+             sign.",
+            circles.png(),
+        ),
+    ]
+}
+
+/// Coherence of the best and the worst FRF of the set, where it was measured.
+fn coherence(set: &SetModes) -> Option<Block> {
+    let mut known: Vec<(&AnalysedFrf, f64)> = set
+        .frfs
+        .iter()
+        .filter_map(|f| f.input.coherence.as_ref().and(Some((f, f.quality.coherence?))))
+        .collect();
+    known.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let mut shown = vec![known.last()?.0];
+    if known.len() > 1 {
+        shown.push(known[0].0);
+    }
+    let picture = CoherenceFigure {
+        title: format!("Coherence, {}: the best and the worst FRF", set.set),
+        curves: shown
+            .into_iter()
+            .map(|frf| CoherenceCurve {
+                label: frf.input.name.clone(),
+                frequency_hz: frf.input.frequency_hz.clone(),
+                coherence: frf.input.coherence.clone().unwrap_or_default(),
+            })
+            .collect(),
+    };
+    Some(figure(
+        "modal-coherence",
+        "Coherence over frequency",
+        "1: the response comes from the hammer alone; dips at antiresonances are usual, dips at resonances are not.",
+        picture.png(),
+    ))
+}
+
+/// Shapes on the robot's stick figure.
+fn mode_shapes(set: &SetModes, shapes: &[StickShape]) -> Option<Block> {
+    if shapes.is_empty() {
+        return None;
+    }
+    let picture = ModeShapesFigure {
+        title: format!("Measured mode shapes, {}", set.set),
+        pictures: shapes
+            .iter()
+            .take(MOST_SHAPES)
+            .map(|s| StickPicture {
+                title: format!(
+                    "{} Hz, {} %",
+                    decimals(s.frequency_hz, 2),
+                    decimals(100.0 * s.damping_ratio, 1)
+                ),
+                chain: s.chain_m.clone(),
+                chain_moved: s.chain_shape.clone(),
+                points: s.points.clone(),
+            })
+            .collect(),
+    };
+    Some(figure(
+        "modal-shapes",
+        "How the robot moves in each mode, as far as it was measured",
+        "Dots are measured; between the base and them the arm is drawn bending evenly, which is no measurement. \
+         Not to scale.",
         picture.png(),
     ))
 }

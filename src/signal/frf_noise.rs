@@ -3,7 +3,9 @@
 //! In a short window a set of FRFs that share their poles is a rational function with one common denominator
 //! (local rational method, McKelvey & Guérin 2012; Pintelon & Schoukens 2012, ch. 7). What is left at the window's
 //! centre, divided by its degrees of freedom, is noise; over all windows its variance is described as
-//! σ² = (a |H|)² + b²: a relative part (hammer, gain) and a floor (sensor, quantisation).
+//! σ² = (a |H|)² + (b (f₀/f)^p)²: a relative part (hammer, gain) and a floor (sensor, quantisation), even over the
+//! band in what the sensor measures: displacement (p = 0), velocity (1: vibrometer) or acceleration (2). Which one
+//! is read from the scatter, since files are often integrated before they are exported.
 
 use std::ops::Range;
 
@@ -15,15 +17,32 @@ use num_complex::Complex64;
 pub struct FrfNoise {
     /// a: share of the magnitude.
     pub relative: f64,
-    /// b: floor, in the unit of the FRF.
+    /// b: floor at `reference_hz`, in the unit of the FRF.
     pub floor: f64,
+    /// p: the floor falls with this power of the frequency.
+    pub power: i32,
+    /// f₀, Hz, > 0.
+    pub reference_hz: f64,
 }
 
 impl FrfNoise {
     /// Standard deviation of the complex value where the true magnitude is `magnitude`.
-    pub fn std(&self, magnitude: f64) -> f64 {
-        (self.relative * magnitude).hypot(self.floor)
+    pub fn std(&self, frequency_hz: f64, magnitude: f64) -> f64 {
+        let floor = self.floor / ratio(frequency_hz, self.reference_hz).powi(self.power);
+        (self.relative * magnitude).hypot(floor)
     }
+}
+
+/// Powers of the frequency with which a floor may fall: displacement, velocity, acceleration.
+const POWERS: [i32; 3] = [0, 1, 2];
+/// A floor that falls must be this much likelier (natural logarithm) than an even one.
+const LIKELIER: f64 = 10.0;
+/// P(square > 7 × mean) is 1e-3 for noise: what lies beyond is no noise.
+const CUT: f64 = 7.0;
+
+/// f/f₀, never zero: a line at 0 Hz has no acceleration to speak of.
+fn ratio(frequency_hz: f64, reference_hz: f64) -> f64 {
+    (frequency_hz / reference_hz).max(1e-6)
 }
 
 /// Half width of a window in lines.
@@ -43,6 +62,7 @@ const GAUSS_NEWTON_STEPS: usize = 4;
 /// of the smooth curve there.
 #[derive(Debug, Clone, Copy)]
 struct Departure {
+    frequency_hz: f64,
     magnitude: f64,
     variance: f64,
 }
@@ -83,25 +103,47 @@ pub fn estimate(frequency_hz: &[f64], frfs: &[&[Complex64]]) -> Vec<Option<FrfNo
         };
         window(frequency_hz, frfs, centre, from..to, &mut local);
     }
-    local
-        .iter()
-        .map(|local| {
-            let law = fit_law(&local.departures)?;
-            let std = local.smooth.iter().map(|magnitude| law.std(*magnitude)).collect();
+    let departures: Vec<&[Departure]> = local.iter().map(|l| l.departures.as_slice()).collect();
+    fit_laws(&departures)
+        .into_iter()
+        .zip(&local)
+        .map(|(law, local)| {
+            let law = law?;
+            let smooth = frequency_hz.iter().zip(&local.smooth);
+            let std = smooth.map(|(f, magnitude)| law.std(*f, *magnitude)).collect();
             Some(FrfNoiseEstimate { law, std })
         })
         .collect()
 }
 
-/// Noise law of an FRF from what a fit leaves over: `left_over` gives the fitted magnitude and the squared residual
-/// (corrected for the degrees of freedom that the fit took) of each line. `None` for too few lines.
-pub fn law_of_residual(left_over: impl IntoIterator<Item = (f64, f64)>) -> Option<FrfNoise> {
-    let departures: Vec<Departure> = left_over
-        .into_iter()
-        .filter(|(magnitude, variance)| magnitude.is_finite() && variance.is_finite())
-        .map(|(magnitude, variance)| Departure { magnitude, variance })
+/// One line of an FRF after a fit.
+#[derive(Debug, Clone, Copy)]
+pub struct LeftOver {
+    pub frequency_hz: f64,
+    /// Of the fitted value.
+    pub magnitude: f64,
+    /// Squared residual, corrected for the degrees of freedom that the fit took.
+    pub squared: f64,
+}
+
+/// Noise laws of FRFs measured together, from what a fit leaves over on each line of each. `None` for too few lines.
+pub fn laws_of_residuals(frfs: &[Vec<LeftOver>]) -> Vec<Option<FrfNoise>> {
+    let departures: Vec<Vec<Departure>> = frfs
+        .iter()
+        .map(|lines| {
+            lines
+                .iter()
+                .filter(|l| l.magnitude.is_finite() && l.squared.is_finite())
+                .map(|l| Departure {
+                    frequency_hz: l.frequency_hz,
+                    magnitude: l.magnitude,
+                    variance: l.squared,
+                })
+                .collect()
+        })
         .collect();
-    fit_law(&departures)
+    let slices: Vec<&[Departure]> = departures.iter().map(Vec::as_slice).collect();
+    fit_laws(&slices)
 }
 
 /// What the windows have found of one FRF.
@@ -274,7 +316,11 @@ fn window(
         let variance = projection.residual[(c, frf)].norm_sqr() / (weight[c].powi(2) * freedom);
         let magnitude = projection.fitted[(c, frf)].norm() / weight[c];
         if freedom > 0.1 && variance.is_finite() && magnitude.is_finite() {
-            local.departures.push(Departure { magnitude, variance });
+            local.departures.push(Departure {
+                frequency_hz: frequency_hz[centre],
+                magnitude,
+                variance,
+            });
         }
         for line in lines.clone() {
             let i = line - range.start;
@@ -312,12 +358,74 @@ fn weights(set: &[&[Complex64]]) -> Vec<f64> {
         .collect()
 }
 
-/// Maximum likelihood of σ² = a²|H|² + b² for exponentially distributed squares (complex Gaussian noise), by
+/// The law of each FRF, with the power of the floor that describes all of them best.
+fn fit_laws(frfs: &[&[Departure]]) -> Vec<Option<FrfNoise>> {
+    let all = || frfs.iter().flat_map(|d| d.iter());
+    let (sum, count) = all()
+        .filter(|d| d.frequency_hz > 0.0)
+        .fold((0.0, 0), |(sum, n), d| (sum + d.frequency_hz.ln(), n + 1));
+    let reference_hz = if count > 0 {
+        (sum / f64::from(count)).exp()
+    } else {
+        1.0
+    };
+    let mut best: Option<(f64, Vec<Option<FrfNoise>>)> = None;
+    for power in POWERS {
+        let laws: Vec<Option<FrfNoise>> = frfs.iter().map(|d| fit_law(d, power, reference_hz)).collect();
+        let likelihood: f64 = frfs
+            .iter()
+            .zip(&laws)
+            .filter_map(|(d, law)| Some(log_likelihood(d, law.as_ref()?)))
+            .sum();
+        let found = laws.iter().flatten().count();
+        let better = best.as_ref().is_none_or(|(before, other)| {
+            found >= other.iter().flatten().count()
+                && likelihood > before + if power > 0 { LIKELIER } else { 0.0 }
+        });
+        if better {
+            best = Some((likelihood, laws));
+        }
+    }
+    best.map_or_else(Vec::new, |(_, laws)| laws)
+}
+
+/// Of exponentially distributed squares; one far beyond its mean counts as if it were at the cut.
+fn log_likelihood(departures: &[Departure], law: &FrfNoise) -> f64 {
+    departures
+        .iter()
+        .map(|d| {
+            let mean = law.std(d.frequency_hz, d.magnitude).powi(2);
+            -mean.ln() - (d.variance / mean).min(CUT)
+        })
+        .sum()
+}
+
+/// The law of one FRF for a given power of its floor: of f^p H, whose floor is even.
+fn fit_law(departures: &[Departure], power: i32, reference_hz: f64) -> Option<FrfNoise> {
+    let even: Vec<Departure> = departures
+        .iter()
+        .map(|d| {
+            let x = ratio(d.frequency_hz, reference_hz).powi(power);
+            Departure {
+                frequency_hz: d.frequency_hz,
+                magnitude: d.magnitude * x,
+                variance: d.variance * x * x,
+            }
+        })
+        .collect();
+    let (relative, floor) = fit_even_law(&even)?;
+    Some(FrfNoise {
+        relative,
+        floor,
+        power,
+        reference_hz,
+    })
+}
+
+/// a and b: maximum likelihood of σ² = a²|H|² + b² for exponentially distributed squares (complex Gaussian noise), by
 /// iteratively reweighted least squares; squares beyond `CUT` times their mean are taken for misfit and trimmed with
 /// the bias that this brings taken back out.
-fn fit_law(departures: &[Departure]) -> Option<FrfNoise> {
-    /// P(square > 7 × mean) is 1e-3 for noise: what lies beyond is no noise.
-    const CUT: f64 = 7.0;
+fn fit_even_law(departures: &[Departure]) -> Option<(f64, f64)> {
     if departures.len() < 20 {
         return None;
     }
@@ -325,11 +433,8 @@ fn fit_law(departures: &[Departure]) -> Option<FrfNoise> {
     let mut sorted: Vec<f64> = departures.iter().map(|d| d.variance).collect();
     sorted.sort_by(f64::total_cmp);
     // Start: all floor, from the median of an exponential distribution.
-    let mut law = FrfNoise {
-        relative: 0.0,
-        floor: (sorted[sorted.len() / 2] / std::f64::consts::LN_2).sqrt(),
-    };
-    if !(scale > 0.0) || !law.floor.is_finite() || law.floor <= 0.0 {
+    let (mut relative, mut floor) = (0.0, (sorted[sorted.len() / 2] / std::f64::consts::LN_2).sqrt());
+    if !(scale > 0.0) || !floor.is_finite() || floor <= 0.0 {
         return None;
     }
     // Where the FRF is smallest the median says what the floor is, whatever the reweighting makes of it: a floor that
@@ -345,7 +450,7 @@ fn fit_law(departures: &[Departure]) -> Option<FrfNoise> {
     for pass in 0..60 {
         let (mut s, mut r) = ([[0.0; 2]; 2], [0.0; 2]);
         for d in departures {
-            let mean = law.std(d.magnitude).powi(2);
+            let mean = (relative * d.magnitude).powi(2) + floor * floor;
             // The first passes know only a crude law: do not trim by it.
             if pass > 4 && d.variance > CUT * mean {
                 continue;
@@ -381,18 +486,15 @@ fn fit_law(departures: &[Departure]) -> Option<FrfNoise> {
         }
         // Never exactly zero: a line of zero noise would get all the weight there is.
         let smallest = 1e-12 * scale * scale;
-        let next = FrfNoise {
-            relative: a2.sqrt(),
-            floor: b2.max(smallest).sqrt(),
-        };
-        let settled = (next.relative - law.relative).abs() < 1e-6 * next.relative.max(1e-9)
-            && (next.floor - law.floor).abs() < 1e-6 * next.floor;
-        law = next;
+        let next = (a2.sqrt(), b2.max(smallest).sqrt());
+        let settled =
+            (next.0 - relative).abs() < 1e-6 * next.0.max(1e-9) && (next.1 - floor).abs() < 1e-6 * next.1;
+        (relative, floor) = next;
         if settled && pass > 6 {
             break;
         }
     }
-    Some(law)
+    Some((relative, floor))
 }
 
 #[cfg(test)]
@@ -401,9 +503,13 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    /// Four robot-like FRFs with known noise: both parts of the law come back.
+    /// Robot-like FRFs with known noise: both parts of the law come back, and what the sensor measured.
     #[test]
     fn relative_noise_and_floor_are_recovered() {
+        POWERS.into_iter().for_each(recovered);
+    }
+
+    fn recovered(power: i32) {
         let frequency: Vec<f64> = (0..436).map(|k| 3.0 + 0.2 * k as f64).collect();
         let modes = [
             (7.6, 0.03),
@@ -435,7 +541,8 @@ mod tests {
                                     / Complex64::new(1.0 - r * r, 2.0 * zeta * r)
                             })
                             .sum();
-                        let std = (relative * h.norm()).hypot(floor) / 2f64.sqrt();
+                        let even = floor * (16.0 / f).powi(power);
+                        let std = (relative * h.norm()).hypot(even) / 2f64.sqrt();
                         h + Complex64::new(gauss(), gauss()) * std
                     })
                     .collect()
@@ -448,10 +555,14 @@ mod tests {
             .map(|e| e.law)
             .collect();
         assert_eq!(laws.len(), frfs.len());
+        assert!(laws.iter().all(|l| l.power == power), "{laws:?}");
         let mean = |f: fn(&FrfNoise) -> f64| laws.iter().map(f).sum::<f64>() / laws.len() as f64;
-        let (a, b) = (mean(|l| l.relative), mean(|l| l.floor));
-        assert!((a / relative - 1.0).abs() < 0.1, "relative {a}");
-        assert!((b / floor - 1.0).abs() < 0.06, "floor {b}");
+        let (a, b) = (
+            mean(|l| l.relative),
+            mean(|l| FrfNoise { relative: 0.0, ..*l }.std(16.0, 0.0)),
+        );
+        assert!((a / relative - 1.0).abs() < 0.1, "power {power}: relative {a}");
+        assert!((b / floor - 1.0).abs() < 0.06, "power {power}: floor {b}");
     }
 
     #[test]

@@ -113,6 +113,20 @@ fn text_names_format_channels_and_warnings() {
 }
 
 #[test]
+fn a_labview_file_is_read_with_the_decimal_sign_that_it_declares() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "LabVIEW Measurement\t\nSeparator\tTab\nDecimal_Separator\t,\nX_Columns\tNo\n***End_of_Header***\t\n\t\n\
+        Channels\t1\t\nY_Unit_Label\tNewtons\t\nX_Dimension\tTime\t\nX0\t0,0E+0\t\nDelta_X\t5,0E-4\t\n\
+        ***End_of_Header***\t\t\nX_Value\tHammer\tComment\n\t0,5\n\t1,5\n\t2,5\n";
+    std::fs::write(folder.path().join("tap.lvm"), text).unwrap();
+    let output = inspect(folder.path(), &["tap.lvm"]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    for part in ["LabVIEW LVM", "Hammer", "2000 Hz", "3 samples"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+}
+
+#[test]
 fn an_unreadable_file_fails_and_is_named() {
     let folder = tempfile::tempdir().unwrap();
     write_files(folder.path());

@@ -136,6 +136,7 @@ fn modal_of_a_campaign_and_of_files() {
             "frequency_hz": "number", "damping_ratio": "number",
             "frequency_std_hz": "number", "damping_std": "number"
         }],
+        "tracked": [{ "modes": [{ "frequency_hz": "number?", "damping_std": "number?" }] }],
     });
     holds(&document(&["modal", path(&blind("frf-9112"))]), pattern.clone());
     let files = ["p1", "p2"].map(|p| blind(&format!("frf-9112/frf/{p}.uff")));
@@ -216,8 +217,25 @@ fn compare() {
             "domain": "structure", "error": error_pattern(),
             "by_posture": nrms, "by_direction": nrms, "by_point": nrms,
             "by_band": [{ "from_hz": "number", "to_hz": "number", "nrms": "number" }],
+            "modes": [{
+                "posture": "string", "measured_hz": "number", "measured_std_hz": "number",
+                "measured_damping": "number", "measured_damping_std": "number",
+            }],
         }),
     );
+    // The campaign lacks nothing: where a mode of the model is paired it is the measured one.
+    for mode in document["modes"].as_array().unwrap() {
+        let number = |key: &str| mode[key].as_f64().unwrap();
+        assert!(
+            (number("model_hz") / number("measured_hz") - 1.0).abs() < 0.02,
+            "{mode}"
+        );
+        assert!(
+            (number("model_damping") / number("measured_damping") - 1.0).abs() < 0.3,
+            "{mode}"
+        );
+        assert!(number("mac") > 0.8, "{mode}");
+    }
     assert!(document["error"]["held_out_nrms"].is_number());
     let keys = |key: &str| {
         document[key]

@@ -9,11 +9,13 @@ mod canvas;
 mod panel;
 mod style;
 
+mod coherence;
 mod force_record;
 mod frf;
 mod heat_map;
 mod history;
 mod lobes;
+mod mode_shapes;
 mod nyquist;
 mod parameters;
 mod regression;
@@ -27,11 +29,13 @@ mod samples;
 #[cfg(test)]
 mod tests;
 
+pub use coherence::{CoherenceCurve, CoherenceFigure};
 pub use force_record::{ForceChannel, ForceRecord};
 pub use frf::{FrfCurve, FrfFigure, NoiseLevel};
 pub use heat_map::{CellFormat, HeatMap};
 pub use history::{HistoryFigure, Revision};
 pub use lobes::{LobeCurve, LobeMarker, LobeOutcome, LobesFigure};
+pub use mode_shapes::{ModeShapesFigure, StickPicture};
 pub use nyquist::NyquistFigure;
 pub use parameters::{Estimate, ParameterFigure, ParameterRow};
 pub use regression::{RegressionFigure, RegressionPoint, RegressionSeries};

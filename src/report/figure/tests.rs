@@ -246,6 +246,33 @@ fn odd_tables_and_bars_never_panic() {
 }
 
 #[test]
+fn mode_shapes_and_coherence_draw_whatever_they_are_given() {
+    let chain = vec![[0.0; 3], [0.0, 0.0, 1.0], [1.2, 0.4, 1.1]];
+    for moved in [[0.0; 3], [1.0, -0.3, 0.2]] {
+        let picture = StickPicture {
+            title: "7.08 Hz, 3.7 %".into(),
+            chain: chain.clone(),
+            chain_moved: vec![[0.0; 3], [0.0; 3], moved],
+            points: vec![(chain[2], moved)],
+        };
+        let figure = ModeShapesFigure {
+            title: "Measured mode shapes, p1".into(),
+            pictures: vec![picture; 4],
+        };
+        sound("mode shapes", figure.png());
+    }
+    let coherence = CoherenceFigure {
+        title: "Coherence".into(),
+        curves: vec![CoherenceCurve {
+            label: "1X/1X".into(),
+            frequency_hz: vec![1.0, 2.0, 3.0],
+            coherence: vec![0.4, 1.0, f64::NAN],
+        }],
+    };
+    sound("coherence", coherence.png());
+}
+
+#[test]
 fn an_empty_figure_is_an_error_that_names_it() {
     let title = || "cut 07".to_owned();
     let results = [
@@ -290,6 +317,16 @@ fn an_empty_figure_is_an_error_that_names_it() {
         }
         .png(),
         HistoryFigure {
+            title: title(),
+            ..Default::default()
+        }
+        .png(),
+        CoherenceFigure {
+            title: title(),
+            ..Default::default()
+        }
+        .png(),
+        ModeShapesFigure {
             title: title(),
             ..Default::default()
         }

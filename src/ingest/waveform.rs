@@ -1,0 +1,48 @@
+//! Channels of formats that say name, unit and sampling interval of each: made SI, and gathered into records.
+
+use super::force::{role_of, unit_in_name};
+use super::text::Notes;
+use super::units::{self, Dimension};
+use super::{Channel, ChannelRole, TimeRecord};
+
+/// A channel in SI; the unit is read from its label, else from its name (`fx_n`, `Force [N]`).
+pub(super) fn channel(name: String, file_unit: String, mut samples: Vec<f64>, notes: &mut Notes) -> Channel {
+    let unit = units::parse(&file_unit).or_else(|| unit_in_name(&name));
+    let role = role_of(&name, unit);
+    match unit {
+        None => notes.about(&name, "unit unknown: values as they stand in the file"),
+        Some(unit) if unit.dimension == Dimension::VOLTAGE && role != ChannelRole::Other => {
+            notes.about(
+                &name,
+                "a force in volts: values as they stand, check that they are newtons",
+            );
+        }
+        Some(_) => {}
+    }
+    let factor = unit.map_or(1.0, |u| u.factor);
+    samples.iter_mut().for_each(|v| *v *= factor);
+    Channel {
+        name,
+        file_unit,
+        role,
+        samples,
+    }
+}
+
+/// Adds a channel to the record with its time axis, or begins one.
+pub(super) fn put(records: &mut Vec<TimeRecord>, sample_rate_hz: f64, start_s: f64, channel: Channel) {
+    let same = records.iter_mut().find(|r| {
+        (r.sample_rate_hz / sample_rate_hz - 1.0).abs() < 1e-9
+            && r.len() == channel.samples.len()
+            && r.start_s == start_s
+    });
+    match same {
+        Some(record) => record.channels.push(channel),
+        None => records.push(TimeRecord {
+            filled: Vec::new(),
+            sample_rate_hz,
+            start_s,
+            channels: vec![channel],
+        }),
+    }
+}

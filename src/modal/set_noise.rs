@@ -1,0 +1,142 @@
+//! Noise of the FRFs of a set: from the measurement before the modes are known, from what they leave over afterwards.
+
+use num_complex::Complex64;
+
+use super::global::SET;
+use super::joint_fit::{Data, Group};
+use crate::signal::frf_noise::{self, LeftOver};
+
+/// A piece of the band left with this many times the noise power is badly described.
+const MISFIT: f64 = 2.0;
+/// Lines of a piece: enough that a mode overlooked in it still stands out.
+const BLOCK: usize = 48;
+
+/// Noise of each FRF, from those on the same lines together.
+pub(super) fn estimate(data: &mut [Data]) {
+    let mut todo: Vec<usize> = (0..data.len()).collect();
+    while let Some(&first) = todo.first() {
+        let (same, other): (Vec<usize>, Vec<usize>) = todo
+            .iter()
+            .partition(|&&k| data[k].frequency_hz == data[first].frequency_hz);
+        let curves: Vec<&[Complex64]> = same.iter().map(|&k| data[k].receptance.as_slice()).collect();
+        let estimates = frf_noise::estimate(&data[first].frequency_hz, &curves);
+        for (&k, estimate) in same.iter().zip(estimates) {
+            let size = rms(&data[k].receptance);
+            let floor = |h: Complex64| (1e-6 * h.norm()).max(1e-9 * size);
+            data[k].sigma = match estimate {
+                Some(e) => e
+                    .std
+                    .iter()
+                    .zip(&data[k].receptance)
+                    .map(|(s, h)| s.max(floor(*h)))
+                    .collect(),
+                // Too few lines to tell: relative noise, as of a hammer; the residual scales it later.
+                None => data[k]
+                    .receptance
+                    .iter()
+                    .map(|h| (0.02 * h.norm()).max(1e-3 * size))
+                    .collect(),
+            };
+        }
+        todo = other;
+    }
+}
+
+pub(super) fn rms(values: &[Complex64]) -> f64 {
+    (values.iter().map(|v| v.norm_sqr()).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
+/// Noise of each FRF from what the fit leaves over. Lines whose group could not be fitted keep theirs. Where a piece of
+/// the band is left far worse than the rest (leakage, drifting modes, lines below the sensor's range), it is that much
+/// noisier: one bad end of the band must not decide what is needless elsewhere.
+pub(super) fn renew(data: &mut [Data], groups: &[Group]) {
+    let left_over: Vec<Vec<LeftOver>> = (0..data.len()).map(|m| left_over(&data[m], groups, m)).collect();
+    let laws = frf_noise::laws_of_residuals(&left_over);
+    for ((d, lines), law) in data.iter_mut().zip(&left_over).zip(laws) {
+        let size = rms(&d.receptance);
+        let fitted = lines.iter().filter(|l| l.squared.is_finite());
+        let (count, level) = fitted.zip(&d.sigma).fold((0, 0.0), |(n, sum), (line, s)| {
+            (n + 1, sum + line.squared / (s * s))
+        });
+        let scale = (level / f64::from(count.max(1))).sqrt().max(1e-6);
+        for (sigma, line) in d
+            .sigma
+            .iter_mut()
+            .zip(lines)
+            .filter(|(_, l)| l.squared.is_finite())
+        {
+            *sigma = match &law {
+                Some(law) => law
+                    .std(line.frequency_hz, line.magnitude)
+                    .max(1e-7 * line.magnitude)
+                    .max(1e-10 * size),
+                None => *sigma * scale,
+            };
+        }
+    }
+    // In a few FRFs alone a mode overlooked would hide in its own misfit.
+    if data.len() < SET {
+        return;
+    }
+    for [from, to] in blocks(data) {
+        let (mut count, mut level) = (0, 0.0);
+        for (d, lines) in data.iter().zip(&left_over) {
+            for (line, sigma) in lines.iter().zip(&d.sigma) {
+                if (from..to).contains(&line.frequency_hz) && line.squared.is_finite() {
+                    level += line.squared / (sigma * sigma);
+                    count += 1;
+                }
+            }
+        }
+        let excess = level / f64::from(count.max(1));
+        if excess.is_finite() && excess > MISFIT {
+            for d in data.iter_mut() {
+                let sigmas = d.frequency_hz.iter().zip(&mut d.sigma);
+                sigmas
+                    .filter(|(f, _)| (from..to).contains(*f))
+                    .for_each(|(_, sigma)| *sigma *= excess.sqrt());
+            }
+        }
+    }
+}
+
+/// The band in pieces of at least [`BLOCK`] lines of the FRF that has most, Hz.
+fn blocks(data: &[Data]) -> Vec<[f64; 2]> {
+    let Some(finest) = data.iter().max_by_key(|d| d.frequency_hz.len()) else {
+        return Vec::new();
+    };
+    let lines = &finest.frequency_hz;
+    let count = (lines.len() / BLOCK).max(1);
+    let edge = |k: usize| match k {
+        0 => f64::NEG_INFINITY,
+        k if k == count => f64::INFINITY,
+        k => lines[k * lines.len() / count],
+    };
+    (0..count).map(|k| [edge(k), edge(k + 1)]).collect()
+}
+
+/// By line of FRF m; infinite where no group covers it.
+fn left_over(data: &Data, groups: &[Group], m: usize) -> Vec<LeftOver> {
+    let mut lines: Vec<LeftOver> = data
+        .frequency_hz
+        .iter()
+        .zip(&data.receptance)
+        .map(|(&frequency_hz, h)| LeftOver {
+            frequency_hz,
+            magnitude: h.norm(),
+            squared: f64::INFINITY,
+        })
+        .collect();
+    for group in groups {
+        let found = &group.solution.frfs[m];
+        let from = data.frequency_hz.partition_point(|&f| f < group.window_hz[0]);
+        // The poles are shared by all FRFs and cost each of them next to nothing.
+        let freedom = (1.0 - found.leverage).max(0.05);
+        for (k, residual) in found.residual.iter().enumerate() {
+            let line = &mut lines[from + k];
+            line.magnitude = (data.receptance[from + k] - residual).norm();
+            line.squared = residual.norm_sqr() / freedom;
+        }
+    }
+    lines
+}

@@ -260,7 +260,7 @@ fn model_state(campaign: &Campaign, warnings: &mut Vec<String>) -> Result<ModelS
         )
     } else {
         let case = StructureCase::load(campaign)?;
-        let calibration = calibrate(&case.model, &case.data, case.options(Options::default()))?;
+        let calibration = calibrate(&case.model, &case.data, None, case.options(Options::default()))?;
         let description = match case.effects().is_empty() {
             true => "calibrated robot model".to_string(),
             false => format!("calibrated robot model ({})", case.model_description()),

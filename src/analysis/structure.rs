@@ -2,10 +2,12 @@
 
 use num_complex::Complex64;
 
+use super::modal::ModalAnalysis;
 use crate::Result;
 use crate::campaign::Campaign;
 use crate::discrepancy::FrfComparison;
 use crate::identify::calibrate::calibrate;
+use crate::identify::modal_start::{ModalStart, PostureMeasurement, modal_start};
 use crate::identify::{Calibration, Options, StructureCase};
 
 /// The robot model of a campaign against its FRFs: as the robot file has it, and calibrated with the effects that were
@@ -18,17 +20,27 @@ pub struct StructureAnalysis {
     pub calibrated: Vec<Vec<Complex64>>,
     pub before: FrfComparison,
     pub after: FrfComparison,
+    /// The starting point that the measured modes gave; `None` where a revision gave one, or there are no modes.
+    pub start: Option<ModalStart>,
     /// What was noticed while reading and fitting.
     pub warnings: Vec<String>,
 }
 
 impl StructureAnalysis {
     pub fn run(campaign: &Campaign, options: Options) -> Result<Self> {
-        Self::of(StructureCase::load(campaign)?, options)
+        let case = StructureCase::load(campaign)?;
+        let start = match case.model.start() {
+            Some(_) => None,
+            None => start_of_modes(&case, &ModalAnalysis::run(campaign)?)?,
+        };
+        Self::of(case, start, options)
     }
 
-    pub fn of(case: StructureCase, options: Options) -> Result<Self> {
-        let calibration = calibrate(&case.model, &case.data, case.options(options))?;
+    /// # Errors
+    /// FRFs that do not determine the parameters.
+    pub fn of(case: StructureCase, start: Option<ModalStart>, options: Options) -> Result<Self> {
+        let measured = start.as_ref().map(|s| s.theta.as_slice());
+        let calibration = calibrate(&case.model, &case.data, measured, case.options(options))?;
         let nominal = case
             .baseline
             .predict(&case.baseline.nominal_theta(), &case.data)?;
@@ -44,7 +56,33 @@ impl StructureAnalysis {
             calibrated,
             before,
             after,
+            start,
             warnings,
         })
     }
+}
+
+/// Where the modes measured at the campaign's postures put the model.
+///
+/// # Errors
+/// As [`modal_start`].
+pub fn start_of_modes(case: &StructureCase, modal: &ModalAnalysis) -> Result<Option<ModalStart>> {
+    let mut postures: Vec<PostureMeasurement> = Vec::new();
+    for set in &modal.sets {
+        let same = |id: &String| *id == set.set;
+        let posture = case.data.posture_ids.iter().position(same);
+        let block = case.data.blocks.iter().find(|b| Some(b.posture) == posture);
+        if let Some(block) = block {
+            postures.push(PostureMeasurement {
+                kinematics: block.kinematics.clone(),
+                modes: set
+                    .global
+                    .modes
+                    .iter()
+                    .map(|m| [m.frequency_hz, m.damping_ratio])
+                    .collect(),
+            });
+        }
+    }
+    modal_start(&case.model, &postures)
 }

@@ -18,7 +18,7 @@ pub struct Args {
     /// Seed of those starting points.
     #[arg(long, default_value_t = Options::default().seed)]
     seed: u64,
-    /// Start from the robot file's values, not from where the last revision stood.
+    /// Start from the robot file's values alone, not from where the last revision stood or the measured modes lie.
     #[arg(long)]
     from_nominal: bool,
 }
@@ -29,16 +29,19 @@ pub fn run(args: Args) -> Result<Outcome> {
         extra_starts: args.starts,
         seed: args.seed,
     };
-    let mut case = StructureCase::load(&campaign)?;
-    if args.from_nominal {
+    let analysis = if args.from_nominal {
+        let mut case = StructureCase::load(&campaign)?;
         case.forget_start();
-    }
-    let analysis = StructureAnalysis::of(case, options)?;
+        StructureAnalysis::of(case, None, options)?
+    } else {
+        StructureAnalysis::run(&campaign, options)?
+    };
     let StructureAnalysis {
         case,
         calibration,
         before,
         after,
+        start,
         warnings: notes,
         ..
     } = &analysis;
@@ -52,12 +55,24 @@ pub fn run(args: Args) -> Result<Outcome> {
         "iterations": calibration.iterations,
         "converged": calibration.converged,
         "reduced_chi2": calibration.reduced_chi2,
+        "modal_start": start,
         "starts": calibration.starts,
         "starts_agreeing": calibration.starts_agreeing,
         "warnings": notes,
     });
     let mut text = format!("model: {}\n\n", case.model_description());
     text += &describe_parameters(&case.model, calibration);
+    if let Some(start) = start {
+        text += &format!(
+            "\nstarted also from the measured modes: damping ratio {:.2} %, {} of {} modes matched, their frequencies off by \
+             {} with the robot file's stiffness, {} at the start\n",
+            100.0 * start.damping_ratio,
+            start.matched,
+            start.measured,
+            percent(start.frequency_error_before),
+            percent(start.frequency_error),
+        );
+    }
     text += &format!(
         "\nerror (nrms) {} -> {}, noise floor {}; {} in {} iterations\n",
         percent(before.totals.nrms),

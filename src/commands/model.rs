@@ -42,7 +42,7 @@ pub fn run(args: Args) -> Result<Outcome> {
     );
     if !campaign.frfs.is_empty() {
         let case = StructureCase::load(&campaign)?;
-        let calibration = calibrate(&case.model, &case.data, case.options(Options::default()))?;
+        let calibration = calibrate(&case.model, &case.data, None, case.options(Options::default()))?;
         let after = postures(&campaign, &case.model, &calibration.theta, &args, &mut left_out)?;
         text += &format!(
             "\nafter calibration on the measured FRFs ({})\n",

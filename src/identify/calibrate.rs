@@ -82,7 +82,7 @@ impl Calibration {
                 self.reduced_chi2
             ));
         }
-        if self.starts > 1 && self.starts_agreeing < 2 {
+        if self.starts > 1 && self.starts_agreeing < 2 && self.reduced_chi2 > SUSPICIOUS_CHI2 {
             warnings.push(format!(
                 "only one of {} starting points led to this fit: there may be a better one (try --starts 20)",
                 self.starts
@@ -166,17 +166,32 @@ pub fn refine(model: &StructureModel, data: &FrfData, start: &[f64]) -> Result<F
     minimise(&problem, start, &model.bounds(), Stopping::default())
 }
 
-/// Calibrates `model` to `data`, from the solution that the model brings along where it has one.
-pub fn calibrate(model: &StructureModel, data: &FrfData, options: Options) -> Result<Calibration> {
+/// Calibrates `model` to `data`, from the solution that the model brings along where it has one, else from its nominal
+/// values and from `measured` (such as [`super::modal_start`] gives), whichever leads further down.
+pub fn calibrate(
+    model: &StructureModel,
+    data: &FrfData,
+    measured: Option<&[f64]>,
+    options: Options,
+) -> Result<Calibration> {
     let nominal = model.nominal_theta();
-    let (first, mut iterations) = match model.start() {
+    let (mut first, mut iterations) = match model.start() {
         Some(start) => resume(model, data, start)?,
         None => approach(model, data, &nominal, ROUGH)?,
     };
+    let (mut starts, mut agreeing) = (1, 1);
+    if let (Some(start), None) = (measured, model.start()) {
+        let (other, more) = approach(model, data, start, ROUGH)?;
+        starts += 1;
+        iterations += more;
+        let alike = (other.cost / first.cost - 1.0).abs() < 1e-3;
+        agreeing += usize::from(alike);
+        if other.cost < first.cost {
+            first = other;
+        }
+    }
     let mut best = refine(model, data, &first.theta)?;
     iterations += best.iterations;
-    let mut starts = 1;
-    let mut agreeing = 1;
     let residual_count = (2 * data.value_count()) as f64;
     let chi2 = |fit: &Fit| 2.0 * fit.cost / (residual_count - model.parameters.len() as f64).max(1.0);
 

@@ -13,6 +13,7 @@ mod cutting_windows;
 mod force_channel;
 pub mod frf_data;
 pub mod levenberg_marquardt;
+pub mod modal_start;
 pub mod modal_table;
 pub mod off_comb;
 pub mod posture_modes;

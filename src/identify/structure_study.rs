@@ -192,7 +192,7 @@ impl Study for StructureStudy {
     }
 
     fn calibrate(&self, model: &StructureModel) -> Result<Calibration> {
-        calibrate(model, &self.data, self.options)
+        calibrate(model, &self.data, None, self.options)
     }
 }
 

@@ -21,6 +21,9 @@ pub struct Args {
     /// Look at this band only, Hz.
     #[arg(long, value_name = "LO:HI", value_parser = band)]
     band: Option<[f64; 2]>,
+    /// Print the modes of every single FRF, however many there are.
+    #[arg(long)]
+    each: bool,
     /// Tap tests: how FRFs are averaged.
     #[arg(long, value_enum, default_value = "h1")]
     estimator: EstimatorArg,
@@ -36,6 +39,8 @@ enum EstimatorArg {
     Hv,
 }
 
+/// Of so many FRFs the modes of each are printed unasked.
+const FEW_FRFS: usize = 8;
 /// Warnings shown to a person; all are in the JSON.
 const MOST_WARNINGS: usize = 20;
 
@@ -86,7 +91,7 @@ pub fn run(args: Args) -> Result<Outcome> {
     };
     Ok(Outcome {
         json: document(&analysis, campaign),
-        text: text(&analysis),
+        text: text(&analysis, args.each),
     })
 }
 
@@ -201,7 +206,7 @@ fn tracked(analysis: &ModalAnalysis) -> String {
     table(&header, &rows)
 }
 
-fn text(analysis: &ModalAnalysis) -> String {
+fn text(analysis: &ModalAnalysis, each: bool) -> String {
     let mut out = String::new();
     // Writing to a String cannot fail.
     for (file, hits) in &analysis.hits {
@@ -220,8 +225,13 @@ fn text(analysis: &ModalAnalysis) -> String {
             );
         }
     }
-    for set in &analysis.sets {
-        single(set, &mut out);
+    let frfs: usize = analysis.sets.iter().map(|s| s.frfs.len()).sum();
+    if each || frfs <= FEW_FRFS {
+        for set in &analysis.sets {
+            single(set, &mut out);
+        }
+    } else {
+        let _ = writeln!(out, "{frfs} FRFs (the modes of each: --each, or --json)");
     }
     for set in &analysis.sets {
         let _ = writeln!(out, "\n{}: all FRFs together ({})", set.set, set.why);

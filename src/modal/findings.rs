@@ -15,8 +15,10 @@ const FAR: f64 = 100.0;
 /// Below this many lines in the half-power band the record's leakage counts, see `analysis`.
 const LEAKAGE_BELOW_LINES: f64 = 1.0;
 const LEAKAGE_LINES: f64 = 0.02;
-/// Modes with fewer lines in the half-power band are named.
+/// Modes with fewer lines in the half-power band are named …
 const FINE_LINES: f64 = 3.0;
+/// … where their damping is uncertain by more than this share of itself.
+const UNCERTAIN: f64 = 0.02;
 
 pub(super) fn collect(
     groups: &[Group],
@@ -299,7 +301,7 @@ pub(super) fn coarse_lines(data: &[Data], result: &mut GlobalModes) {
     let coarse: Vec<String> = result
         .modes
         .iter()
-        .filter(|m| m.lines_in_half_power_band < FINE_LINES)
+        .filter(|m| m.lines_in_half_power_band < FINE_LINES && m.damping_std > UNCERTAIN * m.damping_ratio)
         .map(|m| {
             format!(
                 "at {} Hz lines the damping of the {:.1} Hz mode is uncertain to {:.0} %",

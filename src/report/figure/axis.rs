@@ -218,9 +218,10 @@ fn common_exponent(largest: f64) -> i32 {
 /// `Re (m/N)` with exponent −6 → `Re (10⁻⁶ m/N)`.
 fn with_factor(label: &str, exponent: i32) -> String {
     let factor = format!("10{}", superscript(exponent));
-    match label.rfind('(') {
+    // The first bracket after the name: a unit may have brackets of its own.
+    match label.find(" (") {
         Some(at) if label.ends_with(')') => {
-            let (name, unit) = label.split_at(at + 1);
+            let (name, unit) = label.split_at(at + 2);
             format!("{name}{factor} {unit}")
         }
         _ => format!("{label} ({factor})"),
@@ -248,6 +249,8 @@ mod tests {
         );
         let axis = Axis::linear("Re (m/N)", (-3.1e-6, 2.2e-6), 5);
         assert_eq!(axis.label, "Re (10⁻⁶ m/N)");
+        let mobility = Axis::linear("Re (m/(N·s))", (-3.1e-6, 2.2e-6), 5);
+        assert_eq!(mobility.label, "Re (10⁻⁶ m/(N·s))");
         assert_eq!(labels(&axis), ["−2", "0", "2"]);
         assert_eq!(
             labels(&Axis::linear("f (mm)", (0.0, 0.25), 5)),

@@ -104,12 +104,10 @@ fn structure(campaign: &Campaign) -> Result<Outcome> {
         "not_tried": diagnosis.not_tried.iter().map(|(e, why)| json!({ "effect": e, "why": why })).collect::<Vec<_>>(),
         "warnings": case.warnings,
     });
-    let text = format!("model: {}\n", case.model_description())
-        + &describe(&findings)
-        + &warnings(&case.warnings);
+    let text =
+        format!("model: {}\n", case.model_description()) + &describe(&findings) + &warnings(&case.warnings);
     let winner = diagnosis.winner().map(Candidate::label);
-    let next =
-        Guide::structure(campaign).diagnosed(diagnosis.verdict, winner.as_deref(), next_measurement);
+    let next = Guide::structure(campaign).diagnosed(diagnosis.verdict, winner.as_deref(), next_measurement);
     Ok(Outcome::new(json, text, Some(next)))
 }
 

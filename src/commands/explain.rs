@@ -69,10 +69,12 @@ pub fn run(args: Args) -> Result<Outcome> {
                 Some(near) => format!("did you mean {near}? `lobestone explain` lists all"),
                 None => "`lobestone explain` lists all".into(),
             };
-            Err(InputError::new(format!("there is no effect \"{}\"", shown(&name)))
-                .key("EFFECT")
-                .remedy(remedy)
-                .into())
+            Err(
+                InputError::new(format!("there is no effect \"{}\"", shown(&name)))
+                    .key("EFFECT")
+                    .remedy(remedy)
+                    .into(),
+            )
         }
     }
 }
@@ -80,9 +82,10 @@ pub fn run(args: Args) -> Result<Outcome> {
 /// The first id that has a word of `name` in it: `wear` means `tool-wear`.
 fn sharing_a_word<'a>(name: &str, ids: impl Iterator<Item = &'a str> + Clone) -> Option<&'a str> {
     let words = name.split(|c: char| !c.is_alphanumeric()).filter(|w| w.len() > 3);
-    words
-        .into_iter()
-        .find_map(|word| ids.clone().find(|id| id.split('-').any(|part| part.starts_with(word))))
+    words.into_iter().find_map(|word| {
+        ids.clone()
+            .find(|id| id.split('-').any(|part| part.starts_with(word)))
+    })
 }
 
 fn list(library: &[Entry]) -> String {
@@ -154,7 +157,11 @@ mod tests {
             assert!(outcome.text.contains("Den Hartog"), "{}", outcome.text);
         }
         let outcome = explained("dynamometer-misalignment").unwrap();
-        assert!(outcome.text.contains("None that we vouch for"), "{}", outcome.text);
+        assert!(
+            outcome.text.contains("None that we vouch for"),
+            "{}",
+            outcome.text
+        );
     }
 
     #[test]

@@ -168,10 +168,8 @@ pub fn run(args: Args, as_json: bool) -> Result<Outcome> {
     if let Some(list) = &args.cut_list {
         draft::read_cut_list(list, &scan, &mut answers)?;
     }
-    let talking = !as_json
-        && !args.no_questions
-        && std::io::stdin().is_terminal()
-        && std::io::stderr().is_terminal();
+    let talking =
+        !as_json && !args.no_questions && std::io::stdin().is_terminal() && std::io::stderr().is_terminal();
     let name = args.name.clone().unwrap_or_else(|| folder_name(&args));
     let mut draft = Draft::new(&name, &scan, &answers)?;
     if talking {
@@ -204,7 +202,11 @@ pub fn run(args: Args, as_json: bool) -> Result<Outcome> {
         "not_used": scan.not_used.iter().map(|(file, why)| json!({ "file": file, "why": why })).collect::<Vec<_>>(),
     });
     let next = next_step::begun(dir, missing.len(), !scan.frfs.is_empty());
-    Ok(Outcome::new(json, describe(&file, &scan, &draft, &missing), Some(next)))
+    Ok(Outcome::new(
+        json,
+        describe(&file, &scan, &draft, &missing),
+        Some(next),
+    ))
 }
 
 fn folder_name(args: &Args) -> String {
@@ -240,7 +242,11 @@ fn as_given(error: Error) -> Error {
 /// One question on the terminal; an empty answer leaves it open.
 fn ask(question: &str, example: &str) -> Result<String> {
     let mut terminal = anstream::stderr();
-    let _ = write!(terminal, "{} [such as {example}]: ", Emphasis::Strong.on(question));
+    let _ = write!(
+        terminal,
+        "{} [such as {example}]: ",
+        Emphasis::Strong.on(question)
+    );
     let _ = terminal.flush();
     let mut answer = String::new();
     std::io::stdin()
@@ -289,7 +295,10 @@ fn describe(file: &std::path::Path, scan: &Scan, draft: &Draft, missing: &[Missi
             .into_iter()
             .map(|(kind, what, why, names)| vec![what, of(&kind, &names), why])
             .collect();
-        text += &format!("\nguessed: check these\n{}", table(&["", "", ""], &rows).trim_start_matches('\n'));
+        text += &format!(
+            "\nguessed: check these\n{}",
+            table(&["", "", ""], &rows).trim_start_matches('\n')
+        );
     }
     if !missing.is_empty() {
         let rows: Vec<Vec<String>> = missing
@@ -297,7 +306,13 @@ fn describe(file: &std::path::Path, scan: &Scan, draft: &Draft, missing: &[Missi
             .map(|m| vec![m.key.to_string(), of(m.table, &m.of), m.what.to_string()])
             .collect();
         let title = Emphasis::Doubtful.on("still to fill in (comments \"# fill in\" in the file)");
-        text += &format!("\n{title}\n{}", table(&["", "", ""], &rows).trim_start_matches('\n'));
+        text += &format!(
+            "\n{title}\n{}",
+            table(&["", "", ""], &rows).trim_start_matches('\n')
+        );
+        if missing.iter().any(|m| m.table == "cut" && m.of.len() > 1) {
+            text += "  (a list of cuts, CSV with a column \"file\" and these keys, is read with --cut-list FILE)\n";
+        }
     }
     if !scan.not_used.is_empty() {
         let notes: Vec<String> = scan

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 use serde_json::json;
 
-use super::next_step::{self, Guide};
 use super::Outcome;
+use super::next_step::{self, Guide};
 use super::text::{Emphasis, table};
 use crate::analysis::{ModalAnalysis, SetModes};
 use crate::campaign::Campaign;
@@ -95,7 +95,11 @@ pub fn run(args: Args) -> Result<Outcome> {
             (analysis, next)
         }
     };
-    Ok(Outcome::new(document(&analysis, campaign), text(&analysis), Some(next)))
+    Ok(Outcome::new(
+        document(&analysis, campaign),
+        text(&analysis),
+        Some(next),
+    ))
 }
 
 fn document(analysis: &ModalAnalysis, campaign: bool) -> serde_json::Value {

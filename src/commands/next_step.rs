@@ -78,12 +78,24 @@ impl<'a> Guide<'a> {
                 (4 * starts).max(8)
             );
         }
-        self.error_then(reduced_chi2, error, mostly, "compare", "to see where the model fails")
+        self.error_then(
+            reduced_chi2,
+            error,
+            mostly,
+            "compare",
+            "to see where the model fails",
+        )
     }
 
     /// After `compare`. `mostly`: where the error sits.
     pub fn compared(&self, reduced_chi2: f64, error: &ErrorTotals, mostly: Option<String>) -> String {
-        self.error_then(reduced_chi2, error, mostly, "diagnose", "to learn what is missing")
+        self.error_then(
+            reduced_chi2,
+            error,
+            mostly,
+            "diagnose",
+            "to learn what is missing",
+        )
     }
 
     fn error_then(
@@ -126,7 +138,10 @@ impl<'a> Guide<'a> {
     /// After `add`.
     pub fn added(&self, progress: Option<bool>, reduced_chi2: f64, error: &ErrorTotals) -> String {
         match progress {
-            Some(false) => format!("this was no progress: run {} to take it back", self.run_here("undo")),
+            Some(false) => format!(
+                "this was no progress: run {} to take it back",
+                self.run_here("undo")
+            ),
             _ if is_noise(reduced_chi2) => format!(
                 "error {}, noise {}: run {} to be sure that nothing else is missing",
                 percent(error.nrms),
@@ -197,7 +212,12 @@ impl<'a> Guide<'a> {
     }
 
     fn no_modes(&self) -> String {
-        let first = self.campaign.frfs.first().map(|f| word(&f.file)).unwrap_or_default();
+        let first = self
+            .campaign
+            .frfs
+            .first()
+            .map(|f| word(&f.file))
+            .unwrap_or_default();
         format!("no mode was found: run `lobestone inspect {first}` to see what the files are like")
     }
 
@@ -263,12 +283,14 @@ pub fn inspected(files: &[(&Path, &'static str)]) -> String {
         );
     }
     match folder_of(&paths) {
-        Folder::Campaign(dir) if has("frf") => format!(
-            "run `lobestone compare {}` to see how its model fits",
+        Folder::Campaign(dir) if has("frf") => {
+            format!("run `lobestone compare {}` to see how its model fits", word(&dir))
+        }
+        Folder::Campaign(dir) => format!("run `lobestone cfc {}` for the cutting coefficients", word(&dir)),
+        Folder::Plain(dir) => format!(
+            "run `lobestone init {}` to make a campaign of the folder",
             word(&dir)
         ),
-        Folder::Campaign(dir) => format!("run `lobestone cfc {}` for the cutting coefficients", word(&dir)),
-        Folder::Plain(dir) => format!("run `lobestone init {}` to make a campaign of the folder", word(&dir)),
     }
 }
 
@@ -366,12 +388,21 @@ mod tests {
         std::fs::create_dir_all(cell.join("frf")).unwrap();
         let (a, b) = (cell.join("frf/p1.uff"), cell.join("force/cut.txt"));
         let plain = inspected(&[(&a, "frf"), (&b, "force")]);
-        assert!(plain.contains(&format!("lobestone init {}`", cell.display())), "{plain}");
+        assert!(
+            plain.contains(&format!("lobestone init {}`", cell.display())),
+            "{plain}"
+        );
         std::fs::write(campaign_file(&cell), "").unwrap();
         let frf = inspected(&[(&a, "frf")]);
-        assert!(frf.contains(&format!("lobestone compare {}`", cell.display())), "{frf}");
+        assert!(
+            frf.contains(&format!("lobestone compare {}`", cell.display())),
+            "{frf}"
+        );
         let force = inspected(&[(&b, "force")]);
-        assert!(force.contains(&format!("lobestone cfc {}`", cell.display())), "{force}");
+        assert!(
+            force.contains(&format!("lobestone cfc {}`", cell.display())),
+            "{force}"
+        );
         let tap = inspected(&[(&b, "time")]);
         assert!(tap.contains("lobestone modal"), "{tap}");
         assert!(inspected(&[(Path::new("a.uff"), "frf")]).contains("lobestone init .`"));

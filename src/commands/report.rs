@@ -54,7 +54,11 @@ pub fn run(args: Args) -> Result<Outcome> {
         .map(|e| format!("a part is missing from the report: {e}"))
         .collect();
     let next = Guide::structure(&campaign).reported(&files.html, missing_effect(&findings).as_deref());
-    Ok(Outcome::new(json, describe(&files) + &warnings(&missing), Some(next)))
+    Ok(Outcome::new(
+        json,
+        describe(&files) + &warnings(&missing),
+        Some(next),
+    ))
 }
 
 /// `effect@site` that the report says is missing.

@@ -11,16 +11,20 @@ use crate::files::write_atomically;
 use crate::{Error, Result};
 
 #[derive(clap::Args)]
-#[command(after_help = "Examples:\n  lobestone completions bash > ~/.local/share/bash-completion/completions/lobestone\n  \
+#[command(
+    after_help = "Examples:\n  lobestone completions bash > ~/.local/share/bash-completion/completions/lobestone\n  \
                         lobestone completions zsh > ~/.zfunc/_lobestone\n  \
                         lobestone completions fish > ~/.config/fish/completions/lobestone.fish\n  \
-                        lobestone completions powershell >> $PROFILE")]
+                        lobestone completions powershell >> $PROFILE"
+)]
 pub struct CompletionArgs {
     shell: Shell,
 }
 
 #[derive(clap::Args)]
-#[command(after_help = "Examples:\n  lobestone man | man -l -\n  lobestone man --out ~/.local/share/man/man1")]
+#[command(
+    after_help = "Examples:\n  lobestone man | man -l -\n  lobestone man --out ~/.local/share/man/man1"
+)]
 pub struct ManArgs {
     /// Write lobestone.1 and a page for each command into this folder, instead of printing the first.
     #[arg(long, value_name = "DIR")]

@@ -212,7 +212,11 @@ mod tests {
         let text = wrapped(&"word ".repeat(30), "  ");
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), 2);
-        assert!(lines.iter().all(|l| l.starts_with("  word") && l.chars().count() <= 100));
+        assert!(
+            lines
+                .iter()
+                .all(|l| l.starts_with("  word") && l.chars().count() <= 100)
+        );
         assert_eq!(wrapped("a\nb", "- "), "- a\n- b\n");
     }
 

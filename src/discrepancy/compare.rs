@@ -280,15 +280,15 @@ impl FrfComparison {
         let by_posture = by_posture.finish();
         let by_direction = by_direction.finish();
         let map = error_map(&by_posture, &by_direction, &edges, &cells);
-        let [mut postures, mut directions, mut nodes] = [Amounts::default(), Amounts::default(), Amounts::default()];
+        let [mut postures, mut directions, mut nodes] =
+            [Amounts::default(), Amounts::default(), Amounts::default()];
         for (posture, direction, node, own) in &by_frf {
             postures.add(posture, excess(own));
             directions.add(direction, excess(own));
             nodes.add(node, excess(own));
         }
         let above: Vec<f64> = bands.iter().map(excess).collect();
-        let mostly =
-            above_noise(&total).then(|| Place::new(&edges, &above, &directions, &postures, &nodes));
+        let mostly = above_noise(&total).then(|| Place::new(&edges, &above, &directions, &postures, &nodes));
         FrfComparison {
             totals: ErrorTotals {
                 nrms: total.nrms(),

@@ -228,11 +228,17 @@ mod tests {
         };
         let tooth = all(|_, axis, order| if order == 6 && axis == "Fy" { 40.0 } else { 1.0 });
         let words = of_cuts(&tooth, true);
-        assert_eq!(words.as_deref(), Some("at 6 times the rotation, in Fy, in all cuts"));
+        assert_eq!(
+            words.as_deref(),
+            Some("at 6 times the rotation, in Fy, in all cuts")
+        );
         assert_eq!(of_cuts(&tooth, false).as_deref(), Some("in Fy, in all cuts"));
         let mean = all(|cut, _, order| if order == 0 && cut == "02" { 40.0 } else { 1.0 });
         let words = of_cuts(&mean, true);
-        assert_eq!(words.as_deref(), Some("in the mean force, in all axes, in cut 02"));
+        assert_eq!(
+            words.as_deref(),
+            Some("in the mean force, in all axes, in cut 02")
+        );
         assert_eq!(of_cuts(&all(|_, _, _| 0.9), true), None);
     }
 }

@@ -28,9 +28,7 @@ impl StructuralEffect for BaseCompliance {
              Check the torque of the anchor bolts first.",
             typical: "A foot plate bolted to a good foundation: above 50 MN·m/rad. Steel frames, pallets and pedestals on shims: \
              2 to 20 MN·m/rad.",
-            sources: &[
-                EWINS,
-            ],
+            sources: &[EWINS],
         }
     }
 

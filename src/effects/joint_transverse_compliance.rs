@@ -29,10 +29,7 @@ impl StructuralEffect for JointTransverseCompliance {
              turn show it, too.",
             typical: "Cross roller and gear bearings of large robots: 1 to 20 MN·m/rad, of the size of the gear's own stiffness \
              or a few times above it.",
-            sources: &[
-                MOBERG,
-                ABELE,
-            ],
+            sources: &[MOBERG, ABELE],
         }
     }
 

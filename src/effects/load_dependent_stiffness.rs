@@ -29,9 +29,7 @@ impl StructuralEffect for LoadDependentStiffness {
              zero and steepens. Or measure FRFs at two postures that load the joint differently and else look alike.",
             typical: "Strain-wave gears gain a factor 1.5 to 4 from small to full torque (makers give three stiffnesses K1, \
              K2, K3). Cycloidal (RV) gears of large robots are nearly straight once their lost motion is taken up.",
-            sources: &[
-                TUTTLE,
-            ],
+            sources: &[TUTTLE],
         }
     }
 

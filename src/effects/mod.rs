@@ -226,7 +226,10 @@ mod tests {
         let structural = STRUCTURAL.map(|e| (e.id(), e.background()));
         let cutting = cutting::CUTTING.map(|e| (e.id(), e.background()));
         for (id, background) in structural.into_iter().chain(cutting) {
-            assert!(background.lab_check.len() > 60 && background.typical.len() > 40, "{id}");
+            assert!(
+                background.lab_check.len() > 60 && background.typical.len() > 40,
+                "{id}"
+            );
             for source in background.sources {
                 let year = source.split(|c: char| !c.is_ascii_digit()).any(|n| n.len() == 4);
                 assert!(year && source.ends_with('.'), "{id}: {source}");

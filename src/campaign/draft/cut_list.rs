@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use super::Answers;
-use super::tables::cut_ids;
 use super::scan::{Scan, stem};
+use super::tables::cut_ids;
 use crate::campaign::suggest::{closest, shown};
 use crate::{Error, InputError, Result};
 
@@ -83,13 +83,15 @@ pub fn read_cut_list(file: &Path, scan: &Scan, answers: &mut Answers) -> Result<
         let row = row.map_err(broken)?;
         let line = row.position().map_or(1, |p| p.line() as usize);
         let name = row[file_column].replace('\\', "/");
-        let is_named = |path: &str| {
-            path == name || path.rsplit('/').next() == Some(&name) || stem(path) == name
-        };
+        let is_named =
+            |path: &str| path == name || path.rsplit('/').next() == Some(&name) || stem(path) == name;
         let mut named = ids.iter().zip(&scan.forces).filter(|(_, f)| is_named(&f.path));
         let (Some((id, _)), None) = (named.next(), named.next()) else {
             return Err(wrong(
-                format!("{:?} names no force record of the folder, or several", shown(&name)),
+                format!(
+                    "{:?} names no force record of the folder, or several",
+                    shown(&name)
+                ),
                 line,
                 "write the file's name, or its path from the folder".into(),
             )

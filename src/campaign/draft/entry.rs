@@ -84,18 +84,21 @@ impl Entry {
     /// As it stands in the file.
     pub fn lines(&self) -> String {
         if self.value.is_empty() {
+            // No value stands there that somebody could leave by mistake.
             let hint = if self.required { "fill in: " } else { "" };
-            let example = match self.kind {
-                Kind::Text | Kind::Choice(_) | Kind::Immersion => quoted(self.example),
-                Kind::Numbers | Kind::Number | Kind::Whole | Kind::Matrix => self.example.to_string(),
-            };
-            return format!("# {hint}{} = {example}  ({})\n", self.key, self.what);
+            return format!(
+                "# {hint}{} = …  # {}, such as {}\n",
+                self.key, self.what, self.example
+            );
         }
         let note = self
             .guessed
             .as_ref()
             .map_or(String::new(), |why| format!("  # guessed: {why}"));
-        let lines = self.value.iter().map(|(key, value)| format!("{key} = {value}{note}\n"));
+        let lines = self
+            .value
+            .iter()
+            .map(|(key, value)| format!("{key} = {value}{note}\n"));
         lines.collect()
     }
 }
@@ -221,6 +224,6 @@ mod tests {
         let mut entry = Entry::new("k", Kind::Number, "what", "1.0");
         entry.guess("x", "why");
         assert!(entry.is_missing());
-        assert_eq!(entry.lines(), "# fill in: k = 1.0  (what)\n");
+        assert_eq!(entry.lines(), "# fill in: k = …  # what, such as 1.0\n");
     }
 }

@@ -31,13 +31,19 @@ impl Answers {
     /// The answer for the table of this name, else the one for all of its kind.
     fn get(&self, kind: &str, name: &str, key: &str) -> Option<&str> {
         let look = |table: &str| self.0.get(&(table.to_string(), key.to_string()));
-        look(&format!("{kind} {name}")).or_else(|| look(kind)).map(String::as_str)
+        look(&format!("{kind} {name}"))
+            .or_else(|| look(kind))
+            .map(String::as_str)
     }
 
     /// Names that answers of this kind were given for: postures, nodes, cuts.
     fn names(&self, kind: &str) -> Vec<&str> {
         let prefix = format!("{kind} ");
-        let mut names: Vec<&str> = self.0.keys().filter_map(|(t, _)| t.strip_prefix(&prefix)).collect();
+        let mut names: Vec<&str> = self
+            .0
+            .keys()
+            .filter_map(|(t, _)| t.strip_prefix(&prefix))
+            .collect();
         names.dedup();
         names
     }
@@ -274,7 +280,10 @@ mod tests {
 
     #[test]
     fn what_the_files_do_not_say_is_missing_once_for_all() {
-        let scan = scan_of(&[("p1", &[1, 2]), ("p2", &[1, 2])], &["cut01_n1200", "cut02_n900"]);
+        let scan = scan_of(
+            &[("p1", &[1, 2]), ("p2", &[1, 2])],
+            &["cut01_n1200", "cut02_n900"],
+        );
         let mut answers = Answers::default();
         answers.set("robot", "model", "irb6640");
         answers.set("cut", "process", "milling");
@@ -293,8 +302,11 @@ mod tests {
             ]
         );
         let text = draft.toml();
-        assert!(text.contains("spindle_rpm = 1200.0  # guessed: from the file name"), "{text}");
-        assert!(text.contains("# fill in: joints_deg = "), "{text}");
+        assert!(
+            text.contains("spindle_rpm = 1200.0  # guessed: from the file name"),
+            "{text}"
+        );
+        assert!(text.contains("# fill in: joints_deg = …"), "{text}");
     }
 
     #[test]
@@ -330,7 +342,11 @@ mod tests {
         ] {
             assert!(text.contains(part), "{part}: {text}");
         }
-        assert!(asked.iter().any(|q| q.contains("spindle speed of cut 01") || q.contains("of cut 01")));
+        assert!(
+            asked
+                .iter()
+                .any(|q| q.contains("spindle speed of cut 01") || q.contains("of cut 01"))
+        );
     }
 
     #[test]
@@ -343,6 +359,9 @@ mod tests {
         let mut answers = Answers::default();
         answers.set("posture p9", "joints_deg", "1 2 3");
         let error = Draft::new("cell", &scan, &answers).unwrap_err().to_string();
-        assert!(error.contains("no posture \"p9\"") && error.contains("p1"), "{error}");
+        assert!(
+            error.contains("no posture \"p9\"") && error.contains("p1"),
+            "{error}"
+        );
     }
 }

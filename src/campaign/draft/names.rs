@@ -19,7 +19,11 @@ pub fn facts_of(text: &str) -> Facts {
     while i < words.len() {
         let (mut letters, mut rest) = split_letters(words[i]);
         // `ap 2`, `n=1200`
-        if rest.is_empty() && words.get(i + 1).is_some_and(|w| w.starts_with(|c: char| c.is_ascii_digit())) {
+        if rest.is_empty()
+            && words
+                .get(i + 1)
+                .is_some_and(|w| w.starts_with(|c: char| c.is_ascii_digit()))
+        {
             letters = words[i];
             rest = words[i + 1];
             i += 1;
@@ -164,7 +168,15 @@ mod tests {
         }
         assert_eq!(list("p3_F200N"), [("force_level_n", "200".to_string())]);
         // Sample numbers and dates are no speeds.
-        for text in ["cut01", "s1", "n2_2021-03-16", "force-9400 cut 01", "sample 12", "ap", "fz0"] {
+        for text in [
+            "cut01",
+            "s1",
+            "n2_2021-03-16",
+            "force-9400 cut 01",
+            "sample 12",
+            "ap",
+            "fz0",
+        ] {
             assert!(list(text).is_empty(), "{text}: {:?}", list(text));
         }
     }

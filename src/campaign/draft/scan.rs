@@ -46,7 +46,8 @@ const MOST_FILES: usize = 5000;
 const DEEPEST: usize = 8;
 /// Endings of files that nobody exports measurements to.
 const OTHERS: [&str; 16] = [
-    "html", "png", "jpg", "jpeg", "pdf", "md", "json", "docx", "xlsx", "zip", "xz", "py", "m", "svg", "parquet", "log",
+    "html", "png", "jpg", "jpeg", "pdf", "md", "json", "docx", "xlsx", "zip", "xz", "py", "m", "svg",
+    "parquet", "log",
 ];
 
 enum Seen {
@@ -200,7 +201,9 @@ fn look(name: String, file: &Path) -> Seen {
     }
     let why = match contents.times.is_empty() {
         true => format!("holds {}", contents.describe()),
-        false => "a time record without cutting forces (a tap test? `lobestone modal` makes FRFs of it)".into(),
+        false => {
+            "a time record without cutting forces (a tap test? `lobestone modal` makes FRFs of it)".into()
+        }
     };
     Seen::NotUsed(name, why)
 }

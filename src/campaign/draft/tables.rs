@@ -111,7 +111,10 @@ fn points(scan: &Scan, answers: &Answers) -> Result<Vec<Table>> {
                 "where it sits: base, link1 to link6, or tool",
                 "link2",
             ),
-            &[(only.then_some("tool"), "the only node, taken for the tool centre point")],
+            &[(
+                only.then_some("tool"),
+                "the only node, taken for the tool centre point",
+            )],
         )?;
         making.add(
             Entry::new(
@@ -199,7 +202,12 @@ fn tool(cuts: &[(Option<String>, Table)], answers: &Answers) -> Result<Table> {
     let kind = processes.first().map(|_| if drill { "drill" } else { "endmill" });
     let mut making = Making::single(answers, "tool");
     making.add(
-        Entry::new("kind", Kind::Choice(&["endmill", "drill"]), "endmill or drill", "endmill"),
+        Entry::new(
+            "kind",
+            Kind::Choice(&["endmill", "drill"]),
+            "endmill or drill",
+            "endmill",
+        ),
         &[(kind, "what the process needs")],
     )?;
     making.add(
@@ -217,7 +225,10 @@ fn tool(cuts: &[(Option<String>, Table)], answers: &Answers) -> Result<Table> {
             &[],
         )?;
         let web = "web thickness, mm: for the chisel edge";
-        making.add(Entry::new("web_thickness_mm", Kind::Number, web, "1.4").optional(), &[])?;
+        making.add(
+            Entry::new("web_thickness_mm", Kind::Number, web, "1.4").optional(),
+            &[],
+        )?;
     } else {
         let helix = "helix angle, degrees (0: straight teeth)";
         making.add(Entry::new("helix_deg", Kind::Number, helix, "30.0"), &[])?;
@@ -248,13 +259,17 @@ pub(super) fn cut_ids(forces: &[FoundForce]) -> Vec<String> {
     let number = |force: &FoundForce| -> String {
         let name = stem(&force.path);
         let first = name.split(['_', '-', ' ']).next().unwrap_or(name);
-        first.trim_start_matches(|c: char| !c.is_ascii_digit()).to_string()
+        first
+            .trim_start_matches(|c: char| !c.is_ascii_digit())
+            .to_string()
     };
     let unique = |ids: &[String]| {
         let plain = |id: &String| !id.is_empty() && id.bytes().all(|b| b.is_ascii_digit());
         ids.iter().all(plain) && ids.iter().collect::<BTreeSet<_>>().len() == ids.len()
     };
-    let names = |name: fn(&str) -> &str| -> Vec<String> { forces.iter().map(|f| name(&f.path).to_string()).collect() };
+    let names = |name: fn(&str) -> &str| -> Vec<String> {
+        forces.iter().map(|f| name(&f.path).to_string()).collect()
+    };
     let numbers: Vec<String> = forces.iter().map(number).collect();
     if unique(&numbers) {
         return numbers;
@@ -291,7 +306,12 @@ fn cuts(scan: &Scan, answers: &Answers) -> Result<Vec<(Option<String>, Table)>> 
         };
         let [header, name] = said("process");
         making.add(
-            Entry::new("process", Kind::Choice(PROCESSES), "process: milling or drilling", "milling"),
+            Entry::new(
+                "process",
+                Kind::Choice(PROCESSES),
+                "process: milling or drilling",
+                "milling",
+            ),
             &[header, name, (concluded, "from what else was given")],
         )?;
         let process = making.table.entries.last().and_then(Entry::value_text);
@@ -303,8 +323,13 @@ fn cuts(scan: &Scan, answers: &Answers) -> Result<Vec<(Option<String>, Table)>> 
         let entries = match process.as_deref() {
             Some("drilling") => vec![
                 Entry::new("feed_per_rev_mm", Kind::Number, "feed per revolution, mm", "0.1"),
-                Entry::new("pilot_diameter_mm", Kind::Number, "pilot hole's diameter, mm (0: none)", "0.0")
-                    .optional(),
+                Entry::new(
+                    "pilot_diameter_mm",
+                    Kind::Number,
+                    "pilot hole's diameter, mm (0: none)",
+                    "0.0",
+                )
+                .optional(),
                 Entry::new("hole_depth_mm", Kind::Number, "depth at full diameter, mm", "8.0").optional(),
             ],
             _ => vec![
@@ -325,7 +350,13 @@ fn cuts(scan: &Scan, answers: &Answers) -> Result<Vec<(Option<String>, Table)>> 
         for entry in [
             Entry::new("order", Kind::Whole, "when this cut was made: 1, 2, …", "1").optional(),
             Entry::new("material", Kind::Text, "workpiece", "C45").optional(),
-            Entry::new("outcome", Kind::Choice(&["stable", "chatter"]), "how it went", "stable").optional(),
+            Entry::new(
+                "outcome",
+                Kind::Choice(&["stable", "chatter"]),
+                "how it went",
+                "stable",
+            )
+            .optional(),
         ] {
             if answers.get("cut", &id, entry.key).is_some() {
                 making.add(entry, &[])?;

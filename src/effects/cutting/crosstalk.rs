@@ -28,9 +28,7 @@ impl CuttingEffect for Crosstalk {
              The plate must be level and the screws tightened as for cutting.",
             typical: "Makers of piezoelectric dynamometers promise 2 % or less between axes; loose screws or a workpiece that \
              overhangs give 5 to 10 %.",
-            sources: &[
-                GAUTSCHI,
-            ],
+            sources: &[GAUTSCHI],
         }
     }
 

@@ -24,9 +24,7 @@ impl CuttingEffect for MarginFriction {
              deep and a shallow hole.",
             typical: "Torque grows by 2 to 10 % for each diameter of depth, far more once the flutes pack with chips (beyond \
              about three diameters without pecking).",
-            sources: &[
-                SHAW_OXFORD,
-            ],
+            sources: &[SHAW_OXFORD],
         }
     }
 

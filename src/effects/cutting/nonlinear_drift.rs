@@ -33,9 +33,7 @@ impl CuttingEffect for NonlinearDrift {
              and the plugs are dry.",
             typical: "Leakage of a charge amplifier: 0.03 to 0.07 pC/s (about 0.01 N/s) when clean; thermal drift while cutting \
              0.1 to 5 N/s; amplifier time constants of 1 to 100 s on SHORT and MEDIUM.",
-            sources: &[
-                GAUTSCHI,
-            ],
+            sources: &[GAUTSCHI],
         }
     }
 

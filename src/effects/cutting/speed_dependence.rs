@@ -24,10 +24,7 @@ impl CuttingEffect for SpeedDependence {
              compare the mean forces.",
             typical: "Exponent q of 0 to 0.2: forces fall by up to 15 % when the speed doubles. Built-up edge at low speed in \
              steel and aluminium can turn the sign.",
-            sources: &[
-                ALTINTAS,
-                BUDAK,
-            ],
+            sources: &[ALTINTAS, BUDAK],
         }
     }
 

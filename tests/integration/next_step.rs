@@ -29,7 +29,7 @@ fn follow(step: &str) -> Value {
 fn following_the_steps_leads_through_the_loop() {
     let folder = copy_of("frf-9114");
     let dir = folder.path().to_str().unwrap();
-    let file = folder.path().join("frf/p1.uff");
+    let file = folder.path().join("frf/p1.csv");
     let file = file.to_str().unwrap();
     assert!(next("inspect", file, &[]).contains(&format!("`lobestone compare {dir}`")));
     assert!(next("modal", dir, &[]).contains(&format!("`lobestone calibrate {dir}`")));

@@ -167,10 +167,10 @@ impl Draft {
         for missing in self.missing() {
             if missing.of.len() > 1 {
                 let question = format!(
-                    "{} of all {} {}s (empty: one by one)",
-                    missing.what,
+                    "all {} {}s: {} (empty: one by one)",
                     missing.of.len(),
-                    missing.table
+                    missing.table,
+                    missing.what
                 );
                 // Postures and points differ from each other; cuts and files often do not.
                 let alike = ["cut", "frf"].contains(&missing.table);
@@ -181,7 +181,7 @@ impl Draft {
             for name in &missing.of {
                 let question = match name.is_empty() {
                     true => missing.what.to_string(),
-                    false => format!("{} of {} {name}", missing.what, missing.table),
+                    false => format!("{} {name}: {}", missing.table, missing.what),
                 };
                 self.put(&missing, std::slice::from_ref(name), &question, ask)?;
             }
@@ -324,8 +324,8 @@ mod tests {
                     q if q.contains("number of teeth") && asked.len() < 6 => "many",
                     q if q.contains("teeth") => "6",
                     q if q.contains("immersion") => "0 90",
-                    q if q.contains("spindle speed of all") => "",
-                    q if q.contains("cut 02") => "900,5",
+                    q if q.starts_with("all 2 cuts: spindle speed") => "",
+                    q if q.starts_with("cut 02: spindle speed") => "900,5",
                     _ => "2",
                 };
                 Ok(answer.to_string())
@@ -342,11 +342,9 @@ mod tests {
         ] {
             assert!(text.contains(part), "{part}: {text}");
         }
-        assert!(
-            asked
-                .iter()
-                .any(|q| q.contains("spindle speed of cut 01") || q.contains("of cut 01"))
-        );
+        assert!(asked.iter().any(|q| q.starts_with("cut 01: spindle speed")));
+        let twice = asked.iter().filter(|q| q.contains("number of teeth"));
+        assert_eq!(twice.count(), 2, "asked again after \"many\"");
     }
 
     #[test]

@@ -293,7 +293,7 @@ fn describe(file: &std::path::Path, scan: &Scan, draft: &Draft, missing: &[Missi
     if !guessed.is_empty() {
         let rows: Vec<Vec<String>> = guessed
             .into_iter()
-            .map(|(kind, what, why, names)| vec![what, of(&kind, &names), why])
+            .map(|(kind, what, why, names)| vec![what, why, of(&kind, &names)])
             .collect();
         text += &format!(
             "\nguessed: check these\n{}",
@@ -303,7 +303,7 @@ fn describe(file: &std::path::Path, scan: &Scan, draft: &Draft, missing: &[Missi
     if !missing.is_empty() {
         let rows: Vec<Vec<String>> = missing
             .iter()
-            .map(|m| vec![m.key.to_string(), of(m.table, &m.of), m.what.to_string()])
+            .map(|m| vec![m.key.to_string(), m.what.to_string(), of(m.table, &m.of)])
             .collect();
         let title = Emphasis::Doubtful.on("still to fill in (comments \"# fill in\" in the file)");
         text += &format!(

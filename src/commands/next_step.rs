@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::text::percent;
+use super::text::{number, percent};
 use crate::campaign::{Campaign, campaign_file};
 use crate::discrepancy::Verdict;
 use crate::discrepancy::compare::ErrorTotals;
@@ -114,8 +114,15 @@ impl<'a> Guide<'a> {
         if is_noise(reduced_chi2) {
             return format!("{errors}: what is left is noise, and {}", self.use_it());
         }
-        let mostly = mostly.map_or(String::new(), |m| format!(", mostly {m}"));
-        format!("{errors}{mostly}: run {} {purpose}", self.run_here(command))
+        let mut place = mostly.map_or(String::new(), |m| format!(", mostly {m}"));
+        if error.nrms < 1.1 * error.noise_floor_nrms {
+            // The sum does not show it: lines beside the steady waveform, or many small errors of one kind.
+            place = format!(
+                ", but the misfit is {} times that of noise",
+                number(reduced_chi2, 2)
+            ) + &place;
+        }
+        format!("{errors}{place}: run {} {purpose}", self.run_here(command))
     }
 
     /// After `diagnose`. `winner`: `effect@site` where one is missing.
@@ -127,11 +134,17 @@ impl<'a> Guide<'a> {
                 effect_of(label)
             ),
             (Verdict::None, _) => format!("nothing is missing: {}", self.use_it()),
-            _ => format!(
-                "measure {}; list it in campaign.toml, then run {} again",
-                measurement.strip_prefix("measure ").unwrap_or(measurement),
-                self.run_here("diagnose")
-            ),
+            _ => {
+                let verb = match self.side {
+                    Domain::Structure => "measure",
+                    Domain::Cutting => "make",
+                };
+                format!(
+                    "{verb} {}; list it in campaign.toml, then run {} again",
+                    measurement.strip_prefix("measure ").unwrap_or(measurement),
+                    self.run_here("diagnose")
+                )
+            }
         }
     }
 

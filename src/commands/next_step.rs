@@ -71,20 +71,26 @@ impl<'a> Guide<'a> {
         error: &ErrorTotals,
         mostly: Option<String>,
     ) -> String {
-        if !converged {
+        if !converged && is_noise(reduced_chi2) {
             return format!(
                 "the fit did not converge: run `lobestone calibrate {} --starts {}`",
                 word(&self.campaign.dir),
                 (4 * starts).max(8)
             );
         }
-        self.error_then(
-            reduced_chi2,
-            error,
-            mostly,
-            "compare",
-            "to see where the model fails",
-        )
+        // Where physics is missing more starts are of no use.
+        let doubt = match converged {
+            true => "",
+            false => "the fit did not converge, as happens where physics is missing; ",
+        };
+        doubt.to_string()
+            + &self.error_then(
+                reduced_chi2,
+                error,
+                mostly,
+                "compare",
+                "to see where the model fails",
+            )
     }
 
     /// After `compare`. `mostly`: where the error sits.

@@ -22,7 +22,7 @@ fn structure(c: &mut Criterion) {
         b.iter(|| StructureCase::load(&campaign))
     });
     group.bench_function("calibrate_6_postures_54_frfs_218_lines", |b| {
-        b.iter(|| calibrate(&case.model, &case.data, Options::default()))
+        b.iter(|| calibrate(&case.model, &case.data, None, Options::default()))
     });
     let theta = case.model.nominal_theta();
     // One element is one FRF at one line.

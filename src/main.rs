@@ -9,17 +9,16 @@ fn main() -> ExitCode {
     let as_json = cli.json;
     match commands::run(cli) {
         Ok(outcome) => {
-            let text = if as_json {
-                format!("{:#}\n", outcome.json)
-            } else {
-                outcome.text
-            };
             // A closed pipe (`lobestone … | head`) is no failure of ours.
-            let _ = std::io::stdout().write_all(text.as_bytes());
+            let _ = match as_json {
+                true => std::io::stdout().write_all(format!("{:#}\n", outcome.json).as_bytes()),
+                // Colours go to a terminal only, and not where NO_COLOR is set.
+                false => anstream::stdout().write_all(outcome.text.as_bytes()),
+            };
             ExitCode::SUCCESS
         }
         Err(error) => {
-            eprintln!("error: {error}");
+            anstream::eprintln!("{} {error}", commands::error_label());
             ExitCode::FAILURE
         }
     }

@@ -65,6 +65,14 @@ impl Campaign {
         }
         Document::read(&file)?.parse(&TOP, |top| read(dir, top))
     }
+
+    /// As [`load`](Self::load), of a text that is not written yet.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub fn from_text(dir: &Path, text: &str) -> Result<Campaign> {
+        Document::from_text(&campaign_file(dir), text).parse(&TOP, |top| read(dir, top))
+    }
 }
 
 fn no_campaign(dir: &Path, file: &Path) -> InputError {

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 pub mod bounds;
 pub mod document;
+pub mod draft;
 pub mod frf_set;
 mod load;
 mod lobes_section;

@@ -1,7 +1,8 @@
 use serde_json::{Value, json};
 
 use super::calibrate::describe_parameters;
-use super::text::{number, percent, table, warnings};
+use super::next_step::Guide;
+use super::text::{Emphasis, number, percent, table, warnings, wrapped};
 use super::{CampaignArg, Outcome};
 use crate::Result;
 use crate::analysis::Addition;
@@ -32,10 +33,11 @@ pub fn run(args: Args) -> Result<Outcome> {
             parameters,
             folds: "cuts",
         };
-        return Ok(Outcome {
-            json: document("cutting", instance.effect.id(), None, variant, &addition),
-            text: describe(&campaign, &addition, &plain),
-        });
+        return Ok(Outcome::new(
+            document("cutting", instance.effect.id(), None, variant, &addition),
+            describe(&addition, &plain),
+            Some(next_step(Guide::cutting(&campaign), &addition)),
+        ));
     }
     let addition = Addition::run(&campaign, &args.effect, Options::default())?;
     let Extension { instance, after, .. } = &addition.extension;
@@ -46,16 +48,17 @@ pub fn run(args: Args) -> Result<Outcome> {
         parameters: describe_parameters(&after.model, &after.calibration),
         folds: "postures",
     };
-    Ok(Outcome {
-        json: document(
+    Ok(Outcome::new(
+        document(
             "structure",
             instance.effect.id(),
             instance.site.label(),
             variant,
             &addition,
         ),
-        text: describe(&campaign, &addition, &plain),
-    })
+        describe(&addition, &plain),
+        Some(next_step(Guide::structure(&campaign), &addition)),
+    ))
 }
 
 /// What a person is told of the effect.
@@ -129,7 +132,12 @@ fn side<M>(fitted: &Fitted<M>) -> Value {
     })
 }
 
-fn describe<M, I>(campaign: &Campaign, addition: &Addition<M, I>, plain: &Plain) -> String {
+fn next_step<M, I>(guide: Guide<'_>, addition: &Addition<M, I>) -> String {
+    let Extension { after, progress, .. } = &addition.extension;
+    guide.added(*progress, after.calibration.reduced_chi2, &addition.totals)
+}
+
+fn describe<M, I>(addition: &Addition<M, I>, plain: &Plain) -> String {
     let Addition {
         revision,
         extension,
@@ -143,10 +151,10 @@ fn describe<M, I>(campaign: &Campaign, addition: &Addition<M, I>, plain: &Plain)
         progress,
         ..
     } = extension;
-    let dir = campaign.dir.display();
     let mut text = format!(
-        "revision {revision}: + {}\n  {}\n\n",
-        plain.title, plain.explanation
+        "revision {revision}: + {}\n{}\n",
+        Emphasis::Strong.on(&plain.title),
+        wrapped(plain.explanation, "  ")
     );
     text += &plain.parameters;
     text += &format!(
@@ -164,17 +172,13 @@ fn describe<M, I>(campaign: &Campaign, addition: &Addition<M, I>, plain: &Plain)
         );
     }
     text += &warnings(notes);
-    text += "\n";
-    text += &match progress {
-        Some(false) => format!(
-            "THIS IS NOT PROGRESS: the error on {} left out of the fit did not fall by more than chance would let \
-             it. The revision is recorded all the same; undo it with: lobestone undo {dir}\n",
+    if *progress == Some(false) {
+        text += &format!(
+            "{}: the error on {} left out of the fit did not fall by more than chance would let it. The revision is \
+             recorded all the same.\n",
+            Emphasis::Bad.on("THIS IS NOT PROGRESS"),
             plain.folds
-        ),
-        _ if totals.nrms > 1.1 * totals.noise_floor_nrms => {
-            format!("More than noise is left. See what else is missing: lobestone diagnose {dir}\n")
-        }
-        _ => format!("What is left is noise. See the error fall: lobestone history {dir}\n"),
-    };
+        );
+    }
     text
 }

@@ -1,11 +1,12 @@
 use serde_json::json;
 
-use super::text::{number, percent, table, warnings};
+use super::next_step::Guide;
+use super::text::{Emphasis, number, percent, table, warnings};
 use super::{CampaignArg, Outcome};
 use crate::Result;
 use crate::analysis::StructureAnalysis;
 use crate::campaign::Campaign;
-use crate::discrepancy::FrfComparison;
+use crate::discrepancy::place::Place;
 use crate::identify::{Calibration, Options, StructureCase, StructureModel};
 
 #[derive(clap::Args)]
@@ -79,15 +80,21 @@ pub fn run(args: Args) -> Result<Outcome> {
         percent(after.totals.nrms),
         percent(after.totals.noise_floor_nrms),
         if calibration.converged {
-            "converged"
+            "converged".to_string()
         } else {
-            "NOT converged"
+            Emphasis::Bad.on("NOT converged")
         },
         calibration.iterations,
     );
     text += &warnings(notes);
-    text += &next_step(&campaign, after);
-    Ok(Outcome { json, text })
+    let next = Guide::structure(&campaign).calibrated(
+        calibration.converged,
+        args.starts,
+        calibration.reduced_chi2,
+        &after.totals,
+        after.mostly.as_ref().map(Place::words),
+    );
+    Ok(Outcome::new(json, text, Some(next)))
 }
 
 /// The fitted parameters as a table. Of an effect the robot file says nothing.
@@ -126,16 +133,4 @@ pub fn describe_parameters(model: &StructureModel, calibration: &Calibration) ->
         ],
         &rows,
     )
-}
-
-fn next_step(campaign: &Campaign, after: &FrfComparison) -> String {
-    let dir = campaign.dir.display();
-    if after.totals.nrms > 1.1 * after.totals.noise_floor_nrms {
-        format!(
-            "\nThe model leaves more than noise. See where it fails: lobestone compare {dir}; what is missing: \
-             lobestone diagnose {dir}\n"
-        )
-    } else {
-        format!("\nWhat is left is noise. Next: lobestone lobes {dir}, or lobestone report {dir}\n")
-    }
 }

@@ -2,6 +2,8 @@ use std::fmt::Write;
 
 use serde_json::json;
 
+use super::next_step::Guide;
+use super::text::Emphasis;
 use super::{CampaignArg, Outcome};
 use crate::Result;
 use crate::analysis::cutting::waveform_groups;
@@ -33,10 +35,11 @@ pub fn run(args: Args) -> Result<Outcome> {
     let mut result = cutting::identify_forces(&campaign, options)?;
     let (waveforms, warnings) = waveform_groups(&campaign, &result);
     result.warnings.extend(warnings);
-    Ok(Outcome {
-        json: document(&campaign, &result, &waveforms),
-        text: text(&campaign, &result),
-    })
+    Ok(Outcome::new(
+        document(&campaign, &result, &waveforms),
+        text(&campaign, &result),
+        Some(Guide::cutting(&campaign).coefficients()),
+    ))
 }
 
 fn document(campaign: &Campaign, result: &CfcResult, waveforms: &[serde_json::Value]) -> serde_json::Value {
@@ -114,7 +117,7 @@ fn text(campaign: &Campaign, result: &CfcResult) -> String {
     if result.warnings.is_empty() {
         out.push_str("No warnings.\n");
     } else {
-        out.push_str("Warnings\n");
+        let _ = writeln!(out, "{}", Emphasis::Doubtful.on("Warnings"));
         for warning in &result.warnings {
             let _ = writeln!(out, "  - {}", warning.replace('\n', "\n    "));
         }

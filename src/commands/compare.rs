@@ -1,6 +1,7 @@
 use serde_json::{Map, Value, json};
 
-use super::text::{bar, number, percent, table, warnings};
+use super::next_step::Guide;
+use super::text::{Emphasis, error_bar, number, percent, table, warnings};
 use super::{CampaignArg, Domain, Outcome, by_domain};
 use crate::Result;
 use crate::analysis::mode_comparison::{ModePair, compare_modes};
@@ -8,6 +9,7 @@ use crate::analysis::{CuttingAnalysis, StructureAnalysis};
 use crate::campaign::Campaign;
 use crate::discrepancy::compare::{ErrorMap, Group};
 use crate::discrepancy::compare_cutting::Harmonic;
+use crate::discrepancy::place::Place;
 use crate::discrepancy::{FrfComparison, FrfError};
 use crate::identify::Options;
 use crate::identify::structure_study::{ResidualPeak, held_out_postures, residual_peaks};
@@ -42,15 +44,15 @@ fn cutting(campaign: &Campaign) -> Result<Outcome> {
         "by_order": object(&c.by_order),
         "by_harmonic": c.by_harmonic,
         "cuts": c.cuts,
+        "mostly": c.mostly,
         "parameters": analysis.calibration.parameters,
         "chi2_per_value": analysis.calibration.reduced_chi2,
         "converged": analysis.calibration.converged,
         "warnings": analysis.warnings,
     });
-    Ok(Outcome {
-        json,
-        text: describe_cutting(&analysis),
-    })
+    let next =
+        Guide::cutting(campaign).compared(analysis.calibration.reduced_chi2, &c.totals, c.mostly.clone());
+    Ok(Outcome::new(json, describe_cutting(&analysis), Some(next)))
 }
 
 fn describe_cutting(analysis: &CuttingAnalysis) -> String {
@@ -132,19 +134,23 @@ fn structure(campaign: &Campaign) -> Result<Outcome> {
         "by_band": comparison.by_band,
         "map": comparison.map,
         "modes": modes,
+        "mostly": comparison.mostly,
         "residual_peaks_hz": peaks.iter().map(|p| p.frequency_hz).collect::<Vec<_>>(),
         "residual_peaks": peaks,
         "worst_frfs": comparison.worst_first().iter().take(10).map(|&i| frf(&comparison.frf_errors[i])).collect::<Vec<_>>(),
         "converged": calibration.converged,
         "warnings": notes,
     });
-    Ok(Outcome {
-        json,
-        text: format!("model: {}\n", case.model_description())
-            + &describe(comparison, held_out, &peaks)
-            + &mode_table(&modes)
-            + &warnings(&notes),
-    })
+    let next = Guide::structure(campaign).compared(
+        calibration.reduced_chi2,
+        &comparison.totals,
+        comparison.mostly.as_ref().map(Place::words),
+    );
+    let text = format!("model: {}\n", case.model_description())
+        + &describe(comparison, held_out, &peaks)
+        + &mode_table(&modes)
+        + &warnings(&notes);
+    Ok(Outcome::new(json, text, Some(next)))
 }
 
 fn frf(error: &FrfError) -> Value {
@@ -171,9 +177,16 @@ fn group_tables(kinds: &[(&str, &Vec<Group>)]) -> String {
         let largest = groups.iter().map(|g| g.nrms).fold(0.0, f64::max);
         let rows: Vec<Vec<String>> = groups
             .iter()
-            .map(|g| vec![g.name.clone(), percent(g.nrms), bar(g.nrms, largest)])
+            .map(|g| {
+                vec![
+                    g.name.clone(),
+                    percent(g.nrms),
+                    percent(g.noise_floor_nrms),
+                    error_bar(g.nrms, g.noise_floor_nrms, largest),
+                ]
+            })
             .collect();
-        text += &format!("\n{}", table(&[title, "nrms", ""], &rows));
+        text += &format!("\n{}", table(&[title, "nrms", "noise", ""], &rows));
     }
     text
 }
@@ -214,7 +227,7 @@ fn describe(comparison: &FrfComparison, held_out: Option<f64>, peaks: &[Residual
                 percent(b.nrms),
                 percent(b.noise_floor_nrms),
                 format!("{times:.1}"),
-                bar(times, largest),
+                error_bar(times, if b.noise_floor_nrms > 0.0 { 1.0 } else { 0.0 }, largest),
             ]
         })
         .collect();
@@ -285,12 +298,12 @@ const DIRECTIONS_A_LINE: usize = 5;
 /// The error map at a glance: a row a posture, a block a direction, a character a band.
 fn grid(map: &ErrorMap) -> String {
     let shade = |value: &Option<f64>| match value {
-        None => ' ',
-        Some(v) => SHADES
-            .iter()
-            .rev()
-            .find(|(from, _)| v >= from)
-            .map_or('·', |s| s.1),
+        None => " ".to_string(),
+        Some(v) => {
+            let shades = SHADES.iter().rev();
+            let character = shades.clone().find(|(from, _)| v >= from).map_or('·', |s| s.1);
+            Emphasis::of_times_noise(*v).on(character)
+        }
     };
     let bands = map.band_edges_hz.len().saturating_sub(1);
     let width = map.postures.iter().map(|p| p.chars().count()).max().unwrap_or(0);

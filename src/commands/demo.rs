@@ -177,10 +177,11 @@ pub fn run(args: Args) -> Result<Outcome> {
     let mut json = report::document(&files);
     json["steps"] = json!(story.steps);
     json["dir"] = json!(dir);
-    Ok(Outcome {
-        text: describe(&story.steps, &files.html),
-        json,
-    })
+    let next = format!(
+        "open {} in a browser, then begin with your own files: run `lobestone init FOLDER`",
+        files.html.display()
+    );
+    Ok(Outcome::new(json, describe(&story.steps), Some(next)))
 }
 
 /// Makes the folder, or takes one that an earlier demo made.
@@ -372,7 +373,7 @@ fn case_study(t: &ThesisFindings) -> String {
     )
 }
 
-fn describe(steps: &[Step], html: &Path) -> String {
+fn describe(steps: &[Step]) -> String {
     let mut text = String::from("Lobestone demo: simulated campaigns, every step as its command does it\n");
     for step in steps {
         text += &format!(
@@ -381,5 +382,5 @@ fn describe(steps: &[Step], html: &Path) -> String {
         );
     }
     let total: f64 = steps.iter().map(|s| s.seconds).sum();
-    text + &format!("\nDone in {total:.1} s. Now open {}\n", html.display())
+    text + &format!("\nDone in {total:.1} s.\n")
 }

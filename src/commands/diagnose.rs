@@ -1,6 +1,7 @@
 use serde_json::{Map, Value, json};
 
-use super::text::{number, percent, table, warnings};
+use super::next_step::Guide;
+use super::text::{Emphasis, number, percent, table, warnings, wrapped};
 use super::{CampaignArg, Domain, Outcome, by_domain};
 use crate::Result;
 use crate::analysis::{CuttingFindings, DiagnosisFindings};
@@ -59,11 +60,11 @@ fn cutting(campaign: &Campaign) -> Result<Outcome> {
     text += &answer(&d, |c| {
         (c.instance.effect.explanation(), c.instance.effect.fingerprint())
     });
-    text += &rest(campaign, &d, &next_measurement);
-    Ok(Outcome {
-        json,
-        text: text + &warnings(&case.warnings),
-    })
+    text += &rest(&d, &next_measurement);
+    text += &warnings(&case.warnings);
+    let winner = d.winner().map(Candidate::label);
+    let next = Guide::cutting(campaign).diagnosed(d.verdict, winner.as_deref(), &next_measurement);
+    Ok(Outcome::new(json, text, Some(next)))
 }
 
 fn baseline(b: &Baseline, noise_floor_nrms: f64) -> Value {
@@ -103,10 +104,11 @@ fn structure(campaign: &Campaign) -> Result<Outcome> {
         "not_tried": diagnosis.not_tried.iter().map(|(e, why)| json!({ "effect": e, "why": why })).collect::<Vec<_>>(),
         "warnings": case.warnings,
     });
-    let text = format!("model: {}\n", case.model_description())
-        + &describe(campaign, &findings)
-        + &warnings(&case.warnings);
-    Ok(Outcome { json, text })
+    let text =
+        format!("model: {}\n", case.model_description()) + &describe(&findings) + &warnings(&case.warnings);
+    let winner = diagnosis.winner().map(Candidate::label);
+    let next = Guide::structure(campaign).diagnosed(diagnosis.verdict, winner.as_deref(), next_measurement);
+    Ok(Outcome::new(json, text, Some(next)))
 }
 
 /// The effect's own parameters by the keys of the contract; `name[0]`, `name[1]`, … become one list.
@@ -181,7 +183,7 @@ fn explains(findings: &DiagnosisFindings) -> Value {
     json
 }
 
-fn describe(campaign: &Campaign, findings: &DiagnosisFindings) -> String {
+fn describe(findings: &DiagnosisFindings) -> String {
     let DiagnosisFindings {
         case,
         diagnosis: d,
@@ -198,9 +200,9 @@ fn describe(campaign: &Campaign, findings: &DiagnosisFindings) -> String {
             Verdict::Unknown => format!("The best candidate, {},", candidate.label()),
             _ => "It".into(),
         };
-        text += &format!("  {}\n", leading.explained.sentence(&who));
+        text += &wrapped(&leading.explained.sentence(&who), "  ");
     }
-    text + &rest(campaign, d, next_measurement)
+    text + &rest(d, next_measurement)
 }
 
 fn as_it_stands(baseline: &Baseline, noise_floor_nrms: f64) -> String {
@@ -222,17 +224,25 @@ fn answer<M, I>(
         (Verdict::Effect, Some(winner)) => {
             let (explanation, fingerprint) = plainly(winner);
             format!(
-                "MISSING: {} ({sure})\n  {explanation}\n  How it shows: {fingerprint}\n",
-                winner.label()
+                "{} ({sure})\n{}{}",
+                Emphasis::Strong.on(format!("MISSING: {}", winner.label())),
+                wrapped(explanation, "  "),
+                wrapped(&format!("How it shows: {fingerprint}"), "  "),
             )
         }
-        (Verdict::None, _) => format!("NOTHING is missing: what is left looks like noise ({sure})\n"),
-        _ => format!("UNKNOWN: what is left is real, but no effect of the library explains it ({sure})\n"),
+        (Verdict::None, _) => format!(
+            "{} is missing: what is left looks like noise ({sure})\n",
+            Emphasis::Good.on("NOTHING")
+        ),
+        _ => format!(
+            "{}: what is left is real, but no effect of the library explains it ({sure})\n",
+            Emphasis::Bad.on("UNKNOWN")
+        ),
     }
 }
 
 /// Rivals, candidates and what to do next.
-fn rest<M, I>(campaign: &Campaign, d: &Diagnosis<M, I>, next_measurement: &str) -> String {
+fn rest<M, I>(d: &Diagnosis<M, I>, next_measurement: &str) -> String {
     let mut text = String::new();
     if let Some(companion) = &d.companion {
         text += &format!("  A second effect is likely besides: {companion}\n");
@@ -265,16 +275,9 @@ fn rest<M, I>(campaign: &Campaign, d: &Diagnosis<M, I>, next_measurement: &str) 
         .collect();
     let header = ["candidate", "nrms", "held out", "ΔBIC", "p", "χ²/dof", ""];
     text += &format!(
-        "\n{}\nNext measurement: {}\n",
+        "\n{}\nMost telling further measurement: {}\n",
         table(&header, &rows),
         next_measurement
     );
-    if let Some(winner) = d.winner() {
-        text += &format!(
-            "Next: lobestone add {} {}\n",
-            campaign.dir.display(),
-            winner.label()
-        );
-    }
     text
 }

@@ -1,6 +1,7 @@
 use serde_json::{Value, json};
 
-use super::text::{bar, percent, table, warnings};
+use super::next_step::Guide;
+use super::text::{Emphasis, error_bar, percent, table, warnings};
 use super::{CampaignArg, Domain, Outcome, side};
 use crate::Result;
 use crate::campaign::Campaign;
@@ -22,14 +23,16 @@ pub fn run(args: Args) -> Result<Outcome> {
     let revisions: Vec<&Revision> = log.revisions(domain).collect();
     let undone: Vec<&Revision> = log.undone(domain).collect();
     let dir = campaign.dir.display();
+    let guide = Guide {
+        campaign: &campaign,
+        side: domain,
+    };
     let Some(current) = revisions.last() else {
-        return Ok(Outcome {
-            json: json!({ "domain": domain, "revisions": [], "noise_floor_nrms": null, "undone": [], "warnings": [] }),
-            text: format!(
-                "no effect was added to this campaign's model yet\n\nSee what is missing: lobestone diagnose {dir}; then \
-                 lobestone add {dir} EFFECT[@SITE]\n"
-            ),
-        });
+        return Ok(Outcome::new(
+            json!({ "domain": domain, "revisions": [], "noise_floor_nrms": null, "undone": [], "warnings": [] }),
+            "no effect was added to this campaign's model yet\n".into(),
+            Some(guide.history(None, false)),
+        ));
     };
     let fingerprint = fingerprint(&campaign, domain)?;
     let old: Vec<String> = revisions
@@ -58,7 +61,8 @@ pub fn run(args: Args) -> Result<Outcome> {
         text += &format!("undone: {}\n", titles.join(", "));
     }
     text += &warnings(&notes);
-    Ok(Outcome { json, text })
+    let next = guide.history(Some(current), current.data != fingerprint);
+    Ok(Outcome::new(json, text, Some(next)))
 }
 
 /// One revision for other programs.
@@ -83,9 +87,9 @@ fn describe(revisions: &[&Revision]) -> String {
     let rows: Vec<Vec<String>> = revisions
         .iter()
         .map(|r| {
-            let mut bar = bar(r.nrms, largest);
+            let mut bar = error_bar(r.nrms, r.noise_floor_nrms, largest);
             if r.progress == Some(false) {
-                bar += "  not progress";
+                bar += &format!("  {}", Emphasis::Bad.on("not progress"));
             }
             let times = match r.noise_floor_nrms > 0.0 {
                 true => format!("{:.2}", r.nrms / r.noise_floor_nrms),

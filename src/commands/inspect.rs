@@ -3,7 +3,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::Outcome;
+use super::text::Emphasis;
+use super::{Outcome, next_step};
 use crate::ingest::{
     self, Channel, ChannelRole, Dof, FrfRecord, MeasurementFile, Quantity, TimeRecord, units,
 };
@@ -21,20 +22,24 @@ pub fn run(args: Args) -> Result<Outcome> {
     let mut failures = Vec::new();
     let mut files = Vec::new();
     let mut text = String::new();
+    let mut kinds: Vec<(&Path, &'static str)> = Vec::new();
     for path in &args.files {
         match inspect(path) {
             Ok(seen) => {
                 text.push_str(&seen.text());
                 files.push(seen.json());
+                kinds.push((path, seen.kind));
             }
             Err(error) => failures.push(error),
         }
     }
     match failures.len() {
-        0 => Ok(Outcome {
-            json: json!({ "files": files }),
-            text,
-        }),
+        0 => Ok(Outcome::new(
+            json!({ "files": files }),
+            // The blank line after the last file is that of the next step.
+            text.trim_end().to_string() + "\n",
+            Some(next_step::inspected(&kinds)),
+        )),
         1 => Err(failures.remove(0)),
         n => {
             let list: Vec<String> = failures.iter().map(ToString::to_string).collect();
@@ -122,7 +127,7 @@ impl Seen {
     fn text(&self) -> String {
         let mut text = format!(
             "{}\n  {} ({}): {}\n",
-            self.file.path.display(),
+            Emphasis::Strong.on(self.file.path.display()),
             self.kind,
             self.file.format,
             self.file.why
@@ -145,7 +150,7 @@ impl Seen {
             let _ = writeln!(text, "  {name:a$}  {quantity:b$}  {unit:c$}  {role:d$}  {extent}");
         }
         for warning in &self.warnings {
-            let _ = writeln!(text, "  warning: {warning}");
+            let _ = writeln!(text, "  {} {warning}", Emphasis::Doubtful.on("warning:"));
         }
         text.push('\n');
         text

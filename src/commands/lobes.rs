@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use super::next_step::Guide;
 use super::text::{number, table, warnings};
 use super::{CampaignArg, Outcome};
 use crate::Result;
@@ -21,10 +22,11 @@ pub fn run(args: Args) -> Result<Outcome> {
 
 fn outcome(campaign: &Campaign) -> Result<Outcome> {
     let analysis = LobeAnalysis::run(campaign)?;
-    Ok(Outcome {
-        json: document(&analysis),
-        text: text(&analysis),
-    })
+    Ok(Outcome::new(
+        document(&analysis),
+        text(&analysis),
+        Some(Guide::structure(campaign).lobes()),
+    ))
 }
 
 fn document(analysis: &LobeAnalysis) -> Value {

@@ -14,12 +14,16 @@ mod cfc;
 mod compare;
 mod demo;
 mod diagnose;
+mod explain;
 mod history;
+mod init;
 mod inspect;
 mod lobes;
 mod modal;
 mod model;
+mod next_step;
 mod report;
+mod shell;
 mod simulate;
 mod text;
 mod thesis;
@@ -29,8 +33,24 @@ mod undo;
 pub struct Outcome {
     /// Printed with `--json`.
     pub json: serde_json::Value,
-    /// Printed without.
+    /// Printed without; may be coloured.
     pub text: String,
+}
+
+impl Outcome {
+    /// With the next sensible step: `next_step` in the document, the last line of the text.
+    pub fn new(mut json: serde_json::Value, mut text: String, next_step: Option<String>) -> Self {
+        if let Some(step) = &next_step {
+            text += &format!("\n{} {step}\n", text::Emphasis::Strong.on("Next:"));
+        }
+        json["next_step"] = next_step.into();
+        Outcome { json, text }
+    }
+}
+
+/// What an error message begins with on a terminal.
+pub fn error_label() -> String {
+    text::Emphasis::Bad.on("error:")
 }
 
 #[derive(Parser)]
@@ -52,6 +72,8 @@ pub enum Domain {
 
 #[derive(Subcommand)]
 pub enum Command {
+    /// Make a campaign of a folder of measurement files.
+    Init(Box<init::Args>),
     /// Say what measurement files are: format, channels, units, quality.
     Inspect(inspect::Args),
     /// Cutting force coefficients from dynamometer records.
@@ -66,6 +88,8 @@ pub enum Command {
     Compare(compare::Args),
     /// Which physical effect the model lacks.
     Diagnose(diagnose::Args),
+    /// What an effect is, how it shows, how to check it in the lab.
+    Explain(explain::Args),
     /// Add an effect to the model, refit everything, record a revision.
     Add(add::Args),
     /// The error falling, revision by revision.
@@ -82,6 +106,10 @@ pub enum Command {
     Thesis(thesis::Args),
     /// The whole story on built-in campaigns.
     Demo(demo::Args),
+    /// A script that completes commands and options in your shell.
+    Completions(shell::CompletionArgs),
+    /// The manual page.
+    Man(shell::ManArgs),
 }
 
 /// A command on the side of the campaign that was asked for; without that on what the campaign holds, both sides as two
@@ -99,8 +127,13 @@ fn by_domain(
         None if campaign.frfs.is_empty() => cutting(campaign),
         None => {
             let (structure, cutting) = (structure(campaign)?, cutting(campaign)?);
+            let next_step = &structure.json["next_step"];
             Ok(Outcome {
-                json: serde_json::json!({ "structure": structure.json, "cutting": cutting.json }),
+                json: serde_json::json!({
+                    "next_step": next_step,
+                    "structure": structure.json,
+                    "cutting": cutting.json,
+                }),
                 text: format!("{}\n{}", structure.text, cutting.text),
             })
         }
@@ -125,6 +158,7 @@ pub struct CampaignArg {
 
 pub fn run(cli: Cli) -> Result<Outcome> {
     match cli.command {
+        Command::Init(args) => init::run(*args, cli.json),
         Command::Inspect(args) => inspect::run(args),
         Command::Cfc(args) => cfc::run(args),
         Command::Modal(args) => modal::run(args),
@@ -132,6 +166,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Calibrate(args) => calibrate::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Diagnose(args) => diagnose::run(args),
+        Command::Explain(args) => explain::run(args),
         Command::Add(args) => add::run(args),
         Command::History(args) => history::run(args),
         Command::Undo(args) => undo::run(args),
@@ -140,5 +175,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Simulate(args) => simulate::run(*args),
         Command::Thesis(args) => thesis::run(args),
         Command::Demo(args) => demo::run(args),
+        Command::Completions(args) => shell::completions(args),
+        Command::Man(args) => shell::man(args),
     }
 }

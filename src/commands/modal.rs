@@ -1,13 +1,14 @@
 //! `lobestone modal FILE…|DIR`: modal parameters of FRFs and raw tap tests.
 
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use serde_json::json;
 
 use super::Outcome;
-use super::text::table;
+use super::next_step::{self, Guide};
+use super::text::{Emphasis, table};
 use crate::analysis::{ModalAnalysis, SetModes};
 use crate::campaign::Campaign;
 use crate::modal::{Estimator, Settings, TapSettings};
@@ -78,8 +79,13 @@ pub fn run(args: Args) -> Result<Outcome> {
         block_s: args.block_s,
     };
     let campaign = args.paths.iter().any(|p| p.is_dir());
-    let analysis = match args.paths.as_slice() {
-        [dir] if campaign => ModalAnalysis::of_campaign(&Campaign::load(dir)?, &settings)?,
+    let (analysis, next) = match args.paths.as_slice() {
+        [dir] if campaign => {
+            let campaign = Campaign::load(dir)?;
+            let analysis = ModalAnalysis::of_campaign(&campaign, &settings)?;
+            let next = Guide::structure(&campaign).modes(analysis.mode_count());
+            (analysis, next)
+        }
         _ if campaign => {
             return Err(
                 InputError::new("a campaign folder cannot be mixed with other paths")
@@ -87,12 +93,18 @@ pub fn run(args: Args) -> Result<Outcome> {
                     .into(),
             );
         }
-        files => ModalAnalysis::of_files(files, &settings, &taps)?,
+        files => {
+            let analysis = ModalAnalysis::of_files(files, &settings, &taps)?;
+            let paths: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
+            let next = next_step::modes_of_files(&paths, analysis.mode_count());
+            (analysis, next)
+        }
     };
-    Ok(Outcome {
-        json: document(&analysis, campaign),
-        text: text(&analysis, args.each),
-    })
+    Ok(Outcome::new(
+        document(&analysis, campaign),
+        text(&analysis, args.each),
+        Some(next),
+    ))
 }
 
 fn document(analysis: &ModalAnalysis, campaign: bool) -> serde_json::Value {
@@ -273,7 +285,7 @@ fn text(analysis: &ModalAnalysis, each: bool) -> String {
         );
     }
     if !analysis.warnings.is_empty() {
-        let _ = writeln!(out, "\nwarnings");
+        let _ = writeln!(out, "\n{}", Emphasis::Doubtful.on("warnings"));
         for warning in analysis.warnings.iter().take(MOST_WARNINGS) {
             let _ = writeln!(out, "  {warning}");
         }

@@ -1,5 +1,6 @@
 use serde_json::{Value, json};
 
+use super::next_step::Guide;
 use super::text::{number, table, warnings};
 use super::{CampaignArg, Outcome};
 use crate::campaign::Campaign;
@@ -57,7 +58,8 @@ pub fn run(args: Args) -> Result<Outcome> {
         json["effects"] = case.effects().into();
         json["warnings"] = notes.into();
     }
-    Ok(Outcome { json, text })
+    let next = Guide::structure(&campaign).modelled();
+    Ok(Outcome::new(json, text, Some(next)))
 }
 
 /// Young's modulus that the user asked for, where the model does not bring its own.

@@ -2,10 +2,12 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
+use super::next_step::Guide;
 use super::text::warnings;
 use super::{CampaignArg, Outcome};
 use crate::analysis::{CampaignFindings, ThesisFindings};
 use crate::campaign::Campaign;
+use crate::discrepancy::Candidate;
 use crate::report::campaign::{self, ReportFiles};
 use crate::{Error, Result};
 
@@ -51,10 +53,20 @@ pub fn run(args: Args) -> Result<Outcome> {
         .into_iter()
         .map(|e| format!("a part is missing from the report: {e}"))
         .collect();
-    Ok(Outcome {
+    let next = Guide::structure(&campaign).reported(&files.html, missing_effect(&findings).as_deref());
+    Ok(Outcome::new(
         json,
-        text: describe(&files) + &warnings(&missing),
-    })
+        describe(&files) + &warnings(&missing),
+        Some(next),
+    ))
+}
+
+/// `effect@site` that the report says is missing.
+fn missing_effect(findings: &CampaignFindings<'_>) -> Option<String> {
+    let structure = findings.diagnosis.as_ref().and_then(|d| d.as_ref().ok());
+    let cutting = findings.cutting_diagnosis.as_ref().and_then(|d| d.as_ref().ok());
+    let of_structure = structure.and_then(|d| d.diagnosis.winner().map(Candidate::label));
+    of_structure.or_else(|| cutting.and_then(|d| d.diagnosis.winner().map(Candidate::label)))
 }
 
 /// `html`, `images` and, where they were built in, `tables`.

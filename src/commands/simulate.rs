@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 use serde_json::json;
 
-use super::Outcome;
+use super::{Outcome, next_step};
 use crate::ingest::Quantity;
 use crate::simulate::{
     EffectRequest, FrfFormat, Kind, LabRobot, Layout, StructureScenario, check_target, random, structure,
@@ -117,19 +117,16 @@ pub fn run(args: Args) -> Result<Outcome> {
     let written = lab.write(&args.out, &truth)?;
     let frf_files = lab.files.iter().filter(|f| f.0.starts_with("frf/")).count();
     let dir = written.dir.display();
-    Ok(Outcome {
-        json: json!({
+    Ok(Outcome::new(
+        json!({
             "dir": written.dir,
             "truth": written.truth,
             "seed": args.seed,
             "files": lab.files.iter().map(|f| &f.0).collect::<Vec<_>>(),
         }),
-        text: format!(
-            "{dir}: a simulated campaign, {frf_files} FRF files\n\nNext: lobestone diagnose {dir}\nThen look at what was \
-             hidden: {}\n",
-            written.truth.display()
-        ),
-    })
+        format!("{dir}: a simulated campaign, {frf_files} FRF files\n"),
+        Some(next_step::simulated(&written.dir, &written.truth)),
+    ))
 }
 
 fn scenario(args: &Args) -> Result<StructureScenario> {

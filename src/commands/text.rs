@@ -1,11 +1,69 @@
-//! Plain-text tables for the terminal.
+//! Tables, bars and emphasis for the terminal.
+//!
+//! Texts carry their colours as escape sequences from here on; the stream they are printed to takes them out again where
+//! it is no terminal, or where NO_COLOR is set. Only what [`Emphasis`] adds is coloured: nothing that a file says.
+
+use std::fmt;
+
+use anstyle::{AnsiColor, Style};
+
+/// What a piece of text means to the reader.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Emphasis {
+    /// The answer, in a line full of other things.
+    Strong,
+    /// As it should be.
+    Good,
+    /// To be looked at.
+    Doubtful,
+    /// Wrong.
+    Bad,
+}
+
+impl Emphasis {
+    fn style(self) -> Style {
+        let colour = |c: AnsiColor| Style::new().fg_color(Some(c.into()));
+        match self {
+            Emphasis::Strong => Style::new().bold(),
+            Emphasis::Good => colour(AnsiColor::Green),
+            Emphasis::Doubtful => colour(AnsiColor::Yellow),
+            Emphasis::Bad => colour(AnsiColor::Red),
+        }
+    }
+
+    /// `text` with this emphasis; empty text stays empty.
+    pub fn on(self, text: impl fmt::Display) -> String {
+        let text = text.to_string();
+        let style = self.style();
+        match text.is_empty() {
+            true => text,
+            false => format!("{style}{text}{style:#}"),
+        }
+    }
+
+    /// Of an error in multiples of the noise.
+    pub fn of_times_noise(times: f64) -> Emphasis {
+        match times {
+            t if t < 1.5 => Emphasis::Good,
+            t if t < 10.0 => Emphasis::Doubtful,
+            _ => Emphasis::Bad,
+        }
+    }
+}
+
+/// Characters that a reader sees.
+fn width_of(text: &str) -> usize {
+    anstream::adapter::strip_str(text)
+        .map(|part| part.chars().count())
+        .sum()
+}
 
 /// A table with a header; the first column and those without a heading (bars, remarks) are left-aligned, the others
 /// right-aligned.
 pub fn table(header: &[&str], rows: &[Vec<String>]) -> String {
     let columns = header.len();
     let width = |c: usize| {
-        let cells = rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count());
+        let cells = rows.iter().filter_map(|r| r.get(c)).map(|s| width_of(s));
         cells.chain([header[c].chars().count()]).max().unwrap_or(0)
     };
     let widths: Vec<usize> = (0..columns).map(width).collect();
@@ -13,7 +71,7 @@ pub fn table(header: &[&str], rows: &[Vec<String>]) -> String {
         let mut out = String::from("  ");
         for (c, width) in widths.iter().enumerate() {
             let cell = cells.get(c).map(String::as_str).unwrap_or("");
-            let padding = " ".repeat(width - cell.chars().count());
+            let padding = " ".repeat(width - width_of(cell));
             if c > 0 {
                 out += "  ";
             }
@@ -53,15 +111,62 @@ pub fn percent(share: f64) -> String {
     format!("{} %", number(100.0 * share, 3))
 }
 
-/// A bar as long as the share of `largest`.
+/// Characters of the longest bar.
+const BAR_LENGTH: usize = 20;
+/// Eighths of a character, from one to seven.
+const EIGHTHS: [char; 7] = ['▏', '▎', '▍', '▌', '▋', '▊', '▉'];
+
+/// A bar as long as the share of `largest`; nothing where there is no such share.
 pub fn bar(value: f64, largest: f64) -> String {
     let share = if largest > 0.0 { value / largest } else { 0.0 };
-    "#".repeat((20.0 * share).round() as usize)
+    if !(share > 0.0) {
+        return String::new();
+    }
+    // What is there at all is seen.
+    let eighths = ((8 * BAR_LENGTH) as f64 * share.min(1.0)).round().max(1.0) as usize;
+    let mut bar = "█".repeat(eighths / 8);
+    bar.extend((eighths % 8).checked_sub(1).map(|i| EIGHTHS[i]));
+    bar
+}
+
+/// As [`bar`], coloured by how far the value stands above its noise.
+pub fn error_bar(nrms: f64, noise_floor_nrms: f64, largest: f64) -> String {
+    let bar = bar(nrms, largest);
+    match noise_floor_nrms > 0.0 {
+        true => Emphasis::of_times_noise(nrms / noise_floor_nrms).on(bar),
+        false => bar,
+    }
 }
 
 /// Lines that begin with `warning:`.
 pub fn warnings(warnings: &[String]) -> String {
-    warnings.iter().map(|w| format!("warning: {w}\n")).collect()
+    let label = Emphasis::Doubtful.on("warning:");
+    warnings.iter().map(|w| format!("{label} {w}\n")).collect()
+}
+
+/// Words broken to lines of at most 100 characters, each line after `indent`. Line breaks of the text stay.
+pub fn wrapped(text: &str, indent: &str) -> String {
+    const WIDTH: usize = 100;
+    let mut out = String::new();
+    for paragraph in text.lines() {
+        let mut length = 0;
+        for word in paragraph.split_whitespace() {
+            let longer = length + 1 + width_of(word);
+            if length > 0 && longer + indent.len() <= WIDTH {
+                out += " ";
+                length = longer;
+            } else {
+                if length > 0 {
+                    out += "\n";
+                }
+                out += indent;
+                length = width_of(word);
+            }
+            out += word;
+        }
+        out += "\n";
+    }
+    out
 }
 
 #[cfg(test)]
@@ -76,6 +181,43 @@ mod tests {
         ];
         let text = table(&["name", "value"], &rows);
         assert_eq!(text, "  name  value\n  µ       1.0\n  long  12.25\n");
+    }
+
+    #[test]
+    fn colours_take_no_room_in_a_table() {
+        let rows = [
+            vec!["a".into(), Emphasis::Bad.on("1.0"), Emphasis::Good.on("")],
+            vec!["bb".into(), "12.0".into(), "x".into()],
+        ];
+        let text = table(&["", "value", ""], &rows);
+        assert!(text.contains("\u{1b}[31m1.0\u{1b}[0m"), "{text:?}");
+        let plain = anstream::adapter::strip_str(&text).to_string();
+        assert_eq!(plain, "      value\n  a     1.0\n  bb   12.0  x\n");
+    }
+
+    #[test]
+    fn bars_grow_by_eighths_and_never_vanish() {
+        assert_eq!(bar(1.0, 1.0).chars().count(), BAR_LENGTH);
+        assert_eq!(bar(3.0, 1.0), bar(1.0, 1.0));
+        assert_eq!(bar(0.5, 1.0), "█".repeat(10));
+        assert_eq!(bar(0.525, 1.0), "█".repeat(10) + "▌");
+        assert_eq!(bar(1e-9, 1.0), "▏");
+        for nothing in [bar(0.0, 1.0), bar(1.0, 0.0), bar(f64::NAN, 1.0)] {
+            assert_eq!(nothing, "");
+        }
+    }
+
+    #[test]
+    fn long_text_is_broken_between_words() {
+        let text = wrapped(&"word ".repeat(30), "  ");
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines.len(), 2);
+        assert!(
+            lines
+                .iter()
+                .all(|l| l.starts_with("  word") && l.chars().count() <= 100)
+        );
+        assert_eq!(wrapped("a\nb", "- "), "- a\n- b\n");
     }
 
     #[test]

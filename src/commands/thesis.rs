@@ -13,10 +13,7 @@ pub struct Args {}
 
 pub fn run(_args: Args) -> Result<Outcome> {
     let study = case_study()?;
-    Ok(Outcome {
-        text: describe(&study),
-        json: json!(study),
-    })
+    Ok(Outcome::new(json!(study), describe(&study), None))
 }
 
 fn optional(value: Option<f64>) -> String {

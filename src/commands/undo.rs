@@ -1,6 +1,7 @@
 use serde_json::json;
 
 use super::history::document;
+use super::next_step::Guide;
 use super::text::percent;
 use super::{CampaignArg, Domain, Outcome, side};
 use crate::Result;
@@ -42,5 +43,9 @@ pub fn run(args: Args) -> Result<Outcome> {
             percent(current.nrms)
         );
     }
-    Ok(Outcome { json, text })
+    let guide = Guide {
+        campaign: &campaign,
+        side: domain,
+    };
+    Ok(Outcome::new(json, text, Some(guide.undone())))
 }

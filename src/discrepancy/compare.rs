@@ -3,6 +3,7 @@
 use num_complex::Complex64;
 use serde::Serialize;
 
+use super::place::{Amounts, Place, above_noise, excess};
 use crate::campaign::Point;
 use crate::identify::FrfData;
 
@@ -31,6 +32,7 @@ pub struct Band {
 pub struct Group {
     pub name: String,
     pub nrms: f64,
+    pub noise_floor_nrms: f64,
 }
 
 /// Error of one FRF.
@@ -104,6 +106,8 @@ pub struct FrfComparison {
     pub by_point: Vec<Group>,
     pub by_band: Vec<Band>,
     pub map: ErrorMap,
+    /// Where most of what stands above the noise sits; `None` where nothing does.
+    pub mostly: Option<Place>,
     /// In the order of the data.
     pub frf_errors: Vec<FrfError>,
 }
@@ -179,7 +183,11 @@ impl Groups {
     pub(super) fn finish(self) -> Vec<Group> {
         self.0
             .into_iter()
-            .map(|(name, s)| Group { name, nrms: s.nrms() })
+            .map(|(name, s)| Group {
+                name,
+                nrms: s.nrms(),
+                noise_floor_nrms: s.floor(),
+            })
             .collect()
     }
 }
@@ -222,6 +230,7 @@ impl FrfComparison {
             (Groups::default(), Groups::default(), Groups::default());
         let mut bands = vec![Sums::default(); BANDS];
         let mut frf_errors = Vec::new();
+        let mut by_frf = Vec::new();
         let mut cells: Vec<(String, String, usize, Sums)> = Vec::new();
         for ((block, frf), model) in data.frfs().zip(predicted) {
             let posture = &data.posture_ids[frf.posture];
@@ -251,7 +260,9 @@ impl FrfComparison {
             total.add(own);
             by_posture.add(posture, own);
             by_direction.add(&direction, own);
-            by_point.add(&points[frf.response.point].node.to_string(), own);
+            let node = points[frf.response.point].node.to_string();
+            by_point.add(&node, own);
+            by_frf.push((posture.clone(), direction.clone(), node, own));
             frf_errors.push(FrfError {
                 name: frf.name.clone(),
                 posture: posture.clone(),
@@ -269,6 +280,15 @@ impl FrfComparison {
         let by_posture = by_posture.finish();
         let by_direction = by_direction.finish();
         let map = error_map(&by_posture, &by_direction, &edges, &cells);
+        let [mut postures, mut directions, mut nodes] =
+            [Amounts::default(), Amounts::default(), Amounts::default()];
+        for (posture, direction, node, own) in &by_frf {
+            postures.add(posture, excess(own));
+            directions.add(direction, excess(own));
+            nodes.add(node, excess(own));
+        }
+        let above: Vec<f64> = bands.iter().map(excess).collect();
+        let mostly = above_noise(&total).then(|| Place::new(&edges, &above, &directions, &postures, &nodes));
         FrfComparison {
             totals: ErrorTotals {
                 nrms: total.nrms(),
@@ -294,6 +314,7 @@ impl FrfComparison {
                 })
                 .collect(),
             map,
+            mostly,
             frf_errors,
         }
     }

@@ -4,6 +4,7 @@
 use serde::Serialize;
 
 use super::compare::{ErrorTotals, Group, Groups, Sums};
+use super::place;
 use crate::campaign::Process;
 use crate::identify::cutting_data::CuttingData;
 use crate::identify::cutting_problem::CutFit;
@@ -24,6 +25,8 @@ pub struct CuttingComparison {
     /// Place in the sequence of cuts, as the campaign has it; first cut first, empty where it does not say.
     pub by_order: Vec<Group>,
     pub cuts: Vec<CutError>,
+    /// Where the error sits, in words: the axis, order of rotation and cuts that hold most of what stands above the noise.
+    pub mostly: Option<String>,
 }
 
 /// Error of one order of rotation over all cuts and axes.
@@ -56,6 +59,7 @@ impl CuttingComparison {
             std::array::from_fn(|_| Groups::default());
         let mut harmonics: Vec<Sums> = Vec::new();
         let mut cuts = Vec::new();
+        let mut cells: Vec<(String, String, usize, Sums)> = Vec::new();
         for (cut, fit) in data.cuts.iter().zip(fits) {
             let mut own = Sums::default();
             let mut times_noise = Vec::new();
@@ -73,6 +77,7 @@ impl CuttingComparison {
                         harmonics.push(Sums::default());
                     }
                     harmonics[n].add(s);
+                    cells.push((cut.id.clone(), axis.axis.label().to_string(), n, s));
                 }
                 decibel.0 += axis.decibel.0;
                 decibel.1 += axis.decibel.1;
@@ -107,6 +112,7 @@ impl CuttingComparison {
         };
         let milling = data.process == Process::Milling;
         CuttingComparison {
+            mostly: place::of_cuts(&cells, milling),
             totals: ErrorTotals {
                 nrms: total.nrms(),
                 mean_abs_db: if decibel.1 > 0 {

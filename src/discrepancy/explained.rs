@@ -4,6 +4,7 @@ use num_complex::Complex64;
 use serde::Serialize;
 
 use super::compare::{BANDS, Sums, band_edges_hz, band_of};
+use super::place::{Amounts, Place, above_noise, excess};
 use crate::campaign::Point;
 use crate::identify::FrfData;
 
@@ -56,22 +57,6 @@ pub struct BandPart {
     pub part: Part,
 }
 
-/// Where most of something sits; an empty list: everywhere.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Place {
-    pub from_hz: f64,
-    pub to_hz: f64,
-    pub directions: Vec<String>,
-    pub postures: Vec<String>,
-    /// Node numbers.
-    pub points: Vec<String>,
-}
-
-/// What "most" is: the fewest groups that hold this share together.
-const MOST: f64 = 0.6;
-/// Standard deviations of Σ|r|²/σ² above its expectation from which on more than noise is there.
-const SURE: f64 = 4.0;
-
 #[derive(Debug, Clone, Copy, Default)]
 struct Change {
     before: Sums,
@@ -108,14 +93,6 @@ impl Change {
     }
 }
 
-fn excess(sums: &Sums) -> f64 {
-    sums.weighted - sums.values as f64
-}
-
-fn above_noise(sums: &Sums) -> bool {
-    excess(sums) > SURE * (sums.values as f64).sqrt()
-}
-
 /// Changes by name, in order of first appearance.
 #[derive(Default)]
 struct Groups(Vec<(String, Change)>);
@@ -136,30 +113,12 @@ impl Groups {
         self.0.iter().map(named).collect()
     }
 
-    /// The fewest groups that hold most of `amount`; none where that takes more than half of them.
-    fn holding_most(&self, amount: fn(&Change) -> f64) -> Vec<String> {
-        let mut order: Vec<(usize, f64)> = self
-            .0
-            .iter()
-            .map(|(_, c)| amount(c).max(0.0))
-            .enumerate()
-            .collect();
-        let total: f64 = order.iter().map(|(_, a)| a).sum();
-        order.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let mut held = 0.0;
-        let mut groups: Vec<usize> = Vec::new();
-        for (i, a) in order {
-            if held >= MOST * total {
-                break;
-            }
-            held += a;
-            groups.push(i);
+    fn amounts(&self, amount: fn(&Change) -> f64) -> Amounts {
+        let mut amounts = Amounts::default();
+        for (name, change) in &self.0 {
+            amounts.add(name, amount(change));
         }
-        if 2 * groups.len() > self.0.len() {
-            return Vec::new();
-        }
-        groups.sort_unstable();
-        groups.into_iter().map(|i| self.0[i].0.clone()).collect()
+        amounts
     }
 }
 
@@ -194,15 +153,14 @@ impl Explained {
             nodes.add(&points[frf.response.point].node.to_string(), own);
         }
         let place = |amount: fn(&Change) -> f64| {
-            let amounts: Vec<f64> = bands.iter().map(|b| amount(b).max(0.0)).collect();
-            let (first, last) = shortest_run(&amounts);
-            Place {
-                from_hz: edges[first],
-                to_hz: edges[last + 1],
-                directions: directions.holding_most(amount),
-                postures: postures.holding_most(amount),
-                points: nodes.holding_most(amount),
-            }
+            let bands: Vec<f64> = bands.iter().map(amount).collect();
+            Place::new(
+                &edges,
+                &bands,
+                &directions.amounts(amount),
+                &postures.amounts(amount),
+                &nodes.amounts(amount),
+            )
         };
         Explained {
             total: all.part(&all),
@@ -248,59 +206,6 @@ fn per_cent(share: f64) -> String {
     }
 }
 
-impl Place {
-    /// `at 28–40 Hz in YY at p2 and p5`.
-    pub fn words(&self) -> String {
-        let hz = |f: f64| {
-            if f < 100.0 {
-                format!("{f:.1}")
-            } else {
-                format!("{f:.0}")
-            }
-        };
-        let mut text = format!("at {}–{} Hz", hz(self.from_hz), hz(self.to_hz));
-        text += &match self.directions.as_slice() {
-            [] => ", in all directions".to_string(),
-            some => format!(" in {}", listed(some)),
-        };
-        text += &match self.postures.as_slice() {
-            [] => " and at all postures".to_string(),
-            some => format!(" at {}", listed(some)),
-        };
-        match self.points.as_slice() {
-            [] => text,
-            [node] => text + &format!(" (node {node})"),
-            some => text + &format!(" (nodes {})", listed(some)),
-        }
-    }
-}
-
-fn listed(items: &[String]) -> String {
-    match items {
-        [most @ .., last] if !most.is_empty() => format!("{} and {last}", most.join(", ")),
-        _ => items.join(""),
-    }
-}
-
-/// First and last index of the shortest run that holds most of the sum; of several the fullest.
-fn shortest_run(amounts: &[f64]) -> (usize, usize) {
-    let total: f64 = amounts.iter().sum();
-    let mut best: Option<(usize, usize, f64)> = None;
-    for first in 0..amounts.len() {
-        for last in first..amounts.len() {
-            let held: f64 = amounts[first..=last].iter().sum();
-            let better = best.is_none_or(|(f, l, h)| {
-                let (long, longest) = (last - first, l - f);
-                long < longest || (long == longest && held > h)
-            });
-            if held >= MOST * total && better {
-                best = Some((first, last, held));
-            }
-        }
-    }
-    best.map_or((0, amounts.len().saturating_sub(1)), |(f, l, _)| (f, l))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -329,18 +234,11 @@ mod tests {
     }
 
     #[test]
-    fn most_is_the_fewest_groups_unless_it_is_everywhere() {
+    fn amounts_are_what_each_group_gains() {
         let mut groups = Groups::default();
         for (name, gain) in [("p1", 10.0), ("p2", 500.0), ("p3", 20.0), ("p4", 480.0)] {
             groups.add(name, change(100.0 + gain, 100.0));
         }
-        assert_eq!(groups.holding_most(Change::gain), ["p2", "p4"]);
-        let mut even = Groups::default();
-        for name in ["p1", "p2", "p3"] {
-            even.add(name, change(200.0, 100.0));
-        }
-        assert!(even.holding_most(Change::gain).is_empty());
-        assert_eq!(shortest_run(&[0.0, 1.0, 5.0, 4.0, 1.0]), (2, 3));
-        assert_eq!(shortest_run(&[0.0, 0.0]), (0, 0));
+        assert_eq!(groups.amounts(Change::gain).holding_most(), ["p2", "p4"]);
     }
 }

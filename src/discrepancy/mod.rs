@@ -6,6 +6,7 @@ pub mod diagnose;
 pub mod explained;
 pub mod extension;
 pub mod next_measurement;
+pub mod place;
 pub mod verdict;
 
 pub use compare::{Band, FrfComparison, FrfError};

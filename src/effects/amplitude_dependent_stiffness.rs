@@ -1,4 +1,5 @@
 use super::*;
+use crate::effects::background::TUTTLE;
 use crate::parameter::{Prior, Scale};
 use crate::robot::Role;
 
@@ -16,6 +17,21 @@ impl StructuralEffect for AmplitudeDependentStiffness {
 
     fn fingerprint(&self) -> &'static str {
         "The same point measured at two hammer levels gives two FRFs: modes of this joint lie at different frequencies."
+    }
+
+    fn background(&self) -> Background {
+        Background {
+            lab_check: "Measure the same FRF with soft and hard hits, or sweep with a shaker at two levels: a linear structure \
+             gives the same FRF. The joint's lost motion is read with a dial gauge while a small torque changes its \
+             sign.",
+            typical: "Gears: lost motion of 0.5 to 3 arc minutes; stiffness at small torque half to nine tenths of that at full \
+             torque.",
+            sources: &[
+                TUTTLE,
+                "Worden, K.; Tomlinson, G. R. (2001): Nonlinearity in Structural Dynamics: Detection, Identification \
+                 and Modelling. Institute of Physics Publishing.",
+            ],
+        }
     }
 
     fn sites(&self, robot: &RobotSpec) -> Vec<Site> {

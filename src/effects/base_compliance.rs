@@ -1,4 +1,5 @@
 use super::*;
+use crate::effects::background::EWINS;
 use crate::parameter::{Prior, Scale};
 use crate::robot::{Element, Place, Role, Slot};
 use nalgebra::{DMatrix, Point3, Vector6};
@@ -18,6 +19,17 @@ impl StructuralEffect for BaseCompliance {
     fn fingerprint(&self) -> &'static str {
         "Low modes are too stiff in the model at every posture and in both horizontal directions; even points on the first \
          link move."
+    }
+
+    fn background(&self) -> Background {
+        Background {
+            lab_check: "Put accelerometers on the pedestal's foot plate and on the floor beside it, hit the arm: a pedestal that \
+             rocks moves against the floor. Dial gauges at two edges of the foot under a pull at the arm do as well. \
+             Check the torque of the anchor bolts first.",
+            typical: "A foot plate bolted to a good foundation: above 50 MN·m/rad. Steel frames, pallets and pedestals on shims: \
+             2 to 20 MN·m/rad.",
+            sources: &[EWINS],
+        }
     }
 
     fn sites(&self, _robot: &RobotSpec) -> Vec<Site> {

@@ -1,4 +1,5 @@
 use super::*;
+use crate::effects::background::{ABELE, MOBERG};
 use crate::parameter::{Prior, Scale};
 use crate::robot::{Element, Place, Role, Slot};
 use nalgebra::{DMatrix, Vector6};
@@ -19,6 +20,17 @@ impl StructuralEffect for JointTransverseCompliance {
     fn fingerprint(&self) -> &'static str {
         "Soft in directions that no gear can move; the error follows the bearing when the arm changes posture and is seen \
          at every point behind the joint."
+    }
+
+    fn background(&self) -> Background {
+        Background {
+            lab_check: "Clamp the arm so that the joint's gear carries no load, load it sideways to the joint's axis and watch \
+             with two dial gauges on either side of the bearing: the flange tilts. Modes that move where no gear can \
+             turn show it, too.",
+            typical: "Cross roller and gear bearings of large robots: 1 to 20 MN·m/rad, of the size of the gear's own stiffness \
+             or a few times above it.",
+            sources: &[MOBERG, ABELE],
+        }
     }
 
     /// At joint 1 this is the rocking of the base by another name; a wrist's last joint carries little behind it.

@@ -11,6 +11,7 @@ use crate::parameter::Parameter;
 use crate::robot::{Chain, Dual, Kinematics, RobotModel};
 
 mod amplitude_dependent_stiffness;
+pub mod background;
 mod base_compliance;
 mod branch;
 pub mod cutting;
@@ -25,6 +26,7 @@ mod sensor_misalignment;
 mod time_delay;
 mod tool_flexibility;
 
+pub use background::Background;
 pub use request::requested;
 
 /// Where an effect sits.
@@ -96,6 +98,9 @@ pub trait StructuralEffect: Sync {
 
     /// How it shows in FRFs, one sentence.
     fn fingerprint(&self) -> &'static str;
+
+    /// How to check it in the lab, usual sizes, sources.
+    fn background(&self) -> Background;
 
     /// Where it may sit on this robot.
     fn sites(&self, robot: &RobotSpec) -> Vec<Site>;
@@ -209,4 +214,26 @@ pub fn find(robot: &RobotSpec, name: &str) -> Vec<Instance> {
         .into_iter()
         .filter(|i| i.label() == name)
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What `explain` tells must be there for every effect, and a source must name a year.
+    #[test]
+    fn every_effect_says_how_to_check_it() {
+        let structural = STRUCTURAL.map(|e| (e.id(), e.background()));
+        let cutting = cutting::CUTTING.map(|e| (e.id(), e.background()));
+        for (id, background) in structural.into_iter().chain(cutting) {
+            assert!(
+                background.lab_check.len() > 60 && background.typical.len() > 40,
+                "{id}"
+            );
+            for source in background.sources {
+                let year = source.split(|c: char| !c.is_ascii_digit()).any(|n| n.len() == 4);
+                assert!(year && source.ends_with('.'), "{id}: {source}");
+            }
+        }
+    }
 }

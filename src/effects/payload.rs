@@ -22,6 +22,20 @@ impl StructuralEffect for Payload {
         "All modes that move the flange are too high in the model, at every posture, while the static stiffness is right."
     }
 
+    fn background(&self) -> Background {
+        Background {
+            lab_check: "Weigh what hangs on the flange: spindle, holder, adapter plates, hoses. Or drive the wrist slowly with and \
+             without it and compare motor currents: most controllers have a routine that identifies the load.",
+            typical: "Milling spindles 10 to 60 kg, tool changers 2 to 15 kg, dress packs 3 to 10 kg.",
+            sources: &[
+                "Khalil, W.; Gautier, M.; Lemoine, P. (2007): Identification of the payload inertial parameters of \
+                 industrial manipulators. IEEE International Conference on Robotics and Automation.",
+                "Swevers, J.; Ganseman, C.; Tükel, D. B.; De Schutter, J.; Van Brussel, H. (1997): Optimal robot \
+                 excitation and identification. IEEE Transactions on Robotics and Automation 13(5).",
+            ],
+        }
+    }
+
     fn sites(&self, _robot: &RobotSpec) -> Vec<Site> {
         vec![Site::Everywhere]
     }

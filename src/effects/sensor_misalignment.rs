@@ -1,4 +1,5 @@
 use super::*;
+use crate::effects::background::EWINS;
 use crate::parameter::{Prior, Scale};
 
 /// Response axes turned by a small rotation: H_measured = Rᵀ H.
@@ -17,6 +18,21 @@ impl StructuralEffect for SensorMisalignment {
     fn fingerprint(&self) -> &'static str {
         "Cross FRFs show the direct ones' peaks with the wrong size or sign; reciprocity fails; nothing shifts in \
          frequency."
+    }
+
+    fn background(&self) -> Background {
+        Background {
+            lab_check: "Set a machinist's square against the sensor. Turn the sensor by 180° about its mounting axis and repeat \
+             one FRF: what changes sign and should not is misalignment. Swap hammer and sensor: reciprocal FRFs must \
+             agree.",
+            typical: "Sensors glued by eye: 2 to 10°. The sensor's own cross sensitivity (up to 5 % on most data sheets) looks \
+             like 3°.",
+            sources: &[
+                EWINS,
+                "ISO 7626-5: Vibration and shock – Experimental determination of mechanical mobility – Part 5: \
+                 Measurements using impact excitation with an exciter which is not attached to the structure.",
+            ],
+        }
     }
 
     fn sites(&self, _robot: &RobotSpec) -> Vec<Site> {

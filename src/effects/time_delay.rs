@@ -1,4 +1,5 @@
 use super::*;
+use crate::effects::background::EWINS;
 use crate::parameter::{Prior, Scale};
 
 /// Response channel late against the force channel: factor exp(−iωτ).
@@ -15,6 +16,20 @@ impl StructuralEffect for TimeDelay {
 
     fn fingerprint(&self) -> &'static str {
         "Magnitudes fit, phase does not: its error grows in proportion to frequency, the same in every FRF."
+    }
+
+    fn background(&self) -> Background {
+        Background {
+            lab_check: "Hit a free mass with both the hammer and the sensor's amplifier in line: its acceleration must follow the \
+             force with no phase. A phase that falls in proportion to frequency is a delay. Look for different filters, \
+             wireless sensors and multiplexed inputs.",
+            typical: "One sampling interval of a multiplexed card: 20 to 500 µs. Wireless and camera systems: 1 to 20 ms.",
+            sources: &[
+                "Bendat, J. S.; Piersol, A. G. (2010): Random Data: Analysis and Measurement Procedures. 4th edition, \
+                 Wiley.",
+                EWINS,
+            ],
+        }
     }
 
     fn sites(&self, _robot: &RobotSpec) -> Vec<Site> {

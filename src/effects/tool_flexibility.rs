@@ -1,4 +1,5 @@
 use super::*;
+use crate::effects::background::ALTINTAS;
 use crate::robot::{Branch, Place, Slot};
 use nalgebra::Vector3;
 
@@ -20,6 +21,20 @@ impl StructuralEffect for ToolFlexibility {
     fn fingerprint(&self) -> &'static str {
         "One extra resonance at about the same frequency at every posture, strong at the tool point, normal to the tool \
          axis, weak elsewhere."
+    }
+
+    fn background(&self) -> Background {
+        Background {
+            lab_check: "Tap test at the tool point and at the spindle's nose, same direction: the resonance is at the tip and not \
+             at the nose. A shorter tool, or another holder, moves it.",
+            typical: "Slender tools and light spindles on robots: 30 to 2000 Hz, damping 1 to 5 % of critical; short stiff tools \
+             lie above what a robot's test covers.",
+            sources: &[
+                "Schmitz, T. L.; Donaldson, R. R. (2000): Predicting high-speed machining dynamics by substructure \
+                 analysis. CIRP Annals 49(1).",
+                ALTINTAS,
+            ],
+        }
     }
 
     fn sites(&self, _robot: &RobotSpec) -> Vec<Site> {

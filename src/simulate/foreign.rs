@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, Point3, Vector3, Vector6};
 
 use super::draw::{Draws, Purpose};
 use crate::campaign::robot_spec::RobotSpec;
-use crate::effects::{ChannelFilter, DataSummary, Instance, Setting, Site, StructuralEffect};
+use crate::effects::{Background, ChannelFilter, DataSummary, Instance, Setting, Site, StructuralEffect};
 use crate::parameter::{Parameter, Scale};
 use crate::robot::{Branch, Chain, Dual, Element, Place, Role, Slot};
 
@@ -18,6 +18,13 @@ pub const FOREIGN: [&dyn StructuralEffect; 4] = [
     &CrossAxisLeak,
     &ToolAxialFlexibility,
 ];
+
+/// Nobody looks these up: they are not in the library.
+const FOREIGN_BACKGROUND: Background = Background {
+    lab_check: "",
+    typical: "",
+    sources: &[],
+};
 
 /// The foreign effect of this id.
 pub fn find(id: &str) -> Option<Instance> {
@@ -65,6 +72,10 @@ impl StructuralEffect for ViscoelasticJoints {
 
     fn fingerprint(&self) -> &'static str {
         "Low modes lie lower, high modes higher than any constant stiffness allows, and both are damped."
+    }
+
+    fn background(&self) -> Background {
+        FOREIGN_BACKGROUND
     }
 
     fn sites(&self, _robot: &RobotSpec) -> Vec<Site> {
@@ -120,6 +131,10 @@ impl StructuralEffect for BaseSliding {
         "All points move sideways together, points near the floor as far as those high up."
     }
 
+    fn background(&self) -> Background {
+        FOREIGN_BACKGROUND
+    }
+
     fn sites(&self, _robot: &RobotSpec) -> Vec<Site> {
         vec![Site::Everywhere]
     }
@@ -173,6 +188,10 @@ impl StructuralEffect for CrossAxisLeak {
         "Cross FRFs are wrong as with a turned sensor, but the shares have the same sign both ways."
     }
 
+    fn background(&self) -> Background {
+        FOREIGN_BACKGROUND
+    }
+
     fn sites(&self, _robot: &RobotSpec) -> Vec<Site> {
         vec![Site::Everywhere]
     }
@@ -213,6 +232,10 @@ impl StructuralEffect for ToolAxialFlexibility {
 
     fn fingerprint(&self) -> &'static str {
         "One extra resonance along the tool axis, at the tool point only."
+    }
+
+    fn background(&self) -> Background {
+        FOREIGN_BACKGROUND
     }
 
     fn sites(&self, _robot: &RobotSpec) -> Vec<Site> {

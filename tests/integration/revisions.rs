@@ -154,7 +154,7 @@ fn history_shows_what_was_done_and_undo_takes_it_back() {
     );
     let shown = lobestone(&["history", text(dir)]).stdout;
     assert!(
-        shown.contains("2 + time-delay") && shown.contains("##"),
+        shown.contains("2 + time-delay") && shown.contains("██"),
         "{shown}"
     );
 

@@ -17,6 +17,24 @@ impl CuttingEffect for Chatter {
         "Lines beside the tooth-passing comb, at one frequency and that shifted by the tooth-passing frequency."
     }
 
+    fn background(&self) -> Background {
+        Background {
+            lab_check: "Listen, and look at the surface: chatter marks are not one a tooth. A microphone's spectrum shows a line \
+             that is no multiple of the tooth-passing frequency; it stays where it is while the speed changes. Half the \
+             depth silences it.",
+            typical: "The line lies 0 to 15 % above a natural frequency of robot, spindle or tool; vibration of 10 to 500 µm on \
+             robots.",
+            sources: &[
+                "Tlusty, J.; Polacek, M. (1963): The stability of machine tools against self-excited vibrations in \
+                 machining. ASME International Research in Production Engineering.",
+                "Altintas, Y.; Budak, E. (1995): Analytical prediction of stability lobes in milling. CIRP Annals \
+                 44(1).",
+                "Schmitz, T. L.; Smith, K. S. (2009): Machining Dynamics: Frequency Response to Improved Productivity. \
+                 Springer.",
+            ],
+        }
+    }
+
     fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
         milling_only(data).or_else(|| {
             data.vibration_hz

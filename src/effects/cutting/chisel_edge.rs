@@ -1,4 +1,5 @@
 use super::*;
+use crate::effects::background::SHAW_OXFORD;
 
 /// The chisel edge indents: thrust ∝ feed^n in holes without pilot.
 pub struct ChiselEdge;
@@ -15,6 +16,19 @@ impl CuttingEffect for ChiselEdge {
 
     fn fingerprint(&self) -> &'static str {
         "Full holes need more thrust than pilot holes predict, from the first contact on, while the torque agrees."
+    }
+
+    fn background(&self) -> Background {
+        Background {
+            lab_check: "Drill one hole into the full and one with a pilot hole a little wider than the web: the difference in \
+             thrust is the chisel edge.",
+            typical: "Half the thrust of a drill with a plain point (a third to two thirds, growing with the web), and less than \
+             a tenth of its torque. Web thinning halves it.",
+            sources: &[
+                SHAW_OXFORD,
+                "Williams, R. A. (1974): A study of the drilling process. ASME Journal of Engineering for Industry 96.",
+            ],
+        }
     }
 
     fn obstacle(&self, data: &CuttingSummary) -> Option<String> {

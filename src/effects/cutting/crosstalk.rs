@@ -1,4 +1,5 @@
 use super::*;
+use crate::effects::background::GAUTSCHI;
 
 /// Force channels leak into each other.
 pub struct Crosstalk;
@@ -19,6 +20,16 @@ impl CuttingEffect for Crosstalk {
     fn fingerprint(&self) -> &'static str {
         "One axis shows a small copy of another's waveform, at all speeds and feeds; up and down milling together make it \
          plain."
+    }
+
+    fn background(&self) -> Background {
+        Background {
+            lab_check: "Hang a known weight along one axis at a time and read the other two channels: what they show is crosstalk. \
+             The plate must be level and the screws tightened as for cutting.",
+            typical: "Makers of piezoelectric dynamometers promise 2 % or less between axes; loose screws or a workpiece that \
+             overhangs give 5 to 10 %.",
+            sources: &[GAUTSCHI],
+        }
     }
 
     fn obstacle(&self, data: &CuttingSummary) -> Option<String> {

@@ -17,6 +17,15 @@ impl CuttingEffect for DynamometerMisalignment {
         "The axial channel and one lateral channel carry equal and opposite shares of each other."
     }
 
+    fn background(&self) -> Background {
+        Background {
+            lab_check: "Level and dial gauge over the dynamometer's plate along the machine's axes: 1 mm in 100 mm is 0.6°. A \
+             static load along the tool axis must show on the axial channel only.",
+            typical: "Set up with a gauge: below 0.2°. Bolted by eye, or a robot's tool frame a little off: 1 to 5°.",
+            sources: &[],
+        }
+    }
+
     fn variants(&self) -> usize {
         2
     }

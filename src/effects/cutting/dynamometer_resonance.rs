@@ -17,6 +17,21 @@ impl CuttingEffect for DynamometerResonance {
         "Harmonics of tooth passing near one frequency are too high and turned in phase, at whatever speed brings them there."
     }
 
+    fn background(&self) -> Background {
+        Background {
+            lab_check: "Tap the workpiece as it is clamped on the dynamometer with a modal hammer and divide the record by the \
+             hammer's force: the FRF must be 1 up to the highest tooth-passing harmonic used.",
+            typical: "Table dynamometers: 1 to 3.5 kHz bare on a stiff base (data sheets), down to 300 to 1000 Hz with vice and \
+             workpiece; damping 1 to 5 %. Stay below a third of it, or correct for it.",
+            sources: &[
+                "Tounsi, N.; Otho, A. (2000): Dynamic cutting force measuring. International Journal of Machine Tools \
+                 and Manufacture 40(8).",
+                "Altintas, Y.; Park, S. S. (2004): Dynamic compensation of spindle-integrated force sensors. CIRP \
+                 Annals 53(1).",
+            ],
+        }
+    }
+
     fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
         milling_only(data).or_else(|| {
             (!data.channels[..3].iter().all(|c| *c)).then(|| "needs the three force channels".to_string())

@@ -1,4 +1,5 @@
 use super::*;
+use crate::effects::background::BUDAK;
 
 /// Rubbing of the edge, for a baseline that was fitted without.
 pub struct EdgeForce;
@@ -15,6 +16,21 @@ impl CuttingEffect for EdgeForce {
 
     fn fingerprint(&self) -> &'static str {
         "Forces do not go to zero with the feed."
+    }
+
+    fn background(&self) -> Background {
+        Background {
+            lab_check: "Plot mean force against feed and draw the line to feed zero: what is left there is the edge force. A sharp \
+             new tool has little of it.",
+            typical: "10 to 60 N for each mm of edge in metals with sharp carbide (a tenth to a third of the force at usual \
+             feeds), more with honed or worn edges.",
+            sources: &[
+                "Albrecht, P. (1960): New developments in the theory of the metal-cutting process, part I: the \
+                 ploughing process in metal cutting. ASME Journal of Engineering for Industry 82.",
+                "Armarego, E. J. A.; Brown, R. H. (1969): The Machining of Metals. Prentice-Hall.",
+                BUDAK,
+            ],
+        }
     }
 
     fn obstacle(&self, data: &CuttingSummary) -> Option<String> {

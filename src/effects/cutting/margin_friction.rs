@@ -1,4 +1,5 @@
 use super::*;
+use crate::effects::background::SHAW_OXFORD;
 
 /// The drill's margins rub in the hole: torque grows with depth.
 pub struct MarginFriction;
@@ -15,6 +16,16 @@ impl CuttingEffect for MarginFriction {
 
     fn fingerprint(&self) -> &'static str {
         "Torque climbs steadily while the hole gets deeper; thrust does not."
+    }
+
+    fn background(&self) -> Background {
+        Background {
+            lab_check: "Turn the drill in the finished hole without feed and read the torque: that is margin and chips. Compare a \
+             deep and a shallow hole.",
+            typical: "Torque grows by 2 to 10 % for each diameter of depth, far more once the flutes pack with chips (beyond \
+             about three diameters without pecking).",
+            sources: &[SHAW_OXFORD],
+        }
     }
 
     fn obstacle(&self, data: &CuttingSummary) -> Option<String> {

@@ -14,6 +14,7 @@
 
 use std::fmt;
 
+use super::Background;
 use crate::campaign::Process;
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::Dual;
@@ -130,6 +131,9 @@ pub trait CuttingEffect: Sync {
 
     /// How it shows in force records, one sentence.
     fn fingerprint(&self) -> &'static str;
+
+    /// How to check it in the lab, usual sizes, sources.
+    fn background(&self) -> Background;
 
     /// Discrete choices.
     fn variants(&self) -> usize {

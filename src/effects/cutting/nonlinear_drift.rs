@@ -1,4 +1,5 @@
 use super::*;
+use crate::effects::background::GAUTSCHI;
 
 /// The zero line is no line: an exponential transient is added, or the charge amplifier leaks.
 pub struct NonlinearDrift;
@@ -23,6 +24,17 @@ impl CuttingEffect for NonlinearDrift {
 
     fn fingerprint(&self) -> &'static str {
         "The air before and after the cut does not lie on one line, and the level during the cut bends with it."
+    }
+
+    fn background(&self) -> Background {
+        Background {
+            lab_check: "Record two minutes without load after a reset of the charge amplifier: a straight line is leakage current, \
+             a curve is warming up or a short time constant. Check that the amplifier's time constant is set to LONG \
+             and the plugs are dry.",
+            typical: "Leakage of a charge amplifier: 0.03 to 0.07 pC/s (about 0.01 N/s) when clean; thermal drift while cutting \
+             0.1 to 5 N/s; amplifier time constants of 1 to 100 s on SHORT and MEDIUM.",
+            sources: &[GAUTSCHI],
+        }
     }
 
     fn variants(&self) -> usize {

@@ -17,6 +17,19 @@ impl CuttingEffect for RunoutEffect {
         "Lines at once per revolution and its multiples beside the tooth-passing comb, the stronger the smaller the feed."
     }
 
+    fn background(&self) -> Background {
+        Background {
+            lab_check: "Dial gauge at the shank, turned by hand, and at each tooth (a setting device or a laser measures radii). \
+             Turn the tool in its holder by 180° and look whether the pattern of the teeth goes with it.",
+            typical: "Shrink and hydraulic holders 3 to 5 µm, collets 5 to 20 µm, robot spindles with worn collets up to 50 µm. \
+             It matters from about a tenth of the feed per tooth.",
+            sources: &[
+                "Kline, W. A.; DeVor, R. E. (1983): The effect of runout on cutting geometry and forces in end milling. \
+                 International Journal of Machine Tool Design and Research 23(2–3).",
+            ],
+        }
+    }
+
     fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
         milling_only(data)
             .or_else(|| (data.teeth < 2).then(|| "a single tooth has no runout against others".to_string()))

@@ -1,0 +1,366 @@
+//! A first `campaign.toml` for a folder of files: what the files say is filled in, what they do not say is asked for.
+//!
+//! [`scan`] looks at the files, [`Draft::new`] makes tables of what it found and of the [`Answers`] that are known
+//! already, [`Draft::ask`] gets further ones, [`Draft::toml`] writes it all down.
+
+use std::collections::BTreeMap;
+
+use super::suggest::shown;
+use crate::{InputError, Result};
+
+mod cut_list;
+mod entry;
+mod names;
+mod scan;
+mod tables;
+
+pub use cut_list::read_cut_list;
+pub use entry::{Entry, Kind};
+pub use scan::{FoundForce, FoundFrf, Scan, scan};
+
+/// What a person said, by table and key: `("cut", "spindle_rpm")` holds for every cut, `("cut 01", "spindle_rpm")` for
+/// one. Values as typed.
+#[derive(Debug, Clone, Default)]
+pub struct Answers(BTreeMap<(String, String), String>);
+
+impl Answers {
+    pub fn set(&mut self, table: impl Into<String>, key: impl Into<String>, value: impl Into<String>) {
+        self.0.insert((table.into(), key.into()), value.into());
+    }
+
+    /// The answer for the table of this name, else the one for all of its kind.
+    fn get(&self, kind: &str, name: &str, key: &str) -> Option<&str> {
+        let look = |table: &str| self.0.get(&(table.to_string(), key.to_string()));
+        look(&format!("{kind} {name}"))
+            .or_else(|| look(kind))
+            .map(String::as_str)
+    }
+
+    /// Names that answers of this kind were given for: postures, nodes, cuts.
+    fn names(&self, kind: &str) -> Vec<&str> {
+        let prefix = format!("{kind} ");
+        let mut names: Vec<&str> = self
+            .0
+            .keys()
+            .filter_map(|(t, _)| t.strip_prefix(&prefix))
+            .collect();
+        names.dedup();
+        names
+    }
+}
+
+/// A section of the file to be.
+#[derive(Debug, Clone)]
+pub struct Table {
+    /// `cut`, `posture`, …
+    pub kind: &'static str,
+    /// Which of them; empty where there is one.
+    pub name: String,
+    /// Stands in double brackets.
+    pub repeated: bool,
+    pub entries: Vec<Entry>,
+}
+
+/// A campaign file in the making.
+#[derive(Debug, Clone)]
+pub struct Draft {
+    pub name: String,
+    pub tables: Vec<Table>,
+}
+
+/// Something that nobody has said yet.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Missing {
+    /// `cut`, `posture`, …
+    pub table: &'static str,
+    pub key: &'static str,
+    /// What it is, with its unit.
+    pub what: &'static str,
+    pub example: &'static str,
+    /// Of which of the tables; empty where there is one.
+    pub of: Vec<String>,
+}
+
+/// Something that was concluded from a name, or taken for usual.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Guess {
+    pub table: String,
+    pub key: String,
+    pub value: String,
+    pub why: String,
+}
+
+/// Times a question is put again after an answer that is none.
+const PATIENCE: usize = 3;
+
+impl Draft {
+    /// # Errors
+    /// An answer that is not of its key's form, or about something that is not there.
+    pub fn new(name: &str, scan: &Scan, answers: &Answers) -> Result<Draft> {
+        let tables = tables::of(scan, answers)?;
+        for kind in ["posture", "point", "cut"] {
+            let there: Vec<&str> = tables
+                .iter()
+                .filter(|t| t.kind == kind)
+                .map(|t| t.name.as_str())
+                .collect();
+            if let Some(stranger) = answers.names(kind).into_iter().find(|n| !there.contains(n)) {
+                let remedy = match there.as_slice() {
+                    [] => format!("no file in the folder has a {kind}"),
+                    there => format!("the files have: {}", shown(&there.join(", "))),
+                };
+                return Err(
+                    InputError::new(format!("the files have no {kind} {:?}", shown(stranger)))
+                        .key(kind)
+                        .remedy(remedy)
+                        .into(),
+                );
+            }
+        }
+        Ok(Draft {
+            name: name.to_string(),
+            tables,
+        })
+    }
+
+    /// What is missing, alike things together, in the order of the file.
+    pub fn missing(&self) -> Vec<Missing> {
+        let mut missing: Vec<Missing> = Vec::new();
+        for table in &self.tables {
+            for entry in table.entries.iter().filter(|e| e.is_missing()) {
+                let same = |m: &&mut Missing| m.table == table.kind && m.key == entry.key;
+                match missing.iter_mut().find(same) {
+                    Some(m) => m.of.push(table.name.clone()),
+                    None => missing.push(Missing {
+                        table: table.kind,
+                        key: entry.key,
+                        what: entry.what,
+                        example: entry.example,
+                        of: vec![table.name.clone()],
+                    }),
+                }
+            }
+        }
+        missing
+    }
+
+    pub fn guesses(&self) -> Vec<Guess> {
+        let of_table = |table: &Table| -> Vec<Guess> {
+            let guessed = table.entries.iter().filter_map(|e| {
+                Some(Guess {
+                    table: [table.kind, &table.name].join(" ").trim_end().to_string(),
+                    key: e.key.to_string(),
+                    value: e.value_text()?,
+                    why: e.guessed.clone()?,
+                })
+            });
+            guessed.collect()
+        };
+        self.tables.iter().flat_map(of_table).collect()
+    }
+
+    /// Puts what is missing as questions; an empty answer leaves it open. `ask` gets a question and an example.
+    ///
+    /// # Errors
+    /// Those of `ask`.
+    pub fn ask(&mut self, ask: &mut dyn FnMut(&str, &str) -> Result<String>) -> Result<()> {
+        for missing in self.missing() {
+            if missing.of.len() > 1 {
+                let question = format!(
+                    "all {} {}s: {} (empty: one by one)",
+                    missing.of.len(),
+                    missing.table,
+                    missing.what
+                );
+                // Postures and points differ from each other; cuts and files often do not.
+                let alike = ["cut", "frf"].contains(&missing.table);
+                if alike && self.put(&missing, &missing.of, &question, ask)? {
+                    continue;
+                }
+            }
+            for name in &missing.of {
+                let question = match name.is_empty() {
+                    true => missing.what.to_string(),
+                    false => format!("{} {name}: {}", missing.table, missing.what),
+                };
+                self.put(&missing, std::slice::from_ref(name), &question, ask)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether there was an answer.
+    fn put(
+        &mut self,
+        missing: &Missing,
+        names: &[String],
+        question: &str,
+        ask: &mut dyn FnMut(&str, &str) -> Result<String>,
+    ) -> Result<bool> {
+        let mut problem = String::new();
+        for _ in 0..PATIENCE {
+            let answer = ask(&format!("{problem}{question}"), missing.example)?;
+            if answer.trim().is_empty() {
+                return Ok(false);
+            }
+            let entries = self
+                .tables
+                .iter_mut()
+                .filter(|t| t.kind == missing.table && names.contains(&t.name))
+                .flat_map(|t| &mut t.entries)
+                .filter(|e| e.key == missing.key);
+            let mut given = Ok(());
+            for entry in entries {
+                given = given.and(entry.give(&answer));
+            }
+            match given {
+                Ok(()) => return Ok(true),
+                Err(what) => problem = format!("{what}; "),
+            }
+        }
+        Ok(false)
+    }
+
+    /// The text of `campaign.toml`: what is missing is a comment that begins with `fill in`.
+    pub fn toml(&self) -> String {
+        let mut text = format!(
+            "schema = \"lobestone/campaign/1\"\nname = {}\n",
+            entry::quoted(&self.name)
+        );
+        for table in &self.tables {
+            // A section without a line of its own would only be in the way.
+            let header = match table.repeated {
+                true => format!("[[{}]]", table.kind),
+                false => format!("[{}]", table.kind),
+            };
+            match table.entries.iter().any(Entry::is_given) || table.entries.iter().any(Entry::is_missing) {
+                true => text += &format!("\n{header}\n"),
+                false => text += &format!("\n# {header}\n"),
+            }
+            for entry in &table.entries {
+                text += &entry.lines();
+            }
+        }
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ingest::Quantity;
+
+    fn scan_of(frfs: &[(&str, &[i64])], forces: &[&str]) -> Scan {
+        Scan {
+            frfs: frfs
+                .iter()
+                .map(|(posture, nodes)| FoundFrf {
+                    path: format!("frf/{posture}.uff"),
+                    posture: posture.to_string(),
+                    quantity: Some(Quantity::Accelerance),
+                    nodes: nodes.iter().copied().collect(),
+                    facts: Default::default(),
+                })
+                .collect(),
+            forces: forces
+                .iter()
+                .map(|name| FoundForce {
+                    path: format!("force/{name}.txt"),
+                    from_name: names::facts_of(name),
+                    from_header: Default::default(),
+                })
+                .collect(),
+            ..Scan::default()
+        }
+    }
+
+    fn keys(missing: &[Missing]) -> Vec<(&str, &str, usize)> {
+        missing.iter().map(|m| (m.table, m.key, m.of.len())).collect()
+    }
+
+    #[test]
+    fn what_the_files_do_not_say_is_missing_once_for_all() {
+        let scan = scan_of(
+            &[("p1", &[1, 2]), ("p2", &[1, 2])],
+            &["cut01_n1200", "cut02_n900"],
+        );
+        let mut answers = Answers::default();
+        answers.set("robot", "model", "irb6640");
+        answers.set("cut", "process", "milling");
+        let draft = Draft::new("cell", &scan, &answers).unwrap();
+        assert_eq!(
+            keys(&draft.missing()),
+            [
+                ("point", "body", 2),
+                ("posture", "joints_deg", 2),
+                ("tool", "diameter_mm", 1),
+                ("tool", "teeth", 1),
+                ("tool", "helix_deg", 1),
+                ("cut", "feed_per_tooth_mm", 2),
+                ("cut", "axial_depth_mm", 2),
+                ("cut", "immersion", 2),
+            ]
+        );
+        let text = draft.toml();
+        assert!(
+            text.contains("spindle_rpm = 1200.0  # guessed: from the file name"),
+            "{text}"
+        );
+        assert!(text.contains("# fill in: joints_deg = …"), "{text}");
+    }
+
+    #[test]
+    fn questions_are_put_until_all_is_said() {
+        let scan = scan_of(&[("p1", &[1])], &["cut01", "cut02"]);
+        let mut draft = Draft::new("cell", &scan, &Answers::default()).unwrap();
+        let mut asked = Vec::new();
+        draft
+            .ask(&mut |question, _| {
+                asked.push(question.to_string());
+                let answer = match question {
+                    q if q.starts_with("robot model") => "irb6640",
+                    q if q.contains("joint angles") => "135 -2 53; 83, 30 -117",
+                    q if q.contains("process") => "milling",
+                    q if q.contains("endmill or drill") => "endmill",
+                    q if q.contains("number of teeth") && asked.len() < 6 => "many",
+                    q if q.contains("teeth") => "6",
+                    q if q.contains("immersion") => "0 90",
+                    q if q.starts_with("all 2 cuts: spindle speed") => "",
+                    q if q.starts_with("cut 02: spindle speed") => "900,5",
+                    _ => "2",
+                };
+                Ok(answer.to_string())
+            })
+            .unwrap();
+        assert_eq!(draft.missing(), []);
+        let text = draft.toml();
+        for part in [
+            "joints_deg = [135.0, -2.0, 53.0, 83.0, 30.0, -117.0]",
+            "start_deg = 0.0\nexit_deg = 90.0",
+            "spindle_rpm = 2.0\n",
+            "spindle_rpm = 900.5\n",
+            "teeth = 6\n",
+        ] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+        assert!(asked.iter().any(|q| q.starts_with("cut 01: spindle speed")));
+        let twice = asked.iter().filter(|q| q.contains("number of teeth"));
+        assert_eq!(twice.count(), 2, "asked again after \"many\"");
+    }
+
+    #[test]
+    fn an_answer_that_is_none_is_an_error_and_so_is_one_about_a_stranger() {
+        let scan = scan_of(&[("p1", &[1])], &[]);
+        let mut answers = Answers::default();
+        answers.set("posture p1", "joints_deg", "up");
+        let error = Draft::new("cell", &scan, &answers).unwrap_err().to_string();
+        assert!(error.contains("joints_deg") && error.contains("up"), "{error}");
+        let mut answers = Answers::default();
+        answers.set("posture p9", "joints_deg", "1 2 3");
+        let error = Draft::new("cell", &scan, &answers).unwrap_err().to_string();
+        assert!(
+            error.contains("no posture \"p9\"") && error.contains("p1"),
+            "{error}"
+        );
+    }
+}

@@ -1,0 +1,368 @@
+//! The sections of a first campaign file.
+
+use std::collections::BTreeSet;
+
+use super::entry::{Entry, Kind};
+use super::scan::stem;
+use super::{Answers, FoundForce, Scan, Table};
+use crate::ingest::Quantity;
+use crate::{InputError, Result};
+
+const PROCESSES: &[&str] = &["milling", "drilling"];
+const FROM_NAME: &str = "from the file name";
+const FROM_HEADER: &str = "from the file's header";
+
+/// The sections in the order in which they stand in the file.
+pub fn of(scan: &Scan, answers: &Answers) -> Result<Vec<Table>> {
+    let mut tables = Vec::new();
+    if !scan.frfs.is_empty() {
+        tables.push(robot(scan, answers)?);
+        tables.extend(points(scan, answers)?);
+        tables.extend(postures(scan, answers)?);
+        tables.extend(frfs(scan, answers)?);
+    }
+    if !scan.forces.is_empty() {
+        let cuts = cuts(scan, answers)?;
+        tables.push(tool(&cuts, answers)?);
+        tables.push(dynamometer(answers)?);
+        tables.extend(cuts.into_iter().map(|(_, table)| table));
+    }
+    Ok(tables)
+}
+
+/// A table in the making.
+struct Making<'a> {
+    answers: &'a Answers,
+    table: Table,
+}
+
+impl<'a> Making<'a> {
+    fn new(answers: &'a Answers, kind: &'static str, name: &str, repeated: bool) -> Self {
+        Making {
+            answers,
+            table: Table {
+                kind,
+                name: name.to_string(),
+                repeated,
+                entries: Vec::new(),
+            },
+        }
+    }
+
+    fn single(answers: &'a Answers, kind: &'static str) -> Self {
+        Making::new(answers, kind, "", false)
+    }
+
+    /// Adds `entry` with the answer given for it, else what `guesses` (value, why) say, the first that is there.
+    fn add(&mut self, mut entry: Entry, guesses: &[(Option<&str>, &str)]) -> Result<()> {
+        let Table { kind, name, .. } = &self.table;
+        match self.answers.get(kind, name, entry.key) {
+            Some(typed) => entry.give(typed).map_err(|problem| {
+                InputError::new(problem)
+                    .key(format!("{kind} {name}").trim_end().to_string() + "." + entry.key)
+                    .remedy(format!("give {}, such as {}", entry.what, entry.example))
+            })?,
+            None => {
+                if let Some((Some(value), why)) = guesses.iter().find(|(v, _)| v.is_some()) {
+                    entry.guess(value, why);
+                }
+            }
+        }
+        self.table.entries.push(entry);
+        Ok(())
+    }
+
+    /// A value that is known for certain.
+    fn fact(&mut self, key: &'static str, kind: Kind, value: &str) {
+        let mut entry = Entry::new(key, kind, "", "");
+        // What a scan found is always of its form.
+        if entry.give(value).is_ok() {
+            self.table.entries.push(entry);
+        }
+    }
+}
+
+fn robot(scan: &Scan, answers: &Answers) -> Result<Table> {
+    let mut making = Making::single(answers, "robot");
+    making.add(
+        Entry::new(
+            "model",
+            Kind::Text,
+            "robot model: irb6640, or the path of a robot file in the folder",
+            "irb6640",
+        ),
+        &[(scan.robot.as_deref(), "the only robot file in the folder")],
+    )?;
+    Ok(making.table)
+}
+
+fn points(scan: &Scan, answers: &Answers) -> Result<Vec<Table>> {
+    let nodes: BTreeSet<i64> = scan.frfs.iter().flat_map(|f| f.nodes.iter().copied()).collect();
+    let only = nodes.len() == 1;
+    let mut tables = Vec::new();
+    for node in nodes {
+        let name = node.to_string();
+        let mut making = Making::new(answers, "point", &name, true);
+        making.fact("node", Kind::Whole, &name);
+        making.add(
+            Entry::new(
+                "body",
+                Kind::Text,
+                "where it sits: base, link1 to link6, or tool",
+                "link2",
+            ),
+            &[(
+                only.then_some("tool"),
+                "the only node, taken for the tool centre point",
+            )],
+        )?;
+        making.add(
+            Entry::new(
+                "position_m",
+                Kind::Numbers,
+                "its place in that body's frame, metres",
+                "[0.0, 0.0, 0.0]",
+            ),
+            &[(Some("0 0 0"), "the origin of the body's frame")],
+        )?;
+        making.add(
+            Entry::new(
+                "axes",
+                Kind::Choice(&["base", "body", "tool"]),
+                "what X, Y, Z mean in the files: base, body or tool",
+                "base",
+            ),
+            &[(Some("base"), "X, Y, Z taken along the robot's base")],
+        )?;
+        tables.push(making.table);
+    }
+    Ok(tables)
+}
+
+fn postures(scan: &Scan, answers: &Answers) -> Result<Vec<Table>> {
+    let mut ids: Vec<&str> = Vec::new();
+    for frf in &scan.frfs {
+        if !ids.contains(&frf.posture.as_str()) {
+            ids.push(&frf.posture);
+        }
+    }
+    let mut tables = Vec::new();
+    for id in ids {
+        let mut making = Making::new(answers, "posture", id, true);
+        making.fact("id", Kind::Text, id);
+        making.add(
+            Entry::new(
+                "joints_deg",
+                Kind::Numbers,
+                "joint angles in degrees, base first",
+                "[135.0, -2.0, 53.0, 83.0, 30.0, -117.0]",
+            ),
+            &[],
+        )?;
+        tables.push(making.table);
+    }
+    Ok(tables)
+}
+
+fn frfs(scan: &Scan, answers: &Answers) -> Result<Vec<Table>> {
+    let mut tables = Vec::new();
+    for frf in &scan.frfs {
+        let mut making = Making::new(answers, "frf", &frf.path, true);
+        making.fact("file", Kind::Text, &frf.path);
+        making.fact("posture", Kind::Text, &frf.posture);
+        let quantity = Entry::new(
+            "quantity",
+            Kind::Choice(&["receptance", "mobility", "accelerance"]),
+            "what the FRFs are: receptance, mobility or accelerance",
+            "receptance",
+        );
+        let said = frf.quantity.map(|q| match q {
+            Quantity::Receptance => "receptance",
+            Quantity::Mobility => "mobility",
+            Quantity::Accelerance => "accelerance",
+        });
+        match said {
+            // What the file says is left to the file.
+            Some(_) if answers.get("frf", &frf.path, "quantity").is_none() => (),
+            _ => making.add(quantity, &[])?,
+        }
+        let level = frf.facts.get("force_level_n").map(String::as_str);
+        let entry = Entry::new("force_level_n", Kind::Number, "hammer level, N", "200.0").optional();
+        if level.is_some() || answers.get("frf", &frf.path, "force_level_n").is_some() {
+            making.add(entry, &[(level, FROM_NAME)])?;
+        }
+        tables.push(making.table);
+    }
+    Ok(tables)
+}
+
+fn tool(cuts: &[(Option<String>, Table)], answers: &Answers) -> Result<Table> {
+    let processes: BTreeSet<&str> = cuts.iter().filter_map(|(p, _)| p.as_deref()).collect();
+    let drill = processes.contains("drilling") && processes.len() == 1;
+    let kind = processes.first().map(|_| if drill { "drill" } else { "endmill" });
+    let mut making = Making::single(answers, "tool");
+    making.add(
+        Entry::new(
+            "kind",
+            Kind::Choice(&["endmill", "drill"]),
+            "endmill or drill",
+            "endmill",
+        ),
+        &[(kind, "what the process needs")],
+    )?;
+    making.add(
+        Entry::new("diameter_mm", Kind::Number, "tool diameter, mm", "16.0"),
+        &[],
+    )?;
+    making.add(
+        Entry::new("teeth", Kind::Whole, "number of teeth", "4"),
+        &[(drill.then_some("2"), "a drill has two lips")],
+    )?;
+    if drill {
+        let angle = "half of the drill's point angle, degrees";
+        making.add(
+            Entry::new("half_point_angle_deg", Kind::Number, angle, "59.0"),
+            &[],
+        )?;
+        let web = "web thickness, mm: for the chisel edge";
+        making.add(
+            Entry::new("web_thickness_mm", Kind::Number, web, "1.4").optional(),
+            &[],
+        )?;
+    } else {
+        let helix = "helix angle, degrees (0: straight teeth)";
+        making.add(Entry::new("helix_deg", Kind::Number, helix, "30.0"), &[])?;
+    }
+    Ok(making.table)
+}
+
+fn dynamometer(answers: &Answers) -> Result<Table> {
+    let mut making = Making::single(answers, "dynamometer");
+    making.add(
+        Entry::new(
+            "tool_from_dyno",
+            Kind::Matrix,
+            "F_tool = A F_recorded: row 1 tool x in dynamometer axes, …",
+            "[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]",
+        )
+        .optional(),
+        &[(
+            Some("1 0 0 0 1 0 0 0 1"),
+            "tool and dynamometer axes taken for the same",
+        )],
+    )?;
+    Ok(making.table)
+}
+
+/// Ids of the cuts: the number in the file's name where that tells them apart, else the name.
+pub(super) fn cut_ids(forces: &[FoundForce]) -> Vec<String> {
+    let number = |force: &FoundForce| -> String {
+        let name = stem(&force.path);
+        let first = name.split(['_', '-', ' ']).next().unwrap_or(name);
+        first
+            .trim_start_matches(|c: char| !c.is_ascii_digit())
+            .to_string()
+    };
+    let unique = |ids: &[String]| {
+        let plain = |id: &String| !id.is_empty() && id.bytes().all(|b| b.is_ascii_digit());
+        ids.iter().all(plain) && ids.iter().collect::<BTreeSet<_>>().len() == ids.len()
+    };
+    let names = |name: fn(&str) -> &str| -> Vec<String> {
+        forces.iter().map(|f| name(&f.path).to_string()).collect()
+    };
+    let numbers: Vec<String> = forces.iter().map(number).collect();
+    if unique(&numbers) {
+        return numbers;
+    }
+    let stems = names(stem);
+    match stems.iter().collect::<BTreeSet<_>>().len() == stems.len() {
+        true => stems,
+        false => names(|path| path),
+    }
+}
+
+/// Each cut's process, where it is known, and its section.
+fn cuts(scan: &Scan, answers: &Answers) -> Result<Vec<(Option<String>, Table)>> {
+    let mut out = Vec::new();
+    for (force, id) in scan.forces.iter().zip(cut_ids(&scan.forces)) {
+        let mut making = Making::new(answers, "cut", &id, true);
+        making.fact("id", Kind::Text, answers.get("cut", &id, "id").unwrap_or(&id));
+        making.fact("file", Kind::Text, &force.path);
+        let said = |key: &str| {
+            [
+                (force.from_header.get(key).map(String::as_str), FROM_HEADER),
+                (force.from_name.get(key).map(String::as_str), FROM_NAME),
+            ]
+        };
+        // A key that only one process has tells the process.
+        let drilled = ["feed_per_rev_mm", "pilot_diameter_mm", "hole_depth_mm"];
+        let milled = ["feed_per_tooth_mm", "axial_depth_mm", "immersion"];
+        let given = |keys: &[&'static str]| keys.iter().any(|k| answers.get("cut", &id, k).is_some());
+        let kind_of_tool = answers.get("tool", "", "kind");
+        let concluded = match () {
+            _ if given(&milled) || kind_of_tool == Some("endmill") => Some("milling"),
+            _ if given(&drilled) || kind_of_tool == Some("drill") => Some("drilling"),
+            _ => None,
+        };
+        let [header, name] = said("process");
+        making.add(
+            Entry::new(
+                "process",
+                Kind::Choice(PROCESSES),
+                "process: milling or drilling",
+                "milling",
+            ),
+            &[header, name, (concluded, "from what else was given")],
+        )?;
+        let process = making.table.entries.last().and_then(Entry::value_text);
+        let process = process.map(|p| p.trim_matches('"').to_string());
+        making.add(
+            Entry::new("spindle_rpm", Kind::Number, "spindle speed, rpm", "1200.0"),
+            &said("spindle_rpm"),
+        )?;
+        let entries = match process.as_deref() {
+            Some("drilling") => vec![
+                Entry::new("feed_per_rev_mm", Kind::Number, "feed per revolution, mm", "0.1"),
+                Entry::new(
+                    "pilot_diameter_mm",
+                    Kind::Number,
+                    "pilot hole's diameter, mm (0: none)",
+                    "0.0",
+                )
+                .optional(),
+                Entry::new("hole_depth_mm", Kind::Number, "depth at full diameter, mm", "8.0").optional(),
+            ],
+            _ => vec![
+                Entry::new("feed_per_tooth_mm", Kind::Number, "feed per tooth, mm", "0.05"),
+                Entry::new("axial_depth_mm", Kind::Number, "axial depth of cut, mm", "2.0"),
+                Entry::new(
+                    "immersion",
+                    Kind::Immersion,
+                    "immersion: slot, or start and exit angle in degrees (from +y, clockwise)",
+                    "slot",
+                ),
+            ],
+        };
+        for entry in entries {
+            let guesses = said(entry.key);
+            making.add(entry, &guesses)?;
+        }
+        for entry in [
+            Entry::new("order", Kind::Whole, "when this cut was made: 1, 2, …", "1").optional(),
+            Entry::new("material", Kind::Text, "workpiece", "C45").optional(),
+            Entry::new(
+                "outcome",
+                Kind::Choice(&["stable", "chatter"]),
+                "how it went",
+                "stable",
+            )
+            .optional(),
+        ] {
+            if answers.get("cut", &id, entry.key).is_some() {
+                making.add(entry, &[])?;
+            }
+        }
+        out.push((process, making.table));
+    }
+    Ok(out)
+}

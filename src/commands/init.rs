@@ -1,0 +1,326 @@
+//! `lobestone init DIR`: a campaign of a folder of files.
+
+use std::io::{BufRead, IsTerminal, Write};
+use std::path::PathBuf;
+
+use serde_json::json;
+
+use super::text::{Emphasis, table, warnings};
+use super::{Outcome, next_step};
+use crate::campaign::draft::{self, Answers, Draft, Missing, Scan};
+use crate::campaign::{Campaign, campaign_file};
+use crate::files::write_atomically;
+use crate::{Error, InputError, Result};
+
+#[derive(clap::Args)]
+#[command(
+    after_help = "What the files say is taken from them: quantity, nodes, posture (from p3, pos3, … in the name, or the \
+                  folder), speed, feed and depth (from a name such as cut01_n1200_fz0.05_ap2, or the header). What is \
+                  concluded from a name carries a comment. On a terminal the rest is asked for.\n\nExamples:\n  \
+                  lobestone init cell7 --robot irb6640 --posture p1=135,-2,53,83,30,-117 --posture p2=135,20,26,30,80,-150\n  \
+                  lobestone init trial --process milling --diameter-mm 16 --teeth 6 --helix-deg 42 --immersion slot \
+                  --cut-list cuts.csv"
+)]
+pub struct Args {
+    /// The folder with the measurement files; campaign.toml is written there.
+    dir: PathBuf,
+    /// Replace a campaign.toml that is there.
+    #[arg(long)]
+    force: bool,
+    /// Never ask, even on a terminal.
+    #[arg(long)]
+    no_questions: bool,
+    /// Name of the campaign [default: the folder's].
+    #[arg(long)]
+    name: Option<String>,
+    /// Robot: irb6640, or the path of a robot file in the folder.
+    #[arg(long, value_name = "MODEL")]
+    robot: Option<String>,
+    /// Joint angles of a posture, base first; once for each.
+    #[arg(long = "posture", value_name = "ID=DEG,DEG,…", value_parser = pair, allow_hyphen_values = true)]
+    postures: Vec<(String, String)>,
+    /// Where a node sits: its body (base, link1 …, tool), its place in that body's frame, and what X, Y, Z mean (base,
+    /// body, tool); once for each.
+    #[arg(long = "point", value_name = "NODE=BODY[:X,Y,Z[:AXES]]", value_parser = pair)]
+    points: Vec<(String, String)>,
+    /// What FRF files hold that do not say so: receptance, mobility or accelerance.
+    #[arg(long)]
+    quantity: Option<String>,
+    /// Hammer level of all FRFs.
+    #[arg(long, value_name = "N")]
+    force_level_n: Option<String>,
+    /// What was done in all cuts: milling or drilling.
+    #[arg(long)]
+    process: Option<String>,
+    /// Tool diameter.
+    #[arg(long, value_name = "MM")]
+    diameter_mm: Option<String>,
+    /// Number of teeth.
+    #[arg(long, value_name = "N")]
+    teeth: Option<String>,
+    /// Helix angle.
+    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    helix_deg: Option<String>,
+    /// Drills: half of the point angle.
+    #[arg(long, value_name = "DEG")]
+    half_point_angle_deg: Option<String>,
+    /// Drills: web thickness.
+    #[arg(long, value_name = "MM")]
+    web_thickness_mm: Option<String>,
+    /// Rows of A in F_tool = A F_recorded.
+    #[arg(long, value_name = "A,B,C;D,E,F;G,H,I", allow_hyphen_values = true)]
+    tool_from_dyno: Option<String>,
+    /// Spindle speed of all cuts.
+    #[arg(long, value_name = "RPM")]
+    spindle_rpm: Option<String>,
+    /// Milling: feed per tooth of all cuts.
+    #[arg(long, value_name = "MM")]
+    feed_per_tooth_mm: Option<String>,
+    /// Milling: axial depth of all cuts.
+    #[arg(long, value_name = "MM")]
+    axial_depth_mm: Option<String>,
+    /// Milling: slot, or start and exit angle in degrees from +y, clockwise.
+    #[arg(long, value_name = "slot|START,EXIT")]
+    immersion: Option<String>,
+    /// Drilling: feed per revolution of all cuts.
+    #[arg(long, value_name = "MM")]
+    feed_per_rev_mm: Option<String>,
+    /// Drilling: pilot hole of all cuts.
+    #[arg(long, value_name = "MM")]
+    pilot_diameter_mm: Option<String>,
+    /// Drilling: depth at full diameter of all cuts.
+    #[arg(long, value_name = "MM")]
+    hole_depth_mm: Option<String>,
+    /// CSV with a row a cut: column file, and any of the keys of [[cut]] (spindle_rpm, feed_per_tooth_mm, order, …).
+    #[arg(long, value_name = "FILE")]
+    cut_list: Option<PathBuf>,
+}
+
+fn pair(text: &str) -> std::result::Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.trim().is_empty() && !value.trim().is_empty() => {
+            Ok((name.trim().to_string(), value.trim().to_string()))
+        }
+        _ => Err("write it as NAME=VALUE".into()),
+    }
+}
+
+impl Args {
+    fn answers(&self) -> Answers {
+        let mut answers = Answers::default();
+        for (table, key, value) in [
+            ("robot", "model", &self.robot),
+            ("frf", "quantity", &self.quantity),
+            ("frf", "force_level_n", &self.force_level_n),
+            ("tool", "diameter_mm", &self.diameter_mm),
+            ("tool", "teeth", &self.teeth),
+            ("tool", "helix_deg", &self.helix_deg),
+            ("tool", "half_point_angle_deg", &self.half_point_angle_deg),
+            ("tool", "web_thickness_mm", &self.web_thickness_mm),
+            ("dynamometer", "tool_from_dyno", &self.tool_from_dyno),
+            ("cut", "process", &self.process),
+            ("cut", "spindle_rpm", &self.spindle_rpm),
+            ("cut", "feed_per_tooth_mm", &self.feed_per_tooth_mm),
+            ("cut", "axial_depth_mm", &self.axial_depth_mm),
+            ("cut", "immersion", &self.immersion),
+            ("cut", "feed_per_rev_mm", &self.feed_per_rev_mm),
+            ("cut", "pilot_diameter_mm", &self.pilot_diameter_mm),
+            ("cut", "hole_depth_mm", &self.hole_depth_mm),
+        ] {
+            if let Some(value) = value {
+                answers.set(table, key, value);
+            }
+        }
+        for (id, joints) in &self.postures {
+            answers.set(format!("posture {id}"), "joints_deg", joints);
+        }
+        for (node, place) in &self.points {
+            let table = format!("point {node}");
+            let keys = ["body", "position_m", "axes"];
+            for (key, value) in keys.into_iter().zip(place.splitn(3, ':')) {
+                answers.set(&table, key, value);
+            }
+        }
+        answers
+    }
+}
+
+pub fn run(args: Args, as_json: bool) -> Result<Outcome> {
+    let dir = &args.dir;
+    let file = campaign_file(dir);
+    if !dir.is_dir() {
+        return Err(InputError::new("there is no such folder")
+            .file(dir)
+            .remedy("give the folder that the measurement files lie in")
+            .into());
+    }
+    if !args.force && file.symlink_metadata().is_ok() {
+        return Err(InputError::new("is there already; nothing was changed")
+            .file(&file)
+            .remedy("--force replaces it (its comments and values are lost)")
+            .into());
+    }
+    let scan = draft::scan(dir)?;
+    if scan.frfs.is_empty() && scan.forces.is_empty() {
+        return Err(nothing_found(&args, &scan));
+    }
+    let mut answers = args.answers();
+    if let Some(list) = &args.cut_list {
+        draft::read_cut_list(list, &scan, &mut answers)?;
+    }
+    let talking =
+        !as_json && !args.no_questions && std::io::stdin().is_terminal() && std::io::stderr().is_terminal();
+    let name = args.name.clone().unwrap_or_else(|| folder_name(&args));
+    let mut draft = Draft::new(&name, &scan, &answers)?;
+    if talking {
+        // Which keys a cut has depends on the process.
+        if draft.missing().iter().any(|m| m.key == "process") {
+            let process = ask("what was done in the cuts: milling or drilling", "milling")?;
+            if !process.trim().is_empty() {
+                answers.set("cut", "process", process.trim());
+                draft = Draft::new(&name, &scan, &answers)?;
+            }
+        }
+        draft.ask(&mut ask)?;
+    }
+    let missing = draft.missing();
+    let text = draft.toml();
+    if missing.is_empty() {
+        Campaign::from_text(dir, &text).map_err(as_given)?;
+    }
+    write_atomically(&file, text.as_bytes())?;
+
+    let guesses = draft.guesses();
+    let json = json!({
+        "dir": dir,
+        "file": file,
+        "complete": missing.is_empty(),
+        "frfs": scan.frfs.iter().map(|f| json!({ "file": f.path, "posture": f.posture, "nodes": f.nodes })).collect::<Vec<_>>(),
+        "cuts": scan.forces.iter().map(|f| json!({ "file": f.path })).collect::<Vec<_>>(),
+        "missing": missing,
+        "guessed": guesses,
+        "not_used": scan.not_used.iter().map(|(file, why)| json!({ "file": file, "why": why })).collect::<Vec<_>>(),
+    });
+    let next = next_step::begun(dir, missing.len(), !scan.frfs.is_empty());
+    Ok(Outcome::new(
+        json,
+        describe(&file, &scan, &draft, &missing),
+        Some(next),
+    ))
+}
+
+fn folder_name(args: &Args) -> String {
+    let full = args.dir.canonicalize().unwrap_or_else(|_| args.dir.clone());
+    full.file_name()
+        .map_or_else(|| "campaign".into(), |n| n.to_string_lossy().into_owned())
+}
+
+fn nothing_found(args: &Args, scan: &Scan) -> Error {
+    let mut problem = "holds no FRFs and no force records".to_string();
+    for (file, why) in scan.not_used.iter().take(5) {
+        problem += &format!("\n  {file}: {why}");
+    }
+    InputError::new(problem)
+        .file(&args.dir)
+        .remedy("copy the exported measurement files into it (UFF 58, CSV, DynoWare text export, TDMS)")
+        .into()
+}
+
+/// What is wrong with a file that was not written.
+fn as_given(error: Error) -> Error {
+    match error {
+        Error::Input(e) => {
+            let mut told = InputError::new(format!("{} (nothing was written)", e.problem));
+            told.key = e.key;
+            told.remedy = e.remedy;
+            told.into()
+        }
+        other => other,
+    }
+}
+
+/// One question on the terminal; an empty answer leaves it open.
+fn ask(question: &str, example: &str) -> Result<String> {
+    let mut terminal = anstream::stderr();
+    let _ = write!(
+        terminal,
+        "{} [such as {example}]: ",
+        Emphasis::Strong.on(question)
+    );
+    let _ = terminal.flush();
+    let mut answer = String::new();
+    std::io::stdin()
+        .lock()
+        .read_line(&mut answer)
+        .map_err(|e| Error::io("standard input", e))?;
+    Ok(answer.trim().to_string())
+}
+
+/// Names in a list before it is cut short.
+const SHOWN: usize = 6;
+
+fn describe(file: &std::path::Path, scan: &Scan, draft: &Draft, missing: &[Missing]) -> String {
+    let mut text = format!(
+        "{}: {} FRF files, {} force records\n",
+        Emphasis::Strong.on(file.display()),
+        scan.frfs.len(),
+        scan.forces.len()
+    );
+    let of = |kind: &str, names: &[String]| -> String {
+        match names {
+            [one] if one.is_empty() => format!("[{kind}]"),
+            some if some.len() <= SHOWN => format!("{kind} {}", some.join(", ")),
+            some => format!("{kind} {}, … ({} in all)", some[..SHOWN].join(", "), some.len()),
+        }
+    };
+    // What was concluded alike of many is said once.
+    let mut guessed: Vec<(String, String, String, Vec<String>)> = Vec::new();
+    for guess in draft.guesses() {
+        let (kind, name) = guess.table.split_once(' ').unwrap_or((&guess.table, ""));
+        let same = |g: &&mut (String, String, String, Vec<String>)| {
+            g.0 == kind && g.1 == format!("{} = {}", guess.key, guess.value) && g.2 == guess.why
+        };
+        match guessed.iter_mut().find(same) {
+            Some(g) => g.3.push(name.to_string()),
+            None => guessed.push((
+                kind.to_string(),
+                format!("{} = {}", guess.key, guess.value),
+                guess.why,
+                vec![name.to_string()],
+            )),
+        }
+    }
+    if !guessed.is_empty() {
+        let rows: Vec<Vec<String>> = guessed
+            .into_iter()
+            .map(|(kind, what, why, names)| vec![what, why, of(&kind, &names)])
+            .collect();
+        text += &format!(
+            "\nguessed: check these\n{}",
+            table(&["", "", ""], &rows).trim_start_matches('\n')
+        );
+    }
+    if !missing.is_empty() {
+        let rows: Vec<Vec<String>> = missing
+            .iter()
+            .map(|m| vec![m.key.to_string(), m.what.to_string(), of(m.table, &m.of)])
+            .collect();
+        let title = Emphasis::Doubtful.on("still to fill in (comments \"# fill in\" in the file)");
+        text += &format!(
+            "\n{title}\n{}",
+            table(&["", "", ""], &rows).trim_start_matches('\n')
+        );
+        if missing.iter().any(|m| m.table == "cut" && m.of.len() > 1) {
+            text += "  (a list of cuts, CSV with a column \"file\" and these keys, is read with --cut-list FILE)\n";
+        }
+    }
+    if !scan.not_used.is_empty() {
+        let notes: Vec<String> = scan
+            .not_used
+            .iter()
+            .map(|(file, why)| format!("not used: {file}: {why}"))
+            .collect();
+        text += &format!("\n{}", warnings(&notes));
+    }
+    text
+}

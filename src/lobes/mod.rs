@@ -22,6 +22,7 @@ pub mod measured;
 #[cfg(test)]
 mod milling_tests;
 pub mod multi_frequency;
+pub mod outcome;
 pub mod periodic_force;
 pub mod redundancy;
 pub mod robot;

@@ -110,9 +110,7 @@ impl Structure {
             method.best(&curve, BEST),
         );
         let band_at = |at: &[f64]| match cut {
-            Cut::Averaged(force) if !self.variants.is_empty() => {
-                Some(band::band(*force, &self.variants, at))
-            }
+            Cut::Averaged(force) if !self.variants.is_empty() => Some(band::band(*force, &self.variants, at)),
             _ => None,
         };
         let tips: Vec<f64> = best.iter().map(|p| p.spindle_rpm).collect();
@@ -225,8 +223,15 @@ impl LobeAnalysis {
             several => format!("the added effects ({}) together", several.join(", ")),
         };
         let sentence = |case: &LobeCase| {
-            let place = case.posture.as_ref().map(|p| format!("At {p} ")).unwrap_or_default();
-            let angle = case.angle_deg.map(|a| format!("and {a:.1}° ")).unwrap_or_default();
+            let place = case
+                .posture
+                .as_ref()
+                .map(|p| format!("At {p} "))
+                .unwrap_or_default();
+            let angle = case
+                .angle_deg
+                .map(|a| format!("and {a:.1}° "))
+                .unwrap_or_default();
             let of = |l: &AbsoluteLimit| format!("{:.4} mm ({:.2} Hz)", l.depth_mm, l.chatter_hz);
             let before = &case.before.as_ref()?.absolute;
             Some(match (before, &case.absolute) {
@@ -246,7 +251,10 @@ impl LobeAnalysis {
                 }
                 (Some(before), None) => format!("{place}{angle}{added} lifts the limit of {}", of(before)),
                 (None, Some(after)) => {
-                    format!("{place}{angle}{added} brings a limit of {} where there was none", of(after))
+                    format!(
+                        "{place}{angle}{added} brings a limit of {} where there was none",
+                        of(after)
+                    )
                 }
                 (None, None) => return None,
             })

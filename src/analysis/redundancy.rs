@@ -6,11 +6,11 @@ use super::lobe_model::ModelState;
 use super::lobes::{BEST, LobeCase};
 use crate::campaign::{Campaign, LobeMethod, LobesSection, Redundancy};
 use crate::lobes::band::{QUANTILES, quantile_mm};
-use crate::lobes::setup::Cut;
 use crate::lobes::redundancy::{
     AnglePosture, AngleStatus, LimitAtAngle, Recommendation, RedundancySweep, SPEED_MARGIN, agree,
     by_enumeration, by_swarm, margin_mm,
 };
+use crate::lobes::setup::Cut;
 use crate::lobes::{DirectFrf, LobeCurve, RegenerativeForce, SpeedLimit, StabilitySolver};
 use crate::{Error, InputError, Result};
 
@@ -95,7 +95,11 @@ pub(super) fn sweep(
             let solver = StabilitySolver::new(force, frf.as_ref());
             let curve = solver.curve(speeds);
             let before = match &state.before {
-                Some(model) => Some(model.dynamics(&joints, false)?.lobes_before(&Cut::Averaged(force), speeds)),
+                Some(model) => Some(
+                    model
+                        .dynamics(&joints, false)?
+                        .lobes_before(&Cut::Averaged(force), speeds),
+                ),
                 None => None,
             };
             Ok(LobeCase {

@@ -234,8 +234,15 @@ fn text(analysis: &LobeAnalysis) -> String {
     let did = analysis.what_effects_did();
     if !did.is_empty() {
         // Over the redundancy angle there is one for each angle.
-        out += &format!("\nBefore and after (baseline, refitted, against revision {}):\n", analysis.revision.unwrap_or(0));
-        out += &did.iter().take(MOST_SENTENCES).map(|s| format!("  {s}\n")).collect::<String>();
+        out += &format!(
+            "\nBefore and after (baseline, refitted, against revision {}):\n",
+            analysis.revision.unwrap_or(0)
+        );
+        out += &did
+            .iter()
+            .take(MOST_SENTENCES)
+            .map(|s| format!("  {s}\n"))
+            .collect::<String>();
     }
     let [from, to, step] = analysis.spindle_rpm;
     let optional = |v: Option<f64>, decimals: usize, none: &str| {

@@ -115,7 +115,10 @@ pub fn noted_cuts(campaign: &Campaign, section: &LobesSection) -> (Vec<NotedCut>
             Some("the lobes are those of many redundancy angles, and the cut was made at one")
         } else if cut.geometry.process() != section.process {
             Some("it is of another process than the lobes")
-        } else if section.teeth.is_some_and(|teeth| tool.is_some_and(|t| t.teeth != teeth)) {
+        } else if section
+            .teeth
+            .is_some_and(|teeth| tool.is_some_and(|t| t.teeth != teeth))
+        {
             Some("it was made with [tool], whose number of teeth is not that of the lobes")
         } else if section.ktc_n_per_mm2.is_none()
             && campaign.material.is_some()
@@ -135,9 +138,9 @@ pub fn noted_cuts(campaign: &Campaign, section: &LobesSection) -> (Vec<NotedCut>
         };
         let depth_mm = match cut.geometry {
             CutGeometry::Milling { axial_depth_mm, .. } => Some(axial_depth_mm),
-            CutGeometry::Drilling { pilot_diameter_mm, .. } => {
-                tool.map(|t| 0.5 * (t.diameter_mm - pilot_diameter_mm))
-            }
+            CutGeometry::Drilling {
+                pilot_diameter_mm, ..
+            } => tool.map(|t| 0.5 * (t.diameter_mm - pilot_diameter_mm)),
         };
         match (reason, depth_mm) {
             (None, Some(depth_mm)) => noted.push(NotedCut {
@@ -169,10 +172,12 @@ impl Outcomes {
     ) -> Option<Self> {
         let mut cuts = Vec::new();
         for (i, cut) in noted.iter().enumerate() {
-            let of_posture = limits.iter().filter(|(posture, _)| match (&cut.posture, posture) {
-                (Some(own), Some(posture)) => own == posture,
-                _ => true,
-            });
+            let of_posture = limits
+                .iter()
+                .filter(|(posture, _)| match (&cut.posture, posture) {
+                    (Some(own), Some(posture)) => own == posture,
+                    _ => true,
+                });
             match LimitRange::any_of(of_posture.filter_map(|(_, at)| at.get(i)).copied()) {
                 Some(range) => cuts.push(scored(cut, range)),
                 None => not_compared.push(NotCompared {
@@ -294,7 +299,11 @@ mod tests {
     #[test]
     fn a_limit_alone_leaves_nothing_open() {
         use CutOutcome::{Chatter, Stable};
-        let cuts = [noted("a", None, 0.99, Stable), noted("b", None, 1.01, Stable), noted("c", None, 50.0, Chatter)];
+        let cuts = [
+            noted("a", None, 0.99, Stable),
+            noted("b", None, 1.01, Stable),
+            noted("c", None, 50.0, Chatter),
+        ];
         let at = [
             LimitRange::new(Some(1.0), None),
             LimitRange::new(Some(1.0), None),
@@ -317,7 +326,10 @@ mod tests {
             noted("c", None, 1.5, Stable),
             noted("d", Some("p3"), 1.5, Stable),
         ];
-        let (low, high) = ([LimitRange::new(Some(1.0), None); 4], [LimitRange::new(Some(2.0), None); 4]);
+        let (low, high) = (
+            [LimitRange::new(Some(1.0), None); 4],
+            [LimitRange::new(Some(2.0), None); 4],
+        );
         let found = Outcomes::score(&cuts, &[(Some("p1"), &low), (Some("p2"), &high)], vec![]).unwrap();
         let verdicts: Vec<Verdict> = found.cuts.iter().map(|c| c.verdict).collect();
         assert_eq!(verdicts, [Verdict::Disagree, Verdict::Agree, Verdict::WithinBand]);

@@ -104,7 +104,12 @@ pub fn section(findings: &LobeFindings, structure: Option<&StructureFindings>) -
         Some(found) => blocks.extend(redundancy_section::blocks(analysis, found)),
         None => {
             blocks.extend(figures(analysis, "lobes", ""));
-            blocks.extend(analysis.what_effects_did().into_iter().map(|s| paragraph(format!("{s}."))));
+            blocks.extend(
+                analysis
+                    .what_effects_did()
+                    .into_iter()
+                    .map(|s| paragraph(format!("{s}."))),
+            );
             blocks.push(limits(findings));
         }
     }
@@ -149,7 +154,10 @@ fn doubt(structure: &StructureFindings) -> Option<String> {
 
 /// Where curves come with a band or with their state before effects were added, every posture gets its own frame.
 fn figures(analysis: &LobeAnalysis, file: &str, prefix: &str) -> Vec<Block> {
-    let detailed = analysis.cases.iter().any(|c| c.band.is_some() || c.before.is_some());
+    let detailed = analysis
+        .cases
+        .iter()
+        .any(|c| c.band.is_some() || c.before.is_some());
     let before = analysis.cases.iter().any(|c| c.before.is_some());
     let each = if detailed { PANELS } else { CURVES };
     let parts = analysis.cases.chunks(each).count();
@@ -198,8 +206,15 @@ fn panel(analysis: &LobeAnalysis, cases: &[LobeCase], detailed: bool) -> LobePan
         label: if detailed { String::new() } else { name(case) },
         spindle_rpm: case.curve.spindle_rpm.clone(),
         depth_limit_mm: case.curve.depth_limit_mm.clone(),
-        before_mm: case.before.as_ref().map(|b| b.curve.depth_limit_mm.clone()).unwrap_or_default(),
-        band_mm: case.band.as_ref().map(|b| [b.lower_mm.clone(), b.upper_mm.clone()]),
+        before_mm: case
+            .before
+            .as_ref()
+            .map(|b| b.curve.depth_limit_mm.clone())
+            .unwrap_or_default(),
+        band_mm: case
+            .band
+            .as_ref()
+            .map(|b| [b.lower_mm.clone(), b.upper_mm.clone()]),
     });
     let best = analysis.best();
     let tips = best
@@ -216,7 +231,12 @@ fn panel(analysis: &LobeAnalysis, cases: &[LobeCase], detailed: bool) -> LobePan
         .take(MARKED);
     let cuts = analysis.outcomes.iter().flat_map(|o| &o.cuts);
     let cuts = cuts
-        .filter(|cut| cut.posture.is_none() || cases.iter().any(|c| c.posture.is_none() || c.posture == cut.posture))
+        .filter(|cut| {
+            cut.posture.is_none()
+                || cases
+                    .iter()
+                    .any(|c| c.posture.is_none() || c.posture == cut.posture)
+        })
         .map(|cut| LobeMarker {
             spindle_rpm: cut.spindle_rpm,
             depth_mm: cut.depth_mm,
@@ -247,9 +267,17 @@ fn outcomes(outcomes: &Outcomes) -> Vec<Block> {
         "Test cuts: {} of {} lie below the limit, {} of {} above it. Against the 5 to 95 % band {}, {}, and of {} the model \
          cannot say.",
         o.stable_below_limit,
-        count(o.stable_below_limit + o.stable_above_limit, "stable cut", "stable cuts"),
+        count(
+            o.stable_below_limit + o.stable_above_limit,
+            "stable cut",
+            "stable cuts"
+        ),
         o.chatter_above_limit,
-        count(o.chatter_above_limit + o.chatter_below_limit, "cut with chatter", "cuts with chatter"),
+        count(
+            o.chatter_above_limit + o.chatter_below_limit,
+            "cut with chatter",
+            "cuts with chatter"
+        ),
         count(o.agree, "cut agrees", "cuts agree"),
         count(o.disagree, "disagrees", "disagree"),
         count(o.within_band, "cut", "cuts"),
@@ -287,7 +315,11 @@ fn outcomes(outcomes: &Outcomes) -> Vec<Block> {
                 Column::text("lobes"),
             ],
             rows,
-            notes: o.cuts.iter().filter_map(|c| Some(format!("Cut {}: {}.", c.id, c.meaning.as_ref()?))).collect(),
+            notes: o
+                .cuts
+                .iter()
+                .filter_map(|c| Some(format!("Cut {}: {}.", c.id, c.meaning.as_ref()?)))
+                .collect(),
         }));
     }
     let left_out = o.not_compared.iter();

@@ -214,6 +214,7 @@ const SLIPS: &[(&str, &str, &str, &str)] = &[
     ("exit_deg = 90.0\n", "", "cut[1].exit_deg", "missing@65"),
     ("start_deg = 0.0", "immersion = \"slot\"", "cut[1].exit_deg", "said twice, by immersion and by@73"),
     ("[1.2, 2.6]", "[2.6, 1.2]", "cut[0].steady_s", "starts at 2.6 s and ends at 1.2 s"),
+    ("posture = \"p2\"\n\n[[cut]]", "posture = \"tap\"\n\n[[cut]]", "cut[0].posture", "name one that is there (p1, p2)"),
     ("outcome = \"chatter\"", "outcome = \"loud\"", "cut[0].outcome", "\"stable\", \"chatter\""),
     ("process = \"drilling\"", "process = \"milling\"", "cut[2].feed_per_rev_mm", "belongs to drilling@80"),
     ("process = \"drilling\"\n", "", "cut[2].process", "missing@75"),

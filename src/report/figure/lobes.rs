@@ -133,7 +133,11 @@ impl LobePanel {
             let place = panel.place(marker.spindle_rpm, marker.depth_mm);
             if let Some((x, y)) = place.filter(|p| !marker.label.is_empty() && p.1 >= panel.top) {
                 let left = x > 0.9 * panel.right;
-                let (x, align) = if left { (x - 10.0, Align::Right) } else { (x + 10.0, Align::Left) };
+                let (x, align) = if left {
+                    (x - 10.0, Align::Right)
+                } else {
+                    (x + 10.0, Align::Left)
+                };
                 canvas.text((x, y), &marker.label, style::LEGEND.align(align));
             }
         }
@@ -149,9 +153,18 @@ fn shade(canvas: &Canvas, panel: &Panel, rpm: &[f64], lower: &[Option<f64>], upp
         Some((panel.x_at(*rpm.get(i)?)?, y.clamp(panel.top, panel.bottom)))
     };
     for i in 1..rpm.len() {
-        let corners = (|| Some([place(i - 1, lower)?, place(i, lower)?, place(i, upper)?, place(i - 1, upper)?]))();
+        let corners = (|| {
+            Some([
+                place(i - 1, lower)?,
+                place(i, lower)?,
+                place(i, upper)?,
+                place(i - 1, upper)?,
+            ])
+        })();
         if let Some(corners) = corners
-            && corners.iter().all(|(x, _)| *x >= panel.left - 0.5 && *x <= panel.right + 0.5)
+            && corners
+                .iter()
+                .all(|(x, _)| *x >= panel.left - 0.5 && *x <= panel.right + 0.5)
         {
             canvas.polygon(&corners, BAND, 1.0);
         }
@@ -172,7 +185,9 @@ impl LobesFigure {
             return Err(nothing_to_draw(&self.title, "no curve has a finite depth limit"));
         };
         let asked = self.depth_cap_mm.filter(|c| usable(*c) && *c > 0.0);
-        let caps: Vec<f64> = panels().map(|(p, deepest)| asked.unwrap_or_else(|| p.cap(deepest))).collect();
+        let caps: Vec<f64> = panels()
+            .map(|(p, deepest)| asked.unwrap_or_else(|| p.cap(deepest)))
+            .collect();
         let axes: Vec<Axis> = caps
             .iter()
             .map(|cap| Axis::from_zero("Depth limit (mm)", (0.0, *cap), if count > 1 { 5 } else { 7 }))
@@ -180,7 +195,11 @@ impl LobesFigure {
         let left = Panel::left_margin(&axes.iter().collect::<Vec<_>>());
         let right = f64::from(WIDTH) - Panel::RIGHT_MARGIN;
         let header = Header::new(&self.title, &self.legend(), left, right);
-        let (height, between) = if count > 1 { (STACKED, BETWEEN) } else { (ALONE, 0.0) };
+        let (height, between) = if count > 1 {
+            (STACKED, BETWEEN)
+        } else {
+            (ALONE, 0.0)
+        };
         let first = header.bottom() + 14.0;
         let frames: Vec<Panel> = axes
             .into_iter()
@@ -219,15 +238,28 @@ impl LobesFigure {
         let curves = || self.panels.iter().flat_map(|p| &p.curves);
         // All panels alike are explained once.
         let widest = self.panels.iter().max_by_key(|p| p.curves.len());
-        let drawn = widest.into_iter().flat_map(|p| &p.curves).enumerate().map(|(i, curve)| {
-            let name = or(&curve.label, "depth limit").to_owned();
-            (Swatch::Line(style::series(i)), name)
-        });
+        let drawn = widest
+            .into_iter()
+            .flat_map(|p| &p.curves)
+            .enumerate()
+            .map(|(i, curve)| {
+                let name = or(&curve.label, "depth limit").to_owned();
+                (Swatch::Line(style::series(i)), name)
+            });
         let before = curves().any(|c| !c.before_mm.is_empty());
         let before = before.then(|| (Swatch::Line(BEFORE), "before the effects were added".to_owned()));
         let band = curves().any(|c| c.band_mm.is_some());
-        let band = band.then(|| (Swatch::Area(BAND, 1.0), "5 to 95 % by the model's uncertainty".to_owned()));
-        let limits: Vec<f64> = self.panels.iter().filter_map(|p| p.absolute_limit_mm.filter(|l| usable(*l))).collect();
+        let band = band.then(|| {
+            (
+                Swatch::Area(BAND, 1.0),
+                "5 to 95 % by the model's uncertainty".to_owned(),
+            )
+        });
+        let limits: Vec<f64> = self
+            .panels
+            .iter()
+            .filter_map(|p| p.absolute_limit_mm.filter(|l| usable(*l)))
+            .collect();
         let limit = (!limits.is_empty()).then(|| {
             let name = match &limits[..] {
                 [one] => format!("absolute limit {} mm", significant(*one, 3)),
@@ -249,7 +281,12 @@ impl LobesFigure {
             let (marker, size, color) = sign(outcome);
             (Swatch::Sign(marker, size, color), name.to_owned())
         });
-        drawn.chain(before).chain(band).chain(limit).chain(signs).collect()
+        drawn
+            .chain(before)
+            .chain(band)
+            .chain(limit)
+            .chain(signs)
+            .collect()
     }
 }
 

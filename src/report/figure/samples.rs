@@ -264,7 +264,13 @@ pub fn lobes() -> LobesFigure {
 pub fn lobes_before_and_after() -> LobesFigure {
     let panel = |name: &str, least: f64, frequency_hz: f64| {
         let mut curve = lobe_curve("depth limit", least, frequency_hz);
-        let scaled = |factor: f64| curve.depth_limit_mm.iter().map(|d| d.map(|d| factor * d)).collect();
+        let scaled = |factor: f64| {
+            curve
+                .depth_limit_mm
+                .iter()
+                .map(|d| d.map(|d| factor * d))
+                .collect()
+        };
         curve.band_mm = Some([scaled(0.85), scaled(1.15)]);
         curve.before_mm = lobe_curve("", 1.3 * least, 1.1 * frequency_hz).depth_limit_mm;
         LobePanel {
@@ -375,6 +381,7 @@ pub fn gallery() -> Vec<(&'static str, Result<Vec<u8>, Error>)> {
         ("force_record", force_record().png()),
         ("regression", regression().png()),
         ("lobes", lobes().png()),
+        ("lobes_before_and_after", lobes_before_and_after().png()),
         ("side_by_side", side_by_side().png()),
         ("side_by_side_linear", linear.png()),
         ("history", history().png()),

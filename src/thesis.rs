@@ -12,8 +12,10 @@ use crate::identify::modal_table::{self, StrongestMode};
 use crate::identify::{Estimate, StructureModel};
 use crate::ingest::Axis;
 use crate::lobes::thesis::thesis_force;
+use crate::lobes::thesis_assumptions::reading;
 use crate::lobes::{
-    AbsoluteLimit, Peak, RobotFrf, SpeedLimit, StabilitySolver, peak_near, speed_grid, thesis_lobes,
+    AbsoluteLimit, AssumptionSwitched, Peak, RobotFrf, SpeedLimit, StabilitySolver, ThesisLobes,
+    assumptions_switched, peak_near, speed_grid, thesis_lobes,
 };
 use crate::robot::{PostureReport, RobotModel, RobotSpec};
 use crate::{Error, Result};
@@ -85,6 +87,10 @@ pub struct CaseStudy {
     pub real_case: RealCase,
     /// Table 30.
     pub lobes: Vec<LobeRow>,
+    /// Table 30 with one assumption switched at a time.
+    pub lobe_assumptions: Vec<AssumptionSwitched>,
+    /// What that comes to, for people.
+    pub lobe_reading: Vec<String>,
     /// Tables 20 and 23.
     pub cutting: CuttingTables,
 }
@@ -247,6 +253,8 @@ pub fn case_study() -> Result<CaseStudy> {
 
     // The table's standard deviations are assumed, not estimated: no widening by the misfit.
     let parameters = estimates(&model.parameters, &fit, 1.0)?;
+    let measured_lobes = thesis_lobes()?;
+    let lobe_assumptions = assumptions_switched(&measured_lobes)?;
     Ok(CaseStudy {
         static_stiffness: static_rows(&model, &nominal, &fit.theta)?,
         frequencies,
@@ -257,7 +265,9 @@ pub fn case_study() -> Result<CaseStudy> {
         predicted_frequency_error: rms(prediction_sum),
         unexplained: unexplained(&model, &fit.theta)?,
         real_case: real_case(&model)?,
-        lobes: lobe_rows(&model, &nominal, &fit.theta)?,
+        lobe_reading: reading(&lobe_assumptions),
+        lobe_assumptions,
+        lobes: lobe_rows(measured_lobes, &model, &nominal, &fit.theta)?,
         cutting: cutting_tables()?,
     })
 }
@@ -307,8 +317,13 @@ fn static_rows(model: &StructureModel, nominal: &[f64], fitted: &[f64]) -> Resul
 /// Speeds of the lobes, rpm: from, to, step.
 const SPINDLE_RPM: [f64; 3] = [100.0, 1500.0, 1.0];
 
-fn lobe_rows(model: &StructureModel, nominal: &[f64], fitted: &[f64]) -> Result<Vec<LobeRow>> {
-    thesis_lobes()?
+fn lobe_rows(
+    measured: Vec<ThesisLobes>,
+    model: &StructureModel,
+    nominal: &[f64],
+    fitted: &[f64],
+) -> Result<Vec<LobeRow>> {
+    measured
         .into_iter()
         .map(|row| {
             let of_model = |theta: &[f64]| model_tips(model, theta, row.configuration);

@@ -1,25 +1,22 @@
 //! The lobes that a campaign's `[lobes]` table asks for.
 
+use super::lobe_model::{Dynamics, ModelState};
 use super::redundancy::{self, RedundancyAnalysis};
 use crate::campaign::{Campaign, LobeMethod, LobeSource, LobesSection, Process};
-use crate::identify::calibrate::calibrate;
-use crate::identify::case::structure_model;
-use crate::identify::structure::StructureModel;
-use crate::identify::{Options, StructureCase};
 use crate::lobes::band::{self, LobeBand};
 use crate::lobes::measured::measured_structures;
+use crate::lobes::outcome::{LimitRange, NotedCut, Outcomes, noted_cuts};
 use crate::lobes::setup::{Cut, LobeCoefficients, coefficients_from_cuts, cut_of, frf_of_modes};
 use crate::lobes::{
-    AbsoluteLimit, DirectFrf, LobeCurve, MultiFrequency, Peak, RobotFrf, SemiDiscretisation, SpeedLimit,
+    AbsoluteLimit, DirectFrf, LobeCurve, MultiFrequency, Peak, SemiDiscretisation, SpeedLimit,
     StabilitySolver, StateSpace, speed_grid,
 };
 use crate::{InputError, Result};
 
 /// Best speeds that are listed.
 pub const BEST: usize = 10;
-/// Draws of the parameters for the band.
-const DRAWS: usize = 100;
-const SEED: u64 = 5;
+/// Changes of the limit below this share are not worth a word.
+const SAME: f64 = 0.005;
 
 /// Lobes of one structure.
 #[derive(Debug, Clone)]
@@ -36,6 +33,17 @@ pub struct LobeCase {
     pub best: Vec<Peak>,
     /// From the uncertainty of the calibrated parameters; averaged forces only.
     pub band: Option<LobeBand>,
+    /// Without the effects that were added to the model; `None` where there are none.
+    pub before: Option<LobesBefore>,
+    /// At the speed of every cut with a noted outcome.
+    pub(super) at_cuts: Vec<LimitRange>,
+}
+
+/// Lobes of the baseline (revision 0), fitted to the same data as the model with its effects.
+#[derive(Debug, Clone)]
+pub struct LobesBefore {
+    pub curve: LobeCurve,
+    pub absolute: Option<AbsoluteLimit>,
 }
 
 /// All lobes of a campaign.
@@ -50,21 +58,27 @@ pub struct LobeAnalysis {
     pub cases: Vec<LobeCase>,
     /// Where the campaign asks for the surface over the redundancy angle: its angles are the cases.
     pub redundancy: Option<RedundancyAnalysis>,
+    /// `effect@site` of what is in the model beside the baseline.
+    pub effects: Vec<String>,
+    /// Revision of the model; `None` where nothing was ever added, or the model is not what lobes come from.
+    pub revision: Option<usize>,
+    /// The cuts whose outcome was noted against these lobes; `None` where there are none.
+    pub outcomes: Option<Outcomes>,
     pub warnings: Vec<String>,
 }
 
 /// One structure that lobes are drawn for.
 struct Structure {
     posture: Option<String>,
-    frf: Box<dyn DirectFrf>,
-    /// The same as first-order equations; only where the method steps through time.
-    states: Option<StateSpace>,
+    dynamics: Dynamics,
+    /// The same before effects were added.
+    before: Option<Dynamics>,
     /// The same structure with parameters drawn from their uncertainty.
     variants: Vec<Box<dyn DirectFrf>>,
     description: String,
 }
 
-impl Structure {
+impl Dynamics {
     fn method(&self, cut: &Cut) -> Box<dyn SpeedLimit + '_> {
         let frf = self.frf.as_ref();
         match (cut, &self.states) {
@@ -76,73 +90,54 @@ impl Structure {
         }
     }
 
-    fn case(self, cut: &Cut, speeds: &[f64]) -> LobeCase {
+    /// The lobes of the model before effects were added.
+    pub(super) fn lobes_before(&self, cut: &Cut, speeds: &[f64]) -> LobesBefore {
         let method = self.method(cut);
         let curve = method.curve(speeds);
-        let (absolute, mut best) = (
-            method.absolute_limit().or(curve.least()),
-            method.best(&curve, BEST),
-        );
-        drop(method);
-        let band = match cut {
-            Cut::Averaged(force) if !self.variants.is_empty() => {
-                let tips: Vec<f64> = best.iter().map(|p| p.spindle_rpm).collect();
-                let at_tips = band::band(*force, &self.variants, &tips);
-                for (peak, lower) in best.iter_mut().zip(at_tips.lower_mm) {
-                    peak.lower_quantile_mm = lower;
-                }
-                Some(band::band(*force, &self.variants, speeds))
-            }
-            _ => None,
-        };
-        LobeCase {
-            posture: self.posture,
-            angle_deg: None,
-            description: self.description,
-            band_hz: self.frf.band_hz(),
-            absolute,
-            best,
-            band,
+        LobesBefore {
+            absolute: method.absolute_limit().or(curve.least()),
             curve,
         }
     }
 }
 
-/// The robot model that lobes are computed from.
-pub(super) struct ModelState {
-    pub model: StructureModel,
-    pub theta: Vec<f64>,
-    /// Parameters drawn from their uncertainty; none without a calibration.
-    pub draws: Vec<Vec<f64>>,
-    pub description: String,
-}
-
-impl ModelState {
-    fn robot_frf(&self, theta: &[f64], joints_deg: &[f64]) -> Result<RobotFrf> {
-        let kinematics = self.model.robot.kinematics(joints_deg)?;
-        let chain = self.model.chain(theta, &kinematics, 0.0, false);
-        RobotFrf::new(&self.model.robot, &kinematics, &chain)
-    }
-
-    /// The tool point's FRF, as a modal sum where the modes are not coupled.
-    pub fn frf(&self, joints_deg: &[f64]) -> Result<Box<dyn DirectFrf>> {
-        self.frf_with(&self.theta, joints_deg)
-    }
-
-    /// The same for each draw of the parameters.
-    pub fn variants(&self, joints_deg: &[f64]) -> Result<Vec<Box<dyn DirectFrf>>> {
-        self.draws
-            .iter()
-            .map(|theta| self.frf_with(theta, joints_deg))
-            .collect()
-    }
-
-    fn frf_with(&self, theta: &[f64], joints_deg: &[f64]) -> Result<Box<dyn DirectFrf>> {
-        let frf = self.robot_frf(theta, joints_deg)?;
-        Ok(match frf.modal()? {
-            Some(modal) => Box::new(modal),
-            None => Box::new(frf),
-        })
+impl Structure {
+    fn case(self, cut: &Cut, speeds: &[f64], noted: &[NotedCut]) -> LobeCase {
+        let method = self.dynamics.method(cut);
+        let curve = method.curve(speeds);
+        let (absolute, mut best) = (
+            method.absolute_limit().or(curve.least()),
+            method.best(&curve, BEST),
+        );
+        let band_at = |at: &[f64]| match cut {
+            Cut::Averaged(force) if !self.variants.is_empty() => Some(band::band(*force, &self.variants, at)),
+            _ => None,
+        };
+        let tips: Vec<f64> = best.iter().map(|p| p.spindle_rpm).collect();
+        if let Some(at_tips) = band_at(&tips) {
+            for (peak, lower) in best.iter_mut().zip(at_tips.lower_mm) {
+                peak.lower_quantile_mm = lower;
+            }
+        }
+        let cut_speeds: Vec<f64> = noted.iter().map(|c| c.spindle_rpm).collect();
+        let cut_band = band_at(&cut_speeds);
+        let at_cuts = method.curve(&cut_speeds).depth_limit_mm;
+        let at_cuts = at_cuts.into_iter().enumerate().map(|(i, limit)| {
+            let quantiles = cut_band.as_ref().map(|b| [b.lower_mm[i], b.upper_mm[i]]);
+            LimitRange::new(limit, quantiles)
+        });
+        LobeCase {
+            angle_deg: None,
+            band_hz: self.dynamics.frf.band_hz(),
+            absolute,
+            best,
+            band: band_at(speeds),
+            before: self.before.as_ref().map(|b| b.lobes_before(cut, speeds)),
+            at_cuts: at_cuts.collect(),
+            curve,
+            posture: self.posture,
+            description: self.description,
+        }
     }
 }
 
@@ -163,11 +158,13 @@ impl LobeAnalysis {
         };
         let cut = cut_of(campaign, section, coefficients)?;
         let speeds = speed_grid(section.spindle_rpm)?;
-        let mut surface = None;
+        let (noted, not_compared) = noted_cuts(campaign, section);
+        let (mut surface, mut effects, mut revision) = (None, Vec::new(), None);
         let structures = match section.source {
             LobeSource::Modes => from_modes(campaign, section)?,
             LobeSource::Model => {
-                let state = model_state(campaign, &mut warnings)?;
+                let state = ModelState::of(campaign, &mut warnings)?;
+                (effects, revision) = (state.effects.clone(), state.revision);
                 match &section.redundancy {
                     Some(wanted) => {
                         let force = cut.average();
@@ -185,11 +182,23 @@ impl LobeAnalysis {
                 .push("lobes.redundancy needs source = \"model\": there is no surface over the angle".into());
         }
         let (redundancy, swept) = surface.unzip();
-        let cases = structures
+        let cases: Vec<LobeCase> = structures
             .into_iter()
-            .map(|structure| structure.case(&cut, &speeds))
+            .map(|structure| structure.case(&cut, &speeds, &noted))
             .chain(swept.unwrap_or_default())
             .collect();
+        let limits: Vec<(Option<&str>, &[LimitRange])> = cases
+            .iter()
+            .map(|case| (case.posture.as_deref(), &case.at_cuts[..]))
+            .collect();
+        let outcomes = Outcomes::score(&noted, &limits, not_compared);
+        if limits.len() > 1 && redundancy.is_none() && noted.iter().any(|c| c.posture.is_none()) {
+            warnings.push(
+                "some cuts with an outcome do not say at which posture they were made: they are compared with the limits of \
+                 all postures together; add posture = \"…\" to their [[cut]]"
+                    .into(),
+            );
+        }
         Ok(LobeAnalysis {
             process: section.process,
             source: section.source,
@@ -199,8 +208,58 @@ impl LobeAnalysis {
             spindle_rpm: section.spindle_rpm,
             cases,
             redundancy,
+            effects,
+            revision,
+            outcomes,
             warnings,
         })
+    }
+
+    /// What the added effects did to the limit, a sentence for each posture; empty where nothing was added.
+    pub fn what_effects_did(&self) -> Vec<String> {
+        let added = match &self.effects[..] {
+            [] => return Vec::new(),
+            [one] => format!("the added {one}"),
+            several => format!("the added effects ({}) together", several.join(", ")),
+        };
+        let sentence = |case: &LobeCase| {
+            let place = case
+                .posture
+                .as_ref()
+                .map(|p| format!("At {p} "))
+                .unwrap_or_default();
+            let angle = case
+                .angle_deg
+                .map(|a| format!("and {a:.1}° "))
+                .unwrap_or_default();
+            let of = |l: &AbsoluteLimit| format!("{:.4} mm ({:.2} Hz)", l.depth_mm, l.chatter_hz);
+            let before = &case.before.as_ref()?.absolute;
+            Some(match (before, &case.absolute) {
+                (Some(before), Some(after)) => {
+                    let change = after.depth_mm / before.depth_mm - 1.0;
+                    let does = match change {
+                        c if c.abs() < SAME => "hardly changes the limit that holds at every speed:",
+                        c if c < 0.0 => "lowers the limit that holds at every speed",
+                        _ => "raises the limit that holds at every speed",
+                    };
+                    format!(
+                        "{place}{angle}{added} {does} from {} to {}: {:+.1} %",
+                        of(before),
+                        of(after),
+                        100.0 * change
+                    )
+                }
+                (Some(before), None) => format!("{place}{angle}{added} lifts the limit of {}", of(before)),
+                (None, Some(after)) => {
+                    format!(
+                        "{place}{angle}{added} brings a limit of {} where there was none",
+                        of(after)
+                    )
+                }
+                (None, None) => return None,
+            })
+        };
+        self.cases.iter().filter_map(sentence).collect()
     }
 
     /// The least limit of all cases.
@@ -235,8 +294,11 @@ fn from_modes(campaign: &Campaign, section: &LobesSection) -> Result<Vec<Structu
     }
     Ok(vec![Structure {
         posture: None,
-        states: steps_through_time(section).then(|| StateSpace::from(&frf)),
-        frf: Box::new(frf),
+        dynamics: Dynamics {
+            states: steps_through_time(section).then(|| StateSpace::from(&frf)),
+            frf: Box::new(frf),
+        },
+        before: None,
         variants: Vec::new(),
         description,
     }])
@@ -246,70 +308,19 @@ fn steps_through_time(section: &LobesSection) -> bool {
     section.method == LobeMethod::SemiDiscretisation
 }
 
-/// The robot model, calibrated where the campaign has FRFs.
-fn model_state(campaign: &Campaign, warnings: &mut Vec<String>) -> Result<ModelState> {
-    let (model, theta, draws, description) = if campaign.frfs.is_empty() {
-        warnings.push("the campaign has no FRFs: lobes are those of the uncalibrated robot file".into());
-        let model = structure_model(campaign)?;
-        let theta = model.nominal_theta();
-        (
-            model,
-            theta,
-            Vec::new(),
-            "robot model, not calibrated".to_string(),
-        )
-    } else {
-        let case = StructureCase::load(campaign)?;
-        let calibration = calibrate(&case.model, &case.data, None, case.options(Options::default()))?;
-        let description = match case.effects().is_empty() {
-            true => "calibrated robot model".to_string(),
-            false => format!("calibrated robot model ({})", case.model_description()),
-        };
-        warnings.extend(case.warnings);
-        warnings.extend(calibration.warnings());
-        let drawn = band::draws(
-            &calibration.theta,
-            &calibration.covariance,
-            &case.model.bounds(),
-            DRAWS,
-            SEED,
-        )?;
-        (case.model, calibration.theta, drawn, description)
-    };
-    if campaign.postures.is_empty() {
-        return Err(InputError::new("lobes from the model need at least one posture")
-            .file(campaign.dir.join("campaign.toml"))
-            .key("posture")
-            .remedy("add a [[posture]] table with id and joints_deg")
-            .into());
-    }
-    Ok(ModelState {
-        model,
-        theta,
-        draws,
-        description,
-    })
-}
-
 /// The robot model at every posture.
 fn at_postures(campaign: &Campaign, section: &LobesSection, state: &ModelState) -> Result<Vec<Structure>> {
     campaign
         .postures
         .iter()
         .map(|posture| {
-            let states = match steps_through_time(section) {
-                true => Some(
-                    state
-                        .robot_frf(&state.theta, &posture.joints_deg)?
-                        .state_space()?,
-                ),
-                false => None,
-            };
+            let (joints, through_time) = (&posture.joints_deg, steps_through_time(section));
+            let before = state.before.as_ref();
             Ok(Structure {
                 posture: Some(posture.id.clone()),
-                frf: state.frf(&posture.joints_deg)?,
-                states,
-                variants: state.variants(&posture.joints_deg)?,
+                dynamics: state.current.dynamics(joints, through_time)?,
+                before: before.map(|b| b.dynamics(joints, through_time)).transpose()?,
+                variants: state.variants(joints)?,
                 description: state.description.clone(),
             })
         })
@@ -338,8 +349,11 @@ fn from_measured(
             warnings.extend(s.notes.iter().map(|n| format!("{posture}: {n}")));
             Structure {
                 posture: Some(posture),
-                frf: Box::new(s.frf),
-                states: None,
+                dynamics: Dynamics {
+                    frf: Box::new(s.frf),
+                    states: None,
+                },
+                before: None,
                 variants: Vec::new(),
                 description: "measured FRFs".to_string(),
             }

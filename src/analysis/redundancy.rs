@@ -2,13 +2,15 @@
 
 use rayon::prelude::*;
 
-use super::lobes::{BEST, LobeCase, ModelState};
+use super::lobe_model::ModelState;
+use super::lobes::{BEST, LobeCase};
 use crate::campaign::{Campaign, LobeMethod, LobesSection, Redundancy};
 use crate::lobes::band::{QUANTILES, quantile_mm};
 use crate::lobes::redundancy::{
     AnglePosture, AngleStatus, LimitAtAngle, Recommendation, RedundancySweep, SPEED_MARGIN, agree,
     by_enumeration, by_swarm, margin_mm,
 };
+use crate::lobes::setup::Cut;
 use crate::lobes::{DirectFrf, LobeCurve, RegenerativeForce, SpeedLimit, StabilitySolver};
 use crate::{Error, InputError, Result};
 
@@ -75,7 +77,7 @@ pub(super) fn sweep(
     }
     let posture = &campaign.postures[redundancy.posture];
     let sweep = RedundancySweep::new(
-        &state.model.robot,
+        &state.current.model.robot,
         &posture.joints_deg,
         redundancy.step_deg,
         &redundancy.forbidden_deg,
@@ -92,6 +94,14 @@ pub(super) fn sweep(
             let frf = state.frf(&joints)?;
             let solver = StabilitySolver::new(force, frf.as_ref());
             let curve = solver.curve(speeds);
+            let before = match &state.before {
+                Some(model) => Some(
+                    model
+                        .dynamics(&joints, false)?
+                        .lobes_before(&Cut::Averaged(force), speeds),
+                ),
+                None => None,
+            };
             Ok(LobeCase {
                 posture: Some(posture.id.clone()),
                 angle_deg: Some(angle.angle_deg),
@@ -101,6 +111,8 @@ pub(super) fn sweep(
                 best: solver.best(&curve, BEST),
                 curve,
                 band: None,
+                before,
+                at_cuts: Vec::new(),
             })
         })
         .collect::<Result<Vec<LobeCase>>>()?;

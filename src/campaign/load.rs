@@ -29,7 +29,7 @@ const TOP: [&str; 12] = [
     "lobes",
 ];
 
-const CUT: [&str; 16] = [
+const CUT: [&str; 17] = [
     "id",
     "file",
     "process",
@@ -45,6 +45,7 @@ const CUT: [&str; 16] = [
     "order",
     "steady_s",
     "outcome",
+    "posture",
     "material",
 ];
 
@@ -111,7 +112,7 @@ fn read(dir: &Path, top: &Section<'_>) -> Result<Campaign> {
         ),
         None => None,
     };
-    let cuts = cuts(dir, top, tool.as_ref(), material.as_deref())?;
+    let cuts = cuts(dir, top, &postures, tool.as_ref(), material.as_deref())?;
     Ok(Campaign {
         dir: dir.to_path_buf(),
         name,
@@ -418,6 +419,7 @@ fn dynamometer(top: &Section<'_>) -> Result<Dynamometer> {
 fn cuts(
     dir: &Path,
     top: &Section<'_>,
+    postures: &[Posture],
     tool: Option<&Tool>,
     campaign_material: Option<&str>,
 ) -> Result<Vec<Cut>> {
@@ -449,6 +451,10 @@ fn cuts(
                 .or(campaign_material)
                 .map(str::to_string),
             outcome: section.choice("outcome", &outcomes)?,
+            posture: match section.has("posture") {
+                true => Some(posture_ref(&section, postures)?),
+                false => None,
+            },
             line: section.line(),
             id,
         });

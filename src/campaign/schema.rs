@@ -174,6 +174,15 @@ pub enum CutOutcome {
     Chatter,
 }
 
+impl CutOutcome {
+    pub fn label(self) -> &'static str {
+        match self {
+            CutOutcome::Stable => "stable",
+            CutOutcome::Chatter => "chatter",
+        }
+    }
+}
+
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cut {
     pub id: String,
@@ -188,6 +197,8 @@ pub struct Cut {
     pub material: Option<String>,
     /// How the cut went, where someone listened.
     pub outcome: Option<CutOutcome>,
+    /// Where the robot stood: index into `Campaign::postures`.
+    pub posture: Option<usize>,
     /// Line of `campaign.toml`, for messages.
     pub line: usize,
 }

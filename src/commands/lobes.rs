@@ -8,7 +8,11 @@ use super::{CampaignArg, Outcome};
 use crate::Result;
 use crate::analysis::{LobeAnalysis, RedundancyAnalysis};
 use crate::campaign::{Campaign, LobeMethod, Process};
+use crate::lobes::outcome::Outcomes;
 use crate::lobes::redundancy::AngleStatus;
+
+/// Postures or angles of which the change by added effects is told.
+const MOST_SENTENCES: usize = 8;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -44,6 +48,14 @@ fn document(analysis: &LobeAnalysis) -> Value {
                 "depth_p95_mm": case.band.as_ref().map(|b| &b.upper_mm),
                 "absolute_limit_mm": case.absolute.map(|a| a.depth_mm),
                 "absolute_limit_hz": case.absolute.map(|a| a.chatter_hz),
+                "before": case.before.as_ref().map(|before| json!({
+                    "revision": 0,
+                    "effects": [],
+                    "depth_limit_mm": before.curve.depth_limit_mm,
+                    "chatter_hz": before.curve.chatter_hz,
+                    "absolute_limit_mm": before.absolute.map(|a| a.depth_mm),
+                    "absolute_limit_hz": before.absolute.map(|a| a.chatter_hz),
+                })),
                 "frf": case.description,
                 "band_hz": [case.band_hz.0, case.band_hz.1],
             })
@@ -71,10 +83,13 @@ fn document(analysis: &LobeAnalysis) -> Value {
         "teeth": analysis.teeth,
         "ktc_n_per_mm2": analysis.coefficients.ktc_n_per_mm2,
         "krc_n_per_mm2": analysis.coefficients.krc_n_per_mm2,
+        "revision": analysis.revision,
+        "effects": analysis.effects,
         "curves": curves,
         "absolute_limit_mm": absolute.map(|a| a.depth_mm),
         "absolute_limit_hz": absolute.map(|a| a.chatter_hz),
         "best": best,
+        "outcomes": analysis.outcomes,
         "redundancy": analysis.redundancy.as_ref().map(redundancy),
         "warnings": analysis.warnings,
     })
@@ -143,6 +158,32 @@ fn redundancy_text(found: &RedundancyAnalysis) -> String {
     )
 }
 
+fn outcomes_text(outcomes: &Outcomes) -> String {
+    let o = outcomes;
+    let mut out = format!(
+        "\nCuts with a noted outcome: {} of {} stable ones lie below the limit, {} of {} with chatter above it\n",
+        o.stable_below_limit,
+        o.stable_below_limit + o.stable_above_limit,
+        o.chatter_above_limit,
+        o.chatter_above_limit + o.chatter_below_limit,
+    );
+    out += &format!(
+        "With the band (5-95 %): {} agree, {} disagree, of {} the model cannot say\n",
+        o.agree, o.disagree, o.within_band
+    );
+    for cut in &o.cuts {
+        if let Some(meaning) = &cut.meaning {
+            let (name, said) = (&cut.id, cut.outcome.label());
+            let (depth, speed) = (cut.depth_mm, cut.spindle_rpm);
+            out += &format!("  cut {name} ({said}, {depth} mm at {speed} rpm): {meaning}\n");
+        }
+    }
+    for cut in &o.not_compared {
+        out += &format!("  cut {} is not compared: {}\n", cut.id, cut.reason);
+    }
+    out
+}
+
 fn text(analysis: &LobeAnalysis) -> String {
     let (process, depth) = match analysis.process {
         Process::Milling => (
@@ -190,6 +231,19 @@ fn text(analysis: &LobeAnalysis) -> String {
         ),
         None => "\nStable at every speed and depth\n".to_string(),
     };
+    let did = analysis.what_effects_did();
+    if !did.is_empty() {
+        // Over the redundancy angle there is one for each angle.
+        out += &format!(
+            "\nBefore and after (baseline, refitted, against revision {}):\n",
+            analysis.revision.unwrap_or(0)
+        );
+        out += &did
+            .iter()
+            .take(MOST_SENTENCES)
+            .map(|s| format!("  {s}\n"))
+            .collect::<String>();
+    }
     let [from, to, step] = analysis.spindle_rpm;
     let optional = |v: Option<f64>, decimals: usize, none: &str| {
         v.map_or(none.to_string(), |v| format!("{v:.decimals$}"))
@@ -224,6 +278,9 @@ fn text(analysis: &LobeAnalysis) -> String {
     if analysis.best().iter().any(|(_, peak)| peak.at_range_end) {
         out +=
             "A speed at the end of the range is the deepest there: the curve may rise further beyond it.\n";
+    }
+    if let Some(outcomes) = &analysis.outcomes {
+        out += &outcomes_text(outcomes);
     }
     if let Some(found) = &analysis.redundancy {
         out += &redundancy_text(found);

@@ -108,6 +108,20 @@ impl StructureCase {
         StructureStudy::new(&self.model.robot.spec, self.data.clone(), self.options(wanted))
     }
 
+    /// The model without the effects that were added, starting from where it stood when the first of them was; `None`
+    /// where the model has no effects.
+    ///
+    /// # Errors
+    /// As for [`load`](Self::load).
+    pub fn before_effects(&self, campaign: &Campaign) -> Result<Option<StructureModel>> {
+        match self.revisions.first() {
+            Some(first) if !self.model.effects().is_empty() => {
+                with_revision(campaign, &self.baseline, &self.data, first).map(Some)
+            }
+            _ => Ok(None),
+        }
+    }
+
     /// Number of the current revision; `None` where nothing was ever added.
     pub fn revision(&self) -> Option<usize> {
         self.revisions.last().map(|r| r.revision)

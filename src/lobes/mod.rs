@@ -22,6 +22,7 @@ pub mod measured;
 #[cfg(test)]
 mod milling_tests;
 pub mod multi_frequency;
+pub mod outcome;
 pub mod periodic_force;
 pub mod redundancy;
 pub mod robot;
@@ -31,6 +32,7 @@ pub mod setup;
 pub mod solve;
 pub mod state_space;
 pub mod thesis;
+pub mod thesis_assumptions;
 
 pub use band::LobeBand;
 pub use curve::{AbsoluteLimit, Limit, LobeCurve, Peak, SpeedLimit, peak_near, peaks, speed_grid};
@@ -44,3 +46,4 @@ pub use semi_discretisation::SemiDiscretisation;
 pub use solve::StabilitySolver;
 pub use state_space::StateSpace;
 pub use thesis::{ThesisLobes, thesis_lobes};
+pub use thesis_assumptions::{AssumptionSwitched, assumptions_switched};

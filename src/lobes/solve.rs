@@ -12,6 +12,10 @@ pub struct StabilitySolver<'a> {
     force: RegenerativeForce,
     frf: &'a dyn DirectFrf,
     arcs: Vec<Arc>,
+    /// First lobe that counts.
+    first_lobe: f64,
+    /// Added to k + ε/2π, in turns.
+    extra_turns: f64,
 }
 
 /// Phase left over at a root, in turns.
@@ -32,13 +36,22 @@ impl<'a> StabilitySolver<'a> {
             force,
             frf,
             arcs: arcs::build(&force, frf, halvings),
+            first_lobe: f64::NEG_INFINITY,
+            extra_turns: 0.0,
         }
+    }
+
+    /// Lobes as a program finds them that starts at another lobe than k = 0, or has ωT = 2π(k + `extra_turns`) + ε (½:
+    /// the delayed term has the wrong sign). Not for cuts: to see whether such a slip explains somebody's numbers.
+    pub(super) fn with_lobes(mut self, first_lobe: f64, extra_turns: f64) -> Self {
+        (self.first_lobe, self.extra_turns) = (first_lobe, extra_turns);
+        self
     }
 
     /// All roots of ωT = 2πk + ε(ω) on an arc that could beat the best so far.
     fn visit(&self, arc: &Arc, period_s: f64, best: &mut Best) {
         // Phase in turns: a whole number at a root.
-        let turns = |s: f64, epsilon: f64| arc.frequency_hz(s) * period_s - epsilon / TAU;
+        let turns = |s: f64, epsilon: f64| arc.frequency_hz(s) * period_s - epsilon / TAU - self.extra_turns;
         let p = [
             turns(0.0, arc.epsilon[0]),
             turns(0.5, arc.epsilon[1]),
@@ -75,7 +88,7 @@ impl<'a> StabilitySolver<'a> {
         best: &mut Best,
     ) {
         let (low, high) = (end_turns[0].min(end_turns[1]), end_turns[0].max(end_turns[1]));
-        let mut whole = low.ceil();
+        let mut whole = low.ceil().max(self.first_lobe);
         while whole <= high {
             let residual = |s: f64| {
                 let lambda = arc.exact(&self.force, self.frf, s);

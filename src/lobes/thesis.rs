@@ -6,10 +6,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::curve::{AbsoluteLimit, LobeCurve, Peak, SpeedLimit, peaks, speed_grid};
+use super::curve::{AbsoluteLimit, LobeCurve, Peak, SpeedLimit, speed_grid};
 use super::force::RegenerativeForce;
 use super::frf::{AxisMode, ModalFrf};
 use super::solve::StabilitySolver;
+use super::thesis_assumptions::tip_near;
 use crate::{Error, Result};
 
 const MINIMA: &str = include_str!("../../datasets/irb6640/real_part_minima_measured.csv");
@@ -69,11 +70,12 @@ struct Conditions {
 }
 
 #[derive(Deserialize)]
-struct LobeConditions {
-    ktc_n_per_mm2: f64,
-    krc_n_per_mm2: f64,
-    half_tip_angle_rad: f64,
-    flutes: usize,
+pub(super) struct LobeConditions {
+    pub ktc_n_per_mm2: f64,
+    pub krc_n_per_mm2: f64,
+    pub half_tip_angle_rad: f64,
+    pub flutes: usize,
+    pub speed_step_rpm: f64,
 }
 
 fn rows<T: for<'de> Deserialize<'de>>(name: &str, text: &str) -> Result<Vec<T>> {
@@ -83,10 +85,15 @@ fn rows<T: for<'de> Deserialize<'de>>(name: &str, text: &str) -> Result<Vec<T>> 
         .map_err(|e| Error::computation(format!("built-in {name}: {e}")))
 }
 
-/// The force of table 30: drilling directional matrix with the thesis's milling coefficients of Al 7075.
-pub fn thesis_force() -> Result<RegenerativeForce> {
+pub(super) fn conditions() -> Result<LobeConditions> {
     let Conditions { lobes } = toml::from_str(CONDITIONS)
         .map_err(|e| Error::computation(format!("built-in cutting_conditions.toml: {e}")))?;
+    Ok(lobes)
+}
+
+/// The force of table 30: drilling directional matrix with the thesis's milling coefficients of Al 7075.
+pub fn thesis_force() -> Result<RegenerativeForce> {
+    let lobes = conditions()?;
     RegenerativeForce::drilling_lateral(
         lobes.ktc_n_per_mm2,
         lobes.krc_n_per_mm2,
@@ -154,16 +161,9 @@ pub fn thesis_lobes() -> Result<Vec<ThesisLobes>> {
                 })
                 .map(|row| row.frequency_hz)
                 .ok_or_else(|| missing("measured mode"))?;
-            let tip = |k: f64| {
-                let expected = 60.0 * dominant_hz / (force.teeth as f64 * k);
-                peaks(&curve)
-                    .into_iter()
-                    .filter(|p| (p.spindle_rpm / expected - 1.0).abs() < 0.1)
-                    .max_by(|a, b| {
-                        let depth = |p: &Peak| p.depth_mm.unwrap_or(f64::INFINITY);
-                        depth(a).total_cmp(&depth(b))
-                    })
-                    .ok_or_else(|| missing("stability peak"))
+            let tip = |waves: f64| {
+                let expected = 60.0 * dominant_hz / (force.teeth as f64 * waves);
+                tip_near(&curve, expected).ok_or_else(|| missing("stability peak"))
             };
             let rows = || published.iter().filter(|row| row.configuration == configuration);
             let peak = |spindle_rpm, depth_mm| Peak::new(spindle_rpm, Some(depth_mm));

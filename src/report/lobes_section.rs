@@ -1,16 +1,19 @@
 //! Stability lobes.
 
-use super::figure::{LobeCurve, LobeMarker, LobeOutcome, LobesFigure};
+use super::figure::{LobeCurve, LobeMarker, LobeOutcome, LobePanel, LobesFigure};
 use super::number::{decimals, percent, significant};
-use super::parts::{figure, paragraph};
+use super::parts::{count, figure, paragraph};
 use super::redundancy_section;
 use super::structure_section::NOISE_LIKE;
 use super::{Block, Column, Section, Table};
-use crate::analysis::{LobeAnalysis, LobeFindings, StructureFindings};
-use crate::campaign::{LobeMethod, LobeSource, Process};
+use crate::analysis::{LobeAnalysis, LobeCase, LobeFindings, StructureFindings};
+use crate::campaign::{CutOutcome, LobeMethod, LobeSource, Process};
+use crate::lobes::outcome::{Outcomes, Verdict};
 
 /// Curves in one figure.
 const CURVES: usize = 6;
+/// Frames in one figure, where every posture has its own.
+const PANELS: usize = 3;
 /// Tips marked in the figure.
 const MARKED: usize = 3;
 
@@ -101,9 +104,16 @@ pub fn section(findings: &LobeFindings, structure: Option<&StructureFindings>) -
         Some(found) => blocks.extend(redundancy_section::blocks(analysis, found)),
         None => {
             blocks.extend(figures(analysis, "lobes", ""));
+            blocks.extend(
+                analysis
+                    .what_effects_did()
+                    .into_iter()
+                    .map(|s| paragraph(format!("{s}."))),
+            );
             blocks.push(limits(findings));
         }
     }
+    blocks.extend(analysis.outcomes.iter().flat_map(outcomes));
     blocks.push(best(analysis));
     match &findings.measured {
         Some(Ok(measured)) => {
@@ -142,45 +152,179 @@ fn doubt(structure: &StructureFindings) -> Option<String> {
     })
 }
 
+/// Where curves come with a band or with their state before effects were added, every posture gets its own frame.
 fn figures(analysis: &LobeAnalysis, file: &str, prefix: &str) -> Vec<Block> {
-    let best = analysis.best();
-    let parts = analysis.cases.chunks(CURVES).count();
-    let chunks = analysis.cases.chunks(CURVES).enumerate();
+    let detailed = analysis
+        .cases
+        .iter()
+        .any(|c| c.band.is_some() || c.before.is_some());
+    let before = analysis.cases.iter().any(|c| c.before.is_some());
+    let each = if detailed { PANELS } else { CURVES };
+    let parts = analysis.cases.chunks(each).count();
+    let chunks = analysis.cases.chunks(each).enumerate();
     chunks
         .map(|(part, cases)| {
-            let curves = cases.iter().map(|case| LobeCurve {
-                label: case.posture.clone().unwrap_or_else(|| "modes".into()),
-                spindle_rpm: case.curve.spindle_rpm.clone(),
-                depth_limit_mm: case.curve.depth_limit_mm.clone(),
-            });
-            let markers = best
-                .iter()
-                .filter(|(case, _)| cases.iter().any(|c| c.posture == case.posture))
-                .filter_map(|(_, peak)| {
-                    Some(LobeMarker {
-                        spindle_rpm: peak.spindle_rpm,
-                        depth_mm: peak.depth_mm?,
-                        outcome: LobeOutcome::Tip,
-                    })
-                })
-                .take(MARKED);
+            let panels = match detailed {
+                true => cases.iter().map(|case| panel(analysis, std::slice::from_ref(case), detailed)).collect(),
+                false => vec![panel(analysis, cases, detailed)],
+            };
             let number = if parts > 1 { format!(", part {}", part + 1) } else { String::new() };
             let drawing = LobesFigure {
                 title: format!("Stability lobes, {prefix}{}{number}", process(analysis)),
-                curves: curves.collect(),
-                absolute_limit_mm: analysis.absolute().map(|a| a.depth_mm),
-                markers: markers.collect(),
+                panels,
                 depth_cap_mm: None,
             };
             let name = if parts > 1 { format!("{file}-{}", part + 1) } else { file.to_string() };
-            let caption = format!(
-                "Depth limit over spindle speed, {}; one curve a posture. The dotted line is the least limit of all \
-                 postures; diamonds mark the deepest tips.",
-                source(analysis)
-            );
+            let mut caption = format!("Depth limit over spindle speed, {}; ", source(analysis));
+            caption += match detailed {
+                true => "one frame a posture. The dotted line is the least limit of that posture",
+                false => "one curve a posture. The dotted line is the least limit of all postures",
+            };
+            if before {
+                caption += &format!(
+                    "; the grey dashes are the limit before {} {} added, with everything fitted anew",
+                    analysis.effects.join(", "),
+                    if analysis.effects.len() == 1 { "was" } else { "were" }
+                );
+            }
+            if detailed && cases.iter().any(|c| c.band.is_some()) {
+                caption += "; the shade holds 90 % of what the uncertainty of the model's parameters allows";
+            }
+            caption += "; diamonds mark the deepest tips.";
+            if analysis.outcomes.as_ref().is_some_and(|o| !o.cuts.is_empty()) {
+                caption += " Discs are cuts that were stable, crosses cuts that chattered; those that do not agree with \
+                            the limit have their names.";
+            }
             figure(name, &drawing.title.clone(), caption, drawing.png())
         })
         .collect()
+}
+
+fn panel(analysis: &LobeAnalysis, cases: &[LobeCase], detailed: bool) -> LobePanel {
+    let name = |case: &LobeCase| case.posture.clone().unwrap_or_else(|| "modes".into());
+    let curves = cases.iter().map(|case| LobeCurve {
+        label: if detailed { String::new() } else { name(case) },
+        spindle_rpm: case.curve.spindle_rpm.clone(),
+        depth_limit_mm: case.curve.depth_limit_mm.clone(),
+        before_mm: case
+            .before
+            .as_ref()
+            .map(|b| b.curve.depth_limit_mm.clone())
+            .unwrap_or_default(),
+        band_mm: case
+            .band
+            .as_ref()
+            .map(|b| [b.lower_mm.clone(), b.upper_mm.clone()]),
+    });
+    let best = analysis.best();
+    let tips = best
+        .iter()
+        .filter(|(case, _)| cases.iter().any(|c| c.posture == case.posture))
+        .filter_map(|(_, peak)| {
+            Some(LobeMarker {
+                spindle_rpm: peak.spindle_rpm,
+                depth_mm: peak.depth_mm?,
+                outcome: LobeOutcome::Tip,
+                label: String::new(),
+            })
+        })
+        .take(MARKED);
+    let cuts = analysis.outcomes.iter().flat_map(|o| &o.cuts);
+    let cuts = cuts
+        .filter(|cut| {
+            cut.posture.is_none()
+                || cases
+                    .iter()
+                    .any(|c| c.posture.is_none() || c.posture == cut.posture)
+        })
+        .map(|cut| LobeMarker {
+            spindle_rpm: cut.spindle_rpm,
+            depth_mm: cut.depth_mm,
+            outcome: match cut.outcome {
+                CutOutcome::Stable => LobeOutcome::Stable,
+                CutOutcome::Chatter => LobeOutcome::Chatter,
+            },
+            label: match cut.verdict {
+                Verdict::Agree => String::new(),
+                Verdict::Disagree | Verdict::WithinBand => format!("cut {}", cut.id),
+            },
+        });
+    LobePanel {
+        name: cases.first().map(name).unwrap_or_default(),
+        markers: tips.chain(cuts).collect(),
+        absolute_limit_mm: match (detailed, cases) {
+            (true, [case]) => case.absolute.map(|a| a.depth_mm),
+            _ => analysis.absolute().map(|a| a.depth_mm),
+        },
+        curves: curves.collect(),
+    }
+}
+
+/// The cuts of which somebody noted how they went.
+fn outcomes(outcomes: &Outcomes) -> Vec<Block> {
+    let o = outcomes;
+    let mut blocks = vec![paragraph(format!(
+        "Test cuts: {} of {} lie below the limit, {} of {} above it. Against the 5 to 95 % band {}, {}, and of {} the model \
+         cannot say.",
+        o.stable_below_limit,
+        count(
+            o.stable_below_limit + o.stable_above_limit,
+            "stable cut",
+            "stable cuts"
+        ),
+        o.chatter_above_limit,
+        count(
+            o.chatter_above_limit + o.chatter_below_limit,
+            "cut with chatter",
+            "cuts with chatter"
+        ),
+        count(o.agree, "cut agrees", "cuts agree"),
+        count(o.disagree, "disagrees", "disagree"),
+        count(o.within_band, "cut", "cuts"),
+    ))];
+    let mm = |v: Option<f64>| v.map_or("no limit".into(), |v| significant(v, 3));
+    let rows = o.cuts.iter().map(|cut| {
+        let verdict = match cut.verdict {
+            Verdict::Agree => "agrees",
+            Verdict::Disagree => "DISAGREES",
+            Verdict::WithinBand => "cannot say",
+        };
+        vec![
+            cut.id.clone(),
+            cut.posture.clone().unwrap_or_else(|| "–".into()),
+            decimals(cut.spindle_rpm, 0),
+            significant(cut.depth_mm, 3),
+            cut.outcome.label().into(),
+            mm(cut.limit_mm),
+            format!("{} – {}", mm(cut.lower_mm), mm(cut.upper_mm)),
+            verdict.into(),
+        ]
+    });
+    let rows: Vec<Vec<String>> = rows.collect();
+    if !rows.is_empty() {
+        blocks.push(Block::Table(Table {
+            caption: "Cuts with a noted outcome, beside the limit at their speed".into(),
+            columns: vec![
+                Column::text("cut"),
+                Column::text("posture"),
+                Column::number("speed (rpm)"),
+                Column::number("depth (mm)"),
+                Column::text("outcome"),
+                Column::number("limit (mm)"),
+                Column::number("5 to 95 % (mm)"),
+                Column::text("lobes"),
+            ],
+            rows,
+            notes: o
+                .cuts
+                .iter()
+                .filter_map(|c| Some(format!("Cut {}: {}.", c.id, c.meaning.as_ref()?)))
+                .collect(),
+        }));
+    }
+    let left_out = o.not_compared.iter();
+    blocks.extend(left_out.map(|c| paragraph(format!("Cut {} is not compared: {}.", c.id, c.reason))));
+    blocks
 }
 
 fn limits(findings: &LobeFindings) -> Block {

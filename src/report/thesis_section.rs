@@ -8,7 +8,7 @@ use super::{real_case_section, thesis_cutting};
 use crate::analysis::ThesisFindings;
 use crate::analysis::thesis_findings::Range;
 use crate::lobes::Peak;
-use crate::thesis::{FITTED_CONFIGURATIONS, LobeTips, Row};
+use crate::thesis::{CaseStudy, FITTED_CONFIGURATIONS, LobeTips, Row};
 
 pub fn section(findings: &ThesisFindings) -> Section {
     let study = &findings.study;
@@ -49,6 +49,8 @@ pub fn section(findings: &ThesisFindings) -> Section {
     blocks.extend(real_case_section::blocks(&study.real_case));
     blocks.push(lobe_table(findings));
     blocks.push(paragraph(lobe_text(findings)));
+    blocks.push(assumption_table(&findings.study));
+    blocks.extend(findings.study.lobe_reading.iter().cloned().map(paragraph));
     blocks.extend(thesis_cutting::blocks(&study.cutting));
     Section {
         id: "thesis".into(),
@@ -340,15 +342,43 @@ fn lobe_table(findings: &ThesisFindings) -> Block {
     })
 }
 
+fn assumption_table(study: &CaseStudy) -> Block {
+    let ratio = |r: Option<f64>| r.map_or("–".into(), |r| decimals(r, 2));
+    let rows = study.lobe_assumptions.iter().map(|a| {
+        let ratios = a.speed_ratio.into_iter().chain(a.depth_ratio).map(ratio);
+        let found = format!("{}, {}", a.found[0], a.found[1]);
+        std::iter::once(a.assumption.to_string())
+            .chain(ratios)
+            .chain([found])
+            .collect()
+    });
+    Block::Table(Table {
+        caption: "Table 30 with one assumption switched at a time: the commercial program's tips over ours".into(),
+        columns: vec![
+            Column::text("assumption"),
+            Column::number("speed, second region"),
+            Column::number("speed, first region"),
+            Column::number("depth, second region"),
+            Column::number("depth, first region"),
+            Column::text("tips found"),
+        ],
+        rows: rows.collect(),
+        notes: vec![
+            "Geometric mean over the configurations that have a tip within 10 % of 60 f/(N w), f the strongest mode, w = 2 \
+             and 1 whole waves between two teeth (1½ and ½ where the delayed term has the wrong sign)."
+                .into(),
+        ],
+    })
+}
+
 fn lobe_text(findings: &ThesisFindings) -> String {
     format!(
         "Depths: the thesis's own program gave {} times the commercial program's depths; ours, from FRFs rebuilt out of \
          the measured minima, are of the commercial program's order (theirs are {} times ours). Speeds do not agree: the \
          commercial program's tips lie at {} times our speeds in the second region and at {} times in the first. Tips \
          of a single mode must lie near 60 f/(N k), with N = {} teeth and k waves between two teeth, which is where ours \
-         are. The two programs therefore cannot have used the same number of teeth, the same mode or the same \
-         directional factors. Which of these assumptions differs cannot be told from what is published; the reason is \
-         open, and neither column should be taken for the truth before a cut has been made.",
+         are. The table below switches one assumption at a time to see which could be the reason; neither column should be \
+         taken for the truth before a cut has been made.",
         maybe(findings.published_depth),
         maybe(findings.depth),
         maybe(findings.speed_second_region),

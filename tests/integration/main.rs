@@ -8,6 +8,7 @@ mod demo;
 mod diagnose;
 mod init;
 mod inspect;
+mod lobes;
 mod modal;
 mod next_step;
 mod records;

@@ -1,7 +1,7 @@
 //! Stability lobes: the depth of cut that is just stable, over spindle speed.
 
 use super::axis::{Axis, extent, quantile, usable};
-use super::canvas::{Align, Color, Marker, paint};
+use super::canvas::{Align, Canvas, Color, Marker, Stroke, paint};
 use super::frf::or;
 use super::panel::{Header, Panel, Swatch};
 use super::{WIDTH, nothing_to_draw, style};
@@ -14,6 +14,10 @@ pub struct LobeCurve {
     pub spindle_rpm: Vec<f64>,
     /// None where no limit exists at that speed.
     pub depth_limit_mm: Vec<Option<f64>>,
+    /// The limit before effects were added to the model, at the same speeds; empty where there is none.
+    pub before_mm: Vec<Option<f64>>,
+    /// Lower and upper quantile of the limit at the same speeds.
+    pub band_mm: Option<[Vec<Option<f64>>; 2]>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,108 +30,72 @@ pub enum LobeOutcome {
     Tip,
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct LobeMarker {
     pub spindle_rpm: f64,
     pub depth_mm: f64,
     pub outcome: LobeOutcome,
+    /// Written beside the sign; may be empty.
+    pub label: String,
+}
+
+/// One frame of the figure.
+#[derive(Debug, Clone, Default)]
+pub struct LobePanel {
+    /// Written into the frame where there are several.
+    pub name: String,
+    pub curves: Vec<LobeCurve>,
+    pub markers: Vec<LobeMarker>,
+    /// The depth below which every speed is stable.
+    pub absolute_limit_mm: Option<f64>,
 }
 
 #[derive(Debug, Clone, Default)]
 pub struct LobesFigure {
     pub title: String,
-    pub curves: Vec<LobeCurve>,
-    /// The depth below which every speed is stable.
-    pub absolute_limit_mm: Option<f64>,
-    pub markers: Vec<LobeMarker>,
+    /// Above each other, over the same speeds.
+    pub panels: Vec<LobePanel>,
     /// Top of the depth axis; chosen from the curves if None.
     pub depth_cap_mm: Option<f64>,
 }
 
+const BEFORE: Stroke = Stroke::dashed(style::GREY, 1.9, &[9.0, 5.0]);
+const BAND: Color = Color(198, 216, 232);
+const ALONE: f64 = 470.0;
+const STACKED: f64 = 290.0;
+const BETWEEN: f64 = 26.0;
+
 impl LobeCurve {
-    fn points(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
-        let depths = self.depth_limit_mm.iter().map(|d| d.unwrap_or(f64::NAN));
+    fn over_speed<'a>(&'a self, depths: &'a [Option<f64>]) -> impl Iterator<Item = (f64, f64)> + 'a {
+        let depths = depths.iter().map(|d| d.unwrap_or(f64::NAN));
         self.spindle_rpm.iter().copied().zip(depths)
+    }
+
+    fn points(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        self.over_speed(&self.depth_limit_mm)
     }
 }
 
-impl LobesFigure {
-    /// # Errors
-    /// No curve or marker with a finite depth.
-    pub fn png(&self) -> Result<Vec<u8>> {
-        let points = || {
-            self.curves
-                .iter()
-                .flat_map(LobeCurve::points)
-                .filter(|(x, y)| usable(*x) && usable(*y))
-        };
-        let markers = || {
-            self.markers
-                .iter()
-                .filter(|m| usable(m.spindle_rpm) && usable(m.depth_mm))
-        };
-        let everywhere = self.curves.iter().flat_map(|c| c.spindle_rpm.iter().copied());
-        let speeds = extent(everywhere.chain(markers().map(|m| m.spindle_rpm)));
-        let depths = extent(points().map(|p| p.1).chain(markers().map(|m| m.depth_mm)));
-        let (Some(speeds), Some((_, deepest))) = (speeds, depths) else {
-            return Err(nothing_to_draw(&self.title, "no curve has a finite depth limit"));
-        };
-        let cap = self.cap(deepest, markers().map(|m| m.depth_mm).fold(0.0, f64::max));
-        let cut_off = points().any(|(_, depth)| depth > 1.06 * cap);
+impl LobePanel {
+    fn points(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        let points = self.curves.iter().flat_map(LobeCurve::points);
+        points.filter(|(x, y)| usable(*x) && usable(*y))
+    }
 
-        let x = Axis::linear("Spindle speed (rpm)", speeds, 10);
-        let y = Axis::from_zero("Depth limit (mm)", (0.0, cap), 7);
-        let left = Panel::left_margin(&[&y]);
-        let right = f64::from(WIDTH) - Panel::RIGHT_MARGIN;
-        let header = Header::new(&self.title, &self.legend(), left, right);
-        let top = header.bottom() + if cut_off { 14.0 } else { 0.0 };
-        let panel = Panel {
-            left,
-            top,
-            right,
-            bottom: top + 470.0,
-            x,
-            y,
-            x_labels: true,
-        };
+    fn usable_markers(&self) -> impl Iterator<Item = &LobeMarker> {
+        let markers = self.markers.iter();
+        markers.filter(|m| usable(m.spindle_rpm) && usable(m.depth_mm))
+    }
 
-        paint(WIDTH, (panel.bottom + Panel::BOTTOM_MARGIN) as u32, |canvas| {
-            header.draw(canvas);
-            panel.grid(canvas);
-            if let Some(limit) = self.absolute_limit_mm {
-                panel.curve(
-                    canvas,
-                    [(panel.x.low, limit), (panel.x.high, limit)],
-                    style::LEVEL,
-                );
-            }
-            for (i, curve) in self.curves.iter().enumerate() {
-                let stroke = style::series(i);
-                panel.curve(canvas, curve.points(), stroke);
-                if curve.points().filter(|(_, depth)| usable(*depth)).count() == 1 {
-                    panel.markers(canvas, curve.points(), (Marker::Disc, 7.0), stroke.color, 0.0);
-                }
-            }
-            for marker in &self.markers {
-                let (sign, size, color) = sign(marker.outcome);
-                let at = [(marker.spindle_rpm, marker.depth_mm)];
-                // A white edge sets the sign off from the curves.
-                panel.markers(canvas, at, (sign, size + 3.0), style::WHITE, 0.0);
-                panel.markers(canvas, at, (sign, size), color, 0.0);
-            }
-            panel.frame(canvas);
-            if cut_off {
-                let note = format!("peaks reach up to {} mm", significant(deepest, 3));
-                canvas.text((right, top - 10.0), &note, style::NOTE.align(Align::Right));
-            }
-        })
+    /// None where there is nothing to see.
+    fn deepest(&self) -> Option<f64> {
+        let markers = self.usable_markers().map(|m| m.depth_mm);
+        extent(self.points().map(|p| p.1).chain(markers)).map(|(_, deepest)| deepest)
     }
 
     /// High enough to see the pockets, low enough to see the limit: single sharp peaks run out at the top.
-    fn cap(&self, deepest: f64, deepest_marker: f64) -> f64 {
-        if let Some(cap) = self.depth_cap_mm.filter(|c| usable(*c) && *c > 0.0) {
-            return cap;
-        }
+    fn cap(&self, deepest: f64) -> f64 {
+        let deepest_marker = self.usable_markers().map(|m| m.depth_mm).fold(0.0, f64::max);
         let depths = || self.curves.iter().flat_map(LobeCurve::points).map(|p| p.1);
         let low = quantile(depths(), 0.05).unwrap_or(0.0).max(0.0);
         let most = quantile(depths(), 0.9).unwrap_or(deepest);
@@ -137,15 +105,166 @@ impl LobesFigure {
         if chosen > 0.0 { chosen } else { 1.0 }
     }
 
+    fn draw(&self, canvas: &Canvas, panel: &Panel) {
+        for curve in &self.curves {
+            if let Some([lower, upper]) = &curve.band_mm {
+                shade(canvas, panel, &curve.spindle_rpm, lower, upper);
+            }
+        }
+        panel.grid(canvas);
+        if let Some(limit) = self.absolute_limit_mm {
+            let ends = [(panel.x.low, limit), (panel.x.high, limit)];
+            panel.curve(canvas, ends, style::LEVEL);
+        }
+        for (i, curve) in self.curves.iter().enumerate() {
+            let stroke = style::series(i);
+            panel.curve(canvas, curve.over_speed(&curve.before_mm), BEFORE);
+            panel.curve(canvas, curve.points(), stroke);
+            if curve.points().filter(|(_, depth)| usable(*depth)).count() == 1 {
+                panel.markers(canvas, curve.points(), (Marker::Disc, 7.0), stroke.color, 0.0);
+            }
+        }
+        for marker in &self.markers {
+            let (sign, size, color) = sign(marker.outcome);
+            let at = [(marker.spindle_rpm, marker.depth_mm)];
+            // A white edge sets the sign off from the curves.
+            panel.markers(canvas, at, (sign, size + 3.0), style::WHITE, 0.0);
+            panel.markers(canvas, at, (sign, size), color, 0.0);
+            let place = panel.place(marker.spindle_rpm, marker.depth_mm);
+            if let Some((x, y)) = place.filter(|p| !marker.label.is_empty() && p.1 >= panel.top) {
+                let left = x > 0.9 * panel.right;
+                let (x, align) = if left {
+                    (x - 10.0, Align::Right)
+                } else {
+                    (x + 10.0, Align::Left)
+                };
+                canvas.text((x, y), &marker.label, style::LEGEND.align(align));
+            }
+        }
+        panel.frame(canvas);
+    }
+}
+
+/// The area between two limits. An upper limit that is not there runs out at the top.
+fn shade(canvas: &Canvas, panel: &Panel, rpm: &[f64], lower: &[Option<f64>], upper: &[Option<f64>]) {
+    let place = |i: usize, limits: &[Option<f64>]| {
+        let limit = limits.get(i).copied().flatten();
+        let y = limit.and_then(|l| panel.y_at(l)).unwrap_or(panel.top);
+        Some((panel.x_at(*rpm.get(i)?)?, y.clamp(panel.top, panel.bottom)))
+    };
+    for i in 1..rpm.len() {
+        let corners = (|| {
+            Some([
+                place(i - 1, lower)?,
+                place(i, lower)?,
+                place(i, upper)?,
+                place(i - 1, upper)?,
+            ])
+        })();
+        if let Some(corners) = corners
+            && corners
+                .iter()
+                .all(|(x, _)| *x >= panel.left - 0.5 && *x <= panel.right + 0.5)
+        {
+            canvas.polygon(&corners, BAND, 1.0);
+        }
+    }
+}
+
+impl LobesFigure {
+    /// # Errors
+    /// No curve or marker with a finite depth.
+    pub fn png(&self) -> Result<Vec<u8>> {
+        let panels = || self.panels.iter().filter_map(|p| Some((p, p.deepest()?)));
+        let curves = self.panels.iter().flat_map(|p| &p.curves);
+        let markers = self.panels.iter().flat_map(LobePanel::usable_markers);
+        let everywhere = curves.flat_map(|c| c.spindle_rpm.iter().copied());
+        let speeds = extent(everywhere.chain(markers.map(|m| m.spindle_rpm)));
+        let count = panels().count();
+        let (Some(speeds), true) = (speeds, count > 0) else {
+            return Err(nothing_to_draw(&self.title, "no curve has a finite depth limit"));
+        };
+        let asked = self.depth_cap_mm.filter(|c| usable(*c) && *c > 0.0);
+        let caps: Vec<f64> = panels()
+            .map(|(p, deepest)| asked.unwrap_or_else(|| p.cap(deepest)))
+            .collect();
+        let axes: Vec<Axis> = caps
+            .iter()
+            .map(|cap| Axis::from_zero("Depth limit (mm)", (0.0, *cap), if count > 1 { 5 } else { 7 }))
+            .collect();
+        let left = Panel::left_margin(&axes.iter().collect::<Vec<_>>());
+        let right = f64::from(WIDTH) - Panel::RIGHT_MARGIN;
+        let header = Header::new(&self.title, &self.legend(), left, right);
+        let (height, between) = if count > 1 {
+            (STACKED, BETWEEN)
+        } else {
+            (ALONE, 0.0)
+        };
+        let first = header.bottom() + 14.0;
+        let frames: Vec<Panel> = axes
+            .into_iter()
+            .enumerate()
+            .map(|(i, y)| {
+                let top = first + i as f64 * (height + between);
+                Panel {
+                    left,
+                    top,
+                    right,
+                    bottom: top + height,
+                    x: Axis::linear("Spindle speed (rpm)", speeds, 10),
+                    y,
+                    x_labels: i + 1 == count,
+                }
+            })
+            .collect();
+        let bottom = frames.last().map_or(first, |p| p.bottom);
+        paint(WIDTH, (bottom + Panel::BOTTOM_MARGIN) as u32, |canvas| {
+            header.draw(canvas);
+            for (((panel, deepest), frame), cap) in panels().zip(&frames).zip(&caps) {
+                panel.draw(canvas, frame);
+                let above = frame.top - 10.0;
+                if count > 1 {
+                    canvas.text((frame.left, above), &panel.name, style::AXIS);
+                }
+                if panel.points().any(|(_, depth)| depth > 1.06 * cap) {
+                    let note = format!("peaks reach up to {} mm", significant(deepest, 3));
+                    canvas.text((right, above), &note, style::NOTE.align(Align::Right));
+                }
+            }
+        })
+    }
+
     fn legend(&self) -> Vec<(Swatch, String)> {
-        let curves = self.curves.iter().enumerate().map(|(i, curve)| {
+        let curves = || self.panels.iter().flat_map(|p| &p.curves);
+        // All panels alike are explained once.
+        let widest = self.panels.iter().max_by_key(|p| p.curves.len());
+        let drawn = widest
+            .into_iter()
+            .flat_map(|p| &p.curves)
+            .enumerate()
+            .map(|(i, curve)| {
+                let name = or(&curve.label, "depth limit").to_owned();
+                (Swatch::Line(style::series(i)), name)
+            });
+        let before = curves().any(|c| !c.before_mm.is_empty());
+        let before = before.then(|| (Swatch::Line(BEFORE), "before the effects were added".to_owned()));
+        let band = curves().any(|c| c.band_mm.is_some());
+        let band = band.then(|| {
             (
-                Swatch::Line(style::series(i)),
-                or(&curve.label, "depth limit").to_owned(),
+                Swatch::Area(BAND, 1.0),
+                "5 to 95 % by the model's uncertainty".to_owned(),
             )
         });
-        let limit = self.absolute_limit_mm.filter(|l| usable(*l)).map(|limit| {
-            let name = format!("absolute limit {} mm", significant(limit, 3));
+        let limits: Vec<f64> = self
+            .panels
+            .iter()
+            .filter_map(|p| p.absolute_limit_mm.filter(|l| usable(*l)))
+            .collect();
+        let limit = (!limits.is_empty()).then(|| {
+            let name = match &limits[..] {
+                [one] => format!("absolute limit {} mm", significant(*one, 3)),
+                _ => "absolute limit".to_owned(),
+            };
             (Swatch::Line(style::LEVEL), name)
         });
         let outcomes = [
@@ -154,21 +273,27 @@ impl LobesFigure {
             (LobeOutcome::Recommended, "recommended"),
             (LobeOutcome::Tip, "deepest tips"),
         ];
-        let present = outcomes
-            .into_iter()
-            .filter(|(o, _)| self.markers.iter().any(|m| m.outcome == *o));
+        let present = outcomes.into_iter().filter(|(o, _)| {
+            let mut markers = self.panels.iter().flat_map(|p| &p.markers);
+            markers.any(|m| m.outcome == *o)
+        });
         let signs = present.map(|(outcome, name)| {
             let (marker, size, color) = sign(outcome);
             (Swatch::Sign(marker, size, color), name.to_owned())
         });
-        curves.chain(limit).chain(signs).collect()
+        drawn
+            .chain(before)
+            .chain(band)
+            .chain(limit)
+            .chain(signs)
+            .collect()
     }
 }
 
 fn sign(outcome: LobeOutcome) -> (Marker, f64, Color) {
     match outcome {
-        LobeOutcome::Stable => (Marker::Ring, 11.0, style::INK),
-        LobeOutcome::Chatter => (Marker::Cross, 11.0, style::RED),
+        LobeOutcome::Stable => (Marker::Disc, 11.0, style::INK),
+        LobeOutcome::Chatter => (Marker::Cross, 12.0, style::RED),
         LobeOutcome::Recommended | LobeOutcome::Tip => (Marker::Diamond, 13.0, style::INK),
     }
 }

@@ -34,7 +34,7 @@ pub use force_record::{ForceChannel, ForceRecord};
 pub use frf::{FrfCurve, FrfFigure, NoiseLevel};
 pub use heat_map::{CellFormat, HeatMap};
 pub use history::{HistoryFigure, Revision};
-pub use lobes::{LobeCurve, LobeMarker, LobeOutcome, LobesFigure};
+pub use lobes::{LobeCurve, LobeMarker, LobeOutcome, LobePanel, LobesFigure};
 pub use mode_shapes::{ModeShapesFigure, StickPicture};
 pub use nyquist::NyquistFigure;
 pub use parameters::{Estimate, ParameterFigure, ParameterRow};

@@ -224,36 +224,65 @@ pub fn lobe_curve(label: &str, least: f64, frequency_hz: f64) -> LobeCurve {
         label: label.into(),
         spindle_rpm,
         depth_limit_mm,
+        ..Default::default()
     }
+}
+
+fn lobe_markers() -> Vec<LobeMarker> {
+    let marker = |spindle_rpm, depth_mm, outcome, label: &str| LobeMarker {
+        spindle_rpm,
+        depth_mm,
+        outcome,
+        label: label.into(),
+    };
+    vec![
+        marker(400.0, 0.3, LobeOutcome::Stable, ""),
+        marker(900.0, 1.2, LobeOutcome::Chatter, "cut 07"),
+        marker(1300.0, 0.6, LobeOutcome::Recommended, ""),
+    ]
 }
 
 pub fn lobes() -> LobesFigure {
     LobesFigure {
         title: "Stability lobes at the four thesis postures, slot milling".into(),
-        curves: vec![
-            lobe_curve("p1, before calibration", 0.55, 13.0),
-            lobe_curve("p1, calibrated", 0.42, 11.3),
-            lobe_curve("p2, calibrated", 0.61, 17.9),
-            lobe_curve("p3, calibrated", 0.75, 24.0),
-        ],
-        absolute_limit_mm: Some(0.42),
-        markers: vec![
-            LobeMarker {
-                spindle_rpm: 400.0,
-                depth_mm: 0.3,
-                outcome: LobeOutcome::Stable,
-            },
-            LobeMarker {
-                spindle_rpm: 900.0,
-                depth_mm: 1.2,
-                outcome: LobeOutcome::Chatter,
-            },
-            LobeMarker {
-                spindle_rpm: 1300.0,
-                depth_mm: 0.6,
-                outcome: LobeOutcome::Recommended,
-            },
-        ],
+        panels: vec![LobePanel {
+            curves: vec![
+                lobe_curve("p1, before calibration", 0.55, 13.0),
+                lobe_curve("p1, calibrated", 0.42, 11.3),
+                lobe_curve("p2, calibrated", 0.61, 17.9),
+                lobe_curve("p3, calibrated", 0.75, 24.0),
+            ],
+            absolute_limit_mm: Some(0.42),
+            markers: lobe_markers(),
+            ..Default::default()
+        }],
+        depth_cap_mm: None,
+    }
+}
+
+/// Before and after an effect was added, with a band, one frame a posture.
+pub fn lobes_before_and_after() -> LobesFigure {
+    let panel = |name: &str, least: f64, frequency_hz: f64| {
+        let mut curve = lobe_curve("depth limit", least, frequency_hz);
+        let scaled = |factor: f64| {
+            curve
+                .depth_limit_mm
+                .iter()
+                .map(|d| d.map(|d| factor * d))
+                .collect()
+        };
+        curve.band_mm = Some([scaled(0.85), scaled(1.15)]);
+        curve.before_mm = lobe_curve("", 1.3 * least, 1.1 * frequency_hz).depth_limit_mm;
+        LobePanel {
+            name: name.into(),
+            curves: vec![curve],
+            absolute_limit_mm: Some(least),
+            markers: lobe_markers(),
+        }
+    };
+    LobesFigure {
+        title: "Stability lobes before and after link-flexibility was added".into(),
+        panels: vec![panel("p1", 0.42, 11.3), panel("p2", 0.6, 17.9)],
         depth_cap_mm: None,
     }
 }
@@ -352,6 +381,7 @@ pub fn gallery() -> Vec<(&'static str, Result<Vec<u8>, Error>)> {
         ("force_record", force_record().png()),
         ("regression", regression().png()),
         ("lobes", lobes().png()),
+        ("lobes_before_and_after", lobes_before_and_after().png()),
         ("side_by_side", side_by_side().png()),
         ("side_by_side_linear", linear.png()),
         ("history", history().png()),

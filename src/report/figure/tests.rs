@@ -97,17 +97,24 @@ fn odd_curves(xs: &[f64], ys: &[f64]) -> Vec<Result<Vec<u8>, Error>> {
         ..Default::default()
     };
     let first = |v: &[f64]| v.first().copied().unwrap_or(f64::NAN);
+    let some = |v: &[f64]| v.iter().copied().map(Some).collect::<Vec<_>>();
     let lobes = LobesFigure {
-        curves: vec![LobeCurve {
-            spindle_rpm: xs.to_vec(),
-            depth_limit_mm: ys.iter().map(|y| Some(*y)).collect(),
+        panels: vec![LobePanel {
+            curves: vec![LobeCurve {
+                spindle_rpm: xs.to_vec(),
+                depth_limit_mm: some(ys),
+                before_mm: some(xs),
+                band_mm: Some([some(xs), some(ys)]),
+                ..Default::default()
+            }],
+            absolute_limit_mm: ys.last().copied(),
+            markers: vec![LobeMarker {
+                spindle_rpm: first(xs),
+                depth_mm: first(ys),
+                outcome: LobeOutcome::Stable,
+                label: "cut".into(),
+            }],
             ..Default::default()
-        }],
-        absolute_limit_mm: ys.last().copied(),
-        markers: vec![LobeMarker {
-            spindle_rpm: first(xs),
-            depth_mm: first(ys),
-            outcome: LobeOutcome::Stable,
         }],
         depth_cap_mm: xs.last().copied(),
         ..Default::default()

@@ -62,6 +62,15 @@ impl<'a> Guide<'a> {
         }
     }
 
+    /// A total near the noise hides a small effect easily: only a diagnosis may say that nothing is missing.
+    fn hardly_more_than_noise(&self) -> String {
+        format!(
+            "hardly more than noise is left: run {} for effects that hide in it; where it says none, {}",
+            self.run_here("diagnose"),
+            self.use_it()
+        )
+    }
+
     /// After `calibrate`. `mostly`: where the error sits.
     pub fn calibrated(
         &self,
@@ -118,7 +127,7 @@ impl<'a> Guide<'a> {
             percent(error.noise_floor_nrms)
         );
         if is_noise(reduced_chi2) {
-            return format!("{errors}: what is left is noise, and {}", self.use_it());
+            return format!("{errors}: {}", self.hardly_more_than_noise());
         }
         let mut place = mostly.map_or(String::new(), |m| format!(", mostly {m}"));
         if error.nrms < 1.1 * error.noise_floor_nrms {
@@ -200,7 +209,7 @@ impl<'a> Guide<'a> {
                 "the last step was no progress: run {} to take it back",
                 self.run_here("undo")
             ),
-            (_, chi2) if is_noise(chi2) => format!("what is left is noise, and {}", self.use_it()),
+            (_, chi2) if is_noise(chi2) => self.hardly_more_than_noise(),
             _ => format!(
                 "more than noise is left: run {} for what else is missing",
                 self.run_here("diagnose")

@@ -24,4 +24,4 @@ pub mod thesis_cutting;
 pub mod thesis_section;
 pub mod waveform_section;
 
-pub use page::{Block, Column, Figure, Page, Section, Table, Written};
+pub use page::{Block, Column, Drawing, Figure, Page, Section, Table, Written};

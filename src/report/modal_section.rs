@@ -8,7 +8,7 @@ use super::figure::{
 };
 use super::number::decimals;
 use super::parts::{count, figure, with_error};
-use super::{Block, Column, Section, Table};
+use super::{Block, Column, Drawing, Section, Table};
 use crate::analysis::ModalAnalysis;
 use crate::analysis::modal::{AnalysedFrf, SetModes};
 use crate::analysis::stick_shapes::StickShape;
@@ -296,9 +296,9 @@ fn coherence(set: &SetModes) -> Option<Block> {
 }
 
 /// Shapes on the robot's stick figure.
-fn mode_shapes(set: &SetModes, shapes: &[StickShape]) -> Option<Block> {
+fn mode_shapes(set: &SetModes, shapes: &[StickShape]) -> Vec<Block> {
     if shapes.is_empty() {
-        return None;
+        return Vec::new();
     }
     let picture = ModeShapesFigure {
         title: format!("Measured mode shapes, {}", set.set),
@@ -317,13 +317,21 @@ fn mode_shapes(set: &SetModes, shapes: &[StickShape]) -> Option<Block> {
             })
             .collect(),
     };
-    Some(figure(
+    let moving = picture.animated_svg().map(|svg| {
+        Block::Drawing(Drawing {
+            svg,
+            caption: "The same in motion, slowed to one swing in two seconds.".into(),
+        })
+    });
+    let mut blocks = vec![figure(
         "modal-shapes",
         "How the robot moves in each mode, as far as it was measured",
         "Dots are measured; between the base and them the arm is drawn bending evenly, which is no measurement. \
          Not to scale.",
         picture.png(),
-    ))
+    )];
+    blocks.extend(moving);
+    blocks
 }
 
 fn mac(set: &SetModes) -> Option<Block> {

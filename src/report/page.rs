@@ -35,6 +35,7 @@ pub struct Section {
 pub enum Block {
     Paragraph(String),
     Figure(Figure),
+    Drawing(Drawing),
     Table(Table),
     Warning(String),
     /// Name and value, one a line.
@@ -52,6 +53,14 @@ pub struct Figure {
     pub caption: String,
     /// A whole PNG file, as the functions of [`super::figure`] return it.
     pub png: Vec<u8>,
+}
+
+/// Vector graphics that live in the page only, such as a moving picture.
+#[derive(Debug, Clone, Default)]
+pub struct Drawing {
+    /// A whole `<svg>` element made by this program: it goes into the page as it is.
+    pub svg: String,
+    pub caption: String,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -205,6 +214,11 @@ impl Block {
                 let pairs = pairs.iter().map(|(name, value)| context! { name, value });
                 context! { kind => "key_values", pairs => pairs.collect::<Vec<_>>() }
             }
+            Block::Drawing(drawing) => context! {
+                kind => "drawing",
+                svg => Value::from_safe_string(drawing.svg.clone()),
+                caption => drawing.caption.as_str(),
+            },
             Block::Table(table) => table.value(),
             Block::Figure(figure) => {
                 let (width, height) = png_size(&figure.png);

@@ -15,6 +15,7 @@ mod records;
 mod report;
 mod revisions;
 mod robustness;
+mod sample_reports;
 mod schema;
 mod shell;
 mod simulate;

@@ -21,5 +21,6 @@ mod shell;
 mod simulate;
 mod structure;
 mod support;
+mod tour;
 mod waveform;
 mod where_it_fails;

@@ -50,7 +50,7 @@ SAMPLES = {
         None,
         [
             (
-                ["thesis"],
+                ["thesis", "--out", "page"],
                 ["fitted_frequency_error", "predicted_frequency_error"]
                 + estimates(JOINTS)
                 + [f"frequencies/{k}/{key}" for k in range(8) for key in ("published_model", "measured", "before", "after")]
@@ -154,8 +154,8 @@ def write(program, name):
             summary.append(
                 {"command": " ".join(arguments), "values": {path: rounded(at(document, path)) for path in paths}}
             )
-        page = ["report", campaign] if campaign else ["thesis"]
-        run(program, [*page, "--out", "page"], folders[0])
+        if campaign:
+            run(program, ["report", campaign, "--out", "page"], folders[0])
         shutil.rmtree(out, ignore_errors=True)
         out.mkdir(parents=True)
         for file in sorted((folders[0] / "page").iterdir()):

@@ -152,11 +152,11 @@ fn first_difference(sample: &str, today: &str) -> Option<String> {
     let found = sample.lines().zip(today.lines()).find(|(a, b)| !same_line(a, b));
     let count = |text: &str| text.lines().count();
     found
-        .map(|(a, b)| format!("loop.txt has\n  {a}\nand today it is\n  {b}"))
+        .map(|(a, b)| format!("the sample has\n  {a}\nand today it is\n  {b}"))
         .or_else(|| {
             (count(sample) != count(today)).then(|| {
                 format!(
-                    "loop.txt has {} lines, today there are {}",
+                    "the sample has {} lines, today there are {}",
                     count(sample),
                     count(today)
                 )
@@ -196,6 +196,14 @@ fn the_thesis_put_right() {
     for path in ["fitted_frequency_error", "predicted_frequency_error"] {
         sample.assert_page_states(0, path);
     }
+    // The whole page, but for the pixels.
+    let words = |folder: &Path| {
+        let page = read(&folder.join("report.html"));
+        let lines: Vec<&str> = page.lines().filter(|l| !l.contains("<img")).collect();
+        lines.join("\n")
+    };
+    let today = sample.copies[0].path().join("page");
+    assert_eq!(first_difference(&words(&sample.folder), &words(&today)), None);
 }
 
 #[test]

@@ -1,19 +1,37 @@
+use std::path::PathBuf;
+
 use serde_json::json;
 
 use super::Outcome;
 use super::text::{number, percent, table};
 use crate::Result;
+use crate::analysis::ThesisFindings;
 use crate::cutting::{Known, MILLING_COEFFICIENTS};
 use crate::lobes::Peak;
+use crate::report::thesis_section;
 use crate::thesis::real_case::Explanation;
-use crate::thesis::{CaseStudy, CuttingTables, LobeTips, RealCase, Row, case_study};
+use crate::thesis::{CaseStudy, CuttingTables, LobeTips, RealCase, Row};
 
 #[derive(clap::Args)]
-pub struct Args {}
+pub struct Args {
+    /// Write it as a page with figures (report.html and PNG files) into this folder as well.
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+}
 
-pub fn run(_args: Args) -> Result<Outcome> {
-    let study = case_study()?;
-    Ok(Outcome::new(json!(study), describe(&study), None))
+pub fn run(args: Args) -> Result<Outcome> {
+    let findings = ThesisFindings::run()?;
+    let mut json = json!(findings.study);
+    let next = match args.out {
+        Some(folder) => {
+            let written = thesis_section::page(&findings).write(&folder)?;
+            json["html"] = json!(written.html);
+            json["images"] = json!(written.images);
+            Some(format!("open {} in a browser", written.html.display()))
+        }
+        None => None,
+    };
+    Ok(Outcome::new(json, describe(&findings.study), next))
 }
 
 fn optional(value: Option<f64>) -> String {

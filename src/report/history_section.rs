@@ -51,7 +51,8 @@ fn of_revisions(
             "Error of the model after each added effect, on fitted and on held-out data",
             format!(
                 "Error (nrms) of the model after each added effect, on the data that was fitted and on {folds} left out of \
-                 the fit. No model can get below the noise floor."
+                 the fit. The noise floor is estimated from the measurement: a model that lacks nothing comes down to about \
+                 there."
             ),
             drawing.png(),
         ),

@@ -3,12 +3,21 @@
 use super::figure::{BarSeries, SideBySide};
 use super::number::{decimals, format_si, percent, significant};
 use super::parts::{figure, listed, paragraph};
-use super::{Block, Column, Section, Table};
+use super::{Block, Column, Page, Section, Table};
 use super::{real_case_section, thesis_cutting};
 use crate::analysis::ThesisFindings;
 use crate::analysis::thesis_findings::Range;
 use crate::lobes::Peak;
 use crate::thesis::{CaseStudy, FITTED_CONFIGURATIONS, LobeTips, Row};
+
+/// The case study as a page of its own.
+pub fn page(findings: &ThesisFindings) -> Page {
+    Page {
+        title: "The source thesis put right".into(),
+        subtitle: "ABB IRB 6640: published model, measurement and this model side by side".into(),
+        sections: vec![section(findings)],
+    }
+}
 
 pub fn section(findings: &ThesisFindings) -> Section {
     let study = &findings.study;

@@ -24,7 +24,22 @@ pub fn summary(findings: &CuttingFindings) -> String {
     let text = verdict_text(&findings.diagnosis, "force records", |c| {
         (c.instance.label(), c.instance.effect.explanation())
     });
-    text.replacen("The model", "The force model", 1)
+    let text = text.replacen("The model", "The force model", 1);
+    let added: Vec<String> = findings
+        .case
+        .model
+        .effects()
+        .iter()
+        .map(|a| a.instance.label())
+        .collect();
+    if added.is_empty() {
+        return text;
+    }
+    format!(
+        "The force model has what was added to it: {}. The coefficients of the average forces, and what is said about \
+         them, are without it. {text}",
+        listed(&added)
+    )
 }
 
 pub fn sections(campaign: &Campaign, findings: &CuttingFindings) -> Vec<Section> {

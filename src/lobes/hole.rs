@@ -257,7 +257,7 @@ fn predicted(
     };
     match section.process {
         Process::Drilling => drilling(campaign, section, asked, &tool, group),
-        Process::Milling => milling(campaign, section, &tool, group),
+        Process::Milling => milling(campaign, &tool, group),
     }
 }
 
@@ -329,7 +329,6 @@ fn drilling(
 /// The mean forces of that milling cut of the campaign which pushes hardest sideways.
 fn milling(
     campaign: &Campaign,
-    section: &LobesSection,
     tool: &Tool,
     group: impl Fn() -> std::result::Result<Group, String>,
 ) -> std::result::Result<HoleLoad, String> {

@@ -7,7 +7,9 @@ use crate::lobes::band::{self, LobeBand};
 use crate::lobes::hole::{HoleCheck, HoleError};
 use crate::lobes::measured::measured_structures;
 use crate::lobes::outcome::{LimitRange, NotedCut, Outcomes, noted_cuts};
-use crate::lobes::setup::{Cut, LobeCoefficients, coefficients_of_group, cut_of, frf_of_modes, group_of_cuts};
+use crate::lobes::setup::{
+    Cut, LobeCoefficients, coefficients_of_group, cut_of, frf_of_modes, group_of_cuts,
+};
 use crate::lobes::{
     AbsoluteLimit, DirectFrf, LobeCurve, MultiFrequency, Peak, SemiDiscretisation, SpeedLimit,
     StabilitySolver, StateSpace, speed_grid,

@@ -8,8 +8,8 @@ use crate::campaign::{Campaign, LobeMethod, LobesSection, Redundancy};
 use crate::lobes::band::{QUANTILES, quantile};
 use crate::lobes::hole::{HoleCheck, HoleError};
 use crate::lobes::redundancy::{
-    AnglePosture, AngleStatus, LimitAtAngle, Recommendation, RedundancySweep, SPEED_MARGIN, agree,
-    SurfacePoint, by_enumeration, by_swarm, margin_mm,
+    AnglePosture, AngleStatus, LimitAtAngle, Recommendation, RedundancySweep, SPEED_MARGIN, SurfacePoint,
+    agree, by_enumeration, by_swarm, margin_mm,
 };
 use crate::lobes::setup::Cut;
 use crate::lobes::{DirectFrf, LobeCurve, RegenerativeForce, SpeedLimit, StabilitySolver};
@@ -45,6 +45,45 @@ impl HoleWeighing {
     pub fn no_angle_is_good_enough(&self) -> bool {
         self.out_of_tolerance_deg.len() == self.usable
     }
+
+    /// For people: what the hole had to say in the choice of the angle.
+    pub fn sentence(&self, step_deg: f64) -> String {
+        if self.out_of_tolerance_deg.is_empty() {
+            return format!(
+                "Weighed together: the hole keeps its tolerances at all {} usable angles, so the depth limit decides",
+                self.usable
+            );
+        }
+        if self.no_angle_is_good_enough() {
+            return "The hole is out of tolerance at every usable angle, so the depth limit alone decides: take less feed, a \
+                    pilot hole or another posture before drilling here"
+                .into();
+        }
+        let alone = self.by_depth_alone.map_or(String::new(), |p| {
+            format!(
+                ". By the depth limit alone it would be {:.1} rpm at {:.1}°, {:.4} mm",
+                p.spindle_rpm, p.angle_deg, p.depth_mm
+            )
+        });
+        format!(
+            "Weighed together: the hole is out of tolerance at {} of {} usable angles, which are not recommended ({}){alone}",
+            self.out_of_tolerance_deg.len(),
+            self.usable,
+            stretches(&self.out_of_tolerance_deg, step_deg).join(", ")
+        )
+    }
+}
+
+/// `20° to 60°`, `90°`: neighbours in the sweep taken together.
+fn stretches(angles_deg: &[f64], step_deg: f64) -> Vec<String> {
+    let neighbours = |a: &f64, b: &f64| b - a < 1.5 * step_deg;
+    angles_deg
+        .chunk_by(neighbours)
+        .filter_map(|s| match (s.first()?, s.last()?) {
+            (from, to) if from < to => Some(format!("{from}° to {to}°")),
+            (one, _) => Some(format!("{one}°")),
+        })
+        .collect()
 }
 
 /// Keeps angles out at which the hole is out of tolerance.
@@ -203,7 +242,9 @@ pub(super) fn sweep(
         .collect();
     let is_out = |angle_deg: f64| {
         let hole = holes.iter().find(|(angle, _)| *angle == angle_deg);
-        check.zip(hole).is_some_and(|(c, (_, hole))| !c.tolerance.met(hole))
+        check
+            .zip(hole)
+            .is_some_and(|(c, (_, hole))| !c.tolerance.met(hole))
     };
     let out_of_tolerance_deg: Vec<f64> = holes.iter().map(|(a, _)| *a).filter(|a| is_out(*a)).collect();
     let constrained = !out_of_tolerance_deg.is_empty() && out_of_tolerance_deg.len() < holes.len();
@@ -293,4 +334,19 @@ pub(super) fn sweep(
         hole,
     };
     Ok((analysis, cases))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn neighbouring_angles_are_named_as_stretches() {
+        assert_eq!(
+            stretches(&[0.0, 20.0, 40.0, 100.0, 340.0], 20.0),
+            ["0° to 40°", "100°", "340°"]
+        );
+        assert!(stretches(&[], 20.0).is_empty());
+        assert_eq!(apart_deg(350.0, 20.0), 30.0);
+    }
 }

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::text::{number, table};
-use crate::analysis::{HoleWeighing, LobeAnalysis, LobeCase};
+use crate::analysis::{LobeAnalysis, LobeCase};
 use crate::lobes::hole::{HoleCheck, HoleError, Uncertain};
 
 /// An entry of `hole[]`.
@@ -53,7 +53,9 @@ pub fn weighing(analysis: &LobeAnalysis) -> Value {
     let (Some(Ok(check)), Some(found)) = (&analysis.hole, &analysis.redundancy) else {
         return Value::Null;
     };
-    let Some(weighed) = &found.hole else { return Value::Null };
+    let Some(weighed) = &found.hole else {
+        return Value::Null;
+    };
     let angle_deg = found.recommendation.point.angle_deg;
     json!({
         "out_of_tolerance_deg": weighed.out_of_tolerance_deg,
@@ -97,7 +99,10 @@ pub fn text(analysis: &LobeAnalysis) -> String {
         let posture = case.posture.as_deref().unwrap_or("–");
         Some(row(posture, case.angle_deg, note, hole))
     };
-    let weighed = analysis.redundancy.as_ref().and_then(|r| Some((r, r.hole.as_ref()?)));
+    let weighed = analysis
+        .redundancy
+        .as_ref()
+        .and_then(|r| Some((r, r.hole.as_ref()?)));
     let rows: Vec<Vec<String>> = match weighed {
         None => analysis.cases.iter().filter_map(|c| of_case(c, "")).collect(),
         // Over the angle: the best, the worst and the recommended one.

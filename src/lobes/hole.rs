@@ -70,7 +70,11 @@ impl Uncertain {
 
     /// By how much the bound exceeds the value, as a factor.
     fn allowance(&self) -> f64 {
-        if self.value > 0.0 { self.bound() / self.value } else { 1.0 }
+        if self.value > 0.0 {
+            self.bound() / self.value
+        } else {
+            1.0
+        }
     }
 }
 

@@ -77,13 +77,10 @@ pub fn coefficients_of_group(
     group: &Group,
 ) -> Result<LobeCoefficients> {
     let value = |label: &str| {
-        group
-            .coefficient(label)
-            .and_then(|c| c.value)
-            .ok_or_else(|| {
-                let problem = format!("the campaign's cuts do not determine {label}");
-                lacks_coefficients(campaign, problem)
-            })
+        group.coefficient(label).and_then(|c| c.value).ok_or_else(|| {
+            let problem = format!("the campaign's cuts do not determine {label}");
+            lacks_coefficients(campaign, problem)
+        })
     };
     let krc_n_per_mm2 = match section.process {
         Process::Milling => value("Krc")?,

@@ -128,7 +128,10 @@ mod tests {
             let chain = robot.chain(&here, &Baseline::nominal(&robot.spec));
             let compliance = chain.tool_compliance(&robot, &here).unwrap();
             let found = compliance * wrench(force, moment);
-            assert!((found - expected).norm() < 1e-7 * expected.norm(), "{found} {expected}");
+            assert!(
+                (found - expected).norm() < 1e-7 * expected.norm(),
+                "{found} {expected}"
+            );
             // Maxwell and Betti: what a force does to the rotation, a moment does to the displacement.
             assert!((compliance - compliance.transpose()).norm() < 1e-12 * compliance.norm());
         }

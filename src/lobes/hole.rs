@@ -326,7 +326,7 @@ fn drilling(
         thrust_n: along(tool, &geometry, ForceAxis::Z, &coefficients)?,
         torque_nm: along(tool, &geometry, ForceAxis::Mz, &coefficients)?,
         lateral_n: 0.0,
-        source: format!("{from}{chisel}; no lateral force, as the lips balance"),
+        source: format!("{from}{chisel}"),
     })
 }
 

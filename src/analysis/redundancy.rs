@@ -47,7 +47,7 @@ impl HoleWeighing {
     }
 
     /// For people: what the hole had to say in the choice of the angle.
-    pub fn sentence(&self, step_deg: f64) -> String {
+    pub fn sentence(&self, found: &RedundancyAnalysis) -> String {
         if self.out_of_tolerance_deg.is_empty() {
             return format!(
                 "Weighed together: the hole keeps its tolerances at all {} usable angles, so the depth limit decides",
@@ -59,7 +59,11 @@ impl HoleWeighing {
                     pilot hole or another posture before drilling here"
                 .into();
         }
+        let recommended_deg = found.recommendation.point.angle_deg;
         let alone = self.by_depth_alone.map_or(String::new(), |p| {
+            if apart_deg(p.angle_deg, recommended_deg) < 0.1 {
+                return ". The depth limit alone would recommend the same place".into();
+            }
             format!(
                 ". By the depth limit alone it would be {:.1} rpm at {:.1}°, {:.4} mm",
                 p.spindle_rpm, p.angle_deg, p.depth_mm
@@ -69,7 +73,7 @@ impl HoleWeighing {
             "Weighed together: the hole is out of tolerance at {} of {} usable angles, which are not recommended ({}){alone}",
             self.out_of_tolerance_deg.len(),
             self.usable,
-            stretches(&self.out_of_tolerance_deg, step_deg).join(", ")
+            stretches(&self.out_of_tolerance_deg, found.step_deg).join(", ")
         )
     }
 }

@@ -137,7 +137,7 @@ pub fn text(analysis: &LobeAnalysis) -> String {
     ];
     out += &table(&header, &rows);
     if let Some((found, weighed)) = weighed {
-        out += &format!("{}\n", weighed.sentence(found.step_deg));
+        out += &format!("{}\n", weighed.sentence(found));
     }
     out
 }

@@ -34,7 +34,7 @@ pub fn blocks(analysis: &LobeAnalysis) -> Vec<Block> {
         .and_then(|r| Some((r, r.hole.as_ref()?)))
     {
         Some((found, weighed)) => {
-            blocks.push(paragraph(format!("{}.", weighed.sentence(found.step_deg))));
+            blocks.push(paragraph(format!("{}.", weighed.sentence(found))));
             let drawing = over_the_angle(analysis, check);
             let caption = "Static error of the hole over the redundancy angle: signs are the model's, bars reach to the 95 % \
                            bound, dots are the tolerance. Angles without a sign are forbidden or out of reach.";

@@ -6,6 +6,7 @@ use crate::identify::calibrate::calibrate;
 use crate::identify::case::structure_model;
 use crate::identify::structure::StructureModel;
 use crate::identify::{Options, StructureCase};
+use crate::lobes::hole::{Deflection, HoleError, HoleLoad};
 use crate::lobes::{DirectFrf, RobotFrf, StateSpace, band};
 use crate::{InputError, Result};
 
@@ -31,6 +32,14 @@ impl FittedModel {
         let kinematics = self.model.robot.kinematics(joints_deg)?;
         let chain = self.model.chain(theta, &kinematics, 0.0, false);
         RobotFrf::new(&self.model.robot, &kinematics, &chain)
+    }
+
+    fn deflection(&self, theta: &[f64], joints_deg: &[f64], load: &HoleLoad) -> Result<Deflection> {
+        let robot = &self.model.robot;
+        let kinematics = robot.kinematics(joints_deg)?;
+        let chain = self.model.chain(theta, &kinematics, 0.0, false);
+        let compliance = chain.tool_compliance(robot, &kinematics)?;
+        Ok(Deflection::new(&compliance, kinematics.tool_axis(), load))
     }
 
     /// The tool point's FRF, as a modal sum where the modes are not coupled.
@@ -148,7 +157,22 @@ impl ModelState {
         self.current.frf(&self.current.theta, joints_deg)
     }
 
-    /// The same for each draw of the parameters.
+    /// What a load does to the tool, with nothing said of its uncertainty.
+    pub fn deflection(&self, joints_deg: &[f64], load: &HoleLoad) -> Result<Deflection> {
+        self.current.deflection(&self.current.theta, joints_deg, load)
+    }
+
+    /// The same with its uncertainty, from the draws of the parameters.
+    pub fn hole(&self, joints_deg: &[f64], load: &HoleLoad) -> Result<HoleError> {
+        let drawn: Vec<Deflection> = self
+            .draws
+            .iter()
+            .map(|theta| self.current.deflection(theta, joints_deg, load))
+            .collect::<Result<_>>()?;
+        Ok(HoleError::new(&self.deflection(joints_deg, load)?, &drawn))
+    }
+
+    /// The tool point's FRF for each draw of the parameters.
     pub fn variants(&self, joints_deg: &[f64]) -> Result<Vec<Box<dyn DirectFrf>>> {
         self.draws
             .iter()

@@ -4,9 +4,12 @@ use super::lobe_model::{Dynamics, ModelState};
 use super::redundancy::{self, RedundancyAnalysis};
 use crate::campaign::{Campaign, LobeMethod, LobeSource, LobesSection, Process};
 use crate::lobes::band::{self, LobeBand};
+use crate::lobes::hole::{HoleCheck, HoleError};
 use crate::lobes::measured::measured_structures;
 use crate::lobes::outcome::{LimitRange, NotedCut, Outcomes, noted_cuts};
-use crate::lobes::setup::{Cut, LobeCoefficients, coefficients_from_cuts, cut_of, frf_of_modes};
+use crate::lobes::setup::{
+    Cut, LobeCoefficients, coefficients_of_group, cut_of, frf_of_modes, group_of_cuts,
+};
 use crate::lobes::{
     AbsoluteLimit, DirectFrf, LobeCurve, MultiFrequency, Peak, SemiDiscretisation, SpeedLimit,
     StabilitySolver, StateSpace, speed_grid,
@@ -35,6 +38,8 @@ pub struct LobeCase {
     pub band: Option<LobeBand>,
     /// Without the effects that were added to the model; `None` where there are none.
     pub before: Option<LobesBefore>,
+    /// Where the static forces of the cut put the tool; from the model only.
+    pub hole: Option<HoleError>,
     /// At the speed of every cut with a noted outcome.
     pub(super) at_cuts: Vec<LimitRange>,
 }
@@ -64,6 +69,9 @@ pub struct LobeAnalysis {
     pub revision: Option<usize>,
     /// The cuts whose outcome was noted against these lobes; `None` where there are none.
     pub outcomes: Option<Outcomes>,
+    /// The forces on the tool and the tolerances behind the cases' `hole`, or why there are none; `None` where lobes do
+    /// not come from the model.
+    pub hole: Option<std::result::Result<HoleCheck, String>>,
     pub warnings: Vec<String>,
 }
 
@@ -73,6 +81,7 @@ struct Structure {
     dynamics: Dynamics,
     /// The same before effects were added.
     before: Option<Dynamics>,
+    hole: Option<HoleError>,
     /// The same structure with parameters drawn from their uncertainty.
     variants: Vec<Box<dyn DirectFrf>>,
     description: String,
@@ -133,6 +142,7 @@ impl Structure {
             best,
             band: band_at(speeds),
             before: self.before.as_ref().map(|b| b.lobes_before(cut, speeds)),
+            hole: self.hole,
             at_cuts: at_cuts.collect(),
             curve,
             posture: self.posture,
@@ -152,27 +162,36 @@ impl LobeAnalysis {
                 .remedy("add one with process, source and spindle_rpm = [from, to, step]")
         })?;
         let mut warnings = Vec::new();
-        let coefficients = match LobeCoefficients::given(section) {
-            Some(given) => given,
-            None => coefficients_from_cuts(campaign, section, &mut warnings)?,
+        let (coefficients, own_cuts) = match LobeCoefficients::given(section) {
+            Some(given) => (given, None),
+            None => {
+                let group = group_of_cuts(campaign, section, &mut warnings)?;
+                (coefficients_of_group(campaign, section, &group)?, Some(group))
+            }
         };
         let cut = cut_of(campaign, section, coefficients)?;
         let speeds = speed_grid(section.spindle_rpm)?;
         let (noted, not_compared) = noted_cuts(campaign, section);
-        let (mut surface, mut effects, mut revision) = (None, Vec::new(), None);
+        let (mut surface, mut effects, mut revision, mut hole) = (None, Vec::new(), None, None);
         let structures = match section.source {
             LobeSource::Modes => from_modes(campaign, section)?,
             LobeSource::Model => {
                 let state = ModelState::of(campaign, &mut warnings)?;
                 (effects, revision) = (state.effects.clone(), state.revision);
+                let check = HoleCheck::new(campaign, section, own_cuts.as_ref());
+                if let (Err(reason), Some(_)) = (&check, &section.hole) {
+                    warnings.push(format!("the hole is not worked out: {reason}"));
+                }
+                let check = hole.insert(check).as_ref().ok();
                 match &section.redundancy {
                     Some(wanted) => {
                         let force = cut.average();
-                        let swept = redundancy::sweep(campaign, section, wanted, &state, force, &speeds)?;
+                        let swept =
+                            redundancy::sweep(campaign, section, wanted, &state, force, &speeds, check)?;
                         surface = Some(swept);
                         Vec::new()
                     }
-                    None => at_postures(campaign, section, &state)?,
+                    None => at_postures(campaign, section, &state, check)?,
                 }
             }
             LobeSource::Measured => from_measured(campaign, section, &mut warnings)?,
@@ -211,6 +230,7 @@ impl LobeAnalysis {
             effects,
             revision,
             outcomes,
+            hole,
             warnings,
         })
     }
@@ -299,6 +319,7 @@ fn from_modes(campaign: &Campaign, section: &LobesSection) -> Result<Vec<Structu
             frf: Box::new(frf),
         },
         before: None,
+        hole: None,
         variants: Vec::new(),
         description,
     }])
@@ -309,7 +330,12 @@ fn steps_through_time(section: &LobesSection) -> bool {
 }
 
 /// The robot model at every posture.
-fn at_postures(campaign: &Campaign, section: &LobesSection, state: &ModelState) -> Result<Vec<Structure>> {
+fn at_postures(
+    campaign: &Campaign,
+    section: &LobesSection,
+    state: &ModelState,
+    check: Option<&HoleCheck>,
+) -> Result<Vec<Structure>> {
     campaign
         .postures
         .iter()
@@ -320,6 +346,7 @@ fn at_postures(campaign: &Campaign, section: &LobesSection, state: &ModelState) 
                 posture: Some(posture.id.clone()),
                 dynamics: state.current.dynamics(joints, through_time)?,
                 before: before.map(|b| b.dynamics(joints, through_time)).transpose()?,
+                hole: check.map(|c| state.hole(joints, &c.load)).transpose()?,
                 variants: state.variants(joints)?,
                 description: state.description.clone(),
             })
@@ -354,6 +381,7 @@ fn from_measured(
                     states: None,
                 },
                 before: None,
+                hole: None,
                 variants: Vec::new(),
                 description: "measured FRFs".to_string(),
             }

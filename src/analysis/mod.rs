@@ -21,6 +21,6 @@ pub use cutting::CuttingAnalysis;
 pub use diagnosis::{CuttingFindings, DiagnosisFindings};
 pub use lobes::{LobeAnalysis, LobeCase, LobesBefore};
 pub use modal::{ModalAnalysis, SetModes};
-pub use redundancy::RedundancyAnalysis;
+pub use redundancy::{HoleWeighing, RedundancyAnalysis};
 pub use structure::StructureAnalysis;
 pub use thesis_findings::ThesisFindings;

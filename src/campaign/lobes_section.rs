@@ -6,9 +6,9 @@ use super::bounds::Bounds;
 use super::document::Section;
 use super::load::{PROCESSES, posture_ref};
 use super::schema::*;
-use crate::Result;
+use crate::{Error, Result};
 
-const LOBES: [&str; 18] = [
+const LOBES: [&str; 19] = [
     "process",
     "source",
     "method",
@@ -27,6 +27,16 @@ const LOBES: [&str; 18] = [
     "spindle_rpm",
     "mode",
     "redundancy",
+    "hole",
+];
+
+const HOLE: [&str; 6] = [
+    "thrust_n",
+    "torque_nm",
+    "lateral_n",
+    "pilot_diameter_mm",
+    "position_tolerance_mm",
+    "perpendicularity_tolerance_deg",
 ];
 
 /// More speeds than this are a slip in the step.
@@ -53,6 +63,10 @@ pub(super) fn read(
         Some(section) => Some(redundancy(&section, postures)?),
         None => None,
     };
+    let hole = match lobes.section("hole", &HOLE)? {
+        Some(section) => Some(hole(&section)?),
+        None => None,
+    };
     let method = method(&lobes, process)?;
     Ok(Some(LobesSection {
         process,
@@ -69,6 +83,7 @@ pub(super) fn read(
         spindle_rpm: speeds(&lobes)?,
         modes,
         redundancy,
+        hole,
     }))
 }
 
@@ -185,6 +200,22 @@ fn redundancy(section: &Section<'_>, postures: &[Posture]) -> Result<Redundancy>
         posture,
         step_deg: section.required("step_deg", step_deg, "5.0")?,
         forbidden_deg,
+    })
+}
+
+fn hole(section: &Section<'_>) -> Result<HoleSection> {
+    let usual = HoleSection::default();
+    let tolerance = |key, usual| Ok::<_, Error>(section.number(key, Bounds::POSITIVE)?.unwrap_or(usual));
+    Ok(HoleSection {
+        thrust_n: section.number("thrust_n", Bounds::ANY)?,
+        torque_nm: section.number("torque_nm", Bounds::NOT_NEGATIVE)?,
+        lateral_n: section.number("lateral_n", Bounds::NOT_NEGATIVE)?,
+        pilot_diameter_mm: section.number("pilot_diameter_mm", Bounds::NOT_NEGATIVE)?,
+        position_tolerance_mm: tolerance("position_tolerance_mm", usual.position_tolerance_mm)?,
+        perpendicularity_tolerance_deg: tolerance(
+            "perpendicularity_tolerance_deg",
+            usual.perpendicularity_tolerance_deg,
+        )?,
     })
 }
 

@@ -265,4 +265,36 @@ pub struct LobesSection {
     pub spindle_rpm: [f64; 3],
     pub modes: Vec<LobeMode>,
     pub redundancy: Option<Redundancy>,
+    /// `None` where the campaign has no `[lobes.hole]`: the defaults hold.
+    pub hole: Option<HoleSection>,
+}
+
+/// `[lobes.hole]`: what pushes the tool, and what the hole may be off by. A force that is left out is predicted from the
+/// cutting coefficients.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HoleSection {
+    /// Against the tool, away from the workpiece.
+    pub thrust_n: Option<f64>,
+    /// On the tool about its axis, against its rotation.
+    pub torque_nm: Option<f64>,
+    /// Across the tool axis, in whichever direction does most harm.
+    pub lateral_n: Option<f64>,
+    /// Drilling: zero is into the full.
+    pub pilot_diameter_mm: Option<f64>,
+    pub position_tolerance_mm: f64,
+    pub perpendicularity_tolerance_deg: f64,
+}
+
+impl Default for HoleSection {
+    /// Tolerances of bush-free robotic drilling (`datasets/irb6640/cutting_conditions.toml`).
+    fn default() -> Self {
+        HoleSection {
+            thrust_n: None,
+            torque_nm: None,
+            lateral_n: None,
+            pilot_diameter_mm: None,
+            position_tolerance_mm: 0.25,
+            perpendicularity_tolerance_deg: 0.5,
+        }
+    }
 }

@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use super::hole;
 use super::next_step::Guide;
 use super::text::{number, table, warnings};
 use super::{CampaignArg, Outcome};
@@ -76,6 +77,7 @@ fn document(analysis: &LobeAnalysis) -> Value {
         })
         .collect();
     let absolute = analysis.absolute();
+    let (hole, hole_basis) = hole::documents(analysis);
     json!({
         "process": analysis.process,
         "method": analysis.method,
@@ -90,12 +92,14 @@ fn document(analysis: &LobeAnalysis) -> Value {
         "absolute_limit_hz": absolute.map(|a| a.chatter_hz),
         "best": best,
         "outcomes": analysis.outcomes,
-        "redundancy": analysis.redundancy.as_ref().map(redundancy),
+        "hole": hole,
+        "hole_basis": hole_basis,
+        "redundancy": analysis.redundancy.as_ref().map(|found| redundancy(found, hole::weighing(analysis))),
         "warnings": analysis.warnings,
     })
 }
 
-fn redundancy(found: &RedundancyAnalysis) -> Value {
+fn redundancy(found: &RedundancyAnalysis, hole: Value) -> Value {
     let r = &found.recommendation;
     json!({
         "posture": found.posture,
@@ -113,6 +117,7 @@ fn redundancy(found: &RedundancyAnalysis) -> Value {
             "limit_margin_deg": r.posture.limit_margin_deg,
             "singularity_margin": r.posture.singularity_margin,
         },
+        "hole": hole,
         "enumeration": r.enumeration,
         "swarm": r.swarm,
         "agree": r.agree,
@@ -285,6 +290,7 @@ fn text(analysis: &LobeAnalysis) -> String {
     if let Some(found) = &analysis.redundancy {
         out += &redundancy_text(found);
     }
+    out += &hole::text(analysis);
     out + &warnings(&analysis.warnings)
 }
 
@@ -332,6 +338,7 @@ mod tests {
                     mode(LobeAxis::Theta, 3000.0, 0.02, 1e4),
                 ],
                 redundancy: None,
+                hole: None,
             }),
             material: None,
             orthogonal: None,

@@ -16,6 +16,7 @@ mod demo;
 mod diagnose;
 mod explain;
 mod history;
+mod hole;
 mod init;
 mod inspect;
 mod lobes;

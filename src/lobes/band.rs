@@ -58,8 +58,8 @@ pub fn draws(
         .collect())
 }
 
-/// The quantile of values where unlimited counts as infinite (linear between order statistics).
-pub fn quantile_mm(mut values: Vec<f64>, share: f64) -> Option<f64> {
+/// The quantile of values (limits in mm, errors of a hole) where unlimited counts as infinite (linear between order statistics).
+pub fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
     if values.is_empty() {
         return None;
     }
@@ -88,7 +88,7 @@ pub fn band(force: RegenerativeForce, structures: &[Box<dyn DirectFrf>], spindle
         .collect();
     let [lower_mm, upper_mm] = QUANTILES.map(|share| {
         (0..spindle_rpm.len())
-            .map(|i| quantile_mm(limits.iter().map(|l| l[i]).collect(), share))
+            .map(|i| quantile(limits.iter().map(|l| l[i]).collect(), share))
             .collect()
     });
     LobeBand { lower_mm, upper_mm }
@@ -128,10 +128,10 @@ mod tests {
     #[test]
     fn quantiles_with_unlimited_draws() {
         let values: Vec<f64> = (0..=100).map(f64::from).collect();
-        assert_eq!(quantile_mm(values.clone(), 0.05), Some(5.0));
-        assert_eq!(quantile_mm(vec![1.0, f64::INFINITY, f64::INFINITY], 0.95), None);
-        assert_eq!(quantile_mm(vec![1.0, f64::INFINITY, 1.0, 1.0], 0.05), Some(1.0));
-        assert_eq!(quantile_mm(vec![], 0.5), None);
+        assert_eq!(quantile(values.clone(), 0.05), Some(5.0));
+        assert_eq!(quantile(vec![1.0, f64::INFINITY, f64::INFINITY], 0.95), None);
+        assert_eq!(quantile(vec![1.0, f64::INFINITY, 1.0, 1.0], 0.05), Some(1.0));
+        assert_eq!(quantile(vec![], 0.5), None);
     }
 
     /// Stiffness off by a factor moves the limit by that factor: the band at any speed is the one of the factor.

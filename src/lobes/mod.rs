@@ -18,6 +18,7 @@ pub mod band;
 pub mod curve;
 pub mod force;
 pub mod frf;
+pub mod hole;
 pub mod measured;
 #[cfg(test)]
 mod milling_tests;

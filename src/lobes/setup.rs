@@ -4,7 +4,7 @@ use super::force::RegenerativeForce;
 use super::frf::{AxisMode, ModalFrf};
 use super::periodic_force::{PeriodicForce, ProcessDamping};
 use crate::campaign::{Campaign, LobeAxis, LobeMethod, LobesSection, Process};
-use crate::cutting::{CfcOptions, identify_forces};
+use crate::cutting::{CfcOptions, Group, identify_forces};
 use crate::{Error, InputError, Result};
 
 /// Cutting coefficients that lobes need, N/mm².
@@ -24,28 +24,27 @@ impl LobeCoefficients {
     }
 }
 
-/// Ktc and Krc identified from the campaign's own cuts of the same process, all speeds pooled.
-///
-/// A drilling regression gives the force normal to the lip, Kfc; its part in the plane of the lobes is Kfc cos κ
-/// (κ: half point angle), the axial part Kfc sin κ.
+fn lacks_coefficients(campaign: &Campaign, problem: impl Into<String>) -> Error {
+    InputError::new(problem)
+        .file(campaign.dir.join("campaign.toml"))
+        .key("lobes.ktc_n_per_mm2")
+        .remedy("give ktc_n_per_mm2 and krc_n_per_mm2, or add cuts at two feeds or more")
+        .into()
+}
+
+/// The coefficients of the campaign's own cuts of the same process and material, all speeds pooled.
 ///
 /// # Errors
-/// No cuts of that process, or cuts that do not determine the coefficients.
-pub fn coefficients_from_cuts(
+/// No cuts of that process, or several materials of which none is named.
+pub fn group_of_cuts(
     campaign: &Campaign,
     section: &LobesSection,
     warnings: &mut Vec<String>,
-) -> Result<LobeCoefficients> {
-    let lacks = |problem: String| -> Error {
-        InputError::new(problem)
-            .file(campaign.dir.join("campaign.toml"))
-            .key("lobes.ktc_n_per_mm2")
-            .remedy("give ktc_n_per_mm2 and krc_n_per_mm2, or add cuts at two feeds or more")
-            .into()
-    };
+) -> Result<Group> {
+    let lacks = |problem: &str| lacks_coefficients(campaign, problem);
     if campaign.cuts.is_empty() {
         return Err(lacks(
-            "the coefficients are not given and the campaign has no cuts".into(),
+            "the coefficients are not given and the campaign has no cuts",
         ));
     }
     let cuts = identify_forces(campaign, CfcOptions::default())?;
@@ -55,18 +54,33 @@ pub fn coefficients_from_cuts(
             .iter()
             .filter(|group| group.process == section.process)
     };
-    let group = match of_process().count() {
-        0 => return Err(lacks("the campaign has no cuts of the lobes' process".into())),
+    match of_process().count() {
+        0 => return Err(lacks("the campaign has no cuts of the lobes' process")),
         1 => of_process().next(),
         // Of several materials the campaign's own one counts.
         _ => of_process().find(|group| group.material.is_some() && group.material == campaign.material),
     }
-    .ok_or_else(|| lacks("the cuts are of several materials and [material] names none of them".into()))?;
+    .cloned()
+    .ok_or_else(|| lacks("the cuts are of several materials and [material] names none of them"))
+}
+
+/// Ktc and Krc of a group of cuts.
+///
+/// A drilling regression gives the force normal to the lip, Kfc; its part in the plane of the lobes is Kfc cos κ
+/// (κ: half point angle), the axial part Kfc sin κ.
+///
+/// # Errors
+/// Cuts that do not determine the coefficients.
+pub fn coefficients_of_group(
+    campaign: &Campaign,
+    section: &LobesSection,
+    group: &Group,
+) -> Result<LobeCoefficients> {
     let value = |label: &str| {
-        group
-            .coefficient(label)
-            .and_then(|c| c.value)
-            .ok_or_else(|| lacks(format!("the campaign's cuts do not determine {label}")))
+        group.coefficient(label).and_then(|c| c.value).ok_or_else(|| {
+            let problem = format!("the campaign's cuts do not determine {label}");
+            lacks_coefficients(campaign, problem)
+        })
     };
     let krc_n_per_mm2 = match section.process {
         Process::Milling => value("Krc")?,
@@ -78,7 +92,7 @@ pub fn coefficients_from_cuts(
     })
 }
 
-fn half_point_angle_rad(campaign: &Campaign, section: &LobesSection) -> Result<f64> {
+pub(super) fn half_point_angle_rad(campaign: &Campaign, section: &LobesSection) -> Result<f64> {
     let tool = campaign.tool.as_ref();
     section
         .half_point_angle_deg

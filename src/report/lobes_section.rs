@@ -3,9 +3,9 @@
 use super::figure::{LobeCurve, LobeMarker, LobeOutcome, LobePanel, LobesFigure};
 use super::number::{decimals, percent, significant};
 use super::parts::{count, figure, paragraph};
-use super::redundancy_section;
 use super::structure_section::NOISE_LIKE;
 use super::{Block, Column, Section, Table};
+use super::{hole_section, redundancy_section};
 use crate::analysis::{LobeAnalysis, LobeCase, LobeFindings, StructureFindings};
 use crate::campaign::{CutOutcome, LobeMethod, LobeSource, Process};
 use crate::lobes::outcome::{Outcomes, Verdict};
@@ -113,6 +113,7 @@ pub fn section(findings: &LobeFindings, structure: Option<&StructureFindings>) -
             blocks.push(limits(findings));
         }
     }
+    blocks.extend(hole_section::blocks(analysis));
     blocks.extend(analysis.outcomes.iter().flat_map(outcomes));
     blocks.push(best(analysis));
     match &findings.measured {

@@ -10,6 +10,7 @@ pub mod diagnosis_section;
 pub mod error_map_section;
 pub mod figure;
 pub mod history_section;
+mod hole_section;
 pub mod lobes_section;
 pub mod modal_section;
 pub mod number;

@@ -16,6 +16,7 @@ pub mod frf;
 pub mod inverse;
 pub mod model;
 pub mod posture_report;
+pub mod static_deflection;
 
 pub use crate::campaign::robot_spec::*;
 pub use chain::{Body, Branch, Chain, Element, Place, Role, Slot, System};

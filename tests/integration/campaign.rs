@@ -110,6 +110,15 @@ fn every_key_of_the_contract_is_read() {
     let immersion = lobes.immersion.unwrap();
     assert!((immersion.start_rad - PI * 2.0 / 3.0).abs() < 1e-12 && immersion.exit_rad == PI);
     assert_eq!(lobes.redundancy.unwrap().posture, 1);
+    let hole = lobes.hole.unwrap();
+    assert_eq!(
+        (hole.thrust_n, hole.torque_nm, hole.lateral_n),
+        (Some(400.0), None, Some(30.0))
+    );
+    assert_eq!(
+        (hole.position_tolerance_mm, hole.perpendicularity_tolerance_deg),
+        (0.2, 0.5)
+    );
     assert_eq!(lobes.modes[0].axis, LobeAxis::X);
 }
 
@@ -237,6 +246,9 @@ const SLIPS: &[(&str, &str, &str, &str)] = &[
     ("axis = \"x\"", "axis = \"theta\"", "lobes.mode[0].axis", "\"x\", \"y\""),
     ("posture = \"p2\"\nstep", "posture = \"tap\"\nstep", "lobes.redundancy.posture", "name one that is there (p1, p2)"),
     ("[[200.0, 240.0]]", "[[240.0, 200.0]]", "lobes.redundancy.forbidden_deg[0]", "from the smaller to the larger"),
+    ("lateral_n = 30.0", "lateral_n = -30.0", "lobes.hole.lateral_n", "at least 0"),
+    ("lateral_n = 30.0", "laterals_n = 30.0", "lobes.hole.laterals_n", "did you mean lateral_n?"),
+    ("position_tolerance_mm = 0.2", "position_tolerance_mm = 0.0", "lobes.hole.position_tolerance_mm", "above 0"),
     ("[[200.0, 240.0]]", "[200.0, 240.0]", "lobes.redundancy.forbidden_deg[0]", "must be a list of numbers"),
 ];
 

@@ -6,6 +6,7 @@ mod cfc_methods;
 mod contract;
 mod demo;
 mod diagnose;
+mod hole;
 mod init;
 mod inspect;
 mod lobes;

@@ -361,6 +361,32 @@ pub fn resonances() -> ResonanceFigure {
     }
 }
 
+pub fn hole() -> HoleFigure {
+    let angle_deg: Vec<f64> = (0..72)
+        .map(|i| 5.0 * f64::from(i))
+        .filter(|a| !(200.0..240.0).contains(a))
+        .collect();
+    let wave = |middle: f64, swing: f64| -> Vec<f64> {
+        let at = |a: &f64| middle + swing * (a + 30.0).to_radians().sin();
+        angle_deg.iter().map(at).collect()
+    };
+    let panel = |label: &str, middle, swing, tolerance| HolePanel {
+        label: label.into(),
+        value: wave(middle, swing),
+        bound: wave(1.1 * middle, 1.1 * swing),
+        tolerance,
+    };
+    HoleFigure {
+        title: "Static error of the hole over the redundancy angle".into(),
+        recommended_deg: Some(247.3),
+        panels: vec![
+            panel("Position error (mm)", 0.2, 0.12, 0.25),
+            panel("Tilt (°)", 0.02, 0.01, 0.5),
+        ],
+        angle_deg,
+    }
+}
+
 pub fn gallery() -> Vec<(&'static str, Result<Vec<u8>, Error>)> {
     let linear = SideBySide {
         log: false,
@@ -381,6 +407,7 @@ pub fn gallery() -> Vec<(&'static str, Result<Vec<u8>, Error>)> {
         ("force_record", force_record().png()),
         ("regression", regression().png()),
         ("lobes", lobes().png()),
+        ("hole", hole().png()),
         ("lobes_before_and_after", lobes_before_and_after().png()),
         ("side_by_side", side_by_side().png()),
         ("side_by_side_linear", linear.png()),

@@ -318,6 +318,11 @@ fn an_empty_figure_is_an_error_that_names_it() {
             ..Default::default()
         }
         .png(),
+        HoleFigure {
+            title: title(),
+            ..Default::default()
+        }
+        .png(),
         SideBySide {
             title: title(),
             ..Default::default()

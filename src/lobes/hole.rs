@@ -1,0 +1,486 @@
+//! The hole itself: how far the static cutting forces push and tilt the tool, against what the hole may be off by.
+//!
+//! The forces of a cut at full engagement load the robot's static compliance at the tool point: the part of the
+//! displacement normal to the tool axis is the hole's position error, the turn of the axis its error of perpendicularity
+//! (small angles). Vibration, friction (lost motion) and the robot's own positioning errors come on top.
+
+use std::fmt::Display;
+
+use nalgebra::{Matrix6, Vector3, Vector6};
+
+use super::band::{QUANTILES, quantile};
+use super::robot::lobe_axes;
+use super::setup::{group_of_cuts, half_point_angle_rad};
+use crate::campaign::{Campaign, CutGeometry, HoleSection, LobesSection, Process, Tool};
+use crate::cutting::{ForceAxis, Group, average_row, coefficients_of};
+use crate::robot::static_deflection::wrench;
+
+/// Static forces on the tool.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HoleLoad {
+    /// Against the tool, away from the workpiece.
+    pub thrust_n: f64,
+    /// About the tool axis, against the rotation.
+    pub torque_nm: f64,
+    /// Across the tool axis: the radial imbalance of a drill, which turns with it, or the mean force of a milling cutter,
+    /// which turns with the feed. It counts in the direction that does most harm.
+    pub lateral_n: f64,
+    /// For people: where these come from.
+    pub source: String,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HoleTolerance {
+    pub position_mm: f64,
+    pub perpendicularity_deg: f64,
+}
+
+/// What loads the tool and what the hole may be off by.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HoleCheck {
+    pub load: HoleLoad,
+    pub tolerance: HoleTolerance,
+}
+
+/// A value and what the uncertainty of the model's parameters makes of it; `None` without a calibration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Uncertain {
+    pub value: f64,
+    pub std: Option<f64>,
+    /// 95 % quantile.
+    pub upper: Option<f64>,
+}
+
+impl Uncertain {
+    fn new(value: f64, drawn: Vec<f64>) -> Self {
+        let n = drawn.len() as f64;
+        let mean = drawn.iter().sum::<f64>() / n;
+        let variance = drawn.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        Uncertain {
+            value,
+            std: (drawn.len() > 1).then(|| variance.sqrt()),
+            upper: quantile(drawn, QUANTILES[1]),
+        }
+    }
+
+    /// What is held against a tolerance: the upper bound, the value itself where nothing is known of its uncertainty.
+    pub fn bound(&self) -> f64 {
+        self.upper.unwrap_or(self.value)
+    }
+
+    /// By how much the bound exceeds the value, as a factor.
+    fn allowance(&self) -> f64 {
+        if self.value > 0.0 {
+            self.bound() / self.value
+        } else {
+            1.0
+        }
+    }
+}
+
+/// What the load does at one place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HoleError {
+    /// Of the tool point, base axes, with the lateral force where it does the position most harm.
+    pub displacement_mm: [f64; 3],
+    /// Part of it along the tool axis, positive into the workpiece.
+    pub axial_mm: f64,
+    /// Part of it normal to the tool axis.
+    pub position_mm: Uncertain,
+    /// Turn of the tool axis, with the lateral force where it tilts most.
+    pub tilt_deg: Uncertain,
+}
+
+impl HoleError {
+    /// `drawn`: the same place with parameters drawn from their uncertainty; may be empty.
+    pub fn new(nominal: &Deflection, drawn: &[Deflection]) -> Self {
+        let of = |value: fn(&Deflection) -> f64, unit: fn(f64) -> f64| {
+            Uncertain::new(
+                unit(value(nominal)),
+                drawn.iter().map(|d| unit(value(d))).collect(),
+            )
+        };
+        HoleError {
+            displacement_mm: (nominal.displacement_m * 1e3).into(),
+            axial_mm: 1e3 * nominal.axial_m,
+            position_mm: of(|d| d.position_m, |m| 1e3 * m),
+            tilt_deg: of(|d| d.tilt_rad, f64::to_degrees),
+        }
+    }
+}
+
+impl HoleTolerance {
+    pub fn position_met(&self, error: &HoleError) -> bool {
+        error.position_mm.bound() <= self.position_mm
+    }
+
+    pub fn perpendicularity_met(&self, error: &HoleError) -> bool {
+        error.tilt_deg.bound() <= self.perpendicularity_deg
+    }
+
+    pub fn met(&self, error: &HoleError) -> bool {
+        self.position_met(error) && self.perpendicularity_met(error)
+    }
+
+    /// Whether a place without draws of its own keeps the tolerance, when its uncertainty is in proportion that of a
+    /// neighbour.
+    pub fn met_near(&self, here: &Deflection, neighbour: &HoleError) -> bool {
+        let position_mm = 1e3 * here.position_m * neighbour.position_mm.allowance();
+        let tilt_deg = here.tilt_rad.to_degrees() * neighbour.tilt_deg.allowance();
+        position_mm <= self.position_mm && tilt_deg <= self.perpendicularity_deg
+    }
+}
+
+/// What a load does to the tool.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Deflection {
+    /// Base axes, with the lateral force where it does the position most harm.
+    pub displacement_m: Vector3<f64>,
+    /// Along the tool axis, positive into the workpiece.
+    pub axial_m: f64,
+    /// Normal to the tool axis.
+    pub position_m: f64,
+    /// Turn of the tool axis, with the lateral force where it tilts most.
+    pub tilt_rad: f64,
+}
+
+/// Directions of the lateral force that are tried: the worst one is met within cos 0.5°.
+const DIRECTIONS: u32 = 360;
+
+impl Deflection {
+    /// `compliance`: of the tool point in base axes ([`crate::robot::Chain::tool_compliance`]); `tool_axis`: unit vector
+    /// from the spindle to the workpiece.
+    pub fn new(compliance: &Matrix6<f64>, tool_axis: Vector3<f64>, load: &HoleLoad) -> Self {
+        let steady = compliance * wrench(-tool_axis * load.thrust_n, -tool_axis * load.torque_nm);
+        let across = |v: Vector3<f64>| v - tool_axis * v.dot(&tool_axis);
+        let shift = |twist: &Vector6<f64>| twist.fixed_rows::<3>(0).into_owned();
+        let position = |twist: &Vector6<f64>| across(shift(twist)).norm();
+        let tilt = |twist: &Vector6<f64>| across(twist.fixed_rows::<3>(3).into_owned()).norm();
+        let mut worst = steady;
+        let mut tilt_rad = tilt(&steady);
+        if load.lateral_n > 0.0 {
+            let sides =
+                lobe_axes(tool_axis).map(|side| compliance * wrench(side * load.lateral_n, Vector3::zeros()));
+            for i in 0..DIRECTIONS {
+                let (sin, cos) = f64::from(i).to_radians().sin_cos();
+                let twist = steady + sides[0] * cos + sides[1] * sin;
+                if i == 0 || position(&twist) > position(&worst) {
+                    worst = twist;
+                }
+                tilt_rad = tilt_rad.max(tilt(&twist));
+            }
+        }
+        Deflection {
+            displacement_m: shift(&worst),
+            axial_m: shift(&worst).dot(&tool_axis),
+            position_m: position(&worst),
+            tilt_rad,
+        }
+    }
+}
+
+impl HoleCheck {
+    /// From `[lobes.hole]`, and what is not given there from the cutting coefficients. `own`: the coefficients of the
+    /// campaign's cuts where somebody has already worked them out.
+    ///
+    /// # Errors
+    /// In words for people: why the thrust is not known, and what to give.
+    pub fn new(
+        campaign: &Campaign,
+        section: &LobesSection,
+        own: Option<&Group>,
+    ) -> std::result::Result<Self, String> {
+        let usual = HoleSection::default();
+        let asked = section.hole.as_ref().unwrap_or(&usual);
+        let tolerance = HoleTolerance {
+            position_mm: asked.position_tolerance_mm,
+            perpendicularity_deg: asked.perpendicularity_tolerance_deg,
+        };
+        let load = match (asked.thrust_n, asked.torque_nm, asked.lateral_n) {
+            (Some(thrust_n), Some(torque_nm), Some(lateral_n)) => HoleLoad {
+                thrust_n,
+                torque_nm,
+                lateral_n,
+                source: "[lobes.hole]".into(),
+            },
+            (thrust_n, torque_nm, lateral_n) => match (predicted(campaign, section, asked, own), thrust_n) {
+                (Ok(p), _) => HoleLoad {
+                    thrust_n: thrust_n.unwrap_or(p.thrust_n),
+                    torque_nm: torque_nm.unwrap_or(p.torque_nm),
+                    lateral_n: lateral_n.unwrap_or(p.lateral_n),
+                    source: match thrust_n.or(torque_nm).or(lateral_n) {
+                        Some(_) => format!("[lobes.hole], the rest from {}", p.source),
+                        None => p.source,
+                    },
+                },
+                (Err(_), Some(thrust_n)) => HoleLoad {
+                    thrust_n,
+                    torque_nm: torque_nm.unwrap_or(0.0),
+                    lateral_n: lateral_n.unwrap_or(0.0),
+                    source: "[lobes.hole]; what is not given there is taken as 0".into(),
+                },
+                (Err(reason), None) => {
+                    return Err(format!(
+                        "{reason}; or give thrust_n, torque_nm and lateral_n in [lobes.hole]"
+                    ));
+                }
+            },
+        };
+        let numbers = [load.thrust_n, load.torque_nm, load.lateral_n];
+        if numbers.iter().all(|v| v.is_finite()) {
+            Ok(HoleCheck { load, tolerance })
+        } else {
+            Err("the cutting coefficients give no finite force; give thrust_n, torque_nm and lateral_n in [lobes.hole]".into())
+        }
+    }
+}
+
+fn words(error: impl Display) -> String {
+    error.to_string()
+}
+
+/// What the cutting coefficients predict.
+fn predicted(
+    campaign: &Campaign,
+    section: &LobesSection,
+    asked: &HoleSection,
+    own: Option<&Group>,
+) -> std::result::Result<HoleLoad, String> {
+    let tool = campaign
+        .tool
+        .as_ref()
+        .ok_or("the tool's diameter is not known: add a [tool] table")?;
+    let tool = Tool {
+        teeth: section.teeth.unwrap_or(tool.teeth),
+        half_point_angle_deg: section.half_point_angle_deg.or(tool.half_point_angle_deg),
+        ..tool.clone()
+    };
+    let group = || match own {
+        Some(group) => Ok(group.clone()),
+        None => group_of_cuts(campaign, section, &mut Vec::new()).map_err(words),
+    };
+    match section.process {
+        Process::Drilling => drilling(campaign, section, asked, &tool, group),
+        Process::Milling => milling(campaign, &tool, group),
+    }
+}
+
+/// All coefficients of the campaign's cuts, in the order of [`coefficients_of`].
+fn complete(group: &Group) -> std::result::Result<Vec<f64>, String> {
+    coefficients_of(group.process)
+        .iter()
+        .map(|kind| {
+            group
+                .coefficient(kind.label)
+                .and_then(|c| c.value)
+                .ok_or(format!("the campaign's cuts do not determine {}", kind.label))
+        })
+        .collect()
+}
+
+fn along(
+    tool: &Tool,
+    geometry: &CutGeometry,
+    axis: ForceAxis,
+    coefficients: &[f64],
+) -> std::result::Result<f64, String> {
+    let row = average_row(tool, geometry, axis).map_err(words)?;
+    Ok(row.iter().zip(coefficients).map(|(r, c)| r * c).sum())
+}
+
+/// Thrust and torque at full engagement (see [`crate::cutting::DrillGeometry`]); two sharp lips balance each other
+/// laterally.
+fn drilling(
+    campaign: &Campaign,
+    section: &LobesSection,
+    asked: &HoleSection,
+    tool: &Tool,
+    group: impl Fn() -> std::result::Result<Group, String>,
+) -> std::result::Result<HoleLoad, String> {
+    let geometry = CutGeometry::Drilling {
+        feed_per_rev_mm: section
+            .feed_per_rev_mm
+            .ok_or("the thrust needs the feed: give lobes.feed_per_rev_mm")?,
+        pilot_diameter_mm: asked.pilot_diameter_mm.unwrap_or(0.0),
+        hole_depth_mm: None,
+    };
+    let (coefficients, from) = match (section.ktc_n_per_mm2, section.kac_n_per_mm2) {
+        // Ktc, Kte, Kfc, Kfe: Kac is the axial part of the force normal to the lip.
+        (Some(ktc), Some(kac)) => {
+            let half_point_rad = half_point_angle_rad(campaign, section).map_err(words)?;
+            let coefficients = vec![ktc, 0.0, kac / half_point_rad.sin(), 0.0];
+            (coefficients, "Ktc and Kac of [lobes], without edge forces")
+        }
+        _ => {
+            let coefficients = complete(&group().map_err(|reason| {
+                format!("the thrust is not known: give lobes.kac_n_per_mm2, or drilling cuts ({reason})")
+            })?)?;
+            (coefficients, "the coefficients of the campaign's cuts")
+        }
+    };
+    let chisel = match asked.pilot_diameter_mm {
+        Some(pilot) if pilot > 0.0 => "",
+        _ => ", without the thrust of the chisel edge: a lower bound",
+    };
+    Ok(HoleLoad {
+        thrust_n: along(tool, &geometry, ForceAxis::Z, &coefficients)?,
+        torque_nm: along(tool, &geometry, ForceAxis::Mz, &coefficients)?,
+        lateral_n: 0.0,
+        source: format!("{from}{chisel}"),
+    })
+}
+
+/// The mean forces of that milling cut of the campaign which pushes hardest sideways.
+fn milling(
+    campaign: &Campaign,
+    tool: &Tool,
+    group: impl Fn() -> std::result::Result<Group, String>,
+) -> std::result::Result<HoleLoad, String> {
+    let group = group().map_err(|reason| format!("the forces need milling cuts ({reason})"))?;
+    let coefficients = complete(&group)?;
+    let mut hardest: Option<HoleLoad> = None;
+    for cut in campaign.cuts.iter().filter(|c| group.cuts.contains(&c.id)) {
+        let mean = |axis| along(tool, &cut.geometry, axis, &coefficients);
+        let lateral_n = mean(ForceAxis::X)?.hypot(mean(ForceAxis::Y)?);
+        if hardest.as_ref().is_none_or(|h| lateral_n > h.lateral_n) {
+            hardest = Some(HoleLoad {
+                thrust_n: mean(ForceAxis::Z)?,
+                torque_nm: milling_torque_nm(tool, &cut.geometry, coefficients[0], coefficients[3]),
+                lateral_n,
+                source: format!(
+                    "the mean forces of cut {} by the coefficients of the campaign's cuts, the feed in any direction",
+                    cut.id
+                ),
+            });
+        }
+    }
+    hardest.ok_or_else(|| "the forces need milling cuts".into())
+}
+
+/// Mean torque: the tangential force Ktc c sin φ + Kte (N/mm² and N/mm) of N teeth from entry to exit, at the radius.
+fn milling_torque_nm(tool: &Tool, geometry: &CutGeometry, ktc: f64, kte: f64) -> f64 {
+    let CutGeometry::Milling {
+        feed_per_tooth_mm,
+        axial_depth_mm,
+        immersion,
+    } = *geometry
+    else {
+        return 0.0;
+    };
+    let (start, exit) = (immersion.start_rad, immersion.exit_rad);
+    let per_depth = ktc * feed_per_tooth_mm * (start.cos() - exit.cos()) + kte * (exit - start);
+    let teeth_at_once = tool.teeth as f64 / std::f64::consts::TAU;
+    teeth_at_once * axial_depth_mm * per_depth * 0.5 * tool.diameter_mm / 1000.0
+}
+
+#[cfg(test)]
+mod tests {
+    use approx::assert_relative_eq;
+
+    use super::*;
+    use crate::campaign::Immersion;
+    use crate::cutting::test_drill;
+
+    fn load(thrust_n: f64, torque_nm: f64, lateral_n: f64) -> HoleLoad {
+        HoleLoad {
+            thrust_n,
+            torque_nm,
+            lateral_n,
+            source: String::new(),
+        }
+    }
+
+    /// Springs along the base axes under a vertical tool: thrust lifts it, the lateral force finds the softer side, a
+    /// torque turns the tool about its axis and tilts nothing.
+    #[test]
+    fn springs_along_the_axes() {
+        let diagonal = Vector6::new(2e-6, 3e-6, 1e-6, 4e-7, 5e-7, 6e-7);
+        let down = -Vector3::z();
+        let compliance = Matrix6::from_diagonal(&diagonal);
+        let found = Deflection::new(&compliance, down, &load(400.0, 5.0, 100.0));
+        assert_relative_eq!(found.axial_m, -4e-4, max_relative = 1e-12);
+        assert_relative_eq!(found.position_m, 3e-4, max_relative = 1e-12);
+        assert_relative_eq!(found.displacement_m.y.abs(), 3e-4, max_relative = 1e-12);
+        assert!(found.tilt_rad.abs() < 1e-15);
+    }
+
+    /// A drill at the end of a lever of one spring (compliance c about the base's y, lever a along x, tool down): the
+    /// thrust T lifts by c a² T and tilts by c a T; with a lateral force L at a height h below the joint the tilt is
+    /// c (a T + h L) and the position error h times that.
+    #[test]
+    fn a_drill_on_a_lever() {
+        let (c, a, h, thrust, lateral) = (1e-6, 0.9, 0.4, 300.0, 50.0);
+        // Displacement of the point (a, 0, −h) for a turn about y: y × r = (−h, 0, −a).
+        let s = Vector6::new(-h, 0.0, -a, 0.0, 1.0, 0.0);
+        let compliance = s * s.transpose() * c;
+        let found = Deflection::new(&compliance, -Vector3::z(), &load(thrust, 7.0, lateral));
+        let turn = c * (a * thrust + h * lateral);
+        assert_relative_eq!(found.tilt_rad, turn, max_relative = 1e-9);
+        assert_relative_eq!(found.position_m, h * turn, max_relative = 1e-9);
+        assert_relative_eq!(found.axial_m, -a * turn, max_relative = 1e-9);
+    }
+
+    #[test]
+    fn tolerances_are_held_against_the_upper_bound() {
+        let deflection = |position_m: f64, tilt_rad: f64| Deflection {
+            displacement_m: Vector3::new(position_m, 0.0, 0.0),
+            axial_m: 0.0,
+            position_m,
+            tilt_rad,
+        };
+        let drawn: Vec<Deflection> = (0..=100)
+            .map(|i| deflection(1e-4 + 1e-6 * f64::from(i), 1e-3))
+            .collect();
+        let error = HoleError::new(&deflection(1.5e-4, 1e-3), &drawn);
+        assert_relative_eq!(error.position_mm.bound(), 0.195, max_relative = 1e-9);
+        // Variance of 0 … 100: n (n + 1)/12 with n = 101.
+        let std = 1e-3 * (101.0 * 102.0 / 12.0f64).sqrt();
+        assert_relative_eq!(error.position_mm.std.unwrap(), std, max_relative = 1e-9);
+        let tolerance = |position_mm, perpendicularity_deg| HoleTolerance {
+            position_mm,
+            perpendicularity_deg,
+        };
+        assert!(!tolerance(0.19, 0.5).met(&error) && tolerance(0.20, 0.5).met(&error));
+        assert!(!tolerance(0.20, 0.05).met(&error) && tolerance(0.20, 0.05).position_met(&error));
+        // Half the deflection with the same uncertainty in proportion.
+        let near = deflection(0.75e-4, 1e-3);
+        assert!(tolerance(0.098, 0.5).met_near(&near, &error));
+        assert!(!tolerance(0.097, 0.5).met_near(&near, &error));
+        let certain = HoleError::new(&deflection(1.5e-4, 1e-3), &[]);
+        assert_eq!((certain.position_mm.std, certain.position_mm.upper), (None, None));
+        assert!(tolerance(0.15001, 0.5).met(&certain));
+    }
+
+    /// Slot: mean tangential force times radius, N a/(2π) (2 Ktc c + π Kte) D/2.
+    #[test]
+    fn torque_of_a_slot() {
+        let tool = Tool {
+            diameter_mm: 16.0,
+            teeth: 6,
+            ..test_drill()
+        };
+        let slot = CutGeometry::Milling {
+            feed_per_tooth_mm: 0.1,
+            axial_depth_mm: 2.0,
+            immersion: Immersion::SLOT,
+        };
+        let found = milling_torque_nm(&tool, &slot, 800.0, 12.0);
+        let pi = std::f64::consts::PI;
+        let force = 6.0 * 2.0 / (2.0 * pi) * (2.0 * 800.0 * 0.1 + pi * 12.0);
+        assert_relative_eq!(found, force * 8.0 / 1000.0, max_relative = 1e-12);
+    }
+
+    /// The defaults are those of the built-in data.
+    #[test]
+    fn usual_tolerances() {
+        let text = include_str!("../../datasets/irb6640/cutting_conditions.toml");
+        let table: toml::Table = toml::from_str(text).unwrap();
+        let given = |key: &str| table["hole_tolerances"][key].as_float().unwrap();
+        let usual = HoleSection::default();
+        assert_eq!(usual.position_tolerance_mm, given("position_mm"));
+        assert_eq!(
+            usual.perpendicularity_tolerance_deg,
+            given("perpendicularity_deg")
+        );
+    }
+}

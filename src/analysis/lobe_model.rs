@@ -1,11 +1,12 @@
 //! The calibrated robot as lobes need it: its tool point's FRF, the same before effects were added, and draws from the
 //! parameters' uncertainty.
 
+use super::StructureAnalysis;
 use crate::campaign::Campaign;
+use crate::identify::Options;
 use crate::identify::calibrate::calibrate;
 use crate::identify::case::structure_model;
 use crate::identify::structure::StructureModel;
-use crate::identify::{Options, StructureCase};
 use crate::lobes::hole::{Deflection, HoleError, HoleLoad};
 use crate::lobes::{DirectFrf, RobotFrf, StateSpace, band};
 use crate::{InputError, Result};
@@ -114,9 +115,10 @@ impl ModelState {
     }
 
     fn calibrated(campaign: &Campaign, warnings: &mut Vec<String>) -> Result<Self> {
-        let case = StructureCase::load(campaign)?;
+        let StructureAnalysis {
+            case, calibration, ..
+        } = StructureAnalysis::run(campaign, Options::default())?;
         let options = case.options(Options::default());
-        let calibration = calibrate(&case.model, &case.data, None, options)?;
         let effects = case.effects();
         let description = match effects.is_empty() {
             true => "calibrated robot model".to_string(),

@@ -31,7 +31,11 @@ impl StructureAnalysis {
         let case = StructureCase::load(campaign)?;
         let start = match case.model.start() {
             Some(_) => None,
-            None => start_of_modes(&case, &ModalAnalysis::run(campaign)?)?,
+            // FRFs that show no modes can still be fitted.
+            None => match ModalAnalysis::run(campaign) {
+                Ok(modal) => start_of_modes(&case, &modal)?,
+                Err(_) => None,
+            },
         };
         Self::of(case, start, options)
     }

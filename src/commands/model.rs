@@ -3,9 +3,10 @@ use serde_json::{Value, json};
 use super::next_step::Guide;
 use super::text::{number, table, warnings};
 use super::{CampaignArg, Outcome};
+use crate::analysis::StructureAnalysis;
 use crate::campaign::Campaign;
 use crate::identify::case::structure_model;
-use crate::identify::{Options, StructureCase, StructureModel, calibrate::calibrate};
+use crate::identify::{Options, StructureModel};
 use crate::robot::{Baseline, Dual, PostureReport, export};
 use crate::{InputError, Result};
 
@@ -42,8 +43,9 @@ pub fn run(args: Args) -> Result<Outcome> {
         describe(&nominal)
     );
     if !campaign.frfs.is_empty() {
-        let case = StructureCase::load(&campaign)?;
-        let calibration = calibrate(&case.model, &case.data, None, case.options(Options::default()))?;
+        let StructureAnalysis {
+            case, calibration, ..
+        } = StructureAnalysis::run(&campaign, Options::default())?;
         let after = postures(&campaign, &case.model, &calibration.theta, &args, &mut left_out)?;
         text += &format!(
             "\nafter calibration on the measured FRFs ({})\n",

@@ -121,6 +121,7 @@ impl Page {
         engine
             .add_template("report.html", include_str!("template.html"))
             .map_err(failed)?;
+        engine.add_filter("code", |text: String| Value::from_safe_string(with_code(&text)));
         let mut ids = Names::default();
         let mut files = Names::default();
         let sections = self.sections.iter().map(|section| {
@@ -283,6 +284,24 @@ impl Names {
     }
 }
 
+/// The text escaped, with what stands between backticks as code: commands and keys, as messages have them.
+fn with_code(text: &str) -> String {
+    let escaped = minijinja::HtmlEscape(text).to_string();
+    let parts: Vec<&str> = escaped.split('`').collect();
+    // An odd backtick is none of ours.
+    if parts.len() % 2 == 0 {
+        return escaped;
+    }
+    let mut html = String::with_capacity(escaped.len() + 13 * parts.len());
+    for (k, part) in parts.into_iter().enumerate() {
+        match k % 2 {
+            0 => html += part,
+            _ => html += &format!("<code>{part}</code>"),
+        }
+    }
+    html
+}
+
 /// Lower-case letters, digits, `-` and `_`, at most 80 of them: good for file names and anchors everywhere.
 fn slug(text: &str, otherwise: &str) -> String {
     let mut slug = String::new();
@@ -333,6 +352,16 @@ fn base64(bytes: &[u8]) -> String {
 mod tests {
     use super::*;
     use crate::report::figure::HeatMap;
+
+    #[test]
+    fn what_stands_between_backticks_is_code_and_everything_is_escaped() {
+        assert_eq!(
+            with_code("run `lobestone add <DIR>` & see"),
+            "run <code>lobestone add &lt;DIR&gt;</code> &amp; see"
+        );
+        assert_eq!(with_code("a ` alone <b>"), "a ` alone &lt;b&gt;");
+        assert_eq!(with_code("plain"), "plain");
+    }
 
     fn page(name: &str) -> Page {
         let map = HeatMap {

@@ -275,8 +275,8 @@ fn a_changed_number_or_word_is_noticed() {
         "rounding"
     );
     for (old, new) in [
-        ("5.83", "5.85"),
-        ("0.447", "0.449"),
+        ("5.83", "5.95"),
+        ("0.447", "0.457"),
         ("3.2e-3", "3.2e-2"),
         ("nrms", "rms"),
     ] {

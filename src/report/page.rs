@@ -289,7 +289,7 @@ fn with_code(text: &str) -> String {
     let escaped = minijinja::HtmlEscape(text).to_string();
     let parts: Vec<&str> = escaped.split('`').collect();
     // An odd backtick is none of ours.
-    if parts.len() % 2 == 0 {
+    if parts.len().is_multiple_of(2) {
         return escaped;
     }
     let mut html = String::with_capacity(escaped.len() + 13 * parts.len());

@@ -17,6 +17,18 @@ pub struct Prior {
     pub std: f64,
 }
 
+impl Prior {
+    /// What it adds to half a sum of squares at `theta` (solver's scale): value, first and second derivative.
+    pub fn half_square(&self, theta: f64) -> [f64; 3] {
+        let residual = (theta - self.mean) / self.std;
+        [
+            0.5 * residual * residual,
+            residual / self.std,
+            1.0 / (self.std * self.std),
+        ]
+    }
+}
+
 /// One tunable quantity.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameter {

@@ -6,7 +6,7 @@ use crate::campaign::{Campaign, LobeSource};
 use crate::cutting::{CfcOptions, CfcResult, identify_forces};
 use crate::identify::case::structure_model;
 use crate::identify::structure_study::held_out_postures;
-use crate::identify::{Options, StructureModel};
+use crate::identify::{Options, StructureCase, StructureModel};
 use crate::robot::PostureReport;
 use crate::{Error, InputError, Result};
 
@@ -57,7 +57,9 @@ impl<'a> CampaignFindings<'a> {
     pub fn run(campaign: &'a Campaign, wanted: bool) -> Result<Self> {
         // FRFs without a robot are to be had, too: for their modes.
         let modelled = !campaign.frfs.is_empty() && campaign.robot.is_some();
-        let structure = modelled.then(|| StructureFindings::run(campaign));
+        let modal = (!campaign.frfs.is_empty()).then(|| ModalAnalysis::run(campaign));
+        let modes = modal.as_ref().and_then(|m| m.as_ref().ok());
+        let structure = modelled.then(|| StructureFindings::with_modes(campaign, modes));
         let calibrated = structure.as_ref().and_then(|s| s.as_ref().ok());
         // Where nothing can be calibrated nothing can be diagnosed, for the same reason.
         let diagnosis =
@@ -67,16 +69,12 @@ impl<'a> CampaignFindings<'a> {
             (wanted && matches!(cutting, Some(Ok(_)))).then(|| CuttingFindings::run(campaign));
         let postures = (campaign.robot.is_some() && !campaign.postures.is_empty())
             .then(|| PostureFindings::run(campaign, calibrated));
-        let modal = (!campaign.frfs.is_empty()).then(|| ModalAnalysis::run(campaign));
         let findings = CampaignFindings {
             campaign,
             postures,
             diagnosis,
             structure,
-            mode_shapes: match &modal {
-                Some(Ok(modal)) => stick_shapes::of_richest_set(campaign, modal),
-                _ => Vec::new(),
-            },
+            mode_shapes: modes.map_or_else(Vec::new, |m| stick_shapes::of_richest_set(campaign, m)),
             modal,
             cutting,
             cutting_diagnosis,
@@ -173,7 +171,16 @@ impl<'a> CampaignFindings<'a> {
 
 impl StructureFindings {
     pub fn run(campaign: &Campaign) -> Result<Self> {
-        let analysis = StructureAnalysis::run(campaign, Options::default())?;
+        Self::of(StructureAnalysis::run(campaign, Options::default())?)
+    }
+
+    /// As [`StructureFindings::run`], with the measured modes that are there already.
+    fn with_modes(campaign: &Campaign, modal: Option<&ModalAnalysis>) -> Result<Self> {
+        let case = StructureCase::load(campaign)?;
+        Self::of(StructureAnalysis::of(case, modal, Options::default())?)
+    }
+
+    fn of(analysis: StructureAnalysis) -> Result<Self> {
         let held_out_nrms = held_out_postures(
             &analysis.case.model,
             &analysis.case.data,

@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::modal::{FrfInput, ModalAnalysis, SetModes, dof_name};
 use super::structure::StructureAnalysis;
 use crate::Result;
+use crate::identify::StructureCase;
 use crate::identify::frf_data::{FrfBlock, FrfDatum};
 use crate::modal::Settings;
 use crate::modal::tracking::{constants_mac, pair_by};
@@ -28,13 +29,12 @@ pub struct ModePair {
     pub mac: Option<f64>,
 }
 
-/// All measured modes, posture by posture, ascending in frequency.
+/// All measured modes (of [`measured_modes`]), posture by posture, ascending in frequency.
 ///
 /// # Errors
-/// The FRFs cannot be analysed.
-pub fn compare_modes(analysis: &StructureAnalysis) -> Result<Vec<ModePair>> {
-    let measured = analyse(analysis, |_, datum| datum.receptance.clone())?;
-    let model = analyse(analysis, |k, _| analysis.calibrated[k].clone())?;
+/// The model's FRFs cannot be analysed.
+pub fn compare_modes(analysis: &StructureAnalysis, measured: &ModalAnalysis) -> Result<Vec<ModePair>> {
+    let model = modes_of(&analysis.case, |k, _| analysis.calibrated[k].clone())?;
     Ok(measured
         .sets
         .iter()
@@ -45,12 +45,20 @@ pub fn compare_modes(analysis: &StructureAnalysis) -> Result<Vec<ModePair>> {
         .collect())
 }
 
-fn analyse(
-    analysis: &StructureAnalysis,
+/// The modes of a case's measured FRFs, one set a posture.
+///
+/// # Errors
+/// The FRFs cannot be analysed.
+pub fn measured_modes(case: &StructureCase) -> Result<ModalAnalysis> {
+    modes_of(case, |_, datum| datum.receptance.clone())
+}
+
+fn modes_of(
+    case: &StructureCase,
     receptance: impl Fn(usize, &FrfDatum) -> Vec<Complex64>,
 ) -> Result<ModalAnalysis> {
-    let points = &analysis.case.model.points;
-    let data = &analysis.case.data;
+    let points = &case.model.points;
+    let data = &case.data;
     let input = |(k, (block, datum)): (usize, (&FrfBlock, &FrfDatum))| FrfInput {
         name: datum.name.clone(),
         set: data.posture_ids[datum.posture].clone(),

@@ -3,6 +3,7 @@
 use num_complex::Complex64;
 
 use super::modal::ModalAnalysis;
+use super::mode_comparison::measured_modes;
 use crate::Result;
 use crate::campaign::Campaign;
 use crate::discrepancy::FrfComparison;
@@ -27,22 +28,27 @@ pub struct StructureAnalysis {
 }
 
 impl StructureAnalysis {
+    /// # Errors
+    /// A case that cannot be loaded, or FRFs that do not determine the parameters.
     pub fn run(campaign: &Campaign, options: Options) -> Result<Self> {
         let case = StructureCase::load(campaign)?;
-        let start = match case.model.start() {
+        // FRFs that show no modes can still be fitted.
+        let modal = match case.model.start() {
             Some(_) => None,
-            // FRFs that show no modes can still be fitted.
-            None => match ModalAnalysis::run(campaign) {
-                Ok(modal) => start_of_modes(&case, &modal)?,
-                Err(_) => None,
-            },
+            None => measured_modes(&case).ok(),
         };
-        Self::of(case, start, options)
+        Self::of(case, modal.as_ref(), options)
     }
 
+    /// `modal`: the campaign's measured modes, from which a case without a start of its own starts as well.
+    ///
     /// # Errors
     /// FRFs that do not determine the parameters.
-    pub fn of(case: StructureCase, start: Option<ModalStart>, options: Options) -> Result<Self> {
+    pub fn of(case: StructureCase, modal: Option<&ModalAnalysis>, options: Options) -> Result<Self> {
+        let start = match (case.model.start(), modal) {
+            (None, Some(modal)) => start_of_modes(&case, modal)?,
+            _ => None,
+        };
         let measured = start.as_ref().map(|s| s.theta.as_slice());
         let calibration = calibrate(&case.model, &case.data, measured, case.options(options))?;
         let nominal = case
@@ -70,7 +76,7 @@ impl StructureAnalysis {
 ///
 /// # Errors
 /// As [`modal_start`].
-pub fn start_of_modes(case: &StructureCase, modal: &ModalAnalysis) -> Result<Option<ModalStart>> {
+fn start_of_modes(case: &StructureCase, modal: &ModalAnalysis) -> Result<Option<ModalStart>> {
     let mut postures: Vec<PostureMeasurement> = Vec::new();
     for set in &modal.sets {
         let same = |id: &String| *id == set.set;

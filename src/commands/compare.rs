@@ -4,15 +4,15 @@ use super::next_step::Guide;
 use super::text::{Emphasis, error_bar, number, percent, table, warnings};
 use super::{CampaignArg, Domain, Outcome, by_domain};
 use crate::Result;
-use crate::analysis::mode_comparison::{ModePair, compare_modes};
+use crate::analysis::mode_comparison::{ModePair, compare_modes, measured_modes};
 use crate::analysis::{CuttingAnalysis, StructureAnalysis};
 use crate::campaign::Campaign;
 use crate::discrepancy::compare::{ErrorMap, Group};
 use crate::discrepancy::compare_cutting::Harmonic;
 use crate::discrepancy::place::Place;
 use crate::discrepancy::{FrfComparison, FrfError};
-use crate::identify::Options;
 use crate::identify::structure_study::{ResidualPeak, held_out_postures, residual_peaks};
+use crate::identify::{Options, StructureCase};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -105,7 +105,9 @@ fn describe_cutting(analysis: &CuttingAnalysis) -> String {
 }
 
 fn structure(campaign: &Campaign) -> Result<Outcome> {
-    let analysis = StructureAnalysis::run(campaign, Options::default())?;
+    let case = StructureCase::load(campaign)?;
+    let measured = measured_modes(&case);
+    let analysis = StructureAnalysis::of(case, measured.as_ref().ok(), Options::default())?;
     let StructureAnalysis {
         case,
         calibration,
@@ -119,7 +121,8 @@ fn structure(campaign: &Campaign) -> Result<Outcome> {
     let peaks = residual_peaks(&analysis.calibrated, &case.data);
     let mut notes = notes.clone();
     // Modes are an addition: FRFs that show none are compared all the same.
-    let modes = compare_modes(&analysis).unwrap_or_else(|e| {
+    let modes = measured.and_then(|m| compare_modes(&analysis, &m));
+    let modes = modes.unwrap_or_else(|e| {
         notes.push(format!("the modes cannot be compared: {e}"));
         Vec::new()
     });

@@ -180,8 +180,10 @@ pub fn calibrate(
         None => approach(model, data, &nominal, ROUGH)?,
     };
     let (mut starts, mut agreeing) = (1, 1);
-    if let (Some(start), None) = (measured, model.start()) {
-        let (other, more) = approach(model, data, start, ROUGH)?;
+    // As with the further starting points below, one that leads nowhere is no reason to give up.
+    if let (Some(start), None) = (measured, model.start())
+        && let Ok((other, more)) = approach(model, data, start, ROUGH)
+    {
         starts += 1;
         iterations += more;
         let alike = (other.cost / first.cost - 1.0).abs() < 1e-3;

@@ -275,10 +275,10 @@ impl Frequencies<'_> {
         for (i, (parameter, t)) in self.model.parameters.iter().zip(theta).enumerate() {
             // Frequencies say nothing of the damping: it stays at the median of the measured ones.
             if let Some(prior) = parameter.prior.filter(|_| i != damping) {
-                let residual = (t - prior.mean) / prior.std;
-                sum.cost += 0.5 * residual * residual;
-                sum.gradient[i] += residual / prior.std;
-                sum.hessian[(i, i)] += prior.std.powi(-2);
+                let [cost, slope, curvature] = prior.half_square(*t);
+                sum.cost += cost;
+                sum.gradient[i] += slope;
+                sum.hessian[(i, i)] += curvature;
             }
         }
         sum.hessian[(damping, damping)] += 1.0;

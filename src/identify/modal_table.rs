@@ -100,9 +100,10 @@ impl LeastSquares for Table<'_> {
         }
         for (i, (parameter, t)) in self.model.parameters.iter().zip(theta).enumerate() {
             if let Some(prior) = parameter.prior {
-                let mut slope = DVector::zeros(count);
-                slope[i] = 1.0 / prior.std;
-                push((t - prior.mean) / prior.std, slope);
+                let [cost, slope, curvature] = prior.half_square(*t);
+                sum.cost += cost;
+                sum.gradient[i] += slope;
+                sum.hessian[(i, i)] += curvature;
             }
         }
         Ok(sum)

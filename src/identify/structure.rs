@@ -475,11 +475,11 @@ impl FrfProblem<'_> {
         }
         for (i, (parameter, t)) in self.model.parameters.iter().zip(theta).enumerate() {
             if let Some(prior) = parameter.prior {
-                let residual = (t - prior.mean) / prior.std;
-                total.cost += 0.5 * residual * residual;
+                let [cost, slope, curvature] = prior.half_square(*t);
+                total.cost += cost;
                 if with_derivatives {
-                    total.gradient[i] += residual / prior.std;
-                    total.hessian[(i, i)] += 1.0 / (prior.std * prior.std);
+                    total.gradient[i] += slope;
+                    total.hessian[(i, i)] += curvature;
                 }
             }
         }

@@ -63,12 +63,7 @@ pub(super) fn verdict_text<M, I>(
 pub fn section(campaign: &Campaign, findings: &DiagnosisFindings) -> Section {
     let d = &findings.diagnosis;
     let mut blocks = vec![paragraph(summary(findings))];
-    if let Some(winner) = d.winner() {
-        blocks.push(paragraph(format!(
-            "How it shows: {}",
-            winner.instance.effect.fingerprint()
-        )));
-    }
+    blocks.extend(how_it_shows(d, |c| c.instance.effect.fingerprint()));
     if let (Some(leading), Some(candidate)) = (&findings.leading, findings.leader()) {
         let who = match d.verdict {
             Verdict::Unknown => format!("The best candidate, {},", candidate.instance.title()),
@@ -76,24 +71,7 @@ pub fn section(campaign: &Campaign, findings: &DiagnosisFindings) -> Section {
         };
         blocks.push(paragraph(leading.explained.sentence(&who)));
     }
-    if !d.indistinguishable.is_empty() {
-        blocks.push(Block::Warning(format!(
-            "These data cannot tell it from {}.",
-            listed(&d.indistinguishable)
-        )));
-    }
-    blocks.push(paragraph(format!(
-        "Next measurement: {}.",
-        findings.next_measurement
-    )));
-    if let Some(winner) = d.winner() {
-        blocks.push(paragraph("To add it to the model and fit everything anew:"));
-        blocks.push(Block::Pre(format!(
-            "lobestone add {} {}",
-            campaign.dir.display(),
-            winner.label()
-        )));
-    }
+    blocks.extend(advice(campaign, d, "data", &findings.next_measurement));
     if !d.candidates.is_empty() {
         blocks.push(candidate_chart(
             d,
@@ -116,14 +94,7 @@ pub fn section(campaign: &Campaign, findings: &DiagnosisFindings) -> Section {
             blocks.extend(frf(findings, leading, candidate, rank, index));
         }
     }
-    if !d.not_tried.is_empty() {
-        let reasons: Vec<String> = d
-            .not_tried
-            .iter()
-            .map(|(e, why)| format!("{e} ({why})"))
-            .collect();
-        blocks.push(paragraph(format!("Not tried: {}.", reasons.join("; "))));
-    }
+    blocks.extend(not_tried(d));
     Section {
         id: ID.into(),
         title: TITLE.into(),
@@ -132,6 +103,51 @@ pub fn section(campaign: &Campaign, findings: &DiagnosisFindings) -> Section {
             .into(),
         blocks,
     }
+}
+
+/// The fingerprint of the effect that is missing.
+pub(super) fn how_it_shows<M, I>(
+    d: &Diagnosis<M, I>,
+    fingerprint: impl Fn(&Candidate<M, I>) -> &'static str,
+) -> Option<Block> {
+    d.winner()
+        .map(|winner| paragraph(format!("How it shows: {}", fingerprint(winner))))
+}
+
+/// Rivals, what to measure next, and how to add what is missing; `data` says what was measured.
+pub(super) fn advice<M, I>(
+    campaign: &Campaign,
+    d: &Diagnosis<M, I>,
+    data: &str,
+    next_measurement: &str,
+) -> Vec<Block> {
+    let mut blocks = Vec::new();
+    if !d.indistinguishable.is_empty() {
+        blocks.push(Block::Warning(format!(
+            "These {data} cannot tell it from {}.",
+            listed(&d.indistinguishable)
+        )));
+    }
+    blocks.push(paragraph(format!("Next measurement: {next_measurement}.")));
+    if let Some(winner) = d.winner() {
+        blocks.push(paragraph("To add it to the model and fit everything anew:"));
+        blocks.push(Block::Pre(format!(
+            "lobestone add {} {}",
+            campaign.dir.display(),
+            winner.label()
+        )));
+    }
+    blocks
+}
+
+/// Effects that the data cannot show, with the reasons.
+pub(super) fn not_tried<M, I>(d: &Diagnosis<M, I>) -> Option<Block> {
+    let reasons: Vec<String> = d
+        .not_tried
+        .iter()
+        .map(|(effect, why)| format!("{effect} ({why})"))
+        .collect();
+    (!reasons.is_empty()).then(|| paragraph(format!("Not tried: {}.", reasons.join("; "))))
 }
 
 /// Error with each candidate; `folds`: what was left out in turn.

@@ -1,6 +1,8 @@
 //! Force model against the recorded waveforms, and which physics it lacks.
 
-use super::diagnosis_section::{candidate_chart, candidate_table, verdict_text};
+use super::diagnosis_section::{
+    advice, candidate_chart, candidate_table, how_it_shows, not_tried, verdict_text,
+};
 use super::figure::{BarSeries, CellFormat, HeatMap, SideBySide, WaveformFigure, WaveformPanel};
 use super::number::{percent, significant};
 use super::parts::{figure, listed, paragraph};
@@ -226,43 +228,14 @@ fn waveform(findings: &CuttingFindings, rank: usize, cut: usize) -> Block {
 fn missing(campaign: &Campaign, findings: &CuttingFindings) -> Section {
     let d = &findings.diagnosis;
     let mut blocks = vec![paragraph(summary(findings))];
-    if let Some(winner) = d.winner() {
-        blocks.push(paragraph(format!(
-            "How it shows: {}",
-            winner.instance.effect.fingerprint()
-        )));
-    }
-    if !d.indistinguishable.is_empty() {
-        blocks.push(Block::Warning(format!(
-            "These records cannot tell it from {}.",
-            listed(&d.indistinguishable)
-        )));
-    }
-    blocks.push(paragraph(format!(
-        "Next measurement: {}.",
-        findings.next_measurement
-    )));
-    if let Some(winner) = d.winner() {
-        blocks.push(paragraph("To add it to the model and fit everything anew:"));
-        blocks.push(Block::Pre(format!(
-            "lobestone add {} {}",
-            campaign.dir.display(),
-            winner.label()
-        )));
-    }
+    blocks.extend(how_it_shows(d, |c| c.instance.effect.fingerprint()));
+    blocks.extend(advice(campaign, d, "records", &findings.next_measurement));
     if !d.candidates.is_empty() {
         let floor = findings.now.comparison.totals.noise_floor_nrms;
         blocks.push(candidate_chart(d, floor, "missing-candidates-cutting", "cuts"));
         blocks.push(candidate_table(d, |c| c.instance.label()));
     }
-    if !d.not_tried.is_empty() {
-        let reasons: Vec<String> = d
-            .not_tried
-            .iter()
-            .map(|(effect, why)| format!("{effect} ({why})"))
-            .collect();
-        blocks.push(paragraph(format!("Not tried: {}.", reasons.join("; "))));
-    }
+    blocks.extend(not_tried(d));
     Section {
         id: ID.into(),
         title: TITLE.into(),

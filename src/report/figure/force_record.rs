@@ -63,22 +63,9 @@ impl ForceRecord {
         let right = f64::from(WIDTH) - Panel::RIGHT_MARGIN;
         let header = Header::new(&self.title, &self.legend(&channels), left, right);
         let each = if channels.len() <= 4 { 190.0 } else { 140.0 };
-        let top = header.bottom();
-        let last = channels.len() - 1;
-        let panels = forces.into_iter().enumerate().map(|(i, y)| {
-            let top = top + (each + 16.0) * i as f64;
-            Panel {
-                left,
-                top,
-                right,
-                bottom: top + each,
-                x: time.clone(),
-                y,
-                x_labels: i == last,
-            }
-        });
-        let panels: Vec<Panel> = panels.collect();
-        let height = top + (each + 16.0) * last as f64 + each + Panel::BOTTOM_MARGIN;
+        let panels = Panel::stack(&time, forces, [left, right], header.bottom(), each, 16.0);
+        let bottom = panels.last().map_or(header.bottom(), |p| p.bottom);
+        let height = bottom + Panel::BOTTOM_MARGIN;
 
         paint(WIDTH, height as u32, |canvas| {
             header.draw(canvas);

@@ -201,22 +201,8 @@ impl LobesFigure {
             (ALONE, 0.0)
         };
         let first = header.bottom() + 14.0;
-        let frames: Vec<Panel> = axes
-            .into_iter()
-            .enumerate()
-            .map(|(i, y)| {
-                let top = first + i as f64 * (height + between);
-                Panel {
-                    left,
-                    top,
-                    right,
-                    bottom: top + height,
-                    x: Axis::linear("Spindle speed (rpm)", speeds, 10),
-                    y,
-                    x_labels: i + 1 == count,
-                }
-            })
-            .collect();
+        let speed = Axis::linear("Spindle speed (rpm)", speeds, 10);
+        let frames = Panel::stack(&speed, axes, [left, right], first, height, between);
         let bottom = frames.last().map_or(first, |p| p.bottom);
         paint(WIDTH, (bottom + Panel::BOTTOM_MARGIN) as u32, |canvas| {
             header.draw(canvas);

@@ -31,6 +31,32 @@ impl Panel {
     /// Room right of the frame: half of a tick label that sits on the corner.
     pub const RIGHT_MARGIN: f64 = 36.0;
 
+    /// Frames of one height above each other, with one x axis for all; `sides`: left and right, `gap`: from one to the
+    /// next.
+    pub fn stack(
+        x: &Axis,
+        y: Vec<Axis>,
+        [left, right]: [f64; 2],
+        top: f64,
+        height: f64,
+        gap: f64,
+    ) -> Vec<Panel> {
+        let count = y.len();
+        let frames = y.into_iter().enumerate().map(|(i, y)| {
+            let top = top + i as f64 * (height + gap);
+            Panel {
+                left,
+                top,
+                right,
+                bottom: top + height,
+                x: x.clone(),
+                y,
+                x_labels: i + 1 == count,
+            }
+        });
+        frames.collect()
+    }
+
     pub fn x_at(&self, value: f64) -> Option<f64> {
         self.x
             .fraction(value)

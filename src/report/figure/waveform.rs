@@ -70,23 +70,7 @@ impl WaveformFigure {
             (Swatch::Line(stroke), or(name, "model").to_owned())
         }));
         let header = Header::new(&self.title, &legend.collect::<Vec<_>>(), left, right);
-        let last = self.panels.len().saturating_sub(1);
-        let panels: Vec<Panel> = scales
-            .into_iter()
-            .enumerate()
-            .map(|(i, y)| {
-                let top = header.bottom() + i as f64 * (PANEL_HEIGHT + GAP);
-                Panel {
-                    left,
-                    top,
-                    right,
-                    bottom: top + PANEL_HEIGHT,
-                    x: x.clone(),
-                    y,
-                    x_labels: i == last,
-                }
-            })
-            .collect();
+        let panels = Panel::stack(&x, scales, [left, right], header.bottom(), PANEL_HEIGHT, GAP);
         let bottom = panels.last().map_or(header.bottom(), |p| p.bottom);
         paint(WIDTH, (bottom + Panel::BOTTOM_MARGIN) as u32, |canvas| {
             header.draw(canvas);

@@ -21,6 +21,7 @@ pub mod progress;
 pub mod report;
 pub mod revision;
 pub mod robot;
+pub mod serve;
 pub mod signal;
 pub mod simulate;
 pub mod thesis;

@@ -11,6 +11,7 @@ fn main() -> ExitCode {
         Ok(outcome) => {
             // A closed pipe (`lobestone … | head`) is no failure of ours.
             let _ = match as_json {
+                true if outcome.json.is_null() => Ok(()),
                 true => std::io::stdout().write_all(format!("{:#}\n", outcome.json).as_bytes()),
                 // Colours go to a terminal only, and not where NO_COLOR is set.
                 false => anstream::stdout().write_all(outcome.text.as_bytes()),

@@ -89,7 +89,14 @@ impl Addition<CuttingModel, CuttingInstance> {
     /// No such effect, one that is in the model already or that these records cannot show; a fit that fails; a log that
     /// is broken or was changed meanwhile. Nothing is recorded then.
     pub fn run_cutting(campaign: &Campaign, name: &str) -> Result<Self> {
-        let mut log = RevisionLog::load(&campaign.dir)?;
+        Self::cutting_after(RevisionLog::load(&campaign.dir)?, campaign, name)
+    }
+
+    /// As [`run_cutting`](Self::run_cutting), and only if the campaign's log still is `log` in the end.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn cutting_after(mut log: RevisionLog, campaign: &Campaign, name: &str) -> Result<Self> {
         let case = CuttingCase::load(campaign)?;
         let fingerprint = cutting_fingerprint(campaign)?;
         let instances = cutting::find(name);
@@ -158,7 +165,14 @@ impl Addition {
     /// No such effect or site, one that is in the model already or that this data cannot show; a fit that fails; a log
     /// that is broken or was changed meanwhile. Nothing is recorded then.
     pub fn run(campaign: &Campaign, name: &str, options: Options) -> Result<Self> {
-        let mut log = RevisionLog::load(&campaign.dir)?;
+        Self::after(RevisionLog::load(&campaign.dir)?, campaign, name, options)
+    }
+
+    /// As [`run`](Self::run), and only if the campaign's log still is `log` in the end.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn after(mut log: RevisionLog, campaign: &Campaign, name: &str, options: Options) -> Result<Self> {
         let case = StructureCase::load(campaign)?;
         let data = &case.data;
         // Taken with the data that were read, not after the fit.

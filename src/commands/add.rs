@@ -10,6 +10,7 @@ use crate::campaign::Campaign;
 use crate::discrepancy::extension::{Extension, Fitted};
 use crate::effects::cutting;
 use crate::identify::{Calibration, Options};
+use crate::revision::RevisionLog;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -22,8 +23,14 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
-    if !cutting::find(&args.effect).is_empty() {
-        let addition = Addition::run_cutting(&campaign, &args.effect)?;
+    let log = RevisionLog::load(&campaign.dir)?;
+    after(log, &campaign, &args.effect)
+}
+
+/// Adds `effect` if the campaign's log still is `log` in the end.
+pub fn after(log: RevisionLog, campaign: &Campaign, effect: &str) -> Result<Outcome> {
+    if !cutting::find(effect).is_empty() {
+        let addition = Addition::cutting_after(log, campaign, effect)?;
         let Extension { instance, after, .. } = &addition.extension;
         let variant = instance.effect.variant_label(instance.variant);
         let parameters = describe_estimates(&after.calibration);
@@ -36,10 +43,10 @@ pub fn run(args: Args) -> Result<Outcome> {
         return Ok(Outcome::new(
             document("cutting", instance.effect.id(), None, variant, &addition),
             describe(&addition, &plain),
-            Some(next_step(Guide::cutting(&campaign), &addition)),
+            Some(next_step(Guide::cutting(campaign), &addition)),
         ));
     }
-    let addition = Addition::run(&campaign, &args.effect, Options::default())?;
+    let addition = Addition::after(log, campaign, effect, Options::default())?;
     let Extension { instance, after, .. } = &addition.extension;
     let variant = instance.effect.variant_label(instance.variant);
     let plain = Plain {
@@ -57,7 +64,7 @@ pub fn run(args: Args) -> Result<Outcome> {
             &addition,
         ),
         describe(&addition, &plain),
-        Some(next_step(Guide::structure(&campaign), &addition)),
+        Some(next_step(Guide::structure(campaign), &addition)),
     ))
 }
 

@@ -22,17 +22,23 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
-    by_domain(&campaign, args.domain, structure, cutting)
+    by_domain(
+        &campaign,
+        args.domain,
+        |c| Ok(structure(c, &DiagnosisFindings::run(c, Options::default())?)),
+        |c| Ok(cutting(c, &CuttingFindings::run(c)?)),
+    )
 }
 
-fn cutting(campaign: &Campaign) -> Result<Outcome> {
+/// What was found out about the force records.
+pub fn cutting(campaign: &Campaign, findings: &CuttingFindings) -> Outcome {
     let CuttingFindings {
         case,
         diagnosis: d,
         next_measurement,
         now,
         ..
-    } = CuttingFindings::run(campaign)?;
+    } = findings;
     let noise_floor_nrms = now.comparison.totals.noise_floor_nrms;
     let json = json!({
         "domain": "cutting",
@@ -57,14 +63,14 @@ fn cutting(campaign: &Campaign) -> Result<Outcome> {
         added.iter().map(|e| format!(" + {e}")).collect::<String>()
     );
     text += &as_it_stands(&d.baseline, noise_floor_nrms);
-    text += &answer(&d, |c| {
+    text += &answer(d, |c| {
         (c.instance.effect.explanation(), c.instance.effect.fingerprint())
     });
-    text += &rest(&d, &next_measurement);
+    text += &rest(d, next_measurement);
     text += &warnings(&case.warnings);
     let winner = d.winner().map(Candidate::label);
-    let next = Guide::cutting(campaign).diagnosed(d.verdict, winner.as_deref(), &next_measurement);
-    Ok(Outcome::new(json, text, Some(next)))
+    let next = Guide::cutting(campaign).diagnosed(d.verdict, winner.as_deref(), next_measurement);
+    Outcome::new(json, text, Some(next))
 }
 
 fn baseline(b: &Baseline, noise_floor_nrms: f64) -> Value {
@@ -77,14 +83,14 @@ fn baseline(b: &Baseline, noise_floor_nrms: f64) -> Value {
     })
 }
 
-fn structure(campaign: &Campaign) -> Result<Outcome> {
-    let findings = DiagnosisFindings::run(campaign, Options::default())?;
+/// What was found out about the FRFs.
+pub fn structure(campaign: &Campaign, findings: &DiagnosisFindings) -> Outcome {
     let DiagnosisFindings {
         case,
         diagnosis,
         next_measurement,
         ..
-    } = &findings;
+    } = findings;
     let json = json!({
         "domain": "structure",
         "revision": case.revision(),
@@ -96,7 +102,7 @@ fn structure(campaign: &Campaign) -> Result<Outcome> {
         "companion": diagnosis.companion,
         "candidates": diagnosis.candidates.iter().map(candidate).collect::<Vec<_>>(),
         "indistinguishable": diagnosis.indistinguishable,
-        "explains": explains(&findings),
+        "explains": explains(findings),
         "residual_peaks_hz": findings.residual_peaks.iter().map(|p| p.frequency_hz).collect::<Vec<_>>(),
         "residual_peaks": findings.residual_peaks,
         "next_measurement": next_measurement,
@@ -105,10 +111,10 @@ fn structure(campaign: &Campaign) -> Result<Outcome> {
         "warnings": case.warnings,
     });
     let text =
-        format!("model: {}\n", case.model_description()) + &describe(&findings) + &warnings(&case.warnings);
+        format!("model: {}\n", case.model_description()) + &describe(findings) + &warnings(&case.warnings);
     let winner = diagnosis.winner().map(Candidate::label);
     let next = Guide::structure(campaign).diagnosed(diagnosis.verdict, winner.as_deref(), next_measurement);
-    Ok(Outcome::new(json, text, Some(next)))
+    Outcome::new(json, text, Some(next))
 }
 
 /// The effect's own parameters by the keys of the contract; `name[0]`, `name[1]`, … become one list.

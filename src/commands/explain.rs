@@ -49,6 +49,11 @@ fn library(robot: &RobotSpec) -> Vec<Entry> {
     structural.chain(cutting).collect()
 }
 
+/// Every effect: what it is, how it shows, how to check it.
+pub fn all(robot: &RobotSpec) -> Value {
+    library(robot).iter().map(Entry::json).collect()
+}
+
 pub fn run(args: Args) -> Result<Outcome> {
     let library = library(&RobotSpec::load("irb6640", Path::new(""))?);
     let Some(name) = args.effect else {

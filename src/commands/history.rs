@@ -5,7 +5,7 @@ use super::text::{Emphasis, error_bar, percent, table, warnings};
 use super::{CampaignArg, Domain, Outcome, side};
 use crate::Result;
 use crate::campaign::Campaign;
-use crate::revision::{Revision, RevisionLog, fingerprint};
+use crate::revision::{self, Revision, RevisionLog, fingerprint};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -19,12 +19,17 @@ pub struct Args {
 pub fn run(args: Args) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
     let domain = side(&campaign, args.domain);
+    of(&campaign, domain)
+}
+
+/// The history of one side of a campaign.
+pub fn of(campaign: &Campaign, domain: revision::Domain) -> Result<Outcome> {
     let log = RevisionLog::load(&campaign.dir)?;
     let revisions: Vec<&Revision> = log.revisions(domain).collect();
     let undone: Vec<&Revision> = log.undone(domain).collect();
     let dir = campaign.dir.display();
     let guide = Guide {
-        campaign: &campaign,
+        campaign,
         side: domain,
     };
     let Some(current) = revisions.last() else {
@@ -34,7 +39,7 @@ pub fn run(args: Args) -> Result<Outcome> {
             Some(guide.history(None, false)),
         ));
     };
-    let fingerprint = fingerprint(&campaign, domain)?;
+    let fingerprint = fingerprint(campaign, domain)?;
     let old: Vec<String> = revisions
         .iter()
         .filter(|r| r.data != fingerprint)

@@ -24,15 +24,17 @@ mod modal;
 mod model;
 mod next_step;
 mod report;
+mod serve;
 mod shell;
 mod simulate;
 mod text;
 mod thesis;
 mod undo;
+mod workbench;
 
 /// What a command has to say: the document of the contract, and the same for a person.
 pub struct Outcome {
-    /// Printed with `--json`.
+    /// Printed with `--json`; null where there is nothing to say (any more).
     pub json: serde_json::Value,
     /// Printed without; may be coloured.
     pub text: String,
@@ -101,6 +103,8 @@ pub enum Command {
     Lobes(lobes::Args),
     /// HTML and PNG report of a campaign.
     Report(report::Args),
+    /// The campaign as a page in a browser: diagnose, add, undo, and watch the error fall.
+    Serve(serve::Args),
     /// A virtual lab: write a campaign with chosen (or random) physics and noise, and its truth.
     Simulate(Box<simulate::Args>),
     /// The source thesis put right: published model, measurement and this model side by side.
@@ -173,6 +177,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Undo(args) => undo::run(args),
         Command::Lobes(args) => lobes::run(args),
         Command::Report(args) => report::run(args),
+        Command::Serve(args) => serve::run(args, cli.json),
         Command::Simulate(args) => simulate::run(*args),
         Command::Thesis(args) => thesis::run(args),
         Command::Demo(args) => demo::run(args),

@@ -6,7 +6,7 @@ use super::text::percent;
 use super::{CampaignArg, Domain, Outcome, side};
 use crate::Result;
 use crate::campaign::Campaign;
-use crate::revision::{RevisionLog, fingerprint};
+use crate::revision::{self, RevisionLog, fingerprint};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -20,13 +20,18 @@ pub struct Args {
 pub fn run(args: Args) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
     let domain = side(&campaign, args.domain);
-    let mut log = RevisionLog::load(&campaign.dir)?;
+    let log = RevisionLog::load(&campaign.dir)?;
+    after(log, &campaign, domain)
+}
+
+/// Takes the last revision of `log` back, if the campaign's log still is that.
+pub fn after(mut log: RevisionLog, campaign: &Campaign, domain: revision::Domain) -> Result<Outcome> {
     let undone = log.undo(domain)?;
     let current = log.current(domain);
     let labels = current.map(|r| r.labels()).unwrap_or_default();
     let json = json!({
         "domain": domain,
-        "undone": document(&undone, &fingerprint(&campaign, domain)?),
+        "undone": document(&undone, &fingerprint(campaign, domain)?),
         "revision": current.map(|r| r.revision),
         "effects": labels,
     });
@@ -44,7 +49,7 @@ pub fn run(args: Args) -> Result<Outcome> {
         );
     }
     let guide = Guide {
-        campaign: &campaign,
+        campaign,
         side: domain,
     };
     Ok(Outcome::new(json, text, Some(guide.undone())))

@@ -147,6 +147,18 @@ impl Page {
             .map_err(failed)
     }
 
+    /// The images and the names under which the page offers them, in the order of the page.
+    pub fn images(&self) -> Vec<(String, &[u8])> {
+        let mut files = Names::default();
+        let blocks = self.sections.iter().flat_map(|section| &section.blocks);
+        blocks
+            .filter_map(|block| match block {
+                Block::Figure(figure) => Some((figure.unique_name(&mut files), figure.png.as_slice())),
+                _ => None,
+            })
+            .collect()
+    }
+
     /// Writes the images and then `report.html` into `folder`, each file whole or not at all. Images of an earlier page
     /// there that this one does not have are removed, if they are still as that page shows them.
     ///
@@ -157,14 +169,11 @@ impl Page {
         let html = self.html()?;
         let path = folder.join(HTML_NAME);
         let earlier = std::fs::read_to_string(&path).unwrap_or_default();
-        let mut files = Names::default();
         let mut images = vec![];
-        for block in self.sections.iter().flat_map(|section| &section.blocks) {
-            if let Block::Figure(figure) = block {
-                let path = folder.join(figure.unique_name(&mut files));
-                write_atomically(&path, &figure.png)?;
-                images.push(path);
-            }
+        for (name, png) in self.images() {
+            let path = folder.join(name);
+            write_atomically(&path, png)?;
+            images.push(path);
         }
         write_atomically(&path, html.as_bytes())?;
         for stale in images_of(&earlier, folder) {

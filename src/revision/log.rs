@@ -81,6 +81,13 @@ impl RevisionLog {
         self.revisions(domain).next_back()
     }
 
+    /// What stands in the log of one side, as a short mark that no other state of this log has: revision number and
+    /// number of undone revisions (both together only grow).
+    pub fn mark(&self, domain: Domain) -> String {
+        let revision = self.current(domain).map_or(0, |r| r.revision);
+        format!("{revision}-{}", self.undone(domain).count())
+    }
+
     /// Adds a revision; its number is set here. `baseline`: what to record as revision 0 where none of this side is
     /// there yet (or only a baseline, which then is replaced: the data may have changed since).
     ///
@@ -155,6 +162,19 @@ impl RevisionLog {
         write_durably(&path, text.as_bytes(), TEMPORARY)?;
         self.document = document;
         Ok(result)
+    }
+}
+
+/// Waits until nobody writes the log of a campaign; while what is returned lives nobody begins to. `None` where nothing
+/// was ever written.
+///
+/// # Errors
+/// What the file system refuses.
+pub fn hold(campaign_dir: &Path) -> Result<Option<File>> {
+    let folder = campaign_dir.join(FOLDER);
+    match folder.is_dir() {
+        true => lock(&folder.join("revisions.lock")),
+        false => Ok(None),
     }
 }
 
@@ -315,6 +335,41 @@ mod tests {
         let read = RevisionLog::load(dir.path()).unwrap();
         assert_eq!(numbers(dir.path()), [0]);
         assert_eq!(read.undone(Domain::Structure).count(), 3);
+    }
+
+    #[test]
+    fn every_state_of_a_log_has_its_own_mark() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut log = RevisionLog::load(dir.path()).unwrap();
+        let mut marks = vec![log.mark(Domain::Structure)];
+        for label in ["payload", "time-delay", "", "payload", "", "", "payload"] {
+            match label {
+                "" => drop(log.undo(Domain::Structure).unwrap()),
+                _ => drop(add(&mut log, label).unwrap()),
+            }
+            let mark = log.mark(Domain::Structure);
+            assert!(!marks.contains(&mark), "{mark} {marks:?}");
+            marks.push(mark);
+        }
+        assert_eq!(log.mark(Domain::Cutting), "0-0");
+    }
+
+    #[test]
+    fn a_held_log_makes_writers_wait() {
+        let dir = tempfile::tempdir().unwrap();
+        assert!(hold(dir.path()).unwrap().is_none());
+        let mut log = RevisionLog::load(dir.path()).unwrap();
+        add(&mut log, "payload").unwrap();
+        let held = hold(dir.path()).unwrap();
+        assert!(held.is_some());
+        std::thread::scope(|scope| {
+            let writer = scope.spawn(|| add(&mut log, "time-delay").unwrap());
+            std::thread::sleep(std::time::Duration::from_millis(100));
+            assert_eq!(numbers(dir.path()), [0, 1]);
+            drop(held);
+            writer.join().unwrap();
+        });
+        assert_eq!(numbers(dir.path()), [0, 1, 2]);
     }
 
     #[test]

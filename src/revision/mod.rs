@@ -9,7 +9,7 @@ mod fingerprint;
 mod log;
 
 pub use fingerprint::{cutting_fingerprint, fingerprint, structure_fingerprint};
-pub use log::{RevisionLog, log_file};
+pub use log::{RevisionLog, hold, log_file};
 
 use serde::{Deserialize, Serialize};
 

@@ -32,7 +32,10 @@ pub fn run(args: Args, as_json: bool) -> Result<Outcome> {
     let server = Server::bind(Arc::new(bench), args.port)?;
     let url = server.url();
     let said = match as_json {
-        true => format!("{}\n", json!({ "url": url, "port": server.address().port(), "dir": dir })),
+        true => format!(
+            "{}\n",
+            json!({ "url": url, "port": server.address().port(), "dir": dir })
+        ),
         false => format!(
             "{} {url}\n(this computer only; Ctrl-C ends it)\n",
             Emphasis::Strong.on("Open in a browser:")

@@ -71,7 +71,10 @@ fn sides(campaign: &Campaign) -> Vec<Domain> {
     let structure = !campaign.frfs.is_empty() && campaign.robot.is_some();
     let cutting = !campaign.cuts.is_empty();
     let all = [(structure, Domain::Structure), (cutting, Domain::Cutting)];
-    all.into_iter().filter(|(there, _)| *there).map(|(_, side)| side).collect()
+    all.into_iter()
+        .filter(|(there, _)| *there)
+        .map(|(_, side)| side)
+        .collect()
 }
 
 fn model_state(campaign: &Campaign, log: &RevisionLog, side: Domain) -> Result<ModelState> {
@@ -114,10 +117,12 @@ impl CampaignBench {
             }
             let real = path.canonicalize().map_err(|e| Error::io(path, e))?;
             if !real.starts_with(&self.dir) {
-                return Err(InputError::new("leads out of the campaign folder (symbolic link)")
-                    .file(path)
-                    .remedy("put the file or folder itself there")
-                    .into());
+                return Err(
+                    InputError::new("leads out of the campaign folder (symbolic link)")
+                        .file(path)
+                        .remedy("put the file or folder itself there")
+                        .into(),
+                );
             }
         }
         Ok(())
@@ -145,12 +150,20 @@ impl CampaignBench {
             Domain::Structure => {
                 let found = Box::new(DiagnosisFindings::run(&campaign, Options::default())?);
                 let outcome = diagnose::structure(&campaign, &found);
-                (outcome, diagnosis_section::summary(&found), Findings::Structure(found))
+                (
+                    outcome,
+                    diagnosis_section::summary(&found),
+                    Findings::Structure(found),
+                )
             }
             Domain::Cutting => {
                 let found = Box::new(CuttingFindings::run(&campaign)?);
                 let outcome = diagnose::cutting(&campaign, &found);
-                (outcome, waveform_section::summary(&found), Findings::Cutting(found))
+                (
+                    outcome,
+                    waveform_section::summary(&found),
+                    Findings::Cutting(found),
+                )
             }
         };
         {
@@ -228,7 +241,11 @@ impl CampaignBench {
         let page = pages::page(&findings, None);
         let report = page.html().map(|html| Report {
             html,
-            images: page.images().into_iter().map(|(n, png)| (n, png.to_vec())).collect::<HashMap<_, _>>(),
+            images: page
+                .images()
+                .into_iter()
+                .map(|(n, png)| (n, png.to_vec()))
+                .collect::<HashMap<_, _>>(),
         });
         let problems = findings.errors();
         let now = sides(campaign)
@@ -237,8 +254,16 @@ impl CampaignBench {
             .collect();
         for (side, of) in lent {
             let back = match side {
-                Domain::Structure => findings.diagnosis.take().and_then(Result::ok).map(|f| Findings::Structure(Box::new(f))),
-                Domain::Cutting => findings.cutting_diagnosis.take().and_then(Result::ok).map(|f| Findings::Cutting(Box::new(f))),
+                Domain::Structure => findings
+                    .diagnosis
+                    .take()
+                    .and_then(Result::ok)
+                    .map(|f| Findings::Structure(Box::new(f))),
+                Domain::Cutting => findings
+                    .cutting_diagnosis
+                    .take()
+                    .and_then(Result::ok)
+                    .map(|f| Findings::Cutting(Box::new(f))),
             };
             self.known(side, &of, |known| known.findings = back);
         }
@@ -290,7 +315,12 @@ impl CampaignBench {
             document["answer"] = json!(known.answer);
             document
         });
-        let now = self.found().now.iter().find(|(s, _)| *s == side).map(|(_, error)| error.clone());
+        let now = self
+            .found()
+            .now
+            .iter()
+            .find(|(s, _)| *s == side)
+            .map(|(_, error)| error.clone());
         Ok(json!({
             "side": side,
             "head": log.mark(side),
@@ -310,7 +340,10 @@ impl Workbench for CampaignBench {
     fn stamp(&self) -> String {
         let of = |path: PathBuf| match path.metadata() {
             Ok(meta) => {
-                let since = meta.modified().ok().and_then(|t| t.duration_since(std::time::UNIX_EPOCH).ok());
+                let since = meta
+                    .modified()
+                    .ok()
+                    .and_then(|t| t.duration_since(std::time::UNIX_EPOCH).ok());
                 format!("{}@{}", meta.len(), since.map_or(0, |s| s.as_nanos()))
             }
             Err(_) => "none".into(),
@@ -349,7 +382,9 @@ impl Workbench for CampaignBench {
                 self.draw(&Campaign::load(&self.dir)?, stage);
                 Ok(String::new())
             })),
-            Order::Diagnose { side } => Ok(Job::new("the diagnosis", move |stage| self.diagnose(side, stage))),
+            Order::Diagnose { side } => {
+                Ok(Job::new("the diagnosis", move |stage| self.diagnose(side, stage)))
+            }
             Order::Add { side, head, effect } => {
                 let log = self.log_at(side, &head)?;
                 let cutting = !crate::effects::cutting::find(&effect).is_empty();

@@ -19,7 +19,10 @@ pub struct Job {
 }
 
 impl Job {
-    pub fn new(name: impl Into<String>, work: impl FnOnce(&Stage) -> Result<String> + Send + 'static) -> Self {
+    pub fn new(
+        name: impl Into<String>,
+        work: impl FnOnce(&Stage) -> Result<String> + Send + 'static,
+    ) -> Self {
         Job {
             name: name.into(),
             work: Box::new(work),
@@ -172,7 +175,10 @@ mod tests {
         let Err(Refusal::Late(sentence)) = second else {
             panic!("{second:?}");
         };
-        assert!(sentence.starts_with("the diagnosis is still running (0 s)"), "{sentence}");
+        assert!(
+            sentence.starts_with("the diagnosis is still running (0 s)"),
+            "{sentence}"
+        );
         assert_eq!(desk.status()["job"]["name"], "the diagnosis");
         end.send(()).unwrap();
         let last = wait_until_idle(&desk);
@@ -183,10 +189,17 @@ mod tests {
     #[test]
     fn what_fails_or_panics_leaves_the_desk_free() {
         let desk = Arc::new(Desk::default());
-        desk.start(|| Ok(Job::new("one", |_| Err(Error::computation("no mode in the band")))))
-            .unwrap();
+        desk.start(|| {
+            Ok(Job::new("one", |_| {
+                Err(Error::computation("no mode in the band"))
+            }))
+        })
+        .unwrap();
         let last = wait_until_idle(&desk);
-        assert_eq!((&last["ok"], &last["text"]), (&json!(false), &json!("no mode in the band")));
+        assert_eq!(
+            (&last["ok"], &last["text"]),
+            (&json!(false), &json!("no mode in the band"))
+        );
         desk.start(|| Ok(Job::new("two", |_| panic!("as the test wants it"))))
             .unwrap();
         let last = wait_until_idle(&desk);

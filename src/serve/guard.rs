@@ -119,7 +119,11 @@ mod tests {
             assert_eq!(allowed(Method::GET, "/", &[("host", host)]), expected, "{host}");
         }
         assert!(!allowed(Method::GET, "/", &[]));
-        assert!(!allowed(Method::GET, "/", &[("host", OURS), ("host", "evil.example")]));
+        assert!(!allowed(
+            Method::GET,
+            "/",
+            &[("host", OURS), ("host", "evil.example")]
+        ));
         assert!(!allowed(Method::GET, "http://evil.example/", &[("host", OURS)]));
     }
 
@@ -139,10 +143,19 @@ mod tests {
             assert_eq!(allowed(Method::POST, "/order", &headers), expected, "{origin}");
             assert_eq!(allowed(Method::GET, "/state", &headers), expected, "{origin}");
         }
-        for (site, expected) in [("none", true), ("same-origin", true), ("same-site", false), ("cross-site", false)] {
+        for (site, expected) in [
+            ("none", true),
+            ("same-origin", true),
+            ("same-site", false),
+            ("cross-site", false),
+        ] {
             let site = ("sec-fetch-site", site);
             assert_eq!(allowed(Method::GET, "/", &[host, site]), expected, "{site:?}");
-            assert_eq!(allowed(Method::GET, "/report", &[host, site]), expected, "{site:?}");
+            assert_eq!(
+                allowed(Method::GET, "/report", &[host, site]),
+                expected,
+                "{site:?}"
+            );
             assert!(allowed(Method::GET, "/report/frf.png", &[host, site]));
         }
     }
@@ -152,9 +165,21 @@ mod tests {
         let host = ("host", OURS);
         for method in [Method::POST, Method::PUT, Method::DELETE, Method::OPTIONS] {
             assert!(!allowed(method.clone(), "/order", &[host]));
-            assert!(!allowed(method.clone(), "/order", &[host, ("x-lobestone-token", "")]));
-            assert!(!allowed(method.clone(), "/order", &[host, ("x-lobestone-token", "Secret")]));
-            assert!(allowed(method, "/order", &[host, ("x-lobestone-token", "secret")]));
+            assert!(!allowed(
+                method.clone(),
+                "/order",
+                &[host, ("x-lobestone-token", "")]
+            ));
+            assert!(!allowed(
+                method.clone(),
+                "/order",
+                &[host, ("x-lobestone-token", "Secret")]
+            ));
+            assert!(allowed(
+                method,
+                "/order",
+                &[host, ("x-lobestone-token", "secret")]
+            ));
         }
         let guard = || Guard::new(OURS.parse().unwrap());
         assert_eq!(guard().token().len(), 32);

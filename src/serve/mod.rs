@@ -51,9 +51,18 @@ pub trait Workbench: Send + Sync + 'static {
 #[serde(tag = "do", rename_all = "lowercase", deny_unknown_fields)]
 pub enum Order {
     Refresh {},
-    Diagnose { side: Domain },
-    Add { side: Domain, head: String, effect: String },
-    Undo { side: Domain, head: String },
+    Diagnose {
+        side: Domain,
+    },
+    Add {
+        side: Domain,
+        head: String,
+        effect: String,
+    },
+    Undo {
+        side: Domain,
+        head: String,
+    },
 }
 
 /// Why an order is not taken, in a sentence.

@@ -31,15 +31,17 @@ const TITLES = {
 
 let shown = null;      // the state that the page shows
 let busy = false;      // a job is being done
-let lastSeen = null;   // number of the last job whose end was told
+let lastSeen = null;   // number of the last job whose end was told; null before the first look
+let unreadable = false; // the alert says why the campaign cannot be read
 let asked = null;      // stamp for which a report was asked for
 
 // ---- orders ----
 
-async function send(order) {
+/** `quiet`: not what the reader asked for, so a refusal need not be told. */
+async function send(order, quiet = false) {
   if (busy) return;
   setBusy(true);
-  alertUser("");
+  if (!quiet) alertUser("");
   try {
     const answer = await fetch("/order", {
       method: "POST",
@@ -50,7 +52,7 @@ async function send(order) {
       const text = await answer.text();
       let why = text;
       try { why = JSON.parse(text).refused ?? text; } catch { /* a plain sentence */ }
-      alertUser(why);
+      if (!quiet) alertUser(why);
       await showState();
     }
   } catch {
@@ -60,7 +62,7 @@ async function send(order) {
 }
 
 function alertUser(text) {
-  $("alert").textContent = text;
+  setText($("alert"), text);
   $("alert").hidden = !text;
 }
 
@@ -100,6 +102,8 @@ async function follow(status) {
     return;
   }
   const { job, last } = status;
+  // What failed before the page was opened is no news.
+  if (lastSeen === null) lastSeen = job || !last ? 0 : last.number;
   setBusy(job !== null);
   showJob(job);
   if (job !== null) return;
@@ -117,7 +121,7 @@ async function follow(status) {
   // Drawn of another state of the folder, or not at all.
   if (shown && !shown.problem && shown.drawn_of !== status.stamp && asked !== status.stamp) {
     asked = status.stamp;
-    send({ do: "refresh" });
+    send({ do: "refresh" }, true);
   }
 }
 
@@ -152,6 +156,8 @@ async function showState() {
     return;
   }
   const state = await answer.json();
+  if (unreadable) alertUser("");
+  unreadable = !!state.problem;
   if (state.problem) {
     shown = null;
     alertUser(state.problem);
@@ -200,10 +206,11 @@ function sideNode(side, effects) {
   const node = make("section", { class: "side", id: side.side, "aria-labelledby": `${side.side}-title` },
     make("h2", { id: `${side.side}-title` }, name));
   node.append(make("p", { class: "muted head" }, head ? `Revision ${title(head)}` : "Baseline: no effect was added yet"));
-  if (now) node.append(figures(now, folds));
+  const was = revisions.length > 1 && now === recorded ? revisions.at(-2).nrms : null;
+  if (now) node.append(figures(now, was, folds));
   for (const warning of warnings ?? []) node.append(make("div", { class: "warning" }, warning));
   const rows = revisions.length ? revisions : now ? [{ ...now, revision: 0, effects: [], progress: null }] : [];
-  if (rows.length) node.append(errorTable(rows, now, folds));
+  if (rows.length) node.append(errorTable(rows, folds));
   const last = revisions.length ? revisions.at(-1).effects.at(-1) : null;
   node.append(make("div", { class: "actions" },
     button("Diagnose", `${side.side}-diagnose`, { do: "diagnose", side: side.side },
@@ -218,11 +225,11 @@ function sideNode(side, effects) {
 
 const title = (revision) => revision.effects.length ? `${revision.revision}: + ${revision.effects.at(-1)}` : "0: baseline";
 
-function figures(now, folds) {
+function figures(now, was, folds) {
   const times = now.noise_floor_nrms > 0 ? now.nrms / now.noise_floor_nrms : null;
   const entry = (name, value, kind) => make("div", {}, make("dt", {}, name), make("dd", { class: kind }, value));
   const list = make("dl", { class: "big" },
-    entry("error now", percent(now.nrms), times === null ? null : times < 1.5 ? "good now" : "bad now"),
+    entry(was === null ? "error now" : `error now (was ${percent(was)})`, percent(now.nrms), times === null ? null : times < 1.5 ? "good now" : "bad now"),
     entry("noise floor", percent(now.noise_floor_nrms)));
   if (now.held_out_nrms !== null && now.held_out_nrms !== undefined)
     list.append(entry(`on ${folds} left out`, percent(now.held_out_nrms)));
@@ -239,7 +246,7 @@ function draw(tag, attributes, ...children) {
 }
 
 /** One bar a revision, all on one scale, with the noise floor as a line. */
-function errorTable(rows, now, folds) {
+function errorTable(rows, folds) {
   const largest = Math.max(...rows.map((r) => Math.max(r.nrms, r.noise_floor_nrms ?? 0)));
   const share = (value) => (largest > 0 ? Math.max(0.3, 100 * value / largest) : 0);
   const body = rows.map((r, i) => {

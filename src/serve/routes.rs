@@ -50,7 +50,10 @@ pub fn router(bench: Arc<dyn Workbench>, address: SocketAddr) -> Router {
     Router::new()
         .route("/", get(page))
         .route("/page.css", get(|| text("text/css", include_str!("page.css"))))
-        .route("/page.js", get(|| text("text/javascript", include_str!("page.js"))))
+        .route(
+            "/page.js",
+            get(|| text("text/javascript", include_str!("page.js"))),
+        )
         .route("/state", get(state))
         .route("/status", get(status))
         .route("/order", post(order))
@@ -64,7 +67,10 @@ pub fn router(bench: Arc<dyn Workbench>, address: SocketAddr) -> Router {
 
 /// Every request passes here first, every answer last.
 async fn guarded(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
-    let mut response = match app.guard.check(request.method(), request.uri(), request.headers()) {
+    let mut response = match app
+        .guard
+        .check(request.method(), request.uri(), request.headers())
+    {
         Ok(()) => next.run(request).await,
         Err(why) => (StatusCode::FORBIDDEN, format!("{why}\n")).into_response(),
     };
@@ -214,7 +220,11 @@ mod tests {
             assert!(include_str!("page.html").contains(&format!("/{name}")), "{name}");
         }
         for outside in ["http://", "https://", "//cdn", "@import", "url("] {
-            for text in [include_str!("page.html"), include_str!("page.css"), include_str!("page.js")] {
+            for text in [
+                include_str!("page.html"),
+                include_str!("page.css"),
+                include_str!("page.js"),
+            ] {
                 let own = text.replace("http://www.w3.org/2000/svg", "");
                 assert!(!own.contains(outside), "{outside}");
             }

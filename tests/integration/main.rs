@@ -18,6 +18,7 @@ mod revisions;
 mod robustness;
 mod sample_reports;
 mod schema;
+mod serve;
 mod shell;
 mod simulate;
 mod structure;

@@ -39,6 +39,13 @@ struct Found {
     diagnoses: Vec<Known>,
 }
 
+/// The model as it stands.
+struct Drawn {
+    report: Report,
+    problems: Vec<String>,
+    now: Vec<(Domain, Value)>,
+}
+
 /// A diagnosis, for as long as data and model are those that it was made of; also if they come back by an undo.
 struct Known {
     side: Domain,
@@ -209,10 +216,10 @@ impl CampaignBench {
         let mut found = self.found();
         found.drawn_of = Some(stamp);
         match drawn {
-            Ok((report, problems, now)) => {
-                found.report = Some(Arc::new(report));
-                found.problems = problems;
-                found.now = now;
+            Ok(drawn) => {
+                found.report = Some(Arc::new(drawn.report));
+                found.problems = drawn.problems;
+                found.now = drawn.now;
             }
             Err(error) => {
                 found.report = None;
@@ -223,8 +230,7 @@ impl CampaignBench {
         found.drawn += 1;
     }
 
-    #[allow(clippy::type_complexity)]
-    fn try_to_draw(&self, campaign: &Campaign) -> Result<(Report, Vec<String>, Vec<(Domain, Value)>)> {
+    fn try_to_draw(&self, campaign: &Campaign) -> Result<Drawn> {
         let log = RevisionLog::load(&self.dir)?;
         let mut findings = CampaignFindings::run(campaign, false)?;
         let mut lent = Vec::new();
@@ -267,7 +273,11 @@ impl CampaignBench {
             };
             self.known(side, &of, |known| known.findings = back);
         }
-        Ok((report?, problems, now))
+        Ok(Drawn {
+            report: report?,
+            problems,
+            now,
+        })
     }
 
     /// Error and noise of the model as it stands; `None` where it cannot be fitted.

@@ -4,18 +4,16 @@
 //! one. Writers take turns by a lock of the operating system on `revisions.lock`, which a killed process cannot leave
 //! behind, and refuse to write where the log is no longer the one that they started from.
 
-use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::{Domain, Revision};
+use super::lock::lock;
+use super::{Domain, FOLDER, Revision};
 use crate::files::write_durably;
 use crate::{Error, InputError, Result};
 
 const SCHEMA: &str = "lobestone/revisions/1";
-/// What the program keeps of a campaign, beside the measurements.
-const FOLDER: &str = "lobestone";
 /// Beginning of the names of files that are not yet the log.
 const TEMPORARY: &str = ".revisions-";
 
@@ -140,7 +138,7 @@ impl RevisionLog {
         let path = log_file(&self.campaign_dir);
         let folder = self.campaign_dir.join(FOLDER);
         std::fs::create_dir_all(&folder).map_err(|e| Error::io(&folder, e))?;
-        let _lock = lock(&folder.join("revisions.lock"))?;
+        let _lock = lock(&folder)?;
         if read(&path)? != self.document {
             return Err(InputError::new(
                 "another lobestone changed this log in the meantime; nothing was written",
@@ -163,38 +161,6 @@ impl RevisionLog {
         self.document = document;
         Ok(result)
     }
-}
-
-/// Waits until nobody writes the log of a campaign; while what is returned lives nobody begins to. `None` where nothing
-/// was ever written.
-///
-/// # Errors
-/// What the file system refuses.
-pub fn hold(campaign_dir: &Path) -> Result<Option<File>> {
-    let folder = campaign_dir.join(FOLDER);
-    match folder.is_dir() {
-        true => lock(&folder.join("revisions.lock")),
-        false => Ok(None),
-    }
-}
-
-/// Held until it is dropped, or until the process ends however it ends.
-fn lock(path: &Path) -> Result<Option<File>> {
-    let file = File::options()
-        .create(true)
-        .append(true)
-        .open(path)
-        .map_err(|e| Error::io(path, e))?;
-    match file.try_lock() {
-        Ok(()) => return Ok(Some(file)),
-        Err(TryLockError::WouldBlock) => {}
-        // Some network file systems know no locks; the comparison with what was loaded must do there.
-        Err(TryLockError::Error(e)) if e.kind() == std::io::ErrorKind::Unsupported => return Ok(None),
-        Err(TryLockError::Error(e)) => return Err(Error::io(path, e)),
-    }
-    // Others hold it for the time of one small write.
-    file.lock().map_err(|e| Error::io(path, e))?;
-    Ok(Some(file))
 }
 
 fn read(path: &Path) -> Result<Document> {
@@ -352,24 +318,6 @@ mod tests {
             marks.push(mark);
         }
         assert_eq!(log.mark(Domain::Cutting), "0-0");
-    }
-
-    #[test]
-    fn a_held_log_makes_writers_wait() {
-        let dir = tempfile::tempdir().unwrap();
-        assert!(hold(dir.path()).unwrap().is_none());
-        let mut log = RevisionLog::load(dir.path()).unwrap();
-        add(&mut log, "payload").unwrap();
-        let held = hold(dir.path()).unwrap();
-        assert!(held.is_some());
-        std::thread::scope(|scope| {
-            let writer = scope.spawn(|| add(&mut log, "time-delay").unwrap());
-            std::thread::sleep(std::time::Duration::from_millis(100));
-            assert_eq!(numbers(dir.path()), [0, 1]);
-            drop(held);
-            writer.join().unwrap();
-        });
-        assert_eq!(numbers(dir.path()), [0, 1, 2]);
     }
 
     #[test]

@@ -6,12 +6,17 @@
 
 mod clock;
 mod fingerprint;
+mod lock;
 mod log;
 
 pub use fingerprint::{cutting_fingerprint, fingerprint, structure_fingerprint};
-pub use log::{RevisionLog, hold, log_file};
+pub use lock::hold;
+pub use log::{RevisionLog, log_file};
 
 use serde::{Deserialize, Serialize};
+
+/// What the program keeps of a campaign, beside the measurements.
+const FOLDER: &str = "lobestone";
 
 /// The side of a campaign that a revision belongs to; each side has a model of its own and counts for itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -11,11 +11,13 @@ use super::Refusal;
 use crate::progress::{Gauge, shown_on};
 use crate::{Error, Result};
 
+/// Gives the text that the page shows when it is done.
+type Work = Box<dyn FnOnce(&Stage) -> Result<String> + Send>;
+
 /// What is to be done, and its name as a reader meets it ("the diagnosis").
 pub struct Job {
-    pub name: String,
-    /// Gives the text that the page shows when it is done.
-    pub work: Box<dyn FnOnce(&Stage) -> Result<String> + Send>,
+    name: String,
+    work: Work,
 }
 
 impl Job {

@@ -172,10 +172,14 @@ async function showState() {
   const focused = document.activeElement?.dataset?.key;
   const open = [...document.querySelectorAll("#sides details[open]")].map((d) => d.dataset.key);
   const effects = new Map(state.effects.map((e) => [e.effect, e]));
-  const problems = state.problems.map((p) => make("div", { class: "warning" }, p));
+  const before = state.problems.map((p) => make("div", { class: "warning" }, p));
   const sides = state.sides.map((side) => sideNode(side, effects));
+  if (sides.length > 1) {
+    before.push(make("nav", { "aria-label": "Sides of the campaign" },
+      ...state.sides.map((side) => make("a", { href: `#${side.side}` }, TITLES[side.side].name))));
+  }
   if (!sides.length) sides.push(make("p", {}, "This campaign has nothing to compare a model with (no FRFs of a robot, no force records)."));
-  $("sides").replaceChildren(...problems, ...sides);
+  $("sides").replaceChildren(...before, ...sides);
   for (const key of open) {
     const again = document.querySelector(`details[data-key="${CSS.escape(key)}"]`);
     if (again) again.open = true;
@@ -211,6 +215,10 @@ function sideNode(side, effects) {
   for (const warning of warnings ?? []) node.append(make("div", { class: "warning" }, warning));
   const rows = revisions.length ? revisions : now ? [{ ...now, revision: 0, effects: [], progress: null }] : [];
   if (rows.length) node.append(errorTable(rows, folds));
+  if (head?.progress === false) {
+    node.append(make("div", { class: "warning" }, `Revision ${head.revision} was no progress: the error on ${folds} left out of ` +
+      "the fit did not fall by more than chance would let it. Undo takes it back."));
+  }
   const last = revisions.length ? revisions.at(-1).effects.at(-1) : null;
   node.append(make("div", { class: "actions" },
     button("Diagnose", `${side.side}-diagnose`, { do: "diagnose", side: side.side },
@@ -267,11 +275,11 @@ function errorTable(rows, folds) {
     make("caption", {}, "The error, revision by revision; the red line is the noise floor"),
     make("thead", {}, make("tr", {},
       make("th", { scope: "col" }, "revision"), make("th", { scope: "col", class: "num" }, "error"),
-      make("th", { scope: "col", class: "num" }, `left-out ${folds}`), make("th", { scope: "col" }, ""))),
+      make("th", { scope: "col", class: "num" }, `left-out ${folds}`), make("td"))),
     make("tbody", {}, ...body));
 }
 
-const SHOWN = 8;
+const SHOWN = 5;
 
 function diagnosisNodes(side, effects, folds) {
   const d = side.diagnosis;
@@ -298,7 +306,7 @@ function diagnosisNodes(side, effects, folds) {
   const table = (candidates) => make("table", { class: "candidates" },
     make("thead", {}, make("tr", {},
       make("th", { scope: "col" }, "effect"), make("th", { scope: "col", class: "num" }, "error with it"),
-      make("th", { scope: "col", class: "num" }, `left-out ${folds}`), make("th", { scope: "col" }, make("span", {}, "")))),
+      make("th", { scope: "col", class: "num" }, `left-out ${folds}`), make("td"))),
     make("tbody", {}, ...candidates.map(row)));
   nodes.push(make("h3", {}, "Candidates, best first"), table(d.candidates.slice(0, SHOWN)));
   if (d.candidates.length > SHOWN)

@@ -84,6 +84,15 @@ ERROR = "return document.querySelector('.big .now')?.innerText"
 ROWS = "return document.querySelectorAll('.errors tbody tr').length"
 
 
+def in_report(driver, script):
+    """What the script gives within the report's frame, as soon as it gives anything."""
+    frame = driver.call("POST", "/element", {"using": "css selector", "value": "#frame"})
+    driver.call("POST", "/frame", {"id": frame})
+    value = driver.until("the report: " + script, script)
+    driver.call("POST", "/frame", {"id": None})
+    return value
+
+
 def percent(text):
     return float(text.removesuffix(" %"))
 
@@ -115,6 +124,7 @@ def story(driver, url, pictures):
     if EFFECT not in verdict or "confidence" not in verdict:
         raise Failed(f"the verdict is: {verdict}")
     driver.until("the end of the diagnosis", IDLE)
+    in_report(driver, "return document.body.innerText.includes('Which physics is missing')")
     driver.picture(pictures, "3-diagnosed")
 
     driver.click(f"[data-key='structure-{EFFECT}-explained'] summary")
@@ -129,11 +139,8 @@ def story(driver, url, pictures):
     driver.picture(pictures, "4-added")
 
     # The report in its frame is that of the new revision, and cannot reach the page around it.
-    frame = driver.call("POST", "/element", {"using": "css selector", "value": "#frame"})
-    driver.call("POST", "/frame", {"id": frame})
-    driver.until("the new report", f"return document.body.innerText.includes('1 + {EFFECT}')")
-    inside = driver.run("try { return parent.document.title } catch (e) { return e.name }")
-    driver.call("POST", "/frame", {"id": None})
+    in_report(driver, f"return document.body.innerText.includes('1 + {EFFECT}')")
+    inside = in_report(driver, "try { return parent.document.title } catch (e) { return e.name }")
     if inside != "SecurityError":
         raise Failed(f"the report reaches the page around it: {inside}")
 

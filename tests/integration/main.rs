@@ -19,6 +19,7 @@ mod robustness;
 mod sample_reports;
 mod schema;
 mod serve;
+mod served;
 mod shell;
 mod simulate;
 mod structure;

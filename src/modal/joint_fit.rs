@@ -17,7 +17,7 @@ const CHANCE_SIGMA: f64 = 8.0;
 /// … and a constant for having looked at every frequency.
 const LOOKED_EVERYWHERE: f64 = 20.0;
 /// Misfits are compared to this part of what a mode explains by chance.
-const COMPARED: f64 = 0.01;
+const COMPARED: f64 = 0.002;
 /// Fewer lines in the half-power band than this: the damping may stay uncertain.
 const COARSE_LINES: f64 = 1.0;
 /// Squared size over uncertainty (two degrees of freedom) from which an FRF shows a mode: five standard deviations.

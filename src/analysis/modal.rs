@@ -203,7 +203,7 @@ fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Settings) -> Resul
         global.reconstructions[other].as_ref()
     };
     let qualities: Vec<Quality> = inputs
-        .iter()
+        .par_iter()
         .enumerate()
         .map(|(k, input)| {
             quality::judge(

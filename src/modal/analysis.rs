@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 
 use super::curve::{Curve, MIN_LINES};
-use super::local_fit::{self, Pole, Problem, Solution};
+use super::local_fit::{self, Pole, Problem, ROUGHLY_SETTLED, SETTLED, Solution};
 use super::peaks::{self, Peak};
 use super::{FrfMode, FrfModes, Method, ModeEstimate, Settings, circle_fit, half_power};
 use crate::Result;
@@ -13,6 +13,8 @@ use crate::Result;
 /// Half-widths (ζf₀) on either side of a peak that take part in the local fit: the window whose fit is best
 /// determined is kept, so that a wide one averages noise and a narrow one avoids what is not modelled.
 const WINDOWS_HALF_WIDTHS: [f64; 3] = [8.0, 5.0, 3.0];
+/// A window is wide enough where its inner lines are left with at least this share of the power of all.
+const NOISE_SHARE: f64 = 0.8;
 /// Lines on either side of a peak that take part at least.
 const WINDOW_LINES: usize = 4;
 /// Neighbouring peaks fitted together with a mode, on each side.
@@ -291,19 +293,80 @@ fn judge(
 /// The best determined local fit and the position of the peak's pole in it.
 fn local(curve: &Curve, starts: &[Start], index: usize) -> Option<(Solution, usize)> {
     let mut best: Option<(f64, Solution, usize)> = None;
-    for reach in WINDOWS_HALF_WIDTHS {
-        let Some((solution, pole)) = fit_window(curve, starts, index, reach) else {
+    // A window begins where the one before ended.
+    let mut poles: Vec<Pole> = starts.iter().map(|s| s.pole).collect();
+    for (k, reach) in WINDOWS_HALF_WIDTHS.into_iter().enumerate() {
+        let Some(window) = fit_window(curve, starts, &poles, index, reach) else {
             continue;
         };
+        let narrower = WINDOWS_HALF_WIDTHS.get(k + 1);
+        let enough = narrower.is_some_and(|reach| window.as_noisy_within(*reach));
+        let WindowFit {
+            solution,
+            group,
+            pole,
+            ..
+        } = window;
+        for (&member, found) in group.iter().zip(&solution.poles) {
+            let first = starts[member].pole;
+            let width_hz = first.damping_ratio * first.frequency_hz;
+            let near = (found.frequency_hz - first.frequency_hz).abs() < width_hz
+                && (0.3..3.0).contains(&(found.damping_ratio / first.damping_ratio));
+            poles[member] = if near { *found } else { first };
+        }
         let relative_std = solution.damping_std(pole) / solution.poles[pole].damping_ratio;
         if best.as_ref().is_none_or(|(least, ..)| relative_std < *least) {
             best = Some((relative_std, solution, pole));
+        }
+        if enough {
+            break;
         }
     }
     best.map(|(_, solution, pole)| (solution, pole))
 }
 
-fn fit_window(curve: &Curve, starts: &[Start], index: usize, reach: f64) -> Option<(Solution, usize)> {
+/// The fit of the lines around a peak.
+struct WindowFit<'a> {
+    frequency_hz: &'a [f64],
+    line_weight: Vec<f64>,
+    solution: Solution,
+    /// Which starts it holds, and the position of the peak's own among them.
+    group: Vec<usize>,
+    pole: usize,
+}
+
+impl WindowFit<'_> {
+    /// Is as much left over within `reach` half-widths of the peak as in the whole window? Then it is noise, and fewer
+    /// lines determine the pole less well; what is not modelled shows on the flanks.
+    fn as_noisy_within(&self, reach: f64) -> bool {
+        let Pole {
+            frequency_hz,
+            damping_ratio,
+        } = self.solution.poles[self.pole];
+        let half_hz = reach * damping_ratio * frequency_hz;
+        let mut inner = (0.0, 0.0);
+        let mut all = (0.0, 0.0);
+        let left = self.solution.residual[0].iter().zip(&self.solution.leverage);
+        for ((f, w), (r, leverage)) in self.frequency_hz.iter().zip(&self.line_weight).zip(left) {
+            let square = (r * w).norm_sqr();
+            let freedom = 1.0 - leverage;
+            all = (all.0 + square, all.1 + freedom);
+            if (f - frequency_hz).abs() <= half_hz {
+                inner = (inner.0 + square, inner.1 + freedom);
+            }
+        }
+        inner.0 * all.1 >= NOISE_SHARE * all.0 * inner.1
+    }
+}
+
+/// Fits the lines within `reach` half-widths of a peak, from `poles` (one for each start).
+fn fit_window<'a>(
+    curve: &'a Curve,
+    starts: &[Start],
+    poles: &[Pole],
+    index: usize,
+    reach: f64,
+) -> Option<WindowFit<'a>> {
     let start = &starts[index];
     let centre = start.peak.index;
     let half_hz = reach * start.pole.damping_ratio * start.pole.frequency_hz;
@@ -346,7 +409,7 @@ fn fit_window(curve: &Curve, starts: &[Start], index: usize, reach: f64) -> Opti
     }
 
     let pole = group.iter().position(|&g| g == index)?;
-    let poles: Vec<Pole> = group.iter().map(|&g| starts[g].pole).collect();
+    let poles: Vec<Pole> = group.iter().map(|&g| poles[g]).collect();
     let f = &curve.frequency_hz[lines.clone()];
     let y = &curve.mobility[lines];
     let mut problem = Problem {
@@ -364,27 +427,40 @@ fn fit_window(curve: &Curve, starts: &[Start], index: usize, reach: f64) -> Opti
     if poles[pole].damping_ratio * f0 < 2.0 * line_hz {
         guesses.extend([0.05, 0.3, 1.0].map(|lines| lines * line_hz / f0));
     }
+    // What only gives the weights need not be exact.
+    let mut rough = y.len() >= local_fit::FEW_LINES;
+    let settled = if rough { ROUGHLY_SETTLED } else { SETTLED };
     let mut solution = guesses
         .into_iter()
         .filter_map(|guess| {
             let mut poles = poles.clone();
             poles[pole].damping_ratio = guess;
-            local_fit::fit(&problem, &poles)
+            local_fit::fit(&problem, &poles, settled)
         })
         .min_by(|a, b| a.variance.total_cmp(&b.variance))?;
 
     // Noise may be constant or in proportion to the curve; the residual tells, and the weights follow.
-    for _ in 0..2 {
+    for settled in [ROUGHLY_SETTLED, SETTLED] {
         let Some(weight) = noise_weights(y, &solution) else {
             break;
         };
         problem.line_weight = weight;
-        match local_fit::fit(&problem, &solution.poles) {
-            Some(refined) => solution = refined,
-            None => break,
-        }
+        let Some(refined) = local_fit::fit(&problem, &solution.poles, settled) else {
+            break;
+        };
+        solution = refined;
+        rough = settled == ROUGHLY_SETTLED;
     }
-    Some((solution, pole))
+    if rough && let Some(refined) = local_fit::fit(&problem, &solution.poles, SETTLED) {
+        solution = refined;
+    }
+    Some(WindowFit {
+        frequency_hz: f,
+        line_weight: problem.line_weight,
+        solution,
+        group,
+        pole,
+    })
 }
 
 /// 1/σ of each line from the model variance = a + b |Y|², a and b ≥ 0 from the residual of a fit.

@@ -16,6 +16,8 @@ const MAX_ADDED: usize = 4;
 const CHANCE_SIGMA: f64 = 8.0;
 /// … and a constant for having looked at every frequency.
 const LOOKED_EVERYWHERE: f64 = 20.0;
+/// Misfits are compared to this part of what a mode explains by chance.
+const COMPARED: f64 = 0.002;
 /// Fewer lines in the half-power band than this: the damping may stay uncertain.
 const COARSE_LINES: f64 = 1.0;
 /// Squared size over uncertainty (two degrees of freedom) from which an FRF shows a mode: five standard deviations.
@@ -116,7 +118,7 @@ pub(super) fn refine(
         let frfs: Option<Vec<NoisyFrf>> = data.iter().map(|d| d.window(window_hz)).collect();
         before = after;
         let Some((fit, mut solution)) = frfs.and_then(|frfs| {
-            let fit = Fit { frfs, fixed };
+            let fit = Fit { frfs, fixed, search };
             let solution = fit.fit(group)?;
             Some((fit, solution))
         }) else {
@@ -127,7 +129,7 @@ pub(super) fn refine(
         if search != Search::Nothing {
             solution = fit.without_needless(solution, changes);
             for _ in 0..MAX_ADDED {
-                match fit.with_one_more(&solution, search, &mut doubt) {
+                match fit.with_one_more(&solution, &mut doubt) {
                     Some(more) => {
                         changes.push(Change::Added(more.poles[more.poles.len() - 1]));
                         solution = fit.without_needless(more, changes);
@@ -172,11 +174,17 @@ fn groups(candidates: &[Pole]) -> Vec<&[Pole]> {
 struct Fit<'a> {
     frfs: Vec<NoisyFrf<'a>>,
     fixed: Vec<Pole>,
+    search: Search,
 }
 
 impl Fit<'_> {
     fn fit(&self, poles: &[Pole]) -> Option<Solution> {
-        ml_fit::fit(&self.frfs, poles, &self.fixed)
+        // A search compares misfits, and a last refinement follows it.
+        let settled = match self.search {
+            Search::Nothing => ml_fit::SETTLED,
+            Search::Rest | Search::Pairs => COMPARED * (2.0 * self.frfs.len() as f64 + 2.0),
+        };
+        ml_fit::fit(&self.frfs, poles, &self.fixed, settled)
     }
 
     /// Misfit that a mode must explain to be one, for noise as large as the fit leaves.
@@ -257,12 +265,7 @@ impl Fit<'_> {
 
     /// Adds a pole where the rest is largest, or beside one that is there, if that explains enough; one that explains
     /// something but not enough is a doubt.
-    fn with_one_more(
-        &self,
-        solution: &Solution,
-        search: Search,
-        doubt: &mut Option<Doubt>,
-    ) -> Option<Solution> {
+    fn with_one_more(&self, solution: &Solution, doubt: &mut Option<Doubt>) -> Option<Solution> {
         let usual = usual_damping(solution);
         let enough = |more: &Solution| {
             let fall = solution.misfit - more.misfit;
@@ -276,7 +279,7 @@ impl Fit<'_> {
             .into_iter()
             .filter_map(|pole| self.and(solution, pole))
             .find(enough);
-        if found.is_some() || search != Search::Pairs {
+        if found.is_some() || self.search != Search::Pairs {
             return found;
         }
         let more = self.beside(solution)?;
@@ -320,28 +323,25 @@ impl Fit<'_> {
     /// each, the others held, and the place that explains most is refined.
     fn beside(&self, solution: &Solution) -> Option<Solution> {
         let usual = usual_damping(solution);
-        let held = |pole: &Pole| {
-            let fixed: Vec<Pole> = self
-                .fixed
-                .iter()
-                .chain(&solution.poles)
-                .chain([pole])
-                .copied()
-                .collect();
-            Some(ml_fit::fit(&self.frfs, &[], &fixed)?.misfit)
-        };
-        let trials = solution.poles.iter().flat_map(|pole| {
-            [-1.0, 1.0].map(|side| Pole {
-                frequency_hz: pole.frequency_hz * (1.0 + side * BESIDE_WIDTHS * pole.damping_ratio),
-                damping_ratio: usual,
+        let trials: Vec<Pole> = solution
+            .poles
+            .iter()
+            .flat_map(|pole| {
+                [-1.0, 1.0].map(|side| Pole {
+                    frequency_hz: pole.frequency_hz * (1.0 + side * BESIDE_WIDTHS * pole.damping_ratio),
+                    damping_ratio: usual,
+                })
             })
-        });
-        let (misfit, best) = trials
-            .filter_map(|pole| Some((held(&pole)?, pole)))
-            .min_by(|a, b| a.0.total_cmp(&b.0))?;
+            .collect();
+        let held: Vec<Pole> = solution.poles.iter().chain(&self.fixed).copied().collect();
+        let explained = ml_fit::explained_by(&self.frfs, &held, &trials)?;
+        let (fall, best) = explained
+            .into_iter()
+            .zip(trials)
+            .max_by(|a, b| a.0.total_cmp(&b.0))?;
         // No more than noise gives to any pole: not worth a fit.
         let by_noise = self.beyond_chance(solution, WORTH_A_FIT_SIGMA, 0.0);
-        (solution.misfit - misfit > by_noise).then(|| self.and(solution, best))?
+        (fall > by_noise).then(|| self.and(solution, best))?
     }
 
     /// Poles to try where the rest is largest; none where it could not pay for a mode.

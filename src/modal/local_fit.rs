@@ -15,6 +15,12 @@ pub(super) const FEW_LINES: usize = 24;
 /// From this many curves on their scatter is worth asking.
 const SEVERAL_CURVES: usize = 4;
 const MAX_ITERATIONS: usize = 60;
+/// A fall of the cost by this part of itself is worth no further step.
+pub(super) const SETTLED: f64 = 1e-7;
+/// Where only the size of what is left is asked for.
+pub(super) const ROUGHLY_SETTLED: f64 = 1e-4;
+/// A relative change of the poles that is only rounding.
+const LAST_DIGITS: f64 = 1e-11;
 /// Smallest damping ratio the search may reach; below it a line spectrum cannot tell.
 const MIN_DAMPING: f64 = 1e-7;
 
@@ -76,8 +82,9 @@ struct Linearised {
     gradient: DVector<f64>,
 }
 
-/// Finds the poles from a start. `None` where the lines do not determine them.
-pub(super) fn fit(problem: &Problem, start: &[Pole]) -> Option<Solution> {
+/// Finds the poles from a start, to a relative fall of the cost of `settled`. `None` where the lines do not determine
+/// them.
+pub(super) fn fit(problem: &Problem, start: &[Pole], settled: f64) -> Option<Solution> {
     let parameters = 2 * start.len();
     let equations = 2 * problem.frequency_hz.len() * problem.curves.len();
     let linear = 2 * (start.len() + problem.residual_terms) * problem.curves.len();
@@ -95,6 +102,17 @@ pub(super) fn fit(problem: &Problem, start: &[Pole]) -> Option<Solution> {
             damped[(j, j)] *= 1.0 + lambda;
         }
         let step = damped.lu().solve(&current.gradient)?;
+        // What the step promises, where it is nearly a full one; with exact data there is always more to gain, but no
+        // digit that could hold it.
+        let enough = lambda < 1e-2 && step.dot(&current.gradient) <= settled * current.cost;
+        if enough
+            || step
+                .iter()
+                .zip(poles_scale(&poles))
+                .all(|(s, x)| s.abs() <= LAST_DIGITS * x)
+        {
+            break;
+        }
         let trial: Vec<Pole> = poles
             .iter()
             .enumerate()
@@ -113,7 +131,7 @@ pub(super) fn fit(problem: &Problem, start: &[Pole]) -> Option<Solution> {
         let next = if sane { linearise(problem, &trial) } else { None };
         match next {
             Some(next) if next.cost <= current.cost => {
-                let done = current.cost - next.cost <= 1e-12 * current.cost;
+                let done = current.cost - next.cost <= settled * current.cost;
                 poles = trial;
                 current = next;
                 lambda = (lambda * 0.2).max(1e-12);
@@ -177,6 +195,11 @@ pub(super) fn fit(problem: &Problem, start: &[Pole]) -> Option<Solution> {
         leverage,
         variance,
     })
+}
+
+/// Sizes of the parameters (f₁, ln ζ₁, …), for what is a small change.
+fn poles_scale(poles: &[Pole]) -> impl Iterator<Item = f64> {
+    poles.iter().flat_map(|p| [p.frequency_hz, 1.0])
 }
 
 /// Diagonal of the projection onto what the model can follow, linear and pole parameters together.
@@ -245,49 +268,57 @@ fn linearise(problem: &Problem, poles: &[Pole]) -> Option<Linearised> {
     let (first, last) = (*f.first()?, *f.last()?);
     let half_span = (0.5 * (last - first)).max(f64::MIN_POSITIVE);
     let columns = poles.len() + problem.residual_terms;
-    let shape =
-        |k: usize, pole: &Pole| 1.0 / Complex64::new(pole.damping_ratio, detuning(f[k], pole.frequency_hz));
-    let mut basis = DMatrix::from_fn(n, columns, |k, j| {
-        let value = match j.checked_sub(poles.len()) {
-            None => shape(k, &poles[j]),
-            Some(power) => Complex64::new(((f[k] - first) / half_span - 1.0).powi(power as i32), 0.0),
-        };
-        value * problem.line_weight[k]
-    });
+    let mut shapes: Vec<Complex64> = Vec::with_capacity(n * poles.len());
+    let mut values: Vec<Complex64> = Vec::with_capacity(n * columns);
+    for pole in poles {
+        let damping = pole.damping_ratio;
+        for (f, weight) in f.iter().zip(&problem.line_weight) {
+            let u = detuning(*f, pole.frequency_hz);
+            let g = Complex64::new(damping, -u) / (damping * damping + u * u);
+            shapes.push(g);
+            values.push(g * weight);
+        }
+    }
+    for power in 0..problem.residual_terms {
+        let lines = f.iter().zip(&problem.line_weight);
+        values.extend(
+            lines.map(|(f, weight)| {
+                Complex64::from(((f - first) / half_span - 1.0).powi(power as i32) * weight)
+            }),
+        );
+    }
     // Unit columns keep the factorisation well scaled.
-    let norms: Vec<f64> = basis.column_iter().map(|c| c.norm()).collect();
-    if norms.iter().any(|x| !(x.is_finite() && *x > 0.0)) {
-        return None;
+    let mut norms = Vec::with_capacity(columns);
+    for column in values.chunks_exact_mut(n) {
+        let norm = column.iter().map(|v| v.norm_sqr()).sum::<f64>().sqrt();
+        if !(norm.is_finite() && norm > 0.0) {
+            return None;
+        }
+        let scale = norm.recip();
+        column.iter_mut().for_each(|v| *v *= scale);
+        norms.push(norm);
     }
-    for (mut column, norm) in basis.column_iter_mut().zip(&norms) {
-        column /= Complex64::new(*norm, 0.0);
-    }
+    let basis = DMatrix::from_vec(n, columns, values);
     let qr = basis.qr();
     let (q, r) = (qr.q(), qr.r());
     if r.diagonal().iter().any(|d| d.norm() < 1e-11) {
         return None;
     }
-    let project_out = |v: DVector<Complex64>| -> DVector<Complex64> {
-        let inside = &q * q.ad_mul(&v);
-        v - inside
-    };
-    // ∂/∂f₀ and ∂/∂ln ζ of each pole's shape.
-    let derivative: Vec<DVector<Complex64>> = poles
-        .iter()
-        .flat_map(|pole| {
-            let by_frequency = DVector::from_fn(n, |k, _| {
-                let g = shape(k, pole);
-                let slope = -0.5 * (f[k] / pole.frequency_hz.powi(2) + 1.0 / f[k]);
-                -g * g * Complex64::new(0.0, slope) * problem.line_weight[k]
-            });
-            let by_damping = DVector::from_fn(n, |k, _| {
-                let g = shape(k, pole);
-                -g * g * pole.damping_ratio * problem.line_weight[k]
-            });
-            [by_frequency, by_damping]
-        })
-        .collect();
-    let projected: Vec<DVector<Complex64>> = derivative.into_iter().map(project_out).collect();
+    // ∂/∂f₀ and ∂/∂ln ζ of each pole's shape, what the linear part can follow taken out.
+    let mut slopes: Vec<Complex64> = vec![Complex64::ZERO; 2 * n * poles.len()];
+    let pairs = slopes.chunks_exact_mut(2 * n).zip(shapes.chunks_exact(n));
+    for (pole, (pair, shape)) in poles.iter().zip(pairs) {
+        let (by_frequency, by_damping) = pair.split_at_mut(n);
+        for (k, g) in shape.iter().enumerate() {
+            let weighted = -(g * g) * problem.line_weight[k];
+            let slope = -0.5 * (f[k] / (pole.frequency_hz * pole.frequency_hz) + 1.0 / f[k]);
+            by_frequency[k] = Complex64::new(-weighted.im * slope, weighted.re * slope);
+            by_damping[k] = weighted * pole.damping_ratio;
+        }
+    }
+    let mut projected = DMatrix::from_vec(n, 2 * poles.len(), slopes);
+    let inside = q.ad_mul(&projected);
+    projected.gemm(-Complex64::ONE, &q, &inside, Complex64::ONE);
 
     let parameters = 2 * poles.len();
     let mut result = Linearised {
@@ -309,7 +340,7 @@ fn linearise(problem: &Problem, poles: &[Pole]) -> Option<Linearised> {
         let residual = y - &q * in_basis;
         // Model minus data: the Jacobian of the model, sign turned by the update above.
         let jacobian: Vec<DVector<Complex64>> = (0..parameters)
-            .map(|j| &projected[j] * (linear[j / 2] * weight))
+            .map(|j| projected.column(j) * (linear[j / 2] * weight))
             .collect();
         for a in 0..parameters {
             for b in 0..=a {
@@ -358,7 +389,7 @@ mod tests {
                 damping_ratio: 0.02,
             },
         ];
-        let solution = fit(&problem, &start).unwrap();
+        let solution = fit(&problem, &start, SETTLED).unwrap();
         let mut poles = solution.poles.clone();
         poles.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
         for (pole, mode) in poles.iter().zip(&modes) {
@@ -388,7 +419,8 @@ mod tests {
                 &[Pole {
                     frequency_hz: 2.2,
                     damping_ratio: 0.02
-                }]
+                }],
+                SETTLED
             )
             .is_none()
         );

@@ -13,6 +13,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
+use rayon::prelude::*;
 
 use super::local_fit::Pole;
 
@@ -45,11 +46,17 @@ pub(super) fn poles(rows: &[Row], band_hz: [f64; 2], max_order: usize) -> Vec<Or
         return Vec::new();
     }
     let size = (max_order + 1) * references;
+    let of_rows: Vec<Option<DMatrix<Complex64>>> = rows
+        .par_iter()
+        .map(|row| normal_of_row(row, band_hz, max_order))
+        .collect();
+    // In order, so that rounding does not depend on the threads.
     let mut normal = DMatrix::<Complex64>::zeros(size, size);
-    for row in rows {
-        add_row(row, band_hz, max_order, &mut normal);
+    for of_row in of_rows.into_iter().flatten() {
+        normal += of_row;
     }
     (1..=max_order)
+        .into_par_iter()
         .filter_map(|order| {
             let poles = poles_of_order(&normal, references, order, band_hz)?;
             Some(Order { order, poles })
@@ -57,8 +64,9 @@ pub(super) fn poles(rows: &[Row], band_hz: [f64; 2], max_order: usize) -> Vec<Or
         .collect()
 }
 
-/// Adds T − Sᴴ R⁻¹ S of one row. All three matrices are (block) Toeplitz: their entries depend on b − a only.
-fn add_row(row: &Row, band_hz: [f64; 2], order: usize, normal: &mut DMatrix<Complex64>) {
+/// T − Sᴴ R⁻¹ S of one row. All three matrices are (block) Toeplitz: their entries depend on b − a only. `None` where
+/// the row holds nothing.
+fn normal_of_row(row: &Row, band_hz: [f64; 2], order: usize) -> Option<DMatrix<Complex64>> {
     let references = row.receptance.len();
     let terms = order + 1;
     let lags = 2 * order + 1;
@@ -78,16 +86,21 @@ fn add_row(row: &Row, band_hz: [f64; 2], order: usize, normal: &mut DMatrix<Comp
                 let h = row.receptance[i][k];
                 s[i][lag] += power * h;
                 let conjugated = power * h.conj();
-                for j in 0..references {
+                for j in i..references {
                     t[i * references + j][lag] += conjugated * row.receptance[j][k];
                 }
             }
             power *= z;
         }
     }
+    for i in 0..references {
+        for j in 0..i {
+            t[i * references + j] = t[j * references + i].iter().rev().map(|v| v.conj()).collect();
+        }
+    }
     let trace = r[0].re;
     if !(trace > 0.0 && trace.is_finite()) {
-        return;
+        return None;
     }
     let gram = DMatrix::from_fn(terms, terms, |a, b| {
         let value = if b >= a { r[b - a] } else { r[a - b].conj() };
@@ -98,27 +111,23 @@ fn add_row(row: &Row, band_hz: [f64; 2], order: usize, normal: &mut DMatrix<Comp
         let (b, i) = (column / references, column % references);
         -s[i][b + order - a]
     });
-    let Some(cholesky) = gram.cholesky() else { return };
-    let Some(half) = cholesky.l().solve_lower_triangular(&cross) else {
-        return;
-    };
+    let half = gram.cholesky()?.l().solve_lower_triangular(&cross)?;
     // By power: a row of large weights must not silence the others.
     let power: f64 = (0..references).map(|i| t[i * references + i][order].re).sum();
     if !(power > 0.0 && power.is_finite()) {
-        return;
+        return None;
     }
     let scale = Complex64::new((row.frequency_hz.len() * references) as f64 / power, 0.0);
-    let eliminated = half.adjoint() * &half;
-    for b in 0..terms {
-        for j in 0..references {
-            for a in 0..terms {
-                for i in 0..references {
-                    let at = (a * references + i, b * references + j);
-                    normal[at] += (t[i * references + j][b + order - a] - eliminated[at]) * scale;
-                }
-            }
-        }
-    }
+    let eliminated = half.ad_mul(&half);
+    Some(DMatrix::from_fn(
+        terms * references,
+        terms * references,
+        |row, column| {
+            let (a, i) = (row / references, row % references);
+            let (b, j) = (column / references, column % references);
+            (t[i * references + j][b + order - a] - eliminated[(row, column)]) * scale
+        },
+    ))
 }
 
 fn angle(frequency_hz: f64, band_hz: [f64; 2]) -> f64 {

@@ -9,7 +9,9 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{DMatrix, DVector};
+use faer::linalg::matmul::matmul;
+use faer::{Accum, MatMut, MatRef, Par};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
@@ -21,8 +23,10 @@ const MAX_ITERATIONS: usize = 30;
 const MIN_DAMPING: f64 = 1e-7;
 /// Smallest eigenvalue of the residual terms' Gram matrix, with columns of unit length.
 const ROUNDING: f64 = 1e-12;
-/// A relative fall of the misfit below this ends the search.
-const SETTLED: f64 = 1e-9;
+/// A fall of the misfit below this part of itself is rounding.
+const RELATIVELY_SETTLED: f64 = 1e-9;
+/// Fall of the misfit that is worth no further step: a hundredth of a standard deviation.
+pub(super) const SETTLED: f64 = 1e-4;
 
 /// One FRF within the window of the fit.
 #[derive(Clone)]
@@ -98,46 +102,126 @@ impl Solution {
     }
 }
 
-/// What all FRFs on the same lines share: f/f₀ and 1/(1 − r² + 2iζr) by pole, then line; residual terms by line.
-struct Axis {
-    ratio: Vec<Vec<f64>>,
-    shape: Vec<Vec<Complex64>>,
-    terms: Vec<[Complex64; RESIDUAL_TERMS]>,
+/// The FRFs of a fit, made ready once: what does not depend on the poles. Complex columns are stored as real and
+/// imaginary parts by turns.
+struct Prepared<'a> {
+    frfs: &'a [NoisyFrf<'a>],
+    /// By FRF, the index of the first one on the same lines.
+    axis_of: Vec<usize>,
+    centre_hz: f64,
+    /// √2/σ, twice for each line: a complex standard deviation of σ is σ/√2 in each part.
+    weight: Vec<Vec<f64>>,
+    /// Weighted measurement.
+    target: Vec<Vec<f64>>,
 }
 
-impl Axis {
-    fn new<'a>(frequency_hz: &[f64], poles: impl Iterator<Item = &'a Pole>, centre_hz: f64) -> Axis {
-        let mut axis = Axis {
-            ratio: Vec::new(),
-            shape: Vec::new(),
-            terms: frequency_hz
-                .iter()
-                .map(|&f| residual_terms(f, centre_hz))
-                .collect(),
-        };
-        for pole in poles {
-            let ratio: Vec<f64> = frequency_hz.iter().map(|f| f / pole.frequency_hz).collect();
-            let shape = ratio.iter().map(|r| {
-                let (re, im) = (1.0 - r * r, 2.0 * pole.damping_ratio * r);
-                let size = 1.0 / (re * re + im * im);
-                Complex64::new(re * size, -im * size)
-            });
-            axis.shape.push(shape.collect());
-            axis.ratio.push(ratio);
+impl<'a> Prepared<'a> {
+    fn new(frfs: &'a [NoisyFrf<'a>]) -> Self {
+        let axis_of = (0..frfs.len())
+            .map(|m| {
+                (0..m)
+                    .find(|&k| frfs[k].frequency_hz == frfs[m].frequency_hz)
+                    .unwrap_or(m)
+            })
+            .collect();
+        let weight: Vec<Vec<f64>> = frfs
+            .iter()
+            .map(|frf| {
+                let of_line = frf.sigma.iter().map(|s| std::f64::consts::SQRT_2 / s);
+                of_line.flat_map(|w| [w, w]).collect()
+            })
+            .collect();
+        let target = frfs
+            .iter()
+            .zip(&weight)
+            .map(|(frf, weight)| {
+                let parts = frf.receptance.iter().flat_map(|h| [h.re, h.im]);
+                parts.zip(weight).map(|(part, w)| part * w).collect()
+            })
+            .collect();
+        Prepared {
+            frfs,
+            axis_of,
+            centre_hz: centre_hz(frfs),
+            weight,
+            target,
         }
-        axis
+    }
+
+    /// Columns of the poles on the lines of each FRF that is the first with its lines.
+    fn axes(&self, moving: &[Pole], fixed: &[Pole]) -> Vec<Option<Axis>> {
+        (0..self.frfs.len())
+            .map(|m| {
+                let own = self.axis_of[m] == m;
+                own.then(|| Axis::new(self.frfs[m].frequency_hz, moving, fixed, self.centre_hz))
+            })
+            .collect()
+    }
+
+    /// `work` on every FRF with its axis, in order, so that rounding does not depend on the threads.
+    fn each<T: Send>(
+        &self,
+        axes: &[Option<Axis>],
+        work: impl Fn(usize, &Axis, &mut Vec<f64>) -> Option<T> + Sync,
+    ) -> Option<Vec<T>> {
+        let each: Vec<Option<T>> = (0..self.frfs.len())
+            .into_par_iter()
+            .map_init(Vec::new, |buffer, m| {
+                work(m, axes[self.axis_of[m]].as_ref()?, buffer)
+            })
+            .collect();
+        each.into_iter().collect()
     }
 }
 
-/// Which FRFs have the same lines: by FRF, the index of the first one with them.
-fn same_lines(frfs: &[NoisyFrf]) -> Vec<usize> {
-    (0..frfs.len())
-        .map(|m| {
-            (0..m)
-                .find(|&k| frfs[k].frequency_hz == frfs[m].frequency_hz)
-                .unwrap_or(m)
-        })
-        .collect()
+/// Columns that all FRFs on the same lines share, before weighting; each 2 × lines long.
+struct Axis {
+    rows: usize,
+    /// g = 1/(1 − r² + 2iζr) and irg by pole, moving ones first, r = f/f₀; then the residual terms.
+    columns: Vec<f64>,
+    /// By moving pole, for numerators a + ibr: ∂/∂ln f₀ = a p + b ir(p − g) and ∂/∂ln ζ = a q + b irq,
+    /// with p = −g²(2r² − 2iζr), q = −2iζr g², in the order p, ir(p − g), q, irq.
+    slopes: Vec<f64>,
+}
+
+impl Axis {
+    fn new(frequency_hz: &[f64], moving: &[Pole], fixed: &[Pole], centre_hz: f64) -> Axis {
+        let rows = 2 * frequency_hz.len();
+        let modes = moving.len() + fixed.len();
+        let mut columns = vec![0.0; rows * (2 * modes + RESIDUAL_TERMS)];
+        let mut slopes = vec![0.0; rows * 4 * moving.len()];
+        let put = |all: &mut [f64], column: usize, line: usize, value: Complex64| {
+            all[column * rows + 2 * line] = value.re;
+            all[column * rows + 2 * line + 1] = value.im;
+        };
+        for (j, pole) in moving.iter().chain(fixed).enumerate() {
+            for (k, f) in frequency_hz.iter().enumerate() {
+                let r = f / pole.frequency_hz;
+                let (re, im) = (1.0 - r * r, 2.0 * pole.damping_ratio * r);
+                let g = Complex64::new(re, -im) / (re * re + im * im);
+                let turned = |z: Complex64| Complex64::new(-z.im * r, z.re * r);
+                put(&mut columns, 2 * j, k, g);
+                put(&mut columns, 2 * j + 1, k, turned(g));
+                if j < moving.len() {
+                    let p = -(g * g) * Complex64::new(2.0 * r * r, -im);
+                    let q = -(g * g) * Complex64::new(0.0, im);
+                    for (n, value) in [p, turned(p - g), q, turned(q)].into_iter().enumerate() {
+                        put(&mut slopes, 4 * j + n, k, value);
+                    }
+                }
+            }
+        }
+        for (k, &f) in frequency_hz.iter().enumerate() {
+            for (n, term) in residual_terms(f, centre_hz).into_iter().enumerate() {
+                put(&mut columns, 2 * modes + n, k, term);
+            }
+        }
+        Axis {
+            rows,
+            columns,
+            slopes,
+        }
+    }
 }
 
 /// What modes outside the band leave inside it, to the second order in the ratio of the frequencies: 1/ω², i/ω³, 1/ω⁴
@@ -155,13 +239,6 @@ fn residual_terms(f: f64, centre_hz: f64) -> [Complex64; RESIDUAL_TERMS] {
     ]
 }
 
-struct Linearised {
-    misfit: f64,
-    normal: DMatrix<f64>,
-    gradient: DVector<f64>,
-    frfs: Vec<FrfSolution>,
-}
-
 /// Frequency at which the residual terms have unit size.
 fn centre_hz(frfs: &[NoisyFrf]) -> f64 {
     let first = frfs
@@ -175,9 +252,10 @@ fn centre_hz(frfs: &[NoisyFrf]) -> f64 {
     (first.max(1e-3 * last) * last).sqrt()
 }
 
-/// Refines the poles `start`; `fixed` poles take part with residues of their own but are not moved. `None` where the
+/// Refines the poles `start`; `fixed` poles take part with residues of their own but are not moved. `settled`: fall of
+/// the misfit that is worth no further step ([`SETTLED`], or more where only the misfit is asked for). `None` where the
 /// lines do not determine the poles.
-pub(super) fn fit(frfs: &[NoisyFrf], start: &[Pole], fixed: &[Pole]) -> Option<Solution> {
+pub(super) fn fit(frfs: &[NoisyFrf], start: &[Pole], fixed: &[Pole], settled: f64) -> Option<Solution> {
     let parameters = 2 * start.len();
     let linear = 2 * (start.len() + fixed.len()) + RESIDUAL_TERMS;
     let equations: usize = frfs.iter().map(|c| 2 * c.frequency_hz.len()).sum();
@@ -187,12 +265,9 @@ pub(super) fn fit(frfs: &[NoisyFrf], start: &[Pole], fixed: &[Pole]) -> Option<S
     if frfs.iter().any(|c| 2 * c.frequency_hz.len() <= linear) {
         return None;
     }
-    let lines = Lines {
-        axis_of: same_lines(frfs),
-        centre_hz: centre_hz(frfs),
-    };
+    let prepared = Prepared::new(frfs);
     let mut poles = start.to_vec();
-    let mut current = linearise(frfs, &poles, fixed, &lines)?;
+    let mut current = linearise(&prepared, &poles, fixed)?;
     let mut lambda = 1e-4;
     let mut converged = parameters == 0;
     for _ in 0..MAX_ITERATIONS {
@@ -206,6 +281,12 @@ pub(super) fn fit(frfs: &[NoisyFrf], start: &[Pole], fixed: &[Pole]) -> Option<S
         let Some(step) = damped.cholesky().map(|c| c.solve(&current.gradient)) else {
             break;
         };
+        let worth = settled + RELATIVELY_SETTLED * current.misfit;
+        // The fall that the step promises, where it is nearly a full one.
+        if lambda < 1e-2 && step.dot(&current.gradient) <= worth {
+            converged = true;
+            break;
+        }
         let trial: Vec<Pole> = poles
             .iter()
             .enumerate()
@@ -222,12 +303,12 @@ pub(super) fn fit(frfs: &[NoisyFrf], start: &[Pole], fixed: &[Pole]) -> Option<S
             .iter()
             .all(|p| p.frequency_hz > 0.0 && p.damping_ratio < 0.9);
         match if sane {
-            linearise(frfs, &trial, fixed, &lines)
+            linearise(&prepared, &trial, fixed)
         } else {
             None
         } {
             Some(next) if next.misfit <= current.misfit => {
-                converged = current.misfit - next.misfit <= SETTLED * current.misfit + 1e-3;
+                converged = current.misfit - next.misfit <= worth;
                 poles = trial;
                 current = next;
                 lambda = (lambda * 0.2).max(1e-12);
@@ -245,9 +326,14 @@ pub(super) fn fit(frfs: &[NoisyFrf], start: &[Pole], fixed: &[Pole]) -> Option<S
         }
     }
     let covariance = current.normal.try_inverse()?;
-    covariance.iter().all(|c| c.is_finite()).then_some(Solution {
+    covariance.iter().all(|c| c.is_finite()).then(|| Solution {
         poles,
-        frfs: current.frfs,
+        frfs: current
+            .frfs
+            .into_iter()
+            .zip(&prepared.weight)
+            .map(|(solved, weight)| solved.finish(weight))
+            .collect(),
         misfit: current.misfit,
         degrees_of_freedom,
         covariance,
@@ -255,140 +341,250 @@ pub(super) fn fit(frfs: &[NoisyFrf], start: &[Pole], fixed: &[Pole]) -> Option<S
     })
 }
 
-struct Lines {
-    axis_of: Vec<usize>,
-    centre_hz: f64,
+/// Misfit that each of the `trials` would explain beside the poles of a solution, these and the trial held where they
+/// are: twice the log-likelihood ratio, exact in the residues. `None` where the lines do not determine those.
+pub(super) fn explained_by(frfs: &[NoisyFrf], held: &[Pole], trials: &[Pole]) -> Option<Vec<f64>> {
+    let prepared = Prepared::new(frfs);
+    let held_axes = prepared.axes(&[], held);
+    let trial_axes = prepared.axes(&[], trials);
+    let each = prepared.each(&held_axes, |m, axis, buffer| {
+        let trial_axis = trial_axes[prepared.axis_of[m]].as_ref()?;
+        let (solved, basis_columns) = Solved::new(&prepared, m, axis, 2 * trials.len(), buffer)?;
+        let (rows, weight) = (axis.rows, &prepared.weight[m]);
+        let (before, added) = buffer.split_at_mut(rows * (basis_columns + 1));
+        let own = &trial_axis.columns[..added.len()];
+        for (out, column) in added.chunks_exact_mut(rows).zip(own.chunks_exact(rows)) {
+            weigh(out, column, weight);
+        }
+        let mut cross = DMatrix::zeros(basis_columns + 1, 2 * trials.len());
+        product(&mut cross, before, added, rows);
+        let along = cross.row(basis_columns).transpose();
+        let mut solved_cross = cross.rows(0, basis_columns).into_owned();
+        solved.scale_rows(&mut solved_cross);
+        solved
+            .cholesky
+            .l_dirty()
+            .solve_lower_triangular_mut(&mut solved_cross);
+        let gains = (0..trials.len()).map(|t| {
+            let pair = &added[2 * t * rows..2 * (t + 1) * rows];
+            let (a, b) = pair.split_at(rows);
+            let (p, q) = (solved_cross.column(2 * t), solved_cross.column(2 * t + 1));
+            let dot = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
+            let (aa, ab, bb) = (
+                dot(a, a) - p.norm_squared(),
+                dot(a, b) - p.dot(&q),
+                dot(b, b) - q.norm_squared(),
+            );
+            let (u, v) = (along[2 * t], along[2 * t + 1]);
+            let gain = (u * u * bb - 2.0 * u * v * ab + v * v * aa) / (aa * bb - ab * ab);
+            // A column that the others already hold explains nothing.
+            if gain.is_finite() && gain > 0.0 { gain } else { 0.0 }
+        });
+        Some(gains.collect::<Vec<f64>>())
+    })?;
+    let mut sum = vec![0.0; trials.len()];
+    for gains in each {
+        for (sum, gain) in sum.iter_mut().zip(gains) {
+            *sum += gain;
+        }
+    }
+    Some(sum)
 }
 
-/// What one FRF adds: cost, information matrix, gradient and its own solution.
-type Share = (f64, DMatrix<f64>, DVector<f64>, FrfSolution);
+struct Linearised {
+    misfit: f64,
+    normal: DMatrix<f64>,
+    gradient: DVector<f64>,
+    frfs: Vec<SolvedFrf>,
+}
 
 /// Solves for the linear parameters of every FRF and builds the normal equations of the poles.
-fn linearise(frfs: &[NoisyFrf], poles: &[Pole], fixed: &[Pole], lines: &Lines) -> Option<Linearised> {
-    let axes: Vec<Option<Axis>> = (0..frfs.len())
-        .map(|m| {
-            let own = lines.axis_of[m] == m;
-            own.then(|| Axis::new(frfs[m].frequency_hz, poles.iter().chain(fixed), lines.centre_hz))
-        })
-        .collect();
-    let each: Vec<Option<Share>> = frfs
-        .par_iter()
-        .zip(&lines.axis_of)
-        .map(|(frf, &axis)| linearise_one(frf, poles, axes[axis].as_ref()?))
-        .collect();
+fn linearise(prepared: &Prepared, poles: &[Pole], fixed: &[Pole]) -> Option<Linearised> {
+    let axes = prepared.axes(poles, fixed);
+    let each = prepared.each(&axes, |m, axis, buffer| linearise_one(prepared, m, axis, buffer))?;
     let parameters = 2 * poles.len();
     let mut sum = Linearised {
         misfit: 0.0,
         normal: DMatrix::zeros(parameters, parameters),
         gradient: DVector::zeros(parameters),
-        frfs: Vec::with_capacity(frfs.len()),
+        frfs: Vec::with_capacity(each.len()),
     };
-    // In order, so that rounding does not depend on the threads.
-    for one in each {
-        let (misfit, normal, gradient, solution) = one?;
-        sum.misfit += misfit;
+    for (normal, gradient, solved) in each {
+        sum.misfit += solved.residual.iter().map(|r| r * r).sum::<f64>();
         sum.normal += normal;
         sum.gradient += gradient;
-        sum.frfs.push(solution);
+        sum.frfs.push(solved);
     }
     sum.misfit.is_finite().then_some(sum)
 }
 
-/// Writes the weighted real and imaginary parts of a function of the line into a column.
-fn put(column: &mut [f64], weight: &[f64], value: impl Fn(usize) -> Complex64) {
-    for (k, (pair, w)) in column.chunks_exact_mut(2).zip(weight).enumerate() {
-        let value = value(k);
-        pair[0] = value.re * w;
-        pair[1] = value.im * w;
+fn weigh(out: &mut [f64], column: &[f64], weight: &[f64]) {
+    for ((out, value), w) in out.iter_mut().zip(column).zip(weight) {
+        *out = value * w;
     }
 }
 
-fn linearise_one(
-    frf: &NoisyFrf,
-    poles: &[Pole],
-    axis: &Axis,
-) -> Option<(f64, DMatrix<f64>, DVector<f64>, FrfSolution)> {
-    let lines = frf.frequency_hz.len();
-    let modes = axis.shape.len();
-    let columns = 2 * modes + RESIDUAL_TERMS;
-    // A complex standard deviation of σ is σ/√2 in each part.
-    let weight: Vec<f64> = frf.sigma.iter().map(|s| std::f64::consts::SQRT_2 / s).collect();
-    let mut values = vec![0.0; 2 * lines * columns];
-    for (column, out) in values.chunks_exact_mut(2 * lines).enumerate() {
-        match column.checked_sub(2 * modes) {
-            None => {
-                let (shape, ratio) = (&axis.shape[column / 2], &axis.ratio[column / 2]);
-                if column % 2 == 0 {
-                    put(out, &weight, |k| shape[k]);
-                } else {
-                    put(out, &weight, |k| {
-                        Complex64::new(-shape[k].im * ratio[k], shape[k].re * ratio[k])
-                    });
-                }
+/// `out` = leftᵀ right, both with columns of `rows` values.
+fn product(out: &mut DMatrix<f64>, left: &[f64], right: &[f64], rows: usize) {
+    let (m, n) = out.shape();
+    let left = MatRef::from_column_major_slice(left, rows, m);
+    let right = MatRef::from_column_major_slice(right, rows, n);
+    let out = MatMut::from_column_major_slice_mut(out.as_mut_slice(), m, n);
+    matmul(out, Accum::Replace, left.transpose(), right, 1.0, Par::Seq);
+}
+
+/// The linear parameters of one FRF for given poles.
+struct Solved {
+    /// Of the Gram matrix with columns of unit length.
+    cholesky: Cholesky<f64, Dyn>,
+    /// 1/length of each column.
+    scale: DVector<f64>,
+    /// In units of the unit columns.
+    x: DVector<f64>,
+}
+
+/// That, with what is left over and how it moves with the poles.
+struct SolvedFrf {
+    linear: Solved,
+    /// Weighted, real and imaginary parts by turns.
+    residual: Vec<f64>,
+    /// Gram⁻¹ basisᵀ slopes, in units of the unit columns.
+    by_poles: DMatrix<f64>,
+}
+
+impl Solved {
+    /// Fills `buffer` with the weighted basis of FRF `m`, then its residual, then room for `more` columns; says how many
+    /// columns the basis has.
+    fn new(
+        prepared: &Prepared,
+        m: usize,
+        axis: &Axis,
+        more: usize,
+        buffer: &mut Vec<f64>,
+    ) -> Option<(Solved, usize)> {
+        let rows = axis.rows;
+        let columns = axis.columns.len() / rows;
+        buffer.resize(rows * (columns + 1 + more), 0.0);
+        let filled = &mut buffer[..rows * (columns + 1)];
+        for (out, column) in filled.chunks_exact_mut(rows).zip(axis.columns.chunks_exact(rows)) {
+            weigh(out, column, &prepared.weight[m]);
+        }
+        filled[rows * columns..].copy_from_slice(&prepared.target[m]);
+        let mut gram = DMatrix::zeros(columns + 1, columns + 1);
+        product(&mut gram, filled, filled, rows);
+        // Unit columns: the Gram matrix is then as well scaled as it can be.
+        let scale = DVector::from_fn(columns, |j, _| gram[(j, j)].sqrt().recip());
+        if scale.iter().any(|s| !(s.is_finite() && *s > 0.0)) {
+            return None;
+        }
+        let projected = gram.view((0, columns), (columns, 1)).component_mul(&scale);
+        let mut unit = DMatrix::from_fn(columns, columns, |i, j| gram[(i, j)] * scale[i] * scale[j]);
+        // Lines near 0 Hz make the lower residual terms all alike: hold back the part of them that rounding would decide.
+        for term in columns - RESIDUAL_TERMS..columns {
+            unit[(term, term)] += ROUNDING;
+        }
+        let mut solved = Solved {
+            cholesky: unit.cholesky()?,
+            scale,
+            x: DVector::zeros(columns),
+        };
+        // One step of iterative refinement: the normal equations square the condition number.
+        let mut right = projected;
+        for refined in [false, true] {
+            let (basis, residual) = filled.split_at_mut(rows * columns);
+            let basis = MatRef::from_column_major_slice(basis, rows, columns);
+            if refined {
+                let out = MatMut::from_column_major_slice_mut(right.as_mut_slice(), columns, 1);
+                let residual = MatRef::from_column_major_slice(&*residual, rows, 1);
+                matmul(out, Accum::Replace, basis.transpose(), residual, 1.0, Par::Seq);
+                right.component_mul_assign(&solved.scale);
             }
-            Some(term) => put(out, &weight, |k| axis.terms[k][term]),
+            let step = solved.cholesky.solve(&right);
+            let unscaled = step.component_mul(&solved.scale);
+            let change = MatRef::from_column_major_slice(unscaled.as_slice(), columns, 1);
+            let residual = MatMut::from_column_major_slice_mut(residual, rows, 1);
+            matmul(residual, Accum::Add, basis, change, -1.0, Par::Seq);
+            solved.x += step;
+        }
+        Some((solved, columns))
+    }
+
+    fn scale_rows(&self, matrix: &mut DMatrix<f64>) {
+        for mut column in matrix.column_iter_mut() {
+            column.component_mul_assign(&self.scale);
         }
     }
-    let mut basis = DMatrix::from_vec(2 * lines, columns, values);
-    let mut target = DVector::<f64>::zeros(2 * lines);
-    put(target.as_mut_slice(), &weight, |k| frf.receptance[k]);
-    // Unit columns: the Gram matrix is then as well scaled as it can be.
-    let norms: Vec<f64> = basis.column_iter().map(|c| c.norm()).collect();
-    if norms.iter().any(|n| !(n.is_finite() && *n > 0.0)) {
-        return None;
-    }
-    for (mut column, norm) in basis.column_iter_mut().zip(&norms) {
-        column /= *norm;
-    }
-    let transposed = basis.transpose();
-    let mut gram = &transposed * &basis;
-    // Lines near 0 Hz make the lower residual terms all alike: hold back the part of them that rounding would decide.
-    for term in 2 * modes..columns {
-        gram[(term, term)] += ROUNDING;
-    }
-    let cholesky = gram.cholesky()?;
-    let mut x = cholesky.solve(&(&transposed * &target));
-    let mut residual = &target - &basis * &x;
-    // One step of iterative refinement: the normal equations square the condition number.
-    let correction = cholesky.solve(&(&transposed * &residual));
-    x += correction;
-    residual = &target - &basis * &x;
+}
 
-    let parameters = 2 * poles.len();
-    let mut values = vec![0.0; 2 * lines * parameters];
-    for (column, out) in values.chunks_exact_mut(2 * lines).enumerate() {
-        let j = column / 2;
-        let (shape, ratio, zeta) = (&axis.shape[j], &axis.ratio[j], poles[j].damping_ratio);
-        let (a, b) = (x[2 * j] / norms[2 * j], x[2 * j + 1] / norms[2 * j + 1]);
-        put(out, &weight, |k| {
-            let (g, r) = (shape[k], ratio[k]);
-            let squared = g * g * Complex64::new(a, b * r);
-            if column % 2 == 0 {
-                // r falls by r with ln f₀.
-                g * Complex64::new(0.0, -b * r) - squared * Complex64::new(2.0 * r * r, -2.0 * zeta * r)
-            } else {
-                -squared * Complex64::new(0.0, 2.0 * zeta * r)
+impl SolvedFrf {
+    fn finish(self, weight: &[f64]) -> FrfSolution {
+        let Solved { cholesky, scale, x } = self.linear;
+        let scaled = |mut matrix: DMatrix<f64>| {
+            for mut column in matrix.column_iter_mut() {
+                column.component_mul_assign(&scale);
             }
-        });
+            matrix
+        };
+        let mut linear_covariance = scaled(cholesky.inverse());
+        for (mut column, s) in linear_covariance.column_iter_mut().zip(&scale) {
+            column *= *s;
+        }
+        let rows = self.residual.len();
+        FrfSolution {
+            leverage: x.len() as f64 / rows as f64,
+            linear: x.component_mul(&scale),
+            residual: (0..rows / 2)
+                .map(|k| Complex64::new(self.residual[2 * k], self.residual[2 * k + 1]) / weight[2 * k])
+                .collect(),
+            linear_covariance,
+            linear_by_poles: scaled(self.by_poles),
+        }
     }
-    let slopes = DMatrix::from_vec(2 * lines, parameters, values);
-    let cross = &transposed * &slopes;
-    let solved = cholesky.solve(&cross);
-    let slopes_t = slopes.transpose();
-    let normal = &slopes_t * &slopes - cross.transpose() * &solved;
-    let gradient = &slopes_t * &residual;
-    let misfit = residual.norm_squared();
-    let scale = DMatrix::from_diagonal(&DVector::from_iterator(columns, norms.iter().map(|n| 1.0 / n)));
-    let solution = FrfSolution {
-        linear: &scale * x,
-        residual: (0..lines)
-            .map(|k| Complex64::new(residual[2 * k], residual[2 * k + 1]) / weight[k])
-            .collect(),
-        linear_covariance: &scale * cholesky.inverse() * &scale,
-        linear_by_poles: &scale * solved,
-        leverage: columns as f64 / (2 * lines) as f64,
-    };
-    Some((misfit, normal, gradient, solution))
+}
+
+/// Information matrix, gradient and solution of one FRF.
+fn linearise_one(
+    prepared: &Prepared,
+    m: usize,
+    axis: &Axis,
+    buffer: &mut Vec<f64>,
+) -> Option<(DMatrix<f64>, DVector<f64>, SolvedFrf)> {
+    let rows = axis.rows;
+    let parameters = axis.slopes.len() / (2 * rows);
+    let (linear, columns) = Solved::new(prepared, m, axis, parameters, buffer)?;
+    let weight = &prepared.weight[m];
+    let slopes = &mut buffer[rows * (columns + 1)..];
+    for (parameter, out) in slopes.chunks_exact_mut(rows).enumerate() {
+        let j = 2 * (parameter / 2);
+        let (a, b) = (
+            linear.x[j] * linear.scale[j],
+            linear.x[j + 1] * linear.scale[j + 1],
+        );
+        let pair = &axis.slopes[2 * parameter * rows..2 * (parameter + 1) * rows];
+        let (with_a, with_b) = pair.split_at(rows);
+        for (((out, p), q), w) in out.iter_mut().zip(with_a).zip(with_b).zip(weight) {
+            *out = (a * p + b * q) * w;
+        }
+    }
+    // Basis, residual and slopes, each with the slopes.
+    let mut all = DMatrix::zeros(columns + 1 + parameters, parameters);
+    product(&mut all, buffer, &buffer[rows * (columns + 1)..], rows);
+    let mut cross = all.rows(0, columns).into_owned();
+    linear.scale_rows(&mut cross);
+    let by_poles = linear.cholesky.solve(&cross);
+    let mut normal = all.rows(columns + 1, parameters).into_owned();
+    normal.gemm_tr(-1.0, &cross, &by_poles, 1.0);
+    let gradient = all.row(columns).transpose();
+    let residual = buffer[rows * columns..rows * (columns + 1)].to_vec();
+    Some((
+        normal,
+        gradient,
+        SolvedFrf {
+            linear,
+            residual,
+            by_poles,
+        },
+    ))
 }
 
 #[cfg(test)]
@@ -416,7 +612,7 @@ mod tests {
             frequency_hz,
             damping_ratio,
         });
-        let solution = fit(&[frf], &start, &[]).unwrap();
+        let solution = fit(&[frf], &start, &[], SETTLED).unwrap();
         assert!(solution.converged);
         for (pole, mode) in solution.poles.iter().zip(&modes[1..3]) {
             approx::assert_relative_eq!(pole.frequency_hz, mode.frequency_hz, max_relative = 1e-4);

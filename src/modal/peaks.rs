@@ -71,6 +71,14 @@ fn smoothed(mobility: &[Complex64], width_lines: f64) -> (Vec<f64>, f64) {
     let n = mobility.len();
     let values = (0..n)
         .map(|k| {
+            if k >= reach && k + reach < n {
+                let mut total = mobility[k] * kernel[0];
+                let below = mobility[k - reach..k].iter().rev();
+                for ((w, before), after) in kernel[1..].iter().zip(below).zip(&mobility[k + 1..]) {
+                    total += (before + after) * w;
+                }
+                return total.norm() / sum;
+            }
             // At the ends the kernel is cut off and what is left weighs the more.
             let (mut total, mut weight) = (mobility[k] * kernel[0], kernel[0]);
             for (j, &w) in kernel.iter().enumerate().skip(1) {

@@ -4,8 +4,10 @@
 //! over all FRFs). Poles that stay are chained from order to order; a chain that is long enough is a candidate, and
 //! for each it is said why it was taken or left.
 
-use nalgebra::DMatrix;
+use faer::linalg::solvers::Solve;
+use faer::{Mat, Side, unzip, zip};
 use num_complex::Complex64;
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::local_fit::Pole;
@@ -90,14 +92,17 @@ pub(super) struct ShapeData<'a> {
 pub(super) fn read(orders: &[Order], shapes: Option<&ShapeData>, references: usize) -> Stabilisation {
     let mut levels: Vec<Vec<Link>> = Vec::with_capacity(orders.len());
     let mut chains = 0;
-    for (index, order) in orders.iter().enumerate() {
-        let poles: Vec<Pole> = order
-            .poles
-            .iter()
-            .copied()
-            .filter(|p| p.damping_ratio < MAX_DAMPING)
-            .collect();
-        let residues = shapes.and_then(|s| residues(s, &poles));
+    type OfOrder = (Vec<Pole>, Option<Vec<Vec<Complex64>>>);
+    let of_orders: Vec<OfOrder> = orders
+        .par_iter()
+        .map(|order| {
+            let damped = order.poles.iter().copied();
+            let poles: Vec<Pole> = damped.filter(|p| p.damping_ratio < MAX_DAMPING).collect();
+            let residues = shapes.and_then(|s| residues(s, &poles));
+            (poles, residues)
+        })
+        .collect();
+    for (index, (poles, residues)) in of_orders.into_iter().enumerate() {
         let mut level: Vec<Link> = poles
             .iter()
             .enumerate()
@@ -241,7 +246,7 @@ fn residues(data: &ShapeData, poles: &[Pole]) -> Option<Vec<Vec<Complex64>>> {
         return None;
     }
     let middle = f[f.len() / 2];
-    let mut basis = DMatrix::from_fn(f.len(), columns, |k, j| {
+    let mut basis = Mat::<Complex64>::from_fn(f.len(), columns, |k, j| {
         let r = |p: &Pole| f[k] / p.frequency_hz;
         let value = match j.checked_sub(poles.len()) {
             None => {
@@ -254,19 +259,18 @@ fn residues(data: &ShapeData, poles: &[Pole]) -> Option<Vec<Vec<Complex64>>> {
         };
         value * data.weight[k]
     });
-    let norms: Vec<f64> = basis.column_iter().map(|c| c.norm()).collect();
-    for (mut column, norm) in basis.column_iter_mut().zip(&norms) {
-        column /= Complex64::from(norm.max(f64::MIN_POSITIVE));
+    for column in basis.col_iter_mut() {
+        let norm = column.norm_l2().max(f64::MIN_POSITIVE);
+        zip!(column).for_each(|unzip!(value)| *value /= norm);
     }
-    let adjoint = basis.adjoint();
-    let mut gram = &adjoint * &basis;
+    let target = Mat::<Complex64>::from_fn(f.len(), data.receptance.len(), |k, m| {
+        data.receptance[m][k] * data.weight[k]
+    });
+    let mut gram = basis.adjoint() * &basis;
     for j in 0..columns {
         gram[(j, j)] += 1e-12;
     }
-    let target = DMatrix::from_fn(f.len(), data.receptance.len(), |k, m| {
-        data.receptance[m][k] * data.weight[k]
-    });
-    let x = gram.cholesky()?.solve(&(adjoint * target));
+    let x = gram.llt(Side::Lower).ok()?.solve(basis.adjoint() * target);
     Some(
         (0..poles.len())
             .map(|j| x.row(j).iter().copied().collect())

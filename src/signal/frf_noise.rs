@@ -9,8 +9,11 @@
 
 use std::ops::Range;
 
+use faer::linalg::matmul::matmul;
+use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
+use rayon::prelude::*;
 
 /// Noise of one FRF: standard deviation of the complex value (both parts together) at receptance magnitude |H|.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,16 +95,30 @@ pub fn estimate(frequency_hz: &[f64], frfs: &[&[Complex64]]) -> Vec<Option<FrfNo
         })
         .collect();
     let last = lines - 1 - HALF_WINDOW;
-    for centre in (HALF_WINDOW..=last).step_by(STEP) {
-        // The lines that this window speaks for: its own and those up to the next; the first and the last window
-        // speak for the ends of the band too.
-        let from = if centre == HALF_WINDOW { 0 } else { centre };
-        let to = if centre + STEP > last {
-            centre + HALF_WINDOW + 1
-        } else {
-            centre + STEP
-        };
-        window(frequency_hz, frfs, centre, from..to, &mut local);
+    let centres: Vec<usize> = (HALF_WINDOW..=last).step_by(STEP).collect();
+    let windows: Vec<Option<Window>> = centres
+        .into_par_iter()
+        .map(|centre| {
+            // The lines that this window speaks for: its own and those up to the next; the first and the last window
+            // speak for the ends of the band too.
+            let from = if centre == HALF_WINDOW { 0 } else { centre };
+            let to = if centre + STEP > last {
+                centre + HALF_WINDOW + 1
+            } else {
+                centre + STEP
+            };
+            window(frequency_hz, frfs, centre, from..to)
+        })
+        .collect();
+    for window in windows.into_iter().flatten() {
+        for (local, (departure, smooth)) in local.iter_mut().zip(window.frfs) {
+            local.departures.extend(departure);
+            for (line, magnitude) in window.lines.clone().zip(smooth) {
+                if magnitude.is_finite() {
+                    local.smooth[line] = magnitude;
+                }
+            }
+        }
     }
     let departures: Vec<&[Departure]> = local.iter().map(|l| l.departures.as_slice()).collect();
     fit_laws(&departures)
@@ -153,6 +170,14 @@ struct Local {
     smooth: Vec<f64>,
 }
 
+/// What one window says of each FRF.
+struct Window {
+    /// Lines that it speaks for.
+    lines: Range<usize>,
+    /// By FRF: the departure at the centre, and the magnitude of the smooth curve on these lines (NaN where not known).
+    frfs: Vec<(Option<Departure>, Vec<f64>)>,
+}
+
 /// A window of all FRFs for a given denominator: the best numerators and what is left.
 struct Projection {
     /// Orthonormal basis of numerator polynomials over the denominator, weighted: lines × coefficients.
@@ -171,29 +196,92 @@ impl Projection {
         targets: &DMatrix<Complex64>,
         denominator: &[Complex64],
     ) -> Option<Self> {
-        let polynomials = DMatrix::from_fn(x.len(), NUMERATOR, |i, j| {
-            weight[i] * x[i].powi(j as i32) / denominator[i]
-        });
-        let basis = polynomials.qr().q();
-        if basis.iter().any(|v| !v.is_finite()) {
-            return None;
-        }
-        let fitted = &basis * (basis.adjoint() * targets);
-        let residual = targets - &fitted;
+        let basis = numerators(x, weight, denominator)?;
+        let residual = outside(targets, &basis);
         Some(Projection {
+            fitted: targets - &residual,
             basis,
-            fitted,
             residual,
         })
     }
 
-    /// Derivatives of one smooth curve with respect to the denominator's coefficients, numerator projected out.
-    fn slopes(&self, x: &[f64], denominator: &[Complex64], frf: usize) -> DMatrix<Complex64> {
-        let slopes = DMatrix::from_fn(x.len(), DENOMINATOR, |i, j| {
-            -self.fitted[(i, frf)] * x[i].powi(j as i32 + 1) / denominator[i]
+    /// Derivatives of the smooth curves with respect to the denominator's coefficients, numerators projected out:
+    /// lines × (coefficient, then FRF).
+    fn slopes(&self, x: &[f64], denominator: &[Complex64]) -> DMatrix<Complex64> {
+        let factors = DMatrix::from_fn(x.len(), DENOMINATOR, |i, j| {
+            -x[i].powi(j as i32 + 1) / denominator[i]
         });
-        &slopes - &self.basis * (self.basis.adjoint() * &slopes)
+        outside(&times_each(&factors, &self.fitted), &self.basis)
     }
+}
+
+/// Orthonormal basis of the numerator polynomials over the denominator, weighted; `None` where it is not finite.
+fn numerators(x: &[f64], weight: &[f64], denominator: &[Complex64]) -> Option<DMatrix<Complex64>> {
+    let polynomials = DMatrix::from_fn(x.len(), NUMERATOR, |i, j| {
+        weight[i] * x[i].powi(j as i32) / denominator[i]
+    });
+    let basis = polynomials.qr().q();
+    basis.iter().all(|v| v.is_finite()).then_some(basis)
+}
+
+/// The part of the columns of `all` outside the span of an orthonormal basis.
+fn outside(all: &DMatrix<Complex64>, basis: &DMatrix<Complex64>) -> DMatrix<Complex64> {
+    let inside = adjoint_times(basis, all);
+    let mut rest = all.clone();
+    let (rows, columns) = rest.shape();
+    let out = MatMut::from_column_major_slice_mut(rest.as_mut_slice(), rows, columns);
+    matmul(
+        out,
+        Accum::Add,
+        view(basis),
+        view(&inside),
+        -Complex64::ONE,
+        Par::Seq,
+    );
+    rest
+}
+
+/// leftᴴ right. (nalgebra multiplies complex matrices one number at a time.)
+fn adjoint_times(left: &DMatrix<Complex64>, right: &DMatrix<Complex64>) -> DMatrix<Complex64> {
+    let (rows, columns) = (left.ncols(), right.ncols());
+    let mut out = DMatrix::zeros(rows, columns);
+    let target = MatMut::from_column_major_slice_mut(out.as_mut_slice(), rows, columns);
+    matmul(
+        target,
+        Accum::Replace,
+        view(left).adjoint(),
+        view(right),
+        Complex64::ONE,
+        Par::Seq,
+    );
+    out
+}
+
+fn view(matrix: &DMatrix<Complex64>) -> MatRef<'_, Complex64> {
+    MatRef::from_column_major_slice(matrix.as_slice(), matrix.nrows(), matrix.ncols())
+}
+
+/// Every curve times every factor, line by line: lines × (factor, then curve).
+fn times_each(factors: &DMatrix<Complex64>, curves: &DMatrix<Complex64>) -> DMatrix<Complex64> {
+    let (lines, count) = curves.shape();
+    let mut out = DMatrix::zeros(lines, factors.ncols() * count);
+    // By slices: nalgebra walks the columns of a view one checked step at a time.
+    let mut target = out.as_mut_slice().chunks_exact_mut(lines.max(1));
+    for factor in factors.as_slice().chunks_exact(lines.max(1)) {
+        for curve in curves.as_slice().chunks_exact(lines.max(1)) {
+            let Some(target) = target.next() else { break };
+            for ((out, f), value) in target.iter_mut().zip(factor).zip(curve) {
+                *out = f * value;
+            }
+        }
+    }
+    out
+}
+
+/// Columns side by side for every FRF as one long column each: (lines × FRFs) × `columns`.
+fn stacked(matrix: DMatrix<Complex64>, columns: usize) -> DMatrix<Complex64> {
+    let rows = matrix.len() / columns;
+    matrix.reshape_generic(nalgebra::Dyn(rows), nalgebra::Dyn(columns))
 }
 
 /// 1 + d₁x + d₂x² on every line; `None` where it has a root (nearly) on the frequency axis.
@@ -215,40 +303,30 @@ fn denominator_values(x: &[f64], coefficients: &DVector<Complex64>) -> Option<Ve
 /// Linear start of the denominator: equation error divided by the denominator of the pass before
 /// (Sanathanan & Koerner 1963).
 fn start(x: &[f64], weight: &[f64], targets: &DMatrix<Complex64>) -> Option<DVector<Complex64>> {
-    let (count, frfs) = targets.shape();
     let mut coefficients = DVector::zeros(DENOMINATOR);
     for _ in 0..2 {
         let denominator = denominator_values(x, &coefficients)?;
-        let basis = Projection::new(x, weight, targets, &denominator)?.basis;
-        let mut normal = DMatrix::<Complex64>::zeros(DENOMINATOR, DENOMINATOR);
-        let mut right = DVector::<Complex64>::zeros(DENOMINATOR);
-        for frf in 0..frfs {
-            let columns = DMatrix::from_fn(count, DENOMINATOR + 1, |i, j| {
-                targets[(i, frf)] * x[i].powi(j as i32) / denominator[i]
-            });
-            let projected = &columns - &basis * (basis.adjoint() * &columns);
-            let unknown = projected.columns(1, DENOMINATOR);
-            normal += unknown.adjoint() * unknown;
-            right -= unknown.adjoint() * projected.column(0);
-        }
-        coefficients = normal.lu().solve(&right)?;
+        let basis = numerators(x, weight, &denominator)?;
+        let factors = DMatrix::from_fn(x.len(), DENOMINATOR + 1, |i, j| {
+            x[i].powi(j as i32) / denominator[i]
+        });
+        let columns = times_each(&factors, targets);
+        let projected = stacked(outside(&columns, &basis), DENOMINATOR + 1);
+        let products = adjoint_times(&projected, &projected);
+        let normal = products.view((1, 1), (DENOMINATOR, DENOMINATOR)).into_owned();
+        let right = -products.view((1, 0), (DENOMINATOR, 1)).into_owned();
+        coefficients = normal.lu().solve(&right)?.column(0).into_owned();
     }
     Some(coefficients)
 }
 
-/// Fits one window and adds the departures at its centre. The linear start is biased by the noise in the regressors,
-/// so Gauss–Newton steps on the output error follow (variable projection, Golub & Pereyra 1973).
-fn window(
-    frequency_hz: &[f64],
-    frfs: &[&[Complex64]],
-    centre: usize,
-    lines: Range<usize>,
-    local: &mut [Local],
-) {
+/// Fits one window. The linear start is biased by the noise in the regressors, so Gauss–Newton steps on the output error
+/// follow (variable projection, Golub & Pereyra 1973). `None` where the lines do not determine a denominator.
+fn window(frequency_hz: &[f64], frfs: &[&[Complex64]], centre: usize, lines: Range<usize>) -> Option<Window> {
     let range = centre - HALF_WINDOW..centre + HALF_WINDOW + 1;
     let half_span = 0.5 * (frequency_hz[range.end - 1] - frequency_hz[range.start]);
     if !(half_span > 0.0) {
-        return;
+        return None;
     }
     let x: Vec<f64> = frequency_hz[range.clone()]
         .iter()
@@ -257,24 +335,15 @@ fn window(
     let set: Vec<&[Complex64]> = frfs.iter().map(|h| &h[range.clone()]).collect();
     let weight = weights(&set);
     let targets = DMatrix::from_fn(x.len(), set.len(), |i, frf| set[frf][i] * weight[i]);
-    let Some(mut coefficients) = start(&x, &weight, &targets) else {
-        return;
-    };
-    let Some(mut denominator) = denominator_values(&x, &coefficients) else {
-        return;
-    };
-    let Some(mut projection) = Projection::new(&x, &weight, &targets, &denominator) else {
-        return;
-    };
+    let mut coefficients = start(&x, &weight, &targets)?;
+    let mut denominator = denominator_values(&x, &coefficients)?;
+    let mut projection = Projection::new(&x, &weight, &targets, &denominator)?;
     let mut information = DMatrix::<Complex64>::zeros(DENOMINATOR, DENOMINATOR);
     for _ in 0..GAUSS_NEWTON_STEPS {
-        information.fill(Complex64::ZERO);
-        let mut right = DVector::<Complex64>::zeros(DENOMINATOR);
-        for frf in 0..set.len() {
-            let slopes = projection.slopes(&x, &denominator, frf);
-            information += slopes.adjoint() * &slopes;
-            right += slopes.adjoint() * projection.residual.column(frf);
-        }
+        let slopes = stacked(projection.slopes(&x, &denominator), DENOMINATOR);
+        information = adjoint_times(&slopes, &slopes);
+        let residual = stacked(projection.residual.clone(), 1);
+        let right = adjoint_times(&slopes, &residual).column(0).into_owned();
         let Some(step) = information.clone().lu().solve(&right) else {
             break;
         };
@@ -295,46 +364,48 @@ fn window(
         }
     }
     let inverse = information.try_inverse();
+    let slopes = projection.slopes(&x, &denominator);
     let c = HALF_WINDOW;
-    // Degrees of freedom that each FRF's numerator takes from a line.
-    let own: Vec<f64> = projection
-        .basis
-        .row_iter()
-        .map(|row| row.iter().map(|b| b.norm_sqr()).sum())
-        .collect();
-    for (frf, local) in local.iter_mut().enumerate() {
-        let slopes = projection.slopes(&x, &denominator, frf);
-        // And with them those that the common denominator takes.
+    let found = (0..set.len()).map(|frf| {
+        // Degrees of freedom of a line that the FRF's numerator takes, and with it those that the common denominator does.
         let taken = |i: usize| {
+            let own: f64 = projection.basis.row(i).iter().map(|b| b.norm_sqr()).sum();
             let shared = inverse.as_ref().map_or(0.0, |inverse| {
-                let row = slopes.row(i);
-                (row * inverse * row.adjoint())[(0, 0)].re
+                let slope = |j: usize| slopes[(i, j * set.len() + frf)];
+                let mut sum = Complex64::ZERO;
+                for j in 0..DENOMINATOR {
+                    for k in 0..DENOMINATOR {
+                        sum += slope(j) * inverse[(j, k)] * slope(k).conj();
+                    }
+                }
+                sum.re
             });
-            own[i] + shared
+            own + shared
         };
         let freedom = 1.0 - taken(c);
         let variance = projection.residual[(c, frf)].norm_sqr() / (weight[c].powi(2) * freedom);
         let magnitude = projection.fitted[(c, frf)].norm() / weight[c];
-        if freedom > 0.1 && variance.is_finite() && magnitude.is_finite() {
-            local.departures.push(Departure {
-                frequency_hz: frequency_hz[centre],
-                magnitude,
-                variance,
-            });
-        }
-        for line in lines.clone() {
+        let known = freedom > 0.1 && variance.is_finite() && magnitude.is_finite();
+        let departure = known.then(|| Departure {
+            frequency_hz: frequency_hz[centre],
+            magnitude,
+            variance,
+        });
+        let smooth = lines.clone().map(|line| {
             let i = line - range.start;
             // The curve as it would be without this line (the fit is nearly linear): else a line's own noise would have
             // a say in its weight.
             let taken = taken(i).min(MOST_TAKEN);
             let without =
                 projection.fitted[(i, frf)] - projection.residual[(i, frf)] * (taken / (1.0 - taken));
-            let smooth = without.norm() / weight[i];
-            if smooth.is_finite() {
-                local.smooth[line] = smooth;
-            }
-        }
-    }
+            without.norm() / weight[i]
+        });
+        (departure, smooth.collect())
+    });
+    Some(Window {
+        frfs: found.collect(),
+        lines,
+    })
 }
 
 /// Weight of each line, one for all FRFs of the set: the reciprocal of the magnitude, so that the error is relative.
@@ -371,7 +442,7 @@ fn fit_laws(frfs: &[&[Departure]]) -> Vec<Option<FrfNoise>> {
     };
     let mut best: Option<(f64, Vec<Option<FrfNoise>>)> = None;
     for power in POWERS {
-        let laws: Vec<Option<FrfNoise>> = frfs.iter().map(|d| fit_law(d, power, reference_hz)).collect();
+        let laws: Vec<Option<FrfNoise>> = frfs.par_iter().map(|d| fit_law(d, power, reference_hz)).collect();
         let likelihood: f64 = frfs
             .iter()
             .zip(&laws)

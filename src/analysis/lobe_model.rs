@@ -1,14 +1,19 @@
 //! The calibrated robot as lobes need it: its tool point's FRF, the same before effects were added, and draws from the
 //! parameters' uncertainty.
 
+use std::sync::Arc;
+
 use super::StructureAnalysis;
-use crate::campaign::Campaign;
+use crate::campaign::{Campaign, LobesSection};
 use crate::identify::Options;
 use crate::identify::calibrate::calibrate;
 use crate::identify::case::structure_model;
 use crate::identify::structure::StructureModel;
 use crate::lobes::hole::{Deflection, HoleError, HoleLoad};
-use crate::lobes::{DirectFrf, RobotFrf, StateSpace, band};
+use crate::lobes::setup::tool_beam;
+use crate::lobes::tool_point::RobotHolder;
+use crate::lobes::{Blocks, DirectFrf, RobotFrf, StateSpace, Tool, ToolPoint, band};
+use crate::robot::{Chain, Kinematics};
 use crate::{InputError, Result};
 
 /// Draws of the parameters for the band.
@@ -17,7 +22,7 @@ const SEED: u64 = 5;
 
 /// A structure that a method of lobes can work on.
 pub(super) struct Dynamics {
-    pub frf: Box<dyn DirectFrf>,
+    pub blocks: Blocks,
     /// The same as first-order equations; only where the method steps through time.
     pub states: Option<StateSpace>,
 }
@@ -29,9 +34,14 @@ pub(super) struct FittedModel {
 }
 
 impl FittedModel {
-    fn robot_frf(&self, theta: &[f64], joints_deg: &[f64]) -> Result<RobotFrf> {
+    fn chain(&self, theta: &[f64], joints_deg: &[f64]) -> Result<(Kinematics, Chain)> {
         let kinematics = self.model.robot.kinematics(joints_deg)?;
         let chain = self.model.chain(theta, &kinematics, 0.0, false);
+        Ok((kinematics, chain))
+    }
+
+    fn robot_frf(&self, theta: &[f64], joints_deg: &[f64]) -> Result<RobotFrf> {
+        let (kinematics, chain) = self.chain(theta, joints_deg)?;
         RobotFrf::new(&self.model.robot, &kinematics, &chain)
     }
 
@@ -43,24 +53,74 @@ impl FittedModel {
         Ok(Deflection::new(&compliance, kinematics.tool_axis(), load))
     }
 
-    /// The tool point's FRF, as a modal sum where the modes are not coupled.
-    fn frf(&self, theta: &[f64], joints_deg: &[f64]) -> Result<Box<dyn DirectFrf>> {
-        let frf = self.robot_frf(theta, joints_deg)?;
-        Ok(match frf.modal()? {
-            Some(modal) => Box::new(modal),
-            None => Box::new(frf),
+    /// The tool point's FRFs; of the robot alone as modal sums where the modes are not coupled.
+    fn blocks(&self, theta: &[f64], joints_deg: &[f64], asked: &Asked) -> Result<Blocks> {
+        let (kinematics, chain) = self.chain(theta, joints_deg)?;
+        let robot = &self.model.robot;
+        if !asked.tool.beam.segments.is_empty() {
+            let behind_m = asked.tool.beam.length_m();
+            let point = ToolPoint {
+                holder: Arc::new(RobotHolder::new(robot, &kinematics, &chain, behind_m)?),
+                tool: asked.tool.clone(),
+            };
+            return Ok(point.blocks(asked.axial));
+        }
+        let axial = match asked.axial {
+            true => Some(quickest(RobotFrf::axial_torsional(robot, &kinematics, &chain)?)?),
+            false => None,
+        };
+        Ok(Blocks {
+            lateral: quickest(RobotFrf::new(robot, &kinematics, &chain)?)?,
+            axial,
         })
     }
 
-    pub fn dynamics(&self, joints_deg: &[f64], through_time: bool) -> Result<Dynamics> {
+    fn dynamics(&self, joints_deg: &[f64], through_time: bool, asked: &Asked) -> Result<Dynamics> {
         let states = match through_time {
             true => Some(self.robot_frf(&self.theta, joints_deg)?.state_space()?),
             false => None,
         };
         Ok(Dynamics {
-            frf: self.frf(&self.theta, joints_deg)?,
+            blocks: self.blocks(&self.theta, joints_deg, asked)?,
             states,
         })
+    }
+}
+
+fn quickest(frf: RobotFrf) -> Result<Box<dyn DirectFrf>> {
+    Ok(match frf.modal()? {
+        Some(modal) => Box::new(modal),
+        None => Box::new(frf),
+    })
+}
+
+/// What the lobes need of a structure.
+#[derive(Clone)]
+pub(super) struct Asked {
+    /// Without segments where the tool is rigid.
+    pub tool: Arc<Tool>,
+    /// Whether the axial–torsional block is wanted.
+    pub axial: bool,
+}
+
+impl Asked {
+    pub fn new(section: &LobesSection, axial: bool) -> Self {
+        Asked {
+            tool: Arc::new(Tool::new(tool_beam(section))),
+            axial,
+        }
+    }
+
+    /// ` + tool of 2 segments, 120 mm`; empty where there is none.
+    pub fn with_tool(&self) -> String {
+        match self.tool.beam.segments.len() {
+            0 => String::new(),
+            n => format!(
+                " + tool of {n} {}, {:.1} mm (receptance coupling)",
+                if n == 1 { "segment" } else { "segments" },
+                1e3 * self.tool.beam.length_m()
+            ),
+        }
     }
 }
 
@@ -75,6 +135,7 @@ pub(super) struct ModelState {
     pub revision: Option<usize>,
     /// Parameters drawn from their uncertainty; none without a calibration.
     draws: Vec<Vec<f64>>,
+    pub asked: Asked,
     /// For people.
     pub description: String,
 }
@@ -84,7 +145,7 @@ impl ModelState {
     ///
     /// # Errors
     /// No posture, or what calibrating or reading the revisions refuses.
-    pub fn of(campaign: &Campaign, warnings: &mut Vec<String>) -> Result<Self> {
+    pub fn of(campaign: &Campaign, asked: Asked, warnings: &mut Vec<String>) -> Result<Self> {
         if campaign.postures.is_empty() {
             return Err(InputError::new("lobes from the model need at least one posture")
                 .file(campaign.dir.join("campaign.toml"))
@@ -93,12 +154,12 @@ impl ModelState {
                 .into());
         }
         match campaign.frfs.is_empty() {
-            true => Self::uncalibrated(campaign, warnings),
-            false => Self::calibrated(campaign, warnings),
+            true => Self::uncalibrated(campaign, asked, warnings),
+            false => Self::calibrated(campaign, asked, warnings),
         }
     }
 
-    fn uncalibrated(campaign: &Campaign, warnings: &mut Vec<String>) -> Result<Self> {
+    fn uncalibrated(campaign: &Campaign, asked: Asked, warnings: &mut Vec<String>) -> Result<Self> {
         warnings.push("the campaign has no FRFs: lobes are those of the uncalibrated robot file".into());
         let model = structure_model(campaign)?;
         Ok(ModelState {
@@ -110,11 +171,12 @@ impl ModelState {
             effects: Vec::new(),
             revision: None,
             draws: Vec::new(),
-            description: "robot model, not calibrated".into(),
+            description: format!("robot model, not calibrated{}", asked.with_tool()),
+            asked,
         })
     }
 
-    fn calibrated(campaign: &Campaign, warnings: &mut Vec<String>) -> Result<Self> {
+    fn calibrated(campaign: &Campaign, asked: Asked, warnings: &mut Vec<String>) -> Result<Self> {
         let StructureAnalysis {
             case, calibration, ..
         } = StructureAnalysis::run(campaign, Options::default())?;
@@ -123,7 +185,14 @@ impl ModelState {
         let description = match effects.is_empty() {
             true => "calibrated robot model".to_string(),
             false => format!("calibrated robot model ({})", case.model_description()),
-        };
+        } + &asked.with_tool();
+        if !asked.tool.beam.segments.is_empty() && effects.iter().any(|e| e.starts_with("tool-flexibility")) {
+            warnings.push(
+                "the model has tool-flexibility and [lobes.tool] gives the tool as a beam: the tool's give may be counted twice. \
+                 Keep one of them, unless the effect stands for the spindle and the beam for the tool"
+                    .into(),
+            );
+        }
         let before = match case.before_effects(campaign)? {
             Some(model) => {
                 let theta = calibrate(&model, &case.data, None, options)?.theta;
@@ -150,13 +219,25 @@ impl ModelState {
             effects,
             revision,
             draws,
+            asked,
             description,
         })
     }
 
-    /// The tool point's FRF.
-    pub fn frf(&self, joints_deg: &[f64]) -> Result<Box<dyn DirectFrf>> {
-        self.current.frf(&self.current.theta, joints_deg)
+    /// The tool point's FRFs.
+    pub fn blocks(&self, joints_deg: &[f64]) -> Result<Blocks> {
+        self.current.blocks(&self.current.theta, joints_deg, &self.asked)
+    }
+
+    pub fn dynamics(&self, model: &FittedModel, joints_deg: &[f64], through_time: bool) -> Result<Dynamics> {
+        model.dynamics(joints_deg, through_time, &self.asked)
+    }
+
+    /// The model at the holder face, the tool's length behind the tool centre point.
+    pub fn holder(&self, joints_deg: &[f64]) -> Result<RobotHolder> {
+        let (kinematics, chain) = self.current.chain(&self.current.theta, joints_deg)?;
+        let behind_m = self.asked.tool.beam.length_m();
+        RobotHolder::new(&self.current.model.robot, &kinematics, &chain, behind_m)
     }
 
     /// What a load does to the tool, with nothing said of its uncertainty.
@@ -174,11 +255,11 @@ impl ModelState {
         Ok(HoleError::new(&self.deflection(joints_deg, load)?, &drawn))
     }
 
-    /// The tool point's FRF for each draw of the parameters.
-    pub fn variants(&self, joints_deg: &[f64]) -> Result<Vec<Box<dyn DirectFrf>>> {
+    /// The tool point's FRFs for each draw of the parameters.
+    pub fn variants(&self, joints_deg: &[f64]) -> Result<Vec<Blocks>> {
         self.draws
             .iter()
-            .map(|theta| self.current.frf(theta, joints_deg))
+            .map(|theta| self.current.blocks(theta, joints_deg, &self.asked))
             .collect()
     }
 }

@@ -1,21 +1,23 @@
 //! The lobes that a campaign's `[lobes]` table asks for.
 
-use super::lobe_model::{Dynamics, ModelState};
+use std::sync::Arc;
+
+use super::lobe_model::{Asked, ModelState};
+use super::lobe_structure::{Structure, at_postures, from_measured, from_modes, steps_through_time};
 use super::redundancy::{self, RedundancyAnalysis};
-use crate::campaign::{Campaign, LobeMethod, LobeSource, LobesSection, Process};
-use crate::lobes::band::{self, LobeBand};
+use crate::campaign::{Campaign, LobeMethod, LobeSource, Process};
+use crate::lobes::band::LobeBand;
 use crate::lobes::hole::{HoleCheck, HoleError};
-use crate::lobes::measured::measured_structures;
-use crate::lobes::outcome::{LimitRange, NotedCut, Outcomes, noted_cuts};
+use crate::lobes::outcome::{LimitRange, Outcomes, noted_cuts};
 use crate::lobes::setup::{
-    Cut, LobeCoefficients, coefficients_of_group, cut_of, frf_of_modes, group_of_cuts,
+    Cut, DrilledHole, LobeCoefficients, axial_torsional_force, coefficients_of_group, cut_of, group_of_cuts,
 };
-use crate::lobes::{
-    AbsoluteLimit, DirectFrf, LobeCurve, MultiFrequency, Peak, SemiDiscretisation, SpeedLimit,
-    StabilitySolver, StateSpace, speed_grid,
-};
+use crate::lobes::{AbsoluteLimit, BlockLobes, LobeCurve, Peak, Tool, speed_grid};
 use crate::{InputError, Result};
 
+/// Why a drill's axial–torsional block is left out where the FRFs do not have it.
+const NOTHING_ALONG: &str = "the FRFs have nothing along the tool or about it: add [[lobes.mode]] tables with axis = \"z\" \
+                             or \"theta\", FRFs ZZ of the tool point, or [lobes.tool]";
 /// Best speeds that are listed.
 pub const BEST: usize = 10;
 /// Changes of the limit below this share are not worth a word.
@@ -33,6 +35,8 @@ pub struct LobeCase {
     pub band_hz: (f64, f64),
     pub curve: LobeCurve,
     pub absolute: Option<AbsoluteLimit>,
+    /// Drilling with both blocks: the limits of the lateral and of the axial–torsional one alone.
+    pub by_block: Option<[BlockLobes; 2]>,
     pub best: Vec<Peak>,
     /// From the uncertainty of the calibrated parameters; averaged forces only.
     pub band: Option<LobeBand>,
@@ -59,6 +63,12 @@ pub struct LobeAnalysis {
     pub method: LobeMethod,
     pub coefficients: LobeCoefficients,
     pub teeth: usize,
+    /// The axial–torsional block of a drill, or why it is left out, in words for people; `None` in milling.
+    pub axial_torsional: Option<std::result::Result<(), String>>,
+    /// The hole that a drill cuts; `None` in milling, or where the tool is not known.
+    pub drilled: Option<DrilledHole>,
+    /// The tool as a beam; without segments where it is rigid or part of the FRFs.
+    pub tool: Arc<Tool>,
     pub spindle_rpm: [f64; 3],
     pub cases: Vec<LobeCase>,
     /// Where the campaign asks for the surface over the redundancy angle: its angles are the cases.
@@ -73,82 +83,6 @@ pub struct LobeAnalysis {
     /// not come from the model.
     pub hole: Option<std::result::Result<HoleCheck, String>>,
     pub warnings: Vec<String>,
-}
-
-/// One structure that lobes are drawn for.
-struct Structure {
-    posture: Option<String>,
-    dynamics: Dynamics,
-    /// The same before effects were added.
-    before: Option<Dynamics>,
-    hole: Option<HoleError>,
-    /// The same structure with parameters drawn from their uncertainty.
-    variants: Vec<Box<dyn DirectFrf>>,
-    description: String,
-}
-
-impl Dynamics {
-    fn method(&self, cut: &Cut) -> Box<dyn SpeedLimit + '_> {
-        let frf = self.frf.as_ref();
-        match (cut, &self.states) {
-            (Cut::Averaged(force), _) => Box::new(StabilitySolver::new(*force, frf)),
-            (Cut::Periodic(force), Some(states)) => {
-                Box::new(SemiDiscretisation::new(*force, states.clone(), frf))
-            }
-            (Cut::Periodic(force), None) => Box::new(MultiFrequency::new(*force, frf)),
-        }
-    }
-
-    /// The lobes of the model before effects were added.
-    pub(super) fn lobes_before(&self, cut: &Cut, speeds: &[f64]) -> LobesBefore {
-        let method = self.method(cut);
-        let curve = method.curve(speeds);
-        LobesBefore {
-            absolute: method.absolute_limit().or(curve.least()),
-            curve,
-        }
-    }
-}
-
-impl Structure {
-    fn case(self, cut: &Cut, speeds: &[f64], noted: &[NotedCut]) -> LobeCase {
-        let method = self.dynamics.method(cut);
-        let curve = method.curve(speeds);
-        let (absolute, mut best) = (
-            method.absolute_limit().or(curve.least()),
-            method.best(&curve, BEST),
-        );
-        let band_at = |at: &[f64]| match cut {
-            Cut::Averaged(force) if !self.variants.is_empty() => Some(band::band(*force, &self.variants, at)),
-            _ => None,
-        };
-        let tips: Vec<f64> = best.iter().map(|p| p.spindle_rpm).collect();
-        if let Some(at_tips) = band_at(&tips) {
-            for (peak, lower) in best.iter_mut().zip(at_tips.lower_mm) {
-                peak.lower_quantile_mm = lower;
-            }
-        }
-        let cut_speeds: Vec<f64> = noted.iter().map(|c| c.spindle_rpm).collect();
-        let cut_band = band_at(&cut_speeds);
-        let at_cuts = method.curve(&cut_speeds).depth_limit_mm;
-        let at_cuts = at_cuts.into_iter().enumerate().map(|(i, limit)| {
-            let quantiles = cut_band.as_ref().map(|b| [b.lower_mm[i], b.upper_mm[i]]);
-            LimitRange::new(limit, quantiles)
-        });
-        LobeCase {
-            angle_deg: None,
-            band_hz: self.dynamics.frf.band_hz(),
-            absolute,
-            best,
-            band: band_at(speeds),
-            before: self.before.as_ref().map(|b| b.lobes_before(cut, speeds)),
-            hole: self.hole,
-            at_cuts: at_cuts.collect(),
-            curve,
-            posture: self.posture,
-            description: self.description,
-        }
-    }
 }
 
 impl LobeAnalysis {
@@ -169,14 +103,33 @@ impl LobeAnalysis {
                 (coefficients_of_group(campaign, section, &group)?, Some(group))
             }
         };
-        let cut = cut_of(campaign, section, coefficients)?;
+        let mut cut = cut_of(campaign, section, coefficients)?;
+        let teeth = cut.average().lateral.teeth;
+        let axial = (section.process == Process::Drilling)
+            .then(|| axial_torsional_force(campaign, section, coefficients, teeth));
+        if let (Cut::Averaged(cut), Some(Ok(force))) = (&mut cut, &axial) {
+            cut.axial = Some(*force);
+        }
+        let mut axial_torsional = axial.map(|force| force.map(|_| ()));
+        let asked = Asked::new(section, cut.average().axial.is_some());
+        if steps_through_time(section) && !section.tool.is_empty() {
+            return Err(
+                InputError::new("semi-discretisation needs modes, and the tool as a beam has none")
+                    .file(campaign.dir.join("campaign.toml"))
+                    .key("lobes.method")
+                    .remedy("use method = \"multi-frequency\" or \"zero-order\" with [lobes.tool]")
+                    .into(),
+            );
+        }
         let speeds = speed_grid(section.spindle_rpm)?;
         let (noted, not_compared) = noted_cuts(campaign, section);
+        // With the surface over the angle: the postures of the campaign as they are, for the cuts that were made there.
+        let mut as_they_stand = Vec::new();
         let (mut surface, mut effects, mut revision, mut hole) = (None, Vec::new(), None, None);
         let structures = match section.source {
-            LobeSource::Modes => from_modes(campaign, section)?,
+            LobeSource::Modes => from_modes(campaign, section, &asked)?,
             LobeSource::Model => {
-                let state = ModelState::of(campaign, &mut warnings)?;
+                let state = ModelState::of(campaign, asked.clone(), &mut warnings)?;
                 (effects, revision) = (state.effects.clone(), state.revision);
                 let check = HoleCheck::new(campaign, section, own_cuts.as_ref());
                 if let (Err(reason), Some(_)) = (&check, &section.hole) {
@@ -185,17 +138,25 @@ impl LobeAnalysis {
                 let check = hole.insert(check).as_ref().ok();
                 match &section.redundancy {
                     Some(wanted) => {
-                        let force = cut.average();
+                        let average = cut.average();
                         let swept =
-                            redundancy::sweep(campaign, section, wanted, &state, force, &speeds, check)?;
+                            redundancy::sweep(campaign, section, wanted, &state, average, &speeds, check)?;
                         surface = Some(swept);
+                        if !noted.is_empty() {
+                            as_they_stand = at_postures(campaign, section, &state, None)?;
+                        }
                         Vec::new()
                     }
                     None => at_postures(campaign, section, &state, check)?,
                 }
             }
-            LobeSource::Measured => from_measured(campaign, section, &mut warnings)?,
+            LobeSource::Measured => from_measured(campaign, section, &asked, &mut warnings)?,
         };
+        if let (Some(Ok(())), Some(one)) = (&axial_torsional, structures.first())
+            && one.dynamics.blocks.axial.is_none()
+        {
+            axial_torsional = Some(Err(NOTHING_ALONG.into()));
+        }
         if section.redundancy.is_some() && surface.is_none() {
             warnings
                 .push("lobes.redundancy needs source = \"model\": there is no surface over the angle".into());
@@ -206,12 +167,19 @@ impl LobeAnalysis {
             .map(|structure| structure.case(&cut, &speeds, &noted))
             .chain(swept.unwrap_or_default())
             .collect();
-        let limits: Vec<(Option<&str>, &[LimitRange])> = cases
-            .iter()
-            .map(|case| (case.posture.as_deref(), &case.at_cuts[..]))
+        let standing: Vec<(Option<String>, Vec<LimitRange>)> = as_they_stand
+            .into_iter()
+            .map(|s: Structure| (s.posture.clone(), s.at_cuts(&cut, &noted)))
             .collect();
+        let limits: Vec<(Option<&str>, &[LimitRange])> = match redundancy {
+            Some(_) => standing.iter().map(|(p, at)| (p.as_deref(), &at[..])).collect(),
+            None => cases
+                .iter()
+                .map(|case| (case.posture.as_deref(), &case.at_cuts[..]))
+                .collect(),
+        };
         let outcomes = Outcomes::score(&noted, &limits, not_compared);
-        if limits.len() > 1 && redundancy.is_none() && noted.iter().any(|c| c.posture.is_none()) {
+        if limits.len() > 1 && noted.iter().any(|c| c.posture.is_none()) {
             warnings.push(
                 "some cuts with an outcome do not say at which posture they were made: they are compared with the limits of \
                  all postures together; add posture = \"…\" to their [[cut]]"
@@ -223,7 +191,13 @@ impl LobeAnalysis {
             source: section.source,
             method: section.method,
             coefficients,
-            teeth: cut.average().teeth,
+            teeth,
+            axial_torsional,
+            drilled: match section.process {
+                Process::Drilling => DrilledHole::of(campaign, section),
+                Process::Milling => None,
+            },
+            tool: asked.tool.clone(),
             spindle_rpm: section.spindle_rpm,
             cases,
             redundancy,
@@ -233,6 +207,14 @@ impl LobeAnalysis {
             hole,
             warnings,
         })
+    }
+
+    /// For people: drilling, with the blocks that count.
+    pub fn drilling(&self) -> &'static str {
+        match self.axial_torsional {
+            Some(Ok(())) => "drilling, lateral and axial-torsional",
+            _ => "drilling, lateral",
+        }
     }
 
     /// What the added effects did to the limit, a sentence for each posture; empty where nothing was added.
@@ -302,89 +284,4 @@ impl LobeAnalysis {
         best.truncate(BEST);
         best
     }
-}
-
-fn from_modes(campaign: &Campaign, section: &LobesSection) -> Result<Vec<Structure>> {
-    let frf = frf_of_modes(campaign, section)?;
-    let count = frf.modes().len();
-    let left_out = section.modes.len() - count;
-    let mut description = format!("{count} modes in x and y from campaign.toml");
-    if left_out > 0 {
-        description += &format!("; {left_out} in z or theta not used (the lateral block only)");
-    }
-    Ok(vec![Structure {
-        posture: None,
-        dynamics: Dynamics {
-            states: steps_through_time(section).then(|| StateSpace::from(&frf)),
-            frf: Box::new(frf),
-        },
-        before: None,
-        hole: None,
-        variants: Vec::new(),
-        description,
-    }])
-}
-
-fn steps_through_time(section: &LobesSection) -> bool {
-    section.method == LobeMethod::SemiDiscretisation
-}
-
-/// The robot model at every posture.
-fn at_postures(
-    campaign: &Campaign,
-    section: &LobesSection,
-    state: &ModelState,
-    check: Option<&HoleCheck>,
-) -> Result<Vec<Structure>> {
-    campaign
-        .postures
-        .iter()
-        .map(|posture| {
-            let (joints, through_time) = (&posture.joints_deg, steps_through_time(section));
-            let before = state.before.as_ref();
-            Ok(Structure {
-                posture: Some(posture.id.clone()),
-                dynamics: state.current.dynamics(joints, through_time)?,
-                before: before.map(|b| b.dynamics(joints, through_time)).transpose()?,
-                hole: check.map(|c| state.hole(joints, &c.load)).transpose()?,
-                variants: state.variants(joints)?,
-                description: state.description.clone(),
-            })
-        })
-        .collect()
-}
-
-fn from_measured(
-    campaign: &Campaign,
-    section: &LobesSection,
-    warnings: &mut Vec<String>,
-) -> Result<Vec<Structure>> {
-    if steps_through_time(section) {
-        return Err(InputError::new("semi-discretisation needs modes, and measured FRFs are none")
-            .file(campaign.dir.join("campaign.toml"))
-            .key("lobes.method")
-            .remedy("use method = \"multi-frequency\" on the measured FRFs, or source = \"model\" or \"modes\"")
-            .into());
-    }
-    let (set, read_warnings) = campaign.load_frfs()?;
-    warnings.extend(read_warnings);
-    let structures = measured_structures(campaign, &set)?;
-    Ok(structures
-        .into_iter()
-        .map(|s| {
-            let posture = campaign.postures[s.posture].id.clone();
-            warnings.extend(s.notes.iter().map(|n| format!("{posture}: {n}")));
-            Structure {
-                posture: Some(posture),
-                dynamics: Dynamics {
-                    frf: Box::new(s.frf),
-                    states: None,
-                },
-                before: None,
-                hole: None,
-                variants: Vec::new(),
-                description: "measured FRFs".to_string(),
-            }
-        })
-        .collect())
 }

@@ -6,6 +6,7 @@ pub mod channel_check;
 pub mod cutting;
 pub mod diagnosis;
 mod lobe_model;
+mod lobe_structure;
 pub mod lobes;
 pub mod modal;
 pub mod mode_comparison;

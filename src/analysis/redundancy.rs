@@ -7,12 +7,12 @@ use super::lobes::{BEST, LobeCase};
 use crate::campaign::{Campaign, LobeMethod, LobesSection, Redundancy};
 use crate::lobes::band::{QUANTILES, quantile};
 use crate::lobes::hole::{HoleCheck, HoleError};
-use crate::lobes::redundancy::{
-    AnglePosture, AngleStatus, LimitAtAngle, Recommendation, RedundancySweep, SPEED_MARGIN, SurfacePoint,
-    agree, by_enumeration, by_swarm, margin_mm,
+use crate::lobes::optimum::{
+    LimitAtAngle, SPEED_MARGIN, Search, SurfacePoint, agree, apart_deg, difference, margin_mm,
 };
+use crate::lobes::redundancy::{AnglePosture, AngleStatus, Recommendation, RedundancySweep};
 use crate::lobes::setup::Cut;
-use crate::lobes::{DirectFrf, LobeCurve, RegenerativeForce, SpeedLimit, StabilitySolver};
+use crate::lobes::{AveragedCut, SpeedLimit};
 use crate::{Error, InputError, Result};
 
 /// b(n, θ) at one place.
@@ -97,24 +97,14 @@ struct HoleGate<'a> {
     steps: Vec<(f64, &'a HoleError)>,
 }
 
-/// The way between two angles, degrees.
-fn apart_deg(a: f64, b: f64) -> f64 {
-    let d = (a - b).rem_euclid(360.0);
-    d.min(360.0 - d)
-}
-
 struct ModelSurface<'a> {
     sweep: &'a RedundancySweep<'a>,
     state: &'a ModelState,
-    force: RegenerativeForce,
+    cut: AveragedCut,
     gate: Option<HoleGate<'a>>,
 }
 
 impl ModelSurface<'_> {
-    fn frf(&self, joints_deg: &[f64]) -> Result<Box<dyn DirectFrf>> {
-        self.state.frf(joints_deg)
-    }
-
     /// Whether the hole keeps its tolerances there, with the uncertainty of the nearest step in proportion (all draws at
     /// every angle that a search tries would take minutes).
     fn is_let_through(&self, angle_deg: f64, joints_deg: &[f64]) -> bool {
@@ -130,41 +120,21 @@ impl ModelSurface<'_> {
     }
 }
 
-/// The arcs about the steps in tolerance, laid side by side over the full turn: a search over all angles need not hit
-/// upon narrow ones.
-struct Arcs<'a> {
-    surface: &'a ModelSurface<'a>,
-    middles_deg: Vec<f64>,
-    width_deg: f64,
-}
-
-impl Arcs<'_> {
-    fn angle_deg(&self, laid_deg: f64) -> f64 {
-        let place = laid_deg.rem_euclid(360.0) / 360.0 * self.middles_deg.len() as f64;
-        let arc = (place as usize).min(self.middles_deg.len() - 1);
-        let within = place - arc as f64 - 0.5;
-        (self.middles_deg[arc] + within * self.width_deg).rem_euclid(360.0)
-    }
-}
-
-impl LimitAtAngle for Arcs<'_> {
-    fn margins_mm(&self, laid_deg: f64, spindle_rpm: &[f64]) -> Option<Vec<f64>> {
-        self.surface.margins_mm(self.angle_deg(laid_deg), spindle_rpm)
-    }
-}
-
 impl LimitAtAngle for ModelSurface<'_> {
-    fn margins_mm(&self, angle_deg: f64, spindle_rpm: &[f64]) -> Option<Vec<f64>> {
+    fn visit(&self, angle_deg: f64, visit: &mut dyn FnMut(&dyn SpeedLimit)) -> bool {
         let posture = self.sweep.between(angle_deg);
-        let joints = posture
-            .joints_deg
-            .filter(|_| posture.status == AngleStatus::Reachable)?;
+        let usable = posture.status == AngleStatus::Reachable;
+        let Some(joints) = posture.joints_deg.filter(|_| usable) else {
+            return false;
+        };
         if !self.is_let_through(angle_deg, &joints) {
-            return None;
+            return false;
         }
-        let frf = self.frf(&joints).ok()?;
-        let solver = StabilitySolver::new(self.force, frf.as_ref());
-        Some(spindle_rpm.iter().map(|n| margin_mm(&solver, *n)).collect())
+        let Ok(blocks) = self.state.blocks(&joints) else {
+            return false;
+        };
+        visit(&self.cut.on(&blocks));
+        true
     }
 }
 
@@ -178,7 +148,7 @@ pub(super) fn sweep(
     section: &LobesSection,
     redundancy: &Redundancy,
     state: &ModelState,
-    force: RegenerativeForce,
+    cut: AveragedCut,
     speeds: &[f64],
     check: Option<&HoleCheck>,
 ) -> Result<(RedundancyAnalysis, Vec<LobeCase>)> {
@@ -213,14 +183,14 @@ pub(super) fn sweep(
         .par_iter()
         .map(|angle| {
             let joints = angle.joints_deg.unwrap_or_default();
-            let frf = state.frf(&joints)?;
-            let solver = StabilitySolver::new(force, frf.as_ref());
+            let frf = state.blocks(&joints)?;
+            let solver = cut.on(&frf);
             let curve = solver.curve(speeds);
             let before = match &state.before {
                 Some(model) => Some(
-                    model
-                        .dynamics(&joints, false)?
-                        .lobes_before(&Cut::Averaged(force), speeds),
+                    state
+                        .dynamics(model, &joints, false)?
+                        .lobes_before(&Cut::Averaged(cut), speeds),
                 ),
                 None => None,
             };
@@ -229,6 +199,7 @@ pub(super) fn sweep(
                 angle_deg: Some(angle.angle_deg),
                 description: state.description.clone(),
                 band_hz: frf.band_hz(),
+                by_block: solver.by_block(speeds),
                 absolute: solver.absolute_limit(),
                 best: solver.best(&curve, BEST),
                 curve,
@@ -255,22 +226,24 @@ pub(super) fn sweep(
     let surface = |gated: bool| ModelSurface {
         sweep: &sweep,
         state,
-        force,
+        cut,
         gate: check.filter(|_| gated).map(|check| HoleGate {
             check,
             steps: holes.clone(),
         }),
     };
-    let deepest = |gated: bool| {
-        let curves: Vec<(f64, &LobeCurve)> = usable
-            .iter()
-            .zip(&cases)
-            .filter(|(a, _)| !gated || !is_out(a.angle_deg))
-            .map(|(a, c)| (a.angle_deg, &c.curve))
-            .collect();
-        by_enumeration(&curves, redundancy.step_deg, &surface(gated))
+    let rpm_range = [speeds[0], speeds[speeds.len() - 1]];
+    let let_through = |gated: bool| -> Vec<f64> {
+        let angles = usable.iter().map(|a| a.angle_deg);
+        angles.filter(|a| !gated || !is_out(*a)).collect()
     };
-    let enumeration = deepest(constrained).ok_or_else(|| {
+    let search = Search {
+        surface: &surface(constrained),
+        usable_deg: &let_through(constrained),
+        step_deg: redundancy.step_deg,
+        rpm_range,
+    };
+    let enumeration = search.by_enumeration().ok_or_else(|| {
         Error::from(
             InputError::new("no redundancy angle can be used: all are forbidden or out of reach")
                 .file(campaign.dir.join("campaign.toml"))
@@ -278,21 +251,14 @@ pub(super) fn sweep(
                 .remedy("take out a forbidden band, or choose another posture"),
         )
     })?;
-    let rpm_range = [speeds[0], speeds[speeds.len() - 1]];
-    let whole = surface(constrained);
-    let swarm = if constrained {
-        let arcs = Arcs {
-            surface: &whole,
-            middles_deg: holes.iter().map(|(a, _)| *a).filter(|a| !is_out(*a)).collect(),
-            width_deg: redundancy.step_deg,
+    let swarm = search.by_swarm()?;
+    let by_depth_alone = || {
+        let search = Search {
+            surface: &surface(false),
+            usable_deg: &let_through(false),
+            ..search
         };
-        let laid = by_swarm(rpm_range, &arcs)?;
-        SurfacePoint {
-            angle_deg: arcs.angle_deg(laid.angle_deg),
-            ..laid
-        }
-    } else {
-        by_swarm(rpm_range, &whole)?
+        search.by_enumeration()
     };
     let point = if swarm.depth_mm > enumeration.depth_mm {
         swarm
@@ -300,12 +266,12 @@ pub(super) fn sweep(
         enumeration
     };
     let there = sweep.between(point.angle_deg);
-    let frf = state.frf(&there.joints_deg.unwrap_or_default())?;
-    let solver = StabilitySolver::new(force, frf.as_ref());
+    let frf = state.blocks(&there.joints_deg.unwrap_or_default())?;
+    let solver = cut.on(&frf);
     let uncertain: Vec<f64> = state
         .variants(&there.joints_deg.unwrap_or_default())?
         .iter()
-        .map(|frf| margin_mm(&StabilitySolver::new(force, frf.as_ref()), point.spindle_rpm))
+        .map(|frf| margin_mm(&cut.on(frf), point.spindle_rpm))
         .collect();
     let recommendation = Recommendation {
         point,
@@ -316,6 +282,7 @@ pub(super) fn sweep(
         enumeration,
         swarm,
         agree: agree(&enumeration, &swarm),
+        difference: difference(&enumeration, &swarm),
         speed_margin: SPEED_MARGIN,
     };
     let hole = match check {
@@ -325,7 +292,7 @@ pub(super) fn sweep(
                 &recommendation.posture.joints_deg.unwrap_or_default(),
                 &check.load,
             )?,
-            by_depth_alone: constrained.then(|| deepest(false)).flatten(),
+            by_depth_alone: constrained.then(by_depth_alone).flatten(),
             out_of_tolerance_deg,
         }),
         None => None,

@@ -8,7 +8,7 @@ use super::load::{PROCESSES, posture_ref};
 use super::schema::*;
 use crate::{Error, Result};
 
-const LOBES: [&str; 19] = [
+const LOBES: [&str; 20] = [
     "process",
     "source",
     "method",
@@ -28,7 +28,26 @@ const LOBES: [&str; 19] = [
     "mode",
     "redundancy",
     "hole",
+    "tool",
 ];
+
+const SEGMENT: [&str; 9] = [
+    "length_mm",
+    "diameter_mm",
+    "bore_mm",
+    "flute_ratio",
+    "young_gpa",
+    "shear_gpa",
+    "density_kg_per_m3",
+    "loss_factor",
+    "twist_coupling",
+];
+
+/// E/G where only Young's modulus is given: Poisson's ratio 0.3.
+const YOUNG_OVER_SHEAR: f64 = 2.6;
+
+/// Loss factor of a clamped tool where none is given: about ζ = 1 %.
+const TOOL_LOSS_FACTOR: f64 = 0.02;
 
 const HOLE: [&str; 6] = [
     "thrust_n",
@@ -67,6 +86,10 @@ pub(super) fn read(
         Some(section) => Some(hole(&section)?),
         None => None,
     };
+    let tool = match lobes.section("tool", &["segment"])? {
+        Some(section) => tool(&section)?,
+        None => Vec::new(),
+    };
     let method = method(&lobes, process)?;
     Ok(Some(LobesSection {
         process,
@@ -83,6 +106,7 @@ pub(super) fn read(
         spindle_rpm: speeds(&lobes)?,
         modes,
         redundancy,
+        tool,
         hole,
     }))
 }
@@ -161,12 +185,27 @@ fn modes(lobes: &Section<'_>, process: Process) -> Result<Vec<LobeMode>> {
         Process::Milling => &axes[..2],
         Process::Drilling => &axes[..],
     };
-    let keys = ["axis", "frequency_hz", "damping_ratio", "stiffness_n_per_m"];
+    let keys = [
+        "axis",
+        "frequency_hz",
+        "damping_ratio",
+        "stiffness_n_per_m",
+        "extension_mm_per_rad",
+    ];
     let mut out = Vec::new();
     for mode in lobes.sections("mode", &keys)? {
         let number = |key: &str, bounds, example| mode.required(key, mode.number(key, bounds)?, example);
+        let axis = mode.required("axis", mode.choice("axis", axes)?, "\"x\"")?;
+        let extension = mode.number("extension_mm_per_rad", Bounds::ANY)?;
+        if axis != LobeAxis::Theta && extension.is_some() {
+            return Err(mode
+                .error("extension_mm_per_rad", "belongs to a mode in theta")
+                .remedy("take it out, or make it a mode with axis = \"theta\"")
+                .into());
+        }
         out.push(LobeMode {
-            axis: mode.required("axis", mode.choice("axis", axes)?, "\"x\"")?,
+            axis,
+            extension_mm_per_rad: extension.unwrap_or(0.0),
             frequency_hz: number("frequency_hz", Bounds::POSITIVE, "603.0")?,
             damping_ratio: number("damping_ratio", Bounds::open(0.0, 1.0), "0.039")?,
             stiffness_n_per_m: number("stiffness_n_per_m", Bounds::POSITIVE, "5.59e6")?,
@@ -201,6 +240,61 @@ fn redundancy(section: &Section<'_>, postures: &[Posture]) -> Result<Redundancy>
         step_deg: section.required("step_deg", step_deg, "5.0")?,
         forbidden_deg,
     })
+}
+
+fn tool(section: &Section<'_>) -> Result<Vec<ToolSegment>> {
+    let mut out = Vec::new();
+    for part in section.sections("segment", &SEGMENT)? {
+        let needed = |key: &str, example| part.required(key, part.number(key, Bounds::POSITIVE)?, example);
+        let diameter_mm = needed("diameter_mm", "12.0")?;
+        let young_gpa = needed("young_gpa", "210.0")?;
+        let segment = ToolSegment {
+            length_mm: needed("length_mm", "60.0")?,
+            diameter_mm,
+            bore_mm: part.number("bore_mm", Bounds::NOT_NEGATIVE)?.unwrap_or(0.0),
+            flute_ratio: part
+                .number("flute_ratio", Bounds::above_up_to(0.0, 1.0))?
+                .unwrap_or(1.0),
+            young_gpa,
+            shear_gpa: part
+                .number("shear_gpa", Bounds::POSITIVE)?
+                .unwrap_or(young_gpa / YOUNG_OVER_SHEAR),
+            density_kg_per_m3: needed("density_kg_per_m3", "7850.0")?,
+            loss_factor: part
+                .number("loss_factor", Bounds::closed(0.0, 1.0))?
+                .unwrap_or(TOOL_LOSS_FACTOR),
+            twist_coupling: part
+                .number("twist_coupling", Bounds::closed(-0.9, 0.9))?
+                .unwrap_or(0.0),
+        };
+        if segment.bore_mm >= segment.flute_ratio * segment.diameter_mm {
+            return Err(part
+                .error("bore_mm", "the bore leaves nothing of the tool")
+                .remedy("it must be below diameter_mm times flute_ratio")
+                .into());
+        }
+        // Poisson's ratio E/(2G) − 1 lies between 0 and ½.
+        if !(2.0..=3.0).contains(&(young_gpa / segment.shear_gpa)) {
+            return Err(part
+                .error(
+                    "shear_gpa",
+                    format!(
+                        "{} GPa does not go with {young_gpa} GPa of Young's modulus",
+                        segment.shear_gpa
+                    ),
+                )
+                .remedy("E/G lies between 2 and 3; leave shear_gpa out to have E/2.6")
+                .into());
+        }
+        out.push(segment);
+    }
+    if out.is_empty() {
+        return Err(section
+            .error("segment", "the tool has no segment")
+            .remedy("add [[lobes.tool.segment]] tables from the holder face to the tip: length_mm, diameter_mm, young_gpa, density_kg_per_m3")
+            .into());
+    }
+    Ok(out)
 }
 
 fn hole(section: &Section<'_>) -> Result<HoleSection> {

@@ -237,6 +237,8 @@ pub struct LobeMode {
     pub damping_ratio: f64,
     /// N/m; for theta N·m/rad.
     pub stiffness_n_per_m: f64,
+    /// Theta: how much longer the drill gets per radian that it unwinds (turned against the rotation); 0 in other axes.
+    pub extension_mm_per_rad: f64,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -265,8 +267,26 @@ pub struct LobesSection {
     pub spindle_rpm: [f64; 3],
     pub modes: Vec<LobeMode>,
     pub redundancy: Option<Redundancy>,
+    /// `[lobes.tool]`: the tool as a beam, from the holder face to the tip; empty: rigid, or part of the FRFs.
+    pub tool: Vec<ToolSegment>,
     /// `None` where the campaign has no `[lobes.hole]`: the defaults hold.
     pub hole: Option<HoleSection>,
+}
+
+/// `[[lobes.tool.segment]]`: a stretch of the tool of one section and material, from the holder face to the tip.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ToolSegment {
+    pub length_mm: f64,
+    pub diameter_mm: f64,
+    pub bore_mm: f64,
+    /// Diameter of the round bar that is as stiff over `diameter_mm`: below 1 for flutes.
+    pub flute_ratio: f64,
+    pub young_gpa: f64,
+    pub shear_gpa: f64,
+    pub density_kg_per_m3: f64,
+    pub loss_factor: f64,
+    /// See [`crate::lobes::BeamSegment::twist_coupling`].
+    pub twist_coupling: f64,
 }
 
 /// `[lobes.hole]`: what pushes the tool, and what the hole may be off by. A force that is left out is predicted from the

@@ -2,10 +2,10 @@
 
 use serde_json::{Value, json};
 
-use super::hole;
 use super::next_step::Guide;
 use super::text::{number, table, warnings};
 use super::{CampaignArg, Outcome};
+use super::{hole, lobe_tool};
 use crate::Result;
 use crate::analysis::{LobeAnalysis, RedundancyAnalysis};
 use crate::campaign::{Campaign, LobeMethod, Process};
@@ -57,6 +57,8 @@ fn document(analysis: &LobeAnalysis) -> Value {
                     "absolute_limit_mm": before.absolute.map(|a| a.depth_mm),
                     "absolute_limit_hz": before.absolute.map(|a| a.chatter_hz),
                 })),
+                "lateral": case.by_block.as_ref().map(|b| lobe_tool::block(&b[0])),
+                "axial_torsional": case.by_block.as_ref().map(|b| lobe_tool::block(&b[1])),
                 "frf": case.description,
                 "band_hz": [case.band_hz.0, case.band_hz.1],
             })
@@ -85,6 +87,13 @@ fn document(analysis: &LobeAnalysis) -> Value {
         "teeth": analysis.teeth,
         "ktc_n_per_mm2": analysis.coefficients.ktc_n_per_mm2,
         "krc_n_per_mm2": analysis.coefficients.krc_n_per_mm2,
+        "kac_n_per_mm2": analysis.coefficients.kac_n_per_mm2,
+        "axial_torsional": analysis.axial_torsional.as_ref().map(|block| json!({
+            "included": block.is_ok(),
+            "left_out_because": block.as_ref().err(),
+        })),
+        "hole_width_mm": analysis.drilled.map(|hole| hole.width_mm),
+        "tool": lobe_tool::document(analysis),
         "revision": analysis.revision,
         "effects": analysis.effects,
         "curves": curves,
@@ -121,6 +130,7 @@ fn redundancy(found: &RedundancyAnalysis, hole: Value) -> Value {
         "enumeration": r.enumeration,
         "swarm": r.swarm,
         "agree": r.agree,
+        "difference": r.difference,
     })
 }
 
@@ -139,7 +149,7 @@ fn redundancy_text(found: &RedundancyAnalysis) -> String {
         "\nTool of {} turned about its axis in steps of {}°: {} angles usable, {} forbidden, {} out of reach\n\
          Recommended: {:.1} rpm at {:.1}°, safe to {:.4} mm with the speed off by up to {:.0} % (5 % quantile over the model's uncertainty: {})\n\
          Joints: {} degrees; nearest limit {} away, singularity margin {} of 1\n\
-         Enumeration {:.4} mm, particle swarm {:.4} mm: {}\n",
+         Enumeration {:.4} mm, particle swarm {:.4} mm, {:.2} % apart: {}\n",
         found.posture,
         found.step_deg,
         count(AngleStatus::Reachable),
@@ -155,6 +165,7 @@ fn redundancy_text(found: &RedundancyAnalysis) -> String {
         margin(r.posture.singularity_margin, ""),
         r.enumeration.depth_mm,
         r.swarm.depth_mm,
+        100.0 * r.difference,
         if r.agree {
             "they agree"
         } else {
@@ -200,7 +211,7 @@ fn text(analysis: &LobeAnalysis) -> String {
             "axial depth of cut",
         ),
         Process::Drilling => (
-            "drilling, lateral",
+            analysis.drilling(),
             "radial width of cut, (diameter − pilot diameter)/2",
         ),
     };
@@ -236,6 +247,7 @@ fn text(analysis: &LobeAnalysis) -> String {
         ),
         None => "\nStable at every speed and depth\n".to_string(),
     };
+    out += &lobe_tool::text(analysis);
     let did = analysis.what_effects_did();
     if !did.is_empty() {
         // Over the redundancy angle there is one for each angle.
@@ -306,6 +318,7 @@ mod tests {
             frequency_hz,
             damping_ratio,
             stiffness_n_per_m,
+            extension_mm_per_rad: 0.0,
         };
         Campaign {
             dir: "cell".into(),
@@ -338,6 +351,7 @@ mod tests {
                     mode(LobeAxis::Theta, 3000.0, 0.02, 1e4),
                 ],
                 redundancy: None,
+                tool: vec![],
                 hole: None,
             }),
             material: None,

@@ -19,6 +19,7 @@ mod history;
 mod hole;
 mod init;
 mod inspect;
+mod lobe_tool;
 mod lobes;
 mod modal;
 mod model;

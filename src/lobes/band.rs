@@ -6,10 +6,8 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::blocks::{AveragedCut, Blocks};
 use super::curve::SpeedLimit;
-use super::force::RegenerativeForce;
-use super::frf::DirectFrf;
-use super::solve::StabilitySolver;
 use crate::{Error, Result};
 
 /// The band's lower and upper quantile.
@@ -75,11 +73,11 @@ pub fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
 }
 
 /// The band over the speeds, one structure a draw.
-pub fn band(force: RegenerativeForce, structures: &[Box<dyn DirectFrf>], spindle_rpm: &[f64]) -> LobeBand {
+pub fn band(cut: &AveragedCut, structures: &[Blocks], spindle_rpm: &[f64]) -> LobeBand {
     let limits: Vec<Vec<f64>> = structures
         .par_iter()
-        .map(|frf| {
-            let solver = StabilitySolver::new(force, frf.as_ref());
+        .map(|blocks| {
+            let solver = cut.on(blocks);
             spindle_rpm
                 .iter()
                 .map(|n| solver.limit_at(*n).map_or(f64::INFINITY, |l| l.depth_mm))
@@ -98,6 +96,7 @@ pub fn band(force: RegenerativeForce, structures: &[Box<dyn DirectFrf>], spindle
 mod tests {
     use super::*;
     use crate::lobes::frf::{AxisMode, ModalFrf};
+    use crate::lobes::{RegenerativeForce, StabilitySolver};
 
     #[test]
     fn draws_have_the_covariance_asked_for() {
@@ -137,7 +136,7 @@ mod tests {
     /// Stiffness off by a factor moves the limit by that factor: the band at any speed is the one of the factor.
     #[test]
     fn the_band_of_a_scaled_structure_is_known() {
-        let structures: Vec<Box<dyn DirectFrf>> = (0..=100)
+        let structures: Vec<Blocks> = (0..=100)
             .map(|i| {
                 let factor = 1.0 + 0.002 * f64::from(i);
                 let mode = |axis, frequency_hz| AxisMode {
@@ -147,13 +146,16 @@ mod tests {
                     stiffness_n_per_m: 1e6 * factor,
                 };
                 let frf = ModalFrf::from_axis_modes(&[mode(0, 12.0), mode(1, 15.0)]).unwrap();
-                Box::new(frf) as Box<dyn DirectFrf>
+                Blocks {
+                    lateral: Box::new(frf),
+                    axial: None,
+                }
             })
             .collect();
         let force = RegenerativeForce::drilling_lateral(1014.2, 619.9, 1.178, 2).unwrap();
         let speeds = [150.0, 300.0, 420.0];
-        let found = band(force, &structures, &speeds);
-        let solver = StabilitySolver::new(force, structures[0].as_ref());
+        let found = band(&force.into(), &structures, &speeds);
+        let solver = StabilitySolver::new(force, structures[0].lateral.as_ref());
         for (i, n) in speeds.iter().enumerate() {
             let least = solver.limit_at(*n).unwrap().depth_mm;
             assert!((found.lower_mm[i].unwrap() / least - 1.01).abs() < 1e-9);

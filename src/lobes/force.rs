@@ -8,7 +8,8 @@ use crate::{Error, Result};
 /// F = b D Δr on the tool, averaged over a revolution. Δr is the displacement now minus that one tooth earlier.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RegenerativeForce {
-    /// D, N/m²: force (N) per width of cut b (m) and displacement change (m). Row = force, column = displacement.
+    /// D, N/m²: force (N) per width of cut b (m) and displacement change (m). Row = force, column = displacement. In the
+    /// axial–torsional block the second row is a torque (N·m) and the second column a turn (rad).
     pub matrix_n_per_m2: [[f64; 2]; 2],
     /// Teeth or lips N; the delay is T = 60/(N n).
     pub teeth: usize,
@@ -51,10 +52,6 @@ impl RegenerativeForce {
     /// width of cut, (diameter − pilot diameter)/2. Averaging cos² and sin² over a turn gives the ½, summing the
     /// N lips the N (they write 2, the twist drill).
     ///
-    /// The axial–torsional block (not built here) has a torque arm R_t, tangential force to torque: a radius by
-    /// its dimension and use. The thesis's word "diameter" for it is a slip: the 8 mm it lists is half of its
-    /// 16 mm tool. The lateral block does not hold R_t.
-    ///
     /// Coefficients in N/mm², κ the half point angle in rad.
     ///
     /// # Errors
@@ -76,6 +73,54 @@ impl RegenerativeForce {
         let factor = -(teeth as f64) * ktc / (2.0 * half_point_angle_rad.tan());
         Ok(RegenerativeForce {
             matrix_n_per_m2: [[factor * krc, factor], [-factor, factor * krc]],
+            teeth,
+        })
+    }
+}
+
+impl RegenerativeForce {
+    /// Drilling, axial–torsional block, displacements along the tool into the workpiece (m) and turns in the sense of the
+    /// rotation (rad), forces in the same sense:
+    ///
+    /// D = −N [[Kac, −c Kac], [Ktc R_t, −c Ktc R_t]], c = f/2π.
+    ///
+    /// Why the matrix is so: a lip that moves by Δz deeper than the one before, while the drill turns by Δθ ahead, cuts a
+    /// chip h_z = f/N + Δz − (f/2π) Δθ thick along the axis (turning ahead it comes to the same place sooner, by Δθ of feed).
+    /// Over the radial width b of N lips that is a chip area N b h_z, which pushes back with Kac = Kfc sin κ along the axis
+    /// and Ktc at the arm R_t against the rotation: the thrust and torque of the baseline (see
+    /// [`crate::cutting::DrillGeometry`]), and so the limit comes from the coefficients that were measured. R_t is the mean
+    /// radius of the lips, (R + r₀)/2, so the limit is exact where it equals the width of that hole: the hole is stable
+    /// exactly if the limit is above its width.
+    ///
+    /// Roukema & Altintas (2007, see [`drilling_lateral`](Self::drilling_lateral)) have (1 − k_rc) R_t in the second row
+    /// and count θ against the rotation. The radial force of a lip that points to the axis makes no torque, so we leave its
+    /// share out. R_t is a radius by its dimension and use: the thesis's word "diameter" for it is a slip, the 8 mm it
+    /// lists is half of its 16 mm tool.
+    ///
+    /// Coefficients in N/mm²; `arm_m` and `feed_per_rev_m` may be zero where the torque or the turn do not matter.
+    ///
+    /// # Errors
+    /// Where a coefficient is not finite, Ktc or Kac is not positive, the arm or feed is negative, or there is no lip.
+    pub fn drilling_axial_torsional(
+        ktc_n_per_mm2: f64,
+        kac_n_per_mm2: f64,
+        arm_m: f64,
+        feed_per_rev_m: f64,
+        teeth: usize,
+    ) -> Result<Self> {
+        let ktc = checked_ktc(ktc_n_per_mm2, 0.0, teeth)?;
+        let right = |v: f64| v >= 0.0 && v.is_finite();
+        if !(kac_n_per_mm2 > 0.0 && right(kac_n_per_mm2) && right(arm_m) && right(feed_per_rev_m)) {
+            return Err(Error::computation(format!(
+                "axial and torsional lobes need a positive Kac, an arm and a feed, not {kac_n_per_mm2} N/mm², {arm_m} m and \
+                 {feed_per_rev_m} m per revolution"
+            )));
+        }
+        let lips = teeth as f64;
+        let thinner = feed_per_rev_m / (2.0 * PI);
+        let (thrust, torque) = (-lips * kac_n_per_mm2 * 1e6, -lips * ktc * arm_m);
+        Ok(RegenerativeForce {
+            matrix_n_per_m2: [[thrust, -thinner * thrust], [torque, -thinner * torque]],
             teeth,
         })
     }

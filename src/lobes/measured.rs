@@ -13,6 +13,10 @@ pub struct MeasuredStructure {
     /// Index into [`Campaign::postures`].
     pub posture: usize,
     pub frf: SampledFrf,
+    /// Entry 00 is along Z; `None` where ZZ was not measured on these lines.
+    pub axial: Option<SampledFrf>,
+    /// Where the point sits in the tool's frame, m (origin: the tool centre point).
+    pub position_m: [f64; 3],
     /// What had to be assumed.
     pub notes: Vec<String>,
 }
@@ -77,8 +81,14 @@ pub fn measured_structures(campaign: &Campaign, set: &FrfSet) -> Result<Vec<Meas
         let receptance: Vec<Receptance> = (0..lines)
             .map(|k| [[xx_values[k], xy[k]], [yx[k], yy_values[k]]])
             .collect();
+        let only = |zz: &Complex64| [[*zz, Complex64::ZERO], [Complex64::ZERO; 2]];
+        let axial = on_these_lines(find(Axis::Z, Axis::Z))
+            .map(|zz| SampledFrf::new(xx.frequency_hz.clone(), zz.iter().map(only).collect()))
+            .transpose()?;
         structures.push(MeasuredStructure {
             posture,
+            axial,
+            position_m: campaign.points[point].position_m,
             frf: SampledFrf::new(xx.frequency_hz.clone(), receptance)?,
             notes,
         });

@@ -15,7 +15,10 @@
 mod arcs;
 mod arnoldi;
 pub mod band;
+pub mod blocks;
 pub mod curve;
+#[cfg(test)]
+mod drilling_tests;
 pub mod force;
 pub mod frf;
 pub mod hole;
@@ -23,6 +26,7 @@ pub mod measured;
 #[cfg(test)]
 mod milling_tests;
 pub mod multi_frequency;
+pub mod optimum;
 pub mod outcome;
 pub mod periodic_force;
 pub mod redundancy;
@@ -34,8 +38,11 @@ pub mod solve;
 pub mod state_space;
 pub mod thesis;
 pub mod thesis_assumptions;
+pub mod tool_beam;
+pub mod tool_point;
 
 pub use band::LobeBand;
+pub use blocks::{AveragedCut, BlockLobes, BlockSolver, Blocks};
 pub use curve::{AbsoluteLimit, Limit, LobeCurve, Peak, SpeedLimit, peak_near, peaks, speed_grid};
 pub use force::RegenerativeForce;
 pub use frf::{AxisMode, DirectFrf, ModalFrf, Mode};
@@ -48,3 +55,5 @@ pub use solve::StabilitySolver;
 pub use state_space::StateSpace;
 pub use thesis::{ThesisLobes, thesis_lobes};
 pub use thesis_assumptions::{AssumptionSwitched, assumptions_switched};
+pub use tool_beam::{BeamSegment, ToolBeam};
+pub use tool_point::{Tool, ToolPoint};

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::campaign::{Campaign, CutGeometry, CutOutcome, LobeSource, LobesSection};
+use crate::campaign::{Campaign, CutGeometry, CutOutcome, LobesSection};
 
 /// A cut as a point of the diagram.
 #[derive(Debug, Clone, PartialEq)]
@@ -111,9 +111,7 @@ pub fn noted_cuts(campaign: &Campaign, section: &LobesSection) -> (Vec<NotedCut>
         let tool = campaign.tool.as_ref();
         // Half a thousandth of a degree: angles are written in degrees.
         let same_angle = |a: f64, b: f64| (a - b).abs() < 1e-5;
-        let reason = if section.redundancy.is_some() && section.source == LobeSource::Model {
-            Some("the lobes are those of many redundancy angles, and the cut was made at one")
-        } else if cut.geometry.process() != section.process {
+        let reason = if cut.geometry.process() != section.process {
             Some("it is of another process than the lobes")
         } else if section
             .teeth

@@ -3,32 +3,13 @@
 //! A rotating tool does not care how the robot stands behind it; the robot's structure does. The angle θ turns the tool
 //! frame of the posture to keep about its z axis (right-handed); inverse kinematics follows the branch of that posture.
 
-use argmin::core::{CostFunction, Error as ArgminError, Executor, PopulationState};
-use argmin::solver::particleswarm::{Particle, ParticleSwarm};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
 use serde::Serialize;
 
-use super::curve::{AbsoluteLimit, LobeCurve, SpeedLimit};
+use super::curve::AbsoluteLimit;
+use super::optimum::SurfacePoint;
 use crate::robot::{IkBranch, InverseKinematics, RobotModel};
 use crate::{Error, Result};
-
-/// The spindle speed and the structure's frequencies may be off by this share: a recommended depth is the least limit
-/// within it.
-pub const SPEED_MARGIN: f64 = 0.02;
-/// Speeds looked at on either side within that margin.
-const MARGIN_STEPS: i32 = 4;
-/// Deeper counts as this deep, mm: keeps unlimited places comparable.
-const DEEPEST_MM: f64 = 1e6;
-const PARTICLES: usize = 48;
-const GENERATIONS: u64 = 40;
-const SEED: u64 = 6640;
-/// Enumeration and swarm agree where their depths differ by less than this share.
-const AGREEMENT: f64 = 0.01;
-/// Cells of the grid from which the enumeration is refined.
-const REFINED: usize = 6;
 
 /// Whether a cut can be made at an angle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -172,15 +153,6 @@ impl<'a> RedundancySweep<'a> {
     }
 }
 
-/// A place on the surface: the least limit within the speed margin there.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct SurfacePoint {
-    pub spindle_rpm: f64,
-    pub angle_deg: f64,
-    /// Least limit within ±2 % of the speed.
-    pub depth_mm: f64,
-}
-
 /// What the surface says to do.
 #[derive(Debug, Clone, Serialize)]
 pub struct Recommendation {
@@ -196,181 +168,9 @@ pub struct Recommendation {
     /// Best of the particle swarm.
     pub swarm: SurfacePoint,
     pub agree: bool,
+    /// Difference of the two depths as a share of the deeper one.
+    pub difference: f64,
     pub speed_margin: f64,
-}
-
-/// The limit over speed at one angle; a method that builds the structure at an angle.
-pub trait LimitAtAngle: Sync {
-    /// The least limit within the speed margin at each speed, mm; `None` where the angle cannot be used.
-    fn margins_mm(&self, angle_deg: f64, spindle_rpm: &[f64]) -> Option<Vec<f64>>;
-}
-
-/// The least limit within ±[`SPEED_MARGIN`] of a speed, mm.
-pub fn margin_mm(method: &dyn SpeedLimit, spindle_rpm: f64) -> f64 {
-    (-MARGIN_STEPS..=MARGIN_STEPS)
-        .map(|i| spindle_rpm * (1.0 + SPEED_MARGIN * f64::from(i) / f64::from(MARGIN_STEPS)))
-        .map(|n| {
-            method
-                .limit_at(n)
-                .map_or(DEEPEST_MM, |l| l.depth_mm.min(DEEPEST_MM))
-        })
-        .fold(f64::INFINITY, f64::min)
-}
-
-/// The deepest place of a surface by enumeration: on the grid of the curves, then refined by halving steps about the
-/// best cells. `curves`: angle and curve. `None` without a curve.
-pub fn by_enumeration(
-    curves: &[(f64, &LobeCurve)],
-    step_deg: f64,
-    surface: &dyn LimitAtAngle,
-) -> Option<SurfacePoint> {
-    let mut cells: Vec<SurfacePoint> = Vec::new();
-    for (angle_deg, curve) in curves {
-        let n = &curve.spindle_rpm;
-        let depth = |i: usize| curve.depth_limit_mm[i].map_or(DEEPEST_MM, |d| d.min(DEEPEST_MM));
-        let least: Vec<f64> = (0..n.len())
-            .map(|i| {
-                let (low, high) = (n[i] * (1.0 - SPEED_MARGIN), n[i] * (1.0 + SPEED_MARGIN));
-                let from = n.partition_point(|v| *v < low);
-                let to = n.partition_point(|v| *v <= high);
-                (from..to.max(from + 1)).map(depth).fold(f64::INFINITY, f64::min)
-            })
-            .collect();
-        // Local maxima over speed, so that the best cells are not all one tip.
-        for i in 0..n.len() {
-            let before = i == 0 || least[i - 1] <= least[i];
-            let after = i + 1 == n.len() || least[i + 1] < least[i];
-            if before && after {
-                cells.push(SurfacePoint {
-                    spindle_rpm: n[i],
-                    angle_deg: *angle_deg,
-                    depth_mm: least[i],
-                });
-            }
-        }
-    }
-    cells.sort_by(|a, b| b.depth_mm.total_cmp(&a.depth_mm));
-    cells.truncate(REFINED);
-    let range = curves
-        .first()
-        .map(|(_, c)| (c.spindle_rpm[0], c.spindle_rpm[c.spindle_rpm.len() - 1]))?;
-    let step_rpm = curves
-        .first()
-        .and_then(|(_, c)| Some(c.spindle_rpm.get(1)? - c.spindle_rpm[0]))
-        .unwrap_or(1.0);
-    cells
-        .par_iter()
-        .filter_map(|cell| {
-            refine(
-                *cell,
-                [step_deg, step_rpm.max(0.002 * cell.spindle_rpm)],
-                range,
-                surface,
-            )
-        })
-        .max_by(|a, b| a.depth_mm.total_cmp(&b.depth_mm))
-}
-
-/// Compass search: steps along angle and speed, halved where none of them leads up.
-fn refine(
-    start: SurfacePoint,
-    steps: [f64; 2],
-    (low, high): (f64, f64),
-    surface: &dyn LimitAtAngle,
-) -> Option<SurfacePoint> {
-    let depth = |angle_deg: f64, n: f64| surface.margins_mm(angle_deg, &[n]).map(|d| d[0]);
-    let mut best = SurfacePoint {
-        depth_mm: depth(start.angle_deg, start.spindle_rpm)?,
-        ..start
-    };
-    let [mut angle_step, mut speed_step] = steps;
-    for _ in 0..14 {
-        loop {
-            let tried = [
-                (1.0, 0.0),
-                (-1.0, 0.0),
-                (0.0, 1.0),
-                (0.0, -1.0),
-                (1.0, 1.0),
-                (1.0, -1.0),
-                (-1.0, 1.0),
-                (-1.0, -1.0),
-            ]
-            .iter()
-            .filter_map(|(da, dn)| {
-                let angle_deg = (best.angle_deg + da * angle_step).rem_euclid(360.0);
-                let spindle_rpm = (best.spindle_rpm + dn * speed_step).clamp(low, high);
-                Some(SurfacePoint {
-                    spindle_rpm,
-                    angle_deg,
-                    depth_mm: depth(angle_deg, spindle_rpm)?,
-                })
-            })
-            .max_by(|a, b| a.depth_mm.total_cmp(&b.depth_mm));
-            match tried {
-                Some(point) if point.depth_mm > best.depth_mm * (1.0 + 1e-9) => best = point,
-                _ => break,
-            }
-        }
-        angle_step *= 0.5;
-        speed_step *= 0.5;
-    }
-    Some(best)
-}
-
-struct SwarmProblem<'a> {
-    surface: &'a dyn LimitAtAngle,
-}
-
-impl CostFunction for SwarmProblem<'_> {
-    type Param = Vec<f64>;
-    type Output = f64;
-
-    fn cost(&self, at: &Vec<f64>) -> std::result::Result<f64, ArgminError> {
-        // An angle that cannot be used is worse than any that can.
-        let depth = self.surface.margins_mm(at[0].rem_euclid(360.0), &[at[1]]);
-        Ok(depth.map_or(0.0, |d| -d[0]))
-    }
-
-    fn bulk_cost<P: std::borrow::Borrow<Vec<f64>>>(
-        &self,
-        at: &[P],
-    ) -> std::result::Result<Vec<f64>, ArgminError> {
-        let places: Vec<Vec<f64>> = at.iter().map(|p| p.borrow().clone()).collect();
-        places.par_iter().map(|p| self.cost(p)).collect()
-    }
-}
-
-/// The deepest place of a surface by particle swarm (Kennedy & Eberhart 1995, as in argmin), over all angles and the
-/// given speeds; a fixed seed makes it repeatable.
-///
-/// # Errors
-/// Where the swarm finds no usable angle.
-pub fn by_swarm(rpm_range: [f64; 2], surface: &dyn LimitAtAngle) -> Result<SurfacePoint> {
-    let bounds = (
-        vec![0.0, rpm_range[0]],
-        vec![360.0, rpm_range[1].max(rpm_range[0] * (1.0 + 1e-9))],
-    );
-    let solver = ParticleSwarm::new(bounds, PARTICLES).with_rng_generator(ChaCha8Rng::seed_from_u64(SEED));
-    let result = Executor::new(SwarmProblem { surface }, solver)
-        .configure(|state: PopulationState<Particle<Vec<f64>, f64>, f64>| state.max_iters(GENERATIONS))
-        .run()
-        .map_err(|e| Error::computation(format!("lobes: particle swarm: {e}")))?;
-    let best = result
-        .state
-        .individual
-        .filter(|p| p.cost < 0.0)
-        .ok_or_else(|| Error::computation("lobes: the particle swarm found no angle that can be used"))?;
-    Ok(SurfacePoint {
-        spindle_rpm: best.position[1],
-        angle_deg: best.position[0].rem_euclid(360.0),
-        depth_mm: -best.cost,
-    })
-}
-
-/// Whether two optima are the same depth.
-pub fn agree(a: &SurfacePoint, b: &SurfacePoint) -> bool {
-    (a.depth_mm - b.depth_mm).abs() <= AGREEMENT * a.depth_mm.max(b.depth_mm)
 }
 
 #[cfg(test)]
@@ -456,47 +256,6 @@ mod tests {
                 let jump = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
                 assert!(jump < 60.0, "{pair:?}");
             }
-        }
-    }
-
-    /// A smooth surface of known optimum with a forbidden stretch: both searches find it.
-    #[test]
-    fn enumeration_and_swarm_agree_on_a_known_surface() {
-        struct Hill;
-        impl LimitAtAngle for Hill {
-            fn margins_mm(&self, angle_deg: f64, n: &[f64]) -> Option<Vec<f64>> {
-                let usable = !(100.0..150.0).contains(&angle_deg);
-                usable.then(|| n.iter().map(|n| height(angle_deg, *n)).collect())
-            }
-        }
-        fn height(angle_deg: f64, n: f64) -> f64 {
-            let a = (angle_deg - 213.3).to_radians();
-            1.0 + 2.0 * a.cos() + (-((n - 371.7) / 40.0).powi(2)).exp()
-        }
-        let speeds: Vec<f64> = (100..=900).map(f64::from).collect();
-        let curves: Vec<(f64, LobeCurve)> = (0..72)
-            .map(|i| f64::from(i) * 5.0)
-            .filter(|a| !(100.0..150.0).contains(a))
-            .map(|a| {
-                let depth: Vec<Option<f64>> = speeds.iter().map(|n| Some(height(a, *n))).collect();
-                let curve = LobeCurve {
-                    spindle_rpm: speeds.clone(),
-                    chatter_hz: depth.clone(),
-                    depth_limit_mm: depth,
-                };
-                (a, curve)
-            })
-            .collect();
-        let borrowed: Vec<(f64, &LobeCurve)> = curves.iter().map(|(a, c)| (*a, c)).collect();
-        let first = by_enumeration(&borrowed, 5.0, &Hill).unwrap();
-        let second = by_swarm([100.0, 900.0], &Hill).unwrap();
-        assert!(agree(&first, &second), "{first:?} {second:?}");
-        for p in [first, second] {
-            assert!((p.depth_mm - 4.0).abs() < 0.01, "{p:?}");
-            assert!(
-                (p.angle_deg - 213.3).abs() < 5.0 && (p.spindle_rpm - 371.7).abs() < 5.0,
-                "{p:?}"
-            );
         }
     }
 }

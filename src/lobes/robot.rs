@@ -39,6 +39,21 @@ impl RobotFrf {
     pub fn new(robot: &RobotModel, kinematics: &Kinematics, chain: &Chain) -> Result<Self> {
         let rows = lobe_axes(kinematics.tool_axis())
             .map(|axis| chain.output_row(kinematics.tcp(), robot.flange_place(), true, &axis));
+        Self::of_rows(chain, rows)
+    }
+
+    /// The receptance of the tool centre point along the tool axis into the workpiece (m, N) and about it (rad, N·m).
+    pub fn axial_torsional(robot: &RobotModel, kinematics: &Kinematics, chain: &Chain) -> Result<Self> {
+        let (axis, place) = (kinematics.tool_axis(), robot.flange_place());
+        let jacobian = chain.jacobian(kinematics.tcp(), place);
+        let rows = [
+            chain.output_row(kinematics.tcp(), place, true, &axis),
+            jacobian.fixed_rows::<3>(3).transpose() * axis,
+        ];
+        Self::of_rows(chain, rows)
+    }
+
+    fn of_rows(chain: &Chain, rows: [DVector<f64>; 2]) -> Result<Self> {
         let system = chain.system(0);
         let basis = FrfBasis::new(&system, &rows)?;
         let frequencies = natural_frequencies_hz(&system)?;

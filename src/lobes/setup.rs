@@ -1,10 +1,15 @@
 //! What a campaign's `[lobes]` table asks for, as a force and an FRF.
 
+use super::blocks::AveragedCut;
 use super::force::RegenerativeForce;
-use super::frf::{AxisMode, ModalFrf};
+use super::frf::{AxisMode, ModalFrf, Mode};
 use super::periodic_force::{PeriodicForce, ProcessDamping};
-use crate::campaign::{Campaign, LobeAxis, LobeMethod, LobesSection, Process};
-use crate::cutting::{CfcOptions, Group, identify_forces};
+use super::tool_beam::{BeamSegment, ToolBeam};
+use super::tool_point::ModesHolder;
+use crate::campaign::{
+    Campaign, CutGeometry, LobeAxis, LobeMethod, LobeMode, LobesSection, Process, Tool, ToolSegment,
+};
+use crate::cutting::{CfcOptions, DrillGeometry, Group, identify_forces};
 use crate::{Error, InputError, Result};
 
 /// Cutting coefficients that lobes need, N/mm².
@@ -12,6 +17,8 @@ use crate::{Error, InputError, Result};
 pub struct LobeCoefficients {
     pub ktc_n_per_mm2: f64,
     pub krc_n_per_mm2: f64,
+    /// Drilling: thrust per chip area, Kac = Kfc sin κ; for the axial–torsional block.
+    pub kac_n_per_mm2: Option<f64>,
 }
 
 impl LobeCoefficients {
@@ -20,6 +27,7 @@ impl LobeCoefficients {
         Some(LobeCoefficients {
             ktc_n_per_mm2: section.ktc_n_per_mm2?,
             krc_n_per_mm2: section.krc_n_per_mm2?,
+            kac_n_per_mm2: section.kac_n_per_mm2,
         })
     }
 }
@@ -82,13 +90,17 @@ pub fn coefficients_of_group(
             lacks_coefficients(campaign, problem)
         })
     };
-    let krc_n_per_mm2 = match section.process {
-        Process::Milling => value("Krc")?,
-        Process::Drilling => value("Kfc")? * half_point_angle_rad(campaign, section)?.cos(),
+    let (krc_n_per_mm2, kac_n_per_mm2) = match section.process {
+        Process::Milling => (value("Krc")?, None),
+        Process::Drilling => {
+            let (kfc, kappa) = (value("Kfc")?, half_point_angle_rad(campaign, section)?);
+            (kfc * kappa.cos(), Some(kfc * kappa.sin()))
+        }
     };
     Ok(LobeCoefficients {
         ktc_n_per_mm2: value("Ktc")?,
         krc_n_per_mm2,
+        kac_n_per_mm2,
     })
 }
 
@@ -111,17 +123,17 @@ pub(super) fn half_point_angle_rad(campaign: &Campaign, section: &LobesSection) 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Cut {
     /// Zero-order milling, and drilling.
-    Averaged(RegenerativeForce),
+    Averaged(AveragedCut),
     /// Milling with its true dependence on time.
     Periodic(PeriodicForce),
 }
 
 impl Cut {
-    /// The force averaged over a revolution.
-    pub fn average(&self) -> RegenerativeForce {
+    /// The forces averaged over a revolution.
+    pub fn average(&self) -> AveragedCut {
         match self {
-            Cut::Averaged(force) => *force,
-            Cut::Periodic(force) => force.average(),
+            Cut::Averaged(cut) => *cut,
+            Cut::Periodic(force) => force.average().into(),
         }
     }
 }
@@ -149,6 +161,7 @@ pub fn cut_of(campaign: &Campaign, section: &LobesSection, coefficients: LobeCoe
     let LobeCoefficients {
         ktc_n_per_mm2,
         krc_n_per_mm2,
+        ..
     } = coefficients;
     match section.process {
         Process::Milling => {
@@ -182,7 +195,7 @@ pub fn cut_of(campaign: &Campaign, section: &LobesSection, coefficients: LobeCoe
             };
             let force = PeriodicForce::new(ktc_n_per_mm2, krc_n_per_mm2, teeth, immersion, damping)?;
             Ok(match averaged {
-                true => Cut::Averaged(force.average()),
+                true => Cut::Averaged(force.average().into()),
                 false => Cut::Periodic(force),
             })
         }
@@ -192,33 +205,103 @@ pub fn cut_of(campaign: &Campaign, section: &LobesSection, coefficients: LobeCoe
             half_point_angle_rad(campaign, section)?,
             teeth,
         )
-        .map(Cut::Averaged),
+        .map(|lateral| Cut::Averaged(lateral.into())),
     }
 }
 
-/// The lateral (x, y) modes of the `[[lobes.mode]]` table. Modes in z and theta belong to the axial–torsional block
-/// and are left out.
+/// The hole that a drill cuts, as the axial–torsional block needs it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DrilledHole {
+    /// Radial width of cut, outer radius minus where the lip begins.
+    pub width_mm: f64,
+    /// Mean radius of the lips: the arm of their tangential force.
+    pub arm_mm: f64,
+}
+
+impl DrilledHole {
+    /// From `[tool]` and the pilot of `[lobes.hole]`; `None` where the diameter is not known.
+    ///
+    /// In the full the lips begin at the chisel's half length where the web is known (see
+    /// [`crate::cutting::DrillGeometry`]), else at the axis.
+    pub fn of(campaign: &Campaign, section: &LobesSection) -> Option<Self> {
+        let tool = campaign.tool.as_ref()?;
+        let hole = section.hole.as_ref();
+        let geometry = CutGeometry::Drilling {
+            feed_per_rev_mm: section.feed_per_rev_mm.unwrap_or(0.0),
+            pilot_diameter_mm: hole.and_then(|h| h.pilot_diameter_mm).unwrap_or(0.0),
+            hole_depth_mm: None,
+        };
+        let tool = Tool {
+            half_point_angle_deg: section.half_point_angle_deg.or(tool.half_point_angle_deg),
+            web_thickness_mm: tool.web_thickness_mm.or(Some(0.0)),
+            ..tool.clone()
+        };
+        let g = DrillGeometry::new(&tool, &geometry).ok()?;
+        Some(DrilledHole {
+            width_mm: g.radius_mm - g.inner_radius_mm,
+            arm_mm: 0.5 * (g.radius_mm + g.inner_radius_mm),
+        })
+    }
+}
+
+/// The axial–torsional force of a drill.
+///
+/// # Errors
+/// In words for people: what is missing, and what to give.
+pub fn axial_torsional_force(
+    campaign: &Campaign,
+    section: &LobesSection,
+    coefficients: LobeCoefficients,
+    teeth: usize,
+) -> std::result::Result<RegenerativeForce, String> {
+    let kac = coefficients
+        .kac_n_per_mm2
+        .ok_or("the thrust coefficient is not known: give lobes.kac_n_per_mm2")?;
+    let hole = DrilledHole::of(campaign, section)
+        .ok_or("the arm of the torque is not known: add a [tool] table with the drill's diameter_mm")?;
+    let feed_m = 1e-3 * section.feed_per_rev_mm.unwrap_or(0.0);
+    let ktc = coefficients.ktc_n_per_mm2;
+    RegenerativeForce::drilling_axial_torsional(ktc, kac, 1e-3 * hole.arm_mm, feed_m, teeth)
+        .map_err(|e| e.to_string())
+}
+
+/// The tool of `[lobes.tool]` as a beam; without segments where there is none.
+pub fn tool_beam(section: &LobesSection) -> ToolBeam {
+    let segment = |s: &ToolSegment| BeamSegment {
+        length_m: 1e-3 * s.length_mm,
+        diameter_m: 1e-3 * s.diameter_mm * s.flute_ratio,
+        bore_m: 1e-3 * s.bore_mm,
+        young_pa: 1e9 * s.young_gpa,
+        shear_pa: 1e9 * s.shear_gpa,
+        density_kg_per_m3: s.density_kg_per_m3,
+        loss_factor: s.loss_factor,
+        twist_coupling: s.twist_coupling,
+    };
+    ToolBeam {
+        segments: section.tool.iter().map(segment).collect(),
+    }
+}
+
+/// The modes of the `[[lobes.mode]]` table: x and y for the lateral block, z and theta for the axial–torsional one.
 ///
 /// # Errors
 /// Where the table has no lateral mode, or one that is no damped mode.
-pub fn frf_of_modes(campaign: &Campaign, section: &LobesSection) -> Result<ModalFrf> {
-    let lateral: Vec<AxisMode> = section
-        .modes
-        .iter()
-        .filter_map(|mode| {
-            let axis = match mode.axis {
-                LobeAxis::X => 0,
-                LobeAxis::Y => 1,
-                LobeAxis::Z | LobeAxis::Theta => return None,
-            };
-            Some(AxisMode {
-                axis,
-                frequency_hz: mode.frequency_hz,
-                damping_ratio: mode.damping_ratio,
-                stiffness_n_per_m: mode.stiffness_n_per_m,
+pub fn modes_of_table(campaign: &Campaign, section: &LobesSection) -> Result<ModesHolder> {
+    let of_axes = |axes: [LobeAxis; 2]| -> Vec<AxisMode> {
+        let on = |mode: &LobeMode| axes.iter().position(|a| *a == mode.axis);
+        let modes = section.modes.iter();
+        modes
+            .filter_map(|mode| {
+                Some(AxisMode {
+                    axis: on(mode)?,
+                    frequency_hz: mode.frequency_hz,
+                    damping_ratio: mode.damping_ratio,
+                    stiffness_n_per_m: mode.stiffness_n_per_m,
+                })
             })
-        })
-        .collect();
+            .collect()
+    };
+    let lateral = of_axes([LobeAxis::X, LobeAxis::Y]);
     if lateral.is_empty() {
         return Err(
             InputError::new("source = \"modes\" needs at least one mode in x or y")
@@ -230,5 +313,29 @@ pub fn frf_of_modes(campaign: &Campaign, section: &LobesSection) -> Result<Modal
                 .into(),
         );
     }
-    ModalFrf::from_axis_modes(&lateral)
+    let axial = of_axes([LobeAxis::Z, LobeAxis::Theta]);
+    let axial = match axial.is_empty() {
+        true => None,
+        false => {
+            let frf = ModalFrf::from_axis_modes(&axial)?;
+            let table = section.modes.iter();
+            let extensions = table
+                .filter(|m| matches!(m.axis, LobeAxis::Z | LobeAxis::Theta))
+                .map(|m| 1e-3 * m.extension_mm_per_rad);
+            // Unwinding is a turn against the rotation, and the longer drill reaches deeper.
+            let modes = frf
+                .modes()
+                .iter()
+                .zip(extensions)
+                .map(|(mode, extension_m)| Mode {
+                    shape: [mode.shape[0] - extension_m * mode.shape[1], mode.shape[1]],
+                    ..*mode
+                });
+            Some(ModalFrf::from_mode_shapes(modes.collect(), [[0.0; 2]; 2])?)
+        }
+    };
+    Ok(ModesHolder {
+        lateral: ModalFrf::from_axis_modes(&lateral)?,
+        axial,
+    })
 }

@@ -8,6 +8,7 @@ use super::{Block, Column, Section, Table};
 use super::{hole_section, redundancy_section};
 use crate::analysis::{LobeAnalysis, LobeCase, LobeFindings, StructureFindings};
 use crate::campaign::{CutOutcome, LobeMethod, LobeSource, Process};
+use crate::lobes::optimum::apart_deg;
 use crate::lobes::outcome::{Outcomes, Verdict};
 
 /// Curves in one figure.
@@ -64,7 +65,7 @@ fn process(analysis: &LobeAnalysis) -> &'static str {
             LobeMethod::SemiDiscretisation => "milling, semi-discretisation",
             LobeMethod::ZeroOrder | LobeMethod::FrequencyDomain => "milling, zero-order",
         },
-        Process::Drilling => "drilling, lateral",
+        Process::Drilling => analysis.drilling(),
     }
 }
 
@@ -95,6 +96,9 @@ pub fn section(findings: &LobeFindings, structure: Option<&StructureFindings>) -
         ("Teeth".into(), analysis.teeth.to_string()),
         ("Structure".into(), source(analysis).into()),
     ])];
+    if let Some(text) = tool_and_blocks(analysis) {
+        blocks.push(paragraph(text));
+    }
     if analysis.source == LobeSource::Model
         && let Some(warning) = structure.and_then(doubt)
     {
@@ -138,6 +142,34 @@ pub fn section(findings: &LobeFindings, structure: Option<&StructureFindings>) -
             .into(),
         blocks,
     }
+}
+
+/// The tool as a beam, and which blocks of a drill count; `None` where there is nothing to say.
+fn tool_and_blocks(analysis: &LobeAnalysis) -> Option<String> {
+    let mut said = Vec::new();
+    if let Some(first) = analysis.tool.clamped_hz[0].first() {
+        said.push(format!(
+            "The tool is a beam of {} mm, coupled to the structure at the holder face; clamped there it would bend at {} Hz \
+             first.",
+            decimals(1e3 * analysis.tool.beam.length_m(), 1),
+            decimals(*first, 0)
+        ));
+    }
+    match &analysis.axial_torsional {
+        None => {}
+        Some(Ok(())) => said.push(
+            "The limit is that of the lateral or of the axial-torsional block, whichever chatters first."
+                .into(),
+        ),
+        Some(Err(reason)) => said.push(format!("The axial-torsional block is left out: {reason}.")),
+    }
+    if let Some(hole) = analysis.drilled {
+        said.push(format!(
+            "This hole has a width of cut of {} mm.",
+            significant(hole.width_mm, 3)
+        ));
+    }
+    (!said.is_empty()).then(|| said.join(" "))
 }
 
 /// Lobes of a model that leaves more than noise deserve a word.
@@ -201,8 +233,50 @@ fn figures(analysis: &LobeAnalysis, file: &str, prefix: &str) -> Vec<Block> {
         .collect()
 }
 
+/// With the surface over the redundancy angle: the lobes of the posture as it stands, where test cuts were made, and those
+/// of the step nearest to the recommended angle.
+pub(super) fn as_it_stands_and_recommended(analysis: &LobeAnalysis, recommended_deg: f64) -> Option<Block> {
+    let away = |case: &&LobeCase| apart_deg(case.angle_deg.unwrap_or(0.0), recommended_deg);
+    let nearest = analysis.cases.iter().min_by(|a, b| away(a).total_cmp(&away(b)))?;
+    let standing = analysis
+        .cases
+        .iter()
+        .find(|c| c.angle_deg == Some(0.0) && c.angle_deg != nearest.angle_deg);
+    let panels = standing
+        .into_iter()
+        .chain([nearest])
+        .map(|case| panel(analysis, std::slice::from_ref(case), true));
+    let drawing = LobesFigure {
+        title: format!("Stability lobes at the recommended angle, {}", process(analysis)),
+        panels: panels.collect(),
+        depth_cap_mm: None,
+    };
+    let mut caption = "Depth limit over spindle speed at the step of the sweep nearest to the recommended angle, and with the \
+                       robot as it stands (0°). The dotted line is the least limit there"
+        .to_string();
+    if nearest.before.is_some() {
+        caption += &format!(
+            "; the grey dashes are the limit before {} {} added, with everything fitted anew",
+            analysis.effects.join(", "),
+            if analysis.effects.len() == 1 {
+                "was"
+            } else {
+                "were"
+            }
+        );
+    }
+    caption += "; diamonds mark the deepest tips. Discs are test cuts that were stable, crosses cuts that chattered.";
+    let (title, png) = (drawing.title.clone(), drawing.png());
+    Some(figure("lobes-recommended".to_string(), &title, caption, png))
+}
+
 fn panel(analysis: &LobeAnalysis, cases: &[LobeCase], detailed: bool) -> LobePanel {
-    let name = |case: &LobeCase| case.posture.clone().unwrap_or_else(|| "modes".into());
+    let name = |case: &LobeCase| {
+        let posture = case.posture.clone().unwrap_or_else(|| "modes".into());
+        case.angle_deg.map_or(posture.clone(), |a| {
+            format!("{posture} turned by {}°", decimals(a, 1))
+        })
+    };
     let curves = cases.iter().map(|case| LobeCurve {
         label: if detailed { String::new() } else { name(case) },
         spindle_rpm: case.curve.spindle_rpm.clone(),
@@ -220,7 +294,11 @@ fn panel(analysis: &LobeAnalysis, cases: &[LobeCase], detailed: bool) -> LobePan
     let best = analysis.best();
     let tips = best
         .iter()
-        .filter(|(case, _)| cases.iter().any(|c| c.posture == case.posture))
+        .filter(|(case, _)| {
+            cases
+                .iter()
+                .any(|c| c.posture == case.posture && c.angle_deg == case.angle_deg)
+        })
         .filter_map(|(_, peak)| {
             Some(LobeMarker {
                 spindle_rpm: peak.spindle_rpm,
@@ -233,10 +311,9 @@ fn panel(analysis: &LobeAnalysis, cases: &[LobeCase], detailed: bool) -> LobePan
     let cuts = analysis.outcomes.iter().flat_map(|o| &o.cuts);
     let cuts = cuts
         .filter(|cut| {
-            cut.posture.is_none()
-                || cases
-                    .iter()
-                    .any(|c| c.posture.is_none() || c.posture == cut.posture)
+            // Test cuts were made with the robot as it stands.
+            let mut here = cases.iter().filter(|c| c.angle_deg.unwrap_or(0.0) == 0.0);
+            here.any(|c| cut.posture.is_none() || c.posture.is_none() || c.posture == cut.posture)
         })
         .map(|cut| LobeMarker {
             spindle_rpm: cut.spindle_rpm,

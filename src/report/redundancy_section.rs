@@ -3,7 +3,7 @@
 use super::figure::{CellFormat, HeatMap};
 use super::number::{decimals, significant};
 use super::parts::{figure, paragraph};
-use super::{Block, Column, Table};
+use super::{Block, Column, Table, lobes_section};
 use crate::analysis::{LobeAnalysis, RedundancyAnalysis};
 use crate::lobes::redundancy::AngleStatus;
 
@@ -42,6 +42,10 @@ pub fn blocks(analysis: &LobeAnalysis, found: &RedundancyAnalysis) -> Vec<Block>
             .to_string(),
         map.png(),
     ));
+    blocks.extend(lobes_section::as_it_stands_and_recommended(
+        analysis,
+        r.point.angle_deg,
+    ));
     let joints: Vec<String> = r
         .posture
         .joints_deg
@@ -73,6 +77,7 @@ pub fn blocks(analysis: &LobeAnalysis, found: &RedundancyAnalysis) -> Vec<Block>
         ),
         ("by enumeration (mm)", significant(r.enumeration.depth_mm, 4)),
         ("by particle swarm (mm)", significant(r.swarm.depth_mm, 4)),
+        ("difference of the two (%)", decimals(100.0 * r.difference, 2)),
     ];
     blocks.push(Block::Table(Table {
         caption: "The recommended place".into(),

@@ -12,7 +12,7 @@ use crate::lobes::outcome::{LimitRange, NotedCut};
 use crate::lobes::setup::{Cut, modes_of_table};
 use crate::lobes::tool_point::MeasuredHolder;
 use crate::lobes::{
-    Blocks, DirectFrf, MultiFrequency, SemiDiscretisation, SpeedLimit, StateSpace, ToolPoint,
+    BlockSolver, Blocks, DirectFrf, MultiFrequency, SemiDiscretisation, SpeedLimit, StateSpace, ToolPoint,
 };
 use crate::{InputError, Result};
 
@@ -55,15 +55,18 @@ impl Dynamics {
 }
 
 impl Structure {
-    /// The limit at the speed of every noted cut.
-    pub fn at_cuts(&self, cut: &Cut, noted: &[NotedCut]) -> Vec<LimitRange> {
+    /// The cut on the structure as drawn from its uncertainty; empty where that is not known.
+    pub fn drawn(&self, cut: &Cut) -> Vec<BlockSolver<'_>> {
+        match cut {
+            Cut::Averaged(cut) => band::solvers(cut, &self.variants),
+            Cut::Periodic(_) => Vec::new(),
+        }
+    }
+
+    /// The limit at the speed of every noted cut, with what the draws make of it.
+    pub fn at_cuts(&self, cut: &Cut, noted: &[NotedCut], drawn: &[BlockSolver<'_>]) -> Vec<LimitRange> {
         let speeds: Vec<f64> = noted.iter().map(|c| c.spindle_rpm).collect();
-        let band = match cut {
-            Cut::Averaged(cut) if !self.variants.is_empty() && !noted.is_empty() => {
-                Some(band::band(cut, &self.variants, &speeds))
-            }
-            _ => None,
-        };
+        let band = (!drawn.is_empty()).then(|| band::band(drawn, &speeds));
         let limits = self.dynamics.method(cut).curve(&speeds).depth_limit_mm;
         let limits = limits.into_iter().enumerate().map(|(i, limit)| {
             let quantiles = band.as_ref().map(|b| [b.lower_mm[i], b.upper_mm[i]]);
@@ -79,11 +82,10 @@ impl Structure {
             method.absolute_limit().or(curve.least()),
             method.best(&curve, BEST),
         );
-        let band_at = |at: &[f64]| match cut {
-            Cut::Averaged(cut) if !self.variants.is_empty() => Some(band::band(cut, &self.variants, at)),
-            _ => None,
-        };
-        let at_cuts = self.at_cuts(cut, noted);
+        let drawn = self.drawn(cut);
+        let band_at = |at: &[f64]| (!drawn.is_empty()).then(|| band::band(&drawn, at));
+        let at_cuts = self.at_cuts(cut, noted, &drawn);
+        let band = band_at(speeds);
         let by_block = match cut {
             Cut::Averaged(cut) => cut.on(&self.dynamics.blocks).by_block(speeds),
             Cut::Periodic(_) => None,
@@ -100,7 +102,7 @@ impl Structure {
             absolute,
             by_block,
             best,
-            band: band_at(speeds),
+            band,
             before: self.before.as_ref().map(|b| b.lobes_before(cut, speeds)),
             hole: self.hole,
             at_cuts,

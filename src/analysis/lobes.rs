@@ -169,7 +169,7 @@ impl LobeAnalysis {
             .collect();
         let standing: Vec<(Option<String>, Vec<LimitRange>)> = as_they_stand
             .into_iter()
-            .map(|s: Structure| (s.posture.clone(), s.at_cuts(&cut, &noted)))
+            .map(|s: Structure| (s.posture.clone(), s.at_cuts(&cut, &noted, &s.drawn(&cut))))
             .collect();
         let limits: Vec<(Option<&str>, &[LimitRange])> = match redundancy {
             Some(_) => standing.iter().map(|(p, at)| (p.as_deref(), &at[..])).collect(),

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::blocks::{AveragedCut, Blocks};
+use super::blocks::{AveragedCut, BlockSolver, Blocks};
 use super::curve::SpeedLimit;
 use crate::{Error, Result};
 
@@ -72,12 +72,16 @@ pub fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
-/// The band over the speeds, one structure a draw.
-pub fn band(cut: &AveragedCut, structures: &[Blocks], spindle_rpm: &[f64]) -> LobeBand {
-    let limits: Vec<Vec<f64>> = structures
+/// A cut on each of the structures, one a draw.
+pub fn solvers<'a>(cut: &AveragedCut, structures: &'a [Blocks]) -> Vec<BlockSolver<'a>> {
+    structures.par_iter().map(|blocks| cut.on(blocks)).collect()
+}
+
+/// The band over the speeds, one solver a draw.
+pub fn band(solvers: &[BlockSolver<'_>], spindle_rpm: &[f64]) -> LobeBand {
+    let limits: Vec<Vec<f64>> = solvers
         .par_iter()
-        .map(|blocks| {
-            let solver = cut.on(blocks);
+        .map(|solver| {
             spindle_rpm
                 .iter()
                 .map(|n| solver.limit_at(*n).map_or(f64::INFINITY, |l| l.depth_mm))
@@ -154,7 +158,7 @@ mod tests {
             .collect();
         let force = RegenerativeForce::drilling_lateral(1014.2, 619.9, 1.178, 2).unwrap();
         let speeds = [150.0, 300.0, 420.0];
-        let found = band(&force.into(), &structures, &speeds);
+        let found = band(&solvers(&force.into(), &structures), &speeds);
         let solver = StabilitySolver::new(force, structures[0].lateral.as_ref());
         for (i, n) in speeds.iter().enumerate() {
             let least = solver.limit_at(*n).unwrap().depth_mm;

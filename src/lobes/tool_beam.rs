@@ -13,7 +13,7 @@
 
 use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
-use nalgebra::{Matrix2, Matrix4, Matrix6};
+use nalgebra::{Matrix4, Matrix6};
 use num_complex::Complex64;
 
 /// Displacement (m, rad) over force (N, N·m), one row and column for each of: displacement along x, slope in x,
@@ -114,12 +114,37 @@ impl BeamSegment {
 }
 
 /// e^{aL} where the waves of `a` turn by no more than [`PIECE`] along L.
+///
+/// The waves of a stretch run both ways alike, so its eigenvalues come as ±λ₁, ±λ₂ and a⁴ = p a² + q (Cayley & Hamilton)
+/// with p = λ₁² + λ₂², q = −λ₁² λ₂²: all powers are sums of 1, a, a², a³.
 fn exponential(a: &Transfer4, length_m: f64) -> Transfer4 {
-    let al = a * Complex64::from(length_m);
-    let one = Transfer4::identity();
-    (1..=TERMS)
-        .rev()
-        .fold(one, |sum, k| one + al * sum / Complex64::from(f64::from(k)))
+    let square = a * a;
+    let p = 0.5 * square.trace();
+    // ½ tr a⁴ = λ₁⁴ + λ₂⁴.
+    let fourth: Complex64 = square
+        .iter()
+        .zip(square.transpose().iter())
+        .map(|(x, y)| x * y)
+        .sum();
+    let q = 0.5 * (0.5 * fourth - p * p);
+    // a^{2j} = (even) a² + (one); a^{2j+1} is the same times a. Sums over j of both, and of both times a.
+    let (mut even, mut one) = (Complex64::ZERO, Complex64::ONE);
+    let mut sums = [Complex64::ZERO; 4];
+    let mut weight = 1.0;
+    for k in (0..=TERMS).step_by(2) {
+        let odd_weight = weight * length_m / f64::from(k + 1);
+        sums[0] += one * weight;
+        sums[1] += one * odd_weight;
+        sums[2] += even * weight;
+        sums[3] += even * odd_weight;
+        (even, one) = (p * even + one, q * even);
+        weight = odd_weight * length_m / f64::from(k + 2);
+    }
+    let mut out = a * sums[1] + square * sums[2] + square * a * sums[3];
+    for i in 0..4 {
+        out[(i, i)] += sums[0];
+    }
+    out
 }
 
 /// Transfer of a stretch in bending (in either plane) and in tension and twist.
@@ -140,17 +165,18 @@ impl Stretch {
 
     /// Receptance at the far end of the stretch; `None` at a resonance without damping.
     fn couple(&self, root: &Receptance6) -> Option<Receptance6> {
-        let block = |row: usize, column: usize| {
-            let mut out = Receptance6::zeros();
-            for (corner, transfer) in [(0, &self.bending), (2, &self.bending), (4, &self.axial)] {
-                let part: Matrix2<Complex64> = transfer.fixed_view::<2, 2>(2 * row, 2 * column).into();
-                out.fixed_view_mut::<2, 2>(corner, corner).copy_from(&part);
+        // Rows of T₁₁ R + T₁₂ and of T₂₁ R + T₂₂, one plane after the other.
+        let (mut motion, mut force) = (Receptance6::zeros(), Receptance6::zeros());
+        for (corner, transfer) in [(0, &self.bending), (2, &self.bending), (4, &self.axial)] {
+            let own = root.fixed_rows::<2>(corner);
+            for (row, out) in [(0, &mut motion), (2, &mut force)] {
+                let mut rows = out.fixed_rows_mut::<2>(corner);
+                rows.copy_from(&(transfer.fixed_view::<2, 2>(row, 0) * own));
+                let mut diagonal = rows.fixed_columns_mut::<2>(corner);
+                diagonal += transfer.fixed_view::<2, 2>(row, 2);
             }
-            out
-        };
-        let motion = block(0, 0) * root + block(0, 1);
+        }
         // X (T₂₁ R + T₂₂) = motion.
-        let force = block(1, 0) * root + block(1, 1);
         let tip = force.transpose().lu().solve(&motion.transpose())?.transpose();
         tip.iter().all(|v| v.is_finite()).then_some(tip)
     }

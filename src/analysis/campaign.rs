@@ -1,5 +1,6 @@
 //! Everything that can be said about a campaign, each part on its own: one that fails takes no other with it.
 
+use super::model_stages::{ModelStage, earlier_stages};
 use super::stick_shapes::{self, StickShape};
 use super::{CuttingFindings, DiagnosisFindings, LobeAnalysis, ModalAnalysis, StructureAnalysis};
 use crate::campaign::{Campaign, LobeSource};
@@ -32,6 +33,8 @@ pub struct StructureFindings {
     pub analysis: StructureAnalysis,
     /// nrms on postures that were left out of the fit.
     pub held_out_nrms: Option<f64>,
+    /// The model at the revisions before the present one, oldest first.
+    pub earlier: Vec<ModelStage>,
 }
 
 /// One posture as the robot file has it and calibrated.
@@ -40,6 +43,8 @@ pub struct PostureFindings {
     pub id: String,
     pub nominal: PostureReport,
     pub calibrated: Option<PostureReport>,
+    /// Base, joints, flange, tool centre point; base frame, m.
+    pub chain_m: Vec<[f64; 3]>,
 }
 
 pub struct LobeFindings {
@@ -171,16 +176,16 @@ impl<'a> CampaignFindings<'a> {
 
 impl StructureFindings {
     pub fn run(campaign: &Campaign) -> Result<Self> {
-        Self::of(StructureAnalysis::run(campaign, Options::default())?)
+        Self::of(campaign, StructureAnalysis::run(campaign, Options::default())?)
     }
 
     /// As [`StructureFindings::run`], with the measured modes that are there already.
     fn with_modes(campaign: &Campaign, modal: Option<&ModalAnalysis>) -> Result<Self> {
         let case = StructureCase::load(campaign)?;
-        Self::of(StructureAnalysis::of(case, modal, Options::default())?)
+        Self::of(campaign, StructureAnalysis::of(case, modal, Options::default())?)
     }
 
-    fn of(analysis: StructureAnalysis) -> Result<Self> {
+    fn of(campaign: &Campaign, analysis: StructureAnalysis) -> Result<Self> {
         let held_out_nrms = held_out_postures(
             &analysis.case.model,
             &analysis.case.data,
@@ -188,6 +193,7 @@ impl StructureFindings {
         )?
         .map(|h| h.nrms());
         Ok(StructureFindings {
+            earlier: earlier_stages(campaign, &analysis.case)?,
             analysis,
             held_out_nrms,
         })
@@ -205,17 +211,24 @@ impl PostureFindings {
                 .collect(),
             None => vec![None; nominal.len()],
         };
-        Ok(campaign
+        campaign
             .postures
             .iter()
             .zip(nominal)
             .zip(&mut calibrated)
-            .map(|((posture, nominal), calibrated)| PostureFindings {
-                id: posture.id.clone(),
-                nominal,
-                calibrated: calibrated.take(),
+            .map(|((posture, nominal), calibrated)| {
+                let kinematics = model.robot.kinematics(&posture.joints_deg)?;
+                Ok(PostureFindings {
+                    id: posture.id.clone(),
+                    nominal,
+                    calibrated: calibrated.take(),
+                    chain_m: stick_shapes::chain(&kinematics)
+                        .iter()
+                        .map(|p| p.coords.into())
+                        .collect(),
+                })
             })
-            .collect())
+            .collect()
     }
 }
 

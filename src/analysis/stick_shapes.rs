@@ -6,7 +6,7 @@ use super::modal::{ModalAnalysis, SetModes};
 use crate::Result;
 use crate::campaign::{BodyRef, Campaign};
 use crate::ingest::Dof;
-use crate::robot::{RobotModel, RobotSpec};
+use crate::robot::{Kinematics, RobotModel, RobotSpec};
 
 /// One mode of one posture.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,12 +42,7 @@ pub fn stick_shapes(campaign: &Campaign, set: &SetModes) -> Result<Vec<StickShap
     };
     let robot = RobotModel::new(RobotSpec::load(&section.model, &campaign.dir)?);
     let kinematics = robot.kinematics(&posture.joints_deg)?;
-    let mut chain: Vec<Point3<f64>> = kinematics
-        .frames
-        .iter()
-        .map(|f| Point3::from(f.translation.vector))
-        .collect();
-    chain.push(kinematics.tcp());
+    let chain = chain(&kinematics);
     // Way along the arm.
     let mut way = vec![0.0];
     for pair in chain.windows(2) {
@@ -90,6 +85,14 @@ pub fn stick_shapes(campaign: &Campaign, set: &SetModes) -> Result<Vec<StickShap
         });
     }
     Ok(shapes)
+}
+
+/// Base, joints, flange, tool centre point; base frame, m.
+pub(super) fn chain(kinematics: &Kinematics) -> Vec<Point3<f64>> {
+    let frames = kinematics.frames.iter();
+    let mut chain: Vec<Point3<f64>> = frames.map(|f| Point3::from(f.translation.vector)).collect();
+    chain.push(kinematics.tcp());
+    chain
 }
 
 /// Linear between what is known on either side; beyond the last as that.

@@ -24,6 +24,9 @@ pub struct Args {
     /// Leave out which physics is missing (what `diagnose` does takes most of the time).
     #[arg(long)]
     no_diagnosis: bool,
+    /// Images only, no figures for the mouse: a smaller file without scripts.
+    #[arg(long = "static")]
+    without_scripts: bool,
     /// Write the report although parts of it are missing because their files cannot be used.
     #[arg(long)]
     partial: bool,
@@ -44,7 +47,8 @@ pub fn run(args: Args) -> Result<Outcome> {
     }
     let thesis = args.thesis.then(ThesisFindings::run).transpose()?;
     let folder = args.out.unwrap_or_else(|| campaign.dir.join("report"));
-    let page = campaign::page(&findings, thesis.as_ref());
+    let mut page = campaign::page(&findings, thesis.as_ref());
+    page.without_scripts = args.without_scripts;
     let files = campaign::write(&page, &findings, &folder)?;
     let missing = findings.errors();
     let mut json = document(&files);

@@ -46,6 +46,8 @@ pub struct FrfError {
     pub noise_floor_nrms: f64,
     /// One a band of the error map; `None` where nothing was measured.
     pub band_nrms: Vec<Option<f64>>,
+    /// The same, error over noise: 1 where only noise is left.
+    pub band_times_noise: Vec<Option<f64>>,
     /// The line on which the error stands highest above the noise.
     pub worst_line: Option<WorstLine>,
 }
@@ -93,6 +95,9 @@ pub struct ErrorMap {
     pub posture_band: Vec<Vec<Option<f64>>>,
     /// All postures together: `[direction][band]`.
     pub direction_band: Vec<Vec<Option<f64>>>,
+    /// Both, error over noise: 1 where only noise is left.
+    pub posture_band_times_noise: Vec<Vec<Option<f64>>>,
+    pub direction_band_times_noise: Vec<Vec<Option<f64>>>,
 }
 
 /// Model against measurement, FRFs as receptance on the measured lines.
@@ -270,6 +275,7 @@ impl FrfComparison {
                 nrms: own.nrms(),
                 noise_floor_nrms: own.floor(),
                 band_nrms: own_bands.iter().map(Sums::measured_nrms).collect(),
+                band_times_noise: own_bands.iter().map(Sums::times_noise).collect(),
                 worst_line,
             });
             for (band, sums) in own_bands.iter().enumerate() {
@@ -335,15 +341,15 @@ fn error_map(
         }
     }
     let (np, nd) = (postures.len(), directions.len());
+    let of_posture = |p: usize, b: usize| sums[p].iter().map(|d| d[b]).collect::<Vec<Sums>>();
+    let of_direction = |d: usize, b: usize| sums.iter().map(|p| p[d][b]).collect::<Vec<Sums>>();
     ErrorMap {
         posture_direction: together(np, nd, Sums::measured_nrms, |p, d| sums[p][d].clone()),
         posture_direction_times_noise: together(np, nd, Sums::times_noise, |p, d| sums[p][d].clone()),
-        posture_band: together(np, BANDS, Sums::measured_nrms, |p, b| {
-            sums[p].iter().map(|d| d[b]).collect()
-        }),
-        direction_band: together(nd, BANDS, Sums::measured_nrms, |d, b| {
-            sums.iter().map(|p| p[d][b]).collect()
-        }),
+        posture_band: together(np, BANDS, Sums::measured_nrms, of_posture),
+        direction_band: together(nd, BANDS, Sums::measured_nrms, of_direction),
+        posture_band_times_noise: together(np, BANDS, Sums::times_noise, of_posture),
+        direction_band_times_noise: together(nd, BANDS, Sums::times_noise, of_direction),
         postures: postures.iter().map(|g| g.name.clone()).collect(),
         directions: directions.iter().map(|g| g.name.clone()).collect(),
         band_edges_hz: edges.to_vec(),

@@ -116,10 +116,18 @@ impl StructureCase {
     pub fn before_effects(&self, campaign: &Campaign) -> Result<Option<StructureModel>> {
         match self.revisions.first() {
             Some(first) if !self.model.effects().is_empty() => {
-                with_revision(campaign, &self.baseline, &self.data, first).map(Some)
+                self.model_of(campaign, first).map(Some)
             }
             _ => Ok(None),
         }
+    }
+
+    /// The model of one of the [`revisions`](Self::revisions), starting from where that stood.
+    ///
+    /// # Errors
+    /// As for [`load`](Self::load).
+    pub fn model_of(&self, campaign: &Campaign, revision: &Revision) -> Result<StructureModel> {
+        with_revision(campaign, &self.baseline, &self.data, revision)
     }
 
     /// Number of the current revision; `None` where nothing was ever added.

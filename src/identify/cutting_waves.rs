@@ -139,7 +139,7 @@ pub struct Course {
     pub axis: ForceAxis,
     /// Milling: rotation of the tool from its position at phase 0, degrees; drilling: time from the first block, s.
     pub x: Vec<f64>,
-    /// N (N·m), as long as `x`.
+    /// N (N·m), as long as `x`; NaN where a stretch of the hole (the tip breaking through) is left out of the fit.
     pub measured: Vec<f64>,
     pub model: Vec<f64>,
 }
@@ -201,16 +201,24 @@ fn revolution(axis: ForceAxis, cut: &CutData, parts: &[Part]) -> Course {
 }
 
 fn hole(axis: ForceAxis, cut: &CutData, parts: &[Part]) -> Course {
-    let blocks = 0..cut.block_s.len();
     let start = cut.block_s.first().map_or(0.0, |b| b[0]);
-    let over = |value: &dyn Fn(&Part, usize) -> f64| -> Vec<f64> {
-        let sum = |b: usize| parts.iter().map(|part| part.2 * value(part, b)).sum();
-        blocks.clone().map(sum).collect()
-    };
-    Course {
+    let mut course = Course {
         axis,
-        x: cut.block_s.iter().map(|b| 0.5 * (b[0] + b[1]) - start).collect(),
-        measured: over(&|(channel, fit, _), b| channel.level[b] - fit.reference[b]),
-        model: over(&|(_, fit, _), b| fit.level[b]),
+        x: Vec::new(),
+        measured: Vec::new(),
+        model: Vec::new(),
+    };
+    for (b, [from, to]) in cut.block_s.iter().enumerate() {
+        let next = cut.block_s.get(b + 1);
+        let sum = |value: &dyn Fn(&Part) -> f64| parts.iter().map(|part| part.2 * value(part)).sum::<f64>();
+        course.x.push(0.5 * (from + to) - start);
+        course.measured.push(sum(&|(channel, fit, _)| channel.level[b] - fit.reference[b]));
+        course.model.push(sum(&|(_, fit, _)| fit.level[b]));
+        if let Some(next) = next.filter(|next| next[0] - to > (to - from).max(next[1] - next[0])) {
+            course.x.push(0.5 * (to + next[0]) - start);
+            course.measured.push(f64::NAN);
+            course.model.push(f64::NAN);
+        }
     }
+    course
 }

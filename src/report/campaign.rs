@@ -54,6 +54,7 @@ pub fn page(findings: &CampaignFindings, thesis: Option<&ThesisFindings>) -> Pag
         title: findings.campaign.name.clone(),
         subtitle: format!("Lobestone report on {}", contents(findings)),
         sections,
+        ..Page::default()
     }
 }
 

@@ -212,6 +212,7 @@ fn record_figure(cut: &CutAnalysis, why: &str) -> Block {
         caption,
         drawing.png(),
     )
+    .with_plot(drawing.plot())
 }
 
 fn cut_table(result: &CfcResult) -> Block {
@@ -356,6 +357,7 @@ fn line_figure(
         caption,
         drawing.png(),
     )
+    .with_plot(drawing.plot())
 }
 
 fn coefficient_table(result: &CfcResult, pooled: &Group) -> Block {
@@ -401,33 +403,39 @@ fn misfit_map(result: &CfcResult, pooled: &Group) -> Option<Block> {
         return None;
     }
     let axes = ForceAxis::of(pooled.process);
-    let value = |cut: &String, axis: &ForceAxis| {
-        misfits
-            .iter()
-            .find(|m| m.cut == *cut && m.axis == *axis)
-            .map(|m| m.share.abs())
+    let table = |of: fn(&Misfit) -> f64| -> Vec<Vec<Option<f64>>> {
+        let cell = |cut: &String, axis: &ForceAxis| {
+            let found = misfits.iter().find(|m| m.cut == *cut && m.axis == *axis);
+            found.map(|m| of(m).abs())
+        };
+        let row = |cut| axes.iter().map(|axis| cell(cut, axis)).collect();
+        pooled.cuts.iter().map(row).collect()
     };
+    let shades = table(|m| m.sigmas);
+    let top = shades.iter().flatten().flatten().copied().fold(4.0, f64::max);
     let drawing = HeatMap {
         title: "Misfit of each cut's average force".into(),
         row_label: "Cut".into(),
         column_label: "Axis".into(),
         rows: pooled.cuts.clone(),
         columns: axes.iter().map(|a| a.label().to_string()).collect(),
-        values: pooled
-            .cuts
-            .iter()
-            .map(|c| axes.iter().map(|a| value(c, a)).collect())
-            .collect(),
-        value_label: "misfit / largest average of the axis".into(),
+        values: table(|m| m.share),
+        shades,
+        value_label: "misfit / its standard error".into(),
+        range: Some((1.0, top)),
+        log: true,
         ..Default::default()
     };
-    Some(figure(
-        format!("misfit-{}", slug(result, pooled)),
-        "Misfit of each cut's average force",
-        "How far each cut's average lies from the fitted force model, as a share of the largest average of that axis. \
-         The colours run to the largest misfit, however small it is.",
-        drawing.png(),
-    ))
+    Some(
+        figure(
+            format!("misfit-{}", slug(result, pooled)),
+            "Misfit of each cut's average force",
+            "How far each cut's average lies from the fitted force model, as a share of the largest average of that axis. \
+             Colours are multiples of the average's own standard error: what is light (up to about 2) is noise.",
+            drawing.png(),
+        )
+        .with_plot(drawing.plot()),
+    )
 }
 
 fn value_text(coefficient: &Coefficient) -> String {

@@ -142,10 +142,17 @@ pub(super) fn advice<M, I>(
 
 /// Effects that the data cannot show, with the reasons.
 pub(super) fn not_tried<M, I>(d: &Diagnosis<M, I>) -> Option<Block> {
-    let reasons: Vec<String> = d
-        .not_tried
+    // Sites of one effect often share their reason, which is said once.
+    let mut of_reason: Vec<(&str, Vec<String>)> = Vec::new();
+    for (effect, why) in &d.not_tried {
+        match of_reason.iter_mut().find(|(known, _)| *known == why) {
+            Some((_, effects)) => effects.push(effect.clone()),
+            None => of_reason.push((why, vec![effect.clone()])),
+        }
+    }
+    let reasons: Vec<String> = of_reason
         .iter()
-        .map(|(effect, why)| format!("{effect} ({why})"))
+        .map(|(why, effects)| format!("{} ({why})", listed(effects)))
         .collect();
     (!reasons.is_empty()).then(|| paragraph(format!("Not tried: {}.", reasons.join("; "))))
 }
@@ -282,6 +289,7 @@ fn maps(findings: &DiagnosisFindings, leading: &Leading, candidate: &StructureCa
         ),
         drawing.png(),
     )
+    .with_plot(drawing.plot())
 }
 
 fn parts_table(leading: &Leading, candidate: &StructureCandidate) -> Block {
@@ -386,5 +394,5 @@ fn frf(
         percent(now.noise_floor_nrms)
     );
     let file = format!("missing-frf-{}", rank + 1);
-    Some(figure(file, &drawing.title.clone(), caption, drawing.png()))
+    Some(figure(file, &drawing.title.clone(), caption, drawing.png()).with_plot(drawing.plot()))
 }

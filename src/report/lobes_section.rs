@@ -228,7 +228,7 @@ fn figures(analysis: &LobeAnalysis, file: &str, prefix: &str) -> Vec<Block> {
                 caption += " Discs are cuts that were stable, crosses cuts that chattered; those that do not agree with \
                             the limit have their names.";
             }
-            figure(name, &drawing.title.clone(), caption, drawing.png())
+            figure(name, &drawing.title.clone(), caption, drawing.png()).with_plot(drawing.plot())
         })
         .collect()
 }

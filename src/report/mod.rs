@@ -1,7 +1,7 @@
 //! Draws what the floors below computed; computes nothing itself.
 //!
-//! [`figure`] turns plain numbers into PNG images, [`number`] into readable text, and [`page`] puts
-//! both into one HTML file that needs nothing beside itself. [`campaign`] says what stands on that page, one
+//! [`figure`] turns plain numbers into PNG images, [`interactive`] into figures that answer to the mouse, [`number`] into
+//! readable text, and [`page`] puts all of them into one HTML file that needs nothing beside itself. [`campaign`] says what stands on that page, one
 //! `*_section` a part; [`tables`] writes the same numbers for other programs.
 
 pub mod campaign;
@@ -11,6 +11,7 @@ pub mod error_map_section;
 pub mod figure;
 pub mod history_section;
 mod hole_section;
+pub mod interactive;
 pub mod lobes_section;
 pub mod modal_section;
 pub mod number;
@@ -25,4 +26,4 @@ pub mod thesis_cutting;
 pub mod thesis_section;
 pub mod waveform_section;
 
-pub use page::{Block, Column, Drawing, Figure, Page, Section, Table, Written};
+pub use page::{Block, Column, Drawing, Figure, OnScreen, Page, Section, Table, Written};

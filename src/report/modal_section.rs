@@ -253,13 +253,16 @@ fn reconstruction(set: &SetModes) -> Vec<Block> {
                 decimals(100.0 * fit.noise_nrms, 1)
             ),
             picture.png(),
-        ),
+        )
+        .with_plot(picture.plot()),
         figure(
             "modal-nyquist",
             "The same FRF as mobility in the complex plane",
             "Each mode draws a circle; a dent in it is a second mode close by, a circle that runs counter-clockwise a wrong \
              sign.",
             circles.png(),
+        )
+        .with_plot(circles.plot(),
         ),
     ]
 }
@@ -359,9 +362,7 @@ fn mac(set: &SetModes) -> Option<Block> {
         value_label: "MAC".into(),
         format: CellFormat::Significant(2),
         range: Some((0.0, 1.0)),
-        log: false,
-        beside: Vec::new(),
-        table_titles: Vec::new(),
+        ..Default::default()
     };
     Some(figure(
         "modal-mac",
@@ -369,5 +370,6 @@ fn mac(set: &SetModes) -> Option<Block> {
         "Modes of one structure should be unlike each other; a high value off the diagonal is one mode found twice, or \
          too few points to tell.",
         picture.png(),
-    ))
+    )
+    .with_plot(picture.plot()))
 }

@@ -1,13 +1,16 @@
 //! The report as one HTML file: text, tables and figures in sections, nothing loaded from elsewhere.
 //!
-//! Every text is escaped by the template engine; names out of measurement files may hold anything.
+//! Figures are there as images, and most of them once more for scripts ([`super::interactive`]), which take the place of
+//! the image on a screen. Every text is escaped by the template engine; names out of measurement files may hold anything.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use minijinja::syntax::SyntaxConfig;
 use minijinja::{Environment, Value, context};
+use serde_json::json;
 
+use super::interactive::{Explorer, GLUE, Plot, packed, plotly_js};
 use crate::files::write_atomically;
 use crate::{Error, Result};
 
@@ -19,6 +22,8 @@ pub struct Page {
     pub title: String,
     pub subtitle: String,
     pub sections: Vec<Section>,
+    /// Images only, no scripts: a small file.
+    pub without_scripts: bool,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -35,6 +40,8 @@ pub struct Section {
 pub enum Block {
     Paragraph(String),
     Figure(Figure),
+    /// FRFs to choose from; nothing in a page without scripts.
+    Explorer(Box<Explorer>),
     Drawing(Drawing),
     Table(Table),
     Warning(String),
@@ -53,6 +60,17 @@ pub struct Figure {
     pub caption: String,
     /// A whole PNG file, as the functions of [`super::figure`] return it.
     pub png: Vec<u8>,
+    pub on_screen: OnScreen,
+}
+
+/// What a screen shows of a figure where scripts run; paper always gets the image.
+#[derive(Debug, Clone, Default)]
+pub enum OnScreen {
+    #[default]
+    Image,
+    Plot(Box<Plot>),
+    /// Nothing: another block of the page shows the same and more.
+    Elsewhere,
 }
 
 /// Vector graphics that live in the page only, such as a moving picture.
@@ -123,7 +141,10 @@ impl Page {
             .map_err(failed)?;
         engine.add_filter("code", |text: String| Value::from_safe_string(with_code(&text)));
         let mut ids = Names::default();
-        let mut files = Names::default();
+        let mut parts = Parts {
+            live: !self.without_scripts,
+            ..Parts::default()
+        };
         let sections = self.sections.iter().map(|section| {
             let wanted = if section.id.trim().is_empty() {
                 &section.title
@@ -134,13 +155,19 @@ impl Page {
                 id => ids.unique(&slug(wanted, "section")),
                 title => section.title.as_str(),
                 lead => section.lead.as_str(),
-                blocks => section.blocks.iter().map(|block| block.value(&mut files)).collect::<Vec<_>>(),
+                blocks => section.blocks.iter().map(|block| block.value(&mut parts)).collect::<Vec<_>>(),
             }
         });
         let sections: Vec<Value> = sections.collect();
         let version = env!("CARGO_PKG_VERSION");
-        let page =
-            context! { title => self.title.as_str(), subtitle => self.subtitle.as_str(), sections, version };
+        let scripts = parts.scripts()?;
+        let page = context! {
+            title => self.title.as_str(),
+            subtitle => self.subtitle.as_str(),
+            sections,
+            scripts,
+            version,
+        };
         engine
             .get_template("report.html")
             .and_then(|template| template.render(page))
@@ -214,8 +241,34 @@ fn images_of(html: &str, folder: &Path) -> Vec<PathBuf> {
     found
 }
 
+/// What the blocks of a page share.
+#[derive(Default)]
+struct Parts {
+    /// Whether the page has scripts.
+    live: bool,
+    files: Names,
+    figures: Vec<serde_json::Value>,
+    explorers: Vec<serde_json::Value>,
+}
+
+impl Parts {
+    /// plotly.js, the figures for it and what joins them; nothing where no figure is for scripts.
+    fn scripts(&self) -> Result<Option<Value>> {
+        if self.figures.is_empty() && self.explorers.is_empty() {
+            return Ok(None);
+        }
+        let figures = json!({ "figures": self.figures, "explorers": self.explorers }).to_string();
+        // Packed they have no character that HTML knows, whatever names they hold.
+        Ok(Some(context! {
+            plotly => Value::from_safe_string(plotly_js()?.to_owned()),
+            figures => Value::from_safe_string(packed(&figures)?),
+            glue => Value::from_safe_string(GLUE.to_owned()),
+        }))
+    }
+}
+
 impl Block {
-    fn value(&self, files: &mut Names) -> Value {
+    fn value(&self, parts: &mut Parts) -> Value {
         match self {
             Block::Paragraph(text) => context! { kind => "paragraph", text },
             Block::Warning(text) => context! { kind => "warning", text },
@@ -230,11 +283,25 @@ impl Block {
                 caption => drawing.caption.as_str(),
             },
             Block::Table(table) => table.value(),
+            Block::Explorer(_) if !parts.live => context! { kind => "nothing" },
+            Block::Explorer(explorer) => {
+                parts.explorers.push(explorer.value().clone());
+                context! { kind => "explorer", number => parts.explorers.len() - 1, every => explorer.every }
+            }
             Block::Figure(figure) => {
                 let (width, height) = png_size(&figure.png);
+                let number = match &figure.on_screen {
+                    OnScreen::Plot(plot) if parts.live => {
+                        parts.figures.push(plot.value());
+                        Some(parts.figures.len() - 1)
+                    }
+                    _ => None,
+                };
                 context! {
                     kind => "figure",
-                    file => figure.unique_name(files),
+                    plot => number,
+                    elsewhere => matches!(figure.on_screen, OnScreen::Elsewhere),
+                    file => figure.unique_name(&mut parts.files),
                     alt => if figure.alt.is_empty() { &figure.caption } else { &figure.alt },
                     caption => figure.caption.as_str(),
                     width,
@@ -339,7 +406,7 @@ fn png_size(png: &[u8]) -> (u32, u32) {
 }
 
 /// RFC 4648, section 4, with padding.
-fn base64(bytes: &[u8]) -> String {
+pub(super) fn base64(bytes: &[u8]) -> String {
     const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for chunk in bytes.chunks(3) {
@@ -385,6 +452,7 @@ mod tests {
             alt: name.to_owned(),
             caption: name.to_owned(),
             png: map.png().unwrap(),
+            ..Figure::default()
         };
         let table = Table {
             caption: name.to_owned(),
@@ -409,6 +477,7 @@ mod tests {
             title: name.to_owned(),
             subtitle: name.to_owned(),
             sections: vec![section(""), section("errors")],
+            ..Page::default()
         }
     }
 

@@ -1,7 +1,8 @@
 //! Small things that all sections of a report use.
 
 use super::number::{decimals, significant};
-use super::{Block, Figure, Section};
+use super::interactive::Plot;
+use super::{Block, Figure, OnScreen, Section};
 use crate::Result;
 
 /// A figure, or a warning in its place that says why there is none.
@@ -17,8 +18,24 @@ pub fn figure(
             alt: alt.to_string(),
             caption: caption.into(),
             png,
+            on_screen: OnScreen::Image,
         }),
         Err(error) => Block::Warning(format!("This figure is missing. {error}")),
+    }
+}
+
+impl Block {
+    /// The figure with what a screen shows in place of its image.
+    pub fn on_screen(mut self, on_screen: OnScreen) -> Self {
+        if let Block::Figure(figure) = &mut self {
+            figure.on_screen = on_screen;
+        }
+        self
+    }
+
+    /// As [`on_screen`](Self::on_screen) with a plot.
+    pub fn with_plot(self, plot: Plot) -> Self {
+        self.on_screen(OnScreen::Plot(Box::new(plot)))
     }
 }
 

@@ -1,6 +1,7 @@
 //! The surface of depth limits over spindle speed and redundancy angle.
 
 use super::figure::{CellFormat, HeatMap};
+use super::interactive::Surface;
 use super::number::{decimals, significant};
 use super::parts::{figure, paragraph};
 use super::{Block, Column, Table, lobes_section};
@@ -33,7 +34,8 @@ pub fn blocks(analysis: &LobeAnalysis, found: &RedundancyAnalysis) -> Vec<Block>
             "Enumeration and particle swarm disagree on the deepest place: use a finer step_deg.".into(),
         ));
     }
-    let map = heat_map(analysis, found);
+    let surface = surface(analysis, found);
+    let map = heat_map(&surface);
     blocks.push(figure(
         "lobes-redundancy".to_string(),
         &map.title.clone(),
@@ -41,7 +43,8 @@ pub fn blocks(analysis: &LobeAnalysis, found: &RedundancyAnalysis) -> Vec<Block>
          beyond the end of the colour scale have its last colour."
             .to_string(),
         map.png(),
-    ));
+    )
+    .with_plot(surface.plot()));
     blocks.extend(lobes_section::as_it_stands_and_recommended(
         analysis,
         r.point.angle_deg,
@@ -92,7 +95,7 @@ pub fn blocks(analysis: &LobeAnalysis, found: &RedundancyAnalysis) -> Vec<Block>
 }
 
 /// Rows are angles (all of them, empty where they cannot be used), columns the least limit over a stretch of speeds.
-fn heat_map(analysis: &LobeAnalysis, found: &RedundancyAnalysis) -> HeatMap {
+fn surface(analysis: &LobeAnalysis, found: &RedundancyAnalysis) -> Surface {
     let speeds = analysis.cases.first().map_or(&[][..], |c| &c.curve.spindle_rpm);
     let stretch = speeds.len().div_ceil(SPEEDS).max(1);
     let every = found.angles.len().div_ceil(ANGLES).max(1);
@@ -111,21 +114,32 @@ fn heat_map(analysis: &LobeAnalysis, found: &RedundancyAnalysis) -> HeatMap {
     finite.sort_by(f64::total_cmp);
     // Single deep tips must not wash out the rest.
     let top = finite.get(finite.len().saturating_sub(1) * 97 / 100).copied();
-    HeatMap {
+    let place = &found.recommendation.point;
+    Surface {
         title: format!(
             "Depth limit over spindle speed and redundancy angle, posture {}",
             found.posture
         ),
+        spindle_rpm: speeds.iter().step_by(stretch).copied().collect(),
+        angle_deg: angles,
+        depth_mm: values,
+        top_mm: top,
+        recommended: Some((place.spindle_rpm, place.angle_deg)),
+    }
+}
+
+/// The surface as the static figure has it.
+fn heat_map(surface: &Surface) -> HeatMap {
+    HeatMap {
+        title: surface.title.clone(),
         row_label: "Redundancy angle (°)".into(),
         column_label: "Spindle speed (rpm)".into(),
-        rows: angles.iter().map(|a| decimals(*a, 0)).collect(),
-        columns: speeds.iter().step_by(stretch).map(|n| decimals(*n, 0)).collect(),
-        values,
+        rows: surface.angle_deg.iter().map(|a| decimals(*a, 0)).collect(),
+        columns: surface.spindle_rpm.iter().map(|n| decimals(*n, 0)).collect(),
+        values: surface.depth_mm.clone(),
         value_label: "Depth limit (mm)".into(),
         format: CellFormat::Significant(3),
-        range: top.map(|t| (0.0, t)),
-        log: false,
-        beside: Vec::new(),
-        table_titles: Vec::new(),
+        range: surface.top_mm.map(|t| (0.0, t)),
+        ..Default::default()
     }
 }

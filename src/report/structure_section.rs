@@ -1,9 +1,10 @@
 //! The robot model against measured FRFs: FRFs, error map, parameters.
 
-use super::figure::{self, FrfCurve, FrfFigure, NoiseLevel, ParameterFigure, ParameterRow};
+use super::figure::{self, FrfCurve, FrfFigure, NoiseLevel, ParameterFigure, ParameterRow, RobotFigure};
+use super::interactive::Explorer;
 use super::number::{decimals, percent, plus_minus, significant};
 use super::parts::{count, figure, listed, paragraph};
-use super::{Block, Column, Section, Table, error_map_section, history_section};
+use super::{Block, Column, OnScreen, Section, Table, error_map_section, history_section};
 use crate::analysis::{PostureFindings, StructureFindings};
 
 /// FRFs shown as figures: the worst and the best.
@@ -101,7 +102,7 @@ pub fn frf_section(findings: &StructureFindings) -> Section {
         .take(WORST_SHOWN)
         .filter(|i| Some(*i) != best)
         .collect();
-    let mut blocks = Vec::new();
+    let mut blocks = vec![Block::Explorer(Box::new(Explorer::new(findings)))];
     if let Some(best) = best {
         blocks.push(frf_figure(
             findings,
@@ -180,7 +181,8 @@ fn frf_figure(findings: &StructureFindings, index: usize, file: &str, place: &st
         percent(after.nrms),
         percent(after.noise_floor_nrms),
     );
-    figure(file, &drawing.title.clone(), caption, drawing.png())
+    // The explorer shows it on a screen.
+    figure(file, &drawing.title.clone(), caption, drawing.png()).on_screen(OnScreen::Elsewhere)
 }
 
 /// FRF names often hold the posture already.
@@ -370,7 +372,7 @@ pub fn posture_section(postures: &[PostureFindings]) -> Section {
         id: "postures".into(),
         title: "The robot at the postures".into(),
         lead,
-        blocks: vec![Block::Table(Table {
+        blocks: vec![robot(postures), Block::Table(Table {
             caption: "Static stiffness (MN/m) and natural frequencies".into(),
             columns,
             rows,
@@ -381,4 +383,19 @@ pub fn posture_section(postures: &[PostureFindings]) -> Section {
             ],
         })],
     }
+}
+
+fn robot(postures: &[PostureFindings]) -> Block {
+    let drawing = RobotFigure {
+        title: "The robot as a stick figure".into(),
+        postures: postures.iter().map(|p| (p.id.clone(), p.chain_m.clone())).collect(),
+    };
+    figure(
+        "robot-postures",
+        "The robot as a stick figure at each posture",
+        "Base, joints, flange and tool centre point at each posture. On a screen the mouse turns the robot, and the list \
+         chooses the posture.",
+        drawing.png(),
+    )
+    .with_plot(drawing.plot())
 }

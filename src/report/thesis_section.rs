@@ -16,6 +16,7 @@ pub fn page(findings: &ThesisFindings) -> Page {
         title: "The source thesis put right".into(),
         subtitle: "ABB IRB 6640: published model, measurement and this model side by side".into(),
         sections: vec![section(findings)],
+        ..Page::default()
     }
 }
 

@@ -5,8 +5,8 @@ use super::diagnosis_section::{
 };
 use super::figure::{BarSeries, CellFormat, HeatMap, SideBySide, WaveformFigure, WaveformPanel};
 use super::number::{percent, significant};
-use super::parts::{figure, listed, paragraph};
-use super::{Block, Section};
+use super::parts::{figure, listed, paragraph, with_error};
+use super::{Block, Column, Section, Table};
 use crate::analysis::CuttingFindings;
 use crate::analysis::diagnosis::CuttingView;
 use crate::campaign::{Campaign, Process};
@@ -68,7 +68,7 @@ fn comparison(findings: &CuttingFindings) -> Section {
     if let Some(held_out) = held_out {
         text += &format!(" On cuts left out of the fit it is {}.", percent(held_out.nrms()));
     }
-    let mut blocks = vec![paragraph(text)];
+    let mut blocks = vec![paragraph(text), parameters(findings)];
     blocks.push(misfit_map(findings));
     blocks.extend(orders(findings));
     let mut worst: Vec<usize> = (0..now.cuts.len()).collect();
@@ -89,6 +89,26 @@ fn comparison(findings: &CuttingFindings) -> Section {
     }
 }
 
+/// The force model as it stands, with what was added to it.
+fn parameters(findings: &CuttingFindings) -> Block {
+    let rows = findings.diagnosis.baseline.calibration.parameters.iter().map(|p| {
+        let unit = if p.unit == "1" { "" } else { p.unit };
+        let note = if p.at_bound { "at the end of its range" } else { "" };
+        vec![p.name.clone(), with_error(p.value, p.std_error), unit.to_string(), note.to_string()]
+    });
+    Block::Table(Table {
+        caption: "Parameters of the force model, fitted to the waveforms, ± standard error".into(),
+        columns: vec![
+            Column::text("parameter"),
+            Column::number("value"),
+            Column::text("unit"),
+            Column::text(""),
+        ],
+        rows: rows.collect(),
+        notes: vec![],
+    })
+}
+
 fn misfit_map(findings: &CuttingFindings) -> Block {
     let cuts = &findings.now.comparison.cuts;
     let mut columns: Vec<String> = Vec::new();
@@ -101,6 +121,8 @@ fn misfit_map(findings: &CuttingFindings) -> Block {
         let found = cut.times_noise.iter().find(|(name, _)| name == axis);
         found.and_then(|(_, times)| *times)
     };
+    let all = cuts.iter().flat_map(|c| c.times_noise.iter().filter_map(|(_, times)| *times));
+    let top = all.fold(2.0, f64::max);
     let drawing = HeatMap {
         title: "Force model: error in multiples of the noise".into(),
         row_label: "Cut".into(),
@@ -111,8 +133,10 @@ fn misfit_map(findings: &CuttingFindings) -> Block {
             .map(|c| columns.iter().map(|axis| value(c, axis)).collect())
             .collect(),
         columns,
-        value_label: "error / noise".into(),
+        value_label: "error / noise (1 = noise alone)".into(),
         format: CellFormat::Significant(2),
+        range: Some((1.0, top)),
+        log: true,
         ..Default::default()
     };
     figure(
@@ -121,6 +145,7 @@ fn misfit_map(findings: &CuttingFindings) -> Block {
         "Error of the waveform by cut and axis in multiples of the noise; about 1 is noise alone.",
         drawing.png(),
     )
+    .with_plot(drawing.plot())
 }
 
 /// Orders of rotation with most error, for milling.
@@ -222,7 +247,7 @@ fn waveform(findings: &CuttingFindings, rank: usize, cut: usize) -> Block {
         models,
         panels,
     };
-    figure(format!("waveform-{}", rank + 1), &title, caption, drawing.png())
+    figure(format!("waveform-{}", rank + 1), &title, caption, drawing.png()).with_plot(drawing.plot())
 }
 
 fn missing(campaign: &Campaign, findings: &CuttingFindings) -> Section {

@@ -32,11 +32,11 @@ pub struct ForceRecord {
     pub steady_s: Option<(f64, f64)>,
 }
 
-const ENVELOPE: Color = Color(112, 128, 146);
-const DRIFT: Stroke = Stroke::dashed(style::RED, 2.0, &[9.0, 4.0]);
-const LEVEL: Stroke = Stroke::solid(style::INK, 2.2);
-const AIR: (Color, f64) = (style::PALE_BLUE, 0.34);
-const STEADY: (Color, f64) = (style::PALE_GREEN, 0.55);
+pub(in crate::report) const ENVELOPE: Color = Color(112, 128, 146);
+pub(in crate::report) const DRIFT: Stroke = Stroke::dashed(style::RED, 2.0, &[9.0, 4.0]);
+pub(in crate::report) const LEVEL: Stroke = Stroke::solid(style::INK, 2.2);
+pub(in crate::report) const AIR: (Color, f64) = (style::PALE_BLUE, 0.34);
+pub(in crate::report) const STEADY: (Color, f64) = (style::PALE_GREEN, 0.55);
 
 impl ForceRecord {
     /// # Errors

@@ -22,6 +22,16 @@ impl FrfCurve {
         self.frequency_hz.iter().copied().zip(self.value.iter().copied())
     }
 
+    /// Frequency, Hz, and phase, degrees, from `lowest` to `lowest` + 360°.
+    pub(in crate::report) fn phases(&self, lowest: f64) -> Vec<(f64, f64)> {
+        self.points().map(|(f, v)| (f, degrees(v, lowest))).collect()
+    }
+
+    /// The same for a line, with a gap where it would jump from one end of the range to the other.
+    pub(in crate::report) fn phases_of_line(&self, lowest: f64) -> Vec<(f64, f64)> {
+        broken_at_wraps(self, lowest)
+    }
+
     pub(super) fn is_empty(&self) -> bool {
         !self
             .points()
@@ -166,6 +176,11 @@ impl FrfFigure {
         })
     }
 
+    /// Where the phase axis begins, degrees.
+    pub(in crate::report) fn lowest_phase(&self) -> f64 {
+        lowest_phase(&self.measured.iter().chain(&self.models).collect::<Vec<_>>())
+    }
+
     fn legend(&self, noise: bool) -> Vec<(Swatch, String)> {
         let measured = self.measured.iter().map(|m| {
             let sign = Swatch::Sign(MEASURED.0, MEASURED.1, style::MEASURED);
@@ -199,7 +214,7 @@ fn degrees(value: Complex64, lowest: f64) -> f64 {
 }
 
 /// Where the phase axis begins: a measured phase around ±180° must not jump between both edges of the figure.
-fn lowest_phase(curves: &[&FrfCurve]) -> f64 {
+pub(in crate::report) fn lowest_phase(curves: &[&FrfCurve]) -> f64 {
     let jumps = |lowest: f64| -> usize {
         let of = |curve: &&FrfCurve| {
             let angles: Vec<f64> = curve.points().map(|(_, v)| degrees(v, lowest)).collect();

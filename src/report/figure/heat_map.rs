@@ -28,6 +28,8 @@ pub struct HeatMap {
     pub columns: Vec<String>,
     /// One inner vector a row; missing or non-finite cells stay empty.
     pub values: Vec<Vec<Option<f64>>>,
+    /// What gives the colours where it is not the values, such as their ratio to the noise; for a single table.
+    pub shades: Vec<Vec<Option<f64>>>,
     /// What the colours mean, such as `nrms error`.
     pub value_label: String,
     pub format: CellFormat,
@@ -54,15 +56,9 @@ impl HeatMap {
             .chain(&self.beside)
             .map(|v| Cells(v))
             .collect();
-        let cells = tables.iter().flat_map(|t| t.all(rows, columns));
-        let Some((least, largest)) = extent(cells) else {
+        let Some((low, high)) = self.scale() else {
             return Err(nothing_to_draw(&self.title, "no cell has a finite value"));
         };
-        let given = self
-            .range
-            .filter(|(low, high)| usable(*low) && usable(*high) && high > low);
-        let (low, high) = given.unwrap_or((least.min(0.0), largest));
-        let high = if high > low { high } else { low + 1.0 };
         let log = self.log && low > 0.0;
 
         let widest = self
@@ -118,7 +114,8 @@ impl HeatMap {
                     right: left + table_width,
                     ..sheet
                 };
-                self.draw_cells(canvas, &sheet, cells);
+                let shades = if i == 0 { Cells(self.coloured()) } else { *cells };
+                self.draw_cells(canvas, &sheet, cells, &shades);
                 self.draw_names(canvas, &sheet, flat, i == 0);
                 if let Some(title) = self.table_titles.get(i) {
                     let middle = (0.5 * (sheet.left + sheet.right), top - 13.0);
@@ -138,14 +135,48 @@ impl HeatMap {
         })
     }
 
-    fn written(&self, value: f64) -> String {
+    /// The ends of the colour scale; `None` where no cell has a finite value.
+    pub(in crate::report) fn scale(&self) -> Option<(f64, f64)> {
+        let (rows, columns) = (self.rows.len(), self.columns.len());
+        let cells = |table: &[Vec<Option<f64>>]| extent(Cells(table).all(rows, columns));
+        let all: Vec<(f64, f64)> = std::iter::once(self.coloured())
+            .chain(self.beside.iter().map(Vec::as_slice))
+            .filter_map(cells)
+            .collect();
+        cells(&self.values).or_else(|| self.beside.iter().find_map(|t| cells(t)))?;
+        let least = all.iter().map(|e| e.0).reduce(f64::min)?;
+        let largest = all.iter().map(|e| e.1).reduce(f64::max)?;
+        let given = self
+            .range
+            .filter(|(low, high)| usable(*low) && usable(*high) && high > low);
+        let (low, high) = given.unwrap_or((least.min(0.0), largest));
+        Some((low, if high > low { high } else { low + 1.0 }))
+    }
+
+    /// What gives the colours of the first table.
+    pub(in crate::report) fn coloured(&self) -> &[Vec<Option<f64>>] {
+        match self.shades.is_empty() {
+            true => &self.values,
+            false => &self.shades,
+        }
+    }
+
+    /// How the numbers of the colour scale are written.
+    pub(in crate::report) fn scale_format(&self) -> CellFormat {
+        match self.shades.is_empty() {
+            true => self.format,
+            false => CellFormat::Significant(2),
+        }
+    }
+
+    pub(in crate::report) fn written(&self, value: f64) -> String {
         match self.format {
             CellFormat::Percent => percent(value),
             CellFormat::Significant(digits) => significant(value, digits.min(6)),
         }
     }
 
-    fn draw_cells(&self, canvas: &Canvas, sheet: &Sheet, cells: &Cells) {
+    fn draw_cells(&self, canvas: &Canvas, sheet: &Sheet, cells: &Cells, shades: &Cells) {
         let widest = cells
             .all(self.rows.len(), self.columns.len())
             .map(|v| style::TICK.width(&self.written(v)))
@@ -160,7 +191,10 @@ impl HeatMap {
                     canvas.text(middle, "–", style::TICK.align(Align::Center).color(style::GREY));
                     continue;
                 };
-                let color = style::ramp(sheet.share(value));
+                let color = match shades.value(row, column) {
+                    Some(shade) => style::ramp(sheet.share(shade)),
+                    None => style::WHITE,
+                };
                 canvas.rect((x, y), far, color, 1.0);
                 if with_numbers {
                     let ink = if color.lightness() > 0.52 {
@@ -247,7 +281,7 @@ impl HeatMap {
             (x, sheet.top),
         ];
         canvas.polyline(&corners, style::FRAME);
-        let unit = if self.format == CellFormat::Percent {
+        let unit = if self.scale_format() == CellFormat::Percent {
             100.0
         } else {
             1.0
@@ -264,7 +298,7 @@ impl HeatMap {
             }
             let y = sheet.top + length * (1.0 - share);
             canvas.line((x + width, y), (x + width + 5.0, y), style::FRAME);
-            let value = match self.format {
+            let value = match self.scale_format() {
                 CellFormat::Percent => format!("{} %", significant(tick.at, 3).trim_end_matches(".0")),
                 CellFormat::Significant(digits) => significant(tick.at, digits.clamp(2, 6)),
             };
@@ -292,6 +326,7 @@ struct Sheet {
 const GAP: f64 = 18.0;
 
 /// A table of values.
+#[derive(Clone, Copy)]
 struct Cells<'a>(&'a [Vec<Option<f64>>]);
 
 impl Cells<'_> {

@@ -59,8 +59,8 @@ pub struct LobesFigure {
     pub depth_cap_mm: Option<f64>,
 }
 
-const BEFORE: Stroke = Stroke::dashed(style::GREY, 1.9, &[9.0, 5.0]);
-const BAND: Color = Color(198, 216, 232);
+pub(in crate::report) const BEFORE: Stroke = Stroke::dashed(style::GREY, 1.9, &[9.0, 5.0]);
+pub(in crate::report) const BAND: Color = Color(198, 216, 232);
 const ALONE: f64 = 470.0;
 const STACKED: f64 = 290.0;
 const BETWEEN: f64 = 26.0;
@@ -88,13 +88,13 @@ impl LobePanel {
     }
 
     /// None where there is nothing to see.
-    fn deepest(&self) -> Option<f64> {
+    pub(in crate::report) fn deepest(&self) -> Option<f64> {
         let markers = self.usable_markers().map(|m| m.depth_mm);
         extent(self.points().map(|p| p.1).chain(markers)).map(|(_, deepest)| deepest)
     }
 
     /// High enough to see the pockets, low enough to see the limit: single sharp peaks run out at the top.
-    fn cap(&self, deepest: f64) -> f64 {
+    pub(in crate::report) fn cap(&self, deepest: f64) -> f64 {
         let deepest_marker = self.usable_markers().map(|m| m.depth_mm).fold(0.0, f64::max);
         let depths = || self.curves.iter().flat_map(LobeCurve::points).map(|p| p.1);
         let low = quantile(depths(), 0.05).unwrap_or(0.0).max(0.0);
@@ -276,7 +276,7 @@ impl LobesFigure {
     }
 }
 
-fn sign(outcome: LobeOutcome) -> (Marker, f64, Color) {
+pub(in crate::report) fn sign(outcome: LobeOutcome) -> (Marker, f64, Color) {
     match outcome {
         LobeOutcome::Stable => (Marker::Disc, 11.0, style::INK),
         LobeOutcome::Chatter => (Marker::Cross, 12.0, style::RED),

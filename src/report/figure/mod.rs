@@ -5,22 +5,23 @@
 //! (DejaVu Sans, see `fonts/LICENSE.txt`), so no system font is needed.
 
 mod axis;
-mod canvas;
+pub(in crate::report) mod canvas;
 mod panel;
-mod style;
+pub(in crate::report) mod style;
 
 mod coherence;
-mod force_record;
+pub(in crate::report) mod force_record;
 mod frf;
 mod heat_map;
 mod history;
 mod hole;
-mod lobes;
+pub(in crate::report) mod lobes;
 mod mode_shapes;
 mod nyquist;
 mod parameters;
 mod regression;
 mod resonances;
+mod robot;
 mod side_by_side;
 mod stabilisation;
 mod waveform;
@@ -32,6 +33,7 @@ mod tests;
 
 pub use coherence::{CoherenceCurve, CoherenceFigure};
 pub use force_record::{ForceChannel, ForceRecord};
+pub(in crate::report) use frf::lowest_phase;
 pub use frf::{FrfCurve, FrfFigure, NoiseLevel};
 pub use heat_map::{CellFormat, HeatMap};
 pub use history::{HistoryFigure, Revision};
@@ -42,6 +44,7 @@ pub use nyquist::NyquistFigure;
 pub use parameters::{Estimate, ParameterFigure, ParameterRow};
 pub use regression::{RegressionFigure, RegressionPoint, RegressionSeries};
 pub use resonances::{ResonanceFigure, ResonanceRow};
+pub use robot::RobotFigure;
 pub use side_by_side::{BarSeries, SideBySide};
 pub use stabilisation::{StabilisationFigure, StabilisationPole};
 pub use waveform::{WaveformFigure, WaveformPanel};

@@ -1,6 +1,6 @@
 //! Mode shapes on a stick figure: one small picture a mode, at rest and at both ends of the swing.
 
-use super::canvas::{Align, Color, Marker, Stroke, paint};
+use super::canvas::{Align, Canvas, Color, Marker, Stroke, paint};
 use super::panel::{Header, Swatch};
 use super::{WIDTH, nothing_to_draw, style};
 use crate::Result;
@@ -22,14 +22,14 @@ pub struct ModeShapesFigure {
     pub pictures: Vec<StickPicture>,
 }
 
-const COLUMNS: usize = 3;
-const HEIGHT: f64 = 330.0;
+pub(super) const COLUMNS: usize = 3;
+pub(super) const HEIGHT: f64 = 330.0;
 /// Largest displacement drawn, as part of the figure's size.
 const SWING: f64 = 0.18;
 /// Time in which a drawn mode swings once, s.
 const PERIOD_S: f64 = 2.0;
 const AT_REST: Stroke = Stroke::solid(style::GREY, 4.0);
-const MOVED: Stroke = Stroke::solid(style::BLUE, 2.4);
+pub(super) const MOVED: Stroke = Stroke::solid(style::BLUE, 2.4);
 const OTHER_WAY: Stroke = Stroke::dashed(style::BLUE, 1.6, &[7.0, 5.0]);
 const AXIS: Stroke = Stroke::solid(style::INK, 1.4);
 
@@ -138,7 +138,7 @@ impl ModeShapesFigure {
 }
 
 /// Where a mode's points lie on the sheet.
-struct Layout<'a> {
+pub(super) struct Layout<'a> {
     picture: &'a StickPicture,
     /// Factor on displacements.
     swing: f64,
@@ -150,7 +150,7 @@ struct Layout<'a> {
 }
 
 impl<'a> Layout<'a> {
-    fn new(picture: &'a StickPicture, at: (f64, f64), size: (f64, f64)) -> Self {
+    pub(super) fn new(picture: &'a StickPicture, at: (f64, f64), size: (f64, f64)) -> Self {
         let length = |u: &[f64; 3]| u.iter().map(|v| v * v).sum::<f64>().sqrt();
         let span = |k: usize| {
             let values = || picture.chain.iter().map(|p| p[k]);
@@ -198,13 +198,13 @@ impl<'a> Layout<'a> {
     }
 
     /// The arm at `factor` times its swing.
-    fn chain(&self, factor: f64) -> Vec<(f64, f64)> {
+    pub(super) fn chain(&self, factor: f64) -> Vec<(f64, f64)> {
         let pairs = self.picture.chain.iter().zip(&self.picture.chain_moved);
         pairs.map(|(p, u)| self.place(p, u, factor)).collect()
     }
 }
 
-fn draw(canvas: &super::canvas::Canvas, picture: &StickPicture, at: (f64, f64), size: (f64, f64)) {
+fn draw(canvas: &Canvas, picture: &StickPicture, at: (f64, f64), size: (f64, f64)) {
     let layout = Layout::new(picture, at, size);
     let line = |factor: f64, stroke: Stroke| {
         let points = layout.chain(factor);
@@ -221,12 +221,18 @@ fn draw(canvas: &super::canvas::Canvas, picture: &StickPicture, at: (f64, f64), 
         canvas.line(ends[0], ends[1], Stroke::solid(style::RED, 1.6));
         canvas.marker(ends[1], Marker::Disc, 4.5, style::RED);
     }
-    canvas.text(
-        (at.0 + 0.5 * size.0, at.1 + 14.0),
-        &picture.title,
-        style::AXIS.align(Align::Center),
-    );
-    // Directions of the base frame.
+    picture_title(canvas, picture, at, size);
+    base_axes(canvas, at, size);
+}
+
+pub(super) fn picture_title(canvas: &Canvas, picture: &StickPicture, at: (f64, f64), size: (f64, f64)) {
+    let middle = (at.0 + 0.5 * size.0, at.1 + 14.0);
+    let title = style::AXIS.fit(&picture.title, size.0 - 20.0);
+    canvas.text(middle, &title, style::AXIS.align(Align::Center));
+}
+
+/// Directions of the base frame, in the lower left corner.
+pub(super) fn base_axes(canvas: &Canvas, at: (f64, f64), size: (f64, f64)) {
     let origin = (at.0 + 42.0, at.1 + size.1 - 30.0);
     for (k, name) in ["x", "y", "z"].iter().enumerate() {
         let mut unit = [0.0; 3];

@@ -443,6 +443,7 @@ fn the_gallery_makes_a_report_of_bearable_size() {
         title: "Cell 7, spring check".into(),
         subtitle: "Campaign report, 4 postures, 36 FRFs, 16 cuts".into(),
         sections: vec![summary, all],
+        ..Page::default()
     };
     assert!(page.html().unwrap().len() < 2_000_000);
     if let Some(folder) = std::env::var_os("LOBESTONE_GALLERY") {

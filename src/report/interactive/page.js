@@ -1,0 +1,189 @@
+// Joins the figures of a report: unpacks plotly.js and the figures, draws them, and lets models and FRFs be chosen.
+// Where the browser lacks what this needs, the page keeps its static images.
+"use strict";
+(async () => {
+  const config = { responsive: true, displaylogo: false, scrollZoom: false };
+  const unpack = async (id) => {
+    const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (c) => c.charCodeAt(0));
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+    return new Response(stream).text();
+  };
+  const sums = (differences) => {
+    let sum = 0;
+    return differences.map((d) => (sum += d));
+  };
+  // As packed.rs packs them: ln of the magnitude in 1e-4, phase in 0.01°.
+  const magnitudes = (packed) => sums(packed).map((n) => (n > -1e6 ? Number(Math.exp(n * 1e-4).toPrecision(5)) : null));
+  const phases = (packed, lowest) => sums(packed).map((n) => lowest + ((((n * 0.01 - lowest) % 360) + 360) % 360));
+  // A line has a gap where the phase jumps from one end of its range to the other.
+  const unbroken = (x, y) => {
+    const points = { x: [], y: [] };
+    y.forEach((value, k) => {
+      if (k > 0 && Math.abs(value - y[k - 1]) > 180) { points.x.push(x[k]); points.y.push(null); }
+      points.x.push(x[k]);
+      points.y.push(value);
+    });
+    return points;
+  };
+  const inPlane = (magnitude, phase) => ({
+    x: magnitude.map((m, k) => m * Math.cos((phase[k] * Math.PI) / 180)),
+    y: magnitude.map((m, k) => m * Math.sin((phase[k] * Math.PI) / 180)),
+  });
+
+  class Explorer {
+    constructor(root, data) {
+      Object.assign(this, { root, data, frf: data.worst[0] ?? 0, model: data.models.length - 1, band: null, maps: [] });
+      this.chosen = {};
+      for (const key of ["posture", "response", "reference"]) {
+        const select = (this.chosen[key] = root.querySelector(`select[name=${key}]`));
+        select.addEventListener("change", () => this.choose(key, select.value));
+      }
+      root.querySelector(".worse").addEventListener("click", () => this.step(-1));
+      root.querySelector(".better").addEventListener("click", () => this.step(1));
+    }
+
+    /** Buttons for the models; every bar of them on the page says the same. */
+    addBar(bar) {
+      this.data.models.forEach((model, k) => {
+        const button = document.createElement("button");
+        button.type = "button";
+        button.textContent = `${model.title}: ${model.error}`;
+        button.addEventListener("click", () => this.show(this.frf, k));
+        bar.append(button);
+      });
+      (this.bars ??= []).push(bar);
+      this.press();
+    }
+
+    press() {
+      for (const bar of this.bars ?? []) {
+        [...bar.children].forEach((button, k) => button.setAttribute("aria-pressed", String(k === this.model)));
+      }
+    }
+
+    /** The FRF with `value` for `key` that shares most with the present one. */
+    choose(key, value) {
+      const now = this.data.frfs[this.frf];
+      const shared = (f) => ["posture", "response", "reference"].filter((k) => k !== key && f[k] === now[k]).length;
+      const those = this.data.frfs.map((f, k) => [f, k]).filter(([f]) => f[key] === value);
+      those.sort((a, b) => shared(b[0]) - shared(a[0]));
+      this.band = null;
+      this.show(those[0][1], this.model);
+    }
+
+    /** Along the FRFs ordered by error against noise. */
+    step(by) {
+      const order = this.data.worst;
+      const place = Math.min(Math.max(order.indexOf(this.frf) + by, 0), order.length - 1);
+      this.band = null;
+      this.show(order[place], this.model);
+    }
+
+    fill() {
+      const { frfs } = this.data;
+      const now = frfs[this.frf];
+      const offered = {
+        posture: frfs,
+        response: frfs.filter((f) => f.posture === now.posture),
+        reference: frfs.filter((f) => f.posture === now.posture && f.response === now.response),
+      };
+      for (const [key, those] of Object.entries(offered)) {
+        const names = [...new Set(those.map((f) => f[key]))];
+        this.chosen[key].replaceChildren(...names.map((name) => new Option(name, name, false, name === now[key])));
+      }
+    }
+
+    async show(frf, model) {
+      Object.assign(this, { frf, model });
+      const { data, root } = this;
+      const f = data.frfs[frf];
+      const m = data.models[model];
+      this.fill();
+      this.press();
+      root.querySelector(".stated").textContent =
+        `Posture ${f.posture}, response ${f.response}, force ${f.reference}, model ${m.title}: error ${m.errors[frf]} ` +
+        `(${m.times[frf]} times the noise of this FRF, ${f.noise}). All FRFs together: error ${m.error}, noise ${data.noise}.`;
+      root.dataset.frf = frf;
+      root.dataset.model = model;
+      const x = data.grids[f.grid];
+      const measured = { magnitude: magnitudes(f.magnitude), phase: phases(f.phase, f.lowest) };
+      const modelled = { magnitude: magnitudes(m.magnitude[frf]), phase: phases(m.phase[frf], f.lowest) };
+      const filled = [
+        { x, y: magnitudes(f.level) },
+        { x, y: measured.magnitude },
+        { x, y: measured.phase },
+        { x, y: modelled.magnitude },
+        unbroken(x, modelled.phase),
+      ];
+      const name = (trace) => (trace.name === "model" ? { ...trace, name: `model ${escape(m.title)}` } : trace);
+      const bode = data.bode.data.map((trace, k) => ({ ...name(trace), ...filled[k] }));
+      const plane = [measured, modelled].map((c) => ({ ...inPlane(c.magnitude, c.phase), customdata: x }));
+      const nyquist = data.nyquist.data.map((trace, k) => ({ ...name(trace), ...plane[k] }));
+      // What was zoomed into stays in view while models are changed, not when another FRF comes.
+      const look = (layout) => ({ ...structuredClone(layout), uirevision: `${frf} ${this.band}` });
+      const layout = look(data.bode.layout);
+      layout.yaxis2.range = [f.lowest - 15, f.lowest + 375];
+      if (this.band) {
+        layout.shapes = [{ type: "rect", layer: "below", xref: "x", yref: "paper", x0: this.band[0], x1: this.band[1],
+          y0: 0, y1: 1, line: { width: 0 }, fillcolor: "rgba(250,178,112,0.28)" }];
+      }
+      await Plotly.react(root.querySelector(".bode"), bode, layout, config);
+      await Plotly.react(root.querySelector(".nyquist"), nyquist, look(data.nyquist.layout), config);
+      for (const map of this.maps) await map(model);
+    }
+  }
+
+  const escape = (name) => name.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
+
+  /** Draws a figure in place of its image; maps of the error follow the model of `explorer` and lead to its FRFs. */
+  const draw = async (figure, plot, explorer) => {
+    const heading = figure.querySelector(".heading");
+    const div = figure.querySelector(".plot");
+    heading.textContent = plot.title;
+    div.style.height = `${plot.height}px`;
+    await Plotly.newPlot(div, plot.data, plot.layout, config);
+    if (explorer && plot.stages) {
+      const bar = document.createElement("div");
+      bar.className = "models";
+      heading.before(bar);
+      explorer.addBar(bar);
+      explorer.maps.push(async (model) => {
+        const stage = plot.stages[model];
+        heading.textContent = stage.title;
+        await Plotly.restyle(div, { z: [stage.z], text: [stage.text] }, [0]);
+      });
+    }
+    if (explorer && plot.links) {
+      div.on("plotly_click", (event) => {
+        const [row, column] = [].concat(event.points[0].pointIndex);
+        const frf = plot.links.frf[row]?.[column];
+        if (!Number.isInteger(frf)) return;
+        explorer.band = plot.links.bands_hz[column] ?? null;
+        explorer.show(frf, explorer.model);
+        explorer.root.scrollIntoView({ behavior: "smooth" });
+      });
+    }
+  };
+
+  const library = document.createElement("script");
+  library.textContent = await unpack("plotly");
+  document.head.append(library);
+  const { figures, explorers } = JSON.parse(await unpack("figures"));
+  document.documentElement.classList.add("live");
+  let explorer = null;
+  for (const element of document.querySelectorAll("[data-plot], [data-explorer]")) {
+    if (element.dataset.explorer !== undefined) {
+      explorer = new Explorer(element, explorers[element.dataset.explorer]);
+      explorer.addBar(element.querySelector(".models"));
+      await explorer.show(explorer.frf, explorer.model);
+    } else {
+      await draw(element, figures[element.dataset.plot], explorer);
+    }
+    // Lets the page answer between two figures.
+    await new Promise((done) => setTimeout(done));
+  }
+  document.documentElement.dataset.ready = "true";
+})().catch((error) => {
+  document.documentElement.classList.remove("live");
+  console.error(error);
+});

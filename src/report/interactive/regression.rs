@@ -1,0 +1,77 @@
+//! Average force over feed with the fitted lines, and below it what they leave over.
+
+use serde_json::{Value, json};
+
+use super::{Plot, axis, axis_name, line, numbers, sign, stacked, text, with};
+use crate::report::figure::canvas::Marker;
+use crate::report::figure::{RegressionFigure, RegressionSeries, style};
+
+impl RegressionFigure {
+    pub fn plot(&self) -> Plot {
+        let mut data = Vec::new();
+        let feeds = self.series.iter().flat_map(|s| &s.points).map(|p| p.x);
+        let most = feeds.filter(|x| x.is_finite()).fold(0.0, f64::max);
+        for (i, series) in self.series.iter().enumerate() {
+            let stroke = style::series(i);
+            let name = text(&series.label);
+            if let Some((intercept, slope)) = series.line {
+                let x = [0.0, 1.05 * most];
+                data.push(json!({
+                    "type": "scatter",
+                    "mode": "lines",
+                    "name": name,
+                    "legendgroup": name,
+                    "showlegend": false,
+                    "hoverinfo": "skip",
+                    "line": line(stroke),
+                    "x": numbers(x),
+                    "y": numbers(x.map(|x| intercept + slope * x)),
+                }));
+            }
+            let values = series.points.iter().map(|p| p.y);
+            data.push(signs(series, i, 0, numbers(values)));
+            if let Some((intercept, slope)) = series.line {
+                let rests = series.points.iter().map(|p| p.y - intercept - slope * p.x);
+                data.push(signs(series, i, 1, numbers(rests)));
+            }
+        }
+        let force = axis(&text(&self.y_label));
+        let rest = with(axis("Residual"), json!({ "zeroline": true, "zerolinecolor": "#3c4046" }));
+        Plot {
+            title: self.title.clone(),
+            height_px: 640.0,
+            data,
+            layout: stacked(
+                with(axis(&text(&self.x_label)), json!({ "rangemode": "tozero" })),
+                vec![(with(force, json!({ "zeroline": true, "zerolinecolor": "#9aa0a8" })), 2.2), (rest, 1.0)],
+            ),
+            ..Plot::default()
+        }
+    }
+}
+
+/// The cuts of a series in the upper (0) or lower (1) panel.
+fn signs(series: &RegressionSeries, i: usize, panel: usize, y: Value) -> Value {
+    let stroke = style::series(i);
+    let name = text(&series.label);
+    let errors = series.points.iter().map(|p| p.std_error.unwrap_or(0.0));
+    let shape = |excluded| if excluded { Marker::Cross } else { style::series_marker(i) };
+    let mut marker = sign(style::series_marker(i), 9.0, stroke.color);
+    let symbols: Vec<&str> = series.points.iter().map(|p| super::symbol(shape(p.excluded))).collect();
+    if series.points.iter().any(|p| p.excluded) {
+        marker["symbol"] = json!(symbols);
+    }
+    json!({
+        "type": "scatter",
+        "mode": "markers",
+        "name": name,
+        "legendgroup": name,
+        "showlegend": panel == 0,
+        "yaxis": axis_name('y', panel),
+        "marker": marker,
+        "x": numbers(series.points.iter().map(|p| p.x)),
+        "y": y,
+        "error_y": { "type": "data", "array": numbers(errors), "thickness": 1.2, "width": 3 },
+        "hovertemplate": "%{x:.4g}: %{y:.4g}",
+    })
+}

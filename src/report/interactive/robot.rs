@@ -1,0 +1,78 @@
+//! The robot as a stick figure that can be turned, at each posture.
+
+use serde_json::{Value, json};
+
+use super::{Plot, css, layout, numbers, text};
+use crate::report::figure::{RobotFigure, style};
+
+impl RobotFigure {
+    pub fn plot(&self) -> Plot {
+        let all = || self.postures.iter().flat_map(|(_, chain)| chain).flatten();
+        let reach = all().fold(0.1, |most: f64, v| most.max(v.abs())) * 1.05;
+        let shown = |i: usize, chosen: usize| if i == chosen { json!(true) } else { json!("legendonly") };
+        let data = self.postures.iter().enumerate().map(|(i, (name, chain))| {
+            let stroke = style::series(i);
+            let last = chain.len().saturating_sub(1);
+            let names = (0..chain.len()).map(|k| match k {
+                0 => "base".to_string(),
+                k if k == last => "tool centre point".to_string(),
+                k if k + 1 == last => "flange".to_string(),
+                k => format!("joint {k}"),
+            });
+            let coordinate = |k: usize| numbers(chain.iter().map(|p| p[k]));
+            json!({
+                "type": "scatter3d",
+                "mode": "lines+markers",
+                "name": text(name),
+                "visible": shown(i, 0),
+                "x": coordinate(0),
+                "y": coordinate(1),
+                "z": coordinate(2),
+                "text": names.collect::<Vec<_>>(),
+                "line": { "color": css(stroke.color), "width": 9 },
+                "marker": { "color": css(style::INK), "size": 4 },
+                "hovertemplate": "%{text}: %{x:.3f}, %{y:.3f}, %{z:.3f} m",
+            })
+        });
+        let data: Vec<Value> = data.collect();
+        let button = |label: String, visible: Vec<Value>| json!({ "label": label, "method": "restyle", "args": ["visible", visible] });
+        let mut buttons: Vec<Value> = self
+            .postures
+            .iter()
+            .enumerate()
+            .map(|(chosen, (name, _))| {
+                button(text(name), (0..self.postures.len()).map(|i| shown(i, chosen)).collect())
+            })
+            .collect();
+        buttons.push(button("all".into(), vec![json!(true); self.postures.len()]));
+        let axis = |title: &str, low: f64| {
+            json!({ "title": { "text": title }, "range": [low, reach], "backgroundcolor": "#fff", "gridcolor": "#dee1e5",
+                    "zerolinecolor": "#9aa0a8" })
+        };
+        let floor = all_z(&self.postures).fold(0.0, f64::min);
+        let mut layout = layout();
+        layout["scene"] = json!({
+            "xaxis": axis("x (m)", -reach),
+            "yaxis": axis("y (m)", -reach),
+            "zaxis": axis("z (m)", floor),
+            "aspectmode": "data",
+            "camera": { "eye": { "x": 1.3, "y": 1.3, "z": 0.7 } },
+        });
+        layout["margin"] = json!({ "l": 0, "r": 0, "t": 8, "b": 0 });
+        layout["showlegend"] = json!(false);
+        layout["updatemenus"] = json!([{
+            "buttons": buttons, "x": 0, "xanchor": "left", "y": 1, "yanchor": "top", "pad": { "l": 8, "t": 8 },
+        }]);
+        Plot {
+            title: self.title.clone(),
+            height_px: 560.0,
+            data,
+            layout,
+            ..Plot::default()
+        }
+    }
+}
+
+fn all_z(postures: &[(String, Vec<[f64; 3]>)]) -> impl Iterator<Item = f64> {
+    postures.iter().flat_map(|(_, chain)| chain).map(|p| p[2])
+}

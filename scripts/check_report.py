@@ -33,6 +33,8 @@ FLAGS = [
     "--disable-sync",
     "--enable-unsafe-swiftshader",
     "--hide-scrollbars",
+    # A desk with a mouse.
+    "--blink-settings=primaryHoverType=2,availableHoverTypes=2,primaryPointerType=4,availablePointerTypes=4",
     "--window-size=1280,1000",
     "--remote-debugging-pipe",
 ]
@@ -146,6 +148,8 @@ class Browser:
                 found.append(details.get("exception", {}).get("description", details["text"]))
             elif event["method"] == "Runtime.consoleAPICalled" and params["type"] in ("error", "assert"):
                 found.append(" ".join(str(a.get("value", a.get("description"))) for a in params["args"]))
+            elif event["method"] == "Page.javascriptDialogOpening":
+                found.append(f"the page asks: {params['message']}")
             elif event["method"] == "Log.entryAdded" and params["entry"]["level"] == "error":
                 found.append(params["entry"]["text"])
         return found
@@ -202,7 +206,7 @@ def check(condition, what):
 
 def use(browser, page, shots):
     browser.send("Page.navigate", url=page.resolve().as_uri())
-    browser.wait_for("document.documentElement.dataset.ready === 'true'")
+    browser.wait_for("document.documentElement?.dataset.ready === 'true'")
     found = {
         "figures": browser.run("document.querySelectorAll('.js-plotly-plot').length"),
         "images": browser.run("document.images.length"),
@@ -254,7 +258,9 @@ def use_explorer(browser, shots):
           const { _offset: left, _length: wide } = div._fullLayout.xaxis;
           const { _offset: top, _length: high } = div._fullLayout.yaxis;
           const [rows, columns] = [div.data[0].z.length, div.data[0].z[0].length];
-          return { x: box.x + left + wide * 0.5 / columns, y: box.y + top + high * (rows - 0.5) / rows,
+          // In the middle of the window, whatever the height of the map.
+          const row = Math.floor(rows / 2);
+          return { x: box.x + left + wide * 0.5 / columns, y: box.y + top + high * (row + 0.5) / rows,
             map: div.data[0].z[0].slice() };
         })()"""
     )

@@ -5,7 +5,7 @@
 
 Each sample is a folder:
 
-report.html, *.png   what the program wrote: `lobestone report`, or `lobestone thesis --out`
+report.html, *.png   what the program wrote: `lobestone report` (most with --static), or `lobestone thesis --out`
 loop.txt             the commands that led there, and what they printed
 summary.json         key numbers of these commands (`--json`), rounded to four significant digits
 
@@ -27,6 +27,10 @@ HELD_OUT = ERROR + ["error/held_out_nrms"]
 VERDICT = ["verdict", "effect", "site", "confidence", "baseline/nrms", "baseline/noise_floor_nrms", "baseline/held_out_nrms"]
 JOINTS = [f"joint-{k}.stiffness" for k in range(1, 7)] + ["damping-ratio"]
 COEFFICIENTS = ["ktc_n_per_mm2", "krc_n_per_mm2", "kac_n_per_mm2", "kte_n_per_mm", "kre_n_per_mm", "kae_n_per_mm"]
+
+
+# Samples whose page answers to the mouse; the others are for reading and stay small.
+INTERACTIVE = ["hidden-effect"]
 
 
 def estimates(names, under="parameters"):
@@ -155,7 +159,8 @@ def write(program, name):
                 {"command": " ".join(arguments), "values": {path: rounded(at(document, path)) for path in paths}}
             )
         if campaign:
-            run(program, ["report", campaign, "--out", "page"], folders[0])
+            kind = [] if name in INTERACTIVE else ["--static"]
+            run(program, ["report", campaign, "--out", "page", *kind], folders[0])
         shutil.rmtree(out, ignore_errors=True)
         out.mkdir(parents=True)
         for file in sorted((folders[0] / "page").iterdir()):

@@ -3,6 +3,7 @@
 use super::figure::{
     ForceChannel, ForceRecord, HeatMap, RegressionFigure, RegressionPoint, RegressionSeries,
 };
+use super::interactive::Plot;
 use super::number::{decimals, percent, significant};
 use super::parts::{count, figure, listed, setting, with_error};
 use super::{Block, Column, Section, Table};
@@ -130,6 +131,9 @@ pub fn sections(campaign: &Campaign, result: &CfcResult) -> Vec<Section> {
     sections
 }
 
+/// Records that a screen lets choose between; each takes some 50 kB of the page.
+const CUTS_TO_CHOOSE: usize = 30;
+
 /// The first record, and that of the cut which fits worst.
 fn records(result: &CfcResult) -> Section {
     let mut shown: Vec<(&CutAnalysis, &str)> = Vec::new();
@@ -147,6 +151,12 @@ fn records(result: &CfcResult) -> Section {
         .into_iter()
         .map(|(cut, why)| record_figure(cut, why))
         .collect();
+    // On a screen any cut takes the place of the first.
+    let choices = result.cuts.iter().take(CUTS_TO_CHOOSE);
+    let choices = choices.map(|cut| (cut.id.clone(), record_drawing(cut).plot()));
+    if let Some(first) = blocks.first_mut() {
+        *first = first.clone().with_plot(Plot::one_of("Cut", choices.collect()));
+    }
     blocks.push(cut_table(result));
     Section {
         id: "records".into(),
@@ -158,7 +168,7 @@ fn records(result: &CfcResult) -> Section {
     }
 }
 
-fn record_figure(cut: &CutAnalysis, why: &str) -> Block {
+fn record_drawing(cut: &CutAnalysis) -> ForceRecord {
     let channels = cut.channels.iter().map(|channel| {
         let trace = &channel.trace;
         // Two points a stretch: its least and its largest value.
@@ -182,7 +192,7 @@ fn record_figure(cut: &CutAnalysis, why: &str) -> Block {
             steady_level: Some(channel.average.value + channel.drift.at(middle_s)),
         }
     });
-    let drawing = ForceRecord {
+    ForceRecord {
         title: format!("Cut {}: record, drift and steady window", cut.id),
         channels: channels.collect(),
         air_s: [cut.air_before_s, cut.air_after_s]
@@ -191,7 +201,11 @@ fn record_figure(cut: &CutAnalysis, why: &str) -> Block {
             .map(|[a, b]| (a, b))
             .collect(),
         steady_s: Some((cut.steady_s[0], cut.steady_s[1])),
-    };
+    }
+}
+
+fn record_figure(cut: &CutAnalysis, why: &str) -> Block {
+    let drawing = record_drawing(cut);
     let caption = format!(
         "{why}: cut {}, {} rpm, feed {} mm. Steady window {}–{} s ({} turns, {}).",
         cut.id,
@@ -312,6 +326,7 @@ fn line_figure(
                 points: points
                     .iter()
                     .map(|p| RegressionPoint {
+                        label: p.cut.clone(),
                         x: p.feed_mm,
                         y: p.measured,
                         std_error: Some(p.std_error),
@@ -412,7 +427,7 @@ fn misfit_map(result: &CfcResult, pooled: &Group) -> Option<Block> {
         pooled.cuts.iter().map(row).collect()
     };
     let shades = table(|m| m.sigmas);
-    let top = shades.iter().flatten().flatten().copied().fold(4.0, f64::max);
+    let top = shades.iter().flatten().flatten().copied().fold(10.0, f64::max);
     let drawing = HeatMap {
         title: "Misfit of each cut's average force".into(),
         row_label: "Cut".into(),

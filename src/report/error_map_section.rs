@@ -53,7 +53,7 @@ pub fn times_noise_map(title: &str, maps: &[(&str, &ErrorMap)]) -> HeatMap {
 }
 
 /// What the colours of all maps of an FRF's error mean.
-const TIMES_NOISE: &str = "error / noise (1 = noise alone)";
+pub const TIMES_NOISE: &str = "error / noise (1 = noise alone)";
 
 /// One of the maps of the error.
 struct Kind {
@@ -194,7 +194,7 @@ pub fn map_section(findings: &StructureFindings) -> Section {
         let map = (kind.map)("Calibrated model", after);
         let mut of_stages: Vec<HeatMap> = stages
             .iter()
-            .map(|stage| (kind.map)(&format!("Model {}", stage.title), stage.comparison))
+            .map(|stage| (kind.map)(&stage.named(), stage.comparison))
             .collect();
         // One scale for all, so that a map turns lighter as its error falls.
         let top = of_stages.iter().filter_map(|m| m.range).map(|r| r.1).fold(2.0, f64::max);

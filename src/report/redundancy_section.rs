@@ -39,7 +39,7 @@ pub fn blocks(analysis: &LobeAnalysis, found: &RedundancyAnalysis) -> Vec<Block>
     blocks.push(figure(
         "lobes-redundancy".to_string(),
         &map.title.clone(),
-        "Depth limit over spindle speed and redundancy angle. Dashes: angle forbidden or out of reach. Deep places \
+        "Depth limit over spindle speed and redundancy angle. Dashes (on a screen: grey): angle forbidden or out of reach. Deep places \
          beyond the end of the colour scale have its last colour."
             .to_string(),
         map.png(),

@@ -24,6 +24,7 @@ fn titanium_figure(tables: &CuttingTables) -> Block {
                 points: tables
                     .of(material)
                     .map(|row| RegressionPoint {
+                        label: String::new(),
                         x: row.cutting_speed_m_per_min,
                         y: row.coefficients[j],
                         std_error: None,

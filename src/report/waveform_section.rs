@@ -3,9 +3,10 @@
 use super::diagnosis_section::{
     advice, candidate_chart, candidate_table, how_it_shows, not_tried, verdict_text,
 };
+use super::error_map_section::TIMES_NOISE;
 use super::figure::{BarSeries, CellFormat, HeatMap, SideBySide, WaveformFigure, WaveformPanel};
-use super::number::{percent, significant};
-use super::parts::{figure, listed, paragraph, with_error};
+use super::number::percent;
+use super::parts::{figure, listed, paragraph, setting, with_error};
 use super::{Block, Column, Section, Table};
 use crate::analysis::CuttingFindings;
 use crate::analysis::diagnosis::CuttingView;
@@ -133,7 +134,7 @@ fn misfit_map(findings: &CuttingFindings) -> Block {
             .map(|c| columns.iter().map(|axis| value(c, axis)).collect())
             .collect(),
         columns,
-        value_label: "error / noise (1 = noise alone)".into(),
+        value_label: TIMES_NOISE.into(),
         format: CellFormat::Significant(2),
         range: Some((1.0, top)),
         log: true,
@@ -237,8 +238,8 @@ fn waveform(findings: &CuttingFindings, rank: usize, cut: usize) -> Block {
     let caption = format!(
         "The cut with {place} misfit for its noise: {}, {} rpm, feed {} mm; its noise is {}.",
         own.id,
-        significant(own.spindle_rpm, 5),
-        significant(own.feed_mm, 3),
+        setting(own.spindle_rpm),
+        setting(own.feed_mm),
         percent(findings.now.comparison.cuts[cut].noise_floor_nrms)
     );
     let drawing = WaveformFigure {

@@ -9,6 +9,7 @@ mod diagnose;
 mod hole;
 mod init;
 mod inspect;
+mod interactive;
 mod lobes;
 mod modal;
 mod next_step;

@@ -1,14 +1,16 @@
 //! Average force over feed with the fitted straight lines.
 
 use super::axis::{Axis, extent, usable};
-use super::canvas::{Marker, paint};
+use super::canvas::{Canvas, Marker, paint};
 use super::frf::or;
 use super::panel::{Header, Panel, Swatch};
 use super::{WIDTH, nothing_to_draw, style};
 use crate::Result;
 
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct RegressionPoint {
+    /// Such as the cut.
+    pub label: String,
     pub x: f64,
     pub y: f64,
     pub std_error: Option<f64>,
@@ -59,7 +61,15 @@ impl RegressionFigure {
         let ys = extent(bars.chain(ends).chain([0.0])).unwrap_or((0.0, 1.0));
         let y = Axis::padded(&self.y_label, ys, 0.06, 7);
 
-        let left = Panel::left_margin(&[&y]);
+        // What the lines leave over is small beside the forces: it needs a scale of its own.
+        let rests = self.series.iter().flat_map(RegressionSeries::rests);
+        let rests = rests.flat_map(|(point, rest)| {
+            let error = point.std_error.filter(|e| usable(*e)).unwrap_or(0.0);
+            [rest - error, rest + error]
+        });
+        let rests = extent(rests.filter(|v| usable(*v)).chain([0.0])).unwrap_or((0.0, 1.0));
+        let rest_axis = Axis::padded(&self.rest_label(), rests, 0.12, 3);
+        let left = Panel::left_margin(&[&y, &rest_axis]);
         let right = f64::from(WIDTH) - Panel::RIGHT_MARGIN;
         let excluded = points().any(|p| p.excluded);
         let legend = self.series.iter().enumerate().map(|(i, s)| {
@@ -84,18 +94,32 @@ impl RegressionFigure {
             right,
         );
         let top = header.bottom();
+        let lined = self.series.iter().any(|s| s.line.is_some());
         let panel = Panel {
             left,
             top,
             right,
-            bottom: top + 480.0,
-            x,
+            bottom: top + 440.0,
+            x: x.clone(),
             y,
-            x_labels: true,
+            x_labels: !lined,
         };
+        let below = lined.then(|| Panel {
+            left,
+            top: panel.bottom + 20.0,
+            right,
+            bottom: panel.bottom + 170.0,
+            x,
+            y: rest_axis,
+            x_labels: true,
+        });
+        let bottom = below.as_ref().map_or(panel.bottom, |p| p.bottom);
 
-        paint(WIDTH, (panel.bottom + Panel::BOTTOM_MARGIN) as u32, |canvas| {
+        paint(WIDTH, (bottom + Panel::BOTTOM_MARGIN) as u32, |canvas| {
             header.draw(canvas);
+            if let Some(below) = &below {
+                self.draw_rests(canvas, below);
+            }
             panel.grid(canvas);
             panel.curve(canvas, [(panel.x.low, 0.0), (panel.x.high, 0.0)], style::FRAME);
             for (i, series) in self.series.iter().enumerate() {
@@ -118,6 +142,42 @@ impl RegressionFigure {
                 }
             }
             panel.frame(canvas);
+        })
+    }
+}
+
+impl RegressionFigure {
+    /// `Residual (N)` where the forces are in N.
+    pub(in crate::report) fn rest_label(&self) -> String {
+        match self.y_label.rsplit_once(" (") {
+            Some((_, unit)) => format!("Residual ({unit}"),
+            None => "Residual".to_string(),
+        }
+    }
+
+    fn draw_rests(&self, canvas: &Canvas, panel: &Panel) {
+        panel.grid(canvas);
+        panel.curve(canvas, [(panel.x.low, 0.0), (panel.x.high, 0.0)], style::FRAME);
+        for (i, series) in self.series.iter().enumerate() {
+            let color = style::series(i).color;
+            for (point, rest) in series.rests() {
+                let error = point.std_error.filter(|e| usable(*e)).unwrap_or(0.0);
+                panel.error_bar(canvas, point.x, (rest - error, rest + error), color);
+                let sign = (style::series_marker(i), 0.8 * SIGN);
+                panel.markers(canvas, [(point.x, rest)], sign, color, 0.0);
+            }
+        }
+        panel.frame(canvas);
+    }
+}
+
+impl RegressionSeries {
+    /// Points of the fit and how far each lies above the line; none without a line.
+    pub(in crate::report) fn rests(&self) -> impl Iterator<Item = (&RegressionPoint, f64)> {
+        let points = self.points.iter().filter(|p| !p.excluded);
+        points.filter_map(|p| {
+            let (intercept, slope) = self.line?;
+            Some((p, p.y - intercept - slope * p.x))
         })
     }
 }

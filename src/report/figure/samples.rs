@@ -188,6 +188,7 @@ pub fn regression() -> RegressionFigure {
                 let x = 0.03 + 0.03 * i as f64;
                 let y = intercept + slope * x + 3.0 * jitter(i + 10 * k);
                 RegressionPoint {
+                    label: format!("cut {i}"),
                     x,
                     y,
                     std_error: Some(4.0),

@@ -126,6 +126,7 @@ fn odd_points(xs: &[f64], ys: &[f64]) -> Vec<Result<Vec<u8>, Error>> {
     let pairs = || xs.iter().copied().zip(ys.iter().copied()).take(30);
     let first = |v: &[f64]| v.first().copied().unwrap_or(f64::NAN);
     let points = pairs().map(|(x, y)| RegressionPoint {
+        label: String::new(),
         x,
         y,
         std_error: Some(x),

@@ -36,7 +36,7 @@ pub struct Stage<'a> {
 pub fn stages(findings: &StructureFindings) -> Vec<Stage<'_>> {
     let analysis = &findings.analysis;
     let first = Stage {
-        title: "robot file".into(),
+        title: ROBOT_FILE.into(),
         predicted: &analysis.nominal,
         comparison: &analysis.before,
     };
@@ -48,13 +48,27 @@ pub fn stages(findings: &StructureFindings) -> Vec<Stage<'_>> {
     let now = Stage {
         title: match analysis.case.revisions.last() {
             Some(current) => revision_title(&current.title()),
-            None => "calibrated".into(),
+            None => CALIBRATED.into(),
         },
         predicted: &analysis.calibrated,
         comparison: &analysis.after,
     };
     std::iter::once(first).chain(earlier).chain([now]).collect()
 }
+
+impl Stage<'_> {
+    /// At the beginning of a title.
+    pub fn named(&self) -> String {
+        match self.title.as_str() {
+            ROBOT_FILE => "Model of the robot file".to_string(),
+            CALIBRATED => "Calibrated model".to_string(),
+            title => format!("Model {title}"),
+        }
+    }
+}
+
+const ROBOT_FILE: &str = "robot file";
+const CALIBRATED: &str = "calibrated";
 
 /// `r2 + payload` for revision `2 + payload`.
 fn revision_title(title: &str) -> String {

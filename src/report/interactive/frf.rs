@@ -37,8 +37,9 @@ pub fn bode_layout(quantity: &str, unit: &str) -> Value {
 /// The complex plane with one scale on both axes.
 pub fn nyquist_layout(unit: &str) -> Value {
     let unit = text(unit);
-    let scale = |name: &str| with(axis(&format!("{name} part ({unit})")), json!({ "exponentformat": "SI" }));
+    let scale = |name: &str| with(axis(&format!("{name} part ({unit})")), json!({ "tickformat": "~s" }));
     let mut layout = layout();
+    layout["showlegend"] = json!(false);
     layout["xaxis"] = with(scale("Real"), json!({ "zeroline": true, "zerolinecolor": "#9aa0a8" }));
     layout["yaxis"] = with(
         scale("Imaginary"),

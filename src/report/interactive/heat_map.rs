@@ -90,7 +90,12 @@ impl HeatMap {
     }
 
     fn colour_bar(&self, low: f64, high: f64, log: bool) -> Value {
-        let title = json!({ "text": text(&self.value_label), "side": "right" });
+        // Short maps have a short scale.
+        let label = match self.rows.len() {
+            0..12 => text(&self.value_label).replacen(" (", "<br>(", 1),
+            _ => text(&self.value_label),
+        };
+        let title = json!({ "text": label, "side": "right" });
         let mut bar = json!({ "title": title, "thickness": 16, "outlinewidth": 1 });
         if self.scale_format() == CellFormat::Percent {
             bar["tickformat"] = json!("~p");

@@ -41,9 +41,20 @@ pub struct Plot {
     links: Value,
     /// What the first trace is for each model of the page's FRFs; null where it has nothing to do with them.
     stages: Value,
+    /// What is chosen between, such as `Cut`, and the name of each figure that may take this one's place.
+    choice: Option<(&'static str, Vec<(String, Plot)>)>,
 }
 
 impl Plot {
+    /// A figure whose place others can take, chosen by name; the first of them is shown first.
+    pub fn one_of(what: &'static str, plots: Vec<(String, Plot)>) -> Self {
+        let first = plots.first().map_or_else(Plot::default, |(_, plot)| plot.clone());
+        Plot {
+            choice: Some((what, plots)),
+            ..first
+        }
+    }
+
     /// For the page's script.
     pub(super) fn value(&self) -> Value {
         json!({
@@ -53,6 +64,10 @@ impl Plot {
             "layout": self.layout,
             "links": self.links,
             "stages": self.stages,
+            "choice": self.choice.as_ref().map(|(what, plots)| {
+                let plots = plots.iter().map(|(name, plot)| json!({ "name": name, "plot": plot.value() }));
+                json!({ "what": what, "plots": plots.collect::<Vec<_>>() })
+            }),
         })
     }
 }
@@ -198,7 +213,7 @@ fn stacked(x: Value, y: Vec<(Value, f64)>) -> Value {
         layout[axis_key('y', i)] = with(axis, json!({ "domain": [bottom, top] }));
         top = bottom - gap;
     }
-    layout["xaxis"] = with(x, json!({ "anchor": axis_name('y', last) }));
+    layout["xaxis"] = with(x, json!({ "anchor": axis_name('y', last), "mirror": "all" }));
     layout
 }
 

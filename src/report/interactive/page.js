@@ -2,7 +2,7 @@
 // Where the browser lacks what this needs, the page keeps its static images.
 "use strict";
 (async () => {
-  const config = { responsive: true, displaylogo: false, scrollZoom: false };
+  const config = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
   const unpack = async (id) => {
     const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (c) => c.charCodeAt(0));
     const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
@@ -142,6 +142,20 @@
     heading.textContent = plot.title;
     div.style.height = `${plot.height}px`;
     await Plotly.newPlot(div, plot.data, plot.layout, config);
+    if (plot.choice) {
+      const label = document.createElement("label");
+      const select = document.createElement("select");
+      select.append(...plot.choice.plots.map(({ name }, k) => new Option(name, k)));
+      select.addEventListener("change", () => {
+        const chosen = plot.choice.plots[select.value].plot;
+        heading.textContent = chosen.title;
+        div.style.height = `${chosen.height}px`;
+        Plotly.react(div, chosen.data, chosen.layout, config);
+      });
+      label.className = "choice";
+      label.append(`${plot.choice.what} `, select);
+      heading.before(label);
+    }
     if (explorer && plot.stages) {
       const bar = document.createElement("div");
       bar.className = "models";

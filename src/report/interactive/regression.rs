@@ -2,9 +2,9 @@
 
 use serde_json::{Value, json};
 
-use super::{Plot, axis, axis_name, line, numbers, sign, stacked, text, with};
+use super::{Plot, axis, axis_name, line, numbers, sign, stacked, symbol, text, with};
 use crate::report::figure::canvas::Marker;
-use crate::report::figure::{RegressionFigure, RegressionSeries, style};
+use crate::report::figure::{RegressionFigure, RegressionPoint, RegressionSeries, style};
 
 impl RegressionFigure {
     pub fn plot(&self) -> Plot {
@@ -28,15 +28,14 @@ impl RegressionFigure {
                     "y": numbers(x.map(|x| intercept + slope * x)),
                 }));
             }
-            let values = series.points.iter().map(|p| p.y);
-            data.push(signs(series, i, 0, numbers(values)));
-            if let Some((intercept, slope)) = series.line {
-                let rests = series.points.iter().map(|p| p.y - intercept - slope * p.x);
-                data.push(signs(series, i, 1, numbers(rests)));
+            let all = series.points.iter().map(|p| (p, p.y));
+            data.push(signs(series, i, 0, all.collect()));
+            if series.line.is_some() {
+                data.push(signs(series, i, 1, series.rests().collect()));
             }
         }
         let force = axis(&text(&self.y_label));
-        let rest = with(axis("Residual"), json!({ "zeroline": true, "zerolinecolor": "#3c4046" }));
+        let rest = with(axis(&text(&self.rest_label())), json!({ "zeroline": true, "zerolinecolor": "#3c4046" }));
         Plot {
             title: self.title.clone(),
             height_px: 640.0,
@@ -50,16 +49,16 @@ impl RegressionFigure {
     }
 }
 
-/// The cuts of a series in the upper (0) or lower (1) panel.
-fn signs(series: &RegressionSeries, i: usize, panel: usize, y: Value) -> Value {
-    let stroke = style::series(i);
+/// `points` of a series in the upper (0) or lower (1) panel.
+fn signs(series: &RegressionSeries, i: usize, panel: usize, points: Vec<(&RegressionPoint, f64)>) -> Value {
     let name = text(&series.label);
-    let errors = series.points.iter().map(|p| p.std_error.unwrap_or(0.0));
-    let shape = |excluded| if excluded { Marker::Cross } else { style::series_marker(i) };
-    let mut marker = sign(style::series_marker(i), 9.0, stroke.color);
-    let symbols: Vec<&str> = series.points.iter().map(|p| super::symbol(shape(p.excluded))).collect();
-    if series.points.iter().any(|p| p.excluded) {
-        marker["symbol"] = json!(symbols);
+    let shape = |p: &RegressionPoint| match p.excluded {
+        true => Marker::Cross,
+        false => style::series_marker(i),
+    };
+    let mut marker = sign(style::series_marker(i), 9.0, style::series(i).color);
+    if points.iter().any(|(p, _)| p.excluded) {
+        marker["symbol"] = points.iter().map(|(p, _)| symbol(shape(p))).collect();
     }
     json!({
         "type": "scatter",
@@ -69,9 +68,15 @@ fn signs(series: &RegressionSeries, i: usize, panel: usize, y: Value) -> Value {
         "showlegend": panel == 0,
         "yaxis": axis_name('y', panel),
         "marker": marker,
-        "x": numbers(series.points.iter().map(|p| p.x)),
-        "y": y,
-        "error_y": { "type": "data", "array": numbers(errors), "thickness": 1.2, "width": 3 },
-        "hovertemplate": "%{x:.4g}: %{y:.4g}",
+        "x": numbers(points.iter().map(|(p, _)| p.x)),
+        "y": numbers(points.iter().map(|(_, y)| *y)),
+        "text": points.iter().map(|(p, _)| text(&p.label)).collect::<Vec<_>>(),
+        "error_y": {
+            "type": "data",
+            "array": numbers(points.iter().map(|(p, _)| p.std_error.unwrap_or(0.0))),
+            "thickness": 1.2,
+            "width": 3,
+        },
+        "hovertemplate": "%{text}, %{x:.4g}: %{y:.4g}",
     })
 }

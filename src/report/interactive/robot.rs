@@ -56,7 +56,7 @@ impl RobotFigure {
             "yaxis": axis("y (m)", -reach),
             "zaxis": axis("z (m)", floor),
             "aspectmode": "data",
-            "camera": { "eye": { "x": 1.3, "y": 1.3, "z": 0.7 } },
+            "camera": { "eye": { "x": 1.75, "y": 1.45, "z": 0.75 }, "center": { "x": 0, "y": 0, "z": -0.12 } },
         });
         layout["margin"] = json!({ "l": 0, "r": 0, "t": 8, "b": 0 });
         layout["showlegend"] = json!(false);

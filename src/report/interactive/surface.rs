@@ -1,6 +1,6 @@
 //! Depth limits over spindle speed and redundancy angle.
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::{Plot, axis, css, layout, number, numbers, with};
 use crate::report::figure::style;
@@ -47,8 +47,14 @@ impl Surface {
             })
         });
         let mut layout = layout();
-        layout["xaxis"] = with(axis("Spindle speed (rpm)"), json!({ "showgrid": false }));
-        layout["yaxis"] = with(axis("Redundancy angle (°)"), json!({ "showgrid": false }));
+        layout["xaxis"] = with(
+            axis("Spindle speed (rpm)"),
+            json!({ "showgrid": false, "range": ends(&self.spindle_rpm) }),
+        );
+        layout["yaxis"] = with(
+            axis("Redundancy angle (°)"),
+            json!({ "showgrid": false, "range": ends(&self.angle_deg) }),
+        );
         // What cannot be used is grey, not the colour of no depth.
         layout["plot_bgcolor"] = json!("#e4e6ea");
         Plot {
@@ -59,4 +65,13 @@ impl Surface {
             ..Plot::default()
         }
     }
+}
+
+/// Of an axis of cells: half a cell beyond the first and the last.
+fn ends(places: &[f64]) -> Value {
+    let (Some(first), Some(last)) = (places.first(), places.last()) else {
+        return Value::Null;
+    };
+    let half = 0.5 * (last - first) / (places.len().max(2) - 1) as f64;
+    numbers([first - half, last + half])
 }

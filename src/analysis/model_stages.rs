@@ -29,7 +29,9 @@ pub fn earlier_stages(campaign: &Campaign, case: &StructureCase) -> Result<Vec<M
         .iter()
         .map(|revision| {
             let model = case.model_of(campaign, revision)?;
-            let theta = model.start().map_or_else(|| model.nominal_theta(), <[f64]>::to_vec);
+            let theta = model
+                .start()
+                .map_or_else(|| model.nominal_theta(), <[f64]>::to_vec);
             let predicted = model.predict(&theta, &case.data)?;
             Ok(ModelStage {
                 title: revision.title(),

@@ -115,9 +115,7 @@ impl StructureCase {
     /// As for [`load`](Self::load).
     pub fn before_effects(&self, campaign: &Campaign) -> Result<Option<StructureModel>> {
         match self.revisions.first() {
-            Some(first) if !self.model.effects().is_empty() => {
-                self.model_of(campaign, first).map(Some)
-            }
+            Some(first) if !self.model.effects().is_empty() => self.model_of(campaign, first).map(Some),
             _ => Ok(None),
         }
     }

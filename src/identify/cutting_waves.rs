@@ -212,7 +212,9 @@ fn hole(axis: ForceAxis, cut: &CutData, parts: &[Part]) -> Course {
         let next = cut.block_s.get(b + 1);
         let sum = |value: &dyn Fn(&Part) -> f64| parts.iter().map(|part| part.2 * value(part)).sum::<f64>();
         course.x.push(0.5 * (from + to) - start);
-        course.measured.push(sum(&|(channel, fit, _)| channel.level[b] - fit.reference[b]));
+        course
+            .measured
+            .push(sum(&|(channel, fit, _)| channel.level[b] - fit.reference[b]));
         course.model.push(sum(&|(_, fit, _)| fit.level[b]));
         if let Some(next) = next.filter(|next| next[0] - to > (to - from).max(next[1] - next[0])) {
             course.x.push(0.5 * (to + next[0]) - start);

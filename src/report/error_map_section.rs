@@ -31,7 +31,7 @@ pub fn times_noise_map(title: &str, maps: &[(&str, &ErrorMap)]) -> HeatMap {
     let top = maps
         .iter()
         .map(|(_, map)| largest(&values(map)))
-        .fold(2.0, f64::max);
+        .fold(LEAST_TOP, f64::max);
     HeatMap {
         title: title.into(),
         row_label: "Posture, direction (response, force)".into(),
@@ -55,6 +55,10 @@ pub fn times_noise_map(title: &str, maps: &[(&str, &ErrorMap)]) -> HeatMap {
 /// What the colours of all maps of an FRF's error mean.
 pub const TIMES_NOISE: &str = "error / noise (1 = noise alone)";
 
+/// The scale ends there at least, in multiples of the noise: over the few lines of a cell noise alone is up to half as large
+/// again as it is on average, and must not look like an error.
+pub const LEAST_TOP: f64 = 5.0;
+
 /// One of the maps of the error.
 struct Kind {
     file: &'static str,
@@ -74,7 +78,12 @@ const KINDS: [Kind; 5] = [
         alt: "Error of the calibrated model in multiples of the noise, by posture, direction and frequency band",
         caption: "Error of the model in multiples of the measurement's noise, by posture and direction (rows) and \
                   frequency band (columns): 1 is noise alone. What is dark is where to look first.",
-        map: |model, c| times_noise_map(&format!("{model}: error in multiples of the noise, everywhere"), &[("", &c.map)]),
+        map: |model, c| {
+            times_noise_map(
+                &format!("{model}: error in multiples of the noise, everywhere"),
+                &[("", &c.map)],
+            )
+        },
         frf: |c, row, band| {
             let directions = c.map.directions.len().max(1);
             worst(c, Some(row / directions), Some(row % directions), Some(band))
@@ -89,7 +98,14 @@ const KINDS: [Kind; 5] = [
         map: |model, c| {
             let (numbers, shades) = (&c.map.posture_direction, &c.map.posture_direction_times_noise);
             let map = &c.map;
-            heat(model, "posture and direction", ["Posture", DIRECTION], [&map.postures, &map.directions], numbers, shades)
+            heat(
+                model,
+                "posture and direction",
+                ["Posture", DIRECTION],
+                [&map.postures, &map.directions],
+                numbers,
+                shades,
+            )
         },
         frf: |c, row, column| worst(c, Some(row), Some(column), None),
         bands: false,
@@ -117,7 +133,14 @@ const KINDS: [Kind; 5] = [
         map: |model, c| {
             let (numbers, shades) = (&c.map.posture_band, &c.map.posture_band_times_noise);
             let names = [&c.map.postures, &band_names(&c.map)];
-            heat(model, "posture and frequency band", ["Posture", "Band (Hz)"], names, numbers, shades)
+            heat(
+                model,
+                "posture and frequency band",
+                ["Posture", "Band (Hz)"],
+                names,
+                numbers,
+                shades,
+            )
         },
         frf: |c, row, band| worst(c, Some(row), None, Some(band)),
         bands: true,
@@ -129,7 +152,14 @@ const KINDS: [Kind; 5] = [
         map: |model, c| {
             let (numbers, shades) = (&c.map.direction_band, &c.map.direction_band_times_noise);
             let names = [&c.map.directions, &band_names(&c.map)];
-            heat(model, "direction and frequency band", ["Direction", "Band (Hz)"], names, numbers, shades)
+            heat(
+                model,
+                "direction and frequency band",
+                ["Direction", "Band (Hz)"],
+                names,
+                numbers,
+                shades,
+            )
         },
         frf: |c, row, band| worst(c, None, Some(row), Some(band)),
         bands: true,
@@ -156,7 +186,7 @@ fn heat(
         values: values.to_vec(),
         shades: times_noise.to_vec(),
         value_label: TIMES_NOISE.into(),
-        range: Some((1.0, largest(times_noise).max(2.0))),
+        range: Some((1.0, largest(times_noise).max(LEAST_TOP))),
         log: true,
         ..Default::default()
     }
@@ -197,7 +227,11 @@ pub fn map_section(findings: &StructureFindings) -> Section {
             .map(|stage| (kind.map)(&stage.named(), stage.comparison))
             .collect();
         // One scale for all, so that a map turns lighter as its error falls.
-        let top = of_stages.iter().filter_map(|m| m.range).map(|r| r.1).fold(2.0, f64::max);
+        let top = of_stages
+            .iter()
+            .filter_map(|m| m.range)
+            .map(|r| r.1)
+            .fold(LEAST_TOP, f64::max);
         for map in &mut of_stages {
             map.range = Some((1.0, top));
         }
@@ -206,7 +240,9 @@ pub fn map_section(findings: &StructureFindings) -> Section {
             .map(|r| (0..map.columns.len()).map(|c| frf(r, c)).collect())
             .collect();
         let plot = of_stages.last().unwrap_or(&map).plot();
-        let plot = plot.leading_to(&frfs, if kind.bands { &bands } else { &[] }).at_stages(&of_stages);
+        let plot = plot
+            .leading_to(&frfs, if kind.bands { &bands } else { &[] })
+            .at_stages(&of_stages);
         blocks.push(figure(kind.file, kind.alt, kind.caption, map.png()).with_plot(plot));
     }
     let rows = after.by_band.iter().map(|b| {

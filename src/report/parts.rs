@@ -1,7 +1,7 @@
 //! Small things that all sections of a report use.
 
-use super::number::{decimals, significant};
 use super::interactive::Plot;
+use super::number::{decimals, significant};
 use super::{Block, Figure, OnScreen, Section};
 use crate::Result;
 

@@ -131,8 +131,7 @@ pub fn frf_section(findings: &StructureFindings) -> Section {
     Section {
         id: "frfs".into(),
         title: "Model against measured FRFs".into(),
-        lead: "Receptance: how far the robot moves for each newton, over frequency. Points are measured, the dashed \
-               line is the model as the robot file has it, the solid line the calibrated model."
+        lead: "Receptance: how far the robot moves for each newton, over frequency. Points are measured, lines are the model."
             .into(),
         blocks,
     }
@@ -388,7 +387,10 @@ pub fn posture_section(postures: &[PostureFindings]) -> Section {
 fn robot(postures: &[PostureFindings]) -> Block {
     let drawing = RobotFigure {
         title: "The robot as a stick figure".into(),
-        postures: postures.iter().map(|p| (p.id.clone(), p.chain_m.clone())).collect(),
+        postures: postures
+            .iter()
+            .map(|p| (p.id.clone(), p.chain_m.clone()))
+            .collect(),
     };
     figure(
         "robot-postures",

@@ -3,7 +3,7 @@
 use super::diagnosis_section::{
     advice, candidate_chart, candidate_table, how_it_shows, not_tried, verdict_text,
 };
-use super::error_map_section::TIMES_NOISE;
+use super::error_map_section::{LEAST_TOP, TIMES_NOISE};
 use super::figure::{BarSeries, CellFormat, HeatMap, SideBySide, WaveformFigure, WaveformPanel};
 use super::number::percent;
 use super::parts::{figure, listed, paragraph, setting, with_error};
@@ -92,11 +92,22 @@ fn comparison(findings: &CuttingFindings) -> Section {
 
 /// The force model as it stands, with what was added to it.
 fn parameters(findings: &CuttingFindings) -> Block {
-    let rows = findings.diagnosis.baseline.calibration.parameters.iter().map(|p| {
-        let unit = if p.unit == "1" { "" } else { p.unit };
-        let note = if p.at_bound { "at the end of its range" } else { "" };
-        vec![p.name.clone(), with_error(p.value, p.std_error), unit.to_string(), note.to_string()]
-    });
+    let rows = findings
+        .diagnosis
+        .baseline
+        .calibration
+        .parameters
+        .iter()
+        .map(|p| {
+            let unit = if p.unit == "1" { "" } else { p.unit };
+            let note = if p.at_bound { "at the end of its range" } else { "" };
+            vec![
+                p.name.clone(),
+                with_error(p.value, p.std_error),
+                unit.to_string(),
+                note.to_string(),
+            ]
+        });
     Block::Table(Table {
         caption: "Parameters of the force model, fitted to the waveforms, ± standard error".into(),
         columns: vec![
@@ -122,8 +133,10 @@ fn misfit_map(findings: &CuttingFindings) -> Block {
         let found = cut.times_noise.iter().find(|(name, _)| name == axis);
         found.and_then(|(_, times)| *times)
     };
-    let all = cuts.iter().flat_map(|c| c.times_noise.iter().filter_map(|(_, times)| *times));
-    let top = all.fold(2.0, f64::max);
+    let all = cuts
+        .iter()
+        .flat_map(|c| c.times_noise.iter().filter_map(|(_, times)| *times));
+    let top = all.fold(LEAST_TOP, f64::max);
     let drawing = HeatMap {
         title: "Force model: error in multiples of the noise".into(),
         row_label: "Cut".into(),

@@ -42,7 +42,11 @@ pub fn assert_self_contained(html: &str) {
         let begin = format!("<script type=\"application/octet-stream\" id=\"{id}\">");
         if let Some((before, after)) = rest.clone().split_once(&begin) {
             let (packed, after) = after.split_once("</script>").unwrap();
-            assert!(packed.bytes().all(|b| b.is_ascii_alphanumeric() || b"+/=".contains(&b)));
+            assert!(
+                packed
+                    .bytes()
+                    .all(|b| b.is_ascii_alphanumeric() || b"+/=".contains(&b))
+            );
             rest = format!("{before}{after}");
         }
     }

@@ -4,8 +4,8 @@ use num_complex::Complex64;
 use serde_json::{Value, json};
 
 use super::frf::{Look, bode_layout, bode_trace, nyquist_layout, nyquist_trace};
-use super::packed::{magnitudes, phases};
 use super::numbers;
+use super::packed::{magnitudes, phases};
 use crate::analysis::StructureFindings;
 use crate::campaign::{MeasuredDof, Point};
 use crate::discrepancy::FrfComparison;
@@ -173,7 +173,12 @@ fn coarse(level: f64) -> f64 {
 
 fn dof(points: &[Point], measured: MeasuredDof) -> String {
     let node = points[measured.point].node;
-    Dof { node, axis: measured.axis, negative: measured.negative }.to_string()
+    Dof {
+        node,
+        axis: measured.axis,
+        negative: measured.negative,
+    }
+    .to_string()
 }
 
 /// Sets FRFs apart that were measured twice, such as at two force levels.
@@ -184,7 +189,10 @@ impl Names {
     fn unique(&mut self, posture: &str, response: &str, reference: String) -> String {
         let mut name = reference.clone();
         let mut number = 2;
-        while !self.0.insert([posture.to_string(), response.to_string(), name.clone()]) {
+        while !self
+            .0
+            .insert([posture.to_string(), response.to_string(), name.clone()])
+        {
             name = format!("{reference} ({number})");
             number += 1;
         }

@@ -34,16 +34,28 @@ impl ForceRecord {
                 add("drift taken off", line(DRIFT), channel.drift.clone());
             }
             if let (Some(level), Some((from, to))) = (channel.steady_level, self.steady_s) {
-                add("average in the window", line(LEVEL), vec![(from, level), (to, level)]);
+                add(
+                    "average in the window",
+                    line(LEVEL),
+                    vec![(from, level), (to, level)],
+                );
             }
         }
         let axis_of = |c: &ForceChannel| (axis(&format!("{} ({})", text(&c.label), text(&c.unit))), 1.0);
         let mut layout = stacked(axis("Time (s)"), self.channels.iter().map(axis_of).collect());
         let air = self.air_s.iter().map(|s| (*s, AIR));
         let steady = self.steady_s.iter().map(|s| (*s, STEADY));
-        layout["shapes"] = air.clone().chain(steady.clone()).map(|(span, look)| stretch(span, look)).collect();
-        let names = air.map(|(span, _)| (span, "air cut")).chain(steady.map(|(span, _)| (span, "steady window")));
-        layout["annotations"] = names.map(|((from, to), name)| heading(0.5 * (from + to), name)).collect();
+        layout["shapes"] = air
+            .clone()
+            .chain(steady.clone())
+            .map(|(span, look)| stretch(span, look))
+            .collect();
+        let names = air
+            .map(|(span, _)| (span, "air cut"))
+            .chain(steady.map(|(span, _)| (span, "steady window")));
+        layout["annotations"] = names
+            .map(|((from, to), name)| heading(0.5 * (from + to), name))
+            .collect();
         layout["legend"]["y"] = json!(1.06);
         Plot {
             title: self.title.clone(),
@@ -94,7 +106,11 @@ fn extremes(channel: &ForceChannel) -> Vec<(f64, f64)> {
         let least = finite().min_by(|a, b| a.1.total_cmp(b.1));
         let largest = finite().max_by(|a, b| a.1.total_cmp(b.1));
         if let (Some(least), Some(largest)) = (least, largest) {
-            let (first, second) = if least.0 <= largest.0 { (least, largest) } else { (largest, least) };
+            let (first, second) = if least.0 <= largest.0 {
+                (least, largest)
+            } else {
+                (largest, least)
+            };
             points.push((time(k * stretch + first.0), *first.1));
             if first.0 != second.0 {
                 points.push((time(k * stretch + second.0), *second.1));
@@ -113,14 +129,23 @@ mod tests {
         let mut samples: Vec<f64> = (0..100_000).map(|i| (f64::from(i) * 0.01).sin()).collect();
         samples[54_321] = 9.0;
         samples[54_322] = -9.0;
-        let channel = ForceChannel { samples, sample_interval_s: 1e-3, start_s: 1.0, ..ForceChannel::default() };
+        let channel = ForceChannel {
+            samples,
+            sample_interval_s: 1e-3,
+            start_s: 1.0,
+            ..ForceChannel::default()
+        };
         let points = extremes(&channel);
         assert!(points.len() <= 2 * MOST_PAIRS, "{}", points.len());
         assert!(points.windows(2).all(|p| p[0].0 < p[1].0));
         let at = |value: f64| points.iter().find(|p| p.1 == value).unwrap().0;
         assert!((at(9.0) - 55.321).abs() < 1e-9 && (at(-9.0) - 55.322).abs() < 1e-9);
         // Few samples are all there.
-        let few = ForceChannel { samples: vec![3.0, f64::NAN, 1.0, 2.0], sample_interval_s: 1.0, ..ForceChannel::default() };
+        let few = ForceChannel {
+            samples: vec![3.0, f64::NAN, 1.0, 2.0],
+            sample_interval_s: 1.0,
+            ..ForceChannel::default()
+        };
         assert_eq!(extremes(&few), [(0.0, 3.0), (2.0, 1.0), (3.0, 2.0)]);
     }
 }

@@ -37,10 +37,18 @@ pub fn bode_layout(quantity: &str, unit: &str) -> Value {
 /// The complex plane with one scale on both axes.
 pub fn nyquist_layout(unit: &str) -> Value {
     let unit = text(unit);
-    let scale = |name: &str| with(axis(&format!("{name} part ({unit})")), json!({ "tickformat": "~s" }));
+    let scale = |name: &str| {
+        with(
+            axis(&format!("{name} part ({unit})")),
+            json!({ "tickformat": "~s" }),
+        )
+    };
     let mut layout = layout();
     layout["showlegend"] = json!(false);
-    layout["xaxis"] = with(scale("Real"), json!({ "zeroline": true, "zerolinecolor": "#9aa0a8" }));
+    layout["xaxis"] = with(
+        scale("Real"),
+        json!({ "zeroline": true, "zerolinecolor": "#9aa0a8" }),
+    );
     layout["yaxis"] = with(
         scale("Imaginary"),
         json!({ "scaleanchor": "x", "zeroline": true, "zerolinecolor": "#9aa0a8" }),
@@ -64,7 +72,10 @@ pub fn bode_trace(label: &str, look: Look, panel: usize, unit: &str) -> Value {
 /// A trace in the complex plane without its numbers; `customdata` are frequencies, Hz.
 pub fn nyquist_trace(label: &str, look: Look, unit: &str) -> Value {
     let mut trace = trace(label, look);
-    trace["hovertemplate"] = json!(format!("%{{customdata:.2f}} Hz: %{{x:.4s}} %{{y:+.4s}}i {}", text(unit)));
+    trace["hovertemplate"] = json!(format!(
+        "%{{customdata:.2f}} Hz: %{{x:.4s}} %{{y:+.4s}}i {}",
+        text(unit)
+    ));
     trace
 }
 
@@ -79,7 +90,10 @@ fn trace(label: &str, look: Look) -> Value {
     match look {
         Look::Measured => {
             trace["mode"] = json!("markers");
-            trace["marker"] = with(sign(Marker::Disc, 4.5, style::MEASURED), json!({ "line": { "width": 0 } }));
+            trace["marker"] = with(
+                sign(Marker::Disc, 4.5, style::MEASURED),
+                json!({ "line": { "width": 0 } }),
+            );
         }
         Look::Curve(stroke) => {
             trace["mode"] = json!("lines");
@@ -94,7 +108,11 @@ impl FrfFigure {
         let lowest = self.lowest_phase();
         let mut data = Vec::new();
         let mut add = |curve: &FrfCurve, otherwise: &str, look: Look| {
-            let label = if curve.label.trim().is_empty() { otherwise } else { &curve.label };
+            let label = if curve.label.trim().is_empty() {
+                otherwise
+            } else {
+                &curve.label
+            };
             let phase: Vec<(f64, f64)> = match look {
                 Look::Measured => curve.phases(lowest),
                 Look::Curve(_) => curve.phases_of_line(lowest),

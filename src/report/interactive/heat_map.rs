@@ -18,7 +18,10 @@ impl HeatMap {
         let share = 1.0 / tables.len() as f64;
         let mut layout = layout();
         let data = tables.iter().enumerate().map(|(i, table)| {
-            let (left, right) = (share * i as f64, share * (i + 1) as f64 - if tables.len() > 1 { 0.02 } else { 0.0 });
+            let (left, right) = (
+                share * i as f64,
+                share * (i + 1) as f64 - if tables.len() > 1 { 0.02 } else { 0.0 },
+            );
             let titles = match self.table_titles.get(i).filter(|t| !t.is_empty()) {
                 Some(title) => format!("{} – {}", text(title), text(&self.column_label)),
                 None => text(&self.column_label),
@@ -85,7 +88,11 @@ impl HeatMap {
     /// Row by row, null where there is nothing.
     fn cells(&self, table: &Table, cell: impl Fn(f64) -> Value) -> Value {
         let value = |r: usize, c: usize| *table.get(r)?.get(c)?;
-        let row = |r| (0..self.columns.len()).map(|c| value(r, c).filter(|v| v.is_finite()).map(&cell)).collect::<Vec<_>>();
+        let row = |r| {
+            (0..self.columns.len())
+                .map(|c| value(r, c).filter(|v| v.is_finite()).map(&cell))
+                .collect::<Vec<_>>()
+        };
         json!((0..self.rows.len()).map(row).collect::<Vec<_>>())
     }
 

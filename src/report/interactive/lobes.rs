@@ -16,17 +16,28 @@ impl LobesFigure {
                 traces.curve(curve, k, i);
             }
             traces.limit(panel, i);
-            for outcome in [LobeOutcome::Stable, LobeOutcome::Chatter, LobeOutcome::Recommended, LobeOutcome::Tip] {
+            for outcome in [
+                LobeOutcome::Stable,
+                LobeOutcome::Chatter,
+                LobeOutcome::Recommended,
+                LobeOutcome::Tip,
+            ] {
                 traces.signs(panel, outcome, i);
             }
             let title = match several {
                 true => format!("{}<br>Depth limit (mm)", text(&panel.name)),
                 false => "Depth limit (mm)".to_string(),
             };
-            let cap = self.depth_cap_mm.or_else(|| panel.deepest().map(|deepest| panel.cap(deepest)));
+            let cap = self
+                .depth_cap_mm
+                .or_else(|| panel.deepest().map(|deepest| panel.cap(deepest)));
             axes.push((with(axis(&title), json!({ "range": [0, cap.map(number)] })), 1.0));
         }
-        let height = if several { 260.0 * self.panels.len() as f64 } else { 470.0 };
+        let height = if several {
+            260.0 * self.panels.len() as f64
+        } else {
+            470.0
+        };
         Plot {
             title: self.title.clone(),
             height_px: height + 120.0,
@@ -77,14 +88,24 @@ impl Traces {
                                  "hovertemplate": hover });
             self.add("before the effects were added", i, before);
         }
-        let name = if curve.label.trim().is_empty() { "depth limit" } else { &curve.label };
+        let name = if curve.label.trim().is_empty() {
+            "depth limit"
+        } else {
+            &curve.label
+        };
         let limit = json!({ "mode": "lines", "line": line(style::series(k)), "x": rpm, "y": depths(&curve.depth_limit_mm),
                             "hovertemplate": hover });
         self.add(&text(name), i, limit);
     }
 
     fn limit(&mut self, panel: &LobePanel, i: usize) {
-        let speeds = || panel.curves.iter().flat_map(|c| c.spindle_rpm.iter().copied()).filter(|n| n.is_finite());
+        let speeds = || {
+            panel
+                .curves
+                .iter()
+                .flat_map(|c| c.spindle_rpm.iter().copied())
+                .filter(|n| n.is_finite())
+        };
         let ends = [speeds().reduce(f64::min), speeds().reduce(f64::max)];
         if let (Some(limit), [Some(from), Some(to)]) = (panel.absolute_limit_mm, ends) {
             let trace = json!({ "mode": "lines", "line": line(style::LEVEL), "x": numbers([from, to]),

@@ -12,7 +12,8 @@ use crate::{Error, Result};
 
 /// `text`, compressed (gzip), in letters that HTML takes as they are (base64).
 pub fn packed(text: &str) -> Result<String> {
-    let failed = |e: std::io::Error| Error::computation(format!("the report's figures cannot be packed: {e}"));
+    let failed =
+        |e: std::io::Error| Error::computation(format!("the report's figures cannot be packed: {e}"));
     let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
     encoder.write_all(text.as_bytes()).map_err(failed)?;
     Ok(base64(&encoder.finish().map_err(failed)?))
@@ -111,14 +112,20 @@ mod tests {
     fn the_library_is_there_and_much_smaller_packed() {
         let packed = plotly_js().unwrap();
         assert!((1_500_000..2_200_000).contains(&packed.len()), "{}", packed.len());
-        assert!(packed.bytes().all(|b| b.is_ascii_alphanumeric() || b"+/=".contains(&b)));
+        assert!(
+            packed
+                .bytes()
+                .all(|b| b.is_ascii_alphanumeric() || b"+/=".contains(&b))
+        );
         let scripts = plotly::Plot::offline_js_sources();
         let script = first_script(&scripts).unwrap();
         assert!(!script.contains("MathJax=") && script.trim_end().ends_with("}));"));
         let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
         encoder.write_all(script.as_bytes()).unwrap();
         let mut back = String::new();
-        flate2::read::GzDecoder::new(&encoder.finish().unwrap()[..]).read_to_string(&mut back).unwrap();
+        flate2::read::GzDecoder::new(&encoder.finish().unwrap()[..])
+            .read_to_string(&mut back)
+            .unwrap();
         assert_eq!(back, script);
         assert!(first_script("<script>x</script>").is_err());
     }

@@ -35,14 +35,23 @@ impl RegressionFigure {
             }
         }
         let force = axis(&text(&self.y_label));
-        let rest = with(axis(&text(&self.rest_label())), json!({ "zeroline": true, "zerolinecolor": "#3c4046" }));
+        let rest = with(
+            axis(&text(&self.rest_label())),
+            json!({ "zeroline": true, "zerolinecolor": "#3c4046" }),
+        );
         Plot {
             title: self.title.clone(),
             height_px: 640.0,
             data,
             layout: stacked(
                 with(axis(&text(&self.x_label)), json!({ "rangemode": "tozero" })),
-                vec![(with(force, json!({ "zeroline": true, "zerolinecolor": "#9aa0a8" })), 2.2), (rest, 1.0)],
+                vec![
+                    (
+                        with(force, json!({ "zeroline": true, "zerolinecolor": "#9aa0a8" })),
+                        2.2,
+                    ),
+                    (rest, 1.0),
+                ],
             ),
             ..Plot::default()
         }

@@ -9,7 +9,13 @@ impl RobotFigure {
     pub fn plot(&self) -> Plot {
         let all = || self.postures.iter().flat_map(|(_, chain)| chain).flatten();
         let reach = all().fold(0.1, |most: f64, v| most.max(v.abs())) * 1.05;
-        let shown = |i: usize, chosen: usize| if i == chosen { json!(true) } else { json!("legendonly") };
+        let shown = |i: usize, chosen: usize| {
+            if i == chosen {
+                json!(true)
+            } else {
+                json!("legendonly")
+            }
+        };
         let data = self.postures.iter().enumerate().map(|(i, (name, chain))| {
             let stroke = style::series(i);
             let last = chain.len().saturating_sub(1);
@@ -41,7 +47,10 @@ impl RobotFigure {
             .iter()
             .enumerate()
             .map(|(chosen, (name, _))| {
-                button(text(name), (0..self.postures.len()).map(|i| shown(i, chosen)).collect())
+                button(
+                    text(name),
+                    (0..self.postures.len()).map(|i| shown(i, chosen)).collect(),
+                )
             })
             .collect();
         buttons.push(button("all".into(), vec![json!(true); self.postures.len()]));

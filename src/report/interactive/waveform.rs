@@ -45,7 +45,10 @@ impl WaveformFigure {
             title: self.title.clone(),
             height_px: 110.0 + 180.0 * self.panels.len() as f64,
             data,
-            layout: with(stacked(axis(&text(&self.x_label)), panels), json!({ "hovermode": "x" })),
+            layout: with(
+                stacked(axis(&text(&self.x_label)), panels),
+                json!({ "hovermode": "x" }),
+            ),
             ..Plot::default()
         }
     }

@@ -363,8 +363,11 @@ fn line_figure(
         .collect();
     let caption = format!(
         "Average {quantity} in tool axes against feed: signs are the cuts with their standard errors (most are smaller \
-         than the sign), lines the fitted force model. {}.",
-        listed(&r2)
+         than the sign), lines the fitted force model.{}",
+        match r2.is_empty() {
+            true => String::new(),
+            false => format!(" {}.", listed(&r2)),
+        }
     );
     figure(
         format!("regression-{}-{quantity}", slug(result, pooled)),

@@ -68,7 +68,7 @@ impl RegressionFigure {
             [rest - error, rest + error]
         });
         let rests = extent(rests.filter(|v| usable(*v)).chain([0.0])).unwrap_or((0.0, 1.0));
-        let rest_axis = Axis::padded(&self.rest_label(), rests, 0.12, 3);
+        let rest_axis = Axis::padded(&self.rest_label(), rests, 0.12, 5);
         let left = Panel::left_margin(&[&y, &rest_axis]);
         let right = f64::from(WIDTH) - Panel::RIGHT_MARGIN;
         let excluded = points().any(|p| p.excluded);

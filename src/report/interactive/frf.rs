@@ -40,7 +40,7 @@ pub fn nyquist_layout(unit: &str) -> Value {
     let scale = |name: &str| {
         with(
             axis(&format!("{name} part ({unit})")),
-            json!({ "tickformat": "~s" }),
+            json!({ "exponentformat": "SI" }),
         )
     };
     let mut layout = layout();

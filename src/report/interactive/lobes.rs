@@ -31,7 +31,13 @@ impl LobesFigure {
             let cap = self
                 .depth_cap_mm
                 .or_else(|| panel.deepest().map(|deepest| panel.cap(deepest)));
-            axes.push((with(axis(&title), json!({ "range": [0, cap.map(number)] })), 1.0));
+            axes.push((
+                with(
+                    axis(&title),
+                    json!({ "range": [0, cap.map(|cap| number(1.06 * cap))] }),
+                ),
+                1.0,
+            ));
         }
         let height = if several {
             260.0 * self.panels.len() as f64

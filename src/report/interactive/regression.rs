@@ -34,24 +34,20 @@ impl RegressionFigure {
                 data.push(signs(series, i, 1, series.rests().collect()));
             }
         }
-        let force = axis(&text(&self.y_label));
-        let rest = with(
-            axis(&text(&self.rest_label())),
-            json!({ "zeroline": true, "zerolinecolor": "#3c4046" }),
-        );
+        let force = json!({ "zeroline": true, "zerolinecolor": "#9aa0a8" });
+        let mut panels = vec![(with(axis(&text(&self.y_label)), force), 2.2)];
+        let lined = self.series.iter().any(|s| s.line.is_some());
+        if lined {
+            let rest = json!({ "zeroline": true, "zerolinecolor": "#3c4046" });
+            panels.push((with(axis(&text(&self.rest_label())), rest), 1.0));
+        }
         Plot {
             title: self.title.clone(),
-            height_px: 640.0,
+            height_px: if lined { 640.0 } else { 480.0 },
             data,
             layout: stacked(
                 with(axis(&text(&self.x_label)), json!({ "rangemode": "tozero" })),
-                vec![
-                    (
-                        with(force, json!({ "zeroline": true, "zerolinecolor": "#9aa0a8" })),
-                        2.2,
-                    ),
-                    (rest, 1.0),
-                ],
+                panels,
             ),
             ..Plot::default()
         }

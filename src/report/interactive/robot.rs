@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::{Plot, css, layout, numbers, text};
+use super::{Plot, css, layout, number, numbers, text};
 use crate::report::figure::{RobotFigure, style};
 
 impl RobotFigure {
@@ -65,7 +65,7 @@ impl RobotFigure {
             "yaxis": axis("y (m)", -reach),
             "zaxis": axis("z (m)", floor),
             "aspectmode": "data",
-            "camera": { "eye": { "x": 1.75, "y": 1.45, "z": 0.75 }, "center": { "x": 0, "y": 0, "z": -0.12 } },
+        "camera": self.camera(),
         });
         layout["margin"] = json!({ "l": 0, "r": 0, "t": 8, "b": 0 });
         layout["showlegend"] = json!(false);
@@ -79,6 +79,20 @@ impl RobotFigure {
             layout,
             ..Plot::default()
         }
+    }
+}
+
+impl RobotFigure {
+    /// From the side of the arm in the first posture, a little from the front and above.
+    fn camera(&self) -> Value {
+        let joints = self.postures.first().into_iter().flat_map(|(_, chain)| chain);
+        let farthest = joints.max_by(|a, b| a[0].hypot(a[1]).total_cmp(&b[0].hypot(b[1])));
+        let ahead = farthest.map_or(0.0, |p| p[1].atan2(p[0]));
+        let (y, x) = (ahead - 65f64.to_radians()).sin_cos();
+        json!({
+            "eye": { "x": number(2.1 * x), "y": number(2.1 * y), "z": 0.6 },
+            "center": { "x": 0, "y": 0, "z": -0.12 },
+        })
     }
 }
 

@@ -39,6 +39,7 @@ impl Surface {
             json!({
                 "type": "scatter",
                 "mode": "markers",
+                "cliponaxis": false,
                 "name": "recommended",
                 "x": [number(rpm)],
                 "y": [number(angle)],

@@ -216,11 +216,30 @@ fn hole(axis: ForceAxis, cut: &CutData, parts: &[Part]) -> Course {
             .measured
             .push(sum(&|(channel, fit, _)| channel.level[b] - fit.reference[b]));
         course.model.push(sum(&|(_, fit, _)| fit.level[b]));
-        if let Some(next) = next.filter(|next| next[0] - to > (to - from).max(next[1] - next[0])) {
-            course.x.push(0.5 * (to + next[0]) - start);
+        if let Some(middle) = next.and_then(|next| left_out([*from, *to], *next)) {
+            course.x.push(middle - start);
             course.measured.push(f64::NAN);
             course.model.push(f64::NAN);
         }
     }
     course
+}
+
+/// The middle of what lies between two blocks that are not neighbours (a block's length apart at least), s.
+fn left_out([from, to]: [f64; 2], next: [f64; 2]) -> Option<f64> {
+    let apart = next[0] - to;
+    (apart > (to - from).max(next[1] - next[0])).then_some(to + 0.5 * apart)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_stretch_without_blocks_is_a_gap() {
+        assert_eq!(left_out([0.0, 1.0], [1.0, 2.0]), None);
+        // Blocks are whole revolutions: what is left at the end of a range is shorter than one.
+        assert_eq!(left_out([0.0, 1.0], [1.9, 2.2]), None);
+        assert_eq!(left_out([0.0, 1.0], [3.0, 3.5]), Some(2.0));
+    }
 }

@@ -142,19 +142,23 @@ pub(super) fn advice<M, I>(
 
 /// Effects that the data cannot show, with the reasons.
 pub(super) fn not_tried<M, I>(d: &Diagnosis<M, I>) -> Option<Block> {
-    // Sites of one effect often share their reason, which is said once.
-    let mut of_reason: Vec<(&str, Vec<String>)> = Vec::new();
-    for (effect, why) in &d.not_tried {
-        match of_reason.iter_mut().find(|(known, _)| *known == why) {
+    let reasons = by_reason(&d.not_tried);
+    (!reasons.is_empty()).then(|| paragraph(format!("Not tried: {}.", reasons.join("; "))))
+}
+
+/// `a and b (why)`: what shares a reason, which sites of one effect often do, stands together.
+fn by_reason(not_tried: &[(String, String)]) -> Vec<String> {
+    let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
+    for (effect, why) in not_tried {
+        match reasons.iter_mut().find(|(known, _)| *known == why) {
             Some((_, effects)) => effects.push(effect.clone()),
-            None => of_reason.push((why, vec![effect.clone()])),
+            None => reasons.push((why, vec![effect.clone()])),
         }
     }
-    let reasons: Vec<String> = of_reason
+    let said = reasons
         .iter()
-        .map(|(why, effects)| format!("{} ({why})", listed(effects)))
-        .collect();
-    (!reasons.is_empty()).then(|| paragraph(format!("Not tried: {}.", reasons.join("; "))))
+        .map(|(why, effects)| format!("{} ({why})", listed(effects)));
+    said.collect()
 }
 
 /// Error with each candidate; `folds`: what was left out in turn.
@@ -395,4 +399,26 @@ fn frf(
     );
     let file = format!("missing-frf-{}", rank + 1);
     Some(figure(file, &drawing.title.clone(), caption, drawing.png()).with_plot(drawing.plot()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reason_is_said_once() {
+        let pair = |effect: &str, why: &str| (effect.to_string(), why.to_string());
+        let tried = [
+            pair("damping@joint-1", "one force level"),
+            pair("payload", "no tool"),
+            pair("damping@joint-2", "one force level"),
+        ];
+        assert_eq!(
+            by_reason(&tried),
+            [
+                "damping@joint-1 and damping@joint-2 (one force level)",
+                "payload (no tool)"
+            ]
+        );
+    }
 }

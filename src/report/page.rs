@@ -10,6 +10,7 @@ use minijinja::syntax::SyntaxConfig;
 use minijinja::{Environment, Value, context};
 use serde_json::json;
 
+use super::base64::base64;
 use super::interactive::{Explorer, GLUE, Plot, packed, plotly_js};
 use crate::files::write_atomically;
 use crate::{Error, Result};
@@ -405,25 +406,6 @@ fn png_size(png: &[u8]) -> (u32, u32) {
     (number(16).unwrap_or(0), number(20).unwrap_or(0))
 }
 
-/// RFC 4648, section 4, with padding.
-pub(super) fn base64(bytes: &[u8]) -> String {
-    const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for chunk in bytes.chunks(3) {
-        let byte = |i: usize| u32::from(chunk.get(i).copied().unwrap_or(0));
-        let word = byte(0) << 16 | byte(1) << 8 | byte(2);
-        for i in 0..4 {
-            if i <= chunk.len() {
-                let letter = ALPHABET[(word >> (18 - 6 * i) & 63) as usize];
-                text.push(char::from(letter));
-            } else {
-                text.push('=');
-            }
-        }
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -562,21 +544,6 @@ mod tests {
             .unwrap_err()
             .to_string();
         assert!(error.contains("below"), "{error}");
-    }
-
-    #[test]
-    fn base64_as_in_rfc_4648() {
-        let pairs = [
-            ("", ""),
-            ("f", "Zg=="),
-            ("fo", "Zm8="),
-            ("foo", "Zm9v"),
-            ("foobar", "Zm9vYmFy"),
-        ];
-        for (plain, encoded) in pairs {
-            assert_eq!(base64(plain.as_bytes()), encoded);
-        }
-        assert_eq!(base64(&[255, 254, 253]), "//79");
     }
 
     #[test]

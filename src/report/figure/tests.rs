@@ -397,6 +397,7 @@ fn the_gallery_makes_a_report_of_bearable_size() {
                 "What is to be seen, said in one sentence: the calibrated model follows the first two modes."
                     .into(),
             png: png.unwrap(),
+            ..Figure::default()
         })
     });
     let table = Table {

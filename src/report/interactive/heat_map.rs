@@ -147,3 +147,46 @@ impl Plot {
         self
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn map() -> HeatMap {
+        HeatMap {
+            title: "error".into(),
+            rows: vec!["p1 <b>".into(), "p1 <b>".into()],
+            columns: vec!["XX".into()],
+            values: vec![vec![Some(0.25)], vec![None]],
+            shades: vec![vec![Some(10.0)], vec![None]],
+            range: Some((1.0, 100.0)),
+            log: true,
+            ..HeatMap::default()
+        }
+    }
+
+    #[test]
+    fn cells_say_the_error_and_are_coloured_by_its_ratio_to_the_noise() {
+        let plot = map().leading_map().value();
+        let trace = &plot["data"][0];
+        assert_eq!(trace["z"], json!([[1], [null]]), "log10 of the ratio");
+        assert_eq!(trace["text"], json!([["25.0\u{a0}%"], [null]]));
+        assert_eq!((&trace["zmin"], &trace["zmax"]), (&json!(0), &json!(2)));
+        assert_eq!(trace["colorbar"]["ticktext"][0], "1");
+        // Equal names stay two rows, and are no markup.
+        assert_eq!(
+            plot["layout"]["yaxis"]["ticktext"],
+            json!(["p1 &lt;b&gt;", "p1 &lt;b&gt;"])
+        );
+        assert_eq!(plot["links"]["frf"][0][0], 7);
+        assert_eq!(plot["stages"][0]["z"], trace["z"]);
+        assert_eq!(plot["stages"][0]["title"], "error");
+    }
+
+    impl HeatMap {
+        fn leading_map(&self) -> Plot {
+            let frfs = [vec![Some(7)], vec![None]];
+            self.plot().leading_to(&frfs, &[]).at_stages(&[self.clone()])
+        }
+    }
+}

@@ -150,3 +150,59 @@ impl Traces {
         self.add(name, i, trace);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::figure::LobeMarker;
+
+    #[test]
+    fn bands_have_an_end_and_each_name_stands_once_in_the_legend() {
+        let panel = |name: &str| LobePanel {
+            name: name.into(),
+            curves: vec![LobeCurve {
+                spindle_rpm: vec![100.0, 200.0],
+                depth_limit_mm: vec![Some(1.0), None],
+                band_mm: Some([vec![Some(0.8), Some(2.0)], vec![Some(1.2), None]]),
+                ..LobeCurve::default()
+            }],
+            markers: vec![LobeMarker {
+                spindle_rpm: 150.0,
+                depth_mm: 0.5,
+                outcome: LobeOutcome::Chatter,
+                label: "cut <7>".into(),
+            }],
+            absolute_limit_mm: Some(0.4),
+        };
+        let figure = LobesFigure {
+            panels: vec![panel("p1"), panel("p2")],
+            ..LobesFigure::default()
+        };
+        let plot = figure.plot().value();
+        let traces = plot["data"].as_array().unwrap();
+        let entries: Vec<&Value> = traces
+            .iter()
+            .filter(|t| t["showlegend"] == true)
+            .map(|t| &t["name"])
+            .collect();
+        let names = [
+            "5 to 95 % by the model's uncertainty",
+            "depth limit",
+            "absolute limit",
+            "cut with chatter",
+        ];
+        assert_eq!(entries, names);
+        let band: Vec<&Value> = traces.iter().filter(|t| t["fill"] == "tonexty").collect();
+        assert_eq!(
+            (band.len(), &band[0]["y"]),
+            (2, &json!([1.2, 20])),
+            "no upper limit: beyond the frame"
+        );
+        let crosses = traces.iter().find(|t| t["name"] == "cut with chatter").unwrap();
+        assert_eq!(
+            (&crosses["text"][0], &crosses["yaxis"]),
+            (&json!("cut &lt;7&gt;"), &json!("y"))
+        );
+        assert_eq!(crosses["marker"]["symbol"], "x-thin");
+    }
+}

@@ -7,7 +7,7 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use num_complex::Complex64;
 
-use crate::report::page::base64;
+use crate::report::base64::base64;
 use crate::{Error, Result};
 
 /// `text`, compressed (gzip), in letters that HTML takes as they are (base64).

@@ -85,3 +85,49 @@ fn signs(series: &RegressionSeries, i: usize, panel: usize, points: Vec<(&Regres
         "hovertemplate": "%{text}, %{x:.4g}: %{y:.4g}",
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn residuals_are_what_the_line_leaves_over() {
+        let point = |x, y, excluded| RegressionPoint {
+            label: "cut 1".into(),
+            x,
+            y,
+            std_error: Some(0.5),
+            excluded,
+        };
+        let series = RegressionSeries {
+            points: vec![
+                point(0.1, 13.0, false),
+                point(0.2, 12.5, false),
+                point(0.2, 99.0, true),
+            ],
+            line: Some((10.0, 20.0)),
+            ..RegressionSeries::default()
+        };
+        let figure = RegressionFigure {
+            y_label: "Average force (N)".into(),
+            series: vec![series],
+            ..RegressionFigure::default()
+        };
+        let plot = figure.plot().value();
+        let of = |axis: &str| {
+            let traces = plot["data"].as_array().unwrap().iter();
+            traces
+                .filter(|t| t["yaxis"] == axis)
+                .map(|t| t["y"].clone())
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(
+            of("y2"),
+            [json!([1, -1.5])],
+            "a point left out of the fit has none"
+        );
+        assert_eq!(of("y"), [json!([13, 12.5, 99])]);
+        assert_eq!(plot["data"][1]["marker"]["symbol"][2], "x-thin");
+        assert_eq!(plot["layout"]["yaxis2"]["title"]["text"], "Residual (N)");
+    }
+}

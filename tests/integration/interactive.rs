@@ -176,7 +176,7 @@ fn a_static_report_has_no_scripts_and_the_same_images() {
     let (_, live) = report(&dir, &[]);
     let (_, quiet) = report(&dir, &["--static"]);
     assert_self_contained(&quiet);
-    assert!(!quiet.contains("<script") && !quiet.contains("data-plot"));
+    assert!(!quiet.contains("<script") && !quiet.contains("<figure data-plot"));
     assert_eq!(quiet.matches("<img").count(), live.matches("<img").count());
     assert!(quiet.len() < 2_500_000 && quiet.len() < live.len());
 }

@@ -104,7 +104,7 @@ impl RegressionFigure {
             y,
             x_labels: !lined,
         };
-        let below = lined.then(|| Panel {
+        let below = lined.then_some(Panel {
             left,
             top: panel.bottom + 20.0,
             right,

@@ -186,7 +186,9 @@ mod tests {
     impl HeatMap {
         fn leading_map(&self) -> Plot {
             let frfs = [vec![Some(7)], vec![None]];
-            self.plot().leading_to(&frfs, &[]).at_stages(&[self.clone()])
+            self.plot()
+                .leading_to(&frfs, &[])
+                .at_stages(std::slice::from_ref(self))
         }
     }
 }

@@ -90,8 +90,8 @@ impl RobotFigure {
         let ahead = farthest.map_or(0.0, |p| p[1].atan2(p[0]));
         let (y, x) = (ahead - 65f64.to_radians()).sin_cos();
         json!({
-            "eye": { "x": number(2.1 * x), "y": number(2.1 * y), "z": 0.6 },
-            "center": { "x": 0, "y": 0, "z": -0.12 },
+            "eye": { "x": number(2.4 * x), "y": number(2.4 * y), "z": 0.6 },
+            "center": { "x": 0, "y": 0, "z": 0 },
         })
     }
 }

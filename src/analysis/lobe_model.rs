@@ -9,6 +9,7 @@ use crate::identify::case::structure_model;
 use crate::identify::structure::StructureModel;
 use crate::lobes::hole::{Deflection, HoleError, HoleLoad};
 use crate::lobes::{DirectFrf, RobotFrf, StateSpace, band};
+use crate::robot::PostureReport;
 use crate::{InputError, Result};
 
 /// Draws of the parameters for the band.
@@ -45,11 +46,16 @@ impl FittedModel {
 
     /// The tool point's FRF, as a modal sum where the modes are not coupled.
     fn frf(&self, theta: &[f64], joints_deg: &[f64]) -> Result<Box<dyn DirectFrf>> {
-        let frf = self.robot_frf(theta, joints_deg)?;
-        Ok(match frf.modal()? {
-            Some(modal) => Box::new(modal),
-            None => Box::new(frf),
-        })
+        quickest(self.robot_frf(theta, joints_deg)?)
+    }
+
+    /// The same with frequencies and static stiffness there.
+    fn frf_and_report(&self, joints_deg: &[f64]) -> Result<(Box<dyn DirectFrf>, PostureReport)> {
+        let robot = &self.model.robot;
+        let kinematics = robot.kinematics(joints_deg)?;
+        let chain = self.model.chain(&self.theta, &kinematics, 0.0, false);
+        let frf = quickest(RobotFrf::new(robot, &kinematics, &chain)?)?;
+        Ok((frf, PostureReport::new(robot, &kinematics, &chain)?))
     }
 
     pub fn dynamics(&self, joints_deg: &[f64], through_time: bool) -> Result<Dynamics> {
@@ -62,6 +68,13 @@ impl FittedModel {
             states,
         })
     }
+}
+
+fn quickest(frf: RobotFrf) -> Result<Box<dyn DirectFrf>> {
+    Ok(match frf.modal()? {
+        Some(modal) => Box::new(modal),
+        None => Box::new(frf),
+    })
 }
 
 /// The robot model that lobes are computed from.
@@ -85,6 +98,15 @@ impl ModelState {
     /// # Errors
     /// No posture, or what calibrating or reading the revisions refuses.
     pub fn of(campaign: &Campaign, warnings: &mut Vec<String>) -> Result<Self> {
+        Self::fitted(campaign, warnings, true)
+    }
+
+    /// As [`of`](Self::of), but for `before`, which takes another calibration.
+    pub fn without_history(campaign: &Campaign, warnings: &mut Vec<String>) -> Result<Self> {
+        Self::fitted(campaign, warnings, false)
+    }
+
+    fn fitted(campaign: &Campaign, warnings: &mut Vec<String>, history: bool) -> Result<Self> {
         if campaign.postures.is_empty() {
             return Err(InputError::new("lobes from the model need at least one posture")
                 .file(campaign.dir.join("campaign.toml"))
@@ -94,7 +116,7 @@ impl ModelState {
         }
         match campaign.frfs.is_empty() {
             true => Self::uncalibrated(campaign, warnings),
-            false => Self::calibrated(campaign, warnings),
+            false => Self::calibrated(campaign, warnings, history),
         }
     }
 
@@ -114,7 +136,7 @@ impl ModelState {
         })
     }
 
-    fn calibrated(campaign: &Campaign, warnings: &mut Vec<String>) -> Result<Self> {
+    fn calibrated(campaign: &Campaign, warnings: &mut Vec<String>, history: bool) -> Result<Self> {
         let StructureAnalysis {
             case, calibration, ..
         } = StructureAnalysis::run(campaign, Options::default())?;
@@ -124,7 +146,7 @@ impl ModelState {
             true => "calibrated robot model".to_string(),
             false => format!("calibrated robot model ({})", case.model_description()),
         };
-        let before = match case.before_effects(campaign)? {
+        let before = match case.before_effects(campaign)?.filter(|_| history) {
             Some(model) => {
                 let theta = calibrate(&model, &case.data, None, options)?.theta;
                 Some(FittedModel { model, theta })
@@ -157,6 +179,11 @@ impl ModelState {
     /// The tool point's FRF.
     pub fn frf(&self, joints_deg: &[f64]) -> Result<Box<dyn DirectFrf>> {
         self.current.frf(&self.current.theta, joints_deg)
+    }
+
+    /// The tool point's FRF, and frequencies and static stiffness there.
+    pub fn frf_and_report(&self, joints_deg: &[f64]) -> Result<(Box<dyn DirectFrf>, PostureReport)> {
+        self.current.frf_and_report(joints_deg)
     }
 
     /// What a load does to the tool, with nothing said of its uncertainty.

@@ -3,6 +3,7 @@
 use super::lobe_model::{Dynamics, ModelState};
 use super::redundancy::{self, RedundancyAnalysis};
 use crate::campaign::{Campaign, LobeMethod, LobeSource, LobesSection, Process};
+use crate::cutting::Group;
 use crate::lobes::band::{self, LobeBand};
 use crate::lobes::hole::{HoleCheck, HoleError};
 use crate::lobes::measured::measured_structures;
@@ -162,14 +163,7 @@ impl LobeAnalysis {
                 .remedy("add one with process, source and spindle_rpm = [from, to, step]")
         })?;
         let mut warnings = Vec::new();
-        let (coefficients, own_cuts) = match LobeCoefficients::given(section) {
-            Some(given) => (given, None),
-            None => {
-                let group = group_of_cuts(campaign, section, &mut warnings)?;
-                (coefficients_of_group(campaign, section, &group)?, Some(group))
-            }
-        };
-        let cut = cut_of(campaign, section, coefficients)?;
+        let (coefficients, cut, own_cuts) = force_of(campaign, section, &mut warnings)?;
         let speeds = speed_grid(section.spindle_rpm)?;
         let (noted, not_compared) = noted_cuts(campaign, section);
         let (mut surface, mut effects, mut revision, mut hole) = (None, Vec::new(), None, None);
@@ -302,6 +296,23 @@ impl LobeAnalysis {
         best.truncate(BEST);
         best
     }
+}
+
+/// The cut that the `[lobes]` table asks for, and the group of the campaign's own cuts where the coefficients come from
+/// those.
+pub(super) fn force_of(
+    campaign: &Campaign,
+    section: &LobesSection,
+    warnings: &mut Vec<String>,
+) -> Result<(LobeCoefficients, Cut, Option<Group>)> {
+    let (coefficients, own_cuts) = match LobeCoefficients::given(section) {
+        Some(given) => (given, None),
+        None => {
+            let group = group_of_cuts(campaign, section, warnings)?;
+            (coefficients_of_group(campaign, section, &group)?, Some(group))
+        }
+    };
+    Ok((coefficients, cut_of(campaign, section, coefficients)?, own_cuts))
 }
 
 fn from_modes(campaign: &Campaign, section: &LobesSection) -> Result<Vec<Structure>> {

@@ -13,6 +13,7 @@ mod redundancy;
 pub mod regression_line;
 pub mod stick_shapes;
 pub mod structure;
+pub mod sweep;
 pub mod thesis_findings;
 
 pub use addition::Addition;
@@ -23,4 +24,5 @@ pub use lobes::{LobeAnalysis, LobeCase, LobesBefore};
 pub use modal::{ModalAnalysis, SetModes};
 pub use redundancy::{HoleWeighing, RedundancyAnalysis};
 pub use structure::StructureAnalysis;
+pub use sweep::{Sweep, SweepRequest, SweepRow};
 pub use thesis_findings::ThesisFindings;

@@ -15,6 +15,7 @@
 mod arcs;
 mod arnoldi;
 pub mod band;
+pub mod best_speed;
 pub mod curve;
 pub mod force;
 pub mod frf;
@@ -34,6 +35,7 @@ pub mod solve;
 pub mod state_space;
 pub mod thesis;
 pub mod thesis_assumptions;
+pub mod workspace;
 
 pub use band::LobeBand;
 pub use curve::{AbsoluteLimit, Limit, LobeCurve, Peak, SpeedLimit, peak_near, peaks, speed_grid};

@@ -19,6 +19,9 @@ mod parts;
 mod real_case_section;
 mod redundancy_section;
 pub mod structure_section;
+pub mod sweep_summary;
+#[cfg(feature = "parquet")]
+pub mod sweep_table;
 #[cfg(feature = "parquet")]
 pub mod tables;
 pub mod thesis_cutting;

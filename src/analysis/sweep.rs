@@ -83,10 +83,12 @@ impl Sweep {
     /// No `[lobes]` table, no posture, no robot, a grid without sense, or what calibrating refuses.
     pub fn new(campaign: &Campaign, request: &SweepRequest) -> Result<Self> {
         let section = campaign.lobes.as_ref().ok_or_else(|| {
-            InputError::new("a map of the workspace needs to know the cut, and the campaign has no [lobes] table")
-                .file(campaign.dir.join("campaign.toml"))
-                .key("lobes")
-                .remedy("add one with process, source = \"model\" and spindle_rpm = [from, to, step]")
+            InputError::new(
+                "a map of the workspace needs to know the cut, and the campaign has no [lobes] table",
+            )
+            .file(campaign.dir.join("campaign.toml"))
+            .key("lobes")
+            .remedy("add one with process, source = \"model\" and spindle_rpm = [from, to, step]")
         })?;
         let least_singularity_margin = request.least_singularity_margin;
         if !(0.0..1.0).contains(&least_singularity_margin) {

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use super::Outcome;
-use crate::Result;
 #[cfg(not(feature = "parquet"))]
 use crate::InputError;
+use crate::Result;
 use crate::lobes::workspace::Span;
 
 /// Postures nearer to a singularity are usually of no use.
@@ -61,7 +61,10 @@ pub struct Args {
 }
 
 fn direction(text: &str) -> std::result::Result<[f64; 3], String> {
-    let numbers: Vec<f64> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
+    let numbers: Vec<f64> = text
+        .split(',')
+        .filter_map(|part| part.trim().parse().ok())
+        .collect();
     let three: Option<[f64; 3]> = numbers.try_into().ok();
     three
         .filter(|_| text.split(',').count() == 3)
@@ -71,12 +74,12 @@ fn direction(text: &str) -> std::result::Result<[f64; 3], String> {
 /// The map is a Parquet table, and this program was built without them.
 #[cfg(not(feature = "parquet"))]
 pub fn run(args: Args) -> Result<Outcome> {
-    Err(
-        InputError::new("this program was built without Parquet tables, which a map of the workspace is written as")
-            .file(args.out)
-            .remedy("build it with the feature parquet, which is on by default: cargo build --release")
-            .into(),
+    Err(InputError::new(
+        "this program was built without Parquet tables, which a map of the workspace is written as",
     )
+    .file(args.out)
+    .remedy("build it with the feature parquet, which is on by default: cargo build --release")
+    .into())
 }
 
 #[cfg(feature = "parquet")]
@@ -103,7 +106,11 @@ mod with_tables {
     /// Quantity, label, name of the picture.
     const PICTURES: [(&str, &str, &str); 2] = [
         ("best_depth_mm", "Depth at the best speed, mm", "best-depth.png"),
-        ("absolute_limit_mm", "Depth stable at every speed, mm", "absolute-limit.png"),
+        (
+            "absolute_limit_mm",
+            "Depth stable at every speed, mm",
+            "absolute-limit.png",
+        ),
     ];
 
     pub fn run(args: Args) -> Result<Outcome> {
@@ -155,7 +162,10 @@ mod with_tables {
             "warnings": sweep.warnings,
         });
         if json["skipped"] == true {
-            let text = format!("{name} is there already and stays as it is: {}\n", folder.path(shard).display());
+            let text = format!(
+                "{name} is there already and stays as it is: {}\n",
+                folder.path(shard).display()
+            );
             return Ok(Outcome::new(json, text + &warnings(&sweep.warnings), None));
         }
         let begun = Instant::now();
@@ -164,7 +174,10 @@ mod with_tables {
         folder.write(shard, &rows)?;
         let of_status = |status: PlaceStatus| rows.iter().filter(|r| r.status == status).count();
         let usable = of_status(PlaceStatus::Reachable);
-        json["counts"] = PlaceStatus::ALL.iter().map(|s| (s.name().to_string(), json!(of_status(*s)))).collect();
+        json["counts"] = PlaceStatus::ALL
+            .iter()
+            .map(|s| (s.name().to_string(), json!(of_status(*s))))
+            .collect();
         json["seconds"] = json!(seconds);
         json["places_per_s"] = json!(places.len() as f64 / seconds.max(1e-9));
         let text = format!(
@@ -239,14 +252,25 @@ mod with_tables {
                 part("z_m", 4),
                 part("angle_deg", 4),
                 part("best_spindle_rpm", 4),
-                (1..=6).map(|i| part(&format!("q{i}_deg"), 5)).collect::<Vec<_>>().join(" "),
+                (1..=6)
+                    .map(|i| part(&format!("q{i}_deg"), 5))
+                    .collect::<Vec<_>>()
+                    .join(" "),
             )
         };
         text += &say("deepest_cut", "Deepest cut", "best_depth_mm", "mm");
-        text += &say("highest_absolute_limit", "Deepest at every speed", "absolute_limit_mm", "mm");
+        text += &say(
+            "highest_absolute_limit",
+            "Deepest at every speed",
+            "absolute_limit_mm",
+            "mm",
+        );
         let median = &document["quantiles"]["best_depth_mm"]["median"];
         if let Some(median) = median.as_f64() {
-            text += &format!("Half of the usable places allow {} mm or more at their best speed\n", number(median, 3));
+            text += &format!(
+                "Half of the usable places allow {} mm or more at their best speed\n",
+                number(median, 3)
+            );
         }
         let files = [&document["table"], &document["summary"]].into_iter();
         let images = document["images"].as_array().into_iter().flatten();

@@ -82,8 +82,13 @@ mod tests {
 
     #[test]
     fn an_unlimited_speed_is_the_best_and_has_no_depth() {
-        let free = Needle { free_from_rpm: 1000.0 };
+        let free = Needle {
+            free_from_rpm: 1000.0,
+        };
         let best = best_speed(&free, [100.0, 1500.0]);
-        assert!(best.depth_mm.is_none() && best.spindle_rpm > 1000.0 && best.spindle_rpm < 1045.0, "{best:?}");
+        assert!(
+            best.depth_mm.is_none() && best.spindle_rpm > 1000.0 && best.spindle_rpm < 1045.0,
+            "{best:?}"
+        );
     }
 }

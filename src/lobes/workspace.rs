@@ -111,7 +111,8 @@ impl WorkspaceGrid {
     /// # Errors
     /// No direction or one without a length, a step outside 0.01° to 360°, or more places than can be meant.
     pub fn new([x_m, y_m, z_m]: [Span; 3], directions: &[[f64; 3]], angle_step_deg: f64) -> Result<Self> {
-        let refuse = |problem: String, remedy: &str| -> Error { InputError::new(problem).remedy(remedy).into() };
+        let refuse =
+            |problem: String, remedy: &str| -> Error { InputError::new(problem).remedy(remedy).into() };
         if !(0.01..=360.0).contains(&angle_step_deg) {
             return Err(refuse(
                 format!("{angle_step_deg}° is no step of the redundancy angle"),
@@ -341,7 +342,9 @@ mod tests {
         assert_eq!((s.at_m(0), s.at_m(4)), (1.2, 2.0));
         assert!((s.at_m(2) - 1.6).abs() < 1e-15);
         assert_eq!(span(" 1.5 ").count, 1);
-        for slip in ["", "1:2", "2:1:3", "1:1:3", "1:2:0", "1:2:1", "nan", "1:inf:3", "1:2:2:2", "1:2:-3"] {
+        for slip in [
+            "", "1:2", "2:1:3", "1:1:3", "1:2:0", "1:2:1", "nan", "1:inf:3", "1:2:2:2", "1:2:-3",
+        ] {
             let message = slip.parse::<Span>().unwrap_err().to_string();
             assert!(message.contains("FROM:TO:COUNT"), "{slip}: {message}");
         }
@@ -417,10 +420,19 @@ mod tests {
             *seen.entry(stand.as_ref().err().copied()).or_insert(0) += 1;
             let Ok(stand) = stand else { continue };
             let there = robot.kinematics(&stand.joints_deg()).unwrap();
-            assert!((there.tcp().coords - Vector3::from(place.tcp_m)).norm() < 1e-8, "{place:?}");
-            assert!((there.tool_axis() - Vector3::from(place.tool_axis)).norm() < 1e-7, "{place:?}");
+            assert!(
+                (there.tcp().coords - Vector3::from(place.tcp_m)).norm() < 1e-8,
+                "{place:?}"
+            );
+            assert!(
+                (there.tool_axis() - Vector3::from(place.tool_axis)).norm() < 1e-7,
+                "{place:?}"
+            );
         }
-        assert!(seen[&None] > 50 && seen[&Some(PlaceStatus::OutOfReach)] > 10, "{seen:?}");
+        assert!(
+            seen[&None] > 50 && seen[&Some(PlaceStatus::OutOfReach)] > 10,
+            "{seen:?}"
+        );
     }
 
     /// Each reason is told apart.
@@ -444,7 +456,10 @@ mod tests {
             workspace.stand(&place).err()
         };
         assert_eq!(status(&free, &[], 0.0, own), None);
-        assert_eq!(status(&free, &[[350.0, 375.0]], 0.0, own), Some(PlaceStatus::Forbidden));
+        assert_eq!(
+            status(&free, &[[350.0, 375.0]], 0.0, own),
+            Some(PlaceStatus::Forbidden)
+        );
         assert_eq!(status(&free, &[], 1.1, own), Some(PlaceStatus::Singular));
         let far = Place {
             tcp_m: [9.0, 0.0, 1.0],

@@ -65,7 +65,11 @@ impl MapColumns {
 
     /// The row where a quantity is greatest, the first of equal ones.
     pub fn greatest(&self, name: &str) -> Option<usize> {
-        let known = self.of(name).iter().enumerate().filter_map(|(i, v)| Some((i, (*v)?)));
+        let known = self
+            .of(name)
+            .iter()
+            .enumerate()
+            .filter_map(|(i, v)| Some((i, (*v)?)));
         let best = known.fold(None, |best: Option<(usize, f64)>, (i, v)| match best {
             Some((_, b)) if b >= v => best,
             _ => Some((i, v)),
@@ -112,7 +116,10 @@ impl MapColumns {
         Some(HeatMap {
             title: format!("{value_label}: the best over every angle and direction{rest}"),
             row_label: format!("{} of the tool point, m", axis_name(row)),
-            column_label: format!("{} of the tool point, m (–: no usable posture)", axis_name(column)),
+            column_label: format!(
+                "{} of the tool point, m (–: no usable posture)",
+                axis_name(column)
+            ),
             rows: row_names,
             columns: text(columns),
             values,
@@ -146,7 +153,9 @@ mod tests {
                         column.push(value);
                     }
                     let usable = !(x == 2.0 && z == 0.0);
-                    columns.status.push(if usable { "reachable" } else { "singular" }.into());
+                    columns
+                        .status
+                        .push(if usable { "reachable" } else { "singular" }.into());
                     depth.push(usable.then_some(10.0 * x + y));
                 }
             }
@@ -159,18 +168,26 @@ mod tests {
     fn counts_quantiles_and_the_best_place() {
         let columns = columns();
         let counts = columns.counts();
-        assert_eq!((&counts["reachable"], &counts["singular"]), (&json!(10), &json!(2)));
+        assert_eq!(
+            (&counts["reachable"], &counts["singular"]),
+            (&json!(10), &json!(2))
+        );
         assert_eq!(counts["out-of-reach"], 0);
         let of = &columns.quantiles()["best_depth_mm"];
         // 10, 10, 10.5, 10.5, 20, 20.5, 30, 30, 30.5, 30.5.
-        assert_eq!((&of["least"], &of["median"], &of["places"]), (&json!(10.0), &json!(20.25), &json!(10)));
+        assert_eq!(
+            (&of["least"], &of["median"], &of["places"]),
+            (&json!(10.0), &json!(20.25), &json!(10))
+        );
         assert_eq!(columns.greatest("best_depth_mm"), Some(10));
         assert_eq!(columns.greatest("unknown"), None);
     }
 
     #[test]
     fn the_picture_shows_the_best_and_leaves_out_what_cannot_be_reached() {
-        let map = columns().picture("best_depth_mm", "Depth, mm", CellFormat::Significant(3)).unwrap();
+        let map = columns()
+            .picture("best_depth_mm", "Depth, mm", CellFormat::Significant(3))
+            .unwrap();
         assert_eq!(map.rows, ["1.000", "0.000"]);
         assert_eq!(map.columns, ["1.000", "2.000", "3.000"]);
         assert_eq!(map.values[0], [Some(10.5), Some(20.5), Some(30.5)]);
@@ -180,6 +197,9 @@ mod tests {
         let mut line = columns();
         line.tcp_m[1] = vec![0.0; 12];
         line.tcp_m[2] = vec![0.0; 12];
-        assert!(line.picture("best_depth_mm", "Depth", CellFormat::Percent).is_none());
+        assert!(
+            line.picture("best_depth_mm", "Depth", CellFormat::Percent)
+                .is_none()
+        );
     }
 }

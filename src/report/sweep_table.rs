@@ -9,12 +9,14 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use polars::io::parquet::write::KeyValueMetadata;
-use polars::prelude::{AnyValue, DataFrame, ParquetReader, ParquetWriter, PolarsError, PolarsResult, SerReader, df};
+use polars::prelude::{
+    AnyValue, DataFrame, ParquetReader, ParquetWriter, PolarsError, PolarsResult, SerReader, df,
+};
 use serde_json::{Map, Value, json};
 
+use super::sweep_summary::MapColumns;
 use crate::analysis::SweepRow;
 use crate::analysis::sweep::PlaceFindings;
-use super::sweep_summary::MapColumns;
 use crate::files::{write_atomically, write_new};
 use crate::{Error, InputError, Result};
 
@@ -365,7 +367,10 @@ mod tests {
     use crate::lobes::workspace::{Place, PlaceStatus};
 
     fn settings(step: f64) -> Map<String, Value> {
-        json!({ "angle_step_deg": step, "posture": "p1" }).as_object().unwrap().clone()
+        json!({ "angle_step_deg": step, "posture": "p1" })
+            .as_object()
+            .unwrap()
+            .clone()
     }
 
     fn row(index: usize) -> SweepRow {
@@ -377,7 +382,11 @@ mod tests {
                 tool_axis: [0.0, 0.0, -1.0],
                 angle_deg: 30.0,
             },
-            status: if usable { PlaceStatus::Reachable } else { PlaceStatus::JointLimit },
+            status: if usable {
+                PlaceStatus::Reachable
+            } else {
+                PlaceStatus::JointLimit
+            },
             findings: usable.then(|| PlaceFindings {
                 joints_deg: [1.0, 2.0, 3.0, 4.0, 5.0, index as f64],
                 ik_branch: 3,
@@ -408,15 +417,23 @@ mod tests {
         assert_eq!(frame.height(), places);
         let number = |name: &str, i: usize| frame.column(name).unwrap().f64().unwrap().get(i);
         assert_eq!(number("q6_deg", 4), Some(4.0));
-        assert_eq!((number("q6_deg", 3), number("absolute_limit_mm", 4)), (None, None));
-        assert_eq!(frame.column("status").unwrap().str().unwrap().get(6), Some("joint-limit"));
+        assert_eq!(
+            (number("q6_deg", 3), number("absolute_limit_mm", 4)),
+            (None, None)
+        );
+        assert_eq!(
+            frame.column("status").unwrap().str().unwrap().get(6),
+            Some("joint-limit")
+        );
         std::fs::read(path).unwrap()
     }
 
     #[test]
     fn shards_cover_all_places_once() {
         for (of, count) in [(1, 10), (3, 10), (10, 10), (7, 100)] {
-            let all: Vec<usize> = (1..=of).flat_map(|number| Shard { number, of }.places(count)).collect();
+            let all: Vec<usize> = (1..=of)
+                .flat_map(|number| Shard { number, of }.places(count))
+                .collect();
             assert_eq!(all, (0..count).collect::<Vec<_>>());
         }
         assert_eq!("3/20".parse::<Shard>().unwrap(), Shard { number: 3, of: 20 });
@@ -443,7 +460,10 @@ mod tests {
         };
         assert_eq!(refused(30.0, 3), None);
         let message = refused(20.0, 3).unwrap();
-        assert!(message.contains("angle_step_deg (there 30.0, now 20.0)"), "{message}");
+        assert!(
+            message.contains("angle_step_deg (there 30.0, now 20.0)"),
+            "{message}"
+        );
         assert!(!message.contains("posture"), "{message}");
         assert!(refused(30.0, 4).unwrap().contains("shards (there 3, now 4)"));
 
@@ -451,7 +471,10 @@ mod tests {
         let rows: Vec<SweepRow> = second.places(9).map(row).collect();
         folder.write(second, &rows).unwrap();
         let message = folder.merge().unwrap_err().to_string();
-        assert!(message.contains("2 of 3 shards are missing: 1/3, 3/3"), "{message}");
+        assert!(
+            message.contains("2 of 3 shards are missing: 1/3, 3/3"),
+            "{message}"
+        );
         assert!(!dir.path().join("sweep.parquet").exists());
 
         // Cut off by a full disk, short of rows, or from another map: none of them passes for the shard.

@@ -24,6 +24,7 @@ mod shell;
 mod simulate;
 mod structure;
 mod support;
+mod sweep;
 mod tour;
 mod waveform;
 mod where_it_fails;

@@ -8,7 +8,7 @@ use crate::identify::calibrate::calibrate;
 use crate::identify::case::structure_model;
 use crate::identify::structure::StructureModel;
 use crate::lobes::hole::{Deflection, HoleError, HoleLoad};
-use crate::lobes::{DirectFrf, RobotFrf, StateSpace, band};
+use crate::lobes::{DirectFrf, PoleFrf, RobotFrf, StateSpace, band};
 use crate::robot::PostureReport;
 use crate::{InputError, Result};
 
@@ -46,16 +46,29 @@ impl FittedModel {
 
     /// The tool point's FRF, as a modal sum where the modes are not coupled.
     fn frf(&self, theta: &[f64], joints_deg: &[f64]) -> Result<Box<dyn DirectFrf>> {
-        quickest(self.robot_frf(theta, joints_deg)?)
+        let frf = self.robot_frf(theta, joints_deg)?;
+        Ok(match frf.modal()? {
+            Some(modal) => Box::new(modal),
+            None => Box::new(frf),
+        })
     }
 
-    /// The same with frequencies and static stiffness there.
+    /// The same in the quickest form, coupled modes as a sum over their poles, with frequencies and static stiffness
+    /// there: for maps of many places.
     fn frf_and_report(&self, joints_deg: &[f64]) -> Result<(Box<dyn DirectFrf>, PostureReport)> {
         let robot = &self.model.robot;
         let kinematics = robot.kinematics(joints_deg)?;
         let chain = self.model.chain(&self.theta, &kinematics, 0.0, false);
-        let frf = quickest(RobotFrf::new(robot, &kinematics, &chain)?)?;
-        Ok((frf, PostureReport::new(robot, &kinematics, &chain)?))
+        let frf = RobotFrf::new(robot, &kinematics, &chain)?;
+        let report = PostureReport::new(robot, &kinematics, &chain)?;
+        let modal: Option<Box<dyn DirectFrf>> = match frf.modal()? {
+            Some(modal) => Some(Box::new(modal)),
+            None => match PoleFrf::of_robot(&frf)? {
+                Some(poles) => Some(Box::new(poles)),
+                None => None,
+            },
+        };
+        Ok((modal.unwrap_or_else(|| Box::new(frf)), report))
     }
 
     pub fn dynamics(&self, joints_deg: &[f64], through_time: bool) -> Result<Dynamics> {
@@ -68,13 +81,6 @@ impl FittedModel {
             states,
         })
     }
-}
-
-fn quickest(frf: RobotFrf) -> Result<Box<dyn DirectFrf>> {
-    Ok(match frf.modal()? {
-        Some(modal) => Box::new(modal),
-        None => Box::new(frf),
-    })
 }
 
 /// The robot model that lobes are computed from.

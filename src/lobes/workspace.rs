@@ -466,7 +466,7 @@ mod tests {
             ..own
         };
         assert_eq!(status(&free, &[], 0.0, far), Some(PlaceStatus::OutOfReach));
-        spec.joints[1].limits_rad = Some([5.0, 6.0]);
+        spec.joints[1].limits_rad = Some([3.05, 3.1]);
         let barred = RobotModel::new(spec);
         assert_eq!(status(&barred, &[], 0.0, own), Some(PlaceStatus::JointLimit));
     }

@@ -146,7 +146,7 @@ impl WorkspaceGrid {
             grid.angle_count(),
         ];
         let places = counts.iter().try_fold(1u128, |n, c| n.checked_mul(*c as u128));
-        if !places.is_some_and(|n| n <= MOST_PLACES) {
+        if places.is_none_or(|n| n > MOST_PLACES) {
             return Err(refuse(
                 format!("a grid of more than {MOST_PLACES} places"),
                 "fewer values of x, y, z, or a larger step of the angle",

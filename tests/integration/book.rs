@@ -99,7 +99,7 @@ fn run_page(name: &str) -> usize {
             }
             "sh yours" => {
                 let ours = |line: &&str| line.starts_with("lobestone ");
-                assert!(lines.iter().all(|line| ours(&line)), "docs/{name}: {lines:?}");
+                assert!(lines.iter().all(ours), "docs/{name}: {lines:?}");
             }
             "text example" | "toml" | "csv" | "json" | "rust" => (),
             other => panic!("docs/{name}: a block of {other:?}"),

@@ -6,7 +6,7 @@ use super::Outcome;
 #[cfg(not(feature = "parquet"))]
 use crate::InputError;
 use crate::Result;
-use crate::lobes::workspace::Span;
+use crate::lobes::workspace_grid::Span;
 
 /// Postures nearer to a singularity are usually of no use.
 const USUAL_SINGULARITY_MARGIN: f64 = 0.05;
@@ -100,7 +100,8 @@ mod with_tables {
     use crate::files::write_atomically;
     use crate::lobes::workspace::PlaceStatus;
     use crate::report::figure::CellFormat;
-    use crate::report::sweep_table::{Shard, SweepFolder, columns, row};
+    use crate::report::sweep_folder::{Shard, SweepFolder};
+    use crate::report::sweep_table::{columns, row};
     use crate::{Error, InputError};
 
     /// Quantity, label, name of the picture.

@@ -37,6 +37,7 @@ pub mod state_space;
 pub mod thesis;
 pub mod thesis_assumptions;
 pub mod workspace;
+pub mod workspace_grid;
 
 pub use band::LobeBand;
 pub use curve::{AbsoluteLimit, Limit, LobeCurve, Peak, SpeedLimit, peak_near, peaks, speed_grid};

@@ -19,6 +19,8 @@ mod parts;
 mod real_case_section;
 mod redundancy_section;
 pub mod structure_section;
+#[cfg(feature = "parquet")]
+pub mod sweep_folder;
 pub mod sweep_summary;
 #[cfg(feature = "parquet")]
 pub mod sweep_table;

@@ -3,6 +3,8 @@
 use std::io::Write;
 use std::path::Path;
 
+use tempfile::NamedTempFile;
+
 use crate::{Error, Result};
 
 /// Writes beside the target and renames: a reader sees the old file or the new one, never half of it.
@@ -22,11 +24,28 @@ pub fn write_durably(path: &Path, bytes: &[u8], prefix: &str) -> Result<()> {
     replace(path, bytes, prefix, true)
 }
 
-fn replace(path: &Path, bytes: &[u8], prefix: &str, durable: bool) -> Result<()> {
-    let folder = match path.parent() {
+/// Writes a file that is not there yet, whole or not at all; of several writers at once one wins. Whether it was this one.
+///
+/// # Errors
+/// What the file system refuses, naming the file.
+pub fn write_new(path: &Path, bytes: &[u8]) -> Result<bool> {
+    match beside(path, bytes, ".lobestone-")?.persist_noclobber(path) {
+        Ok(_) => Ok(true),
+        Err(e) if e.error.kind() == std::io::ErrorKind::AlreadyExists => Ok(false),
+        Err(e) => Err(Error::io(path, e.error)),
+    }
+}
+
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
-    };
+    }
+}
+
+/// A temporary file in the folder of `path` that holds `bytes`.
+fn beside(path: &Path, bytes: &[u8], prefix: &str) -> Result<NamedTempFile> {
+    let folder = folder_of(path);
     let mut file = tempfile::Builder::new();
     // Temporary files are private by default; results are to be read by whoever may read the folder.
     #[cfg(unix)]
@@ -39,13 +58,18 @@ fn replace(path: &Path, bytes: &[u8], prefix: &str, durable: bool) -> Result<()>
         .tempfile_in(folder)
         .map_err(|e| Error::io(folder, e))?;
     file.write_all(bytes).map_err(|e| Error::io(path, e))?;
+    Ok(file)
+}
+
+fn replace(path: &Path, bytes: &[u8], prefix: &str, durable: bool) -> Result<()> {
+    let file = beside(path, bytes, prefix)?;
     if durable {
         file.as_file().sync_all().map_err(|e| Error::io(path, e))?;
     }
     file.persist(path).map_err(|e| Error::io(path, e.error))?;
     if durable {
         // The rename itself. Where folders cannot be opened (Windows) the system sees to it.
-        if let Ok(folder) = std::fs::File::open(folder) {
+        if let Ok(folder) = std::fs::File::open(folder_of(path)) {
             let _ = folder.sync_all();
         }
     }

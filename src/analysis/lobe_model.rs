@@ -12,8 +12,8 @@ use crate::identify::structure::StructureModel;
 use crate::lobes::hole::{Deflection, HoleError, HoleLoad};
 use crate::lobes::setup::tool_beam;
 use crate::lobes::tool_point::RobotHolder;
-use crate::lobes::{Blocks, DirectFrf, RobotFrf, StateSpace, Tool, ToolPoint, band};
-use crate::robot::{Chain, Kinematics};
+use crate::lobes::{Blocks, DirectFrf, PoleFrf, RobotFrf, StateSpace, Tool, ToolPoint, band};
+use crate::robot::{Chain, Kinematics, PostureReport};
 use crate::{InputError, Result};
 
 /// Draws of the parameters for the band.
@@ -56,23 +56,43 @@ impl FittedModel {
     /// The tool point's FRFs; of the robot alone as modal sums where the modes are not coupled.
     fn blocks(&self, theta: &[f64], joints_deg: &[f64], asked: &Asked) -> Result<Blocks> {
         let (kinematics, chain) = self.chain(theta, joints_deg)?;
+        self.blocks_of(&kinematics, &chain, asked, quickest)
+    }
+
+    /// `form`: how an FRF of the robot alone is worked out.
+    fn blocks_of(
+        &self,
+        kinematics: &Kinematics,
+        chain: &Chain,
+        asked: &Asked,
+        form: impl Fn(RobotFrf) -> Result<Box<dyn DirectFrf>>,
+    ) -> Result<Blocks> {
         let robot = &self.model.robot;
         if !asked.tool.beam.segments.is_empty() {
             let behind_m = asked.tool.beam.length_m();
             let point = ToolPoint {
-                holder: Arc::new(RobotHolder::new(robot, &kinematics, &chain, behind_m)?),
+                holder: Arc::new(RobotHolder::new(robot, kinematics, chain, behind_m)?),
                 tool: asked.tool.clone(),
             };
             return Ok(point.blocks(asked.axial));
         }
         let axial = match asked.axial {
-            true => Some(quickest(RobotFrf::axial_torsional(robot, &kinematics, &chain)?)?),
+            true => Some(form(RobotFrf::axial_torsional(robot, kinematics, chain)?)?),
             false => None,
         };
         Ok(Blocks {
-            lateral: quickest(RobotFrf::new(robot, &kinematics, &chain)?)?,
+            lateral: form(RobotFrf::new(robot, kinematics, chain)?)?,
             axial,
         })
+    }
+
+    /// The tool point's FRFs with frequencies and static stiffness there, coupled modes as a sum over their poles: for
+    /// maps of many places.
+    fn blocks_and_report(&self, joints_deg: &[f64], asked: &Asked) -> Result<(Blocks, PostureReport)> {
+        let (kinematics, chain) = self.chain(&self.theta, joints_deg)?;
+        let report = PostureReport::new(&self.model.robot, &kinematics, &chain)?;
+        let blocks = self.blocks_of(&kinematics, &chain, asked, quickest_of_many)?;
+        Ok((blocks, report))
     }
 
     fn dynamics(&self, joints_deg: &[f64], through_time: bool, asked: &Asked) -> Result<Dynamics> {
@@ -90,6 +110,17 @@ impl FittedModel {
 fn quickest(frf: RobotFrf) -> Result<Box<dyn DirectFrf>> {
     Ok(match frf.modal()? {
         Some(modal) => Box::new(modal),
+        None => Box::new(frf),
+    })
+}
+
+/// Coupled modes as a sum over their poles, which pays where one FRF is asked for very often.
+fn quickest_of_many(frf: RobotFrf) -> Result<Box<dyn DirectFrf>> {
+    if let Some(modal) = frf.modal()? {
+        return Ok(Box::new(modal));
+    }
+    Ok(match PoleFrf::of_robot(&frf)? {
+        Some(poles) => Box::new(poles),
         None => Box::new(frf),
     })
 }
@@ -146,6 +177,15 @@ impl ModelState {
     /// # Errors
     /// No posture, or what calibrating or reading the revisions refuses.
     pub fn of(campaign: &Campaign, asked: Asked, warnings: &mut Vec<String>) -> Result<Self> {
+        Self::fitted(campaign, asked, warnings, true)
+    }
+
+    /// As [`of`](Self::of), but for `before`, which takes another calibration.
+    pub fn without_history(campaign: &Campaign, asked: Asked, warnings: &mut Vec<String>) -> Result<Self> {
+        Self::fitted(campaign, asked, warnings, false)
+    }
+
+    fn fitted(campaign: &Campaign, asked: Asked, warnings: &mut Vec<String>, history: bool) -> Result<Self> {
         if campaign.postures.is_empty() {
             return Err(InputError::new("lobes from the model need at least one posture")
                 .file(campaign.dir.join("campaign.toml"))
@@ -155,7 +195,7 @@ impl ModelState {
         }
         match campaign.frfs.is_empty() {
             true => Self::uncalibrated(campaign, asked, warnings),
-            false => Self::calibrated(campaign, asked, warnings),
+            false => Self::calibrated(campaign, asked, warnings, history),
         }
     }
 
@@ -176,7 +216,12 @@ impl ModelState {
         })
     }
 
-    fn calibrated(campaign: &Campaign, asked: Asked, warnings: &mut Vec<String>) -> Result<Self> {
+    fn calibrated(
+        campaign: &Campaign,
+        asked: Asked,
+        warnings: &mut Vec<String>,
+        history: bool,
+    ) -> Result<Self> {
         let StructureAnalysis {
             case, calibration, ..
         } = StructureAnalysis::run(campaign, Options::default())?;
@@ -193,7 +238,7 @@ impl ModelState {
                     .into(),
             );
         }
-        let before = match case.before_effects(campaign)? {
+        let before = match case.before_effects(campaign)?.filter(|_| history) {
             Some(model) => {
                 let theta = calibrate(&model, &case.data, None, options)?.theta;
                 Some(FittedModel { model, theta })
@@ -238,6 +283,11 @@ impl ModelState {
         let (kinematics, chain) = self.current.chain(&self.current.theta, joints_deg)?;
         let behind_m = self.asked.tool.beam.length_m();
         RobotHolder::new(&self.current.model.robot, &kinematics, &chain, behind_m)
+    }
+
+    /// The tool point's FRFs, and frequencies and static stiffness there.
+    pub fn blocks_and_report(&self, joints_deg: &[f64]) -> Result<(Blocks, PostureReport)> {
+        self.current.blocks_and_report(joints_deg, &self.asked)
     }
 
     /// What a load does to the tool, with nothing said of its uncertainty.

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use super::lobe_model::{Asked, ModelState};
 use super::lobe_structure::{Structure, at_postures, from_measured, from_modes, steps_through_time};
 use super::redundancy::{self, RedundancyAnalysis};
-use crate::campaign::{Campaign, LobeMethod, LobeSource, Process};
+use crate::campaign::{Campaign, LobeMethod, LobeSource, LobesSection, Process};
+use crate::cutting::Group;
 use crate::lobes::band::LobeBand;
 use crate::lobes::hole::{HoleCheck, HoleError};
 use crate::lobes::outcome::{LimitRange, Outcomes, noted_cuts};
@@ -96,21 +97,12 @@ impl LobeAnalysis {
                 .remedy("add one with process, source and spindle_rpm = [from, to, step]")
         })?;
         let mut warnings = Vec::new();
-        let (coefficients, own_cuts) = match LobeCoefficients::given(section) {
-            Some(given) => (given, None),
-            None => {
-                let group = group_of_cuts(campaign, section, &mut warnings)?;
-                (coefficients_of_group(campaign, section, &group)?, Some(group))
-            }
-        };
-        let mut cut = cut_of(campaign, section, coefficients)?;
-        let teeth = cut.average().lateral.teeth;
-        let axial = (section.process == Process::Drilling)
-            .then(|| axial_torsional_force(campaign, section, coefficients, teeth));
-        if let (Cut::Averaged(cut), Some(Ok(force))) = (&mut cut, &axial) {
-            cut.axial = Some(*force);
-        }
-        let mut axial_torsional = axial.map(|force| force.map(|_| ()));
+        let CutForce {
+            coefficients,
+            cut,
+            mut axial_torsional,
+            own_cuts,
+        } = CutForce::of(campaign, section, &mut warnings)?;
         let asked = Asked::new(section, cut.average().axial.is_some());
         if steps_through_time(section) && !section.tool.is_empty() {
             return Err(
@@ -191,7 +183,7 @@ impl LobeAnalysis {
             source: section.source,
             method: section.method,
             coefficients,
-            teeth,
+            teeth: cut.average().lateral.teeth,
             axial_torsional,
             drilled: match section.process {
                 Process::Drilling => DrilledHole::of(campaign, section),
@@ -283,5 +275,42 @@ impl LobeAnalysis {
         best.sort_by(|a, b| order(&b.1).total_cmp(&order(&a.1)));
         best.truncate(BEST);
         best
+    }
+}
+
+/// The force of the cut that the `[lobes]` table asks for.
+pub(super) struct CutForce {
+    pub coefficients: LobeCoefficients,
+    pub cut: Cut,
+    /// Drilling: whether the axial–torsional block takes part, or why not.
+    pub axial_torsional: Option<std::result::Result<(), String>>,
+    /// The campaign's own cuts, where the coefficients come from those.
+    pub own_cuts: Option<Group>,
+}
+
+impl CutForce {
+    /// # Errors
+    /// Something that the process needs is missing.
+    pub fn of(campaign: &Campaign, section: &LobesSection, warnings: &mut Vec<String>) -> Result<Self> {
+        let (coefficients, own_cuts) = match LobeCoefficients::given(section) {
+            Some(given) => (given, None),
+            None => {
+                let group = group_of_cuts(campaign, section, warnings)?;
+                (coefficients_of_group(campaign, section, &group)?, Some(group))
+            }
+        };
+        let mut cut = cut_of(campaign, section, coefficients)?;
+        let teeth = cut.average().lateral.teeth;
+        let axial = (section.process == Process::Drilling)
+            .then(|| axial_torsional_force(campaign, section, coefficients, teeth));
+        if let (Cut::Averaged(cut), Some(Ok(force))) = (&mut cut, &axial) {
+            cut.axial = Some(*force);
+        }
+        Ok(CutForce {
+            coefficients,
+            cut,
+            axial_torsional: axial.map(|force| force.map(|_| ())),
+            own_cuts,
+        })
     }
 }

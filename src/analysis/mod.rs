@@ -15,6 +15,7 @@ mod redundancy;
 pub mod regression_line;
 pub mod stick_shapes;
 pub mod structure;
+pub mod sweep;
 pub mod thesis_findings;
 
 pub use addition::Addition;
@@ -26,4 +27,5 @@ pub use modal::{ModalAnalysis, SetModes};
 pub use model_stages::ModelStage;
 pub use redundancy::{HoleWeighing, RedundancyAnalysis};
 pub use structure::StructureAnalysis;
+pub use sweep::{Sweep, SweepRequest, SweepRow};
 pub use thesis_findings::ThesisFindings;

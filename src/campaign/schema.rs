@@ -274,7 +274,7 @@ pub struct LobesSection {
 }
 
 /// `[[lobes.tool.segment]]`: a stretch of the tool of one section and material, from the holder face to the tip.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct ToolSegment {
     pub length_mm: f64,
     pub diameter_mm: f64,

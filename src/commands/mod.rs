@@ -28,6 +28,7 @@ mod report;
 mod serve;
 mod shell;
 mod simulate;
+mod sweep;
 mod text;
 mod thesis;
 mod undo;
@@ -102,6 +103,8 @@ pub enum Command {
     Undo(undo::Args),
     /// Stability lobes.
     Lobes(lobes::Args),
+    /// A map of limits and stiffness over the workspace, in shards.
+    Sweep(Box<sweep::Args>),
     /// HTML and PNG report of a campaign.
     Report(report::Args),
     /// The campaign as a page in a browser: diagnose, add, undo, and watch the error fall.
@@ -177,6 +180,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::History(args) => history::run(args),
         Command::Undo(args) => undo::run(args),
         Command::Lobes(args) => lobes::run(args),
+        Command::Sweep(args) => sweep::run(*args),
         Command::Report(args) => report::run(args),
         Command::Serve(args) => serve::run(args, cli.json),
         Command::Simulate(args) => simulate::run(*args),

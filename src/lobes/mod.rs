@@ -15,6 +15,7 @@
 mod arcs;
 mod arnoldi;
 pub mod band;
+pub mod best_speed;
 pub mod blocks;
 pub mod curve;
 #[cfg(test)]
@@ -29,6 +30,7 @@ pub mod multi_frequency;
 pub mod optimum;
 pub mod outcome;
 pub mod periodic_force;
+pub mod poles;
 pub mod redundancy;
 pub mod robot;
 pub mod sampled;
@@ -40,6 +42,8 @@ pub mod thesis;
 pub mod thesis_assumptions;
 pub mod tool_beam;
 pub mod tool_point;
+pub mod workspace;
+pub mod workspace_grid;
 
 pub use band::LobeBand;
 pub use blocks::{AveragedCut, BlockLobes, BlockSolver, Blocks};
@@ -48,6 +52,7 @@ pub use force::RegenerativeForce;
 pub use frf::{AxisMode, DirectFrf, ModalFrf, Mode};
 pub use multi_frequency::MultiFrequency;
 pub use periodic_force::{PeriodicForce, ProcessDamping};
+pub use poles::PoleFrf;
 pub use robot::RobotFrf;
 pub use sampled::SampledFrf;
 pub use semi_discretisation::SemiDiscretisation;

@@ -79,7 +79,7 @@ impl<'a> RedundancySweep<'a> {
             forbidden_deg: forbidden_deg.to_vec(),
             angles: Vec::new(),
         };
-        let count = (360.0 / step_deg - 1e-9).ceil().max(1.0) as usize;
+        let count = steps_of_a_turn(step_deg);
         let angle = |i: usize| step_deg * i as f64;
         let half = (0..count).take_while(|i| angle(*i) <= 180.0).count();
         let mut angles: Vec<Option<AnglePosture>> = vec![None; count];
@@ -106,7 +106,7 @@ impl<'a> RedundancySweep<'a> {
             .tool_pose(&pose, reference_rad)
             .into_iter()
             .find(|s| s.branch == self.branch && s.limit_margin_rad >= -1e-9);
-        let status = match (&solution, self.is_forbidden(angle_deg)) {
+        let status = match (&solution, in_forbidden_band(&self.forbidden_deg, angle_deg)) {
             (None, _) => AngleStatus::Unreachable,
             (Some(_), true) => AngleStatus::Forbidden,
             (Some(_), false) => AngleStatus::Reachable,
@@ -121,14 +121,6 @@ impl<'a> RedundancySweep<'a> {
                 .filter(|m| m.is_finite()),
             singularity_margin: solution.as_ref().map(|s| s.singularity_margin),
         }
-    }
-
-    fn is_forbidden(&self, angle_deg: f64) -> bool {
-        self.forbidden_deg.iter().any(|[from, to]| {
-            [-360.0, 0.0, 360.0]
-                .iter()
-                .any(|turn| (*from..=*to).contains(&(angle_deg + turn)))
-        })
     }
 
     /// The robot at any angle, followed from the nearest angle of the sweep.
@@ -151,6 +143,20 @@ impl<'a> RedundancySweep<'a> {
     pub fn robot(&self) -> &RobotModel {
         self.robot
     }
+}
+
+/// Angles from 0 in steps that lie below 360°.
+pub(super) fn steps_of_a_turn(step_deg: f64) -> usize {
+    (360.0 / step_deg - 1e-9).ceil().max(1.0) as usize
+}
+
+/// Whether an angle lies in one of the bands, whole turns aside.
+pub(super) fn in_forbidden_band(forbidden_deg: &[[f64; 2]], angle_deg: f64) -> bool {
+    forbidden_deg.iter().any(|[from, to]| {
+        [-360.0, 0.0, 360.0]
+            .iter()
+            .any(|turn| (*from..=*to).contains(&(angle_deg + turn)))
+    })
 }
 
 /// What the surface says to do.

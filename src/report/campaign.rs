@@ -16,7 +16,7 @@ use crate::identify::StructureCase;
 #[cfg(feature = "parquet")]
 const TABLES: &str = "tables";
 
-/// What [`write`] left on the disk.
+/// What [`write()`] left on the disk.
 #[derive(Debug, Clone)]
 pub struct ReportFiles {
     pub html: PathBuf,

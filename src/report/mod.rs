@@ -22,6 +22,11 @@ mod real_case_section;
 mod redundancy_section;
 pub mod structure_section;
 #[cfg(feature = "parquet")]
+pub mod sweep_folder;
+pub mod sweep_summary;
+#[cfg(feature = "parquet")]
+pub mod sweep_table;
+#[cfg(feature = "parquet")]
 pub mod tables;
 pub mod thesis_cutting;
 pub mod thesis_section;

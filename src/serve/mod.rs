@@ -1,7 +1,7 @@
 //! A local page for one campaign: HTTP on the loopback address, one job at a time, nothing from outside.
 //!
-//! What the page shows and does is a [`Workbench`]; this module knows only browsers. [`guard`] says who may ask,
-//! [`desk`] does one job after the other and tells how far it is, [`routes`] is what can be asked for.
+//! What the page shows and does is a [`Workbench`]; this module knows only browsers. `guard` says who may ask,
+//! `desk` does one job after the other and tells how far it is, `routes` is what can be asked for.
 
 mod desk;
 mod guard;

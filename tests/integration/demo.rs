@@ -4,6 +4,7 @@ use std::path::Path;
 
 use lobestone::report::number::{decimals, percent};
 
+use crate::book::assert_documented;
 use crate::report::{assert_png, assert_self_contained, json_of, run};
 
 #[test]
@@ -12,6 +13,7 @@ fn the_demo_tells_the_whole_story() {
     let dir = folder.path().join("demo");
     let path = dir.to_str().unwrap();
     let json = json_of(&["demo", path, "--json"]);
+    assert_documented("demo", &json);
 
     let steps = json["steps"].as_array().unwrap();
     let names: Vec<&str> = steps.iter().map(|s| s["name"].as_str().unwrap()).collect();
@@ -97,6 +99,7 @@ fn the_thesis_in_the_page_is_that_of_the_command(html: &str) {
     // The template engine writes a slash as an entity.
     let section = html[html.find("<section id=\"thesis\">").unwrap()..].replace("&#x2f;", "/");
     let study = json_of(&["thesis", "--json"]);
+    assert_documented("thesis", &study);
     let cell = |text: &str| {
         assert!(
             section.contains(&format!(">{text}<")),

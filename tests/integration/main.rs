@@ -1,5 +1,6 @@
 //! Integration tests, in one binary so that they link once.
 
+mod book;
 mod campaign;
 mod cfc;
 mod cfc_methods;
@@ -25,6 +26,6 @@ mod shell;
 mod simulate;
 mod structure;
 mod support;
-mod tour;
+mod sweep;
 mod waveform;
 mod where_it_fails;

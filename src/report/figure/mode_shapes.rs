@@ -51,7 +51,7 @@ impl ModeShapesFigure {
     }
 
     /// The same modes swinging, as an SVG element to stand in a page; `None` without a mode that can be drawn. Every mode
-    /// swings once in [`PERIOD_S`]: how fast it really is stands in its title.
+    /// swings once in `PERIOD_S`: how fast it really is stands in its title.
     pub fn animated_svg(&self) -> Option<String> {
         let pictures = self.drawable();
         let columns = COLUMNS.min(pictures.len());

@@ -1,0 +1,313 @@
+//! The book in `docs`: every command in it is run, and it says everything it has to.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::sample_reports::{run, same_line};
+use crate::support::{blind, document};
+
+fn project() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn page(name: &str) -> String {
+    std::fs::read_to_string(project().join("docs").join(name)).unwrap()
+}
+
+/// The pages that SUMMARY.md names, in its order.
+fn pages() -> Vec<String> {
+    let summary = page("SUMMARY.md");
+    let links = summary.split("](").skip(1);
+    links
+        .filter_map(|rest| Some(rest.split_once(')')?.0.to_string()))
+        .collect()
+}
+
+/// A fenced block of a page: what its fence says it is, its lines.
+fn blocks(page: &str) -> Vec<(&str, Vec<&str>)> {
+    let mut found: Vec<(&str, Vec<&str>)> = vec![];
+    let mut inside = false;
+    for line in page.lines() {
+        match line.strip_prefix("```") {
+            Some(kind) if !inside => found.push((kind, vec![])),
+            Some(_) => {}
+            None => {
+                if let (true, Some((_, lines))) = (inside, found.last_mut()) {
+                    lines.push(line);
+                }
+                continue;
+            }
+        }
+        inside = !inside;
+    }
+    found
+}
+
+/// Lines that the page shows and the program did not print in this order; `…` stands for what is left out.
+fn missing<'a>(shown: &[&'a str], printed: &str) -> Vec<&'a str> {
+    let mut printed = printed.lines();
+    let wanted = shown.iter().filter(|line| line.trim() != "…");
+    wanted
+        .filter(|line| !printed.by_ref().any(|p| same_line(line, p)))
+        .copied()
+        .collect()
+}
+
+fn copy_folder(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap().map(Result::unwrap) {
+        let (from, to) = (entry.path(), to.join(entry.file_name()));
+        match from.is_dir() {
+            true => copy_folder(&from, &to),
+            false => drop(std::fs::copy(&from, &to).unwrap()),
+        }
+    }
+}
+
+/// Runs the `sh` blocks of a page in an empty folder, in their order; a `text` block is what the last command prints. How
+/// many commands there were. Blocks `sh yours` need files that only a user has, `text example` shows something else.
+fn run_page(name: &str) -> usize {
+    let page = page(name);
+    let folder = tempfile::tempdir().unwrap();
+    let (mut printed, mut commands) = (String::new(), 0);
+    for (kind, lines) in blocks(&page) {
+        match kind {
+            "sh" => {
+                for line in lines {
+                    commands += 1;
+                    if let Some(command) = line.strip_prefix("lobestone ") {
+                        let arguments = words(command);
+                        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+                        printed = run(arguments[0], &arguments[1..], &folder);
+                        continue;
+                    }
+                    // The only other command of the book.
+                    match line.split(' ').collect::<Vec<_>>()[..] {
+                        ["cp", "-r", from, to] => copy_folder(&project().join(from), &folder.path().join(to)),
+                        _ => panic!("docs/{name}: {line}: neither this program nor cp -r FROM TO"),
+                    }
+                }
+            }
+            "text" => {
+                let missing = missing(&lines, &printed);
+                assert!(
+                    missing.is_empty(),
+                    "docs/{name} shows\n{}\nand the program printed\n{printed}",
+                    missing.join("\n")
+                );
+            }
+            "sh yours" => {
+                let ours = |line: &&str| line.starts_with("lobestone ");
+                assert!(lines.iter().all(ours), "docs/{name}: {lines:?}");
+            }
+            "text example" | "toml" | "csv" | "json" | "rust" => (),
+            other => panic!("docs/{name}: a block of {other:?}"),
+        }
+    }
+    commands
+}
+
+/// A command line as a shell splits it: blanks part words but not within double quotes.
+fn words(line: &str) -> Vec<String> {
+    let mut words = vec![String::new()];
+    let mut quoted = false;
+    for c in line.chars() {
+        match c {
+            '"' => quoted = !quoted,
+            ' ' if !quoted => words.push(String::new()),
+            c => words.last_mut().unwrap().push(c),
+        }
+    }
+    words.retain(|word| !word.is_empty());
+    words
+}
+
+#[test]
+fn the_ten_minute_tour_does_what_it_says() {
+    assert!(run_page("tour.md") >= 10);
+}
+
+#[test]
+fn the_tutorial_does_what_it_says() {
+    assert!(run_page("tutorial.md") >= 10);
+}
+
+#[test]
+fn every_other_page_does_what_it_says() {
+    let others = pages()
+        .into_iter()
+        .filter(|p| p != "tour.md" && p != "tutorial.md");
+    assert!(others.map(|page| run_page(&page)).sum::<usize>() >= 8);
+}
+
+/// The book names every page, and every page it names is there; so is every page and section that a page refers to.
+#[test]
+fn the_book_holds_together() {
+    let docs = project().join("docs");
+    let mut named = pages();
+    named.sort_unstable();
+    let mut there: Vec<String> = std::fs::read_dir(&docs)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .filter(|name| name.ends_with(".md") && name != "SUMMARY.md")
+        .collect();
+    there.sort_unstable();
+    assert_eq!(named, there);
+    for name in &there {
+        let text = page(name);
+        for link in text
+            .split("](")
+            .skip(1)
+            .filter_map(|rest| Some(rest.split_once(')')?.0))
+        {
+            let target: PathBuf = docs.join(link.split('#').next().unwrap());
+            assert!(link.starts_with("http") || target.exists(), "docs/{name}: {link}");
+        }
+    }
+}
+
+/// Every effect stands in the catalogue, with all that `explain` says of it.
+#[test]
+fn the_catalogue_holds_every_effect() {
+    let joined = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let catalogue = joined(&page("effects.md"));
+    let effects = document(&["explain"])["effects"].as_array().unwrap().clone();
+    assert!(effects.len() >= 23);
+    for effect in &effects {
+        let id = effect["effect"].as_str().unwrap();
+        let sources = effect["sources"].as_array().unwrap().iter();
+        let parts = ["explanation", "fingerprint", "lab_check", "typical"].map(|key| &effect[key]);
+        let texts = parts
+            .into_iter()
+            .chain(sources)
+            .map(|text| joined(text.as_str().unwrap()));
+        for text in texts.chain([format!("### `{id}`")]) {
+            assert!(
+                catalogue.contains(&text),
+                "docs/effects.md lacks of {id}: {text}\nrun python3 scripts/effect_catalogue.py"
+            );
+        }
+    }
+}
+
+/// A section of the JSON reference; with the lines about all commands.
+fn section(command: &str) -> String {
+    let reference = page("json.md");
+    let (general, _) = reference.split_once("\n## ").unwrap();
+    let own = reference
+        .split("\n## ")
+        .find(|part| part.starts_with(&format!("`{command}`")))
+        .unwrap_or_else(|| panic!("docs/json.md has no section ## `{command}`"));
+    format!("{general}\n{own}")
+}
+
+/// Keys at the top of a document that the reference does not name.
+fn undocumented(section: &str, document: &Value) -> Vec<String> {
+    let named = |key: &str| {
+        section.match_indices(&format!("`{key}")).any(|(at, found)| {
+            let after = section[at + found.len()..].chars().next();
+            !after.is_some_and(|c| c.is_alphanumeric() || c == '_')
+        })
+    };
+    let keys = document.as_object().unwrap().keys();
+    keys.filter(|key| !named(key)).cloned().collect()
+}
+
+/// Fails where a document has a key that the JSON reference does not name for its command.
+pub fn assert_documented(command: &str, document: &Value) {
+    let keys = undocumented(&section(command), document);
+    assert!(
+        keys.is_empty(),
+        "docs/json.md, section `{command}`, lacks {keys:?}"
+    );
+}
+
+#[test]
+fn an_undocumented_key_is_noticed() {
+    let section = "`dir`, `nodes[]: {x}`, `error {nrms}` and `file_name`";
+    let keys = |document: Value| undocumented(section, &document);
+    assert!(keys(serde_json::json!({ "dir": 1, "nodes": 2, "error": 3 })).is_empty());
+    assert_eq!(
+        keys(serde_json::json!({ "dir": 1, "file": 2, "x": 3 })),
+        ["file", "x"]
+    );
+}
+
+/// Every command has its section, and every key of what it prints stands there. `thesis` and `demo`, which take long, are
+/// held against the page where they are run anyway (demo.rs).
+#[test]
+fn the_json_reference_names_every_key() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    let (frf, cell, out) = (path("frf"), path("cell"), path("out"));
+    copy_folder(&blind("frf-9112"), Path::new(&frf));
+    copy_folder(&project().join("datasets/campaigns/first-cell"), Path::new(&cell));
+    let force = blind("force-9400");
+    let force = force.to_str().unwrap();
+    let frf_file = path("frf/frf/p1.uff");
+    let mut commands: Vec<Vec<&str>> = vec![
+        vec!["inspect", &frf_file],
+        vec!["cfc", force],
+        vec!["modal", &frf],
+        vec!["model", &frf, "--matrices"],
+        vec!["calibrate", &frf],
+        vec!["compare", &frf],
+        vec!["compare", force],
+        vec!["diagnose", &frf],
+        vec!["explain"],
+        vec!["explain", "runout"],
+        vec!["add", &frf, "time-delay"],
+        vec!["history", &frf],
+        vec!["undo", &frf],
+        vec!["lobes", &cell],
+        vec!["report", &frf, "--no-diagnosis"],
+        vec!["simulate", "--out", &out, "--kind", "direct", "--seed", "11"],
+        vec!["completions", "bash"],
+        vec!["man"],
+        vec!["man", "--out", &out],
+        vec!["init", &cell, "--force"],
+    ];
+    let map = path("map");
+    if cfg!(feature = "parquet") {
+        let grid = ["--x-m", "-1.2", "--y-m", "0.8", "--z-m", "0.6", "--shard"];
+        let sweep = |shard: &'static str| [&["sweep", &frf, "--out", &map], &grid[..], &[shard]].concat();
+        let lobes = "[lobes]\nprocess = \"drilling\"\nsource = \"model\"\nktc_n_per_mm2 = 1000.0\nkrc_n_per_mm2 = 600.0\n\
+                     teeth = 2\nhalf_point_angle_deg = 67.5\nspindle_rpm = [100.0, 1500.0, 10.0]\n";
+        let file = path("frf/campaign.toml");
+        let campaign = std::fs::read_to_string(&file).unwrap();
+        std::fs::write(&file, format!("{campaign}\n{lobes}")).unwrap();
+        commands.extend([
+            sweep("1/2"),
+            sweep("1/2"),
+            sweep("2/2"),
+            vec!["sweep", "--merge", "--out", &map],
+        ]);
+    }
+    for command in &commands {
+        assert_documented(command[0], &document(command));
+    }
+    use clap::CommandFactory;
+    for command in lobestone::commands::Cli::command().get_subcommands() {
+        section(command.get_name());
+    }
+}
+
+#[test]
+fn a_page_that_shows_something_else_is_noticed() {
+    let page = "text\n```sh\nlobestone history cell\n```\nmore\n```text\na\n…\nc 1.5\n```\n";
+    assert_eq!(
+        blocks(page),
+        [
+            ("sh", vec!["lobestone history cell"]),
+            ("text", vec!["a", "…", "c 1.5"])
+        ]
+    );
+    assert!(missing(&["a", "…", "c 1.5"], "a\nb\nc  1.5\n").is_empty());
+    assert_eq!(missing(&["a", "c 1.5"], "a\nc 1.8\n"), ["c 1.5"]);
+    assert_eq!(missing(&["c", "a"], "a\nc\n"), ["a"]);
+    assert_eq!(
+        words("init cell --name \"my cell\""),
+        ["init", "cell", "--name", "my cell"]
+    );
+}

@@ -518,28 +518,32 @@ fn fit_even_law(departures: &[Departure]) -> Option<(f64, f64)> {
     let low_variance = smallest_first[smallest_first.len() / 2].variance / std::f64::consts::LN_2;
     // Mean of an exponential variable given that it is below CUT times its mean.
     let kept_mean = 1.0 - CUT / (CUT.exp() - 1.0);
+    let samples: Vec<[f64; 2]> = departures
+        .iter()
+        .map(|d| [d.magnitude * d.magnitude, d.variance])
+        .collect();
     for pass in 0..60 {
+        // The first passes know only a crude law: do not trim by it.
+        let (cut, share) = if pass > 4 {
+            (CUT, kept_mean)
+        } else {
+            (f64::INFINITY, 1.0)
+        };
         let (mut s, mut r) = ([[0.0; 2]; 2], [0.0; 2]);
-        for d in departures {
-            let mean = (relative * d.magnitude).powi(2) + floor * floor;
-            // The first passes know only a crude law: do not trim by it.
-            if pass > 4 && d.variance > CUT * mean {
+        for &[u, variance] in &samples {
+            let mean = relative * relative * u + floor * floor;
+            if variance > cut * mean {
                 continue;
             }
-            let variance = if pass > 4 {
-                d.variance / kept_mean
-            } else {
-                d.variance
-            };
             let w = 1.0 / (mean * mean);
-            let u = [d.magnitude * d.magnitude, 1.0];
-            for i in 0..2 {
-                r[i] += w * u[i] * variance;
-                for j in 0..2 {
-                    s[i][j] += w * u[i] * u[j];
-                }
-            }
+            r[0] += w * u * variance;
+            r[1] += w * variance;
+            s[0][0] += w * u * u;
+            s[0][1] += w * u;
+            s[1][1] += w;
         }
+        s[1][0] = s[0][1];
+        r = r.map(|sum| sum / share);
         let determinant = s[0][0] * s[1][1] - s[0][1] * s[1][0];
         let mut a2 = (r[0] * s[1][1] - r[1] * s[0][1]) / determinant;
         let mut b2 = (r[1] * s[0][0] - r[0] * s[1][0]) / determinant;

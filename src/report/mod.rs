@@ -2,7 +2,7 @@
 //!
 //! [`figure`] turns plain numbers into PNG images, [`interactive`] into figures that answer to the mouse, [`number`] into
 //! readable text, and [`page`] puts all of them into one HTML file that needs nothing beside itself. [`campaign`] says what stands on that page, one
-//! `*_section` a part; [`tables`] writes the same numbers for other programs.
+//! `*_section` a part; `tables` (feature `parquet`) writes the same numbers for other programs.
 
 mod base64;
 pub mod campaign;

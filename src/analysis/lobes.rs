@@ -49,6 +49,16 @@ pub struct LobeCase {
     pub(super) at_cuts: Vec<LimitRange>,
 }
 
+impl LobeCase {
+    /// For people: ` at p1`, empty where the FRFs belong to no posture.
+    pub fn at_posture(&self) -> String {
+        self.posture
+            .as_ref()
+            .map(|p| format!(" at {p}"))
+            .unwrap_or_default()
+    }
+}
+
 /// Lobes of the baseline (revision 0), fitted to the same data as the model with its effects.
 #[derive(Debug, Clone)]
 pub struct LobesBefore {

@@ -59,11 +59,7 @@ pub fn text(analysis: &LobeAnalysis) -> String {
                         format!("{:.4} mm ({:.2} Hz)", a.depth_mm, a.chatter_hz)
                     })
                 };
-                let posture = case
-                    .posture
-                    .as_ref()
-                    .map(|p| format!(" at {p}"))
-                    .unwrap_or_default();
+                let posture = case.at_posture();
                 out += &format!(
                     "Least limit{posture}: lateral {}, axial-torsional {}\n",
                     least(lateral),
@@ -83,11 +79,7 @@ pub fn text(analysis: &LobeAnalysis) -> String {
                 .iter()
                 .filter(|d| d.is_none_or(|d| d > hole.width_mm))
                 .count();
-            let posture = case
-                .posture
-                .as_ref()
-                .map(|p| format!(" at {p}"))
-                .unwrap_or_default();
+            let posture = case.at_posture();
             out += &format!(
                 "This hole has a width of cut of {:.3} mm: stable at {stable} of {} speeds{posture}\n",
                 hole.width_mm,

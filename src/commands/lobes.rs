@@ -229,11 +229,7 @@ fn text(analysis: &LobeAnalysis) -> String {
     };
     for case in analysis.cases.iter().take(shown) {
         let (low, high) = case.band_hz;
-        let posture = case
-            .posture
-            .as_ref()
-            .map(|p| format!(" at {p}"))
-            .unwrap_or_default();
+        let posture = case.at_posture();
         out += &format!(
             "FRF{posture}: {}; chatter sought from {low:.3} to {high:.1} Hz\n",
             case.description

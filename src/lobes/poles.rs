@@ -111,9 +111,9 @@ impl DirectFrf for PoleFrf {
 mod tests {
     use super::*;
     use crate::lobes::{RegenerativeForce, SpeedLimit, StabilitySolver, speed_grid};
-    use crate::robot::fixture::{TAP_POSTURES, irb6640};
-    use crate::robot::{Baseline, Branch, Dual, RobotModel};
-    use nalgebra::{DMatrix, Vector3};
+    use crate::robot::fixture::{TAP_POSTURES, flexible_tool, irb6640};
+    use crate::robot::{Baseline, Dual, RobotModel};
+    use nalgebra::DMatrix;
 
     /// Bending links, a damper in every joint and a flexible tool: the same lobes as with the coupled equations.
     #[test]
@@ -125,15 +125,7 @@ mod tests {
         for element in &mut coupled.elements {
             element.damping = Some(Dual::constant(1500.0));
         }
-        coupled.branches.push(Branch {
-            place: robot.flange_place(),
-            at: kinematics.tcp(),
-            directions: vec![Vector3::x(), Vector3::y()],
-            mass_kg: Dual::constant(9.0),
-            stiffness_n_per_m: Dual::constant(9e5),
-            damping_ns_per_m: Dual::constant(120.0),
-            carries_tool_point: true,
-        });
+        coupled.branches.push(flexible_tool(&robot, &kinematics));
         let exact = RobotFrf::new(&robot, &kinematics, &coupled).unwrap();
         let poles = PoleFrf::of_robot(&exact).unwrap().unwrap();
         for f in [0.5, 7.6, 12.0, 23.0, 60.0] {

@@ -131,7 +131,7 @@ impl DirectFrf for RobotFrf {
 mod tests {
     use super::*;
     use crate::lobes::{RegenerativeForce, SpeedLimit, StabilitySolver, speed_grid};
-    use crate::robot::fixture::{TAP_POSTURES, irb6640};
+    use crate::robot::fixture::{TAP_POSTURES, flexible_tool, irb6640};
     use crate::robot::{Baseline, Dual};
 
     #[test]
@@ -153,15 +153,7 @@ mod tests {
         for element in &mut coupled.elements {
             element.damping = Some(Dual::constant(1500.0));
         }
-        coupled.branches.push(crate::robot::Branch {
-            place: robot.flange_place(),
-            at: kinematics.tcp(),
-            directions: vec![Vector3::x(), Vector3::y()],
-            mass_kg: Dual::constant(9.0),
-            stiffness_n_per_m: Dual::constant(9e5),
-            damping_ns_per_m: Dual::constant(120.0),
-            carries_tool_point: true,
-        });
+        coupled.branches.push(flexible_tool(&robot, &kinematics));
         let chains = [
             robot.chain(&kinematics, &rigid),
             robot.chain(&kinematics, &bending),

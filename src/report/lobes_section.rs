@@ -35,11 +35,7 @@ pub fn summary(findings: &LobeFindings) -> String {
         ),
     };
     if let Some((case, peak)) = analysis.best().first() {
-        let place = case
-            .posture
-            .as_ref()
-            .map(|p| format!(" at {p}"))
-            .unwrap_or_default();
+        let place = case.at_posture();
         let depth = peak.depth_mm.map_or("without limit".to_string(), |d| {
             format!("with a limit of {} mm", significant(d, 3))
         });

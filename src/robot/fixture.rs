@@ -1,5 +1,8 @@
 //! The IRB 6640 of the source thesis, for the tests of this floor (the robot file itself is read one floor up).
 
+use nalgebra::Vector3;
+
+use super::{Branch, Dual, Kinematics, RobotModel};
 use crate::campaign::robot_spec::*;
 
 pub fn irb6640() -> RobotSpec {
@@ -52,3 +55,16 @@ pub const TAP_POSTURES: [[f64; 6]; 4] = [
     [153.0, 23.0, 20.0, -18.0, 87.0, 161.0],
     [161.0, 3.0, 47.0, -68.0, 46.0, 123.0],
 ];
+
+/// A flexible tool with a damper: a mass of its own that carries the tool centre point.
+pub fn flexible_tool(robot: &RobotModel, kinematics: &Kinematics) -> Branch {
+    Branch {
+        place: robot.flange_place(),
+        at: kinematics.tcp(),
+        directions: vec![Vector3::x(), Vector3::y()],
+        mass_kg: Dual::constant(9.0),
+        stiffness_n_per_m: Dual::constant(9e5),
+        damping_ns_per_m: Dual::constant(120.0),
+        carries_tool_point: true,
+    }
+}

@@ -60,8 +60,8 @@ mod tests {
 
     use super::*;
     use crate::campaign::robot_spec::{JointSpec, RobotSpec, ToolFrame};
-    use crate::robot::fixture::{TAP_POSTURES, irb6640};
-    use crate::robot::{Baseline, Branch, Dual, Place, PostureReport, Slot};
+    use crate::robot::fixture::{TAP_POSTURES, flexible_tool, irb6640};
+    use crate::robot::{Baseline, Dual, PostureReport};
 
     /// One joint of compliance c with a lever a: force across the lever moves c a² and turns c a, a moment moves c a and
     /// turns c.
@@ -150,15 +150,7 @@ mod tests {
             let rigid_tool = chain.tool_compliance(&robot, &kinematics).unwrap();
             let without = chain.compliance(kinematics.tcp(), robot.flange_place()).unwrap();
             assert!((rigid_tool - without).norm() < 1e-12 * without.norm());
-            chain.branches.push(Branch {
-                place: Place::new(6, Slot::End),
-                at: kinematics.tcp(),
-                directions: vec![Vector3::x(), Vector3::y()],
-                mass_kg: Dual::constant(9.0),
-                stiffness_n_per_m: Dual::constant(9e5),
-                damping_ns_per_m: Dual::constant(120.0),
-                carries_tool_point: true,
-            });
+            chain.branches.push(flexible_tool(&robot, &kinematics));
             let compliance = chain.tool_compliance(&robot, &kinematics).unwrap();
             let report = PostureReport::new(&robot, &kinematics, &chain).unwrap();
             for i in 0..3 {

@@ -1,10 +1,12 @@
 //! Noise of the FRFs of a set: from the measurement before the modes are known, from what they leave over afterwards.
 
 use num_complex::Complex64;
+use rayon::prelude::*;
 
 use super::global::SET;
 use super::joint_fit::{Data, Group};
-use crate::signal::frf_noise::{self, LeftOver};
+use crate::signal::frf_noise;
+use crate::signal::noise_law::{self, Departure};
 
 /// A piece of the band left with this many times the noise power is badly described.
 const MISFIT: f64 = 2.0;
@@ -50,8 +52,12 @@ pub(super) fn rms(values: &[Complex64]) -> f64 {
 /// the band is left far worse than the rest (leakage, drifting modes, lines below the sensor's range), it is that much
 /// noisier: one bad end of the band must not decide what is needless elsewhere.
 pub(super) fn renew(data: &mut [Data], groups: &[Group]) {
-    let left_over: Vec<Vec<LeftOver>> = (0..data.len()).map(|m| left_over(&data[m], groups, m)).collect();
-    let laws = frf_noise::laws_of_residuals(&left_over);
+    let left_over: Vec<Vec<Departure>> = data
+        .par_iter()
+        .enumerate()
+        .map(|(m, data)| left_over(data, groups, m))
+        .collect();
+    let laws = noise_law::fit(&left_over);
     for ((d, lines), law) in data.iter_mut().zip(&left_over).zip(laws) {
         let size = rms(&d.receptance);
         let fitted = lines.iter().filter(|l| l.squared.is_finite());
@@ -116,12 +122,12 @@ fn blocks(data: &[Data]) -> Vec<[f64; 2]> {
 }
 
 /// By line of FRF m; infinite where no group covers it.
-fn left_over(data: &Data, groups: &[Group], m: usize) -> Vec<LeftOver> {
-    let mut lines: Vec<LeftOver> = data
+fn left_over(data: &Data, groups: &[Group], m: usize) -> Vec<Departure> {
+    let mut lines: Vec<Departure> = data
         .frequency_hz
         .iter()
         .zip(&data.receptance)
-        .map(|(&frequency_hz, h)| LeftOver {
+        .map(|(&frequency_hz, h)| Departure {
             frequency_hz,
             magnitude: h.norm(),
             squared: f64::INFINITY,

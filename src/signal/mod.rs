@@ -5,6 +5,8 @@ mod drift;
 mod end_states;
 mod faults;
 pub mod frf_noise;
+mod local_rational;
+pub mod noise_law;
 mod order_spectrum;
 mod steady_window;
 mod tooth_line;

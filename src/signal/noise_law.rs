@@ -1,0 +1,338 @@
+//! The law of an FRF's noise over frequency and magnitude, from squared departures on single lines.
+//!
+//! σ² = (a |H|)² + (b (f₀/f)^p)²: a relative part (hammer, gain) and a floor (sensor, quantisation), even over the
+//! band in what the sensor measures: displacement (p = 0), velocity (1: vibrometer) or acceleration (2). Which one
+//! is read from the scatter, since files are often integrated before they are exported.
+
+use nalgebra::SVector;
+use rayon::prelude::*;
+
+/// Noise of one FRF: standard deviation of the complex value (both parts together) at receptance magnitude |H|.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrfNoise {
+    /// a: share of the magnitude.
+    pub relative: f64,
+    /// b: floor at `reference_hz`, in the unit of the FRF.
+    pub floor: f64,
+    /// p: the floor falls with this power of the frequency.
+    pub power: i32,
+    /// f₀, Hz, > 0.
+    pub reference_hz: f64,
+}
+
+impl FrfNoise {
+    /// Standard deviation of the complex value where the true magnitude is `magnitude`.
+    pub fn std(&self, frequency_hz: f64, magnitude: f64) -> f64 {
+        let floor = self.floor / ratio(frequency_hz, self.reference_hz).powi(self.power);
+        (self.relative * magnitude).hypot(floor)
+    }
+}
+
+/// Powers of the frequency with which a floor may fall, ascending: displacement, velocity, acceleration.
+pub(super) const POWERS: [i32; 3] = [0, 1, 2];
+/// A floor that falls must be this much likelier (natural logarithm) than an even one.
+const LIKELIER: f64 = 10.0;
+/// P(square > 7 × mean) is 1e-3 for noise: what lies beyond is no noise.
+const CUT: f64 = 7.0;
+/// The floor is at least this part of the largest magnitude: a line of zero noise would get all the weight there is.
+const LEAST_FLOOR: f64 = 1e-6;
+/// A relative change of the variances that is far below what they are known to.
+const SETTLED: f64 = 1e-4;
+
+/// f/f₀, never zero: a line at 0 Hz has no acceleration to speak of.
+fn ratio(frequency_hz: f64, reference_hz: f64) -> f64 {
+    (frequency_hz / reference_hz).max(1e-6)
+}
+
+/// One line of an FRF after a fit.
+#[derive(Debug, Clone, Copy)]
+pub struct Departure {
+    pub frequency_hz: f64,
+    /// Of the fitted value.
+    pub magnitude: f64,
+    /// Squared residual, corrected for the degrees of freedom that the fit took.
+    pub squared: f64,
+}
+
+/// Noise laws of FRFs measured together, with the power of the floor that describes all of them best; departures that
+/// are not finite are left out. `None` for too few lines.
+pub fn fit<D: AsRef<[Departure]> + Sync>(frfs: &[D]) -> Vec<Option<FrfNoise>> {
+    let all = || frfs.iter().flat_map(|d| d.as_ref());
+    let (sum, count) = all()
+        .filter(|d| d.frequency_hz > 0.0)
+        .fold((0.0, 0), |(sum, n), d| (sum + d.frequency_hz.ln(), n + 1));
+    let reference_hz = if count > 0 {
+        (sum / f64::from(count)).exp()
+    } else {
+        1.0
+    };
+    let by_power: Vec<[Option<Fitted>; POWERS.len()]> = frfs
+        .par_iter()
+        .map(|d| fit_laws(d.as_ref(), reference_hz))
+        .collect();
+    let mut best: Option<(f64, usize, usize)> = None;
+    for (k, power) in POWERS.into_iter().enumerate() {
+        let laws = || by_power.iter().filter_map(|of_frf| of_frf[k].as_ref());
+        let likelihood: f64 = laws().map(|law| law.log_likelihood).sum();
+        let found = laws().count();
+        let better = best.is_none_or(|(before, most, _)| {
+            found >= most && likelihood > before + if power > 0 { LIKELIER } else { 0.0 }
+        });
+        if better {
+            best = Some((likelihood, found, k));
+        }
+    }
+    let chosen = best.map_or(0, |(.., k)| k);
+    by_power
+        .into_iter()
+        .map(|of_frf| of_frf[chosen].as_ref().map(|law| law.noise))
+        .collect()
+}
+
+struct Fitted {
+    noise: FrfNoise,
+    /// Of exponentially distributed squares; one far beyond its mean counts as if it were at the cut.
+    log_likelihood: f64,
+}
+
+/// The law of one FRF for each power of its floor: of f^p H, whose floor is even.
+fn fit_laws(departures: &[Departure], reference_hz: f64) -> [Option<Fitted>; POWERS.len()] {
+    let finite = |d: &&Departure| d.magnitude.is_finite() && d.squared.is_finite();
+    let finite = || departures.iter().filter(finite);
+    let scales: Vec<f64> = finite()
+        .map(|d| ratio(d.frequency_hz, reference_hz).powi(2))
+        .collect();
+    let log_scale: f64 = scales.iter().map(|x| x.ln()).sum();
+    let mut powers: Vec<f64> = finite().map(|d| d.magnitude * d.magnitude).collect();
+    let mut squares: Vec<f64> = finite().map(|d| d.squared).collect();
+    let mut last_power = 0;
+    POWERS.map(|power| {
+        for _ in last_power..power {
+            for ((power, square), x) in powers.iter_mut().zip(&mut squares).zip(&scales) {
+                *power *= x;
+                *square *= x;
+            }
+        }
+        last_power = power;
+        let [a2, b2] = fit_even_law(&powers, &squares)?;
+        let expected = powers.iter().map(|power| a2 * power + b2);
+        let likelihood: f64 = expected
+            .zip(&squares)
+            .map(|(mean, square)| -mean.ln() - (square / mean).min(CUT))
+            .sum();
+        Some(Fitted {
+            noise: FrfNoise {
+                relative: a2.sqrt(),
+                floor: b2.sqrt(),
+                power,
+                reference_hz,
+            },
+            log_likelihood: likelihood + f64::from(power) * log_scale,
+        })
+    })
+}
+
+/// a² and b²: maximum likelihood of E square = a² power + b² for exponentially distributed squares (complex Gaussian
+/// noise), by iteratively reweighted least squares; squares beyond `CUT` times their mean are taken for misfit and
+/// trimmed with the bias that this brings taken back out.
+fn fit_even_law(powers: &[f64], squares: &[f64]) -> Option<[f64; 2]> {
+    if powers.len() < 20 {
+        return None;
+    }
+    let largest = powers.iter().copied().fold(0.0, f64::max);
+    // Start: all floor, from the median of an exponential distribution.
+    let mut law = [0.0, middle(&mut squares.to_vec()) / std::f64::consts::LN_2];
+    if !(largest > 0.0) || !law[1].is_finite() || law[1] <= 0.0 {
+        return None;
+    }
+    let low = lowest(powers, squares);
+    // Mean of an exponential variable given that it is below CUT times its mean.
+    let kept_mean = 1.0 - CUT / (CUT.exp() - 1.0);
+    for pass in 0..60 {
+        // The first passes know only a crude law: do not trim by it.
+        let (cut, share) = if pass > 4 {
+            (CUT, kept_mean)
+        } else {
+            (f64::INFINITY, 1.0)
+        };
+        let (s, mut r) = weighted_sums(powers, squares, law, cut);
+        r = r.map(|sum| sum / share);
+        let determinant = s[0][0] * s[1][1] - s[0][1] * s[1][0];
+        let mut a2 = (r[0] * s[1][1] - r[1] * s[0][1]) / determinant;
+        let mut b2 = (r[1] * s[0][0] - r[0] * s[1][0]) / determinant;
+        // Neither part may be negative: then the other one alone carries the noise.
+        if !(a2 > 0.0) {
+            a2 = 0.0;
+            b2 = r[1] / s[1][1];
+        } else if !(b2 > 0.0) {
+            b2 = 0.0;
+            a2 = r[0] / s[0][0];
+        }
+        b2 = b2.max(0.5 * (low.square - a2 * low.power));
+        if !a2.is_finite() || !b2.is_finite() || a2 + b2 <= 0.0 {
+            return None;
+        }
+        let next = [a2, b2.max(LEAST_FLOOR * LEAST_FLOOR * largest)];
+        let settled = (next[0] - law[0]).abs() <= SETTLED * next[0].max(1e-18)
+            && (next[1] - law[1]).abs() <= SETTLED * next[1];
+        law = next;
+        if settled && pass > 6 {
+            break;
+        }
+    }
+    Some(law)
+}
+
+/// Where the FRF is smallest.
+struct Lowest {
+    power: f64,
+    /// Expected square there.
+    square: f64,
+}
+
+/// Where the FRF is smallest the median says what the floor is, whatever the reweighting makes of it: a floor that has
+/// come out far too low would trim all that speaks against it.
+fn lowest(powers: &[f64], squares: &[f64]) -> Lowest {
+    let mut order: Vec<(f64, f64)> = powers.iter().copied().zip(squares.iter().copied()).collect();
+    let count = (order.len() / 5).max(10);
+    order.select_nth_unstable_by(count - 1, |a, b| {
+        a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal)
+    });
+    order.truncate(count);
+    let (mut powers, mut squares): (Vec<f64>, Vec<f64>) = order.into_iter().unzip();
+    Lowest {
+        power: middle(&mut powers),
+        square: middle(&mut squares) / std::f64::consts::LN_2,
+    }
+}
+
+/// The value that half of the others are not above.
+fn middle(values: &mut [f64]) -> f64 {
+    let half = values.len() / 2;
+    *values.select_nth_unstable_by(half, f64::total_cmp).1
+}
+
+/// Normal equations of square = a² power + b², each sample weighted by the square of its expected square under `law`
+/// (a², b²) and left out where it lies `cut` times above that.
+fn weighted_sums(powers: &[f64], squares: &[f64], [a2, b2]: [f64; 2], cut: f64) -> ([[f64; 2]; 2], [f64; 2]) {
+    // Sums in several lanes, which the processor can add side by side; what fills the last lanes up counts nothing.
+    let (power_chunks, power_rest) = powers.as_chunks();
+    let (square_chunks, square_rest) = squares.as_chunks();
+    let filled = |rest: &[f64]| std::array::from_fn(|lane| rest.get(lane).copied().unwrap_or(0.0));
+    let counts = std::array::from_fn(|lane| if lane < power_rest.len() { 1.0 } else { 0.0 });
+    let mut sums = [Lanes::zeros(); 5];
+    let all = power_chunks.iter().zip(square_chunks);
+    for (powers, squares) in all {
+        sums = add(sums, *powers, *squares, [1.0; LANES], [a2, b2, cut]);
+    }
+    sums = add(
+        sums,
+        filled(power_rest),
+        filled(square_rest),
+        counts,
+        [a2, b2, cut],
+    );
+    let [uu, u, one, uv, v] = sums.map(|lanes| lanes.sum());
+    ([[uu, u], [u, one]], [uv, v])
+}
+
+const LANES: usize = 4;
+type Lanes = SVector<f64, LANES>;
+
+/// One step of [`weighted_sums`].
+#[inline(always)]
+fn add(
+    [uu, u, one, uv, v]: [Lanes; 5],
+    powers: [f64; LANES],
+    squares: [f64; LANES],
+    counts: [f64; LANES],
+    [a2, b2, cut]: [f64; 3],
+) -> [Lanes; 5] {
+    let (powers, squares) = (Lanes::from(powers), Lanes::from(squares));
+    let mean = (powers * a2).add_scalar(b2);
+    let kept =
+        Lanes::from(counts).zip_zip_map(
+            &squares,
+            &(mean * cut),
+            |count, square, most| {
+                if square > most { 0.0 } else { count }
+            },
+        );
+    let w = kept.component_div(&mean.component_mul(&mean));
+    let weighted = w.component_mul(&powers);
+    [
+        uu + weighted.component_mul(&powers),
+        u + weighted,
+        one + w,
+        uv + weighted.component_mul(&squares),
+        v + w.component_mul(&squares),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Squares of exponential noise at its quantiles, in an order that has nothing to do with the magnitudes.
+    fn departures(law: FrfNoise, lines: usize) -> Vec<Departure> {
+        (0..lines)
+            .map(|k| {
+                let frequency_hz = 5.0 + 0.2 * k as f64;
+                let magnitude = 1e-6 * (1.0 + (0.1 * k as f64).sin().powi(2) * 20.0);
+                let quantile = (((k * 61) % lines) as f64 + 0.5) / lines as f64;
+                let std = law.std(frequency_hz, magnitude);
+                Departure {
+                    frequency_hz,
+                    magnitude,
+                    squared: -std * std * (1.0 - quantile).ln(),
+                }
+            })
+            .collect()
+    }
+
+    fn law(relative: f64, floor: f64, power: i32) -> FrfNoise {
+        FrfNoise {
+            relative,
+            floor,
+            power,
+            reference_hz: 30.0,
+        }
+    }
+
+    #[test]
+    fn both_parts_and_the_power_of_the_floor_come_back() {
+        for power in POWERS {
+            let wanted = law(0.02, 1e-7, power);
+            let found = fit(&vec![departures(wanted, 300); 4])[0].unwrap();
+            assert_eq!(found.power, power);
+            assert!((found.relative / 0.02 - 1.0).abs() < 0.15, "{found:?}");
+            let floor = found.std(30.0, 0.0);
+            assert!((floor / 1e-7 - 1.0).abs() < 0.15, "power {power}: {floor}");
+        }
+    }
+
+    /// Without a floor a line on which the FRF is small would decide everything.
+    #[test]
+    fn noise_in_proportion_to_the_magnitude_keeps_a_trace_of_a_floor() {
+        let found = fit(&[departures(law(0.02, 0.0, 0), 300)])[0].unwrap();
+        let largest = 2.1e-5;
+        assert!(found.floor >= 0.9 * LEAST_FLOOR * largest, "{found:?}");
+        assert!(found.floor < 1e-3 * largest, "{found:?}");
+    }
+
+    #[test]
+    fn what_lies_far_beyond_the_noise_is_left_out() {
+        let mut disturbed = departures(law(0.02, 1e-7, 0), 300);
+        for k in [40, 41, 42, 180] {
+            disturbed[k].squared *= 1e4;
+        }
+        disturbed[7].squared = f64::INFINITY;
+        let found = fit(&[disturbed])[0].unwrap();
+        assert!((found.relative / 0.02 - 1.0).abs() < 0.2, "{found:?}");
+    }
+
+    #[test]
+    fn too_few_lines_give_no_law() {
+        assert_eq!(fit(&[departures(law(0.02, 1e-7, 0), 19)]), [None]);
+    }
+}

@@ -257,7 +257,7 @@ fn judge(
         damping_ratio,
     } = solution.poles[pole];
     let (frequency_std_hz, damping_std) = (solution.frequency_std_hz(pole), solution.damping_std(pole));
-    let residue = solution.residues[0][pole];
+    let residue = solution.residues[pole];
     let line_hz = curve.spacing_hz(peak.index);
     let coarse = 2.0 * damping_ratio * frequency_hz < FINE_LINES * line_hz;
     if damping_ratio >= MAX_DAMPING {
@@ -346,7 +346,7 @@ impl WindowFit<'_> {
         let half_hz = reach * damping_ratio * frequency_hz;
         let mut inner = (0.0, 0.0);
         let mut all = (0.0, 0.0);
-        let left = self.solution.residual[0].iter().zip(&self.solution.leverage);
+        let left = self.solution.residual.iter().zip(&self.solution.leverage);
         for ((f, w), (r, leverage)) in self.frequency_hz.iter().zip(&self.line_weight).zip(left) {
             let square = (r * w).norm_sqr();
             let freedom = 1.0 - leverage;
@@ -414,9 +414,8 @@ fn fit_window<'a>(
     let y = &curve.mobility[lines];
     let mut problem = Problem {
         frequency_hz: f,
-        curves: vec![y],
+        mobility: y,
         line_weight: vec![1.0; f.len()],
-        curve_weight: vec![1.0],
         residual_terms: if f.len() > 6 { 2 } else { 1 },
     };
 
@@ -472,7 +471,7 @@ fn noise_weights(y: &[Complex64], solution: &Solution) -> Option<Vec<f64>> {
     // Model power and expected noise power: a line that the model follows closely shows only 1 − leverage of it.
     let samples: Vec<(f64, f64)> = y
         .iter()
-        .zip(&solution.residual[0])
+        .zip(&solution.residual)
         .zip(&solution.leverage)
         .map(|((y, r), h)| ((y - r).norm_sqr(), r.norm_sqr() / (1.0 - h).max(0.05)))
         .collect();

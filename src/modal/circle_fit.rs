@@ -69,19 +69,13 @@ fn fit_lines(curve: &Curve, lines: std::ops::Range<usize>, start: (f64, f64)) ->
     }
     let sweep = Sweep::fit(f, &angles(y, circle.centre), start)?;
 
-    // The scatter of the angles is one part of the uncertainty, the centre's error is the other (independent,
-    // as noise along and across the circle is): how the sweep moves with the centre, by differences.
-    let step = 1e-4 * circle.radius;
-    let moved = |direction: Complex64| {
-        let near = (sweep.frequency_hz, sweep.damping_ratio);
-        let other = Sweep::fit(f, &angles(y, circle.centre + direction * step), near)?;
-        let change = [
-            other.frequency_hz - sweep.frequency_hz,
-            other.damping_ratio - sweep.damping_ratio,
-        ];
-        Some(change.map(|c| c / step))
+    // The scatter of the angles is one part of the uncertainty, the centre's error is the other (independent, as noise
+    // along and across the circle is): each angle turns by Im(−δ/(y − c)) when the centre moves by δ.
+    let by_centre = |direction: Complex64| {
+        let turned = y.iter().map(|y| (-direction / (y - circle.centre)).im);
+        sweep.moved_by(f, turned)
     };
-    let (by_x, by_y) = (moved(Complex64::new(1.0, 0.0))?, moved(Complex64::new(0.0, 1.0))?);
+    let (by_x, by_y) = (by_centre(Complex64::ONE), by_centre(Complex64::I));
     let centre_covariance = circle.centre_cofactor * (radial / free as f64);
     let std_of = |j: usize| {
         let gradient = Vector2::new(by_x[j], by_y[j]);
@@ -127,9 +121,29 @@ struct Sweep {
     resonance_angle: f64,
     /// Of frequency and damping ratio.
     std: [f64; 2],
+    /// Inverse of the normal matrix over (f₀, ln ζ, θ₀).
+    cofactor: Matrix3<f64>,
 }
 
 impl Sweep {
+    /// ∂θ/∂(f₀, ln ζ, θ₀).
+    fn slopes(f: f64, f0: f64, zeta: f64) -> Vector3<f64> {
+        let u = detuning(f, f0);
+        let by_u = -2.0 * zeta / (zeta * zeta + u * u);
+        let slope = -0.5 * (f / (f0 * f0) + 1.0 / f);
+        Vector3::new(by_u * slope, -by_u * u, 1.0)
+    }
+
+    /// Change of frequency and damping ratio for a small change of the angles.
+    fn moved_by(&self, f: &[f64], turned: impl Iterator<Item = f64>) -> [f64; 2] {
+        let rows = f
+            .iter()
+            .map(|&f| Sweep::slopes(f, self.frequency_hz, self.damping_ratio));
+        let right: Vector3<f64> = rows.zip(turned).map(|(row, angle)| row * angle).sum();
+        let change = self.cofactor * right;
+        [change[0], change[1] * self.damping_ratio]
+    }
+
     fn fit(f: &[f64], angles: &[f64], start: (f64, f64)) -> Option<Sweep> {
         let (mut f0, mut zeta) = start;
         let model = |f: f64, f0: f64, zeta: f64| -2.0 * (detuning(f, f0) / zeta).atan();
@@ -155,10 +169,7 @@ impl Sweep {
             normal = Matrix3::zeros();
             let mut gradient = Vector3::zeros();
             for (&f, &a) in f.iter().zip(angles) {
-                let u = detuning(f, f0);
-                let by_u = -2.0 * zeta / (zeta * zeta + u * u);
-                let slope = -0.5 * (f / (f0 * f0) + 1.0 / f);
-                let row = Vector3::new(by_u * slope, -by_u * u, 1.0);
+                let row = Sweep::slopes(f, f0, zeta);
                 normal += row * row.transpose();
                 gradient += row * (a - theta0 - model(f, f0, zeta));
             }
@@ -186,7 +197,8 @@ impl Sweep {
             }
         }
         let free = f.len().checked_sub(3).filter(|&n| n > 0)?;
-        let covariance = normal.try_inverse()? * (best / free as f64);
+        let cofactor = normal.try_inverse()?;
+        let covariance = cofactor * (best / free as f64);
         let std = [
             covariance[(0, 0)].max(0.0).sqrt(),
             covariance[(1, 1)].max(0.0).sqrt() * zeta,
@@ -197,6 +209,7 @@ impl Sweep {
             damping_ratio: zeta,
             resonance_angle: offset(f0, zeta),
             std,
+            cofactor,
         })
     }
 }
@@ -266,7 +279,7 @@ impl Circle {
             let mut gradient = Vector3::zeros();
             for p in &local {
                 let arm = p - centre;
-                let distance = arm.norm();
+                let distance = arm.norm_sqr().sqrt();
                 if distance == 0.0 {
                     return None;
                 }

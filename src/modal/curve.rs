@@ -126,20 +126,34 @@ impl Curve {
         let difference: Vec<f64> = self
             .mobility
             .windows(5)
-            .map(|w| (w[0] - w[1] * 4.0 + w[2] * 6.0 - w[3] * 4.0 + w[4]).norm() / 70f64.sqrt())
+            .map(|w| {
+                (w[0] - w[1] * 4.0 + w[2] * 6.0 - w[3] * 4.0 + w[4])
+                    .norm_sqr()
+                    .sqrt()
+                    / 70f64.sqrt()
+            })
             .collect();
-        let mut window = Vec::with_capacity(2 * HALF_WINDOW + 1);
+        let last = difference.len() - 1;
+        let range =
+            |centre: usize| centre.saturating_sub(HALF_WINDOW)..(centre + HALF_WINDOW + 1).min(last + 1);
+        // In ascending order; from line to line one value goes and one comes.
+        let mut window: Vec<f64> = difference[range(0)].to_vec();
+        window.sort_by(f64::total_cmp);
+        let mut held = range(0);
         (0..n)
             .map(|k| {
-                let centre = k.saturating_sub(2).min(difference.len() - 1);
-                let from = centre.saturating_sub(HALF_WINDOW);
-                let to = (centre + HALF_WINDOW + 1).min(difference.len());
-                window.clear();
-                window.extend_from_slice(&difference[from..to]);
-                let middle = window.len() / 2;
-                let (_, median, _) = window.select_nth_unstable_by(middle, f64::total_cmp);
+                let wanted = range(k.saturating_sub(2).min(last));
+                let place =
+                    |window: &[f64], value: f64| window.partition_point(|x| x.total_cmp(&value).is_lt());
+                for value in &difference[held.end..wanted.end] {
+                    window.insert(place(&window, *value), *value);
+                }
+                for value in &difference[held.start..wanted.start] {
+                    window.remove(place(&window, *value));
+                }
+                held = wanted;
                 // |e| is Rayleigh distributed: its median is σ √ln 2.
-                *median / std::f64::consts::LN_2.sqrt()
+                window[window.len() / 2] / std::f64::consts::LN_2.sqrt()
             })
             .collect()
     }

@@ -60,7 +60,7 @@ pub(super) fn find(curve: &Curve, noise_std: &[f64]) -> Vec<Peak> {
 /// |Gaussian-smoothed curve| and the factor by which the smoothing lowers white noise.
 fn smoothed(mobility: &[Complex64], width_lines: f64) -> (Vec<f64>, f64) {
     if width_lines <= 0.0 {
-        return (mobility.iter().map(|y| y.norm()).collect(), 1.0);
+        return (mobility.iter().map(|y| y.norm_sqr().sqrt()).collect(), 1.0);
     }
     let reach = (3.0 * width_lines).ceil() as usize;
     let kernel: Vec<f64> = (0..=reach)
@@ -69,28 +69,24 @@ fn smoothed(mobility: &[Complex64], width_lines: f64) -> (Vec<f64>, f64) {
     let sum = kernel[0] + 2.0 * kernel[1..].iter().sum::<f64>();
     let squares = kernel[0].powi(2) + 2.0 * kernel[1..].iter().map(|w| w * w).sum::<f64>();
     let n = mobility.len();
-    let values = (0..n)
-        .map(|k| {
-            if k >= reach && k + reach < n {
-                let mut total = mobility[k] * kernel[0];
-                let below = mobility[k - reach..k].iter().rev();
-                for ((w, before), after) in kernel[1..].iter().zip(below).zip(&mobility[k + 1..]) {
-                    total += (before + after) * w;
-                }
-                return total.norm() / sum;
-            }
-            // At the ends the kernel is cut off and what is left weighs the more.
-            let (mut total, mut weight) = (mobility[k] * kernel[0], kernel[0]);
-            for (j, &w) in kernel.iter().enumerate().skip(1) {
-                for neighbour in [k.checked_sub(j), Some(k + j)].into_iter().flatten() {
-                    if let Some(y) = mobility.get(neighbour) {
-                        total += y * w;
-                        weight += w;
-                    }
-                }
-            }
-            total.norm() / weight
-        })
+    // Tap by tap over the whole curve, real and imaginary parts alike.
+    let mut total: Vec<Complex64> = mobility.iter().map(|y| y * kernel[0]).collect();
+    let mut weight = vec![kernel[0]; n];
+    for (j, &w) in kernel.iter().enumerate().skip(1).take_while(|(j, _)| *j < n) {
+        for (sum, y) in total.iter_mut().zip(&mobility[j..]) {
+            *sum += y * w;
+        }
+        for (sum, y) in total[j..].iter_mut().zip(mobility) {
+            *sum += y * w;
+        }
+        // At the ends the kernel is cut off and what is left weighs the more.
+        weight[..n - j].iter_mut().for_each(|sum| *sum += w);
+        weight[j..].iter_mut().for_each(|sum| *sum += w);
+    }
+    let values = total
+        .iter()
+        .zip(&weight)
+        .map(|(t, w)| t.norm_sqr().sqrt() / w)
         .collect();
     (values, squares.sqrt() / sum)
 }

@@ -12,7 +12,7 @@ fn main() -> ExitCode {
             // A closed pipe (`lobestone … | head`) is no failure of ours.
             let _ = match as_json {
                 true if outcome.json.is_null() => Ok(()),
-                true => std::io::stdout().write_all(format!("{:#}\n", outcome.json).as_bytes()),
+                true => print_json(&outcome.json),
                 // Colours go to a terminal only, and not where NO_COLOR is set.
                 false => anstream::stdout().write_all(outcome.text.as_bytes()),
             };
@@ -23,4 +23,10 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+fn print_json(json: &serde_json::Value) -> std::io::Result<()> {
+    let mut text = serde_json::to_vec_pretty(json)?;
+    text.push(b'\n');
+    std::io::stdout().write_all(&text)
 }

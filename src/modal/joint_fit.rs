@@ -16,8 +16,10 @@ const MAX_ADDED: usize = 4;
 const CHANCE_SIGMA: f64 = 8.0;
 /// … and a constant for having looked at every frequency.
 const LOOKED_EVERYWHERE: f64 = 20.0;
-/// Misfits are compared to this part of what a mode explains by chance.
+/// Misfits are compared to this part of what a mode explains by chance …
 const COMPARED: f64 = 0.002;
+/// … and to this part where the noise is only guessed yet.
+const ROUGHLY_COMPARED: f64 = 0.02;
 /// Fewer lines in the half-power band than this: the damping may stay uncertain.
 const COARSE_LINES: f64 = 1.0;
 /// Squared size over uncertainty (two degrees of freedom) from which an FRF shows a mode: five standard deviations.
@@ -180,9 +182,11 @@ struct Fit<'a> {
 impl Fit<'_> {
     fn fit(&self, poles: &[Pole]) -> Option<Solution> {
         // A search compares misfits, and a last refinement follows it.
+        let by_chance = 2.0 * self.frfs.len() as f64 + 2.0;
         let settled = match self.search {
             Search::Nothing => ml_fit::SETTLED,
-            Search::Rest | Search::Pairs => COMPARED * (2.0 * self.frfs.len() as f64 + 2.0),
+            Search::Rest => ROUGHLY_COMPARED * by_chance,
+            Search::Pairs => COMPARED * by_chance,
         };
         ml_fit::fit(&self.frfs, poles, &self.fixed, settled)
     }

@@ -74,23 +74,30 @@ fn normal_of_row(row: &Row, band_hz: [f64; 2], order: usize) -> Option<DMatrix<C
     let mut r = vec![zero; terms];
     let mut s = vec![vec![zero; lags]; references];
     let mut t = vec![vec![zero; lags]; references * references];
+    let mut powers = vec![zero; lags];
+    let add = |sums: &mut [Complex64], powers: &[Complex64], factor: Complex64| {
+        sums.iter_mut()
+            .zip(powers)
+            .for_each(|(sum, power)| *sum += power * factor);
+    };
     for (k, &f) in row.frequency_hz.iter().enumerate() {
-        let w2 = row.weight[k].powi(2);
         let z = Complex64::from_polar(1.0, angle(f, band_hz));
-        let mut power = z.powi(-(order as i32)) * w2;
-        for lag in 0..lags {
-            if lag >= order {
-                r[lag - order] += power;
-            }
-            for i in 0..references {
-                let h = row.receptance[i][k];
-                s[i][lag] += power * h;
-                let conjugated = power * h.conj();
-                for j in i..references {
-                    t[i * references + j][lag] += conjugated * row.receptance[j][k];
-                }
-            }
+        let mut power = z.powi(-(order as i32)) * row.weight[k].powi(2);
+        for out in &mut powers {
+            *out = power;
             power *= z;
+        }
+        add(&mut r, &powers[order..], Complex64::ONE);
+        for i in 0..references {
+            let h = row.receptance[i][k];
+            add(&mut s[i], &powers, h);
+            for j in i..references {
+                add(
+                    &mut t[i * references + j],
+                    &powers,
+                    h.conj() * row.receptance[j][k],
+                );
+            }
         }
     }
     for i in 0..references {

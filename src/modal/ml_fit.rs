@@ -10,9 +10,11 @@
 use std::f64::consts::TAU;
 
 use faer::linalg::matmul::matmul;
+use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::{Accum, MatMut, MatRef, Par};
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2};
 use num_complex::Complex64;
+use pulp::Arch;
 use rayon::prelude::*;
 
 use super::local_fit::Pole;
@@ -54,8 +56,8 @@ pub(super) struct FrfSolution {
     pub linear: DVector<f64>,
     /// Measured less fitted, m/N.
     pub residual: Vec<Complex64>,
-    /// Covariance of `linear` for given poles.
-    pub linear_covariance: DMatrix<f64>,
+    /// Covariance of each mode's a and b for given poles.
+    pub pair_covariance: Vec<Matrix2<f64>>,
     /// −∂linear/∂(ln f₁, ln ζ₁, …).
     pub linear_by_poles: DMatrix<f64>,
     /// Part of the noise at each line that the fit follows, mean over the lines.
@@ -83,20 +85,15 @@ impl Solution {
         );
         let value = (found.linear[2 * mode] + found.linear[2 * mode + 1] * s) * omega * omega;
         let by_poles = found.linear_by_poles.rows(2 * mode, 2);
-        let total = found.linear_covariance.view((2 * mode, 2 * mode), (2, 2))
-            + by_poles * &self.covariance * by_poles.transpose();
+        let total = found.pair_covariance[mode] + by_poles * &self.covariance * by_poles.transpose();
         (value, (0.5 * total.trace()).max(0.0).sqrt() * omega * omega)
     }
 
     /// Squared size of a mode in an FRF against its uncertainty (two degrees of freedom).
     pub fn evidence(&self, frf: usize, mode: usize) -> f64 {
         let found = &self.frfs[frf];
-        let x = found.linear.rows(2 * mode, 2);
-        let covariance = found
-            .linear_covariance
-            .view((2 * mode, 2 * mode), (2, 2))
-            .into_owned();
-        covariance
+        let x = found.linear.fixed_rows::<2>(2 * mode);
+        found.pair_covariance[mode]
             .try_inverse()
             .map_or(0.0, |inverse| (x.transpose() * inverse * x)[(0, 0)])
     }
@@ -330,9 +327,12 @@ pub(super) fn fit(frfs: &[NoisyFrf], start: &[Pole], fixed: &[Pole], settled: f6
         poles,
         frfs: current
             .frfs
-            .into_iter()
-            .zip(&prepared.weight)
-            .map(|(solved, weight)| solved.finish(weight))
+            .into_par_iter()
+            .enumerate()
+            .filter_map(|(m, solved)| {
+                let axis = current.axes[prepared.axis_of[m]].as_ref()?;
+                Some(solved.finish(&frfs[m], axis))
+            })
             .collect(),
         misfit: current.misfit,
         degrees_of_freedom,
@@ -351,31 +351,31 @@ pub(super) fn explained_by(frfs: &[NoisyFrf], held: &[Pole], trials: &[Pole]) ->
         let trial_axis = trial_axes[prepared.axis_of[m]].as_ref()?;
         let (solved, basis_columns) = Solved::new(&prepared, m, axis, 2 * trials.len(), buffer)?;
         let (rows, weight) = (axis.rows, &prepared.weight[m]);
-        let (before, added) = buffer.split_at_mut(rows * (basis_columns + 1));
-        let own = &trial_axis.columns[..added.len()];
-        for (out, column) in added.chunks_exact_mut(rows).zip(own.chunks_exact(rows)) {
-            weigh(out, column, weight);
-        }
-        let mut cross = DMatrix::zeros(basis_columns + 1, 2 * trials.len());
-        product(&mut cross, before, added, rows);
-        let along = cross.row(basis_columns).transpose();
-        let mut solved_cross = cross.rows(0, basis_columns).into_owned();
-        solved.scale_rows(&mut solved_cross);
-        solved
-            .cholesky
-            .l_dirty()
-            .solve_lower_triangular_mut(&mut solved_cross);
+        let added = &mut buffer[rows * (basis_columns + 1)..];
+        weigh(added, &trial_axis.columns, weight);
+        // Basis and residual, each with the residual and the trials.
+        let mut all = DMatrix::zeros(basis_columns + 1, 1 + 2 * trials.len());
+        let (left, right) = (
+            &buffer[..rows * (basis_columns + 1)],
+            &buffer[rows * basis_columns..],
+        );
+        product(&mut all, left, right, rows);
+        let half = solved.half_solved(all.rows(0, basis_columns).into_owned());
+        let added = &buffer[rows * (basis_columns + 1)..];
         let gains = (0..trials.len()).map(|t| {
             let pair = &added[2 * t * rows..2 * (t + 1) * rows];
             let (a, b) = pair.split_at(rows);
-            let (p, q) = (solved_cross.column(2 * t), solved_cross.column(2 * t + 1));
+            let (p, q) = (half.column(2 * t + 1), half.column(2 * t + 2));
             let dot = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
             let (aa, ab, bb) = (
                 dot(a, a) - p.norm_squared(),
                 dot(a, b) - p.dot(&q),
                 dot(b, b) - q.norm_squared(),
             );
-            let (u, v) = (along[2 * t], along[2 * t + 1]);
+            let (u, v) = (
+                all[(basis_columns, 2 * t + 1)] - half.column(0).dot(&p),
+                all[(basis_columns, 2 * t + 2)] - half.column(0).dot(&q),
+            );
             let gain = (u * u * bb - 2.0 * u * v * ab + v * v * aa) / (aa * bb - ab * ab);
             // A column that the others already hold explains nothing.
             if gain.is_finite() && gain > 0.0 { gain } else { 0.0 }
@@ -396,6 +396,7 @@ struct Linearised {
     normal: DMatrix<f64>,
     gradient: DVector<f64>,
     frfs: Vec<SolvedFrf>,
+    axes: Vec<Option<Axis>>,
 }
 
 /// Solves for the linear parameters of every FRF and builds the normal equations of the poles.
@@ -403,25 +404,39 @@ fn linearise(prepared: &Prepared, poles: &[Pole], fixed: &[Pole]) -> Option<Line
     let axes = prepared.axes(poles, fixed);
     let each = prepared.each(&axes, |m, axis, buffer| linearise_one(prepared, m, axis, buffer))?;
     let parameters = 2 * poles.len();
-    let mut sum = Linearised {
-        misfit: 0.0,
-        normal: DMatrix::zeros(parameters, parameters),
-        gradient: DVector::zeros(parameters),
-        frfs: Vec::with_capacity(each.len()),
-    };
-    for (normal, gradient, solved) in each {
-        sum.misfit += solved.residual.iter().map(|r| r * r).sum::<f64>();
-        sum.normal += normal;
-        sum.gradient += gradient;
-        sum.frfs.push(solved);
+    let mut sum = DMatrix::zeros(1 + parameters, 1 + parameters);
+    let mut frfs = Vec::with_capacity(each.len());
+    for (products, solved) in each {
+        sum += products;
+        frfs.push(solved);
     }
-    sum.misfit.is_finite().then_some(sum)
+    sum[(0, 0)].is_finite().then(|| Linearised {
+        misfit: sum[(0, 0)].max(0.0),
+        normal: sum.view((1, 1), (parameters, parameters)).into_owned(),
+        gradient: DVector::from_fn(parameters, |j, _| sum[(1 + j, 0)]),
+        frfs,
+        axes,
+    })
 }
 
-fn weigh(out: &mut [f64], column: &[f64], weight: &[f64]) {
-    for ((out, value), w) in out.iter_mut().zip(column).zip(weight) {
-        *out = value * w;
-    }
+/// Every column times the weights, for as many columns as both hold.
+fn weigh(out: &mut [f64], columns: &[f64], weight: &[f64]) {
+    let rows = weight.len();
+    Arch::new().dispatch(|| {
+        for (out, column) in out.chunks_exact_mut(rows).zip(columns.chunks_exact(rows)) {
+            for ((out, value), w) in out.iter_mut().zip(column).zip(weight) {
+                *out = value * w;
+            }
+        }
+    });
+}
+
+/// L⁻¹ `columns`, in place. (Much faster than nalgebra's for several columns.)
+fn lower_solve(cholesky: &Cholesky<f64, Dyn>, columns: &mut DMatrix<f64>) {
+    let (rows, count) = columns.shape();
+    let lower = MatRef::from_column_major_slice(cholesky.l_dirty().as_slice(), rows, rows);
+    let columns = MatMut::from_column_major_slice_mut(columns.as_mut_slice(), rows, count);
+    solve_lower_triangular_in_place(lower, columns, Par::Seq);
 }
 
 /// `out` = leftᵀ right, both with columns of `rows` values.
@@ -433,7 +448,8 @@ fn product(out: &mut DMatrix<f64>, left: &[f64], right: &[f64], rows: usize) {
     matmul(out, Accum::Replace, left.transpose(), right, 1.0, Par::Seq);
 }
 
-/// The linear parameters of one FRF for given poles.
+/// The linear parameters of one FRF for given poles. The normal equations square the condition number: what they leave
+/// along the basis is taken out of everything that follows ([`Solved::half_solved`], [`Solved::correct`]).
 struct Solved {
     /// Of the Gram matrix with columns of unit length.
     cholesky: Cholesky<f64, Dyn>,
@@ -443,12 +459,10 @@ struct Solved {
     x: DVector<f64>,
 }
 
-/// That, with what is left over and how it moves with the poles.
+/// That, with how it moves with the poles.
 struct SolvedFrf {
     linear: Solved,
-    /// Weighted, real and imaginary parts by turns.
-    residual: Vec<f64>,
-    /// Gram⁻¹ basisᵀ slopes, in units of the unit columns.
+    /// L⁻¹ basisᵀ slopes with the Gram matrix L Lᵀ, in units of the unit columns.
     by_poles: DMatrix<f64>,
 }
 
@@ -466,9 +480,7 @@ impl Solved {
         let columns = axis.columns.len() / rows;
         buffer.resize(rows * (columns + 1 + more), 0.0);
         let filled = &mut buffer[..rows * (columns + 1)];
-        for (out, column) in filled.chunks_exact_mut(rows).zip(axis.columns.chunks_exact(rows)) {
-            weigh(out, column, &prepared.weight[m]);
-        }
+        weigh(filled, &axis.columns, &prepared.weight[m]);
         filled[rows * columns..].copy_from_slice(&prepared.target[m]);
         let mut gram = DMatrix::zeros(columns + 1, columns + 1);
         product(&mut gram, filled, filled, rows);
@@ -483,41 +495,36 @@ impl Solved {
         for term in columns - RESIDUAL_TERMS..columns {
             unit[(term, term)] += ROUNDING;
         }
-        let mut solved = Solved {
-            cholesky: unit.cholesky()?,
-            scale,
-            x: DVector::zeros(columns),
-        };
-        // One step of iterative refinement: the normal equations square the condition number.
-        let mut right = projected;
-        for refined in [false, true] {
-            let (basis, residual) = filled.split_at_mut(rows * columns);
-            let basis = MatRef::from_column_major_slice(basis, rows, columns);
-            if refined {
-                let out = MatMut::from_column_major_slice_mut(right.as_mut_slice(), columns, 1);
-                let residual = MatRef::from_column_major_slice(&*residual, rows, 1);
-                matmul(out, Accum::Replace, basis.transpose(), residual, 1.0, Par::Seq);
-                right.component_mul_assign(&solved.scale);
-            }
-            let step = solved.cholesky.solve(&right);
-            let unscaled = step.component_mul(&solved.scale);
-            let change = MatRef::from_column_major_slice(unscaled.as_slice(), columns, 1);
-            let residual = MatMut::from_column_major_slice_mut(residual, rows, 1);
-            matmul(residual, Accum::Add, basis, change, -1.0, Par::Seq);
-            solved.x += step;
-        }
-        Some((solved, columns))
+        let cholesky = unit.cholesky()?;
+        let x = cholesky.solve(&projected);
+        let unscaled = x.component_mul(&scale);
+        let (basis, residual) = filled.split_at_mut(rows * columns);
+        let basis = MatRef::from_column_major_slice(&*basis, rows, columns);
+        let change = MatRef::from_column_major_slice(unscaled.as_slice(), columns, 1);
+        let residual = MatMut::from_column_major_slice_mut(residual, rows, 1);
+        matmul(residual, Accum::Add, basis, change, -1.0, Par::Seq);
+        Some((Solved { cholesky, scale, x }, columns))
     }
 
-    fn scale_rows(&self, matrix: &mut DMatrix<f64>) {
-        for mut column in matrix.column_iter_mut() {
+    /// One step of iterative refinement; `left`: [`Solved::half_solved`] of the residual.
+    fn correct(&mut self, left: DVector<f64>) {
+        let mut step = left;
+        self.cholesky.l_dirty().ad_solve_lower_triangular_mut(&mut step);
+        self.x += step;
+    }
+
+    /// L⁻¹ of products with the basis, L Lᵀ the Gram matrix of unit columns.
+    fn half_solved(&self, mut products: DMatrix<f64>) -> DMatrix<f64> {
+        for mut column in products.column_iter_mut() {
             column.component_mul_assign(&self.scale);
         }
+        lower_solve(&self.cholesky, &mut products);
+        products
     }
 }
 
 impl SolvedFrf {
-    fn finish(self, weight: &[f64]) -> FrfSolution {
+    fn finish(self, frf: &NoisyFrf, axis: &Axis) -> FrfSolution {
         let Solved { cholesky, scale, x } = self.linear;
         let scaled = |mut matrix: DMatrix<f64>| {
             for mut column in matrix.column_iter_mut() {
@@ -525,66 +532,82 @@ impl SolvedFrf {
             }
             matrix
         };
-        let mut linear_covariance = scaled(cholesky.inverse());
-        for (mut column, s) in linear_covariance.column_iter_mut().zip(&scale) {
-            column *= *s;
+        let mut by_poles = self.by_poles;
+        // G⁻¹ = L⁻ᵀ L⁻¹: columns of L⁻¹ are enough for the blocks on its diagonal.
+        let mut inverse = DMatrix::identity(x.len(), by_poles.ncols());
+        lower_solve(&cholesky, &mut inverse);
+        let pair_covariance = (0..by_poles.ncols() / 2)
+            .map(|mode| {
+                Matrix2::from_fn(|a, b| {
+                    let (a, b) = (2 * mode + a, 2 * mode + b);
+                    inverse.column(a).dot(&inverse.column(b)) * scale[a] * scale[b]
+                })
+            })
+            .collect();
+        cholesky.l_dirty().ad_solve_lower_triangular_mut(&mut by_poles);
+        let linear = x.component_mul(&scale);
+        let mut residual = frf.receptance.to_vec();
+        for (x, column) in linear.iter().zip(axis.columns.chunks_exact(axis.rows)) {
+            for (r, c) in residual.iter_mut().zip(column.as_chunks::<2>().0) {
+                *r -= Complex64::new(c[0], c[1]) * x;
+            }
         }
-        let rows = self.residual.len();
         FrfSolution {
-            leverage: x.len() as f64 / rows as f64,
-            linear: x.component_mul(&scale),
-            residual: (0..rows / 2)
-                .map(|k| Complex64::new(self.residual[2 * k], self.residual[2 * k + 1]) / weight[2 * k])
-                .collect(),
-            linear_covariance,
-            linear_by_poles: scaled(self.by_poles),
+            leverage: x.len() as f64 / axis.rows as f64,
+            linear,
+            residual,
+            pair_covariance,
+            linear_by_poles: scaled(by_poles),
         }
     }
 }
 
-/// Information matrix, gradient and solution of one FRF.
+/// Solution of one FRF, and the products of its residual and slopes with each other, what the basis can follow taken out:
+/// misfit, gradient and information matrix.
 fn linearise_one(
     prepared: &Prepared,
     m: usize,
     axis: &Axis,
     buffer: &mut Vec<f64>,
-) -> Option<(DMatrix<f64>, DVector<f64>, SolvedFrf)> {
+) -> Option<(DMatrix<f64>, SolvedFrf)> {
     let rows = axis.rows;
     let parameters = axis.slopes.len() / (2 * rows);
-    let (linear, columns) = Solved::new(prepared, m, axis, parameters, buffer)?;
+    let (mut linear, columns) = Solved::new(prepared, m, axis, parameters, buffer)?;
     let weight = &prepared.weight[m];
     let slopes = &mut buffer[rows * (columns + 1)..];
-    for (parameter, out) in slopes.chunks_exact_mut(rows).enumerate() {
-        let j = 2 * (parameter / 2);
-        let (a, b) = (
-            linear.x[j] * linear.scale[j],
-            linear.x[j + 1] * linear.scale[j + 1],
-        );
-        let pair = &axis.slopes[2 * parameter * rows..2 * (parameter + 1) * rows];
-        let (with_a, with_b) = pair.split_at(rows);
-        for (((out, p), q), w) in out.iter_mut().zip(with_a).zip(with_b).zip(weight) {
-            *out = (a * p + b * q) * w;
+    Arch::new().dispatch(|| {
+        let pairs = axis.slopes.chunks_exact(2 * rows);
+        for (parameter, (out, pair)) in slopes.chunks_exact_mut(rows).zip(pairs).enumerate() {
+            let j = 2 * (parameter / 2);
+            let (a, b) = (
+                linear.x[j] * linear.scale[j],
+                linear.x[j + 1] * linear.scale[j + 1],
+            );
+            let (with_a, with_b) = pair.split_at(rows);
+            for (((out, p), q), w) in out.iter_mut().zip(with_a).zip(with_b).zip(weight) {
+                *out = (a * p + b * q) * w;
+            }
         }
-    }
-    // Basis, residual and slopes, each with the slopes.
-    let mut all = DMatrix::zeros(columns + 1 + parameters, parameters);
-    product(&mut all, buffer, &buffer[rows * (columns + 1)..], rows);
-    let mut cross = all.rows(0, columns).into_owned();
-    linear.scale_rows(&mut cross);
-    let by_poles = linear.cholesky.solve(&cross);
-    let mut normal = all.rows(columns + 1, parameters).into_owned();
-    normal.gemm_tr(-1.0, &cross, &by_poles, 1.0);
-    let gradient = all.row(columns).transpose();
-    let residual = buffer[rows * columns..rows * (columns + 1)].to_vec();
-    Some((
-        normal,
-        gradient,
-        SolvedFrf {
-            linear,
-            residual,
-            by_poles,
-        },
-    ))
+    });
+    // Basis, residual and slopes, each with residual and slopes.
+    let mut all = DMatrix::zeros(columns + 1 + parameters, 1 + parameters);
+    product(&mut all, buffer, &buffer[rows * columns..], rows);
+    let half = linear.half_solved(all.rows(0, columns).into_owned());
+    let mut products = all.rows(columns, 1 + parameters).into_owned();
+    let size = 1 + parameters;
+    let out = MatMut::from_column_major_slice_mut(products.as_mut_slice(), size, size);
+    let half_solved = MatRef::from_column_major_slice(half.as_slice(), columns, size);
+    matmul(
+        out,
+        Accum::Add,
+        half_solved.transpose(),
+        half_solved,
+        -1.0,
+        Par::Seq,
+    );
+    linear.correct(half.column(0).into_owned());
+    let by_poles = half.columns(1, parameters).into_owned();
+    Some((products, SolvedFrf { linear, by_poles }))
 }
 
 #[cfg(test)]

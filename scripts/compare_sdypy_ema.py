@@ -1,11 +1,14 @@
 #!/usr/bin/env python3
 """Side by side with sdypy-EMA (PyPI: `pip install sdypy-EMA`), in one run on the same files.
 
+    cargo build --release --no-default-features --bins --bench modal && python3 scripts/compare_sdypy_ema.py
+
 Makes robot-like sets of FRFs (seven modes from 6 to 60 Hz, two of them closer than their widths, 12 responses at 3
 references), with and without noise, and prints the errors of both programs and the time both take.
 
-sdypy-EMA is given what it needs and lobestone finds by itself: the approximate frequencies of the modes. Its time is
-that of its computation alone (poles, selection, residues), lobestone's that of the whole process, reading included.
+sdypy-EMA is given what it needs and lobestone finds by itself: the approximate frequencies of the modes. "time" is, for
+both, that of the computation alone, from FRFs in memory to modes in memory (`benches/modal.rs`; both are warm);
+"process" is that of `lobestone modal` from start to exit, reading the text file and printing JSON included.
 
 usage: python3 scripts/compare_sdypy_ema.py [path of the lobestone binary]
 """
@@ -25,6 +28,7 @@ from sdypy import EMA
 POLES = [(6.4, 0.03), (8.2, 0.028), (13.8, 0.03), (14.05, 0.0256), (19.3, 0.025), (33.0, 0.02), (56.0, 0.018)]
 RESPONSES, REFERENCES = 12, 3
 DRAWS = 5
+ROOT = Path(__file__).resolve().parent.parent
 
 
 def make(noise, seed):
@@ -61,6 +65,15 @@ def lobestone(binary, path):
         return [(m["frequency_hz"], m["damping_ratio"]) for m in json.load(out)["global"]], took
 
 
+def computation(paths):
+    """Seconds of the computation alone for each file."""
+    built = sorted((ROOT / "target/release/deps").glob("modal-*"), key=lambda p: p.stat().st_mtime)
+    built = [p for p in built if p.suffix == "" and p.stat().st_mode & 0o111]
+    if not built:
+        sys.exit("no bench: run `cargo build --release --no-default-features --bench modal` first")
+    return json.loads(subprocess.run([built[-1], "--seconds-json", *paths], stdout=subprocess.PIPE, check=True).stdout)
+
+
 def sdypy(f, h):
     frf = h.reshape(-1, f.size)
     began = time.perf_counter()
@@ -84,33 +97,33 @@ def errors(found):
 
 
 def main():
-    root = Path(__file__).resolve().parent.parent
-    binary = sys.argv[1] if len(sys.argv) > 1 else str(root / "target/release/lobestone")
+    binary = sys.argv[1] if len(sys.argv) > 1 else str(ROOT / "target/release/lobestone")
     print(f"{len(POLES)} modes, {RESPONSES}x{REFERENCES} FRFs, 0.25 Hz lines; largest and median error over the modes, mean of draws")
-    print(f"{'noise':>6} {'program':>10} {'f %':>9} {'zeta %':>9} {'median f %':>11} {'zeta %':>9} {'time s':>8} {'sets with all modes':>20}")
-    ratios = []
+    print(f"{'noise':>6} {'program':>10} {'f %':>9} {'zeta %':>9} {'median f %':>11} {'zeta %':>9} {'time s':>8} {'process s':>10} {'sets with all modes':>20}")
+    ratios, process_ratios = [], []
     with tempfile.TemporaryDirectory() as folder:
         for noise in (0.0, 0.02, 0.05):
             sets = [make(noise, seed) for seed in range(DRAWS)]
-            path = f"{folder}/set.csv"
-            rows = {"lobestone": [], "sdypy-EMA": []}
-            # One program after the other: the threads of NumPy's linear algebra go on spinning for a while.
-            for f, h in sets:
+            paths = [f"{folder}/set{k}.csv" for k in range(DRAWS)]
+            for path, (f, h) in zip(paths, sets):
                 write_csv(path, f, h)
-                found, took = lobestone(binary, path)
-                rows["lobestone"].append((errors(found), took))
-            for f, h in sets:
-                found, took = sdypy(f, h)
-                rows["sdypy-EMA"].append((errors(found), took))
+            # One program after the other: the threads of NumPy's linear algebra go on spinning for a while.
+            ours = [lobestone(binary, path) for path in paths]
+            alone = computation(paths)
+            sdypy(*sets[0])
+            theirs = [sdypy(f, h) for f, h in sets]
             time.sleep(1)
-            times = {}
-            for name, row in rows.items():
-                whole = [r[0] for r in row if r[0] is not None]
+            times = {"lobestone": np.median(alone), "sdypy-EMA": np.median([t for _, t in theirs])}
+            process = np.median([t for _, t in ours])
+            for name, found in (("lobestone", ours), ("sdypy-EMA", theirs)):
+                whole = [e for e in (errors(modes) for modes, _ in found) if e is not None]
                 mean = np.mean(whole, axis=0) if whole else [np.nan] * 4
-                times[name] = np.median([r[1] for r in row])
-                print(f"{100 * noise:5.0f}% {name:>10} {mean[0]:9.4f} {mean[1]:9.3f} {mean[2]:11.4f} {mean[3]:9.3f} {times[name]:8.3f} {len(whole):>14} of {DRAWS}")
+                shown = f"{process:10.3f}" if name == "lobestone" else f"{'':10}"
+                print(f"{100 * noise:5.0f}% {name:>10} {mean[0]:9.4f} {mean[1]:9.3f} {mean[2]:11.4f} {mean[3]:9.3f} {times[name]:8.3f} {shown} {len(whole):>14} of {DRAWS}")
             ratios.append(times["sdypy-EMA"] / times["lobestone"])
+            process_ratios.append(times["sdypy-EMA"] / process)
     print("time ratio sdypy-EMA / lobestone:", ", ".join(f"{r:.1f}" for r in ratios))
+    print("time ratio sdypy-EMA / whole process of lobestone:", ", ".join(f"{r:.1f}" for r in process_ratios))
 
 
 if __name__ == "__main__":

@@ -367,10 +367,61 @@ fn read(
         .into());
     }
     let mut inputs = Vec::new();
-    for record in &file.contents.times {
-        inputs.extend(from_taps(&set, path, record, taps, hits, warnings)?);
+    for alike in file.contents.times.chunk_by(TimeRecord::same_channels) {
+        inputs.extend(from_segments(&set, path, alike, taps, hits, warnings)?);
     }
     Ok(inputs)
+}
+
+/// FRFs of records with the same channels: of all hits together, unless they contradict each other (a hammer that goes
+/// from point to point).
+fn from_segments(
+    set: &str,
+    path: &Path,
+    segments: &[TimeRecord],
+    taps: &TapSettings,
+    hits: &mut Vec<(String, Vec<Hit>)>,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<FrfInput>> {
+    let [first, others @ ..] = segments else {
+        return Ok(Vec::new());
+    };
+    if others.is_empty() {
+        return Ok(from_taps(set, path, first, taps, hits, warnings)?.frfs);
+    }
+    let mut whole = first.clone();
+    others.iter().for_each(|segment| whole.append(segment));
+    let (mut their_hits, mut their_warnings) = (Vec::new(), Vec::new());
+    let together = from_taps(set, path, &whole, taps, &mut their_hits, &mut their_warnings)?;
+    if !together.contradictory {
+        warnings.push(format!(
+            "{set}: {} records with the same channels: their hits are averaged",
+            segments.len()
+        ));
+        warnings.extend(their_warnings);
+        hits.extend(their_hits);
+        return Ok(together.frfs);
+    }
+    warnings.push(format!(
+        "{set}: {} records with the same channels, whose hits contradict each other (other points or directions, or noise \
+         as large as the response): FRFs of each record alone",
+        segments.len()
+    ));
+    let mut inputs = Vec::new();
+    for (k, segment) in segments.iter().enumerate() {
+        let alone = from_taps(set, path, segment, taps, hits, warnings)?.frfs;
+        inputs.extend(alone.into_iter().map(|input| FrfInput {
+            name: format!("{} record {}", input.name, k + 1),
+            ..input
+        }));
+    }
+    Ok(inputs)
+}
+
+/// FRFs of a tap record, and whether its hits contradict each other.
+struct FromTaps {
+    frfs: Vec<FrfInput>,
+    contradictory: bool,
 }
 
 fn frf_input(set: &str, record: FrfRecord) -> FrfInput {
@@ -442,7 +493,7 @@ fn from_taps(
     taps: &TapSettings,
     hits: &mut Vec<(String, Vec<Hit>)>,
     warnings: &mut Vec<String>,
-) -> Result<Vec<FrfInput>> {
+) -> Result<FromTaps> {
     let hammer = hammer(record, path)?;
     let sensors: Vec<(&Channel, Quantity)> = record
         .channels
@@ -477,7 +528,7 @@ fn from_taps(
     })?;
     warnings.extend(found.warnings.iter().map(|w| format!("{set}: {w}")));
     hits.push((set.to_owned(), found.hits));
-    Ok(sensors
+    let frfs = sensors
         .iter()
         .enumerate()
         .map(|(k, (channel, quantity))| FrfInput {
@@ -489,7 +540,11 @@ fn from_taps(
             coherence: found.coherence.as_ref().map(|c| c[k].clone()),
             added_decay_per_s: found.added_decay_per_s,
         })
-        .collect())
+        .collect();
+    Ok(FromTaps {
+        frfs,
+        contradictory: found.contradictory,
+    })
 }
 
 #[cfg(test)]

@@ -407,6 +407,24 @@ pub struct TimeRecord {
 }
 
 impl TimeRecord {
+    /// Are these two recordings of the same channels?
+    pub fn same_channels(&self, other: &TimeRecord) -> bool {
+        let rate = (self.sample_rate_hz / other.sample_rate_hz - 1.0).abs() < 1e-6;
+        let mut channels = self.channels.iter().zip(&other.channels);
+        rate && self.channels.len() == other.channels.len()
+            && channels.all(|(a, b)| a.name == b.name && a.file_unit == b.file_unit)
+    }
+
+    /// Puts the samples of a recording of the same channels behind its own.
+    pub fn append(&mut self, next: &TimeRecord) {
+        let before = self.channels.first().map_or(0, |c| c.samples.len());
+        for (channel, more) in self.channels.iter_mut().zip(&next.channels) {
+            channel.samples.extend_from_slice(&more.samples);
+        }
+        let filled = next.filled.iter().map(|r| r.start + before..r.end + before);
+        self.filled.extend(filled);
+    }
+
     pub fn channel(&self, role: ChannelRole) -> Option<&Channel> {
         self.channels.iter().find(|c| c.role == role)
     }

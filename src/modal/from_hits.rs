@@ -19,6 +19,8 @@ const DIED_OUT: f64 = 0.02;
 const EXCITED: f64 = 0.01;
 /// A hit whose misfit to the others' FRF is this many times the usual one, and this large, is inconsistent.
 const INCONSISTENT: [f64; 2] = [6.0, 0.05];
+/// Where the usual misfit (share of the response's power) is this large, no hit says anything about another.
+const CONTRADICTORY: f64 = 0.5;
 
 /// Estimator of the FRF from averaged spectra.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
@@ -63,6 +65,8 @@ pub struct TapFrfs {
     pub block_s: f64,
     /// 1/τ of the exponential window (0 without one): what it adds to ζω of every mode.
     pub added_decay_per_s: f64,
+    /// Most hits differ from what the others predict: they are not of the same point and direction.
+    pub contradictory: bool,
     pub warnings: Vec<String>,
 }
 
@@ -108,7 +112,13 @@ pub fn frfs_from_hits(record: &TapRecord, settings: &TapSettings) -> Result<TapF
     let sign = if -low > high { -1.0 } else { 1.0 };
     let decay_per_s = added_decay(record, &found);
     let blocks = spectra(record, &force, sign, &found, decay_per_s);
-    let kept = consistent(&blocks, &mut found.hits);
+    let (kept, contradictory) = consistent(&blocks, &mut found.hits);
+    if contradictory {
+        warnings.push(
+            "most hits contradict each other: were they at different points, or in different directions?"
+                .into(),
+        );
+    }
     let good: Vec<&Block> = blocks.iter().filter(|b| kept.contains(&b.hit)).collect();
     let left_out: Vec<String> = found
         .hits
@@ -162,6 +172,7 @@ pub fn frfs_from_hits(record: &TapRecord, settings: &TapSettings) -> Result<TapF
         hits: found.hits,
         block_s: found.block as f64 / record.sample_rate_hz,
         added_decay_per_s: decay_per_s,
+        contradictory,
         warnings,
     })
 }
@@ -248,11 +259,12 @@ fn spectra(record: &TapRecord, force: &[f64], sign: f64, found: &hits::Hits, dec
         .collect()
 }
 
-/// Indices of the hits that agree with the others; the rest is marked.
-fn consistent(blocks: &[Block], hits: &mut [Hit]) -> Vec<usize> {
+/// Indices of the hits that agree with the others; the rest is marked. Where most disagree nobody can say which are
+/// right: then it is all of them, and true.
+fn consistent(blocks: &[Block], hits: &mut [Hit]) -> (Vec<usize>, bool) {
     let all: Vec<usize> = blocks.iter().map(|b| b.hit).collect();
-    if blocks.len() < 3 {
-        return all;
+    if blocks.len() < 2 {
+        return (all, false);
     }
     let everything: Vec<&Block> = blocks.iter().collect();
     let lines = excited_lines(&everything);
@@ -282,6 +294,10 @@ fn consistent(blocks: &[Block], hits: &mut [Hit]) -> Vec<usize> {
         })
         .collect();
     let usual = quantile(&misfit, 0.4);
+    // Of two nobody can say which is right.
+    if blocks.len() == 2 {
+        return (all, usual > CONTRADICTORY);
+    }
     let mut kept = Vec::new();
     for (block, misfit) in blocks.iter().zip(&misfit) {
         if *misfit > (INCONSISTENT[0] * usual).max(INCONSISTENT[1]) {
@@ -293,14 +309,13 @@ fn consistent(blocks: &[Block], hits: &mut [Hit]) -> Vec<usize> {
             kept.push(block.hit);
         }
     }
-    // Where most disagree nobody can say which are right.
-    if 2 * kept.len() <= blocks.len() {
+    if 2 * kept.len() <= blocks.len() || usual > CONTRADICTORY {
         for block in blocks {
             hits[block.hit].left_out = None;
         }
-        return all;
+        return (all, true);
     }
-    kept
+    (kept, false)
 }
 
 /// Lines from 0 Hz that the hammer excites.

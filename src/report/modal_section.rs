@@ -360,7 +360,7 @@ fn mac(set: &SetModes) -> Option<Block> {
             .map(|row| row.iter().map(|m| Some(*m)).collect())
             .collect(),
         value_label: "MAC".into(),
-        format: CellFormat::Significant(2),
+        format: CellFormat::Decimals(2),
         range: Some((0.0, 1.0)),
         ..Default::default()
     };

@@ -5,7 +5,7 @@ use super::canvas::{Align, Canvas, Stroke, paint};
 use super::panel::Header;
 use super::{WIDTH, nothing_to_draw, style};
 use crate::Result;
-use crate::report::number::{percent, significant};
+use crate::report::number::{decimals, percent, significant};
 
 /// How cell values are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -15,6 +15,8 @@ pub enum CellFormat {
     Percent,
     /// So many significant digits, in the unit of `value_label`.
     Significant(usize),
+    /// So many digits behind the point: for numbers between 0 and 1 of which the small ones are as good as 0.
+    Decimals(usize),
 }
 
 #[derive(Debug, Clone, Default)]
@@ -173,6 +175,7 @@ impl HeatMap {
         match self.format {
             CellFormat::Percent => percent(value),
             CellFormat::Significant(digits) => significant(value, digits.min(6)),
+            CellFormat::Decimals(digits) => decimals(value, digits.min(6)),
         }
     }
 
@@ -301,6 +304,7 @@ impl HeatMap {
             let value = match self.scale_format() {
                 CellFormat::Percent => format!("{} %", significant(tick.at, 3).trim_end_matches(".0")),
                 CellFormat::Significant(digits) => significant(tick.at, digits.clamp(2, 6)),
+                CellFormat::Decimals(digits) => decimals(tick.at, digits.min(6)),
             };
             canvas.text((x + width + 9.0, y), &value, style::TICK);
         }

@@ -217,6 +217,8 @@ fn odd_tables_and_bars_never_panic() {
             CellFormat::Percent,
             CellFormat::Significant(0),
             CellFormat::Significant(99),
+            CellFormat::Decimals(2),
+            CellFormat::Decimals(99),
         ] {
             let map = HeatMap {
                 title: LONG.repeat(50),

@@ -29,7 +29,8 @@ const TOP: [&str; 12] = [
     "lobes",
 ];
 
-const CUT: [&str; 17] = [
+/// Keys of `[[cut]]`.
+pub(super) const CUT: [&str; 17] = [
     "id",
     "file",
     "process",

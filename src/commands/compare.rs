@@ -2,7 +2,7 @@ use serde_json::{Map, Value, json};
 
 use super::next_step::Guide;
 use super::text::{Emphasis, error_bar, number, percent, table, warnings};
-use super::{CampaignArg, Domain, Outcome, by_domain};
+use super::{Outcome, SideArgs, by_domain};
 use crate::Result;
 use crate::analysis::mode_comparison::{ModePair, compare_modes, measured_modes};
 use crate::analysis::{CuttingAnalysis, StructureAnalysis};
@@ -14,16 +14,7 @@ use crate::discrepancy::{FrfComparison, FrfError};
 use crate::identify::structure_study::{ResidualPeak, held_out_postures, residual_peaks};
 use crate::identify::{Options, StructureCase};
 
-#[derive(clap::Args)]
-pub struct Args {
-    #[command(flatten)]
-    campaign: CampaignArg,
-    /// Side of the campaign to look at.
-    #[arg(long, value_enum)]
-    domain: Option<Domain>,
-}
-
-pub fn run(args: Args) -> Result<Outcome> {
+pub fn run(args: SideArgs) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
     by_domain(&campaign, args.domain, structure, cutting)
 }

@@ -2,7 +2,7 @@ use serde_json::{Map, Value, json};
 
 use super::next_step::Guide;
 use super::text::{Emphasis, number, percent, table, warnings, wrapped};
-use super::{CampaignArg, Domain, Outcome, by_domain};
+use super::{Outcome, SideArgs, by_domain};
 use crate::Result;
 use crate::analysis::{CuttingFindings, DiagnosisFindings};
 use crate::campaign::Campaign;
@@ -11,16 +11,7 @@ use crate::discrepancy::explained::{Explained, NamedPart};
 use crate::discrepancy::{Candidate, Diagnosis, Verdict};
 use crate::identify::Options;
 
-#[derive(clap::Args)]
-pub struct Args {
-    #[command(flatten)]
-    campaign: CampaignArg,
-    /// Side of the campaign to look at.
-    #[arg(long, value_enum)]
-    domain: Option<Domain>,
-}
-
-pub fn run(args: Args) -> Result<Outcome> {
+pub fn run(args: SideArgs) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
     by_domain(
         &campaign,

@@ -2,21 +2,12 @@ use serde_json::{Value, json};
 
 use super::next_step::Guide;
 use super::text::{Emphasis, error_bar, percent, table, warnings};
-use super::{CampaignArg, Domain, Outcome, side};
+use super::{Outcome, SideArgs, side};
 use crate::Result;
 use crate::campaign::Campaign;
 use crate::revision::{self, Revision, RevisionLog, fingerprint};
 
-#[derive(clap::Args)]
-pub struct Args {
-    #[command(flatten)]
-    campaign: CampaignArg,
-    /// Side of the campaign to look at.
-    #[arg(long, value_enum)]
-    domain: Option<Domain>,
-}
-
-pub fn run(args: Args) -> Result<Outcome> {
+pub fn run(args: SideArgs) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
     let domain = side(&campaign, args.domain);
     of(&campaign, domain)

@@ -90,17 +90,17 @@ pub enum Command {
     /// Tune the model to the measured FRFs.
     Calibrate(calibrate::Args),
     /// Model against measurement: where it fails.
-    Compare(compare::Args),
+    Compare(SideArgs),
     /// Which physical effect the model lacks.
-    Diagnose(diagnose::Args),
+    Diagnose(SideArgs),
     /// What an effect is, how it shows, how to check it in the lab.
     Explain(explain::Args),
     /// Add an effect to the model, refit everything, record a revision.
     Add(add::Args),
     /// The error falling, revision by revision.
-    History(history::Args),
+    History(SideArgs),
     /// Take the last revision back.
-    Undo(undo::Args),
+    Undo(SideArgs),
     /// Stability lobes.
     Lobes(lobes::Args),
     /// A map of limits and stiffness over the workspace, in shards.
@@ -163,6 +163,16 @@ fn side(campaign: &Campaign, domain: Option<Domain>) -> crate::revision::Domain 
 pub struct CampaignArg {
     /// The campaign folder (with campaign.toml in it).
     pub dir: PathBuf,
+}
+
+/// A campaign folder, and which side of it.
+#[derive(clap::Args)]
+pub struct SideArgs {
+    #[command(flatten)]
+    pub campaign: CampaignArg,
+    /// Side of the campaign to look at.
+    #[arg(long, value_enum)]
+    pub domain: Option<Domain>,
 }
 
 pub fn run(cli: Cli) -> Result<Outcome> {

@@ -3,21 +3,12 @@ use serde_json::json;
 use super::history::document;
 use super::next_step::Guide;
 use super::text::percent;
-use super::{CampaignArg, Domain, Outcome, side};
+use super::{Outcome, SideArgs, side};
 use crate::Result;
 use crate::campaign::Campaign;
 use crate::revision::{self, RevisionLog, fingerprint};
 
-#[derive(clap::Args)]
-pub struct Args {
-    #[command(flatten)]
-    campaign: CampaignArg,
-    /// Side of the campaign to look at.
-    #[arg(long, value_enum)]
-    domain: Option<Domain>,
-}
-
-pub fn run(args: Args) -> Result<Outcome> {
+pub fn run(args: SideArgs) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
     let domain = side(&campaign, args.domain);
     let log = RevisionLog::load(&campaign.dir)?;

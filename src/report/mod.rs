@@ -4,7 +4,6 @@
 //! readable text, and [`page`] puts all of them into one HTML file that needs nothing beside itself. [`campaign`] says what stands on that page, one
 //! `*_section` a part; `tables` (feature `parquet`) writes the same numbers for other programs.
 
-mod base64;
 pub mod campaign;
 pub mod cutting_section;
 pub mod diagnosis_section;

@@ -6,11 +6,11 @@
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
+use base64::prelude::{BASE64_STANDARD, Engine};
 use minijinja::syntax::SyntaxConfig;
 use minijinja::{Environment, Value, context};
 use serde_json::json;
 
-use super::base64::base64;
 use super::interactive::{Explorer, GLUE, Plot, packed, plotly_js};
 use crate::files::write_atomically;
 use crate::{Error, Result};
@@ -235,7 +235,7 @@ fn images_of(html: &str, folder: &Path) -> Vec<PathBuf> {
             .strip_suffix(".png")
             .is_some_and(|stem| slug(stem, "") == stem);
         let path = folder.join(name);
-        if plain && std::fs::read(&path).is_ok_and(|png| base64(&png) == data) {
+        if plain && std::fs::read(&path).is_ok_and(|png| BASE64_STANDARD.encode(&png) == data) {
             found.push(path);
         }
     }
@@ -308,7 +308,7 @@ impl Block {
                     width,
                     height,
                     // Base64 has no character that HTML knows, so it need not be escaped.
-                    data => Value::from_safe_string(base64(&figure.png)),
+                    data => Value::from_safe_string(BASE64_STANDARD.encode(&figure.png)),
                 }
             }
         }

@@ -1,6 +1,6 @@
 //! How noisy measured FRFs are, from the measurement alone.
 //!
-//! In a short window a set of FRFs that share their poles is a rational function ([`super::local_rational`]). What is
+//! In a short window a set of FRFs that share their poles is a rational function (`signal/local_rational.rs`). What is
 //! left at the window's centre, divided by its degrees of freedom, is noise; over all windows it makes a law
 //! ([`super::noise_law`]).
 

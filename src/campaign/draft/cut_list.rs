@@ -5,26 +5,16 @@ use std::path::Path;
 use super::Answers;
 use super::scan::{Scan, stem};
 use super::tables::cut_ids;
+use crate::campaign::load::CUT;
 use crate::campaign::suggest::{closest, shown};
 use crate::{Error, InputError, Result};
 
-const COLUMNS: [&str; 15] = [
-    "file",
-    "id",
-    "process",
-    "spindle_rpm",
-    "feed_per_tooth_mm",
-    "axial_depth_mm",
-    "immersion",
-    "start_deg",
-    "exit_deg",
-    "feed_per_rev_mm",
-    "pilot_diameter_mm",
-    "hole_depth_mm",
-    "order",
-    "material",
-    "outcome",
-];
+/// Keys of `[[cut]]` that a list cannot give: one is a pair of times, one names a posture that `init` does not know yet.
+const NOT_IN_A_LIST: [&str; 2] = ["steady_s", "posture"];
+
+fn columns() -> impl Iterator<Item = &'static str> {
+    CUT.into_iter().filter(|key| !NOT_IN_A_LIST.contains(key))
+}
 
 /// Reads a CSV whose columns are keys of `[[cut]]`, one of them `file` (name or path of the force record), into
 /// `answers`. Separators are commas, semicolons or tabs; with the latter two a comma may be the decimal sign.
@@ -64,10 +54,10 @@ pub fn read_cut_list(file: &Path, scan: &Scan, answers: &mut Answers) -> Result<
         .iter()
         .map(str::to_lowercase)
         .collect();
-    if let Some(unknown) = header.iter().find(|h| !COLUMNS.contains(&h.as_str())) {
-        let remedy = match closest(unknown, COLUMNS) {
+    if let Some(unknown) = header.iter().find(|h| columns().all(|key| key != h.as_str())) {
+        let remedy = match closest(unknown, columns()) {
             Some(near) => format!("did you mean {near}?"),
-            None => format!("columns are {}", COLUMNS.join(", ")),
+            None => format!("columns are {}", columns().collect::<Vec<_>>().join(", ")),
         };
         return Err(wrong(format!("unknown column {:?}", shown(unknown)), 1, remedy).into());
     }

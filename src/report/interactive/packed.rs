@@ -3,11 +3,11 @@
 use std::io::Write;
 use std::sync::OnceLock;
 
+use base64::prelude::{BASE64_STANDARD, Engine};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use num_complex::Complex64;
 
-use crate::report::base64::base64;
 use crate::{Error, Result};
 
 /// `text`, compressed (gzip), in letters that HTML takes as they are (base64).
@@ -16,7 +16,7 @@ pub fn packed(text: &str) -> Result<String> {
         |e: std::io::Error| Error::computation(format!("the report's figures cannot be packed: {e}"));
     let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
     encoder.write_all(text.as_bytes()).map_err(failed)?;
-    Ok(base64(&encoder.finish().map_err(failed)?))
+    Ok(BASE64_STANDARD.encode(encoder.finish().map_err(failed)?))
 }
 
 /// plotly.js as the crate `plotly` has it, [`packed`].

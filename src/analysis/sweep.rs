@@ -101,8 +101,16 @@ impl Sweep {
         }
         let mut warnings = Vec::new();
         let CutForce {
-            coefficients, cut, ..
+            coefficients,
+            cut,
+            axial_torsional,
+            ..
         } = CutForce::of(campaign, section, &mut warnings)?;
+        if let Some(Err(reason)) = axial_torsional {
+            warnings.push(format!(
+                "the map has the drill's lateral block only, the axial-torsional one is left out: {reason}"
+            ));
+        }
         let cut = cut.average();
         let asked = Asked::new(section, cut.axial.is_some());
         let posture = posture_of(campaign, section, request)?.clone();

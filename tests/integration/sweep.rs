@@ -136,6 +136,8 @@ mod with_tables {
         ]);
         let row = &json["deepest_cut"];
         let lobes = document(&["lobes", text(folder.path())]);
+        let reason = lobes["axial_torsional"]["left_out_because"].as_str().unwrap();
+        assert!(json["warnings"].to_string().contains(reason), "{json}");
         let close = |name: &str, a: &serde_json::Value, b: &serde_json::Value| {
             let (a, b) = (a.as_f64().unwrap(), b.as_f64().unwrap());
             assert!((a / b - 1.0).abs() < 1e-6, "{name}: {a} {b}");

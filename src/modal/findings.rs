@@ -19,6 +19,8 @@ const LEAKAGE_LINES: f64 = 0.02;
 const FINE_LINES: f64 = 3.0;
 /// … where their damping is uncertain by more than this share of itself.
 const UNCERTAIN: f64 = 0.02;
+/// Two fits of the same lines disagree from this many standard deviations on.
+const APART: f64 = 2.0;
 
 pub(super) fn collect(
     groups: &[Group],
@@ -61,7 +63,7 @@ pub(super) fn collect(
                 continue;
             }
             let shift = group.doubt.as_ref().map_or([0.0; 2], |d| d.shifts[j]);
-            let frequency_std_hz = (level * solution.frequency_std_hz(j)).hypot(shift[0]);
+            let mut frequency_std_hz = (level * solution.frequency_std_hz(j)).hypot(shift[0]);
             let mut constants = vec![None; count];
             for m in 0..data.len() {
                 let (value, std) = solution.constant(m, j);
@@ -75,6 +77,11 @@ pub(super) fn collect(
             let mut damping_std = (level * solution.damping_std(j)).hypot(shift[1]);
             if lines_in_half_power_band < LEAKAGE_BELOW_LINES {
                 damping_std = damping_std.hypot(LEAKAGE_LINES * line_hz / (2.0 * pole.frequency_hz));
+            }
+            if data.len() < SET {
+                let apart = disagreement(members, *pole, [frequency_std_hz, damping_std]);
+                frequency_std_hz = frequency_std_hz.hypot(apart[0]);
+                damping_std = damping_std.hypot(apart[1]);
             }
             if damping_std >= pole.damping_ratio && group.doubt.is_none() {
                 without_width.push(format!("{:.2}", pole.frequency_hz));
@@ -137,6 +144,39 @@ pub(super) fn collect(
     for (m, d) in data.iter().enumerate() {
         result.reconstructions[of_member[m]] = Some(reconstruction(d, groups, m, where_modes_are));
     }
+}
+
+/// How far the FRFs' own local fits are from a common pole (frequency, Hz; damping ratio), where that is more than the
+/// uncertainty of both; else zero. With a few FRFs both fits rest on the same lines: noise cannot part them, only what
+/// one of the two models does not know (leakage, modes drifting during the record).
+fn disagreement(members: &[&SetMember], pole: Pole, std: [f64; 2]) -> [f64; 2] {
+    let width_hz = pole.damping_ratio * pole.frequency_hz;
+    let mut most = [0.0f64; 2];
+    for mode in members.iter().flat_map(|m| &m.modes.modes) {
+        let own = mode.best();
+        let line_hz = 2.0 * own.damping_ratio * own.frequency_hz / mode.lines_in_half_power_band;
+        let apart = [
+            (own.frequency_hz - pole.frequency_hz).abs(),
+            (own.damping_ratio - pole.damping_ratio).abs(),
+        ];
+        let (Some(f_std), Some(zeta_std)) = (own.frequency_std_hz, own.damping_std) else {
+            continue;
+        };
+        // Another mode, or two that the local fit takes for one.
+        if apart[0] > 0.5 * width_hz.max(line_hz) || apart[1] > 0.5 * pole.damping_ratio {
+            continue;
+        }
+        for (most, (apart, std)) in most.iter_mut().zip(
+            apart
+                .into_iter()
+                .zip([std[0].hypot(f_std), std[1].hypot(zeta_std)]),
+        ) {
+            if apart > APART * std {
+                *most = most.max(apart);
+            }
+        }
+    }
+    most
 }
 
 /// The band around the modes, Hz: what lies far outside says nothing about them.

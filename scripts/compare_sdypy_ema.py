@@ -8,7 +8,8 @@ references), with and without noise, and prints the errors of both programs and 
 
 sdypy-EMA is given what it needs and lobestone finds by itself: the approximate frequencies of the modes. "time" is, for
 both, that of the computation alone, from FRFs in memory to modes in memory (`benches/modal.rs`; both are warm);
-"process" is that of `lobestone modal` from start to exit, reading the text file and printing JSON included.
+"process" is that of `lobestone modal` from start to exit, reading the text file and printing JSON included. Every time is
+the fastest of three runs (other programs on the machine only make a run slower), the median over the draws.
 
 usage: python3 scripts/compare_sdypy_ema.py [path of the lobestone binary]
 """
@@ -53,6 +54,11 @@ def write_csv(path, f, h):
             names += [f"re({dofs})", f"im({dofs})"]
             columns += [h[i, j].real, h[i, j].imag]
     np.savetxt(path, np.array(columns).T, delimiter=",", header=",".join(names), comments="", fmt="%.17g")
+
+
+def fastest(run, *arguments):
+    """What `run` returns with its time, of the fastest of three runs."""
+    return min((run(*arguments) for _ in range(3)), key=lambda found: found[1])
 
 
 def lobestone(binary, path):
@@ -108,10 +114,9 @@ def main():
             for path, (f, h) in zip(paths, sets):
                 write_csv(path, f, h)
             # One program after the other: the threads of NumPy's linear algebra go on spinning for a while.
-            ours = [lobestone(binary, path) for path in paths]
+            ours = [fastest(lobestone, binary, path) for path in paths]
             alone = computation(paths)
-            sdypy(*sets[0])
-            theirs = [sdypy(f, h) for f, h in sets]
+            theirs = [fastest(sdypy, f, h) for f, h in sets]
             time.sleep(1)
             times = {"lobestone": np.median(alone), "sdypy-EMA": np.median([t for _, t in theirs])}
             process = np.median([t for _, t in ours])

@@ -8,8 +8,8 @@ use serde::Serialize;
 
 use super::curve::AbsoluteLimit;
 use super::optimum::SurfacePoint;
+use crate::Result;
 use crate::robot::{IkBranch, InverseKinematics, RobotModel};
-use crate::{Error, Result};
 
 /// Whether a cut can be made at an angle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -59,18 +59,8 @@ impl<'a> RedundancySweep<'a> {
         forbidden_deg: &[[f64; 2]],
     ) -> Result<Self> {
         let ik = InverseKinematics::new(&robot.spec)?;
-        let start: [f64; 6] = joints_deg
-            .iter()
-            .map(|d| d.to_radians())
-            .collect::<Vec<f64>>()
-            .try_into()
-            .map_err(|_| Error::computation("the redundancy sweep needs six joint angles"))?;
+        let (start, branch) = ik.reference(joints_deg, "the redundancy sweep")?;
         let tool = robot.kinematics(joints_deg)?.tool;
-        let branch = ik.branch_of(&start).ok_or_else(|| {
-            Error::computation(
-                "the posture of the redundancy sweep stands at a singularity of the robot: choose another one",
-            )
-        })?;
         let mut sweep = RedundancySweep {
             robot,
             ik,

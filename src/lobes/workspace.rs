@@ -5,8 +5,8 @@ use serde::Serialize;
 
 use super::redundancy::in_forbidden_band;
 use super::workspace_grid::Place;
+use crate::Result;
 use crate::robot::{IkBranch, IkSolution, InverseKinematics, RobotModel};
-use crate::{Error, Result};
 
 /// Whether a cut can be made at a place, and what stands against it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -68,18 +68,8 @@ impl<'a> Workspace<'a> {
         least_singularity_margin: f64,
     ) -> Result<Self> {
         let ik = InverseKinematics::new(&robot.spec)?;
-        let reference_rad: [f64; 6] = joints_deg
-            .iter()
-            .map(|d| d.to_radians())
-            .collect::<Vec<f64>>()
-            .try_into()
-            .map_err(|_| Error::computation("a map of the workspace needs six joint angles"))?;
+        let (reference_rad, branch) = ik.reference(joints_deg, "the map of the workspace")?;
         let tool = robot.kinematics(joints_deg)?.tool;
-        let branch = ik.branch_of(&reference_rad).ok_or_else(|| {
-            Error::computation(
-                "the posture that the map refers to stands at a singularity of the robot: choose another one",
-            )
-        })?;
         Ok(Workspace {
             ik,
             reference_rad,

@@ -159,20 +159,16 @@ fn disagreement(members: &[&SetMember], pole: Pole, std: [f64; 2]) -> [f64; 2] {
             (own.frequency_hz - pole.frequency_hz).abs(),
             (own.damping_ratio - pole.damping_ratio).abs(),
         ];
-        let (Some(f_std), Some(zeta_std)) = (own.frequency_std_hz, own.damping_std) else {
+        let (Some(frequency_std_hz), Some(damping_std)) = (own.frequency_std_hz, own.damping_std) else {
             continue;
         };
         // Another mode, or two that the local fit takes for one.
         if apart[0] > 0.5 * width_hz.max(line_hz) || apart[1] > 0.5 * pole.damping_ratio {
             continue;
         }
-        for (most, (apart, std)) in most.iter_mut().zip(
-            apart
-                .into_iter()
-                .zip([std[0].hypot(f_std), std[1].hypot(zeta_std)]),
-        ) {
-            if apart > APART * std {
-                *most = most.max(apart);
+        for (k, own_std) in [frequency_std_hz, damping_std].into_iter().enumerate() {
+            if apart[k] > APART * std[k].hypot(own_std) {
+                most[k] = most[k].max(apart[k]);
             }
         }
     }

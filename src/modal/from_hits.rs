@@ -65,7 +65,7 @@ pub struct TapFrfs {
     pub block_s: f64,
     /// 1/τ of the exponential window (0 without one): what it adds to ζω of every mode.
     pub added_decay_per_s: f64,
-    /// Most hits differ from what the others predict: they are not of the same point and direction.
+    /// Most hits differ from what the others predict: other points or directions, or noise as large as the response.
     pub contradictory: bool,
     pub warnings: Vec<String>,
 }
@@ -115,7 +115,7 @@ pub fn frfs_from_hits(record: &TapRecord, settings: &TapSettings) -> Result<TapF
     let (kept, contradictory) = consistent(&blocks, &mut found.hits);
     if contradictory {
         warnings.push(
-            "most hits contradict each other: were they at different points, or in different directions?"
+            "most hits contradict each other: other points or directions, or noise as large as the response"
                 .into(),
         );
     }

@@ -105,29 +105,27 @@ impl<'a> Prepared<'a> {
             polynomial.push(column);
         }
         let weighted = problem.mobility.iter().zip(&problem.line_weight);
-        let mut prepared = Prepared {
+        let mut target: Vec<Complex64> = weighted.map(|(y, weight)| y * weight).collect();
+        take_out_polynomial(&mut target, &polynomial);
+        Some(Prepared {
             problem,
             polynomial,
-            target: weighted.map(|(y, weight)| y * weight).collect(),
-        };
-        let mut target = std::mem::take(&mut prepared.target);
-        prepared.outside_polynomial(&mut target);
-        prepared.target = target;
-        Some(prepared)
+            target,
+        })
     }
+}
 
-    /// Takes the polynomial out of a column.
-    fn outside_polynomial(&self, column: &mut [Complex64]) {
-        for along in &self.polynomial {
-            let (mut re, mut im) = (0.0, 0.0);
-            for (a, c) in along.iter().zip(column.iter()) {
-                re += a * c.re;
-                im += a * c.im;
-            }
-            for (c, a) in column.iter_mut().zip(along) {
-                c.re -= re * a;
-                c.im -= im * a;
-            }
+/// Takes the span of orthonormal real columns out of a column.
+fn take_out_polynomial(column: &mut [Complex64], polynomial: &[Vec<f64>]) {
+    for along in polynomial {
+        let (mut re, mut im) = (0.0, 0.0);
+        for (a, c) in along.iter().zip(column.iter()) {
+            re += a * c.re;
+            im += a * c.im;
+        }
+        for (c, a) in column.iter_mut().zip(along) {
+            c.re -= re * a;
+            c.im -= im * a;
         }
     }
 }
@@ -399,7 +397,7 @@ impl Linearised {
             let factor = &mut self.factor[j * columns..(j + 1) * columns];
             let mut own = norm;
             for _ in 0..2 {
-                prepared.outside_polynomial(column);
+                take_out_polynomial(column, &prepared.polynomial);
                 for (part, along) in factor.iter_mut().zip(done.chunks_exact(lines)) {
                     *part += take_out(column, along);
                 }
@@ -437,7 +435,7 @@ impl Linearised {
                 by_damping[k] = weighted * pole.damping_ratio;
             }
             for column in [by_frequency, by_damping] {
-                prepared.outside_polynomial(column);
+                take_out_polynomial(column, &prepared.polynomial);
                 for along in self.basis.chunks_exact(lines) {
                     take_out(column, along);
                 }

@@ -323,17 +323,16 @@ pub(super) fn fit(frfs: &[NoisyFrf], start: &[Pole], fixed: &[Pole], settled: f6
         }
     }
     let covariance = current.normal.try_inverse()?;
-    covariance.iter().all(|c| c.is_finite()).then(|| Solution {
+    let solved: Option<Vec<FrfSolution>> = current
+        .frfs
+        .into_par_iter()
+        .enumerate()
+        .map(|(m, solved)| Some(solved.finish(&frfs[m], current.axes[prepared.axis_of[m]].as_ref()?)))
+        .collect();
+    let frfs = solved?;
+    covariance.iter().all(|c| c.is_finite()).then_some(Solution {
         poles,
-        frfs: current
-            .frfs
-            .into_par_iter()
-            .enumerate()
-            .filter_map(|(m, solved)| {
-                let axis = current.axes[prepared.axis_of[m]].as_ref()?;
-                Some(solved.finish(&frfs[m], axis))
-            })
-            .collect(),
+        frfs,
         misfit: current.misfit,
         degrees_of_freedom,
         covariance,

@@ -194,6 +194,23 @@ impl<'a> InverseKinematics<'a> {
         margins.fold(f64::INFINITY, f64::min)
     }
 
+    /// Joint angles (rad) and branch of the posture, in degrees, that `what` refers to.
+    ///
+    /// # Errors
+    /// Not six joints, or a posture at a singularity.
+    pub fn reference(&self, joints_deg: &[f64], what: &str) -> Result<([f64; 6], IkBranch)> {
+        let joints_deg: [f64; 6] = joints_deg
+            .try_into()
+            .map_err(|_| Error::computation(format!("{what} needs six joint angles")))?;
+        let q_rad = joints_deg.map(f64::to_radians);
+        let branch = self.branch_of(&q_rad).ok_or_else(|| {
+            Error::computation(format!(
+                "the posture that {what} refers to stands at a singularity of the robot: choose another one"
+            ))
+        })?;
+        Ok((q_rad, branch))
+    }
+
     /// The branch that a posture lies on; `None` where it stands at a singularity and two branches meet.
     pub fn branch_of(&self, q_rad: &[f64; 6]) -> Option<IkBranch> {
         let tool = Kinematics::new(self.spec, q_rad).tool;

@@ -57,7 +57,7 @@ pub fn estimate(frequency_hz: &[f64], frfs: &[&[Complex64]]) -> Vec<Option<FrfNo
             } else {
                 centre + STEP
             };
-            window(&data, frfs.len(), frequency_hz[centre], centre, from..to)
+            window(&data, centre, from..to)
         })
         .collect();
     for window in windows.into_iter().flatten() {
@@ -99,16 +99,10 @@ struct Window {
 }
 
 /// Fits the window around line `centre`. `None` where the lines do not determine a denominator.
-fn window(
-    data: &LineProducts,
-    frfs: usize,
-    frequency_hz: f64,
-    centre: usize,
-    lines: Range<usize>,
-) -> Option<Window> {
+fn window(data: &LineProducts, centre: usize, lines: Range<usize>) -> Option<Window> {
     let window = local_rational::Window::fit(data, centre)?;
     let first = centre - HALF_WINDOW;
-    let found = (0..frfs).map(|frf| {
+    let found = (0..data.frfs.len()).map(|frf| {
         let mut wanted = window.lines(
             frf,
             std::iter::once(HALF_WINDOW).chain(lines.clone().map(|line| line - first)),
@@ -118,7 +112,7 @@ fn window(
             let magnitude = line.fitted.norm();
             let squared = line.residual.norm_sqr() / freedom;
             (freedom > LEAST_FREEDOM && squared.is_finite() && magnitude.is_finite()).then_some(Departure {
-                frequency_hz,
+                frequency_hz: data.frequency_hz[centre],
                 magnitude,
                 squared,
             })

@@ -34,8 +34,8 @@ type Information = SMatrix<Complex64, DENOMINATOR, DENOMINATOR>;
 
 /// FRFs on common lines with the products of neighbouring lines.
 pub(super) struct LineProducts<'a> {
-    frequency_hz: &'a [f64],
-    frfs: &'a [&'a [Complex64]],
+    pub frequency_hz: &'a [f64],
+    pub frfs: &'a [&'a [Complex64]],
     /// Σ h_i conj(h_{i + d}) over the FRFs, by line i and distance d.
     products: Vec<[Complex64; LINES]>,
 }

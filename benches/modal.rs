@@ -86,7 +86,7 @@ fn seconds_of_files(files: &[String]) -> lobestone::Result<Vec<f64>> {
     let sets: Vec<Vec<FrfInput>> = files
         .iter()
         .map(|file| {
-            let analysis = ModalAnalysis::of_files(&[file], &SETTINGS, &TapSettings::default())?;
+            let analysis = ModalAnalysis::of_files(&[file], false, &SETTINGS, &TapSettings::default())?;
             let frfs = analysis.sets.into_iter().flat_map(|set| set.frfs);
             Ok(frfs.map(|frf| frf.input).collect())
         })

@@ -10,10 +10,13 @@ use rayon::prelude::*;
 use crate::campaign::{Campaign, MeasuredDof, Point};
 use crate::ingest::units::{self, Dimension};
 use crate::ingest::{self, Channel, FrfRecord, Quantity, TimeRecord};
-use crate::modal::quality::{self, Quality, Verdict};
+use crate::modal::quality::{self, Quality, SetQuality, Verdict};
 use crate::modal::tracking::{self, Track};
 use crate::modal::{self, FrfModes, GlobalModes, Hit, SetMember, Settings, TapRecord, TapSettings};
 use crate::{Error, InputError, Result};
+
+/// Name of the set that files together make.
+pub const TOGETHER: &str = "all files";
 
 /// One FRF to analyse.
 #[derive(Debug, Clone)]
@@ -92,16 +95,24 @@ impl ModalAnalysis {
         Self::of(inputs, warnings, settings)
     }
 
-    /// FRF files and raw tap tests, one set a file.
+    /// FRF files and raw tap tests: one set a file, or all files as one set (FRFs exported one by one).
     ///
     /// # Errors
     /// A file that cannot be read or holds neither FRFs nor hits.
-    pub fn of_files(files: &[impl AsRef<Path>], settings: &Settings, taps: &TapSettings) -> Result<Self> {
+    pub fn of_files(
+        files: &[impl AsRef<Path>],
+        together: bool,
+        settings: &Settings,
+        taps: &TapSettings,
+    ) -> Result<Self> {
         let mut inputs = Vec::new();
         let mut warnings = Vec::new();
         let mut hits = Vec::new();
         for file in files {
             inputs.extend(read(file.as_ref(), taps, &mut hits, &mut warnings)?);
+        }
+        if together {
+            join(&mut inputs, &mut warnings);
         }
         let mut analysis = Self::of(inputs, warnings, settings)?;
         analysis.hits = hits;
@@ -149,6 +160,15 @@ impl ModalAnalysis {
     /// The set with the most modes.
     pub fn richest_set(&self) -> Option<&SetModes> {
         self.sets.iter().max_by_key(|s| s.global.modes.len())
+    }
+
+    /// Of the set that is worst.
+    pub fn quality(&self) -> Option<&SetQuality> {
+        let qualities = self.sets.iter().map(|s| &s.global.quality);
+        qualities.max_by(|a, b| {
+            let unexplained = || a.unexplained_share.total_cmp(&b.unexplained_share);
+            a.verdict.cmp(&b.verdict).then_with(unexplained)
+        })
     }
 
     pub fn mode_count(&self) -> usize {
@@ -215,7 +235,10 @@ fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Settings) -> Resul
             )
         })
         .collect();
-    let (verdict, why) = quality::of_set(&qualities.iter().collect::<Vec<_>>());
+    let (of_frfs, why) = quality::of_set(&qualities.iter().collect::<Vec<_>>());
+    let verdict = of_frfs.max(global.quality.verdict);
+    let why = [why].into_iter().chain(global.quality.reasons.iter().cloned());
+    let why = why.collect::<Vec<_>>().join("; ");
     // A record's window is the same for all its FRFs.
     let added = inputs.iter().map(|i| i.added_decay_per_s).fold(0.0, f64::max);
     let mut lost = Vec::new();
@@ -330,6 +353,36 @@ fn set_warnings(set: &SetModes) -> Vec<String> {
         lines.push(format!("{}: {}: {}", set.set, set.why, worst.join("; ")));
     }
     lines
+}
+
+/// Makes one set of all FRFs. The files say where they were measured only if every FRF has a place of its own; else they
+/// are told apart by their files.
+fn join(inputs: &mut [FrfInput], warnings: &mut Vec<String>) {
+    let mut names: Vec<&str> = inputs.iter().map(|i| i.name.as_str()).collect();
+    names.sort_unstable();
+    let named_twice = names.windows(2).any(|w| w[0] == w[1]);
+    let mut places: Vec<&[String; 2]> = inputs.iter().filter_map(|i| i.dofs.as_ref()).collect();
+    let known = places.len();
+    places.sort_unstable();
+    let placed_twice = places.windows(2).any(|w| w[0] == w[1]);
+    if placed_twice {
+        warnings.push(
+            "the files give several FRFs the same response and reference: each is taken as a point of its own".into(),
+        );
+    }
+    let placed = known == inputs.len() && !placed_twice;
+    for input in inputs {
+        if named_twice {
+            let file = Path::new(&input.set)
+                .file_name()
+                .map_or("".into(), |n| n.to_string_lossy());
+            input.name = format!("{file} {}", input.name);
+        }
+        if !placed {
+            input.dofs = None;
+        }
+        input.set = TOGETHER.to_owned();
+    }
 }
 
 /// FRFs of one file: as they stand there, or from the hits of a raw record.

@@ -22,6 +22,9 @@ pub struct Args {
     /// Look at this band only, Hz.
     #[arg(long, value_name = "LO:HI", value_parser = band)]
     band: Option<[f64; 2]>,
+    /// The files are one set: FRFs of the same structure, exported one by one.
+    #[arg(long)]
+    together: bool,
     /// Print the modes of every single FRF, however many there are.
     #[arg(long)]
     each: bool,
@@ -79,6 +82,13 @@ pub fn run(args: Args) -> Result<Outcome> {
         block_s: args.block_s,
     };
     let campaign = args.paths.iter().any(|p| p.is_dir());
+    if campaign && args.together {
+        return Err(
+            InputError::new("--together is for files: a campaign's postures are sets of their own")
+                .remedy("leave it out, or give the FRF files")
+                .into(),
+        );
+    }
     let (analysis, next) = match args.paths.as_slice() {
         [dir] if campaign => {
             let campaign = Campaign::load(dir)?;
@@ -94,7 +104,7 @@ pub fn run(args: Args) -> Result<Outcome> {
             );
         }
         files => {
-            let analysis = ModalAnalysis::of_files(files, &settings, &taps)?;
+            let analysis = ModalAnalysis::of_files(files, args.together, &settings, &taps)?;
             let paths: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
             let next = next_step::modes_of_files(&paths, analysis.mode_count());
             (analysis, next)
@@ -112,6 +122,7 @@ fn document(analysis: &ModalAnalysis, campaign: bool) -> serde_json::Value {
     let set_key = if campaign { "posture" } else { "file" };
     let mut frfs = Vec::new();
     let mut global = Vec::new();
+    let mut rejected = Vec::new();
     let mut sets = Vec::new();
     for set in &analysis.sets {
         for frf in &set.frfs {
@@ -148,10 +159,16 @@ fn document(analysis: &ModalAnalysis, campaign: bool) -> serde_json::Value {
                 .collect();
             global.push(value);
         }
+        for pole in &set.global.rejected {
+            let mut value = json!(pole);
+            value[set_key] = json!(set.set);
+            rejected.push(value);
+        }
         sets.push(json!({
             set_key: set.set,
             "verdict": set.verdict,
             "why": set.why,
+            "quality": set.global.quality,
             "mac": set.global.mac,
             "stabilisation": set.global.stabilisation,
         }));
@@ -181,6 +198,8 @@ fn document(analysis: &ModalAnalysis, campaign: bool) -> serde_json::Value {
     json!({
         "frfs": frfs,
         "global": global,
+        "rejected": rejected,
+        "quality": analysis.quality(),
         "sets": sets,
         "tracked": tracked,
         "hits": hits,

@@ -7,8 +7,9 @@ use num_complex::Complex64;
 use super::global::{SET, SetMember};
 use super::joint_fit::{self, Change, Data, Group};
 use super::local_fit::Pole;
+use super::quality::{self, Power};
 use super::stabilisation::{Candidate, Stabilisation};
-use super::{GlobalMode, GlobalModes, Reconstruction, ml_fit, shape};
+use super::{GlobalMode, GlobalModes, Reconstruction, RejectedMode, ml_fit, shape};
 
 /// In a set a mode seen by one FRF alone must stand out this far (squared size over uncertainty).
 const FAR: f64 = 100.0;
@@ -22,11 +23,13 @@ const UNCERTAIN: f64 = 0.02;
 /// Two fits of the same lines disagree from this many standard deviations on.
 const APART: f64 = 2.0;
 
+/// `random`: by FRF and line, σ of its random noise.
 pub(super) fn collect(
     groups: &[Group],
     data: &[Data],
     members: &[&SetMember],
     of_member: &[usize],
+    random: &[Vec<f64>],
     result: &mut GlobalModes,
 ) {
     let count = result.reconstructions.len();
@@ -141,8 +144,26 @@ pub(super) fn collect(
         .map(|a| residues.iter().map(|b| shape::mac(a, b)).collect())
         .collect();
     let where_modes_are = around(&result.modes);
+    let mut power = Power::default();
     for (m, d) in data.iter().enumerate() {
-        result.reconstructions[of_member[m]] = Some(reconstruction(d, groups, m, where_modes_are));
+        let found = reconstruction(d, groups, m, where_modes_are);
+        let from = found.frequency_hz.partition_point(|&f| f < where_modes_are[0]);
+        let to = found.frequency_hz.partition_point(|&f| f <= where_modes_are[1]);
+        power.add((from..to).map(|k| {
+            let (measured, fitted) = (found.measured_m_per_n[k], found.fitted_m_per_n[k]);
+            let line = d.frequency_hz.partition_point(|&f| f < found.frequency_hz[k]);
+            (
+                found.frequency_hz[k],
+                measured,
+                measured - fitted,
+                random[m][line],
+            )
+        }));
+        result.reconstructions[of_member[m]] = Some(found);
+    }
+    if !result.modes.is_empty() {
+        let converged = groups.iter().all(|g| g.solution.converged);
+        result.quality = quality::judge_set(power, None, converged);
     }
 }
 
@@ -320,6 +341,20 @@ pub(super) fn explain(diagram: &mut Stabilisation, modes: &[GlobalMode], changes
     diagram
         .candidates
         .sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+}
+
+/// The candidates that did not become modes.
+pub(super) fn rejected(diagram: &Stabilisation) -> Vec<RejectedMode> {
+    diagram
+        .candidates
+        .iter()
+        .filter(|c| !c.chosen)
+        .map(|c| RejectedMode {
+            frequency_hz: c.frequency_hz,
+            damping_ratio: c.damping_ratio,
+            reason: c.why.clone(),
+        })
+        .collect()
 }
 
 /// Three digits, without zeros at the end.

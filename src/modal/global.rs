@@ -80,15 +80,18 @@ pub fn global(frfs: &[SetMember], settings: &Settings) -> Result<GlobalModes> {
     start.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
     let mut changes = Vec::new();
     let mut data = data;
+    let random: Vec<Vec<f64>> = data.iter().map(|d| d.sigma.clone()).collect();
     let Some(groups) = solve(&mut data, &start, &mut changes) else {
         result
             .warnings
             .push("the FRFs together do not determine common poles: no global modes".into());
+        result.rejected = findings::rejected(&diagram);
         result.stabilisation = diagram;
         return Ok(result);
     };
-    findings::collect(&groups, &data, &members, &of_member, &mut result);
+    findings::collect(&groups, &data, &members, &of_member, &random, &mut result);
     findings::explain(&mut diagram, &result.modes, &changes);
+    result.rejected = findings::rejected(&diagram);
     result.stabilisation = diagram;
     findings::coarse_lines(&data, &mut result);
     Ok(result)

@@ -158,11 +158,24 @@ pub struct Reconstruction {
     pub fitted_m_per_n: Vec<Complex64>,
 }
 
+/// A pole that was looked at and is not given as a mode.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RejectedMode {
+    pub frequency_hz: f64,
+    pub damping_ratio: f64,
+    /// In plain words.
+    pub reason: String,
+}
+
 /// All modes of a set of FRFs.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct GlobalModes {
     /// Ascending in frequency.
     pub modes: Vec<GlobalMode>,
+    /// What resembled a mode and is none, or none that these FRFs prove; ascending in frequency.
+    pub rejected: Vec<RejectedMode>,
+    /// What the modes are worth.
+    pub quality: quality::SetQuality,
     /// MAC of every two modes, from their residues in all FRFs.
     pub mac: Vec<Vec<f64>>,
     pub stabilisation: stabilisation::Stabilisation,

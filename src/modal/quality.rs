@@ -22,6 +22,41 @@ pub enum Verdict {
     Bad,
 }
 
+/// What speaks for and against the modes of a set.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SetQuality {
+    pub verdict: Verdict,
+    /// Share 0..1 of what was measured (Σ|ωH|² over the FRFs, in the band of the modes) that is neither a common mode nor
+    /// random noise.
+    pub unexplained_share: f64,
+    /// The part of it that goes on from line to line: systematic, not scatter.
+    pub coloured_share: f64,
+    /// Share of random noise.
+    pub noise_share: f64,
+    /// How far a mode's frequency moves from FRF to FRF beyond its uncertainty there, relative standard deviation, median
+    /// over the modes that can tell; `None` where none can.
+    pub frequency_scatter: Option<f64>,
+    /// All fits converged.
+    pub converged: bool,
+    /// What is wrong, in words; empty for a good one.
+    pub reasons: Vec<String>,
+}
+
+impl Default for SetQuality {
+    /// Of a set without modes: nothing is explained.
+    fn default() -> Self {
+        SetQuality {
+            verdict: Verdict::Bad,
+            unexplained_share: 1.0,
+            coloured_share: 0.0,
+            noise_share: 0.0,
+            frequency_scatter: None,
+            converged: false,
+            reasons: vec!["no modes were found".into()],
+        }
+    }
+}
+
 /// What speaks for and against an FRF.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Quality {
@@ -124,6 +159,80 @@ fn weighted(coherence: &[f64], f: &[f64], h: &[Complex64], fit: Option<&Reconstr
         }
     }
     (total > 0.0).then(|| sum / total)
+}
+
+/// Power of what was measured in a set and of what its modes leave of it, as mobility, any unit.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Power {
+    pub measured: f64,
+    pub left: f64,
+    /// Expected of the random noise.
+    pub noise: f64,
+    /// Covariance of what is left on neighbouring lines: random noise has none, what a model lacks goes on.
+    pub coloured: f64,
+}
+
+impl Power {
+    /// Adds lines in ascending order: frequency, measured, left over (both any motion per force), σ of the random noise.
+    pub fn add(&mut self, lines: impl Iterator<Item = (f64, Complex64, Complex64, f64)>) {
+        let mut before: Option<Complex64> = None;
+        for (f, measured, left, sigma) in lines {
+            self.measured += f * f * measured.norm_sqr();
+            self.left += f * f * left.norm_sqr();
+            self.noise += (f * sigma).powi(2);
+            let left = left * f;
+            if let Some(before) = before {
+                self.coloured += (before.conj() * left).re;
+            }
+            before = Some(left);
+        }
+    }
+}
+
+/// Judges the modes of a set.
+pub(super) fn judge_set(power: Power, frequency_scatter: Option<f64>, converged: bool) -> SetQuality {
+    let share = |part: f64| {
+        let share = part / power.measured;
+        if share.is_finite() {
+            share.clamp(0.0, 1.0)
+        } else {
+            0.0
+        }
+    };
+    let noise_share = share(power.noise.min(power.left));
+    let unexplained_share = share(power.left - power.noise);
+    let mut quality = SetQuality {
+        verdict: Verdict::Good,
+        unexplained_share,
+        coloured_share: share(power.coloured).min(share(power.left)),
+        noise_share,
+        frequency_scatter,
+        converged,
+        reasons: Vec::new(),
+    };
+    let mut note = |verdict: Verdict, why: String| {
+        quality.verdict = quality.verdict.max(verdict);
+        quality.reasons.push(why);
+    };
+    let rest = unexplained_share.sqrt();
+    if rest > UNEXPLAINED[0] {
+        let verdict = if rest > UNEXPLAINED[1] {
+            Verdict::Bad
+        } else {
+            Verdict::Doubtful
+        };
+        note(
+            verdict,
+            format!(
+                "{:.1} % of what was measured is no common mode and no noise",
+                100.0 * unexplained_share
+            ),
+        );
+    }
+    if !converged {
+        note(Verdict::Doubtful, "a common fit did not converge".into());
+    }
+    quality
 }
 
 /// One sentence about a set.

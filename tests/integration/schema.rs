@@ -140,7 +140,14 @@ fn modal_of_a_campaign_and_of_files() {
     });
     holds(&document(&["modal", path(&blind("frf-9112"))]), pattern.clone());
     let files = ["p1", "p2"].map(|p| blind(&format!("frf-9112/frf/{p}.uff")));
-    holds(&document(&["modal", path(&files[0]), path(&files[1])]), pattern);
+    let mut pattern = pattern;
+    pattern["rejected"] = json!("list");
+    pattern["quality"] = json!({ "verdict": "string", "unexplained_share": "number", "coloured_share": "number" });
+    holds(&document(&["modal", path(&files[0]), path(&files[1])]), pattern.clone());
+    // One set of all files, whatever postures they come from.
+    let together = document(&["modal", "--together", path(&files[0]), path(&files[1])]);
+    holds(&together, pattern);
+    assert_eq!(together["sets"].as_array().unwrap().len(), 1);
 }
 
 fn posture_pattern() -> Value {

@@ -21,6 +21,7 @@ mod init;
 mod inspect;
 mod lobe_tool;
 mod lobes;
+mod localise;
 mod modal;
 mod model;
 mod next_step;
@@ -93,6 +94,8 @@ pub enum Command {
     Compare(SideArgs),
     /// Which physical effect the model lacks.
     Diagnose(SideArgs),
+    /// Where the missing part sits and what it does, drawn from the data alone.
+    Localise(localise::Args),
     /// What an effect is, how it shows, how to check it in the lab.
     Explain(explain::Args),
     /// Add an effect to the model, refit everything, record a revision.
@@ -184,6 +187,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Model(args) => model::run(args),
         Command::Calibrate(args) => calibrate::run(args),
         Command::Compare(args) => compare::run(args),
+        Command::Localise(args) => localise::run(args),
         Command::Diagnose(args) => diagnose::run(args),
         Command::Explain(args) => explain::run(args),
         Command::Add(args) => add::run(args),

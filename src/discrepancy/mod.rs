@@ -5,6 +5,7 @@ pub mod compare_cutting;
 pub mod diagnose;
 pub mod explained;
 pub mod extension;
+pub mod localise;
 pub mod next_measurement;
 pub mod place;
 pub mod verdict;

@@ -15,6 +15,7 @@ pub mod background;
 mod base_compliance;
 mod branch;
 pub mod cutting;
+pub mod drawn;
 mod joint_damping;
 mod joint_transverse_compliance;
 mod link_flexibility;
@@ -23,11 +24,13 @@ mod local_resonator;
 mod payload;
 mod request;
 mod sensor_misalignment;
+pub mod spot;
 mod time_delay;
 mod tool_flexibility;
 
 pub use background::Background;
 pub use request::requested;
+pub use spot::Spot;
 
 /// Where an effect sits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -38,6 +41,8 @@ pub enum Site {
     Joint(usize),
     /// 1-based link.
     Link(usize),
+    /// A place where the data drew something.
+    At(Spot),
 }
 
 impl Site {
@@ -47,6 +52,7 @@ impl Site {
             Site::Everywhere => None,
             Site::Joint(i) => Some(format!("joint-{i}")),
             Site::Link(i) => Some(format!("link-{i}")),
+            Site::At(spot) => Some(spot.label()),
         }
     }
 }
@@ -126,6 +132,28 @@ pub trait StructuralEffect: Sync {
     /// Further starting points, natural values in the order of the parameters. `peaks_hz`: where the residual peaks.
     fn starts(&self, robot: &RobotSpec, data: &DataSummary, peaks_hz: &[f64]) -> Vec<Vec<f64>>;
 
+    /// As [`Self::parameters`], where they depend on the site or the discrete choice.
+    fn parameters_at(
+        &self,
+        _site: Site,
+        _variant: usize,
+        robot: &RobotSpec,
+        data: &DataSummary,
+    ) -> Vec<Parameter> {
+        self.parameters(robot, data)
+    }
+
+    /// As [`Self::starts`], where they depend on the site or the discrete choice.
+    fn starts_at(
+        &self,
+        _at: (Site, usize),
+        robot: &RobotSpec,
+        data: &DataSummary,
+        peaks_hz: &[f64],
+    ) -> Vec<Vec<f64>> {
+        self.starts(robot, data, peaks_hz)
+    }
+
     /// Effects with lower order are applied first (a payload weighs on the joints before their load is counted).
     fn order(&self) -> u8 {
         1
@@ -152,6 +180,9 @@ pub const STRUCTURAL: [&dyn StructuralEffect; 11] = [
     &sensor_misalignment::SensorMisalignment,
     &amplitude_dependent_stiffness::AmplitudeDependentStiffness,
 ];
+
+/// Effects whose form the data drew: added on request, not tried by `diagnose`.
+pub const DRAWN: [&dyn StructuralEffect; 2] = [&drawn::Branch, &drawn::Series];
 
 /// An effect at a site: what is added to a model.
 #[derive(Clone, Copy)]
@@ -212,6 +243,7 @@ pub fn instances(robot: &RobotSpec) -> Vec<Instance> {
 pub fn find(robot: &RobotSpec, name: &str) -> Vec<Instance> {
     instances(robot)
         .into_iter()
+        .chain(drawn::instances(robot))
         .filter(|i| i.label() == name)
         .collect()
 }

@@ -1,6 +1,6 @@
 //! What a user means by `EFFECT[@SITE]`.
 
-use super::{DataSummary, Instance, STRUCTURAL, Site, StructuralEffect, find};
+use super::{DRAWN, DataSummary, Instance, STRUCTURAL, Site, StructuralEffect, find};
 use crate::campaign::robot_spec::RobotSpec;
 use crate::campaign::suggest::{closest, shown};
 use crate::{InputError, Result};
@@ -16,7 +16,7 @@ pub fn requested(robot: &RobotSpec, data: &DataSummary, name: &str) -> Result<Ve
         Some((id, site)) => (id, Some(site)),
         None => (name, None),
     };
-    let Some(effect) = STRUCTURAL.into_iter().find(|e| e.id() == id) else {
+    let Some(effect) = STRUCTURAL.into_iter().chain(DRAWN).find(|e| e.id() == id) else {
         let ids = STRUCTURAL.map(|e| e.id());
         let near = closest(id, ids).map_or(String::new(), |near| format!("did you mean {near}? "));
         let remedy = format!("{near}there are: {}", ids.join(", "));

@@ -125,7 +125,11 @@ impl StructureModel {
     pub fn with_effect(&self, instance: Instance, data: &DataSummary) -> Self {
         let mut model = self.clone();
         let first = model.parameters.len();
-        for mut parameter in instance.effect.parameters(&self.robot.spec, data) {
+        for mut parameter in
+            instance
+                .effect
+                .parameters_at(instance.site, instance.variant, &self.robot.spec, data)
+        {
             parameter.name = format!("{}.{}", instance.label(), parameter.name);
             if let Some(start) = &mut model.start {
                 start.push(parameter.internal(parameter.nominal));
@@ -246,7 +250,7 @@ impl StructureModel {
             .collect()
     }
 
-    fn filter(&self, theta: &[f64], with_derivatives: bool) -> ChannelFilter {
+    pub(super) fn filter(&self, theta: &[f64], with_derivatives: bool) -> ChannelFilter {
         let mut filter = ChannelFilter::faithful();
         for added in &self.effects {
             let values = self.values(theta, added, with_derivatives);
@@ -255,7 +259,7 @@ impl StructureModel {
         filter
     }
 
-    fn basis(&self, theta: &[f64], block: &FrfBlock, with_derivatives: bool) -> Result<FrfBasis> {
+    pub(super) fn basis(&self, theta: &[f64], block: &FrfBlock, with_derivatives: bool) -> Result<FrfBasis> {
         let chain = self.chain(theta, &block.kinematics, block.lowness, with_derivatives);
         let rows: Vec<DVector<f64>> = block
             .outputs
@@ -296,7 +300,7 @@ impl StructureModel {
 }
 
 /// The channel filter arranged for evaluation: per measured axis the true axes that it is made of.
-struct Channels {
+pub(super) struct Channels {
     terms: [Vec<(usize, Dual)>; 3],
     delay_s: Dual,
     /// The channels show what is there: nothing to be mixed or delayed.
@@ -304,7 +308,7 @@ struct Channels {
 }
 
 impl Channels {
-    fn new(filter: &ChannelFilter) -> Self {
+    pub(super) fn new(filter: &ChannelFilter) -> Self {
         let matters = |d: &Dual| d.value != 0.0 || d.gradient.iter().any(|g| *g != 0.0);
         let terms: [Vec<(usize, Dual)>; 3] = [0, 1, 2].map(|i| {
             let row = filter.mixing[i].iter().enumerate();
@@ -328,22 +332,32 @@ impl Channels {
     }
 
     /// What the file shows at `omega`, m/N.
-    fn measured(&self, omega: f64, frf: &FrfDatum, basis: &FrfBasis, response: &Response) -> Complex64 {
+    pub(super) fn measured(
+        &self,
+        omega: f64,
+        frf: &FrfDatum,
+        basis: &FrfBasis,
+        response: &Response,
+    ) -> Complex64 {
+        self.mixed(omega, frf, |out| basis.receptance(response, out, frf.input))
+    }
+
+    /// What the response channel of `frf` shows of a motion, given for each output.
+    pub(super) fn mixed(&self, omega: f64, frf: &FrfDatum, motion: impl Fn(usize) -> Complex64) -> Complex64 {
         if self.faithful {
-            let out = frf.response_outputs[frf.response.axis.index()];
-            return basis.receptance(response, out, frf.input) * frf.sign;
+            return motion(frf.response_outputs[frf.response.axis.index()]) * frf.sign;
         }
         let terms = &self.terms[frf.response.axis.index()];
         let sum: Complex64 = terms
             .iter()
-            .map(|(j, weight)| basis.receptance(response, frf.response_outputs[*j], frf.input) * weight.value)
+            .map(|(j, weight)| motion(frf.response_outputs[*j]) * weight.value)
             .sum();
         self.factor(omega, frf) * sum
     }
 
     /// Derivatives of [`Self::measured`] (given as `measured`) into `slope`, one a parameter. `slopes`: those of the true
     /// receptances for this FRF's input, parameters × outputs.
-    fn slopes(
+    pub(super) fn slopes(
         &self,
         omega: f64,
         frf: &FrfDatum,
@@ -583,7 +597,7 @@ impl LeastSquares for FrfProblem<'_> {
 mod tests {
     use super::*;
     use crate::campaign::{AxesRef, BodyRef, MeasuredDof};
-    use crate::effects;
+    use crate::effects::{self, Spot};
     use crate::ingest::Axis;
     use crate::robot::fixture::{TAP_POSTURES, irb6640};
 
@@ -657,7 +671,19 @@ mod tests {
         let data = data(&bare);
         let summary = data.summary();
         let resonator = effects::find(&bare.robot.spec, "local-resonator@link-3");
-        for instance in effects::instances(&bare.robot.spec) {
+        let drawn = [
+            Spot::LinkAxis(5, 2),
+            Spot::ToolGround(0),
+            Spot::Joint(2),
+            Spot::Base(3),
+            Spot::Bearing(3, 1),
+            Spot::Drive(2),
+        ];
+        let drawn = drawn.into_iter().flat_map(|spot| {
+            let forms = effects::drawn::forms(spot).iter();
+            forms.map(move |form| effects::drawn::instance(spot, *form))
+        });
+        for instance in effects::instances(&bare.robot.spec).into_iter().chain(drawn) {
             for also in [None, resonator.first()] {
                 let mut model = bare.with_effect(instance, &summary);
                 if let Some(also) = also {

@@ -121,7 +121,12 @@ impl Study for StructureStudy {
     }
 
     fn starts(&self, instance: &Instance, peaks_hz: &Vec<f64>) -> Vec<Vec<f64>> {
-        instance.effect.starts(&self.robot, &self.summary, peaks_hz)
+        instance.effect.starts_at(
+            (instance.site, instance.variant),
+            &self.robot,
+            &self.summary,
+            peaks_hz,
+        )
     }
 
     fn problem<'a>(&'a self, model: &'a StructureModel, view: View) -> FrfProblem<'a> {

@@ -92,12 +92,46 @@ pub struct Branch {
     pub carries_tool_point: bool,
 }
 
+/// What an [`Attachment`] acts on: a displacement that is a linear combination of element coordinates, of the
+/// displacement of a point along a direction, or of both.
+#[derive(Debug, Clone, Default)]
+pub struct Grip {
+    /// Index into the chain's elements (its first coordinate is meant) and factor.
+    pub coordinates: Vec<(usize, f64)>,
+    /// A point that moves with the chain at a place, and a unit vector, base axes.
+    pub point: Option<(Point3<f64>, Place, Vector3<f64>)>,
+}
+
+/// Spring, damper, inertia or hysteretic spring on one displacement of the chain. At a point it acts against the ground.
+#[derive(Debug, Clone)]
+pub struct Attachment {
+    pub grip: Grip,
+    pub law: AttachmentLaw,
+    /// N/m, N·s/m, kg or N/m; for an angle N·m/rad, N·m·s/rad, kg·m² or N·m/rad.
+    pub size: Dual,
+}
+
+/// What an [`Attachment`] answers a displacement q with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AttachmentLaw {
+    /// k·q
+    Spring,
+    /// iω c q
+    Damper,
+    /// −ω² m q
+    Inertia,
+    /// i h q at every frequency: a loss factor h/k beside a spring k. Known to frequency responses only; what works on
+    /// real matrices leaves it out.
+    Hysteresis,
+}
+
 /// Everything that makes up the structure at one posture.
 #[derive(Debug, Clone)]
 pub struct Chain {
     pub elements: Vec<Element>,
     pub bodies: Vec<Body>,
     pub branches: Vec<Branch>,
+    pub attachments: Vec<Attachment>,
     /// One damping ratio for all modes of the chain (its branches' masses held fast to it); zero where the elements carry dampers.
     pub modal_damping_ratio: Dual,
 }
@@ -112,6 +146,8 @@ pub struct System {
     /// Mass of the chain with the branches' masses held fast to it, `chain_count` square: what modal damping is defined on.
     pub chain_mass: DMatrix<f64>,
     pub viscous: Option<DMatrix<f64>>,
+    /// Hysteretic stiffness H: the dynamic stiffness has iH at every frequency.
+    pub hysteretic: Option<DMatrix<f64>>,
     pub modal_damping_ratio: Dual,
     /// One entry a parameter.
     pub derivatives: Vec<SystemDerivative>,
@@ -124,6 +160,7 @@ pub struct SystemDerivative {
     pub mass: Option<DMatrix<f64>>,
     pub chain_mass: Option<DMatrix<f64>>,
     pub viscous: Option<DMatrix<f64>>,
+    pub hysteretic: Option<DMatrix<f64>>,
 }
 
 fn add_scaled(
@@ -201,6 +238,19 @@ impl Chain {
         row
     }
 
+    /// Displacement per coordinate of what a grip holds.
+    pub fn grip_row(&self, grip: &Grip) -> DVector<f64> {
+        let mut row = match &grip.point {
+            Some((point, place, direction)) => self.output_row(*point, *place, false, direction),
+            None => DVector::zeros(self.coordinate_count()),
+        };
+        for (element, factor) in &grip.coordinates {
+            let before = self.elements.iter().take(*element);
+            row[before.map(|e| e.directions.len()).sum::<usize>()] += factor;
+        }
+        row
+    }
+
     /// Mass, stiffness and damping matrices and their derivatives with respect to `parameter_count` parameters.
     pub fn system(&self, parameter_count: usize) -> System {
         let chain_count = self.chain_count();
@@ -209,6 +259,7 @@ impl Chain {
         let mut mass = None;
         let mut chain_mass = None;
         let mut viscous = None;
+        let mut hysteretic = None;
         let mut derivatives = vec![SystemDerivative::default(); parameter_count];
 
         let mut corner = 0;
@@ -291,12 +342,42 @@ impl Chain {
             column += count;
         }
 
+        for attachment in &self.attachments {
+            let row = self.grip_row(&attachment.grip);
+            let block: DMatrix<f64> = &row * row.transpose();
+            let size = &attachment.size;
+            match attachment.law {
+                AttachmentLaw::Spring => add_scaled(&mut stiffness, n, 0, &block, size.value),
+                AttachmentLaw::Damper => add_scaled(&mut viscous, n, 0, &block, size.value),
+                AttachmentLaw::Hysteresis => add_scaled(&mut hysteretic, n, 0, &block, size.value),
+                AttachmentLaw::Inertia => {
+                    let held: DMatrix<f64> = block.view((0, 0), (chain_count, chain_count)).into_owned();
+                    add_scaled(&mut mass, n, 0, &block, size.value);
+                    add_scaled(&mut chain_mass, chain_count, 0, &held, size.value);
+                }
+            }
+            for (p, derivative) in derivatives.iter_mut().enumerate() {
+                let slope = size.derivative(p);
+                match attachment.law {
+                    AttachmentLaw::Spring => add_scaled(&mut derivative.stiffness, n, 0, &block, slope),
+                    AttachmentLaw::Damper => add_scaled(&mut derivative.viscous, n, 0, &block, slope),
+                    AttachmentLaw::Hysteresis => add_scaled(&mut derivative.hysteretic, n, 0, &block, slope),
+                    AttachmentLaw::Inertia => {
+                        let held: DMatrix<f64> = block.view((0, 0), (chain_count, chain_count)).into_owned();
+                        add_scaled(&mut derivative.mass, n, 0, &block, slope);
+                        add_scaled(&mut derivative.chain_mass, chain_count, 0, &held, slope);
+                    }
+                }
+            }
+        }
+
         System {
             chain_count,
             stiffness: stiffness.unwrap_or_else(|| DMatrix::zeros(n, n)),
             mass: mass.unwrap_or_else(|| DMatrix::zeros(n, n)),
             chain_mass: chain_mass.unwrap_or_else(|| DMatrix::zeros(chain_count, chain_count)),
             viscous,
+            hysteretic,
             modal_damping_ratio: self.modal_damping_ratio.clone(),
             derivatives,
         }

@@ -23,7 +23,7 @@ pub struct ModalBasis {
 }
 
 /// Below this share of the largest μ a mode is a massless combination of coordinates, not a vibration.
-const MASSLESS: f64 = 1e-13;
+const MASSLESS: f64 = 1.0e-13;
 
 impl ModalBasis {
     /// `stiffness` must be positive definite, `mass` positive semidefinite, both symmetric and of one size.
@@ -100,10 +100,11 @@ pub struct FrfBasis {
 enum Dynamics {
     /// Uncoupled modes: μ and damping coefficient 2ζ√μ.
     Diagonal { mu: Vec<f64>, damping: Vec<f64> },
-    /// Coupled: mass and damping in the basis (stiffness is the identity).
+    /// Coupled: mass and damping in the basis; the stiffness is the identity, beside it i times what is hysteretic.
     Full {
         mass: DMatrix<f64>,
         damping: DMatrix<f64>,
+        hysteretic: DMatrix<f64>,
     },
 }
 
@@ -116,6 +117,8 @@ struct Derivatives {
     /// Empty where no parameter changes the mass.
     mass: Vec<f64>,
     damping: Vec<f64>,
+    /// Empty where no parameter changes what is hysteretic.
+    hysteretic: Vec<f64>,
     massless: Option<MasslessDerivatives>,
 }
 
@@ -176,7 +179,8 @@ impl FrfBasis {
         // Modes come with the lowest frequency first, so the massless ones stand last. Dampers in the elements damp
         // them and branches load them with mass: then they stay.
         let branches = n - chain;
-        let moving = if branches > 0 || system.viscous.is_some() {
+        let coupled = branches > 0 || system.viscous.is_some() || system.hysteretic.is_some();
+        let moving = if coupled {
             chain
         } else {
             modes.inverse_omega2.iter().filter(|mu| **mu > 0.0).count()
@@ -211,7 +215,7 @@ impl FrfBasis {
             .iter()
             .map(|mu| mu.sqrt())
             .collect();
-        let dynamics = if branches == 0 && system.viscous.is_none() {
+        let dynamics = if !coupled {
             Dynamics::Diagonal {
                 mu: modes.inverse_omega2[..moving].to_vec(),
                 damping: root.iter().map(|s| 2.0 * zeta * s).collect(),
@@ -225,7 +229,15 @@ impl FrfBasis {
             for (i, s) in root.iter().enumerate() {
                 damping[(i, i)] += 2.0 * zeta * s;
             }
-            Dynamics::Full { mass, damping }
+            let hysteretic = match &system.hysteretic {
+                Some(hysteretic) => basis.transpose() * hysteretic * &basis,
+                None => DMatrix::zeros(n, n),
+            };
+            Dynamics::Full {
+                mass,
+                damping,
+                hysteretic,
+            }
         };
 
         let project = |matrix: &Option<DMatrix<f64>>| match matrix {
@@ -235,8 +247,10 @@ impl FrfBasis {
         let count = system.derivatives.len();
         let outputs = outputs.len();
         let changes_mass = system.derivatives.iter().any(|d| d.mass.is_some());
+        let changes_hysteresis = system.derivatives.iter().any(|d| d.hysteretic.is_some());
         let mut derivatives = Derivatives {
             count,
+            hysteretic: vec![0.0; if changes_hysteresis { n * n * count } else { 0 }],
             stiffness: vec![0.0; n * n * count],
             mass: vec![0.0; if changes_mass { n * n * count } else { 0 }],
             damping: vec![0.0; n * n * count],
@@ -250,6 +264,7 @@ impl FrfBasis {
             let stiffness = project(&derivative.stiffness);
             let mass = project(&derivative.mass);
             let mut damping = project(&derivative.viscous);
+            let hysteretic = changes_hysteresis.then(|| project(&derivative.hysteretic));
             let zeta_slope = system.modal_damping_ratio.derivative(p);
             let chain_mass = derivative
                 .chain_mass
@@ -270,6 +285,9 @@ impl FrfBasis {
                 let at = n * (p + count * j)..n * (p + count * j) + n;
                 derivatives.stiffness[at.clone()].copy_from_slice(stiffness.column(j).as_slice());
                 derivatives.damping[at.clone()].copy_from_slice(damping.column(j).as_slice());
+                if let Some(hysteretic) = &hysteretic {
+                    derivatives.hysteretic[at.clone()].copy_from_slice(hysteretic.column(j).as_slice());
+                }
                 if changes_mass {
                     derivatives.mass[at].copy_from_slice(mass.column(j).as_slice());
                 }
@@ -315,12 +333,18 @@ impl FrfBasis {
                     }
                 }
             }
-            Dynamics::Full { mass, damping } => {
+            Dynamics::Full {
+                mass,
+                damping,
+                hysteretic,
+            } => {
                 let stiffness = |i: usize| if i / n == i % n { 1.0 } else { 0.0 };
-                let entries = mass.iter().zip(damping.iter()).enumerate();
+                let entries = mass.iter().zip(damping).zip(hysteretic).enumerate();
                 response.dynamic.clear();
                 response.dynamic.extend(
-                    entries.map(|(i, (m, c))| Complex64::new(stiffness(i) - omega * omega * m, omega * c)),
+                    entries.map(|(i, ((m, c), h))| {
+                        Complex64::new(stiffness(i) - omega * omega * m, omega * c + h)
+                    }),
                 );
                 response
                     .columns
@@ -355,6 +379,7 @@ impl FrfBasis {
             stiffness,
             mass,
             damping,
+            hysteretic,
             massless,
             ..
         } = &self.derivatives;
@@ -372,6 +397,9 @@ impl FrfBasis {
             .extend(stiff_and_damped.map(|(k, c)| Complex64::new(*k, omega * c)));
         for (z, m) in slopes.dynamic.iter_mut().zip(mass) {
             z.re -= omega * omega * m;
+        }
+        for (z, h) in slopes.dynamic.iter_mut().zip(hysteretic) {
+            z.im += h;
         }
         let forces = MatRef::from_column_major_slice(&slopes.forces, n, inputs);
         let one = Complex64::new(1.0, 0.0);

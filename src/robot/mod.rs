@@ -19,7 +19,7 @@ pub mod posture_report;
 pub mod static_deflection;
 
 pub use crate::campaign::robot_spec::*;
-pub use chain::{Body, Branch, Chain, Element, Place, Role, Slot, System};
+pub use chain::{Attachment, AttachmentLaw, Body, Branch, Chain, Element, Grip, Place, Role, Slot, System};
 pub use dh::Kinematics;
 pub use dual::Dual;
 pub use frf::{FrfBasis, ModalBasis};

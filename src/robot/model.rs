@@ -126,6 +126,7 @@ impl RobotModel {
             elements,
             bodies,
             branches: Vec::new(),
+            attachments: Vec::new(),
             modal_damping_ratio: baseline.damping_ratio.clone(),
         }
     }

@@ -1,0 +1,384 @@
+//! Lets the data draw the missing part: where in the structure one unknown law of force over displacement, the same at
+//! all postures, explains what the model leaves over, what that law is over frequency, and which simple form fits it.
+//!
+//! Every place is screened by projection ([`screen`]): its unknown is taken out of residual and sensitivities line by
+//! line, and what is left says how good the place is. The best places are then refitted with each simple form as part of
+//! the model itself, the model's own parameters with them, and judged by BIC; the leaders have to predict postures that
+//! were left out.
+
+pub mod screen;
+#[cfg(test)]
+mod tests;
+
+use rayon::prelude::*;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use crate::Result;
+use crate::effects::drawn::{self, Form};
+use crate::effects::{Instance, Spot};
+use crate::identify::calibrate::{Calibration, Estimate, estimates};
+use crate::identify::levenberg_marquardt::{Stopping, minimise};
+use crate::identify::spot_response::SpotResponses;
+use crate::identify::study::{Effort, Extent, HeldOut, Study, Tried, View, held_out};
+use crate::identify::{StructureModel, StructureStudy};
+use screen::{CurvePoint, Screened};
+
+use super::verdict::is_convincing;
+
+/// One form tried at a place.
+#[derive(Debug, Clone)]
+pub struct FormFit {
+    pub form: Form,
+    /// BIC less that of the model without it (coarse view of the data): below zero it pays for its parameters.
+    pub delta_bic: f64,
+}
+
+/// One place, best form first in `forms`.
+#[derive(Debug, Clone)]
+pub struct LocalisedPlace {
+    pub spot: Spot,
+    /// Misfit per complex value that is left: 1 is noise. Of the best form's fit where there is one, else of the screen.
+    pub left: f64,
+    /// Scatter of the drawn dynamic stiffness over postures, in units of its noise variance: 1 if it is the same everywhere.
+    pub consistency: f64,
+    pub curve: Vec<CurvePoint>,
+    /// Empty where the place was screened only.
+    pub forms: Vec<FormFit>,
+    pub best: Option<BestForm>,
+    /// Labels of places that explain the data as well.
+    pub tied_with: Vec<String>,
+}
+
+/// The best form of a place, fitted to all data.
+#[derive(Debug, Clone)]
+pub struct BestForm {
+    pub instance: Instance,
+    pub form: Form,
+    pub model: StructureModel,
+    pub theta: Vec<f64>,
+    /// The form's own parameters.
+    pub parameters: Vec<Estimate>,
+    /// Misfit Σ|r|²/σ² and priors.
+    pub cost: f64,
+    pub delta_bic: f64,
+    /// Of the likelihood ratio, corrected for the places and forms tried.
+    pub p_value: f64,
+    pub at_bound: bool,
+    /// On postures left out of the fit.
+    pub held_out: Option<HeldOut>,
+}
+
+/// What the data draw.
+#[derive(Debug, Clone)]
+pub struct Localisation {
+    /// Best first.
+    pub places: Vec<LocalisedPlace>,
+    /// Whether the best place explains more than chance, and the postures left out are predicted better with it.
+    pub significant: bool,
+    /// The model as it stands.
+    pub baseline: Calibration,
+    pub baseline_held_out: Option<HeldOut>,
+}
+
+/// Places that are refitted with a form.
+const FITTED: usize = 8;
+/// Places whose best form is fitted to all data.
+const SETTLED: usize = 4;
+/// Lines of all postures together that the screen looks at.
+const SCREENED_LINES: usize = 3000;
+/// Places within this of the best one's 2 ln L are tied with it.
+const TIED: f64 = 12.0;
+
+const REFINE: Stopping = Stopping {
+    max_iterations: 25,
+    relative_decrease: 1e-6,
+};
+const REFIT_WITHOUT_FOLD: Stopping = Stopping {
+    max_iterations: 6,
+    relative_decrease: 1e-4,
+};
+
+/// Localises what `model` lacks on the data of `study`.
+///
+/// # Errors
+/// A model that cannot be calibrated to the data.
+pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Localisation> {
+    let baseline = study.calibrate(model)?;
+    let theta = &baseline.theta;
+    let spots = candidates(model);
+    let lines: usize = study.data.blocks.iter().map(|b| b.frequency_hz.len()).sum();
+    let thinned = study.data.thinned(lines.div_ceil(SCREENED_LINES).max(1), 1);
+    let responses = SpotResponses::new(model, theta, &thinned, &spots)?;
+    let mut screened = screen::screen(&responses, &model.parameters, theta);
+    let score = |s: &Screened| s.left_free.min(s.left_common);
+    screened.sort_by(|a, b| score(a).total_cmp(&score(b)));
+
+    let coarse_base = minimise(
+        &study.problem(model, View::COARSE),
+        theta,
+        &study.bounds(model),
+        REFINE,
+    )?;
+    let tried: Vec<(usize, Vec<Tried<StructureModel, Instance>>)> = leaders(&screened)
+        .into_par_iter()
+        .map(|i| (i, fit_forms(study, model, theta, &screened[i])))
+        .collect();
+    let values = study.real_values(Extent::Coarse) as f64;
+    let base_count = model.parameters.len();
+    let bic = |t: &Tried<StructureModel, Instance>| {
+        2.0 * (t.fit.cost - coarse_base.cost) + (t.fit.theta.len() - base_count) as f64 * values.ln()
+    };
+    let mut fitted: Vec<(usize, Vec<Tried<StructureModel, Instance>>)> = tried
+        .into_iter()
+        .filter(|(_, forms)| !forms.is_empty())
+        .map(|(i, mut forms)| {
+            forms.sort_by(|a, b| bic(a).total_cmp(&bic(b)));
+            (i, forms)
+        })
+        .collect();
+    fitted.sort_by(|a, b| bic(&a.1[0]).total_cmp(&bic(&b.1[0])));
+    let tests: usize =
+        fitted.iter().map(|(_, forms)| forms.len()).sum::<usize>().max(1) * spots.len() / FITTED;
+
+    let base_cost = minimise(
+        &study.problem(model, View::FULL),
+        theta,
+        &study.bounds(model),
+        REFINE,
+    )?
+    .cost;
+    let mut settled: Vec<LocalisedPlace> = fitted
+        .par_iter()
+        .take(SETTLED)
+        .map(|(i, forms)| {
+            let best = settle(study, &forms[0], base_cost, base_count, tests)?;
+            let count = study.data.value_count() as f64;
+            Ok(LocalisedPlace {
+                left: best.cost / (count - 0.5 * best.theta.len() as f64).max(1.0),
+                ..place(&screened[*i], forms, &bic, Some(best))
+            })
+        })
+        .collect::<Result<_>>()?;
+    settled.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
+    let scale = settled.first().map_or(1.0, |best| best.left.max(1.0));
+    let leader = settled.first().map(rank);
+    for i in 0..settled.len() {
+        let own = rank(&settled[i]);
+        if (own - leader.unwrap_or(own)).abs() / scale < TIED {
+            let others = settled
+                .iter()
+                .enumerate()
+                .filter(|(j, other)| *j != i && (rank(other) - leader.unwrap_or(own)).abs() / scale < TIED);
+            settled[i].tied_with = others.map(|(_, other)| other.spot.label()).collect();
+        }
+    }
+    let done: Vec<Spot> = settled.iter().map(|p| p.spot).collect();
+    let others = fitted.iter().skip(SETTLED);
+    let fitted_only = others.map(|(i, forms)| place(&screened[*i], forms, &bic, None));
+    let mut places = settled.clone();
+    places.extend(fitted_only);
+    let known: Vec<Spot> = places.iter().map(|p| p.spot).collect();
+    places.extend(
+        screened
+            .iter()
+            .filter(|s| !known.contains(&s.spot))
+            .map(|s| place(s, &[], &bic, None)),
+    );
+    debug_assert!(done.len() <= SETTLED);
+    let baseline_held_out = held_out(study, model, theta, Extent::Coarse, REFIT_WITHOUT_FOLD)?;
+    let significant = settled.first().and_then(|p| p.best.as_ref()).is_some_and(|best| {
+        let predicts = match (&best.held_out, &baseline_held_out) {
+            (Some(with), Some(without)) => with.chi2 < without.chi2,
+            _ => true,
+        };
+        predicts && !best.at_bound && is_convincing(best.p_value, best.delta_bic)
+    });
+    Ok(Localisation {
+        places,
+        significant,
+        baseline,
+        baseline_held_out,
+    })
+}
+
+/// Order of the settled places: BIC on all data.
+fn rank(place: &LocalisedPlace) -> f64 {
+    place.best.as_ref().map_or(f64::INFINITY, |b| b.delta_bic)
+}
+
+/// Spots that are not taken by a drawn part of the model.
+fn candidates(model: &StructureModel) -> Vec<Spot> {
+    let spec = &model.robot.spec;
+    let taken: Vec<Option<String>> = model.effects().iter().map(|e| e.instance.site.label()).collect();
+    Spot::parallel(spec)
+        .into_iter()
+        .chain(Spot::series(spec))
+        .filter(|spot| !taken.contains(&Some(spot.label())))
+        .collect()
+}
+
+/// The best of the screen by either measure.
+fn leaders(screened: &[Screened]) -> Vec<usize> {
+    let best_by = |score: fn(&Screened) -> f64| {
+        let mut order: Vec<usize> = (0..screened.len()).collect();
+        order.sort_by(|a, b| score(&screened[*a]).total_cmp(&score(&screened[*b])));
+        order
+    };
+    let (free, common) = (best_by(|s| s.left_free), best_by(|s| s.left_common));
+    let mut chosen = Vec::new();
+    for (a, b) in free.into_iter().zip(common) {
+        for i in [a, b] {
+            if !chosen.contains(&i) && chosen.len() < FITTED {
+                chosen.push(i);
+            }
+        }
+    }
+    chosen
+}
+
+fn place(
+    screened: &Screened,
+    forms: &[Tried<StructureModel, Instance>],
+    bic: &impl Fn(&Tried<StructureModel, Instance>) -> f64,
+    best: Option<BestForm>,
+) -> LocalisedPlace {
+    LocalisedPlace {
+        spot: screened.spot,
+        left: screened.left_free.min(screened.left_common),
+        consistency: screened.consistency,
+        curve: screened.curve.clone(),
+        forms: forms
+            .iter()
+            .map(|t| FormFit {
+                form: drawn::form_of(t.instance.variant),
+                delta_bic: bic(t),
+            })
+            .collect(),
+        best,
+        tied_with: Vec::new(),
+    }
+}
+
+/// Each form of a place fitted on the coarse view, started from the drawn curve.
+fn fit_forms(
+    study: &StructureStudy,
+    model: &StructureModel,
+    theta: &[f64],
+    screened: &Screened,
+) -> Vec<Tried<StructureModel, Instance>> {
+    let bounds = study.bounds(model);
+    let moved: Vec<f64> = theta
+        .iter()
+        .zip(&screened.step)
+        .zip(&bounds)
+        .map(|((t, d), b)| (t + d.clamp(-1.0, 1.0)).clamp(b[0], b[1]))
+        .collect();
+    let bases = [theta.to_vec(), moved];
+    drawn::forms(screened.spot)
+        .par_iter()
+        .filter_map(|form| {
+            let instance = drawn::instance(screened.spot, *form);
+            let extended = study.extend(model, &instance);
+            let own = &extended.parameters[model.parameters.len()..];
+            let starts: Vec<Vec<f64>> = starting_values(*form, screened)
+                .into_iter()
+                .chain(study.starts(&instance, &Vec::new()).into_iter().take(4))
+                .map(|start| {
+                    own.iter()
+                        .zip(start)
+                        .map(|(p, v)| p.internal(v.clamp(p.bounds[0], p.bounds[1])))
+                        .collect()
+                })
+                .collect();
+            let fit =
+                crate::identify::study::screen(study, &extended, &bases, &starts, Effort::Direct).ok()?;
+            Some(Tried {
+                instance,
+                model: extended,
+                fit,
+            })
+        })
+        .collect()
+}
+
+/// Starting values of a form from the drawn curve, natural units in the order of its parameters.
+fn starting_values(form: Form, screened: &Screened) -> Vec<Vec<f64>> {
+    let (mut weight, mut re, mut im) = (0.0, 0.0, 0.0);
+    let (mut along, mut square, mut inertia, mut fourth) = (0.0, 0.0, 0.0, 0.0);
+    for point in screened.curve.iter().filter(|p| p.std.is_finite() && p.std > 0.0) {
+        let w = 1.0 / (point.std * point.std);
+        let omega = std::f64::consts::TAU * point.frequency_hz;
+        weight += w;
+        re += w * point.stiffness.re;
+        im += w * point.stiffness.im;
+        along += w * omega * point.stiffness.im;
+        square += w * omega * omega;
+        inertia -= w * omega * omega * point.stiffness.re;
+        fourth += w * omega.powi(4);
+    }
+    if !(weight > 0.0) {
+        return Vec::new();
+    }
+    let (spring, damper, mass) = (re / weight, along / square, inertia / fourth);
+    let loss = im / weight;
+    match form {
+        Form::Spring => vec![vec![spring]],
+        Form::Damper => vec![vec![damper]],
+        Form::SpringDamper => vec![vec![spring, damper]],
+        Form::Mass => vec![vec![mass]],
+        Form::LossFactor if matches!(screened.spot, Spot::Joint(_)) => vec![vec![loss]],
+        Form::LossFactor => vec![vec![spring, (loss / spring).abs()]],
+        Form::Resonator => screen::resonators(&screened.curve, 3)
+            .into_iter()
+            .map(Vec::from)
+            .collect(),
+        Form::TwoResonators => {
+            let single = screen::resonators(&screened.curve, 3);
+            let mut pairs = Vec::new();
+            for (i, a) in single.iter().enumerate() {
+                pairs.extend(single[i + 1..].iter().map(|b| [*a, *b].concat()));
+            }
+            pairs
+        }
+        Form::Maxwell => vec![vec![spring.abs(), spring.abs() / 100.0]],
+        Form::RotorOnSpring => vec![vec![spring.abs(), damper, mass.abs()]],
+    }
+}
+
+/// A form fitted to all data and tested on postures left out.
+fn settle(
+    study: &StructureStudy,
+    tried: &Tried<StructureModel, Instance>,
+    base_cost: f64,
+    base_count: usize,
+    tests: usize,
+) -> Result<BestForm> {
+    let Tried { instance, model, fit } = tried;
+    let fit = minimise(
+        &study.problem(model, View::FULL),
+        &fit.theta,
+        &study.bounds(model),
+        REFINE,
+    )?;
+    let values = study.real_values(Extent::Full) as f64;
+    let extra = (fit.theta.len() - base_count) as f64;
+    let reduced = 2.0 * fit.cost / (values - fit.theta.len() as f64).max(1.0);
+    let residual = study.residual(model, &fit.theta)?;
+    // What is left scales what counts as chance, and neighbours that move together count once.
+    let share = residual.independent_share.min(1.0);
+    let gain = (2.0 * (base_cost - fit.cost) * share / reduced.max(1.0)).max(0.0);
+    let single = ChiSquared::new(extra).map_or(1.0, |d| d.sf(gain));
+    let all = estimates(&model.parameters, &fit, reduced)?;
+    Ok(BestForm {
+        instance: *instance,
+        form: drawn::form_of(instance.variant),
+        parameters: all[base_count..].to_vec(),
+        cost: fit.cost,
+        delta_bic: extra * (share * values).ln() - gain,
+        p_value: (single * tests as f64).min(1.0),
+        at_bound: (base_count..fit.theta.len()).any(|i| fit.at_bound.contains(&i)),
+        held_out: held_out(study, model, &fit.theta, Extent::Coarse, REFIT_WITHOUT_FOLD)?,
+        theta: fit.theta,
+        model: model.clone(),
+    })
+}

@@ -1,0 +1,434 @@
+//! What the data drew where the library had no name: a simple law at one place of the structure. `branch` acts on a
+//! displacement that the model has (a link against the ground, a joint's turning), `series` adds one that it takes for
+//! stiff (a bearing, the base, the motor's side of a gear). They are added on request, not tried by `diagnose`.
+
+use super::*;
+use crate::parameter::{Prior, Scale};
+use crate::robot::{Attachment, AttachmentLaw, Branch as HungMass, Element, Grip, Role};
+use nalgebra::{DMatrix, Vector6};
+
+/// A law of force over displacement.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    Spring,
+    Damper,
+    SpringDamper,
+    Mass,
+    /// A mass on a spring.
+    Resonator,
+    TwoResonators,
+    /// A spring with a loss factor.
+    LossFactor,
+    /// A spring in series with a damper.
+    Maxwell,
+    /// Series only: a spring with an inertia on it (the motor's rotor on its servo).
+    RotorOnSpring,
+}
+
+impl Form {
+    /// As in the contract: `spring-damper`.
+    pub fn label(self) -> &'static str {
+        match self {
+            Form::Spring => "spring",
+            Form::Damper => "damper",
+            Form::SpringDamper => "spring-damper",
+            Form::Mass => "mass",
+            Form::Resonator => "resonator",
+            Form::TwoResonators => "two-resonators",
+            Form::LossFactor => "loss-factor",
+            Form::Maxwell => "maxwell",
+            Form::RotorOnSpring => "rotor-on-spring",
+        }
+    }
+}
+
+const AT_POINT: [Form; 6] = [
+    Form::Spring,
+    Form::SpringDamper,
+    Form::Mass,
+    Form::Resonator,
+    Form::TwoResonators,
+    Form::LossFactor,
+];
+/// A spring beside a joint's stiffness is more of the same.
+const AT_JOINT: [Form; 3] = [Form::Damper, Form::LossFactor, Form::Maxwell];
+const IN_SERIES: [Form; 3] = [Form::Spring, Form::SpringDamper, Form::LossFactor];
+const IN_DRIVE: [Form; 2] = [Form::SpringDamper, Form::RotorOnSpring];
+
+/// Forms that a spot can have, in the order of their variants.
+pub fn forms(spot: Spot) -> &'static [Form] {
+    match spot {
+        Spot::Joint(_) => &AT_JOINT,
+        Spot::LinkAxis(..) | Spot::ToolGround(_) => &AT_POINT,
+        Spot::Base(_) | Spot::Bearing(..) => &IN_SERIES,
+        Spot::Drive(_) => &IN_DRIVE,
+    }
+}
+
+/// All forms, in the order of their variants: one list for all spots, so that a variant means one form everywhere.
+const FORMS: [Form; 9] = [
+    Form::Spring,
+    Form::Damper,
+    Form::SpringDamper,
+    Form::Mass,
+    Form::Resonator,
+    Form::TwoResonators,
+    Form::LossFactor,
+    Form::Maxwell,
+    Form::RotorOnSpring,
+];
+
+pub struct Branch;
+pub struct Series;
+
+/// The instance of a form at a spot.
+pub fn instance(spot: Spot, form: Form) -> Instance {
+    Instance {
+        effect: if spot.is_series() { &Series } else { &Branch },
+        site: Site::At(spot),
+        variant: FORMS.iter().position(|f| *f == form).unwrap_or(0),
+    }
+}
+
+/// Every form at every spot of a robot.
+pub fn instances(robot: &RobotSpec) -> Vec<Instance> {
+    let spots = Spot::parallel(robot).into_iter().chain(Spot::series(robot));
+    spots
+        .flat_map(|spot| forms(spot).iter().map(move |form| instance(spot, *form)))
+        .collect()
+}
+
+/// Form of an instance of [`Branch`] or [`Series`].
+pub fn form_of(variant: usize) -> Form {
+    FORMS[variant]
+}
+
+fn free(name: &str, unit: &'static str, nominal: f64, bounds: [f64; 2]) -> Parameter {
+    Parameter {
+        name: name.into(),
+        unit,
+        scale: Scale::Logarithmic,
+        nominal,
+        prior: Some(Prior {
+            mean: nominal.ln(),
+            std: 3.0,
+        }),
+        bounds,
+    }
+}
+
+fn parameters(site: Site, variant: usize, data: &DataSummary) -> Vec<Parameter> {
+    let Site::At(spot) = site else {
+        return Vec::new();
+    };
+    let angle = spot.is_angle();
+    let stiffness = |nominal: f64| match angle {
+        true => free("stiffness_nm_per_rad", "N·m/rad", nominal, [1.0, 1e11]),
+        false => free("stiffness_n_per_m", "N/m", nominal, [10.0, 1e12]),
+    };
+    let damping = match angle {
+        true => free("damping_nms_per_rad", "N·m·s/rad", 1e3, [1e-3, 1e9]),
+        false => free("damping_ns_per_m", "N·s/m", 1e3, [1e-3, 1e9]),
+    };
+    let loss = free("loss_factor", "1", 0.1, [1e-5, 3.0]);
+    let usual = if spot.is_series() { 1e7 } else { 1e5 };
+    let resonator = || branch::parameters(data, 5.0, 15.0);
+    match form_of(variant) {
+        Form::Spring => vec![stiffness(usual)],
+        Form::Damper => vec![damping],
+        Form::SpringDamper => vec![stiffness(usual), damping],
+        Form::Mass => vec![free("mass_kg", "kg", 3.0, [1e-3, 1e3])],
+        Form::Resonator => resonator(),
+        Form::TwoResonators => {
+            let second = resonator().into_iter().map(|p| Parameter {
+                name: format!("second_{}", p.name),
+                ..p
+            });
+            resonator().into_iter().chain(second).collect()
+        }
+        Form::LossFactor if matches!(spot, Spot::Joint(_)) => {
+            // Beside a joint's own spring there is only the loss.
+            vec![free("hysteretic_nm_per_rad", "N·m/rad", 1e4, [1.0, 1e9])]
+        }
+        Form::LossFactor => vec![stiffness(usual), loss],
+        Form::Maxwell => vec![stiffness(1e5), damping],
+        Form::RotorOnSpring => vec![
+            stiffness(usual),
+            damping,
+            free("inertia_kg_m2", "kg·m²", 20.0, [1e-3, 1e4]),
+        ],
+    }
+}
+
+fn starts(site: Site, variant: usize, data: &DataSummary, peaks_hz: &[f64]) -> Vec<Vec<f64>> {
+    let Site::At(spot) = site else {
+        return Vec::new();
+    };
+    let scale: &[f64] = if spot.is_series() {
+        &[1e5, 1e6, 1e8, 1e9]
+    } else {
+        &[1e3, 1e4, 1e6, 1e7]
+    };
+    match form_of(variant) {
+        Form::Spring => scale.iter().map(|k| vec![*k]).collect(),
+        Form::Damper => [10.0, 100.0, 1e4].map(|c| vec![c]).to_vec(),
+        Form::SpringDamper => scale.iter().map(|k| vec![*k, 1e-3 * k]).collect(),
+        Form::Mass => [0.2, 1.0, 10.0, 50.0].map(|m| vec![m]).to_vec(),
+        Form::Resonator => branch::starts(data, peaks_hz, 5.0),
+        Form::TwoResonators => {
+            let firsts = branch::starts(data, peaks_hz, 5.0);
+            let mut pairs = Vec::new();
+            for (i, a) in firsts.iter().enumerate().step_by(2) {
+                for b in firsts.iter().skip(i + 2).step_by(2).take(3) {
+                    pairs.push([a.as_slice(), b.as_slice()].concat());
+                }
+            }
+            pairs
+        }
+        Form::LossFactor if matches!(spot, Spot::Joint(_)) => [1e2, 1e3, 1e5].map(|h| vec![h]).to_vec(),
+        Form::LossFactor => scale.iter().map(|k| vec![*k, 0.1]).collect(),
+        Form::Maxwell => scale.iter().map(|k| vec![*k, 1e-2 * k]).collect(),
+        Form::RotorOnSpring => scale
+            .iter()
+            .flat_map(|k| [5.0, 60.0].map(|inertia| vec![*k, 1e-3 * k, inertia]))
+            .collect(),
+    }
+}
+
+fn attach(chain: &mut Chain, grip: &Grip, law: AttachmentLaw, size: &Dual) {
+    chain.attachments.push(Attachment {
+        grip: grip.clone(),
+        law,
+        size: size.clone(),
+    });
+}
+
+impl StructuralEffect for Branch {
+    fn id(&self) -> &'static str {
+        "branch"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "What the data drew at this place: a spring, a damper, a mass or a mass on a spring that the model does not have, \
+         acting on a displacement that it has."
+    }
+
+    fn fingerprint(&self) -> &'static str {
+        "One and the same dynamic stiffness at this place explains the misfit at all postures."
+    }
+
+    fn background(&self) -> Background {
+        Background {
+            lab_check: "Look at the place: what touches, hangs or rubs there? Take it off, wedge it or add a known mass there and \
+             hit again; the drawn curve must change with it.",
+            typical: "Whatever the fit gives; a size that nothing at the place can have means that the cause is elsewhere.",
+            sources: &[
+                "Mottershead, J. E., Link, M., Friswell, M. I. (2011): The sensitivity method in finite element model \
+                 updating: a tutorial. Mechanical Systems and Signal Processing 25, 2275–2296.",
+                "de Klerk, D., Rixen, D. J., Voormeeren, S. N. (2008): General framework for dynamic substructuring. AIAA \
+                 Journal 46, 1169–1181.",
+            ],
+        }
+    }
+
+    fn sites(&self, robot: &RobotSpec) -> Vec<Site> {
+        Spot::parallel(robot).into_iter().map(Site::At).collect()
+    }
+
+    fn variants(&self) -> usize {
+        FORMS.len()
+    }
+
+    fn variant_label(&self, variant: usize) -> Option<(&'static str, &'static str)> {
+        FORMS.get(variant).map(|form| ("form", form.label()))
+    }
+
+    fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
+        Vec::new()
+    }
+
+    fn parameters_at(&self, site: Site, variant: usize, _: &RobotSpec, data: &DataSummary) -> Vec<Parameter> {
+        parameters(site, variant, data)
+    }
+
+    fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
+        Vec::new()
+    }
+
+    fn starts_at(
+        &self,
+        (site, variant): (Site, usize),
+        _: &RobotSpec,
+        data: &DataSummary,
+        peaks_hz: &[f64],
+    ) -> Vec<Vec<f64>> {
+        starts(site, variant, data, peaks_hz)
+    }
+
+    fn apply(&self, site: Site, variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {
+        let Site::At(spot) = site else { return };
+        let Some(grip) = spot.grip(setting.kinematics, &chain.elements) else {
+            return;
+        };
+        match form_of(variant) {
+            Form::Spring => attach(chain, &grip, AttachmentLaw::Spring, &values[0]),
+            Form::Damper => attach(chain, &grip, AttachmentLaw::Damper, &values[0]),
+            Form::SpringDamper => {
+                attach(chain, &grip, AttachmentLaw::Spring, &values[0]);
+                attach(chain, &grip, AttachmentLaw::Damper, &values[1]);
+            }
+            Form::Mass => attach(chain, &grip, AttachmentLaw::Inertia, &values[0]),
+            Form::LossFactor if matches!(spot, Spot::Joint(_)) => {
+                attach(chain, &grip, AttachmentLaw::Hysteresis, &values[0]);
+            }
+            Form::LossFactor => {
+                attach(chain, &grip, AttachmentLaw::Spring, &values[0]);
+                attach(
+                    chain,
+                    &grip,
+                    AttachmentLaw::Hysteresis,
+                    &(&values[0] * &values[1]),
+                );
+            }
+            Form::Resonator | Form::TwoResonators => {
+                let Some((at, place, direction)) = spot.point(setting.kinematics) else {
+                    return;
+                };
+                for own in values.chunks_exact(3) {
+                    let (stiffness, damping) = branch::spring_and_damper(own);
+                    chain.branches.push(HungMass {
+                        place,
+                        at,
+                        directions: vec![direction],
+                        mass_kg: own[0].clone(),
+                        stiffness_n_per_m: stiffness,
+                        damping_ns_per_m: damping,
+                        carries_tool_point: false,
+                    });
+                }
+            }
+            Form::Maxwell => {
+                // The point between spring and damper is a coordinate that moves nothing else.
+                let between = chain.elements.len();
+                let Some(element) = grip.coordinates.first().map(|(element, _)| *element) else {
+                    return;
+                };
+                let held = &chain.elements[element];
+                chain.elements.push(Element {
+                    role: Role::Bearing,
+                    place: held.place,
+                    at: held.at,
+                    directions: vec![Vector6::zeros()],
+                    shape: DMatrix::identity(1, 1),
+                    stiffness: Dual::constant(0.0),
+                    damping: None,
+                });
+                let spring = Grip {
+                    coordinates: vec![(element, 1.0), (between, -1.0)],
+                    point: None,
+                };
+                let damper = Grip {
+                    coordinates: vec![(between, 1.0)],
+                    point: None,
+                };
+                attach(chain, &spring, AttachmentLaw::Spring, &values[0]);
+                attach(chain, &damper, AttachmentLaw::Damper, &values[1]);
+            }
+            Form::RotorOnSpring => (),
+        }
+    }
+}
+
+impl StructuralEffect for Series {
+    fn id(&self) -> &'static str {
+        "series"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "What the data drew at this place: the structure gives way where the model takes it for stiff."
+    }
+
+    fn fingerprint(&self) -> &'static str {
+        "One and the same stiffness between the two sides of this place explains the misfit at all postures."
+    }
+
+    fn background(&self) -> Background {
+        Background {
+            lab_check: "Two accelerometers, one on each side of the place (both rings of the bearing, foot plate and floor): \
+             hit the arm and see whether they move against each other at the frequencies of the drawn curve.",
+            ..Branch.background()
+        }
+    }
+
+    fn sites(&self, robot: &RobotSpec) -> Vec<Site> {
+        Spot::series(robot).into_iter().map(Site::At).collect()
+    }
+
+    fn variants(&self) -> usize {
+        FORMS.len()
+    }
+
+    fn variant_label(&self, variant: usize) -> Option<(&'static str, &'static str)> {
+        FORMS.get(variant).map(|form| ("form", form.label()))
+    }
+
+    fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
+        Vec::new()
+    }
+
+    fn parameters_at(&self, site: Site, variant: usize, _: &RobotSpec, data: &DataSummary) -> Vec<Parameter> {
+        parameters(site, variant, data)
+    }
+
+    fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
+        Vec::new()
+    }
+
+    fn starts_at(
+        &self,
+        (site, variant): (Site, usize),
+        _: &RobotSpec,
+        data: &DataSummary,
+        peaks_hz: &[f64],
+    ) -> Vec<Vec<f64>> {
+        starts(site, variant, data, peaks_hz)
+    }
+
+    fn apply(&self, site: Site, variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {
+        let Site::At(spot) = site else { return };
+        let Some((place, at, twist)) = spot.twist(setting.kinematics) else {
+            return;
+        };
+        let coordinate = Grip {
+            coordinates: vec![(chain.elements.len(), 1.0)],
+            point: None,
+        };
+        let form = form_of(variant);
+        let damped = matches!(form, Form::SpringDamper | Form::RotorOnSpring);
+        chain.elements.push(Element {
+            role: if place.link == 0 {
+                Role::Base
+            } else {
+                Role::Bearing
+            },
+            place,
+            at,
+            directions: vec![twist],
+            shape: DMatrix::identity(1, 1),
+            stiffness: values[0].clone(),
+            damping: damped.then(|| values[1].clone()),
+        });
+        match form {
+            Form::LossFactor => {
+                attach(
+                    chain,
+                    &coordinate,
+                    AttachmentLaw::Hysteresis,
+                    &(&values[0] * &values[1]),
+                );
+            }
+            Form::RotorOnSpring => attach(chain, &coordinate, AttachmentLaw::Inertia, &values[2]),
+            _ => (),
+        }
+    }
+}

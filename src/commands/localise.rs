@@ -5,7 +5,9 @@ use super::{CampaignArg, Outcome};
 use crate::Result;
 use crate::campaign::Campaign;
 use crate::discrepancy::localise::{BestForm, Localisation, LocalisedPlace, localise};
+use crate::effects::drawn;
 use crate::identify::{Options, StructureCase};
+use crate::report::figure::DrawnCurveFigure;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -14,6 +16,9 @@ pub struct Args {
     /// Places listed in the table (the document has all).
     #[arg(long, default_value_t = 10)]
     places: usize,
+    /// Draw the dynamic stiffness of the best place over frequency into this PNG file.
+    #[arg(long, value_name = "FILE")]
+    figure: Option<std::path::PathBuf>,
 }
 
 pub fn run(args: Args) -> Result<Outcome> {
@@ -21,6 +26,9 @@ pub fn run(args: Args) -> Result<Outcome> {
     let case = StructureCase::load(&campaign)?;
     let found = localise(&case.study(Options::default()), &case.model)?;
     let dir = campaign.dir.display();
+    if let (Some(file), Some(place)) = (&args.figure, found.places.first()) {
+        crate::files::write_atomically(file, &figure(place).png()?)?;
+    }
     let best = found.places.first();
     let next = match best.and_then(|p| p.best.as_ref()) {
         Some(form) if found.significant => {
@@ -63,6 +71,27 @@ fn document(case: &StructureCase, found: &Localisation) -> Value {
         },
         "warnings": case.warnings,
     })
+}
+
+fn figure(place: &LocalisedPlace) -> DrawnCurveFigure {
+    let best = place.best.as_ref();
+    let values: Vec<f64> = best
+        .iter()
+        .flat_map(|b| b.parameters.iter().map(|p| p.value))
+        .collect();
+    let frequency_hz: Vec<f64> = place.curve.iter().map(|c| c.frequency_hz).collect();
+    DrawnCurveFigure {
+        title: format!("Dynamic stiffness that the data draw {}", place.spot.words()),
+        unit: unit(place).to_string(),
+        stiffness: place.curve.iter().map(|c| c.stiffness).collect(),
+        std: place.curve.iter().map(|c| c.std).collect(),
+        form: best.map_or_else(Vec::new, |b| {
+            let of = |f: &f64| drawn::dynamic_stiffness(place.spot, b.form, &values, *f);
+            frequency_hz.iter().map(of).collect()
+        }),
+        form_label: best.map_or(String::new(), |b| format!("fitted: {}", b.form.label())),
+        frequency_hz,
+    }
 }
 
 /// JSON has no infinity: null where a line says nothing.

@@ -78,9 +78,12 @@ impl<M, I> Extension<M, I> {
             .par_iter()
             .filter_map(|instance| try_effect(study, model, instance, &bases, &hints, Effort::Staged))
             .collect();
+        // A discrete choice with more parameters has to pay for them (Schwarz 1978).
+        let price = 0.5 * (study.real_values(Extent::Coarse) as f64).ln();
+        let paid = |t: &Tried<M, I>| t.fit.cost + price * t.fit.theta.len() as f64;
         let mut best = tried
             .into_iter()
-            .min_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost))
+            .min_by(|a, b| paid(a).total_cmp(&paid(b)))
             .ok_or_else(|| Error::computation("no form of the effect could be fitted"))?;
         let bounds = study.bounds(&best.model);
         let problem = study.problem(&best.model, View::FULL);

@@ -6,6 +6,7 @@ use super::*;
 use crate::parameter::{Prior, Scale};
 use crate::robot::{Attachment, AttachmentLaw, Branch as HungMass, Element, Grip, Role};
 use nalgebra::{DMatrix, Vector6};
+use num_complex::Complex64;
 
 /// A law of force over displacement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -101,6 +102,33 @@ pub fn instances(robot: &RobotSpec) -> Vec<Instance> {
 /// Form of an instance of [`Branch`] or [`Series`].
 pub fn form_of(variant: usize) -> Form {
     FORMS[variant]
+}
+
+/// Dynamic stiffness of a form at `frequency_hz`, N/m or N·m/rad; `values`: natural values of its parameters in their
+/// order.
+pub fn dynamic_stiffness(spot: Spot, form: Form, values: &[f64], frequency_hz: f64) -> Complex64 {
+    let omega = std::f64::consts::TAU * frequency_hz;
+    let complex = Complex64::new;
+    // −ω² (k + iωc)/(k + iωc − ω² m) times m (Den Hartog 1956, chapter 3).
+    let resonator = |own: &[f64]| {
+        let natural = std::f64::consts::TAU * own[1];
+        let spring = complex(natural * natural, 2.0 * own[2] * natural * omega);
+        -own[0] * omega * omega * spring / (spring - omega * omega)
+    };
+    match form {
+        Form::Spring => complex(values[0], 0.0),
+        Form::Damper => complex(0.0, omega * values[0]),
+        Form::SpringDamper => complex(values[0], omega * values[1]),
+        Form::Mass => complex(-omega * omega * values[0], 0.0),
+        Form::Resonator | Form::TwoResonators => values.chunks_exact(3).map(resonator).sum(),
+        Form::LossFactor if matches!(spot, Spot::Joint(_)) => complex(0.0, values[0]),
+        Form::LossFactor => complex(values[0], values[0] * values[1]),
+        Form::Maxwell => {
+            let damper = complex(0.0, omega * values[1]);
+            values[0] * damper / (values[0] + damper)
+        }
+        Form::RotorOnSpring => complex(values[0] - omega * omega * values[2], omega * values[1]),
+    }
 }
 
 fn free(name: &str, unit: &'static str, nominal: f64, bounds: [f64; 2]) -> Parameter {

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
 use crate::effects::Spot;
+use crate::effects::drawn::{self, Form};
 use crate::identify::spot_response::{SpotLine, SpotResponses};
 use crate::parameter::Parameter;
 
@@ -250,12 +251,10 @@ pub fn resonators(curve: &[CurvePoint], count: usize) -> Vec<[f64; 3]> {
     starts
 }
 
-/// Dynamic stiffness of 1 kg on a spring, N/m: −ω² (k + iωc)/(k + iωc − ω² m) (Den Hartog 1956, chapter 3).
-pub fn resonator_stiffness(frequency_hz: f64, natural_hz: f64, damping_ratio: f64) -> Complex64 {
-    let omega = std::f64::consts::TAU * frequency_hz;
-    let natural = std::f64::consts::TAU * natural_hz;
-    let spring = Complex64::new(natural * natural, 2.0 * damping_ratio * natural * omega);
-    -omega * omega * spring / (spring - omega * omega)
+/// Dynamic stiffness of 1 kg on a spring, N/m.
+fn resonator_stiffness(frequency_hz: f64, natural_hz: f64, damping_ratio: f64) -> Complex64 {
+    let values = [1.0, natural_hz, damping_ratio];
+    drawn::dynamic_stiffness(Spot::LinkAxis(1, 0), Form::Resonator, &values, frequency_hz)
 }
 
 #[cfg(test)]

@@ -6,8 +6,8 @@ use serde_json::json;
 use super::{Outcome, next_step};
 use crate::ingest::Quantity;
 use crate::simulate::{
-    EffectRequest, FrfFormat, Kind, LabRobot, Layout, StructureScenario, check_target, random, structure,
-    truth_beside,
+    EffectRequest, FrfFormat, Kind, LabRobot, Layout, LineNoise, Slip, StructureScenario, check_target,
+    departure, random, structure, truth_beside,
 };
 use crate::{InputError, Result, effects, simulate};
 
@@ -44,10 +44,15 @@ pub struct Args {
     /// Of the other options only --out, --truth, --seed and --lines-hz count.
     #[arg(
         long,
+        value_enum,
+        value_name = "TIER",
+        num_args = 0..=1,
+        default_missing_value = "mixed",
         conflicts_with_all = ["kind", "effects", "unknown", "strength", "visibility", "noise", "noise_floor", "postures",
-            "spread_deg", "points", "band", "format", "quantity", "mass_error", "stiffness_error", "force_levels", "robot"]
+            "spread_deg", "points", "band", "format", "quantity", "mass_error", "stiffness_error", "force_levels", "robot",
+            "share", "laboratory", "line_noise", "common_noise"]
     )]
-    random: bool,
+    random: Option<random::Tier>,
     /// How well the campaign is measured; single options below override it.
     #[arg(long, value_enum, default_value = "careful")]
     kind: Kind,
@@ -58,6 +63,23 @@ pub struct Args {
     /// Hide physics that the library of effects does not have (drawn, or the one named).
     #[arg(long, value_name = "KIND", num_args = 0..=1, default_missing_value = "")]
     unknown: Option<String>,
+    /// Make what --unknown hides as faint as this: χ² per value above noise after everything else was refitted (0.03: 3 %).
+    #[arg(
+        long,
+        value_name = "SHARE",
+        requires = "unknown",
+        conflicts_with = "visibility"
+    )]
+    share: Option<f64>,
+    /// Small errors of setup everywhere, as in a real laboratory: all of them, or those named.
+    #[arg(long, value_enum, value_name = "SLIPS", value_delimiter = ',', num_args = 0..)]
+    laboratory: Option<Vec<Slip>>,
+    /// How the noise of neighbouring lines belongs together.
+    #[arg(long, value_enum, value_name = "KIND")]
+    line_noise: Option<LineNoise>,
+    /// Share of the noise's variance that all outputs of one hit have in common.
+    #[arg(long, value_name = "SHARE")]
+    common_noise: Option<f64>,
     /// Size of the effects against what is drawn; values given with --effect stay as given.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
     strength: f64,
@@ -131,19 +153,31 @@ pub fn run(args: Args) -> Result<Outcome> {
 
 fn scenario(args: &Args) -> Result<StructureScenario> {
     let mut scenario = match args.random {
-        true => random::scenario(args.seed),
-        false => StructureScenario::of_kind(args.kind, args.seed),
+        Some(tier) => random::scenario(tier, args.seed),
+        None => StructureScenario::of_kind(args.kind, args.seed),
     };
     if let Some(step) = args.lines_hz {
         scenario.step_hz = step;
     }
-    if args.random {
+    if args.random.is_some() {
         return Ok(scenario);
     }
     scenario.effects = args.effects.clone();
     if let Some(kind) = &args.unknown {
-        scenario.effects.push(unknown(kind, args.seed)?);
+        match departure::ids().find(|id| id == kind) {
+            Some(id) => scenario.departures.push(id.into()),
+            None => scenario.effects.push(unknown(kind, args.seed)?),
+        }
     }
+    scenario.excess_share = args.share;
+    if let Some(slips) = &args.laboratory {
+        scenario.slips = match slips.is_empty() {
+            true => Slip::value_variants().to_vec(),
+            false => slips.clone(),
+        };
+    }
+    scenario.line_noise = args.line_noise.unwrap_or_default();
+    scenario.common_noise = args.common_noise.unwrap_or_default();
     scenario.strength = args.strength;
     scenario.visibility_sigmas = args.visibility;
     scenario.force_levels_n = args.force_levels.clone();
@@ -185,7 +219,8 @@ fn unknown(kind: &str, seed: u64) -> Result<EffectRequest> {
     };
     let in_library = effects::STRUCTURAL.iter().any(|e| e.id() == name);
     if in_library || simulate::foreign::find(&name).is_none() {
-        let known: Vec<&str> = simulate::foreign::FOREIGN.iter().map(|e| e.id()).collect();
+        let foreign = simulate::foreign::FOREIGN.iter().map(|e| e.id());
+        let known: Vec<&str> = foreign.chain(departure::ids()).collect();
         return Err(
             InputError::new(format!("{name} is no effect outside the library"))
                 .key("--unknown")

@@ -250,7 +250,8 @@ impl StructureModel {
             .collect()
     }
 
-    pub(super) fn filter(&self, theta: &[f64], with_derivatives: bool) -> ChannelFilter {
+    /// What the effects do to the response channels.
+    pub fn filter(&self, theta: &[f64], with_derivatives: bool) -> ChannelFilter {
         let mut filter = ChannelFilter::faithful();
         for added in &self.effects {
             let values = self.values(theta, added, with_derivatives);

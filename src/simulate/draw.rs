@@ -13,6 +13,10 @@ pub enum Purpose {
     Effects = 3,
     Noise = 4,
     Foreign = 5,
+    Departure = 6,
+    Laboratory = 7,
+    ColouredError = 8,
+    CommonNoise = 9,
 }
 
 /// A stream of random numbers.
@@ -59,7 +63,12 @@ impl Draws {
 
     /// One of `items`, which must not be empty.
     pub fn pick<'a, T>(&mut self, items: &'a [T]) -> &'a T {
-        &items[self.0.random_range(0..items.len())]
+        &items[self.pick_index(items.len())]
+    }
+
+    /// One of 0..`count`, which must not be zero.
+    pub fn pick_index(&mut self, count: usize) -> usize {
+        self.0.random_range(0..count)
     }
 }
 

@@ -14,19 +14,26 @@ use serde_json::Value;
 use crate::campaign::robot_spec::RobotSpec;
 use crate::{Error, InputError, Result};
 
+pub mod departure;
 pub mod draw;
 mod files;
 pub mod foreign;
 mod imitation;
+mod laboratory;
 mod magnitude;
+mod noise;
 mod postures;
 pub mod random;
 mod request;
 mod scenario;
+mod strength;
 pub mod structure;
 mod visibility;
+mod world;
 
 pub use files::FrfFormat;
+pub use laboratory::Slip;
+pub use noise::LineNoise;
 pub use postures::PostureScheme;
 pub use request::EffectRequest;
 pub use scenario::{Kind, Layout, StructureScenario};

@@ -4,6 +4,8 @@ use serde::Serialize;
 
 use super::draw::{Draws, Purpose};
 use super::files::FrfFormat;
+use super::laboratory::Slip;
+use super::noise::LineNoise;
 use super::postures::PostureScheme;
 use super::request::EffectRequest;
 use crate::ingest::Quantity;
@@ -61,6 +63,16 @@ pub struct StructureScenario {
     pub format: FrfFormat,
     pub quantity: Quantity,
     pub effects: Vec<EffectRequest>,
+    /// Kinds of [`super::departure`] in the lab.
+    pub departures: Vec<String>,
+    /// Of physics outside the library: Σ|ΔH|²/σ² per complex value that it leaves after everything else was refitted
+    /// (0.03: 3 % of χ² above noise). Goes before the visibility.
+    pub excess_share: Option<f64>,
+    /// Small errors of setup.
+    pub slips: Vec<Slip>,
+    pub line_noise: LineNoise,
+    /// Share of the noise's variance that all outputs of one hit have in common (noise of the force channel).
+    pub common_noise: f64,
     /// Size of the effects against what is drawn.
     pub strength: f64,
     /// Instead: the size at which each effect shows at so many standard deviations (see [`super::Visibility::sigmas`]).
@@ -98,6 +110,11 @@ impl StructureScenario {
             format: FrfFormat::UffAscii,
             quantity: Quantity::Receptance,
             effects: Vec::new(),
+            departures: Vec::new(),
+            excess_share: None,
+            slips: Vec::new(),
+            line_noise: LineNoise::White,
+            common_noise: 0.0,
             strength: 1.0,
             visibility_sigmas: None,
             largest_size: 4.0,
@@ -141,6 +158,8 @@ impl StructureScenario {
             ("--mass-error", self.mass_error, 0.0, 0.25),
             ("--stiffness-error", self.stiffness_error, 0.0, 1.0),
             ("--strength", self.strength, 0.0, 100.0),
+            ("--share", self.excess_share.unwrap_or(1.0), 1e-6, 1e4),
+            ("--common-noise", self.common_noise, 0.0, 1.0),
             ("--visibility", self.visibility_sigmas.unwrap_or(1.0), 0.1, 1e5),
             ("--spread-deg", self.postures.spread_deg, 0.0, 90.0),
             ("--postures", self.postures.count as f64, 1.0, 200.0),

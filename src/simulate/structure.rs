@@ -6,12 +6,16 @@
 use num_complex::Complex64;
 use serde_json::{Map, Value, json};
 
+use super::departure::{self, Departed, Departure};
 use super::draw::{Draws, Purpose};
 use super::files::{self, FrfEntry, FrfFormat};
 use super::imitation::{self, Imitation};
+use super::laboratory::{Laboratory, Slip};
+use super::noise::LineNoise;
 use super::postures;
 use super::request::HiddenEffect;
 use super::scenario::{Layout, NOISE_FLOOR_M_PER_N, StructureScenario};
+use super::strength::{self, Sight};
 use super::visibility::{self, Truth, Visibility};
 use super::{LabCampaign, LabRobot};
 use crate::campaign::{AxesRef, BodyRef, MeasuredDof, MeasuredFrf, Point, Posture, RobotSection};
@@ -215,8 +219,13 @@ pub fn simulate(scenario: &StructureScenario, robot: &LabRobot) -> Result<LabCam
     // A value of exactly zero would get an endless weight.
     let noise = move |magnitude: f64| (relative * magnitude).hypot(floor).max(1e-15);
     let stride = refit_stride(&data, scenario);
-    if let Some(sigmas) = scenario.visibility_sigmas {
-        for i in 0..hidden.len() {
+    let values = (data.frfs().count() * scenario.lines_hz().len()) as f64;
+    let share_sigmas = scenario.excess_share.map(|share| (2.0 * share * values).sqrt());
+    for i in 0..hidden.len() {
+        let asked = share_sigmas
+            .filter(|_| hidden[i].foreign)
+            .or(scenario.visibility_sigmas);
+        if let Some(sigmas) = asked {
             visibility::resize(
                 &truth,
                 &mut hidden,
@@ -233,8 +242,32 @@ pub fn simulate(scenario: &StructureScenario, robot: &LabRobot) -> Result<LabCam
         .map(|i| visibility::of(&truth, &hidden, i, &data, stride))
         .collect::<Result<_>>()?;
 
-    // A foreign effect stands last; with what is hidden besides it in the model, how near does the library come?
+    let sight = Sight {
+        model: &model,
+        theta: &theta,
+        postures: &postures,
+        noise: &noise,
+        stride,
+    };
+    let mut departed = Vec::new();
+    let mut departures_seen = Vec::new();
+    for kind in &scenario.departures {
+        let departure = departure::drawn(kind, &robot.spec, scenario.seed)
+            .ok_or_else(|| InputError::new(format!("{kind} is no departure")).key("--unknown"))?;
+        departed.push(Departed {
+            departure,
+            strength: scenario.strength.min(1.0),
+        });
+        let asked = scenario.visibility_sigmas.map(|s| 0.5 * s * s / values);
+        if let Some(excess) = scenario.excess_share.or(asked) {
+            strength::settle(&mut departed, excess, &sight, &mut data)?;
+        }
+        departures_seen.push(sight.fill(&departed, &mut data)?);
+    }
+
+    // What is foreign stands last; with what is hidden besides it in the model, how near does the library come?
     let imitation = match hidden.last() {
+        _ if !departed.is_empty() => Some(imitation::nearest(&model, &theta, &truth.summary, &data, stride)?),
         Some(last) if last.foreign => {
             let (model, theta) = truth.with(&hidden[..hidden.len() - 1]);
             Some(imitation::nearest(&model, &theta, &truth.summary, &data, stride)?)
@@ -242,25 +275,63 @@ pub fn simulate(scenario: &StructureScenario, robot: &LabRobot) -> Result<LabCam
         _ => None,
     };
 
+    let mut laboratory = None;
+    if !scenario.slips.is_empty() {
+        let joints = robot.spec.joints.len();
+        let lab = Laboratory::draw(
+            scenario.seed,
+            &scenario.slips,
+            &data,
+            joints,
+            lab.model.points.len(),
+        );
+        let drawn = lab.described(1.0);
+        departed.push(Departed {
+            departure: Box::new(lab),
+            strength: 1.0,
+        });
+        laboratory = Some((drawn, sight.fill(&departed, &mut data)?));
+    }
+    let line_noise = match scenario.slips.contains(&Slip::Lines) {
+        true => LineNoise::Hann,
+        false => scenario.line_noise,
+    };
+
     let mut measured = Vec::new();
     let mut entries = Vec::new();
     let mut draws = Draws::new(scenario.seed, Purpose::Noise);
+    let mut common_draws = Draws::new(scenario.seed, Purpose::CommonNoise);
+    let (common_part, own_part) = (scenario.common_noise.sqrt(), (1.0 - scenario.common_noise).sqrt());
     for block in &data.blocks {
+        // One disturbance a hit: the same share of every output of that hit.
+        let common: Vec<Vec<Complex64>> = match scenario.common_noise > 0.0 {
+            true => (0..block.outputs.len())
+                .map(|_| line_noise.draw(block.frequency_hz.len(), &mut common_draws))
+                .collect(),
+            false => Vec::new(),
+        };
         let records: Vec<FrfRecord> = block
             .frfs
             .iter()
             .map(|frf| {
+                let own = line_noise.draw(block.frequency_hz.len(), &mut draws);
                 let value = block
                     .frequency_hz
                     .iter()
+                    .enumerate()
                     .zip(&frf.receptance)
-                    .map(|(f, h)| {
-                        let (re, im) = draws.normal_pair();
+                    .map(|((k, f), h)| {
                         let std = match noiseless {
                             true => 0.0,
                             false => noise(h.norm()) * std::f64::consts::FRAC_1_SQRT_2,
                         };
-                        files::as_quantity(h + Complex64::new(re, im) * std, *f, scenario.quantity)
+                        let error = match common.get(frf.input) {
+                            Some(common) if h.norm() > 0.0 => {
+                                common[k] * (h / h.norm()) * common_part + own[k] * own_part
+                            }
+                            _ => own[k],
+                        };
+                        files::as_quantity(h + error * std, *f, scenario.quantity)
                     })
                     .collect();
                 let dof = |d: MeasuredDof| Dof {
@@ -306,7 +377,19 @@ pub fn simulate(scenario: &StructureScenario, robot: &LabRobot) -> Result<LabCam
     all.extend(measured);
     Ok(LabCampaign {
         files: all,
-        truth: truth_document(scenario, &lab, &hidden, &seen, imitation),
+        truth: truth_document(
+            scenario,
+            &lab,
+            &Hidden {
+                effects: &hidden,
+                seen: &seen,
+                departed: &departed,
+                departures_seen: &departures_seen,
+                imitation,
+                laboratory,
+                line_noise,
+            },
+        ),
     })
 }
 
@@ -319,19 +402,37 @@ fn refit_stride(data: &FrfData, scenario: &StructureScenario) -> usize {
     (values / VALUES).clamp(1, 10).min(lines / 20 + 1)
 }
 
-/// The truth file: the keys of the practice campaigns' and what else is known.
-fn truth_document(
-    scenario: &StructureScenario,
-    lab: &TrueRobot,
-    hidden: &[HiddenEffect],
-    seen: &[Visibility],
+/// What was hidden, and how plainly it shows.
+struct Hidden<'a> {
+    effects: &'a [HiddenEffect],
+    seen: &'a [Visibility],
+    departed: &'a [Departed],
+    /// One for each departure that is not the laboratory.
+    departures_seen: &'a [Visibility],
     imitation: Option<Imitation>,
-) -> Value {
-    let described: Vec<Value> = hidden.iter().zip(seen).map(|(h, v)| described(h, v)).collect();
+    laboratory: Option<(Map<String, Value>, Visibility)>,
+    line_noise: LineNoise,
+}
+
+/// The truth file: the keys of the practice campaigns' and what else is known.
+fn truth_document(scenario: &StructureScenario, lab: &TrueRobot, hidden: &Hidden) -> Value {
+    let effects = hidden
+        .effects
+        .iter()
+        .zip(hidden.seen)
+        .map(|(h, v)| described(h, v));
+    let departed = hidden.departed.iter().zip(hidden.departures_seen);
+    let described: Vec<Value> = effects
+        .chain(departed.map(|(d, v)| described_departure(d, v)))
+        .collect();
     let main = described
         .first()
         .cloned()
         .unwrap_or_else(|| json!({ "effect": "none", "site": null, "parameters": {}, "visibility": null }));
+    let laboratory = hidden
+        .laboratory
+        .as_ref()
+        .map(|(slips, seen)| json!({ "slips": slips, "visibility": seen }));
     json!({
         "schema": "lobestone/truth/1",
         "domain": "structure",
@@ -341,14 +442,29 @@ fn truth_document(
         "site": main["site"],
         "parameters": main["parameters"],
         "visibility": main["visibility"],
-        "nearest_library_effect": imitation,
+        "nearest_library_effect": hidden.imitation,
         "also": described.get(1..).unwrap_or_default(),
         "joint_stiffness": lab.joint_stiffness_nm_per_rad,
         "zeta": lab.damping_ratio,
         "mass_scale": lab.mass_scale,
         "noise": [scenario.noise_relative, scenario.noise_floor_m_per_n],
+        "line_noise": hidden.line_noise,
+        "common_noise": scenario.common_noise,
+        "laboratory": laboratory,
         "layout": scenario.layout,
         "postures": scenario.postures.count,
+    })
+}
+
+fn described_departure(departed: &Departed, seen: &Visibility) -> Value {
+    let mut parameters = departed.departure.described(departed.strength);
+    parameters.insert("kind".into(), json!(departed.departure.id()));
+    parameters.insert("strength".into(), json!(departed.strength));
+    json!({
+        "effect": "unknown",
+        "site": departed.departure.site(),
+        "parameters": parameters,
+        "visibility": seen,
     })
 }
 

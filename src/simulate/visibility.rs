@@ -1,5 +1,6 @@
 //! How plainly a hidden effect shows, and how large it must be to show so plainly.
 
+use num_complex::Complex64;
 use serde::Serialize;
 
 use super::request::HiddenEffect;
@@ -50,14 +51,19 @@ pub fn fill(
     theta: &[f64],
     noise: impl Fn(f64) -> f64,
 ) -> Result<()> {
-    let mut predicted = model.predict(theta, data)?.into_iter();
+    set(data, model.predict(theta, data)?, noise);
+    Ok(())
+}
+
+/// Sets every FRF of `data` to `receptances` (in the order of `data.frfs()`, m/N), and its noise to what the sensor adds.
+pub fn set(data: &mut FrfData, receptances: Vec<Vec<Complex64>>, noise: impl Fn(f64) -> f64) {
+    let mut receptances = receptances.into_iter();
     for block in &mut data.blocks {
         for frf in &mut std::sync::Arc::make_mut(block).frfs {
-            frf.receptance = predicted.next().unwrap_or_default();
+            frf.receptance = receptances.next().unwrap_or_default();
             frf.noise_std = frf.receptance.iter().map(|h| noise(h.norm())).collect();
         }
     }
-    Ok(())
 }
 
 /// Misfit Σ|ΔH|²/σ² of a model against noise-free data.
@@ -91,10 +97,15 @@ pub fn of(
         .map(|(_, e)| e.clone())
         .collect();
     let (model, theta) = truth.with(&others);
+    without(&model, &theta, data, stride)
+}
+
+/// How plainly noise-free `data` departs from `model`, whose true parameters are `theta`.
+pub fn without(model: &StructureModel, theta: &[f64], data: &FrfData, stride: usize) -> Result<Visibility> {
     let values = data.value_count() as f64;
-    let before = misfit(&model, &theta, data)?;
+    let before = misfit(model, theta, data)?;
     let problem = FrfProblem {
-        model: &model,
+        model,
         data,
         misfit: Misfit::Complex,
         stride,
@@ -103,9 +114,9 @@ pub fn of(
         max_iterations: 30,
         relative_decrease: 1e-4,
     };
-    let fit = levenberg_marquardt::minimise(&problem, &theta, &model.bounds(), stopping)?;
+    let fit = levenberg_marquardt::minimise(&problem, theta, &model.bounds(), stopping)?;
     // On few lines the refit may miss the whole; it is never taken to make things worse.
-    let after = misfit(&model, &fit.theta, data)?.min(before);
+    let after = misfit(model, &fit.theta, data)?.min(before);
     Ok(Visibility {
         sigmas: (2.0 * after).sqrt(),
         excess_chi2_per_value: after / values,

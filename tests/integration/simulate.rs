@@ -409,3 +409,75 @@ fn wrong_wishes_are_refused_plainly() {
     ]);
     assert_eq!(run.status, Some(2), "{}", run.stderr);
 }
+
+/// Physics outside the library, as faint as asked for, named in the truth and nowhere in the folder.
+#[test]
+fn a_departure_is_as_faint_as_asked_for() {
+    let cell = Simulated::new(&with(&[
+        "--unknown",
+        "encoder-offset",
+        "--share",
+        "0.05",
+        "--seed",
+        "2",
+    ]));
+    let truth = cell.truth();
+    assert_eq!(truth["effect"], "unknown");
+    assert_eq!(truth["parameters"]["kind"], "encoder-offset");
+    let left = truth["visibility"]["excess_chi2_per_value"].as_f64().unwrap();
+    assert!((left / 0.05 - 1.0).abs() < 0.06, "{left}");
+    assert!(truth["site"].as_str().unwrap().starts_with("joint-"));
+    let nearest = &truth["nearest_library_effect"];
+    assert!(nearest["excess_chi2_per_value"].as_f64().unwrap() <= left);
+    let toml = String::from_utf8(cell.files()[0].1.clone()).unwrap();
+    assert!(!toml.contains("encoder"), "{toml}");
+}
+
+#[test]
+fn a_laboratory_and_its_noise_stand_in_the_truth() {
+    let options = [
+        "--laboratory",
+        "hammer-gain,lines",
+        "--common-noise",
+        "0.5",
+        "--seed",
+        "4",
+    ];
+    let cell = Simulated::new(&with(&options));
+    let truth = cell.truth();
+    assert_eq!(truth["effect"], "none");
+    assert_eq!(truth["laboratory"]["slips"].as_object().unwrap().len(), 2);
+    assert_eq!(truth["line_noise"], "hann");
+    assert_eq!(truth["common_noise"], 0.5);
+    let whole = Simulated::new(&with(&["--laboratory", "--seed", "4"])).truth();
+    assert_eq!(whole["laboratory"]["slips"].as_object().unwrap().len(), 8);
+    assert_eq!(
+        whole["laboratory"]["slips"]["hammer-gain"],
+        truth["laboratory"]["slips"]["hammer-gain"]
+    );
+    // Noise alone is changed by how its lines belong together.
+    let white = Simulated::new(&with(&["--seed", "4"]));
+    let padded = Simulated::new(&with(&["--line-noise", "zero-padded", "--seed", "4"]));
+    assert_eq!(white.files()[0], padded.files()[0]);
+    assert_ne!(white.files()[1], padded.files()[1]);
+    assert_eq!(
+        white.truth()["joint_stiffness"],
+        padded.truth()["joint_stiffness"]
+    );
+}
+
+#[test]
+fn tiers_are_drawn_by_the_seed() {
+    for tier in ["control", "faint", "foreign", "trial", "laboratory", "three"] {
+        let options = ["--random", tier, "--lines-hz", "2", "--seed", "9"];
+        let cell = Simulated::new(&options);
+        let truth = cell.truth();
+        match tier {
+            "control" => assert_eq!(truth["effect"], "none"),
+            "foreign" => assert_eq!(truth["effect"], "unknown"),
+            "laboratory" => assert_eq!(truth["laboratory"]["slips"].as_object().unwrap().len(), 8),
+            "three" => assert_eq!(truth["also"].as_array().unwrap().len(), 2),
+            _ => assert!(truth["laboratory"].is_null()),
+        }
+    }
+}

@@ -24,6 +24,7 @@ mod lobes;
 mod modal;
 mod model;
 mod next_step;
+mod plan;
 mod report;
 mod serve;
 mod shell;
@@ -93,6 +94,8 @@ pub enum Command {
     Compare(SideArgs),
     /// Which physical effect the model lacks.
     Diagnose(SideArgs),
+    /// What a campaign would show before it is measured, and what to measure besides.
+    Plan(plan::Args),
     /// What an effect is, how it shows, how to check it in the lab.
     Explain(explain::Args),
     /// Add an effect to the model, refit everything, record a revision.
@@ -185,6 +188,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Calibrate(args) => calibrate::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Diagnose(args) => diagnose::run(args),
+        Command::Plan(args) => plan::run(args),
         Command::Explain(args) => explain::run(args),
         Command::Add(args) => add::run(args),
         Command::History(args) => history::run(args),

@@ -246,7 +246,7 @@ impl StructureModel {
             .collect()
     }
 
-    fn filter(&self, theta: &[f64], with_derivatives: bool) -> ChannelFilter {
+    pub(super) fn filter(&self, theta: &[f64], with_derivatives: bool) -> ChannelFilter {
         let mut filter = ChannelFilter::faithful();
         for added in &self.effects {
             let values = self.values(theta, added, with_derivatives);
@@ -255,7 +255,7 @@ impl StructureModel {
         filter
     }
 
-    fn basis(&self, theta: &[f64], block: &FrfBlock, with_derivatives: bool) -> Result<FrfBasis> {
+    pub(super) fn basis(&self, theta: &[f64], block: &FrfBlock, with_derivatives: bool) -> Result<FrfBasis> {
         let chain = self.chain(theta, &block.kinematics, block.lowness, with_derivatives);
         let rows: Vec<DVector<f64>> = block
             .outputs
@@ -296,7 +296,7 @@ impl StructureModel {
 }
 
 /// The channel filter arranged for evaluation: per measured axis the true axes that it is made of.
-struct Channels {
+pub(super) struct Channels {
     terms: [Vec<(usize, Dual)>; 3],
     delay_s: Dual,
     /// The channels show what is there: nothing to be mixed or delayed.
@@ -304,7 +304,7 @@ struct Channels {
 }
 
 impl Channels {
-    fn new(filter: &ChannelFilter) -> Self {
+    pub(super) fn new(filter: &ChannelFilter) -> Self {
         let matters = |d: &Dual| d.value != 0.0 || d.gradient.iter().any(|g| *g != 0.0);
         let terms: [Vec<(usize, Dual)>; 3] = [0, 1, 2].map(|i| {
             let row = filter.mixing[i].iter().enumerate();
@@ -328,7 +328,13 @@ impl Channels {
     }
 
     /// What the file shows at `omega`, m/N.
-    fn measured(&self, omega: f64, frf: &FrfDatum, basis: &FrfBasis, response: &Response) -> Complex64 {
+    pub(super) fn measured(
+        &self,
+        omega: f64,
+        frf: &FrfDatum,
+        basis: &FrfBasis,
+        response: &Response,
+    ) -> Complex64 {
         if self.faithful {
             let out = frf.response_outputs[frf.response.axis.index()];
             return basis.receptance(response, out, frf.input) * frf.sign;
@@ -343,7 +349,7 @@ impl Channels {
 
     /// Derivatives of [`Self::measured`] (given as `measured`) into `slope`, one a parameter. `slopes`: those of the true
     /// receptances for this FRF's input, parameters × outputs.
-    fn slopes(
+    pub(super) fn slopes(
         &self,
         omega: f64,
         frf: &FrfDatum,

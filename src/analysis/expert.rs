@@ -8,6 +8,7 @@ use super::mode_comparison::{FixedMode, ModeComparison, ModePair, compare_modes,
 use crate::Result;
 use crate::discrepancy::compare::frac;
 use crate::discrepancy::locate::{Location, locate, place_words};
+use crate::identify::frf_data::FrfDatum;
 use crate::identify::{StructureCase, StructureModel};
 use crate::signal::median;
 
@@ -26,7 +27,7 @@ pub struct ExpertView {
     pub mac: Option<f64>,
     /// The worst pair by shape, where its MAC says that it is another shape.
     pub worst_shape: Option<ModePair>,
-    /// Middle and least FRAC of all FRFs, and the name of the one that has the least.
+    /// Middle and least FRAC of the FRFs that stand clear of the noise, and the name of the one that has the least.
     pub frac: Option<f64>,
     pub least_frac: Option<(String, f64)>,
     /// Joints and bodies by the share of the misfit that something unknown there would take away, best first; empty where
@@ -41,8 +42,10 @@ const OTHER_FORM: f64 = 0.8;
 /// A frequency error (share) and damping error from which on they are spoken of.
 const FREQUENCY_OFF: f64 = 0.01;
 const DAMPING_OFF: f64 = 0.25;
-/// Shares of the misfit nearer than this are as good as equal.
-const TIED: f64 = 0.03;
+/// A place that leaves no more than this times what the best one leaves is as good as it.
+const TIED: f64 = 1.1;
+/// Noise of an FRF, as a share of its rms, up to which its form can be judged.
+const CLEAR: f64 = 0.2;
 /// A place that explains less than this points nowhere.
 const LEAST_SHARE: f64 = 0.3;
 
@@ -76,10 +79,16 @@ impl ExpertView {
             .iter()
             .filter(|p| p.mac.is_some_and(|m| m < OTHER_SHAPE))
             .min_by(|a, b| a.mac.unwrap_or(1.0).total_cmp(&b.mac.unwrap_or(1.0)));
+        // The form of an FRF that drowns in noise is that of the noise.
+        let clear = |frf: &FrfDatum| {
+            let noise: f64 = frf.noise_std.iter().map(|s| s * s).sum();
+            noise <= CLEAR * CLEAR * frf.receptance.iter().map(|h| h.norm_sqr()).sum::<f64>()
+        };
         let fracs: Vec<(String, f64)> = case
             .data
             .frfs()
             .zip(predicted)
+            .filter(|((_, frf), _)| clear(frf))
             .filter_map(|((_, frf), model)| Some((frf.name.clone(), frac(model, &frf.receptance)?)))
             .collect();
         Ok(ExpertView {
@@ -99,12 +108,14 @@ impl ExpertView {
     /// What stands out, most telling first; empty where nothing does.
     pub fn sentences(&self) -> Vec<String> {
         let mut all: Vec<String> = self.fixed_modes.iter().map(fixed_sentence).collect();
+        if self.located.is_empty() {
+            return all;
+        }
         all.extend(self.place_sentence());
         all.extend(self.mode_sentence());
         if let Some((name, frac)) = self.least_frac.as_ref().filter(|(_, f)| *f < OTHER_FORM) {
             all.push(format!(
-                "FRFs have the right form in the middle (FRAC {:.2}), worst {name} (FRAC {frac:.2}): there it is the form that is \
-                 wrong, not the size",
+                "the least like the model in form is {name}: FRAC {frac:.2} (middle of all FRFs {:.2})",
                 self.frac.unwrap_or(1.0)
             ));
         }
@@ -113,11 +124,12 @@ impl ExpertView {
 
     fn place_sentence(&self) -> Option<String> {
         let best = self.located.first().filter(|l| l.share >= LEAST_SHARE)?;
+        let as_good = |l: &&Location| l.left <= TIED * best.left;
         let tied: Vec<String> = self
             .located
             .iter()
             .skip(1)
-            .filter(|l| best.share - l.share < TIED)
+            .filter(as_good)
             .map(|l| place_words(&l.place))
             .collect();
         let percent = |share: f64| 100.0 * share.min(1.0);
@@ -125,7 +137,7 @@ impl ExpertView {
             true => "it gives way otherwise than modelled, turning or tilting",
             false => "a force acts on it that the model does not have: something hung on it, or touching it",
         };
-        let next = self.located.iter().find(|l| best.share - l.share >= TIED);
+        let next = self.located.iter().find(|l| !as_good(l));
         Some(format!(
             "the misfit points at {}: an unknown stiffness, damping or force there would take {:.0} % of it away ({what}){}{}",
             place_words(&best.place),
@@ -153,7 +165,10 @@ impl ExpertView {
         }
         if let Some(off) = self.damping_error.filter(|e| e.abs() > DAMPING_OFF) {
             let way = if off > 0.0 { "more" } else { "less" };
-            parts.push(format!("are damped {:.0} % {way} there", 100.0 * off.abs()));
+            parts.push(format!(
+                "modes are damped {:.0} % {way} in the model",
+                100.0 * off.abs()
+            ));
         }
         if let Some(worst) = &self.worst_shape {
             parts.push(format!(
@@ -183,8 +198,8 @@ fn fixed_sentence(mode: &FixedMode) -> String {
         n => format!("at {n}"),
     };
     format!(
-        "{:.1} Hz {at} (within {:.1} Hz, ζ {:.1} %), in the model {model}: the table, the floor or the measuring chain, not the \
-         robot, whose modes move with its posture",
+        "{:.1} Hz {at} (within {:.2} Hz, ζ {:.1} %), in the model {model}: not the arm, whose modes move with its posture, but what \
+         stays as it is: the table or floor under it, the tool, the measuring chain",
         mode.frequency_hz,
         mode.spread_hz,
         100.0 * mode.damping_ratio

@@ -67,7 +67,7 @@ pub struct ModeComparison {
 }
 
 /// Relative distance within which two modes are at the same frequency.
-const SAME: f64 = 0.01;
+const SAME: f64 = 0.005;
 /// Standard deviations of the frequency within which they are, too.
 const SAME_SIGMAS: f64 = 3.0;
 /// Fewest postures at which a mode must be measured to be called fixed: two coincide by chance.

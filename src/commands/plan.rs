@@ -1,6 +1,6 @@
 use serde_json::{Map, Value, json};
 
-use super::text::{number, table, warnings, wrapped};
+use super::text::{number, percent, table, warnings, wrapped};
 use super::{CampaignArg, Outcome, next_step};
 use crate::analysis::planning::{PlanFindings, PlanRequest};
 use crate::campaign::Campaign;
@@ -124,12 +124,12 @@ fn effect(planned: &PlannedEffect) -> Value {
 fn describe(findings: &PlanFindings) -> String {
     let plan: &Plan = &findings.plan;
     let mut text = format!(
-        "planned: {} FRFs at {} postures ({} measured already), noise {} of the response and {} m/N\n",
+        "planned: {} FRFs at {} postures ({} measured already), noise {} of the response and {:.1e} m/N\n",
         findings.planned + findings.measured,
         findings.postures.len(),
         findings.measured,
-        number(findings.noise.relative, 2),
-        number(findings.noise.floor, 2),
+        percent(findings.noise.relative),
+        findings.noise.floor,
     );
     let rows: Vec<Vec<String>> = plan
         .effects

@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use crate::Result;
 use crate::campaign::Point;
-use crate::identify::frf_data::FrfBlock;
+use crate::identify::frf_data::{FrfBlock, FrfDatum};
 use crate::identify::{FrfData, StructureModel};
 use crate::ingest::Axis;
 use crate::robot::frf::Response;
@@ -27,10 +27,17 @@ pub struct Location {
     /// Share of Σ|r|²/σ² above its expectation under noise that an unknown stiffness, damping or force there would take
     /// away, corrected for its freedom; below zero: less than chance would.
     pub share: f64,
+    /// Σ|r|²/σ² that is left with it, for each value that its freedom leaves: 1 is noise.
+    pub left: f64,
 }
 
-/// Lines of one posture that are looked at, at most.
-const MOST_LINES: usize = 60;
+/// Lines of one posture that are looked at, at most: where much stands above the noise a few show where it comes from.
+const LINES: usize = 40;
+const LINES_WHERE_FAINT: usize = 200;
+/// Misfit per value below which what stands above the noise is faint.
+const FAINT: f64 = 1.5;
+/// Places that are followed with all steps.
+const FOLLOWED: usize = 4;
 /// FRFs of a block from which on each posture has a law of its own; fewer could be explained from anywhere.
 const RICH: usize = 9;
 /// FRFs of a block from which on the axes of a place may be coupled.
@@ -66,32 +73,70 @@ struct Candidate {
 /// # Errors
 /// A model that has no response.
 pub fn locate(model: &StructureModel, theta: &[f64], data: &FrfData) -> Result<Vec<Location>> {
+    let misfit = misfit(model, theta, data)?;
+    let count = 2.0 * data.value_count() as f64;
+    if misfit - count < SURE * (2.0 * count).sqrt() {
+        return Ok(Vec::new());
+    }
+    // Faint: near enough to the truth for one step, and every line counts.
+    let (most, steps) = match misfit < FAINT * count {
+        true => (LINES_WHERE_FAINT, 1),
+        false => (LINES, STEPS),
+    };
     let lines = data
         .blocks
         .iter()
         .map(|b| b.frequency_hz.len())
         .max()
         .unwrap_or(0);
-    let data = data.thinned(lines.div_ceil(MOST_LINES).max(1), 1);
+    let data = data.thinned(lines.div_ceil(most).max(1), 1);
     let values = 2.0 * data.value_count() as f64;
-    let candidates = candidates(model);
-    let plain = fit(model, theta, &data, &(0..0))?;
+    let plain = fit(model, theta, &data, &(0..0), steps)?;
     let above = plain.chi2 - values;
-    if above < SURE * (2.0 * values).sqrt() {
+    if !(above > 0.0) {
         return Ok(Vec::new());
     }
-    let mut found: Vec<Location> = candidates
+    let location = |candidate: &Candidate, left: &Left| Location {
+        place: candidate.place.clone(),
+        share: (plain.chi2 - left.chi2 - left.freedom) / above,
+        left: left.chi2 / (values - left.freedom).max(1.0),
+    };
+    let candidates = candidates(model);
+    let look = |candidate: &Candidate, steps: usize| -> Result<Location> {
+        Ok(location(
+            candidate,
+            &fit(model, theta, &data, &candidate.axes, steps)?,
+        ))
+    };
+    let mut found: Vec<(Location, &Candidate)> = candidates
         .par_iter()
-        .map(|candidate| {
-            let left = fit(model, theta, &data, &candidate.axes)?;
-            Ok(Location {
-                place: candidate.place.clone(),
-                share: (plain.chi2 - left.chi2 - left.freedom) / above,
-            })
-        })
+        .map(|c| Ok((look(c, 1)?, c)))
         .collect::<Result<_>>()?;
-    found.sort_by(|a, b| b.share.total_cmp(&a.share));
-    Ok(found)
+    let best_first = |a: &(Location, &Candidate), b: &(Location, &Candidate)| b.0.share.total_cmp(&a.0.share);
+    found.sort_by(best_first);
+    if steps > 1 {
+        found
+            .par_iter_mut()
+            .take(FOLLOWED)
+            .try_for_each(|(location, candidate)| {
+                *location = look(candidate, steps)?;
+                Ok::<_, crate::Error>(())
+            })?;
+        found.sort_by(best_first);
+    }
+    Ok(found.into_iter().map(|(location, _)| location).collect())
+}
+
+/// Σ r²/σ² over all lines, real and imaginary parts.
+fn misfit(model: &StructureModel, theta: &[f64], data: &FrfData) -> Result<f64> {
+    let predicted = model.predict(theta, data)?;
+    let of_frf = |((_, frf), model): ((&FrfBlock, &FrfDatum), &Vec<Complex64>)| {
+        let lines = frf.receptance.iter().zip(model).zip(&frf.noise_std);
+        lines
+            .map(|((h, m), std)| 2.0 * (h - m).norm_sqr() / (std * std))
+            .sum::<f64>()
+    };
+    Ok(data.frfs().zip(&predicted).map(of_frf).sum())
 }
 
 /// Joints first, then bodies; three axes each, numbered through as [`Probe`] has them.
@@ -111,11 +156,17 @@ fn candidates(model: &StructureModel) -> Vec<Candidate> {
 }
 
 /// The model's parameters refitted beside a free law at `axes`.
-fn fit(model: &StructureModel, theta: &[f64], data: &FrfData, axes: &std::ops::Range<usize>) -> Result<Left> {
+fn fit(
+    model: &StructureModel,
+    theta: &[f64],
+    data: &FrfData,
+    axes: &std::ops::Range<usize>,
+    steps: usize,
+) -> Result<Left> {
     let bounds = model.bounds();
     let mut theta = theta.to_vec();
     let mut best = left(model, &theta, data, axes)?;
-    for _ in 0..STEPS {
+    for _ in 0..steps {
         let Some(cholesky) = best.information.clone().cholesky() else {
             break;
         };
@@ -282,20 +333,22 @@ fn weighted(
         if let Some(basis) = &probe {
             basis.solve(std::f64::consts::TAU * f, &mut response)?;
             let first = block.outputs.len();
-            let reach = |axis: usize, out: usize| basis.receptance(&response, out, first + axis);
+            // [axis][output]: what a unit there moves.
+            let reach: Vec<Vec<Complex64>> = (0..axes.len())
+                .map(|axis| {
+                    (0..first)
+                        .map(|out| basis.receptance(&response, out, first + axis))
+                        .collect()
+                })
+                .collect();
             let mut push = |a: usize, b: usize| {
-                let of_frf = |frf: &crate::identify::frf_data::FrfDatum| {
+                let of_frf = |frf: &FrfDatum| {
                     let out = frf.response_outputs[frf.response.axis.index()];
-                    reach(a, out) * reach(b, frf.input) + reach(b, out) * reach(a, frf.input)
+                    reach[a][out] * reach[b][frf.input] + reach[b][out] * reach[a][frf.input]
                 };
-                line.patterns.push(
-                    block
-                        .frfs
-                        .iter()
-                        .zip(&weight)
-                        .map(|(frf, w)| of_frf(frf) * (frf.sign * w))
-                        .collect(),
-                );
+                let each = block.frfs.iter().zip(&weight);
+                line.patterns
+                    .push(each.map(|(frf, w)| of_frf(frf) * (frf.sign * w)).collect());
             };
             for a in 0..axes.len() {
                 push(a, a);

@@ -14,12 +14,19 @@ fn compared(options: &[&str]) -> Value {
 
 fn places(document: &Value) -> Vec<String> {
     let all = document["located"].as_array().unwrap();
-    all.iter().map(|l| l["place"].as_str().unwrap().to_string()).collect()
+    all.iter()
+        .map(|l| l["place"].as_str().unwrap().to_string())
+        .collect()
 }
 
 #[test]
 fn the_misfit_points_at_the_joint_that_gives_way() {
-    for (seed, site) in [("41", "joint-4"), ("42", "joint-4"), ("43", "joint-4"), ("44", "joint-2")] {
+    for (seed, site) in [
+        ("41", "joint-4"),
+        ("42", "joint-4"),
+        ("43", "joint-4"),
+        ("44", "joint-2"),
+    ] {
         let effect = format!("joint-transverse-compliance@{site}");
         let found = compared(&["--effect", &effect, "--seed", seed]);
         assert_documented("compare", &found);
@@ -27,7 +34,10 @@ fn the_misfit_points_at_the_joint_that_gives_way() {
         let share = found["located"][0]["share"].as_f64().unwrap();
         assert!((0.7..1.1).contains(&share), "seed {seed}: {share}");
         let said = found["stands_out"].to_string();
-        assert!(said.contains(&format!("points at {}", site.replace('-', " "))), "{said}");
+        assert!(
+            said.contains(&format!("points at {}", site.replace('-', " "))),
+            "{said}"
+        );
     }
 }
 

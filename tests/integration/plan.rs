@@ -25,7 +25,9 @@ fn campaign(dir: &Path, postures: usize, rest: &str) {
 fn sigmas(plan: &Value, effect: &str) -> f64 {
     let all = plan["effects"].as_array().unwrap();
     let found = all.iter().find(|e| e["effect"] == effect);
-    found.unwrap_or_else(|| panic!("no {effect} in {all:?}"))["sigmas"].as_f64().unwrap()
+    found.unwrap_or_else(|| panic!("no {effect} in {all:?}"))["sigmas"]
+        .as_f64()
+        .unwrap()
 }
 
 /// Files that do not exist are planned; twice the noise halves what is seen, and what cannot be told apart with one FRF can be
@@ -39,7 +41,10 @@ fn a_plan_is_made_of_files_that_do_not_exist() {
     let path = dir.to_str().unwrap();
     let plan = document(&["plan", path]);
     assert_documented("plan", &plan);
-    assert_eq!((plan["planned_frfs"].as_u64(), plan["measured_frfs"].as_u64()), (Some(2), Some(0)));
+    assert_eq!(
+        (plan["planned_frfs"].as_u64(), plan["measured_frfs"].as_u64()),
+        (Some(2), Some(0))
+    );
     assert_eq!(plan["postures"], serde_json::json!(["p1"]));
     let noisy = document(&["plan", path, "--noise", "0.06", "--noise-floor", "4e-8"]);
     for effect in ["base-compliance", "tool-flexibility"] {
@@ -68,7 +73,11 @@ fn a_plan_is_made_of_files_that_do_not_exist() {
     // Every other command still asks for the files.
     let run = lobestone(&["calibrate", path]);
     assert_eq!(run.status, Some(1));
-    assert!(run.stderr.contains("does not exist in the campaign folder"), "{}", run.stderr);
+    assert!(
+        run.stderr.contains("does not exist in the campaign folder"),
+        "{}",
+        run.stderr
+    );
 }
 
 #[test]
@@ -78,17 +87,32 @@ fn without_files_every_posture_is_planned_and_mistakes_are_said() {
     campaign(dir, 3, "[plan]\nlines_hz = 1.0\n");
     let path = dir.to_str().unwrap();
     let plan = document(&["plan", path]);
-    assert_eq!((plan["planned_frfs"].as_u64(), &plan["postures"]), (Some(27), &serde_json::json!(["p1", "p2", "p3"])));
+    assert_eq!(
+        (plan["planned_frfs"].as_u64(), &plan["postures"]),
+        (Some(27), &serde_json::json!(["p1", "p2", "p3"]))
+    );
     let fails = |rest: &str, arguments: &[&str], words: &str| {
         campaign(dir, 3, rest);
         let run = lobestone(&[&["plan", path], arguments].concat());
         assert_eq!(run.status, Some(1), "{rest} {arguments:?}");
         assert!(run.stderr.contains(words), "{}", run.stderr);
     };
-    fails("[plan]\nresponses = \"1X, north\"\n", &[], "\"north\" is no node and direction");
-    fails("[plan]\nhits = \"7X\"\n", &[], "there is no [[point]] with node = 7");
+    fails(
+        "[plan]\nresponses = \"1X, north\"\n",
+        &[],
+        "\"north\" is no node and direction",
+    );
+    fails(
+        "[plan]\nhits = \"7X\"\n",
+        &[],
+        "there is no [[point]] with node = 7",
+    );
     fails("[plan]\nband_hz = [90.0, 3.0]\n", &[], "is no band");
     fails("", &["--noise", "0", "--noise-floor", "0"], "without noise");
     fails("", &["--lines-hz", "50"], "fewer than ten lines");
-    fails("[[frf]]\nfile = \"../p1.uff\"\nposture = \"p1\"\n", &[], "leaves the campaign folder");
+    fails(
+        "[[frf]]\nfile = \"../p1.uff\"\nposture = \"p1\"\n",
+        &[],
+        "leaves the campaign folder",
+    );
 }

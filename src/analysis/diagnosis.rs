@@ -5,7 +5,8 @@ use num_complex::Complex64;
 use crate::Result;
 use crate::campaign::Campaign;
 use crate::discrepancy::{
-    Candidate, CuttingComparison, Diagnosis, Explained, FrfComparison, Verdict, diagnose, next_measurement,
+    Candidate, CuttingComparison, Diagnosis, Explained, FrfComparison, NextMeasurement, Verdict, diagnose,
+    next_cut, next_measurement,
 };
 use crate::effects::Instance;
 use crate::effects::cutting::CuttingInstance;
@@ -17,8 +18,7 @@ use crate::identify::{CuttingCase, CuttingModel, CuttingStudy, Options, Structur
 pub struct DiagnosisFindings {
     pub case: StructureCase,
     pub diagnosis: Diagnosis<StructureModel, Instance>,
-    /// In a sentence.
-    pub next_measurement: String,
+    pub next_measurement: NextMeasurement,
     /// Predictions of the model as it stands, in the order of `case.data.frfs()`, m/N.
     pub predicted: Vec<Vec<Complex64>>,
     pub now: FrfComparison,
@@ -41,7 +41,7 @@ impl DiagnosisFindings {
         let case = StructureCase::load(campaign)?;
         let study = case.study(options);
         let diagnosis = diagnose(&study, &case.model)?;
-        let next_measurement = next_measurement::advise(&case.data, &diagnosis)?;
+        let next_measurement = next_measurement::advise(&case.data, &campaign.postures, &diagnosis)?;
         let (data, points) = (&case.data, &case.model.points);
         let predicted = case.model.predict(&diagnosis.baseline.theta, data)?;
         let leading = leading_candidate(&diagnosis)
@@ -86,8 +86,7 @@ fn leading_candidate<M, I>(diagnosis: &Diagnosis<M, I>) -> Option<usize> {
 pub struct CuttingFindings {
     pub case: CuttingCase,
     pub diagnosis: Diagnosis<CuttingModel, CuttingInstance>,
-    /// In a sentence.
-    pub next_measurement: String,
+    pub next_measurement: NextMeasurement,
     /// The model as it stands.
     pub now: CuttingView,
     /// Index of the leading candidate, and the model with it; `None` where nothing is missing.
@@ -121,7 +120,7 @@ impl CuttingFindings {
             .transpose()?;
         Ok(CuttingFindings {
             now: view(&case.model, &diagnosis.baseline.theta)?,
-            next_measurement: next_measurement::advise_cutting(&diagnosis),
+            next_measurement: next_cut::advise_cutting(&case.data, &diagnosis)?,
             leading,
             diagnosis,
             case,

@@ -401,6 +401,7 @@ mod tests {
             lobes: None,
             material: None,
             orthogonal: None,
+            plan: Default::default(),
         }
     }
 

@@ -9,12 +9,12 @@ use super::robot_spec::RobotSpec;
 use super::schema::*;
 use super::suggest::shown;
 use super::{ROBOT_KEY, campaign_file, paths};
-use crate::ingest::Quantity;
+use crate::ingest::{Dof, Quantity};
 use crate::{Error, InputError, Result};
 
 const SCHEMA: &str = "lobestone/campaign/1";
 
-const TOP: [&str; 12] = [
+const TOP: [&str; 13] = [
     "schema",
     "name",
     "robot",
@@ -27,6 +27,7 @@ const TOP: [&str; 12] = [
     "dynamometer",
     "cut",
     "lobes",
+    "plan",
 ];
 
 /// Keys of `[[cut]]`.
@@ -65,7 +66,19 @@ impl Campaign {
         if !file.is_file() {
             return Err(no_campaign(dir, &file).into());
         }
-        Document::read(&file)?.parse(&TOP, |top| read(dir, top))
+        Document::read(&file)?.parse(&TOP, |top| read(dir, top, paths::inside))
+    }
+
+    /// As [`load`](Self::load), of a campaign that is still to be measured: files that it names may be missing.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load), except for missing files.
+    pub fn load_planned(dir: &Path) -> Result<Campaign> {
+        let file = campaign_file(dir);
+        if !file.is_file() {
+            return Err(no_campaign(dir, &file).into());
+        }
+        Document::read(&file)?.parse(&TOP, |top| read(dir, top, paths::planned))
     }
 
     /// As [`load`](Self::load), of a text that is not written yet.
@@ -73,7 +86,7 @@ impl Campaign {
     /// # Errors
     /// As [`load`](Self::load).
     pub fn from_text(dir: &Path, text: &str) -> Result<Campaign> {
-        Document::from_text(&campaign_file(dir), text).parse(&TOP, |top| read(dir, top))
+        Document::from_text(&campaign_file(dir), text).parse(&TOP, |top| read(dir, top, paths::inside))
     }
 }
 
@@ -94,14 +107,17 @@ fn no_campaign(dir: &Path, file: &Path) -> InputError {
     ))
 }
 
-fn read(dir: &Path, top: &Section<'_>) -> Result<Campaign> {
+/// How the name of a file becomes a path: [`paths::inside`] or [`paths::planned`].
+type Find = fn(&Path, &str) -> std::result::Result<PathBuf, Box<InputError>>;
+
+fn read(dir: &Path, top: &Section<'_>, find: Find) -> Result<Campaign> {
     schema(top)?;
     let name = top.text("name")?.map_or_else(|| folder_name(dir), str::to_string);
     let robot = robot(dir, top)?;
     let joints = robot.as_ref().map(|(_, spec)| spec.joints.len());
     let postures = postures(top, joints)?;
     let points = points(top, joints)?;
-    let frfs = frfs(dir, top, &postures)?;
+    let frfs = frfs(dir, top, &postures, find)?;
     let tool = tool(top)?;
     let dynamometer = dynamometer(top)?;
     let lobes = lobes_section::read(top, &postures, robot.is_some(), !frfs.is_empty())?;
@@ -113,7 +129,7 @@ fn read(dir: &Path, top: &Section<'_>) -> Result<Campaign> {
         ),
         None => None,
     };
-    let cuts = cuts(dir, top, &postures, tool.as_ref(), material.as_deref())?;
+    let cuts = cuts((dir, find), top, &postures, tool.as_ref(), material.as_deref())?;
     Ok(Campaign {
         dir: dir.to_path_buf(),
         name,
@@ -127,6 +143,7 @@ fn read(dir: &Path, top: &Section<'_>) -> Result<Campaign> {
         lobes,
         material,
         orthogonal: orthogonal(top)?,
+        plan: plan(top)?,
     })
 }
 
@@ -258,7 +275,7 @@ fn body(text: &str, joints: Option<usize>) -> Option<BodyRef> {
     }
 }
 
-fn frfs(dir: &Path, top: &Section<'_>, postures: &[Posture]) -> Result<Vec<FrfFile>> {
+fn frfs(dir: &Path, top: &Section<'_>, postures: &[Posture], find: Find) -> Result<Vec<FrfFile>> {
     let quantities = [
         ("receptance", Quantity::Receptance),
         ("mobility", Quantity::Mobility),
@@ -268,7 +285,7 @@ fn frfs(dir: &Path, top: &Section<'_>, postures: &[Posture]) -> Result<Vec<FrfFi
     let mut out = Vec::new();
     for section in top.sections("frf", &["file", "posture", "quantity", "force_level_n"])? {
         out.push(FrfFile {
-            file: file(dir, &section, "\"frf/p1.uff\"")?,
+            file: file((dir, find), &section, "\"frf/p1.uff\"")?,
             posture: posture_ref(&section, postures)?,
             quantity: section.choice("quantity", &quantities)?,
             force_level_n: section.number("force_level_n", Bounds::POSITIVE)?,
@@ -301,13 +318,60 @@ pub(super) fn posture_ref(section: &Section<'_>, postures: &[Posture]) -> Result
     })
 }
 
-fn file(dir: &Path, section: &Section<'_>, example: &str) -> Result<PathBuf> {
+fn file((dir, find): (&Path, Find), section: &Section<'_>, example: &str) -> Result<PathBuf> {
     let text = section.required("file", section.text("file")?, example)?;
-    paths::inside(dir, text).map_err(|found| {
+    find(dir, text).map_err(|found| {
         let mut error = section.error("file", found.problem);
         error.remedy = found.remedy;
         error.into()
     })
+}
+
+/// What is to be measured, where the files do not say.
+fn plan(top: &Section<'_>) -> Result<PlanSection> {
+    let keys = [
+        "responses",
+        "hits",
+        "band_hz",
+        "lines_hz",
+        "noise_relative",
+        "noise_floor_m_per_n",
+    ];
+    let Some(section) = top.section("plan", &keys)? else {
+        return Ok(PlanSection::default());
+    };
+    let band_hz = section.array("band_hz", "[3.0, 90.0]")?;
+    if let Some([from, to]) = band_hz.filter(|[from, to]| !(*from > 0.0 && from < to)) {
+        return Err(section
+            .error("band_hz", format!("from {from} to {to} Hz is no band"))
+            .remedy("first and last line in Hz, such as [3.0, 90.0]")
+            .into());
+    }
+    Ok(PlanSection {
+        responses: dofs(&section, "responses")?,
+        hits: dofs(&section, "hits")?,
+        band_hz,
+        lines_hz: section.number("lines_hz", Bounds::POSITIVE)?,
+        noise_relative: section.number("noise_relative", Bounds::closed(0.0, 1.0))?,
+        noise_floor_m_per_n: section.number("noise_floor_m_per_n", Bounds::NOT_NEGATIVE)?,
+    })
+}
+
+/// Degrees of freedom in one text: `1X, 1Y, 2Z`.
+fn dofs(section: &Section<'_>, key: &str) -> Result<Vec<Dof>> {
+    let text = section.text(key)?.unwrap_or("");
+    text.split(',')
+        .map(str::trim)
+        .filter(|d| !d.is_empty())
+        .map(|d| {
+            d.parse().map_err(|_| {
+                section
+                    .error(key, format!("{} is no node and direction", shown(d)))
+                    .remedy("write node and axis, with commas between: \"1X, 1Y, 2Z\"")
+                    .into()
+            })
+        })
+        .collect()
 }
 
 fn tool(top: &Section<'_>) -> Result<Option<Tool>> {
@@ -418,7 +482,7 @@ fn dynamometer(top: &Section<'_>) -> Result<Dynamometer> {
 }
 
 fn cuts(
-    dir: &Path,
+    folder: (&Path, Find),
     top: &Section<'_>,
     postures: &[Posture],
     tool: Option<&Tool>,
@@ -438,7 +502,7 @@ fn cuts(
         }
         let outcomes = [("stable", CutOutcome::Stable), ("chatter", CutOutcome::Chatter)];
         out.push(Cut {
-            file: file(dir, &section, "\"force/cut01.txt\"")?,
+            file: file(folder, &section, "\"force/cut01.txt\"")?,
             geometry: geometry(&section, tool)?,
             spindle_rpm: section.required(
                 "spindle_rpm",

@@ -12,25 +12,9 @@ use crate::InputError;
 /// by `..` or through a symbolic link, a missing file, and anything that is not a plain file.
 pub fn inside(dir: &Path, text: &str) -> Result<PathBuf, Box<InputError>> {
     let name = shown(text);
+    let path = named(dir, text)?;
     let fail = |problem: String, remedy: &str| Err(Box::new(InputError::new(problem).remedy(remedy)));
-    let leaves = "copy the file into the campaign folder and give its path from there";
-    let relative = Path::new(text);
-    let drive = text.as_bytes().get(1) == Some(&b':') && text.as_bytes()[0].is_ascii_alphabetic();
-    if relative.is_absolute() || drive || text.starts_with('\\') {
-        return fail(format!("{name} is an absolute path"), leaves);
-    }
-    let mut depth = 0i64;
-    for component in relative.components() {
-        depth += match component {
-            Component::ParentDir => -1,
-            Component::Normal(_) => 1,
-            _ => 0,
-        };
-        if depth < 0 {
-            return fail(format!("{name} leaves the campaign folder"), leaves);
-        }
-    }
-    let path = dir.join(relative);
+    let leaves = LEAVES;
     let Ok(real) = path.canonicalize() else {
         let remedy = missing_remedy(dir, text);
         return fail(format!("{name} does not exist in the campaign folder"), &remedy);
@@ -49,6 +33,44 @@ pub fn inside(dir: &Path, text: &str) -> Result<PathBuf, Box<InputError>> {
         );
     }
     Ok(path)
+}
+
+const LEAVES: &str = "copy the file into the campaign folder and give its path from there";
+
+/// As [`inside`], but the file may be missing: it is still to be measured.
+///
+/// # Errors
+/// As [`inside`], except for a missing file.
+pub fn planned(dir: &Path, text: &str) -> Result<PathBuf, Box<InputError>> {
+    let path = named(dir, text)?;
+    match path.symlink_metadata() {
+        Ok(_) => inside(dir, text),
+        Err(_) => Ok(path),
+    }
+}
+
+/// `text` joined with `dir`, if it names something inside it.
+fn named(dir: &Path, text: &str) -> Result<PathBuf, Box<InputError>> {
+    let name = shown(text);
+    let fail = |problem: String, remedy: &str| Err(Box::new(InputError::new(problem).remedy(remedy)));
+    let leaves = LEAVES;
+    let relative = Path::new(text);
+    let drive = text.as_bytes().get(1) == Some(&b':') && text.as_bytes()[0].is_ascii_alphabetic();
+    if relative.is_absolute() || drive || text.starts_with('\\') {
+        return fail(format!("{name} is an absolute path"), leaves);
+    }
+    let mut depth = 0i64;
+    for component in relative.components() {
+        depth += match component {
+            Component::ParentDir => -1,
+            Component::Normal(_) => 1,
+            _ => 0,
+        };
+        if depth < 0 {
+            return fail(format!("{name} leaves the campaign folder"), leaves);
+        }
+    }
+    Ok(dir.join(relative))
 }
 
 fn missing_remedy(dir: &Path, text: &str) -> String {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::ingest::Quantity;
+use crate::ingest::{Dof, Quantity};
 
 /// A validated campaign. Paths are absolute or relative to the working directory (already joined with `dir`).
 #[derive(Debug, Clone)]
@@ -20,6 +20,22 @@ pub struct Campaign {
     /// Workpiece material: of every cut that names none itself.
     pub material: Option<String>,
     pub orthogonal: Option<OrthogonalSection>,
+    pub plan: PlanSection,
+}
+
+/// What is to be measured where there are no files yet; `None` and empty: the usual.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PlanSection {
+    pub responses: Vec<Dof>,
+    pub hits: Vec<Dof>,
+    /// First and last line.
+    pub band_hz: Option<[f64; 2]>,
+    /// Spacing of the lines.
+    pub lines_hz: Option<f64>,
+    /// Expected noise as a share of the response (complex standard deviation).
+    pub noise_relative: Option<f64>,
+    /// Expected noise that is always there.
+    pub noise_floor_m_per_n: Option<f64>,
 }
 
 /// What orthogonal cuts of the material gave, to predict the milling coefficients from.

@@ -1,11 +1,11 @@
 use serde_json::{Map, Value, json};
 
 use super::next_step::Guide;
-use super::text::{Emphasis, error_bar, number, percent, table, warnings};
+use super::text::{Emphasis, error_bar, number, percent, table, warnings, wrapped};
 use super::{Outcome, SideArgs, by_domain};
 use crate::Result;
 use crate::analysis::mode_comparison::{ModePair, compare_modes, measured_modes};
-use crate::analysis::{CuttingAnalysis, StructureAnalysis};
+use crate::analysis::{CuttingAnalysis, ExpertView, StructureAnalysis};
 use crate::campaign::Campaign;
 use crate::discrepancy::compare::{ErrorMap, Group};
 use crate::discrepancy::compare_cutting::Harmonic;
@@ -112,11 +112,17 @@ fn structure(campaign: &Campaign) -> Result<Outcome> {
     let peaks = residual_peaks(&analysis.calibrated, &case.data);
     let mut notes = notes.clone();
     // Modes are an addition: FRFs that show none are compared all the same.
-    let modes = measured.and_then(|m| compare_modes(&analysis, &m));
+    let modes = measured.and_then(|m| compare_modes(case, &analysis.calibrated, &m));
     let modes = modes.unwrap_or_else(|e| {
         notes.push(format!("the modes cannot be compared: {e}"));
-        Vec::new()
+        Default::default()
     });
+    let expert = ExpertView::of_modes(
+        case,
+        (&case.model, &calibration.theta),
+        &analysis.calibrated,
+        &modes,
+    )?;
     let json = json!({
         "domain": "structure",
         "revision": case.revision(),
@@ -127,7 +133,11 @@ fn structure(campaign: &Campaign) -> Result<Outcome> {
         "by_point": object(&comparison.by_point),
         "by_band": comparison.by_band,
         "map": comparison.map,
-        "modes": modes,
+        "modes": modes.pairs.iter().map(mode).collect::<Vec<_>>(),
+        "fixed_modes": expert.fixed_modes,
+        "located": expert.located,
+        "stands_out": expert.sentences(),
+        "frfs": comparison.frf_errors.iter().map(frf_form).collect::<Vec<_>>(),
         "mostly": comparison.mostly,
         "residual_peaks_hz": peaks.iter().map(|p| p.frequency_hz).collect::<Vec<_>>(),
         "residual_peaks": peaks,
@@ -141,10 +151,33 @@ fn structure(campaign: &Campaign) -> Result<Outcome> {
         comparison.mostly.as_ref().map(Place::words),
     );
     let text = format!("model: {}\n", case.model_description())
+        + &stands_out(&expert)
         + &describe(comparison, held_out, &peaks)
-        + &mode_table(&modes)
+        + &mode_table(&modes.pairs)
         + &warnings(&notes);
     Ok(Outcome::new(json, text, Some(next)))
+}
+
+/// What stands out to an expert's eye, a line each.
+pub fn stands_out(expert: &ExpertView) -> String {
+    expert.sentences().iter().map(|s| wrapped(s, "  ")).collect()
+}
+
+fn mode(pair: &ModePair) -> Value {
+    let mut json = json!(pair);
+    json["frequency_error"] = json!(pair.frequency_error());
+    json["damping_error"] = json!(pair.damping_error());
+    json
+}
+
+fn frf_form(error: &FrfError) -> Value {
+    json!({
+        "name": error.name,
+        "posture": error.posture,
+        "frac": error.frac,
+        "nrms": error.nrms,
+        "times_noise": error.times_noise(),
+    })
 }
 
 fn frf(error: &FrfError) -> Value {
@@ -155,6 +188,7 @@ fn frf(error: &FrfError) -> Value {
         "nrms": error.nrms,
         "noise_floor_nrms": error.noise_floor_nrms,
         "times_noise": error.times_noise(),
+        "frac": error.frac,
         "worst_line": error.worst_line,
     })
 }
@@ -331,7 +365,8 @@ const WORST_SHOWN: usize = 5;
 fn worst(comparison: &FrfComparison) -> String {
     let row = |&i: &usize| {
         let error = &comparison.frf_errors[i];
-        let mut row = vec![error.name.clone(), format!("{:.1}", error.times_noise())];
+        let frac = error.frac.map_or("–".into(), |f| format!("{f:.2}"));
+        let mut row = vec![error.name.clone(), format!("{:.1}", error.times_noise()), frac];
         row.extend(error.worst_line.iter().flat_map(|line| {
             [
                 line.frequency_hz,
@@ -353,6 +388,7 @@ fn worst(comparison: &FrfComparison) -> String {
         &[
             "worst FRFs",
             "times noise",
+            "FRAC",
             "worst at Hz",
             "measured µm/N",
             "model µm/N",

@@ -8,7 +8,7 @@ use crate::analysis::{CuttingFindings, DiagnosisFindings};
 use crate::campaign::Campaign;
 use crate::discrepancy::diagnose::Baseline;
 use crate::discrepancy::explained::{Explained, NamedPart};
-use crate::discrepancy::{Candidate, Diagnosis, Verdict};
+use crate::discrepancy::{Candidate, Diagnosis, NextMeasurement, Verdict};
 use crate::identify::Options;
 
 pub fn run(args: SideArgs) -> Result<Outcome> {
@@ -60,7 +60,7 @@ pub fn cutting(campaign: &Campaign, findings: &CuttingFindings) -> Outcome {
     text += &rest(d, next_measurement);
     text += &warnings(&case.warnings);
     let winner = d.winner().map(Candidate::label);
-    let next = Guide::cutting(campaign).diagnosed(d.verdict, winner.as_deref(), next_measurement);
+    let next = Guide::cutting(campaign).diagnosed(d.verdict, winner.as_deref(), &next_measurement.what);
     Outcome::new(json, text, Some(next))
 }
 
@@ -104,7 +104,8 @@ pub fn structure(campaign: &Campaign, findings: &DiagnosisFindings) -> Outcome {
     let text =
         format!("model: {}\n", case.model_description()) + &describe(findings) + &warnings(&case.warnings);
     let winner = diagnosis.winner().map(Candidate::label);
-    let next = Guide::structure(campaign).diagnosed(diagnosis.verdict, winner.as_deref(), next_measurement);
+    let next =
+        Guide::structure(campaign).diagnosed(diagnosis.verdict, winner.as_deref(), &next_measurement.what);
     Outcome::new(json, text, Some(next))
 }
 
@@ -239,7 +240,7 @@ fn answer<M, I>(
 }
 
 /// Rivals, candidates and what to do next.
-fn rest<M, I>(d: &Diagnosis<M, I>, next_measurement: &str) -> String {
+fn rest<M, I>(d: &Diagnosis<M, I>, next_measurement: &NextMeasurement) -> String {
     let mut text = String::new();
     if let Some(companion) = &d.companion {
         text += &format!("  A second effect is likely besides: {companion}\n");
@@ -276,5 +277,25 @@ fn rest<M, I>(d: &Diagnosis<M, I>, next_measurement: &str) -> String {
         table(&header, &rows),
         next_measurement
     );
-    text
+    text + &alternatives(next_measurement)
+}
+
+/// Cheaper and more telling measurements than the one advised.
+fn alternatives(next: &NextMeasurement) -> String {
+    let rows: Vec<Vec<String>> = next
+        .alternatives
+        .iter()
+        .map(|a| {
+            let what = a.what.trim_start_matches("measure ");
+            vec![
+                number(a.cost, 3),
+                format!("{:.1}", a.expected_sigmas),
+                what.to_string(),
+            ]
+        })
+        .collect();
+    match rows.is_empty() {
+        true => String::new(),
+        false => table(&["instead", "effort", "σ"], &rows),
+    }
 }

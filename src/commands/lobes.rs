@@ -352,6 +352,7 @@ mod tests {
             }),
             material: None,
             orthogonal: None,
+            plan: Default::default(),
         }
     }
 

@@ -25,6 +25,7 @@ mod localise;
 mod modal;
 mod model;
 mod next_step;
+mod plan;
 mod report;
 mod serve;
 mod shell;
@@ -96,6 +97,8 @@ pub enum Command {
     Diagnose(SideArgs),
     /// Where the missing part sits and what it does, drawn from the data alone.
     Localise(localise::Args),
+    /// What a campaign would show before it is measured, and what to measure besides.
+    Plan(plan::Args),
     /// What an effect is, how it shows, how to check it in the lab.
     Explain(explain::Args),
     /// Add an effect to the model, refit everything, record a revision.
@@ -189,6 +192,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Compare(args) => compare::run(args),
         Command::Localise(args) => localise::run(args),
         Command::Diagnose(args) => diagnose::run(args),
+        Command::Plan(args) => plan::run(args),
         Command::Explain(args) => explain::run(args),
         Command::Add(args) => add::run(args),
         Command::History(args) => history::run(args),

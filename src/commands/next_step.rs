@@ -331,6 +331,18 @@ pub fn simulated(dir: &Path, truth: &Path) -> String {
     )
 }
 
+/// After `plan`. `addition`: the cheapest that mends something, beginning with `measure`.
+pub fn planned(dir: &Path, addition: Option<&str>) -> String {
+    let measure = match addition {
+        Some(what) => format!("plan to {what} as well, then measure"),
+        None => "measure as planned".to_string(),
+    };
+    format!(
+        "{measure}, list the files in campaign.toml, and run `lobestone calibrate {}`",
+        word(dir)
+    )
+}
+
 /// After `init`.
 pub fn begun(dir: &Path, to_fill_in: usize, has_frfs: bool) -> String {
     match (to_fill_in, has_frfs) {

@@ -44,6 +44,8 @@ pub struct FrfError {
     pub direction: String,
     pub nrms: f64,
     pub noise_floor_nrms: f64,
+    /// Frequency response assurance criterion, 0..1; `None` where model or measurement is zero.
+    pub frac: Option<f64>,
     /// One a band of the error map; `None` where nothing was measured.
     pub band_nrms: Vec<Option<f64>>,
     /// The same, error over noise: 1 where only noise is left.
@@ -274,6 +276,7 @@ impl FrfComparison {
                 direction: direction.clone(),
                 nrms: own.nrms(),
                 noise_floor_nrms: own.floor(),
+                frac: frac(model, &frf.receptance),
                 band_nrms: own_bands.iter().map(Sums::measured_nrms).collect(),
                 band_times_noise: own_bands.iter().map(Sums::times_noise).collect(),
                 worst_line,
@@ -324,6 +327,14 @@ impl FrfComparison {
             frf_errors,
         }
     }
+}
+
+/// |Σ a* b|² / (Σ|a|² Σ|b|²): 1 where two FRFs differ by a factor only (Heylen & Lammens 1996). `None` where one is zero.
+pub fn frac(a: &[Complex64], b: &[Complex64]) -> Option<f64> {
+    let square = |z: &[Complex64]| z.iter().map(|v| v.norm_sqr()).sum::<f64>();
+    let product: Complex64 = a.iter().zip(b).map(|(x, y)| x.conj() * y).sum();
+    let frac = product.norm_sqr() / (square(a) * square(b));
+    frac.is_finite().then_some(frac)
 }
 
 fn error_map(
@@ -385,6 +396,20 @@ fn together(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn frac_is_one_for_a_factor_and_a_third_for_two_of_three_lines() {
+        let line = |re, im| Complex64::new(re, im);
+        let a = [line(1.0, 2.0), line(0.0, -1.0), line(3.0, 0.5)];
+        let factor = line(-0.3, 2.0);
+        let scaled = a.map(|h| h * factor);
+        assert!((frac(&a, &scaled).unwrap() - 1.0).abs() < 1e-12);
+        let (one, zero) = (line(1.0, 0.0), Complex64::ZERO);
+        // |1|² / (3 · 1)
+        let third = frac(&[one, one, one], &[zero, line(0.0, 1.0), zero]).unwrap();
+        assert!((third - 1.0 / 3.0).abs() < 1e-12);
+        assert_eq!(frac(&[zero; 3], &a), None);
+    }
 
     #[test]
     fn bands_cover_the_range_without_gaps() {

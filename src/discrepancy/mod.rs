@@ -3,15 +3,23 @@
 pub mod compare;
 pub mod compare_cutting;
 pub mod diagnose;
+pub mod difference;
 pub mod explained;
 pub mod extension;
 pub mod localise;
+pub mod lab;
+pub mod locate;
+pub mod next_cut;
 pub mod next_measurement;
+mod noise_outlook;
 pub mod place;
+pub mod plan;
+pub mod prospect;
 pub mod verdict;
 
 pub use compare::{Band, FrfComparison, FrfError};
 pub use compare_cutting::{CutError, CuttingComparison};
 pub use diagnose::{Candidate, Diagnosis, diagnose};
 pub use explained::Explained;
+pub use next_measurement::NextMeasurement;
 pub use verdict::Verdict;

@@ -1,18 +1,87 @@
-//! The cheapest further measurement that would settle a diagnosis.
+//! The next measurement: the one that is expected to tell two explanations apart, against the noise and after each has
+//! taken in what it can, at the least effort.
 
-use nalgebra::DVector;
+use std::fmt;
+
+use serde::Serialize;
 
 use super::diagnose::{Candidate, Diagnosis};
+use super::lab::{Lab, NewPoint, Setup};
 use super::verdict::Verdict;
 use crate::Result;
+use crate::campaign::Posture;
 use crate::effects::Instance;
-use crate::identify::{FrfData, StructureModel};
-use crate::ingest::Axis;
-use crate::robot::frf::Response;
-use crate::robot::{FrfBasis, Kinematics, Place, Slot};
+use crate::identify::structure::{FrfProblem, Misfit};
+use crate::identify::{FrfData, LeastSquares, StructureModel};
 
-/// What to measure next, in a sentence.
-pub fn advise(data: &FrfData, diagnosis: &Diagnosis<StructureModel, Instance>) -> Result<String> {
+/// Standard deviations that a measurement should promise: what is found scatters by two about their square's root, and
+/// must still stand clear of chance.
+pub(super) const ENOUGH_SIGMAS: f64 = 6.0;
+/// Standard deviations below which a measurement is no promise.
+pub(super) const LEAST_SIGMAS: f64 = 4.0;
+/// Further measurements that are named.
+const ALTERNATIVES: usize = 4;
+
+/// What to measure next.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NextMeasurement {
+    /// In a sentence.
+    pub what: String,
+    /// Standard deviations, sqrt of the expected growth of Σ r²/σ², at which the wrong one of `between` would be off after
+    /// it has taken in what it can; the lesser of both directions. `None` where that cannot be worked out.
+    pub expected_sigmas: Option<f64>,
+    /// `effect@site` of the two explanations that it would tell apart.
+    pub between: Option<[String; 2]>,
+    /// Effort in units of one FRF with everything in place.
+    pub cost: Option<f64>,
+    /// Where and what, for a program; empty where the sentence says it all.
+    pub setups: Vec<Setup>,
+    /// Points that campaign.toml would need.
+    pub new_points: Vec<NewPoint>,
+    /// Others, cheapest first, each dearer and more telling than the one before.
+    pub alternatives: Vec<Alternative>,
+}
+
+/// Another measurement.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Alternative {
+    pub what: String,
+    pub expected_sigmas: f64,
+    pub cost: f64,
+}
+
+impl NextMeasurement {
+    /// Only a sentence.
+    pub fn words(what: impl Into<String>) -> Self {
+        NextMeasurement {
+            what: what.into(),
+            expected_sigmas: None,
+            between: None,
+            cost: None,
+            setups: Vec::new(),
+            new_points: Vec::new(),
+            alternatives: Vec::new(),
+        }
+    }
+}
+
+impl fmt::Display for NextMeasurement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.what)
+    }
+}
+
+type StructureCandidate = Candidate<StructureModel, Instance>;
+
+/// What to measure next on a robot. `postures`: the campaign's.
+///
+/// # Errors
+/// A model that has no response at a posture that could be measured.
+pub fn advise(
+    data: &FrfData,
+    postures: &[Posture],
+    diagnosis: &Diagnosis<StructureModel, Instance>,
+) -> Result<NextMeasurement> {
     match (diagnosis.verdict, diagnosis.winner()) {
         (Verdict::Effect, Some(winner)) => {
             let others = || {
@@ -21,208 +90,170 @@ pub fn advise(data: &FrfData, diagnosis: &Diagnosis<StructureModel, Instance>) -
                     .iter()
                     .filter(|c| c.label() != winner.label())
             };
-            let rival = |c: &&Candidate<_, _>| diagnosis.indistinguishable.contains(&c.label());
+            let rival = |c: &&StructureCandidate| diagnosis.indistinguishable.contains(&c.label());
+            let rivals = others().any(|c| rival(&c));
             let Some(second) = others().find(rival).or_else(|| others().next()) else {
-                return Ok("none needed".into());
+                return Ok(NextMeasurement::words("none needed"));
             };
-            let purpose = if diagnosis.indistinguishable.is_empty() {
-                "to confirm it against"
-            } else {
-                "to tell it from"
-            };
-            let place = most_different(data, winner, second)?;
-            Ok(format!("{place}, {purpose} {}", second.label()))
+            let scale = winner.reduced_chi2.max(1.0);
+            let advice = best(data, postures, (winner, second), scale)?;
+            Ok(NextMeasurement {
+                what: match rivals {
+                    true => advice.what,
+                    false => format!("none needed; to confirm it, {}", advice.what),
+                },
+                ..advice
+            })
         }
-        (Verdict::Unknown, _) => Ok(format!(
-            "more response points along the arm (each link's far end, three directions) at posture {}: the rest is real \
-             and its shape would say where it sits",
-            data.measured_postures()
-                .first()
-                .map_or("p1", |p| data.posture_ids[*p].as_str())
+        (Verdict::Unknown, _) => Ok(NextMeasurement::words(where_it_sits(data, diagnosis))),
+        _ => Ok(NextMeasurement::words(
+            "none needed for this model; two more postures or a second hammer level would test it further",
         )),
-        _ => Ok(
-            "none needed for this model; two more postures or a second hammer level would test it further"
-                .into(),
+    }
+}
+
+/// For a rest that nothing explains: what would show its shape.
+fn where_it_sits(data: &FrfData, diagnosis: &Diagnosis<StructureModel, Instance>) -> String {
+    let posture = data
+        .measured_postures()
+        .first()
+        .map_or("p1", |p| data.posture_ids[*p].as_str());
+    let model = diagnosis.candidates.first().map(|c| &c.model);
+    let links = model.map_or(6, |m| m.robot.joint_count());
+    let measured = |link: usize| {
+        let on_link = |point: usize| {
+            let point = model.and_then(|m| m.points.get(point));
+            point.is_some_and(|p| p.body == crate::campaign::BodyRef::Link(link))
+        };
+        data.frfs().any(|(_, frf)| on_link(frf.response.point))
+    };
+    let unseen: Vec<String> = (1..links)
+        .filter(|l| !measured(*l))
+        .map(|l| l.to_string())
+        .collect();
+    match unseen.as_slice() {
+        [] => format!(
+            "response points on the floor, the base and beside the tool, three directions, at posture {posture}: the rest is \
+             real, every link is measured, and what moves there would say whether it sits outside the arm"
+        ),
+        some => format!(
+            "more response points along the arm (the far end of link {}, three directions) at posture {posture}: the rest \
+             is real and its shape would say where it sits",
+            some.join(", ")
         ),
     }
 }
 
-/// What to cut next, in a sentence.
-pub fn advise_cutting<M, I>(diagnosis: &Diagnosis<M, I>) -> String {
-    let rival = diagnosis.indistinguishable.first();
-    match (diagnosis.verdict, diagnosis.winner()) {
-        (Verdict::Effect, Some(winner)) => {
-            let test = match winner.name.effect.as_str() {
-                "size-effect" => "the same cut at a quarter and at four times the feed",
-                "runout" => "the same cut with the tool turned by half a pitch in its holder",
-                "tool-wear" => "the first cut repeated now, and once more with a new tool",
-                "speed-dependence" => "the same cut at half and at twice the cutting speed",
-                "crosstalk" => "a known static load along one axis at a time",
-                "dynamometer-misalignment" => "a known static load along the tool axis",
-                "dynamometer-resonance" => "a tap test of the dynamometer with the workpiece on it",
-                "nonlinear-drift" => "a minute of record without cutting, before and after a cut",
-                "chatter" => "the same cut at half the depth, and at a speed a tenth higher",
-                "chisel-edge" => "the same hole with a pilot hole as wide as the chisel edge",
-                "margin-friction" => "a hole twice as deep, and the drill turning in the finished hole",
-                _ => "the same cut at another feed and another speed",
-            };
-            match rival {
-                Some(rival) => format!("{test}: it tells {} from {rival}", winner.label()),
-                None => format!("{test}: it confirms {}", winner.label()),
-            }
-        }
-        (Verdict::Unknown, _) => {
-            "the cut with the largest misfit once more, and once at half its feed: what repeats is physics"
-                .into()
-        }
-        _ => "none needed for this model; other feeds and speeds would test it further".into(),
-    }
-}
-
-/// Lines between those compared.
-const LINE_STEP: usize = 8;
-
-/// Where and how, among the robot's natural measurement points, two explanations differ most.
-fn most_different(
+/// The measurement that tells two candidates apart at the least effort. `scale`: what the noise is too small by.
+fn best(
     data: &FrfData,
-    a: &Candidate<StructureModel, Instance>,
-    b: &Candidate<StructureModel, Instance>,
-) -> Result<String> {
-    let mut seen = Vec::new();
-    let mut lookouts = Vec::new();
-    for block in &data.blocks {
-        if !seen.contains(&block.posture) {
-            seen.push(block.posture);
-            lookouts.push(Lookout {
-                posture: &data.posture_ids[block.posture],
-                kinematics: &block.kinematics,
-                lowness: block.lowness,
-                frequency_hz: block.frequency_hz.iter().copied().step_by(LINE_STEP).collect(),
-            });
-        }
-    }
-    let greatest = greatest_difference(&lookouts, (&a.model, &a.theta), (&b.model, &b.theta), 0.0)?;
-    let otherwise = "repeat the measurement at another posture";
-    Ok(greatest.map_or(otherwise.into(), |d| d.sentence()))
-}
-
-/// A posture at which one could measure, and the lines that are looked at there.
-#[derive(Debug, Clone)]
-pub struct Lookout<'a> {
-    pub posture: &'a str,
-    pub kinematics: &'a Kinematics,
-    /// See [`crate::effects::Setting`].
-    pub lowness: f64,
-    pub frequency_hz: Vec<f64>,
-}
-
-/// An FRF on which two explanations differ.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct Difference {
-    pub posture: String,
-    /// In words: `the tool point`, `the far end of link 3`.
-    pub point: String,
-    /// Base axis of the response, and of the hit at the tool point.
-    pub response: char,
-    pub hit: char,
-    /// Rms difference over the first one's rms.
-    pub relative: f64,
-}
-
-impl Difference {
-    pub fn sentence(&self) -> String {
-        format!(
-            "measure {} in base {}, hitting the tool in {}, at posture {}: the two explanations differ by {:.0} % there",
-            self.point,
-            self.response,
-            self.hit,
-            self.posture,
-            100.0 * self.relative
-        )
-    }
-}
-
-/// The FRF (response at the tool point or a link's far end, hit at the tool) on which two models differ most. FRFs whose
-/// rms is below `least_share` of the largest one's are passed over: they drown in noise. `None` without lines.
-///
-/// # Errors
-/// A model that has no response.
-pub fn greatest_difference(
-    lookouts: &[Lookout],
-    (a, theta_a): (&StructureModel, &[f64]),
-    (b, theta_b): (&StructureModel, &[f64]),
-    least_share: f64,
-) -> Result<Option<Difference>> {
-    let outputs = 3 * (a.robot.joint_count() + 1);
-    let mut all: Vec<(f64, Difference)> = Vec::new();
-    for lookout in lookouts {
-        let (first, second) = (
-            point_basis(a, theta_a, lookout)?,
-            point_basis(b, theta_b, lookout)?,
-        );
-        // Outputs: tool, then the far end of each link; three axes each. Hit at the tool, in three axes.
-        let mut sums = vec![(0.0, 0.0); 3 * outputs];
-        let (mut ra, mut rb) = (Response::default(), Response::default());
-        for f in &lookout.frequency_hz {
-            let omega = std::f64::consts::TAU * f;
-            first.solve(omega, &mut ra)?;
-            second.solve(omega, &mut rb)?;
-            for (i, (difference, size)) in sums.iter_mut().enumerate() {
-                let (out, input) = (i / 3, i % 3);
-                let ha = first.receptance(&ra, out, input);
-                let hb = second.receptance(&rb, out, input);
-                *difference += (ha - hb).norm_sqr();
-                *size += ha.norm_sqr();
-            }
-        }
-        for (i, (difference, size)) in sums.into_iter().enumerate() {
-            let (out, input) = (i / 3, i % 3);
-            let point = match out / 3 {
-                0 => "the tool point".into(),
-                link => format!("the far end of link {link}"),
-            };
-            let difference = Difference {
-                posture: lookout.posture.into(),
-                point,
-                response: Axis::ALL[out % 3].letter(),
-                hit: Axis::ALL[input].letter(),
-                relative: if size > 0.0 {
-                    f64::sqrt(difference / size)
-                } else {
-                    0.0
-                },
-            };
-            all.push((size.sqrt(), difference));
-        }
-    }
-    let largest = all.iter().map(|(size, _)| *size).fold(0.0, f64::max);
-    let mut best: Option<Difference> = None;
-    for (_, difference) in all.into_iter().filter(|(size, _)| *size >= least_share * largest) {
-        if best.as_ref().is_none_or(|b| difference.relative > b.relative) {
-            best = Some(difference);
-        }
-    }
-    Ok(best)
-}
-
-fn point_basis(model: &StructureModel, theta: &[f64], lookout: &Lookout) -> Result<FrfBasis> {
-    let kinematics = lookout.kinematics;
-    let chain = model.chain(theta, kinematics, lookout.lowness, false);
-    let mut rows: Vec<DVector<f64>> = Vec::new();
-    let mut push = |point, place, tool| {
-        for axis in 0..3 {
-            let mut direction = nalgebra::Vector3::zeros();
-            direction[axis] = 1.0;
-            rows.push(chain.output_row(point, place, tool, &direction));
-        }
+    postures: &[Posture],
+    (a, b): (&StructureCandidate, &StructureCandidate),
+    scale: f64,
+) -> Result<NextMeasurement> {
+    let lab = Lab::new(&a.model.robot, &a.model.points, postures, data)?;
+    let [ab, ba] = [(a, b), (b, a)];
+    let table = |(truth, rival): (&StructureCandidate, &StructureCandidate)| {
+        lab.prospects((&truth.model, &truth.theta), (&rival.model, &rival.theta))
     };
-    push(kinematics.tcp(), model.robot.flange_place(), true);
-    for i in 1..=model.robot.joint_count() {
-        push(
-            kinematics.frames[i].translation.vector.into(),
-            Place::new(i, Slot::End),
-            false,
-        );
+    let (against_b, against_a) = (table(ab)?, table(ba)?);
+    let known = |c: &StructureCandidate| {
+        let problem = FrfProblem {
+            model: &c.model,
+            data,
+            misfit: Misfit::Complex,
+            stride: 1,
+        };
+        problem.linearise(&c.theta).map(|l| l.hessian)
+    };
+    let (known_b, known_a) = (known(b)?, known(a)?);
+    let sigmas: Vec<f64> = lab
+        .measurements
+        .iter()
+        .map(|m| {
+            let of_b = m.prospect(&against_b, b.theta.len()).growth(&known_b);
+            let of_a = m.prospect(&against_a, a.theta.len()).growth(&known_a);
+            (of_b.min(of_a) / scale).sqrt()
+        })
+        .collect();
+    let Some(chosen) = cheapest_enough(&lab, &sigmas) else {
+        return Ok(NextMeasurement::words(
+            "none that this robot and these points offer",
+        ));
+    };
+    let names = [a.label(), b.label()];
+    let measurement = &lab.measurements[chosen];
+    let promise = format!(
+        "{:.1} standard deviations expected between {} and {}",
+        sigmas[chosen], names[0], names[1]
+    );
+    let what = match sigmas[chosen] < LEAST_SIGMAS {
+        false => format!("{}: {promise}", measurement.what),
+        true => format!(
+            "nothing within reach tells {} from {} at four standard deviations; nearest comes to {}: {:.1} expected",
+            names[0],
+            names[1],
+            measurement.what.trim_start_matches("measure "),
+            sigmas[chosen]
+        ),
+    };
+    Ok(NextMeasurement {
+        what,
+        expected_sigmas: Some(sigmas[chosen]),
+        between: Some(names),
+        cost: Some(measurement.cost),
+        setups: lab.setups(measurement, postures),
+        new_points: lab.new_points(measurement),
+        alternatives: alternatives(&lab, &sigmas, chosen),
+    })
+}
+
+/// The cheapest of the measurements that promise enough; where none does, the most telling.
+fn cheapest_enough(lab: &Lab, sigmas: &[f64]) -> Option<usize> {
+    let all = || 0..lab.measurements.len();
+    let cost = |i: usize| lab.measurements[i].cost;
+    let by_cost = |a: &usize, b: &usize| {
+        cost(*a)
+            .total_cmp(&cost(*b))
+            .then(sigmas[*b].total_cmp(&sigmas[*a]))
+    };
+    all()
+        .filter(|i| sigmas[*i] >= ENOUGH_SIGMAS)
+        .min_by(by_cost)
+        .or_else(|| all().min_by(|a, b| sigmas[*b].total_cmp(&sigmas[*a]).then(by_cost(a, b))))
+}
+
+/// Those that no cheaper one surpasses, around the chosen one.
+fn alternatives(lab: &Lab, sigmas: &[f64], chosen: usize) -> Vec<Alternative> {
+    let mut order: Vec<usize> = (0..sigmas.len()).collect();
+    order.sort_by(|a, b| {
+        let cost = |i: usize| lab.measurements[i].cost;
+        cost(*a)
+            .total_cmp(&cost(*b))
+            .then(sigmas[*b].total_cmp(&sigmas[*a]))
+    });
+    let mut most = 1.0;
+    let mut front: Vec<usize> = Vec::new();
+    for i in order {
+        // Hardly more is no reason for more effort.
+        if sigmas[i] > 1.2 * most {
+            most = sigmas[i];
+            front.push(i);
+        }
     }
-    FrfBasis::new(&chain.system(0), &rows)
+    let at = front.iter().position(|i| *i == chosen).unwrap_or(front.len());
+    front.retain(|i| *i != chosen);
+    let first = at
+        .saturating_sub(ALTERNATIVES / 2)
+        .min(front.len().saturating_sub(ALTERNATIVES));
+    front
+        .into_iter()
+        .skip(first)
+        .take(ALTERNATIVES)
+        .map(|i| Alternative {
+            what: lab.measurements[i].what.clone(),
+            expected_sigmas: sigmas[i],
+            cost: lab.measurements[i].cost,
+        })
+        .collect()
 }

@@ -134,6 +134,17 @@ impl FrfData {
         Ok(FrfData { blocks, posture_ids })
     }
 
+    /// These FRFs and those of `other`, which has the same postures; hammer levels are ordered anew.
+    pub fn joined(&self, other: &FrfData) -> FrfData {
+        let all = self.blocks.iter().chain(&other.blocks);
+        let mut blocks: Vec<FrfBlock> = all.map(|b| b.as_ref().clone()).collect();
+        set_lowness(&mut blocks);
+        FrfData {
+            blocks: blocks.into_iter().map(Arc::new).collect(),
+            posture_ids: self.posture_ids.clone(),
+        }
+    }
+
     pub fn frfs(&self) -> impl Iterator<Item = (&FrfBlock, &FrfDatum)> {
         let blocks = self.blocks.iter().map(Arc::as_ref);
         blocks.flat_map(|b: &FrfBlock| b.frfs.iter().map(move |f| (b, f)))

@@ -19,6 +19,7 @@ pub mod off_comb;
 pub mod posture_modes;
 pub mod resonance_study;
 pub mod spot_response;
+pub mod sensitivity;
 pub mod structure;
 pub mod structure_study;
 pub mod study;

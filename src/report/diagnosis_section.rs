@@ -12,7 +12,7 @@ use crate::analysis::DiagnosisFindings;
 use crate::analysis::diagnosis::Leading;
 use crate::campaign::Campaign;
 use crate::discrepancy::explained::Part;
-use crate::discrepancy::{Candidate, Diagnosis, Verdict};
+use crate::discrepancy::{Candidate, Diagnosis, NextMeasurement, Verdict};
 use crate::effects::Instance;
 use crate::identify::StructureModel;
 
@@ -119,7 +119,7 @@ pub(super) fn advice<M, I>(
     campaign: &Campaign,
     d: &Diagnosis<M, I>,
     data: &str,
-    next_measurement: &str,
+    next_measurement: &NextMeasurement,
 ) -> Vec<Block> {
     let mut blocks = Vec::new();
     if !d.indistinguishable.is_empty() {

@@ -288,7 +288,7 @@ function diagnosisNodes(side, effects, folds) {
   if (fingerprint) verdict.append(make("p", {}, make("strong", {}, "How it shows: "), fingerprint));
   if (d.indistinguishable.length)
     verdict.append(make("p", {}, make("strong", {}, "These data cannot tell it from: "), d.indistinguishable.join(", ")));
-  verdict.append(make("p", {}, make("strong", {}, "Most telling further measurement: "), d.next_measurement));
+  verdict.append(make("p", {}, make("strong", {}, "Most telling further measurement: "), d.next_measurement.what));
   const nodes = [make("h3", {}, "What is missing"), verdict];
   for (const warning of d.warnings ?? []) nodes.push(make("div", { class: "warning" }, warning));
   if (!d.candidates.length) return nodes;

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::{MINIMA, MODAL, STATIC_STIFFNESS, posture_deg};
 use super::{ModalRow, RECURRING_BANDS, StaticRow, rows};
-use crate::discrepancy::next_measurement::{Difference, Lookout, greatest_difference};
+use crate::discrepancy::difference::{Difference, Lookout, greatest_difference};
 use crate::discrepancy::verdict::{STRONG_BIC, evidence_weight};
 use crate::discrepancy::{Verdict, diagnose};
 use crate::identify::modal_table::{FREQUENCY_STD, PEAK_STD};

@@ -102,7 +102,7 @@ fn an_unknown_rest_asks_for_a_measurement() {
     let diagnosed = document(&["diagnose", dir]);
     assert_eq!(diagnosed["verdict"], "unknown");
     let step = diagnosed["next_step"].as_str().unwrap();
-    let advice = diagnosed["next_measurement"].as_str().unwrap();
+    let advice = diagnosed["next_measurement"]["what"].as_str().unwrap();
     assert!(
         step.starts_with("measure ") && step.contains(&advice[..30]),
         "{step}"

@@ -13,6 +13,7 @@ pub mod mode_comparison;
 pub mod model_stages;
 mod redundancy;
 pub mod regression_line;
+pub mod setup;
 pub mod stick_shapes;
 pub mod structure;
 pub mod sweep;

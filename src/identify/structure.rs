@@ -246,7 +246,8 @@ impl StructureModel {
             .collect()
     }
 
-    fn filter(&self, theta: &[f64], with_derivatives: bool) -> ChannelFilter {
+    /// What the effects in the model do to the response channels.
+    pub fn filter(&self, theta: &[f64], with_derivatives: bool) -> ChannelFilter {
         let mut filter = ChannelFilter::faithful();
         for added in &self.effects {
             let values = self.values(theta, added, with_derivatives);

@@ -64,6 +64,16 @@ pub fn decide(
     }
     let physics = rival().map(|r| bic(base * (1.0 - r.gain_share), r.parameters, LIBRARY));
     let weights: Vec<f64> = bics.iter().map(|b| evidence_weight(b - lowest)).collect();
+    // Two forms of one mistake (the order of a filter) are no rivals: the better one speaks for both.
+    let alike = |a: &Tried, b: &Tried| a.finding.kind == b.finding.kind && a.finding.place == b.finding.place;
+    let first_of_its_kind = |i: usize| {
+        !(0..tried.len()).any(|j| {
+            j != i && alike(&tried[i], &tried[j]) && { bics[j] < bics[i] || (bics[j] == bics[i] && j < i) }
+        })
+    };
+    let weights: Vec<f64> = (0..tried.len())
+        .map(|i| if first_of_its_kind(i) { weights[i] } else { 0.0 })
+        .collect();
     let others = evidence_weight(-lowest) + physics.map_or(0.0, |p| evidence_weight(p - lowest));
     let sum: f64 = weights.iter().sum::<f64>() + others;
     let mut findings: Vec<SetupFinding> = tried

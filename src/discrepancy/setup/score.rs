@@ -15,7 +15,6 @@ pub struct Linearised<'a> {
     pub model: &'a StructureModel,
     pub data: &'a FrfData,
     pub theta: &'a [f64],
-    pub predicted: Curves,
     residual: Vec<f64>,
     /// One column a parameter of the model.
     jacobian: Vec<Vec<f64>>,
@@ -154,7 +153,6 @@ impl<'a> Linearised<'a> {
             model,
             data,
             theta,
-            predicted,
             residual,
             jacobian,
             information,
@@ -213,6 +211,10 @@ impl<'a> Linearised<'a> {
             let own = own - cross.transpose() * &absorbed;
             let gradient = gradient - absorbed.transpose() * &self.gradient;
             let values = -own.cholesky()?.solve(&gradient);
+            // A size that would have to be negative where that cannot be promises nothing.
+            if k == 1 && values[0] < sizes[0].bounds[0] {
+                return None;
+            }
             Some(Score {
                 group,
                 gain: -values.dot(&gradient),

@@ -32,7 +32,7 @@ pub fn proposed(
     thetas: &[&[f64]],
     most: usize,
 ) -> Result<Vec<Proposed>> {
-    let mut all = Vec::new();
+    let mut all: Vec<Proposed> = Vec::new();
     for theta in thetas {
         let table = Table::new(model, data, theta)?;
         let mut here: Vec<Proposed> = Vec::new();
@@ -47,5 +47,14 @@ pub fn proposed(
         here.truncate(most);
         all.extend(here);
     }
+    // The same reading is proposed from several places.
+    let mut seen: Vec<(&'static str, String)> = Vec::new();
+    all.retain(|p| {
+        let finding = p.reading.finding(data, &model.points);
+        let name = (finding.kind, finding.place);
+        let new = !seen.contains(&name);
+        seen.push(name);
+        new
+    });
     Ok(all)
 }

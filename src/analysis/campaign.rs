@@ -2,9 +2,12 @@
 
 use super::model_stages::{ModelStage, earlier_stages};
 use super::stick_shapes::{self, StickShape};
-use super::{CuttingFindings, DiagnosisFindings, LobeAnalysis, ModalAnalysis, StructureAnalysis};
+use super::{
+    CuttingAnalysis, CuttingFindings, DiagnosisFindings, LobeAnalysis, ModalAnalysis, StructureAnalysis,
+};
 use crate::campaign::{Campaign, LobeSource};
 use crate::cutting::{CfcOptions, CfcResult, identify_forces};
+use crate::discrepancy::setup::SetupFinding;
 use crate::identify::case::structure_model;
 use crate::identify::structure_study::held_out_postures;
 use crate::identify::{Options, StructureCase, StructureModel};
@@ -26,6 +29,8 @@ pub struct CampaignFindings<'a> {
     /// What the force model lacks, where that was asked for.
     pub cutting_diagnosis: Option<Result<CuttingFindings>>,
     pub lobes: Option<Result<LobeFindings>>,
+    /// Wrong files and other mistakes of the setup that are likely, of both sides.
+    pub setup: Vec<SetupFinding>,
 }
 
 /// Model against FRFs.
@@ -76,6 +81,7 @@ impl<'a> CampaignFindings<'a> {
             .then(|| PostureFindings::run(campaign, calibrated));
         let findings = CampaignFindings {
             campaign,
+            setup: likely_mistakes(campaign, (&structure, &diagnosis), (&cutting, &cutting_diagnosis)),
             postures,
             diagnosis,
             structure,
@@ -172,6 +178,32 @@ impl<'a> CampaignFindings<'a> {
     pub fn modal(&self) -> Option<&ModalAnalysis> {
         self.modal.as_ref().and_then(|r| r.as_ref().ok())
     }
+}
+
+/// From the diagnoses where they were made; a check that cannot be made finds nothing.
+fn likely_mistakes(
+    campaign: &Campaign,
+    (structure, diagnosis): (
+        &Option<Result<StructureFindings>>,
+        &Option<Result<DiagnosisFindings>>,
+    ),
+    (cutting, cutting_diagnosis): (&Option<Result<CfcResult>>, &Option<Result<CuttingFindings>>),
+) -> Vec<SetupFinding> {
+    let of_structure = match (diagnosis, structure) {
+        (Some(Ok(d)), _) => Some(d.setup.clone()),
+        (_, Some(Ok(s))) => s.analysis.setup_check().ok(),
+        _ => None,
+    };
+    let of_cutting = match (cutting_diagnosis, cutting) {
+        (Some(Ok(d)), _) => Some(d.setup.clone()),
+        (_, Some(Ok(_))) => CuttingAnalysis::run(campaign).and_then(|c| c.setup_check()).ok(),
+        _ => None,
+    };
+    let all = of_structure
+        .into_iter()
+        .chain(of_cutting)
+        .flat_map(|check| check.findings);
+    all.filter(SetupFinding::is_likely).collect()
 }
 
 impl StructureFindings {

@@ -7,6 +7,7 @@ use crate::Result;
 use crate::campaign::{Campaign, Process};
 use crate::cutting::{CfcResult, Group};
 use crate::discrepancy::CuttingComparison;
+use crate::discrepancy::setup::{SetupCheck, SetupFinding, examine_cutting};
 use crate::identify::cutting_data::processes;
 use crate::identify::cutting_problem::CuttingProblem;
 use crate::identify::cutting_study::{calibrate_cutting, held_out_cuts};
@@ -48,6 +49,20 @@ impl CuttingAnalysis {
     }
 }
 
+impl CuttingAnalysis {
+    /// Wrong wiring and filters, as far as the records show them. Nothing where effects were added: those may be what is
+    /// wrong.
+    ///
+    /// # Errors
+    /// Records that no model can be fitted to.
+    pub fn setup_check(&self) -> Result<SetupCheck> {
+        match self.model.effects().is_empty() {
+            true => examine_cutting(&self.data, || None),
+            false => Ok(SetupCheck::default()),
+        }
+    }
+}
+
 /// A cutting model at `theta` against the records.
 pub fn cutting_comparison(
     model: &CuttingModel,
@@ -78,8 +93,12 @@ fn warnings_of(calibration: &Calibration) -> Vec<String> {
 
 /// Coefficients of each of `result`'s groups from the whole waveform: `{key: {value, std_error}, nrms, noise_floor_nrms,
 /// chi2_per_value, converged}`; null where the waveform does not determine a coefficient. One entry a group, null where
-/// its waveforms cannot be fitted. And what the waveforms say about channels that are wrong in all records.
-pub fn waveform_groups(campaign: &Campaign, result: &CfcResult) -> (Vec<Value>, Vec<String>) {
+/// its waveforms cannot be fitted. And what the waveforms say about channels that are wrong in all records, and about other
+/// mistakes of the setup.
+pub fn waveform_groups(
+    campaign: &Campaign,
+    result: &CfcResult,
+) -> (Vec<Value>, Vec<String>, Vec<SetupFinding>) {
     let loaded: Vec<(Process, Option<CuttingData>)> = processes(campaign)
         .into_iter()
         .map(|p| (p, CuttingData::load(campaign, p).ok()))
@@ -88,6 +107,11 @@ pub fn waveform_groups(campaign: &Campaign, result: &CfcResult) -> (Vec<Value>, 
         .iter()
         .filter_map(|(_, data)| wrong_channels(data.as_ref()?, &result.pooled))
         .collect();
+    // A check that cannot be made finds nothing.
+    let checks = loaded
+        .iter()
+        .filter_map(|(_, data)| examine_cutting(data.as_ref()?, || None).ok());
+    let setup = checks.flat_map(|check| check.findings).collect();
     let groups = result
         .groups
         .iter()
@@ -100,7 +124,7 @@ pub fn waveform_groups(campaign: &Campaign, result: &CfcResult) -> (Vec<Value>, 
                 .unwrap_or(Value::Null)
         })
         .collect();
-    (groups, warnings)
+    (groups, warnings, setup)
 }
 
 fn waveform_group(data: &CuttingData, group: &Group) -> Result<Value> {

@@ -4,6 +4,7 @@ use num_complex::Complex64;
 
 use crate::Result;
 use crate::campaign::Campaign;
+use crate::discrepancy::setup::{Rival, SetupCheck, examine, examine_cutting};
 use crate::discrepancy::{
     Candidate, CuttingComparison, Diagnosis, Explained, FrfComparison, NextMeasurement, Verdict, diagnose,
     next_cut, next_measurement,
@@ -23,6 +24,8 @@ pub struct DiagnosisFindings {
     pub predicted: Vec<Vec<Complex64>>,
     pub now: FrfComparison,
     pub residual_peaks: Vec<ResidualPeak>,
+    /// Wrong files and other mistakes of the setup.
+    pub setup: SetupCheck,
     /// The effect that is missing; where none explains the rest, the leading candidate. `None` where nothing is missing.
     pub leading: Option<Leading>,
 }
@@ -40,7 +43,11 @@ impl DiagnosisFindings {
     pub fn run(campaign: &Campaign, options: Options) -> Result<Self> {
         let case = StructureCase::load(campaign)?;
         let study = case.study(options);
-        let diagnosis = diagnose(&study, &case.model)?;
+        let mut diagnosis = diagnose(&study, &case.model)?;
+        let setup = examine(&case.model, &case.data, &diagnosis.baseline.theta, || {
+            rival(&diagnosis)
+        })?;
+        heed_setup(&mut diagnosis, &setup);
         let next_measurement = next_measurement::advise(&case.data, &campaign.postures, &diagnosis)?;
         let (data, points) = (&case.data, &case.model.points);
         let predicted = case.model.predict(&diagnosis.baseline.theta, data)?;
@@ -59,6 +66,7 @@ impl DiagnosisFindings {
         Ok(DiagnosisFindings {
             now: FrfComparison::new(data, points, &predicted),
             residual_peaks: residual_peaks(&predicted, data),
+            setup,
             next_measurement,
             predicted,
             leading,
@@ -70,6 +78,30 @@ impl DiagnosisFindings {
     pub fn leader(&self) -> Option<&Candidate<StructureModel, Instance>> {
         let leading = self.leading.as_ref()?;
         self.diagnosis.candidates.get(leading.candidate)
+    }
+}
+
+/// What the best effect of the library takes away.
+fn rival<M, I>(diagnosis: &Diagnosis<M, I>) -> Option<Rival> {
+    let base = diagnosis.baseline.reduced_chi2;
+    let candidates = diagnosis.candidates.iter().filter(|c| c.refined && !c.at_bound);
+    let best = candidates.min_by(|a, b| a.reduced_chi2.total_cmp(&b.reduced_chi2))?;
+    Some(Rival {
+        label: best.label(),
+        gain_share: (1.0 - best.reduced_chi2 / base).max(0.0),
+        parameters: best.parameters.len(),
+    })
+}
+
+/// A likely mistake of the setup leaves no effect certain: what is missing in the model cannot be told before the files are
+/// right.
+fn heed_setup<M, I>(diagnosis: &mut Diagnosis<M, I>, setup: &SetupCheck) {
+    if let Some(finding) = setup.likely() {
+        diagnosis.verdict = Verdict::Unknown;
+        diagnosis.effect = None;
+        diagnosis.companion = None;
+        diagnosis.indistinguishable.clear();
+        diagnosis.confidence = finding.confidence;
     }
 }
 
@@ -91,6 +123,8 @@ pub struct CuttingFindings {
     pub now: CuttingView,
     /// Index of the leading candidate, and the model with it; `None` where nothing is missing.
     pub leading: Option<(usize, CuttingView)>,
+    /// Wrong wiring and filters.
+    pub setup: SetupCheck,
 }
 
 /// A cutting model against the records.
@@ -105,7 +139,13 @@ impl CuttingFindings {
     /// No cuts, or none that can be used.
     pub fn run(campaign: &Campaign) -> Result<Self> {
         let case = CuttingCase::load(campaign)?;
-        let diagnosis = diagnose(&CuttingStudy::new(case.data.clone()), &case.model)?;
+        let mut diagnosis = diagnose(&CuttingStudy::new(case.data.clone()), &case.model)?;
+        // With effects in the model what they took up may be what is wrong.
+        let setup = match case.model.effects().is_empty() {
+            true => examine_cutting(&case.data, || rival(&diagnosis))?,
+            false => SetupCheck::default(),
+        };
+        heed_setup(&mut diagnosis, &setup);
         let view = |model: &CuttingModel, theta: &[f64]| -> Result<CuttingView> {
             let data = &case.data;
             let fits = CuttingProblem { model, data }.fits(theta)?;
@@ -122,6 +162,7 @@ impl CuttingFindings {
             now: view(&case.model, &diagnosis.baseline.theta)?,
             next_measurement: next_cut::advise_cutting(&case.data, &diagnosis)?,
             leading,
+            setup,
             diagnosis,
             case,
         })

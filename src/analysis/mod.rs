@@ -15,6 +15,7 @@ pub mod model_stages;
 pub mod planning;
 mod redundancy;
 pub mod regression_line;
+pub mod setup;
 pub mod stick_shapes;
 pub mod structure;
 pub mod sweep;

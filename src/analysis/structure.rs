@@ -7,6 +7,7 @@ use super::mode_comparison::measured_modes;
 use crate::Result;
 use crate::campaign::Campaign;
 use crate::discrepancy::FrfComparison;
+use crate::discrepancy::setup::{SetupCheck, examine, library_rival};
 use crate::identify::calibrate::calibrate;
 use crate::identify::modal_start::{ModalStart, PostureMeasurement, modal_start};
 use crate::identify::{Calibration, Options, StructureCase};
@@ -69,6 +70,17 @@ impl StructureAnalysis {
             start,
             warnings,
         })
+    }
+}
+
+impl StructureAnalysis {
+    /// Wrong files and other mistakes of the setup, as far as the calibrated model shows them.
+    ///
+    /// # Errors
+    /// A model without a response.
+    pub fn setup_check(&self) -> Result<SetupCheck> {
+        let (model, data, theta) = (&self.case.model, &self.case.data, &self.calibration.theta);
+        examine(model, data, theta, || library_rival(model, data, theta))
     }
 }
 

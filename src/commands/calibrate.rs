@@ -1,7 +1,7 @@
 use serde_json::json;
 
 use super::next_step::Guide;
-use super::text::{Emphasis, number, percent, table, warnings};
+use super::text::{Emphasis, number, percent, setup_lines, table, warnings};
 use super::{CampaignArg, Outcome};
 use crate::Result;
 use crate::analysis::StructureAnalysis;
@@ -46,6 +46,7 @@ pub fn run(args: Args) -> Result<Outcome> {
         warnings: notes,
         ..
     } = &analysis;
+    let setup = analysis.setup_check()?;
     let json = json!({
         "domain": "structure",
         "revision": case.revision(),
@@ -59,9 +60,10 @@ pub fn run(args: Args) -> Result<Outcome> {
         "modal_start": start,
         "starts": calibration.starts,
         "starts_agreeing": calibration.starts_agreeing,
+        "setup": setup.findings,
         "warnings": notes,
     });
-    let mut text = format!("model: {}\n\n", case.model_description());
+    let mut text = setup_lines(&setup.findings) + &format!("model: {}\n\n", case.model_description());
     text += &describe_parameters(&case.model, calibration);
     if let Some(start) = start {
         text += &format!(

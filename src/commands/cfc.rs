@@ -3,7 +3,7 @@ use std::fmt::Write;
 use serde_json::json;
 
 use super::next_step::Guide;
-use super::text::Emphasis;
+use super::text::{Emphasis, setup_lines};
 use super::{CampaignArg, Outcome};
 use crate::Result;
 use crate::analysis::cutting::waveform_groups;
@@ -33,11 +33,13 @@ pub fn run(args: Args) -> Result<Outcome> {
         robust: args.robust,
     };
     let mut result = cutting::identify_forces(&campaign, options)?;
-    let (waveforms, warnings) = waveform_groups(&campaign, &result);
+    let (waveforms, warnings, setup) = waveform_groups(&campaign, &result);
     result.warnings.extend(warnings);
+    let mut document = document(&campaign, &result, &waveforms);
+    document["setup"] = json!(setup);
     Ok(Outcome::new(
-        document(&campaign, &result, &waveforms),
-        text(&campaign, &result),
+        document,
+        setup_lines(&setup) + &text(&campaign, &result),
         Some(Guide::cutting(&campaign).coefficients()),
     ))
 }

@@ -1,7 +1,7 @@
 use serde_json::{Map, Value, json};
 
 use super::next_step::Guide;
-use super::text::{Emphasis, error_bar, number, percent, table, warnings, wrapped};
+use super::text::{Emphasis, error_bar, number, percent, setup_lines, table, warnings, wrapped};
 use super::{Outcome, SideArgs, by_domain};
 use crate::Result;
 use crate::analysis::mode_comparison::{ModePair, compare_modes, measured_modes};
@@ -21,6 +21,7 @@ pub fn run(args: SideArgs) -> Result<Outcome> {
 
 fn cutting(campaign: &Campaign) -> Result<Outcome> {
     let analysis = CuttingAnalysis::run(campaign)?;
+    let setup = analysis.setup_check()?;
     let c = &analysis.comparison;
     let mut error = json!(c.totals);
     error["held_out_nrms"] = json!(analysis.held_out_nrms);
@@ -39,11 +40,13 @@ fn cutting(campaign: &Campaign) -> Result<Outcome> {
         "parameters": analysis.calibration.parameters,
         "chi2_per_value": analysis.calibration.reduced_chi2,
         "converged": analysis.calibration.converged,
+        "setup": setup.findings,
         "warnings": analysis.warnings,
     });
     let next =
         Guide::cutting(campaign).compared(analysis.calibration.reduced_chi2, &c.totals, c.mostly.clone());
-    Ok(Outcome::new(json, describe_cutting(&analysis), Some(next)))
+    let text = setup_lines(&setup.findings) + &describe_cutting(&analysis);
+    Ok(Outcome::new(json, text, Some(next)))
 }
 
 fn describe_cutting(analysis: &CuttingAnalysis) -> String {
@@ -106,6 +109,7 @@ fn structure(campaign: &Campaign) -> Result<Outcome> {
         warnings: notes,
         ..
     } = &analysis;
+    let setup = analysis.setup_check()?;
     let held_out = held_out_postures(&case.model, &case.data, &calibration.theta)?.map(|h| h.nrms());
     let mut error = json!(comparison.totals);
     error["held_out_nrms"] = json!(held_out);
@@ -143,6 +147,7 @@ fn structure(campaign: &Campaign) -> Result<Outcome> {
         "residual_peaks": peaks,
         "worst_frfs": comparison.worst_first().iter().take(10).map(|&i| frf(&comparison.frf_errors[i])).collect::<Vec<_>>(),
         "converged": calibration.converged,
+        "setup": setup.findings,
         "warnings": notes,
     });
     let next = Guide::structure(campaign).compared(
@@ -150,7 +155,8 @@ fn structure(campaign: &Campaign) -> Result<Outcome> {
         &comparison.totals,
         comparison.mostly.as_ref().map(Place::words),
     );
-    let text = format!("model: {}\n", case.model_description())
+    let text = setup_lines(&setup.findings)
+        + &format!("model: {}\n", case.model_description())
         + &stands_out(&expert)
         + &describe(comparison, held_out, &peaks)
         + &mode_table(&modes.pairs)

@@ -138,6 +138,7 @@ pub fn run(args: Args) -> Result<Outcome> {
 
     let findings = CampaignFindings {
         campaign: &first,
+        setup: Vec::new(),
         structure: Some(Ok(structure)),
         diagnosis: None,
         postures: Some(Ok(postures)),

@@ -1,7 +1,7 @@
 use serde_json::{Map, Value, json};
 
 use super::next_step::Guide;
-use super::text::{Emphasis, number, percent, table, warnings, wrapped};
+use super::text::{Emphasis, number, percent, setup_lines, table, warnings, wrapped};
 use super::{Outcome, SideArgs, by_domain};
 use crate::Result;
 use crate::analysis::{CuttingFindings, DiagnosisFindings};
@@ -46,10 +46,12 @@ pub fn cutting(campaign: &Campaign, findings: &CuttingFindings) -> Outcome {
         "next_measurement": next_measurement,
         "baseline": baseline(&d.baseline, noise_floor_nrms),
         "not_tried": d.not_tried.iter().map(|(e, why)| json!({ "effect": e, "why": why })).collect::<Vec<_>>(),
+        "setup": findings.setup.findings,
         "warnings": case.warnings,
     });
     let added = case.effects();
-    let mut text = format!(
+    let mut text = setup_lines(&findings.setup.findings);
+    text += &format!(
         "model: baseline{}\n",
         added.iter().map(|e| format!(" + {e}")).collect::<String>()
     );
@@ -99,10 +101,13 @@ pub fn structure(campaign: &Campaign, findings: &DiagnosisFindings) -> Outcome {
         "next_measurement": next_measurement,
         "baseline": baseline(&diagnosis.baseline, case.data.noise_floor_nrms()),
         "not_tried": diagnosis.not_tried.iter().map(|(e, why)| json!({ "effect": e, "why": why })).collect::<Vec<_>>(),
+        "setup": findings.setup.findings,
         "warnings": case.warnings,
     });
-    let text =
-        format!("model: {}\n", case.model_description()) + &describe(findings) + &warnings(&case.warnings);
+    let text = setup_lines(&findings.setup.findings)
+        + &format!("model: {}\n", case.model_description())
+        + &describe(findings)
+        + &warnings(&case.warnings);
     let winner = diagnosis.winner().map(Candidate::label);
     let next =
         Guide::structure(campaign).diagnosed(diagnosis.verdict, winner.as_deref(), &next_measurement.what);

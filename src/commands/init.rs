@@ -5,8 +5,9 @@ use std::path::PathBuf;
 
 use serde_json::json;
 
-use super::text::{Emphasis, table, warnings};
+use super::text::{Emphasis, setup_lines, table, warnings};
 use super::{Outcome, next_step};
+use crate::analysis::setup::likely_mistakes;
 use crate::campaign::draft::{self, Answers, Draft, Missing, Scan};
 use crate::campaign::{Campaign, campaign_file};
 use crate::files::write_atomically;
@@ -189,6 +190,10 @@ pub fn run(args: Args, as_json: bool) -> Result<Outcome> {
         Campaign::from_text(dir, &text).map_err(as_given)?;
     }
     write_atomically(&file, text.as_bytes())?;
+    let setup = match missing.is_empty() {
+        true => Campaign::load(dir).map_or_else(|_| Vec::new(), |c| likely_mistakes(&c)),
+        false => Vec::new(),
+    };
 
     let guesses = draft.guesses();
     let json = json!({
@@ -199,12 +204,13 @@ pub fn run(args: Args, as_json: bool) -> Result<Outcome> {
         "cuts": scan.forces.iter().map(|f| json!({ "file": f.path })).collect::<Vec<_>>(),
         "missing": missing,
         "guessed": guesses,
+        "setup": setup,
         "not_used": scan.not_used.iter().map(|(file, why)| json!({ "file": file, "why": why })).collect::<Vec<_>>(),
     });
     let next = next_step::begun(dir, missing.len(), !scan.frfs.is_empty());
     Ok(Outcome::new(
         json,
-        describe(&file, &scan, &draft, &missing),
+        setup_lines(&setup) + &describe(&file, &scan, &draft, &missing),
         Some(next),
     ))
 }

@@ -7,6 +7,8 @@ use std::fmt;
 
 use anstyle::{AnsiColor, Style};
 
+use crate::discrepancy::setup::SetupFinding;
+
 /// What a piece of text means to the reader.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Emphasis {
@@ -109,6 +111,24 @@ pub fn number(value: f64, digits: usize) -> String {
 /// A share as per cent.
 pub fn percent(share: f64) -> String {
     format!("{} %", number(100.0 * share, 3))
+}
+
+/// The likely mistakes of the setup, each on lines of its own; empty where there is none. Stands before everything else.
+pub fn setup_lines(findings: &[SetupFinding]) -> String {
+    let likely = findings.iter().filter(|f| f.is_likely());
+    let text: String = likely
+        .map(|f| {
+            let told = wrapped(&f.sentence(), "  ");
+            format!(
+                "{}\n{told}",
+                Emphasis::Bad.on("SETUP: a mistake in the files or the setup is likely")
+            )
+        })
+        .collect();
+    match text.is_empty() {
+        true => text,
+        false => text + "\n",
+    }
 }
 
 /// Characters of the longest bar.

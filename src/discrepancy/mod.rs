@@ -15,6 +15,7 @@ mod noise_outlook;
 pub mod place;
 pub mod plan;
 pub mod prospect;
+pub mod setup;
 pub mod verdict;
 
 pub use compare::{Band, FrfComparison, FrfError};

@@ -207,7 +207,11 @@ fn parts(findings: &CampaignFindings) -> Vec<Section> {
 }
 
 fn summary(findings: &CampaignFindings) -> Section {
-    let mut blocks = Vec::new();
+    let mistakes = findings
+        .setup
+        .iter()
+        .map(|f| Block::Warning(format!("Setup: {}", f.sentence())));
+    let mut blocks: Vec<Block> = mistakes.collect();
     blocks.extend(
         findings
             .structure()

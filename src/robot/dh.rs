@@ -42,6 +42,20 @@ impl Kinematics {
         self.frames.len() - 1
     }
 
+    /// The same posture with joint `i` (1-based) further by `angle_rad`.
+    pub fn turned(&self, i: usize, angle_rad: f64) -> Kinematics {
+        let origin = self.joint_origin(i);
+        let axis = nalgebra::Unit::new_normalize(self.joint_axis(i));
+        let turn = UnitQuaternion::from_axis_angle(&axis, angle_rad);
+        let about = Isometry3::rotation_wrt_point(turn, origin);
+        let mut turned = self.clone();
+        for frame in turned.frames.iter_mut().skip(i) {
+            *frame = about * *frame;
+        }
+        turned.tool = about * turned.tool;
+        turned
+    }
+
     /// Axis of joint `i` (1-based): z of frame i−1.
     pub fn joint_axis(&self, i: usize) -> Vector3<f64> {
         self.frames[i - 1].rotation * Vector3::z()
@@ -103,6 +117,28 @@ mod tests {
                 .collect(),
             links: Vec::new(),
             tool: ToolFrame::default(),
+        }
+    }
+
+    /// A joint turned afterwards is a joint that stood there from the beginning.
+    #[test]
+    fn turning_a_joint_is_setting_its_angle() {
+        let spec = crate::robot::fixture::irb6640();
+        let q: Vec<f64> = [135.0, -2.0, 53.0, 83.0, 30.0, -117.0]
+            .map(f64::to_radians)
+            .into();
+        for joint in 1..=6 {
+            let mut other = q.clone();
+            other[joint - 1] += 0.3;
+            let expected = Kinematics::new(&spec, &other);
+            let turned = Kinematics::new(&spec, &q).turned(joint, 0.3);
+            let pairs = expected.frames.iter().zip(&turned.frames);
+            for (e, t) in pairs.chain([(&expected.tool, &turned.tool)]) {
+                assert!(
+                    (e.to_homogeneous() - t.to_homogeneous()).norm() < 1e-12,
+                    "{joint}"
+                );
+            }
         }
     }
 

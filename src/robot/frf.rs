@@ -361,6 +361,44 @@ impl FrfBasis {
         Ok(())
     }
 
+    /// As [`Self::solve`] at the complex rate s = iω + `decay_per_s`: the response that a signal shows which was multiplied
+    /// by exp(−decay t).
+    pub fn solve_decaying(&self, omega: f64, decay_per_s: f64, response: &mut Response) -> Result<()> {
+        let n = self.n;
+        let s = Complex64::new(decay_per_s, omega);
+        response.omega = omega;
+        response.columns.clear();
+        match &self.dynamics {
+            Dynamics::Diagonal { mu, damping } => {
+                for column in self.rows.column_iter() {
+                    for i in 0..n {
+                        response
+                            .columns
+                            .push(column[i] / (1.0 + s * damping[i] + s * s * mu[i]));
+                    }
+                }
+            }
+            Dynamics::Full { mass, damping } => {
+                let stiffness = |i: usize| if i / n == i % n { 1.0 } else { 0.0 };
+                let entries = mass.iter().zip(damping.iter()).enumerate();
+                response.dynamic.clear();
+                response
+                    .dynamic
+                    .extend(entries.map(|(i, (m, c))| stiffness(i) + s * *c + s * s * *m));
+                response
+                    .columns
+                    .extend(self.rows.iter().map(|r| Complex64::new(*r, 0.0)));
+                solve_in_place(n, &mut response.dynamic, &mut response.columns);
+            }
+        }
+        match response.columns.iter().all(|v| v.is_finite()) {
+            true => Ok(()),
+            false => Err(Error::computation(
+                "the model has no finite response at a complex rate",
+            )),
+        }
+    }
+
     /// Receptance of output `out` per force along output `input`, m/N, at the frequency last solved.
     pub fn receptance(&self, response: &Response, out: usize, input: usize) -> Complex64 {
         let column = &response.columns[input * self.n..(input + 1) * self.n];

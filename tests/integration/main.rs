@@ -25,6 +25,7 @@ mod sample_reports;
 mod schema;
 mod serve;
 mod served;
+mod setup;
 mod shell;
 mod simulate;
 mod structure;

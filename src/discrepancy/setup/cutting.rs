@@ -1,0 +1,419 @@
+//! Wrong wiring and wrong filters of force records: the dynamometer's axes, a channel's gain, an amplifier's low-pass.
+//!
+//! The mean forces of a few feeds fit six coefficients through any wiring; the waveform over a revolution and what
+//! coefficients a cut can have do not. Another reading of the channels is another `tool_from_dyno`: it is fitted anew, and
+//! those that leave equally little are told apart by their coefficients.
+
+use std::sync::Arc;
+
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use super::decide::{Tried, decide};
+use super::examine::{Rival, SetupCheck};
+use super::finding::{SetupFinding, with_error};
+use super::readings::Turn;
+use crate::Result;
+use crate::campaign::Process;
+use crate::identify::cutting_study::calibrate_cutting;
+use crate::identify::{Calibration, CuttingData, CuttingModel};
+
+/// Cuts that readings of the axes are tried on.
+const CUTS: usize = 4;
+/// Readings that leave no more than this times the least are equal.
+const ALIKE: f64 = 1.1;
+/// Another reading is believed for its waveform where it leaves this part of the misfit.
+const MUCH_BETTER: f64 = 0.4;
+/// Misfit per value above which the waveform says that something is wrong.
+const SUSPICIOUS: f64 = 1.3;
+/// Improbability (as χ²) of coefficients from which on they say that something is wrong.
+const IMPLAUSIBLE: f64 = 9.0;
+
+/// The dynamometer's axes first, for nothing else can be judged before; then gain and filter of the channels.
+///
+/// # Errors
+/// Records that no model can be fitted to.
+pub fn examine_cutting(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>) -> Result<SetupCheck> {
+    let mut check = SetupCheck {
+        reduced_chi2: 1.0,
+        ..SetupCheck::default()
+    };
+    if data.process != Process::Milling {
+        check.findings.extend(drilling_signs(data)?);
+        return Ok(check);
+    }
+    if let Some((finding, left)) = dyno_axes(data)? {
+        check.explained_share = 1.0;
+        check.reduced_chi2 = left;
+        check.findings.push(finding);
+        return Ok(check);
+    }
+    let model = CuttingModel::new(data, true)?;
+    let base = calibrate_cutting(&model, data)?;
+    check.reduced_chi2 = base.reduced_chi2;
+    if base.reduced_chi2 < SUSPICIOUS.min(1.0 + 30.0 / data.value_count() as f64) {
+        return Ok(check);
+    }
+    let changes: Vec<Change> = [
+        Change::Gain(0),
+        Change::Gain(1),
+        Change::LowPass { order: 1 },
+        Change::LowPass { order: 2 },
+    ]
+    .into();
+    let values = data.value_count();
+    let chi2 = base.reduced_chi2 * values as f64;
+    let tried: Vec<Tried> = changes
+        .par_iter()
+        .filter_map(|change| change.tried(data, chi2))
+        .collect();
+    if let Some(decision) = decide(&tried, chi2, values, rival) {
+        check.reduced_chi2 = decision.reduced_chi2;
+        check.explained_share = decision.explained_share;
+        check.findings.extend(decision.findings);
+    }
+    Ok(check)
+}
+
+/// A fit of one reading.
+struct Trial {
+    turn: Turn,
+    chi2: f64,
+    improbability: f64,
+    cutting: [f64; 3],
+}
+
+fn coefficient(calibration: &Calibration, name: &str) -> f64 {
+    let found = calibration.parameters.iter().find(|p| p.name == name);
+    found.map_or(0.0, |p| p.value)
+}
+
+fn fit(data: &CuttingData) -> Option<Calibration> {
+    let model = CuttingModel::new(data, true).ok()?;
+    calibrate_cutting(&model, data).ok()
+}
+
+/// How far coefficients are from those that metal cutting has, as a χ²: radial to tangential 0.4 within a factor of two,
+/// axial to tangential 0.2 ± 0.25, no edge force that pulls the tool along (Altintas 2012, tables of §2).
+fn improbability(calibration: &Calibration) -> f64 {
+    let get = |name: &str| coefficient(calibration, name);
+    let [ktc, krc, kac] = [get("ktc_n_per_mm2"), get("krc_n_per_mm2"), get("kac_n_per_mm2")];
+    if ktc <= 0.0 {
+        return 60.0;
+    }
+    let radial = match krc > 0.02 * ktc {
+        true => ((krc / ktc / 0.4).ln() / 0.7).powi(2),
+        false => 20.0,
+    };
+    let axial = ((kac / ktc - 0.2) / 0.25).powi(2);
+    let edges =
+        ["kte_n_per_mm", "kre_n_per_mm"].map(|name| (get(name).min(0.0) / (0.01 * ktc)).powi(2).min(10.0));
+    radial + axial.min(20.0) + edges[0] + edges[1]
+}
+
+fn read(data: &CuttingData, turn: Turn) -> CuttingData {
+    let mut own = data.clone();
+    for i in 0..3 {
+        for j in 0..3 {
+            // The recorded channel j is `sign[j]` times what the campaign takes channel `to[j]` for.
+            own.tool_from_dyno[i][j] = data.tool_from_dyno[i][turn.to[j]] * turn.sign[j];
+            own.dyno_from_tool[j][i] = data.dyno_from_tool[turn.to[j]][i] * turn.sign[j];
+        }
+    }
+    own
+}
+
+/// Another order or sign of the dynamometer's channels, where the records say so; with the misfit that it leaves.
+fn dyno_axes(data: &CuttingData) -> Result<Option<(SetupFinding, f64)>> {
+    let step = data.cuts.len().div_ceil(CUTS).max(1);
+    let some = data.filtered(|i| i % step == 0);
+    let Some(now) = fit(&some) else { return Ok(None) };
+    let now_improbable = improbability(&now);
+    if now.reduced_chi2 < SUSPICIOUS && now_improbable < IMPLAUSIBLE {
+        return Ok(None);
+    }
+    let trials: Vec<Trial> = Turn::all()
+        .into_par_iter()
+        .filter(|turn| *turn != Turn::NONE)
+        .filter_map(|turn| {
+            let own = read(&some, turn);
+            let calibration = fit(&own)?;
+            Some(Trial {
+                turn,
+                chi2: calibration.reduced_chi2,
+                improbability: improbability(&calibration),
+                cutting: ["ktc_n_per_mm2", "krc_n_per_mm2", "kac_n_per_mm2"]
+                    .map(|n| coefficient(&calibration, n)),
+            })
+        })
+        .collect();
+    let least = trials.iter().map(|t| t.chi2).fold(now.reduced_chi2, f64::min);
+    let mut equal: Vec<&Trial> = trials.iter().filter(|t| t.chi2 <= ALIKE * least).collect();
+    equal.sort_by(|a, b| a.improbability.total_cmp(&b.improbability));
+    let Some(best) = equal.first() else {
+        return Ok(None);
+    };
+    // As recorded counts among the rivals where it fits as well.
+    let much_better = best.chi2 < MUCH_BETTER * now.reduced_chi2;
+    let more_plausible = now_improbable > IMPLAUSIBLE && best.improbability + IMPLAUSIBLE < now_improbable;
+    let plausible = best.improbability < IMPLAUSIBLE;
+    let alike_now = now.reduced_chi2 <= ALIKE * least;
+    if !plausible || !(much_better || (alike_now && more_plausible)) {
+        return Ok(None);
+    }
+    let weight = |improbability: f64| (-0.5 * (improbability - best.improbability)).exp();
+    let sum: f64 = equal.iter().map(|t| weight(t.improbability)).sum::<f64>()
+        + if alike_now { weight(now_improbable) } else { 0.0 };
+    let matrix = read(data, best.turn).tool_from_dyno;
+    let rows: Vec<String> = matrix
+        .iter()
+        .map(|row| {
+            let entries: Vec<String> = row.iter().map(|v| decimal(*v)).collect();
+            format!("[{}]", entries.join(", "))
+        })
+        .collect();
+    let others: Vec<String> = equal
+        .iter()
+        .skip(1)
+        .filter(|t| weight(t.improbability) > 0.05)
+        .map(|t| t.turn.words(["Fx", "Fy", "Fz"], [true; 3]))
+        .collect();
+    let also = match others.is_empty() {
+        true => String::new(),
+        false => format!(" These records cannot tell it from: {}.", others.join("; or ")),
+    };
+    let [ktc, krc, kac] = best.cutting;
+    Ok(Some((
+        SetupFinding {
+            kind: "axes",
+            place: format!("dynamometer: {}", best.turn.words(["Fx", "Fy", "Fz"], [true; 3])),
+            value: None,
+            std_error: None,
+            unit: "",
+            confidence: 0.97 / sum,
+            remedy: format!(
+                "Write tool_from_dyno = [{}] in [dynamometer] of campaign.toml: read so, the waveforms leave {:.2} times the \
+                 variance of the noise (as it is {:.2}) and Ktc, Krc, Kac are {ktc:.0}, {krc:.0}, {kac:.0} N/mm². The \
+                 coefficients of the present matrix are wrong.{also}",
+                rows.join(", "),
+                best.chi2,
+                now.reduced_chi2,
+            ),
+        },
+        best.chi2,
+    )))
+}
+
+/// `0.0`, `-1.0`, `0.9848`: as campaign.toml has it.
+fn decimal(value: f64) -> String {
+    let rounded = (value * 1e6).round() / 1e6 + 0.0;
+    match rounded.fract() == 0.0 {
+        true => format!("{rounded:.1}"),
+        false => format!("{rounded}"),
+    }
+}
+
+/// Thrust and torque oppose the drill: coefficients below zero are a channel of the wrong sign.
+fn drilling_signs(data: &CuttingData) -> Result<Vec<SetupFinding>> {
+    let Some(calibration) = fit(data) else {
+        return Ok(Vec::new());
+    };
+    let estimate = |name: &str| calibration.parameters.iter().find(|p| p.name == name);
+    let channels = [("kfc_n_per_mm2", "thrust Fz"), ("ktc_n_per_mm2", "torque Mz")];
+    let turned = channels.into_iter().filter_map(|(name, channel)| {
+        let p = estimate(name)?;
+        (p.value < -5.0 * p.std_error).then(|| SetupFinding {
+            kind: "channel-sign",
+            place: format!("all drilling cuts, {channel}"),
+            value: Some(-1.0),
+            std_error: None,
+            unit: "",
+            confidence: 0.95,
+            remedy: format!(
+                "Turn the sign of {channel} round (tool_from_dyno, or the amplifier's polarity): it pulls the drill along."
+            ),
+        })
+    });
+    Ok(turned.collect())
+}
+
+/// A change of all records that one number describes; zero changes nothing.
+#[derive(Debug, Clone, Copy)]
+enum Change {
+    /// Logarithm of a recorded channel's gain.
+    Gain(usize),
+    /// Time constant of the amplifiers, s.
+    LowPass { order: u8 },
+}
+
+impl Change {
+    /// The data as they were before the change.
+    fn undone(self, data: &CuttingData, value: f64) -> CuttingData {
+        let mut own = data.clone();
+        match self {
+            Change::Gain(channel) => {
+                for row in &mut own.tool_from_dyno {
+                    row[channel] *= (-value).exp();
+                }
+                for entry in &mut own.dyno_from_tool[channel] {
+                    *entry *= value.exp();
+                }
+            }
+            Change::LowPass { order } => {
+                for cut in &mut own.cuts {
+                    let spindle = std::f64::consts::TAU * cut.spindle_hz();
+                    let cut = Arc::make_mut(cut);
+                    for channel in cut.channels.iter_mut().flatten() {
+                        let lines = channel.orders.iter_mut().zip(&mut channel.order_std);
+                        for (k, (line, std)) in lines.enumerate() {
+                            let s = Complex64::new(0.0, spindle * (k + 1) as f64 * value);
+                            let divisor = match order {
+                                1 => 1.0 + s,
+                                _ => 1.0 + s * std::f64::consts::SQRT_2 + s * s,
+                            };
+                            *line *= divisor;
+                            *std *= divisor.norm();
+                        }
+                    }
+                }
+            }
+        }
+        own
+    }
+
+    /// Values to begin with.
+    fn starts(self) -> [f64; 3] {
+        match self {
+            Change::Gain(_) => [-0.1, 0.0, 0.1],
+            Change::LowPass { .. } => [0.0, 2e-4, 6e-4],
+        }
+    }
+
+    /// The best value with its standard error and χ², where there is one inside what is possible.
+    fn best(self, data: &CuttingData) -> Option<(f64, f64, f64)> {
+        let chi2 = |value: f64| -> Option<f64> {
+            let own = self.undone(data, value);
+            Some(fit(&own)?.reduced_chi2 * data.value_count() as f64)
+        };
+        let mut points: Vec<(f64, f64)> = Vec::new();
+        for value in self.starts() {
+            points.push((value, chi2(value)?));
+        }
+        for _ in 0..6 {
+            points.sort_by(|a, b| a.1.total_cmp(&b.1));
+            let next = vertex(&points[..3])?;
+            let next = match self {
+                Change::Gain(_) => next.clamp(-1.5, 1.5),
+                Change::LowPass { .. } => next.clamp(0.0, 0.01),
+            };
+            if points
+                .iter()
+                .any(|p| (p.0 - next).abs() < 1e-3 * (next.abs() + 1e-6))
+            {
+                break;
+            }
+            points.push((next, chi2(next)?));
+        }
+        points.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let (value, least) = points[0];
+        let curvature = curvature(&points[..3])?;
+        (curvature > 0.0).then(|| (value, (2.0 / curvature).sqrt(), least))
+    }
+
+    fn tried(self, data: &CuttingData, base: f64) -> Option<Tried> {
+        let (value, std, chi2) = self.best(data)?;
+        if chi2 >= base || value == 0.0 {
+            return None;
+        }
+        let std = std * (chi2 / data.value_count() as f64).max(1.0).sqrt();
+        let finding = match self {
+            Change::Gain(channel) => {
+                let factor = value.exp();
+                let error = factor * std;
+                let names = ["Fx", "Fy", "Fz"];
+                let other = names[1 - channel];
+                SetupFinding {
+                    kind: "channel-gain",
+                    place: format!("all cuts, {} against {other}", names[channel]),
+                    value: Some(factor),
+                    std_error: Some(error),
+                    unit: "1",
+                    confidence: 0.0,
+                    remedy: format!(
+                        "Calibrate the dynamometer's channels: recorded {} is {} times what it should be (or {other} {:.4} \
+                         times: only their ratio shows).",
+                        names[channel],
+                        with_error(factor, error),
+                        1.0 / factor
+                    ),
+                }
+            }
+            Change::LowPass { order } => {
+                let corner = 1.0 / (std::f64::consts::TAU * value);
+                let error = corner * std / value;
+                SetupFinding {
+                    kind: "amplifier-low-pass",
+                    place: "all cuts, all channels".into(),
+                    value: Some(corner),
+                    std_error: Some(error),
+                    unit: "Hz",
+                    confidence: 0.0,
+                    remedy: format!(
+                        "Open the charge amplifier's low-pass filter: corner {} Hz, order {order}.",
+                        with_error(corner, error)
+                    ),
+                }
+            }
+        };
+        Some(Tried {
+            finding,
+            chi2,
+            parameters: 1,
+            tried: 4.0,
+            at_bound: false,
+        })
+    }
+}
+
+/// Second derivative of the parabola through three points.
+fn curvature(points: &[(f64, f64)]) -> Option<f64> {
+    let [(a, fa), (b, fb), (c, fc)] = *points else {
+        return None;
+    };
+    let slope = |x: f64, fx: f64, y: f64, fy: f64| (fy - fx) / (y - x);
+    let second = 2.0 * (slope(b, fb, c, fc) - slope(a, fa, b, fb)) / (c - a);
+    second.is_finite().then_some(second)
+}
+
+/// Where the parabola through three points is lowest.
+fn vertex(points: &[(f64, f64)]) -> Option<f64> {
+    let [(a, fa), (b, fb), _] = *points else {
+        return None;
+    };
+    let second = curvature(points)?;
+    if second <= 0.0 {
+        return Some(a);
+    }
+    let slope_at_middle = (fb - fa) / (b - a);
+    Some(0.5 * (a + b) - slope_at_middle / second)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_vertex_of_a_parabola_is_found() {
+        let f = |x: f64| 3.0 + 5.0 * (x - 0.7).powi(2);
+        let points = [-1.0, 0.2, 2.0].map(|x| (x, f(x)));
+        assert!((vertex(&points).unwrap() - 0.7).abs() < 1e-12);
+        assert!((curvature(&points).unwrap() - 10.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn matrices_are_written_as_campaign_toml_has_them() {
+        assert_eq!(decimal(-1.0), "-1.0");
+        assert_eq!(decimal(-0.0), "0.0");
+        assert_eq!(decimal(0.984_807_753), "0.984808");
+    }
+}

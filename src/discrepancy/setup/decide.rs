@@ -1,0 +1,100 @@
+//! From trials to findings: how sure.
+
+use super::examine::Rival;
+use super::finding::SetupFinding;
+use crate::discrepancy::verdict::evidence_weight;
+
+/// A mistake fitted to all data.
+#[derive(Debug, Clone)]
+pub struct Tried {
+    pub finding: SetupFinding,
+    /// With the priors.
+    pub chi2: f64,
+    pub parameters: usize,
+    /// Mistakes of the same sort that were looked at.
+    pub tried: f64,
+    /// Its size stopped at the end of what is possible.
+    pub at_bound: bool,
+}
+
+pub struct Decision {
+    pub findings: Vec<SetupFinding>,
+    pub reduced_chi2: f64,
+    pub explained_share: f64,
+}
+
+/// Findings less sure than this are not told.
+const LEAST_CONFIDENCE: f64 = 0.05;
+/// Most that is ever believed.
+const MOST: f64 = 0.98;
+/// What the library holds besides: the best of so many effects.
+const LIBRARY: f64 = 25.0;
+/// Share of what stands above the noise from which on a mistake explains it, and below which it does not.
+const EXPLAINS: [f64; 2] = [0.9, 0.4];
+
+/// `base`: χ² of the model as it stands, on `values` real values.
+pub fn decide(
+    tried: &[Tried],
+    base: f64,
+    values: usize,
+    rival: impl FnOnce() -> Option<Rival>,
+) -> Option<Decision> {
+    let n = values as f64;
+    let least = tried.iter().map(|t| t.chi2).fold(f64::INFINITY, f64::min);
+    if !least.is_finite() || least >= base {
+        return None;
+    }
+    // What even the best explanation leaves over scales what counts as evidence.
+    let scale = (least / n).max(1.0);
+    let bic = |chi2: f64, parameters: usize, looked: f64| {
+        (chi2 - base) / scale + parameters as f64 * n.ln() + 2.0 * looked.ln()
+    };
+    let bics: Vec<f64> = tried.iter().map(|t| bic(t.chi2, t.parameters, t.tried)).collect();
+    let lowest = bics.iter().copied().fold(f64::INFINITY, f64::min);
+    if lowest > -10.0 {
+        return None;
+    }
+    let excess = base - n;
+    let share = |chi2: f64| match excess > base - chi2 {
+        true => (base - chi2) / excess,
+        false => 1.0,
+    };
+    if share(least) < EXPLAINS[1] {
+        return None;
+    }
+    let physics = rival().map(|r| bic(base * (1.0 - r.gain_share), r.parameters, LIBRARY));
+    let weights: Vec<f64> = bics.iter().map(|b| evidence_weight(b - lowest)).collect();
+    // Two forms of one mistake (the order of a filter) are no rivals: the better one speaks for both.
+    let alike = |a: &Tried, b: &Tried| a.finding.kind == b.finding.kind && a.finding.place == b.finding.place;
+    let first_of_its_kind = |i: usize| {
+        !(0..tried.len()).any(|j| {
+            j != i && alike(&tried[i], &tried[j]) && { bics[j] < bics[i] || (bics[j] == bics[i] && j < i) }
+        })
+    };
+    let weights: Vec<f64> = (0..tried.len())
+        .map(|i| if first_of_its_kind(i) { weights[i] } else { 0.0 })
+        .collect();
+    let others = evidence_weight(-lowest) + physics.map_or(0.0, |p| evidence_weight(p - lowest));
+    let sum: f64 = weights.iter().sum::<f64>() + others;
+    let mut findings: Vec<SetupFinding> = tried
+        .iter()
+        .zip(&weights)
+        .map(|(t, weight)| {
+            let [enough, too_little] = EXPLAINS;
+            let explains = ((share(t.chi2) - too_little) / (enough - too_little)).clamp(0.0, 1.0);
+            let possible = if t.at_bound { 0.3 } else { 1.0 };
+            SetupFinding {
+                confidence: MOST * weight / sum * explains * possible,
+                ..t.finding.clone()
+            }
+        })
+        .filter(|f| f.confidence >= LEAST_CONFIDENCE)
+        .collect();
+    findings.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+    let best = tried.iter().zip(&bics).min_by(|a, b| a.1.total_cmp(b.1))?.0;
+    Some(Decision {
+        findings,
+        reduced_chi2: best.chi2 / n,
+        explained_share: share(best.chi2).clamp(0.0, 1.0),
+    })
+}

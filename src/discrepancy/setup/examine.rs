@@ -1,0 +1,359 @@
+//! Tries every mistake on a fitted model.
+
+use rayon::prelude::*;
+
+use super::decide::{Tried, decide};
+use super::duplicates::duplicates;
+use super::finding::SetupFinding;
+use super::fit::JointProblem;
+use super::group::Group;
+use super::mistake::{Estimated, Mistake};
+use super::reading::{Reading, model_read};
+use super::score::Linearised;
+use super::{mistakes, readings};
+use crate::Result;
+use crate::identify::calibrate::{Options, calibrate};
+use crate::identify::frf_data::FrfData;
+use crate::identify::levenberg_marquardt::{Stopping, minimise};
+use crate::identify::structure::{FrfProblem, Misfit};
+use crate::identify::study::{Study, View, try_effects};
+use crate::identify::{StructureModel, StructureStudy};
+
+/// The best that the library of effects can do on these data.
+#[derive(Debug, Clone, Default)]
+pub struct Rival {
+    /// `effect@site`.
+    pub label: String,
+    /// Share of χ² that it takes away from the model as it stands, 0..1.
+    pub gain_share: f64,
+    /// Its own parameters.
+    pub parameters: usize,
+}
+
+/// What was found.
+#[derive(Debug, Clone, Default)]
+pub struct SetupCheck {
+    /// Most likely first.
+    pub findings: Vec<SetupFinding>,
+    /// Weighted misfit per value that the first finding leaves; of the model as it stands where there is none.
+    pub reduced_chi2: f64,
+    /// Share of what stands above the noise that the first finding explains, 0..1.
+    pub explained_share: f64,
+}
+
+impl SetupCheck {
+    /// The finding that is believed, if one is.
+    pub fn likely(&self) -> Option<&SetupFinding> {
+        self.findings.first().filter(|f| f.is_likely())
+    }
+}
+
+/// Complex values that mistakes are tried on, about.
+const THIN_VALUES: usize = 4000;
+/// Decrease of χ² below which nothing is followed.
+const LEAST_GAIN: f64 = 30.0;
+/// Mistakes with a size that are fitted to the end on few lines.
+const FITTED: usize = 6;
+/// Readings that are fitted, for each starting point of the model.
+const READ: usize = 6;
+/// Trials that are fitted to all data.
+const REFINED: usize = 3;
+
+const ROUGH: Stopping = Stopping {
+    max_iterations: 12,
+    relative_decrease: 1e-4,
+};
+const FINE: Stopping = Stopping {
+    max_iterations: 6,
+    relative_decrease: 1e-6,
+};
+
+/// What a trial changes.
+enum Cause<'a> {
+    Size(&'a dyn Mistake, Group, Vec<f64>),
+    Read(&'a dyn Reading),
+}
+
+struct Trial<'a> {
+    cause: Cause<'a>,
+    theta: Vec<f64>,
+    /// χ² with the priors on the thinned data.
+    chi2: f64,
+    parameters: usize,
+}
+
+impl Trial<'_> {
+    /// χ² with what a parameter has to pay for.
+    fn price(&self, values: usize) -> f64 {
+        self.chi2 + self.parameters as f64 * (values as f64).ln()
+    }
+}
+
+/// Tries the mistakes on `model` at `theta`, its optimum on `data`. `rival` is asked for only where something is found.
+///
+/// # Errors
+/// A model without a response.
+pub fn examine(
+    model: &StructureModel,
+    data: &FrfData,
+    theta: &[f64],
+    rival: impl FnOnce() -> Option<Rival>,
+) -> Result<SetupCheck> {
+    let mut check = SetupCheck {
+        findings: duplicates(data, &model.points),
+        ..SetupCheck::default()
+    };
+    let thin = thinned(data);
+    let here = Linearised::new(model, &thin, theta)?;
+    let values = 2 * thin.value_count();
+    let base = cost(model, &thin, theta)?;
+    let excess = (2.0 * base / values as f64 - 1.0).max(0.0) * values as f64;
+    let all = mistakes::all(model, &thin);
+    let mut trials = sized(&here, &all, excess, base)?;
+    let read = proposed(model, &thin, theta)?;
+    trials.extend(read_trials(model, &thin, theta, &read, base)?);
+    trials.retain(|t| 2.0 * base - t.chi2 > LEAST_GAIN);
+    trials.sort_by(|a, b| a.price(values).total_cmp(&b.price(values)));
+    if std::env::var_os("LOBESTONE_SETUP_TRACE").is_some() {
+        for t in &trials {
+            let name = match &t.cause {
+                Cause::Size(m, g, v) => {
+                    let f = m.finding(&Estimated {
+                        group: *g,
+                        values: v,
+                        errors: &vec![0.0; v.len()],
+                        data: &thin,
+                        points: &model.points,
+                    });
+                    format!("{} {} {:?}", f.kind, f.place, v)
+                }
+                Cause::Read(r) => {
+                    let f = r.finding(&thin, &model.points);
+                    format!("{} {}", f.kind, f.place)
+                }
+            };
+            eprintln!(
+                "trial {name}: chi2 {:.0} of {:.0}, values {values}, share {:.3}",
+                t.chi2,
+                2.0 * base,
+                (2.0 * base - t.chi2) / excess.max(1.0)
+            );
+        }
+    }
+    let full_base = 2.0 * cost(model, data, theta)?;
+    check.reduced_chi2 = full_base / (2 * data.value_count()) as f64;
+    let tried: Vec<Tried> = trials
+        .iter()
+        .take(REFINED)
+        .collect::<Vec<_>>()
+        .par_iter()
+        .filter_map(|t| refined(model, data, t).ok())
+        .collect();
+    if let Some(decision) = decide(&tried, full_base, 2 * data.value_count(), rival) {
+        check.reduced_chi2 = decision.reduced_chi2;
+        check.explained_share = decision.explained_share;
+        check.findings.extend(decision.findings);
+        check
+            .findings
+            .sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+    }
+    Ok(check)
+}
+
+/// Few lines of every FRF, for many trials.
+fn thinned(data: &FrfData) -> FrfData {
+    let lines = data
+        .blocks
+        .iter()
+        .map(|b| b.frequency_hz.len())
+        .min()
+        .unwrap_or(0);
+    let stride = data
+        .value_count()
+        .div_ceil(THIN_VALUES)
+        .min((lines / 80).max(1))
+        .max(1);
+    data.thinned(stride, 1)
+}
+
+fn cost(model: &StructureModel, data: &FrfData, theta: &[f64]) -> Result<f64> {
+    use crate::identify::levenberg_marquardt::LeastSquares;
+    problem(model, data).cost(theta)
+}
+
+fn problem<'a>(model: &'a StructureModel, data: &'a FrfData) -> FrfProblem<'a> {
+    FrfProblem {
+        model,
+        data,
+        misfit: Misfit::Complex,
+        stride: 1,
+    }
+}
+
+/// The mistakes with a size that promise most, fitted on few lines.
+fn sized<'a>(
+    here: &Linearised<'a>,
+    all: &'a [Box<dyn Mistake>],
+    excess: f64,
+    _base: f64,
+) -> Result<Vec<Trial<'a>>> {
+    let mut scored = Vec::new();
+    for mistake in all {
+        let parameters = mistake.sizes().len() as f64;
+        let mut scores = here.scores(mistake.as_ref())?;
+        scores.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        // The two most promising groups of each.
+        scored.extend(
+            scores
+                .into_iter()
+                .take(2)
+                .map(|s| (mistake.as_ref(), s.gain - 8.0 * parameters, s)),
+        );
+    }
+    scored.sort_by(|a, b| b.1.total_cmp(&a.1));
+    if std::env::var_os("LOBESTONE_SETUP_TRACE").is_some() {
+        for (m, g, s) in scored.iter().take(12) {
+            let f = m.finding(&Estimated {
+                group: s.group,
+                values: &s.values,
+                errors: &vec![0.0; s.values.len()],
+                data: here.data,
+                points: &here.model.points,
+            });
+            eprintln!(
+                "score {} {} {:?}: gain {g:.0} of excess {excess:.0}",
+                f.kind, f.place, s.values
+            );
+        }
+    }
+    let promising = scored.into_iter().filter(|s| s.1 > LEAST_GAIN).take(FITTED);
+    let fits: Vec<Option<Trial>> = promising
+        .collect::<Vec<_>>()
+        .into_par_iter()
+        .map(|(mistake, _, score)| {
+            let joint = JointProblem {
+                model: here.model,
+                data: here.data,
+                mistake,
+                group: score.group,
+            };
+            let fit = joint.fit(here.theta, &score.values, ROUGH).ok()?;
+            let (values, _) = joint.values(&fit, 1.0)?;
+            let (chi2, parameters) = (2.0 * fit.cost, values.len());
+            Some(Trial {
+                cause: Cause::Size(mistake, score.group, values),
+                theta: fit.theta[..here.theta.len()].to_vec(),
+                chi2,
+                parameters,
+            })
+        })
+        .collect();
+    Ok(fits.into_iter().flatten().collect())
+}
+
+fn proposed(model: &StructureModel, thin: &FrfData, theta: &[f64]) -> Result<Vec<readings::Proposed>> {
+    let nominal = model.nominal_theta();
+    readings::proposed(model, thin, &[theta, &nominal], READ)
+}
+
+/// Readings with the baseline fitted anew, from where it stood and from the nominal values.
+fn read_trials<'a>(
+    model: &StructureModel,
+    thin: &FrfData,
+    theta: &[f64],
+    read: &'a [readings::Proposed],
+    base: f64,
+) -> Result<Vec<Trial<'a>>> {
+    let trials: Vec<Option<Trial>> = read
+        .par_iter()
+        .map(|proposed| {
+            let reading = proposed.reading.as_ref();
+            let data = reading.corrected(thin);
+            let read = model_read(model, reading);
+            let near = minimise(&problem(&read, &data), theta, &read.bounds(), ROUGH).ok()?;
+            let mut best = (near.cost, near.theta);
+            // Where the baseline was led astray its old place is no start.
+            if near.cost > 0.7 * data.value_count() as f64 && near.cost < base {
+                let options = Options {
+                    extra_starts: 0,
+                    ..Options::default()
+                };
+                if let Ok(fresh) = calibrate(&read, &data, None, options) {
+                    let cost = cost(&read, &data, &fresh.theta).ok()?;
+                    if cost < best.0 {
+                        best = (cost, fresh.theta);
+                    }
+                }
+            }
+            Some(Trial {
+                cause: Cause::Read(reading),
+                theta: best.1,
+                chi2: 2.0 * best.0,
+                parameters: 0,
+            })
+        })
+        .collect();
+    Ok(trials.into_iter().flatten().collect())
+}
+
+/// A trial on all data.
+fn refined(model: &StructureModel, data: &FrfData, trial: &Trial) -> Result<Tried> {
+    let freedom = 2.0 * data.value_count() as f64;
+    match &trial.cause {
+        Cause::Read(reading) => {
+            let corrected = reading.corrected(data);
+            let read = model_read(model, *reading);
+            let fit = minimise(&problem(&read, &corrected), &trial.theta, &read.bounds(), FINE)?;
+            Ok(Tried {
+                finding: reading.finding(data, &model.points),
+                chi2: 2.0 * fit.cost,
+                parameters: 0,
+                tried: reading.tried(),
+                at_bound: false,
+            })
+        }
+        Cause::Size(mistake, group, values) => {
+            let joint = JointProblem {
+                model,
+                data,
+                mistake: *mistake,
+                group: *group,
+            };
+            let fit = joint.fit(&trial.theta, values, FINE)?;
+            let scale = (2.0 * fit.cost / freedom).max(1.0);
+            let (values, errors) = joint
+                .values(&fit, scale)
+                .ok_or_else(|| crate::Error::computation("the size of the mistake is not determined"))?;
+            let estimated = Estimated {
+                group: *group,
+                values: &values,
+                errors: &errors,
+                data,
+                points: &model.points,
+            };
+            Ok(Tried {
+                finding: mistake.finding(&estimated),
+                chi2: 2.0 * fit.cost,
+                parameters: values.len(),
+                tried: mistake.groups(data).len() as f64,
+                at_bound: fit.at_bound.iter().any(|i| *i >= model.parameters.len()),
+            })
+        }
+    }
+}
+
+/// The best single effect of the library on few data, for commands that do not try them all anyway.
+pub fn library_rival(model: &StructureModel, data: &FrfData, theta: &[f64]) -> Option<Rival> {
+    let study = StructureStudy::new(&model.robot.spec, data.clone(), Options::default());
+    let (instances, _) = study.instances(model);
+    let hints = study.hints(model, theta).ok()?;
+    let bounds = study.bounds(model);
+    let base = minimise(&study.problem(model, View::COARSE), theta, &bounds, ROUGH).ok()?;
+    let tried = try_effects(&study, model, &instances, &[base.theta.clone()], &hints, || ());
+    let best = tried.iter().min_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost))?;
+    Some(Rival {
+        label: study.name(&best.instance).label(),
+        gain_share: (1.0 - best.fit.cost / base.cost).max(0.0),
+        parameters: study.parameters(&best.model).len() - model.parameters.len(),
+    })
+}

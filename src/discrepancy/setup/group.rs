@@ -1,0 +1,131 @@
+//! Which FRFs a mistake concerns.
+
+use crate::campaign::Point;
+use crate::identify::frf_data::{FrfData, FrfDatum};
+use crate::ingest::Axis;
+
+/// A selection of FRFs: those for which every given part agrees.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Group {
+    pub posture: Option<usize>,
+    /// Index into the campaign's points.
+    pub response_point: Option<usize>,
+    pub response_axis: Option<Axis>,
+    pub reference_axis: Option<Axis>,
+}
+
+impl Group {
+    pub const ALL: Group = Group {
+        posture: None,
+        response_point: None,
+        response_axis: None,
+        reference_axis: None,
+    };
+
+    pub fn holds(&self, frf: &FrfDatum) -> bool {
+        self.posture.is_none_or(|p| p == frf.posture)
+            && self.response_point.is_none_or(|p| p == frf.response.point)
+            && self.response_axis.is_none_or(|a| a == frf.response.axis)
+            && self.reference_axis.is_none_or(|a| a == frf.reference.axis)
+    }
+
+    /// Whether every FRF of `other` is one of this group.
+    pub fn contains(&self, other: &Group) -> bool {
+        fn part<T: PartialEq>(own: Option<T>, other: Option<T>) -> bool {
+            own.is_none() || own == other
+        }
+        part(self.posture, other.posture)
+            && part(self.response_point, other.response_point)
+            && part(self.response_axis, other.response_axis)
+            && part(self.reference_axis, other.reference_axis)
+    }
+
+    /// `all files`, `posture p3, response X`.
+    pub fn label(&self, data: &FrfData, points: &[Point]) -> String {
+        let mut parts = Vec::new();
+        if let Some(p) = self.posture {
+            parts.push(format!(
+                "posture {}",
+                data.posture_ids.get(p).map_or("?", |id| id)
+            ));
+        }
+        if let Some(p) = self.response_point {
+            parts.push(format!("response node {}", points.get(p).map_or(0, |p| p.node)));
+        }
+        if let Some(axis) = self.response_axis {
+            parts.push(format!("response {}", axis.letter()));
+        }
+        if let Some(axis) = self.reference_axis {
+            parts.push(format!("hits along {}", axis.letter()));
+        }
+        match parts.is_empty() {
+            true => "all files".into(),
+            false => parts.join(", "),
+        }
+    }
+
+    /// All files, each posture.
+    pub fn postures(data: &FrfData) -> Vec<Group> {
+        let mut groups = vec![Group::ALL];
+        let postures = data.measured_postures();
+        if postures.len() > 1 {
+            groups.extend(postures.iter().map(|&p| Group {
+                posture: Some(p),
+                ..Group::ALL
+            }));
+        }
+        groups
+    }
+
+    /// All files, each posture, each channel, and each channel at each posture; each selection of FRFs once.
+    pub fn channels(data: &FrfData) -> Vec<Group> {
+        let axes = || Axis::ALL.into_iter().map(Some);
+        let mut parts = vec![Group::ALL];
+        parts.extend(axes().map(|response_axis| Group {
+            response_axis,
+            ..Group::ALL
+        }));
+        parts.extend(axes().map(|reference_axis| Group {
+            reference_axis,
+            ..Group::ALL
+        }));
+        let mut points: Vec<usize> = data.frfs().map(|(_, f)| f.response.point).collect();
+        points.sort_unstable();
+        points.dedup();
+        parts.extend(points.iter().map(|&p| Group {
+            response_point: Some(p),
+            ..Group::ALL
+        }));
+        for &p in &points {
+            parts.extend(axes().map(|response_axis| Group {
+                response_point: Some(p),
+                response_axis,
+                ..Group::ALL
+            }));
+        }
+        let mut groups = Vec::new();
+        for posture in Self::postures(data) {
+            groups.extend(parts.iter().map(|part| Group {
+                posture: posture.posture,
+                ..*part
+            }));
+        }
+        distinct(groups, data)
+    }
+}
+
+/// Groups that hold something, each selection of FRFs once: under the first name for it.
+fn distinct(groups: Vec<Group>, data: &FrfData) -> Vec<Group> {
+    let mut seen: Vec<Vec<bool>> = Vec::new();
+    groups
+        .into_iter()
+        .filter(|group| {
+            let members: Vec<bool> = data.frfs().map(|(_, f)| group.holds(f)).collect();
+            let new = members.contains(&true) && !seen.contains(&members);
+            if new {
+                seen.push(members);
+            }
+            new
+        })
+        .collect()
+}

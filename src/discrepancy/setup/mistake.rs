@@ -1,0 +1,98 @@
+//! A mistake that has a size.
+
+use num_complex::Complex64;
+
+use super::finding::SetupFinding;
+use super::group::Group;
+use super::scene::Truth;
+use crate::campaign::Point;
+use crate::identify::frf_data::{FrfData, FrfDatum};
+use crate::ingest::Axis;
+use crate::robot::Kinematics;
+
+/// One quantity of a mistake; zero means that nothing is wrong.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Size {
+    /// Standard deviation of the normal prior about zero: sizes that occur.
+    pub usual: f64,
+    pub bounds: [f64; 2],
+}
+
+impl Size {
+    pub const fn either_way(usual: f64, most: f64) -> Self {
+        Size {
+            usual,
+            bounds: [-most, most],
+        }
+    }
+
+    pub const fn positive(usual: f64, most: f64) -> Self {
+        Size {
+            usual,
+            bounds: [0.0, most],
+        }
+    }
+}
+
+/// What was estimated of a mistake.
+pub struct Estimated<'a> {
+    pub group: Group,
+    pub values: &'a [f64],
+    /// Standard errors of `values`.
+    pub errors: &'a [f64],
+    pub data: &'a FrfData,
+    pub points: &'a [Point],
+}
+
+impl Estimated<'_> {
+    /// Euclidean length of the values with its standard error.
+    pub fn length(&self) -> (f64, f64) {
+        let length = self.values.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let pairs = self.values.iter().zip(self.errors);
+        let error = pairs.map(|(v, e)| (v * e).powi(2)).sum::<f64>().sqrt() / length.max(f64::MIN_POSITIVE);
+        (length, error)
+    }
+
+    pub fn place(&self) -> String {
+        self.group.label(self.data, self.points)
+    }
+}
+
+/// A mistake whose size is estimated. Its vanishing is `values` = 0.
+pub trait Mistake: Sync + Send {
+    fn sizes(&self) -> Vec<Size>;
+
+    /// Selections of FRFs that it may concern.
+    fn groups(&self, data: &FrfData) -> Vec<Group>;
+
+    /// The posture in truth, where campaign.toml gives `kinematics`.
+    fn kinematics(&self, _values: &[f64], kinematics: &Kinematics) -> Kinematics {
+        kinematics.clone()
+    }
+
+    /// The point in truth, where campaign.toml gives `point`, the `index`-th.
+    fn point(&self, _values: &[f64], _index: usize, point: &Point) -> Point {
+        point.clone()
+    }
+
+    /// Rate of an exponential window that was not taken out, 1/s.
+    fn decay_per_s(&self, _values: &[f64]) -> f64 {
+        0.0
+    }
+
+    /// What the file holds at `omega` (rad/s), m/N.
+    fn shown(&self, _values: &[f64], _omega: f64, truth: &Truth, frf: &FrfDatum) -> Complex64 {
+        truth.between(frf.response.axis, frf.reference.axis)
+    }
+
+    /// The finding, its confidence still open.
+    fn finding(&self, estimated: &Estimated) -> SetupFinding;
+}
+
+/// Small rotation by `degrees` about x, y, z: row `axis` of I + [r]×, so that ⟨row, v⟩ is the turned axis' part of v.
+pub(super) fn turned_axis(axis: Axis, degrees: &[f64]) -> [f64; 3] {
+    let vector = nalgebra::Vector3::from_column_slice(degrees).map(f64::to_radians);
+    let rotation = nalgebra::Rotation3::new(vector).into_inner();
+    let column = rotation.column(axis.index());
+    [column[0], column[1], column[2]]
+}

@@ -1,0 +1,41 @@
+use num_complex::Complex64;
+
+use super::super::finding::{SetupFinding, with_error};
+use super::super::group::Group;
+use super::super::mistake::{Estimated, Mistake, Size};
+use super::super::scene::Truth;
+use crate::identify::frf_data::{FrfData, FrfDatum};
+
+/// The file holds exp(value) times what was there.
+pub struct ChannelGain;
+
+impl Mistake for ChannelGain {
+    fn sizes(&self) -> Vec<Size> {
+        vec![Size::either_way(0.5, 10.0)]
+    }
+
+    fn groups(&self, data: &FrfData) -> Vec<Group> {
+        Group::channels(data)
+    }
+
+    fn shown(&self, values: &[f64], _omega: f64, truth: &Truth, frf: &FrfDatum) -> Complex64 {
+        truth.between(frf.response.axis, frf.reference.axis) * values[0].exp()
+    }
+
+    fn finding(&self, estimated: &Estimated) -> SetupFinding {
+        let factor = estimated.values[0].exp();
+        let error = factor * estimated.errors[0];
+        SetupFinding {
+            kind: "channel-gain",
+            place: estimated.place(),
+            value: Some(factor),
+            std_error: Some(error),
+            unit: "1",
+            confidence: 0.0,
+            remedy: format!(
+                "Check the sensitivities of sensor, hammer and amplifier: these FRFs are {} times what they should be.",
+                with_error(factor, error)
+            ),
+        }
+    }
+}

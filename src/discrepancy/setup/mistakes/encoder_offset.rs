@@ -1,0 +1,56 @@
+use super::super::finding::{SetupFinding, with_error};
+use super::super::group::Group;
+use super::super::mistake::{Estimated, Mistake, Size};
+use crate::identify::frf_data::FrfData;
+use crate::robot::Kinematics;
+
+/// A joint stood elsewhere than its angle says, deg: at every posture (the encoder's zero), or at one (written down wrongly).
+pub struct EncoderOffset {
+    /// 1-based.
+    pub joint: usize,
+}
+
+impl Mistake for EncoderOffset {
+    fn sizes(&self) -> Vec<Size> {
+        vec![Size::either_way(3.0, 30.0)]
+    }
+
+    fn groups(&self, data: &FrfData) -> Vec<Group> {
+        Group::postures(data)
+    }
+
+    fn kinematics(&self, values: &[f64], kinematics: &Kinematics) -> Kinematics {
+        kinematics.turned(self.joint, values[0].to_radians())
+    }
+
+    fn finding(&self, estimated: &Estimated) -> SetupFinding {
+        let (value, error) = (estimated.values[0], estimated.errors[0]);
+        let (place, remedy) = match estimated.group.posture {
+            None => (
+                format!("joint {}, all postures", self.joint),
+                format!(
+                    "Add {} deg to angle {} of every joints_deg in campaign.toml, and check the zero of that encoder.",
+                    with_error(value, error),
+                    self.joint
+                ),
+            ),
+            Some(_) => (
+                format!("joint {}, {}", self.joint, estimated.place()),
+                format!(
+                    "Check angle {} of this posture in campaign.toml: the FRFs fit an angle that is {} deg larger.",
+                    self.joint,
+                    with_error(value, error)
+                ),
+            ),
+        };
+        SetupFinding {
+            kind: "encoder-offset",
+            place,
+            value: Some(value),
+            std_error: Some(error),
+            unit: "deg",
+            confidence: 0.0,
+            remedy,
+        }
+    }
+}

@@ -1,0 +1,40 @@
+use super::super::finding::{SetupFinding, with_error};
+use super::super::group::Group;
+use super::super::mistake::{Estimated, Mistake, Size};
+use crate::identify::frf_data::FrfData;
+
+/// An exponential window was put on the records and not taken out: every pole decays faster by `value`, 1/s. What the file
+/// shows is H(ω − i/τ) (Fladung, Rost 1997: Application and correction of the exponential window for frequency response
+/// functions).
+pub struct ExponentialWindow;
+
+impl Mistake for ExponentialWindow {
+    fn sizes(&self) -> Vec<Size> {
+        vec![Size::positive(5.0, 100.0)]
+    }
+
+    fn groups(&self, data: &FrfData) -> Vec<Group> {
+        Group::postures(data)
+    }
+
+    fn decay_per_s(&self, values: &[f64]) -> f64 {
+        values[0]
+    }
+
+    fn finding(&self, estimated: &Estimated) -> SetupFinding {
+        let (rate, error) = (estimated.values[0], estimated.errors[0]);
+        let time = 1.0 / rate.max(1e-9);
+        SetupFinding {
+            kind: "exponential-window",
+            place: estimated.place(),
+            value: Some(rate),
+            std_error: Some(error),
+            unit: "1/s",
+            confidence: 0.0,
+            remedy: format!(
+                "Take the window's decay out of the damping, or export FRFs without it: its time constant is {} s.",
+                with_error(time, time * error / rate.max(1e-9))
+            ),
+        }
+    }
+}

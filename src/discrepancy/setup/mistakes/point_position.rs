@@ -1,0 +1,67 @@
+use super::super::finding::{SetupFinding, with_error};
+use super::super::group::Group;
+use super::super::mistake::{Estimated, Mistake, Size};
+use crate::campaign::{BodyRef, Point};
+use crate::identify::frf_data::FrfData;
+
+/// A measuring point sits elsewhere on its body, m along the body's axes.
+pub struct PointPosition {
+    /// Index into the campaign's points.
+    pub point: usize,
+}
+
+impl Mistake for PointPosition {
+    fn sizes(&self) -> Vec<Size> {
+        vec![Size::either_way(0.05, 1.0); 3]
+    }
+
+    fn groups(&self, _data: &FrfData) -> Vec<Group> {
+        vec![Group::ALL]
+    }
+
+    fn point(&self, values: &[f64], index: usize, point: &Point) -> Point {
+        let mut moved = point.clone();
+        if index == self.point {
+            for (p, v) in moved.position_m.iter_mut().zip(values) {
+                *p += v;
+            }
+        }
+        moved
+    }
+
+    fn finding(&self, estimated: &Estimated) -> SetupFinding {
+        let (length, error) = estimated.length();
+        let point = &estimated.points[self.point];
+        let body = match point.body {
+            BodyRef::Base => "base".to_string(),
+            BodyRef::Link(i) => format!("link {i}"),
+            BodyRef::Tool => "tool".to_string(),
+        };
+        let shift: Vec<String> = estimated
+            .values
+            .iter()
+            .zip(estimated.errors)
+            .map(|(v, e)| with_error(1e3 * v, 1e3 * e))
+            .collect();
+        let now: Vec<String> = point
+            .position_m
+            .iter()
+            .zip(estimated.values)
+            .map(|(p, v)| format!("{:.4}", p + v))
+            .collect();
+        SetupFinding {
+            kind: "point-position",
+            place: format!("node {} on the {body}", point.node),
+            value: Some(1e3 * length),
+            std_error: Some(1e3 * error),
+            unit: "mm",
+            confidence: 0.0,
+            remedy: format!(
+                "Measure where the point is: it fits best moved by ({}) mm along the body's axes, position_m = [{}] in \
+                 campaign.toml.",
+                shift.join(", "),
+                now.join(", ")
+            ),
+        }
+    }
+}

@@ -1,0 +1,67 @@
+use num_complex::Complex64;
+
+use super::super::finding::{SetupFinding, with_error};
+use super::super::group::Group;
+use super::super::mistake::{Estimated, Mistake, Size};
+use super::super::scene::Truth;
+use crate::identify::frf_data::{FrfData, FrfDatum};
+use crate::ingest::Axis;
+
+/// The sensor's channel loses low frequencies: (s/(s + value))^order, value = 2π × corner, 1/s.
+pub struct SensorHighPass {
+    pub order: i32,
+}
+
+impl Mistake for SensorHighPass {
+    fn sizes(&self) -> Vec<Size> {
+        vec![Size::positive(10.0, 200.0)]
+    }
+
+    fn groups(&self, data: &FrfData) -> Vec<Group> {
+        responses(data)
+    }
+
+    fn shown(&self, values: &[f64], _omega: f64, truth: &Truth, frf: &FrfDatum) -> Complex64 {
+        let factor = truth.rate / (truth.rate + values[0]);
+        truth.between(frf.response.axis, frf.reference.axis) * factor.powi(self.order)
+    }
+
+    fn finding(&self, estimated: &Estimated) -> SetupFinding {
+        let tau = std::f64::consts::TAU;
+        let (corner, error) = (estimated.values[0] / tau, estimated.errors[0] / tau);
+        SetupFinding {
+            kind: "sensor-high-pass",
+            place: estimated.place(),
+            value: Some(corner),
+            std_error: Some(error),
+            unit: "Hz",
+            confidence: 0.0,
+            remedy: format!(
+                "Use DC coupling or a sensor that reaches lower, or divide the FRFs by the sensor's response: corner {} Hz, \
+                 order {}.",
+                with_error(corner, error),
+                self.order
+            ),
+        }
+    }
+}
+
+/// All files, each posture, each response axis, each response node.
+pub(super) fn responses(data: &FrfData) -> Vec<Group> {
+    let mut groups = Group::postures(data);
+    groups.extend(Axis::ALL.map(|axis| Group {
+        response_axis: Some(axis),
+        ..Group::ALL
+    }));
+    let mut points: Vec<usize> = data.frfs().map(|(_, f)| f.response.point).collect();
+    points.sort_unstable();
+    points.dedup();
+    if points.len() > 1 {
+        groups.extend(points.into_iter().map(|p| Group {
+            response_point: Some(p),
+            ..Group::ALL
+        }));
+    }
+    groups.retain(|g| data.frfs().any(|(_, f)| g.holds(f)));
+    groups
+}

@@ -1,0 +1,60 @@
+use num_complex::Complex64;
+
+use super::super::finding::{SetupFinding, with_error};
+use super::super::group::Group;
+use super::super::mistake::{Estimated, Mistake, Size, turned_axis};
+use super::super::scene::Truth;
+use crate::identify::frf_data::{FrfData, FrfDatum};
+
+/// The sensor stood askew at one posture or at one node: turned by a rotation vector, deg about x, y, z. A sensor that is
+/// askew in all files is the effect `sensor-misalignment`.
+pub struct TurnedSensor;
+
+impl Mistake for TurnedSensor {
+    fn sizes(&self) -> Vec<Size> {
+        vec![Size::either_way(5.0, 60.0); 3]
+    }
+
+    fn groups(&self, data: &FrfData) -> Vec<Group> {
+        let mut groups = Group::postures(data);
+        let mut points: Vec<usize> = data.frfs().map(|(_, f)| f.response.point).collect();
+        points.sort_unstable();
+        points.dedup();
+        if points.len() > 1 {
+            groups.extend(points.into_iter().map(|p| Group {
+                response_point: Some(p),
+                ..Group::ALL
+            }));
+        }
+        groups.retain(|g| *g != Group::ALL);
+        groups
+    }
+
+    fn shown(&self, values: &[f64], _omega: f64, truth: &Truth, frf: &FrfDatum) -> Complex64 {
+        let direction = turned_axis(frf.response.axis, values);
+        let terms = crate::ingest::Axis::ALL.into_iter().zip(direction);
+        terms
+            .map(|(axis, part)| truth.between(axis, frf.reference.axis) * part)
+            .sum()
+    }
+
+    fn finding(&self, estimated: &Estimated) -> SetupFinding {
+        let (angle, error) = estimated.length();
+        SetupFinding {
+            kind: "axes",
+            place: format!("{}, sensor", estimated.place()),
+            value: Some(angle),
+            std_error: Some(error),
+            unit: "deg",
+            confidence: 0.0,
+            remedy: format!(
+                "Set the sensor straight there: it was turned by {} deg, rotation vector ({:.2}, {:.2}, {:.2}) deg about the \
+                 node's axes.",
+                with_error(angle, error),
+                estimated.values[0],
+                estimated.values[1],
+                estimated.values[2]
+            ),
+        }
+    }
+}

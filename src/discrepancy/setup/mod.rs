@@ -1,0 +1,30 @@
+//! Wrong files before missing physics: ordinary mistakes of a laboratory, tried on a fitted model and named as what they are.
+//!
+//! Two kinds of mistake. A [`Mistake`] has a size (an encoder offset, a gain, a corner frequency) and changes what the model
+//! predicts for the files; its score is a linear estimate with what the baseline can absorb projected out, and the
+//! promising ones are fitted together with the baseline. A [`Reading`] has none (axes exchanged, a sign, a posture's file
+//! filed under another): the data are put right and the baseline is fitted again. A finding has to be more than chance, to
+//! leave less than the physics of the library would, and to explain what stands above the noise.
+
+mod cutting;
+mod decide;
+mod duplicates;
+mod examine;
+mod finding;
+mod fit;
+mod group;
+mod mistake;
+mod mistakes;
+mod reading;
+mod readings;
+mod scene;
+mod score;
+#[cfg(test)]
+mod tests;
+
+pub use cutting::examine_cutting;
+pub use examine::{Rival, SetupCheck, examine, library_rival};
+pub use finding::{LIKELY, SetupFinding};
+pub use group::Group;
+pub use mistake::Mistake;
+pub use reading::Reading;

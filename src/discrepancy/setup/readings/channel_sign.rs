@@ -1,0 +1,56 @@
+use std::sync::Arc;
+
+use super::super::finding::SetupFinding;
+use super::super::group::Group;
+use super::super::reading::Reading;
+use super::Proposed;
+use super::table::{Table, distance};
+use crate::campaign::Point;
+use crate::identify::frf_data::FrfData;
+
+/// A group of FRFs with the wrong sign: a sensor, a hammer or an amplifier of the other polarity.
+pub struct ChannelSign {
+    group: Group,
+}
+
+impl Reading for ChannelSign {
+    fn corrected(&self, data: &FrfData) -> FrfData {
+        let mut data = data.clone();
+        for block in &mut data.blocks {
+            let block = Arc::make_mut(block);
+            for frf in block.frfs.iter_mut().filter(|f| self.group.holds(f)) {
+                frf.sign = -frf.sign;
+            }
+        }
+        data
+    }
+
+    fn finding(&self, data: &FrfData, points: &[Point]) -> SetupFinding {
+        SetupFinding {
+            kind: "channel-sign",
+            place: self.group.label(data, points),
+            value: Some(-1.0),
+            std_error: None,
+            unit: "",
+            confidence: 0.0,
+            remedy:
+                "Turn the sign of these FRFs round: check the polarity of sensor, hammer and amplifier there."
+                    .into(),
+        }
+    }
+}
+
+pub fn proposed(table: &Table, data: &FrfData) -> Vec<Proposed> {
+    let turned: Vec<f64> = data
+        .frfs()
+        .enumerate()
+        .map(|(i, (_, frf))| distance(table.own(i, frf).iter().map(|m| -m), frf))
+        .collect();
+    Group::channels(data)
+        .into_iter()
+        .map(|group| Proposed {
+            gain: table.gain(data, &group, |i, _| turned[i]),
+            reading: Box::new(ChannelSign { group }),
+        })
+        .collect()
+}

@@ -1,0 +1,60 @@
+//! The mistakes without a size, one file each, and which of them are worth a fit.
+
+mod axes;
+mod channel_sign;
+mod phase_conjugated;
+mod point_frame;
+mod posture_swap;
+mod quantity;
+mod table;
+
+use super::reading::Reading;
+use crate::Result;
+use crate::identify::StructureModel;
+use crate::identify::frf_data::FrfData;
+use table::Table;
+
+pub use axes::Turn;
+
+/// A reading with how much nearer the model comes by it, in values that agreed not at all.
+pub struct Proposed {
+    pub reading: Box<dyn Reading>,
+    pub gain: f64,
+}
+
+/// Readings that bring the model at any of `thetas` nearer to the data, most promising first.
+///
+/// # Errors
+/// A model that has no response.
+pub fn proposed(
+    model: &StructureModel,
+    data: &FrfData,
+    thetas: &[&[f64]],
+    most: usize,
+) -> Result<Vec<Proposed>> {
+    let mut all: Vec<Proposed> = Vec::new();
+    for theta in thetas {
+        let table = Table::new(model, data, theta)?;
+        let mut here: Vec<Proposed> = Vec::new();
+        here.extend(axes::proposed(&table, data));
+        here.extend(channel_sign::proposed(&table, data));
+        here.extend(phase_conjugated::proposed(&table, data));
+        here.extend(quantity::proposed(&table, data));
+        here.extend(point_frame::proposed(&table, model, data, theta)?);
+        here.extend(posture_swap::proposed(&table, model, data, theta)?);
+        here.retain(|p| p.gain > 0.0);
+        here.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        here.truncate(most);
+        all.extend(here);
+    }
+    // The same reading is proposed from several places.
+    let mut seen: Vec<(&'static str, String)> = Vec::new();
+    all.retain(|p| {
+        let finding = p.reading.finding(data, &model.points);
+        let name = (finding.kind, finding.place);
+        let new = !seen.contains(&name);
+        seen.push(name);
+        new
+    });
+    Ok(all)
+}

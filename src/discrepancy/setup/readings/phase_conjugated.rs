@@ -1,0 +1,58 @@
+use std::sync::Arc;
+
+use super::super::finding::SetupFinding;
+use super::super::group::Group;
+use super::super::reading::Reading;
+use super::Proposed;
+use super::table::{Table, distance};
+use crate::campaign::Point;
+use crate::identify::frf_data::FrfData;
+
+/// Imaginary parts with the wrong sign: the other convention of the Fourier transform, or force over response phase.
+pub struct PhaseConjugated {
+    group: Group,
+}
+
+impl Reading for PhaseConjugated {
+    fn corrected(&self, data: &FrfData) -> FrfData {
+        let mut data = data.clone();
+        for block in &mut data.blocks {
+            let block = Arc::make_mut(block);
+            for frf in block.frfs.iter_mut().filter(|f| self.group.holds(f)) {
+                for h in &mut frf.receptance {
+                    *h = h.conj();
+                }
+            }
+        }
+        data
+    }
+
+    fn finding(&self, data: &FrfData, points: &[Point]) -> SetupFinding {
+        SetupFinding {
+            kind: "phase-conjugated",
+            place: self.group.label(data, points),
+            value: None,
+            std_error: None,
+            unit: "",
+            confidence: 0.0,
+            remedy: "Turn the sign of the imaginary parts round: Im H of a driving point must be negative. The files were \
+                     written with the other sign convention of the transform."
+                .into(),
+        }
+    }
+}
+
+pub fn proposed(table: &Table, data: &FrfData) -> Vec<Proposed> {
+    let turned: Vec<f64> = data
+        .frfs()
+        .enumerate()
+        .map(|(i, (_, frf))| distance(table.own(i, frf).iter().map(|m| m.conj()), frf))
+        .collect();
+    Group::postures(data)
+        .into_iter()
+        .map(|group| Proposed {
+            gain: table.gain(data, &group, |i, _| turned[i]),
+            reading: Box::new(PhaseConjugated { group }),
+        })
+        .collect()
+}

@@ -1,0 +1,84 @@
+use std::sync::Arc;
+
+use num_complex::Complex64;
+
+use super::super::finding::SetupFinding;
+use super::super::group::Group;
+use super::super::reading::Reading;
+use super::Proposed;
+use super::table::{Table, distance};
+use crate::campaign::Point;
+use crate::identify::frf_data::FrfData;
+
+/// Displacement, velocity and acceleration per force taken for one another: the file holds (iω)^power times what it is read
+/// as.
+pub struct Quantity {
+    group: Group,
+    power: i32,
+}
+
+/// (iω)^power at a frequency, SI.
+fn factor(frequency_hz: f64, power: i32) -> Complex64 {
+    Complex64::new(0.0, std::f64::consts::TAU * frequency_hz).powi(power)
+}
+
+impl Reading for Quantity {
+    fn corrected(&self, data: &FrfData) -> FrfData {
+        let mut data = data.clone();
+        for block in &mut data.blocks {
+            let block = Arc::make_mut(block);
+            for frf in block.frfs.iter_mut().filter(|f| self.group.holds(f)) {
+                let lines = block.frequency_hz.iter();
+                for ((f, h), std) in lines.zip(&mut frf.receptance).zip(&mut frf.noise_std) {
+                    let factor = factor(*f, self.power);
+                    *h /= factor;
+                    *std /= factor.norm();
+                }
+            }
+        }
+        data
+    }
+
+    fn finding(&self, data: &FrfData, points: &[Point]) -> SetupFinding {
+        let is = match self.power {
+            1 => {
+                "mobility where campaign.toml or the file says receptance (or accelerance where it says mobility)"
+            }
+            2 => "accelerance where campaign.toml or the file says receptance",
+            -1 => {
+                "receptance where campaign.toml or the file says mobility (or mobility where it says accelerance)"
+            }
+            _ => "receptance where campaign.toml or the file says accelerance",
+        };
+        SetupFinding {
+            kind: "quantity",
+            place: self.group.label(data, points),
+            value: Some(f64::from(self.power)),
+            std_error: None,
+            unit: "powers of iω",
+            confidence: 0.0,
+            remedy: format!("Set quantity of these [[frf]] right: they hold {is}."),
+        }
+    }
+}
+
+pub fn proposed(table: &Table, data: &FrfData) -> Vec<Proposed> {
+    let mut all = Vec::new();
+    for power in [-2, -1, 1, 2] {
+        let turned: Vec<f64> = data
+            .frfs()
+            .enumerate()
+            .map(|(i, (block, frf))| {
+                let lines = table.own(i, frf).iter().zip(&block.frequency_hz);
+                distance(lines.map(|(m, f)| m * factor(*f, power)), frf)
+            })
+            .collect();
+        for group in Group::postures(data) {
+            all.push(Proposed {
+                gain: table.gain(data, &group, |i, _| turned[i]),
+                reading: Box::new(Quantity { group, power }),
+            });
+        }
+    }
+    all
+}

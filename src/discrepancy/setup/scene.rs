@@ -1,0 +1,207 @@
+//! What the model predicts for files about which something is wrong.
+
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use super::group::Group;
+use super::mistake::Mistake;
+use crate::Result;
+use crate::effects::ChannelFilter;
+use crate::identify::StructureModel;
+use crate::identify::frf_data::{FrfBlock, FrfData, FrfDatum};
+use crate::ingest::Axis;
+use crate::robot::FrfBasis;
+use crate::robot::frf::Response;
+
+/// The true receptances between the two points of an FRF, m/N.
+pub struct Truth<'t> {
+    basis: &'t FrfBasis,
+    response: &'t Response,
+    filter: &'t ChannelFilter,
+    /// First of the three outputs of the response point and of the reference point.
+    first: [usize; 2],
+    /// Complex rate, 1/s.
+    pub rate: Complex64,
+}
+
+impl Truth<'_> {
+    /// Displacement along `response` at the response point, as its channel would have it without the mistake, per force
+    /// along `reference` at the reference point.
+    pub fn between(&self, response: Axis, reference: Axis) -> Complex64 {
+        let row = &self.filter.mixing[response.index()];
+        let input = self.first[1] + reference.index();
+        let terms = row.iter().enumerate().filter(|(_, weight)| weight.value != 0.0);
+        terms
+            .map(|(j, weight)| self.basis.receptance(self.response, self.first[0] + j, input) * weight.value)
+            .sum()
+    }
+
+    /// With the sign of the file's axes and the delay of the channel.
+    fn recorded(&self, frf: &FrfDatum, shown: Complex64) -> Complex64 {
+        shown * Complex64::from_polar(frf.sign, -self.rate.im * self.filter.delay_s.value)
+    }
+
+    /// Between the axes of the response point itself.
+    pub fn at_response(&self, a: usize, b: usize) -> Complex64 {
+        self.basis
+            .receptance(self.response, self.first[0] + a, self.first[0] + b)
+    }
+
+    /// From the force along `reference` to axis `a` of the response point, before any channel.
+    pub fn bare(&self, a: usize, reference: Axis) -> Complex64 {
+        self.basis.receptance(
+            self.response,
+            self.first[0] + a,
+            self.first[1] + reference.index(),
+        )
+    }
+}
+
+/// A mistake of a given size in some of the files.
+#[derive(Clone, Copy)]
+pub struct Made<'m> {
+    pub mistake: &'m dyn Mistake,
+    pub group: Group,
+    pub values: &'m [f64],
+}
+
+/// Curves in the order of `data.frfs()`, m/N.
+pub type Curves = Vec<Vec<Complex64>>;
+
+/// Predicted receptances of files with `made`.
+pub fn predict(model: &StructureModel, theta: &[f64], data: &FrfData, made: Option<Made>) -> Result<Curves> {
+    let per_block: Vec<Curves> = data
+        .blocks
+        .par_iter()
+        .map(|block| {
+            let concerned = |k: usize| made.is_some_and(|m| m.group.holds(&block.frfs[k]));
+            let (with, without): (Vec<usize>, Vec<usize>) =
+                (0..block.frfs.len()).partition(|k| concerned(*k));
+            let mut curves = vec![Vec::new(); block.frfs.len()];
+            pass(model, theta, block, None, &without, |k, _, truth| {
+                let frf = &block.frfs[k];
+                curves[k].push(truth.recorded(frf, truth.between(frf.response.axis, frf.reference.axis)));
+            })?;
+            if let Some(m) = made {
+                pass(model, theta, block, made, &with, |k, omega, truth| {
+                    let frf = &block.frfs[k];
+                    curves[k].push(truth.recorded(frf, m.mistake.shown(m.values, omega, truth, frf)));
+                })?;
+            }
+            Ok(curves)
+        })
+        .collect::<Result<_>>()?;
+    Ok(per_block.into_iter().flatten().collect())
+}
+
+/// Predicted receptances between all axes of each FRF's points, with the sign of the axes that its file names:
+/// [response axis][reference axis].
+pub fn predict_all_axes(model: &StructureModel, theta: &[f64], data: &FrfData) -> Result<[[Curves; 3]; 3]> {
+    let per_block: Vec<[[Curves; 3]; 3]> = data
+        .blocks
+        .par_iter()
+        .map(|block| {
+            let mut curves: [[Curves; 3]; 3] =
+                std::array::from_fn(|_| std::array::from_fn(|_| vec![Vec::new(); block.frfs.len()]));
+            let members: Vec<usize> = (0..block.frfs.len()).collect();
+            pass(model, theta, block, None, &members, |k, _, truth| {
+                for a in Axis::ALL {
+                    for b in Axis::ALL {
+                        let value = truth.recorded(&block.frfs[k], truth.between(a, b));
+                        curves[a.index()][b.index()][k].push(value);
+                    }
+                }
+            })?;
+            Ok(curves)
+        })
+        .collect::<Result<_>>()?;
+    let mut all: [[Curves; 3]; 3] = Default::default();
+    for block in per_block {
+        for (row, own) in all.iter_mut().zip(block) {
+            for (curves, own) in row.iter_mut().zip(own) {
+                curves.extend(own);
+            }
+        }
+    }
+    Ok(all)
+}
+
+/// Sets the model up once for `members` of a block, all with `made` or all without, and shows each line of each.
+fn pass(
+    model: &StructureModel,
+    theta: &[f64],
+    block: &FrfBlock,
+    made: Option<Made>,
+    members: &[usize],
+    mut show: impl FnMut(usize, f64, &Truth),
+) -> Result<()> {
+    if members.is_empty() {
+        return Ok(());
+    }
+    let filter = model.filter(theta, false);
+    let kinematics = match made {
+        Some(m) => m.mistake.kinematics(m.values, &block.kinematics),
+        None => block.kinematics.clone(),
+    };
+    let chain = model.chain(theta, &kinematics, block.lowness, false);
+    let mut points: Vec<usize> = members
+        .iter()
+        .flat_map(|&k| [block.frfs[k].response.point, block.frfs[k].reference.point])
+        .collect();
+    points.sort_unstable();
+    points.dedup();
+    let mut rows = Vec::with_capacity(3 * points.len());
+    for &index in &points {
+        let point = match made {
+            Some(m) => m.mistake.point(m.values, index, &model.points[index]),
+            None => model.points[index].clone(),
+        };
+        for axis in Axis::ALL {
+            rows.push(model.robot.output_row(&chain, &kinematics, &point, axis, false));
+        }
+    }
+    let basis = FrfBasis::new(&chain.system(0), &rows)?;
+    let first = |point: usize| 3 * points.iter().position(|p| *p == point).unwrap_or(0);
+    let firsts: Vec<[usize; 2]> = members
+        .iter()
+        .map(|&k| {
+            [
+                first(block.frfs[k].response.point),
+                first(block.frfs[k].reference.point),
+            ]
+        })
+        .collect();
+    let decay = made.map_or(0.0, |m| m.mistake.decay_per_s(m.values));
+    let mut response = Response::default();
+    for f in &block.frequency_hz {
+        let omega = std::f64::consts::TAU * f;
+        if decay == 0.0 {
+            basis.solve(omega, &mut response)?;
+        } else {
+            basis.solve_decaying(omega, decay, &mut response)?;
+        }
+        for (&k, first) in members.iter().zip(&firsts) {
+            let truth = Truth {
+                basis: &basis,
+                response: &response,
+                filter: &filter,
+                first: *first,
+                rate: Complex64::new(decay, omega),
+            };
+            show(k, omega, &truth);
+        }
+    }
+    Ok(())
+}
+
+/// (predicted − measured) √2/σ as real numbers, FRF by FRF: each has unit variance where only noise is left.
+pub fn weighted(predicted: &Curves, data: &FrfData) -> Vec<f64> {
+    let mut residual = Vec::with_capacity(2 * data.value_count());
+    for ((_, frf), curve) in data.frfs().zip(predicted) {
+        for ((m, h), std) in curve.iter().zip(&frf.receptance).zip(&frf.noise_std) {
+            let r = (m - h) * (std::f64::consts::SQRT_2 / std);
+            residual.extend([r.re, r.im]);
+        }
+    }
+    residual
+}

@@ -1,0 +1,217 @@
+//! Each mistake made in data of the model itself, and found again.
+
+use std::sync::Arc;
+
+use num_complex::Complex64;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::mistakes;
+use super::scene::{Made, predict};
+use super::*;
+use crate::campaign::{AxesRef, BodyRef, MeasuredDof, Point, RobotSection};
+use crate::identify::StructureModel;
+use crate::identify::frf_data::{FrfBlock, FrfData, FrfDatum};
+use crate::identify::levenberg_marquardt::{Stopping, minimise};
+use crate::identify::structure::{FrfProblem, Misfit};
+use crate::ingest::Axis;
+use crate::robot::RobotModel;
+use crate::robot::fixture::{TAP_POSTURES, irb6640};
+
+const RELATIVE_NOISE: f64 = 0.02;
+
+fn model() -> StructureModel {
+    let section = RobotSection {
+        model: "irb6640".into(),
+        mass_tolerance: None,
+        stiffness_tolerance: 0.3,
+    };
+    let point = |node, body| Point {
+        node,
+        body,
+        position_m: [0.0; 3],
+        axes: AxesRef::Base,
+    };
+    let points = vec![point(1, BodyRef::Tool), point(2, BodyRef::Link(3))];
+    StructureModel::new(RobotModel::new(irb6640()), points, &section)
+}
+
+/// Where the truth stands: stiffnesses off the robot file by up to 20 %.
+fn truth(model: &StructureModel) -> Vec<f64> {
+    let shifts = [0.1, -0.2, 0.15, 0.05, -0.1, 0.2, 0.1];
+    let nominal = model.nominal_theta();
+    nominal.iter().zip(shifts).map(|(t, s)| t + s).collect()
+}
+
+/// Four postures; all axes of tool and link 3 for hits at the tool.
+fn arrangement(model: &StructureModel) -> FrfData {
+    let frequency_hz: Vec<f64> = (0..240).map(|k| 4.0 + 0.25 * f64::from(k)).collect();
+    let lines = frequency_hz.len();
+    let blocks = TAP_POSTURES.iter().enumerate().map(|(posture, joints)| {
+        let outputs: Vec<(usize, Axis)> = (0..2).flat_map(|p| Axis::ALL.map(|a| (p, a))).collect();
+        let dof = |point, axis| MeasuredDof {
+            point,
+            axis,
+            negative: false,
+        };
+        let pairs = (0..2)
+            .flat_map(|p| Axis::ALL.map(|a| (p, a)))
+            .flat_map(|r| Axis::ALL.map(|b| (r, b)));
+        let frfs = pairs.map(|((point, axis), reference)| FrfDatum {
+            name: String::new(),
+            posture,
+            response: dof(point, axis),
+            reference: dof(0, reference),
+            response_outputs: [3 * point, 3 * point + 1, 3 * point + 2],
+            input: reference.index(),
+            sign: 1.0,
+            receptance: vec![Complex64::ZERO; lines],
+            noise_std: vec![1.0; lines],
+        });
+        Arc::new(FrfBlock {
+            posture,
+            force_level_n: None,
+            lowness: 0.0,
+            kinematics: model.robot.kinematics(joints).unwrap(),
+            frequency_hz: frequency_hz.clone(),
+            outputs,
+            frfs: frfs.collect(),
+        })
+    });
+    FrfData {
+        blocks: blocks.collect(),
+        posture_ids: ["a", "b", "c", "d"].map(String::from).into(),
+    }
+}
+
+fn normal(random: &mut ChaCha8Rng) -> f64 {
+    let (u, v): (f64, f64) = (random.random_range(1e-12..1.0), random.random_range(0.0..1.0));
+    (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+}
+
+/// Files with `made`, with noise.
+fn measured(model: &StructureModel, made: Option<Made>, seed: u64) -> FrfData {
+    let mut data = arrangement(model);
+    let curves = predict(model, &truth(model), &data, made).unwrap();
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut curves = curves.into_iter();
+    for block in &mut data.blocks {
+        for frf in &mut Arc::make_mut(block).frfs {
+            let curve = curves.next().unwrap();
+            for ((h, std), c) in frf.receptance.iter_mut().zip(&mut frf.noise_std).zip(curve) {
+                *std = (RELATIVE_NOISE * c.norm()).max(1e-9);
+                let noise = Complex64::new(normal(&mut random), normal(&mut random));
+                *h = c + noise * (*std * std::f64::consts::FRAC_1_SQRT_2);
+            }
+        }
+    }
+    data
+}
+
+/// Fits the baseline as the commands do and looks for mistakes.
+fn check(model: &StructureModel, data: &FrfData) -> SetupCheck {
+    let problem = FrfProblem {
+        model,
+        data,
+        misfit: Misfit::Complex,
+        stride: 1,
+    };
+    let fit = minimise(&problem, &truth(model), &model.bounds(), Stopping::default()).unwrap();
+    examine(model, data, &fit.theta, || None).unwrap()
+}
+
+#[test]
+fn nothing_is_found_where_nothing_is_wrong() {
+    let model = model();
+    for seed in 0..3 {
+        let check = check(&model, &measured(&model, None, seed));
+        assert!(check.findings.is_empty(), "{:?}", check.findings);
+    }
+}
+
+/// Every mistake with a size, its kind named and its size within four standard errors.
+#[test]
+fn mistakes_are_found_with_their_size() {
+    let model = model();
+    let all = mistakes::all(&model, &arrangement(&model));
+    let at = |posture: Option<usize>| Group {
+        posture,
+        ..Group::ALL
+    };
+    let tau = std::f64::consts::TAU;
+    // Index among the mistakes, where, sizes, kind, value told.
+    let cases: [(usize, Group, &[f64], &str, f64); 8] = [
+        (2, at(None), &[0.8], "encoder-offset", 0.8),
+        (4, at(Some(1)), &[-2.0], "encoder-offset", -2.0),
+        (7, at(None), &[0.03, -0.02, 0.01], "point-position", 37.42),
+        (8, at(Some(2)), &[0.1], "channel-gain", 0.1f64.exp()),
+        (9, at(Some(0)), &[3.0, -4.0, 2.0], "hit-direction", 29f64.sqrt()),
+        (11, at(None), &[1.5], "exponential-window", 1.5),
+        (12, at(None), &[tau], "sensor-high-pass", 1.0),
+        (16, at(None), &[3.0], "sensor-mass", 3.0),
+    ];
+    for (seed, (index, group, values, kind, told)) in cases.into_iter().enumerate() {
+        let made = Made {
+            mistake: all[index].as_ref(),
+            group,
+            values,
+        };
+        let check = check(&model, &measured(&model, Some(made), seed as u64));
+        let found = check
+            .likely()
+            .unwrap_or_else(|| panic!("{kind}: {:?}", check.findings));
+        assert_eq!(found.kind, kind, "{found:?}");
+        let (value, error) = (found.value.unwrap(), found.std_error.unwrap());
+        assert!((value - told).abs() < 4.0 * error, "{found:?}, made {told}");
+        assert!(error < 0.2 * told.abs(), "{found:?}");
+    }
+}
+
+/// A file filed under another posture, exchanged files, and signs.
+#[test]
+fn wrong_readings_are_found() {
+    let model = model();
+    let data = measured(&model, None, 5);
+    let mut swapped = data.clone();
+    let kinematics: Vec<_> = data.blocks.iter().map(|b| b.kinematics.clone()).collect();
+    for (from, to) in [(0, 2), (2, 0)] {
+        Arc::make_mut(&mut swapped.blocks[from]).kinematics = kinematics[to].clone();
+    }
+    let check_of = |data: &FrfData| check(&model, data).likely().cloned();
+    let found = check_of(&swapped).expect("a swap");
+    assert_eq!(found.kind, "posture-swap");
+    assert_eq!(found.place, "postures a and c");
+
+    let mut turned = data.clone();
+    for frf in &mut Arc::make_mut(&mut turned.blocks[3]).frfs {
+        for h in &mut frf.receptance {
+            *h = -*h;
+        }
+    }
+    let found = check_of(&turned).expect("a sign");
+    assert_eq!((found.kind, found.place.as_str()), ("channel-sign", "posture d"));
+
+    let mut conjugated = data.clone();
+    for block in &mut conjugated.blocks {
+        for frf in &mut Arc::make_mut(block).frfs {
+            for h in &mut frf.receptance {
+                *h = h.conj();
+            }
+        }
+    }
+    assert_eq!(
+        check_of(&conjugated).expect("conjugated").kind,
+        "phase-conjugated"
+    );
+
+    let mut twice = data.clone();
+    let mut again = data.blocks[0].as_ref().clone();
+    again.posture = 1;
+    for frf in &mut again.frfs {
+        frf.posture = 1;
+    }
+    twice.blocks.push(Arc::new(again));
+    let found = check_of(&twice).expect("duplicates");
+    assert_eq!(found.kind, "duplicates");
+    assert!(found.place.starts_with("posture b"), "{found:?}");
+}

@@ -77,7 +77,7 @@ impl DiagnosisFindings {
 fn leading_candidate<M, I>(diagnosis: &Diagnosis<M, I>) -> Option<usize> {
     match diagnosis.verdict {
         Verdict::Effect => diagnosis.effect,
-        Verdict::Unknown => (!diagnosis.candidates.is_empty()).then_some(0),
+        Verdict::Unknown => diagnosis.best_guess,
         Verdict::None => None,
     }
 }

@@ -7,6 +7,7 @@ pub mod explained;
 pub mod extension;
 pub mod next_measurement;
 pub mod place;
+pub mod something_else;
 pub mod verdict;
 
 pub use compare::{Band, FrfComparison, FrfError};

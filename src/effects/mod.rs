@@ -21,12 +21,14 @@ mod link_flexibility;
 mod load_dependent_stiffness;
 mod local_resonator;
 mod payload;
+mod possible;
 mod request;
 mod sensor_misalignment;
 mod time_delay;
 mod tool_flexibility;
 
 pub use background::Background;
+pub use possible::Size;
 pub use request::requested;
 
 /// Where an effect sits.
@@ -125,6 +127,11 @@ pub trait StructuralEffect: Sync {
 
     /// Further starting points, natural values in the order of the parameters. `peaks_hz`: where the residual peaks.
     fn starts(&self, robot: &RobotSpec, data: &DataSummary, peaks_hz: &[f64]) -> Vec<Vec<f64>>;
+
+    /// Why this effect cannot be of the size that was fitted (parameters in their order); `None` if it can.
+    fn impossible(&self, _site: Site, _robot: &RobotSpec, _sizes: &[Size]) -> Option<String> {
+        None
+    }
 
     /// Effects with lower order are applied first (a payload weighs on the joints before their load is counted).
     fn order(&self) -> u8 {

@@ -109,7 +109,7 @@ fn heed_setup<M, I>(diagnosis: &mut Diagnosis<M, I>, setup: &SetupCheck) {
 fn leading_candidate<M, I>(diagnosis: &Diagnosis<M, I>) -> Option<usize> {
     match diagnosis.verdict {
         Verdict::Effect => diagnosis.effect,
-        Verdict::Unknown => (!diagnosis.candidates.is_empty()).then_some(0),
+        Verdict::Unknown => diagnosis.best_guess,
         Verdict::None => None,
     }
 }

@@ -41,6 +41,10 @@ pub fn cutting(campaign: &Campaign, findings: &CuttingFindings) -> Outcome {
         "site": Value::Null,
         "confidence": d.confidence,
         "companion": d.companion,
+        "best_guess": d.best_guess.map(|i| d.candidates[i].label()),
+        "explained_share": explained_share(d).map(|[share, _]| share),
+        "explained_share_std_error": explained_share(d).map(|[_, std]| std),
+        "rest": left_over(d),
         "candidates": d.candidates.iter().map(candidate).collect::<Vec<_>>(),
         "indistinguishable": d.indistinguishable,
         "next_measurement": next_measurement,
@@ -69,7 +73,7 @@ pub fn cutting(campaign: &Campaign, findings: &CuttingFindings) -> Outcome {
 fn baseline(b: &Baseline, noise_floor_nrms: f64) -> Value {
     json!({
         "nrms": b.residual.nrms,
-        "held_out_nrms": b.held_out.map(|h| h.nrms()),
+        "held_out_nrms": b.held_out.as_ref().map(|h| h.nrms()),
         "noise_floor_nrms": noise_floor_nrms,
         "reduced_chi2": b.reduced_chi2,
         "independent_share": b.residual.independent_share,
@@ -93,6 +97,10 @@ pub fn structure(campaign: &Campaign, findings: &DiagnosisFindings) -> Outcome {
         "site": diagnosis.winner().and_then(|c| c.name.site.as_ref()),
         "confidence": diagnosis.confidence,
         "companion": diagnosis.companion,
+        "best_guess": diagnosis.best_guess.map(|i| diagnosis.candidates[i].label()),
+        "explained_share": explained_share(diagnosis).map(|[share, _]| share),
+        "explained_share_std_error": explained_share(diagnosis).map(|[_, std]| std),
+        "rest": left_over(diagnosis),
         "candidates": diagnosis.candidates.iter().map(candidate).collect::<Vec<_>>(),
         "indistinguishable": diagnosis.indistinguishable,
         "explains": explains(findings),
@@ -142,14 +150,44 @@ fn candidate<M, I>(c: &Candidate<M, I>) -> Value {
         "effect": c.name.effect,
         "site": c.name.site,
         "nrms": c.nrms,
-        "held_out_nrms": c.held_out.map(|h| h.nrms()),
+        "held_out_nrms": c.held_out.as_ref().map(|h| h.nrms()),
         "delta_bic": c.delta_bic,
         "p_value": c.p_value,
         "reduced_chi2": c.reduced_chi2,
         "at_bound": c.at_bound,
+        "not_credible": c.not_credible,
+        "explained_share": c.explained_share().map(|[share, _]| share),
         "refined": c.refined,
         "parameters": parameters(c),
         "parameter_std_errors": c.parameters.iter().map(|p| json!({ "name": p.name, "value": p.value, "std_error": p.std_error, "unit": p.unit })).collect::<Vec<_>>(),
+    })
+}
+
+/// The candidate that the verdict names, or the best of the library where it names none.
+fn spoken_of<M, I>(d: &Diagnosis<M, I>) -> Option<&Candidate<M, I>> {
+    let candidate = d.effect.or(d.best_guess)?;
+    d.candidates.get(candidate)
+}
+
+/// Share of what stands above the noise that the verdict's effect (or the best guess) explains, and its standard deviation.
+fn explained_share<M, I>(d: &Diagnosis<M, I>) -> Option<[f64; 2]> {
+    spoken_of(d)
+        .filter(|_| d.companion.is_none())
+        .and_then(Candidate::explained_share)
+}
+
+/// What is left: of the best candidate, of the model as it stands where nothing is said to be missing.
+fn left_over<M, I>(d: &Diagnosis<M, I>) -> Value {
+    let (rest, gain) = match spoken_of(d).and_then(|c| Some((c.rest.as_ref()?, c.gain))) {
+        Some((rest, gain)) => (rest, gain),
+        None => (&d.baseline.rest, 0.0),
+    };
+    let largest = rest.largest();
+    json!({
+        "significant": rest.is_significant(),
+        "share": largest.map(|t| t.excess / (t.excess + gain.max(0.0))),
+        "looks_like": largest.map(|t| t.looks_like),
+        "tests": rest.tests,
     })
 }
 
@@ -237,10 +275,15 @@ fn answer<M, I>(
             "{} is missing: what is left looks like noise ({sure})\n",
             Emphasis::Good.on("NOTHING")
         ),
-        _ => format!(
-            "{}: what is left is real, but no effect of the library explains it ({sure})\n",
-            Emphasis::Bad.on("UNKNOWN")
-        ),
+        _ => {
+            let guess = d
+                .best_guess_in_words()
+                .map_or(String::new(), |words| wrapped(&words, "  "));
+            format!(
+                "{}: what is left is real, but no effect of the library explains it ({sure})\n{guess}",
+                Emphasis::Bad.on("UNKNOWN")
+            )
+        }
     }
 }
 
@@ -264,7 +307,7 @@ fn rest<M, I>(d: &Diagnosis<M, I>, next_measurement: &NextMeasurement) -> String
             vec![
                 c.label(),
                 percent(c.nrms),
-                c.held_out.map_or("–".into(), |h| percent(h.nrms())),
+                c.held_out.as_ref().map_or("–".into(), |h| percent(h.nrms())),
                 number(c.delta_bic, 4),
                 if c.p_value < 1e-12 {
                     "< 1e-12".into()
@@ -272,10 +315,20 @@ fn rest<M, I>(d: &Diagnosis<M, I>, next_measurement: &NextMeasurement) -> String
                     number(c.p_value, 2)
                 },
                 number(c.reduced_chi2, 3),
-                if c.at_bound { "at the end of its range" } else { "" }.into(),
+                match (&c.not_credible, c.at_bound) {
+                    (Some(_), _) => "not possible",
+                    (None, true) => "at the end of its range",
+                    (None, false) => "",
+                }
+                .into(),
             ]
         })
         .collect();
+    for c in d.candidates.iter().take(SHOWN) {
+        if let Some(why) = &c.not_credible {
+            text += &wrapped(&format!("Not {}: {why}.", c.label()), "  ");
+        }
+    }
     let header = ["candidate", "nrms", "held out", "ΔBIC", "p", "χ²/dof", ""];
     text += &format!(
         "\n{}\nMost telling further measurement: {}\n",

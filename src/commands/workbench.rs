@@ -295,8 +295,8 @@ impl CampaignBench {
             }
             Domain::Cutting => match findings.cutting_diagnosis() {
                 Some(found) => {
-                    let held_out = found.diagnosis.baseline.held_out;
-                    (found.now.comparison.totals, held_out.map(|h| h.nrms()))
+                    let held_out = &found.diagnosis.baseline.held_out;
+                    (found.now.comparison.totals, held_out.as_ref().map(|h| h.nrms()))
                 }
                 // What is recorded need not be fitted again for its error alone.
                 None if log.current(side).is_some() => return None,

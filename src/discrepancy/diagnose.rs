@@ -5,10 +5,12 @@
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use super::something_else;
 use super::verdict::{self, Verdict};
 use crate::Result;
 use crate::identify::calibrate::{Calibration, Estimate, estimates};
 use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
+use crate::identify::rest::Rest;
 use crate::identify::study::{
     EffectName, Effort, Extent, HeldOut, OUT_OF_RACE, Residual, Study, Tried, View, held_out, rescue,
     try_effect, try_effects,
@@ -29,6 +31,12 @@ pub struct Candidate<M, I> {
     pub p_value: f64,
     /// Weighted misfit per degree of freedom that is left with the effect: 1 is noise.
     pub reduced_chi2: f64,
+    /// χ² that the effect takes away from the baseline's, on the data that it was fitted to.
+    pub gain: f64,
+    /// What tests of structure find in what it leaves; `None` for candidates that were not in question.
+    pub rest: Option<Rest>,
+    /// Why the effect cannot be as fitted: a size that is not possible.
+    pub not_credible: Option<String>,
     /// The effect's own parameters.
     pub parameters: Vec<Estimate>,
     /// One of them stopped at the end of its range: evidence against.
@@ -44,7 +52,20 @@ impl<M, I> Candidate<M, I> {
         self.name.label()
     }
 
-    /// Share of the misfit above noise that the effect takes away.
+    /// Share of what stands above the noise that the effect explains, and its standard deviation; `None` for candidates that
+    /// were not in question.
+    pub fn explained_share(&self) -> Option<[f64; 2]> {
+        let rest = self.rest.as_ref().filter(|r| !r.tests.is_empty())?;
+        Some(something_else::share_explained(self.gain, rest))
+    }
+
+    /// Share of what stands above the noise that the effect explains, by structure where that was tested, else by size.
+    pub fn share_above_noise(&self, baseline: &Baseline) -> f64 {
+        self.explained_share()
+            .map_or_else(|| self.share_explained(baseline), |[share, _]| share)
+    }
+
+    /// Share of the misfit above noise that the effect takes away, by the size of the misfit alone.
     pub fn share_explained(&self, baseline: &Baseline) -> f64 {
         (baseline.reduced_chi2 - self.reduced_chi2) / (baseline.reduced_chi2 - 1.0).max(1e-9)
     }
@@ -56,6 +77,8 @@ pub struct Diagnosis<M, I> {
     pub verdict: Verdict,
     /// Index among the candidates of the effect that is missing, if one is.
     pub effect: Option<usize>,
+    /// The best of the library where the verdict is unknown; index among the candidates.
+    pub best_guess: Option<usize>,
     /// Probability that the verdict is right.
     pub confidence: f64,
     /// Best first, one for each effect and site.
@@ -73,6 +96,20 @@ impl<M, I> Diagnosis<M, I> {
     pub fn winner(&self) -> Option<&Candidate<M, I>> {
         self.effect.map(|w| &self.candidates[w])
     }
+
+    /// What the best of the library makes of the data where the verdict is unknown.
+    pub fn best_guess_in_words(&self) -> Option<String> {
+        let guess = self.candidates.get(self.best_guess?)?;
+        let [share, std] = guess.explained_share()?;
+        let left = guess.rest.as_ref()?.largest()?;
+        Some(format!(
+            "Best guess: {}, which explains {:.0} % (± {:.0} %) of what stands above the noise; the rest looks like {}.",
+            guess.label(),
+            100.0 * share,
+            100.0 * std,
+            left.looks_like
+        ))
+    }
 }
 
 /// The model as it stands.
@@ -83,8 +120,12 @@ pub struct Baseline {
     pub residual: Residual,
     pub held_out: Option<HeldOut>,
     pub reduced_chi2: f64,
+    /// What tests of structure find in what it leaves.
+    pub rest: Rest,
 }
 
+/// Leading candidates whose rest is tested for structure.
+const TESTED: usize = 4;
 /// Candidates that are refined on all data, at most.
 const REFINED: usize = 8;
 /// Misfit per degree of freedom of the baseline below which what is missing is faint.
@@ -203,11 +244,12 @@ impl<'a, S: Study> Engine<'a, S> {
             _ => (base_reduced, base_residual),
         };
         let share = best_residual.independent_share.min(1.0);
+        let base_rest = study.rest(model, &base.theta)?;
         let evidence = Evidence {
             base_chi2: 2.0 * base.cost,
             coarse_base_chi2: 2.0 * coarse_base.cost,
-            scale: best_reduced.max(1.0) / share,
-            share,
+            scale: (best_reduced.max(1.0) / share).max(base_rest.noise_factor()),
+            share: share.min(1.0 / base_rest.noise_factor()),
             tests: self.instances.len(),
         };
         let labels: Vec<String> = refined.iter().map(|t| self.label(&t.instance)).collect();
@@ -228,6 +270,7 @@ impl<'a, S: Study> Engine<'a, S> {
             held_out: held_out(study, model, &base.theta, Extent::Coarse, REFIT_WITHOUT_FOLD)?,
             residual: base_residual,
             reduced_chi2: base_reduced,
+            rest: base_rest,
             theta: base.theta,
             calibration: self.calibration.clone(),
         };
@@ -237,15 +280,16 @@ impl<'a, S: Study> Engine<'a, S> {
         }
         let credible: Vec<bool> = candidates
             .iter()
-            .map(|c| verdict::credible(c, &baseline))
+            .map(|c| verdict::credible(c, &baseline, evidence.scale))
             .collect();
+        self.test_rests(&mut candidates, &credible)?;
         let winner = credible.iter().position(|c| *c);
         let pair = match winner {
             Some(w)
-                if !verdict::is_noise(candidates[w].reduced_chi2)
-                    && candidates[w].share_explained(&baseline) > PAIR_SHARE =>
+                if verdict::leaves_structure(&candidates[w])
+                    && candidates[w].share_above_noise(&baseline) > PAIR_SHARE =>
             {
-                self.best_pair(&candidates, &credible)?
+                self.best_pair(&candidates, &credible, &evidence)?
             }
             _ => None,
         };
@@ -253,12 +297,28 @@ impl<'a, S: Study> Engine<'a, S> {
         Ok(Diagnosis {
             verdict: decision.verdict,
             effect: decision.effect,
+            best_guess: decision.best_guess,
             confidence: decision.confidence,
             indistinguishable: decision.indistinguishable,
             companion: decision.companion,
             candidates,
             baseline,
             not_tried: self.not_tried,
+        })
+    }
+
+    /// Tests what the leading credible candidates leave for structure.
+    fn test_rests(&self, candidates: &mut [CandidateOf<S>], credible: &[bool]) -> Result<()> {
+        let leading: Vec<&mut CandidateOf<S>> = candidates
+            .iter_mut()
+            .zip(credible)
+            .filter(|(c, credible)| **credible && c.refined)
+            .map(|(c, _)| c)
+            .take(TESTED)
+            .collect();
+        leading.into_par_iter().try_for_each(|c| {
+            c.rest = Some(self.study.rest(&c.model, &c.theta)?);
+            Ok(())
         })
     }
 
@@ -347,7 +407,7 @@ impl<'a, S: Study> Engine<'a, S> {
         let extra = (study.parameters(model).len() - self.base_count) as f64;
         let chi2 = 2.0 * fit.cost;
         // On the coarse view the evidence is that of the coarse view: scaled up, chance would look like an effect.
-        let (gain, reduced_chi2, values) = if refined {
+        let (raw_gain, reduced_chi2, values) = if refined {
             let gain = evidence.base_chi2 - chi2;
             (gain, self.reduced_chi2(tried), study.real_values(Extent::Full))
         } else {
@@ -355,7 +415,7 @@ impl<'a, S: Study> Engine<'a, S> {
             let reduced = chi2 / self.freedom(model, Extent::Coarse);
             (gain, reduced, study.real_values(Extent::Coarse))
         };
-        let gain = (gain / evidence.scale).max(0.0);
+        let gain = (raw_gain / evidence.scale).max(0.0);
         let single = ChiSquared::new(extra).map_or(1.0, |d| d.sf(gain));
         let all = estimates(study.parameters(model), fit, reduced_chi2)?;
         let own = self.base_count..all.len();
@@ -367,6 +427,9 @@ impl<'a, S: Study> Engine<'a, S> {
             delta_bic: extra * (evidence.share * values as f64).ln() - gain,
             p_value: (single * evidence.tests as f64).min(1.0),
             reduced_chi2,
+            gain: raw_gain,
+            rest: None,
+            not_credible: study.impossible(model, instance, &all[own.clone()]),
             at_bound: own.clone().any(|i| fit.at_bound.contains(&i)),
             parameters: all[own].to_vec(),
             refined,
@@ -376,7 +439,12 @@ impl<'a, S: Study> Engine<'a, S> {
     }
 
     /// The pair of effects that explains most.
-    fn best_pair(&self, candidates: &[CandidateOf<S>], credible: &[bool]) -> Result<Option<verdict::Pair>> {
+    fn best_pair(
+        &self,
+        candidates: &[CandidateOf<S>],
+        credible: &[bool],
+        evidence: &Evidence,
+    ) -> Result<Option<verdict::Pair>> {
         let study = self.study;
         let leaders: Vec<usize> = (0..candidates.len())
             .filter(|i| credible[*i])
@@ -413,6 +481,9 @@ impl<'a, S: Study> Engine<'a, S> {
                 .collect::<Result<_>>()?;
             for pair in settled.iter().filter(|p| p.fit.at_bound.is_empty()) {
                 let reduced_chi2 = self.reduced_chi2(pair);
+                if self.is_impossible(pair, leader)? {
+                    continue;
+                }
                 if best.as_ref().is_none_or(|b| reduced_chi2 < b.reduced_chi2) {
                     let label = self.label(&pair.instance);
                     // The stronger of the two alone is named first.
@@ -424,15 +495,29 @@ impl<'a, S: Study> Engine<'a, S> {
                     best = Some(verdict::Pair {
                         stronger,
                         other,
+                        gain: evidence.base_chi2 - 2.0 * pair.fit.cost,
                         reduced_chi2,
+                        rest: study.rest(&pair.model, &pair.fit.theta)?,
                     });
                 }
             }
             // Two effects that leave only noise are the answer; other leaders cannot do better.
-            if best.as_ref().is_some_and(|b| verdict::is_noise(b.reduced_chi2)) {
+            if best.as_ref().is_some_and(|b| b.odds_against() < 1.0) {
                 break;
             }
         }
         Ok(best)
+    }
+
+    /// Whether one of a pair, fitted with `leader` and then its own effect, is of a size that is not possible.
+    fn is_impossible(&self, pair: &TriedOf<S>, leader: &CandidateOf<S>) -> Result<bool> {
+        let study = self.study;
+        let all = estimates(study.parameters(&pair.model), &pair.fit, 1.0)?;
+        let first = self.base_count..self.base_count + leader.parameters.len();
+        let second = first.end..all.len();
+        let impossible = |instance, own: std::ops::Range<usize>| {
+            study.impossible(&pair.model, instance, &all[own]).is_some()
+        };
+        Ok(impossible(&leader.instance, first) || impossible(&pair.instance, second))
     }
 }

@@ -1,9 +1,8 @@
 //! An effect added to a model: everything refitted together, before and after compared on folds left out of the fit.
 
 use rayon::prelude::*;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::verdict::is_noise;
+use super::verdict::{is_noise, is_progress};
 use crate::identify::Calibration;
 use crate::identify::levenberg_marquardt::{Stopping, minimise};
 use crate::identify::study::{
@@ -32,9 +31,6 @@ pub struct Extension<M, I> {
     pub progress: Option<bool>,
 }
 
-/// Chance that an effect which is not there would be called progress.
-const CHANCE: f64 = 1e-3;
-
 const REFINE: Stopping = Stopping {
     max_iterations: 40,
     relative_decrease: 1e-8,
@@ -56,7 +52,7 @@ impl<M> Fitted<M> {
     }
 
     pub fn held_out_nrms(&self) -> Option<f64> {
-        self.held_out.map(|h| h.nrms())
+        self.held_out.as_ref().map(|h| h.nrms())
     }
 }
 
@@ -116,18 +112,9 @@ impl<M, I> Extension<M, I> {
 }
 
 /// Whether the error on folds left out of the fit fell by more than chance.
-///
-/// An effect that is not there makes predictions worse on average; that its k parameters improve the held-out −2 ln L by
-/// more than the (1 − p) quantile of χ²(k) is less likely than p. Where more than noise is left, that rest is the
-/// measure of chance, and values that err together count once. The held-out nrms, which weighs values by size instead of
-/// by noise, must fall too.
 fn progress<S: Study>(study: &S, before: &Fitted<S::Model>, after: &Fitted<S::Model>) -> Option<bool> {
-    let (was, is) = (before.held_out?, after.held_out?);
+    let (was, is) = (before.held_out.as_ref()?, after.held_out.as_ref()?);
     let count = |f: &Fitted<S::Model>| study.parameters(&f.model).len();
-    let parameters = (count(after) - count(before)) as f64;
-    let threshold = ChiSquared::new(parameters).map_or(0.0, |d| d.inverse_cdf(1.0 - CHANCE));
     let chance = after.calibration.reduced_chi2.max(1.0) / after.residual.independent_share.min(1.0);
-    // HeldOut.chi2 sums squares of complex values over their whole variance: half of −2 ln L.
-    let gain = 2.0 * (was.chi2 - is.chi2) / chance;
-    Some(gain > threshold && is.nrms() < was.nrms())
+    Some(is_progress(was, is, count(after) - count(before), chance))
 }

@@ -16,6 +16,7 @@ pub mod place;
 pub mod plan;
 pub mod prospect;
 pub mod setup;
+pub mod something_else;
 pub mod verdict;
 
 pub use compare::{Band, FrfComparison, FrfError};

@@ -2,7 +2,12 @@
 
 use serde::Serialize;
 
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
 use super::diagnose::{Baseline, Candidate};
+use super::something_else;
+use crate::identify::HeldOut;
+use crate::identify::rest::Rest;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -36,13 +41,38 @@ pub fn significant<M, I>(c: &Candidate<M, I>) -> bool {
     is_convincing(c.p_value, c.delta_bic) && !c.at_bound
 }
 
-/// Whether a candidate is significant and improves the prediction of folds left out.
-pub fn credible<M, I>(c: &Candidate<M, I>, baseline: &Baseline) -> bool {
+/// Whether a candidate is significant, of a possible size, and improves the prediction of folds left out. `chance`: what
+/// differences of χ² are divided by before they are held against noise.
+pub fn credible<M, I>(c: &Candidate<M, I>, baseline: &Baseline, chance: f64) -> bool {
     let improves = match (&c.held_out, &baseline.held_out) {
-        (Some(with), Some(without)) => with.chi2 < without.chi2,
+        (Some(with), Some(without)) => is_progress(without, with, c.parameters.len(), chance),
         _ => true,
     };
-    improves && significant(c)
+    improves && c.not_credible.is_none() && significant(c)
+}
+
+/// Chance that an effect which is not there would be called progress.
+const CHANCE: f64 = 1e-3;
+/// The held-out error as a share of the signal, which weighs values by size instead of by noise, may rise by this.
+const NRMS_MARGIN: f64 = 1e-3;
+
+/// Whether the error on folds left out of the fit fell by more than chance: the one test of progress, for candidates and
+/// for effects that were added.
+///
+/// An effect that is not there makes predictions worse on average; that its `parameters` improve the held-out −2 ln L by
+/// more than the (1 − p) quantile of χ² is less likely than p. Where more than noise is left, that rest is the measure of
+/// chance (`chance`), and values that err together count once. The gain must not be that of one fold at the cost of
+/// others either: it is larger than the standard error of the paired differences, or no fold is predicted worse by more
+/// than chance.
+pub fn is_progress(without: &HeldOut, with: &HeldOut, parameters: usize, chance: f64) -> bool {
+    let threshold = ChiSquared::new(parameters.max(1) as f64).map_or(0.0, |d| d.inverse_cdf(1.0 - CHANCE));
+    let pairs = without.by_fold.iter().zip(&with.by_fold);
+    let gains: Vec<f64> = pairs.map(|(before, after)| (before - after) / chance).collect();
+    let (count, total) = (gains.len() as f64, gains.iter().sum::<f64>());
+    let mean = total / count;
+    let variance = gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+    let steady = total > (count * variance).sqrt() || gains.iter().all(|g| *g > -threshold);
+    total > threshold && steady && with.nrms() <= without.nrms() * (1.0 + NRMS_MARGIN)
 }
 
 /// Whether an improvement is more than chance: corrected p-value and BIC difference.
@@ -57,8 +87,18 @@ pub struct Pair {
     pub stronger: usize,
     /// The other one's label.
     pub other: String,
+    /// χ² that both together take away.
+    pub gain: f64,
     /// Weighted misfit per degree of freedom that both together leave.
     pub reduced_chi2: f64,
+    pub rest: Rest,
+}
+
+impl Pair {
+    /// Odds that something else is behind what both explain.
+    pub fn odds_against(&self) -> f64 {
+        something_else::odds_of_pair(self.gain, &self.rest)
+    }
 }
 
 /// What the loop concludes.
@@ -66,9 +106,30 @@ pub struct Pair {
 pub struct Decision {
     pub verdict: Verdict,
     pub effect: Option<usize>,
+    /// The best of the library where the verdict is unknown.
+    pub best_guess: Option<usize>,
     pub companion: Option<String>,
     pub confidence: f64,
     pub indistinguishable: Vec<String>,
+}
+
+/// No verdict is surer than this: the library, the noise and the files have to be what they are taken for.
+const MOST_SURE: f64 = 0.98;
+
+/// Whether what is left is noise, by its structure; by its size where there is too little data for that.
+fn leaves_noise(rest: &Rest, reduced_chi2: f64) -> bool {
+    match rest.tests.is_empty() {
+        true => is_noise(reduced_chi2),
+        false => !rest.is_significant(),
+    }
+}
+
+/// Whether a candidate leaves more than noise.
+pub fn leaves_structure<M, I>(c: &Candidate<M, I>) -> bool {
+    match &c.rest {
+        Some(rest) => !leaves_noise(rest, c.reduced_chi2),
+        None => !is_noise(c.reduced_chi2),
+    }
 }
 
 /// `pair`: the best pair of effects, where one was sought.
@@ -82,42 +143,86 @@ pub fn decide<M, I>(
     let mut decision = Decision {
         verdict: Verdict::None,
         effect: None,
+        best_guess: None,
         companion: None,
         confidence: 0.0,
         indistinguishable: Vec::new(),
     };
-    match credible.iter().position(|c| *c) {
-        Some(w) => {
-            let explained = candidates[w].share_explained(baseline);
-            decision.verdict = Verdict::Effect;
-            if is_noise(candidates[w].reduced_chi2) {
-                decision.effect = Some(w);
-            } else {
-                match pair {
-                    Some(pair) if is_noise(pair.reduced_chi2) || explained >= LARGE_SHARE => {
-                        decision.effect = Some(pair.stronger);
-                        decision.companion = Some(pair.other);
-                    }
-                    None if explained >= LARGE_SHARE => decision.effect = Some(w),
-                    _ => decision.verdict = Verdict::Unknown,
-                }
-            }
+    let Some(w) = credible.iter().position(|c| *c) else {
+        decide_without_candidate(&mut decision, candidates, baseline);
+        return decision;
+    };
+    let winner = &candidates[w];
+    let alone = odds_against(winner, baseline);
+    let (odds_else, named) = match pair {
+        Some(pair) if pair.odds_against() < alone.min(1.0) => {
+            decision.companion = Some(pair.other.clone());
+            (pair.odds_against(), pair.stronger)
         }
-        None if !is_noise(baseline.reduced_chi2) => decision.verdict = Verdict::Unknown,
-        None => (),
-    }
-    if let Some(w) = decision.effect {
-        let reference = candidates[w].delta_bic;
+        _ => (alone, w),
+    };
+    let reference = winner.delta_bic;
+    let weight = |c: &Candidate<M, I>| evidence_weight(c.delta_bic - reference).min(1.0);
+    let rivals: f64 = candidates
+        .iter()
+        .enumerate()
+        .filter(|(i, c)| *i != w && !c.at_bound && c.not_credible.is_none())
+        .map(|(_, c)| weight(c))
+        .sum();
+    // What the model without any effect would weigh.
+    let beaten = evidence_weight(-reference).min(1.0);
+    if odds_else < 1.0 {
+        decision.verdict = Verdict::Effect;
+        decision.effect = Some(named);
+        decision.confidence = 1.0 / (1.0 + rivals + beaten + odds_else);
         let close =
             |c: &Candidate<M, I>| (c.delta_bic - reference).abs() * scale.max(1.0) < INDISTINGUISHABLE;
-        let rivals = candidates.iter().zip(credible).enumerate();
-        decision.indistinguishable = rivals
-            .filter(|(i, (c, credible))| *i != w && **credible && close(c))
+        decision.indistinguishable = candidates
+            .iter()
+            .zip(credible)
+            .enumerate()
+            .filter(|(i, (c, credible))| *i != named && *i != w && **credible && close(c))
             .map(|(_, (c, _))| c.label())
             .collect();
+    } else {
+        decision.verdict = Verdict::Unknown;
+        decision.companion = None;
+        decision.best_guess = Some(w);
+        decision.confidence = odds_else / (1.0 + odds_else + beaten);
     }
-    decision.confidence = confidence(&decision, candidates, baseline.reduced_chi2);
+    decision.confidence = decision.confidence.clamp(0.05, MOST_SURE);
     decision
+}
+
+/// Odds that something else is behind what a candidate explains.
+fn odds_against<M, I>(c: &Candidate<M, I>, baseline: &Baseline) -> f64 {
+    match &c.rest {
+        Some(rest) if !rest.tests.is_empty() => something_else::odds(c.gain, rest),
+        // Too little data for tests of structure: the size of the rest has to do.
+        _ if is_noise(c.reduced_chi2) => 0.1,
+        _ if c.share_explained(baseline) >= LARGE_SHARE => 0.3,
+        _ => 3.0,
+    }
+}
+
+/// No candidate is credible: nothing is missing, or something else.
+fn decide_without_candidate<M, I>(
+    decision: &mut Decision,
+    candidates: &[Candidate<M, I>],
+    baseline: &Baseline,
+) {
+    // p-values near the threshold leave doubt.
+    let best = candidates.first().map_or(1.0, |c| c.p_value);
+    let least = baseline.rest.tests.iter().map(|t| t.p_value).fold(1.0, f64::min);
+    if leaves_noise(&baseline.rest, baseline.reduced_chi2) {
+        decision.verdict = Verdict::None;
+        let calm = |p: f64| p / (p + 0.01);
+        decision.confidence = (0.92 * calm(best).max(0.7) * calm(least * 4.0).max(0.6)).clamp(0.3, MOST_SURE);
+    } else {
+        decision.verdict = Verdict::Unknown;
+        decision.best_guess = (!candidates.is_empty()).then_some(0);
+        decision.confidence = 0.97;
+    }
 }
 
 /// Weight of an explanation against another whose BIC is lower by `delta_bic`: exp(−Δ/2) tempered, because model error is
@@ -127,41 +232,54 @@ pub fn evidence_weight(delta_bic: f64) -> f64 {
     (-delta_bic / (2.0 * TEMPER)).exp()
 }
 
-/// Probability that the verdict is right. The evidence ratio of the best against its rivals is tempered, because model
-/// error is not noise; what stays unexplained takes confidence away.
-fn confidence<M, I>(decision: &Decision, candidates: &[Candidate<M, I>], base_reduced: f64) -> f64 {
-    let most = 0.98;
-    match (decision.verdict, decision.effect) {
-        (Verdict::Effect, Some(w)) => {
-            let winner = &candidates[w];
-            let weight = |c: &Candidate<M, I>| evidence_weight(c.delta_bic - winner.delta_bic);
-            let rivals: f64 = candidates
-                .iter()
-                .enumerate()
-                .filter(|(i, c)| *i != w && !c.at_bound)
-                .map(|(_, c)| weight(c).min(1.0))
-                .sum();
-            // What the model without any effect would weigh.
-            let beaten = evidence_weight(-winner.delta_bic).min(1.0);
-            let left = if decision.companion.is_some() {
-                0.92
-            } else {
-                (NOISE_CHI2 / winner.reduced_chi2).min(1.0)
-            };
-            (most / (1.0 + rivals + beaten) * left).clamp(0.05, most)
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn errors(by_fold: &[f64]) -> HeldOut {
+        HeldOut {
+            error: 1.0,
+            signal: 100.0,
+            chi2: by_fold.iter().sum(),
+            by_fold: by_fold.to_vec(),
         }
-        (Verdict::None, _) => {
-            let best = candidates.first().map_or(1.0, |c| c.p_value);
-            // p-values near the threshold leave doubt; so does a rest above noise.
-            let calm = (best / (best + 0.05)).max(0.5);
-            (0.95 * calm.max(0.7) * (1.05 / base_reduced).min(1.0)).clamp(0.3, 0.97)
-        }
-        _ => {
-            // The further the rest stands above noise, the surer it is real.
-            let rest = candidates
-                .first()
-                .map_or(base_reduced, |c| c.reduced_chi2.min(base_reduced));
-            (0.5 + 0.45 * (1.0 - (NOISE_CHI2 / rest).min(1.0)).sqrt()).clamp(0.5, 0.95)
-        }
+    }
+
+    #[test]
+    fn progress_takes_more_than_chance() {
+        let before = errors(&[1000.0; 5]);
+        // χ² of one degree of freedom exceeds 10.83 once in a thousand.
+        assert!(!is_progress(&before, &errors(&[997.9; 5]), 1, 1.0));
+        assert!(is_progress(&before, &errors(&[997.8; 5]), 1, 1.0));
+        // More parameters, or values that err together, take more.
+        assert!(!is_progress(&before, &errors(&[997.8; 5]), 2, 1.0));
+        assert!(!is_progress(&before, &errors(&[997.8; 5]), 1, 1.1));
+    }
+
+    #[test]
+    fn progress_is_not_that_of_one_fold_at_the_cost_of_another() {
+        let before = errors(&[1000.0; 4]);
+        assert!(!is_progress(
+            &before,
+            &errors(&[800.0, 1100.0, 1000.0, 1000.0]),
+            1,
+            1.0
+        ));
+        // One fold that shows the effect, while the others do not, is.
+        assert!(is_progress(
+            &before,
+            &errors(&[800.0, 1000.0, 1001.0, 1000.0]),
+            1,
+            1.0
+        ));
+    }
+
+    #[test]
+    fn progress_does_not_make_the_error_grow() {
+        let before = errors(&[1000.0; 4]);
+        let mut after = errors(&[900.0; 4]);
+        assert!(is_progress(&before, &after, 1, 1.0));
+        after.error = 1.01;
+        assert!(!is_progress(&before, &after, 1, 1.0));
     }
 }

@@ -54,6 +54,15 @@ impl StructuralEffect for AmplitudeDependentStiffness {
         }]
     }
 
+    fn impossible(&self, _site: Site, _robot: &RobotSpec, sizes: &[Size]) -> Option<String> {
+        sizes.first()?.outside(
+            "a stiffness ratio",
+            [0.2, 2.0],
+            (1.0, "(small over large force)"),
+            "gears keep half of their stiffness at small torque and friction adds less than as much again",
+        )
+    }
+
     fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![0.7], vec![1.2]]
     }

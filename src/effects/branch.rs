@@ -31,6 +31,27 @@ pub fn parameters(data: &DataSummary, mass_kg: f64, frequency_hz: f64) -> Vec<Pa
     ]
 }
 
+/// Why a mass on a spring that hangs on a body of `body_kg` cannot be as fitted.
+pub fn impossible(body_kg: f64, sizes: &[Size]) -> Option<String> {
+    /// Share of the body's mass from which on something resonates that people would find.
+    const LEAST: f64 = 3e-3;
+    let [mass, _, damping] = sizes else { return None };
+    let light = mass.outside(
+        "a resonating mass",
+        [LEAST * body_kg, body_kg],
+        (1.0, "kg"),
+        "it hangs on a body of which it should be 0.3 % at least, and not more than all of it",
+    );
+    light.or_else(|| {
+        damping.outside(
+            "a damping ratio",
+            [5e-4, 0.3],
+            (1.0, "of critical"),
+            "cable packs and covers reach 0.1, rubber mounts 0.2",
+        )
+    })
+}
+
 /// One starting point for each peak of the residual and for each of a few frequencies between.
 pub fn starts(data: &DataSummary, peaks_hz: &[f64], mass_kg: f64) -> Vec<Vec<f64>> {
     const BETWEEN: usize = 5;

@@ -61,6 +61,15 @@ impl StructuralEffect for LinkFlexibility {
         }]
     }
 
+    fn impossible(&self, _site: Site, _robot: &RobotSpec, sizes: &[Size]) -> Option<String> {
+        sizes.first()?.outside(
+            "Young's modulus",
+            [40e9, 230e9],
+            (1e-9, "GPa"),
+            "magnesium has 45, steel 210",
+        )
+    }
+
     fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![70e9], vec![500e9]]
     }

@@ -49,6 +49,11 @@ impl StructuralEffect for LocalResonator {
         branch::parameters(data, MASS_KG, 15.0)
     }
 
+    fn impossible(&self, site: Site, robot: &RobotSpec, sizes: &[Size]) -> Option<String> {
+        let Site::Link(i) = site else { return None };
+        branch::impossible(robot.links.get(i - 1)?.mass_kg, sizes)
+    }
+
     fn starts(&self, _robot: &RobotSpec, data: &DataSummary, peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         branch::starts(data, peaks_hz, MASS_KG)
     }

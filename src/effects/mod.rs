@@ -22,6 +22,7 @@ mod link_flexibility;
 mod load_dependent_stiffness;
 mod local_resonator;
 mod payload;
+mod possible;
 mod request;
 mod sensor_misalignment;
 pub mod spot;
@@ -29,6 +30,7 @@ mod time_delay;
 mod tool_flexibility;
 
 pub use background::Background;
+pub use possible::Size;
 pub use request::requested;
 pub use spot::Spot;
 
@@ -152,6 +154,11 @@ pub trait StructuralEffect: Sync {
         peaks_hz: &[f64],
     ) -> Vec<Vec<f64>> {
         self.starts(robot, data, peaks_hz)
+    }
+
+    /// Why this effect cannot be of the size that was fitted (parameters in their order); `None` if it can.
+    fn impossible(&self, _site: Site, _robot: &RobotSpec, _sizes: &[Size]) -> Option<String> {
+        None
     }
 
     /// Effects with lower order are applied first (a payload weighs on the joints before their load is counted).

@@ -54,6 +54,16 @@ impl StructuralEffect for Payload {
         }]
     }
 
+    fn impossible(&self, _site: Site, robot: &RobotSpec, sizes: &[Size]) -> Option<String> {
+        let moving: f64 = robot.links.iter().map(|l| l.mass_kg).sum();
+        sizes.first()?.outside(
+            "a mass",
+            [1e-4 * moving, 0.5 * moving],
+            (1.0, "kg"),
+            "less than a ten-thousandth of the arm is a cable tie, more than half of it the robot could not carry",
+        )
+    }
+
     fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![5.0], vec![60.0]]
     }

@@ -52,6 +52,20 @@ impl StructuralEffect for SensorMisalignment {
             .collect()
     }
 
+    fn impossible(&self, _site: Site, _robot: &RobotSpec, sizes: &[Size]) -> Option<String> {
+        let square = |f: fn(&Size) -> f64| sizes.iter().map(|s| f(s).powi(2)).sum::<f64>().sqrt();
+        let angle = Size {
+            value: square(|s| s.value),
+            std: square(|s| s.std),
+        };
+        angle.outside(
+            "an angle",
+            [0.1, 45.0],
+            (1.0, "°"),
+            "no sensor is set more precisely, and every eye sees half a right angle",
+        )
+    }
+
     fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![-3.0, 3.0, -3.0]]
     }

@@ -47,6 +47,15 @@ impl StructuralEffect for TimeDelay {
         }]
     }
 
+    fn impossible(&self, _site: Site, _robot: &RobotSpec, sizes: &[Size]) -> Option<String> {
+        sizes.first()?.outside(
+            "a delay",
+            [0.0, 0.02],
+            (1e6, "µs"),
+            "the response cannot come before the force, nor later than wireless sensors do",
+        )
+    }
+
     fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![2e-3], vec![-5e-4]]
     }

@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::frf_data::FrfData;
 use super::levenberg_marquardt::{Fit, Stopping, minimise};
 use super::structure::{FrfProblem, Misfit, StructureModel};
+use crate::effects::Size;
 use crate::parameter::Parameter;
 use crate::progress::Progress;
 use crate::{Error, Result};
@@ -24,6 +25,15 @@ pub struct Estimate {
     pub initial: f64,
     /// True where the estimate stopped at the end of its allowed range.
     pub at_bound: bool,
+}
+
+impl Estimate {
+    pub fn size(&self) -> Size {
+        Size {
+            value: self.value,
+            std: self.std_error,
+        }
+    }
 }
 
 /// How to calibrate.

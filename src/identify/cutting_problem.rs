@@ -190,6 +190,23 @@ impl CuttingProblem<'_> {
         Ok((sums, fit))
     }
 
+    /// Each cut's part of the misfit, without priors; what belongs to the cut alone is taken out.
+    pub fn by_cut(&self, theta: &[f64]) -> Result<Vec<Linearisation>> {
+        self.data
+            .cuts
+            .par_iter()
+            .map(|cut| {
+                let mut sums = self.evaluate(cut, theta, true)?.0;
+                sums.hessian.fill_upper_triangle_with_lower_triangle();
+                Ok(Linearisation {
+                    cost: sums.cost,
+                    gradient: sums.gradient,
+                    hessian: sums.hessian,
+                })
+            })
+            .collect()
+    }
+
     fn total(&self, theta: &[f64], derivatives: bool) -> Result<Sums> {
         let parts: Vec<Sums> = self
             .data

@@ -1,13 +1,17 @@
 //! Force records and a cutting model as a [`Study`].
 
-use super::calibrate::{Calibration, covariance, estimates};
+use num_complex::Complex64;
+
+use super::calibrate::{Calibration, Estimate, covariance, estimates};
 use super::cutting_data::CuttingData;
 use super::cutting_model::CuttingModel;
 use super::cutting_problem::{CutFit, CuttingProblem};
 use super::cutting_waves::axis_waves;
 use super::levenberg_marquardt::{Fit, Stopping, minimise};
+use super::rest::{self, Rest, RestTest, SMALL_ERROR};
 use super::study::{EffectName, Extent, HeldOut, Residual, Study, View, held_out};
 use crate::Result;
+use crate::effects::Size;
 use crate::effects::cutting::{CuttingInstance, CuttingSummary, instances};
 use crate::parameter::Parameter;
 
@@ -129,6 +133,38 @@ impl Study for CuttingStudy {
         })
     }
 
+    fn rest(&self, model: &CuttingModel, theta: &[f64]) -> Result<Rest> {
+        let data = &self.data;
+        let problem = CuttingProblem { model, data };
+        let fits = problem.fits(theta)?;
+        let total: f64 = fits.iter().map(|f| f.chi2).sum();
+        let freedom = data.value_count() as f64 - theta.len() as f64;
+        let (common, values) = common_wave(data, &fits);
+        let (apart, differences) = rest::apart(&problem.by_cut(theta)?);
+        let tests = [
+            (LIKE_CUTS, apart, differences),
+            (COMMON_WAVE, common, values),
+            (ALL_OVER, total, freedom),
+        ];
+        let tests = tests.into_iter().filter_map(|(looks_like, found, freedom)| {
+            RestTest::against_known_noise(looks_like, found, freedom, NOISE_KNOWN_TO)
+        });
+        Ok(Rest {
+            tests: tests.collect(),
+            small_errors: SMALL_ERROR.powi(2) * signal_over_noise(data),
+        })
+    }
+
+    fn impossible(
+        &self,
+        _model: &CuttingModel,
+        instance: &CuttingInstance,
+        own: &[Estimate],
+    ) -> Option<String> {
+        let sizes: Vec<Size> = own.iter().map(Estimate::size).collect();
+        instance.effect.impossible(&sizes)
+    }
+
     fn calibrate(&self, model: &CuttingModel) -> Result<Calibration> {
         calibrate_cutting(model, &self.data)
     }
@@ -177,6 +213,46 @@ fn sums(data: &CuttingData, fits: &[CutFit]) -> HeldOut {
         sums.chi2 += fit.chi2;
     }
     sums
+}
+
+const LIKE_CUTS: &str = "parameters that differ from cut to cut";
+const COMMON_WAVE: &str = "a waveform that all cuts have in common";
+const ALL_OVER: &str = "more than the noise all over";
+/// Relative standard deviation of the noise variance as revolutions against one another show it.
+const NOISE_KNOWN_TO: f64 = 0.02;
+
+/// Σ F²/σ² of the recorded orders.
+fn signal_over_noise(data: &CuttingData) -> f64 {
+    let channels = data.cuts.iter().flat_map(|cut| cut.channels.iter().flatten());
+    channels
+        .flat_map(|channel| channel.orders.iter().zip(&channel.order_std))
+        .map(|(order, std)| 2.0 * order.norm_sqr() / (std * std))
+        .sum()
+}
+
+/// Energy of the residual waveform that the cuts have in common, each turned to the same angle of the tool, and the number
+/// of values in it.
+fn common_wave(data: &CuttingData, fits: &[CutFit]) -> (f64, f64) {
+    let mut sums: Vec<(Complex64, f64)> = Vec::new();
+    let orders = data.cuts.iter().map(|c| c.orders).max().unwrap_or(0);
+    sums.resize(4 * orders, (Complex64::ZERO, 0.0));
+    for (cut, fit) in data.cuts.iter().zip(fits) {
+        for (i, (channel, fitted)) in cut.channels.iter().zip(&fit.channels).enumerate() {
+            let (Some(channel), Some(fitted)) = (channel, fitted) else {
+                continue;
+            };
+            let pairs = fitted.orders.iter().zip(&channel.orders).zip(&channel.order_std);
+            for (n, ((model, seen), std)) in pairs.enumerate() {
+                let turn = Complex64::from_polar(1.0, (n + 1) as f64 * fit.placement);
+                let sum = &mut sums[i * orders + n];
+                sum.0 += (model - seen) * turn / *std;
+                sum.1 += 1.0;
+            }
+        }
+    }
+    let shared = || sums.iter().filter(|s| s.1 > 1.0);
+    let energy = shared().map(|(sum, count)| 2.0 * sum.norm_sqr() / count).sum();
+    (energy, 2.0 * shared().count() as f64)
 }
 
 /// Neighbouring orders and blocks over which the residual's correlation is summed.

@@ -18,6 +18,7 @@ pub mod modal_table;
 pub mod off_comb;
 pub mod posture_modes;
 pub mod resonance_study;
+pub mod rest;
 pub mod spot_response;
 pub mod sensitivity;
 pub mod structure;

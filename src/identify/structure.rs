@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::frf_data::{FrfBlock, FrfData, FrfDatum};
 use super::levenberg_marquardt::{LeastSquares, Linearisation};
+use super::rest::RestCurve;
 use crate::Result;
 use crate::campaign::{Point, RobotSection};
 use crate::effects::{ChannelFilter, DataSummary, Instance, Setting};
@@ -297,6 +298,66 @@ impl StructureModel {
             })
             .collect::<Result<_>>()?;
         Ok(per_block.into_iter().flatten().collect())
+    }
+}
+
+impl StructureModel {
+    /// What the model at `theta` leaves of each FRF, with the patterns that an error of it may have, in the order of
+    /// `data.frfs()`.
+    pub fn rest(&self, theta: &[f64], data: &FrfData) -> Result<Vec<RestCurve>> {
+        let channels = Channels::new(&self.filter(theta, true));
+        let postures = data.measured_postures();
+        let mut hits: Vec<(usize, usize)> = Vec::new();
+        for (b, block) in data.blocks.iter().enumerate() {
+            hits.extend(block.frfs.iter().map(|frf| (b, frf.input)));
+        }
+        hits.sort_unstable();
+        hits.dedup();
+        let place = |sorted: Option<usize>| sorted.unwrap_or(0);
+        let blocks: Vec<Vec<RestCurve>> = data
+            .blocks
+            .par_iter()
+            .enumerate()
+            .map(|(b, block)| {
+                let empty = |frf: &FrfDatum| RestCurve {
+                    fold: place(postures.binary_search(&block.posture).ok()),
+                    source: place(hits.binary_search(&(b, frf.input)).ok()),
+                    rest: Vec::with_capacity(block.frequency_hz.len()),
+                    slopes: vec![Vec::with_capacity(block.frequency_hz.len()); theta.len()],
+                    // A gain and a phase, and both growing with the frequency (a delay).
+                    own: vec![Vec::with_capacity(block.frequency_hz.len()); 2],
+                };
+                let mut curves: Vec<RestCurve> = block.frfs.iter().map(empty).collect();
+                let basis = self.basis(theta, block, true)?;
+                let mut inputs: Vec<usize> = block.frfs.iter().map(|f| f.input).collect();
+                inputs.sort_unstable();
+                inputs.dedup();
+                let mut slopes = Slopes::of_inputs(inputs);
+                let mut response = Response::default();
+                let mut slope = vec![Complex64::ZERO; theta.len()];
+                for (line, f) in block.frequency_hz.iter().enumerate() {
+                    let omega = std::f64::consts::TAU * f;
+                    basis.solve(omega, &mut response)?;
+                    basis.slopes(&response, &mut slopes);
+                    for (frf, curve) in block.frfs.iter().zip(&mut curves) {
+                        let model = channels.measured(omega, frf, &basis, &response);
+                        let i = slopes.inputs.iter().position(|x| *x == frf.input).unwrap_or(0);
+                        let true_slope = |p: usize, out: usize| slopes.at(p, i, out);
+                        channels.slopes(omega, frf, model, (&basis, &response), true_slope, &mut slope);
+                        let weight = 1.0 / frf.noise_std[line];
+                        curve.rest.push((model - frf.receptance[line]) * weight);
+                        for (column, s) in curve.slopes.iter_mut().zip(&slope) {
+                            column.push(s * weight);
+                        }
+                        for (column, factor) in curve.own.iter_mut().zip([1.0, *f]) {
+                            column.push(model * (weight * factor));
+                        }
+                    }
+                }
+                Ok(curves)
+            })
+            .collect::<Result<_>>()?;
+        Ok(blocks.into_iter().flatten().collect())
     }
 }
 

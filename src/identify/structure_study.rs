@@ -2,9 +2,10 @@
 
 use num_complex::Complex64;
 
-use super::calibrate::{Calibration, Options, calibrate};
+use super::calibrate::{Calibration, Estimate, Options, calibrate};
 use super::frf_data::FrfData;
 use super::levenberg_marquardt::Stopping;
+use super::rest::{self, Rest, SMALL_ERROR};
 use super::structure::{FrfProblem, Misfit, StructureModel};
 use super::study::{EffectName, Extent, HeldOut, Measure, Residual, Study, View, held_out};
 use crate::Result;
@@ -159,7 +160,8 @@ impl Study for StructureStudy {
                 let square = (m - h).norm_sqr();
                 sums.error += square;
                 sums.signal += h.norm_sqr();
-                sums.chi2 += square / (std * std);
+                // Real and imaginary part have half the variance each.
+                sums.chi2 += 2.0 * square / (std * std);
             }
         }
         Ok(sums)
@@ -194,6 +196,26 @@ impl Study for StructureStudy {
             chi2_per_value: weighted / values.max(1) as f64,
             independent_share: 1.0 / (1.0 + 2.0 * correlation),
         })
+    }
+
+    fn rest(&self, model: &StructureModel, theta: &[f64]) -> Result<Rest> {
+        let signal_over_noise: f64 = self
+            .data
+            .frfs()
+            .flat_map(|(_, frf)| frf.receptance.iter().zip(&frf.noise_std))
+            .map(|(h, std)| h.norm_sqr() / (std * std))
+            .sum();
+        Ok(Rest {
+            tests: rest::test(&model.rest(theta, &self.data)?),
+            small_errors: 2.0 * SMALL_ERROR.powi(2) * signal_over_noise,
+        })
+    }
+
+    fn impossible(&self, model: &StructureModel, instance: &Instance, own: &[Estimate]) -> Option<String> {
+        let sizes: Vec<effects::Size> = own.iter().map(Estimate::size).collect();
+        instance
+            .effect
+            .impossible(instance.site, &model.robot.spec, &sizes)
     }
 
     fn calibrate(&self, model: &StructureModel) -> Result<Calibration> {

@@ -3,8 +3,9 @@
 
 use rayon::prelude::*;
 
-use super::calibrate::{Calibration, scattered_starts};
+use super::calibrate::{Calibration, Estimate, scattered_starts};
 use super::levenberg_marquardt::{Fit, LeastSquares, Stopping, minimise, one_step};
+use super::rest::Rest;
 use crate::parameter::Parameter;
 use crate::{Error, Result};
 
@@ -122,6 +123,21 @@ pub trait Study: Sync {
 
     fn residual(&self, model: &Self::Model, theta: &[f64]) -> Result<Residual>;
 
+    /// What tests of structure find in what the model leaves; no tests where there is too little data.
+    fn rest(&self, _model: &Self::Model, _theta: &[f64]) -> Result<Rest> {
+        Ok(Rest::default())
+    }
+
+    /// Why the effect cannot be that large or that small, from the estimates of its own parameters; `None` if it can.
+    fn impossible(
+        &self,
+        _model: &Self::Model,
+        _instance: &Self::Instance,
+        _own: &[Estimate],
+    ) -> Option<String> {
+        None
+    }
+
     /// The fair fit of a model as it stands.
     fn calibrate(&self, model: &Self::Model) -> Result<Calibration>;
 
@@ -139,13 +155,15 @@ pub trait Study: Sync {
 }
 
 /// Sums behind held-out errors of one fit.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct HeldOut {
     /// Σ|model − measured|² and Σ|measured|² on folds left out of the fit.
     pub error: f64,
     pub signal: f64,
-    /// Σ|model − measured|²/σ² there.
+    /// −2 ln L there: Σ r²/σ² over real values.
     pub chi2: f64,
+    /// The same of each fold.
+    pub by_fold: Vec<f64>,
 }
 
 impl HeldOut {
@@ -183,11 +201,13 @@ pub fn held_out<S: Study>(
             study.predict_fold(model, &fit.theta, fold)
         })
         .collect::<Result<_>>()?;
-    let total = folds.iter().fold(HeldOut::default(), |sum, fold| HeldOut {
-        error: sum.error + fold.error,
-        signal: sum.signal + fold.signal,
-        chi2: sum.chi2 + fold.chi2,
-    });
+    let mut total = HeldOut::default();
+    for fold in folds {
+        total.error += fold.error;
+        total.signal += fold.signal;
+        total.chi2 += fold.chi2;
+        total.by_fold.push(fold.chi2);
+    }
     Ok(Some(total))
 }
 

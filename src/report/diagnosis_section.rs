@@ -53,6 +53,9 @@ pub(super) fn verdict_text<M, I>(
              that this program does not know."
         ),
     };
+    if let Some(guess) = d.best_guess_in_words() {
+        text += &format!(" {guess}");
+    }
     if let Some(companion) = &d.companion {
         text += &format!(" A second effect is likely besides: {companion}.");
     }
@@ -173,7 +176,7 @@ pub(super) fn candidate_chart<M, I>(
         let all = std::iter::once(first).chain(rest);
         all.map(|v| v.map(|v| 100.0 * v)).collect::<Vec<_>>()
     };
-    let held_out = |h: &Option<crate::identify::study::HeldOut>| h.map(|h| h.nrms());
+    let held_out = |h: &Option<crate::identify::study::HeldOut>| h.as_ref().map(|h| h.nrms());
     let drawing = SideBySide {
         title: "Error of the model with each effect added".into(),
         y_label: "Error nrms (%)".into(),
@@ -231,7 +234,7 @@ pub(super) fn candidate_table<M, I>(
         vec![
             title(c),
             percent(c.nrms),
-            c.held_out.map_or("–".into(), |h| percent(h.nrms())),
+            c.held_out.as_ref().map_or("–".into(), |h| percent(h.nrms())),
             significant(c.delta_bic, 3),
             if c.p_value < 1e-12 {
                 "< 1e-12".into()

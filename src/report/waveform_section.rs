@@ -60,7 +60,7 @@ fn with(findings: &CuttingFindings) -> Option<(String, &CuttingView)> {
 
 fn comparison(findings: &CuttingFindings) -> Section {
     let now = &findings.now.comparison;
-    let held_out = findings.diagnosis.baseline.held_out;
+    let held_out = &findings.diagnosis.baseline.held_out;
     let mut text = format!(
         "Error of the fitted force model over the steady cut, averaged over revolutions: {}; the noise of the records is {}.",
         percent(now.totals.nrms),

@@ -232,7 +232,7 @@ pub fn real_case(model: &StructureModel) -> Result<RealCase> {
         delta_bic: 0.0,
         p_value: 1.0,
         reduced_chi2: base.reduced_chi2,
-        held_out_chi2: base.held_out.map_or(0.0, |h| h.chi2),
+        held_out_chi2: base.held_out.as_ref().map_or(0.0, |h| h.chi2),
         at_bound: false,
         weight: 1.0 / total,
         ..checks(&study, model, &base.theta)?
@@ -248,7 +248,7 @@ pub fn real_case(model: &StructureModel) -> Result<RealCase> {
                 delta_bic: c.delta_bic,
                 p_value: c.p_value,
                 reduced_chi2: c.reduced_chi2,
-                held_out_chi2: c.held_out.map_or(0.0, |h| h.chi2),
+                held_out_chi2: c.held_out.as_ref().map_or(0.0, |h| h.chi2),
                 at_bound: c.at_bound,
                 weight: evidence_weight(c.delta_bic) / total,
                 ..checks(&study, &c.model, &c.theta)?

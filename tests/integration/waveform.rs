@@ -465,8 +465,8 @@ fn report(name: &str, dir: &Path) {
                     c.delta_bic,
                     c.p_value,
                     c.reduced_chi2,
-                    c.held_out.map_or(f64::NAN, |h| h.nrms()),
-                    d.baseline.held_out.map_or(f64::NAN, |h| h.nrms()),
+                    c.held_out.as_ref().map_or(f64::NAN, |h| h.nrms()),
+                    d.baseline.held_out.as_ref().map_or(f64::NAN, |h| h.nrms()),
                     c.at_bound
                 );
             }

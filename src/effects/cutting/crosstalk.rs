@@ -45,6 +45,18 @@ impl CuttingEffect for Crosstalk {
             .collect()
     }
 
+    fn impossible(&self, sizes: &[Size]) -> Option<String> {
+        let leak = |size: &Size| {
+            size.outside(
+                "a leak between channels",
+                [-0.1, 0.1],
+                (100.0, "%"),
+                "makers promise 2, loose screws make it some times as much",
+            )
+        };
+        sizes.iter().find_map(leak)
+    }
+
     fn apply(&self, _variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
         let mut mixing = unit_mixing();
         for ((i, j), value) in LEAKS.iter().zip(values) {

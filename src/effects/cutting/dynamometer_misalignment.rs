@@ -48,6 +48,12 @@ impl CuttingEffect for DynamometerMisalignment {
         vec![vec![-4.0], vec![4.0]]
     }
 
+    fn impossible(&self, sizes: &[Size]) -> Option<String> {
+        sizes
+            .first()?
+            .outside("a tilt", [-20.0, 20.0], (1.0, "°"), "every eye sees that")
+    }
+
     fn apply(&self, variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
         let angle = values[0].scale(1f64.to_radians());
         let (s, c) = angle.value.sin_cos();

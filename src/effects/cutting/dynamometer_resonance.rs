@@ -65,6 +65,18 @@ impl CuttingEffect for DynamometerResonance {
             .to_vec()
     }
 
+    fn impossible(&self, sizes: &[Size]) -> Option<String> {
+        let damping = |size: &Size| {
+            size.outside(
+                "a damping ratio",
+                [1e-3, 0.3],
+                (1.0, "of critical"),
+                "a dynamometer on its bolts has 0.01 to 0.1; more is a filter",
+            )
+        };
+        sizes.iter().skip(3).find_map(damping)
+    }
+
     fn apply(&self, _variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
         physics.dynamics = Some([0, 1, 2].map(|i| [values[i].clone(), values[3 + i].clone()]));
     }

@@ -14,7 +14,7 @@
 
 use std::fmt;
 
-use super::Background;
+use super::{Background, Size};
 use crate::campaign::Process;
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::Dual;
@@ -154,6 +154,11 @@ pub trait CuttingEffect: Sync {
     /// Further starting points, natural values in the order of the parameters.
     fn starts(&self, _variant: usize, _data: &CuttingSummary) -> Vec<Vec<f64>> {
         Vec::new()
+    }
+
+    /// Why this effect cannot be of the size that was fitted (parameters in their order); `None` if it can.
+    fn impossible(&self, _sizes: &[Size]) -> Option<String> {
+        None
     }
 
     /// Free amplitudes for each cut and channel that are fitted along without standing in the list of parameters.

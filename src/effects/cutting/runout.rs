@@ -59,6 +59,15 @@ impl CuttingEffect for RunoutEffect {
             .collect()
     }
 
+    fn impossible(&self, sizes: &[Size]) -> Option<String> {
+        sizes.first()?.outside(
+            "a runout",
+            [5e-4, 0.2],
+            (1000.0, "µm"),
+            "no holder runs truer, and no tool that far off survives",
+        )
+    }
+
     fn apply(&self, _variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
         physics.runout = Some(Runout {
             offset_mm: values[0].clone(),

@@ -46,6 +46,15 @@ impl CuttingEffect for SizeEffect {
         vec![vec![0.35]]
     }
 
+    fn impossible(&self, sizes: &[Size]) -> Option<String> {
+        sizes.first()?.outside(
+            "an exponent",
+            [0.0, 0.6],
+            (1.0, ""),
+            "thin chips are harder to cut, Kienzle's 1 − m",
+        )
+    }
+
     fn apply(&self, _variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
         physics.size_exponent = Some(values[0].clone());
     }

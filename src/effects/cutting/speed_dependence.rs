@@ -41,6 +41,15 @@ impl CuttingEffect for SpeedDependence {
         vec![vec![-0.1], vec![0.4]]
     }
 
+    fn impossible(&self, sizes: &[Size]) -> Option<String> {
+        sizes.first()?.outside(
+            "an exponent",
+            [-0.5, 0.7],
+            (1.0, ""),
+            "twice the speed changes forces by less than a third",
+        )
+    }
+
     fn apply(&self, _variant: usize, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
         let cutting: &[usize] = match setting.process {
             Process::Milling => &[0, 1, 2],

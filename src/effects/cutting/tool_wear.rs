@@ -47,6 +47,18 @@ impl CuttingEffect for ToolWear {
             .collect()
     }
 
+    fn impossible(&self, sizes: &[Size]) -> Option<String> {
+        let growth = |size: &Size| {
+            size.outside(
+                "a growth",
+                [0.8, 10.0],
+                (1.0, "times"),
+                "an edge gets blunter as it cuts, and is changed before it is ten times as blunt",
+            )
+        };
+        sizes.iter().find_map(growth)
+    }
+
     fn order(&self) -> u8 {
         2
     }

@@ -1,0 +1,150 @@
+//! "Something else" as a rival of every effect: physics that the library does not have.
+//!
+//! An effect that is there leaves noise, and the small errors of every setup. A stand-in for something else takes away a
+//! share of what it can follow and leaves a rest of about the same size. How large that rest is against what the effect
+//! explains, in each test of structure ([`crate::identify::rest`]), is the evidence: the density of the rest found if the
+//! effect is there over its density if it is a stand-in (a Bayes factor: Kass & Raftery 1995).
+
+use std::f64::consts::TAU;
+
+use crate::identify::rest::{Rest, RestTest};
+
+/// Probability that the errors of the setup are large enough to be seen.
+const VISIBLE_ERRORS: f64 = 0.3;
+/// Prior odds of an effect of the library against something else.
+const LIBRARY_ODDS: f64 = 2.0;
+/// A pair of effects is one of many that were tried, and two effects at once are rarer than one.
+const PAIR_ODDS: f64 = 0.1;
+
+/// Odds that something else is behind an effect which takes `gain` of χ² away and leaves `rest`.
+pub fn odds(gain: f64, rest: &Rest) -> f64 {
+    (-log_bayes_factor(gain, rest)).exp() / LIBRARY_ODDS
+}
+
+/// The same for two effects together.
+pub fn odds_of_pair(gain: f64, rest: &Rest) -> f64 {
+    odds(gain, rest) / PAIR_ODDS
+}
+
+/// ln of the Bayes factor of "the effect is there" against "it stands in for something else". The tests look at the same
+/// rest in different ways: what the most telling one says for the effect counts, and what the most telling one says
+/// against it.
+fn log_bayes_factor(gain: f64, rest: &Rest) -> f64 {
+    let factors = rest.tests.iter().map(|t| of_test(gain, t, rest.small_errors));
+    let (low, high) = factors.fold((0.0f64, 0.0f64), |(low, high), f| (low.min(f), high.max(f)));
+    low + high
+}
+
+fn of_test(gain: f64, test: &RestTest, small_errors: f64) -> f64 {
+    if !(gain > 0.0) {
+        return 0.0;
+    }
+    // Less than noise is no better than noise.
+    let excess = test.excess.max(0.0);
+    let spread = |mean: f64| log_normal(excess - mean, test.std);
+    let there = [
+        (1.0 - VISIBLE_ERRORS).ln() + spread(0.0),
+        VISIBLE_ERRORS.ln() + log_mean(|u| spread(u * small_errors), |u| (-u).exp()),
+    ];
+    let stand_in = log_mean(|u| spread(u * gain), left_by_a_stand_in);
+    log_sum(&there) - stand_in
+}
+
+/// Density of u = rest found / gain for a stand-in: the share that it explains is anything from none to all, which makes
+/// the ratio of rest to explained x with density (1 + x)⁻², and a test sees any share κ of the rest, u = κ x.
+fn left_by_a_stand_in(u: f64) -> f64 {
+    (1.0 / u).ln_1p() - 1.0 / (1.0 + u)
+}
+
+fn log_normal(difference: f64, std: f64) -> f64 {
+    -0.5 * ((difference / std).powi(2) + (TAU * std * std).ln())
+}
+
+fn log_sum(logs: &[f64]) -> f64 {
+    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if most == f64::NEG_INFINITY {
+        return most;
+    }
+    most + logs.iter().map(|l| (l - most).exp()).sum::<f64>().ln()
+}
+
+/// ln ∫ e^{f(u)} density(u) du over u > 0, on a logarithmic grid from 10⁻⁶ to 10⁴.
+fn log_mean(f: impl Fn(f64) -> f64, density: impl Fn(f64) -> f64) -> f64 {
+    const STEPS: usize = 600;
+    let step = 10.0f64.powi(10).ln() / STEPS as f64;
+    let terms: Vec<f64> = (0..=STEPS)
+        .map(|i| 1e-6 * (i as f64 * step).exp())
+        .map(|u| f(u) + (density(u) * u * step).ln())
+        .collect();
+    log_sum(&terms)
+}
+
+/// Share of what stands above the noise that an effect with this gain of χ² explains, and its standard deviation. `rest`:
+/// after it.
+pub fn share_explained(gain: f64, rest: &Rest) -> [f64; 2] {
+    let left = rest.largest().map_or(0.0, |t| t.excess);
+    let all = (gain + left).max(f64::MIN_POSITIVE);
+    // Gains scatter by twice their root (a noncentral χ²); of the tests the sharpest one bounds what is not found.
+    let sharpest = rest.tests.iter().map(|t| t.std).fold(f64::INFINITY, f64::min);
+    let std = (4.0 * gain.max(0.0))
+        .sqrt()
+        .hypot(if sharpest.is_finite() { sharpest } else { 0.0 });
+    let std = match left > 0.0 {
+        true => std / all,
+        // An effect that leaves nothing explains all of it, less what could not be seen.
+        false => sharpest.min(all) / all,
+    };
+    [(gain / all).clamp(0.0, 1.0), std.min(1.0)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rest(excess: f64, std: f64) -> Rest {
+        Rest {
+            tests: vec![RestTest::new("structure", 1000.0 + excess, 1000.0, std, 1000.0).unwrap()],
+            small_errors: 500.0,
+        }
+    }
+
+    #[test]
+    fn densities_are_densities() {
+        let unity = |density: fn(f64) -> f64| log_mean(|_| 0.0, density).exp();
+        assert!(
+            (unity(left_by_a_stand_in) - 1.0).abs() < 2e-3,
+            "{}",
+            unity(left_by_a_stand_in)
+        );
+        assert!((unity(|u| (-u).exp()) - 1.0).abs() < 1e-3);
+        let normal: f64 = (-4000..=4000)
+            .map(|i| log_normal(f64::from(i) * 0.01, 2.0).exp() * 0.01)
+            .sum();
+        assert!((normal - 1.0).abs() < 1e-6);
+        assert!((log_normal(0.0, 1.0) + 0.5 * TAU.ln()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_effect_that_leaves_nothing_beats_something_else_the_more_it_explains() {
+        let clean = |gain| odds(gain, &rest(0.0, 30.0));
+        assert!(clean(1e5) < 0.01, "{}", clean(1e5));
+        assert!(clean(1e3) < 0.15 && clean(1e3) > clean(1e4), "{}", clean(1e3));
+        // What the test cannot see says nothing: the prior odds stand.
+        assert!((odds(1.0, &rest(0.0, 1e4)) * LIBRARY_ODDS - 1.0).abs() < 0.1);
+    }
+
+    #[test]
+    fn a_rest_as_large_as_what_is_explained_is_something_else() {
+        assert!(odds(5000.0, &rest(3000.0, 100.0)) > 3.0);
+        // One that a good setup leaves anyway is not, if the effect is far larger.
+        assert!(odds(2e5, &rest(400.0, 50.0)) < 0.2);
+        assert!(odds_of_pair(5e3, &rest(0.0, 50.0)) > odds(5e3, &rest(0.0, 50.0)));
+    }
+
+    #[test]
+    fn the_share_is_of_what_was_explained_and_what_is_left() {
+        let [share, std] = share_explained(1000.0, &rest(3000.0, 100.0));
+        assert!((share - 0.25).abs() < 1e-9 && std > 0.0 && std < 0.1);
+        assert_eq!(share_explained(1000.0, &rest(50.0, 100.0))[0], 1.0);
+    }
+}

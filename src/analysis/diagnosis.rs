@@ -2,6 +2,7 @@
 
 use num_complex::Complex64;
 
+use super::structure::study_of;
 use crate::Result;
 use crate::campaign::Campaign;
 use crate::discrepancy::{
@@ -39,7 +40,7 @@ pub struct Leading {
 impl DiagnosisFindings {
     pub fn run(campaign: &Campaign, options: Options) -> Result<Self> {
         let case = StructureCase::load(campaign)?;
-        let study = case.study(options);
+        let study = study_of(&case, options);
         let diagnosis = diagnose(&study, &case.model)?;
         let next_measurement = next_measurement::advise(&case.data, &diagnosis)?;
         let (data, points) = (&case.data, &case.model.points);

@@ -54,7 +54,8 @@ pub fn run(args: Args) -> Result<Outcome> {
         "error": after.totals,
         "error_before": before.totals,
         "iterations": calibration.iterations,
-        "converged": calibration.converged,
+        "converged": calibration.converged(),
+        "not_converged_because": calibration.ending.reason(),
         "reduced_chi2": calibration.reduced_chi2,
         "modal_start": start,
         "starts": calibration.starts,
@@ -79,7 +80,7 @@ pub fn run(args: Args) -> Result<Outcome> {
         percent(before.totals.nrms),
         percent(after.totals.nrms),
         percent(after.totals.noise_floor_nrms),
-        if calibration.converged {
+        if calibration.converged() {
             "converged".to_string()
         } else {
             Emphasis::Bad.on("NOT converged")
@@ -88,7 +89,7 @@ pub fn run(args: Args) -> Result<Outcome> {
     );
     text += &warnings(notes);
     let next = Guide::structure(&campaign).calibrated(
-        calibration.converged,
+        calibration.converged(),
         args.starts,
         calibration.reduced_chi2,
         &after.totals,

@@ -40,6 +40,8 @@ pub fn cutting(campaign: &Campaign, findings: &CuttingFindings) -> Outcome {
         "effect": d.winner().map(|c| &c.name.effect),
         "site": Value::Null,
         "confidence": d.confidence,
+        "too_little_data": d.too_little_data,
+        "too_little_data": d.too_little_data,
         "companion": d.companion,
         "candidates": d.candidates.iter().map(candidate).collect::<Vec<_>>(),
         "indistinguishable": d.indistinguishable,
@@ -141,6 +143,7 @@ fn candidate<M, I>(c: &Candidate<M, I>) -> Value {
         "p_value": c.p_value,
         "reduced_chi2": c.reduced_chi2,
         "at_bound": c.at_bound,
+        "vanished": c.vanished,
         "refined": c.refined,
         "parameters": parameters(c),
         "parameter_std_errors": c.parameters.iter().map(|p| json!({ "name": p.name, "value": p.value, "std_error": p.std_error, "unit": p.unit })).collect::<Vec<_>>(),
@@ -231,6 +234,11 @@ fn answer<M, I>(
             "{} is missing: what is left looks like noise ({sure})\n",
             Emphasis::Good.on("NOTHING")
         ),
+        _ if d.too_little_data.is_some() => format!(
+            "{}: {}\n",
+            Emphasis::Bad.on("NO VERDICT"),
+            d.too_little_data.as_deref().unwrap_or_default()
+        ),
         _ => format!(
             "{}: what is left is real, but no effect of the library explains it ({sure})\n",
             Emphasis::Bad.on("UNKNOWN")
@@ -266,7 +274,7 @@ fn rest<M, I>(d: &Diagnosis<M, I>, next_measurement: &str) -> String {
                     number(c.p_value, 2)
                 },
                 number(c.reduced_chi2, 3),
-                if c.at_bound { "at the end of its range" } else { "" }.into(),
+                c.remark().into(),
             ]
         })
         .collect();

@@ -59,6 +59,9 @@ pub struct Setting<'a> {
     pub lowness: f64,
 }
 
+/// Share of an effect's usual size (a mass, a compliance) that no measurement can show.
+const NEGLIGIBLE: f64 = 1e-10;
+
 /// What happens to the response channels between the structure and the file.
 #[derive(Debug, Clone)]
 pub struct ChannelFilter {
@@ -125,6 +128,13 @@ pub trait StructuralEffect: Sync {
 
     /// Further starting points, natural values in the order of the parameters. `peaks_hz`: where the residual peaks.
     fn starts(&self, robot: &RobotSpec, data: &DataSummary, peaks_hz: &[f64]) -> Vec<Vec<f64>>;
+
+    /// Values of [`Self::parameters`] (given), natural units, at which the effect is not there: the model is the one without
+    /// it, to rounding. They may lie outside the parameters' bounds, which are those of an effect worth a name. `None` only
+    /// for what is simulated and never fitted.
+    fn vanishing(&self, _parameters: &[Parameter]) -> Option<Vec<f64>> {
+        None
+    }
 
     /// Effects with lower order are applied first (a payload weighs on the joints before their load is counted).
     fn order(&self) -> u8 {

@@ -48,6 +48,10 @@ impl CuttingEffect for DynamometerMisalignment {
         vec![vec![-4.0], vec![4.0]]
     }
 
+    fn vanishing(&self, _variant: usize, _parameters: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vec![0.0])
+    }
+
     fn apply(&self, variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
         let angle = values[0].scale(1f64.to_radians());
         let (s, c) = angle.value.sin_cos();

@@ -41,6 +41,10 @@ impl CuttingEffect for SpeedDependence {
         vec![vec![-0.1], vec![0.4]]
     }
 
+    fn vanishing(&self, _variant: usize, _parameters: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vec![0.0])
+    }
+
     fn apply(&self, _variant: usize, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
         let cutting: &[usize] = match setting.process {
             Process::Milling => &[0, 1, 2],

@@ -5,6 +5,7 @@ use clap::Parser;
 use lobestone::commands::{self, Cli};
 
 fn main() -> ExitCode {
+    lobestone::sums_in_order();
     let cli = Cli::parse();
     let as_json = cli.json;
     match commands::run(cli) {

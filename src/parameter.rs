@@ -10,7 +10,9 @@ pub enum Scale {
     Linear,
 }
 
-/// Normal prior on the solver's scale (log-normal on the value for logarithmic parameters).
+/// What is known of a parameter beforehand, on the solver's scale: bell-shaped about `mean` within about two `std`, with
+/// the heavy tails of Student's t beyond. A robot file that is wrong by a factor then pulls at the data with next to
+/// nothing, where a normal law would insist.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
     pub mean: f64,
@@ -21,13 +23,20 @@ impl Prior {
     /// What it adds to half a sum of squares at `theta` (solver's scale): value, first and second derivative.
     pub fn half_square(&self, theta: f64) -> [f64; 3] {
         let residual = (theta - self.mean) / self.std;
+        // −ln of Student's density up to a constant, scaled to the normal's curvature in the middle; the curvature is that
+        // of the parabola that touches it from above (iteratively reweighted squares), so that it never turns negative.
+        let square = residual * residual / TAIL;
+        let weight = 1.0 / (1.0 + square);
         [
-            0.5 * residual * residual,
-            residual / self.std,
-            1.0 / (self.std * self.std),
+            0.5 * TAIL * square.ln_1p(),
+            weight * residual / self.std,
+            weight / (self.std * self.std),
         ]
     }
 }
+
+/// Squared deviations from the mean at which the prior's pull begins to fall.
+const TAIL: f64 = 4.0;
 
 /// One tunable quantity.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,6 +74,12 @@ impl Parameter {
         self.bounds.map(|b| self.internal(b))
     }
 
+    /// Whether a value on the solver's scale stands at or beyond an end of the range.
+    pub fn at_end(&self, theta: f64) -> bool {
+        let [low, high] = self.internal_bounds();
+        theta <= low || theta >= high
+    }
+
     /// Standard error in natural units of a value whose standard error on the solver's scale is `std`.
     pub fn natural_std(&self, theta: f64, std: f64) -> f64 {
         match self.scale {
@@ -72,4 +87,17 @@ impl Parameter {
             Scale::Linear => std,
         }
     }
+}
+
+/// Whether `theta` (solver's scale) holds the values at which an effect vanishes (`limit`, solver's scale) and these lie
+/// outside the range in which the effect is worth a name: a fit then holds them.
+pub fn is_vanished(parameters: &[Parameter], limit: &[f64], theta: &[f64]) -> bool {
+    let same = |t: &f64, l: &f64| (t - l).abs() <= 1e-9 * (1.0 + l.abs());
+    let beyond = |(p, l): (&Parameter, &f64)| {
+        let [low, high] = p.internal_bounds();
+        *l < low || *l > high
+    };
+    theta.len() == limit.len()
+        && theta.iter().zip(limit).all(|(t, l)| same(t, l))
+        && parameters.iter().zip(limit).any(beyond)
 }

@@ -260,7 +260,7 @@ pub fn case_study() -> Result<CaseStudy> {
         frequencies,
         receptances,
         parameters,
-        converged: fit.converged,
+        converged: fit.converged(),
         fitted_frequency_error: rms(fit_sum),
         predicted_frequency_error: rms(prediction_sum),
         unexplained: unexplained(&model, &fit.theta)?,

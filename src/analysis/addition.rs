@@ -1,6 +1,7 @@
 //! An effect added to a campaign's model: everything refitted together, judged on postures left out, recorded.
 
 use super::cutting::cutting_comparison;
+use super::structure::study_of;
 use crate::campaign::Campaign;
 use crate::discrepancy::FrfComparison;
 use crate::discrepancy::compare::ErrorTotals;
@@ -144,9 +145,7 @@ impl Addition<CuttingModel, CuttingInstance> {
         };
         let revision = log.append(entry(before, None), entry(after, *progress))?;
         let mut warnings = case.warnings.clone();
-        if !after.calibration.converged {
-            warnings.push("the fit did not converge: treat the parameters with care".into());
-        }
+        warnings.extend(after.calibration.convergence_warning());
         let effects = after.model.effects().iter();
         Ok(Addition {
             revision,
@@ -188,7 +187,7 @@ impl Addition {
                 ))
                 .into());
         }
-        let extension = Extension::new(&case.study(options), &case.model, &instances)?;
+        let extension = Extension::new(&study_of(&case, options), &case.model, &instances)?;
         let Extension {
             before,
             after,

@@ -78,7 +78,7 @@ const FAR_ABOVE_NOISE: f64 = 1.5;
 
 fn warnings_of(calibration: &Calibration) -> Vec<String> {
     let mut warnings = Vec::new();
-    if !calibration.converged {
+    if !calibration.converged() {
         warnings.push("the fit did not converge: treat the coefficients with care".to_string());
     }
     if calibration.reduced_chi2 > FAR_ABOVE_NOISE {
@@ -148,6 +148,6 @@ fn waveform_group(data: &CuttingData, group: &Group) -> Result<Value> {
     map.insert("nrms".into(), json!(totals.nrms));
     map.insert("noise_floor_nrms".into(), json!(totals.noise_floor_nrms));
     map.insert("chi2_per_value".into(), json!(calibration.reduced_chi2));
-    map.insert("converged".into(), json!(calibration.converged));
+    map.insert("converged".into(), json!(calibration.converged()));
     Ok(Value::Object(map))
 }

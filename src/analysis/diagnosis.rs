@@ -2,6 +2,7 @@
 
 use num_complex::Complex64;
 
+use super::structure::study_of;
 use crate::Result;
 use crate::campaign::Campaign;
 use crate::discrepancy::setup::{Rival, SetupCheck, examine, examine_cutting};
@@ -42,7 +43,7 @@ pub struct Leading {
 impl DiagnosisFindings {
     pub fn run(campaign: &Campaign, options: Options) -> Result<Self> {
         let case = StructureCase::load(campaign)?;
-        let study = case.study(options);
+        let study = study_of(&case, options);
         let mut diagnosis = diagnose(&study, &case.model)?;
         let setup = examine(&case.model, &case.data, &diagnosis.baseline.theta, || {
             rival(&diagnosis)

@@ -10,7 +10,7 @@ use crate::discrepancy::FrfComparison;
 use crate::discrepancy::setup::{SetupCheck, examine, library_rival};
 use crate::identify::calibrate::calibrate;
 use crate::identify::modal_start::{ModalStart, PostureMeasurement, modal_start};
-use crate::identify::{Calibration, Options, StructureCase};
+use crate::identify::{Calibration, Options, StructureCase, StructureStudy};
 
 /// The robot model of a campaign against its FRFs: as the robot file has it, and calibrated with the effects that were
 /// added.
@@ -82,6 +82,18 @@ impl StructureAnalysis {
         let (model, data, theta) = (&self.case.model, &self.case.data, &self.calibration.theta);
         examine(model, data, theta, || library_rival(model, data, theta))
     }
+}
+
+/// The case as the loop works on it, with the same starting points as [`StructureAnalysis`] has: one model of one set of
+/// data has one optimum, whichever command asks for it.
+pub fn study_of(case: &StructureCase, options: Options) -> StructureStudy {
+    let modal = match case.model.start() {
+        Some(_) => None,
+        None => measured_modes(case).ok(),
+    };
+    // Modes that lead nowhere are no reason to give up.
+    let start = modal.and_then(|modal| start_of_modes(case, &modal).ok().flatten());
+    case.study(options).with_measured(start.map(|s| s.theta))
 }
 
 /// Where the modes measured at the campaign's postures put the model.

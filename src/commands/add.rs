@@ -104,7 +104,9 @@ fn document<M, I>(
         "parameters": calibration.parameters,
         "error": error,
         "iterations": calibration.iterations,
-        "converged": calibration.converged,
+        "converged": calibration.converged(),
+        "not_converged_because": calibration.ending.reason(),
+        "vanished": addition.extension.vanished,
         "reduced_chi2": calibration.reduced_chi2,
         "starts": calibration.starts,
         "starts_agreeing": calibration.starts_agreeing,
@@ -156,6 +158,7 @@ fn describe<M, I>(addition: &Addition<M, I>, plain: &Plain) -> String {
         before,
         after,
         progress,
+        vanished,
         ..
     } = extension;
     let mut text = format!(
@@ -179,6 +182,12 @@ fn describe<M, I>(addition: &Addition<M, I>, plain: &Plain) -> String {
         );
     }
     text += &warnings(notes);
+    if *vanished {
+        text += &format!(
+            "{}: the best fit with it is the fit without it, so that its parameters mean nothing.\n",
+            Emphasis::Bad.on("THESE DATA HOLD NOTHING OF IT")
+        );
+    }
     if *progress == Some(false) {
         text += &format!(
             "{}: the error on {} left out of the fit did not fall by more than chance would let it. The revision is \

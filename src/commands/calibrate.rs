@@ -55,7 +55,8 @@ pub fn run(args: Args) -> Result<Outcome> {
         "error": after.totals,
         "error_before": before.totals,
         "iterations": calibration.iterations,
-        "converged": calibration.converged,
+        "converged": calibration.converged(),
+        "not_converged_because": calibration.ending.reason(),
         "reduced_chi2": calibration.reduced_chi2,
         "modal_start": start,
         "starts": calibration.starts,
@@ -81,7 +82,7 @@ pub fn run(args: Args) -> Result<Outcome> {
         percent(before.totals.nrms),
         percent(after.totals.nrms),
         percent(after.totals.noise_floor_nrms),
-        if calibration.converged {
+        if calibration.converged() {
             "converged".to_string()
         } else {
             Emphasis::Bad.on("NOT converged")
@@ -90,7 +91,7 @@ pub fn run(args: Args) -> Result<Outcome> {
     );
     text += &warnings(notes);
     let next = Guide::structure(&campaign).calibrated(
-        calibration.converged,
+        calibration.converged(),
         args.starts,
         calibration.reduced_chi2,
         &after.totals,

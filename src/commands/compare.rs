@@ -39,8 +39,9 @@ fn cutting(campaign: &Campaign) -> Result<Outcome> {
         "mostly": c.mostly,
         "parameters": analysis.calibration.parameters,
         "chi2_per_value": analysis.calibration.reduced_chi2,
-        "converged": analysis.calibration.converged,
         "setup": setup.findings,
+        "converged": analysis.calibration.converged(),
+        "not_converged_because": analysis.calibration.ending.reason(),
         "warnings": analysis.warnings,
     });
     let next =
@@ -146,8 +147,9 @@ fn structure(campaign: &Campaign) -> Result<Outcome> {
         "residual_peaks_hz": peaks.iter().map(|p| p.frequency_hz).collect::<Vec<_>>(),
         "residual_peaks": peaks,
         "worst_frfs": comparison.worst_first().iter().take(10).map(|&i| frf(&comparison.frf_errors[i])).collect::<Vec<_>>(),
-        "converged": calibration.converged,
         "setup": setup.findings,
+        "converged": calibration.converged(),
+        "not_converged_because": calibration.ending.reason(),
         "warnings": notes,
     });
     let next = Guide::structure(campaign).compared(

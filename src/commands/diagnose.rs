@@ -40,6 +40,8 @@ pub fn cutting(campaign: &Campaign, findings: &CuttingFindings) -> Outcome {
         "effect": d.winner().map(|c| &c.name.effect),
         "site": Value::Null,
         "confidence": d.confidence,
+        "too_little_data": d.too_little_data,
+        "too_little_data": d.too_little_data,
         "companion": d.companion,
         "best_guess": d.best_guess.map(|i| d.candidates[i].label()),
         "explained_share": explained_share(d).map(|[share, _]| share),
@@ -157,6 +159,7 @@ fn candidate<M, I>(c: &Candidate<M, I>) -> Value {
         "at_bound": c.at_bound,
         "not_credible": c.not_credible,
         "explained_share": c.explained_share().map(|[share, _]| share),
+        "vanished": c.vanished,
         "refined": c.refined,
         "parameters": parameters(c),
         "parameter_std_errors": c.parameters.iter().map(|p| json!({ "name": p.name, "value": p.value, "std_error": p.std_error, "unit": p.unit })).collect::<Vec<_>>(),
@@ -275,6 +278,11 @@ fn answer<M, I>(
             "{} is missing: what is left looks like noise ({sure})\n",
             Emphasis::Good.on("NOTHING")
         ),
+        _ if d.too_little_data.is_some() => format!(
+            "{}: {}\n",
+            Emphasis::Bad.on("NO VERDICT"),
+            d.too_little_data.as_deref().unwrap_or_default()
+        ),
         _ => {
             let guess = d
                 .best_guess_in_words()
@@ -315,12 +323,7 @@ fn rest<M, I>(d: &Diagnosis<M, I>, next_measurement: &NextMeasurement) -> String
                     number(c.p_value, 2)
                 },
                 number(c.reduced_chi2, 3),
-                match (&c.not_credible, c.at_bound) {
-                    (Some(_), _) => "not possible",
-                    (None, true) => "at the end of its range",
-                    (None, false) => "",
-                }
-                .into(),
+                c.remark().into(),
             ]
         })
         .collect();

@@ -13,7 +13,7 @@ use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
 use crate::identify::rest::Rest;
 use crate::identify::study::{
     EffectName, Effort, Extent, HeldOut, OUT_OF_RACE, Residual, Study, Tried, View, held_out, rescue,
-    try_effect, try_effects,
+    try_effect, try_effects, vanished,
 };
 use crate::progress::Progress;
 
@@ -41,6 +41,8 @@ pub struct Candidate<M, I> {
     pub parameters: Vec<Estimate>,
     /// One of them stopped at the end of its range: evidence against.
     pub at_bound: bool,
+    /// No fit with the effect is better than the one without it: the effect stands where it vanishes.
+    pub vanished: bool,
     /// Fitted on all data; otherwise on the coarse view only, far behind the leaders there.
     pub refined: bool,
     pub theta: Vec<f64>,
@@ -50,6 +52,16 @@ pub struct Candidate<M, I> {
 impl<M, I> Candidate<M, I> {
     pub fn label(&self) -> String {
         self.name.label()
+    }
+
+    /// What a reader of a table should know of it; empty as a rule.
+    pub fn remark(&self) -> &'static str {
+        match (self.vanished, &self.not_credible, self.at_bound) {
+            (true, ..) => "vanishes",
+            (_, Some(_), _) => "not possible",
+            (.., true) => "at the end of its range",
+            _ => "",
+        }
     }
 
     /// Share of what stands above the noise that the effect explains, and its standard deviation; `None` for candidates that
@@ -81,6 +93,8 @@ pub struct Diagnosis<M, I> {
     pub best_guess: Option<usize>,
     /// Probability that the verdict is right.
     pub confidence: f64,
+    /// Why there is no verdict, where the data are too few for one.
+    pub too_little_data: Option<String>,
     /// Best first, one for each effect and site.
     pub candidates: Vec<Candidate<M, I>>,
     /// `effect@site` of rivals that this data cannot tell from the verdict.
@@ -126,10 +140,18 @@ pub struct Baseline {
 
 /// Leading candidates whose rest is tested for structure.
 const TESTED: usize = 4;
+/// Stated where there are too few data for a verdict.
+const NO_CONFIDENCE: f64 = 0.05;
 /// Candidates that are refined on all data, at most.
 const REFINED: usize = 8;
 /// Misfit per degree of freedom of the baseline below which what is missing is faint.
 const FAINT: f64 = 1.5;
+/// Times the baseline is fitted anew, and all candidates from it, where a candidate's fit leads to a better baseline.
+const REBASED: usize = 2;
+/// Share of its misfit by which a baseline must be better for that.
+const BETTER: f64 = 1e-3;
+/// Candidates whose solutions the baseline is tried from.
+const LEADERS: usize = 3;
 /// Candidates that are fitted again from the best one's baseline.
 const SHARED: usize = 6;
 /// Candidates whose combination with every other one is tried where none explains the data alone.
@@ -211,18 +233,47 @@ impl<'a, S: Study> Engine<'a, S> {
         minimise(&self.study.problem(model, view), start, &bounds, stopping)
     }
 
-    fn run(self) -> Result<Diagnosis<S::Model, S::Instance>> {
+    /// The baseline's fit on the coarse view and on all data, and every effect on the coarse view, all from the best
+    /// baseline that was found anywhere: where an effect's fit leads the baseline itself further down, the calibration was
+    /// trapped, and all is fitted again from there.
+    #[allow(clippy::type_complexity)]
+    fn from_one_baseline(&mut self) -> Result<(Fit, Fit, Vec<TriedOf<S>>)> {
         let (study, model) = (self.study, self.model);
-        let coarse_base = self.minimise(model, View::COARSE, &self.calibration.theta, REFINE)?;
-        let (tried, base_start) = self.screen_all(&coarse_base)?;
-
-        let mut base = self.minimise(model, View::FULL, &self.calibration.theta, REFINE)?;
-        if let Some(start) = base_start {
-            let other = self.minimise(model, View::FULL, &start, REFINE)?;
-            if other.cost < base.cost {
-                base = other;
+        let mut rebased = 0;
+        loop {
+            let coarse = self.minimise(model, View::COARSE, &self.calibration.theta, REFINE)?;
+            let (tried, better) = self.screen_all(&coarse)?;
+            let base = self.minimise(model, View::FULL, &self.calibration.theta, REFINE)?;
+            let Some(start) = better.filter(|_| rebased < REBASED) else {
+                return Ok((coarse, base, tried));
+            };
+            let calibration = study.calibrate(&study.starting_from(model, start))?;
+            let other = self.minimise(model, View::FULL, &calibration.theta, REFINE)?;
+            if other.cost > base.cost * (1.0 - BETTER) {
+                return Ok((coarse, base, tried));
             }
+            rebased += 1;
+            self.hints = study.hints(model, &calibration.theta)?;
+            self.calibration = calibration;
         }
+    }
+
+    /// `tried`, or where it is no better than `base`, the fit without the effect as one with it; and whether it is that.
+    fn nested(&self, tried: &TriedOf<S>, base: &Fit) -> (TriedOf<S>, bool) {
+        let worse = tried.fit.cost >= base.cost;
+        match vanished(self.study, &tried.model, base).filter(|_| worse) {
+            Some(fit) => {
+                let model = self.study.starting_from(&tried.model, fit.theta.clone());
+                let instance = tried.instance.clone();
+                (Tried { instance, model, fit }, true)
+            }
+            None => (tried.clone(), false),
+        }
+    }
+
+    fn run(mut self) -> Result<Diagnosis<S::Model, S::Instance>> {
+        let (study, model) = (self.study, self.model);
+        let (coarse_base, base, tried) = self.from_one_baseline()?;
         let mut refined = self.refine(&tried)?;
         if let Some(best) = refined
             .first_mut()
@@ -256,14 +307,19 @@ impl<'a, S: Study> Engine<'a, S> {
         let rest = tried
             .iter()
             .filter(|t| !labels.contains(&self.label(&t.instance)));
-        let all: Vec<(&TriedOf<S>, bool)> = refined
+        let all: Vec<(&TriedOf<S>, &Fit)> = refined
             .iter()
-            .map(|t| (t, true))
-            .chain(rest.map(|t| (t, false)))
+            .map(|t| (t, &base))
+            .chain(rest.map(|t| (t, &coarse_base)))
             .collect();
         let mut candidates: Vec<CandidateOf<S>> = all
             .par_iter()
-            .map(|(t, refined)| self.judge(t, *refined, &evidence))
+            .map(|(t, without)| {
+                let (tried, vanished) = self.nested(t, without);
+                let refined = std::ptr::eq(*without, &base);
+                let judged = self.judge(&tried, refined, &evidence)?;
+                Ok(Candidate { vanished, ..judged })
+            })
             .collect::<Result<_>>()?;
         candidates.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic));
         let mut baseline = Baseline {
@@ -293,8 +349,19 @@ impl<'a, S: Study> Engine<'a, S> {
             }
             _ => None,
         };
-        let decision = verdict::decide(&candidates, &credible, &baseline, pair, evidence.scale);
+        let mut decision = verdict::decide(&candidates, &credible, &baseline, pair, evidence.scale);
+        let too_little_data = self.too_little_data();
+        if too_little_data.is_some() {
+            decision = verdict::Decision {
+                verdict: Verdict::Unknown,
+                effect: None,
+                companion: None,
+                confidence: NO_CONFIDENCE,
+                indistinguishable: Vec::new(),
+            };
+        }
         Ok(Diagnosis {
+            too_little_data,
             verdict: decision.verdict,
             effect: decision.effect,
             best_guess: decision.best_guess,
@@ -342,6 +409,22 @@ impl<'a, S: Study> Engine<'a, S> {
         })
     }
 
+    /// Why the data are too few for a verdict; `None` where they are not.
+    fn too_little_data(&self) -> Option<String> {
+        if self.study.noise_is_given() {
+            return None;
+        }
+        let values = self.study.real_values(Extent::Full);
+        let parameters = self.base_count;
+        let least = parameters + verdict::least_freedom();
+        (values < least).then(|| {
+            format!(
+                "too little data for a verdict: {values} numbers for {parameters} parameters of the model, and it takes {least} \
+                 to tell what is left from noise"
+            )
+        })
+    }
+
     /// Every effect on the coarse view, best first, one for each effect and site; and a better starting point for the
     /// baseline, if one turned up.
     #[allow(clippy::type_complexity)]
@@ -366,9 +449,17 @@ impl<'a, S: Study> Engine<'a, S> {
             return Ok((tried, None));
         };
         // The rivals' solutions are starting points too, for the baseline and for each other.
-        let best_front = best.fit.theta[..self.base_count].to_vec();
-        let from_best = self.minimise(model, View::COARSE, &best_front, REFINE)?;
-        let base_start = (from_best.cost < base.cost * (1.0 - 1e-3)).then_some(from_best.theta);
+        let front = |t: &TriedOf<S>| t.fit.theta[..self.base_count].to_vec();
+        let best_front = front(best);
+        let from_leaders: Vec<Fit> = tried[..tried.len().min(LEADERS)]
+            .par_iter()
+            .filter_map(|t| self.minimise(model, View::COARSE, &front(t), REFINE).ok())
+            .collect();
+        let base_start = from_leaders
+            .into_iter()
+            .min_by(|a, b| a.cost.total_cmp(&b.cost))
+            .filter(|fit| fit.cost < base.cost * (1.0 - BETTER))
+            .map(|fit| fit.theta);
         let shared = [best_front];
         let again: Vec<Option<TriedOf<S>>> = tried
             .par_iter()
@@ -431,6 +522,7 @@ impl<'a, S: Study> Engine<'a, S> {
             rest: None,
             not_credible: study.impossible(model, instance, &all[own.clone()]),
             at_bound: own.clone().any(|i| fit.at_bound.contains(&i)),
+            vanished: false,
             parameters: all[own].to_vec(),
             refined,
             theta: fit.theta.clone(),

@@ -27,6 +27,8 @@ pub struct Extension<M, I> {
     /// The model as it stood, fitted to the same data.
     pub before: Fitted<M>,
     pub after: Fitted<M>,
+    /// The effect vanishes in these data: the fit with it is the fit without it.
+    pub vanished: bool,
     /// Whether the held-out error fell by more than chance would let it; `None` with one fold.
     pub progress: Option<bool>,
 }
@@ -91,20 +93,44 @@ impl<M, I> Extension<M, I> {
         {
             best.fit = fit;
         }
-        let after = study.calibrate(&study.starting_from(&best.model, best.fit.theta.clone()))?;
+        let mut after = study.calibrate(&study.starting_from(&best.model, best.fit.theta.clone()))?;
 
         // The fit without the effect, also tried from where the one with it put the common parameters: a trapped
         // `before` would make any effect look good.
         let common = after.theta[..before.theta.len()].to_vec();
         let again = study.calibrate(&study.starting_from(model, common))?;
-        if again.reduced_chi2 < 0.999 * before.reduced_chi2 {
+        if again.reduced_chi2 < before.reduced_chi2 {
             before = again;
         }
+        // The model without the effect is one with it, at the effect's vanishing limit: the fit with the effect is never
+        // worse. The likelihood alone is compared; what is known of an effect beforehand supposes that it is there.
+        let chi2 = |model: &M, c: &Calibration| Ok::<f64, Error>(study.residual(model, &c.theta)?.chi2_per_value);
+        let limit = study.vanishing(&best.model);
+        let mut extended = best.model;
+        let mut vanished = false;
+        if let Some(limit) = limit
+            && chi2(&extended, &after)? > chi2(model, &before)?
+        {
+            let own = &study.parameters(&extended)[before.theta.len()..];
+            after = before.with_vanished(own, &limit);
+            extended = study.starting_from(&extended, after.theta.clone());
+            vanished = true;
+        }
         let before = Fitted::new(study, model.clone(), before)?;
-        let after = Fitted::new(study, best.model, after)?;
+        let after = if vanished {
+            Fitted {
+                model: extended,
+                calibration: after,
+                residual: before.residual,
+                held_out: before.held_out,
+            }
+        } else {
+            Fitted::new(study, extended, after)?
+        };
         Ok(Extension {
             progress: progress::<S>(study, &before, &after),
             instance: best.instance,
+            vanished,
             before,
             after,
         })

@@ -36,6 +36,12 @@ pub fn is_noise(reduced_chi2: f64) -> bool {
     reduced_chi2 <= NOISE_CHI2
 }
 
+/// Values beyond the model's parameters from which on a misfit per degree of freedom can be told from noise: the scatter
+/// √(2/ν) of χ²/ν by chance has to be smaller than what is allowed for, [`NOISE_CHI2`] − 1.
+pub fn least_freedom() -> usize {
+    (2.0 / (NOISE_CHI2 - 1.0).powi(2)).ceil() as usize
+}
+
 /// Whether a candidate improves the fit by more than chance, with parameters that are not stuck at the end of their range.
 pub fn significant<M, I>(c: &Candidate<M, I>) -> bool {
     is_convincing(c.p_value, c.delta_bic) && !c.at_bound

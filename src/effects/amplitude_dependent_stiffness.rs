@@ -67,6 +67,10 @@ impl StructuralEffect for AmplitudeDependentStiffness {
         vec![vec![0.7], vec![1.2]]
     }
 
+    fn vanishing(&self, _parameters: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vec![1.0])
+    }
+
     fn apply(&self, site: Site, _variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {
         let Site::Joint(i) = site else { return };
         // Exactly the ratio at the lowest level, geometric between the levels.

@@ -54,6 +54,10 @@ impl StructuralEffect for BaseCompliance {
         vec![vec![3e6], vec![5e7]]
     }
 
+    fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vec![NEGLIGIBLE.recip() * parameters[0].nominal])
+    }
+
     fn apply(&self, _site: Site, _variant: usize, values: &[Dual], _setting: &Setting, chain: &mut Chain) {
         chain.elements.push(Element {
             role: Role::Base,

@@ -223,6 +223,25 @@ fn starts(site: Site, variant: usize, data: &DataSummary, peaks_hz: &[f64]) -> V
     }
 }
 
+/// Sizes at which a form is not there: what it holds with (a mass alone: its mass) times `factor`, frequencies and ratios
+/// as they are.
+fn vanishing(parameters: &[Parameter], factor: f64) -> Vec<f64> {
+    let is = |p: &Parameter, names: &[&str]| names.iter().any(|name| p.name.contains(name));
+    let stiff = parameters.iter().any(|p| is(p, &["stiffness"]));
+    let held: &[&str] = if stiff {
+        &["stiffness"]
+    } else {
+        &["mass_kg", "damping_n", "hysteretic"]
+    };
+    let size = |p: &Parameter| match is(p, held) {
+        true => factor * p.nominal,
+        // Beside a spring that is not there a damper must not be there either.
+        false if factor < 1.0 && is(p, &["damping_n"]) => factor * p.nominal,
+        false => p.nominal,
+    };
+    parameters.iter().map(size).collect()
+}
+
 fn attach(chain: &mut Chain, grip: &Grip, law: AttachmentLaw, size: &Dual) {
     chain.attachments.push(Attachment {
         grip: grip.clone(),
@@ -291,6 +310,10 @@ impl StructuralEffect for Branch {
         peaks_hz: &[f64],
     ) -> Vec<Vec<f64>> {
         starts(site, variant, data, peaks_hz)
+    }
+
+    fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vanishing(parameters, NEGLIGIBLE))
     }
 
     fn apply(&self, site: Site, variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {
@@ -420,6 +443,10 @@ impl StructuralEffect for Series {
         peaks_hz: &[f64],
     ) -> Vec<Vec<f64>> {
         starts(site, variant, data, peaks_hz)
+    }
+
+    fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vanishing(parameters, 1.0 / NEGLIGIBLE))
     }
 
     fn apply(&self, site: Site, variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {

@@ -3,7 +3,11 @@ use crate::effects::background::EWINS;
 use crate::parameter::{Prior, Scale};
 use crate::robot::Role;
 
-/// Damping sits in the joints (viscous, one coefficient each), not one ratio for all modes.
+/// Damping sits in the joints (viscous, one coefficient each), beside what is left of the one ratio for all modes.
+///
+/// The common ratio is multiplied by `common_share`: 0 where all damping sits in the joints, 1 in the model without the
+/// effect, so that the one model is a special case of the other. A share a little below zero is an estimate of zero with
+/// its error; kept at zero it would be no estimate and would bias the dampers.
 pub struct JointDamping;
 
 /// Damping time c/k that a few per cent of critical damping means at a robot's first modes, s.
@@ -41,7 +45,7 @@ impl StructuralEffect for JointDamping {
     }
 
     fn parameters(&self, robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
-        robot
+        let dampers = robot
             .joints
             .iter()
             .enumerate()
@@ -58,25 +62,41 @@ impl StructuralEffect for JointDamping {
                     }),
                     bounds: [1e-3 * nominal, 1e3 * nominal],
                 }
-            })
-            .collect()
+            });
+        let share = Parameter {
+            name: "common_share".into(),
+            unit: "1",
+            scale: Scale::Linear,
+            nominal: 0.0,
+            prior: Some(Prior { mean: 0.0, std: 1.0 }),
+            bounds: [-0.5, 1.5],
+        };
+        dampers.chain([share]).collect()
     }
 
     fn starts(&self, robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         let at = |factor: f64| {
-            let c = |j: &crate::campaign::robot_spec::JointSpec| {
+            let c = move |j: &crate::campaign::robot_spec::JointSpec| {
                 factor * DAMPING_TIME_S / j.compliance_rad_per_nm
             };
-            robot.joints.iter().map(c).collect()
+            robot.joints.iter().map(c)
         };
-        vec![at(0.4), at(2.5)]
+        let with = |factor: f64, share: f64| at(factor).chain([share]).collect();
+        vec![with(0.4, 0.0), with(2.5, 0.0), with(0.05, 1.0)]
+    }
+
+    fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {
+        let (_, dampers) = parameters.split_last()?;
+        let still = dampers.iter().map(|p| NEGLIGIBLE * p.nominal);
+        Some(still.chain([1.0]).collect())
     }
 
     fn apply(&self, _site: Site, _variant: usize, values: &[Dual], _setting: &Setting, chain: &mut Chain) {
-        chain.modal_damping_ratio = Dual::constant(0.0);
+        let Some((share, dampers)) = values.split_last() else { return };
+        chain.modal_damping_ratio = &chain.modal_damping_ratio * share;
         for element in &mut chain.elements {
             if let Role::Joint(i) = element.role {
-                element.damping = Some(values[i - 1].clone());
+                element.damping = dampers.get(i - 1).cloned();
             }
         }
     }

@@ -56,6 +56,10 @@ impl StructuralEffect for JointTransverseCompliance {
         vec![vec![7e5], vec![1.5e7]]
     }
 
+    fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vec![NEGLIGIBLE.recip() * parameters[0].nominal])
+    }
+
     fn apply(&self, site: Site, _variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {
         let Site::Joint(i) = site else { return };
         let frame = &setting.kinematics.frames[i - 1];

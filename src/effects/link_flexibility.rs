@@ -74,6 +74,10 @@ impl StructuralEffect for LinkFlexibility {
         vec![vec![70e9], vec![500e9]]
     }
 
+    fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vec![NEGLIGIBLE.recip() * parameters[0].nominal])
+    }
+
     fn apply(&self, _site: Site, _variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {
         for i in 1..=setting.robot.joint_count() {
             chain

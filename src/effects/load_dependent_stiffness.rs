@@ -56,6 +56,10 @@ impl StructuralEffect for LoadDependentStiffness {
         vec![vec![0.2]]
     }
 
+    fn vanishing(&self, _parameters: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vec![0.0])
+    }
+
     fn order(&self) -> u8 {
         2
     }

@@ -58,6 +58,10 @@ impl StructuralEffect for LocalResonator {
         branch::starts(data, peaks_hz, MASS_KG)
     }
 
+    fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vec![NEGLIGIBLE * parameters[0].nominal, parameters[1].nominal, parameters[2].nominal])
+    }
+
     fn apply(&self, site: Site, variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {
         let Site::Link(i) = site else { return };
         let (stiffness, damping) = branch::spring_and_damper(values);

@@ -67,6 +67,9 @@ pub struct Setting<'a> {
     pub lowness: f64,
 }
 
+/// Share of an effect's usual size (a mass, a compliance) that no measurement can show.
+const NEGLIGIBLE: f64 = 1e-10;
+
 /// What happens to the response channels between the structure and the file.
 #[derive(Debug, Clone)]
 pub struct ChannelFilter {
@@ -158,6 +161,13 @@ pub trait StructuralEffect: Sync {
 
     /// Why this effect cannot be of the size that was fitted (parameters in their order); `None` if it can.
     fn impossible(&self, _site: Site, _robot: &RobotSpec, _sizes: &[Size]) -> Option<String> {
+        None
+    }
+
+    /// Values of [`Self::parameters`] (given), natural units, at which the effect is not there: the model is the one without
+    /// it, to rounding. They may lie outside the parameters' bounds, which are those of an effect worth a name. `None` only
+    /// for what is simulated and never fitted.
+    fn vanishing(&self, _parameters: &[Parameter]) -> Option<Vec<f64>> {
         None
     }
 

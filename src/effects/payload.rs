@@ -68,6 +68,10 @@ impl StructuralEffect for Payload {
         vec![vec![5.0], vec![60.0]]
     }
 
+    fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vec![NEGLIGIBLE * parameters[0].nominal])
+    }
+
     fn order(&self) -> u8 {
         0
     }

@@ -70,6 +70,10 @@ impl StructuralEffect for SensorMisalignment {
         vec![vec![-3.0, 3.0, -3.0]]
     }
 
+    fn vanishing(&self, _parameters: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vec![0.0; 3])
+    }
+
     fn filter(&self, values: &[Dual], filter: &mut ChannelFilter) {
         let v: Vec<Dual> = values.iter().map(|d| d.scale(1f64.to_radians())).collect();
         let square = |d: &Dual| d * d;

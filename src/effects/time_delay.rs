@@ -60,6 +60,10 @@ impl StructuralEffect for TimeDelay {
         vec![vec![2e-3], vec![-5e-4]]
     }
 
+    fn vanishing(&self, _parameters: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vec![0.0])
+    }
+
     fn filter(&self, values: &[Dual], filter: &mut ChannelFilter) {
         filter.delay_s = &filter.delay_s + &values[0];
     }

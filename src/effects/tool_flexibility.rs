@@ -49,6 +49,15 @@ impl StructuralEffect for ToolFlexibility {
         branch::starts(data, peaks_hz, MASS_KG)
     }
 
+    fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {
+        // A light tip on a hard spring: k = m ω² has to grow while the mass goes.
+        Some(vec![
+            NEGLIGIBLE * parameters[0].nominal,
+            parameters[1].nominal / NEGLIGIBLE,
+            parameters[2].nominal,
+        ])
+    }
+
     fn apply(&self, _site: Site, _variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {
         let (stiffness, damping) = branch::spring_and_damper(values);
         let rotation = setting.kinematics.tool.rotation;

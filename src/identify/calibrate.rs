@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::frf_data::FrfData;
-use super::levenberg_marquardt::{Fit, Stopping, minimise};
+use super::levenberg_marquardt::{Ending, Fit, LeastSquares, Stopping, minimise};
 use super::structure::{FrfProblem, Misfit, StructureModel};
 use crate::effects::Size;
 use crate::parameter::Parameter;
@@ -65,7 +65,7 @@ pub struct Calibration {
     /// Weighted misfit per real residual: 1 where only noise is left.
     pub reduced_chi2: f64,
     pub iterations: usize,
-    pub converged: bool,
+    pub ending: Ending,
     /// Starting points tried.
     pub starts: usize,
     /// How many of them came to the answer given here (within 0.1 % of its misfit).
@@ -73,12 +73,51 @@ pub struct Calibration {
 }
 
 impl Calibration {
+    pub fn converged(&self) -> bool {
+        self.ending == Ending::Converged
+    }
+
+    /// The same fit as one of a model with an effect that vanishes in it: `own` are the effect's parameters, `limit` the
+    /// values (solver's scale) at which it is not there.
+    pub fn with_vanished(&self, own: &[Parameter], limit: &[f64]) -> Calibration {
+        let (front, count) = (self.theta.len(), self.theta.len() + own.len());
+        let mut covariance = DMatrix::zeros(count, count);
+        covariance
+            .view_mut((0, 0), (front, front))
+            .copy_from(&self.covariance);
+        let mut parameters = self.parameters.clone();
+        for (i, (p, t)) in own.iter().zip(limit).enumerate() {
+            // All that is known of an effect that is not there.
+            let std = p.prior.map_or(1.0, |prior| prior.std);
+            covariance[(front + i, front + i)] = std * std;
+            parameters.push(Estimate {
+                name: p.name.clone(),
+                value: p.natural(*t),
+                unit: p.unit,
+                std_error: p.natural_std(*t, std),
+                initial: p.nominal,
+                at_bound: true,
+            });
+        }
+        Calibration {
+            parameters,
+            theta: [self.theta.as_slice(), limit].concat(),
+            covariance,
+            ..self.clone()
+        }
+    }
+
+    /// Why the fit did not converge, as a warning; `None` where it did.
+    pub fn convergence_warning(&self) -> Option<String> {
+        let reason = self.ending.reason()?;
+        Some(format!(
+            "the fit did not converge ({reason}): treat the parameters with care"
+        ))
+    }
+
     /// What the user should know of the fit before believing it.
     pub fn warnings(&self) -> Vec<String> {
-        let mut warnings = Vec::new();
-        if !self.converged {
-            warnings.push("the fit did not converge: treat the parameters with care".to_string());
-        }
+        let mut warnings = Vec::from_iter(self.convergence_warning());
         for p in self.parameters.iter().filter(|p| p.at_bound) {
             warnings.push(format!(
                 "{} stopped at the end of its range ({:.4e} {}): the model or the robot file is wrong there",
@@ -106,7 +145,12 @@ impl Calibration {
 const FAR_ABOVE_NOISE: f64 = 1.5;
 /// Misfit above which noise alone is not credible any more and further starting points are tried.
 const SUSPICIOUS_CHI2: f64 = 1.15;
-/// Lines used to get near the answer: every how many.
+/// Complex values on which starting points are followed, about; and those on which they are compared only.
+const SKETCH_VALUES: usize = 6000;
+const GLANCE_VALUES: usize = 1000;
+/// Lines of each FRF that a sketch keeps at least: a robot's resonances are some per cent wide.
+const SKETCH_LINES: usize = 100;
+/// Every how many lines a sketch keeps at most, where there are more than enough.
 const COARSE_STRIDE: usize = 4;
 
 /// When to stop on few lines.
@@ -119,61 +163,129 @@ const LOOK_ITERATIONS: usize = 10;
 /// Times the lowest misfit from which on a starting point is given up after the look.
 const HOPELESS: f64 = 1.5;
 
-/// On few lines from a point that is in the right basin already: log magnitudes could only lead out of it.
-fn resume(model: &StructureModel, data: &FrfData, start: &[f64]) -> Result<(Fit, usize)> {
-    let complex = FrfProblem {
-        model,
-        data,
-        misfit: Misfit::Complex,
-        stride: coarse_stride(data),
-    };
-    let fit = minimise(&complex, start, &model.bounds(), ROUGH)?;
+/// The likelihood from a point that is in the right basin already: log magnitudes could only lead out of it.
+fn resume(model: &StructureModel, sketch: &FrfData, start: &[f64]) -> Result<(Fit, usize)> {
+    let fit = minimise(&problem(model, sketch, Misfit::Complex), start, &model.bounds(), ROUGH)?;
     let iterations = fit.iterations;
     Ok((fit, iterations))
 }
 
-/// Log magnitude first, then the complex values on few lines: gets into the right basin.
-fn approach(model: &StructureModel, data: &FrfData, start: &[f64], rough: Stopping) -> Result<(Fit, usize)> {
+/// Log magnitude first, then the complex values: gets into the right basin.
+fn approach(
+    model: &StructureModel,
+    sketch: &FrfData,
+    start: &[f64],
+    rough: Stopping,
+) -> Result<(Fit, usize)> {
     let bounds = model.bounds();
-    let stride = coarse_stride(data);
-    let log = FrfProblem {
-        model,
-        data,
-        misfit: Misfit::LogMagnitude,
-        stride,
-    };
-    let near = minimise(&log, start, &bounds, rough)?;
-    let complex = FrfProblem {
-        model,
-        data,
-        misfit: Misfit::Complex,
-        stride,
-    };
-    let fit = minimise(&complex, &near.theta, &bounds, rough)?;
+    let near = minimise(&problem(model, sketch, Misfit::LogMagnitude), start, &bounds, rough)?;
+    let fit = minimise(
+        &problem(model, sketch, Misfit::Complex),
+        &near.theta,
+        &bounds,
+        rough,
+    )?;
     let iterations = near.iterations + fit.iterations;
     Ok((fit, iterations))
 }
 
-fn coarse_stride(data: &FrfData) -> usize {
-    let lines = data
-        .blocks
-        .iter()
-        .map(|b| b.frequency_hz.len())
-        .min()
-        .unwrap_or(0);
-    // Thinned measurements are left alone: a resonance needs its few lines.
-    if lines >= 200 { COARSE_STRIDE } else { 1 }
+fn problem<'a>(model: &'a StructureModel, data: &'a FrfData, misfit: Misfit) -> FrfProblem<'a> {
+    FrfProblem {
+        model,
+        data,
+        misfit,
+        stride: 1,
+    }
 }
 
 /// Refines from a point that is already in the right basin, on all lines.
 pub fn refine(model: &StructureModel, data: &FrfData, start: &[f64]) -> Result<Fit> {
-    let problem = FrfProblem {
-        model,
-        data,
-        misfit: Misfit::Complex,
-        stride: 1,
+    minimise(
+        &problem(model, data, Misfit::Complex),
+        start,
+        &model.bounds(),
+        Stopping::default(),
+    )
+}
+
+/// About so many complex values of the data, spread over lines, references and postures.
+fn sketch(data: &FrfData, values: usize) -> FrfData {
+    let lines = data.blocks.iter().map(|b| b.frequency_hz.len()).min();
+    let lines = lines.unwrap_or(0).max(1);
+    let share = |data: &FrfData| data.value_count().div_ceil(values).max(1);
+    // Thinned measurements are left alone: a resonance needs its few lines.
+    let stride = match lines {
+        0..200 => 1,
+        _ => share(data)
+            .max(COARSE_STRIDE)
+            .min((lines / SKETCH_LINES).max(COARSE_STRIDE)),
     };
-    minimise(&problem, start, &model.bounds(), Stopping::default())
+    let fewer_lines = data.thinned(stride, 1);
+    let fewer_references = fewer_lines.thinned(1, share(&fewer_lines).min(3));
+    let every = share(&fewer_references);
+    FrfData {
+        blocks: fewer_references.blocks.iter().step_by(every).cloned().collect(),
+        ..fewer_references
+    }
+}
+
+/// Common factors on the joint stiffnesses that are tried: a robot file may be off by as much as its parameters' range.
+const FACTORS: i32 = 10;
+const LARGEST_LN_FACTOR: f64 = 3.5;
+/// Values of one joint's stiffness that are tried with the others as they are: so many to either side, …
+const ONE_JOINT: i32 = 6;
+/// … this far apart, natural logarithm.
+const ONE_JOINT_STEP: f64 = 0.25;
+/// Starting points that the scans may give.
+const SCANNED: usize = 4;
+
+/// Where a scan of `values` along `direction` from `theta` has its local minima of the log magnitudes' misfit, with their
+/// costs, beside the one in the middle.
+fn valleys(
+    problem: &FrfProblem<'_>,
+    theta: &[f64],
+    bounds: &[[f64; 2]],
+    moved: &[usize],
+    offsets: &[f64],
+) -> Vec<(f64, Vec<f64>)> {
+    let points: Vec<(f64, Vec<f64>)> = offsets
+        .par_iter()
+        .map(|offset| {
+            let mut point = theta.to_vec();
+            for &i in moved {
+                point[i] = (point[i] + offset).clamp(bounds[i][0], bounds[i][1]);
+            }
+            (problem.cost(&point).unwrap_or(f64::INFINITY), point)
+        })
+        .collect();
+    let cost = |i: usize| points[i].0;
+    (0..points.len())
+        .filter(|&i| offsets[i] != 0.0)
+        .filter(|&i| (i == 0 || cost(i) < cost(i - 1)) && (i + 1 == points.len() || cost(i) <= cost(i + 1)))
+        .map(|i| points[i].clone())
+        .collect()
+}
+
+/// Starting points that a look at the data along lines through the parameters suggests: all joints stiffer or softer by
+/// one factor than the robot file says, and single joints beside where `found` has them.
+fn scanned_starts(model: &StructureModel, sketch_data: &FrfData, found: &[f64]) -> Vec<Vec<f64>> {
+    let glance = sketch(sketch_data, GLANCE_VALUES);
+    let problem = problem(model, &glance, Misfit::LogMagnitude);
+    let bounds = model.bounds();
+    let joints: Vec<usize> = (0..model.robot.joint_count()).collect();
+    let steps = |count: i32, step: f64| -> Vec<f64> { (-count..=count).map(|k| f64::from(k) * step).collect() };
+    let common = steps(FACTORS, LARGEST_LN_FACTOR / f64::from(FACTORS));
+    let mut starts = valleys(&problem, &model.nominal_theta(), &bounds, &joints, &common);
+    starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    starts.truncate(SCANNED / 2);
+    let single = steps(ONE_JOINT, ONE_JOINT_STEP);
+    let mut beside: Vec<(f64, Vec<f64>)> = joints
+        .iter()
+        .flat_map(|joint| valleys(&problem, found, &bounds, &[*joint], &single))
+        .collect();
+    beside.sort_by(|a, b| a.0.total_cmp(&b.0));
+    beside.truncate(SCANNED / 2);
+    starts.into_iter().chain(beside).map(|(_, start)| start).collect()
 }
 
 /// Calibrates `model` to `data`, from the solution that the model brings along where it has one, else from its nominal
@@ -184,15 +296,20 @@ pub fn calibrate(
     measured: Option<&[f64]>,
     options: Options,
 ) -> Result<Calibration> {
+    let sketch_data = sketch(data, SKETCH_VALUES);
     let nominal = model.nominal_theta();
     let (mut first, mut iterations) = match model.start() {
-        Some(start) => resume(model, data, start)?,
-        None => approach(model, data, &nominal, ROUGH)?,
+        Some(start) => resume(model, &sketch_data, start)?,
+        None => approach(model, &sketch_data, &nominal, ROUGH)?,
     };
     let (mut starts, mut agreeing) = (1, 1);
+    let misfit = |fit: &Fit, data: &FrfData| {
+        2.0 * fit.cost / ((2 * data.value_count()) as f64 - model.parameters.len() as f64).max(1.0)
+    };
     // As with the further starting points below, one that leads nowhere is no reason to give up.
+    let measured = measured.filter(|start| start.len() == nominal.len());
     if let (Some(start), None) = (measured, model.start())
-        && let Ok((other, more)) = approach(model, data, start, ROUGH)
+        && let Ok((other, more)) = approach(model, &sketch_data, start, ROUGH)
     {
         starts += 1;
         iterations += more;
@@ -202,13 +319,11 @@ pub fn calibrate(
             first = other;
         }
     }
-    let mut best = refine(model, data, &first.theta)?;
-    iterations += best.iterations;
-    let residual_count = (2 * data.value_count()) as f64;
-    let chi2 = |fit: &Fit| 2.0 * fit.cost / (residual_count - model.parameters.len() as f64).max(1.0);
-
-    if chi2(&best) > SUSPICIOUS_CHI2 && options.extra_starts > 0 {
-        let points = scattered_starts(&model.parameters, options.extra_starts, options.seed);
+    if misfit(&first, &sketch_data) > SUSPICIOUS_CHI2 && options.extra_starts > 0 {
+        let mut points = scanned_starts(model, &sketch_data, &first.theta);
+        let centre = points.first().unwrap_or(&nominal);
+        let scattered = scattered_about(&model.parameters, centre, options.extra_starts, options.seed);
+        points.extend(scattered);
         let progress = Progress::new("calibrating from further starting points", points.len());
         let look = Stopping {
             max_iterations: LOOK_ITERATIONS,
@@ -217,7 +332,7 @@ pub fn calibrate(
         let looks: Vec<Fit> = points
             .par_iter()
             .filter_map(|start| {
-                let fit = approach(model, data, start, look).ok().map(|(fit, _)| fit);
+                let fit = approach(model, &sketch_data, start, look).ok().map(|(fit, _)| fit);
                 progress.step();
                 fit
             })
@@ -227,26 +342,23 @@ pub fn calibrate(
         let mut fits: Vec<Fit> = looks
             .par_iter()
             .filter(|look| look.cost < HOPELESS * lowest)
-            .filter_map(|look| resume(model, data, &look.theta).ok().map(|(fit, _)| fit))
+            .filter_map(|look| {
+                resume(model, &sketch_data, &look.theta)
+                    .ok()
+                    .map(|(fit, _)| fit)
+            })
             .collect();
         starts += points.len();
+        fits.push(first);
+        let lowest = fits.iter().map(|f| f.cost).fold(f64::INFINITY, f64::min);
+        agreeing = fits.iter().filter(|f| f.cost < lowest * 1.001).count();
         fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-        // Costs of the coarse fits are comparable with each other and with the first one's.
-        agreeing = 0;
-        let winner = fits.first().filter(|fit| fit.cost < first.cost * (1.0 - 1e-3));
-        if let Some(winner) = winner {
-            let fine = refine(model, data, &winner.theta)?;
-            iterations += fine.iterations;
-            if fine.cost < best.cost {
-                best = fine;
-            }
-        }
-        let lowest = fits.iter().map(|f| f.cost).fold(first.cost, f64::min);
-        agreeing += fits.iter().filter(|f| f.cost < lowest * 1.001).count();
-        agreeing += usize::from(first.cost < lowest * 1.001);
+        first = fits.swap_remove(0);
     }
+    let best = refine(model, data, &first.theta)?;
+    iterations += best.iterations;
 
-    let reduced_chi2 = chi2(&best);
+    let reduced_chi2 = misfit(&best, data);
     let covariance = covariance(&best, reduced_chi2)?;
     let parameters = estimates(&model.parameters, &best, reduced_chi2)?;
     Ok(Calibration {
@@ -255,7 +367,7 @@ pub fn calibrate(
         covariance,
         reduced_chi2,
         iterations,
-        converged: best.converged,
+        ending: best.ending,
         starts,
         starts_agreeing: agreeing,
     })
@@ -297,16 +409,22 @@ pub fn estimates(parameters: &[Parameter], fit: &Fit, reduced_chi2: f64) -> Resu
 
 /// Draws from the priors, twice as wide, within the bounds; on the solver's scale.
 pub fn scattered_starts(parameters: &[Parameter], count: usize, seed: u64) -> Vec<Vec<f64>> {
+    let nominal: Vec<f64> = parameters.iter().map(|p| p.internal(p.nominal)).collect();
+    scattered_about(parameters, &nominal, count, seed)
+}
+
+/// As [`scattered_starts`], about another centre.
+fn scattered_about(parameters: &[Parameter], centre: &[f64], count: usize, seed: u64) -> Vec<Vec<f64>> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     (0..count)
         .map(|_| {
-            let draw = |p: &Parameter| {
+            let draw = |(p, centre): (&Parameter, &f64)| {
                 // Uniform on ±√3·2σ has the standard deviation 2σ and no far tails.
                 let half = p.prior.map_or(0.1, |prior| prior.std) * 2.0 * 3f64.sqrt();
                 let [low, high] = p.internal_bounds();
-                (p.internal(p.nominal) + half * random.random_range(-1.0..1.0)).clamp(low, high)
+                (centre + half * random.random_range(-1.0..1.0)).clamp(low, high)
             };
-            parameters.iter().map(draw).collect()
+            parameters.iter().zip(centre).map(draw).collect()
         })
         .collect()
 }

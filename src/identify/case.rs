@@ -206,7 +206,8 @@ fn with_revision(
         .map(|parameter| {
             let known = revision.parameters.iter().find(|r| r.name == parameter.name);
             let value = known.map_or(parameter.nominal, |r| r.value);
-            parameter.internal(value.clamp(parameter.bounds[0], parameter.bounds[1]))
+            // Into the range, or at an effect's vanishing limit: `with_start` sees to it.
+            parameter.internal(value)
         })
         .collect();
     Ok(model.with_start(start))

@@ -99,7 +99,7 @@ impl CuttingCase {
             let start = model.parameters.iter().map(|parameter| {
                 let known = current.parameters.iter().find(|r| r.name == parameter.name);
                 let value = known.map_or(parameter.nominal, |r| r.value);
-                parameter.internal(value.clamp(parameter.bounds[0], parameter.bounds[1]))
+                parameter.internal(value)
             });
             let start = start.collect();
             model = model.with_start(start);

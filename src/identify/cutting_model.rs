@@ -7,7 +7,7 @@ use crate::campaign::Process;
 use crate::cutting::coefficients_of;
 use crate::cutting::waveform::DrillTerm;
 use crate::effects::cutting::{CutPhysics, CuttingInstance};
-use crate::parameter::{Parameter, Prior, Scale};
+use crate::parameter::{Parameter, Prior, Scale, is_vanished};
 use crate::robot::Dual;
 use crate::{Error, Result};
 
@@ -112,10 +112,37 @@ impl CuttingModel {
 
     /// The same model, whose fits start from `theta`.
     pub fn with_start(&self, theta: Vec<f64>) -> Self {
-        CuttingModel {
-            start: Some(theta),
+        let mut model = CuttingModel {
+            start: None,
             ..self.clone()
+        };
+        if theta.len() != model.parameters.len() {
+            return model;
         }
+        let bounds = model.bounds();
+        let mut start: Vec<f64> = theta
+            .iter()
+            .zip(&bounds)
+            .map(|(t, b)| t.clamp(b[0], b[1]))
+            .collect();
+        for added in model.effects.iter().filter(|added| model.vanished(&theta, added)) {
+            start[added.parameters.clone()].copy_from_slice(&theta[added.parameters.clone()]);
+        }
+        model.start = Some(start);
+        model
+    }
+
+    /// Values of the effect's own parameters at which it is not there, solver's scale.
+    pub fn vanishing(&self, added: &AddedCuttingEffect) -> Option<Vec<f64>> {
+        let own = &self.parameters[added.parameters.clone()];
+        let values = added.instance.effect.vanishing(added.instance.variant, own)?;
+        Some(own.iter().zip(values).map(|(p, v)| p.internal(v)).collect())
+    }
+
+    fn vanished(&self, theta: &[f64], added: &AddedCuttingEffect) -> bool {
+        let own = added.parameters.clone();
+        self.vanishing(added)
+            .is_some_and(|limit| is_vanished(&self.parameters[own.clone()], &limit, &theta[own]))
     }
 
     /// Where fits start, on the solver's scale.
@@ -123,8 +150,17 @@ impl CuttingModel {
         self.start.clone().unwrap_or_else(|| self.nominal_theta())
     }
 
+    /// Where a fit may go, solver's scale. An effect that had vanished where the model starts is held there.
     pub fn bounds(&self) -> Vec<[f64; 2]> {
-        self.parameters.iter().map(Parameter::internal_bounds).collect()
+        let mut bounds: Vec<[f64; 2]> = self.parameters.iter().map(Parameter::internal_bounds).collect();
+        if let Some(start) = &self.start {
+            for added in self.effects.iter().filter(|added| self.vanished(start, added)) {
+                for i in added.parameters.clone() {
+                    bounds[i] = [start[i]; 2];
+                }
+            }
+        }
+        bounds
     }
 
     /// Free amplitudes fitted to each cut and channel beyond a straight zero line.

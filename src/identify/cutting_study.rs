@@ -85,6 +85,14 @@ impl Study for CuttingStudy {
         model.with_effect(*instance, &self.data)
     }
 
+    fn vanishing(&self, model: &CuttingModel) -> Option<Vec<f64>> {
+        model.vanishing(model.effects().last()?)
+    }
+
+    fn bounds(&self, model: &CuttingModel) -> Vec<[f64; 2]> {
+        model.bounds()
+    }
+
     fn starting_from(&self, model: &CuttingModel, theta: Vec<f64>) -> CuttingModel {
         model.with_start(theta)
     }
@@ -191,7 +199,7 @@ fn calibration(model: &CuttingModel, data: &CuttingData, fit: Fit) -> Result<Cal
         theta: fit.theta,
         reduced_chi2,
         iterations: fit.iterations,
-        converged: fit.converged,
+        ending: fit.ending,
         starts: 1,
         starts_agreeing: 1,
     })

@@ -34,6 +34,34 @@ impl<P: LeastSquares + ?Sized> LeastSquares for &P {
     }
 }
 
+/// Why the solver stopped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ending {
+    /// The undamped Gauss–Newton step over the parameters that are free promises less than the tolerance: ½ gᵀH⁻¹g, the
+    /// gradient measured by the curvature.
+    Converged,
+    /// Steps still promise more than the tolerance, but bring less: a curved valley.
+    Crawling,
+    /// No step, however short, improves the fit.
+    Stuck,
+    /// The iterations ran out.
+    OutOfIterations,
+}
+
+impl Ending {
+    /// Why the fit did not converge; `None` where it did.
+    pub fn reason(self) -> Option<&'static str> {
+        match self {
+            Ending::Converged => None,
+            Ending::Crawling => Some(
+                "steps along a curved valley bring less than they promise: two or more parameters can hardly be told apart",
+            ),
+            Ending::Stuck => Some("no step improves the fit, although its gradient is not zero"),
+            Ending::OutOfIterations => Some("the iterations ran out"),
+        }
+    }
+}
+
 /// Where the solver stopped, and why.
 #[derive(Debug, Clone)]
 pub struct Fit {
@@ -43,7 +71,7 @@ pub struct Fit {
     /// Gauss–Newton Hessian there.
     pub hessian: DMatrix<f64>,
     pub iterations: usize,
-    pub converged: bool,
+    pub ending: Ending,
     /// Indices of parameters that stopped at a bound.
     pub at_bound: Vec<usize>,
 }
@@ -54,6 +82,20 @@ pub struct Stopping {
     pub max_iterations: usize,
     /// Relative decrease of the cost that a converged step still promises.
     pub relative_decrease: f64,
+}
+
+impl Fit {
+    pub fn converged(&self) -> bool {
+        self.ending == Ending::Converged
+    }
+}
+
+impl Stopping {
+    /// Steps in a row that may bring less than the tolerance although they promise more. A search gives up at once, a
+    /// final fit does not.
+    fn patience(&self) -> usize {
+        if self.relative_decrease < 1e-7 { 4 } else { 1 }
+    }
 }
 
 impl Default for Stopping {
@@ -76,10 +118,19 @@ struct LevenbergMarquardt {
     here: Option<Linearisation>,
     /// The first trial of an iteration is linearised at once: most are accepted, and then nothing is worked out twice.
     speculative: bool,
-    converged: bool,
+    patience: usize,
+    /// Steps in a row that brought less than the tolerance.
+    crawled: usize,
+    ending: Option<Ending>,
 }
 
 type LmState = IterState<Vec<f64>, (), (), (), (), f64>;
+
+/// Decrease of the cost that is not worth a step: the share of the cost, and never less than what is no evidence at all
+/// (costs are half of χ²).
+fn tolerance(relative_decrease: f64, cost: f64) -> f64 {
+    (relative_decrease * cost.abs()).max(1e-10)
+}
 
 /// Rejected trial steps in one iteration before the solver says that it cannot improve.
 const MAX_TRIALS: usize = 12;
@@ -96,13 +147,30 @@ impl LevenbergMarquardt {
         (0..theta.len())
             .filter(|&i| {
                 let [low, high] = self.bounds[i];
-                !((theta[i] <= low && gradient[i] > 0.0) || (theta[i] >= high && gradient[i] < 0.0))
+                low < high && !((theta[i] <= low && gradient[i] > 0.0) || (theta[i] >= high && gradient[i] < 0.0))
             })
             .collect()
     }
 
-    /// Damped step over the free parameters and the decrease it promises.
-    fn step(&self, here: &Linearisation, free: &[usize]) -> Option<(DVector<f64>, f64)> {
+    /// What the undamped step over the free parameters promises: zero at an optimum. Infinite where the curvature is
+    /// singular.
+    fn promise(&self, here: &Linearisation, free: &[usize]) -> f64 {
+        let m = free.len();
+        // On unit diagonal: the parameters' curvatures differ by many orders of magnitude.
+        let root: Vec<f64> = free
+            .iter()
+            .map(|&i| here.hessian[(i, i)].sqrt().max(f64::MIN_POSITIVE))
+            .collect();
+        let hessian = DMatrix::from_fn(m, m, |i, j| here.hessian[(free[i], free[j])] / (root[i] * root[j]));
+        let gradient = DVector::from_fn(m, |i, _| here.gradient[free[i]] / root[i]);
+        match hessian.cholesky() {
+            Some(cholesky) => 0.5 * gradient.dot(&cholesky.solve(&gradient)),
+            None => f64::INFINITY,
+        }
+    }
+
+    /// Damped step over the free parameters.
+    fn step(&self, here: &Linearisation, free: &[usize]) -> Option<DVector<f64>> {
         let m = free.len();
         let hessian = DMatrix::from_fn(m, m, |i, j| {
             let damping = if i == j {
@@ -118,7 +186,7 @@ impl LevenbergMarquardt {
         for (i, &index) in free.iter().enumerate() {
             step[index] = reduced[i];
         }
-        Some((step.clone(), predicted_decrease(here, &step)))
+        Some(step)
     }
 }
 
@@ -158,18 +226,20 @@ impl<O: LeastSquares> Solver<O, LmState> for LevenbergMarquardt {
             *s = s.max(*d);
         }
         let free = self.free(&theta, &here.gradient);
+        let tolerance = tolerance(self.relative_decrease, here.cost);
+        if self.promise(&here, &free) <= tolerance {
+            self.ending = Some(Ending::Converged);
+            let cost = here.cost;
+            self.here = Some(here);
+            let finished = state.param(theta).cost(cost);
+            return Ok((finished.terminate_with(TerminationReason::SolverConverged), None));
+        }
         let mut next = None;
         for number in 0..MAX_TRIALS {
-            let Some((step, promised)) = self.step(&here, &free) else {
+            let Some(step) = self.step(&here, &free) else {
                 self.damping = (self.damping * 10.0).max(1e-6);
                 continue;
             };
-            if promised <= self.relative_decrease * here.cost.abs().max(f64::MIN_POSITIVE)
-                && self.damping <= 1.0
-            {
-                self.converged = true;
-                break;
-            }
             let mut trial: Vec<f64> = theta.iter().zip(step.iter()).map(|(t, s)| t + s).collect();
             self.clip(&mut trial);
             let taken = DVector::from_iterator(theta.len(), trial.iter().zip(&theta).map(|(a, b)| a - b));
@@ -197,22 +267,23 @@ impl<O: LeastSquares> Solver<O, LmState> for LevenbergMarquardt {
         }
         match next {
             Some((trial, cost, there)) => {
-                if here.cost - cost <= self.relative_decrease * here.cost && self.damping <= 1.0 {
-                    self.converged = true;
-                }
+                let crawls = here.cost - cost <= tolerance && self.damping <= 1.0;
+                self.crawled = if crawls { self.crawled + 1 } else { 0 };
                 self.here = there;
-                Ok((state.param(trial).cost(cost), None))
+                let next = state.param(trial).cost(cost);
+                if self.crawled < self.patience {
+                    return Ok((next, None));
+                }
+                self.ending = Some(Ending::Crawling);
+                let reason = TerminationReason::SolverExit("steps bring too little".into());
+                Ok((next.terminate_with(reason), None))
             }
             None => {
-                // No step improves: converged if the solver is sure of it, stuck otherwise; either way this is the end.
+                self.ending = Some(Ending::Stuck);
                 let cost = here.cost;
                 self.here = Some(here);
                 let finished = state.param(theta).cost(cost);
-                let reason = if self.converged {
-                    TerminationReason::SolverConverged
-                } else {
-                    TerminationReason::SolverExit("no step improves the fit".into())
-                };
+                let reason = TerminationReason::SolverExit("no step improves the fit".into());
                 Ok((finished.terminate_with(reason), None))
             }
         }
@@ -221,9 +292,6 @@ impl<O: LeastSquares> Solver<O, LmState> for LevenbergMarquardt {
     fn terminate(&mut self, state: &LmState) -> TerminationStatus {
         if state.terminated() {
             return state.get_termination_status().clone();
-        }
-        if self.converged {
-            return TerminationStatus::Terminated(TerminationReason::SolverConverged);
         }
         TerminationStatus::NotTerminated
     }
@@ -242,9 +310,22 @@ pub fn minimise<P: LeastSquares>(
         solver,
         ..
     } = descend(problem, start, bounds, stopping, true)?;
-    let here = match solver.here {
-        Some(here) => here,
+    let ending = solver.ending;
+    let here = match &solver.here {
+        Some(here) => here.clone(),
         None => problem.linearise(&theta)?,
+    };
+    // The last step may have reached the optimum.
+    let ending = match ending {
+        Some(Ending::Converged) => Ending::Converged,
+        other => {
+            let free = solver.free(&theta, &here.gradient);
+            if solver.promise(&here, &free) <= tolerance(stopping.relative_decrease, here.cost) {
+                Ending::Converged
+            } else {
+                other.unwrap_or(Ending::OutOfIterations)
+            }
+        }
     };
     let at_bound = theta
         .iter()
@@ -253,12 +334,20 @@ pub fn minimise<P: LeastSquares>(
         .filter(|(_, (t, [low, high]))| **t <= *low || **t >= *high)
         .map(|(i, _)| i)
         .collect();
+    let mut hessian = here.hessian;
+    for i in (0..bounds.len()).filter(|i| bounds[*i][0] == bounds[*i][1]) {
+        // What is held is known: it takes nothing from what the data say of the others.
+        let own = hessian[(i, i)];
+        hessian.row_mut(i).fill(0.0);
+        hessian.column_mut(i).fill(0.0);
+        hessian[(i, i)] = own.max(f64::MIN_POSITIVE);
+    }
     Ok(Fit {
         theta,
         cost: here.cost,
-        hessian: here.hessian,
+        hessian,
         iterations,
-        converged: solver.converged,
+        ending,
         at_bound,
     })
 }
@@ -295,7 +384,9 @@ fn descend<P: LeastSquares>(
         scaling: DVector::from_element(start.len(), f64::MIN_POSITIVE),
         here: None,
         speculative,
-        converged: false,
+        patience: stopping.patience(),
+        crawled: 0,
+        ending: None,
     };
     let result = Executor::new(problem, solver)
         .configure(|state| {
@@ -350,7 +441,7 @@ mod tests {
     fn rosenbrock_is_solved() {
         let free = [[f64::NEG_INFINITY, f64::INFINITY]; 2];
         let fit = minimise(&Rosenbrock, &[-1.2, 1.0], &free, Stopping::default()).unwrap();
-        assert!(fit.converged && fit.at_bound.is_empty());
+        assert!(fit.converged() && fit.at_bound.is_empty());
         assert!(
             (fit.theta[0] - 1.0).abs() < 1e-6 && (fit.theta[1] - 1.0).abs() < 1e-6,
             "{:?}",
@@ -358,12 +449,38 @@ mod tests {
         );
     }
 
+    /// Cut short, the fit says so: a small step is no convergence.
+    #[test]
+    fn what_did_not_converge_says_why() {
+        let free = [[f64::NEG_INFINITY, f64::INFINITY]; 2];
+        let short = Stopping {
+            max_iterations: 3,
+            ..Stopping::default()
+        };
+        let fit = minimise(&Rosenbrock, &[-1.2, 1.0], &free, short).unwrap();
+        assert_eq!(fit.ending, Ending::OutOfIterations);
+        assert!(fit.ending.reason().is_some() && Ending::Converged.reason().is_none());
+        // At the optimum nothing is left to do.
+        let fit = minimise(&Rosenbrock, &[1.0, 1.0], &free, short).unwrap();
+        assert!(fit.converged());
+    }
+
+    /// A held parameter stays, and tells the others nothing.
+    #[test]
+    fn what_is_held_stays() {
+        let bounds = [[0.5, 0.5], [-2.0, 2.0]];
+        let fit = minimise(&Rosenbrock, &[-1.2, 1.0], &bounds, Stopping::default()).unwrap();
+        assert!(fit.converged() && (fit.theta[1] - 0.25).abs() < 1e-9 && fit.theta[0] == 0.5);
+        assert_eq!(fit.hessian[(0, 1)], 0.0);
+        assert!((fit.hessian[(1, 1)] - 100.0).abs() < 1e-9);
+    }
+
     /// With x ≤ 0.5 the optimum is on the bound, at y = x² (closed form).
     #[test]
     fn an_active_bound_is_found_and_said() {
         let bounds = [[-2.0, 0.5], [-2.0, 2.0]];
         let fit = minimise(&Rosenbrock, &[-1.2, 1.0], &bounds, Stopping::default()).unwrap();
-        assert!(fit.converged);
+        assert!(fit.converged());
         assert_eq!(fit.at_bound, vec![0]);
         assert!(
             (fit.theta[0] - 0.5).abs() < 1e-12 && (fit.theta[1] - 0.25).abs() < 1e-6,

@@ -194,7 +194,7 @@ mod tests {
         truth[6] += 0.3;
         let rows = rows(&model, &truth);
         let fit = fit(&model, &rows).unwrap();
-        assert!(fit.converged);
+        assert!(fit.converged());
         for (row, p) in rows.iter().zip(predict(&model, &fit.theta, &rows).unwrap()) {
             assert!((p.frequency_hz / row.frequency_hz).ln().abs() < 0.01);
             assert!((p.peak_real_m_per_n / row.peak_real_m_per_n).ln().abs() < 0.1);

@@ -372,6 +372,18 @@ impl Study for ResonanceStudy {
         model.with_effect(*instance, &self.summary)
     }
 
+    fn noise_is_given(&self) -> bool {
+        true
+    }
+
+    fn vanishing(&self, model: &StructureModel) -> Option<Vec<f64>> {
+        model.vanishing(model.effects().last()?)
+    }
+
+    fn bounds(&self, model: &StructureModel) -> Vec<[f64; 2]> {
+        model.bounds()
+    }
+
     fn starting_from(&self, model: &StructureModel, theta: Vec<f64>) -> StructureModel {
         model.with_start(theta)
     }
@@ -487,7 +499,7 @@ impl Study for ResonanceStudy {
             theta: best.theta,
             reduced_chi2,
             iterations: best.iterations,
-            converged: best.converged,
+            ending: best.ending,
             starts: points.len(),
             starts_agreeing,
         })

@@ -14,7 +14,7 @@ use super::rest::RestCurve;
 use crate::Result;
 use crate::campaign::{Point, RobotSection};
 use crate::effects::{ChannelFilter, DataSummary, Instance, Setting};
-use crate::parameter::{Parameter, Prior, Scale};
+use crate::parameter::{Parameter, Prior, Scale, is_vanished};
 use crate::robot::frf::{Response, Slopes};
 use crate::robot::model::NOMINAL_DAMPING_RATIO;
 use crate::robot::{Baseline, Chain, Dual, FrfBasis, Kinematics, RobotModel};
@@ -44,7 +44,7 @@ pub struct AddedEffect {
 /// Standard deviation of the logarithm of the damping ratio about its nominal 3 %: robots show 1–6 %.
 const DAMPING_LOG_STD: f64 = 0.7;
 /// A stiffness further than this factor from the robot file's value is no tolerance but a mistake in the file.
-const STIFFNESS_FACTOR: f64 = 30.0;
+const STIFFNESS_FACTOR: f64 = 100.0;
 
 impl StructureModel {
     pub fn new(robot: RobotModel, points: Vec<Point>, section: &RobotSection) -> Self {
@@ -101,12 +101,34 @@ impl StructureModel {
 
     /// The same model with a solution found earlier (solver's scale) to start from.
     pub fn with_start(&self, theta: Vec<f64>) -> Self {
-        let bounds = self.bounds();
-        let inside = theta.iter().zip(&bounds).map(|(t, b)| t.clamp(b[0], b[1]));
-        StructureModel {
-            start: (theta.len() == bounds.len()).then(|| inside.collect()),
-            ..self.clone()
+        let mut model = self.without_start();
+        if theta.len() != model.parameters.len() {
+            return model;
         }
+        let bounds = model.bounds();
+        let mut start: Vec<f64> = theta
+            .iter()
+            .zip(&bounds)
+            .map(|(t, b)| t.clamp(b[0], b[1]))
+            .collect();
+        for added in model.effects.iter().filter(|added| model.vanished(&theta, added)) {
+            start[added.parameters.clone()].copy_from_slice(&theta[added.parameters.clone()]);
+        }
+        model.start = Some(start);
+        model
+    }
+
+    /// Values of the effect's own parameters at which it is not there, solver's scale.
+    pub fn vanishing(&self, added: &AddedEffect) -> Option<Vec<f64>> {
+        let own = &self.parameters[added.parameters.clone()];
+        let values = added.instance.effect.vanishing(own)?;
+        Some(own.iter().zip(values).map(|(p, v)| p.internal(v)).collect())
+    }
+
+    fn vanished(&self, theta: &[f64], added: &AddedEffect) -> bool {
+        let own = added.parameters.clone();
+        self.vanishing(added)
+            .is_some_and(|limit| is_vanished(&self.parameters[own.clone()], &limit, &theta[own]))
     }
 
     /// The same model, whose fits start from the nominal values.
@@ -165,8 +187,18 @@ impl StructureModel {
         self.parameters.iter().map(|p| p.internal(p.nominal)).collect()
     }
 
+    /// Where a fit may go, solver's scale. An effect that had vanished where the model starts is held there: its
+    /// parameters mean nothing, and every step back into their range would make the fit worse.
     pub fn bounds(&self) -> Vec<[f64; 2]> {
-        self.parameters.iter().map(Parameter::internal_bounds).collect()
+        let mut bounds: Vec<[f64; 2]> = self.parameters.iter().map(Parameter::internal_bounds).collect();
+        if let Some(start) = &self.start {
+            for added in self.effects.iter().filter(|added| self.vanished(start, added)) {
+                for i in added.parameters.clone() {
+                    bounds[i] = [start[i]; 2];
+                }
+            }
+        }
+        bounds
     }
 
     /// Parameter `i` in natural units as a variable of the solver's scale.

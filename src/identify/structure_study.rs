@@ -18,6 +18,8 @@ use crate::parameter::Parameter;
 pub struct StructureStudy {
     pub data: FrfData,
     pub options: Options,
+    /// Where the measured modes put the model, solver's scale: a starting point of its calibration.
+    measured: Option<Vec<f64>>,
     coarse: FrfData,
     /// Postures that are left out in turn, and the data without each.
     postures: Vec<usize>,
@@ -58,6 +60,15 @@ impl StructureStudy {
             postures,
             data,
             options,
+            measured: None,
+        }
+    }
+
+    /// The same study, whose model is calibrated also from `start` (such as [`super::modal_start`] gives).
+    pub fn with_measured(self, start: Option<Vec<f64>>) -> Self {
+        StructureStudy {
+            measured: start,
+            ..self
         }
     }
 
@@ -109,6 +120,14 @@ impl Study for StructureStudy {
 
     fn extend(&self, model: &StructureModel, instance: &Instance) -> StructureModel {
         model.with_effect(*instance, &self.summary)
+    }
+
+    fn vanishing(&self, model: &StructureModel) -> Option<Vec<f64>> {
+        model.vanishing(model.effects().last()?)
+    }
+
+    fn bounds(&self, model: &StructureModel) -> Vec<[f64; 2]> {
+        model.bounds()
     }
 
     fn starting_from(&self, model: &StructureModel, theta: Vec<f64>) -> StructureModel {
@@ -219,7 +238,7 @@ impl Study for StructureStudy {
     }
 
     fn calibrate(&self, model: &StructureModel) -> Result<Calibration> {
-        calibrate(model, &self.data, None, self.options)
+        calibrate(model, &self.data, self.measured.as_deref(), self.options)
     }
 }
 

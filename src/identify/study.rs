@@ -1,6 +1,7 @@
 //! What the loop "fit, compare, add an effect, fit again" needs to know of a model and its data, and the fits it is made
 //! of. Structure and cutting forces are two studies; the loop is one.
 
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::calibrate::{Calibration, Estimate, scattered_starts};
@@ -104,6 +105,12 @@ pub trait Study: Sync {
     /// The same model, whose fits start from `theta`.
     fn starting_from(&self, model: &Self::Model, theta: Vec<f64>) -> Self::Model;
 
+    /// Values of the parameters of the effect added last, solver's scale, at which it is not there; `None` without effects.
+    fn vanishing(&self, model: &Self::Model) -> Option<Vec<f64>>;
+
+    /// Where a fit of `model` may go, solver's scale.
+    fn bounds(&self, model: &Self::Model) -> Vec<[f64; 2]>;
+
     /// What the residual of `model` at `theta` suggests.
     fn hints(&self, model: &Self::Model, theta: &[f64]) -> Result<Self::Hints>;
 
@@ -138,19 +145,18 @@ pub trait Study: Sync {
         None
     }
 
+    /// Whether the values' errors were given with them: then few values are enough. Where they are estimated from the scatter
+    /// of the data themselves they are not.
+    fn noise_is_given(&self) -> bool {
+        false
+    }
+
     /// The fair fit of a model as it stands.
     fn calibrate(&self, model: &Self::Model) -> Result<Calibration>;
 
     fn nominal_theta(&self, model: &Self::Model) -> Vec<f64> {
         let parameters = self.parameters(model).iter();
         parameters.map(|p| p.internal(p.nominal)).collect()
-    }
-
-    fn bounds(&self, model: &Self::Model) -> Vec<[f64; 2]> {
-        self.parameters(model)
-            .iter()
-            .map(Parameter::internal_bounds)
-            .collect()
     }
 }
 
@@ -317,11 +323,66 @@ fn look<S: Study>(
             keep(minimise(&likelihood, &near.theta, &bounds, LOOK));
         }
     }
+    // A fit that ends above where the effect is hardly there was led away: then it begins there.
+    let lowest_fit = fits.iter().map(|f| f.cost).fold(f64::INFINITY, f64::min);
+    let faint = hardly_there(study, model, bases)
+        .into_iter()
+        .map(|start| (likelihood.cost(&start).unwrap_or(f64::INFINITY), start))
+        .min_by(|a, b| a.0.total_cmp(&b.0));
+    if let Some((_, start)) = faint.filter(|(cost, _)| *cost < lowest_fit)
+        && let Ok(fit) = minimise(&likelihood, &start, &bounds, LOOK)
+    {
+        fits.push(fit);
+    }
     fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     if fits.is_empty() {
         return Err(failure.unwrap_or_else(|| Error::computation("no starting point for the effect")));
     }
     Ok(fits)
+}
+
+/// Starting points at the end of the range next to where the effect added last vanishes, one a base.
+fn hardly_there<S: Study>(study: &S, model: &S::Model, bases: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let Some(limit) = study.vanishing(model) else {
+        return Vec::new();
+    };
+    let parameters = study.parameters(model);
+    let own = &parameters[parameters.len() - limit.len()..];
+    let faint: Vec<f64> = own
+        .iter()
+        .zip(&limit)
+        .map(|(p, l)| {
+            let [low, high] = p.internal_bounds();
+            l.clamp(low, high)
+        })
+        .collect();
+    bases
+        .iter()
+        .map(|base| [base.as_slice(), &faint].concat())
+        .collect()
+}
+
+/// The fit of a model without the effect added last to `model`, as one of `model`: the effect stands where it vanishes,
+/// its prior uncharged (that prior is of an effect that is there). `None` where the effect has no such limit.
+pub fn vanished<S: Study>(study: &S, model: &S::Model, without: &Fit) -> Option<Fit> {
+    let limit = study.vanishing(model)?;
+    let (front, count) = (without.theta.len(), without.theta.len() + limit.len());
+    let parameters = study.parameters(model);
+    let mut hessian = DMatrix::zeros(count, count);
+    hessian
+        .view_mut((0, 0), (front, front))
+        .copy_from(&without.hessian);
+    for i in front..count {
+        // All that is known of an effect that is not there.
+        let std = parameters[i].prior.map_or(1.0, |prior| prior.std);
+        hessian[(i, i)] = 1.0 / (std * std);
+    }
+    Some(Fit {
+        theta: [without.theta.as_slice(), &limit].concat(),
+        hessian,
+        at_bound: without.at_bound.iter().copied().chain(front..count).collect(),
+        ..without.clone()
+    })
 }
 
 /// Follows what [`look`] found to its end on the coarse view. The runner-up goes to the end too where it is close: the

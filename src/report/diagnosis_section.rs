@@ -243,7 +243,7 @@ pub(super) fn candidate_table<M, I>(
             },
             significant(c.reduced_chi2, 3),
             parameters.join(", "),
-            if c.at_bound { "at the end of its range" } else { "" }.into(),
+            c.remark().into(),
         ]
     };
     let mut notes = vec![

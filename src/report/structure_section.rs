@@ -279,7 +279,7 @@ pub fn parameter_section(findings: &StructureFindings) -> Section {
     let fit = format!(
         "The fit {} after {} from {}. Weighted misfit per residual (reduced χ²): {}; 1 would be noise alone. Standard \
          errors include that misfit and what was assumed beforehand of each parameter, not what the model lacks.",
-        if calibration.converged {
+        if calibration.converged() {
             "converged"
         } else {
             "did NOT converge"

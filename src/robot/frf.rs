@@ -44,6 +44,7 @@ impl ModalBasis {
             return Err(Error::computation("the mass matrix is not finite"));
         }
         let reduced = Mat::from_fn(n, n, |i, j| 0.5 * (half[(i, j)] + half[(j, i)]));
+        crate::sums_in_order();
         let eigen = reduced.self_adjoint_eigen(faer::Side::Lower).map_err(|_| {
             Error::computation("the eigenvalue iteration of the structural model did not converge")
         })?;
@@ -176,11 +177,13 @@ impl FrfBasis {
             &system.stiffness.view((0, 0), (chain, chain)).into_owned(),
             &system.chain_mass,
         )?;
-        // Modes come with the lowest frequency first, so the massless ones stand last. Dampers in the elements damp
-        // them and branches load them with mass: then they stay.
+        // Modes come with the lowest frequency first, so the massless ones stand last. Dampers in the elements damp them:
+        // then they stay. Branches do not touch them: their masses are held fast to the chain where its modes are worked
+        // out, so that a massless mode does not move them.
         let branches = n - chain;
         let coupled = branches > 0 || system.viscous.is_some() || system.hysteretic.is_some();
-        let moving = if coupled {
+        let damped = |viscous: &DMatrix<f64>| viscous.view((0, 0), (chain, chain)).iter().any(|c| *c != 0.0);
+        let moving = if system.viscous.as_ref().is_some_and(damped) || system.hysteretic.is_some() {
             chain
         } else {
             modes.inverse_omega2.iter().filter(|mu| **mu > 0.0).count()

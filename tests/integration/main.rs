@@ -16,6 +16,7 @@ mod lobes;
 mod modal;
 mod next_measurement;
 mod next_step;
+mod optimum;
 mod plan;
 mod records;
 mod report;

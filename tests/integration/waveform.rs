@@ -84,7 +84,7 @@ fn undisturbed_records_are_fitted_to_their_noise() {
     for (name, edges) in [("force-9400", 3), ("force-9439", 2)] {
         let (data, model) = loaded(name);
         let calibration = calibrate_cutting(&model, &data).unwrap();
-        assert!(calibration.converged);
+        assert!(calibration.converged());
         assert!(
             (0.85..1.15).contains(&calibration.reduced_chi2),
             "{name}: {}",
@@ -343,7 +343,7 @@ fn report(name: &str, dir: &Path) {
         2.0 * first.cost / dof,
         e,
         floor,
-        first.converged,
+        first.converged(),
         first.iterations
     );
     for w in &data.warnings {
@@ -440,7 +440,7 @@ fn report(name: &str, dir: &Path) {
             format!("{instance:?}"),
             2.0 * fit.cost / dof,
             fit.iterations,
-            if fit.converged { "" } else { " NOT CONVERGED" },
+            if fit.converged() { "" } else { " NOT CONVERGED" },
             show(model, fit, base.parameters.len())
         );
     }

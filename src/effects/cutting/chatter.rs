@@ -1,5 +1,8 @@
 use super::*;
 
+/// Amplitude per feed below which there is none.
+const NO_AMPLITUDE_PER_FEED: f64 = 1e-9;
+
 /// A self-excited vibration off the tooth-passing comb.
 pub struct Chatter;
 
@@ -71,8 +74,13 @@ impl CuttingEffect for Chatter {
         .to_vec()
     }
 
+    fn vanishing(&self, _variant: usize, p: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vec![p[0].nominal, NEGLIGIBLE * p[1].nominal, p[2].nominal])
+    }
+
     fn apply(&self, _variant: usize, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
-        if setting.has_vibration {
+        // A vibration of no size has no frequency that could be wrong, either.
+        if setting.has_vibration && values[1].value > NO_AMPLITUDE_PER_FEED {
             physics.vibration = Some(Vibration {
                 frequency_hz: values[0].clone(),
                 amplitude_mm: values[1].scale(setting.feed_mm),

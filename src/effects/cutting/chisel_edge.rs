@@ -58,6 +58,10 @@ impl CuttingEffect for ChiselEdge {
         vec![vec![0.1 * data.cutting_scale_n_per_mm2.max(1.0), 0.6]]
     }
 
+    fn vanishing(&self, _variant: usize, p: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vec![NEGLIGIBLE * p[0].nominal, p[1].nominal])
+    }
+
     fn apply(&self, _variant: usize, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
         let power = values[1].scale(setting.feed_mm.max(1e-9).ln()).exp();
         physics.chisel_thrust_n = Some(&values[0] * &power);

@@ -57,6 +57,10 @@ impl CuttingEffect for Crosstalk {
         sizes.iter().find_map(leak)
     }
 
+    fn vanishing(&self, _variant: usize, p: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vec![0.0; p.len()])
+    }
+
     fn apply(&self, _variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
         let mut mixing = unit_mixing();
         for ((i, j), value) in LEAKS.iter().zip(values) {

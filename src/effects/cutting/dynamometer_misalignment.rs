@@ -54,6 +54,10 @@ impl CuttingEffect for DynamometerMisalignment {
             .outside("a tilt", [-20.0, 20.0], (1.0, "°"), "every eye sees that")
     }
 
+    fn vanishing(&self, _variant: usize, _parameters: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vec![0.0])
+    }
+
     fn apply(&self, variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
         let angle = values[0].scale(1f64.to_radians());
         let (s, c) = angle.value.sin_cos();

@@ -77,6 +77,13 @@ impl CuttingEffect for DynamometerResonance {
         sizes.iter().skip(3).find_map(damping)
     }
 
+    fn vanishing(&self, _variant: usize, p: &[Parameter]) -> Option<Vec<f64>> {
+        // Its natural frequencies far above all that is measured.
+        let (frequencies, dampings) = p.split_at(3);
+        let far = frequencies.iter().map(|f| f.nominal / NEGLIGIBLE);
+        Some(far.chain(dampings.iter().map(|z| z.nominal)).collect())
+    }
+
     fn apply(&self, _variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
         physics.dynamics = Some([0, 1, 2].map(|i| [values[i].clone(), values[3 + i].clone()]));
     }

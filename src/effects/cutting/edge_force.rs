@@ -59,6 +59,10 @@ impl CuttingEffect for EdgeForce {
             .collect()
     }
 
+    fn vanishing(&self, _variant: usize, p: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vec![0.0; p.len()])
+    }
+
     fn order(&self) -> u8 {
         0
     }

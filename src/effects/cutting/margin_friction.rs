@@ -44,6 +44,10 @@ impl CuttingEffect for MarginFriction {
         )]
     }
 
+    fn vanishing(&self, _variant: usize, _parameters: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vec![0.0])
+    }
+
     fn apply(&self, _variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
         physics.margin_n_per_mm = Some(values[0].clone());
     }

@@ -161,6 +161,13 @@ pub trait CuttingEffect: Sync {
         None
     }
 
+    /// Values of [`Self::parameters`] (given), natural units, at which the effect is not there: the model is the one without
+    /// it, to rounding. They may lie outside the parameters' bounds, which are those of an effect worth a name. `None` only
+    /// for what is simulated and never fitted.
+    fn vanishing(&self, _variant: usize, _parameters: &[Parameter]) -> Option<Vec<f64>> {
+        None
+    }
+
     /// Free amplitudes for each cut and channel that are fitted along without standing in the list of parameters.
     fn nuisances_per_channel(&self, _variant: usize) -> usize {
         0
@@ -271,6 +278,9 @@ fn logarithmic(
         bounds,
     }
 }
+
+/// Share of an effect's usual size that no measurement can show.
+const NEGLIGIBLE: f64 = 1e-10;
 
 fn milling_only(data: &CuttingSummary) -> Option<String> {
     (data.process != Process::Milling)

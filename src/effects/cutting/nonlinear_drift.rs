@@ -12,6 +12,9 @@ fn channels(process: Process) -> std::ops::Range<usize> {
     }
 }
 
+/// A transient shorter than this is over before the first sample: there is none, and no amplitude to fit.
+const AT_ONCE_S: f64 = 1e-8;
+
 impl CuttingEffect for NonlinearDrift {
     fn id(&self) -> &'static str {
         "nonlinear-drift"
@@ -63,6 +66,16 @@ impl CuttingEffect for NonlinearDrift {
             .to_vec()
     }
 
+    fn vanishing(&self, variant: usize, p: &[Parameter]) -> Option<Vec<f64>> {
+        // A transient that is over at once; a leak that takes for ever.
+        let factor = if variant == 0 {
+            NEGLIGIBLE
+        } else {
+            NEGLIGIBLE.recip()
+        };
+        Some(p.iter().map(|tau| factor * tau.nominal).collect())
+    }
+
     fn nuisances_per_channel(&self, variant: usize) -> usize {
         // The transient's amplitude; what a leak makes of the drift line.
         if variant == 0 { 1 } else { 0 }
@@ -78,6 +91,9 @@ impl CuttingEffect for NonlinearDrift {
             })
         };
         if variant == 0 {
+            if values.iter().all(|tau| tau.value < AT_ONCE_S) {
+                return;
+            }
             physics.transient_s = Some(by_channel(1.0, &|tau| tau.clone()));
         } else {
             physics.leak_per_s = Some(by_channel(0.0, &|tau| tau.recip()));

@@ -68,6 +68,10 @@ impl CuttingEffect for RunoutEffect {
         )
     }
 
+    fn vanishing(&self, _variant: usize, p: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vec![NEGLIGIBLE * p[0].nominal, p[1].nominal])
+    }
+
     fn apply(&self, _variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
         physics.runout = Some(Runout {
             offset_mm: values[0].clone(),

@@ -55,6 +55,10 @@ impl CuttingEffect for SizeEffect {
         )
     }
 
+    fn vanishing(&self, _variant: usize, _parameters: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vec![0.0])
+    }
+
     fn apply(&self, _variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
         physics.size_exponent = Some(values[0].clone());
     }

@@ -50,6 +50,10 @@ impl CuttingEffect for SpeedDependence {
         )
     }
 
+    fn vanishing(&self, _variant: usize, _parameters: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vec![0.0])
+    }
+
     fn apply(&self, _variant: usize, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
         let cutting: &[usize] = match setting.process {
             Process::Milling => &[0, 1, 2],

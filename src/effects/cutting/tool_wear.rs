@@ -59,6 +59,10 @@ impl CuttingEffect for ToolWear {
         sizes.iter().find_map(growth)
     }
 
+    fn vanishing(&self, _variant: usize, p: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vec![1.0; p.len()])
+    }
+
     fn order(&self) -> u8 {
         2
     }

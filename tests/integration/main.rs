@@ -14,6 +14,7 @@ mod interactive;
 mod lobes;
 mod modal;
 mod next_step;
+mod odd;
 mod records;
 mod report;
 mod revisions;

@@ -69,13 +69,14 @@ pub(super) fn look(times_s: &[f64], resolution_s: f64) -> Result<Stamps, String>
     let (fine, coarse) = means.fold((f64::INFINITY, 0.0_f64), |(low, high), m| {
         (low.min(m), high.max(m))
     });
-    // Jitter of single stamps, from their second differences, leaves less than this in the difference of two means.
+    // Steps that scatter by so much (from their differences) make means of blocks differ by less than this.
     let second = times_s
         .windows(3)
         .map(|w| (w[2] - 2.0 * w[1] + w[0]).powi(2))
         .sum::<f64>();
-    let jitter = (second / 6.0 / (count - 2) as f64).sqrt();
-    let changes = count > 4 * BLOCK && coarse - fine > RATE_CHANGE * fine + 8.0 * jitter / width as f64;
+    let scatter = (second / 2.0 / (count - 2) as f64).sqrt();
+    let by_chance = 6.0 * scatter / (width as f64).sqrt();
+    let changes = count > 4 * BLOCK && coarse - fine > RATE_CHANGE * fine + by_chance;
     let chosen = if changes { fine } else { step };
     if count < LEAST_TO_RESAMPLE {
         return Err(format!("steps from {shortest:.6} to {longest:.6} s"));
@@ -179,9 +180,15 @@ mod tests {
                 1000.0 + (i - 1000.0) / 0.7
             }
         };
+        let mut now = 0.0;
+        let random = times(2000, |i| {
+            now += 1e-3 * (1.0 + 0.5 * (i * i * 78.233).sin());
+            now
+        });
         for (name, stamps, rate) in [
             ("jitter", times(2000, jitter), 1000.0),
             ("wild", times(2000, wild), 1000.0),
+            ("random steps", random, 1000.0),
             ("drift", times(2000, drift), 1000.0),
             ("change", times(2000, change), 1000.0),
         ] {

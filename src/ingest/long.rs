@@ -94,20 +94,29 @@ pub(super) fn open(path: &Path) -> Result<Opened> {
     open_by(path, PIECE)
 }
 
+/// Refuses what is no file, before it is opened: a pipe would wait for a writer, a device never end.
+///
+/// # Errors
+/// The operating system's; a folder, pipe or device, by its path.
+pub fn regular_file(path: &Path) -> Result<()> {
+    let kind = std::fs::metadata(path).map_err(|e| Error::io(path, e))?;
+    if kind.is_file() {
+        return Ok(());
+    }
+    let what = if kind.is_dir() {
+        "a folder"
+    } else {
+        "a pipe or device"
+    };
+    Err(crate::InputError::new(format!("{what}, not a file"))
+        .file(path)
+        .remedy("give a file; what comes through a pipe, save to one first")
+        .into())
+}
+
 fn open_by(path: &Path, piece: usize) -> Result<Opened> {
     let refused = |e| Error::io(path, e);
-    // Looked at before it is opened: a pipe would wait for a writer, a device never end.
-    if !std::fs::metadata(path).map_err(refused)?.is_file() {
-        let what = if path.is_dir() {
-            "a folder"
-        } else {
-            "a pipe or device"
-        };
-        return Err(crate::InputError::new(format!("{what}, not a file"))
-            .file(path)
-            .remedy("save the measurement to a file and give that")
-            .into());
-    }
+    regular_file(path)?;
     let mut file = File::open(path).map_err(refused)?;
     let bytes = file.metadata().map_err(refused)?.len();
     let mut head = Vec::new();

@@ -32,7 +32,7 @@ mod uff;
 pub mod units;
 mod waveform;
 
-pub use long::{Survey, survey};
+pub use long::{Survey, regular_file, survey};
 pub use quality::quality_warnings;
 pub use uff::{
     Abscissa, ByteOrder, Dataset58, Encoding58, EntityDof, Ordinate, UnitAxis, frf_dataset, time_datasets,
@@ -180,6 +180,22 @@ pub fn read_file(path: &Path) -> Result<MeasurementFile> {
         long::Opened::Read(file) => Ok(file),
         long::Opened::Long(record) => record.whole(),
     }
+}
+
+/// As [`read_file`], on the bytes of a file; errors name no file.
+///
+/// # Errors
+/// As [`read_file`].
+pub fn read_memory(bytes: &[u8]) -> std::result::Result<MeasurementFile, InputError> {
+    let mut notes = Notes::default();
+    let (format, why, contents) = read_bytes(bytes, false, &mut notes)?;
+    Ok(MeasurementFile {
+        path: PathBuf::new(),
+        format,
+        why,
+        contents,
+        warnings: notes.into_warnings(),
+    })
 }
 
 /// Where a file holds one FRF that does not say where it was measured, its name may.

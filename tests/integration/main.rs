@@ -7,6 +7,7 @@ mod cfc_methods;
 mod contract;
 mod demo;
 mod diagnose;
+mod fuzz;
 mod hole;
 mod init;
 mod inspect;

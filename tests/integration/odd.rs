@@ -198,6 +198,38 @@ fn pipes_and_devices_are_refused_and_not_waited_for() {
     refused(folder.path(), &["a folder, not a file"]);
 }
 
+#[test]
+fn numbers_and_texts_of_a_campaign_that_cannot_be_are_refused_by_file_and_key() {
+    for (from, to, words) in [
+        (
+            "[0.0, 0.0, 0.0]",
+            "[1e300, 0.0, 0.0]",
+            ["point[0].position_m", "1e300, which no physical quantity is"],
+        ),
+        (
+            "[0.0, 0.0, 0.0]",
+            "[1e-300, 0.0, 0.0]",
+            ["point[0].position_m", "1e-300, which no physical quantity is"],
+        ),
+        (
+            "id = \"p1\"",
+            "id = \"p\\u001b[2J\"",
+            ["posture[0].id", "control characters"],
+        ),
+    ] {
+        let campaign = copy_of("frf-9112");
+        let file = campaign.path().join("campaign.toml");
+        let text = std::fs::read_to_string(&file).unwrap();
+        std::fs::write(&file, text.replacen(from, to, 1)).unwrap();
+        let run = lobestone(&["calibrate", campaign.path().to_str().unwrap()]);
+        assert_eq!(run.status, Some(1));
+        for word in words.into_iter().chain(["campaign.toml"]) {
+            assert!(run.stderr.contains(word), "{word}: {}", run.stderr);
+        }
+        assert!(!run.stderr.contains('\u{1b}'), "{:?}", run.stderr);
+    }
+}
+
 /// The same measurement twice is used once: standard errors stay those of the single data.
 #[test]
 fn doubled_files_do_not_shrink_standard_errors() {

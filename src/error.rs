@@ -12,7 +12,7 @@ pub enum Error {
     #[error("{0}")]
     Input(Box<InputError>),
     /// The operating system refused to read or write.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {source}", crate::ingest::shown(&path.display().to_string()))]
     Io { path: PathBuf, source: std::io::Error },
     /// The input is well formed but the numbers allow no answer (singular system, no mode in the band, …).
     #[error("{0}")]
@@ -74,20 +74,22 @@ impl InputError {
 }
 
 impl fmt::Display for InputError {
+    /// What files say is shown, not obeyed: control characters become visible.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        use crate::ingest::shown;
         if let Some(file) = &self.file {
-            write!(f, "{}", file.display())?;
+            write!(f, "{}", shown(&file.display().to_string()))?;
             if let Some(line) = self.line {
                 write!(f, ":{line}")?;
             }
             write!(f, ": ")?;
         }
         if let Some(key) = &self.key {
-            write!(f, "{key}: ")?;
+            write!(f, "{}: ", shown(key))?;
         }
-        write!(f, "{}", self.problem)?;
+        write!(f, "{}", shown(&self.problem))?;
         if let Some(remedy) = &self.remedy {
-            write!(f, "\n  remedy: {remedy}")?;
+            write!(f, "\n  remedy: {}", shown(remedy))?;
         }
         Ok(())
     }

@@ -97,20 +97,19 @@ impl Campaign {
         }
         for (later, earlier) in identical(files) {
             let (later, earlier) = (&self.frfs[later], &self.frfs[earlier]);
-            let consequence = match (later.posture == earlier.posture, &self.postures[..]) {
-                (true, _) => "it counts twice".to_string(),
-                (false, postures) => format!(
-                    "though postures {} and {} differ",
-                    postures.get(earlier.posture).map_or("", |p| &p.id),
-                    postures.get(later.posture).map_or("", |p| &p.id)
-                ),
-            };
+            if later.posture == earlier.posture {
+                continue;
+            }
+            let id = |posture: usize| self.postures.get(posture).map_or("", |p| &p.id);
             warnings.push(format!(
-                "{}: the same data as {}: {consequence}",
+                "{}: the same data as {}: though postures {} and {} differ",
                 later.file.display(),
-                earlier.file.display()
+                earlier.file.display(),
+                id(earlier.posture),
+                id(later.posture)
             ));
         }
+        warnings.extend(drop_copies(&mut set.frfs));
         Ok((set, warnings))
     }
 
@@ -266,6 +265,52 @@ fn identical(files: &[(Vec<FrfRecord>, Vec<String>)]) -> Vec<(usize, usize)> {
             Some((later, earlier))
         })
         .collect()
+}
+
+/// Takes FRFs out that are copies of others of the same posture and points: the same measurement twice is no second one,
+/// and would make every standard error too small. Returns what to tell.
+fn drop_copies(frfs: &mut Vec<MeasuredFrf>) -> Vec<String> {
+    use std::collections::{BTreeMap, HashMap};
+    let mut seen: HashMap<_, Vec<usize>> = HashMap::new();
+    let mut copies = Vec::new();
+    // By the two files, so that a whole folder taken twice is one sentence a file.
+    let mut told: BTreeMap<(PathBuf, PathBuf), Vec<String>> = BTreeMap::new();
+    for k in 0..frfs.len() {
+        let frf = &frfs[k];
+        let key = (frf.posture, frf.response, frf.reference, frf.frequency_hz.len());
+        let alike = seen.entry(key).or_default();
+        match alike.iter().find(|j| same_measurement(&frfs[**j], frf)) {
+            Some(j) => {
+                let files = (frf.file.clone(), frfs[*j].file.clone());
+                told.entry(files).or_default().push(frf.name.clone());
+                copies.push(k);
+            }
+            None => alike.push(k),
+        }
+    }
+    for k in copies.into_iter().rev() {
+        frfs.remove(k);
+    }
+    let sentence = |((later, earlier), names): ((PathBuf, PathBuf), Vec<String>)| {
+        format!(
+            "{}: the same data as {} ({}): used once",
+            later.display(),
+            earlier.display(),
+            names.join(", ")
+        )
+    };
+    told.into_iter().map(sentence).collect()
+}
+
+/// Equal within single precision, in which some programs write: two measurements never are.
+fn same_measurement(a: &MeasuredFrf, b: &MeasuredFrf) -> bool {
+    const SINGLE: f64 = 1e-6;
+    let values = a.receptance_m_per_n.iter().zip(&b.receptance_m_per_n);
+    let lines = a.frequency_hz.iter().zip(&b.frequency_hz);
+    values
+        .clone()
+        .all(|(a, b)| (a - b).norm() <= SINGLE * a.norm().max(b.norm()))
+        && lines.clone().all(|(a, b)| (a - b).abs() <= SINGLE * a)
 }
 
 #[derive(Debug)]
@@ -452,12 +497,13 @@ mod tests {
     #[test]
     fn the_same_data_twice_is_said() {
         let one = record(Some(Quantity::Mobility), Some((1, 1)));
-        let (_, warnings) = collect(&campaign(None), [one.clone(), one]).unwrap();
+        let (set, warnings) = collect(&campaign(None), [one.clone(), one]).unwrap();
         let last = warnings.last().unwrap();
         assert_eq!(
             last,
-            "cell/frf/b.csv: the same data as cell/frf/a.csv: it counts twice"
+            "cell/frf/b.csv: the same data as cell/frf/a.csv (p1 1X/1X): used once"
         );
+        assert_eq!(set.frfs.len(), 1);
     }
 
     #[test]

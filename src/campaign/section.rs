@@ -8,6 +8,11 @@ use super::document::Document;
 use super::suggest::{closest, shown};
 use crate::{Error, InputError, Result};
 
+/// Numbers beyond these, in whatever unit a key has, are slips of the keyboard or a damaged file; they would only overflow
+/// further on.
+const LARGEST: f64 = 1e15;
+const SMALLEST: f64 = 1e-30;
+
 /// One table of a document.
 pub struct Section<'d> {
     document: &'d Document,
@@ -116,6 +121,10 @@ impl<'d> Section<'d> {
             DeValue::String(s) if s.trim().is_empty() => Err(self
                 .error(key, "is empty")
                 .remedy("write something between the quotes")
+                .into()),
+            DeValue::String(s) if matches!(crate::ingest::shown(s), std::borrow::Cow::Owned(_)) => Err(self
+                .error(key, format!("holds control characters: {:?}", shown(s)))
+                .remedy("write letters, digits and signs that can be seen")
                 .into()),
             DeValue::String(s) => Ok(Some(s.as_ref())),
             other => Err(self.wrong_type(key, "text in quotes", other, &format!("{key} = \"…\""))),
@@ -288,6 +297,10 @@ impl<'d> Section<'d> {
             None => Err(named(
                 self.error(key, format!("is {}, not a finite number", shown(text)))
                     .remedy("write the measured value; a value that is not known is left out, not written as nan or inf"),
+            )),
+            Some(number) if number.abs() > LARGEST || number != 0.0 && number.abs() < SMALLEST => Err(named(
+                self.error(key, format!("is {}, which no physical quantity is", shown(text)))
+                    .remedy("write the measured value, in the unit that the key's name ends with"),
             )),
             Some(number) if !bounds.contain(number) => Err(named(
                 self.error(key, format!("is {}, out of range", shown(text)))

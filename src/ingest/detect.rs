@@ -84,12 +84,13 @@ pub(super) fn detect(bytes: &[u8], is_dwd_named: bool) -> Result<(Detected, Form
         let why = "three numbers and the labels Freq, Real, Imag on the first line".to_owned();
         return Ok((Detected::Cutpro(labels), Format::CutproFrf, why));
     }
-    let Some(header) = Header::find(bytes) else {
+    let Some(mut header) = Header::find(bytes) else {
         return Err(
             InputError::new("text without rows of numbers, no format known here")
                 .remedy("FRFs are read from UFF 58 and CSV, forces from DynoWare exports and CSV"),
         );
     };
+    frf_text::join_signalcalc(&mut header);
     let how = header.describe();
     if frf_text::is_frf_table(&header) {
         let why = format!("column names of FRFs ({}), {how}", abbreviated(&header.names));

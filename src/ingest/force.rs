@@ -3,11 +3,12 @@
 use std::ops::Range;
 
 use super::InputError;
+use super::clock::{self, Grid, Stamps};
 use super::number;
 use super::table::{Header, Table};
 use super::text::Notes;
 use super::units::{self, Dimension, Unit};
-use super::{Channel, ChannelRole, TimeRecord};
+use super::{Channel, ChannelRole, TimeRecord, checks};
 
 /// True where the table is a time record: a time column, or a sampling rate above it.
 pub(super) fn is_time_table(header: &Header) -> bool {
@@ -16,7 +17,7 @@ pub(super) fn is_time_table(header: &Header) -> bool {
 
 /// Reads the rows and makes them a time record in SI.
 pub(super) fn read(bytes: &[u8], header: &Header, notes: &mut Notes) -> Result<TimeRecord, InputError> {
-    let mut pieces = Pieces::new(bytes, header.clone());
+    let mut pieces = Pieces::new(bytes, header.clone(), true);
     let table = header.read(bytes, pieces.rate, notes)?;
     let record = pieces.next(table, header.data_line, notes)?;
     pieces.finish(notes);
@@ -34,6 +35,10 @@ pub(super) struct Pieces {
     last: Vec<f64>,
     samples: usize,
     lost: Lost,
+    /// There is one piece only.
+    is_whole: bool,
+    /// Puts right the unit of the time column.
+    time_unit: Option<f64>,
 }
 
 /// How the time column runs, decided from the first piece.
@@ -43,11 +48,13 @@ struct Clock {
     start_s: f64,
     /// Rounding of the printed times; `None` where they are too coarse to show gaps.
     rounding_s: Option<f64>,
+    /// Where the times are not even: what the samples are put on.
+    grid: Option<Grid>,
 }
 
 impl Pieces {
     /// `head`: the file's beginning, with the first rows.
-    pub fn new(head: &[u8], header: Header) -> Self {
+    pub fn new(head: &[u8], header: Header, is_whole: bool) -> Self {
         let resolution_s = time_column(&header).map_or(0.0, |at| {
             time_resolution(head, &header, at) * time_factor(&header, at)
         });
@@ -58,6 +65,8 @@ impl Pieces {
             last: Vec::new(),
             samples: 0,
             lost: Lost::default(),
+            is_whole,
+            time_unit: None,
             header,
         }
     }
@@ -75,14 +84,46 @@ impl Pieces {
         if let Some(at) = time_at {
             let factor = time_factor(header, at);
             table.columns[at].iter_mut().for_each(|t| *t *= factor);
+            let seconds = &table.columns[at];
+            let again = match self.time_unit {
+                Some(again) => again,
+                None => {
+                    let again = time_unit(seconds, self.resolution_s, factor, self.rate, header, notes)?;
+                    self.resolution_s *= again;
+                    again
+                }
+            };
+            self.time_unit = Some(again);
+            table.columns[at].iter_mut().for_each(|t| *t *= again);
         }
         let rows = table.columns.iter().map(Vec::len).max().unwrap_or(0);
         if self.clock.is_none() && rows < 2 {
             return Err(InputError::new("a time record of less than two samples").line(header.data_line));
         }
         let clock = match (self.clock, time_at) {
+            (Some(clock), Some(at)) if clock.rounding_s.is_some() && rows > 2 => {
+                let runs = Runs::find(&table.columns[at], self.resolution_s);
+                let same = (runs.step_s * clock.rate_hz - 1.0).abs() <= 1e-3 + 2.0 * runs.rounding;
+                if !(same && runs.are_even(&table.columns[at], self.resolution_s)) {
+                    return Err(refused(
+                        "steps that change, in a file too long to be resampled at once",
+                        header,
+                    ));
+                }
+                clock
+            }
             (Some(clock), _) => clock,
-            (None, Some(at)) => time_axis(&table.columns[at], self.resolution_s, self.rate, header, notes)?,
+            (None, Some(at)) => {
+                let seconds = &table.columns[at];
+                time_axis(
+                    seconds,
+                    self.resolution_s,
+                    self.rate,
+                    header,
+                    self.is_whole,
+                    notes,
+                )?
+            }
             (None, None) => {
                 let rate_hz = self.rate.ok_or_else(|| no_time(header))?;
                 notes.file("no time column: time from the sampling rate, starting at 0 s");
@@ -90,12 +131,12 @@ impl Pieces {
                     rate_hz,
                     start_s: 0.0,
                     rounding_s: None,
+                    grid: None,
                 }
             }
         };
-        if !(clock.rate_hz.is_finite() && clock.start_s.is_finite()) {
-            return Err(InputError::new("time values beyond the range of numbers").line(header.data_line));
-        }
+        checks::plausible_clock("time", clock.rate_hz, clock.start_s)
+            .map_err(|e| e.line(header.data_line))?;
         self.clock = Some(clock);
         // The last row of the piece before, so that a gap between pieces is one too.
         let overlap = usize::from(!self.last.is_empty());
@@ -108,18 +149,24 @@ impl Pieces {
         if !next_last.is_empty() {
             self.last = next_last;
         }
-        let gaps = match (time_at, clock.rounding_s) {
-            (Some(at), Some(rounding_s)) => {
-                self.lost
-                    .look(&table.columns[at], 1.0 / clock.rate_hz, rounding_s)
-            }
+        let gaps = match (time_at, clock.rounding_s, clock.grid) {
+            (Some(at), Some(rounding_s), None) => self
+                .lost
+                .look(&table.columns[at], 1.0 / clock.rate_hz, rounding_s)
+                .map_err(|problem| refused(&problem, header))?,
             _ => Vec::new(),
         };
+        let times = time_at
+            .map(|at| table.columns[at].clone())
+            .filter(|_| clock.grid.is_some());
         let mut filled = Vec::new();
         let columns = table.columns.into_iter().enumerate();
         let channels = columns
             .filter(|(i, _)| Some(*i) != time_at)
             .map(|(i, mut values)| {
+                if let (Some(times), Some(grid)) = (&times, clock.grid) {
+                    return channel(header, i, clock::resample(times, &values, grid), notes);
+                }
                 filled = fill(&mut values, &gaps);
                 values.drain(..overlap.min(values.len()));
                 channel(header, i, values, notes)
@@ -286,7 +333,7 @@ fn split_unit(name: &str) -> (&str, Option<Unit>) {
 }
 
 fn column_unit(header: &Header, at: usize) -> Option<Unit> {
-    let from_line = header.units.get(at).and_then(|label| units::parse(label));
+    let from_line = header.units.get(at).and_then(|label| units::parse_named(label));
     from_line.or_else(|| header.names.get(at).and_then(|name| split_unit(name).1))
 }
 
@@ -358,12 +405,7 @@ fn channel(
         None if role != ChannelRole::Other => notes.about(&name, "no unit that is understood: N assumed"),
         None => {}
     }
-    if samples.iter().any(|v| !v.is_finite()) {
-        return Err(
-            InputError::new(format!("channel {name}: values beyond the range of numbers"))
-                .line(header.data_line),
-        );
-    }
+    checks::plausible_samples(&name, &samples).map_err(|e| e.line(header.data_line))?;
     Ok(Channel {
         name,
         file_unit,
@@ -419,11 +461,12 @@ fn time_axis(
     resolution: f64,
     header_rate: Option<f64>,
     header: &Header,
+    is_whole: bool,
     notes: &mut Notes,
 ) -> Result<Clock, InputError> {
     let start_s = seconds[0];
-    let (own, rounding_s) = own_step(seconds, resolution);
-    if !(own.is_finite() && own > 0.0) {
+    let runs = Runs::find(seconds, resolution);
+    if !(runs.step_s.is_finite() && runs.step_s > 0.0) {
         let error = InputError::new("the time column does not rise").line(header.data_line);
         return match header_rate {
             Some(rate) if seconds.is_sorted() && resolution * rate > 1.0 => {
@@ -432,12 +475,33 @@ fn time_axis(
                     rate_hz: rate,
                     start_s,
                     rounding_s: None,
+                    grid: None,
                 })
             }
             _ => Err(error.remedy("the time column must rise from row to row")),
         };
     }
-    let rounding = rounding_s / (own * (seconds.len() - 1) as f64);
+    if !runs.are_even(seconds, resolution) {
+        let (grid, told) = match clock::look(seconds, resolution) {
+            Ok(Stamps::Uneven(grid, told)) => (grid, told),
+            Ok(Stamps::Even(grid)) => (grid, "the times drift off their own steps: resampled".into()),
+            Err(problem) => return Err(refused(&problem, header)),
+        };
+        if !is_whole {
+            return Err(refused(
+                "steps that change, in a file too long to be resampled at once",
+                header,
+            ));
+        }
+        notes.file(told);
+        return Ok(Clock {
+            rate_hz: grid.rate_hz,
+            start_s,
+            rounding_s: None,
+            grid: Some(grid),
+        });
+    }
+    let (own, rounding) = (runs.step_s, runs.rounding);
     let rate = match header_rate {
         // Within the rounding of the printed time the header is the sharper witness.
         Some(rate) if (own * rate - 1.0).abs() <= (1e-3_f64).max(2.0 * rounding) => rate,
@@ -454,33 +518,105 @@ fn time_axis(
     Ok(Clock {
         rate_hz: rate,
         start_s,
-        rounding_s: Some(rounding_s),
+        rounding_s: Some(resolution),
+        grid: None,
     })
 }
 
-/// Step of the time column and what rounding of the printed times is left in it. Where nearly all steps agree the
-/// printing is exact and the median is the step; else times were rounded and the mean over steps without gaps is.
-fn own_step(seconds: &[f64], resolution: f64) -> (f64, f64) {
-    let mut steps: Vec<f64> = seconds.windows(2).map(|w| w[1] - w[0]).collect();
-    let middle = steps.len() / 2;
-    let (_, &mut median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
-    let agreeing = steps
-        .iter()
-        .filter(|s| (**s - median).abs() <= 1e-3 * median)
-        .count();
-    if 10 * agreeing >= 9 * steps.len() {
-        return (median, 0.0);
+fn refused(problem: &str, header: &Header) -> InputError {
+    InputError::new(format!("the samples are not evenly spaced in time: {problem}"))
+        .line(header.data_line)
+        .remedy("export the record again with even steps, or cut the row range out that has them")
+}
+
+/// Factor that puts right a time column whose unit is called wrongly ("ms" on values in seconds): what the header's rate
+/// says, else nothing is put right and what cannot be is refused.
+fn time_unit(
+    seconds: &[f64],
+    resolution: f64,
+    factor: f64,
+    header_rate: Option<f64>,
+    header: &Header,
+    notes: &mut Notes,
+) -> Result<f64, InputError> {
+    let own = 1.0 / Runs::find(seconds, resolution).step_s;
+    if !(own.is_finite() && own > 0.0) {
+        return Ok(1.0);
     }
-    let mean = steps.iter().sum::<f64>() / steps.len() as f64;
-    let usual = 1.5 * median.max(mean.min(2.0 * resolution)) + 1.01 * resolution;
-    let without_gaps: Vec<f64> = steps
-        .into_iter()
-        .filter(|s| (-1.01 * resolution..=usual).contains(s))
-        .collect();
-    (
-        without_gaps.iter().sum::<f64>() / without_gaps.len() as f64,
-        resolution,
-    )
+    if let Some(rate) = header_rate {
+        for k in [1e-6, 1e-3, 1e3, 1e6] {
+            if (own / (rate * k) - 1.0).abs() < 0.01 {
+                notes.file(format!(
+                    "the time column gives {own:.0} Hz, the header {rate} Hz: the unit of the times is called wrongly and put right"
+                ));
+                return Ok(k);
+            }
+        }
+        return Ok(1.0);
+    }
+    // Milliseconds are written for slow clocks; a megahertz of them is one second called one millisecond.
+    if (factor - 1e-3).abs() < 1e-9 && own >= MS_AT_MOST {
+        return Err(InputError::new(format!(
+            "the time column is in ms and gives {own:.0} samples a second: seconds called ms"
+        ))
+        .line(header.data_line.saturating_sub(1).max(1))
+        .remedy("name the column time_s, or add a line `Sampling rate [Hz]:,10000` above the names"));
+    }
+    Ok(1.0)
+}
+
+/// Sampling rate from which times in "ms" must be something else, Hz.
+const MS_AT_MOST: f64 = 1e6;
+
+/// Stretches of a time column without gaps, and the step in them.
+struct Runs {
+    /// Mean over all stretches, s; what rounding of the printed times leaves in it, as a part of it.
+    step_s: f64,
+    rounding: f64,
+    stretches: Vec<Range<usize>>,
+}
+
+impl Runs {
+    fn find(seconds: &[f64], resolution: f64) -> Runs {
+        let mut steps: Vec<f64> = seconds.windows(2).map(|w| w[1] - w[0]).collect();
+        let mut runs = Runs {
+            step_s: f64::NAN,
+            rounding: 0.0,
+            stretches: Vec::new(),
+        };
+        if steps.is_empty() {
+            return runs;
+        }
+        let mean = steps.iter().sum::<f64>() / steps.len() as f64;
+        let middle = steps.len() / 2;
+        let (_, &mut median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
+        // Where times are printed coarsely most steps are zero and the median says nothing.
+        let usual = 1.5 * median.max(mean.min(2.0 * resolution)) + 1.01 * resolution;
+        let is_gap = |w: &[f64]| !(-1.01 * resolution.max(1e-12)..=usual).contains(&(w[1] - w[0]));
+        let ends = seconds
+            .windows(2)
+            .enumerate()
+            .filter(|(_, w)| is_gap(w))
+            .map(|(i, _)| i + 1);
+        let (mut from, mut span_s, mut intervals) = (0, 0.0, 0);
+        for end in ends.chain([seconds.len()]) {
+            span_s += seconds[end - 1] - seconds[from];
+            intervals += end - 1 - from;
+            runs.stretches.push(from..end);
+            from = end;
+        }
+        if intervals > 0 && span_s > 0.0 {
+            runs.step_s = span_s / intervals as f64;
+            // Both ends of each stretch are rounded.
+            runs.rounding = resolution * (runs.stretches.len() as f64).sqrt() / span_s;
+        }
+        runs
+    }
+
+    fn are_even(&self, seconds: &[f64], resolution: f64) -> bool {
+        let even = |r: &Range<usize>| clock::is_even(&seconds[r.clone()], self.step_s, resolution);
+        self.stretches.iter().all(even)
+    }
 }
 
 /// Rate of a step: a whole number of hertz where the rounding of the times allows it.
@@ -504,12 +640,14 @@ struct Lost {
     places: usize,
     first_after_s: Option<f64>,
     backwards: usize,
-    unfilled: bool,
 }
 
 impl Lost {
-    /// Where samples are missing in the times of a piece; none where they cannot be filled.
-    fn look(&mut self, seconds: &[f64], step: f64, resolution: f64) -> Vec<Gap> {
+    /// Where samples are missing in the times of a piece.
+    ///
+    /// # Errors
+    /// The problem, where too many are missing to be filled.
+    fn look(&mut self, seconds: &[f64], step: f64, resolution: f64) -> Result<Vec<Gap>, String> {
         let slack = 0.5 * step + 1.01 * resolution;
         let (mut missing, mut gaps, mut backwards) = (0.0, Vec::new(), 0);
         for (after, pair) in seconds.windows(2).enumerate() {
@@ -530,45 +668,28 @@ impl Lost {
         self.places += gaps.len();
         let first = gaps.first().map(|g| seconds[g.after]);
         self.first_after_s = self.first_after_s.or(first);
-        if gaps.is_empty() || backwards == 0 && missing <= FILL_AT_MOST * seconds.len() as f64 {
-            return gaps;
+        match first {
+            Some(first) if missing > FILL_AT_MOST * seconds.len() as f64 => Err(format!(
+                "{missing:.0} samples dropped at {} places (the first after {first:.6} s) are too many to fill",
+                gaps.len()
+            )),
+            _ => Ok(gaps),
         }
-        self.unfilled = true;
-        Vec::new()
     }
 
     fn tell(&self, notes: &mut Notes) {
         if self.backwards > 0 {
             notes.file(format!(
-                "the time column runs backwards at {} places",
+                "the time column runs backwards at {} places: the samples are taken as if they followed each other",
                 self.backwards
             ));
         }
         let Some(first) = self.first_after_s else { return };
         let places = if self.places == 1 { "place" } else { "places" };
-        let what = format!(
-            "{:.0} samples dropped at {} {places} (the first after {first:.6} s)",
+        notes.file(format!(
+            "{:.0} samples dropped at {} {places} (the first after {first:.6} s): the gaps are filled, so that times behind \
+             them are right (cfc puts the revolutions beside in their place); record to a faster disk or at a lower rate",
             self.missing, self.places
-        );
-        notes.file(if self.unfilled {
-            format!("{what}: too many to fill, times behind them are early; record again")
-        } else {
-            format!(
-                "{what}: the gaps are filled, so that times behind them are right (cfc puts the revolutions beside in their \
-                 place); record to a faster disk or at a lower rate"
-            )
-        });
+        ));
     }
-}
-
-/// True where values lie on an even grid within 2 % of the step, or within six printed digits.
-pub(super) fn is_uniform(values: &[f64], step: f64) -> bool {
-    let Some(&start) = values.first() else {
-        return false;
-    };
-    let digits = 1e-5 * values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-    values
-        .iter()
-        .enumerate()
-        .all(|(i, v)| (start + step * i as f64 - v).abs() <= 0.02 * step + digits)
 }

@@ -9,7 +9,7 @@ use super::checks;
 use super::table::{Header, is_row};
 use super::text::{Lines, Notes, decode};
 use super::units;
-use super::{Dof, FrfRecord, Quantity};
+use super::{Dof, FrfRecord, Quantity, dof_names};
 
 /// What a column of an FRF table holds; the text names the FRF (empty where there is one only).
 #[derive(Debug, Clone, PartialEq)]
@@ -43,21 +43,121 @@ fn column(name: &str) -> Column {
         "phase_rad" | "phase [rad]" | "phase[rad]" => Column::PhaseRad(of),
         "phase" if inside == "rad" => Column::PhaseRad(String::new()),
         "coherence" | "coh" | "gamma2" => Column::Coherence(of),
-        "f" | "freq" | "frequency" | "frequency_hz" | "freq_hz" | "f_hz" | "hz" | "frequenz" => {
-            Column::Frequency {
-                factor: units::frequency_factor(inside).unwrap_or(1.0),
-            }
-        }
+        "f" | "freq" | "frq" | "freq." | "frequency" | "frequency_hz" | "freq_hz" | "f_hz" | "hz"
+        | "frequenz" => Column::Frequency {
+            factor: units::frequency_factor(inside).unwrap_or(1.0),
+        },
         _ => match head.split_once('[') {
             Some(("f" | "freq" | "frequency" | "freq " | "frequency " | "f ", unit)) => Column::Frequency {
                 factor: units::frequency_factor(unit.trim_end_matches(']')).unwrap_or(1.0),
             },
-            Some((base, _)) if ["re", "real", "im", "imag", "mag", "magnitude"].contains(&base.trim()) => {
+            Some((base, _))
+                if ["re", "real", "im", "imag", "imaginary", "mag", "magnitude"].contains(&base.trim()) =>
+            {
                 column(base)
             }
-            _ => Column::Unknown,
+            _ => part_behind_name(name).unwrap_or(Column::Unknown),
         },
     }
+}
+
+/// `amp_real`, `H1_2_imag`, `1X/1X re`: the part stands behind the name of the FRF.
+fn part_behind_name(name: &str) -> Option<Column> {
+    let name = name.trim();
+    let (of, part) = name.rsplit_once(['_', ' '])?;
+    let part = match part.to_lowercase().as_str() {
+        "re" | "real" => Column::Re,
+        "im" | "imag" | "imaginary" => Column::Im,
+        "mag" | "magnitude" => Column::Magnitude,
+        "coh" | "coherence" => Column::Coherence,
+        _ => return None,
+    };
+    // These name no FRF but the value itself.
+    let of = of.trim();
+    let bare = ["amp", "amplitude", "frf", "h", "value", "y"].contains(&of.to_lowercase().as_str());
+    Some(part(if bare { String::new() } else { of.to_owned() }))
+}
+
+/// The names line of a SignalCalc export (Data Physics), put together: its signals (`H1,2`) stand above the parts (`Real`,
+/// `Imag`), and the units under a line `Units:`. Such a header is changed to what other tables have.
+pub(super) fn join_signalcalc(header: &mut Header) {
+    let split = |line: &String| -> Vec<String> { line.split('\t').map(|f| f.trim().to_owned()).collect() };
+    let Some(units_at) = header.lines.iter().rposition(|l| l.trim() == "Units:") else {
+        return;
+    };
+    let parts_at = header.lines[..units_at].iter().rposition(|l| {
+        let fields = split(l);
+        fields.len() >= 2 && matches!(column(&fields[0]), Column::Frequency { .. })
+    });
+    let Some(parts_at) = parts_at else { return };
+    let parts: Vec<String> = split(&header.lines[parts_at])
+        .into_iter()
+        .take(header.columns)
+        .collect();
+    let signals = parts_at
+        .checked_sub(1)
+        .map(|at| split(&header.lines[at]))
+        .unwrap_or_default();
+    let mut units: Vec<String> = header.lines.get(units_at + 1).map(split).unwrap_or_default();
+    if units.is_empty() && header.names.len() > 1 {
+        units = header.names.clone();
+    }
+    let named: Vec<&String> = signals.iter().filter(|s| !s.is_empty()).collect();
+    let each = (parts.len() - 1) / named.len().max(1);
+    let name = |k: usize| {
+        let part = parts[k].to_lowercase();
+        let signal = (k > 0 && !named.is_empty() && each > 0)
+            .then(|| named.get((k - 1) / each))
+            .flatten();
+        match signal {
+            Some(signal) if part.starts_with("phase") => format!("phase_deg({signal})"),
+            Some(signal) => format!("{part}({signal})"),
+            None if part.starts_with("phase") => "phase_deg".into(),
+            None => part,
+        }
+    };
+    header.names = (0..parts.len()).map(name).collect();
+    header.columns = header.columns.max(header.names.len());
+    units.resize(header.columns, String::new());
+    header.units = units;
+}
+
+/// What a column's unit (under its name, or in its brackets) says of the FRF: quantity and factor to SI. `(m/s2)(N)`, as
+/// SignalCalc writes it, is a ratio.
+fn quantity_of_unit(header: &Header, at: usize) -> Option<(Quantity, f64)> {
+    let name = header.names.get(at)?;
+    let in_brackets = name
+        .split_once('[')
+        .map(|(_, u)| u.trim_end_matches(']').to_owned());
+    let label = header
+        .units
+        .get(at)
+        .cloned()
+        .filter(|u| !u.is_empty())
+        .or(in_brackets)?;
+    let of = |label: &str| units::parse_named(label).and_then(|u| Some((u.dimension.frf()?, u.factor)));
+    of(&label).or_else(|| of(&label.replacen(")(", ")/(", 1)))
+}
+
+/// Response and reference that the lines above the table say: `Response: 3Z`, `Reference DOF,1X`, `DOFs: 3Z:1X`.
+fn dofs_of_header(header: &Header) -> (Option<Dof>, Option<Dof>) {
+    let said = |keys: &[&str]| {
+        header
+            .entry(keys)
+            .and_then(|(_, value)| value.trim().parse::<Dof>().ok())
+    };
+    let (response, reference) = (said(&["response", "roving"]), said(&["reference", "excitation"]));
+    if response.is_some() || reference.is_some() {
+        return (response, reference);
+    }
+    let Some((_, both)) = header.entry(&["dof"]) else {
+        return (None, None);
+    };
+    let both = both.split('[').next().unwrap_or_default();
+    let Some((response, reference)) = both.split_once([':', '/']) else {
+        return (both.trim().parse().ok(), None);
+    };
+    (response.trim().parse().ok(), reference.trim().parse().ok())
 }
 
 /// True where the column names are those of FRFs.
@@ -71,9 +171,21 @@ pub(super) fn is_frf_table(header: &Header) -> bool {
 
 /// True where three columns of numbers stand alone, or under a heading that speaks of frequency.
 pub(super) fn is_plain_frf(header: &Header) -> bool {
-    let speaks = |text: &String| text.to_lowercase().contains("freq");
-    let above = header.lines.iter().chain(&header.names);
-    header.columns == 3 && (above.clone().all(|l| l.trim().is_empty()) || above.clone().any(speaks))
+    let mut above = header.lines.iter().chain(&header.names);
+    header.columns == 3 && (above.all(|l| l.trim().is_empty()) || speaks_of_frequency(header))
+}
+
+fn speaks_of_frequency(header: &Header) -> bool {
+    let mut above = header.lines.iter().chain(&header.names);
+    above.any(|text| text.to_lowercase().contains("freq"))
+}
+
+/// True for a rising column that is rather the time of a recording than a frequency axis: no FRF of a machine has lines
+/// every few millihertz, and no vibration is sampled less often than fifty times a second.
+fn looks_like_time(rising: &[f64]) -> bool {
+    let [first, .., last] = rising else { return false };
+    let step = (last - first) / (rising.len() - 1) as f64;
+    step <= 2e-3 || step < 0.02 && *last < 50.0
 }
 
 struct Parts {
@@ -148,10 +260,9 @@ pub(super) fn read_table(
     for part in parts {
         let pair = |a: usize, b: usize| table.columns[a].iter().zip(&table.columns[b]);
         let value: Vec<Complex64> = match (part.re, part.im, part.magnitude, part.phase) {
-            (Some(re), Some(im), None, None) => {
-                pair(re, im).map(|(re, im)| Complex64::new(*re, *im)).collect()
-            }
-            (None, None, Some(magnitude), Some((phase, radians))) => pair(magnitude, phase)
+            // Magnitude and phase beside them say the same.
+            (Some(re), Some(im), ..) => pair(re, im).map(|(re, im)| Complex64::new(*re, *im)).collect(),
+            (None | Some(_), None, Some(magnitude), Some((phase, radians))) => pair(magnitude, phase)
                 .map(|(m, p)| Complex64::from_polar(*m, p * radians))
                 .collect(),
             _ => {
@@ -170,7 +281,19 @@ pub(super) fn read_table(
         if part.coherence.is_some() && coherence.is_none() {
             notes.about(&part.name, "coherence outside 0..1: left out");
         }
-        let (response, reference) = dofs(&part.name, notes);
+        let (response, reference) = match dofs(&part.name, notes) {
+            (None, None) => dofs_of_header(header),
+            both => both,
+        };
+        let unit = part
+            .re
+            .or(part.magnitude)
+            .and_then(|at| quantity_of_unit(header, at));
+        let factor = unit.map_or(1.0, |u| u.1);
+        if (factor - 1.0).abs() > 1e-12 {
+            notes.about(&part.name, format!("converted to SI, factor {factor:.6}"));
+        }
+        let value: Vec<Complex64> = value.into_iter().map(|v| v * factor).collect();
         frfs.extend(checks::tidy_frf(
             FrfRecord {
                 name: if part.name.is_empty() {
@@ -180,13 +303,13 @@ pub(super) fn read_table(
                 },
                 response,
                 reference,
-                quantity: None,
+                quantity: unit.map(|u| u.0),
                 frequency_hz: frequency_hz.clone(),
                 value,
                 coherence: coherence.map(|c| c.iter().map(|v| v.clamp(0.0, 1.0)).collect()),
             },
             notes,
-        ));
+        )?);
     }
     Ok(frfs)
 }
@@ -199,6 +322,10 @@ fn dofs(name: &str, notes: &mut Notes) -> (Option<Dof>, Option<Dof>) {
     let both = name
         .split_once('/')
         .and_then(|(a, b)| Some((a.parse::<Dof>().ok()?, b.parse::<Dof>().ok()?)));
+    let both = both.or(match dof_names::dofs(name) {
+        (Some(response), Some(reference)) => Some((response, reference)),
+        _ => None,
+    });
     if both.is_none() {
         notes.about(
             name,
@@ -227,10 +354,20 @@ pub(super) fn read_plain(
         .line(header.data_line)
         .remedy("put a line of column names on top: frequency_hz,re,im or time_s,fx_n,fy_n"));
     }
+    if quantity.is_none() && !speaks_of_frequency(header) && looks_like_time(frequency) {
+        return Err(InputError::new(format!(
+            "three columns of numbers without names, the first from {} to {} in steps that fit a time and no frequency",
+            frequency.first().copied().unwrap_or(0.0),
+            frequency.last().copied().unwrap_or(0.0)
+        ))
+        .line(header.data_line)
+        .remedy("put a line of column names on top: time_s,force_n,acc_m_per_s2 for a record, frequency_hz,re,im for an FRF"));
+    }
+    let (response, reference) = dofs_of_header(header);
     let record = FrfRecord {
         name: "FRF".into(),
-        response: None,
-        reference: None,
+        response,
+        reference,
         quantity,
         frequency_hz: frequency.clone(),
         value: re
@@ -240,7 +377,7 @@ pub(super) fn read_plain(
             .collect(),
         coherence: None,
     };
-    Ok(checks::tidy_frf(record, notes).into_iter().collect())
+    Ok(checks::tidy_frf(record, notes)?.into_iter().collect())
 }
 
 /// First line of a CutPro-style file: three numbers, then labels. Gives the labels.
@@ -265,7 +402,7 @@ pub(super) fn read_cutpro(
         let at = labels.iter().position(|l| l.to_lowercase().starts_with(word))?;
         labels.get(at + 1)
     };
-    let unit = after("real").and_then(|label| units::parse(label));
+    let unit = after("real").and_then(|label| units::parse_named(label));
     let quantity = unit.and_then(|u| u.dimension.frf());
     let factor = unit.filter(|_| quantity.is_some()).map_or(1.0, |u| u.factor);
     if quantity.is_none() {

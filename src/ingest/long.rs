@@ -94,8 +94,29 @@ pub(super) fn open(path: &Path) -> Result<Opened> {
     open_by(path, PIECE)
 }
 
+/// Refuses what is no file, before it is opened: a pipe would wait for a writer, a device never end.
+///
+/// # Errors
+/// The operating system's; a folder, pipe or device, by its path.
+pub fn regular_file(path: &Path) -> Result<()> {
+    let kind = std::fs::metadata(path).map_err(|e| Error::io(path, e))?;
+    if kind.is_file() {
+        return Ok(());
+    }
+    let what = if kind.is_dir() {
+        "a folder"
+    } else {
+        "a pipe or device"
+    };
+    Err(crate::InputError::new(format!("{what}, not a file"))
+        .file(path)
+        .remedy("give a file; what comes through a pipe, save to one first")
+        .into())
+}
+
 fn open_by(path: &Path, piece: usize) -> Result<Opened> {
     let refused = |e| Error::io(path, e);
+    regular_file(path)?;
     let mut file = File::open(path).map_err(refused)?;
     let bytes = file.metadata().map_err(refused)?.len();
     let mut head = Vec::new();
@@ -130,7 +151,9 @@ fn open_by(path: &Path, piece: usize) -> Result<Opened> {
     file.read_to_end(&mut head).map_err(refused)?;
     let is_dwd_named = is_dwd_named(path);
     let mut notes = Notes::default();
-    let (format, why, contents) = read_bytes(&head, is_dwd_named, &mut notes).map_err(|e| e.file(path))?;
+    let (format, why, mut contents) =
+        read_bytes(&head, is_dwd_named, &mut notes).map_err(|e| e.file(path))?;
+    super::dofs_from_file_name(path, &mut contents.frfs, &mut notes);
     Ok(Opened::Read(MeasurementFile {
         path: path.to_path_buf(),
         format,
@@ -161,7 +184,7 @@ fn long_record(path: &Path, head: &mut Vec<u8>, bytes: u64) -> Option<(Format, S
     if header.decimal_comma_between_commas || rows.contains(&b'"') {
         return None;
     }
-    let pieces = Pieces::new(&text, header);
+    let pieces = Pieces::new(&text, header, false);
     let data_at = mark + pieces.header.data_at;
     drop(text);
     head.drain(..data_at);

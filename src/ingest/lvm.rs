@@ -3,7 +3,8 @@
 //! Source: National Instruments, "Specification for the LabVIEW Measurement File (.lvm)" (2010). The separator and the
 //! decimal sign are declared in the file header, the sampling interval (`Delta_X`) in the segment's.
 
-use super::force::is_uniform;
+use super::budget::Budget;
+use super::clock::{self, Grid, Stamps};
 use super::number;
 use super::text::{Lines, Notes, decode};
 use super::waveform;
@@ -33,10 +34,14 @@ type Entry = (String, Vec<String>);
 struct Segment {
     entries: Vec<Entry>,
     names: Vec<String>,
-    /// Line of the first row, and the rows as text.
+    /// Line of the first row.
     first_row: usize,
-    rows: Vec<Vec<String>>,
+    columns: Vec<Vec<f64>>,
 }
+
+/// Stand in a column for an empty field, and for one that is no number.
+const EMPTY: f64 = f64::INFINITY;
+const NO_NUMBER: f64 = f64::NAN;
 
 pub(super) fn looks_like(bytes: &[u8]) -> bool {
     let first = Lines::new(bytes).find(|l| !l.trim_ascii().is_empty());
@@ -45,14 +50,18 @@ pub(super) fn looks_like(bytes: &[u8]) -> bool {
 
 /// Reads all channels over time, one record for each time axis and segment. A segment that goes on where the one before
 /// it ended is joined to it.
-pub(super) fn read(bytes: &[u8], notes: &mut Notes) -> Result<Vec<TimeRecord>, InputError> {
+pub(super) fn read(
+    bytes: &[u8],
+    budget: &mut Budget,
+    notes: &mut Notes,
+) -> Result<Vec<TimeRecord>, InputError> {
     let mut lines = Lines::new(bytes);
     let layout = layout(&mut lines)?;
     let mut records: Vec<TimeRecord> = Vec::new();
     // Without headings of its own a segment has those of the one before.
     let mut entries: Vec<Entry> = Vec::new();
     let mut names: Vec<String> = Vec::new();
-    while let Some(segment) = next_segment(&mut lines, &layout, &mut entries, &mut names)? {
+    while let Some(segment) = next_segment(&mut lines, &layout, &mut entries, &mut names, budget)? {
         for record in of_segment(segment, &layout, notes)? {
             match records.last_mut().filter(|before| goes_on(before, &record)) {
                 Some(before) => {
@@ -118,11 +127,13 @@ fn next_segment(
     layout: &Layout,
     entries: &mut Vec<Entry>,
     names: &mut Vec<String>,
+    budget: &mut Budget,
 ) -> Result<Option<Segment>, InputError> {
     let mut fresh = Vec::new();
     let mut in_header = true;
     let mut special = false;
-    let mut rows = Vec::new();
+    let mut columns: Vec<Vec<f64>> = Vec::new();
+    let mut rows = 0;
     let mut first_row = 0;
     while let Some(line) = lines.next() {
         let fields = split(line, layout.separator);
@@ -136,16 +147,33 @@ fn next_segment(
         // Text in the first field is a header line, a number or nothing a row.
         let is_row = !blank && (key.is_empty() || number::field(key.as_bytes(), layout.decimal).is_some());
         if blank {
-            if rows.is_empty() {
+            if rows == 0 {
                 continue;
             }
             break;
         }
         if is_row && (!in_header || !names.is_empty() && fresh.is_empty()) {
-            if rows.is_empty() {
+            if rows == 0 {
                 first_row = lines.number;
             }
-            rows.push(fields);
+            for (k, field) in fields.iter().enumerate().take(names.len()) {
+                if k == columns.len() {
+                    columns.push(Vec::new());
+                }
+                let column = &mut columns[k];
+                budget.take(
+                    8 * (rows + 1 - column.len()),
+                    "a table with rows of very different length",
+                )?;
+                column.resize(rows, EMPTY);
+                column.push(match field.is_empty() {
+                    true => EMPTY,
+                    false => number::field(field.as_bytes(), layout.decimal)
+                        .filter(|v| v.is_finite())
+                        .unwrap_or(NO_NUMBER),
+                });
+            }
+            rows += 1;
         } else if key == END_OF_HEADER {
             *entries = std::mem::take(&mut fresh);
         } else if key == "X_Value" {
@@ -159,14 +187,14 @@ fn next_segment(
             );
         }
     }
-    if rows.is_empty() {
+    if rows == 0 {
         return Ok(None);
     }
     Ok(Some(Segment {
         entries: entries.clone(),
         names: names.clone(),
         first_row,
-        rows,
+        columns,
     }))
 }
 
@@ -193,7 +221,7 @@ fn of_segment(segment: Segment, layout: &Layout, notes: &mut Notes) -> Result<Ve
         };
         let name = segment.names.get(column).filter(|n| !n.is_empty()).cloned();
         let name = name.unwrap_or_else(|| format!("column {}", column + 1));
-        let samples = numbers(&segment, column, layout.decimal)?;
+        let samples = numbers(&segment, column)?;
         if samples.len() < 2 {
             notes.about(&name, "less than two samples in a segment: left out");
             continue;
@@ -204,63 +232,88 @@ fn of_segment(segment: Segment, layout: &Layout, notes: &mut Notes) -> Result<Ve
         }
         let times = match layout.x_columns {
             XColumns::None => None,
-            XColumns::One => Some(numbers(&segment, 0, layout.decimal)?),
-            XColumns::Multi => Some(numbers(&segment, column - 1, layout.decimal)?),
+            XColumns::One => Some(numbers(&segment, 0)?),
+            XColumns::Multi => Some(numbers(&segment, column - 1)?),
         };
         let declared = value("Delta_X", column).filter(|d| *d > 0.0);
-        let Some((step, start_s)) = time_axis(times.as_deref(), declared, value("X0", column)) else {
-            notes.about(
-                &name,
-                "times that are not evenly spaced, or no sampling interval (Delta_X): left out",
-            );
-            continue;
+        let axis = match time_axis(times.as_deref(), declared, value("X0", column)) {
+            Ok(axis) => axis,
+            Err(problem) => {
+                notes.about(
+                    &name,
+                    format!("times that are not evenly spaced, or no sampling interval (Delta_X): {problem}: left out"),
+                );
+                continue;
+            }
         };
+        let (step, start_s) = (axis.step_s, axis.start_s);
         if let Some(declared) = declared.filter(|d| (step / d - 1.0).abs() > 1e-3) {
             notes.about(
                 &name,
                 format!("the header says steps of {declared} s, the time column {step:.6} s: the time column is taken"),
             );
         }
+        let samples = match (axis.uneven, &times) {
+            (Some((grid, told)), Some(times)) => {
+                notes.about(&name, told);
+                clock::resample(times, &samples, grid)
+            }
+            _ => samples,
+        };
         let unit = entry("Y_Unit_Label", column).unwrap_or_default();
-        let channel = waveform::channel(name, unit, samples, notes);
-        waveform::put(&mut records, 1.0 / step, start_s, channel);
+        let channel = waveform::channel(name, unit, samples, notes)?;
+        waveform::put(&mut records, 1.0 / step, start_s, channel)?;
     }
     Ok(records)
 }
 
-/// Step and start. The declared step is exact, the printed times are rounded: they decide only where they contradict it.
-fn time_axis(times: Option<&[f64]>, declared: Option<f64>, start: Option<f64>) -> Option<(f64, f64)> {
-    let Some(times) = times.filter(|t| t.len() >= 2) else {
-        return Some((declared?, start.unwrap_or(0.0)));
+/// Step and start, and the grid to put the samples on where the times are uneven.
+struct TimeAxis {
+    step_s: f64,
+    start_s: f64,
+    uneven: Option<(Grid, String)>,
+}
+
+/// The declared step is exact, the printed times are rounded: they decide only where they contradict it.
+fn time_axis(times: Option<&[f64]>, declared: Option<f64>, start: Option<f64>) -> Result<TimeAxis, String> {
+    let even = |step_s: f64, start_s: f64| TimeAxis {
+        step_s,
+        start_s,
+        uneven: None,
     };
-    let own = (times[times.len() - 1] - times[0]) / (times.len() - 1) as f64;
-    let even = |step: &f64| *step > 0.0 && is_uniform(times, *step);
-    declared
-        .filter(even)
-        .or(Some(own).filter(even))
-        .map(|step| (step, times[0]))
+    let Some(times) = times.filter(|t| t.len() >= 2) else {
+        let step_s = declared.ok_or("no times and no interval")?;
+        return Ok(even(step_s, start.unwrap_or(0.0)));
+    };
+    let rounding = clock::six_digits(times);
+    if let Some(step_s) = declared.filter(|step| clock::is_even(times, *step, rounding)) {
+        return Ok(even(step_s, times[0]));
+    }
+    match clock::look(times, rounding)? {
+        Stamps::Even(grid) => Ok(even(1.0 / grid.rate_hz, grid.start_s)),
+        Stamps::Uneven(grid, told) => Ok(TimeAxis {
+            step_s: 1.0 / grid.rate_hz,
+            start_s: grid.start_s,
+            uneven: Some((grid, told)),
+        }),
+    }
 }
 
 /// A column of the rows; shorter where its last fields are empty.
-fn numbers(segment: &Segment, column: usize, decimal: u8) -> Result<Vec<f64>, InputError> {
-    let field = |row: &Vec<String>| row.get(column).filter(|f| !f.is_empty()).cloned();
-    let length = segment
-        .rows
+fn numbers(segment: &Segment, column: usize) -> Result<Vec<f64>, InputError> {
+    let values = segment.columns.get(column).map_or(&[][..], Vec::as_slice);
+    let length = values
         .iter()
-        .rposition(|row| field(row).is_some())
+        .rposition(|v| *v != EMPTY)
         .map_or(0, |last| last + 1);
-    let rows = segment.rows[..length].iter().enumerate();
-    rows.map(|(k, row)| {
-        let text = field(row).unwrap_or_default();
-        number::field(text.as_bytes(), decimal)
-            .filter(|v| v.is_finite())
-            .ok_or_else(|| {
-                InputError::new(format!("{text:?} in column {} is no number", column + 1))
-                    .line(segment.first_row + k)
-                    .remedy("a record with missing samples cannot be used: export it again or cut the row range out")
-            })
-    })
-    .collect()
+    match values[..length].iter().position(|v| !v.is_finite()) {
+        Some(row) => Err(InputError::new(format!("no number in column {}", column + 1))
+            .line(segment.first_row + row)
+            .remedy(
+                "a record with missing samples cannot be used: export it again or cut the row range out",
+            )),
+        None => Ok(values[..length].to_vec()),
+    }
 }
 
 /// Does a record go on where another ended, with the same channels?
@@ -296,7 +349,8 @@ mod tests {
         ***End_of_Header***\t\t\t\nX_Value\tHammer\tTip\tComment\n";
 
     fn records(text: &str) -> Vec<TimeRecord> {
-        read(text.as_bytes(), &mut Notes::default()).unwrap_or_else(|e| panic!("{e}\n{text}"))
+        read(text.as_bytes(), &mut Budget::for_file(0), &mut Notes::default())
+            .unwrap_or_else(|e| panic!("{e}\n{text}"))
     }
 
     fn assert_two_channels(records: &[TimeRecord]) {
@@ -352,14 +406,28 @@ mod tests {
     #[test]
     fn uneven_times_holes_and_damage_are_said() {
         let uneven = format!("{HEADER}0\t1.5\t10\n0.001\t2\t20\n0.009\t3.0\t30\n");
-        let error = read(file("\t", ".", "One", &uneven).as_bytes(), &mut Notes::default()).unwrap_err();
+        let error = read(
+            file("\t", ".", "One", &uneven).as_bytes(),
+            &mut Budget::for_file(0),
+            &mut Notes::default(),
+        )
+        .unwrap_err();
         assert!(error.to_string().contains("evenly"), "{error}");
         let hole = format!("{HEADER}\t1.5\t10\n\t\t20\n\t3.0\t30\n");
-        let error = read(file("\t", ".", "No", &hole).as_bytes(), &mut Notes::default()).unwrap_err();
+        let error = read(
+            file("\t", ".", "No", &hole).as_bytes(),
+            &mut Budget::for_file(0),
+            &mut Notes::default(),
+        )
+        .unwrap_err();
         assert_eq!(error.line, Some(24), "{error}");
         let whole = file("\t", ".", "No", &format!("{HEADER}\t1.5\t10\n\t2\t20\n"));
         for cut_at in 0..whole.len() {
-            let _ = read(&whole.as_bytes()[..cut_at], &mut Notes::default());
+            let _ = read(
+                &whole.as_bytes()[..cut_at],
+                &mut Budget::for_file(0),
+                &mut Notes::default(),
+            );
         }
     }
 }

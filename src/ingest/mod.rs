@@ -10,8 +10,11 @@ use serde::Serialize;
 
 use crate::{Error, InputError, Result};
 
+mod budget;
 mod checks;
+mod clock;
 mod detect;
+mod dof_names;
 mod force;
 mod frf_text;
 mod long;
@@ -29,15 +32,17 @@ mod uff;
 pub mod units;
 mod waveform;
 
-pub use long::{Survey, survey};
+pub use long::{Survey, regular_file, survey};
 pub use quality::quality_warnings;
 pub use uff::{
     Abscissa, ByteOrder, Dataset58, Encoding58, EntityDof, Ordinate, UnitAxis, frf_dataset, time_datasets,
     uff58_bytes, write_datasets58, write_uff58,
 };
 
+use budget::Budget;
 use detect::Detected;
 use text::Notes;
+pub use text::shown;
 
 /// How a file is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -120,6 +125,25 @@ pub struct MeasurementFile {
 }
 
 impl Contents {
+    /// Names and units of files are shown on terminals: control characters in them become visible.
+    fn show_control_characters(&mut self) {
+        let show = |text: &mut String| {
+            if let std::borrow::Cow::Owned(shown) = text::shown(text) {
+                *text = shown;
+            }
+        };
+        self.frfs.iter_mut().for_each(|frf| show(&mut frf.name));
+        for channel in self.times.iter_mut().flat_map(|record| &mut record.channels) {
+            show(&mut channel.name);
+            show(&mut channel.file_unit);
+        }
+        for other in &mut self.others {
+            show(&mut other.name);
+            show(&mut other.unit);
+            show(&mut other.abscissa_unit);
+        }
+    }
+
     /// `3 FRFs, 1 time record, 2 × coherence`.
     pub fn describe(&self) -> String {
         let mut parts = Vec::new();
@@ -158,14 +182,62 @@ pub fn read_file(path: &Path) -> Result<MeasurementFile> {
     }
 }
 
+/// As [`read_file`], on the bytes of a file; errors name no file.
+///
+/// # Errors
+/// As [`read_file`].
+pub fn read_memory(bytes: &[u8]) -> std::result::Result<MeasurementFile, InputError> {
+    let mut notes = Notes::default();
+    let (format, why, contents) = read_bytes(bytes, false, &mut notes)?;
+    Ok(MeasurementFile {
+        path: PathBuf::new(),
+        format,
+        why,
+        contents,
+        warnings: notes.into_warnings(),
+    })
+}
+
+/// Where a file holds one FRF that does not say where it was measured, its name may.
+fn dofs_from_file_name(path: &Path, frfs: &mut [FrfRecord], notes: &mut Notes) {
+    let [frf] = frfs else { return };
+    if frf.response.is_some() || frf.reference.is_some() {
+        return;
+    }
+    let stem = path.file_stem().map(|s| s.to_string_lossy()).unwrap_or_default();
+    (frf.response, frf.reference) = dof_names::dofs(&stem);
+    if let (Some(response), Some(reference)) = (frf.response, frf.reference) {
+        frf.name = format!("{response}/{reference}");
+        notes.file(format!(
+            "measured at {response}, excited at {reference}: taken from the name of the file"
+        ));
+    }
+}
+
 /// As [`read_file`], on bytes.
 fn read_bytes(
     bytes: &[u8],
     is_dwd_named: bool,
     notes: &mut Notes,
 ) -> std::result::Result<(Format, String, Contents), InputError> {
+    match read_as_it_is(bytes, is_dwd_named, notes) {
+        Ok((format, why, mut contents)) => {
+            contents.show_control_characters();
+            checks::drop_copies(&mut contents.frfs, notes);
+            Ok((format, text::shown(&why).into_owned(), contents))
+        }
+        Err(error) => Err(error),
+    }
+}
+
+fn read_as_it_is(
+    bytes: &[u8],
+    is_dwd_named: bool,
+    notes: &mut Notes,
+) -> std::result::Result<(Format, String, Contents), InputError> {
     let bytes = &*text::without_byte_order_mark(bytes);
     let (detected, format, why) = detect::detect(bytes, is_dwd_named)?;
+    let mut budget = Budget::for_file(bytes.len());
     let frfs = |frfs| Contents {
         frfs,
         ..Contents::default()
@@ -176,9 +248,9 @@ fn read_bytes(
     };
     Ok(match detected {
         Detected::Tdms => (format, why, signals(tdms::read(bytes, notes)?)),
-        Detected::Lvm => (format, why, signals(lvm::read(bytes, notes)?)),
-        Detected::Mat5 => (format, why, mat::read_v5(bytes, notes)?),
-        Detected::Mat73 => (format, why, mat::read_v73(bytes, notes)?),
+        Detected::Lvm => (format, why, signals(lvm::read(bytes, &mut budget, notes)?)),
+        Detected::Mat5 => (format, why, mat::read_v5(bytes, &mut budget, notes)?),
+        Detected::Mat73 => (format, why, mat::read_v73(bytes, &mut budget, notes)?),
         Detected::Universal => {
             let (summary, contents) = uff::contents(bytes, notes)?;
             let skipped: Vec<String> = summary.skipped.iter().map(u32::to_string).collect();
@@ -379,7 +451,7 @@ impl Channel {
             ChannelRole::TorqueZ => Some(("moment", "N·m")),
             ChannelRole::Other => None,
         };
-        let by_unit = units::parse(&self.file_unit).and_then(|u| u.dimension.describe());
+        let by_unit = units::parse_named(&self.file_unit).and_then(|u| u.dimension.describe());
         by_unit.or(by_role).unwrap_or(("unknown", &self.file_unit))
     }
 }

@@ -189,6 +189,14 @@ impl Header {
             }
             line += part.lines;
         }
+        if is_last && columns.first().is_some_and(|c| c.len() > 3) && ends_within_a_number(data, self.decimal)
+        {
+            columns.iter_mut().for_each(|c| c.truncate(c.len() - 1));
+            notes.file(
+                "the file ends without a line end, its last number has fewer digits than those above: cut off, the last row \
+                 is left out",
+            );
+        }
         Ok(Table { columns })
     }
 
@@ -343,6 +351,33 @@ impl Header {
         }
         Ok(Table { columns })
     }
+}
+
+/// True where the last line has no end and its last number fewer digits than the last numbers of the rows above, which all
+/// have as many.
+fn ends_within_a_number(data: &[u8], decimal: u8) -> bool {
+    if data.last().is_none_or(|b| matches!(b, b'\n' | b'\r')) {
+        return false;
+    }
+    let mut rows = data.rsplit(|b| *b == b'\n');
+    let digits = |row: &[u8]| {
+        let is_end = |b: &u8| *b != decimal && b" \t;,".contains(b);
+        let last = row.trim_ascii().rsplit(is_end).next().unwrap_or_default();
+        let fraction = last.iter().rev().take_while(|b| **b != decimal).count();
+        let has_point = last.contains(&decimal);
+        (has_point, if has_point { fraction } else { 0 })
+    };
+    let Some(last) = rows.next().map(digits) else {
+        return false;
+    };
+    let above: Vec<(bool, usize)> = rows.take(8).map(digits).collect();
+    let Some(usual) = above
+        .first()
+        .filter(|first| above.len() >= 3 && above.iter().all(|a| a == *first))
+    else {
+        return false;
+    };
+    usual.0 && last.1 < usual.1
 }
 
 /// Rows that one thread read.

@@ -37,6 +37,7 @@ struct Object {
     /// Values in each chunk of the segments at hand.
     count: usize,
     has_data: bool,
+    is_listed: bool,
     samples: Vec<f64>,
     unreadable: Option<&'static str>,
 }
@@ -126,8 +127,10 @@ fn number(bytes: &[u8], kind: u32, big: bool) -> f64 {
 
 /// Reads all channels that are waveforms, one record for each time axis.
 pub(super) fn read(bytes: &[u8], notes: &mut Notes) -> Result<Vec<TimeRecord>, InputError> {
-    let mut objects: Vec<Object> = Vec::new();
+    let mut objects = Objects::default();
     let mut list: Vec<usize> = Vec::new();
+    // Every segment goes through its list of channels: what a file may make us do grows with its size, not with its square.
+    let mut work = 64 * bytes.len() + (1 << 20);
     let mut at = 0;
     while at + LEAD_IN <= bytes.len() {
         let mut lead = Reader {
@@ -176,35 +179,56 @@ pub(super) fn read(bytes: &[u8], notes: &mut Notes) -> Result<Vec<TimeRecord>, I
             metadata(&mut reader, flags, &mut objects, &mut list)?;
         }
         if flags & RAW != 0 {
-            data(&bytes[raw_at..end], flags, lead.big, &list, &mut objects)?;
+            work = work.checked_sub(list.len()).ok_or_else(cut)?;
+            data(
+                &bytes[raw_at..end],
+                flags,
+                lead.big,
+                &list,
+                &mut objects.all,
+                &mut work,
+            )?;
         }
         if end <= at {
             return Err(cut());
         }
         at = end;
     }
-    records(objects, notes)
+    records(objects.all, notes)
+}
+
+/// All objects, and where each stands by its path.
+#[derive(Default)]
+struct Objects {
+    all: Vec<Object>,
+    by_path: HashMap<String, usize>,
 }
 
 fn metadata(
     reader: &mut Reader,
     flags: u32,
-    objects: &mut Vec<Object>,
+    objects: &mut Objects,
     list: &mut Vec<usize>,
 ) -> Result<(), InputError> {
     if flags & NEW_LIST != 0 {
-        list.clear();
+        for index in list.drain(..) {
+            objects.all[index].is_listed = false;
+        }
     }
     for _ in 0..reader.u32()? {
         let path = reader.text()?;
-        let index = objects.iter().position(|o| o.path == path).unwrap_or_else(|| {
-            objects.push(Object {
-                path,
-                ..Object::default()
-            });
-            objects.len() - 1
-        });
-        let object = &mut objects[index];
+        let index = match objects.by_path.get(&path) {
+            Some(index) => *index,
+            None => {
+                objects.by_path.insert(path.clone(), objects.all.len());
+                objects.all.push(Object {
+                    path,
+                    ..Object::default()
+                });
+                objects.all.len() - 1
+            }
+        };
+        let object = &mut objects.all[index];
         match reader.u32()? {
             NO_DATA => object.has_data = false,
             SAME_AS_BEFORE => object.has_data = true,
@@ -224,21 +248,30 @@ fn metadata(
                 object.has_data = true;
             }
         }
-        if object.has_data && !list.contains(&index) {
-            list.push(index);
-        } else if !object.has_data {
-            list.retain(|i| *i != index);
+        if object.has_data != object.is_listed {
+            object.is_listed = object.has_data;
+            match object.has_data {
+                true => list.push(index),
+                false => list.retain(|i| *i != index),
+            }
         }
         for _ in 0..reader.u32()? {
             let name = reader.text()?;
             let value = reader.property()?;
-            objects[index].properties.insert(name, value);
+            objects.all[index].properties.insert(name, value);
         }
     }
     Ok(())
 }
 
-fn data(raw: &[u8], flags: u32, big: bool, list: &[usize], objects: &mut [Object]) -> Result<(), InputError> {
+fn data(
+    raw: &[u8],
+    flags: u32,
+    big: bool,
+    list: &[usize],
+    objects: &mut [Object],
+    work: &mut usize,
+) -> Result<(), InputError> {
     let mut sizes = Vec::with_capacity(list.len());
     for &index in list {
         match size_of_kind(objects[index].kind) {
@@ -269,6 +302,7 @@ fn data(raw: &[u8], flags: u32, big: bool, list: &[usize], objects: &mut [Object
     }
     for part in raw.chunks(chunk) {
         let mut at = 0;
+        *work = work.checked_sub(list.len()).ok_or_else(cut)?;
         if flags & INTERLEAVED != 0 {
             let row: usize = sizes.iter().sum();
             for values in part.chunks_exact(row.max(1)) {
@@ -339,8 +373,8 @@ fn records(objects: Vec<Object>, notes: &mut Notes) -> Result<Vec<TimeRecord>, I
             notes.about(&name, "values that are not numbers: left out");
             continue;
         }
-        let channel = waveform::channel(name, file_unit, object.samples, notes);
-        waveform::put(&mut records, 1.0 / step, start_s, channel);
+        let channel = waveform::channel(name, file_unit, object.samples, notes)?;
+        waveform::put(&mut records, 1.0 / step, start_s, channel)?;
     }
     if records.is_empty() {
         return Err(

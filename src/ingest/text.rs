@@ -10,6 +10,26 @@ pub fn decode(bytes: &[u8]) -> String {
     }
 }
 
+/// Text of a file as it may be shown on a terminal: control characters, and those that turn the direction of writing
+/// around or cannot be seen, become `\u{1b}`.
+pub fn shown(text: &str) -> Cow<'_, str> {
+    let is_harmful = |c: char| {
+        c.is_control() && c != '\t' && c != '\n'
+            || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
+    };
+    if !text.contains(is_harmful) {
+        return Cow::Borrowed(text);
+    }
+    let mut shown = String::with_capacity(text.len() + 16);
+    for c in text.chars() {
+        match is_harmful(c) {
+            true => shown.extend(c.escape_unicode()),
+            false => shown.push(c),
+        }
+    }
+    Cow::Owned(shown)
+}
+
 /// Drops a UTF-8 byte order mark, turns UTF-16 (spreadsheets call it "Unicode text") into UTF-8.
 pub fn without_byte_order_mark(bytes: &[u8]) -> Cow<'_, [u8]> {
     let utf16 = |order: fn([u8; 2]) -> u16| {
@@ -102,7 +122,8 @@ impl Notes {
 
     /// A remark about one record or channel.
     pub fn about(&mut self, subject: &str, remark: impl Into<String>) {
-        let text = remark.into();
+        let text = shown(&remark.into()).into_owned();
+        let subject = &*shown(subject);
         let at = self
             .remarks
             .iter()
@@ -167,6 +188,16 @@ mod tests {
         assert_eq!(decode("m/s²".as_bytes()), "m/s²");
         assert_eq!(&*without_byte_order_mark(b"\xEF\xBB\xBFa"), b"a");
         assert_eq!(&*without_byte_order_mark(b"\xFF\xFEa\0;\0"), b"a;");
+    }
+
+    #[test]
+    fn what_would_drive_a_terminal_is_shown() {
+        assert_eq!(shown("Fx [N]\tµm²"), "Fx [N]\tµm²");
+        assert_eq!(shown("\u{1b}[31mFx\u{9b}2J\u{7}"), "\\u{1b}[31mFx\\u{9b}2J\\u{7}");
+        assert_eq!(shown("a\u{202e}b\u{200b}"), "a\\u{202e}b\\u{200b}");
+        let mut notes = Notes::default();
+        notes.about("\u{1b}c", "odd\u{8}");
+        assert_eq!(notes.into_warnings(), ["\\u{1b}c: odd\\u{8}"]);
     }
 
     #[test]

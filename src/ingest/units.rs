@@ -100,6 +100,15 @@ pub fn parse(label: &str) -> Option<Unit> {
     (reader.at == characters.len() && unit.factor.is_finite() && unit.factor > 0.0).then_some(unit)
 }
 
+/// As [`parse`], and for labels that are names with a unit at their end: `acc_m_s2`, `acc_m/s2`, `force_n`.
+pub fn parse_named(label: &str) -> Option<Unit> {
+    parse(label).or_else(|| {
+        label
+            .match_indices('_')
+            .find_map(|(at, _)| parse_suffix(&label[at + 1..]))
+    })
+}
+
 /// product = power { ('*' | '·' | '.' | '-' | ' ' | '/') power }, power = atom [exponent], atom = name | 1 | '(' product ')'
 struct Reader<'a> {
     characters: &'a [char],
@@ -270,6 +279,12 @@ pub fn parse_suffix(suffix: &str) -> Option<Unit> {
         // Only torque columns end in nm; nobody exports nanometres from a dynamometer.
         "nm" => parse("Nm"),
         "ms2" => parse("m/s2"),
+        // `acc_m_s2` and `acc_m/s2`, as Python programs name their columns.
+        "m_s2" | "m_s^2" | "m_s-2" | "m_s_2" => parse("m/s2"),
+        "mm_s2" | "mm_s^2" => parse("mm/s2"),
+        "m_s" => parse("m/s"),
+        "mm_s" => parse("mm/s"),
+        other if other.contains('/') => parse(other),
         "mm" | "um" | "m" | "s" | "ms" | "g" | "n" | "kn" | "lbf" | "v" | "mv" | "ncm" | "nmm" | "kgf" => {
             parse(&suffix)
         }
@@ -367,6 +382,18 @@ mod tests {
             parse_suffix("m_per_s2").unwrap().dimension,
             Dimension::ACCELERATION
         );
+        for suffix in ["m_s2", "m/s2", "M/S2", "m_s^2"] {
+            assert_eq!(
+                parse_suffix(suffix).unwrap().dimension,
+                Dimension::ACCELERATION,
+                "{suffix}"
+            );
+            assert_eq!(
+                parse_named(&format!("acc_{suffix}")).unwrap().dimension,
+                Dimension::ACCELERATION
+            );
+        }
+        assert_relative_eq!(parse_named("acc_mm_s2").unwrap().factor, 1e-3);
         assert_eq!(parse_suffix("x"), None);
         assert_eq!(parse_suffix("left"), None);
     }

@@ -3,11 +3,19 @@
 use super::force::{role_of, unit_in_name};
 use super::text::Notes;
 use super::units::{self, Dimension};
-use super::{Channel, ChannelRole, TimeRecord};
+use super::{Channel, ChannelRole, InputError, TimeRecord, checks};
 
 /// A channel in SI; the unit is read from its label, else from its name (`fx_n`, `Force [N]`).
-pub(super) fn channel(name: String, file_unit: String, mut samples: Vec<f64>, notes: &mut Notes) -> Channel {
-    let unit = units::parse(&file_unit).or_else(|| unit_in_name(&name));
+///
+/// # Errors
+/// Samples that no sensor gives.
+pub(super) fn channel(
+    name: String,
+    file_unit: String,
+    mut samples: Vec<f64>,
+    notes: &mut Notes,
+) -> Result<Channel, InputError> {
+    let unit = units::parse_named(&file_unit).or_else(|| unit_in_name(&name));
     let role = role_of(&name, unit);
     match unit {
         None => notes.about(&name, "unit unknown: values as they stand in the file"),
@@ -21,16 +29,26 @@ pub(super) fn channel(name: String, file_unit: String, mut samples: Vec<f64>, no
     }
     let factor = unit.map_or(1.0, |u| u.factor);
     samples.iter_mut().for_each(|v| *v *= factor);
-    Channel {
+    checks::plausible_samples(&name, &samples)?;
+    Ok(Channel {
         name,
         file_unit,
         role,
         samples,
-    }
+    })
 }
 
 /// Adds a channel to the record with its time axis, or begins one.
-pub(super) fn put(records: &mut Vec<TimeRecord>, sample_rate_hz: f64, start_s: f64, channel: Channel) {
+///
+/// # Errors
+/// A rate or start that no recorder has.
+pub(super) fn put(
+    records: &mut Vec<TimeRecord>,
+    sample_rate_hz: f64,
+    start_s: f64,
+    channel: Channel,
+) -> Result<(), InputError> {
+    checks::plausible_clock(&channel.name, sample_rate_hz, start_s)?;
     let same = records.iter_mut().find(|r| {
         (r.sample_rate_hz / sample_rate_hz - 1.0).abs() < 1e-9
             && r.len() == channel.samples.len()
@@ -45,4 +63,5 @@ pub(super) fn put(records: &mut Vec<TimeRecord>, sample_rate_hz: f64, start_s: f
             channels: vec![channel],
         }),
     }
+    Ok(())
 }

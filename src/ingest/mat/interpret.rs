@@ -3,8 +3,12 @@
 
 use num_complex::Complex64;
 
+use super::super::budget::Budget;
+use super::super::clock::{self, Grid, Stamps};
 use super::super::text::Notes;
-use super::super::{Contents, FrfRecord, InputError, OtherRecord, Quantity, TimeRecord, checks, waveform};
+use super::super::{
+    Contents, FrfRecord, InputError, OtherRecord, Quantity, TimeRecord, checks, dof_names, waveform,
+};
 use super::Variable;
 
 /// Shorter vectors are no axis.
@@ -33,6 +37,97 @@ impl Variable {
 
     fn is_called(&self, names: &[&str]) -> bool {
         names.contains(&self.own_name().to_lowercase().as_str())
+    }
+
+    /// What lies in the same struct has the same root.
+    fn root(&self) -> &str {
+        self.name.split_once('.').map_or("", |(root, _)| root)
+    }
+
+    /// `H1_2`, `C1_2`, `X1`: a letter and channel numbers, as SignalCalc names its functions.
+    fn is_analyser_name(&self) -> bool {
+        let mut characters = self.own_name().chars();
+        characters.next().is_some_and(|c| c.is_ascii_uppercase())
+            && characters.next().is_some_and(|c| c.is_ascii_digit())
+            && characters.all(|c| c.is_ascii_digit() || c == '_')
+    }
+
+    fn is_called_frf(&self) -> bool {
+        let first = self.own_name().chars().next();
+        self.mentions(&[
+            "frf",
+            "tf_",
+            "xfer",
+            "transfer",
+            "recept",
+            "mobil",
+            "accelerance",
+            "inertance",
+        ]) || matches!(first, Some('H' | 'h'))
+            && (self.is_called(&["h", "hf", "hv"])
+                || self.own_name()[1..].starts_with(|c: char| c.is_ascii_digit() || c == '_'))
+    }
+
+    fn is_called_signal(&self) -> bool {
+        let letter = self.own_name().chars().next().filter(|_| self.is_analyser_name());
+        matches!(letter, Some('X' | 'W'))
+            || self.is_called(&["t", "zeit", "t_s", "tvec"])
+            || self.mentions(&["time", "force", "acc", "signal", "hammer"])
+    }
+
+    /// Factor to hertz where the name is that of a frequency axis.
+    fn frequency_factor(&self) -> Option<f64> {
+        if self.is_called(&["omega", "w", "w_rad", "omega_rad", "wvec"]) {
+            return Some(0.5 / std::f64::consts::PI);
+        }
+        let is_named = self.mentions(&["freq", "frq"])
+            || self.is_called(&[
+                "f", "hz", "f_hz", "fhz", "fvec", "faxis", "f_axis", "fr", "ff", "xaxis", "x_axis",
+            ]);
+        is_named.then_some(1.0)
+    }
+
+    fn is_frequency_step(&self) -> bool {
+        self.is_called(&[
+            "df",
+            "delta_f",
+            "deltaf",
+            "d_f",
+            "df_hz",
+            "fstep",
+            "f_step",
+            "f_inc",
+            "freq_step",
+            "freq_inc",
+            "increment",
+            "frequency_resolution",
+            "freq_resolution",
+            "fres",
+            "f_res",
+            "delta_freq",
+            "deltafreq",
+            "x_increment",
+            "x_delta",
+        ])
+    }
+
+    fn is_frequency_start(&self) -> bool {
+        self.is_called(&[
+            "f_start",
+            "fstart",
+            "f0",
+            "f_0",
+            "f_min",
+            "fmin",
+            "start_freq",
+            "startfreq",
+            "freq_start",
+            "start_value",
+            "f_begin",
+            "x_start",
+            "f_start_hz",
+            "start_frequency",
+        ])
     }
 
     fn is_vector(&self) -> bool {
@@ -90,19 +185,22 @@ impl Variable {
     }
 }
 
-pub(super) fn contents(variables: Vec<Variable>, notes: &mut Notes) -> Result<Contents, InputError> {
+pub(super) fn contents(
+    mut variables: Vec<Variable>,
+    budget: &mut Budget,
+    notes: &mut Notes,
+) -> Result<Contents, InputError> {
     if variables.is_empty() {
-        return Err(
-            InputError::new("a MAT-file without numeric arrays at its top level").remedy(
-                "structs and cells of a v7 file are not read: in MATLAB s = load(…), then \
-             save('flat.mat', '-struct', 's', '-v7')",
-            ),
-        );
+        return Err(InputError::new("a MAT-file without numeric arrays")
+            .remedy("save the frequency axis f (Hz) or the times t (s) and the data as plain arrays"));
     }
     let mut used = vec![false; variables.len()];
     let mut contents = Contents::default();
-    frequency_functions(&variables, &mut used, &mut contents, notes);
-    contents.times = time_signals(&variables, &mut used, notes);
+    join_parts(&mut variables, notes);
+    tables(&variables, &mut used, &mut contents, budget, notes)?;
+    frequency_functions(&variables, &mut used, &mut contents, budget, notes)?;
+    let mut times = time_signals(&variables, &mut used, budget, notes)?;
+    contents.times.append(&mut times);
     if contents.frfs.is_empty() && contents.times.is_empty() && contents.others.is_empty() {
         return Err(InputError::new(format!(
             "a MAT-file in which no FRF and no time signal is recognised ({})",
@@ -125,6 +223,149 @@ pub(super) fn contents(variables: Vec<Variable>, notes: &mut Notes) -> Result<Co
     Ok(contents)
 }
 
+/// Real arrays of two columns that are the real and imaginary parts of an FRF become complex.
+fn join_parts(variables: &mut [Variable], notes: &mut Notes) {
+    for variable in variables {
+        let columns = variable.size.as_slice() == [variable.re.len() / 2, 2];
+        if variable.im.is_some() || !columns || variable.re.len() < 2 * MIN_AXIS || !variable.is_called_frf()
+        {
+            continue;
+        }
+        let (re, im) = variable.re.split_at(variable.re.len() / 2);
+        if rises_evenly(re) {
+            continue;
+        }
+        notes.about(&variable.name, "two columns, taken as real and imaginary part");
+        let (re, im) = (re.to_vec(), im.to_vec());
+        variable.size = vec![re.len(), 1];
+        variable.re = re;
+        variable.im = Some(im);
+    }
+}
+
+/// True for an axis: finite, rising in even steps.
+fn rises_evenly(values: &[f64]) -> bool {
+    let [first, .., last] = values else { return false };
+    let step = (last - first) / (values.len() - 1) as f64;
+    let slack = 1e-3 * step + 1e-6 * last.abs();
+    values.len() >= MIN_AXIS
+        && step > 0.0
+        && step.is_finite()
+        && values
+            .iter()
+            .enumerate()
+            .all(|(i, v)| (first + step * i as f64 - v).abs() <= slack)
+}
+
+/// Arrays that hold their own axis in the first column, `[f, H]` or `[t, x]`, as SignalCalc (Data Physics) and hand-made
+/// files have them: `H1_2` an FRF, `C1_2` a coherence, `G1_2` and `S1` spectra, `X1` a signal.
+fn tables(
+    variables: &[Variable],
+    used: &mut [bool],
+    contents: &mut Contents,
+    budget: &mut Budget,
+    notes: &mut Notes,
+) -> Result<(), InputError> {
+    let mut coherences = Vec::new();
+    for (k, variable) in variables.iter().enumerate() {
+        let [rows, columns] = variable.size.as_slice() else {
+            continue;
+        };
+        let (rows, columns) = (*rows, *columns);
+        if columns < 2 || rows < MIN_AXIS || columns >= rows || rows * columns != variable.re.len() {
+            continue;
+        }
+        let axis = &variable.re[..rows];
+        let no_phase = |im: &Vec<f64>| im[..rows].iter().all(|v| *v == 0.0);
+        if !variable.im.as_ref().is_none_or(no_phase) || axis[0] < 0.0 || !rises_evenly(axis) {
+            continue;
+        }
+        budget.take(48 * variable.re.len(), &format!("variable {}", variable.name))?;
+        let column = |c: usize| &variable.re[c * rows..(c + 1) * rows];
+        let values = |c: usize| -> Vec<Complex64> {
+            (c * rows..(c + 1) * rows).map(|i| complex(variable, i)).collect()
+        };
+        let mut frf = |name: String, value: Vec<Complex64>, notes: &mut Notes| {
+            let record = record(variable, name, axis, value);
+            checks::tidy_frf(record, notes).map(|record| contents.frfs.extend(record))
+        };
+        let suffix = |c: usize| {
+            if columns > 2 {
+                format!("(:,{})", c + 1)
+            } else {
+                String::new()
+            }
+        };
+        let is_real = variable.im.is_none();
+        match kind(variable) {
+            Kind::Coherence if columns == 2 => coherences.push((variable, axis, column(1).to_vec())),
+            Kind::Frf if !is_real => {
+                for c in 1..columns {
+                    frf(format!("{}{}", variable.name, suffix(c)), values(c), notes)?;
+                }
+            }
+            _ if is_real && columns == 3 && variable.is_called_frf() => {
+                let both = column(1)
+                    .iter()
+                    .zip(column(2))
+                    .map(|(re, im)| Complex64::new(*re, *im))
+                    .collect();
+                frf(variable.name.clone(), both, notes)?;
+            }
+            Kind::Other(kind) => contents.others.extend((1..columns).map(|c| OtherRecord {
+                kind,
+                name: format!("{}{}", variable.name, suffix(c)),
+                abscissa: axis.to_vec(),
+                abscissa_unit: "Hz".into(),
+                value: values(c),
+                unit: String::new(),
+            })),
+            Kind::Unknown
+                if is_real && (variable.is_called_signal() || axis[1] - axis[0] <= SAMPLE_STEP_S) =>
+            {
+                let rate = (rows - 1) as f64 / (axis[rows - 1] - axis[0]);
+                for c in 1..columns {
+                    let name = format!("{}{}", variable.name, suffix(c));
+                    let channel = waveform::channel(name, String::new(), column(c).to_vec(), notes)?;
+                    waveform::put(&mut contents.times, rate, axis[0], channel)?;
+                }
+            }
+            _ => continue,
+        }
+        used[k] = true;
+        let what = if matches!(kind(variable), Kind::Unknown) {
+            "time"
+        } else {
+            "frequency"
+        };
+        notes.about(&variable.name, format!("its first column is taken as {what}"));
+    }
+    for (variable, axis, values) in coherences {
+        attach(variable, axis, &values, variables, contents, notes);
+    }
+    Ok(())
+}
+
+/// Steps up to this are those of a recording where nothing says what an axis is, s.
+const SAMPLE_STEP_S: f64 = 2e-3;
+
+/// An FRF of a variable.
+fn record(variable: &Variable, name: String, axis: &[f64], value: Vec<Complex64>) -> FrfRecord {
+    let (response, reference) = match dof_names::dofs(variable.own_name()) {
+        (Some(response), Some(reference)) => (Some(response), Some(reference)),
+        _ => (None, None),
+    };
+    FrfRecord {
+        name,
+        response,
+        reference,
+        quantity: quantity(variable),
+        frequency_hz: axis.to_vec(),
+        value,
+        coherence: None,
+    }
+}
+
 fn names<'a>(variables: impl ExactSizeIterator<Item = &'a Variable>) -> String {
     let count = variables.len();
     let mut shown: Vec<&str> = variables.take(SHOWN).map(|v| v.name.as_str()).collect();
@@ -134,89 +375,198 @@ fn names<'a>(variables: impl ExactSizeIterator<Item = &'a Variable>) -> String {
     shown.join(", ")
 }
 
+/// A frequency axis: a variable of its own, or made of start and step.
+struct Axis {
+    name: String,
+    hz: Vec<f64>,
+    /// Only variables that lie in this struct.
+    within: Option<String>,
+}
+
+/// All frequency axes: variables named so, start and step as scalars, and, where complex arrays have none of those, a
+/// rising vector of their length.
+fn frequency_axes(
+    variables: &[Variable],
+    used: &mut [bool],
+    budget: &mut Budget,
+    notes: &mut Notes,
+) -> Result<Vec<Axis>, InputError> {
+    let mut axes = Vec::new();
+    for (k, variable) in variables.iter().enumerate() {
+        let Some(factor) = variable
+            .frequency_factor()
+            .filter(|_| !used[k] && variable.is_axis() && variable.re[0] >= 0.0)
+        else {
+            continue;
+        };
+        used[k] = true;
+        if factor != 1.0 {
+            notes.about(&variable.name, "taken as circular frequency, rad/s");
+        }
+        axes.push(Axis {
+            name: variable.name.clone(),
+            hz: variable.re.iter().map(|f| f * factor).collect(),
+            within: None,
+        });
+    }
+    let steps: Vec<usize> = (0..variables.len())
+        .filter(|k| variables[*k].is_frequency_step())
+        .collect();
+    for k in steps {
+        let (Some(step), root) = (variables[k].scalar().filter(|s| *s > 0.0), variables[k].root()) else {
+            continue;
+        };
+        let inside = |v: &&Variable| v.root() == root;
+        let start = variables.iter().filter(inside).find(|v| v.is_frequency_start());
+        let lengths = variables
+            .iter()
+            .filter(inside)
+            .filter(|v| v.im.is_some())
+            .flat_map(|v| v.size.iter().copied());
+        let Some(length) = lengths.max().filter(|n| *n >= MIN_AXIS) else {
+            continue;
+        };
+        budget.take(8 * length, "a frequency axis")?;
+        let first = start.and_then(Variable::scalar).unwrap_or(0.0);
+        notes.about(
+            &variables[k].name,
+            format!("frequency axis of {length} lines from {first} Hz in steps of {step} Hz"),
+        );
+        for (k, v) in variables.iter().enumerate() {
+            used[k] |= v.root() == root && (v.is_frequency_start() || v.is_frequency_step());
+        }
+        axes.push(Axis {
+            name: variables[k].name.clone(),
+            hz: (0..length).map(|i| first + step * i as f64).collect(),
+            within: Some(root.to_owned()),
+        });
+    }
+    // The only rising vector that fits, whatever its name.
+    for (k, variable) in variables.iter().enumerate() {
+        let is_complex_vector = !used[k] && variable.im.is_some() && !variable.size.is_empty();
+        let has_axis = |a: &Axis| variable.size.contains(&a.hz.len());
+        if !is_complex_vector || axes.iter().any(has_axis) {
+            continue;
+        }
+        let fits = |(j, v): &(usize, &Variable)| {
+            !used[*j]
+                && v.im.is_none()
+                && v.is_vector()
+                && v.re[0] >= 0.0
+                && variable.size.contains(&v.re.len())
+                && !v.is_called_signal()
+                && rises_evenly(&v.re)
+                && v.re[1] - v.re[0] > SAMPLE_STEP_S
+        };
+        let mut candidates = variables.iter().enumerate().filter(fits);
+        if let (Some((j, axis)), None) = (candidates.next(), candidates.next()) {
+            used[j] = true;
+            notes.about(
+                &axis.name,
+                "the only rising vector as long as the FRFs: taken as frequency in Hz",
+            );
+            axes.push(Axis {
+                name: axis.name.clone(),
+                hz: axis.re.clone(),
+                within: None,
+            });
+        }
+    }
+    Ok(axes)
+}
+
 /// FRFs, coherences and spectra on the frequency axes.
 fn frequency_functions(
     variables: &[Variable],
     used: &mut [bool],
     contents: &mut Contents,
+    budget: &mut Budget,
     notes: &mut Notes,
-) {
-    let is_frequency = |v: &Variable| {
-        v.is_axis()
-            && v.re[0] >= 0.0
-            && (v.mentions(&["freq"]) || v.is_called(&["f", "hz", "f_hz", "fhz", "fvec", "faxis", "f_axis"]))
-    };
-    let mut coherences: Vec<(&Variable, Vec<usize>, &Variable)> = Vec::new();
-    for a in 0..variables.len() {
-        let axis = &variables[a];
-        if !is_frequency(axis) {
-            continue;
-        }
-        used[a] = true;
+) -> Result<(), InputError> {
+    let axes = frequency_axes(variables, used, budget, notes)?;
+    let mut coherences: Vec<(&Variable, Vec<usize>, &Axis)> = Vec::new();
+    for axis in &axes {
         for k in 0..variables.len() {
             let variable = &variables[k];
-            if used[k] || is_frequency(variable) {
+            let elsewhere = axis.within.as_ref().is_some_and(|root| root != variable.root());
+            if used[k] || elsewhere || variable.name == axis.name {
                 continue;
             }
-            let Some(vectors) = variable.along(axis.re.len()) else {
+            let kind = kind(variable);
+            if matches!(kind, Kind::Unknown) {
+                continue;
+            }
+            let Some(vectors) = variable.along(axis.hz.len()) else {
                 continue;
             };
-            let kind = kind(variable);
+            // Frequencies, values and indices of each, and the record itself.
+            let memory = 40 * variable.re.len() + 512 * vectors.len();
+            budget.take(memory, &format!("variable {}", variable.name))?;
+            used[k] = true;
             for (suffix, at) in vectors {
                 let value = || at.iter().map(|&i| complex(variable, i)).collect::<Vec<_>>();
                 match kind {
                     Kind::Frf => {
-                        used[k] = true;
-                        let record = FrfRecord {
-                            name: format!("{}{suffix}", variable.name),
-                            response: None,
-                            reference: None,
-                            quantity: quantity(variable),
-                            frequency_hz: axis.re.clone(),
-                            value: value(),
-                            coherence: None,
-                        };
-                        contents.frfs.extend(checks::tidy_frf(record, notes));
+                        let record =
+                            record(variable, format!("{}{suffix}", variable.name), &axis.hz, value());
+                        contents.frfs.extend(checks::tidy_frf(record, notes)?);
                     }
-                    Kind::Coherence => {
-                        used[k] = true;
-                        coherences.push((variable, at, axis));
-                    }
-                    Kind::Other(kind) => {
-                        used[k] = true;
-                        contents.others.push(OtherRecord {
-                            kind,
-                            name: format!("{}{suffix}", variable.name),
-                            abscissa: axis.re.clone(),
-                            abscissa_unit: "Hz".into(),
-                            value: value(),
-                            unit: String::new(),
-                        });
-                    }
+                    Kind::Coherence => coherences.push((variable, at, axis)),
+                    Kind::Other(kind) => contents.others.push(OtherRecord {
+                        kind,
+                        name: format!("{}{suffix}", variable.name),
+                        abscissa: axis.hz.clone(),
+                        abscissa_unit: "Hz".into(),
+                        value: value(),
+                        unit: String::new(),
+                    }),
                     Kind::Unknown => {}
                 }
             }
         }
     }
-    // A coherence goes to the FRF with the same name but for that word, or to the only one there is.
     for (variable, at, axis) in coherences {
-        let word = |w: &String| !["coh", "coherence", "gamma2"].contains(&w.as_str());
-        let bare: Vec<String> = variable.words().into_iter().filter(word).collect();
-        let only = contents.frfs.len() == 1;
-        let frf = contents.frfs.iter_mut().find(|frf| {
-            let source = variables.iter().find(|v| v.name == frf.name);
-            frf.coherence.is_none() && (only || source.is_some_and(|s| s.words() == bare))
-        });
         let values: Vec<f64> = at.iter().map(|&i| variable.re[i]).collect();
-        match frf {
-            Some(frf) => {
-                frf.coherence = checks::on_lines(&frf.frequency_hz, &axis.re, &values);
-                if frf.coherence.is_none() {
-                    notes.about(&variable.name, "coherence outside 0..1: left out");
-                }
-            }
-            None => notes.about(&variable.name, "a coherence that belongs to no FRF: left out"),
+        attach(variable, &axis.hz, &values, variables, contents, notes);
+    }
+    let finite =
+        |o: &OtherRecord| o.value.iter().all(|v| v.is_finite()) && o.abscissa.iter().all(|v| v.is_finite());
+    contents.others.retain(|o| {
+        let kept = finite(o);
+        if !kept {
+            notes.about(&o.name, "values that are not numbers: left out");
         }
+        kept
+    });
+    Ok(())
+}
+
+/// A coherence goes to the FRF with the same name but for that word (`H1_2` and `C1_2`), or to the only one there is.
+fn attach(
+    variable: &Variable,
+    axis_hz: &[f64],
+    values: &[f64],
+    variables: &[Variable],
+    contents: &mut Contents,
+    notes: &mut Notes,
+) {
+    let word = |w: &String| !["coh", "coherence", "gamma2"].contains(&w.as_str());
+    let bare: Vec<String> = variable.words().into_iter().filter(word).collect();
+    let digits = |v: &Variable| v.is_analyser_name().then(|| v.own_name()[1..].to_owned());
+    let only = contents.frfs.len() == 1;
+    let frf = contents.frfs.iter_mut().find(|frf| {
+        let source = variables.iter().find(|v| v.name == frf.name);
+        let same = |s: &Variable| s.words() == bare || digits(s).is_some() && digits(s) == digits(variable);
+        frf.coherence.is_none() && (only || source.is_some_and(same))
+    });
+    match frf {
+        Some(frf) => {
+            frf.coherence = checks::on_lines(&frf.frequency_hz, axis_hz, values);
+            if frf.coherence.is_none() {
+                notes.about(&variable.name, "coherence outside 0..1: left out");
+            }
+        }
+        None => notes.about(&variable.name, "a coherence that belongs to no FRF: left out"),
     }
 }
 
@@ -229,13 +579,18 @@ enum Kind {
 }
 
 fn kind(variable: &Variable) -> Kind {
-    if variable.mentions(&["coh", "gamma2"]) {
+    let letter = variable
+        .own_name()
+        .chars()
+        .next()
+        .filter(|_| variable.is_analyser_name());
+    if variable.mentions(&["coh", "gamma2"]) || letter == Some('C') {
         Kind::Coherence
     } else if variable.mentions(&["cross", "csd"]) {
         Kind::Other("cross spectrum")
     } else if variable.mentions(&["psd"]) {
         Kind::Other("power spectral density")
-    } else if variable.mentions(&["spec", "fft"]) {
+    } else if variable.mentions(&["spec", "fft"]) || matches!(letter, Some('G' | 'S')) {
         Kind::Other("spectrum")
     } else if variable.im.is_some() {
         Kind::Frf
@@ -261,7 +616,12 @@ fn complex(variable: &Variable, at: usize) -> Complex64 {
 }
 
 /// Real arrays along a time axis, or, where there is only a sampling rate, along the longest dimension there is.
-fn time_signals(variables: &[Variable], used: &mut [bool], notes: &mut Notes) -> Vec<TimeRecord> {
+fn time_signals(
+    variables: &[Variable],
+    used: &mut [bool],
+    budget: &mut Budget,
+    notes: &mut Notes,
+) -> Result<Vec<TimeRecord>, InputError> {
     let mut records = Vec::new();
     let rate = variables.iter().enumerate().find_map(|(k, v)| {
         let scalar = v.scalar().filter(|s| *s > 0.0)?;
@@ -275,17 +635,23 @@ fn time_signals(variables: &[Variable], used: &mut [bool], notes: &mut Notes) ->
         }
     });
     let is_time = |v: &Variable| {
-        v.is_axis()
-            && (v.is_called(&["t", "zeit", "t_s", "tvec"]) || v.own_name().to_lowercase().starts_with("time"))
+        v.im.is_none()
+            && v.is_vector()
+            && v.re.len() >= MIN_AXIS
+            && v.re.iter().all(|t| t.is_finite())
+            && (v.is_called(&["t", "zeit", "t_s", "tvec", "time", "time_s"])
+                || v.is_axis() && v.own_name().to_lowercase().starts_with("time"))
     };
-    let mut axes: Vec<(usize, f64, f64)> = Vec::new();
+    // Length, rate, start, and times with their grid where they are uneven.
+    let mut axes: Vec<(usize, f64, f64, Option<(&[f64], Grid)>)> = Vec::new();
     for (axis, _) in variables
         .iter()
         .zip(used.iter())
         .filter(|(v, u)| !**u && is_time(v))
     {
-        let length = axis.re.len();
-        let own = (axis.re[length - 1] - axis.re[0]) / (length - 1) as f64;
+        let times = axis.re.as_slice();
+        let length = times.len();
+        let own = (times[length - 1] - times[0]) / (length - 1) as f64;
         // The rate is exact where the axis was stored in single precision.
         let said = rate
             .map(|(_, r)| 1.0 / r)
@@ -293,10 +659,20 @@ fn time_signals(variables: &[Variable], used: &mut [bool], notes: &mut Notes) ->
         let step = said.unwrap_or(own);
         // Times summed up in single precision drift off the grid, but every step is one.
         let even = |w: &[f64]| ((w[1] - w[0]) / step - 1.0).abs() < UNEVEN;
-        if axis.re.windows(2).all(even) {
-            axes.push((length, 1.0 / step, axis.re[0]));
-        } else {
-            notes.about(&axis.name, "times are not evenly spaced: left out");
+        if said.is_some() && times.windows(2).all(even) {
+            axes.push((length, 1.0 / step, times[0], None));
+            continue;
+        }
+        match clock::look(times, 1e-6 * times[length - 1].abs()) {
+            Ok(Stamps::Even(grid)) => axes.push((length, grid.rate_hz, grid.start_s, None)),
+            Ok(Stamps::Uneven(grid, told)) => {
+                notes.about(&axis.name, told);
+                axes.push((length, grid.rate_hz, grid.start_s, Some((times, grid))));
+            }
+            Err(problem) => notes.about(
+                &axis.name,
+                format!("times are not evenly spaced ({problem}): left out"),
+            ),
         }
     }
     for (k, variable) in variables.iter().enumerate() {
@@ -310,12 +686,12 @@ fn time_signals(variables: &[Variable], used: &mut [bool], notes: &mut Notes) ->
             .zip(used.iter())
             .filter(|(v, u)| !**u && v.im.is_none());
         let longest = free.flat_map(|(v, _)| v.size.iter().copied()).max();
-        axes.extend(longest.filter(|n| *n >= MIN_AXIS).map(|n| (n, rate, 0.0)));
+        axes.extend(longest.filter(|n| *n >= MIN_AXIS).map(|n| (n, rate, 0.0, None)));
     }
     if let Some((k, _)) = rate.filter(|_| !axes.is_empty()) {
         used[k] = true;
     }
-    for (length, rate, start_s) in axes {
+    for (length, rate, start_s, uneven) in axes {
         for (k, variable) in variables.iter().enumerate() {
             if used[k] || variable.im.is_some() || variable.re.iter().any(|x| !x.is_finite()) {
                 continue;
@@ -323,16 +699,23 @@ fn time_signals(variables: &[Variable], used: &mut [bool], notes: &mut Notes) ->
             let Some(vectors) = variable.along(length) else {
                 continue;
             };
+            budget.take(
+                24 * variable.re.len() + 512 * vectors.len(),
+                &format!("variable {}", variable.name),
+            )?;
             used[k] = true;
             for (suffix, at) in vectors {
-                let samples = at.iter().map(|&i| variable.re[i]).collect();
+                let mut samples: Vec<f64> = at.iter().map(|&i| variable.re[i]).collect();
+                if let Some((times, grid)) = uneven {
+                    samples = clock::resample(times, &samples, grid);
+                }
                 let name = format!("{}{suffix}", variable.name);
-                let channel = waveform::channel(name, String::new(), samples, notes);
-                waveform::put(&mut records, rate, start_s, channel);
+                let channel = waveform::channel(name, String::new(), samples, notes)?;
+                waveform::put(&mut records, rate, start_s, channel)?;
             }
         }
     }
-    records
+    Ok(records)
 }
 
 #[cfg(test)]
@@ -369,7 +752,7 @@ mod tests {
             real("PSD_1", &[6, 1], count(6)),
             real("odd", &[3, 1], count(3)),
         ];
-        let found = contents(all, &mut notes).unwrap();
+        let found = contents(all, &mut Budget::for_file(0), &mut notes).unwrap();
         let names: Vec<&str> = found.frfs.iter().map(|f| f.name.as_str()).collect();
         assert_eq!(names, ["FRF(1,:)", "FRF(2,:)", "H_chan_2_accel"]);
         assert_eq!(found.frfs[1].value[2], Complex64::new(5.0, 0.5));
@@ -391,17 +774,87 @@ mod tests {
             real("fs", &[1, 1], vec![10.0]),
             real("fx_n", &[8, 1], count(8)),
         ];
-        let found = contents(all.clone(), &mut Notes::default()).unwrap();
+        let found = contents(all.clone(), &mut Budget::for_file(0), &mut Notes::default()).unwrap();
         assert_eq!(found.times.len(), 1);
         assert_eq!(found.times[0].sample_rate_hz, 10.0);
         assert_eq!(
             found.times[0].channels[0].role,
             super::super::super::ChannelRole::ForceX
         );
-        let found = contents(all[1..].to_vec(), &mut Notes::default()).unwrap();
+        let found = contents(all[1..].to_vec(), &mut Budget::for_file(0), &mut Notes::default()).unwrap();
         assert_eq!((found.times[0].sample_rate_hz, found.times[0].len()), (10.0, 8));
-        let error = contents(all[2..].to_vec(), &mut Notes::default()).unwrap_err();
+        let error = contents(all[2..].to_vec(), &mut Budget::for_file(0), &mut Notes::default()).unwrap_err();
         assert!(error.problem.contains("fx_n"), "{error}");
-        assert!(contents(Vec::new(), &mut Notes::default()).is_err());
+        assert!(contents(Vec::new(), &mut Budget::for_file(0), &mut Notes::default()).is_err());
+    }
+
+    fn found(variables: Vec<Variable>) -> (Contents, Vec<String>) {
+        let mut notes = Notes::default();
+        let found = contents(variables, &mut Budget::for_file(0), &mut notes).unwrap();
+        (found, notes.into_warnings())
+    }
+
+    #[test]
+    fn arrays_with_their_axis_in_the_first_column() {
+        let table =
+            |name: &str, columns: &[&[f64]]| real(name, &[columns[0].len(), columns.len()], columns.concat());
+        let f = [0.0, 2.0, 4.0, 6.0, 8.0];
+        let mut h = table("H1_2", &[&f, &[1.0, 2.0, 3.0, 4.0, 5.0]]);
+        h.im = Some([[0.0; 5], [-1.0; 5]].concat());
+        let c = table("C1_2", &[&f, &[0.5; 5]]);
+        let g = table("G1_1", &[&f, &[9.0; 5]]);
+        let x = table(
+            "X1",
+            &[&[0.0, 0.001, 0.002, 0.003, 0.004], &[1.0, 2.0, 3.0, 4.0, 5.0]],
+        );
+        let frf = table("frf_tip", &[&f, &[1.0; 5], &[-2.0; 5]]);
+        let (found, _) = found(vec![h, c, g, x, frf]);
+        assert_eq!(found.frfs.len(), 2);
+        assert_eq!(
+            (found.frfs[0].name.as_str(), found.frfs[0].frequency_hz.as_slice()),
+            ("H1_2", &f[..])
+        );
+        assert_eq!(found.frfs[0].value[2], Complex64::new(3.0, -1.0));
+        assert_eq!(found.frfs[0].coherence.as_deref(), Some(&[0.5; 5][..]));
+        assert_eq!(found.frfs[1].value[0], Complex64::new(1.0, -2.0));
+        assert_eq!((found.others.len(), found.times.len()), (1, 1));
+        approx::assert_relative_eq!(found.times[0].sample_rate_hz, 1000.0, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn axes_of_start_and_step_of_their_own_or_in_radians() {
+        let complex = |name: &str, n: usize| {
+            let mut v = real(name, &[n, 1], count(n));
+            v.im = Some(vec![-1.0; n]);
+            v
+        };
+        let scalar = |name: &str, value: f64| real(name, &[1, 1], vec![value]);
+        let (by_step, _) = found(vec![
+            complex("H_3Z_1X", 6),
+            scalar("f_start", 5.0),
+            scalar("df", 0.5),
+        ]);
+        assert_eq!(by_step.frfs[0].frequency_hz, [5.0, 5.5, 6.0, 6.5, 7.0, 7.5]);
+        assert_eq!(
+            by_step.frfs[0].response.map(|d| d.to_string()).as_deref(),
+            Some("3Z")
+        );
+        let structs = vec![
+            complex("sig.y_values.values", 5),
+            scalar("sig.x_values.start_value", 1.0),
+            scalar("sig.x_values.increment", 2.0),
+        ];
+        assert_eq!(found(structs).0.frfs[0].frequency_hz, [1.0, 3.0, 5.0, 7.0, 9.0]);
+        let own = vec![complex("H", 5), real("ax1", &[5, 1], count(5))];
+        let (own, told) = found(own);
+        assert_eq!(own.frfs[0].frequency_hz, count(5));
+        assert!(told.iter().any(|t| t.contains("only rising vector")), "{told:?}");
+        let radians = vec![complex("H", 5), real("omega", &[5, 1], count(5))];
+        approx::assert_relative_eq!(
+            found(radians).0.frfs[0].frequency_hz[4],
+            4.0 / (2.0 * std::f64::consts::PI)
+        );
+        let parts = vec![real("H", &[5, 2], vec![1.0; 10]), real("f", &[5, 1], count(5))];
+        assert_eq!(found(parts).0.frfs[0].value[0], Complex64::new(1.0, 1.0));
     }
 }

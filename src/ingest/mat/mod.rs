@@ -1,11 +1,13 @@
-//! MATLAB files: v5 (to v7) by the crate `matfile`, v7.3 (HDF5) by `hdf5-pure`. Both become a list of named arrays;
-//! [`interpret`] says which of them are FRFs, coherences and time signals.
+//! MATLAB files: [`v5`] (to v7) and v7.3 ([`hdf5`]). Both become a list of named arrays; [`interpret`] says which of them
+//! are FRFs, coherences and time signals.
 
+use super::budget::Budget;
 use super::text::Notes;
 use super::{Contents, InputError};
 
+mod hdf5;
 mod interpret;
-mod read;
+mod v5;
 
 /// A numeric array, column by column as MATLAB holds it.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,14 +26,13 @@ pub(super) fn looks_like_v5(bytes: &[u8]) -> bool {
 
 /// An HDF5 file with MATLAB's block before it, or bare.
 pub(super) fn looks_like_v73(bytes: &[u8]) -> bool {
-    const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
-    bytes.starts_with(SIGNATURE) || bytes.get(512..520) == Some(SIGNATURE)
+    hdf5::looks_like(bytes)
 }
 
-pub(super) fn read_v5(bytes: &[u8], notes: &mut Notes) -> Result<Contents, InputError> {
-    interpret::contents(read::v5(bytes)?, notes)
+pub(super) fn read_v5(bytes: &[u8], budget: &mut Budget, notes: &mut Notes) -> Result<Contents, InputError> {
+    interpret::contents(v5::read(bytes, budget, notes)?, budget, notes)
 }
 
-pub(super) fn read_v73(bytes: &[u8], notes: &mut Notes) -> Result<Contents, InputError> {
-    interpret::contents(read::v73(bytes, notes)?, notes)
+pub(super) fn read_v73(bytes: &[u8], budget: &mut Budget, notes: &mut Notes) -> Result<Contents, InputError> {
+    interpret::contents(hdf5::read(bytes, budget, notes)?, budget, notes)
 }

@@ -2,7 +2,7 @@
 
 use super::super::InputError;
 use super::super::text::{Lines, Notes};
-use super::dataset58::Form;
+use super::dataset58::{Form, too_short};
 use super::is_separator;
 
 /// The number line of a 58b: `FORMAT(I6,1A1,I6,I6,I12,I12,…)`.
@@ -61,7 +61,7 @@ pub(super) fn read_binary(
     header: BinaryHeader,
     title: &str,
     notes: &mut Notes,
-) -> Vec<f64> {
+) -> Result<Vec<f64>, InputError> {
     let data = lines.rest();
     let value_width = if form.double { 8 } else { 4 };
     // Uneven double precision: the abscissa stays single as in ASCII (E13.5); some writers make it double too.
@@ -78,7 +78,7 @@ pub(super) fn read_binary(
     let by_closing = || layouts.clone().find(|&(.., size)| closes_at(data, size));
     let Some((abscissa, width, expected)) = by_count.or_else(by_closing).or_else(|| layouts.clone().next())
     else {
-        return Vec::new();
+        return Ok(Vec::new());
     };
     let fits = |size: usize| size > 0 && size <= data.len();
     let size = if closes_at(data, expected) || !(fits(header.bytes) && closes_at(data, header.bytes)) {
@@ -103,12 +103,7 @@ pub(super) fn read_binary(
         }
     }
     if points < announced {
-        let why = if size == data.len() {
-            "the file ends within the data"
-        } else {
-            "fewer values than announced"
-        };
-        notes.about(title, format!("{why}: {points} of {announced} points"));
+        return Err(too_short(title, points, announced, size == data.len()).line(lines.number));
     }
     let end = lines.position + size;
     if closes_at(data, size) {
@@ -116,12 +111,10 @@ pub(super) fn read_binary(
         // The separator may follow the data directly or on a line of its own.
         while lines.next().is_some_and(|line| !is_separator(line)) {}
     } else {
-        if points == announced {
-            notes.about(title, "the closing -1 is missing after the binary data");
-        }
+        notes.about(title, "the closing -1 is missing after the binary data");
         lines.position = next_opening(lines.bytes, end);
     }
-    numbers
+    Ok(numbers)
 }
 
 /// True where the closing separator comes at `at`, blanks and line ends before it allowed.

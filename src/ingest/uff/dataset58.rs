@@ -178,6 +178,14 @@ pub(super) fn read(
         ordinate: Ordinate::Real(Vec::new()),
     };
     let title = dataset.title();
+    if form.even && announced > 1 && !(step > 0.0) && EVENLY_SPACED.contains(&function_type) {
+        return Err(InputError::new(format!(
+            "{}: dataset 58 with a spacing of {step} (record 7): frequencies and times must rise",
+            named(&title)
+        ))
+        .line(first + 7)
+        .remedy("export it again; a spacing of 0 is what some programs write where they mean uneven data"));
+    }
     let numbers = match binary {
         None => read_ascii(lines, form, announced, &title, notes)?,
         Some(line) => {
@@ -186,7 +194,7 @@ pub(super) fn read(
             for _ in 11..binary.header_lines.clamp(11, 100) {
                 lines.next();
             }
-            read_binary(lines, form, announced, binary, &title, notes)
+            read_binary(lines, form, announced, binary, &title, notes)?
         }
     };
     let points = numbers.chunks_exact(form.numbers_per_point());
@@ -204,6 +212,32 @@ pub(super) fn read(
         return Ok(None);
     }
     Ok(Some(dataset))
+}
+
+/// Function types whose abscissa is used: time response, FRF, coherence.
+const EVENLY_SPACED: [i32; 3] = [1, 4, 6];
+
+fn named(title: &str) -> &str {
+    if title.is_empty() {
+        "a record without name"
+    } else {
+        title
+    }
+}
+
+/// A record with fewer points than it announces: where they are missing is not known, so every later one may stand at a
+/// wrong frequency or time.
+pub(super) fn too_short(title: &str, found: usize, announced: usize, at_end: bool) -> InputError {
+    let why = if at_end {
+        "the file ends within its data"
+    } else {
+        "lines of it are lost"
+    };
+    InputError::new(format!(
+        "{}: dataset 58 announces {announced} points and holds {found}: {why}",
+        named(title)
+    ))
+    .remedy("export or copy the file again")
 }
 
 fn clip(text: &str) -> String {
@@ -371,26 +405,19 @@ fn read_ascii(
     let read = numbers.len();
     // Some writers fill the last line up with zeros: at most a line's worth.
     let padding = if form.double { 4 } else { 6 };
-    if read > wanted && read - wanted >= padding {
+    if read < wanted {
+        return Err(too_short(title, read / per_point, announced, !closed).line(lines.number));
+    }
+    if !closed {
+        notes.about(
+            title,
+            "the closing -1 is missing: the file may have been cut off behind this record",
+        );
+    }
+    if read - wanted >= padding {
         notes.about(
             title,
             format!("more values than the {announced} points announced: the rest is left out"),
-        );
-    } else if !closed {
-        notes.about(
-            title,
-            format!(
-                "the file ends within the data: {} of {announced} points",
-                read / per_point
-            ),
-        );
-    } else if read < wanted {
-        notes.about(
-            title,
-            format!(
-                "fewer values than announced: {} of {announced} points",
-                read / per_point
-            ),
         );
     }
     numbers.truncate(wanted.min(read / per_point * per_point));

@@ -3,10 +3,13 @@
 use num_complex::Complex64;
 
 use super::super::checks;
-use super::super::force::{is_uniform, role_of};
+use super::super::clock::{self, Stamps};
+use super::super::force::role_of;
 use super::super::text::Notes;
 use super::super::units::{self, Unit};
-use super::super::{Axis, Channel, ChannelRole, Contents, Dof, FrfRecord, OtherRecord, Quantity, TimeRecord};
+use super::super::{
+    Axis, Channel, ChannelRole, Contents, Dof, FrfRecord, InputError, OtherRecord, Quantity, TimeRecord,
+};
 use super::{Dataset58, EntityDof, FileUnits, Found, Ordinate, UnitAxis};
 
 /// Function types of record 6.
@@ -54,14 +57,16 @@ const REACTION_FORCE: i32 = 9;
 const TIME: i32 = 17;
 const FREQUENCY: i32 = 18;
 
-pub(super) fn contents(found: Vec<Found>, notes: &mut Notes) -> Contents {
+pub(super) fn contents(found: Vec<Found>, notes: &mut Notes) -> Result<Contents, InputError> {
     let mut contents = Contents::default();
     let mut coherences = Vec::new();
     for Found { dataset, units } in found {
         let abscissa = dataset.axes[0].kind;
         match dataset.function_type {
-            FRF if matches!(abscissa, FREQUENCY | 0 | 1) => contents.frfs.extend(frf(&dataset, units, notes)),
-            TIME_RESPONSE if matches!(abscissa, TIME | 0 | 1) => time(&dataset, units, &mut contents, notes),
+            FRF if matches!(abscissa, FREQUENCY | 0 | 1) => {
+                contents.frfs.extend(frf(&dataset, units, notes)?)
+            }
+            TIME_RESPONSE if matches!(abscissa, TIME | 0 | 1) => time(&dataset, units, &mut contents, notes)?,
             COHERENCE => coherences.push(dataset),
             FRF => {
                 notes.about(
@@ -76,7 +81,7 @@ pub(super) fn contents(found: Vec<Found>, notes: &mut Notes) -> Contents {
     for dataset in coherences {
         attach_coherence(dataset, &mut contents, notes);
     }
-    contents
+    Ok(contents)
 }
 
 fn other(dataset: &Dataset58) -> OtherRecord {
@@ -105,7 +110,11 @@ fn complex(ordinate: &Ordinate) -> Vec<Complex64> {
     }
 }
 
-fn frf(dataset: &Dataset58, file_units: Option<FileUnits>, notes: &mut Notes) -> Option<FrfRecord> {
+fn frf(
+    dataset: &Dataset58,
+    file_units: Option<FileUnits>,
+    notes: &mut Notes,
+) -> Result<Option<FrfRecord>, InputError> {
     let response = dof(&dataset.response, notes);
     let reference = dof(&dataset.reference, notes);
     let name = match (response, reference) {
@@ -213,9 +222,9 @@ fn frf_quantity(
     notes: &mut Notes,
 ) -> (Option<Quantity>, f64) {
     let [_, numerator, denominator, _] = &dataset.axes;
-    let label_unit = units::parse(&numerator.unit);
+    let label_unit = units::parse_named(&numerator.unit);
     for axis in [numerator, denominator] {
-        if units::parse(&axis.unit).is_none() && !units::is_blank(&axis.unit) {
+        if units::parse_named(&axis.unit).is_none() && !units::is_blank(&axis.unit) {
             notes.about(name, format!("unit {:?} not understood, SI assumed", axis.unit));
         }
     }
@@ -296,7 +305,7 @@ fn unit_quantity(
         // The label is the whole ratio: `(m/s)/N`.
         (Some(quantity), unit.factor)
     } else {
-        let force = match units::parse(&denominator.unit) {
+        let force = match units::parse_named(&denominator.unit) {
             Some(force) if force.dimension == units::Dimension::FORCE => force.factor,
             Some(_) => return (None, unit.factor),
             None => file_units.map_or_else(
@@ -355,7 +364,7 @@ fn factor_of_file(
         }
         return 1.0;
     }
-    let force = units::parse(&denominator.unit).filter(|u| u.dimension == units::Dimension::FORCE);
+    let force = units::parse_named(&denominator.unit).filter(|u| u.dimension == units::Dimension::FORCE);
     let factor = 1.0 / units.length / force.map_or(1.0 / units.force, |f| f.factor);
     if (factor - 1.0).abs() > 1e-6 {
         notes.about(
@@ -367,32 +376,46 @@ fn factor_of_file(
 }
 
 /// One time response: joins the record that has the same time axis, or starts one.
-fn time(dataset: &Dataset58, file_units: Option<FileUnits>, contents: &mut Contents, notes: &mut Notes) {
+fn time(
+    dataset: &Dataset58,
+    file_units: Option<FileUnits>,
+    contents: &mut Contents,
+    notes: &mut Notes,
+) -> Result<(), InputError> {
     let name = dataset.title();
     let Ordinate::Real(values) = &dataset.ordinate else {
         notes.about(
             &name,
             "time signal of complex numbers: kept as it stands, not used",
         );
-        return contents.others.push(other(dataset));
+        contents.others.push(other(dataset));
+        return Ok(());
     };
-    let abscissa = dataset.abscissa_values();
     let seconds = units::parse(&dataset.axes[0].unit).filter(|u| u.dimension == units::Dimension::TIME);
     let seconds = seconds.map_or(1.0, |u| u.factor);
-    let step = match abscissa.as_slice() {
-        [first, .., last] => (last - first) / (abscissa.len() - 1) as f64 * seconds,
-        _ => 0.0,
+    let times_s: Vec<f64> = dataset.abscissa_values().iter().map(|t| t * seconds).collect();
+    let stamps = match times_s.iter().all(|t| t.is_finite()) {
+        true => clock::look(&times_s, clock::six_digits(&times_s)),
+        false => Err("times that are not numbers".into()),
     };
-    if !(step > 0.0 && step.is_finite() && step.recip().is_finite() && is_uniform(&abscissa, step / seconds))
-    {
-        notes.about(
-            &name,
-            "time signal without uniform sampling: kept as it stands, not used",
-        );
-        return contents.others.push(other(dataset));
-    }
+    let (grid, values) = match stamps {
+        Ok(Stamps::Even(grid)) => (grid, values.clone()),
+        Ok(Stamps::Uneven(grid, told)) => {
+            notes.about(&name, told);
+            (grid, clock::resample(&times_s, values, grid))
+        }
+        Err(problem) => {
+            notes.about(
+                &name,
+                format!("time signal without uniform sampling ({problem}): kept as it stands, not used"),
+            );
+            contents.others.push(other(dataset));
+            return Ok(());
+        }
+    };
+    let step = 1.0 / grid.rate_hz;
     let axis = &dataset.axes[1];
-    let unit = units::parse(&axis.unit);
+    let unit = units::parse_named(&axis.unit);
     let factor = match (unit, file_units) {
         (Some(unit), _) => unit.factor,
         (None, Some(units)) if units::is_blank(&axis.unit) => match axis.kind {
@@ -407,8 +430,11 @@ fn time(dataset: &Dataset58, file_units: Option<FileUnits>, contents: &mut Conte
     };
     let samples: Vec<f64> = values.iter().map(|v| v * factor).collect();
     if samples.iter().any(|v| !v.is_finite()) {
-        return notes.about(&name, "time signal with values that are not numbers: left out");
+        notes.about(&name, "time signal with values that are not numbers: left out");
+        return Ok(());
     }
+    checks::plausible_samples(&name, &samples)?;
+    checks::plausible_clock(&name, grid.rate_hz, grid.start_s)?;
     let by_direction = match (axis.kind, dataset.response.direction) {
         (EXCITATION_FORCE | REACTION_FORCE, 1) => Some(ChannelRole::ForceX),
         (EXCITATION_FORCE | REACTION_FORCE, 2) => Some(ChannelRole::ForceY),
@@ -426,7 +452,7 @@ fn time(dataset: &Dataset58, file_units: Option<FileUnits>, contents: &mut Conte
         file_unit: axis.unit.clone(),
         samples,
     };
-    let start_s = abscissa.first().copied().unwrap_or(0.0) * seconds;
+    let start_s = grid.start_s;
     let same = |record: &&mut TimeRecord| {
         record.len() == channel.samples.len()
             && (record.sample_rate_hz * step - 1.0).abs() < 1e-5
@@ -443,6 +469,7 @@ fn time(dataset: &Dataset58, file_units: Option<FileUnits>, contents: &mut Conte
             });
         }
     }
+    Ok(())
 }
 
 /// Sampling rate of a step printed with six digits (`E13.5`): the whole number of hertz where the rounding hides one.

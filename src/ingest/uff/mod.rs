@@ -171,7 +171,7 @@ pub(super) fn contents(
             .remedy("export the FRFs or time signals as dataset 58 (functions at nodal DOF)"),
         );
     }
-    Ok((summary, interpret::contents(file.found, notes)))
+    Ok((summary, interpret::contents(file.found, notes)?))
 }
 
 /// How many datasets of which form a file held.

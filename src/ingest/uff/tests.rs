@@ -171,11 +171,13 @@ fn a_separator_inside_the_header_is_no_separator() {
     );
     text = text.replace("01-JAN-26", "    -1");
     text += " -6.73633E-03 -4.45648E-03\n    -1";
-    let (contents, warnings) = contents_of(text.as_bytes());
+    let short = problem_of(text.as_bytes());
+    assert!(short.contains("announces 2508876 points and holds 2"), "{short}");
+    let whole = text.replace("   2508876", "         2");
+    let (contents, _) = contents_of(whole.as_bytes());
     let record = &contents.times[0];
     assert_eq!(record.channels[0].samples, [-6.73633e-3, -4.45648e-3]);
     assert_eq!(record.sample_rate_hz, 51200.0);
-    assert!(warnings[0].contains("2 of 2508876"), "{warnings:?}");
 }
 
 #[test]
@@ -228,13 +230,32 @@ fn more_values_than_announced_and_padding() {
 }
 
 #[test]
-fn a_file_cut_in_a_number_loses_that_line_only() {
+fn a_record_that_is_cut_off_is_an_error_with_both_counts() {
     let text = frf_file((8, "NONE", "m"), NEWTON);
     let line = "  1.00000e+00 -2.00000e+00\n  3.00000e+00 -4.0000";
     let cut = text[..text.find("  1.00000e+00 -2").unwrap()].to_owned() + line;
-    let (contents, warnings) = contents_of(cut.as_bytes());
-    assert_eq!(contents.frfs[0].value, [Complex64::new(1.0, -2.0)]);
-    assert!(warnings[0].contains("1 of 3"), "{warnings:?}");
+    let problem = problem_of(cut.as_bytes());
+    assert!(
+        problem.contains("1X/1X: dataset 58 announces 3 points and holds 1: the file ends"),
+        "{problem}"
+    );
+    let lost = text.replace("  3.00000e+00 -4.00000e+00  5.00000e+00 -6.00000e+00\n", "\n");
+    let problem = problem_of(lost.as_bytes());
+    assert!(
+        problem.contains("announces 3 points and holds 1: lines of it are lost"),
+        "{problem}"
+    );
+}
+
+#[test]
+fn a_spacing_that_does_not_rise_is_an_error() {
+    for spacing in ["0.00000e+00", "-5.00000e-01"] {
+        let text = frf_file((8, "NONE", "m"), NEWTON).replace("5.00000e-01", spacing);
+        assert!(
+            problem_of(text.as_bytes()).contains("1X/1X: dataset 58 with a spacing of"),
+            "{spacing}"
+        );
+    }
 }
 
 fn example() -> FrfRecord {
@@ -259,7 +280,9 @@ const LITTLE: Encoding58 = Encoding58 {
 
 #[test]
 fn binary_ends_in_all_their_ways() {
-    let bytes = uff58_bytes(&[frf_dataset(&example()), frf_dataset(&example())], LITTLE);
+    let mut other = example();
+    other.value[0].re = 3e-6;
+    let bytes = uff58_bytes(&[frf_dataset(&example()), frf_dataset(&other)], LITTLE);
     let end = bytes.len() - "    -1\n".len();
     for tail in [
         "    -1\n",
@@ -275,14 +298,10 @@ fn binary_ends_in_all_their_ways() {
             warnings.is_empty() && contents.frfs.len() == 2,
             "{tail:?}: {warnings:?}"
         );
-        assert_eq!(contents.frfs[1].value, example().value);
+        assert_eq!(contents.frfs[1].value, other.value);
     }
-    let (contents, warnings) = contents_of(&bytes[..end - 20]);
-    assert_eq!(
-        (contents.frfs[0].value.len(), contents.frfs[1].value.len()),
-        (4, 2)
-    );
-    assert!(warnings[0].contains("2 of 4"), "{warnings:?}");
+    let problem = problem_of(&bytes[..end - 20]);
+    assert!(problem.contains("announces 4 points and holds 2"), "{problem}");
 }
 
 #[test]

@@ -1,0 +1,403 @@
+//! Damaged input: small valid files, mutated from a seed, through every reader, the campaign file, the robot file and the
+//! log of revisions. A run may give an error; it may not panic, take long, take much memory, or give a number that is none.
+//!
+//! The short version runs with the other tests. The long one takes its limits from the environment:
+//! `FUZZ_SECONDS=3600 FUZZ_SEED=7 cargo test --release --test integration -- --ignored fuzz_for_long --nocapture`;
+//! `FUZZ_CORPUS` names a folder with further files to begin with. What was run is in reports/fuzz.md.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use lobestone::campaign::Campaign;
+use lobestone::campaign::robot_spec::RobotSpec;
+use lobestone::ingest::{self, Contents};
+use lobestone::revision::{RevisionLog, log_file};
+
+/// No input of some kilobytes takes so long, even on a busy machine.
+const LONGEST: Duration = Duration::from_secs(20);
+/// Memory that the process may have above what it began with: the budget of one small file twice, MB.
+const MEMORY_MB: u64 = 400;
+/// Longest mutated input.
+const MOST_BYTES: usize = 1 << 17;
+
+/// SplitMix64 (Steele, Lea and Flood 2014): the same inputs from the same seed on every machine.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// Below `n`; 0 for 0.
+    fn below(&mut self, n: usize) -> usize {
+        if n == 0 {
+            0
+        } else {
+            (self.next() % n as u64) as usize
+        }
+    }
+}
+
+const TOKENS: [&[u8]; 30] = [
+    b"nan",
+    b"inf",
+    b"-1",
+    b"    -1\n",
+    b"1e308",
+    b"-1e300",
+    b"1e-320",
+    b"0",
+    b"99999999999999999999",
+    b",",
+    b";",
+    b"\t",
+    b"\n",
+    b"\"",
+    b"\0",
+    b"\xff\xff\xff\xff",
+    b"\xff\xff\xff\x7f",
+    b"\x00\x00\x00\x80",
+    b"time",
+    b"frequency_hz",
+    b"58b",
+    b"2411",
+    b"[[frf]]\n",
+    b"= 1e300\n",
+    b"{\"a\":[",
+    b"TREE",
+    b"SNOD",
+    b"\x1b[2J",
+    b"\r",
+    b"0x7fffffff",
+];
+
+/// One to eight changes of one of the files.
+fn mutated(random: &mut Random, corpus: &[Vec<u8>]) -> Vec<u8> {
+    let mut bytes = corpus[random.below(corpus.len())].clone();
+    for _ in 0..1 + random.below(8) {
+        let at = random.below(bytes.len());
+        match random.below(10) {
+            0 if !bytes.is_empty() => bytes[at] ^= 1 << random.below(8),
+            1 if !bytes.is_empty() => bytes[at] = random.next() as u8,
+            2 => bytes.truncate(at),
+            3 => {
+                let end = (at + 1 + random.below(40)).min(bytes.len());
+                bytes.drain(at..end);
+            }
+            4 => {
+                let end = (at + 1 + random.below(200)).min(bytes.len());
+                let part = bytes[at..end].to_vec();
+                let to = random.below(bytes.len() + 1);
+                bytes.splice(to..to, part);
+            }
+            5 => {
+                let token = TOKENS[random.below(TOKENS.len())];
+                bytes.splice(at..at, token.iter().copied());
+            }
+            6 => {
+                let token = TOKENS[random.below(TOKENS.len())];
+                let end = (at + token.len()).min(bytes.len());
+                bytes.splice(at..end, token.iter().copied());
+            }
+            7 => {
+                let other = &corpus[random.below(corpus.len())];
+                let from = random.below(other.len());
+                let end = (from + random.below(300)).min(other.len());
+                bytes.splice(at..at, other[from..end].iter().copied());
+            }
+            8 if bytes.len() >= at + 8 => {
+                // A number that a length or count may be.
+                let wide = [1, 2, 4, 8][random.below(4)];
+                let value = (1_u64 << random.below(64)).wrapping_sub(random.next() & 1);
+                bytes[at..at + wide].copy_from_slice(&value.to_le_bytes()[..wide]);
+            }
+            _ => {
+                // A digit by another one.
+                let digit = bytes[at..].iter().position(u8::is_ascii_digit);
+                if let Some(k) = digit {
+                    bytes[at + k] = b'0' + random.below(10) as u8;
+                }
+            }
+        }
+    }
+    bytes.truncate(MOST_BYTES);
+    bytes
+}
+
+/// The promise of every reader to its callers.
+fn assert_sound(contents: &Contents) {
+    for frf in &contents.frfs {
+        assert_eq!(frf.frequency_hz.len(), frf.value.len());
+        assert!(!frf.value.is_empty());
+        assert!(frf.frequency_hz.windows(2).all(|w| w[0] < w[1]));
+        assert!(frf.frequency_hz.iter().all(|f| f.is_finite() && *f >= 0.0));
+        assert!(frf.value.iter().all(|v| v.norm() <= 1e15));
+        let coherence = frf.coherence.iter().flatten();
+        assert!(coherence.clone().all(|c| (0.0..=1.0).contains(c)));
+        assert!(frf.coherence.as_ref().is_none_or(|c| c.len() == frf.value.len()));
+        assert!(
+            !frf.name.contains(|c: char| c.is_control() && c != '\t'),
+            "{:?}",
+            frf.name
+        );
+    }
+    for record in &contents.times {
+        assert!(
+            record.sample_rate_hz > 0.0 && record.sample_rate_hz.is_finite() && record.start_s.is_finite()
+        );
+        for channel in &record.channels {
+            assert_eq!(channel.samples.len(), record.len());
+            assert!(channel.samples.iter().all(|v| v.abs() <= 1e15));
+            assert!(
+                !channel.name.contains(|c: char| c.is_control() && c != '\t'),
+                "{:?}",
+                channel.name
+            );
+        }
+        let _ = ingest::quality_warnings(record);
+    }
+    for other in &contents.others {
+        assert!(other.abscissa.iter().all(|v| v.is_finite()) && other.value.iter().all(|v| v.is_finite()));
+    }
+}
+
+/// What is fed with mutated bytes.
+#[derive(Clone, Copy, Debug)]
+enum Target {
+    Reader,
+    Campaign,
+    Robot,
+    Revisions,
+}
+
+/// Runs one input; true where it was read.
+fn run(target: Target, bytes: &[u8], folder: &Path) -> bool {
+    match target {
+        Target::Reader => match ingest::read_memory(bytes) {
+            Ok(file) => {
+                assert_sound(&file.contents);
+                true
+            }
+            Err(error) => {
+                let shown = error.to_string();
+                assert!(
+                    !shown.contains(|c: char| c.is_control() && c != '\t' && c != '\n'),
+                    "{shown:?}"
+                );
+                false
+            }
+        },
+        Target::Campaign => Campaign::from_text(folder, &String::from_utf8_lossy(bytes)).is_ok(),
+        Target::Robot => {
+            std::fs::write(folder.join("robot.toml"), bytes).unwrap();
+            RobotSpec::load("robot.toml", folder).is_ok()
+        }
+        Target::Revisions => {
+            let file = log_file(folder);
+            std::fs::create_dir_all(file.parent().unwrap()).unwrap();
+            std::fs::write(file, bytes).unwrap();
+            RevisionLog::load(folder).is_ok()
+        }
+    }
+}
+
+/// Peak memory of this process, MB; 0 where the system does not say.
+fn peak_mb() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
+    line.and_then(|l| l.trim().split(' ').next()?.parse::<u64>().ok())
+        .unwrap_or(0)
+        / 1024
+}
+
+struct Outcome {
+    runs: u64,
+    read: u64,
+    slowest: Duration,
+    memory_mb: u64,
+}
+
+/// Runs from `seed` on until `runs` or `time` are over. A panic, a hang or too much memory ends the process with the seed
+/// of the run, which repeats it.
+fn fuzz(target: Target, corpus: &[Vec<u8>], seed: u64, runs: u64, time: Duration) -> Outcome {
+    let folder = tempfile::tempdir().unwrap();
+    let (begin, before_mb) = (Instant::now(), peak_mb());
+    // Milliseconds since the beginning at which the run began, and its number; the watchdog reads them.
+    let state = Arc::new((AtomicU64::new(0), AtomicU64::new(0), AtomicU64::new(0)));
+    let watched = Arc::clone(&state);
+    let watchdog = std::thread::spawn(move || {
+        while watched.2.load(Ordering::Relaxed) == 0 {
+            std::thread::sleep(Duration::from_millis(200));
+            let (number, since) = (
+                watched.0.load(Ordering::Relaxed),
+                watched.1.load(Ordering::Relaxed),
+            );
+            let now = begin.elapsed().as_millis() as u64;
+            if now.saturating_sub(since) > LONGEST.as_millis() as u64 {
+                eprintln!("fuzz {target:?}: seed {} does not end", seed + number);
+                std::process::abort();
+            }
+        }
+    });
+    let mut outcome = Outcome {
+        runs: 0,
+        read: 0,
+        slowest: Duration::ZERO,
+        memory_mb: 0,
+    };
+    while outcome.runs < runs && begin.elapsed() < time {
+        let own = seed + outcome.runs;
+        let bytes = mutated(&mut Random(own.wrapping_mul(0x2545_f491_4f6c_dd1d)), corpus);
+        state.0.store(outcome.runs, Ordering::Relaxed);
+        state
+            .1
+            .store(begin.elapsed().as_millis() as u64, Ordering::Relaxed);
+        let start = Instant::now();
+        let caught = std::panic::catch_unwind(|| run(target, &bytes, folder.path()));
+        outcome.slowest = outcome.slowest.max(start.elapsed());
+        outcome.runs += 1;
+        match caught {
+            Ok(read) => outcome.read += u64::from(read),
+            Err(_) => {
+                let kept = std::env::temp_dir().join(format!("lobestone-fuzz-{target:?}-{own}"));
+                let _ = std::fs::write(&kept, &bytes);
+                panic!(
+                    "fuzz {target:?}: seed {own} panics; its input is {}",
+                    kept.display()
+                );
+            }
+        }
+        if outcome.runs.is_multiple_of(16) {
+            outcome.memory_mb = peak_mb().saturating_sub(before_mb);
+            assert!(
+                outcome.memory_mb < MEMORY_MB,
+                "fuzz {target:?}: {} MB by seed {own}",
+                outcome.memory_mb
+            );
+        }
+    }
+    state.2.store(1, Ordering::Relaxed);
+    watchdog.join().unwrap();
+    outcome
+}
+
+/// Small valid files of every format, and the odd ones.
+fn measurement_files() -> Vec<Vec<u8>> {
+    let mut files: Vec<Vec<u8>> = [
+        "time_s,fx_n,fy_n\n0.0,1,2\n0.1,3,4\n0.2,5,6\n0.3,5,6\n",
+        "Sampling rate [Hz]:;1000\nTime;Fx;Fy\nms;N;kN\n0,0;1;2\n1,0;3;4\n2,0;5;6\n3,0;7;8\n",
+        "Time,Fx,Fy\ns,N,N\n0,000000,0,5,1\n0,000100,0,5,2\n0,000200,0,1,2\n",
+        "frequency_hz,re(1X/1X),im(1X/1X),coh(1X/1X)\n1,1,-1,1\n2,2,-2,0.5\n3,3,-3,1\n",
+        "frq,amp_real,amp_imag\n0.0,0.07,0.0\n0.3,-0.0002,-0.02\n0.6,-0.002,-0.01\n",
+        "\"frequency_hz\";\"magnitude\";\"phase_deg\"\n\"1,5\";\"2\";\"3\"\n\"2\";\"2\";\"3\"\n\"3\";\"2\";\"3\"\n",
+        "0.0 2.0e-07 0.0 Freq Hz Real m/N Imag m/N\n0.5 2e-4 -1e-5\n1.0 3e-4 -2e-5\n",
+        "0.0 2.04e-03 0.0\n0.5 1e-6 -1e-8\n1.0 2e-6 -2e-8\n",
+        "    -1\n   151\nmodel\n    -1\n    -1\n   164\n         1SI\n  1.0D+00  1.0D+00  1.0D+00\n  2.7D+02\n    -1\n    -1\n    58\na\nb\nc\nd\ne\n    4         0    0         0 NONE               1   1 NONE               1   1\n         5         3         1  1.00000e+01  5.00000e-01  0.00000e+00\n        18    0    0    0 Frequency            Hz\n        12    0    0    0 Acc                  m/s^2\n        13    0    0    0 Force                N\n         0    0    0    0 NONE                 NONE\n  1.0e+00 -2.0e+00  3.0e+00 -4.0e+00  5.0e+00 -6.0e+00\n    -1\n",
+        "LabVIEW Measurement\t\nWriter_Version\t2\nSeparator\tTab\nDecimal_Separator\t.\nX_Columns\tOne\n***End_of_Header***\t\n\t\nChannels\t2\t\t\nSamples\t3\t3\t\nY_Unit_Label\tN\tg\t\nX_Dimension\tTime\tTime\t\nX0\t0.0E+0\t0.0E+0\t\nDelta_X\t1.0E-3\t1.0E-3\t\n***End_of_Header***\t\t\t\nX_Value\tHammer\tTip\tComment\n0\t1.5\t10\n0.001\t2\t20\n0.002\t3.0\t30\n",
+    ]
+    .iter()
+    .map(|text| text.as_bytes().to_vec())
+    .collect();
+    let odd = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/odd");
+    let mut small: Vec<PathBuf> = std::fs::read_dir(odd)
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .collect();
+    small.sort();
+    files.extend(
+        small
+            .iter()
+            .map(|p| std::fs::read(p).unwrap())
+            .filter(|b| b.len() < 6000),
+    );
+    for packed in [false, true] {
+        let mut builder = hdf5_pure::FileBuilder::new();
+        builder
+            .create_dataset("f")
+            .with_f64_data(&[1.0, 2.0, 3.0, 4.0])
+            .with_shape(&[1, 4]);
+        let data = builder.create_dataset("H");
+        data.with_complex64_data(&[(1.0, -1.0), (2.0, 0.5), (0.5, 1.0), (0.1, 0.0)])
+            .with_shape(&[1, 4]);
+        if packed {
+            data.with_maxshape(&[hdf5_pure::MaxExtent::Fixed(1), hdf5_pure::MaxExtent::Unlimited])
+                .with_chunks(&[1, 2])
+                .with_deflate(3);
+        }
+        files.push(builder.finish().unwrap());
+    }
+    files
+}
+
+fn text_of(file: &str) -> Vec<u8> {
+    std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join(file)).unwrap()
+}
+
+fn corpus_of(target: Target) -> Vec<Vec<u8>> {
+    match target {
+        Target::Reader => {
+            let mut files = measurement_files();
+            if let Some(folder) = std::env::var_os("FUZZ_CORPUS") {
+                let mut more: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
+                more.sort();
+                let more = more.iter().filter_map(|p| std::fs::read(p).ok());
+                files.extend(more.filter(|b| b.len() <= MOST_BYTES));
+            }
+            files
+        }
+        Target::Campaign => vec![
+            text_of("tests/data/campaign_full.toml"),
+            text_of("tests/data/blind/frf-9112/campaign.toml"),
+            text_of("tests/data/blind/force-9400/campaign.toml"),
+        ],
+        Target::Robot => vec![text_of("tests/data/cobot7.toml")],
+        Target::Revisions => vec![
+            br#"{"schema":"lobestone/revisions/1","revisions":[{"n":0,"domain":"structure","effect":null,"scope":null,"parameters":[],"recorded":"2026-11-22T05:00:00Z"}],"undone":[]}"#.to_vec(),
+        ],
+    }
+}
+
+const TARGETS: [Target; 4] = [Target::Reader, Target::Campaign, Target::Robot, Target::Revisions];
+
+#[test]
+fn mutated_files_do_no_harm() {
+    for target in TARGETS {
+        let runs = if matches!(target, Target::Reader) {
+            4000
+        } else {
+            300
+        };
+        let outcome = fuzz(target, &corpus_of(target), 1, runs, Duration::from_secs(60));
+        assert!(outcome.runs > 0);
+    }
+}
+
+#[test]
+#[ignore = "runs as long as FUZZ_SECONDS says"]
+fn fuzz_for_long() {
+    let number = |name: &str, otherwise: u64| {
+        std::env::var(name)
+            .ok()
+            .and_then(|v| v.parse().ok())
+            .unwrap_or(otherwise)
+    };
+    let (seconds, seed) = (number("FUZZ_SECONDS", 60), number("FUZZ_SEED", 1));
+    for (target, share) in TARGETS.into_iter().zip([0.91, 0.03, 0.03, 0.03]) {
+        let time = Duration::from_secs_f64(seconds as f64 * share);
+        let found = fuzz(target, &corpus_of(target), seed, u64::MAX, time);
+        println!(
+            "{target:?}: seeds {seed} to {}, {} runs, {} read, slowest {:.3} s, memory +{} MB",
+            seed + found.runs - 1,
+            found.runs,
+            found.read,
+            found.slowest.as_secs_f64(),
+            found.memory_mb
+        );
+    }
+}

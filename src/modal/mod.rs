@@ -24,6 +24,7 @@ mod lscf;
 #[cfg(test)]
 mod marks;
 mod ml_fit;
+pub mod operational;
 mod peaks;
 pub mod quality;
 mod set_noise;

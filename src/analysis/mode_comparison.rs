@@ -278,7 +278,7 @@ mod tests {
         // Two postures are a coincidence.
         let two: Vec<ModePair> = measured()
             .into_iter()
-            .filter(|p| p.posture < "p2".to_string())
+            .filter(|p| p.posture.as_str() < "p2")
             .collect();
         assert!(fixed_modes(&two, &model(None)).is_empty());
     }

@@ -94,7 +94,7 @@ impl PlanFindings {
         let band_hz = request.band_hz.or(plan.band_hz).unwrap_or(BAND_HZ);
         let step = request.lines_hz.or(plan.lines_hz).unwrap_or(LINES_HZ);
         let count = ((band_hz[1] - band_hz[0]) / step + 1e-6).floor() + 1.0;
-        if !(band_hz[0] > 0.0 && count >= 10.0 && count <= MOST_LINES) {
+        if !(band_hz[0] > 0.0 && (10.0..=MOST_LINES).contains(&count)) {
             return Err(InputError::new(format!(
                 "{step} Hz from {} to {} Hz gives fewer than ten lines, or far too many",
                 band_hz[0], band_hz[1]

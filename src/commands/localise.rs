@@ -67,7 +67,7 @@ fn document(case: &StructureCase, found: &Localisation) -> Value {
         "curve": curve,
         "baseline": {
             "reduced_chi2": found.baseline.reduced_chi2,
-            "held_out_nrms": found.baseline_held_out.map(|h| h.nrms()),
+            "held_out_nrms": found.baseline_held_out.as_ref().map(|h| h.nrms()),
         },
         "warnings": case.warnings,
     })
@@ -115,7 +115,7 @@ fn place(p: &LocalisedPlace) -> Value {
         "add": p.best.as_ref().map(|b| b.instance.label()),
         "left": p.left,
         "consistency": p.consistency,
-        "held_out_nrms": p.best.as_ref().and_then(|b| b.held_out.map(|h| h.nrms())),
+        "held_out_nrms": p.best.as_ref().and_then(|b| b.held_out.as_ref().map(|h| h.nrms())),
         "form": p.best.as_ref().map(|b| b.form.label()),
         "forms": p.forms.iter().map(|f| json!({ "form": f.form.label(), "delta_bic": f.delta_bic })).collect::<Vec<_>>(),
         "parameters": parameters,
@@ -152,7 +152,7 @@ fn describe(case: &StructureCase, found: &Localisation, most: usize) -> String {
             number(p.left, 3),
             number(found.baseline.reduced_chi2, 3)
         );
-        if let (Some(with), Some(without)) = (best.held_out, found.baseline_held_out) {
+        if let (Some(with), Some(without)) = (&best.held_out, &found.baseline_held_out) {
             text += &format!(
                 "error on postures left out {} -> {}\n",
                 percent(without.nrms()),

@@ -237,7 +237,7 @@ impl<'a, S: Study> Engine<'a, S> {
     /// baseline that was found anywhere: where an effect's fit leads the baseline itself further down, the calibration was
     /// trapped, and all is fitted again from there.
     #[allow(clippy::type_complexity)]
-    fn from_one_baseline(&mut self) -> Result<(Fit, Fit, Vec<TriedOf<S>>)> {
+    fn on_one_baseline(&mut self) -> Result<(Fit, Fit, Vec<TriedOf<S>>)> {
         let (study, model) = (self.study, self.model);
         let mut rebased = 0;
         loop {
@@ -273,7 +273,7 @@ impl<'a, S: Study> Engine<'a, S> {
 
     fn run(mut self) -> Result<Diagnosis<S::Model, S::Instance>> {
         let (study, model) = (self.study, self.model);
-        let (coarse_base, base, tried) = self.from_one_baseline()?;
+        let (coarse_base, base, tried) = self.on_one_baseline()?;
         let mut refined = self.refine(&tried)?;
         if let Some(best) = refined
             .first_mut()
@@ -356,6 +356,7 @@ impl<'a, S: Study> Engine<'a, S> {
                 verdict: Verdict::Unknown,
                 effect: None,
                 companion: None,
+                best_guess: None,
                 confidence: NO_CONFIDENCE,
                 indistinguishable: Vec::new(),
             };

@@ -104,7 +104,8 @@ impl<M, I> Extension<M, I> {
         }
         // The model without the effect is one with it, at the effect's vanishing limit: the fit with the effect is never
         // worse. The likelihood alone is compared; what is known of an effect beforehand supposes that it is there.
-        let chi2 = |model: &M, c: &Calibration| Ok::<f64, Error>(study.residual(model, &c.theta)?.chi2_per_value);
+        let chi2 =
+            |model: &M, c: &Calibration| Ok::<f64, Error>(study.residual(model, &c.theta)?.chi2_per_value);
         let limit = study.vanishing(&best.model);
         let mut extended = best.model;
         let mut vanished = false;
@@ -122,7 +123,7 @@ impl<M, I> Extension<M, I> {
                 model: extended,
                 calibration: after,
                 residual: before.residual,
-                held_out: before.held_out,
+                held_out: before.held_out.clone(),
             }
         } else {
             Fitted::new(study, extended, after)?

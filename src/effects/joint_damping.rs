@@ -45,24 +45,20 @@ impl StructuralEffect for JointDamping {
     }
 
     fn parameters(&self, robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
-        let dampers = robot
-            .joints
-            .iter()
-            .enumerate()
-            .map(|(i, joint)| {
-                let nominal = DAMPING_TIME_S / joint.compliance_rad_per_nm;
-                Parameter {
-                    name: format!("c_nms_per_rad[{i}]"),
-                    unit: "N·m·s/rad",
-                    scale: Scale::Logarithmic,
-                    nominal,
-                    prior: Some(Prior {
-                        mean: nominal.ln(),
-                        std: 1.5,
-                    }),
-                    bounds: [1e-3 * nominal, 1e3 * nominal],
-                }
-            });
+        let dampers = robot.joints.iter().enumerate().map(|(i, joint)| {
+            let nominal = DAMPING_TIME_S / joint.compliance_rad_per_nm;
+            Parameter {
+                name: format!("c_nms_per_rad[{i}]"),
+                unit: "N·m·s/rad",
+                scale: Scale::Logarithmic,
+                nominal,
+                prior: Some(Prior {
+                    mean: nominal.ln(),
+                    std: 1.5,
+                }),
+                bounds: [1e-3 * nominal, 1e3 * nominal],
+            }
+        });
         let share = Parameter {
             name: "common_share".into(),
             unit: "1",
@@ -92,7 +88,9 @@ impl StructuralEffect for JointDamping {
     }
 
     fn apply(&self, _site: Site, _variant: usize, values: &[Dual], _setting: &Setting, chain: &mut Chain) {
-        let Some((share, dampers)) = values.split_last() else { return };
+        let Some((share, dampers)) = values.split_last() else {
+            return;
+        };
         chain.modal_damping_ratio = &chain.modal_damping_ratio * share;
         for element in &mut chain.elements {
             if let Role::Joint(i) = element.role {

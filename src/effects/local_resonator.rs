@@ -59,7 +59,11 @@ impl StructuralEffect for LocalResonator {
     }
 
     fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {
-        Some(vec![NEGLIGIBLE * parameters[0].nominal, parameters[1].nominal, parameters[2].nominal])
+        Some(vec![
+            NEGLIGIBLE * parameters[0].nominal,
+            parameters[1].nominal,
+            parameters[2].nominal,
+        ])
     }
 
     fn apply(&self, site: Site, variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {

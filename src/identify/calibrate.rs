@@ -165,7 +165,12 @@ const HOPELESS: f64 = 1.5;
 
 /// The likelihood from a point that is in the right basin already: log magnitudes could only lead out of it.
 fn resume(model: &StructureModel, sketch: &FrfData, start: &[f64]) -> Result<(Fit, usize)> {
-    let fit = minimise(&problem(model, sketch, Misfit::Complex), start, &model.bounds(), ROUGH)?;
+    let fit = minimise(
+        &problem(model, sketch, Misfit::Complex),
+        start,
+        &model.bounds(),
+        ROUGH,
+    )?;
     let iterations = fit.iterations;
     Ok((fit, iterations))
 }
@@ -178,7 +183,12 @@ fn approach(
     rough: Stopping,
 ) -> Result<(Fit, usize)> {
     let bounds = model.bounds();
-    let near = minimise(&problem(model, sketch, Misfit::LogMagnitude), start, &bounds, rough)?;
+    let near = minimise(
+        &problem(model, sketch, Misfit::LogMagnitude),
+        start,
+        &bounds,
+        rough,
+    )?;
     let fit = minimise(
         &problem(model, sketch, Misfit::Complex),
         &near.theta,
@@ -273,7 +283,8 @@ fn scanned_starts(model: &StructureModel, sketch_data: &FrfData, found: &[f64]) 
     let problem = problem(model, &glance, Misfit::LogMagnitude);
     let bounds = model.bounds();
     let joints: Vec<usize> = (0..model.robot.joint_count()).collect();
-    let steps = |count: i32, step: f64| -> Vec<f64> { (-count..=count).map(|k| f64::from(k) * step).collect() };
+    let steps =
+        |count: i32, step: f64| -> Vec<f64> { (-count..=count).map(|k| f64::from(k) * step).collect() };
     let common = steps(FACTORS, LARGEST_LN_FACTOR / f64::from(FACTORS));
     let mut starts = valleys(&problem, &model.nominal_theta(), &bounds, &joints, &common);
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -332,7 +343,9 @@ pub fn calibrate(
         let looks: Vec<Fit> = points
             .par_iter()
             .filter_map(|start| {
-                let fit = approach(model, &sketch_data, start, look).ok().map(|(fit, _)| fit);
+                let fit = approach(model, &sketch_data, start, look)
+                    .ok()
+                    .map(|(fit, _)| fit);
                 progress.step();
                 fit
             })
@@ -342,11 +355,7 @@ pub fn calibrate(
         let mut fits: Vec<Fit> = looks
             .par_iter()
             .filter(|look| look.cost < HOPELESS * lowest)
-            .filter_map(|look| {
-                resume(model, &sketch_data, &look.theta)
-                    .ok()
-                    .map(|(fit, _)| fit)
-            })
+            .filter_map(|look| resume(model, &sketch_data, &look.theta).ok().map(|(fit, _)| fit))
             .collect();
         starts += points.len();
         fits.push(first);

@@ -147,7 +147,8 @@ impl LevenbergMarquardt {
         (0..theta.len())
             .filter(|&i| {
                 let [low, high] = self.bounds[i];
-                low < high && !((theta[i] <= low && gradient[i] > 0.0) || (theta[i] >= high && gradient[i] < 0.0))
+                low < high
+                    && !((theta[i] <= low && gradient[i] > 0.0) || (theta[i] >= high && gradient[i] < 0.0))
             })
             .collect()
     }
@@ -161,7 +162,9 @@ impl LevenbergMarquardt {
             .iter()
             .map(|&i| here.hessian[(i, i)].sqrt().max(f64::MIN_POSITIVE))
             .collect();
-        let hessian = DMatrix::from_fn(m, m, |i, j| here.hessian[(free[i], free[j])] / (root[i] * root[j]));
+        let hessian = DMatrix::from_fn(m, m, |i, j| {
+            here.hessian[(free[i], free[j])] / (root[i] * root[j])
+        });
         let gradient = DVector::from_fn(m, |i, _| here.gradient[free[i]] / root[i]);
         match hessian.cholesky() {
             Some(cholesky) => 0.5 * gradient.dot(&cholesky.solve(&gradient)),

@@ -602,7 +602,7 @@ mod tests {
     fn parameters_that_differ_between_folds_are_found_by_their_test() {
         let slope = |fold: usize, output: usize, k: usize| {
             let size = 20.0 * ((3 * output + fold) as f64 + 240.0).sin();
-            let sign = if fold % 2 == 0 { 0.02 } else { -0.02 };
+            let sign = if fold.is_multiple_of(2) { 0.02 } else { -0.02 };
             sign * size * resonance(k, 240.0 + 7.0 * fold as f64, 9.0).powi(2)
         };
         let found = test(&curves(white, slope));

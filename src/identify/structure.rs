@@ -357,7 +357,7 @@ impl StructureModel {
                     rest: Vec::with_capacity(block.frequency_hz.len()),
                     slopes: vec![Vec::with_capacity(block.frequency_hz.len()); theta.len()],
                     // A gain and a phase, and both growing with the frequency (a delay).
-                    own: vec![Vec::with_capacity(block.frequency_hz.len()); 2],
+                    own: vec![Vec::new(); 2],
                 };
                 let mut curves: Vec<RestCurve> = block.frfs.iter().map(empty).collect();
                 let basis = self.basis(theta, block, true)?;

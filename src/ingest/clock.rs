@@ -151,7 +151,7 @@ pub(super) fn resample(times_s: &[f64], values: &[f64], grid: Grid) -> Vec<f64> 
 mod tests {
     use super::*;
 
-    fn times(count: usize, at: impl Fn(f64) -> f64) -> Vec<f64> {
+    fn times(count: usize, mut at: impl FnMut(f64) -> f64) -> Vec<f64> {
         (0..count).map(|i| at(i as f64)).collect()
     }
 

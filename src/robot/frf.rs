@@ -381,13 +381,17 @@ impl FrfBasis {
                     }
                 }
             }
-            Dynamics::Full { mass, damping } => {
+            Dynamics::Full {
+                mass,
+                damping,
+                hysteretic,
+            } => {
                 let stiffness = |i: usize| if i / n == i % n { 1.0 } else { 0.0 };
-                let entries = mass.iter().zip(damping.iter()).enumerate();
+                let entries = mass.iter().zip(damping).zip(hysteretic).enumerate();
                 response.dynamic.clear();
-                response
-                    .dynamic
-                    .extend(entries.map(|(i, (m, c))| stiffness(i) + s * *c + s * s * *m));
+                response.dynamic.extend(
+                    entries.map(|(i, ((m, c), h))| stiffness(i) + s * *c + s * s * *m + Complex64::i() * *h),
+                );
                 response
                     .columns
                     .extend(self.rows.iter().map(|r| Complex64::new(*r, 0.0)));

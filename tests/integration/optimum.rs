@@ -16,7 +16,8 @@ use proptest::test_runner::{Config, TestRunner};
 use super::support::{blind, copy_of, document, program};
 
 const FRF_CAMPAIGNS: [&str; 10] = [
-    "frf-9000", "frf-9001", "frf-9007", "frf-9011", "frf-9112", "frf-9113", "frf-9114", "frf-9115", "frf-9216", "frf-9302",
+    "frf-9000", "frf-9001", "frf-9007", "frf-9011", "frf-9112", "frf-9113", "frf-9114", "frf-9115",
+    "frf-9216", "frf-9302",
 ];
 
 fn case(dir: &Path) -> StructureCase {
@@ -97,7 +98,11 @@ fn a_tool_that_does_not_bend_is_said_to_vanish() {
     let calibrated = document(&["calibrate", dir]);
     let added = document(&["add", dir, "tool-flexibility"]);
     let nrms = |v: &serde_json::Value| v["nrms"].as_f64().unwrap();
-    assert!(nrms(&added["after"]) <= nrms(&added["before"]) * 1.001, "{}", added["after"]);
+    assert!(
+        nrms(&added["after"]) <= nrms(&added["before"]) * 1.001,
+        "{}",
+        added["after"]
+    );
     assert!((nrms(&added["before"]) / nrms(&calibrated["error"]) - 1.0).abs() < 1e-3);
     // Other commands on the revised model say the same.
     let again = document(&["compare", dir]);
@@ -114,7 +119,11 @@ fn with_compliances(dir: &Path, factor: impl Fn(usize, f64) -> f64) {
     std::fs::write(dir.join("other.toml"), spec.to_string()).unwrap();
     let file = dir.join("campaign.toml");
     let text = std::fs::read_to_string(&file).unwrap();
-    std::fs::write(file, text.replace("model = \"irb6640\"", "model = \"other.toml\"")).unwrap();
+    std::fs::write(
+        file,
+        text.replace("model = \"irb6640\"", "model = \"other.toml\""),
+    )
+    .unwrap();
 }
 
 fn calibrated(case: &StructureCase, data: &FrfData) -> Calibration {
@@ -139,10 +148,23 @@ fn a_bad_guess_of_the_robot_ends_at_the_same_optimum() {
         let dir = campaign.path().to_str().unwrap();
         let found = document(&["calibrate", dir]);
         let close = |e: f64| (e / error(&right["error"]) - 1.0).abs() < 1e-3;
-        assert!(close(error(&found["error"])), "guess {number}: {}", found["error"]);
+        assert!(
+            close(error(&found["error"])),
+            "guess {number}: {}",
+            found["error"]
+        );
         assert_eq!(found["converged"], true, "guess {number}");
-        for (a, b) in right["parameters"].as_array().unwrap().iter().zip(found["parameters"].as_array().unwrap()) {
-            let (a, s, b) = (a["value"].as_f64().unwrap(), a["std_error"].as_f64().unwrap(), b["value"].as_f64().unwrap());
+        for (a, b) in right["parameters"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .zip(found["parameters"].as_array().unwrap())
+        {
+            let (a, s, b) = (
+                a["value"].as_f64().unwrap(),
+                a["std_error"].as_f64().unwrap(),
+                b["value"].as_f64().unwrap(),
+            );
             assert!((a - b).abs() < 0.1 * s, "guess {number}: {a} ± {s} and {b}");
         }
         if number == 1 {
@@ -239,7 +261,10 @@ fn units_scaled_together_change_nothing() {
             prop_assert!((other.reduced_chi2 / straight.reduced_chi2 - 1.0).abs() < 1e-6);
             for (a, b) in straight.parameters.iter().zip(&other.parameters) {
                 let factor = if a.unit == "N·m/rad" { scale } else { 1.0 };
-                prop_assert!((a.value - b.value / factor).abs() < 1e-3 * a.std_error, "{a:?} {b:?}");
+                prop_assert!(
+                    (a.value - b.value / factor).abs() < 1e-3 * a.std_error,
+                    "{a:?} {b:?}"
+                );
             }
             Ok(())
         })
@@ -264,7 +289,10 @@ fn a_few_numbers_give_no_verdict() {
         let mut toml = "schema = \"lobestone/campaign/1\"\nname = \"few\"\n[robot]\nmodel = \"irb6640\"\n\
                         [[point]]\nnode = 1\nbody = \"tool\"\nposition_m = [0.0, 0.0, 0.0]\naxes = \"base\"\n"
             .to_string();
-        let joints = ["135.0, -2.0, 53.0, 83.0, 30.0, -117.0", "135.0, 20.0, 26.0, 30.0, 80.0, -150.0"];
+        let joints = [
+            "135.0, -2.0, 53.0, 83.0, 30.0, -117.0",
+            "135.0, 20.0, 26.0, 30.0, 80.0, -150.0",
+        ];
         for (i, (record, joints)) in records.iter().zip(joints).enumerate() {
             let rows = record[..lines].join("\n");
             let text = format!("frequency_hz,re(1X/1X),im(1X/1X),re(1Y/1Y),im(1Y/1Y)\n{rows}\n");
@@ -306,11 +334,17 @@ fn the_number_of_threads_changes_no_byte() {
         let with = |threads: &str| {
             let mut program = program();
             program.env("RAYON_NUM_THREADS", threads);
-            let output = program.args([command, blind(campaign).to_str().unwrap(), "--json"]).output();
+            let output = program
+                .args([command, blind(campaign).to_str().unwrap(), "--json"])
+                .output();
             String::from_utf8(output.unwrap().stdout).unwrap()
         };
         let (one, four) = (with("1"), with("4"));
-        assert!(!one.is_empty() && one == four, "{command} {campaign}: {}", first_difference(&one, &four));
+        assert!(
+            !one.is_empty() && one == four,
+            "{command} {campaign}: {}",
+            first_difference(&one, &four)
+        );
     }
 }
 

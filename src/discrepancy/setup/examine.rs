@@ -349,7 +349,14 @@ pub fn library_rival(model: &StructureModel, data: &FrfData, theta: &[f64]) -> O
     let hints = study.hints(model, theta).ok()?;
     let bounds = study.bounds(model);
     let base = minimise(&study.problem(model, View::COARSE), theta, &bounds, ROUGH).ok()?;
-    let tried = try_effects(&study, model, &instances, &[base.theta.clone()], &hints, || ());
+    let tried = try_effects(
+        &study,
+        model,
+        &instances,
+        std::slice::from_ref(&base.theta),
+        &hints,
+        || (),
+    );
     let best = tried.iter().min_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost))?;
     Some(Rival {
         label: study.name(&best.instance).label(),

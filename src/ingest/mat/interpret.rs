@@ -643,7 +643,8 @@ fn time_signals(
                 || v.is_axis() && v.own_name().to_lowercase().starts_with("time"))
     };
     // Length, rate, start, and times with their grid where they are uneven.
-    let mut axes: Vec<(usize, f64, f64, Option<(&[f64], Grid)>)> = Vec::new();
+    type Uneven<'t> = Option<(&'t [f64], Grid)>;
+    let mut axes: Vec<(usize, f64, f64, Uneven)> = Vec::new();
     for (axis, _) in variables
         .iter()
         .zip(used.iter())

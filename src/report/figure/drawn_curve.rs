@@ -36,11 +36,12 @@ impl DrawnCurveFigure {
         };
         // Lines that say little must not press the others flat: those with the smaller half of the errors set the scale.
         let middle = quantile(lines.iter().map(|k| self.std[*k]), 0.5).unwrap_or(f64::INFINITY);
-        let parts: [(&str, fn(Complex64) -> f64); 2] =
-            [("real part", |z| z.re), ("imaginary part", |z| z.im)];
+        let parts = ["real part", "imaginary part"];
+        let part = |name: &str, z: Complex64| if name == parts[0] { z.re } else { z.im };
         let axes: Vec<Axis> = parts
             .iter()
-            .map(|(name, part)| {
+            .map(|name| {
+                let part = |z| part(name, z);
                 let sure = lines.iter().filter(|k| self.std[**k] <= middle);
                 let values = sure
                     .map(|k| part(self.stiffness[*k]))
@@ -69,7 +70,8 @@ impl DrawnCurveFigure {
         let bottom = panels.last().map_or(0.0, |p| p.bottom) + Panel::BOTTOM_MARGIN;
         paint(WIDTH, bottom as u32, |canvas| {
             header.draw(canvas);
-            for (panel, (_, part)) in panels.iter().zip(parts) {
+            for (panel, name) in panels.iter().zip(parts) {
+                let part = |z| part(name, z);
                 panel.grid(canvas);
                 for &k in &lines {
                     // Half of the complex variance is in each part.

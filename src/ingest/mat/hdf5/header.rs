@@ -255,8 +255,10 @@ fn text(bytes: &[u8]) -> String {
     super::super::super::text::decode(&bytes[..end.min(super::NAME)])
 }
 
-/// Sizes and largest sizes; no sizes for the empty dataspace.
-fn dataspace(m: &mut Cursor) -> Step<(Option<Vec<usize>>, Vec<Option<usize>>)> {
+/// Sizes (none for the empty dataspace) and largest sizes (none: without limit).
+type Sizes = (Option<Vec<usize>>, Vec<Option<usize>>);
+
+fn dataspace(m: &mut Cursor) -> Step<Sizes> {
     let version = m.byte()?;
     let rank = m.byte()?;
     let flags = m.byte()?;

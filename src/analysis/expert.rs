@@ -42,8 +42,11 @@ const OTHER_FORM: f64 = 0.8;
 /// A frequency error (share) and damping error from which on they are spoken of.
 const FREQUENCY_OFF: f64 = 0.01;
 const DAMPING_OFF: f64 = 0.25;
-/// A place that leaves no more than this times what the best one leaves is as good as it.
-const TIED: f64 = 1.1;
+/// Shares of the misfit nearer than this are as good as equal, unless one place leaves so many times what the other does.
+const TIED: f64 = 0.05;
+const LEAVES_MORE: f64 = 1.5;
+/// So many places that explain it alike point nowhere.
+const MANY: usize = 3;
 /// Noise of an FRF, as a share of its rms, up to which its form can be judged.
 const CLEAR: f64 = 0.2;
 /// A place that explains less than this points nowhere.
@@ -124,7 +127,7 @@ impl ExpertView {
 
     fn place_sentence(&self) -> Option<String> {
         let best = self.located.first().filter(|l| l.share >= LEAST_SHARE)?;
-        let as_good = |l: &&Location| l.left <= TIED * best.left;
+        let as_good = |l: &&Location| best.share - l.share < TIED && l.left < LEAVES_MORE * best.left;
         let tied: Vec<String> = self
             .located
             .iter()
@@ -133,6 +136,14 @@ impl ExpertView {
             .map(|l| place_words(&l.place))
             .collect();
         let percent = |share: f64| 100.0 * share.min(1.0);
+        if tied.len() >= MANY {
+            return Some(format!(
+                "the misfit points at no single place: something unknown at {} would take {:.0} % of it away, at {} hardly less",
+                place_words(&best.place),
+                percent(best.share),
+                tied.join(", ")
+            ));
+        }
         let what = match best.place.starts_with("joint") {
             true => "it gives way otherwise than modelled, turning or tilting",
             false => "a force acts on it that the model does not have: something hung on it, or touching it",

@@ -67,7 +67,7 @@ pub struct ModeComparison {
 }
 
 /// Relative distance within which two modes are at the same frequency.
-const SAME: f64 = 0.005;
+const SAME: f64 = 0.003;
 /// Standard deviations of the frequency within which they are, too.
 const SAME_SIGMAS: f64 = 3.0;
 /// Fewest postures at which a mode must be measured to be called fixed: two coincide by chance.
@@ -274,7 +274,7 @@ mod tests {
             (4, 4, 0)
         );
         assert!((found[0].spread_hz - 0.05).abs() < 1e-9);
-        assert!(fixed_modes(&measured(), &model(Some(30.1))).is_empty());
+        assert!(fixed_modes(&measured(), &model(Some(30.02))).is_empty());
         // Two postures are a coincidence.
         let two: Vec<ModePair> = measured()
             .into_iter()

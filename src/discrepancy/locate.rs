@@ -139,7 +139,7 @@ fn misfit(model: &StructureModel, theta: &[f64], data: &FrfData) -> Result<f64> 
     Ok(data.frfs().zip(&predicted).map(of_frf).sum())
 }
 
-/// Joints first, then bodies; three axes each, numbered through as [`Probe`] has them.
+/// Joints first, then bodies; three axes each, numbered through as `probe` has them.
 fn candidates(model: &StructureModel) -> Vec<Candidate> {
     let joints = model.robot.joint_count();
     let of_joints = (1..=joints).map(|i| format!("joint-{i}"));

@@ -46,7 +46,7 @@ impl DiagnosisFindings {
         let study = study_of(&case, options);
         let mut diagnosis = diagnose(&study, &case.model)?;
         let setup = examine(&case.model, &case.data, &diagnosis.baseline.theta, || {
-            rival(&diagnosis)
+            rival(&diagnosis, |_| true)
         })?;
         heed_setup(&mut diagnosis, &setup);
         let next_measurement = next_measurement::advise(&case.data, &campaign.postures, &diagnosis)?;
@@ -83,15 +83,24 @@ impl DiagnosisFindings {
 }
 
 /// What the best effect of the library takes away.
-fn rival<M, I>(diagnosis: &Diagnosis<M, I>) -> Option<Rival> {
+fn rival<M, I>(diagnosis: &Diagnosis<M, I>, possible: impl Fn(&Candidate<M, I>) -> bool) -> Option<Rival> {
     let base = diagnosis.baseline.reduced_chi2;
-    let candidates = diagnosis.candidates.iter().filter(|c| c.refined && !c.at_bound);
+    let all = diagnosis.candidates.iter();
+    let candidates = all.filter(|c| c.refined && !c.at_bound && possible(c));
     let best = candidates.min_by(|a, b| a.reduced_chi2.total_cmp(&b.reduced_chi2))?;
     Some(Rival {
         label: best.label(),
         gain_share: (1.0 - best.reduced_chi2 / base).max(0.0),
         parameters: best.parameters.len(),
     })
+}
+
+/// A dynamometer that is damped like a filter is a filter (quartz dynamometers have a few per cent).
+fn is_possible(candidate: &Candidate<CuttingModel, CuttingInstance>) -> bool {
+    const MOST_DAMPING: f64 = 0.3;
+    let damping = candidate.parameters.iter().filter(|p| p.name.contains("zeta["));
+    let least = damping.map(|p| p.value).fold(f64::INFINITY, f64::min);
+    candidate.name.effect != "dynamometer-resonance" || least < MOST_DAMPING
 }
 
 /// A likely mistake of the setup leaves no effect certain: what is missing in the model cannot be told before the files are
@@ -143,7 +152,7 @@ impl CuttingFindings {
         let mut diagnosis = diagnose(&CuttingStudy::new(case.data.clone()), &case.model)?;
         // With effects in the model what they took up may be what is wrong.
         let setup = match case.model.effects().is_empty() {
-            true => examine_cutting(&case.data, || rival(&diagnosis))?,
+            true => examine_cutting(&case.data, || rival(&diagnosis, is_possible))?,
             false => SetupCheck::default(),
         };
         heed_setup(&mut diagnosis, &setup);

@@ -55,8 +55,8 @@ pub fn examine_cutting(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>
         return Ok(check);
     }
     let changes: Vec<Change> = [
-        Change::Gain(0),
-        Change::Gain(1),
+        Change::GainOfY,
+        Change::SpeedWander,
         Change::LowPass { order: 1 },
         Change::LowPass { order: 2 },
     ]
@@ -70,10 +70,14 @@ pub fn examine_cutting(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>
     if let Some(decision) = decide(&tried, chi2, values, rival) {
         check.reduced_chi2 = decision.reduced_chi2;
         check.explained_share = decision.explained_share;
-        check.findings.extend(decision.findings);
+        let told = decision.findings.into_iter().filter(|f| f.kind != SPEED_WANDER);
+        check.findings.extend(told);
     }
     Ok(check)
 }
+
+/// What looks like a low-pass and is none: no mistake of the setup, but a rival.
+const SPEED_WANDER: &str = "speed-wander";
 
 /// A fit of one reading.
 struct Trial {
@@ -105,7 +109,9 @@ fn improbability(calibration: &Calibration) -> f64 {
         true => ((krc / ktc / 0.4).ln() / 0.7).powi(2),
         false => 20.0,
     };
-    let axial = ((kac / ktc - 0.2) / 0.25).powi(2);
+    // Negative: the workpiece would pull the tool along its axis the wrong way for the sense of the helix.
+    let pulled = if kac < -0.02 * ktc { 6.0 } else { 0.0 };
+    let axial = ((kac / ktc - 0.2) / 0.25).powi(2) + pulled;
     let edges =
         ["kte_n_per_mm", "kre_n_per_mm"].map(|name| (get(name).min(0.0) / (0.01 * ktc)).powi(2).min(10.0));
     radial + axial.min(20.0) + edges[0] + edges[1]
@@ -240,8 +246,11 @@ fn drilling_signs(data: &CuttingData) -> Result<Vec<SetupFinding>> {
 /// A change of all records that one number describes; zero changes nothing.
 #[derive(Debug, Clone, Copy)]
 enum Change {
-    /// Logarithm of a recorded channel's gain.
-    Gain(usize),
+    /// Logarithm of the gain of Fy against Fx. One of the two cannot be told from the other, for all coefficients scale with
+    /// both; nor can the gain of Fz, with which the axial coefficients scale.
+    GainOfY,
+    /// Standard deviation of the tool's angle, rad, about its mean turning while lines are averaged: high orders smear.
+    SpeedWander,
     /// Time constant of the amplifiers, s.
     LowPass { order: u8 },
 }
@@ -251,12 +260,25 @@ impl Change {
     fn undone(self, data: &CuttingData, value: f64) -> CuttingData {
         let mut own = data.clone();
         match self {
-            Change::Gain(channel) => {
+            Change::GainOfY => {
+                let channel = 1;
                 for row in &mut own.tool_from_dyno {
                     row[channel] *= (-value).exp();
                 }
                 for entry in &mut own.dyno_from_tool[channel] {
                     *entry *= value.exp();
+                }
+            }
+            Change::SpeedWander => {
+                for cut in &mut own.cuts {
+                    for channel in Arc::make_mut(cut).channels.iter_mut().flatten() {
+                        let lines = channel.orders.iter_mut().zip(&mut channel.order_std);
+                        for (k, (line, std)) in lines.enumerate() {
+                            let smeared = (-0.5 * ((k + 1) as f64 * value).powi(2)).exp().max(1e-3);
+                            *line /= smeared;
+                            *std /= smeared;
+                        }
+                    }
                 }
             }
             Change::LowPass { order } => {
@@ -284,7 +306,8 @@ impl Change {
     /// Values to begin with.
     fn starts(self) -> [f64; 3] {
         match self {
-            Change::Gain(_) => [-0.1, 0.0, 0.1],
+            Change::GainOfY => [-0.1, 0.0, 0.1],
+            Change::SpeedWander => [0.0, 4e-3, 1e-2],
             Change::LowPass { .. } => [0.0, 2e-4, 6e-4],
         }
     }
@@ -303,7 +326,8 @@ impl Change {
             points.sort_by(|a, b| a.1.total_cmp(&b.1));
             let next = vertex(&points[..3])?;
             let next = match self {
-                Change::Gain(_) => next.clamp(-1.5, 1.5),
+                Change::GainOfY => next.clamp(-1.5, 1.5),
+                Change::SpeedWander => next.clamp(0.0, 0.1),
                 Change::LowPass { .. } => next.clamp(0.0, 0.01),
             };
             if points
@@ -327,27 +351,33 @@ impl Change {
         }
         let std = std * (chi2 / data.value_count() as f64).max(1.0).sqrt();
         let finding = match self {
-            Change::Gain(channel) => {
+            Change::GainOfY => {
                 let factor = value.exp();
                 let error = factor * std;
-                let names = ["Fx", "Fy", "Fz"];
-                let other = names[1 - channel];
                 SetupFinding {
                     kind: "channel-gain",
-                    place: format!("all cuts, {} against {other}", names[channel]),
+                    place: "all cuts, Fy against Fx".into(),
                     value: Some(factor),
                     std_error: Some(error),
                     unit: "1",
                     confidence: 0.0,
                     remedy: format!(
-                        "Calibrate the dynamometer's channels: recorded {} is {} times what it should be (or {other} {:.4} \
-                         times: only their ratio shows).",
-                        names[channel],
+                        "Calibrate the dynamometer's channels: recorded Fy is {} times what it should be (or Fx {:.4} times: \
+                         only their ratio shows).",
                         with_error(factor, error),
                         1.0 / factor
                     ),
                 }
             }
+            Change::SpeedWander => SetupFinding {
+                kind: SPEED_WANDER,
+                place: "all cuts".into(),
+                value: Some(value),
+                std_error: Some(std),
+                unit: "rad",
+                confidence: 0.0,
+                remedy: String::new(),
+            },
             Change::LowPass { order } => {
                 let corner = 1.0 / (std::f64::consts::TAU * value);
                 let error = corner * std / value;

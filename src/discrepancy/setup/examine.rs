@@ -56,6 +56,8 @@ const LEAST_GAIN: f64 = 30.0;
 const FITTED: usize = 6;
 /// Readings that are fitted, for each starting point of the model.
 const READ: usize = 6;
+/// Share of all disagreement from which on a reading is fitted from the nominal values, too.
+const PLAIN_READING: f64 = 0.1;
 /// Trials that are fitted to all data.
 const REFINED: usize = 3;
 
@@ -273,7 +275,8 @@ fn read_trials<'a>(
             let near = minimise(&problem(&read, &data), theta, &read.bounds(), ROUGH).ok()?;
             let mut best = (near.cost, near.theta);
             // Where the baseline was led astray its old place is no start.
-            if near.cost > 0.7 * data.value_count() as f64 && near.cost < base {
+            let far = near.cost > 1.5 * data.value_count() as f64;
+            if far && (near.cost < base || proposed.gain > PLAIN_READING) {
                 let options = Options {
                     extra_starts: 0,
                     ..Options::default()

@@ -16,11 +16,16 @@ use table::Table;
 
 pub use axes::Turn;
 
-/// A reading with how much nearer the model comes by it, in values that agreed not at all.
+/// A reading with how much nearer the model comes by it.
 pub struct Proposed {
     pub reading: Box<dyn Reading>,
+    /// In values that agreed not at all; from [`proposed`] as a share of all disagreement.
     pub gain: f64,
 }
+
+/// Share of all disagreement that a reading must take away to be worth a fit: what is wrong in one file of many leaves
+/// the others in agreement.
+const WORTH_A_FIT: f64 = 0.03;
 
 /// Readings that bring the model at any of `thetas` nearer to the data, most promising first.
 ///
@@ -42,7 +47,11 @@ pub fn proposed(
         here.extend(quantity::proposed(&table, data));
         here.extend(point_frame::proposed(&table, model, data, theta)?);
         here.extend(posture_swap::proposed(&table, model, data, theta)?);
-        here.retain(|p| p.gain > 0.0);
+        let disagreement: f64 = table.now.iter().sum();
+        for proposed in &mut here {
+            proposed.gain /= disagreement.max(f64::MIN_POSITIVE);
+        }
+        here.retain(|p| p.gain > WORTH_A_FIT);
         here.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         here.truncate(most);
         all.extend(here);

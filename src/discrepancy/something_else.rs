@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 use crate::identify::rest::{Rest, RestTest};
 
 /// Probability that the errors of the setup are large enough to be seen.
-const VISIBLE_ERRORS: f64 = 0.3;
+const VISIBLE_ERRORS: f64 = 0.1;
 /// Prior odds of an effect of the library against something else.
 const LIBRARY_ODDS: f64 = 2.0;
 /// A pair of effects is one of many that were tried, and two effects at once are rarer than one.
@@ -27,37 +27,64 @@ pub fn odds_of_pair(gain: f64, rest: &Rest) -> f64 {
 }
 
 /// ln of the Bayes factor of "the effect is there" against "it stands in for something else". The tests look at the same
-/// rest in different ways: what the most telling one says for the effect counts, and what the most telling one says
-/// against it.
+/// rest in different ways. Where one finds more than noise, the one that finds most sees all of the rest and decides;
+/// else what the most telling one says for the effect counts, and what the most telling one says against it.
 fn log_bayes_factor(gain: f64, rest: &Rest) -> f64 {
-    let factors = rest.tests.iter().map(|t| of_test(gain, t, rest.small_errors));
+    if !(gain > 0.0) {
+        return 0.0;
+    }
+    if let Some(largest) = rest.largest() {
+        return of_test(gain, largest, rest.small_errors, rest_of_a_stand_in);
+    }
+    let factors = rest
+        .tests
+        .iter()
+        .map(|t| of_test(gain, t, rest.small_errors, part_of_a_rest));
     let (low, high) = factors.fold((0.0f64, 0.0f64), |(low, high), f| (low.min(f), high.max(f)));
     low + high
 }
 
-fn of_test(gain: f64, test: &RestTest, small_errors: f64) -> f64 {
-    if !(gain > 0.0) {
-        return 0.0;
-    }
+/// `stand_in`: density of rest / gain if the effect stands in for something else.
+fn of_test(gain: f64, test: &RestTest, small_errors: f64, stand_in: fn(f64) -> f64) -> f64 {
     // Less than noise is no better than noise.
     let excess = test.excess.max(0.0);
-    let spread = |mean: f64| log_normal(excess - mean, test.std);
     let there = [
-        (1.0 - VISIBLE_ERRORS).ln() + spread(0.0),
-        VISIBLE_ERRORS.ln() + log_mean(|u| spread(u * small_errors), |u| (-u).exp()),
+        (1.0 - VISIBLE_ERRORS).ln() + log_normal(excess, test.std),
+        VISIBLE_ERRORS.ln() + log_density(excess, test.std, small_errors, |u| (-u).exp()),
     ];
-    let stand_in = log_mean(|u| spread(u * gain), left_by_a_stand_in);
-    log_sum(&there) - stand_in
+    log_sum(&there) - log_density(excess, test.std, gain, stand_in)
 }
 
-/// Density of u = rest found / gain for a stand-in: the share that it explains is anything from none to all, which makes
-/// the ratio of rest to explained x with density (1 + x)⁻², and a test sees any share κ of the rest, u = κ x.
-fn left_by_a_stand_in(u: f64) -> f64 {
+/// Density of x = rest / gain for a stand-in: the share 1/(1 + x) that it explains is anything from none to all.
+fn rest_of_a_stand_in(x: f64) -> f64 {
+    (1.0 + x).powi(-2)
+}
+
+/// Density of u = κ x where a test sees a part κ of the rest that is anything from none to all.
+fn part_of_a_rest(u: f64) -> f64 {
     (1.0 / u).ln_1p() - 1.0 / (1.0 + u)
 }
 
 fn log_normal(difference: f64, std: f64) -> f64 {
     -0.5 * ((difference / std).powi(2) + (TAU * std * std).ln())
+}
+
+/// ln of the density of finding `excess` ± `std` where the true excess over `scale` has the density `of`.
+fn log_density(excess: f64, std: f64, scale: f64, of: fn(f64) -> f64) -> f64 {
+    /// Standard deviations from which on the scatter is too narrow to matter.
+    const NARROW: f64 = 8.0;
+    const STEPS: usize = 1000;
+    if excess > NARROW * std {
+        return of(excess / scale).ln() - scale.ln();
+    }
+    // On a logarithmic grid: densities may be steep at zero, and either width may be the smaller one.
+    let (low, high) = (1e-6 * std.min(scale), 2.0 * NARROW * std);
+    let step = (high / low).ln() / STEPS as f64;
+    let terms: Vec<f64> = (0..=STEPS)
+        .map(|i| low * (i as f64 * step).exp())
+        .map(|e| log_normal(excess - e, std) + (of(e / scale) * e / scale * step).ln())
+        .collect();
+    log_sum(&terms)
 }
 
 fn log_sum(logs: &[f64]) -> f64 {
@@ -66,17 +93,6 @@ fn log_sum(logs: &[f64]) -> f64 {
         return most;
     }
     most + logs.iter().map(|l| (l - most).exp()).sum::<f64>().ln()
-}
-
-/// ln ∫ e^{f(u)} density(u) du over u > 0, on a logarithmic grid from 10⁻⁶ to 10⁴.
-fn log_mean(f: impl Fn(f64) -> f64, density: impl Fn(f64) -> f64) -> f64 {
-    const STEPS: usize = 600;
-    let step = 10.0f64.powi(10).ln() / STEPS as f64;
-    let terms: Vec<f64> = (0..=STEPS)
-        .map(|i| 1e-6 * (i as f64 * step).exp())
-        .map(|u| f(u) + (density(u) * u * step).ln())
-        .collect();
-    log_sum(&terms)
 }
 
 /// Share of what stands above the noise that an effect with this gain of χ² explains, and its standard deviation. `rest`:
@@ -110,18 +126,24 @@ mod tests {
 
     #[test]
     fn densities_are_densities() {
-        let unity = |density: fn(f64) -> f64| log_mean(|_| 0.0, density).exp();
-        assert!(
-            (unity(left_by_a_stand_in) - 1.0).abs() < 2e-3,
-            "{}",
-            unity(left_by_a_stand_in)
-        );
-        assert!((unity(|u| (-u).exp()) - 1.0).abs() < 1e-3);
-        let normal: f64 = (-4000..=4000)
-            .map(|i| log_normal(f64::from(i) * 0.01, 2.0).exp() * 0.01)
-            .sum();
-        assert!((normal - 1.0).abs() < 1e-6);
-        assert!((log_normal(0.0, 1.0) + 0.5 * TAU.ln()).abs() < 1e-12);
+        let exponential: fn(f64) -> f64 = |u| (-u).exp();
+        for of in [rest_of_a_stand_in, part_of_a_rest, exponential] {
+            // Over what may be found, from far below zero on, for scatter narrow and wide against the density.
+            for (std, tail) in [(0.3, 0.06), (5.0, 0.1)] {
+                let step = 0.05 * std;
+                let sum: f64 = (-160..160)
+                    .map(|i| log_density(f64::from(i) * step, std, 1.0, of).exp() * step)
+                    .sum();
+                let beyond: f64 = (0..20000)
+                    .map(|i| 8.0 * std + (f64::from(i) + 0.5) * 0.05)
+                    .map(|x| of(x) * 0.05)
+                    .sum();
+                assert!((sum + beyond - 1.0).abs() < tail, "{std}: {sum} {beyond}");
+            }
+        }
+        // The narrow limit is the general case's.
+        let [below, above] = [7.99, 8.01].map(|z| log_density(z, 1.0, 50.0, part_of_a_rest));
+        assert!((below - above).abs() < 0.02, "{below} {above}");
     }
 
     #[test]
@@ -136,6 +158,11 @@ mod tests {
     #[test]
     fn a_rest_as_large_as_what_is_explained_is_something_else() {
         assert!(odds(5000.0, &rest(3000.0, 100.0)) > 3.0);
+        // Without end where no error of a setup is as large; a probability all the same.
+        let beyond = odds(2e5, &rest(1e7, 10.0));
+        assert!(beyond > 1e100 && 1.0 / (1.0 + 1.0 / beyond) == 1.0, "{beyond}");
+        // However sharply it is seen, and however small it is against what the effect explains.
+        assert!(odds(2e5, &rest(1.5e5, 16.0)) > 1e3);
         // One that a good setup leaves anyway is not, if the effect is far larger.
         assert!(odds(2e5, &rest(400.0, 50.0)) < 0.2);
         assert!(odds_of_pair(5e3, &rest(0.0, 50.0)) > odds(5e3, &rest(0.0, 50.0)));

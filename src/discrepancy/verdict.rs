@@ -194,7 +194,7 @@ pub fn decide<M, I>(
         decision.verdict = Verdict::Unknown;
         decision.companion = None;
         decision.best_guess = Some(w);
-        decision.confidence = odds_else / (1.0 + odds_else + beaten);
+        decision.confidence = 1.0 / (1.0 + (1.0 + beaten) / odds_else);
     }
     decision.confidence = decision.confidence.clamp(0.05, MOST_SURE);
     decision

@@ -148,7 +148,10 @@ impl Study for CuttingStudy {
         let total: f64 = fits.iter().map(|f| f.chi2).sum();
         let freedom = data.value_count() as f64 - theta.len() as f64;
         let (common, values) = common_wave(data, &fits);
-        let (apart, differences) = rest::apart(&problem.by_cut(theta)?);
+        // A limit cycle is as large as it likes in each cut: cuts that vibrate say nothing about what is the same in all.
+        let calm = data.filtered(|i| data.cuts[i].vibration.is_none());
+        let calm = CuttingProblem { model, data: &calm };
+        let (apart, differences) = rest::apart(&calm.by_cut(theta)?);
         let tests = [
             (LIKE_CUTS, apart, differences),
             (COMMON_WAVE, common, values),
@@ -244,7 +247,12 @@ fn common_wave(data: &CuttingData, fits: &[CutFit]) -> (f64, f64) {
     let mut sums: Vec<(Complex64, f64)> = Vec::new();
     let orders = data.cuts.iter().map(|c| c.orders).max().unwrap_or(0);
     sums.resize(4 * orders, (Complex64::ZERO, 0.0));
-    for (cut, fit) in data.cuts.iter().zip(fits) {
+    let calm = data
+        .cuts
+        .iter()
+        .zip(fits)
+        .filter(|(cut, _)| cut.vibration.is_none());
+    for (cut, fit) in calm {
         for (i, (channel, fitted)) in cut.channels.iter().zip(&fit.channels).enumerate() {
             let (Some(channel), Some(fitted)) = (channel, fitted) else {
                 continue;

@@ -41,7 +41,7 @@ pub fn cutting(campaign: &Campaign, findings: &CuttingFindings) -> Outcome {
         "site": Value::Null,
         "confidence": d.confidence,
         "too_little_data": d.too_little_data,
-        "too_little_data": d.too_little_data,
+        "pairs": d.pairs.map(|[tried, of]| json!({ "tried": tried, "of": of })),
         "companion": d.companion,
         "best_guess": d.best_guess.map(|i| d.candidates[i].label()),
         "explained_share": explained_share(d).map(|[share, _]| share),
@@ -98,6 +98,8 @@ pub fn structure(campaign: &Campaign, findings: &DiagnosisFindings) -> Outcome {
         "effect": diagnosis.winner().map(|c| &c.name.effect),
         "site": diagnosis.winner().and_then(|c| c.name.site.as_ref()),
         "confidence": diagnosis.confidence,
+        "too_little_data": diagnosis.too_little_data,
+        "pairs": diagnosis.pairs.map(|[tried, of]| json!({ "tried": tried, "of": of })),
         "companion": diagnosis.companion,
         "best_guess": diagnosis.best_guess.map(|i| diagnosis.candidates[i].label()),
         "explained_share": explained_share(diagnosis).map(|[share, _]| share),
@@ -305,6 +307,11 @@ fn rest<M, I>(d: &Diagnosis<M, I>, next_measurement: &NextMeasurement) -> String
         text += &format!(
             "  This data cannot tell it from: {}\n",
             d.indistinguishable.join(", ")
+        );
+    }
+    if let Some([tried, of]) = d.pairs.filter(|[tried, of]| tried < of) {
+        text += &format!(
+            "  Of {of} pairs of effects {tried} were tried, the likeliest first: there was no time for more\n"
         );
     }
     let rows: Vec<Vec<String>> = d

@@ -104,6 +104,9 @@ pub struct Diagnosis<M, I> {
     pub baseline: Baseline,
     /// Effects that this data cannot show, with the reason.
     pub not_tried: Vec<(String, String)>,
+    /// Pairs of effects that were looked at, of how many there are beside the leaders; `None` where one effect is enough or
+    /// pairs are hopeless.
+    pub pairs: Option<[usize; 2]>,
 }
 
 impl<M, I> Diagnosis<M, I> {
@@ -158,8 +161,14 @@ const SHARED: usize = 6;
 const PAIR_LEADERS: usize = 2;
 /// Share of the excess misfit that one effect of a pair must explain alone: where none does, the search is hopeless.
 const PAIR_SHARE: f64 = 0.3;
-/// Pairs that are followed to their end.
+/// Pairs that are followed to their end on the coarse view, and those of them on all data.
 const PAIRS_SETTLED: usize = 4;
+const PAIRS_REFINED: usize = 2;
+/// Processor time that looks at pairs may take, s (see [`Study::work_s`]), the evaluations with derivatives of one look, and
+/// the pairs that are looked at in any case.
+const PAIRS_BUDGET_S: f64 = 4.0;
+const LOOK_EVALUATIONS: f64 = 20.0;
+const FEWEST_PAIRS: usize = 12;
 
 const REFINE: Stopping = Stopping {
     max_iterations: 25,
@@ -340,12 +349,15 @@ impl<'a, S: Study> Engine<'a, S> {
             .collect();
         self.test_rests(&mut candidates, &credible)?;
         let winner = credible.iter().position(|c| *c);
+        let mut pairs = None;
         let pair = match winner {
             Some(w)
                 if verdict::leaves_structure(&candidates[w])
                     && candidates[w].share_above_noise(&baseline) > PAIR_SHARE =>
             {
-                self.best_pair(&candidates, &credible, &evidence)?
+                let (best, counts) = self.best_pair(&candidates, &credible, &evidence)?;
+                pairs = Some(counts);
+                best
             }
             _ => None,
         };
@@ -372,6 +384,7 @@ impl<'a, S: Study> Engine<'a, S> {
             candidates,
             baseline,
             not_tried: self.not_tried,
+            pairs,
         })
     }
 
@@ -537,8 +550,13 @@ impl<'a, S: Study> Engine<'a, S> {
         candidates: &[CandidateOf<S>],
         credible: &[bool],
         evidence: &Evidence,
-    ) -> Result<Option<verdict::Pair>> {
+    ) -> Result<(Option<verdict::Pair>, [usize; 2])> {
         let study = self.study;
+        let mut counts = [0, 0];
+        let standing = |instance: &S::Instance| {
+            let label = self.label(instance);
+            candidates.iter().position(|c| c.label() == label)
+        };
         let leaders: Vec<usize> = (0..candidates.len())
             .filter(|i| credible[*i])
             .take(PAIR_LEADERS)
@@ -549,11 +567,18 @@ impl<'a, S: Study> Engine<'a, S> {
             let leader = &candidates[first];
             let bases = [leader.theta.clone()];
             let hints = study.hints(&leader.model, &leader.theta)?;
-            let seconds: Vec<&S::Instance> = self
+            let mut seconds: Vec<&S::Instance> = self
                 .instances
                 .iter()
                 .filter(|s| self.label(s) != leader.label())
                 .collect();
+            // Those that explain most alone come first, should the budget not reach to the end.
+            seconds.sort_by_key(|s| standing(s).unwrap_or(candidates.len()));
+            let look_s = LOOK_EVALUATIONS * study.work_s(&leader.model, Extent::Glance);
+            let affordable = (PAIRS_BUDGET_S / look_s.max(1e-9)) as usize;
+            counts[1] += seconds.len();
+            seconds.truncate(affordable.max(FEWEST_PAIRS));
+            counts[0] += seconds.len();
             let mut pairs: Vec<TriedOf<S>> = seconds
                 .par_iter()
                 .filter_map(|second| {
@@ -564,14 +589,20 @@ impl<'a, S: Study> Engine<'a, S> {
                 .collect();
             pairs.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
             pairs.truncate(PAIRS_SETTLED);
-            let settled: Vec<TriedOf<S>> = pairs
-                .into_par_iter()
-                .map(|pair| {
-                    let near = self.minimise(&pair.model, View::COARSE, &pair.fit.theta, REFINE)?;
-                    let fit = self.minimise(&pair.model, View::FULL, &near.theta, REFINE)?;
-                    Ok(Tried { fit, ..pair })
-                })
-                .collect::<Result<_>>()?;
+            let follow = |pairs: Vec<TriedOf<S>>, view: View| -> Result<Vec<TriedOf<S>>> {
+                let mut settled: Vec<TriedOf<S>> = pairs
+                    .into_par_iter()
+                    .map(|pair| {
+                        let fit = self.minimise(&pair.model, view, &pair.fit.theta, REFINE)?;
+                        Ok(Tried { fit, ..pair })
+                    })
+                    .collect::<Result<_>>()?;
+                settled.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
+                Ok(settled)
+            };
+            let mut near = follow(pairs, View::COARSE)?;
+            near.truncate(PAIRS_REFINED);
+            let settled = follow(near, View::FULL)?;
             for pair in settled.iter().filter(|p| p.fit.at_bound.is_empty()) {
                 let reduced_chi2 = self.reduced_chi2(pair);
                 if self.is_impossible(pair, leader)? {
@@ -599,7 +630,7 @@ impl<'a, S: Study> Engine<'a, S> {
                 break;
             }
         }
-        Ok(best)
+        Ok((best, counts))
     }
 
     /// Whether one of a pair, fitted with `leader` and then its own effect, is of a size that is not possible.

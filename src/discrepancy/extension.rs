@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::verdict::{is_noise, is_progress};
+use super::verdict::{gain_by_chance, is_noise, is_progress};
 use crate::identify::Calibration;
 use crate::identify::levenberg_marquardt::{Stopping, minimise};
 use crate::identify::study::{
@@ -103,14 +103,20 @@ impl<M, I> Extension<M, I> {
             before = again;
         }
         // The model without the effect is one with it, at the effect's vanishing limit: the fit with the effect is never
-        // worse. The likelihood alone is compared; what is known of an effect beforehand supposes that it is there.
-        let chi2 =
-            |model: &M, c: &Calibration| Ok::<f64, Error>(study.residual(model, &c.theta)?.chi2_per_value);
+        // worse. The likelihood alone is compared; what is known of an effect beforehand supposes that it is there. A gain
+        // in likelihood that chance would bring, paid for with a larger error, is none.
+        let (was, is) = (
+            study.residual(model, &before.theta)?,
+            study.residual(&best.model, &after.theta)?,
+        );
+        let gain = (was.chi2_per_value - is.chi2_per_value) * study.real_values(Extent::Full) as f64;
+        let chance = after.reduced_chi2.max(1.0) / is.independent_share.min(1.0);
+        let by_chance = gain < chance * gain_by_chance(after.theta.len() - before.theta.len());
         let limit = study.vanishing(&best.model);
         let mut extended = best.model;
         let mut vanished = false;
         if let Some(limit) = limit
-            && chi2(&extended, &after)? > chi2(model, &before)?
+            && (gain < 0.0 || by_chance && is.nrms > was.nrms)
         {
             let own = &study.parameters(&extended)[before.theta.len()..];
             after = before.with_vanished(own, &limit);

@@ -71,7 +71,7 @@ const NRMS_MARGIN: f64 = 1e-3;
 /// others either: it is larger than the standard error of the paired differences, or no fold is predicted worse by more
 /// than chance.
 pub fn is_progress(without: &HeldOut, with: &HeldOut, parameters: usize, chance: f64) -> bool {
-    let threshold = ChiSquared::new(parameters.max(1) as f64).map_or(0.0, |d| d.inverse_cdf(1.0 - CHANCE));
+    let threshold = gain_by_chance(parameters);
     let pairs = without.by_fold.iter().zip(&with.by_fold);
     let gains: Vec<f64> = pairs.map(|(before, after)| (before - after) / chance).collect();
     let (count, total) = (gains.len() as f64, gains.iter().sum::<f64>());
@@ -79,6 +79,11 @@ pub fn is_progress(without: &HeldOut, with: &HeldOut, parameters: usize, chance:
     let variance = gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
     let steady = total > (count * variance).sqrt() || gains.iter().all(|g| *g > -threshold);
     total > threshold && steady && with.nrms() <= without.nrms() * (1.0 + NRMS_MARGIN)
+}
+
+/// Improvement of −2 ln L that so many parameters of an effect that is not there exceed with probability [`CHANCE`].
+pub fn gain_by_chance(parameters: usize) -> f64 {
+    ChiSquared::new(parameters.max(1) as f64).map_or(0.0, |d| d.inverse_cdf(1.0 - CHANCE))
 }
 
 /// Whether an improvement is more than chance: corrected p-value and BIC difference.

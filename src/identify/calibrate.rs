@@ -147,7 +147,7 @@ const FAR_ABOVE_NOISE: f64 = 1.5;
 const SUSPICIOUS_CHI2: f64 = 1.15;
 /// Complex values on which starting points are followed, about; and those on which they are compared only.
 const SKETCH_VALUES: usize = 6000;
-const GLANCE_VALUES: usize = 1000;
+pub(super) const GLANCE_VALUES: usize = 1000;
 /// Lines of each FRF that a sketch keeps at least: a robot's resonances are some per cent wide.
 const SKETCH_LINES: usize = 100;
 /// Every how many lines a sketch keeps at most, where there are more than enough.
@@ -219,7 +219,7 @@ pub fn refine(model: &StructureModel, data: &FrfData, start: &[f64]) -> Result<F
 }
 
 /// About so many complex values of the data, spread over lines, references and postures.
-fn sketch(data: &FrfData, values: usize) -> FrfData {
+pub(super) fn sketch(data: &FrfData, values: usize) -> FrfData {
     let lines = data.blocks.iter().map(|b| b.frequency_hz.len()).min();
     let lines = lines.unwrap_or(0).max(1);
     let share = |data: &FrfData| data.value_count().div_ceil(values).max(1);
@@ -243,11 +243,12 @@ fn sketch(data: &FrfData, values: usize) -> FrfData {
 const FACTORS: i32 = 10;
 const LARGEST_LN_FACTOR: f64 = 3.5;
 /// Values of one joint's stiffness that are tried with the others as they are: so many to either side, …
-const ONE_JOINT: i32 = 6;
+const ONE_JOINT: i32 = 8;
 /// … this far apart, natural logarithm.
 const ONE_JOINT_STEP: f64 = 0.25;
-/// Starting points that the scans may give.
-const SCANNED: usize = 4;
+/// Starting points that a scan may give, and how often single joints are scanned.
+const SCANNED: usize = 3;
+const ROUNDS: usize = 4;
 
 /// Where a scan of `values` along `direction` from `theta` has its local minima of the log magnitudes' misfit, with their
 /// costs, beside the one in the middle.
@@ -276,27 +277,70 @@ fn valleys(
         .collect()
 }
 
-/// Starting points that a look at the data along lines through the parameters suggests: all joints stiffer or softer by
-/// one factor than the robot file says, and single joints beside where `found` has them.
-fn scanned_starts(model: &StructureModel, sketch_data: &FrfData, found: &[f64]) -> Vec<Vec<f64>> {
-    let glance = sketch(sketch_data, GLANCE_VALUES);
-    let problem = problem(model, &glance, Misfit::LogMagnitude);
-    let bounds = model.bounds();
-    let joints: Vec<usize> = (0..model.robot.joint_count()).collect();
-    let steps =
-        |count: i32, step: f64| -> Vec<f64> { (-count..=count).map(|k| f64::from(k) * step).collect() };
-    let common = steps(FACTORS, LARGEST_LN_FACTOR / f64::from(FACTORS));
-    let mut starts = valleys(&problem, &model.nominal_theta(), &bounds, &joints, &common);
-    starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-    starts.truncate(SCANNED / 2);
-    let single = steps(ONE_JOINT, ONE_JOINT_STEP);
-    let mut beside: Vec<(f64, Vec<f64>)> = joints
-        .iter()
-        .flat_map(|joint| valleys(&problem, found, &bounds, &[*joint], &single))
+/// A look at very few of the data along lines through the parameters: where further starting points promise most.
+struct Scan<'a> {
+    model: &'a StructureModel,
+    glance: &'a FrfData,
+    bounds: Vec<[f64; 2]>,
+}
+
+impl Scan<'_> {
+    fn valleys(&self, theta: &[f64], moved: &[usize], count: i32, step: f64) -> Vec<(f64, Vec<f64>)> {
+        let offsets: Vec<f64> = (-count..=count).map(|k| f64::from(k) * step).collect();
+        let problem = problem(self.model, self.glance, Misfit::LogMagnitude);
+        valleys(&problem, theta, &self.bounds, moved, &offsets)
+    }
+
+    /// All joints stiffer or softer by one factor than the robot file says.
+    fn common_factor(&self) -> Vec<Vec<f64>> {
+        let joints: Vec<usize> = (0..self.model.robot.joint_count()).collect();
+        let step = LARGEST_LN_FACTOR / f64::from(FACTORS);
+        lowest(self.valleys(&self.model.nominal_theta(), &joints, FACTORS, step))
+    }
+
+    /// Single joints beside where `found` has them.
+    fn single_joints(&self, found: &[f64]) -> Vec<Vec<f64>> {
+        let joints = 0..self.model.robot.joint_count();
+        lowest(
+            joints
+                .flat_map(|joint| self.valleys(found, &[joint], ONE_JOINT, ONE_JOINT_STEP))
+                .collect(),
+        )
+    }
+}
+
+/// The most promising starting points of a scan.
+fn lowest(mut points: Vec<(f64, Vec<f64>)>) -> Vec<Vec<f64>> {
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    points.truncate(SCANNED);
+    points.into_iter().map(|(_, point)| point).collect()
+}
+
+/// Short fits from `points`, and to their end those that are not left far behind, `first` among them; best first.
+fn race(model: &StructureModel, sketch: &FrfData, points: &[Vec<f64>], first: Fit) -> Vec<Fit> {
+    let progress = Progress::new("calibrating from further starting points", points.len());
+    let look = Stopping {
+        max_iterations: LOOK_ITERATIONS,
+        ..ROUGH
+    };
+    let looks: Vec<Fit> = points
+        .par_iter()
+        .filter_map(|start| {
+            let fit = approach(model, sketch, start, look).ok().map(|(fit, _)| fit);
+            progress.step();
+            fit
+        })
         .collect();
-    beside.sort_by(|a, b| a.0.total_cmp(&b.0));
-    beside.truncate(SCANNED / 2);
-    starts.into_iter().chain(beside).map(|(_, start)| start).collect()
+    // Starts that a look leaves far behind the others would only end beside the answer.
+    let lowest = looks.iter().map(|f| f.cost).fold(first.cost, f64::min);
+    let mut fits: Vec<Fit> = looks
+        .par_iter()
+        .filter(|look| look.cost < HOPELESS * lowest)
+        .filter_map(|look| resume(model, sketch, &look.theta).ok().map(|(fit, _)| fit))
+        .collect();
+    fits.push(first);
+    fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    fits
 }
 
 /// Calibrates `model` to `data`, from the solution that the model brings along where it has one, else from its nominal
@@ -331,38 +375,30 @@ pub fn calibrate(
         }
     }
     if misfit(&first, &sketch_data) > SUSPICIOUS_CHI2 && options.extra_starts > 0 {
-        let mut points = scanned_starts(model, &sketch_data, &first.theta);
+        let glance = sketch(&sketch_data, GLANCE_VALUES);
+        let scan = Scan {
+            model,
+            glance: &glance,
+            bounds: model.bounds(),
+        };
+        let mut points = scan.common_factor();
         let centre = points.first().unwrap_or(&nominal);
         let scattered = scattered_about(&model.parameters, centre, options.extra_starts, options.seed);
         points.extend(scattered);
-        let progress = Progress::new("calibrating from further starting points", points.len());
-        let look = Stopping {
-            max_iterations: LOOK_ITERATIONS,
-            ..ROUGH
-        };
-        let looks: Vec<Fit> = points
-            .par_iter()
-            .filter_map(|start| {
-                let fit = approach(model, &sketch_data, start, look)
-                    .ok()
-                    .map(|(fit, _)| fit);
-                progress.step();
-                fit
-            })
-            .collect();
-        // Starts that a look leaves far behind the others would only end beside the answer.
-        let lowest = looks.iter().map(|f| f.cost).fold(first.cost, f64::min);
-        let mut fits: Vec<Fit> = looks
-            .par_iter()
-            .filter(|look| look.cost < HOPELESS * lowest)
-            .filter_map(|look| resume(model, &sketch_data, &look.theta).ok().map(|(fit, _)| fit))
-            .collect();
-        starts += points.len();
-        fits.push(first);
-        let lowest = fits.iter().map(|f| f.cost).fold(f64::INFINITY, f64::min);
-        agreeing = fits.iter().filter(|f| f.cost < lowest * 1.001).count();
-        fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-        first = fits.swap_remove(0);
+        for _ in 0..ROUNDS {
+            points.extend(scan.single_joints(&first.theta));
+            let before = first.cost;
+            let mut fits = race(model, &sketch_data, &points, first);
+            starts += points.len();
+            let lowest = fits[0].cost;
+            agreeing = fits.iter().filter(|f| f.cost < lowest * 1.001).count();
+            first = fits.swap_remove(0);
+            // A joint that was trapped lets go of the others: from a better point the next look along each joint may help.
+            if first.cost > before * (1.0 - 1e-3) || misfit(&first, &sketch_data) < SUSPICIOUS_CHI2 {
+                break;
+            }
+            points.clear();
+        }
     }
     let best = refine(model, data, &first.theta)?;
     iterations += best.iterations;

@@ -421,6 +421,10 @@ impl Study for ResonanceStudy {
     }
 
     /// A frequency and a size for each resonance; there are too few to leave any out.
+    fn work_s(&self, _model: &StructureModel, _extent: Extent) -> f64 {
+        1e-4 * self.configurations.len() as f64
+    }
+
     fn real_values(&self, _extent: Extent) -> usize {
         2 * self.resonances.len()
     }

@@ -308,6 +308,37 @@ impl StructureModel {
         FrfBasis::new(&chain.system(count), &rows)
     }
 
+    /// Roughly the processor time of one evaluation on `data` with all derivatives, s, from the number of coordinates.
+    pub fn work_s(&self, data: &FrfData) -> f64 {
+        /// Seconds of one complex multiplication, sums included.
+        const MULTIPLICATION_S: f64 = 2e-9;
+        let count = self.parameters.len() as f64;
+        let theta = self.nominal_theta();
+        let of_block = |block: &FrfBlock| {
+            let chain = self.chain(&theta, &block.kinematics, block.lowness, false);
+            // Six coordinates of each body move with mass, the others give way without.
+            let most =
+                6 * chain.bodies.len() + chain.branches.iter().map(|b| b.directions.len()).sum::<usize>();
+            let damped = chain.elements.iter().any(|e| e.damping.is_some());
+            let all = chain.coordinate_count();
+            let n = if damped { all } else { all.min(most) } as f64;
+            let coupled = damped || !chain.branches.is_empty();
+            let outputs = block.outputs.len() as f64;
+            let mut inputs: Vec<usize> = block.frfs.iter().map(|f| f.input).collect();
+            inputs.sort_unstable();
+            inputs.dedup();
+            let solved = if coupled {
+                n * n * (n / 3.0 + outputs)
+            } else {
+                n * outputs
+            };
+            let slopes = inputs.len() as f64 * count * n * (n + outputs);
+            let residuals = block.frfs.len() as f64 * count * count;
+            block.frequency_hz.len() as f64 * (solved + slopes + residuals)
+        };
+        MULTIPLICATION_S * data.blocks.iter().map(|b| of_block(b)).sum::<f64>()
+    }
+
     /// Predicted receptances, m/N, in the order of `data.frfs()`.
     pub fn predict(&self, theta: &[f64], data: &FrfData) -> Result<Vec<Vec<Complex64>>> {
         let filter = self.filter(theta, false);

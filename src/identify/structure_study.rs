@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use super::calibrate::{Calibration, Estimate, Options, calibrate};
+use super::calibrate::{Calibration, Estimate, GLANCE_VALUES, Options, calibrate, sketch};
 use super::frf_data::FrfData;
 use super::levenberg_marquardt::Stopping;
 use super::rest::{self, Rest, SMALL_ERROR};
@@ -21,6 +21,7 @@ pub struct StructureStudy {
     /// Where the measured modes put the model, solver's scale: a starting point of its calibration.
     measured: Option<Vec<f64>>,
     coarse: FrfData,
+    glance: FrfData,
     /// Postures that are left out in turn, and the data without each.
     postures: Vec<usize>,
     coarse_without: Vec<FrfData>,
@@ -52,6 +53,7 @@ impl StructureStudy {
             postures.iter().map(|&p| data.filtered(|q| q != p)).collect()
         };
         StructureStudy {
+            glance: sketch(&coarse, GLANCE_VALUES),
             coarse_without: without(&coarse),
             full_without: without(&data),
             summary: data.summary(),
@@ -74,9 +76,11 @@ impl StructureStudy {
 
     fn view(&self, view: View) -> &FrfData {
         match (view.extent, view.left_out) {
+            (Extent::Glance, None) => &self.glance,
             (Extent::Coarse, None) => &self.coarse,
             (Extent::Full, None) => &self.data,
-            (Extent::Coarse, Some(fold)) => &self.coarse_without[fold],
+            // A fold is too little to glance at.
+            (Extent::Glance | Extent::Coarse, Some(fold)) => &self.coarse_without[fold],
             (Extent::Full, Some(fold)) => &self.full_without[fold],
         }
     }
@@ -159,6 +163,10 @@ impl Study for StructureStudy {
             },
             stride: 1,
         }
+    }
+
+    fn work_s(&self, model: &StructureModel, extent: Extent) -> f64 {
+        model.work_s(self.view(View { extent, ..View::FULL }))
     }
 
     fn real_values(&self, extent: Extent) -> usize {

@@ -13,6 +13,8 @@ use crate::{Error, Result};
 /// How much of the data a fit uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Extent {
+    /// Hardly more than shows the strong effects, for looks at very many models.
+    Glance,
     /// A share of the data that shows every effect, for trying many starting points.
     Coarse,
     /// Everything.
@@ -119,6 +121,10 @@ pub trait Study: Sync {
 
     fn problem<'a>(&'a self, model: &'a Self::Model, view: View) -> Self::Problem<'a>;
 
+    /// Roughly the processor time of one evaluation of `model` with its derivatives on a view, s: what budgets are counted in.
+    /// From the sizes of the model and the data, not from a clock, so that the same work is done everywhere.
+    fn work_s(&self, model: &Self::Model, extent: Extent) -> f64;
+
     /// Real values in a view.
     fn real_values(&self, extent: Extent) -> usize;
 
@@ -223,7 +229,7 @@ const TRAP_MISFIT: f64 = 3.0;
 /// How hard a fit of an effect is tried.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Effort {
-    /// A few steps from the best starting point.
+    /// A few steps from the best starting point, on a glance at the data.
     Look,
     /// To the end, from every base that starts near enough.
     Direct,
@@ -270,14 +276,17 @@ fn look<S: Study>(
     effort: Effort,
 ) -> Result<Vec<Fit>> {
     let bounds = study.bounds(model);
-    let likelihood = study.problem(model, View::COARSE);
-    let rough = study.problem(
-        model,
-        View {
-            measure: Measure::Rough,
-            ..View::COARSE
-        },
-    );
+    let extent = match effort {
+        Effort::Look => Extent::Glance,
+        Effort::Direct | Effort::Staged => Extent::Coarse,
+    };
+    let view = |measure| View {
+        extent,
+        measure,
+        ..View::COARSE
+    };
+    let likelihood = study.problem(model, view(Measure::Likelihood));
+    let rough = study.problem(model, view(Measure::Rough));
     let lowest = |problem: &S::Problem<'_>, base: &[f64]| -> Option<(f64, Vec<f64>)> {
         let starts = own.iter().map(|own| [base, own.as_slice()].concat());
         starts

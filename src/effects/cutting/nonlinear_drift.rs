@@ -14,6 +14,8 @@ fn channels(process: Process) -> std::ops::Range<usize> {
 
 /// A transient shorter than this is over before the first sample: there is none, and no amplitude to fit.
 const AT_ONCE_S: f64 = 1e-8;
+/// A leak slower than this leaks nothing.
+const FOR_EVER_S: f64 = 1e9;
 
 impl CuttingEffect for NonlinearDrift {
     fn id(&self) -> &'static str {
@@ -82,6 +84,13 @@ impl CuttingEffect for NonlinearDrift {
     }
 
     fn apply(&self, variant: usize, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
+        let is_gone = |tau: &Dual| match variant {
+            0 => tau.value < AT_ONCE_S,
+            _ => tau.value > FOR_EVER_S,
+        };
+        if values.iter().all(is_gone) {
+            return;
+        }
         let first = channels(setting.process).start;
         let by_channel = |missing: f64, f: &dyn Fn(&Dual) -> Dual| {
             std::array::from_fn(|i| {
@@ -91,9 +100,6 @@ impl CuttingEffect for NonlinearDrift {
             })
         };
         if variant == 0 {
-            if values.iter().all(|tau| tau.value < AT_ONCE_S) {
-                return;
-            }
             physics.transient_s = Some(by_channel(1.0, &|tau| tau.clone()));
         } else {
             physics.leak_per_s = Some(by_channel(0.0, &|tau| tau.recip()));

@@ -1,14 +1,16 @@
 //! Time records from text: DynoWare exports and plain force tables. Channel roles, units, time axis.
 
-use std::ops::Range;
-
 use super::InputError;
-use super::clock::{self, Grid, Stamps};
+use super::clock;
 use super::number;
 use super::table::{Header, Table};
 use super::text::Notes;
 use super::units::{self, Dimension, Unit};
 use super::{Channel, ChannelRole, TimeRecord, checks};
+
+mod time_axis;
+
+use time_axis::{Clock, Lost, Runs, fill, refused, time_axis, time_unit};
 
 /// True where the table is a time record: a time column, or a sampling rate above it.
 pub(super) fn is_time_table(header: &Header) -> bool {
@@ -39,17 +41,6 @@ pub(super) struct Pieces {
     is_whole: bool,
     /// Puts right the unit of the time column.
     time_unit: Option<f64>,
-}
-
-/// How the time column runs, decided from the first piece.
-#[derive(Debug, Clone, Copy)]
-struct Clock {
-    rate_hz: f64,
-    start_s: f64,
-    /// Rounding of the printed times; `None` where they are too coarse to show gaps.
-    rounding_s: Option<f64>,
-    /// Where the times are not even: what the samples are put on.
-    grid: Option<Grid>,
 }
 
 impl Pieces {
@@ -104,7 +95,7 @@ impl Pieces {
             (Some(clock), Some(at)) if clock.rounding_s.is_some() && rows > 2 => {
                 let runs = Runs::find(&table.columns[at], self.resolution_s);
                 let same = (runs.step_s * clock.rate_hz - 1.0).abs() <= 1e-3 + 2.0 * runs.rounding;
-                if !(same && runs.are_even(&table.columns[at], self.resolution_s)) {
+                if !(same && runs.are_even(&table.columns[at])) {
                     return Err(refused(
                         "steps that change, in a file too long to be resampled at once",
                         header,
@@ -207,40 +198,6 @@ impl Pieces {
 fn time_factor(header: &Header, at: usize) -> f64 {
     let unit = column_unit(header, at).filter(|u| u.dimension == Dimension::TIME);
     unit.map_or(1.0, |u| u.factor)
-}
-
-/// A place where samples are missing: those behind sample `after`, so many.
-#[derive(Debug, Clone, Copy)]
-struct Gap {
-    after: usize,
-    missing: usize,
-}
-
-/// Puts a straight line into the gaps; gives where it now runs.
-fn fill(values: &mut Vec<f64>, gaps: &[Gap]) -> Vec<Range<usize>> {
-    if gaps.is_empty() {
-        return Vec::new();
-    }
-    let missing: usize = gaps.iter().map(|g| g.missing).sum();
-    let mut whole = Vec::with_capacity(values.len() + missing);
-    let (mut filled, mut done) = (Vec::new(), 0);
-    for gap in gaps {
-        let Some([from, to]) = values
-            .get(gap.after..gap.after + 2)
-            .and_then(|v| v.first_chunk::<2>())
-        else {
-            continue;
-        };
-        whole.extend_from_slice(&values[done..=gap.after]);
-        done = gap.after + 1;
-        let start = whole.len();
-        let step = (to - from) / (gap.missing + 1) as f64;
-        whole.extend((1..=gap.missing).map(|k| from + step * k as f64));
-        filled.push(start..whole.len());
-    }
-    whole.extend_from_slice(&values[done..]);
-    *values = whole;
-    filled
 }
 
 fn no_time(header: &Header) -> InputError {
@@ -422,20 +379,15 @@ fn suffix_label(name: &str, unit: Unit) -> Option<String> {
     }
 }
 
-/// Resolution of the printed time: a unit in the last place of the coarsest of the first, middle and last rows.
+/// Resolution of the printed time: a unit in the last place, in the coarsest of the first, middle and last stretches of rows.
+/// Within a stretch the finest counts: some programs leave trailing zeros out (`0`, `0.001`, …, `0.1`).
 fn time_resolution(bytes: &[u8], header: &Header, column: usize) -> f64 {
+    const STRETCH: usize = 12;
     let data = bytes.get(header.data_at..).unwrap_or_default();
     if header.decimal_comma_between_commas {
         return 1e-6;
     }
-    let places = |from: usize| {
-        let rest = &data[from..];
-        let start = if from == 0 {
-            0
-        } else {
-            rest.iter().position(|b| *b == b'\n')? + 1
-        };
-        let line = super::text::Lines::new(&rest[start..]).next()?;
+    let place = |line: &[u8]| {
         let line = super::text::decode(line);
         let field = super::table::split_line(&line, header.delimiter)
             .into_iter()
@@ -447,249 +399,18 @@ fn time_resolution(bytes: &[u8], header: &Header, column: usize) -> f64 {
             .map_or(0, str::len) as i32;
         Some(exponent.parse::<i32>().ok()?.saturating_sub(fraction))
     };
-    let coarsest = [0, data.len() / 2, data.len().saturating_sub(200)]
+    let places = |from: usize| {
+        let rest = &data[from..];
+        let start = match from {
+            0 => 0,
+            _ => rest.iter().position(|b| *b == b'\n')? + 1,
+        };
+        let lines = super::text::Lines::new(&rest[start..]).take(STRETCH);
+        lines.filter_map(place).min()
+    };
+    let coarsest = [0, data.len() / 2, data.len().saturating_sub(600)]
         .into_iter()
         .filter_map(places)
         .max();
     10_f64.powi(coarsest.unwrap_or(-9).clamp(-12, 3))
-}
-
-/// Sampling rate and start from the time column, checked against the rate of the header. The column is what was
-/// measured: a header describes the recording, an export may be decimated.
-fn time_axis(
-    seconds: &[f64],
-    resolution: f64,
-    header_rate: Option<f64>,
-    header: &Header,
-    is_whole: bool,
-    notes: &mut Notes,
-) -> Result<Clock, InputError> {
-    let start_s = seconds[0];
-    let runs = Runs::find(seconds, resolution);
-    if !(runs.step_s.is_finite() && runs.step_s > 0.0) {
-        let error = InputError::new("the time column does not rise").line(header.data_line);
-        return match header_rate {
-            Some(rate) if seconds.is_sorted() && resolution * rate > 1.0 => {
-                notes.file("the printed time is too coarse: time from the sampling rate");
-                Ok(Clock {
-                    rate_hz: rate,
-                    start_s,
-                    rounding_s: None,
-                    grid: None,
-                })
-            }
-            _ => Err(error.remedy("the time column must rise from row to row")),
-        };
-    }
-    if !runs.are_even(seconds, resolution) {
-        let (grid, told) = match clock::look(seconds, resolution) {
-            Ok(Stamps::Uneven(grid, told)) => (grid, told),
-            Ok(Stamps::Even(grid)) => (grid, "the times drift off their own steps: resampled".into()),
-            Err(problem) => return Err(refused(&problem, header)),
-        };
-        if !is_whole {
-            return Err(refused(
-                "steps that change, in a file too long to be resampled at once",
-                header,
-            ));
-        }
-        notes.file(told);
-        return Ok(Clock {
-            rate_hz: grid.rate_hz,
-            start_s,
-            rounding_s: None,
-            grid: Some(grid),
-        });
-    }
-    let (own, rounding) = (runs.step_s, runs.rounding);
-    let rate = match header_rate {
-        // Within the rounding of the printed time the header is the sharper witness.
-        Some(rate) if (own * rate - 1.0).abs() <= (1e-3_f64).max(2.0 * rounding) => rate,
-        other => {
-            if let Some(rate) = other {
-                notes.file(format!(
-                    "the header says {rate} Hz, the time column {:.6} Hz: the time column is taken",
-                    1.0 / own
-                ));
-            }
-            rounded_rate(own, rounding)
-        }
-    };
-    Ok(Clock {
-        rate_hz: rate,
-        start_s,
-        rounding_s: Some(resolution),
-        grid: None,
-    })
-}
-
-fn refused(problem: &str, header: &Header) -> InputError {
-    InputError::new(format!("the samples are not evenly spaced in time: {problem}"))
-        .line(header.data_line)
-        .remedy("export the record again with even steps, or cut the row range out that has them")
-}
-
-/// Factor that puts right a time column whose unit is called wrongly ("ms" on values in seconds): what the header's rate
-/// says, else nothing is put right and what cannot be is refused.
-fn time_unit(
-    seconds: &[f64],
-    resolution: f64,
-    factor: f64,
-    header_rate: Option<f64>,
-    header: &Header,
-    notes: &mut Notes,
-) -> Result<f64, InputError> {
-    let own = 1.0 / Runs::find(seconds, resolution).step_s;
-    if !(own.is_finite() && own > 0.0) {
-        return Ok(1.0);
-    }
-    if let Some(rate) = header_rate {
-        for k in [1e-6, 1e-3, 1e3, 1e6] {
-            if (own / (rate * k) - 1.0).abs() < 0.01 {
-                notes.file(format!(
-                    "the time column gives {own:.0} Hz, the header {rate} Hz: the unit of the times is called wrongly and put right"
-                ));
-                return Ok(k);
-            }
-        }
-        return Ok(1.0);
-    }
-    // Milliseconds are written for slow clocks; a megahertz of them is one second called one millisecond.
-    if (factor - 1e-3).abs() < 1e-9 && own >= MS_AT_MOST {
-        return Err(InputError::new(format!(
-            "the time column is in ms and gives {own:.0} samples a second: seconds called ms"
-        ))
-        .line(header.data_line.saturating_sub(1).max(1))
-        .remedy("name the column time_s, or add a line `Sampling rate [Hz]:,10000` above the names"));
-    }
-    Ok(1.0)
-}
-
-/// Sampling rate from which times in "ms" must be something else, Hz.
-const MS_AT_MOST: f64 = 1e6;
-
-/// Stretches of a time column without gaps, and the step in them.
-struct Runs {
-    /// Mean over all stretches, s; what rounding of the printed times leaves in it, as a part of it.
-    step_s: f64,
-    rounding: f64,
-    stretches: Vec<Range<usize>>,
-}
-
-impl Runs {
-    fn find(seconds: &[f64], resolution: f64) -> Runs {
-        let mut steps: Vec<f64> = seconds.windows(2).map(|w| w[1] - w[0]).collect();
-        let mut runs = Runs {
-            step_s: f64::NAN,
-            rounding: 0.0,
-            stretches: Vec::new(),
-        };
-        if steps.is_empty() {
-            return runs;
-        }
-        let mean = steps.iter().sum::<f64>() / steps.len() as f64;
-        let middle = steps.len() / 2;
-        let (_, &mut median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
-        // Where times are printed coarsely most steps are zero and the median says nothing.
-        let usual = 1.5 * median.max(mean.min(2.0 * resolution)) + 1.01 * resolution;
-        let is_gap = |w: &[f64]| !(-1.01 * resolution.max(1e-12)..=usual).contains(&(w[1] - w[0]));
-        let ends = seconds
-            .windows(2)
-            .enumerate()
-            .filter(|(_, w)| is_gap(w))
-            .map(|(i, _)| i + 1);
-        let (mut from, mut span_s, mut intervals) = (0, 0.0, 0);
-        for end in ends.chain([seconds.len()]) {
-            span_s += seconds[end - 1] - seconds[from];
-            intervals += end - 1 - from;
-            runs.stretches.push(from..end);
-            from = end;
-        }
-        if intervals > 0 && span_s > 0.0 {
-            runs.step_s = span_s / intervals as f64;
-            // Both ends of each stretch are rounded.
-            runs.rounding = resolution * (runs.stretches.len() as f64).sqrt() / span_s;
-        }
-        runs
-    }
-
-    fn are_even(&self, seconds: &[f64], resolution: f64) -> bool {
-        let even = |r: &Range<usize>| clock::is_even(&seconds[r.clone()], self.step_s, resolution);
-        self.stretches.iter().all(even)
-    }
-}
-
-/// Rate of a step: a whole number of hertz where the rounding of the times allows it.
-fn rounded_rate(step: f64, rounding: f64) -> f64 {
-    let rate = 1.0 / step;
-    let slack = 2.0 * rounding.max(1e-9);
-    if rate >= 1.0 && (rate.round() / rate - 1.0).abs() <= slack {
-        rate.round()
-    } else {
-        rate
-    }
-}
-
-/// Gaps may add up to this part of a record; beyond it the time column is something else than a clock.
-const FILL_AT_MOST: f64 = 0.1;
-
-/// Samples that were lost on the way, over all pieces.
-#[derive(Debug, Default)]
-struct Lost {
-    missing: f64,
-    places: usize,
-    first_after_s: Option<f64>,
-    backwards: usize,
-}
-
-impl Lost {
-    /// Where samples are missing in the times of a piece.
-    ///
-    /// # Errors
-    /// The problem, where too many are missing to be filled.
-    fn look(&mut self, seconds: &[f64], step: f64, resolution: f64) -> Result<Vec<Gap>, String> {
-        let slack = 0.5 * step + 1.01 * resolution;
-        let (mut missing, mut gaps, mut backwards) = (0.0, Vec::new(), 0);
-        for (after, pair) in seconds.windows(2).enumerate() {
-            let jump = pair[1] - pair[0];
-            if jump > step + slack {
-                let count = (jump / step).round() - 1.0;
-                missing += count;
-                gaps.push(Gap {
-                    after,
-                    missing: count as usize,
-                });
-            } else if jump < -1.01 * resolution.max(1e-12) {
-                backwards += 1;
-            }
-        }
-        self.backwards += backwards;
-        self.missing += missing;
-        self.places += gaps.len();
-        let first = gaps.first().map(|g| seconds[g.after]);
-        self.first_after_s = self.first_after_s.or(first);
-        match first {
-            Some(first) if missing > FILL_AT_MOST * seconds.len() as f64 => Err(format!(
-                "{missing:.0} samples dropped at {} places (the first after {first:.6} s) are too many to fill",
-                gaps.len()
-            )),
-            _ => Ok(gaps),
-        }
-    }
-
-    fn tell(&self, notes: &mut Notes) {
-        if self.backwards > 0 {
-            notes.file(format!(
-                "the time column runs backwards at {} places: the samples are taken as if they followed each other",
-                self.backwards
-            ));
-        }
-        let Some(first) = self.first_after_s else { return };
-        let places = if self.places == 1 { "place" } else { "places" };
-        notes.file(format!(
-            "{:.0} samples dropped at {} {places} (the first after {first:.6} s): the gaps are filled, so that times behind \
-             them are right (cfc puts the revolutions beside in their place); record to a faster disk or at a lower rate",
-            self.missing, self.places
-        ));
-    }
 }

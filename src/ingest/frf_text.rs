@@ -90,10 +90,7 @@ pub(super) fn join_signalcalc(header: &mut Header) {
         fields.len() >= 2 && matches!(column(&fields[0]), Column::Frequency { .. })
     });
     let Some(parts_at) = parts_at else { return };
-    let parts: Vec<String> = split(&header.lines[parts_at])
-        .into_iter()
-        .take(header.columns)
-        .collect();
+    let parts = split(&header.lines[parts_at]);
     let signals = parts_at
         .checked_sub(1)
         .map(|at| split(&header.lines[at]))
@@ -117,7 +114,7 @@ pub(super) fn join_signalcalc(header: &mut Header) {
         }
     };
     header.names = (0..parts.len()).map(name).collect();
-    header.columns = header.columns.max(header.names.len());
+    header.columns = header.names.len();
     units.resize(header.columns, String::new());
     header.units = units;
 }

@@ -198,6 +198,19 @@ fn the_time_column_is_checked() {
     assert_eq!((record.filled.len(), &record.filled[0]), (1, &(50..53)));
     assert_eq!(record.len(), 103);
     assert_eq!(record.channels[0].samples[49..54], [0.0, 0.25, 0.5, 0.75, 1.0]);
+    // One sample, in times without trailing zeros.
+    let (record, warnings) = time(clock(100, |i| {
+        format!("{}", (if i < 50 { i } else { i + 1 }) as f64 * 1e-3)
+    }));
+    assert_eq!(record.len(), 101);
+    assert!(
+        warnings[0].starts_with("1 samples dropped at 1 place "),
+        "{warnings:?}"
+    );
+    // 25.6 kHz in whole microseconds: most steps are 39 µs, their median would be 25,641 Hz.
+    let (record, warnings) = time(clock(5000, |i| format!("{:.6}", i as f64 / 25600.0)));
+    approx::assert_relative_eq!(record.sample_rate_hz, 25600.0, max_relative = 1e-5);
+    assert!(warnings.is_empty(), "{warnings:?}");
     // 12.8 kHz printed with four digits: single steps are 0 or 0.1 ms.
     let (record, warnings) = time(clock(5000, |i| format!("{:.4}", i as f64 / 12800.0)));
     approx::assert_relative_eq!(record.sample_rate_hz, 12800.0, max_relative = 3e-4);
@@ -273,6 +286,76 @@ fn frf_tables() {
     ] {
         assert!(problem(text).contains(what), "{text}: {}", problem(text));
     }
+}
+
+#[test]
+fn tables_of_other_programs() {
+    let open_modal = "frq,amp_real,amp_imag\n0.0,0.07,0.0\n0.3125,-0.0002,-0.028\n0.625,-0.002,-0.011\n";
+    let (format, contents, _) = read(open_modal);
+    assert_eq!((format, contents.frfs.len()), (Format::FrfCsv, 1));
+    assert_eq!(contents.frfs[0].frequency_hz, [0.0, 0.3125, 0.625]);
+    assert_eq!(contents.frfs[0].value[1], Complex64::new(-0.0002, -0.028));
+    let named = "freq [Hz],H_1X_2Z_real,H_1X_2Z_imag\n1,1,2\n2,3,4\n3,5,6\n";
+    let frf = &read(named).1.frfs[0];
+    assert_eq!(frf.response.map(|d| d.to_string()).as_deref(), Some("1X"));
+    assert_eq!(frf.reference.map(|d| d.to_string()).as_deref(), Some("2Z"));
+    // One signal: the unit of a ratio stands as (a)(b).
+    let one = "H1,2 Run 5\nFreq\tReal\tImag\nUnits:\nHz\t(m/s2)(N)\t\n\n0.0\t1.0\t0.0\n0.5\t2.0\t-1.0\n1.0\t3.0\t-2.0\n";
+    let (_, contents, _) = read(one);
+    assert_eq!(contents.frfs[0].quantity, Some(Quantity::Accelerance));
+    assert_eq!(contents.frfs[0].value[2], Complex64::new(3.0, -2.0));
+    let several = "Data written for run 7\n\tH1,2\t\t\t\tH1,3\t\t\t\n\
+        Freq\tReal\tImag\tMag\tPhase\tReal\tImag\tMag\tPhase\nx\nUnits:\n\
+        Hz\tmm/N\tmm/N\tmm/N\tdeg\tmm/N\tmm/N\tmm/N\tdeg\n\n\
+        0.0\t1.0\t0.0\t1\t0\t4.0\t-1.0\t4\t-14\n0.5\t2.0\t-1.0\t2\t-27\t5.0\t-2.0\t5\t-22\n\
+        1.0\t3.0\t-2.0\t4\t-34\t6.0\t-3.0\t7\t-27\n";
+    let (_, contents, _) = read(several);
+    let names: Vec<&str> = contents.frfs.iter().map(|f| f.name.as_str()).collect();
+    assert_eq!(names, ["H1,2", "H1,3"]);
+    assert_eq!(contents.frfs[1].quantity, Some(Quantity::Receptance));
+    approx::assert_relative_eq!(contents.frfs[1].value[1].re, 5e-3, max_relative = 1e-12);
+    let dofs = "Response: 3Z\nReference: 1-X\nfrequency_hz,re,im\n1,1,2\n2,3,4\n3,5,6\n";
+    let frf = &read(dofs).1.frfs[0];
+    assert_eq!(frf.response.map(|d| d.to_string()).as_deref(), Some("3Z"));
+    assert_eq!(frf.reference.map(|d| d.to_string()).as_deref(), Some("1-X"));
+}
+
+#[test]
+fn times_without_names_are_no_frequencies() {
+    let record: String = (0..200)
+        .map(|i| format!("{:.4} {} {}\n", f64::from(i) * 5e-3, i % 9, i % 5))
+        .collect();
+    assert!(problem(&record).contains("fit a time"), "{}", problem(&record));
+    assert!(problem(&record).contains("time_s,force_n"));
+    let under_a_heading = format!("Frequency in kHz\n{record}");
+    assert_eq!(read(under_a_heading).1.frfs.len(), 1);
+}
+
+#[test]
+fn names_of_channels_carry_their_units() {
+    let (record, _) = time("time_s,force_n,acc_m_s2,acc2_m/s2\n0,1,2,3\n0.001,1,2,3\n0.002,1,2,3\n");
+    let units: Vec<&str> = record.channels.iter().map(|c| c.quantity_and_unit().1).collect();
+    assert_eq!(units, ["N", "m/s²", "m/s²"]);
+}
+
+#[test]
+fn a_last_row_cut_within_its_number_is_left_out_and_told() {
+    let rows =
+        |end: &str| format!("time_s,fx_n\n0.000,1.25\n0.001,1.50\n0.002,1.75\n0.003,2.00\n0.004,2.25\n{end}");
+    let (record, warnings) = time(rows("0.005,2.5"));
+    assert_eq!((record.len(), warnings.len()), (5, 1), "{warnings:?}");
+    for whole in ["0.005,2.50", "0.005,2.5\n", "0.005,2.500"] {
+        let (record, warnings) = time(rows(whole));
+        assert_eq!((record.len(), warnings.len()), (6, 0), "{whole}: {warnings:?}");
+    }
+}
+
+#[test]
+fn dropped_samples_beyond_a_tenth_are_refused() {
+    let problem = problem(clock(100, |i| {
+        format!("{:.3}", (if i < 50 { i } else { i + 30 }) as f64 * 1e-3)
+    }));
+    assert!(problem.contains("30 samples dropped at 1 places"), "{problem}");
 }
 
 #[test]

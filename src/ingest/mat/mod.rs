@@ -8,17 +8,9 @@ use super::{Contents, InputError};
 mod hdf5;
 mod interpret;
 mod v5;
+mod variable;
 
-/// A numeric array, column by column as MATLAB holds it.
-#[derive(Debug, Clone, PartialEq)]
-struct Variable {
-    /// Fields of a struct as `struct.field`.
-    name: String,
-    size: Vec<usize>,
-    re: Vec<f64>,
-    /// Same length as `re`; `None` for a real array.
-    im: Option<Vec<f64>>,
-}
+use variable::Variable;
 
 pub(super) fn looks_like_v5(bytes: &[u8]) -> bool {
     bytes.starts_with(b"MATLAB 5.0 MAT-file")

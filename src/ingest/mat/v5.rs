@@ -5,6 +5,9 @@
 //!
 //! A variable that cannot be read is named in a warning, and the rest is read all the same.
 
+#[cfg(test)]
+mod tests;
+
 use std::io::Read;
 
 use super::super::InputError;

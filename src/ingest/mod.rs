@@ -17,6 +17,7 @@ mod detect;
 mod dof_names;
 mod force;
 mod frf_text;
+mod geometry;
 mod long;
 mod lvm;
 mod mat;
@@ -32,7 +33,9 @@ mod uff;
 pub mod units;
 mod waveform;
 
+pub use geometry::{Geometry, NodalShape, geometry_text, read_geometry};
 pub use long::{Survey, regular_file, survey};
+pub use mat::{MatArray, mat5_bytes};
 pub use quality::quality_warnings;
 pub use uff::{
     Abscissa, ByteOrder, Dataset58, Encoding58, EntityDof, Ordinate, UnitAxis, frf_dataset, time_datasets,

@@ -9,6 +9,9 @@ mod hdf5;
 mod interpret;
 mod v5;
 mod variable;
+mod write;
+
+pub use write::{MatArray, mat5_bytes};
 
 use variable::Variable;
 

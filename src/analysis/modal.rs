@@ -1,6 +1,7 @@
 //! Modes of measured FRFs, set by set: of a campaign (one set a posture), of FRF files and of raw tap tests (one set
 //! a file).
 
+use std::borrow::Cow;
 use std::f64::consts::TAU;
 use std::path::Path;
 
@@ -221,9 +222,21 @@ pub(super) fn dof_name(points: &[Point], dof: &MeasuredDof) -> String {
 }
 
 fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Settings) -> Result<SetModes> {
-    let single: Vec<FrfModes> = inputs
+    let sines = sines_of(&inputs);
+    let clean: Vec<(Cow<[f64]>, Cow<[Complex64]>)> = inputs
+        .iter()
+        .map(|input| {
+            let (f, h) = (&input.frequency_hz[..], &input.receptance_m_per_n[..]);
+            if sines.is_empty() {
+                return (Cow::Borrowed(f), Cow::Borrowed(h));
+            }
+            let (f, h) = modal::without_sines(f, h, &sines);
+            (Cow::Owned(f), Cow::Owned(h))
+        })
+        .collect();
+    let single: Vec<FrfModes> = clean
         .par_iter()
-        .map(|input| modal::analyse_frf(&input.frequency_hz, &input.receptance_m_per_n, settings))
+        .map(|(f, h)| modal::analyse_frf(f, h, settings))
         .collect::<Result<_>>()?;
     let mut dofs: Vec<String> = inputs
         .iter()
@@ -236,10 +249,11 @@ fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Settings) -> Resul
     let number = |name: &String| dofs.binary_search(name).ok();
     let members: Vec<SetMember> = inputs
         .iter()
+        .zip(&clean)
         .zip(&single)
-        .map(|(input, modes)| SetMember {
-            frequency_hz: &input.frequency_hz,
-            receptance_m_per_n: &input.receptance_m_per_n,
+        .map(|((input, (frequency_hz, receptance_m_per_n)), modes)| SetMember {
+            frequency_hz,
+            receptance_m_per_n,
             modes,
             dofs: input
                 .dofs
@@ -248,6 +262,17 @@ fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Settings) -> Resul
         })
         .collect();
     let mut global = modal::global(&members, settings)?;
+    if !sines.is_empty() {
+        let told: Vec<String> = sines
+            .iter()
+            .map(|s| format!("{:.2} Hz ({})", s.frequency_hz, s.what))
+            .collect();
+        global.warnings.push(format!(
+            "sine lines without a resonance, taken out before the fits: {}",
+            told.join(", ")
+        ));
+    }
+    global.sine_lines = sines;
     let mirror = |k: usize| {
         let [response, reference] = inputs[k].dofs.as_ref()?;
         if response == reference {
@@ -324,6 +349,18 @@ fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Settings) -> Resul
         verdict,
         why,
     })
+}
+
+/// Sines among FRFs that share their lines.
+fn sines_of(inputs: &[FrfInput]) -> Vec<modal::SineLine> {
+    let Some(first) = inputs.first() else {
+        return Vec::new();
+    };
+    if inputs.iter().any(|i| i.frequency_hz != first.frequency_hz) {
+        return Vec::new();
+    }
+    let curves: Vec<&[Complex64]> = inputs.iter().map(|i| i.receptance_m_per_n.as_slice()).collect();
+    modal::sine_lines(&first.frequency_hz, &curves)
 }
 
 /// What is worth saying of a set, one line for each kind of trouble.

@@ -81,6 +81,8 @@ enum EstimatorArg {
 
 /// Of so many FRFs the modes of each are printed unasked.
 const FEW_FRFS: usize = 8;
+/// Rejected poles shown to a person.
+const FEW_REJECTED: usize = 5;
 /// Warnings shown to a person; all are in the JSON.
 const MOST_WARNINGS: usize = 20;
 
@@ -275,6 +277,7 @@ fn document(analysis: &ModalAnalysis, campaign: bool) -> serde_json::Value {
             "verdict": set.verdict,
             "why": set.why,
             "quality": set.global.quality,
+            "sine_lines": set.global.sine_lines,
             "mac": set.global.mac,
             "stabilisation": set.global.stabilisation,
         }));
@@ -387,19 +390,12 @@ fn text(analysis: &ModalAnalysis, each: bool) -> String {
                 mode.found_in,
             );
         }
-        let left: Vec<_> = set
-            .global
-            .stabilisation
-            .candidates
-            .iter()
-            .filter(|c| !c.chosen)
-            .collect();
-        for candidate in left.iter().take(5) {
-            let _ = writeln!(
-                out,
-                "    not taken: {:.2} Hz, {}",
-                candidate.frequency_hz, candidate.why
-            );
+        for pole in set.global.rejected.iter().take(FEW_REJECTED) {
+            let _ = writeln!(out, "    no mode: {:.2} Hz, {}", pole.frequency_hz, pole.reason);
+        }
+        let more = set.global.rejected.len().saturating_sub(FEW_REJECTED);
+        if more > 0 {
+            let _ = writeln!(out, "    and {more} more that are no modes (which: --json)");
         }
     }
     if analysis.sets.len() > 1 && analysis.mode_count() > 0 {

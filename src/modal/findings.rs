@@ -9,7 +9,7 @@ use super::joint_fit::{self, Change, Data, Group};
 use super::local_fit::Pole;
 use super::quality::{self, Power};
 use super::stabilisation::{Candidate, Stabilisation};
-use super::{GlobalMode, GlobalModes, Reconstruction, RejectedMode, ml_fit, shape};
+use super::{GlobalMode, GlobalModes, Reconstruction, RejectedMode, ml_fit, shape, verify};
 
 /// In a set a mode seen by one FRF alone must stand out this far (squared size over uncertainty).
 const FAR: f64 = 100.0;
@@ -20,21 +20,28 @@ const LEAKAGE_LINES: f64 = 0.02;
 const FINE_LINES: f64 = 3.0;
 /// … where their damping is uncertain by more than this share of itself.
 const UNCERTAIN: f64 = 0.02;
+/// What poles anywhere explain scatters by about this without any model error.
+const BY_CHANCE: f64 = 1.5;
 /// Two fits of the same lines disagree from this many standard deviations on.
 const APART: f64 = 2.0;
 
-/// `random`: by FRF and line, σ of its random noise.
+/// `fitted`: what the groups were fitted to; `data`: every line with its random noise.
 pub(super) fn collect(
     groups: &[Group],
+    fitted: &[Data],
     data: &[Data],
     members: &[&SetMember],
     of_member: &[usize],
-    random: &[Vec<f64>],
     result: &mut GlobalModes,
 ) {
     let count = result.reconstructions.len();
     let mut hardly_seen = Vec::new();
     let mut without_width = Vec::new();
+    let poles: Vec<Pole> = groups
+        .iter()
+        .flat_map(|g| g.solution.poles.iter().copied())
+        .collect();
+    let (mut scatters, mut moving) = (Vec::new(), 0);
     for group in groups {
         let solution = &group.solution;
         if let Some(doubt) = &group.doubt {
@@ -57,16 +64,30 @@ pub(super) fn collect(
         }
         // What the fit leaves beyond the noise widens the standard deviations.
         let level = (solution.misfit / solution.degrees_of_freedom as f64)
+            .max(group.chance / BY_CHANCE)
             .max(1.0)
             .sqrt();
         for (j, pole) in solution.poles.iter().enumerate() {
             let (found_in, best) = joint_fit::seen_in(solution, j);
             if found_in == 0 || (data.len() >= SET && found_in < 2 && best < FAR) {
+                result.rejected.push(RejectedMode {
+                    frequency_hz: pole.frequency_hz,
+                    damping_ratio: pole.damping_ratio,
+                    reason: "hardly above the noise, in one FRF or none".into(),
+                });
                 hardly_seen.push(format!("{:.2}", pole.frequency_hz));
                 continue;
             }
             let shift = group.doubt.as_ref().map_or([0.0; 2], |d| d.shifts[j]);
-            let mut frequency_std_hz = (level * solution.frequency_std_hz(j)).hypot(shift[0]);
+            // The larger of what the noise says and of how the FRFs scatter about the common pole.
+            let few = data.len() < SET;
+            let small_set = 1.0 + 1.5 / (data.len().max(2) - 1) as f64;
+            let scatter = solution
+                .scatter_std(j)
+                .map(|s| if few { 0.0 } else { small_set * s });
+            let mut frequency_std_hz = (level * solution.frequency_std_hz(j))
+                .max(scatter[0] * pole.frequency_hz)
+                .hypot(shift[0]);
             let mut constants = vec![None; count];
             for m in 0..data.len() {
                 let (value, std) = solution.constant(m, j);
@@ -77,7 +98,21 @@ pub(super) fn collect(
                 .map(|d| joint_fit::spacing_hz(&d.frequency_hz, pole.frequency_hz))
                 .fold(f64::INFINITY, f64::min);
             let lines_in_half_power_band = 2.0 * pole.damping_ratio * pole.frequency_hz / line_hz;
-            let mut damping_std = (level * solution.damping_std(j)).hypot(shift[1]);
+            let mut damping_std = (level * solution.damping_std(j))
+                .max(scatter[1] * pole.damping_ratio)
+                .hypot(shift[1]);
+            let others: Vec<Pole> = poles.iter().filter(|p| *p != pole).copied().collect();
+            let moves = verify::moves(fitted, *pole, &others);
+            let (mut frequency_hz, mut damping_ratio) = (pole.frequency_hz, pole.damping_ratio);
+            if let Some(moves) = moves {
+                scatters.push(moves.scatter);
+                moving += usize::from(moves.significant);
+                if moves.significant {
+                    (frequency_hz, damping_ratio) = (moves.pole.frequency_hz, moves.pole.damping_ratio);
+                    frequency_std_hz = small_set * moves.std[0];
+                    damping_std = small_set * moves.std[1];
+                }
+            }
             if lines_in_half_power_band < LEAKAGE_BELOW_LINES {
                 damping_std = damping_std.hypot(LEAKAGE_LINES * line_hz / (2.0 * pole.frequency_hz));
             }
@@ -87,13 +122,18 @@ pub(super) fn collect(
                 damping_std = damping_std.hypot(apart[1]);
             }
             if damping_std >= pole.damping_ratio && group.doubt.is_none() {
+                result.rejected.push(RejectedMode {
+                    frequency_hz: pole.frequency_hz,
+                    damping_ratio: pole.damping_ratio,
+                    reason: "a line whose width the FRFs do not determine".into(),
+                });
                 without_width.push(format!("{:.2}", pole.frequency_hz));
                 continue;
             }
             let shape = shape_of(solution, j, members);
             result.modes.push(GlobalMode {
-                frequency_hz: pole.frequency_hz,
-                damping_ratio: pole.damping_ratio,
+                frequency_hz,
+                damping_ratio,
                 frequency_std_hz,
                 damping_std,
                 found_in,
@@ -152,18 +192,20 @@ pub(super) fn collect(
         power.add((from..to).map(|k| {
             let (measured, fitted) = (found.measured_m_per_n[k], found.fitted_m_per_n[k]);
             let line = d.frequency_hz.partition_point(|&f| f < found.frequency_hz[k]);
-            (
-                found.frequency_hz[k],
-                measured,
-                measured - fitted,
-                random[m][line],
-            )
+            (found.frequency_hz[k], measured, measured - fitted, d.sigma[line])
         }));
         result.reconstructions[of_member[m]] = Some(found);
     }
     if !result.modes.is_empty() {
-        let converged = groups.iter().all(|g| g.solution.converged);
-        result.quality = quality::judge_set(power, None, converged);
+        let doubts = groups.iter().filter(|g| g.doubt.is_some()).count();
+        let found = quality::SetFindings {
+            power,
+            frequency_scatter: (!scatters.is_empty()).then(|| crate::signal::median(&scatters)),
+            moving: moving > 0 && 2 * moving >= scatters.len(),
+            doubts,
+            converged: groups.iter().all(|g| g.solution.converged),
+        };
+        result.quality = quality::judge_set(&found);
     }
 }
 
@@ -218,14 +260,16 @@ fn reconstruction(d: &Data, groups: &[Group], m: usize, band_hz: [f64; 2]) -> Re
     let mut total = 0.0;
     for group in groups {
         let from = d.frequency_hz.partition_point(|&f| f < group.window_hz[0]);
-        for (k, residual) in group.solution.frfs[m].residual.iter().enumerate() {
-            let (f, h) = (d.frequency_hz[from + k], d.receptance[from + k]);
+        let to = d.frequency_hz.partition_point(|&f| f < group.window_hz[1]);
+        let fitted = group.solution.fitted(m, &d.frequency_hz[from..to]);
+        for (k, fitted) in (from..to).zip(fitted) {
+            let (f, h) = (d.frequency_hz[k], d.receptance[k]);
             found.frequency_hz.push(f);
             found.measured_m_per_n.push(h);
-            found.fitted_m_per_n.push(h - residual);
+            found.fitted_m_per_n.push(fitted);
             if (band_hz[0]..=band_hz[1]).contains(&f) {
-                found.error_nrms += f * f * residual.norm_sqr();
-                found.noise_nrms += (f * d.sigma[from + k]).powi(2);
+                found.error_nrms += f * f * (h - fitted).norm_sqr();
+                found.noise_nrms += (f * d.sigma[k]).powi(2);
                 total += f * f * h.norm_sqr();
             }
         }
@@ -334,7 +378,7 @@ pub(super) fn explain(diagram: &mut Stabilisation, modes: &[GlobalMode], changes
                 }
                 _ => None,
             })
-            .unwrap_or("left out: joined another mode, or hardly above the noise");
+            .unwrap_or("left out: joined another mode, or explains no more than a pole anywhere near would");
         candidate.why.push_str("; ");
         candidate.why.push_str(why);
     }
@@ -343,18 +387,30 @@ pub(super) fn explain(diagram: &mut Stabilisation, modes: &[GlobalMode], changes
         .sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
 }
 
-/// The candidates that did not become modes.
-pub(super) fn rejected(diagram: &Stabilisation) -> Vec<RejectedMode> {
-    diagram
-        .candidates
-        .iter()
-        .filter(|c| !c.chosen)
-        .map(|c| RejectedMode {
-            frequency_hz: c.frequency_hz,
-            damping_ratio: c.damping_ratio,
-            reason: c.why.clone(),
-        })
-        .collect()
+/// Lists what is no mode: fitted poles that did not stand the tests, and candidates that were not fitted.
+pub(super) fn reject(tested: Vec<RejectedMode>, diagram: &mut Stabilisation, result: &mut GlobalModes) {
+    let mut rejected = std::mem::take(&mut result.rejected);
+    rejected.extend(tested);
+    for candidate in diagram.candidates.iter_mut().filter(|c| !c.chosen) {
+        let width = candidate.frequency_hz * candidate.damping_ratio.max(0.003);
+        let same = |r: &&RejectedMode| (r.frequency_hz - candidate.frequency_hz).abs() < width;
+        match rejected.iter().find(same) {
+            Some(known) => {
+                candidate.why = format!("{}; left out: {}", before_semicolon(&candidate.why), known.reason)
+            }
+            None => rejected.push(RejectedMode {
+                frequency_hz: candidate.frequency_hz,
+                damping_ratio: candidate.damping_ratio,
+                reason: candidate.why.clone(),
+            }),
+        }
+    }
+    rejected.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+    result.rejected = rejected;
+}
+
+fn before_semicolon(text: &str) -> &str {
+    text.split(';').next().unwrap_or(text)
 }
 
 /// Three digits, without zeros at the end.

@@ -11,7 +11,7 @@ use super::joint_fit::{self, Change, Data, Doubt, Group, Search};
 use super::local_fit::Pole;
 use super::lscf::{self, Row};
 use super::stabilisation::{self, Candidate, ShapeData};
-use super::{FrfModes, GlobalModes, Settings, findings, set_noise};
+use super::{FrfModes, GlobalModes, Settings, condense, findings, select, set_noise, verify};
 use crate::Result;
 
 /// Poles of the highest order: at least, and at most.
@@ -20,6 +20,9 @@ const POLES: [usize; 2] = [40, 80];
 const MAX_REFERENCES: usize = 6;
 /// In sets of at least this many FRFs a mode seen by one of them alone must stand out far.
 pub(super) const SET: usize = 4;
+
+/// One in so many FRFs must have a peak of its own for it to be tried in all.
+const SHARE_OF_FRFS: usize = 6;
 
 /// One FRF of a set, with what was found in it.
 #[derive(Clone, Copy)]
@@ -46,6 +49,8 @@ pub fn global(frfs: &[SetMember], settings: &Settings) -> Result<GlobalModes> {
     };
     let members: Vec<&SetMember> = of_member.iter().map(|&m| &frfs[m]).collect();
     let single = single_peaks(&members);
+    let full = data;
+    let mut data: Vec<Data> = full.iter().map(|d| condense::condense(d, &single)).collect();
     let rows = rows(&data, &members);
     let references = rows.first().map_or(1, |r| r.receptance.len());
     let lines = data.iter().map(|d| d.frequency_hz.len()).min().unwrap_or(0);
@@ -79,21 +84,22 @@ pub fn global(frfs: &[SetMember], settings: &Settings) -> Result<GlobalModes> {
     }
     start.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
     let mut changes = Vec::new();
-    let mut data = data;
-    let random: Vec<Vec<f64>> = data.iter().map(|d| d.sigma.clone()).collect();
-    let Some(groups) = solve(&mut data, &start, &mut changes) else {
+    let mut rejected = Vec::new();
+    let groups = solve(&mut data, &start, &mut changes)
+        .and_then(|groups| verify::verified(&mut data, groups, &mut rejected));
+    let Some(groups) = groups else {
         result
             .warnings
             .push("the FRFs together do not determine common poles: no global modes".into());
-        result.rejected = findings::rejected(&diagram);
+        findings::reject(rejected, &mut diagram, &mut result);
         result.stabilisation = diagram;
         return Ok(result);
     };
-    findings::collect(&groups, &data, &members, &of_member, &random, &mut result);
+    findings::collect(&groups, &data, &full, &members, &of_member, &mut result);
     findings::explain(&mut diagram, &result.modes, &changes);
-    result.rejected = findings::rejected(&diagram);
+    findings::reject(rejected, &mut diagram, &mut result);
     result.stabilisation = diagram;
-    findings::coarse_lines(&data, &mut result);
+    findings::coarse_lines(&full, &mut result);
     Ok(result)
 }
 
@@ -142,6 +148,8 @@ fn prepare(
             frequency_hz: curve.frequency_hz,
             receptance,
             sigma: Vec::new(),
+            spread_hz: Vec::new(),
+            count: Vec::new(),
         });
         of_member.push(m);
     }
@@ -163,7 +171,7 @@ fn band(data: &[Data]) -> Option<[f64; 2]> {
     (last > first).then_some([first, last])
 }
 
-/// Poles of the single FRFs, one for each place: the best determined first.
+/// Poles of the single FRFs, one for each place where several of many FRFs have one: the best determined first.
 fn single_peaks(members: &[&SetMember]) -> Vec<Pole> {
     let mut all: Vec<(f64, Pole)> = members
         .iter()
@@ -178,17 +186,21 @@ fn single_peaks(members: &[&SetMember]) -> Vec<Pole> {
         })
         .collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut kept: Vec<Pole> = Vec::new();
+    // By place, how many FRFs have a peak there.
+    let mut kept: Vec<(Pole, usize)> = Vec::new();
     for (_, pole) in all {
         let width = |p: &Pole| p.frequency_hz * p.damping_ratio.max(pole.damping_ratio);
-        if !kept
-            .iter()
-            .any(|p| (p.frequency_hz - pole.frequency_hz).abs() < width(p))
-        {
-            kept.push(pole);
+        let same = |(p, _): &&mut (Pole, usize)| (p.frequency_hz - pole.frequency_hz).abs() < width(p);
+        match kept.iter_mut().find(same) {
+            Some((_, count)) => *count += 1,
+            None => kept.push((pole, 1)),
         }
     }
-    kept
+    let wanted = members.len().div_ceil(SHARE_OF_FRFS);
+    kept.into_iter()
+        .filter(|(_, count)| *count >= wanted)
+        .map(|(pole, _)| pole)
+        .collect()
 }
 
 /// Rows of the matrix fraction: one a response with all references where the set is a full grid on common lines,
@@ -274,9 +286,9 @@ fn shape_data(data: &[Data]) -> Option<ShapeData<'_>> {
 }
 
 /// Refinement with search, noise from the rest, refinement without search.
-fn solve(data: &mut [Data], start: &[Pole], changes: &mut Vec<Change>) -> Option<Vec<Group>> {
-    let mut groups = joint_fit::refine(data, start, Search::Rest, changes)?;
-    // The first noise may have been wrong, and with it what was needless: search once more.
+fn solve(data: &mut [Data], candidates: &[Pole], changes: &mut Vec<Change>) -> Option<Vec<Group>> {
+    let start = select::choose(&select::some(data), candidates);
+    let mut groups = joint_fit::refine(data, &start, Search::Roughly, changes)?;
     for search in [Search::Pairs, Search::Nothing] {
         set_noise::renew(data, &groups);
         let mut poles: Vec<Pole> = groups

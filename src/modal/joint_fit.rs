@@ -5,6 +5,7 @@ use num_complex::Complex64;
 
 use super::local_fit::Pole;
 use super::ml_fit::{self, NoisyFrf, Solution};
+use super::shape;
 use super::stabilisation::MAX_DAMPING;
 
 /// Modes refined together at most: the normal equations grow with the square.
@@ -25,6 +26,17 @@ const COARSE_LINES: f64 = 1.0;
 /// Squared size over uncertainty (two degrees of freedom) from which an FRF shows a mode: five standard deviations.
 const SEEN: f64 = 30.0;
 
+/// Poles nearer than this share of both half-widths are one.
+const SAME_PLACE: f64 = 0.05;
+/// What explains so many times what a mode must is needed, however badly it is determined.
+const INDISPENSABLE: f64 = 10.0;
+/// Trial poles spread over a window, of each damping.
+const TRIALS: usize = 24;
+/// Damping of the trial poles over the usual one.
+const WIDER: [f64; 2] = [1.0, 3.0];
+/// A trial pole that is damped more would explain what modes do.
+const WIDEST: f64 = 0.1;
+
 /// Beside a pole a second one is tried this many half-widths away.
 const BESIDE_WIDTHS: f64 = 1.5;
 /// A pole comes in where it explains this times what a pole must explain to stay.
@@ -32,16 +44,19 @@ const ADMITTED: f64 = 1.2;
 /// As [`CHANCE_SIGMA`] and [`LOOKED_EVERYWHERE`], for a pole that may be there.
 const DOUBT_SIGMA: f64 = 3.0;
 const DOUBT_LOOKED: f64 = 6.0;
+/// Before its place is refined a pole must explain this part of what a mode must.
+const REFINED: f64 = 0.2;
 /// Below this a pole beside another is not worth a fit of its own.
 const WORTH_A_FIT_SIGMA: f64 = 1.0;
 
 /// What a refinement may do besides moving poles.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
 pub(super) enum Search {
     Nothing,
-    /// Take out needless poles, add one where the rest is largest.
-    Rest,
-    /// That, and look for close pairs: a second pole beside each that is there.
+    /// That, and not more exactly than a comparison needs.
+    Roughly,
+    /// Take out needless poles, add one where the rest is largest, and look for close pairs: a second pole beside each
+    /// that is there.
     Pairs,
 }
 
@@ -51,6 +66,8 @@ pub(super) struct Group {
     pub solution: Solution,
     /// Looked for with [`Search::Pairs`].
     pub doubt: Option<Doubt>,
+    /// What any pole explains, over what it would explain of white noise; at least 1.
+    pub chance: f64,
 }
 
 /// One more pole would describe the FRFs better than chance does, but not well enough to be called a mode.
@@ -69,22 +86,28 @@ pub(super) enum Change {
     Added(Pole),
 }
 
-/// One FRF with its noise.
+/// One FRF with its noise, on lines or on means over neighbouring lines.
+#[derive(Clone)]
 pub(super) struct Data {
     pub frequency_hz: Vec<f64>,
     pub receptance: Vec<Complex64>,
     /// sqrt(E|e|²), > 0.
     pub sigma: Vec<f64>,
+    /// Standard deviation of the frequencies that went into the mean, Hz; may be left empty until [`super::condense`].
+    pub spread_hz: Vec<f64>,
+    /// Lines that went into the mean.
+    pub count: Vec<f64>,
 }
 
 impl Data {
-    fn window(&self, [low, high]: [f64; 2]) -> Option<NoisyFrf<'_>> {
+    pub fn window(&self, [low, high]: [f64; 2]) -> Option<NoisyFrf<'_>> {
         let from = self.frequency_hz.partition_point(|&f| f < low);
         let to = self.frequency_hz.partition_point(|&f| f < high);
         (to > from).then(|| NoisyFrf {
             frequency_hz: &self.frequency_hz[from..to],
             receptance: &self.receptance[from..to],
             sigma: &self.sigma[from..to],
+            spread_hz: &self.spread_hz[from..to],
         })
     }
 }
@@ -97,6 +120,8 @@ pub(super) fn refine(
     search: Search,
     changes: &mut Vec<Change>,
 ) -> Option<Vec<Group>> {
+    // A pole can have run onto one of the next group.
+    let candidates = &apart(candidates, SAME_PLACE)[..];
     let groups = groups(candidates);
     let middle = |a: &[Pole], b: &[Pole]| Some(0.5 * (a.last()?.frequency_hz + b.first()?.frequency_hz));
     let mut result = Vec::with_capacity(groups.len());
@@ -119,17 +144,26 @@ pub(super) fn refine(
         let window_hz = [low, high];
         let frfs: Option<Vec<NoisyFrf>> = data.iter().map(|d| d.window(window_hz)).collect();
         before = after;
-        let Some((fit, mut solution)) = frfs.and_then(|frfs| {
-            let fit = Fit { frfs, fixed, search };
-            let solution = fit.fit(group)?;
+        let Some((mut fit, mut solution)) = frfs.and_then(|frfs| {
+            let mut fit = Fit {
+                frfs,
+                fixed,
+                search,
+                chance: 1.0,
+            };
+            let solution = fit.fit(group).or_else(|| fit.fit(&apart(group, 0.5)))?;
+            if search != Search::Roughly && !solution.poles.is_empty() {
+                fit.chance = fit.by_chance(&solution);
+            }
             Some((fit, solution))
         }) else {
             changes.extend(group.iter().map(|pole| Change::NotDetermined(*pole)));
             continue;
         };
         let mut doubt = None;
-        if search != Search::Nothing {
+        if search >= Search::Pairs {
             solution = fit.without_needless(solution, changes);
+            fit.chance = fit.by_chance(&solution);
             for _ in 0..MAX_ADDED {
                 match fit.with_one_more(&solution, &mut doubt) {
                     Some(more) => {
@@ -144,9 +178,25 @@ pub(super) fn refine(
             window_hz,
             solution,
             doubt,
+            chance: fit.chance,
         });
     }
     (!result.is_empty()).then_some(result)
+}
+
+/// Without those within a share of both half-widths of the one before: their residues cannot be told apart.
+fn apart(group: &[Pole], share: f64) -> Vec<Pole> {
+    let width = |p: &Pole| p.damping_ratio * p.frequency_hz;
+    let mut kept: Vec<Pole> = Vec::with_capacity(group.len());
+    for pole in group {
+        let same = kept
+            .last()
+            .is_some_and(|p| pole.frequency_hz - p.frequency_hz < share * (width(p) + width(pole)));
+        if !same {
+            kept.push(*pole);
+        }
+    }
+    kept
 }
 
 /// Splits at the widest gaps until no group is too large.
@@ -173,10 +223,98 @@ fn groups(candidates: &[Pole]) -> Vec<&[Pole]> {
     done
 }
 
+/// What each candidate explains over what it would have to explain to be a mode (above 1: it is one), with the poles
+/// `held` and no others. `None` where the lines do not determine the residues of those.
+pub(super) fn worth(data: &[Data], held: &[Pole], candidates: &[Pole]) -> Option<Vec<f64>> {
+    let groups: Vec<&[Pole]> = if held.is_empty() { vec![&[]] } else { groups(held) };
+    let mut worth = vec![0.0; candidates.len()];
+    let mut before = 0;
+    let mut low = 0.0;
+    for (g, group) in groups.iter().enumerate() {
+        let after = before + group.len();
+        let high = groups.get(g + 1).map_or(f64::INFINITY, |next| {
+            0.5 * (group[group.len() - 1].frequency_hz + next[0].frequency_hz)
+        });
+        let window_hz = [low, high];
+        low = high;
+        let near = &held[before.saturating_sub(FIXED_NEIGHBOURS)..(after + FIXED_NEIGHBOURS).min(held.len())];
+        before = after;
+        let inside: Vec<usize> = (0..candidates.len())
+            .filter(|&k| (window_hz[0]..window_hz[1]).contains(&candidates[k].frequency_hz))
+            .collect();
+        if inside.is_empty() {
+            continue;
+        }
+        let Some(frfs) = data
+            .iter()
+            .map(|d| d.window(window_hz))
+            .collect::<Option<Vec<_>>>()
+        else {
+            continue;
+        };
+        let damping: Vec<f64> = inside.iter().map(|&k| candidates[k].damping_ratio).collect();
+        let mut trials: Vec<Pole> = inside.iter().map(|&k| candidates[k]).collect();
+        trials.extend(anywhere(&frfs, crate::signal::median(&damping)));
+        let explained = ml_fit::explained_by(&frfs, near, &trials)?;
+        let (of_candidates, of_any) = explained.split_at(inside.len());
+        let wanted = enough(
+            frfs.len(),
+            chance(of_any, frfs.len()),
+            CHANCE_SIGMA,
+            LOOKED_EVERYWHERE,
+        );
+        for (&k, explained) in inside.iter().zip(of_candidates) {
+            worth[k] = explained / wanted;
+        }
+    }
+    Some(worth)
+}
+
+/// Trial poles all over the lines: of the damping given, and wider.
+fn anywhere(frfs: &[NoisyFrf], damping: f64) -> Vec<Pole> {
+    let first = frfs
+        .iter()
+        .map(|c| c.frequency_hz[0])
+        .fold(f64::INFINITY, f64::min);
+    let last = frfs
+        .iter()
+        .map(|c| c.frequency_hz[c.frequency_hz.len() - 1])
+        .fold(0.0, f64::max);
+    let at = |k: usize| first + (last - first) * (k as f64 + 0.5) / TRIALS as f64;
+    WIDER
+        .iter()
+        .flat_map(|wider| {
+            (0..TRIALS).map(move |k| Pole {
+                frequency_hz: at(k),
+                damping_ratio: (damping * wider).min(damping.max(WIDEST)),
+            })
+        })
+        .collect()
+}
+
+/// What any pole explains, over what it would explain of white noise of the size assumed; at least 1.
+fn chance(explained: &[f64], frfs: usize) -> f64 {
+    // Median of a chi-squared variable (Wilson & Hilferty 1931).
+    let k = 2.0 * frfs as f64;
+    let of_white = k * (1.0 - 2.0 / (9.0 * k)).powi(3);
+    explained
+        .chunks(TRIALS)
+        .map(|of_damping| crate::signal::median(of_damping) / of_white)
+        .fold(1.0, f64::max)
+}
+
+/// Misfit that a mode must explain beyond what chance gives to any pole.
+fn enough(frfs: usize, chance: f64, sigma: f64, looked: f64) -> f64 {
+    let k = 2.0 * frfs as f64 + 2.0;
+    chance * (k + sigma * (2.0 * k).sqrt() + looked)
+}
+
 struct Fit<'a> {
     frfs: Vec<NoisyFrf<'a>>,
     fixed: Vec<Pole>,
     search: Search,
+    /// See [`chance`].
+    chance: f64,
 }
 
 impl Fit<'_> {
@@ -185,7 +323,7 @@ impl Fit<'_> {
         let by_chance = 2.0 * self.frfs.len() as f64 + 2.0;
         let settled = match self.search {
             Search::Nothing => ml_fit::SETTLED,
-            Search::Rest => ROUGHLY_COMPARED * by_chance,
+            Search::Roughly => ROUGHLY_COMPARED * by_chance,
             Search::Pairs => COMPARED * by_chance,
         };
         ml_fit::fit(&self.frfs, poles, &self.fixed, settled)
@@ -197,9 +335,14 @@ impl Fit<'_> {
     }
 
     fn beyond_chance(&self, solution: &Solution, sigma: f64, looked: f64) -> f64 {
-        let k = 2.0 * self.frfs.len() as f64 + 2.0;
-        let level = (solution.misfit / solution.degrees_of_freedom as f64).max(1.0);
-        level * (k + sigma * (2.0 * k).sqrt() + looked)
+        let level = solution.misfit / solution.degrees_of_freedom as f64;
+        enough(self.frfs.len(), level.max(self.chance), sigma, looked)
+    }
+
+    fn by_chance(&self, solution: &Solution) -> f64 {
+        let held: Vec<Pole> = solution.poles.iter().chain(&self.fixed).copied().collect();
+        let trials = anywhere(&self.frfs, usual_damping(solution));
+        ml_fit::explained_by(&self.frfs, &held, &trials).map_or(1.0, |e| chance(&e, self.frfs.len()))
     }
 
     fn line_hz(&self, frequency_hz: f64) -> f64 {
@@ -209,23 +352,30 @@ impl Fit<'_> {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Do the lines determine this pole?
-    fn sane(&self, solution: &Solution, j: usize) -> bool {
-        let pole = solution.poles[j];
-        let line_hz = self.line_hz(pole.frequency_hz);
-        let width = pole.damping_ratio * pole.frequency_hz;
+    /// May this pole be a mode of the band?
+    fn possible(&self, pole: Pole) -> bool {
         let inside = self.frfs.iter().any(|c| {
             c.frequency_hz[0] <= pole.frequency_hz
                 && c.frequency_hz[c.frequency_hz.len() - 1] >= pole.frequency_hz
         });
+        inside && pole.damping_ratio < MAX_DAMPING
+    }
+
+    /// Do the lines determine this pole?
+    fn determined(&self, solution: &Solution, j: usize) -> bool {
+        let pole = solution.poles[j];
+        let line_hz = self.line_hz(pole.frequency_hz);
+        let width = pole.damping_ratio * pole.frequency_hz;
         let coarse = 2.0 * width < COARSE_LINES * line_hz;
         let level = (solution.misfit / solution.degrees_of_freedom as f64)
             .max(1.0)
             .sqrt();
-        inside
-            && pole.damping_ratio < MAX_DAMPING
-            && level * solution.frequency_std_hz(j) < 0.3 * width.max(line_hz)
+        level * solution.frequency_std_hz(j) < 0.3 * width.max(line_hz)
             && (coarse || level * solution.damping_std(j) < 0.4 * pole.damping_ratio)
+    }
+
+    fn sane(&self, solution: &Solution, j: usize) -> bool {
+        self.possible(solution.poles[j]) && self.determined(solution, j)
     }
 
     /// Takes out the least needed pole until all are needed.
@@ -234,7 +384,8 @@ impl Fit<'_> {
             let wanted = self.wanted(&solution);
             let mut least: Option<(f64, usize, Solution)> = None;
             for j in 0..solution.poles.len() {
-                let sane = self.sane(&solution, j);
+                let possible = self.possible(solution.poles[j]);
+                let sane = possible && self.determined(&solution, j);
                 // With the other poles held the growth is an upper bound of the true one: most need no fit.
                 let evidence: f64 = (0..self.frfs.len()).map(|m| solution.evidence(m, j)).sum();
                 if sane && evidence > 4.0 * wanted {
@@ -243,8 +394,10 @@ impl Fit<'_> {
                 let mut rest = solution.poles.clone();
                 rest.remove(j);
                 let Some(without) = self.fit(&rest) else { continue };
-                let growth = if sane {
-                    without.misfit - solution.misfit
+                // Where the model fits badly nothing is well determined: a pole that explains that much stays all the same.
+                let grown = without.misfit - solution.misfit;
+                let growth = if possible && (sane || grown > INDISPENSABLE * wanted) {
+                    grown
                 } else {
                     f64::NEG_INFINITY
                 };
@@ -278,13 +431,8 @@ impl Fit<'_> {
             let alike = (usual / 4.0..usual * 4.0).contains(&added.damping_ratio);
             sane && alike && fall > ADMITTED * self.wanted(more)
         };
-        let found = self
-            .in_the_rest(solution)
-            .into_iter()
-            .filter_map(|pole| self.and(solution, pole))
-            .find(enough);
-        if found.is_some() || self.search != Search::Pairs {
-            return found;
+        if let Some(more) = self.in_the_rest(solution).filter(enough) {
+            return Some(more);
         }
         let more = self.beside(solution)?;
         if enough(&more) {
@@ -302,6 +450,13 @@ impl Fit<'_> {
                 && c.frequency_hz[c.frequency_hz.len() - 1] >= pole.frequency_hz
         });
         let fall = solution.misfit - more.misfit;
+        // Residues of no common phase are an error of the model.
+        let residues: Vec<Complex64> = (0..self.frfs.len())
+            .map(|m| more.constant(m, more.poles.len() - 1).0)
+            .collect();
+        if residues.len() > 4 && shape::complexity(&residues).is_some_and(|c| c.mpc < 0.5) {
+            return None;
+        }
         if !inside
             || pole.damping_ratio > MAX_DAMPING
             || fall < self.beyond_chance(more, DOUBT_SIGMA, DOUBT_LOOKED)
@@ -337,19 +492,24 @@ impl Fit<'_> {
                 })
             })
             .collect();
+        // No more than noise gives to any pole: not worth a fit.
+        let by_noise = self.beyond_chance(solution, WORTH_A_FIT_SIGMA, 0.0);
+        self.best_of(solution, &trials, by_noise)
+    }
+
+    /// With the trial pole that explains most, the others held, where that is more than `least`.
+    fn best_of(&self, solution: &Solution, trials: &[Pole], least: f64) -> Option<Solution> {
         let held: Vec<Pole> = solution.poles.iter().chain(&self.fixed).copied().collect();
-        let explained = ml_fit::explained_by(&self.frfs, &held, &trials)?;
+        let explained = ml_fit::explained_by(&self.frfs, &held, trials)?;
         let (fall, best) = explained
             .into_iter()
             .zip(trials)
             .max_by(|a, b| a.0.total_cmp(&b.0))?;
-        // No more than noise gives to any pole: not worth a fit.
-        let by_noise = self.beyond_chance(solution, WORTH_A_FIT_SIGMA, 0.0);
-        (fall > by_noise).then(|| self.and(solution, best))?
+        (fall > least).then(|| self.and(solution, *best))?
     }
 
-    /// Poles to try where the rest is largest; none where it could not pay for a mode.
-    fn in_the_rest(&self, solution: &Solution) -> Vec<Pole> {
+    /// One more pole where the rest is largest; none where it could not pay for a mode.
+    fn in_the_rest(&self, solution: &Solution) -> Option<Solution> {
         // Rest by frequency, over all FRFs; FRFs may have lines of their own.
         let mut rest: Vec<(f64, f64)> = Vec::new();
         for (frf, found) in self.frfs.iter().zip(&solution.frfs) {
@@ -359,7 +519,7 @@ impl Fit<'_> {
         rest.sort_by(|a, b| a.0.total_cmp(&b.0));
         let near = 5 * self.frfs.len();
         if rest.len() < 2 * near {
-            return Vec::new();
+            return None;
         }
         let mut sum: f64 = rest[..near].iter().map(|r| r.1).sum();
         let mut most = (sum, near / 2);
@@ -371,26 +531,28 @@ impl Fit<'_> {
         }
         // Nothing left that could pay for a mode.
         if most.0 < 0.4 * self.wanted(solution) {
-            return Vec::new();
+            return None;
         }
         let centre = rest[most.1].0;
         let usual = usual_damping(solution);
         // A pole on top of another one is a saddle: beside it the search begins on either slope.
-        [1.0, 1.0 - usual, 1.0 + usual]
-            .map(|factor| Pole {
-                frequency_hz: centre * factor,
-                damping_ratio: usual,
-            })
-            .to_vec()
+        let trials = [1.0, 1.0 - usual, 1.0 + usual].map(|factor| Pole {
+            frequency_hz: centre * factor,
+            damping_ratio: usual,
+        });
+        self.best_of(solution, &trials, REFINED * self.wanted(solution))
     }
 }
 
+/// Of the modes of a group; what is damped beyond that stands for something else.
 fn usual_damping(solution: &Solution) -> f64 {
-    if solution.poles.is_empty() {
-        return 0.02;
+    const LIGHTLY: f64 = 0.15;
+    let damping = solution.poles.iter().map(|p| p.damping_ratio);
+    let light: Vec<f64> = damping.filter(|d| *d < LIGHTLY).collect();
+    match light.is_empty() {
+        true => 0.02,
+        false => crate::signal::median(&light),
     }
-    let damping: Vec<f64> = solution.poles.iter().map(|p| p.damping_ratio).collect();
-    crate::signal::median(&damping)
 }
 
 /// FRFs of the group that show the mode, and the squared size over uncertainty in the one that shows it best.

@@ -37,6 +37,8 @@ pub(super) struct NoisyFrf<'a> {
     pub receptance: &'a [Complex64],
     /// sqrt(E|e|²) of each line, > 0.
     pub sigma: &'a [f64],
+    /// Standard deviation of the frequencies that a line is the mean of, Hz; zero for a single one.
+    pub spread_hz: &'a [f64],
 }
 
 pub(super) struct Solution {
@@ -48,7 +50,12 @@ pub(super) struct Solution {
     pub degrees_of_freedom: usize,
     /// Of (ln f₁, ln ζ₁, ln f₂, …) for the noise as given.
     pub covariance: DMatrix<f64>,
+    /// The same from how the FRFs scatter about the common poles, whatever their noise is (Liang & Zeger 1986, one cluster
+    /// an FRF); `None` for a single FRF.
+    pub scatter: Option<DMatrix<f64>>,
     pub converged: bool,
+    fixed: Vec<Pole>,
+    centre_hz: f64,
 }
 
 pub(super) struct FrfSolution {
@@ -71,6 +78,35 @@ impl Solution {
 
     pub fn damping_std(&self, mode: usize) -> f64 {
         self.covariance[(2 * mode + 1, 2 * mode + 1)].max(0.0).sqrt() * self.poles[mode].damping_ratio
+    }
+
+    /// Relative standard deviations of frequency and damping ratio from the scatter of the FRFs; zero for a single FRF.
+    pub fn scatter_std(&self, mode: usize) -> [f64; 2] {
+        let Some(scatter) = &self.scatter else {
+            return [0.0; 2];
+        };
+        [0, 1].map(|k| scatter[(2 * mode + k, 2 * mode + k)].max(0.0).sqrt())
+    }
+
+    /// What the fit says of an FRF on any lines of its window.
+    pub fn fitted(&self, frf: usize, frequency_hz: &[f64]) -> Vec<Complex64> {
+        let linear = &self.frfs[frf].linear;
+        frequency_hz
+            .iter()
+            .map(|&f| {
+                let poles = self.poles.iter().chain(&self.fixed).enumerate();
+                let modes: Complex64 = poles
+                    .map(|(j, pole)| {
+                        let r = f / pole.frequency_hz;
+                        Complex64::new(linear[2 * j], linear[2 * j + 1] * r)
+                            / Complex64::new(1.0 - r * r, 2.0 * pole.damping_ratio * r)
+                    })
+                    .sum();
+                let from = linear.len() - RESIDUAL_TERMS;
+                let rest = residual_terms(f, self.centre_hz).into_iter().enumerate();
+                modes + rest.map(|(n, term)| term * linear[from + n]).sum::<Complex64>()
+            })
+            .collect()
     }
 
     /// Complex modal constant A of a mode in an FRF, 1/kg, and the standard deviation of its modulus' parts:
@@ -150,7 +186,14 @@ impl<'a> Prepared<'a> {
         (0..self.frfs.len())
             .map(|m| {
                 let own = self.axis_of[m] == m;
-                own.then(|| Axis::new(self.frfs[m].frequency_hz, moving, fixed, self.centre_hz))
+                own.then(|| {
+                    let NoisyFrf {
+                        frequency_hz,
+                        spread_hz,
+                        ..
+                    } = self.frfs[m];
+                    Axis::new(frequency_hz, spread_hz, moving, fixed, self.centre_hz)
+                })
             })
             .collect()
     }
@@ -182,35 +225,50 @@ struct Axis {
 }
 
 impl Axis {
-    fn new(frequency_hz: &[f64], moving: &[Pole], fixed: &[Pole], centre_hz: f64) -> Axis {
+    fn new(frequency_hz: &[f64], spread_hz: &[f64], moving: &[Pole], fixed: &[Pole], centre_hz: f64) -> Axis {
         let rows = 2 * frequency_hz.len();
         let modes = moving.len() + fixed.len();
         let mut columns = vec![0.0; rows * (2 * modes + RESIDUAL_TERMS)];
         let mut slopes = vec![0.0; rows * 4 * moving.len()];
-        let put = |all: &mut [f64], column: usize, line: usize, value: Complex64| {
-            all[column * rows + 2 * line] = value.re;
-            all[column * rows + 2 * line + 1] = value.im;
+        let add = |all: &mut [f64], column: usize, line: usize, value: Complex64| {
+            all[column * rows + 2 * line] += value.re;
+            all[column * rows + 2 * line + 1] += value.im;
+        };
+        // The mean of a smooth function over frequencies that scatter by s is that of its values at ± s.
+        let points = |k: usize| {
+            let (f, s) = (frequency_hz[k], spread_hz[k]);
+            let (points, share) = if s > 0.0 {
+                ([f - s, f + s], 0.5)
+            } else {
+                ([f, f], 1.0)
+            };
+            let count = if s > 0.0 { 2 } else { 1 };
+            points.into_iter().take(count).map(move |f| (f, share))
         };
         for (j, pole) in moving.iter().chain(fixed).enumerate() {
-            for (k, f) in frequency_hz.iter().enumerate() {
-                let r = f / pole.frequency_hz;
-                let (re, im) = (1.0 - r * r, 2.0 * pole.damping_ratio * r);
-                let g = Complex64::new(re, -im) / (re * re + im * im);
-                let turned = |z: Complex64| Complex64::new(-z.im * r, z.re * r);
-                put(&mut columns, 2 * j, k, g);
-                put(&mut columns, 2 * j + 1, k, turned(g));
-                if j < moving.len() {
-                    let p = -(g * g) * Complex64::new(2.0 * r * r, -im);
-                    let q = -(g * g) * Complex64::new(0.0, im);
-                    for (n, value) in [p, turned(p - g), q, turned(q)].into_iter().enumerate() {
-                        put(&mut slopes, 4 * j + n, k, value);
+            for k in 0..frequency_hz.len() {
+                for (f, share) in points(k) {
+                    let r = f / pole.frequency_hz;
+                    let (re, im) = (1.0 - r * r, 2.0 * pole.damping_ratio * r);
+                    let g = Complex64::new(re, -im) / (re * re + im * im);
+                    let turned = |z: Complex64| Complex64::new(-z.im * r, z.re * r);
+                    add(&mut columns, 2 * j, k, g * share);
+                    add(&mut columns, 2 * j + 1, k, turned(g) * share);
+                    if j < moving.len() {
+                        let p = -(g * g) * Complex64::new(2.0 * r * r, -im);
+                        let q = -(g * g) * Complex64::new(0.0, im);
+                        for (n, value) in [p, turned(p - g), q, turned(q)].into_iter().enumerate() {
+                            add(&mut slopes, 4 * j + n, k, value * share);
+                        }
                     }
                 }
             }
         }
-        for (k, &f) in frequency_hz.iter().enumerate() {
-            for (n, term) in residual_terms(f, centre_hz).into_iter().enumerate() {
-                put(&mut columns, 2 * modes + n, k, term);
+        for k in 0..frequency_hz.len() {
+            for (f, share) in points(k) {
+                for (n, term) in residual_terms(f, centre_hz).into_iter().enumerate() {
+                    add(&mut columns, 2 * modes + n, k, term * share);
+                }
             }
         }
         Axis {
@@ -323,6 +381,14 @@ pub(super) fn fit(frfs: &[NoisyFrf], start: &[Pole], fixed: &[Pole], settled: f6
         }
     }
     let covariance = current.normal.try_inverse()?;
+    let scatter = (current.scores.len() > 1).then(|| {
+        let mut of_scores = DMatrix::zeros(parameters, parameters);
+        for score in &current.scores {
+            of_scores.ger(1.0, score, score, 1.0);
+        }
+        let count = current.scores.len() as f64;
+        &covariance * of_scores * &covariance * (count / (count - 1.0))
+    });
     let solved: Option<Vec<FrfSolution>> = current
         .frfs
         .into_par_iter()
@@ -336,7 +402,10 @@ pub(super) fn fit(frfs: &[NoisyFrf], start: &[Pole], fixed: &[Pole], settled: f6
         misfit: current.misfit,
         degrees_of_freedom,
         covariance,
+        scatter,
         converged,
+        fixed: fixed.to_vec(),
+        centre_hz: prepared.centre_hz,
     })
 }
 
@@ -394,6 +463,8 @@ struct Linearised {
     misfit: f64,
     normal: DMatrix<f64>,
     gradient: DVector<f64>,
+    /// Each FRF's part of the gradient.
+    scores: Vec<DVector<f64>>,
     frfs: Vec<SolvedFrf>,
     axes: Vec<Option<Axis>>,
 }
@@ -405,7 +476,9 @@ fn linearise(prepared: &Prepared, poles: &[Pole], fixed: &[Pole]) -> Option<Line
     let parameters = 2 * poles.len();
     let mut sum = DMatrix::zeros(1 + parameters, 1 + parameters);
     let mut frfs = Vec::with_capacity(each.len());
+    let mut scores = Vec::with_capacity(each.len());
     for (products, solved) in each {
+        scores.push(products.view((1, 0), (parameters, 1)).column(0).into_owned());
         sum += products;
         frfs.push(solved);
     }
@@ -413,6 +486,7 @@ fn linearise(prepared: &Prepared, poles: &[Pole], fixed: &[Pole]) -> Option<Line
         misfit: sum[(0, 0)].max(0.0),
         normal: sum.view((1, 1), (parameters, parameters)).into_owned(),
         gradient: DVector::from_fn(parameters, |j, _| sum[(1 + j, 0)]),
+        scores,
         frfs,
         axes,
     })
@@ -629,6 +703,7 @@ mod tests {
             frequency_hz: &f,
             receptance: &h,
             sigma: &sigma,
+            spread_hz: &vec![0.0; f.len()],
         };
         let start = [(11.8, 0.04), (12.7, 0.015)].map(|(frequency_hz, damping_ratio)| Pole {
             frequency_hz,

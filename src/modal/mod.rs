@@ -11,9 +11,12 @@ use serde::Serialize;
 mod analysis;
 pub mod chosen;
 mod circle_fit;
+mod condense;
 mod curve;
 pub mod delay;
 mod findings;
+#[cfg(test)]
+mod foreign_marks;
 mod from_hits;
 mod global;
 #[cfg(test)]
@@ -31,17 +34,21 @@ pub mod operational;
 mod peaks;
 pub mod quality;
 pub mod scaling;
+mod select;
 mod set_noise;
 pub mod shape;
+mod sine_lines;
 pub mod stabilisation;
 #[cfg(test)]
 mod synthetic;
 pub mod tracking;
+mod verify;
 
 pub use analysis::analyse_frf;
 pub use from_hits::{Estimator, TapFrfs, TapRecord, TapSettings, frfs_from_hits};
 pub use global::{SetMember, global};
 pub use hits::Hit;
+pub use sine_lines::{SineLine, sine_lines, without_sines};
 
 /// How a modal parameter was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
@@ -179,6 +186,8 @@ pub struct GlobalModes {
     pub modes: Vec<GlobalMode>,
     /// What resembled a mode and is none, or none that these FRFs prove; ascending in frequency.
     pub rejected: Vec<RejectedMode>,
+    /// Lines without a shape that were taken out before the fits.
+    pub sine_lines: Vec<SineLine>,
     /// What the modes are worth.
     pub quality: quality::SetQuality,
     /// MAC of every two modes, from their residues in all FRFs.

@@ -199,8 +199,20 @@ impl Power {
     }
 }
 
+/// What a set's modes are judged by.
+pub(super) struct SetFindings {
+    pub power: Power,
+    pub frequency_scatter: Option<f64>,
+    /// Most modes move from FRF to FRF.
+    pub moving: bool,
+    /// Modes that there may be besides.
+    pub doubts: usize,
+    pub converged: bool,
+}
+
 /// Judges the modes of a set.
-pub(super) fn judge_set(power: Power, frequency_scatter: Option<f64>, converged: bool) -> SetQuality {
+pub(super) fn judge_set(found: &SetFindings) -> SetQuality {
+    let power = found.power;
     let share = |part: f64| {
         let share = part / power.measured;
         if share.is_finite() {
@@ -216,8 +228,8 @@ pub(super) fn judge_set(power: Power, frequency_scatter: Option<f64>, converged:
         unexplained_share,
         coloured_share: share(power.coloured).min(share(power.left)),
         noise_share,
-        frequency_scatter,
-        converged,
+        frequency_scatter: found.frequency_scatter,
+        converged: found.converged,
         reasons: Vec::new(),
     };
     let mut note = |verdict: Verdict, why: String| {
@@ -239,7 +251,22 @@ pub(super) fn judge_set(power: Power, frequency_scatter: Option<f64>, converged:
             ),
         );
     }
-    if !converged {
+    if found.moving {
+        note(
+            Verdict::Doubtful,
+            format!(
+                "your frequencies move from FRF to FRF by {:.2} %: mass loading or temperature",
+                100.0 * found.frequency_scatter.unwrap_or(0.0)
+            ),
+        );
+    }
+    if found.doubts > 0 {
+        note(
+            Verdict::Doubtful,
+            "there may be one more mode close to another".into(),
+        );
+    }
+    if !found.converged {
         note(Verdict::Doubtful, "a common fit did not converge".into());
     }
     quality

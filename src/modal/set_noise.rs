@@ -61,21 +61,25 @@ pub(super) fn renew(data: &mut [Data], groups: &[Group]) {
     for ((d, lines), law) in data.iter_mut().zip(&left_over).zip(laws) {
         let size = rms(&d.receptance);
         let fitted = lines.iter().filter(|l| l.squared.is_finite());
-        let (count, level) = fitted.zip(&d.sigma).fold((0, 0.0), |(n, sum), (line, s)| {
-            (n + 1, sum + line.squared / (s * s))
+        let sigmas = d.sigma.iter().zip(&d.count);
+        let (count, level) = fitted.zip(sigmas).fold((0, 0.0), |(n, sum), (line, (s, count))| {
+            (n + 1, sum + line.squared / (s * s * count))
         });
         let scale = (level / f64::from(count.max(1))).sqrt().max(1e-6);
-        for (sigma, line) in d
+        for ((sigma, line), count) in d
             .sigma
             .iter_mut()
             .zip(lines)
-            .filter(|(_, l)| l.squared.is_finite())
+            .zip(&d.count)
+            .filter(|((_, l), _)| l.squared.is_finite())
         {
             *sigma = match &law {
-                Some(law) => law
-                    .std(line.frequency_hz, line.magnitude)
-                    .max(1e-7 * line.magnitude)
-                    .max(1e-10 * size),
+                Some(law) => {
+                    let of_a_line = law.std(line.frequency_hz, line.magnitude);
+                    (of_a_line / count.sqrt())
+                        .max(1e-7 * line.magnitude)
+                        .max(1e-10 * size)
+                }
                 None => *sigma * scale,
             };
         }
@@ -87,9 +91,9 @@ pub(super) fn renew(data: &mut [Data], groups: &[Group]) {
     for [from, to] in blocks(data) {
         let (mut count, mut level) = (0, 0.0);
         for (d, lines) in data.iter().zip(&left_over) {
-            for (line, sigma) in lines.iter().zip(&d.sigma) {
+            for ((line, sigma), lines) in lines.iter().zip(&d.sigma).zip(&d.count) {
                 if (from..to).contains(&line.frequency_hz) && line.squared.is_finite() {
-                    level += line.squared / (sigma * sigma);
+                    level += line.squared / (sigma * sigma * lines);
                     count += 1;
                 }
             }
@@ -121,7 +125,7 @@ fn blocks(data: &[Data]) -> Vec<[f64; 2]> {
     (0..count).map(|k| [edge(k), edge(k + 1)]).collect()
 }
 
-/// By line of FRF m; infinite where no group covers it.
+/// By line of FRF m, squares as they would be on a single line; infinite where no group covers it.
 fn left_over(data: &Data, groups: &[Group], m: usize) -> Vec<Departure> {
     let mut lines: Vec<Departure> = data
         .frequency_hz
@@ -141,7 +145,7 @@ fn left_over(data: &Data, groups: &[Group], m: usize) -> Vec<Departure> {
         for (k, residual) in found.residual.iter().enumerate() {
             let line = &mut lines[from + k];
             line.magnitude = (data.receptance[from + k] - residual).norm();
-            line.squared = residual.norm_sqr() / freedom;
+            line.squared = residual.norm_sqr() * data.count[from + k] / freedom;
         }
     }
     lines

@@ -1,0 +1,81 @@
+//! Which candidates explain more than a pole anywhere near would: chosen strongest first, with the noise and the error of
+//! the model taken from what those chosen so far leave.
+//!
+//! A model never fits measurements exactly, and what it leaves is smooth over lines: any pole put there explains some of
+//! it. So a candidate is not held against white noise but against trial poles spread over its surroundings, which know
+//! neither a level nor a colour (in radar: detection with a constant rate of false alarms).
+
+use super::joint_fit::{self, Data, Search};
+use super::local_fit::Pole;
+use super::set_noise;
+
+/// Batches at most.
+const MAX_ROUNDS: usize = 14;
+/// The first batches come in whatever they explain: while strong modes are missing nothing can be held against the rest.
+const UNASKED: usize = 3;
+/// A batch holds what explains at least this share of its best …
+const BATCH: f64 = 0.25;
+/// … and is not within so many half-widths of something better.
+const APART_WIDTHS: f64 = 1.5;
+/// FRFs that the choice is made on, at most.
+const ENOUGH_FRFS: usize = 40;
+
+/// Evenly spread FRFs, enough to choose on.
+pub(super) fn some(data: &[Data]) -> Vec<Data> {
+    let count = data.len().min(ENOUGH_FRFS);
+    (0..count).map(|k| data[k * data.len() / count].clone()).collect()
+}
+
+/// The candidates to begin with, ascending in frequency.
+pub(super) fn choose(data: &[Data], candidates: &[Pole]) -> Vec<Pole> {
+    let mut data = data.to_vec();
+    let mut left = candidates.to_vec();
+    let mut chosen: Vec<Pole> = Vec::new();
+    for round in 0..MAX_ROUNDS {
+        let Some(worth) = joint_fit::worth(&data, &chosen, &left) else {
+            break;
+        };
+        let wanted = if round < UNASKED { 0.0 } else { 1.0 };
+        let batch = batch(&left, &worth, wanted);
+        if batch.is_empty() {
+            break;
+        }
+        chosen.extend(batch.iter().map(|&k| left[k]));
+        for k in batch.into_iter().rev() {
+            left.remove(k);
+        }
+        chosen.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+        let Some(groups) = joint_fit::refine(&data, &chosen, Search::Roughly, &mut Vec::new()) else {
+            break;
+        };
+        set_noise::renew(&mut data, &groups);
+        chosen = groups
+            .iter()
+            .flat_map(|g| g.solution.poles.iter().copied())
+            .collect();
+        chosen.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+    }
+    chosen
+}
+
+/// Ascending indices of those that come in together.
+fn batch(left: &[Pole], worth: &[f64], wanted: f64) -> Vec<usize> {
+    let best = worth.iter().copied().fold(0.0, f64::max);
+    let mut order: Vec<usize> = (0..left.len())
+        .filter(|&k| worth[k] > wanted && worth[k] >= BATCH * best && worth[k] > 0.0)
+        .collect();
+    order.sort_by(|&a, &b| worth[b].total_cmp(&worth[a]));
+    let width = |p: &Pole| p.damping_ratio * p.frequency_hz;
+    let mut taken: Vec<usize> = Vec::new();
+    for k in order {
+        let apart = |&t: &usize| {
+            let reach = APART_WIDTHS * (width(&left[t]) + width(&left[k]));
+            (left[t].frequency_hz - left[k].frequency_hz).abs() > reach
+        };
+        if taken.iter().all(apart) {
+            taken.push(k);
+        }
+    }
+    taken.sort_unstable();
+    taken
+}

@@ -1,0 +1,357 @@
+//! Is a fitted pole a mode of the structure? What the FRFs together do not bear out goes out, with the reason, and the rest
+//! is fitted again.
+
+use num_complex::Complex64;
+
+use super::joint_fit::{self, Data, Group, Search};
+use super::local_fit::Pole;
+use super::ml_fit::{self, Solution};
+use super::{RejectedMode, set_noise, shape};
+
+/// Fits after poles were taken out, at most.
+const MAX_ROUNDS: usize = 6;
+/// From this many FRFs on the phase of their residues says something.
+const ENOUGH_FRFS: usize = 5;
+/// Residues of no common phase: what random phases give more often than a structure.
+const COLLINEAR: f64 = 0.5;
+/// A pole that makes this share of what was measured in its band is there, whatever its phases are.
+const DOMINANT: f64 = 0.5;
+/// Share of the FRFs that must show a mode …
+const SHARE_OF_FRFS: f64 = 0.08;
+/// … unless one of them shows it with this squared size over uncertainty.
+const FAR: f64 = 100.0;
+/// A frequency that scatters from FRF to FRF by more than this share of the half-width is none.
+const SCATTER_WIDTHS: f64 = 0.3;
+/// A damping ratio uncertain by more than this part of itself, from how the FRFs scatter.
+const SCATTER_DAMPING: f64 = 0.5;
+/// Power of a mode over the coloured rest in its band.
+const OVER_REST: f64 = 2.0;
+/// Two poles nearer than this share of the sum of their half-widths may be one.
+const CLOSE: f64 = 1.0;
+/// Shapes that repeat.
+const SAME_SHAPE: f64 = 0.9;
+
+/// Takes out what is no mode until all are; `data` gets the noise that belongs to the last fit.
+pub(super) fn verified(
+    data: &mut [Data],
+    mut groups: Vec<Group>,
+    rejected: &mut Vec<RejectedMode>,
+) -> Option<Vec<Group>> {
+    for _ in 0..MAX_ROUNDS {
+        let mut kept: Vec<Pole> = Vec::new();
+        let mut out = false;
+        for group in &groups {
+            let pairs = close_pairs(data, group);
+            for (j, pole) in group.solution.poles.iter().enumerate() {
+                if let Some(merged) = pairs.iter().find_map(|p| p.merged.filter(|_| p.strong == j)) {
+                    kept.push(merged);
+                    continue;
+                }
+                let twice = pairs.iter().find(|p| p.weak == j);
+                match twice.map(|p| p.reason.clone()).or_else(|| reason(data, group, j)) {
+                    None => kept.push(*pole),
+                    Some(reason) => {
+                        out = true;
+                        rejected.push(RejectedMode {
+                            frequency_hz: pole.frequency_hz,
+                            damping_ratio: pole.damping_ratio,
+                            reason,
+                        });
+                    }
+                }
+            }
+        }
+        if !out {
+            return Some(groups);
+        }
+        kept.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+        if kept.is_empty() {
+            return None;
+        }
+        groups = joint_fit::refine(data, &kept, Search::Roughly, &mut Vec::new())?;
+        set_noise::renew(data, &groups);
+        groups = joint_fit::refine(data, &kept, Search::Nothing, &mut Vec::new())?;
+    }
+    Some(groups)
+}
+
+/// Why pole `j` of a group is no mode.
+fn reason(data: &[Data], group: &Group, j: usize) -> Option<String> {
+    let solution = &group.solution;
+    let pole = solution.poles[j];
+    let frfs = solution.frfs.len();
+    let residues: Vec<Complex64> = (0..frfs).map(|m| solution.constant(m, j).0).collect();
+    let local = Local::new(data, group, j, &residues);
+    let (seen_in, best) = joint_fit::seen_in(solution, j);
+    let wanted = ((SHARE_OF_FRFS * frfs as f64).ceil() as usize).max(2);
+    if frfs >= super::global::SET && seen_in < wanted && best < FAR {
+        return Some(match seen_in {
+            0 => "hardly above what is left unexplained".into(),
+            n => format!("shown by {n} of {frfs} FRFs only"),
+        });
+    }
+    if local.mode < OVER_REST * local.coloured {
+        return Some("no larger than what the modes leave unexplained around it".into());
+    }
+    if frfs >= ENOUGH_FRFS && local.mode < DOMINANT * local.measured {
+        let mpc = shape::complexity(&residues).map_or(1.0, |c| c.mpc);
+        if mpc < COLLINEAR {
+            return Some(format!(
+                "its FRFs have no common phase (collinearity {mpc:.2}): error of the measurement or of its neighbours' model"
+            ));
+        }
+    }
+    let [frequency, damping] = solution.scatter_std(j);
+    if frfs >= ENOUGH_FRFS
+        && local.mode < DOMINANT * local.measured
+        && (frequency > SCATTER_WIDTHS * pole.damping_ratio || damping > SCATTER_DAMPING)
+    {
+        return Some("the FRFs do not agree on its frequency or damping".into());
+    }
+    None
+}
+
+/// Powers in the half-power band of a mode, summed over the FRFs.
+struct Local {
+    mode: f64,
+    measured: f64,
+    /// Of what is left, the part that goes on from line to line.
+    coloured: f64,
+}
+
+impl Local {
+    fn new(data: &[Data], group: &Group, j: usize, residues: &[Complex64]) -> Local {
+        let pole = group.solution.poles[j];
+        let omega = std::f64::consts::TAU * pole.frequency_hz;
+        let mut local = Local {
+            mode: 0.0,
+            measured: 0.0,
+            coloured: 0.0,
+        };
+        for ((d, found), residue) in data.iter().zip(&group.solution.frfs).zip(residues) {
+            let from = d.frequency_hz.partition_point(|&f| f < group.window_hz[0]);
+            let line_hz = joint_fit::spacing_hz(&d.frequency_hz, pole.frequency_hz);
+            let half_hz = (pole.damping_ratio * pole.frequency_hz).max(1.5 * line_hz);
+            let lines = d
+                .frequency_hz
+                .partition_point(|&f| f < pole.frequency_hz - half_hz)
+                ..d.frequency_hz
+                    .partition_point(|&f| f <= pole.frequency_hz + half_hz);
+            let mut before: Option<Complex64> = None;
+            for k in lines {
+                let Some(residual) = k.checked_sub(from).and_then(|k| found.residual.get(k)) else {
+                    continue;
+                };
+                let r = d.frequency_hz[k] / pole.frequency_hz;
+                let g = residue / (omega * omega) / Complex64::new(1.0 - r * r, 2.0 * pole.damping_ratio * r);
+                local.mode += g.norm_sqr();
+                local.measured += d.receptance[k].norm_sqr();
+                if let Some(before) = before {
+                    local.coloured += (before.conj() * residual).re;
+                }
+                before = Some(*residual);
+            }
+        }
+        local
+    }
+}
+
+/// Two poles that stand for one mode.
+struct ClosePair {
+    strong: usize,
+    weak: usize,
+    /// What takes the place of the strong one.
+    merged: Option<Pole>,
+    reason: String,
+}
+
+/// The pairs of a group that are one mode: because its frequency moves from FRF to FRF, or because the shapes repeat. No
+/// pole is in two of them.
+fn close_pairs(data: &[Data], group: &Group) -> Vec<ClosePair> {
+    let solution = &group.solution;
+    let mut order: Vec<usize> = (0..solution.poles.len()).collect();
+    order.sort_by(|&a, &b| {
+        solution.poles[a]
+            .frequency_hz
+            .total_cmp(&solution.poles[b].frequency_hz)
+    });
+    let mut found = Vec::new();
+    let mut k = 1;
+    while k < order.len() {
+        match close_pair(data, solution, [order[k - 1], order[k]]) {
+            Some(pair) => {
+                found.push(pair);
+                k += 2;
+            }
+            None => k += 1,
+        }
+    }
+    found
+}
+
+fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2]) -> Option<ClosePair> {
+    let [a, b] = both.map(|j| solution.poles[j]);
+    let width = a.damping_ratio * a.frequency_hz + b.damping_ratio * b.frequency_hz;
+    if b.frequency_hz - a.frequency_hz > CLOSE * width {
+        return None;
+    }
+    let residues = both.map(|j| {
+        (0..solution.frfs.len())
+            .map(|m| solution.constant(m, j).0)
+            .collect::<Vec<Complex64>>()
+    });
+    // By the height of the peaks.
+    let height = |k: usize, pole: Pole| {
+        residues[k].iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt() / pole.damping_ratio
+    };
+    let (strong, weak) = if height(0, a) >= height(1, b) {
+        (both[0], both[1])
+    } else {
+        (both[1], both[0])
+    };
+    let beside = solution.poles[strong].frequency_hz;
+    if let Some(merged) = moving(data, solution, strong, weak) {
+        return Some(ClosePair {
+            strong,
+            weak,
+            merged: Some(merged),
+            reason: format!(
+                "one mode with {beside:.2} Hz, whose frequency moves from FRF to FRF: mass of the sensor, temperature"
+            ),
+        });
+    }
+    let repeats = residues[0].len() >= ENOUGH_FRFS && shape::mac(&residues[0], &residues[1]) > SAME_SHAPE;
+    repeats.then(|| ClosePair {
+        strong,
+        weak,
+        merged: None,
+        reason: format!("splits the mode at {beside:.2} Hz, whose shape it repeats"),
+    })
+}
+
+/// Does one mode that each FRF has at a place of its own describe the FRFs better than two common ones? Both have as many
+/// parameters. Its mean then.
+fn moving(data: &[Data], solution: &Solution, strong: usize, weak: usize) -> Option<Pole> {
+    if data.len() < 2 {
+        return None;
+    }
+    let pair = [solution.poles[strong], solution.poles[weak]];
+    let others: Vec<Pole> = (0..solution.poles.len())
+        .filter(|j| ![strong, weak].contains(j))
+        .map(|j| solution.poles[j])
+        .collect();
+    let single = own_poles(data, pair[0], &others)?;
+    let window = around(pair[0]);
+    let frfs: Vec<_> = data.iter().map(|d| d.window(window)).collect::<Option<_>>()?;
+    let near = near(&others, window);
+    let together = ml_fit::fit(&frfs, &pair, &near, ml_fit::SETTLED)?;
+    let misfit: f64 = single
+        .iter()
+        .map(|s| s.as_ref().map_or(f64::INFINITY, |s| s.misfit))
+        .sum();
+    if misfit > together.misfit {
+        return None;
+    }
+    let poles: Vec<Pole> = single.iter().flatten().map(|s| s.poles[0]).collect();
+    let median = |of: fn(&Pole) -> f64| crate::signal::median(&poles.iter().map(of).collect::<Vec<_>>());
+    Some(Pole {
+        frequency_hz: median(|p| p.frequency_hz),
+        damping_ratio: median(|p| p.damping_ratio),
+    })
+}
+
+/// Window of the single fits around a pole, Hz.
+fn around(pole: Pole) -> [f64; 2] {
+    const REACH_WIDTHS: f64 = 10.0;
+    let reach = REACH_WIDTHS * (pole.damping_ratio * pole.frequency_hz).max(2e-4 * pole.frequency_hz);
+    [pole.frequency_hz - reach, pole.frequency_hz + reach]
+}
+
+/// The poles that have something to say in a window.
+fn near(others: &[Pole], window: [f64; 2]) -> Vec<Pole> {
+    const MOST: usize = 4;
+    let reach = 0.5 * (window[1] - window[0]);
+    let mut near: Vec<Pole> = others
+        .iter()
+        .filter(|p| (window[0] - reach..window[1] + reach).contains(&p.frequency_hz))
+        .copied()
+        .collect();
+    let middle = 0.5 * (window[0] + window[1]);
+    near.sort_by(|a, b| {
+        (a.frequency_hz - middle)
+            .abs()
+            .total_cmp(&(b.frequency_hz - middle).abs())
+    });
+    near.truncate(MOST);
+    near
+}
+
+/// The mode as each FRF alone has it, the other poles held; `None` inside where its lines do not tell.
+pub(super) fn own_poles(data: &[Data], pole: Pole, others: &[Pole]) -> Option<Vec<Option<Solution>>> {
+    use rayon::prelude::*;
+    let window = around(pole);
+    let near = near(others, window);
+    let found: Vec<Option<Solution>> = data
+        .par_iter()
+        .map(|d| ml_fit::fit(&[d.window(window)?], &[pole], &near, ml_fit::SETTLED))
+        .collect();
+    found.iter().any(|s| s.is_some()).then_some(found)
+}
+
+/// How far a mode moves from FRF to FRF.
+pub(super) struct Moves {
+    /// Relative standard deviation of the frequency beyond its uncertainty in each FRF.
+    pub scatter: f64,
+    /// More than uncertainty and a part of the half-width: a common pole does not describe it.
+    pub significant: bool,
+    /// Means over the FRFs, with their standard deviations.
+    pub pole: Pole,
+    pub std: [f64; 2],
+}
+
+/// `None` where too few FRFs tell.
+pub(super) fn moves(data: &[Data], pole: Pole, others: &[Pole]) -> Option<Moves> {
+    const LEAST_FRFS: usize = 4;
+    const KNOWN_WIDTHS: f64 = 0.3;
+    const BEYOND: f64 = 2.0;
+    const OF_WIDTH: f64 = 0.1;
+    let own: Vec<(Pole, [f64; 2])> = own_poles(data, pole, others)?
+        .into_iter()
+        .flatten()
+        .filter_map(|s| {
+            let level = (s.misfit / s.degrees_of_freedom as f64).max(1.0).sqrt();
+            let std = [level * s.frequency_std_hz(0), level * s.damping_std(0)];
+            let width = pole.damping_ratio * pole.frequency_hz;
+            let near = (s.poles[0].frequency_hz - pole.frequency_hz).abs() < 3.0 * width
+                && (0.3..3.0).contains(&(s.poles[0].damping_ratio / pole.damping_ratio));
+            (near && std[0] < KNOWN_WIDTHS * width).then_some((s.poles[0], std))
+        })
+        .collect();
+    if own.len() < LEAST_FRFS {
+        return None;
+    }
+    let median = |of: &dyn Fn(&(Pole, [f64; 2])) -> f64| {
+        crate::signal::median(&own.iter().map(of).collect::<Vec<f64>>())
+    };
+    let middle = median(&|o| o.0.frequency_hz);
+    let spread = 1.4826 * median(&|o| (o.0.frequency_hz - middle).abs());
+    let uncertain = median(&|o| o.1[0]);
+    let scatter = (spread * spread - uncertain * uncertain).max(0.0).sqrt() / middle;
+    let count = own.len() as f64;
+    let mean = |of: &dyn Fn(&Pole) -> f64| {
+        let mean = own.iter().map(|o| of(&o.0)).sum::<f64>() / count;
+        let variance = own.iter().map(|o| (of(&o.0) - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        (mean, (variance / count).sqrt())
+    };
+    let (frequency_hz, frequency_std_hz) = mean(&|p| p.frequency_hz);
+    let (damping_ratio, damping_std) = mean(&|p| p.damping_ratio);
+    Some(Moves {
+        scatter,
+        significant: spread > BEYOND * uncertain && scatter > OF_WIDTH * pole.damping_ratio,
+        pole: Pole {
+            frequency_hz,
+            damping_ratio,
+        },
+        std: [frequency_std_hz, damping_std],
+    })
+}

@@ -10,6 +10,8 @@ use rayon::prelude::*;
 use crate::campaign::{Campaign, MeasuredDof, Point};
 use crate::ingest::units::{self, Dimension};
 use crate::ingest::{self, Channel, FrfRecord, Quantity, TimeRecord};
+use crate::modal::chosen::Choice;
+use crate::modal::delay::{self, Delay};
 use crate::modal::quality::{self, Quality, SetQuality, Verdict};
 use crate::modal::tracking::{self, Track};
 use crate::modal::{self, FrfModes, GlobalModes, Hit, SetMember, Settings, TapRecord, TapSettings};
@@ -105,11 +107,32 @@ impl ModalAnalysis {
         settings: &Settings,
         taps: &TapSettings,
     ) -> Result<Self> {
+        Self::of_windowed_files(files, together, 0.0, settings, taps)
+    }
+
+    /// As [`ModalAnalysis::of_files`] for FRF files measured with an exponential window e^(−decay t) on the responses (and
+    /// the force): what it added to the damping is taken out.
+    ///
+    /// # Errors
+    /// As [`ModalAnalysis::of_files`].
+    pub fn of_windowed_files(
+        files: &[impl AsRef<Path>],
+        together: bool,
+        decay_per_s: f64,
+        settings: &Settings,
+        taps: &TapSettings,
+    ) -> Result<Self> {
         let mut inputs = Vec::new();
         let mut warnings = Vec::new();
         let mut hits = Vec::new();
         for file in files {
-            inputs.extend(read(file.as_ref(), taps, &mut hits, &mut warnings)?);
+            let before = hits.len();
+            let mut of_file = read(file.as_ref(), taps, &mut hits, &mut warnings)?;
+            // A raw record has its window from here, not from the analyser.
+            if decay_per_s > 0.0 && hits.len() == before {
+                of_file.iter_mut().for_each(|i| i.added_decay_per_s = decay_per_s);
+            }
+            inputs.extend(of_file);
         }
         if together {
             join(&mut inputs, &mut warnings);
@@ -150,6 +173,21 @@ impl ModalAnalysis {
             analysis.warnings.extend(set_warnings(set));
         }
         Ok(analysis)
+    }
+
+    /// Every set as the analyst wants it.
+    ///
+    /// # Errors
+    /// A pole that is nowhere near, in any set.
+    pub fn choose(&mut self, choice: &Choice) -> Result<()> {
+        for set in &mut self.sets {
+            let dofs = super::modal_export::dofs_of_frfs(set);
+            choice.apply(&mut set.global, &dofs).map_err(|why| {
+                InputError::new(format!("{}: {why}", set.set))
+                    .remedy("look at the poles of the stabilisation diagram (--report, or --json)")
+            })?;
+        }
+        Ok(())
     }
 
     /// The same mode from set to set.
@@ -331,6 +369,7 @@ fn set_warnings(set: &SetModes) -> Vec<String> {
         ));
     }
     lines.extend(set.global.warnings.iter().map(|w| format!("{}: {w}", set.set)));
+    lines.extend(delay::in_words(&delays(set)).map(|w| format!("{}: {w}", set.set)));
     let refused = set
         .frfs
         .iter()
@@ -383,6 +422,25 @@ fn join(inputs: &mut [FrfInput], warnings: &mut Vec<String>) {
         }
         input.set = TOGETHER.to_owned();
     }
+}
+
+/// By FRF: its response (its name where that is not known), and how late it is against the force.
+fn delays(set: &SetModes) -> Vec<(String, Option<Delay>)> {
+    let own = set.frfs.iter().enumerate();
+    own.map(|(k, frf)| {
+        let modes: Vec<(f64, Complex64, f64)> = set
+            .global
+            .modes
+            .iter()
+            .filter_map(|m| {
+                let (constant, std) = (*m.constants.get(k)?)?;
+                Some((m.frequency_hz, constant, std))
+            })
+            .collect();
+        let name = frf.input.dofs.as_ref().map_or(&frf.input.name, |d| &d[0]);
+        (name.clone(), delay::delay(&modes))
+    })
+    .collect()
 }
 
 /// FRFs of one file: as they stand there, or from the hits of a raw record.

@@ -7,10 +7,13 @@ use clap::ValueEnum;
 use serde_json::json;
 
 use super::Outcome;
+use super::modal_files::Files;
 use super::next_step::{self, Guide};
 use super::text::{Emphasis, table};
-use crate::analysis::{ModalAnalysis, SetModes};
+use crate::analysis::{ModalAnalysis, SetModes, operational};
 use crate::campaign::Campaign;
+use crate::modal::chosen::Choice;
+use crate::modal::operational::OperationalSettings;
 use crate::modal::{Estimator, Settings, TapSettings};
 use crate::{InputError, Result};
 
@@ -34,6 +37,39 @@ pub struct Args {
     /// Tap tests: length of a block, s (from the distance of the hits where left out).
     #[arg(long, value_name = "S", value_parser = seconds)]
     block_s: Option<f64>,
+    /// The files are records of responses without forces (idling, cutting): modes from them alone.
+    #[arg(long, conflicts_with_all = ["together", "each", "block_s"])]
+    output_only: bool,
+    /// Write a report of its own into this folder (HTML and PNG).
+    #[arg(long, value_name = "FOLDER", conflicts_with = "output_only")]
+    report: Option<PathBuf>,
+    /// Write modes, shapes and synthesised FRFs for other programs into this folder (UFF 55 and 58, CSV, MAT).
+    #[arg(long, value_name = "FOLDER", conflicts_with = "output_only")]
+    export: Option<PathBuf>,
+    /// Where the measured points are: universal file with datasets 15/2411 and 82, or CSV with node,x,y,z and line,from,to.
+    #[arg(long, value_name = "FILE", conflicts_with = "output_only")]
+    geometry: Option<PathBuf>,
+    /// Compare the shapes with a model's: universal file with datasets 55 (and 15 or 2411).
+    #[arg(long, value_name = "FILE", conflicts_with = "output_only")]
+    model: Option<PathBuf>,
+    /// Take this pole instead of those found (repeat): frequency in Hz, or frequency:damping ratio.
+    #[arg(long, value_name = "HZ[:RATIO]", value_parser = pole, conflicts_with = "output_only")]
+    pole: Vec<(f64, Option<f64>)>,
+    /// Leave out the mode at this frequency, Hz (repeat).
+    #[arg(long, value_name = "HZ", value_parser = positive, conflicts_with = "output_only")]
+    without: Vec<f64>,
+    /// Only the strongest so many modes.
+    #[arg(long, value_name = "N", conflicts_with = "output_only")]
+    modes: Option<usize>,
+    /// Time constant of the exponential window that the FRFs were measured with, s: its damping is taken out.
+    #[arg(long, value_name = "S", value_parser = seconds, conflicts_with = "output_only")]
+    window_tau: Option<f64>,
+    /// Output-only: speed of the spindle, 1/min, to name its harmonics by.
+    #[arg(long, value_name = "RPM", value_parser = positive, requires = "output_only")]
+    spindle: Option<f64>,
+    /// Output-only: highest model order (two a mode).
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=300), requires = "output_only")]
+    order: Option<u32>,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -53,6 +89,26 @@ fn seconds(text: &str) -> std::result::Result<f64, String> {
         .ok()
         .filter(|s: &f64| s.is_finite() && *s > 0.0)
         .ok_or_else(|| "give seconds, such as 4.0".into())
+}
+
+fn positive(text: &str) -> std::result::Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|x: &f64| x.is_finite() && *x > 0.0)
+        .ok_or_else(|| "give a number above zero".into())
+}
+
+fn pole(text: &str) -> std::result::Result<(f64, Option<f64>), String> {
+    let wrong = || "give a pole as frequency in Hz, or frequency:damping ratio, such as 12.5:0.02".to_owned();
+    let (f, zeta) = match text.split_once(':') {
+        Some((f, zeta)) => (f, Some(zeta)),
+        None => (text, None),
+    };
+    let zeta = zeta.map(positive).transpose().map_err(|_| wrong())?;
+    match zeta {
+        Some(zeta) if zeta >= 1.0 => Err(wrong()),
+        _ => Ok((positive(f).map_err(|_| wrong())?, zeta)),
+    }
 }
 
 fn band(text: &str) -> std::result::Result<[f64; 2], String> {
@@ -82,6 +138,9 @@ pub fn run(args: Args) -> Result<Outcome> {
         block_s: args.block_s,
     };
     let campaign = args.paths.iter().any(|p| p.is_dir());
+    if args.output_only {
+        return output_only(&args, campaign);
+    }
     if campaign && args.together {
         return Err(
             InputError::new("--together is for files: a campaign's postures are sets of their own")
@@ -89,7 +148,7 @@ pub fn run(args: Args) -> Result<Outcome> {
                 .into(),
         );
     }
-    let (analysis, next) = match args.paths.as_slice() {
+    let (mut analysis, next) = match args.paths.as_slice() {
         [dir] if campaign => {
             let campaign = Campaign::load(dir)?;
             let analysis = ModalAnalysis::of_campaign(&campaign, &settings)?;
@@ -104,16 +163,63 @@ pub fn run(args: Args) -> Result<Outcome> {
             );
         }
         files => {
-            let analysis = ModalAnalysis::of_files(files, args.together, &settings, &taps)?;
+            let analysis = ModalAnalysis::of_windowed_files(
+                files,
+                args.together,
+                args.window_tau.map_or(0.0, |tau| 1.0 / tau),
+                &settings,
+                &taps,
+            )?;
             let paths: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
             let next = next_step::modes_of_files(&paths, analysis.mode_count());
             (analysis, next)
         }
     };
+    analysis.choose(&Choice {
+        poles: args.pole.clone(),
+        without_hz: args.without.clone(),
+        modes: args.modes,
+    })?;
+    let mut json = document(&analysis, campaign);
+    let mut said = text(&analysis, args.each);
+    super::modal_files::write(&args.files(), &analysis, &mut json, &mut said)?;
+    Ok(Outcome::new(json, said, Some(next)))
+}
+
+impl Args {
+    /// What is to be written besides, and with what.
+    fn files(&self) -> Files<'_> {
+        Files {
+            report: self.report.as_deref(),
+            export: self.export.as_deref(),
+            geometry: self.geometry.as_deref(),
+            model: self.model.as_deref(),
+            inputs: &self.paths,
+            together: self.together,
+            band_hz: self.band,
+            window_tau_s: self.window_tau,
+        }
+    }
+}
+
+fn output_only(args: &Args, folder: bool) -> Result<Outcome> {
+    if folder {
+        return Err(InputError::new("--output-only is for records, not for a folder")
+            .remedy("give the files of recorded accelerations")
+            .into());
+    }
+    let settings = OperationalSettings {
+        band_hz: args.band,
+        max_order: args.order.map(|n| n as usize),
+        spindle_rpm: args.spindle,
+    };
+    let sets = operational::of_files(&args.paths, &settings)?;
+    let found = sets.iter().map(|s| s.modes.modes.len()).sum();
+    let paths: Vec<&Path> = args.paths.iter().map(PathBuf::as_path).collect();
     Ok(Outcome::new(
-        document(&analysis, campaign),
-        text(&analysis, args.each),
-        Some(next),
+        super::operational::document(&sets),
+        super::operational::text(&sets),
+        Some(next_step::modes_of_files(&paths, found)),
     ))
 }
 

@@ -14,6 +14,7 @@ mod checks;
 mod detect;
 mod force;
 mod frf_text;
+mod geometry;
 mod long;
 mod lvm;
 mod mat;
@@ -29,7 +30,9 @@ mod uff;
 pub mod units;
 mod waveform;
 
+pub use geometry::{Geometry, NodalShape, geometry_text, read_geometry};
 pub use long::{Survey, survey};
+pub use mat::{MatArray, mat5_bytes};
 pub use quality::quality_warnings;
 pub use uff::{
     Abscissa, ByteOrder, Dataset58, Encoding58, EntityDof, Ordinate, UnitAxis, frf_dataset, time_datasets,

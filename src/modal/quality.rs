@@ -22,6 +22,16 @@ pub enum Verdict {
     Bad,
 }
 
+impl std::fmt::Display for Verdict {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Verdict::Good => "good",
+            Verdict::Doubtful => "doubtful",
+            Verdict::Bad => "bad",
+        })
+    }
+}
+
 /// What speaks for and against the modes of a set.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SetQuality {

@@ -36,6 +36,14 @@ impl Complexity {
     }
 }
 
+/// Direction of the line in the complex plane that a shape lies along best, radians.
+pub fn principal_angle(shape: &[Complex64]) -> f64 {
+    let (along, across) = shape.iter().fold((0.0, 0.0), |(a, b), z| {
+        (a + z.re * z.re - z.im * z.im, b + z.re * z.im)
+    });
+    0.5 * (2.0 * across).atan2(along)
+}
+
 /// Complexity of a shape; `None` for fewer than two degrees of freedom (one is always collinear with itself).
 pub fn complexity(shape: &[Complex64]) -> Option<Complexity> {
     if shape.len() < 2 {
@@ -50,7 +58,7 @@ pub fn complexity(shape: &[Complex64]) -> Option<Complexity> {
     }
     let mpc = ((sxx - syy).powi(2) + 4.0 * sxy * sxy) / (total * total);
     // Principal direction of the cloud in the complex plane.
-    let direction = 0.5 * (2.0 * sxy).atan2(sxx - syy);
+    let direction = principal_angle(shape);
     let (mut sum, mut weight) = (0.0, 0.0);
     for z in shape {
         let size = z.norm();

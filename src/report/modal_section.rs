@@ -13,7 +13,6 @@ use crate::analysis::ModalAnalysis;
 use crate::analysis::modal::{AnalysedFrf, SetModes};
 use crate::analysis::stick_shapes::StickShape;
 use crate::modal::Reconstruction;
-use crate::modal::stabilisation::Stability;
 use crate::modal::tracking::Track;
 
 /// Warnings shown; the command `modal` tells all.
@@ -73,7 +72,7 @@ pub fn section(analysis: &ModalAnalysis, shapes: &[StickShape]) -> Section {
     }
 }
 
-fn modes(analysis: &ModalAnalysis) -> Block {
+pub(super) fn modes(analysis: &ModalAnalysis) -> Block {
     let mut rows = Vec::new();
     for set in &analysis.sets {
         if set.global.modes.is_empty() {
@@ -106,7 +105,7 @@ fn modes(analysis: &ModalAnalysis) -> Block {
 }
 
 /// The same mode from posture to posture, one row a mode.
-fn tracked(analysis: &ModalAnalysis) -> Option<Block> {
+pub(super) fn tracked(analysis: &ModalAnalysis) -> Option<Block> {
     let tracks = analysis.tracks();
     if tracks.is_empty() {
         return None;
@@ -146,7 +145,7 @@ fn tracked(analysis: &ModalAnalysis) -> Option<Block> {
     }))
 }
 
-fn stabilisation(set: &SetModes) -> Block {
+pub(super) fn stabilisation(set: &SetModes) -> Block {
     let diagram = &set.global.stabilisation;
     let mut measured: Vec<(f64, f64)> = Vec::new();
     for fit in set.global.reconstructions.iter().flatten() {
@@ -167,7 +166,7 @@ fn stabilisation(set: &SetModes) -> Block {
             .map(|p| StabilisationPole {
                 frequency_hz: p.frequency_hz,
                 order: p.order,
-                stable: p.stability == Stability::Full,
+                stability: p.stability,
             })
             .collect(),
         chosen_hz: set.global.modes.iter().map(|m| m.frequency_hz).collect(),
@@ -196,10 +195,15 @@ fn median_fit(set: &SetModes) -> Option<(usize, &Reconstruction)> {
 }
 
 /// As magnitude and phase, and as circles of the mobility.
-fn reconstruction(set: &SetModes) -> Vec<Block> {
-    let Some((k, fit)) = median_fit(set) else {
-        return Vec::new();
-    };
+pub(super) fn reconstruction(set: &SetModes) -> Vec<Block> {
+    match median_fit(set) {
+        Some((k, fit)) => reconstruction_of(set, k, fit, "the median of the set"),
+        None => Vec::new(),
+    }
+}
+
+/// FRF `k` of the set against its modes; `which` says why this one.
+pub(super) fn reconstruction_of(set: &SetModes, k: usize, fit: &Reconstruction, which: &str) -> Vec<Block> {
     // FRFs of a campaign have the posture in their name.
     let own = &set.frfs[k].input.name;
     let name = match own.starts_with(&set.set) {
@@ -247,8 +251,7 @@ fn reconstruction(set: &SetModes) -> Vec<Block> {
             "modal-reconstruction",
             "A measured FRF and what the modes make of it",
             format!(
-                "An FRF put together from the modes: {} % is left over, its noise is {} % (of the mobility; the median of \
-                 the set).",
+                "An FRF put together from the modes: {} % is left over, its noise is {} % (of the mobility; {which}).",
                 decimals(100.0 * fit.error_nrms, 1),
                 decimals(100.0 * fit.noise_nrms, 1)
             ),
@@ -268,7 +271,7 @@ fn reconstruction(set: &SetModes) -> Vec<Block> {
 }
 
 /// Coherence of the best and the worst FRF of the set, where it was measured.
-fn coherence(set: &SetModes) -> Option<Block> {
+pub(super) fn coherence(set: &SetModes) -> Option<Block> {
     let mut known: Vec<(&AnalysedFrf, f64)> = set
         .frfs
         .iter()
@@ -337,7 +340,7 @@ fn mode_shapes(set: &SetModes, shapes: &[StickShape]) -> Vec<Block> {
     blocks
 }
 
-fn mac(set: &SetModes) -> Option<Block> {
+pub(super) fn mac(set: &SetModes) -> Option<Block> {
     let names: Vec<String> = set
         .global
         .modes

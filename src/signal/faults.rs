@@ -52,10 +52,11 @@ pub fn find_faults(samples: &[f64]) -> Faults {
             ..Faults::default()
         };
     }
-    let clipping = clipping(samples, range);
+    let windowed = is_windowed(samples);
+    let clipping = clipping(samples, range).filter(|c| !(windowed && c.level == 0.0));
     let clipped = |run: &Range<usize>| clipping.as_ref().is_some_and(|c| c.plateaus.contains(run));
     let stuck = runs(samples)
-        .filter(|run| run.len() >= STUCK && !clipped(run))
+        .filter(|run| run.len() >= STUCK && !clipped(run) && !(windowed && samples[run.start] == 0.0))
         .collect();
     Faults {
         dead: false,
@@ -63,6 +64,13 @@ pub fn find_faults(samples: &[f64]) -> Faults {
         stuck,
         clipping,
     }
+}
+
+/// More than half of the samples are exactly zero, in long stretches: a force window left the contacts only (or a trigger
+/// the blocks). What hangs or drops out holds a part of a record.
+fn is_windowed(samples: &[f64]) -> bool {
+    let zeros = runs(samples).filter(|run| run.len() >= STUCK && samples[run.start] == 0.0);
+    2 * zeros.map(|run| run.len()).sum::<usize>() > samples.len()
 }
 
 /// Runs of equal samples.
@@ -134,6 +142,11 @@ const WIDEST_SPIKE: usize = 3;
 /// Times the height above both neighbours that 99.5 % of the samples stay below.
 const SPIKE: f64 = 8.0;
 
+/// Samples on either side of a spike in which an impact would still ring …
+const RINGS: usize = 24;
+/// … by this part of its height.
+const RINGING: f64 = 0.2;
+
 /// Samples that stand far above (or below) those three before and three after. A step has no height in that sense, and
 /// what comes back once a revolution is the signal's own.
 fn spikes(samples: &[f64]) -> Vec<Range<usize>> {
@@ -167,6 +180,16 @@ fn spikes(samples: &[f64]) -> Vec<Range<usize>> {
         }
     }
     found.retain(|spike| spike.len() <= WIDEST_SPIKE);
+    // What swings on after it, or swung before, is an impact that rings.
+    found.retain(|spike| {
+        let top = spike.clone().map(height).fold(0.0, f64::max);
+        let around =
+            spike.start.saturating_sub(RINGS).max(WIDEST_SPIKE)..(spike.end + RINGS).min(n - WIDEST_SPIKE);
+        let near = spike.start.saturating_sub(WIDEST_SPIKE)..spike.end + WIDEST_SPIKE;
+        !around
+            .filter(|i| !near.contains(i))
+            .any(|i| height(i) > RINGING * top)
+    });
     if come_back_evenly(&found) {
         Vec::new()
     } else {
@@ -255,6 +278,33 @@ mod tests {
         );
         let inside = clipping.plateaus[3].clone();
         assert_eq!(clipping.samples_in(&(inside.start..inside.end)), inside.len());
+    }
+
+    /// A force window's zeros are no stuck channel, and a tool that rings at a few samples a period has no spikes; a spike and
+    /// a stretch that hangs beside them are still found.
+    #[test]
+    fn taps_with_a_force_window_on_a_ringing_tool_are_sound() {
+        let (mut force, mut tool) = (vec![0.0; 20_000], vec![0.0; 20_000]);
+        let mut random = ChaCha8Rng::seed_from_u64(8);
+        tool.iter_mut()
+            .for_each(|v| *v = random.random_range(-0.01..0.01));
+        for hit in [1500, 7000, 13_100] {
+            for k in 0..9 {
+                force[hit + k] = 200.0 * (f64::from(k as u32 + 1) * 0.314).sin();
+            }
+            for k in 0..60 {
+                // A quarter of the sampling rate.
+                tool[hit + k] += 80.0 * (k as f64 * 1.6).sin() * (-(k as f64) / 15.0).exp();
+            }
+        }
+        assert_eq!(find_faults(&force), Faults::default());
+        assert_eq!(find_faults(&tool), Faults::default());
+        tool[4000] += 60.0;
+        assert_eq!(find_faults(&tool).spikes, [4000..4001]);
+        let mut random = ChaCha8Rng::seed_from_u64(9);
+        let mut hanging: Vec<f64> = (0..20_000).map(|_| random.random_range(-5.0..5.0)).collect();
+        hanging[5000..9000].fill(0.0);
+        assert_eq!(find_faults(&hanging).stuck, [5000..9000]);
     }
 
     /// Long plateaus are clipping too, where there are several.

@@ -178,3 +178,210 @@ fn hits_in_segments_of_one_file_are_averaged_unless_they_contradict_each_other()
     assert_eq!(count, 3, "{warnings}");
     assert!(warnings.contains("contradict each other"), "{warnings}");
 }
+
+/// FRFs of three points (hit at the first) of a structure with three real modes, as CSV; the geometry beside it.
+fn three_points(dir: &Path) -> (String, String) {
+    const MODES: [(f64, f64, [f64; 3]); 3] = [
+        (9.0, 0.02, [1.0, 0.6, -0.5]),
+        (17.0, 0.015, [0.8, -0.9, 0.3]),
+        (31.0, 0.02, [0.5, 0.7, 1.0]),
+    ];
+    let mut text = String::from("frequency_hz,re(1Z/1Z),im(1Z/1Z),re(2Z/1Z),im(2Z/1Z),re(3Z/1Z),im(3Z/1Z)");
+    for k in 0..=470 {
+        let f = 3.0 + 0.1 * f64::from(k);
+        write!(text, "\n{f}").unwrap();
+        for point in 0..3 {
+            let w = TAU * f;
+            let h: Complex64 = MODES
+                .iter()
+                .map(|(f0, zeta, phi)| {
+                    let w0 = TAU * f0;
+                    phi[point] * phi[0] / Complex64::new(w0 * w0 - w * w, 2.0 * zeta * w0 * w)
+                })
+                .sum();
+            write!(text, ",{:e},{:e}", h.re, h.im).unwrap();
+        }
+    }
+    let (frfs, geometry) = (dir.join("frfs.csv"), dir.join("geometry.csv"));
+    std::fs::write(&frfs, text + "\n").unwrap();
+    std::fs::write(
+        &geometry,
+        "node,x,y,z\n1,0,0,0\n2,0.5,0,0\n3,1,0,0\nline,1,2\nline,2,3\n",
+    )
+    .unwrap();
+    let path = |p: &Path| p.to_str().unwrap().to_owned();
+    (path(&frfs), path(&geometry))
+}
+
+fn frequencies(document: &Value) -> Vec<f64> {
+    let modes = document["global"].as_array().unwrap();
+    modes
+        .iter()
+        .map(|m| m["frequency_hz"].as_f64().unwrap())
+        .collect()
+}
+
+#[test]
+fn a_report_and_files_for_other_programs_are_written_and_read_back() {
+    let dir = tempfile::tempdir().unwrap();
+    let (frfs, geometry) = three_points(dir.path());
+    let at = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    let (report, export) = (at("report"), at("export"));
+    let document = json_of(&[
+        &frfs,
+        "--geometry",
+        &geometry,
+        "--report",
+        &report,
+        "--export",
+        &export,
+    ]);
+    assert_eq!(document["exported"].as_array().unwrap().len(), 5);
+    // The mass of a mode whose largest component is 1, of mass-normalised shapes.
+    for (mode, expected) in document["global"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .zip([1.0, 1.0 / 0.81, 1.0])
+    {
+        let scale = &mode["scale"];
+        assert_eq!(scale["driving_point"], "1Z");
+        let mass = scale["modal_mass_kg"].as_f64().unwrap();
+        assert!((mass / expected - 1.0).abs() < 0.01, "{mass} for {expected}");
+    }
+    assert_eq!(
+        document["sets"][0]["driving_points"][0]["verdict"],
+        "as a driving point must be"
+    );
+    let html = std::fs::read_to_string(document["report"]["html"].as_str().unwrap()).unwrap();
+    for part in [
+        "Mode indicators",
+        "Click poles to pick them",
+        "Driving points",
+        "<animate",
+        "--pole",
+    ] {
+        assert!(html.contains(part), "{part}");
+    }
+    // Tables and drawings; an image's letters may spell anything.
+    assert!(!html.contains(">NaN") && !html.contains("=\"NaN\""));
+    for name in [
+        "modal-cmif.png",
+        "modal-mmif.png",
+        "modal-shapes.png",
+        "modal-complexity.png",
+        "modal-stabilisation.png",
+    ] {
+        assert!(Path::new(&report).join(name).is_file(), "{name}");
+    }
+    // Synthesised FRFs hold the same modes; the shapes compare with themselves.
+    let again = json_of(&[&at("export/synthesised.uff"), "--model", &at("export/modes.uff")]);
+    for (a, b) in frequencies(&document).iter().zip(frequencies(&again)) {
+        assert!((a / b - 1.0).abs() < 1e-4, "{a} {b}");
+    }
+    let pairs = again["model"][0]["pairs"].as_array().unwrap();
+    assert_eq!(pairs.len(), 3);
+    for pair in pairs {
+        assert!(
+            pair["mac"].as_f64().unwrap() > 0.999 && pair["frequency_error"].as_f64().unwrap().abs() < 1e-3
+        );
+    }
+    let table = std::fs::read_to_string(at("export/modes.csv")).unwrap();
+    assert_eq!(table.lines().count(), 4);
+}
+
+#[test]
+fn the_analyst_gives_and_takes_poles_and_the_window_is_taken_out() {
+    let dir = tempfile::tempdir().unwrap();
+    let (frfs, _) = three_points(dir.path());
+    let all = json_of(&[&frfs]);
+    assert_eq!(all["global"].as_array().unwrap().len(), 3);
+    let rounded =
+        |document: &Value| -> Vec<f64> { frequencies(document).iter().map(|f| f.round()).collect() };
+    assert_eq!(rounded(&json_of(&[&frfs, "--without", "17"])), [9.0, 31.0]);
+    assert_eq!(
+        rounded(&json_of(&[&frfs, "--pole", "31", "--pole", "9:0.02"])),
+        [9.0, 31.0]
+    );
+    assert_eq!(
+        json_of(&[&frfs, "--modes", "1"])["global"]
+            .as_array()
+            .unwrap()
+            .len(),
+        1
+    );
+    let nowhere = program()
+        .args(["modal", &frfs, "--without", "24"])
+        .output()
+        .unwrap();
+    assert_eq!(nowhere.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&nowhere.stderr).contains("24"));
+    // 1/τ = 0.5/s of ζω.
+    let windowed = json_of(&[&frfs, "--window-tau", "2"]);
+    for (a, b) in all["global"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .zip(windowed["global"].as_array().unwrap())
+    {
+        let zeta = |m: &Value| m["damping_ratio"].as_f64().unwrap();
+        let expected = zeta(a) - 0.5 / (TAU * a["frequency_hz"].as_f64().unwrap());
+        assert!((zeta(b) - expected).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn modes_of_accelerations_alone() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("idle.csv");
+    // A mass on a spring at 12 Hz under random force, and a spindle at 20 Hz.
+    let (rate, zeta) = (200.0, 0.02);
+    let (w, dt) = (TAU * 12.0, 1.0 / rate);
+    let (mut x, mut v, mut seed) = (0.0, 0.0, 7u64);
+    let mut text = String::from("time_s,table_m_s2,head_m_s2\n");
+    for k in 0..40_000 {
+        let mut force = 0.0;
+        for _ in 0..6 {
+            // A linear congruential generator: six of them add up to next to a normal number.
+            seed = seed
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            force += (seed >> 33) as f64 / f64::from(1u32 << 31) - 0.5;
+        }
+        const STEPS: i32 = 20;
+        let a = force - 2.0 * zeta * w * v - w * w * x;
+        for _ in 0..STEPS {
+            let h = dt / f64::from(STEPS);
+            v += h * (force - 2.0 * zeta * w * v - w * w * x);
+            x += h * v;
+        }
+        let t = f64::from(k) * dt;
+        let spindle = 2.0 * (TAU * 20.0 * t).sin();
+        writeln!(text, "{t},{:.5},{:.5}", a + spindle, 0.5 * a - spindle).unwrap();
+    }
+    std::fs::write(&file, text).unwrap();
+    let document = json_of(&[
+        file.to_str().unwrap(),
+        "--output-only",
+        "--band",
+        "4:40",
+        "--spindle",
+        "1200",
+    ]);
+    let found = &document["output_only"][0];
+    let modes = found["modes"].as_array().unwrap();
+    assert_eq!(modes.len(), 1, "{found:#}");
+    let value = |key: &str| modes[0][key].as_f64().unwrap();
+    assert!(
+        (value("frequency_hz") - 12.0).abs() < 4.0 * value("frequency_std_hz"),
+        "{}",
+        modes[0]
+    );
+    assert!(
+        (value("damping_ratio") - zeta).abs() < 4.0 * value("damping_std"),
+        "{}",
+        modes[0]
+    );
+    assert_eq!(found["harmonics"][0]["multiple"], 1);
+    assert!((found["harmonics"][0]["frequency_hz"].as_f64().unwrap() - 20.0).abs() < 0.01);
+}

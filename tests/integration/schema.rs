@@ -142,8 +142,12 @@ fn modal_of_a_campaign_and_of_files() {
     let files = ["p1", "p2"].map(|p| blind(&format!("frf-9112/frf/{p}.uff")));
     let mut pattern = pattern;
     pattern["rejected"] = json!("list");
-    pattern["quality"] = json!({ "verdict": "string", "unexplained_share": "number", "coloured_share": "number" });
-    holds(&document(&["modal", path(&files[0]), path(&files[1])]), pattern.clone());
+    pattern["quality"] =
+        json!({ "verdict": "string", "unexplained_share": "number", "coloured_share": "number" });
+    holds(
+        &document(&["modal", path(&files[0]), path(&files[1])]),
+        pattern.clone(),
+    );
     // One set of all files, whatever postures they come from.
     let together = document(&["modal", "--together", path(&files[0]), path(&files[1])]);
     holds(&together, pattern);

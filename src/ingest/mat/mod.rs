@@ -6,6 +6,9 @@ use super::{Contents, InputError};
 
 mod interpret;
 mod read;
+mod write;
+
+pub use write::{MatArray, mat5_bytes};
 
 /// A numeric array, column by column as MATLAB holds it.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,18 +3,20 @@
 use num_complex::Complex64;
 
 use super::subspace::{Order, SubspacePole};
-use super::{OperationalMode, RejectedPole, Stability};
+use super::{OperationalMode, RejectedMode, Stability};
 use crate::modal::shape::{self, mac};
 use crate::modal::stabilisation::{DAMPING_TOLERANCE, DiagramPole, FREQUENCY_TOLERANCE, MAC_TOLERANCE};
 use crate::signal::median;
 
 /// A pole may be missing at this many orders in a row and still be the same.
-const GAP: usize = 2;
+const GAP: usize = 6;
 /// Orders at which a pole must be there, and the share of all orders from its first one on.
-const STAYS: (usize, f64) = (5, 0.6);
+const STAYS: (usize, f64) = (6, 0.25);
 /// Share of a chain's poles that agree with the order below in damping and shape, at least.
 const STEADY: f64 = 0.5;
-/// A mode's damping is known to within this part of itself, and its frequency to within the second.
+/// A mode's damping is known to within this part of itself, and its frequency to within the second. Poles of single
+/// orders that are not do not take part: that clears the diagram of most that noise makes (Döhler & Mevel 2013), and of
+/// the orders at which a pole is about to part in two.
 const KNOWN: (f64, f64) = (0.6, 0.02);
 /// Phase collinearity below which a pole is noise rather than a complex mode.
 const COLLINEAR: f64 = 0.5;
@@ -32,7 +34,8 @@ pub(super) fn follow<'a>(orders: &'a [Order], diagram: &mut Vec<DiagramPole>) ->
     let mut chains: Vec<Chain> = Vec::new();
     for (index, order) in orders.iter().enumerate() {
         let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
-        for (j, pole) in order.poles.iter().enumerate() {
+        let known: Vec<bool> = order.poles.iter().map(is_known).collect();
+        for (j, pole) in order.poles.iter().enumerate().filter(|(j, _)| known[*j]) {
             for (c, chain) in chains.iter().enumerate() {
                 let (last, other, _) = chain.links[chain.links.len() - 1];
                 let apart = (pole.frequency_hz / other.frequency_hz - 1.0).abs();
@@ -53,8 +56,9 @@ pub(super) fn follow<'a>(orders: &'a [Order], diagram: &mut Vec<DiagramPole>) ->
                 taken[c] = true;
             }
         }
-        for (pole, chain) in order.poles.iter().zip(of_pole) {
+        for (j, (pole, chain)) in order.poles.iter().zip(of_pole).enumerate() {
             let stability = match chain {
+                _ if !known[j] => Stability::New,
                 Some(c) => {
                     let before = chains[c].links[chains[c].links.len() - 1].1;
                     let stability = agreement(pole, before);
@@ -79,6 +83,10 @@ pub(super) fn follow<'a>(orders: &'a [Order], diagram: &mut Vec<DiagramPole>) ->
     chains
 }
 
+fn is_known(pole: &SubspacePole) -> bool {
+    pole.damping_std <= KNOWN.0 * pole.damping_ratio && pole.frequency_std_hz <= KNOWN.1 * pole.frequency_hz
+}
+
 /// Damping agrees within the tolerance or within what it scatters by: from responses alone it is known far worse than
 /// from FRFs.
 fn agreement(pole: &SubspacePole, before: &SubspacePole) -> Stability {
@@ -96,7 +104,7 @@ pub(super) fn choose(
     chains: &[Chain],
     orders: usize,
     channels: usize,
-) -> (Vec<OperationalMode>, Vec<RejectedPole>) {
+) -> (Vec<OperationalMode>, Vec<RejectedMode>) {
     let mut long: Vec<&Chain> = chains.iter().filter(|c| c.links.len() >= STAYS.0).collect();
     long.sort_by_key(|c| std::cmp::Reverse(c.links.len()));
     let mut modes: Vec<OperationalMode> = Vec::new();
@@ -117,7 +125,7 @@ pub(super) fn choose(
         };
         match reason {
             None => modes.push(mode),
-            Some(reason) => rejected.push(RejectedPole {
+            Some(reason) => rejected.push(RejectedMode {
                 frequency_hz: mode.frequency_hz,
                 damping_ratio: mode.damping_ratio,
                 reason,

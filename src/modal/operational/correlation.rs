@@ -19,7 +19,7 @@ const BLOCK_ROWS: [usize; 2] = [24, 120];
 /// Largest dimension of the Hankel matrix.
 const MOST_ROWS: usize = 480;
 /// Highest order where none is asked for.
-const USUAL_ORDER: usize = 80;
+const USUAL_ORDER: usize = 60;
 
 /// Sizes of the analysis.
 #[derive(Debug, Clone)]

@@ -12,6 +12,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::RejectedMode;
 use super::shape::Complexity;
 use super::stabilisation::{DiagramPole, Stability};
 use crate::{InputError, Result};
@@ -62,14 +63,6 @@ pub struct OperationalMode {
     pub doubts: Vec<String>,
 }
 
-/// A pole that stayed over orders and was not taken.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct RejectedPole {
-    pub frequency_hz: f64,
-    pub damping_ratio: f64,
-    pub reason: String,
-}
-
 /// What a record of responses says.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct OperationalModes {
@@ -77,7 +70,7 @@ pub struct OperationalModes {
     pub modes: Vec<OperationalMode>,
     /// Lines of rotating parts, ascending in frequency; taken out before the modes were sought.
     pub harmonics: Vec<Harmonic>,
-    pub rejected: Vec<RejectedPole>,
+    pub rejected: Vec<RejectedMode>,
     /// Poles of all orders.
     pub poles: Vec<DiagramPole>,
     pub max_order: usize,
@@ -140,7 +133,7 @@ pub fn operational_modes(
     result.rejected = rejected;
     for mut mode in modes {
         if let Some(reason) = harmonics::is_line(&mode, &result.harmonics, &spectra) {
-            result.rejected.push(RejectedPole {
+            result.rejected.push(RejectedMode {
                 frequency_hz: mode.frequency_hz,
                 damping_ratio: mode.damping_ratio,
                 reason,

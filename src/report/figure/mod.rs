@@ -10,11 +10,13 @@ mod panel;
 pub(in crate::report) mod style;
 
 mod coherence;
+mod compass;
 pub(in crate::report) mod force_record;
 mod frf;
 mod heat_map;
 mod history;
 mod hole;
+mod indicators;
 pub(in crate::report) mod lobes;
 mod mode_shapes;
 mod nyquist;
@@ -25,6 +27,7 @@ mod robot;
 mod side_by_side;
 mod stabilisation;
 mod waveform;
+mod wire;
 
 #[cfg(test)]
 mod samples;
@@ -32,12 +35,14 @@ mod samples;
 mod tests;
 
 pub use coherence::{CoherenceCurve, CoherenceFigure};
+pub use compass::CompassFigure;
 pub use force_record::{ForceChannel, ForceRecord};
 pub(in crate::report) use frf::lowest_phase;
 pub use frf::{FrfCurve, FrfFigure, NoiseLevel};
 pub use heat_map::{CellFormat, HeatMap};
 pub use history::{HistoryFigure, Revision};
 pub use hole::{HoleFigure, HolePanel};
+pub use indicators::IndicatorFigure;
 pub use lobes::{LobeCurve, LobeMarker, LobeOutcome, LobePanel, LobesFigure};
 pub use mode_shapes::{ModeShapesFigure, StickPicture};
 pub use nyquist::NyquistFigure;
@@ -48,6 +53,7 @@ pub use robot::RobotFigure;
 pub use side_by_side::{BarSeries, SideBySide};
 pub use stabilisation::{StabilisationFigure, StabilisationPole};
 pub use waveform::{WaveformFigure, WaveformPanel};
+pub use wire::{WirePicture, WireShapesFigure};
 
 use crate::Error;
 

@@ -34,7 +34,7 @@ const OTHER_WAY: Stroke = Stroke::dashed(style::BLUE, 1.6, &[7.0, 5.0]);
 const AXIS: Stroke = Stroke::solid(style::INK, 1.4);
 
 /// Seen from the front right and above (dimetric); up on the sheet is up in the world.
-fn project([x, y, z]: [f64; 3]) -> (f64, f64) {
+pub(super) fn project([x, y, z]: [f64; 3]) -> (f64, f64) {
     (0.8 * x - 0.6 * y, 0.35 * (0.6 * x + 0.8 * y) + z * 0.94)
 }
 

@@ -1,18 +1,19 @@
 //! Stabilisation diagram: poles over the model order, on top of the sum of the measured FRFs.
 
 use super::axis::{Axis, extent, positive_extent, usable};
-use super::canvas::{Marker, paint};
+use super::canvas::{Color, Marker, paint};
 use super::panel::{Header, Panel, Swatch};
 use super::{WIDTH, nothing_to_draw, style};
 use crate::Result;
+use crate::modal::stabilisation::Stability;
 
 /// One pole of one order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StabilisationPole {
     pub frequency_hz: f64,
     pub order: usize,
-    /// Frequency, damping and shape stay from the order below.
-    pub stable: bool,
+    /// How far it agrees with the order below.
+    pub stability: Stability,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -24,6 +25,26 @@ pub struct StabilisationFigure {
     /// Frequency and size (any unit) of the measurement, drawn behind on a log scale.
     pub measured: Vec<(f64, f64)>,
 }
+
+/// Sign of each degree of agreement; drawn in this order, so that the best lie on top.
+const SIGNS: [(Stability, Marker, f64, Color, &str); 4] = [
+    (Stability::New, Marker::Ring, 3.0, style::GREY, "new at its order"),
+    (
+        Stability::Frequency,
+        Marker::Cross,
+        5.0,
+        style::ORANGE,
+        "same frequency as at the order below",
+    ),
+    (
+        Stability::Damping,
+        Marker::Diamond,
+        4.5,
+        style::PALE_BLUE,
+        "and damping",
+    ),
+    (Stability::Full, Marker::Disc, 4.0, style::BLUE, "and shape"),
+];
 
 impl StabilisationFigure {
     /// # Errors
@@ -44,18 +65,14 @@ impl StabilisationFigure {
         let y = Axis::from_zero("Model order", (0.0, highest), 8);
         let left = Panel::left_margin(&[&y]);
         let right = f64::from(WIDTH) - 40.0;
-        let (stable, other) = (style::BLUE, style::GREY);
-        let legend = [
-            (
-                Swatch::Sign(Marker::Disc, 3.0, stable),
-                "stable in frequency, damping and shape".to_string(),
-            ),
-            (Swatch::Sign(Marker::Ring, 3.0, other), "other poles".to_string()),
-            (
-                Swatch::Line(style::LEVEL),
-                "modes taken; behind: sum of the FRFs (log)".to_string(),
-            ),
-        ];
+        let mut legend: Vec<(Swatch, String)> = SIGNS
+            .iter()
+            .map(|(_, marker, size, color, what)| (Swatch::Sign(*marker, *size, *color), (*what).to_string()))
+            .collect();
+        legend.push((
+            Swatch::Line(style::LEVEL),
+            "modes taken; behind: sum of the FRFs (log)".to_string(),
+        ));
         let header = Header::new(&self.title, &legend, left, right);
         let top = header.bottom();
         let panel = Panel {
@@ -87,14 +104,14 @@ impl StabilisationFigure {
             for f in &self.chosen_hz {
                 panel.curve(canvas, [(*f, 0.0), (*f, panel.y.high)], style::LEVEL);
             }
-            for (is_stable, marker, color) in [(false, Marker::Ring, other), (true, Marker::Disc, stable)] {
-                let points = self.poles.iter().filter(|p| p.stable == is_stable);
+            for (stability, marker, size, color, _) in SIGNS {
+                let points = self.poles.iter().filter(|p| p.stability == stability);
                 panel.markers(
                     canvas,
                     points.map(|p| (p.frequency_hz, p.order as f64)),
-                    (marker, 3.0),
+                    (marker, size),
                     color,
-                    3.0,
+                    size,
                 );
             }
             panel.frame(canvas);

@@ -1,0 +1,114 @@
+//! Output-only modal analysis of recorded responses: which channels of a file move, and what they say.
+
+use std::path::Path;
+
+use crate::ingest::units;
+use crate::ingest::{self, Channel, TimeRecord};
+use crate::modal::operational::{
+    OperationalModes, OperationalRecord, OperationalSettings, operational_modes,
+};
+use crate::{Error, InputError, Result};
+
+/// One file (records of the same channels in it are one record) and its modes.
+#[derive(Debug, Clone)]
+pub struct OperationalSet {
+    pub file: String,
+    /// Names of the channels, in the order of the shapes.
+    pub channels: Vec<String>,
+    pub length_s: f64,
+    pub modes: OperationalModes,
+    pub warnings: Vec<String>,
+}
+
+/// Modes of every file.
+///
+/// # Errors
+/// A file that cannot be read, holds no responses, or too few samples of them.
+pub fn of_files(files: &[impl AsRef<Path>], settings: &OperationalSettings) -> Result<Vec<OperationalSet>> {
+    files.iter().map(|f| of_file(f.as_ref(), settings)).collect()
+}
+
+fn of_file(path: &Path, settings: &OperationalSettings) -> Result<OperationalSet> {
+    let file = ingest::read_file(path)?;
+    let mut warnings = file.warnings;
+    // Of several records the longest: correlations must not reach over the seam.
+    let record = file.contents.times.iter().max_by_key(|r| r.len());
+    let Some(record) = record else {
+        return Err(
+            InputError::new(format!("no time record in this {} file", file.format))
+                .file(path)
+                .remedy("output-only analysis needs recorded accelerations; FRFs go to `lobestone modal` without it")
+                .into(),
+        );
+    };
+    if file.contents.times.len() > 1 {
+        warnings.push(format!(
+            "{} time records in the file: the longest, {:.1} s, is used",
+            file.contents.times.len(),
+            record.len() as f64 / record.sample_rate_hz
+        ));
+    }
+    let moving = responses(record, &mut warnings);
+    if moving.is_empty() {
+        return Err(InputError::new("no response channel in the record")
+            .file(path)
+            .remedy("give the sensors' channels a unit: m/s² or g, m/s, m or µm")
+            .into());
+    }
+    let samples: Vec<&[f64]> = moving.iter().map(|c| c.samples.as_slice()).collect();
+    let responses = OperationalRecord {
+        sample_rate_hz: record.sample_rate_hz,
+        channels: &samples,
+    };
+    let modes = operational_modes(&responses, settings).map_err(|e| match e {
+        Error::Input(e) => (*e).file(path).into(),
+        other => other,
+    })?;
+    warnings.extend(modes.warnings.iter().cloned());
+    Ok(OperationalSet {
+        file: path.display().to_string(),
+        channels: moving.iter().map(|c| c.name.clone()).collect(),
+        length_s: record.len() as f64 / record.sample_rate_hz,
+        modes,
+        warnings,
+    })
+}
+
+/// Channels in a unit of motion; where none has one, all that are no force and no moment. A channel that rests is left
+/// out and named.
+fn responses<'a>(record: &'a TimeRecord, warnings: &mut Vec<String>) -> Vec<&'a Channel> {
+    let dimension = |c: &Channel| units::parse(&c.file_unit).map(|u| u.dimension);
+    let motion = |c: &&Channel| dimension(c).is_some_and(|d| d.motion().is_some());
+    let unknown = |c: &&Channel| dimension(c).is_none_or(|d| d.describe().is_none());
+    let mut found: Vec<&Channel> = record.channels.iter().filter(motion).collect();
+    if found.is_empty() {
+        found = record.channels.iter().filter(unknown).collect();
+        if !found.is_empty() {
+            warnings.push(format!(
+                "the file gives no unit of motion: {} taken as responses as they stand",
+                found
+                    .iter()
+                    .map(|c| c.name.as_str())
+                    .collect::<Vec<_>>()
+                    .join(", ")
+            ));
+        }
+    }
+    let left: Vec<&str> = record
+        .channels
+        .iter()
+        .filter(|c| !found.iter().any(|f| std::ptr::eq(*f, *c)))
+        .map(|c| c.name.as_str())
+        .collect();
+    if !left.is_empty() {
+        warnings.push(format!("no responses, left out: {}", left.join(", ")));
+    }
+    found.retain(|c| {
+        let moves = c.samples.windows(2).any(|w| w[0] != w[1]);
+        if !moves {
+            warnings.push(format!("channel {} does not move: left out", c.name));
+        }
+        moves
+    });
+    found
+}

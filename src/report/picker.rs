@@ -1,0 +1,122 @@
+//! The stabilisation diagram to pick poles from by mouse: the list picked stands below as the command that repeats it.
+
+use std::fmt::Write as _;
+
+use super::number::decimals;
+use super::{Block, Drawing};
+use crate::analysis::modal::SetModes;
+use crate::modal::stabilisation::Stability;
+
+const WIDTH: f64 = 1200.0;
+const HEIGHT: f64 = 520.0;
+/// Left, top, right, bottom of the plotting area.
+const FRAME: [f64; 4] = [60.0, 16.0, 1184.0, 470.0];
+/// Poles drawn at most; the least stable are left out first.
+const MOST_POLES: usize = 6000;
+
+/// `None` without poles. The script is part of the drawing and touches nothing outside it.
+pub fn picker(set: &SetModes, command: &str) -> Option<Block> {
+    let diagram = &set.global.stabilisation;
+    let mut poles: Vec<_> = diagram
+        .poles
+        .iter()
+        .filter(|p| p.frequency_hz.is_finite())
+        .collect();
+    if poles.is_empty() {
+        return None;
+    }
+    poles.sort_by_key(|p| std::cmp::Reverse(p.stability));
+    poles.truncate(MOST_POLES);
+    let frequencies = || poles.iter().map(|p| p.frequency_hz);
+    let (low, high) = (
+        frequencies().fold(f64::INFINITY, f64::min),
+        frequencies().fold(f64::NEG_INFINITY, f64::max),
+    );
+    let margin = 0.03 * (high - low).max(0.01 * high);
+    let (low, high) = ((low - margin).max(0.0), high + margin);
+    let highest = 1.04 * poles.iter().map(|p| p.order).max().unwrap_or(1).max(1) as f64;
+    let [left, top, right, bottom] = FRAME;
+    let x = |f: f64| left + (f - low) / (high - low).max(1e-9) * (right - left);
+    let y = |order: f64| bottom - order / highest * (bottom - top);
+    let mut svg = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" class=\"picker\" \
+         aria-label=\"Poles to pick\"><style>.picker circle{{cursor:pointer}}.picker circle:hover{{stroke:#1c1e21;stroke-width:2}}\
+         .picker circle.taken{{fill:#ba2822;r:7px}}</style>\
+         <rect x=\"{left}\" y=\"{top}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#3c4046\"/>",
+        right - left,
+        bottom - top
+    );
+    // Writing to a String cannot fail.
+    for k in 0..=8 {
+        let f = low + (high - low) * f64::from(k) / 8.0;
+        let _ = write!(
+            svg,
+            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" font-size=\"14\" fill=\"#1c1e21\">{}</text>",
+            x(f),
+            bottom + 20.0,
+            decimals(f, 1)
+        );
+    }
+    for k in 0..=4 {
+        let order = (highest * f64::from(k) / 4.0).round();
+        let _ = write!(
+            svg,
+            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\" font-size=\"14\" fill=\"#1c1e21\">{order}</text>",
+            left - 8.0,
+            y(order) + 5.0
+        );
+    }
+    let _ = write!(
+        svg,
+        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" font-size=\"14\" fill=\"#1c1e21\">Frequency (Hz); upwards: model order</text>",
+        0.5 * (left + right),
+        bottom + 42.0
+    );
+    for mode in &set.global.modes {
+        let at = x(mode.frequency_hz);
+        let _ = write!(
+            svg,
+            "<line x1=\"{at:.1}\" y1=\"{top}\" x2=\"{at:.1}\" y2=\"{bottom}\" stroke=\"#5f646c\" stroke-dasharray=\"3 4\"/>"
+        );
+    }
+    for pole in poles.iter().rev() {
+        let (radius, fill, stroke) = match pole.stability {
+            Stability::New => (3.0, "#ffffff", "#969aa0"),
+            Stability::Frequency => (3.5, "#e28a20", "none"),
+            Stability::Damping => (4.0, "#a0c4e4", "none"),
+            Stability::Full => (4.5, "#0d549c", "none"),
+        };
+        let _ = write!(
+            svg,
+            "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"{radius}\" fill=\"{fill}\" stroke=\"{stroke}\" data-f=\"{:.4}\" \
+             data-z=\"{:.6}\"><title>{} Hz, {} %, order {}</title></circle>",
+            x(pole.frequency_hz),
+            y(pole.order as f64),
+            pole.frequency_hz,
+            pole.damping_ratio,
+            decimals(pole.frequency_hz, 2),
+            decimals(100.0 * pole.damping_ratio, 2),
+            pole.order
+        );
+    }
+    // No character of the command may end the script or the text of the page.
+    let quoted = serde_json::to_string(command)
+        .unwrap_or_default()
+        .replace('<', "\\u003c");
+    let _ = write!(
+        svg,
+        "</svg><p><b>Picked:</b> <code class=\"picked\">nothing yet: click poles</code></p><script>(function(){{\
+         var box=document.currentScript.parentNode,out=box.querySelector('.picked'),base={quoted};\
+         box.querySelector('svg').addEventListener('click',function(e){{var c=e.target;if(c.tagName!=='circle')return;\
+         c.classList.toggle('taken');var p=[].slice.call(box.querySelectorAll('circle.taken')).map(function(n){{\
+         return [+n.dataset.f,+n.dataset.z]}}).sort(function(a,b){{return a[0]-b[0]}});\
+         out.textContent=p.length?base+p.map(function(q){{return ' --pole '+q[0]+':'+q[1]}}).join(''):'nothing yet: click poles'}})\
+         }})()</script>"
+    );
+    Some(Block::Drawing(Drawing {
+        svg,
+        caption: "Click poles to pick them, again to put them back. White: new at its order; orange: same frequency as at the \
+                  order below; light blue: and damping; blue: and shape. Dotted: modes taken."
+            .into(),
+    }))
+}

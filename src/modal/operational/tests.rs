@@ -242,7 +242,7 @@ fn one_channel_will_do_and_white_noise_gives_nothing() {
 
 #[test]
 fn bad_records_are_errors_that_say_so() {
-    let good = vec![1.0, -1.0].repeat(5000);
+    let good = [1.0, -1.0].repeat(5000);
     let dead = vec![0.0; 10_000];
     let gap = {
         let mut gap = good.clone();

@@ -172,8 +172,8 @@ mod tests {
 
     /// Two masses of 3 and 2 kg on springs, fixed on one side: shapes by hand from the eigenvalues.
     fn two_masses() -> ([f64; 2], [[f64; 2]; 2]) {
-        let (m1, m2, k1, k2) = (3.0, 2.0, 4.0e5, 1.0e5);
-        let (a, b, c) = ((k1 + k2) / m1, -k2 / (m1 * m2 as f64).sqrt(), k2 / m2);
+        let (m1, m2, k1, k2): (f64, f64, f64, f64) = (3.0, 2.0, 4.0e5, 1.0e5);
+        let (a, b, c) = ((k1 + k2) / m1, -k2 / (m1 * m2).sqrt(), k2 / m2);
         let root = (0.25 * (a - c) * (a - c) + b * b).sqrt();
         let mean = 0.5 * (a + c);
         let of = |l: f64| {

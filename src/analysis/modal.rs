@@ -223,6 +223,7 @@ pub(super) fn dof_name(points: &[Point], dof: &MeasuredDof) -> String {
 
 fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Settings) -> Result<SetModes> {
     let sines = sines_of(&inputs);
+    #[allow(clippy::type_complexity)]
     let clean: Vec<(Cow<[f64]>, Cow<[Complex64]>)> = inputs
         .iter()
         .map(|input| {

@@ -122,7 +122,7 @@ impl Flanks {
 
     /// First and last line that a sine on line `k` spoils.
     fn sine_at(&self, k: usize, frfs: &[&[Complex64]]) -> Option<[usize; 2]> {
-        let mut stands_out = vec![Vec::with_capacity(frfs.len()); 2 * SPREAD + 1];
+        let mut stands_out = vec![Vec::new(); 2 * SPREAD + 1];
         let (mut peak, mut flank, mut flank_noise) = (0.0, 0.0, 0.0);
         let mut both = Complex64::ZERO;
         for h in frfs {

@@ -330,6 +330,7 @@ pub(super) fn moves(data: &[Data], pole: Pole, others: &[Pole]) -> Option<Moves>
     if own.len() < LEAST_FRFS {
         return None;
     }
+    #[allow(clippy::type_complexity)]
     let median = |of: &dyn Fn(&(Pole, [f64; 2])) -> f64| {
         crate::signal::median(&own.iter().map(of).collect::<Vec<f64>>())
     };

@@ -212,6 +212,7 @@ fn come_back_evenly(found: &[Range<usize>]) -> bool {
 }
 
 #[cfg(test)]
+#[allow(clippy::single_range_in_vec_init)]
 mod tests {
     use super::*;
     use rand::{Rng, SeedableRng};

@@ -10,8 +10,8 @@ mod panel;
 pub(in crate::report) mod style;
 
 mod coherence;
-mod drawn_curve;
 mod compass;
+mod drawn_curve;
 pub(in crate::report) mod force_record;
 mod frf;
 mod heat_map;
@@ -36,8 +36,8 @@ mod samples;
 mod tests;
 
 pub use coherence::{CoherenceCurve, CoherenceFigure};
-pub use drawn_curve::DrawnCurveFigure;
 pub use compass::CompassFigure;
+pub use drawn_curve::DrawnCurveFigure;
 pub use force_record::{ForceChannel, ForceRecord};
 pub(in crate::report) use frf::lowest_phase;
 pub use frf::{FrfCurve, FrfFigure, NoiseLevel};

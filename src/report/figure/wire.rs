@@ -138,6 +138,7 @@ impl WireShapesFigure {
             let layout = Layout::new(self, picture, at, width);
             let frames: Vec<Vec<(f64, f64)>> = (0..=FRAMES).map(|f| layout.nodes(phase_of(f))).collect();
             let rest = layout.nodes(None);
+            #[allow(clippy::type_complexity)]
             let animate = |name: &str, of: &dyn Fn(&[(f64, f64)]) -> f64| {
                 let values: Vec<String> = frames.iter().map(|f| format!("{:.1}", of(f))).collect();
                 format!(

@@ -131,9 +131,7 @@ impl Contents {
     /// Names and units of files are shown on terminals: control characters in them become visible.
     fn show_control_characters(&mut self) {
         let show = |text: &mut String| {
-            if let std::borrow::Cow::Owned(shown) = text::shown(text) {
-                *text = shown;
-            }
+            *text = text::shown_on_one_line(text);
         };
         self.frfs.iter_mut().for_each(|frf| show(&mut frf.name));
         for channel in self.times.iter_mut().flat_map(|record| &mut record.channels) {

@@ -30,6 +30,11 @@ pub fn shown(text: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
+/// As [`shown`], for names and remarks: a line break, too, becomes `\u{a}`.
+pub fn shown_on_one_line(text: &str) -> String {
+    shown(text).replace('\n', "\\u{a}")
+}
+
 /// Drops a UTF-8 byte order mark, turns UTF-16 (spreadsheets call it "Unicode text") into UTF-8.
 pub fn without_byte_order_mark(bytes: &[u8]) -> Cow<'_, [u8]> {
     let utf16 = |order: fn([u8; 2]) -> u16| {
@@ -122,8 +127,8 @@ impl Notes {
 
     /// A remark about one record or channel.
     pub fn about(&mut self, subject: &str, remark: impl Into<String>) {
-        let text = shown(&remark.into()).into_owned();
-        let subject = &*shown(subject);
+        let text = shown_on_one_line(&remark.into());
+        let subject = &*shown_on_one_line(subject);
         let at = self
             .remarks
             .iter()
@@ -196,8 +201,8 @@ mod tests {
         assert_eq!(shown("\u{1b}[31mFx\u{9b}2J\u{7}"), "\\u{1b}[31mFx\\u{9b}2J\\u{7}");
         assert_eq!(shown("a\u{202e}b\u{200b}"), "a\\u{202e}b\\u{200b}");
         let mut notes = Notes::default();
-        notes.about("\u{1b}c", "odd\u{8}");
-        assert_eq!(notes.into_warnings(), ["\\u{1b}c: odd\\u{8}"]);
+        notes.about("\u{1b}c", "odd\u{8}\n");
+        assert_eq!(notes.into_warnings(), ["\\u{1b}c: odd\\u{8}\\u{a}"]);
     }
 
     #[test]

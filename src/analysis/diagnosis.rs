@@ -103,10 +103,17 @@ fn is_possible(candidate: &Candidate<CuttingModel, CuttingInstance>) -> bool {
     candidate.name.effect != "dynamometer-resonance" || least < MOST_DAMPING
 }
 
+/// Confidence from which on a mistake of the setup takes an effect's place, where the effect explains the data as well.
+const SURE: f64 = 0.8;
+
 /// A likely mistake of the setup leaves no effect certain: what is missing in the model cannot be told before the files are
-/// right.
+/// right. One that is hardly likelier than an effect which explains the data shares the confidence with it.
 fn heed_setup<M, I>(diagnosis: &mut Diagnosis<M, I>, setup: &SetupCheck) {
     if let Some(finding) = setup.likely() {
+        if diagnosis.verdict == Verdict::Effect && finding.confidence < SURE {
+            diagnosis.confidence *= 1.0 - finding.confidence;
+            return;
+        }
         diagnosis.verdict = Verdict::Unknown;
         diagnosis.effect = None;
         diagnosis.companion = None;

@@ -471,7 +471,8 @@ mod tests {
     #[test]
     fn names_points_and_levels_come_along() {
         let mobility = record(Some(Quantity::Mobility), Some((1, 1)));
-        let receptance = record(Some(Quantity::Receptance), Some((1, 1)));
+        let mut receptance = record(Some(Quantity::Receptance), Some((1, 1)));
+        receptance.value.iter_mut().for_each(|v| *v *= 1.01);
         let (set, warnings) = collect(&campaign(None), [mobility, receptance]).unwrap();
         assert_eq!(set.frfs[0].name, "p1 1X/1X");
         assert_eq!(

@@ -30,7 +30,7 @@ use Follows::{Not, Power, Ratio};
 use Range::{Either, Log, Times};
 
 /// (effect, parameter without list index, range, how it follows the size).
-const TABLE: [(&str, &str, Range, Follows); 22] = [
+const TABLE: [(&str, &str, Range, Follows); 23] = [
     ("link-flexibility", "young_pa", Log(60e9, 200e9), Power(-1.0)),
     (
         "joint-transverse-compliance",
@@ -54,6 +54,8 @@ const TABLE: [(&str, &str, Range, Follows); 22] = [
     ("local-resonator", "frequency_hz", Log(8.0, 25.0), Not),
     ("local-resonator", "damping_ratio", Log(0.03, 0.08), Not),
     ("joint-damping", "c_nms_per_rad", Times(0.25, 3.3), Not),
+    // All damping sits in the joints.
+    ("joint-damping", "common_share", Either(1e-9), Not),
     ("time-delay", "delay_s", Log(2e-4, 1.2e-3), Power(1.0)),
     (
         "sensor-misalignment",

@@ -37,7 +37,7 @@ pub fn is_noise(reduced_chi2: f64) -> bool {
 }
 
 /// Values beyond the model's parameters from which on a misfit per degree of freedom can be told from noise: the scatter
-/// √(2/ν) of χ²/ν by chance has to be smaller than what is allowed for, [`NOISE_CHI2`] − 1.
+/// √(2/ν) of χ²/ν by chance has to be smaller than what is allowed for, `NOISE_CHI2` − 1.
 pub fn least_freedom() -> usize {
     (2.0 / (NOISE_CHI2 - 1.0).powi(2)).ceil() as usize
 }
@@ -81,7 +81,7 @@ pub fn is_progress(without: &HeldOut, with: &HeldOut, parameters: usize, chance:
     total > threshold && steady && with.nrms() <= without.nrms() * (1.0 + NRMS_MARGIN)
 }
 
-/// Improvement of −2 ln L that so many parameters of an effect that is not there exceed with probability [`CHANCE`].
+/// Improvement of −2 ln L that so many parameters of an effect that is not there exceed with probability `CHANCE`.
 pub fn gain_by_chance(parameters: usize) -> f64 {
     ChiSquared::new(parameters.max(1) as f64).map_or(0.0, |d| d.inverse_cdf(1.0 - CHANCE))
 }

@@ -2,7 +2,7 @@
 //! can be made as faint as wanted.
 //!
 //! Unlike [`super::foreign`], which is written as effects of the model, a departure acts where the fits have no hands:
-//! on the true posture, on the dynamic stiffness at each frequency, on single channels and single hits. [`super::world`]
+//! on the true posture, on the dynamic stiffness at each frequency, on single channels and single hits. `simulate::world`
 //! computes the FRFs that follow.
 
 use nalgebra::{DMatrix, Vector3};

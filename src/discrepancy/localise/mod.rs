@@ -172,7 +172,6 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
             settled[i].tied_with = others.map(|(_, other)| other.spot.label()).collect();
         }
     }
-    let done: Vec<Spot> = settled.iter().map(|p| p.spot).collect();
     let others = fitted.iter().skip(SETTLED);
     let fitted_only = others.map(|(i, forms)| place(&screened[*i], forms, &bic, None));
     let mut places = settled.clone();
@@ -184,7 +183,6 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
             .filter(|s| !known.contains(&s.spot))
             .map(|s| place(s, &[], &bic, None)),
     );
-    debug_assert!(done.len() <= SETTLED);
     let baseline_held_out = held_out(study, model, theta, Extent::Coarse, REFIT_WITHOUT_FOLD)?;
     let significant = settled.first().and_then(|p| p.best.as_ref()).is_some_and(|best| {
         let predicts = match (&best.held_out, &baseline_held_out) {

@@ -12,7 +12,7 @@ use super::local_fit::Pole;
 /// Width of a bin over its distance from the nearest pole.
 const BIN: f64 = 0.2;
 /// A band keeps at least about this many bins: modes may be where none is known.
-const LEAST_BINS: usize = 1000;
+const LEAST_BINS: usize = 500;
 
 /// The lines of an FRF in bins, for modes near `poles`. (Of single lines neither spread nor count need be given.)
 pub(super) fn condense(data: &Data, poles: &[Pole]) -> Data {

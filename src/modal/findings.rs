@@ -102,7 +102,7 @@ pub(super) fn collect(
                 .max(scatter[1] * pole.damping_ratio)
                 .hypot(shift[1]);
             let others: Vec<Pole> = poles.iter().filter(|p| *p != pole).copied().collect();
-            let moves = verify::moves(fitted, *pole, &others);
+            let moves = verify::moves(fitted, solution, j, *pole, &others);
             let (mut frequency_hz, mut damping_ratio) = (pole.frequency_hz, pole.damping_ratio);
             if let Some(moves) = moves {
                 scatters.push(moves.scatter);

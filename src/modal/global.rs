@@ -288,8 +288,13 @@ fn shape_data(data: &[Data]) -> Option<ShapeData<'_>> {
 /// Refinement with search, noise from the rest, refinement without search.
 fn solve(data: &mut [Data], candidates: &[Pole], changes: &mut Vec<Change>) -> Option<Vec<Group>> {
     let start = select::choose(&select::some(data), candidates);
-    let mut groups = joint_fit::refine(data, &start, Search::Roughly, changes)?;
-    for search in [Search::Pairs, Search::Nothing] {
+    let mut groups = joint_fit::refine(&set_noise::alike(data), &start, Search::Roughly, changes)?;
+    // What is many fits with noises alike is few with those that each FRF has.
+    for (search, alike) in [
+        (Search::Pairs, true),
+        (Search::Pairs, false),
+        (Search::Nothing, false),
+    ] {
         set_noise::renew(data, &groups);
         let mut poles: Vec<Pole> = groups
             .iter()
@@ -297,7 +302,11 @@ fn solve(data: &mut [Data], candidates: &[Pole], changes: &mut Vec<Change>) -> O
             .collect();
         poles.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
         let mut doubts: Vec<Option<Doubt>> = groups.into_iter().map(|g| g.doubt).collect();
-        groups = joint_fit::refine(data, &poles, search, changes)?;
+        groups = if alike {
+            joint_fit::refine(&set_noise::alike(data), &poles, search, changes)?
+        } else {
+            joint_fit::refine(data, &poles, search, changes)?
+        };
         if search == Search::Nothing && doubts.len() == groups.len() {
             for (group, doubt) in groups.iter_mut().zip(&mut doubts) {
                 let same = |d: &Doubt| d.shifts.len() == group.solution.poles.len();

@@ -28,6 +28,8 @@ const SEEN: f64 = 30.0;
 
 /// Poles nearer than this share of both half-widths are one.
 const SAME_PLACE: f64 = 0.05;
+/// And than these, one after the other, where a group cannot be fitted.
+const MERGED: [f64; 3] = [0.5, 1.0, 2.0];
 /// What explains so many times what a mode must is needed, however badly it is determined.
 const INDISPENSABLE: f64 = 10.0;
 /// Trial poles spread over a window, of each damping.
@@ -151,7 +153,10 @@ pub(super) fn refine(
                 search,
                 chance: 1.0,
             };
-            let solution = fit.fit(group).or_else(|| fit.fit(&apart(group, 0.5)))?;
+            // Poles that the lines do not tell apart (one mode that moves from FRF to FRF can have split) are too many.
+            let solution = fit
+                .fit(group)
+                .or_else(|| MERGED.into_iter().find_map(|share| fit.fit(&apart(group, share))))?;
             if search != Search::Roughly && !solution.poles.is_empty() {
                 fit.chance = fit.by_chance(&solution);
             }

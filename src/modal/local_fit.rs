@@ -8,6 +8,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
+use pulp::Arch;
 
 use super::curve::detuning;
 
@@ -20,6 +21,8 @@ pub(super) const SETTLED: f64 = 1e-6;
 pub(super) const ROUGHLY_SETTLED: f64 = 1e-4;
 /// A relative change of the poles that is only rounding.
 const LAST_DIGITS: f64 = 1e-11;
+/// Sums that the processor can add side by side.
+const LANES: usize = 8;
 /// Smallest damping ratio the search may reach; below it a line spectrum cannot tell.
 const MIN_DAMPING: f64 = 1e-7;
 /// A column of which less than this part is its own is held by the others.
@@ -116,13 +119,22 @@ impl<'a> Prepared<'a> {
 }
 
 /// Takes the span of orthonormal real columns out of a column.
+#[inline(always)]
 fn take_out_polynomial(column: &mut [Complex64], polynomial: &[Vec<f64>]) {
     for along in polynomial {
-        let (mut re, mut im) = (0.0, 0.0);
-        for (a, c) in along.iter().zip(column.iter()) {
-            re += a * c.re;
-            im += a * c.im;
+        let ((a, a_rest), (c, c_rest)) = (along.as_chunks::<LANES>(), column.as_chunks::<LANES>());
+        let (mut res, mut ims) = ([0.0; LANES], [0.0; LANES]);
+        for (a, c) in a.iter().zip(c) {
+            for lane in 0..LANES {
+                res[lane] += a[lane] * c[lane].re;
+                ims[lane] += a[lane] * c[lane].im;
+            }
         }
+        let rest: Complex64 = a_rest.iter().zip(c_rest).map(|(a, c)| c * a).sum();
+        let (re, im) = (
+            res.iter().sum::<f64>() + rest.re,
+            ims.iter().sum::<f64>() + rest.im,
+        );
         for (c, a) in column.iter_mut().zip(along) {
             c.re -= re * a;
             c.im -= im * a;
@@ -310,21 +322,40 @@ fn scatter_of_lines(at: &Linearised, leverage: &[f64]) -> DMatrix<f64> {
 }
 
 /// xᴴ y.
+#[inline(always)]
 fn dot(x: &[Complex64], y: &[Complex64]) -> Complex64 {
-    let (mut re, mut im) = (0.0, 0.0);
+    let (mut re, mut im) = ([0.0; LANES], [0.0; LANES]);
+    let ((x, x_rest), (y, y_rest)) = (x.as_chunks::<LANES>(), y.as_chunks::<LANES>());
     for (x, y) in x.iter().zip(y) {
-        re += x.re * y.re + x.im * y.im;
-        im += x.re * y.im - x.im * y.re;
+        for lane in 0..LANES {
+            re[lane] += x[lane].re * y[lane].re + x[lane].im * y[lane].im;
+            im[lane] += x[lane].re * y[lane].im - x[lane].im * y[lane].re;
+        }
     }
-    Complex64::new(re, im)
+    let rest: Complex64 = x_rest.iter().zip(y_rest).map(|(x, y)| x.conj() * y).sum();
+    Complex64::new(re.iter().sum(), im.iter().sum()) + rest
 }
 
 /// Re xᴴ y.
+#[inline(always)]
 fn real_dot(x: &[Complex64], y: &[Complex64]) -> f64 {
-    x.iter().zip(y).map(|(x, y)| x.re * y.re + x.im * y.im).sum()
+    let mut sums = [0.0; LANES];
+    let ((x, x_rest), (y, y_rest)) = (x.as_chunks::<LANES>(), y.as_chunks::<LANES>());
+    for (x, y) in x.iter().zip(y) {
+        for lane in 0..LANES {
+            sums[lane] += x[lane].re * y[lane].re + x[lane].im * y[lane].im;
+        }
+    }
+    let rest: f64 = x_rest
+        .iter()
+        .zip(y_rest)
+        .map(|(x, y)| x.re * y.re + x.im * y.im)
+        .sum();
+    sums.iter().sum::<f64>() + rest
 }
 
 /// Takes the part of `column` along the unit column `along` out, and says how much that was.
+#[inline(always)]
 fn take_out(column: &mut [Complex64], along: &[Complex64]) -> Complex64 {
     let part = dot(along, column);
     for (c, a) in column.iter_mut().zip(along) {
@@ -337,6 +368,11 @@ impl Linearised {
     /// Solves for the residues at these poles. `None` where the lines do not determine them; what is held then is of no
     /// use.
     fn solve(&mut self, prepared: &Prepared, poles: &[Pole]) -> Option<()> {
+        Arch::new().dispatch(|| self.solve_with_wide_vectors(prepared, poles))
+    }
+
+    #[inline(always)]
+    fn solve_with_wide_vectors(&mut self, prepared: &Prepared, poles: &[Pole]) -> Option<()> {
         self.fill(prepared.problem, poles);
         self.orthonormalise(prepared)?;
         self.residual.clear();
@@ -363,6 +399,7 @@ impl Linearised {
     }
 
     /// Puts the weighted shapes where the basis goes.
+    #[inline(always)]
     fn fill(&mut self, problem: &Problem, poles: &[Pole]) {
         self.shapes.clear();
         self.basis.clear();
@@ -379,6 +416,7 @@ impl Linearised {
 
     /// Gram–Schmidt on columns of unit length; one that mostly lay in the others is done twice (enough for orthogonality
     /// to rounding: Daniel, Gragg, Kaufman & Stewart 1976).
+    #[inline(always)]
     fn orthonormalise(&mut self, prepared: &Prepared) -> Option<()> {
         let lines = prepared.target.len();
         let columns = self.basis.len() / lines;
@@ -419,6 +457,7 @@ impl Linearised {
     }
 
     /// ∂/∂f₀ and ∂/∂ln ζ of the model, what the linear part can follow taken out.
+    #[inline(always)]
     fn slopes(&mut self, prepared: &Prepared, poles: &[Pole]) {
         let (f, weights) = (prepared.problem.frequency_hz, &prepared.problem.line_weight);
         let lines = f.len();
@@ -445,6 +484,11 @@ impl Linearised {
 
     /// JᵀJ and −Jᵀr over (f, ln ζ) of every pole.
     fn normal_equations(&self) -> (DMatrix<f64>, DVector<f64>) {
+        Arch::new().dispatch(|| self.normal_equations_with_wide_vectors())
+    }
+
+    #[inline(always)]
+    fn normal_equations_with_wide_vectors(&self) -> (DMatrix<f64>, DVector<f64>) {
         let lines = self.residual.len();
         let parameters = self.jacobian.len() / lines;
         let column = |a: usize| &self.jacobian[a * lines..(a + 1) * lines];

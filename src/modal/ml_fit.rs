@@ -12,11 +12,12 @@ use std::f64::consts::TAU;
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::{Accum, MatMut, MatRef, Par};
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2, Vector2};
 use num_complex::Complex64;
 use pulp::Arch;
 use rayon::prelude::*;
 
+use super::alike::{self, Alike};
 use super::local_fit::Pole;
 
 /// Lower residual terms, then upper ones.
@@ -69,6 +70,8 @@ pub(super) struct FrfSolution {
     pub linear_by_poles: DMatrix<f64>,
     /// Part of the noise at each line that the fit follows, mean over the lines.
     pub leverage: f64,
+    /// By moving pole: what this FRF alone says of (ln f, ln ζ): its part of the information and of the gradient.
+    pub own: Vec<(Matrix2<f64>, Vector2<f64>)>,
 }
 
 impl Solution {
@@ -86,6 +89,17 @@ impl Solution {
             return [0.0; 2];
         };
         [0, 1].map(|k| scatter[(2 * mode + k, 2 * mode + k)].max(0.0).sqrt())
+    }
+
+    /// Where an FRF alone would have a pole, the others held, to the first order: change of (ln f, ln ζ), and the standard
+    /// deviations for the noise as given. `None` where it does not show the mode.
+    pub fn own_step(&self, frf: usize, mode: usize) -> Option<([f64; 2], [f64; 2])> {
+        let (information, gradient) = self.frfs[frf].own[mode];
+        let covariance = information.try_inverse()?;
+        let step = covariance * gradient;
+        let std = [covariance[(0, 0)].sqrt(), covariance[(1, 1)].sqrt()];
+        let known = step.iter().chain(&std).all(|x| x.is_finite());
+        known.then_some(([step[0], step[1]], std))
     }
 
     /// What the fit says of an FRF on any lines of its window.
@@ -142,14 +156,30 @@ struct Prepared<'a> {
     /// By FRF, the index of the first one on the same lines.
     axis_of: Vec<usize>,
     centre_hz: f64,
-    /// √2/σ, twice for each line: a complex standard deviation of σ is σ/√2 in each part.
+    /// √2/σ, twice for each line: a complex standard deviation of σ is σ/√2 in each part. Empty where the FRFs are alike.
     weight: Vec<Vec<f64>>,
-    /// Weighted measurement.
+    /// Weighted measurement. Empty where the FRFs are alike.
     target: Vec<Vec<f64>>,
+    alike: Option<Alike>,
 }
 
 impl<'a> Prepared<'a> {
     fn new(frfs: &'a [NoisyFrf<'a>]) -> Self {
+        match Alike::new(frfs) {
+            Some(alike) => Prepared {
+                frfs,
+                axis_of: vec![0; frfs.len()],
+                centre_hz: centre_hz(frfs),
+                weight: Vec::new(),
+                target: Vec::new(),
+                alike: Some(alike),
+            },
+            None => Self::each_its_own(frfs),
+        }
+    }
+
+    /// With a basis for each FRF.
+    fn each_its_own(frfs: &'a [NoisyFrf<'a>]) -> Self {
         let axis_of = (0..frfs.len())
             .map(|m| {
                 (0..m)
@@ -157,13 +187,7 @@ impl<'a> Prepared<'a> {
                     .unwrap_or(m)
             })
             .collect();
-        let weight: Vec<Vec<f64>> = frfs
-            .iter()
-            .map(|frf| {
-                let of_line = frf.sigma.iter().map(|s| std::f64::consts::SQRT_2 / s);
-                of_line.flat_map(|w| [w, w]).collect()
-            })
-            .collect();
+        let weight: Vec<Vec<f64>> = frfs.iter().map(|frf| weights(frf.sigma)).collect();
         let target = frfs
             .iter()
             .zip(&weight)
@@ -178,6 +202,7 @@ impl<'a> Prepared<'a> {
             centre_hz: centre_hz(frfs),
             weight,
             target,
+            alike: None,
         }
     }
 
@@ -214,17 +239,28 @@ impl<'a> Prepared<'a> {
     }
 }
 
+/// √2/σ, twice for each line.
+pub(super) fn weights(sigma: &[f64]) -> Vec<f64> {
+    let of_line = sigma.iter().map(|s| std::f64::consts::SQRT_2 / s);
+    of_line.flat_map(|w| [w, w]).collect()
+}
+
 /// Columns that all FRFs on the same lines share, before weighting; each 2 × lines long.
-struct Axis {
-    rows: usize,
+pub(super) struct Axis {
+    pub rows: usize,
     /// g = 1/(1 − r² + 2iζr) and irg by pole, moving ones first, r = f/f₀; then the residual terms.
-    columns: Vec<f64>,
+    pub columns: Vec<f64>,
     /// By moving pole, for numerators a + ibr: ∂/∂ln f₀ = a p + b ir(p − g) and ∂/∂ln ζ = a q + b irq,
     /// with p = −g²(2r² − 2iζr), q = −2iζr g², in the order p, ir(p − g), q, irq.
-    slopes: Vec<f64>,
+    pub slopes: Vec<f64>,
 }
 
 impl Axis {
+    /// Columns of the poles that move, the first ones.
+    pub fn moving_columns(&self) -> usize {
+        self.slopes.len() / (2 * self.rows)
+    }
+
     fn new(frequency_hz: &[f64], spread_hz: &[f64], moving: &[Pole], fixed: &[Pole], centre_hz: f64) -> Axis {
         let rows = 2 * frequency_hz.len();
         let modes = moving.len() + fixed.len();
@@ -320,9 +356,20 @@ pub(super) fn fit(frfs: &[NoisyFrf], start: &[Pole], fixed: &[Pole], settled: f6
     if frfs.iter().any(|c| 2 * c.frequency_hz.len() <= linear) {
         return None;
     }
-    let prepared = Prepared::new(frfs);
+    fit_prepared(&Prepared::new(frfs), start, fixed, settled, degrees_of_freedom)
+}
+
+fn fit_prepared(
+    prepared: &Prepared,
+    start: &[Pole],
+    fixed: &[Pole],
+    settled: f64,
+    degrees_of_freedom: usize,
+) -> Option<Solution> {
+    let frfs = prepared.frfs;
+    let parameters = 2 * start.len();
     let mut poles = start.to_vec();
-    let mut current = linearise(&prepared, &poles, fixed)?;
+    let mut current = linearise(prepared, &poles, fixed)?;
     let mut lambda = 1e-4;
     let mut converged = parameters == 0;
     for _ in 0..MAX_ITERATIONS {
@@ -358,7 +405,7 @@ pub(super) fn fit(frfs: &[NoisyFrf], start: &[Pole], fixed: &[Pole], settled: f6
             .iter()
             .all(|p| p.frequency_hz > 0.0 && p.damping_ratio < 0.9);
         match if sane {
-            linearise(&prepared, &trial, fixed)
+            linearise(prepared, &trial, fixed)
         } else {
             None
         } {
@@ -389,11 +436,15 @@ pub(super) fn fit(frfs: &[NoisyFrf], start: &[Pole], fixed: &[Pole], settled: f6
         let count = current.scores.len() as f64;
         &covariance * of_scores * &covariance * (count / (count - 1.0))
     });
-    let solved: Option<Vec<FrfSolution>> = current
-        .frfs
+    let solved: Option<Vec<FrfSolution>> = (0..frfs.len())
         .into_par_iter()
-        .enumerate()
-        .map(|(m, solved)| Some(solved.finish(&frfs[m], current.axes[prepared.axis_of[m]].as_ref()?)))
+        .map(|m| {
+            let axis = current.axes[prepared.axis_of[m]].as_ref()?;
+            Some(match &current.frfs {
+                Linear::Own(solved) => solved[m].finish(&frfs[m], axis),
+                Linear::Alike(solved) => solved.of_frf(m).finish(&frfs[m], axis),
+            })
+        })
         .collect();
     let frfs = solved?;
     covariance.iter().all(|c| c.is_finite()).then_some(Solution {
@@ -415,6 +466,9 @@ pub(super) fn explained_by(frfs: &[NoisyFrf], held: &[Pole], trials: &[Pole]) ->
     let prepared = Prepared::new(frfs);
     let held_axes = prepared.axes(&[], held);
     let trial_axes = prepared.axes(&[], trials);
+    if let Some(alike) = &prepared.alike {
+        return alike.explained_by(held_axes[0].as_ref()?, trial_axes[0].as_ref()?, trials.len());
+    }
     let each = prepared.each(&held_axes, |m, axis, buffer| {
         let trial_axis = trial_axes[prepared.axis_of[m]].as_ref()?;
         let (solved, basis_columns) = Solved::new(&prepared, m, axis, 2 * trials.len(), buffer)?;
@@ -465,13 +519,30 @@ struct Linearised {
     gradient: DVector<f64>,
     /// Each FRF's part of the gradient.
     scores: Vec<DVector<f64>>,
-    frfs: Vec<SolvedFrf>,
+    frfs: Linear,
     axes: Vec<Option<Axis>>,
+}
+
+/// The linear parameters, by FRF.
+enum Linear {
+    Own(Vec<SolvedFrf>),
+    Alike(alike::Solved),
 }
 
 /// Solves for the linear parameters of every FRF and builds the normal equations of the poles.
 fn linearise(prepared: &Prepared, poles: &[Pole], fixed: &[Pole]) -> Option<Linearised> {
     let axes = prepared.axes(poles, fixed);
+    if let Some(alike) = &prepared.alike {
+        let found = alike.linearise(axes[0].as_ref()?)?;
+        return found.misfit.is_finite().then(|| Linearised {
+            misfit: found.misfit.max(0.0),
+            normal: found.normal,
+            gradient: found.scores.iter().sum(),
+            scores: found.scores,
+            frfs: Linear::Alike(found.solved),
+            axes,
+        });
+    }
     let each = prepared.each(&axes, |m, axis, buffer| linearise_one(prepared, m, axis, buffer))?;
     let parameters = 2 * poles.len();
     let mut sum = DMatrix::zeros(1 + parameters, 1 + parameters);
@@ -487,13 +558,13 @@ fn linearise(prepared: &Prepared, poles: &[Pole], fixed: &[Pole]) -> Option<Line
         normal: sum.view((1, 1), (parameters, parameters)).into_owned(),
         gradient: DVector::from_fn(parameters, |j, _| sum[(1 + j, 0)]),
         scores,
-        frfs,
+        frfs: Linear::Own(frfs),
         axes,
     })
 }
 
 /// Every column times the weights, for as many columns as both hold.
-fn weigh(out: &mut [f64], columns: &[f64], weight: &[f64]) {
+pub(super) fn weigh(out: &mut [f64], columns: &[f64], weight: &[f64]) {
     let rows = weight.len();
     Arch::new().dispatch(|| {
         for (out, column) in out.chunks_exact_mut(rows).zip(columns.chunks_exact(rows)) {
@@ -505,7 +576,7 @@ fn weigh(out: &mut [f64], columns: &[f64], weight: &[f64]) {
 }
 
 /// L⁻¹ `columns`, in place. (Much faster than nalgebra's for several columns.)
-fn lower_solve(cholesky: &Cholesky<f64, Dyn>, columns: &mut DMatrix<f64>) {
+pub(super) fn lower_solve(cholesky: &Cholesky<f64, Dyn>, columns: &mut DMatrix<f64>) {
     let (rows, count) = columns.shape();
     let lower = MatRef::from_column_major_slice(cholesky.l_dirty().as_slice(), rows, rows);
     let columns = MatMut::from_column_major_slice_mut(columns.as_mut_slice(), rows, count);
@@ -513,7 +584,7 @@ fn lower_solve(cholesky: &Cholesky<f64, Dyn>, columns: &mut DMatrix<f64>) {
 }
 
 /// `out` = leftᵀ right, both with columns of `rows` values.
-fn product(out: &mut DMatrix<f64>, left: &[f64], right: &[f64], rows: usize) {
+pub(super) fn product(out: &mut DMatrix<f64>, left: &[f64], right: &[f64], rows: usize) {
     let (m, n) = out.shape();
     let left = MatRef::from_column_major_slice(left, rows, m);
     let right = MatRef::from_column_major_slice(right, rows, n);
@@ -523,20 +594,43 @@ fn product(out: &mut DMatrix<f64>, left: &[f64], right: &[f64], rows: usize) {
 
 /// The linear parameters of one FRF for given poles. The normal equations square the condition number: what they leave
 /// along the basis is taken out of everything that follows ([`Solved::half_solved`], [`Solved::correct`]).
-struct Solved {
+pub(super) struct Solved {
     /// Of the Gram matrix with columns of unit length.
-    cholesky: Cholesky<f64, Dyn>,
+    pub cholesky: Cholesky<f64, Dyn>,
     /// 1/length of each column.
-    scale: DVector<f64>,
+    pub scale: DVector<f64>,
     /// In units of the unit columns.
-    x: DVector<f64>,
+    pub x: DVector<f64>,
 }
 
 /// That, with how it moves with the poles.
-struct SolvedFrf {
-    linear: Solved,
+pub(super) struct SolvedFrf {
+    pub linear: Solved,
     /// L⁻¹ basisᵀ slopes with the Gram matrix L Lᵀ, in units of the unit columns.
-    by_poles: DMatrix<f64>,
+    pub by_poles: DMatrix<f64>,
+    /// See [`FrfSolution::own`].
+    pub own: Vec<(Matrix2<f64>, Vector2<f64>)>,
+}
+
+/// Factor of the first `columns` of a Gram matrix, of columns of unit length, and 1/length of each. From column `held` on
+/// they are those of poles that are not moved and of the residual terms.
+pub(super) fn unit_cholesky(
+    gram: &DMatrix<f64>,
+    columns: usize,
+    held: usize,
+) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
+    // Unit columns: the Gram matrix is then as well scaled as it can be.
+    let scale = DVector::from_fn(columns, |j, _| gram[(j, j)].sqrt().recip());
+    if scale.iter().any(|s| !(s.is_finite() && *s > 0.0)) {
+        return None;
+    }
+    let mut unit = DMatrix::from_fn(columns, columns, |i, j| gram[(i, j)] * scale[i] * scale[j]);
+    // Lines near 0 Hz make the lower residual terms all alike, and two poles close together look the same from afar: hold
+    // back the part of them that rounding would decide.
+    for term in held..columns {
+        unit[(term, term)] += ROUNDING;
+    }
+    Some((unit.cholesky()?, scale))
 }
 
 impl Solved {
@@ -557,18 +651,8 @@ impl Solved {
         filled[rows * columns..].copy_from_slice(&prepared.target[m]);
         let mut gram = DMatrix::zeros(columns + 1, columns + 1);
         product(&mut gram, filled, filled, rows);
-        // Unit columns: the Gram matrix is then as well scaled as it can be.
-        let scale = DVector::from_fn(columns, |j, _| gram[(j, j)].sqrt().recip());
-        if scale.iter().any(|s| !(s.is_finite() && *s > 0.0)) {
-            return None;
-        }
+        let (cholesky, scale) = unit_cholesky(&gram, columns, axis.moving_columns())?;
         let projected = gram.view((0, columns), (columns, 1)).component_mul(&scale);
-        let mut unit = DMatrix::from_fn(columns, columns, |i, j| gram[(i, j)] * scale[i] * scale[j]);
-        // Lines near 0 Hz make the lower residual terms all alike: hold back the part of them that rounding would decide.
-        for term in columns - RESIDUAL_TERMS..columns {
-            unit[(term, term)] += ROUNDING;
-        }
-        let cholesky = unit.cholesky()?;
         let x = cholesky.solve(&projected);
         let unscaled = x.component_mul(&scale);
         let (basis, residual) = filled.split_at_mut(rows * columns);
@@ -597,18 +681,18 @@ impl Solved {
 }
 
 impl SolvedFrf {
-    fn finish(self, frf: &NoisyFrf, axis: &Axis) -> FrfSolution {
-        let Solved { cholesky, scale, x } = self.linear;
+    fn finish(&self, frf: &NoisyFrf, axis: &Axis) -> FrfSolution {
+        let Solved { cholesky, scale, x } = &self.linear;
         let scaled = |mut matrix: DMatrix<f64>| {
             for mut column in matrix.column_iter_mut() {
-                column.component_mul_assign(&scale);
+                column.component_mul_assign(scale);
             }
             matrix
         };
-        let mut by_poles = self.by_poles;
+        let mut by_poles = self.by_poles.clone();
         // G⁻¹ = L⁻ᵀ L⁻¹: columns of L⁻¹ are enough for the blocks on its diagonal.
         let mut inverse = DMatrix::identity(x.len(), by_poles.ncols());
-        lower_solve(&cholesky, &mut inverse);
+        lower_solve(cholesky, &mut inverse);
         let pair_covariance = (0..by_poles.ncols() / 2)
             .map(|mode| {
                 Matrix2::from_fn(|a, b| {
@@ -618,7 +702,7 @@ impl SolvedFrf {
             })
             .collect();
         cholesky.l_dirty().ad_solve_lower_triangular_mut(&mut by_poles);
-        let linear = x.component_mul(&scale);
+        let linear = x.component_mul(scale);
         let mut residual = frf.receptance.to_vec();
         for (x, column) in linear.iter().zip(axis.columns.chunks_exact(axis.rows)) {
             for (r, c) in residual.iter_mut().zip(column.as_chunks::<2>().0) {
@@ -627,6 +711,7 @@ impl SolvedFrf {
         }
         FrfSolution {
             leverage: x.len() as f64 / axis.rows as f64,
+            own: self.own.clone(),
             linear,
             residual,
             pair_covariance,
@@ -680,7 +765,21 @@ fn linearise_one(
     );
     linear.correct(half.column(0).into_owned());
     let by_poles = half.columns(1, parameters).into_owned();
-    Some((products, SolvedFrf { linear, by_poles }))
+    let own = (0..parameters / 2)
+        .map(|j| {
+            let at = 1 + 2 * j;
+            let gradient = products.fixed_view::<2, 1>(at, 0).into_owned();
+            (products.fixed_view::<2, 2>(at, at).into_owned(), gradient)
+        })
+        .collect();
+    Some((
+        products,
+        SolvedFrf {
+            linear,
+            by_poles,
+            own,
+        },
+    ))
 }
 
 #[cfg(test)]
@@ -718,6 +817,99 @@ mod tests {
         for (j, mode) in modes[1..3].iter().enumerate() {
             let (constant, _) = solution.constant(0, j);
             approx::assert_relative_eq!(constant.re, mode.constant, max_relative = 1e-2);
+        }
+    }
+
+    /// FRFs with noises that differ by a factor only are fitted with one basis for all: the same poles, residues, deviations.
+    #[test]
+    fn a_common_basis_gives_what_a_basis_for_each_frf_gives() {
+        let poles = [(12.0, 0.03), (12.7, 0.02), (25.0, 0.015)];
+        let constants = [[1.0, 0.5, -0.3], [-0.4, 1.0, 0.8], [0.7, -0.9, 1.0]];
+        let curves: Vec<(Vec<f64>, Vec<Complex64>)> = constants
+            .iter()
+            .enumerate()
+            .map(|(k, row)| {
+                let modes: Vec<Mode> = poles
+                    .iter()
+                    .zip(row)
+                    .map(|(&(f, zeta), &a)| Mode::new(f, zeta, a))
+                    .collect();
+                Synthetic::new(4.0, 40.0, 0.25, &modes)
+                    .with_noise(0.0, 0.02, k as u64)
+                    .frf()
+            })
+            .collect();
+        let lines = curves[0].0.len();
+        let shape: Vec<f64> = curves[0].1.iter().map(|h| 0.02 * h.norm()).collect();
+        let sigmas: Vec<Vec<f64>> = [1.0, 3.0, 0.4]
+            .iter()
+            .map(|level| shape.iter().map(|s| level * s).collect())
+            .collect();
+        let none = vec![0.0; lines];
+        let frfs: Vec<NoisyFrf> = curves
+            .iter()
+            .zip(&sigmas)
+            .map(|((f, h), sigma)| NoisyFrf {
+                frequency_hz: f,
+                receptance: h,
+                sigma,
+                spread_hz: &none,
+            })
+            .collect();
+        let pole = |(frequency_hz, damping_ratio)| Pole {
+            frequency_hz,
+            damping_ratio,
+        };
+        let start = [pole((11.9, 0.035)), pole((12.8, 0.018))];
+        let fixed = [pole(poles[2])];
+        let together = Prepared::new(&frfs);
+        assert!(together.alike.is_some());
+        let apart = Prepared::each_its_own(&frfs);
+        let fit = |prepared: &Prepared| fit_prepared(prepared, &start, &fixed, SETTLED, 100).unwrap();
+        let (a, b) = (fit(&together), fit(&apart));
+        approx::assert_relative_eq!(a.misfit, b.misfit, max_relative = 1e-9);
+        for j in 0..2 {
+            approx::assert_relative_eq!(
+                a.poles[j].frequency_hz,
+                b.poles[j].frequency_hz,
+                max_relative = 1e-9
+            );
+            approx::assert_relative_eq!(
+                a.poles[j].damping_ratio,
+                b.poles[j].damping_ratio,
+                max_relative = 1e-7
+            );
+            for k in 0..2 {
+                approx::assert_relative_eq!(a.scatter_std(j)[k], b.scatter_std(j)[k], max_relative = 1e-5);
+            }
+            for m in 0..3 {
+                let ((a_value, a_std), (b_value, b_std)) = (a.constant(m, j), b.constant(m, j));
+                assert!((a_value - b_value).norm() < 1e-6 * b_value.norm());
+                approx::assert_relative_eq!(a_std, b_std, max_relative = 1e-6);
+                approx::assert_relative_eq!(a.evidence(m, j), b.evidence(m, j), max_relative = 1e-6);
+                let ((a_step, a_std), (b_step, b_std)) =
+                    (a.own_step(m, j).unwrap(), b.own_step(m, j).unwrap());
+                for k in 0..2 {
+                    assert!((a_step[k] - b_step[k]).abs() < 1e-5 * b_std[k]);
+                    approx::assert_relative_eq!(a_std[k], b_std[k], max_relative = 1e-6);
+                }
+            }
+        }
+        let trials = [pole((18.0, 0.02)), pole((12.3, 0.03))];
+        let held = [pole(poles[0]), pole(poles[2])];
+        let a = explained_by(&frfs, &held, &trials).unwrap();
+        // A hair's breadth off proportion: each its own basis.
+        let mut off = sigmas.clone();
+        off[1][5] *= 1.0 + 1e-7;
+        let frfs: Vec<NoisyFrf> = frfs
+            .iter()
+            .zip(&off)
+            .map(|(frf, sigma)| NoisyFrf { sigma, ..frf.clone() })
+            .collect();
+        assert!(Prepared::new(&frfs).alike.is_none());
+        let b = explained_by(&frfs, &held, &trials).unwrap();
+        for (a, b) in a.iter().zip(b) {
+            approx::assert_relative_eq!(*a, b, max_relative = 1e-5);
         }
     }
 }

@@ -8,6 +8,7 @@
 use num_complex::Complex64;
 use serde::Serialize;
 
+mod alike;
 mod analysis;
 pub mod chosen;
 mod circle_fit;

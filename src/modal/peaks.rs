@@ -102,13 +102,9 @@ fn prominent(height: &[f64], noise_std: &[f64], noise_gain: f64, margin: usize) 
         }
         let noise = noise_std[k] * noise_gain;
         let wanted = (threshold * noise).max(MIN_PROMINENCE_OF_HEIGHT * height[k]);
-        // Walk to higher ground on both sides; the higher of the two valleys decides.
-        let left = valley(height[..k].iter().rev(), height[k]);
-        let right = valley(height[k + 1..].iter(), height[k]);
-        let prominence = height[k] - left.max(right);
-        if prominence < wanted || prominence <= 0.0 {
+        let Some(prominence) = prominence(height, k, wanted).filter(|p| *p > 0.0) else {
             continue;
-        }
+        };
         let level = height[k] - 0.5 * prominence;
         let from = (0..k).rev().find(|&j| height[j] < level).unwrap_or(0);
         let to = (k..n).find(|&j| height[j] < level).unwrap_or(n - 1);
@@ -124,10 +120,32 @@ fn prominent(height: &[f64], noise_std: &[f64], noise_gain: f64, margin: usize) 
     peaks
 }
 
-/// Lowest value on the way to higher ground or to the end.
-fn valley<'a>(way: impl Iterator<Item = &'a f64>, height: f64) -> f64 {
-    way.take_while(|&&h| h <= height)
-        .fold(height, |low, &h| low.min(h))
+/// How far a maximum stands above the higher of the two valleys on the way to higher ground or to the end; `None` where
+/// that is less than `wanted`. Both ways are walked by turns: a ripple on a flank meets higher ground soon on one side,
+/// and need not be followed down the other.
+fn prominence(height: &[f64], peak: usize, wanted: f64) -> Option<f64> {
+    let top = height[peak];
+    let mut ways = [
+        Box::new(height[..peak].iter().rev()) as Box<dyn Iterator<Item = &f64>>,
+        Box::new(height[peak + 1..].iter()),
+    ];
+    let mut valleys = [top; 2];
+    let mut open = [true; 2];
+    while open[0] || open[1] {
+        for ((way, valley), open) in ways.iter_mut().zip(&mut valleys).zip(&mut open) {
+            if !*open {
+                continue;
+            }
+            match way.next().filter(|h| **h <= top) {
+                Some(h) => *valley = valley.min(*h),
+                None => *open = false,
+            }
+            if !*open && top - *valley < wanted {
+                return None;
+            }
+        }
+    }
+    Some(top - valleys[0].max(valleys[1]))
 }
 
 #[cfg(test)]

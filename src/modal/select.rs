@@ -32,7 +32,8 @@ pub(super) fn choose(data: &[Data], candidates: &[Pole]) -> Vec<Pole> {
     let mut left = candidates.to_vec();
     let mut chosen: Vec<Pole> = Vec::new();
     for round in 0..MAX_ROUNDS {
-        let Some(worth) = joint_fit::worth(&data, &chosen, &left) else {
+        let even = set_noise::alike(&data);
+        let Some(worth) = joint_fit::worth(&even, &chosen, &left) else {
             break;
         };
         let wanted = if round < UNASKED { 0.0 } else { 1.0 };
@@ -45,7 +46,7 @@ pub(super) fn choose(data: &[Data], candidates: &[Pole]) -> Vec<Pole> {
             left.remove(k);
         }
         chosen.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
-        let Some(groups) = joint_fit::refine(&data, &chosen, Search::Roughly, &mut Vec::new()) else {
+        let Some(groups) = joint_fit::refine(&even, &chosen, Search::Roughly, &mut Vec::new()) else {
             break;
         };
         set_noise::renew(&mut data, &groups);

@@ -44,6 +44,39 @@ pub(super) fn estimate(data: &mut [Data]) {
     }
 }
 
+/// The FRFs with noises that differ by a factor only, where they are on the same lines: at each line the mean square over
+/// the FRFs of what each has over its own level, so that what a fit leaves there is as large as expected. A fit of such
+/// FRFs takes a fraction of the time ([`super::alike`]) and is hardly less exact; its standard deviations are not those
+/// of the noise.
+pub(super) fn alike(data: &[Data]) -> Vec<Data> {
+    let mut data = data.to_vec();
+    let lines = data.first().map_or(0, |d| d.frequency_hz.len());
+    if data
+        .windows(2)
+        .any(|w| w[0].frequency_hz != w[1].frequency_hz || w[0].spread_hz != w[1].spread_hz)
+    {
+        return data;
+    }
+    let mut squares = vec![0.0; lines];
+    let levels: Vec<f64> = data
+        .iter()
+        .map(|d| {
+            let level = (d.sigma.iter().map(|s| s.ln()).sum::<f64>() / lines as f64).exp();
+            for (sum, sigma) in squares.iter_mut().zip(&d.sigma) {
+                *sum += (sigma / level).powi(2);
+            }
+            level
+        })
+        .collect();
+    let count = data.len() as f64;
+    for (d, level) in data.iter_mut().zip(levels) {
+        for (sigma, sum) in d.sigma.iter_mut().zip(&squares) {
+            *sigma = level * (sum / count).sqrt();
+        }
+    }
+    data
+}
+
 pub(super) fn rms(values: &[Complex64]) -> f64 {
     (values.iter().map(|v| v.norm_sqr()).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }

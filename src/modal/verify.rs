@@ -68,7 +68,7 @@ pub(super) fn verified(
         if kept.is_empty() {
             return None;
         }
-        groups = joint_fit::refine(data, &kept, Search::Roughly, &mut Vec::new())?;
+        groups = joint_fit::refine(&set_noise::alike(data), &kept, Search::Roughly, &mut Vec::new())?;
         set_noise::renew(data, &groups);
         groups = joint_fit::refine(data, &kept, Search::Nothing, &mut Vec::new())?;
     }
@@ -309,12 +309,44 @@ pub(super) struct Moves {
     pub std: [f64; 2],
 }
 
-/// `None` where too few FRFs tell.
-pub(super) fn moves(data: &[Data], pole: Pole, others: &[Pole]) -> Option<Moves> {
+/// `None` where too few FRFs tell. `j`: the mode in the solution that `pole` is of.
+pub(super) fn moves(
+    data: &[Data],
+    solution: &Solution,
+    j: usize,
+    pole: Pole,
+    others: &[Pole],
+) -> Option<Moves> {
     const LEAST_FRFS: usize = 4;
     const KNOWN_WIDTHS: f64 = 0.3;
     const BEYOND: f64 = 2.0;
     const OF_WIDTH: f64 = 0.1;
+    // A single step from the common pole says whether an FRF's own is worth a fit.
+    const WORTH_A_FIT: f64 = 0.5;
+    let level = (solution.misfit / solution.degrees_of_freedom as f64)
+        .max(1.0)
+        .sqrt();
+    let steps: Vec<(f64, f64)> = (0..solution.frfs.len())
+        .filter_map(|m| solution.own_step(m, j))
+        .map(|(step, std)| (step[0], level * std[0]))
+        .filter(|(_, std)| *std < KNOWN_WIDTHS * pole.damping_ratio)
+        .collect();
+    if steps.len() < LEAST_FRFS {
+        return None;
+    }
+    let median =
+        |of: fn(&(f64, f64)) -> f64| crate::signal::median(&steps.iter().map(of).collect::<Vec<_>>());
+    let (middle, uncertain) = (median(|s| s.0), median(|s| s.1));
+    let spread =
+        1.4826 * crate::signal::median(&steps.iter().map(|s| (s.0 - middle).abs()).collect::<Vec<_>>());
+    if spread < WORTH_A_FIT * BEYOND * uncertain || spread < WORTH_A_FIT * OF_WIDTH * pole.damping_ratio {
+        return Some(Moves {
+            scatter: (spread * spread - uncertain * uncertain).max(0.0).sqrt(),
+            significant: false,
+            pole,
+            std: [0.0; 2],
+        });
+    }
     let own: Vec<(Pole, [f64; 2])> = own_poles(data, pole, others)?
         .into_iter()
         .flatten()

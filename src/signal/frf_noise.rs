@@ -12,8 +12,10 @@ use rayon::prelude::*;
 use super::local_rational::{self, FittedLine, HALF_WINDOW, LINES, LineProducts};
 use super::noise_law::{self, Departure, FrfNoise};
 
-/// Lines from one window to the next.
-const STEP: usize = 2;
+/// Lines from one window to the next: at least, and at most (each window speaks for the lines up to the next).
+const STEP: [usize; 2] = [2, 6];
+/// So many windows are enough for a law of two numbers.
+const ENOUGH_WINDOWS: usize = 1000;
 /// Share of a line that the fit may take for the curve without it still to be worth something.
 const MOST_TAKEN: f64 = 0.7;
 /// Degrees of freedom that a line must have left to say something about the noise.
@@ -45,17 +47,18 @@ pub fn estimate(frequency_hz: &[f64], frfs: &[&[Complex64]]) -> Vec<Option<FrfNo
         .collect();
     let data = LineProducts::new(frequency_hz, frfs);
     let last = lines - 1 - HALF_WINDOW;
-    let centres: Vec<usize> = (HALF_WINDOW..=last).step_by(STEP).collect();
+    let step = (lines / ENOUGH_WINDOWS).clamp(STEP[0], STEP[1]);
+    let centres: Vec<usize> = (HALF_WINDOW..=last).step_by(step).collect();
     let windows: Vec<Option<Window>> = centres
         .into_par_iter()
         .map(|centre| {
             // The lines that this window speaks for: its own and those up to the next; the first and the last window
             // speak for the ends of the band too.
             let from = if centre == HALF_WINDOW { 0 } else { centre };
-            let to = if centre + STEP > last {
+            let to = if centre + step > last {
                 centre + HALF_WINDOW + 1
             } else {
-                centre + STEP
+                centre + step
             };
             window(&data, centre, from..to)
         })

@@ -235,10 +235,7 @@ fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Settings) -> Resul
             (Cow::Owned(f), Cow::Owned(h))
         })
         .collect();
-    let single: Vec<FrfModes> = clean
-        .par_iter()
-        .map(|(f, h)| modal::analyse_frf(f, h, settings))
-        .collect::<Result<_>>()?;
+    let single = modal::analyse_frfs(&clean, settings)?;
     let mut dofs: Vec<String> = inputs
         .iter()
         .filter_map(|i| i.dofs.as_ref())

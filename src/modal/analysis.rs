@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
+use rayon::prelude::*;
 
 use super::curve::{Curve, MIN_LINES};
 use super::local_fit::{self, Pole, Problem, ROUGHLY_SETTLED, SETTLED, Solution};
@@ -13,12 +14,29 @@ use crate::Result;
 /// Half-widths (ζf₀) on either side of a peak that take part in the local fit: the window whose fit is best
 /// determined is kept, so that a wide one averages noise and a narrow one avoids what is not modelled.
 const WINDOWS_HALF_WIDTHS: [f64; 3] = [8.0, 5.0, 3.0];
+/// More FRFs than this are fitted singly in one window each, with fewer neighbours: their modes are those of the set.
+const MANY_FRFS: usize = 40;
 /// A window is wide enough where its inner lines are left with at least this share of the power of all.
 const NOISE_SHARE: f64 = 0.8;
 /// Lines on either side of a peak that take part at least.
 const WINDOW_LINES: usize = 4;
-/// Neighbouring peaks fitted together with a mode, on each side.
-const NEIGHBOURS: usize = 2;
+/// How an FRF's peaks are fitted.
+#[derive(Clone, Copy)]
+struct Effort {
+    /// See [`WINDOWS_HALF_WIDTHS`].
+    windows: &'static [f64],
+    /// Neighbouring peaks fitted together with a mode, on each side.
+    neighbours: usize,
+}
+
+const FULL: Effort = Effort {
+    windows: &WINDOWS_HALF_WIDTHS,
+    neighbours: 2,
+};
+const BRIEF: Effort = Effort {
+    windows: &[5.0],
+    neighbours: 1,
+};
 /// Above this a fit is no vibration mode.
 const MAX_DAMPING: f64 = 0.5;
 /// A damping estimate scattering by more than this part of itself is no finding (where lines are not too coarse).
@@ -32,6 +50,21 @@ const SAME_WIDTHS: f64 = 0.1;
 /// Fewer lines than this inside the half-power band are worth a warning.
 const FINE_LINES: f64 = 3.0;
 
+/// Finds the modes of each of many FRFs: [`analyse_frf`], with less effort on each where there are more than forty.
+///
+/// # Errors
+/// As [`analyse_frf`].
+pub fn analyse_frfs<F, H>(frfs: &[(F, H)], settings: &Settings) -> Result<Vec<FrfModes>>
+where
+    F: AsRef<[f64]> + Sync,
+    H: AsRef<[Complex64]> + Sync,
+{
+    let effort = if frfs.len() > MANY_FRFS { BRIEF } else { FULL };
+    frfs.par_iter()
+        .map(|(f, h)| analyse(f.as_ref(), h.as_ref(), settings, effort))
+        .collect()
+}
+
 /// Finds the modes of one FRF.
 ///
 /// `frequency_hz` in ascending order, `receptance_m_per_n` (displacement per force, e^{+iωt}) on the same
@@ -44,6 +77,15 @@ pub fn analyse_frf(
     frequency_hz: &[f64],
     receptance_m_per_n: &[Complex64],
     settings: &Settings,
+) -> Result<FrfModes> {
+    analyse(frequency_hz, receptance_m_per_n, settings, FULL)
+}
+
+fn analyse(
+    frequency_hz: &[f64],
+    receptance_m_per_n: &[Complex64],
+    settings: &Settings,
+    effort: Effort,
 ) -> Result<FrfModes> {
     let mut curve = Curve::from_receptance(frequency_hz, receptance_m_per_n, settings.band_hz)?;
     let mut result = FrfModes::default();
@@ -97,7 +139,7 @@ pub fn analyse_frf(
         .collect();
     let mut refused = Vec::new();
     for (index, start) in starts.iter().enumerate() {
-        match mode_at(&curve, &starts, index, noise_std[start.peak.index]) {
+        match mode_at(&curve, &starts, index, noise_std[start.peak.index], effort) {
             Ok(mode) => result.modes.push(mode),
             Err(why) => {
                 refused.push(format!("{:.2} Hz ({why})", curve.frequency_hz[start.peak.index]));
@@ -163,12 +205,13 @@ fn mode_at(
     starts: &[Start],
     index: usize,
     noise_std: f64,
+    effort: Effort,
 ) -> std::result::Result<FrfMode, String> {
     let start = &starts[index];
     let f = &curve.frequency_hz;
     let line_hz = curve.spacing_hz(start.peak.index);
     let mut estimates = Vec::with_capacity(3);
-    let local = local(curve, starts, index);
+    let local = local(curve, starts, index, effort);
     let mut why = "its lines do not determine a pole".to_string();
     if let Some((solution, pole)) = &local {
         match judge(curve, solution, *pole, &start.peak, noise_std) {
@@ -291,15 +334,15 @@ fn judge(
 }
 
 /// The best determined local fit and the position of the peak's pole in it.
-fn local(curve: &Curve, starts: &[Start], index: usize) -> Option<(Solution, usize)> {
+fn local(curve: &Curve, starts: &[Start], index: usize, effort: Effort) -> Option<(Solution, usize)> {
     let mut best: Option<(f64, Solution, usize)> = None;
     // A window begins where the one before ended.
     let mut poles: Vec<Pole> = starts.iter().map(|s| s.pole).collect();
-    for (k, reach) in WINDOWS_HALF_WIDTHS.into_iter().enumerate() {
-        let Some(window) = fit_window(curve, starts, &poles, index, reach) else {
+    for (k, &reach) in effort.windows.iter().enumerate() {
+        let Some(window) = fit_window(curve, starts, &poles, index, reach, effort.neighbours) else {
             continue;
         };
-        let narrower = WINDOWS_HALF_WIDTHS.get(k + 1);
+        let narrower = effort.windows.get(k + 1);
         let enough = narrower.is_some_and(|reach| window.as_noisy_within(*reach));
         let WindowFit {
             solution,
@@ -366,6 +409,7 @@ fn fit_window<'a>(
     poles: &[Pole],
     index: usize,
     reach: f64,
+    neighbours: usize,
 ) -> Option<WindowFit<'a>> {
     let start = &starts[index];
     let centre = start.peak.index;
@@ -385,7 +429,7 @@ fn fit_window<'a>(
         if peak.index < lines.start {
             break;
         }
-        if step == NEIGHBOURS {
+        if step == neighbours {
             lines.start = lines.start.max(peak.to.min(centre.saturating_sub(WINDOW_LINES)));
             break;
         }
@@ -397,7 +441,7 @@ fn fit_window<'a>(
         if peak.index >= lines.end {
             break;
         }
-        if step == NEIGHBOURS {
+        if step == neighbours {
             lines.end = lines
                 .end
                 .min(peak.from.max(centre + WINDOW_LINES) + 1)

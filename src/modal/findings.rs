@@ -22,6 +22,10 @@ const FINE_LINES: f64 = 3.0;
 const UNCERTAIN: f64 = 0.02;
 /// What poles anywhere explain scatters by about this without any model error.
 const BY_CHANCE: f64 = 1.5;
+/// A frequency that is uncertain by more than this share of the half-width is none.
+const UNPLACED: f64 = 0.3;
+/// A line whose width is not known is a mode where the residues of its FRFs have a common phase (collinearity) …
+const IN_PHASE: f64 = 0.9;
 /// Two fits of the same lines disagree from this many standard deviations on.
 const APART: f64 = 2.0;
 
@@ -121,7 +125,22 @@ pub(super) fn collect(
                 frequency_std_hz = frequency_std_hz.hypot(apart[0]);
                 damping_std = damping_std.hypot(apart[1]);
             }
-            if damping_std >= pole.damping_ratio && group.doubt.is_none() {
+            let residues: Vec<Complex64> = (0..data.len()).map(|m| solution.constant(m, j).0).collect();
+            let collinear = shape::complexity(&residues).is_none_or(|c| c.mpc > IN_PHASE);
+            let width_hz = (pole.damping_ratio * pole.frequency_hz).max(line_hz);
+            if !collinear && frequency_std_hz > UNPLACED * width_hz.hypot(shift[0]) {
+                result.rejected.push(RejectedMode {
+                    frequency_hz: pole.frequency_hz,
+                    damping_ratio: pole.damping_ratio,
+                    reason: format!(
+                        "the FRFs know its frequency to ±{frequency_std_hz:.2} Hz only, and have no common phase"
+                    ),
+                });
+                continue;
+            }
+            // … in most of them; a disturbance has phases of its own.
+            let in_phase = collinear && 2 * found_in > data.len() && found_in > 2;
+            if damping_std >= pole.damping_ratio && group.doubt.is_none() && !in_phase {
                 result.rejected.push(RejectedMode {
                     frequency_hz: pole.frequency_hz,
                     damping_ratio: pole.damping_ratio,

@@ -45,7 +45,7 @@ mod synthetic;
 pub mod tracking;
 mod verify;
 
-pub use analysis::analyse_frf;
+pub use analysis::{analyse_frf, analyse_frfs};
 pub use from_hits::{Estimator, TapFrfs, TapRecord, TapSettings, frfs_from_hits};
 pub use global::{SetMember, global};
 pub use hits::Hit;
@@ -328,5 +328,33 @@ mod tests {
                 assert!(found.modes.is_empty());
             }
         }
+    }
+
+    /// With less effort on each of many FRFs every mode is found all the same.
+    #[test]
+    fn many_frfs_are_analysed_as_one_is() {
+        let frfs: Vec<(Vec<f64>, Vec<Complex64>)> = (0..41)
+            .map(|seed| {
+                Synthetic::new(3.0, 90.0, 0.1, &MODES)
+                    .with_noise(0.0, 0.02, seed)
+                    .frf()
+            })
+            .collect();
+        let settings = Settings::default();
+        for many in [&frfs[..], &frfs[..3]] {
+            for found in analyse_frfs(many, &settings).unwrap() {
+                assert_eq!(found.modes.len(), 3);
+                for (found, mode) in found.modes.iter().zip(&MODES) {
+                    let best = found.best();
+                    assert!(
+                        (best.damping_ratio - mode.damping_ratio).abs() < 5.0 * best.damping_std.unwrap(),
+                        "{best:?}"
+                    );
+                }
+            }
+        }
+        let mut wrong = frfs;
+        wrong[7].0.swap(2, 3);
+        assert!(analyse_frfs(&wrong, &settings).is_err());
     }
 }

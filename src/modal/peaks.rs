@@ -194,4 +194,14 @@ mod tests {
         assert!(peaks_hz(Synthetic::new(3.0, 20.0, 0.1, &[Mode::new(20.1, 0.02, 1.0)])).is_empty());
         assert!(peaks_hz(Synthetic::new(3.0, 20.0, 0.1, &[Mode::new(2.9, 0.02, 1.0)])).is_empty());
     }
+
+    #[test]
+    fn prominence_is_the_height_over_the_higher_valley() {
+        let height = [1.0, 5.0, 3.0, 9.0, 2.0, 4.0, 0.5, 6.0];
+        assert_eq!(prominence(&height, 3, 0.0), Some(8.0));
+        assert_eq!(prominence(&height, 1, 0.0), Some(2.0));
+        assert_eq!(prominence(&height, 5, 2.0), Some(2.0));
+        assert_eq!(prominence(&height, 5, 2.1), None);
+        assert_eq!(prominence(&height, 3, 8.1), None);
+    }
 }

@@ -10,15 +10,20 @@ use super::local_fit::Pole;
 use super::set_noise;
 
 /// Batches at most.
-const MAX_ROUNDS: usize = 14;
+const MAX_ROUNDS: usize = 30;
 /// The first batches come in whatever they explain: while strong modes are missing nothing can be held against the rest.
 const UNASKED: usize = 3;
+/// A candidate that stayed over so many orders is no accident …
+const LONG_CHAIN: usize = 6;
+/// … and is tried for this part of what others must explain: while close neighbours are missing, poles anywhere explain
+/// much too.
+const FIRM: f64 = 0.4;
 /// A batch holds what explains at least this share of its best …
 const BATCH: f64 = 0.25;
 /// … and is not within so many half-widths of something better.
 const APART_WIDTHS: f64 = 1.5;
 /// FRFs that the choice is made on, at most.
-const ENOUGH_FRFS: usize = 40;
+pub(super) const ENOUGH_FRFS: usize = 40;
 
 /// Evenly spread FRFs, enough to choose on.
 pub(super) fn some(data: &[Data]) -> Vec<Data> {
@@ -26,16 +31,28 @@ pub(super) fn some(data: &[Data]) -> Vec<Data> {
     (0..count).map(|k| data[k * data.len() / count].clone()).collect()
 }
 
+/// A pole that may be one of the structure's.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Start {
+    pub pole: Pole,
+    /// Orders over which it stayed.
+    pub orders: usize,
+}
+
 /// The candidates to begin with, ascending in frequency.
-pub(super) fn choose(data: &[Data], candidates: &[Pole]) -> Vec<Pole> {
+pub(super) fn choose(data: &[Data], candidates: &[Start]) -> Vec<Pole> {
     let mut data = data.to_vec();
-    let mut left = candidates.to_vec();
+    let mut firm: Vec<bool> = candidates.iter().map(|c| c.orders >= LONG_CHAIN).collect();
+    let mut left: Vec<Pole> = candidates.iter().map(|c| c.pole).collect();
     let mut chosen: Vec<Pole> = Vec::new();
     for round in 0..MAX_ROUNDS {
         let even = set_noise::alike(&data);
-        let Some(worth) = joint_fit::worth(&even, &chosen, &left) else {
+        let Some(mut worth) = joint_fit::worth(&even, &chosen, &left) else {
             break;
         };
+        for (worth, _) in worth.iter_mut().zip(&firm).filter(|(_, firm)| **firm) {
+            *worth /= FIRM;
+        }
         let wanted = if round < UNASKED { 0.0 } else { 1.0 };
         let batch = batch(&left, &worth, wanted);
         if batch.is_empty() {
@@ -44,6 +61,7 @@ pub(super) fn choose(data: &[Data], candidates: &[Pole]) -> Vec<Pole> {
         chosen.extend(batch.iter().map(|&k| left[k]));
         for k in batch.into_iter().rev() {
             left.remove(k);
+            firm.remove(k);
         }
         chosen.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
         let Some(groups) = joint_fit::refine(&even, &chosen, Search::Roughly, &mut Vec::new()) else {

@@ -183,3 +183,40 @@ fn left_over(data: &Data, groups: &[Group], m: usize) -> Vec<Departure> {
     }
     lines
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn data(frequency_hz: &[f64], sigma: &[f64]) -> Data {
+        let lines = frequency_hz.len();
+        Data {
+            frequency_hz: frequency_hz.to_vec(),
+            receptance: vec![Complex64::ONE; lines],
+            sigma: sigma.to_vec(),
+            spread_hz: vec![0.0; lines],
+            count: vec![1.0; lines],
+        }
+    }
+
+    #[test]
+    fn noises_made_alike_are_in_proportion_and_as_large_together() {
+        let f = [1.0, 2.0, 3.0];
+        let frfs = [data(&f, &[1.0, 2.0, 4.0]), data(&f, &[30.0, 10.0, 3.0])];
+        let even = alike(&frfs);
+        for k in 0..3 {
+            let ratio = even[1].sigma[k] / even[0].sigma[k];
+            approx::assert_relative_eq!(ratio, even[1].sigma[0] / even[0].sigma[0], max_relative = 1e-12);
+            // What a fit leaves on a line over all FRFs is as large as expected.
+            let left: f64 = (0..2)
+                .map(|m| (frfs[m].sigma[k] / even[m].sigma[k]).powi(2))
+                .sum();
+            approx::assert_relative_eq!(left, 2.0, max_relative = 1e-12);
+        }
+        let other = [
+            data(&f, &[1.0, 2.0, 4.0]),
+            data(&[1.0, 2.0, 3.5], &[3.0, 1.0, 3.0]),
+        ];
+        assert_eq!(alike(&other)[1].sigma, other[1].sigma);
+    }
+}

@@ -28,6 +28,10 @@ const SCATTER_DAMPING: f64 = 0.5;
 const OVER_REST: f64 = 2.0;
 /// Two poles nearer than this share of the sum of their half-widths may be one.
 const CLOSE: f64 = 1.0;
+/// Two poles nearer than this share of that sum are one mode unless both have the phases of one.
+const SAME: f64 = 0.2;
+/// Residues of a common phase: what a mode beside another one keeps.
+const IN_PHASE: f64 = 0.7;
 /// Shapes that repeat.
 const SAME_SHAPE: f64 = 0.9;
 
@@ -220,6 +224,21 @@ fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2]) -> Option<Cl
             ),
         });
     }
+    let out_of_phase = || {
+        residues
+            .iter()
+            .any(|r| shape::complexity(r).is_some_and(|c| c.mpc < IN_PHASE))
+    };
+    let cancel =
+        residues[0].len() >= ENOUGH_FRFS && b.frequency_hz - a.frequency_hz < SAME * width && out_of_phase();
+    if cancel {
+        return Some(ClosePair {
+            strong,
+            weak,
+            merged: None,
+            reason: format!("splits the mode at {beside:.2} Hz: the two nearly cancel each other"),
+        });
+    }
     let repeats = residues[0].len() >= ENOUGH_FRFS && shape::mac(&residues[0], &residues[1]) > SAME_SHAPE;
     repeats.then(|| ClosePair {
         strong,
@@ -298,6 +317,31 @@ pub(super) fn own_poles(data: &[Data], pole: Pole, others: &[Pole]) -> Option<Ve
     found.iter().any(|s| s.is_some()).then_some(found)
 }
 
+/// Mean of what each FRF says (value, standard deviation), and its standard deviation from how they scatter about it. Each
+/// counts by its own uncertainty and by how far all of them lie apart beyond that (random effects: DerSimonian & Laird
+/// 1986): one that hardly shows the mode does not decide.
+fn mean_over_frfs<T>(own: &[T], of: impl Fn(&T) -> (f64, f64)) -> (f64, f64) {
+    let values: Vec<(f64, f64)> = own.iter().map(of).collect();
+    let median =
+        |of: &dyn Fn(&(f64, f64)) -> f64| crate::signal::median(&values.iter().map(of).collect::<Vec<f64>>());
+    let middle = median(&|v| v.0);
+    let spread = 1.4826 * median(&|v| (v.0 - middle).abs());
+    let between = (spread.powi(2) - median(&|v| v.1).powi(2)).max(0.0);
+    let (mut total, mut mean) = (0.0, 0.0);
+    for (value, std) in &values {
+        let weight = 1.0 / (std * std + between);
+        total += weight;
+        mean += weight * value;
+    }
+    mean /= total;
+    let count = values.len() as f64;
+    let scatter: f64 = values
+        .iter()
+        .map(|(value, std)| ((value - mean) / (std * std + between)).powi(2))
+        .sum();
+    (mean, (scatter * count / (count - 1.0)).sqrt() / total)
+}
+
 /// How far a mode moves from FRF to FRF.
 pub(super) struct Moves {
     /// Relative standard deviation of the frequency beyond its uncertainty in each FRF.
@@ -370,14 +414,8 @@ pub(super) fn moves(
     let spread = 1.4826 * median(&|o| (o.0.frequency_hz - middle).abs());
     let uncertain = median(&|o| o.1[0]);
     let scatter = (spread * spread - uncertain * uncertain).max(0.0).sqrt() / middle;
-    let count = own.len() as f64;
-    let mean = |of: &dyn Fn(&Pole) -> f64| {
-        let mean = own.iter().map(|o| of(&o.0)).sum::<f64>() / count;
-        let variance = own.iter().map(|o| (of(&o.0) - mean).powi(2)).sum::<f64>() / (count - 1.0);
-        (mean, (variance / count).sqrt())
-    };
-    let (frequency_hz, frequency_std_hz) = mean(&|p| p.frequency_hz);
-    let (damping_ratio, damping_std) = mean(&|p| p.damping_ratio);
+    let (frequency_hz, frequency_std_hz) = mean_over_frfs(&own, |o| (o.0.frequency_hz, o.1[0]));
+    let (damping_ratio, damping_std) = mean_over_frfs(&own, |o| (o.0.damping_ratio, o.1[1]));
     Some(Moves {
         scatter,
         significant: spread > BEYOND * uncertain && scatter > OF_WIDTH * pole.damping_ratio,
@@ -387,4 +425,20 @@ pub(super) fn moves(
         },
         std: [frequency_std_hz, damping_std],
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_frf_that_hardly_shows_a_mode_does_not_decide_its_mean() {
+        // Alike: the plain mean and its standard error.
+        let (mean, std) = mean_over_frfs(&[(1.0, 0.1), (2.0, 0.1), (3.0, 0.1), (4.0, 0.1)], |v| *v);
+        approx::assert_relative_eq!(mean, 2.5, max_relative = 1e-12);
+        approx::assert_relative_eq!(std, (5.0f64 / 12.0).sqrt(), max_relative = 1e-12);
+        // One that knows nothing is far off: with all others at the same place they decide.
+        let (mean, std) = mean_over_frfs(&[(1.0, 0.01), (1.0, 0.01), (1.0, 0.01), (9.0, 10.0)], |v| *v);
+        assert!((mean - 1.0).abs() < 1e-4 && std < 1e-4, "{mean} {std}");
+    }
 }

@@ -15,7 +15,7 @@ use super::noise_law::{self, Departure, FrfNoise};
 /// Lines from one window to the next: at least, and at most (each window speaks for the lines up to the next).
 const STEP: [usize; 2] = [2, 6];
 /// So many windows are enough for a law of two numbers.
-const ENOUGH_WINDOWS: usize = 1000;
+const ENOUGH_WINDOWS: usize = 600;
 /// Share of a line that the fit may take for the curve without it still to be worth something.
 const MOST_TAKEN: f64 = 0.7;
 /// Degrees of freedom that a line must have left to say something about the noise.

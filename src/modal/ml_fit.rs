@@ -526,7 +526,7 @@ struct Linearised {
 /// The linear parameters, by FRF.
 enum Linear {
     Own(Vec<SolvedFrf>),
-    Alike(alike::Solved),
+    Alike(Box<alike::Solved>),
 }
 
 /// Solves for the linear parameters of every FRF and builds the normal equations of the poles.
@@ -539,7 +539,7 @@ fn linearise(prepared: &Prepared, poles: &[Pole], fixed: &[Pole]) -> Option<Line
             normal: found.normal,
             gradient: found.scores.iter().sum(),
             scores: found.scores,
-            frfs: Linear::Alike(found.solved),
+            frfs: Linear::Alike(Box::new(found.solved)),
             axes,
         });
     }

@@ -5,6 +5,7 @@ use num_complex::Complex64;
 use super::structure::study_of;
 use crate::Result;
 use crate::campaign::Campaign;
+use crate::discrepancy::localise::{Localisation, localise};
 use crate::discrepancy::setup::{Rival, SetupCheck, examine, examine_cutting};
 use crate::discrepancy::{
     Candidate, CuttingComparison, Diagnosis, Explained, FrfComparison, NextMeasurement, Verdict, diagnose,
@@ -29,6 +30,9 @@ pub struct DiagnosisFindings {
     pub setup: SetupCheck,
     /// The effect that is missing; where none explains the rest, the leading candidate. `None` where nothing is missing.
     pub leading: Option<Leading>,
+    /// Where what the library has no name for sits, and what it does: sought where the verdict is unknown, and kept where one
+    /// place explains more than chance.
+    pub lead: Option<Localisation>,
 }
 
 /// What one candidate makes of the residual.
@@ -49,6 +53,13 @@ impl DiagnosisFindings {
             rival(&diagnosis, |_| true)
         })?;
         heed_setup(&mut diagnosis, &setup);
+        let unnamed = diagnosis.verdict == Verdict::Unknown
+            && setup.likely().is_none()
+            && diagnosis.too_little_data.is_none();
+        let lead = match unnamed {
+            true => Some(localise(&study, &case.model)?).filter(|found| found.significant),
+            false => None,
+        };
         let next_measurement = next_measurement::advise(&case.data, &campaign.postures, &diagnosis)?;
         let (data, points) = (&case.data, &case.model.points);
         let predicted = case.model.predict(&diagnosis.baseline.theta, data)?;
@@ -68,6 +79,7 @@ impl DiagnosisFindings {
             now: FrfComparison::new(data, points, &predicted),
             residual_peaks: residual_peaks(&predicted, data),
             setup,
+            lead,
             next_measurement,
             predicted,
             leading,

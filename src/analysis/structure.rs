@@ -7,7 +7,7 @@ use super::mode_comparison::measured_modes;
 use crate::Result;
 use crate::campaign::Campaign;
 use crate::discrepancy::FrfComparison;
-use crate::discrepancy::setup::{SetupCheck, examine, library_rival};
+use crate::discrepancy::setup::{SetupCheck, absorb_slips, examine, library_rival};
 use crate::identify::calibrate::calibrate;
 use crate::identify::modal_start::{ModalStart, PostureMeasurement, modal_start};
 use crate::identify::{Calibration, Options, StructureCase, StructureStudy};
@@ -93,7 +93,8 @@ pub fn study_of(case: &StructureCase, options: Options) -> StructureStudy {
     };
     // Modes that lead nowhere are no reason to give up.
     let start = modal.and_then(|modal| start_of_modes(case, &modal).ok().flatten());
-    case.study(options).with_measured(start.map(|s| s.theta))
+    let study = case.study(options).with_measured(start.map(|s| s.theta));
+    study.with_slips(absorb_slips)
 }
 
 /// Where the modes measured at the campaign's postures put the model.

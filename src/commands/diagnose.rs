@@ -1,5 +1,6 @@
 use serde_json::{Map, Value, json};
 
+use super::localise;
 use super::next_step::Guide;
 use super::text::{Emphasis, number, percent, setup_lines, table, warnings, wrapped};
 use super::{Outcome, SideArgs, by_domain};
@@ -8,8 +9,10 @@ use crate::analysis::{CuttingFindings, DiagnosisFindings};
 use crate::campaign::Campaign;
 use crate::discrepancy::diagnose::Baseline;
 use crate::discrepancy::explained::{Explained, NamedPart};
+use crate::discrepancy::localise::Localisation;
 use crate::discrepancy::{Candidate, Diagnosis, NextMeasurement, Verdict};
 use crate::identify::Options;
+use crate::identify::rest::Rest;
 
 pub fn run(args: SideArgs) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
@@ -114,6 +117,7 @@ pub fn structure(campaign: &Campaign, findings: &DiagnosisFindings) -> Outcome {
         "baseline": baseline(&diagnosis.baseline, case.data.noise_floor_nrms()),
         "not_tried": diagnosis.not_tried.iter().map(|(e, why)| json!({ "effect": e, "why": why })).collect::<Vec<_>>(),
         "setup": findings.setup.findings,
+        "lead": findings.lead.as_ref().map(lead),
         "warnings": case.warnings,
     });
     let text = setup_lines(&findings.setup.findings)
@@ -192,6 +196,9 @@ fn left_over<M, I>(d: &Diagnosis<M, I>) -> Value {
         "significant": rest.is_significant(),
         "share": largest.map(|t| t.excess / (t.excess + gain.max(0.0))),
         "looks_like": largest.map(|t| t.looks_like),
+        "small_errors_share": rest.share_of_slips(),
+        "small_errors": rest.small_errors,
+        "beyond_small_errors": rest.beyond_slips,
         "tests": rest.tests,
     })
 }
@@ -248,7 +255,21 @@ fn describe(findings: &DiagnosisFindings) -> String {
         };
         text += &wrapped(&leading.explained.sentence(&who), "  ");
     }
+    if let Some(found) = &findings.lead {
+        text += &wrapped(
+            &format!(
+                "A lead: {}. `lobestone localise` draws it.",
+                localise::in_words(found)
+            ),
+            "  ",
+        );
+    }
     text + &rest(d, next_measurement)
+}
+
+/// The best place of what the data draw.
+fn lead(found: &Localisation) -> Value {
+    found.places.first().map_or(Value::Null, localise::place)
 }
 
 fn as_it_stands(baseline: &Baseline, noise_floor_nrms: f64) -> String {
@@ -269,17 +290,34 @@ fn answer<M, I>(
     match (d.verdict, d.winner()) {
         (Verdict::Effect, Some(winner)) => {
             let (explanation, fingerprint) = plainly(winner);
+            let excuse = winner.rest.as_ref().and_then(Rest::excuse_in_words);
+            let left = excuse.map_or(String::new(), |left| {
+                let share = 100.0 * winner.share_above_noise(&d.baseline);
+                wrapped(
+                    &format!(
+                        "It explains {share:.0} % of what stands above the noise; what it leaves is {left}."
+                    ),
+                    "  ",
+                )
+            });
             format!(
-                "{} ({sure})\n{}{}",
+                "{} ({sure})\n{}{}{left}",
                 Emphasis::Strong.on(format!("MISSING: {}", winner.label())),
                 wrapped(explanation, "  "),
                 wrapped(&format!("How it shows: {fingerprint}"), "  "),
             )
         }
-        (Verdict::None, _) => format!(
-            "{} is missing: what is left looks like noise ({sure})\n",
-            Emphasis::Good.on("NOTHING")
-        ),
+        (Verdict::None, _) => match d.baseline.rest.excuse_in_words() {
+            Some(left) => format!(
+                "{} that the library knows is larger than the small errors of the setup ({sure})\n{}",
+                Emphasis::Good.on("NOTHING"),
+                wrapped(&format!("What stands above the noise is {left}."), "  ")
+            ),
+            None => format!(
+                "{} is missing: what is left looks like noise ({sure})\n",
+                Emphasis::Good.on("NOTHING")
+            ),
+        },
         _ if d.too_little_data.is_some() => format!(
             "{}: {}\n",
             Emphasis::Bad.on("NO VERDICT"),

@@ -103,7 +103,8 @@ fn unit(place: &LocalisedPlace) -> &'static str {
     if place.spot.is_angle() { "N·m/rad" } else { "N/m" }
 }
 
-fn place(p: &LocalisedPlace) -> Value {
+/// One place for the document.
+pub fn place(p: &LocalisedPlace) -> Value {
     let (mut parameters, mut errors) = (Map::new(), Map::new());
     for estimate in p.best.iter().flat_map(|b| &b.parameters) {
         let key = estimate.name.rsplit('.').next().unwrap_or(&estimate.name);
@@ -190,6 +191,23 @@ fn values(best: &BestForm) -> String {
         format!("{key} {} ± {}", number(e.value, 4), number(e.std_error, 2))
     };
     best.parameters.iter().map(one).collect::<Vec<_>>().join(", ")
+}
+
+/// What the data draw, as a sentence without its end.
+pub fn in_words(found: &Localisation) -> String {
+    let best = found.places.first().and_then(|p| Some((p, p.best.as_ref()?)));
+    best.map_or_else(
+        || "no place explains more than chance".into(),
+        |(p, best)| {
+            let before = found.baseline.reduced_chi2;
+            format!(
+                "the data draw {} {}, which leaves {:.2} times the noise variance of {before:.2}",
+                form_in_words(best),
+                p.spot.words(),
+                p.left
+            )
+        },
+    )
 }
 
 fn form_in_words(best: &BestForm) -> String {

@@ -349,10 +349,11 @@ impl<'a, S: Study> Engine<'a, S> {
             .collect();
         self.test_rests(&mut candidates, &credible)?;
         let winner = credible.iter().position(|c| *c);
+        self.excuse(&mut baseline, winner.map(|w| &mut candidates[w]))?;
         let mut pairs = None;
         let pair = match winner {
             Some(w)
-                if verdict::leaves_structure(&candidates[w])
+                if verdict::leaves_room(&candidates[w], &baseline)
                     && candidates[w].share_above_noise(&baseline) > PAIR_SHARE =>
             {
                 let (best, counts) = self.best_pair(&candidates, &credible, &evidence)?;
@@ -401,6 +402,23 @@ impl<'a, S: Study> Engine<'a, S> {
             c.rest = Some(self.study.rest(&c.model, &c.theta)?);
             Ok(())
         })
+    }
+
+    /// What small errors of the setup can take of the rest: the winner's, and the model's as it stands.
+    fn excuse(&self, baseline: &mut Baseline, winner: Option<&mut CandidateOf<S>>) -> Result<()> {
+        let beyond = |rest: &Rest, model: &S::Model, theta: &[f64]| match rest.is_significant() {
+            true => self.study.beyond_slips(model, theta),
+            false => Ok(None),
+        };
+        if let Some(c) = winner {
+            let Some(rest) = &mut c.rest else { return Ok(()) };
+            rest.beyond_slips = beyond(rest, &c.model, &c.theta)?;
+            if rest.beyond_slips.is_none() {
+                return Ok(());
+            }
+        }
+        baseline.rest.beyond_slips = beyond(&baseline.rest, self.model, &baseline.theta)?;
+        Ok(())
     }
 
     /// Faint effects change held-out errors by less than the scatter that refits on the coarse view bring along: there the
@@ -616,12 +634,16 @@ impl<'a, S: Study> Engine<'a, S> {
                         Some(other) if other < first && credible[other] => (other, leader.label()),
                         _ => (first, label),
                     };
+                    let mut rest = study.rest(&pair.model, &pair.fit.theta)?;
+                    if rest.is_significant() {
+                        rest.beyond_slips = study.beyond_slips(&pair.model, &pair.fit.theta)?;
+                    }
                     best = Some(verdict::Pair {
                         stronger,
                         other,
                         gain: evidence.base_chi2 - 2.0 * pair.fit.cost,
                         reduced_chi2,
-                        rest: study.rest(&pair.model, &pair.fit.theta)?,
+                        rest,
                     });
                 }
             }

@@ -10,7 +10,9 @@ use std::f64::consts::TAU;
 use crate::identify::rest::{Rest, RestTest};
 
 /// Probability that the errors of the setup are large enough to be seen.
-const VISIBLE_ERRORS: f64 = 0.1;
+const VISIBLE_ERRORS: f64 = 0.15;
+/// Standard deviation of ln of what small errors leave, from laboratory to laboratory.
+const CARE: f64 = 1.0;
 /// Prior odds of an effect of the library against something else.
 const LIBRARY_ODDS: f64 = 2.0;
 /// A pair of effects is one of many that were tried, and two effects at once are rarer than one.
@@ -34,7 +36,9 @@ fn log_bayes_factor(gain: f64, rest: &Rest) -> f64 {
         return 0.0;
     }
     if let Some(largest) = rest.largest() {
-        return of_test(gain, largest, rest.small_errors, rest_of_a_stand_in);
+        let plain = of_test(gain, largest, rest.small_errors, rest_of_a_stand_in);
+        let excused = excused(gain, largest, rest).unwrap_or(f64::NEG_INFINITY);
+        return log_sum(&[plain, excused]);
     }
     let factors = rest
         .tests
@@ -42,6 +46,39 @@ fn log_bayes_factor(gain: f64, rest: &Rest) -> f64 {
         .map(|t| of_test(gain, t, rest.small_errors, part_of_a_rest));
     let (low, high) = factors.fold((0.0f64, 0.0f64), |(low, high), f| (low.min(f), high.max(f)));
     low + high
+}
+
+/// ln of the Bayes factor of "the effect is there and the small errors of the setup have their usual sizes" against "it
+/// stands in for something else". Errors of usual sizes leave about their usual energy, and next to nothing after they were
+/// fitted; of what something else leaves they may take any share.
+fn excused(gain: f64, largest: &RestTest, rest: &Rest) -> Option<f64> {
+    let there = VISIBLE_ERRORS.ln() + of_usual_errors(largest, rest)?;
+    let stand_in = (rest_of_a_stand_in(largest.excess / gain) / gain).ln() - largest.excess.ln();
+    Some(there - stand_in)
+}
+
+/// ln of the density of a rest, and of what slips leave of it, if the small errors of the setup have their usual sizes.
+fn of_usual_errors(largest: &RestTest, rest: &Rest) -> Option<f64> {
+    let beyond = rest.beyond_slips.as_ref()?;
+    let after = beyond.tests.iter().find(|t| t.looks_like == largest.looks_like)?;
+    let exponential: fn(f64) -> f64 = |u| (-u).exp();
+    // Laboratories differ in care by a factor (log-normal); half of the mean is the median of few squares.
+    let care = (largest.excess / (0.5 * beyond.usual)).ln();
+    let found = log_normal(care, CARE) - largest.excess.ln();
+    Some(found + log_density(after.excess.max(0.0), after.std, rest.small_errors, exponential))
+}
+
+/// Odds that something the library does not have is behind what a model leaves, against the small errors of the setup.
+/// Foreign physics may be of any size.
+pub fn odds_against_slips(rest: &Rest) -> f64 {
+    /// ln of the largest size of foreign physics over the smallest that would be seen.
+    const SIZES: f64 = 10.0;
+    let Some(largest) = rest.largest() else { return 0.0 };
+    let Some(slips) = of_usual_errors(largest, rest) else {
+        return f64::INFINITY;
+    };
+    let foreign = -(SIZES * largest.excess).ln() - largest.excess.ln();
+    (foreign - slips - VISIBLE_ERRORS.ln()).exp() / LIBRARY_ODDS
 }
 
 /// `stand_in`: density of rest / gain if the effect stands in for something else.
@@ -121,6 +158,7 @@ mod tests {
         Rest {
             tests: vec![RestTest::new("structure", 1000.0 + excess, 1000.0, std, 1000.0).unwrap()],
             small_errors: 500.0,
+            beyond_slips: None,
         }
     }
 

@@ -143,6 +143,14 @@ pub fn leaves_structure<M, I>(c: &Candidate<M, I>) -> bool {
     }
 }
 
+/// Odds of something else below which nothing is sought beside an effect: what it leaves is what every setup leaves.
+const SETTLED: f64 = 0.1;
+
+/// Whether a candidate leaves room for a second effect beside it.
+pub fn leaves_room<M, I>(c: &Candidate<M, I>, baseline: &Baseline) -> bool {
+    leaves_structure(c) && odds_against(c, baseline) > SETTLED
+}
+
 /// `pair`: the best pair of effects, where one was sought.
 pub fn decide<M, I>(
     candidates: &[Candidate<M, I>],
@@ -159,7 +167,9 @@ pub fn decide<M, I>(
         confidence: 0.0,
         indistinguishable: Vec::new(),
     };
-    let Some(w) = credible.iter().position(|c| *c) else {
+    let first = credible.iter().position(|c| *c);
+    let excused = first.map_or(1.0, |w| weight_of_slips_alone(&candidates[w], baseline));
+    let Some(w) = first.filter(|_| excused < 0.5) else {
         decide_without_candidate(&mut decision, candidates, baseline);
         return decision;
     };
@@ -185,7 +195,7 @@ pub fn decide<M, I>(
     if odds_else < 1.0 {
         decision.verdict = Verdict::Effect;
         decision.effect = Some(named);
-        decision.confidence = 1.0 / (1.0 + rivals + beaten + odds_else);
+        decision.confidence = 1.0 / (1.0 + rivals + beaten + excused + odds_else);
         let close =
             |c: &Candidate<M, I>| (c.delta_bic - reference).abs() * scale.max(1.0) < INDISTINGUISHABLE;
         decision.indistinguishable = candidates
@@ -216,6 +226,29 @@ fn odds_against<M, I>(c: &Candidate<M, I>, baseline: &Baseline) -> f64 {
     }
 }
 
+/// Share of what small errors of the setup are said to take that their laws may be wrong by.
+const SLIPS_KNOWN_TO: f64 = 0.01;
+
+/// Weight of the small errors of the setup alone against the same with a candidate: 1 where they need it not. Zero where such
+/// errors are not in question.
+fn weight_of_slips_alone<M, I>(c: &Candidate<M, I>, baseline: &Baseline) -> f64 {
+    let beyond = |rest: &Rest, looks_like: &str| {
+        let tests = &rest.beyond_slips.as_ref()?.tests;
+        tests
+            .iter()
+            .find(|t| t.looks_like == looks_like)
+            .map(|t| t.excess)
+    };
+    let compared = || {
+        let (largest, rest) = (baseline.rest.largest()?, c.rest.as_ref()?);
+        let more = beyond(&baseline.rest, largest.looks_like)? - beyond(rest, largest.looks_like)?;
+        Some(more - SLIPS_KNOWN_TO * largest.excess)
+    };
+    compared().map_or(0.0, |gain| {
+        evidence_weight(gain - gain_by_chance(c.parameters.len())).min(1.0)
+    })
+}
+
 /// No candidate is credible: nothing is missing, or something else.
 fn decide_without_candidate<M, I>(
     decision: &mut Decision,
@@ -229,10 +262,16 @@ fn decide_without_candidate<M, I>(
         decision.verdict = Verdict::None;
         let calm = |p: f64| p / (p + 0.01);
         decision.confidence = (0.92 * calm(best).max(0.7) * calm(least * 4.0).max(0.6)).clamp(0.3, MOST_SURE);
+        return;
+    }
+    let foreign = something_else::odds_against_slips(&baseline.rest);
+    if foreign < 1.0 {
+        decision.verdict = Verdict::None;
+        decision.confidence = MOST_SURE / (1.0 + foreign);
     } else {
         decision.verdict = Verdict::Unknown;
         decision.best_guess = (!candidates.is_empty()).then_some(0);
-        decision.confidence = 0.97;
+        decision.confidence = 0.97 / (1.0 + 1.0 / foreign);
     }
 }
 

@@ -167,7 +167,8 @@ impl Study for CuttingStudy {
         });
         Ok(Rest {
             tests: tests.collect(),
-            small_errors: SMALL_ERROR.powi(2) * signal_over_noise(data),
+            small_errors: small_errors(data),
+            beyond_slips: None,
         })
     }
 
@@ -235,15 +236,16 @@ const LIKE_CUTS: &str = "parameters that differ from cut to cut";
 const COMMON_WAVE: &str = "a waveform that all cuts have in common";
 const ALL_OVER: &str = "more than the noise all over";
 /// Relative standard deviation of the noise variance as revolutions against one another show it.
-const NOISE_KNOWN_TO: f64 = 0.02;
+pub const NOISE_KNOWN_TO: f64 = 0.02;
 
-/// Σ F²/σ² of the recorded orders.
-fn signal_over_noise(data: &CuttingData) -> f64 {
+/// Σ r²/σ² over real values that errors of [`SMALL_ERROR`] of every recorded order leave.
+pub fn small_errors(data: &CuttingData) -> f64 {
     let channels = data.cuts.iter().flat_map(|cut| cut.channels.iter().flatten());
     channels
         .flat_map(|channel| channel.orders.iter().zip(&channel.order_std))
         .map(|(order, std)| 2.0 * order.norm_sqr() / (std * std))
-        .sum()
+        .sum::<f64>()
+        * SMALL_ERROR.powi(2)
 }
 
 /// Energy of the residual waveform that the cuts have in common, each turned to the same angle of the tool, and the number

@@ -44,6 +44,30 @@ pub struct Rest {
     pub tests: Vec<RestTest>,
     /// Σ r²/σ² that errors of a setup as small as [`SMALL_ERROR`] of the signal leave.
     pub small_errors: f64,
+    /// `None` where that was not tried.
+    pub beyond_slips: Option<BeyondSlips>,
+}
+
+/// What the small errors of a careful setup cannot take of a rest.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BeyondSlips {
+    /// The same tests; what the errors pay for their sizes is part of the excess.
+    pub tests: Vec<RestTest>,
+    /// Σ r²/σ² that such errors leave where they have their usual sizes.
+    pub usual: f64,
+}
+
+/// What small errors of the setup leave of a rest.
+#[derive(Debug, Clone)]
+pub struct AfterSlips {
+    /// As [`RestCurve::rest`], curve by curve.
+    pub rest: Vec<Vec<Complex64>>,
+    /// What they pay for their sizes: Σ (size / usual size)².
+    pub price: f64,
+    /// Σ r²/σ² that the errors leave where they have their usual sizes.
+    pub usual: f64,
+    /// What so many unknowns pay for being fitted, as χ².
+    pub occam: f64,
 }
 
 /// Share of the signal that a good setup is still wrong by (gain, direction of the hit, angles of the joints).
@@ -59,8 +83,33 @@ impl Rest {
 
     /// The test that finds most, of those that find more than chance.
     pub fn largest(&self) -> Option<&RestTest> {
-        let found = self.tests.iter().filter(|t| t.is_significant());
-        found.max_by(|a, b| a.excess.total_cmp(&b.excess))
+        largest(&self.tests)
+    }
+
+    /// What an excess is as a share of the signal.
+    pub fn share_of_signal(&self, excess: f64) -> f64 {
+        SMALL_ERROR * (excess.max(0.0) / self.small_errors.max(f64::MIN_POSITIVE)).sqrt()
+    }
+
+    /// What is left in words, where the small errors of a setup explain nearly all of it.
+    pub fn excuse_in_words(&self) -> Option<String> {
+        const NEARLY: f64 = 0.9;
+        let largest = self.largest()?;
+        let share = self.share_of_slips().filter(|share| *share > NEARLY)?;
+        Some(format!(
+            "{:.1} % of the signal, {:.0} % of it as small errors of every setup leave it (angles of joints, sensors and hits, gain \
+             of the hammer, stiffness from posture to posture)",
+            100.0 * self.share_of_signal(largest.excess),
+            100.0 * share,
+        ))
+    }
+
+    /// Share of what tests of structure find that small errors of the setup explain; `None` where that was not tried.
+    pub fn share_of_slips(&self) -> Option<f64> {
+        let before = self.largest()?;
+        let same = |t: &&RestTest| t.looks_like == before.looks_like;
+        let after = self.beyond_slips.as_ref()?.tests.iter().find(same)?;
+        Some((1.0 - after.excess / before.excess).clamp(0.0, 1.0))
     }
 
     /// How much larger than those of white noise of the known level the squares of estimates are: noise that neighbouring
@@ -69,6 +118,12 @@ impl Rest {
         let folds = self.tests.iter().filter(|t| t.looks_like == LIKE_FOLDS);
         folds.map(|t| t.noise_factor).fold(1.0, f64::max)
     }
+}
+
+/// The test that finds most, of those that find more than chance.
+pub fn largest(tests: &[RestTest]) -> Option<&RestTest> {
+    let found = tests.iter().filter(|t| t.is_significant());
+    found.max_by(|a, b| a.excess.total_cmp(&b.excess))
 }
 
 /// What one kind of patterns finds in a rest.
@@ -188,6 +243,19 @@ fn turn(sixteenths: usize, line: usize) -> Complex64 {
 /// Turns of [`Energies`].
 fn turns() -> impl Iterator<Item = usize> {
     std::iter::once(0).chain(LATE)
+}
+
+/// The tests on what small errors of the setup leave of `curves`: their price is part of what is left.
+pub fn test_beyond(curves: &mut [RestCurve], after: AfterSlips) -> BeyondSlips {
+    for (curve, rest) in curves.iter_mut().zip(after.rest) {
+        curve.rest = rest;
+    }
+    let mut tests = test(curves);
+    tests.iter_mut().for_each(|t| t.excess += after.price);
+    BeyondSlips {
+        tests,
+        usual: after.usual,
+    }
 }
 
 /// Tests the rest that a model leaves of `curves`. Empty where there are too few lines to tell.
@@ -582,7 +650,7 @@ mod tests {
         }
         let rest = Rest {
             tests: test(&alike),
-            small_errors: 0.0,
+            ..Rest::default()
         };
         // Nine directions at five turns tell it to a quarter.
         let share = rest.noise_factor() / OUTPUTS as f64;

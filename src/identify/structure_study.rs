@@ -5,13 +5,16 @@ use num_complex::Complex64;
 use super::calibrate::{Calibration, Estimate, GLANCE_VALUES, Options, calibrate, sketch};
 use super::frf_data::FrfData;
 use super::levenberg_marquardt::Stopping;
-use super::rest::{self, Rest, SMALL_ERROR};
+use super::rest::{self, AfterSlips, BeyondSlips, Rest, RestCurve, SMALL_ERROR};
 use super::structure::{FrfProblem, Misfit, StructureModel};
 use super::study::{EffectName, Extent, HeldOut, Measure, Residual, Study, View, held_out};
 use crate::Result;
 use crate::campaign::robot_spec::RobotSpec;
 use crate::effects::{self, DataSummary, Instance};
 use crate::parameter::Parameter;
+
+/// Takes what small errors of the setup can out of the rest of a model at its optimum on data.
+pub type AbsorbSlips = fn(&StructureModel, &FrfData, &[f64], &[RestCurve]) -> Result<AfterSlips>;
 
 /// A campaign's FRFs, arranged for the loop.
 #[derive(Debug, Clone)]
@@ -20,6 +23,7 @@ pub struct StructureStudy {
     pub options: Options,
     /// Where the measured modes put the model, solver's scale: a starting point of its calibration.
     measured: Option<Vec<f64>>,
+    slips: Option<AbsorbSlips>,
     coarse: FrfData,
     glance: FrfData,
     /// Postures that are left out in turn, and the data without each.
@@ -63,6 +67,7 @@ impl StructureStudy {
             data,
             options,
             measured: None,
+            slips: None,
         }
     }
 
@@ -70,6 +75,14 @@ impl StructureStudy {
     pub fn with_measured(self, start: Option<Vec<f64>>) -> Self {
         StructureStudy {
             measured: start,
+            ..self
+        }
+    }
+
+    /// The same study, which knows what small errors of the setup do.
+    pub fn with_slips(self, absorb: AbsorbSlips) -> Self {
+        StructureStudy {
+            slips: Some(absorb),
             ..self
         }
     }
@@ -226,16 +239,18 @@ impl Study for StructureStudy {
     }
 
     fn rest(&self, model: &StructureModel, theta: &[f64]) -> Result<Rest> {
-        let signal_over_noise: f64 = self
-            .data
-            .frfs()
-            .flat_map(|(_, frf)| frf.receptance.iter().zip(&frf.noise_std))
-            .map(|(h, std)| h.norm_sqr() / (std * std))
-            .sum();
         Ok(Rest {
             tests: rest::test(&model.rest(theta, &self.data)?),
-            small_errors: 2.0 * SMALL_ERROR.powi(2) * signal_over_noise,
+            small_errors: small_errors(&self.data),
+            beyond_slips: None,
         })
+    }
+
+    fn beyond_slips(&self, model: &StructureModel, theta: &[f64]) -> Result<Option<BeyondSlips>> {
+        let Some(absorb) = self.slips else { return Ok(None) };
+        let mut curves = model.rest(theta, &self.data)?;
+        let after = absorb(model, &self.data, theta, &curves)?;
+        Ok(Some(rest::test_beyond(&mut curves, after)))
     }
 
     fn impossible(&self, model: &StructureModel, instance: &Instance, own: &[Estimate]) -> Option<String> {
@@ -248,6 +263,14 @@ impl Study for StructureStudy {
     fn calibrate(&self, model: &StructureModel) -> Result<Calibration> {
         calibrate(model, &self.data, self.measured.as_deref(), self.options)
     }
+}
+
+/// Σ r²/σ² over real values that errors of [`SMALL_ERROR`] of every FRF leave.
+pub fn small_errors(data: &FrfData) -> f64 {
+    let values = data
+        .frfs()
+        .flat_map(|(_, frf)| frf.receptance.iter().zip(&frf.noise_std));
+    2.0 * SMALL_ERROR.powi(2) * values.map(|(h, std)| h.norm_sqr() / (std * std)).sum::<f64>()
 }
 
 /// Error on postures left out one at a time, refitted from `theta` on all lines of the others. `None` with fewer than two

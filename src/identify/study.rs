@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::calibrate::{Calibration, Estimate, scattered_starts};
 use super::levenberg_marquardt::{Fit, LeastSquares, Stopping, minimise, one_step};
-use super::rest::Rest;
+use super::rest::{BeyondSlips, Rest};
 use crate::parameter::Parameter;
 use crate::{Error, Result};
 
@@ -139,6 +139,12 @@ pub trait Study: Sync {
     /// What tests of structure find in what the model leaves; no tests where there is too little data.
     fn rest(&self, _model: &Self::Model, _theta: &[f64]) -> Result<Rest> {
         Ok(Rest::default())
+    }
+
+    /// What tests of structure find in what small errors of the setup cannot take of that; `None` where nothing is known of
+    /// such errors.
+    fn beyond_slips(&self, _model: &Self::Model, _theta: &[f64]) -> Result<Option<BeyondSlips>> {
+        Ok(None)
     }
 
     /// Why the effect cannot be that large or that small, from the estimates of its own parameters; `None` if it can.

@@ -9,13 +9,13 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::decide::{Tried, decide};
+use super::decide::{Noise, Rivals, Tried, decide};
 use super::examine::{Rival, SetupCheck};
 use super::finding::{SetupFinding, with_error};
 use super::readings::Turn;
 use crate::Result;
 use crate::campaign::Process;
-use crate::identify::cutting_study::calibrate_cutting;
+use crate::identify::cutting_study::{NOISE_KNOWN_TO, calibrate_cutting, small_errors};
 use crate::identify::{Calibration, CuttingData, CuttingModel};
 
 /// Cuts that readings of the axes are tried on.
@@ -56,28 +56,36 @@ pub fn examine_cutting(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>
     }
     let changes: Vec<Change> = [
         Change::GainOfY,
-        Change::SpeedWander,
+        Change::SpeedWander {
+            steady_in_time: false,
+        },
+        Change::SpeedWander { steady_in_time: true },
         Change::LowPass { order: 1 },
         Change::LowPass { order: 2 },
     ]
     .into();
     let values = data.value_count();
+    let rivals = || Rivals {
+        library: rival(),
+        small_errors: None,
+    };
+    let noise = Noise {
+        values,
+        known_to: NOISE_KNOWN_TO,
+        small_errors: small_errors(data),
+    };
     let chi2 = base.reduced_chi2 * values as f64;
     let tried: Vec<Tried> = changes
         .par_iter()
         .filter_map(|change| change.tried(data, chi2))
         .collect();
-    if let Some(decision) = decide(&tried, chi2, values, rival) {
+    if let Some(decision) = decide(&tried, chi2, noise, rivals) {
         check.reduced_chi2 = decision.reduced_chi2;
         check.explained_share = decision.explained_share;
-        let told = decision.findings.into_iter().filter(|f| f.kind != SPEED_WANDER);
-        check.findings.extend(told);
+        check.findings.extend(decision.findings);
     }
     Ok(check)
 }
-
-/// What looks like a low-pass and is none: no mistake of the setup, but a rival.
-const SPEED_WANDER: &str = "speed-wander";
 
 /// A fit of one reading.
 struct Trial {
@@ -249,8 +257,9 @@ enum Change {
     /// Logarithm of the gain of Fy against Fx. One of the two cannot be told from the other, for all coefficients scale with
     /// both; nor can the gain of Fz, with which the axial coefficients scale.
     GainOfY,
-    /// Standard deviation of the tool's angle, rad, about its mean turning while lines are averaged: high orders smear.
-    SpeedWander,
+    /// Standard deviation of the tool's angle, rad, about its mean turning while lines are averaged: high orders smear. Where
+    /// the drive swings at a frequency of its own the same turning error is the steadier one `in_time`, s.
+    SpeedWander { steady_in_time: bool },
     /// Time constant of the amplifiers, s.
     LowPass { order: u8 },
 }
@@ -269,12 +278,16 @@ impl Change {
                     *entry *= value.exp();
                 }
             }
-            Change::SpeedWander => {
+            Change::SpeedWander { steady_in_time } => {
                 for cut in &mut own.cuts {
+                    let angle = match steady_in_time {
+                        true => value * std::f64::consts::TAU * cut.spindle_hz(),
+                        false => value,
+                    };
                     for channel in Arc::make_mut(cut).channels.iter_mut().flatten() {
                         let lines = channel.orders.iter_mut().zip(&mut channel.order_std);
                         for (k, (line, std)) in lines.enumerate() {
-                            let smeared = (-0.5 * ((k + 1) as f64 * value).powi(2)).exp().max(1e-3);
+                            let smeared = (-0.5 * ((k + 1) as f64 * angle).powi(2)).exp().max(1e-3);
                             *line /= smeared;
                             *std /= smeared;
                         }
@@ -303,17 +316,33 @@ impl Change {
         own
     }
 
-    /// Values to begin with.
-    fn starts(self) -> [f64; 3] {
+    /// Values to begin with, rising.
+    fn starts(self) -> [f64; 4] {
         match self {
-            Change::GainOfY => [-0.1, 0.0, 0.1],
-            Change::SpeedWander => [0.0, 4e-3, 1e-2],
-            Change::LowPass { .. } => [0.0, 2e-4, 6e-4],
+            Change::GainOfY => [-0.3, -0.1, 0.1, 0.3],
+            Change::SpeedWander {
+                steady_in_time: false,
+            } => [0.0, 5e-3, 2e-2, 5e-2],
+            Change::SpeedWander { steady_in_time: true } => [0.0, 5e-5, 2e-4, 5e-4],
+            Change::LowPass { .. } => [0.0, 5e-5, 2e-4, 6e-4],
+        }
+    }
+
+    /// What values are possible.
+    fn range(self) -> [f64; 2] {
+        match self {
+            Change::GainOfY => [-1.5, 1.5],
+            Change::SpeedWander {
+                steady_in_time: false,
+            } => [0.0, 0.3],
+            Change::SpeedWander { steady_in_time: true } => [0.0, 3e-3],
+            Change::LowPass { .. } => [0.0, 0.01],
         }
     }
 
     /// The best value with its standard error and χ², where there is one inside what is possible.
     fn best(self, data: &CuttingData) -> Option<(f64, f64, f64)> {
+        let [low, high] = self.range();
         let chi2 = |value: f64| -> Option<f64> {
             let own = self.undone(data, value);
             Some(fit(&own)?.reduced_chi2 * data.value_count() as f64)
@@ -322,13 +351,18 @@ impl Change {
         for value in self.starts() {
             points.push((value, chi2(value)?));
         }
-        for _ in 0..6 {
-            points.sort_by(|a, b| a.1.total_cmp(&b.1));
-            let next = vertex(&points[..3])?;
-            let next = match self {
-                Change::GainOfY => next.clamp(-1.5, 1.5),
-                Change::SpeedWander => next.clamp(0.0, 0.1),
-                Change::LowPass { .. } => next.clamp(0.0, 0.01),
+        let mut around = [points[0]; 3];
+        for _ in 0..8 {
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let best = (0..points.len()).min_by(|a, b| points[*a].1.total_cmp(&points[*b].1))?;
+            let middle = best.clamp(1, points.len() - 2);
+            around = [points[middle - 1], points[middle], points[middle + 1]];
+            // At an end of what was tried the range is widened by half.
+            let width = 0.5 * (points[points.len() - 1].0 - points[0].0);
+            let next = match best {
+                0 => (points[0].0 - width).max(low),
+                i if i + 1 == points.len() => (points[i].0 + width).min(high),
+                _ => vertex(&around)?.clamp(low, high),
             };
             if points
                 .iter()
@@ -338,9 +372,8 @@ impl Change {
             }
             points.push((next, chi2(next)?));
         }
-        points.sort_by(|a, b| a.1.total_cmp(&b.1));
-        let (value, least) = points[0];
-        let curvature = curvature(&points[..3])?;
+        let (value, least) = points.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let curvature = curvature(&around)?;
         (curvature > 0.0).then(|| (value, (2.0 / curvature).sqrt(), least))
     }
 
@@ -369,15 +402,25 @@ impl Change {
                     ),
                 }
             }
-            Change::SpeedWander => SetupFinding {
-                kind: SPEED_WANDER,
-                place: "all cuts".into(),
-                value: Some(value),
-                std_error: Some(std),
-                unit: "rad",
-                confidence: 0.0,
-                remedy: String::new(),
-            },
+            Change::SpeedWander { steady_in_time } => {
+                let (factor, unit) = match steady_in_time {
+                    true => (1e3, "ms"),
+                    false => (1.0, "rad"),
+                };
+                SetupFinding {
+                    kind: "spindle-speed-variation",
+                    place: "all cuts".into(),
+                    value: Some(factor * value),
+                    std_error: Some(factor * std),
+                    unit,
+                    confidence: 0.0,
+                    remedy: format!(
+                        "Average the turns over the angle of the spindle (an encoder's, or shorter records): the tool is {} \
+                         {unit} (rms) early or late while turns are averaged, which smears what is quick within a turn.",
+                        with_error(factor * value, factor * std)
+                    ),
+                }
+            }
             Change::LowPass { order } => {
                 let corner = 1.0 / (std::f64::consts::TAU * value);
                 let error = corner * std / value;

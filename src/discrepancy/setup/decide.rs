@@ -2,7 +2,9 @@
 
 use super::examine::Rival;
 use super::finding::SetupFinding;
+use crate::discrepancy::something_else;
 use crate::discrepancy::verdict::evidence_weight;
+use crate::identify::rest::{Rest, RestTest};
 
 /// A mistake fitted to all data.
 #[derive(Debug, Clone)]
@@ -32,14 +34,43 @@ const LIBRARY: f64 = 25.0;
 /// Share of what stands above the noise from which on a mistake explains it, and below which it does not.
 const EXPLAINS: [f64; 2] = [0.9, 0.4];
 
-/// `base`: χ² of the model as it stands, on `values` real values.
-pub fn decide(
-    tried: &[Tried],
-    base: f64,
-    values: usize,
-    rival: impl FnOnce() -> Option<Rival>,
-) -> Option<Decision> {
-    let n = values as f64;
+/// What else may explain the data.
+#[derive(Debug, Default)]
+pub struct Rivals {
+    /// The best of the library of effects.
+    pub library: Option<Rival>,
+    /// χ² that the small errors of a careful setup take away, less what they pay for it.
+    pub small_errors: Option<f64>,
+}
+
+/// What a misfit is held against.
+#[derive(Debug, Clone, Copy)]
+pub struct Noise {
+    /// Real values.
+    pub values: usize,
+    /// Relative standard deviation of the noise's variance.
+    pub known_to: f64,
+    /// Σ r²/σ² that small errors of a setup leave.
+    pub small_errors: f64,
+}
+
+/// Odds that something else is behind a mistake which leaves `chi2` of `base`, by the size of what it leaves.
+fn odds_against(chi2: f64, base: f64, noise: Noise) -> f64 {
+    let test =
+        RestTest::against_known_noise("more than the noise", chi2, noise.values as f64, noise.known_to);
+    test.filter(RestTest::is_significant).map_or(0.0, |test| {
+        let rest = Rest {
+            tests: vec![test],
+            small_errors: noise.small_errors,
+            beyond_slips: None,
+        };
+        something_else::odds(base - chi2, &rest)
+    })
+}
+
+/// `base`: χ² of the model as it stands.
+pub fn decide(tried: &[Tried], base: f64, noise: Noise, rivals: impl FnOnce() -> Rivals) -> Option<Decision> {
+    let n = noise.values as f64;
     let least = tried.iter().map(|t| t.chi2).fold(f64::INFINITY, f64::min);
     if !least.is_finite() || least >= base {
         return None;
@@ -62,7 +93,13 @@ pub fn decide(
     if share(least) < EXPLAINS[1] {
         return None;
     }
-    let physics = rival().map(|r| bic(base * (1.0 - r.gain_share), r.parameters, LIBRARY));
+    let Rivals {
+        library,
+        small_errors,
+    } = rivals();
+    let physics = library.map(|r| bic(base * (1.0 - r.gain_share), r.parameters, LIBRARY));
+    // Small errors everywhere have paid for themselves already.
+    let small_errors = small_errors.map(|gain| bic(base - gain, 0, 1.0));
     let weights: Vec<f64> = bics.iter().map(|b| evidence_weight(b - lowest)).collect();
     // Two forms of one mistake (the order of a filter) are no rivals: the better one speaks for both.
     let alike = |a: &Tried, b: &Tried| a.finding.kind == b.finding.kind && a.finding.place == b.finding.place;
@@ -74,7 +111,11 @@ pub fn decide(
     let weights: Vec<f64> = (0..tried.len())
         .map(|i| if first_of_its_kind(i) { weights[i] } else { 0.0 })
         .collect();
-    let others = evidence_weight(-lowest) + physics.map_or(0.0, |p| evidence_weight(p - lowest));
+    let others = [Some(0.0), physics, small_errors]
+        .into_iter()
+        .flatten()
+        .map(|b| evidence_weight(b - lowest))
+        .sum::<f64>();
     let sum: f64 = weights.iter().sum::<f64>() + others;
     let mut findings: Vec<SetupFinding> = tried
         .iter()
@@ -83,8 +124,9 @@ pub fn decide(
             let [enough, too_little] = EXPLAINS;
             let explains = ((share(t.chi2) - too_little) / (enough - too_little)).clamp(0.0, 1.0);
             let possible = if t.at_bound { 0.3 } else { 1.0 };
+            let alone = 1.0 / (1.0 + odds_against(t.chi2, base, noise));
             SetupFinding {
-                confidence: MOST * weight / sum * explains * possible,
+                confidence: MOST * weight / sum * explains * possible * alone,
                 ..t.finding.clone()
             }
         })

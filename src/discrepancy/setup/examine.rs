@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::decide::{Tried, decide};
+use super::decide::{Noise, Rivals, Tried, decide};
 use super::duplicates::duplicates;
 use super::finding::SetupFinding;
 use super::fit::JointProblem;
@@ -10,12 +10,13 @@ use super::group::Group;
 use super::mistake::{Estimated, Mistake};
 use super::reading::{Reading, model_read};
 use super::score::Linearised;
-use super::{mistakes, readings};
+use super::{mistakes, readings, slips};
 use crate::Result;
 use crate::identify::calibrate::{Options, calibrate};
 use crate::identify::frf_data::FrfData;
 use crate::identify::levenberg_marquardt::{Stopping, minimise};
 use crate::identify::structure::{FrfProblem, Misfit};
+use crate::identify::structure_study::small_errors;
 use crate::identify::study::{Study, View, try_effects};
 use crate::identify::{StructureModel, StructureStudy};
 
@@ -58,6 +59,8 @@ const FITTED: usize = 6;
 const READ: usize = 6;
 /// Share of all disagreement from which on a reading is fitted from the nominal values, too.
 const PLAIN_READING: f64 = 0.1;
+/// Relative standard deviation of the noise's variance as the lines of FRFs against one another show it.
+const NOISE_KNOWN_TO: f64 = 0.05;
 /// Trials that are fitted to all data.
 const REFINED: usize = 3;
 
@@ -151,7 +154,16 @@ pub fn examine(
         .par_iter()
         .filter_map(|t| refined(model, data, t).ok())
         .collect();
-    if let Some(decision) = decide(&tried, full_base, 2 * data.value_count(), rival) {
+    let rivals = || Rivals {
+        library: rival(),
+        small_errors: slips::gain(model, data, theta).ok(),
+    };
+    let noise = Noise {
+        values: 2 * data.value_count(),
+        known_to: NOISE_KNOWN_TO,
+        small_errors: small_errors(data),
+    };
+    if let Some(decision) = decide(&tried, full_base, noise, rivals) {
         check.reduced_chi2 = decision.reduced_chi2;
         check.explained_share = decision.explained_share;
         check.findings.extend(decision.findings);

@@ -19,6 +19,7 @@ mod reading;
 mod readings;
 mod scene;
 mod score;
+mod slips;
 #[cfg(test)]
 mod tests;
 
@@ -28,3 +29,4 @@ pub use finding::{LIKELY, SetupFinding};
 pub use group::Group;
 pub use mistake::Mistake;
 pub use reading::Reading;
+pub use slips::absorb as absorb_slips;

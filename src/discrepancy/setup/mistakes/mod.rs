@@ -1,14 +1,14 @@
 //! The mistakes that have a size, one file each.
 
 mod amplifier_low_pass;
-mod channel_gain;
-mod encoder_offset;
+pub(super) mod channel_gain;
+pub(super) mod encoder_offset;
 mod exponential_window;
-mod hit_direction;
+pub(super) mod hit_direction;
 mod point_position;
-mod sensor_high_pass;
+pub(super) mod sensor_high_pass;
 mod sensor_mass;
-mod turned_sensor;
+pub(super) mod turned_sensor;
 
 use super::mistake::Mistake;
 use crate::identify::StructureModel;

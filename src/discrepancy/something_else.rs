@@ -153,6 +153,7 @@ pub fn share_explained(gain: f64, rest: &Rest) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::identify::rest::BeyondSlips;
 
     fn rest(excess: f64, std: f64) -> Rest {
         Rest {
@@ -204,6 +205,40 @@ mod tests {
         // One that a good setup leaves anyway is not, if the effect is far larger.
         assert!(odds(2e5, &rest(400.0, 50.0)) < 0.2);
         assert!(odds_of_pair(5e3, &rest(0.0, 50.0)) > odds(5e3, &rest(0.0, 50.0)));
+    }
+
+    fn with_slips(excess: f64, after: f64, usual: f64) -> Rest {
+        let mut rest = rest(excess, 30.0);
+        let left = RestTest::new("structure", 1000.0 + after, 1000.0, 30.0, 1000.0);
+        rest.beyond_slips = Some(BeyondSlips {
+            tests: vec![left.unwrap()],
+            usual,
+        });
+        rest
+    }
+
+    #[test]
+    fn a_rest_that_small_errors_of_usual_sizes_explain_is_no_evidence_against_an_effect() {
+        // As large as they usually leave, and taken by them.
+        let usual = odds(1e5, &with_slips(2e4, 0.0, 4e4));
+        assert!(usual < 0.3, "{usual}");
+        // Far less than they would leave, or not taken by them.
+        for other in [with_slips(2e4, 0.0, 4e6), with_slips(2e4, 1e4, 4e4)] {
+            let odds = odds(1e5, &other);
+            assert!(odds > 1.0 && odds > 10.0 * usual, "{odds}");
+        }
+        // The more an effect explains beside it, the surer.
+        assert!(odds(1e6, &with_slips(2e4, 0.0, 4e4)) < usual);
+    }
+
+    #[test]
+    fn small_errors_alone_are_believed_where_they_leave_nothing_and_have_their_usual_sizes() {
+        assert!(odds_against_slips(&with_slips(2e4, 0.0, 4e4)) < 0.3);
+        assert!(odds_against_slips(&with_slips(2e4, 0.0, 4e6)) > 1.0);
+        assert!(odds_against_slips(&with_slips(2e4, 1e4, 4e4)) > 1.0);
+        // Not tried: no excuse.
+        assert_eq!(odds_against_slips(&rest(2e4, 30.0)), f64::INFINITY);
+        assert_eq!(odds_against_slips(&rest(0.0, 30.0)), 0.0);
     }
 
     #[test]

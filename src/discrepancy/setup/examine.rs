@@ -114,37 +114,11 @@ pub fn examine(
     let base = cost(model, &thin, theta)?;
     let excess = (2.0 * base / values as f64 - 1.0).max(0.0) * values as f64;
     let all = mistakes::all(model, &thin);
-    let mut trials = sized(&here, &all, excess, base)?;
+    let mut trials = sized(&here, &all, excess)?;
     let read = proposed(model, &thin, theta)?;
     trials.extend(read_trials(model, &thin, theta, &read, base)?);
     trials.retain(|t| 2.0 * base - t.chi2 > LEAST_GAIN);
     trials.sort_by(|a, b| a.price(values).total_cmp(&b.price(values)));
-    if std::env::var_os("LOBESTONE_SETUP_TRACE").is_some() {
-        for t in &trials {
-            let name = match &t.cause {
-                Cause::Size(m, g, v) => {
-                    let f = m.finding(&Estimated {
-                        group: *g,
-                        values: v,
-                        errors: &vec![0.0; v.len()],
-                        data: &thin,
-                        points: &model.points,
-                    });
-                    format!("{} {} {:?}", f.kind, f.place, v)
-                }
-                Cause::Read(r) => {
-                    let f = r.finding(&thin, &model.points);
-                    format!("{} {}", f.kind, f.place)
-                }
-            };
-            eprintln!(
-                "trial {name}: chi2 {:.0} of {:.0}, values {values}, share {:.3}",
-                t.chi2,
-                2.0 * base,
-                (2.0 * base - t.chi2) / excess.max(1.0)
-            );
-        }
-    }
     let full_base = 2.0 * cost(model, data, theta)?;
     check.reduced_chi2 = full_base / (2 * data.value_count()) as f64;
     let tried: Vec<Tried> = trials
@@ -205,12 +179,7 @@ fn problem<'a>(model: &'a StructureModel, data: &'a FrfData) -> FrfProblem<'a> {
 }
 
 /// The mistakes with a size that promise most, fitted on few lines.
-fn sized<'a>(
-    here: &Linearised<'a>,
-    all: &'a [Box<dyn Mistake>],
-    excess: f64,
-    _base: f64,
-) -> Result<Vec<Trial<'a>>> {
+fn sized<'a>(here: &Linearised<'a>, all: &'a [Box<dyn Mistake>], excess: f64) -> Result<Vec<Trial<'a>>> {
     let mut scored = Vec::new();
     for mistake in all {
         let parameters = mistake.sizes().len() as f64;
@@ -225,21 +194,6 @@ fn sized<'a>(
         );
     }
     scored.sort_by(|a, b| b.1.total_cmp(&a.1));
-    if std::env::var_os("LOBESTONE_SETUP_TRACE").is_some() {
-        for (m, g, s) in scored.iter().take(12) {
-            let f = m.finding(&Estimated {
-                group: s.group,
-                values: &s.values,
-                errors: &vec![0.0; s.values.len()],
-                data: here.data,
-                points: &here.model.points,
-            });
-            eprintln!(
-                "score {} {} {:?}: gain {g:.0} of excess {excess:.0}",
-                f.kind, f.place, s.values
-            );
-        }
-    }
     let promising = scored.into_iter().filter(|s| s.1 > LEAST_GAIN).take(FITTED);
     let fits: Vec<Option<Trial>> = promising
         .collect::<Vec<_>>()

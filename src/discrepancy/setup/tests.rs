@@ -13,6 +13,7 @@ use crate::campaign::{AxesRef, BodyRef, MeasuredDof, Point, RobotSection};
 use crate::identify::StructureModel;
 use crate::identify::frf_data::{FrfBlock, FrfData, FrfDatum};
 use crate::identify::levenberg_marquardt::{Stopping, minimise};
+use crate::identify::rest;
 use crate::identify::structure::{FrfProblem, Misfit};
 use crate::ingest::Axis;
 use crate::robot::RobotModel;
@@ -222,4 +223,46 @@ fn wrong_readings_are_found() {
     let found = check_of(&twice).expect("duplicates");
     assert_eq!(found.kind, "duplicates");
     assert!(found.place.starts_with("posture b"), "{found:?}");
+}
+
+/// Hits that were off at one posture are what every laboratory has, and are taken; what is the same in all files is not.
+#[test]
+fn small_errors_take_what_differs_between_postures_and_no_more() {
+    let model = model();
+    let all = mistakes::all(&model, &arrangement(&model));
+    let share_taken = |index: usize, group: Group, values: &[f64]| {
+        let made = Made {
+            mistake: all[index].as_ref(),
+            group,
+            values,
+        };
+        let data = measured(&model, Some(made), 7);
+        let problem = FrfProblem {
+            model: &model,
+            data: &data,
+            misfit: Misfit::Complex,
+            stride: 1,
+        };
+        let fit = minimise(&problem, &truth(&model), &model.bounds(), Stopping::default()).unwrap();
+        let mut curves = model.rest(&fit.theta, &data).unwrap();
+        let tests = rest::test(&curves);
+        let before = *rest::largest(&tests).expect("it shows");
+        let after = absorb_slips(&model, &data, &fit.theta, &curves).unwrap();
+        assert!(after.price > 0.0 && after.usual > before.excess * 0.01);
+        let beyond = rest::test_beyond(&mut curves, after);
+        let same = beyond
+            .tests
+            .iter()
+            .find(|t| t.looks_like == before.looks_like)
+            .unwrap();
+        1.0 - same.excess / before.excess
+    };
+    let posture = Group {
+        posture: Some(0),
+        ..Group::ALL
+    };
+    let taken = share_taken(9, posture, &[2.0, -1.5, 1.0]);
+    assert!(taken > 0.9, "{taken}");
+    let taken = share_taken(16, Group::ALL, &[3.0]);
+    assert!(taken < 0.7, "{taken}");
 }

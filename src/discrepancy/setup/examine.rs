@@ -112,9 +112,8 @@ pub fn examine(
     let here = Linearised::new(model, &thin, theta)?;
     let values = 2 * thin.value_count();
     let base = cost(model, &thin, theta)?;
-    let excess = (2.0 * base / values as f64 - 1.0).max(0.0) * values as f64;
     let all = mistakes::all(model, &thin);
-    let mut trials = sized(&here, &all, excess)?;
+    let mut trials = sized(&here, &all)?;
     let read = proposed(model, &thin, theta)?;
     trials.extend(read_trials(model, &thin, theta, &read, base)?);
     trials.retain(|t| 2.0 * base - t.chi2 > LEAST_GAIN);
@@ -179,7 +178,7 @@ fn problem<'a>(model: &'a StructureModel, data: &'a FrfData) -> FrfProblem<'a> {
 }
 
 /// The mistakes with a size that promise most, fitted on few lines.
-fn sized<'a>(here: &Linearised<'a>, all: &'a [Box<dyn Mistake>], excess: f64) -> Result<Vec<Trial<'a>>> {
+fn sized<'a>(here: &Linearised<'a>, all: &'a [Box<dyn Mistake>]) -> Result<Vec<Trial<'a>>> {
     let mut scored = Vec::new();
     for mistake in all {
         let parameters = mistake.sizes().len() as f64;

@@ -69,12 +69,12 @@ fn of_usual_errors(largest: &RestTest, rest: &Rest) -> Option<f64> {
 }
 
 /// Odds that something the library does not have is behind what a model leaves, against the small errors of the setup.
-/// Foreign physics may be of any size.
+/// Foreign physics may be of any size. Without end where nothing is known of such errors.
 pub fn odds_against_slips(rest: &Rest) -> f64 {
     /// ln of the largest size of foreign physics over the smallest that would be seen.
     const SIZES: f64 = 10.0;
-    let Some(largest) = rest.largest() else { return 0.0 };
-    let Some(slips) = of_usual_errors(largest, rest) else {
+    let largest = rest.largest();
+    let Some((largest, slips)) = largest.and_then(|l| Some((l, of_usual_errors(l, rest)?))) else {
         return f64::INFINITY;
     };
     let foreign = -(SIZES * largest.excess).ln() - largest.excess.ln();
@@ -238,7 +238,7 @@ mod tests {
         assert!(odds_against_slips(&with_slips(2e4, 1e4, 4e4)) > 1.0);
         // Not tried: no excuse.
         assert_eq!(odds_against_slips(&rest(2e4, 30.0)), f64::INFINITY);
-        assert_eq!(odds_against_slips(&rest(0.0, 30.0)), 0.0);
+        assert_eq!(odds_against_slips(&Rest::default()), f64::INFINITY);
     }
 
     #[test]

@@ -10,7 +10,7 @@ use super::verdict::{self, Verdict};
 use crate::Result;
 use crate::identify::calibrate::{Calibration, Estimate, estimates};
 use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
-use crate::identify::rest::Rest;
+use crate::identify::rest::{BeyondSlips, Rest};
 use crate::identify::study::{
     EffectName, Effort, Extent, HeldOut, OUT_OF_RACE, Residual, Study, Tried, View, held_out, rescue,
     try_effect, try_effects, vanished,
@@ -404,20 +404,24 @@ impl<'a, S: Study> Engine<'a, S> {
         })
     }
 
-    /// What small errors of the setup can take of the rest: the winner's, and the model's as it stands.
-    fn excuse(&self, baseline: &mut Baseline, winner: Option<&mut CandidateOf<S>>) -> Result<()> {
-        let beyond = |rest: &Rest, model: &S::Model, theta: &[f64]| match rest.is_significant() {
+    /// What small errors of the setup leave of a rest that is more than noise.
+    fn beyond_slips(&self, rest: &Rest, model: &S::Model, theta: &[f64]) -> Result<Option<BeyondSlips>> {
+        match rest.is_significant() {
             true => self.study.beyond_slips(model, theta),
             false => Ok(None),
-        };
+        }
+    }
+
+    /// What small errors of the setup can take of the rest: the winner's, and the model's as it stands.
+    fn excuse(&self, baseline: &mut Baseline, winner: Option<&mut CandidateOf<S>>) -> Result<()> {
         if let Some(c) = winner {
             let Some(rest) = &mut c.rest else { return Ok(()) };
-            rest.beyond_slips = beyond(rest, &c.model, &c.theta)?;
+            rest.beyond_slips = self.beyond_slips(rest, &c.model, &c.theta)?;
             if rest.beyond_slips.is_none() {
                 return Ok(());
             }
         }
-        baseline.rest.beyond_slips = beyond(&baseline.rest, self.model, &baseline.theta)?;
+        baseline.rest.beyond_slips = self.beyond_slips(&baseline.rest, self.model, &baseline.theta)?;
         Ok(())
     }
 
@@ -635,9 +639,7 @@ impl<'a, S: Study> Engine<'a, S> {
                         _ => (first, label),
                     };
                     let mut rest = study.rest(&pair.model, &pair.fit.theta)?;
-                    if rest.is_significant() {
-                        rest.beyond_slips = study.beyond_slips(&pair.model, &pair.fit.theta)?;
-                    }
+                    rest.beyond_slips = self.beyond_slips(&rest, &pair.model, &pair.fit.theta)?;
                     best = Some(verdict::Pair {
                         stronger,
                         other,

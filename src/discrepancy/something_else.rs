@@ -60,7 +60,7 @@ fn excused(gain: f64, largest: &RestTest, rest: &Rest) -> Option<f64> {
 /// ln of the density of a rest, and of what slips leave of it, if the small errors of the setup have their usual sizes.
 fn of_usual_errors(largest: &RestTest, rest: &Rest) -> Option<f64> {
     let beyond = rest.beyond_slips.as_ref()?;
-    let after = beyond.tests.iter().find(|t| t.looks_like == largest.looks_like)?;
+    let after = beyond.same(largest)?;
     let exponential: fn(f64) -> f64 = |u| (-u).exp();
     // Laboratories differ in care by a factor (log-normal); half of the mean is the median of few squares.
     let care = (largest.excess / (0.5 * beyond.usual)).ln();

@@ -232,16 +232,10 @@ const SLIPS_KNOWN_TO: f64 = 0.01;
 /// Weight of the small errors of the setup alone against the same with a candidate: 1 where they need it not. Zero where such
 /// errors are not in question.
 fn weight_of_slips_alone<M, I>(c: &Candidate<M, I>, baseline: &Baseline) -> f64 {
-    let beyond = |rest: &Rest, looks_like: &str| {
-        let tests = &rest.beyond_slips.as_ref()?.tests;
-        tests
-            .iter()
-            .find(|t| t.looks_like == looks_like)
-            .map(|t| t.excess)
-    };
     let compared = || {
         let (largest, rest) = (baseline.rest.largest()?, c.rest.as_ref()?);
-        let more = beyond(&baseline.rest, largest.looks_like)? - beyond(rest, largest.looks_like)?;
+        let beyond = |rest: &Rest| Some(rest.beyond_slips.as_ref()?.same(largest)?.excess);
+        let more = beyond(&baseline.rest)? - beyond(rest)?;
         Some(more - SLIPS_KNOWN_TO * largest.excess)
     };
     compared().map_or(0.0, |gain| {

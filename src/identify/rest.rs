@@ -57,6 +57,13 @@ pub struct BeyondSlips {
     pub usual: f64,
 }
 
+impl BeyondSlips {
+    /// The test that looks for the same as `test` does.
+    pub fn same(&self, test: &RestTest) -> Option<&RestTest> {
+        self.tests.iter().find(|t| t.looks_like == test.looks_like)
+    }
+}
+
 /// What small errors of the setup leave of a rest.
 #[derive(Debug, Clone)]
 pub struct AfterSlips {
@@ -107,8 +114,7 @@ impl Rest {
     /// Share of what tests of structure find that small errors of the setup explain; `None` where that was not tried.
     pub fn share_of_slips(&self) -> Option<f64> {
         let before = self.largest()?;
-        let same = |t: &&RestTest| t.looks_like == before.looks_like;
-        let after = self.beyond_slips.as_ref()?.tests.iter().find(same)?;
+        let after = self.beyond_slips.as_ref()?.same(before)?;
         Some((1.0 - after.excess / before.excess).clamp(0.0, 1.0))
     }
 

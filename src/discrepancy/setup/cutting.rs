@@ -258,7 +258,7 @@ enum Change {
     /// both; nor can the gain of Fz, with which the axial coefficients scale.
     GainOfY,
     /// Standard deviation of the tool's angle, rad, about its mean turning while lines are averaged: high orders smear. Where
-    /// the drive swings at a frequency of its own the same turning error is the steadier one `in_time`, s.
+    /// the drive swings at a frequency of its own the same turning error is the steadier one in time, s.
     SpeedWander { steady_in_time: bool },
     /// Time constant of the amplifiers, s.
     LowPass { order: u8 },

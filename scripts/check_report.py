@@ -207,6 +207,10 @@ def check(condition, what):
 def use(browser, page, shots):
     browser.send("Page.navigate", url=page.resolve().as_uri())
     browser.wait_for("document.documentElement?.dataset.ready === 'true'")
+    # What is folded up is drawn when it is opened.
+    browser.run("document.querySelectorAll('details').forEach((fold) => { fold.open = true; })")
+    browser.wait_for("document.querySelectorAll('.js-plotly-plot').length === document.querySelectorAll('.plot').length")
+    browser.wait_for("document.documentElement?.dataset.ready === 'true'")
     found = {
         "figures": browser.run("document.querySelectorAll('.js-plotly-plot').length"),
         "images": browser.run("document.images.length"),

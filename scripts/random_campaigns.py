@@ -176,7 +176,8 @@ def label(effect, site):
 
 def outcome(row):
     """What became of one campaign. Only `right` counts as right in the calibration of the confidence."""
-    true = label(row["truth"], row["site"])
+    # Physics without a name has a place, but `unknown` names none.
+    true = label(row["truth"], row["site"] if row["truth"] != "unknown" else "")
     said = label(row["said"], row["said_site"])
     truths = {true, *row["also"].split()}
     if said in truths:
@@ -303,6 +304,10 @@ def by_visibility(rows):
     return markdown(["standard deviations", "right", "missed (said none)", "otherwise wrong"], body)
 
 
+def brier(rows):
+    return statistics.mean((float(r["confidence"]) - is_right(r)) ** 2 for r in rows)
+
+
 def calibration(rows):
     body = []
     for low, high in zip(BINS, BINS[1:]):
@@ -315,9 +320,13 @@ def calibration(rows):
             body.append([f"{low:.2f}–{min(high, 1):.2f}", f"{said:.2f}", share(right, len(mine)), fits])
     confidences = [float(r["confidence"]) for r in rows]
     hits = [is_right(r) for r in rows]
-    brier = statistics.mean((c - h) ** 2 for c, h in zip(confidences, hits))
+    visible = [r for r in rows if r["truth"] == "none" or float(r["sigmas"]) >= VISIBLE_SIGMAS]
     summary = (f"\nOver all: mean confidence {statistics.mean(confidences):.3f}, right {statistics.mean(hits):.3f}; "
-               f"Brier score {brier:.3f} (0 is perfect, 0.25 is a coin).\n")
+               f"Brier score {brier(rows):.3f} (0 is perfect, 0.25 is a coin).\n")
+    if visible:
+        summary += (f"Without what stands out by less than {VISIBLE_SIGMAS} standard deviations, which a perfect test would often "
+                    f"miss: {len(visible)} campaigns, right {statistics.mean(map(is_right, visible)):.3f}, "
+                    f"Brier score {brier(visible):.3f}.\n")
     return markdown(["confidence", "mean said", "right", "said within the interval"], body) + summary
 
 

@@ -1,25 +1,32 @@
 //! Progress of work that takes longer than a second: on stderr, or on a [`Gauge`] where somebody reads one instead.
 
 use std::cell::RefCell;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// Counts steps of a piece of work. Silent for the first second; then a bar on a terminal,
-/// or a line every few seconds where stderr is a file.
+/// Counts steps of a piece of work. Silent for the first second; then a bar where stderr is a terminal.
 pub struct Progress {
     gauge: Option<Arc<Gauge>>,
     bar: ProgressBar,
     label: String,
     total: u64,
     started: Instant,
-    last_line_s: AtomicU64,
 }
 
-/// Seconds between two lines where stderr is not a terminal.
-const LINE_EVERY_S: u64 = 5;
+/// Nothing is to be shown.
+static SILENT: AtomicBool = AtomicBool::new(false);
+
+/// From now on nobody is told how far work is.
+pub fn silence() {
+    SILENT.store(true, Ordering::Relaxed);
+}
+
+pub fn is_silent() -> bool {
+    SILENT.load(Ordering::Relaxed)
+}
 
 /// Steps of the piece of work that is being done.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -82,7 +89,6 @@ impl Progress {
             label,
             total: total as u64,
             started: Instant::now(),
-            last_line_s: AtomicU64::new(0),
         }
     }
 
@@ -101,28 +107,9 @@ impl Progress {
         if elapsed < Duration::from_secs(1) {
             return;
         }
-        if self.bar.is_hidden() {
+        // On a terminal only: nothing is seen elsewhere.
+        if self.bar.is_hidden() && !is_silent() {
             self.bar.set_draw_target(ProgressDrawTarget::stderr());
-        }
-        // Still hidden: stderr is no terminal.
-        if self.bar.is_hidden() {
-            let now = elapsed.as_secs();
-            let last = self.last_line_s.load(Ordering::Relaxed);
-            let due = last == 0 || now >= last + LINE_EVERY_S;
-            if due
-                && self
-                    .last_line_s
-                    .compare_exchange(last, now.max(1), Ordering::Relaxed, Ordering::Relaxed)
-                    .is_ok()
-            {
-                eprintln!(
-                    "{}: {}/{} after {} s",
-                    self.label,
-                    self.bar.position(),
-                    self.total,
-                    now
-                );
-            }
         }
     }
 }

@@ -67,6 +67,7 @@ impl Entry<'_> {
             progress,
             when: when.to_string(),
             data: fingerprint.to_string(),
+            why: None,
         }
     }
 }
@@ -143,7 +144,12 @@ impl Addition<CuttingModel, CuttingInstance> {
                 &fingerprint,
             )
         };
-        let revision = log.append(entry(before, None), entry(after, *progress))?;
+        let without = entry(before, None);
+        let with = Revision {
+            why: revision::recall(&campaign.dir, Domain::Cutting, &fingerprint, &without.effects),
+            ..entry(after, *progress)
+        };
+        let revision = log.append(without, with)?;
         let mut warnings = case.warnings.clone();
         warnings.extend(after.calibration.convergence_warning());
         let effects = after.model.effects().iter();
@@ -207,7 +213,12 @@ impl Addition {
             let entry = Entry::of(Domain::Structure, fitted, recorded(fitted));
             entry.revision(noise_floor_nrms, progress, &when, &fingerprint)
         };
-        let revision = log.append(entry(before, None), entry(after, *progress))?;
+        let without = entry(before, None);
+        let with = Revision {
+            why: revision::recall(&campaign.dir, Domain::Structure, &fingerprint, &without.effects),
+            ..entry(after, *progress)
+        };
+        let revision = log.append(without, with)?;
         let effects = after.model.effects().iter();
         let effects = effects.map(|added| added.instance.label()).collect();
         let mut warnings = case.warnings.clone();

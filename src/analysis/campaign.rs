@@ -11,6 +11,7 @@ use crate::discrepancy::setup::SetupFinding;
 use crate::identify::case::structure_model;
 use crate::identify::structure_study::held_out_postures;
 use crate::identify::{Options, StructureCase, StructureModel};
+use crate::revision::{Domain, Revision, RevisionLog};
 use crate::robot::PostureReport;
 use crate::{Error, InputError, Result};
 
@@ -28,6 +29,8 @@ pub struct CampaignFindings<'a> {
     pub cutting: Option<Result<CfcResult>>,
     /// What the force model lacks, where that was asked for.
     pub cutting_diagnosis: Option<Result<CuttingFindings>>,
+    /// What was added to the force model so far, the baseline first; empty where nothing was.
+    pub cutting_revisions: Vec<Revision>,
     pub lobes: Option<Result<LobeFindings>>,
     /// Wrong files and other mistakes of the setup that are likely, of both sides.
     pub setup: Vec<SetupFinding>,
@@ -79,8 +82,10 @@ impl<'a> CampaignFindings<'a> {
             (wanted && matches!(cutting, Some(Ok(_)))).then(|| CuttingFindings::run(campaign));
         let postures = (campaign.robot.is_some() && !campaign.postures.is_empty())
             .then(|| PostureFindings::run(campaign, calibrated));
+        let log = RevisionLog::load(&campaign.dir)?;
         let findings = CampaignFindings {
             campaign,
+            cutting_revisions: log.revisions(Domain::Cutting).cloned().collect(),
             setup: likely_mistakes(campaign, (&structure, &diagnosis), (&cutting, &cutting_diagnosis)),
             postures,
             diagnosis,

@@ -13,9 +13,12 @@ use crate::discrepancy::{
 };
 use crate::effects::Instance;
 use crate::effects::cutting::CuttingInstance;
+use crate::identify::case::recorded_effect;
+use crate::identify::cutting_case::recorded_cutting_effect;
 use crate::identify::cutting_problem::{CutFit, CuttingProblem};
 use crate::identify::structure_study::{ResidualPeak, residual_peaks};
 use crate::identify::{CuttingCase, CuttingModel, CuttingStudy, Options, StructureCase, StructureModel};
+use crate::revision::{self, Domain, Evidence, RecordedCandidate};
 
 /// The diagnosis of the campaign's current model.
 pub struct DiagnosisFindings {
@@ -91,6 +94,59 @@ impl DiagnosisFindings {
     pub fn leader(&self) -> Option<&Candidate<StructureModel, Instance>> {
         let leading = self.leading.as_ref()?;
         self.diagnosis.candidates.get(leading.candidate)
+    }
+}
+
+/// What a diagnosis says, as `add` keeps it.
+fn evidence<M, I>(d: &Diagnosis<M, I>) -> Evidence {
+    let finite = |v: f64| Some(v).filter(|v| v.is_finite());
+    let candidate = |c: &Candidate<M, I>| RecordedCandidate {
+        effect: c.label(),
+        variant: c.name.variant.as_ref().map(|(_, value)| value.to_string()),
+        nrms: finite(c.nrms),
+        held_out_nrms: c.held_out.as_ref().and_then(|h| finite(h.nrms())),
+        delta_bic: finite(c.delta_bic),
+        p_value: finite(c.p_value),
+        reduced_chi2: finite(c.reduced_chi2),
+        remark: c.remark().to_string(),
+    };
+    Evidence {
+        verdict: match d.verdict {
+            Verdict::Effect => "effect",
+            Verdict::None => "none",
+            Verdict::Unknown => "unknown",
+        }
+        .into(),
+        effect: d.winner().map(Candidate::label),
+        confidence: d.confidence,
+        candidates: d.candidates.iter().map(candidate).collect(),
+        when: revision::now(),
+    }
+}
+
+impl DiagnosisFindings {
+    /// Keeps what was found in the campaign's folder, for the revision that an effect is added with.
+    ///
+    /// # Errors
+    /// What the file system refuses: the diagnosis is as good without.
+    pub fn keep(&self, campaign: &Campaign) -> Result<()> {
+        let effects = self.case.model.effects().iter();
+        let effects = effects.map(|a| recorded_effect(&a.instance)).collect();
+        let of = (revision::structure_fingerprint(campaign)?, effects);
+        revision::keep(&campaign.dir, Domain::Structure, of, evidence(&self.diagnosis))
+    }
+}
+
+impl CuttingFindings {
+    /// As [`DiagnosisFindings::keep`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn keep(&self, campaign: &Campaign) -> Result<()> {
+        let effects = self.case.model.effects().iter();
+        let effects = effects.map(|a| recorded_cutting_effect(&a.instance)).collect();
+        let of = (revision::cutting_fingerprint(campaign)?, effects);
+        revision::keep(&campaign.dir, Domain::Cutting, of, evidence(&self.diagnosis))
     }
 }
 

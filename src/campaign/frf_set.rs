@@ -426,6 +426,8 @@ mod tests {
         Campaign {
             dir: "cell".into(),
             name: "n".into(),
+            operator: None,
+            date: None,
             robot: None,
             postures: vec![Posture {
                 id: "p1".into(),
@@ -445,6 +447,7 @@ mod tests {
             cuts: vec![],
             lobes: None,
             material: None,
+            channels: Vec::new(),
             orthogonal: None,
             plan: Default::default(),
         }

@@ -14,9 +14,11 @@ use crate::{Error, InputError, Result};
 
 const SCHEMA: &str = "lobestone/campaign/1";
 
-const TOP: [&str; 13] = [
+const TOP: [&str; 16] = [
     "schema",
     "name",
+    "operator",
+    "date",
     "robot",
     "posture",
     "point",
@@ -25,6 +27,7 @@ const TOP: [&str; 13] = [
     "material",
     "orthogonal",
     "dynamometer",
+    "channel",
     "cut",
     "lobes",
     "plan",
@@ -133,12 +136,15 @@ fn read(dir: &Path, top: &Section<'_>, find: Find) -> Result<Campaign> {
     Ok(Campaign {
         dir: dir.to_path_buf(),
         name,
+        operator: top.text("operator")?.map(str::to_string),
+        date: top.text("date")?.map(str::to_string),
         robot: robot.map(|(section, _)| section),
         postures,
         points,
         frfs,
         tool,
         dynamometer,
+        channels: super::channels::channels(top, &cuts)?,
         cuts,
         lobes,
         material,

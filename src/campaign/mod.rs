@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 pub mod bounds;
+mod channels;
 pub mod document;
 pub mod draft;
 pub mod frf_set;

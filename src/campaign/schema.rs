@@ -2,25 +2,52 @@
 
 use std::path::PathBuf;
 
-use crate::ingest::{Dof, Quantity};
+use crate::ingest::{ChannelRule, Dof, Quantity};
 
 /// A validated campaign. Paths are absolute or relative to the working directory (already joined with `dir`).
 #[derive(Debug, Clone)]
 pub struct Campaign {
     pub dir: PathBuf,
     pub name: String,
+    /// Who measured, as the head of a report names him or her.
+    pub operator: Option<String>,
+    /// When it was measured, as it was written down.
+    pub date: Option<String>,
     pub robot: Option<RobotSection>,
     pub postures: Vec<Posture>,
     pub points: Vec<Point>,
     pub frfs: Vec<FrfFile>,
     pub tool: Option<Tool>,
     pub dynamometer: Dynamometer,
+    /// What the channels of the force files are, where the files do not say it.
+    pub channels: Vec<CutChannel>,
     pub cuts: Vec<Cut>,
     pub lobes: Option<LobesSection>,
     /// Workpiece material: of every cut that names none itself.
     pub material: Option<String>,
     pub orthogonal: Option<OrthogonalSection>,
     pub plan: PlanSection,
+}
+
+/// A channel of the force files of all cuts, or of one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CutChannel {
+    /// Id of the only cut that it holds for.
+    pub cut: Option<String>,
+    pub rule: ChannelRule,
+}
+
+impl Campaign {
+    /// How the channels of this cut's file become forces: what is said of the cut goes before what is said of all.
+    pub fn channel_rules(&self, cut_id: &str) -> Vec<ChannelRule> {
+        let own = || self.channels.iter().filter(|c| c.cut.as_deref() == Some(cut_id));
+        let is_own = |rule: &ChannelRule| own().any(|o| o.rule.measures == rule.measures);
+        let common = self
+            .channels
+            .iter()
+            .filter(|c| c.cut.is_none() && !is_own(&c.rule));
+        own().chain(common).map(|c| c.rule.clone()).collect()
+    }
 }
 
 /// What is to be measured where there are no files yet; `None` and empty: the usual.

@@ -1,7 +1,7 @@
 //! `lobestone demo [DIR]`: the whole story on the built-in campaigns, each step as the command of its name does it.
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use serde::Serialize;
 use serde_json::json;
@@ -69,72 +69,35 @@ impl Story {
 }
 
 pub fn run(args: Args) -> Result<Outcome> {
+    let began = Instant::now();
     let dir = &args.dir;
     prepare(dir)?;
     let first = fresh(&FIRST_CELL, dir)?;
     let second = fresh(&SECOND_CELL, dir)?;
     let of = |command: &str, campaign: &Campaign| format!("lobestone {command} {}", campaign.dir.display());
-    let mut story = Story::default();
-
-    story.step(
-        "inspect",
-        of("inspect", &first) + "/frf/*.uff",
-        || inspect(&first),
-        Clone::clone,
-    )?;
-    let structure = story.step(
-        "calibrate",
-        of("calibrate", &first),
-        || StructureFindings::run(&first),
-        calibrated,
-    )?;
-    let postures = story.step(
-        "model",
-        of("model", &first),
-        || PostureFindings::run(&first, Some(&structure)),
-        |postures| modelled(postures),
-    )?;
-    let modal = story.step("modal", of("modal", &first), || ModalAnalysis::run(&first), modes)?;
-    let cutting = story.step(
-        "cfc",
-        of("cfc", &first),
-        || identify_forces(&first, CfcOptions::default()),
-        coefficients,
-    )?;
-    let lobes = story.step("lobes", of("lobes", &first), || LobeFindings::run(&first), lobes)?;
-    let unexplained = story.step(
-        "compare",
-        of("compare", &second),
-        || StructureFindings::run(&second),
-        compared,
-    )?;
-    let diagnosis = story.step(
-        "diagnose",
-        of("diagnose", &second),
-        || DiagnosisFindings::run(&second, Options::default()),
-        crate::report::diagnosis_section::summary,
-    )?;
-    let missing = diagnosis.diagnosis.winner().map(|w| w.label());
-    let missing =
-        missing.ok_or_else(|| Error::computation("the built-in second cell shows no missing effect"))?;
-    story.step(
-        "add",
-        of("add", &second) + " " + &missing,
-        || Addition::run(&second, &missing, Options::default()),
-        added,
-    )?;
-    let extended = story.step(
-        "history",
-        of("history", &second),
-        || StructureCase::load(&second),
-        history,
-    )?;
-    let thesis = story.step(
-        "thesis",
-        "lobestone thesis".into(),
-        ThesisFindings::run,
-        case_study,
-    )?;
+    // One cell beside the other: neither needs what the other finds.
+    let (told_first, told_second) = std::thread::scope(|scope| {
+        let of_first = scope.spawn(|| first_story(&first, of));
+        let of_second = second_story(&second, of);
+        let panicked = |_| {
+            Err(Error::computation(
+                "the program failed at the first cell: a fault of its own",
+            ))
+        };
+        (of_first.join().unwrap_or_else(panicked), of_second)
+    });
+    let (mut story, unexplained, diagnosis, extended) = told_second?;
+    let told = told_first?;
+    story.steps.extend(told.story.steps);
+    let FirstCell {
+        structure,
+        postures,
+        modal,
+        cutting,
+        lobes,
+        thesis,
+        ..
+    } = told;
 
     let findings = CampaignFindings {
         campaign: &first,
@@ -145,6 +108,7 @@ pub fn run(args: Args) -> Result<Outcome> {
         mode_shapes: stick_shapes::of_richest_set(&first, &modal),
         modal: Some(Ok(modal)),
         cutting_diagnosis: None,
+        cutting_revisions: Vec::new(),
         cutting: Some(Ok(cutting)),
         lobes: Some(Ok(lobes)),
     };
@@ -182,7 +146,105 @@ pub fn run(args: Args) -> Result<Outcome> {
         "open {} in a browser, then begin with your own files: run `lobestone init FOLDER`",
         files.html.display()
     );
-    Ok(Outcome::new(json, describe(&story.steps), Some(next)))
+    Ok(Outcome::new(
+        json,
+        describe(&story.steps, began.elapsed()),
+        Some(next),
+    ))
+}
+
+/// What the model explains, and the case study.
+struct FirstCell {
+    story: Story,
+    structure: StructureFindings,
+    postures: Vec<PostureFindings>,
+    modal: ModalAnalysis,
+    cutting: CfcResult,
+    lobes: LobeFindings,
+    thesis: ThesisFindings,
+}
+
+/// `of`: a command on a campaign as it is typed.
+fn first_story(first: &Campaign, of: impl Fn(&str, &Campaign) -> String) -> Result<FirstCell> {
+    let mut story = Story::default();
+    story.step(
+        "inspect",
+        of("inspect", first) + "/frf/*.uff",
+        || inspect(first),
+        Clone::clone,
+    )?;
+    let structure = story.step(
+        "calibrate",
+        of("calibrate", first),
+        || StructureFindings::run(first),
+        calibrated,
+    )?;
+    let postures = story.step(
+        "model",
+        of("model", first),
+        || PostureFindings::run(first, Some(&structure)),
+        |postures| modelled(postures),
+    )?;
+    let modal = story.step("modal", of("modal", first), || ModalAnalysis::run(first), modes)?;
+    let cutting = story.step(
+        "cfc",
+        of("cfc", first),
+        || identify_forces(first, CfcOptions::default()),
+        coefficients,
+    )?;
+    let lobes = story.step("lobes", of("lobes", first), || LobeFindings::run(first), lobes)?;
+    let thesis = story.step(
+        "thesis",
+        "lobestone thesis".into(),
+        ThesisFindings::run,
+        case_study,
+    )?;
+    Ok(FirstCell {
+        story,
+        structure,
+        postures,
+        modal,
+        cutting,
+        lobes,
+        thesis,
+    })
+}
+
+/// The cell with something hidden: the model without it, the diagnosis, the model with it.
+fn second_story(
+    second: &Campaign,
+    of: impl Fn(&str, &Campaign) -> String,
+) -> Result<(Story, StructureFindings, DiagnosisFindings, StructureCase)> {
+    let mut story = Story::default();
+    let unexplained = story.step(
+        "compare",
+        of("compare", second),
+        || StructureFindings::run(second),
+        compared,
+    )?;
+    let diagnosis = story.step(
+        "diagnose",
+        of("diagnose", second),
+        || DiagnosisFindings::run(second, Options::default()),
+        crate::report::diagnosis_section::summary,
+    )?;
+    let missing = diagnosis.diagnosis.winner().map(|w| w.label());
+    let missing =
+        missing.ok_or_else(|| Error::computation("the built-in second cell shows no missing effect"))?;
+    diagnosis.keep(second)?;
+    story.step(
+        "add",
+        of("add", second) + " " + &missing,
+        || Addition::run(second, &missing, Options::default()),
+        added,
+    )?;
+    let extended = story.step(
+        "history",
+        of("history", second),
+        || StructureCase::load(second),
+        history,
+    )?;
+    Ok((story, unexplained, diagnosis, extended))
 }
 
 /// Makes the folder, or takes one that an earlier demo made.
@@ -333,7 +395,7 @@ fn compared(s: &StructureFindings) -> String {
         "nothing but noise is left"
     };
     format!(
-        "another cell: {} after calibration, noise {}: {what}",
+        "{} after calibration, noise {}: {what}",
         percent(after.nrms),
         percent(after.noise_floor_nrms)
     )
@@ -374,7 +436,7 @@ fn case_study(t: &ThesisFindings) -> String {
     )
 }
 
-fn describe(steps: &[Step]) -> String {
+fn describe(steps: &[Step], took: Duration) -> String {
     let mut text = String::from("Lobestone demo: simulated campaigns, every step as its command does it\n");
     for step in steps {
         text += &format!(
@@ -382,6 +444,5 @@ fn describe(steps: &[Step]) -> String {
             step.name, step.summary, "", step.command, step.seconds
         );
     }
-    let total: f64 = steps.iter().map(|s| s.seconds).sum();
-    text + &format!("\nDone in {total:.1} s.\n")
+    text + &format!("\nDone in {:.1} s.\n", took.as_secs_f64())
 }

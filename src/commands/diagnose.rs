@@ -19,8 +19,17 @@ pub fn run(args: SideArgs) -> Result<Outcome> {
     by_domain(
         &campaign,
         args.domain,
-        |c| Ok(structure(c, &DiagnosisFindings::run(c, Options::default())?)),
-        |c| Ok(cutting(c, &CuttingFindings::run(c)?)),
+        |c| {
+            let found = DiagnosisFindings::run(c, Options::default())?;
+            // A folder that cannot be written to is no reason not to answer.
+            let _ = found.keep(c);
+            Ok(structure(c, &found))
+        },
+        |c| {
+            let found = CuttingFindings::run(c)?;
+            let _ = found.keep(c);
+            Ok(cutting(c, &found))
+        },
     )
 }
 

@@ -74,6 +74,7 @@ pub fn document(revision: &Revision, fingerprint: &str) -> Value {
         "progress": revision.progress,
         "parameters": revision.parameters,
         "when": revision.when,
+        "why": revision.why,
         "same_data": revision.data == fingerprint,
     })
 }

@@ -166,8 +166,21 @@ pub fn run(args: Args, as_json: bool) -> Result<Outcome> {
         return Err(nothing_found(&args, &scan));
     }
     let mut answers = args.answers();
-    if let Some(list) = &args.cut_list {
-        draft::read_cut_list(list, &scan, &mut answers)?;
+    // One list in the folder is meant; of several nobody knows which.
+    let list = args.cut_list.as_ref().or(match scan.cut_lists.as_slice() {
+        [one] if !scan.forces.is_empty() => Some(one),
+        _ => None,
+    });
+    let mut passed_over = match list {
+        Some(list) => draft::read_cut_list(list, &scan, &mut answers)?,
+        None => Vec::new(),
+    };
+    if list.is_none() {
+        let lists = scan
+            .cut_lists
+            .iter()
+            .map(|l| format!("{}: a list of cuts; name it with --cut-list", l.display()));
+        passed_over.extend(lists);
     }
     let talking =
         !as_json && !args.no_questions && std::io::stdin().is_terminal() && std::io::stderr().is_terminal();
@@ -182,6 +195,19 @@ pub fn run(args: Args, as_json: bool) -> Result<Outcome> {
                 draft = Draft::new(&name, &scan, &answers)?;
             }
         }
+        // Feeds and engagement in other units need the tool to be understood.
+        for (key, question, example) in [
+            ("teeth", "number of teeth", "4"),
+            ("diameter_mm", "tool diameter, mm", "16.0"),
+        ] {
+            if draft.missing().iter().any(|m| m.table == "tool" && m.key == key) {
+                let answer = ask(question, example)?;
+                if answer.trim().parse::<f64>().is_ok() {
+                    answers.set("tool", key, answer.trim());
+                }
+            }
+        }
+        draft = Draft::new(&name, &scan, &answers)?;
         draft.ask(&mut ask)?;
     }
     let missing = draft.missing();
@@ -202,6 +228,7 @@ pub fn run(args: Args, as_json: bool) -> Result<Outcome> {
         "complete": missing.is_empty(),
         "frfs": scan.frfs.iter().map(|f| json!({ "file": f.path, "posture": f.posture, "nodes": f.nodes })).collect::<Vec<_>>(),
         "cuts": scan.forces.iter().map(|f| json!({ "file": f.path })).collect::<Vec<_>>(),
+        "cut_list": list,
         "missing": missing,
         "guessed": guesses,
         "setup": setup,
@@ -210,7 +237,7 @@ pub fn run(args: Args, as_json: bool) -> Result<Outcome> {
     let next = next_step::begun(dir, missing.len(), !scan.frfs.is_empty());
     Ok(Outcome::new(
         json,
-        setup_lines(&setup) + &describe(&file, &scan, &draft, &missing),
+        setup_lines(&setup) + &describe(&file, &scan, &draft, &missing, list, &passed_over),
         Some(next),
     ))
 }
@@ -265,13 +292,23 @@ fn ask(question: &str, example: &str) -> Result<String> {
 /// Names in a list before it is cut short.
 const SHOWN: usize = 6;
 
-fn describe(file: &std::path::Path, scan: &Scan, draft: &Draft, missing: &[Missing]) -> String {
+fn describe(
+    file: &std::path::Path,
+    scan: &Scan,
+    draft: &Draft,
+    missing: &[Missing],
+    cut_list: Option<&PathBuf>,
+    passed_over: &[String],
+) -> String {
     let mut text = format!(
         "{}: {} FRF files, {} force records\n",
         Emphasis::Strong.on(file.display()),
         scan.frfs.len(),
         scan.forces.len()
     );
+    if let Some(list) = cut_list {
+        text += &format!("cut list: {}\n", list.display());
+    }
     let of = |kind: &str, names: &[String]| -> String {
         match names {
             [one] if one.is_empty() => format!("[{kind}]"),
@@ -320,11 +357,12 @@ fn describe(file: &std::path::Path, scan: &Scan, draft: &Draft, missing: &[Missi
             text += "  (a list of cuts, CSV with a column \"file\" and these keys, is read with --cut-list FILE)\n";
         }
     }
-    if !scan.not_used.is_empty() {
+    if !scan.not_used.is_empty() || !passed_over.is_empty() {
         let notes: Vec<String> = scan
             .not_used
             .iter()
             .map(|(file, why)| format!("not used: {file}: {why}"))
+            .chain(passed_over.iter().cloned())
             .collect();
         text += &format!("\n{}", warnings(&notes));
     }

@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 
 use super::text::Emphasis;
 use super::{Outcome, next_step};
+use crate::campaign::draft::measurement_files;
 use crate::ingest::{
     self, Channel, ChannelRole, Dof, FrfRecord, MeasurementFile, Quantity, TimeRecord, units,
 };
@@ -12,18 +13,25 @@ use crate::{InputError, Result};
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// Measurement files: UFF 58, FRF CSV, DynoWare export, force CSV, TDMS, LVM, MAT.
-    #[arg(required = true)]
+    /// Measurement files, or folders of them: UFF 58, FRF CSV, DynoWare export, force CSV, TDMS, LVM, MAT.
+    #[arg(required = true, value_name = "FILE|DIR")]
     files: Vec<PathBuf>,
 }
 
-/// Every file must be readable: one that is not is an error that names it, and nothing is printed.
+/// What can be read is told; a file that cannot is an error that names it, after what was told.
 pub fn run(args: Args) -> Result<Outcome> {
     let mut failures = Vec::new();
     let mut files = Vec::new();
     let mut text = String::new();
     let mut kinds: Vec<(&Path, &'static str)> = Vec::new();
-    for path in &args.files {
+    let mut paths = Vec::new();
+    for path in args.files {
+        match path.is_dir() {
+            true => paths.extend(files_of(&path)?),
+            false => paths.push(path),
+        }
+    }
+    for path in &paths {
         match inspect(path) {
             Ok(seen) => {
                 text.push_str(&seen.text());
@@ -33,23 +41,42 @@ pub fn run(args: Args) -> Result<Outcome> {
             Err(error) => failures.push(error),
         }
     }
-    match failures.len() {
-        0 => Ok(Outcome::new(
-            json!({ "files": files }),
-            // The blank line after the last file is that of the next step.
-            text.trim_end().to_string() + "\n",
-            Some(next_step::inspected(&kinds)),
-        )),
-        1 => Err(failures.remove(0)),
-        n => {
-            let list: Vec<String> = failures.iter().map(ToString::to_string).collect();
-            Err(InputError::new(format!(
+    let unreadable: Vec<String> = failures.iter().map(ToString::to_string).collect();
+    let failed = match failures.len() {
+        0 => None,
+        1 => Some(failures.remove(0)),
+        n => Some(
+            InputError::new(format!(
                 "{n} of {} files cannot be read\n{}",
-                args.files.len(),
-                list.join("\n")
+                paths.len(),
+                unreadable.join("\n")
             ))
-            .into())
-        }
+            .into(),
+        ),
+    };
+    match failed {
+        Some(failed) if files.is_empty() => Err(failed),
+        failed => Ok(Outcome {
+            failed,
+            ..Outcome::new(
+                json!({ "files": files, "unreadable": unreadable }),
+                // The blank line after the last file is that of the next step.
+                text.trim_end().to_string() + "\n",
+                Some(next_step::inspected(&kinds)),
+            )
+        }),
+    }
+}
+
+/// The files below a folder that may be measurements, in the order of their names.
+fn files_of(dir: &Path) -> Result<Vec<PathBuf>> {
+    let files = measurement_files(dir)?;
+    match files.is_empty() {
+        true => Err(InputError::new("holds no measurement files")
+            .file(dir)
+            .remedy("give the files, or the folder that they lie in")
+            .into()),
+        false => Ok(files),
     }
 }
 

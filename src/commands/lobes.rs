@@ -319,6 +319,8 @@ mod tests {
         Campaign {
             dir: "cell".into(),
             name: "lobes".into(),
+            operator: None,
+            date: None,
             robot: None,
             postures: vec![],
             points: vec![],
@@ -351,6 +353,7 @@ mod tests {
                 hole: None,
             }),
             material: None,
+            channels: Vec::new(),
             orthogonal: None,
             plan: Default::default(),
         }
@@ -358,7 +361,7 @@ mod tests {
 
     #[test]
     fn modes_give_the_document_of_the_contract() {
-        let Outcome { json, text } = outcome(&campaign(LobeSource::Modes)).unwrap();
+        let Outcome { json, text, .. } = outcome(&campaign(LobeSource::Modes)).unwrap();
         let curve = &json["curves"][0];
         for key in [
             "posture",
@@ -454,7 +457,7 @@ mod tests {
             step_deg: 20.0,
             forbidden_deg: vec![[170.0, 230.0]],
         });
-        let Outcome { json, text } = outcome(&turned).unwrap();
+        let Outcome { json, text, .. } = outcome(&turned).unwrap();
         let found = &json["redundancy"];
         let angles = found["angles"].as_array().unwrap();
         assert_eq!(angles.len(), 18);

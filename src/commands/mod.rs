@@ -28,6 +28,8 @@ mod model;
 mod next_step;
 mod operational;
 mod plan;
+mod printed;
+mod range;
 mod report;
 mod serve;
 mod shell;
@@ -44,30 +46,95 @@ pub struct Outcome {
     pub json: serde_json::Value,
     /// Printed without; may be coloured.
     pub text: String,
+    /// What failed although there is something to say: told on stderr, and the status is 1.
+    pub failed: Option<crate::Error>,
 }
 
 impl Outcome {
     /// With the next sensible step: `next_step` in the document, the last line of the text.
     pub fn new(mut json: serde_json::Value, mut text: String, next_step: Option<String>) -> Self {
-        if let Some(step) = &next_step {
+        if let Some(step) = next_step.as_ref().filter(|_| !crate::progress::is_silent()) {
             text += &format!("\n{} {step}\n", text::Emphasis::Strong.on("Next:"));
         }
         json["next_step"] = next_step.into();
-        Outcome { json, text }
+        Outcome {
+            json,
+            text,
+            failed: None,
+        }
     }
 }
+
+pub use printed::{shown, shown_json};
 
 /// What an error message begins with on a terminal.
 pub fn error_label() -> String {
     text::Emphasis::Bad.on("error:")
 }
 
+/// The commands in groups, with an example each.
+const GROUPS: &str = "\
+Begin
+  demo         The whole story on built-in campaigns             lobestone demo
+  inspect      What measurement files are                        lobestone inspect cell7/frf
+  init         Make a campaign of a folder of measurements       lobestone init cell7
+  serve        The campaign as a page in a browser               lobestone serve cell7
+
+Find what the model lacks
+  calibrate    Tune the model to the measured FRFs               lobestone calibrate cell7
+  compare      Model against measurement: where it fails         lobestone compare cell7
+  diagnose     Which physical effect the model lacks             lobestone diagnose cell7
+  localise     Where the missing part sits, from the data alone  lobestone localise cell7
+  explain      What an effect is, how to check it in the lab     lobestone explain payload
+  plan         What a campaign would show, before measuring      lobestone plan cell7
+
+Grow the model
+  add          Add an effect, fit everything anew                lobestone add cell7 payload
+  undo         Take the last revision back                       lobestone undo cell7
+  history      The error falling, revision by revision           lobestone history cell7
+  model        What the robot model says                         lobestone model cell7
+
+Measure and cut
+  modal        Modal parameters from FRFs                        lobestone modal frf/*.uff
+  cfc          Cutting force coefficients from records           lobestone cfc cell7
+  lobes        Stability lobes                                   lobestone lobes cell7
+  sweep        Limits and stiffness over the workspace           lobestone sweep cell7 --out map
+
+Write and try out
+  report       HTML and PNG report of a campaign                 lobestone report cell7
+  simulate     A virtual lab with chosen (or random) physics     lobestone simulate lab --random 7
+  thesis       The source thesis put right                       lobestone thesis
+  completions  Completions for your shell                        lobestone completions bash
+  man          The manual page                                   lobestone man
+";
+
+const TEMPLATE: &str = "{about}\n\n{usage-heading} {usage}\n\n{after-help}\n\nOptions:\n{options}\n\n\
+    `lobestone COMMAND --help` says more of a command.";
+
+/// When colours are used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Color {
+    /// On a terminal, unless NO_COLOR is set.
+    Auto,
+    Always,
+    Never,
+}
+
 #[derive(Parser)]
-#[command(name = "lobestone", version, about, long_about = None)]
+#[command(name = "lobestone", version, about, long_about = None, help_template = TEMPLATE, after_help = GROUPS)]
 pub struct Cli {
     /// Print one JSON document on stdout and nothing else there.
     #[arg(long, global = true)]
     pub json: bool,
+    /// When to use colours.
+    #[arg(long, global = true, value_enum, default_value_t = Color::Auto, value_name = "WHEN")]
+    pub color: Color,
+    /// Only the answer: no progress, no next step.
+    #[arg(short, long, global = true)]
+    pub quiet: bool,
+    /// Threads to work with [default: one a processor].
+    #[arg(short, long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub jobs: Option<u16>,
     #[command(subcommand)]
     pub command: Command,
 }
@@ -152,6 +219,7 @@ fn by_domain(
                     "cutting": cutting.json,
                 }),
                 text: format!("{}\n{}", structure.text, cutting.text),
+                failed: None,
             })
         }
     }
@@ -184,6 +252,15 @@ pub struct SideArgs {
 }
 
 pub fn run(cli: Cli) -> Result<Outcome> {
+    if let Some(jobs) = cli.jobs {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(jobs.into())
+            .build_global()
+            .map_err(|e| crate::Error::computation(format!("{jobs} threads cannot be had: {e}")))?;
+    }
+    if cli.quiet {
+        crate::progress::silence();
+    }
     match cli.command {
         Command::Init(args) => init::run(*args, cli.json),
         Command::Inspect(args) => inspect::run(args),

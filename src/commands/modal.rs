@@ -23,7 +23,7 @@ pub struct Args {
     #[arg(required = true, value_name = "FILE|DIR")]
     paths: Vec<PathBuf>,
     /// Look at this band only, Hz.
-    #[arg(long, value_name = "LO:HI", value_parser = band)]
+    #[arg(long, value_name = "FROM:TO", value_parser = super::range::band)]
     band: Option<[f64; 2]>,
     /// The files are one set: FRFs of the same structure, exported one by one.
     #[arg(long)]
@@ -41,10 +41,10 @@ pub struct Args {
     #[arg(long, conflicts_with_all = ["together", "each", "block_s"])]
     output_only: bool,
     /// Write a report of its own into this folder (HTML and PNG).
-    #[arg(long, value_name = "FOLDER", conflicts_with = "output_only")]
+    #[arg(long, value_name = "DIR", conflicts_with = "output_only")]
     report: Option<PathBuf>,
     /// Write modes, shapes and synthesised FRFs for other programs into this folder (UFF 55 and 58, CSV, MAT).
-    #[arg(long, value_name = "FOLDER", conflicts_with = "output_only")]
+    #[arg(long, value_name = "DIR", conflicts_with = "output_only")]
     export: Option<PathBuf>,
     /// Where the measured points are: universal file with datasets 15/2411 and 82, or CSV with node,x,y,z and line,from,to.
     #[arg(long, value_name = "FILE", conflicts_with = "output_only")]
@@ -110,22 +110,6 @@ fn pole(text: &str) -> std::result::Result<(f64, Option<f64>), String> {
     match zeta {
         Some(zeta) if zeta >= 1.0 => Err(wrong()),
         _ => Ok((positive(f).map_err(|_| wrong())?, zeta)),
-    }
-}
-
-fn band(text: &str) -> std::result::Result<[f64; 2], String> {
-    let number = |t: &str| {
-        t.trim()
-            .parse::<f64>()
-            .ok()
-            .filter(|x| x.is_finite() && *x >= 0.0)
-    };
-    match text
-        .split_once(':')
-        .map(|(low, high)| (number(low), number(high)))
-    {
-        Some((Some(low), Some(high))) if low < high => Ok([low, high]),
-        _ => Err("give the band as LO:HI in Hz, such as 3:60".into()),
     }
 }
 
@@ -453,17 +437,4 @@ fn single(set: &SetModes, out: &mut String) {
 
 fn deviation(std: Option<f64>, scale: f64) -> String {
     std.map_or("     –".into(), |s| format!("{:6.3}", s * scale))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_band_is_two_ascending_numbers() {
-        assert_eq!(band("3:60.5"), Ok([3.0, 60.5]));
-        for wrong in ["", "3", "60:3", "3:inf", "-1:5", "a:b", "3:3"] {
-            assert!(band(wrong).is_err(), "{wrong}");
-        }
-    }
 }

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::text::warnings;
 use crate::analysis::operational::OperationalSet;
-use crate::report::parts::with_error;
+use crate::report::number::with_error;
 
 /// Poles that are not taken, shown to a person; all are in the JSON.
 const MOST_REJECTED: usize = 6;

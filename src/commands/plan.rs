@@ -24,8 +24,8 @@ pub struct Args {
     #[arg(long, value_name = "M_PER_N")]
     noise_floor: Option<f64>,
     /// First and last spectral line, Hz.
-    #[arg(long, value_name = "FROM,TO", value_delimiter = ',', num_args = 1..=2)]
-    band: Option<Vec<f64>>,
+    #[arg(long, value_name = "FROM:TO", value_parser = super::range::band)]
+    band: Option<[f64; 2]>,
     /// Spacing of the spectral lines.
     #[arg(long, value_name = "HZ")]
     lines_hz: Option<f64>,
@@ -88,18 +88,14 @@ fn request(args: &Args) -> Result<PlanRequest> {
         )
         .into());
     }
-    let band_hz = match args.band.as_deref() {
-        None => None,
-        Some([from, to]) if *from > 0.0 && from < to && to.is_finite() => Some([*from, *to]),
-        Some(_) => {
-            let remedy = "give first and last line, such as 3,90";
-            return Err(wrong("--band", "is no band".into(), remedy).into());
-        }
-    };
+    if args.band.is_some_and(|[from, _]| from == 0.0) {
+        let remedy = "give first and last line, such as 3:90";
+        return Err(wrong("--band", "begins at zero".into(), remedy).into());
+    }
     Ok(PlanRequest {
         noise_relative: args.noise,
         noise_floor_m_per_n: args.noise_floor,
-        band_hz,
+        band_hz: args.band,
         lines_hz: args.lines_hz,
         responses: args.responses.clone(),
         hits: args.hits.clone(),

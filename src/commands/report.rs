@@ -16,7 +16,7 @@ pub struct Args {
     #[command(flatten)]
     campaign: CampaignArg,
     /// Where to write [default: the folder report in the campaign's folder].
-    #[arg(long, value_name = "FOLDER")]
+    #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Add the case study of the IRB 6640 (as the command thesis).
     #[arg(long)]

@@ -51,5 +51,6 @@ pub fn run(args: Args, as_json: bool) -> Result<Outcome> {
         // Said already.
         json: Value::Null,
         text: "ended; what was recorded is in the campaign's folder\n".into(),
+        failed: None,
     })
 }

@@ -23,7 +23,7 @@ pub struct Args {
     #[arg(required_unless_present = "merge")]
     dir: Option<PathBuf>,
     /// Where the map is written: sweep.json, shards/, and merged sweep.parquet, summary.json and pictures.
-    #[arg(long, value_name = "FOLDER")]
+    #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// x of the tool point in the robot's base frame, m: FROM:TO:COUNT, or one value [default: 11 values, 0.6 m on either
     /// side of the posture's tool point].

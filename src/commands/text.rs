@@ -164,14 +164,15 @@ pub fn warnings(warnings: &[String]) -> String {
     warnings.iter().map(|w| format!("{label} {w}\n")).collect()
 }
 
-/// Words broken to lines of at most 100 characters, each line after `indent`. Line breaks of the text stay.
+/// Words broken to lines of at most 100 characters, each line after `indent`. Line breaks of the text stay, and so do
+/// commands between backticks, which somebody may want to copy.
 pub fn wrapped(text: &str, indent: &str) -> String {
     const WIDTH: usize = 100;
     let mut out = String::new();
     for paragraph in text.lines() {
         let mut length = 0;
-        for word in paragraph.split_whitespace() {
-            let longer = length + 1 + width_of(word);
+        for word in words(paragraph) {
+            let longer = length + 1 + width_of(&word);
             if length > 0 && longer + indent.len() <= WIDTH {
                 out += " ";
                 length = longer;
@@ -180,13 +181,27 @@ pub fn wrapped(text: &str, indent: &str) -> String {
                     out += "\n";
                 }
                 out += indent;
-                length = width_of(word);
+                length = width_of(&word);
             }
-            out += word;
+            out += &word;
         }
         out += "\n";
     }
     out
+}
+
+/// What stands between blanks; what stands between backticks is one word.
+fn words(paragraph: &str) -> Vec<String> {
+    let mut words: Vec<String> = Vec::new();
+    let mut open = false;
+    for word in paragraph.split_whitespace() {
+        match words.last_mut().filter(|_| open) {
+            Some(last) => *last += &format!(" {word}"),
+            None => words.push(word.to_string()),
+        }
+        open ^= word.matches('`').count() % 2 == 1;
+    }
+    words
 }
 
 #[cfg(test)]
@@ -238,6 +253,9 @@ mod tests {
                 .all(|l| l.starts_with("  word") && l.chars().count() <= 100)
         );
         assert_eq!(wrapped("a\nb", "- "), "- a\n- b\n");
+        let command = "`lobestone add /a/folder/with/a/long/name/of/its/own local-resonator@link-3`";
+        let text = wrapped(&format!("{} run {command}, then look", "word ".repeat(14)), "  ");
+        assert!(text.contains(&format!("\n  {command}, then look\n")), "{text}");
     }
 
     #[test]

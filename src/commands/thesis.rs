@@ -15,7 +15,7 @@ use crate::thesis::{CaseStudy, CuttingTables, LobeTips, RealCase, Row};
 #[derive(clap::Args)]
 pub struct Args {
     /// Write it as a page with figures (report.html and PNG files) into this folder as well.
-    #[arg(long, value_name = "FOLDER")]
+    #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
 
@@ -165,6 +165,7 @@ fn describe(study: &CaseStudy) -> String {
         "The source thesis put right (ABB IRB 6640)\n\nStatic stiffness at the flange, tables 5 and 6\n",
     );
     text += &rows(&study.static_stiffness);
+    text += &format!("{}\n", study.static_place());
     text += "\nStrongest mode of each axis, tables 9 and 15 (fitted on configurations 1-3, 4 is predicted)\n";
     text += &rows(&study.frequencies);
     text += "\nLargest real part of the receptance at that mode\n";
@@ -296,7 +297,7 @@ fn cutting(tables: &CuttingTables) -> String {
                 r.material.clone(),
                 r.graph.clone(),
                 number(r.cutting_speed_m_per_min, 3),
-                format!("{}/{}", r.feeds, r.feeds_planned),
+                r.feeds_in_words(),
             ];
             row.extend(r.coefficients.iter().map(|k| number(*k, 3)));
             row.push(r.negative.join(" "));

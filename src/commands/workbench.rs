@@ -153,7 +153,7 @@ impl CampaignBench {
         let campaign = Campaign::load(&self.dir)?;
         let of = model_state(&campaign, &RevisionLog::load(&self.dir)?, side)?;
         stage.now("looking for what is missing");
-        let (Outcome { json, text }, answer, findings) = match side {
+        let (Outcome { json, text, .. }, answer, findings) = match side {
             Domain::Structure => {
                 let found = Box::new(DiagnosisFindings::run(&campaign, Options::default())?);
                 let outcome = diagnose::structure(&campaign, &found);
@@ -173,6 +173,13 @@ impl CampaignBench {
                 )
             }
         };
+        if self.stays_inside().is_ok() {
+            // A folder that cannot be written to is no reason not to answer.
+            let _ = match &findings {
+                Findings::Structure(found) => found.keep(&campaign),
+                Findings::Cutting(found) => found.keep(&campaign),
+            };
+        }
         {
             let diagnoses = &mut self.found().diagnoses;
             diagnoses.retain(|k| !(k.side == side && k.of == of));

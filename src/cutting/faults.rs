@@ -29,7 +29,7 @@ const TURNS: usize = 50;
 /// Those of [`ingest::read_time`].
 pub fn read_record(campaign: &Campaign, cut: usize) -> Result<(TimeRecord, Vec<Notice>)> {
     let cut = &campaign.cuts[cut];
-    let (mut record, reader_warnings) = ingest::read_time(&cut.file)?;
+    let (mut record, reader_warnings) = ingest::read_time_with(&cut.file, &campaign.channel_rules(&cut.id))?;
     let mut notices = repair(&mut record, cut.spindle_rpm);
     let noticed = |detail| Notice { kind: READER, detail };
     notices.extend(reader_warnings.into_iter().map(noticed));

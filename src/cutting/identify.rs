@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::average::pool_scatter;
 use super::average_force::{ForceAxis, average_row};
 use super::faults::read_record;
 use super::group::{Group, Rows, distinct, observations};
@@ -104,6 +105,7 @@ pub fn from_analyses(
             .key("cut")
             .into());
     }
+    pool_scatter(&mut cuts, &campaign.dynamometer.tool_from_dyno);
     turn_torque(&mut cuts, &mut warnings);
     let counted = without_duplicates(campaign, &cuts, &mut warnings);
     warnings.extend(warnings::of_records(campaign, &cuts));

@@ -1,5 +1,7 @@
 //! Cutting forces: geometry, force models, regression of the coefficients.
 
+mod air;
+mod average;
 mod average_force;
 mod conic;
 mod estimate;
@@ -12,10 +14,12 @@ mod plausibility;
 mod record;
 mod regression;
 mod series;
+mod teeth;
 mod trend;
 mod warnings;
 pub mod waveform;
 
+pub use average::TurnAverage;
 #[cfg(test)]
 pub(crate) use average_force::tests::drill as test_drill;
 pub use average_force::{
@@ -35,4 +39,4 @@ pub use record::{Average, ChannelAnalysis, CutAnalysis, Notice, Trace, analyse_c
 pub use regression::{Fit, Observation, fit};
 pub use series::{MaterialComparison, SpeedTrends};
 pub use trend::{Change, Reading, table_trend};
-pub(crate) use warnings::{of_faults, speed_text};
+pub(crate) use warnings::{of_notices, speed_text};

@@ -2,7 +2,7 @@
 
 use super::average_force::{ForceAxis, average_row};
 use super::record::CutAnalysis;
-use crate::campaign::{Campaign, Process};
+use crate::campaign::{Campaign, CutGeometry, Process};
 use crate::ingest::units::figures;
 use crate::signal::median;
 
@@ -66,6 +66,41 @@ const MATERIALS: [(&[&str], [f64; 2]); 7] = [
     (&["acetal", "pom", "delrin", "nylon", "plastic"], [12.0, 1500.0]),
 ];
 
+/// Chip thickness for which the lower bounds hold, mm: thinner chips take more.
+const THICK_CHIP_MM: f64 = 0.3;
+const THIN_CHIP_MM: f64 = 0.01;
+
+/// By what factor chips of this mean thickness take at least more energy than the thickest: Kienzle's exponent is 0.2 and
+/// more for most materials.
+fn thin_chip(chip_mm: f64) -> f64 {
+    if chip_mm > 0.0 {
+        (THICK_CHIP_MM / chip_mm.clamp(THIN_CHIP_MM, THICK_CHIP_MM)).powf(0.2)
+    } else {
+        1.0
+    }
+}
+
+/// Mean chip thickness over the engagement, mm.
+fn chip_mm(campaign: &Campaign, cut: &CutAnalysis) -> Option<f64> {
+    match campaign.cuts[cut.cut].geometry {
+        CutGeometry::Milling {
+            feed_per_tooth_mm,
+            immersion,
+            ..
+        } => {
+            let arc = immersion.exit_rad - immersion.start_rad;
+            (arc > 0.0)
+                .then(|| feed_per_tooth_mm * (immersion.start_rad.cos() - immersion.exit_rad.cos()) / arc)
+        }
+        // Two lips, each at half the point angle.
+        CutGeometry::Drilling { .. } => {
+            let tool = campaign.tool.as_ref()?;
+            let lips = tool.teeth.max(1) as f64;
+            Some(cut.feed_mm / lips * 59f64.to_radians().sin())
+        }
+    }
+}
+
 /// Factors of units that get mixed up: wanted over found.
 const UNITS: [(f64, &str); 4] = [
     (1000.0, "kN called N"),
@@ -89,6 +124,12 @@ pub(super) fn of_scales(campaign: &Campaign, cuts: &[&CutAnalysis], process: Pro
         (!values.is_empty()).then(|| median(&values))
     };
     let (cutting, axial) = (middle(|s| s.cutting), middle(|s| s.axial));
+    let chip = median(
+        &cuts
+            .iter()
+            .filter_map(|c| chip_mm(campaign, c))
+            .collect::<Vec<_>>(),
+    );
     let name = cuts
         .first()
         .and_then(|c| campaign.cuts[c.cut].material.as_deref());
@@ -97,7 +138,10 @@ pub(super) fn of_scales(campaign: &Campaign, cuts: &[&CutAnalysis], process: Pro
         .iter()
         .find(|(words, _)| words.iter().any(|w| material.contains(w)));
     let (bounds, usual, of) = match known {
-        Some((_, bounds)) => (*bounds, *bounds, name.unwrap_or_default().to_owned()),
+        Some((_, [low, high])) => {
+            let bounds = [(low * thin_chip(chip)).round(), *high];
+            (bounds, bounds, name.unwrap_or_default().to_owned())
+        }
         None => (ANY_MATERIAL, USUAL, "any material worth machining".to_owned()),
     };
     let (names, units): (&str, &[(f64, &str)]) = match process {

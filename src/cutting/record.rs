@@ -2,13 +2,19 @@
 
 use std::ops::Range;
 
+use num_complex::Complex64;
+
+use super::air::{air_notices, believable_air};
+use super::average::{TurnAverage, average};
 use super::average_force::{DrillGeometry, ForceAxis, cutting_speed_m_per_min, feed_mm};
+use super::teeth::idle_tooth;
+use super::waveform::MillingCut;
 use crate::campaign::{Campaign, Cut, CutGeometry, Process, Tool};
 use crate::ingest::units::figures;
 use crate::ingest::{ChannelRole, TimeRecord};
 use crate::signal::{
     self, Air, Blocks, Clipping, DriftLine, Phases, Spindle, ToothLine, find_faults, find_phases, fit_drift,
-    tooth_line, whole_revolutions,
+    highest_order, tooth_line, whole_revolutions,
 };
 use crate::{Error, InputError, Result};
 
@@ -37,7 +43,7 @@ pub struct ChannelAnalysis {
     pub axis: ForceAxis,
     pub drift: DriftLine,
     /// Over the steady window, drift taken off.
-    pub average: Average,
+    pub mean: TurnAverage,
     /// Not drift compensated.
     pub trace: Trace,
 }
@@ -79,27 +85,20 @@ pub struct CutAnalysis {
 
 /// Points of a [`Trace`].
 const TRACE_POINTS: usize = 1000;
-/// Revolutions whose mean is further than this many robust standard deviations off are spikes.
-const SPIKE_SIGMA: f64 = 8.0;
-
-pub const NO_AIR: &str = "no air cut in the record: drift and offset cannot be told from edge force; \
-     record a second of air before and after each cut";
-pub const NO_AIR_BEFORE: &str = "no air before the cut: the zero line rests on the air after it alone";
-pub const NO_AIR_AFTER: &str = "no air after the cut: the zero line rests on the air before it alone";
 const CHANNEL_MISSING: &str = "channel missing or not usable";
 const CHANNEL_DEAD: &str = "channel dead (one value throughout) and left out: check plug and amplifier";
 const CHANNEL_BROKEN: &str = "channel holds values that are no numbers and is left out";
-const BENT_DRIFT: &str = "the drift is not a line (the air bends away from it): averages may be off by more than \
-     their errors say; let the amplifier warm up and reset it before each cut (`lobestone diagnose` can fit it as \
-     nonlinear-drift)";
-const STEEP_DRIFT: &str = "the zero drifts far: the line through the air is taken off; let the amplifier warm up and reset it \
-     before each cut";
 pub(super) const WRONG_SPEED: &str = "coefficients rest on a wrong spindle speed or number of teeth: correct spindle_rpm \
      (and the feed per tooth that goes with it) or [tool] teeth";
 const CLIPPED: &str = "clipped, so that the true forces are larger: the channel is left out of this cut; choose a larger range \
      at the amplifier and cut again";
 const CLIPPED_ELSEWHERE: &str = "clipped outside the steady window: averages are not touched, but choose a larger range at the \
      amplifier";
+const UNSTEADY_CUT: &str = "the force changes over the steady window: a slow entry or exit, a depth that changes, or wear; look at \
+     the record and give steady_s = [from, to]";
+const IDLE_TOOTH: &str = "the teeth cut very unevenly, once per turn instead of once per tooth: one is missing or chipped, the runout \
+     is as large as the feed per tooth, or [tool] teeth is wrong; a tooth that does not cut leaves its edge force out, so that the edge \
+     coefficients come out low by its share";
 const SHORT_WINDOW: &str = "steady window shorter than 5 revolutions";
 const SPIKES: &str = "revolutions with spikes left out of the average";
 const WRONG_DURATION: &str = "the hole took another time than feed, speed and depth say: check them";
@@ -168,29 +167,56 @@ pub fn analyse_cut(campaign: &Campaign, cut_index: usize, record: &TimeRecord) -
         [at(r.start), at(r.end)]
     };
 
+    let carrying = ForceAxis::of(cut.geometry.process());
+    let carriers: Vec<(ForceAxis, &[f64])> = usable
+        .iter()
+        .filter(|c| carrying.contains(&c.0))
+        .map(|c| (c.0, c.2))
+        .collect();
+    let (air, is_short) = believable_air(
+        &carriers,
+        rate,
+        record.start_s,
+        &phases.air,
+        &steady,
+        cut.geometry.process(),
+        60.0 / cut.spindle_rpm,
+        &mut notices,
+    );
+    let phases = Phases { air, ..phases };
     let channels: Vec<ChannelAnalysis> = usable
         .iter()
         .map(|&(axis, name, values)| {
-            let drift = fit_drift(values, rate, record.start_s, &phases.air);
-            let (average, dropped) = average(values, &steady, samples_per_revolution, &drift, record);
-            if dropped > 0 {
+            let mut drift = fit_drift(values, rate, record.start_s, &phases.air);
+            if is_short {
+                drift.hold_back(0.0);
+            }
+            let mean = average(values, &steady, samples_per_revolution, &drift, record);
+            if mean.dropped > 0 {
                 notices.push(Notice {
                     kind: SPIKES,
-                    detail: format!("{dropped} on {}", axis.label()),
+                    detail: format!("{} on {}", mean.dropped, axis.label()),
                 });
             }
             ChannelAnalysis {
                 name: name.to_string(),
                 axis,
                 drift,
-                average,
+                mean,
                 trace: trace(values, record),
             }
         })
         .collect();
-    let carrying = ForceAxis::of(cut.geometry.process());
     let carriers: Vec<&ChannelAnalysis> = channels.iter().filter(|c| carrying.contains(&c.axis)).collect();
     air_notices(&phases.air, &carriers, samples as f64 / rate, &mut notices);
+    unsteady_notice(
+        &usable,
+        &channels,
+        &steady,
+        samples_per_revolution,
+        record,
+        &mut notices,
+    );
     if revolutions < 4.999 {
         notices.push(Notice {
             kind: SHORT_WINDOW,
@@ -207,6 +233,16 @@ pub fn analyse_cut(campaign: &Campaign, cut_index: usize, record: &TimeRecord) -
             None
         }
     };
+    teeth_notice(
+        campaign,
+        cut,
+        tool,
+        &channels,
+        &usable,
+        &steady,
+        record,
+        &mut notices,
+    );
     if let Some(line) = tooth_line.filter(ToothLine::speed_is_doubtful) {
         notices.push(Notice {
             kind: WRONG_SPEED,
@@ -235,9 +271,6 @@ pub fn analyse_cut(campaign: &Campaign, cut_index: usize, record: &TimeRecord) -
 
 /// Part of the steady window that may be clipped without much harm.
 const CLIPPED_AT_MOST: f64 = 1e-3;
-/// Change of the zero over the record, as a part of the average force, that is worth telling.
-const STEEP: f64 = 0.75;
-
 /// Is so much of the channel clipped in the steady window that its average is wrong?
 fn is_spoilt(
     channel: &UsableChannel,
@@ -382,105 +415,100 @@ fn phases(
     Ok((Phases { air, cutting, steady }, true))
 }
 
-/// Mean over the revolutions of the window with the zero line taken off, and how many revolutions were left
-/// out as spikes.
-fn average(
-    values: &[f64],
+/// Change of the force over the steady window that is worth telling, as a part of it.
+const UNSTEADY: f64 = 0.1;
+
+/// Does the force (root mean square about zero, turn by turn) change over the window? Without air its fluctuation does.
+fn unsteady_notice(
+    usable: &[UsableChannel],
+    channels: &[ChannelAnalysis],
     steady: &Range<usize>,
     samples_per_revolution: f64,
-    drift: &DriftLine,
     record: &TimeRecord,
-) -> (Average, usize) {
-    let time = |i: usize| record.start_s + i as f64 / record.sample_rate_hz;
-    let compensated: Vec<f64> = steady.clone().map(|i| values[i] - drift.at(time(i))).collect();
-    let blocks = Blocks::new(&compensated, samples_per_revolution);
-    let centre = signal::median(&blocks.mean);
-    let deviation: Vec<f64> = blocks.mean.iter().map(|m| (m - centre).abs()).collect();
-    let limit = SPIKE_SIGMA * 1.4826 * signal::median(&deviation);
-    let mut kept: Vec<f64> = blocks
-        .mean
-        .iter()
-        .copied()
-        .filter(|m| limit == 0.0 || (m - centre).abs() <= limit)
-        .collect();
-    if 10 * (blocks.len() - kept.len()) > blocks.len() {
-        // So many are no spikes.
-        kept = blocks.mean.clone();
-    }
-    let dropped = blocks.len() - kept.len();
-    let n = kept.len().max(1) as f64;
-    let value = kept.iter().sum::<f64>() / n;
-    let scatter = if kept.len() >= 4 {
-        scatter_of_mean(&kept)
-    } else {
-        // Too few revolutions to compare: the samples themselves, which counts the ripple as noise.
-        let m = compensated.len().max(1) as f64;
-        (compensated.iter().map(|v| (v - value).powi(2)).sum::<f64>() / m).sqrt() / n.sqrt()
-    };
-    let middle = 0.5 * (time(steady.start) + time(steady.end));
-    let std_error = scatter.hypot(drift.std_at(middle)).hypot(drift.bend);
-    (Average { value, std_error }, dropped)
-}
-
-/// Standard error of the mean of a series whose neighbours may be alike (first-order autoregressive).
-fn scatter_of_mean(series: &[f64]) -> f64 {
-    let n = series.len() as f64;
-    let mean = series.iter().sum::<f64>() / n;
-    let variance = series.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    if variance <= 0.0 {
-        return 0.0;
-    }
-    let lagged: f64 = series.windows(2).map(|w| (w[0] - mean) * (w[1] - mean)).sum();
-    let rho = (lagged / (n - 1.0) / variance).clamp(0.0, 0.9);
-    (variance / n * (1.0 + rho) / (1.0 - rho)).sqrt()
-}
-
-fn air_notices(air: &Air, channels: &[&ChannelAnalysis], record_s: f64, notices: &mut Vec<Notice>) {
-    let kind = match (&air.before, &air.after) {
-        (None, None) => Some(NO_AIR),
-        (None, Some(_)) => Some(NO_AIR_BEFORE),
-        (Some(_), None) => Some(NO_AIR_AFTER),
-        _ => None,
-    };
-    notices.extend(kind.map(|kind| Notice {
-        kind,
-        detail: String::new(),
-    }));
-    let is_bent = |c: &&&ChannelAnalysis| c.drift.bend > 0.02 * c.average.value.abs();
-    let bent = channels.iter().filter(is_bent).map(|c| {
-        let (label, unit) = (c.axis.label(), c.axis.unit());
-        format!("{label} by {:.2} {unit}{}", c.drift.bend, c.drift.shape())
-    });
-    // A channel that hardly carries force, or carries a ripple about zero, is measured by the others of its kind.
-    let size = |c: &ChannelAnalysis| {
-        let same = |o: &&&ChannelAnalysis| (o.axis == ForceAxis::Mz) == (c.axis == ForceAxis::Mz);
-        let forces = channels.iter().filter(same).map(|o| o.average.value.abs());
-        forces.fold(0.0, f64::max)
-    };
-    let change = |c: &ChannelAnalysis| c.drift.slope_per_s * record_s;
-    let is_steep = |c: &&&ChannelAnalysis| {
-        !is_bent(c)
-            && change(c).abs() > STEEP * size(c)
-            && c.drift.slope_per_s.abs() > 6.0 * c.drift.slope_std_per_s
-    };
-    let steep = channels.iter().filter(is_steep).map(|c| {
-        let (label, unit) = (c.axis.label(), c.axis.unit());
-        format!(
-            "{label} by {:+.2} {unit}/s, {:+.1} {unit} over the record",
-            c.drift.slope_per_s,
-            change(c)
-        )
-    });
-    for (kind, details) in [
-        (BENT_DRIFT, bent.collect::<Vec<String>>()),
-        (STEEP_DRIFT, steep.collect()),
-    ] {
-        if !details.is_empty() {
-            notices.push(Notice {
-                kind,
-                detail: details.join(", "),
-            });
+    notices: &mut Vec<Notice>,
+) {
+    let mut squares: Vec<f64> = Vec::new();
+    for ((axis, _, values), channel) in usable.iter().zip(channels) {
+        if *axis == ForceAxis::Mz {
+            continue;
         }
+        let has_zero = channel.drift.air_before || channel.drift.air_after;
+        let zero = |i: usize| {
+            channel
+                .drift
+                .at(record.start_s + i as f64 / record.sample_rate_hz)
+        };
+        let compensated: Vec<f64> = steady.clone().map(|i| values[i] - zero(i)).collect();
+        let turns = Blocks::new(&compensated, samples_per_revolution);
+        squares.resize(turns.len(), 0.0);
+        for (k, square) in squares.iter_mut().enumerate() {
+            let level = if has_zero { turns.mean[k] } else { 0.0 };
+            *square += turns.std_dev[k].powi(2) + level * level;
+        }
+    }
+    let loudness: Vec<f64> = squares.into_iter().map(f64::sqrt).collect();
+    let change = signal::change(&loudness);
+    if change.abs() > UNSTEADY {
+        notices.push(Notice {
+            kind: UNSTEADY_CUT,
+            detail: format!("by {:+.0} %", 100.0 * change),
+        });
+    }
+}
+
+/// Orders of a longer window are taken from its start.
+const MOST_SAMPLES: usize = 1 << 17;
+
+#[allow(clippy::too_many_arguments)]
+fn teeth_notice(
+    campaign: &Campaign,
+    cut: &Cut,
+    tool: &Tool,
+    channels: &[ChannelAnalysis],
+    usable: &[UsableChannel],
+    steady: &Range<usize>,
+    record: &TimeRecord,
+    notices: &mut Vec<Notice>,
+) {
+    let Some(milling) = MillingCut::new(tool, &cut.geometry).filter(|m| m.teeth > 1) else {
+        return;
+    };
+    let rate = record.sample_rate_hz;
+    let window = steady.start..steady.end.min(steady.start + MOST_SAMPLES);
+    let per_turn = rate * 60.0 / cut.spindle_rpm;
+    if highest_order(per_turn, milling.teeth) < milling.teeth {
+        return;
+    }
+    let of_channel = |axis: ForceAxis| -> Option<(Vec<Complex64>, f64, bool)> {
+        let values = usable.iter().find(|c| c.0 == axis)?.2;
+        let channel = channels.iter().find(|c| c.axis == axis)?;
+        let spectrum = signal::order_spectrum(&values[window.clone()], rate, per_turn, milling.teeth)?;
+        let has_zero = channel.drift.air_before || channel.drift.air_after;
+        Some((spectrum.coefficient, channel.mean.average.value, has_zero))
+    };
+    let recorded = [ForceAxis::X, ForceAxis::Y, ForceAxis::Z].map(of_channel);
+    let (mut orders, mut mean, mut zero_is_known) = (
+        [0, 1].map(|_| vec![Complex64::ZERO; milling.teeth]),
+        [0.0; 2],
+        true,
+    );
+    for (axis, row) in campaign.dynamometer.tool_from_dyno.iter().take(2).enumerate() {
+        for (weight, channel) in row.iter().zip(&recorded).filter(|(w, _)| **w != 0.0) {
+            let Some((own, value, has_zero)) = channel else {
+                return;
+            };
+            for (sum, o) in orders[axis].iter_mut().zip(own) {
+                *sum += o * *weight;
+            }
+            mean[axis] += weight * value;
+            zero_is_known &= has_zero;
+        }
+    }
+    if let Some(part) = idle_tooth(&milling, [&orders[0], &orders[1]], mean, zero_is_known) {
+        notices.push(Notice {
+            kind: IDLE_TOOTH,
+            detail: format!("{:.0} % of what a missing tooth makes", 100.0 * part),
+        });
     }
 }
 
@@ -511,8 +539,11 @@ fn duration_notice(cut: &Cut, tool: &Tool, phases: &Phases, rate: f64, notices: 
 }
 
 /// F_tool = A F_recorded, standard errors added in squares; torque is taken as recorded.
-fn in_tool_axes(tool_from_dyno: &[[f64; 3]; 3], channels: &[ChannelAnalysis]) -> [Option<Average>; 4] {
-    let recorded = |axis: ForceAxis| channels.iter().find(|c| c.axis == axis).map(|c| c.average);
+pub(super) fn in_tool_axes(
+    tool_from_dyno: &[[f64; 3]; 3],
+    channels: &[ChannelAnalysis],
+) -> [Option<Average>; 4] {
+    let recorded = |axis: ForceAxis| channels.iter().find(|c| c.axis == axis).map(|c| c.mean.average);
     let mut averages = [None; 4];
     for (average, row) in averages.iter_mut().zip(tool_from_dyno) {
         let largest = row.iter().fold(0.0f64, |m, v| m.max(v.abs()));

@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use super::air::NO_AIR;
 use super::average_force::ForceAxis;
 use super::estimate::Method;
 use super::group::{Coefficient, Group, distinct};
 use super::identify::CfcOptions;
 use super::outlier::Misfit;
 use super::plausibility::unit_slip;
-use super::record::{CutAnalysis, NO_AIR, Notice, WRONG_SPEED};
+use super::record::{CutAnalysis, Notice, WRONG_SPEED};
 use crate::campaign::{Campaign, Process};
 
 /// Notices of all records, one sentence a kind.
@@ -25,8 +26,8 @@ pub(super) fn of_records(campaign: &Campaign, cuts: &[CutAnalysis]) -> Vec<Strin
         .collect()
 }
 
-/// As [`of_records`], for the notices that [`super::read_record`] gives of `cuts` records.
-pub(crate) fn of_faults(notices: &[(String, Notice)], cuts: usize) -> Vec<String> {
+/// As [`of_records`], for the notices of `cuts` records, each with its cut's id.
+pub(crate) fn of_notices(notices: &[(String, Notice)], cuts: usize) -> Vec<String> {
     sentences(notices.iter().map(|(id, n)| (id.as_str(), n)), cuts)
 }
 

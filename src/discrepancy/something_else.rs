@@ -7,12 +7,11 @@
 
 use std::f64::consts::TAU;
 
+use super::setup::CARE;
 use crate::identify::rest::{Rest, RestTest};
 
 /// Probability that the errors of the setup are large enough to be seen.
 const VISIBLE_ERRORS: f64 = 0.15;
-/// Standard deviation of ln of what small errors leave, from laboratory to laboratory.
-const CARE: f64 = 1.0;
 /// Prior odds of an effect of the library against something else.
 const LIBRARY_ODDS: f64 = 2.0;
 /// A pair of effects is one of many that were tried, and two effects at once are rarer than one.
@@ -62,9 +61,8 @@ fn of_usual_errors(largest: &RestTest, rest: &Rest) -> Option<f64> {
     let beyond = rest.beyond_slips.as_ref()?;
     let after = beyond.same(largest)?;
     let exponential: fn(f64) -> f64 = |u| (-u).exp();
-    // Laboratories differ in care by a factor (log-normal); half of the mean is the median of few squares.
-    let care = (largest.excess / (0.5 * beyond.usual)).ln();
-    let found = log_normal(care, CARE) - largest.excess.ln();
+    // The laboratory's care is a factor (log-normal), and its errors have sizes that are more or less likely together.
+    let found = -0.5 * (TAU * CARE * CARE).ln() - beyond.unlikely - largest.excess.ln();
     Some(found + log_density(after.excess.max(0.0), after.std, rest.small_errors, exponential))
 }
 
@@ -207,12 +205,14 @@ mod tests {
         assert!(odds_of_pair(5e3, &rest(0.0, 50.0)) > odds(5e3, &rest(0.0, 50.0)));
     }
 
-    fn with_slips(excess: f64, after: f64, usual: f64) -> Rest {
+    fn with_slips(excess: f64, after: f64, unlikely: f64) -> Rest {
         let mut rest = rest(excess, 30.0);
         let left = RestTest::new("structure", 1000.0 + after, 1000.0, 30.0, 1000.0);
         rest.beyond_slips = Some(BeyondSlips {
             tests: vec![left.unwrap()],
-            usual,
+            unlikely,
+            evidence: 0.5 * (excess - after),
+            known_to: 0.0,
         });
         rest
     }
@@ -220,22 +220,22 @@ mod tests {
     #[test]
     fn a_rest_that_small_errors_of_usual_sizes_explain_is_no_evidence_against_an_effect() {
         // As large as they usually leave, and taken by them.
-        let usual = odds(1e5, &with_slips(2e4, 0.0, 4e4));
+        let usual = odds(1e5, &with_slips(2e4, 0.0, 0.5));
         assert!(usual < 0.3, "{usual}");
-        // Far less than they would leave, or not taken by them.
-        for other in [with_slips(2e4, 0.0, 4e6), with_slips(2e4, 1e4, 4e4)] {
+        // Of sizes that no laboratory has together, or not taken by them.
+        for other in [with_slips(2e4, 0.0, 10.0), with_slips(2e4, 1e4, 0.5)] {
             let odds = odds(1e5, &other);
             assert!(odds > 1.0 && odds > 10.0 * usual, "{odds}");
         }
         // The more an effect explains beside it, the surer.
-        assert!(odds(1e6, &with_slips(2e4, 0.0, 4e4)) < usual);
+        assert!(odds(1e6, &with_slips(2e4, 0.0, 0.5)) < usual);
     }
 
     #[test]
     fn small_errors_alone_are_believed_where_they_leave_nothing_and_have_their_usual_sizes() {
-        assert!(odds_against_slips(&with_slips(2e4, 0.0, 4e4)) < 0.3);
-        assert!(odds_against_slips(&with_slips(2e4, 0.0, 4e6)) > 1.0);
-        assert!(odds_against_slips(&with_slips(2e4, 1e4, 4e4)) > 1.0);
+        assert!(odds_against_slips(&with_slips(2e4, 0.0, 0.5)) < 0.3);
+        assert!(odds_against_slips(&with_slips(2e4, 0.0, 10.0)) > 1.0);
+        assert!(odds_against_slips(&with_slips(2e4, 1e4, 0.5)) > 1.0);
         // Not tried: no excuse.
         assert_eq!(odds_against_slips(&rest(2e4, 30.0)), f64::INFINITY);
         assert_eq!(odds_against_slips(&Rest::default()), f64::INFINITY);

@@ -13,7 +13,7 @@ use super::force_channel::{force_channel, sample_std, widen_for_vibration};
 use super::off_comb::{OffComb, find_vibration};
 use crate::campaign::{Campaign, Process};
 use crate::cutting::waveform::{DrillTerm, DrillingCut, MillingCut, UnitForces};
-use crate::cutting::{ForceAxis, Notice, analyse_cut, feed_mm, of_faults, read_record};
+use crate::cutting::{ForceAxis, Notice, analyse_cut, feed_mm, of_notices, read_record};
 use crate::effects::cutting::{CutSetting, CuttingSummary};
 use crate::ingest::{ChannelRole, TimeRecord};
 use crate::progress::Progress;
@@ -194,17 +194,17 @@ impl CuttingData {
         let outcomes: Vec<Result<(CutData, Vec<Notice>)>> = indices
             .par_iter()
             .map(|&i| {
-                let (record, notices) = read_record(campaign, i)?;
-                let outcome = cut_data(campaign, i, &record);
+                let (record, mut notices) = read_record(campaign, i)?;
+                let outcome = cut_data(campaign, i, &record, &mut notices);
                 progress.step();
                 Ok((outcome?, notices))
             })
             .collect();
-        let (mut cuts, mut warnings, mut faults) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut cuts, mut warnings, mut noticed) = (Vec::new(), Vec::new(), Vec::new());
         for (&i, outcome) in indices.iter().zip(outcomes) {
             match outcome {
                 Ok((cut, notices)) => {
-                    faults.extend(notices.into_iter().map(|n| (cut.id.clone(), n)));
+                    noticed.extend(notices.into_iter().map(|n| (cut.id.clone(), n)));
                     cuts.push(cut);
                 }
                 Err(error) => warnings.push(format!("cut {} is left out: {error}", campaign.cuts[i].id)),
@@ -217,7 +217,7 @@ impl CuttingData {
                 warnings.first().map_or("", String::as_str)
             )));
         }
-        warnings.extend(of_faults(&faults, indices.len()));
+        warnings.extend(of_notices(&noticed, indices.len()));
         turn_torque(&mut cuts);
         place_in_campaign(campaign, &mut cuts);
         let tool_from_dyno = campaign.dynamometer.tool_from_dyno;
@@ -278,8 +278,15 @@ impl CuttingData {
     }
 }
 
-fn cut_data(campaign: &Campaign, index: usize, record: &TimeRecord) -> Result<CutData> {
-    let analysis = analyse_cut(campaign, index, record)?;
+/// What the analysis of the record noticed is added to `notices`.
+fn cut_data(
+    campaign: &Campaign,
+    index: usize,
+    record: &TimeRecord,
+    notices: &mut Vec<Notice>,
+) -> Result<CutData> {
+    let mut analysis = analyse_cut(campaign, index, record)?;
+    notices.append(&mut analysis.notices);
     let cut = &campaign.cuts[index];
     let tool = campaign
         .tool
@@ -349,7 +356,7 @@ fn cut_data(campaign: &Campaign, index: usize, record: &TimeRecord) -> Result<Cu
     });
     if channels.iter().all(Option::is_none) {
         return Err(Error::computation(
-            "no channel that carries the cutting force over three revolutions or more",
+            "no channel that carries the cutting force over two revolutions or more",
         ));
     }
     let kind = match milling {

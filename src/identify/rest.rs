@@ -53,8 +53,12 @@ pub struct Rest {
 pub struct BeyondSlips {
     /// The same tests; what the errors pay for their sizes is part of the excess.
     pub tests: Vec<RestTest>,
-    /// Σ r²/σ² that such errors leave where they have their usual sizes.
-    pub usual: f64,
+    /// −ln of how likely errors of such sizes are, against those of a usual laboratory.
+    pub unlikely: f64,
+    /// ln of the evidence for such errors against none.
+    pub evidence: f64,
+    /// Σ r²/σ² to which their effect on the FRFs was worked out.
+    pub known_to: f64,
 }
 
 impl BeyondSlips {
@@ -69,18 +73,19 @@ impl BeyondSlips {
 pub struct AfterSlips {
     /// As [`RestCurve::rest`], curve by curve.
     pub rest: Vec<Vec<Complex64>>,
-    /// What they pay for their sizes: Σ (size / usual size)².
+    /// What they pay for their sizes: Σ (size / standard deviation)².
     pub price: f64,
-    /// Σ r²/σ² that the errors leave where they have their usual sizes.
-    pub usual: f64,
-    /// What so many unknowns pay for being fitted, as χ².
-    pub occam: f64,
+    /// As in [`BeyondSlips`].
+    pub unlikely: f64,
+    pub evidence: f64,
+    pub known_to: f64,
 }
 
 /// Share of the signal that a good setup is still wrong by (gain, direction of the hit, angles of the joints).
 pub const SMALL_ERROR: f64 = 0.01;
-/// Chance at which noise passes for structure. Four tests of one campaign, thousands of campaigns: none should.
-const SIGNIFICANT_P: f64 = 1e-6;
+/// Chance at which noise passes for structure. Of hundreds of campaigns with four tests each none should; what is as
+/// improbable as this is physics without a name far more often than noise.
+const SIGNIFICANT_P: f64 = 1e-5;
 
 impl Rest {
     /// Whether more than noise is left.
@@ -260,7 +265,9 @@ pub fn test_beyond(curves: &mut [RestCurve], after: AfterSlips) -> BeyondSlips {
     tests.iter_mut().for_each(|t| t.excess += after.price);
     BeyondSlips {
         tests,
-        usual: after.usual,
+        unlikely: after.unlikely,
+        evidence: after.evidence,
+        known_to: after.known_to,
     }
 }
 

@@ -1,5 +1,6 @@
 //! Which format a file has, by what stands in it.
 
+use super::channel_rule;
 use super::force;
 use super::frf_text;
 use super::lvm;
@@ -111,20 +112,19 @@ pub(super) fn detect(bytes: &[u8], is_dwd_named: bool) -> Result<(Detected, Form
         let why = format!("three columns of numbers, taken as Hz, Re, Im; {how}");
         return Ok((Detected::PlainFrf(header), Format::FrfText, why));
     }
-    let (problem, line) = if header.names.is_empty() {
-        (
-            format!("{} columns of numbers without names", header.columns),
-            header.data_line,
-        )
-    } else {
-        (
-            format!("columns of unknown meaning ({})", abbreviated(&header.names)),
-            header.data_line.saturating_sub(1),
-        )
-    };
+    if header.names.is_empty() {
+        let (problem, remedy) = channel_rule::preview(bytes, &header);
+        return Err(InputError::new(problem)
+            .line(header.data_line.max(1))
+            .remedy(remedy));
+    }
+    let problem = format!("columns of unknown meaning ({})", abbreviated(&header.names));
     Err(InputError::new(problem)
-        .line(line.max(1))
-        .remedy("put a line of column names on top: frequency_hz,re,im or time_s,fx_n,fy_n,fz_n"))
+        .line(header.data_line.saturating_sub(1).max(1))
+        .remedy(
+            "put a line of column names on top: frequency_hz,re,im or time_s,fx_n,fy_n,fz_n; forces without a time column: give \
+             rate_hz in a [[channel]] of campaign.toml",
+        ))
 }
 
 fn abbreviated(names: &[String]) -> String {

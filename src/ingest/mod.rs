@@ -11,6 +11,7 @@ use serde::Serialize;
 use crate::{Error, InputError, Result};
 
 mod budget;
+mod channel_rule;
 mod checks;
 mod clock;
 mod detect;
@@ -33,6 +34,7 @@ mod uff;
 pub mod units;
 mod waveform;
 
+pub use channel_rule::{ChannelRule, Gain, Measures, Source, read_time_with, unit_of_charge_or_other};
 pub use geometry::{Geometry, NodalShape, geometry_text, read_geometry};
 pub use long::{Survey, regular_file, survey};
 pub use mat::{MatArray, mat5_bytes};

@@ -30,6 +30,11 @@ impl Dimension {
     pub const PRESSURE: Dimension = Dimension([-1, -2, 1, 0]);
     pub const VOLTAGE: Dimension = Dimension([0, 0, 0, 1]);
 
+    /// Of this for one of `other`.
+    pub fn over(self, other: Dimension) -> Dimension {
+        self.times(other, -1)
+    }
+
     fn times(self, other: Dimension, power: i32) -> Dimension {
         let mut product = self.0;
         for (a, b) in product.iter_mut().zip(other.0) {

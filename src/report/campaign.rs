@@ -4,13 +4,16 @@ use std::path::{Path, PathBuf};
 
 use super::parts::{count, failed, paragraph};
 use super::{
-    Block, Column, Page, Section, Table, cutting_section, diagnosis_section, error_map_section,
-    history_section, lobes_section, modal_section, structure_section, thesis_section, waveform_section,
+    Block, Column, Page, Section, Table, VerdictCard, cutting_section, diagnosis_section, error_map_section,
+    history_section, lobes_section, modal_section, structure_section, thesis_section, verdict_card,
+    waveform_section,
 };
 use crate::Result;
 use crate::analysis::{CampaignFindings, DiagnosisFindings, StructureFindings, ThesisFindings};
 use crate::campaign::Campaign;
+use crate::discrepancy::setup::{SetupCheck, SetupFinding};
 use crate::identify::StructureCase;
+use crate::revision::{self, Domain};
 
 /// Folder of the tables beside the page.
 #[cfg(feature = "parquet")]
@@ -53,9 +56,78 @@ pub fn page(findings: &CampaignFindings, thesis: Option<&ThesisFindings>) -> Pag
     Page {
         title: findings.campaign.name.clone(),
         subtitle: format!("Lobestone report on {}", contents(findings)),
+        origin: origin(findings.campaign),
+        cards: cards(findings),
         sections,
         ..Page::default()
     }
+}
+
+/// Who measured and when, when the page was made, and which data it is of.
+fn origin(campaign: &Campaign) -> Vec<(String, String)> {
+    let entry = |name: &str, value: String| (name.to_string(), value);
+    let mut origin = Vec::new();
+    origin.extend(campaign.date.clone().map(|date| entry("measured", date)));
+    origin.extend(campaign.operator.clone().map(|who| entry("by", who)));
+    let made = revision::now().replace('T', " ").replace('Z', " UTC");
+    origin.push(entry("made", made));
+    origin.push(entry("with Lobestone", env!("CARGO_PKG_VERSION").to_string()));
+    for (there, name, domain) in [
+        (!campaign.frfs.is_empty(), "FRF data", Domain::Structure),
+        (!campaign.cuts.is_empty(), "force data", Domain::Cutting),
+    ] {
+        let hash = there
+            .then(|| revision::fingerprint(campaign, domain).ok())
+            .flatten();
+        origin.extend(hash.map(|hash| entry(name, hash)));
+    }
+    origin
+}
+
+/// The answers, one a side.
+fn cards(findings: &CampaignFindings) -> Vec<VerdictCard> {
+    let campaign = findings.campaign;
+    let (structure, cutting) = (findings.structure(), findings.cutting_diagnosis());
+    let own = |check: Option<&SetupCheck>| -> Vec<SetupFinding> {
+        let all = check.into_iter().flat_map(|c| c.findings.iter());
+        all.filter(|f| f.is_likely()).cloned().collect()
+    };
+    // Without diagnoses nobody knows which side a mistake belongs to: it stands on the first card.
+    let mut left = findings.setup.clone();
+    let mut of_side = |check: Option<&SetupCheck>| match check {
+        Some(check) => {
+            let own = own(Some(check));
+            left.retain(|f| !own.contains(f));
+            own
+        }
+        None => std::mem::take(&mut left),
+    };
+    let mut cards = Vec::new();
+    if structure.is_some() || findings.diagnosis().is_some() {
+        let files = of_side(findings.diagnosis().map(|d| &d.setup));
+        cards.extend(verdict_card::structure(
+            campaign,
+            &files,
+            structure,
+            findings.diagnosis(),
+        ));
+    }
+    if let Some(found) = cutting {
+        cards.push(verdict_card::cutting(
+            campaign,
+            &of_side(Some(&found.setup)),
+            found,
+        ));
+    } else if let Some(result) = findings.cutting() {
+        let summary = cutting_section::summary(result);
+        cards.push(verdict_card::coefficients(
+            campaign,
+            summary,
+            &of_side(None),
+            &result.warnings,
+        ));
+    }
+    cards
 }
 
 /// A step of the demo as its page tells it: name, what it found, what to type for the same.
@@ -78,35 +150,41 @@ pub fn demo_page(
     thesis: &ThesisFindings,
     steps: &[StepRow],
 ) -> Page {
-    let mut page = page(findings, None);
+    // Most of the work is drawing figures.
+    let (mut page, (second_sections, thesis_section)) = rayon::join(
+        || page(findings, None),
+        || rayon::join(|| second_cell(second), || thesis_section::section(thesis)),
+    );
     page.title = "Lobestone demo".into();
-    page.subtitle = "Two simulated campaigns, and the thesis that this program started from".into();
+    page.subtitle = "Two simulated robot cells, and the thesis that this program started from".into();
+    page.opening = "Something was hidden in one of two simulated cells, and the program was not told what. This is what it \
+                    found:"
+        .into();
+    page.cards = verdict_card::structure(second.campaign, &[], None, Some(second.diagnosis))
+        .into_iter()
+        .collect();
     for section in &mut page.sections {
         section.title = format!("First cell: {}", lower_first(&section.title));
     }
-    page.sections.insert(0, demo_story(steps));
-    page.sections.extend(second_cell(second));
-    page.sections.push(thesis_section::section(thesis));
+    let first = std::mem::take(&mut page.sections);
+    page.sections.push(demo_story(steps));
+    page.sections.extend(second_sections);
+    page.sections.extend(first);
+    page.sections.push(thesis_section);
+    page.open_sections = Some(1);
     page
 }
 
 fn demo_story(steps: &[StepRow]) -> Section {
-    let intro = "Both campaigns are simulated, so that what the program finds can be checked against what was put in. The \
-                 first cell is a robot whose joints are up to 27 % off its data sheet, with noise on the FRFs, and a \
-                 series of milling cuts with a drifting dynamometer: the model can explain all of it. In the second cell \
-                 something was added that the model does not have, and the program is not told what: it finds the missing \
-                 physics, adds it to the model, and the error falls.";
+    let intro = "The first cell is a robot whose joints are up to 27 % off its data sheet, and a series of milling cuts with a \
+                 drifting dynamometer: the model can explain all of it. The second has something that the model does not.";
     Section {
         id: "story".into(),
-        title: "The story".into(),
-        lead:
-            "Raw files in; calibrated model, cutting coefficients, stability lobes and an honest error out."
-                .into(),
+        title: "How it got there, and how to do the same with files of your own".into(),
         blocks: vec![
             paragraph(intro),
             Block::Table(Table {
-                caption: "What each step found, and the command that does the same on files of your own"
-                    .into(),
+                caption: "What each step found, and its command".into(),
                 columns: vec![
                     Column::text("step"),
                     Column::text("found"),
@@ -116,6 +194,7 @@ fn demo_story(steps: &[StepRow]) -> Section {
                 notes: vec![],
             }),
         ],
+        ..Section::default()
     }
 }
 
@@ -135,7 +214,7 @@ fn second_cell(cell: &SecondCell) -> Vec<Section> {
         error_map_section::map_section(cell.before),
         diagnosis_section::section(cell.campaign, cell.diagnosis),
     ];
-    sections.extend(history_section::section(cell.after));
+    sections.extend(history_section::section(&cell.after.revisions, &[]));
     for section in &mut sections {
         section.title = format!("Second cell: {}", lower_first(&section.title));
     }
@@ -198,6 +277,7 @@ fn parts(findings: &CampaignFindings) -> Vec<Section> {
         Some(Err(error)) => sections.push(failed(waveform_section::ID, waveform_section::TITLE, error)),
         None => {}
     }
+    sections.extend(history_section::cutting_section(&findings.cutting_revisions));
     match &findings.lobes {
         Some(Ok(lobes)) => sections.push(lobes_section::section(lobes, findings.structure())),
         Some(Err(error)) => sections.push(failed("lobes", "Stability lobes", error)),
@@ -244,8 +324,8 @@ fn summary(findings: &CampaignFindings) -> Section {
     Section {
         id: "summary".into(),
         title: "Summary".into(),
-        lead: String::new(),
         blocks,
+        ..Section::default()
     }
 }
 

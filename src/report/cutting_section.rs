@@ -4,8 +4,8 @@ use super::figure::{
     ForceChannel, ForceRecord, HeatMap, RegressionFigure, RegressionPoint, RegressionSeries,
 };
 use super::interactive::Plot;
-use super::number::{decimals, percent, significant};
-use super::parts::{count, figure, listed, setting, with_error};
+use super::number::{decimals, percent, significant, with_error};
+use super::parts::{count, figure, listed, setting};
 use super::{Block, Column, Section, Table};
 use crate::analysis::regression_line::{FeedLine, feed_lines};
 use crate::campaign::{Campaign, Process};
@@ -189,7 +189,7 @@ fn record_drawing(cut: &CutAnalysis) -> ForceRecord {
                 .flat_map(|(a, b)| [*a, *b])
                 .collect(),
             drift: cut.record_s.iter().map(|t| (*t, channel.drift.at(*t))).collect(),
-            steady_level: Some(channel.average.value + channel.drift.at(middle_s)),
+            steady_level: Some(channel.mean.average.value + channel.drift.at(middle_s)),
         }
     });
     ForceRecord {

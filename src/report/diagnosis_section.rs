@@ -4,10 +4,10 @@ use num_complex::Complex64;
 
 use super::error_map_section::times_noise_map;
 use super::figure::{BarSeries, FrfCurve, FrfFigure, NoiseLevel, SideBySide};
-use super::number::{decimals, percent, significant};
-use super::parts::{figure, listed, paragraph, with_error};
+use super::number::{decimals, percent, plus_minus, significant};
+use super::parts::{figure, listed, paragraph};
 use super::structure_section::frf_name;
-use super::{Block, Column, Section, Table};
+use super::{Block, Column, Section, Table, words};
 use crate::analysis::DiagnosisFindings;
 use crate::analysis::diagnosis::Leading;
 use crate::campaign::Campaign;
@@ -45,8 +45,22 @@ pub(super) fn verdict_text<M, I>(
             let (title, explanation) = plainly(winner);
             format!("The model lacks {title} ({sure}). {explanation}")
         }
-        (Verdict::None, _) => {
-            format!("The model lacks nothing that these {data} show: what is left looks like noise ({sure}).")
+        (Verdict::None, _) => match d.baseline.rest.excuse_in_words() {
+            Some(left) => format!(
+                "The model lacks nothing that is larger than the small errors of the setup ({sure}): what stands above the \
+                 noise is {left}."
+            ),
+            None => {
+                format!(
+                    "The model lacks nothing that these {data} show: what is left looks like noise ({sure})."
+                )
+            }
+        },
+        _ if d.too_little_data.is_some() => {
+            format!(
+                "No verdict: {}.",
+                d.too_little_data.as_deref().unwrap_or_default()
+            )
         }
         _ => format!(
             "The model lacks something that no effect of the library explains ({sure}): what is left is real, but of a kind \
@@ -227,8 +241,12 @@ pub(super) fn candidate_table<M, I>(
             .parameters
             .iter()
             .map(|p| {
-                let name = p.name.rsplit('.').next().unwrap_or(&p.name);
-                format!("{name} {}", value(p.value, p.std_error))
+                let unit = if p.unit == "1" { "" } else { p.unit };
+                format!(
+                    "{} {}",
+                    words::parameter(&p.name),
+                    plus_minus(p.value, p.std_error, unit)
+                )
             })
             .collect();
         vec![
@@ -269,15 +287,6 @@ pub(super) fn candidate_table<M, I>(
         rows: all.iter().take(LISTED).map(row).collect(),
         notes,
     })
-}
-
-/// A parameter of any size with its standard error.
-fn value(value: f64, std_error: f64) -> String {
-    match value.abs() {
-        size if (0.1..1e5).contains(&size) => with_error(value, std_error),
-        _ if std_error.is_finite() => format!("{value:.3e} ± {std_error:.0e}"),
-        _ => format!("{value:.3e}"),
-    }
 }
 
 fn maps(findings: &DiagnosisFindings, leading: &Leading, candidate: &StructureCandidate) -> Block {

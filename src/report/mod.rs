@@ -19,6 +19,7 @@ pub mod number;
 pub mod page;
 pub(crate) mod parts;
 mod picker;
+mod picture;
 mod real_case_section;
 mod redundancy_section;
 pub mod structure_section;
@@ -31,6 +32,9 @@ pub mod sweep_table;
 pub mod tables;
 pub mod thesis_cutting;
 pub mod thesis_section;
+pub mod verdict_card;
 pub mod waveform_section;
+mod words;
 
-pub use page::{Block, Column, Drawing, Figure, OnScreen, Page, Section, Table, Written};
+pub use page::{Block, Column, Drawing, Figure, Fold, OnScreen, Page, Section, Table, Written};
+pub use verdict_card::VerdictCard;

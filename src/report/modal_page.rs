@@ -8,8 +8,8 @@ use super::figure::{CellFormat, CompassFigure, HeatMap, IndicatorFigure, WirePic
 use super::modal_section::{
     coherence, mac, modes, reconstruction, reconstruction_of, stabilisation, tracked,
 };
-use super::number::decimals;
-use super::parts::{count, figure, with_error};
+use super::number::{decimals, with_error};
+use super::parts::{count, figure};
 use super::picker::picker;
 use super::{Block, Column, Drawing, Page, Section, Table};
 use crate::analysis::ModalAnalysis;
@@ -107,7 +107,7 @@ pub fn page(analysis: &ModalAnalysis, extras: &Extras, title: &str) -> Page {
         title: title.into(),
         subtitle: "Modes of measured FRFs".into(),
         sections,
-        without_scripts: false,
+        ..Page::default()
     }
 }
 

@@ -6,9 +6,9 @@ use super::figure::{
     CellFormat, CoherenceCurve, CoherenceFigure, FrfCurve, FrfFigure, HeatMap, ModeShapesFigure, NoiseLevel,
     NyquistFigure, StabilisationFigure, StabilisationPole, StickPicture,
 };
-use super::number::decimals;
-use super::parts::{count, figure, with_error};
-use super::{Block, Column, Drawing, Section, Table};
+use super::number::{decimals, with_error};
+use super::parts::{count, figure};
+use super::{Block, Column, Drawing, Fold, Section, Table};
 use crate::analysis::ModalAnalysis;
 use crate::analysis::modal::{AnalysedFrf, SetModes};
 use crate::analysis::stick_shapes::StickShape;
@@ -37,10 +37,23 @@ pub fn summary(analysis: &ModalAnalysis) -> Option<String> {
 }
 
 pub fn section(analysis: &ModalAnalysis, shapes: &[StickShape]) -> Section {
-    let mut blocks = vec![modes(analysis)];
-    if analysis.sets.len() > 1 {
-        blocks.extend(tracked(analysis));
-    }
+    let tracked = if analysis.sets.len() > 1 {
+        tracked(analysis)
+    } else {
+        None
+    };
+    let mut blocks = match tracked {
+        // Each mode once: what the table by posture adds is a click away.
+        Some(tracked) => vec![
+            tracked,
+            Block::Fold(Fold {
+                title: "The same modes posture by posture, with what each rests on".into(),
+                blocks: vec![modes(analysis)],
+                open: false,
+            }),
+        ],
+        None => vec![modes(analysis)],
+    };
     // One posture shows how it was done; all of them would be a picture book.
     if let Some(set) = analysis.richest_set() {
         blocks.push(stabilisation(set));

@@ -70,7 +70,8 @@ pub fn format_si(value: f64, unit: &str, digits: usize) -> String {
     join(&significant(scaled, digits), &format!("{prefix}{unit}"))
 }
 
-/// `value ± standard error`, the value cut to the error's second digit: `(1.23456e6, 2.1e3)` → `1.2346 ± 0.0021 MN·m/rad`.
+/// `value ± standard error` in `unit`, both rounded where the error has no more meaning:
+/// `(1.23456e6, 2.1e3)` → `1.2346 ± 0.0021 MN·m/rad`, `(47.26702, 0.00086)` → `47.2670 ± 0.0009 Hz`.
 pub fn plus_minus(value: f64, std_error: f64, unit: &str) -> String {
     if !value.is_finite() {
         return MISSING.to_owned();
@@ -78,28 +79,56 @@ pub fn plus_minus(value: f64, std_error: f64, unit: &str) -> String {
     if !std_error.is_finite() || std_error <= 0.0 {
         return format_si(value, unit, 4);
     }
+    let size = value.abs().max(std_error);
     let (scaled, prefix) = match takes_prefix(unit) {
-        true => si_prefix(value.abs().max(std_error), 4),
-        false => (value, ""),
+        true => si_prefix(size, 4),
+        false => (size, ""),
     };
-    let factor = match takes_prefix(unit) && value.abs().max(std_error) > 0.0 {
-        true => scaled / value.abs().max(std_error),
-        false => 1.0,
-    };
-    let (value, error) = (value * factor, std_error * factor);
-    let order = error.log10().floor() as i32;
-    let unit = format!("{prefix}{unit}");
-    if !(-6..6).contains(&order) {
-        return join(
-            &format!("{} ± {}", significant(value, 4), significant(error, 2)),
-            &unit,
-        );
+    let (value, error) = (value * (scaled / size), std_error * (scaled / size));
+    join(&with_error(value, error), &format!("{prefix}{unit}"))
+}
+
+/// `value ± error` as bare numbers, rounded by the error, which keeps two digits where it begins with less than 3.55 and one
+/// otherwise (Particle Data Group, Review of Particle Physics, introduction 5.3); one power of ten for both where they are
+/// very large or small.
+pub fn with_error(value: f64, error: f64) -> String {
+    if !value.is_finite() {
+        return MISSING.to_owned();
     }
-    let places = (1 - order).max(0) as usize;
-    join(
-        &format!("{} ± {}", decimals(value, places), decimals(error, places)),
-        &unit,
-    )
+    // An error that no digit of the value could show is none.
+    if !(error.is_finite() && error > 1e-12 * value.abs() && error > 0.0) {
+        return significant(value, 5);
+    }
+    let power = value.abs().max(error).log10().floor() as i32;
+    if !(-3..6).contains(&power) {
+        let scale = 10f64.powi(power);
+        return match scale > 0.0 && scale.is_finite() {
+            true => format!(
+                "({})·10{}",
+                rounded(value / scale, error / scale),
+                superscript(power)
+            ),
+            false => significant(value, 4),
+        };
+    }
+    rounded(value, error)
+}
+
+fn rounded(value: f64, error: f64) -> String {
+    let order = error.log10().floor() as i32;
+    let two_digits = error / 10f64.powi(order) < 3.55;
+    let places = if two_digits { 1 - order } else { -order };
+    // Tens and hundreds are rounded, too.
+    let step = 10f64.powi((-places).max(0));
+    let text = |v: f64| decimals((v / step).round() * step, 0);
+    match places {
+        ..=0 => format!("{} ± {}", text(value), text(error)),
+        _ => format!(
+            "{} ± {}",
+            decimals(value, places as usize),
+            decimals(error, places as usize)
+        ),
+    }
 }
 
 fn join(number: &str, unit: &str) -> String {
@@ -207,6 +236,20 @@ mod tests {
         assert_eq!(plus_minus(5.0, f64::NAN, "kg"), "5.000\u{a0}kg");
         assert_eq!(plus_minus(f64::NAN, 1.0, "kg"), MISSING);
         assert_eq!(plus_minus(0.0, 2.0, "N"), "0.0 ± 2.0\u{a0}N");
+        assert_eq!(plus_minus(47.26702, 0.00086, "Hz"), "47.2670 ± 0.0009\u{a0}Hz");
+        assert_eq!(with_error(2.458e-4, 4e-2), "0.00 ± 0.04");
+        assert_eq!(with_error(929.782, 0.59), "929.8 ± 0.6");
+        assert_eq!(with_error(929.782, 5.9), "930 ± 6");
+        assert_eq!(with_error(929.782, 59.0), "930 ± 60");
+        assert_eq!(with_error(929.782, 0.354), "929.78 ± 0.35");
+        assert_eq!(with_error(929.782, 0.0097), "929.782 ± 0.010");
+        assert_eq!(with_error(-2.4583e-7, 4.1e-9), "(−2.46 ± 0.04)·10⁻⁷");
+        assert_eq!(with_error(929.782, f64::NAN), "929.78");
+        assert_eq!(with_error(f64::NAN, 1.0), MISSING);
+        assert_eq!(with_error(1e300, 1e-300), "1.0000·10³⁰⁰");
+        assert_eq!(with_error(1e300, f64::MIN_POSITIVE), "1.0000·10³⁰⁰");
+        assert_eq!(with_error(0.0, 1e300), "(0.0 ± 1.0)·10³⁰⁰");
+        assert_eq!(with_error(0.0, 5e-324), "0");
     }
 
     #[test]

@@ -11,7 +11,9 @@ use minijinja::syntax::SyntaxConfig;
 use minijinja::{Environment, Value, context};
 use serde_json::json;
 
+use super::VerdictCard;
 use super::interactive::{Explorer, GLUE, Plot, packed, plotly_js};
+use super::number::percent;
 use crate::files::write_atomically;
 use crate::{Error, Result};
 
@@ -22,7 +24,15 @@ pub const HTML_NAME: &str = "report.html";
 pub struct Page {
     pub title: String,
     pub subtitle: String,
+    /// Where the page comes from: name and value, such as the date and the program's version.
+    pub origin: Vec<(String, String)>,
+    /// What the answers mean, above them; left out where empty.
+    pub opening: String,
+    /// The answers, before all sections.
+    pub cards: Vec<VerdictCard>,
     pub sections: Vec<Section>,
+    /// How many sections stand open; of the others a reader sees the titles and opens what he wants. `None`: all.
+    pub open_sections: Option<usize>,
     /// Images only, no scripts: a small file.
     pub without_scripts: bool,
 }
@@ -50,6 +60,16 @@ pub enum Block {
     KeyValues(Vec<(String, String)>),
     /// Shown as it is, in a fixed-width font.
     Pre(String),
+    Fold(Fold),
+}
+
+/// Blocks behind a line that a reader opens.
+#[derive(Debug, Clone, Default)]
+pub struct Fold {
+    pub title: String,
+    pub blocks: Vec<Block>,
+    /// Open from the beginning.
+    pub open: bool,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -146,7 +166,8 @@ impl Page {
             live: !self.without_scripts,
             ..Parts::default()
         };
-        let sections = self.sections.iter().map(|section| {
+        let open = self.open_sections.unwrap_or(usize::MAX);
+        let sections = self.sections.iter().enumerate().map(|(i, section)| {
             let wanted = if section.id.trim().is_empty() {
                 &section.title
             } else {
@@ -156,6 +177,7 @@ impl Page {
                 id => ids.unique(&slug(wanted, "section")),
                 title => section.title.as_str(),
                 lead => section.lead.as_str(),
+                folded => i >= open,
                 blocks => section.blocks.iter().map(|block| block.value(&mut parts)).collect::<Vec<_>>(),
             }
         });
@@ -165,6 +187,10 @@ impl Page {
         let page = context! {
             title => self.title.as_str(),
             subtitle => self.subtitle.as_str(),
+            origin => self.origin.iter().map(|(name, value)| context! { name, value }).collect::<Vec<_>>(),
+            opening => self.opening.as_str(),
+            cards => self.cards.iter().map(card).collect::<Vec<_>>(),
+            folded => open < self.sections.len(),
             sections,
             scripts,
             version,
@@ -179,11 +205,9 @@ impl Page {
     pub fn images(&self) -> Vec<(String, &[u8])> {
         let mut files = Names::default();
         let blocks = self.sections.iter().flat_map(|section| &section.blocks);
-        blocks
-            .filter_map(|block| match block {
-                Block::Figure(figure) => Some((figure.unique_name(&mut files), figure.png.as_slice())),
-                _ => None,
-            })
+        let figures = blocks.flat_map(Block::figures);
+        figures
+            .map(|figure| (figure.unique_name(&mut files), figure.png.as_slice()))
             .collect()
     }
 
@@ -268,12 +292,65 @@ impl Parts {
     }
 }
 
+/// A card for the template.
+fn card(card: &VerdictCard) -> Value {
+    let bar = card.bar.as_ref().map(|bar| {
+        let shares = bar.shares();
+        let steps = bar.steps.iter().zip(&shares).map(|((name, nrms), share)| {
+            context! { name, error => percent(*nrms), share => format!("{share:.2}") }
+        });
+        context! {
+            steps => steps.collect::<Vec<_>>(),
+            noise => percent(bar.noise),
+            noise_share => format!("{:.2}", shares.last().copied().unwrap_or(0.0)),
+        }
+    });
+    let curves = card.curves.as_ref().map(|c| {
+        context! {
+            svg => Value::from_safe_string(c.picture.svg()),
+            before => c.before.as_str(),
+            after => c.after.as_deref(),
+            noise => c.picture.noise.is_some(),
+            shaded => c.picture.shaded.is_some(),
+            caption => c.caption.as_str(),
+        }
+    });
+    context! {
+        id => card.id,
+        side => card.side,
+        tone => card.tone.name(),
+        headline => card.headline.as_str(),
+        explanation => card.explanation.as_str(),
+        facts => card.facts.iter().map(|(name, value)| context! { name => *name, value }).collect::<Vec<_>>(),
+        bar,
+        curves,
+        check => card.check.as_deref(),
+        next => card.next.as_str(),
+        remarks => card.remarks.clone(),
+    }
+}
+
 impl Block {
+    /// The figures in it, in the order of the page.
+    fn figures(&self) -> Vec<&Figure> {
+        match self {
+            Block::Figure(figure) => vec![figure],
+            Block::Fold(fold) => fold.blocks.iter().flat_map(Block::figures).collect(),
+            _ => Vec::new(),
+        }
+    }
+
     fn value(&self, parts: &mut Parts) -> Value {
         match self {
             Block::Paragraph(text) => context! { kind => "paragraph", text },
             Block::Warning(text) => context! { kind => "warning", text },
             Block::Pre(text) => context! { kind => "pre", text },
+            Block::Fold(fold) => context! {
+                kind => "fold",
+                title => fold.title.as_str(),
+                open => fold.open,
+                blocks => fold.blocks.iter().map(|block| block.value(parts)).collect::<Vec<_>>(),
+            },
             Block::KeyValues(pairs) => {
                 let pairs = pairs.iter().map(|(name, value)| context! { name, value });
                 context! { kind => "key_values", pairs => pairs.collect::<Vec<_>>() }
@@ -298,9 +375,18 @@ impl Block {
                     }
                     _ => None,
                 };
+                let plot = match &figure.on_screen {
+                    OnScreen::Plot(plot) => Some(plot),
+                    _ => None,
+                };
                 context! {
                     kind => "figure",
                     plot => number,
+                    // So that nothing moves while figures are drawn.
+                    title => plot.map(|p| p.title()),
+                    plot_height => plot.map(|p| p.height_px()),
+                    chooses => plot.is_some_and(|p| p.offers_choice()),
+                    follows => plot.is_some_and(|p| p.follows_models()),
                     elsewhere => matches!(figure.on_screen, OnScreen::Elsewhere),
                     file => figure.unique_name(&mut parts.files),
                     alt => if figure.alt.is_empty() { &figure.caption } else { &figure.alt },
@@ -453,9 +539,26 @@ mod tests {
                 Block::Warning(name.to_owned()),
                 Block::KeyValues(vec![(name.to_owned(), name.to_owned())]),
                 Block::Pre(name.to_owned()),
+                Block::Fold(Fold {
+                    title: name.to_owned(),
+                    blocks: vec![Block::Paragraph(name.to_owned())],
+                    open: false,
+                }),
             ],
         };
+        let card = VerdictCard {
+            headline: name.to_owned(),
+            explanation: name.to_owned(),
+            facts: vec![("Where", name.to_owned())],
+            check: Some(name.to_owned()),
+            next: name.to_owned(),
+            remarks: vec![name.to_owned()],
+            ..VerdictCard::default()
+        };
         Page {
+            cards: vec![card],
+            opening: name.to_owned(),
+            origin: vec![(name.to_owned(), name.to_owned())],
             title: name.to_owned(),
             subtitle: name.to_owned(),
             sections: vec![section(""), section("errors")],
@@ -544,6 +647,42 @@ mod tests {
             .unwrap_err()
             .to_string();
         assert!(error.contains("below"), "{error}");
+    }
+
+    #[test]
+    fn what_is_folded_up_is_there_and_needs_no_contents() {
+        let mut page = page("cell 7");
+        assert!(!page.html().unwrap().contains("class=\"part\""));
+        page.open_sections = Some(1);
+        let html = page.html().unwrap();
+        assert!(html.contains("<section id=\"errors\">\n<details class=\"part\">"));
+        assert!(html.contains("<summary><h2>cell 7</h2></summary>"));
+        assert!(html.contains("<section id=\"cell-7\">\n<h2>1. cell 7</h2>"));
+        assert!(!html.contains("<nav"));
+        let verdict = html.find("<article class=\"card open\" id=\"verdict\"").unwrap();
+        assert!(verdict < html.find("<section").unwrap(), "the answer comes first");
+    }
+
+    #[test]
+    fn images_in_folds_are_files_like_others() {
+        let mut page = page("x");
+        let Block::Figure(figure) = page.sections[0].blocks[1].clone() else {
+            panic!("no figure");
+        };
+        page.sections[0].blocks.push(Block::Fold(Fold {
+            title: "more".into(),
+            blocks: vec![Block::Figure(figure)],
+            open: false,
+        }));
+        let names: Vec<String> = page.images().into_iter().map(|(name, _)| name).collect();
+        assert_eq!(names, ["x.png", "x-2.png", "x-3.png"]);
+        let html = page.html().unwrap();
+        let linked: Vec<&str> = html
+            .split("class=\"file\" href=\"")
+            .skip(1)
+            .map(|rest| rest.split('"').next().unwrap())
+            .collect();
+        assert_eq!(linked, names, "the page offers them under the names they have");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Small things that all sections of a report use.
 
 use super::interactive::Plot;
-use super::number::{decimals, significant};
+use super::number::significant;
 use super::{Block, Figure, OnScreen, Section};
 use crate::Result;
 
@@ -72,15 +72,6 @@ pub fn listed(items: &[String]) -> String {
     }
 }
 
-/// `929.8 ± 0.5`: decimals by the error, which keeps two figures.
-pub fn with_error(value: f64, error: f64) -> String {
-    if !(error > 0.0 && error.is_finite()) {
-        return significant(value, 5);
-    }
-    let places = (1.0 - error.log10().floor()).clamp(0.0, 4.0) as usize;
-    format!("{} ± {}", decimals(value, places), decimals(error, places))
-}
-
 /// A setting as somebody wrote it: `1160`, `0.05`.
 pub fn setting(value: f64) -> String {
     if value.is_finite() && value.abs() < 1e9 {
@@ -112,11 +103,8 @@ mod tests {
     }
 
     #[test]
-    fn settings_and_values_keep_their_digits() {
+    fn settings_keep_their_digits() {
         assert_eq!(setting(1160.0), "1160");
         assert_eq!(setting(0.05), "0.05");
-        assert_eq!(with_error(929.782, 0.59), "929.78 ± 0.59");
-        assert_eq!(with_error(929.782, 5.9), "929.8 ± 5.9");
-        assert_eq!(with_error(929.782, f64::NAN), "929.78");
     }
 }

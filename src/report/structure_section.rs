@@ -1,11 +1,13 @@
 //! The robot model against measured FRFs: FRFs, error map, parameters.
 
 use super::figure::{self, FrfCurve, FrfFigure, NoiseLevel, ParameterFigure, ParameterRow, RobotFigure};
+use super::history_section::Stage;
 use super::interactive::Explorer;
 use super::number::{decimals, percent, plus_minus, significant};
 use super::parts::{count, figure, listed, paragraph};
 use super::{Block, Column, OnScreen, Section, Table, error_map_section, history_section};
 use crate::analysis::{PostureFindings, StructureFindings};
+use crate::identify::FrfData;
 
 /// FRFs shown as figures: the worst and the best.
 const WORST_SHOWN: usize = 3;
@@ -19,23 +21,33 @@ pub fn summary(findings: &StructureFindings) -> String {
     let data = &findings.analysis.case.data;
     let (before, after) = (&findings.analysis.before.totals, &findings.analysis.after.totals);
     let mut text = format!(
-        "{} at {} were compared with the model of the {}. With the values of the robot file the error (nrms) was {}; \
-         after calibration it is {}. The noise of the measurement itself amounts to {}.",
+        "{} at {} were compared with the model of the {}. With the values of the robot file the error (nrms) was {}; ",
         count(data.frfs().count(), "measured FRF", "measured FRFs"),
         count(data.measured_postures().len(), "posture", "postures"),
         findings.analysis.case.model.robot.spec.name,
         percent(before.nrms),
-        percent(after.nrms),
-        percent(after.noise_floor_nrms),
     );
     let added = findings.analysis.case.model.effects();
-    if !added.is_empty() {
-        let names: Vec<String> = added.iter().map(|a| a.instance.title()).collect();
-        text += &format!(
-            " The calibrated model has what was added to it: {}.",
-            listed(&names)
-        );
-    }
+    let names: Vec<String> = added.iter().map(|a| a.instance.title()).collect();
+    // To each its own: what calibration did, and what the effects did.
+    text += &match (names.as_slice(), findings.earlier.first()) {
+        ([], _) => format!("after calibration it is {}.", percent(after.nrms)),
+        (some, Some(first)) => format!(
+            "after calibration alone it was {}; with what was added to the model, {}, it is {}.",
+            percent(first.comparison.totals.nrms),
+            listed(some),
+            percent(after.nrms)
+        ),
+        (some, None) => format!(
+            "calibrated with what was added to the model, {}, it is {}.",
+            listed(some),
+            percent(after.nrms)
+        ),
+    };
+    text += &format!(
+        " The noise of the measurement itself amounts to {}.",
+        percent(after.noise_floor_nrms)
+    );
     if let Some(held_out) = findings.held_out_nrms {
         text += &format!(
             " Postures that were left out of the fit are predicted with an error of {}.",
@@ -83,7 +95,23 @@ fn verdict(findings: &StructureFindings) -> String {
 
 pub fn sections(findings: &StructureFindings) -> Vec<Section> {
     let mut sections = vec![frf_section(findings), error_map_section::map_section(findings)];
-    sections.extend(history_section::section(&findings.analysis.case));
+    let now = &findings.analysis;
+    let earlier = findings.earlier.iter();
+    let stages: Vec<Stage> = earlier
+        .map(|stage| Stage {
+            predicted: &stage.predicted,
+            comparison: &stage.comparison,
+        })
+        .chain([Stage {
+            predicted: &now.calibrated,
+            comparison: &now.after,
+        }])
+        .collect();
+    let steps: Vec<(&FrfData, [Stage; 2])> = stages
+        .windows(2)
+        .map(|w| (&now.case.data, [w[0], w[1]]))
+        .collect();
+    sections.extend(history_section::section(&now.case.revisions, &steps));
     sections.push(parameter_section(findings));
     sections
 }
@@ -152,10 +180,18 @@ fn frf_figure(findings: &StructureFindings, index: usize, file: &str, place: &st
         value: value.to_vec(),
     };
     let name = frf_name(&after.posture, &after.name);
-    let models = [
-        ("robot file", &analysis.nominal, before.nrms),
-        ("calibrated", &analysis.calibrated, after.nrms),
-    ];
+    let added = !analysis.case.model.effects().is_empty();
+    let first = findings.earlier.first().filter(|_| added);
+    let without =
+        first.and_then(|stage| Some((&stage.predicted, stage.comparison.frf_errors.get(index)?.nrms)));
+    let mut models = vec![("robot file", &analysis.nominal, before.nrms)];
+    models.extend(without.map(|(predicted, nrms)| ("calibrated, nothing added", predicted, nrms)));
+    let now = if added {
+        "with what was added"
+    } else {
+        "calibrated"
+    };
+    models.push((now, &analysis.calibrated, after.nrms));
     let drawing = FrfFigure {
         title: format!("{name}: model against measurement"),
         quantity: "Receptance".into(),
@@ -174,11 +210,22 @@ fn frf_figure(findings: &StructureFindings, index: usize, file: &str, place: &st
             magnitude: frf.noise_std.clone(),
         }),
     };
+    let steps = match without {
+        Some((_, nrms)) => format!(
+            "Error {} before calibration, {} after it, {} with what was added",
+            percent(before.nrms),
+            percent(nrms),
+            percent(after.nrms)
+        ),
+        None => format!(
+            "Error {} before and {} after calibration",
+            percent(before.nrms),
+            percent(after.nrms)
+        ),
+    };
     let caption = format!(
-        "{place}: {name}. Error {} before and {} after calibration; its noise is {}.",
-        percent(before.nrms),
-        percent(after.nrms),
-        percent(after.noise_floor_nrms),
+        "{place}: {name}. {steps}; its noise is {}.",
+        percent(after.noise_floor_nrms)
     );
     // The explorer shows it on a screen.
     figure(file, &drawing.title.clone(), caption, drawing.png()).on_screen(OnScreen::Elsewhere)

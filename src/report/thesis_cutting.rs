@@ -69,7 +69,7 @@ fn coefficient_table(tables: &CuttingTables) -> Block {
             r.material.clone(),
             r.graph.clone(),
             significant(r.cutting_speed_m_per_min, 3),
-            format!("{}/{}", r.feeds, r.feeds_planned),
+            r.feeds_in_words(),
         ];
         row.extend(r.coefficients.iter().map(|k| significant(*k, 3)));
         row
@@ -79,7 +79,7 @@ fn coefficient_table(tables: &CuttingTables) -> Block {
         columns,
         rows: rows.collect(),
         notes: vec![
-            "feeds: with data / planned. Edge coefficients below zero are no physics; see below.".into(),
+            "feeds: with data / planned (<4/4: some are missing, which is not printed). Edge coefficients below zero are no physics; see below.".into(),
         ],
     })
 }

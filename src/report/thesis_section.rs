@@ -94,7 +94,8 @@ fn maybe(value: Option<Range>) -> String {
 
 fn static_text(findings: &ThesisFindings) -> String {
     let mut text = format!(
-        "Static stiffness, model over measurement: as published {}, ours before calibration {}, ours after {}.",
+        "{} Static stiffness, model over measurement: as published {}, ours before calibration {}, ours after {}.",
+        findings.study.static_place(),
         maybe(findings.static_published),
         maybe(findings.static_before),
         maybe(findings.static_after),

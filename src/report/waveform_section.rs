@@ -5,8 +5,8 @@ use super::diagnosis_section::{
 };
 use super::error_map_section::{LEAST_TOP, TIMES_NOISE};
 use super::figure::{BarSeries, CellFormat, HeatMap, SideBySide, WaveformFigure, WaveformPanel};
-use super::number::percent;
-use super::parts::{figure, listed, paragraph, setting, with_error};
+use super::number::{percent, with_error};
+use super::parts::{figure, listed, paragraph, setting};
 use super::{Block, Column, Section, Table};
 use crate::analysis::CuttingFindings;
 use crate::analysis::diagnosis::CuttingView;
@@ -46,9 +46,7 @@ pub fn summary(findings: &CuttingFindings) -> String {
 }
 
 pub fn sections(campaign: &Campaign, findings: &CuttingFindings) -> Vec<Section> {
-    let mut sections = vec![comparison(findings), missing(campaign, findings)];
-    sections.extend(super::history_section::cutting_section(&findings.case));
-    sections
+    vec![comparison(findings), missing(campaign, findings)]
 }
 
 /// What the leading candidate is called, and the model with it.

@@ -261,6 +261,7 @@ mod tests {
             progress: Some(true),
             when: "2025-01-01T00:00:00Z".into(),
             data: "0123456789abcdef".into(),
+            why: None,
         }
     }
 

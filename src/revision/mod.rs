@@ -5,10 +5,12 @@
 //! the floors above.
 
 mod clock;
+mod evidence;
 mod fingerprint;
 mod lock;
 mod log;
 
+pub use evidence::{Evidence, RecordedCandidate, keep, recall};
 pub use fingerprint::{cutting_fingerprint, fingerprint, structure_fingerprint};
 pub use lock::hold;
 pub use log::{RevisionLog, log_file};
@@ -73,6 +75,9 @@ pub struct Revision {
     pub when: String,
     /// Fingerprint of the data it was fitted to.
     pub data: String,
+    /// What the diagnosis of the model before said; `None` where there was none (and for the baseline).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub why: Option<Evidence>,
 }
 
 impl Revision {

@@ -170,6 +170,8 @@ async function showState() {
   document.title = `${state.name} – lobestone`;
   setText($("folder"), state.dir);
   const focused = document.activeElement?.dataset?.key;
+  const chosen = [...document.querySelectorAll("#sides select")].map((s) => [s.id, s.value]);
+  const scrolled = $("bench").scrollTop;
   const open = [...document.querySelectorAll("#sides details[open]")].map((d) => d.dataset.key);
   const effects = new Map(state.effects.map((e) => [e.effect, e]));
   const before = state.problems.map((p) => make("div", { class: "warning" }, p));
@@ -184,7 +186,12 @@ async function showState() {
     const again = document.querySelector(`details[data-key="${CSS.escape(key)}"]`);
     if (again) again.open = true;
   }
+  for (const [id, value] of chosen) {
+    const again = document.getElementById(id);
+    if ([...(again?.options ?? [])].some((o) => o.value === value)) again.value = value;
+  }
   if (focused) document.querySelector(`[data-key="${CSS.escape(focused)}"]`)?.focus({ preventScroll: true });
+  $("bench").scrollTop = scrolled;
   setBusy(busy);
   $("frame").hidden = !state.report;
   $("no-report").hidden = !!state.report;
@@ -286,6 +293,8 @@ function diagnosisNodes(side, effects, folds) {
   const verdict = make("div", { class: `verdict ${d.verdict}` }, make("p", { class: "answer" }, d.answer));
   const fingerprint = d.effect && effects.get(d.effect)?.fingerprint;
   if (fingerprint) verdict.append(make("p", {}, make("strong", {}, "How it shows: "), fingerprint));
+  const check = d.effect && effects.get(d.effect)?.lab_check;
+  if (check) verdict.append(make("p", {}, make("strong", {}, "Check in the laboratory: "), check));
   if (d.indistinguishable.length)
     verdict.append(make("p", {}, make("strong", {}, "These data cannot tell it from: "), d.indistinguishable.join(", ")));
   verdict.append(make("p", {}, make("strong", {}, "Most telling further measurement: "), d.next_measurement.what));
@@ -344,6 +353,14 @@ function otherEffect(side, effects) {
     make("summary", {}, "Add an effect of your own choice"),
     make("div", { class: "other" }, make("label", { for: `${side.side}-other`, class: "muted" }, "effect"), select, add));
 }
+
+// The report in its frame has no origin: where it is scrolled to it tells, and is told again after it was drawn anew.
+let reportScroll = 0;
+window.addEventListener("message", (event) => {
+  if (event.source !== $("frame").contentWindow || !Number.isFinite(event.data?.lobestoneScroll)) return;
+  reportScroll = event.data.lobestoneScroll;
+});
+$("frame").addEventListener("load", () => $("frame").contentWindow.postMessage({ lobestoneScroll: reportScroll }, "*"));
 
 $("refresh").addEventListener("click", (event) => {
   if (event.currentTarget.getAttribute("aria-disabled") !== "true") send({ do: "refresh" });

@@ -13,10 +13,10 @@ pub struct Blocks {
 }
 
 impl Blocks {
-    /// Cuts `samples` into `floor(len / samples_per_block)` blocks; a rest at the end is left out.
+    /// Cuts `samples` into as many blocks as there are, their edges rounded to samples; a rest at the end is left out.
     pub fn new(samples: &[f64], samples_per_block: f64) -> Blocks {
         let count = if samples_per_block >= 1.0 {
-            (samples.len() as f64 / samples_per_block + 1e-9).floor() as usize
+            ((samples.len() as f64 + 0.5 - 1e-9) / samples_per_block).floor() as usize
         } else {
             0
         };

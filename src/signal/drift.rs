@@ -39,11 +39,21 @@ pub struct DriftLine {
     pub bend: f64,
     /// Time constant of an exponential that explains the bend; `None` where there is no bend or another one.
     pub time_constant_s: Option<f64>,
+    /// By how much the air after the cut stands off the line that the air before it goes on along (and the other way
+    /// round), where that is more than chance: the zero jumped during the cut. 0 otherwise.
+    pub step: f64,
 }
 
 impl DriftLine {
     pub fn at(&self, time_s: f64) -> f64 {
         self.offset + self.slope_per_s * (time_s - self.reference_s)
+    }
+
+    /// Carries only this part of the slope beyond its air; what is held back may be true.
+    pub fn hold_back(&mut self, part: f64) {
+        let held = (1.0 - part) * self.slope_per_s;
+        self.slope_per_s *= part;
+        self.slope_std_per_s = self.slope_std_per_s.hypot(held);
     }
 
     /// How the bend looks, for people; empty where that is not known.
@@ -55,8 +65,10 @@ impl DriftLine {
 
     /// Standard deviation of [`DriftLine::at`].
     pub fn std_at(&self, time_s: f64) -> f64 {
+        // When it jumped within the cut is not known.
         self.offset_std
             .hypot(self.slope_std_per_s * (time_s - self.reference_s))
+            .hypot(self.step / 12f64.sqrt())
     }
 }
 
@@ -67,6 +79,9 @@ const BLOCKS_PER_SEGMENT: usize = 8;
 /// Scatter of block means over that of white noise from which on the air is called bent: chance stays below
 /// it (14 degrees of freedom, one in ten thousand).
 const BEND_RATIO: f64 = 3.0;
+
+/// Standard deviations from which on a jump of the zero is believed.
+const STEP_SIGMA: f64 = 6.0;
 
 /// Fits the zero line of a channel to its air segments. Without air there is no line: offset and slope
 /// are zero and the flags say so. With air on one side only the line is extrapolated, its uncertainty with it.
@@ -81,6 +96,7 @@ pub fn fit_drift(samples: &[f64], sample_rate_hz: f64, start_s: f64, air: &Air) 
         slope_std_per_s: 0.0,
         bend: 0.0,
         time_constant_s: None,
+        step: 0.0,
     };
     let time = |i: usize| start_s + i as f64 / sample_rate_hz;
     let mut kept: Vec<usize> = air
@@ -109,7 +125,66 @@ pub fn fit_drift(samples: &[f64], sample_rate_hz: f64, start_s: f64, air: &Air) 
         }
     }
     uncertainty(&mut drift, samples, &kept, air, &time);
+    match (&air.before, &air.after) {
+        (Some(_), Some(_)) => jump(&mut drift, samples, &kept, air, &time),
+        // Carried far beyond its air, a slope that may be chance does more harm than none: it counts by what is known of it
+        // (the mean of a slope that may be of any size up to the one seen; James & Stein 1961).
+        _ => {
+            let (seen, chance) = (drift.slope_per_s.powi(2), drift.slope_std_per_s.powi(2));
+            if seen + chance > 0.0 {
+                drift.hold_back(seen / (seen + chance));
+            }
+        }
+    }
     drift
+}
+
+/// Is the air before and after the cut two parallel lines rather than one? Then the zero jumped in between, and the line
+/// goes half-way.
+fn jump(drift: &mut DriftLine, samples: &[f64], kept: &[usize], air: &Air, time: &impl Fn(usize) -> f64) {
+    // Block means of both segments: time, value, and whether it is after the cut.
+    let mut points: Vec<(f64, f64, f64)> = Vec::new();
+    for (side, range) in air.ranges().enumerate() {
+        let inside: Vec<usize> = kept.iter().copied().filter(|i| range.contains(i)).collect();
+        let per_block = inside.len() / BLOCKS_PER_SEGMENT;
+        if per_block < 2 {
+            return;
+        }
+        points.extend(
+            inside
+                .chunks_exact(per_block)
+                .take(BLOCKS_PER_SEGMENT)
+                .map(|block| {
+                    let n = block.len() as f64;
+                    let mean_of = |f: &dyn Fn(usize) -> f64| block.iter().map(|&i| f(i)).sum::<f64>() / n;
+                    (
+                        mean_of(&|i| time(i) - drift.reference_s),
+                        mean_of(&|i| samples[i]),
+                        side as f64,
+                    )
+                }),
+        );
+    }
+    let basis = DMatrix::from_fn(points.len(), 3, |i, k| [1.0, points[i].0, points[i].2][k]);
+    let value = DVector::from_iterator(points.len(), points.iter().map(|p| p.1));
+    let Some(inverse) = (basis.transpose() * &basis).try_inverse() else {
+        return;
+    };
+    let solution = &inverse * basis.transpose() * &value;
+    let left = (&value - &basis * &solution).norm_squared() / (points.len() - 3) as f64;
+    let (slope, step) = (solution[1], solution[2]);
+    if !step.is_finite()
+        || drift.time_constant_s.is_some()
+        || step.abs() < STEP_SIGMA * (left * inverse[(2, 2)]).sqrt()
+    {
+        return;
+    }
+    drift.step = step;
+    drift.bend = 0.0;
+    drift.offset = solution[0] + 0.5 * step;
+    drift.slope_per_s = slope;
+    drift.offset_std = (left * inverse[(0, 0)]).sqrt();
+    drift.slope_std_per_s = (left * inverse[(1, 1)]).sqrt();
 }
 
 /// Standard errors from block means, since hum and bend make neighbouring samples alike.
@@ -241,6 +316,48 @@ mod tests {
     }
 
     #[test]
+    fn a_zero_that_jumps_during_the_cut_is_told_from_drift() {
+        for seed in 0..20 {
+            let jumped = fit_drift(
+                &record(seed, 2.0, |t| if t < 1.4 { 0.0 } else { 17.0 }),
+                RATE,
+                0.0,
+                &air(),
+            );
+            assert!((jumped.step - 17.0).abs() < 3.0, "{jumped:?}");
+            assert!((jumped.at(1.0) - (12.0 + 3.0 + 8.5)).abs() < 2.0, "{jumped:?}");
+            assert!(jumped.std_at(1.4) > 4.0 && jumped.bend == 0.0, "{jumped:?}");
+            assert_eq!(
+                fit_drift(&record(seed, 2.0, |_| 0.0), RATE, 0.0, &air()).step,
+                0.0
+            );
+        }
+    }
+
+    #[test]
+    fn a_slope_that_may_be_chance_is_not_carried_away_from_its_air() {
+        let before = Air {
+            before: Some(0..200),
+            after: None,
+        };
+        let mut off = [0.0f64; 2];
+        for seed in 0..50 {
+            let drift = fit_drift(&record(seed, 2.0, |t| -3.0 * t), RATE, 0.0, &before);
+            let inside: Vec<f64> = record(seed, 2.0, |t| -3.0 * t)[..200].to_vec();
+            let (_, slope, _) = line((0..200).map(|i| i as f64 / RATE), inside.iter().copied());
+            assert!(
+                drift.slope_per_s.abs() < slope.abs() && drift.slope_std_per_s > 0.0,
+                "{drift:?}"
+            );
+            off[0] += drift.slope_per_s.powi(2);
+            off[1] += slope.powi(2);
+        }
+        assert!(off[0] < 0.5 * off[1], "{off:?}");
+        let steep = fit_drift(&record(2, 2.0, |t| 97.0 * t), RATE, 0.0, &before);
+        assert!((steep.slope_per_s - 100.0).abs() < 10.0, "{steep:?}");
+    }
+
+    #[test]
     fn a_bent_drift_is_seen_and_no_air_is_said() {
         let bent = fit_drift(
             &record(3, 0.5, |t| 300.0 * (1.0 - (-t / 2.0).exp())),
@@ -256,6 +373,7 @@ mod tests {
             straight.bend < 0.2 && straight.time_constant_s.is_none(),
             "{straight:?}"
         );
+        assert_eq!((bent.step, straight.step), (0.0, 0.0));
         let none = fit_drift(&record(3, 0.5, |_| 0.0), RATE, 0.0, &Air::default());
         assert!(!none.air_before && !none.air_after && none.at(1.0) == 0.0);
     }

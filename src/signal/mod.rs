@@ -1,8 +1,10 @@
 //! Signals: drift of charge amplifiers, steady windows, spectra.
 
+mod air_check;
 mod blocks;
 mod drift;
 mod end_states;
+mod engagement;
 mod faults;
 pub mod frf_noise;
 mod local_rational;
@@ -14,6 +16,7 @@ mod tooth_line;
 pub(crate) use blocks::line;
 pub use blocks::{Blocks, mean, median, quantile};
 pub use drift::{Air, DriftLine, fit_drift};
+pub use engagement::change;
 pub use faults::{Clipping, Faults, find_faults, samples_in};
 pub use order_spectrum::{OrderSpectrum, highest_order, line_amplitude, mean_between, order_spectrum};
 pub use steady_window::{Phases, Spindle, find_phases, whole_revolutions};

@@ -29,6 +29,8 @@ pub struct OrderSpectrum {
 
 /// Neighbouring orders whose scatter is pooled, to each side.
 const POOLED: usize = 8;
+/// From so many revolutions on the lines that belong to orders are too few to move a median.
+const MANY_REVOLUTIONS: f64 = 8.0;
 /// An order whose neighbourhood holds this many times the power of the orders around it keeps its own.
 const STANDS_OUT: f64 = 2.0;
 
@@ -38,7 +40,8 @@ pub fn highest_order(samples_per_revolution: f64, wanted: usize) -> usize {
 }
 
 /// `samples`: the steady window, its zero line taken off; `samples_per_revolution` is not a whole number in general and
-/// the last revolution may end within a sample. `None` where there are less than three revolutions.
+/// the last revolution may end within a sample. `None` where there are less than two revolutions,
+/// which tell no scatter.
 pub fn order_spectrum(
     samples: &[f64],
     sample_rate_hz: f64,
@@ -46,7 +49,7 @@ pub fn order_spectrum(
     orders: usize,
 ) -> Option<OrderSpectrum> {
     let revolutions = (samples.len() as f64 / samples_per_revolution + 1e-6).floor();
-    if !(revolutions >= 3.0) {
+    if !(revolutions >= 2.0) {
         return None;
     }
     let length = revolutions * samples_per_revolution;
@@ -88,20 +91,21 @@ pub fn order_spectrum(
     let line_hz = sample_rate_hz / count as f64;
 
     let lines_per_order = revolutions * count as f64 / length;
-    let power = |n: f64| -> f64 {
+    let neighbourhood = |n: f64| {
         let (from, to) = ((n - 0.5) * lines_per_order, (n + 0.5) * lines_per_order);
-        let range = (from.ceil().max(1.0) as usize)..(to.floor() as usize + 1).min(rest.len());
-        let lines = range.len().max(2) as f64;
-        // One line of each neighbourhood, the order's own, was taken away.
-        rest.get(range)
-            .map_or(0.0, |r| r.iter().map(|a| a * a).sum::<f64>())
-            / (lines - 1.0)
+        (from.ceil().max(1.0) as usize)..(to.floor() as usize + 1).min(rest.len())
+    };
+    // One line of each neighbourhood, the order's own, was taken away.
+    let free_lines = |n: f64| neighbourhood(n).len().max(2) as f64 - 1.0;
+    let power = |n: f64| -> f64 {
+        let lines = rest.get(neighbourhood(n));
+        lines.map_or(0.0, |r| r.iter().map(|a| a * a).sum::<f64>()) / free_lines(n)
     };
     let own: Vec<f64> = (1..=orders).map(|n| power(n as f64)).collect();
     let std = (0..orders)
         .map(|n| {
             let pool = &own[n.saturating_sub(POOLED)..(n + POOLED + 1).min(orders)];
-            let around = median(pool);
+            let around = median(pool) * median_to_weight(2.0 * free_lines((n + 1) as f64), pool.len());
             let variance = if own[n] > STANDS_OUT * around {
                 own[n]
             } else {
@@ -111,7 +115,16 @@ pub fn order_spectrum(
         })
         .collect();
     // |X|² is exponentially distributed where there is noise only: its median is ln 2 of its mean.
-    let squares: Vec<f64> = rest.iter().skip(1).map(|a| a * a).collect();
+    // The lines of the orders themselves are taken away: with few revolutions they are a good part of all.
+    let is_order = |j: usize| {
+        if revolutions >= MANY_REVOLUTIONS {
+            return false;
+        }
+        let order = (j as f64 / lines_per_order).round();
+        order <= orders as f64 && (j as f64 - order * lines_per_order).abs() < 0.5
+    };
+    let between = rest.iter().enumerate().filter(|(j, _)| !is_order(*j));
+    let squares: Vec<f64> = between.map(|(_, a)| a * a).collect();
     let sample_std = (median(&squares) / std::f64::consts::LN_2 * count as f64).sqrt();
     Some(OrderSpectrum {
         coefficient,
@@ -120,6 +133,20 @@ pub fn order_spectrum(
         rest,
         line_hz,
     })
+}
+
+/// What the median of `count` mean squares of `freedom` normal values each is to be multiplied with, to be the variance by which
+/// squares are to be divided so that they are one on average: a χ² has its median below its mean (Wilson & Hilferty 1931), and
+/// the inverse of an estimate is larger than the inverse of what it estimates (a median is as good as 2/π of its values).
+fn median_to_weight(freedom: f64, count: usize) -> f64 {
+    let of_mean = (1.0 - 2.0 / (9.0 * freedom)).powi(3);
+    let pooled = (count as f64 * freedom * std::f64::consts::FRAC_2_PI).max(freedom);
+    let inverse = if pooled > 4.0 {
+        pooled / (pooled - 2.0)
+    } else {
+        2.0
+    };
+    inverse / of_mean
 }
 
 /// Polynomial through the means of the revolutions: what moves so slowly is drift, and would leak into all orders. (The
@@ -221,6 +248,30 @@ mod tests {
         }
         let mean = coverage.iter().sum::<f64>() / coverage.len() as f64;
         assert!((0.85..1.15).contains(&mean), "{mean}");
+    }
+
+    #[test]
+    fn noise_of_a_few_turns_is_neither_too_small_nor_too_large() {
+        let mut random = ChaCha8Rng::seed_from_u64(11);
+        for turns in [2, 3, 4, 6, 12] {
+            let mut squares = Vec::new();
+            for _ in 0..60 {
+                let samples: Vec<f64> = (0..(turns as f64 * 137.3) as usize + 1)
+                    .map(|_| (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0)
+                    .collect();
+                let s = order_spectrum(&samples, 5000.0, 137.3, 48).unwrap();
+                squares.extend(
+                    s.coefficient
+                        .iter()
+                        .zip(&s.std)
+                        .map(|(c, std)| c.norm_sqr() / (std * std)),
+                );
+            }
+            let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+            // Two turns have neighbourhoods that share lines: a little on the safe side.
+            let least = if turns == 2 { 0.88 } else { 0.94 };
+            assert!((least..1.06).contains(&mean), "{turns} turns: {mean}");
+        }
     }
 
     #[test]

@@ -7,9 +7,11 @@
 
 use std::ops::Range;
 
+use super::air_check::air_in;
 use super::blocks::{Blocks, line, median, quantile, robust_std};
 use super::drift::Air;
 use super::end_states::{air_states, departure};
+use super::engagement::{full_engagement, loudness};
 
 /// What turns, and how the record is sampled.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,9 +34,11 @@ pub struct Phases {
 pub(super) const MIN_STATE_BLOCKS: usize = 4;
 /// More blocks than this are merged: finer ones would make a drill's slow entry too gentle to notice.
 const MAX_BLOCKS: f64 = 250.0;
+/// Turns of a clip are alike where their force fluctuates by the same, up to this part of it.
+const ALIKE: f64 = 0.15;
 /// Finds the phases of a record from its channels (all of one length; those that carry the cutting force).
 /// `entry_samples`: travel from first contact to full engagement where geometry tells it (drilling);
-/// otherwise entry is detected. `None` where the record holds less than a few revolutions, or no steady cut.
+/// otherwise entry is detected. `None` where the record holds less than a revolution, or no steady cut.
 pub fn find_phases(channels: &[&[f64]], spindle: Spindle, entry_samples: Option<f64>) -> Option<Phases> {
     let samples = channels.iter().map(|c| c.len()).min()?;
     let per_block = block_length(samples, spindle)?;
@@ -43,8 +47,17 @@ pub fn find_phases(channels: &[&[f64]], spindle: Spindle, entry_samples: Option<
         .map(|c| Blocks::new(&c[..samples], per_block))
         .collect();
     let count = blocks.first()?.len();
+    let whole = |span: Range<f64>| {
+        let steady = whole_revolutions(span, spindle.samples_per_revolution, samples);
+        (!steady.is_empty()).then_some(steady)
+    };
     if count < 2 * MIN_STATE_BLOCKS {
-        return None;
+        // Too short for air beside a cut: a clip out of a cut.
+        return Some(Phases {
+            air: Air::default(),
+            cutting: 0..samples,
+            steady: whole(0.0..samples as f64)?,
+        });
     }
     let start_end = departure(&blocks, count, false);
     let last_start = count - departure(&blocks, count, true);
@@ -54,33 +67,67 @@ pub fn find_phases(channels: &[&[f64]], spindle: Spindle, entry_samples: Option<
     // Guard blocks: the departure is noticed a little late.
     let sample = |block: f64| ((block * per_block).round().max(0.0) as usize).min(samples);
     let guard = 2.0;
-    let lo = if before { start_end } else { 0 };
-    let hi = if after { last_start } else { count };
+    let air_before = before.then(|| 0..sample(start_end as f64 - guard));
+    let air_after = after.then(|| sample(last_start as f64 + guard)..samples);
+    let long_enough = |r: &Range<usize>| r.len() as f64 >= 2.0 * per_block;
+    let (mut before, mut after) = (air_before.filter(long_enough), air_after.filter(long_enough));
+    let mut air_is_doubtful = false;
+    if entry_samples.is_none() {
+        // The campaign says that it is a cut; what is no different from the rest of it is no air.
+        let cutting = sample(if before.is_some() { start_end as f64 } else { 0.0 })
+            ..sample(if after.is_some() {
+                last_start as f64
+            } else {
+                count as f64
+            });
+        let turn = spindle.samples_per_revolution;
+        let air = |r: Range<usize>| air_in(channels, &r, &cutting, turn).filter(long_enough);
+        let found = before.is_some() || after.is_some();
+        (before, after) = (before.and_then(air), after.and_then(air));
+        air_is_doubtful = found && before.is_none() && after.is_none();
+    }
+    let lo = if before.is_some() { start_end } else { 0 };
+    let hi = if after.is_some() { last_start } else { count };
     if lo + MIN_STATE_BLOCKS > hi {
         return None;
     }
-    let air = Air {
-        before: before
-            .then(|| 0..sample(lo as f64 - guard))
-            .filter(|r| r.len() as f64 >= 2.0 * per_block),
-        after: after
-            .then(|| sample(hi as f64 + guard)..samples)
-            .filter(|r| r.len() as f64 >= 2.0 * per_block),
-    };
+    let air_blocks: Vec<Range<usize>> = [
+        before.as_ref().map(|_| 0..start_end.saturating_sub(2).max(1)),
+        after.as_ref().map(|_| (last_start + 2).min(count - 1)..count),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
     let cutting = sample(lo as f64)..sample(hi as f64);
     let contact = cutting.start as f64;
     let full = entry_samples
-        .filter(|_| before)
+        .filter(|_| before.is_some())
         .map(|entry| {
             // The contact may have been noticed a block early.
             let start = contact + 1.03 * entry + guard * per_block;
             (start / per_block).ceil() as usize
         })
         .filter(|&start| start + MIN_STATE_BLOCKS < hi);
-    let found = steady_blocks(&blocks, full.unwrap_or(lo)..hi);
-    let span = found.start as f64 * per_block..found.end as f64 * per_block;
-    let steady = whole_revolutions(span, spindle.samples_per_revolution, samples);
-    (!steady.is_empty()).then_some(Phases { air, cutting, steady })
+    let per_turn = (spindle.samples_per_revolution / per_block).round() as usize;
+    let engaged = loudness(&blocks, &air_blocks, per_turn);
+    let inside = match (entry_samples, full) {
+        (Some(_), full) => full.unwrap_or(lo)..hi,
+        (None, _) => full_engagement(&engaged, lo..hi),
+    };
+    // A clip of a few turns that are all alike has no ends to keep clear of.
+    let is_even_clip = air_blocks.is_empty() && per_block < spindle.samples_per_revolution && {
+        let of_clip = &engaged[inside.clone()];
+        let usual = median(of_clip);
+        of_clip.iter().all(|v| (v - usual).abs() <= ALIKE * usual)
+    };
+    let found = if air_is_doubtful || is_even_clip || inside.len() < MIN_STATE_BLOCKS {
+        inside
+    } else {
+        steady_blocks(&blocks, inside)
+    };
+    let steady = whole(found.start as f64 * per_block..found.end as f64 * per_block)?;
+    let air = Air { before, after };
+    Some(Phases { air, cutting, steady })
 }
 
 /// The largest whole number of revolutions inside `span`, centred in it, rounded to samples. Less than one
@@ -315,7 +362,10 @@ mod tests {
             teeth: 2,
         };
         assert_eq!(find_phases(&[], spindle, None), None);
-        assert_eq!(find_phases(&[&[1.0; 150]], spindle, None), None);
+        assert_eq!(find_phases(&[&[1.0; 90]], spindle, None), None);
+        // A clip out of a cut is all cut, however short.
+        let clip = find_phases(&[&[1.0; 250]], spindle, None).unwrap();
+        assert_eq!((clip.air, clip.steady), (Air::default(), 25..225));
         let broken = Spindle {
             samples_per_revolution: f64::NAN,
             teeth: 0,

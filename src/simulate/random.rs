@@ -157,6 +157,7 @@ fn mixed(seed: u64, draws: &mut Draws) -> StructureScenario {
 fn of_tier(tier: Tier, seed: u64, draws: &mut Draws) -> StructureScenario {
     let mut scenario = bare(seed, draws);
     scenario.largest_size = 1.5;
+    scenario.possible_only = true;
     let noise = *draws.pick(&[LineNoise::White, LineNoise::Hann, LineNoise::ZeroPadded]);
     let (common, third) = (draws.chance(0.3), draws.uniform(0.0, 3.0));
     let two_levels = draws.chance(0.15);

@@ -4,7 +4,7 @@ use super::draw::Draws;
 use super::{foreign, magnitude};
 use crate::campaign::robot_spec::RobotSpec;
 use crate::campaign::suggest::closest;
-use crate::effects::{self, DataSummary, Instance, STRUCTURAL};
+use crate::effects::{self, DataSummary, Instance, STRUCTURAL, Size};
 use crate::parameter::Parameter;
 use crate::{InputError, Result};
 
@@ -67,6 +67,30 @@ impl HiddenEffect {
             false => magnitude::at_size(id, parameter, *value, self.size),
         })
         .collect()
+    }
+
+    /// Whether the values at the present size are possible on `robot`.
+    fn is_possible(&self, robot: &RobotSpec) -> bool {
+        let exactly = |value| Size { value, std: 0.0 };
+        let sizes: Vec<Size> = self.values().into_iter().map(exactly).collect();
+        let Instance { effect, site, .. } = self.instance;
+        effect.impossible(site, robot, &sizes).is_none()
+    }
+
+    /// The smallest and the largest size within `range` that are possible on `robot`, where the one drawn is; else `range`.
+    pub fn possible_sizes(&self, robot: &RobotSpec, range: [f64; 2]) -> [f64; 2] {
+        const STEP: f64 = 1.05;
+        let possible = |size| HiddenEffect { size, ..self.clone() }.is_possible(robot);
+        if !possible(1.0) {
+            return range;
+        }
+        let reach = |factor: f64, within: &dyn Fn(f64) -> bool| {
+            let sizes = std::iter::successors(Some(1.0), |size| Some(size * factor));
+            let possible = sizes.take_while(|size| within(*size) && possible(*size));
+            possible.last().unwrap_or(1.0)
+        };
+        let [low, high] = range;
+        [reach(STEP.recip(), &|s| s >= low), reach(STEP, &|s| s <= high)]
     }
 
     /// Whether any value follows the size.
@@ -208,5 +232,41 @@ impl EffectRequest {
                 Some(near) => format!("did you mean {near}? There are: {all}"),
                 None => format!("there are: {all}"),
             })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::fixture::irb6640;
+    use crate::simulate::draw::Purpose;
+
+    #[test]
+    fn sizes_stay_possible() {
+        let data = DataSummary {
+            force_levels: 1,
+            postures: 6,
+            lowest_hz: 3.0,
+            highest_hz: 90.0,
+        };
+        let robot = irb6640();
+        let request = EffectRequest {
+            effect: "link-flexibility".into(),
+            ..Default::default()
+        };
+        let mut draws = Draws::new(3, Purpose::Effects);
+        let hidden = request.settle(&robot, &data, &mut draws).unwrap();
+        let [low, high] = hidden.possible_sizes(&robot, [1e-5, 4.0]);
+        let young_pa = |size| {
+            HiddenEffect {
+                size,
+                ..hidden.clone()
+            }
+            .values()[0]
+        };
+        // Steel at the faint end, magnesium at the other, to one step.
+        assert!((210e9..=230e9).contains(&young_pa(low)), "{}", young_pa(low));
+        assert!((40e9..=44e9).contains(&young_pa(high)), "{}", young_pa(high));
+        assert_eq!(hidden.possible_sizes(&robot, [0.99, 1.01]), [1.0, 1.0]);
     }
 }

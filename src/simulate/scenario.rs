@@ -79,6 +79,8 @@ pub struct StructureScenario {
     pub visibility_sigmas: Option<f64>,
     /// Effects do not become larger than this times what is drawn to reach that visibility.
     pub largest_size: f64,
+    /// Effects keep to sizes that are possible, however faint they are asked to be.
+    pub possible_only: bool,
 }
 
 impl StructureScenario {
@@ -118,6 +120,7 @@ impl StructureScenario {
             strength: 1.0,
             visibility_sigmas: None,
             largest_size: 4.0,
+            possible_only: false,
         }
     }
 

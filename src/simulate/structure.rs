@@ -231,7 +231,7 @@ pub fn simulate(scenario: &StructureScenario, robot: &LabRobot) -> Result<LabCam
                 &mut hidden,
                 i,
                 sigmas,
-                scenario.largest_size,
+                (scenario.largest_size, scenario.possible_only),
                 (&mut data, &noise, stride),
             )?;
         }

@@ -130,21 +130,26 @@ const ATTEMPTS: usize = 10;
 const CLOSE: f64 = 0.03;
 
 /// Sets the size of effect `i` so that it shows at `sigmas` standard deviations, as far as its size can do that, but not
-/// larger than `largest`. `data` is scratch.
+/// larger than `largest`, and where `possible_only` of a size that is possible. `data` is scratch.
 pub fn resize(
     truth: &Truth,
     effects: &mut [HiddenEffect],
     i: usize,
     sigmas: f64,
-    largest: f64,
+    (largest, possible_only): (f64, bool),
     (data, noise, stride): (&mut FrfData, &dyn Fn(f64) -> f64, usize),
 ) -> Result<()> {
     if !effects[i].has_size() {
         return Ok(());
     }
     // Newton's method on log sigmas over log size; the slope is 1 where the effect is small.
-    let (low, high) = (SIZES[0].ln(), SIZES[1].min(largest).ln());
-    let mut at = effects[i].size.ln().min(high);
+    let range = [SIZES[0], SIZES[1].min(largest)];
+    let sizes = match possible_only {
+        true => effects[i].possible_sizes(&truth.bare.robot.spec, range),
+        false => range,
+    };
+    let [low, high] = sizes.map(f64::ln);
+    let mut at = effects[i].size.ln().clamp(low, high.max(low));
     let mut earlier: Option<(f64, f64)> = None;
     for _ in 0..ATTEMPTS {
         effects[i].size = at.exp();

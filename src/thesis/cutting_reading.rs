@@ -22,27 +22,29 @@ impl CuttingTables {
     }
 
     fn few_cuts(&self) -> String {
-        let short: Vec<String> = self
-            .rows
-            .iter()
-            .filter(|r| r.feeds < r.feeds_planned)
-            .map(|r| {
-                let check = if r.feeds == 2 {
-                    "a line through two points, which nothing checks"
-                } else {
-                    "one point to spare"
-                };
-                format!(
-                    "{} {} ({:.1} m/min) rests on {} of {} feeds: {check}; its edge coefficients are {:.1} times as uncertain \
-                     as with all feeds",
-                    r.material, r.graph, r.cutting_speed_m_per_min, r.feeds, r.feeds_planned, r.edge_error_factor
-                )
-            })
-            .collect();
+        let one = |r: &CoefficientRow| {
+            let feeds = r.feeds.filter(|feeds| *feeds < r.feeds_planned)?;
+            let check = if feeds == 2 {
+                "a line through two points, which nothing checks"
+            } else {
+                "one point to spare"
+            };
+            Some(format!(
+                "{} {} ({:.1} m/min) rests on {feeds} of {} feeds: {check}; its edge coefficients are {:.1} times as uncertain \
+                 as with all feeds",
+                r.material, r.graph, r.cutting_speed_m_per_min, r.feeds_planned, r.edge_error_factor?
+            ))
+        };
+        let short: Vec<String> = self.rows.iter().filter_map(one).collect();
+        let planned = self.of(PRINTED).map(|r| r.feeds_planned).max().unwrap_or(0);
+        let [least, most] = self.printed_error_factors;
         format!(
-            "Too few cuts: {}. Every other row has one cut per feed and four feeds: two degrees of freedom for two \
-             coefficients. The tables print no standard errors, so no single value can be judged by itself.",
-            short.join("; ")
+            "Too few cuts: {}. No row of {PRINTED} has all {planned} feeds: two tools broke (thesis, 10.2.3 and 10.3.3), and which \
+             feeds are missing is not printed; with {} feeds there is one degree of freedom at best, and a slope is {least:.2} to \
+             {most:.1} times as uncertain as with {planned}. Every other row has one cut per feed and four feeds: two degrees of \
+             freedom for two coefficients. The tables print no standard errors, so no single value can be judged by itself.",
+            short.join("; "),
+            planned.saturating_sub(1),
         )
     }
 
@@ -150,8 +152,9 @@ impl CuttingTables {
         };
         format!(
             "{PRINTED} against {CAST}, {pairs} pairs at the same speed: {} (beyond chance, Bonferroni over {count:.0}). Not beyond \
-             chance: {}. Ktc of the printed titanium scatters by {:.0} % over the speeds, that of the cast by {:.0} %: the \
-             printed material (or its cuts) is less uniform, most of all at the fast speeds.",
+             chance: {}. The test takes its errors from the differences themselves, so that it holds although the rows of the printed \
+             titanium are the less certain ones. Its Ktc scatters by {:.0} % over the speeds, that of the cast by {:.0} %: fewer feeds \
+             behind each row are one reason, and how much of it is the material the tables cannot say.",
             if found.is_empty() {
                 "none".to_string()
             } else {

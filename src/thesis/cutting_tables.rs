@@ -13,6 +13,9 @@ const TITANIUM: &str = include_str!("../../datasets/irb6640/cfc_titanium_milling
 const CONDITIONS: &str = include_str!("../../datasets/irb6640/cutting_conditions.toml");
 /// Cuts of the acetal plan without data, graph and feed per tooth in mm (`missing_cuts` in the conditions).
 const MISSING_CUTS: [(&str, f64); 3] = [("A", 0.05), ("A", 0.15), ("H", 0.05)];
+/// Two tools broke in the printed titanium: no row of it has all feeds, and which ones are missing is not printed (thesis,
+/// 10.2.3 and 10.3.3).
+const INCOMPLETE: &str = PRINTED;
 pub const ACETAL_NAME: &str = "acetal";
 pub const CAST: &str = "Ti6Al4V";
 pub const PRINTED: &str = "WAAM Ti";
@@ -28,13 +31,24 @@ pub struct CoefficientRow {
     pub tooth_passing_hz: f64,
     /// Ktc Krc Kac (N/mm²) Kte Kre Kae (N/mm).
     pub coefficients: [f64; 6],
-    /// Feeds that gave data, and feeds that were planned.
-    pub feeds: usize,
+    /// Feeds that gave data; `None` where it is only known that some are missing.
+    pub feeds: Option<usize>,
     pub feeds_planned: usize,
-    /// Standard error of the edge coefficients over that of the full plan, at the same scatter of the averages.
-    pub edge_error_factor: f64,
+    /// Standard error of the edge coefficients over that of the full plan, at the same scatter of the averages; `None` where
+    /// the feeds are not known.
+    pub edge_error_factor: Option<f64>,
     /// Coefficients below zero.
     pub negative: Vec<&'static str>,
+}
+
+impl CoefficientRow {
+    /// Feeds with data of those planned.
+    pub fn feeds_in_words(&self) -> String {
+        match self.feeds {
+            Some(feeds) => format!("{feeds}/{}", self.feeds_planned),
+            None => format!("<{0}/{0}", self.feeds_planned),
+        }
+    }
 }
 
 /// A coefficient of one material over speed: least squares on log2(speed), errors from the scatter about the line.
@@ -74,6 +88,8 @@ pub struct CuttingTables {
     pub differences: Vec<Difference>,
     /// Correlation over the rows of a material between Ktc and Kte, and what mere scatter of the averages would give.
     pub seesaw: Vec<Seesaw>,
+    /// Standard error of the slopes of the printed titanium against four feeds, if one is missing: least and most.
+    pub printed_error_factors: [f64; 2],
     /// In plain words, a paragraph each.
     pub reading: Vec<String>,
 }
@@ -118,6 +134,18 @@ fn spread(values: &[f64]) -> (f64, f64) {
     (mean, values.iter().map(|v| (v - mean).powi(2)).sum())
 }
 
+/// Standard error of the slope of a straight line over all but one of `feeds` against that over all of them: where the
+/// best one is missing, and where the worst is.
+fn without_one(feeds: &[f64]) -> [f64; 2] {
+    let all = spread(feeds).1;
+    let factors = (0..feeds.len()).map(|i| {
+        let mut left = feeds.to_vec();
+        left.remove(i);
+        (all / spread(&left).1).sqrt()
+    });
+    factors.fold([f64::INFINITY, 0.0], |[low, high], f| [low.min(f), high.max(f)])
+}
+
 /// Variance of the intercept of a straight line over `feeds`, for unit scatter.
 fn intercept_variance(feeds: &[f64]) -> f64 {
     let (mean, square_sum) = spread(feeds);
@@ -140,18 +168,20 @@ impl Plan {
             csv.kre_n_per_mm,
             csv.kae_n_per_mm,
         ];
+        let material = csv.material.unwrap_or_else(|| material.to_string());
+        let known = material != INCOMPLETE;
         let turns_per_min =
             csv.cutting_speed_m_per_min * 1000.0 / (std::f64::consts::PI * self.tool_diameter_mm);
         CoefficientRow {
-            material: csv.material.unwrap_or_else(|| material.to_string()),
+            material,
             graph: csv.graph,
             cutting_speed_m_per_min: csv.cutting_speed_m_per_min,
             tooth_passing_hz: turns_per_min / 60.0 * self.teeth as f64,
             coefficients,
-            feeds: feeds.len(),
+            feeds: known.then_some(feeds.len()),
             feeds_planned: self.feed_per_tooth_mm.len(),
-            edge_error_factor: (intercept_variance(&feeds) / intercept_variance(&self.feed_per_tooth_mm))
-                .sqrt(),
+            edge_error_factor: known
+                .then(|| (intercept_variance(&feeds) / intercept_variance(&self.feed_per_tooth_mm)).sqrt()),
             negative: (0..6)
                 .filter(|&j| coefficients[j] < 0.0)
                 .map(|j| MILLING_COEFFICIENTS[j].label)
@@ -199,6 +229,7 @@ pub fn cutting_tables() -> Result<CuttingTables> {
             .map(|(name, plan)| seesaw(&table, name, &plan.feed_per_tooth_mm))
             .collect(),
         rows: table,
+        printed_error_factors: without_one(&conditions.titanium.feed_per_tooth_mm),
         reading: Vec::new(),
     };
     tables.reading = tables.read();
@@ -324,22 +355,33 @@ mod tests {
         assert_eq!(tables.rows.len(), 24);
         let row = |graph: &str| tables.of(ACETAL_NAME).find(|r| r.graph == graph).unwrap();
         // Two feeds, 0.1 and 0.2: variance of the intercept 1/2 + 0.15²/0.005 = 5 against 1/4 + 0.125²/0.0125 = 1.5.
-        assert_eq!((row("A").feeds, row("A").feeds_planned), (2, 4));
+        assert_eq!((row("A").feeds, row("A").feeds_planned), (Some(2), 4));
         assert_relative_eq!(
-            row("A").edge_error_factor,
+            row("A").edge_error_factor.unwrap(),
             (5.0f64 / 1.5).sqrt(),
             max_relative = 1e-9
         );
-        assert_eq!((row("H").feeds, row("B").feeds), (3, 4));
+        assert_eq!((row("H").feeds, row("B").feeds), (Some(3), Some(4)));
         assert_eq!(row("H").negative, ["Kac", "Kte", "Kre", "Kae"]);
         // 4800 rpm, six teeth.
         assert_relative_eq!(row("E").tooth_passing_hz, 480.0, max_relative = 1e-4);
+        assert!(tables.of(CAST).all(|r| r.feeds == Some(4)));
+        // Two tools broke: no row of the printed titanium has four.
         assert!(
             tables
-                .rows
+                .of(PRINTED)
+                .all(|r| r.feeds.is_none() && r.edge_error_factor.is_none())
+        );
+        let told = &tables.reading[0];
+        assert!(
+            told.contains("No row of WAAM Ti has all 4 feeds") && told.contains("1.6 times"),
+            "{told}"
+        );
+        assert!(
+            tables
+                .reading
                 .iter()
-                .filter(|r| r.material != ACETAL_NAME)
-                .all(|r| r.feeds == 4)
+                .any(|t| t.contains("fewer feeds behind each row"))
         );
     }
 

@@ -12,7 +12,10 @@ fn the_demo_tells_the_whole_story() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path().join("demo");
     let path = dir.to_str().unwrap();
+    let started = std::time::Instant::now();
     let json = json_of(&["demo", path, "--json"]);
+    // What a reader waits for; steps of the two cells run side by side.
+    let seconds = started.elapsed().as_secs_f64();
     assert_documented("demo", &json);
 
     let steps = json["steps"].as_array().unwrap();
@@ -33,17 +36,16 @@ fn the_demo_tells_the_whole_story() {
     ] {
         assert!(names.contains(&name), "{name} not in {names:?}");
     }
-    let mut seconds = 0.0;
     for step in steps {
         assert!(!step["summary"].as_str().unwrap().is_empty());
         assert!(step["command"].as_str().unwrap().starts_with("lobestone "));
-        seconds += step["seconds"].as_f64().unwrap();
+        assert!(step["seconds"].as_f64().unwrap() >= 0.0);
     }
     assert!(seconds < 60.0, "{seconds} s");
 
     let html = std::fs::read_to_string(json["html"].as_str().unwrap()).unwrap();
     assert_self_contained(&html);
-    assert!(html.len() < 8_000_000, "{}", html.len());
+    assert!(html.len() < 6_000_000, "{}", html.len());
     let images = json["images"].as_array().unwrap();
     assert!(images.len() >= 15);
     for image in images {
@@ -51,6 +53,12 @@ fn the_demo_tells_the_whole_story() {
     }
     the_thesis_in_the_page_is_that_of_the_command(&html);
 
+    // The hidden effect first; of the rest the titles.
+    let card = html
+        .find("<article class=\"card missing\" id=\"verdict\"")
+        .unwrap();
+    assert!(html[card..].contains("Missing: tool flexibility"));
+    assert!(card < html.find("<section").unwrap());
     for section in [
         "second-frfs",
         "second-error-map",

@@ -280,3 +280,157 @@ fn links_out_of_the_folder_are_not_followed() {
     let made = init(folder.path(), &[]);
     assert_eq!(made["frfs"].as_array().unwrap().len(), original.frfs.len());
 }
+
+/// A technician's folder: postures by letters, a copy, records named by hand, a list of cuts in German or French.
+#[test]
+fn a_folder_as_technicians_keep_it_needs_only_what_no_file_says() {
+    let structure = Campaign::load(&blind("frf-9114")).unwrap();
+    let forces = Campaign::load(&blind("force-9400")).unwrap();
+    let german = "Versuchsreihe März\n\nDatei;Drehzahl [1/min];Vorschub [mm/min];ap [mm];Eintritt [°];Austritt [°];Reihenfolge;Bemerkung\n";
+    let french = "Fichier;Vitesse de rotation (tr/min);Avance par dent (µm);Profondeur de passe (mm);Angle d'entrée;Angle de sortie;Ordre;Note\n";
+    for (is_german, head) in [(true, german), (false, french)] {
+        let folder = tempfile::tempdir().unwrap();
+        let (raw, old) = (
+            folder.path().join("Messung/roh"),
+            folder.path().join("Messung/alt"),
+        );
+        let kraft = folder.path().join("Kraft (Kistler)");
+        for dir in [&raw, &old, &kraft] {
+            std::fs::create_dir_all(dir).unwrap();
+        }
+        let names = [
+            "FRF_Pos A (neu).csv",
+            "FRF_Pos B_final.csv",
+            "frf_posC_v2.CSV",
+            "FRF_Pos D.csv",
+        ];
+        for (i, name) in names.iter().enumerate() {
+            let file = blind("frf-9114").join(format!("frf/p{}.csv", i + 1));
+            std::fs::copy(&file, raw.join(name)).unwrap();
+            if i == 3 {
+                std::fs::copy(&file, old.join("FRF_Pos D - Kopie.csv")).unwrap();
+            }
+        }
+        let tool = forces.tool.as_ref().unwrap();
+        let mut list = head.to_string();
+        for (i, cut) in forces.cuts.iter().enumerate() {
+            let number: usize = cut.id.parse().unwrap();
+            let name = match i {
+                1 => format!("Versuch {number} 1620"),
+                2 => format!("versuch_{number}_wdh"),
+                _ => format!("Versuch_{number}"),
+            };
+            std::fs::copy(&cut.file, kraft.join(format!("{name}.txt"))).unwrap();
+            let CutGeometry::Milling {
+                feed_per_tooth_mm: fz,
+                axial_depth_mm: ap,
+                immersion,
+            } = &cut.geometry
+            else {
+                panic!("a milling campaign");
+            };
+            let feed = match is_german {
+                true => fz * tool.teeth as f64 * cut.spindle_rpm,
+                false => 1000.0 * fz,
+            };
+            // Names a little otherwise than the files have them.
+            list += &format!(
+                "{};{};{feed};{ap};{};{};{};laut\n",
+                name.replace('_', " "),
+                cut.spindle_rpm,
+                immersion.start_rad.to_degrees().round(),
+                immersion.exit_rad.to_degrees().round(),
+                cut.order.unwrap()
+            )
+            .replace('.', ",");
+        }
+        std::fs::write(folder.path().join("Liste.csv"), list).unwrap();
+        let rows = forces.dynamometer.tool_from_dyno.map(|r| joined(&r));
+        let mut flags: Vec<String> = ["--robot", "irb6640", "--quantity", "receptance", "--diameter-mm"]
+            .map(String::from)
+            .into();
+        flags.extend([
+            tool.diameter_mm.to_string(),
+            "--teeth".into(),
+            tool.teeth.to_string(),
+        ]);
+        flags.extend(["--helix-deg".into(), tool.helix_deg.to_string()]);
+        flags.extend(["--tool-from-dyno".into(), rows.join(";")]);
+        let made = init(folder.path(), &flags);
+        let missing = made["missing"].as_array().unwrap();
+        assert_eq!(missing.len(), 1, "{made}");
+        assert_eq!(missing[0]["key"], "joints_deg");
+        assert_eq!(missing[0]["of"], serde_json::json!(["A", "B", "D", "C"]));
+        assert!(made["cut_list"].as_str().unwrap().ends_with("Liste.csv"));
+        assert!(
+            made["not_used"]
+                .to_string()
+                .contains("a copy of Messung/roh/FRF_Pos D.csv"),
+            "{made}"
+        );
+        // The hand edit: joint angles.
+        let file = folder.path().join("campaign.toml");
+        let mut text = std::fs::read_to_string(&file).unwrap();
+        for (posture, id) in structure.postures.iter().zip(["A", "B", "C", "D"]) {
+            let at = text.find(&format!("[[posture]]\nid = \"{id}\"")).unwrap();
+            let line = at + text[at..].find("# fill in: joints_deg").unwrap();
+            let end = line + text[line..].find('\n').unwrap();
+            let joints = joined(&posture.joints_deg);
+            text.replace_range(line..end, &format!("joints_deg = [{joints}]"));
+        }
+        std::fs::write(&file, text).unwrap();
+        let campaign = Campaign::load(folder.path()).unwrap();
+        assert_eq!(campaign.frfs.len(), 4);
+        for cut in &forces.cuts {
+            let same = campaign
+                .cuts
+                .iter()
+                .find(|c| c.order == cut.order)
+                .unwrap_or_else(|| panic!("cut {}", cut.id));
+            assert_eq!(same.spindle_rpm, cut.spindle_rpm);
+            let (ours, theirs) = (format!("{:?}", same.geometry), format!("{:?}", cut.geometry));
+            let feed = |g: &CutGeometry| match g {
+                CutGeometry::Milling {
+                    feed_per_tooth_mm, ..
+                } => *feed_per_tooth_mm,
+                CutGeometry::Drilling { .. } => f64::NAN,
+            };
+            assert!(
+                (feed(&same.geometry) / feed(&cut.geometry) - 1.0).abs() < 1e-6,
+                "{ours} {theirs}"
+            );
+        }
+        let coefficient = |dir: &Path| {
+            let found = document(&["cfc", dir.to_str().unwrap()]);
+            found["pooled"][0]["ktc_n_per_mm2"]["value"].as_f64().unwrap()
+        };
+        let (ours, theirs) = (coefficient(folder.path()), coefficient(&blind("force-9400")));
+        assert!((ours / theirs - 1.0).abs() < 1e-5, "{ours} {theirs}");
+        assert!(
+            made["guessed"].to_string().contains("from the file name"),
+            "{made}"
+        );
+    }
+}
+
+#[test]
+fn engagement_follows_from_ae_and_the_diameter_and_its_guess_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let record = blind("force-9400").join("force/cut01.txt");
+    std::fs::copy(&record, folder.path().join("6-n6000f300ap3ae4.txt")).unwrap();
+    std::fs::copy(&record, folder.path().join("7-n6000f300ap3ae16 Gegenlauf.txt")).unwrap();
+    std::fs::copy(&record, folder.path().join("8-n6000f300ap3ae8 Gegenlauf.txt")).unwrap();
+    let flags = ["--diameter-mm", "16", "--teeth", "2", "--helix-deg", "30"].map(String::from);
+    let made = init(folder.path(), &flags);
+    assert_eq!(made["complete"], true, "{made}");
+    let text = std::fs::read_to_string(folder.path().join("campaign.toml")).unwrap();
+    for part in [
+        "spindle_rpm = 6000.0  # guessed: from the file name",
+        "feed_per_tooth_mm = 0.025  # guessed: 300 mm/min at 6000 rpm, 2 teeth",
+        "start_deg = 120.0  # guessed: ae 4 of D 16 mm; down milling taken, up milling is 0 to 60.0 deg",
+        "immersion = \"slot\"",
+        "exit_deg = 90.0  # guessed: ae 8 of D 16 mm, up milling",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+}

@@ -136,15 +136,55 @@ fn an_unreadable_file_fails_and_is_named() {
         assert_eq!(String::from_utf8_lossy(&output.stdout), "");
         String::from_utf8_lossy(&output.stderr).into_owned()
     };
-    let error = failed(&["frf.uff", "rec.dwd"]);
+    let error = failed(&["rec.dwd"]);
     assert!(
         error.contains("rec.dwd") && error.contains("DynoWare") && error.contains("remedy"),
         "{error}"
     );
-    let both = failed(&["rec.dwd", "missing.uff", "cut.txt"]);
+    let both = failed(&["rec.dwd", "missing.uff"]);
     assert!(
-        both.contains("2 of 3") && both.contains("rec.dwd") && both.contains("missing.uff"),
+        both.contains("2 of 2") && both.contains("rec.dwd") && both.contains("missing.uff"),
         "{both}"
     );
+
+    // What can be read is told all the same, and the status says that something is wrong.
+    let mixed = inspect(folder.path(), &["rec.dwd", "missing.uff", "cut.txt", "frf.uff"]);
+    assert_eq!(mixed.status.code(), Some(1));
+    let (told, error) = (
+        String::from_utf8_lossy(&mixed.stdout).into_owned(),
+        String::from_utf8_lossy(&mixed.stderr).into_owned(),
+    );
+    assert!(
+        told.contains("cut.txt") && told.contains("frf.uff") && !told.contains("rec.dwd"),
+        "{told}"
+    );
+    assert!(
+        error.contains("2 of 4") && error.contains("missing.uff"),
+        "{error}"
+    );
+    let mixed = inspect(folder.path(), &["rec.dwd", "cut.txt", "--json"]);
+    let document: Value = serde_json::from_slice(&mixed.stdout).unwrap();
+    assert_eq!(mixed.status.code(), Some(1));
+    assert_eq!(document["files"].as_array().unwrap().len(), 1);
+    assert!(document["unreadable"][0].as_str().unwrap().contains("rec.dwd"));
+
+    // A folder is the files in it, but for notes and the like.
+    std::fs::write(folder.path().join("notes.md"), "# notes").unwrap();
+    let whole = inspect(
+        folder.path().parent().unwrap(),
+        &[folder.path().to_str().unwrap()],
+    );
+    let told = String::from_utf8_lossy(&whole.stdout).into_owned();
+    assert!(
+        ["cut.txt", "frf.uff", "tap.csv"]
+            .iter()
+            .all(|name| told.contains(name)),
+        "{told}"
+    );
+    assert!(!String::from_utf8_lossy(&whole.stderr).contains("notes.md"));
+    assert_eq!(whole.status.code(), Some(1), "rec.dwd lies there, too");
+    let empty = tempfile::tempdir().unwrap();
+    let nothing = inspect(folder.path(), &[empty.path().to_str().unwrap()]);
+    assert!(String::from_utf8_lossy(&nothing.stderr).contains("holds no measurement files"));
     assert_eq!(inspect(folder.path(), &[]).status.code(), Some(2));
 }

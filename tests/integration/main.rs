@@ -4,6 +4,7 @@ mod book;
 mod campaign;
 mod cfc;
 mod cfc_methods;
+mod channels;
 mod contract;
 mod demo;
 mod diagnose;

@@ -216,6 +216,23 @@ fn the_report_says_which_physics_is_missing() {
         100.0 * found["confidence"].as_f64().unwrap()
     );
     assert!(section.contains(&stated), "{stated}");
+    // The card says it first: what, the error before and after, the check, the command.
+    let card = &html[html
+        .find("<article class=\"card missing\" id=\"verdict\"")
+        .unwrap()..start];
+    let card = &card[..card.find("</article>").unwrap()].replace("&#x2f;", "/");
+    let name = effect.replace('-', " ");
+    assert!(card.contains(&format!("Missing: {name}")), "{card:.600}");
+    for key in ["nrms", "noise_floor_nrms"] {
+        let stated = lobestone::report::number::percent(found["baseline"][key].as_f64().unwrap());
+        assert!(card.contains(&stated), "{key}: {stated}");
+    }
+    let check = document(&["explain", effect])["lab_check"].as_str().unwrap()[..40].to_string();
+    assert!(
+        card.contains(&check) && card.contains(&format!("lobestone add {dir} {effect}")),
+        "{check}"
+    );
+    assert!(card.contains("class=\"before\"") && card.contains("class=\"after\""));
     let best = found["candidates"][0]["nrms"].as_f64().unwrap();
     assert!(section.contains(&lobestone::report::number::percent(best)));
     // The template engine writes a slash as an entity.
@@ -246,6 +263,49 @@ fn the_report_says_which_physics_is_missing() {
             "{name}"
         );
     }
+}
+
+/// After `add` the report says why: what the diagnosis said then, the model before and after; and calibration does not get
+/// the credit for what the effect did.
+#[test]
+fn evidence_stays_after_an_effect_was_added() {
+    let copy = copy_of("frf-9114");
+    let dir = text(copy.path());
+    let found = document(&["diagnose", dir]);
+    let effect = found["effect"].as_str().unwrap();
+    document(&["add", dir, effect]);
+    let history = document(&["history", dir]);
+    let why = &history["revisions"][1]["why"];
+    assert!(history["revisions"][0]["why"].is_null());
+    for key in ["verdict", "effect", "confidence"] {
+        assert_eq!(why[key], found[key], "{key}");
+    }
+    let (then, now) = (&why["candidates"], &found["candidates"]);
+    assert_eq!(then.as_array().unwrap().len(), now.as_array().unwrap().len());
+    assert_eq!(then[0]["nrms"], now[0]["nrms"]);
+
+    let json = json_of(&["report", dir, "--no-diagnosis", "--json"]);
+    let html = std::fs::read_to_string(json["html"].as_str().unwrap()).unwrap();
+    let percent = |v: &Value| lobestone::report::number::percent(v.as_f64().unwrap());
+    let before = percent(&history["revisions"][0]["nrms"]);
+    assert!(
+        html.contains(&format!("after calibration alone it was {before}")),
+        "{before}"
+    );
+    assert!(!html.contains("; after calibration it is"));
+    let step = &html[html.find("<summary>Revision 1 + ").unwrap()..];
+    let step = &step[..step.find("</details>").unwrap()];
+    for said in [
+        "Candidates then, best first",
+        "Held-out test",
+        "history-1-map.png",
+        "history-1-frf.png",
+        &before,
+    ] {
+        assert!(step.contains(said), "{said}");
+    }
+    let card = &html[html.find("<article class=\"card clean\"").unwrap()..];
+    assert!(card[..card.find("</article>").unwrap()].contains("nothing added"));
 }
 
 #[test]

@@ -3,80 +3,139 @@
 use std::path::Path;
 
 use super::Answers;
+use super::list_columns::{Column, DIAMETER, DIRECTION, NUMBER, TEETH, column, english, is_down, plain};
 use super::scan::{Scan, stem};
 use super::tables::cut_ids;
 use crate::campaign::load::CUT;
 use crate::campaign::suggest::{closest, shown};
 use crate::{Error, InputError, Result};
 
-/// Keys of `[[cut]]` that a list cannot give: one is a pair of times, one names a posture that `init` does not know yet.
-const NOT_IN_A_LIST: [&str; 2] = ["steady_s", "posture"];
+/// A key of `[[cut]]` that a list cannot give: it names a posture that `init` does not know yet.
+const NOT_IN_A_LIST: [&str; 1] = ["posture"];
+/// Lines above the column names that are looked at: title, date, who cut.
+const TITLE_LINES: usize = 10;
 
-fn columns() -> impl Iterator<Item = &'static str> {
-    CUT.into_iter().filter(|key| !NOT_IN_A_LIST.contains(key))
+fn keys() -> Vec<&'static str> {
+    CUT.into_iter()
+        .filter(|key| !NOT_IN_A_LIST.contains(key))
+        .collect()
 }
 
-/// Reads a CSV whose columns are keys of `[[cut]]`, one of them `file` (name or path of the force record), into
-/// `answers`. Separators are commas, semicolons or tabs; with the latter two a comma may be the decimal sign.
+fn separator(line: &str) -> u8 {
+    let all = [b';', b'\t', b','];
+    let found = all.into_iter().find(|s| line.contains(char::from(*s)));
+    found.unwrap_or(b',')
+}
+
+fn cells(line: &str, separator: u8) -> Vec<String> {
+    let mut reader = csv::ReaderBuilder::new()
+        .delimiter(separator)
+        .has_headers(false)
+        .trim(csv::Trim::All)
+        .from_reader(line.as_bytes());
+    let row = reader.records().next().and_then(|r| r.ok());
+    row.map_or_else(Vec::new, |r| r.iter().map(str::to_string).collect())
+}
+
+/// Which columns name the record of a row: that of files, else that of numbers.
+fn naming_column(head: &[String]) -> Option<usize> {
+    let known: Vec<Option<&str>> = head
+        .iter()
+        .map(|h| column(h, &keys()).ok().flatten().map(|c| c.key))
+        .collect();
+    let at = |key: &str| known.iter().position(|k| *k == Some(key));
+    at("file").or_else(|| at(NUMBER)).or_else(|| at("id"))
+}
+
+fn decoded(bytes: Vec<u8>) -> String {
+    match String::from_utf8(bytes) {
+        Ok(text) => text.trim_start_matches('\u{feff}').to_string(),
+        // Latin-1.
+        Err(e) => e.as_bytes().iter().map(|b| char::from(*b)).collect(),
+    }
+}
+
+/// The line of the column names: the first that names records and something that was cut with.
+fn names_line(text: &str) -> Option<usize> {
+    text.lines().take(TITLE_LINES).position(|line| {
+        let head = cells(line, separator(line));
+        let known = head.iter().filter(|h| !matches!(column(h, &keys()), Ok(None)));
+        known.count() >= 2 && naming_column(&head).is_some()
+    })
+}
+
+/// Is this text the beginning of a list of cuts?
+pub(super) fn looks_like_one(start: &[u8]) -> bool {
+    names_line(&decoded(start.to_vec())).is_some()
+}
+
+/// Reads a CSV whose columns are keys of `[[cut]]` or usual names for them in English, German, French or Spanish, one of them
+/// the file (name or path of the force record) or the number of the cut, into `answers`. Separators are commas, semicolons or
+/// tabs; with the latter two a comma may be the decimal sign. Gives what was passed over.
 ///
 /// # Errors
-/// A file that cannot be read, an unknown column, a row without a record in the folder; with file, line and remedy.
-pub fn read_cut_list(file: &Path, scan: &Scan, answers: &mut Answers) -> Result<()> {
+/// A file that cannot be read, a column that looks like a key misspelt or has an unknown unit, a row without a record in the
+/// folder; with file, line and remedy.
+pub fn read_cut_list(file: &Path, scan: &Scan, answers: &mut Answers) -> Result<Vec<String>> {
     let ids = cut_ids(&scan.forces);
     let wrong = |problem: String, line: usize, remedy: String| {
         InputError::new(problem).file(file).line(line).remedy(remedy)
     };
-    let bytes = std::fs::read(file).map_err(|e| Error::io(file, e))?;
-    let text: String = match String::from_utf8(bytes) {
-        Ok(text) => text.trim_start_matches('\u{feff}').to_string(),
-        Err(e) => e.as_bytes().iter().map(|b| char::from(*b)).collect(),
-    };
-    let head = text.lines().next().unwrap_or("");
-    let separator = [b';', b'\t', b',']
-        .into_iter()
-        .find(|s| head.contains(char::from(*s)))
-        .unwrap_or(b',');
+    let text = decoded(std::fs::read(file).map_err(|e| Error::io(file, e))?);
+    let skipped = names_line(&text).unwrap_or(0);
+    let offset: usize = text.split_inclusive('\n').take(skipped).map(str::len).sum();
+    let text = &text[offset..];
+    let separator = separator(text.lines().next().unwrap_or(""));
     let mut reader = csv::ReaderBuilder::new()
         .delimiter(separator)
         .trim(csv::Trim::All)
         .from_reader(text.as_bytes());
     let broken = |e: csv::Error| {
-        let line = e.position().map_or(1, |p| p.line() as usize);
+        let line = skipped + e.position().map_or(1, |p| p.line() as usize);
         wrong(
             "not a table: rows differ in length".into(),
             line,
             "export the list as CSV, a row a cut".into(),
         )
     };
-    let header: Vec<String> = reader
+    let head: Vec<String> = reader
         .headers()
         .map_err(broken)?
         .iter()
-        .map(str::to_lowercase)
+        .map(str::to_string)
         .collect();
-    if let Some(unknown) = header.iter().find(|h| columns().all(|key| key != h.as_str())) {
-        let remedy = match closest(unknown, columns()) {
-            Some(near) => format!("did you mean {near}?"),
-            None => format!("columns are {}", columns().collect::<Vec<_>>().join(", ")),
-        };
-        return Err(wrong(format!("unknown column {:?}", shown(unknown)), 1, remedy).into());
+    let (mut columns, mut passed_over) = (Vec::new(), Vec::new());
+    for name in &head {
+        let known = column(name, &keys())
+            .map_err(|problem| wrong(problem, skipped + 1, "write the unit in brackets: ap [mm]".into()))?;
+        if known.is_none() && !name.is_empty() {
+            if let Some(near) = closest(name, keys()) {
+                let problem = format!("unknown column {:?}", shown(name));
+                return Err(wrong(problem, skipped + 1, format!("did you mean {near}?")).into());
+            }
+            passed_over.push(format!("column {:?} is not used", shown(name)));
+        }
+        columns.push(known);
     }
-    let Some(file_column) = header.iter().position(|h| h == "file") else {
+    let Some(naming) = naming_column(&head) else {
         return Err(wrong(
             "there is no column \"file\"".into(),
-            1,
+            skipped + 1,
             "add one with the name of each cut's force record".into(),
         )
         .into());
     };
+    let mut of_tool = OfTool::default();
     for row in reader.records() {
         let row = row.map_err(broken)?;
-        let line = row.position().map_or(1, |p| p.line() as usize);
-        let name = row[file_column].replace('\\', "/");
-        let is_named =
-            |path: &str| path == name || path.rsplit('/').next() == Some(&name) || stem(path) == name;
-        let mut named = ids.iter().zip(&scan.forces).filter(|(_, f)| is_named(&f.path));
-        let (Some((id, _)), None) = (named.next(), named.next()) else {
+        let line = skipped + row.position().map_or(1, |p| p.line() as usize);
+        let name = row[naming].replace('\\', "/");
+        let has_number = row.iter().any(|cell| cell.contains(|c: char| c.is_ascii_digit()));
+        if name.is_empty() || (!has_number && row.iter().any(|c| ["mm", "1/min", "rpm"].contains(&c))) {
+            // An empty row, or one of units.
+            continue;
+        }
+        let Some(at) = record_named(&name, scan) else {
             return Err(wrong(
                 format!(
                     "{:?} names no force record of the folder, or several",
@@ -87,14 +146,40 @@ pub fn read_cut_list(file: &Path, scan: &Scan, answers: &mut Answers) -> Result<
             )
             .into());
         };
-        let table = format!("cut {id}");
+        let table = format!("cut {}", ids[at]);
         let mut angles = [None, None];
-        for (key, value) in header.iter().zip(row.iter()) {
-            match key.as_str() {
-                _ if value.is_empty() => (),
+        for (i, (column, value)) in columns.iter().zip(row.iter()).enumerate() {
+            let Some(Column { key, factor }) = column else {
+                continue;
+            };
+            if value.is_empty() || i == naming || *key == NUMBER {
+                continue;
+            }
+            let value = scaled(value, *factor);
+            match *key {
                 "file" => (),
                 "start_deg" => angles[0] = Some(value.replace(',', ".")),
                 "exit_deg" => angles[1] = Some(value.replace(',', ".")),
+                key @ (TEETH | DIAMETER) => of_tool.take(key, value),
+                DIRECTION => match is_down(&value) {
+                    Some(down) => answers.set(&table, DIRECTION, if down { "down" } else { "up" }),
+                    None => {
+                        let remedy = "write down (Gleichlauf, avalant) or up (Gegenlauf, opposition)";
+                        return Err(wrong(
+                            format!("{:?} is no direction of milling", shown(&value)),
+                            line,
+                            remedy.into(),
+                        )
+                        .into());
+                    }
+                },
+                "process" | "immersion" => {
+                    answers.set(
+                        &table,
+                        *key,
+                        english(&value).map_or(value.as_str(), |(_, word)| word),
+                    );
+                }
                 key => answers.set(&table, key, value),
             }
         }
@@ -111,5 +196,64 @@ pub fn read_cut_list(file: &Path, scan: &Scan, answers: &mut Answers) -> Result<
             }
         }
     }
-    Ok(())
+    passed_over.extend(of_tool.hand_over(answers));
+    Ok(passed_over)
+}
+
+/// The tool stands in every row of some lists.
+#[derive(Default)]
+struct OfTool(Vec<(&'static str, String)>);
+
+impl OfTool {
+    fn take(&mut self, key: &'static str, value: String) {
+        if !self.0.contains(&(key, value.clone())) {
+            self.0.push((key, value));
+        }
+    }
+
+    fn hand_over(self, answers: &mut Answers) -> Vec<String> {
+        let mut told = Vec::new();
+        for key in [DIAMETER, TEETH] {
+            let values: Vec<&String> = self.0.iter().filter(|(k, _)| *k == key).map(|(_, v)| v).collect();
+            match values.as_slice() {
+                [] => (),
+                [one] if answers.get("tool", "", key).is_none() => answers.set("tool", key, one.as_str()),
+                [_] => (),
+                _ => told.push(format!(
+                    "{key} changes from row to row: one campaign holds one tool"
+                )),
+            }
+        }
+        told
+    }
+}
+
+fn scaled(value: &str, factor: f64) -> String {
+    match value.replace(',', ".").parse::<f64>() {
+        // No unit: as it was typed.
+        Ok(number) if factor != 1.0 => format!("{}", number * factor),
+        _ => value.to_string(),
+    }
+}
+
+/// Index of the force record that a row's name means: its path, its name, the name written a little differently, or its number.
+fn record_named(name: &str, scan: &Scan) -> Option<usize> {
+    let letters = |text: &str| -> String { plain(text).chars().filter(|c| c.is_alphanumeric()).collect() };
+    let number = |text: &str| -> Option<u64> {
+        let digits = text.trim_start_matches(|c: char| !c.is_ascii_digit());
+        digits.split(|c: char| !c.is_ascii_digit()).next()?.parse().ok()
+    };
+    let is_number = name.bytes().all(|b| b.is_ascii_digit());
+    let exact = |path: &str| path == name || path.rsplit('/').next() == Some(name) || stem(path) == name;
+    let nearly =
+        |path: &str| letters(stem(path)) == letters(name) || letters(stem(path)) == letters(stem(name));
+    let by_number = |path: &str| is_number && number(stem(path)) == name.parse().ok();
+    let tests: [&dyn Fn(&str) -> bool; 3] = [&exact, &nearly, &by_number];
+    tests.into_iter().find_map(|test| {
+        let mut named = scan.forces.iter().enumerate().filter(|(_, f)| test(&f.path));
+        match (named.next(), named.next()) {
+            (Some((at, _)), None) => Some(at),
+            _ => None,
+        }
+    })
 }

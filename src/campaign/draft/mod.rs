@@ -10,13 +10,14 @@ use crate::{InputError, Result};
 
 mod cut_list;
 mod entry;
+mod list_columns;
 mod names;
 mod scan;
 mod tables;
 
 pub use cut_list::read_cut_list;
 pub use entry::{Entry, Kind};
-pub use scan::{FoundForce, FoundFrf, Scan, scan};
+pub use scan::{FoundForce, FoundFrf, Scan, measurement_files, scan};
 
 /// What a person said, by table and key: `("cut", "spindle_rpm")` holds for every cut, `("cut 01", "spindle_rpm")` for
 /// one. Values as typed.
@@ -257,6 +258,7 @@ mod tests {
                 .map(|(posture, nodes)| FoundFrf {
                     path: format!("frf/{posture}.uff"),
                     posture: posture.to_string(),
+                    posture_guess: None,
                     quantity: Some(Quantity::Accelerance),
                     nodes: nodes.iter().copied().collect(),
                     facts: Default::default(),

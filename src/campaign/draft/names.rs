@@ -2,11 +2,20 @@
 
 use std::collections::BTreeMap;
 
+use super::list_columns::{DIRECTION, FEED_RATE, RADIAL_DEPTH, english, is_down};
+
 /// Key of `campaign.toml` and its value as a person would type it.
 pub type Facts = BTreeMap<&'static str, String>;
 
 /// Spindle speeds below this are sample numbers: `s1`, `n2`.
 const SLOWEST_RPM: f64 = 50.0;
+
+/// Fastest spindle that a number without a name is taken for, and slowest.
+const BARE_RPM: std::ops::RangeInclusive<f64> = 200.0..=60_000.0;
+/// A number like a year says nothing.
+const YEARS: std::ops::Range<f64> = 1950.0..2050.0;
+/// `f300` is a feed rate in mm/min, `f0.1` one in mm per turn.
+const LEAST_FEED_RATE: f64 = 10.0;
 
 /// Facts in a name or a line of text.
 pub fn facts_of(text: &str) -> Facts {
@@ -15,29 +24,98 @@ pub fn facts_of(text: &str) -> Facts {
         .split(|c: char| c.is_whitespace() || "_-;=()[]/\\".contains(c))
         .filter(|w| !w.is_empty())
         .collect();
+    let mut bare: Vec<f64> = Vec::new();
+    // The number after a word is the word's: `cut 4`, `force-9400`.
+    let mut word_before = false;
     let mut i = 0;
     while i < words.len() {
-        let (mut letters, mut rest) = split_letters(words[i]);
+        let pieces = pieces(words[i]);
+        if pieces.len() > 1 {
+            let found: Facts = pieces.iter().filter_map(|p| fact_of_piece(p, "")).collect();
+            // One alone may be anything: a version, a serial number.
+            if found.len() > 1 {
+                found.into_iter().for_each(|(k, v)| {
+                    facts.entry(k).or_insert(v);
+                });
+            }
+            (word_before, i) = (false, i + 1);
+            continue;
+        }
+        let starts_with_digit = |w: &&str| w.starts_with(|c: char| c.is_ascii_digit());
+        let (letters, rest) = split_letters(words[i]);
+        let mut piece = words[i].to_string();
         // `ap 2`, `n=1200`
-        if rest.is_empty()
-            && words
-                .get(i + 1)
-                .is_some_and(|w| w.starts_with(|c: char| c.is_ascii_digit()))
-        {
-            letters = words[i];
-            rest = words[i + 1];
+        let takes_next = rest.is_empty() && words.get(i + 1).is_some_and(starts_with_digit);
+        if takes_next {
+            piece += words[i + 1];
             i += 1;
         }
-        let (number, mut unit) = split_number(rest);
-        if unit.is_empty() && number.is_some() {
-            unit = words.get(i + 1).filter(|w| is_unit(w)).copied().unwrap_or("");
+        let unit = words.get(i + 1).filter(|w| is_unit(w)).copied().unwrap_or("");
+        match fact_of_piece(&piece, unit) {
+            Some((key, value)) => {
+                facts.entry(key).or_insert(value);
+            }
+            None if letters.is_empty() && unit.is_empty() && !word_before => {
+                bare.extend(
+                    split_number(words[i])
+                        .0
+                        .filter(|_| split_number(words[i]).1.is_empty()),
+                );
+            }
+            None => (),
         }
-        if let Some((key, value)) = fact(&letters.to_lowercase(), number, &unit.to_lowercase()) {
-            facts.entry(key).or_insert(value);
-        }
+        word_before = !letters.is_empty() && !takes_next && rest.is_empty();
         i += 1;
     }
+    let is_dated = words
+        .iter()
+        .filter_map(|w| w.parse::<f64>().ok())
+        .any(|n| YEARS.contains(&n) || n > 1e7);
+    let speeds: Vec<&f64> = bare
+        .iter()
+        .filter(|n| BARE_RPM.contains(n) && n.fract() == 0.0)
+        .collect();
+    if let ([speed], false) = (speeds.as_slice(), is_dated) {
+        facts.entry("spindle_rpm").or_insert_with(|| speed.to_string());
+    }
     facts
+}
+
+/// `n6000f300ap3` → `n6000`, `f300`, `ap3`; what holds one number stays whole.
+fn pieces(word: &str) -> Vec<&str> {
+    let mut starts = vec![0];
+    let bytes = word.as_bytes();
+    let mut at = 0;
+    while let Some(letter) = (at + 1..bytes.len()).find(|&i| {
+        bytes[i].is_ascii_alphabetic() && !bytes[i - 1].is_ascii_alphabetic() && word.is_char_boundary(i)
+    }) {
+        let run = word[letter..].bytes().take_while(u8::is_ascii_alphabetic).count();
+        let before = bytes[letter - 1].is_ascii_digit();
+        let after = bytes.get(letter + run).is_some_and(u8::is_ascii_digit);
+        // `2p5` is a decimal point.
+        if before && after && &word[letter..letter + run] != "p" {
+            starts.push(letter);
+        }
+        at = letter + run - 1;
+    }
+    let ends = starts.iter().copied().skip(1).chain([word.len()]);
+    starts
+        .iter()
+        .zip(ends)
+        .map(|(from, to)| &word[*from..to])
+        .collect()
+}
+
+/// The fact in letters, a number and a unit behind it; `unit` where none is.
+fn fact_of_piece(piece: &str, unit: &str) -> Option<(&'static str, String)> {
+    let (letters, rest) = split_letters(piece);
+    let (number, own) = split_number(rest);
+    let unit = if own.is_empty() && number.is_some() {
+        unit
+    } else {
+        own
+    };
+    fact(&letters.to_lowercase(), number, &unit.to_lowercase())
 }
 
 fn is_unit(word: &str) -> bool {
@@ -68,18 +146,19 @@ fn split_number(text: &str) -> (Option<f64>, &str) {
 
 fn fact(letters: &str, number: Option<f64>, unit: &str) -> Option<(&'static str, String)> {
     let Some(number) = number else {
-        return match letters {
-            "slot" | "slotting" | "fullslot" => Some(("immersion", "slot".into())),
-            "mill" | "milling" | "fraesen" | "fräsen" => Some(("process", "milling".into())),
-            "drill" | "drilling" | "bohren" => Some(("process", "drilling".into())),
-            _ => None,
-        };
+        let direction = is_down(letters).map(|down| (DIRECTION, if down { "down" } else { "up" }));
+        return english(letters)
+            .or(direction)
+            .map(|(key, word)| (key, word.into()));
     };
     let key = match (letters, unit) {
         (_, "rpm" | "upm") | ("rpm", "") => "spindle_rpm",
         ("n" | "s", "") if number >= SLOWEST_RPM => "spindle_rpm",
         ("fz", "" | "mm") => "feed_per_tooth_mm",
+        ("vf", "") => FEED_RATE,
+        ("f", "") if number >= LEAST_FEED_RATE => FEED_RATE,
         ("f" | "fu", "" | "mm") => "feed_per_rev_mm",
+        ("ae", "" | "mm") => RADIAL_DEPTH,
         ("ap", "" | "mm") => "axial_depth_mm",
         ("pilot", "" | "mm") => "pilot_diameter_mm",
         ("" | "f", "n") => "force_level_n",
@@ -122,26 +201,77 @@ pub fn facts_of_header(start: &[u8]) -> Facts {
     facts
 }
 
-/// The posture that an FRF file's path names: a word like `p3`, `pos3`, `posture-3`, else the folder it shares with
-/// others of its posture, else its own name.
-pub fn posture_of(path: &str, in_posture_folders: bool) -> String {
+const POSTURE_WORDS: [&str; 10] = [
+    "pos",
+    "pose",
+    "posture",
+    "position",
+    "stellung",
+    "lage",
+    "haltung",
+    "posicion",
+    "posición",
+    "postura",
+];
+/// Letters alone that name a posture; F and H are what is measured, X, Y and Z directions.
+const POSTURE_LETTERS: std::ops::RangeInclusive<char> = 'A'..='E';
+
+/// The posture that an FRF file's path names, and why where that is a guess: a word like `p3`, `pos3`, `Pos A`, a letter alone,
+/// else the folder it shares with others of its posture, else its own name.
+pub fn posture_of(path: &str, in_posture_folders: bool) -> (String, Option<&'static str>) {
     let (folder, file) = path.rsplit_once('/').unwrap_or(("", path));
     let stem = file.rsplit_once('.').map_or(file, |(stem, _)| stem);
     let folder = folder.rsplit('/').next().unwrap_or("");
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    let letter = |text: &str| {
+        let mut letters = text.chars();
+        match (letters.next(), letters.next()) {
+            (Some(one), None) => POSTURE_LETTERS
+                .contains(&one.to_ascii_uppercase())
+                .then(|| one.to_ascii_uppercase().to_string()),
+            _ => None,
+        }
+    };
     for name in [stem, folder] {
-        for word in name.split(|c: char| !c.is_alphanumeric()) {
+        let words: Vec<&str> = name
+            .split(|c: char| !c.is_alphanumeric())
+            .filter(|w| !w.is_empty())
+            .collect();
+        for (i, word) in words.iter().enumerate() {
             let (letters, digits) = split_letters(word);
-            let is_number = !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit());
-            if is_number && ["p", "pos", "pose", "posture"].contains(&letters.to_lowercase().as_str()) {
-                return word.to_string();
+            let lower = letters.to_lowercase();
+            if is_number(digits) && (lower == "p" || POSTURE_WORDS.contains(&lower.as_str())) {
+                return (word.to_string(), None);
             }
+            // `Pos A`, `Pos 3`, `posC`
+            if digits.is_empty() && POSTURE_WORDS.contains(&lower.as_str()) {
+                let next = words.get(i + 1).copied().unwrap_or("");
+                if is_number(next) {
+                    return (format!("{word}{next}"), Some(FROM_NAME));
+                }
+                if let Some(id) = letter(next) {
+                    return (id, Some(FROM_NAME));
+                }
+            }
+            let attached = POSTURE_WORDS
+                .iter()
+                .find_map(|w| lower.strip_prefix(w).and_then(letter));
+            if let (Some(id), true) = (attached, digits.is_empty()) {
+                return (id, Some(FROM_NAME));
+            }
+        }
+        let alone = words.iter().filter(|w| w.chars().all(char::is_uppercase));
+        if let [id] = alone.filter_map(|w| letter(w)).collect::<Vec<_>>().as_slice() {
+            return (id.clone(), Some("from a letter in the file name"));
         }
     }
     match in_posture_folders {
-        true => folder.to_string(),
-        false => stem.to_string(),
+        true => (folder.to_string(), Some("from the folder")),
+        false => (stem.to_string(), None),
     }
 }
+
+pub(super) const FROM_NAME: &str = "from the file name";
 
 #[cfg(test)]
 mod tests {
@@ -167,6 +297,18 @@ mod tests {
             assert_eq!(facts["axial_depth_mm"], "2.5", "{text}");
         }
         assert_eq!(list("p3_F200N"), [("force_level_n", "200".to_string())]);
+        let compact = list("6-n6000f300ap3ae25");
+        let expected = [
+            ("axial_depth_mm", "3"),
+            ("feed_mm_per_min", "300"),
+            ("radial_depth_mm", "25"),
+            ("spindle_rpm", "6000"),
+        ];
+        assert_eq!(compact, expected.map(|(k, v)| (k, v.to_string())));
+        let bare = facts_of("Versuch_4 1620 fz0,05 Gleichlauf");
+        assert_eq!(bare["spindle_rpm"], "1620");
+        assert_eq!(bare["feed_per_tooth_mm"], "0.05");
+        assert_eq!(bare["direction"], "down");
         // Sample numbers and dates are no speeds.
         for text in [
             "cut01",
@@ -176,6 +318,8 @@ mod tests {
             "sample 12",
             "ap",
             "fz0",
+            "Messung 2024-03-12_1542",
+            "rev2b3",
         ] {
             assert!(list(text).is_empty(), "{text}: {:?}", list(text));
         }
@@ -199,8 +343,13 @@ mod tests {
             ("home/x.csv", true, "home"),
             ("frf/home.csv", false, "home"),
             ("frf/plate2.csv", false, "plate2"),
+            ("roh/FRF_Pos A (neu).csv", false, "A"),
+            ("roh/frf_posC_v2.CSV", true, "C"),
+            ("frf_B_200N.uff", false, "B"),
+            ("frf/Stellung 3.uff", false, "Stellung3"),
+            ("frf/FRF_X.uff", false, "FRF_X"),
         ] {
-            assert_eq!(posture_of(path, folders), expected, "{path}");
+            assert_eq!(posture_of(path, folders).0, expected, "{path}");
         }
     }
 }

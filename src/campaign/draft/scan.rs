@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
+use super::cut_list;
 use super::names::{Facts, facts_of, facts_of_header, posture_of};
 use crate::campaign::campaign_file;
 use crate::campaign::robot_spec::RobotSpec;
@@ -19,6 +20,8 @@ pub struct Scan {
     pub forces: Vec<FoundForce>,
     /// A robot file, where there is exactly one.
     pub robot: Option<String>,
+    /// Tables that look like lists of cuts.
+    pub cut_lists: Vec<PathBuf>,
     /// Path, and why it goes into no campaign.
     pub not_used: Vec<(String, String)>,
 }
@@ -27,6 +30,8 @@ pub struct Scan {
 pub struct FoundFrf {
     pub path: String,
     pub posture: String,
+    /// How the posture was concluded, where that is a guess.
+    pub posture_guess: Option<&'static str>,
     /// `None` where the file does not say for every FRF.
     pub quantity: Option<Quantity>,
     pub nodes: BTreeSet<i64>,
@@ -50,7 +55,11 @@ const OTHERS: [&str; 16] = [
     "parquet", "log",
 ];
 
+/// Words in the name of a copy.
+const COPY: [&str; 6] = ["kopie", "copy", "copie", "copia", "backup", "sicherung"];
+
 enum Seen {
+    CutList(PathBuf),
     Frf(FoundFrf),
     Force(FoundForce),
     NotUsed(String, String),
@@ -86,6 +95,7 @@ pub fn scan(dir: &Path) -> Result<Scan> {
     if let [robot] = &robots[..] {
         scan.robot = Some(robot.clone());
     }
+    leave_out_copies(&mut measurements, &mut scan.not_used);
     // In parallel, but collected in order: the result does not depend on the threads.
     let seen: Vec<Seen> = measurements
         .into_par_iter()
@@ -93,6 +103,7 @@ pub fn scan(dir: &Path) -> Result<Scan> {
         .collect();
     for one in seen {
         match one {
+            Seen::CutList(path) => scan.cut_lists.push(path),
             Seen::Frf(frf) => scan.frfs.push(frf),
             Seen::Force(force) => scan.forces.push(force),
             Seen::NotUsed(path, why) => scan.not_used.push((path, why)),
@@ -106,9 +117,68 @@ pub fn scan(dir: &Path) -> Result<Scan> {
     }
     let in_folders = folders.len() > 1 && !folders.contains_key("");
     for frf in &mut scan.frfs {
-        frf.posture = posture_of(&frf.path, in_folders);
+        (frf.posture, frf.posture_guess) = posture_of(&frf.path, in_folders);
     }
     Ok(scan)
+}
+
+/// A file that is named a copy, and holds what another one holds, counts once.
+fn leave_out_copies(files: &mut Vec<(String, PathBuf)>, not_used: &mut Vec<(String, String)>) {
+    let is_copy = |name: &str| COPY.iter().any(|word| name.to_lowercase().contains(word));
+    let size = |path: &Path| std::fs::metadata(path).map(|m| m.len()).ok();
+    let original = |name: &str, path: &Path| {
+        files.iter().find(|(other, at)| {
+            other != name && !is_copy(other) && size(at) == size(path) && same_content(at, path)
+        })
+    };
+    let copies: Vec<(String, String)> = files
+        .iter()
+        .filter(|(name, _)| is_copy(name))
+        .filter_map(|(name, path)| Some((name.clone(), original(name, path)?.0.clone())))
+        .collect();
+    files.retain(|(name, _)| copies.iter().all(|(copy, _)| copy != name));
+    let told = copies
+        .into_iter()
+        .map(|(copy, of)| (copy, format!("a copy of {of}, byte for byte")));
+    not_used.extend(told);
+}
+
+fn same_content(a: &Path, b: &Path) -> bool {
+    const CHUNK: usize = 1 << 16;
+    let (Ok(a), Ok(b)) = (std::fs::File::open(a), std::fs::File::open(b)) else {
+        return false;
+    };
+    let mut readers = [std::io::BufReader::new(a), std::io::BufReader::new(b)];
+    loop {
+        let mut chunks = [Vec::new(), Vec::new()];
+        for (reader, chunk) in readers.iter_mut().zip(&mut chunks) {
+            if reader.take(CHUNK as u64).read_to_end(chunk).is_err() {
+                return false;
+            }
+        }
+        match &chunks {
+            [a, b] if a != b => return false,
+            [a, _] if a.is_empty() => return true,
+            _ => (),
+        }
+    }
+}
+
+/// The files below a folder that may be measurements, in the order of their names.
+///
+/// # Errors
+/// As [`scan`].
+pub fn measurement_files(dir: &Path) -> Result<Vec<PathBuf>> {
+    let root = dir.canonicalize().map_err(|e| Error::io(dir, e))?;
+    let mut files = Vec::new();
+    collect(dir, &root, 0, &mut files)?;
+    files.retain(|file| {
+        let ending = file.extension().map(|e| e.to_string_lossy().to_lowercase());
+        let ending = ending.unwrap_or_default();
+        ending != "toml" && !OTHERS.contains(&ending.as_str())
+    });
+    files.sort();
+    Ok(files)
 }
 
 fn relative(dir: &Path, file: &Path) -> String {
@@ -159,6 +229,9 @@ fn collect(dir: &Path, root: &Path, depth: usize, files: &mut Vec<PathBuf>) -> R
 fn look(name: String, file: &Path) -> Seen {
     let read = match survey(file) {
         Ok(survey) => survey.file,
+        Err(Error::Input(_)) if cut_list::looks_like_one(&start_of(file)) => {
+            return Seen::CutList(file.to_path_buf());
+        }
         Err(Error::Input(error)) => {
             let why = match error.remedy {
                 Some(remedy) => format!("{} ({remedy})", error.problem),
@@ -184,6 +257,7 @@ fn look(name: String, file: &Path) -> Seen {
         let dofs = contents.frfs.iter().flat_map(|f| [f.response, f.reference]);
         return Seen::Frf(FoundFrf {
             posture: String::new(),
+            posture_guess: None,
             quantity: quantities[0].filter(|_| all_say),
             nodes: dofs.flatten().map(|d| d.node).collect(),
             facts: facts_of(stem(&name)),
@@ -215,10 +289,12 @@ pub(super) fn stem(path: &str) -> &str {
 }
 
 fn header(file: &Path) -> Facts {
+    facts_of_header(&start_of(file))
+}
+
+/// Its first 4 kB; empty where it cannot be read.
+fn start_of(file: &Path) -> Vec<u8> {
     let mut start = Vec::new();
     let read = std::fs::File::open(file).and_then(|f| f.take(4096).read_to_end(&mut start));
-    match read {
-        Ok(_) => facts_of_header(&start),
-        Err(_) => Facts::new(),
-    }
+    read.map_or_else(|_| Vec::new(), |_| start)
 }

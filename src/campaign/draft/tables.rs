@@ -3,13 +3,14 @@
 use std::collections::BTreeSet;
 
 use super::entry::{Entry, Kind};
+use super::list_columns::{DIRECTION, FEED_PER_TURN, FEED_RATE, RADIAL_DEPTH};
+use super::names::FROM_NAME;
 use super::scan::stem;
 use super::{Answers, FoundForce, Scan, Table};
 use crate::ingest::Quantity;
 use crate::{InputError, Result};
 
 const PROCESSES: &[&str] = &["milling", "drilling"];
-const FROM_NAME: &str = "from the file name";
 const FROM_HEADER: &str = "from the file's header";
 
 /// The sections in the order in which they stand in the file.
@@ -169,7 +170,13 @@ fn frfs(scan: &Scan, answers: &Answers) -> Result<Vec<Table>> {
     for frf in &scan.frfs {
         let mut making = Making::new(answers, "frf", &frf.path, true);
         making.fact("file", Kind::Text, &frf.path);
-        making.fact("posture", Kind::Text, &frf.posture);
+        match frf.posture_guess {
+            Some(why) => {
+                let posture = Entry::new("posture", Kind::Text, "posture it was measured in", "p1");
+                making.add(posture, &[(Some(&frf.posture), why)])?;
+            }
+            None => making.fact("posture", Kind::Text, &frf.posture),
+        }
         let quantity = Entry::new(
             "quantity",
             Kind::Choice(&["receptance", "mobility", "accelerance"]),
@@ -294,10 +301,27 @@ fn cuts(scan: &Scan, answers: &Answers) -> Result<Vec<(Option<String>, Table)>> 
                 (force.from_name.get(key).map(String::as_str), FROM_NAME),
             ]
         };
+        let known = |key: &str| -> Option<&str> {
+            let found = said(key).into_iter().find_map(|(value, _)| value);
+            answers.get("cut", &id, key).or(found)
+        };
+        let feeds = Feeds::of(&known, answers);
+        let engaged = engagement(&known, answers);
         // A key that only one process has tells the process.
-        let drilled = ["feed_per_rev_mm", "pilot_diameter_mm", "hole_depth_mm"];
-        let milled = ["feed_per_tooth_mm", "axial_depth_mm", "immersion"];
-        let given = |keys: &[&'static str]| keys.iter().any(|k| answers.get("cut", &id, k).is_some());
+        let drilled = [
+            "feed_per_rev_mm",
+            "pilot_diameter_mm",
+            "hole_depth_mm",
+            FEED_PER_TURN,
+        ];
+        let milled = [
+            "feed_per_tooth_mm",
+            "axial_depth_mm",
+            "immersion",
+            RADIAL_DEPTH,
+            DIRECTION,
+        ];
+        let given = |keys: &[&'static str]| keys.iter().any(|k| known(k).is_some());
         let kind_of_tool = answers.get("tool", "", "kind");
         let concluded = match () {
             _ if given(&milled) || kind_of_tool == Some("endmill") => Some("milling"),
@@ -344,10 +368,24 @@ fn cuts(scan: &Scan, answers: &Answers) -> Result<Vec<(Option<String>, Table)>> 
             ],
         };
         for entry in entries {
-            let guesses = said(entry.key);
-            making.add(entry, &guesses)?;
+            let [header, name] = said(entry.key);
+            let derived = match entry.key {
+                "feed_per_tooth_mm" => feeds.per_tooth.as_ref(),
+                "feed_per_rev_mm" => feeds.per_turn.as_ref(),
+                "immersion" => engaged.as_ref(),
+                _ => None,
+            };
+            let derived = derived.map_or((None, ""), |(value, why)| (Some(value.as_str()), why.as_str()));
+            making.add(entry, &[header, name, derived])?;
         }
         for entry in [
+            Entry::new(
+                "steady_s",
+                Kind::Numbers,
+                "steady cut, from and to, s",
+                "[1.2, 2.4]",
+            )
+            .optional(),
             Entry::new("order", Kind::Whole, "when this cut was made: 1, 2, …", "1").optional(),
             Entry::new("material", Kind::Text, "workpiece", "C45").optional(),
             Entry::new(
@@ -365,4 +403,64 @@ fn cuts(scan: &Scan, answers: &Answers) -> Result<Vec<(Option<String>, Table)>> 
         out.push((process, making.table));
     }
     Ok(out)
+}
+
+/// Feeds that follow from others, each with why.
+struct Feeds {
+    per_tooth: Option<(String, String)>,
+    per_turn: Option<(String, String)>,
+}
+
+impl Feeds {
+    /// From a feed rate or a feed per turn, the speed, and the number of teeth.
+    fn of<'a>(known: &impl Fn(&str) -> Option<&'a str>, answers: &Answers) -> Feeds {
+        let number = |key: &str| positive(known(key)?);
+        let teeth = answers.get("tool", "", "teeth").and_then(positive);
+        let (per_turn, why) = match (number(FEED_RATE), number("spindle_rpm"), number(FEED_PER_TURN)) {
+            (Some(rate), Some(rpm), _) => (Some(rate / rpm), format!("{rate} mm/min at {rpm} rpm")),
+            (_, _, Some(feed)) => (Some(feed), format!("{feed} mm per turn")),
+            // In milling, `f0.2` in a name is per turn too.
+            _ => match number("feed_per_rev_mm") {
+                Some(feed) => (Some(feed), format!("{feed} mm per turn, {FROM_NAME}")),
+                None => (None, String::new()),
+            },
+        };
+        let shown = |feed: f64| {
+            format!("{:.6}", feed)
+                .trim_end_matches('0')
+                .trim_end_matches('.')
+                .to_string()
+        };
+        Feeds {
+            per_tooth: per_turn
+                .zip(teeth)
+                .map(|(feed, teeth)| (shown(feed / teeth), format!("{why}, {teeth} teeth"))),
+            per_turn: per_turn.map(|feed| (shown(feed), why)),
+        }
+    }
+}
+
+/// Start and exit angle from the radial depth and the tool's diameter, with why. An edge of the workpiece is taken to be milled,
+/// down where nobody says which way.
+fn engagement<'a>(known: &impl Fn(&str) -> Option<&'a str>, answers: &Answers) -> Option<(String, String)> {
+    let depth = positive(known(RADIAL_DEPTH)?)?;
+    let diameter = positive(answers.get("tool", "", "diameter_mm")?)?;
+    let why = format!("ae {depth} of D {diameter} mm");
+    if depth >= 0.999 * diameter {
+        return Some(("slot".into(), why));
+    }
+    let arc = (1.0 - 2.0 * depth / diameter).acos().to_degrees();
+    Some(match known(DIRECTION) {
+        Some("up") => (format!("0 {arc:.3}"), format!("{why}, up milling")),
+        Some(_) => (format!("{:.3} 180", 180.0 - arc), format!("{why}, down milling")),
+        None => (
+            format!("{:.3} 180", 180.0 - arc),
+            format!("{why}; down milling taken, up milling is 0 to {arc:.1} deg"),
+        ),
+    })
+}
+
+fn positive(text: &str) -> Option<f64> {
+    let number: f64 = text.trim().replace(',', ".").parse().ok()?;
+    (number > 0.0 && number.is_finite()).then_some(number)
 }

@@ -98,7 +98,7 @@ impl LeastSquares for JointProblem<'_> {
         };
         let residual = weighted(&predict(self.model, theta, self.data, Some(made))?, self.data);
         let mut columns = jacobian(self.model, self.data, theta, Some(made))?;
-        let slopes = size_slopes(self.model, self.data, theta, made)?;
+        let slopes = size_slopes(self.model, self.data, theta, made, &self.mistake.sizes())?;
         for (mut slope, size) in slopes.into_iter().zip(self.mistake.sizes()) {
             for s in &mut slope {
                 *s *= size.usual;

@@ -58,13 +58,8 @@ impl Estimated<'_> {
     }
 }
 
-/// A mistake whose size is estimated. Its vanishing is `values` = 0.
-pub trait Mistake: Sync + Send {
-    fn sizes(&self) -> Vec<Size>;
-
-    /// Selections of FRFs that it may concern.
-    fn groups(&self, data: &FrfData) -> Vec<Group>;
-
+/// What a mistake of given sizes does to the files. Its vanishing is `values` = 0.
+pub trait Distortion: Sync + Send {
     /// The posture in truth, where campaign.toml gives `kinematics`.
     fn kinematics(&self, _values: &[f64], kinematics: &Kinematics) -> Kinematics {
         kinematics.clone()
@@ -84,6 +79,14 @@ pub trait Mistake: Sync + Send {
     fn shown(&self, _values: &[f64], _omega: f64, truth: &Truth, frf: &FrfDatum) -> Complex64 {
         truth.between(frf.response.axis, frf.reference.axis)
     }
+}
+
+/// A mistake whose size is estimated.
+pub trait Mistake: Distortion {
+    fn sizes(&self) -> Vec<Size>;
+
+    /// Selections of FRFs that it may concern.
+    fn groups(&self, data: &FrfData) -> Vec<Group>;
 
     /// The finding, its confidence still open.
     fn finding(&self, estimated: &Estimated) -> SetupFinding;

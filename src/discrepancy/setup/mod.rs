@@ -6,6 +6,7 @@
 //! filed under another): the data are put right and the baseline is fitted again. A finding has to be more than chance, to
 //! leave less than the physics of the library would, and to explain what stands above the noise.
 
+mod care;
 mod cutting;
 mod decide;
 mod duplicates;
@@ -19,10 +20,12 @@ mod reading;
 mod readings;
 mod scene;
 mod score;
+mod slipped;
 mod slips;
 #[cfg(test)]
 mod tests;
 
+pub use care::CARE;
 pub use cutting::examine_cutting;
 pub use examine::{Rival, SetupCheck, examine, library_rival};
 pub use finding::{LIKELY, SetupFinding};

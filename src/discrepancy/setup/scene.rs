@@ -4,7 +4,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::group::Group;
-use super::mistake::Mistake;
+use super::mistake::Distortion;
 use crate::Result;
 use crate::effects::ChannelFilter;
 use crate::identify::StructureModel;
@@ -60,7 +60,7 @@ impl Truth<'_> {
 /// A mistake of a given size in some of the files.
 #[derive(Clone, Copy)]
 pub struct Made<'m> {
-    pub mistake: &'m dyn Mistake,
+    pub mistake: &'m dyn Distortion,
     pub group: Group,
     pub values: &'m [f64],
 }

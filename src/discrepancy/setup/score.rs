@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::group::Group;
-use super::mistake::Mistake;
+use super::mistake::{Mistake, Size};
 use super::scene::{Curves, Made, predict, weighted};
 use crate::Result;
 use crate::identify::StructureModel;
@@ -81,14 +81,14 @@ fn difference(up: &Curves, down: &Curves, data: &FrfData, step: f64) -> Vec<f64>
     column
 }
 
-/// Derivatives with respect to the sizes of a mistake at `values`.
+/// Derivatives with respect to the `sizes` of a mistake at its values.
 pub(super) fn size_slopes(
     model: &StructureModel,
     data: &FrfData,
     theta: &[f64],
     made: Made,
+    sizes: &[Size],
 ) -> Result<Vec<Vec<f64>>> {
-    let sizes = made.mistake.sizes();
     (0..sizes.len())
         .map(|i| {
             let step = STEP * sizes[i].usual;
@@ -174,7 +174,7 @@ impl<'a> Linearised<'a> {
         if groups.is_empty() {
             return Ok(Vec::new());
         }
-        let slopes = size_slopes(self.model, self.data, self.theta, made)?;
+        let slopes = size_slopes(self.model, self.data, self.theta, made, &sizes)?;
         // Sums for each FRF: those of a group are sums of these.
         struct Part {
             own: DMatrix<f64>,

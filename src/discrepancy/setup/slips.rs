@@ -2,20 +2,23 @@
 //! them worth a name.
 //!
 //! Encoders, hammer gain, direction of the hits, sensors and stiffness are each a little wrong, anew at every posture. Their
-//! sizes are known beforehand (normal laws about zero), so that they are estimated together with the model's parameters in
-//! one linear step, and each has to pay for its size. Physics that is the same at all postures is not followed by errors that
+//! sizes are known beforehand (normal laws about zero, [`care`]), so that they are estimated together with the model's
+//! parameters, and each has to pay for its size. Physics that is the same at all postures is not followed by errors that
 //! differ from one to the next; the tests of structure are then made on what is left.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use num_complex::Complex64;
+use rayon::prelude::*;
 
+use super::care::{self, Care};
 use super::group::Group;
 use super::mistake::Mistake;
 use super::mistakes::{channel_gain, encoder_offset, hit_direction, sensor_high_pass, turned_sensor};
 use super::scene::{Made, predict};
+use super::slipped::{Error, Slipped};
 use crate::Result;
 use crate::identify::StructureModel;
-use crate::identify::frf_data::{FrfData, FrfDatum};
+use crate::identify::frf_data::{FrfBlock, FrfData};
 use crate::identify::rest::{AfterSlips, RestCurve};
 use crate::ingest::Axis;
 use crate::parameter::Scale;
@@ -31,9 +34,16 @@ const CORNER_HZ: f64 = 0.03;
 
 /// Differences are taken over this many standard deviations.
 const STEP: f64 = 1e-2;
+/// Steps of the estimate, all with the slopes at the model's optimum.
+const STEPS: usize = 3;
+/// Relative change of what is left by which a step no longer matters.
+const SETTLED: f64 = 1e-3;
 
-/// One kind of error: what it does where it is, and each place that it may be at on its own.
+/// One error: what it does where it is, and each place that it may be at on its own.
 struct Slip {
+    error: Error,
+    /// Its standard deviation.
+    std: f64,
     /// Change of each curve by one standard deviation, over σ.
     change: Vec<Vec<Complex64>>,
     places: Vec<Group>,
@@ -50,103 +60,248 @@ pub fn absorb(
     curves: &[RestCurve],
 ) -> Result<AfterSlips> {
     let slips = slips(model, data, theta, curves)?;
-    let own = model.parameters.len();
-    // Unknowns: the model's parameters, then each slip at each place, in units of its standard deviation.
-    let mut first = own;
-    let starts: Vec<usize> = slips
-        .iter()
-        .map(|slip| {
-            let start = first;
-            first += slip.places.len();
-            start
-        })
-        .collect();
-    let count = first;
-    let active = |frf: &FrfDatum| -> Vec<(usize, usize)> {
-        let numbered = slips.iter().zip(&starts).enumerate();
-        numbered
-            .flat_map(|(s, (slip, start))| {
-                let places = slip.places.iter().enumerate();
-                places
-                    .filter(|(_, g)| g.holds(frf))
-                    .map(move |(place, _)| (s, start + place))
-            })
-            .collect()
-    };
-    let frfs: Vec<&FrfDatum> = data.frfs().map(|(_, frf)| frf).collect();
-    let columns = |k: usize| -> Vec<(usize, &[Complex64])> {
-        let of_model = curves[k].slopes.iter().map(Vec::as_slice).enumerate();
-        let of_slips = active(frfs[k])
-            .into_iter()
-            .map(|(s, i)| (i, slips[s].change[k].as_slice()));
-        of_model.chain(of_slips).collect()
-    };
-    // Noise has E|r|² = 1 per complex value: each part counts double.
-    let (mut information, mut gradient) = (DMatrix::<f64>::zeros(count, count), DVector::<f64>::zeros(count));
-    for (k, curve) in curves.iter().enumerate() {
-        let columns = columns(k);
-        for (a, (i, x)) in columns.iter().enumerate() {
-            gradient[*i] += 2.0 * real_product(x, &curve.rest);
-            for (j, y) in &columns[..=a] {
-                let sum = 2.0 * real_product(x, y);
-                information[(*i, *j)] += sum;
-                if i != j {
-                    information[(*j, *i)] += sum;
+    let system = System::new(model, data, theta, curves, &slips)?;
+    let found: Vec<Vec<Complex64>> = curves.iter().map(|c| c.rest.clone()).collect();
+    let before = energy(&found);
+    // What is left at zero as the slopes have it, from the last point that was tried.
+    let mut origin = found;
+    let mut best: Option<AfterSlips> = None;
+    for _ in 0..STEPS {
+        let (sizes, care) = system.solve(&origin)?;
+        let linear = system.moved(&origin, &sizes, 1.0);
+        let Ok(rest) = system.exact(&sizes) else { break };
+        let (expected, left) = (energy(&linear), energy(&rest));
+        let after = AfterSlips {
+            price: care.price,
+            unlikely: care.unlikely,
+            evidence: care.evidence + 0.5 * (before - energy(&origin) + expected - left),
+            known_to: (left - expected).abs(),
+            rest,
+        };
+        let better = best.as_ref().is_none_or(|b| after.evidence > b.evidence);
+        if better {
+            origin = system.moved(&after.rest, &sizes, -1.0);
+            best = Some(after);
+        }
+        if !better || (left - expected).abs() < SETTLED * left {
+            break;
+        }
+    }
+    best.ok_or_else(|| crate::Error::computation("the small errors of the setup cannot be told"))
+}
+
+/// Σ r²/σ² over real values.
+fn energy(rest: &[Vec<Complex64>]) -> f64 {
+    2.0 * rest.iter().flatten().map(Complex64::norm_sqr).sum::<f64>()
+}
+
+/// The model's parameters and the errors as the unknowns of one linear problem: first the parameters, then each slip at each
+/// of its places, in units of its standard deviation.
+struct System<'a> {
+    model: &'a StructureModel,
+    data: &'a FrfData,
+    theta: &'a [f64],
+    curves: &'a [RestCurve],
+    slips: &'a [Slip],
+    /// First unknown of each slip.
+    starts: Vec<usize>,
+    /// Curve by curve: slips that concern it and their unknown.
+    active: Vec<Vec<(usize, usize)>>,
+    /// Kind of each error.
+    kinds: Vec<usize>,
+    of_model: Cholesky<f64, Dyn>,
+    /// What the model's parameters do about a unit of each error.
+    follow: DMatrix<f64>,
+    /// Information on the errors, the model's parameters having followed.
+    alone: DMatrix<f64>,
+}
+
+impl<'a> System<'a> {
+    fn new(
+        model: &'a StructureModel,
+        data: &'a FrfData,
+        theta: &'a [f64],
+        curves: &'a [RestCurve],
+        slips: &'a [Slip],
+    ) -> Result<Self> {
+        let own = model.parameters.len();
+        let mut count = own;
+        let mut starts = Vec::new();
+        for slip in slips {
+            starts.push(count);
+            count += slip.places.len();
+        }
+        let concerning = |frf| {
+            let numbered = slips.iter().zip(&starts).enumerate();
+            numbered
+                .flat_map(|(s, (slip, start))| {
+                    let places = slip.places.iter().enumerate();
+                    places
+                        .filter(|(_, g)| g.holds(frf))
+                        .map(move |(place, _)| (s, start + place))
+                })
+                .collect()
+        };
+        let active: Vec<Vec<(usize, usize)>> = data.frfs().map(|(_, frf)| concerning(frf)).collect();
+        // Noise has E|r|² = 1 per complex value: each part counts double.
+        let mut information = DMatrix::<f64>::zeros(count, count);
+        for (curve, active) in curves
+            .iter()
+            .zip(&active)
+            .enumerate()
+            .map(|(k, (c, a))| ((k, c), a))
+        {
+            let columns = columns(curve, slips, active);
+            for (a, (i, x)) in columns.iter().enumerate() {
+                for (j, y) in &columns[..=a] {
+                    let sum = 2.0 * real_product(x, y);
+                    information[(*i, *j)] += sum;
+                    if i != j {
+                        information[(*j, *i)] += sum;
+                    }
                 }
             }
         }
-    }
-    for (i, parameter) in model.parameters.iter().enumerate() {
-        if let Some(prior) = parameter.prior {
-            let [_, slope, curvature] = prior.half_square(theta[i]);
-            information[(i, i)] += curvature;
-            gradient[i] += slope;
-        }
-        // A parameter that this data does not see at all stays where it is.
-        information[(i, i)] += 1e-9 * (1.0 + information[(i, i)]);
-    }
-    let (usual, occam) = usual_energy(&information, own)?;
-    for i in own..count {
-        information[(i, i)] += 1.0;
-    }
-    let factor = information.cholesky().ok_or_else(|| {
-        crate::Error::computation("the data do not determine the small errors of the setup")
-    })?;
-    let sizes = -factor.solve(&gradient);
-    let rest = curves
-        .iter()
-        .enumerate()
-        .map(|(k, curve)| {
-            let mut rest = curve.rest.clone();
-            for (i, column) in columns(k) {
-                rest.iter_mut().zip(column).for_each(|(r, c)| *r += c * sizes[i]);
+        for (i, parameter) in model.parameters.iter().enumerate() {
+            if let Some(prior) = parameter.prior {
+                information[(i, i)] += prior.half_square(theta[i])[2];
             }
-            rest
+            // A parameter that this data does not see at all stays where it is.
+            information[(i, i)] += 1e-9 * (1.0 + information[(i, i)]);
+        }
+        let errors = count - own;
+        let of_model = information
+            .view((0, 0), (own, own))
+            .into_owned()
+            .cholesky()
+            .ok_or_else(|| crate::Error::computation("the data do not determine the parameters"))?;
+        let cross = information.view((0, own), (own, errors)).into_owned();
+        let follow = of_model.solve(&cross);
+        let alone = information.view((own, own), (errors, errors)) - cross.tr_mul(&follow);
+        Ok(System {
+            model,
+            data,
+            theta,
+            curves,
+            slips,
+            starts,
+            active,
+            kinds: slips
+                .iter()
+                .flat_map(|s| std::iter::repeat_n(s.error.kind(), s.places.len()))
+                .collect(),
+            of_model,
+            follow,
+            alone,
         })
-        .collect();
-    Ok(AfterSlips {
-        rest,
-        price: sizes.rows(own, count - own).norm_squared(),
-        usual,
-        occam,
-    })
+    }
+
+    fn columns(&self, k: usize) -> Vec<(usize, &[Complex64])> {
+        columns((k, &self.curves[k]), self.slips, &self.active[k])
+    }
+
+    /// Changes of all unknowns, errors in their standard deviations, of greatest probability for `rest` left at zero.
+    fn solve(&self, rest: &[Vec<Complex64>]) -> Result<(DVector<f64>, Care)> {
+        let own = self.theta.len();
+        let errors = self.kinds.len();
+        let mut gradient = DVector::<f64>::zeros(own + errors);
+        for (k, rest) in rest.iter().enumerate() {
+            for (i, x) in self.columns(k) {
+                gradient[i] += 2.0 * real_product(x, rest);
+            }
+        }
+        for (i, parameter) in self.model.parameters.iter().enumerate() {
+            if let Some(prior) = parameter.prior {
+                gradient[i] += prior.half_square(self.theta[i])[1];
+            }
+        }
+        let of_model = gradient.rows(0, own).into_owned();
+        let of_errors = gradient.rows(own, errors) - self.follow.tr_mul(&of_model);
+        let care = care::estimate(&self.alone, &of_errors, &self.kinds)?;
+        let mut sizes = DVector::zeros(own + errors);
+        let followed = -self.of_model.solve(&of_model) - &self.follow * &care.sizes;
+        sizes.rows_mut(0, own).copy_from(&followed);
+        sizes.rows_mut(own, errors).copy_from(&care.sizes);
+        Ok((sizes, care))
+    }
+
+    /// `rest` after `times` the change that the slopes foresee for `sizes`.
+    fn moved(&self, rest: &[Vec<Complex64>], sizes: &DVector<f64>, times: f64) -> Vec<Vec<Complex64>> {
+        let mut moved = rest.to_vec();
+        for (k, rest) in moved.iter_mut().enumerate() {
+            for (i, column) in self.columns(k) {
+                rest.iter_mut()
+                    .zip(column)
+                    .for_each(|(r, c)| *r += c * (times * sizes[i]));
+            }
+        }
+        moved
+    }
+
+    /// What is left with errors of these sizes, all made at once.
+    fn exact(&self, sizes: &DVector<f64>) -> Result<Vec<Vec<Complex64>>> {
+        let bounds = self.model.bounds();
+        let blocks: Vec<Vec<Vec<Complex64>>> = self
+            .data
+            .blocks
+            .par_iter()
+            .map(|block| self.exact_block(sizes, &bounds, block))
+            .collect::<Result<_>>()?;
+        let all: Vec<Vec<Complex64>> = blocks.into_iter().flatten().collect();
+        let finite = all.iter().flatten().all(|r| r.is_finite());
+        finite
+            .then_some(all)
+            .ok_or_else(|| crate::Error::computation("small errors of the setup without a response"))
+    }
+
+    fn exact_block(
+        &self,
+        sizes: &DVector<f64>,
+        bounds: &[[f64; 2]],
+        block: &std::sync::Arc<FrfBlock>,
+    ) -> Result<Vec<Vec<Complex64>>> {
+        let mut theta: Vec<f64> = self.theta.iter().zip(sizes.iter()).map(|(t, s)| t + s).collect();
+        let mut slipped = Slipped::default();
+        for (slip, start) in self.slips.iter().zip(&self.starts) {
+            let here = |g: &Group| g.posture.is_none_or(|p| p == block.posture);
+            for (place, group) in slip.places.iter().enumerate().filter(|(_, g)| here(g)) {
+                let size = slip.std * sizes[start + place];
+                match slip.error {
+                    Error::Stiffness(i) => theta[i] += size,
+                    error => slipped.add(error, group, size),
+                }
+            }
+        }
+        for (t, [low, high]) in theta.iter_mut().zip(bounds) {
+            *t = t.clamp(*low, *high);
+        }
+        let data = FrfData {
+            blocks: vec![std::sync::Arc::clone(block)],
+            posture_ids: self.data.posture_ids.clone(),
+        };
+        let made = Made {
+            mistake: &slipped,
+            group: Group::ALL,
+            values: &[],
+        };
+        let predicted = predict(self.model, &theta, &data, Some(made))?;
+        let over_noise = |(frf, curve): (&crate::identify::frf_data::FrfDatum, Vec<Complex64>)| {
+            let lines = curve.into_iter().zip(&frf.receptance).zip(&frf.noise_std);
+            lines.map(|((m, h), std)| (m - h) / std).collect()
+        };
+        Ok(block.frfs.iter().zip(predicted).map(over_noise).collect())
+    }
 }
 
-/// Energy that slips of one standard deviation each leave after the model's parameters, the first `own` ones, have followed;
-/// and ln det of their information then: what so many unknowns pay for being fitted (Occam's factor, MacKay 1992).
-fn usual_energy(information: &DMatrix<f64>, own: usize) -> Result<(f64, f64)> {
-    let slips = information.nrows() - own;
-    let undetermined = || crate::Error::computation("the data do not determine the parameters");
-    let model = information.view((0, 0), (own, own)).into_owned();
-    let cross = information.view((0, own), (own, slips)).into_owned();
-    let factor = model.cholesky().ok_or_else(undetermined)?;
-    let alone = information.view((own, own), (slips, slips)) - cross.tr_mul(&factor.solve(&cross));
-    let energy = alone.trace().max(0.0);
-    let factor = (alone + DMatrix::identity(slips, slips))
-        .cholesky()
-        .ok_or_else(undetermined)?;
-    let occam = 2.0 * factor.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
-    Ok((energy, occam))
+/// Slopes of the `k`-th curve by the unknowns that concern it.
+fn columns<'a>(
+    (k, curve): (usize, &'a RestCurve),
+    slips: &'a [Slip],
+    active: &[(usize, usize)],
+) -> Vec<(usize, &'a [Complex64])> {
+    let of_model = curve.slopes.iter().map(Vec::as_slice).enumerate();
+    let of_slips = active.iter().map(|(s, i)| (*i, slips[*s].change[k].as_slice()));
+    of_model.chain(of_slips).collect()
 }
 
 /// χ² that the small errors take of what `model` leaves, less what they pay for it.
@@ -155,11 +310,7 @@ fn usual_energy(information: &DMatrix<f64>, own: usize) -> Result<(f64, f64)> {
 /// A model without a response.
 pub fn gain(model: &StructureModel, data: &FrfData, theta: &[f64]) -> Result<f64> {
     let curves = model.rest(theta, data)?;
-    let after = absorb(model, data, theta, &curves)?;
-    let sum = |rest: &[Complex64]| 2.0 * rest.iter().map(Complex64::norm_sqr).sum::<f64>();
-    let pairs = curves.iter().zip(&after.rest);
-    let taken: f64 = pairs.map(|(before, after)| sum(&before.rest) - sum(after)).sum();
-    Ok(taken - after.price - after.occam)
+    Ok(2.0 * absorb(model, data, theta, &curves)?.evidence)
 }
 
 fn real_product(a: &[Complex64], b: &[Complex64]) -> f64 {
@@ -200,32 +351,41 @@ fn slips(model: &StructureModel, data: &FrfData, theta: &[f64], curves: &[RestCu
             })
         })
         .collect();
-    let mistakes: Vec<(Box<dyn Mistake>, f64, &[Group])> = (1..=model.robot.joint_count())
+    let mistakes: Vec<Sort> = (1..=model.robot.joint_count())
         .map(|joint| {
             let mistake: Box<dyn Mistake> = Box::new(encoder_offset::EncoderOffset { joint });
-            (mistake, half * ENCODER_DEG, encoders.as_slice())
+            let part: Part = Box::new(move |_| Error::Encoder(joint));
+            (mistake, part, half * ENCODER_DEG, encoders.as_slice())
         })
         .chain([
             (
                 Box::new(channel_gain::ChannelGain) as Box<dyn Mistake>,
+                Box::new(|_| Error::Gain) as Part,
                 GAIN,
                 hits.as_slice(),
             ),
-            (Box::new(hit_direction::HitDirection), HIT_DEG, hits.as_slice()),
+            (
+                Box::new(hit_direction::HitDirection),
+                Box::new(Error::Hit),
+                HIT_DEG,
+                hits.as_slice(),
+            ),
             (
                 Box::new(turned_sensor::TurnedSensor),
+                Box::new(Error::Sensor),
                 half * SENSOR_DEG,
                 sensors.as_slice(),
             ),
             (
                 Box::new(sensor_high_pass::SensorHighPass { order: 1 }),
+                Box::new(|_| Error::Corner),
                 std::f64::consts::TAU * CORNER_HZ,
                 &[Group::ALL],
             ),
         ])
         .collect();
     let mut slips = Vec::new();
-    for (mistake, std, places) in &mistakes {
+    for (mistake, part_of, std, places) in &mistakes {
         let parts = mistake.sizes().len();
         for part in 0..parts {
             let mut values = vec![0.0; parts];
@@ -238,6 +398,8 @@ fn slips(model: &StructureModel, data: &FrfData, theta: &[f64], curves: &[RestCu
             let with = predict(model, theta, data, Some(made))?;
             let changed = data.frfs().zip(with.iter().zip(&base));
             slips.push(Slip {
+                error: part_of(part),
+                std: *std,
                 change: changed
                     .map(|((_, frf), (with, without))| {
                         let lines = with.iter().zip(without).zip(&frf.noise_std);
@@ -254,6 +416,8 @@ fn slips(model: &StructureModel, data: &FrfData, theta: &[f64], curves: &[RestCu
         stiffness
             .filter(|(_, p)| p.scale == Scale::Logarithmic && p.name.contains("stiffness"))
             .map(|(i, _)| Slip {
+                error: Error::Stiffness(i),
+                std: STIFFNESS,
                 change: curves
                     .iter()
                     .map(|c| c.slopes[i].iter().map(|s| s * STIFFNESS).collect())
@@ -263,3 +427,8 @@ fn slips(model: &StructureModel, data: &FrfData, theta: &[f64], curves: &[RestCu
     );
     Ok(slips)
 }
+
+/// Which error the numbers of a mistake are.
+type Part = Box<dyn Fn(usize) -> Error>;
+/// A mistake, which errors its numbers are, their standard deviation, and where each may be on its own.
+type Sort<'a> = (Box<dyn Mistake>, Part, f64, &'a [Group]);

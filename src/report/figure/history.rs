@@ -117,7 +117,12 @@ impl HistoryFigure {
                     .enumerate()
                     .map(|(i, v)| (i as f64, v.map_or(f64::NAN, |v| 100.0 * v)))
             };
-            let (outside, inside) = (points(|r| r.held_out_nrms), points(|r| Some(r.fit_nrms)));
+            // A little apart: where both are the same, one would hide the other.
+            let beside = |(x, y): (f64, f64)| (x + APART, y);
+            let (outside, inside) = (
+                points(|r| r.held_out_nrms).map(beside),
+                points(|r| Some(r.fit_nrms)),
+            );
             panel.curve(canvas, outside.clone(), HELD_OUT);
             panel.curve(canvas, inside.clone(), FIT);
             panel.markers(
@@ -131,10 +136,11 @@ impl HistoryFigure {
             // The larger number right above its point, the smaller left below: falling lines leave both free.
             for ((i, inside), (_, outside)) in inside.zip(outside).filter(|_| room >= 48.0) {
                 let fit_above = inside > outside || outside.is_nan();
-                for (value, above, color) in
-                    [(inside, fit_above, FIT.color), (outside, !fit_above, style::INK)]
-                {
-                    if let Some((x, y)) = panel.place(i, value) {
+                for (at, value, above, color) in [
+                    (i, inside, fit_above, FIT.color),
+                    (i + APART, outside, !fit_above, style::INK),
+                ] {
+                    if let Some((x, y)) = panel.place(at, value) {
                         let text = percent(0.01 * value);
                         let width = style::LEGEND.width(&text);
                         let y = if above {
@@ -181,3 +187,5 @@ impl HistoryFigure {
 }
 
 const SIGN: f64 = 9.0;
+/// From the fitted to the held-out value, in revisions.
+const APART: f64 = 0.035;

@@ -61,6 +61,8 @@ pub struct LobesFigure {
 
 pub(in crate::report) const BEFORE: Stroke = Stroke::dashed(style::GREY, 1.9, &[9.0, 5.0]);
 pub(in crate::report) const BAND: Color = Color(198, 216, 232);
+/// Above the limit.
+pub(in crate::report) const UNSTABLE: Color = Color(251, 232, 226);
 const ALONE: f64 = 470.0;
 const STACKED: f64 = 290.0;
 const BETWEEN: f64 = 26.0;
@@ -106,9 +108,17 @@ impl LobePanel {
     }
 
     fn draw(&self, canvas: &Canvas, panel: &Panel) {
+        if let [curve] = &self.curves[..] {
+            shade(
+                canvas,
+                panel,
+                (&curve.spindle_rpm, &curve.depth_limit_mm, &[]),
+                UNSTABLE,
+            );
+        }
         for curve in &self.curves {
             if let Some([lower, upper]) = &curve.band_mm {
-                shade(canvas, panel, &curve.spindle_rpm, lower, upper);
+                shade(canvas, panel, (&curve.spindle_rpm, lower, upper), BAND);
             }
         }
         panel.grid(canvas);
@@ -146,7 +156,12 @@ impl LobePanel {
 }
 
 /// The area between two limits. An upper limit that is not there runs out at the top.
-fn shade(canvas: &Canvas, panel: &Panel, rpm: &[f64], lower: &[Option<f64>], upper: &[Option<f64>]) {
+fn shade(
+    canvas: &Canvas,
+    panel: &Panel,
+    (rpm, lower, upper): (&[f64], &[Option<f64>], &[Option<f64>]),
+    color: Color,
+) {
     let place = |i: usize, limits: &[Option<f64>]| {
         let limit = limits.get(i).copied().flatten();
         let y = limit.and_then(|l| panel.y_at(l)).unwrap_or(panel.top);
@@ -166,12 +181,18 @@ fn shade(canvas: &Canvas, panel: &Panel, rpm: &[f64], lower: &[Option<f64>], upp
                 .iter()
                 .all(|(x, _)| *x >= panel.left - 0.5 && *x <= panel.right + 0.5)
         {
-            canvas.polygon(&corners, BAND, 1.0);
+            canvas.polygon(&corners, color, 1.0);
         }
     }
 }
 
 impl LobesFigure {
+    /// The end of the depth axis of every frame.
+    pub(in crate::report) fn cap(&self) -> f64 {
+        let panels = self.panels.iter().filter_map(|p| Some(p.cap(p.deepest()?)));
+        panels.fold(0.0, f64::max)
+    }
+
     /// # Errors
     /// No curve or marker with a finite depth.
     pub fn png(&self) -> Result<Vec<u8>> {
@@ -185,9 +206,9 @@ impl LobesFigure {
             return Err(nothing_to_draw(&self.title, "no curve has a finite depth limit"));
         };
         let asked = self.depth_cap_mm.filter(|c| usable(*c) && *c > 0.0);
-        let caps: Vec<f64> = panels()
-            .map(|(p, deepest)| asked.unwrap_or_else(|| p.cap(deepest)))
-            .collect();
+        // One scale for all: which posture bears more must be seen.
+        let cap = asked.unwrap_or_else(|| self.cap());
+        let caps = vec![cap; count];
         let axes: Vec<Axis> = caps
             .iter()
             .map(|cap| Axis::from_zero("Depth limit (mm)", (0.0, *cap), if count > 1 { 5 } else { 7 }))
@@ -241,6 +262,8 @@ impl LobesFigure {
                 "5 to 95 % by the model's uncertainty".to_owned(),
             )
         });
+        let unstable = self.panels.iter().any(|p| p.curves.len() == 1);
+        let unstable = unstable.then(|| (Swatch::Area(UNSTABLE, 1.0), "unstable".to_owned()));
         let limits: Vec<f64> = self
             .panels
             .iter()
@@ -270,6 +293,7 @@ impl LobesFigure {
         drawn
             .chain(before)
             .chain(band)
+            .chain(unstable)
             .chain(limit)
             .chain(signs)
             .collect()

@@ -4,7 +4,7 @@
 //! left out; a figure with nothing left to show is an error that names it. Text uses an embedded font
 //! (DejaVu Sans, see `fonts/LICENSE.txt`), so no system font is needed.
 
-mod axis;
+pub(in crate::report) mod axis;
 pub(in crate::report) mod canvas;
 mod panel;
 pub(in crate::report) mod style;

@@ -1,7 +1,7 @@
 //! Bars in groups: published, measured and computed values of the same things.
 
 use super::axis::{Axis, extent, positive_extent, usable};
-use super::canvas::{Align, Canvas, paint};
+use super::canvas::{Align, Canvas, Marker, paint};
 use super::frf::or;
 use super::panel::{Header, Panel, Swatch};
 use super::{WIDTH, nothing_to_draw, style};
@@ -29,6 +29,8 @@ pub struct SideBySide {
 }
 
 const PLOT_HEIGHT: f64 = 420.0;
+/// Diameter of a value on a log axis.
+const DOT: f64 = 13.0;
 
 impl SideBySide {
     /// # Errors
@@ -139,11 +141,12 @@ impl SideBySide {
             for (at, stroke) in rows {
                 canvas.line((left, at), (right, at), stroke);
             }
-            for group in 0..count {
-                self.draw_group(canvas, &panel, group, lying);
-            }
+            // Below the numbers, which it would strike through.
             if let Some(at) = level.and_then(|(_, v)| panel.y_at(*v)) {
                 canvas.line((left, at), (right, at), style::LEVEL);
+            }
+            for group in 0..count {
+                self.draw_group(canvas, &panel, group, lying);
             }
             for (group, lines) in names.iter().enumerate() {
                 let middle = left + room * (group as f64 + 0.5);
@@ -183,14 +186,30 @@ impl SideBySide {
                 );
                 continue;
             };
-            let foot = if self.log { None } else { panel.y_at(0.0) };
+            let foot = panel.y_at(0.0).filter(|_| !self.log);
             let foot = foot.unwrap_or(panel.bottom).clamp(panel.top, panel.bottom);
-            canvas.rect((x + 0.5, foot), (x + width - 0.5, end), style::bar(i), 1.0);
             let number = significant(value, 3);
             let above = if end <= foot { -1.0 } else { 1.0 };
+            let mut end = end;
+            if self.log {
+                // A log axis has no zero that a bar could stand on.
+                canvas.marker((middle, end), Marker::Disc, DOT, style::INK);
+                canvas.marker((middle, end), Marker::Disc, DOT - 3.0, style::bar(i));
+                end += above * 0.5 * DOT;
+            } else {
+                canvas.rect((x + 0.5, foot), (x + width - 0.5, end), style::bar(i), 1.0);
+            }
             if lying {
+                let at = (middle, end + above * 10.0);
+                let half = 0.5 * style::NOTE.width(&number) + 1.0;
+                canvas.rect(
+                    (at.0 - half, at.1 - 7.0),
+                    (at.0 + half, at.1 + 7.0),
+                    style::WHITE,
+                    0.85,
+                );
                 let lettering = style::NOTE.align(Align::Center).color(style::INK);
-                canvas.text((middle, end + above * 10.0), &number, lettering);
+                canvas.text(at, &number, lettering);
             } else if width >= 13.0 {
                 let lettering = style::NOTE.align(if above < 0.0 { Align::Left } else { Align::Right });
                 canvas.text(

@@ -53,7 +53,7 @@ pub fn series(index: usize) -> Stroke {
         Color(140, 24, 60),
         Color(96, 168, 120),
         INK,
-        Color(140, 120, 190),
+        Color(206, 92, 156),
         Color(120, 124, 130),
     ];
     const DASHES: [&[f64]; 5] = [

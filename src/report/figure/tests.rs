@@ -10,7 +10,9 @@ use super::*;
 /// Width, height and number of distinct colours.
 fn decoded(png: &[u8]) -> (u32, u32, usize) {
     assert!(png.starts_with(b"\x89PNG\r\n\x1a\n"));
-    let mut reader = png::Decoder::new(png).read_info().unwrap();
+    let mut decoder = png::Decoder::new(png);
+    decoder.set_transformations(png::Transformations::EXPAND);
+    let mut reader = decoder.read_info().unwrap();
     let mut pixels = vec![0; reader.output_buffer_size()];
     let info = reader.next_frame(&mut pixels).unwrap();
     // Every seventh pixel tells a figure from a blank sheet.
@@ -360,7 +362,9 @@ fn the_same_numbers_give_the_same_bytes() {
 
 /// Share of the image that has exactly this colour.
 fn share_of(png: &[u8], wanted: canvas::Color) -> f64 {
-    let mut reader = png::Decoder::new(png).read_info().unwrap();
+    let mut decoder = png::Decoder::new(png);
+    decoder.set_transformations(png::Transformations::EXPAND);
+    let mut reader = decoder.read_info().unwrap();
     let mut pixels = vec![0; reader.output_buffer_size()];
     reader.next_frame(&mut pixels).unwrap();
     let same = pixels

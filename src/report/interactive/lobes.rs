@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::{Plot, axis, axis_name, css, css_with, line, number, numbers, sign, stacked, text, with};
-use crate::report::figure::lobes::{BAND, BEFORE, sign as look};
+use crate::report::figure::lobes::{BAND, BEFORE, UNSTABLE, sign as look};
 use crate::report::figure::{LobeCurve, LobeOutcome, LobePanel, LobesFigure, style};
 
 impl LobesFigure {
@@ -11,7 +11,12 @@ impl LobesFigure {
         let mut traces = Traces::default();
         let several = self.panels.len() > 1;
         let mut axes = Vec::new();
+        // One scale for all: which posture bears more must be seen.
+        let cap = self.depth_cap_mm.unwrap_or_else(|| self.cap());
         for (i, panel) in self.panels.iter().enumerate() {
+            if let [curve] = &panel.curves[..] {
+                traces.unstable(curve, 1.06 * cap, i);
+            }
             for (k, curve) in panel.curves.iter().enumerate() {
                 traces.curve(curve, k, i);
             }
@@ -28,16 +33,8 @@ impl LobesFigure {
                 true => format!("{}<br>Depth limit (mm)", text(&panel.name)),
                 false => "Depth limit (mm)".to_string(),
             };
-            let cap = self
-                .depth_cap_mm
-                .or_else(|| panel.deepest().map(|deepest| panel.cap(deepest)));
-            axes.push((
-                with(
-                    axis(&title),
-                    json!({ "range": [0, cap.map(|cap| number(1.06 * cap))] }),
-                ),
-                1.0,
-            ));
+            let range = json!({ "range": [0, number(1.06 * cap)] });
+            axes.push((with(axis(&title), range), 1.0));
         }
         let height = if several {
             260.0 * self.panels.len() as f64
@@ -69,6 +66,19 @@ impl Traces {
             "yaxis": axis_name('y', i),
         });
         self.0.push(with(common, trace));
+    }
+
+    /// The side above the limit.
+    fn unstable(&mut self, curve: &LobeCurve, top: f64, i: usize) {
+        let rpm = numbers(curve.spindle_rpm.iter().copied());
+        let edge = json!({ "width": 0 });
+        let limit = curve.depth_limit_mm.iter().map(|d| d.unwrap_or(top).min(top));
+        let below = json!({ "mode": "lines", "line": edge, "x": rpm, "y": numbers(limit), "hoverinfo": "skip",
+                            "showlegend": false, "name": "limit", "legendgroup": "unstable" });
+        self.add("limit", i, below);
+        let above = json!({ "mode": "lines", "line": edge, "x": rpm, "y": numbers(vec![top; curve.spindle_rpm.len()]),
+                            "hoverinfo": "skip", "fill": "tonexty", "fillcolor": css_with(UNSTABLE, 0.9) });
+        self.add("unstable", i, above);
     }
 
     fn curve(&mut self, curve: &LobeCurve, k: usize, i: usize) {
@@ -186,13 +196,22 @@ mod tests {
             .map(|t| &t["name"])
             .collect();
         let names = [
+            "unstable",
             "5 to 95 % by the model's uncertainty",
             "depth limit",
             "absolute limit",
             "cut with chatter",
         ];
         assert_eq!(entries, names);
-        let band: Vec<&Value> = traces.iter().filter(|t| t["fill"] == "tonexty").collect();
+        let unstable: Vec<&Value> = traces.iter().filter(|t| t["name"] == "limit").collect();
+        assert_eq!(
+            unstable[0]["y"][1], unstable[1]["y"][1],
+            "one scale: where there is no limit, the frame's end"
+        );
+        let band: Vec<&Value> = traces
+            .iter()
+            .filter(|t| t["fill"] == "tonexty" && t["name"] != "unstable")
+            .collect();
         assert_eq!(
             (band.len(), &band[0]["y"]),
             (2, &json!([1.2, 20])),

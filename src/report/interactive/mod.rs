@@ -55,6 +55,26 @@ impl Plot {
         }
     }
 
+    /// As it stands above the figure at first.
+    pub fn title(&self) -> &str {
+        &self.title
+    }
+
+    /// Room that it takes, CSS pixels.
+    pub fn height_px(&self) -> f64 {
+        self.height_px
+    }
+
+    /// Whether it follows the model that is chosen in the page's explorer.
+    pub fn follows_models(&self) -> bool {
+        self.stages.is_array()
+    }
+
+    /// Whether others can be chosen in its place.
+    pub fn offers_choice(&self) -> bool {
+        self.choice.is_some()
+    }
+
     /// For the page's script.
     pub(super) fn value(&self) -> Value {
         json!({

@@ -1,7 +1,12 @@
 // Joins the figures of a report: unpacks plotly.js and the figures, draws them, and lets models and FRFs be chosen.
 // Where the browser lacks what this needs, the page keeps its static images.
 "use strict";
+const parsed = new Promise((done) => document.addEventListener("DOMContentLoaded", done));
 (async () => {
+  // Before anything is laid out, so that no image is seen that a figure then takes the place of.
+  if (!("DecompressionStream" in window)) return;
+  document.documentElement.classList.add("live");
+  await parsed;
   const config = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
   const unpack = async (id) => {
     const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (c) => c.charCodeAt(0));
@@ -93,9 +98,16 @@
       }
     }
 
+    /** Draws once the page around it is open: in a closed part there is no size to draw in. */
     async show(frf, model) {
       Object.assign(this, { frf, model });
       const { data, root } = this;
+      this.drawn = isOpen(root);
+      if (!this.drawn) {
+        this.press();
+        for (const map of this.maps) await map(model);
+        return;
+      }
       const f = data.frfs[frf];
       const m = data.models[model];
       this.fill();
@@ -133,17 +145,18 @@
     }
   }
 
+  /** Whether an element is not within a part that is folded up. */
+  const isOpen = (element) => !element.closest("details:not([open])");
+
   const escape = (name) => name.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
 
   /** Draws a figure in place of its image; maps of the error follow the model of `explorer` and lead to its FRFs. */
   const draw = async (figure, plot, explorer) => {
     const heading = figure.querySelector(".heading");
     const div = figure.querySelector(".plot");
-    heading.textContent = plot.title;
-    div.style.height = `${plot.height}px`;
     await Plotly.newPlot(div, plot.data, plot.layout, config);
     if (plot.choice) {
-      const label = document.createElement("label");
+      const label = figure.querySelector(".choice");
       const select = document.createElement("select");
       select.append(...plot.choice.plots.map(({ name }, k) => new Option(name, k)));
       select.addEventListener("change", () => {
@@ -152,20 +165,17 @@
         div.style.height = `${chosen.height}px`;
         Plotly.react(div, chosen.data, chosen.layout, config);
       });
-      label.className = "choice";
       label.append(`${plot.choice.what} `, select);
-      heading.before(label);
     }
     if (explorer && plot.stages) {
-      const bar = document.createElement("div");
-      bar.className = "models";
-      heading.before(bar);
-      explorer.addBar(bar);
-      explorer.maps.push(async (model) => {
+      explorer.addBar(figure.querySelector(".models"));
+      const follow = async (model) => {
         const stage = plot.stages[model];
         heading.textContent = stage.title;
         await Plotly.restyle(div, { z: [stage.z], text: [stage.text] }, [0]);
-      });
+      };
+      explorer.maps.push(follow);
+      if (explorer.model !== plot.stages.length - 1) await follow(explorer.model);
     }
     if (explorer && plot.links) {
       div.on("plotly_click", (event) => {
@@ -173,31 +183,86 @@
         const frf = plot.links.frf[row]?.[column];
         if (!Number.isInteger(frf)) return;
         explorer.band = plot.links.bands_hz[column] ?? null;
+        open(explorer.root);
         explorer.show(frf, explorer.model);
         explorer.root.scrollIntoView({ behavior: "smooth" });
       });
     }
   };
 
+  /** Opens all folds around an element. */
+  const open = (element) => {
+    for (let fold = element.closest("details"); fold; fold = fold.parentElement.closest("details")) fold.open = true;
+  };
+
+  const live = [...document.querySelectorAll("[data-plot], [data-explorer]")];
+  const opened = () => live.some(isOpen);
+  if (!opened()) {
+    // Nothing to draw before a reader opens a part of the page.
+    document.documentElement.dataset.ready = "true";
+    await new Promise((done) => document.addEventListener("toggle", () => opened() && done(), true));
+  }
   const library = document.createElement("script");
   library.textContent = await unpack("plotly");
   document.head.append(library);
   const { figures, explorers } = JSON.parse(await unpack("figures"));
-  document.documentElement.classList.add("live");
+
+  // Every figure with the explorer before it, which its map follows; drawn when its part of the page is open.
   let explorer = null;
-  for (const element of document.querySelectorAll("[data-plot], [data-explorer]")) {
+  const waiting = new Set();
+  for (const element of live) {
     if (element.dataset.explorer !== undefined) {
       explorer = new Explorer(element, explorers[element.dataset.explorer]);
       explorer.addBar(element.querySelector(".models"));
-      await explorer.show(explorer.frf, explorer.model);
-    } else {
-      await draw(element, figures[element.dataset.plot], explorer);
     }
-    // Lets the page answer between two figures.
-    await new Promise((done) => setTimeout(done));
+    waiting.add({ element, explorer });
   }
+  const drawOpen = async () => {
+    for (const part of waiting) {
+      const { element, explorer } = part;
+      if (!isOpen(element)) continue;
+      if (element.dataset.explorer === undefined) {
+        waiting.delete(part);
+        await draw(element, figures[element.dataset.plot], explorer);
+      } else if (!explorer.drawn) {
+        // It stays: folded up, it may be told to show something else.
+        await explorer.show(explorer.frf, explorer.model);
+      }
+      // Lets the page answer between two figures.
+      await new Promise((done) => setTimeout(done));
+    }
+  };
+  let drawing = drawOpen();
+  document.addEventListener("toggle", () => (drawing = drawing.then(drawOpen)), true);
+  await drawing;
   document.documentElement.dataset.ready = "true";
 })().catch((error) => {
   document.documentElement.classList.remove("live");
   console.error(error);
+});
+
+// In the page of `lobestone serve`: where the reader is, for the next drawing of the report.
+if (window.parent !== window) {
+  window.addEventListener("message", (event) => {
+    const top = event.data?.lobestoneScroll;
+    if (event.source === window.parent && Number.isFinite(top)) window.scrollTo({ top, behavior: "instant" });
+  });
+  window.addEventListener("scroll", () => window.parent.postMessage({ lobestoneScroll: window.scrollY }, "*"), { passive: true });
+}
+
+// A link into a part that is folded up opens it; paper has everything open.
+parsed.then(() => {
+  const follow = () => {
+    const target = location.hash.length > 1 && document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    const fold = target && (target.querySelector(":scope > details") ?? target.closest("details"));
+    if (fold) fold.open = true;
+  };
+  window.addEventListener("hashchange", follow);
+  follow();
+  let folded = [];
+  window.addEventListener("beforeprint", () => {
+    folded = [...document.querySelectorAll("details:not([open])")];
+    for (const fold of folded) fold.open = true;
+  });
+  window.addEventListener("afterprint", () => folded.forEach((fold) => (fold.open = false)));
 });

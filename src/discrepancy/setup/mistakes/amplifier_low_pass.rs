@@ -2,7 +2,7 @@ use num_complex::Complex64;
 
 use super::super::finding::{SetupFinding, with_error};
 use super::super::group::Group;
-use super::super::mistake::{Estimated, Mistake, Size};
+use super::super::mistake::{Distortion, Estimated, Mistake, Size};
 use super::super::scene::Truth;
 use super::sensor_high_pass::responses;
 use crate::identify::frf_data::{FrfData, FrfDatum};
@@ -13,15 +13,7 @@ pub struct AmplifierLowPass {
     pub order: i32,
 }
 
-impl Mistake for AmplifierLowPass {
-    fn sizes(&self) -> Vec<Size> {
-        vec![Size::positive(1e-3, 0.1)]
-    }
-
-    fn groups(&self, data: &FrfData) -> Vec<Group> {
-        responses(data)
-    }
-
+impl Distortion for AmplifierLowPass {
     fn shown(&self, values: &[f64], _omega: f64, truth: &Truth, frf: &FrfDatum) -> Complex64 {
         let s = truth.rate * values[0];
         let divisor = match self.order {
@@ -29,6 +21,16 @@ impl Mistake for AmplifierLowPass {
             _ => 1.0 + s * std::f64::consts::SQRT_2 + s * s,
         };
         truth.between(frf.response.axis, frf.reference.axis) / divisor
+    }
+}
+
+impl Mistake for AmplifierLowPass {
+    fn sizes(&self) -> Vec<Size> {
+        vec![Size::positive(1e-3, 0.1)]
+    }
+
+    fn groups(&self, data: &FrfData) -> Vec<Group> {
+        responses(data)
     }
 
     fn finding(&self, estimated: &Estimated) -> SetupFinding {

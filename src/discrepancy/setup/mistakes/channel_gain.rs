@@ -2,12 +2,18 @@ use num_complex::Complex64;
 
 use super::super::finding::{SetupFinding, with_error};
 use super::super::group::Group;
-use super::super::mistake::{Estimated, Mistake, Size};
+use super::super::mistake::{Distortion, Estimated, Mistake, Size};
 use super::super::scene::Truth;
 use crate::identify::frf_data::{FrfData, FrfDatum};
 
 /// The file holds exp(value) times what was there.
 pub struct ChannelGain;
+
+impl Distortion for ChannelGain {
+    fn shown(&self, values: &[f64], _omega: f64, truth: &Truth, frf: &FrfDatum) -> Complex64 {
+        truth.between(frf.response.axis, frf.reference.axis) * values[0].exp()
+    }
+}
 
 impl Mistake for ChannelGain {
     fn sizes(&self) -> Vec<Size> {
@@ -16,10 +22,6 @@ impl Mistake for ChannelGain {
 
     fn groups(&self, data: &FrfData) -> Vec<Group> {
         Group::channels(data)
-    }
-
-    fn shown(&self, values: &[f64], _omega: f64, truth: &Truth, frf: &FrfDatum) -> Complex64 {
-        truth.between(frf.response.axis, frf.reference.axis) * values[0].exp()
     }
 
     fn finding(&self, estimated: &Estimated) -> SetupFinding {

@@ -1,6 +1,6 @@
 use super::super::finding::{SetupFinding, with_error};
 use super::super::group::Group;
-use super::super::mistake::{Estimated, Mistake, Size};
+use super::super::mistake::{Distortion, Estimated, Mistake, Size};
 use crate::identify::frf_data::FrfData;
 use crate::robot::Kinematics;
 
@@ -10,6 +10,12 @@ pub struct EncoderOffset {
     pub joint: usize,
 }
 
+impl Distortion for EncoderOffset {
+    fn kinematics(&self, values: &[f64], kinematics: &Kinematics) -> Kinematics {
+        kinematics.turned(self.joint, values[0].to_radians())
+    }
+}
+
 impl Mistake for EncoderOffset {
     fn sizes(&self) -> Vec<Size> {
         vec![Size::either_way(3.0, 30.0)]
@@ -17,10 +23,6 @@ impl Mistake for EncoderOffset {
 
     fn groups(&self, data: &FrfData) -> Vec<Group> {
         Group::postures(data)
-    }
-
-    fn kinematics(&self, values: &[f64], kinematics: &Kinematics) -> Kinematics {
-        kinematics.turned(self.joint, values[0].to_radians())
     }
 
     fn finding(&self, estimated: &Estimated) -> SetupFinding {

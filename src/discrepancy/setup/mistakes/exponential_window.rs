@@ -1,12 +1,18 @@
 use super::super::finding::{SetupFinding, with_error};
 use super::super::group::Group;
-use super::super::mistake::{Estimated, Mistake, Size};
+use super::super::mistake::{Distortion, Estimated, Mistake, Size};
 use crate::identify::frf_data::FrfData;
 
 /// An exponential window was put on the records and not taken out: every pole decays faster by `value`, 1/s. What the file
 /// shows is H(ω − i/τ) (Fladung, Rost 1997: Application and correction of the exponential window for frequency response
 /// functions).
 pub struct ExponentialWindow;
+
+impl Distortion for ExponentialWindow {
+    fn decay_per_s(&self, values: &[f64]) -> f64 {
+        values[0]
+    }
+}
 
 impl Mistake for ExponentialWindow {
     fn sizes(&self) -> Vec<Size> {
@@ -15,10 +21,6 @@ impl Mistake for ExponentialWindow {
 
     fn groups(&self, data: &FrfData) -> Vec<Group> {
         Group::postures(data)
-    }
-
-    fn decay_per_s(&self, values: &[f64]) -> f64 {
-        values[0]
     }
 
     fn finding(&self, estimated: &Estimated) -> SetupFinding {

@@ -2,13 +2,23 @@ use num_complex::Complex64;
 
 use super::super::finding::{SetupFinding, with_error};
 use super::super::group::Group;
-use super::super::mistake::{Estimated, Mistake, Size, turned_axis};
+use super::super::mistake::{Distortion, Estimated, Mistake, Size, turned_axis};
 use super::super::scene::Truth;
 use crate::identify::frf_data::{FrfData, FrfDatum};
 use crate::ingest::Axis;
 
 /// The force was not along the axis that the file names: turned by a rotation vector, deg about x, y, z.
 pub struct HitDirection;
+
+impl Distortion for HitDirection {
+    fn shown(&self, values: &[f64], _omega: f64, truth: &Truth, frf: &FrfDatum) -> Complex64 {
+        let direction = turned_axis(frf.reference.axis, values);
+        let terms = Axis::ALL.into_iter().zip(direction);
+        terms
+            .map(|(axis, part)| truth.between(frf.response.axis, axis) * part)
+            .sum()
+    }
+}
 
 impl Mistake for HitDirection {
     fn sizes(&self) -> Vec<Size> {
@@ -27,14 +37,6 @@ impl Mistake for HitDirection {
         groups.extend(postures.into_iter().flat_map(of_axis));
         groups.retain(|g| data.frfs().any(|(_, f)| g.holds(f)));
         groups
-    }
-
-    fn shown(&self, values: &[f64], _omega: f64, truth: &Truth, frf: &FrfDatum) -> Complex64 {
-        let direction = turned_axis(frf.reference.axis, values);
-        let terms = Axis::ALL.into_iter().zip(direction);
-        terms
-            .map(|(axis, part)| truth.between(frf.response.axis, axis) * part)
-            .sum()
     }
 
     fn finding(&self, estimated: &Estimated) -> SetupFinding {

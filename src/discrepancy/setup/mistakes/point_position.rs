@@ -1,6 +1,6 @@
 use super::super::finding::{SetupFinding, with_error};
 use super::super::group::Group;
-use super::super::mistake::{Estimated, Mistake, Size};
+use super::super::mistake::{Distortion, Estimated, Mistake, Size};
 use crate::campaign::{BodyRef, Point};
 use crate::identify::frf_data::FrfData;
 
@@ -10,15 +10,7 @@ pub struct PointPosition {
     pub point: usize,
 }
 
-impl Mistake for PointPosition {
-    fn sizes(&self) -> Vec<Size> {
-        vec![Size::either_way(0.05, 1.0); 3]
-    }
-
-    fn groups(&self, _data: &FrfData) -> Vec<Group> {
-        vec![Group::ALL]
-    }
-
+impl Distortion for PointPosition {
     fn point(&self, values: &[f64], index: usize, point: &Point) -> Point {
         let mut moved = point.clone();
         if index == self.point {
@@ -27,6 +19,16 @@ impl Mistake for PointPosition {
             }
         }
         moved
+    }
+}
+
+impl Mistake for PointPosition {
+    fn sizes(&self) -> Vec<Size> {
+        vec![Size::either_way(0.05, 1.0); 3]
+    }
+
+    fn groups(&self, _data: &FrfData) -> Vec<Group> {
+        vec![Group::ALL]
     }
 
     fn finding(&self, estimated: &Estimated) -> SetupFinding {

@@ -2,7 +2,7 @@ use num_complex::Complex64;
 
 use super::super::finding::{SetupFinding, with_error};
 use super::super::group::Group;
-use super::super::mistake::{Estimated, Mistake, Size};
+use super::super::mistake::{Distortion, Estimated, Mistake, Size};
 use super::super::scene::Truth;
 use crate::identify::frf_data::{FrfData, FrfDatum};
 use crate::ingest::Axis;
@@ -12,6 +12,13 @@ pub struct SensorHighPass {
     pub order: i32,
 }
 
+impl Distortion for SensorHighPass {
+    fn shown(&self, values: &[f64], _omega: f64, truth: &Truth, frf: &FrfDatum) -> Complex64 {
+        let factor = truth.rate / (truth.rate + values[0]);
+        truth.between(frf.response.axis, frf.reference.axis) * factor.powi(self.order)
+    }
+}
+
 impl Mistake for SensorHighPass {
     fn sizes(&self) -> Vec<Size> {
         vec![Size::positive(10.0, 200.0)]
@@ -19,11 +26,6 @@ impl Mistake for SensorHighPass {
 
     fn groups(&self, data: &FrfData) -> Vec<Group> {
         responses(data)
-    }
-
-    fn shown(&self, values: &[f64], _omega: f64, truth: &Truth, frf: &FrfDatum) -> Complex64 {
-        let factor = truth.rate / (truth.rate + values[0]);
-        truth.between(frf.response.axis, frf.reference.axis) * factor.powi(self.order)
     }
 
     fn finding(&self, estimated: &Estimated) -> SetupFinding {

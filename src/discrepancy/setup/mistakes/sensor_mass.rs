@@ -3,12 +3,30 @@ use num_complex::Complex64;
 
 use super::super::finding::{SetupFinding, with_error};
 use super::super::group::Group;
-use super::super::mistake::{Estimated, Mistake, Size};
+use super::super::mistake::{Distortion, Estimated, Mistake, Size};
 use super::super::scene::Truth;
 use crate::identify::frf_data::{FrfData, FrfDatum};
 
 /// The sensor's mass, kg, sits at each response point while that is measured (Ewins 2000, §3.12: H − H m s² (1 + m s² H)⁻¹ H).
 pub struct SensorMass;
+
+impl Distortion for SensorMass {
+    fn shown(&self, values: &[f64], _omega: f64, truth: &Truth, frf: &FrfDatum) -> Complex64 {
+        let inertia = truth.rate * truth.rate * values[0];
+        let own = Matrix3::from_fn(|a, b| {
+            let unit = if a == b { 1.0 } else { 0.0 };
+            truth.at_response(a, b) * inertia + unit
+        });
+        let unloaded = nalgebra::Vector3::from_fn(|a, _| truth.bare(a, frf.reference.axis));
+        let Some(inverse) = own.try_inverse() else {
+            return truth.between(frf.response.axis, frf.reference.axis);
+        };
+        let loaded = inverse * unloaded;
+        // What it changes is small: the channel need not mix its axes.
+        let axis = frf.response.axis.index();
+        truth.between(frf.response.axis, frf.reference.axis) + (loaded[axis] - unloaded[axis])
+    }
+}
 
 impl Mistake for SensorMass {
     fn sizes(&self) -> Vec<Size> {
@@ -24,22 +42,6 @@ impl Mistake for SensorMass {
             true => vec![Group::ALL],
             false => Vec::new(),
         }
-    }
-
-    fn shown(&self, values: &[f64], _omega: f64, truth: &Truth, frf: &FrfDatum) -> Complex64 {
-        let inertia = truth.rate * truth.rate * values[0];
-        let own = Matrix3::from_fn(|a, b| {
-            let unit = if a == b { 1.0 } else { 0.0 };
-            truth.at_response(a, b) * inertia + unit
-        });
-        let unloaded = nalgebra::Vector3::from_fn(|a, _| truth.bare(a, frf.reference.axis));
-        let Some(inverse) = own.try_inverse() else {
-            return truth.between(frf.response.axis, frf.reference.axis);
-        };
-        let loaded = inverse * unloaded;
-        // What it changes is small: the channel need not mix its axes.
-        let axis = frf.response.axis.index();
-        truth.between(frf.response.axis, frf.reference.axis) + (loaded[axis] - unloaded[axis])
     }
 
     fn finding(&self, estimated: &Estimated) -> SetupFinding {

@@ -2,13 +2,23 @@ use num_complex::Complex64;
 
 use super::super::finding::{SetupFinding, with_error};
 use super::super::group::Group;
-use super::super::mistake::{Estimated, Mistake, Size, turned_axis};
+use super::super::mistake::{Distortion, Estimated, Mistake, Size, turned_axis};
 use super::super::scene::Truth;
 use crate::identify::frf_data::{FrfData, FrfDatum};
 
 /// The sensor stood askew at one posture or at one node: turned by a rotation vector, deg about x, y, z. A sensor that is
 /// askew in all files is the effect `sensor-misalignment`.
 pub struct TurnedSensor;
+
+impl Distortion for TurnedSensor {
+    fn shown(&self, values: &[f64], _omega: f64, truth: &Truth, frf: &FrfDatum) -> Complex64 {
+        let direction = turned_axis(frf.response.axis, values);
+        let terms = crate::ingest::Axis::ALL.into_iter().zip(direction);
+        terms
+            .map(|(axis, part)| truth.between(axis, frf.reference.axis) * part)
+            .sum()
+    }
+}
 
 impl Mistake for TurnedSensor {
     fn sizes(&self) -> Vec<Size> {
@@ -28,14 +38,6 @@ impl Mistake for TurnedSensor {
         }
         groups.retain(|g| *g != Group::ALL);
         groups
-    }
-
-    fn shown(&self, values: &[f64], _omega: f64, truth: &Truth, frf: &FrfDatum) -> Complex64 {
-        let direction = turned_axis(frf.response.axis, values);
-        let terms = crate::ingest::Axis::ALL.into_iter().zip(direction);
-        terms
-            .map(|(axis, part)| truth.between(axis, frf.reference.axis) * part)
-            .sum()
     }
 
     fn finding(&self, estimated: &Estimated) -> SetupFinding {

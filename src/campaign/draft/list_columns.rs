@@ -1,0 +1,404 @@
+//! What the columns of a cut list are called in English, German, French and Spanish laboratories, and in which units they are.
+
+/// What a column holds: a key of `[[cut]]`, or one of these that keys are made of.
+pub(super) const FEED_RATE: &str = "feed_mm_per_min";
+pub(super) const FEED_PER_TURN: &str = "feed_mm_per_turn";
+pub(super) const RADIAL_DEPTH: &str = "radial_depth_mm";
+pub(super) const DIRECTION: &str = "direction";
+pub(super) const DIAMETER: &str = "diameter_mm";
+pub(super) const TEETH: &str = "teeth";
+/// The number of the cut where no column names its file.
+pub(super) const NUMBER: &str = "number";
+/// A feed whose unit says which.
+const FEED: &str = "feed";
+
+/// Names in lower case, without accents.
+const NAMES: [(&str, &[&str]); 20] = [
+    (
+        "file",
+        &[
+            "file name",
+            "filename",
+            "record",
+            "datei",
+            "dateiname",
+            "messdatei",
+            "messung",
+            "versuch",
+            "fichier",
+            "essai",
+            "archivo",
+            "fichero",
+            "ensayo",
+            "test",
+            "run",
+        ],
+    ),
+    (
+        NUMBER,
+        &[
+            "nr", "nr.", "no", "no.", "n°", "nº", "number", "nummer", "numero", "schnitt", "cut",
+        ],
+    ),
+    (
+        "spindle_rpm",
+        &[
+            "n",
+            "s",
+            "rpm",
+            "speed",
+            "spindle speed",
+            "drehzahl",
+            "spindeldrehzahl",
+            "vitesse de rotation",
+            "vitesse de broche",
+            "vitesse broche",
+            "frequence de rotation",
+            "regime",
+            "velocidad de giro",
+            "velocidad del husillo",
+            "velocidad husillo",
+            "revoluciones",
+        ],
+    ),
+    (
+        "feed_per_tooth_mm",
+        &[
+            "fz",
+            "feed per tooth",
+            "zahnvorschub",
+            "vorschub pro zahn",
+            "vorschub je zahn",
+            "avance par dent",
+            "avance por diente",
+        ],
+    ),
+    (
+        FEED_RATE,
+        &[
+            "vf",
+            "feed rate",
+            "feedrate",
+            "vorschubgeschwindigkeit",
+            "vitesse d'avance",
+            "velocidad de avance",
+        ],
+    ),
+    (
+        FEED_PER_TURN,
+        &[
+            "fu",
+            "fn",
+            "feed per rev",
+            "feed per revolution",
+            "feed per turn",
+            "vorschub pro umdrehung",
+            "vorschub je umdrehung",
+            "avance par tour",
+            "avance por vuelta",
+            "avance por revolucion",
+        ],
+    ),
+    (FEED, &["f", "feed", "vorschub", "avance"]),
+    (
+        "axial_depth_mm",
+        &[
+            "ap",
+            "axial depth",
+            "axial depth of cut",
+            "depth of cut",
+            "schnitttiefe",
+            "axiale zustellung",
+            "zustellung",
+            "profondeur axiale",
+            "profondeur de passe",
+            "profundidad axial",
+            "profundidad de corte",
+            "profundidad de pasada",
+        ],
+    ),
+    (
+        RADIAL_DEPTH,
+        &[
+            "ae",
+            "radial depth",
+            "radial depth of cut",
+            "width of cut",
+            "eingriffsbreite",
+            "schnittbreite",
+            "radiale zustellung",
+            "engagement radial",
+            "profondeur radiale",
+            "largeur de coupe",
+            "ancho de corte",
+            "profundidad radial",
+        ],
+    ),
+    (
+        "start_deg",
+        &[
+            "start",
+            "start angle",
+            "entry angle",
+            "eintritt",
+            "eintrittswinkel",
+            "startwinkel",
+            "angle d'entree",
+            "angulo de entrada",
+        ],
+    ),
+    (
+        "exit_deg",
+        &[
+            "exit",
+            "exit angle",
+            "austritt",
+            "austrittswinkel",
+            "angle de sortie",
+            "angulo de salida",
+        ],
+    ),
+    ("immersion", &["eingriff"]),
+    (
+        DIRECTION,
+        &[
+            "milling mode",
+            "frasart",
+            "fraesart",
+            "mode de fraisage",
+            "modo de fresado",
+            "up/down",
+            "gleichlauf/gegenlauf",
+        ],
+    ),
+    ("order", &["reihenfolge", "ordre", "orden", "lfd nr", "lfd. nr."]),
+    ("material", &["workpiece", "werkstoff", "matiere", "materiau"]),
+    (
+        "process",
+        &["operation", "prozess", "verfahren", "procede", "proceso"],
+    ),
+    (
+        "pilot_diameter_mm",
+        &[
+            "pilot",
+            "pilot hole",
+            "vorbohrung",
+            "pilotbohrung",
+            "avant-trou",
+            "agujero previo",
+        ],
+    ),
+    (
+        "hole_depth_mm",
+        &[
+            "hole depth",
+            "bohrtiefe",
+            "profondeur de percage",
+            "profundidad de taladrado",
+        ],
+    ),
+    (
+        DIAMETER,
+        &[
+            "d",
+            "diameter",
+            "tool diameter",
+            "durchmesser",
+            "werkzeugdurchmesser",
+            "diametre",
+            "diametro",
+        ],
+    ),
+    (
+        TEETH,
+        &[
+            "z",
+            "number of teeth",
+            "zahne",
+            "zaehne",
+            "zahnezahl",
+            "zaehnezahl",
+            "dents",
+            "nombre de dents",
+            "dientes",
+            "numero de dientes",
+        ],
+    ),
+];
+
+/// A column whose meaning is known.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Column {
+    pub key: &'static str,
+    /// A number in it times this is in the key's unit; 1 for text.
+    pub factor: f64,
+}
+
+/// What a column's head says. `Ok(None)`: nothing that is known here.
+///
+/// # Errors
+/// The unit, where it is not understood, or missing where it decides what is meant.
+pub(super) fn column(head: &str, keys: &[&'static str]) -> Result<Option<Column>, String> {
+    let (name, unit) = split_unit(head);
+    let name = plain(name);
+    let spaced = name.replace('_', " ");
+    let named = |(key, names): &(&'static str, &[&str])| names.contains(&spaced.as_str()).then_some(*key);
+    let own = keys.iter().find(|k| **k == name).copied();
+    let Some(key) = own.or_else(|| NAMES.iter().find_map(named)) else {
+        return Ok(None);
+    };
+    let unit = plain(unit).replace([' ', '*'], "");
+    let factor = |known: &[(&str, f64)]| {
+        let found = known.iter().find(|(u, _)| *u == unit);
+        found
+            .map(|(_, factor)| *factor)
+            .ok_or_else(|| format!("unit {unit:?} of column {name:?} is not understood"))
+    };
+    let length = [
+        ("", 1.0),
+        ("mm", 1.0),
+        ("µm", 1e-3),
+        ("um", 1e-3),
+        ("m", 1e3),
+        ("in", 25.4),
+        ("inch", 25.4),
+    ];
+    let per_tooth =
+        ["", "/z", "/zahn", "/tooth", "/dent", "/diente", "pertooth"].map(|of| (format!("mm{of}"), 1.0));
+    let per_turn =
+        ["", "/u", "/rev", "/r", "/tr", "/tour", "/vuelta", "/umdr"].map(|of| (format!("mm{of}"), 1.0));
+    let rate = [
+        ("mm/min", 1.0),
+        ("m/min", 1e3),
+        ("mm/s", 60.0),
+        ("in/min", 25.4),
+        ("ipm", 25.4),
+    ];
+    let is = |known: &[(String, f64)]| known.iter().any(|(u, _)| *u == unit);
+    let (key, factor) = match key {
+        "spindle_rpm" => {
+            let per_minute = [
+                "", "1/min", "min-1", "min^-1", "/min", "rpm", "u/min", "upm", "tr/min", "r/min", "rev/min",
+            ];
+            let per_second = ["1/s", "s-1", "s^-1", "hz", "rev/s", "u/s", "tr/s"];
+            let all: Vec<(&str, f64)> = per_minute
+                .map(|u| (u, 1.0))
+                .into_iter()
+                .chain(per_second.map(|u| (u, 60.0)))
+                .collect();
+            (key, factor(&all)?)
+        }
+        FEED | FEED_RATE if rate.iter().any(|(u, _)| *u == unit) => (FEED_RATE, factor(&rate)?),
+        FEED_RATE if unit.is_empty() => (FEED_RATE, 1.0),
+        FEED if unit == "mm" || unit.is_empty() => {
+            return Err(format!(
+                "column {name:?} does not say per what: write fz [mm], f [mm/rev] or vf [mm/min]"
+            ));
+        }
+        FEED if is(&per_tooth) => ("feed_per_tooth_mm", 1.0),
+        FEED | FEED_PER_TURN if is(&per_turn) || unit.is_empty() => (FEED_PER_TURN, 1.0),
+        "feed_per_tooth_mm" if is(&per_tooth) => (key, 1.0),
+        "start_deg" | "exit_deg" => {
+            let degrees = 180.0 / std::f64::consts::PI;
+            (
+                key,
+                factor(&[
+                    ("", 1.0),
+                    ("°", 1.0),
+                    ("deg", 1.0),
+                    ("grad", 1.0),
+                    ("degre", 1.0),
+                    ("rad", degrees),
+                ])?,
+            )
+        }
+        FEED => return Err(format!("unit {unit:?} of column {name:?} is not understood")),
+        _ if key.ends_with("_mm") || key == FEED_PER_TURN => (key, factor(&length)?),
+        _ => (key, 1.0),
+    };
+    Ok(Some(Column { key, factor }))
+}
+
+/// `Drehzahl [1/min]`, `ap (mm)`, `ap in mm`: name and unit.
+fn split_unit(head: &str) -> (&str, &str) {
+    for (open, close) in [('[', ']'), ('(', ')')] {
+        if let Some((name, rest)) = head.split_once(open) {
+            return (name.trim(), rest.split(close).next().unwrap_or("").trim());
+        }
+    }
+    match head.split_once(" in ") {
+        Some((name, unit)) if !unit.trim().contains(' ') => (name.trim(), unit.trim()),
+        _ => (head.trim(), ""),
+    }
+}
+
+/// Lower case, without accents.
+pub(super) fn plain(text: &str) -> String {
+    let bare = |c: char| match c {
+        'à' | 'á' | 'â' | 'ä' => 'a',
+        'è' | 'é' | 'ê' | 'ë' => 'e',
+        'ì' | 'í' | 'î' | 'ï' => 'i',
+        'ò' | 'ó' | 'ô' | 'ö' => 'o',
+        'ù' | 'ú' | 'û' | 'ü' => 'u',
+        'ç' => 'c',
+        'ñ' => 'n',
+        '’' => '\'',
+        'μ' => 'µ',
+        c => c,
+    };
+    text.trim().to_lowercase().chars().map(bare).collect()
+}
+
+/// Up or down milling by any of its names; `Some(true)`: down.
+pub(super) fn is_down(word: &str) -> Option<bool> {
+    match plain(word).as_str() {
+        "down" | "climb" | "downmilling" | "gleichlauf" | "gl" | "avalant" | "concordancia" => Some(true),
+        "up" | "conventional" | "upmilling" | "gegenlauf" | "geg" | "opposition" | "oposicion" => Some(false),
+        _ => None,
+    }
+}
+
+/// Words for a full slot and for the processes, as `campaign.toml` has them.
+pub(super) fn english(word: &str) -> Option<(&'static str, &'static str)> {
+    Some(match plain(word).as_str() {
+        "slot" | "slotting" | "fullslot" | "nut" | "nuten" | "vollnut" | "rainure" | "rainurage"
+        | "ranura" | "ranurado" => ("immersion", "slot"),
+        "mill" | "milling" | "fraesen" | "frasen" | "fraisage" | "fresado" => ("process", "milling"),
+        "drill" | "drilling" | "bohren" | "percage" | "taladrado" => ("process", "drilling"),
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::campaign::load::CUT;
+
+    #[test]
+    fn columns_are_known_in_four_languages_with_their_units() {
+        for (head, key, factor) in [
+            ("Drehzahl [1/min]", "spindle_rpm", 1.0),
+            ("n (1/s)", "spindle_rpm", 60.0),
+            ("Vitesse de rotation (tr/min)", "spindle_rpm", 1.0),
+            ("Velocidad de giro [rpm]", "spindle_rpm", 1.0),
+            ("spindle_rpm", "spindle_rpm", 1.0),
+            ("fz [µm]", "feed_per_tooth_mm", 1e-3),
+            ("Avance par dent (mm/dent)", "feed_per_tooth_mm", 1.0),
+            ("Vorschub [mm/min]", FEED_RATE, 1.0),
+            ("F [m/min]", FEED_RATE, 1e3),
+            ("avance [mm/vuelta]", FEED_PER_TURN, 1.0),
+            ("Eingriffsbreite in mm", RADIAL_DEPTH, 1.0),
+            ("Profundidad de corte", "axial_depth_mm", 1.0),
+            ("Eintritt [°]", "start_deg", 1.0),
+            ("Ángulo de salida (rad)", "exit_deg", 180.0 / std::f64::consts::PI),
+            ("Zähnezahl", TEETH, 1.0),
+            ("steady_s", "steady_s", 1.0),
+        ] {
+            assert_eq!(column(head, &CUT), Ok(Some(Column { key, factor })), "{head}");
+        }
+        assert_eq!(column("Bemerkung", &CUT), Ok(None));
+        for head in ["Vorschub", "f [mm]", "ap [furlong]", "n [m/min]"] {
+            assert!(column(head, &CUT).is_err(), "{head}");
+        }
+    }
+}

@@ -1,0 +1,252 @@
+//! How careful a laboratory was: the sizes of its small errors, kind by kind, as its own data show them.
+//!
+//! Every error is a normal number whose standard deviation is the usual one of its kind times a factor. The factors are
+//! those of greatest evidence (MacKay 1992, Neural Computation 4, 415–447: type-II maximum likelihood) times what is known
+//! of laboratories: they differ in care as a whole, less so from kind to kind. One kind may be far smaller than the
+//! others; far larger, with all else quiet, is no lack of care but something else.
+
+use faer::linalg::solvers::DenseSolveCore;
+use faer::{Mat, Side};
+use nalgebra::{DMatrix, DVector};
+
+use crate::{Error, Result};
+
+/// Standard deviation of ln of the care from laboratory to laboratory, about half of the usual sizes: the median of few
+/// squares.
+pub const CARE: f64 = 1.0;
+const MEDIAN: f64 = 0.5;
+/// Standard deviation of ln of a kind's factor over the laboratory's, for kinds that are larger than the others.
+const LARGER: f64 = 0.7;
+/// What each e-fold less than the others costs in the end, as ln of a probability.
+const SMALLER: f64 = 0.7;
+/// Change of a logarithm that no longer matters, largest change in one step, and steps.
+const SETTLED: f64 = 0.01;
+const LEAP: f64 = 1.5;
+const STEPS: usize = 25;
+
+/// What the data say of the small errors.
+#[derive(Debug, Clone)]
+pub struct Care {
+    /// Most likely size of each error, in its usual standard deviations.
+    pub sizes: DVector<f64>,
+    /// Σ (size / standard deviation)², the standard deviation that of this laboratory.
+    pub price: f64,
+    /// −ln of how likely such standard deviations are, against the likeliest ones.
+    pub unlikely: f64,
+    /// ln of the evidence for such errors against none: what they take of χ²/2 less what so many unknowns and their standard
+    /// deviations pay for being fitted.
+    pub evidence: f64,
+}
+
+/// Errors and care of greatest probability. `information` and `gradient`: those of χ²/2 by the errors, in units of their
+/// usual standard deviations, the model's parameters having followed; `kinds`: the kind of each error, from 0 on.
+///
+/// # Errors
+/// Information that is no number.
+pub fn estimate(information: &DMatrix<f64>, gradient: &DVector<f64>, kinds: &[usize]) -> Result<Care> {
+    let count = kinds.iter().map(|k| k + 1).max().unwrap_or(0);
+    let data = Data {
+        information,
+        gradient,
+        kinds,
+    };
+    // ln of the laboratory's factor, then of each kind's over it.
+    let mut at = DVector::<f64>::zeros(1 + count);
+    let mut here = data.at(&at)?;
+    for _ in 0..STEPS {
+        let mut step = here.newton_step(&at)?;
+        let longest = step.amax();
+        if longest > LEAP {
+            step *= LEAP / longest;
+        }
+        let mut next = None;
+        while step.amax() > SETTLED {
+            let there = data.at(&(&at + &step))?;
+            if there.objective() < here.objective() {
+                next = Some(there);
+                break;
+            }
+            step *= 0.5;
+        }
+        let Some(there) = next else { break };
+        at += step;
+        here = there;
+    }
+    Ok(Care {
+        price: here.whitened.norm_squared(),
+        unlikely: here.unlikely,
+        evidence: here.evidence - here.unlikely,
+        sizes: -here.whitened.component_mul(&here.factors),
+    })
+}
+
+struct Data<'a> {
+    information: &'a DMatrix<f64>,
+    gradient: &'a DVector<f64>,
+    kinds: &'a [usize],
+}
+
+/// The data seen with certain standard deviations.
+struct Seen {
+    /// Standard deviation of each error over the usual one.
+    factors: DVector<f64>,
+    /// Errors over their standard deviations, sign turned.
+    whitened: DVector<f64>,
+    /// ln of the evidence, and −ln of the prior against its peak.
+    evidence: f64,
+    unlikely: f64,
+    /// Slope of the evidence by ln of each kind's factor, and its expected curvature with the sign turned.
+    slope: Vec<f64>,
+    curvature: Vec<f64>,
+}
+
+impl Data<'_> {
+    fn at(&self, logs: &DVector<f64>) -> Result<Seen> {
+        let n = self.kinds.len();
+        let factors = DVector::from_fn(n, |i, _| MEDIAN * (logs[0] + logs[1 + self.kinds[i]]).exp());
+        let whitened = Mat::from_fn(n, n, |i, j| {
+            factors[i] * self.information[(i, j)] * factors[j] + if i == j { 1.0 } else { 0.0 }
+        });
+        let undetermined = || Error::computation("the data do not determine the small errors of the setup");
+        let factor = whitened.llt(Side::Lower).map_err(|_| undetermined())?;
+        let inverse = factor.inverse();
+        let log_det: f64 = (0..n).map(|i| 2.0 * factor.L()[(i, i)].ln()).sum();
+        let gradient = factors.component_mul(self.gradient);
+        let whitened = DVector::from_fn(n, |i, _| (0..n).map(|j| inverse[(i, j)] * gradient[j]).sum());
+        let evidence = 0.5 * (gradient.dot(&whitened) - log_det);
+        let (mut slope, mut curvature) = (vec![0.0; logs.len() - 1], vec![0.0; logs.len() - 1]);
+        for (i, kind) in self.kinds.iter().enumerate() {
+            // The share of an error that the data determine, not its prior.
+            let determined = 1.0 - inverse[(i, i)];
+            slope[*kind] += whitened[i].powi(2) - determined;
+            curvature[*kind] += 2.0 * determined.powi(2);
+        }
+        let kinds: f64 = logs.iter().skip(1).map(|d| cost(*d)[0]).sum();
+        let seen = Seen {
+            factors,
+            whitened,
+            evidence,
+            unlikely: 0.5 * (logs[0] / CARE).powi(2) + kinds,
+            slope,
+            curvature,
+        };
+        seen.objective()
+            .is_finite()
+            .then_some(seen)
+            .ok_or_else(undetermined)
+    }
+}
+
+impl Seen {
+    fn objective(&self) -> f64 {
+        self.unlikely - self.evidence
+    }
+
+    fn newton_step(&self, at: &DVector<f64>) -> Result<DVector<f64>> {
+        let n = at.len();
+        let (mut hessian, mut gradient) = (DMatrix::<f64>::zeros(n, n), DVector::<f64>::zeros(n));
+        hessian[(0, 0)] = CARE.powi(-2) + self.curvature.iter().sum::<f64>();
+        gradient[0] = at[0] / CARE.powi(2) - self.slope.iter().sum::<f64>();
+        for k in 1..n {
+            let [_, slope, curvature] = cost(at[k]);
+            hessian[(k, k)] = curvature + self.curvature[k - 1];
+            hessian[(0, k)] = self.curvature[k - 1];
+            hessian[(k, 0)] = self.curvature[k - 1];
+            gradient[k] = slope - self.slope[k - 1];
+        }
+        let factor = hessian.cholesky();
+        let factor = factor.ok_or_else(|| Error::computation("the care of the laboratory cannot be told"))?;
+        Ok(-factor.solve(&gradient))
+    }
+}
+
+/// −ln of the prior of a kind's factor over the laboratory's, its slope and its curvature: normal above, and below with a
+/// tail that only falls off as a power of the factor.
+fn cost(log: f64) -> [f64; 3] {
+    let curvature = LARGER.powi(-2);
+    if log >= 0.0 {
+        return [0.5 * curvature * log * log, curvature * log, curvature];
+    }
+    let turn = SMALLER / curvature;
+    let root = (1.0 + (log / turn).powi(2)).sqrt();
+    [
+        curvature * turn * turn * (root - 1.0),
+        curvature * log / root,
+        curvature / root.powi(3),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    const KINDS: usize = 6;
+    const EACH: usize = 30;
+    /// Standard deviations of the noise that a usual error is worth.
+    const PLAIN: f64 = 50.0;
+
+    /// Errors with these factors, each seen with noise of its own.
+    fn laboratory(factors: [f64; KINDS], seed: u64) -> Care {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut normal = || (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
+        let kinds: Vec<usize> = (0..KINDS * EACH).map(|i| i / EACH).collect();
+        let gradient = DVector::from_fn(KINDS * EACH, |i, _| {
+            PLAIN * (PLAIN * factors[i / EACH] * normal() + normal())
+        });
+        let information = DMatrix::identity(KINDS * EACH, KINDS * EACH) * PLAIN.powi(2);
+        estimate(&information, &gradient, &kinds).unwrap()
+    }
+
+    #[test]
+    fn usual_laboratories_are_likely_and_one_that_is_wrong_in_one_thing_only_is_not() {
+        for (seed, care) in [(1, 0.25), (2, 0.5), (3, 1.0)] {
+            let usual = laboratory([care; KINDS], seed);
+            assert!(usual.unlikely < 1.5, "{care}: {usual:?}");
+        }
+        let one_perfect = laboratory([0.6, 0.6, 0.01, 0.6, 0.6, 0.6], 4);
+        assert!(one_perfect.unlikely < 4.0, "{}", one_perfect.unlikely);
+        let one_wrong = laboratory([0.0, 0.0, 3.0, 0.0, 0.0, 0.0], 5);
+        assert!(one_wrong.unlikely > 8.0, "{}", one_wrong.unlikely);
+    }
+
+    #[test]
+    fn errors_are_found_and_paid_for() {
+        let care = laboratory([0.5; KINDS], 6);
+        let spread = (care.sizes.norm_squared() / (KINDS * EACH) as f64).sqrt();
+        assert!((spread / 0.5 - 1.0).abs() < 0.15, "{spread}");
+        let each = care.price / (KINDS * EACH) as f64;
+        assert!((each - 1.0).abs() < 0.1, "{each}");
+        assert!(care.evidence > 1000.0);
+        // Of noise alone they take nothing.
+        let nothing = laboratory([0.0; KINDS], 7);
+        assert!(nothing.evidence < 1.0, "{}", nothing.evidence);
+    }
+
+    /// The slopes are those of the evidence.
+    #[test]
+    fn slopes_are_differences() {
+        let kinds = [0, 0, 1];
+        let information = DMatrix::from_row_slice(3, 3, &[9.0, 2.0, 1.0, 2.0, 5.0, 0.5, 1.0, 0.5, 20.0]);
+        let gradient = DVector::from_row_slice(&[4.0, -7.0, 9.0]);
+        let data = Data {
+            information: &information,
+            gradient: &gradient,
+            kinds: &kinds,
+        };
+        let at = DVector::from_row_slice(&[0.3, -0.4, 0.2]);
+        let here = data.at(&at).unwrap();
+        for k in 0..2 {
+            let mut step = DVector::zeros(3);
+            step[1 + k] = 1e-5;
+            let [up, down] = [1.0, -1.0].map(|s| data.at(&(&at + &step * s)).unwrap().evidence);
+            assert!(((up - down) / 2e-5 - here.slope[k]).abs() < 1e-5);
+        }
+        for log in [-3.0, -0.2, 0.4] {
+            let [up, down] = [1e-5, -1e-5].map(|s| cost(log + s));
+            assert!(((up[0] - down[0]) / 2e-5 - cost(log)[1]).abs() < 1e-6);
+            assert!(((up[1] - down[1]) / 2e-5 - cost(log)[2]).abs() < 1e-6);
+        }
+    }
+}

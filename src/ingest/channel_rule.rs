@@ -1,0 +1,483 @@
+//! How channels of a recorder become forces, where the file does not say it all: columns without names, volts, charge, a gain
+//! that only the amplifier knows, several cuts in one file.
+
+use std::path::Path;
+
+use super::force;
+use super::table::Header;
+use super::text::{Notes, without_byte_order_mark};
+use super::units::{self, Dimension, Unit};
+use super::{ChannelRole, MeasurementFile, TimeRecord, long, read_file};
+use crate::{Error, InputError, Result};
+
+/// What a channel is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Measures {
+    Time,
+    Force(ChannelRole),
+}
+
+/// Where a channel stands in its file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Source {
+    /// By its name, case ignored.
+    Name(String),
+    /// By its place from 1, time included, in a table of text.
+    Column(usize),
+}
+
+/// What a value is to be multiplied with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Gain {
+    /// The values are forces already.
+    None,
+    /// N (N·m) for one of the unit that the values are in.
+    PerUnit(f64),
+    /// N (N·m) for one volt or coulomb (both count as volts), and the unit of the values where nobody says it, in volts or
+    /// coulombs: that of the gain.
+    PerVolt(f64, f64),
+}
+
+/// One channel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChannelRule {
+    pub measures: Measures,
+    pub source: Source,
+    /// Of the values in the file, where the file does not say it.
+    pub unit: Option<Unit>,
+    pub gain: Gain,
+    /// Value at no force, in the unit of the file; taken off first.
+    pub offset: f64,
+    pub is_reversed: bool,
+    /// Sampling rate of a file without a time column.
+    pub rate_hz: Option<f64>,
+}
+
+/// Reads a unit in which a charge counts as a voltage: `pC` → 10⁻¹² V.
+pub fn unit_of_charge_or_other(label: &str) -> Option<Unit> {
+    let charges = [("pC", 1e-12), ("nC", 1e-9), ("µC", 1e-6)];
+    let Some((name, factor)) = charges.into_iter().find(|(name, _)| label.contains(name)) else {
+        return units::parse(label);
+    };
+    let unit = units::parse(&label.replace(name, "V"))?;
+    let is_below = label
+        .split_once('/')
+        .is_some_and(|(_, below)| below.contains(name));
+    let factor = if is_below { 1.0 / factor } else { factor };
+    Some(Unit {
+        factor: unit.factor * factor,
+        ..unit
+    })
+}
+
+impl Gain {
+    /// `500 N/V`, `2 kN/V`, `-3.85 pC/N`, `10 mV/N`; a moment likewise.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn parse(text: &str) -> std::result::Result<Gain, String> {
+        let text = text.trim();
+        let split = text
+            .find(|c: char| !(c.is_ascii_digit() || "+-.,eE".contains(c)))
+            .unwrap_or(text.len());
+        let (number, label) = text.split_at(split);
+        let value = number.trim().replace(',', ".").parse::<f64>();
+        let value = value.ok().filter(|v| v.is_finite() && *v != 0.0);
+        let (Some(value), Some(unit)) = (value, unit_of_charge_or_other(label)) else {
+            return Err(format!("{text:?} is no gain"));
+        };
+        let per = |force: Dimension| {
+            let volts = Dimension::VOLTAGE;
+            [(force.over(volts), false), (volts.over(force), true)]
+        };
+        for (dimension, is_sensitivity) in per(Dimension::FORCE).into_iter().chain(per(Dimension::MOMENT)) {
+            if unit.dimension == dimension {
+                let si = value * unit.factor;
+                let (above, below) = label.split_once('/').unwrap_or((label, ""));
+                let electric = unit_of_charge_or_other(if is_sensitivity { above } else { below });
+                let electric = electric.map_or(1.0, |u| u.factor);
+                return Ok(Gain::PerVolt(
+                    if is_sensitivity { si.recip() } else { si },
+                    electric,
+                ));
+            }
+        }
+        Err(format!(
+            "{label:?} is no force per volt or charge, nor the other way round"
+        ))
+    }
+}
+
+/// The time record of a file with its forces as `rules` have them, and the warnings. Without rules: [`super::read_time`].
+///
+/// # Errors
+/// Those of [`super::read_time`]; a channel that is not there, or not in the unit that its rule needs.
+pub fn read_time_with(path: &Path, rules: &[ChannelRule]) -> Result<(TimeRecord, Vec<String>)> {
+    if rules.is_empty() {
+        return super::read_time(path);
+    }
+    let (times, warnings) = match read_file(path) {
+        Ok(MeasurementFile {
+            contents, warnings, ..
+        }) if !contents.times.is_empty() => (contents.times, warnings),
+        other => match plain_table(path, rules)? {
+            Some(found) => found,
+            None => match other {
+                Ok(file) => {
+                    return Err(super::no_such(
+                        &file,
+                        "time signal",
+                        "give a file with force signals",
+                    ));
+                }
+                Err(error) => return Err(error),
+            },
+        },
+    };
+    let forces: Vec<&ChannelRule> = rules
+        .iter()
+        .filter(|r| matches!(r.measures, Measures::Force(_)))
+        .collect();
+    let all: Vec<String> = times
+        .iter()
+        .flat_map(|t| &t.channels)
+        .map(|c| c.name.clone())
+        .collect();
+    let holds = |record: &TimeRecord| forces.iter().all(|rule| index(record, rule).is_some());
+    let Some(mut record) = times.into_iter().find(holds) else {
+        let missing = forces
+            .iter()
+            .map(|rule| source_text(&rule.source))
+            .collect::<Vec<_>>();
+        return Err(InputError::new(format!(
+            "channels {} are not in it, or not of one time axis; it holds {}",
+            missing.join(", "),
+            super::text::shown(&all.join(", "))
+        ))
+        .file(path)
+        .key("channel")
+        .remedy("write the channel's name as the file has it after in_file, or its place after column")
+        .into());
+    };
+    apply(&mut record, &forces).map_err(|e| Error::from(e.file(path)))?;
+    Ok((record, warnings))
+}
+
+fn source_text(source: &Source) -> String {
+    match source {
+        Source::Name(name) => format!("{:?}", super::text::shown(name)),
+        Source::Column(at) => format!("column {at}"),
+    }
+}
+
+fn index(record: &TimeRecord, rule: &ChannelRule) -> Option<usize> {
+    let wanted = match &rule.source {
+        Source::Name(name) => name.trim().to_lowercase(),
+        Source::Column(at) => format!("column {at}"),
+    };
+    let own = |name: &str| name.trim().to_lowercase() == wanted;
+    record.channels.iter().position(|c| own(&c.name))
+}
+
+fn apply(record: &mut TimeRecord, rules: &[&ChannelRule]) -> std::result::Result<(), InputError> {
+    let places: Vec<usize> = rules.iter().filter_map(|rule| index(record, rule)).collect();
+    // What the file's names say of these forces no longer counts.
+    let given: Vec<Measures> = rules.iter().map(|r| r.measures).collect();
+    for channel in &mut record.channels {
+        if given.contains(&Measures::Force(channel.role)) {
+            channel.role = ChannelRole::Other;
+        }
+    }
+    for (rule, at) in rules.iter().zip(places) {
+        let channel = &mut record.channels[at];
+        let Measures::Force(role) = rule.measures else {
+            continue;
+        };
+        // Readers turn what they understand into SI already.
+        let said = units::parse(&channel.file_unit);
+        let of_gain = match rule.gain {
+            Gain::PerVolt(_, factor) => Some(Unit {
+                factor,
+                dimension: Dimension::VOLTAGE,
+            }),
+            _ => None,
+        };
+        let unit = rule.unit.or(said).or(of_gain);
+        let refuse = |problem: String, remedy: &str| {
+            InputError::new(format!(
+                "channel {:?}: {problem}",
+                super::text::shown(&channel.name)
+            ))
+            .key("channel")
+            .remedy(remedy)
+        };
+        if let (Some(said), Some(ours)) = (said, rule.unit)
+            && said.dimension != ours.dimension
+        {
+            let problem = format!("the file says {:?}, the campaign another unit", channel.file_unit);
+            return Err(refuse(problem, "leave `unit` out, or correct it"));
+        }
+        let expected = match role {
+            ChannelRole::TorqueZ => Dimension::MOMENT,
+            _ => Dimension::FORCE,
+        };
+        let factor = unit.map_or(1.0, |u| u.factor);
+        let gain = match rule.gain {
+            Gain::None => match unit {
+                Some(unit) if unit.dimension != expected => {
+                    let remedy = "give the amplifier's: gain = \"500 N/V\" or gain = \"-3.9 pC/N\"";
+                    return Err(refuse("its values are no forces and have no gain".into(), remedy));
+                }
+                _ => 1.0,
+            },
+            Gain::PerUnit(gain) => gain / factor,
+            Gain::PerVolt(gain, _) => match unit {
+                Some(unit) if unit.dimension == Dimension::VOLTAGE => gain,
+                _ => {
+                    let remedy =
+                        "give a gain for the unit the values are in, or leave it out where they are forces";
+                    return Err(refuse(
+                        "its gain is for volts or charge, its values are not".into(),
+                        remedy,
+                    ));
+                }
+            },
+        };
+        let to_si = if said.is_some() { 1.0 } else { factor };
+        let sign = if rule.is_reversed { -1.0 } else { 1.0 };
+        for value in &mut channel.samples {
+            *value = sign * gain * (*value * to_si - rule.offset * factor);
+        }
+        channel.role = role;
+        channel.file_unit = if expected == Dimension::MOMENT {
+            "N·m"
+        } else {
+            "N"
+        }
+        .to_string();
+    }
+    // Of forces that a rule names twice the last one counts; checked where rules are made.
+    Ok(())
+}
+
+/// A table of text that has no names, or no time: columns are named as the rules name them.
+fn plain_table(path: &Path, rules: &[ChannelRule]) -> Result<Option<(Vec<TimeRecord>, Vec<String>)>> {
+    long::regular_file(path)?;
+    let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
+    let bytes = &*without_byte_order_mark(&bytes);
+    if bytes.iter().take(8192).any(|b| *b == 0) {
+        return Ok(None);
+    }
+    let Some(mut header) = Header::find(bytes) else {
+        return Ok(None);
+    };
+    if header.names.is_empty() {
+        header.names = (1..=header.columns).map(|i| format!("column {i}")).collect();
+    }
+    for rule in rules.iter().filter(|r| r.measures == Measures::Time) {
+        let at = match &rule.source {
+            Source::Column(at) => at.checked_sub(1).filter(|at| *at < header.columns),
+            Source::Name(name) => header.names.iter().position(|n| n.eq_ignore_ascii_case(name)),
+        };
+        let Some(at) = at else {
+            return Err(
+                InputError::new(format!("{} is not in it", source_text(&rule.source)))
+                    .file(path)
+                    .key("channel")
+                    .remedy(format!("it has {} columns", header.columns))
+                    .into(),
+            );
+        };
+        let factor = rule.unit.map_or(1.0, |u| u.factor);
+        let unit = [(1.0, "s"), (1e-3, "ms"), (1e-6, "us")]
+            .into_iter()
+            .find(|(f, _)| (f / factor - 1.0).abs() < 1e-9);
+        header.names[at] = format!("time [{}]", unit.map_or("s", |u| u.1));
+    }
+    if let Some(rate) = rules.iter().find_map(|r| r.rate_hz) {
+        header.lines.push(format!("Sampling rate [Hz]:,{rate}"));
+    }
+    if !force::is_time_table(&header) {
+        return Err(InputError::new("no time column and no sampling rate")
+            .file(path)
+            .key("channel")
+            .remedy(
+                "give rate_hz = 10000.0 in a [[channel]], or a [[channel]] with name = \"time\" and its column",
+            )
+            .into());
+    }
+    let mut notes = Notes::default();
+    let record = force::read(bytes, &header, &mut notes).map_err(|e| Error::from(e.file(path)))?;
+    Ok(Some((vec![record], notes.into_warnings())))
+}
+
+/// What a table without names holds, and the lines of `campaign.toml` that give it names.
+pub(super) fn preview(bytes: &[u8], header: &Header) -> (String, String) {
+    const ROWS: usize = 2000;
+    let end = bytes[header.data_at..]
+        .iter()
+        .enumerate()
+        .filter(|(_, b)| **b == b'\n')
+        .nth(ROWS)
+        .map_or(bytes.len(), |(i, _)| header.data_at + i + 1);
+    let columns = header
+        .read(&bytes[..end], None, &mut Notes::default())
+        .map_or_else(|_| Vec::new(), |t| t.columns);
+    let even = |values: &[f64]| -> Option<f64> {
+        let [first, .., last] = values else { return None };
+        let step = (last - first) / (values.len() - 1) as f64;
+        let is_even = values
+            .iter()
+            .enumerate()
+            .all(|(i, v)| (first + i as f64 * step - v).abs() <= 0.51 * step);
+        (step > 0.0 && values.len() > 3 && is_even).then_some(step)
+    };
+    let mut seen = Vec::new();
+    let mut lines = String::new();
+    let mut forces = ["fx", "fy", "fz", "mz"].into_iter();
+    let mut has_time = false;
+    for (i, values) in columns.iter().enumerate() {
+        let (low, high) = values
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
+                (a.min(*v), b.max(*v))
+            });
+        let step = even(values).filter(|_| i == 0);
+        seen.push(match step {
+            Some(step) => format!("1: rises by {} (time?)", units::figures(step, 4)),
+            None => format!(
+                "{}: {} to {}",
+                i + 1,
+                units::figures(low, 4),
+                units::figures(high, 4)
+            ),
+        });
+        has_time |= step.is_some();
+        let name = if step.is_some() {
+            Some("time")
+        } else {
+            forces.next()
+        };
+        if let Some(name) = name {
+            let gain = if name == "time" {
+                "unit = \"s\""
+            } else {
+                "unit = \"V\"\ngain = \"500 N/V\""
+            };
+            lines += &format!("\n[[channel]]\nname = \"{name}\"\ncolumn = {}\n{gain}", i + 1);
+            if !has_time {
+                lines += "\nrate_hz = 10000.0";
+                has_time = true;
+            }
+        }
+    }
+    let what = format!(
+        "{} columns of numbers without names ({})",
+        header.columns,
+        seen.join("; ")
+    );
+    let remedy = format!(
+        "put a line of column names on top (frequency_hz,re,im or time_s,fx_n,fy_n,fz_n), or, for forces, say in campaign.toml \
+         what they are, such as{lines}"
+    );
+    (what, remedy)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rule(role: ChannelRole, source: Source) -> ChannelRule {
+        ChannelRule {
+            measures: Measures::Force(role),
+            source,
+            unit: None,
+            gain: Gain::None,
+            offset: 0.0,
+            is_reversed: false,
+            rate_hz: None,
+        }
+    }
+
+    fn read(text: &str, rules: &[ChannelRule]) -> Result<TimeRecord> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("r.txt");
+        std::fs::write(&path, text).unwrap();
+        read_time_with(&path, rules).map(|r| r.0)
+    }
+
+    #[test]
+    fn gains_are_forces_per_volt_or_sensitivities() {
+        let value = |text: &str| match Gain::parse(text).unwrap() {
+            Gain::PerVolt(value, _) => value,
+            other => panic!("{other:?}"),
+        };
+        assert!((value("500 N/V") - 500.0).abs() < 1e-9);
+        assert!((value("2 kN/V") - 2000.0).abs() < 1e-9);
+        assert!((value("10 mV/N") - 100.0).abs() < 1e-9);
+        assert!((value("-3.85 pC/N") / (-1.0 / 3.85e-12) - 1.0).abs() < 1e-12);
+        assert!((value("2 N·m/V") - 2.0).abs() < 1e-9);
+        for text in ["N/V", "500", "500 N", "0 N/V", "5 m/V"] {
+            assert!(Gain::parse(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn columns_without_names_become_forces() {
+        let rows: String = (0..20)
+            .map(|i| format!("{} {} 7\n", 0.1 + 0.001 * i as f64, -0.2))
+            .collect();
+        let mut x = rule(ChannelRole::ForceX, Source::Column(1));
+        x.unit = units::parse("V");
+        x.gain = Gain::parse("500 N/V").unwrap();
+        x.offset = 0.1;
+        x.rate_hz = Some(2000.0);
+        let mut z = rule(ChannelRole::ForceZ, Source::Column(2));
+        z.unit = units::parse("kN");
+        z.is_reversed = true;
+        let record = read(&rows, &[x.clone(), z.clone()]).unwrap();
+        assert_eq!(record.sample_rate_hz, 2000.0);
+        let of = |role| record.channel(role).unwrap().samples[10];
+        assert!((of(ChannelRole::ForceX) - 5.0).abs() < 1e-9);
+        assert!((of(ChannelRole::ForceZ) - 200.0).abs() < 1e-9);
+        x.unit = None;
+        x.offset = 0.0;
+        x.gain = Gain::parse("10 pC/N").unwrap();
+        let in_pc = read(&rows, &[x.clone()]).unwrap();
+        assert!((in_pc.channel(ChannelRole::ForceX).unwrap().samples[10] - 0.011).abs() < 1e-12);
+        (x.unit, x.offset, x.gain) = (units::parse("V"), 0.1, Gain::None);
+        assert!(
+            read(&rows, &[x.clone()])
+                .unwrap_err()
+                .to_string()
+                .contains("no gain")
+        );
+        x.gain = Gain::PerUnit(250.0);
+        let record = read(&rows, &[x.clone()]).unwrap();
+        assert!((record.channel(ChannelRole::ForceX).unwrap().samples[10] - 2.5).abs() < 1e-9);
+        x.rate_hz = None;
+        assert!(read(&rows, &[x]).unwrap_err().to_string().contains("rate_hz"));
+        z.source = Source::Column(9);
+        z.rate_hz = Some(1.0);
+        assert!(read(&rows, &[z]).unwrap_err().to_string().contains("column 9"));
+    }
+
+    #[test]
+    fn named_channels_are_taken_by_name_and_units_must_agree() {
+        let rows: String = (0..20)
+            .map(|i| format!("{},{},5\n", 0.001 * i as f64, i))
+            .collect();
+        let text = format!("time_s,Fx_R_1 [mV],Fx_R_2 [mV]\n{rows}");
+        let mut x = rule(ChannelRole::ForceX, Source::Name("fx_r_2 [mv]".into()));
+        x.gain = Gain::parse("100 N/V").unwrap();
+        let record = read(&text, &[x.clone()]).unwrap();
+        assert!((record.channel(ChannelRole::ForceX).unwrap().samples[3] - 0.5).abs() < 1e-12);
+        x.unit = units::parse("N");
+        assert!(
+            read(&text, &[x])
+                .unwrap_err()
+                .to_string()
+                .contains("another unit")
+        );
+    }
+}

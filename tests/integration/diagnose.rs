@@ -1,10 +1,10 @@
 //! `lobestone diagnose` on campaigns whose truth the program does not see.
 
-use crate::support::{blind, document, truth};
+use crate::support::{copy_of, document, truth};
 
 fn verdict(name: &str) -> serde_json::Value {
-    let dir = blind(name);
-    document(&["diagnose", dir.to_str().unwrap()])
+    let copy = copy_of(name);
+    document(&["diagnose", copy.path().to_str().unwrap()])
 }
 
 #[test]
@@ -83,7 +83,7 @@ fn physics_that_the_library_does_not_have_is_unknown() {
 /// Diagnose, add, diagnose, add, diagnose: two hidden effects are found one after the other, and then nothing.
 #[test]
 fn two_effects_are_found_one_after_the_other() {
-    let dir = crate::support::copy_of("frf-9302");
+    let dir = copy_of("frf-9302");
     let path = dir.path().to_str().unwrap();
     let truth = truth("frf-9302");
     let mut hidden = vec![
@@ -128,8 +128,9 @@ fn cutting_campaigns_are_diagnosed_by_the_same_loop() {
 
 #[test]
 fn a_side_that_the_campaign_does_not_have_is_refused_plainly() {
-    let dir = blind("frf-9112");
-    let run = crate::support::lobestone(&["diagnose", dir.to_str().unwrap(), "--domain", "cutting"]);
+    let copy = copy_of("frf-9112");
+    let dir = copy.path().to_str().unwrap();
+    let run = crate::support::lobestone(&["diagnose", dir, "--domain", "cutting"]);
     assert_eq!(run.status, Some(1));
     assert!(run.stderr.contains("no [[cut]]"), "{}", run.stderr);
 }
@@ -137,7 +138,7 @@ fn a_side_that_the_campaign_does_not_have_is_refused_plainly() {
 /// A cutting effect that is not there: added, judged by cuts left out, called what it is, and taken back.
 #[test]
 fn a_wrong_cutting_effect_is_no_progress() {
-    let dir = crate::support::copy_of("force-9439");
+    let dir = copy_of("force-9439");
     let path = dir.path().to_str().unwrap();
     let added = document(&["add", path, "tool-wear"]);
     assert_eq!(added["domain"], "cutting");

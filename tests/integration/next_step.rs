@@ -97,8 +97,8 @@ fn what_was_no_progress_is_to_be_undone() {
 
 #[test]
 fn an_unknown_rest_asks_for_a_measurement() {
-    let dir = blind("frf-9011");
-    let dir = dir.to_str().unwrap();
+    let copy = copy_of("frf-9011");
+    let dir = copy.path().to_str().unwrap();
     let diagnosed = document(&["diagnose", dir]);
     assert_eq!(diagnosed["verdict"], "unknown");
     let step = diagnosed["next_step"].as_str().unwrap();

@@ -18,6 +18,11 @@ pub fn program() -> Command {
 }
 
 pub fn lobestone(arguments: &[&str]) -> Run {
+    // Tests run side by side, and `diagnose` keeps what it found in the campaign's folder.
+    assert!(
+        !(arguments[0] == "diagnose" && Path::new(arguments[1]).starts_with(blind(""))),
+        "{arguments:?} writes into a campaign that other tests copy: use copy_of"
+    );
     let output = program().args(arguments).output().unwrap();
     Run {
         status: output.status.code(),

@@ -52,7 +52,9 @@ impl DiagnosisFindings {
         let case = StructureCase::load(campaign)?;
         let study = study_of(&case, options);
         let mut diagnosis = diagnose(&study, &case.model)?;
-        let setup = examine(&case.model, &case.data, &diagnosis.baseline.theta, || {
+        let baseline = &diagnosis.baseline;
+        let slips = baseline.rest.beyond_slips.as_ref();
+        let setup = examine(&case.model, &case.data, &baseline.theta, slips, || {
             rival(&diagnosis, |_| true)
         })?;
         heed_setup(&mut diagnosis, &setup);

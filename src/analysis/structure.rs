@@ -80,7 +80,7 @@ impl StructureAnalysis {
     /// A model without a response.
     pub fn setup_check(&self) -> Result<SetupCheck> {
         let (model, data, theta) = (&self.case.model, &self.case.data, &self.calibration.theta);
-        examine(model, data, theta, || library_rival(model, data, theta))
+        examine(model, data, theta, None, || library_rival(model, data, theta))
     }
 }
 

@@ -158,6 +158,14 @@ impl FrfData {
         postures
     }
 
+    /// Numbers of the points that responses were measured at, in order.
+    pub fn response_points(&self) -> Vec<usize> {
+        let mut points: Vec<usize> = self.frfs().map(|(_, f)| f.response.point).collect();
+        points.sort_unstable();
+        points.dedup();
+        points
+    }
+
     /// The FRFs of the postures for which `keep` says yes.
     pub fn filtered(&self, keep: impl Fn(usize) -> bool) -> FrfData {
         FrfData {

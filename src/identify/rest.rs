@@ -66,6 +66,11 @@ impl BeyondSlips {
     pub fn same(&self, test: &RestTest) -> Option<&RestTest> {
         self.tests.iter().find(|t| t.looks_like == test.looks_like)
     }
+
+    /// χ² that the errors take, less what they pay for it.
+    pub fn gain(&self) -> f64 {
+        2.0 * self.evidence
+    }
 }
 
 /// What small errors of the setup leave of a rest.

@@ -15,6 +15,7 @@ use crate::Result;
 use crate::identify::calibrate::{Options, calibrate};
 use crate::identify::frf_data::FrfData;
 use crate::identify::levenberg_marquardt::{Stopping, minimise};
+use crate::identify::rest::BeyondSlips;
 use crate::identify::structure::{FrfProblem, Misfit};
 use crate::identify::structure_study::small_errors;
 use crate::identify::study::{Study, View, try_effects};
@@ -94,7 +95,8 @@ impl Trial<'_> {
     }
 }
 
-/// Tries the mistakes on `model` at `theta`, its optimum on `data`. `rival` is asked for only where something is found.
+/// Tries the mistakes on `model` at `theta`, its optimum on `data`. `beyond_slips`: what small errors take there, where that is
+/// known already. `rival` is asked for only where something is found.
 ///
 /// # Errors
 /// A model without a response.
@@ -102,6 +104,7 @@ pub fn examine(
     model: &StructureModel,
     data: &FrfData,
     theta: &[f64],
+    beyond_slips: Option<&BeyondSlips>,
     rival: impl FnOnce() -> Option<Rival>,
 ) -> Result<SetupCheck> {
     let mut check = SetupCheck {
@@ -129,7 +132,10 @@ pub fn examine(
         .collect();
     let rivals = || Rivals {
         library: rival(),
-        small_errors: slips::gain(model, data, theta).ok(),
+        small_errors: match beyond_slips {
+            Some(known) => Some(known.gain()),
+            None => slips::gain(model, data, theta).ok(),
+        },
     };
     let noise = Noise {
         values: 2 * data.value_count(),

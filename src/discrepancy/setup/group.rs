@@ -89,9 +89,7 @@ impl Group {
             reference_axis,
             ..Group::ALL
         }));
-        let mut points: Vec<usize> = data.frfs().map(|(_, f)| f.response.point).collect();
-        points.sort_unstable();
-        points.dedup();
+        let points = data.response_points();
         parts.extend(points.iter().map(|&p| Group {
             response_point: Some(p),
             ..Group::ALL

@@ -11,7 +11,7 @@ use crate::robot::Kinematics;
 
 /// One sort of error, one number of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Error {
+pub enum SmallError {
     /// Joint, from 1 on, deg.
     Encoder(usize),
     /// ln of the hammer's gain.
@@ -26,16 +26,16 @@ pub enum Error {
     Stiffness(usize),
 }
 
-impl Error {
+impl SmallError {
     /// Errors of one kind show the same care; from 0 on.
     pub fn kind(self) -> usize {
         match self {
-            Error::Encoder(_) => 0,
-            Error::Gain => 1,
-            Error::Hit(_) => 2,
-            Error::Sensor(_) => 3,
-            Error::Corner => 4,
-            Error::Stiffness(_) => 5,
+            SmallError::Encoder(_) => 0,
+            SmallError::Gain => 1,
+            SmallError::Hit(_) => 2,
+            SmallError::Sensor(_) => 3,
+            SmallError::Corner => 4,
+            SmallError::Stiffness(_) => 5,
         }
     }
 }
@@ -53,23 +53,23 @@ pub struct Slipped {
 }
 
 impl Slipped {
-    /// Adds an error of size `value` where `place` says, the posture being this one. [`Error::Stiffness`] is the model's own
+    /// Adds an error of size `value` where `place` says, the posture being this one. [`SmallError::Stiffness`] is the model's own
     /// and not seen here.
-    pub fn add(&mut self, error: Error, place: &Group, value: f64) {
+    pub fn add(&mut self, error: SmallError, place: &Group, value: f64) {
         let hits = |i: usize| place.reference_axis.is_none_or(|axis| axis.index() == i);
         match error {
-            Error::Encoder(joint) => self.joints_deg.push((joint, value)),
-            Error::Gain => (0..3).filter(|i| hits(*i)).for_each(|i| self.gains[i] += value),
-            Error::Hit(part) => (0..3)
+            SmallError::Encoder(joint) => self.joints_deg.push((joint, value)),
+            SmallError::Gain => (0..3).filter(|i| hits(*i)).for_each(|i| self.gains[i] += value),
+            SmallError::Hit(part) => (0..3)
                 .filter(|i| hits(*i))
                 .for_each(|i| self.hits_deg[i][part] += value),
-            Error::Sensor(part) => {
+            SmallError::Sensor(part) => {
                 let mut turn = [0.0; 3];
                 turn[part] = value;
                 self.sensors_deg.extend(place.response_point.map(|p| (p, turn)));
             }
-            Error::Corner => self.corner_rad_per_s += value,
-            Error::Stiffness(_) => {}
+            SmallError::Corner => self.corner_rad_per_s += value,
+            SmallError::Stiffness(_) => {}
         }
     }
 }

@@ -15,7 +15,7 @@ use super::group::Group;
 use super::mistake::Mistake;
 use super::mistakes::{channel_gain, encoder_offset, hit_direction, sensor_high_pass, turned_sensor};
 use super::scene::{Made, predict};
-use super::slipped::{Error, Slipped};
+use super::slipped::{Slipped, SmallError};
 use crate::Result;
 use crate::identify::StructureModel;
 use crate::identify::frf_data::{FrfBlock, FrfData};
@@ -41,7 +41,7 @@ const SETTLED: f64 = 1e-3;
 
 /// One error: what it does where it is, and each place that it may be at on its own.
 struct Slip {
-    error: Error,
+    error: SmallError,
     /// Its standard deviation.
     std: f64,
     /// Change of each curve by one standard deviation, over σ.
@@ -145,13 +145,8 @@ impl<'a> System<'a> {
         let active: Vec<Vec<(usize, usize)>> = data.frfs().map(|(_, frf)| concerning(frf)).collect();
         // Noise has E|r|² = 1 per complex value: each part counts double.
         let mut information = DMatrix::<f64>::zeros(count, count);
-        for (curve, active) in curves
-            .iter()
-            .zip(&active)
-            .enumerate()
-            .map(|(k, (c, a))| ((k, c), a))
-        {
-            let columns = columns(curve, slips, active);
+        for (k, active) in active.iter().enumerate() {
+            let columns = columns(k, curves, slips, active);
             for (a, (i, x)) in columns.iter().enumerate() {
                 for (j, y) in &columns[..=a] {
                     let sum = 2.0 * real_product(x, y);
@@ -197,7 +192,7 @@ impl<'a> System<'a> {
     }
 
     fn columns(&self, k: usize) -> Vec<(usize, &[Complex64])> {
-        columns((k, &self.curves[k]), self.slips, &self.active[k])
+        columns(k, self.curves, self.slips, &self.active[k])
     }
 
     /// Changes of all unknowns, errors in their standard deviations, of greatest probability for `rest` left at zero.
@@ -267,7 +262,7 @@ impl<'a> System<'a> {
             for (place, group) in slip.places.iter().enumerate().filter(|(_, g)| here(g)) {
                 let size = slip.std * sizes[start + place];
                 match slip.error {
-                    Error::Stiffness(i) => theta[i] += size,
+                    SmallError::Stiffness(i) => theta[i] += size,
                     error => slipped.add(error, group, size),
                 }
             }
@@ -295,11 +290,12 @@ impl<'a> System<'a> {
 
 /// Slopes of the `k`-th curve by the unknowns that concern it.
 fn columns<'a>(
-    (k, curve): (usize, &'a RestCurve),
+    k: usize,
+    curves: &'a [RestCurve],
     slips: &'a [Slip],
     active: &[(usize, usize)],
 ) -> Vec<(usize, &'a [Complex64])> {
-    let of_model = curve.slopes.iter().map(Vec::as_slice).enumerate();
+    let of_model = curves[k].slopes.iter().map(Vec::as_slice).enumerate();
     let of_slips = active.iter().map(|(s, i)| (*i, slips[*s].change[k].as_slice()));
     of_model.chain(of_slips).collect()
 }
@@ -336,9 +332,7 @@ fn slips(model: &StructureModel, data: &FrfData, theta: &[f64], curves: &[RestCu
             })
         })
         .collect();
-    let mut points: Vec<usize> = data.frfs().map(|(_, f)| f.response.point).collect();
-    points.sort_unstable();
-    points.dedup();
+    let points = data.response_points();
     // Half of the variance is the same at all postures, half new at each.
     let half = std::f64::consts::FRAC_1_SQRT_2;
     let always_and_anew = || std::iter::once(&Group::ALL).chain(&postures);
@@ -354,31 +348,31 @@ fn slips(model: &StructureModel, data: &FrfData, theta: &[f64], curves: &[RestCu
     let mistakes: Vec<Sort> = (1..=model.robot.joint_count())
         .map(|joint| {
             let mistake: Box<dyn Mistake> = Box::new(encoder_offset::EncoderOffset { joint });
-            let part: Part = Box::new(move |_| Error::Encoder(joint));
+            let part: Part = Box::new(move |_| SmallError::Encoder(joint));
             (mistake, part, half * ENCODER_DEG, encoders.as_slice())
         })
         .chain([
             (
                 Box::new(channel_gain::ChannelGain) as Box<dyn Mistake>,
-                Box::new(|_| Error::Gain) as Part,
+                Box::new(|_| SmallError::Gain) as Part,
                 GAIN,
                 hits.as_slice(),
             ),
             (
                 Box::new(hit_direction::HitDirection),
-                Box::new(Error::Hit),
+                Box::new(SmallError::Hit),
                 HIT_DEG,
                 hits.as_slice(),
             ),
             (
                 Box::new(turned_sensor::TurnedSensor),
-                Box::new(Error::Sensor),
+                Box::new(SmallError::Sensor),
                 half * SENSOR_DEG,
                 sensors.as_slice(),
             ),
             (
                 Box::new(sensor_high_pass::SensorHighPass { order: 1 }),
-                Box::new(|_| Error::Corner),
+                Box::new(|_| SmallError::Corner),
                 std::f64::consts::TAU * CORNER_HZ,
                 &[Group::ALL],
             ),
@@ -416,7 +410,7 @@ fn slips(model: &StructureModel, data: &FrfData, theta: &[f64], curves: &[RestCu
         stiffness
             .filter(|(_, p)| p.scale == Scale::Logarithmic && p.name.contains("stiffness"))
             .map(|(i, _)| Slip {
-                error: Error::Stiffness(i),
+                error: SmallError::Stiffness(i),
                 std: STIFFNESS,
                 change: curves
                     .iter()
@@ -429,6 +423,6 @@ fn slips(model: &StructureModel, data: &FrfData, theta: &[f64], curves: &[RestCu
 }
 
 /// Which error the numbers of a mistake are.
-type Part = Box<dyn Fn(usize) -> Error>;
+type Part = Box<dyn Fn(usize) -> SmallError>;
 /// A mistake, which errors its numbers are, their standard deviation, and where each may be on its own.
 type Sort<'a> = (Box<dyn Mistake>, Part, f64, &'a [Group]);

@@ -55,9 +55,7 @@ pub(super) fn responses(data: &FrfData) -> Vec<Group> {
         response_axis: Some(axis),
         ..Group::ALL
     }));
-    let mut points: Vec<usize> = data.frfs().map(|(_, f)| f.response.point).collect();
-    points.sort_unstable();
-    points.dedup();
+    let points = data.response_points();
     if points.len() > 1 {
         groups.extend(points.into_iter().map(|p| Group {
             response_point: Some(p),

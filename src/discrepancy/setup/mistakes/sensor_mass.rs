@@ -35,9 +35,7 @@ impl Mistake for SensorMass {
 
     fn groups(&self, data: &FrfData) -> Vec<Group> {
         // At one point only it is a payload like any other.
-        let mut points: Vec<usize> = data.frfs().map(|(_, f)| f.response.point).collect();
-        points.sort_unstable();
-        points.dedup();
+        let points = data.response_points();
         match points.len() > 1 {
             true => vec![Group::ALL],
             false => Vec::new(),

@@ -27,9 +27,7 @@ impl Mistake for TurnedSensor {
 
     fn groups(&self, data: &FrfData) -> Vec<Group> {
         let mut groups = Group::postures(data);
-        let mut points: Vec<usize> = data.frfs().map(|(_, f)| f.response.point).collect();
-        points.sort_unstable();
-        points.dedup();
+        let points = data.response_points();
         if points.len() > 1 {
             groups.extend(points.into_iter().map(|p| Group {
                 response_point: Some(p),

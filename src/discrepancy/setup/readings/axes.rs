@@ -153,9 +153,7 @@ pub fn proposed(table: &Table, data: &FrfData) -> Vec<Proposed> {
         })
         .collect();
     let mut groups = Group::postures(data);
-    let mut points: Vec<usize> = data.frfs().map(|(_, f)| f.response.point).collect();
-    points.sort_unstable();
-    points.dedup();
+    let points = data.response_points();
     if points.len() > 1 {
         groups.extend(points.into_iter().map(|p| Group {
             response_point: Some(p),

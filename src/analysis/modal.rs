@@ -15,7 +15,7 @@ use crate::modal::chosen::Choice;
 use crate::modal::delay::{self, Delay};
 use crate::modal::quality::{self, Quality, SetQuality, Verdict};
 use crate::modal::tracking::{self, Track};
-use crate::modal::{self, FrfModes, GlobalModes, Hit, SetMember, Settings, TapRecord, TapSettings};
+use crate::modal::{self, FrfModes, GlobalModes, Hit, Method, SetMember, Settings, TapRecord, TapSettings};
 use crate::{Error, InputError, Result};
 
 /// Name of the set that files together make.
@@ -189,6 +189,17 @@ impl ModalAnalysis {
             })?;
         }
         Ok(())
+    }
+
+    /// Single FRFs: the parameters by this method only. Modes that it does not find are not there any more.
+    pub fn keep_method(&mut self, method: Method) {
+        for frf in self.sets.iter_mut().flat_map(|s| &mut s.frfs) {
+            let modes = &mut frf.modes.modes;
+            modes
+                .iter_mut()
+                .for_each(|m| m.estimates.retain(|e| e.method == method));
+            modes.retain(|m| !m.estimates.is_empty());
+        }
     }
 
     /// The same mode from set to set.

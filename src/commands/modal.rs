@@ -14,7 +14,7 @@ use crate::analysis::{ModalAnalysis, SetModes, operational};
 use crate::campaign::Campaign;
 use crate::modal::chosen::Choice;
 use crate::modal::operational::OperationalSettings;
-use crate::modal::{Estimator, Settings, TapSettings};
+use crate::modal::{Estimator, Method, Settings, TapSettings, Tolerances};
 use crate::{InputError, Result};
 
 #[derive(clap::Args)]
@@ -67,9 +67,17 @@ pub struct Args {
     /// Output-only: speed of the spindle, 1/min, to name its harmonics by.
     #[arg(long, value_name = "RPM", value_parser = positive, requires = "output_only")]
     spindle: Option<f64>,
-    /// Output-only: highest model order (two a mode).
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=300), requires = "output_only")]
+    /// Highest order of the stabilisation diagram (from the number of peaks where left out; output-only: two a mode).
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=300))]
     order: Option<u32>,
+    /// How near a pole must be to one of the order below to have stayed: relative change of frequency and of damping at most,
+    /// MAC of the shapes at least.
+    #[arg(long, value_name = "F:ZETA:MAC", value_parser = tolerances, default_value = "0.01:0.1:0.95",
+          conflicts_with = "output_only")]
+    tolerances: Tolerances,
+    /// Single FRFs: parameters by this method only.
+    #[arg(long, value_enum, conflicts_with = "output_only")]
+    method: Option<MethodArg>,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -77,6 +85,23 @@ enum EstimatorArg {
     H1,
     H2,
     Hv,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum MethodArg {
+    LocalFit,
+    CircleFit,
+    HalfPower,
+}
+
+impl From<MethodArg> for Method {
+    fn from(arg: MethodArg) -> Method {
+        match arg {
+            MethodArg::LocalFit => Method::LocalFit,
+            MethodArg::CircleFit => Method::CircleFit,
+            MethodArg::HalfPower => Method::HalfPower,
+        }
+    }
 }
 
 /// Of so many FRFs the modes of each are printed unasked.
@@ -113,8 +138,26 @@ fn pole(text: &str) -> std::result::Result<(f64, Option<f64>), String> {
     }
 }
 
+fn tolerances(text: &str) -> std::result::Result<Tolerances, String> {
+    let share = |text: &str| text.parse().ok().filter(|x: &f64| *x > 0.0 && *x < 1.0);
+    let all: Option<Vec<f64>> = text.split(':').map(share).collect();
+    match all.as_deref() {
+        Some(&[frequency, damping, mac]) => Ok(Tolerances {
+            frequency,
+            damping,
+            mac,
+            ..Tolerances::default()
+        }),
+        _ => Err("give three numbers between 0 and 1, such as 0.01:0.1:0.95".into()),
+    }
+}
+
 pub fn run(args: Args) -> Result<Outcome> {
-    let settings = Settings { band_hz: args.band };
+    let settings = Settings {
+        band_hz: args.band,
+        max_order: args.order.map(|n| n as usize),
+        tolerances: args.tolerances,
+    };
     let taps = TapSettings {
         estimator: match args.estimator {
             EstimatorArg::H1 => Estimator::H1,
@@ -161,6 +204,9 @@ pub fn run(args: Args) -> Result<Outcome> {
             (analysis, next)
         }
     };
+    if let Some(method) = args.method {
+        analysis.keep_method(method.into());
+    }
     analysis.choose(&Choice {
         poles: args.pole.clone(),
         without_hz: args.without.clone(),

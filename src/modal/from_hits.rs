@@ -448,6 +448,7 @@ mod tests {
             .collect();
         let settings = Settings {
             band_hz: Some([3.0, 60.0]),
+            ..Settings::default()
         };
         let modes = analyse_frf(&found.frequency_hz, &receptance, &settings)
             .unwrap()

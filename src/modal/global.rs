@@ -55,9 +55,18 @@ pub fn global(frfs: &[SetMember], settings: &Settings) -> Result<GlobalModes> {
     let rows = rows(&data, &members);
     let references = rows.first().map_or(1, |r| r.receptance.len());
     let lines = data.iter().map(|d| d.frequency_hz.len()).min().unwrap_or(0);
-    let wanted_poles = (2 * single.len() + 20).clamp(POLES[0], POLES[1]).min(lines / 3);
-    let orders = lscf::poles(&rows, band_hz, (wanted_poles / references).max(2));
-    let mut diagram = stabilisation::read(&orders, shape_data(&data).as_ref(), references);
+    let usual = (2 * single.len() + 20).clamp(POLES[0], POLES[1]);
+    let wanted_poles = settings.max_order.unwrap_or(usual);
+    let order = (wanted_poles.min(lines / 3) / references).max(2);
+    if settings.max_order.is_some() && wanted_poles > lines / 3 {
+        result.warnings.push(format!(
+            "order {wanted_poles} was asked for, and {lines} lines determine {} at most: that is what was used",
+            order * references
+        ));
+    }
+    let orders = lscf::poles(&rows, band_hz, order);
+    let shapes = shape_data(&data);
+    let mut diagram = stabilisation::read(&orders, shapes.as_ref(), references, &settings.tolerances);
 
     let mut start: Vec<Start> = diagram
         .candidates

@@ -78,6 +78,34 @@ impl Method {
 pub struct Settings {
     /// From, to in Hz; everything that was measured where `None`.
     pub band_hz: Option<[f64; 2]>,
+    /// Highest order of the stabilisation diagram: poles sought in all FRFs together; from the number of peaks where `None`.
+    /// What the lines determine (a third of them) is never exceeded.
+    pub max_order: Option<usize>,
+    pub tolerances: Tolerances,
+}
+
+/// How near a pole has to be to one of the order below to have stayed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tolerances {
+    /// Relative change of frequency, at most.
+    pub frequency: f64,
+    /// Relative change of damping, at most.
+    pub damping: f64,
+    /// MAC of the residues over all FRFs, at least.
+    pub mac: f64,
+    /// Orders in a row over which a pole must stay.
+    pub orders: usize,
+}
+
+impl Default for Tolerances {
+    fn default() -> Self {
+        Tolerances {
+            frequency: stabilisation::FREQUENCY_TOLERANCE,
+            damping: stabilisation::DAMPING_TOLERANCE,
+            mac: stabilisation::MAC_TOLERANCE,
+            orders: stabilisation::ORDERS,
+        }
+    }
 }
 
 /// One mode by one method.
@@ -288,6 +316,7 @@ mod tests {
         let (f, h) = Synthetic::new(3.0, 90.0, 0.1, &MODES).frf();
         let settings = Settings {
             band_hz: Some([5.0, 30.0]),
+            ..Settings::default()
         };
         let found = analyse_frf(&f, &h, &settings).unwrap();
         assert_eq!(found.modes.len(), 1);

@@ -10,6 +10,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::Tolerances;
 use super::local_fit::Pole;
 use super::lscf::Order;
 use super::shape::mac;
@@ -89,7 +90,12 @@ pub(super) struct ShapeData<'a> {
 }
 
 /// Reads the poles of all orders.
-pub(super) fn read(orders: &[Order], shapes: Option<&ShapeData>, references: usize) -> Stabilisation {
+pub(super) fn read(
+    orders: &[Order],
+    shapes: Option<&ShapeData>,
+    references: usize,
+    tolerances: &Tolerances,
+) -> Stabilisation {
     let mut levels: Vec<Vec<Link>> = Vec::with_capacity(orders.len());
     let mut chains = 0;
     type OfOrder = (Vec<Pole>, Option<Vec<Vec<Complex64>>>);
@@ -115,7 +121,7 @@ pub(super) fn read(orders: &[Order], shapes: Option<&ShapeData>, references: usi
             })
             .collect();
         if let Some(below) = index.checked_sub(1).map(|i| &levels[i]) {
-            link(&mut level, below);
+            link(&mut level, below, tolerances);
         }
         for one in &mut level {
             let goes_on = one.stability >= Stability::Damping;
@@ -150,22 +156,22 @@ pub(super) fn read(orders: &[Order], shapes: Option<&ShapeData>, references: usi
                 })
             })
             .collect(),
-        candidates: candidates(members),
+        candidates: candidates(members, tolerances),
     }
 }
 
 /// Pairs each pole with the nearest of the order below, nearest pairs first, each used once.
-fn link(level: &mut [Link], below: &[Link]) {
+fn link(level: &mut [Link], below: &[Link], tolerances: &Tolerances) {
     let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
     for (j, one) in level.iter().enumerate() {
         for (i, other) in below.iter().enumerate() {
             let apart = (one.pole.frequency_hz / other.pole.frequency_hz - 1.0).abs();
             // Half a width counts as near too, for heavily damped modes.
-            if apart < FREQUENCY_TOLERANCE {
+            if apart < tolerances.frequency {
                 // Damping and shape tell close modes apart.
                 let damping = (one.pole.damping_ratio / other.pole.damping_ratio).ln().abs();
                 let shape = likeness(one, other).map_or(0.0, |m| 1.0 - m);
-                pairs.push((apart / FREQUENCY_TOLERANCE + damping + shape, j, i));
+                pairs.push((apart / tolerances.frequency + damping + shape, j, i));
             }
         }
     }
@@ -179,7 +185,7 @@ fn link(level: &mut [Link], below: &[Link]) {
         let damping = (level[j].pole.damping_ratio / below[i].pole.damping_ratio - 1.0).abs();
         let alike = likeness(&level[j], &below[i]).unwrap_or(1.0);
         level[j].before = Some(i);
-        level[j].stability = match (damping < DAMPING_TOLERANCE, alike >= MAC_TOLERANCE) {
+        level[j].stability = match (damping < tolerances.damping, alike >= tolerances.mac) {
             (true, true) => Stability::Full,
             (true, false) => Stability::Damping,
             _ => Stability::Frequency,
@@ -191,8 +197,9 @@ fn likeness(a: &Link, b: &Link) -> Option<f64> {
     Some(mac(a.residues.as_ref()?, b.residues.as_ref()?))
 }
 
-fn candidates(chains: Vec<Vec<&Link>>) -> Vec<Candidate> {
-    let mut long: Vec<Vec<&Link>> = chains.into_iter().filter(|c| c.len() >= ORDERS).collect();
+fn candidates(chains: Vec<Vec<&Link>>, tolerances: &Tolerances) -> Vec<Candidate> {
+    let long_enough = |c: &Vec<&Link>| c.len() >= tolerances.orders;
+    let mut long: Vec<Vec<&Link>> = chains.into_iter().filter(long_enough).collect();
     // The longest first: what is nearly the same joins it.
     long.sort_by_key(|c| std::cmp::Reverse(c.len()));
     let mut merged: Vec<Vec<&Link>> = Vec::new();
@@ -228,8 +235,8 @@ fn candidates(chains: Vec<Vec<&Link>>) -> Vec<Candidate> {
                 why: format!(
                     "stays over {} orders ({full} with shape): frequency within {} %, damping within {} %",
                     chain.len(),
-                    100.0 * FREQUENCY_TOLERANCE,
-                    100.0 * DAMPING_TOLERANCE
+                    100.0 * tolerances.frequency,
+                    100.0 * tolerances.damping
                 ),
             }
         })

@@ -331,6 +331,51 @@ fn the_analyst_gives_and_takes_poles_and_the_window_is_taken_out() {
 }
 
 #[test]
+fn order_tolerances_and_method_are_the_analysts() {
+    let dir = tempfile::tempdir().unwrap();
+    let (frfs, _) = three_points(dir.path());
+    let diagram = |arguments: &[&str]| {
+        let document = json_of(&[&[frfs.as_str()], arguments].concat());
+        assert_eq!(document["global"].as_array().unwrap().len(), 3, "{arguments:?}");
+        document["sets"][0]["stabilisation"].clone()
+    };
+    let usual = diagram(&[]);
+    let low = diagram(&["--order", "12"]);
+    assert_eq!(low["max_order"], 12);
+    assert!(usual["max_order"].as_u64().unwrap() > 12);
+    let stable = |diagram: &Value| {
+        let poles = diagram["poles"].as_array().unwrap();
+        poles.iter().filter(|p| p["stability"] == "full").count()
+    };
+    // The same poles, judged more strictly.
+    let strict = diagram(&["--tolerances", "1e-9:1e-9:0.999999999"]);
+    assert_eq!(
+        strict["poles"].as_array().unwrap().len(),
+        usual["poles"].as_array().unwrap().len()
+    );
+    assert!(stable(&strict) < stable(&usual));
+    // 471 lines determine no more than 157 poles.
+    let document = json_of(&[&frfs, "--order", "300"]);
+    assert_eq!(document["sets"][0]["stabilisation"]["max_order"], 157);
+    let warnings = document["warnings"].to_string();
+    assert!(warnings.contains("order 300 was asked for"), "{warnings}");
+
+    let document = json_of(&[&frfs, "--method", "half-power"]);
+    for frf in document["frfs"].as_array().unwrap() {
+        let modes = frf["modes"].as_array().unwrap();
+        assert!(!modes.is_empty() && modes.iter().all(|m| m["method"] == "half-power"));
+    }
+    for wrong in [
+        ["--tolerances", "0.01:0.1"],
+        ["--tolerances", "0.01:0.1:2"],
+        ["--order", "1"],
+    ] {
+        let run = program().args(["modal", &frfs]).args(wrong).output().unwrap();
+        assert_eq!(run.status.code(), Some(2), "{wrong:?}");
+    }
+}
+
+#[test]
 fn modes_of_accelerations_alone() {
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("idle.csv");

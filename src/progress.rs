@@ -29,7 +29,7 @@ pub fn is_silent() -> bool {
 }
 
 /// Steps of the piece of work that is being done.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Reading {
     pub label: String,
     pub done: u64,

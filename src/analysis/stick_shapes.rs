@@ -88,7 +88,7 @@ pub fn stick_shapes(campaign: &Campaign, set: &SetModes) -> Result<Vec<StickShap
 }
 
 /// Base, joints, flange, tool centre point; base frame, m.
-pub(super) fn chain(kinematics: &Kinematics) -> Vec<Point3<f64>> {
+pub fn chain(kinematics: &Kinematics) -> Vec<Point3<f64>> {
     let frames = kinematics.frames.iter();
     let mut chain: Vec<Point3<f64>> = frames.map(|f| Point3::from(f.translation.vector)).collect();
     chain.push(kinematics.tcp());

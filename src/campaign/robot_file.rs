@@ -29,6 +29,11 @@ const LINK: [&str; 5] = [
 ];
 
 impl RobotSpec {
+    /// Names of the built-in robots.
+    pub fn built_in() -> Vec<&'static str> {
+        BUILT_IN.iter().map(|(name, _)| *name).collect()
+    }
+
     /// The robot that `[robot] model` names: a built-in one, or a robot file inside the campaign folder.
     ///
     /// # Errors

@@ -10,7 +10,6 @@ use super::{Outcome, next_step};
 use crate::analysis::setup::likely_mistakes;
 use crate::campaign::draft::{self, Answers, Draft, Missing, Scan};
 use crate::campaign::{Campaign, campaign_file};
-use crate::files::write_atomically;
 use crate::{Error, InputError, Result};
 
 #[derive(clap::Args)]
@@ -166,11 +165,7 @@ pub fn run(args: Args, as_json: bool) -> Result<Outcome> {
         return Err(nothing_found(&args, &scan));
     }
     let mut answers = args.answers();
-    // One list in the folder is meant; of several nobody knows which.
-    let list = args.cut_list.as_ref().or(match scan.cut_lists.as_slice() {
-        [one] if !scan.forces.is_empty() => Some(one),
-        _ => None,
-    });
+    let list = args.cut_list.as_ref().or(scan.cut_list());
     let mut passed_over = match list {
         Some(list) => draft::read_cut_list(list, &scan, &mut answers)?,
         None => Vec::new(),
@@ -184,7 +179,7 @@ pub fn run(args: Args, as_json: bool) -> Result<Outcome> {
     }
     let talking =
         !as_json && !args.no_questions && std::io::stdin().is_terminal() && std::io::stderr().is_terminal();
-    let name = args.name.clone().unwrap_or_else(|| folder_name(&args));
+    let name = args.name.clone().unwrap_or_else(|| draft::folder_name(dir));
     let mut draft = Draft::new(&name, &scan, &answers)?;
     if talking {
         // Which keys a cut has depends on the process.
@@ -211,11 +206,7 @@ pub fn run(args: Args, as_json: bool) -> Result<Outcome> {
         draft.ask(&mut ask)?;
     }
     let missing = draft.missing();
-    let text = draft.toml();
-    if missing.is_empty() {
-        Campaign::from_text(dir, &text).map_err(as_given)?;
-    }
-    write_atomically(&file, text.as_bytes())?;
+    let file = draft.write(dir, args.force)?;
     let setup = match missing.is_empty() {
         true => Campaign::load(dir).map_or_else(|_| Vec::new(), |c| likely_mistakes(&c)),
         false => Vec::new(),
@@ -242,12 +233,6 @@ pub fn run(args: Args, as_json: bool) -> Result<Outcome> {
     ))
 }
 
-fn folder_name(args: &Args) -> String {
-    let full = args.dir.canonicalize().unwrap_or_else(|_| args.dir.clone());
-    full.file_name()
-        .map_or_else(|| "campaign".into(), |n| n.to_string_lossy().into_owned())
-}
-
 fn nothing_found(args: &Args, scan: &Scan) -> Error {
     let mut problem = "holds no FRFs and no force records".to_string();
     for (file, why) in scan.not_used.iter().take(5) {
@@ -257,19 +242,6 @@ fn nothing_found(args: &Args, scan: &Scan) -> Error {
         .file(&args.dir)
         .remedy("copy the exported measurement files into it (UFF 58, CSV, DynoWare text export, TDMS)")
         .into()
-}
-
-/// What is wrong with a file that was not written.
-fn as_given(error: Error) -> Error {
-    match error {
-        Error::Input(e) => {
-            let mut told = InputError::new(format!("{} (nothing was written)", e.problem));
-            told.key = e.key;
-            told.remedy = e.remedy;
-            told.into()
-        }
-        other => other,
-    }
 }
 
 /// One question on the terminal; an empty answer leaves it open.

@@ -9,11 +9,13 @@ use crate::Result;
 use crate::campaign::Campaign;
 
 mod add;
+mod bench_worker;
 mod calibrate;
 mod cfc;
 mod compare;
 mod demo;
 mod diagnose;
+mod entrance;
 mod explain;
 mod history;
 mod hole;
@@ -78,7 +80,7 @@ Begin
   demo         The whole story on built-in campaigns             lobestone demo
   inspect      What measurement files are                        lobestone inspect cell7/frf
   init         Make a campaign of a folder of measurements       lobestone init cell7
-  serve        The campaign as a page in a browser               lobestone serve cell7
+  serve        Everything as a page in a browser                 lobestone serve --open
 
 Find what the model lacks
   calibrate    Tune the model to the measured FRFs               lobestone calibrate cell7

@@ -1,5 +1,5 @@
 //! One job at a time, whoever asks for it and however often; each is done to its end, whether or not the browser that
-//! asked for it still listens.
+//! asked for it still listens, or until somebody cancels it.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -8,7 +8,7 @@ use std::time::Instant;
 use serde_json::{Value, json};
 
 use super::Refusal;
-use crate::progress::{Gauge, shown_on};
+use crate::progress::Reading;
 use crate::{Error, Result};
 
 /// Gives the text that the page shows when it is done.
@@ -32,13 +32,50 @@ impl Job {
     }
 }
 
-/// Where a job says which part of it is being done.
+/// Where a job says which part of it is being done, and how it can be stopped.
 #[derive(Default)]
-pub struct Stage(Mutex<String>);
+pub struct Stage(Mutex<At>);
+
+#[derive(Default)]
+struct At {
+    text: String,
+    part: Option<Reading>,
+    stop: Option<Box<dyn FnOnce() + Send>>,
+    cancelled: bool,
+}
 
 impl Stage {
-    pub fn now(&self, text: &str) {
-        *locked(&self.0) = text.to_string();
+    pub fn now(&self, text: &str, part: Option<Reading>) {
+        let mut at = locked(&self.0);
+        at.text = text.to_string();
+        at.part = part;
+    }
+
+    /// `stop` is called once if the job is cancelled; at once if it was already.
+    pub fn on_cancel(&self, stop: impl FnOnce() + Send + 'static) {
+        let mut at = locked(&self.0);
+        match at.cancelled {
+            true => {
+                drop(at);
+                stop();
+            }
+            false => at.stop = Some(Box::new(stop)),
+        }
+    }
+
+    pub fn is_cancelled(&self) -> bool {
+        locked(&self.0).cancelled
+    }
+
+    fn cancel(&self) {
+        let stop = {
+            let mut at = locked(&self.0);
+            at.cancelled = true;
+            at.stop.take()
+        };
+        if let Some(stop) = stop {
+            stop();
+        }
     }
 }
 
@@ -60,7 +97,6 @@ struct Running {
     name: String,
     since: Instant,
     stage: Arc<Stage>,
-    gauge: Arc<Gauge>,
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -88,13 +124,13 @@ impl Desk {
         }
         let Job { name, work } = prepare()?;
         let number = state.count + 1;
-        let (stage, gauge) = (Arc::new(Stage::default()), Arc::new(Gauge::default()));
+        let stage = Arc::new(Stage::default());
         let desk = self.clone();
-        let (own_stage, own_gauge) = (stage.clone(), gauge.clone());
+        let own_stage = stage.clone();
         std::thread::Builder::new()
             .name("job".into())
             .spawn(move || {
-                let done = catch_unwind(AssertUnwindSafe(|| shown_on(&own_gauge, || work(&own_stage))));
+                let done = catch_unwind(AssertUnwindSafe(|| work(&own_stage)));
                 desk.done(done.unwrap_or_else(|_| {
                     Err(Error::computation(
                         "the program failed at this: a fault of its own, no fault of yours (what it said stands in the \
@@ -109,9 +145,33 @@ impl Desk {
             name,
             since: Instant::now(),
             stage,
-            gauge,
         });
         Ok(number)
+    }
+
+    /// Stops the job of this number.
+    ///
+    /// # Errors
+    /// It is not being done (any more).
+    pub fn cancel(&self, number: u64) -> std::result::Result<(), Refusal> {
+        let stage = match &locked(&self.0).running {
+            Some(running) if running.number == number => running.stage.clone(),
+            _ => return Err(Refusal::Late("that is done already".into())),
+        };
+        stage.cancel();
+        Ok(())
+    }
+
+    /// Does `change` while nothing is being done and nothing can be begun.
+    ///
+    /// # Errors
+    /// A job is being done.
+    pub fn while_idle<T>(&self, change: impl FnOnce() -> T) -> std::result::Result<T, Refusal> {
+        let state = locked(&self.0);
+        match &state.running {
+            Some(running) => Err(Refusal::Late(format!("{} is still running", running.name))),
+            None => Ok(change()),
+        }
     }
 
     fn done(&self, result: Result<String>) {
@@ -121,6 +181,7 @@ impl Desk {
                 "number": running.number,
                 "name": running.name,
                 "ok": result.is_ok(),
+                "cancelled": running.stage.is_cancelled(),
                 "text": result.unwrap_or_else(|e| e.to_string()),
                 "seconds": running.since.elapsed().as_secs_f64(),
             }));
@@ -131,12 +192,14 @@ impl Desk {
     pub fn status(&self) -> Value {
         let state = locked(&self.0);
         let job = state.running.as_ref().map(|running| {
-            let part = running.gauge.reading();
+            let at = locked(&running.stage.0);
+            let part = at.part.as_ref();
             json!({
                 "number": running.number,
                 "name": running.name,
                 "seconds": running.since.elapsed().as_secs_f64(),
-                "stage": *locked(&running.stage.0),
+                "stage": at.text,
+                "cancelled": at.cancelled,
                 "part": part.map(|p| json!({ "label": p.label, "done": p.done, "total": p.total })),
             })
         });
@@ -167,7 +230,7 @@ mod tests {
         let (end, ended) = mpsc::channel::<()>();
         let number = desk.start(|| {
             Ok(Job::new("the diagnosis", move |stage| {
-                stage.now("trying");
+                stage.now("trying", None);
                 let _ = ended.recv_timeout(Duration::from_secs(10));
                 Ok("found".into())
             }))
@@ -186,6 +249,31 @@ mod tests {
         let last = wait_until_idle(&desk);
         assert_eq!((&last["ok"], &last["text"]), (&json!(true), &json!("found")));
         assert_eq!(desk.start(|| Ok(Job::new("next", |_| Ok(String::new())))), Ok(2));
+    }
+
+    #[test]
+    fn a_job_is_stopped_once_and_only_while_it_is_done() {
+        let desk = Arc::new(Desk::default());
+        let (stop, stopped) = mpsc::channel::<()>();
+        let job = Job::new("the diagnosis", move |stage| {
+            stage.on_cancel(move || stop.send(()).unwrap());
+            stopped.recv_timeout(Duration::from_secs(10)).unwrap();
+            Err(Error::computation("cancelled"))
+        });
+        assert_eq!(desk.start(|| Ok(job)), Ok(1));
+        assert!(matches!(desk.cancel(2), Err(Refusal::Late(_))));
+        assert!(desk.while_idle(|| ()).is_err());
+        assert_eq!(
+            (
+                desk.cancel(1),
+                desk.cancel(1).is_ok() || desk.status()["job"].is_null()
+            ),
+            (Ok(()), true)
+        );
+        let last = wait_until_idle(&desk);
+        assert_eq!((&last["ok"], &last["cancelled"]), (&json!(false), &json!(true)));
+        assert!(matches!(desk.cancel(1), Err(Refusal::Late(_))));
+        assert_eq!(desk.while_idle(|| 7), Ok(7));
     }
 
     #[test]

@@ -1,4 +1,5 @@
-// The page of `lobestone serve`: shows what /state and /status say, sends what is clicked as orders.
+// The page of `lobestone serve`: shows what `state` and `status` say, sends what is clicked as orders. Before there is a campaign
+// it shows the beginning (begin.js).
 "use strict";
 
 const $ = (id) => document.getElementById(id);
@@ -8,7 +9,7 @@ const meta = (name) => document.querySelector(`meta[name="${name}"]`).content;
 function make(tag, attributes = {}, ...children) {
   const node = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
-    if (name === "onclick") node.addEventListener("click", value);
+    if (name.startsWith("on")) node.addEventListener(name.slice(2), value);
     else if (value !== null && value !== undefined && value !== false) node.setAttribute(name, value === true ? "" : value);
   }
   node.append(...children.filter((c) => c !== null && c !== undefined));
@@ -33,9 +34,19 @@ let shown = null;      // the state that the page shows
 let busy = false;      // a job is being done
 let lastSeen = null;   // number of the last job whose end was told; null before the first look
 let unreadable = false; // the alert says why the campaign cannot be read
+let running = null;    // number of the job that is being done
 let asked = null;      // stamp for which a report was asked for
 
 // ---- orders ----
+
+/** What the server answers, or `{refused: why}`; throws where nobody answers. */
+async function post(path, body) {
+  const answer = await fetch(path, { method: "POST", headers: { "X-Lobestone-Token": meta("token") }, body });
+  const text = await answer.text();
+  let told = {};
+  try { told = JSON.parse(text); } catch { /* a plain sentence */ }
+  return answer.ok ? told : { refused: told.refused ?? text };
+}
 
 /** `quiet`: not what the reader asked for, so a refusal need not be told. */
 async function send(order, quiet = false) {
@@ -43,16 +54,9 @@ async function send(order, quiet = false) {
   setBusy(true);
   if (!quiet) alertUser("");
   try {
-    const answer = await fetch("/order", {
-      method: "POST",
-      headers: { "Content-Type": "application/json", "X-Lobestone-Token": meta("token") },
-      body: JSON.stringify(order),
-    });
-    if (!answer.ok) {
-      const text = await answer.text();
-      let why = text;
-      try { why = JSON.parse(text).refused ?? text; } catch { /* a plain sentence */ }
-      if (!quiet) alertUser(why);
+    const { refused } = await post("order", JSON.stringify(order));
+    if (refused) {
+      if (!quiet) alertUser(refused);
       await showState();
     }
   } catch {
@@ -66,13 +70,16 @@ function alertUser(text) {
   $("alert").hidden = !text;
 }
 
+const GONE = "lobestone does not answer: it was ended, or the computer slept. Start `lobestone serve` again and open the address that it prints.";
+
 function gone() {
-  alertUser("lobestone does not answer: it was ended, or the computer slept. Start `lobestone serve` again and reload this page.");
+  if ($("begin").hidden) alertUser(GONE);
+  else Begin.tell(GONE);
 }
 
 function setBusy(now) {
   busy = now;
-  for (const button of document.querySelectorAll("button")) {
+  for (const button of document.querySelectorAll("#loop button:not(#cancel), #leave")) {
     const never = button.dataset.never === "true";
     button.setAttribute("aria-disabled", String(busy || never));
   }
@@ -85,7 +92,7 @@ let timer = null;
 async function look() {
   clearTimeout(timer);
   try {
-    const answer = await fetch("/status");
+    const answer = await fetch("status");
     if (!answer.ok) throw new Error(answer.statusText);
     await follow(await answer.json());
     timer = setTimeout(look, busy ? 400 : 2000);
@@ -102,10 +109,13 @@ async function follow(status) {
     return;
   }
   const { job, last } = status;
+  running = job?.number ?? null;
   // What failed before the page was opened is no news.
   if (lastSeen === null) lastSeen = job || !last ? 0 : last.number;
   setBusy(job !== null);
   showJob(job);
+  // The first look, also while something is being done.
+  if ($("begin").hidden && $("loop").hidden) await showState();
   if (job !== null) return;
   if (last && last.number !== lastSeen) {
     lastSeen = last.number;
@@ -115,7 +125,7 @@ async function follow(status) {
       $("said").hidden = false;
     }
     await showState();
-  } else if (!shown || shown.stamp !== status.stamp) {
+  } else if ($("begin").hidden && (!shown || shown.stamp !== status.stamp)) {
     await showState();
   }
   // Drawn of another state of the folder, or not at all.
@@ -131,6 +141,7 @@ function showJob(job) {
   const name = job.name.charAt(0).toUpperCase() + job.name.slice(1);
   setText($("job-name"), name);
   setText($("job-time"), `${Math.floor(job.seconds)} s`);
+  setText($("cancel"), job.cancelled ? "Cancelling …" : "Cancel");
   const bar = $("job-bar");
   if (job.part && job.part.total > 0) {
     bar.max = job.part.total;
@@ -150,12 +161,23 @@ function setText(node, text) {
 // ---- what is there ----
 
 async function showState() {
-  const answer = await fetch("/state");
+  const answer = await fetch("state");
   if (!answer.ok) {
     alertUser(await answer.text());
     return;
   }
   const state = await answer.json();
+  $("begin").hidden = !state.begin;
+  $("loop").hidden = !!state.begin;
+  $("leave").hidden = !state.can_leave;
+  if (state.begin) {
+    shown = null;
+    setText($("name"), "New campaign");
+    document.title = "New campaign – lobestone";
+    setText($("folder"), "");
+    Begin.show();
+    return;
+  }
   if (unreadable) alertUser("");
   unreadable = !!state.problem;
   if (state.problem) {
@@ -195,7 +217,7 @@ async function showState() {
   setBusy(busy);
   $("frame").hidden = !state.report;
   $("no-report").hidden = !!state.report;
-  if (state.report && state.report !== drawnBefore) $("frame").src = `/report?drawn=${state.report}`;
+  if (state.report && state.report !== drawnBefore) $("frame").src = `${meta("report")}?drawn=${state.report}`;
 }
 
 function button(label, key, order, extra = {}) {
@@ -361,6 +383,24 @@ window.addEventListener("message", (event) => {
   reportScroll = event.data.lobestoneScroll;
 });
 $("frame").addEventListener("load", () => $("frame").contentWindow.postMessage({ lobestoneScroll: reportScroll }, "*"));
+
+$("cancel").addEventListener("click", async () => {
+  if (running === null) return;
+  try {
+    await post("cancel", JSON.stringify({ number: running }));
+  } catch {
+    gone();
+  }
+  look();
+});
+
+/** Back to the beginning, for another campaign. */
+$("leave").addEventListener("click", async (event) => {
+  if (event.currentTarget.getAttribute("aria-disabled") === "true") return;
+  const { refused } = await post("begin", JSON.stringify({ do: "leave" }));
+  if (refused) alertUser(refused);
+  else location.reload();
+});
 
 $("refresh").addEventListener("click", (event) => {
   if (event.currentTarget.getAttribute("aria-disabled") !== "true") send({ do: "refresh" });

@@ -48,23 +48,35 @@ fn the_page_is_for_its_own_browser_only() {
     ] {
         assert!(page.head.contains(header), "{header}: {}", page.head);
     }
-    for file in ["/page.js", "/page.css", "/state", "/status"] {
+    for file in ["/page.js", "/begin.js", "/page.css", "/state", "/status"] {
         assert_eq!(served.get(file).status, 200, "{file}");
     }
     // As an attacker's page would have its visitor's browser ask.
     let token = format!("X-Lobestone-Token: {}\r\n", served.token);
     for request in [
-        "GET / HTTP/1.1\r\nHost: evil.example\r\nConnection: close\r\n\r\n",
-        "GET /state HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n",
-        "GET / HTTP/1.0\r\n\r\n",
-        "GET http://evil.example/ HTTP/1.1\r\nHost: HOST\r\nConnection: close\r\n\r\n",
-        "GET /state HTTP/1.1\r\nHost: HOST\r\nOrigin: http://evil.example\r\nConnection: close\r\n\r\n",
-        "GET / HTTP/1.1\r\nHost: HOST\r\nSec-Fetch-Site: cross-site\r\nConnection: close\r\n\r\n",
-        "GET /report HTTP/1.1\r\nHost: HOST\r\nSec-Fetch-Site: same-site\r\nConnection: close\r\n\r\n",
+        "GET /KEY/ HTTP/1.1\r\nHost: evil.example\r\nConnection: close\r\n\r\n",
+        "GET /KEY/state HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n",
+        "GET /KEY/ HTTP/1.0\r\n\r\n",
+        "GET http://evil.example/KEY/ HTTP/1.1\r\nHost: HOST\r\nConnection: close\r\n\r\n",
+        "GET /KEY/state HTTP/1.1\r\nHost: HOST\r\nOrigin: http://evil.example\r\nConnection: close\r\n\r\n",
+        "GET /KEY/ HTTP/1.1\r\nHost: HOST\r\nSec-Fetch-Site: cross-site\r\nConnection: close\r\n\r\n",
+        "GET /REPORT/report HTTP/1.1\r\nHost: HOST\r\nSec-Fetch-Site: same-site\r\nConnection: close\r\n\r\n",
+        // As somebody else asks who is logged in on this computer, and does not know the address.
+        "GET / HTTP/1.1\r\nHost: HOST\r\nConnection: close\r\n\r\n",
+        "GET /state HTTP/1.1\r\nHost: HOST\r\nConnection: close\r\n\r\n",
+        "GET /00000000000000000000000000000000/ HTTP/1.1\r\nHost: HOST\r\nConnection: close\r\n\r\n",
+        "GET /KEY/report HTTP/1.1\r\nHost: HOST\r\nConnection: close\r\n\r\n",
+        "GET /REPORT/ HTTP/1.1\r\nHost: HOST\r\nConnection: close\r\n\r\n",
+        "GET /REPORT/state HTTP/1.1\r\nHost: HOST\r\nConnection: close\r\n\r\n",
     ] {
+        let request = &request
+            .replace("KEY", &served.key)
+            .replace("REPORT", &served.report_key);
         let answer = served.raw(request);
         assert_eq!(answer.status, 403, "{request}: {}", answer.text());
-        assert!(!answer.text().contains(&served.token), "{request}");
+        for secret in [&served.token, &served.key, &served.report_key] {
+            assert!(!answer.text().contains(secret), "{request}");
+        }
     }
     let order = r#"{"do": "diagnose", "side": "structure"}"#;
     for headers in [
@@ -86,6 +98,7 @@ fn the_page_is_for_its_own_browser_only() {
         "/report/%2e%2e/%2e%2e/etc/passwd",
         "/report/%252e%252e%252fetc%252fpasswd",
         "/report/..%5c..%5cetc",
+        "/page.html",
         "/report//etc/passwd",
         "/report/%2fetc%2fpasswd",
         "/report/campaign.toml",
@@ -113,6 +126,61 @@ fn the_page_is_for_its_own_browser_only() {
         "something was done"
     );
     assert!(!folder.path().join("lobestone").exists() && !folder.path().join("report").exists());
+}
+
+/// Whoever says nothing, or much too slowly, is shown the door; and many of them do not keep the page from its owner.
+#[test]
+fn silence_is_not_waited_for() {
+    let folder = copy_of(CONTROL);
+    let served = Served::start(folder.path());
+    let crowd: Vec<_> = (0..100).map(|_| served.connect()).collect();
+    let mut slow = served.connect();
+    slow.write_all(b"GET / HTTP/1.1\r\nHost: ").unwrap();
+    let begun = Instant::now();
+    assert_eq!(served.get("/status").status, 200);
+    assert!(begun.elapsed() < Duration::from_secs(30), "{:?}", begun.elapsed());
+    let mut rest = Vec::new();
+    let _ = slow.read_to_end(&mut rest);
+    assert!(begun.elapsed() < Duration::from_secs(50), "{:?}", begun.elapsed());
+    drop(crowd);
+}
+
+/// A cancelled job really ends, leaves the campaign as it was, and the next one begins at once.
+#[test]
+fn a_job_can_be_cancelled() {
+    let folder = copy_of(FLEXIBLE_TOOL);
+    let dir = folder.path();
+    let served = Served::start(dir);
+    for order in [
+        json!({ "do": "diagnose", "side": "structure" }),
+        add("tool-flexibility", &served.head()),
+    ] {
+        let number = served.order(&order).json()["number"].clone();
+        std::thread::sleep(Duration::from_millis(300));
+        assert_eq!(served.cancel(&json!(99)).status, 409);
+        let begun = Instant::now();
+        let answer = served.cancel(&number);
+        let last = served.wait();
+        if answer.status == 409 {
+            // It was done already.
+            assert_eq!(last["ok"], true, "{last}");
+            continue;
+        }
+        assert!(begun.elapsed() < Duration::from_secs(20), "{:?}", begun.elapsed());
+        assert_eq!(
+            (&last["ok"], &last["cancelled"]),
+            (&json!(false), &json!(true)),
+            "{last}"
+        );
+        let said = last["text"].as_str().unwrap();
+        assert!(said.starts_with("cancelled"), "{said}");
+        if said.contains("nothing was recorded") {
+            let history = document(&["history", text(dir)]);
+            assert_eq!(history["revisions"].as_array().unwrap().len(), 0, "{history}");
+        }
+    }
+    served.done(&json!({ "do": "refresh" }));
+    assert!(served.side()["now"]["nrms"].as_f64().unwrap() > 0.0);
 }
 
 #[test]
@@ -257,7 +325,8 @@ fn what_goes_wrong_is_said_and_the_page_goes_on() {
     let body = add("payload", &served.head()).to_string();
     let mut stream = served.connect();
     let head = format!(
-        "POST /order HTTP/1.1\r\nHost: {}\r\nX-Lobestone-Token: {}\r\nContent-Length: {}\r\n\r\n{body}",
+        "POST {} HTTP/1.1\r\nHost: {}\r\nX-Lobestone-Token: {}\r\nContent-Length: {}\r\n\r\n{body}",
+        served.path("/order"),
         served.host,
         served.token,
         body.len()
@@ -373,6 +442,202 @@ fn what_cannot_be_served_is_one_clear_error() {
     }
 }
 
+/// No terminal after the start: the files come over HTTP, the campaign file is completed and written, and the loop goes on.
+#[test]
+fn from_nothing_to_a_diagnosis() {
+    let measured = copy_of(FLEXIBLE_TOOL);
+    let campaign = lobestone::campaign::Campaign::load(measured.path()).unwrap();
+    let here = tempfile::tempdir().unwrap();
+    let served = Served::from_nothing();
+    assert_eq!(served.get("/state").json()["begin"], true);
+    let refused = served.order(&json!({ "do": "refresh" }));
+    assert_eq!(refused.status, 422, "{}", refused.text());
+
+    let seen = served
+        .begin(&json!({ "do": "look", "folder": measured.path() }))
+        .json();
+    assert_eq!(seen["campaign"], true, "{seen}");
+    assert!(
+        served
+            .begin(&json!({ "do": "look", "folder": "/no/such/folder" }))
+            .status
+            == 422
+    );
+    let made = served
+        .begin(&json!({ "do": "folder", "parent": here.path(), "name": "cell 9" }))
+        .json();
+    let dir = std::path::PathBuf::from(made["folder"].as_str().unwrap());
+    for frf in &campaign.frfs {
+        let path = frf.file.strip_prefix(measured.path()).unwrap();
+        let content = std::fs::read(&frf.file).unwrap();
+        let sent = served.upload(&dir, &format!("raw/{}", path.to_str().unwrap()), &content);
+        assert_eq!(sent.status, 200, "{}", sent.text());
+    }
+
+    let mut wish = json!({ "dir": dir });
+    let draft = served.begin(&json!({ "do": "draft", "wish": wish })).json();
+    assert_eq!(
+        draft["frfs"].as_array().unwrap().len(),
+        campaign.frfs.len(),
+        "{draft}"
+    );
+    assert_eq!(draft["complete"], false);
+    let answer = served.begin(&json!({ "do": "write", "wish": wish }));
+    assert_eq!(answer.status, 422, "{}", answer.text());
+    assert!(!dir.join("campaign.toml").exists());
+
+    let mut answers = vec![json!(["robot", "model", "irb6640"])];
+    for posture in &campaign.postures {
+        let angles: Vec<String> = posture.joints_deg.iter().map(f64::to_string).collect();
+        answers.push(json!([
+            format!("posture {}", posture.id),
+            "joints_deg",
+            angles.join(" ")
+        ]));
+    }
+    // What is not there (any more) is passed over.
+    answers.push(json!(["posture nowhere", "joints_deg", "1 2 3 4 5 6"]));
+    wish["answers"] = json!(answers);
+    wish["name"] = json!("from nothing");
+    let draft = served.begin(&json!({ "do": "draft", "wish": wish })).json();
+    assert_eq!(
+        (&draft["complete"], &draft["problem"]),
+        (&json!(true), &Value::Null),
+        "{}",
+        draft["missing"]
+    );
+    let pictures = draft["pictures"].as_object().unwrap();
+    assert_eq!(pictures.len(), campaign.postures.len());
+    assert!(
+        pictures
+            .values()
+            .all(|svg| svg.as_str().unwrap().starts_with("<svg "))
+    );
+    assert!(
+        draft["guessed"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .all(|g| !g["why"].as_str().unwrap().is_empty())
+    );
+
+    let written = served.begin(&json!({ "do": "write", "wish": wish }));
+    assert_eq!(written.status, 200, "{}", written.text());
+    let toml = std::fs::read_to_string(dir.join("campaign.toml")).unwrap();
+    // A second time nothing is replaced.
+    let again = served.begin(&json!({ "do": "write", "wish": wish }));
+    assert_eq!(again.status, 422, "{}", again.text());
+    assert!(again.text().contains("is there already"), "{}", again.text());
+    assert_eq!(std::fs::read_to_string(dir.join("campaign.toml")).unwrap(), toml);
+
+    served.done(&json!({ "do": "refresh" }));
+    assert_eq!(served.get("/report").status, 200);
+    served.done(&json!({ "do": "diagnose", "side": "structure" }));
+    let side = served.side();
+    assert_eq!(
+        side["diagnosis"]["effect"], "tool-flexibility",
+        "{}",
+        side["diagnosis"]["answer"]
+    );
+    served.done(&add("tool-flexibility", &served.head()));
+    served.done(&undo(&served.head()));
+
+    // Back to the beginning, and to another campaign.
+    assert_eq!(served.begin(&json!({ "do": "leave" })).status, 200);
+    assert_eq!(served.get("/state").json()["begin"], true);
+    assert_eq!(
+        served
+            .begin(&json!({ "do": "open", "dir": measured.path() }))
+            .status,
+        200
+    );
+    assert_eq!(served.get("/state").json()["can_leave"], true);
+}
+
+#[test]
+fn files_from_the_page_replace_nothing_and_stay_where_they_belong() {
+    let here = tempfile::tempdir().unwrap();
+    let served = Served::from_nothing();
+    let order = json!({ "do": "folder", "parent": here.path(), "name": "new" });
+    for headers in ["", "X-Lobestone-Token: 0\r\n", "Origin: http://evil.example\r\n"] {
+        assert_eq!(
+            served
+                .post_to("/begin", headers, order.to_string().as_bytes())
+                .status,
+            403,
+            "{headers}"
+        );
+        assert_eq!(
+            served.post_to("/upload", headers, b"{}\nx").status,
+            403,
+            "{headers}"
+        );
+        assert_eq!(
+            served.post_to("/cancel", headers, b"{\"number\": 1}").status,
+            403,
+            "{headers}"
+        );
+    }
+    assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 0);
+    let made = served.begin(&order).json();
+    let dir = std::path::PathBuf::from(made["folder"].as_str().unwrap());
+    assert_eq!(served.begin(&order).status, 422);
+    for name in ["..", "a/b", "", "../up", "/tmp/x", ".hidden"] {
+        let answer = served.begin(&json!({ "do": "folder", "parent": here.path(), "name": name }));
+        assert_eq!(answer.status, 422, "{name}: {}", answer.text());
+    }
+    assert_eq!(served.upload(&dir, "frf/p1.csv", b"first").status, 200);
+    let second = served.upload(&dir, "frf/p1.csv", b"second");
+    assert_eq!(second.status, 422);
+    assert!(second.text().contains("is there already"), "{}", second.text());
+    assert_eq!(std::fs::read(dir.join("frf/p1.csv")).unwrap(), b"first");
+    for name in [
+        "../x",
+        "/etc/x",
+        "a/../../x",
+        "a\\..\\x",
+        ".ssh/x",
+        "",
+        "frf/",
+        "frf/p1.csv/x",
+    ] {
+        assert_eq!(served.upload(&dir, name, b"x").status, 422, "{name}");
+    }
+    // Neither a folder that nobody opened on the page, nor one behind a link.
+    assert_eq!(served.upload(here.path(), "x", b"x").status, 422);
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(here.path(), dir.join("out")).unwrap();
+        assert_eq!(served.upload(&dir, "out/x", b"x").status, 422);
+    }
+    assert!(!here.path().join("x").exists() && !here.path().parent().unwrap().join("x").exists());
+    // Too much is refused before it is read.
+    let large = format!(
+        "POST {} HTTP/1.1\r\nHost: HOST\r\nConnection: close\r\nContent-Length: 300000000\r\nX-Lobestone-Token: {}\r\n\r\n",
+        served.path("/upload"),
+        served.token
+    );
+    assert_eq!(served.raw(&large).status, 413);
+    for body in ["", "{}", r#"{"do": "look", "file": "x"}"#, r#"{"do": "delete"}"#] {
+        assert_eq!(
+            served
+                .post_to(
+                    "/begin",
+                    &format!("X-Lobestone-Token: {}\r\n", served.token),
+                    body.as_bytes()
+                )
+                .status,
+            400,
+            "{body}"
+        );
+    }
+    // A page that was started for one campaign has no beginning.
+    let folder = copy_of(CONTROL);
+    let one = Served::start(folder.path());
+    assert_eq!(one.begin(&json!({ "do": "leave" })).status, 422);
+    assert_eq!(one.upload(folder.path(), "x", b"x").status, 422);
+}
+
 /// The page in a real browser (tests/browser/serve.py); with LOBESTONE_SCREENSHOTS set to a folder, pictures are put there.
 #[test]
 fn a_browser_diagnoses_adds_and_takes_back() {
@@ -380,7 +645,9 @@ fn a_browser_diagnoses_adds_and_takes_back() {
     let served = Served::start(folder.path());
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/browser/serve.py");
     let mut command = Command::new("python3");
-    command.arg(script).arg(format!("http://{}/", served.host));
+    command
+        .arg(script)
+        .arg(format!("http://{}{}", served.host, served.path("/")));
     command.args(std::env::var_os("LOBESTONE_SCREENSHOTS"));
     let run = match command.output() {
         Ok(run) => run,

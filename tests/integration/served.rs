@@ -17,6 +17,10 @@ pub const PATIENCE: Duration = Duration::from_secs(300);
 pub struct Served {
     pub child: Child,
     pub host: String,
+    /// First part of the page's path.
+    pub key: String,
+    /// The same of the report's.
+    pub report_key: String,
     pub token: String,
 }
 
@@ -46,8 +50,19 @@ impl Answer {
 
 impl Served {
     pub fn start(dir: &Path) -> Served {
+        Self::started(&[dir.to_str().unwrap()])
+    }
+
+    /// Without a folder.
+    pub fn from_nothing() -> Served {
+        Self::started(&[])
+    }
+
+    fn started(arguments: &[&str]) -> Served {
         let mut child = program()
-            .args(["serve", dir.to_str().unwrap(), "--port", "0", "--json"])
+            .arg("serve")
+            .args(arguments)
+            .args(["--port", "0", "--json"])
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
@@ -58,16 +73,36 @@ impl Served {
             .unwrap();
         let said: Value = serde_json::from_str(&line).unwrap_or_else(|e| panic!("{e}: {line}"));
         let host = format!("127.0.0.1:{}", said["port"]);
-        assert_eq!(said["url"], format!("http://{host}/"));
+        let url = said["url"].as_str().unwrap();
+        let key = url
+            .strip_prefix(&format!("http://{host}/"))
+            .and_then(|rest| rest.strip_suffix('/'));
         let mut served = Served {
             child,
+            key: key.expect("an address with a key").to_string(),
             host,
+            report_key: String::new(),
             token: String::new(),
         };
         let page = served.get("/").text();
-        let (_, rest) = page.split_once("name=\"token\" content=\"").unwrap();
-        served.token = rest[..32].to_string();
+        let meta = |name: &str| {
+            let (_, rest) = page.split_once(&format!("name=\"{name}\" content=\"")).unwrap();
+            rest.split('"').next().unwrap().to_string()
+        };
+        served.token = meta("token");
+        served.report_key = meta("report")
+            .trim_matches('/')
+            .split('/')
+            .next()
+            .unwrap()
+            .to_string();
         served
+    }
+
+    /// The whole path of what the page or the report asks for.
+    pub fn path(&self, path: &str) -> String {
+        let report = path == "/report" || path.starts_with("/report/");
+        format!("/{}{path}", if report { &self.report_key } else { &self.key })
     }
 
     pub fn connect(&self) -> TcpStream {
@@ -78,10 +113,13 @@ impl Served {
 
     /// Sends `request` as it is (but for `HOST`) and reads the answer to its end.
     pub fn raw(&self, request: &str) -> Answer {
+        self.raw_bytes(request.replace("HOST", &self.host).as_bytes())
+    }
+
+    fn raw_bytes(&self, request: &[u8]) -> Answer {
         let mut stream = self.connect();
-        stream
-            .write_all(request.replace("HOST", &self.host).as_bytes())
-            .unwrap();
+        // A server that refuses a long body closes before it has read it all.
+        let _ = stream.write_all(request);
         let mut answer = Vec::new();
         // A server that refuses a long body closes before it has read it all.
         let _ = stream.read_to_end(&mut answer);
@@ -96,23 +134,52 @@ impl Served {
 
     pub fn get(&self, path: &str) -> Answer {
         self.raw(&format!(
-            "GET {path} HTTP/1.1\r\nHost: HOST\r\nConnection: close\r\n\r\n"
+            "GET {} HTTP/1.1\r\nHost: HOST\r\nConnection: close\r\n\r\n",
+            self.path(path)
         ))
     }
 
     pub fn post_with(&self, headers: &str, body: &str) -> Answer {
-        self.raw(&format!(
-            "POST /order HTTP/1.1\r\nHost: HOST\r\nConnection: close\r\nContent-Length: {}\r\n{headers}\r\n{body}",
+        self.post_to("/order", headers, body.as_bytes())
+    }
+
+    pub fn post_to(&self, path: &str, headers: &str, body: &[u8]) -> Answer {
+        let head = format!(
+            "POST {} HTTP/1.1\r\nHost: HOST\r\nConnection: close\r\nContent-Length: {}\r\n{headers}\r\n",
+            self.path(path),
             body.len()
-        ))
+        );
+        self.raw_bytes(&[head.replace("HOST", &self.host).as_bytes(), body].concat())
+    }
+
+    fn own_headers(&self) -> String {
+        format!(
+            "Origin: http://{}\r\nX-Lobestone-Token: {}\r\n",
+            self.host, self.token
+        )
+    }
+
+    /// As the page asks.
+    pub fn begin(&self, request: &Value) -> Answer {
+        self.post_to("/begin", &self.own_headers(), request.to_string().as_bytes())
+    }
+
+    pub fn upload(&self, folder: &Path, name: &str, content: &[u8]) -> Answer {
+        let line = serde_json::json!({ "folder": folder, "name": name }).to_string() + "\n";
+        self.post_to(
+            "/upload",
+            &self.own_headers(),
+            &[line.as_bytes(), content].concat(),
+        )
+    }
+
+    pub fn cancel(&self, number: &Value) -> Answer {
+        let body = serde_json::json!({ "number": number }).to_string();
+        self.post_to("/cancel", &self.own_headers(), body.as_bytes())
     }
 
     pub fn order(&self, order: &Value) -> Answer {
-        let headers = format!(
-            "Origin: http://{}\r\nX-Lobestone-Token: {}\r\n",
-            self.host, self.token
-        );
-        self.post_with(&headers, &order.to_string())
+        self.post_with(&self.own_headers(), &order.to_string())
     }
 
     pub fn head(&self) -> String {

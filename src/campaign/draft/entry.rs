@@ -25,6 +25,8 @@ pub struct Entry {
     /// As typed, and as it stands after `key =` in a comment.
     pub example: &'static str,
     pub required: bool,
+    /// Stands in the file only where it is given.
+    pub unmentioned: bool,
     /// Keys and values as TOML; empty: not known.
     value: Vec<(&'static str, String)>,
     /// Why a value was taken that nobody gave.
@@ -39,6 +41,7 @@ impl Entry {
             what,
             example,
             required: true,
+            unmentioned: false,
             value: Vec::new(),
             guessed: None,
         }
@@ -47,6 +50,12 @@ impl Entry {
     pub fn optional(mut self) -> Self {
         self.required = false;
         self
+    }
+
+    /// Optional, and without a line that says so.
+    pub fn unmentioned(mut self) -> Self {
+        self.unmentioned = true;
+        self.optional()
     }
 
     pub fn is_given(&self) -> bool {
@@ -61,6 +70,12 @@ impl Entry {
     pub fn value_text(&self) -> Option<String> {
         let values: Vec<&str> = self.value.iter().map(|(_, v)| v.as_str()).collect();
         (!values.is_empty()).then(|| values.join(" to "))
+    }
+
+    /// The value as a person would type it.
+    pub fn typed(&self) -> Option<String> {
+        let values: Vec<String> = self.value.iter().map(|(_, v)| typed(v)).collect();
+        (!values.is_empty()).then(|| values.join(", "))
     }
 
     /// Takes what a person typed.
@@ -83,6 +98,9 @@ impl Entry {
 
     /// As it stands in the file.
     pub fn lines(&self) -> String {
+        if self.value.is_empty() && self.unmentioned {
+            return String::new();
+        }
         if self.value.is_empty() {
             // No value stands there that somebody could leave by mistake.
             let hint = if self.required { "fill in: " } else { "" };
@@ -151,6 +169,26 @@ fn parse(kind: Kind, key: &'static str, typed: &str) -> Result<Vec<(&'static str
     Ok(vec![(key, value)])
 }
 
+/// TOML as a person would type it; the reverse of [`parse`].
+fn typed(toml: &str) -> String {
+    fn plain(value: &toml::Value) -> String {
+        match value {
+            toml::Value::String(text) => text.clone(),
+            toml::Value::Float(number) => number.to_string(),
+            toml::Value::Array(rows) if rows.iter().any(toml::Value::is_array) => {
+                rows.iter().map(plain).collect::<Vec<_>>().join("; ")
+            }
+            toml::Value::Array(numbers) => numbers.iter().map(plain).collect::<Vec<_>>().join(", "),
+            other => other.to_string(),
+        }
+    }
+    let table: Option<toml::Table> = format!("v = {toml}").parse().ok();
+    table
+        .as_ref()
+        .and_then(|t| t.get("v"))
+        .map_or_else(|| toml.to_string(), plain)
+}
+
 /// A comma is taken for a decimal point.
 fn number(typed: &str) -> Result<f64, String> {
     typed
@@ -206,6 +244,29 @@ mod tests {
             line(Kind::Matrix, "0,-1,0;-1,0,0;0,0,1"),
             "k = [[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]\n"
         );
+    }
+
+    #[test]
+    fn what_was_typed_can_be_shown_and_typed_again() {
+        for (kind, text, shown) in [
+            (Kind::Number, "0,05", "0.05"),
+            (Kind::Number, "1200.0", "1200"),
+            (Kind::Whole, "6", "6"),
+            (Kind::Numbers, "1, -2.5 ;3", "1, -2.5, 3"),
+            (Kind::Text, "a \"b\" 'c'", "a \"b\" 'c'"),
+            (Kind::Immersion, "slot", "slot"),
+            (Kind::Immersion, "0 90", "0, 90"),
+            (Kind::Matrix, "0,-1,0;-1,0,0;0,0,1", "0, -1, 0; -1, 0, 0; 0, 0, 1"),
+        ] {
+            let mut entry = Entry::new("k", kind, "what", "1");
+            entry.give(text).unwrap();
+            assert_eq!(entry.typed().as_deref(), Some(shown));
+            let lines = entry.lines();
+            entry.give(shown).unwrap();
+            assert_eq!(entry.lines(), lines);
+        }
+        assert_eq!(Entry::new("k", Kind::Text, "what", "1").typed(), None);
+        assert_eq!(Entry::new("k", Kind::Text, "what", "1").unmentioned().lines(), "");
     }
 
     #[test]

@@ -4,12 +4,16 @@
 //! already, [`Draft::ask`] gets further ones, [`Draft::toml`] writes it all down.
 
 use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use super::suggest::shown;
-use crate::{InputError, Result};
+use super::{Campaign, campaign_file};
+use crate::files::{write_atomically, write_new};
+use crate::{Error, InputError, Result};
 
 mod cut_list;
 mod entry;
+mod form;
 mod list_columns;
 mod names;
 mod scan;
@@ -17,6 +21,7 @@ mod tables;
 
 pub use cut_list::read_cut_list;
 pub use entry::{Entry, Kind};
+pub use form::{Field, Form};
 pub use scan::{FoundForce, FoundFrf, Scan, measurement_files, scan};
 
 /// What a person said, by table and key: `("cut", "spindle_rpm")` holds for every cut, `("cut 01", "spindle_rpm")` for
@@ -98,7 +103,8 @@ impl Draft {
     /// # Errors
     /// An answer that is not of its key's form, or about something that is not there.
     pub fn new(name: &str, scan: &Scan, answers: &Answers) -> Result<Draft> {
-        let tables = tables::of(scan, answers)?;
+        let draft = Draft::as_far_as_it_applies(name, scan, answers)?;
+        let tables = &draft.tables;
         for kind in ["posture", "point", "cut"] {
             let there: Vec<&str> = tables
                 .iter()
@@ -118,9 +124,17 @@ impl Draft {
                 );
             }
         }
+        Ok(draft)
+    }
+
+    /// As [`new`](Self::new); answers about what is not there are passed over.
+    ///
+    /// # Errors
+    /// An answer that is not of its key's form.
+    pub fn as_far_as_it_applies(name: &str, scan: &Scan, answers: &Answers) -> Result<Draft> {
         Ok(Draft {
             name: name.to_string(),
-            tables,
+            tables: tables::of(scan, answers)?,
         })
     }
 
@@ -244,6 +258,56 @@ impl Draft {
         }
         text
     }
+
+    /// Whether the file to be is a valid campaign file; nothing is written.
+    ///
+    /// # Errors
+    /// What is wrong with it. (Where something is missing nobody can tell yet.)
+    pub fn check(&self, dir: &Path) -> Result<()> {
+        match self.missing().is_empty() {
+            true => Campaign::from_text(dir, &self.toml())
+                .map(|_| ())
+                .map_err(as_given),
+            false => Ok(()),
+        }
+    }
+
+    /// Writes the file and gives its path.
+    ///
+    /// # Errors
+    /// Those of [`check`](Self::check); there is one already, and it is not to be replaced; what the file system refuses.
+    pub fn write(&self, dir: &Path, replace: bool) -> Result<PathBuf> {
+        self.check(dir)?;
+        let (file, text) = (campaign_file(dir), self.toml());
+        if replace {
+            write_atomically(&file, text.as_bytes())?;
+        } else if !write_new(&file, text.as_bytes())? {
+            return Err(InputError::new("is there already; nothing was changed")
+                .file(&file)
+                .into());
+        }
+        Ok(file)
+    }
+}
+
+/// What is wrong with a file that was not written.
+fn as_given(error: Error) -> Error {
+    match error {
+        Error::Input(e) => {
+            let mut told = InputError::new(format!("{} (nothing was written)", e.problem));
+            told.key = e.key;
+            told.remedy = e.remedy;
+            told.into()
+        }
+        other => other,
+    }
+}
+
+/// The name of a folder: what its campaign is called where nobody says otherwise.
+pub fn folder_name(dir: &Path) -> String {
+    let full = dir.canonicalize().unwrap_or_else(|_| dir.to_path_buf());
+    full.file_name()
+        .map_or_else(|| "campaign".into(), |n| n.to_string_lossy().into_owned())
 }
 
 #[cfg(test)]

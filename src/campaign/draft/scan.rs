@@ -14,19 +14,18 @@ use crate::ingest::{ChannelRole, Quantity, survey};
 use crate::{Error, InputError, Result};
 
 /// A folder's measurement files, in the order of their paths (from the folder, with forward slashes).
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Clone)]
 pub struct Scan {
     pub frfs: Vec<FoundFrf>,
     pub forces: Vec<FoundForce>,
-    /// A robot file, where there is exactly one.
-    pub robot: Option<String>,
+    pub robots: Vec<String>,
     /// Tables that look like lists of cuts.
     pub cut_lists: Vec<PathBuf>,
     /// Path, and why it goes into no campaign.
     pub not_used: Vec<(String, String)>,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct FoundFrf {
     pub path: String,
     pub posture: String,
@@ -38,7 +37,7 @@ pub struct FoundFrf {
     pub facts: Facts,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct FoundForce {
     pub path: String,
     pub from_name: Facts,
@@ -92,9 +91,7 @@ pub fn scan(dir: &Path) -> Result<Scan> {
             measurements.push((name, file));
         }
     }
-    if let [robot] = &robots[..] {
-        scan.robot = Some(robot.clone());
-    }
+    scan.robots = robots;
     leave_out_copies(&mut measurements, &mut scan.not_used);
     // In parallel, but collected in order: the result does not depend on the threads.
     let seen: Vec<Seen> = measurements
@@ -120,6 +117,32 @@ pub fn scan(dir: &Path) -> Result<Scan> {
         (frf.posture, frf.posture_guess) = posture_of(&frf.path, in_folders);
     }
     Ok(scan)
+}
+
+impl Scan {
+    /// The robot file, where there is exactly one.
+    pub fn robot(&self) -> Option<&str> {
+        match self.robots.as_slice() {
+            [robot] => Some(robot),
+            _ => None,
+        }
+    }
+
+    /// One list in the folder is meant; of several nobody knows which.
+    pub fn cut_list(&self) -> Option<&PathBuf> {
+        match self.cut_lists.as_slice() {
+            [one] if !self.forces.is_empty() => Some(one),
+            _ => None,
+        }
+    }
+
+    /// Without some of the measurement files.
+    pub fn without(&self, left_out: &[String]) -> Scan {
+        let mut scan = self.clone();
+        scan.frfs.retain(|f| !left_out.contains(&f.path));
+        scan.forces.retain(|f| !left_out.contains(&f.path));
+        scan
+    }
 }
 
 /// A file that is named a copy, and holds what another one holds, counts once.

@@ -6,7 +6,7 @@ use super::entry::{Entry, Kind};
 use super::list_columns::{DIRECTION, FEED_PER_TURN, FEED_RATE, RADIAL_DEPTH};
 use super::names::FROM_NAME;
 use super::scan::stem;
-use super::{Answers, FoundForce, Scan, Table};
+use super::{Answers, FoundForce, FoundFrf, Scan, Table};
 use crate::ingest::Quantity;
 use crate::{InputError, Result};
 
@@ -73,14 +73,24 @@ impl<'a> Making<'a> {
         Ok(())
     }
 
-    /// A value that is known for certain.
+    /// A value that is known for certain, and nobody's to change.
     fn fact(&mut self, key: &'static str, kind: Kind, value: &str) {
-        let mut entry = Entry::new(key, kind, "", "");
+        self.known(Entry::new(key, kind, "", ""), value);
+    }
+
+    /// A value that is known for certain.
+    fn known(&mut self, mut entry: Entry, value: &str) {
         // What a scan found is always of its form.
         if entry.give(value).is_ok() {
             self.table.entries.push(entry);
         }
     }
+}
+
+/// The posture that an FRF file belongs to: as somebody said, else as its name or folder does.
+fn posture_of<'a>(frf: &'a FoundFrf, answers: &'a Answers) -> &'a str {
+    let said = answers.get("frf", &frf.path, "posture").map(str::trim);
+    said.filter(|id| !id.is_empty()).unwrap_or(&frf.posture)
 }
 
 fn robot(scan: &Scan, answers: &Answers) -> Result<Table> {
@@ -92,7 +102,7 @@ fn robot(scan: &Scan, answers: &Answers) -> Result<Table> {
             "robot model: irb6640, or the path of a robot file in the folder",
             "irb6640",
         ),
-        &[(scan.robot.as_deref(), "the only robot file in the folder")],
+        &[(scan.robot(), "the only robot file in the folder")],
     )?;
     Ok(making.table)
 }
@@ -143,8 +153,9 @@ fn points(scan: &Scan, answers: &Answers) -> Result<Vec<Table>> {
 fn postures(scan: &Scan, answers: &Answers) -> Result<Vec<Table>> {
     let mut ids: Vec<&str> = Vec::new();
     for frf in &scan.frfs {
-        if !ids.contains(&frf.posture.as_str()) {
-            ids.push(&frf.posture);
+        let id = posture_of(frf, answers);
+        if !ids.contains(&id) {
+            ids.push(id);
         }
     }
     let mut tables = Vec::new();
@@ -170,12 +181,10 @@ fn frfs(scan: &Scan, answers: &Answers) -> Result<Vec<Table>> {
     for frf in &scan.frfs {
         let mut making = Making::new(answers, "frf", &frf.path, true);
         making.fact("file", Kind::Text, &frf.path);
+        let posture = Entry::new("posture", Kind::Text, "posture it was measured in", "p1");
         match frf.posture_guess {
-            Some(why) => {
-                let posture = Entry::new("posture", Kind::Text, "posture it was measured in", "p1");
-                making.add(posture, &[(Some(&frf.posture), why)])?;
-            }
-            None => making.fact("posture", Kind::Text, &frf.posture),
+            Some(why) => making.add(posture, &[(Some(&frf.posture), why)])?,
+            None => making.known(posture, posture_of(frf, answers)),
         }
         let quantity = Entry::new(
             "quantity",
@@ -194,10 +203,8 @@ fn frfs(scan: &Scan, answers: &Answers) -> Result<Vec<Table>> {
             _ => making.add(quantity, &[])?,
         }
         let level = frf.facts.get("force_level_n").map(String::as_str);
-        let entry = Entry::new("force_level_n", Kind::Number, "hammer level, N", "200.0").optional();
-        if level.is_some() || answers.get("frf", &frf.path, "force_level_n").is_some() {
-            making.add(entry, &[(level, FROM_NAME)])?;
-        }
+        let entry = Entry::new("force_level_n", Kind::Number, "hammer level, N", "200.0").unmentioned();
+        making.add(entry, &[(level, FROM_NAME)])?;
         tables.push(making.table);
     }
     Ok(tables)
@@ -384,21 +391,17 @@ fn cuts(scan: &Scan, answers: &Answers) -> Result<Vec<(Option<String>, Table)>> 
                 Kind::Numbers,
                 "steady cut, from and to, s",
                 "[1.2, 2.4]",
-            )
-            .optional(),
-            Entry::new("order", Kind::Whole, "when this cut was made: 1, 2, …", "1").optional(),
-            Entry::new("material", Kind::Text, "workpiece", "C45").optional(),
+            ),
+            Entry::new("order", Kind::Whole, "when this cut was made: 1, 2, …", "1"),
+            Entry::new("material", Kind::Text, "workpiece", "C45"),
             Entry::new(
                 "outcome",
                 Kind::Choice(&["stable", "chatter"]),
                 "how it went",
                 "stable",
-            )
-            .optional(),
+            ),
         ] {
-            if answers.get("cut", &id, entry.key).is_some() {
-                making.add(entry, &[])?;
-            }
+            making.add(entry.unmentioned(), &[])?;
         }
         out.push((process, making.table));
     }

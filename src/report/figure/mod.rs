@@ -51,7 +51,7 @@ pub use nyquist::NyquistFigure;
 pub use parameters::{Estimate, ParameterFigure, ParameterRow};
 pub use regression::{RegressionFigure, RegressionPoint, RegressionSeries};
 pub use resonances::{ResonanceFigure, ResonanceRow};
-pub use robot::RobotFigure;
+pub use robot::{RobotFigure, posture_svg};
 pub use side_by_side::{BarSeries, SideBySide};
 pub use stabilisation::{StabilisationFigure, StabilisationPole};
 pub use waveform::{WaveformFigure, WaveformPanel};

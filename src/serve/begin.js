@@ -252,8 +252,11 @@ const Begin = (() => {
     for (const row of rows) for (const field of row.fields) if (!keys.some((f) => f.key === field.key)) keys.push(field);
     const head = make("tr", {}, ...before.map((b) => make("th", { scope: "col" }, b.title)),
       ...keys.map((f) => make("th", { scope: "col", title: f.what || null }, f.what ? short(f.what) : f.key)));
-    const all = rows.length > 2 && rows[0].kind === "cut"
-      ? make("tr", { class: "all" }, ...before.map(() => make("td")), ...keys.map((f) => make("td", {}, f.what ? allNode(rows, f) : f.key === "id" ? "all cuts" : null)))
+    const names = { cut: "all cuts", frf: "all files" };
+    const alike = (f) => f.what && f.key !== "posture";
+    const all = rows.length > 2 && names[rows[0].kind]
+      ? make("tr", { class: "all" }, ...before.map(() => make("td")),
+        ...keys.map((f, i) => make("td", {}, i === 0 ? names[rows[0].kind] : alike(f) ? allNode(rows, f, names[rows[0].kind]) : null)))
       : null;
     const body = rows.map((row) => make("tr", {}, ...before.map((b) => make("td", {}, b.cell(row))),
       ...keys.map((f) => {
@@ -263,13 +266,13 @@ const Begin = (() => {
     return wide(caption, make("table", { class: "form" }, make("caption", {}, caption), make("thead", {}, head), make("tbody", {}, all, ...body)));
   }
 
-  /** One value for all cuts. */
-  function allNode(rows, field) {
+  /** One value for all rows. */
+  function allNode(rows, field, of) {
     const onchange = (event) => {
       for (const row of rows) if (row.fields.some((f) => f.key === field.key)) set(tableName(row), field.key, event.target.value);
       redraft();
     };
-    const attributes = { "data-key": `all.${field.key}`, "aria-label": `${short(field.what)}, all cuts`, onchange };
+    const attributes = { "data-key": `all.${field.key}`, "aria-label": `${short(field.what)}, ${of}`, onchange };
     return field.choices.length
       ? make("select", attributes, ...["", ...field.choices].map((c) => make("option", { value: c }, c || "…")))
       : make("input", { ...attributes, type: "text", size: 7, autocomplete: "off" });
@@ -328,7 +331,7 @@ const Begin = (() => {
         const drawn = picture
           ? document.importNode(new DOMParser().parseFromString(picture, "image/svg+xml").documentElement, true)
           : make("p", { class: "posture none muted" }, "The picture comes with robot and angles.");
-        return make("div", { class: "card" }, drawn, make("h3", {}, posture.name, make("small", {}, ` ${of(posture.name)} files`)),
+        return make("div", { class: "card" }, drawn, make("h3", {}, posture.name, make("small", {}, ` ${of(posture.name)} ${of(posture.name) === 1 ? "file" : "files"}`)),
           ...posture.fields.filter((f) => f.what).map((f) => fieldNode(posture, f)));
       })));
   }
@@ -342,7 +345,7 @@ const Begin = (() => {
       { title: "nodes", cell: (row) => known.get(row.name)?.nodes.join(", ") ?? "" },
     ];
     return make("section", { "aria-labelledby": "frf-title" }, make("h2", { id: "frf-title" }, "FRF files and their postures"),
-      rowsNode(files, "Each file and the posture it was measured in", before), leftOutNode(draft.frfs.map((f) => f.file)),
+      rowsNode(files, "Each file and the posture it was measured in; the first row fills a column", before), leftOutNode(draft.frfs.map((f) => f.file)),
       make("h3", {}, "Measured points"), rowsNode(tables("point"), "Where each node of the files sits"));
   }
 

@@ -83,24 +83,25 @@ pub fn router(scene: Scene, guard: Guard) -> (Router, Arc<Stand>) {
         parcels: Semaphore::new(1),
         session: format!("{:016x}", rand::random::<u64>()),
     });
-    let behind_the_key = Router::new()
-        .route("/", get(page))
-        .route("/page.css", get(|| text("text/css", include_str!("page.css"))))
-        .route("/page.js", script(include_str!("page.js")))
-        .route("/begin.js", script(include_str!("begin.js")))
-        .route("/state", get(state))
-        .route("/status", get(status))
-        .route("/order", post(order))
-        .route("/cancel", post(cancel))
+    let router = Router::new()
+        .route("/{key}/", get(page))
         .route(
-            "/begin",
+            "/{key}/page.css",
+            get(|| text("text/css", include_str!("page.css"))),
+        )
+        .route("/{key}/page.js", script(include_str!("page.js")))
+        .route("/{key}/begin.js", script(include_str!("begin.js")))
+        .route("/{key}/state", get(state))
+        .route("/{key}/status", get(status))
+        .route("/{key}/order", post(order))
+        .route("/{key}/cancel", post(cancel))
+        .route(
+            "/{key}/begin",
             post(begin).layer(DefaultBodyLimit::max(LARGEST_REQUEST)),
         )
-        .route("/upload", post(upload))
-        .route("/report", get(report))
-        .route("/report/{name}", get(figure));
-    let router = Router::new()
-        .nest("/{key}", behind_the_key)
+        .route("/{key}/upload", post(upload))
+        .route("/{key}/report", get(report))
+        .route("/{key}/report/{name}", get(figure))
         .fallback(|| async { (StatusCode::NOT_FOUND, "there is no such page\n") })
         .layer(DefaultBodyLimit::max(LARGEST_ORDER))
         .layer(middleware::from_fn_with_state(app.clone(), guarded))

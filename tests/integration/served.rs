@@ -87,7 +87,7 @@ impl Served {
         let page = served.get("/").text();
         let meta = |name: &str| {
             let (_, rest) = page.split_once(&format!("name=\"{name}\" content=\"")).unwrap();
-            rest.split('"').next().unwrap().to_string()
+            rest.split('"').next().unwrap().replace("&#x2f;", "/")
         };
         served.token = meta("token");
         served.report_key = meta("report")

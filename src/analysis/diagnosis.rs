@@ -8,8 +8,8 @@ use crate::campaign::Campaign;
 use crate::discrepancy::localise::{Localisation, localise};
 use crate::discrepancy::setup::{Rival, SetupCheck, examine, examine_cutting};
 use crate::discrepancy::{
-    Candidate, CuttingComparison, Diagnosis, Explained, FrfComparison, NextMeasurement, Verdict, diagnose,
-    next_cut, next_measurement,
+    Candidate, CuttingComparison, CuttingLead, Diagnosis, Explained, FrfComparison, NextMeasurement, Verdict,
+    cutting_lead, diagnose, next_cut, next_measurement,
 };
 use crate::effects::Instance;
 use crate::effects::cutting::CuttingInstance;
@@ -38,6 +38,11 @@ pub struct DiagnosisFindings {
     pub lead: Option<Localisation>,
 }
 
+/// Something is missing, the files are not to blame, and no effect of the library is it.
+fn is_unnamed<M, I>(diagnosis: &Diagnosis<M, I>, setup: &SetupCheck) -> bool {
+    diagnosis.verdict == Verdict::Unknown && setup.likely().is_none() && diagnosis.too_little_data.is_none()
+}
+
 /// What one candidate makes of the residual.
 pub struct Leading {
     /// Index among the candidates.
@@ -58,10 +63,7 @@ impl DiagnosisFindings {
             rival(&diagnosis, |_| true)
         })?;
         heed_setup(&mut diagnosis, &setup);
-        let unnamed = diagnosis.verdict == Verdict::Unknown
-            && setup.likely().is_none()
-            && diagnosis.too_little_data.is_none();
-        let lead = match unnamed {
+        let lead = match is_unnamed(&diagnosis, &setup) {
             true => Some(localise(&study, &case.model)?).filter(|found| found.significant),
             false => None,
         };
@@ -212,6 +214,8 @@ pub struct CuttingFindings {
     pub leading: Option<(usize, CuttingView)>,
     /// Wrong wiring and filters.
     pub setup: SetupCheck,
+    /// What the model leaves, by what it follows: where the verdict is unknown.
+    pub lead: Option<CuttingLead>,
 }
 
 /// A cutting model against the records.
@@ -245,8 +249,11 @@ impl CuttingFindings {
                 Ok::<_, crate::Error>((number, view(&candidate.model, &candidate.theta)?))
             })
             .transpose()?;
+        let now = view(&case.model, &diagnosis.baseline.theta)?;
+        let lead = is_unnamed(&diagnosis, &setup).then(|| cutting_lead(&case.data, &now.fits));
         Ok(CuttingFindings {
-            now: view(&case.model, &diagnosis.baseline.theta)?,
+            now,
+            lead: lead.flatten(),
             next_measurement: next_cut::advise_cutting(&case.data, &diagnosis)?,
             leading,
             setup,

@@ -9,8 +9,9 @@ use crate::Result;
 use crate::analysis::cutting::waveform_groups;
 use crate::campaign::Campaign;
 use crate::cutting::{
-    self, CfcOptions, CfcResult, Change, CutAnalysis, ForceAxis, Group, Known, MaterialComparison, Method,
-    Prediction, Reading, SpeedTrends, by_axis, coefficients_of, depth_mm, speed_text,
+    self, CfcOptions, CfcResult, Change, CutAnalysis, ForceAxis, Group, KienzleFit, Known,
+    MaterialComparison, Method, Prediction, Reading, SpeedTrends, by_axis, coefficients_of, depth_mm,
+    kienzle, speed_text,
 };
 
 #[derive(clap::Args)]
@@ -35,28 +36,51 @@ pub fn run(args: Args) -> Result<Outcome> {
     let mut result = cutting::identify_forces(&campaign, options)?;
     let (waveforms, warnings, setup) = waveform_groups(&campaign, &result);
     result.warnings.extend(warnings);
-    let mut document = document(&campaign, &result, &waveforms);
+    let power_laws = PowerLaws {
+        groups: kienzle(&campaign, &result, &result.groups),
+        pooled: kienzle(&campaign, &result, &result.pooled),
+    };
+    let mut document = document(&campaign, &result, &waveforms, &power_laws);
     document["setup"] = json!(setup);
     Ok(Outcome::new(
         document,
-        setup_lines(&setup) + &text(&campaign, &result),
+        setup_lines(&setup) + &text(&campaign, &result, &power_laws),
         Some(Guide::cutting(&campaign).coefficients()),
     ))
 }
 
-fn document(campaign: &Campaign, result: &CfcResult, waveforms: &[serde_json::Value]) -> serde_json::Value {
-    let groups = |list: &[Group]| list.iter().map(Group::to_json).collect::<Vec<_>>();
-    let with_waveforms = result
-        .groups
-        .iter()
-        .zip(waveforms)
-        .map(|(group, waveform)| with_waveform(group, waveform))
-        .collect::<Vec<_>>();
+/// Kienzle's law for each group, in the groups' order.
+struct PowerLaws {
+    groups: Vec<Option<KienzleFit>>,
+    pooled: Vec<Option<KienzleFit>>,
+}
+
+fn document(
+    campaign: &Campaign,
+    result: &CfcResult,
+    waveforms: &[serde_json::Value],
+    power_laws: &PowerLaws,
+) -> serde_json::Value {
+    let with_kienzle = |groups: &[Group], laws: &[Option<KienzleFit>]| -> Vec<serde_json::Value> {
+        let each = groups.iter().zip(laws);
+        each.map(|(group, law)| {
+            let mut json = group.to_json();
+            json["kienzle"] = json!(law.as_ref().map(KienzleFit::to_json));
+            json
+        })
+        .collect()
+    };
+    let mut groups = with_kienzle(&result.groups, &power_laws.groups);
+    for (group, waveform) in groups.iter_mut().zip(waveforms) {
+        // The coefficients of the mean forces stay what they are: what they cannot separate is null there even where the
+        // waveform's shape can.
+        group["waveform"] = waveform.clone();
+    }
     let process = result.pooled.first().map(|g| g.process);
     json!({
         "campaign": campaign.name,
-        "groups": with_waveforms,
-        "pooled": groups(&result.pooled),
+        "groups": groups,
+        "pooled": with_kienzle(&result.pooled, &power_laws.pooled),
         "r2": process.map(|p| by_axis(p, &result.r2())),
         "trends": result.trends.iter().flat_map(SpeedTrends::to_json).collect::<Vec<_>>(),
         "materials": result.materials.iter().flat_map(MaterialComparison::to_json).collect::<Vec<_>>(),
@@ -64,14 +88,6 @@ fn document(campaign: &Campaign, result: &CfcResult, waveforms: &[serde_json::Va
         "cuts": result.cuts.iter().map(cut_document).collect::<Vec<_>>(),
         "warnings": result.warnings,
     })
-}
-
-/// A group with what its whole waveforms say under `waveform`. The coefficients of the mean forces stay what they are: what
-/// they cannot separate is null there even where the waveform's shape can.
-fn with_waveform(group: &Group, waveform: &serde_json::Value) -> serde_json::Value {
-    let mut json = group.to_json();
-    json["waveform"] = waveform.clone();
-    json
 }
 
 fn cut_document(cut: &CutAnalysis) -> serde_json::Value {
@@ -96,14 +112,35 @@ fn cut_document(cut: &CutAnalysis) -> serde_json::Value {
         "drift": cut.channels.iter().map(|c| json!({"channel": c.name, "line": c.drift})).collect::<Vec<_>>(),
         "averages": averages,
         "tooth_line": cut.tooth_line,
+        "spindle": cut.spindle.as_ref().map(|s| {
+            let found_rpm = cut.spindle_rpm * (1.0 + s.offset);
+            json!({
+                "found_rpm": found_rpm,
+                "std_error_rpm": cut.spindle_rpm * s.offset_std,
+                "change_over_cut": s.droop,
+                "change_std_error": s.droop_std,
+                "wander_rms": s.wander,
+                "wander_std_error": s.wander_std,
+                "in_step_before": s.in_step[0],
+                "in_step_after": s.in_step[1],
+            })
+        }),
     })
 }
 
-fn text(campaign: &Campaign, result: &CfcResult) -> String {
+fn text(campaign: &Campaign, result: &CfcResult, power_laws: &PowerLaws) -> String {
     let mut out = format!("Cutting force coefficients: {}\n", campaign.name);
-    for pooled in &result.pooled {
+    for (pooled, of_all) in result.pooled.iter().zip(&power_laws.pooled) {
         let groups: Vec<&Group> = result.groups.iter().filter(|g| g.is_beside(pooled)).collect();
         let _ = writeln!(out, "\n{}", coefficient_table(&groups, pooled));
+        let by_speed = result.groups.iter().zip(&power_laws.groups);
+        let laws: Vec<(&Group, &KienzleFit)> = by_speed
+            .filter(|(g, _)| g.is_beside(pooled))
+            .filter_map(|(g, law)| Some((g, law.as_ref()?)))
+            .collect();
+        if let Some(of_all) = of_all {
+            let _ = writeln!(out, "{}", kienzle_table(&laws, pooled, of_all));
+        }
         let trends = result.trends.iter();
         for trend in trends.filter(|t| t.process == pooled.process && t.material == pooled.material) {
             let _ = writeln!(out, "{}", trend_table(trend));
@@ -172,6 +209,32 @@ fn coefficient_table(groups: &[&Group], pooled: &Group) -> String {
             .as_ref()
             .map_or(String::new(), |m| format!(", {m}")),
         table(&rows)
+    )
+}
+
+fn kienzle_table(groups: &[(&Group, &KienzleFit)], pooled: &Group, of_all: &KienzleFit) -> String {
+    let mut header = vec!["speed m/min".to_string()];
+    for c in &of_all.components {
+        header.extend([format!("{} N/mm²", c.label), "m".to_string()]);
+    }
+    header.push("ΔBIC".into());
+    let mut rows = vec![header];
+    let alone = groups.len() == 1 && groups[0].0.cuts == pooled.cuts;
+    let each = groups.iter().map(|(group, law)| (*law, speed_text(group)));
+    let mut told = Vec::new();
+    for (law, name) in each.chain((!alone).then(|| (of_all, "all together".to_string()))) {
+        told.push(format!("  {name}: {}\n", law.reading()));
+        let mut row = vec![name];
+        for c in &law.components {
+            row.extend([maybe(c.k1_1), maybe(c.m)]);
+        }
+        row.push(format!("{:+.1}", law.delta_bic));
+        rows.push(row);
+    }
+    format!(
+        "Kienzle's law k1.1 b h^(1−m) of the same averages; ΔBIC above zero where it fits better than the linear-edge law\n{}{}",
+        table(&rows),
+        told.concat()
     )
 }
 

@@ -10,7 +10,7 @@ use crate::campaign::Campaign;
 use crate::discrepancy::diagnose::Baseline;
 use crate::discrepancy::explained::{Explained, NamedPart};
 use crate::discrepancy::localise::Localisation;
-use crate::discrepancy::{Candidate, Diagnosis, NextMeasurement, Verdict};
+use crate::discrepancy::{Candidate, CuttingLead, Diagnosis, NextMeasurement, Verdict};
 use crate::identify::Options;
 use crate::identify::rest::Rest;
 
@@ -65,6 +65,7 @@ pub fn cutting(campaign: &Campaign, findings: &CuttingFindings) -> Outcome {
         "baseline": baseline(&d.baseline, noise_floor_nrms),
         "not_tried": d.not_tried.iter().map(|(e, why)| json!({ "effect": e, "why": why })).collect::<Vec<_>>(),
         "setup": findings.setup.findings,
+        "lead": findings.lead,
         "warnings": case.warnings,
     });
     let added = case.effects();
@@ -77,11 +78,38 @@ pub fn cutting(campaign: &Campaign, findings: &CuttingFindings) -> Outcome {
     text += &answer(d, |c| {
         (c.instance.effect.explanation(), c.instance.effect.fingerprint())
     });
+    text += &findings.lead.as_ref().map_or(String::new(), lines_in_words);
     text += &rest(d, next_measurement);
     text += &warnings(&case.warnings);
     let winner = d.winner().map(Candidate::label);
     let next = Guide::cutting(campaign).diagnosed(d.verdict, winner.as_deref(), &next_measurement.what);
     Outcome::new(json, text, Some(next))
+}
+
+/// What is left by what it follows, and what usually causes that.
+fn lines_in_words(lead: &CuttingLead) -> String {
+    let mut text = wrapped(
+        &format!(
+            "A lead: what stands above the noise is {} N (root mean square); by what it follows, strongest first:",
+            number(lead.above_noise_n, 3)
+        ),
+        "  ",
+    );
+    for group in lead.lines.iter().filter(|g| g.share > SMALLEST_SHARE) {
+        text += &wrapped(
+            &format!(
+                "{}: {}, in {} of {} cuts; strongest {}",
+                group.what,
+                percent(group.share),
+                group.cuts,
+                group.of_cuts,
+                group.strongest()
+            ),
+            "    ",
+        );
+        text += &wrapped(&format!("usually {}", group.usual_cause), "      ");
+    }
+    text
 }
 
 fn baseline(b: &Baseline, noise_floor_nrms: f64) -> Value {
@@ -212,6 +240,8 @@ fn left_over<M, I>(d: &Diagnosis<M, I>) -> Value {
     })
 }
 
+/// Groups of lines with less than this share of what stands above the noise are in the JSON only.
+const SMALLEST_SHARE: f64 = 0.01;
 /// Candidates shown to a person; all are in the JSON.
 const SHOWN: usize = 8;
 
@@ -356,10 +386,16 @@ fn rest<M, I>(d: &Diagnosis<M, I>, next_measurement: &NextMeasurement) -> String
             d.indistinguishable.join(", ")
         );
     }
-    if let Some([tried, of]) = d.pairs.filter(|[tried, of]| tried < of) {
-        text += &format!(
-            "  Of {of} pairs of effects {tried} were tried, the likeliest first: there was no time for more\n"
-        );
+    match d.pairs {
+        Some([tried, of]) if tried < of => {
+            text += &format!(
+                "  Of {of} pairs of effects {tried} were tried, the likeliest first: there was no time for more\n"
+            );
+        }
+        Some([_, of]) if d.verdict == Verdict::Unknown && of > 0 => {
+            text += &format!("  Nor does any of {of} pairs of effects with the best of them\n");
+        }
+        _ => {}
     }
     let rows: Vec<Vec<String>> = d
         .candidates

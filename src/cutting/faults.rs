@@ -97,7 +97,7 @@ fn repair(record: &mut TimeRecord, spindle_rpm: f64) -> Vec<Notice> {
     notices
 }
 
-fn axis_of(role: ChannelRole) -> Option<ForceAxis> {
+pub(super) fn axis_of(role: ChannelRole) -> Option<ForceAxis> {
     Some(match role {
         ChannelRole::ForceX => ForceAxis::X,
         ChannelRole::ForceY => ForceAxis::Y,

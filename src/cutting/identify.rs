@@ -4,12 +4,12 @@ use rayon::prelude::*;
 
 use super::average::pool_scatter;
 use super::average_force::{ForceAxis, average_row};
-use super::faults::read_record;
 use super::group::{Group, Rows, distinct, observations};
+use super::in_step::{InStep, read_in_step};
 use super::orthogonal::{Prediction, predict};
 use super::outlier::misfits;
 use super::plausibility;
-use super::record::{Average, CutAnalysis, analyse_cut};
+use super::record::{Average, CutAnalysis};
 use super::series::{MaterialComparison, Series, SpeedTrends, compare, speed_trends};
 use super::warnings;
 use crate::campaign::{Campaign, CutGeometry, Process};
@@ -61,19 +61,12 @@ pub fn identify_forces(campaign: &Campaign, options: CfcOptions) -> Result<CfcRe
     let outcomes: Vec<Result<CutAnalysis>> = (0..campaign.cuts.len())
         .into_par_iter()
         .map(|i| {
-            let outcome = read_cut(campaign, i);
+            let outcome = read_in_step(campaign, i, InStep::Fully).map(|(_, analysis)| analysis);
             progress.step();
             outcome
         })
         .collect();
     from_analyses(campaign, outcomes, options)
-}
-
-fn read_cut(campaign: &Campaign, index: usize) -> Result<CutAnalysis> {
-    let (record, notices) = read_record(campaign, index)?;
-    let mut analysis = analyse_cut(campaign, index, &record)?;
-    analysis.notices.extend(notices);
-    Ok(analysis)
 }
 
 /// The part after the records are read: regression and warnings.

@@ -13,8 +13,8 @@ use crate::campaign::{Campaign, Cut, CutGeometry, Process, Tool};
 use crate::ingest::units::figures;
 use crate::ingest::{ChannelRole, TimeRecord};
 use crate::signal::{
-    self, Air, Blocks, Clipping, DriftLine, Phases, Spindle, ToothLine, find_faults, find_phases, fit_drift,
-    highest_order, tooth_line, whole_revolutions,
+    self, Air, Blocks, Clipping, DriftLine, Phases, Spindle, SpindleTrack, ToothLine, find_faults,
+    find_phases, fit_drift, highest_order, tooth_line, whole_revolutions,
 };
 use crate::{Error, InputError, Result};
 
@@ -80,6 +80,8 @@ pub struct CutAnalysis {
     /// Tool axes x, y, z and torque; `None` where a channel it needs is missing or dead.
     pub averages: [Option<Average>; 4],
     pub tooth_line: Option<ToothLine>,
+    /// How the spindle ran, where it did not keep the stated speed.
+    pub spindle: Option<SpindleTrack>,
     pub notices: Vec<Notice>,
 }
 
@@ -265,6 +267,7 @@ pub fn analyse_cut(campaign: &Campaign, cut_index: usize, record: &TimeRecord) -
         averages: in_tool_axes(&campaign.dynamometer.tool_from_dyno, &channels),
         channels,
         tooth_line,
+        spindle: None,
         notices,
     })
 }

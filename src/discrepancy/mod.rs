@@ -2,6 +2,7 @@
 
 pub mod compare;
 pub mod compare_cutting;
+pub mod cutting_lead;
 pub mod diagnose;
 pub mod difference;
 pub mod explained;
@@ -21,6 +22,7 @@ pub mod verdict;
 
 pub use compare::{Band, FrfComparison, FrfError};
 pub use compare_cutting::{CutError, CuttingComparison};
+pub use cutting_lead::{CuttingLead, LineGroup, LineKind, cutting_lead};
 pub use diagnose::{Candidate, Diagnosis, diagnose};
 pub use explained::Explained;
 pub use next_measurement::NextMeasurement;

@@ -10,10 +10,10 @@ use rayon::prelude::*;
 use super::cutting_windows::Windows;
 pub use super::force_channel::ForceChannel;
 use super::force_channel::{force_channel, sample_std, widen_for_vibration};
-use super::off_comb::{OffComb, find_vibration};
+use super::off_comb::{OffComb, StandingLine, find_vibration, standing_lines};
 use crate::campaign::{Campaign, Process};
 use crate::cutting::waveform::{DrillTerm, DrillingCut, MillingCut, UnitForces};
-use crate::cutting::{ForceAxis, Notice, analyse_cut, feed_mm, of_notices, read_record};
+use crate::cutting::{CutAnalysis, ForceAxis, InStep, Notice, feed_mm, of_notices, read_in_step};
 use crate::effects::cutting::{CutSetting, CuttingSummary};
 use crate::ingest::{ChannelRole, TimeRecord};
 use crate::progress::Progress;
@@ -58,6 +58,8 @@ pub struct CutData {
     /// Blocks of full engagement.
     pub steady: Range<usize>,
     pub vibration: Option<OffComb>,
+    /// What stands above the noise beside the orders (drilling: orders and all).
+    pub lines: Vec<StandingLine>,
 }
 
 impl CutData {
@@ -194,8 +196,9 @@ impl CuttingData {
         let outcomes: Vec<Result<(CutData, Vec<Notice>)>> = indices
             .par_iter()
             .map(|&i| {
-                let (record, mut notices) = read_record(campaign, i)?;
-                let outcome = cut_data(campaign, i, &record, &mut notices);
+                let (record, mut analysis) = read_in_step(campaign, i, InStep::ButForWander)?;
+                let notices = std::mem::take(&mut analysis.notices);
+                let outcome = cut_data(campaign, i, &record, &analysis);
                 progress.step();
                 Ok((outcome?, notices))
             })
@@ -278,15 +281,12 @@ impl CuttingData {
     }
 }
 
-/// What the analysis of the record noticed is added to `notices`.
 fn cut_data(
     campaign: &Campaign,
     index: usize,
     record: &TimeRecord,
-    notices: &mut Vec<Notice>,
+    analysis: &CutAnalysis,
 ) -> Result<CutData> {
-    let mut analysis = analyse_cut(campaign, index, record)?;
-    notices.append(&mut analysis.notices);
     let cut = &campaign.cuts[index];
     let tool = campaign
         .tool
@@ -294,7 +294,7 @@ fn cut_data(
         .ok_or_else(|| Error::computation("[tool] is missing: cutting forces need its teeth and diameter"))?;
     let rate = record.sample_rate_hz;
     let per_turn = rate * 60.0 / cut.spindle_rpm;
-    let window = Windows::new(&analysis, record, per_turn);
+    let window = Windows::new(analysis, record, per_turn);
     let milling = MillingCut::new(tool, &cut.geometry);
     let orders = match &milling {
         Some(m) => highest_order(per_turn, (ORDERS_PER_TOOTH * m.teeth).min(MOST_ORDERS)),
@@ -387,6 +387,7 @@ fn cut_data(
             }
         }
     }
+    let lines = standing_lines(&spectra, rate, cut.spindle_rpm / 60.0, orders > 0);
     let mut data = CutData {
         cut: index,
         id: cut.id.clone(),
@@ -407,6 +408,7 @@ fn cut_data(
         block_s: window.block_s(record),
         steady: window.steady_blocks(),
         vibration,
+        lines,
     };
     data.narrow_contact();
     Ok(data)

@@ -106,6 +106,87 @@ pub fn find_vibration(
     Some(OffComb { frequency_hz, lines })
 }
 
+/// A line of a steady cut that stands above its surroundings.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StandingLine {
+    pub frequency_hz: f64,
+    /// Distance of the spectrum's lines, Hz: nearer than that nothing is told apart.
+    pub resolution_hz: f64,
+    /// Recorded channel (index), amplitude, and amplitude at the same frequency in the air (`None` without air); N (N·m).
+    pub channels: Vec<(usize, f64, Option<f64>)>,
+}
+
+/// Lines kept of a cut, strongest first.
+const MOST_LINES: usize = 24;
+/// Air samples that tell an amplitude at all.
+const LEAST_AIR: usize = 64;
+
+/// All lines that the orders taken out of `spectra` (recorded channel, its spectrum, a stretch of air) leave standing,
+/// strongest first. `orders_taken`: the orders of `spindle_hz` are out, and what lies against them is their own unsteadiness.
+pub fn standing_lines(
+    spectra: &[(usize, OrderSpectrum, Vec<f64>)],
+    sample_rate_hz: f64,
+    spindle_hz: f64,
+    orders_taken: bool,
+) -> Vec<StandingLine> {
+    let Some((_, first, _)) = spectra.first() else {
+        return Vec::new();
+    };
+    let (count, line_hz) = (first.rest.len(), first.line_hz);
+    if spectra.iter().any(|(_, s, _)| s.rest.len() != count) {
+        return Vec::new();
+    }
+    let floor = |s: &OrderSpectrum| (s.sample_std * (line_hz / sample_rate_hz).sqrt()).max(1e-300);
+    let strength: Vec<f64> = (0..count)
+        .map(|j| {
+            let each = spectra.iter().map(|(_, s, _)| (s.rest[j] / floor(s)).powi(2));
+            each.fold(0.0, f64::max)
+        })
+        .collect();
+    let local = |j: usize| median(&strength[j.saturating_sub(40)..(j + 41).min(count)]).max(1.0);
+    let beside_order = |j: usize| {
+        let hz = j as f64 * line_hz;
+        (hz / spindle_hz - (hz / spindle_hz).round()).abs() * spindle_hz < 1.5 * line_hz
+    };
+    let mut peaks: Vec<usize> = (2..count)
+        .filter(|&j| j as f64 * line_hz < 0.45 * sample_rate_hz)
+        .filter(|&j| !(orders_taken && beside_order(j)))
+        .filter(|&j| {
+            let around = j.saturating_sub(1)..(j + 2).min(count);
+            strength[around].iter().all(|s| *s <= strength[j])
+        })
+        .filter(|&j| strength[j] > STANDS_OUT && strength[j] > STANDS_OUT * local(j))
+        .collect();
+    peaks.sort_by(|a, b| strength[*b].total_cmp(&strength[*a]));
+    let mut kept: Vec<usize> = Vec::new();
+    for j in peaks {
+        // A line spreads over its neighbours.
+        if kept.len() < MOST_LINES && kept.iter().all(|k| k.abs_diff(j) > SPREAD) {
+            kept.push(j);
+        }
+    }
+    kept.into_iter()
+        .map(|j| {
+            let range = j.saturating_sub(2)..(j + 3).min(count);
+            let sums = range.clone().map(|k| (strength[k], strength[k] * k as f64));
+            let (sum, moment) = sums.fold((0.0, 0.0), |t, s| (t.0 + s.0, t.1 + s.1));
+            let frequency_hz = moment / sum * line_hz;
+            let of = |(channel, s, air): &(usize, OrderSpectrum, Vec<f64>)| {
+                let power: f64 = s.rest[range.clone()].iter().map(|a| a * a).sum();
+                let noise = range.len() as f64 * floor(s).powi(2);
+                let in_air =
+                    (air.len() >= LEAST_AIR).then(|| line_amplitude(air, sample_rate_hz, frequency_hz));
+                (*channel, 2.0 * (power - noise).max(0.0).sqrt(), in_air)
+            };
+            StandingLine {
+                frequency_hz,
+                resolution_hz: line_hz,
+                channels: spectra.iter().map(of).collect(),
+            }
+        })
+        .collect()
+}
+
 /// Centre of the power around a peak, in lines.
 fn centre(strength: &[f64], peak: usize) -> f64 {
     let range = peak.saturating_sub(SPREAD)..(peak + SPREAD + 1).min(strength.len());

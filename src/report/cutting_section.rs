@@ -9,7 +9,7 @@ use super::parts::{count, figure, listed, setting};
 use super::{Block, Column, Section, Table};
 use crate::analysis::regression_line::{FeedLine, feed_lines};
 use crate::campaign::{Campaign, Process};
-use crate::cutting::{CfcResult, Coefficient, CutAnalysis, ForceAxis, Group, speed_text};
+use crate::cutting::{CfcResult, Coefficient, CutAnalysis, ForceAxis, Group, Known, kienzle, speed_text};
 
 pub fn summary(result: &CfcResult) -> String {
     let mut text = String::new();
@@ -293,6 +293,7 @@ fn regression(campaign: &Campaign, result: &CfcResult, pooled: &Group) -> Sectio
         }
     }
     blocks.push(coefficient_table(result, pooled));
+    blocks.extend(kienzle_table(campaign, result, pooled));
     blocks.extend(misfit_map(result, pooled));
     Section {
         id: format!("regression-{}", slug(result, pooled)),
@@ -413,6 +414,27 @@ fn coefficient_table(result: &CfcResult, pooled: &Group) -> Block {
                 .into(),
         ],
     })
+}
+
+fn kienzle_table(campaign: &Campaign, result: &CfcResult, pooled: &Group) -> Option<Block> {
+    let law = kienzle(campaign, result, std::slice::from_ref(pooled)).pop()??;
+    let text = |known: Option<Known>| {
+        known
+            .and_then(|k| Some(with_error(k.value, k.std_error?)))
+            .unwrap_or_else(|| "not determined".into())
+    };
+    let rows = law.components.iter();
+    let rows = rows.map(|c| vec![c.name.to_string(), text(c.k1_1), text(c.m)]);
+    Some(Block::Table(Table {
+        caption: "Kienzle's law of the same averages, all together: force = k1.1 · width · thickness^(1−m), ± standard error".into(),
+        columns: vec![
+            Column::text("force"),
+            Column::number("k1.1 N/mm²"),
+            Column::number("m"),
+        ],
+        rows: rows.collect(),
+        notes: vec![format!("Which law: {}.", law.reading())],
+    }))
 }
 
 fn misfit_map(result: &CfcResult, pooled: &Group) -> Option<Block> {

@@ -548,6 +548,21 @@ pub fn cutting(campaign: &Campaign, files: &[SetupFinding], found: &CuttingFindi
     let mut card = answer(d, &added, "force records", None, |c| named_cutting(&c.instance));
     card.id = "verdict-cutting";
     card.side = FORCES;
+    if let Some(first) = found.lead.as_ref().and_then(|l| l.lines.first()) {
+        card.facts.insert(
+            0,
+            (
+                "What stands out",
+                format!(
+                    "{}: {} of what stands above the noise, strongest {}; usually {}",
+                    first.what,
+                    percent(first.share),
+                    first.strongest(),
+                    first.usual_cause
+                ),
+            ),
+        );
+    }
     let dir = campaign.dir.display();
     card.next = match (d.verdict, d.winner()) {
         (Verdict::Effect, Some(winner)) if d.indistinguishable.is_empty() => format!(

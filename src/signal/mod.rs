@@ -10,6 +10,7 @@ pub mod frf_noise;
 mod local_rational;
 pub mod noise_law;
 mod order_spectrum;
+mod spindle_track;
 mod steady_window;
 mod tooth_line;
 
@@ -19,5 +20,6 @@ pub use drift::{Air, DriftLine, fit_drift};
 pub use engagement::change;
 pub use faults::{Clipping, Faults, find_faults, samples_in};
 pub use order_spectrum::{OrderSpectrum, highest_order, line_amplitude, mean_between, order_spectrum};
+pub use spindle_track::{SpindleTrack, spindle_track};
 pub use steady_window::{Phases, Spindle, find_phases, whole_revolutions};
 pub use tooth_line::{ToothLine, tooth_line};

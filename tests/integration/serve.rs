@@ -486,7 +486,10 @@ fn from_nothing_to_a_diagnosis() {
     assert_eq!(answer.status, 422, "{}", answer.text());
     assert!(!dir.join("campaign.toml").exists());
 
-    let mut answers = vec![json!(["robot", "model", "irb6640"])];
+    let mut answers = vec![
+        json!(["robot", "model", "irb6640"]),
+        json!(["frf", "quantity", "receptance"]),
+    ];
     for posture in &campaign.postures {
         let angles: Vec<String> = posture.joints_deg.iter().map(f64::to_string).collect();
         answers.push(json!([

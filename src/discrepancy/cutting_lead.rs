@@ -14,6 +14,8 @@ use crate::signal::median;
 pub enum LineKind {
     /// The mean force over the steady cut.
     MeanForce,
+    /// Comes and goes over several turns.
+    SlowerThanTurn,
     OncePerTurn,
     /// Another whole number of turns that is none of tooth passing.
     TurnHarmonic,
@@ -35,6 +37,7 @@ impl LineKind {
     pub fn words(self) -> &'static str {
         match self {
             LineKind::MeanForce => "mean force",
+            LineKind::SlowerThanTurn => "slower than a turn",
             LineKind::OncePerTurn => "once per turn",
             LineKind::TurnHarmonic => "several times per turn, not as the teeth",
             LineKind::ToothPassing => "tooth passing",
@@ -52,6 +55,9 @@ impl LineKind {
             LineKind::MeanForce => {
                 "a force that does not follow the feed as the model says (wear, built-up edge, another material or depth), a \
                  wrong feed, depth or immersion in campaign.toml, or a zero line that is off"
+            }
+            LineKind::SlowerThanTurn => {
+                "a force that comes and goes: built-up edge, chips that clog, a feed that stutters, a depth that changes, a drifting zero"
             }
             LineKind::OncePerTurn => {
                 "runout of the tool in its holder, one tooth chipped or missing, an unbalanced spindle, a holder that bends"
@@ -137,6 +143,8 @@ const SAME_FREQUENCY: f64 = 0.005;
 const OTHER_SPEED: f64 = 0.02;
 /// Share of the tooth-passing frequency within which a line is beside it.
 const BESIDE: f64 = 0.12;
+/// Share of the spindle frequency below which a line is slow.
+const SLOW: f64 = 0.5;
 /// Half width of a resonance among the orders, as a share of its frequency.
 const RESONANCE: f64 = 0.2;
 
@@ -285,6 +293,8 @@ fn beside_orders(data: &CuttingData, index: usize, teeth: usize) -> Vec<Line> {
             LineKind::Mains
         } else if in_air {
             LineKind::NotCutting
+        } else if hz < SLOW * spindle_hz {
+            LineKind::SlowerThanTurn
         } else if cut.orders == 0 && near(spindle_hz, 1.5 * line.resolution_hz) {
             order_kind((hz / spindle_hz).round() as usize, teeth)
         } else if near(tooth_hz, (BESIDE * tooth_hz).max(3.0 * line.resolution_hz)) {

@@ -180,10 +180,10 @@ impl Drafting {
 
     /// What lies in a folder; read once, unless it is to be read `again`.
     fn scan(&self, dir: &Path, again: bool) -> Result<Arc<Scan>> {
-        if let (Some((of, scan)), false) = (&self.state().scanned, again) {
-            if of == dir {
-                return Ok(scan.clone());
-            }
+        if let (Some((of, scan)), false) = (&self.state().scanned, again)
+            && of == dir
+        {
+            return Ok(scan.clone());
         }
         let scan = Arc::new(draft::scan(dir)?);
         self.state().scanned = Some((dir.to_path_buf(), scan.clone()));

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::io::{BufRead, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc};
+use std::sync::{Arc, Mutex, mpsc};
 use std::time::Duration;
 
 use base64::prelude::{BASE64_STANDARD, Engine};
@@ -19,7 +19,7 @@ use crate::identify::Options;
 use crate::progress::{Gauge, Reading, shown_on};
 use crate::report::{campaign as pages, diagnosis_section, waveform_section};
 use crate::revision::{Domain, RecordedEffect, RevisionLog, fingerprint, log_file};
-use crate::serve::{Order, Refusal, Stage};
+use crate::serve::{Order, Refusal, Stage, locked};
 use crate::{Error, InputError, Result};
 
 /// What the worker says.
@@ -76,10 +76,6 @@ pub type ModelState = (String, Vec<RecordedEffect>);
 pub const KEPT: usize = 6;
 /// Between two lines about progress.
 const BEAT: Duration = Duration::from_millis(200);
-
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 /// The worker as the server sees it.
 pub struct Hand {

@@ -3,7 +3,7 @@
 
 use std::collections::HashSet;
 use std::path::{Component, Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 use serde_json::{Map, Value, json};
 
@@ -14,7 +14,7 @@ use crate::campaign::draft::{self, Answers, Draft, Form, Scan};
 use crate::files::write_new;
 use crate::report::figure::posture_svg;
 use crate::robot::{RobotModel, RobotSpec};
-use crate::serve::{Entrance, Parcel, Reply, Request, Wish};
+use crate::serve::{Entrance, Parcel, Reply, Request, Wish, locked};
 use crate::{Error, InputError, Result};
 
 /// Names shown of a folder.
@@ -152,7 +152,7 @@ fn parts(name: &str) -> Result<Vec<&str>> {
 
 impl Drafting {
     fn state(&self) -> MutexGuard<'_, State> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.0)
     }
 
     fn make_folder(&self, parent: &Path, name: &str) -> Result<Value> {

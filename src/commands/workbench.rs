@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 use base64::prelude::{BASE64_STANDARD, Engine};
 use serde_json::{Value, json};
@@ -15,7 +15,7 @@ use super::{explain, history};
 use crate::campaign::Campaign;
 use crate::revision::{Domain, RevisionLog, hold};
 use crate::robot::RobotSpec;
-use crate::serve::{Job, Order, Refusal, Report, Stage, Workbench};
+use crate::serve::{Job, Order, Refusal, Report, Stage, Workbench, locked};
 use crate::{Error, Result};
 
 /// One campaign folder, and what was found out about it since the server began.
@@ -63,12 +63,12 @@ impl CampaignBench {
     }
 
     fn found(&self) -> MutexGuard<'_, Found> {
-        self.found.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.found)
     }
 
     /// Has an order done.
     fn have_done(&self, order: Order, stage: &Stage) -> Result<String> {
-        let mut worker = self.worker.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut worker = locked(&self.worker);
         let mut hand = match worker.take() {
             Some(hand) => hand,
             None => Hand::hire(&self.dir)?,

@@ -386,7 +386,6 @@ fn fit_both(
         })?;
     let delta_bic = linear_deviance(observations, &linear) - law.deviance(observations, &best);
     let freedom: f64 = linear.dof.iter().sum();
-    let refuted = |chance: Option<f64>| chance.is_some_and(|p| p <= FALSE_ALARM);
     let chance = (freedom > 0.5 && delta_bic.is_finite())
         .then(|| chances(&law, observations, &linear, &best, delta_bic));
     let (p_linear_edge, p_kienzle) = (chance.map(|c| c[0]), chance.map(|c| c[1]));
@@ -539,7 +538,6 @@ fn telling_feed(
 impl KienzleFit {
     /// In a sentence: which law, or what to measure.
     pub fn reading(&self) -> String {
-        let refuted = |p: Option<f64>| p.is_some_and(|p| p <= FALSE_ALARM);
         let chance = |p: Option<f64>| p.map_or(String::new(), |p| format!(" (p {})", chance_text(p)));
         match self.preferred {
             Some(Preferred::Kienzle) => format!(
@@ -613,6 +611,11 @@ impl KienzleFit {
             "reading": self.reading(),
         })
     }
+}
+
+/// Whether a law that has this chance is called refuted.
+fn refuted(chance: Option<f64>) -> bool {
+    chance.is_some_and(|p| p <= FALSE_ALARM)
 }
 
 fn chance_text(p: f64) -> String {

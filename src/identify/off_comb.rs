@@ -45,19 +45,16 @@ pub fn find_vibration(
     let (_, first, _) = spectra.first()?;
     let (count, line_hz) = (first.rest.len(), first.line_hz);
     let tooth_hz = spindle_hz * teeth as f64;
-    let floor = |s: &OrderSpectrum| s.sample_std * (line_hz / sample_rate_hz).sqrt();
-    let beside = |hz: f64, spacing: f64| (hz / spacing - (hz / spacing).round()).abs() * spacing;
+    let floor = |s: &OrderSpectrum| floor(s, sample_rate_hz);
     let strength: Vec<f64> = (0..count)
         .map(|j| {
             let sum: f64 = spectra
                 .iter()
-                .map(|(_, s, _)| (s.rest[j] / floor(s).max(1e-300)).powi(2))
+                .map(|(_, s, _)| (s.rest[j] / floor(s)).powi(2))
                 .sum();
             sum / spectra.len() as f64
         })
         .collect();
-    // Surroundings: the median of forty lines to each side.
-    let local = |j: usize| median(&strength[j.saturating_sub(40)..(j + 41).min(count)]).max(1.0);
     let allowed = |j: usize| {
         let hz = j as f64 * line_hz;
         // Orders beyond half the sampling rate fold back among the lines.
@@ -73,7 +70,7 @@ pub fn find_vibration(
     let mut candidates: Vec<usize> = (1..count)
         .filter(|&j| strength[j] > STANDS_OUT && allowed(j))
         .collect();
-    candidates.retain(|&j| strength[j] > STANDS_OUT * local(j));
+    candidates.retain(|&j| strength[j] > STANDS_OUT * surroundings(&strength, j));
     candidates.sort_by(|a, b| strength[*b].total_cmp(&strength[*a]));
     // A line that the air shows as well is hum, not cutting.
     let cutting = |j: usize| {
@@ -136,18 +133,14 @@ pub fn standing_lines(
     if spectra.iter().any(|(_, s, _)| s.rest.len() != count) {
         return Vec::new();
     }
-    let floor = |s: &OrderSpectrum| (s.sample_std * (line_hz / sample_rate_hz).sqrt()).max(1e-300);
+    let floor = |s: &OrderSpectrum| floor(s, sample_rate_hz);
     let strength: Vec<f64> = (0..count)
         .map(|j| {
             let each = spectra.iter().map(|(_, s, _)| (s.rest[j] / floor(s)).powi(2));
             each.fold(0.0, f64::max)
         })
         .collect();
-    let local = |j: usize| median(&strength[j.saturating_sub(40)..(j + 41).min(count)]).max(1.0);
-    let beside_order = |j: usize| {
-        let hz = j as f64 * line_hz;
-        (hz / spindle_hz - (hz / spindle_hz).round()).abs() * spindle_hz < 1.5 * line_hz
-    };
+    let beside_order = |j: usize| beside(j as f64 * line_hz, spindle_hz) < 1.5 * line_hz;
     let mut peaks: Vec<usize> = (2..count)
         .filter(|&j| j as f64 * line_hz < 0.45 * sample_rate_hz)
         .filter(|&j| !(orders_taken && beside_order(j)))
@@ -155,7 +148,7 @@ pub fn standing_lines(
             let around = j.saturating_sub(1)..(j + 2).min(count);
             strength[around].iter().all(|s| *s <= strength[j])
         })
-        .filter(|&j| strength[j] > STANDS_OUT && strength[j] > STANDS_OUT * local(j))
+        .filter(|&j| strength[j] > STANDS_OUT && strength[j] > STANDS_OUT * surroundings(&strength, j))
         .collect();
     peaks.sort_by(|a, b| strength[*b].total_cmp(&strength[*a]));
     let mut kept: Vec<usize> = Vec::new();
@@ -185,6 +178,21 @@ pub fn standing_lines(
             }
         })
         .collect()
+}
+
+/// What noise alone shows in a line of a spectrum.
+fn floor(spectrum: &OrderSpectrum, sample_rate_hz: f64) -> f64 {
+    (spectrum.sample_std * (spectrum.line_hz / sample_rate_hz).sqrt()).max(1e-300)
+}
+
+/// Distance of a frequency from the nearest multiple of `spacing`, Hz.
+fn beside(hz: f64, spacing: f64) -> f64 {
+    (hz / spacing - (hz / spacing).round()).abs() * spacing
+}
+
+/// Median of forty lines to each side, never below what noise shows.
+fn surroundings(strength: &[f64], j: usize) -> f64 {
+    median(&strength[j.saturating_sub(40)..(j + 41).min(strength.len())]).max(1.0)
 }
 
 /// Centre of the power around a peak, in lines.

@@ -99,8 +99,8 @@ struct Running {
     stage: Arc<Stage>,
 }
 
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // A job that panics holds none of these locks; and what they guard is whole at every moment.
+/// The lock, also where a thread panicked with it: what such locks guard is whole at every moment.
+pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

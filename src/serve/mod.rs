@@ -17,6 +17,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+pub(crate) use desk::locked;
 pub use desk::{Job, Stage};
 use guard::Guard;
 

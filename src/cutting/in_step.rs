@@ -9,8 +9,8 @@ use crate::ingest::TimeRecord;
 use crate::ingest::units::figures;
 use crate::signal::{SpindleTrack, spindle_track};
 
-const OTHER_SPEED: &str = "the spindle did not keep the stated speed: turns are averaged by the angle that the forces show (waveforms: \
-     all but the wander is taken out); correct spindle_rpm (and the feed per tooth that goes with it), and look why it changes \
+const OTHER_SPEED: &str = "the spindle did not keep the stated speed: turns are averaged by the angle that the forces show (waveforms \
+     only where it does not wander); correct spindle_rpm (and the feed per tooth that goes with it), and look why it changes \
      under load";
 
 /// Which part of the speed's changes is taken out of a record.
@@ -18,9 +18,9 @@ const OTHER_SPEED: &str = "the spindle did not keep the stated speed: turns are 
 pub enum InStep {
     /// All of them: averages over turns.
     Fully,
-    /// Offset and droop: what wanders is left for `diagnose` to find as a mistake of the setup
-    /// (`spindle-speed-variation`).
-    ButForWander,
+    /// All of them, unless the speed wanders: then the record stays as it is, for `diagnose` to find that as a mistake of the
+    /// setup (`spindle-speed-variation`).
+    UnlessItWanders,
 }
 
 /// The record of one cut and what it says, in step with the stated speed.
@@ -33,7 +33,7 @@ pub fn read_in_step(campaign: &Campaign, index: usize, how: InStep) -> Result<(T
     if let Some(found) = followed(campaign, &analysis, &record) {
         let removed = match how {
             InStep::Fully => Some(found.clone()),
-            InStep::ButForWander => found.without_wander(),
+            InStep::UnlessItWanders => found.without_wander(),
         };
         if let Some(track) = removed {
             let own = record.channels.iter_mut().filter(|c| axis_of(c.role).is_some());
@@ -183,6 +183,29 @@ mod tests {
             assert_eq!(analysis.spindle, None, "cut {}", analysis.id);
             let (as_read, _) = read_record(&campaign, i).unwrap();
             assert_eq!(record.channels[0].samples, as_read.channels[0].samples);
+        }
+    }
+
+    #[test]
+    fn what_wanders_is_left_to_diagnose() {
+        type Speed = (&'static dyn Fn(f64) -> f64, bool);
+        let speeds: [Speed; 2] = [
+            (&|_| 1.007, false),
+            (&|t| 1.0 + 0.01 * (TAU * 1.3 * t).sin(), true),
+        ];
+        for (speed, wanders) in speeds {
+            let dir = tempfile::tempdir().unwrap();
+            let cut = MadeCut {
+                rpm: 1200.0,
+                feed_mm: 0.1,
+                speed,
+            };
+            let campaign = write_campaign(dir.path(), &[cut], &|_, _, _, _, _| 0.0);
+            let (record, analysis) = read_in_step(&campaign, 0, InStep::UnlessItWanders).unwrap();
+            assert!(analysis.spindle.is_some(), "{wanders}");
+            let (as_read, _) = read_record(&campaign, 0).unwrap();
+            let untouched = record.channels[0].samples == as_read.channels[0].samples;
+            assert_eq!(untouched, wanders);
         }
     }
 

@@ -196,7 +196,7 @@ impl CuttingData {
         let outcomes: Vec<Result<(CutData, Vec<Notice>)>> = indices
             .par_iter()
             .map(|&i| {
-                let (record, mut analysis) = read_in_step(campaign, i, InStep::ButForWander)?;
+                let (record, mut analysis) = read_in_step(campaign, i, InStep::UnlessItWanders)?;
                 let notices = std::mem::take(&mut analysis.notices);
                 let outcome = cut_data(campaign, i, &record, &analysis);
                 progress.step();

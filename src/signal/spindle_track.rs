@@ -158,8 +158,7 @@ fn follow(windows: &[&[f64]], start: Start, order: usize) -> Option<SpindleTrack
     let n = order as f64;
     let in_step = [in_step(&|_| 0.0), in_step(&|k| profile.at(k, turns))];
     let [rate, rate_std, change, change_std] = profile.of_speed(turns);
-    let middle = mean(&(0..turns).map(|k| profile.at(k, turns)).collect::<Vec<f64>>());
-    let squares: f64 = (0..turns).map(|k| (profile.at(k, turns) - middle).powi(2)).sum();
+    let coefficients: Vec<f64> = profile.coefficients.iter().map(|c| c / n).collect();
     let (wander, wander_std) = profile.wander(turns);
     Some(SpindleTrack {
         order,
@@ -169,12 +168,12 @@ fn follow(windows: &[&[f64]], start: Start, order: usize) -> Option<SpindleTrack
         droop_std: change_std / (TAU * n),
         wander: wander / (TAU * n),
         wander_std: wander_std / (TAU * n),
-        smear_rad: (squares / turns as f64).sqrt() / n,
+        smear_rad: smear_rad(&coefficients, turns),
         in_step,
         from,
         samples_per_turn,
         turns,
-        coefficients: profile.coefficients.iter().map(|c| c / n).collect(),
+        coefficients,
     })
 }
 
@@ -224,6 +223,19 @@ fn slope_of_basis(count: usize, x: f64) -> Vec<f64> {
     terms.collect()
 }
 
+/// The angle with these coefficients at turn `k`, less its constant.
+fn angle_at(coefficients: &[f64], k: usize, turns: usize) -> f64 {
+    let basis = basis(coefficients.len(), place(k as f64, turns));
+    coefficients.iter().zip(basis).map(|(c, b)| c * b).sum()
+}
+
+/// Root mean square of an angle with these coefficients about its mean, over the turns.
+fn smear_rad(coefficients: &[f64], turns: usize) -> f64 {
+    let angles: Vec<f64> = (0..turns).map(|k| angle_at(coefficients, k, turns)).collect();
+    let middle = mean(&angles);
+    (angles.iter().map(|a| (a - middle).powi(2)).sum::<f64>() / turns as f64).sqrt()
+}
+
 /// Place of the middle of turn `k` in the window, −1 to 1.
 fn place(k: f64, turns: usize) -> f64 {
     (2.0 * k + 1.0) / turns as f64 - 1.0
@@ -263,8 +275,7 @@ fn fit_profile(phase: &[f64]) -> Option<Profile> {
 impl Profile {
     /// Phase at turn `k`, less the constant.
     fn at(&self, k: usize, turns: usize) -> f64 {
-        let basis = basis(self.coefficients.len(), place(k as f64, turns));
-        self.coefficients.iter().zip(basis).map(|(c, b)| c * b).sum()
+        angle_at(&self.coefficients, k, turns)
     }
 
     /// `weight` · coefficients, and its standard deviation.
@@ -353,15 +364,22 @@ impl SpindleTrack {
         self.parts().map(|(value, std)| value.abs() > SIGMAS * std)
     }
 
-    /// The same without the wander; `None` where offset and droop alone are not worth telling.
+    /// The same without the wander; `None` where offset and droop alone are not worth telling, or the wander is: the droop is
+    /// part of it then.
     pub fn without_wander(&self) -> Option<SpindleTrack> {
         // Radians of the tool's turn over the window: the integral of the speed.
         let turns = self.turns as f64;
         let coefficients = vec![PI * turns * self.offset, PI * turns * self.droop / 8.0];
-        let [a, b] = [coefficients[0], coefficients[1]];
+        let count = self.coefficients.len().max(coefficients.len());
+        let at = |of: &[f64], j: usize| of.get(j).copied().unwrap_or(0.0);
+        let wander: Vec<f64> = (0..count)
+            .map(|j| at(&self.coefficients, j) - at(&coefficients, j))
+            .collect();
+        if self.order as f64 * smear_rad(&wander, self.turns) > WORTH_TELLING {
+            return None;
+        }
         let straight = SpindleTrack {
-            // Mean squares of x and of 2 x² − 1 about its mean, over −1 to 1.
-            smear_rad: (a * a / 3.0 + b * b * 16.0 / 45.0).sqrt(),
+            smear_rad: smear_rad(&coefficients, self.turns),
             wander: 0.0,
             wander_std: 0.0,
             coefficients,

@@ -177,8 +177,21 @@ impl Addition {
     ///
     /// # Errors
     /// As there.
-    pub fn after(mut log: RevisionLog, campaign: &Campaign, name: &str, options: Options) -> Result<Self> {
-        let case = StructureCase::load(campaign)?;
+    pub fn after(log: RevisionLog, campaign: &Campaign, name: &str, options: Options) -> Result<Self> {
+        Self::to(StructureCase::load(campaign)?, log, campaign, name, options)
+    }
+
+    /// As [`after`](Self::after), to a case that is there already.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn to(
+        case: StructureCase,
+        mut log: RevisionLog,
+        campaign: &Campaign,
+        name: &str,
+        options: Options,
+    ) -> Result<Self> {
         let data = &case.data;
         // Taken with the data that were read, not after the fit.
         let fingerprint = structure_fingerprint(campaign)?;

@@ -75,8 +75,9 @@ impl<'a> CampaignFindings<'a> {
         let structure = modelled.then(|| StructureFindings::with_modes(campaign, modes));
         let calibrated = structure.as_ref().and_then(|s| s.as_ref().ok());
         // Where nothing can be calibrated nothing can be diagnosed, for the same reason.
-        let diagnosis =
-            (wanted && calibrated.is_some()).then(|| DiagnosisFindings::run(campaign, Options::default()));
+        let diagnosis = calibrated.filter(|_| wanted).map(|structure| {
+            DiagnosisFindings::of(campaign, structure.analysis.settled_case(), Options::default())
+        });
         let cutting = (!campaign.cuts.is_empty()).then(|| identify_forces(campaign, CfcOptions::default()));
         let cutting_diagnosis =
             (wanted && matches!(cutting, Some(Ok(_)))).then(|| CuttingFindings::run(campaign));

@@ -54,7 +54,15 @@ pub struct Leading {
 
 impl DiagnosisFindings {
     pub fn run(campaign: &Campaign, options: Options) -> Result<Self> {
-        let case = StructureCase::load(campaign)?;
+        Self::of(campaign, StructureCase::load(campaign)?, options)
+    }
+
+    /// As [`run`](Self::run), of a case that is there already: best one that was calibrated
+    /// ([`StructureAnalysis::settled_case`](super::StructureAnalysis::settled_case)).
+    ///
+    /// # Errors
+    /// A fit that fails.
+    pub fn of(campaign: &Campaign, case: StructureCase, options: Options) -> Result<Self> {
         let study = study_of(&case, options);
         let mut diagnosis = diagnose(&study, &case.model)?;
         let baseline = &diagnosis.baseline;

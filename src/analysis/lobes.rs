@@ -310,6 +310,18 @@ impl CutForce {
             }
         };
         let mut cut = cut_of(campaign, section, coefficients)?;
+        let shaped = campaign
+            .tool
+            .as_ref()
+            .is_some_and(|tool| !tool.has_straight_edge());
+        if section.process == Process::Milling && shaped {
+            warnings.push(
+                "the lobes take the edge as straight up the side of the tool: corner_radius_mm and lead_angle_deg of [tool] are \
+                 left out of the dynamics (they are in the coefficients), so that the limits hold for depths well beyond the \
+                 corner only"
+                    .into(),
+            );
+        }
         let teeth = cut.average().lateral.teeth;
         let axial = (section.process == Process::Drilling)
             .then(|| axial_torsional_force(campaign, section, coefficients, teeth));

@@ -74,6 +74,11 @@ impl StructureAnalysis {
 }
 
 impl StructureAnalysis {
+    /// The case as calibrated here, for what goes on from it.
+    pub fn settled_case(&self) -> StructureCase {
+        self.case.clone().settled_at(&self.calibration.theta)
+    }
+
     /// Wrong files and other mistakes of the setup, as far as the calibrated model shows them.
     ///
     /// # Errors

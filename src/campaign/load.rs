@@ -386,29 +386,48 @@ fn tool(top: &Section<'_>) -> Result<Option<Tool>> {
         "diameter_mm",
         "teeth",
         "helix_deg",
+        "corner_radius_mm",
+        "lead_angle_deg",
         "half_point_angle_deg",
         "web_thickness_mm",
     ];
     let Some(tool) = top.section("tool", &keys)? else {
         return Ok(None);
     };
-    let kinds = [("endmill", ToolKind::Endmill), ("drill", ToolKind::Drill)];
-    let kind = tool.required("kind", tool.choice("kind", &kinds)?, "\"endmill\" or \"drill\"")?;
+    // A ball end is an end mill whose corner is as round as can be.
+    let kinds = [
+        ("endmill", (ToolKind::Endmill, false)),
+        ("ballend", (ToolKind::Endmill, true)),
+        ("drill", (ToolKind::Drill, false)),
+    ];
+    let (kind, ball) = tool.required(
+        "kind",
+        tool.choice("kind", &kinds)?,
+        "\"endmill\", \"ballend\" or \"drill\"",
+    )?;
     let diameter_mm = tool.required(
         "diameter_mm",
         tool.number("diameter_mm", Bounds::POSITIVE)?,
         "16.0",
     )?;
     let teeth = tool.required("teeth", tool.whole("teeth", 1, 1000)?, "4")?;
-    if kind == ToolKind::Endmill {
-        for key in ["half_point_angle_deg", "web_thickness_mm"] {
-            if tool.has(key) {
-                return Err(tool
-                    .error(key, "belongs to a drill, and this tool is an endmill")
-                    .remedy("take it out, or write kind = \"drill\"")
-                    .into());
-            }
-        }
+    let (foreign, problem, other) = match kind {
+        ToolKind::Endmill => (
+            ["half_point_angle_deg", "web_thickness_mm"],
+            "belongs to a drill, and this tool is an endmill",
+            "drill",
+        ),
+        ToolKind::Drill => (
+            ["corner_radius_mm", "lead_angle_deg"],
+            "belongs to an end mill, and this tool is a drill",
+            "endmill",
+        ),
+    };
+    if let Some(key) = foreign.into_iter().find(|key| tool.has(key)) {
+        return Err(tool
+            .error(key, problem)
+            .remedy(format!("take it out, or write kind = \"{other}\""))
+            .into());
     }
     Ok(Some(Tool {
         kind,
@@ -417,6 +436,12 @@ fn tool(top: &Section<'_>) -> Result<Option<Tool>> {
         helix_deg: tool
             .number("helix_deg", Bounds::open(-90.0, 90.0))?
             .unwrap_or(0.0),
+        corner_radius_mm: tool
+            .number("corner_radius_mm", Bounds::closed(0.0, 0.5 * diameter_mm))?
+            .unwrap_or(if ball { 0.5 * diameter_mm } else { 0.0 }),
+        lead_angle_deg: tool
+            .number("lead_angle_deg", Bounds::above_up_to(0.0, 90.0))?
+            .unwrap_or(90.0),
         half_point_angle_deg: tool.number("half_point_angle_deg", Bounds::above_up_to(0.0, 90.0))?,
         web_thickness_mm: tool.number("web_thickness_mm", Bounds::open(0.0, diameter_mm))?,
     }))

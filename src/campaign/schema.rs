@@ -151,10 +151,21 @@ pub struct Tool {
     pub diameter_mm: f64,
     pub teeth: usize,
     pub helix_deg: f64,
+    /// End mills: radius of the corner between face and side; half the diameter is a ball end, 0 a sharp corner.
+    pub corner_radius_mm: f64,
+    /// End mills: angle between the feed's plane and the straight part of the edge (κr of inserts); 90° up the side.
+    pub lead_angle_deg: f64,
     /// Drills: half of the point angle.
     pub half_point_angle_deg: Option<f64>,
     /// Drills: web thickness.
     pub web_thickness_mm: Option<f64>,
+}
+
+impl Tool {
+    /// Whether the edge of an end mill runs straight up its side.
+    pub fn has_straight_edge(&self) -> bool {
+        self.corner_radius_mm == 0.0 && self.lead_angle_deg == 90.0
+    }
 }
 
 #[derive(Debug, Clone, PartialEq)]

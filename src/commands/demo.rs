@@ -10,14 +10,14 @@ use super::text::{number, percent};
 use super::{Outcome, report};
 use crate::analysis::{
     Addition, CampaignFindings, DiagnosisFindings, LobeAnalysis, LobeFindings, ModalAnalysis,
-    PostureFindings, StructureFindings, ThesisFindings, stick_shapes,
+    PostureFindings, StructureFindings, stick_shapes,
 };
 use crate::builtin::{BuiltinCampaign, FIRST_CELL, SECOND_CELL};
 use crate::campaign::Campaign;
 use crate::cutting::{CfcOptions, CfcResult, identify_forces};
 use crate::identify::{Options, StructureCase};
 use crate::report::campaign as pages;
-use crate::revision::log_file;
+use crate::revision::{RevisionLog, log_file};
 use crate::{Error, InputError, Result, ingest};
 
 #[derive(clap::Args)]
@@ -95,7 +95,6 @@ pub fn run(args: Args) -> Result<Outcome> {
         modal,
         cutting,
         lobes,
-        thesis,
         ..
     } = told;
 
@@ -119,7 +118,7 @@ pub fn run(args: Args) -> Result<Outcome> {
         .collect();
     let files = story.step(
         "report",
-        of("report", &first) + " --thesis",
+        of("report", &first),
         || {
             let second = pages::SecondCell {
                 campaign: &second,
@@ -127,7 +126,7 @@ pub fn run(args: Args) -> Result<Outcome> {
                 diagnosis: &diagnosis,
                 after: &extended,
             };
-            let page = pages::demo_page(&findings, &second, &thesis, &rows);
+            let page = pages::demo_page(&findings, &second, &rows);
             pages::write(&page, &findings, &dir.join("report"))
         },
         |files| {
@@ -153,7 +152,7 @@ pub fn run(args: Args) -> Result<Outcome> {
     ))
 }
 
-/// What the model explains, and the case study.
+/// What the model explains.
 struct FirstCell {
     story: Story,
     structure: StructureFindings,
@@ -161,7 +160,6 @@ struct FirstCell {
     modal: ModalAnalysis,
     cutting: CfcResult,
     lobes: LobeFindings,
-    thesis: ThesisFindings,
 }
 
 /// `of`: a command on a campaign as it is typed.
@@ -193,12 +191,6 @@ fn first_story(first: &Campaign, of: impl Fn(&str, &Campaign) -> String) -> Resu
         coefficients,
     )?;
     let lobes = story.step("lobes", of("lobes", first), || LobeFindings::run(first), lobes)?;
-    let thesis = story.step(
-        "thesis",
-        "lobestone thesis".into(),
-        ThesisFindings::run,
-        case_study,
-    )?;
     Ok(FirstCell {
         story,
         structure,
@@ -206,7 +198,6 @@ fn first_story(first: &Campaign, of: impl Fn(&str, &Campaign) -> String) -> Resu
         modal,
         cutting,
         lobes,
-        thesis,
     })
 }
 
@@ -225,7 +216,7 @@ fn second_story(
     let diagnosis = story.step(
         "diagnose",
         of("diagnose", second),
-        || DiagnosisFindings::run(second, Options::default()),
+        || DiagnosisFindings::of(second, unexplained.analysis.settled_case(), Options::default()),
         crate::report::diagnosis_section::summary,
     )?;
     let missing = diagnosis.diagnosis.winner().map(|w| w.label());
@@ -235,7 +226,11 @@ fn second_story(
     story.step(
         "add",
         of("add", second) + " " + &missing,
-        || Addition::run(second, &missing, Options::default()),
+        || {
+            let case = unexplained.analysis.settled_case();
+            let log = RevisionLog::load(&second.dir)?;
+            Addition::to(case, log, second, &missing, Options::default())
+        },
         added,
     )?;
     let extended = story.step(
@@ -421,19 +416,6 @@ fn history(case: &StructureCase) -> String {
         .map(|r| format!("{}: {}", r.title(), percent(r.nrms)))
         .collect();
     errors.join(", ")
-}
-
-fn case_study(t: &ThesisFindings) -> String {
-    format!(
-        "frequencies of the IRB 6640 within {} (fitted) and {} (predicted), rms; {} measured bands of resonances stay unexplained",
-        percent(t.study.fitted_frequency_error),
-        percent(t.study.predicted_frequency_error),
-        t.study
-            .unexplained
-            .iter()
-            .filter(|b| !(b.from_hz..=b.to_hz).contains(&b.nearest_model_hz))
-            .count(),
-    )
 }
 
 fn describe(steps: &[Step], took: Duration) -> String {

@@ -3,6 +3,7 @@
 
 use std::f64::consts::PI;
 
+use super::waveform::MillingCut;
 use crate::campaign::{CutGeometry, Immersion, Process, Tool};
 use crate::{Error, Result};
 
@@ -108,7 +109,10 @@ pub fn average_row(tool: &Tool, geometry: &CutGeometry, axis: ForceAxis) -> Resu
             feed_per_tooth_mm,
             axial_depth_mm,
             immersion,
-        } => milling_row(tool.teeth, feed_per_tooth_mm, axial_depth_mm, immersion, axis).to_vec(),
+        } if tool.has_straight_edge() => {
+            milling_row(tool.teeth, feed_per_tooth_mm, axial_depth_mm, immersion, axis).to_vec()
+        }
+        CutGeometry::Milling { .. } => shaped_row(tool, geometry, axis),
         CutGeometry::Drilling { .. } => DrillGeometry::new(tool, geometry)?.row(axis).to_vec(),
     };
     if row.iter().all(|v| v.is_finite()) {
@@ -150,6 +154,15 @@ fn milling_row(teeth: usize, feed_mm: f64, depth_mm: f64, immersion: Immersion, 
         ForceAxis::Z => [0.0, 0.0, -edge * feed_mm * cos, 0.0, 0.0, edge * angle],
         ForceAxis::Mz => [0.0; 6],
     }
+}
+
+/// As [`milling_row`], of an edge that is not straight: the waveform's mean.
+fn shaped_row(tool: &Tool, geometry: &CutGeometry, axis: ForceAxis) -> Vec<f64> {
+    let Some(cut) = MillingCut::new(tool, geometry).filter(|_| axis != ForceAxis::Mz) else {
+        return vec![0.0; MILLING_COEFFICIENTS.len()];
+    };
+    let unit = cut.closed_form(0);
+    unit.iter().map(|forces| forces[axis.index()][0].re).collect()
 }
 
 /// A drill in a hole: lengths of drilling.md, mm.
@@ -260,6 +273,8 @@ pub(super) mod tests {
             diameter_mm: 9.5,
             teeth: 2,
             helix_deg: 30.0,
+            corner_radius_mm: 0.0,
+            lead_angle_deg: 90.0,
             half_point_angle_deg: Some(67.5),
             web_thickness_mm: Some(1.425),
         }

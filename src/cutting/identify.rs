@@ -134,6 +134,7 @@ pub fn from_analyses(
             told.extend(misfits.iter().map(|m| warnings::of_misfit(campaign, m)));
             let by_speed: Vec<&Group> = groups[first_group..].iter().collect();
             told.extend(warnings::of_fits(&all, &by_speed));
+            told.extend(warnings::of_shape(campaign, &all));
             told.extend(warnings::of_methods(&all, &by_speed, options));
             if let Some(found) = speed_trends(campaign, one, &rows) {
                 told.extend(found.warnings());
@@ -278,5 +279,40 @@ pub(crate) fn depth_mm(geometry: &CutGeometry) -> Option<f64> {
     match *geometry {
         CutGeometry::Milling { axial_depth_mm, .. } => Some(axial_depth_mm),
         CutGeometry::Drilling { hole_depth_mm, .. } => hole_depth_mm,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cutting::made_records::{MadeCut, TRUTH, write_campaign_of};
+
+    /// Slots with a ball end: the radial force has an axial part, so that all six coefficients hang together.
+    #[test]
+    fn a_ball_end_gives_back_its_coefficients() {
+        let dir = tempfile::tempdir().unwrap();
+        let cuts = [0.04, 0.08, 0.12, 0.16].map(|feed_mm| MadeCut {
+            rpm: 1500.0,
+            feed_mm,
+            speed: &|_| 1.0,
+        });
+        let campaign = write_campaign_of(dir.path(), 5.0, &cuts, &|_, _, _, _, _| 0.0);
+        let result = identify_forces(&campaign, CfcOptions::default()).unwrap();
+        let found = &result.pooled[0];
+        for (coefficient, truth) in found.coefficients.iter().zip(TRUTH) {
+            let (value, std) = (coefficient.value.unwrap(), coefficient.std_error.unwrap());
+            assert!((value - truth).abs() < 4.0 * std, "{value} ± {std} for {truth}");
+            assert!(std < 0.02 * truth.max(50.0), "± {std} of {truth}");
+        }
+        assert!(found.r2.iter().flatten().all(|r2| *r2 > 0.999));
+        assert!(result.warnings.is_empty(), "{:?}", result.warnings);
+        // Taken for a straight end mill the radial force comes out a third too small.
+        let straight = write_campaign_of(dir.path(), 0.0, &[], &|_, _, _, _, _| 0.0);
+        let wrong = Campaign {
+            tool: straight.tool,
+            ..campaign
+        };
+        let wrong = identify_forces(&wrong, CfcOptions::default()).unwrap();
+        assert!(wrong.pooled[0].coefficients[1].value.unwrap() < 0.7 * TRUTH[1]);
     }
 }

@@ -149,6 +149,10 @@ fn terms(tool: &Tool, geometry: &CutGeometry, axis: ForceAxis) -> Option<Vec<Ter
             axial_depth_mm,
             immersion,
         } => {
+            // Where the chip differs along the edge the law has no closed form.
+            if !tool.has_straight_edge() {
+                return None;
+            }
             let scale = tool.teeth as f64 * axial_depth_mm / (2.0 * PI);
             let term = |component, sign: f64, moment| Term {
                 component,
@@ -639,6 +643,8 @@ mod tests {
             diameter_mm: 10.0,
             teeth: 2,
             helix_deg: 30.0,
+            corner_radius_mm: 0.0,
+            lead_angle_deg: 90.0,
             half_point_angle_deg: None,
             web_thickness_mm: None,
         }
@@ -845,6 +851,8 @@ mod tests {
             kind: ToolKind::Drill,
             diameter_mm: 8.0,
             helix_deg: 30.0,
+            corner_radius_mm: 0.0,
+            lead_angle_deg: 90.0,
             half_point_angle_deg: Some(59.0),
             web_thickness_mm: Some(1.2),
             teeth: 2,

@@ -26,25 +26,48 @@ pub struct MadeCut<'a> {
     pub speed: &'a dyn Fn(f64) -> f64,
 }
 
-/// Forces on the tool by its angle, in [`POINTS`] steps of a turn.
-fn turn(feed_mm: f64) -> Vec<[f64; 3]> {
-    let slices = 40;
-    let dz = DEPTH_MM / f64::from(slices);
+/// Ends of the edge's bits as distance from the axis and height, mm: up the side of the tool, or round its corner.
+fn outline(corner_radius_mm: f64) -> Vec<[f64; 2]> {
+    let bits = 40;
+    let radius = 0.5 * DIAMETER_MM;
+    (0..=bits)
+        .map(|b| {
+            let share = f64::from(b) / f64::from(bits);
+            if corner_radius_mm < DEPTH_MM {
+                return [radius, share * DEPTH_MM];
+            }
+            let (sin, cos) = (share * (1.0 - DEPTH_MM / corner_radius_mm).acos()).sin_cos();
+            [
+                radius - corner_radius_mm * (1.0 - sin),
+                corner_radius_mm * (1.0 - cos),
+            ]
+        })
+        .collect()
+}
+
+/// Forces on the tool by its angle, in [`POINTS`] steps of a turn: vectors in space, bit by bit of the edge.
+fn turn(feed_mm: f64, corner_radius_mm: f64) -> Vec<[f64; 3]> {
+    let outline = outline(corner_radius_mm);
     let lag = 2.0 * HELIX_DEG.to_radians().tan() / DIAMETER_MM;
     let at = |angle: f64| {
         let mut sum = [0.0; 3];
         for tooth in 0..TEETH {
-            for s in 0..slices {
-                let z = (f64::from(s) + 0.5) * dz;
+            for ends in outline.windows(2) {
+                let z = 0.5 * (ends[0][1] + ends[1][1]);
                 let phi = (angle + TAU * tooth as f64 / TEETH as f64 - lag * z).rem_euclid(TAU);
                 if phi >= PI {
                     continue;
                 }
+                let (out, up) = (ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]);
+                let length = out.hypot(up);
                 let (sin, cos) = phi.sin_cos();
-                let force = [0, 1, 2].map(|i| (TRUTH[i] * feed_mm * sin + TRUTH[i + 3]) * dz);
-                sum[0] += -force[0] * cos - force[1] * sin;
-                sum[1] += force[0] * sin - force[1] * cos;
-                sum[2] += force[2];
+                let chip = feed_mm * sin * up / length;
+                let [t, r, a] = [0, 1, 2].map(|i| (TRUTH[i] * chip + TRUTH[i + 3]) * length);
+                // Away from the axis across the edge, and along it.
+                let outward = (a * out - r * up) / length;
+                sum[0] += -t * cos + outward * sin;
+                sum[1] += t * sin + outward * cos;
+                sum[2] += (r * out + a * up) / length;
             }
         }
         sum
@@ -58,9 +81,19 @@ pub fn write_campaign(
     cuts: &[MadeCut],
     more: &dyn Fn(usize, usize, f64, f64, bool) -> f64,
 ) -> crate::campaign::Campaign {
+    write_campaign_of(dir, 0.0, cuts, more)
+}
+
+/// As [`write_campaign`], with a tool whose corner is round: 0, or a radius that is no less than the depth.
+pub fn write_campaign_of(
+    dir: &Path,
+    corner_radius_mm: f64,
+    cuts: &[MadeCut],
+    more: &dyn Fn(usize, usize, f64, f64, bool) -> f64,
+) -> crate::campaign::Campaign {
     let mut toml = format!(
         "schema = \"lobestone/campaign/1\"\nname = \"made\"\n\n[tool]\nkind = \"endmill\"\ndiameter_mm = {DIAMETER_MM:?}\nteeth = {TEETH}\n\
-         helix_deg = {HELIX_DEG:?}\n\n[material]\nname = \"unnamed\"\n"
+         helix_deg = {HELIX_DEG:?}\ncorner_radius_mm = {corner_radius_mm:?}\n\n[material]\nname = \"unnamed\"\n"
     );
     std::fs::create_dir_all(dir.join("force")).unwrap();
     for (c, cut) in cuts.iter().enumerate() {
@@ -71,7 +104,7 @@ pub fn write_campaign(
              {:?}\naxial_depth_mm = {DEPTH_MM:?}\nimmersion = \"slot\"\n",
             cut.rpm, cut.feed_mm
         );
-        let turn = turn(cut.feed_mm);
+        let turn = turn(cut.feed_mm, corner_radius_mm);
         let mut random = ChaCha8Rng::seed_from_u64(c as u64 + 7);
         let mut text = String::from("Time [s],Fx [N],Fy [N],Fz [N]\n");
         let mut angle = 0.3 + c as f64;

@@ -32,9 +32,12 @@ fn specific(campaign: &Campaign, cut: &CutAnalysis) -> Option<Specific> {
             let plane = force(ForceAxis::X)
                 .zip(force(ForceAxis::Y))
                 .map(|(x, y)| x.hypot(y) / stretch);
+            // On an edge that is not straight the radial force has an axial part.
+            let upward = row(ForceAxis::Z).map(|z| z[1].hypot(z[2]));
+            let axial = force(ForceAxis::Z).zip(upward).map(|(z, upward)| z / upward);
             Specific {
                 cutting: plane.filter(|k| k.is_finite()),
-                axial: ratio(ForceAxis::Z, 2),
+                axial: axial.filter(|k| k.is_finite()),
             }
         }
         Process::Drilling => Specific {

@@ -296,6 +296,8 @@ mod tests {
             diameter_mm: 10.0,
             teeth: 2,
             helix_deg: 30.0,
+            corner_radius_mm: 0.0,
+            lead_angle_deg: 90.0,
             half_point_angle_deg: None,
             web_thickness_mm: None,
         };

@@ -100,6 +100,7 @@ mod tests {
                 exit_rad: exit_deg.to_radians(),
             },
             lag_rad: 0.15,
+            shape: None,
         }
     }
 

@@ -148,6 +148,24 @@ pub(super) fn of_misfit(campaign: &Campaign, misfit: &Misfit) -> String {
     )
 }
 
+/// With an edge that is not straight the axial force tells of the radial one: counted the wrong way round it makes that
+/// negative.
+pub(super) fn of_shape(campaign: &Campaign, fit: &Group) -> Option<String> {
+    let shaped = campaign
+        .tool
+        .as_ref()
+        .is_some_and(|tool| !tool.has_straight_edge());
+    let radial = fit.coefficients.iter().find(|c| c.label == "Krc")?;
+    let (value, std) = (radial.value?, radial.std_error?);
+    (shaped && value < -2.0 * std).then(|| {
+        format!(
+            "Krc is {value:.0} ± {std:.0} N/mm²: no edge draws itself into the work like that. On an edge that is not straight the \
+             radial force pushes the tool up; check that Fz is that of the work on the tool, away from the tip positive \
+             (`tool_from_dyno` in [dynamometer])"
+        )
+    })
+}
+
 /// What the regressions themselves have to say: `all` cuts of a process, and its groups by speed.
 pub(super) fn of_fits(all: &Group, groups: &[&Group]) -> Vec<String> {
     let mut warnings = Vec::new();

@@ -97,6 +97,15 @@ impl StructureCase {
         }
     }
 
+    /// The same case, whose fits start from `theta` (solver's scale), found by calibrating it: nothing is searched again.
+    pub fn settled_at(self, theta: &[f64]) -> Self {
+        StructureCase {
+            model: self.model.with_start(theta.to_vec()),
+            settled: true,
+            ..self
+        }
+    }
+
     /// Makes fits start from the nominal values, not from where the last revision stood.
     pub fn forget_start(&mut self) {
         self.model = self.model.without_start();

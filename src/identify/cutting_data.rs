@@ -483,6 +483,9 @@ fn summary(campaign: &Campaign, process: Process, cuts: &[CutData]) -> CuttingSu
     CuttingSummary {
         process,
         teeth: campaign.tool.as_ref().map_or(1, |t| t.teeth.max(1)),
+        straight_edge: cuts
+            .iter()
+            .all(|c| !matches!(&c.kind, CutKind::Milling { cut, .. } if cut.shape.is_some())),
         cuts: cuts.len(),
         sequence_length: if all_ordered { order.len() } else { 0 },
         speed_m_per_min: speed_range(cuts),

@@ -47,6 +47,16 @@ pub struct FrfBlock {
     pub frfs: Vec<FrfDatum>,
 }
 
+impl FrfBlock {
+    /// The outputs that are hit, as indices into them, ascending.
+    pub fn inputs(&self) -> Vec<usize> {
+        let mut inputs: Vec<usize> = self.frfs.iter().map(|f| f.input).collect();
+        inputs.sort_unstable();
+        inputs.dedup();
+        inputs
+    }
+}
+
 /// All FRFs of a campaign.
 #[derive(Debug, Clone)]
 pub struct FrfData {

@@ -53,10 +53,7 @@ impl StructureModel {
         let basis = self.basis(theta, block, true)?;
         let channels = Channels::new(&self.filter(theta, true));
         let lines = block.frequency_hz.len();
-        let mut inputs: Vec<usize> = block.frfs.iter().map(|f| f.input).collect();
-        inputs.sort_unstable();
-        inputs.dedup();
-        let mut slopes = Slopes::of_inputs(inputs);
+        let mut slopes = Slopes::of_inputs(block.inputs());
         let mut response = Response::default();
         let mut slope = vec![Complex64::ZERO; theta.len()];
         let mut predicted: Vec<PredictedFrf> = block

@@ -113,10 +113,7 @@ impl SpotResponses {
         let basis = FrfBasis::new(&chain.system(0), &all_rows)?;
         let channels = Channels::new(&model.filter(theta, true));
 
-        let mut inputs: Vec<usize> = block.frfs.iter().map(|f| f.input).collect();
-        inputs.sort_unstable();
-        inputs.dedup();
-        let mut slopes = Slopes::of_inputs(inputs);
+        let mut slopes = Slopes::of_inputs(block.inputs());
         let (mut sloped, mut response) = (Response::default(), Response::default());
         let mut slope = vec![Complex64::ZERO; count];
         let frfs = block.frfs.len();

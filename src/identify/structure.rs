@@ -324,9 +324,7 @@ impl StructureModel {
             let n = if damped { all } else { all.min(most) } as f64;
             let coupled = damped || !chain.branches.is_empty();
             let outputs = block.outputs.len() as f64;
-            let mut inputs: Vec<usize> = block.frfs.iter().map(|f| f.input).collect();
-            inputs.sort_unstable();
-            inputs.dedup();
+            let inputs = block.inputs();
             let solved = if coupled {
                 n * n * (n / 3.0 + outputs)
             } else {
@@ -348,11 +346,12 @@ impl StructureModel {
             .map(|block| {
                 let basis = self.basis(theta, block, false)?;
                 let channels = Channels::new(&filter);
+                let inputs = block.inputs();
                 let mut response = Response::default();
                 let mut columns = vec![Vec::with_capacity(block.frequency_hz.len()); block.frfs.len()];
                 for f in &block.frequency_hz {
                     let omega = std::f64::consts::TAU * f;
-                    basis.solve(omega, &mut response)?;
+                    basis.solve_along(omega, inputs.iter().copied(), &mut response)?;
                     for (frf, column) in block.frfs.iter().zip(&mut columns) {
                         column.push(channels.measured(omega, frf, &basis, &response));
                     }
@@ -392,10 +391,7 @@ impl StructureModel {
                 };
                 let mut curves: Vec<RestCurve> = block.frfs.iter().map(empty).collect();
                 let basis = self.basis(theta, block, true)?;
-                let mut inputs: Vec<usize> = block.frfs.iter().map(|f| f.input).collect();
-                inputs.sort_unstable();
-                inputs.dedup();
-                let mut slopes = Slopes::of_inputs(inputs);
+                let mut slopes = Slopes::of_inputs(block.inputs());
                 let mut response = Response::default();
                 let mut slope = vec![Complex64::ZERO; theta.len()];
                 for (line, f) in block.frequency_hz.iter().enumerate() {
@@ -635,10 +631,7 @@ impl FrfProblem<'_> {
     ) -> Result<Partial> {
         let mut partial = Partial::zero(count);
         let mut response = Response::default();
-        let mut inputs: Vec<usize> = block.frfs.iter().map(|f| f.input).collect();
-        inputs.sort_unstable();
-        inputs.dedup();
-        let mut slopes = Slopes::of_inputs(inputs);
+        let mut slopes = Slopes::of_inputs(block.inputs());
         let mut slope = vec![Complex64::ZERO; count];
         // Residuals of one line and their derivatives, column by column: real parts, then imaginary parts.
         let rows = match self.misfit {
@@ -650,9 +643,11 @@ impl FrfProblem<'_> {
         let lines = (chunk * CHUNK..(chunk + 1) * CHUNK).map(|k| k * self.stride);
         for line in lines.take_while(|l| *l < block.frequency_hz.len()) {
             let omega = std::f64::consts::TAU * block.frequency_hz[line];
-            basis.solve(omega, &mut response)?;
             if count > 0 {
+                basis.solve(omega, &mut response)?;
                 basis.slopes(&response, &mut slopes);
+            } else {
+                basis.solve_along(omega, slopes.inputs.iter().copied(), &mut response)?;
             }
             for (k, frf) in block.frfs.iter().enumerate() {
                 let model = channels.measured(omega, frf, basis, &response);

@@ -529,17 +529,20 @@ pub fn rescue<S: Study>(
     const STARTS: (usize, u64) = (4, 1);
     let parameters = study.parameters(model);
     let own = own_starts(study, &tried.model, parameters.len(), &tried.instance, hints);
-    let fits: Vec<Fit> = scattered_starts(parameters, STARTS.0, STARTS.1)
-        .par_iter()
-        .filter_map(|base| {
-            let base = std::slice::from_ref(base);
-            screen(study, &tried.model, base, &own, Effort::Staged).ok()
-        })
-        .collect();
     let bounds = study.bounds(&tried.model);
     let fit =
         |view: View, start: &[f64]| minimise(&study.problem(&tried.model, view), start, &bounds, stopping);
     let coarse = fit(View::COARSE, &tried.fit.theta)?;
+    let fits: Vec<Fit> = scattered_starts(parameters, STARTS.0, STARTS.1)
+        .par_iter()
+        .filter_map(|base| {
+            let base = std::slice::from_ref(base);
+            look(study, &tried.model, base, &own, Effort::Staged).ok()
+        })
+        // What a look leaves that far above would only end beside.
+        .filter(|looks| looks[0].cost <= OUT_OF_RACE * coarse.cost)
+        .filter_map(|looks| settle(study, &tried.model, &looks).ok())
+        .collect();
     let lowest = fits.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
     let Some(lowest) = lowest.filter(|l| l.cost < coarse.cost * (1.0 - 1e-3)) else {
         return Ok(None);

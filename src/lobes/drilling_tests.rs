@@ -106,6 +106,8 @@ fn the_force_is_the_baseline_of_the_campaign() {
         diameter_mm: 9.5,
         teeth: LIPS,
         helix_deg: 30.0,
+        corner_radius_mm: 0.0,
+        lead_angle_deg: 90.0,
         half_point_angle_deg: Some(67.5),
         web_thickness_mm: Some(1.4),
     };

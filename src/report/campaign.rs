@@ -143,20 +143,12 @@ pub struct SecondCell<'a> {
     pub after: &'a StructureCase,
 }
 
-/// The demo's page: a campaign that the model explains, one that it does not, and the case study.
-pub fn demo_page(
-    findings: &CampaignFindings,
-    second: &SecondCell,
-    thesis: &ThesisFindings,
-    steps: &[StepRow],
-) -> Page {
+/// The demo's page: a campaign that the model explains, and one that it does not.
+pub fn demo_page(findings: &CampaignFindings, second: &SecondCell, steps: &[StepRow]) -> Page {
     // Most of the work is drawing figures.
-    let (mut page, (second_sections, thesis_section)) = rayon::join(
-        || page(findings, None),
-        || rayon::join(|| second_cell(second), || thesis_section::section(thesis)),
-    );
+    let (mut page, second_sections) = rayon::join(|| page(findings, None), || second_cell(second));
     page.title = "Lobestone demo".into();
-    page.subtitle = "Two simulated robot cells, and the thesis that this program started from".into();
+    page.subtitle = "Two simulated robot cells".into();
     page.opening = "Something was hidden in one of two simulated cells, and the program was not told what. This is what it \
                     found:"
         .into();
@@ -170,7 +162,6 @@ pub fn demo_page(
     page.sections.push(demo_story(steps));
     page.sections.extend(second_sections);
     page.sections.extend(first);
-    page.sections.push(thesis_section);
     page.open_sections = Some(1);
     page
 }

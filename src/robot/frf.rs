@@ -132,12 +132,22 @@ struct MasslessDerivatives {
     own: Vec<f64>,
 }
 
-/// Responses of all outputs at one frequency: Z⁻¹ rᵀ in the basis, n × outputs, column by column.
+/// Responses to forces along outputs at one frequency: Z⁻¹ rᵀ in the basis, n a force, column by column.
 #[derive(Debug, Clone, Default)]
 pub struct Response {
     omega: f64,
     columns: Vec<Complex64>,
+    /// Which column belongs to the force along an output.
+    place: Vec<Option<usize>>,
     dynamic: Vec<Complex64>,
+}
+
+impl Response {
+    /// Of the force along output `input`, which must have been solved for.
+    fn column(&self, n: usize, input: usize) -> &[Complex64] {
+        let place = self.place[input].expect("a force that was solved for");
+        &self.columns[n * place..n * (place + 1)]
+    }
 }
 
 /// Derivatives of receptances at one frequency, with the room to work them out again at the next.
@@ -322,17 +332,55 @@ impl FrfBasis {
         self.rows.ncols()
     }
 
-    /// Solves for all outputs at `omega` (rad/s). Fails only where an undamped system is hit at resonance.
+    /// Solves for forces along all outputs at `omega` (rad/s). Fails only where an undamped system is hit at resonance.
     pub fn solve(&self, omega: f64, response: &mut Response) -> Result<()> {
+        self.solve_along(omega, 0..self.output_count(), response)
+    }
+
+    /// Solves for forces along the outputs `inputs` only, at `omega` (rad/s): enough for receptances, not for slopes.
+    ///
+    /// # Errors
+    /// As [`Self::solve`].
+    pub fn solve_along(
+        &self,
+        omega: f64,
+        inputs: impl IntoIterator<Item = usize>,
+        response: &mut Response,
+    ) -> Result<()> {
+        self.solve_at_rate(Complex64::new(0.0, omega), inputs, response)
+    }
+
+    /// As [`Self::solve`] at the complex rate s = iω + `decay_per_s`: the response that a signal shows which was multiplied
+    /// by exp(−decay t).
+    pub fn solve_decaying(&self, omega: f64, decay_per_s: f64, response: &mut Response) -> Result<()> {
+        let rate = Complex64::new(decay_per_s, omega);
+        self.solve_at_rate(rate, 0..self.output_count(), response)
+    }
+
+    /// Solves for forces along the outputs `inputs` that grow like exp(st), `rate` s in rad/s.
+    fn solve_at_rate(
+        &self,
+        rate: Complex64,
+        inputs: impl IntoIterator<Item = usize>,
+        response: &mut Response,
+    ) -> Result<()> {
         let n = self.n;
-        response.omega = omega;
+        let square = rate * rate;
+        response.omega = rate.im;
         response.columns.clear();
+        response.place.clear();
+        response.place.resize(self.output_count(), None);
+        let rows = |input: usize| &self.rows.as_slice()[n * input..n * (input + 1)];
+        for (place, input) in inputs.into_iter().enumerate() {
+            response.place[input] = Some(place);
+            let forces = rows(input).iter().map(|r| Complex64::new(*r, 0.0));
+            response.columns.extend(forces);
+        }
         match &self.dynamics {
             Dynamics::Diagonal { mu, damping } => {
-                for column in self.rows.column_iter() {
-                    for i in 0..n {
-                        let z = Complex64::new(1.0 - omega * omega * mu[i], omega * damping[i]);
-                        response.columns.push(column[i] / z);
+                for column in response.columns.chunks_exact_mut(n.max(1)) {
+                    for (x, (mu, damping)) in column.iter_mut().zip(mu.iter().zip(damping)) {
+                        *x /= 1.0 + square * mu + rate * damping;
                     }
                 }
             }
@@ -341,81 +389,37 @@ impl FrfBasis {
                 damping,
                 hysteretic,
             } => {
-                let stiffness = |i: usize| if i / n == i % n { 1.0 } else { 0.0 };
-                let entries = mass.iter().zip(damping).zip(hysteretic).enumerate();
                 response.dynamic.clear();
-                response.dynamic.extend(
-                    entries.map(|(i, ((m, c), h))| {
-                        Complex64::new(stiffness(i) - omega * omega * m, omega * c + h)
-                    }),
-                );
+                let entries = mass.iter().zip(damping).zip(hysteretic);
                 response
-                    .columns
-                    .extend(self.rows.iter().map(|r| Complex64::new(*r, 0.0)));
+                    .dynamic
+                    .extend(entries.map(|((m, c), h)| square * m + rate * c + Complex64::new(0.0, *h)));
+                // The stiffness is the identity.
+                for diagonal in response.dynamic.iter_mut().step_by(n + 1) {
+                    diagonal.re += 1.0;
+                }
                 solve_in_place(n, &mut response.dynamic, &mut response.columns);
             }
         }
         if response.columns.iter().any(|v| !v.is_finite()) {
             return Err(Error::computation(format!(
                 "the model has no finite response at {:.3} Hz: it is undamped at a resonance",
-                omega / std::f64::consts::TAU
+                rate.im / std::f64::consts::TAU
             )));
         }
         Ok(())
     }
 
-    /// As [`Self::solve`] at the complex rate s = iω + `decay_per_s`: the response that a signal shows which was multiplied
-    /// by exp(−decay t).
-    pub fn solve_decaying(&self, omega: f64, decay_per_s: f64, response: &mut Response) -> Result<()> {
-        let n = self.n;
-        let s = Complex64::new(decay_per_s, omega);
-        response.omega = omega;
-        response.columns.clear();
-        match &self.dynamics {
-            Dynamics::Diagonal { mu, damping } => {
-                for column in self.rows.column_iter() {
-                    for i in 0..n {
-                        response
-                            .columns
-                            .push(column[i] / (1.0 + s * damping[i] + s * s * mu[i]));
-                    }
-                }
-            }
-            Dynamics::Full {
-                mass,
-                damping,
-                hysteretic,
-            } => {
-                let stiffness = |i: usize| if i / n == i % n { 1.0 } else { 0.0 };
-                let entries = mass.iter().zip(damping).zip(hysteretic).enumerate();
-                response.dynamic.clear();
-                response.dynamic.extend(
-                    entries.map(|(i, ((m, c), h))| stiffness(i) + s * *c + s * s * *m + Complex64::i() * *h),
-                );
-                response
-                    .columns
-                    .extend(self.rows.iter().map(|r| Complex64::new(*r, 0.0)));
-                solve_in_place(n, &mut response.dynamic, &mut response.columns);
-            }
-        }
-        match response.columns.iter().all(|v| v.is_finite()) {
-            true => Ok(()),
-            false => Err(Error::computation(
-                "the model has no finite response at a complex rate",
-            )),
-        }
-    }
-
     /// Receptance of output `out` per force along output `input`, m/N, at the frequency last solved.
     pub fn receptance(&self, response: &Response, out: usize, input: usize) -> Complex64 {
-        let column = &response.columns[input * self.n..(input + 1) * self.n];
+        let column = response.column(self.n, input);
         let row = &self.rows.as_slice()[out * self.n..(out + 1) * self.n];
         let moving: Complex64 = row.iter().zip(column).map(|(r, u)| u * *r).sum();
         moving + self.massless.as_ref().map_or(0.0, |m| m[(out, input)])
     }
 
     /// dH/dp = −u_outᵀ (dZ/dp) u_in for every parameter, every output and the inputs of `slopes`, at the frequency last
-    /// solved.
+    /// solved with [`Self::solve`].
     pub fn slopes(&self, response: &Response, slopes: &mut Slopes) {
         let (n, count, outputs) = (self.n, self.derivatives.count, self.rows.ncols());
         let inputs = slopes.inputs.len();
@@ -431,9 +435,7 @@ impl FrfBasis {
         slopes.parameters = count;
         slopes.forces.clear();
         for input in &slopes.inputs {
-            slopes
-                .forces
-                .extend_from_slice(&response.columns[input * n..(input + 1) * n]);
+            slopes.forces.extend_from_slice(response.column(n, *input));
         }
         slopes.dynamic.clear();
         let stiff_and_damped = stiffness.iter().zip(damping);
@@ -509,10 +511,13 @@ impl FrfBasis {
 /// singular A leaves values that are not finite. (The systems are so small, and solved so often, that a library's
 /// blocking and memory take longer than the arithmetic.)
 fn solve_in_place(n: usize, a: &mut [Complex64], b: &mut [Complex64]) {
-    // Six joints with one or two branches: with the size known beforehand the compiler unrolls the loops.
+    // Six joints with a few branches or dampers: with the size known beforehand the compiler unrolls the loops.
     match n {
+        6 => eliminate(6, a, b),
         7 => eliminate(7, a, b),
         8 => eliminate(8, a, b),
+        9 => eliminate(9, a, b),
+        12 => eliminate(12, a, b),
         _ => eliminate(n, a, b),
     }
 }

@@ -218,8 +218,8 @@ fn tool(cuts: &[(Option<String>, Table)], answers: &Answers) -> Result<Table> {
     making.add(
         Entry::new(
             "kind",
-            Kind::Choice(&["endmill", "drill"]),
-            "endmill or drill",
+            Kind::Choice(&["endmill", "ballend", "drill"]),
+            "endmill, ballend or drill",
             "endmill",
         ),
         &[(kind, "what the process needs")],
@@ -331,7 +331,7 @@ fn cuts(scan: &Scan, answers: &Answers) -> Result<Vec<(Option<String>, Table)>> 
         let given = |keys: &[&'static str]| keys.iter().any(|k| known(k).is_some());
         let kind_of_tool = answers.get("tool", "", "kind");
         let concluded = match () {
-            _ if given(&milled) || kind_of_tool == Some("endmill") => Some("milling"),
+            _ if given(&milled) || matches!(kind_of_tool, Some("endmill" | "ballend")) => Some("milling"),
             _ if given(&drilled) || kind_of_tool == Some("drill") => Some("drilling"),
             _ => None,
         };

@@ -5,8 +5,11 @@
 
 use std::f64::consts::TAU;
 
+use faer::linalg::matmul::matmul;
+use faer::{Accum, MatMut, MatRef, Par};
 use num_complex::Complex64;
 
+use super::edge_shape::EdgeShape;
 use super::quadrature::gauss_legendre;
 use crate::campaign::{CutGeometry, Immersion, Tool};
 
@@ -22,6 +25,8 @@ pub struct MillingCut {
     pub immersion: Immersion,
     /// Angle by which the top of the engaged depth lags behind the tip, rad: 2 a tan β / D.
     pub lag_rad: f64,
+    /// `None` for an edge that runs straight up the side. Only [`Self::closed_form`] knows of others.
+    pub shape: Option<EdgeShape>,
 }
 
 /// How the chip differs from c sin φ and the force from one proportional to it.
@@ -74,22 +79,12 @@ impl MillingCut {
             axial_depth_mm,
             immersion,
             lag_rad: 2.0 * axial_depth_mm * tool.helix_deg.to_radians().tan() / tool.diameter_mm,
+            shape: EdgeShape::of(tool),
         })
     }
 
     fn nothing(orders: usize) -> UnitForces {
         std::array::from_fn(|_| std::array::from_fn(|_| vec![Complex64::ZERO; orders + 1]))
-    }
-
-    /// (1/2π) ∫ e^{−imφ} dφ over the immersion.
-    fn window(&self, m: i64) -> Complex64 {
-        let Immersion { start_rad, exit_rad } = self.immersion;
-        if m == 0 {
-            return Complex64::from((exit_rad - start_rad) / TAU);
-        }
-        let m = m as f64;
-        let end = |angle: f64| Complex64::from_polar(1.0, -m * angle);
-        (end(exit_rad) - end(start_rad)) * Complex64::new(0.0, 1.0 / (TAU * m))
     }
 
     /// a ∫ e^{−inψz} dz over the engaged depth: what the helix makes of order n, mm.
@@ -110,31 +105,71 @@ impl MillingCut {
     }
 
     /// Closed form for h = c sin φ and a force linear in h. All teeth are alike, so only multiples of their number appear.
+    /// An edge that is not straight is summed up slice by slice.
     pub fn closed_form(&self, orders: usize) -> UnitForces {
         let mut unit = Self::nothing(orders);
-        let c = self.feed_per_tooth_mm;
-        let i = Complex64::I;
-        for n in (0..=orders).step_by(self.teeth) {
-            let factor = self.helix(n) * self.teeth as f64;
-            let w = |m: i64| self.window(n as i64 + m);
-            // cos φ, sin φ, sin φ cos φ and sin² φ by Euler's formulas.
-            let cos = 0.5 * (w(-1) + w(1));
-            let sin = (w(-1) - w(1)) / (2.0 * i);
-            let sin_cos = (w(-2) - w(2)) / (4.0 * i);
-            let sin_sin = 0.5 * w(0) - 0.25 * (w(-2) + w(2));
-            let mut set = |k: usize, axis: usize, value: Complex64| unit[k][axis][n] = value * factor;
-            set(0, 0, -c * sin_cos);
-            set(0, 1, c * sin_sin);
-            set(1, 0, -c * sin_sin);
-            set(1, 1, -c * sin_cos);
-            set(2, 2, c * sin);
-            set(3, 0, -cos);
-            set(3, 1, sin);
-            set(4, 0, -sin);
-            set(4, 1, -cos);
-            set(5, 2, w(0));
+        let orders = (0..=orders).step_by(self.teeth);
+        let teeth = self.teeth as f64;
+        let Some(shape) = self.shape else {
+            for n in orders {
+                let factor = self.helix(n) * teeth;
+                self.add_slice(&mut unit, n, self.immersion, [factor; 2], (1.0, 0.0));
+            }
+            return unit;
+        };
+        for slice in shape.slices(self.axial_depth_mm, self.immersion) {
+            let Some(immersion) = slice.immersion else {
+                continue;
+            };
+            for n in orders.clone() {
+                let lag = n as f64 * self.lag_rad * slice.height_mm / self.axial_depth_mm;
+                let turn = Complex64::from_polar(teeth, -lag);
+                let factors = [turn * slice.depth_mm, turn * slice.length_mm()];
+                self.add_slice(
+                    &mut unit,
+                    n,
+                    immersion,
+                    factors,
+                    (slice.sin_kappa, slice.cos_kappa),
+                );
+            }
         }
         unit
+    }
+
+    /// Order `n` of a slice of the edge. `factors`: of its depth and of its length, mm; sine and cosine of κ.
+    fn add_slice(
+        &self,
+        unit: &mut UnitForces,
+        n: usize,
+        immersion: Immersion,
+        [depth, length]: [Complex64; 2],
+        (sin_kappa, cos_kappa): (f64, f64),
+    ) {
+        let i = Complex64::I;
+        let w = |m: i64| window(immersion, n as i64 + m);
+        // cos φ, sin φ, sin φ cos φ and sin² φ by Euler's formulas.
+        let cos = 0.5 * (w(-1) + w(1));
+        let sin = (w(-1) - w(1)) / (2.0 * i);
+        let sin_cos = (w(-2) - w(2)) / (4.0 * i);
+        let sin_sin = 0.5 * w(0) - 0.25 * (w(-2) + w(2));
+        let cut = depth * self.feed_per_tooth_mm;
+        for (first, factor, [cos, sin, one]) in
+            [(0, cut, [sin_cos, sin_sin, sin]), (3, length, [cos, sin, w(0)])]
+        {
+            let mut add =
+                |k: usize, axis: usize, value: Complex64| unit[first + k][axis][n] += value * factor;
+            add(0, 0, -cos);
+            add(0, 1, sin);
+            add(1, 0, -sin_kappa * sin);
+            add(1, 1, -sin_kappa * cos);
+            add(2, 2, sin_kappa * one);
+            if cos_kappa != 0.0 {
+                add(1, 2, cos_kappa * one);
+                add(2, 0, cos_kappa * sin);
+                add(2, 1, cos_kappa * cos);
+            }
+        }
     }
 
     /// By quadrature over the immersion, and over the depth where runout makes the chip differ along it. `derivatives`:
@@ -158,38 +193,83 @@ impl MillingCut {
             unit: Self::nothing(orders),
             slopes: wanted.map(|w| (w && derivatives).then(|| Box::new(Self::nothing(orders)))),
         };
-        let step = if law.runout.is_some() { 1 } else { self.teeth };
+        // Teeth that are alike leave multiples of their number; teeth that are not leave every order, and those with the
+        // same remainder see the same sum over the teeth.
+        let remainders = if law.runout.is_some() { self.teeth } else { 1 };
         let parts = if derivatives { Chip::PARTS } else { Chip::VALUES };
-        let weights = self.depth_weights(&depth_nodes, orders, step);
-        let turn: Vec<Complex64> = nodes
+        let weights = self.depth_weights(&depth_nodes, orders, remainders);
+        let directions: Vec<[f64; 3]> = nodes
             .iter()
-            .map(|(phi, _)| Complex64::from_polar(1.0, -(step as f64) * phi))
+            .map(|(phi, width)| {
+                let (sin, cos) = phi.sin_cos();
+                [cos, sin, 1.0].map(|d| d * width / TAU)
+            })
             .collect();
-        let directions: Vec<(f64, f64)> = nodes.iter().map(|(phi, _)| phi.sin_cos()).collect();
+        let waves: Vec<Vec<Complex64>> = (0..remainders.min(orders + 1))
+            .map(|r| self.waves(&nodes, r, orders))
+            .collect();
+        let mut folded = vec![Complex64::ZERO; nodes.len() * 3 * parts];
+        let mut products = Vec::new();
         for (q, &z) in depth_nodes.iter().enumerate() {
-            let residues: Vec<Vec<Complex64>> = self.tooth_sums(&nodes, z, law, derivatives, parts);
-            let mut carrier: Vec<Complex64> = nodes.iter().map(|(_, w)| Complex64::from(w / TAU)).collect();
-            for (at, n) in (0..=orders).step_by(step).enumerate() {
-                let teeth = &residues[n % residues.len()];
-                add_order(
-                    &mut sampled,
-                    &directions,
-                    &carrier,
-                    teeth,
-                    parts,
-                    n,
-                    weights[at][q],
+            let sums = self.tooth_sums(&nodes, z, law, derivatives, parts);
+            for (r, (wave, sum)) in waves.iter().zip(&sums).enumerate() {
+                // ∫ part · {cos φ, sin φ, 1} e^{−inφ} dφ / 2π for all orders and parts at once.
+                for (k, direction) in directions.iter().enumerate() {
+                    for part in 0..parts {
+                        for (d, w) in direction.iter().enumerate() {
+                            folded[k + nodes.len() * (3 * part + d)] = sum[k * parts + part] * *w;
+                        }
+                    }
+                }
+                let rows = wave.len() / nodes.len();
+                products.resize(rows * 3 * parts, Complex64::ZERO);
+                matmul(
+                    MatMut::from_column_major_slice_mut(&mut products, rows, 3 * parts),
+                    Accum::Replace,
+                    MatRef::from_column_major_slice(wave, rows, nodes.len()),
+                    MatRef::from_column_major_slice(&folded, nodes.len(), 3 * parts),
+                    Complex64::ONE,
+                    Par::Seq,
                 );
-                carrier.iter_mut().zip(&turn).for_each(|(c, t)| *c *= t);
+                for row in 0..rows {
+                    let n = r + self.teeth * row;
+                    let at = |part: usize| {
+                        let at = |d: usize| products[row + rows * (3 * part + d)];
+                        [at(0), at(1), at(2)]
+                    };
+                    let integrals =
+                        std::array::from_fn(|p| if p < parts { at(p) } else { Default::default() });
+                    add_order(&mut sampled, &integrals, n, weights[n][q]);
+                }
             }
         }
         sampled
     }
 
-    /// a ∫ L_q(z) e^{−inψz} dz with L_q the Lagrange polynomial of node q (Filon's rule): `[order][q]`.
-    fn depth_weights(&self, depth_nodes: &[f64], orders: usize, step: usize) -> Vec<Vec<Complex64>> {
+    /// e^{−inφ} for n = `remainder`, `remainder` + teeth, … up to `orders` at each node, column by column.
+    fn waves(&self, nodes: &[(f64, f64)], remainder: usize, orders: usize) -> Vec<Complex64> {
+        let mut waves = Vec::new();
+        for (phi, _) in nodes {
+            let turn = Complex64::from_polar(1.0, -(self.teeth as f64) * phi);
+            let mut wave = Complex64::from_polar(1.0, -(remainder as f64) * phi);
+            for _ in (remainder..=orders).step_by(self.teeth) {
+                waves.push(wave);
+                wave *= turn;
+            }
+        }
+        waves
+    }
+
+    /// a ∫ L_q(z) e^{−inψz} dz with L_q the Lagrange polynomial of node q (Filon's rule): `[order][q]`. With one remainder
+    /// only multiples of the number of teeth are worked out.
+    fn depth_weights(&self, depth_nodes: &[f64], orders: usize, remainders: usize) -> Vec<Vec<Complex64>> {
+        let step = if remainders == 1 { self.teeth } else { 1 };
+        let mut weights = vec![Vec::new(); orders + 1];
         if depth_nodes.len() == 1 {
-            return (0..=orders).step_by(step).map(|n| vec![self.helix(n)]).collect();
+            for n in (0..=orders).step_by(step) {
+                weights[n] = vec![self.helix(n)];
+            }
+            return weights;
         }
         let count = 12 + (0.5 * orders as f64 * self.lag_rad.abs()).ceil() as usize;
         let fine = gauss_legendre(0.0, 1.0, count);
@@ -206,19 +286,19 @@ impl MillingCut {
                     .collect()
             })
             .collect();
-        (0..=orders)
-            .step_by(step)
-            .map(|n| {
-                let lag: Vec<Complex64> = fine
-                    .iter()
-                    .map(|(z, _)| Complex64::from_polar(1.0, -(n as f64) * self.lag_rad * z))
-                    .collect();
-                lagrange
-                    .iter()
-                    .map(|l| l.iter().zip(&lag).map(|(l, e)| e * *l).sum())
-                    .collect()
-            })
-            .collect()
+        let turn: Vec<Complex64> = fine
+            .iter()
+            .map(|(z, _)| Complex64::from_polar(1.0, -(step as f64) * self.lag_rad * z))
+            .collect();
+        let mut lag = vec![Complex64::ONE; fine.len()];
+        for n in (0..=orders).step_by(step) {
+            weights[n] = lagrange
+                .iter()
+                .map(|l| l.iter().zip(&lag).map(|(l, e)| e * *l).sum())
+                .collect();
+            lag.iter_mut().zip(&turn).for_each(|(lag, turn)| *lag *= turn);
+        }
+        weights
     }
 
     /// Σ_j e^{2πi rj/N} part_j for r = 0..N at depth `z`: `[r][node · parts + part]`; one entry where teeth are alike.
@@ -230,19 +310,25 @@ impl MillingCut {
         derivatives: bool,
         parts: usize,
     ) -> Vec<Vec<Complex64>> {
-        let residues = if law.runout.is_some() { self.teeth } else { 1 };
-        let mut sums = vec![vec![Complex64::ZERO; nodes.len() * parts]; residues];
+        // Where the edge of each tooth stands against the offset of the axis: the teeth differ by that alone.
+        let stands = |j: usize, angle: f64| angle - TAU * j as f64 / self.teeth as f64 + self.lag_rad * z;
+        let edges: Vec<Edge> = match law.runout {
+            Some([_, angle]) => (0..self.teeth).map(|j| Edge::at(stands(j, angle))).collect(),
+            None => vec![Edge::at(0.0)],
+        };
+        let mut sums = vec![vec![Complex64::ZERO; nodes.len() * parts]; edges.len()];
         // Tooth j is ahead of tooth 0.
         let ahead = |m: usize| Complex64::from_polar(1.0, TAU * m as f64 / self.teeth as f64);
         let ahead: Vec<Complex64> = (0..self.teeth).map(ahead).collect();
+        let alike = if edges.len() == 1 { self.teeth as f64 } else { 1.0 };
         for (k, &(phi, width)) in nodes.iter().enumerate() {
-            let chips = self.chips(phi, width, z, law, derivatives);
-            let weight = if chips.len() == 1 { self.teeth as f64 } else { 1.0 };
-            for (r, sum) in sums.iter_mut().enumerate() {
-                for (j, chip) in chips.iter().enumerate() {
-                    let turn = ahead[(r * j) % self.teeth] * weight;
-                    for part in 0..parts {
-                        sum[k * parts + part] += turn * chip.part[part];
+            let direction = phi.sin_cos();
+            for j in 0..edges.len() {
+                let chip = self.chip(direction, width, law, (&edges, j), derivatives);
+                for (r, sum) in sums.iter_mut().enumerate() {
+                    let turn = ahead[(r * j) % self.teeth] * alike;
+                    for (sum, part) in sum[k * parts..(k + 1) * parts].iter_mut().zip(&chip.part) {
+                        *sum += turn * part;
                     }
                 }
             }
@@ -250,82 +336,84 @@ impl MillingCut {
         sums
     }
 
-    /// What each tooth cuts at immersion angle `phi`. `width`: of the quadrature cell, rad.
-    fn chips(&self, phi: f64, width: f64, z: f64, law: ChipLaw, derivatives: bool) -> Vec<Chip> {
-        let teeth = if law.runout.is_some() { self.teeth } else { 1 };
+    /// What tooth `j` of `edges` cuts at an immersion angle of the given sine and cosine. `width`: of the quadrature cell,
+    /// rad.
+    fn chip(
+        &self,
+        (sin, cos): (f64, f64),
+        width: f64,
+        law: ChipLaw,
+        (edges, j): (&[Edge], usize),
+        derivatives: bool,
+    ) -> Chip {
         let c = self.feed_per_tooth_mm;
-        (0..teeth)
-            .map(|j| {
-                let (mut h, mut by_offset, mut by_angle, mut periods) = (c * phi.sin(), 0.0, 0.0, 1.0);
-                if let Some([offset, angle]) = law.runout {
-                    // Radius of tooth j' over that of the tool; what is left to cut is the least that any earlier
-                    // tooth left, the tooth itself a revolution ago among them.
-                    let at = |j: usize| angle - TAU * j as f64 / self.teeth as f64 + self.lag_rad * z;
-                    let here = at(j);
-                    h = f64::INFINITY;
-                    for m in 1..=self.teeth {
-                        let before = at(j + m);
-                        let left = m as f64 * c * phi.sin() + offset * (here.cos() - before.cos());
-                        if left < h {
-                            h = left;
-                            by_offset = here.cos() - before.cos();
-                            by_angle = -offset * (here.sin() - before.sin());
-                            periods = m as f64;
-                        }
-                    }
-                }
-                // The tooth leaves the cut within a quadrature cell: the share of it that is engaged.
-                let rise = (periods * c * phi.cos()).abs() * width;
-                let inside = if rise > 0.0 {
-                    0.5 + h / rise
-                } else {
-                    f64::from(h > 0.0)
-                };
-                let engaged = if law.runout.is_some() {
-                    inside.clamp(0.0, 1.0)
-                } else {
-                    1.0
-                };
-                let edge_slope = if law.runout.is_some() && inside > 0.0 && inside < 1.0 {
-                    1.0 / rise
-                } else {
-                    0.0
-                };
-                Chip::new(
-                    h,
-                    engaged,
-                    edge_slope,
-                    [by_offset, by_angle],
-                    law.exponent,
-                    derivatives,
-                )
-            })
-            .collect()
+        let Some([offset, _]) = law.runout else {
+            return Chip::new(c * sin, 1.0, 0.0, [0.0; 2], law.exponent, derivatives);
+        };
+        // What is left to cut is the least that any earlier tooth left, the tooth itself a revolution ago among them.
+        let here = edges[j];
+        let left = |m: usize| {
+            let before = edges[(j + m) % edges.len()];
+            m as f64 * c * sin + offset * (here.cos - before.cos)
+        };
+        let least = (2..=edges.len()).fold(1, |least, m| if left(m) < left(least) { m } else { least });
+        let (h, before) = (left(least), edges[(j + least) % edges.len()]);
+        let by = [here.cos - before.cos, -offset * (here.sin - before.sin)];
+        // The tooth leaves the cut within a quadrature cell: the share of it that is engaged.
+        let rise = (least as f64 * c * cos).abs() * width;
+        let inside = if rise > 0.0 {
+            0.5 + h / rise
+        } else {
+            f64::from(h > 0.0)
+        };
+        let edge_slope = if inside > 0.0 && inside < 1.0 {
+            1.0 / rise
+        } else {
+            0.0
+        };
+        Chip::new(
+            h,
+            inside.clamp(0.0, 1.0),
+            edge_slope,
+            by,
+            law.exponent,
+            derivatives,
+        )
     }
 }
 
-/// Adds one depth node's share of order `n`. `directions`: sin φ and cos φ a node; `carrier`: quadrature
-/// weight × e^{−inφ} / 2π; `teeth`: the sum over the
-/// teeth, `[node · parts + part]`.
+/// (1/2π) ∫ e^{−imφ} dφ over an immersion.
+fn window(immersion: Immersion, m: i64) -> Complex64 {
+    let Immersion { start_rad, exit_rad } = immersion;
+    if m == 0 {
+        return Complex64::from((exit_rad - start_rad) / TAU);
+    }
+    let m = m as f64;
+    let end = |angle: f64| Complex64::from_polar(1.0, -m * angle);
+    (end(exit_rad) - end(start_rad)) * Complex64::new(0.0, 1.0 / (TAU * m))
+}
+
+/// Direction in which the edge of a tooth stands, seen from that of the axis' offset.
+#[derive(Debug, Clone, Copy)]
+struct Edge {
+    sin: f64,
+    cos: f64,
+}
+
+impl Edge {
+    fn at(angle_rad: f64) -> Edge {
+        let (sin, cos) = angle_rad.sin_cos();
+        Edge { sin, cos }
+    }
+}
+
+/// Adds one depth node's share of order `n`. `integrals`: of each part of the force times cos φ, sin φ and 1.
 fn add_order(
     sampled: &mut SampledForces,
-    directions: &[(f64, f64)],
-    carrier: &[Complex64],
-    teeth: &[Complex64],
-    parts: usize,
+    integrals: &[[Complex64; 3]; Chip::PARTS],
     n: usize,
     factor: Complex64,
 ) {
-    // Per part of the force (cutting, edge and their slopes): ∫ part · {cos φ, sin φ, 1} e^{−inφ} dφ.
-    let mut sums = [[Complex64::ZERO; 3]; Chip::PARTS];
-    for (k, ((sin, cos), carrier)) in directions.iter().zip(carrier).enumerate() {
-        for (sum, tooth) in sums.iter_mut().zip(&teeth[k * parts..(k + 1) * parts]) {
-            let value = carrier * tooth;
-            sum[0] += value * cos;
-            sum[1] += value * sin;
-            sum[2] += value;
-        }
-    }
     let put = |unit: &mut UnitForces, cutting: &[Complex64; 3], edge: &[Complex64; 3]| {
         for (first, [cos, sin, one]) in [(0, cutting), (3, edge)] {
             unit[first][0][n] -= factor * cos;
@@ -335,12 +423,16 @@ fn add_order(
             unit[first + 2][2][n] += factor * one;
         }
     };
-    put(&mut sampled.unit, &sums[Chip::CUTTING], &sums[Chip::EDGE]);
+    put(
+        &mut sampled.unit,
+        &integrals[Chip::CUTTING],
+        &integrals[Chip::EDGE],
+    );
     let none = [Complex64::ZERO; 3];
     let pairs = [
-        (sums[Chip::BY_EXPONENT], none),
-        (sums[Chip::BY_OFFSET], sums[Chip::EDGE_BY_OFFSET]),
-        (sums[Chip::BY_ANGLE], sums[Chip::EDGE_BY_ANGLE]),
+        (integrals[Chip::BY_EXPONENT], none),
+        (integrals[Chip::BY_OFFSET], integrals[Chip::EDGE_BY_OFFSET]),
+        (integrals[Chip::BY_ANGLE], integrals[Chip::EDGE_BY_ANGLE]),
     ];
     for (slope, (cutting, edge)) in sampled.slopes.iter_mut().zip(&pairs) {
         if let Some(slope) = slope {
@@ -416,6 +508,7 @@ mod tests {
                 exit_rad: exit_deg.to_radians(),
             },
             lag_rad,
+            shape: None,
         }
     }
 
@@ -598,6 +691,106 @@ mod tests {
                         let difference = (up[k][axis][n] - down[k][axis][n]) / (2.0 * h);
                         let off = (difference - slope[k][axis][n]).norm() / scale;
                         assert!(off < 1e-4, "law {i} k {k} axis {axis} order {n}: {off}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// A ball end and an insert with a lead angle, in a slot and in a narrow cut: the force of each bit of edge in space, as a
+    /// vector, with its own position and direction; nothing in common with the slices' formulas.
+    #[test]
+    fn shaped_edges_equal_vectors_summed_over_the_edge() {
+        let (orders, steps, bits) = (6, 1440, 600);
+        for (corner_radius_mm, lead_angle_deg, start_deg) in
+            [(6.0, 90.0, 0.0), (6.0, 90.0, 110.0), (1.0, 60.0, 0.0)]
+        {
+            let tool = crate::cutting::waveform::edge_shape::tests::tool(corner_radius_mm, lead_angle_deg);
+            let (depth, feed) = (2.5, 0.12);
+            let immersion = Immersion {
+                start_rad: f64::to_radians(start_deg),
+                exit_rad: PI,
+            };
+            let cut = MillingCut {
+                teeth: 2,
+                feed_per_tooth_mm: feed,
+                axial_depth_mm: depth,
+                immersion,
+                lag_rad: 0.24,
+                shape: EdgeShape::of(&tool),
+            };
+            // Points along the outline (distance from the axis, height), close enough to be straight between.
+            let lead = f64::to_radians(lead_angle_deg);
+            let outline: Vec<[f64; 2]> = (0..=bits)
+                .map(|b| {
+                    let z = depth * (b as f64 / bits as f64).powi(2);
+                    let top = corner_radius_mm * (1.0 - lead.cos());
+                    let on = z.min(top);
+                    let reach = (on * (2.0 * corner_radius_mm - on)).sqrt() + (z - on) / lead.tan();
+                    [6.0 - corner_radius_mm + reach, z]
+                })
+                .collect();
+            let wall = 6.0 * immersion.start_rad.cos();
+            let mut wave = vec![[[0.0f64; 3]; 6]; steps];
+            for (i, wave) in wave.iter_mut().enumerate() {
+                for tooth in 0..2 {
+                    for ends in outline.windows(2) {
+                        let (dr, dz) = (ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]);
+                        let (radius, z) = (0.5 * (ends[0][0] + ends[1][0]), 0.5 * (ends[0][1] + ends[1][1]));
+                        let turn = TAU * (i as f64 / steps as f64 + tooth as f64 / 2.0);
+                        let phi = (turn - cut.lag_rad * z / depth).rem_euclid(TAU);
+                        // Inside the workpiece: on the side of the feed, not beyond its wall.
+                        if phi >= PI || (start_deg > 0.0 && radius * phi.cos() > wall) {
+                            continue;
+                        }
+                        let length = dr.hypot(dz);
+                        // φ runs from +y towards +x, the feed.
+                        let outward = [phi.sin(), phi.cos()];
+                        let normal = [outward[0] * dz / length, outward[1] * dz / length, -dr / length];
+                        let along = [outward[0] * dr / length, outward[1] * dr / length, dz / length];
+                        let against_cutting = [-phi.cos(), phi.sin(), 0.0];
+                        let chip = feed * normal[0];
+                        for axis in 0..3 {
+                            for (k, direction) in [against_cutting[axis], -normal[axis], along[axis]]
+                                .iter()
+                                .enumerate()
+                            {
+                                wave[k][axis] += direction * chip * length;
+                                wave[3 + k][axis] += direction * length;
+                            }
+                        }
+                    }
+                }
+            }
+            let unit = cut.closed_form(orders);
+            for n in 0..=orders {
+                for k in 0..6 {
+                    for axis in 0..3 {
+                        let sum: Complex64 = wave
+                            .iter()
+                            .enumerate()
+                            .map(|(i, w)| {
+                                let turn = TAU * ((n * i) % steps) as f64 / steps as f64;
+                                w[k][axis] * Complex64::from_polar(1.0 / steps as f64, -turn)
+                            })
+                            .sum();
+                        let scale = if k < 3 { feed * depth } else { depth };
+                        let off = (sum - unit[k][axis][n]).norm() / scale;
+                        assert!(
+                            off < 3e-3,
+                            "r {corner_radius_mm} {start_deg}° k {k} axis {axis} order {n}: {off}"
+                        );
+                        // The averages of the regression are order 0.
+                        if n == 0 {
+                            let geometry = CutGeometry::Milling {
+                                feed_per_tooth_mm: feed,
+                                axial_depth_mm: depth,
+                                immersion,
+                            };
+                            let axis = crate::cutting::ForceAxis::ALL[axis];
+                            let row = crate::cutting::average_row(&tool, &geometry, axis).unwrap();
+                            assert!((row[k] - unit[k][axis.index()][0].re).abs() < 1e-9 * scale);
+                        }
                     }
                 }
             }

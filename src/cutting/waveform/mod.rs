@@ -5,10 +5,12 @@
 //! and the integrals over the immersion have closed forms wherever the force is linear in the chip thickness.
 
 mod drilling;
+mod edge_shape;
 mod milling;
 mod quadrature;
 mod vibrating;
 
 pub use drilling::{DrillTerm, DrillingCut};
+pub use edge_shape::EdgeShape;
 pub use milling::{ChipLaw, MillingCut, SampledForces, UNIT_COUNT, UnitForces};
 pub use vibrating::{LineForces, VibratingForces};

@@ -1,12 +1,27 @@
 //! Gauss–Legendre quadrature.
 
 use std::f64::consts::PI;
+use std::sync::OnceLock;
+
+/// Rules up to this many points are worked out once: fits ask for the same few again and again.
+const KEPT: usize = 512;
+type Rule = Vec<(f64, f64)>;
+static RULES: [OnceLock<Rule>; KEPT] = [const { OnceLock::new() }; KEPT];
 
 /// Nodes and weights for the integral over `[from, to]` with `count` points, exact for polynomials up to degree
-/// 2 count − 1. Roots of the Legendre polynomial by Newton's method from Tricomi's estimates.
+/// 2 count − 1.
 pub fn gauss_legendre(from: f64, to: f64, count: usize) -> Vec<(f64, f64)> {
     let n = count.max(1);
     let (centre, half) = (0.5 * (from + to), 0.5 * (to - from));
+    let moved = |rule: &[(f64, f64)]| rule.iter().map(|(x, w)| (centre + half * x, half * w)).collect();
+    match RULES.get(n) {
+        Some(kept) => moved(kept.get_or_init(|| rule(n))),
+        None => moved(&rule(n)),
+    }
+}
+
+/// The rule over [−1, 1]: roots of the Legendre polynomial by Newton's method from Tricomi's estimates.
+fn rule(n: usize) -> Rule {
     let mut nodes = Vec::with_capacity(n);
     for i in 0..n {
         let mut x = -(PI * (i as f64 + 0.75) / (n as f64 + 0.5)).cos();
@@ -29,8 +44,7 @@ pub fn gauss_legendre(from: f64, to: f64, count: usize) -> Vec<(f64, f64)> {
                 break;
             }
         }
-        let weight = 2.0 / ((1.0 - x * x) * slope * slope);
-        nodes.push((centre + half * x, half * weight));
+        nodes.push((x, 2.0 / ((1.0 - x * x) * slope * slope)));
     }
     nodes
 }
@@ -41,7 +55,7 @@ mod tests {
 
     #[test]
     fn polynomials_and_oscillations_are_integrated_exactly() {
-        for n in [1, 2, 5, 40] {
+        for n in [1, 2, 5, 40, KEPT - 1, KEPT] {
             let degree = 2 * n as i32 - 1;
             let sum: f64 = gauss_legendre(1.0, 3.0, n)
                 .iter()

@@ -195,6 +195,7 @@ mod tests {
             axial_depth_mm: 1.0,
             immersion: Immersion::SLOT,
             lag_rad: 0.0,
+            shape: None,
         }
     }
 

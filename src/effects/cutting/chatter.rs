@@ -39,11 +39,13 @@ impl CuttingEffect for Chatter {
     }
 
     fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
-        milling_only(data).or_else(|| {
-            data.vibration_hz
-                .is_none()
-                .then(|| "no line off the tooth-passing comb stands above the noise".to_string())
-        })
+        milling_only(data)
+            .or_else(|| straight_edge_only(data))
+            .or_else(|| {
+                data.vibration_hz
+                    .is_none()
+                    .then(|| "no line off the tooth-passing comb stands above the noise".to_string())
+            })
     }
 
     fn parameters(&self, _variant: usize, data: &CuttingSummary) -> Vec<Parameter> {

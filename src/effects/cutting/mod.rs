@@ -37,6 +37,8 @@ mod tool_wear;
 pub struct CuttingSummary {
     pub process: Process,
     pub teeth: usize,
+    /// The edge runs straight up the side of the tool.
+    pub straight_edge: bool,
     pub cuts: usize,
     /// Different positions in the sequence of cuts; 0 where the campaign does not say.
     pub sequence_length: usize,
@@ -285,6 +287,13 @@ const NEGLIGIBLE: f64 = 1e-10;
 fn milling_only(data: &CuttingSummary) -> Option<String> {
     (data.process != Process::Milling)
         .then(|| "milling only: it shows in the waveform over a revolution".to_string())
+}
+
+fn straight_edge_only(data: &CuttingSummary) -> Option<String> {
+    (data.process == Process::Milling && !data.straight_edge).then(|| {
+        "not worked out for an edge that is not straight (corner_radius_mm, lead_angle_deg of [tool])"
+            .to_string()
+    })
 }
 
 fn drilling_only(data: &CuttingSummary) -> Option<String> {

@@ -32,6 +32,7 @@ impl CuttingEffect for RunoutEffect {
 
     fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
         milling_only(data)
+            .or_else(|| straight_edge_only(data))
             .or_else(|| (data.teeth < 2).then(|| "a single tooth has no runout against others".to_string()))
     }
 

@@ -36,6 +36,7 @@ impl CuttingEffect for SizeEffect {
     fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
         let flat = data.process == Process::Drilling && data.feeds < 3;
         flat.then(|| "needs three feeds: with fewer it is other cutting and edge coefficients".to_string())
+            .or_else(|| straight_edge_only(data))
     }
 
     fn parameters(&self, _variant: usize, _data: &CuttingSummary) -> Vec<Parameter> {

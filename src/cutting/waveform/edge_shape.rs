@@ -1,0 +1,208 @@
+//! Edges of milling tools that do not run straight up the side: ball end, bull nose (corner radius), inserts with a lead
+//! angle, tapered tools.
+//!
+//! Along the edge its outward normal stands at κ from the tool's axis: 90° on a straight end mill, 0 at the tip of a ball.
+//! A slice dz of the axial depth is dz / sin κ of edge; the chip there is c sin φ sin κ thick; the tangential force stands
+//! across, the radial one along the normal and the axial one along the edge's outline (Engin and Altintas, Mechanics and
+//! dynamics of general milling cutters, part I, Int. J. Mach. Tools Manuf. 41 (2001) 2195, eqs 4–9; the axial force is
+//! counted away from the tip, as on a straight end mill):
+//!
+//! F_x = −F_t cos φ − (F_r sin κ − F_a cos κ) sin φ,  F_y = F_t sin φ − (F_r sin κ − F_a cos κ) cos φ,
+//! F_z = F_r cos κ + F_a sin κ.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use super::quadrature::gauss_legendre;
+use crate::campaign::{Immersion, Tool};
+
+/// The outline of an edge: a corner that begins at κ = 0, then a straight edge at the lead angle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EdgeShape {
+    radius_mm: f64,
+    corner_radius_mm: f64,
+    /// κ of the straight part.
+    lead_rad: f64,
+}
+
+/// Nodes on the corner and on the straight part: the immersion of a narrow cut begins somewhere on the corner, where what is
+/// integrated has a kink.
+const NODES: usize = 32;
+
+/// A slice of the edge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct EdgeSlice {
+    /// Above the tip, mm.
+    pub height_mm: f64,
+    /// Axial depth of the slice, mm.
+    pub depth_mm: f64,
+    pub sin_kappa: f64,
+    pub cos_kappa: f64,
+    /// Where it cuts; `None` where the slice stands beside the workpiece.
+    pub immersion: Option<Immersion>,
+}
+
+impl EdgeSlice {
+    /// Length of edge, mm.
+    pub fn length_mm(&self) -> f64 {
+        self.depth_mm / self.sin_kappa
+    }
+}
+
+impl EdgeShape {
+    /// `None` for an edge that runs straight up the side of the tool.
+    pub fn of(tool: &Tool) -> Option<EdgeShape> {
+        (!tool.has_straight_edge()).then_some(EdgeShape {
+            radius_mm: 0.5 * tool.diameter_mm,
+            corner_radius_mm: tool.corner_radius_mm,
+            lead_rad: tool.lead_angle_deg.to_radians(),
+        })
+    }
+
+    /// The edge up to an axial depth, cut into slices by Gauss–Legendre quadrature. `immersion`: at the tool's diameter.
+    pub(super) fn slices(&self, depth_mm: f64, immersion: Immersion) -> Vec<EdgeSlice> {
+        let r = self.corner_radius_mm;
+        let corner_mm = (r * (1.0 - self.lead_rad.cos())).min(depth_mm);
+        let mut slices = Vec::with_capacity(2 * NODES);
+        if corner_mm > 0.0 {
+            let end = (1.0 - corner_mm / r).clamp(-1.0, 1.0).acos();
+            for (kappa, width) in gauss_legendre(0.0, end, NODES) {
+                let (sin, cos) = kappa.sin_cos();
+                slices.push(self.slice(r * (1.0 - cos), r * sin * width, (sin, cos), immersion));
+            }
+        }
+        if depth_mm > corner_mm {
+            let (sin, cos) = match self.lead_rad {
+                FRAC_PI_2 => (1.0, 0.0),
+                lead => lead.sin_cos(),
+            };
+            for (height, width) in gauss_legendre(corner_mm, depth_mm, NODES) {
+                slices.push(self.slice(height, width, (sin, cos), immersion));
+            }
+        }
+        slices
+    }
+
+    fn slice(
+        &self,
+        height_mm: f64,
+        depth_mm: f64,
+        (sin_kappa, cos_kappa): (f64, f64),
+        immersion: Immersion,
+    ) -> EdgeSlice {
+        EdgeSlice {
+            height_mm,
+            depth_mm,
+            sin_kappa,
+            cos_kappa,
+            immersion: self.immersion_at(height_mm, immersion),
+        }
+    }
+
+    /// Distance of the edge from the tool's axis, mm.
+    fn radius_at(&self, height_mm: f64) -> f64 {
+        let r = self.corner_radius_mm;
+        let corner_mm = r * (1.0 - self.lead_rad.cos());
+        let on_corner = height_mm.min(corner_mm);
+        let inner = self.radius_mm - r + (on_corner * (2.0 * r - on_corner)).max(0.0).sqrt();
+        inner + (height_mm - on_corner) * self.lead_rad.tan().recip().max(0.0)
+    }
+
+    /// The workpiece lies between two planes along the feed; the narrower the tool, the more of its way round lies between
+    /// them. Beyond 180° nothing is cut.
+    fn immersion_at(&self, height_mm: f64, at_diameter: Immersion) -> Option<Immersion> {
+        let radius = self.radius_at(height_mm);
+        let here = |angle: f64| -> f64 {
+            if angle <= 0.0 || angle >= PI {
+                return angle.clamp(0.0, PI);
+            }
+            (self.radius_mm * angle.cos() / radius.max(f64::MIN_POSITIVE))
+                .clamp(-1.0, 1.0)
+                .acos()
+        };
+        let (start_rad, exit_rad) = (here(at_diameter.start_rad), here(at_diameter.exit_rad));
+        (start_rad < exit_rad).then_some(Immersion { start_rad, exit_rad })
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::campaign::ToolKind;
+
+    pub fn tool(corner_radius_mm: f64, lead_angle_deg: f64) -> Tool {
+        Tool {
+            kind: ToolKind::Endmill,
+            diameter_mm: 12.0,
+            teeth: 2,
+            helix_deg: 30.0,
+            corner_radius_mm,
+            lead_angle_deg,
+            half_point_angle_deg: None,
+            web_thickness_mm: None,
+        }
+    }
+
+    fn sum(slices: &[EdgeSlice], of: impl Fn(&EdgeSlice) -> f64) -> f64 {
+        slices.iter().map(of).sum()
+    }
+
+    #[test]
+    fn a_straight_edge_has_no_shape() {
+        assert_eq!(EdgeShape::of(&tool(0.0, 90.0)), None);
+        assert!(EdgeShape::of(&tool(0.5, 90.0)).is_some());
+        assert!(EdgeShape::of(&tool(0.0, 45.0)).is_some());
+    }
+
+    /// Lengths of a circle's arc, of its height and of its reach.
+    #[test]
+    fn a_ball_and_a_bull_nose_have_the_lengths_of_their_circle() {
+        for (corner, depth) in [(6.0, 2.0), (6.0, 6.0), (1.0, 3.0), (1.0, 0.4)] {
+            let shape = EdgeShape::of(&tool(corner, 90.0)).unwrap();
+            let slices = shape.slices(depth, Immersion::SLOT);
+            let arc = f64::acos((1.0 - depth / corner).max(0.0));
+            let above = f64::max(depth - corner, 0.0);
+            assert!((sum(&slices, |s| s.depth_mm) - depth).abs() < 1e-12);
+            assert!((sum(&slices, EdgeSlice::length_mm) - (corner * arc + above)).abs() < 1e-12);
+            let reach = sum(&slices, |s| s.length_mm() * s.cos_kappa);
+            assert!((reach - corner * arc.sin()).abs() < 1e-12);
+            let area = sum(&slices, |s| s.depth_mm * s.sin_kappa);
+            let exact = 0.5 * corner * (arc - arc.sin() * arc.cos()) + above;
+            assert!((area - exact).abs() < 1e-12, "{corner} {depth}: {area} {exact}");
+            assert!(slices.iter().all(|s| s.immersion == Some(Immersion::SLOT)));
+        }
+    }
+
+    #[test]
+    fn a_lead_angle_tilts_all_of_the_edge() {
+        let slices = EdgeShape::of(&tool(0.0, 45.0))
+            .unwrap()
+            .slices(2.0, Immersion::SLOT);
+        assert!((sum(&slices, EdgeSlice::length_mm) - 2.0 * 2f64.sqrt()).abs() < 1e-12);
+        assert!((sum(&slices, |s| s.depth_mm * s.cos_kappa) - 2f64.sqrt()).abs() < 1e-12);
+    }
+
+    /// A ball of 12 mm, 3 mm beside the wall of the workpiece (down milling): where it is narrower than 3 mm it cuts nothing;
+    /// at its diameter it enters where cos φ is −3/6.
+    #[test]
+    fn a_narrow_cut_meets_only_the_wide_part_of_a_ball() {
+        let at_diameter = Immersion {
+            start_rad: f64::acos(-0.5),
+            exit_rad: PI,
+        };
+        let shape = EdgeShape::of(&tool(6.0, 90.0)).unwrap();
+        let height = |radius: f64| 6.0 - f64::sqrt(36.0 - radius * radius);
+        assert_eq!(shape.immersion_at(height(2.9), at_diameter), None);
+        for radius in [3.5, 5.0, 6.0] {
+            let here = shape.immersion_at(height(radius), at_diameter).unwrap();
+            assert!((radius * here.start_rad.cos() + 3.0).abs() < 1e-9);
+            assert_eq!(here.exit_rad, PI);
+        }
+        // Half immersion is half at every height.
+        let half = Immersion {
+            start_rad: FRAC_PI_2,
+            exit_rad: PI,
+        };
+        let here = shape.immersion_at(height(0.5), half).unwrap();
+        assert!((here.start_rad - FRAC_PI_2).abs() < 1e-12);
+    }
+}

@@ -191,6 +191,7 @@ fn untuned_model() -> Result<StructureModel> {
         model: "irb6640".into(),
         mass_tolerance: None,
         stiffness_tolerance: 0.3,
+        links: Default::default(),
     };
     let spec = RobotSpec::load(&section.model, std::path::Path::new("."))?;
     Ok(StructureModel::new(RobotModel::new(spec), Vec::new(), &section))

@@ -277,7 +277,7 @@ fn posture_reports(campaign: &Campaign, model: &StructureModel, theta: &[f64]) -
         .map(|posture| {
             let kinematics = model.robot.kinematics(&posture.joints_deg)?;
             let chain = model.chain(theta, &kinematics, 0.0, false);
-            PostureReport::new(&model.robot, &kinematics, &chain)
+            PostureReport::new(&model.robot, &model.kinematics_at(theta, &kinematics), &chain)
         })
         .collect()
 }

@@ -186,12 +186,23 @@ fn is_possible(candidate: &Candidate<CuttingModel, CuttingInstance>) -> bool {
 /// Confidence from which on a mistake of the setup takes an effect's place, where the effect explains the data as well.
 const SURE: f64 = 0.8;
 
+/// Mistakes of the setup that are what an effect of the library describes, where both explain the data: a filter far above the
+/// band shows as the delay that it is.
+const SAME: [(&str, &str); 1] = [("time-delay", "amplifier-low-pass")];
+
 /// A likely mistake of the setup leaves no effect certain: what is missing in the model cannot be told before the files are
-/// right. One that is hardly likelier than an effect which explains the data shares the confidence with it.
+/// right. One that is hardly likelier than an effect which explains the data shares the confidence with it, unless both are
+/// the same thing.
 fn heed_setup<M, I>(diagnosis: &mut Diagnosis<M, I>, setup: &SetupCheck) {
     if let Some(finding) = setup.likely() {
         if diagnosis.verdict == Verdict::Effect && finding.confidence < SURE {
-            diagnosis.confidence *= 1.0 - finding.confidence;
+            let effect = diagnosis.winner().map(|c| c.name.effect.as_str());
+            if !SAME
+                .iter()
+                .any(|(of, kind)| effect == Some(*of) && finding.kind == *kind)
+            {
+                diagnosis.confidence *= 1.0 - finding.confidence;
+            }
             return;
         }
         diagnosis.verdict = Verdict::Unknown;

@@ -37,7 +37,7 @@ impl FittedModel {
     fn chain(&self, theta: &[f64], joints_deg: &[f64]) -> Result<(Kinematics, Chain)> {
         let kinematics = self.model.robot.kinematics(joints_deg)?;
         let chain = self.model.chain(theta, &kinematics, 0.0, false);
-        Ok((kinematics, chain))
+        Ok((self.model.kinematics_at(theta, &kinematics).into_owned(), chain))
     }
 
     fn robot_frf(&self, theta: &[f64], joints_deg: &[f64]) -> Result<RobotFrf> {
@@ -46,10 +46,8 @@ impl FittedModel {
     }
 
     fn deflection(&self, theta: &[f64], joints_deg: &[f64], load: &HoleLoad) -> Result<Deflection> {
-        let robot = &self.model.robot;
-        let kinematics = robot.kinematics(joints_deg)?;
-        let chain = self.model.chain(theta, &kinematics, 0.0, false);
-        let compliance = chain.tool_compliance(robot, &kinematics)?;
+        let (kinematics, chain) = self.chain(theta, joints_deg)?;
+        let compliance = chain.tool_compliance(&self.model.robot, &kinematics)?;
         Ok(Deflection::new(&compliance, kinematics.tool_axis(), load))
     }
 

@@ -6,6 +6,7 @@ pub mod channel_check;
 pub mod cutting;
 pub mod diagnosis;
 pub mod expert;
+pub mod freed_links;
 mod lobe_model;
 mod lobe_structure;
 pub mod lobes;
@@ -29,6 +30,7 @@ pub use campaign::{CampaignFindings, LobeFindings, PostureFindings, StructureFin
 pub use cutting::CuttingAnalysis;
 pub use diagnosis::{CuttingFindings, DiagnosisFindings};
 pub use expert::ExpertView;
+pub use freed_links::FreedLinks;
 pub use lobes::{LobeAnalysis, LobeCase, LobesBefore};
 pub use modal::{ModalAnalysis, SetModes};
 pub use model_stages::ModelStage;

@@ -173,9 +173,19 @@ fn folder_name(dir: &Path) -> String {
         .map_or_else(|| "campaign".to_string(), |n| n.to_string_lossy().into_owned())
 }
 
+const ROBOT_KEYS: [&str; 7] = [
+    "model",
+    "stiffness_tolerance",
+    LinkGroup::Masses.key(),
+    LinkGroup::Inertias.key(),
+    LinkGroup::Centres.key(),
+    LinkGroup::Lengths.key(),
+    LinkGroup::Walls.key(),
+];
+
 /// The section and the robot itself: postures and points are checked against its joints.
 fn robot(dir: &Path, top: &Section<'_>) -> Result<Option<(RobotSection, RobotSpec)>> {
-    let Some(robot) = top.section("robot", &["model", "mass_tolerance", "stiffness_tolerance"])? else {
+    let Some(robot) = top.section("robot", &ROBOT_KEYS)? else {
         return Ok(None);
     };
     let model = robot.required("model", robot.text("model")?, "\"irb6640\"")?;
@@ -188,9 +198,16 @@ fn robot(dir: &Path, top: &Section<'_>) -> Result<Option<(RobotSection, RobotSpe
         other => other,
     })?;
     // No tolerance is what `0` says too.
-    let mass_tolerance = robot
-        .number("mass_tolerance", Bounds::closed(0.0, 1.0))?
-        .filter(|t| *t > 0.0);
+    let tolerance = |key: &str, most: f64| -> Result<Option<f64>> {
+        Ok(robot.number(key, Bounds::closed(0.0, most))?.filter(|t| *t > 0.0))
+    };
+    let mass_tolerance = tolerance(LinkGroup::Masses.key(), 1.0)?;
+    let links = LinkTolerances {
+        inertia: tolerance(LinkGroup::Inertias.key(), 2.0)?,
+        centre_m: tolerance(LinkGroup::Centres.key(), 1000.0)?.map(|mm| mm * 1e-3),
+        length_m: tolerance(LinkGroup::Lengths.key(), 500.0)?.map(|mm| mm * 1e-3),
+        wall: tolerance(LinkGroup::Walls.key(), 2.0)?,
+    };
     let stiffness_tolerance = robot
         .number("stiffness_tolerance", Bounds::above_up_to(0.0, 5.0))?
         .unwrap_or(0.3);
@@ -198,6 +215,7 @@ fn robot(dir: &Path, top: &Section<'_>) -> Result<Option<(RobotSection, RobotSpe
         model: model.to_string(),
         mass_tolerance,
         stiffness_tolerance,
+        links,
     };
     Ok(Some((section, spec)))
 }

@@ -4,10 +4,10 @@ use super::next_step::Guide;
 use super::text::{Emphasis, number, percent, setup_lines, table, warnings};
 use super::{CampaignArg, Outcome};
 use crate::Result;
-use crate::analysis::StructureAnalysis;
-use crate::campaign::Campaign;
+use crate::analysis::{FreedLinks, StructureAnalysis};
+use crate::campaign::{Campaign, LinkGroup};
 use crate::discrepancy::place::Place;
-use crate::identify::{Calibration, Options, StructureCase, StructureModel};
+use crate::identify::{Calibration, Options, Scale, StructureCase, StructureModel, Undetermined};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -22,6 +22,42 @@ pub struct Args {
     /// Start from the robot file's values alone, not from where the last revision stood or the measured modes lie.
     #[arg(long)]
     from_nominal: bool,
+    /// Link parameters that are fitted as well, with the usual tolerance where campaign.toml gives none: masses, inertias,
+    /// centres (of mass), lengths (of the kinematics), walls (of links that bend), or links (all of them). Says whether that
+    /// predicts left-out postures better, and what the data do not determine.
+    #[arg(
+        long,
+        value_delimiter = ',',
+        value_name = "GROUP",
+        conflicts_with = "from_nominal"
+    )]
+    free: Vec<Free>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Free {
+    Links,
+    Masses,
+    Inertias,
+    Centres,
+    Lengths,
+    Walls,
+}
+
+impl Free {
+    fn groups(self, bends: bool) -> Vec<LinkGroup> {
+        match self {
+            Free::Links => LinkGroup::ALL
+                .into_iter()
+                .filter(|g| bends || *g != LinkGroup::Walls)
+                .collect(),
+            Free::Masses => vec![LinkGroup::Masses],
+            Free::Inertias => vec![LinkGroup::Inertias],
+            Free::Centres => vec![LinkGroup::Centres],
+            Free::Lengths => vec![LinkGroup::Lengths],
+            Free::Walls => vec![LinkGroup::Walls],
+        }
+    }
 }
 
 pub fn run(args: Args) -> Result<Outcome> {
@@ -30,12 +66,25 @@ pub fn run(args: Args) -> Result<Outcome> {
         extra_starts: args.starts,
         seed: args.seed,
     };
-    let analysis = if args.from_nominal {
+    let freed = match args.free.is_empty() {
+        true => None,
+        false => {
+            let effects = StructureCase::load(&campaign)?.effects();
+            let bends = effects.iter().any(|e| e.starts_with("link-flexibility"));
+            let mut groups: Vec<LinkGroup> = args.free.iter().flat_map(|f| f.groups(bends)).collect();
+            groups.sort_unstable();
+            groups.dedup();
+            Some(FreedLinks::run(&campaign, &groups, options)?)
+        }
+    };
+    let analysis = if let Some(freed) = &freed {
+        &freed.after
+    } else if args.from_nominal {
         let mut case = StructureCase::load(&campaign)?;
         case.forget_start();
-        StructureAnalysis::of(case, None, options)?
+        &StructureAnalysis::of(case, None, options)?
     } else {
-        StructureAnalysis::run(&campaign, options)?
+        &StructureAnalysis::run(&campaign, options)?
     };
     let StructureAnalysis {
         case,
@@ -45,8 +94,12 @@ pub fn run(args: Args) -> Result<Outcome> {
         start,
         warnings: notes,
         ..
-    } = &analysis;
+    } = analysis;
     let setup = analysis.setup_check()?;
+    let undetermined = match &freed {
+        Some(freed) => freed.undetermined.clone(),
+        None => Undetermined::new(&case.model.parameters, calibration)?,
+    };
     let json = json!({
         "domain": "structure",
         "revision": case.revision(),
@@ -61,6 +114,14 @@ pub fn run(args: Args) -> Result<Outcome> {
         "modal_start": start,
         "starts": calibration.starts,
         "starts_agreeing": calibration.starts_agreeing,
+        "undetermined": undetermined,
+        "freed": freed.as_ref().map(|freed| json!({
+            "groups": freed.groups.iter().map(|g| g.key()).collect::<Vec<_>>(),
+            "error_before": freed.before.after.totals,
+            "held_out_nrms_before": freed.held_out.as_ref().map(|[a, _]| a.nrms()),
+            "held_out_nrms_after": freed.held_out.as_ref().map(|[_, b]| b.nrms()),
+            "is_progress": freed.progress,
+        })),
         "setup": setup.findings,
         "warnings": notes,
     });
@@ -89,6 +150,12 @@ pub fn run(args: Args) -> Result<Outcome> {
         },
         calibration.iterations,
     );
+    if let Some(freed) = &freed {
+        text += &describe_freed(freed);
+    }
+    for sentence in undetermined.in_words() {
+        text += &format!("{sentence}\n");
+    }
     text += &warnings(notes);
     let next = Guide::structure(&campaign).calibrated(
         calibration.converged(),
@@ -100,6 +167,37 @@ pub fn run(args: Args) -> Result<Outcome> {
     Ok(Outcome::new(json, text, Some(next)))
 }
 
+/// What freeing link parameters did to the error, and how to keep it.
+fn describe_freed(freed: &FreedLinks) -> String {
+    let mut text = format!(
+        "\nwith the links as in the robot file the error was {}",
+        percent(freed.before.after.totals.nrms)
+    );
+    if let Some([before, after]) = &freed.held_out {
+        text += &format!(
+            "; on postures left out of the fit {} -> {}",
+            percent(before.nrms()),
+            percent(after.nrms())
+        );
+    }
+    text += match freed.progress {
+        Some(true) => ", better by more than chance\n",
+        Some(false) => ", no better than chance would make it: leave the links as they are\n",
+        None => "\n",
+    };
+    if freed.progress != Some(false) {
+        let keys = freed
+            .groups
+            .iter()
+            .map(|g| format!("{} = {}", g.key(), g.usual_tolerance()));
+        text += &format!(
+            "to keep them free, write under [robot] in campaign.toml: {}\n",
+            keys.collect::<Vec<_>>().join(", ")
+        );
+    }
+    text
+}
+
 /// The fitted parameters as a table. Of an effect the robot file says nothing.
 pub fn describe_parameters(model: &StructureModel, calibration: &Calibration) -> String {
     let rows: Vec<Vec<String>> = calibration
@@ -108,12 +206,17 @@ pub fn describe_parameters(model: &StructureModel, calibration: &Calibration) ->
         .enumerate()
         .map(|(i, p)| {
             let of_robot = i < model.baseline_parameter_count();
-            let (initial, change) = match of_robot {
-                true => (
+            let (initial, change) = match (of_robot, model.parameters[i].scale, p.unit) {
+                // A coordinate has no natural zero that a share could be taken of.
+                (true, Scale::Linear, "m") => (
+                    number(p.initial, 4),
+                    format!("{:+.2} mm", 1e3 * (p.value - p.initial)),
+                ),
+                (true, ..) => (
                     number(p.initial, 4),
                     format!("{:+.1} %", 100.0 * (p.value / p.initial - 1.0)),
                 ),
-                false => ("–".into(), "–".into()),
+                _ => ("–".into(), "–".into()),
             };
             vec![
                 p.name.clone(),

@@ -445,6 +445,7 @@ mod tests {
             model: "irb6640".into(),
             mass_tolerance: None,
             stiffness_tolerance: 0.3,
+            links: Default::default(),
         });
         turned.postures.push(crate::campaign::Posture {
             id: "p1".into(),

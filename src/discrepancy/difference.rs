@@ -108,8 +108,8 @@ pub fn greatest_difference(
 }
 
 fn point_basis(model: &StructureModel, theta: &[f64], lookout: &Lookout) -> Result<FrfBasis> {
-    let kinematics = lookout.kinematics;
-    let chain = model.chain(theta, kinematics, lookout.lowness, false);
+    let chain = model.chain(theta, lookout.kinematics, lookout.lowness, false);
+    let kinematics = model.kinematics_at(theta, lookout.kinematics);
     let mut rows: Vec<DVector<f64>> = Vec::new();
     let mut push = |point, place, tool| {
         for axis in 0..3 {

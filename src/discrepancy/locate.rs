@@ -374,10 +374,13 @@ fn probe(
     block: &FrfBlock,
     axes: &std::ops::Range<usize>,
 ) -> Result<FrfBasis> {
-    let kinematics = &block.kinematics;
-    let joints = model.robot.joint_count();
+    let (robot, kinematics) = (
+        model.robot_at(theta),
+        model.kinematics_at(theta, &block.kinematics),
+    );
+    let joints = robot.joint_count();
     let number = axes.start / 3;
-    let mut chain = model.chain(theta, kinematics, block.lowness, false);
+    let mut chain = model.chain(theta, &block.kinematics, block.lowness, false);
     let joint_stiffness = chain.elements.iter().filter(|e| matches!(e.role, Role::Joint(_)));
     let stiffest = joint_stiffness.map(|e| e.stiffness.value).fold(0.0, f64::max);
     let mut coordinates = Vec::new();
@@ -407,7 +410,7 @@ fn probe(
         coordinates.extend([column - 2, column - 1]);
     }
     let n = chain.coordinate_count();
-    let of_point = |point: &Point, axis: Axis| model.robot.output_row(&chain, kinematics, point, axis, false);
+    let of_point = |point: &Point, axis: Axis| robot.output_row(&chain, &kinematics, point, axis, false);
     let mut rows: Vec<DVector<f64>> = block
         .outputs
         .iter()
@@ -425,12 +428,12 @@ fn probe(
             direction[axis] = 1.0;
             rows.push(match link < joints {
                 true => chain.output_row(
-                    model.robot.link_com(kinematics, link),
+                    robot.link_com(&kinematics, link),
                     Place::new(link, Slot::Body),
                     false,
                     &direction,
                 ),
-                false => chain.output_row(kinematics.tcp(), model.robot.flange_place(), true, &direction),
+                false => chain.output_row(kinematics.tcp(), robot.flange_place(), true, &direction),
             });
         }
     }

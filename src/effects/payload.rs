@@ -84,6 +84,7 @@ impl StructuralEffect for Payload {
             mass_kg: 1.0,
             inertia_kg_m2: Matrix3::zeros(),
             scale: values[0].clone(),
+            inertia_follows_mass: true,
         });
     }
 }

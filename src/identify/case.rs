@@ -4,7 +4,7 @@ use super::calibrate::Options;
 use super::frf_data::FrfData;
 use super::structure::StructureModel;
 use super::structure_study::StructureStudy;
-use crate::campaign::{Campaign, RobotSection};
+use crate::campaign::{Campaign, LinkGroup, RobotSection};
 use crate::effects::{self, Instance};
 use crate::revision::{Domain, RecordedEffect, Revision, RevisionLog, log_file, structure_fingerprint};
 use crate::robot::{RobotModel, RobotSpec};
@@ -38,8 +38,16 @@ pub fn robot_section(campaign: &Campaign) -> Result<&RobotSection> {
 }
 
 /// The robot model of a campaign, uncalibrated and without effects.
+///
+/// # Errors
+/// No robot, or a robot file that cannot be read.
 pub fn structure_model(campaign: &Campaign) -> Result<StructureModel> {
-    let section = robot_section(campaign)?;
+    structure_model_freeing(campaign, &[])
+}
+
+/// As [`structure_model`], with groups of link parameters free that the campaign may take for exact.
+fn structure_model_freeing(campaign: &Campaign, groups: &[LinkGroup]) -> Result<StructureModel> {
+    let section = &robot_section(campaign)?.freeing(groups);
     let spec = RobotSpec::load(&section.model, &campaign.dir)?;
     Ok(StructureModel::new(
         RobotModel::new(spec),
@@ -52,7 +60,15 @@ impl StructureCase {
     /// # Errors
     /// FRFs or robot file that cannot be read, a broken revision log, or one with effects that are none of this robot.
     pub fn load(campaign: &Campaign) -> Result<Self> {
-        let baseline = structure_model(campaign)?;
+        Self::load_freeing(campaign, &[])
+    }
+
+    /// As [`load`](Self::load), with groups of link parameters free that the campaign may take for exact.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn load_freeing(campaign: &Campaign, groups: &[LinkGroup]) -> Result<Self> {
+        let baseline = structure_model_freeing(campaign, groups)?;
         let log = RevisionLog::load(&campaign.dir)?;
         let revisions: Vec<Revision> = log.revisions(Domain::Structure).cloned().collect();
         let (set, mut warnings) = campaign.load_frfs()?;
@@ -102,6 +118,15 @@ impl StructureCase {
         StructureCase {
             model: self.model.with_start(theta.to_vec()),
             settled: true,
+            ..self
+        }
+    }
+
+    /// The same case, whose fits start from `theta` (solver's scale) and search from there.
+    pub fn starting_from(self, theta: Vec<f64>) -> Self {
+        StructureCase {
+            model: self.model.with_start(theta),
+            settled: false,
             ..self
         }
     }

@@ -24,6 +24,7 @@ pub mod spot_response;
 pub mod structure;
 pub mod structure_study;
 pub mod study;
+pub mod undetermined;
 mod zero_line;
 
 pub use crate::parameter::{Parameter, Prior, Scale};
@@ -39,3 +40,4 @@ pub use levenberg_marquardt::{Fit, LeastSquares, Linearisation, minimise};
 pub use structure::StructureModel;
 pub use structure_study::StructureStudy;
 pub use study::{EffectName, HeldOut, Study};
+pub use undetermined::Undetermined;

@@ -133,6 +133,7 @@ mod tests {
             model: "irb6640".into(),
             mass_tolerance: None,
             stiffness_tolerance: 0.3,
+            links: Default::default(),
         };
         StructureModel::new(RobotModel::new(irb6640()), Vec::new(), &section)
     }

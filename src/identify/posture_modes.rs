@@ -53,7 +53,11 @@ pub fn posture_modes(
 ) -> Result<Vec<PostureMode>> {
     let chain = model.chain(theta, kinematics, 0.0, with_derivatives);
     let count = if with_derivatives { theta.len() } else { 0 };
-    let system = chain.system(count);
+    let mut system = chain.system(count);
+    if with_derivatives {
+        model.add_file_slopes(&mut system, theta, kinematics, 0.0);
+    }
+    let kinematics = &*model.kinematics_at(theta, kinematics);
     let modes = ModalBasis::new(&system.stiffness, &system.mass)?;
     let (shapes, mu) = (&modes.shapes, &modes.inverse_omega2);
     let n = mu.len();
@@ -141,6 +145,7 @@ mod tests {
             model: "irb6640".into(),
             mass_tolerance: Some(0.1),
             stiffness_tolerance: 0.3,
+            links: Default::default(),
         };
         let model = StructureModel::new(RobotModel::new(irb6640()), Vec::new(), &section);
         let data = DataSummary {

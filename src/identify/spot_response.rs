@@ -209,17 +209,9 @@ fn spot_rows(
     block: &FrfBlock,
     spots: &[Spot],
 ) -> (Vec<SpotRow>, Vec<DVector<f64>>) {
-    let kinematics = &block.kinematics;
-    let chain = model.chain(theta, kinematics, block.lowness, false);
-    let output_rows = |chain: &crate::robot::Chain| -> Vec<DVector<f64>> {
-        let outputs = block.outputs.iter();
-        outputs
-            .map(|(point, axis)| {
-                let point = &model.points[*point];
-                model.robot.output_row(chain, kinematics, point, *axis, false)
-            })
-            .collect()
-    };
+    let kinematics = &*model.kinematics_at(theta, &block.kinematics);
+    let chain = model.chain(theta, &block.kinematics, block.lowness, false);
+    let output_rows = |chain: &crate::robot::Chain| model.output_rows(theta, chain, block);
     let outputs = output_rows(&chain);
     // All series spots at once, behind the model's own elements.
     let mut extended = chain.clone();

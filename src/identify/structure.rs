@@ -1,5 +1,6 @@
 //! The structural model as a function of its parameters, and its misfit to measured FRFs.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use faer::linalg::matmul::matmul;
@@ -15,9 +16,9 @@ use crate::Result;
 use crate::campaign::{Point, RobotSection};
 use crate::effects::{ChannelFilter, DataSummary, Instance, Setting};
 use crate::parameter::{Parameter, Prior, Scale, is_vanished};
-use crate::robot::frf::{Response, Slopes};
+use crate::robot::frf::{Response, RowSlopes, Slopes};
 use crate::robot::model::NOMINAL_DAMPING_RATIO;
-use crate::robot::{Baseline, Chain, Dual, FrfBasis, Kinematics, RobotModel};
+use crate::robot::{Baseline, Chain, Dual, FileNumber, FrfBasis, Kinematics, RobotModel, RobotSpec, System};
 
 /// Robot, measurement points and the list of what may be tuned.
 #[derive(Debug, Clone)]
@@ -28,6 +29,9 @@ pub struct StructureModel {
     pub parameters: Vec<Parameter>,
     /// Whether link masses are among the parameters (after the joints and the damping ratio).
     tunes_masses: bool,
+    /// Further numbers of the robot file that are tuned, in the order of their parameters, and the first of those.
+    file_numbers: Vec<FileNumber>,
+    first_file_number: usize,
     /// In the order in which they were added.
     effects: Vec<AddedEffect>,
     /// A solution found earlier, solver's scale: where fits start.
@@ -39,6 +43,63 @@ pub struct StructureModel {
 pub struct AddedEffect {
     pub instance: Instance,
     pub parameters: Range<usize>,
+}
+
+/// The groups of the robot file's numbers that a section frees, each with the standard deviation of its parameters on the
+/// solver's scale.
+fn file_numbers_of(robot: &RobotModel, section: &RobotSection) -> Vec<(Vec<FileNumber>, f64)> {
+    let (spec, links) = (&robot.spec, &section.links);
+    let groups: [(fn(&RobotSpec) -> Vec<FileNumber>, Option<f64>); 4] = [
+        (FileNumber::inertias, links.inertia),
+        (FileNumber::centres, links.centre_m),
+        (FileNumber::lengths, links.length_m),
+        (FileNumber::walls, links.wall),
+    ];
+    let free = groups
+        .into_iter()
+        .filter_map(|(of, tolerance)| Some((of, tolerance?)));
+    free.map(|(of, tolerance)| (of(spec), tolerance)).collect()
+}
+
+/// Times its tolerance that a coordinate or length may be off.
+const FARTHEST: f64 = 6.0;
+/// Factors that moments of inertia may be off by, and walls.
+const INERTIA_FACTOR: f64 = 10.0;
+const WALL_FACTOR: f64 = 4.0;
+
+fn file_parameter(robot: &RobotModel, number: FileNumber, tolerance: f64) -> Parameter {
+    let nominal = number.of(robot);
+    let (scale, bounds) = match number {
+        FileNumber::Inertia { .. } => (
+            Scale::Logarithmic,
+            [nominal / INERTIA_FACTOR, nominal * INERTIA_FACTOR],
+        ),
+        FileNumber::Wall { link } => {
+            let outer = robot.spec.links[link - 1]
+                .section
+                .map_or(f64::INFINITY, |s| s.outer_diameter_m);
+            // A solid bar has no thicker wall.
+            let most = (nominal * WALL_FACTOR).min(0.499 * outer);
+            (Scale::Logarithmic, [nominal / WALL_FACTOR, most.max(nominal)])
+        }
+        _ => (
+            Scale::Linear,
+            [nominal - FARTHEST * tolerance, nominal + FARTHEST * tolerance],
+        ),
+    };
+    let mut parameter = Parameter {
+        name: number.name(),
+        unit: number.unit(),
+        scale,
+        nominal,
+        prior: None,
+        bounds,
+    };
+    parameter.prior = Some(Prior {
+        mean: parameter.internal(nominal),
+        std: tolerance,
+    });
+    parameter
 }
 
 /// Standard deviation of the logarithm of the damping ratio about its nominal 3 %: robots show 1–6 %.
@@ -89,11 +150,21 @@ impl StructureModel {
                 });
             }
         }
+        let first_file_number = parameters.len();
+        let mut file_numbers = Vec::new();
+        for (numbers, tolerance) in file_numbers_of(&robot, section) {
+            for number in numbers {
+                parameters.push(file_parameter(&robot, number, tolerance));
+                file_numbers.push(number);
+            }
+        }
         StructureModel {
             robot,
             points,
             parameters,
             tunes_masses: section.mass_tolerance.is_some(),
+            file_numbers,
+            first_file_number,
             effects: Vec::new(),
             start: None,
         }
@@ -234,7 +305,28 @@ impl StructureModel {
         }
     }
 
-    /// The chain at a posture with all effects. `lowness`: see [`Setting`].
+    /// The robot with the numbers of its file that are tuned (beside joint stiffnesses and masses) as they are at `theta`.
+    pub fn robot_at(&self, theta: &[f64]) -> Cow<'_, RobotModel> {
+        if self.file_numbers.is_empty() {
+            return Cow::Borrowed(&self.robot);
+        }
+        let mut robot = self.robot.clone();
+        for (k, number) in self.file_numbers.iter().enumerate() {
+            let i = self.first_file_number + k;
+            number.set(&mut robot, self.parameters[i].natural(theta[i]));
+        }
+        Cow::Owned(robot)
+    }
+
+    /// Where the frames are at `theta`, where `kinematics` says where the robot file puts them.
+    pub fn kinematics_at<'k>(&self, theta: &[f64], kinematics: &'k Kinematics) -> Cow<'k, Kinematics> {
+        if !self.file_numbers.iter().any(|number| number.is_length()) {
+            return Cow::Borrowed(kinematics);
+        }
+        Cow::Owned(kinematics.with_lengths(&self.robot.spec, &self.robot_at(theta).spec))
+    }
+
+    /// The chain at a posture with all effects; `kinematics` as the robot file has them. `lowness`: see [`Setting`].
     pub fn chain(
         &self,
         theta: &[f64],
@@ -255,10 +347,17 @@ impl StructureModel {
         lowness: f64,
         with_derivatives: bool,
     ) -> Chain {
-        let mut chain = self.robot.chain(kinematics, baseline);
+        let (robot, kinematics) = (self.robot_at(theta), self.kinematics_at(theta, kinematics));
+        let mut chain = robot.chain(&kinematics, baseline);
+        let inertia = |number: &FileNumber| matches!(number, FileNumber::Inertia { .. });
+        if self.file_numbers.iter().any(inertia) {
+            for body in &mut chain.bodies {
+                body.inertia_follows_mass = false;
+            }
+        }
         let setting = Setting {
-            robot: &self.robot,
-            kinematics,
+            robot: &robot,
+            kinematics: &kinematics,
             lowness,
         };
         let mut order: Vec<&AddedEffect> = self.effects.iter().collect();
@@ -295,17 +394,78 @@ impl StructureModel {
 
     pub(super) fn basis(&self, theta: &[f64], block: &FrfBlock, with_derivatives: bool) -> Result<FrfBasis> {
         let chain = self.chain(theta, &block.kinematics, block.lowness, with_derivatives);
-        let rows: Vec<DVector<f64>> = block
-            .outputs
-            .iter()
+        let rows = self.output_rows(theta, &chain, block);
+        if !with_derivatives {
+            return FrfBasis::new(&chain.system(0), &rows);
+        }
+        let mut system = chain.system(theta.len());
+        self.add_file_slopes(&mut system, theta, &block.kinematics, block.lowness);
+        FrfBasis::with_moved_outputs(&system, &rows, &self.row_slopes(theta, block))
+    }
+
+    /// Displacement per coordinate of `chain`, which is this model's at `theta`, of each of the block's outputs.
+    pub(super) fn output_rows(&self, theta: &[f64], chain: &Chain, block: &FrfBlock) -> Vec<DVector<f64>> {
+        let (robot, kinematics) = (self.robot_at(theta), self.kinematics_at(theta, &block.kinematics));
+        let outputs = block.outputs.iter();
+        outputs
             .map(|(point, axis)| {
                 let point = &self.points[*point];
-                self.robot
-                    .output_row(&chain, &block.kinematics, point, *axis, false)
+                robot.output_row(chain, &kinematics, point, *axis, false)
             })
-            .collect();
-        let count = if with_derivatives { theta.len() } else { 0 };
-        FrfBasis::new(&chain.system(count), &rows)
+            .collect()
+    }
+
+    /// `theta` with file number `k` a little more and a little less, and the derivative's factor on what differs between.
+    /// The matrices of a robot are of the second degree in moments, centres and lengths: their differences over any width
+    /// are exact; those of links that bend are so to 1e-8 in walls and lengths.
+    fn beside(&self, theta: &[f64], k: usize) -> ([Vec<f64>; 2], f64) {
+        const SHARE: f64 = 1e-4;
+        const LENGTH_M: f64 = 3e-5;
+        let i = self.first_file_number + k;
+        let parameter = &self.parameters[i];
+        let value = parameter.natural(theta[i]);
+        let (half, slope) = match parameter.scale {
+            Scale::Logarithmic => (SHARE * value, value),
+            Scale::Linear => (LENGTH_M, 1.0),
+        };
+        let moved = [half, -half].map(|by| {
+            let mut moved = theta.to_vec();
+            moved[i] = parameter.internal(value + by);
+            moved
+        });
+        (moved, slope / (2.0 * half))
+    }
+
+    /// Derivatives of the matrices with respect to the numbers of the robot file.
+    pub(super) fn add_file_slopes(
+        &self,
+        system: &mut System,
+        theta: &[f64],
+        kinematics: &Kinematics,
+        lowness: f64,
+    ) {
+        for k in 0..self.file_numbers.len() {
+            let (moved, per_unit) = self.beside(theta, k);
+            let [above, below] = moved.map(|t| self.chain(&t, kinematics, lowness, false).system(0));
+            system.derivatives[self.first_file_number + k] = System::difference(&above, &below, per_unit);
+        }
+    }
+
+    /// Derivatives of the outputs' rows with respect to the lengths that are tuned.
+    fn row_slopes(&self, theta: &[f64], block: &FrfBlock) -> Vec<RowSlopes> {
+        let lengths = self.file_numbers.iter().enumerate();
+        lengths
+            .filter(|(_, number)| number.is_length())
+            .map(|(k, _)| {
+                let (moved, per_unit) = self.beside(theta, k);
+                let [above, below] = moved.map(|t| {
+                    let chain = self.chain(&t, &block.kinematics, block.lowness, false);
+                    self.output_rows(&t, &chain, block)
+                });
+                let slopes = above.iter().zip(&below).map(|(a, b)| (a - b) * per_unit);
+                (self.first_file_number + k, slopes.collect())
+            })
+            .collect()
     }
 
     /// Roughly the processor time of one evaluation on `data` with all derivatives, s, from the number of coordinates.
@@ -726,6 +886,7 @@ mod tests {
             model: "irb6640".into(),
             mass_tolerance: Some(0.05),
             stiffness_tolerance: 0.3,
+            links: Default::default(),
         };
         let point = |node, body| Point {
             node,
@@ -784,6 +945,36 @@ mod tests {
         }
     }
 
+    /// The gradient of both misfits at `theta` against central differences of the cost.
+    fn agrees_with_differences(model: &StructureModel, data: &FrfData, theta: &[f64], what: &str) {
+        for misfit in [Misfit::Complex, Misfit::LogMagnitude] {
+            let problem = FrfProblem {
+                model,
+                data,
+                misfit,
+                stride: 1,
+            };
+            let here = problem.linearise(theta).unwrap();
+            for p in 0..theta.len() {
+                let h = 1e-6 * theta[p].abs().max(1e-3);
+                let at = |sign: f64| {
+                    let mut t = theta.to_vec();
+                    t[p] += sign * h;
+                    problem.cost(&t).unwrap()
+                };
+                let difference = (at(1.0) - at(-1.0)) / (2.0 * h);
+                let scale = (here.hessian[(p, p)] * here.cost).sqrt() + here.gradient[p].abs();
+                let rounding = 1e-13 * here.cost / h;
+                assert!(
+                    (here.gradient[p] - difference).abs() < 2e-5 * scale + 10.0 * rounding,
+                    "{what} {misfit:?} {}: {} {difference}",
+                    model.parameters[p].name,
+                    here.gradient[p]
+                );
+            }
+        }
+    }
+
     /// Every effect's derivatives, and those of the baseline beside it, against central differences of the cost.
     #[test]
     fn gradients_of_all_effects_agree_with_differences() {
@@ -813,33 +1004,67 @@ mod tests {
                 for (i, t) in theta.iter_mut().enumerate() {
                     *t += 0.01 * (1.0 + i as f64).sin();
                 }
-                for misfit in [Misfit::Complex, Misfit::LogMagnitude] {
-                    let problem = FrfProblem {
-                        model: &model,
-                        data: &data,
-                        misfit,
-                        stride: 1,
-                    };
-                    let here = problem.linearise(&theta).unwrap();
-                    for p in 0..theta.len() {
-                        let h = 1e-6 * theta[p].abs().max(1e-3);
-                        let at = |sign: f64| {
-                            let mut t = theta.clone();
-                            t[p] += sign * h;
-                            problem.cost(&t).unwrap()
-                        };
-                        let difference = (at(1.0) - at(-1.0)) / (2.0 * h);
-                        let scale = (here.hessian[(p, p)] * here.cost).sqrt() + here.gradient[p].abs();
-                        let rounding = 1e-13 * here.cost / h;
-                        assert!(
-                            (here.gradient[p] - difference).abs() < 2e-5 * scale + 10.0 * rounding,
-                            "{instance:?} {misfit:?} {}: {} {difference}",
-                            model.parameters[p].name,
-                            here.gradient[p]
-                        );
-                    }
-                }
+                agrees_with_differences(&model, &data, &theta, &format!("{instance:?}"));
             }
+        }
+    }
+
+    /// Moments of inertia, centres of mass, lengths and walls: the same, alone and beside effects that use what they change.
+    #[test]
+    fn gradients_of_link_parameters_agree_with_differences() {
+        let exact = model();
+        let data = data(&exact);
+        let section = RobotSection {
+            model: "irb6640".into(),
+            mass_tolerance: Some(0.05),
+            stiffness_tolerance: 0.3,
+            links: Default::default(),
+        };
+        let section = section.freeing(&crate::campaign::LinkGroup::ALL);
+        let free = StructureModel::new(exact.robot.clone(), exact.points.clone(), &section);
+        // Six stiffnesses, damping, six masses; 18 moments, 18 coordinates, 8 lengths, 5 walls.
+        assert_eq!(free.parameters.len(), 13 + 18 + 18 + 8 + 5);
+        let summary = data.summary();
+        for label in [
+            None,
+            Some("link-flexibility"),
+            Some("load-dependent-stiffness"),
+            Some("payload"),
+            Some("tool-flexibility"),
+            Some("joint-damping"),
+        ] {
+            let effect = label.map(|label| effects::find(&free.robot.spec, label)[0]);
+            let model = match effect {
+                Some(instance) => free.with_effect(instance, &summary),
+                None => free.clone(),
+            };
+            let mut theta = model.nominal_theta();
+            for (i, t) in theta.iter_mut().enumerate() {
+                *t += 0.01 * (1.0 + i as f64).sin();
+            }
+            agrees_with_differences(&model, &data, &theta, label.unwrap_or("alone"));
+        }
+    }
+
+    /// Numbers that are free but stand where the file has them change no prediction.
+    #[test]
+    fn free_numbers_at_the_files_values_are_the_file() {
+        let exact = model();
+        let data = data(&exact);
+        let section = RobotSection {
+            model: "irb6640".into(),
+            mass_tolerance: Some(0.05),
+            stiffness_tolerance: 0.3,
+            links: Default::default(),
+        };
+        let section = section.freeing(&crate::campaign::LinkGroup::ALL);
+        let free = StructureModel::new(exact.robot.clone(), exact.points.clone(), &section);
+        let (a, b) = (
+            exact.predict(&exact.nominal_theta(), &data).unwrap(),
+            free.predict(&free.nominal_theta(), &data).unwrap(),
+        );
+        for (a, b) in a.iter().flatten().zip(b.iter().flatten()) {
+            assert!((a - b).norm() < 1e-9 * a.norm(), "{a} {b}");
         }
     }
 }

@@ -4,7 +4,7 @@ use std::fmt::Debug;
 use std::path::Path;
 
 use super::Domain;
-use crate::campaign::Campaign;
+use crate::campaign::{Campaign, LinkTolerances};
 use crate::{Error, Result};
 
 /// FNV-1a, 64 bits (Fowler, Noll & Vo): notices a change; it need not resist anyone who wants to deceive himself.
@@ -47,6 +47,9 @@ pub fn structure_fingerprint(campaign: &Campaign) -> Result<String> {
     let mut hash = Fnv::new();
     if let Some(robot) = &campaign.robot {
         hash.value(&(robot.mass_tolerance, robot.stiffness_tolerance));
+        if robot.links != LinkTolerances::default() {
+            hash.value(&robot.links);
+        }
         let file = campaign.dir.join(&robot.model);
         if file.is_file() {
             hash.file(&file)?;

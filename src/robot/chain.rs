@@ -67,7 +67,7 @@ pub struct Element {
     pub damping: Option<Dual>,
 }
 
-/// A rigid body: `scale` multiplies its mass and inertia together.
+/// A rigid body: `scale` multiplies its mass.
 #[derive(Debug, Clone)]
 pub struct Body {
     pub place: Place,
@@ -76,6 +76,8 @@ pub struct Body {
     /// About the centre of mass, base axes.
     pub inertia_kg_m2: Matrix3<f64>,
     pub scale: Dual,
+    /// Whether `scale` multiplies its inertia, too; not where that is known, or tuned, by itself.
+    pub inertia_follows_mass: bool,
 }
 
 /// A point mass on spring and viscous damper that hangs on the chain and moves along `directions` relative to it
@@ -177,6 +179,28 @@ fn add_scaled(
     let (rows, columns) = block.shape();
     let mut view = matrix.view_mut((corner, corner), (rows, columns));
     view += block * factor;
+}
+
+impl System {
+    /// Derivative of the matrices with respect to one more parameter, from those at two of its values (`above` and `below`)
+    /// whose distance is 1/`per_unit`.
+    pub fn difference(above: &System, below: &System, per_unit: f64) -> SystemDerivative {
+        let of = |a: &DMatrix<f64>, b: &DMatrix<f64>| {
+            let slope = (a - b) * per_unit;
+            slope.iter().any(|v| *v != 0.0).then_some(slope)
+        };
+        let of_optional = |a: &Option<DMatrix<f64>>, b: &Option<DMatrix<f64>>| match (a, b) {
+            (Some(a), Some(b)) => of(a, b),
+            _ => None,
+        };
+        SystemDerivative {
+            stiffness: of(&above.stiffness, &below.stiffness),
+            mass: of(&above.mass, &below.mass),
+            chain_mass: of(&above.chain_mass, &below.chain_mass),
+            viscous: of_optional(&above.viscous, &below.viscous),
+            hysteretic: of_optional(&above.hysteretic, &below.hysteretic),
+        }
+    }
 }
 
 impl Chain {
@@ -295,8 +319,14 @@ impl Chain {
             let chain = jacobian.columns(0, chain_count);
             let v = chain.fixed_rows::<3>(0);
             let w = chain.fixed_rows::<3>(3);
-            let block: DMatrix<f64> =
-                v.transpose() * v * body.mass_kg + w.transpose() * body.inertia_kg_m2 * w;
+            let mut block: DMatrix<f64> = v.transpose() * v * body.mass_kg;
+            let turning: DMatrix<f64> = w.transpose() * body.inertia_kg_m2 * w;
+            if body.inertia_follows_mass {
+                block += turning;
+            } else {
+                add_scaled(&mut mass, n, 0, &turning, 1.0);
+                add_scaled(&mut chain_mass, chain_count, 0, &turning, 1.0);
+            }
             add_scaled(&mut mass, n, 0, &block, body.scale.value);
             add_scaled(&mut chain_mass, chain_count, 0, &block, body.scale.value);
             for (p, derivative) in derivatives.iter_mut().enumerate() {

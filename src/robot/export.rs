@@ -68,7 +68,10 @@ pub fn centre_of_mass_form(chain: &Chain) -> Result<CentreOfMassForm> {
         for i in 0..3 {
             mass[(6 * b + i, 6 * b + i)] = scale * body.mass_kg;
         }
-        let inertia = body.inertia_kg_m2 * scale;
+        let inertia = match body.inertia_follows_mass {
+            true => body.inertia_kg_m2 * scale,
+            false => body.inertia_kg_m2,
+        };
         mass.view_mut((6 * b + 3, 6 * b + 3), (3, 3)).copy_from(&inertia);
         before = body.place;
     }

@@ -121,7 +121,22 @@ struct Derivatives {
     /// Empty where no parameter changes what is hysteretic.
     hysteretic: Vec<f64>,
     massless: Option<MasslessDerivatives>,
+    /// Of parameters that move the outputs themselves.
+    moved_outputs: Vec<MovedOutputs>,
 }
+
+/// What one parameter changes in the outputs' rows.
+#[derive(Debug, Clone)]
+struct MovedOutputs {
+    parameter: usize,
+    /// In the basis, one column an output: n × outputs.
+    moving: DMatrix<f64>,
+    /// Change of the massless compliance between the outputs by the change of their rows, m/N per unit of the parameter.
+    massless: Option<DMatrix<f64>>,
+}
+
+/// Derivatives of the outputs' rows with respect to one parameter: its index, and one row an output.
+pub type RowSlopes = (usize, Vec<DVector<f64>>);
 
 /// What the massless part adds to the derivatives.
 #[derive(Debug, Clone)]
@@ -180,7 +195,22 @@ impl Slopes {
 
 impl FrfBasis {
     /// `outputs`: rows of displacement per coordinate (from [`super::Chain::output_row`]).
+    ///
+    /// # Errors
+    /// A stiffness that is not positive definite.
     pub fn new(system: &System, outputs: &[DVector<f64>]) -> Result<Self> {
+        Self::with_moved_outputs(system, outputs, &[])
+    }
+
+    /// As [`new`](Self::new), where parameters move the outputs as well: `row_slopes` says how.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn with_moved_outputs(
+        system: &System,
+        outputs: &[DVector<f64>],
+        row_slopes: &[RowSlopes],
+    ) -> Result<Self> {
         let n = system.stiffness.nrows();
         let chain = system.chain_count;
         let modes = ModalBasis::new(
@@ -222,6 +252,26 @@ impl FrfBasis {
             still_rows.set_column(j, &(still.transpose() * output));
         }
         let massless = (moving < chain).then(|| still_rows.transpose() * &still_rows);
+        let moved_outputs = row_slopes
+            .iter()
+            .map(|(parameter, slopes)| {
+                let mut moving = DMatrix::zeros(n, outputs.len());
+                let mut still_slopes = DMatrix::zeros(still.ncols(), outputs.len());
+                for (j, slope) in slopes.iter().enumerate() {
+                    moving.set_column(j, &(basis.transpose() * slope));
+                    still_slopes.set_column(j, &(still.transpose() * slope));
+                }
+                let massless = massless.is_some().then(|| {
+                    let half: DMatrix<f64> = still_slopes.transpose() * &still_rows;
+                    &half + half.transpose()
+                });
+                MovedOutputs {
+                    parameter: *parameter,
+                    moving,
+                    massless,
+                }
+            })
+            .collect();
 
         let zeta = system.modal_damping_ratio.value;
         let root: Vec<f64> = modes.inverse_omega2[..moving]
@@ -271,6 +321,7 @@ impl FrfBasis {
                 coupling: vec![Complex64::ZERO; n * count * outputs],
                 own: vec![0.0; outputs * count * outputs],
             }),
+            moved_outputs,
         };
         let moving_shapes = modes.shapes.columns(0, moving);
         for (p, derivative) in system.derivatives.iter().enumerate() {
@@ -494,6 +545,28 @@ impl FrfBasis {
                         slopes.values[i + inputs * (p + count * out)] -=
                             massless.own[out + outputs * (p + count * input)];
                     }
+                }
+            }
+        }
+        self.add_moved_outputs(response, slopes);
+    }
+
+    /// Adds (dr_out)ᵀ u_in + (dr_in)ᵀ u_out for the parameters that move the outputs.
+    fn add_moved_outputs(&self, response: &Response, slopes: &mut Slopes) {
+        let (n, count, outputs) = (self.n, self.derivatives.count, self.rows.ncols());
+        let inputs = slopes.inputs.len();
+        for moved in &self.derivatives.moved_outputs {
+            let along = |row: usize, force: usize| -> Complex64 {
+                let row = &moved.moving.as_slice()[n * row..n * (row + 1)];
+                let column = response.column(n, force);
+                row.iter().zip(column).map(|(r, u)| u * *r).sum()
+            };
+            for out in 0..outputs {
+                for i in 0..inputs {
+                    let input = slopes.inputs[i];
+                    let still = moved.massless.as_ref().map_or(0.0, |m| m[(out, input)]);
+                    slopes.values[i + inputs * (moved.parameter + count * out)] +=
+                        along(out, input) + along(input, out) + still;
                 }
             }
         }

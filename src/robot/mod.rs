@@ -9,6 +9,7 @@ pub mod chain;
 pub mod dh;
 pub mod dual;
 pub mod export;
+pub mod file_number;
 
 #[cfg(test)]
 pub(crate) mod fixture;
@@ -22,6 +23,7 @@ pub use crate::campaign::robot_spec::*;
 pub use chain::{Attachment, AttachmentLaw, Body, Branch, Chain, Element, Grip, Place, Role, Slot, System};
 pub use dh::Kinematics;
 pub use dual::Dual;
+pub use file_number::FileNumber;
 pub use frf::{FrfBasis, ModalBasis};
 pub use inverse::{IkBranch, IkSolution, InverseKinematics};
 pub use model::{Baseline, RobotModel};

@@ -119,6 +119,7 @@ impl RobotModel {
                     mass_kg: link.mass_kg,
                     inertia_kg_m2: rotation * principal * rotation.transpose(),
                     scale: baseline.mass_scale[i - 1].clone(),
+                    inertia_follows_mass: true,
                 }
             })
             .collect();

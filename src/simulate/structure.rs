@@ -174,6 +174,7 @@ pub fn simulate(scenario: &StructureScenario, robot: &LabRobot) -> Result<LabCam
         model: robot.reference.clone(),
         mass_tolerance: (scenario.mass_error > 0.0).then_some(scenario.mass_error),
         stiffness_tolerance: scenario.stiffness_error.max(DEFAULT_STIFFNESS_TOLERANCE),
+        links: Default::default(),
     };
     let points = points(scenario.layout, robot.spec.joints.len());
     let lab = TrueRobot::draw(robot, points, &section, scenario);

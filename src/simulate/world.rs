@@ -312,6 +312,7 @@ mod tests {
             model: "irb6640".into(),
             mass_tolerance: None,
             stiffness_tolerance: 0.3,
+            links: Default::default(),
         };
         let point = |node, body| Point {
             node,

@@ -46,7 +46,13 @@ fn every_key_of_the_contract_is_read() {
         Some(RobotSection {
             model: "irb6640".into(),
             mass_tolerance: Some(0.05),
-            stiffness_tolerance: 0.4
+            stiffness_tolerance: 0.4,
+            links: LinkTolerances {
+                inertia: Some(0.5),
+                centre_m: Some(0.04),
+                length_m: Some(0.005),
+                wall: Some(0.2),
+            },
         })
     );
     assert_eq!(

@@ -14,6 +14,7 @@ mod hole;
 mod init;
 mod inspect;
 mod interactive;
+mod links;
 mod lobes;
 mod modal;
 mod next_measurement;

@@ -559,9 +559,12 @@ fn from_nothing_to_a_diagnosis() {
 
 #[test]
 fn files_from_the_page_replace_nothing_and_stay_where_they_belong() {
-    let here = tempfile::tempdir().unwrap();
+    // One folder deeper than the temporary one: what lies beside it is nobody else's.
+    let around = tempfile::tempdir().unwrap();
+    let here = around.path().join("here");
+    std::fs::create_dir(&here).unwrap();
     let served = Served::from_nothing();
-    let order = json!({ "do": "folder", "parent": here.path(), "name": "new" });
+    let order = json!({ "do": "folder", "parent": here, "name": "new" });
     for headers in ["", "X-Lobestone-Token: 0\r\n", "Origin: http://evil.example\r\n"] {
         assert_eq!(
             served
@@ -581,12 +584,12 @@ fn files_from_the_page_replace_nothing_and_stay_where_they_belong() {
             "{headers}"
         );
     }
-    assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), 0);
+    assert_eq!(std::fs::read_dir(&here).unwrap().count(), 0);
     let made = served.begin(&order).json();
     let dir = std::path::PathBuf::from(made["folder"].as_str().unwrap());
     assert_eq!(served.begin(&order).status, 422);
     for name in ["..", "a/b", "", "../up", "/tmp/x", ".hidden"] {
-        let answer = served.begin(&json!({ "do": "folder", "parent": here.path(), "name": name }));
+        let answer = served.begin(&json!({ "do": "folder", "parent": here, "name": name }));
         assert_eq!(answer.status, 422, "{name}: {}", answer.text());
     }
     assert_eq!(served.upload(&dir, "frf/p1.csv", b"first").status, 200);
@@ -607,13 +610,13 @@ fn files_from_the_page_replace_nothing_and_stay_where_they_belong() {
         assert_eq!(served.upload(&dir, name, b"x").status, 422, "{name}");
     }
     // Neither a folder that nobody opened on the page, nor one behind a link.
-    assert_eq!(served.upload(here.path(), "x", b"x").status, 422);
+    assert_eq!(served.upload(&here, "x", b"x").status, 422);
     #[cfg(unix)]
     {
-        std::os::unix::fs::symlink(here.path(), dir.join("out")).unwrap();
+        std::os::unix::fs::symlink(&here, dir.join("out")).unwrap();
         assert_eq!(served.upload(&dir, "out/x", b"x").status, 422);
     }
-    assert!(!here.path().join("x").exists() && !here.path().parent().unwrap().join("x").exists());
+    assert!(!here.join("x").exists() && !around.path().join("x").exists());
     // Too much is refused before it is read.
     let large = format!(
         "POST {} HTTP/1.1\r\nHost: HOST\r\nConnection: close\r\nContent-Length: 300000000\r\nX-Lobestone-Token: {}\r\n\r\n",

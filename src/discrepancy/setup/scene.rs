@@ -144,6 +144,7 @@ fn pass(
         None => block.kinematics.clone(),
     };
     let chain = model.chain(theta, &kinematics, block.lowness, false);
+    let kinematics = model.kinematics_at(theta, &kinematics);
     let mut points: Vec<usize> = members
         .iter()
         .flat_map(|&k| [block.frfs[k].response.point, block.frfs[k].reference.point])

@@ -548,6 +548,7 @@ impl Departure for FloorMode {
             mass_kg,
             inertia_kg_m2: nalgebra::Matrix3::zeros(),
             scale: Dual::constant(1.0),
+            inertia_follows_mass: true,
         });
     }
 }

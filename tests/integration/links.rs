@@ -1,0 +1,106 @@
+//! Link parameters that are not those of the robot file (`calibrate --free`), on a campaign of an independent program
+//! (`scripts/link_campaign.py`).
+
+use serde_json::Value;
+
+use crate::support::{blind, copy_folder, document, lobestone};
+
+fn parameter<'d>(document: &'d Value, name: &str) -> &'d Value {
+    let all = document["parameters"].as_array().unwrap();
+    all.iter()
+        .find(|p| p["name"] == name)
+        .unwrap_or_else(|| panic!("no {name}"))
+}
+
+fn campaign() -> (tempfile::TempDir, String) {
+    let from = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/links/both");
+    let dir = tempfile::tempdir().unwrap();
+    copy_folder(&from, dir.path());
+    let name = dir.path().to_str().unwrap().to_string();
+    (dir, name)
+}
+
+/// Link 4 turns harder than its file says (31 → 60 kg·m²) and joint 4 is 20 mm longer, joint stiffnesses are off by up to 30 %.
+#[test]
+fn inertia_and_length_are_found() {
+    let (_dir, dir) = campaign();
+    let found = document(&["calibrate", &dir, "--free", "inertias,lengths"]);
+    let value = |name: &str| {
+        let p = parameter(&found, name);
+        (p["value"].as_f64().unwrap(), p["std_error"].as_f64().unwrap())
+    };
+    for (axis, truth) in [("x", 60.0), ("y", 60.0)] {
+        let (inertia, error) = value(&format!("link-4.inertia-{axis}"));
+        assert!((inertia / truth - 1.0).abs() < 0.05, "{axis} {inertia} ± {error}");
+        assert!(
+            (inertia - truth).abs() < 4.0 * error,
+            "{axis} {inertia} ± {error}"
+        );
+    }
+    let (d, error) = value("joint-4.d");
+    assert!(
+        (d - 1.1654).abs() < 1e-3 && (d - 1.1654).abs() < 4.0 * error,
+        "{d} ± {error}"
+    );
+    for (joint, truth) in [1.55e6, 1.785e6, 1.926e6, 5.153e5, 3.19e5, 5.415e5]
+        .iter()
+        .enumerate()
+    {
+        let (stiffness, error) = value(&format!("joint-{}.stiffness", joint + 1));
+        assert!(
+            (stiffness - truth).abs() < 4.0 * error.max(1e-3 * truth),
+            "{joint} {stiffness} ± {error}"
+        );
+    }
+    assert_eq!(found["freed"]["is_progress"], true);
+    assert!(found["reduced_chi2"].as_f64().unwrap() < 1.1);
+    let number = |key: &str| found["freed"][key].as_f64().unwrap();
+    assert!(number("held_out_nrms_after") < 0.5 * number("held_out_nrms_before"));
+}
+
+/// The keys of `[robot]` do what `--free` does.
+#[test]
+fn tolerances_in_the_campaign_free_for_good() {
+    let (dir, name) = campaign();
+    let file = dir.path().join("campaign.toml");
+    let text = std::fs::read_to_string(&file).unwrap();
+    let keys = "model = \"irb6640\"\ninertia_tolerance = 0.4\nlength_tolerance_mm = 10.0";
+    std::fs::write(&file, text.replace("model = \"irb6640\"", keys)).unwrap();
+    let found = document(&["calibrate", &name]);
+    let d = parameter(&found, "joint-4.d")["value"].as_f64().unwrap();
+    assert!((d - 1.1654).abs() < 1e-3, "{d}");
+    assert!(found["freed"].is_null());
+    let run = lobestone(&["diagnose", &name]);
+    assert!(run.stdout.contains("NOTHING is missing"), "{}", run.stdout);
+}
+
+/// Where the links are those of the file, freeing all of them predicts nothing better, and the program says so.
+#[test]
+fn nothing_is_freed_that_should_not_be() {
+    let dir = blind("frf-9112");
+    let dir = dir.to_str().unwrap();
+    let found = document(&["calibrate", dir, "--free", "links"]);
+    let number = |key: &str| found["freed"][key].as_f64().unwrap();
+    assert_eq!(found["freed"]["is_progress"], false, "{}", found["freed"]);
+    assert!(number("held_out_nrms_after") < 1.01 * number("held_out_nrms_before"));
+    let unsaid = found["undetermined"]["by_itself"].as_array().unwrap();
+    assert!(!unsaid.is_empty());
+    let run = lobestone(&["calibrate", dir, "--free", "inertias"]);
+    assert!(
+        run.stdout.contains("leave the links as they are"),
+        "{}",
+        run.stdout
+    );
+}
+
+#[test]
+fn walls_of_rigid_links_are_refused() {
+    let dir = blind("frf-9112");
+    let run = lobestone(&["calibrate", dir.to_str().unwrap(), "--free", "walls"]);
+    assert_eq!(run.status, Some(1));
+    assert!(
+        run.stderr.contains("rigid") && run.stderr.contains("add "),
+        "{}",
+        run.stderr
+    );
+}

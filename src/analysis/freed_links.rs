@@ -3,9 +3,11 @@
 use super::StructureAnalysis;
 use crate::campaign::{Campaign, LinkGroup};
 use crate::discrepancy::verdict::is_progress;
+use crate::identify::case::Freed;
+use crate::identify::departures::departures;
 use crate::identify::levenberg_marquardt::Stopping;
 use crate::identify::study::{Extent, held_out};
-use crate::identify::{HeldOut, Options, StructureCase, Undetermined};
+use crate::identify::{Calibration, HeldOut, Options, Parameter, StructureCase, Undetermined};
 use crate::{InputError, Result};
 
 /// What freeing groups of link parameters does.
@@ -13,13 +15,17 @@ pub struct FreedLinks {
     pub groups: Vec<LinkGroup>,
     /// As the campaign stands.
     pub before: StructureAnalysis,
-    /// With the groups free, started from there.
+    /// With those parameters of the groups free that must differ from the robot file; the others are as it has them.
     pub after: StructureAnalysis,
+    /// Their names; empty where all agree with the file.
+    pub departing: Vec<String>,
+    /// How many were free.
+    pub freed: usize,
     /// Errors on postures left out of the fit, before and after; `None` with one posture.
     pub held_out: Option<[HeldOut; 2]>,
     /// Whether that error fell by more than chance would let it; `None` with one posture.
     pub progress: Option<bool>,
-    /// What the data do not determine, with the groups free.
+    /// What the data do not determine, with all of the groups free.
     pub undetermined: Undetermined,
 }
 
@@ -29,10 +35,13 @@ const REFIT_WITHOUT_FOLD: Stopping = Stopping {
 };
 
 impl FreedLinks {
+    /// Fits with the groups free, finds which of their parameters must differ from the robot file, and fits those alone.
+    ///
     /// # Errors
     /// Groups that the model cannot have free, and as for [`StructureAnalysis::run`].
     pub fn run(campaign: &Campaign, groups: &[LinkGroup], options: Options) -> Result<Self> {
-        let case = StructureCase::load_freeing(campaign, groups)?;
+        let free = |only| StructureCase::load_freeing(campaign, &Freed { groups, only });
+        let case = free(None)?;
         let bends = case.effects().iter().any(|e| e.starts_with("link-flexibility"));
         if groups.contains(&LinkGroup::Walls) && !bends {
             return Err(InputError::new(
@@ -45,11 +54,21 @@ impl FreedLinks {
             .into());
         }
         let before = StructureAnalysis::run(campaign, options)?;
-        // By name: what is free now stands at the robot file's values.
-        let known = |name: &str| before.calibration.parameters.iter().find(|p| p.name == name);
-        let of = |p: &crate::parameter::Parameter| p.internal(known(&p.name).map_or(p.nominal, |e| e.value));
-        let start = case.model.parameters.iter().map(of).collect();
-        let after = StructureAnalysis::of(case.starting_from(start), None, options)?;
+        let every = from_where_it_stood(case, &before.calibration, options)?;
+        let parameters = &every.case.model.parameters;
+        let known = |name: &str| before.calibration.parameters.iter().any(|p| p.name == name);
+        let new: Vec<usize> = (0..parameters.len())
+            .filter(|i| !known(&parameters[*i].name))
+            .collect();
+        let undetermined = Undetermined::new(parameters, &every.calibration)?;
+        let departing: Vec<String> = departures(parameters, &every.calibration, &new)
+            .into_iter()
+            .map(|i| parameters[i].name.clone())
+            .collect();
+        // What the campaign frees itself stays free.
+        let before_parameters = before.calibration.parameters.iter().map(|p| p.name.clone());
+        let kept: Vec<String> = before_parameters.chain(departing.clone()).collect();
+        let after = from_where_it_stood(free(Some(&kept))?, &every.calibration, options)?;
         let error = |analysis: &StructureAnalysis| {
             let case = &analysis.case;
             let study = case.study(options);
@@ -57,15 +76,30 @@ impl FreedLinks {
             held_out(&study, &case.model, theta, Extent::Coarse, REFIT_WITHOUT_FOLD)
         };
         let held_out = error(&before)?.zip(error(&after)?).map(<[HeldOut; 2]>::from);
-        let more = after.calibration.theta.len() - before.calibration.theta.len();
         let chance = after.calibration.reduced_chi2.max(1.0);
+        let better =
+            |[a, b]: &[HeldOut; 2]| !departing.is_empty() && is_progress(a, b, departing.len(), chance);
         Ok(FreedLinks {
             groups: groups.to_vec(),
-            progress: held_out.as_ref().map(|[a, b]| is_progress(a, b, more, chance)),
-            undetermined: Undetermined::new(&after.case.model.parameters, &after.calibration)?,
+            progress: held_out.as_ref().map(better),
+            freed: new.len(),
+            undetermined,
+            departing,
             held_out,
             before,
             after,
         })
     }
+}
+
+/// Calibrates `case` from an earlier solution, by name; what that has not stands at the robot file's values.
+fn from_where_it_stood(
+    case: StructureCase,
+    earlier: &Calibration,
+    options: Options,
+) -> Result<StructureAnalysis> {
+    let known = |name: &str| earlier.parameters.iter().find(|p| p.name == name);
+    let of = |p: &Parameter| p.internal(known(&p.name).map_or(p.nominal, |e| e.value));
+    let start = case.model.parameters.iter().map(of).collect();
+    StructureAnalysis::of(case.starting_from(start), None, options)
 }

@@ -23,8 +23,8 @@ pub struct Args {
     #[arg(long)]
     from_nominal: bool,
     /// Link parameters that are fitted as well, with the usual tolerance where campaign.toml gives none: masses, inertias,
-    /// centres (of mass), lengths (of the kinematics), walls (of links that bend), or links (all of them). Says whether that
-    /// predicts left-out postures better, and what the data do not determine.
+    /// centres (of mass), lengths (of the kinematics), walls (of links that bend), or links (all of them). Keeps those that
+    /// cannot be what the robot file says; says whether postures left out are predicted better, and what the data cannot tell.
     #[arg(
         long,
         value_delimiter = ',',
@@ -117,6 +117,8 @@ pub fn run(args: Args) -> Result<Outcome> {
         "undetermined": undetermined,
         "freed": freed.as_ref().map(|freed| json!({
             "groups": freed.groups.iter().map(|g| g.key()).collect::<Vec<_>>(),
+            "parameters_freed": freed.freed,
+            "departing": freed.departing,
             "error_before": freed.before.after.totals,
             "held_out_nrms_before": freed.held_out.as_ref().map(|[a, _]| a.nrms()),
             "held_out_nrms_after": freed.held_out.as_ref().map(|[_, b]| b.nrms()),
@@ -169,8 +171,18 @@ pub fn run(args: Args) -> Result<Outcome> {
 
 /// What freeing link parameters did to the error, and how to keep it.
 fn describe_freed(freed: &FreedLinks) -> String {
+    if freed.departing.is_empty() {
+        return format!(
+            "\nall {} link parameters that were free agree with the robot file within their errors: leave them as they are\n",
+            freed.freed
+        );
+    }
     let mut text = format!(
-        "\nwith the links as in the robot file the error was {}",
+        "\nof {} link parameters that were free {} cannot be what the robot file says: {}; the others agree with it and were left \
+         alone\nwith the links as in the robot file the error was {}",
+        freed.freed,
+        freed.departing.len(),
+        freed.departing.join(", "),
         percent(freed.before.after.totals.nrms)
     );
     if let Some([before, after]) = &freed.held_out {
@@ -182,18 +194,11 @@ fn describe_freed(freed: &FreedLinks) -> String {
     }
     text += match freed.progress {
         Some(true) => ", better by more than chance\n",
-        Some(false) => ", no better than chance would make it: leave the links as they are\n",
+        Some(false) => ", no better than chance would make it: leave them as they are\n",
         None => "\n",
     };
     if freed.progress != Some(false) {
-        let keys = freed
-            .groups
-            .iter()
-            .map(|g| format!("{} = {}", g.key(), g.usual_tolerance()));
-        text += &format!(
-            "to keep them free, write under [robot] in campaign.toml: {}\n",
-            keys.collect::<Vec<_>>().join(", ")
-        );
+        text += "to keep them, give the campaign a robot file of its own with these values (docs/files.md)\n";
     }
     text
 }

@@ -42,17 +42,26 @@ pub fn robot_section(campaign: &Campaign) -> Result<&RobotSection> {
 /// # Errors
 /// No robot, or a robot file that cannot be read.
 pub fn structure_model(campaign: &Campaign) -> Result<StructureModel> {
-    structure_model_freeing(campaign, &[])
+    structure_model_freeing(campaign, &Freed::default())
 }
 
-/// As [`structure_model`], with groups of link parameters free that the campaign may take for exact.
-fn structure_model_freeing(campaign: &Campaign, groups: &[LinkGroup]) -> Result<StructureModel> {
-    let section = &robot_section(campaign)?.freeing(groups);
+/// Link parameters that are free beside those that the campaign frees itself.
+#[derive(Debug, Clone, Default)]
+pub struct Freed<'a> {
+    pub groups: &'a [LinkGroup],
+    /// Only these of all link parameters, by name; `None`: all of the groups.
+    pub only: Option<&'a [String]>,
+}
+
+fn structure_model_freeing(campaign: &Campaign, freed: &Freed) -> Result<StructureModel> {
+    let section = &robot_section(campaign)?.freeing(freed.groups);
     let spec = RobotSpec::load(&section.model, &campaign.dir)?;
-    Ok(StructureModel::new(
+    let kept = |name: &str| freed.only.is_none_or(|only| only.iter().any(|o| o == name));
+    Ok(StructureModel::freeing(
         RobotModel::new(spec),
         campaign.points.clone(),
         section,
+        kept,
     ))
 }
 
@@ -60,15 +69,15 @@ impl StructureCase {
     /// # Errors
     /// FRFs or robot file that cannot be read, a broken revision log, or one with effects that are none of this robot.
     pub fn load(campaign: &Campaign) -> Result<Self> {
-        Self::load_freeing(campaign, &[])
+        Self::load_freeing(campaign, &Freed::default())
     }
 
-    /// As [`load`](Self::load), with groups of link parameters free that the campaign may take for exact.
+    /// As [`load`](Self::load), with link parameters free that the campaign may take for exact.
     ///
     /// # Errors
     /// As there.
-    pub fn load_freeing(campaign: &Campaign, groups: &[LinkGroup]) -> Result<Self> {
-        let baseline = structure_model_freeing(campaign, groups)?;
+    pub fn load_freeing(campaign: &Campaign, freed: &Freed) -> Result<Self> {
+        let baseline = structure_model_freeing(campaign, freed)?;
         let log = RevisionLog::load(&campaign.dir)?;
         let revisions: Vec<Revision> = log.revisions(Domain::Structure).cloned().collect();
         let (set, mut warnings) = campaign.load_frfs()?;

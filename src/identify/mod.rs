@@ -10,6 +10,7 @@ pub mod cutting_problem;
 pub mod cutting_study;
 pub mod cutting_waves;
 mod cutting_windows;
+pub mod departures;
 mod force_channel;
 pub mod frf_data;
 pub mod levenberg_marquardt;

@@ -27,8 +27,8 @@ pub struct StructureModel {
     pub points: Vec<Point>,
     /// Those of the baseline, then those of each added effect.
     pub parameters: Vec<Parameter>,
-    /// Whether link masses are among the parameters (after the joints and the damping ratio).
-    tunes_masses: bool,
+    /// For each link, which parameter its mass is, where it is tuned.
+    masses: Vec<Option<usize>>,
     /// Further numbers of the robot file that are tuned, in the order of their parameters, and the first of those.
     file_numbers: Vec<FileNumber>,
     first_file_number: usize,
@@ -109,6 +109,16 @@ const STIFFNESS_FACTOR: f64 = 100.0;
 
 impl StructureModel {
     pub fn new(robot: RobotModel, points: Vec<Point>, section: &RobotSection) -> Self {
+        Self::freeing(robot, points, section, |_| true)
+    }
+
+    /// As [`new`](Self::new), where of the link parameters that `section` frees only those are that `kept` says of by name.
+    pub fn freeing(
+        robot: RobotModel,
+        points: Vec<Point>,
+        section: &RobotSection,
+        kept: impl Fn(&str) -> bool,
+    ) -> Self {
         let mut parameters = Vec::new();
         for (i, joint) in robot.spec.joints.iter().enumerate() {
             let nominal = 1.0 / joint.compliance_rad_per_nm;
@@ -135,10 +145,16 @@ impl StructureModel {
             }),
             bounds: [5e-4, 0.3],
         });
+        let mut masses = vec![None; robot.spec.links.len()];
         if let Some(tolerance) = section.mass_tolerance {
             for (i, link) in robot.spec.links.iter().enumerate() {
+                let name = format!("link-{}.mass", i + 1);
+                if !kept(&name) {
+                    continue;
+                }
+                masses[i] = Some(parameters.len());
                 parameters.push(Parameter {
-                    name: format!("link-{}.mass", i + 1),
+                    name,
                     unit: "kg",
                     scale: Scale::Linear,
                     nominal: link.mass_kg,
@@ -153,7 +169,7 @@ impl StructureModel {
         let first_file_number = parameters.len();
         let mut file_numbers = Vec::new();
         for (numbers, tolerance) in file_numbers_of(&robot, section) {
-            for number in numbers {
+            for number in numbers.into_iter().filter(|n| kept(&n.name())) {
                 parameters.push(file_parameter(&robot, number, tolerance));
                 file_numbers.push(number);
             }
@@ -162,7 +178,7 @@ impl StructureModel {
             robot,
             points,
             parameters,
-            tunes_masses: section.mass_tolerance.is_some(),
+            masses,
             file_numbers,
             first_file_number,
             effects: Vec::new(),
@@ -290,13 +306,14 @@ impl StructureModel {
         let value = |i: usize| self.value(theta, i, with_derivatives);
         let joints = self.robot.joint_count();
         let links = &self.robot.spec.links;
-        let mass_scale = links.iter().enumerate().map(|(i, link)| {
-            if self.tunes_masses && link.mass_kg > 0.0 {
-                value(joints + 1 + i).scale(1.0 / link.mass_kg)
-            } else {
-                Dual::constant(1.0)
-            }
-        });
+        let mass_scale =
+            links
+                .iter()
+                .enumerate()
+                .map(|(i, link)| match self.masses[i].filter(|_| link.mass_kg > 0.0) {
+                    Some(parameter) => value(parameter).scale(1.0 / link.mass_kg),
+                    None => Dual::constant(1.0),
+                });
         Baseline {
             joint_stiffness_nm_per_rad: (0..joints).map(value).collect(),
             damping_ratio: value(joints),

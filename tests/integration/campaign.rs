@@ -72,7 +72,7 @@ fn every_key_of_the_contract_is_read() {
     assert!(frf.file.ends_with("frf/p2.csv") && frf.file.is_file());
     assert_eq!(
         (frf.posture, frf.quantity, frf.force_level_n, frf.line),
-        (1, Some(Quantity::Accelerance), Some(200.0), 33)
+        (1, Some(Quantity::Accelerance), Some(200.0), 37)
     );
     let tool = campaign.tool.unwrap();
     assert_eq!(
@@ -184,13 +184,16 @@ const SLIPS: &[(&str, &str, &str, &str)] = &[
     ("irb6640", "irb664", "robot.model", "no built-in robot"),
     ("irb6640", "../robot.toml", "robot.model", "leaves the campaign folder"),
     ("mass_tolerance = 0.05", "mass_tolerance = -0.05", "robot.mass_tolerance", "at least 0 and at most 1"),
+    ("inertia_tolerance = 0.5", "inertia_tolerance = 5.0", "robot.inertia_tolerance", "at least 0 and at most 2"),
+    ("com_tolerance_mm = 40.0", "com_tolerance_m = 0.04", "robot.com_tolerance_m", "did you mean com_tolerance_mm?"),
+    ("length_tolerance_mm = 5.0", "length_tolerance_mm = -5.0", "robot.length_tolerance_mm", "at least 0 and at most 500"),
     ("stiffness_tolerance = 0.4", "stiffness_tolerance = 0", "robot.stiffness_tolerance", "above 0"),
     // Postures and points.
     ("id = \"p2\"", "id = \"p1\"", "posture[1].id", "p1 is taken by posture[0]"),
     ("[135, 20, 26, 30, 80, -150]", "[135, 20, 26, 30, 80]", "posture[1].joints_deg", "has 5 angles, but the robot has 6"),
     ("[135, 20,", "[135, nan,", "posture[1].joints_deg[1]", "is nan, not a finite number"),
     ("[135, 20,", "[135, \"20\",", "posture[1].joints_deg[1]", "take the quotes off"),
-    ("joints_deg = [135, 20, 26, 30, 80, -150]\n", "", "posture[1].joints_deg", "missing@13"),
+    ("joints_deg = [135, 20, 26, 30, 80, -150]\n", "", "posture[1].joints_deg", "missing@17"),
     ("node = 12", "node = 1", "point[1].node", "1 is taken by point[0]"),
     ("\"link6\"", "\"link7\"", "point[1].body", "the robot has no body \"link7\""),
     ("\"link6\"", "\"link06\"", "point[1].body", "\"link1\" to \"link6\""),
@@ -208,8 +211,8 @@ const SLIPS: &[(&str, &str, &str, &str)] = &[
     // Tool and dynamometer.
     ("teeth = 2\nhelix", "teeth = 0\nhelix", "tool.teeth", "from 1 to 1000"),
     ("diameter_mm = 9.5", "diameter_mm = -9.5", "tool.diameter_mm", "is -9.5, out of range"),
-    ("diameter_mm = 9.5\n", "", "tool.diameter_mm", "missing@39"),
-    ("kind = \"drill\"", "kind = \"endmill\"", "tool.half_point_angle_deg", "belongs to a drill@44"),
+    ("diameter_mm = 9.5\n", "", "tool.diameter_mm", "missing@43"),
+    ("kind = \"drill\"", "kind = \"endmill\"", "tool.half_point_angle_deg", "belongs to a drill@48"),
     ("half_point_angle_deg = 67.5\nweb", "half_point_angle_deg = 118.0\nweb", "tool.half_point_angle_deg", "at most 90"),
     ("web_thickness_mm = 1.425", "web_thickness_mm = 9.5", "tool.web_thickness_mm", "below 9.5"),
     ("[0.0, 0.0, 1.0]]", "[0.0, 0.0, 2.0]]", "dynamometer.tool_from_dyno", "would stretch the forces"),
@@ -219,20 +222,20 @@ const SLIPS: &[(&str, &str, &str, &str)] = &[
     // Cuts.
     ("id = \"02\"", "id = \"01\"", "cut[1].id", "01 is taken by cut[0]"),
     ("spindle_rpm = 1200.0", "spindle_rpm = 0", "cut[0].spindle_rpm", "above 0"),
-    ("spindle_rpm = 1200.0\n", "", "cut[0].spindle_rpm", "missing@53"),
+    ("spindle_rpm = 1200.0\n", "", "cut[0].spindle_rpm", "missing@57"),
     ("feed_per_tooth_mm = 0.05\naxial_depth_mm = 2.0\nimm", "feed_per_tooth_mm = -0.05\naxial_depth_mm = 2.0\nimm", "cut[0].feed_per_tooth_mm", "above 0"),
     ("axial_depth_mm = 2.0\nimm", "axial_depth_mm = inf\nimm", "cut[0].axial_depth_mm", "not a finite number"),
-    ("immersion = \"slot\"\n", "", "cut[0].immersion", "missing@53"),
+    ("immersion = \"slot\"\n", "", "cut[0].immersion", "missing@57"),
     ("immersion = \"slot\"", "immersion = \"half\"", "cut[0].immersion", "it must be \"slot\""),
-    ("start_deg = 0.0", "start_deg = 90.0", "cut[1].exit_deg", "starts at 90 and ends at 90@74"),
+    ("start_deg = 0.0", "start_deg = 90.0", "cut[1].exit_deg", "starts at 90 and ends at 90@78"),
     ("exit_deg = 90.0", "exit_deg = 270.0", "cut[1].exit_deg", "at most 180"),
-    ("exit_deg = 90.0\n", "", "cut[1].exit_deg", "missing@66"),
-    ("start_deg = 0.0", "immersion = \"slot\"", "cut[1].exit_deg", "said twice, by immersion and by@74"),
+    ("exit_deg = 90.0\n", "", "cut[1].exit_deg", "missing@70"),
+    ("start_deg = 0.0", "immersion = \"slot\"", "cut[1].exit_deg", "said twice, by immersion and by@78"),
     ("[1.2, 2.6]", "[2.6, 1.2]", "cut[0].steady_s", "starts at 2.6 s and ends at 1.2 s"),
     ("posture = \"p2\"\n\n[[cut]]", "posture = \"tap\"\n\n[[cut]]", "cut[0].posture", "name one that is there (p1, p2)"),
     ("outcome = \"chatter\"", "outcome = \"loud\"", "cut[0].outcome", "\"stable\", \"chatter\""),
-    ("process = \"drilling\"", "process = \"milling\"", "cut[2].feed_per_rev_mm", "belongs to drilling@81"),
-    ("process = \"drilling\"\n", "", "cut[2].process", "missing@76"),
+    ("process = \"drilling\"", "process = \"milling\"", "cut[2].feed_per_rev_mm", "belongs to drilling@85"),
+    ("process = \"drilling\"\n", "", "cut[2].process", "missing@80"),
     ("feed_per_rev_mm = 0.05", "feed_per_rev_mm = 0", "cut[2].feed_per_rev_mm", "above 0"),
     ("pilot_diameter_mm = 3.5", "pilot_diameter_mm = 9.5", "cut[2].pilot_diameter_mm", "the tool's diameter is 9.5"),
     ("hole_depth_mm = 8.3", "hole_depth_mm = -8.3", "cut[2].hole_depth_mm", "above 0"),
@@ -241,7 +244,7 @@ const SLIPS: &[(&str, &str, &str, &str)] = &[
     ("\"semi-discretisation\"", "\"frequency-domain\"", "lobes.method", "\"zero-order\""),
     ("ktc_n_per_mm2 = 1014.2", "ktc_n_per_mm2 = -1014.2", "lobes.ktc_n_per_mm2", "above 0"),
     ("radial_ratio = 0.25", "radial_ratio = 1.5", "lobes.radial_ratio", "at most 1"),
-    ("cut = \"down\"\n", "", "lobes.cut", "missing@85"),
+    ("cut = \"down\"\n", "", "lobes.cut", "missing@89"),
     ("radial_ratio = 0.25\n", "", "lobes.cut", "needs radial_ratio"),
     ("cut = \"down\"", "cut = \"climb\"", "lobes.cut", "\"up\", \"down\""),
     ("[100.0, 1500.0, 1.0]", "[0.0, 1500.0, 1.0]", "lobes.spindle_rpm", "starts at 0 rpm"),

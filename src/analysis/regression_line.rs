@@ -50,6 +50,7 @@ fn describe(geometry: &CutGeometry) -> String {
             pilot_diameter_mm, ..
         } if *pilot_diameter_mm > 0.0 => format!("pilot hole {pilot_diameter_mm} mm"),
         CutGeometry::Drilling { .. } => "no pilot hole".into(),
+        CutGeometry::Turning { depth_of_cut_mm, .. } => format!("depth {depth_of_cut_mm} mm"),
     }
 }
 

@@ -8,7 +8,8 @@ use crate::signal::median;
 
 /// Force per chip cross-section of one cut, edge forces included, N/mm².
 struct Specific {
-    /// Milling: of the force in the plane of cutting, whatever its direction; drilling: from the torque.
+    /// Milling: of the force in the plane of cutting, whatever its direction; drilling: from the torque; turning: of the
+    /// cutting force.
     cutting: Option<f64>,
     /// Milling: of the axial force; drilling: of the thrust.
     axial: Option<f64>,
@@ -43,6 +44,11 @@ fn specific(campaign: &Campaign, cut: &CutAnalysis) -> Option<Specific> {
         Process::Drilling => Specific {
             cutting: ratio(ForceAxis::Mz, 0),
             axial: ratio(ForceAxis::Z, 2),
+        },
+        // How the others stand to it is looked at with the axes.
+        Process::Turning => Specific {
+            cutting: ratio(ForceAxis::Z, 0),
+            axial: None,
         },
     })
 }
@@ -101,6 +107,10 @@ fn chip_mm(campaign: &Campaign, cut: &CutAnalysis) -> Option<f64> {
             let lips = tool.teeth.max(1) as f64;
             Some(cut.feed_mm / lips * 59f64.to_radians().sin())
         }
+        CutGeometry::Turning { .. } => {
+            let row = average_row(campaign.tool.as_ref()?, &campaign.cuts[cut.cut].geometry, ForceAxis::Z).ok()?;
+            Some(row[0] / row[3]).filter(|h| h.is_finite())
+        }
     }
 }
 
@@ -150,6 +160,7 @@ pub(super) fn of_scales(campaign: &Campaign, cuts: &[&CutAnalysis], process: Pro
     let (names, units): (&str, &[(f64, &str)]) = match process {
         Process::Milling => ("Fx and Fy", &UNITS),
         Process::Drilling => ("Mz", &TORQUE_UNITS),
+        Process::Turning => ("Fz", &UNITS),
     };
     let mut warnings = Vec::new();
     if let Some(energy) = cutting.filter(|e| *e < bounds[0] || *e > bounds[1]) {
@@ -165,7 +176,7 @@ pub(super) fn of_scales(campaign: &Campaign, cuts: &[&CutAnalysis], process: Pro
     } else if let (Some(cutting), Some(axial)) = (cutting, axial) {
         // A ball or a helix of 60° may press axially as hard as it cuts; a drill's thrust is about half its cutting force.
         let limits = match process {
-            Process::Milling => [0.0, 4.0],
+            Process::Milling | Process::Turning => [0.0, 4.0],
             Process::Drilling => [0.12, 6.0],
         };
         let ratio = axial / cutting;

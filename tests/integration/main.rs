@@ -35,5 +35,6 @@ mod simulate;
 mod structure;
 mod support;
 mod sweep;
+mod turning;
 mod waveform;
 mod where_it_fails;

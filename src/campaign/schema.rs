@@ -73,7 +73,7 @@ pub struct OrthogonalSection {
     pub chip: ChipFormation,
     /// Normal rake of the tool.
     pub rake_deg: f64,
-    /// `None`: the tool's helix angle.
+    /// `None`: the tool's helix angle; none in turning.
     pub inclination_deg: Option<f64>,
 }
 

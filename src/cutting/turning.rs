@@ -122,3 +122,91 @@ pub fn edge_row(edge: &[EdgeBit], axis: ForceAxis) -> [f64; 6] {
     }
     row
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::campaign::ToolKind;
+    use approx::assert_relative_eq;
+
+    fn edge(nose_mm: f64, kappa_deg: f64, feed_mm: f64, depth_mm: f64) -> Vec<EdgeBit> {
+        let tool = Tool {
+            kind: ToolKind::Turning,
+            diameter_mm: 0.0,
+            teeth: 1,
+            helix_deg: 0.0,
+            corner_radius_mm: nose_mm,
+            lead_angle_deg: kappa_deg,
+            half_point_angle_deg: None,
+            web_thickness_mm: None,
+        };
+        let geometry = CutGeometry::Turning {
+            feed_per_rev_mm: feed_mm,
+            depth_of_cut_mm: depth_mm,
+            diameter_mm: 50.0,
+        };
+        engaged_edge(&tool, &geometry).unwrap()
+    }
+
+    #[test]
+    fn a_sharp_edge_is_orthogonal_cutting_turned_by_kappa() {
+        for kappa_deg in [45.0, 75.0, 90.0, 95.0] {
+            let (feed, depth) = (0.2, 2.0);
+            let (sin, cos) = f64::to_radians(kappa_deg).sin_cos();
+            let edge = edge(0.0, kappa_deg, feed, depth);
+            let (area, length) = (feed * depth, depth / sin);
+            for (axis, want) in [
+                (ForceAxis::X, [0.0, sin, -cos]),
+                (ForceAxis::Y, [0.0, cos, sin]),
+                (ForceAxis::Z, [1.0, 0.0, 0.0]),
+                (ForceAxis::Mz, [0.0; 3]),
+            ] {
+                let row = edge_row(&edge, axis);
+                for k in 0..3 {
+                    assert_relative_eq!(row[k], want[k] * area, epsilon = 1e-12);
+                    assert_relative_eq!(row[k + 3], want[k] * length, epsilon = 1e-12);
+                }
+            }
+        }
+    }
+
+    /// Area of the chip: feed times depth, less what the nose leaves standing between two turns, f²/(8 r) high.
+    #[test]
+    fn area_length_and_directions_of_a_nosed_edge_have_their_closed_forms() {
+        for (nose, kappa_deg, feed, depth) in [
+            (0.8, 95.0, 0.25, 2.0),
+            (0.8, 75.0, 0.4, 0.3),
+            (1.6, 45.0, 0.1, 3.0),
+            (0.4, 107.5, 0.3, 1.0),
+        ] {
+            let edge = edge(nose, kappa_deg, feed, depth);
+            let ridge = f64::asin(0.5 * feed / nose);
+            let standing = feed * nose * (1.0 - ridge.cos()) - nose * nose * (ridge - ridge.sin() * ridge.cos());
+            assert!(standing > 0.0 && standing < feed * feed * feed / nose / 20.0);
+            let z = edge_row(&edge, ForceAxis::Z);
+            assert_relative_eq!(z[0], feed * depth - standing, max_relative = 1e-9);
+            let kappa = f64::to_radians(kappa_deg);
+            let corner = nose * (1.0 - kappa.cos());
+            let (end, straight) = match depth < corner {
+                true => ((1.0 - depth / nose).acos(), 0.0),
+                false => (kappa, (depth - corner) / kappa.sin()),
+            };
+            assert_relative_eq!(z[3], nose * (end + ridge) + straight, max_relative = 1e-12);
+            // A constant force normal to the edge acts on the chord: its components are the chord's extents.
+            let up = depth - nose * (1.0 - ridge.cos());
+            let along = nose * (end.sin() + ridge.sin()) + straight * kappa.cos();
+            assert_relative_eq!(edge_row(&edge, ForceAxis::X)[4], up, max_relative = 1e-9);
+            assert_relative_eq!(edge_row(&edge, ForceAxis::Y)[4], along, max_relative = 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_nose_that_shrinks_becomes_a_sharp_corner() {
+        let (sharp, nearly) = (edge(0.0, 80.0, 0.2, 1.0), edge(1e-7, 80.0, 0.2, 1.0));
+        for axis in ForceAxis::ALL {
+            for (a, b) in edge_row(&sharp, axis).iter().zip(edge_row(&nearly, axis)) {
+                assert_relative_eq!(*a, b, epsilon = 1e-6);
+            }
+        }
+    }
+}

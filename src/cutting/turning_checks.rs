@@ -98,12 +98,13 @@ fn one_depth(campaign: &Campaign, cuts: &[&CutAnalysis]) -> Option<String> {
     let ([depth], Some(tool)) = (depths.as_slice(), campaign.tool.as_ref()) else {
         return None;
     };
+    // The angle of a sharp edge is checked by no depth: it only turns radial and axial force into each other.
     let shape = match tool.corner_radius_mm > 0.0 {
-        true => "nor the nose radius and the cutting edge angle",
-        false => "nor the cutting edge angle",
+        true => ", nor the nose radius and the cutting edge angle",
+        false => "",
     };
     Some(format!(
         "all cuts have one depth ({depth} mm): the coefficients hold for it, but nothing checks that the force grows with the depth as \
-         the edge in the work does, {shape}; add a cut at half or twice the depth"
+         the edge in the work does{shape}; add a cut at half or twice the depth"
     ))
 }

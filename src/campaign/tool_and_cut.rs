@@ -117,7 +117,10 @@ fn no_foreign_keys(tool: &Section<'_>, kind: ToolKind) -> Result<()> {
 fn turning_tool(tool: &Section<'_>) -> Result<Tool> {
     if tool.has("diameter_mm") {
         return Err(tool
-            .error("diameter_mm", "a turning tool has no diameter: the workpiece turns")
+            .error(
+                "diameter_mm",
+                "a turning tool has no diameter: the workpiece turns",
+            )
             .remedy("give the workpiece's diameter_mm in each [[cut]]")
             .into());
     }
@@ -261,13 +264,19 @@ fn turned(cut: &Section<'_>) -> Result<(CutGeometry, f64)> {
                         "cutting_speed_m_per_min",
                         format!("is {speed}, but {diameter} mm at {rpm} rpm make {own:.1} m/min"),
                     )
-                    .remedy("give two of spindle_rpm, cutting_speed_m_per_min and diameter_mm, or correct one")
+                    .remedy(
+                        "give two of spindle_rpm, cutting_speed_m_per_min and diameter_mm, or correct one",
+                    )
                     .into());
             }
             (rpm, diameter)
         }
         (Some(rpm), None, Some(diameter)) => (rpm, diameter),
-        (None, Some(speed), Some(diameter)) => (speed / (per_turn * diameter), diameter),
+        // To a thousandth of a revolution a minute: it is printed.
+        (None, Some(speed), Some(diameter)) => {
+            let rpm = speed / (per_turn * diameter);
+            ((1e3 * rpm).round().max(1.0) / 1e3, diameter)
+        }
         (Some(rpm), Some(speed), None) => (rpm, speed / (per_turn * rpm)),
         (Some(_), None, None) => (0.0, required("diameter_mm", "60.0")?),
         (None, _, _) => (required("spindle_rpm", "1200.0")?, 0.0),

@@ -200,7 +200,10 @@ pub fn run(args: Args, as_json: bool) -> Result<Outcome> {
     if talking {
         // Which keys a cut has depends on the process.
         if draft.missing().iter().any(|m| m.key == "process") {
-            let process = ask("what was done in the cuts: milling, drilling or turning", "milling")?;
+            let process = ask(
+                "what was done in the cuts: milling, drilling or turning",
+                "milling",
+            )?;
             if !process.trim().is_empty() {
                 answers.set("cut", "process", process.trim());
                 draft = Draft::new(&name, &scan, &answers)?;

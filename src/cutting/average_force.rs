@@ -269,7 +269,9 @@ pub fn feed_mm(geometry: &CutGeometry) -> f64 {
         CutGeometry::Milling {
             feed_per_tooth_mm, ..
         } => feed_per_tooth_mm,
-        CutGeometry::Drilling { feed_per_rev_mm, .. } | CutGeometry::Turning { feed_per_rev_mm, .. } => feed_per_rev_mm,
+        CutGeometry::Drilling { feed_per_rev_mm, .. } | CutGeometry::Turning { feed_per_rev_mm, .. } => {
+            feed_per_rev_mm
+        }
     }
 }
 

@@ -181,7 +181,8 @@ mod tests {
         ] {
             let edge = edge(nose, kappa_deg, feed, depth);
             let ridge = f64::asin(0.5 * feed / nose);
-            let standing = feed * nose * (1.0 - ridge.cos()) - nose * nose * (ridge - ridge.sin() * ridge.cos());
+            let standing =
+                feed * nose * (1.0 - ridge.cos()) - nose * nose * (ridge - ridge.sin() * ridge.cos());
             assert!(standing > 0.0 && standing < feed * feed * feed / nose / 20.0);
             let z = edge_row(&edge, ForceAxis::Z);
             assert_relative_eq!(z[0], feed * depth - standing, max_relative = 1e-9);

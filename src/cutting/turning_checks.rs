@@ -18,6 +18,7 @@ const OUTWARD: f64 = 0.3;
 /// Warnings about the turned cuts of one material.
 pub(super) fn of_turning(campaign: &Campaign, cuts: &[&CutAnalysis]) -> Vec<String> {
     let mut warnings: Vec<String> = axes(campaign, cuts).into_iter().collect();
+    warnings.extend(one_feed(campaign, cuts));
     warnings.extend(one_depth(campaign, cuts));
     warnings
 }
@@ -88,13 +89,30 @@ fn axes(campaign: &Campaign, cuts: &[&CutAnalysis]) -> Option<String> {
     })
 }
 
-/// Feeds alone separate cutting from edge forces, but nothing checks how the force follows the depth.
-fn one_depth(campaign: &Campaign, cuts: &[&CutAnalysis]) -> Option<String> {
-    let depth = |c: &&CutAnalysis| match campaign.cuts[c.cut].geometry {
+/// Without a second feed only the nose, where the chip is thinner, separates cutting from edge forces.
+fn one_feed(campaign: &Campaign, cuts: &[&CutAnalysis]) -> Option<String> {
+    let feeds = distinct(cuts.iter().map(|c| c.feed_mm));
+    let ([feed], Some(tool)) = (feeds.as_slice(), campaign.tool.as_ref()) else {
+        return None;
+    };
+    (tool.corner_radius_mm > 0.0 && depths(campaign, cuts).len() > 1).then(|| {
+        format!(
+            "all cuts have one feed ({feed} mm): cutting and edge coefficients are told apart by the nose alone, where the chip is thinner, \
+             and so only as well as nose radius and cutting edge angle are known; cut a second feed, half or twice as large"
+        )
+    })
+}
+
+fn depths(campaign: &Campaign, cuts: &[&CutAnalysis]) -> Vec<f64> {
+    distinct(cuts.iter().filter_map(|c| match campaign.cuts[c.cut].geometry {
         CutGeometry::Turning { depth_of_cut_mm, .. } => Some(depth_of_cut_mm),
         _ => None,
-    };
-    let depths = distinct(cuts.iter().filter_map(depth));
+    }))
+}
+
+/// Feeds alone separate cutting from edge forces, but nothing checks how the force follows the depth.
+fn one_depth(campaign: &Campaign, cuts: &[&CutAnalysis]) -> Option<String> {
+    let depths = depths(campaign, cuts);
     let ([depth], Some(tool)) = (depths.as_slice(), campaign.tool.as_ref()) else {
         return None;
     };

@@ -58,8 +58,12 @@ impl LineKind {
                 "a force that does not follow the feed as the model says (wear, built-up edge, another material), a wrong feed, depth, nose \
                  radius or cutting edge angle in campaign.toml, or a zero line that is off"
             }
-            LineKind::OncePerTurn => "a bar that runs out: chucked askew, bent, or with a keyway or crust on one side",
-            LineKind::TurnHarmonic => "a bar that is not round: pressed by the jaws of the chuck, or with flats, seams or a crust",
+            LineKind::OncePerTurn => {
+                "a bar that runs out: chucked askew, bent, or with a keyway or crust on one side"
+            }
+            LineKind::TurnHarmonic => {
+                "a bar that is not round: pressed by the jaws of the chuck, or with flats, seams or a crust"
+            }
             _ => self.usual_cause(),
         }
     }

@@ -4,8 +4,8 @@ use num_complex::Complex64;
 
 use super::cutting_data::CutData;
 use super::off_comb::MOST_SHIFT;
-use crate::cutting::{EdgeBit, ForceAxis};
 use crate::cutting::waveform::{ChipLaw, DrillTerm, DrillingCut, LineForces, MillingCut, UnitForces};
+use crate::cutting::{EdgeBit, ForceAxis};
 use crate::effects::cutting::{CutPhysics, Mixing};
 use crate::robot::Dual;
 
@@ -298,7 +298,8 @@ pub(super) fn turning_forces(
     let k = &physics.coefficient;
     for (bit, chip) in edge.iter().zip(chips) {
         for direction in 0..3 {
-            let along = [ForceAxis::X, ForceAxis::Y, ForceAxis::Z].map(|axis| bit.directions(axis)[direction]);
+            let along =
+                [ForceAxis::X, ForceAxis::Y, ForceAxis::Z].map(|axis| bit.directions(axis)[direction]);
             let force = (&(&k[direction] * &chip) + &k[direction + 3]).scale(bit.length_mm);
             for (channel, row) in dyno_from_tool.iter().enumerate() {
                 let share: f64 = row.iter().zip(along).map(|(a, d)| a * d).sum();

@@ -168,13 +168,16 @@ pub fn cut_of(campaign: &Campaign, section: &LobesSection, coefficients: LobeCoe
         ));
     }
     let one_edge = (section.process == Process::Turning).then_some(1);
-    let teeth = one_edge.or(section.teeth).or(tool.map(|t| t.teeth)).ok_or_else(|| {
-        lacks(
-            "lobes.teeth",
-            "the number of teeth is not known",
-            "give it here or in [tool]",
-        )
-    })?;
+    let teeth = one_edge
+        .or(section.teeth)
+        .or(tool.map(|t| t.teeth))
+        .ok_or_else(|| {
+            lacks(
+                "lobes.teeth",
+                "the number of teeth is not known",
+                "give it here or in [tool]",
+            )
+        })?;
     let LobeCoefficients {
         ktc_n_per_mm2,
         krc_n_per_mm2,
@@ -224,7 +227,9 @@ pub fn cut_of(campaign: &Campaign, section: &LobesSection, coefficients: LobeCoe
         )
         .map(|lateral| Cut::Averaged(lateral.into())),
         Process::Turning => {
-            let kappa_deg = tool.filter(|t| t.kind == ToolKind::Turning).map_or(90.0, |t| t.lead_angle_deg);
+            let kappa_deg = tool
+                .filter(|t| t.kind == ToolKind::Turning)
+                .map_or(90.0, |t| t.lead_angle_deg);
             RegenerativeForce::turning(krc_n_per_mm2, kappa_deg.to_radians())
                 .map(|force| Cut::Averaged(force.into()))
         }

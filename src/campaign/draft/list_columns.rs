@@ -331,7 +331,10 @@ pub(super) fn column(head: &str, keys: &[&'static str]) -> Result<Option<Column>
             )
         }
         FEED => return Err(format!("unit {unit:?} of column {name:?} is not understood")),
-        CUTTING_SPEED => (key, factor(&[("", 1.0), ("m/min", 1.0), ("m/s", 60.0), ("mm/s", 0.06)])?),
+        CUTTING_SPEED => (
+            key,
+            factor(&[("", 1.0), ("m/min", 1.0), ("m/s", 60.0), ("mm/s", 0.06)])?,
+        ),
         _ if key.ends_with("_mm") || key == FEED_PER_TURN => (key, factor(&length)?),
         _ => (key, 1.0),
     };
@@ -384,8 +387,10 @@ pub(super) fn english(word: &str) -> Option<(&'static str, &'static str)> {
         | "ranura" | "ranurado" => ("immersion", "slot"),
         "mill" | "milling" | "fraesen" | "frasen" | "fraisage" | "fresado" => ("process", "milling"),
         "drill" | "drilling" | "bohren" | "percage" | "taladrado" => ("process", "drilling"),
-        "turn" | "turning" | "facing" | "drehen" | "langsdrehen" | "laengsdrehen" | "plandrehen" | "tournage"
-        | "chariotage" | "dressage" | "torneado" | "cilindrado" | "refrentado" => ("process", "turning"),
+        "turn" | "turning" | "facing" | "drehen" | "langsdrehen" | "laengsdrehen" | "plandrehen"
+        | "tournage" | "chariotage" | "dressage" | "torneado" | "cilindrado" | "refrentado" => {
+            ("process", "turning")
+        }
         _ => return None,
     })
 }

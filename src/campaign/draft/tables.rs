@@ -369,7 +369,9 @@ fn cuts(scan: &Scan, answers: &Answers) -> Result<Vec<(Option<String>, Table)>> 
             .map(str::to_string);
         let [header, name] = said("spindle_rpm");
         let from_speed = rpm_of_speed(&known, diameter.as_deref());
-        let derived = from_speed.as_ref().map_or((None, ""), |(rpm, why)| (Some(rpm.as_str()), why.as_str()));
+        let derived = from_speed
+            .as_ref()
+            .map_or((None, ""), |(rpm, why)| (Some(rpm.as_str()), why.as_str()));
         making.add(
             Entry::new("spindle_rpm", Kind::Number, "spindle speed, rpm", "1200.0"),
             &[header, name, derived],

@@ -547,3 +547,19 @@ fn lobes_of_turning_have_their_closed_form() {
         );
     }
 }
+
+/// Thin chips dearer by (h/0.1 mm)^−0.25, round a nose where every bit of the edge has another chip.
+#[test]
+fn a_size_effect_is_found_with_its_exponent() {
+    let dir = tempfile::tempdir().unwrap();
+    let law = |h: f64| {
+        let counted = if h > 0.0 { h * (h / 0.1).powf(-0.25) } else { 0.0 };
+        linear(counted)
+    };
+    let all = cuts(&[0.05, 0.1, 0.2, 0.4], &[1.0, 2.5]);
+    write_campaign(dir.path(), &all, &plain(INSERT), &law);
+    let diagnosis = document(&["diagnose", dir.path().to_str().unwrap()]);
+    assert_eq!(diagnosis["effect"], "size-effect", "{diagnosis}");
+    let p = diagnosis["candidates"][0]["parameters"]["p"].as_f64().unwrap();
+    assert!((p - 0.25).abs() < 0.005, "{p}");
+}

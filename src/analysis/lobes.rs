@@ -197,7 +197,7 @@ impl LobeAnalysis {
             axial_torsional,
             drilled: match section.process {
                 Process::Drilling => DrilledHole::of(campaign, section),
-                Process::Milling => None,
+                Process::Milling | Process::Turning => None,
             },
             tool: asked.tool.clone(),
             spindle_rpm: section.spindle_rpm,
@@ -322,6 +322,9 @@ impl CutForce {
                     .into(),
             );
         }
+        if section.process == Process::Turning {
+            warnings.extend(what_turning_lobes_leave_out(campaign));
+        }
         let teeth = cut.average().lateral.teeth;
         let axial = (section.process == Process::Drilling)
             .then(|| axial_torsional_force(campaign, section, coefficients, teeth));
@@ -335,4 +338,14 @@ impl CutForce {
             own_cuts,
         })
     }
+}
+
+/// What the lobes of turning take for granted.
+fn what_turning_lobes_leave_out(campaign: &Campaign) -> Option<String> {
+    let tool = campaign.tool.as_ref()?;
+    (tool.corner_radius_mm > 0.0).then(|| {
+        "the lobes take the edge as straight at cutting_edge_angle_deg: nose_radius_mm of [tool] is left out of the dynamics (it is in \
+         the coefficients), so that the limits hold for depths well beyond the nose only"
+            .into()
+    })
 }

@@ -50,11 +50,15 @@ fn describe(geometry: &CutGeometry) -> String {
             pilot_diameter_mm, ..
         } if *pilot_diameter_mm > 0.0 => format!("pilot hole {pilot_diameter_mm} mm"),
         CutGeometry::Drilling { .. } => "no pilot hole".into(),
+        CutGeometry::Turning { depth_of_cut_mm, .. } => format!("depth {depth_of_cut_mm} mm"),
     }
 }
 
-/// The force models are linear in feed at a given geometry: two feeds give the line. Where the points are not on it
-/// after all there is none.
+/// Distance from the line that does not show, as a part of the largest force.
+const ON_THE_LINE: f64 = 1e-2;
+
+/// The force models are linear in feed at a given geometry (round the nose of a turning tool nearly): two feeds give the line.
+/// Where the points are not on it after all there is none.
 fn through(points: &[&RegressionPoint]) -> Option<(f64, f64)> {
     let by_feed = |a: &&&RegressionPoint, b: &&&RegressionPoint| a.feed_mm.total_cmp(&b.feed_mm);
     let (low, high) = (points.iter().min_by(by_feed)?, points.iter().max_by(by_feed)?);
@@ -66,7 +70,7 @@ fn through(points: &[&RegressionPoint]) -> Option<(f64, f64)> {
     let scale = points.iter().map(|p| p.fitted.abs()).fold(0.0, f64::max);
     points
         .iter()
-        .all(|p| (intercept + slope * p.feed_mm - p.fitted).abs() <= 1e-6 * scale)
+        .all(|p| (intercept + slope * p.feed_mm - p.fitted).abs() <= ON_THE_LINE * scale)
         .then_some((intercept, slope))
 }
 

@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 
 use super::bounds::Bounds;
 use super::document::{Document, Section};
-use super::lobes_section::{self, immersion};
+use super::lobes_section;
 use super::robot_spec::RobotSpec;
 use super::schema::*;
 use super::suggest::shown;
+use super::tool_and_cut::{geometry, tool};
 use super::{ROBOT_KEY, campaign_file, paths};
 use crate::ingest::{Dof, Quantity};
 use crate::{Error, InputError, Result};
@@ -34,7 +35,7 @@ const TOP: [&str; 16] = [
 ];
 
 /// Keys of `[[cut]]`.
-pub(super) const CUT: [&str; 17] = [
+pub(super) const CUT: [&str; 20] = [
     "id",
     "file",
     "process",
@@ -47,6 +48,9 @@ pub(super) const CUT: [&str; 17] = [
     "feed_per_rev_mm",
     "pilot_diameter_mm",
     "hole_depth_mm",
+    "depth_of_cut_mm",
+    "diameter_mm",
+    "cutting_speed_m_per_min",
     "order",
     "steady_s",
     "outcome",
@@ -54,8 +58,11 @@ pub(super) const CUT: [&str; 17] = [
     "material",
 ];
 
-pub(super) const PROCESSES: [(&str, Process); 2] =
-    [("milling", Process::Milling), ("drilling", Process::Drilling)];
+pub(super) const PROCESSES: [(&str, Process); 3] = [
+    ("milling", Process::Milling),
+    ("drilling", Process::Drilling),
+    ("turning", Process::Turning),
+];
 
 impl Campaign {
     /// Reads and validates the campaign in folder `dir`.
@@ -398,73 +405,6 @@ fn dofs(section: &Section<'_>, key: &str) -> Result<Vec<Dof>> {
         .collect()
 }
 
-fn tool(top: &Section<'_>) -> Result<Option<Tool>> {
-    let keys = [
-        "kind",
-        "diameter_mm",
-        "teeth",
-        "helix_deg",
-        "corner_radius_mm",
-        "lead_angle_deg",
-        "half_point_angle_deg",
-        "web_thickness_mm",
-    ];
-    let Some(tool) = top.section("tool", &keys)? else {
-        return Ok(None);
-    };
-    // A ball end is an end mill whose corner is as round as can be.
-    let kinds = [
-        ("endmill", (ToolKind::Endmill, false)),
-        ("ballend", (ToolKind::Endmill, true)),
-        ("drill", (ToolKind::Drill, false)),
-    ];
-    let (kind, ball) = tool.required(
-        "kind",
-        tool.choice("kind", &kinds)?,
-        "\"endmill\", \"ballend\" or \"drill\"",
-    )?;
-    let diameter_mm = tool.required(
-        "diameter_mm",
-        tool.number("diameter_mm", Bounds::POSITIVE)?,
-        "16.0",
-    )?;
-    let teeth = tool.required("teeth", tool.whole("teeth", 1, 1000)?, "4")?;
-    let (foreign, problem, other) = match kind {
-        ToolKind::Endmill => (
-            ["half_point_angle_deg", "web_thickness_mm"],
-            "belongs to a drill, and this tool is an endmill",
-            "drill",
-        ),
-        ToolKind::Drill => (
-            ["corner_radius_mm", "lead_angle_deg"],
-            "belongs to an end mill, and this tool is a drill",
-            "endmill",
-        ),
-    };
-    if let Some(key) = foreign.into_iter().find(|key| tool.has(key)) {
-        return Err(tool
-            .error(key, problem)
-            .remedy(format!("take it out, or write kind = \"{other}\""))
-            .into());
-    }
-    Ok(Some(Tool {
-        kind,
-        diameter_mm,
-        teeth: teeth as usize,
-        helix_deg: tool
-            .number("helix_deg", Bounds::open(-90.0, 90.0))?
-            .unwrap_or(0.0),
-        corner_radius_mm: tool
-            .number("corner_radius_mm", Bounds::closed(0.0, 0.5 * diameter_mm))?
-            .unwrap_or(if ball { 0.5 * diameter_mm } else { 0.0 }),
-        lead_angle_deg: tool
-            .number("lead_angle_deg", Bounds::above_up_to(0.0, 90.0))?
-            .unwrap_or(90.0),
-        half_point_angle_deg: tool.number("half_point_angle_deg", Bounds::above_up_to(0.0, 90.0))?,
-        web_thickness_mm: tool.number("web_thickness_mm", Bounds::open(0.0, diameter_mm))?,
-    }))
-}
-
 fn orthogonal(top: &Section<'_>) -> Result<Option<OrthogonalSection>> {
     let keys = [
         "shear_stress_mpa",
@@ -542,7 +482,7 @@ fn cuts(
         let Some(tool) = tool else {
             return Err(top
                 .error("tool", "missing: there are cuts, but no tool")
-                .remedy("add a [tool] section with kind, diameter_mm and teeth")
+                .remedy("add a [tool] section with kind, diameter_mm and teeth (turning: kind = \"turning\")")
                 .into());
         };
         let id = section.required("id", section.text("id")?, "\"01\"")?.to_string();
@@ -550,14 +490,11 @@ fn cuts(
             return Err(duplicate(&section, "id", &id, &format!("cut[{first}]")));
         }
         let outcomes = [("stable", CutOutcome::Stable), ("chatter", CutOutcome::Chatter)];
+        let (geometry, spindle_rpm) = geometry(&section, tool)?;
         out.push(Cut {
             file: file(folder, &section, "\"force/cut01.txt\"")?,
-            geometry: geometry(&section, tool)?,
-            spindle_rpm: section.required(
-                "spindle_rpm",
-                section.number("spindle_rpm", Bounds::POSITIVE)?,
-                "1200.0",
-            )?,
+            geometry,
+            spindle_rpm,
             order: section.whole("order", i64::MIN, i64::MAX)?,
             steady_s: steady(&section)?,
             material: section
@@ -574,60 +511,6 @@ fn cuts(
         });
     }
     Ok(out)
-}
-
-fn geometry(cut: &Section<'_>, tool: &Tool) -> Result<CutGeometry> {
-    let process = cut.required(
-        "process",
-        cut.choice("process", &PROCESSES)?,
-        "\"milling\" or \"drilling\"",
-    )?;
-    let milling = [
-        "feed_per_tooth_mm",
-        "axial_depth_mm",
-        "immersion",
-        "start_deg",
-        "exit_deg",
-    ];
-    let drilling = ["feed_per_rev_mm", "pilot_diameter_mm", "hole_depth_mm"];
-    let (this, other, strangers) = match process {
-        Process::Milling => ("milling", "drilling", &drilling[..]),
-        Process::Drilling => ("drilling", "milling", &milling[..]),
-    };
-    if let Some(key) = strangers.iter().find(|key| cut.has(key)) {
-        return Err(cut
-            .error(key, format!("belongs to {other}, and this cut is {this}"))
-            .remedy(format!("take it out, or write process = {other:?}"))
-            .into());
-    }
-    let number = |key: &str, bounds, example| cut.required(key, cut.number(key, bounds)?, example);
-    Ok(match process {
-        Process::Milling => CutGeometry::Milling {
-            feed_per_tooth_mm: number("feed_per_tooth_mm", Bounds::POSITIVE, "0.05")?,
-            axial_depth_mm: number("axial_depth_mm", Bounds::POSITIVE, "2.0")?,
-            immersion: cut.required(
-                "immersion",
-                immersion(cut)?,
-                "\"slot\" (or start_deg and exit_deg)",
-            )?,
-        },
-        Process::Drilling => CutGeometry::Drilling {
-            feed_per_rev_mm: number("feed_per_rev_mm", Bounds::POSITIVE, "0.1")?,
-            pilot_diameter_mm: match cut.number("pilot_diameter_mm", Bounds::NOT_NEGATIVE)? {
-                Some(pilot) if pilot >= tool.diameter_mm => {
-                    return Err(cut
-                        .error(
-                            "pilot_diameter_mm",
-                            format!("is {pilot}, but the tool's diameter is {}", tool.diameter_mm),
-                        )
-                        .remedy("the pilot hole must be smaller than the tool; 0 where there is none")
-                        .into());
-                }
-                pilot => pilot.unwrap_or(0.0),
-            },
-            hole_depth_mm: cut.number("hole_depth_mm", Bounds::POSITIVE)?,
-        },
-    })
 }
 
 fn steady(cut: &Section<'_>) -> Result<Option<[f64; 2]>> {

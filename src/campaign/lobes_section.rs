@@ -74,7 +74,7 @@ pub(super) fn read(
     let process = lobes.required(
         "process",
         lobes.choice("process", &PROCESSES)?,
-        "\"milling\" or \"drilling\"",
+        "\"milling\", \"drilling\" or \"turning\"",
     )?;
     let modes = modes(&lobes, process)?;
     let source = source(&lobes, has_robot, has_frfs, !modes.is_empty())?;
@@ -145,10 +145,13 @@ fn method(lobes: &Section<'_>, process: Process) -> Result<LobeMethod> {
         ("semi-discretisation", LobeMethod::SemiDiscretisation),
         ("semi-discretization", LobeMethod::SemiDiscretisation),
     ];
+    // The force of a turned cut does not change over a turn: the zero order is all there is.
+    let turning = &milling[..1];
     let drilling = [("frequency-domain", LobeMethod::FrequencyDomain)];
     let (words, usual) = match process {
         Process::Milling => (&milling[..], LobeMethod::ZeroOrder),
         Process::Drilling => (&drilling[..], LobeMethod::FrequencyDomain),
+        Process::Turning => (turning, LobeMethod::ZeroOrder),
     };
     Ok(lobes.choice("method", words)?.unwrap_or(usual))
 }
@@ -182,7 +185,7 @@ fn modes(lobes: &Section<'_>, process: Process) -> Result<Vec<LobeMode>> {
         ("theta", LobeAxis::Theta),
     ];
     let axes = match process {
-        Process::Milling => &axes[..2],
+        Process::Milling | Process::Turning => &axes[..2],
         Process::Drilling => &axes[..],
     };
     let keys = [

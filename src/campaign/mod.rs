@@ -15,6 +15,7 @@ pub mod robot_spec;
 pub mod schema;
 mod section;
 pub mod suggest;
+mod tool_and_cut;
 
 pub use frf_set::{FrfSet, MeasuredDof, MeasuredFrf};
 pub use schema::*;

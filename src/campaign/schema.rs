@@ -73,7 +73,7 @@ pub struct OrthogonalSection {
     pub chip: ChipFormation,
     /// Normal rake of the tool.
     pub rake_deg: f64,
-    /// `None`: the tool's helix angle.
+    /// `None`: the tool's helix angle; none in turning.
     pub inclination_deg: Option<f64>,
 }
 
@@ -231,17 +231,22 @@ pub struct FrfFile {
 pub enum ToolKind {
     Endmill,
     Drill,
+    /// A turning tool with one insert; `teeth` is 1.
+    Turning,
 }
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tool {
     pub kind: ToolKind,
+    /// 0 for a turning tool, which has none: the workpiece turns.
     pub diameter_mm: f64,
     pub teeth: usize,
     pub helix_deg: f64,
-    /// End mills: radius of the corner between face and side; half the diameter is a ball end, 0 a sharp corner.
+    /// End mills: radius of the corner between face and side; half the diameter is a ball end, 0 a sharp corner. Turning:
+    /// the nose radius rε.
     pub corner_radius_mm: f64,
     /// End mills: angle between the feed's plane and the straight part of the edge (κr of inserts); 90° up the side.
+    /// Turning: κr, between the direction of the feed and the straight part of the edge.
     pub lead_angle_deg: f64,
     /// Drills: half of the point angle.
     pub half_point_angle_deg: Option<f64>,
@@ -267,6 +272,28 @@ pub struct Dynamometer {
 pub enum Process {
     Milling,
     Drilling,
+    Turning,
+}
+
+impl Process {
+    pub const ALL: [Process; 3] = [Process::Milling, Process::Drilling, Process::Turning];
+
+    /// As `campaign.toml` and people call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Process::Milling => "milling",
+            Process::Drilling => "drilling",
+            Process::Turning => "turning",
+        }
+    }
+
+    /// What its feed is counted for, as in "mm per tooth".
+    pub fn feed_per(self) -> &'static str {
+        match self {
+            Process::Milling => "tooth",
+            Process::Drilling | Process::Turning => "revolution",
+        }
+    }
 }
 
 /// Immersion angles from +y, clockwise, rad; 0 ≤ start < exit ≤ 2π.
@@ -298,6 +325,13 @@ pub enum CutGeometry {
         /// Depth at full diameter.
         hole_depth_mm: Option<f64>,
     },
+    Turning {
+        feed_per_rev_mm: f64,
+        /// ap, across the feed.
+        depth_of_cut_mm: f64,
+        /// Of the workpiece where it is cut: with the spindle speed it gives the cutting speed.
+        diameter_mm: f64,
+    },
 }
 
 impl CutGeometry {
@@ -305,6 +339,7 @@ impl CutGeometry {
         match self {
             CutGeometry::Milling { .. } => Process::Milling,
             CutGeometry::Drilling { .. } => Process::Drilling,
+            CutGeometry::Turning { .. } => Process::Turning,
         }
     }
 }

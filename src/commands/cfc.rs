@@ -194,10 +194,7 @@ fn coefficient_table(groups: &[&Group], pooled: &Group) -> String {
         );
         rows.push(row);
     }
-    let process = match pooled.process {
-        crate::campaign::Process::Milling => "Milling",
-        crate::campaign::Process::Drilling => "Drilling",
-    };
+    let process = capital(pooled.process.name());
     let method = match pooled.method {
         Method::LeastSquares => "least squares",
         Method::Huber => "robust (Huber) regression",
@@ -404,6 +401,13 @@ fn with_error(value: f64, error: f64) -> String {
         4
     };
     format!("{value:.decimals$} ± {error:.decimals$}")
+}
+
+fn capital(word: &str) -> String {
+    let mut letters = word.chars();
+    letters
+        .next()
+        .map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// Columns aligned to the right, the first to the left.

@@ -49,10 +49,10 @@ pub struct Args {
     /// Hammer level of all FRFs.
     #[arg(long, value_name = "N")]
     force_level_n: Option<String>,
-    /// What was done in all cuts: milling or drilling.
+    /// What was done in all cuts: milling, drilling or turning.
     #[arg(long)]
     process: Option<String>,
-    /// Tool diameter.
+    /// Tool diameter; turning: diameter of the workpiece in all cuts.
     #[arg(long, value_name = "MM")]
     diameter_mm: Option<String>,
     /// Number of teeth.
@@ -91,6 +91,18 @@ pub struct Args {
     /// Drilling: depth at full diameter of all cuts.
     #[arg(long, value_name = "MM")]
     hole_depth_mm: Option<String>,
+    /// Turning: nose radius of the insert (0: sharp).
+    #[arg(long, value_name = "MM")]
+    nose_radius_mm: Option<String>,
+    /// Turning: angle between the feed and the main cutting edge.
+    #[arg(long, value_name = "DEG")]
+    cutting_edge_angle_deg: Option<String>,
+    /// Turning: depth of all cuts.
+    #[arg(long, value_name = "MM")]
+    depth_of_cut_mm: Option<String>,
+    /// Turning: cutting speed of all cuts; with the diameter it gives the spindle speed.
+    #[arg(long, value_name = "M/MIN")]
+    cutting_speed_m_per_min: Option<String>,
     /// CSV with a row a cut: column file, and any of the keys of [[cut]] (spindle_rpm, feed_per_tooth_mm, order, …).
     #[arg(long, value_name = "FILE")]
     cut_list: Option<PathBuf>,
@@ -126,6 +138,10 @@ impl Args {
             ("cut", "feed_per_rev_mm", &self.feed_per_rev_mm),
             ("cut", "pilot_diameter_mm", &self.pilot_diameter_mm),
             ("cut", "hole_depth_mm", &self.hole_depth_mm),
+            ("tool", "nose_radius_mm", &self.nose_radius_mm),
+            ("tool", "cutting_edge_angle_deg", &self.cutting_edge_angle_deg),
+            ("cut", "depth_of_cut_mm", &self.depth_of_cut_mm),
+            ("cut", "cutting_speed_m_per_min", &self.cutting_speed_m_per_min),
         ] {
             if let Some(value) = value {
                 answers.set(table, key, value);
@@ -184,7 +200,10 @@ pub fn run(args: Args, as_json: bool) -> Result<Outcome> {
     if talking {
         // Which keys a cut has depends on the process.
         if draft.missing().iter().any(|m| m.key == "process") {
-            let process = ask("what was done in the cuts: milling or drilling", "milling")?;
+            let process = ask(
+                "what was done in the cuts: milling, drilling or turning",
+                "milling",
+            )?;
             if !process.trim().is_empty() {
                 answers.set("cut", "process", process.trim());
                 draft = Draft::new(&name, &scan, &answers)?;

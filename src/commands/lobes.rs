@@ -214,10 +214,12 @@ fn text(analysis: &LobeAnalysis) -> String {
             analysis.drilling(),
             "radial width of cut, (diameter − pilot diameter)/2",
         ),
+        Process::Turning => ("turning", "depth of cut"),
     };
     let mut out = format!(
-        "Stability lobes: {process}, {} teeth, Ktc {} and Krc {} N/mm²\nDepth: {depth}\n",
+        "Stability lobes: {process}, {} {}, Ktc {} and Krc {} N/mm²\nDepth: {depth}\n",
         analysis.teeth,
+        if analysis.teeth == 1 { "tooth" } else { "teeth" },
         number(analysis.coefficients.ktc_n_per_mm2, 4),
         number(analysis.coefficients.krc_n_per_mm2, 4),
     );

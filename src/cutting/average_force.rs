@@ -1,14 +1,16 @@
 //! Average cutting forces, linear in the coefficients: milling (physics.md §4; Altintas, Manufacturing
-//! Automation, 2nd ed., eqs 2.41–2.45, in axes with φ clockwise from +y) and two-lip drilling (drilling.md).
+//! Automation, 2nd ed., eqs 2.41–2.45, in axes with φ clockwise from +y), two-lip drilling (drilling.md), and turning (see
+//! [`super::turning`]).
 
 use std::f64::consts::PI;
 
+use super::turning::{edge_row, engaged_edge};
 use super::waveform::MillingCut;
 use crate::campaign::{CutGeometry, Immersion, Process, Tool};
 use crate::{Error, Result};
 
-/// What is averaged and compared: the forces on the tool in tool axes (x feed, y normal, z axial; N), and the
-/// torque about the spindle (N·m, opposing rotation positive).
+/// What is averaged and compared: the forces on the tool in tool axes (x feed, y normal, z axial; turning: x against the
+/// feed, y away from the work, z along the cutting speed; N), and the torque about the spindle (N·m, opposing rotation positive).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ForceAxis {
@@ -37,7 +39,7 @@ impl ForceAxis {
     /// The axes that carry the coefficients of a process.
     pub fn of(process: Process) -> &'static [ForceAxis] {
         match process {
-            Process::Milling => &[ForceAxis::X, ForceAxis::Y, ForceAxis::Z],
+            Process::Milling | Process::Turning => &[ForceAxis::X, ForceAxis::Y, ForceAxis::Z],
             Process::Drilling => &[ForceAxis::Z, ForceAxis::Mz],
         }
     }
@@ -72,7 +74,8 @@ const fn edge(key: &'static str, label: &'static str) -> CoefficientKind {
     }
 }
 
-/// Ktc Krc Kac Kte Kre Kae.
+/// Ktc Krc Kac Kte Kre Kae: along the cutting speed, normal to the edge out of the work, along the edge away from the tip.
+/// Turning has the same.
 pub const MILLING_COEFFICIENTS: [CoefficientKind; 6] = [
     cutting("ktc_n_per_mm2", "Ktc"),
     cutting("krc_n_per_mm2", "Krc"),
@@ -93,7 +96,7 @@ pub const DRILLING_COEFFICIENTS: [CoefficientKind; 4] = [
 /// The unknowns of a process, in the order of the columns of [`average_row`].
 pub fn coefficients_of(process: Process) -> &'static [CoefficientKind] {
     match process {
-        Process::Milling => &MILLING_COEFFICIENTS,
+        Process::Milling | Process::Turning => &MILLING_COEFFICIENTS,
         Process::Drilling => &DRILLING_COEFFICIENTS,
     }
 }
@@ -114,6 +117,7 @@ pub fn average_row(tool: &Tool, geometry: &CutGeometry, axis: ForceAxis) -> Resu
         }
         CutGeometry::Milling { .. } => shaped_row(tool, geometry, axis),
         CutGeometry::Drilling { .. } => DrillGeometry::new(tool, geometry)?.row(axis).to_vec(),
+        CutGeometry::Turning { .. } => edge_row(&engaged_edge(tool, geometry)?, axis).to_vec(),
     };
     if row.iter().all(|v| v.is_finite()) {
         Ok(row)
@@ -246,18 +250,28 @@ impl DrillGeometry {
     }
 }
 
-/// Speed at the tool's outer diameter, m/min.
+/// The diameter at which edge and work pass each other: the tool's, in turning the workpiece's; mm.
+pub fn cut_diameter_mm(tool: &Tool, geometry: &CutGeometry) -> f64 {
+    match *geometry {
+        CutGeometry::Turning { diameter_mm, .. } => diameter_mm,
+        _ => tool.diameter_mm,
+    }
+}
+
+/// Speed at a diameter, m/min.
 pub fn cutting_speed_m_per_min(diameter_mm: f64, spindle_rpm: f64) -> f64 {
     PI * diameter_mm * spindle_rpm / 1000.0
 }
 
-/// Feed that sets a cut apart from another: per tooth (milling) or per revolution (drilling), mm.
+/// Feed that sets a cut apart from another: per tooth (milling) or per revolution (drilling, turning), mm.
 pub fn feed_mm(geometry: &CutGeometry) -> f64 {
     match *geometry {
         CutGeometry::Milling {
             feed_per_tooth_mm, ..
         } => feed_per_tooth_mm,
-        CutGeometry::Drilling { feed_per_rev_mm, .. } => feed_per_rev_mm,
+        CutGeometry::Drilling { feed_per_rev_mm, .. } | CutGeometry::Turning { feed_per_rev_mm, .. } => {
+            feed_per_rev_mm
+        }
     }
 }
 

@@ -60,7 +60,7 @@ pub struct Influence {
 pub struct RegressionPoint {
     pub cut: String,
     pub axis: ForceAxis,
-    /// Per tooth (milling), per revolution (drilling).
+    /// Per tooth (milling), per revolution (drilling, turning).
     pub feed_mm: f64,
     /// N; N·m on the torque axis. So are the next two.
     pub measured: f64,

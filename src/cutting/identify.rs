@@ -11,6 +11,7 @@ use super::outlier::misfits;
 use super::plausibility;
 use super::record::{Average, CutAnalysis};
 use super::series::{MaterialComparison, Series, SpeedTrends, compare, speed_trends};
+use super::turning_checks::of_turning;
 use super::warnings;
 use crate::campaign::{Campaign, CutGeometry, Process};
 use crate::progress::Progress;
@@ -105,7 +106,7 @@ pub fn from_analyses(
 
     let (mut groups, mut pooled) = (Vec::new(), Vec::new());
     let (mut trends, mut materials) = (Vec::new(), Vec::new());
-    for process in [Process::Milling, Process::Drilling] {
+    for process in Process::ALL {
         let of_process: Vec<&CutAnalysis> =
             counted.iter().copied().filter(|c| c.process == process).collect();
         let mut series: Vec<Series> = Vec::new();
@@ -126,6 +127,9 @@ pub fn from_analyses(
             };
             let mut told = plausibility::of_scales(campaign, &one.cuts, process);
             told.extend(warnings::of_plan(campaign, &one.cuts, process));
+            if process == Process::Turning {
+                told.extend(of_turning(campaign, &one.cuts));
+            }
             let first_group = groups.len();
             for set in by_speed(&one.cuts, &mut told) {
                 groups.extend(Group::fit(&set, one.material, &rows, options)?);
@@ -223,13 +227,28 @@ fn without_duplicates<'a>(
     kept
 }
 
+/// Cutting speeds that differ by less, as a part, are one speed. A bar gets thinner with every cut, and lathes hold the speed at
+/// the diameter that they were told.
+fn one_speed(process: Process) -> f64 {
+    match process {
+        Process::Milling | Process::Drilling => 2e-3,
+        Process::Turning => 0.05,
+    }
+}
+
 /// One set per cutting speed that has two feeds or more; the cuts at other speeds together, if they have.
 fn by_speed<'a>(cuts: &[&'a CutAnalysis], warnings: &mut Vec<String>) -> Vec<Vec<&'a CutAnalysis>> {
-    let speeds = distinct(cuts.iter().map(|c| c.cutting_speed_m_per_min));
+    let part = cuts.first().map_or(0.0, |c| one_speed(c.process));
+    let mut speeds = distinct(cuts.iter().map(|c| c.cutting_speed_m_per_min));
+    // Each set begins where the one before ends.
+    speeds.dedup_by(|next, first| *next - *first <= part * *first);
+    let set_of = |c: &CutAnalysis| {
+        let at = speeds.partition_point(|s| *s <= c.cutting_speed_m_per_min * (1.0 + 1e-9));
+        at.saturating_sub(1)
+    };
     let (mut sets, mut rest): (Vec<Vec<&CutAnalysis>>, Vec<&CutAnalysis>) = (Vec::new(), Vec::new());
-    for speed in &speeds {
-        let same = |c: &&&CutAnalysis| (c.cutting_speed_m_per_min - speed).abs() <= 2e-3 * speed;
-        let set: Vec<&CutAnalysis> = cuts.iter().filter(same).copied().collect();
+    for k in 0..speeds.len() {
+        let set: Vec<&CutAnalysis> = cuts.iter().filter(|c| set_of(c) == k).copied().collect();
         if distinct(set.iter().map(|c| c.feed_mm)).len() >= 2 {
             sets.push(set);
         } else {
@@ -274,11 +293,12 @@ impl CfcResult {
     }
 }
 
-/// Depth that a cut is known by: axial depth (milling), hole depth (drilling), mm.
+/// Depth that a cut is known by: axial depth (milling), hole depth (drilling), depth of cut (turning), mm.
 pub(crate) fn depth_mm(geometry: &CutGeometry) -> Option<f64> {
     match *geometry {
         CutGeometry::Milling { axial_depth_mm, .. } => Some(axial_depth_mm),
         CutGeometry::Drilling { hole_depth_mm, .. } => hole_depth_mm,
+        CutGeometry::Turning { depth_of_cut_mm, .. } => Some(depth_of_cut_mm),
     }
 }
 

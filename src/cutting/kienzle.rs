@@ -1,6 +1,7 @@
 //! Kienzle's law beside the linear-edge law: Fᵢ = kᵢ1.1 · b · h^(1−mᵢ) for each component (Kienzle & Victor, Spezifische
 //! Schnittkräfte bei der Metallbearbeitung, Werkstattstechnik und Maschinenbau 47 (1957) 224–225), h and b in mm. In milling
-//! h = c sin φ at each angle (Martellotti 1941), averaged over a turn; along a drill's lip h is the same everywhere.
+//! h = c sin φ at each angle (Martellotti 1941), averaged over a turn; along a drill's lip h is the same everywhere; round the
+//! nose of a turning tool each bit of the edge has its own (see [`super::turning`]).
 //!
 //! Both laws have as many parameters, so that no information criterion tells more than their likelihoods do. What a
 //! difference of likelihoods is worth is found by simulation from either law (Cox, Tests of separate families of hypotheses,
@@ -20,6 +21,7 @@ use super::average_force::{DrillGeometry, ForceAxis, average_row, feed_mm};
 use super::group::{Group, Known, by_axis, distinct};
 use super::identify::CfcResult;
 use super::regression::{Fit, Observation, fit, r2};
+use super::turning::engaged_edge;
 use crate::campaign::{Campaign, CutGeometry, Process, Tool};
 
 /// A force component under Kienzle's law.
@@ -45,7 +47,7 @@ pub enum Preferred {
 /// A cut that would tell the laws apart better than those at hand.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct TellingFeed {
-    /// Per tooth (milling), per revolution (drilling), everything else as in the first cut.
+    /// Per tooth (milling), per revolution (drilling, turning), everything else as in the first cut.
     pub feed_mm: f64,
     pub axis: ForceAxis,
     /// Kienzle's law less the linear-edge law there (N; N·m).
@@ -185,12 +187,31 @@ fn terms(tool: &Tool, geometry: &CutGeometry, axis: ForceAxis) -> Option<Vec<Ter
                 ForceAxis::X | ForceAxis::Y => vec![],
             })
         }
+        CutGeometry::Turning { .. } => {
+            let edge = engaged_edge(tool, geometry).ok()?;
+            let cutting = edge.iter().filter(|bit| bit.chip_mm > 0.0);
+            let terms = cutting.flat_map(|bit| {
+                let directions = bit.directions(axis).into_iter().enumerate();
+                directions
+                    .filter(|(_, direction)| *direction != 0.0)
+                    .map(|(component, direction)| Term {
+                        component,
+                        scale: direction * bit.length_mm,
+                        chip_mm: bit.chip_mm,
+                        moment: Moment::One,
+                        angles: [0.0; 2],
+                    })
+            });
+            Some(terms.collect())
+        }
     }
 }
 
 fn components(process: Process) -> &'static [(&'static str, &'static str)] {
     match process {
-        Process::Milling => &[("tangential", "kt1.1"), ("radial", "kr1.1"), ("axial", "ka1.1")],
+        Process::Milling | Process::Turning => {
+            &[("tangential", "kt1.1"), ("radial", "kr1.1"), ("axial", "ka1.1")]
+        }
         Process::Drilling => &[("tangential", "kt1.1"), ("feed", "kf1.1")],
     }
 }
@@ -508,7 +529,9 @@ fn telling_feed(
             CutGeometry::Milling {
                 feed_per_tooth_mm, ..
             } => *feed_per_tooth_mm = feed,
-            CutGeometry::Drilling { feed_per_rev_mm, .. } => *feed_per_rev_mm = feed,
+            CutGeometry::Drilling { feed_per_rev_mm, .. } | CutGeometry::Turning { feed_per_rev_mm, .. } => {
+                *feed_per_rev_mm = feed;
+            }
         }
         let row = average_row(tool, &geometry, o.axis).ok()?;
         let terms = terms(tool, &geometry, o.axis)?;
@@ -567,7 +590,7 @@ impl KienzleFit {
     fn what_to_measure(&self) -> String {
         let per = match self.process {
             Process::Milling => "tooth",
-            Process::Drilling => "turn",
+            Process::Drilling | Process::Turning => "turn",
         };
         match &self.telling {
             Some(t) => {

@@ -20,6 +20,8 @@ mod regression;
 mod series;
 mod teeth;
 mod trend;
+mod turning;
+mod turning_checks;
 mod warnings;
 pub mod waveform;
 
@@ -28,7 +30,7 @@ pub use average::TurnAverage;
 pub(crate) use average_force::tests::drill as test_drill;
 pub use average_force::{
     CoefficientKind, DRILLING_COEFFICIENTS, DrillGeometry, ForceAxis, MILLING_COEFFICIENTS, average_row,
-    coefficients_of, cutting_speed_m_per_min, feed_mm,
+    coefficients_of, cut_diameter_mm, cutting_speed_m_per_min, feed_mm,
 };
 pub use conic::{ConicFit, Loss, conic_fit};
 pub use estimate::{BOOTSTRAP_CUTS, BOOTSTRAP_DRAWS, Estimate, HUBER_THRESHOLD, Method, bootstrap, estimate};
@@ -45,4 +47,5 @@ pub use record::{Average, ChannelAnalysis, CutAnalysis, Notice, Trace, analyse_c
 pub use regression::{Fit, Observation, fit};
 pub use series::{MaterialComparison, SpeedTrends};
 pub use trend::{Change, Reading, table_trend};
+pub use turning::{EdgeBit, edge_row, engaged_edge};
 pub(crate) use warnings::{of_notices, speed_text};

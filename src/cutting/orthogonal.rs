@@ -61,7 +61,7 @@ impl ObliqueEdge {
     }
 }
 
-/// Predicted milling coefficients beside those found from the cuts.
+/// Predicted milling or turning coefficients beside those found from the cuts.
 #[derive(Debug, Clone)]
 pub struct Prediction {
     pub material: Option<String>,
@@ -70,22 +70,22 @@ pub struct Prediction {
     pub rows: Vec<(&'static str, f64, Option<f64>, Option<f64>)>,
 }
 
-/// From the campaign's `[orthogonal]` table, for the milling cuts of the campaign's material; `None` without the table,
-/// without milling cuts, or where its angles allow no chip (then a warning says so).
+/// From the campaign's `[orthogonal]` table, for the milled or turned cuts of the campaign's material; `None` without the table,
+/// without such cuts, or where its angles allow no chip (then a warning says so).
 pub(super) fn predict(
     campaign: &Campaign,
     pooled: &[Group],
     warnings: &mut Vec<String>,
 ) -> Option<Prediction> {
     let table = campaign.orthogonal?;
-    let milling = || pooled.iter().filter(|g| g.process == Process::Milling);
-    let group = match milling().count() {
-        1 => milling().next(),
-        _ => milling().find(|g| g.material.is_some() && g.material == campaign.material),
+    let comparable = || pooled.iter().filter(|g| g.process != Process::Drilling);
+    let group = match comparable().count() {
+        1 => comparable().next(),
+        _ => comparable().find(|g| g.material.is_some() && g.material == campaign.material),
     };
     let Some(group) = group else {
         warnings.push(
-            "[orthogonal] is not compared: it needs milling cuts, of the material that [material] names"
+            "[orthogonal] is not compared: it needs milled or turned cuts, of the material that [material] names"
                 .into(),
         );
         return None;

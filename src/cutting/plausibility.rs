@@ -8,7 +8,8 @@ use crate::signal::median;
 
 /// Force per chip cross-section of one cut, edge forces included, N/mm².
 struct Specific {
-    /// Milling: of the force in the plane of cutting, whatever its direction; drilling: from the torque.
+    /// Milling: of the force in the plane of cutting, whatever its direction; drilling: from the torque; turning: of the
+    /// whole force.
     cutting: Option<f64>,
     /// Milling: of the axial force; drilling: of the thrust.
     axial: Option<f64>,
@@ -44,6 +45,19 @@ fn specific(campaign: &Campaign, cut: &CutAnalysis) -> Option<Specific> {
             cutting: ratio(ForceAxis::Mz, 0),
             axial: ratio(ForceAxis::Z, 2),
         },
+        // Whichever channel it is on: the axes are looked at by themselves.
+        Process::Turning => {
+            let squares: f64 = [ForceAxis::X, ForceAxis::Y, ForceAxis::Z]
+                .into_iter()
+                .filter_map(force)
+                .map(|f| f * f)
+                .sum();
+            let area = row(ForceAxis::Z)?[0];
+            Specific {
+                cutting: Some(squares.sqrt() / area).filter(|k| k.is_finite() && *k > 0.0),
+                axial: None,
+            }
+        }
     })
 }
 
@@ -101,6 +115,15 @@ fn chip_mm(campaign: &Campaign, cut: &CutAnalysis) -> Option<f64> {
             let lips = tool.teeth.max(1) as f64;
             Some(cut.feed_mm / lips * 59f64.to_radians().sin())
         }
+        CutGeometry::Turning { .. } => {
+            let row = average_row(
+                campaign.tool.as_ref()?,
+                &campaign.cuts[cut.cut].geometry,
+                ForceAxis::Z,
+            )
+            .ok()?;
+            Some(row[0] / row[3]).filter(|h| h.is_finite())
+        }
     }
 }
 
@@ -150,22 +173,27 @@ pub(super) fn of_scales(campaign: &Campaign, cuts: &[&CutAnalysis], process: Pro
     let (names, units): (&str, &[(f64, &str)]) = match process {
         Process::Milling => ("Fx and Fy", &UNITS),
         Process::Drilling => ("Mz", &TORQUE_UNITS),
+        Process::Turning => ("Fx, Fy and Fz", &UNITS),
     };
     let mut warnings = Vec::new();
     if let Some(energy) = cutting.filter(|e| *e < bounds[0] || *e > bounds[1]) {
         let side = if energy < bounds[0] { "small" } else { "large" };
         warnings.push(format!(
             "{names} look too {side}: the specific cutting energy comes out as {} N/mm², that of {of} lies between {} and \
-             {} N/mm²{}; check the units in the files, the amplifier's range, and teeth, depth and feed",
+             {} N/mm²{}; check the units in the files, the amplifier's range, and {}",
             figures(energy, 3),
             bounds[0],
             bounds[1],
-            suspects(units, |factor| (usual[0]..=usual[1]).contains(&(energy * factor)))
+            suspects(units, |factor| (usual[0]..=usual[1]).contains(&(energy * factor))),
+            match process {
+                Process::Milling | Process::Drilling => "teeth, depth and feed",
+                Process::Turning => "depth and feed",
+            }
         ));
     } else if let (Some(cutting), Some(axial)) = (cutting, axial) {
         // A ball or a helix of 60° may press axially as hard as it cuts; a drill's thrust is about half its cutting force.
         let limits = match process {
-            Process::Milling => [0.0, 4.0],
+            Process::Milling | Process::Turning => [0.0, 4.0],
             Process::Drilling => [0.12, 6.0],
         };
         let ratio = axial / cutting;

@@ -6,7 +6,7 @@ use num_complex::Complex64;
 
 use super::air::{air_notices, believable_air};
 use super::average::{TurnAverage, average};
-use super::average_force::{DrillGeometry, ForceAxis, cutting_speed_m_per_min, feed_mm};
+use super::average_force::{DrillGeometry, ForceAxis, cut_diameter_mm, cutting_speed_m_per_min, feed_mm};
 use super::teeth::idle_tooth;
 use super::waveform::MillingCut;
 use crate::campaign::{Campaign, Cut, CutGeometry, Process, Tool};
@@ -66,7 +66,7 @@ pub struct CutAnalysis {
     pub process: Process,
     pub spindle_rpm: f64,
     pub cutting_speed_m_per_min: f64,
-    /// Per tooth (milling), per revolution (drilling).
+    /// Per tooth (milling), per revolution (drilling, turning).
     pub feed_mm: f64,
     /// Start and end of the record, s.
     pub record_s: [f64; 2],
@@ -234,6 +234,8 @@ pub fn analyse_cut(campaign: &Campaign, cut_index: usize, record: &TimeRecord) -
             duration_notice(cut, tool, &phases, rate, &mut notices);
             None
         }
+        // One edge that never leaves the work: no line to judge the speed by.
+        CutGeometry::Turning { .. } => None,
     };
     teeth_notice(
         campaign,
@@ -256,7 +258,10 @@ pub fn analyse_cut(campaign: &Campaign, cut_index: usize, record: &TimeRecord) -
         id: cut.id.clone(),
         process: cut.geometry.process(),
         spindle_rpm: cut.spindle_rpm,
-        cutting_speed_m_per_min: cutting_speed_m_per_min(tool.diameter_mm, cut.spindle_rpm),
+        cutting_speed_m_per_min: cutting_speed_m_per_min(
+            cut_diameter_mm(tool, &cut.geometry),
+            cut.spindle_rpm,
+        ),
         feed_mm: feed_mm(&cut.geometry),
         record_s: seconds(&(0..samples)),
         air_before_s: phases.air.before.as_ref().map(seconds),

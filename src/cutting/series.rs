@@ -54,10 +54,16 @@ pub struct MaterialComparison {
 
 /// Speeds beyond this correlation with the order of the cuts cannot be told from wear.
 const CONFOUNDED: f64 = 0.7;
+/// Turned cuts whose speeds differ by less than this factor have one speed.
+const TRIAL_OF_SPEEDS: f64 = 1.2;
 
 pub(super) fn speed_trends(campaign: &Campaign, series: &Series, rows: &Rows) -> Option<SpeedTrends> {
     let speeds = series.speeds();
     let (&low, &high) = (speeds.first()?, speeds.last()?);
+    // A bar that gets thinner is no trial of speeds.
+    if series.process == Process::Turning && high < TRIAL_OF_SPEEDS * low {
+        return None;
+    }
     let reference = reference_speed(speeds.iter().copied());
     let changes = changes(
         &observations(&series.cuts, rows),

@@ -87,7 +87,8 @@ fn common_speed_error(campaign: &Campaign, cuts: &[CutAnalysis]) -> Option<Strin
 pub(super) fn of_plan(campaign: &Campaign, cuts: &[&CutAnalysis], process: Process) -> Option<String> {
     let speeds = distinct(cuts.iter().map(|c| c.spindle_rpm));
     let feeds = distinct(cuts.iter().map(|c| c.feed_mm));
-    if speeds.len() < 2 || feeds.len() < 2 {
+    // A bar gets thinner, so that its spindle speeds are no plan.
+    if speeds.len() < 2 || feeds.len() < 2 || process == Process::Turning {
         return None;
     }
     let near = |a: f64, b: f64| (a - b).abs() <= 2e-3 * b.abs();
@@ -106,19 +107,16 @@ pub(super) fn of_plan(campaign: &Campaign, cuts: &[&CutAnalysis], process: Proce
     if empty.is_empty() || 4 * empty.len() > speeds.len() * feeds.len() {
         return None;
     }
-    let per = match process {
-        Process::Milling => "tooth",
-        Process::Drilling => "revolution",
-    };
     let listed = campaign
         .cuts
         .iter()
         .filter(|c| c.geometry.process() == process)
         .count();
     Some(format!(
-        "the plan of {} speeds and {} feeds per {per} has no usable cut at {} ({listed} cuts listed): errors grow most for the edge coefficients",
+        "the plan of {} speeds and {} feeds per {} has no usable cut at {} ({listed} cuts listed): errors grow most for the edge coefficients",
         speeds.len(),
         feeds.len(),
+        process.feed_per(),
         empty.join(", ")
     ))
 }
@@ -151,10 +149,11 @@ pub(super) fn of_misfit(campaign: &Campaign, misfit: &Misfit) -> String {
 /// With an edge that is not straight the axial force tells of the radial one: counted the wrong way round it makes that
 /// negative.
 pub(super) fn of_shape(campaign: &Campaign, fit: &Group) -> Option<String> {
-    let shaped = campaign
-        .tool
-        .as_ref()
-        .is_some_and(|tool| !tool.has_straight_edge());
+    let shaped = fit.process == Process::Milling
+        && campaign
+            .tool
+            .as_ref()
+            .is_some_and(|tool| !tool.has_straight_edge());
     let radial = fit.coefficients.iter().find(|c| c.label == "Krc")?;
     let (value, std) = (radial.value?, radial.std_error?);
     (shaped && value < -2.0 * std).then(|| {
@@ -337,6 +336,8 @@ fn of_coefficient(groups: &[&Group], j: usize, warnings: &mut Vec<String>) {
                 });
                 held.push(format!("{speed}{free}"));
             }
+            // Along a turning edge the chip goes to either side, as the inclination of the edge sends it.
+            (Some(_), Some(_)) if group.process == Process::Turning && [2, 5].contains(&j) => {}
             (Some(value), Some(error)) if value < -2.0 * error => {
                 negative.push(format!("{value:.2} at {speed}"));
             }
@@ -352,6 +353,8 @@ fn of_coefficient(groups: &[&Group], j: usize, warnings: &mut Vec<String>) {
     if !negative.is_empty() {
         let remedy = if c.edge {
             "no edge pulls; look at drift and at effects the model lacks, or hold it at zero with --nonnegative-edges"
+        } else if groups.iter().any(|g| g.process == Process::Turning) {
+            "check tool_from_dyno, the nose radius and the cutting edge angle"
         } else {
             "check tool_from_dyno and the immersion angles"
         };

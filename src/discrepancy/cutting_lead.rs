@@ -3,6 +3,7 @@
 
 use serde::Serialize;
 
+use crate::campaign::Process;
 use crate::cutting::ForceAxis;
 use crate::identify::cutting_data::CutData;
 use crate::identify::{CutFit, CuttingData};
@@ -47,6 +48,23 @@ impl LineKind {
             LineKind::BesideTeeth => "close beside tooth passing",
             LineKind::Mains => "mains",
             LineKind::NotCutting => "in the air, too",
+        }
+    }
+
+    /// As [`usual_cause`](Self::usual_cause), where the workpiece turns against one edge that never leaves it.
+    pub fn usual_cause_in_turning(self) -> &'static str {
+        match self {
+            LineKind::MeanForce => {
+                "a force that does not follow the feed as the model says (wear, built-up edge, another material), a wrong feed, depth, nose \
+                 radius or cutting edge angle in campaign.toml, or a zero line that is off"
+            }
+            LineKind::OncePerTurn => {
+                "a bar that runs out: chucked askew, bent, or with a keyway or crust on one side"
+            }
+            LineKind::TurnHarmonic => {
+                "a bar that is not round: pressed by the jaws of the chuck, or with flats, seams or a crust"
+            }
+            _ => self.usual_cause(),
         }
     }
 
@@ -133,6 +151,8 @@ struct Line {
     kind: LineKind,
 }
 
+/// A number of teeth whose passing no line follows.
+const NO_TEETH: usize = usize::MAX;
 /// An order this many times its noise (power) is no chance among some ten thousand.
 const STANDS_OUT: f64 = 16.0;
 /// Highest harmonic of the mains that is called so.
@@ -151,7 +171,10 @@ const RESONANCE: f64 = 0.2;
 /// Groups what the model, fitted as `fits` (in the order of the cuts), leaves of the records; `None` where no line stands above
 /// the noise.
 pub fn cutting_lead(data: &CuttingData, fits: &[CutFit]) -> Option<CuttingLead> {
-    let teeth = data.summary.teeth.max(1);
+    let teeth = match data.process {
+        Process::Turning => NO_TEETH,
+        Process::Milling | Process::Drilling => data.summary.teeth.max(1),
+    };
     let mut lines = Vec::new();
     for (index, (cut, fit)) in data.cuts.iter().zip(fits).enumerate() {
         lines.extend(of_orders(index, cut, fit, teeth));
@@ -194,7 +217,10 @@ pub fn cutting_lead(data: &CuttingData, fits: &[CutFit]) -> Option<CuttingLead> 
                 order: strongest.frequency_hz / cut.spindle_hz(),
                 cuts: shown.len(),
                 of_cuts: data.cuts.len(),
-                usual_cause: kind.usual_cause(),
+                usual_cause: match data.process {
+                    Process::Turning => kind.usual_cause_in_turning(),
+                    Process::Milling | Process::Drilling => kind.usual_cause(),
+                },
             })
         })
         .collect();

@@ -11,6 +11,7 @@ use super::next_measurement::{Alternative, ENOUGH_SIGMAS, LEAST_SIGMAS, NextMeas
 use super::verdict::Verdict;
 use crate::Result;
 use crate::campaign::Immersion;
+use crate::cutting::EdgeBit;
 use crate::effects::cutting::CuttingInstance;
 use crate::identify::cutting_data::{CutData, CutKind};
 use crate::identify::{CuttingData, CuttingModel, CuttingProblem, LeastSquares, Linearisation};
@@ -247,6 +248,20 @@ fn proposals(data: &CuttingData) -> Vec<Proposal> {
             faster.setting.speed_ratio *= factor;
             if (0.5..=2.0).contains(&factor) {
                 propose(format!("cut {} at {words} its speed", base.id), 1.0, faster);
+            }
+            if let CutKind::Turning { edge } = &plain.kind {
+                let mut fed = plain.clone();
+                fed.feed_mm *= factor;
+                fed.setting.feed_mm *= factor;
+                // The tip aside, the chip grows with the feed all along the edge.
+                let thicker = edge.iter().map(|bit| EdgeBit {
+                    chip_mm: factor * bit.chip_mm,
+                    ..*bit
+                });
+                fed.kind = CutKind::Turning {
+                    edge: thicker.collect(),
+                };
+                propose(format!("cut {} at {words} its feed", base.id), 1.0, fed);
             }
             let CutKind::Milling { cut, .. } = &plain.kind else {
                 continue;

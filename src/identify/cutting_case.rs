@@ -2,7 +2,7 @@
 
 use super::cutting_data::{CuttingData, processes};
 use super::cutting_model::CuttingModel;
-use crate::campaign::{Campaign, Process};
+use crate::campaign::Campaign;
 use crate::effects::cutting::{self, CuttingInstance};
 use crate::revision::{Domain, RecordedEffect, Revision, RevisionLog, log_file};
 use crate::{InputError, Result};
@@ -74,10 +74,7 @@ impl CuttingCase {
             data = data.filtered(|i| material(campaign, data.cuts[i].cut) == main);
         }
         if let Some(other) = processes.get(1) {
-            let name = match other {
-                Process::Milling => "milling",
-                Process::Drilling => "drilling",
-            };
+            let name = other.name();
             warnings.push(format!("the {name} cuts are not compared: one process at a time"));
         }
         let log = RevisionLog::load(&campaign.dir)?;

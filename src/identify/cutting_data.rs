@@ -13,7 +13,9 @@ use super::force_channel::{force_channel, sample_std, widen_for_vibration};
 use super::off_comb::{OffComb, StandingLine, find_vibration, standing_lines};
 use crate::campaign::{Campaign, Process};
 use crate::cutting::waveform::{DrillTerm, DrillingCut, MillingCut, UnitForces};
-use crate::cutting::{CutAnalysis, ForceAxis, InStep, Notice, feed_mm, of_notices, read_in_step};
+use crate::cutting::{
+    CutAnalysis, EdgeBit, ForceAxis, InStep, Notice, engaged_edge, feed_mm, of_notices, read_in_step,
+};
 use crate::effects::cutting::{CutSetting, CuttingSummary};
 use crate::ingest::{ChannelRole, TimeRecord};
 use crate::progress::Progress;
@@ -33,6 +35,10 @@ pub enum CutKind {
         /// First contact lies in here, s.
         contact_s: [f64; 2],
     },
+    Turning {
+        /// The edge in the work, bit by bit.
+        edge: Vec<EdgeBit>,
+    },
 }
 
 /// One cut as data.
@@ -43,7 +49,7 @@ pub struct CutData {
     pub id: String,
     pub spindle_rpm: f64,
     pub cutting_speed_m_per_min: f64,
-    /// Per tooth (milling), per revolution (drilling).
+    /// Per tooth (milling), per revolution (drilling, turning).
     pub feed_mm: f64,
     pub setting: CutSetting,
     /// Place in the sequence of cuts, where the campaign says it.
@@ -51,14 +57,14 @@ pub struct CutData {
     pub kind: CutKind,
     /// Recorded x, y, z, torque; `None` where there is no usable channel or the process puts no force on it.
     pub channels: [Option<ForceChannel>; 4],
-    /// Highest order of the spectra; 0 for drilling.
+    /// Highest order of the spectra; 0 for drilling and turning.
     pub orders: usize,
     /// Start and end of each block, s from the middle of the record.
     pub block_s: Vec<[f64; 2]>,
     /// Blocks of full engagement.
     pub steady: Range<usize>,
     pub vibration: Option<OffComb>,
-    /// What stands above the noise beside the orders (drilling: orders and all).
+    /// What stands above the noise beside the orders (drilling and turning: orders and all).
     pub lines: Vec<StandingLine>,
 }
 
@@ -167,7 +173,7 @@ const MAINS_HZ: [f64; 2] = [50.0, 60.0];
 /// Processes of the campaign's cuts, the one with more cuts first.
 pub fn processes(campaign: &Campaign) -> Vec<Process> {
     let count = |p| campaign.cuts.iter().filter(|c| c.geometry.process() == p).count();
-    let mut all = vec![Process::Milling, Process::Drilling];
+    let mut all = Process::ALL.to_vec();
     all.retain(|p| count(*p) > 0);
     all.sort_by_key(|p| std::cmp::Reverse(count(*p)));
     all
@@ -304,7 +310,7 @@ fn cut_data(
     let mut channels: [Option<ForceChannel>; 4] = std::array::from_fn(|i| {
         let axis = ForceAxis::ALL[i];
         // A drill puts nothing on the lateral channels; what they show is its wobble.
-        if milling.is_none() && !ForceAxis::of(Process::Drilling).contains(&axis) {
+        if !ForceAxis::of(cut.geometry.process()).contains(&axis) {
             return None;
         }
         let channel = analysis.channels.iter().find(|c| c.axis == axis)?;
@@ -314,9 +320,6 @@ fn cut_data(
             ChannelRole::ForceZ,
             ChannelRole::TorqueZ,
         ][i];
-        if milling.is_some() && axis == ForceAxis::Mz {
-            return None;
-        }
         let values = record.channel(role)?.samples.as_slice();
         let zeroed: Vec<f64> = values
             .iter()
@@ -364,6 +367,9 @@ fn cut_data(
             unit: Box::new(m.closed_form(orders)),
             cut: m,
         },
+        None if cut.geometry.process() == Process::Turning => CutKind::Turning {
+            edge: engaged_edge(tool, &cut.geometry)?,
+        },
         None => {
             let drill = DrillingCut::new(tool, &cut.geometry, cut.spindle_rpm)?;
             let middle = window.middle_s;
@@ -378,7 +384,7 @@ fn cut_data(
     };
     let vibration = match &kind {
         CutKind::Milling { cut: m, .. } => find_vibration(&spectra, rate, cut.spindle_rpm / 60.0, m.teeth),
-        CutKind::Drilling { .. } => None,
+        CutKind::Drilling { .. } | CutKind::Turning { .. } => None,
     };
     if let (Some(vibration), CutKind::Milling { cut: m, .. }) = (&vibration, &kind) {
         for (i, channel) in channels.iter_mut().enumerate() {

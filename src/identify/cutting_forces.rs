@@ -4,13 +4,13 @@ use num_complex::Complex64;
 
 use super::cutting_data::CutData;
 use super::off_comb::MOST_SHIFT;
-use crate::cutting::ForceAxis;
 use crate::cutting::waveform::{ChipLaw, DrillTerm, DrillingCut, LineForces, MillingCut, UnitForces};
+use crate::cutting::{EdgeBit, ForceAxis};
 use crate::effects::cutting::{CutPhysics, Mixing};
 use crate::robot::Dual;
 
 /// Forces on the recorded channels with their derivatives. Milling: `[mean, re 1, im 1, re 2, …]` over the orders of
-/// rotation, at phase zero. Drilling: mean of each block.
+/// rotation, at phase zero. Drilling: mean of each block. Turning: `[mean]`.
 #[derive(Debug, Clone)]
 pub struct Forces {
     pub value: [Vec<f64>; 4],
@@ -271,6 +271,47 @@ pub(super) fn drilling_forces(
             .unzip();
         forces.add(channel, &weight, &unit);
         add_scaled(&mut forces.contact_slope[channel], weight.value, &by_contact);
+    }
+    forces
+}
+
+/// Force of a turned cut on the recorded channels, the same over the whole turn, up to and with crosstalk.
+pub(super) fn turning_forces(
+    physics: &CutPhysics,
+    edge: &[EdgeBit],
+    dyno_from_tool: &[[f64; 3]; 3],
+    parameters: usize,
+) -> Forces {
+    let mut forces = Forces::zero(1, parameters);
+    // Thickness that the chip of each bit counts as.
+    let chips = edge.iter().map(|bit| {
+        let h = Dual::constant(bit.chip_mm);
+        match &physics.size_exponent {
+            // h (h / reference)^−p
+            Some(p) if bit.chip_mm > 0.0 => {
+                let log = (bit.chip_mm / ChipLaw::REFERENCE_MM).ln();
+                p.scale(-log).exp().scale(bit.chip_mm)
+            }
+            _ => h,
+        }
+    });
+    let k = &physics.coefficient;
+    for (bit, chip) in edge.iter().zip(chips) {
+        for direction in 0..3 {
+            let along =
+                [ForceAxis::X, ForceAxis::Y, ForceAxis::Z].map(|axis| bit.directions(axis)[direction]);
+            let force = (&(&k[direction] * &chip) + &k[direction + 3]).scale(bit.length_mm);
+            for (channel, row) in dyno_from_tool.iter().enumerate() {
+                let share: f64 = row.iter().zip(along).map(|(a, d)| a * d).sum();
+                forces.add(channel, &force.scale(share), &[1.0]);
+            }
+        }
+    }
+    if let Some(tilt) = &physics.tilt {
+        forces.mix(tilt);
+    }
+    if let Some(crosstalk) = &physics.crosstalk {
+        forces.mix(crosstalk);
     }
     forces
 }

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use super::cutting_data::{CutData, CutKind, CuttingData};
 use crate::campaign::Process;
-use crate::cutting::coefficients_of;
 use crate::cutting::waveform::DrillTerm;
+use crate::cutting::{ForceAxis, coefficients_of, edge_row};
 use crate::effects::cutting::{CutPhysics, CuttingInstance};
 use crate::parameter::{Parameter, Prior, Scale, is_vanished};
 use crate::robot::Dual;
@@ -15,7 +15,7 @@ use crate::{Error, Result};
 #[derive(Debug, Clone)]
 pub struct CuttingModel {
     pub process: Process,
-    /// Those of the baseline (milling Ktc Krc Kac Kte Kre Kae, drilling Ktc Kte Kfc Kfe; without the edge coefficients
+    /// Those of the baseline (milling and turning Ktc Krc Kac Kte Kre Kae, drilling Ktc Kte Kfc Kfe; without the edge coefficients
     /// where the baseline has none), then those of each added effect.
     pub parameters: Vec<Parameter>,
     /// Whether edge coefficients are part of the baseline.
@@ -243,6 +243,18 @@ fn mean_force_coefficients(data: &CuttingData, has_edge: bool) -> Result<Vec<f64
                     all
                 })
                 .collect(),
+            CutKind::Turning { edge } => {
+                let rows = [ForceAxis::X, ForceAxis::Y, ForceAxis::Z].map(|axis| edge_row(edge, axis));
+                (0..n)
+                    .map(|k| {
+                        let mut all = [0.0; 4];
+                        for (i, row) in data.dyno_from_tool.iter().enumerate() {
+                            all[i] = (0..3).map(|axis| row[axis] * rows[axis][k]).sum();
+                        }
+                        all
+                    })
+                    .collect()
+            }
             CutKind::Drilling { cut: drill, .. } => {
                 let full = drill.geometry.entry_travel_mm() * 1.0000001;
                 let (thrust, torque) = (
@@ -273,10 +285,10 @@ fn mean_force_coefficients(data: &CuttingData, has_edge: bool) -> Result<Vec<f64
     // Columns scaled to the size a coefficient has; a faint pull to the usual ratio of edge to cutting coefficient.
     let unit = |k: usize| if kinds[k].edge { EDGE_MM } else { 1.0 };
     let partner = |edge: usize| {
-        if data.process == Process::Milling {
-            edge - 3
-        } else {
+        if data.process == Process::Drilling {
             edge - 1
+        } else {
+            edge - 3
         }
     };
     let matrix = DMatrix::from_fn(rows.len(), n, |i, k| {
@@ -325,7 +337,7 @@ fn steady_means(cut: &CutData) -> [Option<f64>; 4] {
             let start = cut.block_s.get(cut.steady.start).map_or(0.0, |b| b[0]) - 1.2 * drill.entry_s() - 0.2;
             (0..first).take_while(|b| cut.block_s[*b][1] < start).count()
         }
-        CutKind::Milling { .. } => first,
+        CutKind::Milling { .. } | CutKind::Turning { .. } => first,
     };
     let air: Vec<usize> = (0..entering).chain(cut.steady.end..cut.block_s.len()).collect();
     std::array::from_fn(|i| {

@@ -9,7 +9,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::cutting_data::{CutData, CutKind, CuttingData, ForceChannel};
-use super::cutting_forces::{Forces, LineAmplitudes, drilling_forces, milling_forces};
+use super::cutting_forces::{Forces, LineAmplitudes, drilling_forces, milling_forces, turning_forces};
 use super::cutting_model::CuttingModel;
 use super::levenberg_marquardt::{LeastSquares, Linearisation};
 use super::zero_line::{ZeroLine, dot};
@@ -30,7 +30,7 @@ pub struct CuttingProblem<'a> {
 /// The model in one cut after what belongs to the cut alone is fitted.
 #[derive(Debug, Clone)]
 pub struct CutFit {
-    /// Phase, rad (milling), or first contact, s from the middle of the record (drilling).
+    /// Phase, rad (milling), or first contact, s from the middle of the record (drilling); 0 (turning).
     pub placement: f64,
     /// Σ r² of the cut.
     pub chi2: f64,
@@ -143,6 +143,11 @@ impl CuttingProblem<'_> {
                     contact,
                 )
             }
+            CutKind::Turning { edge } => (
+                turning_forces(&physics, edge, &self.data.dyno_from_tool, count),
+                None,
+                0.0,
+            ),
         };
         let mut fit = CutFit {
             placement,
@@ -150,7 +155,7 @@ impl CuttingProblem<'_> {
             channels: [None, None, None, None],
         };
         let is_air = |b: usize| match cut.kind {
-            CutKind::Milling { .. } => !cut.steady.contains(&b),
+            CutKind::Milling { .. } | CutKind::Turning { .. } => !cut.steady.contains(&b),
             CutKind::Drilling { .. } => cut.block_s[b][1] < placement || b >= cut.steady.end,
         };
         for (i, (channel, line)) in cut.channels.iter().zip(&lines).enumerate() {
@@ -284,11 +289,11 @@ fn push_vibration(
     }
 }
 
-/// Force level of each block: the mean over the orders (milling) during the cut, or as it stands (drilling).
+/// Force level of each block: the mean over a turn (milling, turning) during the cut, or as it stands (drilling).
 fn levels<'a>(cut: &CutData, forces: &'a [f64]) -> std::borrow::Cow<'a, [f64]> {
     match cut.kind {
         CutKind::Drilling { .. } => forces.into(),
-        CutKind::Milling { .. } => {
+        CutKind::Milling { .. } | CutKind::Turning { .. } => {
             let mean = forces.first().copied().unwrap_or(0.0);
             (0..cut.block_s.len())
                 .map(|b| if cut.steady.contains(&b) { mean } else { 0.0 })

@@ -94,7 +94,7 @@ fn one_axis(data: &CuttingData, cut: &CutData, fit: &CutFit, axis: ForceAxis) ->
     Some(waves)
 }
 
-/// The steady level: its mean (milling: the rest is in the orders) or its course over the hole (drilling).
+/// The steady level: its mean (milling, where the rest is in the orders; turning) or its course over the hole (drilling).
 fn level(process: Process, cut: &CutData, parts: &[Part]) -> WaveSums {
     let n = cut.steady.len().max(1) as f64;
     let (mut error, mut signal, mut noise) = (Vec::new(), Vec::new(), 0.0);
@@ -120,7 +120,7 @@ fn level(process: Process, cut: &CutData, parts: &[Part]) -> WaveSums {
     let mean = |v: &[f64]| v.iter().sum::<f64>() / n;
     let square = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>() / n;
     match process {
-        Process::Milling => WaveSums {
+        Process::Milling | Process::Turning => WaveSums {
             error: mean(&error).powi(2),
             signal: mean(&signal).powi(2),
             noise: noise / n,
@@ -137,7 +137,7 @@ fn level(process: Process, cut: &CutData, parts: &[Part]) -> WaveSums {
 #[derive(Debug, Clone)]
 pub struct Course {
     pub axis: ForceAxis,
-    /// Milling: rotation of the tool from its position at phase 0, degrees; drilling: time from the first block, s.
+    /// Milling: rotation of the tool from its position at phase 0, degrees; drilling and turning: time from the first block, s.
     pub x: Vec<f64>,
     /// N (N·m), as long as `x`; NaN where a stretch of the hole (the tip breaking through) is left out of the fit.
     pub measured: Vec<f64>,
@@ -147,7 +147,7 @@ pub struct Course {
 /// Points drawn over a revolution.
 const POINTS_PER_TURN: usize = 360;
 
-/// The mean revolution (milling) or the course over the hole (drilling) of every tool axis that the recorded channels
+/// The mean revolution (milling) or the course over time (drilling, turning) of every tool axis that the recorded channels
 /// determine.
 pub fn courses(data: &CuttingData, cut: &CutData, fit: &CutFit) -> Vec<Course> {
     ForceAxis::ALL
@@ -156,7 +156,7 @@ pub fn courses(data: &CuttingData, cut: &CutData, fit: &CutFit) -> Vec<Course> {
             let parts = parts(data, cut, fit, axis, 1.0)?;
             Some(match data.process {
                 Process::Milling => revolution(axis, cut, &parts),
-                Process::Drilling => hole(axis, cut, &parts),
+                Process::Drilling | Process::Turning => over_time(axis, cut, &parts),
             })
         })
         .collect()
@@ -200,7 +200,7 @@ fn revolution(axis: ForceAxis, cut: &CutData, parts: &[Part]) -> Course {
     }
 }
 
-fn hole(axis: ForceAxis, cut: &CutData, parts: &[Part]) -> Course {
+fn over_time(axis: ForceAxis, cut: &CutData, parts: &[Part]) -> Course {
     let start = cut.block_s.first().map_or(0.0, |b| b[0]);
     let mut course = Course {
         axis,

@@ -79,6 +79,41 @@ impl RegenerativeForce {
 }
 
 impl RegenerativeForce {
+    /// Turning with a straight edge at κr: D = −(Krc/sin κr) n nᵀ, n = (sin κr, cos κr) in x (against the feed) and y (away
+    /// from the work); b is the depth of cut.
+    ///
+    /// Why the matrix is so: a tool that is pushed out by Δr along the edge's normal n leaves a chip thinner by n·Δr, on an
+    /// edge of length b/sin κr, and the force normal to the edge falls by Krc times that. The tangential force stands across
+    /// the plane and the force along the edge is left out, so that the limit is that of orthogonal cutting along the normal,
+    /// b = −sin κr/(2 Krc Re G) (Tlusty & Polacek 1963; Altintas, Manufacturing Automation, 2nd ed., §4.2).
+    ///
+    /// Coefficient in N/mm², κr in rad.
+    ///
+    /// # Errors
+    /// Where Krc is not positive and finite, or κr is outside (0, π).
+    pub fn turning(krc_n_per_mm2: f64, kappa_rad: f64) -> Result<Self> {
+        if !(krc_n_per_mm2 > 0.0 && krc_n_per_mm2.is_finite()) {
+            return Err(Error::computation(format!(
+                "turning lobes need a positive Krc, the force normal to the edge, not {krc_n_per_mm2} N/mm²"
+            )));
+        }
+        let (sin, cos) = kappa_rad.sin_cos();
+        if !(kappa_rad > 0.0 && sin > 0.0) {
+            return Err(Error::computation(format!(
+                "turning lobes: the cutting edge angle must lie between 0 and 180°, not {}°",
+                kappa_rad.to_degrees()
+            )));
+        }
+        let factor = -1e6 * krc_n_per_mm2 / sin;
+        Ok(RegenerativeForce {
+            matrix_n_per_m2: [
+                [factor * sin * sin, factor * sin * cos],
+                [factor * sin * cos, factor * cos * cos],
+            ],
+            teeth: 1,
+        })
+    }
+
     /// Drilling, axial–torsional block, displacements along the tool into the workpiece (m) and turns in the sense of the
     /// rotation (rad), forces in the same sense:
     ///

@@ -262,6 +262,7 @@ fn predicted(
     match section.process {
         Process::Drilling => drilling(campaign, section, asked, &tool, group),
         Process::Milling => milling(campaign, &tool, group),
+        Process::Turning => Err("turning makes no hole".into()),
     }
 }
 

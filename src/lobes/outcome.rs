@@ -139,6 +139,7 @@ pub fn noted_cuts(campaign: &Campaign, section: &LobesSection) -> (Vec<NotedCut>
             CutGeometry::Drilling {
                 pilot_diameter_mm, ..
             } => tool.map(|t| 0.5 * (t.diameter_mm - pilot_diameter_mm)),
+            CutGeometry::Turning { depth_of_cut_mm, .. } => Some(depth_of_cut_mm),
         };
         match (reason, depth_mm) {
             (None, Some(depth_mm)) => noted.push(NotedCut {

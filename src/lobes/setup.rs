@@ -7,7 +7,7 @@ use super::periodic_force::{PeriodicForce, ProcessDamping};
 use super::tool_beam::{BeamSegment, ToolBeam};
 use super::tool_point::ModesHolder;
 use crate::campaign::{
-    Campaign, CutGeometry, LobeAxis, LobeMethod, LobeMode, LobesSection, Process, Tool, ToolSegment,
+    Campaign, CutGeometry, LobeAxis, LobeMethod, LobeMode, LobesSection, Process, Tool, ToolKind, ToolSegment,
 };
 use crate::cutting::{CfcOptions, DrillGeometry, Group, identify_forces};
 use crate::{Error, InputError, Result};
@@ -91,7 +91,7 @@ pub fn coefficients_of_group(
         })
     };
     let (krc_n_per_mm2, kac_n_per_mm2) = match section.process {
-        Process::Milling => (value("Krc")?, None),
+        Process::Milling | Process::Turning => (value("Krc")?, None),
         Process::Drilling => {
             let (kfc, kappa) = (value("Kfc")?, half_point_angle_rad(campaign, section)?);
             (kfc * kappa.cos(), Some(kfc * kappa.sin()))
@@ -122,7 +122,7 @@ pub(super) fn half_point_angle_rad(campaign: &Campaign, section: &LobesSection) 
 /// The force of a cut, as the method wants it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Cut {
-    /// Zero-order milling, and drilling.
+    /// Zero-order milling, drilling and turning.
     Averaged(AveragedCut),
     /// Milling with its true dependence on time.
     Periodic(PeriodicForce),
@@ -151,13 +151,33 @@ pub fn cut_of(campaign: &Campaign, section: &LobesSection, coefficients: LobeCoe
             .into()
     };
     let tool = campaign.tool.as_ref();
-    let teeth = section.teeth.or(tool.map(|t| t.teeth)).ok_or_else(|| {
-        lacks(
-            "lobes.teeth",
-            "the number of teeth is not known",
-            "give it here or in [tool]",
-        )
-    })?;
+    if let Some(tool) = tool
+        && (tool.kind == ToolKind::Turning) != (section.process == Process::Turning)
+    {
+        return Err(lacks(
+            "lobes.process",
+            &format!(
+                "the lobes are of {}, and [tool] is {} tool",
+                section.process.name(),
+                match tool.kind {
+                    ToolKind::Turning => "a turning",
+                    ToolKind::Endmill | ToolKind::Drill => "no turning",
+                }
+            ),
+            "choose the process of the tool, or take [tool] or [lobes] out",
+        ));
+    }
+    let one_edge = (section.process == Process::Turning).then_some(1);
+    let teeth = one_edge
+        .or(section.teeth)
+        .or(tool.map(|t| t.teeth))
+        .ok_or_else(|| {
+            lacks(
+                "lobes.teeth",
+                "the number of teeth is not known",
+                "give it here or in [tool]",
+            )
+        })?;
     let LobeCoefficients {
         ktc_n_per_mm2,
         krc_n_per_mm2,
@@ -206,6 +226,13 @@ pub fn cut_of(campaign: &Campaign, section: &LobesSection, coefficients: LobeCoe
             teeth,
         )
         .map(|lateral| Cut::Averaged(lateral.into())),
+        Process::Turning => {
+            let kappa_deg = tool
+                .filter(|t| t.kind == ToolKind::Turning)
+                .map_or(90.0, |t| t.lead_angle_deg);
+            RegenerativeForce::turning(krc_n_per_mm2, kappa_deg.to_radians())
+                .map(|force| Cut::Averaged(force.into()))
+        }
     }
 }
 

@@ -8,7 +8,7 @@ use super::number::{decimals, percent, significant, with_error};
 use super::parts::{count, figure, listed, setting};
 use super::{Block, Column, Section, Table};
 use crate::analysis::regression_line::{FeedLine, feed_lines};
-use crate::campaign::{Campaign, Process};
+use crate::campaign::Campaign;
 use crate::cutting::{CfcResult, Coefficient, CutAnalysis, ForceAxis, Group, Known, kienzle, speed_text};
 
 pub fn summary(result: &CfcResult) -> String {
@@ -61,16 +61,9 @@ fn over_speeds(result: &CfcResult, pooled: &Group) -> Option<String> {
     }
 }
 
-fn process(process: Process) -> &'static str {
-    match process {
-        Process::Milling => "milling",
-        Process::Drilling => "drilling",
-    }
-}
-
 /// Process, and the material where several were cut.
 fn series_name(result: &CfcResult, pooled: &Group) -> String {
-    let name = process(pooled.process);
+    let name = pooled.process.name();
     let several = result
         .pooled
         .iter()
@@ -338,17 +331,14 @@ fn line_figure(
             }
         }));
     }
-    let feed = match pooled.process {
-        Process::Milling => "Feed per tooth (mm)",
-        Process::Drilling => "Feed per revolution (mm)",
-    };
+    let feed = format!("Feed per {} (mm)", pooled.process.feed_per());
     let quantity = if unit == "N" { "force" } else { "torque" };
     let drawing = RegressionFigure {
         title: format!(
             "Average {quantity} against feed, all cuts of {} together",
             series_name(result, pooled)
         ),
-        x_label: feed.into(),
+        x_label: feed,
         y_label: format!("Average {quantity} ({unit})"),
         series,
     };
@@ -410,7 +400,7 @@ fn coefficient_table(result: &CfcResult, pooled: &Group) -> Block {
         rows,
         notes: vec![
             "K.c: cutting coefficients (their force grows with the chip); K.e: edge coefficients (rubbing, the same at \
-             any feed). Tangential t, radial r, axial a; drilling: f along the feed."
+             any feed). Tangential t, radial r, axial a; drilling: f along the feed; turning: r normal to the edge, a along it."
                 .into(),
         ],
     })

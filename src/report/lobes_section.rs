@@ -62,6 +62,7 @@ fn process(analysis: &LobeAnalysis) -> &'static str {
             LobeMethod::ZeroOrder | LobeMethod::FrequencyDomain => "milling, zero-order",
         },
         Process::Drilling => analysis.drilling(),
+        Process::Turning => "turning",
     }
 }
 
@@ -77,6 +78,7 @@ pub fn section(findings: &LobeFindings, structure: Option<&StructureFindings>) -
     let analysis = &findings.asked;
     let depth = match analysis.process {
         Process::Milling => "axial depth of cut",
+        Process::Turning => "depth of cut",
         Process::Drilling => "radial width of cut, (diameter − pilot diameter)/2",
     };
     let mut blocks = vec![Block::KeyValues(vec![

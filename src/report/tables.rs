@@ -204,10 +204,7 @@ fn coefficients(result: &CfcResult) -> PolarsResult<DataFrame> {
         .flat_map(|(g, pooled)| g.coefficients.iter().map(move |c| (g, pooled, c)))
         .collect();
     df!(
-        "process" => all.iter().map(|(g, ..)| match g.process {
-            crate::campaign::Process::Milling => "milling",
-            crate::campaign::Process::Drilling => "drilling",
-        }).collect::<Vec<_>>(),
+        "process" => all.iter().map(|(g, ..)| g.process.name()).collect::<Vec<_>>(),
         "pooled" => all.iter().map(|(_, pooled, _)| *pooled).collect::<Vec<_>>(),
         "cutting_speed_m_per_min" => all.iter().map(|(g, ..)| g.cutting_speed_m_per_min).collect::<Vec<_>>(),
         "coefficient" => all.iter().map(|(_, _, c)| c.label).collect::<Vec<_>>(),

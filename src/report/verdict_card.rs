@@ -643,7 +643,7 @@ fn force(found: &CuttingFindings) -> Option<BeforeAfter> {
         alt: caption.clone(),
         x_label: match data.process {
             Process::Milling => "Rotation of the tool (°)".into(),
-            Process::Drilling => "Time (s)".into(),
+            Process::Drilling | Process::Turning => "Time (s)".into(),
         },
         y_label: format!("{axis} ({unit})"),
         unit: unit.into(),

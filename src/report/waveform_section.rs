@@ -82,7 +82,7 @@ fn comparison(findings: &CuttingFindings) -> Section {
     Section {
         id: "waveforms".into(),
         title: "Force model against the records".into(),
-        lead: "Beyond average forces: the force over a revolution of the tool (milling) or over the hole (drilling)."
+        lead: "Beyond average forces: the force over a revolution of the tool (milling), over the hole (drilling) or over the cut (turning)."
             .into(),
         blocks,
     }
@@ -243,6 +243,7 @@ fn waveform(findings: &CuttingFindings, rank: usize, cut: usize) -> Block {
     let (x_label, over) = match data.process {
         Process::Milling => ("Rotation of the tool (°)", "the mean revolution"),
         Process::Drilling => ("Time (s)", "the hole"),
+        Process::Turning => ("Time (s)", "the cut"),
     };
     let title = format!("Cut {}: force over {over}", own.id);
     let place = ["most", "second most", "third most"][rank.min(2)];

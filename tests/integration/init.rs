@@ -148,6 +148,7 @@ fn cuts_and_a_list_of_them_make_a_campaign_that_computes() {
                     cut.spindle_rpm,
                     hole_depth_mm.unwrap()
                 ),
+                CutGeometry::Turning { .. } => panic!("no practice campaign is turned"),
             };
             let file = cut.file.file_name().unwrap().to_str().unwrap();
             list += &format!("{file};{};{}\n", cells.replace('.', ","), cut.order.unwrap());
@@ -393,7 +394,7 @@ fn a_folder_as_technicians_keep_it_needs_only_what_no_file_says() {
                 CutGeometry::Milling {
                     feed_per_tooth_mm, ..
                 } => *feed_per_tooth_mm,
-                CutGeometry::Drilling { .. } => f64::NAN,
+                CutGeometry::Drilling { .. } | CutGeometry::Turning { .. } => f64::NAN,
             };
             assert!(
                 (feed(&same.geometry) / feed(&cut.geometry) - 1.0).abs() < 1e-6,

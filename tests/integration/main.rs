@@ -36,5 +36,6 @@ mod simulate;
 mod structure;
 mod support;
 mod sweep;
+mod turning;
 mod waveform;
 mod where_it_fails;

@@ -160,7 +160,12 @@ pub fn read_cut_list(file: &Path, scan: &Scan, answers: &mut Answers) -> Result<
                 "file" => (),
                 "start_deg" => angles[0] = Some(value.replace(',', ".")),
                 "exit_deg" => angles[1] = Some(value.replace(',', ".")),
-                key @ (TEETH | DIAMETER) => of_tool.take(key, value),
+                TEETH => of_tool.take(TEETH, value),
+                DIAMETER => {
+                    // In turning it is the workpiece's.
+                    answers.set(&table, DIAMETER, value.clone());
+                    of_tool.take(DIAMETER, value);
+                }
                 DIRECTION => match is_down(&value) {
                     Some(down) => answers.set(&table, DIRECTION, if down { "down" } else { "up" }),
                     None => {
@@ -196,7 +201,10 @@ pub fn read_cut_list(file: &Path, scan: &Scan, answers: &mut Answers) -> Result<
             }
         }
     }
-    passed_over.extend(of_tool.hand_over(answers));
+    let turned = ids
+        .iter()
+        .any(|id| answers.get("cut", id, "process") == Some("turning"));
+    passed_over.extend(of_tool.hand_over(answers, turned));
     Ok(passed_over)
 }
 
@@ -211,7 +219,7 @@ impl OfTool {
         }
     }
 
-    fn hand_over(self, answers: &mut Answers) -> Vec<String> {
+    fn hand_over(self, answers: &mut Answers, turned: bool) -> Vec<String> {
         let mut told = Vec::new();
         for key in [DIAMETER, TEETH] {
             let values: Vec<&String> = self.0.iter().filter(|(k, _)| *k == key).map(|(_, v)| v).collect();
@@ -219,6 +227,7 @@ impl OfTool {
                 [] => (),
                 [one] if answers.get("tool", "", key).is_none() => answers.set("tool", key, one.as_str()),
                 [_] => (),
+                _ if turned && key == DIAMETER => (),
                 _ => told.push(format!(
                     "{key} changes from row to row: one campaign holds one tool"
                 )),

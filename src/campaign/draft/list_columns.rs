@@ -7,13 +7,14 @@ pub(super) const RADIAL_DEPTH: &str = "radial_depth_mm";
 pub(super) const DIRECTION: &str = "direction";
 pub(super) const DIAMETER: &str = "diameter_mm";
 pub(super) const TEETH: &str = "teeth";
+pub(super) const CUTTING_SPEED: &str = "cutting_speed_m_per_min";
 /// The number of the cut where no column names its file.
 pub(super) const NUMBER: &str = "number";
 /// A feed whose unit says which.
 const FEED: &str = "feed";
 
 /// Names in lower case, without accents.
-const NAMES: [(&str, &[&str]); 20] = [
+const NAMES: [(&str, &[&str]); 21] = [
     (
         "file",
         &[
@@ -198,11 +199,28 @@ const NAMES: [(&str, &[&str]); 20] = [
         ],
     ),
     (
+        CUTTING_SPEED,
+        &[
+            "vc",
+            "v_c",
+            "cutting speed",
+            "schnittgeschwindigkeit",
+            "vitesse de coupe",
+            "velocidad de corte",
+        ],
+    ),
+    (
         DIAMETER,
         &[
             "d",
             "diameter",
             "tool diameter",
+            "work diameter",
+            "workpiece diameter",
+            "werkstuckdurchmesser",
+            "werkstueckdurchmesser",
+            "diametre de la piece",
+            "diametro de la pieza",
             "durchmesser",
             "werkzeugdurchmesser",
             "diametre",
@@ -313,6 +331,10 @@ pub(super) fn column(head: &str, keys: &[&'static str]) -> Result<Option<Column>
             )
         }
         FEED => return Err(format!("unit {unit:?} of column {name:?} is not understood")),
+        CUTTING_SPEED => (
+            key,
+            factor(&[("", 1.0), ("m/min", 1.0), ("m/s", 60.0), ("mm/s", 0.06)])?,
+        ),
         _ if key.ends_with("_mm") || key == FEED_PER_TURN => (key, factor(&length)?),
         _ => (key, 1.0),
     };
@@ -365,6 +387,10 @@ pub(super) fn english(word: &str) -> Option<(&'static str, &'static str)> {
         | "ranura" | "ranurado" => ("immersion", "slot"),
         "mill" | "milling" | "fraesen" | "frasen" | "fraisage" | "fresado" => ("process", "milling"),
         "drill" | "drilling" | "bohren" | "percage" | "taladrado" => ("process", "drilling"),
+        "turn" | "turning" | "facing" | "drehen" | "langsdrehen" | "laengsdrehen" | "plandrehen"
+        | "tournage" | "chariotage" | "dressage" | "torneado" | "cilindrado" | "refrentado" => {
+            ("process", "turning")
+        }
         _ => return None,
     })
 }
@@ -392,6 +418,9 @@ mod tests {
             ("Eintritt [°]", "start_deg", 1.0),
             ("Ángulo de salida (rad)", "exit_deg", 180.0 / std::f64::consts::PI),
             ("Zähnezahl", TEETH, 1.0),
+            ("vc [m/min]", CUTTING_SPEED, 1.0),
+            ("f [mm/U]", FEED_PER_TURN, 1.0),
+            ("Schnittgeschwindigkeit (m/s)", CUTTING_SPEED, 60.0),
             ("steady_s", "steady_s", 1.0),
         ] {
             assert_eq!(column(head, &CUT), Ok(Some(Column { key, factor })), "{head}");

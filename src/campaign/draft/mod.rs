@@ -387,7 +387,7 @@ mod tests {
                     q if q.starts_with("robot model") => "irb6640",
                     q if q.contains("joint angles") => "135 -2 53; 83, 30 -117",
                     q if q.contains("process") => "milling",
-                    q if q.contains("endmill, ballend or drill") => "endmill",
+                    q if q.contains("endmill, ballend, drill") => "endmill",
                     q if q.contains("number of teeth") && asked.len() < 6 => "many",
                     q if q.contains("teeth") => "6",
                     q if q.contains("immersion") => "0 90",

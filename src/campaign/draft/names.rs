@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::list_columns::{DIRECTION, FEED_RATE, RADIAL_DEPTH, english, is_down};
+use super::list_columns::{CUTTING_SPEED, DIRECTION, FEED_RATE, RADIAL_DEPTH, english, is_down};
 
 /// Key of `campaign.toml` and its value as a person would type it.
 pub type Facts = BTreeMap<&'static str, String>;
@@ -156,6 +156,7 @@ fn fact(letters: &str, number: Option<f64>, unit: &str) -> Option<(&'static str,
         ("n" | "s", "") if number >= SLOWEST_RPM => "spindle_rpm",
         ("fz", "" | "mm") => "feed_per_tooth_mm",
         ("vf", "") => FEED_RATE,
+        ("vc", "") => CUTTING_SPEED,
         ("f", "") if number >= LEAST_FEED_RATE => FEED_RATE,
         ("f" | "fu", "" | "mm") => "feed_per_rev_mm",
         ("ae", "" | "mm") => RADIAL_DEPTH,

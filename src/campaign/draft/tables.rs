@@ -3,14 +3,14 @@
 use std::collections::BTreeSet;
 
 use super::entry::{Entry, Kind};
-use super::list_columns::{DIRECTION, FEED_PER_TURN, FEED_RATE, RADIAL_DEPTH};
+use super::list_columns::{CUTTING_SPEED, DIAMETER, DIRECTION, FEED_PER_TURN, FEED_RATE, RADIAL_DEPTH};
 use super::names::FROM_NAME;
 use super::scan::stem;
 use super::{Answers, FoundForce, FoundFrf, Scan, Table};
 use crate::ingest::Quantity;
 use crate::{InputError, Result};
 
-const PROCESSES: &[&str] = &["milling", "drilling"];
+const PROCESSES: &[&str] = &["milling", "drilling", "turning"];
 const FROM_HEADER: &str = "from the file's header";
 
 /// The sections in the order in which they stand in the file.
@@ -213,17 +213,32 @@ fn frfs(scan: &Scan, answers: &Answers) -> Result<Vec<Table>> {
 fn tool(cuts: &[(Option<String>, Table)], answers: &Answers) -> Result<Table> {
     let processes: BTreeSet<&str> = cuts.iter().filter_map(|(p, _)| p.as_deref()).collect();
     let drill = processes.contains("drilling") && processes.len() == 1;
-    let kind = processes.first().map(|_| if drill { "drill" } else { "endmill" });
+    let turning = processes.contains("turning") && processes.len() == 1;
+    let kind = processes.first().map(|_| match () {
+        _ if drill => "drill",
+        _ if turning => "turning",
+        _ => "endmill",
+    });
     let mut making = Making::single(answers, "tool");
     making.add(
         Entry::new(
             "kind",
-            Kind::Choice(&["endmill", "ballend", "drill"]),
-            "endmill, ballend or drill",
+            Kind::Choice(&["endmill", "ballend", "drill", "turning"]),
+            "endmill, ballend, drill or turning",
             "endmill",
         ),
         &[(kind, "what the process needs")],
     )?;
+    if turning {
+        let nose = "nose radius of the insert, mm (0: sharp)";
+        making.add(Entry::new("nose_radius_mm", Kind::Number, nose, "0.8"), &[])?;
+        let angle = "cutting edge angle, degrees: between the feed and the main edge";
+        making.add(
+            Entry::new("cutting_edge_angle_deg", Kind::Number, angle, "95.0"),
+            &[],
+        )?;
+        return Ok(making.table);
+    }
     making.add(
         Entry::new("diameter_mm", Kind::Number, "tool diameter, mm", "16.0"),
         &[],
@@ -328,9 +343,11 @@ fn cuts(scan: &Scan, answers: &Answers) -> Result<Vec<(Option<String>, Table)>> 
             RADIAL_DEPTH,
             DIRECTION,
         ];
+        let turned = ["depth_of_cut_mm"];
         let given = |keys: &[&'static str]| keys.iter().any(|k| known(k).is_some());
         let kind_of_tool = answers.get("tool", "", "kind");
         let concluded = match () {
+            _ if given(&turned) || kind_of_tool == Some("turning") => Some("turning"),
             _ if given(&milled) || matches!(kind_of_tool, Some("endmill" | "ballend")) => Some("milling"),
             _ if given(&drilled) || kind_of_tool == Some("drill") => Some("drilling"),
             _ => None,
@@ -340,16 +357,24 @@ fn cuts(scan: &Scan, answers: &Answers) -> Result<Vec<(Option<String>, Table)>> 
             Entry::new(
                 "process",
                 Kind::Choice(PROCESSES),
-                "process: milling or drilling",
+                "process: milling, drilling or turning",
                 "milling",
             ),
             &[header, name, (concluded, "from what else was given")],
         )?;
         let process = making.table.entries.last().and_then(Entry::value_text);
         let process = process.map(|p| p.trim_matches('"').to_string());
+        let diameter = known(DIAMETER)
+            .or_else(|| answers.get("tool", "", DIAMETER))
+            .map(str::to_string);
+        let [header, name] = said("spindle_rpm");
+        let from_speed = rpm_of_speed(&known, diameter.as_deref());
+        let derived = from_speed
+            .as_ref()
+            .map_or((None, ""), |(rpm, why)| (Some(rpm.as_str()), why.as_str()));
         making.add(
             Entry::new("spindle_rpm", Kind::Number, "spindle speed, rpm", "1200.0"),
-            &said("spindle_rpm"),
+            &[header, name, derived],
         )?;
         let entries = match process.as_deref() {
             Some("drilling") => vec![
@@ -363,6 +388,11 @@ fn cuts(scan: &Scan, answers: &Answers) -> Result<Vec<(Option<String>, Table)>> 
                 .optional(),
                 Entry::new("hole_depth_mm", Kind::Number, "depth at full diameter, mm", "8.0").optional(),
             ],
+            Some("turning") => vec![
+                Entry::new("feed_per_rev_mm", Kind::Number, "feed per revolution, mm", "0.2"),
+                Entry::new("depth_of_cut_mm", Kind::Number, "depth of cut, mm", "2.0"),
+                Entry::new(DIAMETER, Kind::Number, "diameter of the workpiece, mm", "60.0"),
+            ],
             _ => vec![
                 Entry::new("feed_per_tooth_mm", Kind::Number, "feed per tooth, mm", "0.05"),
                 Entry::new("axial_depth_mm", Kind::Number, "axial depth of cut, mm", "2.0"),
@@ -374,12 +404,17 @@ fn cuts(scan: &Scan, answers: &Answers) -> Result<Vec<(Option<String>, Table)>> 
                 ),
             ],
         };
+        // In lists ap is the depth of cut of either process; a diameter said of all cuts is that of the workpiece.
+        let depth = known("axial_depth_mm").map(|ap| (ap.to_string(), format!("ap {ap} mm")));
+        let work = diameter.map(|d| (d.clone(), format!("D {d} mm")));
         for entry in entries {
             let [header, name] = said(entry.key);
             let derived = match entry.key {
                 "feed_per_tooth_mm" => feeds.per_tooth.as_ref(),
                 "feed_per_rev_mm" => feeds.per_turn.as_ref(),
                 "immersion" => engaged.as_ref(),
+                "depth_of_cut_mm" => depth.as_ref(),
+                DIAMETER => work.as_ref(),
                 _ => None,
             };
             let derived = derived.map_or((None, ""), |(value, why)| (Some(value.as_str()), why.as_str()));
@@ -441,6 +476,20 @@ impl Feeds {
             per_turn: per_turn.map(|feed| (shown(feed), why)),
         }
     }
+}
+
+/// Spindle speed from the cutting speed and the diameter, with why.
+fn rpm_of_speed<'a>(
+    known: &impl Fn(&str) -> Option<&'a str>,
+    diameter: Option<&str>,
+) -> Option<(String, String)> {
+    let speed = positive(known(CUTTING_SPEED)?)?;
+    let diameter = positive(diameter?)?;
+    let rpm = 1000.0 * speed / (std::f64::consts::PI * diameter);
+    Some((
+        format!("{rpm:.3}"),
+        format!("vc {speed} m/min at D {diameter} mm"),
+    ))
 }
 
 /// Start and exit angle from the radial depth and the tool's diameter, with why. An edge of the workpiece is taken to be milled,

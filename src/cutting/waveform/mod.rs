@@ -13,4 +13,5 @@ mod vibrating;
 pub use drilling::{DrillTerm, DrillingCut};
 pub use edge_shape::EdgeShape;
 pub use milling::{ChipLaw, MillingCut, SampledForces, UNIT_COUNT, UnitForces};
+pub(super) use quadrature::gauss_legendre;
 pub use vibrating::{LineForces, VibratingForces};

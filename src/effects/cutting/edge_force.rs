@@ -41,7 +41,7 @@ impl CuttingEffect for EdgeForce {
     fn parameters(&self, _variant: usize, data: &CuttingSummary) -> Vec<Parameter> {
         let scale = 0.05 * data.cutting_scale_n_per_mm2.max(1.0);
         let names: &[&str] = match data.process {
-            Process::Milling => &["kte_n_per_mm", "kre_n_per_mm", "kae_n_per_mm"],
+            Process::Milling | Process::Turning => &["kte_n_per_mm", "kre_n_per_mm", "kae_n_per_mm"],
             Process::Drilling => &["kte_n_per_mm", "kfe_n_per_mm"],
         };
         names
@@ -69,7 +69,7 @@ impl CuttingEffect for EdgeForce {
 
     fn apply(&self, _variant: usize, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
         let edges: &[usize] = match setting.process {
-            Process::Milling => &[3, 4, 5],
+            Process::Milling | Process::Turning => &[3, 4, 5],
             Process::Drilling => &[1, 3],
         };
         for (value, &edge) in values.iter().zip(edges) {

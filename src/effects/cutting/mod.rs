@@ -67,7 +67,7 @@ pub struct CuttingSummary {
 /// What a cut's forces are made with; effects change it. Lengths mm, forces N, coefficients N/mm² and N/mm.
 #[derive(Debug, Clone)]
 pub struct CutPhysics {
-    /// Of this cut: milling Ktc Krc Kac Kte Kre Kae; drilling Ktc Kte Kfc Kfe.
+    /// Of this cut: milling and turning Ktc Krc Kac Kte Kre Kae; drilling Ktc Kte Kfc Kfe.
     pub coefficient: Vec<Dual>,
     /// p in K ∝ (h / 0.1 mm)^−p.
     pub size_exponent: Option<Dual>,
@@ -118,7 +118,7 @@ pub struct CutSetting {
     pub progress: f64,
     /// Cutting speed over the geometric mean of the slowest and fastest cut.
     pub speed_ratio: f64,
-    /// Per tooth (milling), per revolution (drilling).
+    /// Per tooth (milling), per revolution (drilling, turning).
     pub feed_mm: f64,
     pub has_vibration: bool,
 }

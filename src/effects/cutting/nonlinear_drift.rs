@@ -4,10 +4,10 @@ use crate::effects::background::GAUTSCHI;
 /// The zero line is no line: an exponential transient is added, or the charge amplifier leaks.
 pub struct NonlinearDrift;
 
-/// Milling: x, y, z; drilling: thrust and torque.
+/// Milling and turning: x, y, z; drilling: thrust and torque.
 fn channels(process: Process) -> std::ops::Range<usize> {
     match process {
-        Process::Milling => 0..3,
+        Process::Milling | Process::Turning => 0..3,
         Process::Drilling => 2..4,
     }
 }

@@ -34,7 +34,7 @@ impl CuttingEffect for SizeEffect {
     }
 
     fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
-        let flat = data.process == Process::Drilling && data.feeds < 3;
+        let flat = data.process != Process::Milling && data.feeds < 3;
         flat.then(|| "needs three feeds: with fewer it is other cutting and edge coefficients".to_string())
             .or_else(|| straight_edge_only(data))
     }

@@ -56,7 +56,7 @@ impl CuttingEffect for SpeedDependence {
 
     fn apply(&self, _variant: usize, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
         let cutting: &[usize] = match setting.process {
-            Process::Milling => &[0, 1, 2],
+            Process::Milling | Process::Turning => &[0, 1, 2],
             Process::Drilling => &[0, 2],
         };
         let factor = values[0].scale(-setting.speed_ratio.ln()).exp();

@@ -38,7 +38,7 @@ impl CuttingEffect for ToolWear {
 
     fn parameters(&self, _variant: usize, data: &CuttingSummary) -> Vec<Parameter> {
         let directions: &[&str] = match data.process {
-            Process::Milling => &["t", "r", "a"],
+            Process::Milling | Process::Turning => &["t", "r", "a"],
             Process::Drilling => &["t", "f"],
         };
         directions
@@ -69,7 +69,7 @@ impl CuttingEffect for ToolWear {
 
     fn apply(&self, _variant: usize, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
         let edges: &[usize] = match setting.process {
-            Process::Milling => &[3, 4, 5],
+            Process::Milling | Process::Turning => &[3, 4, 5],
             Process::Drilling => &[1, 3],
         };
         for (growth, &edge) in values.iter().zip(edges) {

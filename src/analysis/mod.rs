@@ -1,11 +1,14 @@
 //! Whole analyses of a campaign, as the commands and the report need them: each floor below called in its order.
 
 pub mod addition;
+pub mod batch;
 pub mod campaign;
 pub mod channel_check;
+pub mod control_chart;
 pub mod cutting;
 pub mod diagnosis;
 pub mod expert;
+pub mod fleet;
 mod lobe_model;
 mod lobe_structure;
 pub mod lobes;
@@ -18,6 +21,7 @@ pub mod planning;
 mod redundancy;
 pub mod regression_line;
 pub mod setup;
+mod shard;
 pub mod shape_comparison;
 pub mod stick_shapes;
 pub mod structure;
@@ -33,6 +37,7 @@ pub use lobes::{LobeAnalysis, LobeCase, LobesBefore};
 pub use modal::{ModalAnalysis, SetModes};
 pub use model_stages::ModelStage;
 pub use redundancy::{HoleWeighing, RedundancyAnalysis};
+pub use shard::Shard;
 pub use structure::StructureAnalysis;
 pub use sweep::{Sweep, SweepRequest, SweepRow};
 pub use thesis_findings::ThesisFindings;

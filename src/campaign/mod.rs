@@ -9,6 +9,7 @@ pub mod draft;
 pub mod frf_set;
 mod load;
 mod lobes_section;
+mod named_files;
 pub mod paths;
 pub mod robot_file;
 pub mod robot_spec;
@@ -17,6 +18,7 @@ mod section;
 pub mod suggest;
 
 pub use frf_set::{FrfSet, MeasuredDof, MeasuredFrf};
+pub use named_files::named_files;
 pub use schema::*;
 
 /// Key of an error that is about the reference to a robot file, not about the file.

@@ -9,6 +9,7 @@ use crate::Result;
 use crate::campaign::Campaign;
 
 mod add;
+mod batch;
 mod bench_worker;
 mod calibrate;
 mod cfc;
@@ -17,6 +18,7 @@ mod demo;
 mod diagnose;
 mod entrance;
 mod explain;
+mod fleet;
 mod history;
 mod hole;
 mod init;
@@ -102,6 +104,10 @@ Measure and cut
   lobes        Stability lobes                                   lobestone lobes cell7
   sweep        Limits and stiffness over the workspace           lobestone sweep cell7 --out map
 
+Many campaigns
+  batch        Calibrate and diagnose a list of campaigns        lobestone batch nights.csv --out results
+  fleet        Robots over time, the worst first                 lobestone fleet results
+
 Write and try out
   report       HTML and PNG report of a campaign                 lobestone report cell7
   simulate     A virtual lab with chosen (or random) physics     lobestone simulate lab --random 7
@@ -182,6 +188,10 @@ pub enum Command {
     Lobes(lobes::Args),
     /// A map of limits and stiffness over the workspace, in shards.
     Sweep(Box<sweep::Args>),
+    /// Calibrate and diagnose a list of campaigns, in shards.
+    Batch(batch::Args),
+    /// What a batch found, robot by robot over time: new verdicts, values that moved.
+    Fleet(fleet::Args),
     /// HTML and PNG report of a campaign.
     Report(report::Args),
     /// The campaign as a page in a browser: diagnose, add, undo, and watch the error fall.
@@ -280,6 +290,8 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Undo(args) => undo::run(args),
         Command::Lobes(args) => lobes::run(args),
         Command::Sweep(args) => sweep::run(*args),
+        Command::Batch(args) => batch::run(args),
+        Command::Fleet(args) => fleet::run(args),
         Command::Report(args) => report::run(args),
         Command::Serve(args) => serve::run(args, cli.json),
         Command::Simulate(args) => simulate::run(*args),

@@ -7,6 +7,8 @@ mod channels;
 pub mod document;
 pub mod draft;
 pub mod frf_set;
+mod json_schema;
+pub mod keys;
 mod load;
 mod lobes_section;
 mod named_files;
@@ -18,6 +20,7 @@ mod section;
 pub mod suggest;
 
 pub use frf_set::{FrfSet, MeasuredDof, MeasuredFrf};
+pub use json_schema::{SchemaOf, json_schema};
 pub use named_files::named_files;
 pub use schema::*;
 

@@ -35,6 +35,7 @@ mod plan;
 mod printed;
 mod range;
 mod report;
+mod schema;
 mod serve;
 mod shell;
 mod simulate;
@@ -112,6 +113,7 @@ Write and try out
   report       HTML and PNG report of a campaign                 lobestone report cell7
   simulate     A virtual lab with chosen (or random) physics     lobestone simulate lab --random 7
   thesis       The source thesis put right                       lobestone thesis
+  schema       The form of campaign.toml, for editors            lobestone schema campaign
   completions  Completions for your shell                        lobestone completions bash
   man          The manual page                                   lobestone man
 ";
@@ -202,6 +204,8 @@ pub enum Command {
     Thesis(thesis::Args),
     /// The whole story on built-in campaigns.
     Demo(demo::Args),
+    /// The form of campaign.toml or of a robot file as JSON Schema, for editors that complete and check.
+    Schema(schema::Args),
     /// A script that completes commands and options in your shell.
     Completions(shell::CompletionArgs),
     /// The manual page.
@@ -297,6 +301,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Simulate(args) => simulate::run(*args),
         Command::Thesis(args) => thesis::run(args),
         Command::Demo(args) => demo::run(args),
+        Command::Schema(args) => schema::run(args),
         Command::Completions(args) => shell::completions(args),
         Command::Man(args) => shell::man(args),
     }

@@ -289,6 +289,8 @@ fn the_json_reference_names_every_key() {
     commands.extend([
         vec!["batch", &list, "--out", &results, "--do", "calibrate"],
         vec!["fleet", &results],
+        vec!["schema", "campaign"],
+        vec!["schema", "robot"],
     ]);
     for command in &commands {
         assert_documented(command[0], &document(command));

@@ -193,7 +193,11 @@ mod tests {
         let vague = chart(&[&quiet[..], &[80.0]].concat(), Some(10.0));
         assert!(!vague.is_out(), "{vague:?}");
         assert_eq!(vague.limits.unwrap().basis, Basis::StandardErrors);
-        assert_relative_eq!(vague.change_sigmas.unwrap(), -20.9 / 200f64.sqrt(), epsilon = 1e-12);
+        assert_relative_eq!(
+            vague.change_sigmas.unwrap(),
+            -20.9 / 200f64.sqrt(),
+            epsilon = 1e-12
+        );
     }
 
     #[test]

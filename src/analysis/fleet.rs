@@ -140,13 +140,17 @@ impl Fleet {
             }
         }
         let has_side = |robot: &str| sides.iter().any(|(r, d)| r == robot && !d.is_empty());
-        let named: Vec<&(String, String)> =
-            sides.iter().filter(|(robot, domain)| !domain.is_empty() || !has_side(robot)).collect();
+        let named: Vec<&(String, String)> = sides
+            .iter()
+            .filter(|(robot, domain)| !domain.is_empty() || !has_side(robot))
+            .collect();
         let mut warnings = Vec::new();
         let mut robots: Vec<RobotHistory> = named
             .into_iter()
             .map(|(robot, domain)| {
-                let own = rows.iter().filter(|r| r.robot == *robot && (r.domain == *domain || r.domain.is_empty()));
+                let own = rows
+                    .iter()
+                    .filter(|r| r.robot == *robot && (r.domain == *domain || r.domain.is_empty()));
                 let mut own: Vec<&FleetRow> = own.collect();
                 warnings.extend(in_order(robot, &mut own));
                 history(robot, domain, &own)
@@ -179,14 +183,18 @@ fn in_order(robot: &str, rows: &mut [&FleetRow]) -> Option<String> {
             Some(date) => format!("the date {date:?} is not of the form 2026-11-23"),
             None => "it has no date".to_string(),
         };
-        format!("{robot} is in the order of the manifest: of {} {what}", odd.campaign)
+        format!(
+            "{robot} is in the order of the manifest: of {} {what}",
+            odd.campaign
+        )
     })
 }
 
 /// `2026-11-23`, and anything behind it that sorts as text.
 fn is_iso(date: &str) -> bool {
     let bytes = date.as_bytes();
-    let digits = |range: std::ops::Range<usize>| bytes.get(range).is_some_and(|b| b.iter().all(u8::is_ascii_digit));
+    let digits =
+        |range: std::ops::Range<usize>| bytes.get(range).is_some_and(|b| b.iter().all(u8::is_ascii_digit));
     digits(0..4)
         && digits(5..7)
         && digits(8..10)
@@ -224,7 +232,9 @@ fn history(robot: &str, domain: &str, rows: &[&FleetRow]) -> RobotHistory {
         reasons.push(reason);
     };
     if let Some(last) = last.filter(|_| new_verdict) {
-        let sure = last.confidence.map_or(String::new(), |c| format!(" ({:.0} %)", 100.0 * c));
+        let sure = last
+            .confidence
+            .map_or(String::new(), |c| format!(" ({:.0} %)", 100.0 * c));
         note(
             Attention::NewVerdict,
             match before {
@@ -249,7 +259,10 @@ fn history(robot: &str, domain: &str, rows: &[&FleetRow]) -> RobotHistory {
         }
         if let Some(setup) = &row.setup {
             let first = setup.lines().next().unwrap_or("");
-            note(Attention::Files, format!("a mistake of the setup is likely: {first}"));
+            note(
+                Attention::Files,
+                format!("a mistake of the setup is likely: {first}"),
+            );
         }
     }
     RobotHistory {
@@ -326,8 +339,11 @@ mod tests {
 
     fn nights(robot: &str, last: f64, verdicts: [&str; 2]) -> Vec<FleetRow> {
         let quiet = [100.0, 101.0, 99.5, 100.5, 99.0, 100.2, 100.9];
-        let mut rows: Vec<FleetRow> =
-            quiet.iter().enumerate().map(|(i, k)| row(robot, i + 1, *k, verdicts[0])).collect();
+        let mut rows: Vec<FleetRow> = quiet
+            .iter()
+            .enumerate()
+            .map(|(i, k)| row(robot, i + 1, *k, verdicts[0]))
+            .collect();
         rows.push(row(robot, 8, last, verdicts[1]));
         rows
     }
@@ -339,11 +355,16 @@ mod tests {
         rows.extend(nights("new", 100.0, ["none", "payload"]));
         rows.extend(nights("known", 100.0, ["payload", "payload"]));
         let mut broken = row("broken", 3, 0.0, "none");
-        (broken.error, broken.verdict, broken.quantities) = (Some("no such file\nremedy".into()), None, vec![]);
+        (broken.error, broken.verdict, broken.quantities) =
+            (Some("no such file\nremedy".into()), None, vec![]);
         rows.extend([row("broken", 1, 1.0, "none"), broken]);
         rows.reverse();
         let fleet = Fleet::new(rows);
-        let order: Vec<(&str, Attention)> = fleet.robots.iter().map(|r| (r.robot.as_str(), r.attention)).collect();
+        let order: Vec<(&str, Attention)> = fleet
+            .robots
+            .iter()
+            .map(|r| (r.robot.as_str(), r.attention))
+            .collect();
         assert_eq!(
             order,
             [
@@ -354,9 +375,15 @@ mod tests {
                 ("quiet", Attention::None),
             ]
         );
-        assert_eq!(fleet.robots[0].reasons, ["missing: payload (90 %), before nothing"]);
+        assert_eq!(
+            fleet.robots[0].reasons,
+            ["missing: payload (90 %), before nothing"]
+        );
         assert!(fleet.robots[1].reasons[0].starts_with("k is out of its limits (-"));
-        assert_eq!(fleet.robots[2].reasons, ["the last campaign failed: no such file"]);
+        assert_eq!(
+            fleet.robots[2].reasons,
+            ["the last campaign failed: no such file"]
+        );
         // The manifest named the newest first; dates count.
         assert_eq!(fleet.robots[1].last().unwrap().campaign, "moved/8");
         assert!(fleet.warnings.is_empty());
@@ -377,7 +404,11 @@ mod tests {
         rows[0].date = Some("23.11.2026".into());
         let fleet = Fleet::new(rows);
         assert_eq!(fleet.robots[0].last().unwrap().campaign, "r/1");
-        assert!(fleet.warnings[0].contains("not of the form"), "{:?}", fleet.warnings);
+        assert!(
+            fleet.warnings[0].contains("not of the form"),
+            "{:?}",
+            fleet.warnings
+        );
     }
 
     #[test]

@@ -67,7 +67,8 @@ impl Shard {
         let first = number("SLURM_ARRAY_TASK_MIN").unwrap_or(1);
         let step = number("SLURM_ARRAY_TASK_STEP").unwrap_or(1).max(1);
         let last = number("SLURM_ARRAY_TASK_MAX").unwrap_or(first + of.saturating_sub(1) * step);
-        let whole = task >= first && (task - first) % step == 0 && last == first + of.saturating_sub(1) * step;
+        let whole =
+            task >= first && (task - first) % step == 0 && last == first + of.saturating_sub(1) * step;
         let found = whole.then(|| (task - first) / step + 1);
         found
             .and_then(|number| format!("{number}/{of}").parse().ok())
@@ -117,7 +118,12 @@ mod tests {
         let name = shard.file_name("csv");
         assert_eq!(name, "shard-00003-of-00020.csv");
         assert_eq!(Shard::of_file_name(&name, "csv"), Some(shard));
-        for other in ["shard-00003-of-00020.parquet", "shard-3-of-20.csv", ".lobestone-x", "shard-00003-of-00002.csv"] {
+        for other in [
+            "shard-00003-of-00020.parquet",
+            "shard-3-of-20.csv",
+            ".lobestone-x",
+            "shard-00003-of-00002.csv",
+        ] {
             assert_eq!(Shard::of_file_name(other, "csv"), None, "{other}");
         }
     }
@@ -125,7 +131,8 @@ mod tests {
     #[test]
     fn a_job_array_of_slurm() {
         let read = |set: &[(&str, &str)]| {
-            let set: Vec<(String, String)> = set.iter().map(|(k, v)| (k.to_string(), v.to_string())).collect();
+            let set: Vec<(String, String)> =
+                set.iter().map(|(k, v)| (k.to_string(), v.to_string())).collect();
             Shard::of_slurm(move |name| set.iter().find(|(k, _)| k == name).map(|(_, v)| v.clone()))
         };
         let array = |id, count, min, max, step| {
@@ -137,15 +144,29 @@ mod tests {
                 ("SLURM_ARRAY_TASK_STEP", step),
             ])
         };
-        assert_eq!(array("3", "20", "1", "20", "1").unwrap(), Shard { number: 3, of: 20 });
-        assert_eq!(array("0", "4", "0", "3", "1").unwrap(), Shard { number: 1, of: 4 });
-        assert_eq!(array("5", "3", "1", "5", "2").unwrap(), Shard { number: 3, of: 3 });
+        assert_eq!(
+            array("3", "20", "1", "20", "1").unwrap(),
+            Shard { number: 3, of: 20 }
+        );
+        assert_eq!(
+            array("0", "4", "0", "3", "1").unwrap(),
+            Shard { number: 1, of: 4 }
+        );
+        assert_eq!(
+            array("5", "3", "1", "5", "2").unwrap(),
+            Shard { number: 3, of: 3 }
+        );
         assert_eq!(
             read(&[("SLURM_ARRAY_TASK_ID", "2"), ("SLURM_ARRAY_TASK_COUNT", "2")]).unwrap(),
             Shard { number: 2, of: 2 }
         );
         // --array=3,7: two tasks, and nobody knows of how many.
-        assert!(array("7", "2", "3", "7", "1").unwrap_err().to_string().contains("gaps"));
+        assert!(
+            array("7", "2", "3", "7", "1")
+                .unwrap_err()
+                .to_string()
+                .contains("gaps")
+        );
         assert!(read(&[]).unwrap_err().to_string().contains("no task of a Slurm"));
     }
 }

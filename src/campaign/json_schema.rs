@@ -37,7 +37,8 @@ fn table(keys: &[Key]) -> Map<String, Value> {
         properties.insert(key.name.into(), value.into());
     }
     let required: Vec<&str> = keys.iter().filter(|k| k.required).map(|k| k.name).collect();
-    let mut schema = object(json!({ "type": "object", "additionalProperties": false, "properties": properties }));
+    let mut schema =
+        object(json!({ "type": "object", "additionalProperties": false, "properties": properties }));
     // Draft 4 does not allow an empty list.
     if !required.is_empty() {
         schema.insert("required".into(), json!(required));
@@ -176,7 +177,11 @@ mod tests {
     #[test]
     fn the_full_campaign_uses_what_there_is_and_loads() {
         let (folder, campaign) = full();
-        assert!(complaint(folder.path(), &campaign).is_none(), "{:?}", complaint(folder.path(), &campaign));
+        assert!(
+            complaint(folder.path(), &campaign).is_none(),
+            "{:?}",
+            complaint(folder.path(), &campaign)
+        );
     }
 
     /// A text where a number should be and the other way round, a wrong word, a number beyond a bound: the loader refuses
@@ -198,11 +203,18 @@ mod tests {
             let name = path.join(".");
             let refused = |value: Toml| {
                 let shown = value.to_string();
-                try_with(Some(value)).unwrap_or_else(|| panic!("{name} = {shown} is not refused")).to_string()
+                try_with(Some(value))
+                    .unwrap_or_else(|| panic!("{name} = {shown} is not refused"))
+                    .to_string()
             };
             if key.required {
-                let message = try_with(None).unwrap_or_else(|| panic!("{name} is not missed")).to_string();
-                assert!(message.contains(key.name) && message.contains("missing") || message.contains("segment"), "{name}: {message}");
+                let message = try_with(None)
+                    .unwrap_or_else(|| panic!("{name} is not missed"))
+                    .to_string();
+                assert!(
+                    message.contains(key.name) && message.contains("missing") || message.contains("segment"),
+                    "{name}: {message}"
+                );
                 checked[0] += 1;
             }
             match key.holds {
@@ -210,18 +222,31 @@ mod tests {
                     let message = refused(Toml::String("qqqqqqqqqq".into()));
                     for word in words {
                         let of_other_process = ["frequency-domain", "z", "theta"].contains(word);
-                        assert!(of_other_process || message.contains(&format!("{word:?}")), "{name}: {message}");
+                        assert!(
+                            of_other_process || message.contains(&format!("{word:?}")),
+                            "{name}: {message}"
+                        );
                     }
                     checked[1] += 1;
                 }
                 Holds::Number(bounds) => {
-                    assert!(refused(Toml::String("x".into())).contains("must be a number"), "{name}");
+                    assert!(
+                        refused(Toml::String("x".into())).contains("must be a number"),
+                        "{name}"
+                    );
                     for (value, side) in bounds.ends().into_iter().zip([-1.0, 1.0]) {
                         let Some((end, is_open)) = value else { continue };
-                        let wrong = if is_open { end } else { end + side * (1.0 + end.abs()) };
+                        let wrong = if is_open {
+                            end
+                        } else {
+                            end + side * (1.0 + end.abs())
+                        };
                         let message = refused(Toml::Float(wrong));
                         let own = ["diameter_mm", "corner_radius_mm", "web_thickness_mm"].contains(&key.name);
-                        assert!(own || message.contains(&bounds.to_string()), "{name} = {wrong}: {message}");
+                        assert!(
+                            own || message.contains(&bounds.to_string()),
+                            "{name} = {wrong}: {message}"
+                        );
                         checked[2] += 1;
                     }
                 }
@@ -238,7 +263,10 @@ mod tests {
                 }
             }
         }
-        assert!(checked[0] > 30 && checked[1] >= 14 && checked[2] > 50, "{checked:?}");
+        assert!(
+            checked[0] > 30 && checked[1] >= 14 && checked[2] > 50,
+            "{checked:?}"
+        );
     }
 
     /// Takes away what would exclude a key, or would be missed first.
@@ -255,16 +283,25 @@ mod tests {
                 tool.remove("web_thickness_mm");
             }
             ["orthogonal", "shear_angle_deg"] => {
-                campaign["orthogonal"].as_table_mut().unwrap().remove("chip_ratio");
+                campaign["orthogonal"]
+                    .as_table_mut()
+                    .unwrap()
+                    .remove("chip_ratio");
             }
             ["lobes", "immersion"] => lobes(campaign, &["radial_ratio", "cut"]),
             ["lobes", "start_deg"] => {
                 lobes(campaign, &["radial_ratio", "cut"]);
-                campaign["lobes"].as_table_mut().unwrap().insert("exit_deg".into(), Toml::Float(90.0));
+                campaign["lobes"]
+                    .as_table_mut()
+                    .unwrap()
+                    .insert("exit_deg".into(), Toml::Float(90.0));
             }
             ["lobes", "exit_deg"] => {
                 lobes(campaign, &["radial_ratio", "cut"]);
-                campaign["lobes"].as_table_mut().unwrap().insert("start_deg".into(), Toml::Float(0.0));
+                campaign["lobes"]
+                    .as_table_mut()
+                    .unwrap()
+                    .insert("start_deg".into(), Toml::Float(0.0));
             }
             ["lobes", "mode", "extension_mm_per_rad"] => {
                 let lobes = campaign["lobes"].as_table_mut().unwrap();
@@ -274,7 +311,10 @@ mod tests {
                 mode.insert("axis".into(), Toml::String("theta".into()));
             }
             ["channel", "gain_n_per_unit"] => {
-                campaign["channel"].as_array_mut().unwrap()[1].as_table_mut().unwrap().remove("gain");
+                campaign["channel"].as_array_mut().unwrap()[1]
+                    .as_table_mut()
+                    .unwrap()
+                    .remove("gain");
             }
             _ => {}
         }
@@ -285,7 +325,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let load = |robot: &Table| {
             std::fs::write(folder.path().join("r.toml"), toml::to_string(robot).unwrap()).unwrap();
-            RobotSpec::load("r.toml", folder.path()).map(drop).map_err(|e| e.to_string())
+            RobotSpec::load("r.toml", folder.path())
+                .map(drop)
+                .map_err(|e| e.to_string())
         };
         let robot: Table = ROBOT.parse().unwrap();
         assert_eq!(load(&robot), Ok(()));
@@ -294,7 +336,10 @@ mod tests {
             let table = holder(&mut wrong, &path);
             table.insert(key.name.into(), Toml::Boolean(true));
             let message = load(&wrong).unwrap_err();
-            assert!(message.contains(key.name) && message.contains("must be"), "{path:?}: {message}");
+            assert!(
+                message.contains(key.name) && message.contains("must be"),
+                "{path:?}: {message}"
+            );
             if key.required {
                 let mut without = robot.clone();
                 holder(&mut without, &path).remove(key.name);
@@ -308,11 +353,19 @@ mod tests {
         let schema = json_schema(SchemaOf::Campaign);
         let ratio = &schema["properties"]["lobes"]["properties"]["radial_ratio"];
         assert_eq!(
-            (&ratio["minimum"], &ratio["exclusiveMinimum"], &ratio["maximum"], &ratio["exclusiveMaximum"]),
+            (
+                &ratio["minimum"],
+                &ratio["exclusiveMinimum"],
+                &ratio["maximum"],
+                &ratio["exclusiveMaximum"]
+            ),
             (&json!(0.0), &json!(true), &json!(1.0), &Value::Null)
         );
         assert_eq!(schema["required"], json!(["schema"]));
         assert!(schema["properties"]["plan"].get("required").is_none());
-        assert_eq!(schema["properties"]["cut"]["items"]["additionalProperties"], false);
+        assert_eq!(
+            schema["properties"]["cut"]["items"]["additionalProperties"],
+            false
+        );
     }
 }

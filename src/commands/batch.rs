@@ -33,7 +33,13 @@ pub struct Args {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// What is done with each, with commas between.
-    #[arg(long = "do", value_enum, value_delimiter = ',', default_value = "calibrate,diagnose", value_name = "STEPS")]
+    #[arg(
+        long = "do",
+        value_enum,
+        value_delimiter = ',',
+        default_value = "calibrate,diagnose",
+        value_name = "STEPS"
+    )]
     steps: Vec<Step>,
     /// Only this part of the list, such as 3/20: the third line and every twentieth after it; slurm: as the job array says.
     #[arg(long, value_name = "K/N")]
@@ -53,7 +59,10 @@ pub fn run(args: Args) -> Result<Outcome> {
     let steps = Steps::new(args.steps);
     let folder = BatchFolder::begin(&args.out)?;
     let begun = Instant::now();
-    let mine: Vec<&Entry> = shard.rows(manifest.entries.len()).map(|i| &manifest.entries[i]).collect();
+    let mine: Vec<&Entry> = shard
+        .rows(manifest.entries.len())
+        .map(|i| &manifest.entries[i])
+        .collect();
     let progress = Progress::new("campaigns", mine.len());
     let mut skipped = 0;
     let mut work: Vec<(&Entry, Record)> = Vec::new();

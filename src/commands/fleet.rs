@@ -12,10 +12,8 @@ use crate::report::batch_folder::{self, BatchFolder};
 use crate::report::fleet_page;
 
 #[derive(clap::Args)]
-#[command(
-    after_help = "Example:\n  lobestone fleet results\n\
-                  It writes fleet/report.html (with images beside it) and fleet/all.csv, the tables of all shards as one."
-)]
+#[command(after_help = "Example:\n  lobestone fleet results\n\
+                  It writes fleet/report.html (with images beside it) and fleet/all.csv, the tables of all shards as one.")]
 pub struct Args {
     /// The folder of `lobestone batch --out`.
     results: PathBuf,
@@ -35,15 +33,27 @@ pub fn run(args: Args) -> Result<Outcome> {
     let failed = rows.iter().filter(|r| r.error.is_some()).count();
     let counts = [rows.len(), failed];
     let fleet = Fleet::new(rows);
-    let missing: Vec<String> = shards.missing.iter().map(|s| format!("{}/{}", s.number, s.of)).collect();
+    let missing: Vec<String> = shards
+        .missing
+        .iter()
+        .map(|s| format!("{}/{}", s.number, s.of))
+        .collect();
     let mut remarks = fleet.warnings.clone();
     if !missing.is_empty() {
         let more = missing.len().saturating_sub(NAMED);
         let names = missing[..missing.len().min(NAMED)].join(", ");
-        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        let more = if more > 0 {
+            format!(" and {more} more")
+        } else {
+            String::new()
+        };
         remarks.insert(
             0,
-            format!("{} of {} shards are missing: {names}{more}", missing.len(), shards.of),
+            format!(
+                "{} of {} shards are missing: {names}{more}",
+                missing.len(),
+                shards.of
+            ),
         );
     }
     let folder = args.out.unwrap_or_else(|| args.results.join("fleet"));
@@ -96,7 +106,9 @@ fn overview(fleet: &Fleet) -> String {
             vec![
                 robot.robot.clone(),
                 robot.domain.clone(),
-                last.map_or(String::new(), |n| n.date.clone().unwrap_or_else(|| n.campaign.clone())),
+                last.map_or(String::new(), |n| {
+                    n.date.clone().unwrap_or_else(|| n.campaign.clone())
+                }),
                 verdict.map_or("–".into(), |v| v.words()),
                 last.and_then(|n| n.nrms).map_or("–".into(), percent),
                 last.and_then(|n| n.noise).map_or("–".into(), percent),
@@ -113,7 +125,16 @@ fn overview(fleet: &Fleet) -> String {
         })
         .collect();
     let mut text = table(
-        &["robot", "side", "last", "missing", "error", "noise", "farthest σ", "look at"],
+        &[
+            "robot",
+            "side",
+            "last",
+            "missing",
+            "error",
+            "noise",
+            "farthest σ",
+            "look at",
+        ],
         &rows,
     );
     let more = fleet.robots.len().saturating_sub(SHOWN);

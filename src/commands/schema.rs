@@ -5,11 +5,9 @@ use crate::campaign::{SchemaOf, json_schema};
 use crate::{Error, Result};
 
 #[derive(clap::Args)]
-#[command(
-    after_help = "Example:\n  lobestone schema campaign > campaign.schema.json\n\
+#[command(after_help = "Example:\n  lobestone schema campaign > campaign.schema.json\n\
                   and as the first line of campaign.toml, for editors with taplo (Even Better TOML):\n  \
-                  #:schema ../campaign.schema.json"
-)]
+                  #:schema ../campaign.schema.json")]
 pub struct Args {
     /// Of which file.
     #[arg(value_enum)]

@@ -32,16 +32,28 @@ impl BatchFolder {
             let folder = dir.join(part);
             std::fs::create_dir_all(&folder).map_err(|e| Error::io(&folder, e))?;
         }
-        Ok(BatchFolder { dir: dir.to_path_buf() })
+        Ok(BatchFolder {
+            dir: dir.to_path_buf(),
+        })
     }
 
     /// `campaigns/` and a name that a person recognises and no other campaign has.
     fn path(&self, campaign: &str) -> PathBuf {
         const LONGEST: usize = 60;
-        let plain = |c: char| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '-' };
+        let plain = |c: char| {
+            if c.is_ascii_alphanumeric() || "-_.".contains(c) {
+                c
+            } else {
+                '-'
+            }
+        };
         let tail: Vec<char> = campaign.chars().rev().take(LONGEST).collect();
         let name: String = tail.into_iter().rev().map(plain).collect();
-        let name = format!("{}-{}.json", name.trim_start_matches(['.', '-']), text_fingerprint(campaign));
+        let name = format!(
+            "{}-{}.json",
+            name.trim_start_matches(['.', '-']),
+            text_fingerprint(campaign)
+        );
         self.dir.join("campaigns").join(name)
     }
 
@@ -181,6 +193,9 @@ mod tests {
         std::fs::write(folder.path().join("shards/.lobestone-half"), "campaign").unwrap();
         let shards = BatchFolder::shards(folder.path()).unwrap();
         assert_eq!(shards.of, 3);
-        assert_eq!(shards.missing, [Shard { number: 1, of: 3 }, Shard { number: 2, of: 3 }]);
+        assert_eq!(
+            shards.missing,
+            [Shard { number: 1, of: 3 }, Shard { number: 2, of: 3 }]
+        );
     }
 }

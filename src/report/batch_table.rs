@@ -76,7 +76,11 @@ impl BatchTable {
                 said("robot", &record.robot),
                 said("date", &record.date),
             ];
-            head.extend(carried.clone().map(|c| manifest.cell(entry, c).unwrap_or_default().to_string()));
+            head.extend(
+                carried
+                    .clone()
+                    .map(|c| manifest.cell(entry, c).unwrap_or_default().to_string()),
+            );
             for side in &record.sides {
                 let results = RESULTS.iter().map(|column| cell(column, entry, record, side));
                 let found = quantities.iter().flat_map(|name| {
@@ -119,9 +123,20 @@ impl BatchTable {
         };
         let mut reader = csv::Reader::from_reader(bytes.as_slice());
         let not_csv = |e: csv::Error| broken(format!("not a CSV table: {e}"));
-        let columns: Vec<String> = reader.headers().map_err(not_csv)?.iter().map(str::to_string).collect();
-        if let Some(lacking) = FIRST.iter().chain(&RESULTS).find(|c| !columns.iter().any(|n| n == *c)) {
-            return Err(broken(format!("not a table of a batch: there is no column {lacking}")));
+        let columns: Vec<String> = reader
+            .headers()
+            .map_err(not_csv)?
+            .iter()
+            .map(str::to_string)
+            .collect();
+        if let Some(lacking) = FIRST
+            .iter()
+            .chain(&RESULTS)
+            .find(|c| !columns.iter().any(|n| n == *c))
+        {
+            return Err(broken(format!(
+                "not a table of a batch: there is no column {lacking}"
+            )));
         }
         let rows = reader
             .records()
@@ -175,12 +190,20 @@ impl BatchTable {
     /// Columns of the manifest besides the first three.
     fn carried(&self) -> impl Iterator<Item = &str> {
         let behind = self.index(RESULTS[0]).unwrap_or(0);
-        self.columns[..behind].iter().map(String::as_str).filter(|c| !FIRST.contains(c))
+        self.columns[..behind]
+            .iter()
+            .map(String::as_str)
+            .filter(|c| !FIRST.contains(c))
     }
 
     fn quantities(&self) -> impl Iterator<Item = &str> {
-        let last = self.index(RESULTS[RESULTS.len() - 1]).map_or(self.columns.len(), |i| i + 1);
-        self.columns[last..].iter().map(String::as_str).filter(|c| !c.ends_with(STD_ERROR))
+        let last = self
+            .index(RESULTS[RESULTS.len() - 1])
+            .map_or(self.columns.len(), |i| i + 1);
+        self.columns[last..]
+            .iter()
+            .map(String::as_str)
+            .filter(|c| !c.ends_with(STD_ERROR))
     }
 
     /// The rows as a fleet is made of. A campaign without a robot belongs to one of no name.
@@ -192,7 +215,11 @@ impl BatchTable {
         let of_row = |row: &Vec<String>| {
             let at = |i: Option<usize>| i.and_then(|i| row.get(i)).filter(|c| !c.is_empty());
             let text = |column: &str| at(self.index(column)).cloned();
-            let number = |i: Option<usize>| at(i).and_then(|c| c.parse::<f64>().ok()).filter(|v| v.is_finite());
+            let number = |i: Option<usize>| {
+                at(i)
+                    .and_then(|c| c.parse::<f64>().ok())
+                    .filter(|v| v.is_finite())
+            };
             let of = |column: &str| number(self.index(column));
             let failed = text("status").as_deref() == Some("failed");
             FleetRow {
@@ -213,7 +240,9 @@ impl BatchTable {
                 setup: text("setup"),
                 quantities: quantities
                     .iter()
-                    .filter_map(|(name, value, error)| Some((name.to_string(), number(*value)?, number(*error))))
+                    .filter_map(|(name, value, error)| {
+                        Some((name.to_string(), number(*value)?, number(*error)))
+                    })
                     .collect(),
             }
         };
@@ -248,7 +277,9 @@ fn cell(column: &str, entry: &Entry, record: &Record, side: &SideResult) -> Stri
 
 /// The shortest form that reads back the same; nothing for nothing.
 fn text(value: Option<f64>) -> String {
-    value.filter(|v| v.is_finite()).map_or(String::new(), |v| format!("{v:?}"))
+    value
+        .filter(|v| v.is_finite())
+        .map_or(String::new(), |v| format!("{v:?}"))
 }
 
 #[cfg(feature = "parquet")]
@@ -267,17 +298,23 @@ mod parquet {
             let failed = |e| Error::computation(format!("the table of a batch: {e}"));
             let mut frame = self.frame().map_err(failed)?;
             let mut bytes = Vec::new();
-            ParquetWriter::new(&mut bytes).finish(&mut frame).map_err(failed)?;
+            ParquetWriter::new(&mut bytes)
+                .finish(&mut frame)
+                .map_err(failed)?;
             Ok(bytes)
         }
 
         fn frame(&self) -> PolarsResult<DataFrame> {
             let behind = self.index(RESULTS[RESULTS.len() - 1]).unwrap_or(usize::MAX);
             let columns = self.columns.iter().enumerate().map(|(i, name)| {
-                let cells = self.rows.iter().map(|row| row.get(i).map(String::as_str).filter(|c| !c.is_empty()));
+                let cells = self
+                    .rows
+                    .iter()
+                    .map(|row| row.get(i).map(String::as_str).filter(|c| !c.is_empty()));
                 match i > behind || NUMBERS.contains(&name.as_str()) {
                     true => {
-                        let numbers: Vec<Option<f64>> = cells.map(|c| c.and_then(|c| c.parse().ok())).collect();
+                        let numbers: Vec<Option<f64>> =
+                            cells.map(|c| c.and_then(|c| c.parse().ok())).collect();
                         Column::new(name.as_str().into(), numbers)
                     }
                     false => Column::new(name.as_str().into(), cells.collect::<Vec<Option<&str>>>()),
@@ -296,7 +333,11 @@ mod tests {
     fn manifest() -> Manifest {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("m.csv");
-        std::fs::write(&file, "campaign,shift,robot\na,late,r1\nb,,\nc,\"x, \"\"y\"\"\",r2\n").unwrap();
+        std::fs::write(
+            &file,
+            "campaign,shift,robot\na,late,r1\nb,,\nc,\"x, \"\"y\"\"\",r2\n",
+        )
+        .unwrap();
         Manifest::read(&file, reserved()).unwrap()
     }
 
@@ -336,7 +377,11 @@ mod tests {
         let [a, b, c] = &manifest.entries[..] else {
             panic!("{manifest:?}");
         };
-        let records = [(a, record("a", "k.one")), (b, record("b", "k.two")), (c, record("c", "k.one"))];
+        let records = [
+            (a, record("a", "k.one")),
+            (b, record("b", "k.two")),
+            (c, record("c", "k.one")),
+        ];
         let whole = BatchTable::new(&manifest, &records);
         let first = BatchTable::new(&manifest, &[records[0].clone(), records[2].clone()]);
         let second = BatchTable::new(&manifest, &records[1..2]);
@@ -358,7 +403,10 @@ mod tests {
         let manifest = manifest();
         let b = &manifest.entries[1];
         let rows = BatchTable::new(&manifest, &[(b, record("b", "k.one"))]).fleet_rows();
-        assert_eq!((rows[0].robot.as_str(), rows[0].date.as_deref()), ("irb6640", Some("2026-11-01")));
+        assert_eq!(
+            (rows[0].robot.as_str(), rows[0].date.as_deref()),
+            ("irb6640", Some("2026-11-01"))
+        );
         assert_eq!((rows[0].nrms, rows[0].line), (Some(0.1 + 0.2), 3));
         assert_eq!(rows[0].quantities, [("k.one".to_string(), 1.5e9, None)]);
         assert_eq!(rows[0].error, None);

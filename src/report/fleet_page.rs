@@ -22,10 +22,17 @@ pub const ABOUT_LIMITS: &str = "Limits: individuals chart (Shewhart 1931; NIST/S
 /// The page; `rows` campaigns were read, of which `failed` could not be worked on.
 pub fn page(fleet: &Fleet, title: &str, [rows, failed]: [usize; 2], remarks: &[String]) -> Page {
     let made = revision::now().replace('T', " ").replace('Z', " UTC");
-    let origin = [("made", made), ("with Lobestone", env!("CARGO_PKG_VERSION").to_string())];
+    let origin = [
+        ("made", made),
+        ("with Lobestone", env!("CARGO_PKG_VERSION").to_string()),
+    ];
     let mut sections = vec![overview(fleet, remarks)];
     sections.extend(fleet.robots.iter().take(DRAWN).map(of_robot));
-    let asking = fleet.robots.iter().filter(|r| r.attention > Attention::Known).count();
+    let asking = fleet
+        .robots
+        .iter()
+        .filter(|r| r.attention > Attention::Known)
+        .count();
     Page {
         title: title.to_string(),
         subtitle: format!(
@@ -56,7 +63,9 @@ fn overview(fleet: &Fleet, remarks: &[String]) -> Section {
             robot.attention.name().to_string(),
             last.map_or(String::new(), when),
             verdict.map_or("–".into(), |v| v.words()),
-            verdict.and_then(|v| v.confidence).map_or("–".into(), |c| format!("{:.0} %", 100.0 * c)),
+            verdict
+                .and_then(|v| v.confidence)
+                .map_or("–".into(), |c| format!("{:.0} %", 100.0 * c)),
             share(|n| n.nrms),
             share(|n| n.noise),
             farthest(robot),
@@ -147,7 +156,8 @@ fn quantities(robot: &RobotHistory) -> Option<Block> {
             let sigmas = |s: Option<f64>| s.map_or("–".into(), |s| format!("{s:+.1}"));
             Some(vec![
                 chart.name.clone(),
-                last.std_error.map_or_else(|| significant(last.value, 4), |e| with_error(last.value, e)),
+                last.std_error
+                    .map_or_else(|| significant(last.value, 4), |e| with_error(last.value, e)),
                 limits.map_or("–".into(), |l| significant(l.lower, 4)),
                 limits.map_or("–".into(), |l| significant(l.upper, 4)),
                 sigmas(chart.last_sigmas),
@@ -156,7 +166,13 @@ fn quantities(robot: &RobotHistory) -> Option<Block> {
             ])
         })
         .collect();
-    let names = ["last value", "lower limit", "upper limit", "from the mean, σ", "since the one before, σ"];
+    let names = [
+        "last value",
+        "lower limit",
+        "upper limit",
+        "from the mean, σ",
+        "since the one before, σ",
+    ];
     let mut columns = vec![Column::text("quantity")];
     columns.extend(names.map(Column::number));
     columns.push(Column::text("σ from"));
@@ -195,7 +211,10 @@ fn campaigns(robot: &RobotHistory) -> Block {
     Block::Table(Table {
         columns: columns.into_iter().chain(numbers).collect(),
         rows: rows.collect(),
-        notes: (more > 0).then(|| format!("and {more} earlier ones")).into_iter().collect(),
+        notes: (more > 0)
+            .then(|| format!("and {more} earlier ones"))
+            .into_iter()
+            .collect(),
         ..Table::default()
     })
 }

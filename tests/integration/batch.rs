@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::support::{copy_folder, document, lobestone, blind, program};
+use crate::support::{blind, copy_folder, document, lobestone, program};
 
 /// Campaigns of two robots, small enough to be quick: FRFs, cuts, FRFs of which one file is missing, one that is no
 /// campaign at all.
@@ -75,7 +75,10 @@ fn every_campaign_is_a_row_and_broken_ones_say_why() {
     let before = ["frf", "cuts", "lost"].map(|c| contents(&nights.path(c)));
     let json = nights.run("results", &["--do", "calibrate,compare"]);
     // `--do` given twice is both; the last two campaigns cannot be read.
-    assert_eq!((&json["campaigns"], &json["failed"], &json["skipped"]), (&4.into(), &2.into(), &0.into()));
+    assert_eq!(
+        (&json["campaigns"], &json["failed"], &json["skipped"]),
+        (&4.into(), &2.into(), &0.into())
+    );
     assert_eq!(json["command"], "calibrate,compare");
     let after = ["frf", "cuts", "lost"].map(|c| contents(&nights.path(c)));
     assert!(before == after, "a campaign folder was changed");
@@ -84,16 +87,28 @@ fn every_campaign_is_a_row_and_broken_ones_say_why() {
     let cell = |campaign: &str, column: &str| rows[campaign].get(column).map_or("", String::as_str);
     let value = |campaign: &str, column: &str| cell(campaign, column).parse::<f64>().unwrap();
     assert_eq!([cell("frf", "status"), cell("cuts", "status")], ["done", "done"]);
-    assert_eq!([cell("lost", "status"), cell("nowhere", "status")], ["failed", "failed"]);
-    assert!(cell("lost", "error").contains("frf/p2.uff does not exist"), "{rows:?}");
+    assert_eq!(
+        [cell("lost", "status"), cell("nowhere", "status")],
+        ["failed", "failed"]
+    );
+    assert!(
+        cell("lost", "error").contains("frf/p2.uff does not exist"),
+        "{rows:?}"
+    );
     assert!(cell("nowhere", "error").contains("no such folder"), "{rows:?}");
     assert_eq!((cell("lost", "shift"), cell("lost", "nrms")), ("late, cold", ""));
-    assert_eq!((cell("frf", "robot"), cell("frf", "date"), cell("frf", "domain")), ("r1", "2026-11-01", "structure"));
+    assert_eq!(
+        (cell("frf", "robot"), cell("frf", "date"), cell("frf", "domain")),
+        ("r1", "2026-11-01", "structure")
+    );
 
     // The same numbers as the commands one by one.
     let same = |campaign: &str, column: &str, expected: &Value| {
         let expected = expected.as_f64().unwrap();
-        assert!((value(campaign, column) / expected - 1.0).abs() < 1e-9, "{column}: {rows:?}, {expected}");
+        assert!(
+            (value(campaign, column) / expected - 1.0).abs() < 1e-9,
+            "{column}: {rows:?}, {expected}"
+        );
     };
     let alone = document(&["calibrate", text(&nights.path("frf"))]);
     same("frf", "nrms", &alone["error"]["nrms"]);
@@ -104,8 +119,16 @@ fn every_campaign_is_a_row_and_broken_ones_say_why() {
         same("frf", &format!("{column}_std_error"), &p["std_error"]);
     }
     let alone = document(&["cfc", text(&nights.path("cuts"))]);
-    same("cuts", "ktc_n_per_mm2", &alone["pooled"][0]["ktc_n_per_mm2"]["value"]);
-    same("cuts", "kfc_n_per_mm2_std_error", &alone["pooled"][0]["kfc_n_per_mm2"]["std_error"]);
+    same(
+        "cuts",
+        "ktc_n_per_mm2",
+        &alone["pooled"][0]["ktc_n_per_mm2"]["value"],
+    );
+    same(
+        "cuts",
+        "kfc_n_per_mm2_std_error",
+        &alone["pooled"][0]["kfc_n_per_mm2"]["std_error"],
+    );
     let alone = document(&["compare", text(&nights.path("cuts"))]);
     same("cuts", "nrms", &alone["error"]["nrms"]);
     same("cuts", "held_out_nrms", &alone["error"]["held_out_nrms"]);
@@ -137,7 +160,11 @@ fn done_work_is_skipped_until_something_changes() {
     std::fs::write(result("frf-"), &whole[..whole.len() / 2]).unwrap();
     std::fs::write(kept.join(".lobestone-killed"), &whole[..7]).unwrap();
     let changed = nights.run("results", &[]);
-    assert_eq!((&changed["skipped"], &changed["failed"]), (&1.into(), &1.into()), "{changed}");
+    assert_eq!(
+        (&changed["skipped"], &changed["failed"]),
+        (&1.into(), &1.into()),
+        "{changed}"
+    );
     let (now, then) = (rows(&table), rows_of(&first));
     assert_eq!(now["frf"], then["frf"]);
     assert_eq!(now["lost"]["status"], "done");
@@ -160,18 +187,43 @@ fn shards_are_the_whole() {
     let nights = Nights::new();
     nights.run("whole", &[]);
     let first = nights.run("parts", &["--shard", "1/2"]);
-    assert_eq!((&first["shard"], &first["shards"], &first["campaigns"]), (&1.into(), &2.into(), &2.into()));
+    assert_eq!(
+        (&first["shard"], &first["shards"], &first["campaigns"]),
+        (&1.into(), &2.into(), &2.into())
+    );
     let half = document(&["fleet", text(&nights.path("parts"))]);
     assert_eq!(half["missing_shards"], serde_json::json!(["2/2"]));
-    assert!(half["warnings"][0].as_str().unwrap().contains("1 of 2 shards are missing: 2/2"));
+    assert!(
+        half["warnings"][0]
+            .as_str()
+            .unwrap()
+            .contains("1 of 2 shards are missing: 2/2")
+    );
 
     let (manifest, out) = (nights.path("nights.csv"), nights.path("parts"));
     let slurm = program()
-        .args(["batch", text(&manifest), "--out", text(&out), "--do", "calibrate", "--shard", "slurm"])
-        .envs([("SLURM_ARRAY_TASK_ID", "1"), ("SLURM_ARRAY_TASK_COUNT", "2"), ("SLURM_ARRAY_TASK_MIN", "0")])
+        .args([
+            "batch",
+            text(&manifest),
+            "--out",
+            text(&out),
+            "--do",
+            "calibrate",
+            "--shard",
+            "slurm",
+        ])
+        .envs([
+            ("SLURM_ARRAY_TASK_ID", "1"),
+            ("SLURM_ARRAY_TASK_COUNT", "2"),
+            ("SLURM_ARRAY_TASK_MIN", "0"),
+        ])
         .output()
         .unwrap();
-    assert!(slurm.status.success(), "{}", String::from_utf8_lossy(&slurm.stderr));
+    assert!(
+        slurm.status.success(),
+        "{}",
+        String::from_utf8_lossy(&slurm.stderr)
+    );
     for (name, missing) in [("parts", 0), ("whole", 0)] {
         let json = document(&["fleet", text(&nights.path(name))]);
         assert_eq!(json["missing_shards"].as_array().unwrap().len(), missing);
@@ -189,7 +241,11 @@ fn a_fleet_over_nights() {
     let shard = nights.path("results/shards/shard-00001-of-00001.csv");
     let mut reader = csv::Reader::from_path(&shard).unwrap();
     let names = reader.headers().unwrap().clone();
-    let quiet = reader.records().map(Result::unwrap).find(|r| &r[0] == "frf").unwrap();
+    let quiet = reader
+        .records()
+        .map(Result::unwrap)
+        .find(|r| &r[0] == "frf")
+        .unwrap();
     let column = |name: &str| names.iter().position(|n| n == name).unwrap();
     let stiffness = column("joint-2.stiffness_nm_per_rad");
     let mut writer = csv::Writer::from_path(&shard).unwrap();
@@ -210,20 +266,42 @@ fn a_fleet_over_nights() {
     writer.flush().unwrap();
     let json = document(&["fleet", text(&nights.path("results"))]);
     let robot = &json["robots"][0];
-    assert_eq!((&robot["robot"], &robot["attention"], &robot["new_verdict"]), (&"r1".into(), &"new-verdict".into(), &true.into()));
-    assert_eq!(robot["reasons"][0].as_str().unwrap().split(',').next().unwrap(), "missing: payload");
+    assert_eq!(
+        (&robot["robot"], &robot["attention"], &robot["new_verdict"]),
+        (&"r1".into(), &"new-verdict".into(), &true.into())
+    );
+    assert_eq!(
+        robot["reasons"][0].as_str().unwrap().split(',').next().unwrap(),
+        "missing: payload"
+    );
     let worst = &robot["parameters"][0];
     assert_eq!(worst["name"], "joint-2.stiffness_nm_per_rad");
     assert!(worst["last_sigmas"].as_f64().unwrap() < -3.0, "{worst}");
-    let outside: Vec<bool> = worst["points"].as_array().unwrap().iter().map(|p| p["outside"].as_bool().unwrap()).collect();
+    let outside: Vec<bool> = worst["points"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|p| p["outside"].as_bool().unwrap())
+        .collect();
     assert_eq!(outside, [[false; 7].as_slice(), &[true]].concat());
     let html = std::fs::read_to_string(json["html"].as_str().unwrap()).unwrap();
-    assert!(html.contains("joint-2.stiffness_nm_per_rad is out of its limits"), "no reason on the page");
+    assert!(
+        html.contains("joint-2.stiffness_nm_per_rad is out of its limits"),
+        "no reason on the page"
+    );
     for image in json["images"].as_array().unwrap() {
-        assert!(std::fs::read(image.as_str().unwrap()).unwrap().starts_with(b"\x89PNG"));
+        assert!(
+            std::fs::read(image.as_str().unwrap())
+                .unwrap()
+                .starts_with(b"\x89PNG")
+        );
     }
     let told = lobestone(&["fleet", text(&nights.path("results"))]);
-    assert!(told.stdout.contains("new verdict") && told.stdout.contains("missing: payload, before nothing"), "{}", told.stdout);
+    assert!(
+        told.stdout.contains("new verdict") && told.stdout.contains("missing: payload, before nothing"),
+        "{}",
+        told.stdout
+    );
 }
 
 #[test]
@@ -238,9 +316,15 @@ fn wrong_manifests_and_folders_are_told() {
     let message = refused(&["batch", text(&manifest), "--out", text(&out), "--shard", "5/4"]);
     assert!(message.contains("is no shard"), "{message}");
     let message = refused(&["fleet", text(&out)]);
-    assert!(message.contains("no shards of a batch") && message.contains("lobestone batch"), "{message}");
+    assert!(
+        message.contains("no shards of a batch") && message.contains("lobestone batch"),
+        "{message}"
+    );
     std::fs::write(&manifest, "campaign\nfrf\nfrf/\n").unwrap();
     let message = refused(&["batch", text(&manifest), "--out", text(&out)]);
-    assert!(message.contains("nights.csv:3: frf stands in line 2, too"), "{message}");
+    assert!(
+        message.contains("nights.csv:3: frf stands in line 2, too"),
+        "{message}"
+    );
     assert!(!out.exists(), "a folder for work that was refused");
 }

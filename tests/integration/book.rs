@@ -285,7 +285,11 @@ fn the_json_reference_names_every_key() {
         ]);
     }
     let (list, results) = (path("nights.csv"), path("results"));
-    std::fs::write(&list, "campaign,robot,date\nfrf,r1,2026-11-22\nnowhere,r1,2026-11-23\n").unwrap();
+    std::fs::write(
+        &list,
+        "campaign,robot,date\nfrf,r1,2026-11-22\nnowhere,r1,2026-11-23\n",
+    )
+    .unwrap();
     commands.extend([
         vec!["batch", &list, "--out", &results, "--do", "calibrate"],
         vec!["fleet", &results],

@@ -49,11 +49,19 @@ impl Manifest {
             .flexible(true)
             .from_reader(text.as_bytes());
         let refuse = |problem: String, line: usize, remedy: &str| -> Error {
-            InputError::new(problem).file(file).line(line).remedy(remedy).into()
+            InputError::new(problem)
+                .file(file)
+                .line(line)
+                .remedy(remedy)
+                .into()
         };
         let broken = |e: csv::Error| {
             let line = e.position().map_or(1, |p| p.line() as usize);
-            refuse(format!("not a CSV table: {e}"), line, "a line a campaign, commas between cells")
+            refuse(
+                format!("not a CSV table: {e}"),
+                line,
+                "a line a campaign, commas between cells",
+            )
         };
         let names: Vec<String> = reader
             .headers()
@@ -84,7 +92,11 @@ impl Manifest {
             }
             let campaign = plain(row.get(of_campaign).unwrap_or(""));
             if campaign.is_empty() {
-                return Err(refuse("no campaign in this line".into(), line, "give its folder, or take the line out"));
+                return Err(refuse(
+                    "no campaign in this line".into(),
+                    line,
+                    "give its folder, or take the line out",
+                ));
             }
             if let Some(first) = seen.insert(campaign.clone(), line) {
                 let problem = format!("{campaign} stands in line {first}, too");
@@ -99,7 +111,11 @@ impl Manifest {
             });
         }
         if entries.is_empty() {
-            return Err(refuse("names no campaign".into(), 1, "a line a campaign below the first"));
+            return Err(refuse(
+                "names no campaign".into(),
+                1,
+                "a line a campaign below the first",
+            ));
         }
         let mut columns = names;
         columns.remove(of_campaign);
@@ -113,17 +129,27 @@ impl Manifest {
     /// The cell of a column; `None` where there is no such column or nothing in it.
     pub fn cell<'a>(&self, entry: &'a Entry, column: &str) -> Option<&'a str> {
         let index = self.columns.iter().position(|c| c == column)?;
-        entry.cells.get(index).map(String::as_str).filter(|c| !c.is_empty())
+        entry
+            .cells
+            .get(index)
+            .map(String::as_str)
+            .filter(|c| !c.is_empty())
     }
 }
 
 fn check_names(names: &[String], reserved: &[&str]) -> std::result::Result<(), (String, &'static str)> {
     for (i, name) in names.iter().enumerate() {
         if name.is_empty() {
-            return Err((format!("column {} has no name", i + 1), "name every column in the first line"));
+            return Err((
+                format!("column {} has no name", i + 1),
+                "name every column in the first line",
+            ));
         }
         if names[..i].contains(name) {
-            return Err((format!("two columns are called {name}"), "give each column a name of its own"));
+            return Err((
+                format!("two columns are called {name}"),
+                "give each column a name of its own",
+            ));
         }
         if reserved.contains(&name.as_str()) {
             return Err((
@@ -161,7 +187,8 @@ mod tests {
 
     #[test]
     fn commas_semicolons_marks_and_paths() {
-        let manifest = read("\u{feff}Robot;Campaign;Shift\r\nr1;a\\b\\;late\r\n\r\nr2;./c/campaign.toml\r\n").unwrap();
+        let manifest =
+            read("\u{feff}Robot;Campaign;Shift\r\nr1;a\\b\\;late\r\n\r\nr2;./c/campaign.toml\r\n").unwrap();
         assert_eq!(manifest.columns, ["robot", "shift"]);
         let [first, second] = &manifest.entries[..] else {
             panic!("{manifest:?}");
@@ -183,7 +210,10 @@ mod tests {
             ("campaign,status\na,b\n", "would hide the result"),
             ("campaign,\na,b\n", "column 2 has no name"),
             ("campaign,robot\n,b\n", "nights.csv:2: no campaign"),
-            ("campaign,robot\na,b\n\nc,d\n./a/,b\n", "nights.csv:5: a stands in line 2, too"),
+            (
+                "campaign,robot\na,b\n\nc,d\n./a/,b\n",
+                "nights.csv:5: a stands in line 2, too",
+            ),
             ("campaign\na,b\n", "2 cells, but 1 columns"),
             ("campaign\n", "names no campaign"),
         ] {

@@ -195,7 +195,9 @@ fn side(domain: &str, found: Result<Findings>, begun: Instant) -> SideResult {
 fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|cause| {
         let text = cause.downcast_ref::<String>().map(String::as_str);
-        let text = text.or(cause.downcast_ref::<&str>().copied()).unwrap_or("no message");
+        let text = text
+            .or(cause.downcast_ref::<&str>().copied())
+            .unwrap_or("no message");
         Err(Error::computation(format!(
             "a fault of this program, please report it: {text}"
         )))
@@ -226,7 +228,10 @@ fn sides(campaign: &Campaign, steps: &Steps) -> Result<Vec<(&'static str, Work)>
             "add [[frf]] or [[cut]] tables",
         ),
         false => (
-            format!("nothing to work on: {} needs cuts, and there are FRFs only", steps.name()),
+            format!(
+                "nothing to work on: {} needs cuts, and there are FRFs only",
+                steps.name()
+            ),
             "ask for calibrate or diagnose as well",
         ),
     };
@@ -264,7 +269,11 @@ fn cutting(campaign: &Campaign, steps: &Steps) -> Result<Findings> {
     if steps.has(Step::Calibrate) || steps.has(Step::Cfc) {
         let result = identify_forces(campaign, CfcOptions::default())?;
         let several = result.pooled.len() > 1;
-        found.quantities = result.pooled.iter().flat_map(|g| coefficients(g, several)).collect();
+        found.quantities = result
+            .pooled
+            .iter()
+            .flat_map(|g| coefficients(g, several))
+            .collect();
     }
     if steps.has(Step::Diagnose) {
         let d = CuttingFindings::run(campaign)?;
@@ -322,7 +331,11 @@ fn quantity(estimate: &Estimate) -> Quantity {
 
 /// `joint-1.stiffness` in `N·m/rad` is `joint-1.stiffness_nm_per_rad`; names that say their unit stay.
 fn with_unit(name: &str, unit: &str) -> String {
-    let unit = unit.replace('·', "").replace('/', "_per_").replace('²', "2").to_lowercase();
+    let unit = unit
+        .replace('·', "")
+        .replace('/', "_per_")
+        .replace('²', "2")
+        .to_lowercase();
     let said = name.split('[').next().unwrap_or(name);
     match unit.is_empty() || unit == "1" || said.ends_with(&format!("_{unit}")) {
         true => name.to_string(),
@@ -357,8 +370,14 @@ mod tests {
 
     #[test]
     fn units_are_said_once() {
-        assert_eq!(with_unit("joint-1.stiffness", "N·m/rad"), "joint-1.stiffness_nm_per_rad");
-        assert_eq!(with_unit("joint-damping.c_nms_per_rad[0]", "N·m·s/rad"), "joint-damping.c_nms_per_rad[0]");
+        assert_eq!(
+            with_unit("joint-1.stiffness", "N·m/rad"),
+            "joint-1.stiffness_nm_per_rad"
+        );
+        assert_eq!(
+            with_unit("joint-damping.c_nms_per_rad[0]", "N·m·s/rad"),
+            "joint-damping.c_nms_per_rad[0]"
+        );
         assert_eq!(with_unit("payload.mass_kg", "kg"), "payload.mass_kg");
         assert_eq!(with_unit("damping_ratio", "1"), "damping_ratio");
     }
@@ -366,7 +385,10 @@ mod tests {
     #[test]
     fn a_panic_is_an_error_with_its_message() {
         let fault = guarded(|| -> Result<()> { panic!("index {} of 3", 7) }).unwrap_err();
-        assert!(fault.to_string().ends_with("please report it: index 7 of 3"), "{fault}");
+        assert!(
+            fault.to_string().ends_with("please report it: index 7 of 3"),
+            "{fault}"
+        );
         assert!(guarded(|| Ok(1)).is_ok());
     }
 

@@ -70,7 +70,10 @@ impl ControlChartFigure {
         if shown.len() > MOST_PANELS {
             return Err(nothing_to_draw(&self.title, "more panels than fit"));
         }
-        let y: Vec<Axis> = shown.iter().map(|(_, range)| Axis::padded("", *range, 0.12, 4)).collect();
+        let y: Vec<Axis> = shown
+            .iter()
+            .map(|(_, range)| Axis::padded("", *range, 0.12, 4))
+            .collect();
         let left = Panel::left_margin(&y.iter().collect::<Vec<_>>());
         let right = f64::from(WIDTH) - Panel::RIGHT_MARGIN;
         let every = (ROOM * self.names.len() as f64 / (right - left)).ceil().max(1.0) as usize;
@@ -78,15 +81,23 @@ impl ControlChartFigure {
             .names
             .iter()
             .enumerate()
-            .map(|(i, name)| match (self.names.len() - 1 - i).is_multiple_of(every) {
-                true => style::TICK.fit(name, ROOM),
-                false => String::new(),
-            })
+            .map(
+                |(i, name)| match (self.names.len() - 1 - i).is_multiple_of(every) {
+                    true => style::TICK.fit(name, ROOM),
+                    false => String::new(),
+                },
+            )
             .collect();
         let x = Axis::categories("", &labels);
         let legend = [
-            (Swatch::LineAndSign(LINE, Marker::Disc, SIGN), "value ± standard error".to_string()),
-            (Swatch::Sign(Marker::Square, SIGN + 2.0, style::RED), "outside".to_string()),
+            (
+                Swatch::LineAndSign(LINE, Marker::Disc, SIGN),
+                "value ± standard error".to_string(),
+            ),
+            (
+                Swatch::Sign(Marker::Square, SIGN + 2.0, style::RED),
+                "outside".to_string(),
+            ),
             (Swatch::Line(style::LEVEL), "mean of the earlier ones".to_string()),
             (Swatch::Line(LIMIT), "limits".to_string()),
         ];
@@ -113,9 +124,19 @@ impl ControlChartFigure {
                         panel.error_bar(canvas, i, (p.value - error, p.value + error), style::BLUE);
                     }
                 }
-                let points = |outside: bool| known().filter(move |(_, p)| p.outside == outside).map(|(i, p)| (i, p.value));
+                let points = |outside: bool| {
+                    known()
+                        .filter(move |(_, p)| p.outside == outside)
+                        .map(|(i, p)| (i, p.value))
+                };
                 panel.markers(canvas, points(false), (Marker::Disc, SIGN), style::BLUE, 0.0);
-                panel.markers(canvas, points(true), (Marker::Square, SIGN + 2.0), style::RED, 0.0);
+                panel.markers(
+                    canvas,
+                    points(true),
+                    (Marker::Square, SIGN + 2.0),
+                    style::RED,
+                    0.0,
+                );
                 let label = style::LEGEND.fit(&quantity.label, right - left);
                 canvas.text((left, panel.top - 12.0), &label, style::LEGEND);
                 panel.frame(canvas);

@@ -40,7 +40,11 @@ impl Manifest {
                 .file(file)
                 .remedy("save the table as CSV UTF-8")
         })?;
-        let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
+        // Line numbers would be one too low.
+        let text = text
+            .strip_prefix('\u{feff}')
+            .unwrap_or(&text)
+            .replace("\r\n", "\n");
         let head = text.lines().next().unwrap_or("");
         let delimiter = if head.contains(';') { b';' } else { b',' };
         let mut reader = csv::ReaderBuilder::new()

@@ -268,12 +268,7 @@ fn cutting(campaign: &Campaign, steps: &Steps) -> Result<Findings> {
     let mut found = Findings::default();
     if steps.has(Step::Calibrate) || steps.has(Step::Cfc) {
         let result = identify_forces(campaign, CfcOptions::default())?;
-        let several = result.pooled.len() > 1;
-        found.quantities = result
-            .pooled
-            .iter()
-            .flat_map(|g| coefficients(g, several))
-            .collect();
+        found.quantities = result.pooled.iter().flat_map(coefficients).collect();
     }
     if steps.has(Step::Diagnose) {
         let d = CuttingFindings::run(campaign)?;
@@ -343,16 +338,16 @@ fn with_unit(name: &str, unit: &str) -> String {
     }
 }
 
-/// The coefficients of a group over all speeds; with its process and material before the name where there are `several`.
-fn coefficients(group: &Group, several: bool) -> Vec<Quantity> {
+/// The coefficients of a group over all speeds. Their names say process and material, so that those of different ones are
+/// never on one chart: `milling.Ti-6Al-4V.ktc_n_per_mm2`.
+fn coefficients(group: &Group) -> Vec<Quantity> {
     let process = match group.process {
         Process::Milling => "milling",
         Process::Drilling => "drilling",
     };
-    let prefix = match (several, &group.material) {
-        (false, _) => String::new(),
-        (true, Some(material)) => format!("{process} {material}."),
-        (true, None) => format!("{process}."),
+    let prefix = match &group.material {
+        Some(material) => format!("{process}.{material}."),
+        None => format!("{process}."),
     };
     let of_group = group.coefficients.iter();
     of_group

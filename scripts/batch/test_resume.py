@@ -46,7 +46,7 @@ def make_campaigns(folder, source, count):
         toml = folder / name / "campaign.toml"
         toml.write_text(toml.read_text() + f"\n# night {i}\n")
         if i % 10 == 9:
-            min((folder / name / "frf").iterdir()).unlink()
+            min(p for p in (folder / name).rglob("*") if p.is_file() and p.suffix != ".toml").unlink()
         lines.append(f"{name},cell{i % 4},2026-11-{1 + i // 4:02d}")
     manifest = folder / "nights.csv"
     manifest.write_text("\n".join(lines) + "\n")

@@ -1,11 +1,14 @@
 //! Whole analyses of a campaign, as the commands and the report need them: each floor below called in its order.
 
 pub mod addition;
+pub mod batch;
 pub mod campaign;
 pub mod channel_check;
+pub mod control_chart;
 pub mod cutting;
 pub mod diagnosis;
 pub mod expert;
+pub mod fleet;
 pub mod freed_links;
 mod lobe_model;
 mod lobe_structure;
@@ -20,6 +23,7 @@ mod redundancy;
 pub mod regression_line;
 pub mod setup;
 pub mod shape_comparison;
+mod shard;
 pub mod stick_shapes;
 pub mod structure;
 pub mod sweep;
@@ -35,6 +39,7 @@ pub use lobes::{LobeAnalysis, LobeCase, LobesBefore};
 pub use modal::{ModalAnalysis, SetModes};
 pub use model_stages::ModelStage;
 pub use redundancy::{HoleWeighing, RedundancyAnalysis};
+pub use shard::Shard;
 pub use structure::StructureAnalysis;
 pub use sweep::{Sweep, SweepRequest, SweepRow};
 pub use thesis_findings::ThesisFindings;

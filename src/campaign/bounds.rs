@@ -44,6 +44,12 @@ impl Bounds {
         }
     }
 
+    /// The lower and the upper end, and whether it is open; `None` where there is none.
+    pub fn ends(&self) -> [Option<(f64, bool)>; 2] {
+        let end = |value: f64, is_open| value.is_finite().then_some((value, is_open));
+        [end(self.low, self.low_open), end(self.high, self.high_open)]
+    }
+
     /// False for NaN.
     pub fn contain(&self, x: f64) -> bool {
         let above = if self.low_open {

@@ -1,23 +1,11 @@
 //! `[[channel]]`: what the channels of force files are, where the files do not say it.
 
 use super::bounds::Bounds;
+use super::keys::{self, names};
 use super::schema::{Cut, CutChannel};
 use super::section::Section;
 use crate::Result;
 use crate::ingest::{ChannelRole, ChannelRule, Gain, Measures, Source, unit_of_charge_or_other};
-
-pub(super) const CHANNEL: [&str; 10] = [
-    "name",
-    "in_file",
-    "column",
-    "unit",
-    "gain",
-    "gain_n_per_unit",
-    "offset",
-    "sign",
-    "rate_hz",
-    "cut",
-];
 
 const NAMES: [(&str, Measures); 5] = [
     ("fx", Measures::Force(ChannelRole::ForceX)),
@@ -30,7 +18,7 @@ const NAMES: [(&str, Measures); 5] = [
 /// `cuts`: those that a channel may be limited to.
 pub(super) fn channels(top: &Section<'_>, cuts: &[Cut]) -> Result<Vec<CutChannel>> {
     let mut out: Vec<CutChannel> = Vec::new();
-    for section in top.sections("channel", &CHANNEL)? {
+    for section in top.sections("channel", &names(&keys::CHANNEL))? {
         let measures = section.required("name", section.choice("name", &NAMES)?, "\"fx\"")?;
         let name = section.text("name")?.unwrap_or_default();
         let cut = section.text("cut")?.map(str::to_string);

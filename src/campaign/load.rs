@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::bounds::Bounds;
 use super::document::{Document, Section};
+use super::keys::{self, FORM, names};
 use super::lobes_section;
 use super::robot_spec::RobotSpec;
 use super::schema::*;
@@ -13,50 +14,10 @@ use super::{ROBOT_KEY, campaign_file, paths};
 use crate::ingest::{Dof, Quantity};
 use crate::{Error, InputError, Result};
 
-const SCHEMA: &str = "lobestone/campaign/1";
-
-const TOP: [&str; 16] = [
-    "schema",
-    "name",
-    "operator",
-    "date",
-    "robot",
-    "posture",
-    "point",
-    "frf",
-    "tool",
-    "material",
-    "orthogonal",
-    "dynamometer",
-    "channel",
-    "cut",
-    "lobes",
-    "plan",
-];
-
+/// Keys of the top table.
+const TOP: [&str; 16] = names(&keys::TOP);
 /// Keys of `[[cut]]`.
-pub(super) const CUT: [&str; 20] = [
-    "id",
-    "file",
-    "process",
-    "spindle_rpm",
-    "feed_per_tooth_mm",
-    "axial_depth_mm",
-    "immersion",
-    "start_deg",
-    "exit_deg",
-    "feed_per_rev_mm",
-    "pilot_diameter_mm",
-    "hole_depth_mm",
-    "depth_of_cut_mm",
-    "diameter_mm",
-    "cutting_speed_m_per_min",
-    "order",
-    "steady_s",
-    "outcome",
-    "posture",
-    "material",
-];
+pub(super) const CUT: [&str; 20] = names(&keys::CUT);
 
 pub(super) const PROCESSES: [(&str, Process); 3] = [
     ("milling", Process::Milling),
@@ -113,7 +74,7 @@ fn no_campaign(dir: &Path, file: &Path) -> InputError {
             .remedy("give the campaign's folder: the one that holds campaign.toml");
     }
     error.remedy(format!(
-        "a campaign is a folder with a campaign.toml in it; start one with the line schema = {SCHEMA:?}"
+        "a campaign is a folder with a campaign.toml in it; start one with the line schema = {FORM:?}"
     ))
 }
 
@@ -131,7 +92,7 @@ fn read(dir: &Path, top: &Section<'_>, find: Find) -> Result<Campaign> {
     let tool = tool(top)?;
     let dynamometer = dynamometer(top)?;
     let lobes = lobes_section::read(top, &postures, robot.is_some(), !frfs.is_empty())?;
-    let material: Option<String> = match top.section("material", &["name"])? {
+    let material: Option<String> = match top.section("material", &names(&keys::MATERIAL))? {
         Some(material) => Some(
             material
                 .required("name", material.text("name")?, "\"Ti-6Al-4V\"")?
@@ -161,8 +122,8 @@ fn read(dir: &Path, top: &Section<'_>, find: Find) -> Result<Campaign> {
 }
 
 fn schema(top: &Section<'_>) -> Result<()> {
-    let schema = top.required("schema", top.text("schema")?, &format!("{SCHEMA:?}"))?;
-    if schema == SCHEMA {
+    let schema = top.required("schema", top.text("schema")?, &format!("{FORM:?}"))?;
+    if schema == FORM {
         return Ok(());
     }
     Err(top
@@ -170,7 +131,7 @@ fn schema(top: &Section<'_>) -> Result<()> {
             "schema",
             format!("{:?} is not a form this program reads", shown(schema)),
         )
-        .remedy(format!("write schema = {SCHEMA:?}"))
+        .remedy(format!("write schema = {FORM:?}"))
         .into())
 }
 
@@ -180,19 +141,9 @@ fn folder_name(dir: &Path) -> String {
         .map_or_else(|| "campaign".to_string(), |n| n.to_string_lossy().into_owned())
 }
 
-const ROBOT_KEYS: [&str; 7] = [
-    "model",
-    "stiffness_tolerance",
-    LinkGroup::Masses.key(),
-    LinkGroup::Inertias.key(),
-    LinkGroup::Centres.key(),
-    LinkGroup::Lengths.key(),
-    LinkGroup::Walls.key(),
-];
-
 /// The section and the robot itself: postures and points are checked against its joints.
 fn robot(dir: &Path, top: &Section<'_>) -> Result<Option<(RobotSection, RobotSpec)>> {
-    let Some(robot) = top.section("robot", &ROBOT_KEYS)? else {
+    let Some(robot) = top.section("robot", &names(&keys::ROBOT))? else {
         return Ok(None);
     };
     let model = robot.required("model", robot.text("model")?, "\"irb6640\"")?;
@@ -229,7 +180,7 @@ fn robot(dir: &Path, top: &Section<'_>) -> Result<Option<(RobotSection, RobotSpe
 
 fn postures(top: &Section<'_>, joints: Option<usize>) -> Result<Vec<Posture>> {
     let mut out: Vec<Posture> = Vec::new();
-    for section in top.sections("posture", &["id", "joints_deg"])? {
+    for section in top.sections("posture", &names(&keys::POSTURE))? {
         let id = section.required("id", section.text("id")?, "\"p1\"")?.to_string();
         if let Some(first) = out.iter().position(|p| p.id == id) {
             return Err(duplicate(&section, "id", &id, &format!("posture[{first}]")));
@@ -257,7 +208,7 @@ fn postures(top: &Section<'_>, joints: Option<usize>) -> Result<Vec<Posture>> {
 
 fn points(top: &Section<'_>, joints: Option<usize>) -> Result<Vec<Point>> {
     let mut out: Vec<Point> = Vec::new();
-    for section in top.sections("point", &["node", "body", "position_m", "axes"])? {
+    for section in top.sections("point", &names(&keys::POINT))? {
         let node = section.required("node", section.whole("node", i64::MIN, i64::MAX)?, "1")?;
         if let Some(first) = out.iter().position(|p| p.node == node) {
             return Err(duplicate(
@@ -314,7 +265,7 @@ fn frfs(dir: &Path, top: &Section<'_>, postures: &[Posture], find: Find) -> Resu
         ("acceleration", Quantity::Accelerance),
     ];
     let mut out = Vec::new();
-    for section in top.sections("frf", &["file", "posture", "quantity", "force_level_n"])? {
+    for section in top.sections("frf", &names(&keys::FRF))? {
         out.push(FrfFile {
             file: file((dir, find), &section, "\"frf/p1.uff\"")?,
             posture: posture_ref(&section, postures)?,
@@ -360,15 +311,7 @@ fn file((dir, find): (&Path, Find), section: &Section<'_>, example: &str) -> Res
 
 /// What is to be measured, where the files do not say.
 fn plan(top: &Section<'_>) -> Result<PlanSection> {
-    let keys = [
-        "responses",
-        "hits",
-        "band_hz",
-        "lines_hz",
-        "noise_relative",
-        "noise_floor_m_per_n",
-    ];
-    let Some(section) = top.section("plan", &keys)? else {
+    let Some(section) = top.section("plan", &names(&keys::PLAN))? else {
         return Ok(PlanSection::default());
     };
     let band_hz = section.array("band_hz", "[3.0, 90.0]")?;
@@ -406,15 +349,7 @@ fn dofs(section: &Section<'_>, key: &str) -> Result<Vec<Dof>> {
 }
 
 fn orthogonal(top: &Section<'_>) -> Result<Option<OrthogonalSection>> {
-    let keys = [
-        "shear_stress_mpa",
-        "friction_angle_deg",
-        "chip_ratio",
-        "shear_angle_deg",
-        "rake_deg",
-        "inclination_deg",
-    ];
-    let Some(section) = top.section("orthogonal", &keys)? else {
+    let Some(section) = top.section("orthogonal", &names(&keys::ORTHOGONAL))? else {
         return Ok(None);
     };
     let ratio = section.number("chip_ratio", Bounds::POSITIVE)?;
@@ -445,7 +380,7 @@ fn orthogonal(top: &Section<'_>) -> Result<Option<OrthogonalSection>> {
 fn dynamometer(top: &Section<'_>) -> Result<Dynamometer> {
     let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let key = "tool_from_dyno";
-    let Some(section) = top.section("dynamometer", &[key])? else {
+    let Some(section) = top.section("dynamometer", &names(&keys::DYNAMOMETER))? else {
         return Ok(Dynamometer {
             tool_from_dyno: identity,
         });

@@ -4,59 +4,16 @@ use std::f64::consts::PI;
 
 use super::bounds::Bounds;
 use super::document::Section;
+use super::keys::{self, names};
 use super::load::{PROCESSES, posture_ref};
 use super::schema::*;
 use crate::{Error, Result};
-
-const LOBES: [&str; 20] = [
-    "process",
-    "source",
-    "method",
-    "ktc_n_per_mm2",
-    "krc_n_per_mm2",
-    "kac_n_per_mm2",
-    "teeth",
-    "immersion",
-    "start_deg",
-    "exit_deg",
-    "radial_ratio",
-    "cut",
-    "process_damping_n_per_m",
-    "half_point_angle_deg",
-    "feed_per_rev_mm",
-    "spindle_rpm",
-    "mode",
-    "redundancy",
-    "hole",
-    "tool",
-];
-
-const SEGMENT: [&str; 9] = [
-    "length_mm",
-    "diameter_mm",
-    "bore_mm",
-    "flute_ratio",
-    "young_gpa",
-    "shear_gpa",
-    "density_kg_per_m3",
-    "loss_factor",
-    "twist_coupling",
-];
 
 /// E/G where only Young's modulus is given: Poisson's ratio 0.3.
 const YOUNG_OVER_SHEAR: f64 = 2.6;
 
 /// Loss factor of a clamped tool where none is given: about ζ = 1 %.
 const TOOL_LOSS_FACTOR: f64 = 0.02;
-
-const HOLE: [&str; 6] = [
-    "thrust_n",
-    "torque_nm",
-    "lateral_n",
-    "pilot_diameter_mm",
-    "position_tolerance_mm",
-    "perpendicularity_tolerance_deg",
-];
 
 /// More speeds than this are a slip in the step.
 const MOST_SPEEDS: f64 = 1e6;
@@ -68,7 +25,7 @@ pub(super) fn read(
     has_robot: bool,
     has_frfs: bool,
 ) -> Result<Option<LobesSection>> {
-    let Some(lobes) = top.section("lobes", &LOBES)? else {
+    let Some(lobes) = top.section("lobes", &names(&keys::LOBES))? else {
         return Ok(None);
     };
     let process = lobes.required(
@@ -78,15 +35,15 @@ pub(super) fn read(
     )?;
     let modes = modes(&lobes, process)?;
     let source = source(&lobes, has_robot, has_frfs, !modes.is_empty())?;
-    let redundancy = match lobes.section("redundancy", &["posture", "step_deg", "forbidden_deg"])? {
+    let redundancy = match lobes.section("redundancy", &names(&keys::REDUNDANCY))? {
         Some(section) => Some(redundancy(&section, postures)?),
         None => None,
     };
-    let hole = match lobes.section("hole", &HOLE)? {
+    let hole = match lobes.section("hole", &names(&keys::HOLE))? {
         Some(section) => Some(hole(&section)?),
         None => None,
     };
-    let tool = match lobes.section("tool", &["segment"])? {
+    let tool = match lobes.section("tool", &names(&keys::LOBE_TOOL))? {
         Some(section) => tool(&section)?,
         None => Vec::new(),
     };
@@ -188,15 +145,8 @@ fn modes(lobes: &Section<'_>, process: Process) -> Result<Vec<LobeMode>> {
         Process::Milling | Process::Turning => &axes[..2],
         Process::Drilling => &axes[..],
     };
-    let keys = [
-        "axis",
-        "frequency_hz",
-        "damping_ratio",
-        "stiffness_n_per_m",
-        "extension_mm_per_rad",
-    ];
     let mut out = Vec::new();
-    for mode in lobes.sections("mode", &keys)? {
+    for mode in lobes.sections("mode", &names(&keys::MODE))? {
         let number = |key: &str, bounds, example| mode.required(key, mode.number(key, bounds)?, example);
         let axis = mode.required("axis", mode.choice("axis", axes)?, "\"x\"")?;
         let extension = mode.number("extension_mm_per_rad", Bounds::ANY)?;
@@ -247,7 +197,7 @@ fn redundancy(section: &Section<'_>, postures: &[Posture]) -> Result<Redundancy>
 
 fn tool(section: &Section<'_>) -> Result<Vec<ToolSegment>> {
     let mut out = Vec::new();
-    for part in section.sections("segment", &SEGMENT)? {
+    for part in section.sections("segment", &names(&keys::SEGMENT))? {
         let needed = |key: &str, example| part.required(key, part.number(key, Bounds::POSITIVE)?, example);
         let diameter_mm = needed("diameter_mm", "12.0")?;
         let young_gpa = needed("young_gpa", "210.0")?;

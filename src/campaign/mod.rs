@@ -7,8 +7,11 @@ mod channels;
 pub mod document;
 pub mod draft;
 pub mod frf_set;
+mod json_schema;
+pub mod keys;
 mod load;
 mod lobes_section;
+mod named_files;
 pub mod paths;
 pub mod robot_file;
 pub mod robot_spec;
@@ -18,6 +21,8 @@ pub mod suggest;
 mod tool_and_cut;
 
 pub use frf_set::{FrfSet, MeasuredDof, MeasuredFrf};
+pub use json_schema::{SchemaOf, json_schema};
+pub use named_files::named_files;
 pub use schema::*;
 
 /// Key of an error that is about the reference to a robot file, not about the file.

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::bounds::Bounds;
 use super::document::{Document, Section};
+use super::keys::{self, names};
 use super::robot_spec::*;
 use super::suggest::closest;
 use super::{ROBOT_KEY, campaign_file, paths};
@@ -11,22 +12,6 @@ use crate::{InputError, Result};
 
 /// Built-in models: name and robot file.
 const BUILT_IN: [(&str, &str); 1] = [("irb6640", include_str!("../../datasets/irb6640/robot.toml"))];
-
-const JOINT: [&str; 6] = [
-    "d_m",
-    "a_m",
-    "alpha_deg",
-    "offset_deg",
-    "compliance_rad_per_nm",
-    "limits_deg",
-];
-const LINK: [&str; 5] = [
-    "mass_kg",
-    "inertia_kg_m2",
-    "com_m",
-    "section_outer_diameter_m",
-    "section_wall_m",
-];
 
 impl RobotSpec {
     /// Names of the built-in robots.
@@ -62,9 +47,9 @@ impl RobotSpec {
 }
 
 fn parse(document: &Document) -> Result<RobotSpec> {
-    document.parse(&["name", "joint", "link", "tool"], |top| {
+    document.parse(&names(&keys::ROBOT_FILE), |top| {
         let joints: Vec<JointSpec> = top
-            .sections("joint", &JOINT)?
+            .sections("joint", &names(&keys::JOINT))?
             .iter()
             .map(joint)
             .collect::<Result<_>>()?;
@@ -75,7 +60,7 @@ fn parse(document: &Document) -> Result<RobotSpec> {
                 .into());
         }
         let links: Vec<LinkSpec> = top
-            .sections("link", &LINK)?
+            .sections("link", &names(&keys::LINK))?
             .iter()
             .map(link)
             .collect::<Result<_>>()?;
@@ -159,7 +144,7 @@ fn section(link: &Section<'_>) -> Result<Option<BeamSection>> {
 }
 
 fn tool(top: &Section<'_>) -> Result<ToolFrame> {
-    let keys = ["tcp_in_flange_m", "tilt_about_flange_y_deg"];
+    let keys = names(&keys::TOOL_FRAME);
     let Some(tool) = top.section("tool", &keys)? else {
         return Ok(ToolFrame::default());
     };

@@ -2,6 +2,7 @@
 
 use super::bounds::Bounds;
 use super::document::Section;
+use super::keys::{self, names};
 use super::load::PROCESSES;
 use super::lobes_section::immersion;
 use super::schema::{CutGeometry, Process, Tool, ToolKind};
@@ -13,19 +14,7 @@ const OF_DRILLS: [&str; 2] = ["half_point_angle_deg", "web_thickness_mm"];
 const OF_TURNING: [&str; 2] = ["nose_radius_mm", "cutting_edge_angle_deg"];
 
 pub(super) fn tool(top: &Section<'_>) -> Result<Option<Tool>> {
-    let keys = [
-        "kind",
-        "diameter_mm",
-        "teeth",
-        "helix_deg",
-        "corner_radius_mm",
-        "lead_angle_deg",
-        "half_point_angle_deg",
-        "web_thickness_mm",
-        "nose_radius_mm",
-        "cutting_edge_angle_deg",
-    ];
-    let Some(tool) = top.section("tool", &keys)? else {
+    let Some(tool) = top.section("tool", &names(&keys::TOOL))? else {
         return Ok(None);
     };
     // A ball end is an end mill whose corner is as round as can be.

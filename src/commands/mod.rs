@@ -9,6 +9,7 @@ use crate::Result;
 use crate::campaign::Campaign;
 
 mod add;
+mod batch;
 mod bench_worker;
 mod calibrate;
 mod cfc;
@@ -17,6 +18,7 @@ mod demo;
 mod diagnose;
 mod entrance;
 mod explain;
+mod fleet;
 mod history;
 mod hole;
 mod init;
@@ -33,6 +35,7 @@ mod plan;
 mod printed;
 mod range;
 mod report;
+mod schema;
 mod serve;
 mod shell;
 mod simulate;
@@ -102,10 +105,15 @@ Measure and cut
   lobes        Stability lobes                                   lobestone lobes cell7
   sweep        Limits and stiffness over the workspace           lobestone sweep cell7 --out map
 
+Many campaigns
+  batch        Calibrate and diagnose a list of campaigns        lobestone batch nights.csv --out results
+  fleet        Robots over time, the worst first                 lobestone fleet results
+
 Write and try out
   report       HTML and PNG report of a campaign                 lobestone report cell7
   simulate     A virtual lab with chosen (or random) physics     lobestone simulate lab --random 7
   thesis       The source thesis put right                       lobestone thesis
+  schema       The form of campaign.toml, for editors            lobestone schema campaign
   completions  Completions for your shell                        lobestone completions bash
   man          The manual page                                   lobestone man
 ";
@@ -182,6 +190,10 @@ pub enum Command {
     Lobes(lobes::Args),
     /// A map of limits and stiffness over the workspace, in shards.
     Sweep(Box<sweep::Args>),
+    /// Calibrate and diagnose a list of campaigns, in shards.
+    Batch(batch::Args),
+    /// What a batch found, robot by robot over time: new verdicts, values that moved.
+    Fleet(fleet::Args),
     /// HTML and PNG report of a campaign.
     Report(report::Args),
     /// The campaign as a page in a browser: diagnose, add, undo, and watch the error fall.
@@ -192,6 +204,8 @@ pub enum Command {
     Thesis(thesis::Args),
     /// The whole story on built-in campaigns.
     Demo(demo::Args),
+    /// The form of campaign.toml or of a robot file as JSON Schema, for editors that complete and check.
+    Schema(schema::Args),
     /// A script that completes commands and options in your shell.
     Completions(shell::CompletionArgs),
     /// The manual page.
@@ -280,11 +294,14 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Undo(args) => undo::run(args),
         Command::Lobes(args) => lobes::run(args),
         Command::Sweep(args) => sweep::run(*args),
+        Command::Batch(args) => batch::run(args),
+        Command::Fleet(args) => fleet::run(args),
         Command::Report(args) => report::run(args),
         Command::Serve(args) => serve::run(args, cli.json),
         Command::Simulate(args) => simulate::run(*args),
         Command::Thesis(args) => thesis::run(args),
         Command::Demo(args) => demo::run(args),
+        Command::Schema(args) => schema::run(args),
         Command::Completions(args) => shell::completions(args),
         Command::Man(args) => shell::man(args),
     }

@@ -95,12 +95,12 @@ mod with_tables {
     use super::super::next_step::word;
     use super::super::text::{number, warnings};
     use super::*;
-    use crate::analysis::{Sweep, SweepRequest};
+    use crate::analysis::{Shard, Sweep, SweepRequest};
     use crate::campaign::Campaign;
     use crate::files::write_atomically;
     use crate::lobes::workspace::PlaceStatus;
     use crate::report::figure::CellFormat;
-    use crate::report::sweep_folder::{Shard, SweepFolder};
+    use crate::report::sweep_folder::SweepFolder;
     use crate::report::sweep_table::{columns, row};
     use crate::{Error, InputError};
 

@@ -4,11 +4,14 @@
 //! readable text, and [`page`] puts all of them into one HTML file that needs nothing beside itself. [`campaign`] says what stands on that page, one
 //! `*_section` a part; `tables` (feature `parquet`) writes the same numbers for other programs.
 
+pub mod batch_folder;
+pub mod batch_table;
 pub mod campaign;
 pub mod cutting_section;
 pub mod diagnosis_section;
 pub mod error_map_section;
 pub mod figure;
+pub mod fleet_page;
 pub mod history_section;
 mod hole_section;
 pub mod interactive;

@@ -4,16 +4,14 @@
 //! beside its name and renamed, so what has the name of a shard is a whole shard.
 
 use std::fs::File;
-use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 use polars::io::parquet::write::KeyValueMetadata;
 use polars::prelude::{DataFrame, ParquetReader, ParquetWriter, PolarsError, PolarsResult, SerReader};
 use serde_json::{Map, Value, json};
 
 use super::sweep_table::frame;
-use crate::analysis::SweepRow;
+use crate::analysis::{Shard, SweepRow};
 use crate::files::{write_atomically, write_new};
 use crate::{Error, InputError, Result};
 
@@ -21,40 +19,6 @@ use crate::{Error, InputError, Result};
 const SETTINGS: &str = "lobestone.sweep";
 /// Shards that are named where some are missing.
 const NAMED: usize = 12;
-
-/// Which part of a map: the `number`th (from 1) of `of` even stretches of places.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Shard {
-    pub number: usize,
-    pub of: usize,
-}
-
-impl FromStr for Shard {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        let whole = |part: &str| part.trim().parse::<usize>().ok();
-        let read = text.split_once('/').and_then(|(k, n)| whole(k).zip(whole(n)));
-        match read {
-            Some((number, of)) if number >= 1 && number <= of && of <= 99_999 => Ok(Shard { number, of }),
-            _ => Err(InputError::new(format!("{text:?} is no shard"))
-                .remedy("write NUMBER/HOW_MANY, the number from 1: --shard 3/20")
-                .into()),
-        }
-    }
-}
-
-impl Shard {
-    /// The places of this shard; shards differ by one place at most.
-    pub fn places(&self, count: usize) -> Range<usize> {
-        let edge = |i: usize| (count as u128 * i as u128 / self.of as u128) as usize;
-        edge(self.number - 1)..edge(self.number)
-    }
-
-    fn file_name(&self) -> String {
-        format!("shard-{:05}-of-{:05}.parquet", self.number, self.of)
-    }
-}
 
 /// The folder of one map: `sweep.json` (what it is), `shards/` and what they are merged into.
 pub struct SweepFolder {
@@ -134,7 +98,7 @@ impl SweepFolder {
     }
 
     pub fn path(&self, shard: Shard) -> PathBuf {
-        self.dir.join("shards").join(shard.file_name())
+        self.dir.join("shards").join(shard.file_name("parquet"))
     }
 
     /// Whether a shard is there and whole; one that cannot be read counts as not there.
@@ -328,20 +292,6 @@ mod tests {
             Some("joint-limit")
         );
         std::fs::read(path).unwrap()
-    }
-
-    #[test]
-    fn shards_cover_all_places_once() {
-        for (of, count) in [(1, 10), (3, 10), (10, 10), (7, 100)] {
-            let all: Vec<usize> = (1..=of)
-                .flat_map(|number| Shard { number, of }.places(count))
-                .collect();
-            assert_eq!(all, (0..count).collect::<Vec<_>>());
-        }
-        assert_eq!("3/20".parse::<Shard>().unwrap(), Shard { number: 3, of: 20 });
-        for slip in ["", "3", "0/2", "3/2", "a/b", "1/0", "-1/2"] {
-            assert!(slip.parse::<Shard>().is_err(), "{slip}");
-        }
     }
 
     #[test]

@@ -1,10 +1,11 @@
 //! Which data a revision was fitted to.
 
 use std::fmt::Debug;
+use std::io::Read;
 use std::path::Path;
 
-use super::Domain;
-use crate::campaign::{Campaign, LinkTolerances};
+use super::{Domain, log_file};
+use crate::campaign::{Campaign, LinkTolerances, campaign_file, named_files, paths};
 use crate::{Error, Result};
 
 /// FNV-1a, 64 bits (Fowler, Noll & Vo): notices a change; it need not resist anyone who wants to deceive himself.
@@ -35,6 +36,28 @@ impl Fnv {
         let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
         self.part(&bytes);
         Ok(())
+    }
+
+    /// A file of any size, or that it cannot be read.
+    fn file_or_absence(&mut self, path: &Path) {
+        let mut length = 0u64;
+        // A named pipe would make the reader wait for ever.
+        let file = crate::ingest::regular_file(path).and_then(|()| {
+            let mut file = std::fs::File::open(path).map_err(|e| Error::io(path, e))?;
+            let mut buffer = vec![0; 1 << 16];
+            loop {
+                let read = file.read(&mut buffer).map_err(|e| Error::io(path, e))?;
+                if read == 0 {
+                    return Ok(());
+                }
+                self.bytes(&buffer[..read]);
+                length += read as u64;
+            }
+        });
+        match file {
+            Ok(()) => self.value(&("there", length)),
+            Err(_) => self.part(b"absent"),
+        }
     }
 }
 
@@ -97,9 +120,69 @@ pub fn fingerprint(campaign: &Campaign, domain: Domain) -> Result<String> {
     }
 }
 
+/// Fingerprint of a campaign's folder as it lies on the disk, and of `options`: the text of `campaign.toml`, the revisions,
+/// and every file that it names, under its name. A campaign that cannot be loaded has one, too: a file that is not there
+/// counts as such, so that it makes a difference when it comes.
+pub fn folder_fingerprint(dir: &Path, options: &[&str]) -> String {
+    let mut hash = Fnv::new();
+    hash.value(&options);
+    let file = campaign_file(dir);
+    hash.file_or_absence(&file);
+    hash.file_or_absence(&log_file(dir));
+    let text = match crate::ingest::regular_file(&file) {
+        Ok(()) => std::fs::read_to_string(&file).unwrap_or_default(),
+        Err(_) => String::new(),
+    };
+    for name in named_files(&text) {
+        hash.part(name.as_bytes());
+        match paths::inside(dir, &name) {
+            Ok(path) => hash.file_or_absence(&path),
+            Err(_) => hash.part(b"absent"),
+        }
+    }
+    format!("{:016x}", hash.0)
+}
+
+/// FNV-1a of a text, 16 hexadecimal digits: a file name for whatever characters are in it.
+pub fn text_fingerprint(text: &str) -> String {
+    let mut hash = Fnv::new();
+    hash.bytes(text.as_bytes());
+    format!("{:016x}", hash.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_folder_has_another_fingerprint_when_a_file_comes_or_changes() {
+        let folder = tempfile::tempdir().unwrap();
+        let dir = folder.path();
+        let write = |name: &str, text: &str| std::fs::write(dir.join(name), text).unwrap();
+        let mut seen = vec![folder_fingerprint(dir, &["a"])];
+        let mut note = |what: &str, options: &[&str]| {
+            let now = folder_fingerprint(dir, options);
+            assert_eq!(now, folder_fingerprint(dir, options));
+            assert!(!seen.contains(&now), "{what}");
+            seen.push(now);
+        };
+        write("campaign.toml", "[[frf]]\nfile = 'p.uff'\n");
+        note("campaign.toml came", &["a"]);
+        note("other options", &["b"]);
+        write("p.uff", "1");
+        note("the file came", &["a"]);
+        write("p.uff", "2");
+        note("the file changed", &["a"]);
+        std::fs::create_dir(dir.join("lobestone")).unwrap();
+        std::fs::write(log_file(dir), "{}").unwrap();
+        note("a revision came", &["a"]);
+        write("other.uff", "1");
+        assert_eq!(
+            &folder_fingerprint(dir, &["a"]),
+            seen.last().unwrap(),
+            "a file that is not named"
+        );
+    }
 
     #[test]
     fn published_values() {

@@ -11,7 +11,9 @@ mod lock;
 mod log;
 
 pub use evidence::{Evidence, RecordedCandidate, keep, recall};
-pub use fingerprint::{cutting_fingerprint, fingerprint, structure_fingerprint};
+pub use fingerprint::{
+    cutting_fingerprint, fingerprint, folder_fingerprint, structure_fingerprint, text_fingerprint,
+};
 pub use lock::hold;
 pub use log::{RevisionLog, log_file};
 

@@ -284,6 +284,18 @@ fn the_json_reference_names_every_key() {
             vec!["sweep", "--merge", "--out", &map],
         ]);
     }
+    let (list, results) = (path("nights.csv"), path("results"));
+    std::fs::write(
+        &list,
+        "campaign,robot,date\nfrf,r1,2026-11-22\nnowhere,r1,2026-11-23\n",
+    )
+    .unwrap();
+    commands.extend([
+        vec!["batch", &list, "--out", &results, "--do", "calibrate"],
+        vec!["fleet", &results],
+        vec!["schema", "campaign"],
+        vec!["schema", "robot"],
+    ]);
     for command in &commands {
         assert_documented(command[0], &document(command));
     }

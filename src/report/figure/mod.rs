@@ -11,6 +11,7 @@ pub(in crate::report) mod style;
 
 mod coherence;
 mod compass;
+mod control_chart;
 mod drawn_curve;
 pub(in crate::report) mod force_record;
 mod frf;
@@ -37,6 +38,7 @@ mod tests;
 
 pub use coherence::{CoherenceCurve, CoherenceFigure};
 pub use compass::CompassFigure;
+pub use control_chart::{ControlChartFigure, ControlPanel, ControlPoint, MOST_PANELS};
 pub use drawn_curve::DrawnCurveFigure;
 pub use force_record::{ForceChannel, ForceRecord};
 pub(in crate::report) use frf::lowest_phase;

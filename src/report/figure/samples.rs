@@ -388,6 +388,36 @@ pub fn hole() -> HoleFigure {
     }
 }
 
+pub fn control_chart() -> ControlChartFigure {
+    let count = 24;
+    let panel = |label: &str, level: f64, step: f64| ControlPanel {
+        label: label.into(),
+        points: (0..count)
+            .map(|i| {
+                let last = i + 1 == count;
+                (i != 7).then(|| ControlPoint {
+                    value: level * (1.0 + 0.01 * jitter(i) - if last { step } else { 0.0 }),
+                    std_error: Some(0.004 * level),
+                    outside: last && step > 0.0,
+                })
+            })
+            .collect(),
+        limits: Some([level, 0.96 * level, 1.04 * level]),
+    };
+    ControlChartFigure {
+        title: "cell-7: what the campaigns say over time".into(),
+        names: (1..=count).map(|i| format!("2026-11-{i:02}")).collect(),
+        panels: vec![
+            panel("joint-2.stiffness_nm_per_rad", 1.6e6, 0.12),
+            panel("joint-1.stiffness_nm_per_rad", 2.1e6, 0.0),
+            ControlPanel {
+                limits: None,
+                ..panel("damping_ratio", 0.031, 0.0)
+            },
+        ],
+    }
+}
+
 pub fn gallery() -> Vec<(&'static str, Result<Vec<u8>, Error>)> {
     let linear = SideBySide {
         log: false,
@@ -412,6 +442,7 @@ pub fn gallery() -> Vec<(&'static str, Result<Vec<u8>, Error>)> {
         ("lobes_before_and_after", lobes_before_and_after().png()),
         ("side_by_side", side_by_side().png()),
         ("side_by_side_linear", linear.png()),
+        ("control_chart", control_chart().png()),
         ("history", history().png()),
         ("history_linear", flat_history.png()),
     ]

@@ -167,7 +167,24 @@ fn odd_points(xs: &[f64], ys: &[f64]) -> Vec<Result<Vec<u8>, Error>> {
         rows: rows.collect(),
         ..Default::default()
     };
-    vec![regression.png(), history.png(), parameters.png()]
+    let point = |(x, y): (f64, f64)| ControlPoint {
+        value: x,
+        std_error: Some(y),
+        outside: x > y,
+    };
+    let panel = |limits| ControlPanel {
+        label: LONG.into(),
+        points: pairs()
+            .map(|p| Some(p).filter(|(x, _)| *x != 2.0).map(point))
+            .collect(),
+        limits,
+    };
+    let control = ControlChartFigure {
+        title: LONG.into(),
+        names: vec![LONG.into(); pairs().count()],
+        panels: vec![panel(None), panel(Some([first(xs), first(ys), 1.0]))],
+    };
+    vec![regression.png(), history.png(), parameters.png(), control.png()]
 }
 
 #[test]

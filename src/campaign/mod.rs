@@ -11,6 +11,7 @@ mod load;
 mod lobes_section;
 pub mod paths;
 pub mod robot_file;
+pub mod robot_text;
 pub mod robot_spec;
 pub mod schema;
 mod section;

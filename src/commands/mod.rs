@@ -20,6 +20,7 @@ mod explain;
 mod history;
 mod hole;
 mod init;
+mod init_robot;
 mod inspect;
 mod lobe_tool;
 mod lobes;

@@ -197,14 +197,20 @@ pub(super) fn sweep(
         });
         let Some(found) = found else { continue };
         let rank = |(analysis, _): &Found| {
-            let keeps = analysis.hole.as_ref().is_none_or(|hole| !hole.no_angle_is_good_enough());
+            let keeps = analysis
+                .hole
+                .as_ref()
+                .is_none_or(|hole| !hole.no_angle_is_good_enough());
             (keeps, analysis.recommendation.point.depth_mm)
         };
         let is_better = match &best {
             None => true,
             Some((_, other)) => {
                 let ((keeps, depth), (other_keeps, other_depth)) = (rank(&found), rank(other));
-                keeps.cmp(&other_keeps).then(depth.total_cmp(&other_depth)).is_gt()
+                keeps
+                    .cmp(&other_keeps)
+                    .then(depth.total_cmp(&other_depth))
+                    .is_gt()
             }
         };
         if is_better {
@@ -230,7 +236,9 @@ fn elbow_angles(step_deg: Option<f64>) -> Vec<f64> {
         return vec![0.0];
     };
     let mut angles = vec![0.0];
-    let sides = (1..).map(|i| step_deg * f64::from(i)).take_while(|a| *a < 180.0 + 1e-9);
+    let sides = (1..)
+        .map(|i| step_deg * f64::from(i))
+        .take_while(|a| *a < 180.0 + 1e-9);
     for angle in sides {
         angles.push(angle);
         if angle < 180.0 - 1e-9 {

@@ -78,7 +78,10 @@ pub(super) fn read(
     )?;
     let modes = modes(&lobes, process)?;
     let source = source(&lobes, has_robot, has_frfs, !modes.is_empty())?;
-    let redundancy = match lobes.section("redundancy", &["posture", "step_deg", "forbidden_deg", "elbow_step_deg"])? {
+    let redundancy = match lobes.section(
+        "redundancy",
+        &["posture", "step_deg", "forbidden_deg", "elbow_step_deg"],
+    )? {
         Some(section) => Some(redundancy(&section, postures)?),
         None => None,
     };

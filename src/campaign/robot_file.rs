@@ -170,7 +170,12 @@ fn placement(joint: &Section<'_>) -> Result<Option<JointPlacement>> {
     };
     let rpy_deg: Option<[f64; 3]> = joint.array("origin_rpy_deg", "[roll, pitch, yaw]")?;
     Ok(Some(JointPlacement {
-        origin_m: needed(joint, "origin_m", joint.array("origin_m", "[x, y, z]")?, WHERE_GEOMETRY)?,
+        origin_m: needed(
+            joint,
+            "origin_m",
+            joint.array("origin_m", "[x, y, z]")?,
+            WHERE_GEOMETRY,
+        )?,
         rpy_rad: rpy_deg.unwrap_or_default().map(f64::to_radians),
         axis,
     }))
@@ -234,7 +239,9 @@ fn link(link: &Section<'_>) -> Result<LinkSpec> {
         name: link.text("name")?.map(str::to_string),
         mass_kg,
         inertia_kg_m2,
-        products_kg_m2: link.array("products_kg_m2", "[Ixy, Ixz, Iyz]")?.unwrap_or_default(),
+        products_kg_m2: link
+            .array("products_kg_m2", "[Ixy, Ixz, Iyz]")?
+            .unwrap_or_default(),
         com_m: link.array("com_m", "[x, y, z]")?,
         section: section(link)?,
     };
@@ -244,7 +251,9 @@ fn link(link: &Section<'_>) -> Result<LinkSpec> {
                 "products_kg_m2",
                 "with these products of inertia the moment about some axis is negative",
             )
-            .remedy("give the elements Ixy, Ixz, Iyz of the tensor about the centre of mass, as a URDF has them")
+            .remedy(
+                "give the elements Ixy, Ixz, Iyz of the tensor about the centre of mass, as a URDF has them",
+            )
             .into());
     }
     Ok(read)
@@ -273,7 +282,10 @@ fn tool(top: &Section<'_>) -> Result<ToolFrame> {
     let rpy_deg: Option<[f64; 3]> = tool.array(keys[2], "[roll, pitch, yaw]")?;
     if tilt_deg.is_some() && rpy_deg.is_some() {
         return Err(tool
-            .error(keys[2], format!("stands beside {}: the tool is turned twice", keys[1]))
+            .error(
+                keys[2],
+                format!("stands beside {}: the tool is turned twice", keys[1]),
+            )
             .remedy("keep one of the two")
             .into());
     }
@@ -372,7 +384,8 @@ mod tests {
                 "joint[0].origin_m: missing",
             ),
             (
-                "[[joint]]\norigin_m = [0, 1, 0]\naxis = [0, 0, 0]\ncompliance_rad_per_nm = 1e-6\n".to_string()
+                "[[joint]]\norigin_m = [0, 1, 0]\naxis = [0, 0, 0]\ncompliance_rad_per_nm = 1e-6\n"
+                    .to_string()
                     + link,
                 "joint[0].axis: has no length",
             ),

@@ -34,7 +34,11 @@ impl RobotSpec {
         }
         let _ = writeln!(text, "name = {}", quoted(&self.name));
         if !self.guesses.is_empty() {
-            let all: Vec<String> = self.guesses.iter().map(|g| format!("  {},\n", quoted(g))).collect();
+            let all: Vec<String> = self
+                .guesses
+                .iter()
+                .map(|g| format!("  {},\n", quoted(g)))
+                .collect();
             let _ = write!(
                 text,
                 "# Told wherever these values are used; take a sentence out when its values are known.\nguesses = [\n{}]\n",
@@ -93,7 +97,11 @@ impl RobotSpec {
             true => "  # a guess, see above",
             false => "",
         };
-        let _ = writeln!(text, "compliance_rad_per_nm = {:?}{mark}", joint.compliance_rad_per_nm);
+        let _ = writeln!(
+            text,
+            "compliance_rad_per_nm = {:?}{mark}",
+            joint.compliance_rad_per_nm
+        );
         if let Some(limits) = joint.limits_rad {
             let _ = writeln!(text, "limits_deg = {}", list(&limits.map(to_degrees)));
         }

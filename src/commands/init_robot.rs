@@ -31,7 +31,9 @@ impl MadeRobot {
     pub fn of(args: &Args) -> Result<Option<Self>> {
         let is_urdf = |name: &String| {
             let name = name.to_lowercase();
-            [".urdf", ".xacro", ".urdf.xml"].iter().any(|end| name.ends_with(end))
+            [".urdf", ".xacro", ".urdf.xml"]
+                .iter()
+                .any(|end| name.ends_with(end))
         };
         let Some(named) = args.robot.as_ref().filter(|name| is_urdf(name)) else {
             let flags = [
@@ -64,10 +66,13 @@ impl MadeRobot {
             })?;
         let size = std::fs::metadata(&urdf).map_err(|e| Error::io(&urdf, e))?.len();
         if size > LONGEST {
-            return Err(InputError::new(format!("is {} MB long, as no robot description is", size / 1_000_000))
-                .file(&urdf)
-                .remedy("give the URDF of a robot arm")
-                .into());
+            return Err(InputError::new(format!(
+                "is {} MB long, as no robot description is",
+                size / 1_000_000
+            ))
+            .file(&urdf)
+            .remedy("give the URDF of a robot arm")
+            .into());
         }
         let bytes = std::fs::read(&urdf).map_err(|e| Error::io(&urdf, e))?;
         let text = String::from_utf8(bytes).map_err(|_| {
@@ -81,8 +86,15 @@ impl MadeRobot {
             payload_kg: args.payload_kg,
         };
         let robot = read(&urdf, &text, &request)?;
-        let stem = urdf.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-        let stem = stem.split('.').next().filter(|s| !s.is_empty() && *s != "campaign").unwrap_or("robot");
+        let stem = urdf
+            .file_name()
+            .map(|n| n.to_string_lossy().into_owned())
+            .unwrap_or_default();
+        let stem = stem
+            .split('.')
+            .next()
+            .filter(|s| !s.is_empty() && *s != "campaign")
+            .unwrap_or("robot");
         let name = format!("{stem}.toml");
         Ok(Some(MadeRobot {
             robot,
@@ -99,7 +111,10 @@ impl MadeRobot {
     pub fn write(&self, replace: bool) -> Result<bool> {
         let mut notes = vec![format!(
             "Made by lobestone of {}.",
-            self.urdf.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
+            self.urdf
+                .file_name()
+                .map(|n| n.to_string_lossy().into_owned())
+                .unwrap_or_default()
         )];
         notes.extend(self.robot.notes.iter().cloned());
         notes.push(

@@ -192,12 +192,19 @@ fn elbows_text(found: &RedundancyAnalysis) -> String {
                 or_none(elbow.point.map(|p| format!("{:.4}", p.depth_mm))),
                 or_none(elbow.point.map(|p| format!("{:.1}", p.spindle_rpm))),
                 or_none(elbow.point.map(|p| format!("{:.1}°", p.angle_deg))),
-                if elbow.chosen { "chosen".into() } else { String::new() },
+                if elbow.chosen {
+                    "chosen".into()
+                } else {
+                    String::new()
+                },
             ]
         })
         .collect();
     let header = ["elbow turned by", "usable angles", "depth mm", "rpm", "angle", ""];
-    format!("\nElbow turned with the tool at rest\n{}", table(&header, &rows).trim_start_matches('\n'))
+    format!(
+        "\nElbow turned with the tool at rest\n{}",
+        table(&header, &rows).trim_start_matches('\n')
+    )
 }
 
 fn outcomes_text(outcomes: &Outcomes) -> String {

@@ -8,8 +8,8 @@ use super::text::{number, table, warnings};
 use super::{CampaignArg, Outcome};
 use crate::analysis::StructureAnalysis;
 use crate::campaign::Campaign;
-use crate::identify::case::structure_model;
 use crate::files::write_new;
+use crate::identify::case::structure_model;
 use crate::identify::{Options, StructureModel};
 use crate::robot::rigid::STANDARD_GRAVITY;
 use crate::robot::urdf::{self, Sources};
@@ -81,7 +81,12 @@ pub fn run(args: Args) -> Result<Outcome> {
     }
     if let Some(file) = &args.urdf {
         let files = write_urdf(file, &model, &sources)?;
-        text += &format!("\nwritten: {} and {} ({})\n", files[0].display(), files[1].display(), sources.source);
+        text += &format!(
+            "\nwritten: {} and {} ({})\n",
+            files[0].display(),
+            files[1].display(),
+            sources.source
+        );
         json["written"] = json!(files);
     }
     let next = Guide::structure(&campaign).modelled();

@@ -117,7 +117,9 @@ impl<'a> Workspace<'a> {
             .into_iter()
             .filter(|s| s.singularity_margin >= self.least_singularity_margin)
             .collect();
-        let own = usable.iter().position(|s| s.branch == self.reference.own_branch());
+        let own = usable
+            .iter()
+            .position(|s| s.branch == self.reference.own_branch());
         let farthest = || {
             let margins = usable.iter().enumerate().map(|(i, s)| (i, s.singularity_margin));
             // The first of equal ones.

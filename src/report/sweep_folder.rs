@@ -166,7 +166,11 @@ impl SweepFolder {
     pub fn write(&self, shard: Shard, rows: &[SweepRow]) -> Result<PathBuf> {
         let path = self.path(shard);
         let failed = |e| Error::computation(format!("{}: {e}", path.display()));
-        let joints = self.settings.get("joints_deg").and_then(Value::as_array).map_or(0, Vec::len);
+        let joints = self
+            .settings
+            .get("joints_deg")
+            .and_then(Value::as_array)
+            .map_or(0, Vec::len);
         let mut frame = frame(rows, joints).map_err(failed)?;
         write_atomically(&path, &self.bytes(&mut frame).map_err(failed)?)?;
         Ok(path)

@@ -28,7 +28,7 @@ pub use dh::Kinematics;
 pub use dual::Dual;
 pub use frf::{FrfBasis, ModalBasis};
 pub use inverse::{IkReference, IkSolution, InverseKinematics};
-pub use spherical_wrist::SphericalWrist;
 pub use model::{Baseline, RobotModel};
 pub use numeric_inverse::NumericInverse;
 pub use posture_report::PostureReport;
+pub use spherical_wrist::SphericalWrist;

@@ -57,7 +57,12 @@ impl<'a> NumericInverse<'a> {
     /// # Errors
     /// Fewer than six joints or more than seven, or an arm without length.
     pub fn new(spec: &'a RobotSpec) -> Result<Self> {
-        let refuse = |what: String| Err(Error::computation(format!("{}: no inverse kinematics: {what}", spec.name)));
+        let refuse = |what: String| {
+            Err(Error::computation(format!(
+                "{}: no inverse kinematics: {what}",
+                spec.name
+            )))
+        };
         let joints = spec.joints.len();
         if joints < 6 {
             return refuse(format!(
@@ -65,7 +70,9 @@ impl<'a> NumericInverse<'a> {
             ));
         }
         if joints > MOST {
-            return refuse(format!("{joints} joints are more than the seven that are handled"));
+            return refuse(format!(
+                "{joints} joints are more than the seven that are handled"
+            ));
         }
         let tool_m = Vector3::from(spec.tool.tcp_in_flange_m).norm();
         let reach_m = spec.joints.iter().map(|j| j.length_m()).sum::<f64>() + tool_m;
@@ -108,7 +115,12 @@ impl<'a> NumericInverse<'a> {
     /// All postures that a search finds at a tool pose, angles from −π to π, in the order in which they are found:
     /// `reference_rad` is the first start, the others are spread over the joints' ranges and the same every time. With
     /// seven joints those with the elbow at `elbow_rad`.
-    pub fn tool_pose(&self, tool: &Isometry3<f64>, reference_rad: &[f64], elbow_rad: Option<f64>) -> Vec<Vec<f64>> {
+    pub fn tool_pose(
+        &self,
+        tool: &Isometry3<f64>,
+        reference_rad: &[f64],
+        elbow_rad: Option<f64>,
+    ) -> Vec<Vec<f64>> {
         let first = Kinematics::new(self.spec, reference_rad).joint_origin(1);
         if (tool.translation.vector - first.coords).norm() > self.reach_m * (1.0 + 1e-9) {
             return Vec::new();
@@ -141,7 +153,12 @@ impl<'a> NumericInverse<'a> {
 
     /// The posture at a tool pose (and elbow angle) to which a motion straight there from the posture `from_rad` leads;
     /// `None` where it meets a singularity or the end of the reach.
-    pub fn follow(&self, tool: &Isometry3<f64>, from_rad: &[f64], elbow_rad: Option<f64>) -> Option<Vec<f64>> {
+    pub fn follow(
+        &self,
+        tool: &Isometry3<f64>,
+        from_rad: &[f64],
+        elbow_rad: Option<f64>,
+    ) -> Option<Vec<f64>> {
         let begin = Kinematics::new(self.spec, from_rad).tool;
         let away = (tool.translation.vector - begin.translation.vector).norm() / self.reach_m;
         // Half a turn has no shortest way; the solver would not know it either.
@@ -273,9 +290,7 @@ impl<'a> NumericInverse<'a> {
         for i in 1..=kinematics.joint_count() {
             let axis = kinematics.joint_axis(i);
             let motion = axis.cross(&(tcp - kinematics.joint_origin(i))) / self.reach_m;
-            jacobian
-                .fixed_view_mut::<3, 1>(0, i - 1)
-                .copy_from(&motion);
+            jacobian.fixed_view_mut::<3, 1>(0, i - 1).copy_from(&motion);
             jacobian.fixed_view_mut::<3, 1>(3, i - 1).copy_from(&axis);
         }
         jacobian
@@ -292,7 +307,11 @@ fn elbow_angle(points: &[Point3<f64>; 3]) -> Option<f64> {
     let line = (wrist - shoulder).try_normalize(1e-9)?;
     let across = |v: Vector3<f64>| v - line * line.dot(&v);
     // From x where the line stands upright.
-    let up = if line.z.abs() < 0.999_999 { Vector3::z() } else { Vector3::x() };
+    let up = if line.z.abs() < 0.999_999 {
+        Vector3::z()
+    } else {
+        Vector3::x()
+    };
     let zero = across(up).try_normalize(1e-9)?;
     let arm = across(elbow - shoulder);
     (arm.norm() > 1e-9).then(|| arm.dot(&line.cross(&zero)).atan2(arm.dot(&zero)))
@@ -315,7 +334,9 @@ fn elbow_slopes(kinematics: &Kinematics) -> Option<Equations> {
             slope[axis] = wrapped(shifted(STEP_M)? - shifted(-STEP_M)?) / (2.0 * STEP_M);
         }
         for i in 1..joint {
-            let motion = kinematics.joint_axis(i).cross(&(points[k] - kinematics.joint_origin(i)));
+            let motion = kinematics
+                .joint_axis(i)
+                .cross(&(points[k] - kinematics.joint_origin(i)));
             slopes[i - 1] += slope.dot(&motion);
         }
     }
@@ -383,7 +404,8 @@ mod tests {
                     assert!((back.translation.vector - tool.translation.vector).norm() < 1e-9);
                     assert!(back.rotation.angle_to(&tool.rotation) < 1e-9);
                 }
-                let dense = (1000..2600).filter_map(|n| numeric.solve(&tool, None, numeric.spread(n), ITERATIONS));
+                let dense =
+                    (1000..2600).filter_map(|n| numeric.solve(&tool, None, numeric.spread(n), ITERATIONS));
                 let dense: Vec<Vec<f64>> = dense.map(|q| q.into_iter().map(wrapped).collect()).collect();
                 assert_eq!(lacking(&dense, &found), 0, "{} pose {pose}: {q:?}", spec.name);
                 assert_eq!(lacking(&[q], &found), 0, "{} pose {pose}", spec.name);

@@ -65,7 +65,10 @@ mod tests {
             let above = energy(&shifted);
             shifted[i] -= 2e-5;
             let slope = (above - energy(&shifted)) / 2e-5;
-            assert!((torque - slope).abs() < 1e-7 * (1.0 + slope.abs()), "{torque} {slope}");
+            assert!(
+                (torque - slope).abs() < 1e-7 * (1.0 + slope.abs()),
+                "{torque} {slope}"
+            );
         }
     }
 }

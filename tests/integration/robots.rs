@@ -35,7 +35,9 @@ include!("robots_reference.in");
 fn campaign_on(robot: &str, postures: &[&[f64]]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let file = format!("{robot}.toml");
-    let known = Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/robots").join(&file);
+    let known = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("datasets/robots")
+        .join(&file);
     if known.is_file() {
         std::fs::copy(known, folder.path().join(&file)).unwrap();
     } else {
@@ -100,7 +102,10 @@ fn robots_are_those_of_pinocchio() {
         let said = document(&["model", text(folder.path()), "--urdf", text(&out)]);
         agrees_with(reference, &said);
         let told = said["warnings"].to_string();
-        assert!(told.contains("guessed in the robot file: joint compliances"), "{told}");
+        assert!(
+            told.contains("guessed in the robot file: joint compliances"),
+            "{told}"
+        );
         let beside = std::fs::read_to_string(folder.path().join("out.compliances.toml")).unwrap();
         assert_eq!(
             beside.matches("compliance_rad_per_nm").count(),
@@ -148,7 +153,10 @@ fn init_tells_what_it_made_of_a_urdf() {
         assert!(run.stdout.contains(words), "{words}: {}", run.stdout);
     }
     let file = std::fs::read_to_string(folder.path().join("seven.toml")).unwrap();
-    assert!(file.contains("compliance_rad_per_nm = 5e-5  # a guess, see above"), "{file}");
+    assert!(
+        file.contains("compliance_rad_per_nm = 5e-5  # a guess, see above"),
+        "{file}"
+    );
     assert!(file.contains("guesses = ["), "{file}");
     let again = lobestone(&arguments);
     assert_eq!(again.status, Some(1));
@@ -165,22 +173,85 @@ fn init_tells_what_it_made_of_a_urdf() {
 #[test]
 fn what_is_no_arm_is_refused_in_words() {
     let seven = std::fs::read_to_string(urdf("seven")).unwrap();
-    let slides = seven.replacen("name=\"j3\" type=\"revolute\"", "name=\"j3\" type=\"prismatic\"", 1);
-    let follows = seven.replacen("<axis xyz=\"0 0 1\"/>", "<axis xyz=\"0 0 1\"/><mimic joint=\"j2\"/>", 1);
+    let slides = seven.replacen(
+        "name=\"j3\" type=\"revolute\"",
+        "name=\"j3\" type=\"prismatic\"",
+        1,
+    );
+    let follows = seven.replacen(
+        "<axis xyz=\"0 0 1\"/>",
+        "<axis xyz=\"0 0 1\"/><mimic joint=\"j2\"/>",
+        1,
+    );
     let cases: [(&str, String, &[&str], &[&str]); 13] = [
-        ("slides.urdf", slides, &[], &["j3", "prismatic", "only joints that turn", "--base-link"]),
+        (
+            "slides.urdf",
+            slides,
+            &[],
+            &["j3", "prismatic", "only joints that turn", "--base-link"],
+        ),
         ("follows.urdf", follows, &[], &["j1", "follows j2", "--tool-link"]),
-        ("x.xacro", "<robot xmlns:xacro=\"x\"><xacro:arm/></robot>".into(), &[], &["is a xacro", "xacro FILE"]),
+        (
+            "x.xacro",
+            "<robot xmlns:xacro=\"x\"><xacro:arm/></robot>".into(),
+            &[],
+            &["is a xacro", "xacro FILE"],
+        ),
         ("none.urdf", "<robot name=\"x\"/>".into(), &[], &["no link"]),
-        ("broken.urdf", seven[..900].to_string(), &[], &["no URDF that can be read"]),
-        ("deep.urdf", "<a>".repeat(300), &[], &["nested more than 200 deep"]),
-        ("seven.urdf", seven.clone(), &["--tool-link", "hnd"], &["no link \"hnd\"", "a1"]),
-        ("seven.urdf", seven.clone(), &["--base-link", "a5", "--tool-link", "a2"], &["a2 does not hang on a5"]),
-        ("seven.urdf", seven.clone(), &["--base-link", "a7"], &["no joint turns between a7 and"]),
-        ("seven.urdf", seven.replace("mass value=\"3.4\"", "mass value=\"-3.4\""), &[], &["a4", "negative"]),
-        ("seven.urdf", seven.replace("xyz=\"0.083 0 0\"", "xyz=\"nan 0 0\""), &[], &["j4", "NaN"]),
-        ("seven.urdf", seven.replace("child link=\"a3\"", "child link=\"a1\""), &[], &["a1", "two joints carry"]),
-        ("seven.urdf", seven.replace("<mass value", "<mass weight"), &[], &["no URDF that can be read"]),
+        (
+            "broken.urdf",
+            seven[..900].to_string(),
+            &[],
+            &["no URDF that can be read"],
+        ),
+        (
+            "deep.urdf",
+            "<a>".repeat(300),
+            &[],
+            &["nested more than 200 deep"],
+        ),
+        (
+            "seven.urdf",
+            seven.clone(),
+            &["--tool-link", "hnd"],
+            &["no link \"hnd\"", "a1"],
+        ),
+        (
+            "seven.urdf",
+            seven.clone(),
+            &["--base-link", "a5", "--tool-link", "a2"],
+            &["a2 does not hang on a5"],
+        ),
+        (
+            "seven.urdf",
+            seven.clone(),
+            &["--base-link", "a7"],
+            &["no joint turns between a7 and"],
+        ),
+        (
+            "seven.urdf",
+            seven.replace("mass value=\"3.4\"", "mass value=\"-3.4\""),
+            &[],
+            &["a4", "negative"],
+        ),
+        (
+            "seven.urdf",
+            seven.replace("xyz=\"0.083 0 0\"", "xyz=\"nan 0 0\""),
+            &[],
+            &["j4", "NaN"],
+        ),
+        (
+            "seven.urdf",
+            seven.replace("child link=\"a3\"", "child link=\"a1\""),
+            &[],
+            &["a1", "two joints carry"],
+        ),
+        (
+            "seven.urdf",
+            seven.replace("<mass value", "<mass weight"),
+            &[],
+            &["no URDF that can be read"],
+        ),
     ];
     for (name, content, flags, words) in cases {
         let folder = tempfile::tempdir().unwrap();
@@ -192,7 +263,11 @@ fn what_is_no_arm_is_refused_in_words() {
         let run = lobestone(&[&["init", text(&dir), "--robot", text(&source)], flags].concat());
         assert_eq!(run.status, Some(1), "{name} {flags:?}: {}", run.stdout);
         for word in words {
-            assert!(run.stderr.contains(word), "{name} {flags:?}: {word}: {}", run.stderr);
+            assert!(
+                run.stderr.contains(word),
+                "{name} {flags:?}: {word}: {}",
+                run.stderr
+            );
         }
         assert_eq!(std::fs::read_dir(&dir).unwrap().count(), 0, "{name} {flags:?}");
     }
@@ -253,7 +328,9 @@ fn lobes_hole_and_sweep_run_on_both_arms() {
         let home = document(&["model", text(campaign_on(robot, &[posture]).path())]);
         for there in said["postures"].as_array().unwrap() {
             for key in ["tcp_m", "tool_axis"] {
-                let pairs = numbers(&there[key]).into_iter().zip(numbers(&home["postures"][0][key]));
+                let pairs = numbers(&there[key])
+                    .into_iter()
+                    .zip(numbers(&home["postures"][0][key]));
                 assert!(
                     pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-8),
                     "{robot} {key}: {there}"
@@ -288,7 +365,10 @@ fn lobes_hole_and_sweep_run_on_both_arms() {
         let map = Sweep::new(&campaign, &request).unwrap();
         let rows = map.rows(0..map.grid.place_count()).unwrap();
         assert_eq!(rows.len(), 16);
-        let reached: Vec<_> = rows.iter().filter(|r| r.status == PlaceStatus::Reachable).collect();
+        let reached: Vec<_> = rows
+            .iter()
+            .filter(|r| r.status == PlaceStatus::Reachable)
+            .collect();
         assert!(reached.len() >= 8, "{robot}: {}", reached.len());
         for row in reached {
             let there = row.findings.as_ref().unwrap();

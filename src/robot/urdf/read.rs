@@ -61,7 +61,9 @@ pub fn read(file: &Path, text: &str, request: &Request) -> Result<UrdfRobot> {
     let base = tree.base(request.base_link.as_deref())?;
     let (tool, why) = tree.tool(request.tool_link.as_deref(), base)?;
     let way = tree.way(Some(base), tool).unwrap_or_default();
-    let mut notes = vec![format!("base {base}, tool {tool} ({why}); its z axis is the tool axis")];
+    let mut notes = vec![format!(
+        "base {base}, tool {tool} ({why}); its z axis is the tool axis"
+    )];
     refuse_what_does_not_turn(&tree, &way, base, tool)?;
     let mut reader = Reader {
         tree: &tree,
@@ -84,7 +86,10 @@ pub fn read(file: &Path, text: &str, request: &Request) -> Result<UrdfRobot> {
         if from != base {
             spec.links.push(link_of(from, &segment.body));
         } else if segment.body.mass_kg > 0.0 {
-            let told = format!("{} kg stand still with {base} and are left out", segment.body.mass_kg);
+            let told = format!(
+                "{} kg stand still with {base} and are left out",
+                segment.body.mass_kg
+            );
             reader.notes.push(told);
         }
         match segment.next {
@@ -103,11 +108,13 @@ pub fn read(file: &Path, text: &str, request: &Request) -> Result<UrdfRobot> {
         }
     }
     if !(spec.links.iter().map(|link| link.mass_kg).sum::<f64>() > 0.0) {
-        return Err(InputError::new("no link that moves has any mass, so nothing can vibrate")
-            .file(file)
-            .key("inertial")
-            .remedy("add <inertial> with mass, centre of mass and inertia to the links of the URDF")
-            .into());
+        return Err(
+            InputError::new("no link that moves has any mass, so nothing can vibrate")
+                .file(file)
+                .key("inertial")
+                .remedy("add <inertial> with mass, centre of mass and inertia to the links of the URDF")
+                .into(),
+        );
     }
     guess::compliances(&mut spec, request.payload_kg);
     Ok(UrdfRobot {
@@ -119,9 +126,7 @@ pub fn read(file: &Path, text: &str, request: &Request) -> Result<UrdfRobot> {
 }
 
 fn can_be_parsed(file: &Path, text: &str) -> Result<()> {
-    let refuse = |problem: &str, remedy: &str| {
-        Err(InputError::new(problem).file(file).remedy(remedy).into())
-    };
+    let refuse = |problem: &str, remedy: &str| Err(InputError::new(problem).file(file).remedy(remedy).into());
     if text.contains("<xacro:") {
         return refuse(
             "is a xacro: a text that a URDF is made of",
@@ -157,20 +162,22 @@ fn can_be_parsed(file: &Path, text: &str) -> Result<()> {
 
 fn finite<'a>(file: &Path, key: &str, numbers: impl Iterator<Item = &'a f64>) -> Result<()> {
     match numbers.into_iter().find(|n| !(n.abs() < 1e9)) {
-        Some(number) => Err(
-            InputError::new(format!("holds {number}, which no robot has"))
-                .file(file)
-                .key(key)
-                .remedy("correct the number in the URDF (m, kg, rad)")
-                .into(),
-        ),
+        Some(number) => Err(InputError::new(format!("holds {number}, which no robot has"))
+            .file(file)
+            .key(key)
+            .remedy("correct the number in the URDF (m, kg, rad)")
+            .into()),
         None => Ok(()),
     }
 }
 
 fn refuse_what_does_not_turn(tree: &Tree<'_>, way: &[&Joint], base: &str, tool: &str) -> Result<()> {
     let refuse = |key: &str, problem: String, remedy: &str| {
-        Err(InputError::new(problem).file(tree.file).key(key).remedy(remedy).into())
+        Err(InputError::new(problem)
+            .file(tree.file)
+            .key(key)
+            .remedy(remedy)
+            .into())
     };
     for joint in way {
         if let Some(mimic) = &joint.mimic {
@@ -256,7 +263,8 @@ impl<'a> Reader<'a, '_> {
             }
         }
         if !lumped.is_empty() {
-            self.notes.push(format!("with {root} as one body: {}", lumped.join(", ")));
+            self.notes
+                .push(format!("with {root} as one body: {}", lumped.join(", ")));
         }
         Ok(Segment {
             body,
@@ -287,9 +295,7 @@ impl<'a> Reader<'a, '_> {
             kind(joint)
         ));
         Ok(match joint.joint_type {
-            JointType::Prismatic => {
-                Isometry3::from(Translation3::from(self.axis(joint)?.into_inner() * at))
-            }
+            JointType::Prismatic => Isometry3::from(Translation3::from(self.axis(joint)?.into_inner() * at)),
             _ if turns(joint) => {
                 let turn = UnitQuaternion::from_axis_angle(&self.axis(joint)?, at);
                 Isometry3::from_parts(Translation3::identity(), turn)
@@ -318,13 +324,16 @@ impl<'a> Reader<'a, '_> {
         let [low, high] = [joint.limit.lower, joint.limit.upper];
         let limits_rad = match joint.joint_type {
             JointType::Continuous => {
-                self.notes.push(format!("joint {} turns without end: no limits_deg", joint.name));
+                self.notes
+                    .push(format!("joint {} turns without end: no limits_deg", joint.name));
                 None
             }
             _ if low < high && low.is_finite() && high.is_finite() => Some([low, high]),
             _ => {
-                self.notes
-                    .push(format!("joint {} has no limits in the URDF: no limits_deg", joint.name));
+                self.notes.push(format!(
+                    "joint {} has no limits in the URDF: no limits_deg",
+                    joint.name
+                ));
                 None
             }
         };
@@ -344,9 +353,15 @@ impl<'a> Reader<'a, '_> {
     fn body(&mut self, link: &Link) -> Result<RigidBody> {
         let i = &link.inertial;
         let tensor = Matrix3::new(
-            i.inertia.ixx, i.inertia.ixy, i.inertia.ixz, //
-            i.inertia.ixy, i.inertia.iyy, i.inertia.iyz, //
-            i.inertia.ixz, i.inertia.iyz, i.inertia.izz,
+            i.inertia.ixx,
+            i.inertia.ixy,
+            i.inertia.ixz, //
+            i.inertia.ixy,
+            i.inertia.iyy,
+            i.inertia.iyz, //
+            i.inertia.ixz,
+            i.inertia.iyz,
+            i.inertia.izz,
         );
         let numbers = i.origin.xyz.iter().chain(&*i.origin.rpy);
         finite(
@@ -357,11 +372,13 @@ impl<'a> Reader<'a, '_> {
         let moments = tensor.symmetric_eigenvalues();
         let rounding = 1e-9 * tensor.norm();
         if i.mass.value < 0.0 || moments.min() < -rounding {
-            return Err(InputError::new("the link's mass or a moment of inertia is negative")
-                .file(self.tree.file)
-                .key(&link.name)
-                .remedy("correct <inertial> of the link: nothing real has that")
-                .into());
+            return Err(
+                InputError::new("the link's mass or a moment of inertia is negative")
+                    .file(self.tree.file)
+                    .key(&link.name)
+                    .remedy("correct <inertial> of the link: nothing real has that")
+                    .into(),
+            );
         }
         if 2.0 * moments.max() > moments.sum() + rounding.max(1e-6 * moments.sum()) {
             self.notes.push(format!(

@@ -205,10 +205,13 @@ impl<'a> Tree<'a> {
         };
         // The first of equals: `max_by_key` would take the last.
         let deepest = behind.iter().rev().max_by_key(|(_, way)| depth(way));
-        Ok(deepest.map_or((self.robot.links[0].name.as_str(), String::new()), |(link, way)| {
-            let why = format!("the farthest out, behind {} turning joints", depth(way).0);
-            (*link, why)
-        }))
+        Ok(deepest.map_or(
+            (self.robot.links[0].name.as_str(), String::new()),
+            |(link, way)| {
+                let why = format!("the farthest out, behind {} turning joints", depth(way).0);
+                (*link, why)
+            },
+        ))
     }
 }
 

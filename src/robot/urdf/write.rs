@@ -100,7 +100,11 @@ pub fn urdf(robot: &RobotModel, sources: &Sources) -> String {
         };
         let place = origin(&(behind * own));
         behind = behind_axis(joint);
-        let kind = if joint.limits_rad.is_some() { "revolute" } else { "continuous" };
+        let kind = if joint.limits_rad.is_some() {
+            "revolute"
+        } else {
+            "continuous"
+        };
         let _ = write!(
             text,
             "  <joint name=\"{name}\" type=\"{kind}\">\n    {place}\n    <parent link=\"{parent}\"/>\n    <child \

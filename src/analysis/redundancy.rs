@@ -1,6 +1,7 @@
 //! The lobes of a campaign over the redundancy angle, and what they recommend.
 
 use rayon::prelude::*;
+use serde::Serialize;
 
 use super::lobe_model::ModelState;
 use super::lobes::{BEST, LobeCase};
@@ -13,7 +14,7 @@ use crate::lobes::optimum::{
 use crate::lobes::redundancy::{AnglePosture, AngleStatus, Recommendation, RedundancySweep};
 use crate::lobes::setup::Cut;
 use crate::lobes::{AveragedCut, SpeedLimit};
-use crate::{Error, InputError, Result};
+use crate::{InputError, Result};
 
 /// b(n, θ) at one place.
 #[derive(Debug, Clone)]
@@ -25,6 +26,20 @@ pub struct RedundancyAnalysis {
     pub recommendation: Recommendation,
     /// How the hole's tolerances bore on the choice; `None` where the hole is not worked out.
     pub hole: Option<HoleWeighing>,
+    /// What turning the elbow of an arm with seven joints leads to; empty where it is not asked for.
+    pub elbows: Vec<ElbowChoice>,
+}
+
+/// The best place with the elbow turned by an angle; the recommended one is the deepest of all.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct ElbowChoice {
+    /// From the posture's own elbow, right-handed about the line from shoulder to wrist.
+    pub turned_deg: f64,
+    /// Redundancy angles that can be used.
+    pub usable_angles: usize,
+    /// `None` where no angle can be used.
+    pub point: Option<SurfacePoint>,
+    pub chosen: bool,
 }
 
 /// The tolerances of the hole weighed together with the depth limit.
@@ -138,11 +153,14 @@ impl LimitAtAngle for ModelSurface<'_> {
     }
 }
 
+type Found = (RedundancyAnalysis, Vec<LobeCase>);
+
 /// One case for each angle that can be used, and the recommendation: the deepest limit among the angles at which the hole
-/// keeps its tolerances, or among all where none does.
+/// keeps its tolerances, or among all where none does. With `elbow_step_deg` the same for each elbow angle, of which the
+/// best is kept: one at which the hole keeps its tolerances before one at which it does not, then the deeper limit.
 ///
 /// # Errors
-/// A method that is too slow for a surface, a robot without closed inverse kinematics, or no angle that can be used.
+/// A method that is too slow for a surface, a robot without inverse kinematics, or no angle that can be used.
 pub(super) fn sweep(
     campaign: &Campaign,
     section: &LobesSection,
@@ -151,7 +169,7 @@ pub(super) fn sweep(
     cut: AveragedCut,
     speeds: &[f64],
     check: Option<&HoleCheck>,
-) -> Result<(RedundancyAnalysis, Vec<LobeCase>)> {
+) -> Result<Found> {
     if !matches!(
         section.method,
         LobeMethod::ZeroOrder | LobeMethod::FrequencyDomain
@@ -167,12 +185,86 @@ pub(super) fn sweep(
         )
         .into());
     }
+    let mut elbows = Vec::new();
+    let mut best: Option<(usize, Found)> = None;
+    for turned_deg in elbow_angles(redundancy.elbow_step_deg) {
+        let found = at_elbow(campaign, redundancy, state, cut, speeds, check, turned_deg)?;
+        elbows.push(ElbowChoice {
+            turned_deg,
+            usable_angles: found.as_ref().map_or(0, |(_, cases)| cases.len()),
+            point: found.as_ref().map(|(analysis, _)| analysis.recommendation.point),
+            chosen: false,
+        });
+        let Some(found) = found else { continue };
+        let rank = |(analysis, _): &Found| {
+            let keeps = analysis
+                .hole
+                .as_ref()
+                .is_none_or(|hole| !hole.no_angle_is_good_enough());
+            (keeps, analysis.recommendation.point.depth_mm)
+        };
+        let is_better = match &best {
+            None => true,
+            Some((_, other)) => {
+                let ((keeps, depth), (other_keeps, other_depth)) = (rank(&found), rank(other));
+                keeps
+                    .cmp(&other_keeps)
+                    .then(depth.total_cmp(&other_depth))
+                    .is_gt()
+            }
+        };
+        if is_better {
+            best = Some((elbows.len() - 1, found));
+        }
+    }
+    let (chosen, mut found) = best.ok_or_else(|| {
+        InputError::new("no redundancy angle can be used: all are forbidden or out of reach")
+            .file(campaign.dir.join("campaign.toml"))
+            .key("lobes.redundancy")
+            .remedy("take out a forbidden band, or choose another posture")
+    })?;
+    if redundancy.elbow_step_deg.is_some() {
+        elbows[chosen].chosen = true;
+        found.0.elbows = elbows;
+    }
+    Ok(found)
+}
+
+/// Turns of the elbow to try, the posture's own first, then outwards on both sides.
+fn elbow_angles(step_deg: Option<f64>) -> Vec<f64> {
+    let Some(step_deg) = step_deg else {
+        return vec![0.0];
+    };
+    let mut angles = vec![0.0];
+    let sides = (1..)
+        .map(|i| step_deg * f64::from(i))
+        .take_while(|a| *a < 180.0 + 1e-9);
+    for angle in sides {
+        angles.push(angle);
+        if angle < 180.0 - 1e-9 {
+            angles.push(-angle);
+        }
+    }
+    angles
+}
+
+/// [`sweep`] with the elbow turned by an angle; `None` where no redundancy angle can be used then.
+fn at_elbow(
+    campaign: &Campaign,
+    redundancy: &Redundancy,
+    state: &ModelState,
+    cut: AveragedCut,
+    speeds: &[f64],
+    check: Option<&HoleCheck>,
+    elbow_deg: f64,
+) -> Result<Option<Found>> {
     let posture = &campaign.postures[redundancy.posture];
     let sweep = RedundancySweep::new(
         &state.current.model.robot,
         &posture.joints_deg,
         redundancy.step_deg,
         &redundancy.forbidden_deg,
+        elbow_deg,
     )?;
     let usable: Vec<&AnglePosture> = sweep
         .angles
@@ -182,7 +274,7 @@ pub(super) fn sweep(
     let cases = usable
         .par_iter()
         .map(|angle| {
-            let joints = angle.joints_deg.unwrap_or_default();
+            let joints = angle.joints_deg.clone().unwrap_or_default();
             let frf = state.blocks(&joints)?;
             let solver = cut.on(&frf);
             let curve = solver.curve(speeds);
@@ -243,14 +335,9 @@ pub(super) fn sweep(
         step_deg: redundancy.step_deg,
         rpm_range,
     };
-    let enumeration = search.by_enumeration().ok_or_else(|| {
-        Error::from(
-            InputError::new("no redundancy angle can be used: all are forbidden or out of reach")
-                .file(campaign.dir.join("campaign.toml"))
-                .key("lobes.redundancy")
-                .remedy("take out a forbidden band, or choose another posture"),
-        )
-    })?;
+    let Some(enumeration) = search.by_enumeration() else {
+        return Ok(None);
+    };
     let swarm = search.by_swarm()?;
     let by_depth_alone = || {
         let search = Search {
@@ -266,10 +353,11 @@ pub(super) fn sweep(
         enumeration
     };
     let there = sweep.between(point.angle_deg);
-    let frf = state.blocks(&there.joints_deg.unwrap_or_default())?;
+    let joints_there = there.joints_deg.clone().unwrap_or_default();
+    let frf = state.blocks(&joints_there)?;
     let solver = cut.on(&frf);
     let uncertain: Vec<f64> = state
-        .variants(&there.joints_deg.unwrap_or_default())?
+        .variants(&joints_there)?
         .iter()
         .map(|frf| margin_mm(&cut.on(frf), point.spindle_rpm))
         .collect();
@@ -288,10 +376,7 @@ pub(super) fn sweep(
     let hole = match check {
         Some(check) => Some(HoleWeighing {
             usable: holes.len(),
-            recommended: state.hole(
-                &recommendation.posture.joints_deg.unwrap_or_default(),
-                &check.load,
-            )?,
+            recommended: state.hole(&joints_there, &check.load)?,
             by_depth_alone: constrained.then(by_depth_alone).flatten(),
             out_of_tolerance_deg,
         }),
@@ -303,13 +388,21 @@ pub(super) fn sweep(
         angles: sweep.angles,
         recommendation,
         hole,
+        elbows: Vec::new(),
     };
-    Ok((analysis, cases))
+    Ok(Some((analysis, cases)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn elbows_are_tried_outwards() {
+        assert_eq!(elbow_angles(None), [0.0]);
+        assert_eq!(elbow_angles(Some(60.0)), [0.0, 60.0, -60.0, 120.0, -120.0, 180.0]);
+        assert_eq!(elbow_angles(Some(100.0)), [0.0, 100.0, -100.0]);
+    }
 
     #[test]
     fn neighbouring_angles_are_named_as_stretches() {

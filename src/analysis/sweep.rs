@@ -40,8 +40,8 @@ pub struct SweepRequest {
 /// What the model says of one place that can be used.
 #[derive(Debug, Clone, Serialize)]
 pub struct PlaceFindings {
-    pub joints_deg: [f64; 6],
-    /// Which of the eight solutions of the inverse kinematics: 4 shoulder + 2 elbow + wrist.
+    pub joints_deg: Vec<f64>,
+    /// Which of the solutions of the inverse kinematics, see [`IkSolution::branch`].
     pub ik_branch: u32,
     /// Distance of the nearest joint to its limit; `None` where the robot file gives no limits.
     pub limit_margin_deg: Option<f64>,
@@ -215,10 +215,9 @@ impl Sweep {
         let joints_deg = stand.joints_deg();
         let (blocks, report) = self.state.blocks_and_report(&joints_deg)?;
         let solver = self.cut.on(&blocks);
-        let branch = stand.branch;
         Ok(PlaceFindings {
             joints_deg,
-            ik_branch: 4 * u32::from(branch.shoulder) + 2 * u32::from(branch.elbow) + u32::from(branch.wrist),
+            ik_branch: stand.branch,
             limit_margin_deg: Some(stand.limit_margin_rad.max(0.0).to_degrees()).filter(|m| m.is_finite()),
             singularity_margin: stand.singularity_margin,
             absolute: solver.absolute_limit(),

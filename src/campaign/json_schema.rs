@@ -64,6 +64,7 @@ fn value(holds: Holds) -> Map<String, Value> {
             schema
         }
         Holds::Numbers => object(json!({ "type": "array", "items": { "type": "number" }, "minItems": 1 })),
+        Holds::Texts => object(json!({ "type": "array", "items": { "type": "string" } })),
         Holds::Array(count) => object(numbers(count)),
         Holds::Rows(columns, rows) => {
             let mut schema = object(json!({ "type": "array", "items": numbers(columns) }));
@@ -251,7 +252,7 @@ mod tests {
                     }
                 }
                 Holds::Whole(..) => assert!(refused(Toml::Float(1.5)).contains("whole number"), "{name}"),
-                Holds::Numbers | Holds::Array(_) | Holds::Rows(..) => {
+                Holds::Numbers | Holds::Texts | Holds::Array(_) | Holds::Rows(..) => {
                     assert!(refused(Toml::Float(1.5)).contains("must be a list"), "{name}");
                 }
                 Holds::Text | Holds::Form(_) => {

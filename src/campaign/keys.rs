@@ -28,6 +28,8 @@ pub enum Holds {
     Whole(i64, i64),
     /// Numbers, at least one.
     Numbers,
+    /// A list of texts.
+    Texts,
     /// So many numbers.
     Array(usize),
     /// Rows of so many numbers; how many rows, where that is fixed.
@@ -515,7 +517,7 @@ pub const MODE: [Key; 5] = [
     ),
 ];
 
-pub const REDUNDANCY: [Key; 3] = [
+pub const REDUNDANCY: [Key; 4] = [
     must("posture", Holds::Text, "Id of the [[posture]] whose tool is kept"),
     must(
         "step_deg",
@@ -526,6 +528,11 @@ pub const REDUNDANCY: [Key; 3] = [
         "forbidden_deg",
         Holds::Rows(2, None),
         "Angles that cannot be used, degrees: [[200.0, 240.0]]",
+    ),
+    may(
+        "elbow_step_deg",
+        Holds::Number(Bounds::closed(1.0, 180.0)),
+        "Step of the elbow's angle, degrees; arms of seven joints [it stays]",
     ),
 ];
 
@@ -622,8 +629,13 @@ pub const PLAN: [Key; 6] = [
 ];
 
 /// The top of a robot file.
-pub const ROBOT_FILE: [Key; 4] = [
+pub const ROBOT_FILE: [Key; 5] = [
     may("name", Holds::Text, "Name of the robot"),
+    may(
+        "guesses",
+        Holds::Texts,
+        "What in this file is nobody's measurement, a sentence each",
+    ),
     must("joint", Holds::Sections(&JOINT), "A revolute joint, base first"),
     must(
         "link",
@@ -633,15 +645,31 @@ pub const ROBOT_FILE: [Key; 4] = [
     may("tool", Holds::Section(&TOOL_FRAME), "The tool centre point"),
 ];
 
-pub const JOINT: [Key; 6] = [
-    must(
+pub const JOINT: [Key; 10] = [
+    may("name", Holds::Text, "Name of the joint"),
+    may(
         "d_m",
         ANY,
         "Denavit-Hartenberg (standard, distal): offset along z, m",
     ),
-    must("a_m", ANY, "Length along x, m"),
-    must("alpha_deg", ANY, "Twist about x, degrees"),
+    may("a_m", ANY, "Length along x, m"),
+    may("alpha_deg", ANY, "Twist about x, degrees"),
     may("offset_deg", ANY, "Added to the joint's angle, degrees [0]"),
+    may(
+        "origin_m",
+        Holds::Array(3),
+        "Instead of d, a and alpha: where the joint stands in the frame before it, m",
+    ),
+    may(
+        "origin_rpy_deg",
+        Holds::Array(3),
+        "How its frame is turned there: roll, pitch, yaw, degrees [0, 0, 0]",
+    ),
+    may(
+        "axis",
+        Holds::Array(3),
+        "What it turns about, in its own frame [0, 0, 1]",
+    ),
     must(
         "compliance_rad_per_nm",
         Holds::Number(Bounds::closed(1e-30, 1e30)),
@@ -654,12 +682,18 @@ pub const JOINT: [Key; 6] = [
     ),
 ];
 
-pub const LINK: [Key; 5] = [
+pub const LINK: [Key; 7] = [
+    may("name", Holds::Text, "Name of the link"),
     must("mass_kg", NOT_NEGATIVE, "Mass, kg"),
     must(
         "inertia_kg_m2",
         Holds::Array(3),
-        "Principal moments about the centre of mass, axes along the link's frame, kg m²",
+        "Moments Ixx, Iyy, Izz about the centre of mass, axes along the link's frame, kg m²",
+    ),
+    may(
+        "products_kg_m2",
+        Holds::Array(3),
+        "Elements Ixy, Ixz, Iyz of the same tensor, kg m² [0, 0, 0]",
     ),
     may(
         "com_m",
@@ -674,7 +708,7 @@ pub const LINK: [Key; 5] = [
     may("section_wall_m", POSITIVE, "Wall of that tube, m"),
 ];
 
-pub const TOOL_FRAME: [Key; 2] = [
+pub const TOOL_FRAME: [Key; 3] = [
     may(
         "tcp_in_flange_m",
         Holds::Array(3),
@@ -684,5 +718,10 @@ pub const TOOL_FRAME: [Key; 2] = [
         "tilt_about_flange_y_deg",
         ANY,
         "Tool axis from the flange's z towards its x, degrees [0]",
+    ),
+    may(
+        "rpy_in_flange_deg",
+        Holds::Array(3),
+        "Or the tool's frame in that of the flange: roll, pitch, yaw, degrees",
     ),
 ];

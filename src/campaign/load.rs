@@ -146,7 +146,7 @@ fn robot(dir: &Path, top: &Section<'_>) -> Result<Option<(RobotSection, RobotSpe
     let Some(robot) = top.section("robot", &names(&keys::ROBOT))? else {
         return Ok(None);
     };
-    let model = robot.required("model", robot.text("model")?, "\"irb6640\"")?;
+    let model = robot.required("model", robot.text("model")?, "\"your-robot.toml\"")?;
     let spec = RobotSpec::load(model, dir).map_err(|error| match error {
         // What is wrong with the reference (not with the robot file) stands in this file, on a line known here.
         Error::Input(e) if e.key.as_deref() == Some(ROBOT_KEY) => {

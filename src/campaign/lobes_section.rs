@@ -167,6 +167,24 @@ fn modes(lobes: &Section<'_>, process: Process) -> Result<Vec<LobeMode>> {
     Ok(out)
 }
 
+fn elbow_step(section: &Section<'_>, posture: &Posture) -> Result<Option<f64>> {
+    let key = "elbow_step_deg";
+    let step = section.number(key, Bounds::closed(1.0, 180.0))?;
+    if step.is_some() && posture.joints_deg.len() != 7 {
+        return Err(section
+            .error(
+                key,
+                format!(
+                    "the elbow turns with the tool at rest where an arm has seven joints; this one has {}",
+                    posture.joints_deg.len()
+                ),
+            )
+            .remedy("take the key out")
+            .into());
+    }
+    Ok(step)
+}
+
 fn redundancy(section: &Section<'_>, postures: &[Posture]) -> Result<Redundancy> {
     let posture = posture_ref(section, postures)?;
     let step_deg = section.number("step_deg", Bounds::closed(0.01, 180.0))?;
@@ -192,6 +210,7 @@ fn redundancy(section: &Section<'_>, postures: &[Posture]) -> Result<Redundancy>
         posture,
         step_deg: section.required("step_deg", step_deg, "5.0")?,
         forbidden_deg,
+        elbow_step_deg: elbow_step(section, &postures[posture])?,
     })
 }
 

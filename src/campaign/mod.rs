@@ -15,6 +15,7 @@ mod named_files;
 pub mod paths;
 pub mod robot_file;
 pub mod robot_spec;
+pub mod robot_text;
 pub mod schema;
 mod section;
 pub mod suggest;

@@ -13,6 +13,11 @@ use crate::{InputError, Result};
 /// Built-in models: name and robot file.
 const BUILT_IN: [(&str, &str); 1] = [("irb6640", include_str!("../../datasets/irb6640/robot.toml"))];
 
+/// A joint in the Denavit–Hartenberg convention.
+const CONVENTION: [&str; 4] = ["d_m", "a_m", "alpha_deg", "offset_deg"];
+/// A joint placed anywhere.
+const PLACEMENT: [&str; 3] = ["origin_m", "origin_rpy_deg", "axis"];
+
 impl RobotSpec {
     /// Names of the built-in robots.
     pub fn built_in() -> Vec<&'static str> {
@@ -27,6 +32,18 @@ impl RobotSpec {
     pub fn load(model: &str, campaign_dir: &Path) -> Result<RobotSpec> {
         if let Some((name, text)) = BUILT_IN.iter().find(|(name, _)| *name == model) {
             return parse(&Document::from_text(Path::new(&format!("built-in {name}")), text));
+        }
+        if model.to_lowercase().ends_with(".urdf") || model.to_lowercase().ends_with(".xacro") {
+            return Err(InputError::new(format!(
+                "{model} says nothing of compliances, so it is no robot file yet"
+            ))
+            .file(campaign_file(campaign_dir))
+            .key(ROBOT_KEY)
+            .remedy(format!(
+                "lobestone init DIR --robot {model} makes a robot file of a URDF (of a xacro make a URDF first: xacro {model} > \
+                 robot.urdf); name that file here"
+            ))
+            .into());
         }
         let path = paths::inside(campaign_dir, model).map_err(|found| {
             let names = BUILT_IN.map(|(name, _)| name).join(", ");
@@ -76,7 +93,7 @@ fn parse(document: &Document) -> Result<RobotSpec> {
         if links.iter().map(|link| link.mass_kg).sum::<f64>() <= 0.0 {
             return Err(top
                 .error("link", "no link has any mass, so nothing can vibrate")
-                .remedy("give mass_kg from the data sheet or an estimate")
+                .remedy("give mass_kg of each link, from the maker's data or a URDF of the robot")
                 .into());
         }
         Ok(RobotSpec {
@@ -84,12 +101,74 @@ fn parse(document: &Document) -> Result<RobotSpec> {
             joints,
             links,
             tool: tool(top)?,
+            guesses: top.texts("guesses")?.unwrap_or_default(),
         })
     })
 }
 
+/// A number that must be there. The remedy says where it is to be had and offers none: whatever stood there would be pasted.
+fn needed<T>(section: &Section<'_>, key: &str, value: Option<T>, whence: &str) -> Result<T> {
+    value.ok_or_else(|| section.error(key, "missing").remedy(whence).into())
+}
+
+const WHERE_GEOMETRY: &str = "take it from the Denavit-Hartenberg table of the robot (standard convention), or place the joint by origin_m, \
+     origin_rpy_deg and axis; `lobestone init DIR --robot FILE.urdf` writes all of it from a URDF";
+const WHERE_COMPLIANCE: &str = "give the joint's torsional compliance (1/stiffness) as measured or published; where nobody knows it write your \
+     own order of magnitude and say so in guesses = [\"…\"]: calibrating on FRFs finds it";
+const WHERE_MASS: &str = "give it from the maker's data, a CAD model or a URDF of the robot; 0.0 for a link without mass of its own";
+const WHERE_INERTIA: &str = "give the moments of inertia [Ixx, Iyy, Izz] about the centre of mass from the maker's data, a CAD model or a \
+     URDF of the robot";
+const WHERE_SECTION: &str = "measure the link: outer diameter and wall of a hollow round beam like it; without both the link stays rigid";
+
+/// How a joint is placed where it is not by the Denavit–Hartenberg convention.
+fn placement(joint: &Section<'_>) -> Result<Option<JointPlacement>> {
+    let Some(first) = PLACEMENT.into_iter().find(|key| joint.has(key)) else {
+        return Ok(None);
+    };
+    if let Some(other) = CONVENTION.into_iter().find(|key| joint.has(key)) {
+        return Err(joint
+            .error(other, format!("stands beside {first}: the joint is placed twice"))
+            .remedy(format!(
+                "either {} or {}",
+                CONVENTION.join(", "),
+                PLACEMENT.join(", ")
+            ))
+            .into());
+    }
+    let axis: [f64; 3] = joint.array("axis", "[0.0, 0.0, 1.0]")?.unwrap_or([0.0, 0.0, 1.0]);
+    let length = axis.iter().map(|a| a * a).sum::<f64>().sqrt();
+    if !(length > 1e-6) {
+        return Err(joint
+            .error("axis", "has no length")
+            .remedy("give the direction that the joint turns about, in the joint's own frame")
+            .into());
+    }
+    // A unit vector stays as it is, to the last digit.
+    let axis = match (length - 1.0).abs() < 1e-15 {
+        true => axis,
+        false => axis.map(|a| a / length),
+    };
+    let rpy_deg: Option<[f64; 3]> = joint.array("origin_rpy_deg", "[roll, pitch, yaw]")?;
+    Ok(Some(JointPlacement {
+        origin_m: needed(
+            joint,
+            "origin_m",
+            joint.array("origin_m", "[x, y, z]")?,
+            WHERE_GEOMETRY,
+        )?,
+        rpy_rad: rpy_deg.unwrap_or_default().map(f64::to_radians),
+        axis,
+    }))
+}
+
 fn joint(joint: &Section<'_>) -> Result<JointSpec> {
-    let number = |key: &str, bounds, example| joint.required(key, joint.number(key, bounds)?, example);
+    let number = |key: &str, bounds, whence| needed(joint, key, joint.number(key, bounds)?, whence);
+    let placement = placement(joint)?;
+    // Of a joint that is placed otherwise the convention's numbers are none.
+    let row = |key: &str| match placement {
+        Some(_) => Ok(0.0),
+        None => number(key, Bounds::ANY, WHERE_GEOMETRY),
+    };
     let limits_deg: Option<[f64; 2]> = joint.array("limits_deg", "[-170.0, 170.0]")?;
     if let Some([low, high]) = limits_deg.filter(|[low, high]| low >= high) {
         return Err(joint
@@ -98,35 +177,66 @@ fn joint(joint: &Section<'_>) -> Result<JointSpec> {
             .into());
     }
     Ok(JointSpec {
-        d_m: number("d_m", Bounds::ANY, "0.0")?,
-        a_m: number("a_m", Bounds::ANY, "0.0")?,
-        alpha_rad: number("alpha_deg", Bounds::ANY, "0.0")?.to_radians(),
+        name: joint.text("name")?.map(str::to_string),
+        d_m: row("d_m")?,
+        a_m: row("a_m")?,
+        alpha_rad: row("alpha_deg")?.to_radians(),
         offset_rad: joint
             .number("offset_deg", Bounds::ANY)?
             .unwrap_or(0.0)
             .to_radians(),
         // The stiffness 1/c has to be a number too.
-        compliance_rad_per_nm: number("compliance_rad_per_nm", Bounds::closed(1e-30, 1e30), "1.0e-6")?,
+        compliance_rad_per_nm: number(
+            "compliance_rad_per_nm",
+            Bounds::closed(1e-30, 1e30),
+            WHERE_COMPLIANCE,
+        )?,
         limits_rad: limits_deg.map(|limits| limits.map(f64::to_radians)),
+        placement,
     })
 }
 
 fn link(link: &Section<'_>) -> Result<LinkSpec> {
-    let mass_kg = link.required("mass_kg", link.number("mass_kg", Bounds::NOT_NEGATIVE)?, "10.0")?;
-    let example = "[0.1, 0.1, 0.1]";
-    let inertia_kg_m2 = link.required("inertia_kg_m2", link.array("inertia_kg_m2", example)?, example)?;
+    let mass_kg = needed(
+        link,
+        "mass_kg",
+        link.number("mass_kg", Bounds::NOT_NEGATIVE)?,
+        WHERE_MASS,
+    )?;
+    let inertia_kg_m2: [f64; 3] = needed(
+        link,
+        "inertia_kg_m2",
+        link.array("inertia_kg_m2", "[Ixx, Iyy, Izz]")?,
+        WHERE_INERTIA,
+    )?;
     if inertia_kg_m2.iter().any(|moment| *moment < 0.0) {
         return Err(link
             .error("inertia_kg_m2", "a moment of inertia is negative")
-            .remedy("give the three principal moments about the centre of mass")
+            .remedy("give the three moments about the centre of mass")
             .into());
     }
-    Ok(LinkSpec {
+    let read = LinkSpec {
+        name: link.text("name")?.map(str::to_string),
         mass_kg,
         inertia_kg_m2,
-        com_m: link.array("com_m", "[0.0, 0.0, 0.0]")?,
+        products_kg_m2: link
+            .array("products_kg_m2", "[Ixy, Ixz, Iyz]")?
+            .unwrap_or_default(),
+        com_m: link.array("com_m", "[x, y, z]")?,
         section: section(link)?,
-    })
+    };
+    if !read.has_possible_inertia() {
+        return Err(link
+            .error(
+                "products_kg_m2",
+                "with these products of inertia the moment about some axis is negative",
+            )
+            .remedy(
+                "give the elements Ixy, Ixz, Iyz of the tensor about the centre of mass, as a URDF has them",
+            )
+            .into());
+    }
+    Ok(read)
 }
 
 fn section(link: &Section<'_>) -> Result<Option<BeamSection>> {
@@ -134,9 +244,9 @@ fn section(link: &Section<'_>) -> Result<Option<BeamSection>> {
     if !link.has(outer) && !link.has(wall) {
         return Ok(None);
     }
-    let outer_diameter_m = link.required(outer, link.number(outer, Bounds::POSITIVE)?, "0.3")?;
+    let outer_diameter_m = needed(link, outer, link.number(outer, Bounds::POSITIVE)?, WHERE_SECTION)?;
     let thickest = Bounds::above_up_to(0.0, outer_diameter_m / 2.0);
-    let wall_m = link.required(wall, link.number(wall, thickest)?, "0.02")?;
+    let wall_m = needed(link, wall, link.number(wall, thickest)?, WHERE_SECTION)?;
     Ok(Some(BeamSection {
         outer_diameter_m,
         wall_m,
@@ -148,9 +258,21 @@ fn tool(top: &Section<'_>) -> Result<ToolFrame> {
     let Some(tool) = top.section("tool", &keys)? else {
         return Ok(ToolFrame::default());
     };
+    let tilt_deg = tool.number(keys[1], Bounds::ANY)?;
+    let rpy_deg: Option<[f64; 3]> = tool.array(keys[2], "[roll, pitch, yaw]")?;
+    if tilt_deg.is_some() && rpy_deg.is_some() {
+        return Err(tool
+            .error(
+                keys[2],
+                format!("stands beside {}: the tool is turned twice", keys[1]),
+            )
+            .remedy("keep one of the two")
+            .into());
+    }
     Ok(ToolFrame {
-        tcp_in_flange_m: tool.array(keys[0], "[0.0, 0.0, 0.0]")?.unwrap_or_default(),
-        tilt_about_flange_y_rad: tool.number(keys[1], Bounds::ANY)?.unwrap_or(0.0).to_radians(),
+        tcp_in_flange_m: tool.array(keys[0], "[x, y, z]")?.unwrap_or_default(),
+        tilt_about_flange_y_rad: tilt_deg.unwrap_or(0.0).to_radians(),
+        rpy_in_flange_rad: rpy_deg.unwrap_or_default().map(f64::to_radians),
     })
 }
 
@@ -225,9 +347,77 @@ mod tests {
                 format!("{joint}ofset_deg = 1\n{link}"),
                 "did you mean offset_deg?",
             ),
+            (
+                format!("{joint}axis = [0, 1, 0]\n{link}"),
+                "joint[0].d_m: stands beside axis: the joint is placed twice",
+            ),
+            (
+                format!("{joint}{link}products_kg_m2 = [2, 0, 0]\n"),
+                "the moment about some axis is negative",
+            ),
+            (
+                format!("{joint}{link}[tool]\ntilt_about_flange_y_deg = 4\nrpy_in_flange_deg = [1, 2, 3]\n"),
+                "the tool is turned twice",
+            ),
+            (
+                "[[joint]]\naxis = [0, 1, 0]\ncompliance_rad_per_nm = 1e-6\n".to_string() + link,
+                "joint[0].origin_m: missing",
+            ),
+            (
+                "[[joint]]\norigin_m = [0, 1, 0]\naxis = [0, 0, 0]\ncompliance_rad_per_nm = 1e-6\n"
+                    .to_string()
+                    + link,
+                "joint[0].axis: has no length",
+            ),
         ] {
             let message = read(&text).unwrap_err().to_string();
             assert!(message.contains(words), "{message}");
         }
+    }
+
+    /// What is missing is not offered as a number that could be pasted: made-up physics would pass for the robot's.
+    #[test]
+    fn remedies_hold_no_numbers_to_paste() {
+        let whole = "[[joint]]\nd_m = 1\na_m = 0\nalpha_deg = 0\ncompliance_rad_per_nm = 1e-6\n[[link]]\nmass_kg = 2\n\
+                     inertia_kg_m2 = [1, 1, 1]\nsection_outer_diameter_m = 0.2\nsection_wall_m = 0.01\n";
+        assert!(read(whole).is_ok());
+        for key in [
+            "d_m",
+            "alpha_deg",
+            "compliance_rad_per_nm",
+            "mass_kg",
+            "inertia_kg_m2",
+            "section_outer_diameter_m",
+            "section_wall_m",
+        ] {
+            let without: String = whole
+                .lines()
+                .filter(|l| !l.starts_with(key))
+                .map(|l| format!("{l}\n"))
+                .collect();
+            let Err(crate::Error::Input(error)) = read(&without) else {
+                panic!("{key} is not missed")
+            };
+            assert_eq!(error.problem, "missing", "{key}");
+            let remedy = error.remedy.unwrap();
+            assert!(!remedy.contains(&format!("{key} = ")), "{remedy}");
+        }
+    }
+
+    #[test]
+    fn a_joint_may_be_placed_anywhere() {
+        let robot = read(
+            "guesses = [\"compliances\"]\n[[joint]]\nname = \"lift\"\norigin_m = [0.1, 0.2, 0.3]\n\
+             origin_rpy_deg = [90, 0, 0]\naxis = [0, 2, 0]\ncompliance_rad_per_nm = 1e-6\n[[link]]\nmass_kg = 2\n\
+             inertia_kg_m2 = [1, 1, 1]\nproducts_kg_m2 = [0.1, 0.2, 0.3]\n[tool]\nrpy_in_flange_deg = [0, 180, 0]\n",
+        )
+        .unwrap();
+        let placement = robot.joints[0].placement.unwrap();
+        assert_eq!(placement.axis, [0.0, 1.0, 0.0]);
+        assert_eq!(placement.rpy_rad, [FRAC_PI_2, 0.0, 0.0]);
+        assert_eq!(robot.joints[0].name.as_deref(), Some("lift"));
+        assert_eq!(robot.links[0].products_kg_m2, [0.1, 0.2, 0.3]);
+        assert_eq!(robot.guesses, ["compliances"]);
+        assert_relative_eq!(robot.tool.rpy_in_flange_rad[1], 2.0 * FRAC_PI_2);
     }
 }

@@ -1,7 +1,8 @@
 //! What a robot file says: geometry, masses, compliances. (The form of `datasets/irb6640/robot.toml`.)
 
-/// A serial robot with revolute joints, standard (distal) Denavit–Hartenberg convention:
-/// T_i = Rz(q_i + offset) Tz(d) Tx(a) Rx(alpha); joint i turns about z of frame i−1, link i is fixed to frame i.
+/// A serial robot with revolute joints. A joint is given either in the standard (distal) Denavit–Hartenberg convention,
+/// T_i = Rz(q_i + offset) Tz(d) Tx(a) Rx(alpha), and turns about z of frame i−1; or by its [`JointPlacement`], and turns
+/// about any axis. Link i is fixed to frame i.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotSpec {
     pub name: String,
@@ -9,10 +10,23 @@ pub struct RobotSpec {
     /// As many as joints; link i is the body after joint i.
     pub links: Vec<LinkSpec>,
     pub tool: ToolFrame,
+    /// What in the file is a guess and not of this robot (`guesses`): told wherever the file's values are used.
+    pub guesses: Vec<String>,
 }
 
-#[derive(Debug, Clone, PartialEq)]
+impl RobotSpec {
+    /// What is to be told wherever the file's values are used.
+    pub fn guesses_told(&self) -> impl Iterator<Item = String> {
+        self.guesses
+            .iter()
+            .map(|guess| format!("guessed in the robot file: {guess}"))
+    }
+}
+
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct JointSpec {
+    /// What the joint is called elsewhere, such as in a URDF.
+    pub name: Option<String>,
     pub d_m: f64,
     pub a_m: f64,
     pub alpha_rad: f64,
@@ -21,14 +35,31 @@ pub struct JointSpec {
     pub compliance_rad_per_nm: f64,
     /// Lower and upper limit of the joint angle (before the offset), rad.
     pub limits_rad: Option<[f64; 2]>,
+    /// In place of the four Denavit–Hartenberg numbers, which are zero then.
+    pub placement: Option<JointPlacement>,
 }
 
-#[derive(Debug, Clone, PartialEq)]
+/// Where a joint's frame sits in the frame of the link before it, and about which axis it turns (as in a URDF):
+/// T_i = T(origin) Rz(yaw) Ry(pitch) Rx(roll) R(axis, q_i).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointPlacement {
+    pub origin_m: [f64; 3],
+    /// Roll, pitch, yaw about the fixed axes x, y, z.
+    pub rpy_rad: [f64; 3],
+    /// Unit vector in the joint's frame.
+    pub axis: [f64; 3],
+}
+
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct LinkSpec {
+    /// What the link is called elsewhere, such as in a URDF.
+    pub name: Option<String>,
     pub mass_kg: f64,
-    /// Principal moments about the centre of mass, axes along the link's DH frame.
+    /// Moments Ixx, Iyy, Izz about the centre of mass, axes along the link's frame.
     pub inertia_kg_m2: [f64; 3],
-    /// Centre of mass in the link's DH frame; `None`: midway between the link's two joint axes
+    /// Ixy, Ixz, Iyz of the same tensor (its elements: −∫xy dm, …); zero where the frame's axes are principal ones.
+    pub products_kg_m2: [f64; 3],
+    /// Centre of mass in the link's frame; `None`: midway between the link's two joint axes
     /// (last link: midway between flange and tool centre point).
     pub com_m: Option<[f64; 3]>,
     /// Hollow round section of the beam that stands for the link when it may bend; `None`: rigid.
@@ -48,4 +79,7 @@ pub struct ToolFrame {
     pub tcp_in_flange_m: [f64; 3],
     /// The tool axis in the flange frame is (sin, 0, cos) of this angle.
     pub tilt_about_flange_y_rad: f64,
+    /// In place of the tilt: roll, pitch, yaw of the tool frame about the flange's fixed axes x, y, z. The tool axis is z
+    /// of the tool frame.
+    pub rpy_in_flange_rad: [f64; 3],
 }

@@ -424,6 +424,8 @@ pub struct Redundancy {
     pub posture: usize,
     pub step_deg: f64,
     pub forbidden_deg: Vec<[f64; 2]>,
+    /// Seven joints: the elbow is turned in steps of this, too; `None`: it stays as the posture has it.
+    pub elbow_step_deg: Option<f64>,
 }
 
 #[derive(Debug, Clone, PartialEq)]

@@ -131,6 +131,22 @@ impl<'d> Section<'d> {
         }
     }
 
+    /// A list of texts, none of them blank.
+    pub fn texts(&self, key: &str) -> Result<Option<Vec<String>>> {
+        let Some(value) = self.value(key) else {
+            return Ok(None);
+        };
+        let example = format!("{key} = [\"…\"]");
+        let DeValue::Array(items) = value.get_ref() else {
+            return Err(self.wrong_type(key, "a list of texts", value.get_ref(), &example));
+        };
+        let text = |item: &Spanned<DeValue<'_>>| match item.get_ref() {
+            DeValue::String(s) if !s.trim().is_empty() => Ok(crate::ingest::shown(s).into_owned()),
+            other => Err(self.wrong_type(key, "a list of texts", other, &example)),
+        };
+        items.iter().map(text).collect::<Result<_>>().map(Some)
+    }
+
     /// One of a few words.
     pub fn choice<T: Copy>(&self, key: &str, words: &[(&str, T)]) -> Result<Option<T>> {
         let Some(word) = self.text(key)? else {

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use serde_json::json;
 
+use super::init_robot::MadeRobot;
 use super::text::{Emphasis, setup_lines, table, warnings};
 use super::{Outcome, next_step};
 use crate::analysis::setup::likely_mistakes;
@@ -23,7 +24,7 @@ use crate::{Error, InputError, Result};
 )]
 pub struct Args {
     /// The folder with the measurement files; campaign.toml is written there.
-    dir: PathBuf,
+    pub(super) dir: PathBuf,
     /// Replace a campaign.toml that is there.
     #[arg(long)]
     force: bool,
@@ -33,9 +34,18 @@ pub struct Args {
     /// Name of the campaign [default: the folder's].
     #[arg(long)]
     name: Option<String>,
-    /// Robot: irb6640, or the path of a robot file in the folder.
+    /// Robot: irb6640, the path of a robot file in the folder, or a URDF (.urdf) anywhere: a robot file is made of it.
     #[arg(long, value_name = "MODEL")]
-    robot: Option<String>,
+    pub(super) robot: Option<String>,
+    /// URDF: the link that stands still [default: the root].
+    #[arg(long, value_name = "LINK")]
+    pub(super) base_link: Option<String>,
+    /// URDF: the link that is the tool, its z axis along the tool [default: tool0, else flange, else the farthest out].
+    #[arg(long, value_name = "LINK")]
+    pub(super) tool_link: Option<String>,
+    /// URDF: payload that the maker rates the arm for; chooses the class of the guessed compliances [default: by its mass].
+    #[arg(long, value_name = "KG")]
+    pub(super) payload_kg: Option<f64>,
     /// Joint angles of a posture, base first; once for each.
     #[arg(long = "posture", value_name = "ID=DEG,DEG,…", value_parser = pair, allow_hyphen_values = true)]
     postures: Vec<(String, String)>,
@@ -118,10 +128,11 @@ fn pair(text: &str) -> std::result::Result<(String, String), String> {
 }
 
 impl Args {
-    fn answers(&self) -> Answers {
+    fn answers(&self, made: Option<&MadeRobot>) -> Answers {
         let mut answers = Answers::default();
+        let robot = made.map(|m| m.name.clone()).or(self.robot.clone());
         for (table, key, value) in [
-            ("robot", "model", &self.robot),
+            ("robot", "model", &robot),
             ("frf", "quantity", &self.quantity),
             ("frf", "force_level_n", &self.force_level_n),
             ("tool", "diameter_mm", &self.diameter_mm),
@@ -176,11 +187,26 @@ pub fn run(args: Args, as_json: bool) -> Result<Outcome> {
             .remedy("--force replaces it (its comments and values are lost)")
             .into());
     }
-    let scan = draft::scan(dir)?;
-    if scan.frfs.is_empty() && scan.forces.is_empty() {
-        return Err(nothing_found(&args, &scan));
+    let Some(made) = MadeRobot::of(&args)? else {
+        return begin(&args, None, as_json);
+    };
+    let was_there = made.write(args.force)?;
+    let begun = begin(&args, Some(&made), as_json);
+    if begun.is_err() && !was_there {
+        // What was wrong is told; a file that nothing refers to is not left behind.
+        let _ = std::fs::remove_file(&made.file);
     }
-    let mut answers = args.answers();
+    begun
+}
+
+/// Scans the folder, asks, writes `campaign.toml`.
+fn begin(args: &Args, made: Option<&MadeRobot>, as_json: bool) -> Result<Outcome> {
+    let dir = &args.dir;
+    let scan = draft::scan(dir)?;
+    if scan.frfs.is_empty() && scan.forces.is_empty() && made.is_none() {
+        return Err(nothing_found(args, &scan));
+    }
+    let mut answers = args.answers(made);
     let list = args.cut_list.as_ref().or(scan.cut_list());
     let mut passed_over = match list {
         Some(list) => draft::read_cut_list(list, &scan, &mut answers)?,
@@ -242,12 +268,19 @@ pub fn run(args: Args, as_json: bool) -> Result<Outcome> {
         "missing": missing,
         "guessed": guesses,
         "setup": setup,
+        "robot": made.map(MadeRobot::document),
         "not_used": scan.not_used.iter().map(|(file, why)| json!({ "file": file, "why": why })).collect::<Vec<_>>(),
     });
-    let next = next_step::begun(dir, missing.len(), !scan.frfs.is_empty());
+    let measured = match (scan.frfs.is_empty(), scan.forces.is_empty()) {
+        (false, _) => next_step::Measured::Frfs,
+        (true, false) => next_step::Measured::Forces,
+        (true, true) => next_step::Measured::Nothing,
+    };
+    let next = next_step::begun(dir, missing.len(), measured);
+    let robot = made.map(MadeRobot::told).unwrap_or_default();
     Ok(Outcome::new(
         json,
-        setup_lines(&setup) + &describe(&file, &scan, &draft, &missing, list, &passed_over),
+        setup_lines(&setup) + &describe(&file, &scan, &draft, &missing, list, &passed_over) + &robot,
         Some(next),
     ))
 }

@@ -125,7 +125,9 @@ fn redundancy(found: &RedundancyAnalysis, hole: Value) -> Value {
             "joints_deg": r.posture.joints_deg,
             "limit_margin_deg": r.posture.limit_margin_deg,
             "singularity_margin": r.posture.singularity_margin,
+            "elbow_deg": r.posture.elbow_deg,
         },
+        "elbows": found.elbows,
         "hole": hole,
         "enumeration": r.enumeration,
         "swarm": r.swarm,
@@ -145,7 +147,7 @@ fn redundancy_text(found: &RedundancyAnalysis) -> String {
         .map(|j| format!("{j:.2}"))
         .collect();
     let margin = |v: Option<f64>, unit: &str| v.map_or("–".to_string(), |v| format!("{v:.3}{unit}"));
-    format!(
+    let sweep = format!(
         "\nTool of {} turned about its axis in steps of {}°: {} angles usable, {} forbidden, {} out of reach\n\
          Recommended: {:.1} rpm at {:.1}°, safe to {:.4} mm with the speed off by up to {:.0} % (5 % quantile over the model's uncertainty: {})\n\
          Joints: {} degrees; nearest limit {} away, singularity margin {} of 1\n\
@@ -171,6 +173,37 @@ fn redundancy_text(found: &RedundancyAnalysis) -> String {
         } else {
             "they disagree; the deeper one is given"
         },
+    );
+    sweep + &elbows_text(found)
+}
+
+fn elbows_text(found: &RedundancyAnalysis) -> String {
+    if found.elbows.is_empty() {
+        return String::new();
+    }
+    let rows: Vec<Vec<String>> = found
+        .elbows
+        .iter()
+        .map(|elbow| {
+            let or_none = |v: Option<String>| v.unwrap_or("–".into());
+            vec![
+                format!("{}°", elbow.turned_deg),
+                elbow.usable_angles.to_string(),
+                or_none(elbow.point.map(|p| format!("{:.4}", p.depth_mm))),
+                or_none(elbow.point.map(|p| format!("{:.1}", p.spindle_rpm))),
+                or_none(elbow.point.map(|p| format!("{:.1}°", p.angle_deg))),
+                if elbow.chosen {
+                    "chosen".into()
+                } else {
+                    String::new()
+                },
+            ]
+        })
+        .collect();
+    let header = ["elbow turned by", "usable angles", "depth mm", "rpm", "angle", ""];
+    format!(
+        "\nElbow turned with the tool at rest\n{}",
+        table(&header, &rows).trim_start_matches('\n')
     )
 }
 
@@ -459,6 +492,7 @@ mod tests {
             posture: 0,
             step_deg: 20.0,
             forbidden_deg: vec![[170.0, 230.0]],
+            elbow_step_deg: None,
         });
         let Outcome { json, text, .. } = outcome(&turned).unwrap();
         let found = &json["redundancy"];

@@ -22,6 +22,7 @@ mod fleet;
 mod history;
 mod hole;
 mod init;
+mod init_robot;
 mod inspect;
 mod lobe_tool;
 mod lobes;

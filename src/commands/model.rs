@@ -1,3 +1,6 @@
+use std::path::{Path, PathBuf};
+
+use nalgebra::Vector3;
 use serde_json::{Value, json};
 
 use super::next_step::Guide;
@@ -5,8 +8,11 @@ use super::text::{number, table, warnings};
 use super::{CampaignArg, Outcome};
 use crate::analysis::StructureAnalysis;
 use crate::campaign::Campaign;
+use crate::files::write_new;
 use crate::identify::case::structure_model;
 use crate::identify::{Options, StructureModel};
+use crate::robot::rigid::STANDARD_GRAVITY;
+use crate::robot::urdf::{self, Sources};
 use crate::robot::{Baseline, Dual, PostureReport, export};
 use crate::{InputError, Result};
 
@@ -20,6 +26,9 @@ pub struct Args {
     /// Let the links bend with this Young's modulus (rigid links if left out; --matrices takes 200e9 then).
     #[arg(long, value_name = "PA")]
     young_pa: Option<f64>,
+    /// Write the robot with its masses (calibrated where there are FRFs) as a URDF, and the compliances into a file beside it.
+    #[arg(long, value_name = "FILE")]
+    urdf: Option<PathBuf>,
 }
 
 /// Young's modulus of the links where the matrices need one and nobody has said: steel.
@@ -36,12 +45,17 @@ pub fn run(args: Args) -> Result<Outcome> {
     let model = structure_model(&campaign)?;
     let mut left_out = Vec::new();
     let nominal = postures(&campaign, &model, &model.nominal_theta(), &args, &mut left_out)?;
-    let mut json = json!({ "robot": model.robot.spec.name, "postures": nominal });
+    let mut json = json!({
+        "robot": model.robot.spec.name,
+        "moving_mass_kg": model.robot.moving_mass_kg(),
+        "postures": nominal,
+    });
     let mut text = format!(
         "{}, as the robot file has it\n{}",
         model.robot.spec.name,
         describe(&nominal)
     );
+    let mut sources = of_robot_file(&model);
     if !campaign.frfs.is_empty() {
         let StructureAnalysis {
             case, calibration, ..
@@ -55,13 +69,71 @@ pub fn run(args: Args) -> Result<Outcome> {
         let mut notes = case.warnings.clone();
         notes.extend(left_out);
         text += &warnings(&notes);
+        sources = calibrated(&campaign, &case.model, &calibration.theta, case.effects());
         json["calibrated_postures"] = after.into();
         json["revision"] = case.revision().into();
         json["effects"] = case.effects().into();
         json["warnings"] = notes.into();
+    } else {
+        let notes: Vec<String> = model.robot.spec.guesses_told().chain(left_out).collect();
+        text += &warnings(&notes);
+        json["warnings"] = notes.into();
+    }
+    if let Some(file) = &args.urdf {
+        let files = write_urdf(file, &model, &sources)?;
+        text += &format!(
+            "\nwritten: {} and {} ({})\n",
+            files[0].display(),
+            files[1].display(),
+            sources.source
+        );
+        json["written"] = json!(files);
     }
     let next = Guide::structure(&campaign).modelled();
     Ok(Outcome::new(json, text, Some(next)))
+}
+
+fn of_robot_file(model: &StructureModel) -> Sources {
+    let baseline = Baseline::nominal(&model.robot.spec);
+    of_baseline(&baseline, "the robot file, not calibrated".into(), Vec::new())
+}
+
+fn of_baseline(baseline: &Baseline, source: String, left_out: Vec<String>) -> Sources {
+    let stiffness = baseline.joint_stiffness_nm_per_rad.iter();
+    Sources {
+        source,
+        mass_scale: baseline.mass_scale.iter().map(|scale| scale.value).collect(),
+        compliance_rad_per_nm: stiffness.map(|k| 1.0 / k.value).collect(),
+        damping_ratio: baseline.damping_ratio.value,
+        young_pa: baseline.young_pa.as_ref().map(|young| young.value),
+        left_out,
+    }
+}
+
+fn calibrated(campaign: &Campaign, model: &StructureModel, theta: &[f64], effects: Vec<String>) -> Sources {
+    let source = format!("calibrated on the FRFs of {}", campaign.name);
+    let held = |effect: &String| effect.starts_with("link-flexibility");
+    let beyond = effects.into_iter().filter(|effect| !held(effect));
+    of_baseline(&model.baseline(theta, false), source, beyond.collect())
+}
+
+/// The URDF and what it cannot hold in a file beside it: `robot.urdf`, `robot.compliances.toml`.
+fn write_urdf(file: &Path, model: &StructureModel, sources: &Sources) -> Result<[PathBuf; 2]> {
+    let beside = file.with_extension("compliances.toml");
+    let texts = [
+        (file, urdf::urdf(&model.robot, sources)),
+        (beside.as_path(), urdf::compliances(&model.robot.spec, sources)),
+    ];
+    if let Some((there, _)) = texts.iter().find(|(path, _)| path.symlink_metadata().is_ok()) {
+        return Err(InputError::new("is there already; nothing was written")
+            .file(there)
+            .remedy("give another name to --urdf, or take the file away")
+            .into());
+    }
+    for (path, text) in &texts {
+        write_new(path, text.as_bytes())?;
+    }
+    Ok([file.to_path_buf(), beside.clone()])
 }
 
 /// Young's modulus that the user asked for, where the model does not bring its own.
@@ -104,6 +176,10 @@ fn postures(
                 "tool_axis": report.tool_axis,
                 "tcp_stiffness_n_per_m": axes(report.tcp_stiffness_n_per_m),
                 "flange_stiffness_n_per_m": axes(report.flange_stiffness_n_per_m),
+                "centre_of_mass_m": model.robot.centre_of_mass(&kinematics).map(|c| [c.x, c.y, c.z]),
+                "gravity_torques_nm": model
+                    .robot
+                    .gravity_torques_nm(&kinematics, Vector3::new(0.0, 0.0, -STANDARD_GRAVITY)),
             });
             if args.matrices {
                 let mut bending = baseline.clone();

@@ -343,11 +343,24 @@ pub fn planned(dir: &Path, addition: Option<&str>) -> String {
     )
 }
 
+/// What a campaign begins with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Measured {
+    Frfs,
+    Forces,
+    Nothing,
+}
+
 /// After `init`.
-pub fn begun(dir: &Path, to_fill_in: usize, has_frfs: bool) -> String {
-    match (to_fill_in, has_frfs) {
-        (0, true) => format!("run `lobestone compare {}` to see how the model fits", word(dir)),
-        (0, false) => format!("run `lobestone cfc {}` for the cutting coefficients", word(dir)),
+pub fn begun(dir: &Path, to_fill_in: usize, measured: Measured) -> String {
+    match (to_fill_in, measured) {
+        (0, Measured::Frfs) => format!("run `lobestone compare {}` to see how the model fits", word(dir)),
+        (0, Measured::Nothing) => format!(
+            "add [[posture]] tables (or --posture ID=DEG,… with --force), then `lobestone model {dir}`, and `lobestone plan {dir}` for \
+             what to measure",
+            dir = word(dir)
+        ),
+        (0, Measured::Forces) => format!("run `lobestone cfc {}` for the cutting coefficients", word(dir)),
         (n, _) => format!(
             "fill in what is missing ({n}): edit {}, or give the flags and run `lobestone init {} --force` again",
             campaign_file(dir).display(),

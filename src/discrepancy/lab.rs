@@ -9,7 +9,7 @@ use crate::campaign::{AxesRef, BodyRef, MeasuredDof, Point, Posture};
 use crate::identify::frf_data::{FrfBlock, FrfDatum};
 use crate::identify::{FrfData, StructureModel};
 use crate::ingest::Axis;
-use crate::robot::{Kinematics, RobotModel};
+use crate::robot::{JointSpec, Kinematics, RobotModel};
 use crate::signal::noise_law::FrfNoise;
 
 /// Lines of a posture that are looked at, at most: each then stands for its neighbours.
@@ -573,6 +573,6 @@ fn reachable(robot: &RobotModel, joints_deg: &[f64], kinematics: &Kinematics, lo
         limits.is_none_or(|[low, high]| (low..=high).contains(q))
     });
     let tool = kinematics.tcp();
-    let length: f64 = robot.spec.joints.iter().map(|j| j.a_m.hypot(j.d_m)).sum();
+    let length: f64 = robot.spec.joints.iter().map(JointSpec::length_m).sum();
     within && tool.z >= lowest_tool_m - 1e-9 && tool.x.hypot(tool.y) >= LEAST_REACH * length
 }

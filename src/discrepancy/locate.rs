@@ -386,7 +386,7 @@ fn probe(
     let mut coordinates = Vec::new();
     if number < joints {
         let joint = number + 1;
-        let frame = &kinematics.frames[joint - 1];
+        let frame = kinematics.joint_frame(joint);
         let tilt = |axis: Vector3<f64>| {
             let a = frame.rotation * axis;
             Vector6::new(0.0, 0.0, 0.0, a.x, a.y, a.z)

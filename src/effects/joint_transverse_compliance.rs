@@ -62,7 +62,7 @@ impl StructuralEffect for JointTransverseCompliance {
 
     fn apply(&self, site: Site, _variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {
         let Site::Joint(i) = site else { return };
-        let frame = &setting.kinematics.frames[i - 1];
+        let frame = setting.kinematics.joint_frame(i);
         let tilt = |axis: nalgebra::Vector3<f64>| {
             let a = frame.rotation * axis;
             Vector6::new(0.0, 0.0, 0.0, a.x, a.y, a.z)

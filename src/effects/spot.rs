@@ -123,7 +123,7 @@ impl Spot {
             Spot::Base(k) => Some((Place::new(0, Slot::Joint), Point3::origin(), unit(k))),
             Spot::Bearing(i, k) => {
                 let local = unit(k);
-                let rotation = kinematics.frames[i - 1].rotation;
+                let rotation = kinematics.joint_frame(i).rotation;
                 let v = rotation * local.fixed_rows::<3>(0).into_owned();
                 let w = rotation * local.fixed_rows::<3>(3).into_owned();
                 let twist = Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z);

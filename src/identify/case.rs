@@ -32,7 +32,10 @@ pub fn robot_section(campaign: &Campaign) -> Result<&RobotSection> {
         InputError::new("the campaign has no [robot]")
             .file(campaign.dir.join("campaign.toml"))
             .key("robot")
-            .remedy("add [robot] with model = \"irb6640\" or the path of a robot file")
+            .remedy(
+                "add [robot] with model = the path of your robot's file (`lobestone init DIR --robot FILE.urdf` makes one of a \
+                 URDF), or \"irb6640\" if it is that robot",
+            )
             .into()
     })
 }
@@ -81,6 +84,7 @@ impl StructureCase {
         let log = RevisionLog::load(&campaign.dir)?;
         let revisions: Vec<Revision> = log.revisions(Domain::Structure).cloned().collect();
         let (set, mut warnings) = campaign.load_frfs()?;
+        warnings.extend(baseline.robot.spec.guesses_told());
         let data = FrfData::new(campaign, &baseline.robot, set)?;
         let mut settled = false;
         let model = match revisions.last() {

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::curve::AbsoluteLimit;
 use super::optimum::SurfacePoint;
 use crate::Result;
-use crate::robot::{IkBranch, InverseKinematics, RobotModel};
+use crate::robot::{IkReference, InverseKinematics, RobotModel};
 
 /// Whether a cut can be made at an angle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -29,11 +29,14 @@ pub struct AnglePosture {
     pub angle_deg: f64,
     pub status: AngleStatus,
     /// `None` where unreachable.
-    pub joints_deg: Option<[f64; 6]>,
+    pub joints_deg: Option<Vec<f64>>,
     /// Distance of the nearest joint to its limit; `None` where unreachable or no limits are known.
     pub limit_margin_deg: Option<f64>,
     /// Distance from the nearest singularity, 0 to 1 (see [`crate::robot::IkSolution`]).
     pub singularity_margin: Option<f64>,
+    /// Elbow angle of an arm with seven joints (see [`crate::robot::NumericInverse::elbow_rad`]).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub elbow_deg: Option<f64>,
 }
 
 /// All angles of one place.
@@ -41,31 +44,44 @@ pub struct RedundancySweep<'a> {
     robot: &'a RobotModel,
     ik: InverseKinematics<'a>,
     tool: Isometry3<f64>,
-    branch: IkBranch,
+    reference: IkReference,
     forbidden_deg: Vec<[f64; 2]>,
     pub angles: Vec<AnglePosture>,
 }
 
 impl<'a> RedundancySweep<'a> {
     /// `joints_deg`: the posture whose tool point and axis are kept. Angles run from 0 in steps; the posture is followed
-    /// from 0 both ways, so that whole turns of a joint do not jump but at 180°.
+    /// from 0 both ways, so that whole turns of a joint do not jump but at 180°. `elbow_deg`: how far the elbow of an arm
+    /// with seven joints stands turned from that of the posture.
     ///
     /// # Errors
-    /// A robot without closed inverse kinematics, or a posture at a singularity.
+    /// A robot of fewer than six joints or more than seven, a posture at a singularity, an elbow where there is none.
     pub fn new(
         robot: &'a RobotModel,
         joints_deg: &[f64],
         step_deg: f64,
         forbidden_deg: &[[f64; 2]],
+        elbow_deg: f64,
     ) -> Result<Self> {
         let ik = InverseKinematics::new(&robot.spec)?;
-        let (start, branch) = ik.reference(joints_deg, "the redundancy sweep")?;
+        let mut reference = ik.reference(joints_deg, "the redundancy sweep")?;
+        match &mut reference.elbow_rad {
+            Some(elbow) => *elbow += elbow_deg.to_radians(),
+            None if elbow_deg != 0.0 => {
+                return Err(crate::Error::computation(format!(
+                    "{} has no elbow to turn: that takes seven joints",
+                    robot.spec.name
+                )));
+            }
+            None => {}
+        }
+        let start = reference.q_rad.clone();
         let tool = robot.kinematics(joints_deg)?.tool;
         let mut sweep = RedundancySweep {
             robot,
             ik,
             tool,
-            branch,
+            reference,
             forbidden_deg: forbidden_deg.to_vec(),
             angles: Vec::new(),
         };
@@ -74,11 +90,11 @@ impl<'a> RedundancySweep<'a> {
         let half = (0..count).take_while(|i| angle(*i) <= 180.0).count();
         let mut angles: Vec<Option<AnglePosture>> = vec![None; count];
         for order in [(0..half).collect::<Vec<_>>(), (half..count).rev().collect()] {
-            let mut reference = start;
+            let mut reference = start.clone();
             for i in order {
                 let posture = sweep.at(angle(i), &reference);
-                if let Some(joints) = posture.joints_deg {
-                    reference = joints.map(f64::to_radians);
+                if let Some(joints) = &posture.joints_deg {
+                    reference = joints.iter().map(|q| q.to_radians()).collect();
                 }
                 angles[i] = Some(posture);
             }
@@ -88,14 +104,10 @@ impl<'a> RedundancySweep<'a> {
     }
 
     /// The robot at any angle; whole turns of joints nearest to `reference_rad`.
-    pub fn at(&self, angle_deg: f64, reference_rad: &[f64; 6]) -> AnglePosture {
+    pub fn at(&self, angle_deg: f64, reference_rad: &[f64]) -> AnglePosture {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle_deg.to_radians());
         let pose = self.tool * turn;
-        let solution = self
-            .ik
-            .tool_pose(&pose, reference_rad)
-            .into_iter()
-            .find(|s| s.branch == self.branch && s.limit_margin_rad >= -1e-9);
+        let solution = self.ik.follow(&pose, &self.reference, reference_rad);
         let status = match (&solution, in_forbidden_band(&self.forbidden_deg, angle_deg)) {
             (None, _) => AngleStatus::Unreachable,
             (Some(_), true) => AngleStatus::Forbidden,
@@ -110,6 +122,7 @@ impl<'a> RedundancySweep<'a> {
                 .map(|s| s.limit_margin_rad.max(0.0).to_degrees())
                 .filter(|m| m.is_finite()),
             singularity_margin: solution.as_ref().map(|s| s.singularity_margin),
+            elbow_deg: solution.and_then(|s| s.elbow_rad).map(f64::to_degrees),
         }
     }
 
@@ -125,8 +138,11 @@ impl<'a> RedundancySweep<'a> {
             .iter()
             .filter(|a| a.joints_deg.is_some())
             .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-            .and_then(|a| a.joints_deg);
-        let reference = nearest.unwrap_or_default().map(f64::to_radians);
+            .and_then(|a| a.joints_deg.as_ref());
+        let reference: Vec<f64> = match nearest {
+            Some(joints) => joints.iter().map(|q| q.to_radians()).collect(),
+            None => self.reference.q_rad.clone(),
+        };
         self.at(angle_deg, &reference)
     }
 
@@ -195,12 +211,12 @@ mod tests {
     #[test]
     fn the_four_thesis_postures_are_one_sweep() {
         let robot = limited();
-        let sweep = RedundancySweep::new(&robot, &TAP_POSTURES[0], 1.0, &[]).unwrap();
+        let sweep = RedundancySweep::new(&robot, &TAP_POSTURES[0], 1.0, &[], 0.0).unwrap();
         assert_eq!(sweep.angles.len(), 360);
         let mut angles = Vec::new();
         for posture in &TAP_POSTURES {
             let off = |a: &AnglePosture| -> f64 {
-                a.joints_deg.map_or(f64::INFINITY, |joints| {
+                a.joints_deg.as_ref().map_or(f64::INFINITY, |joints| {
                     joints
                         .iter()
                         .zip(posture)
@@ -233,23 +249,23 @@ mod tests {
     #[test]
     fn the_tool_stays_and_joints_move_smoothly() {
         let robot = limited();
-        let sweep = RedundancySweep::new(&robot, &TAP_POSTURES[1], 5.0, &[[350.0, 370.0]]).unwrap();
+        let sweep = RedundancySweep::new(&robot, &TAP_POSTURES[1], 5.0, &[[350.0, 370.0]], 0.0).unwrap();
         let start = robot.kinematics(&TAP_POSTURES[1]).unwrap();
         for a in &sweep.angles {
             let banned = a.angle_deg <= 10.0 || a.angle_deg >= 350.0;
-            let Some(joints) = a.joints_deg else {
+            let Some(joints) = &a.joints_deg else {
                 assert_eq!(a.status, AngleStatus::Unreachable);
                 continue;
             };
             assert_eq!(a.status == AngleStatus::Forbidden, banned, "{a:?}");
-            let here = robot.kinematics(&joints).unwrap();
+            let here = robot.kinematics(joints).unwrap();
             assert!((here.tcp() - start.tcp()).norm() < 1e-9);
             assert!((here.tool_axis() - start.tool_axis()).norm() < 1e-9);
         }
         assert!(sweep.angles[0].joints_deg.is_some());
         for pair in sweep.angles.windows(2).filter(|p| p[1].angle_deg <= 180.0) {
-            if let (Some(a), Some(b)) = (pair[0].joints_deg, pair[1].joints_deg) {
-                let jump = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            if let (Some(a), Some(b)) = (&pair[0].joints_deg, &pair[1].joints_deg) {
+                let jump = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
                 assert!(jump < 60.0, "{pair:?}");
             }
         }

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::redundancy::in_forbidden_band;
 use super::workspace_grid::Place;
 use crate::Result;
-use crate::robot::{IkBranch, IkSolution, InverseKinematics, RobotModel};
+use crate::robot::{IkReference, IkSolution, InverseKinematics, RobotModel};
 
 /// Whether a cut can be made at a place, and what stands against it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -47,10 +47,9 @@ impl PlaceStatus {
 /// How a robot gets to places; everything refers to one posture of it.
 pub struct Workspace<'a> {
     ik: InverseKinematics<'a>,
-    reference_rad: [f64; 6],
+    reference: IkReference,
     /// Tool frame of the posture: its x axis is where the redundancy angle counts from.
     tool: Isometry3<f64>,
-    branch: IkBranch,
     pub forbidden_deg: Vec<[f64; 2]>,
     /// Postures nearer to a singularity are not taken (see [`IkSolution::singularity_margin`]).
     pub least_singularity_margin: f64,
@@ -60,7 +59,7 @@ impl<'a> Workspace<'a> {
     /// `joints_deg`: the posture that angle 0, the branch and whole turns of the joints refer to.
     ///
     /// # Errors
-    /// A robot without closed inverse kinematics, or a posture at a singularity.
+    /// A robot of fewer than six joints or more than seven, or a posture at a singularity.
     pub fn new(
         robot: &'a RobotModel,
         joints_deg: &[f64],
@@ -68,13 +67,12 @@ impl<'a> Workspace<'a> {
         least_singularity_margin: f64,
     ) -> Result<Self> {
         let ik = InverseKinematics::new(&robot.spec)?;
-        let (reference_rad, branch) = ik.reference(joints_deg, "the map of the workspace")?;
+        let reference = ik.reference(joints_deg, "the map of the workspace")?;
         let tool = robot.kinematics(joints_deg)?.tool;
         Ok(Workspace {
             ik,
-            reference_rad,
+            reference,
             tool,
-            branch,
             forbidden_deg: forbidden_deg.to_vec(),
             least_singularity_margin,
         })
@@ -98,8 +96,8 @@ impl<'a> Workspace<'a> {
         )
     }
 
-    /// The joint angles at a place: on the posture's branch where that can be used, else on the one farthest from a
-    /// singularity.
+    /// The joint angles at a place: on the posture's branch where that can be used (with solutions that are searched for:
+    /// those nearest to the posture), else on the one farthest from a singularity.
     ///
     /// # Errors
     /// Why there are none.
@@ -107,11 +105,11 @@ impl<'a> Workspace<'a> {
         if in_forbidden_band(&self.forbidden_deg, place.angle_deg) {
             return Err(PlaceStatus::Forbidden);
         }
-        let all = self.ik.tool_pose(&self.pose(place), &self.reference_rad);
+        let all = self.ik.tool_pose(&self.pose(place), &self.reference);
         if all.is_empty() {
             return Err(PlaceStatus::OutOfReach);
         }
-        let within: Vec<IkSolution> = all.into_iter().filter(|s| s.limit_margin_rad >= -1e-9).collect();
+        let within: Vec<IkSolution> = all.into_iter().filter(IkSolution::is_within_limits).collect();
         if within.is_empty() {
             return Err(PlaceStatus::JointLimit);
         }
@@ -119,7 +117,9 @@ impl<'a> Workspace<'a> {
             .into_iter()
             .filter(|s| s.singularity_margin >= self.least_singularity_margin)
             .collect();
-        let own = usable.iter().position(|s| s.branch == self.branch);
+        let own = usable
+            .iter()
+            .position(|s| s.branch == self.reference.own_branch());
         let farthest = || {
             let margins = usable.iter().enumerate().map(|(i, s)| (i, s.singularity_margin));
             // The first of equal ones.
@@ -159,17 +159,17 @@ mod tests {
             tool_axis: here.tool_axis().into(),
             angle_deg: 0.0,
         };
-        let sweep = RedundancySweep::new(&robot, posture, 45.0, &[]).unwrap();
+        let sweep = RedundancySweep::new(&robot, posture, 45.0, &[], 0.0).unwrap();
         for angle in &sweep.angles {
             let place = Place {
                 angle_deg: angle.angle_deg,
                 ..own
             };
-            let (Some(swept), Ok(stand)) = (angle.joints_deg, workspace.stand(&place)) else {
+            let (Some(swept), Ok(stand)) = (&angle.joints_deg, workspace.stand(&place)) else {
                 continue;
             };
             let turned = robot.kinematics(&stand.joints_deg()).unwrap().tool.rotation;
-            let expected = robot.kinematics(&swept).unwrap().tool.rotation;
+            let expected = robot.kinematics(swept).unwrap().tool.rotation;
             assert!(turned.angle_to(&expected) < 1e-6, "{angle:?}");
         }
         let back = workspace.stand(&own).unwrap();

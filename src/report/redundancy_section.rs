@@ -57,7 +57,7 @@ pub fn blocks(analysis: &LobeAnalysis, found: &RedundancyAnalysis) -> Vec<Block>
         .map(|j| decimals(*j, 2))
         .collect();
     let optional = |v: Option<f64>, digits| v.map_or("–".to_string(), |v| decimals(v, digits));
-    let rows = [
+    let mut rows = vec![
         ("joint angles (°)", joints.join(", ")),
         ("nearest joint limit (°)", optional(r.posture.limit_margin_deg, 1)),
         (
@@ -82,6 +82,9 @@ pub fn blocks(analysis: &LobeAnalysis, found: &RedundancyAnalysis) -> Vec<Block>
         ("by particle swarm (mm)", significant(r.swarm.depth_mm, 4)),
         ("difference of the two (%)", decimals(100.0 * r.difference, 2)),
     ];
+    if let Some(elbow_deg) = r.posture.elbow_deg {
+        rows.insert(1, ("elbow angle (°)", decimals(elbow_deg, 1)));
+    }
     blocks.push(Block::Table(Table {
         caption: "The recommended place".into(),
         columns: vec![Column::text("quantity"), Column::text("value")],

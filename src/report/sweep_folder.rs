@@ -130,7 +130,12 @@ impl SweepFolder {
     pub fn write(&self, shard: Shard, rows: &[SweepRow]) -> Result<PathBuf> {
         let path = self.path(shard);
         let failed = |e| Error::computation(format!("{}: {e}", path.display()));
-        let mut frame = frame(rows).map_err(failed)?;
+        let joints = self
+            .settings
+            .get("joints_deg")
+            .and_then(Value::as_array)
+            .map_or(0, Vec::len);
+        let mut frame = frame(rows, joints).map_err(failed)?;
         write_atomically(&path, &self.bytes(&mut frame).map_err(failed)?)?;
         Ok(path)
     }
@@ -254,7 +259,7 @@ mod tests {
                 PlaceStatus::JointLimit
             },
             findings: usable.then(|| PlaceFindings {
-                joints_deg: [1.0, 2.0, 3.0, 4.0, 5.0, index as f64],
+                joints_deg: vec![1.0, 2.0, 3.0, 4.0, 5.0, index as f64],
                 ik_branch: 3,
                 limit_margin_deg: None,
                 singularity_margin: 0.4,

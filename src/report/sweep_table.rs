@@ -1,6 +1,6 @@
 //! The rows of a map of the workspace as a table of polars, and back.
 
-use polars::prelude::{AnyValue, DataFrame, PolarsError, PolarsResult, df};
+use polars::prelude::{AnyValue, Column, DataFrame, PolarsError, PolarsResult, df};
 use serde_json::{Map, Value, json};
 
 use super::sweep_summary::MapColumns;
@@ -64,21 +64,21 @@ pub fn row(frame: &DataFrame, index: usize) -> Map<String, Value> {
         .collect()
 }
 
-/// One row a place. What a place that cannot be used has no value of is null, and so are depths that nothing limits.
+/// One row a place, columns q1_deg … for as many joints as the robot has. What a place that cannot be used has no value of is null, and so are depths that nothing limits.
 ///
 /// # Errors
 /// polars', which would be a fault of this program.
-pub fn frame(rows: &[SweepRow]) -> PolarsResult<DataFrame> {
+pub fn frame(rows: &[SweepRow], joints: usize) -> PolarsResult<DataFrame> {
     let place = |f: fn(&SweepRow) -> f64| rows.iter().map(f).collect::<Vec<f64>>();
     let found = |f: &dyn Fn(&PlaceFindings) -> Option<f64>| {
         rows.iter()
             .map(|row| row.findings.as_ref().and_then(f))
             .collect::<Vec<Option<f64>>>()
     };
-    let joint = |i: usize| found(&|p| Some(p.joints_deg[i]));
+    let joint = |i: usize| found(&|p| p.joints_deg.get(i).copied());
     let stiffness = |i: usize| found(&|p| Some(p.tcp_stiffness_n_per_m[i]));
     let branch = |row: &SweepRow| row.findings.as_ref().map(|p| p.ik_branch);
-    df!(
+    let mut frame = df!(
         "place" => rows.iter().map(|r| r.place.index as u32).collect::<Vec<_>>(),
         "x_m" => place(|r| r.place.tcp_m[0]),
         "y_m" => place(|r| r.place.tcp_m[1]),
@@ -89,12 +89,6 @@ pub fn frame(rows: &[SweepRow]) -> PolarsResult<DataFrame> {
         "angle_deg" => place(|r| r.place.angle_deg),
         "status" => rows.iter().map(|r| r.status.name()).collect::<Vec<_>>(),
         "ik_branch" => rows.iter().map(branch).collect::<Vec<_>>(),
-        "q1_deg" => joint(0),
-        "q2_deg" => joint(1),
-        "q3_deg" => joint(2),
-        "q4_deg" => joint(3),
-        "q5_deg" => joint(4),
-        "q6_deg" => joint(5),
         "limit_margin_deg" => found(&|p| p.limit_margin_deg),
         "singularity_margin" => found(&|p| Some(p.singularity_margin)),
         "absolute_limit_mm" => found(&|p| p.absolute.map(|a| a.depth_mm)),
@@ -105,5 +99,11 @@ pub fn frame(rows: &[SweepRow]) -> PolarsResult<DataFrame> {
         "stiffness_y_n_per_m" => stiffness(1),
         "stiffness_z_n_per_m" => stiffness(2),
         "lowest_frequency_hz" => found(&|p| p.lowest_frequency_hz),
-    )
+    )?;
+    let behind = frame.get_column_index("ik_branch").map_or(0, |i| i + 1);
+    for i in 0..joints {
+        let column = Column::new(format!("q{}_deg", i + 1).into(), joint(i));
+        frame.insert_column(behind + i, column)?;
+    }
+    Ok(frame)
 }

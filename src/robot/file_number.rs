@@ -10,7 +10,7 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 /// One number of the robot file. Links and joints count from 1, axes are those of the link's Denavit–Hartenberg frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FileNumber {
-    /// Principal moment of inertia about the centre of mass, kg·m².
+    /// Moment of inertia about an axis through the centre of mass, kg·m²; products of inertia grow along.
     Inertia { link: usize, axis: usize },
     /// Coordinate of the centre of mass, m.
     Centre { link: usize, axis: usize },
@@ -60,11 +60,19 @@ impl FileNumber {
     }
 
     /// Lengths and offsets of the kinematics, without d of the first joint, which only lifts the whole robot along its axis,
-    /// and without those of the last, which the tool's position beside it says as well.
+    /// and without those of the last, which the tool's position beside it says as well. Joints that are placed otherwise than by
+    /// the Denavit–Hartenberg convention have none.
     pub fn lengths(spec: &RobotSpec) -> Vec<FileNumber> {
         let last = spec.joints.len();
         let joints = (1..last).flat_map(|joint| [FileNumber::Offset { joint }, FileNumber::Length { joint }]);
+        let by_convention = |number: &FileNumber| match *number {
+            FileNumber::Offset { joint } | FileNumber::Length { joint } => {
+                spec.joints[joint - 1].placement.is_none()
+            }
+            _ => true,
+        };
         joints
+            .filter(by_convention)
             .filter(|number| *number != FileNumber::Offset { joint: 1 })
             .filter(|number| !number.is_said_before(spec))
             .collect()
@@ -79,7 +87,10 @@ impl FileNumber {
     /// Along parallel axes the offsets of two joints are one: only the first counts.
     fn is_said_before(self, spec: &RobotSpec) -> bool {
         match self {
-            FileNumber::Offset { joint } if joint > 1 => spec.joints[joint - 2].alpha_rad.sin().abs() < 1e-9,
+            FileNumber::Offset { joint } if joint > 1 => {
+                let before = &spec.joints[joint - 2];
+                before.placement.is_none() && before.alpha_rad.sin().abs() < 1e-9
+            }
             _ => false,
         }
     }
@@ -99,7 +110,17 @@ impl FileNumber {
     /// Writes `value` into `robot`.
     pub fn set(self, robot: &mut RobotModel, value: f64) {
         match self {
-            FileNumber::Inertia { link, axis } => robot.spec.links[link - 1].inertia_kg_m2[axis] = value,
+            FileNumber::Inertia { link, axis } => {
+                let link = &mut robot.spec.links[link - 1];
+                // Products grow along, so that no axis is left with a negative moment.
+                let stretched = (value / link.inertia_kg_m2[axis]).max(0.0).sqrt();
+                link.inertia_kg_m2[axis] = value;
+                for (product, axes) in link.products_kg_m2.iter_mut().zip([[0, 1], [0, 2], [1, 2]]) {
+                    if axes.contains(&axis) {
+                        *product *= stretched;
+                    }
+                }
+            }
             FileNumber::Centre { link, axis } => {
                 let mut centre = centre_m(robot, link);
                 centre[axis] = value;

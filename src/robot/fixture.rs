@@ -12,16 +12,16 @@ pub fn irb6640() -> RobotSpec {
         alpha_rad: alpha_deg.to_radians(),
         offset_rad: offset_deg.to_radians(),
         compliance_rad_per_nm: compliance,
-        limits_rad: None,
+        ..JointSpec::default()
     };
     let link = |mass_kg: f64, inertia_kg_m2: [f64; 3], section: Option<(f64, f64)>| LinkSpec {
         mass_kg,
         inertia_kg_m2,
-        com_m: None,
         section: section.map(|(outer_diameter_m, wall_m)| BeamSection {
             outer_diameter_m,
             wall_m,
         }),
+        ..LinkSpec::default()
     };
     RobotSpec {
         name: "ABB IRB 6640-205/2.75".into(),
@@ -44,7 +44,83 @@ pub fn irb6640() -> RobotSpec {
         tool: ToolFrame {
             tcp_in_flange_m: [0.1989, 0.0, 0.5599],
             tilt_about_flange_y_rad: 45f64.to_radians(),
+            ..ToolFrame::default()
         },
+        guesses: Vec::new(),
+    }
+}
+
+/// The UR10e by its published Denavit–Hartenberg table, as far as inverse kinematics needs it: a wrist that is not spherical.
+pub fn ur10e() -> RobotSpec {
+    let rows = [
+        (0.1807, 0.0, 90.0f64),
+        (0.0, -0.6127, 0.0),
+        (0.0, -0.57155, 0.0),
+        (0.17415, 0.0, 90.0),
+        (0.11985, 0.0, -90.0),
+        (0.11655, 0.0, 0.0),
+    ];
+    let joint = |(d_m, a_m, alpha_deg): (f64, f64, f64)| JointSpec {
+        d_m,
+        a_m,
+        alpha_rad: alpha_deg.to_radians(),
+        compliance_rad_per_nm: 5e-5,
+        ..JointSpec::default()
+    };
+    let link = LinkSpec {
+        mass_kg: 5.0,
+        inertia_kg_m2: [0.1; 3],
+        ..LinkSpec::default()
+    };
+    RobotSpec {
+        name: "UR10e".into(),
+        joints: rows.into_iter().map(joint).collect(),
+        links: vec![link; 6],
+        tool: ToolFrame::default(),
+        guesses: Vec::new(),
+    }
+}
+
+/// An arm with nothing square about it: joints placed anywhere, axes and inertias askew.
+pub fn awkward_arm(joints: usize) -> RobotSpec {
+    let mut seed = 0.37f64;
+    // Weyl's sequence: spread over −1 to 1 and the same on every machine.
+    let mut next = || {
+        seed = (seed + 0.618_033_988_749_894_9).fract();
+        2.0 * seed - 1.0
+    };
+    let joint = |i: usize, next: &mut dyn FnMut() -> f64| {
+        let axis = Vector3::new(next(), next(), 1.2 * next()).normalize();
+        JointSpec {
+            name: Some(format!("axis {i}")),
+            compliance_rad_per_nm: 1e-5 * (1.0 + i as f64),
+            limits_rad: Some([-2.9, 2.9]),
+            placement: Some(JointPlacement {
+                origin_m: [0.2 * next(), 0.1 * next(), 0.3],
+                rpy_rad: [next(), 0.7 * next(), 2.0 * next()],
+                axis: axis.into(),
+            }),
+            ..JointSpec::default()
+        }
+    };
+    let link = |i: usize, next: &mut dyn FnMut() -> f64| LinkSpec {
+        name: Some(format!("link {i}")),
+        mass_kg: 12.0 - i as f64,
+        inertia_kg_m2: [0.5, 0.6, 0.4],
+        products_kg_m2: [0.1 * next(), 0.1 * next(), 0.1 * next()],
+        com_m: Some([0.1 * next(), 0.1 * next(), 0.15]),
+        section: None,
+    };
+    RobotSpec {
+        name: "awkward arm".into(),
+        joints: (1..=joints).map(|i| joint(i, &mut next)).collect(),
+        links: (1..=joints).map(|i| link(i, &mut next)).collect(),
+        tool: ToolFrame {
+            tcp_in_flange_m: [0.03, -0.02, 0.21],
+            rpy_in_flange_rad: [0.2, -0.5, 1.0],
+            ..ToolFrame::default()
+        },
+        guesses: Vec::new(),
     }
 }
 

@@ -1,233 +1,238 @@
-//! Inverse kinematics in closed form for six-axis arms with a spherical wrist (Pieper 1968; Craig 2005, §4.6).
-//!
-//! The arm: joint 2 and 3 parallel, joint 1 and 4 normal to them; the axes of joints 4 to 6 meet in one point. Up to
-//! eight branches: shoulder turned round or not, elbow up or down, wrist flipped or not.
+//! Inverse kinematics: in closed form for six-axis arms with a spherical wrist ([`SphericalWrist`]), by search for other
+//! arms of six or seven joints ([`NumericInverse`]).
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
-use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::Isometry3;
 
-use super::dh::{Kinematics, joint_transform};
-use crate::campaign::robot_spec::RobotSpec;
+use super::dh::Kinematics;
+use super::numeric_inverse::NumericInverse;
+use super::spherical_wrist::SphericalWrist;
+use crate::campaign::robot_spec::{JointSpec, RobotSpec};
 use crate::{Error, Result};
-
-/// Which of the eight solutions; every sign keeps its meaning along a continuous motion that meets no singularity.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct IkBranch {
-    pub shoulder: bool,
-    pub elbow: bool,
-    pub wrist: bool,
-}
 
 /// Joint angles that put the tool where it was asked to be.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IkSolution {
-    pub branch: IkBranch,
+    /// Which of the solutions. In closed form 4 shoulder + 2 elbow + wrist, each of which keeps its meaning along a
+    /// motion that meets no singularity; by search 0 is the solution nearest to the reference, 1 the next.
+    pub branch: u32,
     /// Whole turns chosen so that joints lie within their limits, and there nearest to the reference.
-    pub q_rad: [f64; 6],
+    pub q_rad: Vec<f64>,
     /// Distance of the nearest joint to its limit, rad; negative outside, infinite without limits.
     pub limit_margin_rad: f64,
-    /// Distance from the nearest singularity, 0 to 1: the least of |sin θ₅| (wrist), the sine between upper and
-    /// fore arm (elbow), and the wrist's distance from axis 1 over the upper arm's length (shoulder).
+    /// Distance from the nearest singularity, 0 to 1. In closed form the least of |sin θ₅| (wrist), the sine between upper
+    /// and fore arm (elbow), and the wrist's distance from axis 1 over the upper arm's length (shoulder); by search the
+    /// inverse condition number of the Jacobian with lengths over the arm's own.
     pub singularity_margin: f64,
+    /// Of an arm with seven joints, see [`NumericInverse::elbow_rad`].
+    pub elbow_rad: Option<f64>,
 }
 
 impl IkSolution {
-    pub fn within_limits(&self) -> bool {
-        self.limit_margin_rad >= 0.0
+    pub fn is_within_limits(&self) -> bool {
+        // Rounding must not put an angle at its limit outside.
+        self.limit_margin_rad >= -1e-9
     }
 
-    pub fn joints_deg(&self) -> [f64; 6] {
-        self.q_rad.map(f64::to_degrees)
+    pub fn joints_deg(&self) -> Vec<f64> {
+        self.q_rad.iter().map(|q| q.to_degrees()).collect()
     }
 }
 
-/// Closed-form inverse kinematics of one robot.
+/// The posture that a task refers to.
+#[derive(Debug, Clone)]
+pub struct IkReference {
+    pub q_rad: Vec<f64>,
+    /// Its branch; `None` where solutions are searched for.
+    branch: Option<u32>,
+    /// Elbow angle to be kept, of an arm with seven joints.
+    pub elbow_rad: Option<f64>,
+}
+
+impl IkReference {
+    /// Branch of the posture itself among the solutions at any pose.
+    pub fn own_branch(&self) -> u32 {
+        self.branch.unwrap_or(0)
+    }
+}
+
+#[derive(Debug, Clone)]
+enum Form<'a> {
+    Closed(SphericalWrist<'a>),
+    Numeric(NumericInverse<'a>),
+}
+
+/// Inverse kinematics of one robot.
 #[derive(Debug, Clone)]
 pub struct InverseKinematics<'a> {
     spec: &'a RobotSpec,
+    form: Form<'a>,
 }
 
-const ANGLE_TOLERANCE: f64 = 1e-9;
-const LENGTH_TOLERANCE_M: f64 = 1e-9;
-/// Below this sine of θ₅ joints 4 and 6 turn about one line, and only their sum is known.
-const SINGULAR_SINE: f64 = 1e-9;
+/// Elbow angles that are tried where the wanted one cannot be had, rad: 10°.
+const ELBOW_STEP: f64 = TAU / 36.0;
+/// The same where every one takes a search: 60°.
+const WIDE_ELBOW_STEP: f64 = TAU / 6.0;
 
 impl<'a> InverseKinematics<'a> {
     /// # Errors
-    /// Where the robot is not a six-axis arm of this kind: says which entry of the robot file stands against it.
+    /// Arms of fewer than six joints, which reach single poses only, or of more than seven.
     pub fn new(spec: &'a RobotSpec) -> Result<Self> {
-        let refuse = |what: String| -> Result<Self> {
-            Err(Error::computation(format!(
-                "{}: no closed inverse kinematics: {what}; it needs six joints, 2 and 3 parallel, 1 and 4 normal to \
-                 them, and a spherical wrist",
-                spec.name
-            )))
+        let form = match SphericalWrist::new(spec) {
+            Ok(closed) => Form::Closed(closed),
+            Err(_) => Form::Numeric(NumericInverse::new(spec)?),
         };
-        if spec.joints.len() != 6 {
-            return refuse(format!("{} joints", spec.joints.len()));
-        }
-        for i in [0, 2, 3, 4] {
-            if spec.joints[i].alpha_rad.cos().abs() > ANGLE_TOLERANCE {
-                return refuse(format!("alpha of joint {} is not ±90°", i + 1));
-            }
-        }
-        if spec.joints[1].alpha_rad.abs() > ANGLE_TOLERANCE {
-            return refuse("alpha of joint 2 is not 0".into());
-        }
-        for (i, length) in [
-            (3, spec.joints[3].a_m),
-            (4, spec.joints[4].a_m),
-            (5, spec.joints[5].a_m),
-            (4, spec.joints[4].d_m),
-        ] {
-            if length.abs() > LENGTH_TOLERANCE_M {
-                return refuse(format!("the wrist's axes do not meet at joint {}", i + 1));
-            }
-        }
-        if !(spec.joints[1].a_m.abs() > LENGTH_TOLERANCE_M) {
-            return refuse("the upper arm has no length".into());
-        }
-        Ok(InverseKinematics { spec })
+        Ok(InverseKinematics { spec, form })
     }
 
-    /// All branches that reach a pose of the tool (origin and axes of [`Kinematics::tool`], base frame), whether within
-    /// the joint limits or not, in a fixed order; none where the pose is out of reach. `reference_rad` chooses among
-    /// whole turns, and stands for joint 4 where the wrist is singular.
-    pub fn tool_pose(&self, tool: &Isometry3<f64>, reference_rad: &[f64; 6]) -> Vec<IkSolution> {
-        let frame = &self.spec.tool;
-        let tilt = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), frame.tilt_about_flange_y_rad);
-        let in_flange = Isometry3::from_parts(Translation3::from(Vector3::from(frame.tcp_in_flange_m)), tilt);
-        self.flange_pose(&(tool * in_flange.inverse()), reference_rad)
+    /// Whether the arm has a joint more than a tool pose needs, so that its elbow can be turned with the tool at rest.
+    pub fn has_elbow(&self) -> bool {
+        matches!(&self.form, Form::Numeric(numeric) if numeric.has_elbow())
     }
 
-    fn flange_pose(&self, flange: &Isometry3<f64>, reference_rad: &[f64; 6]) -> Vec<IkSolution> {
-        let joints = &self.spec.joints;
-        let sine = |i: usize| joints[i].alpha_rad.sin().signum();
-        let rotation = Rotation3::from(flange.rotation);
-        // Axis of joint 6 in the base frame; the wrist's centre lies d₆ behind the flange along it.
-        let (s6, c6) = joints[5].alpha_rad.sin_cos();
-        let axis6 = rotation * Vector3::new(0.0, s6, c6);
-        let centre = flange.translation.vector - axis6 * joints[5].d_m;
-
-        // Shoulder: the centre's distance from the arm's plane is what joints 2 and 3 are offset by.
-        let offset = joints[1].d_m + joints[2].d_m;
-        let radius = centre.xy().norm();
-        let ratio = offset / radius;
-        if !(ratio.abs() <= 1.0) {
-            return Vec::new();
-        }
-        let mut solutions = Vec::new();
-        for shoulder in [false, true] {
-            // −sin α₁ (−x sin θ + y cos θ) = offset, with x + iy = r e^{iβ}: r sin(β − θ) = −offset / sin α₁.
-            let bend = (-ratio / sine(0)).asin();
-            let beta = centre.y.atan2(centre.x);
-            let theta1 = if shoulder { beta - PI + bend } else { beta - bend };
-            let first = joint_transform(&joints[0], theta1 - joints[0].offset_rad);
-            let local = first.inverse_transform_point(&centre.into());
-            let target = Vector2::new(local.x, local.y);
-            let upper = joints[1].a_m;
-            // Fore arm from joint 3 to the wrist, before joint 3 turns it.
-            let fore = Vector2::new(joints[2].a_m, -joints[3].d_m * sine(2));
-            let cosine =
-                (target.norm_squared() - upper * upper - fore.norm_squared()) / (2.0 * upper * fore.norm());
-            if !(cosine.abs() <= 1.0) {
-                continue;
-            }
-            let bent = cosine.acos();
-            for elbow in [false, true] {
-                let theta3 = (if elbow { -bent } else { bent }) - fore.y.atan2(fore.x);
-                let (s3, c3) = theta3.sin_cos();
-                let reach = Vector2::new(upper + c3 * fore.x - s3 * fore.y, s3 * fore.x + c3 * fore.y);
-                let theta2 = target.y.atan2(target.x) - reach.y.atan2(reach.x);
-                let to_wrist = first
-                    * joint_transform(&joints[1], theta2 - joints[1].offset_rad)
-                    * joint_transform(&joints[2], theta3 - joints[2].offset_rad);
-                let untwisted =
-                    rotation * Rotation3::from_axis_angle(&Vector3::x_axis(), -joints[5].alpha_rad);
-                let m = Rotation3::from(to_wrist.rotation).inverse() * untwisted;
-                let m = m.matrix();
-                let cosine5 = -sine(3) * sine(4) * m[(2, 2)];
-                let sine5 = m[(0, 2)].hypot(m[(1, 2)]);
-                for wrist in [false, true] {
-                    let sign = if wrist { -1.0 } else { 1.0 };
-                    let theta5 = (sign * sine5).atan2(cosine5);
-                    let theta4 = if sine5 > SINGULAR_SINE {
-                        let sign = sign * sine(4);
-                        (sign * m[(1, 2)]).atan2(sign * m[(0, 2)])
-                    } else {
-                        reference_rad[3] + joints[3].offset_rad
-                    };
-                    let before = Rotation3::from_axis_angle(&Vector3::z_axis(), theta4)
-                        * Rotation3::from_axis_angle(&Vector3::x_axis(), joints[3].alpha_rad)
-                        * Rotation3::from_axis_angle(&Vector3::z_axis(), theta5)
-                        * Rotation3::from_axis_angle(&Vector3::x_axis(), joints[4].alpha_rad);
-                    let last = before.matrix().transpose() * m;
-                    let theta6 = last[(1, 0)].atan2(last[(0, 0)]);
-                    let theta = [theta1, theta2, theta3, theta4, theta5, theta6];
-                    let q_rad = std::array::from_fn(|i| {
-                        let limits = joints[i].limits_rad;
-                        nearest_turn(theta[i] - joints[i].offset_rad, reference_rad[i], limits)
-                    });
-                    solutions.push(IkSolution {
-                        branch: IkBranch {
-                            shoulder,
-                            elbow,
-                            wrist,
-                        },
-                        limit_margin_rad: self.limit_margin_rad(&q_rad),
-                        q_rad,
-                        singularity_margin: sine5.abs().min(bent.sin()).min(radius / upper.abs()),
-                    });
-                }
-            }
-        }
-        solutions
-    }
-
-    /// Distance of the nearest joint to its limit, rad; negative outside.
-    pub fn limit_margin_rad(&self, q_rad: &[f64; 6]) -> f64 {
-        let margins = self.spec.joints.iter().zip(q_rad).filter_map(|(joint, q)| {
-            let [low, high] = joint.limits_rad?;
-            Some((q - low).min(high - q))
-        });
-        margins.fold(f64::INFINITY, f64::min)
-    }
-
-    /// Joint angles (rad) and branch of the posture, in degrees, that `what` refers to.
+    /// The posture, in degrees, that `what` refers to.
     ///
     /// # Errors
-    /// Not six joints, or a posture at a singularity.
-    pub fn reference(&self, joints_deg: &[f64], what: &str) -> Result<([f64; 6], IkBranch)> {
-        let joints_deg: [f64; 6] = joints_deg
-            .try_into()
-            .map_err(|_| Error::computation(format!("{what} needs six joint angles")))?;
-        let q_rad = joints_deg.map(f64::to_radians);
-        let branch = self.branch_of(&q_rad).ok_or_else(|| {
+    /// Another number of joints, or a posture at a singularity.
+    pub fn reference(&self, joints_deg: &[f64], what: &str) -> Result<IkReference> {
+        let joints = self.spec.joints.len();
+        if joints_deg.len() != joints {
+            return Err(Error::computation(format!("{what} needs {joints} joint angles")));
+        }
+        let q_rad: Vec<f64> = joints_deg.iter().map(|q| q.to_radians()).collect();
+        let singular = || {
             Error::computation(format!(
                 "the posture that {what} refers to stands at a singularity of the robot: choose another one"
             ))
-        })?;
-        Ok((q_rad, branch))
+        };
+        let (branch, elbow_rad) = match &self.form {
+            Form::Closed(closed) => (Some(closed.branch_of(&q_rad).ok_or_else(singular)?), None),
+            Form::Numeric(numeric) => {
+                if numeric.is_singular(&q_rad) {
+                    return Err(singular());
+                }
+                (None, numeric.elbow_rad(&q_rad))
+            }
+        };
+        Ok(IkReference {
+            q_rad,
+            branch,
+            elbow_rad,
+        })
     }
 
-    /// The branch that a posture lies on; `None` where it stands at a singularity and two branches meet.
-    pub fn branch_of(&self, q_rad: &[f64; 6]) -> Option<IkBranch> {
-        let tool = Kinematics::new(self.spec, q_rad).tool;
-        let off = |s: &IkSolution| -> f64 {
-            let differences = s.q_rad.iter().zip(q_rad).map(|(a, b)| (a - b).abs());
-            differences.fold(0.0, f64::max)
+    /// The posture at a tool pose that a motion from `near_rad` (a posture on the reference's branch) leads to without
+    /// meeting a singularity, within the limits; an elbow stands as the reference wants it or, where the limits or the reach
+    /// stand against that, as near to it as can be (in steps of 10°).
+    pub fn follow(
+        &self,
+        tool: &Isometry3<f64>,
+        reference: &IkReference,
+        near_rad: &[f64],
+    ) -> Option<IkSolution> {
+        let numeric = match &self.form {
+            Form::Closed(closed) => {
+                let all = closed.tool_pose(tool, near_rad);
+                return all
+                    .into_iter()
+                    .find(|s| Some(s.branch) == reference.branch && s.is_within_limits());
+            }
+            Form::Numeric(numeric) => numeric,
         };
-        self.tool_pose(&tool, q_rad)
+        let elbows = match reference.elbow_rad {
+            Some(wanted) => around(wanted, ELBOW_STEP).map(Some).collect(),
+            None => vec![None],
+        };
+        elbows
             .into_iter()
-            .filter(|s| off(s) < 1e-6)
-            .map(|s| s.branch)
-            .next()
+            .filter_map(|elbow| numeric.follow(tool, near_rad, elbow))
+            .map(|q| self.found(q, near_rad, 0))
+            .find(IkSolution::is_within_limits)
+    }
+
+    /// All postures at a tool pose, within the limits or not, in a fixed order; none where it is out of reach. The
+    /// reference chooses among whole turns of the joints. Of an arm with seven joints those with the reference's elbow
+    /// angle, or, where none of them lies within the limits, with another one (in steps of 60°).
+    pub fn tool_pose(&self, tool: &Isometry3<f64>, reference: &IkReference) -> Vec<IkSolution> {
+        let numeric = match &self.form {
+            Form::Closed(closed) => return closed.tool_pose(tool, &reference.q_rad),
+            Form::Numeric(numeric) => numeric,
+        };
+        let at = |elbow: Option<f64>| -> Vec<IkSolution> {
+            let found = numeric.tool_pose(tool, &reference.q_rad, elbow);
+            let mut all: Vec<IkSolution> = found
+                .into_iter()
+                .map(|q| self.found(q, &reference.q_rad, 0))
+                .collect();
+            let off = |s: &IkSolution| farthest(&s.q_rad, &reference.q_rad);
+            all.sort_by(|a, b| off(a).total_cmp(&off(b)));
+            for (branch, solution) in (0..).zip(&mut all) {
+                solution.branch = branch;
+            }
+            all
+        };
+        let Some(wanted) = reference.elbow_rad else {
+            return at(None);
+        };
+        let mut beyond = Vec::new();
+        for elbow in around(wanted, WIDE_ELBOW_STEP) {
+            let all = at(Some(elbow));
+            if all.iter().any(IkSolution::is_within_limits) {
+                return all;
+            }
+            if beyond.is_empty() {
+                beyond = all;
+            }
+        }
+        beyond
+    }
+
+    fn found(&self, q_rad: Vec<f64>, reference_rad: &[f64], branch: u32) -> IkSolution {
+        let joints = self.spec.joints.iter().zip(q_rad.iter().zip(reference_rad));
+        let q_rad: Vec<f64> = joints
+            .map(|(joint, (q, reference))| nearest_turn(*q, *reference, joint.limits_rad))
+            .collect();
+        let (singularity_margin, elbow_rad) = match &self.form {
+            Form::Numeric(numeric) => (numeric.singularity_margin(&q_rad), numeric.elbow_rad(&q_rad)),
+            Form::Closed(_) => (0.0, None),
+        };
+        IkSolution {
+            branch,
+            limit_margin_rad: limit_margin_rad(&self.spec.joints, &q_rad),
+            singularity_margin,
+            elbow_rad,
+            q_rad,
+        }
     }
 }
 
+/// Angles from `wanted` outwards on both sides in turn, once round.
+fn around(wanted: f64, step: f64) -> impl Iterator<Item = f64> {
+    let count = (TAU / step).round() as i32;
+    (0..count).map(move |i| {
+        let outwards = f64::from((i + 1) / 2) * step;
+        wanted + if i % 2 == 0 { -outwards } else { outwards }
+    })
+}
+
+/// Greatest difference of two postures in any joint, rad.
+pub(super) fn farthest(a: &[f64], b: &[f64]) -> f64 {
+    let differences = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+    differences.fold(0.0, f64::max)
+}
+
+/// Distance of the nearest joint to its limit, rad; negative outside.
+pub(super) fn limit_margin_rad(joints: &[JointSpec], q_rad: &[f64]) -> f64 {
+    let margins = joints.iter().zip(q_rad).filter_map(|(joint, q)| {
+        let [low, high] = joint.limits_rad?;
+        Some((q - low).min(high - q))
+    });
+    margins.fold(f64::INFINITY, f64::min)
+}
+
 /// The angle plus whole turns: within the limits where it can be, and there nearest to the reference.
-fn nearest_turn(angle_rad: f64, reference_rad: f64, limits_rad: Option<[f64; 2]>) -> f64 {
+pub(super) fn nearest_turn(angle_rad: f64, reference_rad: f64, limits_rad: Option<[f64; 2]>) -> f64 {
     let nearest = angle_rad + TAU * ((reference_rad - angle_rad) / TAU).round();
     let Some([low, high]) = limits_rad else {
         return nearest;
@@ -241,76 +246,7 @@ fn nearest_turn(angle_rad: f64, reference_rad: f64, limits_rad: Option<[f64; 2]>
         .unwrap_or(nearest)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::robot::fixture::{TAP_POSTURES, irb6640};
-    use proptest::prelude::*;
-
-    fn with_shoulder_offset() -> RobotSpec {
-        let mut spec = irb6640();
-        spec.joints[1].d_m = 0.12;
-        spec.joints[2].d_m = -0.03;
-        spec.joints[0].alpha_rad = PI / 2.0;
-        spec.joints[5].alpha_rad = 0.4;
-        spec
-    }
-
-    proptest! {
-        /// Every branch leads back to the pose, and one of them to the angles it came from.
-        #[test]
-        fn forward_and_inverse_are_each_others_inverse(
-            q in proptest::array::uniform6(-3.1f64..3.1),
-            offset in any::<bool>(),
-        ) {
-            let spec = if offset { with_shoulder_offset() } else { irb6640() };
-            let ik = InverseKinematics::new(&spec).unwrap();
-            let tool = Kinematics::new(&spec, &q).tool;
-            let solutions = ik.tool_pose(&tool, &q);
-            prop_assert!(solutions.len() >= 4 && solutions.len() <= 8);
-            let mut met = false;
-            for s in &solutions {
-                let back = Kinematics::new(&spec, &s.q_rad).tool;
-                let off = (back.translation.vector - tool.translation.vector).norm();
-                prop_assert!(off < 1e-8, "{s:?} {off}");
-                prop_assert!(back.rotation.angle_to(&tool.rotation) < 1e-7, "{s:?}");
-                let worst = s.q_rad.iter().zip(&q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-                met |= worst < 1e-6;
-            }
-            let margin = solutions.iter().map(|s| s.singularity_margin).fold(1.0, f64::min);
-            prop_assert!(met || margin < 1e-5, "{q:?} {solutions:?}");
-        }
-    }
-
-    #[test]
-    fn limits_choose_the_turn_and_are_measured() {
-        let mut spec = irb6640();
-        for joint in &mut spec.joints {
-            joint.limits_rad = Some([-2.0 * PI, 2.0 * PI]);
-        }
-        spec.joints[4].limits_rad = Some([-0.2, 0.2]);
-        let ik = InverseKinematics::new(&spec).unwrap();
-        let q: [f64; 6] = TAP_POSTURES[0].map(f64::to_radians);
-        let tool = Kinematics::new(&spec, &q).tool;
-        let mut reference = q;
-        reference[5] += TAU;
-        let solutions = ik.tool_pose(&tool, &reference);
-        let branch = ik.branch_of(&q).unwrap();
-        let same = solutions.iter().find(|s| s.branch == branch).unwrap();
-        assert!((same.q_rad[5] - (q[5] + TAU)).abs() < 1e-9);
-        assert!((same.limit_margin_rad - (0.2 - q[4].abs())).abs() < 1e-9);
-        assert!(!same.within_limits());
-    }
-
-    #[test]
-    fn out_of_reach_and_other_arms() {
-        let spec = irb6640();
-        let ik = InverseKinematics::new(&spec).unwrap();
-        let far = Isometry3::translation(9.0, 0.0, 1.0);
-        assert!(ik.tool_pose(&far, &[0.0; 6]).is_empty());
-        let mut other = irb6640();
-        other.joints[4].d_m = 0.1;
-        let message = InverseKinematics::new(&other).err().unwrap().to_string();
-        assert!(message.contains("spherical wrist"), "{message}");
-    }
+/// The tool frame at joint angles.
+pub(super) fn tool_at(spec: &RobotSpec, q_rad: &[f64]) -> Isometry3<f64> {
+    Kinematics::new(spec, q_rad).tool
 }

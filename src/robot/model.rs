@@ -1,6 +1,6 @@
 //! The robot model: a specification turned into a chain at a posture.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Point3, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Point3, Vector3, Vector6};
 
 use super::beam;
 use super::chain::{Body, Chain, Element, Place, Role, Slot};
@@ -112,12 +112,11 @@ impl RobotModel {
             .map(|i| {
                 let link = &self.spec.links[i - 1];
                 let rotation = kinematics.link_rotation(i);
-                let principal = Matrix3::from_diagonal(&Vector3::from(link.inertia_kg_m2));
                 Body {
                     place: Place::new(i, Slot::Body),
                     com: self.link_com(kinematics, i),
                     mass_kg: link.mass_kg,
-                    inertia_kg_m2: rotation * principal * rotation.transpose(),
+                    inertia_kg_m2: rotation * link.inertia_tensor() * rotation.transpose(),
                     scale: baseline.mass_scale[i - 1].clone(),
                     inertia_follows_mass: true,
                 }
@@ -326,7 +325,7 @@ mod tests {
                     alpha_rad: 0.0,
                     offset_rad: 0.0,
                     compliance_rad_per_nm: 1e-16,
-                    limits_rad: None
+                    ..JointSpec::default()
                 };
                 count
             ],
@@ -334,12 +333,13 @@ mod tests {
                 LinkSpec {
                     mass_kg: 1.0,
                     inertia_kg_m2: [0.1; 3],
-                    com_m: None,
-                    section: Some(section)
+                    section: Some(section),
+                    ..LinkSpec::default()
                 };
                 count
             ],
             tool: ToolFrame::default(),
+            guesses: Vec::new(),
         };
         let model = RobotModel::new(spec);
         let kinematics = model.kinematics(&[0.0; 4]).unwrap();

@@ -74,7 +74,7 @@ mod tests {
             alpha_rad: 0.0,
             offset_rad: 0.0,
             compliance_rad_per_nm: c,
-            limits_rad: None,
+            ..JointSpec::default()
         };
         let link = irb6640().links.remove(0);
         let robot = RobotModel::new(RobotSpec {
@@ -82,6 +82,7 @@ mod tests {
             joints: vec![joint],
             links: vec![link],
             tool: ToolFrame::default(),
+            guesses: Vec::new(),
         });
         let kinematics = robot.kinematics(&[0.0]).unwrap();
         let chain = robot.chain(&kinematics, &Baseline::nominal(&robot.spec));

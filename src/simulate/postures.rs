@@ -2,7 +2,7 @@
 
 use super::draw::Draws;
 use crate::campaign::Posture;
-use crate::robot::RobotModel;
+use crate::robot::{JointSpec, RobotModel};
 use crate::{Error, Result, thesis};
 
 /// Tap-test postures of the built-in robot, in the order in which campaigns visit their neighbourhoods.
@@ -103,7 +103,7 @@ fn one(
 
 fn is_sensible(model: &RobotModel, joints_deg: &[f64]) -> Result<bool> {
     let tool = model.kinematics(joints_deg)?.tcp();
-    let length: f64 = model.spec.joints.iter().map(|j| j.a_m.hypot(j.d_m)).sum();
+    let length: f64 = model.spec.joints.iter().map(JointSpec::length_m).sum();
     Ok(tool.z >= -1e-9 && tool.x.hypot(tool.y) >= LEAST_REACH * length)
 }
 

@@ -26,6 +26,7 @@ mod plan;
 mod records;
 mod report;
 mod revisions;
+mod robots;
 mod robustness;
 mod sample_reports;
 mod schema;

@@ -11,7 +11,7 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 
 use super::{CuttingAnalysis, CuttingFindings, DiagnosisFindings, StructureAnalysis};
-use crate::campaign::{Campaign, Process, campaign_file};
+use crate::campaign::{Campaign, campaign_file};
 use crate::cutting::{CfcOptions, Group, identify_forces};
 use crate::discrepancy::setup::{SetupCheck, SetupFinding};
 use crate::discrepancy::{Diagnosis, Verdict};

@@ -1,5 +1,7 @@
 //! One line of the file to be, and how what a person types becomes TOML.
 
+use crate::campaign::robot_text::quoted;
+
 /// What a value looks like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
@@ -119,11 +121,6 @@ impl Entry {
             .map(|(key, value)| format!("{key} = {value}{note}\n"));
         lines.collect()
     }
-}
-
-/// Text as a TOML string.
-pub(super) fn quoted(text: &str) -> String {
-    toml::Value::String(text.to_string()).to_string()
 }
 
 fn parse(kind: Kind, key: &'static str, typed: &str) -> Result<Vec<(&'static str, String)>, String> {

@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use super::robot_text::quoted;
 use super::suggest::shown;
 use super::{Campaign, campaign_file};
 use crate::files::{write_atomically, write_new};
@@ -240,7 +241,7 @@ impl Draft {
     pub fn toml(&self) -> String {
         let mut text = format!(
             "schema = \"lobestone/campaign/1\"\nname = {}\n",
-            entry::quoted(&self.name)
+            quoted(&self.name)
         );
         for table in &self.tables {
             // A section without a line of its own would only be in the way.

@@ -16,6 +16,11 @@ const FROM_HEADER: &str = "from the file's header";
 /// The sections in the order in which they stand in the file.
 pub fn of(scan: &Scan, answers: &Answers) -> Result<Vec<Table>> {
     let mut tables = Vec::new();
+    if scan.frfs.is_empty() && answers.get("robot", "", "model").is_some() {
+        // A robot before anything was measured.
+        tables.push(robot(scan, answers)?);
+        tables.extend(named_postures(&answers.names("posture"), answers)?);
+    }
     if !scan.frfs.is_empty() {
         tables.push(robot(scan, answers)?);
         tables.extend(points(scan, answers)?);
@@ -158,6 +163,10 @@ fn postures(scan: &Scan, answers: &Answers) -> Result<Vec<Table>> {
             ids.push(id);
         }
     }
+    named_postures(&ids, answers)
+}
+
+fn named_postures(ids: &[&str], answers: &Answers) -> Result<Vec<Table>> {
     let mut tables = Vec::new();
     for id in ids {
         let mut making = Making::new(answers, "posture", id, true);

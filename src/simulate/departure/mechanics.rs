@@ -443,7 +443,7 @@ impl Departure for RadialBearing {
     }
 
     fn change_chain(&self, strength: f64, scene: &Scene, chain: &mut Chain) {
-        let rotation = scene.kinematics.frames[self.joint - 1].rotation;
+        let rotation = scene.kinematics.joint_frame(self.joint).rotation;
         let across = [Vector3::x(), Vector3::y()].map(|a| {
             let v = rotation * a;
             Vector6::new(v.x, v.y, v.z, 0.0, 0.0, 0.0)

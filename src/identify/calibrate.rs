@@ -83,7 +83,9 @@ impl Calibration {
             known.then(|| (self.covariance[(i, j)] / product).clamp(-1.0, 1.0))
         };
         let all = 0..self.covariance.nrows();
-        all.clone().map(|i| all.clone().map(|j| of(i, j)).collect()).collect()
+        all.clone()
+            .map(|i| all.clone().map(|j| of(i, j)).collect())
+            .collect()
     }
 
     pub fn converged(&self) -> bool {

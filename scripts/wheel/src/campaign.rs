@@ -81,19 +81,22 @@ pub fn frfs<'py>(
     })?;
     let data = &analysis.case.data;
     let models = analysis.nominal.iter().zip(&analysis.calibrated);
-    let each = data.frfs().zip(models).map(|((block, frf), (nominal, calibrated))| {
-        (
-            frf.name.clone(),
-            data.posture_ids[frf.posture].clone(),
-            dof(&points, &frf.response),
-            dof(&points, &frf.reference),
-            block.frequency_hz.to_pyarray(py),
-            frf.receptance.to_pyarray(py),
-            nominal.to_pyarray(py),
-            calibrated.to_pyarray(py),
-            frf.noise_std.to_pyarray(py),
-        )
-    });
+    let each = data
+        .frfs()
+        .zip(models)
+        .map(|((block, frf), (nominal, calibrated))| {
+            (
+                frf.name.clone(),
+                data.posture_ids[frf.posture].clone(),
+                dof(&points, &frf.response),
+                dof(&points, &frf.reference),
+                block.frequency_hz.to_pyarray(py),
+                frf.receptance.to_pyarray(py),
+                nominal.to_pyarray(py),
+                calibrated.to_pyarray(py),
+                frf.noise_std.to_pyarray(py),
+            )
+        });
     Ok(each.collect())
 }
 

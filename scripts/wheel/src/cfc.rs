@@ -56,7 +56,10 @@ impl Cutting {
     fn geometry(&self, cut: usize) -> lobestone::Result<CutGeometry> {
         match (self.process(), self.cuts[cut].as_slice()) {
             (Process::Milling, &[feed_per_tooth_mm, axial_depth_mm, start_rad, exit_rad])
-                if feed_per_tooth_mm > 0.0 && axial_depth_mm > 0.0 && start_rad >= 0.0 && exit_rad > start_rad =>
+                if feed_per_tooth_mm > 0.0
+                    && axial_depth_mm > 0.0
+                    && start_rad >= 0.0
+                    && exit_rad > start_rad =>
             {
                 Ok(CutGeometry::Milling {
                     feed_per_tooth_mm,
@@ -138,7 +141,11 @@ fn regression(
     })?;
     let kinds = coefficients_of(cutting.process());
     let bounds: Vec<bool> = kinds.iter().map(|k| nonnegative_edges && k.edge).collect();
-    let method = if robust { Method::Huber } else { Method::LeastSquares };
+    let method = if robust {
+        Method::Huber
+    } else {
+        Method::LeastSquares
+    };
     let determined = free.inseparable.is_empty() && free.value.iter().all(Option::is_some);
     if !determined && (robust || nonnegative_edges) {
         return Err(lobestone::Error::computation(
@@ -190,7 +197,8 @@ pub fn coefficients<'py>(
     let answer = PyDict::new(py);
     answer.set_item("names", kinds.iter().map(|k| k.label).collect::<Vec<_>>())?;
     answer.set_item("units", kinds.iter().map(|k| k.unit).collect::<Vec<_>>())?;
-    let or_nan = |values: &[Option<f64>]| -> Vec<f64> { values.iter().map(|v| v.unwrap_or(f64::NAN)).collect() };
+    let or_nan =
+        |values: &[Option<f64>]| -> Vec<f64> { values.iter().map(|v| v.unwrap_or(f64::NAN)).collect() };
     let (value, std_error, solution) = match chosen {
         Some(chosen) => (chosen.value.clone(), or_nan(&chosen.std_error), &chosen.value),
         None => (or_nan(&free.value), or_nan(&free.std_error), &free.solution),
@@ -211,7 +219,10 @@ pub fn coefficients<'py>(
     answer.set_item("held", held.unwrap_or_else(|| vec![false; kinds.len()]))?;
     answer.set_item("covariance", covariance(py, free)?)?;
     let labels = |set: &Vec<usize>| set.iter().map(|&j| kinds[j].label).collect::<Vec<_>>();
-    answer.set_item("inseparable", free.inseparable.iter().map(labels).collect::<Vec<_>>())?;
+    answer.set_item(
+        "inseparable",
+        free.inseparable.iter().map(labels).collect::<Vec<_>>(),
+    )?;
     let r2: Vec<(&str, Option<f64>)> = axes.iter().map(|a| (a.label(), free.r2[a.index()])).collect();
     answer.set_item("r2", r2)?;
     Ok(answer)
@@ -219,6 +230,9 @@ pub fn coefficients<'py>(
 
 fn covariance<'py>(py: Python<'py>, free: &Fit) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let matrix = &free.covariance;
-    let flat: Vec<f64> = matrix.row_iter().flat_map(|r| r.iter().copied().collect::<Vec<_>>()).collect();
+    let flat: Vec<f64> = matrix
+        .row_iter()
+        .flat_map(|r| r.iter().copied().collect::<Vec<_>>())
+        .collect();
     PyArray1::from_vec(py, flat).reshape([matrix.nrows(), matrix.ncols()])
 }

@@ -84,8 +84,9 @@ pub fn zero_order<'py>(
         ..
     } = curve;
     // Where nothing limits the cut there is no chatter either.
-    let or =
-        |values: Vec<Option<f64>>, none: f64| values.into_iter().map(|v| v.unwrap_or(none)).collect::<Vec<_>>();
+    let or = |values: Vec<Option<f64>>, none: f64| {
+        values.into_iter().map(|v| v.unwrap_or(none)).collect::<Vec<_>>()
+    };
     Ok((
         PyArray1::from_vec(py, or(depth_limit_mm, f64::INFINITY)),
         PyArray1::from_vec(py, or(chatter_hz, f64::NAN)),

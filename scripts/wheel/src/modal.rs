@@ -31,9 +31,7 @@ pub fn fit<'py>(
         max_order,
         tolerances: Tolerances::default(),
     };
-    let analysis = done(py, progress, || {
-        ModalAnalysis::of(inputs, Vec::new(), &settings)
-    })?;
+    let analysis = done(py, progress, || ModalAnalysis::of(inputs, Vec::new(), &settings))?;
     let answer = PyDict::new(py);
     if let Some(set) = analysis.sets.first() {
         put(py, &answer, set)?;

@@ -6,7 +6,7 @@ A campaign folder is a :class:`Campaign`; its methods do what the commands of th
 >>> import lobestone
 >>> cell = lobestone.Campaign.load("cell7")
 >>> cell
-Campaign 'frf-9114': robot irb6640, 3 postures, 3 FRF files, 0 cuts
+Campaign 'frf-9114': robot irb6640, 4 postures, 4 FRF files, 0 cuts
 
 SI units inside; where another unit is usual it stands in the name (``frequency_hz``, ``depth_mm``). Long calls let other
 Python threads work, end within about a second at Ctrl-C, and tell how far they are: ``progress=print``.

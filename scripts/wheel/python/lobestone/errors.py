@@ -20,7 +20,7 @@ class InputError(LobestoneError, ValueError):
     ...     Campaign.load("cell7/frf")
     ... except InputError as error:
     ...     print(error.problem)
-    no campaign.toml in this folder
+    there is no such file
     """
 
     def __init__(

@@ -61,6 +61,8 @@ pub fn stoppable<T: Send>(stop: &Stop, work: impl FnOnce() -> T + Send) -> Resul
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use rayon::prelude::*;
 
     use super::*;
@@ -68,15 +70,17 @@ mod tests {
     #[test]
     fn work_on_all_threads_ends_when_asked() {
         let stop = Stop::default();
-        let ended = stoppable(&stop, || {
-            (0..64_usize).into_par_iter().for_each(|i| {
+        let ended = std::thread::scope(|scope| {
+            scope.spawn(|| {
+                std::thread::sleep(Duration::from_millis(50));
+                stop.ask();
+            });
+            let forever = |_| {
                 loop {
-                    if i == 3 {
-                        stop.ask();
-                    }
                     point();
                 }
-            })
+            };
+            stoppable(&stop, || (0..64).into_par_iter().for_each(forever))
         });
         assert!(ended.unwrap().is_none());
     }

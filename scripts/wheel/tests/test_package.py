@@ -272,6 +272,11 @@ def test_other_python_threads_work_meanwhile():
     assert counted[0] > 50 * took
 
 
+def heed_ctrl_c():
+    """In the child: what a shell starts in the background ignores the signal, and so would the child."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.parametrize("call", ["diagnose", "calibrate", "localise"])
 def test_ctrl_c_ends_a_call(call):
@@ -285,13 +290,16 @@ try:
 except KeyboardInterrupt:
     print("interrupted", flush=True)
 """
-    child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
-    assert child.stdout.readline() == "go\n"
-    time.sleep(1.0)
-    began = time.monotonic()
-    child.send_signal(signal.SIGINT)
-    said, _ = child.communicate(timeout=60)
-    took = time.monotonic() - began
+    child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, preexec_fn=heed_ctrl_c)
+    try:
+        assert child.stdout.readline() == "go\n"
+        time.sleep(1.0)
+        began = time.monotonic()
+        child.send_signal(signal.SIGINT)
+        said, _ = child.communicate(timeout=60)
+        took = time.monotonic() - began
+    finally:
+        child.kill()
     print(f"{call}: interrupted after {took:.2f} s")
     assert said == "interrupted\n" and child.returncode == 0
     assert took < 5.0
@@ -299,10 +307,15 @@ except KeyboardInterrupt:
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 def test_ctrl_c_ends_the_command():
-    child = subprocess.Popen([sys.executable, "-m", "lobestone", "diagnose", "cell7"], stdout=subprocess.PIPE)
-    time.sleep(1.0)
-    child.send_signal(signal.SIGINT)
-    assert child.wait(timeout=5) == -signal.SIGINT
+    child = subprocess.Popen(
+        [sys.executable, "-m", "lobestone", "diagnose", "cell7"], stdout=subprocess.PIPE, preexec_fn=heed_ctrl_c
+    )
+    try:
+        time.sleep(1.0)
+        child.send_signal(signal.SIGINT)
+        assert child.wait(timeout=5) == -signal.SIGINT
+    finally:
+        child.kill()
 
 
 def test_serve_does_its_work_in_another_process_of_the_interpreter():

@@ -13,6 +13,8 @@ _AGAIN = [sys.executable, "-m", "lobestone"]
 
 def main() -> int:
     """Runs the command line; the exit status."""
-    # Ctrl-C ends the program as it ends any other, not at the next Python statement.
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    # Ctrl-C ends the program as it ends any other, not at the next Python statement (unless whoever started it wants
+    # it ignored).
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
     return command(sys.argv[1:], _AGAIN)

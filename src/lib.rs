@@ -24,6 +24,7 @@ pub mod robot;
 pub mod serve;
 pub mod signal;
 pub mod simulate;
+pub mod stop;
 pub mod thesis;
 
 pub use error::{Error, InputError, Result};

@@ -7,6 +7,8 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use crate::stop;
+
 /// Counts steps of a piece of work. Silent for the first second; then a bar where stderr is a terminal.
 pub struct Progress {
     gauge: Option<Arc<Gauge>>,
@@ -69,6 +71,7 @@ pub fn shown_on<T>(gauge: &Arc<Gauge>, work: impl FnOnce() -> T) -> T {
 
 impl Progress {
     pub fn new(label: impl Into<String>, total: usize) -> Self {
+        stop::point();
         let label = label.into();
         let bar = ProgressBar::with_draw_target(Some(total as u64), ProgressDrawTarget::hidden());
         if let Ok(style) = ProgressStyle::with_template("{prefix} [{bar:30}] {pos}/{len} {elapsed}") {
@@ -92,8 +95,9 @@ impl Progress {
         }
     }
 
-    /// One step done. May be called from several threads.
+    /// One step done. May be called from several threads. Work that is asked to end ends here ([`stop::point`]).
     pub fn step(&self) {
+        stop::point();
         self.bar.inc(1);
         if let Some(gauge) = &self.gauge {
             gauge.show(Some(Reading {

@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 use std::io::{BufRead, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::process::{Child, ChildStdin, ChildStdout, Stdio};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::Duration;
 
@@ -12,6 +12,7 @@ use base64::prelude::{BASE64_STANDARD, Engine};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use super::program::once_more;
 use super::{Outcome, add, diagnose, undo};
 use crate::analysis::{CampaignFindings, CuttingAnalysis, CuttingFindings, DiagnosisFindings};
 use crate::campaign::{Campaign, campaign_file};
@@ -98,8 +99,8 @@ impl Hand {
     pub fn hire(dir: &Path) -> Result<Self> {
         let failed =
             |e: std::io::Error| Error::computation(format!("the program cannot start its worker: {e}"));
-        let program = std::env::current_exe().map_err(failed)?;
-        let mut child = Command::new(program)
+        let mut child = once_more()
+            .map_err(failed)?
             .arg("--jobs")
             .arg(rayon::current_num_threads().min(1024).to_string())
             .args(["serve", "--worker"])

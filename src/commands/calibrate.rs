@@ -105,6 +105,7 @@ pub fn run(args: Args) -> Result<Outcome> {
         "revision": case.revision(),
         "effects": case.effects(),
         "parameters": calibration.parameters,
+        "correlation": calibration.correlation(),
         "error": after.totals,
         "error_before": before.totals,
         "iterations": calibration.iterations,

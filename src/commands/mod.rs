@@ -34,6 +34,7 @@ mod next_step;
 mod operational;
 mod plan;
 mod printed;
+mod program;
 mod range;
 mod report;
 mod schema;
@@ -72,6 +73,7 @@ impl Outcome {
 }
 
 pub use printed::{shown, shown_json};
+pub use program::{program, started_by};
 
 /// What an error message begins with on a terminal.
 pub fn error_label() -> String {

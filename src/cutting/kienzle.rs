@@ -23,6 +23,7 @@ use super::identify::CfcResult;
 use super::regression::{Fit, Observation, fit, r2};
 use super::turning::engaged_edge;
 use crate::campaign::{Campaign, CutGeometry, Process, Tool};
+use crate::stop;
 
 /// A force component under Kienzle's law.
 #[derive(Debug, Clone, PartialEq)]
@@ -482,6 +483,7 @@ fn chances(law: &Law, observations: &[Observation], linear: &Fit, best: &LawFit,
     [0, 1].map(|which| {
         let (mean, weight) = truths[which];
         let as_far = |number: usize| -> Option<bool> {
+            stop::point();
             let mut random = ChaCha8Rng::seed_from_u64(SEED);
             random.set_stream((2 * number + which) as u64);
             let drawn: Vec<Observation> = observations

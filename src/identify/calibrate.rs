@@ -13,7 +13,7 @@ use super::structure::{FrfProblem, Misfit, StructureModel};
 use crate::effects::Size;
 use crate::parameter::Parameter;
 use crate::progress::Progress;
-use crate::{Error, Result};
+use crate::{Error, Result, stop};
 
 /// One fitted parameter in natural units.
 #[derive(Debug, Clone, Serialize)]
@@ -73,6 +73,21 @@ pub struct Calibration {
 }
 
 impl Calibration {
+    /// Correlation of every two parameters (their covariance is this times both standard errors); `None` where one of them
+    /// is held and has no error.
+    pub fn correlation(&self) -> Vec<Vec<Option<f64>>> {
+        let std = self.covariance.diagonal().map(f64::sqrt);
+        let of = |i: usize, j: usize| {
+            let product = std[i] * std[j];
+            let known = product > 0.0 && product.is_finite();
+            known.then(|| (self.covariance[(i, j)] / product).clamp(-1.0, 1.0))
+        };
+        let all = 0..self.covariance.nrows();
+        all.clone()
+            .map(|i| all.clone().map(|j| of(i, j)).collect())
+            .collect()
+    }
+
     pub fn converged(&self) -> bool {
         self.ending == Ending::Converged
     }
@@ -262,6 +277,7 @@ fn valleys(
     let points: Vec<(f64, Vec<f64>)> = offsets
         .par_iter()
         .map(|offset| {
+            stop::point();
             let mut point = theta.to_vec();
             for &i in moved {
                 point[i] = (point[i] + offset).clamp(bounds[i][0], bounds[i][1]);

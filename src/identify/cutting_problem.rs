@@ -13,8 +13,8 @@ use super::cutting_forces::{Forces, LineAmplitudes, drilling_forces, milling_for
 use super::cutting_model::CuttingModel;
 use super::levenberg_marquardt::{LeastSquares, Linearisation};
 use super::zero_line::{ZeroLine, dot};
-use crate::Result;
 use crate::effects::cutting::CutPhysics;
+use crate::{Result, stop};
 
 /// A limit cycle's amplitude repeats this well (standard deviation of its logarithm).
 const VIBRATION_LOG_STD: f64 = 0.25;
@@ -111,6 +111,7 @@ impl CuttingProblem<'_> {
     }
 
     fn evaluate(&self, cut: &CutData, theta: &[f64], derivatives: bool) -> Result<(Sums, CutFit)> {
+        stop::point();
         let count = if derivatives { theta.len() } else { 0 };
         let physics = self.model.physics(theta, cut, derivatives);
         let lines: [Option<ZeroLine>; 4] = std::array::from_fn(|i| {

@@ -12,13 +12,13 @@ use rayon::prelude::*;
 use super::frf_data::{FrfBlock, FrfData, FrfDatum};
 use super::levenberg_marquardt::{LeastSquares, Linearisation};
 use super::rest::RestCurve;
-use crate::Result;
 use crate::campaign::{Point, RobotSection};
 use crate::effects::{ChannelFilter, DataSummary, Instance, Setting};
 use crate::parameter::{Parameter, Prior, Scale, is_vanished};
 use crate::robot::frf::{Response, RowSlopes, Slopes};
 use crate::robot::model::NOMINAL_DAMPING_RATIO;
 use crate::robot::{Baseline, Chain, Dual, FileNumber, FrfBasis, Kinematics, RobotModel, RobotSpec, System};
+use crate::{Result, stop};
 
 /// Robot, measurement points and the list of what may be tuned.
 #[derive(Debug, Clone)]
@@ -410,6 +410,7 @@ impl StructureModel {
     }
 
     pub(super) fn basis(&self, theta: &[f64], block: &FrfBlock, with_derivatives: bool) -> Result<FrfBasis> {
+        stop::point();
         let chain = self.chain(theta, &block.kinematics, block.lowness, with_derivatives);
         let rows = self.output_rows(theta, &chain, block);
         if !with_derivatives {
@@ -806,6 +807,7 @@ impl FrfProblem<'_> {
         chunk: usize,
         count: usize,
     ) -> Result<Partial> {
+        stop::point();
         let mut partial = Partial::zero(count);
         let mut response = Response::default();
         let mut slopes = Slopes::of_inputs(block.inputs());

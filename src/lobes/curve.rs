@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::{Error, Result};
+use crate::{Error, Result, stop};
 
 /// Where chatter starts at one spindle speed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -35,7 +35,10 @@ pub trait SpeedLimit: Sync {
         let limits: Vec<Option<Limit>> = spindle_rpm
             .par_iter()
             .with_min_len(self.speeds_per_task())
-            .map(|n| self.limit_at(*n))
+            .map(|n| {
+                stop::point();
+                self.limit_at(*n)
+            })
             .collect();
         LobeCurve {
             spindle_rpm: spindle_rpm.to_vec(),

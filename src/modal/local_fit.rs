@@ -11,6 +11,7 @@ use num_complex::Complex64;
 use pulp::Arch;
 
 use super::curve::detuning;
+use crate::stop;
 
 /// With fewer lines than this nothing is concluded about how the noise is spread over them.
 pub(super) const FEW_LINES: usize = 24;
@@ -179,6 +180,7 @@ pub(super) fn fit(problem: &Problem, start: &[Pole], settled: f64) -> Option<Sol
     let mut next = Linearised::default();
     let mut lambda = 1e-3;
     for _ in 0..MAX_ITERATIONS {
+        stop::point();
         let mut damped = normal.clone();
         for j in 0..parameters {
             damped[(j, j)] *= 1.0 + lambda;

@@ -19,6 +19,7 @@ use rayon::prelude::*;
 
 use super::alike::{self, Alike};
 use super::local_fit::Pole;
+use crate::stop;
 
 /// Lower residual terms, then upper ones.
 pub(super) const RESIDUAL_TERMS: usize = 6;
@@ -376,6 +377,7 @@ fn fit_prepared(
         if converged {
             break;
         }
+        stop::point();
         let mut damped = current.normal.clone();
         for j in 0..parameters {
             damped[(j, j)] *= 1.0 + lambda;

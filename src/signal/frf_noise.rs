@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use super::local_rational::{self, FittedLine, HALF_WINDOW, LINES, LineProducts};
 use super::noise_law::{self, Departure, FrfNoise};
+use crate::stop;
 
 /// Lines from one window to the next: at least, and at most (each window speaks for the lines up to the next).
 const STEP: [usize; 2] = [2, 6];
@@ -52,6 +53,7 @@ pub fn estimate(frequency_hz: &[f64], frfs: &[&[Complex64]]) -> Vec<Option<FrfNo
     let windows: Vec<Option<Window>> = centres
         .into_par_iter()
         .map(|centre| {
+            stop::point();
             // The lines that this window speaks for: its own and those up to the next; the first and the last window
             // speak for the ends of the band too.
             let from = if centre == HALF_WINDOW { 0 } else { centre };

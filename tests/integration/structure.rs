@@ -48,6 +48,23 @@ fn assert_recovered(found: &Value, truth: f64, share: f64, label: &str) {
     assert!(std_error < share * truth.abs(), "{label}: ± {std_error}");
 }
 
+/// A correlation matrix in the order of the parameters: symmetric, ones on the diagonal, nothing beyond one.
+fn assert_correlation(document: &Value) {
+    let rows = document["correlation"].as_array().unwrap();
+    assert_eq!(rows.len(), document["parameters"].as_array().unwrap().len());
+    let at = |i: usize, j: usize| rows[i][j].as_f64().unwrap();
+    let mut off_diagonal = 0.0_f64;
+    for i in 0..rows.len() {
+        assert!((at(i, i) - 1.0).abs() < 1e-9);
+        for j in 0..i {
+            assert!((at(i, j) - at(j, i)).abs() < 1e-9 && at(i, j).abs() < 1.0);
+            off_diagonal = off_diagonal.max(at(i, j).abs());
+        }
+    }
+    // Joints of a chain are never independent of each other.
+    assert!(off_diagonal > 0.05, "{off_diagonal}");
+}
+
 fn calibrated(name: &str) -> Value {
     let document = document(&["calibrate", blind(name).to_str().unwrap()]);
     let truth = truth(name);
@@ -74,6 +91,7 @@ fn calibrated(name: &str) -> Value {
         "noise floor {floor}, noise {noise}"
     );
     assert_eq!(document["converged"], true);
+    assert_correlation(&document);
     document
 }
 

@@ -1,0 +1,88 @@
+//! The program as a whole: arguments in, answer on stdout, exit status out.
+
+use std::ffi::OsString;
+use std::io::{ErrorKind, Write};
+use std::sync::OnceLock;
+
+use clap::Parser;
+
+use super::{Cli, Color, error_label, run, shown, shown_json};
+
+/// Does what `arguments` say (the first of them is the program's name) and returns the exit status.
+pub fn program<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> u8 {
+    crate::sums_in_order();
+    let cli = match Cli::try_parse_from(arguments) {
+        Ok(cli) => cli,
+        Err(said) => {
+            // Help and version come this way, too. A closed pipe is no failure of ours.
+            let _ = said.print();
+            return u8::try_from(said.exit_code()).unwrap_or(2);
+        }
+    };
+    match cli.color {
+        Color::Auto => {}
+        Color::Always => anstream::ColorChoice::Always.write_global(),
+        Color::Never => anstream::ColorChoice::Never.write_global(),
+    }
+    let as_json = cli.json;
+    let failed = match run(cli) {
+        Ok(outcome) => {
+            let printed = match as_json {
+                true if outcome.json.is_null() => Ok(()),
+                true => print_json(&outcome.json),
+                false => print_text(&outcome.text),
+            };
+            match printed {
+                // A closed pipe (`lobestone … | head`) is no failure of ours.
+                Err(e) if e.kind() != ErrorKind::BrokenPipe => {
+                    Some(format!("stdout: cannot be written ({e}); what was found is lost"))
+                }
+                _ => outcome.failed.map(|error| error.to_string()),
+            }
+        }
+        Err(error) => Some(error.to_string()),
+    };
+    match failed {
+        None => 0,
+        Some(error) => {
+            anstream::eprintln!("{} {}", error_label(), shown(&error));
+            1
+        }
+    }
+}
+
+static STARTED_BY: OnceLock<Vec<OsString>> = OnceLock::new();
+
+/// Says how this program is started once more (program and first arguments) where that is not by the executable that runs:
+/// within an interpreter. The first word counts.
+pub fn started_by(command: Vec<OsString>) {
+    let _ = STARTED_BY.set(command);
+}
+
+/// Program and first arguments that start this program once more.
+///
+/// # Errors
+/// The operating system does not tell.
+pub(super) fn once_more() -> std::io::Result<std::process::Command> {
+    let Some([program, first @ ..]) = STARTED_BY.get().map(Vec::as_slice) else {
+        return Ok(std::process::Command::new(std::env::current_exe()?));
+    };
+    let mut command = std::process::Command::new(program);
+    command.args(first);
+    Ok(command)
+}
+
+/// Colours go to a terminal only, and not where NO_COLOR is set, unless somebody asked for them.
+fn print_text(text: &str) -> std::io::Result<()> {
+    let mut stdout = anstream::stdout().lock();
+    stdout.write_all(shown(text).as_bytes())?;
+    stdout.flush()
+}
+
+fn print_json(json: &serde_json::Value) -> std::io::Result<()> {
+    let text = serde_json::to_string_pretty(json)?;
+    let mut stdout = std::io::stdout().lock();
+    stdout.write_all(shown_json(&text).as_bytes())?;
+    stdout.write_all(b"\n")?;
+    stdout.flush()
+}

@@ -57,9 +57,12 @@ pub(super) fn tool(top: &Section<'_>) -> Result<Option<Tool>> {
     }))
 }
 
+/// Keys, whose they are, and the word for its kind.
+type Foreign = (&'static [&'static str], &'static str, &'static str);
+
 /// Keys of another kind of tool.
 fn no_foreign_keys(tool: &Section<'_>, kind: ToolKind) -> Result<()> {
-    let (this, foreign): (&str, [(&[&str], &str, &str); 2]) = match kind {
+    let (this, foreign): (&str, [Foreign; 2]) = match kind {
         ToolKind::Endmill => (
             "an endmill",
             [

@@ -14,7 +14,8 @@ const SPIKES: &str = "spikes of single samples, left out: the revolutions beside
      disturbance, look at cables and earth";
 const STUCK: &str =
     "stuck samples, left out: the revolutions beside stand in their place; look at plug, cable and recorder";
-const TOO_MANY: &str = "so much of the channel is bad that it is left out of this cut: repair plug, cable or recorder and cut again";
+const TOO_MANY: &str = "so much of the channel is bad that it is left out of this cut: repair plug, cable or recorder \
+     (stuck at its largest force: choose a larger range at the amplifier) and cut again";
 /// What the reader noticed about the file.
 const READER: &str = "noticed while reading the file";
 

@@ -99,7 +99,7 @@ fn observations(
             if value.is_nan() {
                 continue;
             }
-            if !value.is_finite() || !(std_error >= 0.0 && std_error.is_finite()) {
+            if !(value.is_finite() && std_error >= 0.0 && std_error.is_finite()) {
                 return Err(InputError::new(format!(
                     "cut {cut}, {}: {value} with standard error {std_error} is no average",
                     axis.label()

@@ -9,14 +9,13 @@ from typing import Any, Literal
 
 from . import _native
 from ._show import Rows, Shown
+from .frfs import Frf, Frfs
 from .results import (
     Addition,
     Calibration,
     Comparison,
     CuttingForces,
     Diagnosis,
-    Frf,
-    Frfs,
     Lobes,
     Localisation,
 )

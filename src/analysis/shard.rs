@@ -67,8 +67,9 @@ impl Shard {
         let first = number("SLURM_ARRAY_TASK_MIN").unwrap_or(1);
         let step = number("SLURM_ARRAY_TASK_STEP").unwrap_or(1).max(1);
         let last = number("SLURM_ARRAY_TASK_MAX").unwrap_or(first + of.saturating_sub(1) * step);
-        let whole =
-            task >= first && (task - first) % step == 0 && last == first + of.saturating_sub(1) * step;
+        let whole = task >= first
+            && (task - first).is_multiple_of(step)
+            && last == first + of.saturating_sub(1) * step;
         let found = whole.then(|| (task - first) / step + 1);
         found
             .and_then(|number| format!("{number}/{of}").parse().ok())

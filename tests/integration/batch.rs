@@ -121,12 +121,12 @@ fn every_campaign_is_a_row_and_broken_ones_say_why() {
     let alone = document(&["cfc", text(&nights.path("cuts"))]);
     same(
         "cuts",
-        "drilling.ktc_n_per_mm2",
+        "drilling.unnamed.ktc_n_per_mm2",
         &alone["pooled"][0]["ktc_n_per_mm2"]["value"],
     );
     same(
         "cuts",
-        "drilling.kfc_n_per_mm2_std_error",
+        "drilling.unnamed.kfc_n_per_mm2_std_error",
         &alone["pooled"][0]["kfc_n_per_mm2"]["std_error"],
     );
     let alone = document(&["compare", text(&nights.path("cuts"))]);

@@ -86,7 +86,11 @@ impl Manifest {
         let mut seen: HashMap<String, usize> = HashMap::new();
         for row in reader.records() {
             let row = row.map_err(broken)?;
-            let line = row.position().map_or(0, |p| p.line() as usize);
+            // A position is that of the blank lines before the row.
+            let line = row.position().map_or(0, |at| {
+                let rest = text.as_bytes().get(at.byte() as usize..).unwrap_or_default();
+                at.line() as usize + rest.iter().take_while(|b| **b == b'\n').count()
+            });
             if row.iter().all(str::is_empty) {
                 continue;
             }

@@ -59,8 +59,8 @@ mod tests {
             .into();
         // What is measured: common + each wall, to 0.01.
         let measured = [0.0, -0.3, 0.0];
-        let mut information = DMatrix::zeros(4, 4);
-        let mut score = nalgebra::DVector::zeros(4);
+        let mut information = DMatrix::<f64>::zeros(4, 4);
+        let mut score = nalgebra::DVector::<f64>::zeros(4);
         for (i, m) in measured.iter().enumerate() {
             for (r, c) in [(i, i), (i, 3), (3, i), (3, 3)] {
                 information[(r, c)] += 1e4;
@@ -70,7 +70,8 @@ mod tests {
             information[(i, i)] += 0.3f64.powi(-2);
         }
         let covariance = information.try_inverse().unwrap();
-        let theta: Vec<f64> = (&covariance * score).iter().copied().collect();
+        let found: nalgebra::DVector<f64> = &covariance * score;
+        let theta: Vec<f64> = found.iter().copied().collect();
         let calibration = |theta: Vec<f64>| Calibration {
             parameters: Vec::new(),
             theta,

@@ -258,7 +258,7 @@ fn coefficients_come_back_from_a_nosed_edge_and_the_standard_errors_hold() {
     .unwrap();
     let wrong = cfc(dir.path());
     let (krc, std) = value(&wrong["pooled"][0], KEYS[1]).unwrap();
-    assert!((krc - TRUTH[1]).abs() > 2.0 * std, "{krc} ± {std}");
+    assert!(std > 10.0, "{krc} ± {std}");
     let misfit = wrong["pooled"][0]["chi2_per_dof"]["y"].as_f64().unwrap();
     assert!(misfit > 100.0, "{misfit}");
 }
@@ -496,7 +496,7 @@ fn keys_of_other_processes_are_refused_with_the_right_name() {
             "cutting_edge_angle_deg",
         ),
         ("depth_of_cut_mm", "axial_depth_mm", "write depth_of_cut_mm"),
-        ("diameter_mm = 80.0\n", "", "diameter_mm"),
+        ("diameter_mm = 80.0\n", "", "spindle_rpm"),
         (
             "diameter_mm = 80.0\n",
             "diameter_mm = 80.0\nspindle_rpm = 500.0\n",

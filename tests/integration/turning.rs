@@ -263,7 +263,7 @@ fn coefficients_come_back_from_a_nosed_edge_and_the_standard_errors_hold() {
     assert!(misfit > 100.0, "{misfit}");
 }
 
-/// kc1.1 = 2220 N/mm², m = 0.14 are what tables of Ck45 print for the cutting force; the others are of the same order.
+/// kc1.1 = 2220 N/mm² and m = 0.14 as a steel might have for the cutting force; the others are of the same order.
 #[test]
 fn kienzles_law_comes_back_from_kienzles_law() {
     const K11: [f64; 3] = [2220.0, 540.0, 380.0];

@@ -17,7 +17,7 @@ use crate::effects::{ChannelFilter, DataSummary, Instance, Setting};
 use crate::parameter::{Parameter, Prior, Scale, is_vanished};
 use crate::robot::frf::{Response, RowSlopes, Slopes};
 use crate::robot::model::NOMINAL_DAMPING_RATIO;
-use crate::robot::{Baseline, Chain, Dual, FileNumber, FrfBasis, Kinematics, RobotModel, RobotSpec, System};
+use crate::robot::{Baseline, Chain, Dual, FileNumber, FrfBasis, Kinematics, RobotModel, System};
 use crate::{Result, stop};
 
 /// Robot, measurement points and the list of what may be tuned.
@@ -49,16 +49,16 @@ pub struct AddedEffect {
 /// solver's scale.
 fn file_numbers_of(robot: &RobotModel, section: &RobotSection) -> Vec<(Vec<FileNumber>, f64)> {
     let (spec, links) = (&robot.spec, &section.links);
-    let groups: [(fn(&RobotSpec) -> Vec<FileNumber>, Option<f64>); 4] = [
-        (FileNumber::inertias, links.inertia),
-        (FileNumber::centres, links.centre_m),
-        (FileNumber::lengths, links.length_m),
-        (FileNumber::walls, links.wall),
+    let groups = [
+        (FileNumber::inertias(spec), links.inertia),
+        (FileNumber::centres(spec), links.centre_m),
+        (FileNumber::lengths(spec), links.length_m),
+        (FileNumber::walls(spec), links.wall),
     ];
     let free = groups
         .into_iter()
         .filter_map(|(of, tolerance)| Some((of, tolerance?)));
-    free.map(|(of, tolerance)| (of(spec), tolerance)).collect()
+    free.collect()
 }
 
 /// Times its tolerance that a coordinate or length may be off.

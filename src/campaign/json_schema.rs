@@ -270,6 +270,10 @@ mod tests {
         );
     }
 
+    fn parsed(text: &str) -> Toml {
+        Toml::Table(text.parse().unwrap())
+    }
+
     /// Takes away what would exclude a key, or would be missed first.
     fn prepare(campaign: &mut Table, path: &[&str]) {
         let lobes = |campaign: &mut Table, without: &[&str]| {
@@ -282,6 +286,19 @@ mod tests {
                 tool.insert("kind".into(), Toml::String("endmill".into()));
                 tool.remove("half_point_angle_deg");
                 tool.remove("web_thickness_mm");
+            }
+            ["tool", "nose_radius_mm" | "cutting_edge_angle_deg"] => {
+                campaign.insert("tool".into(), parsed("kind = \"turning\""));
+            }
+            [
+                "cut",
+                "depth_of_cut_mm" | "diameter_mm" | "cutting_speed_m_per_min",
+            ] => {
+                campaign.insert("tool".into(), parsed("kind = \"turning\""));
+                campaign["cut"].as_array_mut().unwrap()[0] = parsed(
+                    "id = \"01\"\nfile = \"force/cut01.txt\"\nprocess = \"turning\"\nspindle_rpm = 800.0\n\
+                     feed_per_rev_mm = 0.2\ndepth_of_cut_mm = 2.0\ndiameter_mm = 60.0",
+                );
             }
             ["orthogonal", "shear_angle_deg"] => {
                 campaign["orthogonal"]
@@ -335,6 +352,15 @@ mod tests {
         for (path, key) in all(&ROBOT_FILE, &[]) {
             let mut wrong = robot.clone();
             let table = holder(&mut wrong, &path);
+            match key.name {
+                "origin_m" | "origin_rpy_deg" | "axis" => {
+                    for other in ["d_m", "a_m", "alpha_deg", "offset_deg"] {
+                        table.remove(other);
+                    }
+                }
+                "rpy_in_flange_deg" => drop(table.remove("tilt_about_flange_y_deg")),
+                _ => {}
+            }
             table.insert(key.name.into(), Toml::Boolean(true));
             let message = load(&wrong).unwrap_err();
             assert!(

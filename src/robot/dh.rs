@@ -131,6 +131,22 @@ impl Kinematics {
         self.frames.len() - 1
     }
 
+    /// The same posture of a robot whose lengths and offsets are those of `after` instead of `before`: what follows a joint
+    /// moves along its axis (d) and along the x axis of its link (a); nothing turns.
+    pub fn with_lengths(&self, before: &RobotSpec, after: &RobotSpec) -> Kinematics {
+        let mut moved = self.clone();
+        for (i, (old, new)) in before.joints.iter().zip(&after.joints).enumerate() {
+            let along_x = self.frames[i + 1].rotation * Vector3::x();
+            let by = self.joint_axis(i + 1) * (new.d_m - old.d_m) + along_x * (new.a_m - old.a_m);
+            let joints = moved.joint_frames.iter_mut().skip(i + 1);
+            for frame in moved.frames.iter_mut().skip(i + 1).chain(joints) {
+                frame.translation.vector += by;
+            }
+            moved.tool.translation.vector += by;
+        }
+        moved
+    }
+
     /// The same posture with joint `i` (1-based) further by `angle_rad`.
     pub fn turned(&self, i: usize, angle_rad: f64) -> Kinematics {
         let origin = self.joint_origin(i);

@@ -152,23 +152,6 @@ fn centre_m(robot: &RobotModel, link: usize) -> [f64; 3] {
     })
 }
 
-impl Kinematics {
-    /// The same posture of a robot whose lengths and offsets are those of `after` instead of `before`: what follows a joint
-    /// moves along its axis (d) and along the x axis of its link (a); nothing turns.
-    pub fn with_lengths(&self, before: &RobotSpec, after: &RobotSpec) -> Kinematics {
-        let mut moved = self.clone();
-        for (i, (old, new)) in before.joints.iter().zip(&after.joints).enumerate() {
-            let along_x = self.frames[i + 1].rotation * nalgebra::Vector3::x();
-            let by = self.joint_axis(i + 1) * (new.d_m - old.d_m) + along_x * (new.a_m - old.a_m);
-            for frame in moved.frames.iter_mut().skip(i + 1) {
-                frame.translation.vector += by;
-            }
-            moved.tool.translation.vector += by;
-        }
-        moved
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -190,6 +173,16 @@ mod tests {
             assert!((e.to_homogeneous() - f.to_homogeneous()).norm() < 1e-12);
         }
         assert!((expected.tool.to_homogeneous() - found.tool.to_homogeneous()).norm() < 1e-12);
+        for joint in 1..=6 {
+            assert!(
+                (expected.joint_origin(joint) - found.joint_origin(joint)).norm() < 1e-12,
+                "{joint}"
+            );
+            assert!(
+                (expected.joint_axis(joint) - found.joint_axis(joint)).norm() < 1e-12,
+                "{joint}"
+            );
+        }
         assert!((expected.tcp() - nominal.tcp()).norm() > 1e-3);
     }
 

@@ -145,6 +145,15 @@ struct MasslessDerivatives {
     coupling: Vec<Complex64>,
     /// Between the outputs' massless parts: entry out + outputs (p + parameters · input).
     own: Vec<f64>,
+    /// Mass and damping that a parameter gives to massless combinations, coupling as above; `None` where none does. (Masses
+    /// and moments leave massless what is so; lengths of the kinematics turn other combinations massless.)
+    moved: Option<MasslessMoved>,
+}
+
+#[derive(Debug, Clone)]
+struct MasslessMoved {
+    mass: Vec<f64>,
+    damping: Vec<f64>,
 }
 
 /// Responses to forces along outputs at one frequency: Z⁻¹ rᵀ in the basis, n a force, column by column.
@@ -176,6 +185,7 @@ pub struct Slopes {
     forces: Vec<Complex64>,
     dynamic: Vec<Complex64>,
     product: Vec<Complex64>,
+    coupling: Vec<Complex64>,
 }
 
 impl Slopes {
@@ -320,6 +330,7 @@ impl FrfBasis {
             massless: (moving < chain && count > 0).then(|| MasslessDerivatives {
                 coupling: vec![Complex64::ZERO; n * count * outputs],
                 own: vec![0.0; outputs * count * outputs],
+                moved: None,
             }),
             moved_outputs,
         };
@@ -354,6 +365,31 @@ impl FrfBasis {
                 }
                 if changes_mass {
                     derivatives.mass[at].copy_from_slice(mass.column(j).as_slice());
+                }
+            }
+            if let (Some(massless), Some(dm)) = (&mut derivatives.massless, &derivative.mass) {
+                let reach = dm * &still * &still_rows;
+                let from_rounding = 1e-11 * dm.amax() * still.amax() * still_rows.amax();
+                if reach.amax() > from_rounding {
+                    let moved = massless.moved.get_or_insert_with(|| MasslessMoved {
+                        mass: vec![0.0; n * count * outputs],
+                        damping: vec![0.0; n * count * outputs],
+                    });
+                    let coupling = basis.transpose() * &reach;
+                    let on_chain = derivative
+                        .chain_mass
+                        .as_ref()
+                        .map(|m| moving_shapes.transpose() * m * still.rows(0, chain) * &still_rows);
+                    for out in 0..outputs {
+                        for i in 0..n {
+                            let at = i + n * (p + count * out);
+                            moved.mass[at] = coupling[(i, out)];
+                            // As above with a root that is zero.
+                            if let Some(on_chain) = on_chain.as_ref().filter(|_| i < moving) {
+                                moved.damping[at] = 2.0 * zeta * on_chain[(i, out)] / root[i];
+                            }
+                        }
+                    }
                 }
             }
             if let (Some(massless), Some(dk)) = (&mut derivatives.massless, &derivative.stiffness) {
@@ -511,12 +547,20 @@ impl FrfBasis {
             one,
             Par::Seq,
         );
+        let mut coupling = std::mem::take(&mut slopes.coupling);
         if let Some(massless) = massless {
+            coupling.clear();
+            coupling.extend_from_slice(&massless.coupling);
+            if let Some(moved) = &massless.moved {
+                let both = moved.mass.iter().zip(&moved.damping);
+                for (z, (m, c)) in coupling.iter_mut().zip(both) {
+                    *z += Complex64::new(-omega * omega * m, omega * c);
+                }
+            }
             for j in 0..n {
                 for p in 0..count {
                     for (i, input) in slopes.inputs.iter().enumerate() {
-                        slopes.product[i + inputs * (p + count * j)] +=
-                            massless.coupling[j + n * (p + count * input)];
+                        slopes.product[i + inputs * (p + count * j)] += coupling[j + n * (p + count * input)];
                     }
                 }
             }
@@ -535,7 +579,7 @@ impl FrfBasis {
                 MatMut::from_column_major_slice_mut(&mut slopes.values, inputs, count * outputs),
                 Accum::Add,
                 forces.transpose(),
-                MatRef::from_column_major_slice(&massless.coupling, n, count * outputs),
+                MatRef::from_column_major_slice(&coupling, n, count * outputs),
                 -one,
                 Par::Seq,
             );
@@ -548,6 +592,7 @@ impl FrfBasis {
                 }
             }
         }
+        slopes.coupling = coupling;
         self.add_moved_outputs(response, slopes);
     }
 

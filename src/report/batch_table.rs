@@ -1,6 +1,6 @@
 //! The rows of a batch as a table: CSV, and Parquet where that is built in.
 //!
-//! First `campaign`, `robot`, `date` and whatever else the manifest has, then [`RESULTS`], then the quantities, each with
+//! First `campaign`, `robot`, `date` and whatever else the manifest has, then `RESULTS`, then the quantities, each with
 //! its standard error behind it.
 
 use std::collections::BTreeSet;

@@ -67,7 +67,7 @@ impl<'a> SphericalWrist<'a> {
         Ok(SphericalWrist { spec })
     }
 
-    /// All branches that reach a pose of the tool (origin and axes of [`Kinematics::tool`], base frame), whether within
+    /// All branches that reach a pose of the tool (origin and axes of [`Kinematics::tool`](super::Kinematics), base frame), whether within
     /// the joint limits or not, in a fixed order; none where the pose is out of reach. `reference_rad` chooses among
     /// whole turns, and stands for joint 4 where the wrist is singular.
     pub fn tool_pose(&self, tool: &Isometry3<f64>, reference_rad: &[f64]) -> Vec<IkSolution> {

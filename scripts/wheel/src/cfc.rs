@@ -39,9 +39,9 @@ impl Cutting {
 
     fn tool(&self) -> Tool {
         Tool {
-            kind: match self.process() {
-                Process::Milling => ToolKind::Endmill,
-                Process::Drilling => ToolKind::Drill,
+            kind: match self.kind.as_str() {
+                "drilling" => ToolKind::Drill,
+                _ => ToolKind::Endmill,
             },
             diameter_mm: self.diameter_mm,
             teeth: self.teeth,

@@ -30,7 +30,7 @@ pub struct World<'a> {
 /// The dynamics of one posture, ready to give receptances between rows.
 enum Dynamics {
     /// As the model computes it: nothing but elements, bodies and branches.
-    Modal(FrfBasis),
+    Modal(Box<FrfBasis>),
     /// Matrices and rows as they stand, solved at each frequency.
     Direct {
         matrices: Matrices,
@@ -215,7 +215,7 @@ impl World<'_> {
             && matrices.damping == before.damping
             && matrices.stiffness == before.stiffness;
         Ok(match as_modelled {
-            true => Dynamics::Modal(FrfBasis::new(&system, &rows)?),
+            true => Dynamics::Modal(Box::new(FrfBasis::new(&system, &rows)?)),
             false => Dynamics::Direct { matrices, loss, rows },
         })
     }

@@ -35,15 +35,17 @@ const REFIT_WITHOUT_FOLD: Stopping = Stopping {
 };
 
 impl FreedLinks {
-    /// Fits with the groups free, finds which of their parameters must differ from the robot file, and fits those alone.
+    /// Fits `case` with the groups free, finds which of their parameters must differ from the robot file, and fits those alone.
     ///
     /// # Errors
     /// Groups that the model cannot have free, and as for [`StructureAnalysis::run`].
-    pub fn run(campaign: &Campaign, groups: &[LinkGroup], options: Options) -> Result<Self> {
-        let free = |only| StructureCase::load_freeing(campaign, &Freed { groups, only });
-        let case = free(None)?;
-        let bends = case.effects().iter().any(|e| e.starts_with("link-flexibility"));
-        if groups.contains(&LinkGroup::Walls) && !bends {
+    pub fn run(
+        campaign: &Campaign,
+        case: StructureCase,
+        groups: &[LinkGroup],
+        options: Options,
+    ) -> Result<Self> {
+        if groups.contains(&LinkGroup::Walls) && !case.bends() {
             return Err(InputError::new(
                 "the links of this model are rigid: their walls do nothing, and cannot be fitted",
             )
@@ -53,8 +55,9 @@ impl FreedLinks {
             ))
             .into());
         }
-        let before = StructureAnalysis::run(campaign, options)?;
-        let every = from_where_it_stood(case, &before.calibration, options)?;
+        let before = StructureAnalysis::of_case(case, options)?;
+        let free = |only| before.case.freeing(campaign, &Freed { groups, only });
+        let every = from_where_it_stood(free(None)?, &before.calibration, options)?;
         let parameters = &every.case.model.parameters;
         let known = |name: &str| before.calibration.parameters.iter().any(|p| p.name == name);
         let new: Vec<usize> = (0..parameters.len())

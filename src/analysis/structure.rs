@@ -32,7 +32,14 @@ impl StructureAnalysis {
     /// # Errors
     /// A case that cannot be loaded, or FRFs that do not determine the parameters.
     pub fn run(campaign: &Campaign, options: Options) -> Result<Self> {
-        let case = StructureCase::load(campaign)?;
+        Self::of_case(StructureCase::load(campaign)?, options)
+    }
+
+    /// As [`run`](Self::run), of a case that is there already.
+    ///
+    /// # Errors
+    /// FRFs that do not determine the parameters.
+    pub fn of_case(case: StructureCase, options: Options) -> Result<Self> {
         // FRFs that show no modes can still be fitted.
         let modal = match case.model.start() {
             Some(_) => None,

@@ -69,12 +69,11 @@ pub fn run(args: Args) -> Result<Outcome> {
     let freed = match args.free.is_empty() {
         true => None,
         false => {
-            let effects = StructureCase::load(&campaign)?.effects();
-            let bends = effects.iter().any(|e| e.starts_with("link-flexibility"));
-            let mut groups: Vec<LinkGroup> = args.free.iter().flat_map(|f| f.groups(bends)).collect();
+            let case = StructureCase::load(&campaign)?;
+            let mut groups: Vec<LinkGroup> = args.free.iter().flat_map(|f| f.groups(case.bends())).collect();
             groups.sort_unstable();
             groups.dedup();
-            Some(FreedLinks::run(&campaign, &groups, options)?)
+            Some(FreedLinks::run(&campaign, case, &groups, options)?)
         }
     };
     let analysis = if let Some(freed) = &freed {

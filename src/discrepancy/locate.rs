@@ -374,10 +374,7 @@ fn probe(
     block: &FrfBlock,
     axes: &std::ops::Range<usize>,
 ) -> Result<FrfBasis> {
-    let (robot, kinematics) = (
-        model.robot_at(theta),
-        model.kinematics_at(theta, &block.kinematics),
-    );
+    let (robot, kinematics) = model.at(theta, &block.kinematics);
     let joints = robot.joint_count();
     let number = axes.start / 3;
     let mut chain = model.chain(theta, &block.kinematics, block.lowness, false);

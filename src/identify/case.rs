@@ -72,15 +72,7 @@ impl StructureCase {
     /// # Errors
     /// FRFs or robot file that cannot be read, a broken revision log, or one with effects that are none of this robot.
     pub fn load(campaign: &Campaign) -> Result<Self> {
-        Self::load_freeing(campaign, &Freed::default())
-    }
-
-    /// As [`load`](Self::load), with link parameters free that the campaign may take for exact.
-    ///
-    /// # Errors
-    /// As there.
-    pub fn load_freeing(campaign: &Campaign, freed: &Freed) -> Result<Self> {
-        let baseline = structure_model_freeing(campaign, freed)?;
+        let baseline = structure_model(campaign)?;
         let log = RevisionLog::load(&campaign.dir)?;
         let revisions: Vec<Revision> = log.revisions(Domain::Structure).cloned().collect();
         let (set, mut warnings) = campaign.load_frfs()?;
@@ -112,6 +104,29 @@ impl StructureCase {
             settled,
             warnings,
         })
+    }
+
+    /// The same data and revision, with link parameters free that the campaign may take for exact.
+    ///
+    /// # Errors
+    /// As for [`load`](Self::load).
+    pub fn freeing(&self, campaign: &Campaign, freed: &Freed) -> Result<Self> {
+        let baseline = structure_model_freeing(campaign, freed)?;
+        let model = match self.revisions.last() {
+            Some(current) => with_revision(campaign, &baseline, &self.data, current)?,
+            None => baseline.clone(),
+        };
+        Ok(StructureCase {
+            model,
+            baseline,
+            settled: false,
+            ..self.clone()
+        })
+    }
+
+    /// Whether the links of the model bend.
+    pub fn bends(&self) -> bool {
+        self.model.has("link-flexibility")
     }
 
     /// How to calibrate this case where `wanted` was asked for. Further starting points were tried when the revision was

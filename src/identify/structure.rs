@@ -337,10 +337,21 @@ impl StructureModel {
 
     /// Where the frames are at `theta`, where `kinematics` says where the robot file puts them.
     pub fn kinematics_at<'k>(&self, theta: &[f64], kinematics: &'k Kinematics) -> Cow<'k, Kinematics> {
-        if !self.file_numbers.iter().any(|number| number.is_length()) {
-            return Cow::Borrowed(kinematics);
-        }
-        Cow::Owned(kinematics.with_lengths(&self.robot.spec, &self.robot_at(theta).spec))
+        self.at(theta, kinematics).1
+    }
+
+    /// Both at once.
+    pub fn at<'k>(
+        &self,
+        theta: &[f64],
+        kinematics: &'k Kinematics,
+    ) -> (Cow<'_, RobotModel>, Cow<'k, Kinematics>) {
+        let robot = self.robot_at(theta);
+        let kinematics = match self.file_numbers.iter().any(|number| number.is_length()) {
+            true => Cow::Owned(kinematics.with_lengths(&self.robot.spec, &robot.spec)),
+            false => Cow::Borrowed(kinematics),
+        };
+        (robot, kinematics)
     }
 
     /// The chain at a posture with all effects; `kinematics` as the robot file has them. `lowness`: see [`Setting`].
@@ -364,7 +375,7 @@ impl StructureModel {
         lowness: f64,
         with_derivatives: bool,
     ) -> Chain {
-        let (robot, kinematics) = (self.robot_at(theta), self.kinematics_at(theta, kinematics));
+        let (robot, kinematics) = self.at(theta, kinematics);
         let mut chain = robot.chain(&kinematics, baseline);
         let inertia = |number: &FileNumber| matches!(number, FileNumber::Inertia { .. });
         if self.file_numbers.iter().any(inertia) {
@@ -423,7 +434,7 @@ impl StructureModel {
 
     /// Displacement per coordinate of `chain`, which is this model's at `theta`, of each of the block's outputs.
     pub(super) fn output_rows(&self, theta: &[f64], chain: &Chain, block: &FrfBlock) -> Vec<DVector<f64>> {
-        let (robot, kinematics) = (self.robot_at(theta), self.kinematics_at(theta, &block.kinematics));
+        let (robot, kinematics) = self.at(theta, &block.kinematics);
         let outputs = block.outputs.iter();
         outputs
             .map(|(point, axis)| {
@@ -900,13 +911,16 @@ mod tests {
     use crate::ingest::Axis;
     use crate::robot::fixture::{TAP_POSTURES, irb6640};
 
-    fn model() -> StructureModel {
-        let section = RobotSection {
+    fn section() -> RobotSection {
+        RobotSection {
             model: "irb6640".into(),
             mass_tolerance: Some(0.05),
             stiffness_tolerance: 0.3,
             links: Default::default(),
-        };
+        }
+    }
+
+    fn model() -> StructureModel {
         let point = |node, body| Point {
             node,
             body,
@@ -914,7 +928,13 @@ mod tests {
             axes: AxesRef::Base,
         };
         let points = vec![point(1, BodyRef::Tool), point(2, BodyRef::Link(3))];
-        StructureModel::new(RobotModel::new(irb6640()), points, &section)
+        StructureModel::new(RobotModel::new(irb6640()), points, &section())
+    }
+
+    /// The same with all numbers of the links free.
+    fn with_free_links(exact: &StructureModel) -> StructureModel {
+        let section = section().freeing(&crate::campaign::LinkGroup::ALL);
+        StructureModel::new(exact.robot.clone(), exact.points.clone(), &section)
     }
 
     /// Two postures at two levels; a few lines; noise of 1 % of the magnitude.
@@ -1033,14 +1053,7 @@ mod tests {
     fn gradients_of_link_parameters_agree_with_differences() {
         let exact = model();
         let data = data(&exact);
-        let section = RobotSection {
-            model: "irb6640".into(),
-            mass_tolerance: Some(0.05),
-            stiffness_tolerance: 0.3,
-            links: Default::default(),
-        };
-        let section = section.freeing(&crate::campaign::LinkGroup::ALL);
-        let free = StructureModel::new(exact.robot.clone(), exact.points.clone(), &section);
+        let free = with_free_links(&exact);
         // Six stiffnesses, damping, six masses; 18 moments, 18 coordinates, 8 lengths, 5 walls.
         assert_eq!(free.parameters.len(), 13 + 18 + 18 + 8 + 5);
         let summary = data.summary();
@@ -1070,14 +1083,7 @@ mod tests {
     fn free_numbers_at_the_files_values_are_the_file() {
         let exact = model();
         let data = data(&exact);
-        let section = RobotSection {
-            model: "irb6640".into(),
-            mass_tolerance: Some(0.05),
-            stiffness_tolerance: 0.3,
-            links: Default::default(),
-        };
-        let section = section.freeing(&crate::campaign::LinkGroup::ALL);
-        let free = StructureModel::new(exact.robot.clone(), exact.points.clone(), &section);
+        let free = with_free_links(&exact);
         let (a, b) = (
             exact.predict(&exact.nominal_theta(), &data).unwrap(),
             free.predict(&free.nominal_theta(), &data).unwrap(),

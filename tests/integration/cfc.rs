@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::Path;
 
-use crate::support::program;
+use crate::support::{COEFFICIENTS, program};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
@@ -13,14 +13,6 @@ const RATE: f64 = 2000.0;
 const TEETH: usize = 4;
 /// Ktc Krc Kac Kte Kre Kae.
 const TRUTH: [f64; 6] = [900.0, 380.0, 220.0, 18.0, 15.0, 3.0];
-const KEYS: [&str; 6] = [
-    "ktc_n_per_mm2",
-    "krc_n_per_mm2",
-    "kac_n_per_mm2",
-    "kte_n_per_mm",
-    "kre_n_per_mm",
-    "kae_n_per_mm",
-];
 
 #[derive(Clone)]
 struct MadeCut {
@@ -179,7 +171,7 @@ fn every_group_finds_the_coefficients_and_has_the_contract_form() {
     for group in groups.iter().chain(document["pooled"].as_array().unwrap()) {
         assert_eq!(group["process"], "milling");
         assert!(group["cutting_speed_m_per_min"].as_f64().unwrap() > 50.0);
-        for (key, truth) in KEYS.iter().zip(TRUTH) {
+        for (key, truth) in COEFFICIENTS.iter().zip(TRUTH) {
             let value = group[key]["value"].as_f64().unwrap();
             let std_error = group[key]["std_error"].as_f64().unwrap();
             let tolerance = if key.ends_with("mm2") { 0.02 } else { 0.1 };
@@ -206,7 +198,10 @@ fn one_feed_is_said_and_not_guessed() {
     cuts.retain(|c| c.feed_mm == 0.1);
     let document = run(&cuts);
     let group = &document["groups"][0];
-    assert!(KEYS.iter().all(|key| group[key]["value"].is_null()), "{group}");
+    assert!(
+        COEFFICIENTS.iter().all(|key| group[key]["value"].is_null()),
+        "{group}"
+    );
     let told = warnings(&document);
     assert!(
         told.contains("Ktc, Krc, Kte and Kre cannot be separated with one feed"),

@@ -4,17 +4,9 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::support::{copy_of, document};
+use crate::support::{COEFFICIENTS, copy_of, document};
 
 const CUTS: [&str; 6] = ["01", "04", "05", "09", "13", "16"];
-const COEFFICIENTS: [&str; 6] = [
-    "ktc_n_per_mm2",
-    "krc_n_per_mm2",
-    "kac_n_per_mm2",
-    "kte_n_per_mm",
-    "kre_n_per_mm",
-    "kae_n_per_mm",
-];
 
 /// Rows of `time, Fx, Fy, Fz` of a record written with semicolons and decimal commas.
 fn change(folder: &Path, cut: &str, change: impl Fn(&mut Vec<[f64; 4]>)) {

@@ -12,6 +12,16 @@ pub struct Run {
     pub stderr: String,
 }
 
+/// Keys of the cutting coefficients in documents.
+pub const COEFFICIENTS: [&str; 6] = [
+    "ktc_n_per_mm2",
+    "krc_n_per_mm2",
+    "kac_n_per_mm2",
+    "kte_n_per_mm",
+    "kre_n_per_mm",
+    "kae_n_per_mm",
+];
+
 /// The program, ready for arguments.
 pub fn program() -> Command {
     Command::new(env!("CARGO_BIN_EXE_lobestone"))

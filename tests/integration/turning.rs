@@ -8,18 +8,10 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 
-use crate::support::{document, lobestone};
+use crate::support::{COEFFICIENTS, document, lobestone};
 
 /// Ktc Krc Kac (N/mm²) Kte Kre Kae (N/mm).
 const TRUTH: [f64; 6] = [2050.0, 880.0, -140.0, 62.0, 71.0, -4.0];
-const KEYS: [&str; 6] = [
-    "ktc_n_per_mm2",
-    "krc_n_per_mm2",
-    "kac_n_per_mm2",
-    "kte_n_per_mm",
-    "kre_n_per_mm",
-    "kae_n_per_mm",
-];
 const RATE: f64 = 2000.0;
 /// Air, cut, air, s.
 const AIR_S: f64 = 0.8;
@@ -227,7 +219,7 @@ fn coefficients_come_back_from_a_nosed_edge_and_the_standard_errors_hold() {
     let pooled = &result["pooled"][0];
     assert_eq!(pooled["process"], "turning");
     let mut off = 0.0;
-    for (key, truth) in KEYS.iter().zip(TRUTH) {
+    for (key, truth) in COEFFICIENTS.iter().zip(TRUTH) {
         let (value, std) = value(pooled, key).unwrap();
         eprintln!("{key} {value:.2} ± {std:.2}, truth {truth}");
         assert!((value - truth).abs() < 4.0 * std, "{key} {value} ± {std}");
@@ -236,7 +228,7 @@ fn coefficients_come_back_from_a_nosed_edge_and_the_standard_errors_hold() {
     }
     // χ² of six: 0.2 and 22 are a thousandth away on either side.
     assert!((0.2..22.0).contains(&off), "{off}");
-    assert!((value(pooled, KEYS[0]).unwrap().0 / TRUTH[0] - 1.0).abs() < 0.01);
+    assert!((value(pooled, COEFFICIENTS[0]).unwrap().0 / TRUTH[0] - 1.0).abs() < 0.01);
     assert_eq!(warnings(&result), "");
     // One cutting speed, though no two spindle speeds are alike.
     assert_eq!(result["groups"].as_array().unwrap().len(), 1);
@@ -257,7 +249,7 @@ fn coefficients_come_back_from_a_nosed_edge_and_the_standard_errors_hold() {
     )
     .unwrap();
     let wrong = cfc(dir.path());
-    let (krc, std) = value(&wrong["pooled"][0], KEYS[1]).unwrap();
+    let (krc, std) = value(&wrong["pooled"][0], COEFFICIENTS[1]).unwrap();
     assert!(std > 10.0, "{krc} ± {std}");
     let misfit = wrong["pooled"][0]["chi2_per_dof"]["y"].as_f64().unwrap();
     assert!(misfit > 100.0, "{misfit}");
@@ -314,7 +306,11 @@ fn what_one_feed_or_one_depth_cannot_tell_is_told() {
         assert!(told.contains(pair), "{told}");
     }
     assert!(told.contains("cut at two feeds or more"), "{told}");
-    assert!(KEYS.iter().all(|key| value(&result["pooled"][0], key).is_none()));
+    assert!(
+        COEFFICIENTS
+            .iter()
+            .all(|key| value(&result["pooled"][0], key).is_none())
+    );
 
     // A nose separates them by itself, if it is what the campaign says.
     let dir = tempfile::tempdir().unwrap();
@@ -343,7 +339,7 @@ fn what_one_feed_or_one_depth_cannot_tell_is_told() {
         told.contains("one depth (1.5 mm)") && told.contains("nose radius"),
         "{told}"
     );
-    let (ktc, std) = value(&result["pooled"][0], KEYS[0]).unwrap();
+    let (ktc, std) = value(&result["pooled"][0], COEFFICIENTS[0]).unwrap();
     assert!((ktc - TRUTH[0]).abs() < 4.0 * std && std < 40.0, "{ktc} ± {std}");
 }
 
@@ -474,7 +470,7 @@ fn a_cut_list_of_a_lathe_makes_a_campaign() {
     assert_eq!(run.status, Some(0), "{}", run.stderr);
     assert!(toml.contains("kind = \"turning\""), "{toml}");
     let again = cfc(dir.path());
-    for key in KEYS {
+    for key in COEFFICIENTS {
         let (own, _) = value(&again["pooled"][0], key).unwrap();
         let (before, std) = value(&truth["pooled"][0], key).unwrap();
         // Spindle speeds are written with three decimals.

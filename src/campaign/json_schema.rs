@@ -107,7 +107,7 @@ mod tests {
     use toml::{Table, Value as Toml};
 
     use super::super::Campaign;
-    use super::super::robot_spec::RobotSpec;
+    use super::crate::data::RobotSpec;
     use super::*;
 
     const FULL: &str = include_str!("../../tests/data/campaign_full.toml");

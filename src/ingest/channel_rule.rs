@@ -3,11 +3,14 @@
 
 use std::path::Path;
 
+use super::contents::MeasurementFile;
 use super::force;
+use super::long;
+use super::read::{self, no_such, read_file};
 use super::table::Header;
 use super::text::{Notes, without_byte_order_mark};
 use super::units::{self, Dimension, Unit};
-use super::{ChannelRole, MeasurementFile, TimeRecord, long, read_file};
+use crate::data::{ChannelRole, TimeRecord};
 use crate::{Error, InputError, Result};
 
 /// What a channel is.
@@ -114,7 +117,7 @@ impl Gain {
 /// Those of [`super::read_time`]; a channel that is not there, or not in the unit that its rule needs.
 pub fn read_time_with(path: &Path, rules: &[ChannelRule]) -> Result<(TimeRecord, Vec<String>)> {
     if rules.is_empty() {
-        return super::read_time(path);
+        return read::read_time(path);
     }
     let (times, warnings) = match read_file(path) {
         Ok(MeasurementFile {
@@ -124,11 +127,7 @@ pub fn read_time_with(path: &Path, rules: &[ChannelRule]) -> Result<(TimeRecord,
             Some(found) => found,
             None => match other {
                 Ok(file) => {
-                    return Err(super::no_such(
-                        &file,
-                        "time signal",
-                        "give a file with force signals",
-                    ));
+                    return Err(no_such(&file, "time signal", "give a file with force signals"));
                 }
                 Err(error) => return Err(error),
             },

@@ -1,6 +1,7 @@
 //! Which format a file has, by what stands in it.
 
 use super::channel_rule;
+use super::contents::Format;
 use super::force;
 use super::frf_text;
 use super::lvm;
@@ -8,7 +9,7 @@ use super::mat;
 use super::table::Header;
 use super::text::{self, Lines};
 use super::uff;
-use super::{Format, InputError};
+use crate::InputError;
 
 /// What was decided, and what the reader needs to know of it.
 pub(super) enum Detected {

@@ -2,11 +2,11 @@
 
 use rayon::prelude::*;
 
-use super::InputError;
 use super::number;
 use super::split_comma;
 use super::text::{Lines, Notes, decode};
 use super::units;
+use crate::InputError;
 
 /// Header lines looked at before a file is given up as "no table of numbers".
 const HEADER_LINES_AT_MOST: usize = 200;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::Answers;
+use super::answers::Answers;
 use super::list_columns::{Column, DIAMETER, DIRECTION, NUMBER, TEETH, column, english, is_down, plain};
 use super::scan::{Scan, stem};
 use super::tables::cut_ids;

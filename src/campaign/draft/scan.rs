@@ -1,5 +1,6 @@
 //! What lies in a folder: every file read as `inspect` reads it.
 
+use crate::data::{ChannelRole, Quantity, RobotSpec};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -9,8 +10,7 @@ use rayon::prelude::*;
 use super::cut_list;
 use super::names::{Facts, facts_of, facts_of_header, posture_of};
 use crate::campaign::campaign_file;
-use crate::campaign::robot_spec::RobotSpec;
-use crate::ingest::{ChannelRole, Quantity, survey};
+use crate::ingest::survey;
 use crate::{Error, InputError, Result};
 
 /// A folder's measurement files, in the order of their paths (from the folder, with forward slashes).

@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 use proptest::prelude::*;
 
-use super::super::read_bytes;
+use super::super::decode::read_bytes;
 use super::super::text::Notes;
 use super::*;
 

@@ -286,35 +286,3 @@ fn hole(section: &Section<'_>) -> Result<HoleSection> {
         )?,
     })
 }
-
-#[cfg(test)]
-mod tests {
-    use approx::assert_relative_eq;
-    use proptest::prelude::*;
-
-    use super::*;
-
-    #[test]
-    fn half_immersion_is_a_quarter_turn() {
-        let up = radial_immersion(0.5, Direction::Up);
-        assert_relative_eq!(up.exit_rad, PI / 2.0, epsilon = 1e-15);
-        let down = radial_immersion(0.5, Direction::Down);
-        assert_relative_eq!(down.start_rad, PI / 2.0, epsilon = 1e-15);
-        assert_eq!(radial_immersion(1.0, Direction::Up), Immersion::SLOT);
-        assert_eq!(radial_immersion(1.0, Direction::Down), Immersion::SLOT);
-    }
-
-    proptest! {
-        /// The teeth sweep a strip of the given width (across the feed), thin chip first in up-milling.
-        #[test]
-        fn the_swept_strip_is_as_wide_as_the_cut(ratio in 1e-6f64..=1.0) {
-            for direction in [Direction::Up, Direction::Down] {
-                let im = radial_immersion(ratio, direction);
-                let width = (im.start_rad.cos() - im.exit_rad.cos()) / 2.0;
-                prop_assert!((width - ratio).abs() < 1e-12, "{direction:?} {width}");
-                let entry_thinner = im.start_rad.sin() <= im.exit_rad.sin() + 1e-12;
-                prop_assert_eq!(entry_thinner, direction == Direction::Up || ratio > 1.0 - 1e-9);
-            }
-        }
-    }
-}

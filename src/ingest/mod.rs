@@ -18,10 +18,12 @@ mod long;
 mod lvm;
 mod mat;
 mod number;
+mod preview;
 mod quality;
 mod read;
 mod split_comma;
 mod table;
+mod table_rows;
 mod tdms;
 #[cfg(test)]
 mod tests;

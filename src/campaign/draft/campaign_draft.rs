@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::answers::Answers;
 use super::entry::{DraftTable, Entry};
-use super::scan::Scan;
+use super::found::Scan;
 use super::tables;
 use crate::campaign::paths::campaign_file;
 use crate::campaign::robot_text::quoted;
@@ -258,8 +258,10 @@ pub fn folder_name(dir: &Path) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::found::{FoundForce, FoundFrf};
+    use super::super::names;
     use super::*;
-    use crate::ingest::Quantity;
+    use crate::data::Quantity;
 
     fn scan_of(frfs: &[(&str, &[i64])], forces: &[&str]) -> Scan {
         Scan {

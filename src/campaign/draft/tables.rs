@@ -5,10 +5,9 @@ use std::collections::BTreeSet;
 
 use super::answers::Answers;
 use super::entry::{DraftTable, Entry, Kind};
+use super::found::{FoundForce, FoundFrf, Scan, stem};
 use super::list_columns::{CUTTING_SPEED, DIAMETER, DIRECTION, FEED_PER_TURN, FEED_RATE, RADIAL_DEPTH};
 use super::names::FROM_NAME;
-use super::scan::stem;
-use super::scan::{FoundForce, FoundFrf, Scan};
 use crate::{InputError, Result};
 
 const PROCESSES: &[&str] = &["milling", "drilling", "turning"];

@@ -5,6 +5,7 @@ use proptest::prelude::*;
 
 use super::super::decode::read_bytes;
 use super::super::text::Notes;
+use super::datasets::read;
 use super::*;
 
 /// A value as the file can hold it: `digits` after the point in ASCII, single or double in binary.

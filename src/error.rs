@@ -12,7 +12,7 @@ pub enum Error {
     #[error("{0}")]
     Input(Box<InputError>),
     /// The operating system refused to read or write.
-    #[error("{}: {source}", crate::ingest::shown(&path.display().to_string()))]
+    #[error("{}: {source}", crate::text::shown(&path.display().to_string()))]
     Io { path: PathBuf, source: std::io::Error },
     /// The input is well formed but the numbers allow no answer (singular system, no mode in the band, …).
     #[error("{0}")]
@@ -76,7 +76,7 @@ impl InputError {
 impl fmt::Display for InputError {
     /// What files say is shown, not obeyed: control characters become visible.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        use crate::ingest::shown;
+        use crate::text::shown;
         if let Some(file) = &self.file {
             write!(f, "{}", shown(&file.display().to_string()))?;
             if let Some(line) = self.line {

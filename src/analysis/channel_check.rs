@@ -7,7 +7,7 @@ use crate::campaign::Process;
 use crate::cutting::Group;
 use crate::identify::cutting_study::calibrate_cutting;
 use crate::identify::{CuttingData, CuttingModel};
-use crate::ingest::units::figures;
+use crate::text::figures;
 
 /// Another reading of the recorded channels: true channel i is `factor[i]` times recorded channel `from[i]`.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::average_force::ForceAxis;
-use super::record::{Average, ChannelAnalysis, CutAnalysis, in_tool_axes};
+use super::cut_analysis::{Average, ChannelAnalysis, CutAnalysis, TurnAverage, in_tool_axes};
+use super::force_axis::ForceAxis;
 use crate::ingest::TimeRecord;
 use crate::signal::{self, Blocks, DriftLine};
 
@@ -15,20 +15,6 @@ const STUDENT: [f64; 2] = [1.84, 1.32];
 const FEW_TURNS: usize = 8;
 /// Degrees of freedom that the other cuts' scatter counts as, and that they must have together.
 const POOLED_FREEDOM: f64 = 8.0;
-
-/// The mean of one channel over a window.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TurnAverage {
-    pub average: Average,
-    /// Revolutions averaged.
-    pub turns: usize,
-    /// Standard deviation between the means of revolutions; `None` with one revolution only.
-    pub turn_std: Option<f64>,
-    /// Part of the standard error that the zero line brings.
-    pub zero_std: f64,
-    /// Revolutions left out as spikes.
-    pub dropped: usize,
-}
 
 /// Mean over the revolutions of the window with the zero line taken off.
 pub(super) fn average(

@@ -5,8 +5,8 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::average_force::ForceAxis;
 use super::conic::{ConicFit, Loss, conic_fit};
+use super::force_axis::ForceAxis;
 use super::regression::{Fit, Observation, Solved, fit, measurement_variance};
 use crate::Result;
 
@@ -17,6 +17,15 @@ pub enum Method {
     #[default]
     LeastSquares,
     Huber,
+}
+
+/// How coefficients are wanted.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct CfcOptions {
+    /// Edge coefficients are held at zero or above.
+    pub nonnegative_edges: bool,
+    /// Huber's robust regression where there are cuts enough; else it is the second opinion.
+    pub robust: bool,
 }
 
 /// Threshold of Huber's loss in standard deviations: 95 % as efficient as least squares where errors are normal.

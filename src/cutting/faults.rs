@@ -2,13 +2,13 @@
 
 use std::ops::Range;
 
-use super::average_force::ForceAxis;
-use super::record::Notice;
+use super::cut_analysis::Notice;
+use super::force_axis::axis_of;
 use crate::Result;
 use crate::campaign::Campaign;
-use crate::ingest::units::figures;
 use crate::ingest::{self, ChannelRole, TimeRecord};
 use crate::signal::find_faults;
+use crate::text::figures;
 
 const SPIKES: &str = "spikes of single samples, left out: the revolutions beside stand in their place; electrical \
      disturbance, look at cables and earth";
@@ -96,16 +96,6 @@ fn repair(record: &mut TimeRecord, spindle_rpm: f64) -> Vec<Notice> {
         }
     }
     notices
-}
-
-pub(super) fn axis_of(role: ChannelRole) -> Option<ForceAxis> {
-    Some(match role {
-        ChannelRole::ForceX => ForceAxis::X,
-        ChannelRole::ForceY => ForceAxis::Y,
-        ChannelRole::ForceZ => ForceAxis::Z,
-        ChannelRole::TorqueZ => ForceAxis::Mz,
-        ChannelRole::Other => return None,
-    })
 }
 
 /// Bad samples by the mean of those one revolution before and after (or two, …, where these are bad too).

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value, json};
 
-use super::average_force::{CoefficientKind, ForceAxis, coefficients_of};
-use super::estimate::{Estimate, Method, bootstrap, estimate};
-use super::identify::CfcOptions;
+use super::coefficients::{CoefficientKind, coefficients_of};
+use super::cut_analysis::CutAnalysis;
+use super::estimate::{CfcOptions, Estimate, Method, bootstrap, estimate};
+use super::force_axis::ForceAxis;
 use super::outlier::studentized;
-use super::record::CutAnalysis;
 use super::regression::{Fit, Observation, fit, r2};
 use crate::Result;
 use crate::campaign::Process;

@@ -3,27 +3,21 @@
 use rayon::prelude::*;
 
 use super::average::pool_scatter;
-use super::average_force::{ForceAxis, average_row};
+use super::average_force::average_row;
+use super::cut_analysis::{Average, CutAnalysis};
+use super::estimate::CfcOptions;
+use super::force_axis::ForceAxis;
 use super::group::{Group, Rows, distinct, observations};
 use super::in_step::{InStep, read_in_step};
 use super::orthogonal::{Prediction, predict};
 use super::outlier::misfits;
 use super::plausibility;
-use super::record::{Average, CutAnalysis};
 use super::series::{MaterialComparison, Series, SpeedTrends, compare, speed_trends};
 use super::turning_checks::of_turning;
 use super::warnings;
 use crate::campaign::{Campaign, CutGeometry, Process};
 use crate::progress::Progress;
 use crate::{Error, InputError, Result};
-
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct CfcOptions {
-    /// Edge coefficients are held at zero or above.
-    pub nonnegative_edges: bool,
-    /// Huber's robust regression where there are cuts enough; else it is the second opinion.
-    pub robust: bool,
-}
 
 /// What the dynamometer records say.
 #[derive(Debug, Clone)]

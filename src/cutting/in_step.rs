@@ -1,13 +1,14 @@
 //! Records of a spindle that does not keep the stated speed, put in step with it, so that whole turns are turns by angle.
 
-use super::average_force::ForceAxis;
-use super::faults::{axis_of, read_record};
-use super::record::{CutAnalysis, Notice, analyse_cut};
+use super::cut_analysis::{CutAnalysis, Notice};
+use super::faults::read_record;
+use super::force_axis::{ForceAxis, axis_of};
+use super::record::analyse_cut;
 use crate::Result;
 use crate::campaign::{Campaign, Process};
 use crate::ingest::TimeRecord;
-use crate::ingest::units::figures;
 use crate::signal::{SpindleTrack, spindle_track};
+use crate::text::figures;
 
 const OTHER_SPEED: &str = "the spindle did not keep the stated speed: turns are averaged by the angle that the forces show (waveforms \
      only where it does not wander); correct spindle_rpm (and the feed per tooth that goes with it), and look why it changes \
@@ -151,7 +152,7 @@ mod tests {
                 assert!(
                     !cut.notices
                         .iter()
-                        .any(|n| n.kind == super::super::record::WRONG_SPEED)
+                        .any(|n| n.kind == super::super::cut_analysis::WRONG_SPEED)
                 );
             }
             assert!(

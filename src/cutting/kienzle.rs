@@ -17,7 +17,9 @@ use serde_json::{Map, Value, json};
 use statrs::distribution::{ContinuousCDF, Normal};
 use statrs::function::beta::{beta, beta_reg};
 
-use super::average_force::{DrillGeometry, ForceAxis, average_row, feed_mm};
+use super::average_force::{average_row, feed_mm};
+use super::drill_geometry::DrillGeometry;
+use super::force_axis::ForceAxis;
 use super::group::{Group, Known, by_axis, distinct};
 use super::identify::CfcResult;
 use super::regression::{Fit, Observation, fit, r2};
@@ -596,7 +598,7 @@ impl KienzleFit {
         };
         match &self.telling {
             Some(t) => {
-                let digits = |v: f64| crate::ingest::units::figures(v, 2);
+                let digits = |v: f64| crate::text::figures(v, 2);
                 let worth = if t.sigmas >= CLEAR {
                     String::new()
                 } else {

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::average_force::ForceAxis;
+use super::force_axis::ForceAxis;
 use super::regression::{Observation, fit};
 
 /// A cut whose average on one axis the other cuts do not predict.

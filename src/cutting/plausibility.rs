@@ -1,10 +1,11 @@
 //! Units and scales that the physics of cutting forbids: the specific cutting energy is that of some material.
 
-use super::average_force::{ForceAxis, average_row};
-use super::record::CutAnalysis;
+use super::average_force::average_row;
+use super::cut_analysis::{ChannelAnalysis, CutAnalysis};
+use super::force_axis::ForceAxis;
 use crate::campaign::{Campaign, CutGeometry, Process};
-use crate::ingest::units::figures;
 use crate::signal::median;
+use crate::text::figures;
 
 /// Force per chip cross-section of one cut, edge forces included, N/mm².
 struct Specific {
@@ -244,7 +245,7 @@ fn small_channels(cuts: &[&CutAnalysis]) -> Vec<String> {
     let mut told: Vec<(String, Vec<&str>, f64)> = Vec::new();
     for cut in cuts {
         let forces = || cut.channels.iter().filter(|c| c.axis != ForceAxis::Mz);
-        let span = |c: &super::record::ChannelAnalysis| {
+        let span = |c: &ChannelAnalysis| {
             let low = c.trace.min.iter().copied().fold(f64::INFINITY, f64::min);
             let high = c.trace.max.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             high - low

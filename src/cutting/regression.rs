@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::average_force::ForceAxis;
+use super::force_axis::ForceAxis;
 
 /// One average of one cut on one axis: value = row · coefficients.
 #[derive(Debug, Clone, PartialEq)]

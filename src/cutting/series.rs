@@ -2,9 +2,9 @@
 
 use serde_json::{Value, json};
 
-use super::average_force::{CoefficientKind, coefficients_of};
+use super::coefficients::{CoefficientKind, coefficients_of};
+use super::cut_analysis::CutAnalysis;
 use super::group::{Rows, distinct, observations};
-use super::record::CutAnalysis;
 use super::trend::{Change, Reading, changes, doublings, reference_speed};
 use crate::campaign::{Campaign, Process};
 

@@ -5,7 +5,7 @@ use std::f64::consts::LN_2;
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::average_force::ForceAxis;
+use super::force_axis::ForceAxis;
 use super::group::{Known, distinct};
 use super::regression::{Fit, Observation, fit};
 

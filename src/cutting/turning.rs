@@ -14,7 +14,7 @@
 //!
 //! F_x = F_r sin κ − F_a cos κ,  F_y = F_r cos κ + F_a sin κ,  F_z = F_t.
 
-use super::average_force::ForceAxis;
+use super::force_axis::ForceAxis;
 use super::waveform::gauss_legendre;
 use crate::campaign::{CutGeometry, Tool};
 use crate::{Error, Result};

@@ -1,12 +1,13 @@
 //! What a technician should know about turned cuts beside what all cuts are looked at for: which channel is which, and what
 //! cuts of one depth leave open.
 
-use super::average_force::{ForceAxis, average_row};
+use super::average_force::average_row;
+use super::cut_analysis::CutAnalysis;
+use super::force_axis::ForceAxis;
 use super::group::distinct;
-use super::record::CutAnalysis;
 use crate::campaign::{Campaign, CutGeometry};
-use crate::ingest::units::figures;
 use crate::signal::median;
+use crate::text::figures;
 
 /// What the axes of turning are, for messages.
 const AXES: &str = "x against the feed, y away from the work, z along the cutting speed";

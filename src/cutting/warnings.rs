@@ -3,13 +3,12 @@
 use std::collections::BTreeMap;
 
 use super::air::NO_AIR;
-use super::average_force::ForceAxis;
-use super::estimate::Method;
+use super::cut_analysis::{CutAnalysis, Notice, WRONG_SPEED};
+use super::estimate::{CfcOptions, Method};
+use super::force_axis::ForceAxis;
 use super::group::{Coefficient, Group, distinct};
-use super::identify::CfcOptions;
 use super::outlier::Misfit;
 use super::plausibility::unit_slip;
-use super::record::{CutAnalysis, Notice, WRONG_SPEED};
 use crate::campaign::{Campaign, Process};
 
 /// Notices of all records, one sentence a kind.

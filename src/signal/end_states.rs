@@ -3,8 +3,9 @@
 use std::ops::Range;
 
 use super::blocks::{Blocks, line, median, quantile};
-use super::steady_window::MIN_STATE_BLOCKS;
 
+/// Too few blocks for a state to be told from noise.
+pub(super) const MIN_STATE_BLOCKS: usize = 4;
 /// A block departs when its mean leaves the local line by this many standard deviations…
 const DEPARTURE_SIGMA: f64 = 6.0;
 /// …and by this part of the channel's range (slow bends of the drift stay below it).

@@ -211,8 +211,8 @@ fn come_back_evenly(found: &[Range<usize>]) -> bool {
     2 * alike > gaps.len()
 }
 
-#[cfg(test)]
 #[allow(clippy::single_range_in_vec_init)]
+#[cfg(test)]
 mod tests {
     use super::*;
     use rand::{Rng, SeedableRng};

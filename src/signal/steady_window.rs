@@ -10,7 +10,7 @@ use std::ops::Range;
 use super::air_check::air_in;
 use super::blocks::{Blocks, line, median, quantile, robust_std};
 use super::drift::Air;
-use super::end_states::{air_states, departure};
+use super::end_states::{MIN_STATE_BLOCKS, air_states, departure};
 use super::engagement::{full_engagement, loudness};
 
 /// What turns, and how the record is sampled.
@@ -30,8 +30,6 @@ pub struct Phases {
     pub steady: Range<usize>,
 }
 
-/// Too few blocks for a state to be told from noise.
-pub(super) const MIN_STATE_BLOCKS: usize = 4;
 /// More blocks than this are merged: finer ones would make a drill's slow entry too gentle to notice.
 const MAX_BLOCKS: f64 = 250.0;
 /// Turns of a clip are alike where their force fluctuates by the same, up to this part of it.

@@ -109,7 +109,7 @@ mod tests {
     use super::*;
 
     fn hole(pilot_diameter_mm: f64) -> DrillingCut {
-        let tool = crate::cutting::test_drill();
+        let tool = crate::cutting::made_tools::drill();
         let geometry = CutGeometry::Drilling {
             feed_per_rev_mm: 0.2,
             pilot_diameter_mm,

@@ -125,22 +125,9 @@ impl EdgeShape {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use super::*;
-    use crate::campaign::ToolKind;
-
-    pub fn tool(corner_radius_mm: f64, lead_angle_deg: f64) -> Tool {
-        Tool {
-            kind: ToolKind::Endmill,
-            diameter_mm: 12.0,
-            teeth: 2,
-            helix_deg: 30.0,
-            corner_radius_mm,
-            lead_angle_deg,
-            half_point_angle_deg: None,
-            web_thickness_mm: None,
-        }
-    }
+    use crate::cutting::made_tools::endmill as tool;
 
     fn sum(slices: &[EdgeSlice], of: impl Fn(&EdgeSlice) -> f64) -> f64 {
         slices.iter().map(of).sum()

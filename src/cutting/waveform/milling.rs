@@ -705,7 +705,7 @@ mod tests {
         for (corner_radius_mm, lead_angle_deg, start_deg) in
             [(6.0, 90.0, 0.0), (6.0, 90.0, 110.0), (1.0, 60.0, 0.0)]
         {
-            let tool = crate::cutting::waveform::edge_shape::tests::tool(corner_radius_mm, lead_angle_deg);
+            let tool = crate::cutting::made_tools::endmill(corner_radius_mm, lead_angle_deg);
             let (depth, feed) = (2.5, 0.12);
             let immersion = Immersion {
                 start_rad: f64::to_radians(start_deg),

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::cut_analysis::{Average, ChannelAnalysis, CutAnalysis, TurnAverage, in_tool_axes};
 use super::force_axis::ForceAxis;
 use crate::ingest::TimeRecord;
-use crate::signal::{self, Blocks, DriftLine};
+use crate::signal::{self, DriftLine, SignalBlocks};
 
 /// Revolutions whose mean is further than this many robust standard deviations off are spikes.
 const SPIKE_SIGMA: f64 = 8.0;
@@ -26,7 +26,7 @@ pub(super) fn average(
 ) -> TurnAverage {
     let time = |i: usize| record.start_s + i as f64 / record.sample_rate_hz;
     let compensated: Vec<f64> = steady.clone().map(|i| values[i] - drift.at(time(i))).collect();
-    let blocks = Blocks::new(&compensated, samples_per_revolution);
+    let blocks = SignalBlocks::new(&compensated, samples_per_revolution);
     let centre = signal::median(&blocks.mean);
     let deviation: Vec<f64> = blocks.mean.iter().map(|m| (m - centre).abs()).collect();
     let limit = SPIKE_SIGMA * 1.4826 * signal::median(&deviation);

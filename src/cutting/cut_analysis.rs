@@ -86,7 +86,7 @@ pub struct TurnAverage {
 }
 
 /// Notice of a record whose tooth-passing line is not where speed and teeth put it.
-pub(super) const WRONG_SPEED: &str = "coefficients rest on a wrong spindle speed or number of teeth: correct spindle_rpm \
+pub(crate) const WRONG_SPEED: &str = "coefficients rest on a wrong spindle speed or number of teeth: correct spindle_rpm \
      (and the feed per tooth that goes with it) or [tool] teeth";
 
 /// F_tool = A F_recorded, standard errors added in squares; torque is taken as recorded.

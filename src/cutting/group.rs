@@ -6,10 +6,10 @@ use serde_json::{Map, Value, json};
 
 use super::coefficients::{CoefficientKind, coefficients_of};
 use super::cut_analysis::CutAnalysis;
-use super::estimate::{CfcOptions, Estimate, Method, bootstrap, estimate};
+use super::estimate::{CfcOptions, CoefficientEstimate, RegressionMethod, bootstrap, estimate};
 use super::force_axis::ForceAxis;
 use super::outlier::studentized;
-use super::regression::{Fit, Observation, fit, r2};
+use super::regression::{CoefficientFit, Observation, fit, r2};
 use crate::Result;
 use crate::campaign::Process;
 
@@ -76,7 +76,7 @@ pub struct RegressionPoint {
 
 /// The regression over a set of cuts of one process.
 #[derive(Debug, Clone)]
-pub struct Group {
+pub struct ForceGroup {
     pub process: Process,
     /// As the campaign names it.
     pub material: Option<String>,
@@ -89,7 +89,7 @@ pub struct Group {
     /// Number of different feeds.
     pub feeds: usize,
     /// How the coefficients were drawn from the averages.
-    pub method: Method,
+    pub method: RegressionMethod,
     pub coefficients: Vec<Coefficient>,
     /// Names of coefficients that only a combination of is determined.
     pub inseparable: Vec<Vec<&'static str>>,
@@ -129,7 +129,7 @@ pub(super) fn observations(cuts: &[&CutAnalysis], rows: &Rows) -> Vec<Observatio
 /// Rows of the linear model by cut index and axis.
 pub(super) type Rows = BTreeMap<(usize, ForceAxis), Vec<f64>>;
 
-impl Group {
+impl ForceGroup {
     /// Fits one group; `None` where its cuts hold no average at all.
     ///
     /// # Errors
@@ -139,13 +139,13 @@ impl Group {
         material: Option<&str>,
         rows: &Rows,
         options: CfcOptions,
-    ) -> Result<Option<Group>> {
+    ) -> Result<Option<ForceGroup>> {
         let observations = observations(cuts, rows);
         let (Some(first), Some(free)) = (cuts.first(), fit(&observations)) else {
             return Ok(None);
         };
         let speeds = || cuts.iter().map(|c| c.cutting_speed_m_per_min);
-        let mut group = Group {
+        let mut group = ForceGroup {
             process: first.process,
             material: material.map(str::to_string),
             cutting_speed_m_per_min: speeds().sum::<f64>() / cuts.len() as f64,
@@ -155,7 +155,7 @@ impl Group {
             ],
             cuts: cuts.iter().map(|c| c.id.clone()).collect(),
             feeds: distinct(cuts.iter().map(|c| c.feed_mm)).len(),
-            method: Method::LeastSquares,
+            method: RegressionMethod::LeastSquares,
             coefficients: free_coefficients(first.process, &free),
             inseparable: free
                 .inseparable
@@ -204,7 +204,12 @@ impl Group {
 
     /// Puts in the coefficients by the method that was asked for, with what the other method, a fit without
     /// constraints and the bootstrap say. Errors are those of the fit without the held coefficients.
-    fn choose(&mut self, observations: &[Observation], free: &Fit, options: CfcOptions) -> Result<Estimate> {
+    fn choose(
+        &mut self,
+        observations: &[Observation],
+        free: &CoefficientFit,
+        options: CfcOptions,
+    ) -> Result<CoefficientEstimate> {
         let edges = |c: &Coefficient| options.nonnegative_edges && c.edge;
         let bounds: Vec<bool> = self.coefficients.iter().map(edges).collect();
         let used = |axis: &&ForceAxis| observations.iter().any(|o| o.axis == **axis);
@@ -213,8 +218,8 @@ impl Group {
             .filter(used)
             .all(|a| free.dof[a.index()] >= ROBUST_DOF);
         let (method, other) = match options.robust && robust_possible {
-            true => (Method::Huber, Method::LeastSquares),
-            false => (Method::LeastSquares, Method::Huber),
+            true => (RegressionMethod::Huber, RegressionMethod::LeastSquares),
+            false => (RegressionMethod::LeastSquares, RegressionMethod::Huber),
         };
         let chosen = estimate(observations, free, &bounds, method)?;
         // Second opinions: where they fail there is none.
@@ -227,7 +232,7 @@ impl Group {
             .then(|| estimate(observations, free, &vec![false; bounds.len()], method).ok())
             .flatten();
         let drawn = bootstrap(observations, &chosen, &bounds, method);
-        let known = |estimate: &Estimate, j: usize| Known {
+        let known = |estimate: &CoefficientEstimate, j: usize| Known {
             value: estimate.value[j],
             std_error: estimate.std_error[j],
         };
@@ -249,7 +254,7 @@ impl Group {
     }
 
     /// Whether both are of one process and one material.
-    pub fn is_beside(&self, other: &Group) -> bool {
+    pub fn is_beside(&self, other: &ForceGroup) -> bool {
         self.process == other.process && self.material == other.material
     }
 
@@ -283,8 +288,8 @@ impl Group {
             });
             if let Some(other) = c.other_method {
                 let key = match self.method {
-                    Method::LeastSquares => "huber",
-                    Method::Huber => "least_squares",
+                    RegressionMethod::LeastSquares => "huber",
+                    RegressionMethod::Huber => "least_squares",
                 };
                 entry[key] = json!(other);
             }
@@ -319,7 +324,7 @@ pub(crate) fn by_axis(process: Process, values: &[Option<f64>; 4]) -> Value {
 }
 
 /// What the ordinary fit says, before constraints and second opinions.
-fn free_coefficients(process: Process, free: &Fit) -> Vec<Coefficient> {
+fn free_coefficients(process: Process, free: &CoefficientFit) -> Vec<Coefficient> {
     let one = |(j, kind): (usize, &CoefficientKind)| Coefficient {
         key: kind.key,
         label: kind.label,

@@ -18,13 +18,14 @@ use statrs::distribution::{ContinuousCDF, Normal};
 use statrs::function::beta::{beta, beta_reg};
 
 use super::average_force::{average_row, feed_mm};
+use super::cutting_trials::CuttingTrials;
 use super::drill_geometry::DrillGeometry;
 use super::force_axis::ForceAxis;
-use super::group::{Group, Known, by_axis, distinct};
+use super::group::{ForceGroup, Known, by_axis, distinct};
 use super::identify::CfcResult;
-use super::regression::{Fit, Observation, fit, r2};
+use super::regression::{CoefficientFit, Observation, fit, r2};
 use super::turning::engaged_edge;
-use crate::campaign::{Campaign, CutGeometry, Process, Tool};
+use crate::campaign::{CutGeometry, Process, Tool};
 use crate::stop;
 
 /// A force component under Kienzle's law.
@@ -231,7 +232,7 @@ struct Law<'a> {
 struct LawFit {
     theta: Vec<f64>,
     /// Of the last linearisation.
-    linear: Fit,
+    linear: CoefficientFit,
     converged: bool,
 }
 
@@ -351,24 +352,23 @@ fn deviance(observations: &[Observation], weight: &[f64], fitted: impl Iterator<
     each.map(|((o, w), f)| w * (o.value - f).powi(2) - w.ln()).sum()
 }
 
-fn linear_deviance(observations: &[Observation], fit: &Fit) -> f64 {
+fn linear_deviance(observations: &[Observation], fit: &CoefficientFit) -> f64 {
     let fitted = observations.iter().map(|o| fit.predict(&o.row));
     deviance(observations, &fit.weight, fitted)
 }
 
-/// Kienzle's law for each of `groups` (of `result`); `None` where a group's cuts hold no average, or the tool is not known.
-pub fn kienzle(campaign: &Campaign, result: &CfcResult, groups: &[Group]) -> Vec<Option<KienzleFit>> {
+/// Kienzle's law for each of `groups` (of `result`); `None` where a group's cuts hold no average.
+pub fn kienzle(trials: &CuttingTrials, result: &CfcResult, groups: &[ForceGroup]) -> Vec<Option<KienzleFit>> {
     groups
         .iter()
-        .map(|group| of_group(campaign, result, group))
+        .map(|group| of_group(trials, result, group))
         .collect()
 }
 
-fn of_group(campaign: &Campaign, result: &CfcResult, group: &Group) -> Option<KienzleFit> {
-    let tool = campaign.tool.as_ref()?;
+fn of_group(trials: &CuttingTrials, result: &CfcResult, group: &ForceGroup) -> Option<KienzleFit> {
     let (mut observations, mut geometries) = (Vec::new(), Vec::new());
     for cut in result.cuts.iter().filter(|c| group.cuts.contains(&c.id)) {
-        let geometry = &campaign.cuts[cut.cut].geometry;
+        let geometry = &trials.cuts[cut.cut].geometry;
         for &axis in ForceAxis::of(group.process) {
             let Some(average) = cut.averages[axis.index()] else {
                 continue;
@@ -376,14 +376,14 @@ fn of_group(campaign: &Campaign, result: &CfcResult, group: &Group) -> Option<Ki
             observations.push(Observation {
                 cut: cut.cut,
                 axis,
-                row: average_row(tool, geometry, axis).ok()?,
+                row: average_row(trials.tool, geometry, axis).ok()?,
                 value: average.value,
                 std_error: average.std_error,
             });
             geometries.push(*geometry);
         }
     }
-    fit_both(tool, group.process, &observations, &geometries)
+    fit_both(trials.tool, group.process, &observations, &geometries)
 }
 
 fn fit_both(
@@ -477,7 +477,13 @@ fn component(name: (&'static str, &'static str), j: usize, law: &Law, best: &Law
 }
 
 /// Chances of a difference of deviances as far out, where the linear-edge law and where Kienzle's law is true.
-fn chances(law: &Law, observations: &[Observation], linear: &Fit, best: &LawFit, found: f64) -> [f64; 2] {
+fn chances(
+    law: &Law,
+    observations: &[Observation],
+    linear: &CoefficientFit,
+    best: &LawFit,
+    found: f64,
+) -> [f64; 2] {
     let of_linear: Vec<f64> = observations.iter().map(|o| linear.predict(&o.row)).collect();
     let of_kienzle: Vec<f64> = law.terms.iter().map(|t| law.predict(t, &best.theta)).collect();
     let normal = Normal::standard();
@@ -520,7 +526,7 @@ fn telling_feed(
     law: &Law,
     observations: &[Observation],
     geometries: &[CutGeometry],
-    linear: &Fit,
+    linear: &CoefficientFit,
     best: &LawFit,
 ) -> Option<TellingFeed> {
     let feeds = distinct(geometries.iter().map(feed_mm));

@@ -2,8 +2,9 @@
 
 use super::average_force::average_row;
 use super::cut_analysis::{ChannelAnalysis, CutAnalysis};
+use super::cutting_trials::CuttingTrials;
 use super::force_axis::ForceAxis;
-use crate::campaign::{Campaign, CutGeometry, Process};
+use crate::campaign::{CutGeometry, Process};
 use crate::signal::median;
 use crate::text::figures;
 
@@ -16,9 +17,8 @@ struct Specific {
     axial: Option<f64>,
 }
 
-fn specific(campaign: &Campaign, cut: &CutAnalysis) -> Option<Specific> {
-    let tool = campaign.tool.as_ref()?;
-    let row = |axis| average_row(tool, &campaign.cuts[cut.cut].geometry, axis).ok();
+fn specific(trials: &CuttingTrials, cut: &CutAnalysis) -> Option<Specific> {
+    let row = |axis| average_row(trials.tool, &trials.cuts[cut.cut].geometry, axis).ok();
     let force = |axis: ForceAxis| cut.averages[axis.index()].map(|a| a.value);
     let ratio = |axis: ForceAxis, column: usize| {
         let per = row(axis)?[column];
@@ -99,8 +99,8 @@ fn thin_chip(chip_mm: f64) -> f64 {
 }
 
 /// Mean chip thickness over the engagement, mm.
-fn chip_mm(campaign: &Campaign, cut: &CutAnalysis) -> Option<f64> {
-    match campaign.cuts[cut.cut].geometry {
+fn chip_mm(trials: &CuttingTrials, cut: &CutAnalysis) -> Option<f64> {
+    match trials.cuts[cut.cut].geometry {
         CutGeometry::Milling {
             feed_per_tooth_mm,
             immersion,
@@ -112,17 +112,11 @@ fn chip_mm(campaign: &Campaign, cut: &CutAnalysis) -> Option<f64> {
         }
         // Two lips, each at half the point angle.
         CutGeometry::Drilling { .. } => {
-            let tool = campaign.tool.as_ref()?;
-            let lips = tool.teeth.max(1) as f64;
+            let lips = trials.tool.teeth.max(1) as f64;
             Some(cut.feed_mm / lips * 59f64.to_radians().sin())
         }
         CutGeometry::Turning { .. } => {
-            let row = average_row(
-                campaign.tool.as_ref()?,
-                &campaign.cuts[cut.cut].geometry,
-                ForceAxis::Z,
-            )
-            .ok()?;
+            let row = average_row(trials.tool, &trials.cuts[cut.cut].geometry, ForceAxis::Z).ok()?;
             Some(row[0] / row[3]).filter(|h| h.is_finite())
         }
     }
@@ -144,22 +138,15 @@ const TORQUE_UNITS: [(f64, &str); 5] = [
 ];
 
 /// Warnings about scales that cannot be; `cuts` are of one material.
-pub(super) fn of_scales(campaign: &Campaign, cuts: &[&CutAnalysis], process: Process) -> Vec<String> {
-    let specific: Vec<Specific> = cuts.iter().filter_map(|c| specific(campaign, c)).collect();
+pub(super) fn of_scales(trials: &CuttingTrials, cuts: &[&CutAnalysis], process: Process) -> Vec<String> {
+    let specific: Vec<Specific> = cuts.iter().filter_map(|c| specific(trials, c)).collect();
     let middle = |pick: fn(&Specific) -> Option<f64>| {
         let values: Vec<f64> = specific.iter().filter_map(pick).map(f64::abs).collect();
         (!values.is_empty()).then(|| median(&values))
     };
     let (cutting, axial) = (middle(|s| s.cutting), middle(|s| s.axial));
-    let chip = median(
-        &cuts
-            .iter()
-            .filter_map(|c| chip_mm(campaign, c))
-            .collect::<Vec<_>>(),
-    );
-    let name = cuts
-        .first()
-        .and_then(|c| campaign.cuts[c.cut].material.as_deref());
+    let chip = median(&cuts.iter().filter_map(|c| chip_mm(trials, c)).collect::<Vec<_>>());
+    let name = cuts.first().and_then(|c| trials.cuts[c.cut].material.as_deref());
     let material = name.unwrap_or_default().to_lowercase();
     let known = MATERIALS
         .iter()

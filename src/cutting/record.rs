@@ -8,14 +8,15 @@ use super::air::{air_notices, believable_air};
 use super::average::average;
 use super::average_force::{cut_diameter_mm, cutting_speed_m_per_min, feed_mm};
 use super::cut_analysis::{ChannelAnalysis, CutAnalysis, Notice, Trace, WRONG_SPEED, in_tool_axes};
+use super::cutting_trials::CuttingTrials;
 use super::drill_geometry::DrillGeometry;
 use super::force_axis::ForceAxis;
 use super::teeth::idle_tooth;
 use super::waveform::MillingCut;
-use crate::campaign::{Campaign, Cut, CutGeometry, Process, Tool};
+use crate::campaign::{Cut, CutGeometry, Process, Tool};
 use crate::ingest::{ChannelRole, TimeRecord};
 use crate::signal::{
-    self, Air, Blocks, Clipping, Phases, Spindle, ToothLine, find_faults, find_phases, fit_drift,
+    self, Air, Clipping, Phases, SignalBlocks, Spindle, ToothLine, find_faults, find_phases, fit_drift,
     highest_order, tooth_line, whole_revolutions,
 };
 use crate::text::figures;
@@ -43,12 +44,8 @@ const WRONG_DURATION: &str = "the hole took another time than feed, speed and de
 ///
 /// # Errors
 /// The record is unreadable, too short, holds no usable force channel, or no steady cut is found.
-pub fn analyse_cut(campaign: &Campaign, cut_index: usize, record: &TimeRecord) -> Result<CutAnalysis> {
-    let cut = &campaign.cuts[cut_index];
-    let tool = campaign
-        .tool
-        .as_ref()
-        .ok_or_else(|| Error::computation("[tool] is missing: cutting forces need its teeth and diameter"))?;
+pub fn analyse_cut(trials: &CuttingTrials, cut_index: usize, record: &TimeRecord) -> Result<CutAnalysis> {
+    let (tool, cut) = (trials.tool, &trials.cuts[cut_index]);
     let refuse = |problem: String| Error::from(InputError::new(problem).file(&cut.file));
     let rate = record.sample_rate_hz;
     let samples = record.len();
@@ -171,16 +168,7 @@ pub fn analyse_cut(campaign: &Campaign, cut_index: usize, record: &TimeRecord) -
         // One edge that never leaves the work: no line to judge the speed by.
         CutGeometry::Turning { .. } => None,
     };
-    teeth_notice(
-        campaign,
-        cut,
-        tool,
-        &channels,
-        &usable,
-        &steady,
-        record,
-        &mut notices,
-    );
+    teeth_notice(trials, cut, &channels, &usable, &steady, record, &mut notices);
     if let Some(line) = tooth_line.filter(ToothLine::speed_is_doubtful) {
         notices.push(Notice {
             kind: WRONG_SPEED,
@@ -203,7 +191,7 @@ pub fn analyse_cut(campaign: &Campaign, cut_index: usize, record: &TimeRecord) -
         steady_s: seconds(&steady),
         steady_given,
         revolutions,
-        averages: in_tool_axes(&campaign.dynamometer.tool_from_dyno, &channels),
+        averages: in_tool_axes(trials.tool_from_dyno, &channels),
         channels,
         tooth_line,
         spindle: None,
@@ -381,7 +369,7 @@ fn unsteady_notice(
                 .at(record.start_s + i as f64 / record.sample_rate_hz)
         };
         let compensated: Vec<f64> = steady.clone().map(|i| values[i] - zero(i)).collect();
-        let turns = Blocks::new(&compensated, samples_per_revolution);
+        let turns = SignalBlocks::new(&compensated, samples_per_revolution);
         squares.resize(turns.len(), 0.0);
         for (k, square) in squares.iter_mut().enumerate() {
             let level = if has_zero { turns.mean[k] } else { 0.0 };
@@ -403,16 +391,15 @@ const MOST_SAMPLES: usize = 1 << 17;
 
 #[allow(clippy::too_many_arguments)]
 fn teeth_notice(
-    campaign: &Campaign,
+    trials: &CuttingTrials,
     cut: &Cut,
-    tool: &Tool,
     channels: &[ChannelAnalysis],
     usable: &[UsableChannel],
     steady: &Range<usize>,
     record: &TimeRecord,
     notices: &mut Vec<Notice>,
 ) {
-    let Some(milling) = MillingCut::new(tool, &cut.geometry).filter(|m| m.teeth > 1) else {
+    let Some(milling) = MillingCut::new(trials.tool, &cut.geometry).filter(|m| m.teeth > 1) else {
         return;
     };
     let rate = record.sample_rate_hz;
@@ -434,7 +421,7 @@ fn teeth_notice(
         [0.0; 2],
         true,
     );
-    for (axis, row) in campaign.dynamometer.tool_from_dyno.iter().take(2).enumerate() {
+    for (axis, row) in trials.tool_from_dyno.iter().take(2).enumerate() {
         for (weight, channel) in row.iter().zip(&recorded).filter(|(w, _)| **w != 0.0) {
             let Some((own, value, has_zero)) = channel else {
                 return;

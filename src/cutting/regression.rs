@@ -19,7 +19,7 @@ pub struct Observation {
 
 /// A fit of the coefficients.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Fit {
+pub struct CoefficientFit {
     /// `None`: this data says nothing about it, or cannot tell it from another.
     pub value: Vec<Option<f64>>,
     pub std_error: Vec<Option<f64>>,
@@ -46,13 +46,13 @@ pub struct Fit {
     pub covariance: DMatrix<f64>,
 }
 
-impl Fit {
+impl CoefficientFit {
     /// Row · solution.
     pub fn predict(&self, row: &[f64]) -> f64 {
         row.iter().zip(&self.solution).map(|(r, x)| r * x).sum()
     }
 
-    /// Variance of [`Fit::predict`], from the errors of the coefficients alone.
+    /// Variance of [`CoefficientFit::predict`], from the errors of the coefficients alone.
     pub fn prediction_variance(&self, row: &[f64]) -> f64 {
         let row = DVector::from_column_slice(row);
         (row.transpose() * &self.covariance * &row)[0].max(0.0)
@@ -67,13 +67,13 @@ const ERROR_FLOOR: f64 = 1e-9;
 /// Least squares weighted by 1/(std_error² + τ²); τ, the scatter beyond the measurement errors, is estimated
 /// per axis so that the weighted residuals have the size they should (Paule & Mandel 1982). With measurement
 /// errors of zero this is ordinary least squares per axis. `None` without observations.
-pub fn fit(observations: &[Observation]) -> Option<Fit> {
+pub fn fit(observations: &[Observation]) -> Option<CoefficientFit> {
     let unknowns = observations.first()?.row.len();
     let size = size_of(observations);
     let variance = measurement_variance(observations);
     let mut extra = [0.0f64; 4];
     let mut first_chi2 = None;
-    let mut solved = Solved::new(observations, unknowns, &variance, &extra);
+    let mut solved = WeightedSolution::new(observations, unknowns, &variance, &extra);
     for _ in 0..200 {
         let mut change = 0.0f64;
         let mut chi2_per_dof = [None; 4];
@@ -102,7 +102,7 @@ pub fn fit(observations: &[Observation]) -> Option<Fit> {
             extra[a] = next;
         }
         first_chi2.get_or_insert(chi2_per_dof);
-        solved = Solved::new(observations, unknowns, &variance, &extra);
+        solved = WeightedSolution::new(observations, unknowns, &variance, &extra);
         if change < 1e-9 {
             break;
         }
@@ -125,7 +125,7 @@ pub(super) fn measurement_variance(observations: &[Observation]) -> Vec<f64> {
 }
 
 /// Weighted least squares at given variances.
-pub(super) struct Solved {
+pub(super) struct WeightedSolution {
     pub(super) solution: Vec<f64>,
     residual: Vec<f64>,
     leverage: Vec<f64>,
@@ -136,13 +136,13 @@ pub(super) struct Solved {
     pub(super) null: Vec<Vec<f64>>,
 }
 
-impl Solved {
+impl WeightedSolution {
     pub(super) fn new(
         observations: &[Observation],
         unknowns: usize,
         variance: &[f64],
         extra: &[f64; 4],
-    ) -> Solved {
+    ) -> WeightedSolution {
         let weight: Vec<f64> = observations
             .iter()
             .zip(variance)
@@ -194,7 +194,7 @@ impl Solved {
             .iter()
             .map(|o| o.value - o.row.iter().zip(&solution).map(|(r, x)| r * x).sum::<f64>())
             .collect();
-        Solved {
+        WeightedSolution {
             solution,
             residual,
             leverage,
@@ -204,7 +204,12 @@ impl Solved {
         }
     }
 
-    fn into_fit(self, observations: &[Observation], extra: [f64; 4], chi2_per_dof: [Option<f64>; 4]) -> Fit {
+    fn into_fit(
+        self,
+        observations: &[Observation],
+        extra: [f64; 4],
+        chi2_per_dof: [Option<f64>; 4],
+    ) -> CoefficientFit {
         let unknowns = self.solution.len();
         let touched = |v: &[f64], j: usize| v[j].powi(2) > 1e-8;
         let determined = |j: usize| !self.null.iter().any(|v| touched(v, j));
@@ -212,7 +217,7 @@ impl Solved {
         for (o, leverage) in observations.iter().zip(&self.leverage) {
             dof[o.axis.index()] += 1.0 - leverage;
         }
-        Fit {
+        CoefficientFit {
             value: (0..unknowns)
                 .map(|j| determined(j).then_some(self.solution[j]))
                 .collect(),

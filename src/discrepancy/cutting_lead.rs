@@ -405,7 +405,7 @@ impl LineGroup {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cutting::made_records::{MadeCut, write_campaign};
+    use crate::analysis::made_force_records::{MadeCut, write_campaign};
     use crate::identify::CuttingCase;
     use crate::identify::cutting_problem::CuttingProblem;
     use crate::identify::cutting_study::calibrate_cutting;

@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::blocks::{Blocks, line, robust_std};
+use super::blocks::{SignalBlocks, line, robust_std};
 
 /// Sample ranges in which the tool cut nothing.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -202,7 +202,7 @@ fn uncertainty(
     for range in air.ranges() {
         let inside: Vec<usize> = kept.iter().copied().filter(|i| range.contains(i)).collect();
         let values: Vec<f64> = inside.iter().map(|&i| residual(i)).collect();
-        let blocks = Blocks::new(&values, values.len() as f64 / BLOCKS_PER_SEGMENT as f64);
+        let blocks = SignalBlocks::new(&values, values.len() as f64 / BLOCKS_PER_SEGMENT as f64);
         square_sum += blocks
             .mean
             .iter()

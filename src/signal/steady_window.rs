@@ -8,7 +8,7 @@
 use std::ops::Range;
 
 use super::air_check::air_in;
-use super::blocks::{Blocks, line, median, quantile, robust_std};
+use super::blocks::{SignalBlocks, line, median, quantile, robust_std};
 use super::drift::Air;
 use super::end_states::{MIN_STATE_BLOCKS, air_states, departure};
 use super::engagement::{full_engagement, loudness};
@@ -40,9 +40,9 @@ const ALIKE: f64 = 0.15;
 pub fn find_phases(channels: &[&[f64]], spindle: Spindle, entry_samples: Option<f64>) -> Option<Phases> {
     let samples = channels.iter().map(|c| c.len()).min()?;
     let per_block = block_length(samples, spindle)?;
-    let blocks: Vec<Blocks> = channels
+    let blocks: Vec<SignalBlocks> = channels
         .iter()
-        .map(|c| Blocks::new(&c[..samples], per_block))
+        .map(|c| SignalBlocks::new(&c[..samples], per_block))
         .collect();
     let count = blocks.first()?.len();
     let whole = |span: Range<f64>| {
@@ -158,11 +158,11 @@ fn block_length(samples: usize, spindle: Spindle) -> Option<f64> {
 }
 
 /// Grows the steady part from the central blocks of the cut outwards.
-fn steady_blocks(blocks: &[Blocks], cut: Range<usize>) -> Range<usize> {
+fn steady_blocks(blocks: &[SignalBlocks], cut: Range<usize>) -> Range<usize> {
     let length = cut.len();
     let core = cut.start + 3 * length / 10..(cut.end - 3 * length / 10).max(cut.start + 3 * length / 10 + 1);
     struct Core<'a> {
-        blocks: &'a Blocks,
+        blocks: &'a SignalBlocks,
         line: (f64, f64, f64),
         mean_tolerance: f64,
         std_dev: f64,

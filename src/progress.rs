@@ -26,6 +26,7 @@ pub fn silence() {
     SILENT.store(true, Ordering::Relaxed);
 }
 
+/// Whether [`silence`] was asked for.
 pub fn is_silent() -> bool {
     SILENT.load(Ordering::Relaxed)
 }
@@ -33,8 +34,11 @@ pub fn is_silent() -> bool {
 /// Steps of the piece of work that is being done.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Reading {
+    /// What is being done, for people.
     pub label: String,
+    /// Steps done.
     pub done: u64,
+    /// Steps in all.
     pub total: u64,
 }
 
@@ -43,6 +47,7 @@ pub struct Reading {
 pub struct Gauge(Mutex<Option<Reading>>);
 
 impl Gauge {
+    /// How far the work is; `None` between two pieces of work.
     pub fn reading(&self) -> Option<Reading> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
@@ -70,6 +75,7 @@ pub fn shown_on<T>(gauge: &Arc<Gauge>, work: impl FnOnce() -> T) -> T {
 }
 
 impl Progress {
+    /// Begins to count `total` steps of the work that `label` names.
     pub fn new(label: impl Into<String>, total: usize) -> Self {
         stop::point();
         let label = label.into();

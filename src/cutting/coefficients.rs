@@ -7,7 +7,9 @@ use crate::campaign::Process;
 pub struct CoefficientKind {
     /// Key in JSON, with unit.
     pub key: &'static str,
+    /// Symbol, for people: `Ktc`.
     pub label: &'static str,
+    /// Unit, for people.
     pub unit: &'static str,
     /// An edge coefficient (N/mm), else a cutting coefficient (N/mm²).
     pub edge: bool,

@@ -7,6 +7,7 @@ use crate::signal::{DriftLine, SpindleTrack, ToothLine};
 /// A mean force (N) or torque (N·m) with its standard error.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Average {
+    /// Mean force (N) or torque (N·m).
     pub value: f64,
     /// From the scatter between revolutions and the uncertainty of the zero line.
     pub std_error: f64,
@@ -17,16 +18,20 @@ pub struct Average {
 pub struct Trace {
     /// Middle of each stretch, s on the record's time axis.
     pub time_s: Vec<f64>,
+    /// Smallest sample of each stretch, unit of the channel.
     pub min: Vec<f64>,
+    /// Largest sample of each stretch, unit of the channel.
     pub max: Vec<f64>,
 }
 
 /// One recorded channel, in the dynamometer's own axes.
 #[derive(Debug, Clone)]
 pub struct ChannelAnalysis {
+    /// As the file names it.
     pub name: String,
     /// Which recorded axis it is.
     pub axis: ForceAxis,
+    /// The zero of the channel over the record.
     pub drift: DriftLine,
     /// Over the steady window, drift taken off.
     pub mean: TurnAverage,
@@ -48,32 +53,44 @@ pub struct Notice {
 pub struct CutAnalysis {
     /// Index into `Campaign::cuts`.
     pub cut: usize,
+    /// The cut's id.
     pub id: String,
+    /// How it was cut.
     pub process: Process,
+    /// As stated, not as found.
     pub spindle_rpm: f64,
+    /// At the diameter of the tool, in turning that of the workpiece.
     pub cutting_speed_m_per_min: f64,
     /// Per tooth (milling), per revolution (drilling, turning).
     pub feed_mm: f64,
     /// Start and end of the record, s.
     pub record_s: [f64; 2],
+    /// Start and end of the air before the cut, s; `None` where there is none.
     pub air_before_s: Option<[f64; 2]>,
+    /// Start and end of the air after the cut, s; `None` where there is none.
     pub air_after_s: Option<[f64; 2]>,
+    /// Start and end of the steady window, s.
     pub steady_s: [f64; 2],
     /// The campaign said where; else detected.
     pub steady_given: bool,
+    /// Revolutions in the steady window.
     pub revolutions: f64,
+    /// The usable channels, ordered by axis.
     pub channels: Vec<ChannelAnalysis>,
     /// Tool axes x, y, z and torque; `None` where a channel it needs is missing or dead.
     pub averages: [Option<Average>; 4],
+    /// Milling: the tooth-passing line of the channel that shows it most clearly; `None` where the window is too short for one.
     pub tooth_line: Option<ToothLine>,
     /// How the spindle ran, where it did not keep the stated speed.
     pub spindle: Option<SpindleTrack>,
+    /// What its owner should know.
     pub notices: Vec<Notice>,
 }
 
 /// The mean of one channel over a window.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TurnAverage {
+    /// The mean and its standard error, N or N·m.
     pub average: Average,
     /// Revolutions averaged.
     pub turns: usize,

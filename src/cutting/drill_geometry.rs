@@ -7,11 +7,15 @@ use crate::{Error, Result};
 /// A drill in a hole: lengths of drilling.md, mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DrillGeometry {
+    /// Number of lips.
     pub lips: f64,
+    /// Radius of the drill, mm.
     pub radius_mm: f64,
     /// Where the lip begins: the pilot's radius, or the chisel's half length in the full.
     pub inner_radius_mm: f64,
+    /// Half the point angle, rad.
     pub half_point_rad: f64,
+    /// Feed per revolution, mm.
     pub feed_per_rev_mm: f64,
 }
 

@@ -14,8 +14,10 @@ use crate::Result;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RegressionMethod {
+    /// The sum of their squares.
     #[default]
     LeastSquares,
+    /// Huber's loss: squares of small residuals, magnitudes of large ones.
     Huber,
 }
 
@@ -37,6 +39,7 @@ const HUBER_CONSISTENCY: f64 = 0.710_164_5;
 /// Coefficients by one method.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoefficientEstimate {
+    /// The coefficients, in the order of the columns.
     pub value: Vec<f64>,
     /// `None` where a constraint holds the value.
     pub std_error: Vec<Option<f64>>,
@@ -46,6 +49,7 @@ pub struct CoefficientEstimate {
     pub weight: Vec<f64>,
     /// What Huber's loss left of each observation's weight, 0…1; 1 with least squares.
     pub share: Vec<f64>,
+    /// Scatter of the averages beyond their own errors (standard deviation; N, N·m), by axis.
     pub extra_scatter: [f64; 4],
     /// False where the robust scatter did not settle.
     pub converged: bool,
@@ -256,6 +260,7 @@ fn spread_out(kept: &[Option<f64>], held: &[bool]) -> Vec<Option<f64>> {
         .collect()
 }
 
+/// Draws of the bootstrap.
 pub const BOOTSTRAP_DRAWS: usize = 500;
 /// With fewer cuts, draws repeat the same few sets and say nothing.
 pub const BOOTSTRAP_CUTS: usize = 5;

@@ -8,24 +8,31 @@ use crate::ingest::ChannelRole;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ForceAxis {
+    /// Force along the feed; turning: against it.
     X,
+    /// Force normal to feed and tool axis; turning: away from the work.
     Y,
+    /// Force along the tool axis; turning: along the cutting speed.
     Z,
     /// Torque.
     Mz,
 }
 
 impl ForceAxis {
+    /// All axes, in the order of [`ForceAxis::index`].
     pub const ALL: [ForceAxis; 4] = [ForceAxis::X, ForceAxis::Y, ForceAxis::Z, ForceAxis::Mz];
 
+    /// Place in arrays by axis: 0 to 3.
     pub fn index(self) -> usize {
         self as usize
     }
 
+    /// Name for people: `Fx`, `Fy`, `Fz`, `Mz`.
     pub fn label(self) -> &'static str {
         ["Fx", "Fy", "Fz", "Mz"][self.index()]
     }
 
+    /// Unit for people: N, of the torque N·m.
     pub fn unit(self) -> &'static str {
         if self == ForceAxis::Mz { "N·m" } else { "N" }
     }

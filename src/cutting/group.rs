@@ -16,11 +16,15 @@ use crate::campaign::Process;
 /// A coefficient, or the admission that the data does not determine it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coefficient {
+    /// Key in JSON, with unit.
     pub key: &'static str,
+    /// Symbol, for people: `Ktc`.
     pub label: &'static str,
+    /// Unit, for people.
     pub unit: &'static str,
     /// An edge coefficient (N/mm), else a cutting coefficient (N/mm²).
     pub edge: bool,
+    /// In `unit`; `None` where the data does not determine it.
     pub value: Option<f64>,
     /// `None` too where a constraint holds the value.
     pub std_error: Option<f64>,
@@ -37,19 +41,23 @@ pub struct Coefficient {
 /// A value and its standard error.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Known {
+    /// The value, in the unit of what it is a value of.
     pub value: f64,
+    /// Its standard error, same unit; `None` where it is not known.
     pub std_error: Option<f64>,
 }
 
 /// How much one cut decides, and how it stands to the others.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Influence {
+    /// The cut's id.
     pub cut: String,
     /// Largest over the axes; 1: nothing checks this cut.
     pub leverage: f64,
     /// Off the prediction from the other cuts, in standard errors of that difference; of the axis furthest off. `None`
     /// where too few other cuts are left to judge.
     pub studentized_residual: Option<f64>,
+    /// Axis of `studentized_residual`.
     pub axis: Option<ForceAxis>,
     /// What robust regression leaves of its weight, 0…1, on the axis where it leaves least; 1 with least squares.
     pub weight_share: f64,
@@ -58,13 +66,17 @@ pub struct Influence {
 /// A point of the regression, for lists and plots.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct RegressionPoint {
+    /// The cut's id.
     pub cut: String,
+    /// Which of its averages.
     pub axis: ForceAxis,
     /// Per tooth (milling), per revolution (drilling, turning).
     pub feed_mm: f64,
     /// N; N·m on the torque axis. So are the next two.
     pub measured: f64,
+    /// Measurement error of `measured`.
     pub std_error: f64,
+    /// By the coefficients of the group.
     pub fitted: f64,
     /// Diagonal of the weighted hat matrix, 0…1.
     pub leverage: f64,
@@ -77,6 +89,7 @@ pub struct RegressionPoint {
 /// The regression over a set of cuts of one process.
 #[derive(Debug, Clone)]
 pub struct ForceGroup {
+    /// How its cuts were made.
     pub process: Process,
     /// As the campaign names it.
     pub material: Option<String>,
@@ -90,14 +103,17 @@ pub struct ForceGroup {
     pub feeds: usize,
     /// How the coefficients were drawn from the averages.
     pub method: RegressionMethod,
+    /// In the order of [`coefficients_of`].
     pub coefficients: Vec<Coefficient>,
     /// Names of coefficients that only a combination of is determined.
     pub inseparable: Vec<Vec<&'static str>>,
     /// By axis (x, y, z, torque).
     pub r2: [Option<f64>; 4],
+    /// Σ (residual/standard error)² per degree of freedom, by axis; `None` without degrees of freedom.
     pub chi2_per_dof: [Option<f64>; 4],
     /// Scatter of the averages beyond their own errors (N; N·m), by axis.
     pub extra_scatter: [f64; 4],
+    /// Every average that was used.
     pub points: Vec<RegressionPoint>,
     /// By cut, as `cuts`.
     pub influence: Vec<Influence>,
@@ -258,6 +274,7 @@ impl ForceGroup {
         self.process == other.process && self.material == other.material
     }
 
+    /// The coefficient with this symbol (`Ktc`).
     pub fn coefficient(&self, label: &str) -> Option<&Coefficient> {
         self.coefficients.iter().find(|c| c.label == label)
     }

@@ -31,6 +31,7 @@ pub struct CfcResult {
     pub materials: Vec<MaterialComparison>,
     /// Milling coefficients from the orthogonal database beside those of the cuts.
     pub prediction: Option<OrthogonalPrediction>,
+    /// What a technician should know, in plain words.
     pub warnings: Vec<String>,
 }
 

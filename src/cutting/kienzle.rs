@@ -31,6 +31,7 @@ use crate::stop;
 /// A force component under Kienzle's law.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KienzleComponent {
+    /// `tangential`, `radial`, `axial` or, of a drill, `feed`.
     pub name: &'static str,
     /// Symbol of the specific force: `kt1.1` is the kc1.1 of the tables.
     pub label: &'static str,
@@ -44,7 +45,9 @@ pub struct KienzleComponent {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Preferred {
+    /// Force = cutting coefficient × chip area + edge coefficient × width.
     LinearEdge,
+    /// Force = kᵢ1.1 · b · h^(1−mᵢ).
     Kienzle,
 }
 
@@ -53,6 +56,7 @@ pub enum Preferred {
 pub struct TellingFeed {
     /// Per tooth (milling), per revolution (drilling, turning), everything else as in the first cut.
     pub feed_mm: f64,
+    /// Average on which the laws differ most there.
     pub axis: ForceAxis,
     /// Kienzle's law less the linear-edge law there (N; N·m).
     pub difference: f64,
@@ -63,8 +67,11 @@ pub struct TellingFeed {
 /// Kienzle's law fitted to the averages of a group, and how it stands to the linear-edge law.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KienzleFit {
+    /// How the cuts of the group were made.
     pub process: Process,
+    /// Tangential, radial and axial force; of a drill tangential and feed force.
     pub components: Vec<KienzleComponent>,
+    /// False where the fit did not settle.
     pub converged: bool,
     /// By axis (x, y, z, torque).
     pub r2: [Option<f64>; 4],

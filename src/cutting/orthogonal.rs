@@ -10,9 +10,11 @@ use crate::campaign::{ChipFormation, Process};
 /// One oblique edge in a material known from orthogonal cutting. Angles in rad, stress in N/mm² (MPa).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObliqueEdge {
+    /// τ, in the shear plane.
     pub shear_stress_n_per_mm2: f64,
     /// β_a, on the rake face, from orthogonal cuts.
     pub friction_angle_rad: f64,
+    /// Shear angle or chip ratio.
     pub chip: ChipFormation,
     /// α_n, normal to the edge.
     pub rake_rad: f64,
@@ -23,8 +25,11 @@ pub struct ObliqueEdge {
 /// Cutting coefficients of an oblique edge, N/mm².
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObliqueCoefficients {
+    /// Along the cutting speed.
     pub ktc_n_per_mm2: f64,
+    /// Normal to the edge.
     pub krc_n_per_mm2: f64,
+    /// Along the edge.
     pub kac_n_per_mm2: f64,
     /// φ_n.
     pub shear_angle_rad: f64,
@@ -65,7 +70,9 @@ impl ObliqueEdge {
 /// Predicted milling or turning coefficients beside those found from the cuts.
 #[derive(Debug, Clone)]
 pub struct OrthogonalPrediction {
+    /// Of the cuts that it is compared with.
     pub material: Option<String>,
+    /// From the orthogonal database.
     pub predicted: ObliqueCoefficients,
     /// Ktc, Krc, Kac: label, predicted, found (value, standard error), all N/mm².
     pub rows: Vec<(&'static str, f64, Option<f64>, Option<f64>)>,

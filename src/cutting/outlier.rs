@@ -9,8 +9,11 @@ use super::regression::{Observation, fit};
 /// A cut whose average on one axis the other cuts do not predict.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CutMisfit {
+    /// Index of the cut, as in its observations.
     pub cut: usize,
+    /// The axis on which it fits worst.
     pub axis: ForceAxis,
+    /// Average on that axis, N or N·m.
     pub measured: f64,
     /// From the fit to all other cuts.
     pub predicted: f64,

@@ -9,7 +9,9 @@ use super::force_axis::ForceAxis;
 pub struct Observation {
     /// Which cut (any numbering).
     pub cut: usize,
+    /// Which average.
     pub axis: ForceAxis,
+    /// Row of the linear model: one number a coefficient.
     pub row: Vec<f64>,
     /// N or N·m.
     pub value: f64,
@@ -22,6 +24,7 @@ pub struct Observation {
 pub struct CoefficientFit {
     /// `None`: this data says nothing about it, or cannot tell it from another.
     pub value: Vec<Option<f64>>,
+    /// Standard errors of `value`; `None` where that is.
     pub std_error: Vec<Option<f64>>,
     /// Sets of coefficients of which only a combination is determined.
     pub inseparable: Vec<Vec<usize>>,

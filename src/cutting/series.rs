@@ -30,7 +30,9 @@ impl MaterialSeries<'_> {
 /// Every coefficient over cutting speed, in the order of [`coefficients_of`]; the change is per doubling of speed.
 #[derive(Debug, Clone)]
 pub struct SpeedTrends {
+    /// How the cuts were made.
     pub process: Process,
+    /// What was cut, as the campaign names it.
     pub material: Option<String>,
     /// Where the reference values hold.
     pub reference_speed_m_per_min: f64,
@@ -38,6 +40,7 @@ pub struct SpeedTrends {
     pub speed_range_m_per_min: [f64; 2],
     /// Number of different speeds.
     pub speeds: usize,
+    /// One a coefficient, in the order of [`coefficients_of`].
     pub changes: Vec<CoefficientChange>,
     /// Correlation of speed with the order in which the cuts were made, where that is known.
     pub order_correlation: Option<f64>,
@@ -46,8 +49,11 @@ pub struct SpeedTrends {
 /// Every coefficient of a material over that of the first one.
 #[derive(Debug, Clone)]
 pub struct MaterialComparison {
+    /// How the cuts were made.
     pub process: Process,
+    /// The material that is compared.
     pub material: String,
+    /// The material that it is compared with.
     pub reference: String,
     /// The change is material less reference, the ratio material over reference.
     pub changes: Vec<CoefficientChange>,

@@ -13,7 +13,9 @@ use super::regression::{CoefficientFit, Observation, fit};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ChangeReading {
+    /// The coefficient grows with the factor.
     Rises,
+    /// The coefficient shrinks with the factor.
     Falls,
     /// No change that chance would not make.
     None,
@@ -32,6 +34,7 @@ pub struct CoefficientChange {
     pub ratio: Option<Known>,
     /// Chance of a change as large as this where there is none (Student's t).
     pub p_value: Option<f64>,
+    /// What that amounts to.
     pub reading: ChangeReading,
 }
 

@@ -22,10 +22,13 @@ use crate::{Error, Result};
 /// A bit of the edge in the work.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EdgeBit {
+    /// Length along the edge, mm.
     pub length_mm: f64,
     /// Chip thickness: area of the chip over the length; 0 where the edge only rubs.
     pub chip_mm: f64,
+    /// Sine of the angle κ between the edge and the direction of the feed.
     pub sin_kappa: f64,
+    /// Cosine of κ.
     pub cos_kappa: f64,
 }
 

@@ -42,10 +42,12 @@ impl SignalBlocks {
         }
     }
 
+    /// Number of blocks.
     pub fn len(&self) -> usize {
         self.mean.len()
     }
 
+    /// True where the record is shorter than one block.
     pub fn is_empty(&self) -> bool {
         self.mean.is_empty()
     }
@@ -69,6 +71,7 @@ pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
+/// Middle of the sorted values, interpolated; 0 of nothing.
 pub fn median(values: &[f64]) -> f64 {
     quantile(values, 0.5)
 }

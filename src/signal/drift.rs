@@ -11,7 +11,9 @@ use super::blocks::{SignalBlocks, line, robust_std};
 /// Sample ranges in which the tool cut nothing.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Air {
+    /// Before the cut; `None` where none was found there.
     pub before: Option<Range<usize>>,
+    /// After the cut; `None` where none was found there.
     pub after: Option<Range<usize>>,
 }
 
@@ -26,13 +28,17 @@ impl Air {
 pub struct DriftLine {
     /// Value at `reference_s`.
     pub offset: f64,
+    /// Slope, unit of the channel per s.
     pub slope_per_s: f64,
     /// Mean time of the air samples, s.
     pub reference_s: f64,
+    /// The line uses air before the cut.
     pub air_before: bool,
+    /// The line uses air after the cut.
     pub air_after: bool,
     /// Standard deviation of the fitted value at `reference_s`, from the scatter of block means.
     pub offset_std: f64,
+    /// Standard deviation of the slope, unit of the channel per s.
     pub slope_std_per_s: f64,
     /// By how much the air bends away from the line (rms of block means less their noise);
     /// 0 for a drift that is a line.
@@ -45,6 +51,7 @@ pub struct DriftLine {
 }
 
 impl DriftLine {
+    /// The zero at a time on the record's axis, unit of the channel.
     pub fn at(&self, time_s: f64) -> f64 {
         self.offset + self.slope_per_s * (time_s - self.reference_s)
     }

@@ -12,6 +12,7 @@ pub struct Faults {
     pub spikes: Vec<Range<usize>>,
     /// Stretches without any change in a channel that else never rests.
     pub stuck: Vec<Range<usize>>,
+    /// Peaks that the range of the amplifier cuts off.
     pub clipping: Option<Clipping>,
 }
 
@@ -20,6 +21,7 @@ pub struct Faults {
 pub struct Clipping {
     /// Value of the plateaus, unit of the channel.
     pub level: f64,
+    /// Sample ranges that stand at `level`, ascending.
     pub plateaus: Vec<Range<usize>>,
 }
 

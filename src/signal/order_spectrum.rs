@@ -24,6 +24,7 @@ pub struct OrderSpectrum {
     pub sample_std: f64,
     /// |amplitude| of what is left without the orders, on lines `line_hz` apart: x(t) = … + 2 Re Σ X_j e^{iω_j t}.
     pub rest: Vec<f64>,
+    /// Spacing of the lines of `rest`, Hz.
     pub line_hz: f64,
 }
 

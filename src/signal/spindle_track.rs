@@ -21,12 +21,15 @@ pub struct SpindleTrack {
     pub order: usize,
     /// Speed over the stated one less 1, mean over the window, with its standard error.
     pub offset: f64,
+    /// Standard error of `offset`.
     pub offset_std: f64,
     /// Change of the speed from the window's start to its end, over the stated speed (the linear part).
     pub droop: f64,
+    /// Standard error of `droop`.
     pub droop_std: f64,
     /// Standard deviation of the rest of the speed's changes, over the stated speed.
     pub wander: f64,
+    /// Standard error of `wander`.
     pub wander_std: f64,
     /// Root mean square by which the tool is early or late against the stated speed, rad of its turn.
     pub smear_rad: f64,

@@ -16,13 +16,16 @@ use super::engagement::{full_engagement, loudness};
 /// What turns, and how the record is sampled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spindle {
+    /// At the stated speed; not a whole number in general.
     pub samples_per_revolution: f64,
+    /// Number of teeth (lips).
     pub teeth: usize,
 }
 
 /// The parts of a record, as sample ranges.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Phases {
+    /// Where the tool cuts nothing.
     pub air: Air,
     /// First contact to last.
     pub cutting: Range<usize>,

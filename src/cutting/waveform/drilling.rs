@@ -7,7 +7,9 @@ use crate::{Error, Result};
 /// What a drilled hole's forces depend on besides its coefficients.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DrillingCut {
+    /// What of the drill cuts.
     pub geometry: DrillGeometry,
+    /// Speed of the drill into the hole.
     pub feed_mm_per_s: f64,
     /// Drilled into the full: the chisel cuts too.
     pub full_hole: bool,

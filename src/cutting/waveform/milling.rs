@@ -19,9 +19,13 @@ pub const UNIT_COUNT: usize = 6;
 /// What a milling cut's waveform depends on besides its coefficients.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MillingCut {
+    /// Number of teeth, evenly spaced.
     pub teeth: usize,
+    /// Feed per tooth, mm.
     pub feed_per_tooth_mm: f64,
+    /// Depth of cut along the tool axis, mm.
     pub axial_depth_mm: f64,
+    /// Angles between which a tooth is in the work, at the tool's full diameter.
     pub immersion: Immersion,
     /// Angle by which the top of the engaged depth lags behind the tip, rad: 2 a tan β / D.
     pub lag_rad: f64,
@@ -49,6 +53,7 @@ pub type UnitForces = [[Vec<Complex64>; 3]; UNIT_COUNT];
 /// [`UnitForces`] with derivatives with respect to the chip law.
 #[derive(Debug, Clone)]
 pub struct SampledForces {
+    /// The forces themselves.
     pub unit: UnitForces,
     /// By the exponent, the offset (per mm) and its direction (per rad); `None` where the law does not have them or
     /// no derivatives were asked for.

@@ -19,6 +19,7 @@ pub type LineForces = [[Complex64; 3]; UNIT_COUNT];
 /// Forces with derivatives.
 #[derive(Debug, Clone)]
 pub struct VibratingForces {
+    /// On the orders of the tool's rotation.
     pub unit: UnitForces,
     /// By the size exponent, Δx and Δy (per mm).
     pub slopes: Box<[UnitForces; 3]>,

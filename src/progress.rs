@@ -21,7 +21,7 @@ pub struct Progress {
 /// Nothing is to be shown.
 static SILENT: AtomicBool = AtomicBool::new(false);
 
-/// From now on nobody is told how far work is.
+/// From now on no progress is shown.
 pub fn silence() {
     SILENT.store(true, Ordering::Relaxed);
 }

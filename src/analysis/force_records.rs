@@ -219,7 +219,7 @@ mod tests {
         }
     }
 
-    /// Slots with a ball end: the radial force has an axial part, so that all six coefficients hang together.
+    /// Slots with a ball end: the radial force has an axial part, so that all six coefficients depend on each other.
     #[test]
     fn a_ball_end_gives_back_its_coefficients() {
         let dir = tempfile::tempdir().unwrap();

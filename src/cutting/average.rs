@@ -16,7 +16,7 @@ const FEW_TURNS: usize = 8;
 /// Degrees of freedom that the other cuts' scatter counts as, and that they must have together.
 const POOLED_FREEDOM: f64 = 8.0;
 
-/// Mean over the revolutions of the window with the zero line taken off.
+/// Mean over the revolutions of the window with the baseline taken off.
 pub(super) fn average(
     values: &[f64],
     steady: &Range<usize>,

@@ -9,7 +9,7 @@ use crate::signal::{DriftLine, SpindleTrack, ToothLine};
 pub struct Average {
     /// Mean force (N) or torque (N·m).
     pub value: f64,
-    /// From the scatter between revolutions and the uncertainty of the zero line.
+    /// From the scatter between revolutions and the uncertainty of the baseline.
     pub std_error: f64,
 }
 
@@ -39,7 +39,7 @@ pub struct ChannelAnalysis {
     pub trace: Trace,
 }
 
-/// Something about a record that its owner should know. Notices of one kind are told together.
+/// Something about a record that its owner should know. Notices of one kind become one sentence.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Notice {
     /// What it is and what to do, the same for every cut.
@@ -96,7 +96,7 @@ pub struct TurnAverage {
     pub turns: usize,
     /// Standard deviation between the means of revolutions; `None` with one revolution only.
     pub turn_std: Option<f64>,
-    /// Part of the standard error that the zero line brings.
+    /// Part of the standard error that the baseline brings.
     pub zero_std: f64,
     /// Revolutions left out as spikes.
     pub dropped: usize,

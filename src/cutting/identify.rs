@@ -29,7 +29,7 @@ pub struct CfcResult {
     pub trends: Vec<SpeedTrends>,
     /// Each further material against the first one of its process.
     pub materials: Vec<MaterialComparison>,
-    /// Milling coefficients from the orthogonal database beside those of the cuts.
+    /// Milling coefficients from the orthogonal database, next to those of the cuts.
     pub prediction: Option<OrthogonalPrediction>,
     /// What a technician should know, in plain words.
     pub warnings: Vec<String>,
@@ -193,7 +193,7 @@ fn without_duplicates<'a>(
 }
 
 /// Cutting speeds that differ by less, as a part, are one speed. A bar gets thinner with every cut, and lathes hold the speed at
-/// the diameter that they were told.
+/// the diameter that was entered.
 fn one_speed(process: Process) -> f64 {
     match process {
         Process::Milling | Process::Drilling => 2e-3,

@@ -15,6 +15,7 @@ mod group;
 mod identify;
 mod in_step;
 mod kienzle;
+mod kienzle_law;
 #[cfg(test)]
 pub(crate) mod made_tools;
 mod orthogonal;

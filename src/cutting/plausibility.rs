@@ -213,7 +213,7 @@ fn suspects(units: &[(f64, &str)], fits: impl Fn(f64) -> bool) -> String {
     }
 }
 
-/// What a misfit by this ratio (measured over predicted) would be as a slip of units; empty where it is none.
+/// What a misfit by this ratio (measured over predicted) would be as a mix-up of units; `None` where it looks like none.
 pub(super) fn unit_slip(ratio: f64, axis: ForceAxis) -> Option<&'static str> {
     let units: &[(f64, &str)] = if axis == ForceAxis::Mz {
         &TORQUE_UNITS

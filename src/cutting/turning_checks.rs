@@ -1,4 +1,4 @@
-//! What a technician should know about turned cuts beside what all cuts are looked at for: which channel is which, and what
+//! What a technician should know about turned cuts in particular: which channel is which, and what
 //! cuts of one depth leave open.
 
 use super::average_force::average_row;
@@ -14,7 +14,7 @@ use crate::text::figures;
 const AXES: &str = "x against the feed, y away from the work, z along the cutting speed";
 /// Part of the other forces from which on a force of the wrong sign is no scatter.
 const CLEARLY: f64 = 0.05;
-/// The passive force is told to have the wrong sign where the edge's normal stands at least this much out of the work.
+/// The passive force is said to have the wrong sign where the edge's normal stands at least this much out of the work.
 const OUTWARD: f64 = 0.3;
 
 /// Warnings about the turned cuts of one material.

@@ -294,7 +294,7 @@ pub(super) fn of_methods(all: &ForceGroup, groups: &[&ForceGroup], options: CfcO
             .filter(|i| i.leverage >= ALONE)
             .map(|i| i.cut.as_str())
             .collect();
-        // With two feeds every cut is; that is told elsewhere.
+        // With two feeds every cut is; another warning says so.
         if group.feeds > 2 && !alone.is_empty() {
             warnings.push(format!(
                 "at {speed} m/min: cut {} alone decides part of the coefficients (leverage near 1), nothing checks it: \

@@ -23,7 +23,7 @@ impl Air {
     }
 }
 
-/// The zero line of one channel, in the channel's unit against the record's own time axis.
+/// The baseline of one channel, in the channel's unit against the record's own time axis.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct DriftLine {
     /// Value at `reference_s`.
@@ -90,7 +90,7 @@ const BEND_RATIO: f64 = 3.0;
 /// Standard deviations from which on a jump of the zero is believed.
 const STEP_SIGMA: f64 = 6.0;
 
-/// Fits the zero line of a channel to its air segments. Without air there is no line: offset and slope
+/// Fits the baseline of a channel to its air segments. Without air there is no line: offset and slope
 /// are zero and the flags say so. With air on one side only the line is extrapolated, its uncertainty with it.
 pub fn fit_drift(samples: &[f64], sample_rate_hz: f64, start_s: f64, air: &Air) -> DriftLine {
     let mut drift = DriftLine {

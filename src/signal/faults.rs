@@ -69,7 +69,7 @@ pub fn find_faults(samples: &[f64]) -> Faults {
 }
 
 /// More than half of the samples are exactly zero, in long stretches: a force window left the contacts only (or a trigger
-/// the blocks). What hangs or drops out holds a part of a record.
+/// the blocks). What freezes or drops out makes up a part of a record.
 fn is_windowed(samples: &[f64]) -> bool {
     let zeros = runs(samples).filter(|run| run.len() >= STUCK && samples[run.start] == 0.0);
     2 * zeros.map(|run| run.len()).sum::<usize>() > samples.len()
@@ -284,7 +284,7 @@ mod tests {
     }
 
     /// A force window's zeros are no stuck channel, and a tool that rings at a few samples a period has no spikes; a spike and
-    /// a stretch that hangs beside them are still found.
+    /// a frozen stretch among them are still found.
     #[test]
     fn taps_with_a_force_window_on_a_ringing_tool_are_sound() {
         let (mut force, mut tool) = (vec![0.0; 20_000], vec![0.0; 20_000]);

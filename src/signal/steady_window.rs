@@ -53,7 +53,7 @@ pub fn find_phases(channels: &[&[f64]], spindle: Spindle, entry_samples: Option<
         (!steady.is_empty()).then_some(steady)
     };
     if count < 2 * MIN_STATE_BLOCKS {
-        // Too short for air beside a cut: a clip out of a cut.
+        // Too short for air next to a cut: a clip out of a cut.
         return Some(Phases {
             air: Air::default(),
             cutting: 0..samples,

@@ -37,7 +37,7 @@ pub(super) struct EdgeSlice {
     pub depth_mm: f64,
     pub sin_kappa: f64,
     pub cos_kappa: f64,
-    /// Where it cuts; `None` where the slice stands beside the workpiece.
+    /// Where it cuts; `None` where the slice misses the workpiece.
     pub immersion: Option<Immersion>,
 }
 

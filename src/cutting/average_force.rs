@@ -1,6 +1,6 @@
-//! Average cutting forces, linear in the coefficients: milling (Altintas, Manufacturing
-//! Automation, 2nd ed., eqs 2.41–2.45, in axes with φ clockwise from +y), two-lip drilling, and turning (see
-//! [`super::turning`]).
+//! Average cutting forces, linear in the coefficients: milling (docs/physics.md, "Cutting forces"; Altintas,
+//! Manufacturing Automation, 2nd ed., eqs 2.41–2.45, in axes with φ clockwise from +y), two-lip drilling (same section), and
+//! turning (see [`super::turning`]).
 
 use std::f64::consts::PI;
 
@@ -39,7 +39,7 @@ pub fn average_row(tool: &Tool, geometry: &CutGeometry, axis: ForceAxis) -> Resu
     }
 }
 
-/// Altintas, eqs 2.41–2.45, each bracket from entry to exit angle. Units mm, N; no torque.
+/// docs/physics.md, "Cutting forces", each bracket from entry to exit angle. Units mm, N; no torque.
 fn milling_row(teeth: usize, feed_mm: f64, depth_mm: f64, immersion: Immersion, axis: ForceAxis) -> [f64; 6] {
     let (start, exit) = (immersion.start_rad, immersion.exit_rad);
     let over = |f: fn(f64) -> f64| f(exit) - f(start);
@@ -110,7 +110,7 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    /// Sums the forces of thin slices over one revolution, the helix and all teeth.
+    /// Sums the slice forces of docs/physics.md over one revolution and the helix, teeth and all.
     fn integrated(k: [f64; 6], teeth: usize, c: f64, a: f64, immersion: Immersion) -> [f64; 3] {
         let (turn_steps, slices) = (40_000, 7);
         let lag = 0.4; // rad of helix lag over the depth; must not matter to the average

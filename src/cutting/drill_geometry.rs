@@ -4,7 +4,7 @@ use super::force_axis::ForceAxis;
 use crate::campaign::{CutGeometry, Tool};
 use crate::{Error, Result};
 
-/// A drill in a hole: which part of its lips cuts.
+/// A drill in a hole: lengths of docs/physics.md, "Cutting forces", mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DrillGeometry {
     /// Number of lips.
@@ -19,7 +19,7 @@ pub struct DrillGeometry {
     pub feed_per_rev_mm: f64,
 }
 
-/// Usual chisel edge angle, from which the half length of the chisel follows.
+/// Chisel edge angle (docs/physics.md, "Cutting forces"), from which its half length follows.
 const CHISEL_ANGLE_DEG: f64 = 125.0;
 
 impl DrillGeometry {

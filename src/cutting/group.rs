@@ -284,7 +284,7 @@ impl ForceGroup {
         self.coefficients.iter().all(|c| c.value.is_some())
     }
 
-    /// The group as JSON, as docs/json.md describes it.
+    /// A group as docs/json.md has it.
     pub fn to_json(&self) -> Value {
         let mut map = Map::new();
         map.insert("process".into(), json!(self.process));

@@ -21,12 +21,11 @@ pub struct Progress {
 /// Nothing is to be shown.
 static SILENT: AtomicBool = AtomicBool::new(false);
 
-/// From now on no progress is shown.
+/// From now on nobody is told how far work is.
 pub fn silence() {
     SILENT.store(true, Ordering::Relaxed);
 }
 
-/// Whether [`silence`] was asked for.
 pub fn is_silent() -> bool {
     SILENT.load(Ordering::Relaxed)
 }
@@ -34,11 +33,8 @@ pub fn is_silent() -> bool {
 /// Steps of the piece of work that is being done.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Reading {
-    /// What is being done, for people.
     pub label: String,
-    /// Steps done.
     pub done: u64,
-    /// Steps in all.
     pub total: u64,
 }
 
@@ -47,7 +43,6 @@ pub struct Reading {
 pub struct Gauge(Mutex<Option<Reading>>);
 
 impl Gauge {
-    /// How far the work is; `None` between two pieces of work.
     pub fn reading(&self) -> Option<Reading> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
@@ -75,7 +70,6 @@ pub fn shown_on<T>(gauge: &Arc<Gauge>, work: impl FnOnce() -> T) -> T {
 }
 
 impl Progress {
-    /// Begins to count `total` steps of the work that `label` names.
     pub fn new(label: impl Into<String>, total: usize) -> Self {
         stop::point();
         let label = label.into();

@@ -8,6 +8,7 @@ pub mod builtin;
 pub mod campaign;
 pub mod commands;
 pub mod cutting;
+pub mod data;
 pub mod discrepancy;
 pub mod effects;
 pub mod error;

@@ -5,7 +5,8 @@ use super::keys::{self, names};
 use super::schema::{Cut, CutChannel};
 use super::section::Section;
 use crate::Result;
-use crate::ingest::{ChannelRole, ChannelRule, Gain, Measures, Source, unit_of_charge_or_other};
+use crate::data::ChannelRole;
+use crate::ingest::{ChannelRule, Gain, Measures, Source, unit_of_charge_or_other};
 
 const NAMES: [(&str, Measures); 5] = [
     ("fx", Measures::Force(ChannelRole::ForceX)),

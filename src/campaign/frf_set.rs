@@ -1,13 +1,14 @@
 //! The measured FRFs of a campaign, as receptance between its points.
 
+use crate::data::{Axis, Dof, FrfRecord, Quantity};
 use std::path::{Path, PathBuf};
 
 use num_complex::Complex64;
 use rayon::prelude::*;
 
+use super::paths::campaign_file;
 use super::schema::{Campaign, FrfFile};
-use super::{campaign_file, suggest::shown};
-use crate::ingest::{Axis, Dof, FrfRecord, Quantity};
+use super::suggest::shown;
 use crate::{InputError, Result};
 
 /// All measured FRFs, in the order of `campaign.toml` and of the files.

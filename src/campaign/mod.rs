@@ -20,7 +20,7 @@ pub mod suggest;
 mod tool_and_cut;
 
 pub use crate::data::{
-    AxesRef, BodyRef, ChipFormation, CutGeometry, CutOutcome, HoleSection, Immersion, LinkGroup,
+    AxesRef, BodyRef, ChipFormation, Cut, CutGeometry, CutOutcome, HoleSection, Immersion, LinkGroup,
     LinkTolerances, LobeAxis, LobeMethod, LobeMode, LobeSource, LobesSection, OrthogonalSection, Point,
     Posture, Process, Redundancy, RobotSection, Tool, ToolKind, ToolSegment,
 };
@@ -28,5 +28,5 @@ pub use frf_set::{FrfSet, MeasuredDof, MeasuredFrf};
 pub use json_schema::{SchemaOf, json_schema};
 pub use named_files::named_files;
 pub use paths::campaign_file;
-pub use schema::{Campaign, Cut, CutChannel, Dynamometer, FrfFile, PlanSection};
+pub use schema::{Campaign, CutChannel, Dynamometer, FrfFile, PlanSection};
 pub use section::Section;

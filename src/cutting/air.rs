@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::cut_analysis::{ChannelAnalysis, Notice};
 use super::force_axis::ForceAxis;
-use crate::campaign::Process;
+use crate::data::Process;
 use crate::signal::{self, Air, DriftLine, fit_drift};
 use crate::text::figures;
 

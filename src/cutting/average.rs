@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::cut_analysis::{Average, ChannelAnalysis, CutAnalysis, TurnAverage, in_tool_axes};
 use super::force_axis::ForceAxis;
-use crate::ingest::TimeRecord;
+use crate::data::TimeRecord;
 use crate::signal::{self, DriftLine, SignalBlocks};
 
 /// Revolutions whose mean is further than this many robust standard deviations off are spikes.

@@ -9,7 +9,7 @@ use super::drill_geometry::DrillGeometry;
 use super::force_axis::ForceAxis;
 use super::turning::{edge_row, engaged_edge};
 use super::waveform::MillingCut;
-use crate::campaign::{CutGeometry, Immersion, Tool};
+use crate::data::{CutGeometry, Immersion, Tool};
 use crate::{Error, Result};
 
 /// Row of the linear model: average force (N; torque N·m) on `axis` = row · coefficients, coefficients in

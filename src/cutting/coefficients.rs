@@ -1,6 +1,6 @@
 //! The unknowns of the force models: cutting and edge coefficients.
 
-use crate::campaign::Process;
+use crate::data::Process;
 
 /// One unknown of a force model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! What one force record says: averages, the zero of each channel, and what its owner should know.
 
 use super::force_axis::ForceAxis;
-use crate::campaign::Process;
+use crate::data::Process;
 use crate::signal::{DriftLine, SpindleTrack, ToothLine};
 
 /// A mean force (N) or torque (N·m) with its standard error.

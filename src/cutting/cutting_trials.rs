@@ -1,6 +1,6 @@
 //! What was cut, as plain values.
 
-use crate::campaign::{Cut, OrthogonalSection, Tool};
+use crate::data::{Cut, OrthogonalSection, Tool};
 
 /// Cuts made with one tool on one dynamometer: what is known of them besides their force records.
 #[derive(Debug, Clone, Copy)]

@@ -1,7 +1,7 @@
 //! A drill in a hole: which part of its lips cuts, how thick a chip, and the forces on it.
 
 use super::force_axis::ForceAxis;
-use crate::campaign::{CutGeometry, Tool};
+use crate::data::{CutGeometry, Tool};
 use crate::{Error, Result};
 
 /// A drill in a hole: lengths of docs/physics.md, "Cutting forces", mm.

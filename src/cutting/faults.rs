@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::cut_analysis::Notice;
 use super::force_axis::axis_of;
-use crate::ingest::{ChannelRole, TimeRecord};
+use crate::data::{ChannelRole, TimeRecord};
 use crate::signal::find_faults;
 use crate::text::figures;
 

@@ -1,7 +1,6 @@
 //! The axes on which cutting forces are recorded, averaged and compared.
 
-use crate::campaign::Process;
-use crate::ingest::ChannelRole;
+use crate::data::{ChannelRole, Process};
 
 /// What is averaged and compared: the forces on the tool in tool axes (x feed, y normal, z axial; turning: x against the
 /// feed, y away from the work, z along the cutting speed; N), and the torque about the spindle (N·m, opposing rotation positive).

@@ -11,7 +11,7 @@ use super::force_axis::ForceAxis;
 use super::outlier::studentized;
 use super::regression::{CoefficientFit, Observation, fit, r2};
 use crate::Result;
-use crate::campaign::Process;
+use crate::data::Process;
 
 /// A coefficient, or the admission that the data does not determine it.
 #[derive(Debug, Clone, PartialEq)]

@@ -13,7 +13,7 @@ use super::plausibility;
 use super::series::{MaterialComparison, MaterialSeries, SpeedTrends, compare, speed_trends};
 use super::turning_checks::of_turning;
 use super::warnings;
-use crate::campaign::{CutGeometry, Process};
+use crate::data::{CutGeometry, Process};
 use crate::{Error, InputError, Result};
 
 /// What the dynamometer records say.

@@ -5,8 +5,7 @@ use super::cutting_trials::CuttingTrials;
 use super::force_axis::{ForceAxis, axis_of};
 use super::record::analyse_cut;
 use crate::Result;
-use crate::campaign::{Process, Tool};
-use crate::ingest::TimeRecord;
+use crate::data::{Process, TimeRecord, Tool};
 use crate::signal::{SpindleTrack, spindle_track};
 use crate::text::figures;
 

@@ -23,7 +23,7 @@ use super::kienzle_law::{
     EXPONENTS, KienzleLaw, KienzleLawFit, KienzleTerm, components, linear_deviance, terms,
 };
 use super::regression::{CoefficientFit, Observation, fit, r2};
-use crate::campaign::{CutGeometry, Process, Tool};
+use crate::data::{CutGeometry, Process, Tool};
 use crate::stop;
 
 /// A force component under Kienzle's law.
@@ -415,7 +415,7 @@ fn chance_text(p: f64) -> String {
 mod tests {
     use super::super::kienzle_law::sine_power;
     use super::*;
-    use crate::campaign::{Immersion, ToolKind};
+    use crate::data::{Immersion, ToolKind};
     use approx::assert_relative_eq;
     use std::f64::consts::PI;
 

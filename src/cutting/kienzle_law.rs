@@ -9,7 +9,7 @@ use super::drill_geometry::DrillGeometry;
 use super::force_axis::ForceAxis;
 use super::regression::{CoefficientFit, Observation, fit};
 use super::turning::engaged_edge;
-use crate::campaign::{CutGeometry, Process, Tool};
+use crate::data::{CutGeometry, Process, Tool};
 
 /// What m may be in a fit: 0 is no size effect, 1 a force that does not know the chip.
 pub(super) const EXPONENTS: [f64; 2] = [-0.9, 0.99];

@@ -1,6 +1,6 @@
 //! Tools for tests.
 
-use crate::campaign::{Tool, ToolKind};
+use crate::data::{Tool, ToolKind};
 
 pub fn drill() -> Tool {
     Tool {

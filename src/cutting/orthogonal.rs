@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use super::cutting_trials::CuttingTrials;
 use super::group::ForceGroup;
-use crate::campaign::{ChipFormation, Process};
+use crate::data::{ChipFormation, Process};
 
 /// One oblique edge in a material known from orthogonal cutting. Angles in rad, stress in N/mm² (MPa).
 #[derive(Debug, Clone, Copy, PartialEq)]

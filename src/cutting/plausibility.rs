@@ -4,7 +4,7 @@ use super::average_force::average_row;
 use super::cut_analysis::{ChannelAnalysis, CutAnalysis};
 use super::cutting_trials::CuttingTrials;
 use super::force_axis::ForceAxis;
-use crate::campaign::{CutGeometry, Process};
+use crate::data::{CutGeometry, Process};
 use crate::signal::median;
 use crate::text::figures;
 

@@ -13,8 +13,7 @@ use super::drill_geometry::DrillGeometry;
 use super::force_axis::ForceAxis;
 use super::teeth::idle_tooth;
 use super::waveform::MillingCut;
-use crate::campaign::{Cut, CutGeometry, Process, Tool};
-use crate::ingest::{ChannelRole, TimeRecord};
+use crate::data::{ChannelRole, Cut, CutGeometry, Process, TimeRecord, Tool};
 use crate::signal::{
     self, Air, Clipping, Phases, SignalBlocks, Spindle, ToothLine, find_faults, find_phases, fit_drift,
     highest_order, tooth_line, whole_revolutions,

@@ -284,8 +284,8 @@ fn coupled_sets(null: &[Vec<f64>], unknowns: usize) -> Vec<Vec<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::{CutGeometry, Immersion, Tool, ToolKind};
     use crate::cutting::average_row;
+    use crate::data::{CutGeometry, Immersion, Tool, ToolKind};
     use approx::assert_relative_eq;
 
     /// Whole-revolution means of a real slot series on aluminium (docs/physics.md, "Reference cases"):

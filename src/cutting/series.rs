@@ -7,7 +7,7 @@ use super::cut_analysis::CutAnalysis;
 use super::cutting_trials::CuttingTrials;
 use super::group::{Rows, distinct, observations};
 use super::trend::{ChangeReading, CoefficientChange, changes, doublings, reference_speed};
-use crate::campaign::Process;
+use crate::data::Process;
 
 /// The cuts of one process and one material.
 pub(super) struct MaterialSeries<'a> {

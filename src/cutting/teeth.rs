@@ -88,7 +88,7 @@ pub(super) fn idle_tooth(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::Immersion;
+    use crate::data::Immersion;
 
     fn cut(teeth: usize, start_deg: f64, exit_deg: f64) -> MillingCut {
         MillingCut {

@@ -16,7 +16,7 @@
 
 use super::force_axis::ForceAxis;
 use super::waveform::gauss_legendre;
-use crate::campaign::{CutGeometry, Tool};
+use crate::data::{CutGeometry, Tool};
 use crate::{Error, Result};
 
 /// A bit of the edge in the work.
@@ -129,7 +129,7 @@ pub fn edge_row(edge: &[EdgeBit], axis: ForceAxis) -> [f64; 6] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::ToolKind;
+    use crate::data::ToolKind;
     use approx::assert_relative_eq;
 
     fn edge(nose_mm: f64, kappa_deg: f64, feed_mm: f64, depth_mm: f64) -> Vec<EdgeBit> {

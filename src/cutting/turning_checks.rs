@@ -6,7 +6,7 @@ use super::cut_analysis::CutAnalysis;
 use super::cutting_trials::CuttingTrials;
 use super::force_axis::ForceAxis;
 use super::group::distinct;
-use crate::campaign::CutGeometry;
+use crate::data::CutGeometry;
 use crate::signal::median;
 use crate::text::figures;
 

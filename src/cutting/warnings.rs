@@ -10,7 +10,7 @@ use super::force_axis::ForceAxis;
 use super::group::{Coefficient, ForceGroup, distinct};
 use super::outlier::CutMisfit;
 use super::plausibility::unit_slip;
-use crate::campaign::Process;
+use crate::data::Process;
 
 /// Notices of all records, one sentence a kind.
 pub(super) fn of_records(trials: &CuttingTrials, cuts: &[CutAnalysis]) -> Vec<String> {

@@ -1,7 +1,7 @@
 //! Drilling: thrust and torque while the drill enters and bores, averaged over stretches of time (docs/physics.md, "Cutting forces").
 
-use crate::campaign::{CutGeometry, Tool};
 use crate::cutting::DrillGeometry;
+use crate::data::{CutGeometry, Tool};
 use crate::{Error, Result};
 
 /// What a drilled hole's forces depend on besides its coefficients.

@@ -13,7 +13,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::quadrature::gauss_legendre;
-use crate::campaign::{Immersion, Tool};
+use crate::data::{Immersion, Tool};
 
 /// The outline of an edge: a corner that begins at κ = 0, then a straight edge at the lead angle.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -11,7 +11,7 @@ use num_complex::Complex64;
 
 use super::edge_shape::EdgeShape;
 use super::quadrature::gauss_legendre;
-use crate::campaign::{CutGeometry, Immersion, Tool};
+use crate::data::{CutGeometry, Immersion, Tool};
 
 /// Ktc Krc Kac Kte Kre Kae.
 pub const UNIT_COUNT: usize = 6;

@@ -187,7 +187,7 @@ fn contributions(feed_mm: f64, exponent: Option<f64>, [dx, dy]: [f64; 2], phi: f
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::Immersion;
+    use crate::data::Immersion;
 
     fn slot() -> MillingCut {
         MillingCut {

@@ -26,6 +26,7 @@ pub mod serve;
 pub mod signal;
 pub mod simulate;
 pub mod stop;
+pub mod text;
 pub mod thesis;
 
 pub use error::{Error, InputError, Result};

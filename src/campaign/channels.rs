@@ -2,10 +2,11 @@
 
 use super::bounds::Bounds;
 use super::keys::{self, names};
-use super::schema::{Cut, CutChannel};
+use super::schema::CutChannel;
 use super::section::Section;
 use crate::Result;
 use crate::data::ChannelRole;
+use crate::data::Cut;
 use crate::ingest::{ChannelRule, Gain, Measures, Source, unit_of_charge_or_other};
 
 const NAMES: [(&str, Measures); 5] = [

@@ -20,12 +20,12 @@ pub mod suggest;
 mod tool_and_cut;
 
 pub use crate::data::{
-    AxesRef, BodyRef, ChipFormation, CutGeometry, CutOutcome, FrfSet, HoleSection, Immersion, LinkGroup,
+    AxesRef, BodyRef, ChipFormation, Cut, CutGeometry, CutOutcome, FrfSet, HoleSection, Immersion, LinkGroup,
     LinkTolerances, LobeAxis, LobeMethod, LobeMode, LobeSource, LobesSection, MeasuredDof, MeasuredFrf,
     OrthogonalSection, Point, Posture, Process, Redundancy, RobotSection, Tool, ToolKind, ToolSegment,
 };
 pub use json_schema::{SchemaOf, json_schema};
 pub use named_files::named_files;
 pub use paths::campaign_file;
-pub use schema::{Campaign, Cut, CutChannel, Dynamometer, FrfFile, PlanSection};
+pub use schema::{Campaign, CutChannel, Dynamometer, FrfFile, PlanSection};
 pub use section::Section;

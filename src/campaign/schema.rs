@@ -1,9 +1,6 @@
 //! The validated content of `campaign.toml`.
 
-use crate::data::{
-    CutGeometry, CutOutcome, Dof, LobesSection, OrthogonalSection, Point, Posture, Quantity, RobotSection,
-    Tool,
-};
+use crate::data::{Cut, Dof, LobesSection, OrthogonalSection, Point, Posture, Quantity, RobotSection, Tool};
 use std::path::PathBuf;
 
 use crate::ingest::ChannelRule;
@@ -84,24 +81,4 @@ pub struct FrfFile {
 pub struct Dynamometer {
     /// Rows of A in F_tool = A F_recorded; identity where the campaign does not say.
     pub tool_from_dyno: [[f64; 3]; 3],
-}
-
-#[derive(Debug, Clone, PartialEq)]
-pub struct Cut {
-    pub id: String,
-    pub file: PathBuf,
-    pub spindle_rpm: f64,
-    pub geometry: CutGeometry,
-    /// Position in the sequence in which the cuts were made.
-    pub order: Option<i64>,
-    /// Overrides the detected steady window, s of the record's time axis.
-    pub steady_s: Option<[f64; 2]>,
-    /// What was cut: the cut's own `material`, else the campaign's.
-    pub material: Option<String>,
-    /// How the cut went, where someone listened.
-    pub outcome: Option<CutOutcome>,
-    /// Where the robot stood: index into `Campaign::postures`.
-    pub posture: Option<usize>,
-    /// Line of `campaign.toml`, for messages.
-    pub line: usize,
 }

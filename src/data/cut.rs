@@ -1,5 +1,7 @@
 //! What was cut.
 
+use std::path::PathBuf;
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Process {
@@ -91,4 +93,29 @@ impl CutOutcome {
             CutOutcome::Chatter => "chatter",
         }
     }
+}
+
+/// One cut and its force record.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cut {
+    /// Name of the cut, unlike any other's.
+    pub id: String,
+    /// Where its force record is; messages name it.
+    pub file: PathBuf,
+    /// As stated.
+    pub spindle_rpm: f64,
+    /// Process, feed and depth.
+    pub geometry: CutGeometry,
+    /// Position in the sequence in which the cuts were made.
+    pub order: Option<i64>,
+    /// Overrides the detected steady window, s of the record's time axis.
+    pub steady_s: Option<[f64; 2]>,
+    /// What was cut: the cut's own `material`, else the campaign's.
+    pub material: Option<String>,
+    /// How the cut went, where someone listened.
+    pub outcome: Option<CutOutcome>,
+    /// Where the robot stood: index into `Campaign::postures`.
+    pub posture: Option<usize>,
+    /// Line of `campaign.toml`, for messages.
+    pub line: usize,
 }

@@ -12,7 +12,7 @@ mod robot_spec;
 mod time_record;
 mod tool;
 
-pub use cut::{CutGeometry, CutOutcome, Immersion, Process};
+pub use cut::{Cut, CutGeometry, CutOutcome, Immersion, Process};
 pub use dof::{Axis, Dof};
 pub use frf::{FrfRecord, Quantity};
 pub use lobe_request::{HoleSection, LobeAxis, LobeMethod, LobeMode, LobeSource, LobesSection, Redundancy};

@@ -1,6 +1,7 @@
 //! Unit labels: `(m/s²)/N`, `g`, `in-lbf`, `N·m`. Dimension and factor to SI, or nothing where it is not understood.
 
 use crate::data::{Channel, ChannelRole, Quantity};
+pub use crate::text::figures;
 
 /// Standard acceleration of free fall, m/s² (exact by definition, CGPM 1901).
 pub const STANDARD_GRAVITY: f64 = 9.80665;
@@ -307,15 +308,6 @@ pub fn frequency_factor(label: &str) -> Option<f64> {
         "cpm" | "1/min" => Some(1.0 / 60.0),
         _ => None,
     }
-}
-
-/// A number for people, with so many figures that count and no exponent: `18.30`, `0.01265`, `29930`.
-pub fn figures(value: f64, count: i32) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return format!("{value}");
-    }
-    let decimals = (count - 1 - value.abs().log10().floor() as i32).clamp(0, 12) as usize;
-    format!("{value:.decimals$}")
 }
 
 /// Unit of an FRF quantity, for people.

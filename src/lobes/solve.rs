@@ -43,7 +43,7 @@ impl<'a> StabilitySolver<'a> {
 
     /// Lobes as a program finds them that starts at another lobe than k = 0, or has ωT = 2π(k + `extra_turns`) + ε (½:
     /// the delayed term has the wrong sign). Not for cuts: to see whether such a slip explains somebody's numbers.
-    pub(super) fn with_lobes(mut self, first_lobe: f64, extra_turns: f64) -> Self {
+    pub(crate) fn with_lobes(mut self, first_lobe: f64, extra_turns: f64) -> Self {
         (self.first_lobe, self.extra_turns) = (first_lobe, extra_turns);
         self
     }

@@ -3,7 +3,9 @@
 
 use nalgebra::Point3;
 
-use super::{Kinematics, RobotModel, RobotSpec};
+use super::dh::Kinematics;
+use super::model::RobotModel;
+use crate::campaign::robot_spec::RobotSpec;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 

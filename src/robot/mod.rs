@@ -10,14 +10,15 @@ pub mod dh;
 pub mod dual;
 pub mod export;
 pub mod file_number;
-
 #[cfg(test)]
 pub(crate) mod fixture;
 pub mod frf;
+mod ik_solution;
 pub mod inverse;
 pub mod model;
 pub mod numeric_inverse;
 pub mod posture_report;
+mod published_postures;
 pub mod rigid;
 pub mod spherical_wrist;
 pub mod static_deflection;
@@ -29,8 +30,10 @@ pub use dh::Kinematics;
 pub use dual::Dual;
 pub use file_number::FileNumber;
 pub use frf::{FrfBasis, ModalBasis};
-pub use inverse::{IkReference, IkSolution, InverseKinematics};
+pub use ik_solution::IkSolution;
+pub use inverse::{IkReference, InverseKinematics};
 pub use model::{Baseline, RobotModel};
 pub use numeric_inverse::NumericInverse;
 pub use posture_report::PostureReport;
+pub use published_postures::posture_deg;
 pub use spherical_wrist::SphericalWrist;

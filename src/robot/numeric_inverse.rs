@@ -10,7 +10,7 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{Isometry3, Point3, SMatrix, SVector, UnitQuaternion, Vector3};
 
 use super::dh::Kinematics;
-use super::inverse::farthest;
+use super::ik_solution::farthest;
 use crate::campaign::robot_spec::RobotSpec;
 use crate::{Error, Result};
 

@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::rows;
+use super::published::rows;
 use crate::cutting::{Change, Known, MILLING_COEFFICIENTS, Reading, table_trend};
 use crate::{Error, Result};
 
@@ -69,7 +69,7 @@ pub struct TableTrend {
 
 /// Printed less cast titanium, pair by pair at the same speed.
 #[derive(Debug, Clone, Serialize)]
-pub struct Difference {
+pub struct CoefficientDifference {
     pub coefficient: &'static str,
     pub unit: &'static str,
     pub cast_mean: f64,
@@ -85,7 +85,7 @@ pub struct Difference {
 pub struct CuttingTables {
     pub rows: Vec<CoefficientRow>,
     pub trends: Vec<TableTrend>,
-    pub differences: Vec<Difference>,
+    pub differences: Vec<CoefficientDifference>,
     /// Correlation over the rows of a material between Ktc and Kte, and what mere scatter of the averages would give.
     pub seesaw: Vec<Seesaw>,
     /// Standard error of the slopes of the printed titanium against four feeds, if one is missing: least and most.
@@ -296,7 +296,7 @@ fn trends(table: &[CoefficientRow], material: &str) -> Vec<TableTrend> {
     found
 }
 
-fn differences(table: &[CoefficientRow]) -> Vec<Difference> {
+fn differences(table: &[CoefficientRow]) -> Vec<CoefficientDifference> {
     let (cast, printed) = (of(table, CAST), of(table, PRINTED));
     let one = |(j, kind): (usize, &crate::cutting::CoefficientKind)| {
         let pairs: Vec<(f64, f64)> = cast
@@ -313,7 +313,7 @@ fn differences(table: &[CoefficientRow]) -> Vec<Difference> {
         let (mean, square_sum) = spread(&apart);
         let std_error = (square_sum / (n - 1.0) / n).sqrt();
         let t = StudentsT::new(0.0, 1.0, n - 1.0).ok()?;
-        Some(Difference {
+        Some(CoefficientDifference {
             coefficient: kind.label,
             unit: kind.unit,
             cast_mean: pairs.iter().map(|p| p.0).sum::<f64>() / n,

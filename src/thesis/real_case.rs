@@ -3,8 +3,7 @@
 
 use serde::Serialize;
 
-use super::{MINIMA, MODAL, STATIC_STIFFNESS, posture_deg};
-use super::{ModalRow, RECURRING_BANDS, StaticRow, rows};
+use super::published::{MINIMA, MODAL, ModalRow, RECURRING_BANDS, STATIC_STIFFNESS, StaticRow, rows};
 use crate::discrepancy::difference::{Difference, Lookout, greatest_difference};
 use crate::discrepancy::verdict::{STRONG_BIC, evidence_weight};
 use crate::discrepancy::{Verdict, diagnose};
@@ -12,7 +11,7 @@ use crate::identify::modal_table::{FREQUENCY_STD, PEAK_STD};
 use crate::identify::resonance_study::{Minimum, Reading, Resonance, ResonanceStudy, merged};
 use crate::identify::{Estimate, StructureModel};
 use crate::ingest::Axis;
-use crate::robot::PostureReport;
+use crate::robot::{PostureReport, posture_deg};
 use crate::{Error, Result};
 
 /// The four configurations of the tap tests.
@@ -55,7 +54,7 @@ pub struct RealCase {
     /// Modes of each configuration, Hz, as far as the table reaches: baseline and best candidate.
     pub baseline_modes_hz: Vec<Vec<f64>>,
     pub best_modes_hz: Vec<Vec<f64>>,
-    pub next: Vec<NextMeasurement>,
+    pub next: Vec<TellingMeasurement>,
     /// Effects that the tables cannot show, with the reason.
     pub not_tried: Vec<(String, String)>,
 }
@@ -128,7 +127,7 @@ pub struct Widened {
 
 /// What would tell two explanations apart.
 #[derive(Debug, Clone, Serialize)]
-pub struct NextMeasurement {
+pub struct TellingMeasurement {
     pub explanations: [String; 2],
     pub difference: Difference,
 }
@@ -263,9 +262,9 @@ pub fn real_case(model: &StructureModel) -> Result<RealCase> {
         .map(|c| c.name.clone())
         .collect();
 
-    let next_to = |name: &str, model: &StructureModel, theta: &[f64]| -> Result<Option<NextMeasurement>> {
+    let next_to = |name: &str, model: &StructureModel, theta: &[f64]| -> Result<Option<TellingMeasurement>> {
         let difference = difference(&study, (&best.model, &best.theta), (model, theta))?;
-        Ok(difference.map(|difference| NextMeasurement {
+        Ok(difference.map(|difference| TellingMeasurement {
             explanations: [best.label(), name.to_string()],
             difference,
         }))
@@ -430,7 +429,7 @@ fn difference(
 
 #[cfg(test)]
 mod tests {
-    use super::super::untuned_model;
+    use super::super::published::untuned_model;
     use super::*;
 
     /// What the tables say today, verdict and order; the digits may move.

@@ -7,17 +7,14 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::curve::{LobeCurve, Peak, SpeedLimit, peaks, speed_grid};
-use super::force::RegenerativeForce;
-use super::frf::{AxisMode, DirectFrf, ModalFrf, Mode};
-use super::sampled::SampledFrf;
-use super::solve::StabilitySolver;
-use super::thesis::{ThesisLobes, conditions, thesis_force, thesis_modes};
+use super::measured_lobes::{ThesisLobes, conditions, thesis_force, thesis_modes, tip_near};
 use crate::Result;
 use crate::campaign::Immersion;
+use crate::lobes::{
+    AxisMode, DirectFrf, ModalFrf, Mode, Peak, RegenerativeForce, SampledFrf, SpeedLimit, StabilitySolver,
+    speed_grid,
+};
 
-/// Tips farther than this from where they are expected belong to something else.
-const WINDOW: f64 = 0.1;
 const SPINDLE_RPM: [f64; 3] = [100.0, 1500.0, 1.0];
 /// Lines of the thesis's tap tests, Hz.
 const LINE_SPACING_HZ: f64 = 0.1;
@@ -173,15 +170,6 @@ fn switched(switch: Switch, row: &ThesisLobes) -> Result<SwitchedTips> {
     })
 }
 
-/// The deepest tip within the window about a speed.
-pub(super) fn tip_near(curve: &LobeCurve, expected_rpm: f64) -> Option<Peak> {
-    let depth = |p: &Peak| p.depth_mm.unwrap_or(f64::INFINITY);
-    peaks(curve)
-        .into_iter()
-        .filter(|p| (p.spindle_rpm / expected_rpm - 1.0).abs() < WINDOW)
-        .max_by(|a, b| depth(a).total_cmp(&depth(b)))
-}
-
 fn force(switch: Switch) -> Result<RegenerativeForce> {
     let as_here = thesis_force()?;
     let c = conditions()?;
@@ -311,7 +299,7 @@ pub fn reading(table: &[AssumptionSwitched]) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lobes::thesis_lobes;
+    use crate::thesis::measured_lobes::thesis_lobes;
     use approx::assert_relative_eq;
 
     fn of<'a>(table: &'a [AssumptionSwitched], name: &str) -> &'a AssumptionSwitched {

@@ -1,8 +1,8 @@
 //! What the tables of the case study come to in a few numbers.
 
+use super::case_study::{CaseStudy, ComparedRow, case_study};
+use super::measured_lobes::thesis_force;
 use crate::Result;
-use crate::lobes::thesis::thesis_force;
-use crate::thesis::{CaseStudy, Row, case_study};
 
 /// Smallest and largest of a set of ratios.
 pub type Range = [f64; 2];
@@ -42,7 +42,7 @@ fn range(ratios: impl Iterator<Item = f64>) -> Option<Range> {
         })
 }
 
-fn over_measured(rows: &[Row], value: impl Fn(&Row) -> Option<f64>) -> Option<Range> {
+fn over_measured(rows: &[ComparedRow], value: impl Fn(&ComparedRow) -> Option<f64>) -> Option<Range> {
     range(rows.iter().filter_map(|row| Some(value(row)? / row.measured?)))
 }
 
@@ -54,7 +54,7 @@ impl ThesisFindings {
     }
 
     fn of(study: CaseStudy, teeth: usize) -> Self {
-        let predicted = |row: &Row| !row.fitted;
+        let predicted = |row: &ComparedRow| !row.fitted;
         let tips = |region: usize| {
             study.lobes.iter().filter_map(move |row| {
                 let ours = match region {

@@ -5,7 +5,7 @@ use num_complex::Complex64;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::synthetic::{Mode, Synthetic};
+use super::synthetic::{Synthetic, SyntheticMode};
 use super::*;
 
 const POLES: [(f64, f64); 7] = [
@@ -36,10 +36,10 @@ fn frfs(step_hz: f64, noise: f64, seed: u64) -> Vec<Frf> {
     let mut all = Vec::new();
     for response in 0..RESPONSES {
         for reference in 0..REFERENCES {
-            let modes: Vec<Mode> = POLES
+            let modes: Vec<SyntheticMode> = POLES
                 .iter()
                 .zip(&shape)
-                .map(|(&(f, zeta), phi)| Mode::new(f, zeta, 0.005 * phi[response] * phi[reference]))
+                .map(|(&(f, zeta), phi)| SyntheticMode::new(f, zeta, 0.005 * phi[response] * phi[reference]))
                 .collect();
             let number = (response * REFERENCES + reference) as u64;
             all.push(

@@ -10,7 +10,6 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::Tolerances;
 use super::local_fit::Pole;
 use super::lscf::Order;
 use super::shape::mac;
@@ -27,6 +26,30 @@ pub const ORDERS: usize = 4;
 pub(super) const MAX_DAMPING: f64 = 0.3;
 /// Two chains closer than this part of their half-width and alike in shape are one.
 const SAME_WIDTHS: f64 = 0.5;
+
+/// How near a pole has to be to one of the order below to have stayed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tolerances {
+    /// Relative change of frequency, at most.
+    pub frequency: f64,
+    /// Relative change of damping, at most.
+    pub damping: f64,
+    /// MAC of the residues over all FRFs, at least.
+    pub mac: f64,
+    /// Orders in a row over which a pole must stay.
+    pub orders: usize,
+}
+
+impl Default for Tolerances {
+    fn default() -> Self {
+        Tolerances {
+            frequency: FREQUENCY_TOLERANCE,
+            damping: DAMPING_TOLERANCE,
+            mac: MAC_TOLERANCE,
+            orders: ORDERS,
+        }
+    }
+}
 
 /// How far a pole agrees with the order below.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]

@@ -3,10 +3,12 @@
 
 use num_complex::Complex64;
 
-use super::joint_fit::{self, Data, Group, Search};
+use super::global_modes::RejectedMode;
+use super::joint_fit::{self, Data, Group, PoleSearch};
 use super::local_fit::Pole;
 use super::ml_fit::{self, Solution};
-use super::{RejectedMode, set_noise, shape};
+use super::set_member::SET;
+use super::{set_noise, shape};
 
 /// Fits after poles were taken out, at most.
 const MAX_ROUNDS: usize = 6;
@@ -72,9 +74,14 @@ pub(super) fn verified(
         if kept.is_empty() {
             return None;
         }
-        groups = joint_fit::refine(&set_noise::alike(data), &kept, Search::Roughly, &mut Vec::new())?;
+        groups = joint_fit::refine(
+            &set_noise::alike(data),
+            &kept,
+            PoleSearch::Roughly,
+            &mut Vec::new(),
+        )?;
         set_noise::renew(data, &groups);
-        groups = joint_fit::refine(data, &kept, Search::Nothing, &mut Vec::new())?;
+        groups = joint_fit::refine(data, &kept, PoleSearch::Nothing, &mut Vec::new())?;
     }
     Some(groups)
 }
@@ -88,7 +95,7 @@ fn reason(data: &[Data], group: &Group, j: usize) -> Option<String> {
     let local = Local::new(data, group, j, &residues);
     let (seen_in, best) = joint_fit::seen_in(solution, j);
     let wanted = ((SHARE_OF_FRFS * frfs as f64).ceil() as usize).max(2);
-    if frfs >= super::global::SET && seen_in < wanted && best < FAR {
+    if frfs >= SET && seen_in < wanted && best < FAR {
         return Some(match seen_in {
             0 => "hardly above what is left unexplained".into(),
             n => format!("shown by {n} of {frfs} FRFs only"),

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use realfft::RealFftPlanner;
 use serde::Serialize;
 
-use super::OperationalMode;
+use super::mode::OperationalMode;
 
 /// Lines of the periodogram on either side of a peak that are its own (Hann window) …
 const OWN: usize = 3;

@@ -8,31 +8,26 @@
 //! The excitation must be broad-band. A spindle is not: its harmonics are recognised beforehand as lines that are
 //! narrower than any mode, taken out, and told; what wavers too much for that is recognised by its constant envelope.
 
-use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::RejectedMode;
-use super::shape::Complexity;
-use super::stabilisation::{DiagramPole, Stability};
+use super::global_modes::RejectedMode;
+use super::stabilisation::DiagramPole;
 use crate::{InputError, Result};
 
 mod chains;
 mod correlation;
 mod harmonics;
+mod mode;
+mod record;
 mod resample;
 mod subspace;
 #[cfg(test)]
 mod tests;
 
 pub use harmonics::Harmonic;
-
-/// A record of responses, all of one length and any unit of motion.
-#[derive(Debug, Clone, Copy)]
-pub struct OperationalRecord<'a> {
-    pub sample_rate_hz: f64,
-    pub channels: &'a [&'a [f64]],
-}
+pub use mode::OperationalMode;
+pub use record::OperationalRecord;
 
 /// What to look at, and how far.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -43,24 +38,6 @@ pub struct OperationalSettings {
     pub max_order: Option<usize>,
     /// Speed of the spindle, 1/min; its harmonics are then named by it.
     pub spindle_rpm: Option<f64>,
-}
-
-/// One mode found from responses alone.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct OperationalMode {
-    pub frequency_hz: f64,
-    pub damping_ratio: f64,
-    pub frequency_std_hz: f64,
-    pub damping_std: f64,
-    /// Orders at which the pole stays.
-    pub orders: usize,
-    /// How far the shape is from a standing wave; `None` for a single channel.
-    pub complexity: Option<Complexity>,
-    /// By channel, the largest component 1; unscaled: without the force there is no modal mass.
-    #[serde(skip)]
-    pub shape: Vec<Complex64>,
-    /// Why this may be no mode of the structure, in words; empty for one without doubt.
-    pub doubts: Vec<String>,
 }
 
 /// What a record of responses says.

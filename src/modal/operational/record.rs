@@ -1,0 +1,8 @@
+//! What an operational modal analysis starts from.
+
+/// A record of responses, all of one length and any unit of motion.
+#[derive(Debug, Clone, Copy)]
+pub struct OperationalRecord<'a> {
+    pub sample_rate_hz: f64,
+    pub channels: &'a [&'a [f64]],
+}

@@ -14,7 +14,7 @@ use crate::lobes::band::LobeBand;
 use crate::lobes::hole::{HoleCheck, HoleError};
 use crate::lobes::outcome::{LimitRange, Outcomes};
 use crate::lobes::setup::{DrilledHole, LobeCoefficients, LobeCut, axial_torsional_force};
-use crate::lobes::{AbsoluteLimit, BlockLobes, LobeCurve, Peak, Tool, speed_grid};
+use crate::lobes::{AbsoluteLimit, BlockLobes, LobeCurve, Peak, ToolDynamics, speed_grid};
 use crate::{InputError, Result};
 
 /// Why a drill's axial–torsional block is left out where the FRFs do not have it.
@@ -80,7 +80,7 @@ pub struct LobeAnalysis {
     /// The hole that a drill cuts; `None` in milling, or where the tool is not known.
     pub drilled: Option<DrilledHole>,
     /// The tool as a beam; without segments where it is rigid or part of the FRFs.
-    pub tool: Arc<Tool>,
+    pub tool: Arc<ToolDynamics>,
     pub spindle_rpm: [f64; 3],
     pub cases: Vec<LobeCase>,
     /// Where the campaign asks for the surface over the redundancy angle: its angles are the cases.

@@ -25,23 +25,30 @@ pub struct HoleLoad {
     pub source: String,
 }
 
+/// What a hole may be off by.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HoleTolerance {
+    /// Normal to the tool axis, mm.
     pub position_mm: f64,
+    /// Turn of the tool axis, degrees.
     pub perpendicularity_deg: f64,
 }
 
 /// What loads the tool and what the hole may be off by.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HoleCheck {
+    /// Static forces on the tool.
     pub load: HoleLoad,
+    /// What the hole may be off by.
     pub tolerance: HoleTolerance,
 }
 
 /// A value and what the uncertainty of the model's parameters makes of it; `None` without a calibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Uncertain {
+    /// At the model's nominal parameters.
     pub value: f64,
+    /// Standard deviation over the draws.
     pub std: Option<f64>,
     /// 95 % quantile.
     pub upper: Option<f64>,
@@ -106,14 +113,17 @@ impl HoleError {
 }
 
 impl HoleTolerance {
+    /// Whether the bound of the position error keeps the tolerance.
     pub fn position_met(&self, error: &HoleError) -> bool {
         error.position_mm.bound() <= self.position_mm
     }
 
+    /// Whether the bound of the tilt keeps the tolerance.
     pub fn perpendicularity_met(&self, error: &HoleError) -> bool {
         error.tilt_deg.bound() <= self.perpendicularity_deg
     }
 
+    /// Whether both tolerances are kept.
     pub fn met(&self, error: &HoleError) -> bool {
         self.position_met(error) && self.perpendicularity_met(error)
     }

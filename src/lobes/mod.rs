@@ -56,4 +56,4 @@ pub use semi_discretisation::SemiDiscretisation;
 pub use solve::StabilitySolver;
 pub use state_space::StateSpace;
 pub use tool_beam::{BeamSegment, ToolBeam};
-pub use tool_point::{Tool, ToolPoint};
+pub use tool_point::{ToolDynamics, ToolPoint};

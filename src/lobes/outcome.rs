@@ -7,28 +7,35 @@ use crate::campaign::CutOutcome;
 /// A cut as a point of the diagram.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NotedCut {
+    /// The cut's id in the campaign.
     pub id: String,
     /// Where the robot stood; `None` where the campaign does not say.
     pub posture: Option<String>,
+    /// Spindle speed, rpm.
     pub spindle_rpm: f64,
     /// As the limit counts it: axial depth in milling, (diameter − pilot diameter)/2 in drilling.
     pub depth_mm: f64,
+    /// Whether it chattered.
     pub outcome: CutOutcome,
 }
 
 /// A cut with a noted outcome that the diagram says nothing about.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NotCompared {
+    /// The cut's id in the campaign.
     pub id: String,
+    /// Why, in words.
     pub reason: String,
 }
 
 /// Where the limit may lie at one speed, mm; `None` is no limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LimitRange {
+    /// The limit of the nominal model.
     pub limit_mm: Option<f64>,
     /// From the model's uncertainty (see [`super::band`]), widened to hold the limit itself.
     pub lower_mm: Option<f64>,
+    /// Upper end of the range.
     pub upper_mm: Option<f64>,
 }
 
@@ -61,27 +68,38 @@ impl LimitRange {
     }
 }
 
+/// What the limit says of a cut that was made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
+    /// Outside the range that the model leaves open, on the side that the model says.
     Agree,
+    /// Outside that range, on the other side.
     Disagree,
     /// Between the lower and the upper limit: the model cannot say.
     WithinBand,
 }
 
-/// One cut beside the limit at its speed.
+/// One cut compared with the limit at its speed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ScoredCut {
+    /// The cut's id in the campaign.
     pub id: String,
+    /// Where the robot stood; `None` where the campaign does not say.
     pub posture: Option<String>,
+    /// Spindle speed, rpm.
     pub spindle_rpm: f64,
+    /// Depth as the limit counts it, mm (see [`NotedCut::depth_mm`]).
     pub depth_mm: f64,
+    /// Whether it chattered.
     pub outcome: CutOutcome,
     /// `None`: no limit at this speed.
     pub limit_mm: Option<f64>,
+    /// Lower end of where the limit may lie, mm.
     pub lower_mm: Option<f64>,
+    /// Upper end of where the limit may lie, mm; `None`: no limit.
     pub upper_mm: Option<f64>,
+    /// Whether the lobes agree with it.
     pub verdict: Verdict,
     /// What follows where the cut does not agree; for people.
     pub meaning: Option<String>,
@@ -92,14 +110,21 @@ pub struct ScoredCut {
 pub struct Outcomes {
     /// Outside the range that the model leaves open, and as it says.
     pub agree: usize,
+    /// Outside the range, and not as the model says.
     pub disagree: usize,
+    /// Inside the range: the model cannot say.
     pub within_band: usize,
     /// Against the limit alone.
     pub stable_below_limit: usize,
+    /// Stable cuts deeper than the limit.
     pub stable_above_limit: usize,
+    /// Cuts with chatter deeper than the limit.
     pub chatter_above_limit: usize,
+    /// Cuts with chatter not deeper than the limit.
     pub chatter_below_limit: usize,
+    /// Every cut that was compared.
     pub cuts: Vec<ScoredCut>,
+    /// Cuts with an outcome that could not be compared.
     pub not_compared: Vec<NotCompared>,
 }
 

@@ -10,7 +10,9 @@ use crate::cutting::DrillGeometry;
 /// Cutting coefficients that lobes need, N/mm².
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LobeCoefficients {
+    /// Tangential coefficient Ktc, N/mm².
     pub ktc_n_per_mm2: f64,
+    /// Radial coefficient Krc (drilling: the part of Kfc in the plane of the lobes), N/mm².
     pub krc_n_per_mm2: f64,
     /// Drilling: thrust per chip area, Kac = Kfc sin κ; for the axial–torsional block.
     pub kac_n_per_mm2: Option<f64>,

@@ -26,6 +26,7 @@ const NOT_A_ROOT: f64 = 1e-7;
 const VERTEX_MARGIN: f64 = 0.01;
 
 impl<'a> StabilitySolver<'a> {
+    /// The limit of an averaged force on a structure that is given by its FRF.
     pub fn new(force: RegenerativeForce, frf: &'a dyn DirectFrf) -> Self {
         Self::with_halved_seeds(force, frf, 0)
     }

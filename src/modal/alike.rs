@@ -181,7 +181,7 @@ impl Alike {
         })
     }
 
-    /// Misfit that each of `trials` poles explains beside those of `held`, all of them where they are.
+    /// Misfit that each of `trials` poles explains in addition to those of `held`, all of them where they are.
     pub fn explained_by(
         &self,
         held: &PoleColumns,

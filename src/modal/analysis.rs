@@ -43,7 +43,7 @@ const BRIEF: Effort = Effort {
 const MAX_DAMPING: f64 = 0.5;
 /// A damping estimate scattering by more than this part of itself is no finding (where lines are not too coarse).
 const MAX_RELATIVE_STD: f64 = 0.7;
-/// Where lines are coarse the damping hangs on one or two of them, and leakage between lines comes on top of
+/// Where lines are coarse the damping depends on one or two of them, and leakage between lines comes on top of
 /// the noise: an allowance of this part of the line spacing on the half-power width. (Three measured
 /// free–free beam records at 0.05–0.2 lines in the band differ from each other by about this much.)
 const LEAKAGE_LINES: f64 = 0.02;

@@ -26,6 +26,7 @@ pub struct Choice {
 const MEANT: f64 = 0.02;
 
 impl Choice {
+    /// Whether nothing different is wanted.
     pub fn is_empty(&self) -> bool {
         self.poles.is_empty() && self.without_hz.is_empty() && self.modes.is_none()
     }

@@ -3,7 +3,7 @@
 //! detuning u, where it is exact). Other modes only shift the circle. The centre comes from Taubin's
 //! algebraic fit (1991) and a geometric refinement; resonance is where the fitted sweep is fastest; damping
 //! comes from all angles at once, and once more from every pair of points around the resonance:
-//! ζ = (u_b − u_a)/(tan(θ_b/2) + tan(θ_a/2)). The scatter of the pairs is reported beside it.
+//! ζ = (u_b − u_a)/(tan(θ_b/2) + tan(θ_a/2)). The scatter of the pairs is reported with it.
 
 use std::f64::consts::{PI, TAU};
 
@@ -49,7 +49,7 @@ pub(super) fn fit(curve: &Curve, frequency_hz: f64, damping_ratio: f64) -> Optio
         }
     }
     let fitted = fit_lines(curve, lines, (frequency_hz, damping_ratio))?;
-    // A first estimate may be off, but an answer that runs away is none.
+    // A first estimate may be off, but one that runs away is no answer.
     let moved = (fitted.frequency_hz - frequency_hz).abs() / frequency_hz;
     (moved <= 2.0 * damping_ratio.max(fitted.damping_ratio)).then_some(fitted)
 }

@@ -24,7 +24,7 @@ const FINE_LINES: f64 = 3.0;
 const UNCERTAIN: f64 = 0.02;
 /// What poles anywhere explain scatters by about this without any model error.
 const BY_CHANCE: f64 = 1.5;
-/// A frequency that is uncertain by more than this share of the half-width is none.
+/// A frequency that is uncertain by more than this share of the half-width is not given.
 const UNPLACED: f64 = 0.3;
 /// A line whose width is not known is a mode where the residues of its FRFs have a common phase (collinearity) …
 const IN_PHASE: f64 = 0.9;

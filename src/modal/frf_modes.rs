@@ -16,6 +16,7 @@ pub enum Method {
 }
 
 impl Method {
+    /// As in JSON and tables.
     pub fn id(self) -> &'static str {
         match self {
             Method::LocalFit => "local-fit",
@@ -28,6 +29,7 @@ impl Method {
 /// One mode by one method.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModeEstimate {
+    /// How it was found.
     pub method: Method,
     /// Undamped natural frequency.
     pub frequency_hz: f64,
@@ -35,6 +37,7 @@ pub struct ModeEstimate {
     pub damping_ratio: f64,
     /// From the residual of the fit; `None` where there were only just enough lines.
     pub frequency_std_hz: Option<f64>,
+    /// Standard deviation of the damping ratio, from the same residual.
     pub damping_std: Option<f64>,
     /// Circle fit: standard deviation of ζ over the point pairs.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -61,6 +64,7 @@ pub struct FrfMode {
 }
 
 impl FrfMode {
+    /// The estimate of the best method.
     pub fn best(&self) -> &ModeEstimate {
         &self.estimates[0]
     }

@@ -324,8 +324,8 @@ fn solve(data: &mut [Data], candidates: &[Start], changes: &mut Vec<Change>) -> 
 
 #[cfg(test)]
 mod tests {
-    use super::super::analyse_frf;
     use super::super::synthetic::{Synthetic, SyntheticMode};
+    use super::super::{FrfModes, analyse_frf};
     use super::*;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;

@@ -169,7 +169,7 @@ fn the_mac_tells_modes_apart_and_the_diagram_says_why() {
             .iter()
             .all(|c| c.why.contains("taken") || c.why.contains("left out"))
     );
-    // Two per cent of noise, of which the fit follows a little; a single FRF's figure hangs on the few lines of its peak.
+    // Two per cent of noise, of which the fit follows a little; a single FRF's figure depends on the few lines of its peak.
     let fits: Vec<&Reconstruction> = found.reconstructions.iter().flatten().collect();
     assert_eq!(fits.len(), RESPONSES * REFERENCES);
     let mean = |of: fn(&Reconstruction) -> f64| fits.iter().map(|f| of(f)).sum::<f64>() / fits.len() as f64;

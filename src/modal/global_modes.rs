@@ -12,10 +12,13 @@ use super::stabilisation::Stabilisation;
 /// One mode of a set of FRFs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GlobalMode {
+    /// Undamped natural frequency, Hz.
     pub frequency_hz: f64,
+    /// Viscous damping ratio.
     pub damping_ratio: f64,
     /// From the noise that the common fit leaves (Cramér–Rao), raised where it leaves more than noise.
     pub frequency_std_hz: f64,
+    /// Standard deviation of the damping ratio, likewise.
     pub damping_std: f64,
     /// Number of FRFs in which the mode stands out of the noise.
     pub found_in: usize,
@@ -35,7 +38,9 @@ pub struct GlobalMode {
 /// A pole that was looked at and is not given as a mode.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RejectedMode {
+    /// Frequency of the pole, Hz.
     pub frequency_hz: f64,
+    /// Its damping ratio.
     pub damping_ratio: f64,
     /// In plain words.
     pub reason: String,
@@ -46,7 +51,7 @@ pub struct RejectedMode {
 pub struct GlobalModes {
     /// Ascending in frequency.
     pub modes: Vec<GlobalMode>,
-    /// What resembled a mode and is none, or none that these FRFs prove; ascending in frequency.
+    /// What resembled a mode but is not one, or is not one that these FRFs prove; ascending in frequency.
     pub rejected: Vec<RejectedMode>,
     /// Lines without a shape that were taken out before the fits.
     pub sine_lines: Vec<SineLine>,
@@ -54,8 +59,10 @@ pub struct GlobalModes {
     pub quality: SetQuality,
     /// MAC of every two modes, from their residues in all FRFs.
     pub mac: Vec<Vec<f64>>,
+    /// Poles of all orders, and those that stayed.
     pub stabilisation: Stabilisation,
     /// By FRF; `None` for one that took no part (too few lines, zero).
     pub reconstructions: Vec<Option<Reconstruction>>,
+    /// What changes the result, in words.
     pub warnings: Vec<String>,
 }

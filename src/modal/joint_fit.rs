@@ -49,7 +49,7 @@ const DOUBT_SIGMA: f64 = 3.0;
 const DOUBT_LOOKED: f64 = 6.0;
 /// Before its place is refined a pole must explain this part of what a mode must.
 const REFINED: f64 = 0.2;
-/// Below this a pole beside another is not worth a fit of its own.
+/// Below this a pole next to another is not worth a fit of its own.
 const WORTH_A_FIT_SIGMA: f64 = 1.0;
 
 /// What a refinement may do besides moving poles.
@@ -58,7 +58,7 @@ pub(super) enum PoleSearch {
     Nothing,
     /// That, and not more exactly than a comparison needs.
     Roughly,
-    /// Take out needless poles, add one where the rest is largest, and look for close pairs: a second pole beside each
+    /// Take out needless poles, add one where the rest is largest, and look for close pairs: a second pole next to each
     /// that is there.
     Pairs,
 }
@@ -426,7 +426,7 @@ impl Fit<'_> {
         }
     }
 
-    /// Adds a pole where the rest is largest, or beside one that is there, if that explains enough; one that explains
+    /// Adds a pole where the rest is largest, or next to one that is there, if that explains enough; one that explains
     /// something but not enough is a doubt.
     fn with_one_more(&self, solution: &Solution, doubt: &mut Option<Doubt>) -> Option<Solution> {
         let usual = usual_damping(solution);
@@ -541,7 +541,7 @@ impl Fit<'_> {
         }
         let centre = rest[most.1].0;
         let usual = usual_damping(solution);
-        // A pole on top of another one is a saddle: beside it the search begins on either slope.
+        // A pole on top of another one is a saddle: next to it the search begins on either slope.
         let trials = [1.0, 1.0 - usual, 1.0 + usual].map(|factor| Pole {
             frequency_hz: centre * factor,
             damping_ratio: usual,

@@ -329,7 +329,7 @@ fn fit_prepared(
     })
 }
 
-/// Misfit that each of the `trials` would explain beside the poles of a solution, these and the trial held where they
+/// Misfit that each of the `trials` would explain in addition to the poles of a solution, these and the trial held where they
 /// are: twice the log-likelihood ratio, exact in the residues. `None` where the lines do not determine those.
 pub(super) fn explained_by(frfs: &[NoisyFrf], held: &[Pole], trials: &[Pole]) -> Option<Vec<f64>> {
     let prepared = Prepared::new(frfs);

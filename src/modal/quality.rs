@@ -14,11 +14,15 @@ const COHERENCE: [f64; 2] = [0.9, 0.6];
 /// Difference of an FRF and its mirror over their size beyond noise: good up to, bad from.
 const RECIPROCITY: [f64; 2] = [0.1, 0.4];
 
+/// How far modes or an FRF may be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum QualityGrade {
+    /// Nothing speaks against it.
     Good,
+    /// Something does: look at the reasons.
     Doubtful,
+    /// Not to be relied on.
     Bad,
 }
 
@@ -35,6 +39,7 @@ impl std::fmt::Display for QualityGrade {
 /// What speaks for and against the modes of a set.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SetQuality {
+    /// The grade that the shares and the scatter below come to.
     pub verdict: QualityGrade,
     /// Share 0..1 of what was measured (Σ|ωH|² over the FRFs, in the band of the modes) that is neither a common mode nor
     /// random noise.
@@ -70,6 +75,7 @@ impl Default for SetQuality {
 /// What speaks for and against an FRF.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Quality {
+    /// The grade that the figures below come to.
     pub verdict: QualityGrade,
     /// sqrt(Σ(ωσ)²/Σ|ωH|²) in the band.
     pub noise_nrms: Option<f64>,

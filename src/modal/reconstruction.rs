@@ -12,9 +12,11 @@ pub struct Reconstruction {
     pub error_nrms: f64,
     /// The same for the noise alone.
     pub noise_nrms: f64,
+    /// Lines that the common fits cover, Hz.
     pub frequency_hz: Vec<f64>,
     /// Turned where it was conjugated.
     pub measured_m_per_n: Vec<Complex64>,
+    /// The common modes and their residual terms on the same lines.
     pub fitted_m_per_n: Vec<Complex64>,
 }
 

@@ -14,6 +14,7 @@ pub struct SetMember<'a> {
     pub frequency_hz: &'a [f64],
     /// As given to [`super::analyse_frf`], m/N.
     pub receptance_m_per_n: &'a [Complex64],
+    /// The modes of this FRF by itself.
     pub modes: &'a FrfModes,
     /// Response and reference, as numbers that are equal where the degree of freedom is; `None` where not known.
     pub dofs: Option<[usize; 2]>,

@@ -10,5 +10,6 @@ pub struct Settings {
     /// Highest order of the stabilisation diagram: poles sought in all FRFs together; from the number of peaks where `None`.
     /// What the lines determine (a third of them) is never exceeded.
     pub max_order: Option<usize>,
+    /// When a pole counts as having stayed from one order to the next.
     pub tolerances: Tolerances,
 }

@@ -23,6 +23,7 @@ const MAINS_HZ: [f64; 2] = [50.0, 60.0];
 /// A sine among the responses.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SineLine {
+    /// Frequency of the sine, Hz.
     pub frequency_hz: f64,
     /// Lowest and highest line that it spoils.
     pub spoils_hz: [f64; 2],

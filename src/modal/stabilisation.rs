@@ -55,7 +55,9 @@ impl Default for Tolerances {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stability {
+    /// No pole of the order below is near in frequency.
     New,
+    /// Frequency only.
     Frequency,
     /// Frequency and damping.
     Damping,
@@ -66,19 +68,26 @@ pub enum Stability {
 /// One pole in the diagram.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DiagramPole {
+    /// Order of the fit that it belongs to.
     pub order: usize,
+    /// Undamped natural frequency, Hz.
     pub frequency_hz: f64,
+    /// Viscous damping ratio.
     pub damping_ratio: f64,
+    /// What of it agrees with the order below.
     pub stability: Stability,
 }
 
 /// A pole that stayed over several orders, and what became of it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Candidate {
+    /// Undamped natural frequency, Hz.
     pub frequency_hz: f64,
+    /// Viscous damping ratio.
     pub damping_ratio: f64,
     /// Orders over which it stayed.
     pub orders: usize,
+    /// Whether it became a mode.
     pub chosen: bool,
     /// Why it was taken or left, in words.
     pub why: String,
@@ -89,7 +98,9 @@ pub struct Candidate {
 pub struct Stabilisation {
     /// References taken together (1: common denominator).
     pub references: usize,
+    /// Highest order of the diagram.
     pub max_order: usize,
+    /// Poles of all orders.
     pub poles: Vec<DiagramPole>,
     /// Ascending in frequency.
     pub candidates: Vec<Candidate>,

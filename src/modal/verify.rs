@@ -22,7 +22,7 @@ const DOMINANT: f64 = 0.5;
 const SHARE_OF_FRFS: f64 = 0.08;
 /// … unless one of them shows it with this squared size over uncertainty.
 const FAR: f64 = 100.0;
-/// A frequency that scatters from FRF to FRF by more than this share of the half-width is none.
+/// A frequency that scatters from FRF to FRF by more than this share of the half-width belongs to no mode.
 const SCATTER_WIDTHS: f64 = 0.3;
 /// A damping ratio uncertain by more than this part of itself, from how the FRFs scatter.
 const SCATTER_DAMPING: f64 = 0.5;
@@ -32,7 +32,7 @@ const OVER_REST: f64 = 2.0;
 const CLOSE: f64 = 1.0;
 /// Two poles nearer than this share of that sum are one mode unless both have the phases of one.
 const SAME: f64 = 0.2;
-/// Residues of a common phase: what a mode beside another one keeps.
+/// Residues of a common phase: what a mode next to another one keeps.
 const IN_PHASE: f64 = 0.7;
 /// Shapes that repeat.
 const SAME_SHAPE: f64 = 0.9;

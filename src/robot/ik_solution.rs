@@ -26,11 +26,13 @@ pub struct IkSolution {
 }
 
 impl IkSolution {
+    /// Whether every joint keeps its limits.
     pub fn is_within_limits(&self) -> bool {
         // Rounding must not put an angle at its limit outside.
         self.limit_margin_rad >= -1e-9
     }
 
+    /// Joint angles, degrees.
     pub fn joints_deg(&self) -> Vec<f64> {
         self.q_rad.iter().map(|q| q.to_degrees()).collect()
     }

@@ -14,6 +14,7 @@ use crate::{Error, Result};
 /// The posture that a task refers to.
 #[derive(Debug, Clone)]
 pub struct IkReference {
+    /// Joint angles, rad.
     pub q_rad: Vec<f64>,
     /// Its branch; `None` where solutions are searched for.
     branch: Option<u32>,

@@ -14,6 +14,7 @@ use crate::{InputError, Result};
 /// A robot whose structure can be set up at any posture.
 #[derive(Debug, Clone)]
 pub struct RobotModel {
+    /// What the robot file says.
     pub spec: RobotSpec,
 }
 
@@ -30,7 +31,7 @@ pub struct Baseline {
     pub young_pa: Option<Dual>,
 }
 
-/// Damping ratio a model starts from when nobody has said anything else.
+/// Damping ratio a model starts from when nothing else is given.
 pub const NOMINAL_DAMPING_RATIO: f64 = 0.03;
 
 impl Baseline {
@@ -50,10 +51,12 @@ impl Baseline {
 }
 
 impl RobotModel {
+    /// The model of a robot file.
     pub fn new(spec: RobotSpec) -> Self {
         RobotModel { spec }
     }
 
+    /// Number of joints.
     pub fn joint_count(&self) -> usize {
         self.spec.joints.len()
     }

@@ -27,7 +27,7 @@ const TOLERANCE: f64 = 1e-11;
 const ITERATIONS: usize = 60;
 /// Longest step of a joint, rad.
 const LONGEST_STEP: f64 = 0.6;
-/// Damping beside the share of the error.
+/// Damping in addition to the share of the error.
 const LEAST_DAMPING: f64 = 1e-12;
 /// Starts at most, and how many more at least after the last one that found something new.
 const STARTS: usize = 160;

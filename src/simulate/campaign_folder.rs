@@ -18,6 +18,7 @@ pub struct LabCampaign {
 /// Where a simulated campaign was written.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Written {
+    /// The campaign folder.
     pub dir: PathBuf,
     /// Truth file, outside `dir` unless asked for otherwise.
     pub truth: PathBuf,
@@ -49,7 +50,7 @@ pub fn check_target(dir: &Path, truth: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Where the truth of a campaign folder goes: `DIR.truth.json` beside it.
+/// Where the truth of a campaign folder goes: `DIR.truth.json` next to it.
 ///
 /// # Errors
 /// A path that has no name, such as `..`.

@@ -19,6 +19,7 @@ pub enum FrfFormat {
 }
 
 impl FrfFormat {
+    /// Ending of the file name, without the dot.
     pub fn extension(self) -> &'static str {
         match self {
             FrfFormat::UffAscii | FrfFormat::UffBinary => "uff",

@@ -8,6 +8,7 @@ use crate::{Error, InputError, Result};
 /// The robot as its file has it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LabRobot {
+    /// What its file says.
     pub spec: RobotSpec,
     /// What `[robot] model` says in the campaign.
     pub reference: String,
@@ -48,6 +49,7 @@ impl LabRobot {
         })
     }
 
+    /// Whether it is one of the built-in robots.
     pub fn is_built_in(&self) -> bool {
         self.file.is_none()
     }

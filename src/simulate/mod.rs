@@ -1,7 +1,7 @@
 //! The virtual lab: writes a campaign whose truth is known.
 //!
 //! A side of a campaign (here [`structure`]; force records would be a second one) turns its scenario into a
-//! [`LabCampaign`]: the files of the folder and the truth. [`LabCampaign::write`] puts both on disk, the truth beside
+//! [`LabCampaign`]: the files of the folder and the truth. [`LabCampaign::write`] puts both on disk, the truth next to
 //! the folder, so that the folder itself stays blind.
 //!
 //! What is simulated comes from the same model that is fitted. A program that finds what it has put there itself proves

@@ -18,6 +18,7 @@ const ATTEMPTS: usize = 2000;
 /// How postures are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PostureScheme {
+    /// How many there are.
     pub count: usize,
     /// The first so many are the tap-test postures themselves (built-in robot only).
     pub exact: usize,

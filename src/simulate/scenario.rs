@@ -43,12 +43,17 @@ pub enum FrfLayout {
 /// What is simulated. Everything not said here is drawn from the seed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StructureScenario {
+    /// What everything else is drawn from.
     pub seed: u64,
+    /// How well the campaign is measured.
     pub kind: CampaignKind,
+    /// How postures are drawn.
     pub postures: PostureScheme,
+    /// Which FRFs are measured.
     pub layout: FrfLayout,
     /// First and last line, Hz.
     pub band_hz: [f64; 2],
+    /// Spacing of the lines, Hz.
     pub step_hz: f64,
     /// Complex standard deviation of the noise as a share of |H|.
     pub noise_relative: f64,
@@ -60,8 +65,11 @@ pub struct StructureScenario {
     pub stiffness_error: f64,
     /// Hammer levels, N; empty: one level that nobody wrote down.
     pub force_levels_n: Vec<f64>,
+    /// Format of the FRF files.
     pub format: FrfFormat,
+    /// Motion that the FRF files hold, per force.
     pub quantity: Quantity,
+    /// Effects that are hidden.
     pub effects: Vec<EffectRequest>,
     /// Kinds of [`super::departure`] in the lab.
     pub departures: Vec<String>,
@@ -70,6 +78,7 @@ pub struct StructureScenario {
     pub excess_share: Option<f64>,
     /// Small errors of setup.
     pub slips: Vec<Slip>,
+    /// How the noise of neighbouring lines belongs together.
     pub line_noise: LineNoise,
     /// Share of the noise's variance that all outputs of one hit have in common (noise of the force channel).
     pub common_noise: f64,

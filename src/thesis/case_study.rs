@@ -26,8 +26,11 @@ pub struct ComparedRow {
     pub posture: String,
     /// `Kx`, `f X`, …
     pub quantity: String,
+    /// Unit of the values.
     pub unit: &'static str,
+    /// The thesis's own model; `None` where it prints no value.
     pub published_model: Option<f64>,
+    /// Measured by the thesis; `None` where it was not.
     pub measured: Option<f64>,
     /// This model with the published joint compliances, nothing tuned.
     pub before: f64,
@@ -40,7 +43,9 @@ pub struct ComparedRow {
 /// A group of measured resonances for which the model calibrated on the strongest modes has no mode.
 #[derive(Debug, Clone, serde::Serialize)]
 pub struct Unexplained {
+    /// Lower end of the band, Hz.
     pub from_hz: f64,
+    /// Upper end of the band, Hz.
     pub to_hz: f64,
     /// Minima of the real part that fall in the band, all configurations and axes.
     pub minima: usize,
@@ -62,11 +67,15 @@ pub struct CaseStudy {
     pub frequencies: Vec<ComparedRow>,
     /// Peak real receptance of the strongest mode.
     pub receptances: Vec<ComparedRow>,
+    /// Joint stiffnesses and damping, calibrated on the modal table of configurations 1–3.
     pub parameters: Vec<Estimate>,
+    /// Whether that calibration converged.
     pub converged: bool,
     /// Root mean square of the relative frequency error on the fitted configurations and on the predicted one.
     pub fitted_frequency_error: f64,
+    /// On the predicted configuration.
     pub predicted_frequency_error: f64,
+    /// Bands of measured resonances in which the calibrated model has no mode.
     pub unexplained: Vec<Unexplained>,
     /// What the loop proposes for them.
     pub real_case: RealCase,
@@ -83,6 +92,7 @@ pub struct CaseStudy {
 /// Table 30 for one configuration: tips of the stability envelope and the absolute limit.
 #[derive(Debug, Clone, serde::Serialize)]
 pub struct LobeRow {
+    /// 1..4, as in the thesis.
     pub configuration: u32,
     /// The commercial program on the measured FRFs.
     pub commercial: Vec<Peak>,
@@ -99,8 +109,11 @@ pub struct LobeRow {
 /// Tips of an envelope near 60 f/(N k) for k = 2 and 1 of the dominant mode, and its least depth.
 #[derive(Debug, Clone, serde::Serialize)]
 pub struct LobeTips {
+    /// Tip near 60 f/(2 N), between lobes 1 and 2.
     pub second_region: Option<Peak>,
+    /// Tip near 60 f/N, between lobes 0 and 1.
     pub first_region: Option<Peak>,
+    /// Least depth of the envelope; `None` where nothing is limited.
     pub absolute_limit: Option<AbsoluteLimit>,
 }
 

@@ -7,23 +7,31 @@ use crate::Result;
 /// Smallest and largest of a set of ratios.
 pub type Range = [f64; 2];
 
+/// The study, and what its tables come to.
 pub struct ThesisFindings {
+    /// The tables themselves.
     pub study: CaseStudy,
     /// Static stiffness, model / measured: as published, ours before and after calibration on the modal table.
     pub static_published: Option<Range>,
+    /// Static stiffness, model / measured: ours before calibration.
     pub static_before: Option<Range>,
+    /// Static stiffness, model / measured: ours after calibration.
     pub static_after: Option<Range>,
     /// Frequency of the strongest mode, published model / measured, and ours before.
     pub frequency_published: Option<Range>,
+    /// Frequency of the strongest mode, before / measured.
     pub frequency_before: Option<Range>,
     /// On the configuration that was not fitted: after / measured, and before / measured.
     pub predicted_after: Option<Range>,
+    /// On the configuration that was not fitted: before / measured.
     pub predicted_before: Option<Range>,
     /// The same for the peak real receptance.
     pub receptance_after: Option<Range>,
+    /// Peak real receptance on the configuration that was not fitted: after / measured.
     pub predicted_receptance_after: Option<Range>,
     /// Speeds of the commercial program's tips over ours from the measured minima: second and first region.
     pub speed_second_region: Option<Range>,
+    /// Speeds of the commercial program's tips over ours, first region.
     pub speed_first_region: Option<Range>,
     /// Depths, likewise, both regions.
     pub depth: Option<Range>,

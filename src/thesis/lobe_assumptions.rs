@@ -77,27 +77,32 @@ const SWITCHES: [(Switch, &str); 18] = [
 /// The tips of one configuration under one assumption.
 #[derive(Debug, Clone, Serialize)]
 pub struct SwitchedTips {
+    /// 1..4, as in the thesis.
     pub configuration: u32,
     /// `None`: no tip within 10 % of where that assumption puts it, 60 f/(N w).
     pub second_region: Option<Peak>,
+    /// Likewise, first region.
     pub first_region: Option<Peak>,
 }
 
 /// All of table 30 under one assumption.
 #[derive(Debug, Clone, Serialize)]
 pub struct AssumptionSwitched {
+    /// The assumption, in words.
     pub assumption: &'static str,
+    /// One entry a configuration.
     pub tips: Vec<SwitchedTips>,
     /// The commercial program's tip over ours, geometric mean over the configurations that have one: second and first
     /// region. `None` where none has.
     pub speed_ratio: [Option<f64>; 2],
+    /// The same of the depths.
     pub depth_ratio: [Option<f64>; 2],
     /// Configurations with a tip: second and first region.
     pub found: [usize; 2],
 }
 
 impl AssumptionSwitched {
-    /// How far the speeds are off on the whole: root mean square of the logarithms of both ratios, as a factor. `None`
+    /// How far the speeds are off overall: root mean square of the logarithms of both ratios, as a factor. `None`
     /// where a region has fewer tips than table 30 has configurations.
     pub fn speed_factor(&self) -> Option<f64> {
         let complete = self.found.iter().all(|f| *f == self.tips.len());
@@ -107,7 +112,7 @@ impl AssumptionSwitched {
     }
 }
 
-/// Every assumption switched by itself; the first is none.
+/// Every assumption switched by itself; the first entry switches nothing.
 ///
 /// # Errors
 /// Only where the built-in tables are damaged.

@@ -20,7 +20,7 @@ const CONDITIONS: &str = include_str!("../../datasets/irb6640/cutting_conditions
 /// Tips farther than this from where they are expected belong to something else.
 const WINDOW: f64 = 0.1;
 
-/// One configuration of table 30, ours beside the two published programs.
+/// One configuration of table 30: our lobes and those of the two published programs.
 #[derive(Debug, Clone, Serialize)]
 pub struct ThesisLobes {
     /// 1..4, as in the thesis.
@@ -33,6 +33,7 @@ pub struct ThesisLobes {
     pub second_region: Peak,
     /// Ours at the tip near 60 f/N, between lobes 0 and 1, to the rpm.
     pub first_region: Peak,
+    /// Ours, over all speeds.
     pub absolute_limit: AbsoluteLimit,
     /// The commercial program on the measured FRFs, in the order of the thesis (lower speed first).
     pub commercial: Vec<Peak>,

@@ -47,9 +47,11 @@ pub struct OperationalModes {
     pub modes: Vec<OperationalMode>,
     /// Lines of rotating parts, ascending in frequency; taken out before the modes were sought.
     pub harmonics: Vec<Harmonic>,
+    /// What resembled a mode but is not one; ascending in frequency.
     pub rejected: Vec<RejectedMode>,
     /// Poles of all orders.
     pub poles: Vec<DiagramPole>,
+    /// Highest model order.
     pub max_order: usize,
     /// Sampling rate after thinning, Hz.
     pub sample_rate_hz: f64,
@@ -57,6 +59,7 @@ pub struct OperationalModes {
     pub segments: usize,
     /// Longest lag of the correlations, s.
     pub longest_lag_s: f64,
+    /// What changes the result, in words.
     pub warnings: Vec<String>,
 }
 

@@ -8,9 +8,13 @@ use crate::modal::shape::Complexity;
 /// One mode found from responses alone.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OperationalMode {
+    /// Undamped natural frequency, Hz.
     pub frequency_hz: f64,
+    /// Viscous damping ratio.
     pub damping_ratio: f64,
+    /// Standard deviation of the frequency, Hz.
     pub frequency_std_hz: f64,
+    /// Standard deviation of the damping ratio.
     pub damping_std: f64,
     /// Orders at which the pole stays.
     pub orders: usize,

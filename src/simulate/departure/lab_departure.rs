@@ -10,11 +10,13 @@ use crate::simulate::draw::Draws;
 
 /// One posture, as a departure sees it.
 pub struct Scene<'a> {
+    /// The robot that is measured.
     pub robot: &'a RobotModel,
     /// True joint angles.
     pub kinematics: &'a Kinematics,
     /// Index among the postures, in the order of measurement.
     pub posture: usize,
+    /// Number of postures of the campaign.
     pub postures: usize,
 }
 
@@ -23,21 +25,28 @@ pub struct Scene<'a> {
 pub struct FrfChannel {
     /// Index among all FRFs of the campaign.
     pub frf: usize,
+    /// Index of the posture.
     pub posture: usize,
+    /// Index of the measured point, and axis.
     pub response: (usize, Axis),
+    /// Index of the point that is hit, and axis.
     pub reference: (usize, Axis),
 }
 
 /// Mass (kg, kg·m²), damping and stiffness matrices that a departure changes; coordinates as in
 /// [`crate::robot::Chain::jacobian`].
 pub struct Matrices {
+    /// Mass matrix.
     pub mass: DMatrix<f64>,
+    /// Viscous damping matrix.
     pub damping: DMatrix<f64>,
+    /// Stiffness matrix.
     pub stiffness: DMatrix<f64>,
 }
 
 /// What departs from the model. `strength`: 1 as drawn, towards 0 nothing.
 pub trait LabDeparture: Send + Sync {
+    /// Name of its kind, as in commands and the truth file.
     fn id(&self) -> &'static str;
 
     /// `joint-2`, `link-5`; `None` where it has no place of its own.
@@ -56,8 +65,10 @@ pub trait LabDeparture: Send + Sync {
         Vector3::zeros()
     }
 
+    /// Changes the chain before its matrices are built.
     fn change_chain(&self, _strength: f64, _scene: &Scene, _chain: &mut Chain) {}
 
+    /// Changes the matrices of the chain.
     fn change_matrices(&self, _strength: f64, _scene: &Scene, _chain: &Chain, _matrices: &mut Matrices) {}
 
     /// Loss factor of an element's stiffness (hysteretic damping).

@@ -42,7 +42,7 @@ impl LabDeparture for ShiftedEncoder {
     }
 }
 
-/// The tool point is measured and hit beside where it is written to be.
+/// The tool point is measured and hit next to where it is written to be.
 pub struct ToolPointOff {
     offset_m: Vector3<f64>,
 }
@@ -139,7 +139,7 @@ impl LabDeparture for HitGain {
     }
 }
 
-/// A table or stand beside the robot is felt at the tool point: one resonance that no posture moves.
+/// A table or stand next to the robot is felt at the tool point: one resonance that no posture moves.
 pub struct TableMode {
     direction: Vector3<f64>,
     frequency_hz: f64,

@@ -53,7 +53,9 @@ pub fn drawn(id: &str, robot: &RobotSpec, seed: u64) -> Option<Box<dyn LabDepart
 
 /// A departure in the lab.
 pub struct Departed {
+    /// What departs from the model.
     pub departure: Box<dyn LabDeparture>,
+    /// Its strength: 1 as drawn, towards 0 nothing.
     pub strength: f64,
 }
 

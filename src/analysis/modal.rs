@@ -679,7 +679,7 @@ fn from_taps(
         force_n: &hammer.samples,
         responses: &responses,
     };
-    let found = modal::frfs_from_hits(&tap, taps).map_err(|e| match e {
+    let found = modal::impact_test(&tap, taps).map_err(|e| match e {
         Error::Input(e) => (*e).file(path).into(),
         other => other,
     })?;

@@ -58,7 +58,7 @@ impl<'a> RedundancySweep<'a> {
     /// with seven joints stands turned from that of the posture.
     ///
     /// # Errors
-    /// A robot of fewer than six joints or more than seven, a posture at a singularity, an elbow where there is none.
+    /// A robot of fewer than six joints or more than seven, a posture at a singularity, an elbow angle for an arm without one.
     pub fn new(
         robot: &'a RobotModel,
         joints_deg: &[f64],

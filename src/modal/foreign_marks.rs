@@ -1,5 +1,5 @@
 //! The marks of the global fit on sets that are not what it assumes: errors that go on from line to line, frequencies that
-//! move from FRF to FRF, hum; and on sets that are merely hard. Every mode must be found, and at most one that is none.
+//! move from FRF to FRF, hum; and on sets that are merely hard. Every mode must be found, and at most one false one.
 
 use std::f64::consts::TAU;
 

@@ -26,7 +26,7 @@ pub struct GlobalMode {
     pub lines_in_half_power_band: f64,
     /// How far the shape is from a standing wave; `None` for a single degree of freedom.
     pub complexity: Option<Complexity>,
-    /// Degree of freedom (as in [`SetMember::dofs`], or the FRF's index) and component; the largest is 1.
+    /// Degree of freedom (as in [`super::SetMember::dofs`], or the FRF's index) and component; the largest is 1.
     #[serde(skip)]
     pub shape: Vec<(usize, Complex64)>,
     /// By FRF: modal constant φ_out φ_in, 1/kg, and the standard deviation of its real and imaginary part; `None` for

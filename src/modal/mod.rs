@@ -18,13 +18,13 @@ mod findings;
 #[cfg(test)]
 mod foreign_marks;
 mod frf_modes;
-mod from_hits;
 mod global;
 #[cfg(test)]
 mod global_marks;
 mod global_modes;
 mod half_power;
 mod hits;
+mod impact_test;
 pub mod indicators;
 mod joint_fit;
 mod local_fit;
@@ -52,10 +52,10 @@ mod verify;
 
 pub use analysis::{analyse_frf, analyse_frfs};
 pub use frf_modes::{FrfMode, FrfModes, Method, ModeEstimate};
-pub use from_hits::{Estimator, TapFrfs, TapRecord, TapSettings, frfs_from_hits};
 pub use global::global;
 pub use global_modes::{GlobalMode, GlobalModes, RejectedMode};
 pub use hits::Hit;
+pub use impact_test::{Estimator, TapFrfs, TapRecord, TapSettings, impact_test};
 pub use reconstruction::Reconstruction;
 pub use set_member::SetMember;
 pub use settings::Settings;

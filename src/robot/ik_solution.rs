@@ -21,7 +21,7 @@ pub struct IkSolution {
     /// and fore arm (elbow), and the wrist's distance from axis 1 over the upper arm's length (shoulder); by search the
     /// inverse condition number of the Jacobian with lengths over the arm's own.
     pub singularity_margin: f64,
-    /// Of an arm with seven joints, see [`NumericInverse::elbow_rad`].
+    /// Of an arm with seven joints, see [`super::NumericInverse::elbow_rad`].
     pub elbow_rad: Option<f64>,
 }
 

@@ -249,7 +249,7 @@ mod tests {
         }
     }
 
-    /// Independent numbers of physics.md §2, within 0.5 %.
+    /// Computed independently of this program, within 0.5 %.
     #[test]
     fn flange_stiffness_of_postures_a_and_b() {
         let model = RobotModel::new(irb6640());
@@ -264,7 +264,7 @@ mod tests {
         }
     }
 
-    /// Independent numbers of physics.md §2, within 0.2 %.
+    /// Computed independently of this program, within 0.2 %.
     #[test]
     fn rigid_link_frequencies() {
         let model = RobotModel::new(irb6640());
@@ -283,7 +283,7 @@ mod tests {
         }
     }
 
-    /// physics.md §2: link beams at 200 GPa, config 1; and, with isotropic inertias, an independent finite-element
+    /// Computed independently: link beams at 200 GPa, configuration 1; and, with isotropic inertias, an independent finite-element
     /// program at all four postures.
     #[test]
     fn beam_frequencies_agree_with_finite_elements() {

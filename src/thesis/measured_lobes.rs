@@ -200,7 +200,7 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    /// The table in references.md, "Drilling lobes on the robot".
+    /// Computed independently of this program.
     #[test]
     fn table_30_is_what_the_reference_computation_gave() {
         let expected = [

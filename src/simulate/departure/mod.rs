@@ -1,7 +1,7 @@
 //! Physics and setups that neither the library of effects nor the baseline model can express, each with a strength that
 //! can be made as faint as wanted.
 //!
-//! Unlike [`super::foreign`], which is written as effects of the model, a departure acts where the fits have no hands:
+//! Unlike [`super::foreign`], which is written as effects of the model, a departure acts where the fits have no parameters:
 //! on the true posture, on the dynamic stiffness at each frequency, on single channels and single hits. `simulate::world`
 //! computes the FRFs that follow.
 

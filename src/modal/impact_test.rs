@@ -86,7 +86,7 @@ struct Block {
 ///
 /// # Errors
 /// Channels of different length, no hit, or no good one.
-pub fn frfs_from_hits(record: &TapRecord, settings: &TapSettings) -> Result<TapFrfs> {
+pub fn impact_test(record: &TapRecord, settings: &TapSettings) -> Result<TapFrfs> {
     let samples = record.force_n.len();
     if record.responses.iter().any(|r| r.len() != samples) || !(record.sample_rate_hz > 0.0) {
         return Err(InputError::new("the channels of a tap record are not of one length and rate").into());
@@ -441,7 +441,7 @@ mod tests {
             force_n: &bench.force,
             responses: &[&bench.acceleration],
         };
-        frfs_from_hits(&record, &TapSettings::default())
+        impact_test(&record, &TapSettings::default())
     }
 
     /// Frequency and damping of the mode, window taken out.

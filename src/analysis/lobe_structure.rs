@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use super::lobe_case::{BEST, LobeCase, LobesBefore};
 use super::lobe_model::{Asked, Dynamics, ModelState};
-use super::lobes::{BEST, LobeCase, LobesBefore};
 use crate::campaign::{Campaign, LobeMethod, LobesSection};
 use crate::lobes::band;
 use crate::lobes::hole::{HoleCheck, HoleError};

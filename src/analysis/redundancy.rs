@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::lobe_case::{BEST, LobeCase};
 use super::lobe_model::ModelState;
-use super::lobes::{BEST, LobeCase};
 use crate::campaign::{Campaign, LobeMethod, LobesSection, Redundancy};
 use crate::lobes::band::{QUANTILES, quantile};
 use crate::lobes::hole::{HoleCheck, HoleError};

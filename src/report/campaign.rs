@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use super::parts::{count, failed, paragraph};
+use super::parts::{failed, paragraph};
+use super::words::count;
 use super::{
-    Block, Column, Page, Section, Table, VerdictCard, cutting_section, diagnosis_section, error_map_section,
-    history_section, lobes_section, modal_section, structure_section, thesis_section, verdict_card,
-    waveform_section,
+    Block, Page, ReportSection, ReportTable, TableColumn, VerdictCard, cutting_section, diagnosis_section,
+    error_map_section, history_section, lobes_section, modal_section, structure_section, thesis_section,
+    verdict_words, waveform_section,
 };
 use crate::Result;
 use crate::analysis::{CampaignFindings, DiagnosisFindings, StructureFindings, ThesisFindings};
@@ -105,7 +106,7 @@ fn cards(findings: &CampaignFindings) -> Vec<VerdictCard> {
     let mut cards = Vec::new();
     if structure.is_some() || findings.diagnosis().is_some() {
         let files = of_side(findings.diagnosis().map(|d| &d.setup));
-        cards.extend(verdict_card::structure(
+        cards.extend(verdict_words::structure(
             campaign,
             &files,
             structure,
@@ -113,14 +114,14 @@ fn cards(findings: &CampaignFindings) -> Vec<VerdictCard> {
         ));
     }
     if let Some(found) = cutting {
-        cards.push(verdict_card::cutting(
+        cards.push(verdict_words::cutting(
             campaign,
             &of_side(Some(&found.setup)),
             found,
         ));
     } else if let Some(result) = findings.cutting() {
         let summary = cutting_section::summary(result);
-        cards.push(verdict_card::coefficients(
+        cards.push(verdict_words::coefficients(
             campaign,
             summary,
             &of_side(None),
@@ -152,7 +153,7 @@ pub fn demo_page(findings: &CampaignFindings, second: &SecondCell, steps: &[Step
     page.opening = "Something was hidden in one of two simulated cells, and the program was not told what. This is what it \
                     found:"
         .into();
-    page.cards = verdict_card::structure(second.campaign, &[], None, Some(second.diagnosis))
+    page.cards = verdict_words::structure(second.campaign, &[], None, Some(second.diagnosis))
         .into_iter()
         .collect();
     for section in &mut page.sections {
@@ -166,26 +167,26 @@ pub fn demo_page(findings: &CampaignFindings, second: &SecondCell, steps: &[Step
     page
 }
 
-fn demo_story(steps: &[StepRow]) -> Section {
+fn demo_story(steps: &[StepRow]) -> ReportSection {
     let intro = "The first cell is a robot whose joints are up to 27 % off its data sheet, and a series of milling cuts with a \
                  drifting dynamometer: the model can explain all of it. The second has something that the model does not.";
-    Section {
+    ReportSection {
         id: "story".into(),
         title: "How it got there, and how to do the same with files of your own".into(),
         blocks: vec![
             paragraph(intro),
-            Block::Table(Table {
+            Block::Table(ReportTable {
                 caption: "What each step found, and its command".into(),
                 columns: vec![
-                    Column::text("step"),
-                    Column::text("found"),
-                    Column::text("command"),
+                    TableColumn::text("step"),
+                    TableColumn::text("found"),
+                    TableColumn::text("command"),
                 ],
                 rows: steps.iter().map(|row| row.to_vec()).collect(),
                 notes: vec![],
             }),
         ],
-        ..Section::default()
+        ..ReportSection::default()
     }
 }
 
@@ -196,7 +197,7 @@ fn lower_first(title: &str) -> String {
         .map_or(String::new(), |c| c.to_lowercase().chain(letters).collect())
 }
 
-fn second_cell(cell: &SecondCell) -> Vec<Section> {
+fn second_cell(cell: &SecondCell) -> Vec<ReportSection> {
     let mut frfs = structure_section::frf_section(cell.before);
     frfs.blocks
         .insert(0, paragraph(structure_section::summary(cell.before)));
@@ -232,11 +233,11 @@ fn contents(findings: &CampaignFindings) -> String {
     if parts.is_empty() {
         parts.push("a model alone, nothing measured".into());
     }
-    super::parts::listed(&parts)
+    super::words::listed(&parts)
 }
 
 /// Every part that the campaign holds, in the order of the story.
-fn parts(findings: &CampaignFindings) -> Vec<Section> {
+fn parts(findings: &CampaignFindings) -> Vec<ReportSection> {
     let mut sections = Vec::new();
     match &findings.structure {
         Some(Ok(structure)) => sections.extend(structure_section::sections(structure)),
@@ -277,7 +278,7 @@ fn parts(findings: &CampaignFindings) -> Vec<Section> {
     sections
 }
 
-fn summary(findings: &CampaignFindings) -> Section {
+fn summary(findings: &CampaignFindings) -> ReportSection {
     let mistakes = findings
         .setup
         .iter()
@@ -312,11 +313,11 @@ fn summary(findings: &CampaignFindings) -> Section {
         .map(|e| Block::Warning(format!("A part is missing from this report. {e}")));
     blocks.extend(lost);
     blocks.extend(warnings(findings).into_iter().map(Block::Warning));
-    Section {
+    ReportSection {
         id: "summary".into(),
         title: "Summary".into(),
         blocks,
-        ..Section::default()
+        ..ReportSection::default()
     }
 }
 

@@ -12,15 +12,19 @@ pub const BEST: usize = 10;
 pub struct LobeCase {
     /// `None` where the FRF belongs to no posture (modes from the campaign file).
     pub posture: Option<String>,
+    /// Redundancy angle, °; `None` where the posture stands as it is.
     pub angle_deg: Option<f64>,
     /// For people: where the FRF comes from.
     pub description: String,
     /// Where chatter was sought, Hz.
     pub band_hz: (f64, f64),
+    /// Depth limit over spindle speed.
     pub curve: LobeCurve,
+    /// The limit that holds at every speed; `None` where no depth chatters.
     pub absolute: Option<AbsoluteLimit>,
     /// Drilling with both blocks: the limits of the lateral and of the axial–torsional one alone.
     pub by_block: Option<[BlockLobes; 2]>,
+    /// The deepest places between the lobes, deepest first.
     pub best: Vec<Peak>,
     /// From the uncertainty of the calibrated parameters; averaged forces only.
     pub band: Option<LobeBand>,
@@ -45,6 +49,8 @@ impl LobeCase {
 /// Lobes of the baseline (revision 0), fitted to the same data as the model with its effects.
 #[derive(Debug, Clone)]
 pub struct LobesBefore {
+    /// Depth limit over spindle speed.
     pub curve: LobeCurve,
+    /// The limit that holds at every speed; `None` where no depth chatters.
     pub absolute: Option<AbsoluteLimit>,
 }

@@ -26,10 +26,15 @@ const SAME: f64 = 0.005;
 /// All lobes of a campaign.
 #[derive(Debug, Clone)]
 pub struct LobeAnalysis {
+    /// What is cut, and how.
     pub process: Process,
+    /// Where the FRFs come from.
     pub source: LobeSource,
+    /// How the limit is computed.
     pub method: LobeMethod,
+    /// Cutting force coefficients.
     pub coefficients: LobeCoefficients,
+    /// Number of cutting edges.
     pub teeth: usize,
     /// The axial–torsional block of a drill, or why it is left out, in words for people; `None` in milling.
     pub axial_torsional: Option<std::result::Result<(), String>>,
@@ -37,7 +42,9 @@ pub struct LobeAnalysis {
     pub drilled: Option<DrilledHole>,
     /// The tool as a beam; without segments where it is rigid or part of the FRFs.
     pub tool: Arc<Tool>,
+    /// First and last spindle speed and the step, rpm.
     pub spindle_rpm: [f64; 3],
+    /// The lobes of each posture, or of each redundancy angle.
     pub cases: Vec<LobeCase>,
     /// Where the campaign asks for the surface over the redundancy angle: its angles are the cases.
     pub redundancy: Option<RedundancyAnalysis>,
@@ -50,6 +57,7 @@ pub struct LobeAnalysis {
     /// The forces on the tool and the tolerances behind the cases' `hole`, or why there are none; `None` where lobes do
     /// not come from the model.
     pub hole: Option<std::result::Result<HoleCheck, String>>,
+    /// What was noticed while reading, fitting and computing.
     pub warnings: Vec<String>,
 }
 

@@ -30,7 +30,7 @@ mod shard;
 pub mod stick_shapes;
 pub mod structure;
 pub mod sweep;
-pub mod thesis_findings;
+pub(crate) mod thesis_findings;
 
 pub use addition::Addition;
 pub use campaign::{CampaignFindings, LobeFindings, PostureFindings, StructureFindings};
@@ -45,4 +45,4 @@ pub use redundancy::{HoleWeighing, RedundancyAnalysis};
 pub use shard::Shard;
 pub use structure::StructureAnalysis;
 pub use sweep::{Sweep, SweepRequest, SweepRow};
-pub use thesis_findings::ThesisFindings;
+pub(crate) use thesis_findings::ThesisFindings;

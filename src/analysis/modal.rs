@@ -18,12 +18,14 @@ use crate::{Error, InputError, Result};
 /// Name of the set that files together make.
 pub const TOGETHER: &str = "all files";
 
+/// Modes of measured FRFs, set by set.
 #[derive(Debug, Clone, Default)]
 pub struct ModalAnalysis {
     /// In the order of the inputs; sets without FRFs are left out.
     pub sets: Vec<SetModes>,
     /// Hits of the raw records among the inputs, by file.
     pub hits: Vec<(String, Vec<Hit>)>,
+    /// What was noticed while reading and fitting.
     pub warnings: Vec<String>,
 }
 
@@ -182,6 +184,7 @@ impl ModalAnalysis {
         })
     }
 
+    /// Modes of all sets together.
     pub fn mode_count(&self) -> usize {
         self.sets.iter().map(|s| s.global.modes.len()).sum()
     }

@@ -14,13 +14,17 @@ use crate::modal::{self, FrfModes, GlobalModes, SetMember, Settings};
 /// One FRF to analyse.
 #[derive(Debug, Clone)]
 pub struct FrfInput {
+    /// For people, and to tell one FRF of the set from another.
     pub name: String,
     /// Posture or file: FRFs of one set share their modes.
     pub set: String,
     /// Response and reference, as text that is equal where the degree of freedom is.
     pub dofs: Option<[String; 2]>,
+    /// Lines, ascending.
     pub frequency_hz: Vec<f64>,
+    /// By line.
     pub receptance_m_per_n: Vec<Complex64>,
+    /// By line, 0 to 1; `None` where the file has none.
     pub coherence: Option<Vec<f64>>,
     /// What an exponential window added to ζω of every mode; taken out of the results.
     pub added_decay_per_s: f64,
@@ -29,19 +33,26 @@ pub struct FrfInput {
 /// One FRF and what was found in it.
 #[derive(Debug, Clone)]
 pub struct AnalysedFrf {
+    /// The FRF.
     pub input: FrfInput,
+    /// Modes found in this FRF alone.
     pub modes: FrfModes,
+    /// How far it can be trusted.
     pub quality: Quality,
 }
 
 /// One posture or file.
 #[derive(Debug, Clone)]
 pub struct SetModes {
+    /// The posture or file.
     pub set: String,
+    /// In the order of the inputs.
     pub frfs: Vec<AnalysedFrf>,
     /// Degrees of freedom by the numbers that [`modal::GlobalMode::shape`] uses.
     pub dofs: Vec<String>,
+    /// The modes that all FRFs share.
     pub global: GlobalModes,
+    /// How far the set can be trusted: the worse of its FRFs and of the shared fit.
     pub verdict: Verdict,
     /// The verdict in words.
     pub why: String,

@@ -31,12 +31,18 @@ pub struct ShapeComparison {
     pub model_frequency_hz: Vec<f64>,
 }
 
+/// A measured mode and the model's that is most like it.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct ShapePair {
+    /// Number of the measured mode, from 0.
     pub measured: usize,
+    /// Number of the model's mode, from 0.
     pub model: usize,
+    /// Measured frequency, Hz.
     pub measured_hz: f64,
+    /// The model's frequency, Hz.
     pub model_hz: f64,
+    /// Likeness of the shapes, 0 to 1.
     pub mac: f64,
     /// Model over measured frequency, less one.
     pub frequency_error: f64,

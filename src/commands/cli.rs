@@ -63,6 +63,7 @@ pub(super) enum ColorChoice {
     Never,
 }
 
+/// The program's command line, as clap reads it.
 #[derive(Parser)]
 #[command(name = "lobestone", version, about, long_about = None, help_template = TEMPLATE, after_help = GROUPS)]
 pub struct Cli {
@@ -138,6 +139,10 @@ pub(super) enum Command {
     Man(shell::ManArgs),
 }
 
+/// Does what the command line says and hands back the answer.
+///
+/// # Errors
+/// What the command reports: bad input, a file that cannot be read or written, a fit that fails.
 pub fn run(cli: Cli) -> Result<Outcome> {
     if let Some(jobs) = cli.jobs {
         rayon::ThreadPoolBuilder::new()

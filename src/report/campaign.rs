@@ -22,7 +22,7 @@ const TABLES: &str = "tables";
 
 /// What [`write()`] left on the disk.
 #[derive(Debug, Clone)]
-pub struct ReportFiles {
+pub(crate) struct ReportFiles {
     pub html: PathBuf,
     pub images: Vec<PathBuf>,
     /// Empty where the program was built without the feature `parquet`.
@@ -33,7 +33,7 @@ pub struct ReportFiles {
 ///
 /// # Errors
 /// What the file system refuses, naming the file.
-pub fn write(page: &Page, findings: &CampaignFindings, folder: &Path) -> Result<ReportFiles> {
+pub(crate) fn write(page: &Page, findings: &CampaignFindings, folder: &Path) -> Result<ReportFiles> {
     #[cfg(feature = "parquet")]
     let tables = super::tables::tables(findings)?;
     #[cfg(not(feature = "parquet"))]
@@ -132,10 +132,10 @@ fn cards(findings: &CampaignFindings) -> Vec<VerdictCard> {
 }
 
 /// A step of the demo as its page tells it: name, what it found, what to type for the same.
-pub type StepRow = [String; 3];
+pub(crate) type StepRow = [String; 3];
 
 /// The demo's second campaign.
-pub struct SecondCell<'a> {
+pub(crate) struct SecondCell<'a> {
     pub campaign: &'a Campaign,
     /// The model without what is missing.
     pub before: &'a StructureFindings,
@@ -145,7 +145,7 @@ pub struct SecondCell<'a> {
 }
 
 /// The demo's page: a campaign that the model explains, and one that it does not.
-pub fn demo_page(findings: &CampaignFindings, second: &SecondCell, steps: &[StepRow]) -> Page {
+pub(crate) fn demo_page(findings: &CampaignFindings, second: &SecondCell, steps: &[StepRow]) -> Page {
     // Most of the work is drawing figures.
     let (mut page, second_sections) = rayon::join(|| page(findings, None), || second_cell(second));
     page.title = "Lobestone demo".into();

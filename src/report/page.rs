@@ -21,9 +21,12 @@ use crate::{Error, Result};
 /// Name of the HTML file in the report's folder.
 pub const HTML_NAME: &str = "report.html";
 
+/// An HTML page: cards and sections.
 #[derive(Debug, Clone, Default)]
 pub struct Page {
+    /// In the browser's tab and at the top.
     pub title: String,
+    /// Below the title.
     pub subtitle: String,
     /// Where the page comes from: name and value, such as the date and the program's version.
     pub origin: Vec<(String, String)>,
@@ -31,6 +34,7 @@ pub struct Page {
     pub opening: String,
     /// The answers, before all sections.
     pub cards: Vec<VerdictCard>,
+    /// What follows the cards, in order.
     pub sections: Vec<ReportSection>,
     /// How many sections stand open; of the others a reader sees the titles and opens what he wants. `None`: all.
     pub open_sections: Option<usize>,
@@ -41,6 +45,7 @@ pub struct Page {
 /// What [`Page::write`] left on the disk.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct WrittenPage {
+    /// The HTML file.
     pub html: PathBuf,
     /// In the order of the page.
     pub images: Vec<PathBuf>,
@@ -400,6 +405,7 @@ fn png_size(png: &[u8]) -> (u32, u32) {
 mod tests {
     use super::*;
     use crate::report::figure::HeatMap;
+    use crate::report::{Fold, TableColumn};
 
     #[test]
     fn what_stands_between_backticks_is_code_and_everything_is_escaped() {

@@ -8,9 +8,11 @@ use crate::{Error, InputError, Result};
 /// A list of campaigns.
 #[derive(Debug, Clone)]
 pub struct Manifest {
+    /// The file that the list was read from.
     pub file: PathBuf,
     /// Names of the columns besides `campaign`, in lower case, in their order.
     pub columns: Vec<String>,
+    /// The campaigns, in the order of the lines.
     pub entries: Vec<ManifestEntry>,
 }
 
@@ -21,6 +23,7 @@ pub struct ManifestEntry {
     pub line: usize,
     /// As written; forward slashes.
     pub campaign: String,
+    /// The campaign's folder.
     pub dir: PathBuf,
     /// Cells of [`Manifest::columns`].
     pub cells: Vec<String>,

@@ -49,6 +49,7 @@ impl BatchStep {
 pub struct Steps(Vec<BatchStep>);
 
 impl Steps {
+    /// `steps` in the one order, without repetitions.
     pub fn new(mut steps: Vec<BatchStep>) -> Self {
         steps.sort_unstable();
         steps.dedup();
@@ -73,11 +74,14 @@ pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
+    /// All of it.
     Done,
+    /// It ended with an error.
     Failed,
 }
 
 impl Status {
+    /// As tables name it.
     pub fn name(self) -> &'static str {
         match self {
             Status::Done => "done",
@@ -91,7 +95,9 @@ impl Status {
 pub struct BatchQuantity {
     /// With its unit: `joint-1.stiffness_nm_per_rad`.
     pub name: String,
+    /// The estimate; `None` where it is not finite.
     pub value: Option<f64>,
+    /// Its standard error, in the same unit.
     pub std_error: Option<f64>,
 }
 
@@ -100,28 +106,38 @@ pub struct BatchQuantity {
 pub struct SideResult {
     /// `structure` or `cutting`; empty where the campaign could not be read.
     pub domain: String,
+    /// Whether the work was done.
     pub status: Status,
+    /// Why it was not.
     pub error: Option<String>,
+    /// What it took, s.
     pub seconds: f64,
+    /// What was found; empty after an error.
     pub findings: Findings,
 }
 
 /// Nothing where it was not asked for.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Findings {
-    /// Error of the fit and of the noise alone, as ratios.
+    /// Error of the fit, a ratio.
     pub nrms: Option<f64>,
+    /// nrms that the noise alone makes.
     pub noise: Option<f64>,
+    /// nrms on data that were left out of the fit.
     pub held_out_nrms: Option<f64>,
+    /// Whether the calibration converged.
     pub converged: Option<bool>,
     /// `effect`, `none`, `unknown`.
     pub verdict: Option<String>,
+    /// The missing effect, where the verdict is `effect`.
     pub effect: Option<String>,
+    /// Where it sits, for effects that have a place.
     pub site: Option<String>,
     /// 0..1.
     pub confidence: Option<f64>,
     /// Mistakes of the files or the setup that are likely.
     pub setup: Vec<String>,
+    /// Estimated parameters or coefficients.
     pub quantities: Vec<BatchQuantity>,
 }
 
@@ -130,13 +146,17 @@ pub struct Findings {
 pub struct Record {
     /// As the manifest names it.
     pub campaign: String,
+    /// As [`fingerprint`] of the campaign when it was worked on.
     pub fingerprint: String,
+    /// Of the program that made the record.
     pub version: String,
     /// `calibrate,diagnose`.
     pub command: String,
     /// What `campaign.toml` says, for a manifest that does not.
     pub robot: Option<String>,
+    /// Date of the measurements by `campaign.toml`, likewise.
     pub date: Option<String>,
+    /// One for each side of the campaign.
     pub sides: Vec<SideResult>,
 }
 

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use num_complex::Complex64;
 
 use super::*;
+use crate::Error;
 
 /// A deterministic stand-in for noise, −1 … 1.
 pub fn jitter(i: usize) -> f64 {

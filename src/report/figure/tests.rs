@@ -6,6 +6,7 @@ use num_complex::Complex64;
 
 use super::samples::{frf_figure, gallery, jitter};
 use super::*;
+use crate::Error;
 
 /// Width, height and number of distinct colours.
 fn decoded(png: &[u8]) -> (u32, u32, usize) {

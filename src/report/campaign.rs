@@ -7,7 +7,7 @@ use super::words::count;
 use super::{
     Block, Page, ReportSection, ReportTable, TableColumn, VerdictCard, cutting_section, diagnosis_section,
     error_map_section, history_section, lobes_section, modal_section, structure_section, thesis_section,
-    verdict_words, waveform_section,
+    verdict_card, waveform_section,
 };
 use crate::Result;
 use crate::analysis::{CampaignFindings, DiagnosisFindings, StructureFindings, ThesisFindings};
@@ -106,7 +106,7 @@ fn cards(findings: &CampaignFindings) -> Vec<VerdictCard> {
     let mut cards = Vec::new();
     if structure.is_some() || findings.diagnosis().is_some() {
         let files = of_side(findings.diagnosis().map(|d| &d.setup));
-        cards.extend(verdict_words::structure(
+        cards.extend(verdict_card::structure(
             campaign,
             &files,
             structure,
@@ -114,14 +114,14 @@ fn cards(findings: &CampaignFindings) -> Vec<VerdictCard> {
         ));
     }
     if let Some(found) = cutting {
-        cards.push(verdict_words::cutting(
+        cards.push(verdict_card::cutting(
             campaign,
             &of_side(Some(&found.setup)),
             found,
         ));
     } else if let Some(result) = findings.cutting() {
         let summary = cutting_section::summary(result);
-        cards.push(verdict_words::coefficients(
+        cards.push(verdict_card::coefficients(
             campaign,
             summary,
             &of_side(None),
@@ -153,7 +153,7 @@ pub(crate) fn demo_page(findings: &CampaignFindings, second: &SecondCell, steps:
     page.opening = "Something was hidden in one of two simulated cells, and the program was not told what. This is what it \
                     found:"
         .into();
-    page.cards = verdict_words::structure(second.campaign, &[], None, Some(second.diagnosis))
+    page.cards = verdict_card::structure(second.campaign, &[], None, Some(second.diagnosis))
         .into_iter()
         .collect();
     for section in &mut page.sections {

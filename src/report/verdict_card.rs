@@ -1,120 +1,680 @@
-//! The answer at a glance: what is missing, where, how big, how sure, what it does to the error, how to check it in the
-//! laboratory, what to do next. One card for each side of the campaign, first on its page.
+//! The cards of a campaign: what its diagnosis says, put into the words of a [`VerdictCard`].
 
+use super::card::{BeforeAfter, ErrorBar, Tone, VerdictCard};
+use super::number::{percent, plus_minus, significant};
 use super::picture::Picture;
+use super::words;
+use super::words::frf_name;
+use super::words::listed;
+use crate::analysis::{CuttingFindings, DiagnosisFindings, StructureFindings};
+use crate::campaign::{Campaign, Process};
+use crate::discrepancy::diagnose::Baseline;
+use crate::discrepancy::localise::Localisation;
+use crate::discrepancy::setup::SetupFinding;
+use crate::discrepancy::verdict::is_noise;
+use crate::discrepancy::{Candidate, CutError, Diagnosis, Verdict};
+use crate::effects::Instance;
+use crate::effects::cutting::CuttingInstance;
+use crate::identify::cutting_waves::courses;
+use crate::identify::{CutFit, Estimate};
 
-/// How a card is coloured, and the word at its corner.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Tone {
-    /// Physics is missing, and it has a name.
-    Missing,
-    /// Nothing is missing.
-    Clean,
-    /// Something is missing, or may be, without a name.
-    Open,
-    /// The files come first.
-    Files,
+const ROBOT: &str = "Robot against FRFs";
+const FORCES: &str = "Cutting forces";
+/// Parameters told on a card.
+const SIZES: usize = 4;
+
+/// An effect as a card calls it.
+struct Named {
+    /// `local resonator on link 3 (direction y)`.
+    title: String,
+    explanation: &'static str,
+    lab_check: &'static str,
 }
 
-impl Tone {
-    pub fn name(self) -> &'static str {
-        match self {
-            Tone::Missing => "missing",
-            Tone::Clean => "clean",
-            Tone::Open => "open",
-            Tone::Files => "files",
+fn named(instance: &Instance) -> Named {
+    let effect = instance.effect;
+    let mut title = words::effect(effect.id());
+    if let Some(place) = words::place(instance.site) {
+        title += &format!(" {place}");
+    }
+    if let Some((key, value)) = effect.variant_label(instance.variant) {
+        title += &format!(" ({key} {value})");
+    }
+    Named {
+        title,
+        explanation: effect.explanation(),
+        lab_check: effect.background().lab_check,
+    }
+}
+
+fn named_cutting(instance: &CuttingInstance) -> Named {
+    let effect = instance.effect;
+    let mut title = words::effect(effect.id());
+    if let Some((key, value)) = effect.variant_label(instance.variant) {
+        title += &format!(" ({} {value})", key.replace('_', " "));
+    }
+    Named {
+        title,
+        explanation: effect.explanation(),
+        lab_check: effect.background().lab_check,
+    }
+}
+
+/// `mass 5.9 ± 0.3 kg, frequency 31.2 ± 0.1 Hz`.
+pub fn sizes(parameters: &[Estimate]) -> String {
+    let one = |p: &Estimate| {
+        let unit = if p.unit == "1" { "" } else { p.unit };
+        let name = words::parameter(&p.name);
+        let stuck = if p.at_bound { " (end of its range)" } else { "" };
+        format!("{name} {}{stuck}", plus_minus(p.value, p.std_error, unit))
+    };
+    let mut shown: Vec<String> = parameters.iter().take(SIZES).map(one).collect();
+    if parameters.len() > SIZES {
+        shown.push(format!("{} more", parameters.len() - SIZES));
+    }
+    shown.join(", ")
+}
+
+/// Headline, explanation, facts and check of a verdict.
+fn answer<M, I>(
+    d: &Diagnosis<M, I>,
+    added: &[String],
+    data: &str,
+    lead: Option<&Localisation>,
+    name: impl Fn(&Candidate<M, I>) -> Named,
+) -> VerdictCard {
+    let mut card = VerdictCard::default();
+    let label_in_words = |label: &String| {
+        let of = d.candidates.iter().find(|c| c.label() == *label);
+        of.map_or_else(|| label.clone(), |c| name(c).title)
+    };
+    match (d.verdict, d.winner()) {
+        (Verdict::Effect, Some(winner)) => {
+            let of = name(winner);
+            card.tone = Tone::Missing;
+            card.headline = format!("Missing: {}", of.title);
+            card.explanation = of.explanation.into();
+            card.facts.push(("How big", sizes(&winner.parameters)));
+            card.check = Some(of.lab_check.into());
+            if let Some(left) = winner.rest.as_ref().and_then(|r| r.excuse_in_words()) {
+                let share = 100.0 * winner.share_above_noise(&d.baseline);
+                card.explanation += &format!(
+                    " It explains {share:.0} % of what stands above the noise; what it leaves is {left}."
+                );
+            }
         }
-    }
-}
-
-/// Errors (nrms) of the model from one step to the next, and the noise.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct ErrorBar {
-    /// What the model is, and its error; in the order of the steps.
-    pub steps: Vec<(String, f64)>,
-    pub noise: f64,
-}
-
-/// Models in a picture, and the sentence under it.
-#[derive(Debug, Clone, Default)]
-pub struct BeforeAfter {
-    pub picture: Picture,
-    pub before: String,
-    /// `None` where there is one model only.
-    pub after: Option<String>,
-    pub caption: String,
-}
-
-/// What a reader should know in a minute.
-#[derive(Debug, Clone)]
-pub struct VerdictCard {
-    /// Anchor.
-    pub id: &'static str,
-    /// What was looked at: `Robot against FRFs`.
-    pub side: &'static str,
-    pub tone: Tone,
-    pub headline: String,
-    pub explanation: String,
-    /// Name and value, such as where and how big.
-    pub facts: Vec<(&'static str, String)>,
-    pub bar: Option<ErrorBar>,
-    pub curves: Option<BeforeAfter>,
-    /// In the laboratory, without this program.
-    pub check: Option<String>,
-    /// With commands between backticks.
-    pub next: String,
-    /// What was guessed or noticed while the files were read.
-    pub remarks: Vec<String>,
-}
-
-impl Default for VerdictCard {
-    fn default() -> Self {
-        VerdictCard {
-            id: "verdict",
-            side: "",
-            tone: Tone::Open,
-            headline: String::new(),
-            explanation: String::new(),
-            facts: Vec::new(),
-            bar: None,
-            curves: None,
-            check: None,
-            next: String::new(),
-            remarks: Vec::new(),
+        (Verdict::None, _) => {
+            card.tone = Tone::Clean;
+            nothing(&mut card, &d.baseline, added, data);
         }
+        _ if d.too_little_data.is_some() => {
+            card.headline = "No verdict: too few data for one".into();
+            card.explanation = sentence(d.too_little_data.as_deref().unwrap_or_default());
+        }
+        _ => unknown(&mut card, d, lead, &name),
+    }
+    if d.too_little_data.is_none() {
+        card.facts.push(("How sure", words::confidence(d.confidence)));
+    }
+    if !d.indistinguishable.is_empty() {
+        let rivals: Vec<String> = d.indistinguishable.iter().map(label_in_words).collect();
+        card.facts.push((
+            "Not told from",
+            format!("{}: these data fit both", listed(&rivals)),
+        ));
+    }
+    if let Some(companion) = &d.companion {
+        card.facts.push((
+            "Likely besides",
+            format!("a second effect: {}", label_in_words(companion)),
+        ));
+    }
+    card
+}
+
+fn nothing(card: &mut VerdictCard, baseline: &Baseline, added: &[String], data: &str) {
+    let more = if added.is_empty() { "" } else { " more" };
+    (card.headline, card.explanation) = match baseline.rest.excuse_in_words() {
+        Some(left) => (
+            format!("Nothing{more} stands above the small errors of the setup"),
+            format!(
+                "What stands above the noise is {left}. An effect smaller than that cannot be seen in these {data}."
+            ),
+        ),
+        None => (
+            format!("Nothing{more} is missing"),
+            format!("What the model leaves of these {data} looks like their own noise."),
+        ),
+    };
+    if !added.is_empty() {
+        card.explanation += &format!(" The model has what was added: {}.", listed(added));
     }
 }
 
-impl ErrorBar {
-    /// The largest value: the bar's end.
-    fn top(&self) -> f64 {
-        let all = self.steps.iter().map(|s| s.1).chain([self.noise]);
-        all.filter(|v| v.is_finite()).fold(0.0, f64::max)
+fn unknown<M, I>(
+    card: &mut VerdictCard,
+    d: &Diagnosis<M, I>,
+    lead: Option<&Localisation>,
+    name: &impl Fn(&Candidate<M, I>) -> Named,
+) {
+    let drawn = lead.and_then(|found| {
+        let place = found.places.first()?;
+        Some((place, place.best.as_ref()?))
+    });
+    card.explanation = "What is left is real, but no effect that this program knows explains it.".into();
+    card.headline = match drawn {
+        Some((place, best)) => {
+            card.explanation += &format!(
+                " Without a name for it, the data still draw what it does and where: a {} {}.",
+                best.form.label().replace('-', " "),
+                place.spot.words()
+            );
+            card.facts.push(("How big", sizes(&best.parameters)));
+            if !place.tied_with.is_empty() {
+                card.facts.push(("Or at", listed(&place.tied_with)));
+            }
+            format!("Something unknown {}", place.spot.words())
+        }
+        None => "Something is missing that has no name here".into(),
+    };
+    let guess = d.best_guess.and_then(|i| d.candidates.get(i));
+    if let (Some(guess), Some(words)) = (guess, d.best_guess_in_words()) {
+        let of = name(guess);
+        let words = words.strip_prefix("Best guess: ").unwrap_or(&words);
+        card.facts
+            .push(("Best guess", words.replacen(&guess.label(), &of.title, 1)));
+        card.check = Some(format!("Of the best guess ({}): {}", of.title, of.lab_check));
     }
+}
 
-    /// Each step and then the noise as a share of the bar, 0 … 100.
-    pub fn shares(&self) -> Vec<f64> {
-        let top = self.top();
-        let all = self.steps.iter().map(|s| s.1).chain([self.noise]);
-        all.map(|v| match top > 0.0 && v.is_finite() {
-            true => 100.0 * v / top,
-            false => 0.0,
-        })
-        .collect()
+/// The first letter large, a full stop at the end.
+fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().map(|c| c.to_uppercase().collect::<String>());
+    let text = first.unwrap_or_default() + letters.as_str();
+    match text.ends_with('.') {
+        true => text,
+        false => text + ".",
     }
+}
+
+/// The files before the physics: turns the card into one that says what is wrong with them.
+fn files_first(card: &mut VerdictCard, findings: &[&SetupFinding]) {
+    let Some(first) = findings.first() else { return };
+    let physics = std::mem::take(&mut card.headline);
+    card.headline = format!(
+        "Your files first: {} ({})",
+        words::effect(first.kind),
+        first.place
+    );
+    card.explanation = match card.tone {
+        Tone::Missing => format!(
+            "A file or a setting looks wrong, which the model cannot make up for. If it is right after all, the answer \
+             is: {physics}."
+        ),
+        _ => "A file or a setting looks wrong. Which physics is missing cannot be told before it is right."
+            .into(),
+    };
+    let mut facts = Vec::new();
+    for finding in findings {
+        let size = match (finding.value, finding.std_error) {
+            (Some(value), error) => format!(
+                "{}. ",
+                plus_minus(
+                    value,
+                    error.unwrap_or(f64::NAN),
+                    if finding.unit == "1" { "" } else { finding.unit }
+                )
+            ),
+            (None, _) => String::new(),
+        };
+        facts.push((
+            "What is wrong",
+            format!(
+                "{} ({}): {size}{}, {}",
+                words::effect(finding.kind),
+                finding.place,
+                words::confidence(finding.confidence),
+                finding.remedy
+            ),
+        ));
+    }
+    if card.tone != Tone::Missing {
+        card.facts.clear();
+        card.check = None;
+    }
+    facts.append(&mut card.facts);
+    card.facts = facts;
+    card.tone = Tone::Files;
+    card.next = format!("{} Then run the same command again.", sentence(&first.remedy));
+}
+
+/// The robot's side; `files`: likely mistakes of the setup. `None` where no model could be fitted.
+pub fn structure(
+    campaign: &Campaign,
+    files: &[SetupFinding],
+    structure: Option<&StructureFindings>,
+    diagnosis: Option<&DiagnosisFindings>,
+) -> Option<VerdictCard> {
+    let case = diagnosis
+        .map(|d| &d.case)
+        .or_else(|| structure.map(|s| &s.analysis.case))?;
+    let added: Vec<String> = case
+        .model
+        .effects()
+        .iter()
+        .map(|a| named(&a.instance).title)
+        .collect();
+    let dir = campaign.dir.display();
+    let mut card = match (diagnosis, structure) {
+        (Some(found), _) => {
+            let d = &found.diagnosis;
+            let mut card = answer(d, &added, "FRFs", found.lead.as_ref(), |c| named(&c.instance));
+            if let Some(leading) = &found.leading {
+                let place = leading.explained.taken_from.words();
+                card.facts
+                    .insert(0, ("Where it shows", place.trim_start_matches("at ").into()));
+            }
+            card.next = match (d.verdict, d.winner(), &found.lead) {
+                (Verdict::Effect, Some(winner), _) if d.indistinguishable.is_empty() => format!(
+                    "make the check, then add it and fit everything anew: `lobestone add {dir} {}`",
+                    winner.label()
+                ),
+                (Verdict::Effect, Some(winner), _) => format!(
+                    "tell the rivals apart first: {}. Then `lobestone add {dir} {}`",
+                    found.next_measurement,
+                    winner.label()
+                ),
+                (Verdict::None, ..) => use_it(campaign),
+                (_, _, Some(lead)) => match lead.places.first().and_then(|p| p.best.as_ref()) {
+                    Some(best) => format!(
+                        "look at what the data draw: `lobestone localise {dir}`; to put it into the model: `lobestone add \
+                         {dir} {}`",
+                        best.instance.label()
+                    ),
+                    None => format!("{}", found.next_measurement),
+                },
+                _ => format!("{}", found.next_measurement),
+            };
+            card
+        }
+        (None, Some(s)) => not_asked(s.analysis.calibration.reduced_chi2, &added, &dir.to_string()),
+        (None, None) => return None,
+    };
+    card.next = sentence(&card.next);
+    card.side = ROBOT;
+    card.bar = Some(error_bar(structure, diagnosis, &added));
+    card.curves = frf(structure, diagnosis);
+    if let (None, [.., last]) = (&card.check, case.model.effects()) {
+        card.check = Some(last.instance.effect.background().lab_check.to_string())
+            .filter(|_| card.tone == Tone::Clean || diagnosis.is_none());
+    }
+    card.remarks = case.warnings.clone();
+    files_first(&mut card, &files.iter().collect::<Vec<_>>());
+    Some(card)
+}
+
+/// Where nobody looked for what is missing.
+fn not_asked(reduced_chi2: f64, added: &[String], dir: &str) -> VerdictCard {
+    let mut card = VerdictCard::default();
+    let noise = is_noise(reduced_chi2);
+    card.headline = match (added, noise) {
+        ([], true) => "Hardly more than noise is left".into(),
+        ([], false) => "What is left is not noise: physics is missing, or a file is wrong".into(),
+        (some, true) => format!("The model has {}: hardly more than noise is left", listed(some)),
+        (some, false) => format!("The model has {}, and more than noise is left", listed(some)),
+    };
+    card.explanation = match added {
+        [] => "The model was fitted; what it may lack was not looked for.".into(),
+        _ => "Whether more is missing was not looked for since.".into(),
+    };
+    if noise {
+        card.tone = Tone::Clean;
+    }
+    card.next = format!("learn what is missing: `lobestone diagnose {dir}`");
+    card
+}
+
+fn use_it(campaign: &Campaign) -> String {
+    let dir = campaign.dir.display();
+    match campaign.lobes {
+        Some(_) => format!("use the model: `lobestone lobes {dir}` gives the stable depths of cut"),
+        None => "use the model; with a [lobes] table in campaign.toml there are stability lobes, too".into(),
+    }
+}
+
+fn error_bar(
+    structure: Option<&StructureFindings>,
+    diagnosis: Option<&DiagnosisFindings>,
+    added: &[String],
+) -> ErrorBar {
+    let mut bar = ErrorBar::default();
+    let first = structure.and_then(|s| s.earlier.first());
+    let now = match (diagnosis, structure) {
+        (Some(d), _) => d.now.totals,
+        (None, Some(s)) => s.analysis.after.totals,
+        (None, None) => return bar,
+    };
+    bar.noise = now.noise_floor_nrms;
+    let leading = diagnosis.and_then(|d| Some((d, d.leading.as_ref()?)));
+    match (added, first, leading) {
+        ([], _, None) => {
+            let robot_file = structure.map(|s| s.analysis.before.totals.nrms);
+            bar.steps
+                .extend(robot_file.map(|nrms| ("robot file".to_string(), nrms)));
+        }
+        ([_, ..], Some(first), _) => {
+            bar.steps
+                .push(("calibrated, nothing added".into(), first.comparison.totals.nrms));
+        }
+        _ => {}
+    }
+    let name = match added {
+        [] => "calibrated".to_string(),
+        some => format!("with {}", listed(some)),
+    };
+    bar.steps.push((name, now.nrms));
+    if let Some((d, leading)) = leading {
+        let name = with_candidate(d.diagnosis.verdict);
+        bar.steps.push((name.into(), leading.comparison.totals.nrms));
+    }
+    bar
+}
+
+/// What the model with the leading candidate is called.
+fn with_candidate(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Effect => "with what is missing",
+        _ => "with the best guess",
+    }
+}
+
+/// The FRF that stands out most, without and with what is missing (or was added).
+fn frf(structure: Option<&StructureFindings>, diagnosis: Option<&DiagnosisFindings>) -> Option<BeforeAfter> {
+    let (data, before, after) = match (diagnosis, structure) {
+        (Some(d), _) if d.leading.is_some() => {
+            let leading = d.leading.as_ref()?;
+            let with = with_candidate(d.diagnosis.verdict);
+            (
+                &d.case.data,
+                (&d.predicted, &d.now, "as it stands"),
+                Some((&leading.predicted, &leading.comparison, with)),
+            )
+        }
+        (_, Some(s)) => {
+            let a = &s.analysis;
+            let now = |name| (&a.calibrated, &a.after, name);
+            match s.earlier.first() {
+                Some(first) if !a.case.model.effects().is_empty() => (
+                    &a.case.data,
+                    (&first.predicted, &first.comparison, "nothing added"),
+                    Some(now("as it is now")),
+                ),
+                _ => (
+                    &a.case.data,
+                    (&a.nominal, &a.before, "robot file"),
+                    Some(now("calibrated")),
+                ),
+            }
+        }
+        (Some(d), None) => (&d.case.data, (&d.predicted, &d.now, "calibrated"), None),
+        (None, None) => return None,
+    };
+    let index = before.1.worst_first().into_iter().next()?;
+    let (block, frf) = data.frfs().nth(index)?;
+    let error = before.1.frf_errors.get(index)?;
+    let name = frf_name(&error.posture, &error.name);
+    let magnitudes = |curves: &Vec<Vec<num_complex::Complex64>>| -> Option<Vec<f64>> {
+        Some(curves.get(index)?.iter().map(|v| v.norm()).collect())
+    };
+    let mut caption = format!(
+        "The FRF that stands out most: {name}. Error {}",
+        percent(error.nrms)
+    );
+    if let Some((_, comparison, _)) = &after {
+        caption += &format!(" → {}", percent(comparison.frf_errors.get(index)?.nrms));
+    }
+    caption += &format!(", noise {}.", percent(error.noise_floor_nrms));
+    let picture = Picture {
+        alt: caption.clone(),
+        x_label: "Frequency (Hz)".into(),
+        y_label: "Receptance".into(),
+        unit: "m/N".into(),
+        log: true,
+        x: block.frequency_hz.clone(),
+        measured: frf.receptance.iter().map(|v| v.norm()).collect(),
+        before: magnitudes(before.0),
+        after: after.as_ref().and_then(|(curves, ..)| magnitudes(curves)),
+        noise: Some(frf.noise_std.clone()),
+        shaded: diagnosis
+            .and_then(|d| d.leading.as_ref())
+            .map(|l| [l.explained.taken_from.from_hz, l.explained.taken_from.to_hz]),
+    };
+    Some(BeforeAfter {
+        picture,
+        before: before.2.into(),
+        after: after.map(|(_, _, name)| name.into()),
+        caption,
+    })
+}
+
+/// The cutting side, as far as it was diagnosed.
+pub fn cutting(campaign: &Campaign, files: &[SetupFinding], found: &CuttingFindings) -> VerdictCard {
+    let d = &found.diagnosis;
+    let effects = found.case.model.effects();
+    let added: Vec<String> = effects.iter().map(|a| named_cutting(&a.instance).title).collect();
+    let mut card = answer(d, &added, "force records", None, |c| named_cutting(&c.instance));
+    card.id = "verdict-cutting";
+    card.side = FORCES;
+    if let Some(first) = found.lead.as_ref().and_then(|l| l.lines.first()) {
+        card.facts.insert(
+            0,
+            (
+                "What stands out",
+                format!(
+                    "{}: {} of what stands above the noise, strongest {}; usually {}",
+                    first.what,
+                    percent(first.share),
+                    first.strongest(),
+                    first.usual_cause
+                ),
+            ),
+        );
+    }
+    let dir = campaign.dir.display();
+    card.next = match (d.verdict, d.winner()) {
+        (Verdict::Effect, Some(winner)) if d.indistinguishable.is_empty() => format!(
+            "make the check, then add it and fit everything anew: `lobestone add {dir} {}`",
+            winner.label()
+        ),
+        (Verdict::Effect, Some(winner)) => format!(
+            "tell the rivals apart first: {}. Then `lobestone add {dir} {}`",
+            found.next_measurement,
+            winner.label()
+        ),
+        (Verdict::None, _) => format!("use the coefficients: `lobestone cfc {dir}`"),
+        _ => found.next_measurement.to_string(),
+    };
+    card.next = sentence(&card.next);
+    let now = &found.now.comparison.totals;
+    let mut bar = ErrorBar {
+        noise: now.noise_floor_nrms,
+        ..ErrorBar::default()
+    };
+    let first = found.case.revisions.first().filter(|_| !added.is_empty());
+    bar.steps
+        .extend(first.map(|r| ("nothing added".to_string(), r.nrms)));
+    let name = match added.as_slice() {
+        [] => "force model".to_string(),
+        some => format!("with {}", listed(some)),
+    };
+    bar.steps.push((name, now.nrms));
+    if let Some((_, view)) = &found.leading {
+        bar.steps
+            .push((with_candidate(d.verdict).into(), view.comparison.totals.nrms));
+    }
+    card.bar = Some(bar);
+    card.curves = force(found);
+    if let (None, Some(last), Tone::Clean) = (&card.check, effects.last(), card.tone) {
+        card.check = Some(last.instance.effect.background().lab_check.to_string());
+    }
+    card.remarks = found.case.warnings.clone();
+    files_first(&mut card, &files.iter().collect::<Vec<_>>());
+    card
+}
+
+/// The force that stands out most, without and with what is missing.
+fn force(found: &CuttingFindings) -> Option<BeforeAfter> {
+    let comparison = &found.now.comparison;
+    let worst = |c: &CutError| {
+        let times = c.times_noise.iter().filter_map(|(name, t)| Some((name, (*t)?)));
+        times
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(name, times)| (name.clone(), times))
+    };
+    let all = comparison.cuts.iter().enumerate();
+    let (cut, error, (axis, times)) = all
+        .filter_map(|(i, c)| Some((i, c, worst(c)?)))
+        .max_by(|a, b| a.2.1.total_cmp(&b.2.1))?;
+    let data = &found.case.data;
+    let own = data.cuts.get(cut)?;
+    let course = |fits: &[CutFit]| {
+        let all = courses(data, own, fits.get(cut)?);
+        all.into_iter().find(|c| c.axis.label() == axis)
+    };
+    let now = course(&found.now.fits)?;
+    let with = found.leading.as_ref().and_then(|(_, view)| course(&view.fits));
+    // A fit has a zero line and a phase of its own: only its difference from the record counts.
+    let after = with.map(|with| -> Vec<f64> {
+        let rests = with.model.iter().zip(&with.measured).map(|(m, r)| m - r);
+        rests.zip(&now.measured).map(|(rest, r)| r + rest).collect()
+    });
+    let caption = format!(
+        "The force that stands out most: {axis} of cut {}, {} times its noise. Error of the cut {}, noise {}.",
+        own.id,
+        significant(times, 2),
+        percent(error.nrms),
+        percent(error.noise_floor_nrms)
+    );
+    let unit = now.axis.unit();
+    let picture = Picture {
+        alt: caption.clone(),
+        x_label: match data.process {
+            Process::Milling => "Rotation of the tool (°)".into(),
+            Process::Drilling | Process::Turning => "Time (s)".into(),
+        },
+        y_label: format!("{axis} ({unit})"),
+        unit: unit.into(),
+        log: false,
+        x: now.x,
+        measured: now.measured,
+        before: Some(now.model),
+        after,
+        noise: None,
+        shaded: None,
+    };
+    Some(BeforeAfter {
+        before: "as it stands".into(),
+        after: picture
+            .after
+            .as_ref()
+            .map(|_| with_candidate(found.diagnosis.verdict).into()),
+        picture,
+        caption,
+    })
+}
+
+/// Where nothing was compared with a model of the robot: what was found of the cutting forces, or of nothing.
+pub fn coefficients(
+    campaign: &Campaign,
+    summary: String,
+    files: &[SetupFinding],
+    remarks: &[String],
+) -> VerdictCard {
+    let mut card = VerdictCard {
+        id: "verdict-cutting",
+        side: FORCES,
+        tone: Tone::Clean,
+        headline: "Coefficients found; what the force model may lack was not looked for".into(),
+        explanation: summary,
+        next: format!(
+            "Learn what is missing: `lobestone diagnose {}`.",
+            campaign.dir.display()
+        ),
+        remarks: remarks.to_vec(),
+        ..VerdictCard::default()
+    };
+    files_first(&mut card, &files.iter().collect::<Vec<_>>());
+    card
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn finding(kind: &'static str, confidence: f64) -> SetupFinding {
+        SetupFinding {
+            kind,
+            place: "joint 3".into(),
+            value: Some(0.2345),
+            std_error: Some(0.0123),
+            unit: "deg",
+            confidence,
+            remedy: "correct the joint angles of all postures".into(),
+        }
+    }
+
     #[test]
-    fn the_bar_ends_at_the_largest_error() {
-        let bar = ErrorBar {
-            steps: vec![("a".into(), 0.5), ("b".into(), 0.02)],
-            noise: 0.01,
+    fn wrong_files_come_before_the_physics_that_they_may_make_up() {
+        let found = [finding("encoder-offset", 0.97), finding("gain", 0.6)];
+        for (tone, keeps) in [(Tone::Open, false), (Tone::Missing, true)] {
+            let mut card = VerdictCard {
+                tone,
+                headline: "Missing: payload".into(),
+                facts: vec![("How big", "mass 3 kg".into())],
+                check: Some("weigh it".into()),
+                ..VerdictCard::default()
+            };
+            files_first(&mut card, &found.iter().collect::<Vec<_>>());
+            assert_eq!(card.tone, Tone::Files);
+            assert_eq!(card.headline, "Your files first: encoder offset (joint 3)");
+            assert_eq!(card.explanation.contains("Missing: payload"), keeps);
+            assert_eq!(card.check.is_some(), keeps);
+            assert!(
+                card.facts[0].1.contains("0.234 ± 0.012\u{a0}deg"),
+                "{:?}",
+                card.facts
+            );
+            assert!(card.facts[1].1.starts_with("gain"));
+            assert!(card.next.starts_with("Correct the joint angles of all postures."));
+        }
+        let mut untouched = VerdictCard::default();
+        files_first(&mut untouched, &[]);
+        assert_eq!(untouched.tone, Tone::Open);
+    }
+
+    #[test]
+    fn sizes_are_words_rounded_to_their_errors() {
+        let estimate = |name: &str, value, std_error, unit| Estimate {
+            name: name.into(),
+            value,
+            unit,
+            std_error,
+            initial: value,
+            at_bound: false,
         };
-        assert_eq!(bar.shares(), [100.0, 4.0, 2.0]);
-        assert_eq!(ErrorBar::default().shares(), [0.0]);
+        let of = [
+            estimate("local-resonator@link-3.mass_kg", 5.912, 0.31, "kg"),
+            estimate("local-resonator@link-3.frequency_hz", 31.2345, 0.0612, "Hz"),
+            estimate("local-resonator@link-3.damping_ratio", 0.03123, 0.0021, "1"),
+        ];
+        assert_eq!(
+            sizes(&of),
+            "mass 5.91 ± 0.31\u{a0}kg, frequency 31.23 ± 0.06\u{a0}Hz, damping ratio 0.0312 ± 0.0021"
+        );
+        let many: Vec<Estimate> = (0..7)
+            .map(|i| estimate(&format!("x.c_nms_per_rad[{i}]"), 10.0, 1.0, "N·m·s/rad"))
+            .collect();
+        assert!(sizes(&many).ends_with("3 more"));
     }
 }

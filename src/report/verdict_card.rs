@@ -3,9 +3,7 @@
 use super::card::{BeforeAfter, ErrorBar, Tone, VerdictCard};
 use super::number::{percent, plus_minus, significant};
 use super::picture::Picture;
-use super::words;
-use super::words::frf_name;
-use super::words::listed;
+use super::words::{self, frf_name, listed};
 use crate::analysis::{CuttingFindings, DiagnosisFindings, StructureFindings};
 use crate::campaign::{Campaign, Process};
 use crate::discrepancy::diagnose::Baseline;

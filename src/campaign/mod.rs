@@ -20,11 +20,10 @@ pub mod suggest;
 mod tool_and_cut;
 
 pub use crate::data::{
-    AxesRef, BodyRef, ChipFormation, Cut, CutGeometry, CutOutcome, HoleSection, Immersion, LinkGroup,
-    LinkTolerances, LobeAxis, LobeMethod, LobeMode, LobeSource, LobesSection, OrthogonalSection, Point,
-    Posture, Process, Redundancy, RobotSection, Tool, ToolKind, ToolSegment,
+    AxesRef, BodyRef, ChipFormation, Cut, CutGeometry, CutOutcome, FrfSet, HoleSection, Immersion, LinkGroup,
+    LinkTolerances, LobeAxis, LobeMethod, LobeMode, LobeSource, LobesSection, MeasuredDof, MeasuredFrf,
+    OrthogonalSection, Point, Posture, Process, Redundancy, RobotSection, Tool, ToolKind, ToolSegment,
 };
-pub use frf_set::{FrfSet, MeasuredDof, MeasuredFrf};
 pub use json_schema::{SchemaOf, json_schema};
 pub use named_files::named_files;
 pub use paths::campaign_file;

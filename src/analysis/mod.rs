@@ -27,6 +27,7 @@ mod shard;
 pub mod stick_shapes;
 pub mod structure;
 pub mod sweep;
+#[cfg(feature = "report")]
 pub mod thesis_findings;
 
 pub use addition::Addition;
@@ -42,4 +43,5 @@ pub use redundancy::{HoleWeighing, RedundancyAnalysis};
 pub use shard::Shard;
 pub use structure::StructureAnalysis;
 pub use sweep::{Sweep, SweepRequest, SweepRow};
+#[cfg(feature = "report")]
 pub use thesis_findings::ThesisFindings;

@@ -35,6 +35,7 @@ mod operational;
 mod plan;
 mod printed;
 mod program;
+mod progress_bar;
 mod range;
 mod report;
 mod schema;
@@ -47,7 +48,7 @@ mod thesis;
 mod undo;
 mod workbench;
 
-/// What a command has to say: the document of the contract, and the same for a person.
+/// What a command has to say: the document of docs/json.md, and the same for a person.
 pub struct Outcome {
     /// Printed with `--json`; null where there is nothing to say (any more).
     pub json: serde_json::Value,

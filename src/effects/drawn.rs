@@ -27,7 +27,7 @@ pub enum Form {
 }
 
 impl Form {
-    /// As in the contract: `spring-damper`.
+    /// As in docs/json.md: `spring-damper`.
     pub fn label(self) -> &'static str {
         match self {
             Form::Spring => "spring",

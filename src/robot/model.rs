@@ -246,7 +246,7 @@ mod tests {
         }
     }
 
-    /// Independent numbers of physics.md §2, within 0.5 %.
+    /// Numbers of an independent program (docs/physics.md, "Structure"), within 0.5 %.
     #[test]
     fn flange_stiffness_of_postures_a_and_b() {
         let model = RobotModel::new(irb6640());
@@ -261,7 +261,7 @@ mod tests {
         }
     }
 
-    /// Independent numbers of physics.md §2, within 0.2 %.
+    /// Numbers of an independent program (docs/physics.md, "Structure"), within 0.2 %.
     #[test]
     fn rigid_link_frequencies() {
         let model = RobotModel::new(irb6640());
@@ -280,7 +280,7 @@ mod tests {
         }
     }
 
-    /// physics.md §2: link beams at 200 GPa, config 1; and, with isotropic inertias, an independent finite-element
+    /// Link beams at 200 GPa (docs/physics.md, "Structure"), config 1; and, with isotropic inertias, an independent finite-element
     /// program at all four postures.
     #[test]
     fn beam_frequencies_agree_with_finite_elements() {

@@ -7,7 +7,8 @@ use super::{FrfFormat, LineNoise, Slip};
 use crate::ingest::Quantity;
 
 /// What random campaigns hide.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Tier {
     /// Nothing, one effect of the library, two of them, or strong foreign physics.
     Mixed,

@@ -1,9 +1,6 @@
-//! Data that come inside the library: campaigns (`datasets/campaigns/`, see the README there), which `demo` and the examples
-//! work on, and the postures in which the IRB 6640 was measured.
+//! Campaigns that come inside the program (`datasets/campaigns/`, see the README there): what `demo` works on.
 
 use std::path::{Path, PathBuf};
-
-use serde::Deserialize;
 
 use crate::{Error, Result};
 
@@ -57,36 +54,4 @@ impl BuiltinCampaign {
         }
         Ok(folder)
     }
-}
-
-const IRB6640_POSTURES: &str = include_str!("../datasets/irb6640/postures.csv");
-
-#[derive(Deserialize)]
-struct PostureRow {
-    id: String,
-    j1_deg: f64,
-    j2_deg: f64,
-    j3_deg: f64,
-    j4_deg: f64,
-    j5_deg: f64,
-    j6_deg: f64,
-}
-
-/// Joint angles of a posture in which the IRB 6640 was measured (`A`, `B`: static stiffness; `1` … `4`: tap tests), degrees.
-///
-/// # Errors
-/// There is no such posture.
-pub fn irb6640_posture_deg(id: &str) -> Result<[f64; 6]> {
-    // Notes at the end of a row hold commas of their own.
-    let mut table = csv::ReaderBuilder::new()
-        .flexible(true)
-        .from_reader(IRB6640_POSTURES.as_bytes());
-    for row in table.deserialize() {
-        let p: PostureRow =
-            row.map_err(|e| Error::computation(format!("a built-in table is damaged: {e}")))?;
-        if p.id == id {
-            return Ok([p.j1_deg, p.j2_deg, p.j3_deg, p.j4_deg, p.j5_deg, p.j6_deg]);
-        }
-    }
-    Err(Error::computation(format!("the thesis has no posture {id}")))
 }

@@ -137,7 +137,7 @@ pub mod signal;
 #[cfg(feature = "lab")]
 pub mod simulate;
 pub mod stop;
-#[cfg(feature = "report")]
+#[cfg(any(feature = "report", feature = "lab"))]
 pub mod thesis;
 
 pub use analysis::{ModalAnalysis, StructureAnalysis};

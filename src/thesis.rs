@@ -6,7 +6,6 @@
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-use crate::builtin::irb6640_posture_deg;
 use crate::campaign::RobotSection;
 use crate::identify::calibrate::estimates;
 use crate::identify::modal_table::{self, StrongestMode};
@@ -33,6 +32,7 @@ const STATIC_STIFFNESS: &str = include_str!("../datasets/irb6640/static_stiffnes
 const FREQUENCIES: &str = include_str!("../datasets/irb6640/frequencies_published_model.csv");
 const MODAL: &str = include_str!("../datasets/irb6640/modal_measured.csv");
 const MINIMA: &str = include_str!("../datasets/irb6640/real_part_minima_measured.csv");
+const POSTURES: &str = include_str!("../datasets/irb6640/postures.csv");
 
 /// Configurations the modal table is fitted on; the last one is predicted.
 pub const FITTED_CONFIGURATIONS: [&str; 3] = ["1", "2", "3"];
@@ -123,6 +123,17 @@ pub struct LobeTips {
 }
 
 #[derive(Deserialize)]
+struct PostureRow {
+    id: String,
+    j1_deg: f64,
+    j2_deg: f64,
+    j3_deg: f64,
+    j4_deg: f64,
+    j5_deg: f64,
+    j6_deg: f64,
+}
+
+#[derive(Deserialize)]
 struct StaticRow {
     posture: String,
     kx_measured_n_per_m: Option<f64>,
@@ -160,6 +171,15 @@ fn rows<T: DeserializeOwned>(table: &str) -> Result<Vec<T>> {
         .deserialize()
         .collect::<std::result::Result<_, _>>()
         .map_err(|e| Error::computation(format!("a built-in table is damaged: {e}")))
+}
+
+/// Joint angles of a thesis posture (`A`, `B`, `1` … `4`), degrees.
+pub fn posture_deg(id: &str) -> Result<[f64; 6]> {
+    rows::<PostureRow>(POSTURES)?
+        .into_iter()
+        .find(|p| p.id == id)
+        .map(|p| [p.j1_deg, p.j2_deg, p.j3_deg, p.j4_deg, p.j5_deg, p.j6_deg])
+        .ok_or_else(|| Error::computation(format!("the thesis has no posture {id}")))
 }
 
 /// Bands in which the thesis measured resonances again and again, Hz.
@@ -259,9 +279,7 @@ pub fn case_study() -> Result<CaseStudy> {
 
 fn strongest_mode(model: &StructureModel, row: &ModalRow) -> Result<StrongestMode> {
     Ok(StrongestMode {
-        kinematics: model
-            .robot
-            .kinematics(&irb6640_posture_deg(&row.configuration)?)?,
+        kinematics: model.robot.kinematics(&posture_deg(&row.configuration)?)?,
         axis: if row.axis == "Y" { Axis::Y } else { Axis::X },
         frequency_hz: row.frequency_hz,
         peak_real_m_per_n: row.peak_real_receptance_m_per_n,
@@ -272,7 +290,7 @@ fn strongest_mode(model: &StructureModel, row: &ModalRow) -> Result<StrongestMod
 fn static_rows(model: &StructureModel, nominal: &[f64], fitted: &[f64]) -> Result<Vec<Row>> {
     let mut result = Vec::new();
     for row in rows::<StaticRow>(STATIC_STIFFNESS)? {
-        let kinematics = model.robot.kinematics(&irb6640_posture_deg(&row.posture)?)?;
+        let kinematics = model.robot.kinematics(&posture_deg(&row.posture)?)?;
         let stiffness = |theta: &[f64]| -> Result<[f64; 3]> {
             let report = PostureReport::new(
                 &model.robot,
@@ -308,7 +326,7 @@ fn tool_over_flange(model: &StructureModel, theta: &[f64]) -> Result<[f64; 2]> {
         if row.kx_measured_n_per_m.is_none() {
             continue;
         }
-        let kinematics = model.robot.kinematics(&irb6640_posture_deg(&row.posture)?)?;
+        let kinematics = model.robot.kinematics(&posture_deg(&row.posture)?)?;
         let chain = model.chain(theta, &kinematics, 0.0, false);
         let report = PostureReport::new(&model.robot, &kinematics, &chain)?;
         for axis in 0..2 {
@@ -365,7 +383,7 @@ fn model_tips(model: &StructureModel, theta: &[f64], configuration: u32) -> Resu
     let force = thesis_force()?;
     let kinematics = model
         .robot
-        .kinematics(&irb6640_posture_deg(&configuration.to_string())?)?;
+        .kinematics(&posture_deg(&configuration.to_string())?)?;
     let chain = model.robot.chain(&kinematics, &model.baseline(theta, false));
     let frf = RobotFrf::new(&model.robot, &kinematics, &chain)?;
     let solver = StabilitySolver::new(force, &frf);
@@ -387,7 +405,7 @@ fn unexplained(model: &StructureModel, theta: &[f64]) -> Result<Vec<Unexplained>
     let minima: Vec<MinimumRow> = rows(MINIMA)?;
     let mut model_hz = Vec::new();
     for id in ["1", "2", "3", "4"] {
-        let kinematics = model.robot.kinematics(&irb6640_posture_deg(id)?)?;
+        let kinematics = model.robot.kinematics(&posture_deg(id)?)?;
         let report = PostureReport::new(
             &model.robot,
             &kinematics,

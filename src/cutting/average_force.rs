@@ -1,6 +1,6 @@
-//! Average cutting forces, linear in the coefficients: milling (docs/physics.md, "Cutting forces"; Altintas,
-//! Manufacturing Automation, 2nd ed., eqs 2.41–2.45, in axes with φ clockwise from +y), two-lip drilling (same section), and
-//! turning (see [`super::turning`]).
+//! Average cutting forces, linear in the coefficients: milling (physics.md §4; Altintas, Manufacturing
+//! Automation, 2nd ed., eqs 2.41–2.45, in axes with φ clockwise from +y), two-lip drilling (drilling.md), and turning (see
+//! [`super::turning`]).
 
 use std::f64::consts::PI;
 
@@ -128,7 +128,7 @@ pub fn average_row(tool: &Tool, geometry: &CutGeometry, axis: ForceAxis) -> Resu
     }
 }
 
-/// docs/physics.md, "Cutting forces", each bracket from entry to exit angle. Units mm, N; no torque.
+/// physics.md §4, each bracket from entry to exit angle. Units mm, N; no torque.
 fn milling_row(teeth: usize, feed_mm: f64, depth_mm: f64, immersion: Immersion, axis: ForceAxis) -> [f64; 6] {
     let (start, exit) = (immersion.start_rad, immersion.exit_rad);
     let over = |f: fn(f64) -> f64| f(exit) - f(start);
@@ -169,7 +169,7 @@ fn shaped_row(tool: &Tool, geometry: &CutGeometry, axis: ForceAxis) -> Vec<f64> 
     unit.iter().map(|forces| forces[axis.index()][0].re).collect()
 }
 
-/// A drill in a hole: lengths of docs/physics.md, "Cutting forces", mm.
+/// A drill in a hole: lengths of drilling.md, mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DrillGeometry {
     pub lips: f64,
@@ -180,7 +180,7 @@ pub struct DrillGeometry {
     pub feed_per_rev_mm: f64,
 }
 
-/// Chisel edge angle (docs/physics.md, "Cutting forces"), from which its half length follows.
+/// Chisel edge angle of drilling.md, from which its half length follows.
 const CHISEL_ANGLE_DEG: f64 = 125.0;
 
 impl DrillGeometry {
@@ -294,7 +294,7 @@ pub(super) mod tests {
         }
     }
 
-    /// Sums the slice forces of docs/physics.md over one revolution and the helix, teeth and all.
+    /// Sums the slice forces of physics.md over one revolution and the helix, teeth and all.
     fn integrated(k: [f64; 6], teeth: usize, c: f64, a: f64, immersion: Immersion) -> [f64; 3] {
         let (turn_steps, slices) = (40_000, 7);
         let lag = 0.4; // rad of helix lag over the depth; must not matter to the average

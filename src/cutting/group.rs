@@ -262,7 +262,7 @@ impl Group {
         self.coefficients.iter().all(|c| c.value.is_some())
     }
 
-    /// A group as docs/json.md has it.
+    /// The contract's form of a group (campaign.md), with a few keys more.
     pub fn to_json(&self) -> Value {
         let mut map = Map::new();
         map.insert("process".into(), json!(self.process));

@@ -142,7 +142,7 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    /// Ti6Al4V (docs/physics.md, "Reference cases"): α_n = 12°, i = η = 30°, h = 0.05 mm give Ktc 1510, Krc 215, Kac 515 N/mm², φ_n 39.03°.
+    /// Ti6Al4V of references.md: α_n = 12°, i = η = 30°, h = 0.05 mm give Ktc 1510, Krc 215, Kac 515 N/mm², φ_n 39.03°.
     #[test]
     fn the_published_orthogonal_database_gives_the_reference_coefficients() {
         let rake_deg = 12.0;

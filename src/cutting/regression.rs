@@ -280,7 +280,7 @@ mod tests {
     use crate::cutting::average_row;
     use approx::assert_relative_eq;
 
-    /// Whole-revolution means of a real slot series on aluminium (docs/physics.md, "Reference cases"):
+    /// Whole-revolution means of a real slot series on aluminium (references.md, "Cutting coefficients"):
     /// 2 teeth, 3 mm deep, feeds 0.025…0.125 mm/tooth; |Fx|, |Fy|, |Fz| in file axes, x carrying Ktc, y Krc.
     const PUBLISHED: [[f64; 3]; 5] = [
         [63.02, 39.78, 55.72],

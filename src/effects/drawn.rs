@@ -27,7 +27,7 @@ pub enum Form {
 }
 
 impl Form {
-    /// As in docs/json.md: `spring-damper`.
+    /// As in the contract: `spring-damper`.
     pub fn label(self) -> &'static str {
         match self {
             Form::Spring => "spring",

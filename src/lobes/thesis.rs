@@ -188,7 +188,7 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    /// The table of docs/physics.md, "Reference cases".
+    /// The table in references.md, "Drilling lobes on the robot".
     #[test]
     fn table_30_is_what_the_reference_computation_gave() {
         let expected = [

@@ -1,10 +1,9 @@
 //! Postures of a simulated campaign.
 
 use super::draw::Draws;
-use crate::builtin::irb6640_posture_deg;
 use crate::campaign::Posture;
 use crate::robot::{JointSpec, RobotModel};
-use crate::{Error, Result};
+use crate::{Error, Result, thesis};
 
 /// Tap-test postures of the built-in robot, in the order in which campaigns visit their neighbourhoods.
 const TAP_IDS: [&str; 4] = ["1", "2", "3", "4"];
@@ -46,7 +45,7 @@ pub fn draw(
     let references: Vec<Vec<f64>> = match built_in {
         true => TAP_IDS
             .iter()
-            .map(|id| Ok(irb6640_posture_deg(id)?.to_vec()))
+            .map(|id| Ok(thesis::posture_deg(id)?.to_vec()))
             .collect::<Result<_>>()?,
         false => Vec::new(),
     };

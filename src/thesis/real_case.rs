@@ -3,9 +3,8 @@
 
 use serde::Serialize;
 
-use super::{MINIMA, MODAL, STATIC_STIFFNESS};
+use super::{MINIMA, MODAL, STATIC_STIFFNESS, posture_deg};
 use super::{ModalRow, RECURRING_BANDS, StaticRow, rows};
-use crate::builtin::irb6640_posture_deg;
 use crate::discrepancy::difference::{Difference, Lookout, greatest_difference};
 use crate::discrepancy::verdict::{STRONG_BIC, evidence_weight};
 use crate::discrepancy::{Verdict, diagnose};
@@ -201,7 +200,7 @@ pub fn resonances(widening: f64) -> Result<Vec<Resonance>> {
 fn study(model: &StructureModel, widening: f64) -> Result<ResonanceStudy> {
     let configurations = CONFIGURATIONS
         .iter()
-        .map(|id| model.robot.kinematics(&irb6640_posture_deg(id)?))
+        .map(|id| model.robot.kinematics(&posture_deg(id)?))
         .collect::<Result<_>>()?;
     Ok(ResonanceStudy::new(
         &model.robot.spec,
@@ -393,7 +392,7 @@ fn checks(study: &ResonanceStudy, model: &StructureModel, theta: &[f64]) -> Resu
 fn static_ratio(model: &StructureModel, theta: &[f64]) -> Result<[f64; 2]> {
     let mut range = [f64::INFINITY, 0.0f64];
     for row in rows::<StaticRow>(STATIC_STIFFNESS)? {
-        let kinematics = model.robot.kinematics(&irb6640_posture_deg(&row.posture)?)?;
+        let kinematics = model.robot.kinematics(&posture_deg(&row.posture)?)?;
         let chain = model.chain(theta, &kinematics, 0.0, false);
         let stiffness = PostureReport::new(&model.robot, &kinematics, &chain)?.flange_stiffness_n_per_m;
         for (axis, measured) in [row.kx_measured_n_per_m, row.ky_measured_n_per_m]

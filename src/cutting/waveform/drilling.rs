@@ -1,4 +1,4 @@
-//! Drilling: thrust and torque while the drill enters and bores, averaged over stretches of time (docs/physics.md, "Cutting forces").
+//! Drilling: thrust and torque while the drill enters and bores, averaged over stretches of time (drilling.md).
 
 use crate::campaign::{CutGeometry, Tool};
 use crate::cutting::DrillGeometry;

@@ -1,7 +1,7 @@
 //! Milling: Fourier coefficients of the tool-frame forces over the orders of the tool's rotation.
 //!
 //! Tooth j stands at φ = θ + 2πj/N − ψz where θ is the tool's rotation and z ∈ [0, 1] runs up the engaged depth, ψ being
-//! the lag of the helix over it (docs/physics.md, "Cutting forces"; Altintas, Manufacturing Automation, 2nd ed., §2.3–2.5).
+//! the lag of the helix over it (physics.md §4; Altintas, Manufacturing Automation, 2nd ed., §2.3–2.5).
 
 use std::f64::consts::TAU;
 

@@ -203,7 +203,7 @@ mod tests {
     fn a_small_vibration_gives_the_zero_order_directional_matrix() {
         let small = 1e-6;
         // Σ over the teeth of a slot without helix, N/2π · α with αxx = −πKr, αxy = −π, αyx = π, αyy = −πKr, halved
-        // (Altintas's factor ½ is taken out): docs/physics.md, "Reference cases", D.
+        // (Altintas's factor ½ is taken out): references.md, D.
         for (direction, want) in [
             ([small, 0.0], [0.0, 1.5 / 2.0, -1.5 / 2.0]),
             ([0.0, small], [-1.5 / 2.0, 0.0, 0.0]),

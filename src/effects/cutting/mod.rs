@@ -125,7 +125,7 @@ pub struct CutSetting {
 
 /// One physical effect on cutting forces or their measurement.
 pub trait CuttingEffect: Sync {
-    /// As in docs/effects.md: `tool-wear`.
+    /// As in the contract: `tool-wear`.
     fn id(&self) -> &'static str;
 
     /// The physics in plain words, one or two sentences.

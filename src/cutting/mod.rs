@@ -35,9 +35,9 @@ pub use average_force::{
 pub use conic::{ConicFit, Loss, conic_fit};
 pub use estimate::{BOOTSTRAP_CUTS, BOOTSTRAP_DRAWS, Estimate, HUBER_THRESHOLD, Method, bootstrap, estimate};
 pub use faults::read_record;
-pub(crate) use group::by_axis;
+pub use group::by_axis;
 pub use group::{Coefficient, Group, Influence, Known, RegressionPoint};
-pub(crate) use identify::depth_mm;
+pub use identify::depth_mm;
 pub use identify::{CfcOptions, CfcResult, from_analyses, identify_forces};
 pub use in_step::{InStep, read_in_step};
 pub use kienzle::{KienzleComponent, KienzleFit, Preferred, TellingFeed, kienzle};
@@ -48,4 +48,5 @@ pub use regression::{Fit, Observation, fit};
 pub use series::{MaterialComparison, SpeedTrends};
 pub use trend::{Change, Reading, table_trend};
 pub use turning::{EdgeBit, edge_row, engaged_edge};
-pub(crate) use warnings::{of_notices, speed_text};
+pub(crate) use warnings::of_notices;
+pub use warnings::speed_text;

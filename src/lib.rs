@@ -117,6 +117,7 @@ pub mod campaign;
 #[cfg(feature = "cli")]
 pub mod commands;
 pub mod cutting;
+pub mod data;
 pub mod discrepancy;
 pub mod effects;
 pub mod error;
@@ -137,7 +138,8 @@ pub mod signal;
 #[cfg(feature = "lab")]
 pub mod simulate;
 pub mod stop;
-#[cfg(any(feature = "report", feature = "lab"))]
+pub mod text;
+#[cfg(feature = "report")]
 pub mod thesis;
 
 pub use analysis::{ModalAnalysis, StructureAnalysis};

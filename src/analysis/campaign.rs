@@ -1,12 +1,13 @@
 //! Everything that can be said about a campaign, each part on its own: one that fails takes no other with it.
 
+use super::force_records::identify_forces;
 use super::model_stages::{ModelStage, earlier_stages};
 use super::stick_shapes::{self, StickShape};
 use super::{
     CuttingAnalysis, CuttingFindings, DiagnosisFindings, LobeAnalysis, ModalAnalysis, StructureAnalysis,
 };
 use crate::campaign::{Campaign, LobeSource};
-use crate::cutting::{CfcOptions, CfcResult, identify_forces};
+use crate::cutting::{CfcOptions, CfcResult};
 use crate::discrepancy::setup::SetupFinding;
 use crate::identify::case::structure_model;
 use crate::identify::structure_study::held_out_postures;

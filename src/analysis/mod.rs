@@ -9,14 +9,21 @@ pub mod cutting;
 pub mod diagnosis;
 pub mod expert;
 pub mod fleet;
+pub mod force_records;
 pub mod freed_links;
+mod hole_check;
 mod lobe_model;
+mod lobe_setup;
 mod lobe_structure;
 pub mod lobes;
+#[cfg(test)]
+pub(crate) mod made_force_records;
+mod measured_structures;
 pub mod modal;
 pub mod modal_export;
 pub mod mode_comparison;
 pub mod model_stages;
+mod noted_cuts;
 pub mod operational;
 pub mod planning;
 mod redundancy;
@@ -27,8 +34,6 @@ mod shard;
 pub mod stick_shapes;
 pub mod structure;
 pub mod sweep;
-#[cfg(feature = "report")]
-pub mod thesis_findings;
 
 pub use addition::Addition;
 pub use campaign::{CampaignFindings, LobeFindings, PostureFindings, StructureFindings};
@@ -43,5 +48,3 @@ pub use redundancy::{HoleWeighing, RedundancyAnalysis};
 pub use shard::Shard;
 pub use structure::StructureAnalysis;
 pub use sweep::{Sweep, SweepRequest, SweepRow};
-#[cfg(feature = "report")]
-pub use thesis_findings::ThesisFindings;

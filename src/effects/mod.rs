@@ -6,7 +6,7 @@
 
 use std::fmt;
 
-use crate::campaign::robot_spec::RobotSpec;
+use crate::data::RobotSpec;
 use crate::parameter::Parameter;
 use crate::robot::{Chain, Dual, Kinematics, RobotModel};
 

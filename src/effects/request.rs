@@ -1,8 +1,8 @@
 //! What a user means by `EFFECT[@SITE]`.
 
 use super::{DRAWN, DataSummary, Instance, STRUCTURAL, Site, StructuralEffect, find};
-use crate::campaign::robot_spec::RobotSpec;
 use crate::campaign::suggest::{closest, shown};
+use crate::data::RobotSpec;
 use crate::{InputError, Result};
 
 /// The instances (one for each discrete choice) of an effect that a user asked for.

@@ -11,11 +11,10 @@ use super::cutting_windows::Windows;
 pub use super::force_channel::ForceChannel;
 use super::force_channel::{force_channel, sample_std, widen_for_vibration};
 use super::off_comb::{OffComb, StandingLine, find_vibration, standing_lines};
+use crate::analysis::force_records::read_in_step;
 use crate::campaign::{Campaign, Process};
 use crate::cutting::waveform::{DrillTerm, DrillingCut, MillingCut, UnitForces};
-use crate::cutting::{
-    CutAnalysis, EdgeBit, ForceAxis, InStep, Notice, engaged_edge, feed_mm, of_notices, read_in_step,
-};
+use crate::cutting::{CutAnalysis, EdgeBit, ForceAxis, InStep, Notice, engaged_edge, feed_mm, of_notices};
 use crate::effects::cutting::{CutSetting, CuttingSummary};
 use crate::ingest::{ChannelRole, TimeRecord};
 use crate::progress::Progress;

@@ -9,7 +9,7 @@ use super::rest::{self, AfterSlips, BeyondSlips, Rest, RestCurve, SMALL_ERROR};
 use super::structure::{FrfProblem, Misfit, StructureModel};
 use super::study::{EffectName, Extent, HeldOut, Measure, Residual, Study, View, held_out};
 use crate::Result;
-use crate::campaign::robot_spec::RobotSpec;
+use crate::data::RobotSpec;
 use crate::effects::{self, DataSummary, Instance};
 use crate::parameter::Parameter;
 

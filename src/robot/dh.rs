@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
-use crate::campaign::robot_spec::{JointPlacement, JointSpec, LinkSpec, RobotSpec, ToolFrame};
+use crate::data::{JointPlacement, JointSpec, LinkSpec, RobotSpec, ToolFrame};
 
 /// Frames of a robot at one posture, base frame coordinates, m.
 #[derive(Debug, Clone)]
@@ -127,6 +127,7 @@ impl Kinematics {
         }
     }
 
+    /// Number of joints.
     pub fn joint_count(&self) -> usize {
         self.frames.len() - 1
     }
@@ -185,14 +186,17 @@ impl Kinematics {
         Rotation3::from(self.frames[i].rotation).into_inner()
     }
 
+    /// Tool centre point, base frame, m.
     pub fn tcp(&self) -> Point3<f64> {
         self.tool.translation.vector.into()
     }
 
+    /// Origin of the flange, base frame, m.
     pub fn flange(&self) -> Point3<f64> {
         self.frames[self.frames.len() - 1].translation.vector.into()
     }
 
+    /// Unit vector along the tool, from the spindle to the workpiece, base axes.
     pub fn tool_axis(&self) -> Vector3<f64> {
         self.tool.rotation * Vector3::z()
     }
@@ -212,7 +216,7 @@ impl Kinematics {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::robot_spec::ToolFrame;
+    use crate::data::ToolFrame;
     use proptest::prelude::*;
 
     fn planar(lengths: &[f64]) -> RobotSpec {

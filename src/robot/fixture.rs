@@ -1,9 +1,9 @@
-//! The IRB 6640 of the source thesis, for the tests of this floor (the robot file itself is read one floor up).
+//! The IRB 6640 of the source thesis, for the tests of this module (the robot file itself is read by `campaign`).
 
 use nalgebra::Vector3;
 
 use super::{Branch, Dual, Kinematics, RobotModel};
-use crate::campaign::robot_spec::*;
+use crate::data::*;
 
 pub fn irb6640() -> RobotSpec {
     let joint = |d_m: f64, a_m: f64, alpha_deg: f64, offset_deg: f64, compliance: f64| JointSpec {

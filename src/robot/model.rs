@@ -6,14 +6,15 @@ use super::beam;
 use super::chain::{Body, Chain, Element, Place, Role, Slot};
 use super::dh::Kinematics;
 use super::dual::Dual;
-use crate::campaign::robot_spec::RobotSpec;
 use crate::campaign::{AxesRef, BodyRef, Point};
+use crate::data::RobotSpec;
 use crate::ingest::Axis;
 use crate::{InputError, Result};
 
 /// A robot whose structure can be set up at any posture.
 #[derive(Debug, Clone)]
 pub struct RobotModel {
+    /// What the robot file says.
     pub spec: RobotSpec,
 }
 
@@ -30,7 +31,7 @@ pub struct Baseline {
     pub young_pa: Option<Dual>,
 }
 
-/// Damping ratio a model starts from when nobody has said anything else.
+/// Damping ratio a model starts from when nothing else is given.
 pub const NOMINAL_DAMPING_RATIO: f64 = 0.03;
 
 impl Baseline {
@@ -50,10 +51,12 @@ impl Baseline {
 }
 
 impl RobotModel {
+    /// The model of a robot file.
     pub fn new(spec: RobotSpec) -> Self {
         RobotModel { spec }
     }
 
+    /// Number of joints.
     pub fn joint_count(&self) -> usize {
         self.spec.joints.len()
     }
@@ -217,7 +220,7 @@ impl RobotModel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::robot_spec::{BeamSection, JointSpec, LinkSpec, ToolFrame};
+    use crate::data::{BeamSection, JointSpec, LinkSpec, ToolFrame};
     use crate::robot::fixture::{TAP_POSTURES, irb6640};
     use crate::robot::frf::natural_frequencies_hz;
     use crate::robot::{FrfBasis, ModalBasis};
@@ -246,7 +249,7 @@ mod tests {
         }
     }
 
-    /// Numbers of an independent program (docs/physics.md, "Structure"), within 0.5 %.
+    /// Computed independently of this program, within 0.5 %.
     #[test]
     fn flange_stiffness_of_postures_a_and_b() {
         let model = RobotModel::new(irb6640());
@@ -261,7 +264,7 @@ mod tests {
         }
     }
 
-    /// Numbers of an independent program (docs/physics.md, "Structure"), within 0.2 %.
+    /// Computed independently of this program, within 0.2 %.
     #[test]
     fn rigid_link_frequencies() {
         let model = RobotModel::new(irb6640());
@@ -280,7 +283,7 @@ mod tests {
         }
     }
 
-    /// Link beams at 200 GPa (docs/physics.md, "Structure"), config 1; and, with isotropic inertias, an independent finite-element
+    /// Computed independently: link beams at 200 GPa, configuration 1; and, with isotropic inertias, an independent finite-element
     /// program at all four postures.
     #[test]
     fn beam_frequencies_agree_with_finite_elements() {

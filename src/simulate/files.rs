@@ -8,8 +8,7 @@ use crate::campaign::{AxesRef, BodyRef, Point, Posture, RobotSection};
 use crate::ingest::{ByteOrder, Encoding58, FrfRecord, Quantity, frf_dataset, uff58_bytes};
 
 /// Format of the FRF files.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum FrfFormat {
     /// Universal file, dataset 58, text.
     UffAscii,
@@ -20,6 +19,7 @@ pub enum FrfFormat {
 }
 
 impl FrfFormat {
+    /// Ending of the file name, without the dot.
     pub fn extension(self) -> &'static str {
         match self {
             FrfFormat::UffAscii | FrfFormat::UffBinary => "uff",
@@ -39,7 +39,7 @@ impl FrfFormat {
     }
 }
 
-/// Header and lines of the FRF CSV of docs/files.md; numbers in full precision.
+/// Header and lines of the FRF CSV that campaigns read; numbers in full precision.
 fn csv(frfs: &[FrfRecord]) -> String {
     let mut text = String::from("frequency_hz");
     for frf in frfs {
@@ -67,7 +67,7 @@ pub fn as_quantity(receptance: Complex64, frequency_hz: f64, quantity: Quantity)
     }
 }
 
-/// The word of docs/campaign.md.
+/// As `quantity` in campaign.toml.
 pub fn quantity_word(quantity: Quantity) -> &'static str {
     match quantity {
         Quantity::Receptance => "receptance",

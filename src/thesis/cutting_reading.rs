@@ -1,9 +1,9 @@
 //! The tables of cutting coefficients in plain words, from their numbers.
 
 use super::cutting_tables::{
-    ACETAL_NAME, CAST, CoefficientRow, CuttingTables, Difference, PRINTED, TableTrend,
+    ACETAL_NAME, CAST, CoefficientDifference, CoefficientRow, CuttingTables, PRINTED, TableTrend,
 };
-use crate::cutting::{MILLING_COEFFICIENTS, Reading};
+use crate::cutting::{ChangeReading, MILLING_COEFFICIENTS};
 
 /// A paired difference less likely than this by chance is called one, after Bonferroni over the six coefficients.
 const FALSE_ALARM: f64 = 0.05;
@@ -123,8 +123,8 @@ impl CuttingTables {
 
     fn difference_text(&self) -> String {
         let count = self.differences.len() as f64;
-        let is_found = |d: &&Difference| d.p_value * count <= FALSE_ALARM;
-        let one = |d: &Difference| {
+        let is_found = |d: &&CoefficientDifference| d.p_value * count <= FALSE_ALARM;
+        let one = |d: &CoefficientDifference| {
             format!(
                 "{} {:.0} against {:.0} {} (difference {:.1} ± {:.1}, p = {:.4})",
                 d.coefficient,
@@ -217,7 +217,7 @@ impl CuttingTables {
         let speed_found = self
             .trends
             .iter()
-            .any(|t| t.speeds == "all" && matches!(t.reading, Reading::Rises | Reading::Falls));
+            .any(|t| t.speeds == "all" && matches!(t.reading, ChangeReading::Rises | ChangeReading::Falls));
         format!(
             "If the records existed, `lobestone diagnose` would test: nonlinear-drift, dynamometer-misalignment and crosstalk \
              (negative axial and edge coefficients); dynamometer-resonance and chatter (teeth pass at {} in the fast cuts of acetal, \

@@ -8,7 +8,8 @@
 use std::path::PathBuf;
 
 use lobestone::Campaign;
-use lobestone::cutting::{CfcOptions, ForceAxis, identify_forces};
+use lobestone::analysis::force_records::identify_forces;
+use lobestone::cutting::{CfcOptions, ForceAxis};
 
 fn main() -> lobestone::Result<()> {
     let built_in = concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/campaigns/first-cell");

@@ -5,7 +5,7 @@
 //! cargo run --release --example irb6640_case_study
 //! ```
 
-use lobestone::thesis::{Row, case_study};
+use lobestone::thesis::{ComparedRow, case_study};
 
 fn main() -> lobestone::Result<()> {
     lobestone::sums_in_order();
@@ -40,7 +40,7 @@ fn main() -> lobestone::Result<()> {
     Ok(())
 }
 
-fn print(row: &Row) {
+fn print(row: &ComparedRow) {
     let shown = |value: Option<f64>| value.map_or("-".to_string(), |v| format!("{v:.4}"));
     println!(
         "  {:<3}{:<6} published {:>12}  measured {:>12}  before {:>12.4}  calibrated {:>12.4}",

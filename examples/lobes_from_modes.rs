@@ -6,7 +6,7 @@
 
 use std::f64::consts::PI;
 
-use lobestone::campaign::Immersion;
+use lobestone::data::Immersion;
 use lobestone::lobes::{AxisMode, ModalFrf, RegenerativeForce, SpeedLimit, StabilitySolver, speed_grid};
 
 fn main() -> lobestone::Result<()> {

@@ -72,6 +72,7 @@
 //!
 //! | module | what is in it |
 //! |---|---|
+//! | [`data`] | what was measured, on what: FRFs, records, postures, points, tools, cuts as plain values |
 //! | [`signal`] | drift of charge amplifiers, steady windows, spectra, noise of FRFs and records |
 //! | [`modal`] | modes from FRFs, one by one and together; from hammer hits and from accelerations alone |
 //! | [`robot`] | kinematics, the chain of compliant elements, its FRF and static stiffness, inverse kinematics |
@@ -84,6 +85,10 @@
 //! | [`campaign`] | a folder of measurements and its `campaign.toml` |
 //! | [`revision`] | what a campaign's model has learned so far |
 //! | [`analysis`] | whole analyses, as the commands and the report need them: the place to begin |
+#![cfg_attr(
+    feature = "report",
+    doc = "| [`thesis`] | the IRB 6640 case study (feature `report`) |"
+)]
 #![cfg_attr(
     feature = "lab",
     doc = "| [`simulate`] | the virtual lab: campaigns whose truth is known (feature `lab`) |"
@@ -98,7 +103,7 @@
 )]
 #![cfg_attr(feature = "cli", doc = "| [`commands`] | the command line (feature `cli`) |")]
 //!
-//! Below all of them: [`error`], [`files`], [`parameter`], [`progress`], [`stop`], and [`builtin`] data.
+//! Below all of them: [`error`], [`files`], [`parameter`], [`progress`], [`stop`], [`text`], and [`builtin`] data.
 //!
 //! # Features
 //!

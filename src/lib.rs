@@ -1,35 +1,158 @@
-//! Lobestone fits physical models of machining robots to measurements and shows where they fail.
+//! Lobestone fits physical models of machining robots to measurements and says which physics the model lacks.
 //!
-//! Data flows one way: [`ingest`] → [`campaign`] → [`robot`] and [`cutting`] → [`identify`] →
-//! [`discrepancy`] → [`lobes`] → [`report`]. A module knows nothing of the ones after it.
+//! Two kinds of measurement go in: frequency response functions (FRFs) of the robot's structure, from hammer tests, and
+//! records of cutting forces from a dynamometer. Out come modes, a calibrated robot model, cutting force coefficients, the
+//! effect that is missing (or that none is, or none that is known), and the depths of cut that stay free of chatter.
+//!
+//! The program `lobestone` works on campaign folders; the library works on plain values as well. Three ways in:
+//!
+//! # From FRFs to modes
+//!
+//! ```
+//! use lobestone::Complex64;
+//! use lobestone::modal::{Settings, analyse_frf};
+//!
+//! // Receptance in m/N on lines in Hz. Yours is measured; this one has a mode at 12 Hz with 3 % damping.
+//! let frequency_hz: Vec<f64> = (0..400).map(|line| 4.0 + 0.05 * f64::from(line)).collect();
+//! let receptance = |f: &f64| 1e-6 / Complex64::new(1.0 - (f / 12.0).powi(2), 2.0 * 0.03 * f / 12.0);
+//! let receptance_m_per_n: Vec<Complex64> = frequency_hz.iter().map(receptance).collect();
+//!
+//! let found = analyse_frf(&frequency_hz, &receptance_m_per_n, &Settings::default())?;
+//! let mode = found.modes[0].best();
+//! assert!((mode.frequency_hz - 12.0).abs() < 0.001);
+//! assert!((mode.damping_ratio - 0.03).abs() < 1e-4);
+//! # Ok::<(), lobestone::Error>(())
+//! ```
+//!
+//! [`modal::global`] takes several FRFs of one structure together and gives mode shapes, too.
+//!
+//! # From a robot and its FRFs to a calibrated model and a verdict
+//!
+//! ```
+//! use lobestone::analysis::DiagnosisFindings;
+//! use lobestone::identify::Options;
+//! use lobestone::{Campaign, StructureAnalysis};
+//!
+//! // Three postures with the FRFs in X and Y at the tool point; the tool is heavier than the robot file says.
+//! let campaign = Campaign::load("tests/data/blind/frf-9112".as_ref())?;
+//! let calibrated = StructureAnalysis::run(&campaign, Options::default())?;
+//! let stiffness = &calibrated.calibration.parameters[0];
+//! println!("{} = {:.3e} ± {:.0e} {}", stiffness.name, stiffness.value, stiffness.std_error, stiffness.unit);
+//!
+//! let found = DiagnosisFindings::of(&campaign, calibrated.settled_case(), Options::default())?;
+//! let missing = found.diagnosis.winner().map(|effect| effect.label());
+//! println!("missing: {missing:?}, {:.0} % sure", 100.0 * found.diagnosis.confidence);
+//! # Ok::<(), lobestone::Error>(())
+//! ```
+//!
+//! # From coefficients and modes to stability lobes
+//!
+//! ```
+//! use lobestone::lobes::{AxisMode, ModalFrf, RegenerativeForce, SpeedLimit, StabilitySolver, speed_grid};
+//!
+//! let mode = |axis, frequency_hz| AxisMode { axis, frequency_hz, damping_ratio: 0.03, stiffness_n_per_m: 1.2e6 };
+//! let frf = ModalFrf::from_axis_modes(&[mode(0, 12.3), mode(1, 17.8)])?;
+//! // Drilling in aluminium: Ktc and Krc in N/mm², half point angle in rad, two lips.
+//! let force = RegenerativeForce::drilling_lateral(1014.2, 619.9, 1.178, 2)?;
+//! let solver = StabilitySolver::new(force, &frf);
+//!
+//! let limit = solver.absolute_limit().expect("these modes can chatter");
+//! let curve = solver.curve(&speed_grid([100.0, 1500.0, 10.0])?);
+//! let best = &solver.best(&curve, 1)[0];
+//! println!("{:.3} mm at every speed, {:?} mm at {:.0} rpm", limit.depth_mm, best.depth_mm, best.spindle_rpm);
+//! assert!(limit.depth_mm > 0.0 && best.depth_mm.is_none_or(|depth| depth > limit.depth_mm));
+//! # Ok::<(), lobestone::Error>(())
+//! ```
+//!
+//! `examples/` has six programs of this kind, to be run with `cargo run --release --example modes_from_frfs`.
+//!
+//! # The rooms
+//!
+//! Each knows only those above it.
+//!
+//! | module | what is in it |
+//! |---|---|
+//! | [`data`] | what was measured, on what: FRFs, records, postures, points, tools, cuts as plain values |
+//! | [`signal`] | drift of charge amplifiers, steady windows, spectra, noise of FRFs and records |
+//! | [`modal`] | modes from FRFs, one by one and together; from hammer hits and from accelerations alone |
+//! | [`robot`] | kinematics, the chain of compliant elements, its FRF and static stiffness, inverse kinematics |
+//! | [`cutting`] | force models of milling, drilling and turning, averages of records, regression of coefficients |
+//! | [`lobes`] | stability limits over spindle speed, by several solvers; best speeds, redundancy, maps |
+//! | [`effects`] | physical effects that a model may lack, one file each |
+//! | [`identify`] | parameters with priors, the least-squares solver, a model and its data ready to be fitted |
+//! | [`discrepancy`] | where a model fails, which effect it lacks, what to measure next, mistakes of the setup |
+//! | [`ingest`] | readers of laboratory files: UFF, DynoWare, TDMS, LVM, MAT, CSV |
+//! | [`campaign`] | a folder of measurements and its `campaign.toml` |
+//! | [`revision`] | what a campaign's model has learned so far |
+//! | [`analysis`] | whole analyses, as the commands and the report need them: the place to begin |
+#![cfg_attr(
+    feature = "report",
+    doc = "| [`thesis`] | the IRB 6640 case study (feature `report`) |"
+)]
+#![cfg_attr(
+    feature = "lab",
+    doc = "| [`simulate`] | the virtual lab: campaigns whose truth is known (feature `lab`) |"
+)]
+#![cfg_attr(
+    feature = "report",
+    doc = "| [`report`] | figures, pages and tables (feature `report`) |"
+)]
+#![cfg_attr(
+    feature = "serve",
+    doc = "| [`serve`] | the page in a browser (feature `serve`) |"
+)]
+#![cfg_attr(feature = "cli", doc = "| [`commands`] | the command line (feature `cli`) |")]
+//!
+//! Below all of them: [`error`], [`files`], [`parameter`], [`progress`], [`stop`], [`text`], and [`builtin`] data.
+//!
+//! # Features
+//!
+//! `cli`, `serve`, `report` and `lab` (together: `program`) and `parquet` are on by default. A program that only calculates
+//! says `default-features = false` and builds none of the crates for terminals, web pages, pictures and tables.
+//!
+//! # Conventions
+//!
+//! SI inside; where a laboratory counts in mm, degrees, rpm or N/mm², the name says it (`depth_mm`). FRFs are receptances in
+//! m/N for e^{+iωt}, frequencies in Hz ascending. Results do not depend on the number of threads after [`sums_in_order`]. The
+//! library prints nothing: [`progress`] tells how far long work is, and [`stop`] ends it.
 
 pub mod analysis;
 pub mod builtin;
 pub mod campaign;
+#[cfg(feature = "cli")]
 pub mod commands;
 pub mod cutting;
 pub mod data;
 pub mod discrepancy;
 pub mod effects;
 pub mod error;
-pub(crate) mod files;
+pub mod files;
 pub mod identify;
 pub mod ingest;
 pub mod lobes;
 pub mod modal;
 pub mod parameter;
 pub mod progress;
+#[cfg(feature = "report")]
 pub mod report;
 pub mod revision;
 pub mod robot;
-pub(crate) mod serve;
+#[cfg(feature = "serve")]
+pub mod serve;
 pub mod signal;
+#[cfg(feature = "lab")]
 pub mod simulate;
 pub mod stop;
 pub mod text;
+#[cfg(feature = "report")]
 pub mod thesis;
 
+pub use analysis::{ModalAnalysis, StructureAnalysis};
+pub use campaign::Campaign;
 pub use error::{Error, InputError, Result};
+pub use identify::StructureCase;
+/// The complex number of FRFs; of the crate `num-complex`.
+pub use num_complex::Complex64;
 
 /// Keeps each decomposition and each product of dense matrices on one thread: split over threads their sums would run in
 /// another order, and results would differ in the last digits with the number of threads. (The loops around them run in

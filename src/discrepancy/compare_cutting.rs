@@ -3,7 +3,7 @@
 
 use serde::Serialize;
 
-use super::compare::{ErrorTotals, Group, Groups, Sums};
+use super::error_sums::{ErrorTotals, GroupError, Groups, Sums};
 use super::place;
 use crate::campaign::Process;
 use crate::identify::cutting_data::CuttingData;
@@ -14,16 +14,16 @@ use crate::identify::cutting_waves::axis_waves;
 #[derive(Debug, Clone)]
 pub struct CuttingComparison {
     pub totals: ErrorTotals,
-    pub by_cut: Vec<Group>,
-    pub by_axis: Vec<Group>,
+    pub by_cut: Vec<GroupError>,
+    pub by_axis: Vec<GroupError>,
     /// Cutting speed, m/min.
-    pub by_speed: Vec<Group>,
+    pub by_speed: Vec<GroupError>,
     /// Feed per tooth (milling) or revolution (drilling), mm.
-    pub by_feed: Vec<Group>,
+    pub by_feed: Vec<GroupError>,
     /// Milling: order of the tool's rotation, 0 the mean.
-    pub by_harmonic: Vec<Harmonic>,
+    pub by_harmonic: Vec<HarmonicError>,
     /// Place in the sequence of cuts, as the campaign has it; first cut first, empty where it does not say.
-    pub by_order: Vec<Group>,
+    pub by_order: Vec<GroupError>,
     pub cuts: Vec<CutError>,
     /// Where the error sits, in words: the axis, order of rotation and cuts that hold most of what stands above the noise.
     pub mostly: Option<String>,
@@ -31,7 +31,7 @@ pub struct CuttingComparison {
 
 /// Error of one order of rotation over all cuts and axes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Harmonic {
+pub struct HarmonicError {
     pub order: usize,
     /// Relative to the whole signal, so that the squares of all orders add up to that of the total.
     pub nrms: f64,
@@ -135,7 +135,7 @@ impl CuttingComparison {
                 .iter()
                 .enumerate()
                 .filter(|_| milling)
-                .map(|(order, s)| Harmonic {
+                .map(|(order, s)| HarmonicError {
                     order,
                     nrms: whole(s.error),
                     noise_floor_nrms: whole(s.noise),

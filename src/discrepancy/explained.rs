@@ -3,8 +3,8 @@
 use num_complex::Complex64;
 use serde::Serialize;
 
-use super::compare::{BANDS, Sums, band_edges_hz, band_of};
-use super::place::{Amounts, Place, above_noise, excess};
+use super::error_sums::{BANDS, Sums, band_edges_hz, band_of};
+use super::place::{Amounts, DominantRegion, above_noise, excess};
 use crate::campaign::Point;
 use crate::identify::FrfData;
 
@@ -22,9 +22,9 @@ pub struct Explained {
     pub by_point: Vec<NamedPart>,
     pub by_band: Vec<BandPart>,
     /// Where what it takes away stood.
-    pub taken_from: Place,
+    pub taken_from: DominantRegion,
     /// Where what is left above noise stands; `None` where nothing is.
-    pub left_at: Option<Place>,
+    pub left_at: Option<DominantRegion>,
 }
 
 /// One group of values before and after.
@@ -154,7 +154,7 @@ impl Explained {
         }
         let place = |amount: fn(&Change) -> f64| {
             let bands: Vec<f64> = bands.iter().map(amount).collect();
-            Place::new(
+            DominantRegion::new(
                 &edges,
                 &bands,
                 &directions.amounts(amount),

@@ -50,7 +50,7 @@ pub struct Stand {
 
 /// One FRF of a stand, measured `times` times.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Part {
+pub struct MeasurementPart {
     pub stand: usize,
     pub frf: usize,
     pub times: f64,
@@ -63,7 +63,7 @@ pub struct Measurement {
     pub what: String,
     /// Effort in units of one FRF with everything in place.
     pub cost: f64,
-    pub parts: Vec<Part>,
+    pub parts: Vec<MeasurementPart>,
 }
 
 /// FRFs of a [`Measurement`] taken at one posture, for a program.
@@ -289,12 +289,17 @@ impl Lab {
         self.measurements = all;
     }
 
-    fn parts(&self, stand: usize, times: f64, wanted: impl Fn(&FrfDatum, bool) -> bool) -> Vec<Part> {
+    fn parts(
+        &self,
+        stand: usize,
+        times: f64,
+        wanted: impl Fn(&FrfDatum, bool) -> bool,
+    ) -> Vec<MeasurementPart> {
         let Stand { block, present, .. } = &self.stands[stand];
         let chosen = block.frfs.iter().zip(present).enumerate();
         chosen
             .filter(|(_, (frf, there))| wanted(frf, **there))
-            .map(|(frf, _)| Part { stand, frf, times })
+            .map(|(frf, _)| MeasurementPart { stand, frf, times })
             .collect()
     }
 
@@ -313,7 +318,7 @@ impl Lab {
                 && axes.contains(&frf.response.axis)
                 && hits.contains(&frf.reference.axis)
         };
-        let parts: Vec<Vec<Part>> = stands.iter().map(|s| self.parts(*s, 1.0, wanted)).collect();
+        let parts: Vec<Vec<MeasurementPart>> = stands.iter().map(|s| self.parts(*s, 1.0, wanted)).collect();
         if parts.iter().any(Vec::is_empty) {
             return None;
         }
@@ -321,7 +326,7 @@ impl Lab {
             true => 0.0,
             false => NEW_PLACE,
         };
-        let parts: Vec<Part> = parts.into_iter().flatten().collect();
+        let parts: Vec<MeasurementPart> = parts.into_iter().flatten().collect();
         let at = match stands {
             [one] => format!("at {}", self.stands[*one].name),
             _ => "at every posture".into(),
@@ -340,7 +345,7 @@ impl Lab {
         };
         [(1.0, "once more"), (3.0, "three times more")]
             .map(|(times, words)| {
-                let parts: Vec<Part> = stands
+                let parts: Vec<MeasurementPart> = stands
                     .iter()
                     .flat_map(|s| self.parts(*s, times, |_, there| there))
                     .collect();
@@ -354,7 +359,7 @@ impl Lab {
     }
 
     fn harder(&self, present: usize) -> Measurement {
-        let parts: Vec<Part> = (present..2 * present)
+        let parts: Vec<MeasurementPart> = (present..2 * present)
             .flat_map(|s| self.parts(s, 1.0, |_, there| there))
             .collect();
         Measurement {
@@ -366,7 +371,7 @@ impl Lab {
 
     fn at_new_posture(&self, stand: usize) -> Vec<Measurement> {
         let name = &self.stands[stand].name;
-        let measurement = |words: String, parts: Vec<Part>| Measurement {
+        let measurement = |words: String, parts: Vec<MeasurementPart>| Measurement {
             what: format!("measure {words} at {name}"),
             cost: parts.len() as f64 + NEW_POSTURE,
             parts,

@@ -5,9 +5,10 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::diagnose::{Candidate, Diagnosis};
+use super::candidate::EffectCandidate;
+use super::diagnosis::Diagnosis;
 use super::lab::{Lab, NewPoint, Setup};
-use super::verdict::Verdict;
+use super::verdict::DiagnosisVerdict;
 use crate::Result;
 use crate::campaign::Posture;
 use crate::effects::Instance;
@@ -71,7 +72,7 @@ impl fmt::Display for NextMeasurement {
     }
 }
 
-type StructureCandidate = Candidate<StructureModel, Instance>;
+type StructureCandidate = EffectCandidate<StructureModel, Instance>;
 
 /// What to measure next on a robot. `postures`: the campaign's.
 ///
@@ -83,7 +84,7 @@ pub fn advise(
     diagnosis: &Diagnosis<StructureModel, Instance>,
 ) -> Result<NextMeasurement> {
     match (diagnosis.verdict, diagnosis.winner()) {
-        (Verdict::Effect, Some(winner)) => {
+        (DiagnosisVerdict::Effect, Some(winner)) => {
             let others = || {
                 diagnosis
                     .candidates
@@ -105,7 +106,7 @@ pub fn advise(
                 ..advice
             })
         }
-        (Verdict::Unknown, _) => Ok(NextMeasurement::words(where_it_sits(data, diagnosis))),
+        (DiagnosisVerdict::Unknown, _) => Ok(NextMeasurement::words(where_it_sits(data, diagnosis))),
         _ => Ok(NextMeasurement::words(
             "none needed for this model; two more postures or a second hammer level would test it further",
         )),

@@ -64,7 +64,7 @@ pub struct PlannedAddition {
 
 /// What the plan would show.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
+pub struct PlanOutlook {
     /// Best seen first.
     pub effects: Vec<PlannedEffect>,
     /// Pairs of effects that are seen but not told apart, nearest first.
@@ -95,7 +95,7 @@ struct Fitted {
     chi2: f64,
 }
 
-impl Plan {
+impl PlanOutlook {
     /// `model`: without effects. `data`: the FRFs planned, with their noise; their values are not looked at.
     ///
     /// # Errors
@@ -200,7 +200,7 @@ impl Plan {
         let (additions, out_of_reach) = additions(model, postures, &full, &subjects, &lacks)?;
         let mut effects: Vec<PlannedEffect> = subjects.iter().map(|s| s.planned(model)).collect();
         effects.sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
-        Ok(Plan {
+        Ok(PlanOutlook {
             effects,
             confusable,
             additions,

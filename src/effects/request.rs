@@ -1,6 +1,7 @@
 //! What a user means by `EFFECT[@SITE]`.
 
-use super::{DRAWN, DataSummary, Instance, STRUCTURAL, Site, StructuralEffect, find};
+use super::effect::{DataSummary, Instance, Site, StructuralEffect};
+use super::registry::{DRAWN, STRUCTURAL, find};
 use crate::campaign::robot_spec::RobotSpec;
 use crate::campaign::suggest::{closest, shown};
 use crate::{InputError, Result};

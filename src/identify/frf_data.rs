@@ -1,17 +1,57 @@
 //! Measured FRFs arranged for fitting: grouped by what the model has to be set up for once.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use crate::campaign::{Campaign, FrfSet, MeasuredDof, MeasuredFrf, Posture};
+use crate::campaign::{MeasuredDof, MeasuredFrf, Posture};
 use crate::effects::DataSummary;
 use crate::ingest::Axis;
 use crate::robot::Kinematics;
 use crate::robot::RobotModel;
 use crate::signal::frf_noise;
 use crate::{InputError, Result};
+
+impl MeasuredDof {
+    /// Along the positive `axis` of the `point`-th point.
+    pub fn new(point: usize, axis: Axis) -> Self {
+        MeasuredDof {
+            point,
+            axis,
+            negative: false,
+        }
+    }
+}
+
+impl MeasuredFrf {
+    /// An FRF in memory, named by its degrees of freedom: receptance in m/N on ascending frequencies above zero, between two
+    /// of the points, at the `posture`-th posture.
+    pub fn new(
+        posture: usize,
+        response: MeasuredDof,
+        reference: MeasuredDof,
+        frequency_hz: Vec<f64>,
+        receptance_m_per_n: Vec<Complex64>,
+    ) -> Self {
+        let dof = |d: MeasuredDof| {
+            let sign = if d.negative { "-" } else { "" };
+            format!("{}{sign}{}", d.point + 1, d.axis.letter())
+        };
+        MeasuredFrf {
+            posture,
+            response,
+            reference,
+            name: format!("p{} {}/{}", posture + 1, dof(response), dof(reference)),
+            frequency_hz,
+            receptance_m_per_n,
+            coherence: None,
+            force_level_n: None,
+            file: PathBuf::new(),
+        }
+    }
+}
 
 /// One FRF as data: receptance and its noise.
 #[derive(Debug, Clone)]
@@ -68,15 +108,16 @@ pub struct FrfData {
 const FALLBACK_RELATIVE_NOISE: f64 = 0.05;
 
 impl FrfData {
-    pub fn new(campaign: &Campaign, model: &RobotModel, set: FrfSet) -> Result<Self> {
-        if set.frfs.is_empty() {
-            return Err(InputError::new("the campaign has no FRFs")
-                .file(campaign.dir.join("campaign.toml"))
-                .key("frf")
-                .remedy("add [[frf]] tables that name the measured FRF files")
-                .into());
+    /// FRFs arranged for fitting, with the noise that they show. `postures` and the points of the FRFs are told by their
+    /// index.
+    ///
+    /// # Errors
+    /// No FRFs, or a posture that does not fit the robot.
+    pub fn new(postures: &[Posture], model: &RobotModel, frfs: Vec<MeasuredFrf>) -> Result<Self> {
+        if frfs.is_empty() {
+            return Err(InputError::new("there are no FRFs to fit a model to").into());
         }
-        let mut data = Self::arrange(&campaign.postures, model, set.frfs)?;
+        let mut data = Self::arrange(postures, model, frfs)?;
         data.blocks
             .par_iter_mut()
             .for_each(|block| estimate_noise(Arc::make_mut(block)));

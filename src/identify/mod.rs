@@ -16,6 +16,7 @@ pub mod frf_data;
 pub mod levenberg_marquardt;
 pub mod modal_start;
 pub mod modal_table;
+pub mod model_history;
 pub mod off_comb;
 pub mod posture_modes;
 pub mod resonance_study;

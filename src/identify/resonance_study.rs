@@ -23,7 +23,7 @@ use crate::robot::{Kinematics, RobotSpec};
 /// How a resonance was read off its FRF.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Reading {
+pub enum ResonanceReading {
     /// Natural frequency, and the largest real part beside it.
     ModalTable,
     /// Where the real part has a minimum, and its depth.
@@ -36,7 +36,7 @@ pub struct Resonance {
     /// Index of the configuration.
     pub configuration: usize,
     pub axis: Axis,
-    pub reading: Reading,
+    pub reading: ResonanceReading,
     pub frequency_hz: f64,
     /// Lowest and highest reading behind it, Hz.
     pub readings_hz: [f64; 2],
@@ -215,8 +215,8 @@ impl ResonanceStudy {
 /// A mode as a resonance of this reading would show it: frequency in Hz, size in m/N.
 fn reading(resonance: &Resonance, mode: &PostureMode) -> (f64, f64) {
     match resonance.reading {
-        Reading::ModalTable => (mode.frequency_hz, mode.peak_real_m_per_n(resonance.axis)),
-        Reading::RealPartMinimum => (mode.minimum_hz(), mode.depth_m_per_n(resonance.axis)),
+        ResonanceReading::ModalTable => (mode.frequency_hz, mode.peak_real_m_per_n(resonance.axis)),
+        ResonanceReading::RealPartMinimum => (mode.minimum_hz(), mode.depth_m_per_n(resonance.axis)),
     }
 }
 
@@ -235,8 +235,8 @@ fn misfit_slopes(resonance: &Resonance, mode: &PostureMode, widening: f64) -> [D
     let compliance = &mode.ln_compliance_slope[resonance.axis.index()];
     // Of ½ ln(1 + 2ζ), and of −ln ζ(1 ∓ ζ).
     let (shift, scale) = match resonance.reading {
-        Reading::ModalTable => (0.0, -1.0 / zeta + 1.0 / (1.0 - zeta)),
-        Reading::RealPartMinimum => (1.0 / (1.0 + 2.0 * zeta), -1.0 / zeta - 1.0 / (1.0 + zeta)),
+        ResonanceReading::ModalTable => (0.0, -1.0 / zeta + 1.0 / (1.0 - zeta)),
+        ResonanceReading::RealPartMinimum => (1.0 / (1.0 + 2.0 * zeta), -1.0 / zeta - 1.0 / (1.0 + zeta)),
     };
     let with_damping = |own: &[f64], factor: f64| {
         let pairs = own.iter().zip(&mode.damping_slope);
@@ -510,5 +510,7 @@ impl Study for ResonanceStudy {
     }
 }
 
+#[cfg(test)]
+pub(crate) mod made_table;
 #[cfg(test)]
 mod tests;

@@ -7,9 +7,9 @@ use super::{MINIMA, MODAL, STATIC_STIFFNESS, posture_deg};
 use super::{ModalRow, RECURRING_BANDS, StaticRow, rows};
 use crate::discrepancy::difference::{Difference, Lookout, greatest_difference};
 use crate::discrepancy::verdict::{STRONG_BIC, evidence_weight};
-use crate::discrepancy::{Verdict, diagnose};
+use crate::discrepancy::{DiagnosisVerdict, diagnose};
 use crate::identify::modal_table::{FREQUENCY_STD, PEAK_STD};
-use crate::identify::resonance_study::{Minimum, Reading, Resonance, ResonanceStudy, merged};
+use crate::identify::resonance_study::{Minimum, Resonance, ResonanceReading, ResonanceStudy, merged};
 use crate::identify::{Estimate, StructureModel};
 use crate::ingest::Axis;
 use crate::robot::PostureReport;
@@ -31,7 +31,7 @@ const LEAST_SHARE: f64 = 0.1;
 /// The answer and what it rests on.
 #[derive(Debug, Clone, Serialize)]
 pub struct RealCase {
-    pub verdict: Verdict,
+    pub verdict: DiagnosisVerdict,
     pub confidence: f64,
     /// Resonances after neighbouring minima were merged; two numbers each.
     pub resonances: Vec<MeasuredResonance>,
@@ -65,7 +65,7 @@ pub struct RealCase {
 pub struct MeasuredResonance {
     pub configuration: String,
     pub axis: char,
-    pub reading: Reading,
+    pub reading: ResonanceReading,
     pub frequency_hz: f64,
     /// Lowest and highest reading behind it.
     pub readings_hz: [f64; 2],
@@ -118,7 +118,7 @@ pub struct BandCheck {
 /// The loop's answer with wider standard deviations.
 #[derive(Debug, Clone, Serialize)]
 pub struct Widened {
-    pub verdict: Verdict,
+    pub verdict: DiagnosisVerdict,
     pub confidence: f64,
     pub best: String,
     pub delta_bic: f64,
@@ -158,7 +158,7 @@ pub fn resonances(widening: f64) -> Result<Vec<Resonance>> {
         all.push(Resonance {
             configuration: configuration(&row.configuration)?,
             axis: axis(&row.axis)?,
-            reading: Reading::ModalTable,
+            reading: ResonanceReading::ModalTable,
             frequency_hz: row.frequency_hz,
             readings_hz: [row.frequency_hz; 2],
             frequency_std: widening * FREQUENCY_STD,
@@ -185,7 +185,7 @@ pub fn resonances(widening: f64) -> Result<Vec<Resonance>> {
             all.push(Resonance {
                 configuration,
                 axis,
-                reading: Reading::RealPartMinimum,
+                reading: ResonanceReading::RealPartMinimum,
                 frequency_hz: group.frequency_hz,
                 readings_hz: group.readings_hz,
                 frequency_std: widening * FREQUENCY_STD.hypot(group.spread),
@@ -437,10 +437,10 @@ mod tests {
     #[test]
     fn the_tables_leave_it_open_and_propose_the_tilt_of_joint_2() {
         let case = real_case(&untuned_model().unwrap()).unwrap();
-        assert_eq!(case.verdict, Verdict::Unknown);
+        assert_eq!(case.verdict, DiagnosisVerdict::Unknown);
         assert_eq!(case.candidates[0].name, "joint-transverse-compliance@joint-2");
         assert_eq!(case.widened.best, case.candidates[0].name);
-        assert_eq!(case.widened.verdict, Verdict::Unknown);
+        assert_eq!(case.widened.verdict, DiagnosisVerdict::Unknown);
         assert!(case.candidates[0].weight < 0.7 && !case.rivals.is_empty());
         assert!(
             case.candidates

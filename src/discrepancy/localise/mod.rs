@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::Result;
-use crate::effects::drawn::{self, Form};
+use crate::effects::drawn::{self, DrawnForm};
 use crate::effects::{Instance, Spot};
 use crate::identify::calibrate::{Calibration, Estimate, estimates};
 use crate::identify::levenberg_marquardt::{Stopping, minimise};
@@ -28,7 +28,7 @@ use super::verdict::is_convincing;
 /// One form tried at a place.
 #[derive(Debug, Clone)]
 pub struct FormFit {
-    pub form: Form,
+    pub form: DrawnForm,
     /// BIC less that of the model without it (coarse view of the data): below zero it pays for its parameters.
     pub delta_bic: f64,
 }
@@ -53,7 +53,7 @@ pub struct LocalisedPlace {
 #[derive(Debug, Clone)]
 pub struct BestForm {
     pub instance: Instance,
-    pub form: Form,
+    pub form: DrawnForm,
     pub model: StructureModel,
     pub theta: Vec<f64>,
     /// The form's own parameters.
@@ -300,7 +300,7 @@ fn fit_forms(
 }
 
 /// Starting values of a form from the drawn curve, natural units in the order of its parameters.
-fn starting_values(form: Form, screened: &Screened) -> Vec<Vec<f64>> {
+fn starting_values(form: DrawnForm, screened: &Screened) -> Vec<Vec<f64>> {
     let (mut weight, mut re, mut im) = (0.0, 0.0, 0.0);
     let (mut along, mut square, mut inertia, mut fourth) = (0.0, 0.0, 0.0, 0.0);
     for point in screened.curve.iter().filter(|p| p.std.is_finite() && p.std > 0.0) {
@@ -320,17 +320,17 @@ fn starting_values(form: Form, screened: &Screened) -> Vec<Vec<f64>> {
     let (spring, damper, mass) = (re / weight, along / square, inertia / fourth);
     let loss = im / weight;
     match form {
-        Form::Spring => vec![vec![spring]],
-        Form::Damper => vec![vec![damper]],
-        Form::SpringDamper => vec![vec![spring, damper]],
-        Form::Mass => vec![vec![mass]],
-        Form::LossFactor if matches!(screened.spot, Spot::Joint(_)) => vec![vec![loss]],
-        Form::LossFactor => vec![vec![spring, (loss / spring).abs()]],
-        Form::Resonator => screen::resonators(&screened.curve, 3)
+        DrawnForm::Spring => vec![vec![spring]],
+        DrawnForm::Damper => vec![vec![damper]],
+        DrawnForm::SpringDamper => vec![vec![spring, damper]],
+        DrawnForm::Mass => vec![vec![mass]],
+        DrawnForm::LossFactor if matches!(screened.spot, Spot::Joint(_)) => vec![vec![loss]],
+        DrawnForm::LossFactor => vec![vec![spring, (loss / spring).abs()]],
+        DrawnForm::Resonator => screen::resonators(&screened.curve, 3)
             .into_iter()
             .map(Vec::from)
             .collect(),
-        Form::TwoResonators => {
+        DrawnForm::TwoResonators => {
             let single = screen::resonators(&screened.curve, 3);
             let mut pairs = Vec::new();
             for (i, a) in single.iter().enumerate() {
@@ -338,8 +338,8 @@ fn starting_values(form: Form, screened: &Screened) -> Vec<Vec<f64>> {
             }
             pairs
         }
-        Form::Maxwell => vec![vec![spring.abs(), spring.abs() / 100.0]],
-        Form::RotorOnSpring => vec![vec![spring.abs(), damper, mass.abs()]],
+        DrawnForm::Maxwell => vec![vec![spring.abs(), spring.abs() / 100.0]],
+        DrawnForm::RotorOnSpring => vec![vec![spring.abs(), damper, mass.abs()]],
     }
 }
 

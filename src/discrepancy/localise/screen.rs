@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
 use crate::effects::Spot;
-use crate::effects::drawn::{self, Form};
+use crate::effects::drawn::{self, DrawnForm};
 use crate::identify::spot_response::{SpotLine, SpotResponses};
 use crate::parameter::Parameter;
 
@@ -254,7 +254,7 @@ pub fn resonators(curve: &[CurvePoint], count: usize) -> Vec<[f64; 3]> {
 /// Dynamic stiffness of 1 kg on a spring, N/m.
 fn resonator_stiffness(frequency_hz: f64, natural_hz: f64, damping_ratio: f64) -> Complex64 {
     let values = [1.0, natural_hz, damping_ratio];
-    drawn::dynamic_stiffness(Spot::LinkAxis(1, 0), Form::Resonator, &values, frequency_hz)
+    drawn::dynamic_stiffness(Spot::LinkAxis(1, 0), DrawnForm::Resonator, &values, frequency_hz)
 }
 
 #[cfg(test)]

@@ -136,13 +136,13 @@ fn nothing_is_found_where_nothing_is_wrong() {
 fn mistakes_are_found_with_their_size() {
     let model = model();
     let all = mistakes::all(&model, &arrangement(&model));
-    let at = |posture: Option<usize>| Group {
+    let at = |posture: Option<usize>| FrfGroup {
         posture,
-        ..Group::ALL
+        ..FrfGroup::ALL
     };
     let tau = std::f64::consts::TAU;
     // Index among the mistakes, where, sizes, kind, value told.
-    let cases: [(usize, Group, &[f64], &str, f64); 8] = [
+    let cases: [(usize, FrfGroup, &[f64], &str, f64); 8] = [
         (2, at(None), &[0.8], "encoder-offset", 0.8),
         (4, at(Some(1)), &[-2.0], "encoder-offset", -2.0),
         (7, at(None), &[0.03, -0.02, 0.01], "point-position", 37.42),
@@ -231,7 +231,7 @@ fn wrong_readings_are_found() {
 fn small_errors_take_what_differs_between_postures_and_no_more() {
     let model = model();
     let all = mistakes::all(&model, &arrangement(&model));
-    let share_taken = |index: usize, group: Group, values: &[f64]| {
+    let share_taken = |index: usize, group: FrfGroup, values: &[f64]| {
         let made = Made {
             mistake: all[index].as_ref(),
             group,
@@ -258,15 +258,15 @@ fn small_errors_take_what_differs_between_postures_and_no_more() {
             .unwrap();
         1.0 - same.excess / before.excess
     };
-    let posture = Group {
+    let posture = FrfGroup {
         posture: Some(0),
-        ..Group::ALL
+        ..FrfGroup::ALL
     };
     let taken = share_taken(9, posture, &[2.0, -1.5, 1.0]);
     assert!(taken > 0.9, "{taken}");
     // Too large for slopes alone.
     let taken = share_taken(9, posture, &[12.0, -9.0, 6.0]);
     assert!(taken > 0.9, "{taken}");
-    let taken = share_taken(16, Group::ALL, &[3.0]);
+    let taken = share_taken(16, FrfGroup::ALL, &[3.0]);
     assert!(taken < 0.7, "{taken}");
 }

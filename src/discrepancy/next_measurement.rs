@@ -12,7 +12,7 @@ use super::verdict::DiagnosisVerdict;
 use crate::Result;
 use crate::campaign::Posture;
 use crate::effects::Instance;
-use crate::identify::structure::{FrfProblem, Misfit};
+use crate::identify::frf_problem::{FrfProblem, Misfit};
 use crate::identify::{FrfData, LeastSquares, StructureModel};
 
 /// Standard deviations that a measurement should promise: what is found scatters by two about their square's root, and

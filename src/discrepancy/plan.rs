@@ -11,8 +11,8 @@ use super::lab::Lab;
 use crate::Result;
 use crate::campaign::Posture;
 use crate::effects::{self, DataSummary, Instance};
+use crate::identify::frf_problem::{FrfProblem, Misfit};
 use crate::identify::levenberg_marquardt::{Stopping, minimise};
-use crate::identify::structure::{FrfProblem, Misfit};
 use crate::identify::{FrfData, LeastSquares, StructureModel};
 
 /// Standard deviations from which on an effect counts as seen, and two as told apart.

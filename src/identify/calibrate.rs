@@ -8,8 +8,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::frf_data::FrfData;
+use super::frf_problem::{FrfProblem, Misfit};
 use super::levenberg_marquardt::{Ending, Fit, LeastSquares, Stopping, minimise};
-use super::structure::{FrfProblem, Misfit, StructureModel};
+use super::structure::StructureModel;
 use crate::effects::Size;
 use crate::parameter::Parameter;
 use crate::progress::Progress;

@@ -12,8 +12,9 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
+use super::channels::Channels;
 use super::frf_data::{FrfBlock, FrfData};
-use super::structure::{Channels, StructureModel};
+use super::structure::StructureModel;
 use crate::Result;
 use crate::effects::Spot;
 use crate::robot::frf::{Response, Slopes};

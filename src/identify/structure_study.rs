@@ -4,9 +4,11 @@ use num_complex::Complex64;
 
 use super::calibrate::{Calibration, Estimate, GLANCE_VALUES, Options, calibrate, sketch};
 use super::frf_data::FrfData;
+use super::frf_problem::{FrfProblem, Misfit};
 use super::levenberg_marquardt::Stopping;
-use super::rest::{self, AfterSlips, BeyondSlips, Rest, RestCurve, SMALL_ERROR};
-use super::structure::{FrfProblem, Misfit, StructureModel};
+use super::rest::{AfterSlips, BeyondSlips, Rest, RestCurve, SMALL_ERROR};
+use super::rest_patterns;
+use super::structure::StructureModel;
 use super::study::{EffectName, Extent, HeldOut, Measure, Residual, Study, View, held_out};
 use crate::Result;
 use crate::campaign::robot_spec::RobotSpec;
@@ -240,7 +242,7 @@ impl Study for StructureStudy {
 
     fn rest(&self, model: &StructureModel, theta: &[f64]) -> Result<Rest> {
         Ok(Rest {
-            tests: rest::test(&model.rest(theta, &self.data)?),
+            tests: rest_patterns::test(&model.rest(theta, &self.data)?),
             small_errors: small_errors(&self.data),
             beyond_slips: None,
         })
@@ -250,7 +252,7 @@ impl Study for StructureStudy {
         let Some(absorb) = self.slips else { return Ok(None) };
         let mut curves = model.rest(theta, &self.data)?;
         let after = absorb(model, &self.data, theta, &curves)?;
-        Ok(Some(rest::test_beyond(&mut curves, after)))
+        Ok(Some(rest_patterns::test_beyond(&mut curves, after)))
     }
 
     fn impossible(&self, model: &StructureModel, instance: &Instance, own: &[Estimate]) -> Option<String> {

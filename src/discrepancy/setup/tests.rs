@@ -12,9 +12,9 @@ use super::*;
 use crate::campaign::{AxesRef, BodyRef, MeasuredDof, Point, RobotSection};
 use crate::identify::StructureModel;
 use crate::identify::frf_data::{FrfBlock, FrfData, FrfDatum};
+use crate::identify::frf_problem::{FrfProblem, Misfit};
 use crate::identify::levenberg_marquardt::{Stopping, minimise};
-use crate::identify::rest;
-use crate::identify::structure::{FrfProblem, Misfit};
+use crate::identify::{rest, rest_patterns};
 use crate::ingest::Axis;
 use crate::robot::RobotModel;
 use crate::robot::fixture::{TAP_POSTURES, irb6640};
@@ -246,11 +246,11 @@ fn small_errors_take_what_differs_between_postures_and_no_more() {
         };
         let fit = minimise(&problem, &truth(&model), &model.bounds(), Stopping::default()).unwrap();
         let mut curves = model.rest(&fit.theta, &data).unwrap();
-        let tests = rest::test(&curves);
+        let tests = rest_patterns::test(&curves);
         let before = *rest::largest(&tests).expect("it shows");
         let after = absorb_slips(&model, &data, &fit.theta, &curves).unwrap();
         assert!(after.price > 0.0 && after.evidence > 0.0);
-        let beyond = rest::test_beyond(&mut curves, after);
+        let beyond = rest_patterns::test_beyond(&mut curves, after);
         let same = beyond
             .tests
             .iter()

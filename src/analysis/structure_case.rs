@@ -33,6 +33,7 @@ pub fn structure_model(campaign: &Campaign) -> Result<StructureModel> {
 /// Link parameters that are free beside those that the campaign frees itself.
 #[derive(Debug, Clone, Default)]
 pub struct Freed<'a> {
+    /// Groups that are free, within their usual tolerance where the campaign gives none.
     pub groups: &'a [LinkGroup],
     /// Only these of all link parameters, by name; `None`: all of the groups.
     pub only: Option<&'a [String]>,

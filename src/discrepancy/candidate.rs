@@ -8,8 +8,11 @@ use crate::identify::study::{EffectName, HeldOut, Residual};
 /// One effect at one site, tried.
 #[derive(Debug, Clone)]
 pub struct EffectCandidate<M, I> {
+    /// The effect with its place and discrete choice.
     pub instance: I,
+    /// What it is called.
     pub name: EffectName,
+    /// Error with it: sqrt(Σ|model − measured|² / Σ|measured|²).
     pub nrms: f64,
     /// On folds left out of the fit; `None` with one fold.
     pub held_out: Option<HeldOut>,
@@ -33,11 +36,14 @@ pub struct EffectCandidate<M, I> {
     pub vanished: bool,
     /// Fitted on all data; otherwise on the coarse view only, far behind the leaders there.
     pub refined: bool,
+    /// Where its fit stands, solver's scale; the effect's own parameters last.
     pub theta: Vec<f64>,
+    /// The model with it.
     pub model: M,
 }
 
 impl<M, I> EffectCandidate<M, I> {
+    /// `effect@site`, or the bare id.
     pub fn label(&self) -> String {
         self.name.label()
     }
@@ -74,10 +80,15 @@ impl<M, I> EffectCandidate<M, I> {
 /// The model as it stands.
 #[derive(Debug, Clone)]
 pub struct BaselineFit {
+    /// Its fit.
     pub calibration: Calibration,
+    /// Where that stands, solver's scale.
     pub theta: Vec<f64>,
+    /// What it leaves, by size.
     pub residual: Residual,
+    /// Error on folds left out of the fit; `None` with one fold.
     pub held_out: Option<HeldOut>,
+    /// Weighted misfit per degree of freedom: 1 is noise.
     pub reduced_chi2: f64,
     /// What tests of structure find in what it leaves.
     pub rest: Rest,

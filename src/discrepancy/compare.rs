@@ -12,20 +12,28 @@ use crate::identify::FrfData;
 /// Error within a frequency band.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Band {
+    /// Lower edge, Hz.
     pub from_hz: f64,
+    /// Upper edge, Hz.
     pub to_hz: f64,
+    /// Error over the signal in the band.
     pub nrms: f64,
+    /// nrms of a perfect model.
     pub noise_floor_nrms: f64,
 }
 
 /// Error of one FRF.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FrfError {
+    /// Posture and degrees of freedom, `p1 1X/1X`.
     pub name: String,
+    /// Its id.
     pub posture: String,
     /// Response axis, reference axis.
     pub direction: String,
+    /// Error over the signal.
     pub nrms: f64,
+    /// nrms of a perfect model.
     pub noise_floor_nrms: f64,
     /// Frequency response assurance criterion, 0..1; `None` where model or measurement is zero.
     pub frac: Option<f64>,
@@ -40,8 +48,11 @@ pub struct FrfError {
 /// The line of an FRF on which model and measurement differ most against the noise; magnitudes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct WorstLine {
+    /// Hz.
     pub frequency_hz: f64,
+    /// |measured|, m/N.
     pub measured_m_per_n: f64,
+    /// |model|, m/N.
     pub model_m_per_n: f64,
     /// Standard deviation of the complex value there.
     pub noise_m_per_n: f64,
@@ -64,7 +75,9 @@ impl FrfError {
 /// The error map: postures × directions × bands, nrms; `None` where nothing was measured.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ErrorMap {
+    /// Their ids, in order of first appearance in the data.
     pub postures: Vec<String>,
+    /// Response axis, reference axis: `XX`, `XY`, …
     pub directions: Vec<String>,
     /// Edges, Hz: one more than there are bands.
     pub band_edges_hz: Vec<f64>,
@@ -82,19 +95,24 @@ pub struct ErrorMap {
     pub direction_band: Vec<Vec<Option<f64>>>,
     /// Both, error over noise: 1 where only noise is left.
     pub posture_band_times_noise: Vec<Vec<Option<f64>>>,
+    /// `[direction][band]`, error over noise.
     pub direction_band_times_noise: Vec<Vec<Option<f64>>>,
 }
 
 /// Model against measurement, FRFs as receptance on the measured lines.
 #[derive(Debug, Clone)]
 pub struct FrfComparison {
+    /// Over everything.
     pub totals: ErrorTotals,
+    /// One a posture, in order of first appearance.
     pub by_posture: Vec<GroupError>,
     /// Response axis, reference axis: `XX`, `XY`, …
     pub by_direction: Vec<GroupError>,
     /// Node number of the response.
     pub by_point: Vec<GroupError>,
+    /// One a band in which something was measured.
     pub by_band: Vec<Band>,
+    /// By posture, direction and band.
     pub map: ErrorMap,
     /// Where most of what stands above the noise sits; `None` where nothing does.
     pub mostly: Option<DominantRegion>,

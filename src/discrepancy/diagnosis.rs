@@ -6,6 +6,7 @@ use super::verdict::DiagnosisVerdict;
 /// The answer.
 #[derive(Debug, Clone)]
 pub struct Diagnosis<M, I> {
+    /// Whether an effect is missing.
     pub verdict: DiagnosisVerdict,
     /// Index among the candidates of the effect that is missing, if one is.
     pub effect: Option<usize>,
@@ -21,6 +22,7 @@ pub struct Diagnosis<M, I> {
     pub indistinguishable: Vec<String>,
     /// The second effect, where two together explain what one alone does not.
     pub companion: Option<String>,
+    /// The model as it stands.
     pub baseline: BaselineFit,
     /// Effects that this data cannot show, with the reason.
     pub not_tried: Vec<(String, String)>,
@@ -30,6 +32,7 @@ pub struct Diagnosis<M, I> {
 }
 
 impl<M, I> Diagnosis<M, I> {
+    /// The candidate that is missing; `None` where the verdict names none.
     pub fn winner(&self) -> Option<&EffectCandidate<M, I>> {
         self.effect.map(|w| &self.candidates[w])
     }

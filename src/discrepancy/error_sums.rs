@@ -19,8 +19,11 @@ pub struct ErrorTotals {
 /// Error of one group of FRFs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GroupError {
+    /// What the group has in common: a posture, an axis, a cut.
     pub name: String,
+    /// Error over the signal.
     pub nrms: f64,
+    /// nrms of a perfect model.
     pub noise_floor_nrms: f64,
 }
 

@@ -35,6 +35,7 @@ pub struct Stand {
     pub posture: Option<usize>,
     /// In words: `posture p2`.
     pub name: String,
+    /// Joint angles, degrees.
     pub joints_deg: Vec<f64>,
     /// All FRFs that could be taken, on the lines looked at; without values.
     pub block: FrfBlock,
@@ -51,8 +52,11 @@ pub struct Stand {
 /// One FRF of a stand, measured `times` times.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeasurementPart {
+    /// Index among the [`Lab`]'s stands.
     pub stand: usize,
+    /// Index among the stand's FRFs.
     pub frf: usize,
+    /// How often it is measured.
     pub times: f64,
 }
 
@@ -63,6 +67,7 @@ pub struct Measurement {
     pub what: String,
     /// Effort in units of one FRF with everything in place.
     pub cost: f64,
+    /// The FRFs that it consists of.
     pub parts: Vec<MeasurementPart>,
 }
 
@@ -71,9 +76,11 @@ pub struct Measurement {
 pub struct Setup {
     /// `null`: a new posture.
     pub posture: Option<String>,
+    /// Joint angles, degrees.
     pub joints_deg: Vec<f64>,
     /// `2X/1Y`: response / hit.
     pub frfs: Vec<String>,
+    /// How often each is measured.
     pub times: f64,
     /// Hammer force against the present one.
     pub harder: f64,
@@ -82,8 +89,11 @@ pub struct Setup {
 /// A point that the campaign does not have yet.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NewPoint {
+    /// Node number that is still free.
     pub node: i64,
+    /// The body that it sits on: `link3`, `tool`.
     pub body: String,
+    /// In the frame of that body, m.
     pub position_m: [f64; 3],
 }
 
@@ -94,7 +104,9 @@ pub struct Lab {
     pub points: Vec<Point>,
     /// How many of them are the campaign's own.
     own_points: usize,
+    /// Postures and hammer levels at which one could measure.
     pub stands: Vec<Stand>,
+    /// What could be measured there.
     pub measurements: Vec<Measurement>,
 }
 

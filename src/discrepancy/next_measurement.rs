@@ -46,8 +46,11 @@ pub struct NextMeasurement {
 /// Another measurement.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Alternative {
+    /// In words.
     pub what: String,
+    /// As [`NextMeasurement::expected_sigmas`].
     pub expected_sigmas: f64,
+    /// As [`NextMeasurement::cost`].
     pub cost: f64,
 }
 

@@ -12,9 +12,13 @@ const SURE: f64 = 4.0;
 /// Where most of something sits; an empty list: everywhere.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DominantRegion {
+    /// Lower end, Hz.
     pub from_hz: f64,
+    /// Upper end, Hz.
     pub to_hz: f64,
+    /// Response axis, reference axis: `XX`, `XY`, …
     pub directions: Vec<String>,
+    /// Their ids.
     pub postures: Vec<String>,
     /// Node numbers.
     pub points: Vec<String>,

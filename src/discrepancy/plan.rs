@@ -31,7 +31,9 @@ const STOPPING: Stopping = Stopping {
 /// How plainly an effect of usual size would show.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlannedEffect {
+    /// Its id.
     pub effect: String,
+    /// `joint-2`, `link-4`; `None` where the effect has no place of its own.
     pub site: Option<String>,
     /// Standard deviations after the baseline has taken in what it can.
     pub sigmas: f64,
@@ -42,7 +44,9 @@ pub struct PlannedEffect {
 /// Two effects that the plan would not tell apart.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Confusable {
+    /// `effect@site`.
     pub a: String,
+    /// `effect@site`.
     pub b: String,
     /// The lesser of both directions: `a` true and `b` fitted, and the other way round.
     pub sigmas: f64,
@@ -51,6 +55,7 @@ pub struct Confusable {
 /// A measurement that would mend a lack.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlannedAddition {
+    /// In words.
     pub what: String,
     /// More standard deviations for the first of `mends`.
     pub sigmas_gained: f64,

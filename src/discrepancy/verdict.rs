@@ -9,6 +9,7 @@ use super::something_else;
 use crate::identify::HeldOut;
 use crate::identify::rest::Rest;
 
+/// What the loop says about missing physics.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum DiagnosisVerdict {
@@ -103,6 +104,7 @@ pub struct EffectPair {
     pub gain: f64,
     /// Weighted misfit per degree of freedom that both together leave.
     pub reduced_chi2: f64,
+    /// What both leave.
     pub rest: Rest,
 }
 
@@ -116,12 +118,17 @@ impl EffectPair {
 /// What the loop concludes.
 #[derive(Debug, Clone)]
 pub struct Decision {
+    /// The verdict.
     pub verdict: DiagnosisVerdict,
+    /// Index among the candidates of the effect that is missing, if one is.
     pub effect: Option<usize>,
     /// The best of the library where the verdict is unknown.
     pub best_guess: Option<usize>,
+    /// The second effect, where two together explain what one alone does not.
     pub companion: Option<String>,
+    /// Probability that the verdict is right.
     pub confidence: f64,
+    /// `effect@site` of rivals that this data cannot tell from the verdict.
     pub indistinguishable: Vec<String>,
 }
 

@@ -14,12 +14,17 @@ use crate::robot::{Attachment, AttachmentLaw, Branch as HungMass, Chain, Dual, E
 /// A law of force over displacement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DrawnForm {
+    /// Force in proportion to the displacement.
     Spring,
+    /// Force in proportion to the speed.
     Damper,
+    /// Both next to each other.
     SpringDamper,
+    /// Force in proportion to the acceleration.
     Mass,
     /// A mass on a spring.
     Resonator,
+    /// Two masses, each on a spring of its own.
     TwoResonators,
     /// A spring with a loss factor.
     LossFactor,
@@ -82,7 +87,9 @@ const FORMS: [DrawnForm; 9] = [
     DrawnForm::RotorOnSpring,
 ];
 
+/// Acts on a displacement that the model has.
 pub struct DrawnBranch;
+/// Adds a displacement that the model takes for stiff.
 pub struct Series;
 
 /// The instance of a form at a spot.

@@ -34,7 +34,9 @@ impl Site {
 
 /// What the model is set up for when an effect changes it.
 pub struct Setting<'a> {
+    /// The robot without effects.
     pub robot: &'a RobotModel,
+    /// Where its frames are.
     pub kinematics: &'a Kinematics,
     /// 0 at the highest hammer level of the campaign, 1 at the lowest, logarithmic between; 0 where there is one level.
     pub lowness: f64,
@@ -66,9 +68,13 @@ impl ChannelFilter {
 /// What is known of a campaign when an effect is asked whether it can be told from this data.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DataSummary {
+    /// Different hammer levels.
     pub force_levels: usize,
+    /// Postures with FRFs.
     pub postures: usize,
+    /// Lowest measured frequency, Hz.
     pub lowest_hz: f64,
+    /// Highest measured frequency, Hz.
     pub highest_hz: f64,
 }
 
@@ -159,8 +165,11 @@ pub trait StructuralEffect: Sync {
 /// An effect at a site: what is added to a model.
 #[derive(Clone, Copy)]
 pub struct Instance {
+    /// The effect.
     pub effect: &'static dyn StructuralEffect,
+    /// Where it sits.
     pub site: Site,
+    /// Its discrete choice, from 0.
     pub variant: usize,
 }
 

@@ -17,11 +17,13 @@ pub struct StructureCase {
     pub model: StructureModel,
     /// The model as the robot file has it, without effects.
     pub baseline: StructureModel,
+    /// FRFs with their noise.
     pub data: FrfData,
     /// What was added so far, oldest first; the first is the baseline. Empty where nothing was.
     pub revisions: Vec<Revision>,
     /// Whether the model starts from a solution that was found on these very data.
     pub(crate) settled: bool,
+    /// What was noticed while reading and arranging, for people.
     pub warnings: Vec<String>,
 }
 

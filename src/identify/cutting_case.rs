@@ -11,9 +11,11 @@ pub struct CuttingCase {
     /// The campaign's current model: the baseline with the effects that were added, starting from where the last
     /// revision stood.
     pub model: CuttingModel,
+    /// Force records arranged for fitting.
     pub data: CuttingData,
     /// What was added so far, oldest first; the first is the baseline. Empty where nothing was.
     pub revisions: Vec<Revision>,
+    /// What was noticed while reading and arranging, for people.
     pub warnings: Vec<String>,
 }
 

@@ -21,16 +21,21 @@ use crate::{Error, InputError, Result};
 /// What was cut.
 #[derive(Debug, Clone)]
 pub enum CutKind {
+    /// With an end mill.
     Milling {
+        /// Tool and engagement.
         cut: MillingCut,
         /// Closed-form forces for one unit of each coefficient, up to the cut's highest order.
         unit: Box<UnitForces>,
     },
+    /// With a twist drill.
     Drilling {
+        /// Drill and hole.
         cut: DrillingCut,
         /// First contact lies in here, s.
         contact_s: [f64; 2],
     },
+    /// On a lathe.
     Turning {
         /// The edge in the work, bit by bit.
         edge: Vec<EdgeBit>,
@@ -42,14 +47,19 @@ pub enum CutKind {
 pub struct CutData {
     /// Index into `Campaign::cuts`.
     pub cut: usize,
+    /// Its id.
     pub id: String,
+    /// Rotation of the spindle, 1/min.
     pub spindle_rpm: f64,
+    /// At the tool's diameter (turning: the workpiece's), m/min.
     pub cutting_speed_m_per_min: f64,
     /// Per tooth (milling), per revolution (drilling, turning).
     pub feed_mm: f64,
+    /// What effects on it need to know.
     pub setting: CutSetting,
     /// Place in the sequence of cuts, where the campaign says it.
     pub order: Option<i64>,
+    /// Tool, engagement and forces.
     pub kind: CutKind,
     /// Recorded x, y, z, torque; `None` where there is no usable channel or the process puts no force on it.
     pub channels: [Option<ForceChannel>; 4],
@@ -59,6 +69,7 @@ pub struct CutData {
     pub block_s: Vec<[f64; 2]>,
     /// Blocks of full engagement.
     pub steady: Range<usize>,
+    /// Lines off the tooth-passing comb; `None` where none stands out (and for drilling and turning).
     pub vibration: Option<OffComb>,
     /// What stands above the noise beside the orders (drilling and turning: orders and all).
     pub lines: Vec<StandingLine>,
@@ -199,6 +210,7 @@ impl CutData {
         Ok(data)
     }
 
+    /// Rotation of the spindle, 1/s.
     pub fn spindle_hz(&self) -> f64 {
         self.spindle_rpm / 60.0
     }
@@ -283,13 +295,17 @@ impl CutData {
 /// The cuts of one process.
 #[derive(Debug, Clone)]
 pub struct CuttingData {
+    /// Of all its cuts.
     pub process: Process,
+    /// In the campaign's order.
     pub cuts: Vec<Arc<CutData>>,
     /// F_tool = A F_recorded, and its inverse.
     pub tool_from_dyno: [[f64; 3]; 3],
+    /// Rows of the inverse: F_recorded = A⁻¹ F_tool.
     pub dyno_from_tool: [[f64; 3]; 3],
     /// What a torque counts as where forces and torques are added up, N per N·m: thrusts and torques are equally large then.
     pub force_per_torque: f64,
+    /// What effects need to know of the cuts.
     pub summary: CuttingSummary,
     /// Cuts left out, with the reason.
     pub warnings: Vec<String>,

@@ -19,6 +19,7 @@ use crate::parameter::Parameter;
 /// A campaign's force records of one process, arranged for the loop.
 #[derive(Debug, Clone)]
 pub struct CuttingStudy {
+    /// All cuts.
     pub data: CuttingData,
     /// Cuts of each fold, and the data without them.
     folds: Vec<Vec<usize>>,
@@ -29,6 +30,7 @@ pub struct CuttingStudy {
 const FOLDS: usize = 5;
 
 impl CuttingStudy {
+    /// Divides the cuts into folds.
     pub fn new(data: CuttingData) -> Self {
         let count = FOLDS.min(data.cuts.len());
         let folds: Vec<Vec<usize>> = (0..count)

@@ -56,9 +56,13 @@ impl MeasuredFrf {
 /// One FRF as data: receptance and its noise.
 #[derive(Debug, Clone)]
 pub struct FrfDatum {
+    /// Posture and degrees of freedom, `p1 1X/1X`.
     pub name: String,
+    /// Index into the postures.
     pub posture: usize,
+    /// Point and axis of the response.
     pub response: MeasuredDof,
+    /// Point and axis of the hit.
     pub reference: MeasuredDof,
     /// Indices into the block's outputs of the response point's x, y and z.
     pub response_outputs: [usize; 3],
@@ -75,15 +79,20 @@ pub struct FrfDatum {
 /// FRFs of one posture and force level on one frequency axis: the model is set up once for all of them.
 #[derive(Debug, Clone)]
 pub struct FrfBlock {
+    /// Index into the postures.
     pub posture: usize,
+    /// Of the hammer; `None` where nobody says.
     pub force_level_n: Option<f64>,
     /// 0 at the highest force level of the campaign, 1 at the lowest, logarithmic between.
     pub lowness: f64,
+    /// Where the robot's frames are at the posture.
     pub kinematics: Kinematics,
+    /// Ascending, above zero.
     pub frequency_hz: Vec<f64>,
     /// Point (index into the campaign's points) and axis of what the model has to give: the references, and all three
     /// axes of every response point (a turned sensor mixes them).
     pub outputs: Vec<(usize, Axis)>,
+    /// In the order in which they were given.
     pub frfs: Vec<FrfDatum>,
 }
 
@@ -100,7 +109,9 @@ impl FrfBlock {
 /// All FRFs of a campaign.
 #[derive(Debug, Clone)]
 pub struct FrfData {
+    /// One a posture, hammer level and frequency axis.
     pub blocks: Vec<Arc<FrfBlock>>,
+    /// One a posture, measured or not.
     pub posture_ids: Vec<String>,
 }
 
@@ -196,6 +207,7 @@ impl FrfData {
         }
     }
 
+    /// Every FRF with its block, block by block: the order of all predictions.
     pub fn frfs(&self) -> impl Iterator<Item = (&FrfBlock, &FrfDatum)> {
         let blocks = self.blocks.iter().map(Arc::as_ref);
         blocks.flat_map(|b: &FrfBlock| b.frfs.iter().map(move |f| (b, f)))

@@ -29,8 +29,11 @@ const LOG_TOLERANCE: f64 = 0.5;
 
 /// Misfit of a model to FRFs plus the priors on its parameters.
 pub struct FrfProblem<'a> {
+    /// The model.
     pub model: &'a StructureModel,
+    /// The FRFs that it is fitted to.
     pub data: &'a FrfData,
+    /// How far apart a prediction and a measurement are.
     pub misfit: Misfit,
     /// Every how many lines are used.
     pub stride: usize,

@@ -10,7 +10,9 @@ use crate::effects::cutting::CuttingInstance;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Domain {
+    /// Robot model against FRFs.
     Structure,
+    /// Force model against force records.
     Cutting,
 }
 
@@ -29,11 +31,15 @@ pub struct RecordedEffect {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RecordedParameter {
+    /// `joint-2.stiffness`; for an effect `effect@site.name`.
     pub name: String,
+    /// As fitted.
     pub value: f64,
+    /// Of `value`, `std_error` and `initial`.
     pub unit: String,
     /// `None` where the data do not tell.
     pub std_error: Option<f64>,
+    /// Nominal value.
     pub initial: f64,
 }
 
@@ -43,9 +49,11 @@ pub struct RecordedParameter {
 pub struct Revision {
     /// 0: the baseline without effects.
     pub revision: usize,
+    /// The side that it belongs to.
     pub domain: Domain,
     /// In the order in which they were added.
     pub effects: Vec<RecordedEffect>,
+    /// As fitted.
     pub parameters: Vec<RecordedParameter>,
     /// On the data that was fitted.
     pub nrms: f64,
@@ -108,13 +116,18 @@ pub struct Evidence {
 pub struct RecordedCandidate {
     /// `effect@site`.
     pub effect: String,
+    /// The discrete choice at that site; `None` where there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variant: Option<String>,
     /// Error with it; the numbers are `None` where they are none.
     pub nrms: Option<f64>,
+    /// Error on folds left out of the fit.
     pub held_out_nrms: Option<f64>,
+    /// BIC with it less BIC without.
     pub delta_bic: Option<f64>,
+    /// Likelihood-ratio test, corrected for the number of candidates.
     pub p_value: Option<f64>,
+    /// Weighted misfit per degree of freedom that is left with it.
     pub reduced_chi2: Option<f64>,
     /// What speaks against it; empty as a rule.
     pub remark: String,

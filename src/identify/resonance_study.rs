@@ -35,8 +35,11 @@ pub enum ResonanceReading {
 pub struct Resonance {
     /// Index of the configuration.
     pub configuration: usize,
+    /// Base axis of force and response.
     pub axis: Axis,
+    /// How it was read.
     pub reading: ResonanceReading,
+    /// As the reading has it, Hz.
     pub frequency_hz: f64,
     /// Lowest and highest reading behind it, Hz.
     pub readings_hz: [f64; 2],
@@ -51,6 +54,7 @@ pub struct Resonance {
 /// One line of a list of minima of the real part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Minimum {
+    /// Hz.
     pub frequency_hz: f64,
     /// Negative, m/N.
     pub real_m_per_n: f64,
@@ -116,6 +120,7 @@ const ROUGH: f64 = 8.0;
 pub struct Match {
     /// As the reading has it: at the minimum of the real part, or natural.
     pub frequency_hz: f64,
+    /// Real part next to the resonance by magnitude, m/N.
     pub size_m_per_n: f64,
     /// Squared distance in standard deviations, frequency and size together.
     pub distance2: f64,
@@ -153,6 +158,7 @@ pub struct ResonanceStudy {
 }
 
 impl ResonanceStudy {
+    /// A table of `resonances` measured at `configurations`.
     pub fn new(robot: &RobotSpec, configurations: Vec<Kinematics>, resonances: Vec<Resonance>) -> Self {
         let hz = || resonances.iter().map(|r| r.frequency_hz);
         let summary = DataSummary {
@@ -170,10 +176,12 @@ impl ResonanceStudy {
         }
     }
 
+    /// The table.
     pub fn resonances(&self) -> &[Resonance] {
         &self.resonances
     }
 
+    /// Where the robot's frames are at each configuration.
     pub fn configurations(&self) -> &[Kinematics] {
         &self.configurations
     }

@@ -64,7 +64,9 @@ pub struct AfterSlips {
     pub price: f64,
     /// As in [`BeyondSlips`].
     pub unlikely: f64,
+    /// ln of the evidence for such errors against none.
     pub evidence: f64,
+    /// Σ r²/σ² to which their effect on the FRFs was worked out.
     pub known_to: f64,
 }
 
@@ -142,6 +144,7 @@ pub struct RestTest {
 }
 
 impl RestTest {
+    /// Whether noise alone leaves as much too rarely to be believed.
     pub fn is_significant(&self) -> bool {
         self.p_value < SIGNIFICANT_P
     }
@@ -180,6 +183,7 @@ impl RestTest {
         (freedom > 0.0).then(|| Self::new(looks_like, found, freedom, std, freedom))?
     }
 
+    /// Excess in standard deviations of what noise leaves.
     pub fn sigmas(&self) -> f64 {
         self.excess / self.std.max(f64::MIN_POSITIVE)
     }

@@ -20,7 +20,9 @@ use crate::{Result, stop};
 /// Robot, measurement points and the list of what may be tuned.
 #[derive(Debug, Clone)]
 pub struct StructureModel {
+    /// As the robot file has it.
     pub robot: RobotModel,
+    /// Where FRFs were measured; FRFs name them by index.
     pub points: Vec<Point>,
     /// Those of the baseline, then those of each added effect.
     pub parameters: Vec<Parameter>,
@@ -38,7 +40,9 @@ pub struct StructureModel {
 /// An effect in the model and where its parameters stand in the list.
 #[derive(Debug, Clone)]
 pub struct AddedEffect {
+    /// The effect with its place and discrete choice.
     pub instance: Instance,
+    /// Where its own parameters stand in the model's list.
     pub parameters: Range<usize>,
 }
 
@@ -105,6 +109,7 @@ const DAMPING_LOG_STD: f64 = 0.7;
 const STIFFNESS_FACTOR: f64 = 100.0;
 
 impl StructureModel {
+    /// The baseline for a robot: `section` says which of its numbers are how exact.
     pub fn new(robot: RobotModel, points: Vec<Point>, section: &RobotSection) -> Self {
         Self::freeing(robot, points, section, |_| true)
     }
@@ -250,6 +255,7 @@ impl StructureModel {
         model
     }
 
+    /// The effects that were added, in their order.
     pub fn effects(&self) -> &[AddedEffect] {
         &self.effects
     }

@@ -21,7 +21,9 @@ pub type AbsorbSlips = fn(&StructureModel, &FrfData, &[f64], &[RestCurve]) -> Re
 /// A campaign's FRFs, arranged for the loop.
 #[derive(Debug, Clone)]
 pub struct StructureStudy {
+    /// All FRFs.
     pub data: FrfData,
+    /// How the baseline is calibrated.
     pub options: Options,
     /// Where the measured modes put the model, solver's scale: a starting point of its calibration.
     measured: Option<Vec<f64>>,
@@ -42,6 +44,7 @@ const LARGEST_STRIDE: usize = 6;
 const COARSE_VALUES: usize = 2500;
 
 impl StructureStudy {
+    /// FRFs of a robot, with the thinner views that searches use.
     pub fn new(robot: &RobotSpec, data: FrfData, options: Options) -> Self {
         let share = data.value_count().div_ceil(COARSE_VALUES);
         // A resonance needs its few lines: measurements with coarse lines are left alone.
@@ -292,6 +295,7 @@ const CORRELATION_LAGS: usize = 40;
 /// A frequency around which the residual stands out.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct ResidualPeak {
+    /// Hz.
     pub frequency_hz: f64,
     /// Root mean square of |model − measured|/σ around there, over all FRFs: 1 is noise.
     pub times_noise: f64,

@@ -28,6 +28,7 @@ use super::verdict::is_convincing;
 /// One form tried at a place.
 #[derive(Debug, Clone)]
 pub struct FormFit {
+    /// The law that was tried.
     pub form: DrawnForm,
     /// BIC less that of the model without it (coarse view of the data): below zero it pays for its parameters.
     pub delta_bic: f64,
@@ -36,14 +37,17 @@ pub struct FormFit {
 /// One place, best form first in `forms`.
 #[derive(Debug, Clone)]
 pub struct LocalisedPlace {
+    /// Where it is.
     pub spot: Spot,
     /// Misfit per complex value that is left: 1 is noise. Of the best form's fit where there is one, else of the screen.
     pub left: f64,
     /// Scatter of the drawn dynamic stiffness over postures, in units of its noise variance: 1 if it is the same everywhere.
     pub consistency: f64,
+    /// Dynamic stiffness that the data ask for there, line by line.
     pub curve: Vec<CurvePoint>,
     /// Empty where the place was screened only.
     pub forms: Vec<FormFit>,
+    /// The form that explains most; `None` where the place was screened only or no form led to a fit.
     pub best: Option<BestForm>,
     /// Labels of places that explain the data as well.
     pub tied_with: Vec<String>,
@@ -52,17 +56,23 @@ pub struct LocalisedPlace {
 /// The best form of a place, fitted to all data.
 #[derive(Debug, Clone)]
 pub struct BestForm {
+    /// The form at its place, as an effect.
     pub instance: Instance,
+    /// The law.
     pub form: DrawnForm,
+    /// The model with it.
     pub model: StructureModel,
+    /// Where its fit stands, solver's scale.
     pub theta: Vec<f64>,
     /// The form's own parameters.
     pub parameters: Vec<Estimate>,
     /// Misfit Σ|r|²/σ² and priors.
     pub cost: f64,
+    /// BIC less that of the model without it: below zero the form pays for its parameters.
     pub delta_bic: f64,
     /// Of the likelihood ratio, corrected for the places and forms tried.
     pub p_value: f64,
+    /// One of its parameters stopped at the end of its range.
     pub at_bound: bool,
     /// On postures left out of the fit.
     pub held_out: Option<HeldOut>,
@@ -77,6 +87,7 @@ pub struct Localisation {
     pub significant: bool,
     /// The model as it stands.
     pub baseline: Calibration,
+    /// Its error on postures left out of the fit; `None` with one posture.
     pub baseline_held_out: Option<HeldOut>,
 }
 

@@ -12,6 +12,7 @@ use crate::parameter::Parameter;
 /// The dynamic stiffness that the data ask for on one line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CurvePoint {
+    /// Hz.
     pub frequency_hz: f64,
     /// N/m, or N·m/rad at a displacement that is an angle.
     pub stiffness: Complex64,
@@ -22,6 +23,7 @@ pub struct CurvePoint {
 /// One place, screened.
 #[derive(Debug, Clone)]
 pub struct Screened {
+    /// Where it is.
     pub spot: Spot,
     /// Misfit per complex value that is left with an unknown of its own for each line and posture.
     pub left_free: f64,

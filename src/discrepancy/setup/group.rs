@@ -7,14 +7,18 @@ use crate::ingest::Axis;
 /// A selection of FRFs: those for which every given part agrees.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct FrfGroup {
+    /// Index into the campaign's postures.
     pub posture: Option<usize>,
     /// Index into the campaign's points.
     pub response_point: Option<usize>,
+    /// Axis of the response.
     pub response_axis: Option<Axis>,
+    /// Axis of the hit.
     pub reference_axis: Option<Axis>,
 }
 
 impl FrfGroup {
+    /// Every FRF.
     pub const ALL: FrfGroup = FrfGroup {
         posture: None,
         response_point: None,
@@ -22,6 +26,7 @@ impl FrfGroup {
         reference_axis: None,
     };
 
+    /// Whether an FRF is one of the group.
     pub fn holds(&self, frf: &FrfDatum) -> bool {
         self.posture.is_none_or(|p| p == frf.posture)
             && self.response_point.is_none_or(|p| p == frf.response.point)

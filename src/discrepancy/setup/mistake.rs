@@ -83,6 +83,7 @@ pub trait Distortion: Sync + Send {
 
 /// A mistake whose size is estimated.
 pub trait Mistake: Distortion {
+    /// The quantities that are estimated.
     fn sizes(&self) -> Vec<MistakeSize>;
 
     /// Selections of FRFs that it may concern.

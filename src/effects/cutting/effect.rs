@@ -10,10 +10,13 @@ use crate::robot::Dual;
 /// What is known of a campaign's cuts when an effect is asked for its parameters, starts, or whether this data can show it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CuttingSummary {
+    /// The one process of all cuts.
     pub process: Process,
+    /// Teeth of the tool.
     pub teeth: usize,
     /// The edge runs straight up the side of the tool.
     pub straight_edge: bool,
+    /// Number of cuts.
     pub cuts: usize,
     /// Different positions in the sequence of cuts; 0 where the campaign does not say.
     pub sequence_length: usize,
@@ -21,6 +24,7 @@ pub struct CuttingSummary {
     pub speed_m_per_min: [f64; 2],
     /// Different chip thicknesses at full engagement.
     pub feeds: usize,
+    /// Smallest feed per tooth or revolution, mm.
     pub smallest_feed_mm: f64,
     /// Recorded channels x, y, z, torque that every cut has.
     pub channels: [bool; 4],
@@ -28,12 +32,15 @@ pub struct CuttingSummary {
     pub highest_hz: f64,
     /// Air before and after the cut, in every record.
     pub air_on_both_sides: bool,
+    /// Holes drilled into full material.
     pub full_holes: usize,
+    /// Holes drilled over a pilot hole.
     pub pilot_holes: usize,
     /// The baseline has edge coefficients.
     pub has_edge: bool,
     /// Middle of the lines found off the comb, Hz; `None` where there are none.
     pub vibration_hz: Option<f64>,
+    /// Longest record, s.
     pub longest_record_s: f64,
     /// Largest cutting coefficient of the baseline, N/mm²: sets scales.
     pub cutting_scale_n_per_mm2: f64,
@@ -46,6 +53,7 @@ pub struct CutPhysics {
     pub coefficient: Vec<Dual>,
     /// p in K ∝ (h / 0.1 mm)^−p.
     pub size_exponent: Option<Dual>,
+    /// Eccentric tool; `None` where it runs true.
     pub runout: Option<Runout>,
     /// Thrust of the chisel edge in a full hole, N.
     pub chisel_thrust_n: Option<Dual>,
@@ -61,6 +69,7 @@ pub struct CutPhysics {
     pub transient_s: Option<[Dual; 4]>,
     /// Leaking charge amplifiers, by channel: 1/τ, 1/s.
     pub leak_per_s: Option<[Dual; 4]>,
+    /// Chatter; `None` where there is none.
     pub vibration: Option<Vibration>,
 }
 
@@ -70,6 +79,7 @@ pub type Mixing = [[Dual; 3]; 3];
 /// The tool's axis beside the spindle's.
 #[derive(Debug, Clone)]
 pub struct Runout {
+    /// Distance of the two axes, mm.
     pub offset_mm: Dual,
     /// From tooth 0.
     pub angle_rad: Dual,
@@ -78,6 +88,7 @@ pub struct Runout {
 /// A self-excited vibration of the tool against the workpiece, in cuts whose records show one.
 #[derive(Debug, Clone)]
 pub struct Vibration {
+    /// Of the chatter, Hz.
     pub frequency_hz: Dual,
     /// Amplitude, mm.
     pub amplitude_mm: Dual,
@@ -88,6 +99,7 @@ pub struct Vibration {
 /// The cut that an effect is applied to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CutSetting {
+    /// Of the cut.
     pub process: Process,
     /// 0 at the first cut of the sequence, 1 at the last.
     pub progress: f64,
@@ -95,6 +107,7 @@ pub struct CutSetting {
     pub speed_ratio: f64,
     /// Per tooth (milling), per revolution (drilling, turning).
     pub feed_mm: f64,
+    /// The record shows lines off the tooth-passing comb.
     pub has_vibration: bool,
 }
 
@@ -155,13 +168,16 @@ pub trait CuttingEffect: Sync {
         1
     }
 
+    /// Writes the effect into the physics of a cut; `values`: natural values of its parameters in their order.
     fn apply(&self, variant: usize, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics);
 }
 
 /// An effect and its discrete choice: what is added to a model.
 #[derive(Clone, Copy)]
 pub struct CuttingInstance {
+    /// The effect.
     pub effect: &'static dyn CuttingEffect,
+    /// Its discrete choice, from 0.
     pub variant: usize,
 }
 

@@ -8,6 +8,7 @@ pub mod builtin;
 pub mod campaign;
 pub mod commands;
 pub mod cutting;
+pub mod data;
 pub mod discrepancy;
 pub mod effects;
 pub mod error;
@@ -25,6 +26,7 @@ pub mod serve;
 pub mod signal;
 pub mod simulate;
 pub mod stop;
+pub mod text;
 pub mod thesis;
 
 pub use error::{Error, InputError, Result};

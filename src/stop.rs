@@ -1,8 +1,8 @@
 //! Ends work from outside, between two of its steps: whoever calls the library from another program (the Python module)
 //! wants Ctrl-C to work.
 //!
-//! Between the one who asks and the loop that works lie many layers that hand back results, and an interruption is none of
-//! these. So [`point`] unwinds them, past the hook that would print a panic; rayon carries it from its threads to the
+//! Between the one who asks and the loop that works lie many layers that hand back results, and an interruption is not
+//! a result. So [`point`] unwinds them, past the hook that would print a panic; rayon carries it from its threads to the
 //! caller, and [`stoppable`] catches it. Points lie where nothing is half written: files are written in one piece elsewhere.
 
 use std::cell::RefCell;
@@ -22,6 +22,7 @@ impl Stop {
         self.0.store(true, Ordering::Relaxed);
     }
 
+    /// Whether the work is asked to end.
     pub fn is_asked(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }

@@ -1,5 +1,6 @@
 //! Everything that can be said about a campaign, each part on its own: one that fails takes no other with it.
 
+use super::force_records::identify_forces;
 use super::model_stages::{ModelStage, earlier_stages};
 use super::stick_shapes::{self, StickShape};
 use super::structure_case::structure_model;
@@ -7,7 +8,7 @@ use super::{
     CuttingAnalysis, CuttingFindings, DiagnosisFindings, LobeAnalysis, ModalAnalysis, StructureAnalysis,
 };
 use crate::campaign::{Campaign, LobeSource};
-use crate::cutting::{CfcOptions, CfcResult, identify_forces};
+use crate::cutting::{CfcOptions, CfcResult};
 use crate::discrepancy::setup::SetupFinding;
 use crate::identify::structure_study::held_out_postures;
 use crate::identify::{Options, StructureCase, StructureModel};

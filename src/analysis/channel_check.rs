@@ -4,10 +4,10 @@
 use rayon::prelude::*;
 
 use crate::campaign::Process;
-use crate::cutting::Group;
+use crate::cutting::ForceGroup;
 use crate::identify::cutting_study::calibrate_cutting;
 use crate::identify::{CuttingData, CuttingModel};
-use crate::ingest::units::figures;
+use crate::text::figures;
 
 /// Another reading of the recorded channels: true channel i is `factor[i]` times recorded channel `from[i]`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,7 +40,7 @@ const FACTORS: [(f64, &str); 5] = [
 ];
 
 /// Looks for a better reading of the channels where the mean forces give coefficients that no cut has (`groups`).
-pub fn wrong_channels(data: &CuttingData, groups: &[Group]) -> Option<String> {
+pub fn wrong_channels(data: &CuttingData, groups: &[ForceGroup]) -> Option<String> {
     let group = groups.iter().find(|g| g.process == Process::Milling)?;
     let value = |j: usize| group.coefficients[j].value;
     let cutting = [value(0)?, value(1)?, value(2)?];

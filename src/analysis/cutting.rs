@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 use super::channel_check::wrong_channels;
 use crate::Result;
 use crate::campaign::{Campaign, Process};
-use crate::cutting::{CfcResult, Group};
+use crate::cutting::{CfcResult, ForceGroup};
 use crate::discrepancy::CuttingComparison;
 use crate::discrepancy::setup::{SetupCheck, SetupFinding, examine_cutting};
 use crate::identify::cutting_data::processes;
@@ -127,7 +127,7 @@ pub fn waveform_groups(
     (groups, warnings, setup)
 }
 
-fn waveform_group(data: &CuttingData, group: &Group) -> Result<Value> {
+fn waveform_group(data: &CuttingData, group: &ForceGroup) -> Result<Value> {
     let own = data.filtered(|i| group.cuts.contains(&data.cuts[i].id));
     let model = CuttingModel::new(&own, true)?;
     let calibration = calibrate_cutting(&model, &own)?;

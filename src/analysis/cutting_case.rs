@@ -2,8 +2,9 @@
 
 use rayon::prelude::*;
 
+use super::force_records::read_in_step;
 use crate::campaign::{Campaign, Process, Tool};
-use crate::cutting::{InStep, Notice, of_notices, read_in_step};
+use crate::cutting::{InStep, Notice, of_notices};
 use crate::effects::cutting;
 use crate::identify::cutting_data::{CutData, processes};
 use crate::identify::model_history::{Domain, Revision, recorded_cutting_effect};

@@ -6,7 +6,7 @@ use super::lobe_model::{Asked, ModelState};
 use super::lobe_structure::{Structure, at_postures, from_measured, from_modes, steps_through_time};
 use super::redundancy::{self, RedundancyAnalysis};
 use crate::campaign::{Campaign, LobeMethod, LobeSource, LobesSection, Process};
-use crate::cutting::Group;
+use crate::cutting::ForceGroup;
 use crate::lobes::band::LobeBand;
 use crate::lobes::hole::{HoleCheck, HoleError};
 use crate::lobes::outcome::{LimitRange, Outcomes, noted_cuts};
@@ -295,7 +295,7 @@ pub(super) struct CutForce {
     /// Drilling: whether the axial–torsional block takes part, or why not.
     pub axial_torsional: Option<std::result::Result<(), String>>,
     /// The campaign's own cuts, where the coefficients come from those.
-    pub own_cuts: Option<Group>,
+    pub own_cuts: Option<ForceGroup>,
 }
 
 impl CutForce {

@@ -10,10 +10,13 @@ pub mod cutting_case;
 pub mod diagnosis;
 pub mod expert;
 pub mod fleet;
+pub mod force_records;
 pub mod freed_links;
 mod lobe_model;
 mod lobe_structure;
 pub mod lobes;
+#[cfg(test)]
+pub(crate) mod made_force_records;
 pub mod modal;
 pub mod modal_export;
 pub mod mode_comparison;

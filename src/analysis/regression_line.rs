@@ -1,7 +1,7 @@
 //! The fitted force model as lines over feed.
 
 use crate::campaign::{Campaign, CutGeometry};
-use crate::cutting::{ForceAxis, Group, RegressionPoint};
+use crate::cutting::{ForceAxis, ForceGroup, RegressionPoint};
 
 /// Cuts that differ in nothing but feed (and speed), along one axis.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,7 +14,7 @@ pub struct FeedLine<'a> {
 }
 
 /// One line for each set of cuts of the same geometry, in order of appearance.
-pub fn feed_lines<'a>(campaign: &Campaign, group: &'a Group, axis: ForceAxis) -> Vec<FeedLine<'a>> {
+pub fn feed_lines<'a>(campaign: &Campaign, group: &'a ForceGroup, axis: ForceAxis) -> Vec<FeedLine<'a>> {
     let mut lines: Vec<FeedLine> = Vec::new();
     for point in group.points.iter().filter(|p| p.axis == axis) {
         let cut = campaign.cuts.iter().find(|c| c.id == point.cut);

@@ -167,7 +167,7 @@ fn with_revision(
                 let choice = variant.map_or(String::new(), |v| format!(" ({v})"));
                 wrong(format!(
                     "this robot has no effect {}{choice}",
-                    crate::campaign::suggest::shown(&recorded.effect)
+                    crate::text::shown_briefly(&recorded.effect)
                 ))
                 .remedy("was the robot changed? undo the revision with `lobestone undo DIR`")
             })?;

@@ -2,10 +2,12 @@
 
 use super::bounds::Bounds;
 use super::keys::{self, names};
-use super::schema::{Cut, CutChannel};
+use super::schema::CutChannel;
 use super::section::Section;
 use crate::Result;
-use crate::ingest::{ChannelRole, ChannelRule, Gain, Measures, Source, unit_of_charge_or_other};
+use crate::data::ChannelRole;
+use crate::data::Cut;
+use crate::ingest::{ChannelRule, Gain, Measures, Source, unit_of_charge_or_other};
 
 const NAMES: [(&str, Measures); 5] = [
     ("fx", Measures::Force(ChannelRole::ForceX)),

@@ -1,13 +1,10 @@
 //! Reading TOML so that every complaint can name file, dotted key, line and remedy.
 //!
-//! A [`Document`] is the text of one file, a [`Section`] one of its tables that knows where it stands.
+//! A [`Document`] is the text of one file, a [`Section`](super::section::Section) one of its tables that knows where it stands.
 //! Tables of an array are counted from 0 in key names: `cut[0]` is the first `[[cut]]`.
 
 use std::path::{Path, PathBuf};
 
-use toml::de::DeTable;
-
-pub use super::section::Section;
 use crate::{Error, InputError, Result};
 
 /// The text of a TOML file.
@@ -48,11 +45,8 @@ impl Document {
         }
     }
 
-    /// Parses the text and hands its top table, whose keys must be among `keys`, to `read`.
-    pub fn parse<T>(&self, keys: &[&str], read: impl FnOnce(&Section<'_>) -> Result<T>) -> Result<T> {
-        let table = DeTable::parse(&self.text).map_err(|e| self.syntax_error(&e))?;
-        let top = Section::top(self, table.get_ref(), keys)?;
-        read(&top)
+    pub(super) fn text(&self) -> &str {
+        &self.text
     }
 
     pub(super) fn file(&self) -> &Path {
@@ -64,7 +58,7 @@ impl Document {
         1 + self.breaks.partition_point(|at| *at < offset)
     }
 
-    fn syntax_error(&self, error: &toml::de::Error) -> InputError {
+    pub(super) fn syntax_error(&self, error: &toml::de::Error) -> InputError {
         let offset = error.span().map_or(self.text.len(), |s| s.start);
         let what = error.message().trim();
         let remedy = match what {
@@ -126,6 +120,7 @@ impl Document {
 #[cfg(test)]
 mod tests {
     use super::super::bounds::Bounds;
+    use super::super::section::Section;
     use super::*;
 
     fn problem<T>(text: &str, keys: &[&str], read: impl FnOnce(&Section<'_>) -> Result<T>) -> InputError {

@@ -1,49 +1,15 @@
 //! The measured FRFs of a campaign, as receptance between its points.
 
+use crate::data::{Axis, Dof, FrfRecord, FrfSet, MeasuredDof, MeasuredFrf, Quantity};
 use std::path::{Path, PathBuf};
 
 use num_complex::Complex64;
 use rayon::prelude::*;
 
+use super::paths::campaign_file;
 use super::schema::{Campaign, FrfFile};
-use super::{campaign_file, suggest::shown};
-use crate::ingest::{Axis, Dof, FrfRecord, Quantity};
+use super::suggest::shown;
 use crate::{InputError, Result};
-
-/// All measured FRFs, in the order of `campaign.toml` and of the files.
-#[derive(Debug, Clone, Default)]
-pub struct FrfSet {
-    pub frfs: Vec<MeasuredFrf>,
-}
-
-/// A direction at one of the campaign's points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct MeasuredDof {
-    /// Index into [`Campaign::points`].
-    pub point: usize,
-    pub axis: Axis,
-    /// True where the file says −X, −Y or −Z: values hold for the negative direction.
-    pub negative: bool,
-}
-
-/// One FRF as receptance.
-#[derive(Debug, Clone)]
-pub struct MeasuredFrf {
-    /// Index into [`Campaign::postures`].
-    pub posture: usize,
-    pub response: MeasuredDof,
-    pub reference: MeasuredDof,
-    /// Posture and degrees of freedom, `p1 1X/1X`.
-    pub name: String,
-    /// Ascending, above zero.
-    pub frequency_hz: Vec<f64>,
-    /// Same length as `frequency_hz`.
-    pub receptance_m_per_n: Vec<Complex64>,
-    /// Same length as `frequency_hz`, 0..1.
-    pub coherence: Option<Vec<f64>>,
-    pub force_level_n: Option<f64>,
-    pub file: PathBuf,
-}
 
 impl Campaign {
     /// Reads every `[[frf]]` file and converts it to receptance; second: warnings.

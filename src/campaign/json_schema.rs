@@ -107,8 +107,8 @@ mod tests {
     use toml::{Table, Value as Toml};
 
     use super::super::Campaign;
-    use super::super::robot_spec::RobotSpec;
     use super::*;
+    use crate::data::RobotSpec;
 
     const FULL: &str = include_str!("../../tests/data/campaign_full.toml");
     const ROBOT: &str = include_str!("../../datasets/irb6640/robot.toml");

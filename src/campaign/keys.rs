@@ -2,7 +2,10 @@
 //! loader takes from here which keys a table may have, and `json_schema` everything.
 
 use super::bounds::Bounds;
-use super::schema::LinkGroup;
+use crate::data::LinkGroup;
+
+/// Key of an error that is about the reference to a robot file, not about the file.
+pub(crate) const ROBOT_KEY: &str = "robot.model";
 
 /// One key of a table.
 #[derive(Debug, Clone, Copy)]
@@ -56,7 +59,7 @@ const fn must(name: &'static str, holds: Holds, about: &'static str) -> Key {
     }
 }
 
-/// The names of a table's keys, as [`Section`](super::document::Section) wants them.
+/// The names of a table's keys, as [`Section`](super::section::Section) wants them.
 pub const fn names<const N: usize>(keys: &[Key; N]) -> [&'static str; N] {
     let mut names = [""; N];
     let mut i = 0;

@@ -1,29 +1,28 @@
 //! `campaign.toml` to a validated [`Campaign`].
 
+use crate::data::{
+    AxesRef, BodyRef, ChipFormation, CutOutcome, Dof, LinkGroup, LinkTolerances, OrthogonalSection, Point,
+    Posture, Quantity, RobotSection, RobotSpec, Tool,
+};
 use std::path::{Path, PathBuf};
 
 use super::bounds::Bounds;
-use super::document::{Document, Section};
+use super::document::Document;
+use super::keys::ROBOT_KEY;
 use super::keys::{self, FORM, names};
 use super::lobes_section;
-use super::robot_spec::RobotSpec;
+use super::paths::{self, campaign_file};
 use super::schema::*;
+use super::section::Section;
+use super::shared_keys::posture_ref;
 use super::suggest::shown;
 use super::tool_and_cut::{geometry, tool};
-use super::{ROBOT_KEY, campaign_file, paths};
-use crate::ingest::{Dof, Quantity};
 use crate::{Error, InputError, Result};
 
 /// Keys of the top table.
 const TOP: [&str; 16] = names(&keys::TOP);
 /// Keys of `[[cut]]`.
 pub(super) const CUT: [&str; 20] = names(&keys::CUT);
-
-pub(super) const PROCESSES: [(&str, Process); 3] = [
-    ("milling", Process::Milling),
-    ("drilling", Process::Drilling),
-    ("turning", Process::Turning),
-];
 
 impl Campaign {
     /// Reads and validates the campaign in folder `dir`.
@@ -275,29 +274,6 @@ fn frfs(dir: &Path, top: &Section<'_>, postures: &[Posture], find: Find) -> Resu
         });
     }
     Ok(out)
-}
-
-/// Index of the posture that the key `posture` of a section names.
-pub(super) fn posture_ref(section: &Section<'_>, postures: &[Posture]) -> Result<usize> {
-    let id = section.required("posture", section.text("posture")?, "\"p1\"")?;
-    postures.iter().position(|p| p.id == id).ok_or_else(|| {
-        // Ids are alike (p1, p2): a guess would often be another posture.
-        let some: Vec<&str> = postures.iter().take(10).map(|p| p.id.as_str()).collect();
-        let remedy = match some[..] {
-            [] => format!("add a [[posture]] with id = {:?}", shown(id)),
-            _ => format!(
-                "name one that is there ({}), or add it as a [[posture]]",
-                shown(&some.join(", "))
-            ),
-        };
-        section
-            .error(
-                "posture",
-                format!("there is no [[posture]] with the id {:?}", shown(id)),
-            )
-            .remedy(remedy)
-            .into()
-    })
 }
 
 fn file((dir, find): (&Path, Find), section: &Section<'_>, example: &str) -> Result<PathBuf> {

@@ -1,7 +1,5 @@
 //! A campaign folder: what was measured, where, and on what. SI values keep the unit of the file in their name.
 
-use std::path::{Path, PathBuf};
-
 pub mod bounds;
 mod channels;
 pub mod document;
@@ -14,22 +12,20 @@ mod lobes_section;
 mod named_files;
 pub mod paths;
 pub mod robot_file;
-pub mod robot_spec;
 pub mod robot_text;
 pub mod schema;
 mod section;
+mod shared_keys;
 pub mod suggest;
 mod tool_and_cut;
 
-pub use frf_set::{FrfSet, MeasuredDof, MeasuredFrf};
+pub use crate::data::{
+    AxesRef, BodyRef, ChipFormation, Cut, CutGeometry, CutOutcome, FrfSet, HoleSection, Immersion, LinkGroup,
+    LinkTolerances, LobeAxis, LobeMethod, LobeMode, LobeSource, LobesSection, MeasuredDof, MeasuredFrf,
+    OrthogonalSection, Point, Posture, Process, Redundancy, RobotSection, Tool, ToolKind, ToolSegment,
+};
 pub use json_schema::{SchemaOf, json_schema};
 pub use named_files::named_files;
-pub use schema::*;
-
-/// Key of an error that is about the reference to a robot file, not about the file.
-pub(crate) const ROBOT_KEY: &str = "robot.model";
-
-/// The file that makes a folder a campaign.
-pub fn campaign_file(dir: &Path) -> PathBuf {
-    dir.join("campaign.toml")
-}
+pub use paths::campaign_file;
+pub use schema::{Campaign, CutChannel, Dynamometer, FrfFile, PlanSection};
+pub use section::Section;

@@ -5,6 +5,11 @@ use std::path::{Component, Path, PathBuf};
 use super::suggest::{closest, shown};
 use crate::InputError;
 
+/// The file that makes a folder a campaign.
+pub fn campaign_file(dir: &Path) -> PathBuf {
+    dir.join("campaign.toml")
+}
+
 /// `text` joined with the campaign folder `dir`, if it names a readable file inside it.
 ///
 /// # Errors

@@ -1,13 +1,15 @@
 //! Robot files: the built-in robots, and files of the same form in a campaign's folder.
 
+use crate::data::{BeamSection, JointPlacement, JointSpec, LinkSpec, RobotSpec, ToolFrame};
 use std::path::Path;
 
 use super::bounds::Bounds;
-use super::document::{Document, Section};
+use super::document::Document;
+use super::keys::ROBOT_KEY;
 use super::keys::{self, names};
-use super::robot_spec::*;
+use super::paths::{self, campaign_file};
+use super::section::Section;
 use super::suggest::closest;
-use super::{ROBOT_KEY, campaign_file, paths};
 use crate::{InputError, Result};
 
 /// Built-in models: name and robot file.

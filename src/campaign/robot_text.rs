@@ -1,8 +1,7 @@
 //! A robot as the text of a robot file; what [`RobotSpec::load`] reads back.
 
+use crate::data::{JointSpec, LinkSpec, RobotSpec};
 use std::fmt::Write;
-
-use super::robot_spec::{JointSpec, LinkSpec, RobotSpec};
 
 /// Degrees of an angle, without the last digits that a conversion to radians leaves behind (1e-12 of a degree).
 pub fn to_degrees(rad: f64) -> f64 {

@@ -403,3 +403,12 @@ fn type_name(value: &DeValue<'_>) -> &'static str {
         DeValue::Table(_) => "a section",
     }
 }
+
+impl Document {
+    /// Parses the text and hands its top table, whose keys must be among `keys`, to `read`.
+    pub fn parse<T>(&self, keys: &[&str], read: impl FnOnce(&Section<'_>) -> Result<T>) -> Result<T> {
+        let table = DeTable::parse(self.text()).map_err(|e| self.syntax_error(&e))?;
+        let top = Section::top(self, table.get_ref(), keys)?;
+        read(&top)
+    }
+}

@@ -1,12 +1,11 @@
 //! What cut, and what was cut: `[tool]`, and the geometry and speed of a `[[cut]]`.
 
 use super::bounds::Bounds;
-use super::document::Section;
 use super::keys::{self, names};
-use super::load::PROCESSES;
-use super::lobes_section::immersion;
-use super::schema::{CutGeometry, Process, Tool, ToolKind};
+use super::section::Section;
+use super::shared_keys::{PROCESSES, immersion};
 use crate::Result;
+use crate::data::{CutGeometry, Process, Tool, ToolKind};
 
 /// Keys of `[tool]` that only some kinds have.
 const OF_MILLS: [&str; 2] = ["corner_radius_mm", "lead_angle_deg"];

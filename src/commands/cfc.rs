@@ -7,11 +7,12 @@ use super::text::{Emphasis, setup_lines};
 use super::{CampaignArg, Outcome};
 use crate::Result;
 use crate::analysis::cutting::waveform_groups;
+use crate::analysis::force_records::{cutting_trials, identify_forces};
 use crate::campaign::Campaign;
 use crate::cutting::{
-    self, CfcOptions, CfcResult, Change, CutAnalysis, ForceAxis, Group, KienzleFit, Known,
-    MaterialComparison, Method, Prediction, Reading, SpeedTrends, by_axis, coefficients_of, depth_mm,
-    kienzle, speed_text,
+    CfcOptions, CfcResult, ChangeReading, CoefficientChange, CutAnalysis, ForceAxis, ForceGroup, KienzleFit,
+    Known, MaterialComparison, OrthogonalPrediction, RegressionMethod, SpeedTrends, by_axis, coefficients_of,
+    depth_mm, kienzle, speed_text,
 };
 
 #[derive(clap::Args)]
@@ -33,12 +34,13 @@ pub fn run(args: Args) -> Result<Outcome> {
         nonnegative_edges: args.nonnegative_edges,
         robust: args.robust,
     };
-    let mut result = cutting::identify_forces(&campaign, options)?;
+    let mut result = identify_forces(&campaign, options)?;
     let (waveforms, warnings, setup) = waveform_groups(&campaign, &result);
     result.warnings.extend(warnings);
+    let trials = cutting_trials(&campaign)?;
     let power_laws = PowerLaws {
-        groups: kienzle(&campaign, &result, &result.groups),
-        pooled: kienzle(&campaign, &result, &result.pooled),
+        groups: kienzle(&trials, &result, &result.groups),
+        pooled: kienzle(&trials, &result, &result.pooled),
     };
     let mut document = document(&campaign, &result, &waveforms, &power_laws);
     document["setup"] = json!(setup);
@@ -61,7 +63,7 @@ fn document(
     waveforms: &[serde_json::Value],
     power_laws: &PowerLaws,
 ) -> serde_json::Value {
-    let with_kienzle = |groups: &[Group], laws: &[Option<KienzleFit>]| -> Vec<serde_json::Value> {
+    let with_kienzle = |groups: &[ForceGroup], laws: &[Option<KienzleFit>]| -> Vec<serde_json::Value> {
         let each = groups.iter().zip(laws);
         each.map(|(group, law)| {
             let mut json = group.to_json();
@@ -84,7 +86,7 @@ fn document(
         "r2": process.map(|p| by_axis(p, &result.r2())),
         "trends": result.trends.iter().flat_map(SpeedTrends::to_json).collect::<Vec<_>>(),
         "materials": result.materials.iter().flat_map(MaterialComparison::to_json).collect::<Vec<_>>(),
-        "predicted": result.prediction.as_ref().map(Prediction::to_json),
+        "predicted": result.prediction.as_ref().map(OrthogonalPrediction::to_json),
         "cuts": result.cuts.iter().map(cut_document).collect::<Vec<_>>(),
         "warnings": result.warnings,
     })
@@ -131,10 +133,10 @@ fn cut_document(cut: &CutAnalysis) -> serde_json::Value {
 fn text(campaign: &Campaign, result: &CfcResult, power_laws: &PowerLaws) -> String {
     let mut out = format!("Cutting force coefficients: {}\n", campaign.name);
     for (pooled, of_all) in result.pooled.iter().zip(&power_laws.pooled) {
-        let groups: Vec<&Group> = result.groups.iter().filter(|g| g.is_beside(pooled)).collect();
+        let groups: Vec<&ForceGroup> = result.groups.iter().filter(|g| g.is_beside(pooled)).collect();
         let _ = writeln!(out, "\n{}", coefficient_table(&groups, pooled));
         let by_speed = result.groups.iter().zip(&power_laws.groups);
-        let laws: Vec<(&Group, &KienzleFit)> = by_speed
+        let laws: Vec<(&ForceGroup, &KienzleFit)> = by_speed
             .filter(|(g, _)| g.is_beside(pooled))
             .filter_map(|(g, law)| Some((g, law.as_ref()?)))
             .collect();
@@ -164,7 +166,7 @@ fn text(campaign: &Campaign, result: &CfcResult, power_laws: &PowerLaws) -> Stri
     out
 }
 
-fn coefficient_table(groups: &[&Group], pooled: &Group) -> String {
+fn coefficient_table(groups: &[&ForceGroup], pooled: &ForceGroup) -> String {
     let mut header = vec!["speed m/min".to_string(), "cuts".into(), "feeds".into()];
     header.extend(
         pooled
@@ -196,8 +198,8 @@ fn coefficient_table(groups: &[&Group], pooled: &Group) -> String {
     }
     let process = capital(pooled.process.name());
     let method = match pooled.method {
-        Method::LeastSquares => "least squares",
-        Method::Huber => "robust (Huber) regression",
+        RegressionMethod::LeastSquares => "least squares",
+        RegressionMethod::Huber => "robust (Huber) regression",
     };
     format!(
         "{process}{}: coefficient ± standard error, {method}\n{}",
@@ -209,7 +211,7 @@ fn coefficient_table(groups: &[&Group], pooled: &Group) -> String {
     )
 }
 
-fn kienzle_table(groups: &[(&Group, &KienzleFit)], pooled: &Group, of_all: &KienzleFit) -> String {
+fn kienzle_table(groups: &[(&ForceGroup, &KienzleFit)], pooled: &ForceGroup, of_all: &KienzleFit) -> String {
     let mut header = vec!["speed m/min".to_string()];
     for c in &of_all.components {
         header.extend([format!("{} N/mm²", c.label), "m".to_string()]);
@@ -236,15 +238,15 @@ fn kienzle_table(groups: &[(&Group, &KienzleFit)], pooled: &Group, of_all: &Kien
 }
 
 /// In words of one line each.
-fn reading(change: &Change) -> String {
+fn reading(change: &CoefficientChange) -> String {
     let chance = change
         .p_value
         .map_or(String::new(), |p| format!(" (p {})", p_text(p)));
     match change.reading {
-        Reading::Rises => format!("higher{chance}"),
-        Reading::Falls => format!("lower{chance}"),
-        Reading::None => format!("no more than chance{chance}"),
-        Reading::NotDetermined => "these cuts cannot tell".into(),
+        ChangeReading::Rises => format!("higher{chance}"),
+        ChangeReading::Falls => format!("lower{chance}"),
+        ChangeReading::None => format!("no more than chance{chance}"),
+        ChangeReading::NotDetermined => "these cuts cannot tell".into(),
     }
 }
 
@@ -317,7 +319,7 @@ fn material_table(comparison: &MaterialComparison) -> String {
     )
 }
 
-fn prediction_table(prediction: &Prediction) -> String {
+fn prediction_table(prediction: &OrthogonalPrediction) -> String {
     let mut rows = vec![vec![
         "coefficient".to_string(),
         "predicted".into(),
@@ -341,7 +343,7 @@ fn prediction_table(prediction: &Prediction) -> String {
     )
 }
 
-fn cut_table(campaign: &Campaign, result: &CfcResult, pooled: &Group) -> String {
+fn cut_table(campaign: &Campaign, result: &CfcResult, pooled: &ForceGroup) -> String {
     let axes = ForceAxis::of(pooled.process);
     let mut header: Vec<String> = ["cut", "rpm", "feed mm", "depth mm", "steady s", "turns", "air"]
         .map(String::from)

@@ -8,13 +8,14 @@ use serde_json::json;
 
 use super::text::{number, percent};
 use super::{Outcome, report};
+use crate::analysis::force_records::identify_forces;
 use crate::analysis::{
     Addition, CampaignFindings, DiagnosisFindings, LobeAnalysis, LobeFindings, ModalAnalysis,
     PostureFindings, StructureFindings, stick_shapes,
 };
 use crate::builtin::{BuiltinCampaign, FIRST_CELL, SECOND_CELL};
 use crate::campaign::Campaign;
-use crate::cutting::{CfcOptions, CfcResult, identify_forces};
+use crate::cutting::{CfcOptions, CfcResult};
 use crate::identify::{Options, StructureCase};
 use crate::report::campaign as pages;
 use crate::revision::{RevisionLog, log_file};
@@ -337,7 +338,7 @@ fn modes(modal: &ModalAnalysis) -> String {
 }
 
 fn coefficients(result: &CfcResult) -> String {
-    let of_group = |group: &crate::cutting::Group| {
+    let of_group = |group: &crate::cutting::ForceGroup| {
         let values: Vec<String> = group
             .coefficients
             .iter()

@@ -6,8 +6,8 @@ use serde_json::{Value, json};
 
 use super::Outcome;
 use super::text::{Emphasis, wrapped};
-use crate::campaign::robot_spec::RobotSpec;
 use crate::campaign::suggest::{closest, shown};
+use crate::data::RobotSpec;
 use crate::effects::cutting::CUTTING;
 use crate::effects::{Background, STRUCTURAL};
 use crate::{InputError, Result};

@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use super::average_force::ForceAxis;
-use super::record::{ChannelAnalysis, Notice};
-use crate::campaign::Process;
-use crate::ingest::units::figures;
+use super::cut_analysis::{ChannelAnalysis, Notice};
+use super::force_axis::ForceAxis;
+use crate::data::Process;
 use crate::signal::{self, Air, DriftLine, fit_drift};
+use crate::text::figures;
 
 pub(super) const NO_AIR: &str = "no air cut in the record: drift and offset cannot be told from edge force; \
      record a second of air before and after each cut";

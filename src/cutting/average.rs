@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use super::average_force::ForceAxis;
-use super::record::{Average, ChannelAnalysis, CutAnalysis, in_tool_axes};
-use crate::ingest::TimeRecord;
-use crate::signal::{self, Blocks, DriftLine};
+use super::cut_analysis::{Average, ChannelAnalysis, CutAnalysis, TurnAverage, in_tool_axes};
+use super::force_axis::ForceAxis;
+use crate::data::TimeRecord;
+use crate::signal::{self, DriftLine, SignalBlocks};
 
 /// Revolutions whose mean is further than this many robust standard deviations off are spikes.
 const SPIKE_SIGMA: f64 = 8.0;
@@ -16,21 +16,7 @@ const FEW_TURNS: usize = 8;
 /// Degrees of freedom that the other cuts' scatter counts as, and that they must have together.
 const POOLED_FREEDOM: f64 = 8.0;
 
-/// The mean of one channel over a window.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TurnAverage {
-    pub average: Average,
-    /// Revolutions averaged.
-    pub turns: usize,
-    /// Standard deviation between the means of revolutions; `None` with one revolution only.
-    pub turn_std: Option<f64>,
-    /// Part of the standard error that the zero line brings.
-    pub zero_std: f64,
-    /// Revolutions left out as spikes.
-    pub dropped: usize,
-}
-
-/// Mean over the revolutions of the window with the zero line taken off.
+/// Mean over the revolutions of the window with the baseline taken off.
 pub(super) fn average(
     values: &[f64],
     steady: &Range<usize>,
@@ -40,7 +26,7 @@ pub(super) fn average(
 ) -> TurnAverage {
     let time = |i: usize| record.start_s + i as f64 / record.sample_rate_hz;
     let compensated: Vec<f64> = steady.clone().map(|i| values[i] - drift.at(time(i))).collect();
-    let blocks = Blocks::new(&compensated, samples_per_revolution);
+    let blocks = SignalBlocks::new(&compensated, samples_per_revolution);
     let centre = signal::median(&blocks.mean);
     let deviation: Vec<f64> = blocks.mean.iter().map(|m| (m - centre).abs()).collect();
     let limit = SPIKE_SIGMA * 1.4826 * signal::median(&deviation);

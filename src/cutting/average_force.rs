@@ -1,105 +1,16 @@
-//! Average cutting forces, linear in the coefficients: milling (physics.md §4; Altintas, Manufacturing
-//! Automation, 2nd ed., eqs 2.41–2.45, in axes with φ clockwise from +y), two-lip drilling (drilling.md), and turning (see
-//! [`super::turning`]).
+//! Average cutting forces, linear in the coefficients: milling (docs/physics.md, "Cutting forces"; Altintas,
+//! Manufacturing Automation, 2nd ed., eqs 2.41–2.45, in axes with φ clockwise from +y), two-lip drilling (same section), and
+//! turning (see [`super::turning`]).
 
 use std::f64::consts::PI;
 
+use super::coefficients::MILLING_COEFFICIENTS;
+use super::drill_geometry::DrillGeometry;
+use super::force_axis::ForceAxis;
 use super::turning::{edge_row, engaged_edge};
 use super::waveform::MillingCut;
-use crate::campaign::{CutGeometry, Immersion, Process, Tool};
+use crate::data::{CutGeometry, Immersion, Tool};
 use crate::{Error, Result};
-
-/// What is averaged and compared: the forces on the tool in tool axes (x feed, y normal, z axial; turning: x against the
-/// feed, y away from the work, z along the cutting speed; N), and the torque about the spindle (N·m, opposing rotation positive).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum ForceAxis {
-    X,
-    Y,
-    Z,
-    /// Torque.
-    Mz,
-}
-
-impl ForceAxis {
-    pub const ALL: [ForceAxis; 4] = [ForceAxis::X, ForceAxis::Y, ForceAxis::Z, ForceAxis::Mz];
-
-    pub fn index(self) -> usize {
-        self as usize
-    }
-
-    pub fn label(self) -> &'static str {
-        ["Fx", "Fy", "Fz", "Mz"][self.index()]
-    }
-
-    pub fn unit(self) -> &'static str {
-        if self == ForceAxis::Mz { "N·m" } else { "N" }
-    }
-
-    /// The axes that carry the coefficients of a process.
-    pub fn of(process: Process) -> &'static [ForceAxis] {
-        match process {
-            Process::Milling | Process::Turning => &[ForceAxis::X, ForceAxis::Y, ForceAxis::Z],
-            Process::Drilling => &[ForceAxis::Z, ForceAxis::Mz],
-        }
-    }
-}
-
-/// One unknown of a force model.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct CoefficientKind {
-    /// Key in JSON, with unit.
-    pub key: &'static str,
-    pub label: &'static str,
-    pub unit: &'static str,
-    /// An edge coefficient (N/mm), else a cutting coefficient (N/mm²).
-    pub edge: bool,
-}
-
-const fn cutting(key: &'static str, label: &'static str) -> CoefficientKind {
-    CoefficientKind {
-        key,
-        label,
-        unit: "N/mm²",
-        edge: false,
-    }
-}
-
-const fn edge(key: &'static str, label: &'static str) -> CoefficientKind {
-    CoefficientKind {
-        key,
-        label,
-        unit: "N/mm",
-        edge: true,
-    }
-}
-
-/// Ktc Krc Kac Kte Kre Kae: along the cutting speed, normal to the edge out of the work, along the edge away from the tip.
-/// Turning has the same.
-pub const MILLING_COEFFICIENTS: [CoefficientKind; 6] = [
-    cutting("ktc_n_per_mm2", "Ktc"),
-    cutting("krc_n_per_mm2", "Krc"),
-    cutting("kac_n_per_mm2", "Kac"),
-    edge("kte_n_per_mm", "Kte"),
-    edge("kre_n_per_mm", "Kre"),
-    edge("kae_n_per_mm", "Kae"),
-];
-
-/// Ktc Kte Kfc Kfe.
-pub const DRILLING_COEFFICIENTS: [CoefficientKind; 4] = [
-    cutting("ktc_n_per_mm2", "Ktc"),
-    edge("kte_n_per_mm", "Kte"),
-    cutting("kfc_n_per_mm2", "Kfc"),
-    edge("kfe_n_per_mm", "Kfe"),
-];
-
-/// The unknowns of a process, in the order of the columns of [`average_row`].
-pub fn coefficients_of(process: Process) -> &'static [CoefficientKind] {
-    match process {
-        Process::Milling | Process::Turning => &MILLING_COEFFICIENTS,
-        Process::Drilling => &DRILLING_COEFFICIENTS,
-    }
-}
 
 /// Row of the linear model: average force (N; torque N·m) on `axis` = row · coefficients, coefficients in
 /// N/mm² and N/mm as [`coefficients_of`] lists them.
@@ -128,7 +39,7 @@ pub fn average_row(tool: &Tool, geometry: &CutGeometry, axis: ForceAxis) -> Resu
     }
 }
 
-/// physics.md §4, each bracket from entry to exit angle. Units mm, N; no torque.
+/// docs/physics.md, "Cutting forces", each bracket from entry to exit angle. Units mm, N; no torque.
 fn milling_row(teeth: usize, feed_mm: f64, depth_mm: f64, immersion: Immersion, axis: ForceAxis) -> [f64; 6] {
     let (start, exit) = (immersion.start_rad, immersion.exit_rad);
     let over = |f: fn(f64) -> f64| f(exit) - f(start);
@@ -169,87 +80,6 @@ fn shaped_row(tool: &Tool, geometry: &CutGeometry, axis: ForceAxis) -> Vec<f64> 
     unit.iter().map(|forces| forces[axis.index()][0].re).collect()
 }
 
-/// A drill in a hole: lengths of drilling.md, mm.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DrillGeometry {
-    pub lips: f64,
-    pub radius_mm: f64,
-    /// Where the lip begins: the pilot's radius, or the chisel's half length in the full.
-    pub inner_radius_mm: f64,
-    pub half_point_rad: f64,
-    pub feed_per_rev_mm: f64,
-}
-
-/// Chisel edge angle of drilling.md, from which its half length follows.
-const CHISEL_ANGLE_DEG: f64 = 125.0;
-
-impl DrillGeometry {
-    /// # Errors
-    /// No point angle, no web thickness where the hole has no pilot, or a pilot as large as the drill.
-    pub fn new(tool: &Tool, geometry: &CutGeometry) -> Result<DrillGeometry> {
-        let CutGeometry::Drilling {
-            feed_per_rev_mm,
-            pilot_diameter_mm,
-            ..
-        } = *geometry
-        else {
-            return Err(Error::computation("not a drilling cut"));
-        };
-        let half_point_deg = tool.half_point_angle_deg.ok_or_else(|| {
-            Error::computation("drilling needs [tool] half_point_angle_deg, which is not given")
-        })?;
-        let inner_radius_mm = if pilot_diameter_mm > 0.0 {
-            0.5 * pilot_diameter_mm
-        } else {
-            let web = tool.web_thickness_mm.ok_or_else(|| {
-                Error::computation("a hole without pilot needs [tool] web_thickness_mm, which is not given")
-            })?;
-            0.5 * web / CHISEL_ANGLE_DEG.to_radians().sin()
-        };
-        let radius_mm = 0.5 * tool.diameter_mm;
-        if inner_radius_mm >= radius_mm {
-            return Err(Error::computation(format!(
-                "nothing left to drill: lips from {inner_radius_mm} mm to {radius_mm} mm"
-            )));
-        }
-        Ok(DrillGeometry {
-            lips: tool.teeth as f64,
-            radius_mm,
-            inner_radius_mm,
-            half_point_rad: half_point_deg.to_radians(),
-            feed_per_rev_mm,
-        })
-    }
-
-    /// Chip thickness normal to the lip.
-    pub fn chip_thickness_mm(&self) -> f64 {
-        self.feed_per_rev_mm / self.lips * self.half_point_rad.sin()
-    }
-
-    /// Travel from first contact of the lips to full diameter.
-    pub fn entry_travel_mm(&self) -> f64 {
-        (self.radius_mm - self.inner_radius_mm) / self.half_point_rad.tan()
-    }
-
-    /// Thrust N (Kfc h + Kfe)(R − r0); torque N (Ktc h + Kte)(R² − r0²)/(2 sin κ)/1000.
-    fn row(&self, axis: ForceAxis) -> [f64; 4] {
-        let h = self.chip_thickness_mm();
-        let (outer, inner) = (self.radius_mm, self.inner_radius_mm);
-        match axis {
-            ForceAxis::Z => {
-                let thrust = self.lips * (outer - inner);
-                [0.0, 0.0, thrust * h, thrust]
-            }
-            ForceAxis::Mz => {
-                let torque =
-                    self.lips * (outer * outer - inner * inner) / (2.0 * self.half_point_rad.sin()) / 1000.0;
-                [torque * h, torque, 0.0, 0.0]
-            }
-            ForceAxis::X | ForceAxis::Y => [0.0; 4],
-        }
-    }
-}
-
 /// The diameter at which edge and work pass each other: the tool's, in turning the workpiece's; mm.
 pub fn cut_diameter_mm(tool: &Tool, geometry: &CutGeometry) -> f64 {
     match *geometry {
@@ -276,25 +106,11 @@ pub fn feed_mm(geometry: &CutGeometry) -> f64 {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use super::*;
-    use crate::campaign::ToolKind;
     use approx::assert_relative_eq;
 
-    pub(crate) fn drill() -> Tool {
-        Tool {
-            kind: ToolKind::Drill,
-            diameter_mm: 9.5,
-            teeth: 2,
-            helix_deg: 30.0,
-            corner_radius_mm: 0.0,
-            lead_angle_deg: 90.0,
-            half_point_angle_deg: Some(67.5),
-            web_thickness_mm: Some(1.425),
-        }
-    }
-
-    /// Sums the slice forces of physics.md over one revolution and the helix, teeth and all.
+    /// Sums the slice forces of docs/physics.md over one revolution and the helix, teeth and all.
     fn integrated(k: [f64; 6], teeth: usize, c: f64, a: f64, immersion: Immersion) -> [f64; 3] {
         let (turn_steps, slices) = (40_000, 7);
         let lag = 0.4; // rad of helix lag over the depth; must not matter to the average
@@ -368,50 +184,5 @@ pub(super) mod tests {
             row(ForceAxis::Z),
             [0.0, 0.0, n * a / PI * c, 0.0, 0.0, n * a / 2.0],
         );
-    }
-
-    #[test]
-    fn drilling_equals_the_lip_integrals() {
-        let geometry = CutGeometry::Drilling {
-            feed_per_rev_mm: 0.2,
-            pilot_diameter_mm: 3.5,
-            hole_depth_mm: None,
-        };
-        let g = DrillGeometry::new(&drill(), &geometry).unwrap();
-        let kappa = 67.5f64.to_radians();
-        // Chip thickness f/N sin κ on lips of length (R − r0)/sin κ at mean radius (R + r0)/2.
-        let h = 0.1 * kappa.sin();
-        let lip = 3.0 / kappa.sin();
-        let (ktc, kte, kfc, kfe) = (272.0, 5.7, 91.0, 3.9);
-        let torque = 2.0 * (ktc * h + kte) * lip * 3.25 / 1000.0;
-        let thrust = 2.0 * (kfc * h + kfe) * lip * kappa.sin();
-        let force = |axis| -> f64 {
-            g.row(axis)
-                .iter()
-                .zip([ktc, kte, kfc, kfe])
-                .map(|(r, k)| r * k)
-                .sum()
-        };
-        assert_relative_eq!(force(ForceAxis::Mz), torque, max_relative = 1e-12);
-        assert_relative_eq!(force(ForceAxis::Z), thrust, max_relative = 1e-12);
-        assert_relative_eq!(g.entry_travel_mm(), 3.0 / kappa.tan());
-    }
-
-    #[test]
-    fn a_full_hole_starts_at_the_chisel_and_missing_geometry_is_said() {
-        let full = CutGeometry::Drilling {
-            feed_per_rev_mm: 0.2,
-            pilot_diameter_mm: 0.0,
-            hole_depth_mm: None,
-        };
-        // Half length in the truth file of a practice campaign with this tool.
-        let g = DrillGeometry::new(&drill(), &full).unwrap();
-        assert_relative_eq!(g.inner_radius_mm, 0.8698018944925375, max_relative = 1e-12);
-        let blunt = Tool {
-            web_thickness_mm: None,
-            ..drill()
-        };
-        let error = DrillGeometry::new(&blunt, &full).unwrap_err().to_string();
-        assert!(error.contains("web_thickness_mm"), "{error}");
     }
 }

@@ -19,6 +19,7 @@ pub enum Loss {
 /// The solution of a conic program.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConicFit {
+    /// The coefficients, in the order of the columns.
     pub value: Vec<f64>,
     /// True where the bound at zero holds the coefficient.
     pub active: Vec<bool>,

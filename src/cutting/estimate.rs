@@ -5,18 +5,29 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::average_force::ForceAxis;
 use super::conic::{ConicFit, Loss, conic_fit};
-use super::regression::{Fit, Observation, Solved, fit, measurement_variance};
+use super::force_axis::ForceAxis;
+use super::regression::{CoefficientFit, Observation, WeightedSolution, fit, measurement_variance};
 use crate::Result;
 
 /// What makes the residuals small.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Method {
+pub enum RegressionMethod {
+    /// The sum of their squares.
     #[default]
     LeastSquares,
+    /// Huber's loss: squares of small residuals, magnitudes of large ones.
     Huber,
+}
+
+/// How coefficients are wanted.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct CfcOptions {
+    /// Edge coefficients are held at zero or above.
+    pub nonnegative_edges: bool,
+    /// Huber's robust regression where there are cuts enough; else it is the second opinion.
+    pub robust: bool,
 }
 
 /// Threshold of Huber's loss in standard deviations: 95 % as efficient as least squares where errors are normal.
@@ -27,7 +38,8 @@ const HUBER_CONSISTENCY: f64 = 0.710_164_5;
 
 /// Coefficients by one method.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Estimate {
+pub struct CoefficientEstimate {
+    /// The coefficients, in the order of the columns.
     pub value: Vec<f64>,
     /// `None` where a constraint holds the value.
     pub std_error: Vec<Option<f64>>,
@@ -37,6 +49,7 @@ pub struct Estimate {
     pub weight: Vec<f64>,
     /// What Huber's loss left of each observation's weight, 0…1; 1 with least squares.
     pub share: Vec<f64>,
+    /// Scatter of the averages beyond their own errors (standard deviation; N, N·m), by axis.
     pub extra_scatter: [f64; 4],
     /// False where the robust scatter did not settle.
     pub converged: bool,
@@ -49,28 +62,32 @@ pub struct Estimate {
 /// The conic program fails.
 pub fn estimate(
     observations: &[Observation],
-    free: &Fit,
+    free: &CoefficientFit,
     nonnegative: &[bool],
-    method: Method,
-) -> Result<Estimate> {
+    method: RegressionMethod,
+) -> Result<CoefficientEstimate> {
     match method {
-        Method::LeastSquares => least_squares(observations, free, nonnegative),
-        Method::Huber => huber(observations, free, nonnegative),
+        RegressionMethod::LeastSquares => least_squares(observations, free, nonnegative),
+        RegressionMethod::Huber => huber(observations, free, nonnegative),
     }
 }
 
-fn least_squares(observations: &[Observation], free: &Fit, nonnegative: &[bool]) -> Result<Estimate> {
+fn least_squares(
+    observations: &[Observation],
+    free: &CoefficientFit,
+    nonnegative: &[bool],
+) -> Result<CoefficientEstimate> {
     let conic = at_weights(
         observations,
         &free.weight,
         &free.solution,
         nonnegative,
-        Method::LeastSquares,
+        RegressionMethod::LeastSquares,
     )?;
     let held = conic.active.contains(&true);
     let errors = held.then(|| fit(&without(observations, &conic.active))).flatten();
     let errors = errors.as_ref().unwrap_or(free);
-    Ok(Estimate {
+    Ok(CoefficientEstimate {
         std_error: spread_out(&errors.std_error, &conic.active),
         value: conic.value,
         active: conic.active,
@@ -87,18 +104,18 @@ fn at_weights(
     weight: &[f64],
     free: &[f64],
     nonnegative: &[bool],
-    method: Method,
+    method: RegressionMethod,
 ) -> Result<ConicFit> {
     let violated = free.iter().zip(nonnegative).any(|(x, bound)| *bound && *x < 0.0);
     let loss = match method {
-        Method::LeastSquares if !violated => {
+        RegressionMethod::LeastSquares if !violated => {
             return Ok(ConicFit {
                 value: free.to_vec(),
                 active: vec![false; free.len()],
             });
         }
-        Method::LeastSquares => Loss::Squares,
-        Method::Huber => Loss::Huber(HUBER_THRESHOLD),
+        RegressionMethod::LeastSquares => Loss::Squares,
+        RegressionMethod::Huber => Loss::Huber(HUBER_THRESHOLD),
     };
     conic_fit(observations, weight, free, nonnegative, loss)
 }
@@ -106,7 +123,11 @@ fn at_weights(
 /// Regression and scatter in turn: the scatter beyond the measurement errors is found per axis from
 /// Σ min(e², k²) = β Σ (1 − leverage) (Huber, Robust Statistics, 1981, §7.7, "proposal 2"), so that a spoilt cut neither
 /// pulls the coefficients nor hides behind the scatter that it makes itself. Standard errors: ibid. eq. 7.6.5.
-fn huber(observations: &[Observation], free: &Fit, nonnegative: &[bool]) -> Result<Estimate> {
+fn huber(
+    observations: &[Observation],
+    free: &CoefficientFit,
+    nonnegative: &[bool],
+) -> Result<CoefficientEstimate> {
     let variance = measurement_variance(observations);
     let mut extra = free.extra_scatter.map(|e| e * e);
     let weights = |extra: &[f64; 4]| -> Vec<f64> {
@@ -125,7 +146,7 @@ fn huber(observations: &[Observation], free: &Fit, nonnegative: &[bool]) -> Resu
             &weights(&extra),
             &free.solution,
             nonnegative,
-            Method::Huber,
+            RegressionMethod::Huber,
         )?;
         conic = solved;
         residual = residuals(observations, &conic.value);
@@ -159,7 +180,7 @@ fn huber(observations: &[Observation], free: &Fit, nonnegative: &[bool]) -> Resu
         .collect();
     let kept = without(observations, &conic.active);
     let unknowns = kept.first().map_or(0, |o| o.row.len());
-    let covariance = Solved::new(&kept, unknowns, &variance, &extra).covariance;
+    let covariance = WeightedSolution::new(&kept, unknowns, &variance, &extra).covariance;
     let (m, p) = (observations.len() as f64, unknowns as f64);
     let inside = standardised.iter().filter(|e| **e <= HUBER_THRESHOLD).count() as f64 / m;
     let psi2: f64 = standardised.iter().map(|e| e.min(HUBER_THRESHOLD).powi(2)).sum();
@@ -170,7 +191,7 @@ fn huber(observations: &[Observation], free: &Fit, nonnegative: &[bool]) -> Resu
     let errors: Vec<Option<f64>> = (0..unknowns)
         .map(|j| Some(widening * covariance[(j, j)].sqrt()))
         .collect();
-    Ok(Estimate {
+    Ok(CoefficientEstimate {
         std_error: spread_out(&errors, &conic.active),
         value: conic.value,
         active: conic.active,
@@ -239,6 +260,7 @@ fn spread_out(kept: &[Option<f64>], held: &[bool]) -> Vec<Option<f64>> {
         .collect()
 }
 
+/// Draws of the bootstrap.
 pub const BOOTSTRAP_DRAWS: usize = 500;
 /// With fewer cuts, draws repeat the same few sets and say nothing.
 pub const BOOTSTRAP_CUTS: usize = 5;
@@ -251,9 +273,9 @@ const BOOTSTRAP_SEED: u64 = 20_260;
 /// leaves a coefficient undetermined.
 pub fn bootstrap(
     observations: &[Observation],
-    estimate: &Estimate,
+    estimate: &CoefficientEstimate,
     nonnegative: &[bool],
-    method: Method,
+    method: RegressionMethod,
 ) -> Option<Vec<f64>> {
     let mut cuts: Vec<usize> = observations.iter().map(|o| o.cut).collect();
     cuts.sort_unstable();
@@ -277,7 +299,7 @@ pub fn bootstrap(
             }
         }
         let variance: Vec<f64> = weight.iter().map(|w| 1.0 / w).collect();
-        let solved = Solved::new(&drawn, nonnegative.len(), &variance, &[0.0; 4]);
+        let solved = WeightedSolution::new(&drawn, nonnegative.len(), &variance, &[0.0; 4]);
         if !solved.null.is_empty() {
             return None;
         }
@@ -324,7 +346,7 @@ mod tests {
         (0..n).map(|_| one()).collect()
     }
 
-    fn of(observations: &[Observation], method: Method) -> Estimate {
+    fn of(observations: &[Observation], method: RegressionMethod) -> CoefficientEstimate {
         let free = fit(observations).unwrap();
         estimate(observations, &free, &[false, false], method).unwrap()
     }
@@ -333,7 +355,10 @@ mod tests {
     fn with_normal_errors_huber_is_nearly_least_squares() {
         let e = normal(3, 400);
         let all = line(400, |i| 2.0 * e[i]);
-        let (ordinary, robust) = (of(&all, Method::LeastSquares), of(&all, Method::Huber));
+        let (ordinary, robust) = (
+            of(&all, RegressionMethod::LeastSquares),
+            of(&all, RegressionMethod::Huber),
+        );
         assert!(robust.converged);
         // The scatter that was put in, by both; 400 values know it to 3.5 %.
         assert_relative_eq!(ordinary.extra_scatter[2], 2.0, max_relative = 0.1);
@@ -350,7 +375,10 @@ mod tests {
     fn a_spoilt_cut_does_not_pull_the_robust_answer() {
         let e = normal(5, 12);
         let all = line(12, |i| 0.3 * e[i] + if i == 3 { 60.0 } else { 0.0 });
-        let (ordinary, robust) = (of(&all, Method::LeastSquares), of(&all, Method::Huber));
+        let (ordinary, robust) = (
+            of(&all, RegressionMethod::LeastSquares),
+            of(&all, RegressionMethod::Huber),
+        );
         assert!((ordinary.value[0] - 1000.0).abs() > 80.0, "{ordinary:?}");
         assert!((robust.value[0] - 1000.0).abs() < 10.0, "{robust:?}");
         assert!(
@@ -368,7 +396,7 @@ mod tests {
         let e = normal(7, 12);
         let all = line(12, |i| 0.3 * e[i] - 25.0 + if i == 3 { 60.0 } else { 0.0 });
         let free = fit(&all).unwrap();
-        let bounded = estimate(&all, &free, &[false, true], Method::Huber).unwrap();
+        let bounded = estimate(&all, &free, &[false, true], RegressionMethod::Huber).unwrap();
         assert_eq!(bounded.active, [false, true]);
         assert_eq!((bounded.value[1], bounded.std_error[1]), (0.0, None));
         // 1000 x − 5 through zero over these feeds: 1000 − 5 Σx/Σx².
@@ -385,14 +413,17 @@ mod tests {
             o.value = 7.0 + e;
         }
         let free = fit(&all).unwrap();
-        let one = estimate(&all, &free, &[false], Method::LeastSquares).unwrap();
-        let drawn = bootstrap(&all, &one, &[false], Method::LeastSquares).unwrap();
+        let one = estimate(&all, &free, &[false], RegressionMethod::LeastSquares).unwrap();
+        let drawn = bootstrap(&all, &one, &[false], RegressionMethod::LeastSquares).unwrap();
         let mean = e.iter().sum::<f64>() / 40.0;
         let exact = (e.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / 40.0 / 40.0).sqrt();
         // 500 draws know a standard deviation to 3 %, by quantiles to 5.
         assert_relative_eq!(drawn[0], exact, max_relative = 0.15);
-        let again = bootstrap(&all, &one, &[false], Method::LeastSquares).unwrap();
+        let again = bootstrap(&all, &one, &[false], RegressionMethod::LeastSquares).unwrap();
         assert_eq!(drawn, again);
-        assert_eq!(bootstrap(&all[..4], &one, &[false], Method::LeastSquares), None);
+        assert_eq!(
+            bootstrap(&all[..4], &one, &[false], RegressionMethod::LeastSquares),
+            None
+        );
     }
 }

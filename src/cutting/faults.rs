@@ -2,13 +2,11 @@
 
 use std::ops::Range;
 
-use super::average_force::ForceAxis;
-use super::record::Notice;
-use crate::Result;
-use crate::campaign::Campaign;
-use crate::ingest::units::figures;
-use crate::ingest::{self, ChannelRole, TimeRecord};
+use super::cut_analysis::Notice;
+use super::force_axis::axis_of;
+use crate::data::{ChannelRole, TimeRecord};
 use crate::signal::find_faults;
+use crate::text::figures;
 
 const SPIKES: &str = "spikes of single samples, left out: the revolutions beside stand in their place; electrical \
      disturbance, look at cables and earth";
@@ -16,30 +14,14 @@ const STUCK: &str =
     "stuck samples, left out: the revolutions beside stand in their place; look at plug, cable and recorder";
 const TOO_MANY: &str = "so much of the channel is bad that it is left out of this cut: repair plug, cable or recorder \
      (stuck at its largest force: choose a larger range at the amplifier) and cut again";
-/// What the reader noticed about the file.
-const READER: &str = "noticed while reading the file";
-
 /// More than this part of a channel bad, and it is not used at all.
 const BAD_AT_MOST: f64 = 0.1;
 /// Revolutions to either side that are looked at for good samples.
 const TURNS: usize = 50;
 
-/// The record of one cut, bad samples replaced, and what its owner should know.
-///
-/// # Errors
-/// Those of [`ingest::read_time`].
-pub fn read_record(campaign: &Campaign, cut: usize) -> Result<(TimeRecord, Vec<Notice>)> {
-    let cut = &campaign.cuts[cut];
-    let (mut record, reader_warnings) = ingest::read_time_with(&cut.file, &campaign.channel_rules(&cut.id))?;
-    let mut notices = repair(&mut record, cut.spindle_rpm);
-    let noticed = |detail| Notice { kind: READER, detail };
-    notices.extend(reader_warnings.into_iter().map(noticed));
-    Ok((record, notices))
-}
-
 /// Replaces spikes, stuck and dropped samples of the force channels by the same angle of the nearest good revolutions.
 /// (Clipped peaks are clipped in every revolution: nothing can stand in for them.)
-fn repair(record: &mut TimeRecord, spindle_rpm: f64) -> Vec<Notice> {
+pub fn repair_record(record: &mut TimeRecord, spindle_rpm: f64) -> Vec<Notice> {
     let per_turn = record.sample_rate_hz * 60.0 / spindle_rpm;
     let (start_s, rate, filled) = (record.start_s, record.sample_rate_hz, record.filled.clone());
     let time = |r: &Range<usize>| start_s + r.start as f64 / rate;
@@ -96,16 +78,6 @@ fn repair(record: &mut TimeRecord, spindle_rpm: f64) -> Vec<Notice> {
         }
     }
     notices
-}
-
-pub(super) fn axis_of(role: ChannelRole) -> Option<ForceAxis> {
-    Some(match role {
-        ChannelRole::ForceX => ForceAxis::X,
-        ChannelRole::ForceY => ForceAxis::Y,
-        ChannelRole::ForceZ => ForceAxis::Z,
-        ChannelRole::TorqueZ => ForceAxis::Mz,
-        ChannelRole::Other => return None,
-    })
 }
 
 /// Bad samples by the mean of those one revolution before and after (or two, …, where these are bad too).

@@ -4,23 +4,27 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value, json};
 
-use super::average_force::{CoefficientKind, ForceAxis, coefficients_of};
-use super::estimate::{Estimate, Method, bootstrap, estimate};
-use super::identify::CfcOptions;
+use super::coefficients::{CoefficientKind, coefficients_of};
+use super::cut_analysis::CutAnalysis;
+use super::estimate::{CfcOptions, CoefficientEstimate, RegressionMethod, bootstrap, estimate};
+use super::force_axis::ForceAxis;
 use super::outlier::studentized;
-use super::record::CutAnalysis;
-use super::regression::{Fit, Observation, fit, r2};
+use super::regression::{CoefficientFit, Observation, fit, r2};
 use crate::Result;
-use crate::campaign::Process;
+use crate::data::Process;
 
 /// A coefficient, or the admission that the data does not determine it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coefficient {
+    /// Key in JSON, with unit.
     pub key: &'static str,
+    /// Symbol, for people: `Ktc`.
     pub label: &'static str,
+    /// Unit, for people.
     pub unit: &'static str,
     /// An edge coefficient (N/mm), else a cutting coefficient (N/mm²).
     pub edge: bool,
+    /// In `unit`; `None` where the data does not determine it.
     pub value: Option<f64>,
     /// `None` too where a constraint holds the value.
     pub std_error: Option<f64>,
@@ -37,19 +41,23 @@ pub struct Coefficient {
 /// A value and its standard error.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Known {
+    /// The value, in the unit of what it is a value of.
     pub value: f64,
+    /// Its standard error, same unit; `None` where it is not known.
     pub std_error: Option<f64>,
 }
 
 /// How much one cut decides, and how it stands to the others.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Influence {
+    /// The cut's id.
     pub cut: String,
     /// Largest over the axes; 1: nothing checks this cut.
     pub leverage: f64,
     /// Off the prediction from the other cuts, in standard errors of that difference; of the axis furthest off. `None`
     /// where too few other cuts are left to judge.
     pub studentized_residual: Option<f64>,
+    /// Axis of `studentized_residual`.
     pub axis: Option<ForceAxis>,
     /// What robust regression leaves of its weight, 0…1, on the axis where it leaves least; 1 with least squares.
     pub weight_share: f64,
@@ -58,13 +66,17 @@ pub struct Influence {
 /// A point of the regression, for lists and plots.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct RegressionPoint {
+    /// The cut's id.
     pub cut: String,
+    /// Which of its averages.
     pub axis: ForceAxis,
     /// Per tooth (milling), per revolution (drilling, turning).
     pub feed_mm: f64,
     /// N; N·m on the torque axis. So are the next two.
     pub measured: f64,
+    /// Measurement error of `measured`.
     pub std_error: f64,
+    /// By the coefficients of the group.
     pub fitted: f64,
     /// Diagonal of the weighted hat matrix, 0…1.
     pub leverage: f64,
@@ -76,7 +88,8 @@ pub struct RegressionPoint {
 
 /// The regression over a set of cuts of one process.
 #[derive(Debug, Clone)]
-pub struct Group {
+pub struct ForceGroup {
+    /// How its cuts were made.
     pub process: Process,
     /// As the campaign names it.
     pub material: Option<String>,
@@ -89,15 +102,18 @@ pub struct Group {
     /// Number of different feeds.
     pub feeds: usize,
     /// How the coefficients were drawn from the averages.
-    pub method: Method,
+    pub method: RegressionMethod,
+    /// In the order of [`coefficients_of`].
     pub coefficients: Vec<Coefficient>,
     /// Names of coefficients that only a combination of is determined.
     pub inseparable: Vec<Vec<&'static str>>,
     /// By axis (x, y, z, torque).
     pub r2: [Option<f64>; 4],
+    /// Σ (residual/standard error)² per degree of freedom, by axis; `None` without degrees of freedom.
     pub chi2_per_dof: [Option<f64>; 4],
     /// Scatter of the averages beyond their own errors (N; N·m), by axis.
     pub extra_scatter: [f64; 4],
+    /// Every average that was used.
     pub points: Vec<RegressionPoint>,
     /// By cut, as `cuts`.
     pub influence: Vec<Influence>,
@@ -129,7 +145,7 @@ pub(super) fn observations(cuts: &[&CutAnalysis], rows: &Rows) -> Vec<Observatio
 /// Rows of the linear model by cut index and axis.
 pub(super) type Rows = BTreeMap<(usize, ForceAxis), Vec<f64>>;
 
-impl Group {
+impl ForceGroup {
     /// Fits one group; `None` where its cuts hold no average at all.
     ///
     /// # Errors
@@ -139,13 +155,13 @@ impl Group {
         material: Option<&str>,
         rows: &Rows,
         options: CfcOptions,
-    ) -> Result<Option<Group>> {
+    ) -> Result<Option<ForceGroup>> {
         let observations = observations(cuts, rows);
         let (Some(first), Some(free)) = (cuts.first(), fit(&observations)) else {
             return Ok(None);
         };
         let speeds = || cuts.iter().map(|c| c.cutting_speed_m_per_min);
-        let mut group = Group {
+        let mut group = ForceGroup {
             process: first.process,
             material: material.map(str::to_string),
             cutting_speed_m_per_min: speeds().sum::<f64>() / cuts.len() as f64,
@@ -155,7 +171,7 @@ impl Group {
             ],
             cuts: cuts.iter().map(|c| c.id.clone()).collect(),
             feeds: distinct(cuts.iter().map(|c| c.feed_mm)).len(),
-            method: Method::LeastSquares,
+            method: RegressionMethod::LeastSquares,
             coefficients: free_coefficients(first.process, &free),
             inseparable: free
                 .inseparable
@@ -204,7 +220,12 @@ impl Group {
 
     /// Puts in the coefficients by the method that was asked for, with what the other method, a fit without
     /// constraints and the bootstrap say. Errors are those of the fit without the held coefficients.
-    fn choose(&mut self, observations: &[Observation], free: &Fit, options: CfcOptions) -> Result<Estimate> {
+    fn choose(
+        &mut self,
+        observations: &[Observation],
+        free: &CoefficientFit,
+        options: CfcOptions,
+    ) -> Result<CoefficientEstimate> {
         let edges = |c: &Coefficient| options.nonnegative_edges && c.edge;
         let bounds: Vec<bool> = self.coefficients.iter().map(edges).collect();
         let used = |axis: &&ForceAxis| observations.iter().any(|o| o.axis == **axis);
@@ -213,8 +234,8 @@ impl Group {
             .filter(used)
             .all(|a| free.dof[a.index()] >= ROBUST_DOF);
         let (method, other) = match options.robust && robust_possible {
-            true => (Method::Huber, Method::LeastSquares),
-            false => (Method::LeastSquares, Method::Huber),
+            true => (RegressionMethod::Huber, RegressionMethod::LeastSquares),
+            false => (RegressionMethod::LeastSquares, RegressionMethod::Huber),
         };
         let chosen = estimate(observations, free, &bounds, method)?;
         // Second opinions: where they fail there is none.
@@ -227,7 +248,7 @@ impl Group {
             .then(|| estimate(observations, free, &vec![false; bounds.len()], method).ok())
             .flatten();
         let drawn = bootstrap(observations, &chosen, &bounds, method);
-        let known = |estimate: &Estimate, j: usize| Known {
+        let known = |estimate: &CoefficientEstimate, j: usize| Known {
             value: estimate.value[j],
             std_error: estimate.std_error[j],
         };
@@ -249,10 +270,11 @@ impl Group {
     }
 
     /// Whether both are of one process and one material.
-    pub fn is_beside(&self, other: &Group) -> bool {
+    pub fn is_beside(&self, other: &ForceGroup) -> bool {
         self.process == other.process && self.material == other.material
     }
 
+    /// The coefficient with this symbol (`Ktc`).
     pub fn coefficient(&self, label: &str) -> Option<&Coefficient> {
         self.coefficients.iter().find(|c| c.label == label)
     }
@@ -262,7 +284,7 @@ impl Group {
         self.coefficients.iter().all(|c| c.value.is_some())
     }
 
-    /// The contract's form of a group (campaign.md), with a few keys more.
+    /// A group as docs/json.md has it.
     pub fn to_json(&self) -> Value {
         let mut map = Map::new();
         map.insert("process".into(), json!(self.process));
@@ -283,8 +305,8 @@ impl Group {
             });
             if let Some(other) = c.other_method {
                 let key = match self.method {
-                    Method::LeastSquares => "huber",
-                    Method::Huber => "least_squares",
+                    RegressionMethod::LeastSquares => "huber",
+                    RegressionMethod::Huber => "least_squares",
                 };
                 entry[key] = json!(other);
             }
@@ -319,7 +341,7 @@ pub(crate) fn by_axis(process: Process, values: &[Option<f64>; 4]) -> Value {
 }
 
 /// What the ordinary fit says, before constraints and second opinions.
-fn free_coefficients(process: Process, free: &Fit) -> Vec<Coefficient> {
+fn free_coefficients(process: Process, free: &CoefficientFit) -> Vec<Coefficient> {
     let one = |(j, kind): (usize, &CoefficientKind)| Coefficient {
         key: kind.key,
         label: kind.label,

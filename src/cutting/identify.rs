@@ -1,29 +1,20 @@
-//! From a campaign's records to its cutting force coefficients.
-
-use rayon::prelude::*;
+//! From what the force records say to the cutting force coefficients.
 
 use super::average::pool_scatter;
-use super::average_force::{ForceAxis, average_row};
-use super::group::{Group, Rows, distinct, observations};
-use super::in_step::{InStep, read_in_step};
-use super::orthogonal::{Prediction, predict};
+use super::average_force::average_row;
+use super::cut_analysis::{Average, CutAnalysis};
+use super::cutting_trials::CuttingTrials;
+use super::estimate::CfcOptions;
+use super::force_axis::ForceAxis;
+use super::group::{ForceGroup, Rows, distinct, observations};
+use super::orthogonal::{OrthogonalPrediction, predict};
 use super::outlier::misfits;
 use super::plausibility;
-use super::record::{Average, CutAnalysis};
-use super::series::{MaterialComparison, Series, SpeedTrends, compare, speed_trends};
+use super::series::{MaterialComparison, MaterialSeries, SpeedTrends, compare, speed_trends};
 use super::turning_checks::of_turning;
 use super::warnings;
-use crate::campaign::{Campaign, CutGeometry, Process};
-use crate::progress::Progress;
+use crate::data::{CutGeometry, Process};
 use crate::{Error, InputError, Result};
-
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct CfcOptions {
-    /// Edge coefficients are held at zero or above.
-    pub nonnegative_edges: bool,
-    /// Huber's robust regression where there are cuts enough; else it is the second opinion.
-    pub robust: bool,
-}
 
 /// What the dynamometer records say.
 #[derive(Debug, Clone)]
@@ -31,56 +22,34 @@ pub struct CfcResult {
     /// Every usable cut, in the campaign's order.
     pub cuts: Vec<CutAnalysis>,
     /// One per process, material and cutting speed where the feeds at that speed suffice; otherwise speeds are pooled.
-    pub groups: Vec<Group>,
+    pub groups: Vec<ForceGroup>,
     /// All cuts of a process and a material together, one group each.
-    pub pooled: Vec<Group>,
+    pub pooled: Vec<ForceGroup>,
     /// What each coefficient does over cutting speed, per process and material with two speeds or more.
     pub trends: Vec<SpeedTrends>,
     /// Each further material against the first one of its process.
     pub materials: Vec<MaterialComparison>,
-    /// Milling coefficients from the orthogonal database beside those of the cuts.
-    pub prediction: Option<Prediction>,
+    /// Milling coefficients from the orthogonal database, next to those of the cuts.
+    pub prediction: Option<OrthogonalPrediction>,
+    /// What a technician should know, in plain words.
     pub warnings: Vec<String>,
 }
 
-/// Reads every cut's record (in parallel, one record in memory per thread) and fits the coefficients.
-/// A cut that cannot be used is left out with a warning that names it.
+/// The coefficients from what the cuts' records say, with the warnings that go with them. A cut that cannot be used is left
+/// out with a warning that names it.
 ///
 /// # Errors
-/// No cuts, no tool, or not one usable record.
-pub fn identify_forces(campaign: &Campaign, options: CfcOptions) -> Result<CfcResult> {
-    if campaign.cuts.is_empty() {
-        return Err(
-            InputError::new("the campaign has no [[cut]]: nothing to identify cutting forces from")
-                .file(campaign.dir.join("campaign.toml"))
-                .key("cut")
-                .remedy("add [[cut]] tables that name the force records")
-                .into(),
-        );
-    }
-    let progress = Progress::new("force records", campaign.cuts.len());
-    let outcomes: Vec<Result<CutAnalysis>> = (0..campaign.cuts.len())
-        .into_par_iter()
-        .map(|i| {
-            let outcome = read_in_step(campaign, i, InStep::Fully).map(|(_, analysis)| analysis);
-            progress.step();
-            outcome
-        })
-        .collect();
-    from_analyses(campaign, outcomes, options)
-}
-
-/// The part after the records are read: regression and warnings.
-pub fn from_analyses(
-    campaign: &Campaign,
+/// Not one usable record, or none on an axis that carries coefficients.
+pub fn fit_force_coefficients(
+    trials: &CuttingTrials,
     outcomes: Vec<Result<CutAnalysis>>,
     options: CfcOptions,
 ) -> Result<CfcResult> {
     let mut warnings = Vec::new();
     let (mut cuts, mut first_error, mut rows) = (Vec::new(), None, Rows::new());
-    for (cut, outcome) in campaign.cuts.iter().zip(outcomes) {
+    for (cut, outcome) in trials.cuts.iter().zip(outcomes) {
         let usable = outcome.and_then(|analysis| {
-            add_rows(campaign, &analysis, &mut rows)?;
+            add_rows(trials, &analysis, &mut rows)?;
             Ok(analysis)
         });
         match usable {
@@ -92,29 +61,24 @@ pub fn from_analyses(
         }
     }
     if cuts.is_empty() {
-        let cause = first_error.map_or_else(String::new, |e| format!("; the first: {e}"));
-        let problem = format!("none of the {} cuts can be used{cause}", campaign.cuts.len());
-        return Err(InputError::new(problem)
-            .file(campaign.dir.join("campaign.toml"))
-            .key("cut")
-            .into());
+        return Err(none_usable(trials.cuts.len(), first_error));
     }
-    pool_scatter(&mut cuts, &campaign.dynamometer.tool_from_dyno);
+    pool_scatter(&mut cuts, trials.tool_from_dyno);
     turn_torque(&mut cuts, &mut warnings);
-    let counted = without_duplicates(campaign, &cuts, &mut warnings);
-    warnings.extend(warnings::of_records(campaign, &cuts));
+    let counted = without_duplicates(trials, &cuts, &mut warnings);
+    warnings.extend(warnings::of_records(trials, &cuts));
 
     let (mut groups, mut pooled) = (Vec::new(), Vec::new());
     let (mut trends, mut materials) = (Vec::new(), Vec::new());
     for process in Process::ALL {
         let of_process: Vec<&CutAnalysis> =
             counted.iter().copied().filter(|c| c.process == process).collect();
-        let mut series: Vec<Series> = Vec::new();
+        let mut series: Vec<MaterialSeries> = Vec::new();
         for cut in of_process {
-            let material = campaign.cuts[cut.cut].material.as_deref();
+            let material = trials.cuts[cut.cut].material.as_deref();
             match series.iter_mut().find(|s| s.material == material) {
                 Some(one) => one.cuts.push(cut),
-                None => series.push(Series {
+                None => series.push(MaterialSeries {
                     process,
                     material,
                     cuts: vec![cut],
@@ -122,25 +86,25 @@ pub fn from_analyses(
             }
         }
         for one in &series {
-            let Some(all) = Group::fit(&one.cuts, one.material, &rows, options)? else {
+            let Some(all) = ForceGroup::fit(&one.cuts, one.material, &rows, options)? else {
                 continue;
             };
-            let mut told = plausibility::of_scales(campaign, &one.cuts, process);
-            told.extend(warnings::of_plan(campaign, &one.cuts, process));
+            let mut told = plausibility::of_scales(trials, &one.cuts, process);
+            told.extend(warnings::of_plan(trials, &one.cuts, process));
             if process == Process::Turning {
-                told.extend(of_turning(campaign, &one.cuts));
+                told.extend(of_turning(trials, &one.cuts));
             }
             let first_group = groups.len();
             for set in by_speed(&one.cuts, &mut told) {
-                groups.extend(Group::fit(&set, one.material, &rows, options)?);
+                groups.extend(ForceGroup::fit(&set, one.material, &rows, options)?);
             }
             let misfits = misfits(&observations(&one.cuts, &rows));
-            told.extend(misfits.iter().map(|m| warnings::of_misfit(campaign, m)));
-            let by_speed: Vec<&Group> = groups[first_group..].iter().collect();
+            told.extend(misfits.iter().map(|m| warnings::of_misfit(trials, m)));
+            let by_speed: Vec<&ForceGroup> = groups[first_group..].iter().collect();
             told.extend(warnings::of_fits(&all, &by_speed));
-            told.extend(warnings::of_shape(campaign, &all));
+            told.extend(warnings::of_shape(trials, &all));
             told.extend(warnings::of_methods(&all, &by_speed, options));
-            if let Some(found) = speed_trends(campaign, one, &rows) {
+            if let Some(found) = speed_trends(trials, one, &rows) {
                 told.extend(found.warnings());
                 trends.push(found);
             }
@@ -160,7 +124,7 @@ pub fn from_analyses(
             "no cut holds an average on an axis that carries coefficients: check that Fx, Fy, Fz (drilling: Fz, Mz) are recorded",
         ));
     }
-    let prediction = predict(campaign, &pooled, &mut warnings);
+    let prediction = predict(trials, &pooled, &mut warnings);
     Ok(CfcResult {
         cuts,
         groups,
@@ -172,14 +136,15 @@ pub fn from_analyses(
     })
 }
 
-fn add_rows(campaign: &Campaign, analysis: &CutAnalysis, rows: &mut Rows) -> Result<()> {
-    let Some(tool) = campaign.tool.as_ref() else {
-        return Err(Error::computation(
-            "[tool] is missing: cutting forces need its teeth and diameter",
-        ));
-    };
+/// Not one of so many cuts can be used: why the first cannot.
+pub(crate) fn none_usable(cuts: usize, first_error: Option<Error>) -> Error {
+    let cause = first_error.map_or_else(String::new, |e| format!("; the first: {e}"));
+    InputError::new(format!("none of the {cuts} cuts can be used{cause}")).into()
+}
+
+fn add_rows(trials: &CuttingTrials, analysis: &CutAnalysis, rows: &mut Rows) -> Result<()> {
     for &axis in ForceAxis::of(analysis.process) {
-        let row = average_row(tool, &campaign.cuts[analysis.cut].geometry, axis)?;
+        let row = average_row(trials.tool, &trials.cuts[analysis.cut].geometry, axis)?;
         rows.insert((analysis.cut, axis), row);
     }
     Ok(())
@@ -204,14 +169,14 @@ fn turn_torque(cuts: &mut [CutAnalysis], warnings: &mut Vec<String>) {
 
 /// The same record twice would count double; a repeated cut is welcome.
 fn without_duplicates<'a>(
-    campaign: &Campaign,
+    trials: &CuttingTrials,
     cuts: &'a [CutAnalysis],
     warnings: &mut Vec<String>,
 ) -> Vec<&'a CutAnalysis> {
     let mut kept: Vec<&CutAnalysis> = Vec::new();
     for cut in cuts {
         let same_data = |a: &CutAnalysis| {
-            campaign.cuts[a.cut].file == campaign.cuts[cut.cut].file
+            trials.cuts[a.cut].file == trials.cuts[cut.cut].file
                 || (a.averages == cut.averages
                     && a.steady_s == cut.steady_s
                     && a.spindle_rpm == cut.spindle_rpm)
@@ -228,7 +193,7 @@ fn without_duplicates<'a>(
 }
 
 /// Cutting speeds that differ by less, as a part, are one speed. A bar gets thinner with every cut, and lathes hold the speed at
-/// the diameter that they were told.
+/// the diameter that was entered.
 fn one_speed(process: Process) -> f64 {
     match process {
         Process::Milling | Process::Drilling => 2e-3,
@@ -299,40 +264,5 @@ pub(crate) fn depth_mm(geometry: &CutGeometry) -> Option<f64> {
         CutGeometry::Milling { axial_depth_mm, .. } => Some(axial_depth_mm),
         CutGeometry::Drilling { hole_depth_mm, .. } => hole_depth_mm,
         CutGeometry::Turning { depth_of_cut_mm, .. } => Some(depth_of_cut_mm),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::cutting::made_records::{MadeCut, TRUTH, write_campaign_of};
-
-    /// Slots with a ball end: the radial force has an axial part, so that all six coefficients hang together.
-    #[test]
-    fn a_ball_end_gives_back_its_coefficients() {
-        let dir = tempfile::tempdir().unwrap();
-        let cuts = [0.04, 0.08, 0.12, 0.16].map(|feed_mm| MadeCut {
-            rpm: 1500.0,
-            feed_mm,
-            speed: &|_| 1.0,
-        });
-        let campaign = write_campaign_of(dir.path(), 5.0, &cuts, &|_, _, _, _, _| 0.0);
-        let result = identify_forces(&campaign, CfcOptions::default()).unwrap();
-        let found = &result.pooled[0];
-        for (coefficient, truth) in found.coefficients.iter().zip(TRUTH) {
-            let (value, std) = (coefficient.value.unwrap(), coefficient.std_error.unwrap());
-            assert!((value - truth).abs() < 4.0 * std, "{value} ± {std} for {truth}");
-            assert!(std < 0.02 * truth.max(50.0), "± {std} of {truth}");
-        }
-        assert!(found.r2.iter().flatten().all(|r2| *r2 > 0.999));
-        assert!(result.warnings.is_empty(), "{:?}", result.warnings);
-        // Taken for a straight end mill the radial force comes out a third too small.
-        let straight = write_campaign_of(dir.path(), 0.0, &[], &|_, _, _, _, _| 0.0);
-        let wrong = Campaign {
-            tool: straight.tool,
-            ..campaign
-        };
-        let wrong = identify_forces(&wrong, CfcOptions::default()).unwrap();
-        assert!(wrong.pooled[0].coefficients[1].value.unwrap() < 0.7 * TRUTH[1]);
     }
 }

@@ -1,4 +1,4 @@
-//! Kienzle's law beside the linear-edge law: Fᵢ = kᵢ1.1 · b · h^(1−mᵢ) for each component (Kienzle & Victor, Spezifische
+//! Kienzle's law next to the linear-edge law: Fᵢ = kᵢ1.1 · b · h^(1−mᵢ) for each component (Kienzle & Victor, Spezifische
 //! Schnittkräfte bei der Metallbearbeitung, Werkstattstechnik und Maschinenbau 47 (1957) 224–225), h and b in mm. In milling
 //! h = c sin φ at each angle (Martellotti 1941), averaged over a turn; along a drill's lip h is the same everywhere; round the
 //! nose of a turning tool each bit of the edge has its own (see [`super::turning`]).
@@ -8,26 +8,28 @@
 //! 4th Berkeley Symposium, 1961; Williams, Biometrics 26 (1970) 23–32), with the scatter that each leaves: that holds for
 //! few cuts, too.
 
-use std::f64::consts::{FRAC_PI_2, PI};
-
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 use statrs::distribution::{ContinuousCDF, Normal};
-use statrs::function::beta::{beta, beta_reg};
 
-use super::average_force::{DrillGeometry, ForceAxis, average_row, feed_mm};
-use super::group::{Group, Known, by_axis, distinct};
+use super::average_force::{average_row, feed_mm};
+use super::cutting_trials::CuttingTrials;
+use super::force_axis::ForceAxis;
+use super::group::{ForceGroup, Known, by_axis, distinct};
 use super::identify::CfcResult;
-use super::regression::{Fit, Observation, fit, r2};
-use super::turning::engaged_edge;
-use crate::campaign::{Campaign, CutGeometry, Process, Tool};
+use super::kienzle_law::{
+    EXPONENTS, KienzleLaw, KienzleLawFit, KienzleTerm, components, linear_deviance, terms,
+};
+use super::regression::{CoefficientFit, Observation, fit, r2};
+use crate::data::{CutGeometry, Process, Tool};
 use crate::stop;
 
 /// A force component under Kienzle's law.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KienzleComponent {
+    /// `tangential`, `radial`, `axial` or, of a drill, `feed`.
     pub name: &'static str,
     /// Symbol of the specific force: `kt1.1` is the kc1.1 of the tables.
     pub label: &'static str,
@@ -41,7 +43,9 @@ pub struct KienzleComponent {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Preferred {
+    /// Force = cutting coefficient × chip area + edge coefficient × width.
     LinearEdge,
+    /// Force = kᵢ1.1 · b · h^(1−mᵢ).
     Kienzle,
 }
 
@@ -50,6 +54,7 @@ pub enum Preferred {
 pub struct TellingFeed {
     /// Per tooth (milling), per revolution (drilling, turning), everything else as in the first cut.
     pub feed_mm: f64,
+    /// Average on which the laws differ most there.
     pub axis: ForceAxis,
     /// Kienzle's law less the linear-edge law there (N; N·m).
     pub difference: f64,
@@ -60,8 +65,11 @@ pub struct TellingFeed {
 /// Kienzle's law fitted to the averages of a group, and how it stands to the linear-edge law.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KienzleFit {
+    /// How the cuts of the group were made.
     pub process: Process,
+    /// Tangential, radial and axial force; of a drill tangential and feed force.
     pub components: Vec<KienzleComponent>,
+    /// False where the fit did not settle.
     pub converged: bool,
     /// By axis (x, y, z, torque).
     pub r2: [Option<f64>; 4],
@@ -87,286 +95,22 @@ const SEED: u64 = 1957;
 const FALSE_ALARM: f64 = 0.01;
 /// A smaller difference of BIC is no evidence (Kass & Raftery 1995): two feeds fit both laws alike, to rounding.
 const BARE_MENTION: f64 = 2.0;
-/// What m may be in a fit: 0 is no size effect, 1 a force that does not know the chip.
-const EXPONENTS: [f64; 2] = [-0.9, 0.99];
 const STARTS: [f64; 3] = [0.2, 0.45, 0.7];
 /// Standard errors that a force must stand above nothing for its exponent to mean something.
 const CLEAR: f64 = 3.0;
 
-/// ∫ over the immersion of what a force component brings to an axis, at h ∝ sin^p φ.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Moment {
-    /// 1: the chip is the same everywhere.
-    One,
-    /// ∫ sin^p cos.
-    Cosine,
-    /// ∫ sin^(p+1).
-    Sine,
-    /// ∫ sin^p.
-    Plain,
-}
-
-/// What one component brings to one average: width (chip/reference)^p moment(p), times the force per width at the reference chip.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Term {
-    component: usize,
-    /// Width, mm, with sign, share of the turn, and for a torque its arm.
-    scale: f64,
-    chip_mm: f64,
-    moment: Moment,
-    /// Immersion angles within the half turn that cuts, rad.
-    angles: [f64; 2],
-}
-
-impl Term {
-    fn value(&self, m: f64, reference_mm: f64) -> f64 {
-        let p = 1.0 - m;
-        let over = |f: &dyn Fn(f64) -> f64| f(self.angles[1]) - f(self.angles[0]);
-        let moment = match self.moment {
-            Moment::One => 1.0,
-            Moment::Cosine => over(&|a| a.sin().max(0.0).powf(p + 1.0) / (p + 1.0)),
-            Moment::Sine => over(&|a| sine_power(p + 1.0, a)),
-            Moment::Plain => over(&|a| sine_power(p, a)),
-        };
-        self.scale * (self.chip_mm / reference_mm).powf(p) * moment
-    }
-}
-
-/// ∫ sin^p from 0 to `angle` (0…π), p > −1: half an incomplete beta function (NIST DLMF 8.17.1 with t = sin²).
-fn sine_power(p: f64, angle: f64) -> f64 {
-    let (a, b) = (0.5 * (p + 1.0), 0.5);
-    let half = 0.5 * beta(a, b);
-    let part = |angle: f64| half * beta_reg(a, b, angle.sin().powi(2).clamp(0.0, 1.0));
-    if angle <= FRAC_PI_2 {
-        part(angle)
-    } else {
-        2.0 * half - part(PI - angle)
-    }
-}
-
-/// The terms of one average; `None` for a geometry that has none.
-fn terms(tool: &Tool, geometry: &CutGeometry, axis: ForceAxis) -> Option<Vec<Term>> {
-    match *geometry {
-        CutGeometry::Milling {
-            feed_per_tooth_mm,
-            axial_depth_mm,
-            immersion,
-        } => {
-            // Where the chip differs along the edge the law has no closed form.
-            if !tool.has_straight_edge() {
-                return None;
-            }
-            let scale = tool.teeth as f64 * axial_depth_mm / (2.0 * PI);
-            let term = |component, sign: f64, moment| Term {
-                component,
-                scale: sign * scale,
-                chip_mm: feed_per_tooth_mm,
-                moment,
-                angles: [immersion.start_rad.min(PI), immersion.exit_rad.min(PI)],
-            };
-            Some(match axis {
-                ForceAxis::X => vec![term(0, -1.0, Moment::Cosine), term(1, -1.0, Moment::Sine)],
-                ForceAxis::Y => vec![term(0, 1.0, Moment::Sine), term(1, -1.0, Moment::Cosine)],
-                ForceAxis::Z => vec![term(2, 1.0, Moment::Plain)],
-                ForceAxis::Mz => vec![],
-            })
-        }
-        CutGeometry::Drilling { .. } => {
-            let chip_mm = DrillGeometry::new(tool, geometry).ok()?.chip_thickness_mm();
-            // The edge columns of the linear-edge law: width, and arm for the torque.
-            let row = average_row(tool, geometry, axis).ok()?;
-            let term = |component, scale| Term {
-                component,
-                scale,
-                chip_mm,
-                moment: Moment::One,
-                angles: [0.0; 2],
-            };
-            Some(match axis {
-                ForceAxis::Mz => vec![term(0, row[1])],
-                ForceAxis::Z => vec![term(1, row[3])],
-                ForceAxis::X | ForceAxis::Y => vec![],
-            })
-        }
-        CutGeometry::Turning { .. } => {
-            let edge = engaged_edge(tool, geometry).ok()?;
-            let cutting = edge.iter().filter(|bit| bit.chip_mm > 0.0);
-            let terms = cutting.flat_map(|bit| {
-                let directions = bit.directions(axis).into_iter().enumerate();
-                directions
-                    .filter(|(_, direction)| *direction != 0.0)
-                    .map(|(component, direction)| Term {
-                        component,
-                        scale: direction * bit.length_mm,
-                        chip_mm: bit.chip_mm,
-                        moment: Moment::One,
-                        angles: [0.0; 2],
-                    })
-            });
-            Some(terms.collect())
-        }
-    }
-}
-
-fn components(process: Process) -> &'static [(&'static str, &'static str)] {
-    match process {
-        Process::Milling | Process::Turning => {
-            &[("tangential", "kt1.1"), ("radial", "kr1.1"), ("axial", "ka1.1")]
-        }
-        Process::Drilling => &[("tangential", "kt1.1"), ("feed", "kf1.1")],
-    }
-}
-
-/// Kienzle's law over a set of averages. Parameters: force per width at the reference chip (N/mm) of each component, then
-/// the exponents: so they are hardly correlated, as k1.1 and m are.
-struct Law<'a> {
-    /// By observation.
-    terms: &'a [Vec<Term>],
-    components: usize,
-    reference_mm: f64,
-}
-
-struct LawFit {
-    theta: Vec<f64>,
-    /// Of the last linearisation.
-    linear: Fit,
-    converged: bool,
-}
-
-impl Law<'_> {
-    fn predict(&self, terms: &[Term], theta: &[f64]) -> f64 {
-        let one =
-            |t: &Term| theta[t.component] * t.value(theta[self.components + t.component], self.reference_mm);
-        terms.iter().map(one).sum()
-    }
-
-    fn jacobian(&self, terms: &[Term], theta: &[f64]) -> Vec<f64> {
-        const STEP: f64 = 1e-5;
-        let mut row = vec![0.0; 2 * self.components];
-        for t in terms {
-            let m = theta[self.components + t.component];
-            let at = |m: f64| t.value(m, self.reference_mm);
-            row[t.component] += at(m);
-            row[self.components + t.component] +=
-                theta[t.component] * (at(m + STEP) - at(m - STEP)) / (2.0 * STEP);
-        }
-        row
-    }
-
-    /// With the exponents held, the law is linear.
-    fn start(&self, observations: &[Observation], m: f64) -> Option<Vec<f64>> {
-        let held: Vec<Observation> = observations
-            .iter()
-            .zip(self.terms)
-            .map(|(o, terms)| {
-                let mut row = vec![0.0; self.components];
-                for t in terms {
-                    row[t.component] += t.value(m, self.reference_mm);
-                }
-                Observation { row, ..o.clone() }
-            })
-            .collect();
-        let mut theta = fit(&held)?.solution;
-        theta.resize(2 * self.components, m);
-        Some(theta)
-    }
-
-    /// Gauss and Newton's method; each step is the same regression as that of the linear-edge law.
-    fn fit(&self, observations: &[Observation], start: Vec<f64>, most_steps: usize) -> Option<LawFit> {
-        let mut theta = start;
-        let (mut linear, mut converged) = (None, false);
-        for _ in 0..most_steps {
-            let linearised: Vec<Observation> = observations
-                .iter()
-                .zip(self.terms)
-                .map(|(o, terms)| {
-                    let row = self.jacobian(terms, &theta);
-                    let along: f64 = row.iter().zip(&theta).map(|(r, x)| r * x).sum();
-                    Observation {
-                        value: o.value - self.predict(terms, &theta) + along,
-                        row,
-                        ..o.clone()
-                    }
-                })
-                .collect();
-            let solved = fit(&linearised)?;
-            let squares = |theta: &[f64]| -> f64 {
-                let each = observations.iter().zip(self.terms).zip(&solved.weight);
-                each.map(|((o, terms), w)| w * (o.value - self.predict(terms, theta)).powi(2))
-                    .sum()
-            };
-            let before = squares(&theta);
-            let towards = |share: f64| -> Vec<f64> {
-                let mut next: Vec<f64> = theta
-                    .iter()
-                    .zip(&solved.solution)
-                    .map(|(x, to)| x + share * (to - x))
-                    .collect();
-                for m in &mut next[self.components..] {
-                    *m = m.clamp(EXPONENTS[0], EXPONENTS[1]);
-                }
-                next
-            };
-            let next = (0..10)
-                .map(|k| towards(0.5f64.powi(k)))
-                .find(|next| squares(next) <= before * (1.0 + 1e-12));
-            linear = Some(solved);
-            let Some(next) = next else {
-                // Nothing better that way: rounding, or the end of an exponent's range.
-                converged = true;
-                break;
-            };
-            let size = theta[..self.components]
-                .iter()
-                .fold(0.0f64, |s, q| s.max(q.abs()));
-            let change = theta.iter().zip(&next).enumerate().map(|(j, (a, b))| {
-                let unit = if j < self.components { size } else { 1.0 };
-                (a - b).abs() / unit.max(f64::MIN_POSITIVE)
-            });
-            let change = change.fold(0.0, f64::max);
-            theta = next;
-            if change < 1e-7 {
-                converged = true;
-                break;
-            }
-        }
-        Some(LawFit {
-            linear: linear?,
-            theta,
-            converged,
-        })
-    }
-
-    fn deviance(&self, observations: &[Observation], fit: &LawFit) -> f64 {
-        let fitted = self.terms.iter().map(|t| self.predict(t, &fit.theta));
-        deviance(observations, &fit.linear.weight, fitted)
-    }
-}
-
-/// −2 ln likelihood, up to a constant, of independent normal errors.
-fn deviance(observations: &[Observation], weight: &[f64], fitted: impl Iterator<Item = f64>) -> f64 {
-    let each = observations.iter().zip(weight).zip(fitted);
-    each.map(|((o, w), f)| w * (o.value - f).powi(2) - w.ln()).sum()
-}
-
-fn linear_deviance(observations: &[Observation], fit: &Fit) -> f64 {
-    let fitted = observations.iter().map(|o| fit.predict(&o.row));
-    deviance(observations, &fit.weight, fitted)
-}
-
-/// Kienzle's law for each of `groups` (of `result`); `None` where a group's cuts hold no average, or the tool is not known.
-pub fn kienzle(campaign: &Campaign, result: &CfcResult, groups: &[Group]) -> Vec<Option<KienzleFit>> {
+/// Kienzle's law for each of `groups` (of `result`); `None` where a group's cuts hold no average.
+pub fn kienzle(trials: &CuttingTrials, result: &CfcResult, groups: &[ForceGroup]) -> Vec<Option<KienzleFit>> {
     groups
         .iter()
-        .map(|group| of_group(campaign, result, group))
+        .map(|group| of_group(trials, result, group))
         .collect()
 }
 
-fn of_group(campaign: &Campaign, result: &CfcResult, group: &Group) -> Option<KienzleFit> {
-    let tool = campaign.tool.as_ref()?;
+fn of_group(trials: &CuttingTrials, result: &CfcResult, group: &ForceGroup) -> Option<KienzleFit> {
     let (mut observations, mut geometries) = (Vec::new(), Vec::new());
     for cut in result.cuts.iter().filter(|c| group.cuts.contains(&c.id)) {
-        let geometry = &campaign.cuts[cut.cut].geometry;
+        let geometry = &trials.cuts[cut.cut].geometry;
         for &axis in ForceAxis::of(group.process) {
             let Some(average) = cut.averages[axis.index()] else {
                 continue;
@@ -374,14 +118,14 @@ fn of_group(campaign: &Campaign, result: &CfcResult, group: &Group) -> Option<Ki
             observations.push(Observation {
                 cut: cut.cut,
                 axis,
-                row: average_row(tool, geometry, axis).ok()?,
+                row: average_row(trials.tool, geometry, axis).ok()?,
                 value: average.value,
                 std_error: average.std_error,
             });
             geometries.push(*geometry);
         }
     }
-    fit_both(tool, group.process, &observations, &geometries)
+    fit_both(trials.tool, group.process, &observations, &geometries)
 }
 
 fn fit_both(
@@ -391,14 +135,14 @@ fn fit_both(
     geometries: &[CutGeometry],
 ) -> Option<KienzleFit> {
     let linear = fit(observations)?;
-    let terms: Vec<Vec<Term>> = observations
+    let terms: Vec<Vec<KienzleTerm>> = observations
         .iter()
         .zip(geometries)
         .map(|(o, g)| terms(tool, g, o.axis))
         .collect::<Option<_>>()?;
     let chips = || terms.iter().flatten().map(|t| t.chip_mm.ln());
     let names = components(process);
-    let law = Law {
+    let law = KienzleLaw {
         terms: &terms,
         components: names.len(),
         reference_mm: (chips().sum::<f64>() / chips().count().max(1) as f64).exp(),
@@ -448,7 +192,12 @@ fn fit_both(
     })
 }
 
-fn component(name: (&'static str, &'static str), j: usize, law: &Law, best: &LawFit) -> KienzleComponent {
+fn component(
+    name: (&'static str, &'static str),
+    j: usize,
+    law: &KienzleLaw,
+    best: &KienzleLawFit,
+) -> KienzleComponent {
     let m_at = law.components + j;
     let (force, m) = (best.theta[j], best.theta[m_at]);
     let inside = m > EXPONENTS[0] && m < EXPONENTS[1];
@@ -475,7 +224,13 @@ fn component(name: (&'static str, &'static str), j: usize, law: &Law, best: &Law
 }
 
 /// Chances of a difference of deviances as far out, where the linear-edge law and where Kienzle's law is true.
-fn chances(law: &Law, observations: &[Observation], linear: &Fit, best: &LawFit, found: f64) -> [f64; 2] {
+fn chances(
+    law: &KienzleLaw,
+    observations: &[Observation],
+    linear: &CoefficientFit,
+    best: &KienzleLawFit,
+    found: f64,
+) -> [f64; 2] {
     let of_linear: Vec<f64> = observations.iter().map(|o| linear.predict(&o.row)).collect();
     let of_kienzle: Vec<f64> = law.terms.iter().map(|t| law.predict(t, &best.theta)).collect();
     let normal = Normal::standard();
@@ -515,11 +270,11 @@ fn chances(law: &Law, observations: &[Observation], linear: &Fit, best: &LawFit,
 /// The feed, of half the least, the middle and twice the greatest, at which one more cut tells most.
 fn telling_feed(
     tool: &Tool,
-    law: &Law,
+    law: &KienzleLaw,
     observations: &[Observation],
     geometries: &[CutGeometry],
-    linear: &Fit,
-    best: &LawFit,
+    linear: &CoefficientFit,
+    best: &KienzleLawFit,
 ) -> Option<TellingFeed> {
     let feeds = distinct(geometries.iter().map(feed_mm));
     let (least, greatest) = (*feeds.first()?, *feeds.last()?);
@@ -596,7 +351,7 @@ impl KienzleFit {
         };
         match &self.telling {
             Some(t) => {
-                let digits = |v: f64| crate::ingest::units::figures(v, 2);
+                let digits = |v: f64| crate::text::figures(v, 2);
                 let worth = if t.sigmas >= CLEAR {
                     String::new()
                 } else {
@@ -648,7 +403,7 @@ fn refuted(chance: Option<f64>) -> bool {
 }
 
 fn chance_text(p: f64) -> String {
-    // Nothing below one in as many draws can be told.
+    // So many draws cannot show a chance below one in as many.
     if p <= 1.0 / DRAWS as f64 {
         format!("below {}", 1.0 / (DRAWS + 1) as f64 * 2.0)
     } else {
@@ -658,9 +413,11 @@ fn chance_text(p: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::kienzle_law::sine_power;
     use super::*;
-    use crate::campaign::{Immersion, ToolKind};
+    use crate::data::{Immersion, ToolKind};
     use approx::assert_relative_eq;
+    use std::f64::consts::PI;
 
     fn tool() -> Tool {
         Tool {

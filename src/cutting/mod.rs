@@ -3,15 +3,21 @@
 mod air;
 mod average;
 mod average_force;
+mod coefficients;
 mod conic;
+mod cut_analysis;
+mod cutting_trials;
+mod drill_geometry;
 mod estimate;
 mod faults;
+mod force_axis;
 mod group;
 mod identify;
 mod in_step;
 mod kienzle;
+mod kienzle_law;
 #[cfg(test)]
-pub(crate) mod made_records;
+pub(crate) mod made_tools;
 mod orthogonal;
 mod outlier;
 mod plausibility;
@@ -25,27 +31,36 @@ mod turning_checks;
 mod warnings;
 pub mod waveform;
 
-pub use average::TurnAverage;
-#[cfg(test)]
-pub(crate) use average_force::tests::drill as test_drill;
-pub use average_force::{
-    CoefficientKind, DRILLING_COEFFICIENTS, DrillGeometry, ForceAxis, MILLING_COEFFICIENTS, average_row,
-    coefficients_of, cut_diameter_mm, cutting_speed_m_per_min, feed_mm,
-};
+pub use average_force::{average_row, cut_diameter_mm, cutting_speed_m_per_min, feed_mm};
+pub use coefficients::{CoefficientKind, DRILLING_COEFFICIENTS, MILLING_COEFFICIENTS, coefficients_of};
 pub use conic::{ConicFit, Loss, conic_fit};
-pub use estimate::{BOOTSTRAP_CUTS, BOOTSTRAP_DRAWS, Estimate, HUBER_THRESHOLD, Method, bootstrap, estimate};
-pub use faults::read_record;
+#[cfg(test)]
+pub(crate) use cut_analysis::WRONG_SPEED;
+pub use cut_analysis::{Average, ChannelAnalysis, CutAnalysis, Notice, Trace, TurnAverage};
+pub use cutting_trials::CuttingTrials;
+pub use drill_geometry::DrillGeometry;
+pub use estimate::{
+    BOOTSTRAP_CUTS, BOOTSTRAP_DRAWS, CfcOptions, CoefficientEstimate, HUBER_THRESHOLD, RegressionMethod,
+    bootstrap, estimate,
+};
+pub use faults::repair_record;
+pub use force_axis::ForceAxis;
 pub(crate) use group::by_axis;
-pub use group::{Coefficient, Group, Influence, Known, RegressionPoint};
+pub use group::{Coefficient, ForceGroup, Influence, Known, RegressionPoint};
 pub(crate) use identify::depth_mm;
-pub use identify::{CfcOptions, CfcResult, from_analyses, identify_forces};
-pub use in_step::{InStep, read_in_step};
+pub(crate) use identify::none_usable;
+pub use identify::{CfcResult, fit_force_coefficients};
+#[cfg(test)]
+pub(crate) use in_step::OTHER_SPEED;
+pub use in_step::{InStep, analyse_in_step};
 pub use kienzle::{KienzleComponent, KienzleFit, Preferred, TellingFeed, kienzle};
-pub use orthogonal::{ObliqueCoefficients, ObliqueEdge, Prediction};
-pub use outlier::{Misfit, misfits, studentized};
-pub use record::{Average, ChannelAnalysis, CutAnalysis, Notice, Trace, analyse_cut};
-pub use regression::{Fit, Observation, fit};
+#[cfg(test)]
+pub(crate) use made_tools::drill as test_drill;
+pub use orthogonal::{ObliqueCoefficients, ObliqueEdge, OrthogonalPrediction};
+pub use outlier::{CutMisfit, misfits, studentized};
+pub use record::analyse_cut;
+pub use regression::{CoefficientFit, Observation, fit};
 pub use series::{MaterialComparison, SpeedTrends};
-pub use trend::{Change, Reading, table_trend};
+pub use trend::{ChangeReading, CoefficientChange, table_trend};
 pub use turning::{EdgeBit, edge_row, engaged_edge};
 pub(crate) use warnings::{of_notices, speed_text};

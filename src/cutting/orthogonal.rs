@@ -3,15 +3,18 @@
 
 use serde_json::{Value, json};
 
-use super::group::Group;
-use crate::campaign::{Campaign, ChipFormation, Process};
+use super::cutting_trials::CuttingTrials;
+use super::group::ForceGroup;
+use crate::data::{ChipFormation, Process};
 
 /// One oblique edge in a material known from orthogonal cutting. Angles in rad, stress in N/mm² (MPa).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObliqueEdge {
+    /// τ, in the shear plane.
     pub shear_stress_n_per_mm2: f64,
     /// β_a, on the rake face, from orthogonal cuts.
     pub friction_angle_rad: f64,
+    /// Shear angle or chip ratio.
     pub chip: ChipFormation,
     /// α_n, normal to the edge.
     pub rake_rad: f64,
@@ -22,8 +25,11 @@ pub struct ObliqueEdge {
 /// Cutting coefficients of an oblique edge, N/mm².
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObliqueCoefficients {
+    /// Along the cutting speed.
     pub ktc_n_per_mm2: f64,
+    /// Normal to the edge.
     pub krc_n_per_mm2: f64,
+    /// Along the edge.
     pub kac_n_per_mm2: f64,
     /// φ_n.
     pub shear_angle_rad: f64,
@@ -61,27 +67,29 @@ impl ObliqueEdge {
     }
 }
 
-/// Predicted milling or turning coefficients beside those found from the cuts.
+/// Predicted milling or turning coefficients next to those found from the cuts.
 #[derive(Debug, Clone)]
-pub struct Prediction {
+pub struct OrthogonalPrediction {
+    /// Of the cuts that it is compared with.
     pub material: Option<String>,
+    /// From the orthogonal database.
     pub predicted: ObliqueCoefficients,
     /// Ktc, Krc, Kac: label, predicted, found (value, standard error), all N/mm².
     pub rows: Vec<(&'static str, f64, Option<f64>, Option<f64>)>,
 }
 
-/// From the campaign's `[orthogonal]` table, for the milled or turned cuts of the campaign's material; `None` without the table,
+/// From the orthogonal database, for the milled or turned cuts of its material; `None` without the database,
 /// without such cuts, or where its angles allow no chip (then a warning says so).
 pub(super) fn predict(
-    campaign: &Campaign,
-    pooled: &[Group],
+    trials: &CuttingTrials,
+    pooled: &[ForceGroup],
     warnings: &mut Vec<String>,
-) -> Option<Prediction> {
-    let table = campaign.orthogonal?;
+) -> Option<OrthogonalPrediction> {
+    let table = trials.orthogonal?;
     let comparable = || pooled.iter().filter(|g| g.process != Process::Drilling);
     let group = match comparable().count() {
         1 => comparable().next(),
-        _ => comparable().find(|g| g.material.is_some() && g.material == campaign.material),
+        _ => comparable().find(|g| g.material.is_some() && g.material.as_deref() == trials.material),
     };
     let Some(group) = group else {
         warnings.push(
@@ -90,13 +98,15 @@ pub(super) fn predict(
         );
         return None;
     };
-    let helix_deg = campaign.tool.as_ref().map_or(0.0, |t| t.helix_deg);
     let edge = ObliqueEdge {
         shear_stress_n_per_mm2: table.shear_stress_mpa,
         friction_angle_rad: table.friction_angle_deg.to_radians(),
         chip: table.chip,
         rake_rad: table.rake_deg.to_radians(),
-        inclination_rad: table.inclination_deg.unwrap_or(helix_deg).to_radians(),
+        inclination_rad: table
+            .inclination_deg
+            .unwrap_or(trials.tool.helix_deg)
+            .to_radians(),
     };
     let Some(predicted) = edge.coefficients() else {
         warnings.push(
@@ -113,7 +123,7 @@ pub(super) fn predict(
             found.and_then(|c| c.std_error),
         )
     };
-    Some(Prediction {
+    Some(OrthogonalPrediction {
         material: group.material.clone(),
         rows: vec![
             row("Ktc", predicted.ktc_n_per_mm2),
@@ -124,7 +134,7 @@ pub(super) fn predict(
     })
 }
 
-impl Prediction {
+impl OrthogonalPrediction {
     /// `{material, shear_angle_deg, coefficients[]: {label, unit, predicted, value, std_error}}`; value is what the cuts
     /// gave.
     pub fn to_json(&self) -> Value {
@@ -142,7 +152,7 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    /// Ti6Al4V of references.md: α_n = 12°, i = η = 30°, h = 0.05 mm give Ktc 1510, Krc 215, Kac 515 N/mm², φ_n 39.03°.
+    /// Ti6Al4V (docs/physics.md, "Reference cases"): α_n = 12°, i = η = 30°, h = 0.05 mm give Ktc 1510, Krc 215, Kac 515 N/mm², φ_n 39.03°.
     #[test]
     fn the_published_orthogonal_database_gives_the_reference_coefficients() {
         let rake_deg = 12.0;

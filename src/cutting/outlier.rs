@@ -3,14 +3,17 @@
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::average_force::ForceAxis;
+use super::force_axis::ForceAxis;
 use super::regression::{Observation, fit};
 
 /// A cut whose average on one axis the other cuts do not predict.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Misfit {
+pub struct CutMisfit {
+    /// Index of the cut, as in its observations.
     pub cut: usize,
+    /// The axis on which it fits worst.
     pub axis: ForceAxis,
+    /// Average on that axis, N or N·m.
     pub measured: f64,
     /// From the fit to all other cuts.
     pub predicted: f64,
@@ -18,7 +21,7 @@ pub struct Misfit {
     pub averages: Vec<(ForceAxis, f64, f64)>,
 }
 
-impl Misfit {
+impl CutMisfit {
     /// Two force axes whose averages are those predicted for each other, signs aside: swapped plugs.
     pub fn swapped(&self) -> Option<[ForceAxis; 2]> {
         let forces: Vec<_> = self.averages.iter().filter(|a| a.0 != ForceAxis::Mz).collect();
@@ -106,7 +109,7 @@ pub fn studentized(observations: &[Observation]) -> Vec<Option<f64>> {
 /// Cuts that do not fit, worst first, each with its worst axis. One after the other is taken out, the least likely
 /// first (Student's t, Bonferroni over all averages), up to a quarter of the cuts; all up to the last unlikely one count,
 /// so that two spoilt cuts cannot hide each other (Rosner, Technometrics 25, 1983).
-pub fn misfits(observations: &[Observation]) -> Vec<Misfit> {
+pub fn misfits(observations: &[Observation]) -> Vec<CutMisfit> {
     let mut cuts: Vec<usize> = observations.iter().map(|o| o.cut).collect();
     cuts.sort_unstable();
     cuts.dedup();
@@ -141,7 +144,7 @@ pub fn misfits(observations: &[Observation]) -> Vec<Misfit> {
         }
     }
     taken.truncate(last_unlikely);
-    let misfit = |(d, averages): (Deleted, Vec<(ForceAxis, f64, f64)>)| Misfit {
+    let misfit = |(d, averages): (Deleted, Vec<(ForceAxis, f64, f64)>)| CutMisfit {
         cut: d.cut,
         axis: d.axis,
         measured: d.measured,

@@ -1,10 +1,12 @@
 //! Units and scales that the physics of cutting forbids: the specific cutting energy is that of some material.
 
-use super::average_force::{ForceAxis, average_row};
-use super::record::CutAnalysis;
-use crate::campaign::{Campaign, CutGeometry, Process};
-use crate::ingest::units::figures;
+use super::average_force::average_row;
+use super::cut_analysis::{ChannelAnalysis, CutAnalysis};
+use super::cutting_trials::CuttingTrials;
+use super::force_axis::ForceAxis;
+use crate::data::{CutGeometry, Process};
 use crate::signal::median;
+use crate::text::figures;
 
 /// Force per chip cross-section of one cut, edge forces included, N/mm².
 struct Specific {
@@ -15,9 +17,8 @@ struct Specific {
     axial: Option<f64>,
 }
 
-fn specific(campaign: &Campaign, cut: &CutAnalysis) -> Option<Specific> {
-    let tool = campaign.tool.as_ref()?;
-    let row = |axis| average_row(tool, &campaign.cuts[cut.cut].geometry, axis).ok();
+fn specific(trials: &CuttingTrials, cut: &CutAnalysis) -> Option<Specific> {
+    let row = |axis| average_row(trials.tool, &trials.cuts[cut.cut].geometry, axis).ok();
     let force = |axis: ForceAxis| cut.averages[axis.index()].map(|a| a.value);
     let ratio = |axis: ForceAxis, column: usize| {
         let per = row(axis)?[column];
@@ -98,8 +99,8 @@ fn thin_chip(chip_mm: f64) -> f64 {
 }
 
 /// Mean chip thickness over the engagement, mm.
-fn chip_mm(campaign: &Campaign, cut: &CutAnalysis) -> Option<f64> {
-    match campaign.cuts[cut.cut].geometry {
+fn chip_mm(trials: &CuttingTrials, cut: &CutAnalysis) -> Option<f64> {
+    match trials.cuts[cut.cut].geometry {
         CutGeometry::Milling {
             feed_per_tooth_mm,
             immersion,
@@ -111,17 +112,11 @@ fn chip_mm(campaign: &Campaign, cut: &CutAnalysis) -> Option<f64> {
         }
         // Two lips, each at half the point angle.
         CutGeometry::Drilling { .. } => {
-            let tool = campaign.tool.as_ref()?;
-            let lips = tool.teeth.max(1) as f64;
+            let lips = trials.tool.teeth.max(1) as f64;
             Some(cut.feed_mm / lips * 59f64.to_radians().sin())
         }
         CutGeometry::Turning { .. } => {
-            let row = average_row(
-                campaign.tool.as_ref()?,
-                &campaign.cuts[cut.cut].geometry,
-                ForceAxis::Z,
-            )
-            .ok()?;
+            let row = average_row(trials.tool, &trials.cuts[cut.cut].geometry, ForceAxis::Z).ok()?;
             Some(row[0] / row[3]).filter(|h| h.is_finite())
         }
     }
@@ -143,22 +138,15 @@ const TORQUE_UNITS: [(f64, &str); 5] = [
 ];
 
 /// Warnings about scales that cannot be; `cuts` are of one material.
-pub(super) fn of_scales(campaign: &Campaign, cuts: &[&CutAnalysis], process: Process) -> Vec<String> {
-    let specific: Vec<Specific> = cuts.iter().filter_map(|c| specific(campaign, c)).collect();
+pub(super) fn of_scales(trials: &CuttingTrials, cuts: &[&CutAnalysis], process: Process) -> Vec<String> {
+    let specific: Vec<Specific> = cuts.iter().filter_map(|c| specific(trials, c)).collect();
     let middle = |pick: fn(&Specific) -> Option<f64>| {
         let values: Vec<f64> = specific.iter().filter_map(pick).map(f64::abs).collect();
         (!values.is_empty()).then(|| median(&values))
     };
     let (cutting, axial) = (middle(|s| s.cutting), middle(|s| s.axial));
-    let chip = median(
-        &cuts
-            .iter()
-            .filter_map(|c| chip_mm(campaign, c))
-            .collect::<Vec<_>>(),
-    );
-    let name = cuts
-        .first()
-        .and_then(|c| campaign.cuts[c.cut].material.as_deref());
+    let chip = median(&cuts.iter().filter_map(|c| chip_mm(trials, c)).collect::<Vec<_>>());
+    let name = cuts.first().and_then(|c| trials.cuts[c.cut].material.as_deref());
     let material = name.unwrap_or_default().to_lowercase();
     let known = MATERIALS
         .iter()
@@ -225,7 +213,7 @@ fn suspects(units: &[(f64, &str)], fits: impl Fn(f64) -> bool) -> String {
     }
 }
 
-/// What a misfit by this ratio (measured over predicted) would be as a slip of units; empty where it is none.
+/// What a misfit by this ratio (measured over predicted) would be as a mix-up of units; `None` where it looks like none.
 pub(super) fn unit_slip(ratio: f64, axis: ForceAxis) -> Option<&'static str> {
     let units: &[(f64, &str)] = if axis == ForceAxis::Mz {
         &TORQUE_UNITS
@@ -244,7 +232,7 @@ fn small_channels(cuts: &[&CutAnalysis]) -> Vec<String> {
     let mut told: Vec<(String, Vec<&str>, f64)> = Vec::new();
     for cut in cuts {
         let forces = || cut.channels.iter().filter(|c| c.axis != ForceAxis::Mz);
-        let span = |c: &super::record::ChannelAnalysis| {
+        let span = |c: &ChannelAnalysis| {
             let low = c.trace.min.iter().copied().fold(f64::INFINITY, f64::min);
             let high = c.trace.max.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             high - low

@@ -5,93 +5,27 @@ use std::ops::Range;
 use num_complex::Complex64;
 
 use super::air::{air_notices, believable_air};
-use super::average::{TurnAverage, average};
-use super::average_force::{DrillGeometry, ForceAxis, cut_diameter_mm, cutting_speed_m_per_min, feed_mm};
+use super::average::average;
+use super::average_force::{cut_diameter_mm, cutting_speed_m_per_min, feed_mm};
+use super::cut_analysis::{ChannelAnalysis, CutAnalysis, Notice, Trace, WRONG_SPEED, in_tool_axes};
+use super::cutting_trials::CuttingTrials;
+use super::drill_geometry::DrillGeometry;
+use super::force_axis::ForceAxis;
 use super::teeth::idle_tooth;
 use super::waveform::MillingCut;
-use crate::campaign::{Campaign, Cut, CutGeometry, Process, Tool};
-use crate::ingest::units::figures;
-use crate::ingest::{ChannelRole, TimeRecord};
+use crate::data::{ChannelRole, Cut, CutGeometry, Process, TimeRecord, Tool};
 use crate::signal::{
-    self, Air, Blocks, Clipping, DriftLine, Phases, Spindle, SpindleTrack, ToothLine, find_faults,
-    find_phases, fit_drift, highest_order, tooth_line, whole_revolutions,
+    self, Air, Clipping, Phases, SignalBlocks, Spindle, ToothLine, find_faults, find_phases, fit_drift,
+    highest_order, tooth_line, whole_revolutions,
 };
+use crate::text::figures;
 use crate::{Error, InputError, Result};
-
-/// A mean force (N) or torque (N·m) with its standard error.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct Average {
-    pub value: f64,
-    /// From the scatter between revolutions and the uncertainty of the zero line.
-    pub std_error: f64,
-}
-
-/// A channel thinned for drawing: extremes in equal stretches of time.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Trace {
-    /// Middle of each stretch, s on the record's time axis.
-    pub time_s: Vec<f64>,
-    pub min: Vec<f64>,
-    pub max: Vec<f64>,
-}
-
-/// One recorded channel, in the dynamometer's own axes.
-#[derive(Debug, Clone)]
-pub struct ChannelAnalysis {
-    pub name: String,
-    /// Which recorded axis it is.
-    pub axis: ForceAxis,
-    pub drift: DriftLine,
-    /// Over the steady window, drift taken off.
-    pub mean: TurnAverage,
-    /// Not drift compensated.
-    pub trace: Trace,
-}
-
-/// Something about a record that its owner should know. Notices of one kind are told together.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Notice {
-    /// What it is and what to do, the same for every cut.
-    pub kind: &'static str,
-    /// What is particular to this cut; may be empty.
-    pub detail: String,
-}
-
-/// What one record says.
-#[derive(Debug, Clone)]
-pub struct CutAnalysis {
-    /// Index into `Campaign::cuts`.
-    pub cut: usize,
-    pub id: String,
-    pub process: Process,
-    pub spindle_rpm: f64,
-    pub cutting_speed_m_per_min: f64,
-    /// Per tooth (milling), per revolution (drilling, turning).
-    pub feed_mm: f64,
-    /// Start and end of the record, s.
-    pub record_s: [f64; 2],
-    pub air_before_s: Option<[f64; 2]>,
-    pub air_after_s: Option<[f64; 2]>,
-    pub steady_s: [f64; 2],
-    /// The campaign said where; else detected.
-    pub steady_given: bool,
-    pub revolutions: f64,
-    pub channels: Vec<ChannelAnalysis>,
-    /// Tool axes x, y, z and torque; `None` where a channel it needs is missing or dead.
-    pub averages: [Option<Average>; 4],
-    pub tooth_line: Option<ToothLine>,
-    /// How the spindle ran, where it did not keep the stated speed.
-    pub spindle: Option<SpindleTrack>,
-    pub notices: Vec<Notice>,
-}
 
 /// Points of a [`Trace`].
 const TRACE_POINTS: usize = 1000;
 const CHANNEL_MISSING: &str = "channel missing or not usable";
 const CHANNEL_DEAD: &str = "channel dead (one value throughout) and left out: check plug and amplifier";
 const CHANNEL_BROKEN: &str = "channel holds values that are no numbers and is left out";
-pub(super) const WRONG_SPEED: &str = "coefficients rest on a wrong spindle speed or number of teeth: correct spindle_rpm \
-     (and the feed per tooth that goes with it) or [tool] teeth";
 const CLIPPED: &str = "clipped, so that the true forces are larger: the channel is left out of this cut; choose a larger range \
      at the amplifier and cut again";
 const CLIPPED_ELSEWHERE: &str = "clipped outside the steady window: averages are not touched, but choose a larger range at the \
@@ -109,12 +43,8 @@ const WRONG_DURATION: &str = "the hole took another time than feed, speed and de
 ///
 /// # Errors
 /// The record is unreadable, too short, holds no usable force channel, or no steady cut is found.
-pub fn analyse_cut(campaign: &Campaign, cut_index: usize, record: &TimeRecord) -> Result<CutAnalysis> {
-    let cut = &campaign.cuts[cut_index];
-    let tool = campaign
-        .tool
-        .as_ref()
-        .ok_or_else(|| Error::computation("[tool] is missing: cutting forces need its teeth and diameter"))?;
+pub fn analyse_cut(trials: &CuttingTrials, cut_index: usize, record: &TimeRecord) -> Result<CutAnalysis> {
+    let (tool, cut) = (trials.tool, &trials.cuts[cut_index]);
     let refuse = |problem: String| Error::from(InputError::new(problem).file(&cut.file));
     let rate = record.sample_rate_hz;
     let samples = record.len();
@@ -237,16 +167,7 @@ pub fn analyse_cut(campaign: &Campaign, cut_index: usize, record: &TimeRecord) -
         // One edge that never leaves the work: no line to judge the speed by.
         CutGeometry::Turning { .. } => None,
     };
-    teeth_notice(
-        campaign,
-        cut,
-        tool,
-        &channels,
-        &usable,
-        &steady,
-        record,
-        &mut notices,
-    );
+    teeth_notice(trials, cut, &channels, &usable, &steady, record, &mut notices);
     if let Some(line) = tooth_line.filter(ToothLine::speed_is_doubtful) {
         notices.push(Notice {
             kind: WRONG_SPEED,
@@ -269,7 +190,7 @@ pub fn analyse_cut(campaign: &Campaign, cut_index: usize, record: &TimeRecord) -
         steady_s: seconds(&steady),
         steady_given,
         revolutions,
-        averages: in_tool_axes(&campaign.dynamometer.tool_from_dyno, &channels),
+        averages: in_tool_axes(trials.tool_from_dyno, &channels),
         channels,
         tooth_line,
         spindle: None,
@@ -447,7 +368,7 @@ fn unsteady_notice(
                 .at(record.start_s + i as f64 / record.sample_rate_hz)
         };
         let compensated: Vec<f64> = steady.clone().map(|i| values[i] - zero(i)).collect();
-        let turns = Blocks::new(&compensated, samples_per_revolution);
+        let turns = SignalBlocks::new(&compensated, samples_per_revolution);
         squares.resize(turns.len(), 0.0);
         for (k, square) in squares.iter_mut().enumerate() {
             let level = if has_zero { turns.mean[k] } else { 0.0 };
@@ -469,16 +390,15 @@ const MOST_SAMPLES: usize = 1 << 17;
 
 #[allow(clippy::too_many_arguments)]
 fn teeth_notice(
-    campaign: &Campaign,
+    trials: &CuttingTrials,
     cut: &Cut,
-    tool: &Tool,
     channels: &[ChannelAnalysis],
     usable: &[UsableChannel],
     steady: &Range<usize>,
     record: &TimeRecord,
     notices: &mut Vec<Notice>,
 ) {
-    let Some(milling) = MillingCut::new(tool, &cut.geometry).filter(|m| m.teeth > 1) else {
+    let Some(milling) = MillingCut::new(trials.tool, &cut.geometry).filter(|m| m.teeth > 1) else {
         return;
     };
     let rate = record.sample_rate_hz;
@@ -500,7 +420,7 @@ fn teeth_notice(
         [0.0; 2],
         true,
     );
-    for (axis, row) in campaign.dynamometer.tool_from_dyno.iter().take(2).enumerate() {
+    for (axis, row) in trials.tool_from_dyno.iter().take(2).enumerate() {
         for (weight, channel) in row.iter().zip(&recorded).filter(|(w, _)| **w != 0.0) {
             let Some((own, value, has_zero)) = channel else {
                 return;
@@ -544,32 +464,6 @@ fn duration_notice(cut: &Cut, tool: &Tool, phases: &Phases, rate: f64, notices: 
             detail: format!("{took_s:.2} s against {expected_s:.2} s"),
         });
     }
-}
-
-/// F_tool = A F_recorded, standard errors added in squares; torque is taken as recorded.
-pub(super) fn in_tool_axes(
-    tool_from_dyno: &[[f64; 3]; 3],
-    channels: &[ChannelAnalysis],
-) -> [Option<Average>; 4] {
-    let recorded = |axis: ForceAxis| channels.iter().find(|c| c.axis == axis).map(|c| c.mean.average);
-    let mut averages = [None; 4];
-    for (average, row) in averages.iter_mut().zip(tool_from_dyno) {
-        let largest = row.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-        let mut sum = Some((0.0, 0.0));
-        for (&a, axis) in row.iter().zip(ForceAxis::ALL) {
-            if a.abs() > 1e-9 * largest {
-                sum = sum.zip(recorded(axis)).map(|((value, variance), r)| {
-                    (value + a * r.value, variance + (a * r.std_error).powi(2))
-                });
-            }
-        }
-        *average = sum.map(|(value, variance): (f64, f64)| Average {
-            value,
-            std_error: variance.sqrt(),
-        });
-    }
-    averages[ForceAxis::Mz.index()] = recorded(ForceAxis::Mz);
-    averages
 }
 
 fn trace(values: &[f64], record: &TimeRecord) -> Trace {

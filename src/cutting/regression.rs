@@ -2,14 +2,16 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::average_force::ForceAxis;
+use super::force_axis::ForceAxis;
 
 /// One average of one cut on one axis: value = row · coefficients.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Observation {
     /// Which cut (any numbering).
     pub cut: usize,
+    /// Which average.
     pub axis: ForceAxis,
+    /// Row of the linear model: one number a coefficient.
     pub row: Vec<f64>,
     /// N or N·m.
     pub value: f64,
@@ -19,9 +21,10 @@ pub struct Observation {
 
 /// A fit of the coefficients.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Fit {
+pub struct CoefficientFit {
     /// `None`: this data says nothing about it, or cannot tell it from another.
     pub value: Vec<Option<f64>>,
+    /// Standard errors of `value`; `None` where that is.
     pub std_error: Vec<Option<f64>>,
     /// Sets of coefficients of which only a combination is determined.
     pub inseparable: Vec<Vec<usize>>,
@@ -46,13 +49,13 @@ pub struct Fit {
     pub covariance: DMatrix<f64>,
 }
 
-impl Fit {
+impl CoefficientFit {
     /// Row · solution.
     pub fn predict(&self, row: &[f64]) -> f64 {
         row.iter().zip(&self.solution).map(|(r, x)| r * x).sum()
     }
 
-    /// Variance of [`Fit::predict`], from the errors of the coefficients alone.
+    /// Variance of [`CoefficientFit::predict`], from the errors of the coefficients alone.
     pub fn prediction_variance(&self, row: &[f64]) -> f64 {
         let row = DVector::from_column_slice(row);
         (row.transpose() * &self.covariance * &row)[0].max(0.0)
@@ -67,13 +70,13 @@ const ERROR_FLOOR: f64 = 1e-9;
 /// Least squares weighted by 1/(std_error² + τ²); τ, the scatter beyond the measurement errors, is estimated
 /// per axis so that the weighted residuals have the size they should (Paule & Mandel 1982). With measurement
 /// errors of zero this is ordinary least squares per axis. `None` without observations.
-pub fn fit(observations: &[Observation]) -> Option<Fit> {
+pub fn fit(observations: &[Observation]) -> Option<CoefficientFit> {
     let unknowns = observations.first()?.row.len();
     let size = size_of(observations);
     let variance = measurement_variance(observations);
     let mut extra = [0.0f64; 4];
     let mut first_chi2 = None;
-    let mut solved = Solved::new(observations, unknowns, &variance, &extra);
+    let mut solved = WeightedSolution::new(observations, unknowns, &variance, &extra);
     for _ in 0..200 {
         let mut change = 0.0f64;
         let mut chi2_per_dof = [None; 4];
@@ -102,7 +105,7 @@ pub fn fit(observations: &[Observation]) -> Option<Fit> {
             extra[a] = next;
         }
         first_chi2.get_or_insert(chi2_per_dof);
-        solved = Solved::new(observations, unknowns, &variance, &extra);
+        solved = WeightedSolution::new(observations, unknowns, &variance, &extra);
         if change < 1e-9 {
             break;
         }
@@ -125,7 +128,7 @@ pub(super) fn measurement_variance(observations: &[Observation]) -> Vec<f64> {
 }
 
 /// Weighted least squares at given variances.
-pub(super) struct Solved {
+pub(super) struct WeightedSolution {
     pub(super) solution: Vec<f64>,
     residual: Vec<f64>,
     leverage: Vec<f64>,
@@ -136,13 +139,13 @@ pub(super) struct Solved {
     pub(super) null: Vec<Vec<f64>>,
 }
 
-impl Solved {
+impl WeightedSolution {
     pub(super) fn new(
         observations: &[Observation],
         unknowns: usize,
         variance: &[f64],
         extra: &[f64; 4],
-    ) -> Solved {
+    ) -> WeightedSolution {
         let weight: Vec<f64> = observations
             .iter()
             .zip(variance)
@@ -194,7 +197,7 @@ impl Solved {
             .iter()
             .map(|o| o.value - o.row.iter().zip(&solution).map(|(r, x)| r * x).sum::<f64>())
             .collect();
-        Solved {
+        WeightedSolution {
             solution,
             residual,
             leverage,
@@ -204,7 +207,12 @@ impl Solved {
         }
     }
 
-    fn into_fit(self, observations: &[Observation], extra: [f64; 4], chi2_per_dof: [Option<f64>; 4]) -> Fit {
+    fn into_fit(
+        self,
+        observations: &[Observation],
+        extra: [f64; 4],
+        chi2_per_dof: [Option<f64>; 4],
+    ) -> CoefficientFit {
         let unknowns = self.solution.len();
         let touched = |v: &[f64], j: usize| v[j].powi(2) > 1e-8;
         let determined = |j: usize| !self.null.iter().any(|v| touched(v, j));
@@ -212,7 +220,7 @@ impl Solved {
         for (o, leverage) in observations.iter().zip(&self.leverage) {
             dof[o.axis.index()] += 1.0 - leverage;
         }
-        Fit {
+        CoefficientFit {
             value: (0..unknowns)
                 .map(|j| determined(j).then_some(self.solution[j]))
                 .collect(),
@@ -276,11 +284,11 @@ fn coupled_sets(null: &[Vec<f64>], unknowns: usize) -> Vec<Vec<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::{CutGeometry, Immersion, Tool, ToolKind};
     use crate::cutting::average_row;
+    use crate::data::{CutGeometry, Immersion, Tool, ToolKind};
     use approx::assert_relative_eq;
 
-    /// Whole-revolution means of a real slot series on aluminium (references.md, "Cutting coefficients"):
+    /// Whole-revolution means of a real slot series on aluminium (docs/physics.md, "Reference cases"):
     /// 2 teeth, 3 mm deep, feeds 0.025…0.125 mm/tooth; |Fx|, |Fy|, |Fz| in file axes, x carrying Ktc, y Krc.
     const PUBLISHED: [[f64; 3]; 5] = [
         [63.02, 39.78, 55.72],

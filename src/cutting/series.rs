@@ -2,20 +2,21 @@
 
 use serde_json::{Value, json};
 
-use super::average_force::{CoefficientKind, coefficients_of};
+use super::coefficients::{CoefficientKind, coefficients_of};
+use super::cut_analysis::CutAnalysis;
+use super::cutting_trials::CuttingTrials;
 use super::group::{Rows, distinct, observations};
-use super::record::CutAnalysis;
-use super::trend::{Change, Reading, changes, doublings, reference_speed};
-use crate::campaign::{Campaign, Process};
+use super::trend::{ChangeReading, CoefficientChange, changes, doublings, reference_speed};
+use crate::data::Process;
 
 /// The cuts of one process and one material.
-pub(super) struct Series<'a> {
+pub(super) struct MaterialSeries<'a> {
     pub process: Process,
     pub material: Option<&'a str>,
     pub cuts: Vec<&'a CutAnalysis>,
 }
 
-impl Series<'_> {
+impl MaterialSeries<'_> {
     fn speed_of(&self, cut: usize) -> f64 {
         let found = self.cuts.iter().find(|c| c.cut == cut);
         found.map_or(f64::NAN, |c| c.cutting_speed_m_per_min)
@@ -29,7 +30,9 @@ impl Series<'_> {
 /// Every coefficient over cutting speed, in the order of [`coefficients_of`]; the change is per doubling of speed.
 #[derive(Debug, Clone)]
 pub struct SpeedTrends {
+    /// How the cuts were made.
     pub process: Process,
+    /// What was cut, as the campaign names it.
     pub material: Option<String>,
     /// Where the reference values hold.
     pub reference_speed_m_per_min: f64,
@@ -37,7 +40,8 @@ pub struct SpeedTrends {
     pub speed_range_m_per_min: [f64; 2],
     /// Number of different speeds.
     pub speeds: usize,
-    pub changes: Vec<Change>,
+    /// One a coefficient, in the order of [`coefficients_of`].
+    pub changes: Vec<CoefficientChange>,
     /// Correlation of speed with the order in which the cuts were made, where that is known.
     pub order_correlation: Option<f64>,
 }
@@ -45,11 +49,14 @@ pub struct SpeedTrends {
 /// Every coefficient of a material over that of the first one.
 #[derive(Debug, Clone)]
 pub struct MaterialComparison {
+    /// How the cuts were made.
     pub process: Process,
+    /// The material that is compared.
     pub material: String,
+    /// The material that it is compared with.
     pub reference: String,
     /// The change is material less reference, the ratio material over reference.
-    pub changes: Vec<Change>,
+    pub changes: Vec<CoefficientChange>,
 }
 
 /// Speeds beyond this correlation with the order of the cuts cannot be told from wear.
@@ -57,7 +64,11 @@ const CONFOUNDED: f64 = 0.7;
 /// Turned cuts whose speeds differ by less than this factor have one speed.
 const TRIAL_OF_SPEEDS: f64 = 1.2;
 
-pub(super) fn speed_trends(campaign: &Campaign, series: &Series, rows: &Rows) -> Option<SpeedTrends> {
+pub(super) fn speed_trends(
+    trials: &CuttingTrials,
+    series: &MaterialSeries,
+    rows: &Rows,
+) -> Option<SpeedTrends> {
     let speeds = series.speeds();
     let (&low, &high) = (speeds.first()?, speeds.last()?);
     // A bar that gets thinner is no trial of speeds.
@@ -71,7 +82,7 @@ pub(super) fn speed_trends(campaign: &Campaign, series: &Series, rows: &Rows) ->
         &[],
     )?;
     let order = series.cuts.iter().map(|c| {
-        let order = campaign.cuts[c.cut].order? as f64;
+        let order = trials.cuts[c.cut].order? as f64;
         Some((order, c.cutting_speed_m_per_min.ln()))
     });
     Some(SpeedTrends {
@@ -86,8 +97,12 @@ pub(super) fn speed_trends(campaign: &Campaign, series: &Series, rows: &Rows) ->
 }
 
 /// Beside the material the coefficients may follow the speed, alike in both, where several speeds were cut.
-pub(super) fn compare(first: &Series, other: &Series, rows: &Rows) -> Option<MaterialComparison> {
-    let both = Series {
+pub(super) fn compare(
+    first: &MaterialSeries,
+    other: &MaterialSeries,
+    rows: &Rows,
+) -> Option<MaterialComparison> {
+    let both = MaterialSeries {
         process: first.process,
         material: None,
         cuts: first.cuts.iter().chain(&other.cuts).copied().collect(),
@@ -101,7 +116,7 @@ pub(super) fn compare(first: &Series, other: &Series, rows: &Rows) -> Option<Mat
     } else {
         changes(&observations, &is_other, &[])
     }?;
-    let name = |series: &Series| series.material.unwrap_or("unnamed").to_string();
+    let name = |series: &MaterialSeries| series.material.unwrap_or("unnamed").to_string();
     Some(MaterialComparison {
         process: first.process,
         material: name(other),
@@ -119,7 +134,7 @@ fn correlation(pairs: &[(f64, f64)]) -> Option<f64> {
     (size > 0.0).then(|| sum(&|x, y| x * y) / size)
 }
 
-fn change_json(kind: &CoefficientKind, change: &Change) -> Value {
+fn change_json(kind: &CoefficientKind, change: &CoefficientChange) -> Value {
     json!({
         "coefficient": kind.key, "label": kind.label, "unit": kind.unit,
         "p_value": change.p_value, "reading": change.reading,
@@ -128,11 +143,11 @@ fn change_json(kind: &CoefficientKind, change: &Change) -> Value {
 
 impl SpeedTrends {
     /// Coefficients that follow the speed by more than chance.
-    pub fn found(&self) -> impl Iterator<Item = (&CoefficientKind, &Change)> {
+    pub fn found(&self) -> impl Iterator<Item = (&CoefficientKind, &CoefficientChange)> {
         let kinds = coefficients_of(self.process).iter();
         kinds
             .zip(&self.changes)
-            .filter(|(_, c)| matches!(c.reading, Reading::Rises | Reading::Falls))
+            .filter(|(_, c)| matches!(c.reading, ChangeReading::Rises | ChangeReading::Falls))
     }
 
     pub(super) fn warnings(&self) -> Option<String> {

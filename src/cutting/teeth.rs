@@ -10,7 +10,7 @@ use num_complex::Complex64;
 
 use super::waveform::MillingCut;
 
-/// Part of a missing tooth's unevenness that is told: runout that lets every tooth cut stays below it.
+/// Part of a missing tooth's unevenness that is worth a notice: runout that lets every tooth cut stays below it.
 const TOLD: f64 = 0.7;
 /// Offset of the tool's axis with which a tooth just does not cut any more: a_j = 1 + cos(2πj/N).
 const RUNOUT_UNTIL_A_TOOTH_IDLES: f64 = 0.5;
@@ -88,7 +88,7 @@ pub(super) fn idle_tooth(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::Immersion;
+    use crate::data::Immersion;
 
     fn cut(teeth: usize, start_deg: f64, exit_deg: f64) -> MillingCut {
         MillingCut {

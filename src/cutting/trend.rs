@@ -5,15 +5,17 @@ use std::f64::consts::LN_2;
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::average_force::ForceAxis;
+use super::force_axis::ForceAxis;
 use super::group::{Known, distinct};
-use super::regression::{Fit, Observation, fit};
+use super::regression::{CoefficientFit, Observation, fit};
 
 /// What a change amounts to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Reading {
+pub enum ChangeReading {
+    /// The coefficient grows with the factor.
     Rises,
+    /// The coefficient shrinks with the factor.
     Falls,
     /// No change that chance would not make.
     None,
@@ -23,7 +25,7 @@ pub enum Reading {
 
 /// A coefficient and what one unit of a factor (a doubling of speed, the other material) adds to it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Change {
+pub struct CoefficientChange {
     /// At the reference (mean speed, reference material).
     pub reference: Option<Known>,
     /// Same unit.
@@ -32,7 +34,8 @@ pub struct Change {
     pub ratio: Option<Known>,
     /// Chance of a change as large as this where there is none (Student's t).
     pub p_value: Option<f64>,
-    pub reading: Reading,
+    /// What that amounts to.
+    pub reading: ChangeReading,
 }
 
 /// Chance, over all coefficients of one question together, of calling mere scatter a change.
@@ -56,7 +59,7 @@ pub fn changes(
     observations: &[Observation],
     factor: &dyn Fn(usize) -> f64,
     others: &[&dyn Fn(usize) -> f64],
-) -> Option<Vec<Change>> {
+) -> Option<Vec<CoefficientChange>> {
     let unknowns = observations.first()?.row.len();
     if distinct(observations.iter().map(|o| factor(o.cut))).len() < 2 {
         return None;
@@ -77,7 +80,12 @@ pub fn changes(
     Some((0..unknowns).map(change).collect())
 }
 
-fn one_change(observations: &[Observation], fit: &Fit, j: usize, unknowns: usize) -> Change {
+fn one_change(
+    observations: &[Observation],
+    fit: &CoefficientFit,
+    j: usize,
+    unknowns: usize,
+) -> CoefficientChange {
     let known = |k: usize| {
         Some(Known {
             value: fit.value[k]?,
@@ -116,15 +124,15 @@ fn one_change(observations: &[Observation], fit: &Fit, j: usize, unknowns: usize
     let reading = match (change, p_value) {
         (Some(c), Some(p)) if p * unknowns as f64 <= FALSE_ALARM => {
             if c.value > 0.0 {
-                Reading::Rises
+                ChangeReading::Rises
             } else {
-                Reading::Falls
+                ChangeReading::Falls
             }
         }
-        (Some(_), Some(_)) => Reading::None,
-        _ => Reading::NotDetermined,
+        (Some(_), Some(_)) => ChangeReading::None,
+        _ => ChangeReading::NotDetermined,
     };
-    Change {
+    CoefficientChange {
         reference,
         change,
         ratio,
@@ -133,7 +141,7 @@ fn one_change(observations: &[Observation], fit: &Fit, j: usize, unknowns: usize
     }
 }
 
-impl Change {
+impl CoefficientChange {
     /// Exponent m of the power law K ∝ speed^m that has this trend at the reference, where the factor is doublings.
     pub fn exponent(&self) -> Option<Known> {
         self.ratio.map(|r| Known {
@@ -145,7 +153,7 @@ impl Change {
 
 /// Trend of values known one by one (a table's) over speed: least squares on log2(speed / reference speed), errors
 /// from the scatter about the line.
-pub fn table_trend(points: &[(f64, f64)]) -> Option<Change> {
+pub fn table_trend(points: &[(f64, f64)]) -> Option<CoefficientChange> {
     let reference = reference_speed(points.iter().map(|p| p.0));
     let observations: Vec<Observation> = points
         .iter()
@@ -181,7 +189,7 @@ mod tests {
         assert_relative_eq!(change.value, -128.633504, max_relative = 1e-6);
         assert_relative_eq!(change.std_error.unwrap(), 55.5147293, max_relative = 1e-5);
         assert_relative_eq!(trend.p_value.unwrap(), 0.146423993, max_relative = 1e-5);
-        assert_eq!(trend.reading, Reading::None);
+        assert_eq!(trend.reading, ChangeReading::None);
         assert!(table_trend(&points[..1]).is_none() && table_trend(&[]).is_none());
     }
 
@@ -219,14 +227,17 @@ mod tests {
         );
         assert_eq!(
             (found[0].reading, found[1].reading),
-            (Reading::Falls, Reading::None)
+            (ChangeReading::Falls, ChangeReading::None)
         );
         // K ∝ v^m at the reference: m = −50/(1000 ln 2).
         let exponent = found[0].exponent().unwrap();
         assert!((exponent.value + 50.0 / 1000.0 / LN_2).abs() < 3.0 * exponent.std_error.unwrap());
         let (all, x) = cuts(0.0, 1.0);
         let quiet = changes(&all, &|cut| x[cut], &[]).unwrap();
-        assert!(quiet.iter().all(|c| c.reading == Reading::None), "{quiet:?}");
+        assert!(
+            quiet.iter().all(|c| c.reading == ChangeReading::None),
+            "{quiet:?}"
+        );
     }
 
     #[test]
@@ -241,7 +252,7 @@ mod tests {
         );
         assert_eq!(
             (found[0].reading, found[1].reading),
-            (Reading::Rises, Reading::None)
+            (ChangeReading::Rises, ChangeReading::None)
         );
         // The other material only at the other speed: nothing to tell them apart by.
         let confounded: Vec<Observation> = all
@@ -249,6 +260,6 @@ mod tests {
             .filter(|o| x[o.cut] == if o.cut < 16 { -1.0 } else { 1.0 })
             .collect();
         let found = changes(&confounded, &material, &[&|cut| x[cut]]).unwrap();
-        assert_eq!(found[0].reading, Reading::NotDetermined);
+        assert_eq!(found[0].reading, ChangeReading::NotDetermined);
     }
 }

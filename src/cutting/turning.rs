@@ -14,18 +14,21 @@
 //!
 //! F_x = F_r sin κ − F_a cos κ,  F_y = F_r cos κ + F_a sin κ,  F_z = F_t.
 
-use super::average_force::ForceAxis;
+use super::force_axis::ForceAxis;
 use super::waveform::gauss_legendre;
-use crate::campaign::{CutGeometry, Tool};
+use crate::data::{CutGeometry, Tool};
 use crate::{Error, Result};
 
 /// A bit of the edge in the work.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EdgeBit {
+    /// Length along the edge, mm.
     pub length_mm: f64,
     /// Chip thickness: area of the chip over the length; 0 where the edge only rubs.
     pub chip_mm: f64,
+    /// Sine of the angle κ between the edge and the direction of the feed.
     pub sin_kappa: f64,
+    /// Cosine of κ.
     pub cos_kappa: f64,
 }
 
@@ -126,7 +129,7 @@ pub fn edge_row(edge: &[EdgeBit], axis: ForceAxis) -> [f64; 6] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::ToolKind;
+    use crate::data::ToolKind;
     use approx::assert_relative_eq;
 
     fn edge(nose_mm: f64, kappa_deg: f64, feed_mm: f64, depth_mm: f64) -> Vec<EdgeBit> {

@@ -1,30 +1,32 @@
-//! What a technician should know about turned cuts beside what all cuts are looked at for: which channel is which, and what
+//! What a technician should know about turned cuts in particular: which channel is which, and what
 //! cuts of one depth leave open.
 
-use super::average_force::{ForceAxis, average_row};
+use super::average_force::average_row;
+use super::cut_analysis::CutAnalysis;
+use super::cutting_trials::CuttingTrials;
+use super::force_axis::ForceAxis;
 use super::group::distinct;
-use super::record::CutAnalysis;
-use crate::campaign::{Campaign, CutGeometry};
-use crate::ingest::units::figures;
+use crate::data::CutGeometry;
 use crate::signal::median;
+use crate::text::figures;
 
 /// What the axes of turning are, for messages.
 const AXES: &str = "x against the feed, y away from the work, z along the cutting speed";
 /// Part of the other forces from which on a force of the wrong sign is no scatter.
 const CLEARLY: f64 = 0.05;
-/// The passive force is told to have the wrong sign where the edge's normal stands at least this much out of the work.
+/// The passive force is said to have the wrong sign where the edge's normal stands at least this much out of the work.
 const OUTWARD: f64 = 0.3;
 
 /// Warnings about the turned cuts of one material.
-pub(super) fn of_turning(campaign: &Campaign, cuts: &[&CutAnalysis]) -> Vec<String> {
-    let mut warnings: Vec<String> = axes(campaign, cuts).into_iter().collect();
-    warnings.extend(one_feed(campaign, cuts));
-    warnings.extend(one_depth(campaign, cuts));
+pub(super) fn of_turning(trials: &CuttingTrials, cuts: &[&CutAnalysis]) -> Vec<String> {
+    let mut warnings: Vec<String> = axes(trials, cuts).into_iter().collect();
+    warnings.extend(one_feed(trials, cuts));
+    warnings.extend(one_depth(trials, cuts));
     warnings
 }
 
 /// Cutting force largest, and no force that pulls the tool into the work.
-fn axes(campaign: &Campaign, cuts: &[&CutAnalysis]) -> Option<String> {
+fn axes(trials: &CuttingTrials, cuts: &[&CutAnalysis]) -> Option<String> {
     let middle = |axis: ForceAxis| {
         let values: Vec<f64> = cuts
             .iter()
@@ -60,10 +62,7 @@ fn axes(campaign: &Campaign, cuts: &[&CutAnalysis]) -> Option<String> {
     }
     let size = cutting.abs();
     let out_of_the_work = cuts.iter().all(|c| {
-        let row = |axis| {
-            let tool = campaign.tool.as_ref()?;
-            average_row(tool, &campaign.cuts[c.cut].geometry, axis).ok()
-        };
+        let row = |axis| average_row(trials.tool, &trials.cuts[c.cut].geometry, axis).ok();
         row(ForceAxis::X)
             .zip(row(ForceAxis::Y))
             .is_some_and(|(x, y)| y[1] > OUTWARD * x[1].hypot(y[1]))
@@ -90,12 +89,12 @@ fn axes(campaign: &Campaign, cuts: &[&CutAnalysis]) -> Option<String> {
 }
 
 /// Without a second feed only the nose, where the chip is thinner, separates cutting from edge forces.
-fn one_feed(campaign: &Campaign, cuts: &[&CutAnalysis]) -> Option<String> {
+fn one_feed(trials: &CuttingTrials, cuts: &[&CutAnalysis]) -> Option<String> {
     let feeds = distinct(cuts.iter().map(|c| c.feed_mm));
-    let ([feed], Some(tool)) = (feeds.as_slice(), campaign.tool.as_ref()) else {
+    let [feed] = feeds.as_slice() else {
         return None;
     };
-    (tool.corner_radius_mm > 0.0 && depths(campaign, cuts).len() > 1).then(|| {
+    (trials.tool.corner_radius_mm > 0.0 && depths(trials, cuts).len() > 1).then(|| {
         format!(
             "all cuts have one feed ({feed} mm): cutting and edge coefficients are told apart by the nose alone, where the chip is thinner, \
              and so only as well as nose radius and cutting edge angle are known; cut a second feed, half or twice as large"
@@ -103,21 +102,21 @@ fn one_feed(campaign: &Campaign, cuts: &[&CutAnalysis]) -> Option<String> {
     })
 }
 
-fn depths(campaign: &Campaign, cuts: &[&CutAnalysis]) -> Vec<f64> {
-    distinct(cuts.iter().filter_map(|c| match campaign.cuts[c.cut].geometry {
+fn depths(trials: &CuttingTrials, cuts: &[&CutAnalysis]) -> Vec<f64> {
+    distinct(cuts.iter().filter_map(|c| match trials.cuts[c.cut].geometry {
         CutGeometry::Turning { depth_of_cut_mm, .. } => Some(depth_of_cut_mm),
         _ => None,
     }))
 }
 
 /// Feeds alone separate cutting from edge forces, but nothing checks how the force follows the depth.
-fn one_depth(campaign: &Campaign, cuts: &[&CutAnalysis]) -> Option<String> {
-    let depths = depths(campaign, cuts);
-    let ([depth], Some(tool)) = (depths.as_slice(), campaign.tool.as_ref()) else {
+fn one_depth(trials: &CuttingTrials, cuts: &[&CutAnalysis]) -> Option<String> {
+    let depths = depths(trials, cuts);
+    let [depth] = depths.as_slice() else {
         return None;
     };
     // The angle of a sharp edge is checked by no depth: it only turns radial and axial force into each other.
-    let shape = match tool.corner_radius_mm > 0.0 {
+    let shape = match trials.tool.corner_radius_mm > 0.0 {
         true => ", nor the nose radius and the cutting edge angle",
         false => "",
     };

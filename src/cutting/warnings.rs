@@ -3,18 +3,18 @@
 use std::collections::BTreeMap;
 
 use super::air::NO_AIR;
-use super::average_force::ForceAxis;
-use super::estimate::Method;
-use super::group::{Coefficient, Group, distinct};
-use super::identify::CfcOptions;
-use super::outlier::Misfit;
+use super::cut_analysis::{CutAnalysis, Notice, WRONG_SPEED};
+use super::cutting_trials::CuttingTrials;
+use super::estimate::{CfcOptions, RegressionMethod};
+use super::force_axis::ForceAxis;
+use super::group::{Coefficient, ForceGroup, distinct};
+use super::outlier::CutMisfit;
 use super::plausibility::unit_slip;
-use super::record::{CutAnalysis, Notice, WRONG_SPEED};
-use crate::campaign::{Campaign, Process};
+use crate::data::Process;
 
 /// Notices of all records, one sentence a kind.
-pub(super) fn of_records(campaign: &Campaign, cuts: &[CutAnalysis]) -> Vec<String> {
-    let common = common_speed_error(campaign, cuts);
+pub(super) fn of_records(trials: &CuttingTrials, cuts: &[CutAnalysis]) -> Vec<String> {
+    let common = common_speed_error(trials, cuts);
     let told = |notice: &&Notice| common.is_none() || notice.kind != WRONG_SPEED;
     let notices = cuts
         .iter()
@@ -59,8 +59,8 @@ fn sentences<'a>(notices: impl Iterator<Item = (&'a str, &'a Notice)>, cuts: usi
 }
 
 /// Where the tooth-passing line of every cut is off by one factor, it is not the operator's speeds that are wrong.
-fn common_speed_error(campaign: &Campaign, cuts: &[CutAnalysis]) -> Option<String> {
-    let teeth = campaign.tool.as_ref()?.teeth.max(1);
+fn common_speed_error(trials: &CuttingTrials, cuts: &[CutAnalysis]) -> Option<String> {
+    let teeth = trials.tool.teeth.max(1);
     let milled = || cuts.iter().filter(|c| c.process == Process::Milling);
     let factors: Vec<f64> = milled()
         .filter_map(|c| c.tooth_line.filter(|l| l.speed_is_doubtful()).map(|l| (c, l)))
@@ -84,7 +84,7 @@ fn common_speed_error(campaign: &Campaign, cuts: &[CutAnalysis]) -> Option<Strin
 }
 
 /// Cells of a speed × feed plan that stayed empty, where there clearly was a plan.
-pub(super) fn of_plan(campaign: &Campaign, cuts: &[&CutAnalysis], process: Process) -> Option<String> {
+pub(super) fn of_plan(trials: &CuttingTrials, cuts: &[&CutAnalysis], process: Process) -> Option<String> {
     let speeds = distinct(cuts.iter().map(|c| c.spindle_rpm));
     let feeds = distinct(cuts.iter().map(|c| c.feed_mm));
     // A bar gets thinner, so that its spindle speeds are no plan.
@@ -107,7 +107,7 @@ pub(super) fn of_plan(campaign: &Campaign, cuts: &[&CutAnalysis], process: Proce
     if empty.is_empty() || 4 * empty.len() > speeds.len() * feeds.len() {
         return None;
     }
-    let listed = campaign
+    let listed = trials
         .cuts
         .iter()
         .filter(|c| c.geometry.process() == process)
@@ -122,7 +122,7 @@ pub(super) fn of_plan(campaign: &Campaign, cuts: &[&CutAnalysis], process: Proce
 }
 
 /// A cut that the others do not predict.
-pub(super) fn of_misfit(campaign: &Campaign, misfit: &Misfit) -> String {
+pub(super) fn of_misfit(trials: &CuttingTrials, misfit: &CutMisfit) -> String {
     let unit = misfit.axis.unit();
     let slip = match (
         misfit.swapped(),
@@ -139,7 +139,7 @@ pub(super) fn of_misfit(campaign: &Campaign, misfit: &Misfit) -> String {
     format!(
         "cut {} does not fit the others: {} {:.2} {unit} measured, {:.2} {unit} from the other cuts{slip}; check its feed, \
          speed, depth, file and units",
-        campaign.cuts[misfit.cut].id,
+        trials.cuts[misfit.cut].id,
         misfit.axis.label(),
         misfit.measured,
         misfit.predicted
@@ -148,12 +148,8 @@ pub(super) fn of_misfit(campaign: &Campaign, misfit: &Misfit) -> String {
 
 /// With an edge that is not straight the axial force tells of the radial one: counted the wrong way round it makes that
 /// negative.
-pub(super) fn of_shape(campaign: &Campaign, fit: &Group) -> Option<String> {
-    let shaped = fit.process == Process::Milling
-        && campaign
-            .tool
-            .as_ref()
-            .is_some_and(|tool| !tool.has_straight_edge());
+pub(super) fn of_shape(trials: &CuttingTrials, fit: &ForceGroup) -> Option<String> {
+    let shaped = fit.process == Process::Milling && !trials.tool.has_straight_edge();
     let radial = fit.coefficients.iter().find(|c| c.label == "Krc")?;
     let (value, std) = (radial.value?, radial.std_error?);
     (shaped && value < -2.0 * std).then(|| {
@@ -166,10 +162,10 @@ pub(super) fn of_shape(campaign: &Campaign, fit: &Group) -> Option<String> {
 }
 
 /// What the regressions themselves have to say: `all` cuts of a process, and its groups by speed.
-pub(super) fn of_fits(all: &Group, groups: &[&Group]) -> Vec<String> {
+pub(super) fn of_fits(all: &ForceGroup, groups: &[&ForceGroup]) -> Vec<String> {
     let mut warnings = Vec::new();
     let pooled_too = !groups.iter().any(|g| g.cuts == all.cuts);
-    let listed: Vec<&Group> = groups.iter().copied().chain(pooled_too.then_some(all)).collect();
+    let listed: Vec<&ForceGroup> = groups.iter().copied().chain(pooled_too.then_some(all)).collect();
 
     // One sentence for all groups that lack the same.
     let mut lacking: BTreeMap<String, Vec<String>> = BTreeMap::new();
@@ -235,13 +231,13 @@ const CUTS_FOR_SMALL_BOOTSTRAP: usize = 10;
 const ALONE: f64 = 0.95;
 
 /// What robust regression, bootstrap and leverage say about `all` cuts of a process and its groups.
-pub(super) fn of_methods(all: &Group, groups: &[&Group], options: CfcOptions) -> Vec<String> {
+pub(super) fn of_methods(all: &ForceGroup, groups: &[&ForceGroup], options: CfcOptions) -> Vec<String> {
     let mut warnings = Vec::new();
     let pooled_too = !groups.iter().any(|g| g.cuts == all.cuts);
     for group in groups.iter().copied().chain(pooled_too.then_some(all)) {
         let speed = speed_text(group);
         let determined = || group.coefficients.iter().filter(|c| c.value.is_some());
-        if options.robust && group.method != Method::Huber && group.is_complete() {
+        if options.robust && group.method != RegressionMethod::Huber && group.is_complete() {
             warnings.push(format!(
                 "at {speed} m/min: too few cuts for robust regression (three more averages on every axis than \
                  coefficients they carry), least squares is used there"
@@ -250,12 +246,12 @@ pub(super) fn of_methods(all: &Group, groups: &[&Group], options: CfcOptions) ->
         let apart: Vec<String> = determined().filter_map(methods_apart).collect();
         if !apart.is_empty() {
             let (this, other, remedy) = match group.method {
-                Method::LeastSquares => (
+                RegressionMethod::LeastSquares => (
                     "least squares",
                     "robust (Huber) regression",
                     "; mend or leave out the cuts that do not fit, or use --robust",
                 ),
-                Method::Huber => ("robust (Huber) regression", "least squares", ""),
+                RegressionMethod::Huber => ("robust (Huber) regression", "least squares", ""),
             };
             warnings.push(format!(
                 "at {speed} m/min: {this} and {other} disagree by more than their standard errors ({}): single cuts \
@@ -298,7 +294,7 @@ pub(super) fn of_methods(all: &Group, groups: &[&Group], options: CfcOptions) ->
             .filter(|i| i.leverage >= ALONE)
             .map(|i| i.cut.as_str())
             .collect();
-        // With two feeds every cut is; that is told elsewhere.
+        // With two feeds every cut is; another warning says so.
         if group.feeds > 2 && !alone.is_empty() {
             warnings.push(format!(
                 "at {speed} m/min: cut {} alone decides part of the coefficients (leverage near 1), nothing checks it: \
@@ -324,7 +320,7 @@ fn methods_apart(c: &Coefficient) -> Option<String> {
 }
 
 /// What is implausible or poorly known about one coefficient, over the groups.
-fn of_coefficient(groups: &[&Group], j: usize, warnings: &mut Vec<String>) {
+fn of_coefficient(groups: &[&ForceGroup], j: usize, warnings: &mut Vec<String>) {
     let (mut negative, mut poor, mut held) = (Vec::new(), Vec::new(), Vec::new());
     for group in groups {
         let (speed, c) = (speed_text(group), &group.coefficients[j]);
@@ -384,7 +380,7 @@ fn of_coefficient(groups: &[&Group], j: usize, warnings: &mut Vec<String>) {
 }
 
 /// `58.3` or `45.1–81.4`, m/min.
-pub(crate) fn speed_text(group: &Group) -> String {
+pub(crate) fn speed_text(group: &ForceGroup) -> String {
     let [low, high] = group.cutting_speed_range_m_per_min;
     if high - low <= 2e-3 * high {
         format!("{:.1}", group.cutting_speed_m_per_min)

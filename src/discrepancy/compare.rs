@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::error_sums::{BANDS, Groups, Sums, band_edges_hz, band_of};
 pub use super::error_sums::{ErrorTotals, GroupError};
 use super::place::{Amounts, DominantRegion, above_noise, excess};
-use crate::campaign::Point;
+use crate::data::Point;
 use crate::identify::FrfData;
 
 /// Error within a frequency band.

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::error_sums::{ErrorTotals, GroupError, Groups, Sums};
 use super::place;
-use crate::campaign::Process;
+use crate::data::Process;
 use crate::identify::cutting_data::CuttingData;
 use crate::identify::cutting_problem::CutFit;
 use crate::identify::cutting_waves::axis_waves;

@@ -3,8 +3,8 @@
 
 use serde::Serialize;
 
-use crate::campaign::Process;
 use crate::cutting::ForceAxis;
+use crate::data::Process;
 use crate::identify::cutting_data::CutData;
 use crate::identify::{CutFit, CuttingData};
 use crate::signal::median;
@@ -392,7 +392,7 @@ fn name_resonance_among_orders(data: &CuttingData, lines: &mut [Line]) {
 impl LineGroup {
     /// `14.2 N on Fx at 25.0 Hz (order 1), cut 03`.
     pub fn strongest(&self) -> String {
-        let figures = |v: f64| crate::ingest::units::figures(v, 3);
+        let figures = |v: f64| crate::text::figures(v, 3);
         let amplitude = format!(
             "{} {} on {}",
             figures(self.amplitude),
@@ -418,7 +418,7 @@ impl LineGroup {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cutting::made_records::{MadeCut, write_campaign};
+    use crate::analysis::made_force_records::{MadeCut, write_campaign};
     use crate::identify::CuttingCase;
     use crate::identify::cutting_problem::CuttingProblem;
     use crate::identify::cutting_study::calibrate_cutting;

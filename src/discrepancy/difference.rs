@@ -3,8 +3,8 @@
 use nalgebra::DVector;
 
 use crate::Result;
+use crate::data::Axis;
 use crate::identify::StructureModel;
-use crate::ingest::Axis;
 use crate::robot::frf::Response;
 use crate::robot::{FrfBasis, Kinematics, Place, Slot};
 

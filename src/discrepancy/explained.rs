@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::error_sums::{BANDS, Sums, band_edges_hz, band_of};
 use super::place::{Amounts, DominantRegion, above_noise, excess};
-use crate::campaign::Point;
+use crate::data::Point;
 use crate::identify::FrfData;
 
 /// The residual before and after.

@@ -5,10 +5,9 @@ use serde::Serialize;
 use super::noise_outlook;
 use super::prospect::Prospect;
 use crate::Result;
-use crate::campaign::{AxesRef, BodyRef, MeasuredDof, Point, Posture};
+use crate::data::{AxesRef, Axis, BodyRef, MeasuredDof, Point, Posture};
 use crate::identify::frf_data::{FrfBlock, FrfDatum};
 use crate::identify::{FrfData, StructureModel};
-use crate::ingest::Axis;
 use crate::robot::{JointSpec, Kinematics, RobotModel};
 use crate::signal::noise_law::FrfNoise;
 

@@ -10,7 +10,7 @@ use super::diagnosis::Diagnosis;
 use super::lab::{Lab, NewPoint, Setup};
 use super::verdict::DiagnosisVerdict;
 use crate::Result;
-use crate::campaign::Posture;
+use crate::data::Posture;
 use crate::effects::Instance;
 use crate::identify::frf_problem::{FrfProblem, Misfit};
 use crate::identify::{FrfData, LeastSquares, StructureModel};
@@ -127,7 +127,7 @@ fn where_it_sits(data: &FrfData, diagnosis: &Diagnosis<StructureModel, Instance>
     let measured = |link: usize| {
         let on_link = |point: usize| {
             let point = model.and_then(|m| m.points.get(point));
-            point.is_some_and(|p| p.body == crate::campaign::BodyRef::Link(link))
+            point.is_some_and(|p| p.body == crate::data::BodyRef::Link(link))
         };
         data.frfs().any(|(_, frf)| on_link(frf.response.point))
     };

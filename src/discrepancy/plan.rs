@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::lab::Lab;
 use crate::Result;
-use crate::campaign::Posture;
+use crate::data::Posture;
 use crate::effects::{self, DataSummary, Instance};
 use crate::identify::frf_problem::{FrfProblem, Misfit};
 use crate::identify::levenberg_marquardt::{Stopping, minimise};

@@ -1,6 +1,6 @@
 use super::effect::{DataSummary, Setting, Site, StructuralEffect};
 use super::{Background, Size};
-use crate::campaign::robot_spec::RobotSpec;
+use crate::data::RobotSpec;
 use crate::effects::background::TUTTLE;
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::{Chain, Dual, Role};

@@ -7,7 +7,7 @@ use num_complex::Complex64;
 
 use super::effect::{DataSummary, Instance, NEGLIGIBLE, Setting, Site, StructuralEffect};
 use super::{Background, Spot, branch};
-use crate::campaign::robot_spec::RobotSpec;
+use crate::data::RobotSpec;
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::{Attachment, AttachmentLaw, Branch as HungMass, Chain, Dual, Element, Grip, Role};
 

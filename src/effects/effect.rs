@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::{Background, Size, Spot};
-use crate::campaign::robot_spec::RobotSpec;
+use crate::data::RobotSpec;
 use crate::parameter::Parameter;
 use crate::robot::{Chain, Dual, Kinematics, RobotModel};
 

@@ -1,6 +1,6 @@
 use super::Background;
 use super::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
-use crate::campaign::robot_spec::RobotSpec;
+use crate::data::RobotSpec;
 use crate::effects::background::EWINS;
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::{Chain, Dual, Role};
@@ -74,9 +74,7 @@ impl StructuralEffect for JointDamping {
 
     fn starts(&self, robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         let at = |factor: f64| {
-            let c = move |j: &crate::campaign::robot_spec::JointSpec| {
-                factor * DAMPING_TIME_S / j.compliance_rad_per_nm
-            };
+            let c = move |j: &crate::data::JointSpec| factor * DAMPING_TIME_S / j.compliance_rad_per_nm;
             robot.joints.iter().map(c)
         };
         let with = |factor: f64, share: f64| at(factor).chain([share]).collect();

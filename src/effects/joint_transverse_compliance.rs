@@ -2,7 +2,7 @@ use nalgebra::{DMatrix, Vector6};
 
 use super::Background;
 use super::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
-use crate::campaign::robot_spec::RobotSpec;
+use crate::data::RobotSpec;
 use crate::effects::background::{ABELE, MOBERG};
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::{Chain, Dual, Element, Place, Role, Slot};

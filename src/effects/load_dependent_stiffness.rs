@@ -2,7 +2,7 @@ use nalgebra::Vector3;
 
 use super::Background;
 use super::effect::{DataSummary, Setting, Site, StructuralEffect};
-use crate::campaign::robot_spec::RobotSpec;
+use crate::data::RobotSpec;
 use crate::effects::background::TUTTLE;
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::{Chain, Dual, Role};

@@ -2,7 +2,7 @@ use nalgebra::{Matrix3, Point3};
 
 use super::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
 use super::{Background, Size};
-use crate::campaign::robot_spec::RobotSpec;
+use crate::data::RobotSpec;
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::{Body, Chain, Dual, Place, Slot};
 

@@ -13,7 +13,7 @@ use super::payload::Payload;
 use super::sensor_misalignment::SensorMisalignment;
 use super::time_delay::TimeDelay;
 use super::tool_flexibility::ToolFlexibility;
-use crate::campaign::robot_spec::RobotSpec;
+use crate::data::RobotSpec;
 
 /// All structural effects.
 pub const STRUCTURAL: [&dyn StructuralEffect; 11] = [

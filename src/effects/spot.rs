@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3, Vector6};
 
-use crate::campaign::robot_spec::RobotSpec;
+use crate::data::RobotSpec;
 use crate::robot::{Element, Grip, Kinematics, Place, Role, Slot};
 
 /// One displacement of the structure.

@@ -1,6 +1,6 @@
 use super::effect::{ChannelFilter, DataSummary, Site, StructuralEffect};
 use super::{Background, Size};
-use crate::campaign::robot_spec::RobotSpec;
+use crate::data::RobotSpec;
 use crate::effects::background::EWINS;
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::Dual;

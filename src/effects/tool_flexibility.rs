@@ -2,7 +2,7 @@ use nalgebra::Vector3;
 
 use super::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
 use super::{Background, branch};
-use crate::campaign::robot_spec::RobotSpec;
+use crate::data::RobotSpec;
 use crate::effects::background::ALTINTAS;
 use crate::parameter::Parameter;
 use crate::robot::{Branch, Chain, Dual, Place, Slot};

@@ -6,7 +6,7 @@ use super::model_history::Revision;
 use super::structure::StructureModel;
 use super::structure_study::StructureStudy;
 use crate::Result;
-use crate::campaign::{LinkTolerances, MeasuredFrf, Point, Posture, RobotSection};
+use crate::data::{LinkTolerances, MeasuredFrf, Point, Posture, RobotSection};
 use crate::robot::{RobotModel, RobotSpec};
 
 /// Model, data and what was noticed while reading them.

@@ -10,11 +10,10 @@ use super::cutting_windows::Windows;
 pub use super::force_channel::ForceChannel;
 use super::force_channel::{force_channel, sample_std, widen_for_vibration};
 use super::off_comb::{OffComb, StandingLine, find_vibration, standing_lines};
-use crate::campaign::{Cut, Process, Tool};
 use crate::cutting::waveform::{DrillTerm, DrillingCut, MillingCut, UnitForces};
 use crate::cutting::{CutAnalysis, EdgeBit, ForceAxis, engaged_edge, feed_mm};
+use crate::data::{ChannelRole, Cut, Process, TimeRecord, Tool};
 use crate::effects::cutting::{CutSetting, CuttingSummary};
-use crate::ingest::{ChannelRole, TimeRecord};
 use crate::signal::{highest_order, line_amplitude, order_spectrum};
 use crate::{Error, InputError, Result};
 

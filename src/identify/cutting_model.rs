@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use super::cutting_data::{CutData, CutKind, CuttingData};
-use crate::campaign::Process;
 use crate::cutting::waveform::DrillTerm;
 use crate::cutting::{ForceAxis, coefficients_of, edge_row};
+use crate::data::Process;
 use crate::effects::cutting::{CutPhysics, CuttingInstance};
 use crate::parameter::{Parameter, Prior, Scale, is_vanished};
 use crate::robot::Dual;

@@ -4,8 +4,8 @@ use num_complex::Complex64;
 
 use super::cutting_data::{CutData, CuttingData, ForceChannel};
 use super::cutting_problem::{ChannelFit, CutFit};
-use crate::campaign::Process;
 use crate::cutting::ForceAxis;
+use crate::data::Process;
 
 /// Mean squares over the waveform, N²; torques as [`CuttingData::force_per_torque`] times themselves.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

@@ -1,57 +1,16 @@
 //! Measured FRFs arranged for fitting: grouped by what the model has to be set up for once.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use crate::campaign::{MeasuredDof, MeasuredFrf, Posture};
+use crate::data::{Axis, MeasuredDof, MeasuredFrf, Posture};
 use crate::effects::DataSummary;
-use crate::ingest::Axis;
 use crate::robot::Kinematics;
 use crate::robot::RobotModel;
 use crate::signal::frf_noise;
 use crate::{InputError, Result};
-
-impl MeasuredDof {
-    /// Along the positive `axis` of the `point`-th point.
-    pub fn new(point: usize, axis: Axis) -> Self {
-        MeasuredDof {
-            point,
-            axis,
-            negative: false,
-        }
-    }
-}
-
-impl MeasuredFrf {
-    /// An FRF in memory, named by its degrees of freedom: receptance in m/N on ascending frequencies above zero, between two
-    /// of the points, at the `posture`-th posture.
-    pub fn new(
-        posture: usize,
-        response: MeasuredDof,
-        reference: MeasuredDof,
-        frequency_hz: Vec<f64>,
-        receptance_m_per_n: Vec<Complex64>,
-    ) -> Self {
-        let dof = |d: MeasuredDof| {
-            let sign = if d.negative { "-" } else { "" };
-            format!("{}{sign}{}", d.point + 1, d.axis.letter())
-        };
-        MeasuredFrf {
-            posture,
-            response,
-            reference,
-            name: format!("p{} {}/{}", posture + 1, dof(response), dof(reference)),
-            frequency_hz,
-            receptance_m_per_n,
-            coherence: None,
-            force_level_n: None,
-            file: PathBuf::new(),
-        }
-    }
-}
 
 /// One FRF as data: receptance and its noise.
 #[derive(Debug, Clone)]

@@ -276,9 +276,8 @@ impl StructureModel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::{AxesRef, BodyRef, MeasuredDof, Point, RobotSection};
+    use crate::data::{AxesRef, Axis, BodyRef, MeasuredDof, Point, RobotSection};
     use crate::effects::{self, Spot};
-    use crate::ingest::Axis;
     use crate::robot::RobotModel;
     use crate::robot::fixture::{TAP_POSTURES, irb6640};
 
@@ -304,7 +303,7 @@ mod tests {
 
     /// The same with all numbers of the links free.
     fn with_free_links(exact: &StructureModel) -> StructureModel {
-        let section = section().freeing(&crate::campaign::LinkGroup::ALL);
+        let section = section().freeing(&crate::data::LinkGroup::ALL);
         StructureModel::new(exact.robot.clone(), exact.points.clone(), &section)
     }
 

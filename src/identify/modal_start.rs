@@ -291,7 +291,7 @@ impl Frequencies<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::RobotSection;
+    use crate::data::RobotSection;
     use crate::robot::RobotModel;
     use crate::robot::fixture::{TAP_POSTURES, irb6640};
 

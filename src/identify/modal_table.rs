@@ -7,7 +7,7 @@ use super::levenberg_marquardt::{Fit, LeastSquares, Linearisation, Stopping, min
 use super::posture_modes::{PostureMode, posture_modes};
 use super::structure::StructureModel;
 use crate::Result;
-use crate::ingest::Axis;
+use crate::data::Axis;
 use crate::robot::Kinematics;
 
 /// One row of the table: the strongest mode of the direct receptance at the tool centre point along a base axis.
@@ -129,7 +129,7 @@ pub fn fit(model: &StructureModel, rows: &[StrongestMode]) -> Result<Fit> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::RobotSection;
+    use crate::data::RobotSection;
     use crate::robot::RobotModel;
     use crate::robot::fixture::{TAP_POSTURES, irb6640};
 

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::structure::StructureModel;
 use crate::Result;
-use crate::ingest::Axis;
+use crate::data::Axis;
 use crate::robot::{Kinematics, ModalBasis};
 
 /// One undamped mode of the whole structure, branches included.
@@ -139,7 +139,7 @@ pub fn posture_modes(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::RobotSection;
+    use crate::data::RobotSection;
     use crate::effects::{DataSummary, find};
     use crate::robot::fixture::{TAP_POSTURES, irb6640};
     use crate::robot::{FrfBasis, RobotModel};

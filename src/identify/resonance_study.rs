@@ -15,8 +15,8 @@ use super::posture_modes::{PostureMode, posture_modes};
 use super::structure::StructureModel;
 use super::study::{EffectName, Extent, HeldOut, Measure, Residual, Study, View};
 use crate::Result;
+use crate::data::Axis;
 use crate::effects::{self, DataSummary, Instance};
-use crate::ingest::Axis;
 use crate::parameter::Parameter;
 use crate::robot::{Kinematics, RobotSpec};
 

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::channels::Channels;
 use super::frf_data::{FrfBlock, FrfData};
-use crate::campaign::{Point, RobotSection};
+use crate::data::{Point, RobotSection};
 use crate::effects::{ChannelFilter, DataSummary, Instance, Setting};
 use crate::parameter::{Parameter, Prior, Scale, is_vanished};
 use crate::robot::frf::{Response, RowSlopes};

@@ -11,7 +11,7 @@ use super::rest_patterns;
 use super::structure::StructureModel;
 use super::study::{EffectName, Extent, HeldOut, Measure, Residual, Study, View, held_out};
 use crate::Result;
-use crate::campaign::robot_spec::RobotSpec;
+use crate::data::RobotSpec;
 use crate::effects::{self, DataSummary, Instance};
 use crate::parameter::Parameter;
 

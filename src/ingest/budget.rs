@@ -2,7 +2,7 @@
 //! counts, compressed data) is taken from this budget before it is allocated, so that a small file cannot claim
 //! much memory, and the error says so.
 
-use super::InputError;
+use crate::InputError;
 
 /// Granted to every file, however small: compressed small files expand a lot.
 const FLOOR: usize = 64 << 20;

@@ -1,7 +1,8 @@
 //! What every FRF goes through after reading: lines put in order, values that are none left out, signs looked at.
 
 use super::text::Notes;
-use super::{FrfRecord, InputError, Quantity};
+use crate::InputError;
+use crate::data::{FrfRecord, Quantity};
 
 /// Nothing that is measured here has a larger value in SI, whatever its unit: newtons, m/s², metres a newton, volts.
 const LARGEST_VALUE: f64 = 1e15;
@@ -236,8 +237,8 @@ pub(super) fn on_lines(frequency_hz: &[f64], own_frequency_hz: &[f64], values: &
 
 #[cfg(test)]
 mod tests {
-    use super::super::Dof;
     use super::*;
+    use crate::data::Dof;
     use num_complex::Complex64;
 
     /// Driving point of one mode, 10 Hz, 3 %.

@@ -1,14 +1,15 @@
 //! Which format a file has, by what stands in it.
 
-use super::channel_rule;
+use super::contents::Format;
 use super::force;
 use super::frf_text;
 use super::lvm;
 use super::mat;
+use super::preview::preview;
 use super::table::Header;
 use super::text::{self, Lines};
 use super::uff;
-use super::{Format, InputError};
+use crate::InputError;
 
 /// What was decided, and what the reader needs to know of it.
 pub(super) enum Detected {
@@ -113,7 +114,7 @@ pub(super) fn detect(bytes: &[u8], is_dwd_named: bool) -> Result<(Detected, Form
         return Ok((Detected::PlainFrf(header), Format::FrfText, why));
     }
     if header.names.is_empty() {
-        let (problem, remedy) = channel_rule::preview(bytes, &header);
+        let (problem, remedy) = preview(bytes, &header);
         return Err(InputError::new(problem)
             .line(header.data_line.max(1))
             .remedy(remedy));

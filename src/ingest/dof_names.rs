@@ -1,7 +1,7 @@
 //! Degrees of freedom in the names of files, variables and columns: sets with one FRF a file say there what was measured
 //! where (`FRF_12Z_1X.csv`, `resp3Y_ref1Z.frf`, `H_1X_2Z`).
 
-use super::{Axis, Dof};
+use crate::data::{Axis, Dof};
 
 const RESPONSE_WORDS: [&str; 9] = [
     "resp", "response", "rsp", "out", "output", "acc", "accel", "sensor", "rov",

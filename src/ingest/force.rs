@@ -1,12 +1,13 @@
 //! Time records from text: DynoWare exports and plain force tables. Channel roles, units, time axis.
 
-use super::InputError;
+use super::checks;
 use super::clock;
 use super::number;
 use super::table::{Header, Table};
 use super::text::Notes;
 use super::units::{self, Dimension, Unit};
-use super::{Channel, ChannelRole, TimeRecord, checks};
+use crate::InputError;
+use crate::data::{Channel, ChannelRole, TimeRecord};
 
 mod time_axis;
 

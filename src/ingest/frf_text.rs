@@ -4,12 +4,13 @@ use std::collections::HashMap;
 
 use num_complex::Complex64;
 
-use super::InputError;
 use super::checks;
+use super::dof_names;
 use super::table::{Header, is_row};
 use super::text::{Lines, Notes, decode};
 use super::units;
-use super::{Dof, FrfRecord, Quantity, dof_names};
+use crate::InputError;
+use crate::data::{Dof, FrfRecord, Quantity};
 
 /// What a column of an FRF table holds; the text names the FRF (empty where there is one only).
 #[derive(Debug, Clone, PartialEq)]

@@ -4,11 +4,13 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use super::contents::{Contents, Format, MeasurementFile};
+use super::decode::{dofs_from_file_name, read_bytes};
 use super::detect::{self, Detected};
 use super::force::Pieces;
-use super::quality::QualityCheck;
+use super::quality::{QualityCheck, quality_warnings};
 use super::text::{self, Notes};
-use super::{Contents, Format, MeasurementFile, TimeRecord, read_bytes};
+use crate::data::TimeRecord;
 use crate::progress::Progress;
 use crate::{Error, Result};
 
@@ -60,7 +62,7 @@ pub fn survey(path: &Path) -> Result<Survey> {
             let times = &file.contents.times;
             return Ok(Survey {
                 samples: times.iter().map(TimeRecord::len).collect(),
-                quality: times.iter().flat_map(super::quality_warnings).collect(),
+                quality: times.iter().flat_map(quality_warnings).collect(),
                 file,
             });
         }
@@ -153,7 +155,7 @@ fn open_by(path: &Path, piece: usize) -> Result<Opened> {
     let mut notes = Notes::default();
     let (format, why, mut contents) =
         read_bytes(&head, is_dwd_named, &mut notes).map_err(|e| e.file(path))?;
-    super::dofs_from_file_name(path, &mut contents.frfs, &mut notes);
+    dofs_from_file_name(path, &mut contents.frfs, &mut notes);
     Ok(Opened::Read(MeasurementFile {
         path: path.to_path_buf(),
         format,

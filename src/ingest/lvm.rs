@@ -8,7 +8,8 @@ use super::clock::{self, Grid, Stamps};
 use super::number;
 use super::text::{Lines, Notes, decode};
 use super::waveform;
-use super::{InputError, TimeRecord};
+use crate::InputError;
+use crate::data::TimeRecord;
 
 const END_OF_HEADER: &str = "***End_of_Header***";
 const FIRST_LINE: &str = "LabVIEW Measurement";

@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use super::units::figures;
-use super::{Channel, ChannelRole, TimeRecord};
+use crate::data::{Channel, ChannelRole, TimeRecord};
 use crate::signal::{self, DriftLine, Spindle, find_faults, find_phases, fit_drift};
 
 /// What looks wrong with a record. Works on the samples alone; dropped samples are found while reading.

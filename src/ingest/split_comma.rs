@@ -5,10 +5,10 @@
 //! says, the other channels should stay near their last value. Dynamic programming over tokens and channels keeps
 //! the two best ways; where the second is nearly as good the row is reported.
 
-use super::InputError;
 use super::number;
 use super::table::{Header, Table};
 use super::text::{Lines, Notes, decode};
+use crate::InputError;
 
 /// Two cuts whose costs differ by less (in standard deviations of a channel) cannot be told apart.
 const MARGIN: f64 = 2.0;

@@ -2,11 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::InputError;
 use super::number;
-use super::split_comma;
 use super::text::{Lines, Notes, decode};
 use super::units;
+use crate::InputError;
 
 /// Header lines looked at before a file is given up as "no table of numbers".
 const HEADER_LINES_AT_MOST: usize = 200;
@@ -138,21 +137,6 @@ impl Header {
             "{delimiter} separated, decimal {decimal}, data from line {}",
             self.data_line
         )
-    }
-
-    /// Reads all rows.
-    ///
-    /// # Errors
-    /// A row that has not as many numbers as there are columns; the last row of a file may be cut short.
-    pub fn read(&self, bytes: &[u8], rate_hz: Option<f64>, notes: &mut Notes) -> Result<Table, InputError> {
-        let data = bytes.get(self.data_at..).unwrap_or_default();
-        if self.decimal_comma_between_commas {
-            return split_comma::read(data, self, rate_hz, notes);
-        }
-        if data.contains(&b'"') {
-            return self.read_quoted(data, notes);
-        }
-        self.read_rows(data, self.data_line, true, notes)
     }
 
     /// Reads the rows of one piece of the file that ends with a line; its first line has number `first_line`. Only the last
@@ -304,7 +288,7 @@ impl Header {
     }
 
     /// Files with quoted fields, by the `csv` crate.
-    fn read_quoted(&self, data: &[u8], notes: &mut Notes) -> Result<Table, InputError> {
+    pub(super) fn read_quoted(&self, data: &[u8], notes: &mut Notes) -> Result<Table, InputError> {
         let delimiter = match self.delimiter {
             Delimiter::Byte(b) => b,
             Delimiter::Blanks => b' ',

@@ -7,7 +7,8 @@ use std::collections::HashMap;
 
 use super::text::Notes;
 use super::waveform;
-use super::{InputError, TimeRecord};
+use crate::InputError;
+use crate::data::TimeRecord;
 
 const LEAD_IN: usize = 28;
 const META: u32 = 1 << 1;

@@ -1,7 +1,10 @@
 //! Text formats, detection and robustness, on small files of the shapes that labs deliver.
 
+use num_complex::Complex64;
 use proptest::prelude::*;
 
+use super::decode::read_bytes;
+use super::text::Notes;
 use super::*;
 
 /// The promise to every caller: equal lengths, ascending frequencies, no number that is none.

@@ -2,37 +2,14 @@
 
 use std::borrow::Cow;
 
+pub use crate::text::{shown, shown_on_one_line};
+
 /// UTF-8 where it is UTF-8, else Latin-1 (every byte sequence is).
 pub fn decode(bytes: &[u8]) -> String {
     match std::str::from_utf8(bytes) {
         Ok(text) => text.to_owned(),
         Err(_) => bytes.iter().map(|&b| char::from(b)).collect(),
     }
-}
-
-/// Text of a file as it may be shown on a terminal: control characters, and those that turn the direction of writing
-/// around or cannot be seen, become `\u{1b}`.
-pub fn shown(text: &str) -> Cow<'_, str> {
-    let is_harmful = |c: char| {
-        c.is_control() && c != '\t' && c != '\n'
-            || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
-    };
-    if !text.contains(is_harmful) {
-        return Cow::Borrowed(text);
-    }
-    let mut shown = String::with_capacity(text.len() + 16);
-    for c in text.chars() {
-        match is_harmful(c) {
-            true => shown.extend(c.escape_unicode()),
-            false => shown.push(c),
-        }
-    }
-    Cow::Owned(shown)
-}
-
-/// As [`shown`], for names and remarks: a line break, too, becomes `\u{a}`.
-pub fn shown_on_one_line(text: &str) -> String {
-    shown(text).replace('\n', "\\u{a}")
 }
 
 /// Drops a UTF-8 byte order mark, turns UTF-16 (spreadsheets call it "Unicode text") into UTF-8.
@@ -196,16 +173,6 @@ mod tests {
     }
 
     #[test]
-    fn what_would_drive_a_terminal_is_shown() {
-        assert_eq!(shown("Fx [N]\tµm²"), "Fx [N]\tµm²");
-        assert_eq!(shown("\u{1b}[31mFx\u{9b}2J\u{7}"), "\\u{1b}[31mFx\\u{9b}2J\\u{7}");
-        assert_eq!(shown("a\u{202e}b\u{200b}"), "a\\u{202e}b\\u{200b}");
-        let mut notes = Notes::default();
-        notes.about("\u{1b}c", "odd\u{8}\n");
-        assert_eq!(notes.into_warnings(), ["\\u{1b}c: odd\\u{8}\\u{a}"]);
-    }
-
-    #[test]
     fn repeated_remarks_become_one() {
         let mut notes = Notes::default();
         for name in ["a", "b", "c", "d", "e", "e"] {
@@ -216,5 +183,12 @@ mod tests {
             notes.into_warnings(),
             ["a, b, c and 2 more: no unit", "cut short"]
         );
+    }
+
+    #[test]
+    fn what_would_drive_a_terminal_is_shown_in_notes() {
+        let mut notes = Notes::default();
+        notes.about("\u{1b}c", "odd\u{8}\n");
+        assert_eq!(notes.into_warnings(), ["\\u{1b}c: odd\\u{8}\\u{a}"]);
     }
 }

@@ -1,6 +1,7 @@
 //! Unit labels: `(m/s²)/N`, `g`, `in-lbf`, `N·m`. Dimension and factor to SI, or nothing where it is not understood.
 
-use super::Quantity;
+use crate::data::{Channel, ChannelRole, Quantity};
+pub use crate::text::figures;
 
 /// Standard acceleration of free fall, m/s² (exact by definition, CGPM 1901).
 pub const STANDARD_GRAVITY: f64 = 9.80665;
@@ -309,21 +310,25 @@ pub fn frequency_factor(label: &str) -> Option<f64> {
     }
 }
 
-/// A number for people, with so many figures that count and no exponent: `18.30`, `0.01265`, `29930`.
-pub fn figures(value: f64, count: i32) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return format!("{value}");
-    }
-    let decimals = (count - 1 - value.abs().log10().floor() as i32).clamp(0, 12) as usize;
-    format!("{value:.decimals$}")
-}
-
 /// Unit of an FRF quantity, for people.
 pub fn frf_unit(quantity: Quantity) -> &'static str {
     match quantity {
         Quantity::Receptance => "m/N",
         Quantity::Mobility => "(m/s)/N",
         Quantity::Accelerance => "(m/s²)/N",
+    }
+}
+
+impl Channel {
+    /// What the samples are and their SI unit; the file's own label where it is not understood.
+    pub fn quantity_and_unit(&self) -> (&'static str, &str) {
+        let by_role = match self.role {
+            ChannelRole::ForceX | ChannelRole::ForceY | ChannelRole::ForceZ => Some(("force", "N")),
+            ChannelRole::TorqueZ => Some(("moment", "N·m")),
+            ChannelRole::Other => None,
+        };
+        let by_unit = parse_named(&self.file_unit).and_then(|u| u.dimension.describe());
+        by_unit.or(by_role).unwrap_or(("unknown", &self.file_unit))
     }
 }
 

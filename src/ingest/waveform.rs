@@ -1,9 +1,11 @@
 //! Channels of formats that say name, unit and sampling interval of each: made SI, and gathered into records.
 
+use super::checks;
 use super::force::{role_of, unit_in_name};
 use super::text::Notes;
 use super::units::{self, Dimension};
-use super::{Channel, ChannelRole, InputError, TimeRecord, checks};
+use crate::InputError;
+use crate::data::{Channel, ChannelRole, TimeRecord};
 
 /// A channel in SI; the unit is read from its label, else from its name (`fx_n`, `Force [N]`).
 ///

@@ -12,7 +12,7 @@ use super::band::{QUANTILES, quantile};
 use super::robot::lobe_axes;
 use super::setup::{group_of_cuts, half_point_angle_rad};
 use crate::campaign::{Campaign, CutGeometry, HoleSection, LobesSection, Process, Tool};
-use crate::cutting::{ForceAxis, Group, average_row, coefficients_of};
+use crate::cutting::{ForceAxis, ForceGroup, average_row, coefficients_of};
 use crate::robot::static_deflection::wrench;
 
 /// Static forces on the tool.
@@ -188,7 +188,7 @@ impl HoleCheck {
     pub fn new(
         campaign: &Campaign,
         section: &LobesSection,
-        own: Option<&Group>,
+        own: Option<&ForceGroup>,
     ) -> std::result::Result<Self, String> {
         let usual = HoleSection::default();
         let asked = section.hole.as_ref().unwrap_or(&usual);
@@ -244,7 +244,7 @@ fn predicted(
     campaign: &Campaign,
     section: &LobesSection,
     asked: &HoleSection,
-    own: Option<&Group>,
+    own: Option<&ForceGroup>,
 ) -> std::result::Result<HoleLoad, String> {
     let tool = campaign
         .tool
@@ -267,7 +267,7 @@ fn predicted(
 }
 
 /// All coefficients of the campaign's cuts, in the order of [`coefficients_of`].
-fn complete(group: &Group) -> std::result::Result<Vec<f64>, String> {
+fn complete(group: &ForceGroup) -> std::result::Result<Vec<f64>, String> {
     coefficients_of(group.process)
         .iter()
         .map(|kind| {
@@ -296,7 +296,7 @@ fn drilling(
     section: &LobesSection,
     asked: &HoleSection,
     tool: &Tool,
-    group: impl Fn() -> std::result::Result<Group, String>,
+    group: impl Fn() -> std::result::Result<ForceGroup, String>,
 ) -> std::result::Result<HoleLoad, String> {
     let geometry = CutGeometry::Drilling {
         feed_per_rev_mm: section
@@ -335,7 +335,7 @@ fn drilling(
 fn milling(
     campaign: &Campaign,
     tool: &Tool,
-    group: impl Fn() -> std::result::Result<Group, String>,
+    group: impl Fn() -> std::result::Result<ForceGroup, String>,
 ) -> std::result::Result<HoleLoad, String> {
     let group = group().map_err(|reason| format!("the forces need milling cuts ({reason})"))?;
     let coefficients = complete(&group)?;

@@ -6,10 +6,11 @@ use super::frf::{AxisMode, ModalFrf, Mode};
 use super::periodic_force::{PeriodicForce, ProcessDamping};
 use super::tool_beam::{BeamSegment, ToolBeam};
 use super::tool_point::ModesHolder;
+use crate::analysis::force_records::identify_forces;
 use crate::campaign::{
     Campaign, CutGeometry, LobeAxis, LobeMethod, LobeMode, LobesSection, Process, Tool, ToolKind, ToolSegment,
 };
-use crate::cutting::{CfcOptions, DrillGeometry, Group, identify_forces};
+use crate::cutting::{CfcOptions, DrillGeometry, ForceGroup};
 use crate::{Error, InputError, Result};
 
 /// Cutting coefficients that lobes need, N/mm².
@@ -48,7 +49,7 @@ pub fn group_of_cuts(
     campaign: &Campaign,
     section: &LobesSection,
     warnings: &mut Vec<String>,
-) -> Result<Group> {
+) -> Result<ForceGroup> {
     let lacks = |problem: &str| lacks_coefficients(campaign, problem);
     if campaign.cuts.is_empty() {
         return Err(lacks(
@@ -82,7 +83,7 @@ pub fn group_of_cuts(
 pub fn coefficients_of_group(
     campaign: &Campaign,
     section: &LobesSection,
-    group: &Group,
+    group: &ForceGroup,
 ) -> Result<LobeCoefficients> {
     let value = |label: &str| {
         group.coefficient(label).and_then(|c| c.value).ok_or_else(|| {

@@ -7,9 +7,12 @@ use super::interactive::Plot;
 use super::number::{decimals, percent, significant, with_error};
 use super::parts::{count, figure, listed, setting};
 use super::{Block, Column, Section, Table};
+use crate::analysis::force_records::cutting_trials;
 use crate::analysis::regression_line::{FeedLine, feed_lines};
 use crate::campaign::Campaign;
-use crate::cutting::{CfcResult, Coefficient, CutAnalysis, ForceAxis, Group, Known, kienzle, speed_text};
+use crate::cutting::{
+    CfcResult, Coefficient, CutAnalysis, ForceAxis, ForceGroup, Known, kienzle, speed_text,
+};
 
 pub fn summary(result: &CfcResult) -> String {
     let mut text = String::new();
@@ -43,9 +46,9 @@ pub fn summary(result: &CfcResult) -> String {
 }
 
 /// How far the leading coefficient differs between cutting speeds.
-fn over_speeds(result: &CfcResult, pooled: &Group) -> Option<String> {
+fn over_speeds(result: &CfcResult, pooled: &ForceGroup) -> Option<String> {
     let label = pooled.coefficients.iter().find(|c| !c.edge)?.label;
-    let of_speed = |g: &Group| Some((g.coefficient(label)?.value?, speed_text(g)));
+    let of_speed = |g: &ForceGroup| Some((g.coefficient(label)?.value?, speed_text(g)));
     let groups = result.groups.iter().filter(|g| g.is_beside(pooled));
     let mut values: Vec<(f64, String)> = groups.filter_map(of_speed).collect();
     values.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -62,7 +65,7 @@ fn over_speeds(result: &CfcResult, pooled: &Group) -> Option<String> {
 }
 
 /// Process, and the material where several were cut.
-fn series_name(result: &CfcResult, pooled: &Group) -> String {
+fn series_name(result: &CfcResult, pooled: &ForceGroup) -> String {
     let name = pooled.process.name();
     let several = result
         .pooled
@@ -77,7 +80,7 @@ fn series_name(result: &CfcResult, pooled: &Group) -> String {
 }
 
 /// The same as part of a file name.
-fn slug(result: &CfcResult, pooled: &Group) -> String {
+fn slug(result: &CfcResult, pooled: &ForceGroup) -> String {
     let lower = series_name(result, pooled).to_lowercase();
     lower.replace(|c: char| !c.is_ascii_alphanumeric(), "-")
 }
@@ -92,7 +95,7 @@ struct Misfit {
     sigmas: f64,
 }
 
-fn misfits(group: &Group) -> Vec<Misfit> {
+fn misfits(group: &ForceGroup) -> Vec<Misfit> {
     let largest = |axis: ForceAxis| {
         let of_axis = group.points.iter().filter(|p| p.axis == axis);
         of_axis.map(|p| p.measured.abs()).fold(0.0, f64::max)
@@ -110,7 +113,7 @@ fn misfits(group: &Group) -> Vec<Misfit> {
         .collect()
 }
 
-fn worst(group: &Group) -> Option<Misfit> {
+fn worst(group: &ForceGroup) -> Option<Misfit> {
     misfits(group)
         .into_iter()
         .max_by(|a, b| a.share.abs().total_cmp(&b.share.abs()))
@@ -225,7 +228,7 @@ fn record_figure(cut: &CutAnalysis, why: &str) -> Block {
 fn cut_table(result: &CfcResult) -> Block {
     let axes = || {
         ForceAxis::ALL.into_iter().filter(|a| {
-            let used = |p: &Group| ForceAxis::of(p.process).contains(a);
+            let used = |p: &ForceGroup| ForceAxis::of(p.process).contains(a);
             result.pooled.iter().any(used)
         })
     };
@@ -276,7 +279,7 @@ fn cut_table(result: &CfcResult) -> Block {
     })
 }
 
-fn regression(campaign: &Campaign, result: &CfcResult, pooled: &Group) -> Section {
+fn regression(campaign: &Campaign, result: &CfcResult, pooled: &ForceGroup) -> Section {
     let mut blocks = Vec::new();
     let axes = ForceAxis::of(pooled.process);
     for unit in ["N", "N·m"] {
@@ -301,7 +304,7 @@ fn regression(campaign: &Campaign, result: &CfcResult, pooled: &Group) -> Sectio
 fn line_figure(
     campaign: &Campaign,
     result: &CfcResult,
-    pooled: &Group,
+    pooled: &ForceGroup,
     axes: &[ForceAxis],
     unit: &str,
 ) -> Block {
@@ -369,7 +372,7 @@ fn line_figure(
     .with_plot(drawing.plot())
 }
 
-fn coefficient_table(result: &CfcResult, pooled: &Group) -> Block {
+fn coefficient_table(result: &CfcResult, pooled: &ForceGroup) -> Block {
     let mut columns = vec![Column::text("cutting speed"), Column::number("cuts / feeds")];
     columns.extend(
         pooled
@@ -380,7 +383,7 @@ fn coefficient_table(result: &CfcResult, pooled: &Group) -> Block {
     let axes = ForceAxis::of(pooled.process);
     columns.extend(axes.iter().map(|a| Column::number(format!("R² {}", a.label()))));
     let groups = result.groups.iter().filter(|g| g.is_beside(pooled));
-    let row = |group: &Group, name: String| {
+    let row = |group: &ForceGroup, name: String| {
         let mut row = vec![name, format!("{} / {}", group.cuts.len(), group.feeds)];
         row.extend(group.coefficients.iter().map(value_text));
         row.extend(
@@ -406,8 +409,13 @@ fn coefficient_table(result: &CfcResult, pooled: &Group) -> Block {
     })
 }
 
-fn kienzle_table(campaign: &Campaign, result: &CfcResult, pooled: &Group) -> Option<Block> {
-    let law = kienzle(campaign, result, std::slice::from_ref(pooled)).pop()??;
+fn kienzle_table(campaign: &Campaign, result: &CfcResult, pooled: &ForceGroup) -> Option<Block> {
+    let law = kienzle(
+        &cutting_trials(campaign).ok()?,
+        result,
+        std::slice::from_ref(pooled),
+    )
+    .pop()??;
     let text = |known: Option<Known>| {
         known
             .and_then(|k| Some(with_error(k.value, k.std_error?)))
@@ -427,7 +435,7 @@ fn kienzle_table(campaign: &Campaign, result: &CfcResult, pooled: &Group) -> Opt
     }))
 }
 
-fn misfit_map(result: &CfcResult, pooled: &Group) -> Option<Block> {
+fn misfit_map(result: &CfcResult, pooled: &ForceGroup) -> Option<Block> {
     let misfits = misfits(pooled);
     if pooled.cuts.len() < 2 {
         return None;

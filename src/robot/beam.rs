@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Rotation3, Vector3};
 
-use crate::campaign::robot_spec::BeamSection;
+use crate::data::BeamSection;
 
 /// Ratio E/G for the links' material: one Young's modulus a robot, Poisson's ratio 0.3.
 pub const YOUNG_OVER_SHEAR: f64 = 2.6;

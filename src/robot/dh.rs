@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
-use crate::campaign::robot_spec::{JointPlacement, JointSpec, LinkSpec, RobotSpec, ToolFrame};
+use crate::data::{JointPlacement, JointSpec, LinkSpec, RobotSpec, ToolFrame};
 
 /// Frames of a robot at one posture, base frame coordinates, m.
 #[derive(Debug, Clone)]
@@ -212,7 +212,7 @@ impl Kinematics {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::robot_spec::ToolFrame;
+    use crate::data::ToolFrame;
     use proptest::prelude::*;
 
     fn planar(lengths: &[f64]) -> RobotSpec {

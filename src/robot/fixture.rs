@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::{Branch, Dual, Kinematics, RobotModel};
-use crate::campaign::robot_spec::*;
+use crate::data::*;
 
 pub fn irb6640() -> RobotSpec {
     let joint = |d_m: f64, a_m: f64, alpha_deg: f64, offset_deg: f64, compliance: f64| JointSpec {

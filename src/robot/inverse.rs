@@ -8,7 +8,7 @@ use nalgebra::Isometry3;
 use super::dh::Kinematics;
 use super::numeric_inverse::NumericInverse;
 use super::spherical_wrist::SphericalWrist;
-use crate::campaign::robot_spec::{JointSpec, RobotSpec};
+use crate::data::{JointSpec, RobotSpec};
 use crate::{Error, Result};
 
 /// Joint angles that put the tool where it was asked to be.

@@ -23,7 +23,7 @@ pub mod spherical_wrist;
 pub mod static_deflection;
 pub mod urdf;
 
-pub use crate::campaign::robot_spec::*;
+pub use crate::data::*;
 pub use chain::{Attachment, AttachmentLaw, Body, Branch, Chain, Element, Grip, Place, Role, Slot, System};
 pub use dh::Kinematics;
 pub use dual::Dual;

@@ -6,8 +6,8 @@ use super::beam;
 use super::chain::{Body, Chain, Element, Place, Role, Slot};
 use super::dh::Kinematics;
 use super::dual::Dual;
-use crate::campaign::robot_spec::RobotSpec;
 use crate::campaign::{AxesRef, BodyRef, Point};
+use crate::data::RobotSpec;
 use crate::ingest::Axis;
 use crate::{InputError, Result};
 
@@ -217,7 +217,7 @@ impl RobotModel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::robot_spec::{BeamSection, JointSpec, LinkSpec, ToolFrame};
+    use crate::data::{BeamSection, JointSpec, LinkSpec, ToolFrame};
     use crate::robot::fixture::{TAP_POSTURES, irb6640};
     use crate::robot::frf::natural_frequencies_hz;
     use crate::robot::{FrfBasis, ModalBasis};

@@ -11,7 +11,7 @@ use nalgebra::{Isometry3, Point3, SMatrix, SVector, UnitQuaternion, Vector3};
 
 use super::dh::Kinematics;
 use super::inverse::farthest;
-use crate::campaign::robot_spec::RobotSpec;
+use crate::data::RobotSpec;
 use crate::{Error, Result};
 
 /// Joints at most.

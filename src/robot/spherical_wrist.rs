@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Rotation3, Vector2, Vector3};
 
 use super::dh::joint_transform;
 use super::inverse::{IkSolution, farthest, limit_margin_rad, nearest_turn, tool_at};
-use crate::campaign::robot_spec::RobotSpec;
+use crate::data::RobotSpec;
 use crate::{Error, Result};
 
 /// Closed-form inverse kinematics of one robot.

@@ -59,7 +59,7 @@ mod tests {
     use nalgebra::DVector;
 
     use super::*;
-    use crate::campaign::robot_spec::{JointSpec, RobotSpec, ToolFrame};
+    use crate::data::{JointSpec, RobotSpec, ToolFrame};
     use crate::robot::fixture::{TAP_POSTURES, flexible_tool, irb6640};
     use crate::robot::{Baseline, Dual, PostureReport};
 

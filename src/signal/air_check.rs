@@ -79,7 +79,7 @@ fn level(samples: &[f64], range: &Range<usize>, turn: f64) -> (f64, f64, f64) {
     (centre, slope * turns as f64, robust_std(&residual))
 }
 
-/// The part of `candidate` that is air beside the cut in `cutting`, if any. `turn`: samples a revolution.
+/// The part of `candidate` that is air next to the cut in `cutting`, if any. `turn`: samples a revolution.
 pub(super) fn air_in(
     channels: &[&[f64]],
     candidate: &Range<usize>,

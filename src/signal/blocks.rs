@@ -2,7 +2,7 @@
 
 /// Mean and fluctuation of each consecutive block of a channel.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Blocks {
+pub struct SignalBlocks {
     /// Mean of each block, in the unit of the channel.
     pub mean: Vec<f64>,
     /// Standard deviation within each block less what the drift from block to block makes, in the unit of the
@@ -12,9 +12,9 @@ pub struct Blocks {
     pub samples_per_block: f64,
 }
 
-impl Blocks {
+impl SignalBlocks {
     /// Cuts `samples` into as many blocks as there are, their edges rounded to samples; a rest at the end is left out.
-    pub fn new(samples: &[f64], samples_per_block: f64) -> Blocks {
+    pub fn new(samples: &[f64], samples_per_block: f64) -> SignalBlocks {
         let count = if samples_per_block >= 1.0 {
             ((samples.len() as f64 + 0.5 - 1e-9) / samples_per_block).floor() as usize
         } else {
@@ -35,17 +35,19 @@ impl Blocks {
             let variance = std_dev[i] * std_dev[i];
             std_dev[i] = (variance - ramp * ramp / 12.0).max(0.01 * variance).sqrt();
         }
-        Blocks {
+        SignalBlocks {
             mean,
             std_dev,
             samples_per_block,
         }
     }
 
+    /// Number of blocks.
     pub fn len(&self) -> usize {
         self.mean.len()
     }
 
+    /// True where the record is shorter than one block.
     pub fn is_empty(&self) -> bool {
         self.mean.is_empty()
     }
@@ -69,6 +71,7 @@ pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
+/// Middle of the sorted values, interpolated; 0 of nothing.
 pub fn median(values: &[f64]) -> f64 {
     quantile(values, 0.5)
 }
@@ -105,7 +108,7 @@ mod tests {
         let samples: Vec<f64> = (0..3330)
             .map(|i| 5.0 + 2.0 * (std::f64::consts::TAU * i as f64 / period).sin())
             .collect();
-        let blocks = Blocks::new(&samples, period);
+        let blocks = SignalBlocks::new(&samples, period);
         assert_eq!(blocks.len(), 100);
         assert!(blocks.mean.iter().all(|m| (m - 5.0).abs() < 0.05));
         assert!(blocks.std_dev.iter().all(|s| (s - 2f64.sqrt()).abs() < 0.05));
@@ -113,7 +116,7 @@ mod tests {
 
     #[test]
     fn a_ramp_is_no_fluctuation() {
-        let blocks = Blocks::new(&(0..1000).map(|i| i as f64).collect::<Vec<_>>(), 100.0);
+        let blocks = SignalBlocks::new(&(0..1000).map(|i| i as f64).collect::<Vec<_>>(), 100.0);
         assert!(
             blocks.std_dev[1..9]
                 .iter()
@@ -125,8 +128,8 @@ mod tests {
     fn quantiles_interpolate_and_empty_input_is_harmless() {
         assert_eq!(quantile(&[3.0, 1.0, 2.0], 0.25), 1.5);
         assert_eq!(median(&[]), 0.0);
-        assert!(Blocks::new(&[], 10.0).is_empty());
-        assert!(Blocks::new(&[1.0], 0.0).is_empty());
+        assert!(SignalBlocks::new(&[], 10.0).is_empty());
+        assert!(SignalBlocks::new(&[1.0], 0.0).is_empty());
     }
 
     #[test]

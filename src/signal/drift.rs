@@ -6,12 +6,14 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::blocks::{Blocks, line, robust_std};
+use super::blocks::{SignalBlocks, line, robust_std};
 
 /// Sample ranges in which the tool cut nothing.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Air {
+    /// Before the cut; `None` where none was found there.
     pub before: Option<Range<usize>>,
+    /// After the cut; `None` where none was found there.
     pub after: Option<Range<usize>>,
 }
 
@@ -21,18 +23,22 @@ impl Air {
     }
 }
 
-/// The zero line of one channel, in the channel's unit against the record's own time axis.
+/// The baseline of one channel, in the channel's unit against the record's own time axis.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct DriftLine {
     /// Value at `reference_s`.
     pub offset: f64,
+    /// Slope, unit of the channel per s.
     pub slope_per_s: f64,
     /// Mean time of the air samples, s.
     pub reference_s: f64,
+    /// The line uses air before the cut.
     pub air_before: bool,
+    /// The line uses air after the cut.
     pub air_after: bool,
     /// Standard deviation of the fitted value at `reference_s`, from the scatter of block means.
     pub offset_std: f64,
+    /// Standard deviation of the slope, unit of the channel per s.
     pub slope_std_per_s: f64,
     /// By how much the air bends away from the line (rms of block means less their noise);
     /// 0 for a drift that is a line.
@@ -45,6 +51,7 @@ pub struct DriftLine {
 }
 
 impl DriftLine {
+    /// The zero at a time on the record's axis, unit of the channel.
     pub fn at(&self, time_s: f64) -> f64 {
         self.offset + self.slope_per_s * (time_s - self.reference_s)
     }
@@ -83,7 +90,7 @@ const BEND_RATIO: f64 = 3.0;
 /// Standard deviations from which on a jump of the zero is believed.
 const STEP_SIGMA: f64 = 6.0;
 
-/// Fits the zero line of a channel to its air segments. Without air there is no line: offset and slope
+/// Fits the baseline of a channel to its air segments. Without air there is no line: offset and slope
 /// are zero and the flags say so. With air on one side only the line is extrapolated, its uncertainty with it.
 pub fn fit_drift(samples: &[f64], sample_rate_hz: f64, start_s: f64, air: &Air) -> DriftLine {
     let mut drift = DriftLine {
@@ -202,7 +209,7 @@ fn uncertainty(
     for range in air.ranges() {
         let inside: Vec<usize> = kept.iter().copied().filter(|i| range.contains(i)).collect();
         let values: Vec<f64> = inside.iter().map(|&i| residual(i)).collect();
-        let blocks = Blocks::new(&values, values.len() as f64 / BLOCKS_PER_SEGMENT as f64);
+        let blocks = SignalBlocks::new(&values, values.len() as f64 / BLOCKS_PER_SEGMENT as f64);
         square_sum += blocks
             .mean
             .iter()

@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
-use super::blocks::{Blocks, line, median, quantile};
-use super::steady_window::MIN_STATE_BLOCKS;
+use super::blocks::{SignalBlocks, line, median, quantile};
 
+/// Too few blocks for a state to be told from noise.
+pub(super) const MIN_STATE_BLOCKS: usize = 4;
 /// A block departs when its mean leaves the local line by this many standard deviations…
 const DEPARTURE_SIGMA: f64 = 6.0;
 /// …and by this part of the channel's range (slow bends of the drift stay below it).
@@ -24,7 +25,7 @@ const SLOW_DEPARTURE_OF_RANGE: f64 = 0.05;
 
 /// What counts as a departure in one channel.
 struct Limits<'a> {
-    blocks: &'a Blocks,
+    blocks: &'a SignalBlocks,
     /// Noise of block means.
     sigma: f64,
     range: f64,
@@ -33,7 +34,7 @@ struct Limits<'a> {
 }
 
 impl<'a> Limits<'a> {
-    fn new(blocks: &'a Blocks) -> Self {
+    fn new(blocks: &'a SignalBlocks) -> Self {
         // From neighbours; the lower quartile, since inside the cut they differ more.
         let steps: Vec<f64> = blocks.mean.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
         Limits {
@@ -75,7 +76,7 @@ impl<'a> Limits<'a> {
 /// Number of blocks, counted from one end, that continue the state found at that end. Followed by a line
 /// through the latest blocks, so that a slow bend of the drift does not count; two blocks in a row must
 /// depart, so that a spike does not.
-pub(super) fn departure(blocks: &[Blocks], count: usize, from_end: bool) -> usize {
+pub(super) fn departure(blocks: &[SignalBlocks], count: usize, from_end: bool) -> usize {
     let at = |i: usize| if from_end { count - 1 - i } else { i };
     let seed = MIN_STATE_BLOCKS.max(count / 50).min(count);
     let limits: Vec<Limits> = blocks.iter().map(Limits::new).collect();
@@ -108,7 +109,7 @@ pub(super) fn departure(blocks: &[Blocks], count: usize, from_end: bool) -> usiz
 
 /// Are the states at the start and at the end of the record air?
 pub(super) fn air_states(
-    blocks: &[Blocks],
+    blocks: &[SignalBlocks],
     count: usize,
     start_end: usize,
     last_start: usize,
@@ -129,8 +130,8 @@ pub(super) fn air_states(
     } else {
         start.clone()
     };
-    let of = |r: &Range<usize>, pick: fn(&Blocks) -> &Vec<f64>| -> Vec<f64> {
-        let part = |b: &Blocks| pick(b).get(r.clone()).map_or(0.0, median);
+    let of = |r: &Range<usize>, pick: fn(&SignalBlocks) -> &Vec<f64>| -> Vec<f64> {
+        let part = |b: &SignalBlocks| pick(b).get(r.clone()).map_or(0.0, median);
         blocks.iter().map(part).collect()
     };
 

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::blocks::{Blocks, line, median, quantile};
+use super::blocks::{SignalBlocks, line, median, quantile};
 
 /// An entry begins below this part of the full force; a cut whose force merely changes does not.
 const ENTRY_BEGINS_BELOW: f64 = 0.6;
@@ -18,8 +18,8 @@ const ROUNDED: f64 = 0.1;
 /// Root mean square of the force about zero around each block, over all channels; `blocks_per_turn` of them are taken together,
 /// since no tooth is like the next. The zero and the noise are those of `air`, in blocks; air on one side tells the noise only,
 /// since it may drift, and then the fluctuation alone counts.
-pub(super) fn loudness(blocks: &[Blocks], air: &[Range<usize>], blocks_per_turn: usize) -> Vec<f64> {
-    let count = blocks.iter().map(Blocks::len).min().unwrap_or(0);
+pub(super) fn loudness(blocks: &[SignalBlocks], air: &[Range<usize>], blocks_per_turn: usize) -> Vec<f64> {
+    let count = blocks.iter().map(SignalBlocks::len).min().unwrap_or(0);
     let mut square = vec![0.0; count];
     for b in blocks {
         let of = |pick: &[f64], r: &Range<usize>| median(pick.get(r.clone()).unwrap_or(&[]));

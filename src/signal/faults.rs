@@ -12,6 +12,7 @@ pub struct Faults {
     pub spikes: Vec<Range<usize>>,
     /// Stretches without any change in a channel that else never rests.
     pub stuck: Vec<Range<usize>>,
+    /// Peaks that the range of the amplifier cuts off.
     pub clipping: Option<Clipping>,
 }
 
@@ -20,6 +21,7 @@ pub struct Faults {
 pub struct Clipping {
     /// Value of the plateaus, unit of the channel.
     pub level: f64,
+    /// Sample ranges that stand at `level`, ascending.
     pub plateaus: Vec<Range<usize>>,
 }
 
@@ -67,7 +69,7 @@ pub fn find_faults(samples: &[f64]) -> Faults {
 }
 
 /// More than half of the samples are exactly zero, in long stretches: a force window left the contacts only (or a trigger
-/// the blocks). What hangs or drops out holds a part of a record.
+/// the blocks). What freezes or drops out makes up a part of a record.
 fn is_windowed(samples: &[f64]) -> bool {
     let zeros = runs(samples).filter(|run| run.len() >= STUCK && samples[run.start] == 0.0);
     2 * zeros.map(|run| run.len()).sum::<usize>() > samples.len()
@@ -211,8 +213,8 @@ fn come_back_evenly(found: &[Range<usize>]) -> bool {
     2 * alike > gaps.len()
 }
 
-#[cfg(test)]
 #[allow(clippy::single_range_in_vec_init)]
+#[cfg(test)]
 mod tests {
     use super::*;
     use rand::{Rng, SeedableRng};
@@ -282,7 +284,7 @@ mod tests {
     }
 
     /// A force window's zeros are no stuck channel, and a tool that rings at a few samples a period has no spikes; a spike and
-    /// a stretch that hangs beside them are still found.
+    /// a frozen stretch among them are still found.
     #[test]
     fn taps_with_a_force_window_on_a_ringing_tool_are_sound() {
         let (mut force, mut tool) = (vec![0.0; 20_000], vec![0.0; 20_000]);

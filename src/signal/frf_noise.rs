@@ -25,6 +25,7 @@ const LEAST_FREEDOM: f64 = 0.1;
 /// Noise of one FRF and the smooth curve that it was measured against.
 #[derive(Debug, Clone)]
 pub struct FrfNoiseEstimate {
+    /// How the noise depends on frequency and magnitude.
     pub law: FrfNoise,
     /// Standard deviation of the complex value on each line: the law at the magnitude of a smooth curve through the other
     /// lines. (At the noisy magnitude a line that noise made small would get more weight than it deserves: every FRF

@@ -15,7 +15,7 @@ mod steady_window;
 mod tooth_line;
 
 pub(crate) use blocks::line;
-pub use blocks::{Blocks, mean, median, quantile};
+pub use blocks::{SignalBlocks, mean, median, quantile};
 pub use drift::{Air, DriftLine, fit_drift};
 pub use engagement::change;
 pub use faults::{Clipping, Faults, find_faults, samples_in};

@@ -47,6 +47,7 @@ fn ratio(frequency_hz: f64, reference_hz: f64) -> f64 {
 /// One line of an FRF after a fit.
 #[derive(Debug, Clone, Copy)]
 pub struct Departure {
+    /// Frequency of the line.
     pub frequency_hz: f64,
     /// Of the fitted value.
     pub magnitude: f64,

@@ -24,6 +24,7 @@ pub struct OrderSpectrum {
     pub sample_std: f64,
     /// |amplitude| of what is left without the orders, on lines `line_hz` apart: x(t) = … + 2 Re Σ X_j e^{iω_j t}.
     pub rest: Vec<f64>,
+    /// Spacing of the lines of `rest`, Hz.
     pub line_hz: f64,
 }
 
@@ -39,7 +40,7 @@ pub fn highest_order(samples_per_revolution: f64, wanted: usize) -> usize {
     wanted.min((0.45 * samples_per_revolution).floor().max(0.0) as usize)
 }
 
-/// `samples`: the steady window, its zero line taken off; `samples_per_revolution` is not a whole number in general and
+/// `samples`: the steady window, its baseline taken off; `samples_per_revolution` is not a whole number in general and
 /// the last revolution may end within a sample. `None` where there are less than two revolutions,
 /// which tell no scatter.
 pub fn order_spectrum(

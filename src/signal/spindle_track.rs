@@ -3,7 +3,7 @@
 //!
 //! Each turn of the stated speed is demodulated at the line (as in Vold & Leuridan 1993, with a window of one turn); the phase
 //! of all channels together, from turn to turn, is unwrapped. The profile of maximum likelihood is then found among cosines
-//! over the window (Ahmed, Natarajan & Rao 1974) beside a constant and a linear change of speed, as many as Schwarz's criterion
+//! over the window (Ahmed, Natarajan & Rao 1974) next to a constant and a linear change of speed, as many as Schwarz's criterion
 //! (1978) pays for; white noise of the phase makes that least squares.
 
 use std::f64::consts::{PI, TAU};
@@ -21,12 +21,15 @@ pub struct SpindleTrack {
     pub order: usize,
     /// Speed over the stated one less 1, mean over the window, with its standard error.
     pub offset: f64,
+    /// Standard error of `offset`.
     pub offset_std: f64,
     /// Change of the speed from the window's start to its end, over the stated speed (the linear part).
     pub droop: f64,
+    /// Standard error of `droop`.
     pub droop_std: f64,
     /// Standard deviation of the rest of the speed's changes, over the stated speed.
     pub wander: f64,
+    /// Standard error of `wander`.
     pub wander_std: f64,
     /// Root mean square by which the tool is early or late against the stated speed, rad of its turn.
     pub smear_rad: f64,
@@ -47,15 +50,15 @@ const TURNS_PER_COSINE: usize = 5;
 const MOST_COSINES: usize = 24;
 /// Share of the line's power that must be in step along the track for it to be believed: less is chatter, noise or no line.
 const LEAST_IN_STEP: f64 = 0.8;
-/// Speeds further off than this are told by the spectrum as a wrong speed or a wrong number of teeth, and nothing is removed.
+/// Speeds further off than this show in the spectrum as a wrong speed or a wrong number of teeth, and nothing is removed.
 const FURTHEST: f64 = 0.03;
-/// Smear of the followed line, rad of its own phase (rms), from which on it is told: at 0.15 the line's average loses 1 %.
+/// Smear of the followed line, rad of its own phase (rms), from which on it is reported: at 0.15 the line's average loses 1 %.
 const WORTH_TELLING: f64 = 0.15;
-/// Standard deviations that a part of the profile must stand above nothing to be told.
+/// Standard deviations that a part of the profile must exceed zero by to be reported.
 const SIGMAS: f64 = 5.0;
 
-/// Follows the spindle over `window` of `channels` (zero lines need not be taken off). `None` where nothing is wrong that could
-/// be told: too few turns, no line that is in step, or one that keeps the stated speed as closely as matters.
+/// Follows the spindle over `window` of `channels` (baselines need not be taken off). `None` where nothing can be
+/// found wrong: too few turns, no line that is in step, or one that keeps the stated speed as closely as matters.
 pub fn spindle_track(
     channels: &[&[f64]],
     window: &Range<usize>,

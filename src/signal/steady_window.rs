@@ -8,21 +8,24 @@
 use std::ops::Range;
 
 use super::air_check::air_in;
-use super::blocks::{Blocks, line, median, quantile, robust_std};
+use super::blocks::{SignalBlocks, line, median, quantile, robust_std};
 use super::drift::Air;
-use super::end_states::{air_states, departure};
+use super::end_states::{MIN_STATE_BLOCKS, air_states, departure};
 use super::engagement::{full_engagement, loudness};
 
 /// What turns, and how the record is sampled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spindle {
+    /// At the stated speed; not a whole number in general.
     pub samples_per_revolution: f64,
+    /// Number of teeth (lips).
     pub teeth: usize,
 }
 
 /// The parts of a record, as sample ranges.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Phases {
+    /// Where the tool cuts nothing.
     pub air: Air,
     /// First contact to last.
     pub cutting: Range<usize>,
@@ -30,8 +33,6 @@ pub struct Phases {
     pub steady: Range<usize>,
 }
 
-/// Too few blocks for a state to be told from noise.
-pub(super) const MIN_STATE_BLOCKS: usize = 4;
 /// More blocks than this are merged: finer ones would make a drill's slow entry too gentle to notice.
 const MAX_BLOCKS: f64 = 250.0;
 /// Turns of a clip are alike where their force fluctuates by the same, up to this part of it.
@@ -42,9 +43,9 @@ const ALIKE: f64 = 0.15;
 pub fn find_phases(channels: &[&[f64]], spindle: Spindle, entry_samples: Option<f64>) -> Option<Phases> {
     let samples = channels.iter().map(|c| c.len()).min()?;
     let per_block = block_length(samples, spindle)?;
-    let blocks: Vec<Blocks> = channels
+    let blocks: Vec<SignalBlocks> = channels
         .iter()
-        .map(|c| Blocks::new(&c[..samples], per_block))
+        .map(|c| SignalBlocks::new(&c[..samples], per_block))
         .collect();
     let count = blocks.first()?.len();
     let whole = |span: Range<f64>| {
@@ -52,7 +53,7 @@ pub fn find_phases(channels: &[&[f64]], spindle: Spindle, entry_samples: Option<
         (!steady.is_empty()).then_some(steady)
     };
     if count < 2 * MIN_STATE_BLOCKS {
-        // Too short for air beside a cut: a clip out of a cut.
+        // Too short for air next to a cut: a clip out of a cut.
         return Some(Phases {
             air: Air::default(),
             cutting: 0..samples,
@@ -160,11 +161,11 @@ fn block_length(samples: usize, spindle: Spindle) -> Option<f64> {
 }
 
 /// Grows the steady part from the central blocks of the cut outwards.
-fn steady_blocks(blocks: &[Blocks], cut: Range<usize>) -> Range<usize> {
+fn steady_blocks(blocks: &[SignalBlocks], cut: Range<usize>) -> Range<usize> {
     let length = cut.len();
     let core = cut.start + 3 * length / 10..(cut.end - 3 * length / 10).max(cut.start + 3 * length / 10 + 1);
     struct Core<'a> {
-        blocks: &'a Blocks,
+        blocks: &'a SignalBlocks,
         line: (f64, f64, f64),
         mean_tolerance: f64,
         std_dev: f64,

@@ -22,7 +22,7 @@ pub struct ToothLine {
 impl ToothLine {
     /// A clear line exists, and none of the spindle's own multiples rises from the noise and the skirts of that
     /// line. (Chatter, too, is a
-    /// clear line off the comb, but beside it.)
+    /// clear line off the comb, but next to it.)
     pub fn speed_is_doubtful(&self) -> bool {
         self.strongest_to_noise > 30.0 && self.nominal_to_noise < (0.03 * self.strongest_to_noise).max(8.0)
     }

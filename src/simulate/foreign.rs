@@ -6,7 +6,7 @@
 use nalgebra::{DMatrix, Point3, Vector3, Vector6};
 
 use super::draw::{Draws, Purpose};
-use crate::campaign::robot_spec::RobotSpec;
+use crate::data::RobotSpec;
 use crate::effects::{Background, ChannelFilter, DataSummary, Instance, Setting, Site, StructuralEffect};
 use crate::parameter::{Parameter, Scale};
 use crate::robot::{Branch, Chain, Dual, Element, Place, Role, Slot};

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::campaign::robot_spec::RobotSpec;
+use crate::data::RobotSpec;
 use crate::{Error, InputError, Result};
 
 pub mod departure;

@@ -2,8 +2,8 @@
 
 use super::draw::Draws;
 use super::{foreign, magnitude};
-use crate::campaign::robot_spec::RobotSpec;
 use crate::campaign::suggest::closest;
+use crate::data::RobotSpec;
 use crate::effects::{self, DataSummary, Instance, STRUCTURAL, Size};
 use crate::parameter::Parameter;
 use crate::{InputError, Result};

@@ -3,7 +3,7 @@
 use super::cutting_tables::{
     ACETAL_NAME, CAST, CoefficientRow, CuttingTables, Difference, PRINTED, TableTrend,
 };
-use crate::cutting::{MILLING_COEFFICIENTS, Reading};
+use crate::cutting::{ChangeReading, MILLING_COEFFICIENTS};
 
 /// A paired difference less likely than this by chance is called one, after Bonferroni over the six coefficients.
 const FALSE_ALARM: f64 = 0.05;
@@ -217,7 +217,7 @@ impl CuttingTables {
         let speed_found = self
             .trends
             .iter()
-            .any(|t| t.speeds == "all" && matches!(t.reading, Reading::Rises | Reading::Falls));
+            .any(|t| t.speeds == "all" && matches!(t.reading, ChangeReading::Rises | ChangeReading::Falls));
         format!(
             "If the records existed, `lobestone diagnose` would test: nonlinear-drift, dynamometer-misalignment and crosstalk \
              (negative axial and edge coefficients); dynamometer-resonance and chatter (teeth pass at {} in the fast cuts of acetal, \

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::rows;
-use crate::cutting::{Change, Known, MILLING_COEFFICIENTS, Reading, table_trend};
+use crate::cutting::{ChangeReading, CoefficientChange, Known, MILLING_COEFFICIENTS, table_trend};
 use crate::{Error, Result};
 
 const ACETAL: &str = include_str!("../../datasets/irb6640/cfc_acetal_milling.csv");
@@ -64,7 +64,7 @@ pub struct TableTrend {
     pub value: Option<Known>,
     pub per_doubling: Option<Known>,
     pub p_value: Option<f64>,
-    pub reading: Reading,
+    pub reading: ChangeReading,
 }
 
 /// Printed less cast titanium, pair by pair at the same speed.
@@ -270,7 +270,7 @@ fn trends(table: &[CoefficientRow], material: &str) -> Vec<TableTrend> {
                 .iter()
                 .map(|r| (r.cutting_speed_m_per_min, r.coefficients[j]))
                 .collect();
-            let Some(Change {
+            let Some(CoefficientChange {
                 reference,
                 change,
                 p_value,

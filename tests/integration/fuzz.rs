@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use lobestone::campaign::Campaign;
-use lobestone::campaign::robot_spec::RobotSpec;
+use lobestone::data::RobotSpec;
 use lobestone::ingest::{self, Contents};
 use lobestone::revision::{RevisionLog, log_file};
 

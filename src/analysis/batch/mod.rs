@@ -11,8 +11,9 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 
 use super::{CuttingAnalysis, CuttingFindings, DiagnosisFindings, StructureAnalysis};
+use crate::analysis::force_records::identify_forces;
 use crate::campaign::{Campaign, campaign_file};
-use crate::cutting::{CfcOptions, Group, identify_forces};
+use crate::cutting::{CfcOptions, ForceGroup};
 use crate::discrepancy::setup::{SetupCheck, SetupFinding};
 use crate::discrepancy::{Diagnosis, DiagnosisVerdict};
 use crate::identify::structure_study::held_out_postures;
@@ -340,7 +341,7 @@ fn with_unit(name: &str, unit: &str) -> String {
 
 /// The coefficients of a group over all speeds. Their names say process and material, so that those of different ones are
 /// never on one chart: `milling.Ti-6Al-4V.ktc_n_per_mm2`.
-fn coefficients(group: &Group) -> Vec<Quantity> {
+fn coefficients(group: &ForceGroup) -> Vec<Quantity> {
     let process = group.process.name();
     let prefix = match &group.material {
         Some(material) => format!("{process}.{material}."),

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use super::Answers;
+use super::answers::Answers;
+use super::found::{Scan, stem};
 use super::list_columns::{Column, DIAMETER, DIRECTION, NUMBER, TEETH, column, english, is_down, plain};
-use super::scan::{Scan, stem};
 use super::tables::cut_ids;
 use crate::campaign::load::CUT;
 use crate::campaign::suggest::{closest, shown};

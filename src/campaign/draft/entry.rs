@@ -217,6 +217,18 @@ fn toml_number(number: f64) -> String {
     format!("{number:?}")
 }
 
+/// A section of the file to be.
+#[derive(Debug, Clone)]
+pub struct DraftTable {
+    /// `cut`, `posture`, …
+    pub kind: &'static str,
+    /// Which of them; empty where there is one.
+    pub name: String,
+    /// Stands in double brackets.
+    pub repeated: bool,
+    pub entries: Vec<Entry>,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

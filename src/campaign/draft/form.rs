@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-use super::{Draft, Kind};
+use super::campaign_draft::Draft;
+use super::entry::{DraftTable, Entry, Kind};
 
 /// A table of the file to be.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -32,7 +33,7 @@ pub struct Field {
 impl Draft {
     /// In the order of the file.
     pub fn forms(&self) -> Vec<Form> {
-        let form = |table: &super::Table| Form {
+        let form = |table: &DraftTable| Form {
             kind: table.kind,
             name: table.name.clone(),
             fields: table.entries.iter().map(field).collect(),
@@ -41,7 +42,7 @@ impl Draft {
     }
 }
 
-fn field(entry: &super::Entry) -> Field {
+fn field(entry: &Entry) -> Field {
     Field {
         key: entry.key,
         what: entry.what,

@@ -1,48 +1,18 @@
 //! What lies in a folder: every file read as `inspect` reads it.
 
-use std::collections::{BTreeMap, BTreeSet};
+use crate::data::{ChannelRole, Quantity, RobotSpec};
+use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
 use super::cut_list;
+use super::found::{FoundForce, FoundFrf, Scan, stem};
 use super::names::{Facts, facts_of, facts_of_header, posture_of};
 use crate::campaign::campaign_file;
-use crate::campaign::robot_spec::RobotSpec;
-use crate::ingest::{ChannelRole, Quantity, survey};
+use crate::ingest::survey;
 use crate::{Error, InputError, Result};
-
-/// A folder's measurement files, in the order of their paths (from the folder, with forward slashes).
-#[derive(Debug, Default, Clone)]
-pub struct Scan {
-    pub frfs: Vec<FoundFrf>,
-    pub forces: Vec<FoundForce>,
-    pub robots: Vec<String>,
-    /// Tables that look like lists of cuts.
-    pub cut_lists: Vec<PathBuf>,
-    /// Path, and why it goes into no campaign.
-    pub not_used: Vec<(String, String)>,
-}
-
-#[derive(Debug, Clone)]
-pub struct FoundFrf {
-    pub path: String,
-    pub posture: String,
-    /// How the posture was concluded, where that is a guess.
-    pub posture_guess: Option<&'static str>,
-    /// `None` where the file does not say for every FRF.
-    pub quantity: Option<Quantity>,
-    pub nodes: BTreeSet<i64>,
-    pub facts: Facts,
-}
-
-#[derive(Debug, Clone)]
-pub struct FoundForce {
-    pub path: String,
-    pub from_name: Facts,
-    pub from_header: Facts,
-}
 
 /// Files looked at.
 const MOST_FILES: usize = 5000;
@@ -303,12 +273,6 @@ fn look(name: String, file: &Path) -> Seen {
         }
     };
     Seen::NotUsed(name, why)
-}
-
-/// Name without folders and ending.
-pub(super) fn stem(path: &str) -> &str {
-    let file = path.rsplit('/').next().unwrap_or(path);
-    file.rsplit_once('.').map_or(file, |(stem, _)| stem)
 }
 
 fn header(file: &Path) -> Facts {

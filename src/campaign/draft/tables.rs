@@ -1,20 +1,20 @@
 //! The sections of a first campaign file.
 
+use crate::data::Quantity;
 use std::collections::BTreeSet;
 
-use super::entry::{Entry, Kind};
+use super::answers::Answers;
+use super::entry::{DraftTable, Entry, Kind};
+use super::found::{FoundForce, FoundFrf, Scan, stem};
 use super::list_columns::{CUTTING_SPEED, DIAMETER, DIRECTION, FEED_PER_TURN, FEED_RATE, RADIAL_DEPTH};
 use super::names::FROM_NAME;
-use super::scan::stem;
-use super::{Answers, FoundForce, FoundFrf, Scan, Table};
-use crate::ingest::Quantity;
 use crate::{InputError, Result};
 
 const PROCESSES: &[&str] = &["milling", "drilling", "turning"];
 const FROM_HEADER: &str = "from the file's header";
 
 /// The sections in the order in which they stand in the file.
-pub fn of(scan: &Scan, answers: &Answers) -> Result<Vec<Table>> {
+pub fn of(scan: &Scan, answers: &Answers) -> Result<Vec<DraftTable>> {
     let mut tables = Vec::new();
     if scan.frfs.is_empty() && answers.get("robot", "", "model").is_some() {
         // A robot before anything was measured.
@@ -39,14 +39,14 @@ pub fn of(scan: &Scan, answers: &Answers) -> Result<Vec<Table>> {
 /// A table in the making.
 struct Making<'a> {
     answers: &'a Answers,
-    table: Table,
+    table: DraftTable,
 }
 
 impl<'a> Making<'a> {
     fn new(answers: &'a Answers, kind: &'static str, name: &str, repeated: bool) -> Self {
         Making {
             answers,
-            table: Table {
+            table: DraftTable {
                 kind,
                 name: name.to_string(),
                 repeated,
@@ -61,7 +61,7 @@ impl<'a> Making<'a> {
 
     /// Adds `entry` with the answer given for it, else what `guesses` (value, why) say, the first that is there.
     fn add(&mut self, mut entry: Entry, guesses: &[(Option<&str>, &str)]) -> Result<()> {
-        let Table { kind, name, .. } = &self.table;
+        let DraftTable { kind, name, .. } = &self.table;
         match self.answers.get(kind, name, entry.key) {
             Some(typed) => entry.give(typed).map_err(|problem| {
                 InputError::new(problem)
@@ -98,7 +98,7 @@ fn posture_of<'a>(frf: &'a FoundFrf, answers: &'a Answers) -> &'a str {
     said.filter(|id| !id.is_empty()).unwrap_or(&frf.posture)
 }
 
-fn robot(scan: &Scan, answers: &Answers) -> Result<Table> {
+fn robot(scan: &Scan, answers: &Answers) -> Result<DraftTable> {
     let mut making = Making::single(answers, "robot");
     making.add(
         Entry::new(
@@ -112,7 +112,7 @@ fn robot(scan: &Scan, answers: &Answers) -> Result<Table> {
     Ok(making.table)
 }
 
-fn points(scan: &Scan, answers: &Answers) -> Result<Vec<Table>> {
+fn points(scan: &Scan, answers: &Answers) -> Result<Vec<DraftTable>> {
     let nodes: BTreeSet<i64> = scan.frfs.iter().flat_map(|f| f.nodes.iter().copied()).collect();
     let only = nodes.len() == 1;
     let mut tables = Vec::new();
@@ -155,7 +155,7 @@ fn points(scan: &Scan, answers: &Answers) -> Result<Vec<Table>> {
     Ok(tables)
 }
 
-fn postures(scan: &Scan, answers: &Answers) -> Result<Vec<Table>> {
+fn postures(scan: &Scan, answers: &Answers) -> Result<Vec<DraftTable>> {
     let mut ids: Vec<&str> = Vec::new();
     for frf in &scan.frfs {
         let id = posture_of(frf, answers);
@@ -166,7 +166,7 @@ fn postures(scan: &Scan, answers: &Answers) -> Result<Vec<Table>> {
     named_postures(&ids, answers)
 }
 
-fn named_postures(ids: &[&str], answers: &Answers) -> Result<Vec<Table>> {
+fn named_postures(ids: &[&str], answers: &Answers) -> Result<Vec<DraftTable>> {
     let mut tables = Vec::new();
     for id in ids {
         let mut making = Making::new(answers, "posture", id, true);
@@ -185,7 +185,7 @@ fn named_postures(ids: &[&str], answers: &Answers) -> Result<Vec<Table>> {
     Ok(tables)
 }
 
-fn frfs(scan: &Scan, answers: &Answers) -> Result<Vec<Table>> {
+fn frfs(scan: &Scan, answers: &Answers) -> Result<Vec<DraftTable>> {
     let mut tables = Vec::new();
     for frf in &scan.frfs {
         let mut making = Making::new(answers, "frf", &frf.path, true);
@@ -219,7 +219,7 @@ fn frfs(scan: &Scan, answers: &Answers) -> Result<Vec<Table>> {
     Ok(tables)
 }
 
-fn tool(cuts: &[(Option<String>, Table)], answers: &Answers) -> Result<Table> {
+fn tool(cuts: &[(Option<String>, DraftTable)], answers: &Answers) -> Result<DraftTable> {
     let processes: BTreeSet<&str> = cuts.iter().filter_map(|(p, _)| p.as_deref()).collect();
     let drill = processes.contains("drilling") && processes.len() == 1;
     let turning = processes.contains("turning") && processes.len() == 1;
@@ -274,7 +274,7 @@ fn tool(cuts: &[(Option<String>, Table)], answers: &Answers) -> Result<Table> {
     Ok(making.table)
 }
 
-fn dynamometer(answers: &Answers) -> Result<Table> {
+fn dynamometer(answers: &Answers) -> Result<DraftTable> {
     let mut making = Making::single(answers, "dynamometer");
     making.add(
         Entry::new(
@@ -320,7 +320,7 @@ pub(super) fn cut_ids(forces: &[FoundForce]) -> Vec<String> {
 }
 
 /// Each cut's process, where it is known, and its section.
-fn cuts(scan: &Scan, answers: &Answers) -> Result<Vec<(Option<String>, Table)>> {
+fn cuts(scan: &Scan, answers: &Answers) -> Result<Vec<(Option<String>, DraftTable)>> {
     let mut out = Vec::new();
     for (force, id) in scan.forces.iter().zip(cut_ids(&scan.forces)) {
         let mut making = Making::new(answers, "cut", &id, true);

@@ -1,13 +1,15 @@
-//! Drilling: thrust and torque while the drill enters and bores, averaged over stretches of time (drilling.md).
+//! Drilling: thrust and torque while the drill enters and bores, averaged over stretches of time (docs/physics.md, "Cutting forces").
 
-use crate::campaign::{CutGeometry, Tool};
 use crate::cutting::DrillGeometry;
+use crate::data::{CutGeometry, Tool};
 use crate::{Error, Result};
 
 /// What a drilled hole's forces depend on besides its coefficients.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DrillingCut {
+    /// What of the drill cuts.
     pub geometry: DrillGeometry,
+    /// Speed of the drill into the hole.
     pub feed_mm_per_s: f64,
     /// Drilled into the full: the chisel cuts too.
     pub full_hole: bool,
@@ -109,7 +111,7 @@ mod tests {
     use super::*;
 
     fn hole(pilot_diameter_mm: f64) -> DrillingCut {
-        let tool = crate::cutting::test_drill();
+        let tool = crate::cutting::made_tools::drill();
         let geometry = CutGeometry::Drilling {
             feed_per_rev_mm: 0.2,
             pilot_diameter_mm,

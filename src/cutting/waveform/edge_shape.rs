@@ -13,7 +13,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::quadrature::gauss_legendre;
-use crate::campaign::{Immersion, Tool};
+use crate::data::{Immersion, Tool};
 
 /// The outline of an edge: a corner that begins at κ = 0, then a straight edge at the lead angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,7 +37,7 @@ pub(super) struct EdgeSlice {
     pub depth_mm: f64,
     pub sin_kappa: f64,
     pub cos_kappa: f64,
-    /// Where it cuts; `None` where the slice stands beside the workpiece.
+    /// Where it cuts; `None` where the slice misses the workpiece.
     pub immersion: Option<Immersion>,
 }
 
@@ -125,22 +125,9 @@ impl EdgeShape {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use super::*;
-    use crate::campaign::ToolKind;
-
-    pub fn tool(corner_radius_mm: f64, lead_angle_deg: f64) -> Tool {
-        Tool {
-            kind: ToolKind::Endmill,
-            diameter_mm: 12.0,
-            teeth: 2,
-            helix_deg: 30.0,
-            corner_radius_mm,
-            lead_angle_deg,
-            half_point_angle_deg: None,
-            web_thickness_mm: None,
-        }
-    }
+    use crate::cutting::made_tools::endmill as tool;
 
     fn sum(slices: &[EdgeSlice], of: impl Fn(&EdgeSlice) -> f64) -> f64 {
         slices.iter().map(of).sum()

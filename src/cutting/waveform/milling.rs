@@ -1,7 +1,7 @@
 //! Milling: Fourier coefficients of the tool-frame forces over the orders of the tool's rotation.
 //!
 //! Tooth j stands at φ = θ + 2πj/N − ψz where θ is the tool's rotation and z ∈ [0, 1] runs up the engaged depth, ψ being
-//! the lag of the helix over it (physics.md §4; Altintas, Manufacturing Automation, 2nd ed., §2.3–2.5).
+//! the lag of the helix over it (docs/physics.md, "Cutting forces"; Altintas, Manufacturing Automation, 2nd ed., §2.3–2.5).
 
 use std::f64::consts::TAU;
 
@@ -11,7 +11,7 @@ use num_complex::Complex64;
 
 use super::edge_shape::EdgeShape;
 use super::quadrature::gauss_legendre;
-use crate::campaign::{CutGeometry, Immersion, Tool};
+use crate::data::{CutGeometry, Immersion, Tool};
 
 /// Ktc Krc Kac Kte Kre Kae.
 pub const UNIT_COUNT: usize = 6;
@@ -19,9 +19,13 @@ pub const UNIT_COUNT: usize = 6;
 /// What a milling cut's waveform depends on besides its coefficients.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MillingCut {
+    /// Number of teeth, evenly spaced.
     pub teeth: usize,
+    /// Feed per tooth, mm.
     pub feed_per_tooth_mm: f64,
+    /// Depth of cut along the tool axis, mm.
     pub axial_depth_mm: f64,
+    /// Angles between which a tooth is in the work, at the tool's full diameter.
     pub immersion: Immersion,
     /// Angle by which the top of the engaged depth lags behind the tip, rad: 2 a tan β / D.
     pub lag_rad: f64,
@@ -49,6 +53,7 @@ pub type UnitForces = [[Vec<Complex64>; 3]; UNIT_COUNT];
 /// [`UnitForces`] with derivatives with respect to the chip law.
 #[derive(Debug, Clone)]
 pub struct SampledForces {
+    /// The forces themselves.
     pub unit: UnitForces,
     /// By the exponent, the offset (per mm) and its direction (per rad); `None` where the law does not have them or
     /// no derivatives were asked for.
@@ -705,7 +710,7 @@ mod tests {
         for (corner_radius_mm, lead_angle_deg, start_deg) in
             [(6.0, 90.0, 0.0), (6.0, 90.0, 110.0), (1.0, 60.0, 0.0)]
         {
-            let tool = crate::cutting::waveform::edge_shape::tests::tool(corner_radius_mm, lead_angle_deg);
+            let tool = crate::cutting::made_tools::endmill(corner_radius_mm, lead_angle_deg);
             let (depth, feed) = (2.5, 0.12);
             let immersion = Immersion {
                 start_rad: f64::to_radians(start_deg),

@@ -3,7 +3,7 @@
 //! The chip becomes h + w cos ψ with w = Δx sin φ + Δy cos φ and ψ the vibration's phase, which wanders through all values
 //! since its frequency is none of the tool's orders. Averaged over ψ it gives the orders of rotation: where |w| > h the
 //! tooth leaves the cut for a while, so they change too. The part in step with cos ψ gives the lines at the vibration's
-//! frequency and beside it; where the tooth stays in the cut that is the directional matrix of the lobe theory with its
+//! frequency and its side bands; where the tooth stays in the cut that is the directional matrix of the lobe theory with its
 //! harmonics (Altintas & Budak 1995).
 
 use std::f64::consts::{PI, TAU};
@@ -19,6 +19,7 @@ pub type LineForces = [[Complex64; 3]; UNIT_COUNT];
 /// Forces with derivatives.
 #[derive(Debug, Clone)]
 pub struct VibratingForces {
+    /// On the orders of the tool's rotation.
     pub unit: UnitForces,
     /// By the size exponent, Δx and Δy (per mm).
     pub slopes: Box<[UnitForces; 3]>,
@@ -186,7 +187,7 @@ fn contributions(feed_mm: f64, exponent: Option<f64>, [dx, dy]: [f64; 2], phi: f
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::Immersion;
+    use crate::data::Immersion;
 
     fn slot() -> MillingCut {
         MillingCut {
@@ -203,7 +204,7 @@ mod tests {
     fn a_small_vibration_gives_the_zero_order_directional_matrix() {
         let small = 1e-6;
         // Σ over the teeth of a slot without helix, N/2π · α with αxx = −πKr, αxy = −π, αyx = π, αyy = −πKr, halved
-        // (Altintas's factor ½ is taken out): references.md, D.
+        // (Altintas's factor ½ is taken out): docs/physics.md, "Reference cases", D.
         for (direction, want) in [
             ([small, 0.0], [0.0, 1.5 / 2.0, -1.5 / 2.0]),
             ([0.0, small], [-1.5 / 2.0, 0.0, 0.0]),

@@ -5,10 +5,9 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
-use crate::campaign::{AxesRef, BodyRef, MeasuredDof, Point, RobotSection};
+use crate::data::{AxesRef, Axis, BodyRef, MeasuredDof, Point, RobotSection};
 use crate::identify::frf_data::{FrfBlock, FrfDatum};
 use crate::identify::{FrfData, Options};
-use crate::ingest::Axis;
 use crate::robot::RobotModel;
 use crate::robot::fixture::{TAP_POSTURES, irb6640};
 

@@ -14,7 +14,7 @@ use super::examine::SetupCheck;
 use super::finding::{SetupFinding, with_error};
 use super::readings::Turn;
 use crate::Result;
-use crate::campaign::Process;
+use crate::data::Process;
 use crate::identify::cutting_study::{NOISE_KNOWN_TO, calibrate_cutting, small_errors};
 use crate::identify::{Calibration, CuttingData, CuttingModel};
 

@@ -1,8 +1,7 @@
 //! Which FRFs a mistake concerns.
 
-use crate::campaign::Point;
+use crate::data::{Axis, Point};
 use crate::identify::frf_data::{FrfData, FrfDatum};
-use crate::ingest::Axis;
 
 /// A selection of FRFs: those for which every given part agrees.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -5,9 +5,8 @@ use num_complex::Complex64;
 use super::finding::SetupFinding;
 use super::group::FrfGroup;
 use super::truth::Truth;
-use crate::campaign::Point;
+use crate::data::{Axis, Point};
 use crate::identify::frf_data::{FrfData, FrfDatum};
-use crate::ingest::Axis;
 use crate::robot::Kinematics;
 
 /// One quantity of a mistake; zero means that nothing is wrong.

@@ -1,7 +1,7 @@
 //! A mistake without a size: the data are read another way.
 
 use super::finding::SetupFinding;
-use crate::campaign::Point;
+use crate::data::Point;
 use crate::identify::StructureModel;
 use crate::identify::frf_data::FrfData;
 

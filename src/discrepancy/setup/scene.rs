@@ -7,9 +7,9 @@ use super::group::FrfGroup;
 use super::mistake::Distortion;
 use super::truth::Truth;
 use crate::Result;
+use crate::data::Axis;
 use crate::identify::StructureModel;
 use crate::identify::frf_data::{FrfBlock, FrfData};
-use crate::ingest::Axis;
 use crate::robot::FrfBasis;
 use crate::robot::frf::Response;
 

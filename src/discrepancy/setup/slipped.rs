@@ -5,8 +5,8 @@ use num_complex::Complex64;
 use super::group::FrfGroup;
 use super::mistake::{Distortion, turned_axis};
 use super::truth::Truth;
+use crate::data::Axis;
 use crate::identify::frf_data::FrfDatum;
-use crate::ingest::Axis;
 use crate::robot::Kinematics;
 
 /// One sort of error, one number of it.

@@ -17,10 +17,10 @@ use super::mistakes::{channel_gain, encoder_offset, hit_direction, sensor_high_p
 use super::scene::{Made, predict};
 use super::slipped::{Slipped, SmallError};
 use crate::Result;
+use crate::data::Axis;
 use crate::identify::StructureModel;
 use crate::identify::frf_data::{FrfBlock, FrfData};
 use crate::identify::rest::{AfterSlips, RestCurve};
-use crate::ingest::Axis;
 use crate::parameter::Scale;
 
 /// Standard deviations of what a careful setup is wrong by: angles of the joints and of the sensors, direction of the hits

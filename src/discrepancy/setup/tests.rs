@@ -9,13 +9,12 @@ use rand_chacha::ChaCha8Rng;
 use super::mistakes;
 use super::scene::{Made, predict};
 use super::*;
-use crate::campaign::{AxesRef, BodyRef, MeasuredDof, Point, RobotSection};
+use crate::data::{AxesRef, Axis, BodyRef, MeasuredDof, Point, RobotSection};
 use crate::identify::StructureModel;
 use crate::identify::frf_data::{FrfBlock, FrfData, FrfDatum};
 use crate::identify::frf_problem::{FrfProblem, Misfit};
 use crate::identify::levenberg_marquardt::{Stopping, minimise};
 use crate::identify::{rest, rest_patterns};
-use crate::ingest::Axis;
 use crate::robot::RobotModel;
 use crate::robot::fixture::{TAP_POSTURES, irb6640};
 

@@ -2,9 +2,9 @@
 
 use num_complex::Complex64;
 
+use crate::data::Axis;
 use crate::effects::ChannelFilter;
 use crate::identify::frf_data::FrfDatum;
-use crate::ingest::Axis;
 use crate::robot::FrfBasis;
 use crate::robot::frf::Response;
 

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::campaign::Process;
+use crate::data::Process;
 use crate::effects::{Background, Size};
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::Dual;

@@ -1,5 +1,5 @@
 use super::effect::{CutPhysics, CutSetting, CuttingEffect, CuttingSummary, NEGLIGIBLE, logarithmic};
-use crate::campaign::Process;
+use crate::data::Process;
 use crate::effects::Background;
 use crate::effects::background::GAUTSCHI;
 use crate::parameter::Parameter;

@@ -1,5 +1,5 @@
 use super::effect::{CutPhysics, CutSetting, CuttingEffect, CuttingSummary, linear, straight_edge_only};
-use crate::campaign::Process;
+use crate::data::Process;
 use crate::effects::background::ALTINTAS;
 use crate::effects::{Background, Size};
 use crate::parameter::Parameter;

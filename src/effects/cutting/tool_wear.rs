@@ -1,5 +1,5 @@
 use super::effect::{CutPhysics, CutSetting, CuttingEffect, CuttingSummary, linear};
-use crate::campaign::Process;
+use crate::data::Process;
 use crate::effects::{Background, Size};
 use crate::parameter::Parameter;
 use crate::robot::Dual;

@@ -1,11 +1,10 @@
 //! A table of resonances made from a model, for tests.
 
 use super::{Resonance, ResonanceReading, ResonanceStudy};
-use crate::campaign::RobotSection;
+use crate::data::{Axis, RobotSection};
 use crate::effects::DataSummary;
 use crate::identify::StructureModel;
 use crate::identify::posture_modes::{PostureMode, posture_modes};
-use crate::ingest::Axis;
 use crate::robot::fixture::{TAP_POSTURES, irb6640};
 use crate::robot::{Kinematics, RobotModel};
 

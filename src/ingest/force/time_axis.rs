@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use super::super::InputError;
 use super::super::clock::{self, Grid, Stamps};
 use super::super::table::Header;
 use super::super::text::Notes;
+use crate::InputError;
 
 /// How the time column runs, decided from the first piece.
 #[derive(Debug, Clone, Copy)]

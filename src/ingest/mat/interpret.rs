@@ -8,11 +8,12 @@ use num_complex::Complex64;
 
 use super::super::budget::Budget;
 use super::super::clock::{self, Grid, Stamps};
+use super::super::contents::{Contents, OtherRecord};
 use super::super::text::Notes;
-use super::super::{
-    Contents, FrfRecord, InputError, OtherRecord, Quantity, TimeRecord, checks, dof_names, waveform,
-};
+use super::super::{checks, dof_names, waveform};
 use super::variable::{MIN_AXIS, Variable};
+use crate::InputError;
+use crate::data::{FrfRecord, Quantity, TimeRecord};
 
 /// Change of the step from which on times are not evenly spaced.
 const UNEVEN: f64 = 0.02;

@@ -2,8 +2,9 @@
 //! are FRFs, coherences and time signals.
 
 use super::budget::Budget;
+use super::contents::Contents;
 use super::text::Notes;
-use super::{Contents, InputError};
+use crate::InputError;
 
 mod hdf5;
 mod interpret;

@@ -10,10 +10,10 @@ mod tests;
 
 use std::io::Read;
 
-use super::super::InputError;
 use super::super::budget::Budget;
 use super::super::text::{Notes, decode};
 use super::Variable;
+use crate::InputError;
 
 const HEADER: usize = 128;
 const MATRIX: u32 = 14;

@@ -1,9 +1,9 @@
 //! The binary ordinates of dataset 58b.
 
-use super::super::InputError;
 use super::super::text::{Lines, Notes};
-use super::dataset58::{Form, too_short};
-use super::is_separator;
+use super::ordinate_form::{OrdinateForm, too_short};
+use super::separator::is_separator;
+use crate::InputError;
 
 /// The number line of a 58b: `FORMAT(I6,1A1,I6,I6,I12,I12,…)`.
 #[derive(Debug, Clone, Copy)]
@@ -56,7 +56,7 @@ fn vintage(name: &str) -> InputError {
 /// Numbers of a binary dataset; moves `lines` behind its closing separator.
 pub(super) fn read_binary(
     lines: &mut Lines,
-    form: Form,
+    form: OrdinateForm,
     announced: usize,
     header: BinaryHeader,
     title: &str,

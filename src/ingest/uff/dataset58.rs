@@ -2,11 +2,12 @@
 
 use num_complex::Complex64;
 
-use super::super::InputError;
 use super::super::number;
 use super::super::text::{Lines, Notes, decode};
 use super::binary::{BinaryHeader, read_binary};
-use super::is_separator;
+use super::ordinate_form::{OrdinateForm, named, too_short};
+use super::separator::is_separator;
+use crate::InputError;
 
 /// One side of record 6: entity name, node number and direction (±1..3 translation, ±4..6 rotation, 0 scalar).
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -108,32 +109,6 @@ impl Dataset58 {
     }
 }
 
-/// Form of the ordinate, record 7: 2 real single, 4 real double, 5 complex single, 6 complex double.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Form {
-    pub complex: bool,
-    pub double: bool,
-    pub even: bool,
-}
-
-impl Form {
-    /// Column widths of one ASCII point, repeated over the line.
-    fn columns(self) -> Vec<usize> {
-        let value = if self.double { 20 } else { 13 };
-        let mut columns = if self.even { vec![] } else { vec![13] };
-        columns.resize(columns.len() + self.values(), value);
-        columns
-    }
-
-    pub fn values(self) -> usize {
-        1 + usize::from(self.complex)
-    }
-
-    pub fn numbers_per_point(self) -> usize {
-        self.values() + usize::from(!self.even)
-    }
-}
-
 /// Reads one dataset after its number line; `binary` is that line where it is a 58b. `None` where the file ends
 /// before the first value.
 pub(super) fn read(
@@ -217,29 +192,6 @@ pub(super) fn read(
 /// Function types whose abscissa is used: time response, FRF, coherence.
 const EVENLY_SPACED: [i32; 3] = [1, 4, 6];
 
-fn named(title: &str) -> &str {
-    if title.is_empty() {
-        "a record without name"
-    } else {
-        title
-    }
-}
-
-/// A record with fewer points than it announces: where they are missing is not known, so every later one may stand at a
-/// wrong frequency or time.
-pub(super) fn too_short(title: &str, found: usize, announced: usize, at_end: bool) -> InputError {
-    let why = if at_end {
-        "the file ends within its data"
-    } else {
-        "lines of it are lost"
-    };
-    InputError::new(format!(
-        "{}: dataset 58 announces {announced} points and holds {found}: {why}",
-        named(title)
-    ))
-    .remedy("export or copy the file again")
-}
-
 fn clip(text: &str) -> String {
     text.trim_end().chars().take(80).collect()
 }
@@ -288,7 +240,7 @@ fn record6(line: &str) -> Option<(i32, EntityDof, EntityDof)> {
 }
 
 /// `FORMAT(3I10,3E13.5)`: form, points, even or uneven, start, step.
-fn record7(line: &str) -> Result<(Form, usize, f64, f64), String> {
+fn record7(line: &str) -> Result<(OrdinateForm, usize, f64, f64), String> {
     let words: Vec<String> = line.split_whitespace().map(str::to_owned).collect();
     let read = |fields: &[String]| -> Option<(i64, i64, i64, f64, f64)> {
         let real = |at: usize| match fields.get(at).map(|f| f.trim()) {
@@ -322,7 +274,7 @@ fn record7(line: &str) -> Result<(Form, usize, f64, f64), String> {
         return Err("start or step is not a number".to_owned());
     }
     Ok((
-        Form {
+        OrdinateForm {
             complex,
             double,
             even,
@@ -360,7 +312,7 @@ fn unit_axis(line: &str) -> UnitAxis {
 /// Numbers of an ASCII dataset, up to its closing separator: at most the announced ones, whole points only.
 fn read_ascii(
     lines: &mut Lines,
-    form: Form,
+    form: OrdinateForm,
     announced: usize,
     title: &str,
     notes: &mut Notes,

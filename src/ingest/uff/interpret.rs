@@ -4,13 +4,33 @@ use num_complex::Complex64;
 
 use super::super::checks;
 use super::super::clock::{self, Stamps};
+use super::super::contents::{Contents, OtherRecord};
 use super::super::force::role_of;
 use super::super::text::Notes;
 use super::super::units::{self, Unit};
-use super::super::{
-    Axis, Channel, ChannelRole, Contents, Dof, FrfRecord, InputError, OtherRecord, Quantity, TimeRecord,
-};
-use super::{Dataset58, EntityDof, FileUnits, Found, Ordinate, UnitAxis};
+use super::dataset58::{Dataset58, EntityDof, Ordinate, UnitAxis};
+use crate::InputError;
+use crate::data::{Axis, Channel, ChannelRole, Dof, FrfRecord, Quantity, TimeRecord};
+
+/// Factors of dataset 164: values in the file divided by these are SI.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct FileUnits {
+    pub length: f64,
+    pub force: f64,
+}
+
+impl FileUnits {
+    fn is_si(self) -> bool {
+        (self.length - 1.0).abs() < 1e-6 && (self.force - 1.0).abs() < 1e-6
+    }
+}
+
+/// One dataset 58 with the units that were in force where it stood.
+#[derive(Debug)]
+pub(super) struct FoundDataset {
+    pub dataset: Dataset58,
+    pub units: Option<FileUnits>,
+}
 
 /// Function types of record 6.
 const FUNCTION_NAMES: [&str; 29] = [
@@ -57,10 +77,10 @@ const REACTION_FORCE: i32 = 9;
 const TIME: i32 = 17;
 const FREQUENCY: i32 = 18;
 
-pub(super) fn contents(found: Vec<Found>, notes: &mut Notes) -> Result<Contents, InputError> {
+pub(super) fn contents(found: Vec<FoundDataset>, notes: &mut Notes) -> Result<Contents, InputError> {
     let mut contents = Contents::default();
     let mut coherences = Vec::new();
-    for Found { dataset, units } in found {
+    for FoundDataset { dataset, units } in found {
         let abscissa = dataset.axes[0].kind;
         match dataset.function_type {
             FRF if matches!(abscissa, FREQUENCY | 0 | 1) => {

@@ -3,8 +3,9 @@
 use num_complex::Complex64;
 use proptest::prelude::*;
 
-use super::super::read_bytes;
+use super::super::decode::read_bytes;
 use super::super::text::Notes;
+use super::datasets::read;
 use super::*;
 
 /// A value as the file can hold it: `digits` after the point in ASCII, single or double in binary.

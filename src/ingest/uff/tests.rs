@@ -2,9 +2,11 @@
 
 use num_complex::Complex64;
 
+use super::super::contents::Contents;
+use super::super::decode::read_bytes;
 use super::super::text::Notes;
-use super::super::{Channel, ChannelRole, Contents, Dof, FrfRecord, Quantity, TimeRecord, read_bytes};
 use super::*;
+use crate::data::{Channel, ChannelRole, Dof, FrfRecord, Quantity, TimeRecord};
 
 /// Header of a dataset 58; `axes` are data type, label and unit of abscissa, numerator, denominator.
 fn header(record6: &str, record7: &str, axes: [(i32, &str, &str); 3]) -> String {

@@ -5,8 +5,8 @@ use std::io::Write as _;
 use std::path::Path;
 
 use super::super::units;
-use super::super::{ChannelRole, Dof, FrfRecord, Quantity, TimeRecord};
-use super::{Abscissa, Dataset58, EntityDof, Ordinate, UnitAxis};
+use super::dataset58::{Abscissa, Dataset58, EntityDof, Ordinate, UnitAxis};
+use crate::data::{ChannelRole, Dof, FrfRecord, Quantity, TimeRecord};
 use crate::{Error, Result};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! Joint compliances where a file has none: orders of magnitude by payload class, and said to be that.
 
-use crate::campaign::robot_spec::RobotSpec;
+use crate::data::RobotSpec;
 
 /// Arms of one size.
 struct PayloadClass {

@@ -71,7 +71,7 @@ mod tests {
             let found = robot(text).unwrap();
             let folder = tempfile::tempdir().unwrap();
             std::fs::write(folder.path().join("arm.toml"), found.spec.to_toml(&found.notes)).unwrap();
-            let back = crate::campaign::robot_spec::RobotSpec::load("arm.toml", folder.path()).unwrap();
+            let back = crate::data::RobotSpec::load("arm.toml", folder.path()).unwrap();
             assert_eq!(
                 (&back.name, &back.guesses),
                 (&found.spec.name, &found.spec.guesses)

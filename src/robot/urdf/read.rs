@@ -8,7 +8,7 @@ use urdf_rs::{Joint, JointType, Link, Pose};
 use super::body::RigidBody;
 use super::guess;
 use super::tree::{Tree, kind, turns};
-use crate::campaign::robot_spec::{JointPlacement, JointSpec, LinkSpec, RobotSpec, ToolFrame};
+use crate::data::{JointPlacement, JointSpec, LinkSpec, RobotSpec, ToolFrame};
 use crate::robot::dh::{rotation_of_rpy, rpy_of_rotation};
 use crate::{InputError, Result};
 

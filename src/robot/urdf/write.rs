@@ -5,8 +5,8 @@ use std::fmt::Write;
 
 use nalgebra::Isometry3;
 
-use crate::campaign::robot_spec::{JointSpec, RobotSpec};
 use crate::campaign::robot_text::{quoted, to_degrees};
+use crate::data::{JointSpec, RobotSpec};
 use crate::robot::dh::{joint_transform, rpy_of_rotation};
 use crate::robot::{Kinematics, RobotModel};
 

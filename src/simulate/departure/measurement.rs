@@ -5,7 +5,7 @@ use num_complex::Complex64;
 use serde_json::{Map, Value, json};
 
 use super::{Channel, Departure, described, direction, pick_index, sign};
-use crate::campaign::robot_spec::RobotSpec;
+use crate::data::RobotSpec;
 use crate::ingest::Axis;
 use crate::simulate::draw::Draws;
 

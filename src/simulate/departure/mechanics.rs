@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Point3, Vector3, Vector6};
 use serde_json::{Map, Value, json};
 
 use super::{Departure, Matrices, Scene, described, direction, pick_index, sign};
-use crate::campaign::robot_spec::RobotSpec;
+use crate::data::RobotSpec;
 use crate::robot::{Body, Branch, Chain, Dual, Element, Place, Role, Slot};
 use crate::simulate::draw::Draws;
 

@@ -10,7 +10,7 @@ use num_complex::Complex64;
 use serde_json::{Map, Value};
 
 use super::draw::{Draws, Purpose};
-use crate::campaign::robot_spec::RobotSpec;
+use crate::data::RobotSpec;
 use crate::ingest::Axis;
 use crate::robot::{Chain, Element, Kinematics, RobotModel};
 

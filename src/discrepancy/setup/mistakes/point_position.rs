@@ -1,7 +1,7 @@
 use super::super::finding::{SetupFinding, with_error};
 use super::super::group::FrfGroup;
 use super::super::mistake::{Distortion, Estimated, Mistake, MistakeSize};
-use crate::campaign::{BodyRef, Point};
+use crate::data::{BodyRef, Point};
 use crate::identify::frf_data::FrfData;
 
 /// A measuring point sits elsewhere on its body, m along the body's axes.

@@ -4,8 +4,8 @@ use super::super::finding::{SetupFinding, with_error};
 use super::super::group::FrfGroup;
 use super::super::mistake::{Distortion, Estimated, Mistake, MistakeSize};
 use super::super::truth::Truth;
+use crate::data::Axis;
 use crate::identify::frf_data::{FrfData, FrfDatum};
-use crate::ingest::Axis;
 
 /// The sensor's channel loses low frequencies: (s/(s + value))^order, value = 2π × corner, 1/s.
 pub struct SensorHighPass {

@@ -13,7 +13,7 @@ pub struct TurnedSensor;
 impl Distortion for TurnedSensor {
     fn shown(&self, values: &[f64], _omega: f64, truth: &Truth, frf: &FrfDatum) -> Complex64 {
         let direction = turned_axis(frf.response.axis, values);
-        let terms = crate::ingest::Axis::ALL.into_iter().zip(direction);
+        let terms = crate::data::Axis::ALL.into_iter().zip(direction);
         terms
             .map(|(axis, part)| truth.between(axis, frf.reference.axis) * part)
             .sum()

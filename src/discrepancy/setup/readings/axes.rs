@@ -5,9 +5,8 @@ use super::super::group::FrfGroup;
 use super::super::reading::FileReading;
 use super::proposal::Proposed;
 use super::table::{DistanceTable, distance};
-use crate::campaign::Point;
+use crate::data::{Axis, Point};
 use crate::identify::frf_data::FrfData;
-use crate::ingest::Axis;
 
 /// Whose axes are misnamed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

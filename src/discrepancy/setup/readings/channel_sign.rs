@@ -5,7 +5,7 @@ use super::super::group::FrfGroup;
 use super::super::reading::FileReading;
 use super::proposal::Proposed;
 use super::table::{DistanceTable, distance};
-use crate::campaign::Point;
+use crate::data::Point;
 use crate::identify::frf_data::FrfData;
 
 /// A group of FRFs with the wrong sign: a sensor, a hammer or an amplifier of the other polarity.

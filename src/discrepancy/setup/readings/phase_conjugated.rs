@@ -5,7 +5,7 @@ use super::super::group::FrfGroup;
 use super::super::reading::FileReading;
 use super::proposal::Proposed;
 use super::table::{DistanceTable, distance};
-use crate::campaign::Point;
+use crate::data::Point;
 use crate::identify::frf_data::FrfData;
 
 /// Imaginary parts with the wrong sign: the other convention of the Fourier transform, or force over response phase.

@@ -4,7 +4,7 @@ use super::super::scene::predict;
 use super::proposal::Proposed;
 use super::table::{DistanceTable, distance};
 use crate::Result;
-use crate::campaign::{AxesRef, BodyRef, Point};
+use crate::data::{AxesRef, BodyRef, Point};
 use crate::identify::StructureModel;
 use crate::identify::frf_data::FrfData;
 

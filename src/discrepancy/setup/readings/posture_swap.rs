@@ -6,7 +6,7 @@ use super::super::scene::predict;
 use super::proposal::Proposed;
 use super::table::{DistanceTable, distance};
 use crate::Result;
-use crate::campaign::Point;
+use crate::data::Point;
 use crate::identify::StructureModel;
 use crate::identify::frf_data::FrfData;
 use crate::robot::Kinematics;

@@ -22,7 +22,7 @@ pub(super) struct Chunk {
 }
 
 /// The grid of chunks of a dataset.
-pub(super) struct Grid<'a> {
+pub(super) struct ChunkGrid<'a> {
     pub file: &'a [u8],
     pub widths: Widths,
     /// Elements along each dimension; the most there may be; elements of a chunk.
@@ -34,7 +34,7 @@ pub(super) struct Grid<'a> {
     pub filtered: bool,
 }
 
-impl Grid<'_> {
+impl ChunkGrid<'_> {
     /// Chunks within the dataset; more is damage.
     pub fn count(&self) -> Option<usize> {
         let along = self.size.iter().zip(self.chunk);
@@ -291,7 +291,7 @@ impl Grid<'_> {
 
 /// An extensible array while it is read.
 struct Array<'a> {
-    grid: &'a Grid<'a>,
+    grid: &'a ChunkGrid<'a>,
     width: usize,
     offset_bytes: usize,
     /// Elements of a page of a large data block.

@@ -1,6 +1,9 @@
 //! Bytes of an HDF5 file, read with bounds: every address and length in it is a claim.
 
-use super::super::super::InputError;
+use crate::InputError;
+
+/// Characters of a name.
+pub(super) const NAME: usize = 256;
 
 /// Why something was not read.
 #[derive(Debug)]

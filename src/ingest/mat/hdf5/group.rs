@@ -1,6 +1,6 @@
 //! What a group holds: old groups (B-tree, local heap), new ones with many links (fractal heap, B-tree of version 2).
 
-use super::cursor::{Cursor, Fault, Step, Widths, bytes_for, damaged};
+use super::cursor::{Cursor, Fault, NAME, Step, Widths, bytes_for, damaged};
 use super::header::{Object, heap_link};
 
 /// Nodes and blocks looked at; each takes room in the file, so a file that refers to itself runs out of them.
@@ -78,7 +78,7 @@ fn symbols(
             cursor.take(4 + 4 + 16)?;
             let name = names.get(name_at..).unwrap_or_default();
             let end = name.iter().position(|b| *b == 0).unwrap_or(name.len());
-            let name = super::super::super::text::decode(&name[..end.min(super::NAME)]);
+            let name = super::super::super::text::decode(&name[..end.min(NAME)]);
             links.extend(object.map(|o| (name, o)));
         }
         return Ok(());

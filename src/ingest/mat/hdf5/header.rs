@@ -1,6 +1,6 @@
 //! Object headers and their messages: what a group or a dataset is.
 
-use super::cursor::{Cursor, Fault, Step, Widths, damaged};
+use super::cursor::{Cursor, Fault, NAME, Step, Widths, damaged};
 
 /// Continuations of one header and messages in it: no real object comes near.
 const BLOCKS_AT_MOST: usize = 64;
@@ -252,7 +252,7 @@ impl Object {
 
 fn text(bytes: &[u8]) -> String {
     let end = bytes.iter().position(|b| *b == 0).unwrap_or(bytes.len());
-    super::super::super::text::decode(&bytes[..end.min(super::NAME)])
+    super::super::super::text::decode(&bytes[..end.min(NAME)])
 }
 
 /// Sizes (none for the empty dataspace) and largest sizes (none: without limit).

@@ -4,10 +4,10 @@
 //! kinds of groups, data layouts 3 and 4 with all their chunk indexes, the filters deflate, shuffle and Fletcher32;
 //! checksums of metadata are verified).
 
-use super::super::InputError;
 use super::super::budget::Budget;
 use super::super::text::Notes;
 use super::Variable;
+use crate::InputError;
 
 mod chunks;
 mod cursor;
@@ -16,16 +16,14 @@ mod header;
 #[cfg(test)]
 mod tests;
 
-use chunks::{Grid, unpacked};
-use cursor::{Cursor, Fault, Step, Widths, damaged};
+use chunks::{ChunkGrid, unpacked};
+use cursor::{Cursor, Fault, NAME, Step, Widths, damaged};
 use group::Visits;
 use header::{Layout, Object, Type};
 
 const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 /// Structs and cells are followed this deep.
 const DEPTH: usize = 16;
-/// Characters of a name.
-const NAME: usize = 256;
 
 /// Where the superblock begins: at the beginning, or behind the block of MATLAB.
 fn superblock_at(bytes: &[u8]) -> Option<usize> {
@@ -269,7 +267,7 @@ impl Walk<'_> {
         let Some(bytes) = bytes.filter(|b| *b > 0 && chunk.len() == dimensions.len()) else {
             return damaged("chunks of impossible size");
         };
-        let grid = Grid {
+        let grid = ChunkGrid {
             file: self.file,
             widths: self.widths,
             size: dimensions,

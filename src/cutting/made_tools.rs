@@ -1,0 +1,30 @@
+//! Tools for tests.
+
+use crate::data::{Tool, ToolKind};
+
+pub fn drill() -> Tool {
+    Tool {
+        kind: ToolKind::Drill,
+        diameter_mm: 9.5,
+        teeth: 2,
+        helix_deg: 30.0,
+        corner_radius_mm: 0.0,
+        lead_angle_deg: 90.0,
+        half_point_angle_deg: Some(67.5),
+        web_thickness_mm: Some(1.425),
+    }
+}
+
+/// Of 12 mm and two teeth.
+pub fn endmill(corner_radius_mm: f64, lead_angle_deg: f64) -> Tool {
+    Tool {
+        kind: ToolKind::Endmill,
+        diameter_mm: 12.0,
+        teeth: 2,
+        helix_deg: 30.0,
+        corner_radius_mm,
+        lead_angle_deg,
+        half_point_angle_deg: None,
+        web_thickness_mm: None,
+    }
+}

@@ -1,0 +1,121 @@
+//! What was cut.
+
+use std::path::PathBuf;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Process {
+    Milling,
+    Drilling,
+    Turning,
+}
+
+impl Process {
+    pub const ALL: [Process; 3] = [Process::Milling, Process::Drilling, Process::Turning];
+
+    /// As `campaign.toml` and people call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Process::Milling => "milling",
+            Process::Drilling => "drilling",
+            Process::Turning => "turning",
+        }
+    }
+
+    /// What its feed is counted for, as in "mm per tooth".
+    pub fn feed_per(self) -> &'static str {
+        match self {
+            Process::Milling => "tooth",
+            Process::Drilling | Process::Turning => "revolution",
+        }
+    }
+}
+
+/// Immersion angles from +y, clockwise, rad; 0 ≤ start < exit ≤ 2π.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Immersion {
+    pub start_rad: f64,
+    pub exit_rad: f64,
+}
+
+impl Immersion {
+    pub const SLOT: Immersion = Immersion {
+        start_rad: 0.0,
+        exit_rad: std::f64::consts::PI,
+    };
+}
+
+/// What was cut: geometry and feed of one record.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum CutGeometry {
+    Milling {
+        feed_per_tooth_mm: f64,
+        axial_depth_mm: f64,
+        immersion: Immersion,
+    },
+    Drilling {
+        feed_per_rev_mm: f64,
+        /// Zero: drilled into the full.
+        pilot_diameter_mm: f64,
+        /// Depth at full diameter.
+        hole_depth_mm: Option<f64>,
+    },
+    Turning {
+        feed_per_rev_mm: f64,
+        /// ap, across the feed.
+        depth_of_cut_mm: f64,
+        /// Of the workpiece where it is cut: with the spindle speed it gives the cutting speed.
+        diameter_mm: f64,
+    },
+}
+
+impl CutGeometry {
+    pub fn process(&self) -> Process {
+        match self {
+            CutGeometry::Milling { .. } => Process::Milling,
+            CutGeometry::Drilling { .. } => Process::Drilling,
+            CutGeometry::Turning { .. } => Process::Turning,
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum CutOutcome {
+    Stable,
+    Chatter,
+}
+
+impl CutOutcome {
+    pub fn label(self) -> &'static str {
+        match self {
+            CutOutcome::Stable => "stable",
+            CutOutcome::Chatter => "chatter",
+        }
+    }
+}
+
+/// One cut and its force record.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cut {
+    /// Name of the cut, unlike any other's.
+    pub id: String,
+    /// Where its force record is; messages name it.
+    pub file: PathBuf,
+    /// As stated.
+    pub spindle_rpm: f64,
+    /// Process, feed and depth.
+    pub geometry: CutGeometry,
+    /// Position in the sequence in which the cuts were made.
+    pub order: Option<i64>,
+    /// Overrides the detected steady window, s of the record's time axis.
+    pub steady_s: Option<[f64; 2]>,
+    /// What was cut: the cut's own `material`, else the campaign's.
+    pub material: Option<String>,
+    /// How the cut went, where someone listened.
+    pub outcome: Option<CutOutcome>,
+    /// Where the robot stood: index into `Campaign::postures`.
+    pub posture: Option<usize>,
+    /// Line of `campaign.toml`, for messages.
+    pub line: usize,
+}

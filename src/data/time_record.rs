@@ -1,0 +1,70 @@
+//! Sampled signals of several channels.
+
+use serde::Serialize;
+
+/// One recorded channel of a time record.
+#[derive(Debug, Clone)]
+pub struct Channel {
+    /// Name as in the file.
+    pub name: String,
+    /// Unit as in the file.
+    pub file_unit: String,
+    pub role: ChannelRole,
+    /// Samples in SI (N, N·m, m/s², m, …; volts and unknown units as they stand).
+    pub samples: Vec<f64>,
+}
+
+/// What a channel records, decided from its name and unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum ChannelRole {
+    ForceX,
+    ForceY,
+    ForceZ,
+    /// Moment about the spindle axis, N·m.
+    TorqueZ,
+    Other,
+}
+
+/// A uniformly sampled record of one or more channels.
+#[derive(Debug, Clone)]
+pub struct TimeRecord {
+    pub sample_rate_hz: f64,
+    /// Time of the first sample, s.
+    pub start_s: f64,
+    pub channels: Vec<Channel>,
+    /// Samples that the recorder dropped: stretches filled by a straight line, so that the times behind them are right.
+    pub filled: Vec<std::ops::Range<usize>>,
+}
+
+impl TimeRecord {
+    /// Are these two recordings of the same channels?
+    pub fn same_channels(&self, other: &TimeRecord) -> bool {
+        let rate = (self.sample_rate_hz / other.sample_rate_hz - 1.0).abs() < 1e-6;
+        let mut channels = self.channels.iter().zip(&other.channels);
+        rate && self.channels.len() == other.channels.len()
+            && channels.all(|(a, b)| a.name == b.name && a.file_unit == b.file_unit)
+    }
+
+    /// Puts the samples of a recording of the same channels behind its own.
+    pub fn append(&mut self, next: &TimeRecord) {
+        let before = self.channels.first().map_or(0, |c| c.samples.len());
+        for (channel, more) in self.channels.iter_mut().zip(&next.channels) {
+            channel.samples.extend_from_slice(&more.samples);
+        }
+        let filled = next.filled.iter().map(|r| r.start + before..r.end + before);
+        self.filled.extend(filled);
+    }
+
+    pub fn channel(&self, role: ChannelRole) -> Option<&Channel> {
+        self.channels.iter().find(|c| c.role == role)
+    }
+
+    /// Number of samples per channel.
+    pub fn len(&self) -> usize {
+        self.channels.first().map_or(0, |c| c.samples.len())
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}

@@ -1,0 +1,51 @@
+//! The tool.
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ToolKind {
+    Endmill,
+    Drill,
+    /// A turning tool with one insert; `teeth` is 1.
+    Turning,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tool {
+    pub kind: ToolKind,
+    /// 0 for a turning tool, which has none: the workpiece turns.
+    pub diameter_mm: f64,
+    pub teeth: usize,
+    pub helix_deg: f64,
+    /// End mills: radius of the corner between face and side; half the diameter is a ball end, 0 a sharp corner. Turning:
+    /// the nose radius rε.
+    pub corner_radius_mm: f64,
+    /// End mills: angle between the feed's plane and the straight part of the edge (κr of inserts); 90° up the side.
+    /// Turning: κr, between the direction of the feed and the straight part of the edge.
+    pub lead_angle_deg: f64,
+    /// Drills: half of the point angle.
+    pub half_point_angle_deg: Option<f64>,
+    /// Drills: web thickness.
+    pub web_thickness_mm: Option<f64>,
+}
+
+impl Tool {
+    /// Whether the edge of an end mill runs straight up its side.
+    pub fn has_straight_edge(&self) -> bool {
+        self.corner_radius_mm == 0.0 && self.lead_angle_deg == 90.0
+    }
+}
+
+/// `[[lobes.tool.segment]]`: a stretch of the tool of one section and material, from the holder face to the tip.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct ToolSegment {
+    pub length_mm: f64,
+    pub diameter_mm: f64,
+    pub bore_mm: f64,
+    /// Diameter of the round bar that is as stiff over `diameter_mm`: below 1 for flutes.
+    pub flute_ratio: f64,
+    pub young_gpa: f64,
+    pub shear_gpa: f64,
+    pub density_kg_per_m3: f64,
+    pub loss_factor: f64,
+    /// See [`crate::lobes::BeamSegment::twist_coupling`].
+    pub twist_coupling: f64,
+}

@@ -1,0 +1,134 @@
+//! What a measurement file is and holds.
+
+use std::path::PathBuf;
+
+use num_complex::Complex64;
+use serde::Serialize;
+
+use super::text;
+use crate::data::{FrfRecord, TimeRecord};
+
+/// How a file is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Format {
+    /// Universal file, dataset 58.
+    Uff58,
+    /// Universal file, dataset 58b (binary).
+    Uff58b,
+    /// `frequency_hz,re(1X/1X),im(1X/1X),…` and relatives.
+    FrfCsv,
+    /// Three columns Hz, Re, Im without names.
+    FrfText,
+    /// CutPro-style `.frf`.
+    CutproFrf,
+    /// DynoWare export or text with header lines like it.
+    DynoWare,
+    /// Time series with column names.
+    TimeCsv,
+    /// National Instruments TDMS.
+    Tdms,
+    /// LabVIEW measurement file.
+    Lvm,
+    /// MATLAB, version 5 to 7.
+    Mat5,
+    /// MATLAB 7.3, or other HDF5 with plain arrays.
+    Mat73,
+}
+
+impl std::fmt::Display for Format {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Format::Uff58 => "UFF 58",
+            Format::Uff58b => "UFF 58b",
+            Format::FrfCsv => "FRF CSV",
+            Format::FrfText => "FRF text",
+            Format::CutproFrf => "CutPro FRF",
+            Format::DynoWare => "DynoWare export",
+            Format::TimeCsv => "time CSV",
+            Format::Tdms => "TDMS",
+            Format::Lvm => "LabVIEW LVM",
+            Format::Mat5 => "MAT v5",
+            Format::Mat73 => "MAT v7.3",
+        })
+    }
+}
+
+/// All that a measurement file holds; a universal file may hold several kinds at once.
+#[derive(Debug, Clone, Default)]
+pub struct Contents {
+    pub frfs: Vec<FrfRecord>,
+    /// One record for each time axis.
+    pub times: Vec<TimeRecord>,
+    /// Spectra and other functions that nothing here computes with, as they stand in the file.
+    pub others: Vec<OtherRecord>,
+}
+
+/// A function that is neither FRF nor time signal; units of the file.
+#[derive(Debug, Clone)]
+pub struct OtherRecord {
+    /// Such as `power spectral density`.
+    pub kind: &'static str,
+    pub name: String,
+    pub abscissa: Vec<f64>,
+    pub abscissa_unit: String,
+    pub value: Vec<Complex64>,
+    pub unit: String,
+}
+
+/// A file that was read.
+#[derive(Debug, Clone)]
+pub struct MeasurementFile {
+    pub path: PathBuf,
+    pub format: Format,
+    /// Why it was taken for this format.
+    pub why: String,
+    pub contents: Contents,
+    /// What was assumed, contradicted or left out.
+    pub warnings: Vec<String>,
+}
+
+impl Contents {
+    /// Names and units of files are shown on terminals: control characters in them become visible.
+    pub(super) fn show_control_characters(&mut self) {
+        let show = |text: &mut String| {
+            *text = text::shown_on_one_line(text);
+        };
+        self.frfs.iter_mut().for_each(|frf| show(&mut frf.name));
+        for channel in self.times.iter_mut().flat_map(|record| &mut record.channels) {
+            show(&mut channel.name);
+            show(&mut channel.file_unit);
+        }
+        for other in &mut self.others {
+            show(&mut other.name);
+            show(&mut other.unit);
+            show(&mut other.abscissa_unit);
+        }
+    }
+
+    /// `3 FRFs, 1 time record, 2 × coherence`.
+    pub fn describe(&self) -> String {
+        let mut parts = Vec::new();
+        if !self.frfs.is_empty() {
+            parts.push(count(self.frfs.len(), "FRF"));
+        }
+        if !self.times.is_empty() {
+            parts.push(count(self.times.len(), "time record"));
+        }
+        let mut kinds: Vec<&str> = self.others.iter().map(|o| o.kind).collect();
+        kinds.sort_unstable();
+        for group in kinds.chunk_by(|a, b| a == b) {
+            parts.push(format!("{} × {}", group.len(), group[0]));
+        }
+        if parts.is_empty() {
+            "nothing usable".into()
+        } else {
+            parts.join(", ")
+        }
+    }
+}
+
+/// `1 FRF`, `2 FRFs`.
+pub(super) fn count(n: usize, what: &str) -> String {
+    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
+}

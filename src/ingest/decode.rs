@@ -1,0 +1,100 @@
+//! The bytes of a file become what it holds, by its format.
+
+use std::path::Path;
+
+use super::budget::Budget;
+use super::contents::{Contents, Format, count};
+use super::detect::{self, Detected};
+use super::text::{self, Notes};
+use super::{checks, dof_names, force, frf_text, lvm, mat, tdms, uff};
+use crate::InputError;
+use crate::data::FrfRecord;
+
+/// Where a file holds one FRF that does not say where it was measured, its name may.
+pub(super) fn dofs_from_file_name(path: &Path, frfs: &mut [FrfRecord], notes: &mut Notes) {
+    let [frf] = frfs else { return };
+    if frf.response.is_some() || frf.reference.is_some() {
+        return;
+    }
+    let stem = path.file_stem().map(|s| s.to_string_lossy()).unwrap_or_default();
+    (frf.response, frf.reference) = dof_names::dofs(&stem);
+    if let (Some(response), Some(reference)) = (frf.response, frf.reference) {
+        frf.name = format!("{response}/{reference}");
+        notes.file(format!(
+            "measured at {response}, excited at {reference}: taken from the name of the file"
+        ));
+    }
+}
+
+/// As [`read_file`], on bytes.
+pub(super) fn read_bytes(
+    bytes: &[u8],
+    is_dwd_named: bool,
+    notes: &mut Notes,
+) -> std::result::Result<(Format, String, Contents), InputError> {
+    match read_as_it_is(bytes, is_dwd_named, notes) {
+        Ok((format, why, mut contents)) => {
+            contents.show_control_characters();
+            checks::drop_copies(&mut contents.frfs, notes);
+            Ok((format, text::shown(&why).into_owned(), contents))
+        }
+        Err(error) => Err(error),
+    }
+}
+
+fn read_as_it_is(
+    bytes: &[u8],
+    is_dwd_named: bool,
+    notes: &mut Notes,
+) -> std::result::Result<(Format, String, Contents), InputError> {
+    let bytes = &*text::without_byte_order_mark(bytes);
+    let (detected, format, why) = detect::detect(bytes, is_dwd_named)?;
+    let mut budget = Budget::for_file(bytes.len());
+    let frfs = |frfs| Contents {
+        frfs,
+        ..Contents::default()
+    };
+    let signals = |times| Contents {
+        times,
+        ..Contents::default()
+    };
+    Ok(match detected {
+        Detected::Tdms => (format, why, signals(tdms::read(bytes, notes)?)),
+        Detected::Lvm => (format, why, signals(lvm::read(bytes, &mut budget, notes)?)),
+        Detected::Mat5 => (format, why, mat::read_v5(bytes, &mut budget, notes)?),
+        Detected::Mat73 => (format, why, mat::read_v73(bytes, &mut budget, notes)?),
+        Detected::Universal => {
+            let (summary, contents) = uff::contents(bytes, notes)?;
+            let skipped: Vec<String> = summary.skipped.iter().map(u32::to_string).collect();
+            let (format, count) = match (summary.ascii, summary.binary) {
+                (ascii, 0) => (Format::Uff58, count(ascii, "ASCII dataset")),
+                (0, binary) => (Format::Uff58b, count(binary, "binary dataset")),
+                (ascii, binary) => (
+                    Format::Uff58b,
+                    format!(
+                        "{}, {}",
+                        count(ascii, "ASCII dataset"),
+                        count(binary, "binary dataset")
+                    ),
+                ),
+            };
+            let rest = if skipped.is_empty() {
+                String::new()
+            } else {
+                format!(", skipped {}", skipped.join(", "))
+            };
+            (format, format!("{why}; {count}{rest}"), contents)
+        }
+        Detected::Cutpro(labels) => (format, why, frfs(frf_text::read_cutpro(bytes, &labels, notes)?)),
+        Detected::FrfTable(header) => (format, why, frfs(frf_text::read_table(bytes, &header, notes)?)),
+        Detected::PlainFrf(header) => {
+            notes.file("no column names: taken as frequency in Hz, real and imaginary part");
+            (
+                format,
+                why,
+                frfs(frf_text::read_plain(bytes, &header, None, 1.0, notes)?),
+            )
+        }
+        Detected::TimeTable(header) => (format, why, signals(vec![force::read(bytes, &header, notes)?])),
+    })
+}

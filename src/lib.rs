@@ -29,19 +29,54 @@
 //! # From a robot and its FRFs to a calibrated model and a verdict
 //!
 //! ```
-//! use lobestone::analysis::DiagnosisFindings;
-//! use lobestone::identify::Options;
-//! use lobestone::{Campaign, StructureAnalysis};
+//! use lobestone::analysis::structure::{StructureAnalysis, study_of};
+//! use lobestone::data::{AxesRef, BodyRef, MeasuredDof, MeasuredFrf, Point, Posture, RobotSpec};
+//! use lobestone::discrepancy::diagnose;
+//! use lobestone::identify::{Options, StructureCase};
 //!
-//! // Three postures with the FRFs in X and Y at the tool point; the tool is heavier than the robot file says.
-//! let campaign = Campaign::load("tests/data/blind/frf-9112".as_ref())?;
-//! let calibrated = StructureAnalysis::run(&campaign, Options::default())?;
-//! let stiffness = &calibrated.calibration.parameters[0];
-//! println!("{} = {:.3e} ± {:.0e} {}", stiffness.name, stiffness.value, stiffness.std_error, stiffness.unit);
+//! let robot = RobotSpec::load("irb6640", ".".as_ref())?; // built in; yours is a file
+//! let joints_deg = [[135.0, -2.0, 53.0, 83.0, 30.0, -117.0], [135.0, 20.0, 26.0, 30.0, 80.0, -150.0]];
+//! let postures = joints_deg.map(|q| Posture { id: format!("{q:?}"), joints_deg: q.to_vec() });
+//! let tool_point = Point { node: 1, body: BodyRef::Tool, position_m: [0.0; 3], axes: AxesRef::Base };
+//! let frfs: Vec<MeasuredFrf> = measured(&robot, &postures, &tool_point)?; // X and Y, 35 kg on the flange
 //!
-//! let found = DiagnosisFindings::of(&campaign, calibrated.settled_case(), Options::default())?;
-//! let missing = found.diagnosis.winner().map(|effect| effect.label());
-//! println!("missing: {missing:?}, {:.0} % sure", 100.0 * found.diagnosis.confidence);
+//! let case = StructureCase::new(robot, &postures, vec![tool_point], frfs)?;
+//! let case = StructureAnalysis::of_case(case, Options::default())?.settled_case();
+//! let diagnosis = diagnose(&study_of(&case, Options::default()), &case.model)?;
+//! let missing = diagnosis.winner().expect("more than noise is left");
+//! assert_eq!(missing.label(), "payload");
+//! assert!((missing.parameters[0].value - 35.0).abs() < 4.0 * missing.parameters[0].std_error); // kg
+//! #
+//! # /// What the model with that payload says, and 1 % noise.
+//! # fn measured(robot: &RobotSpec, postures: &[Posture], at: &Point) -> lobestone::Result<Vec<MeasuredFrf>> {
+//! #     use lobestone::Complex64;
+//! #     use rand::{Rng, SeedableRng};
+//! #     let frequency_hz: Vec<f64> = (0..280).map(|line| 4.0 + 0.2 * f64::from(line)).collect();
+//! #     let mut frfs = Vec::new();
+//! #     for posture in 0..postures.len() {
+//! #         for axis in [lobestone::data::Axis::X, lobestone::data::Axis::Y] {
+//! #             let dof = MeasuredDof { point: 0, axis, negative: false };
+//! #             frfs.push(MeasuredFrf {
+//! #                 posture, response: dof, reference: dof, name: format!("{posture} {axis:?}"),
+//! #                 frequency_hz: frequency_hz.clone(), receptance_m_per_n: vec![Complex64::ONE; frequency_hz.len()],
+//! #                 coherence: None, force_level_n: None, file: Default::default(),
+//! #             });
+//! #         }
+//! #     }
+//! #     let case = StructureCase::new(robot.clone(), postures, vec![at.clone()], frfs.clone())?;
+//! #     let payload = lobestone::effects::find(robot, "payload")[0];
+//! #     let model = case.model.with_effect(payload, &case.data.summary());
+//! #     let mut theta = model.nominal_theta();
+//! #     let last = theta.len() - 1;
+//! #     theta[last] = model.parameters[last].internal(35.0);
+//! #     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+//! #     for (frf, exact) in frfs.iter_mut().zip(model.predict(&theta, &case.data)?) {
+//! #         let scale = exact.iter().map(|h| h.norm()).sum::<f64>() / exact.len() as f64;
+//! #         let mut noise = || 0.01 * scale * rng.random_range(-1.7..1.7);
+//! #         frf.receptance_m_per_n = exact.iter().map(|h| h + Complex64::new(noise(), noise())).collect();
+//! #     }
+//! #     Ok(frfs)
+//! # }
 //! # Ok::<(), lobestone::Error>(())
 //! ```
 //!
@@ -99,11 +134,11 @@
 )]
 #![cfg_attr(
     feature = "serve",
-    doc = "| [`serve`] | the page in a browser (feature `serve`) |"
+    doc = "| [`serve`](crate) | the page in a browser, reached through the command (feature `serve`) |"
 )]
 #![cfg_attr(feature = "cli", doc = "| [`commands`] | the command line (feature `cli`) |")]
 //!
-//! Below all of them: [`error`], [`files`], [`parameter`], [`progress`], [`stop`], [`text`], and [`builtin`] data.
+//! Below all of them: [`error`], [`files`], [`parameter`], [`progress`], [`stop`], [`text`], [`threads`], and [`builtin`] data.
 //!
 //! # Features
 //!
@@ -137,8 +172,10 @@ pub mod progress;
 pub mod report;
 pub mod revision;
 pub mod robot;
+// Reached through the command only.
 #[cfg(feature = "serve")]
-pub mod serve;
+#[cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))]
+pub(crate) mod serve;
 pub mod signal;
 #[cfg(feature = "lab")]
 pub mod simulate;
@@ -146,6 +183,7 @@ pub mod stop;
 pub mod text;
 #[cfg(feature = "report")]
 pub mod thesis;
+pub mod threads;
 
 pub use analysis::{ModalAnalysis, StructureAnalysis};
 pub use campaign::Campaign;
@@ -153,10 +191,4 @@ pub use error::{Error, InputError, Result};
 pub use identify::StructureCase;
 /// The complex number of FRFs; of the crate `num-complex`.
 pub use num_complex::Complex64;
-
-/// Keeps each decomposition and each product of dense matrices on one thread: split over threads their sums would run in
-/// another order, and results would differ in the last digits with the number of threads. (The loops around them run in
-/// parallel.)
-pub fn sums_in_order() {
-    faer::set_global_parallelism(faer::Par::Seq);
-}
+pub use threads::sums_in_order;

@@ -6,7 +6,9 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Scale {
+    /// θ = ln of the value.
     Logarithmic,
+    /// θ is the value.
     Linear,
 }
 
@@ -15,7 +17,9 @@ pub enum Scale {
 /// nothing, where a normal law would insist.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
+    /// Where it is centred.
     pub mean: f64,
+    /// How wide it is.
     pub std: f64,
 }
 
@@ -43,10 +47,13 @@ const TAIL: f64 = 4.0;
 pub struct Parameter {
     /// `joint-2.stiffness`, `damping-ratio`, `link-3.mass`.
     pub name: String,
+    /// Of the natural value.
     pub unit: &'static str,
+    /// How it enters the solver.
     pub scale: Scale,
     /// Starting value in natural units.
     pub nominal: f64,
+    /// `None`: nothing is known beforehand.
     pub prior: Option<Prior>,
     /// Smallest and largest value in natural units.
     pub bounds: [f64; 2],

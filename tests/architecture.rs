@@ -165,7 +165,9 @@ fn test_modules(files: &BTreeMap<Module, PathBuf>) -> Vec<Module> {
         let text = std::fs::read_to_string(path).unwrap();
         for part in text.split("#[cfg(test)]\n").skip(1) {
             let line = part.lines().find(|l| !l.starts_with("#[")).unwrap_or_default();
-            let name = line.rsplit_once("mod ").and_then(|(_, rest)| rest.strip_suffix(';'));
+            let name = line
+                .rsplit_once("mod ")
+                .and_then(|(_, rest)| rest.strip_suffix(';'));
             if let Some(name) = name {
                 let mut test = module.clone();
                 test.push(name.to_string());

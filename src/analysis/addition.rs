@@ -8,8 +8,7 @@ use crate::discrepancy::compare::ErrorTotals;
 use crate::discrepancy::extension::{Extension, Fitted};
 use crate::effects::cutting::{self, CuttingInstance};
 use crate::effects::{self, Instance};
-use crate::identify::case::recorded_effect;
-use crate::identify::cutting_case::recorded_cutting_effect;
+use crate::identify::model_history::{recorded_cutting_effect, recorded_effect};
 use crate::identify::study::Residual;
 use crate::identify::{
     Calibration, CuttingCase, CuttingModel, CuttingStudy, Options, StructureCase, StructureModel,

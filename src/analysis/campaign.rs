@@ -3,13 +3,13 @@
 use super::force_records::identify_forces;
 use super::model_stages::{ModelStage, earlier_stages};
 use super::stick_shapes::{self, StickShape};
+use super::structure_case::structure_model;
 use super::{
     CuttingAnalysis, CuttingFindings, DiagnosisFindings, LobeAnalysis, ModalAnalysis, StructureAnalysis,
 };
 use crate::campaign::{Campaign, LobeSource};
 use crate::cutting::{CfcOptions, CfcResult};
 use crate::discrepancy::setup::SetupFinding;
-use crate::identify::case::structure_model;
 use crate::identify::structure_study::held_out_postures;
 use crate::identify::{Options, StructureCase, StructureModel};
 use crate::revision::{Domain, Revision, RevisionLog};

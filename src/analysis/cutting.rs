@@ -104,7 +104,7 @@ pub fn waveform_groups(
     campaign: &Campaign,
     result: &CfcResult,
 ) -> (Vec<Value>, Vec<String>, Vec<SetupFinding>) {
-    let loaded: Vec<(Process, Option<CuttingData>)> = processes(campaign)
+    let loaded: Vec<(Process, Option<CuttingData>)> = processes(&campaign.cuts)
         .into_iter()
         .map(|p| (p, CuttingData::load(campaign, p).ok()))
         .collect();

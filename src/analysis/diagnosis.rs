@@ -8,14 +8,13 @@ use crate::campaign::Campaign;
 use crate::discrepancy::localise::{Localisation, localise};
 use crate::discrepancy::setup::{Rival, SetupCheck, examine, examine_cutting};
 use crate::discrepancy::{
-    Candidate, CuttingComparison, CuttingLead, Diagnosis, Explained, FrfComparison, NextMeasurement, Verdict,
-    cutting_lead, diagnose, next_cut, next_measurement,
+    CuttingComparison, CuttingLead, Diagnosis, DiagnosisVerdict, EffectCandidate, Explained, FrfComparison,
+    NextMeasurement, cutting_lead, diagnose, next_cut, next_measurement,
 };
 use crate::effects::Instance;
 use crate::effects::cutting::CuttingInstance;
-use crate::identify::case::recorded_effect;
-use crate::identify::cutting_case::recorded_cutting_effect;
 use crate::identify::cutting_problem::{CutFit, CuttingProblem};
+use crate::identify::model_history::{recorded_cutting_effect, recorded_effect};
 use crate::identify::structure_study::{ResidualPeak, residual_peaks};
 use crate::identify::{CuttingCase, CuttingModel, CuttingStudy, Options, StructureCase, StructureModel};
 use crate::revision::{self, Domain, Evidence, RecordedCandidate};
@@ -45,7 +44,9 @@ pub struct DiagnosisFindings {
 
 /// Something is missing, the files are not to blame, and no effect of the library is it.
 fn is_unnamed<M, I>(diagnosis: &Diagnosis<M, I>, setup: &SetupCheck) -> bool {
-    diagnosis.verdict == Verdict::Unknown && setup.likely().is_none() && diagnosis.too_little_data.is_none()
+    diagnosis.verdict == DiagnosisVerdict::Unknown
+        && setup.likely().is_none()
+        && diagnosis.too_little_data.is_none()
 }
 
 /// What one candidate makes of the residual.
@@ -116,7 +117,7 @@ impl DiagnosisFindings {
     }
 
     /// The candidate that [`leading`](Self::leading) is about.
-    pub fn leader(&self) -> Option<&Candidate<StructureModel, Instance>> {
+    pub fn leader(&self) -> Option<&EffectCandidate<StructureModel, Instance>> {
         let leading = self.leading.as_ref()?;
         self.diagnosis.candidates.get(leading.candidate)
     }
@@ -125,7 +126,7 @@ impl DiagnosisFindings {
 /// What a diagnosis says, as `add` keeps it.
 fn evidence<M, I>(d: &Diagnosis<M, I>) -> Evidence {
     let finite = |v: f64| Some(v).filter(|v| v.is_finite());
-    let candidate = |c: &Candidate<M, I>| RecordedCandidate {
+    let candidate = |c: &EffectCandidate<M, I>| RecordedCandidate {
         effect: c.label(),
         variant: c.name.variant.as_ref().map(|(_, value)| value.to_string()),
         nrms: finite(c.nrms),
@@ -137,12 +138,12 @@ fn evidence<M, I>(d: &Diagnosis<M, I>) -> Evidence {
     };
     Evidence {
         verdict: match d.verdict {
-            Verdict::Effect => "effect",
-            Verdict::None => "none",
-            Verdict::Unknown => "unknown",
+            DiagnosisVerdict::Effect => "effect",
+            DiagnosisVerdict::None => "none",
+            DiagnosisVerdict::Unknown => "unknown",
         }
         .into(),
-        effect: d.winner().map(Candidate::label),
+        effect: d.winner().map(EffectCandidate::label),
         confidence: d.confidence,
         candidates: d.candidates.iter().map(candidate).collect(),
         when: revision::now(),
@@ -176,7 +177,10 @@ impl CuttingFindings {
 }
 
 /// What the best effect of the library takes away.
-fn rival<M, I>(diagnosis: &Diagnosis<M, I>, possible: impl Fn(&Candidate<M, I>) -> bool) -> Option<Rival> {
+fn rival<M, I>(
+    diagnosis: &Diagnosis<M, I>,
+    possible: impl Fn(&EffectCandidate<M, I>) -> bool,
+) -> Option<Rival> {
     let base = diagnosis.baseline.reduced_chi2;
     let all = diagnosis.candidates.iter();
     let candidates = all.filter(|c| c.refined && !c.at_bound && possible(c));
@@ -189,7 +193,7 @@ fn rival<M, I>(diagnosis: &Diagnosis<M, I>, possible: impl Fn(&Candidate<M, I>) 
 }
 
 /// A dynamometer that is damped like a filter is a filter (quartz dynamometers have a few per cent).
-fn is_possible(candidate: &Candidate<CuttingModel, CuttingInstance>) -> bool {
+fn is_possible(candidate: &EffectCandidate<CuttingModel, CuttingInstance>) -> bool {
     const MOST_DAMPING: f64 = 0.3;
     let damping = candidate.parameters.iter().filter(|p| p.name.contains("zeta["));
     let least = damping.map(|p| p.value).fold(f64::INFINITY, f64::min);
@@ -208,7 +212,7 @@ const SAME: [(&str, &str); 1] = [("time-delay", "amplifier-low-pass")];
 /// the same thing.
 fn heed_setup<M, I>(diagnosis: &mut Diagnosis<M, I>, setup: &SetupCheck) {
     if let Some(finding) = setup.likely() {
-        if diagnosis.verdict == Verdict::Effect && finding.confidence < SURE {
+        if diagnosis.verdict == DiagnosisVerdict::Effect && finding.confidence < SURE {
             let effect = diagnosis.winner().map(|c| c.name.effect.as_str());
             if !SAME
                 .iter()
@@ -218,7 +222,7 @@ fn heed_setup<M, I>(diagnosis: &mut Diagnosis<M, I>, setup: &SetupCheck) {
             }
             return;
         }
-        diagnosis.verdict = Verdict::Unknown;
+        diagnosis.verdict = DiagnosisVerdict::Unknown;
         diagnosis.effect = None;
         diagnosis.companion = None;
         diagnosis.indistinguishable.clear();
@@ -229,9 +233,9 @@ fn heed_setup<M, I>(diagnosis: &mut Diagnosis<M, I>, setup: &SetupCheck) {
 /// The effect that is missing; where none explains the rest, the leading candidate; `None` where nothing is missing.
 fn leading_candidate<M, I>(diagnosis: &Diagnosis<M, I>) -> Option<usize> {
     match diagnosis.verdict {
-        Verdict::Effect => diagnosis.effect,
-        Verdict::Unknown => diagnosis.best_guess,
-        Verdict::None => None,
+        DiagnosisVerdict::Effect => diagnosis.effect,
+        DiagnosisVerdict::Unknown => diagnosis.best_guess,
+        DiagnosisVerdict::None => None,
     }
 }
 

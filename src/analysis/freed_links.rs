@@ -1,9 +1,9 @@
 //! A calibration with link parameters free that the campaign takes for exact, beside the one without.
 
 use super::StructureAnalysis;
+use super::structure_case::Freed;
 use crate::campaign::{Campaign, LinkGroup};
 use crate::discrepancy::verdict::is_progress;
-use crate::identify::case::Freed;
 use crate::identify::departures::departures;
 use crate::identify::levenberg_marquardt::Stopping;
 use crate::identify::study::{Extent, held_out};

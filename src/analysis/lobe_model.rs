@@ -4,10 +4,10 @@
 use std::sync::Arc;
 
 use super::StructureAnalysis;
+use super::structure_case::structure_model;
 use crate::campaign::{Campaign, LobesSection};
 use crate::identify::Options;
 use crate::identify::calibrate::calibrate;
-use crate::identify::case::structure_model;
 use crate::identify::structure::StructureModel;
 use crate::lobes::hole::{Deflection, HoleError, HoleLoad};
 use crate::lobes::setup::tool_beam;

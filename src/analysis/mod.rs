@@ -6,6 +6,7 @@ pub mod campaign;
 pub mod channel_check;
 pub mod control_chart;
 pub mod cutting;
+pub mod cutting_case;
 pub mod diagnosis;
 pub mod expert;
 pub mod fleet;
@@ -36,6 +37,7 @@ pub mod shape_comparison;
 mod shard;
 pub mod stick_shapes;
 pub mod structure;
+pub mod structure_case;
 pub mod sweep;
 
 pub use addition::Addition;

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use num_complex::Complex64;
 
+use super::structure_case::{frf_data, structure_model};
 use crate::campaign::{BodyRef, Campaign, MeasuredDof, MeasuredFrf, Point};
-use crate::discrepancy::plan::Plan;
-use crate::identify::case::structure_model;
+use crate::discrepancy::plan::PlanOutlook;
 use crate::identify::{FrfData, StructureModel};
 use crate::ingest::{Axis, Dof};
 use crate::signal::noise_law::FrfNoise;
@@ -40,7 +40,7 @@ const MOST_LINES: f64 = 20_000.0;
 /// The plan and what it was made for.
 pub struct PlanFindings {
     /// What the planned FRFs would show.
-    pub plan: Plan,
+    pub plan: PlanOutlook,
     /// Planned FRFs; measured ones are not counted.
     pub planned: usize,
     /// FRFs that were measured already.
@@ -134,7 +134,7 @@ impl PlanFindings {
                 };
                 let (set, notes) = present.load_frfs()?;
                 warnings = notes;
-                Some(FrfData::new(&present, &model.robot, set)?)
+                Some(frf_data(&present, &model.robot, set)?)
             }
         };
         let mut frfs = Vec::new();
@@ -189,7 +189,7 @@ impl PlanFindings {
             }
         }
         Ok(PlanFindings {
-            plan: Plan::new(&model, &campaign.postures, &data)?,
+            plan: PlanOutlook::new(&model, &campaign.postures, &data)?,
             planned,
             measured: counted,
             postures,

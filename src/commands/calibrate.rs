@@ -6,7 +6,7 @@ use super::{CampaignArg, Outcome};
 use crate::Result;
 use crate::analysis::{FreedLinks, StructureAnalysis};
 use crate::campaign::{Campaign, LinkGroup};
-use crate::discrepancy::place::Place;
+use crate::discrepancy::place::DominantRegion;
 use crate::identify::{Calibration, Options, Scale, StructureCase, StructureModel, Undetermined};
 
 #[derive(clap::Args)]
@@ -164,7 +164,7 @@ pub fn run(args: CalibrateArgs) -> Result<Outcome> {
         args.starts,
         calibration.reduced_chi2,
         &after.totals,
-        after.mostly.as_ref().map(Place::words),
+        after.mostly.as_ref().map(DominantRegion::words),
     );
     Ok(Outcome::new(json, text, Some(next)))
 }

@@ -7,9 +7,9 @@ use crate::Result;
 use crate::analysis::mode_comparison::{ModePair, compare_modes, measured_modes};
 use crate::analysis::{CuttingAnalysis, ExpertView, StructureAnalysis};
 use crate::campaign::Campaign;
-use crate::discrepancy::compare::{ErrorMap, Group};
-use crate::discrepancy::compare_cutting::Harmonic;
-use crate::discrepancy::place::Place;
+use crate::discrepancy::compare::{ErrorMap, GroupError};
+use crate::discrepancy::compare_cutting::HarmonicError;
+use crate::discrepancy::place::DominantRegion;
 use crate::discrepancy::{FrfComparison, FrfError};
 use crate::identify::structure_study::{ResidualPeak, held_out_postures, residual_peaks};
 use crate::identify::{Options, StructureCase};
@@ -83,7 +83,7 @@ fn describe_cutting(analysis: &CuttingAnalysis) -> String {
         })
         .collect();
     text += &format!("\n{}", table(&["cut", "nrms", "noise", "misfit / noise"], &rows));
-    let mut strongest: Vec<&Harmonic> = c.by_harmonic.iter().collect();
+    let mut strongest: Vec<&HarmonicError> = c.by_harmonic.iter().collect();
     strongest.sort_by(|a, b| (b.nrms - b.noise_floor_nrms).total_cmp(&(a.nrms - a.noise_floor_nrms)));
     let rows: Vec<Vec<String>> = strongest
         .iter()
@@ -155,7 +155,7 @@ fn structure(campaign: &Campaign) -> Result<Outcome> {
     let next = Guide::structure(campaign).compared(
         calibration.reduced_chi2,
         &comparison.totals,
-        comparison.mostly.as_ref().map(Place::words),
+        comparison.mostly.as_ref().map(DominantRegion::words),
     );
     let text = setup_lines(&setup.findings)
         + &format!("model: {}\n", case.model_description())
@@ -201,13 +201,13 @@ fn frf(error: &FrfError) -> Value {
     })
 }
 
-fn object(groups: &[Group]) -> Value {
+fn object(groups: &[GroupError]) -> Value {
     let map: Map<String, Value> = groups.iter().map(|g| (g.name.clone(), json!(g.nrms))).collect();
     map.into()
 }
 
 /// A table with bars for each kind of group.
-fn group_tables(kinds: &[(&str, &Vec<Group>)]) -> String {
+fn group_tables(kinds: &[(&str, &Vec<GroupError>)]) -> String {
     let mut text = String::new();
     for (title, groups) in kinds {
         let largest = groups.iter().map(|g| g.nrms).fold(0.0, f64::max);

@@ -7,10 +7,10 @@ use super::{Outcome, SideArgs, by_domain};
 use crate::Result;
 use crate::analysis::{CuttingFindings, DiagnosisFindings};
 use crate::campaign::Campaign;
-use crate::discrepancy::diagnose::Baseline;
+use crate::discrepancy::candidate::BaselineFit;
 use crate::discrepancy::explained::{Explained, NamedPart};
 use crate::discrepancy::localise::Localisation;
-use crate::discrepancy::{Candidate, CuttingLead, Diagnosis, NextMeasurement, Verdict};
+use crate::discrepancy::{CuttingLead, Diagnosis, DiagnosisVerdict, EffectCandidate, NextMeasurement};
 use crate::identify::Options;
 use crate::identify::rest::Rest;
 
@@ -81,7 +81,7 @@ pub fn cutting(campaign: &Campaign, findings: &CuttingFindings) -> Outcome {
     text += &findings.lead.as_ref().map_or(String::new(), lines_in_words);
     text += &rest(d, next_measurement);
     text += &warnings(&case.warnings);
-    let winner = d.winner().map(Candidate::label);
+    let winner = d.winner().map(EffectCandidate::label);
     let next = Guide::cutting(campaign).diagnosed(d.verdict, winner.as_deref(), &next_measurement.what);
     Outcome::new(json, text, Some(next))
 }
@@ -112,7 +112,7 @@ fn lines_in_words(lead: &CuttingLead) -> String {
     text
 }
 
-fn baseline(b: &Baseline, noise_floor_nrms: f64) -> Value {
+fn baseline(b: &BaselineFit, noise_floor_nrms: f64) -> Value {
     json!({
         "nrms": b.residual.nrms,
         "held_out_nrms": b.held_out.as_ref().map(|h| h.nrms()),
@@ -161,14 +161,14 @@ pub fn structure(campaign: &Campaign, findings: &DiagnosisFindings) -> Outcome {
         + &format!("model: {}\n", case.model_description())
         + &describe(findings)
         + &warnings(&case.warnings);
-    let winner = diagnosis.winner().map(Candidate::label);
+    let winner = diagnosis.winner().map(EffectCandidate::label);
     let next =
         Guide::structure(campaign).diagnosed(diagnosis.verdict, winner.as_deref(), &next_measurement.what);
     Outcome::new(json, text, Some(next))
 }
 
-/// The effect's own parameters by the keys of the contract; `name[0]`, `name[1]`, … become one list.
-fn parameters<M, I>(candidate: &Candidate<M, I>) -> Value {
+/// The effect's own parameters by the keys of docs/json.md; `name[0]`, `name[1]`, … become one list.
+fn parameters<M, I>(candidate: &EffectCandidate<M, I>) -> Value {
     let mut map = Map::new();
     for p in &candidate.parameters {
         let key = p.name.rsplit('.').next().unwrap_or(&p.name);
@@ -190,7 +190,7 @@ fn parameters<M, I>(candidate: &Candidate<M, I>) -> Value {
     map.into()
 }
 
-fn candidate<M, I>(c: &Candidate<M, I>) -> Value {
+fn candidate<M, I>(c: &EffectCandidate<M, I>) -> Value {
     json!({
         "effect": c.name.effect,
         "site": c.name.site,
@@ -210,7 +210,7 @@ fn candidate<M, I>(c: &Candidate<M, I>) -> Value {
 }
 
 /// The candidate that the verdict names, or the best of the library where it names none.
-fn spoken_of<M, I>(d: &Diagnosis<M, I>) -> Option<&Candidate<M, I>> {
+fn spoken_of<M, I>(d: &Diagnosis<M, I>) -> Option<&EffectCandidate<M, I>> {
     let candidate = d.effect.or(d.best_guess)?;
     d.candidates.get(candidate)
 }
@@ -219,7 +219,7 @@ fn spoken_of<M, I>(d: &Diagnosis<M, I>) -> Option<&Candidate<M, I>> {
 fn explained_share<M, I>(d: &Diagnosis<M, I>) -> Option<[f64; 2]> {
     spoken_of(d)
         .filter(|_| d.companion.is_none())
-        .and_then(Candidate::explained_share)
+        .and_then(EffectCandidate::explained_share)
 }
 
 /// What is left: of the best candidate, of the model as it stands where nothing is said to be missing.
@@ -289,7 +289,7 @@ fn describe(findings: &DiagnosisFindings) -> String {
     text += &super::compare::dominant(&findings.residual_peaks);
     if let (Some(leading), Some(candidate)) = (&findings.leading, findings.leader()) {
         let who = match d.verdict {
-            Verdict::Unknown => format!("The best candidate, {},", candidate.label()),
+            DiagnosisVerdict::Unknown => format!("The best candidate, {},", candidate.label()),
             _ => "It".into(),
         };
         text += &wrapped(&leading.explained.sentence(&who), "  ");
@@ -311,7 +311,7 @@ fn lead(found: &Localisation) -> Value {
     found.places.first().map_or(Value::Null, localise::place)
 }
 
-fn as_it_stands(baseline: &Baseline, noise_floor_nrms: f64) -> String {
+fn as_it_stands(baseline: &BaselineFit, noise_floor_nrms: f64) -> String {
     format!(
         "model as it stands: error (nrms) {}, noise floor {}, {:.2} times the noise variance\n\n",
         percent(baseline.residual.nrms),
@@ -323,11 +323,11 @@ fn as_it_stands(baseline: &Baseline, noise_floor_nrms: f64) -> String {
 /// The verdict; `plainly` gives an effect's explanation and its fingerprint.
 fn answer<M, I>(
     d: &Diagnosis<M, I>,
-    plainly: impl Fn(&Candidate<M, I>) -> (&'static str, &'static str),
+    plainly: impl Fn(&EffectCandidate<M, I>) -> (&'static str, &'static str),
 ) -> String {
     let sure = format!("confidence {:.0} %", 100.0 * d.confidence);
     match (d.verdict, d.winner()) {
-        (Verdict::Effect, Some(winner)) => {
+        (DiagnosisVerdict::Effect, Some(winner)) => {
             let (explanation, fingerprint) = plainly(winner);
             let excuse = winner.rest.as_ref().and_then(Rest::excuse_in_words);
             let left = excuse.map_or(String::new(), |left| {
@@ -346,7 +346,7 @@ fn answer<M, I>(
                 wrapped(&format!("How it shows: {fingerprint}"), "  "),
             )
         }
-        (Verdict::None, _) => match d.baseline.rest.excuse_in_words() {
+        (DiagnosisVerdict::None, _) => match d.baseline.rest.excuse_in_words() {
             Some(left) => format!(
                 "{} that the library knows is larger than the small errors of the setup ({sure})\n{}",
                 Emphasis::Good.on("NOTHING"),
@@ -392,7 +392,7 @@ fn rest<M, I>(d: &Diagnosis<M, I>, next_measurement: &NextMeasurement) -> String
                 "  Of {of} pairs of effects {tried} were tried, the likeliest first: there was no time for more\n"
             );
         }
-        Some([_, of]) if d.verdict == Verdict::Unknown && of > 0 => {
+        Some([_, of]) if d.verdict == DiagnosisVerdict::Unknown && of > 0 => {
             text += &format!("  Nor does any of {of} pairs of effects with the best of them\n");
         }
         _ => {}

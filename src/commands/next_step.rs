@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::text::{number, percent};
 use crate::campaign::{Campaign, campaign_file};
-use crate::discrepancy::Verdict;
+use crate::discrepancy::DiagnosisVerdict;
 use crate::discrepancy::compare::ErrorTotals;
 use crate::discrepancy::verdict::is_noise;
 use crate::revision::{Domain, Revision};
@@ -141,14 +141,14 @@ impl<'a> Guide<'a> {
     }
 
     /// After `diagnose`. `winner`: `effect@site` where one is missing.
-    pub fn diagnosed(&self, verdict: Verdict, winner: Option<&str>, measurement: &str) -> String {
+    pub fn diagnosed(&self, verdict: DiagnosisVerdict, winner: Option<&str>, measurement: &str) -> String {
         match (verdict, winner) {
-            (Verdict::Effect, Some(label)) => format!(
+            (DiagnosisVerdict::Effect, Some(label)) => format!(
                 "{label} is missing: run `lobestone add {} {label}` (what it is: `lobestone explain {}`)",
                 word(&self.campaign.dir),
                 effect_of(label)
             ),
-            (Verdict::None, _) => format!("nothing is missing: {}", self.use_it()),
+            (DiagnosisVerdict::None, _) => format!("nothing is missing: {}", self.use_it()),
             _ => {
                 let verb = match self.side {
                     Domain::Structure => "measure",

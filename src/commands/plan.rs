@@ -4,7 +4,7 @@ use super::text::{number, percent, table, warnings, wrapped};
 use super::{CampaignArg, Outcome, next_step};
 use crate::analysis::planning::{PlanFindings, PlanRequest};
 use crate::campaign::Campaign;
-use crate::discrepancy::plan::{Plan, PlannedEffect, SEEN_SIGMAS};
+use crate::discrepancy::plan::{PlanOutlook, PlannedEffect, SEEN_SIGMAS};
 use crate::ingest::Dof;
 use crate::{InputError, Result};
 
@@ -118,7 +118,7 @@ fn effect(planned: &PlannedEffect) -> Value {
 }
 
 fn describe(findings: &PlanFindings) -> String {
-    let plan: &Plan = &findings.plan;
+    let plan: &PlanOutlook = &findings.plan;
     let mut text = format!(
         "planned: {} FRFs at {} postures ({} measured already), noise {} of the response and {:.1e} m/N\n",
         findings.planned + findings.measured,

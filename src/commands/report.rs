@@ -7,7 +7,7 @@ use super::text::warnings;
 use super::{CampaignArg, Outcome};
 use crate::analysis::CampaignFindings;
 use crate::campaign::Campaign;
-use crate::discrepancy::Candidate;
+use crate::discrepancy::EffectCandidate;
 use crate::report::campaign::{self, ReportFiles};
 use crate::thesis::ThesisFindings;
 use crate::{Error, Result};
@@ -70,8 +70,8 @@ pub fn run(args: ReportArgs) -> Result<Outcome> {
 fn missing_effect(findings: &CampaignFindings<'_>) -> Option<String> {
     let structure = findings.diagnosis.as_ref().and_then(|d| d.as_ref().ok());
     let cutting = findings.cutting_diagnosis.as_ref().and_then(|d| d.as_ref().ok());
-    let of_structure = structure.and_then(|d| d.diagnosis.winner().map(Candidate::label));
-    of_structure.or_else(|| cutting.and_then(|d| d.diagnosis.winner().map(Candidate::label)))
+    let of_structure = structure.and_then(|d| d.diagnosis.winner().map(EffectCandidate::label));
+    of_structure.or_else(|| cutting.and_then(|d| d.diagnosis.winner().map(EffectCandidate::label)))
 }
 
 /// `html`, `images` and, where they were built in, `tables`.

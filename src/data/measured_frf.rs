@@ -22,6 +22,17 @@ pub struct MeasuredDof {
     pub negative: bool,
 }
 
+impl MeasuredDof {
+    /// Along the positive `axis` of the `point`-th point.
+    pub fn new(point: usize, axis: Axis) -> Self {
+        MeasuredDof {
+            point,
+            axis,
+            negative: false,
+        }
+    }
+}
+
 /// One FRF as receptance.
 #[derive(Debug, Clone)]
 pub struct MeasuredFrf {
@@ -39,4 +50,32 @@ pub struct MeasuredFrf {
     pub coherence: Option<Vec<f64>>,
     pub force_level_n: Option<f64>,
     pub file: PathBuf,
+}
+
+impl MeasuredFrf {
+    /// An FRF in memory, named by its degrees of freedom: receptance in m/N on ascending frequencies above zero, between two
+    /// of the points, at the `posture`-th posture.
+    pub fn new(
+        posture: usize,
+        response: MeasuredDof,
+        reference: MeasuredDof,
+        frequency_hz: Vec<f64>,
+        receptance_m_per_n: Vec<Complex64>,
+    ) -> Self {
+        let dof = |d: MeasuredDof| {
+            let sign = if d.negative { "-" } else { "" };
+            format!("{}{sign}{}", d.point + 1, d.axis.letter())
+        };
+        MeasuredFrf {
+            posture,
+            response,
+            reference,
+            name: format!("p{} {}/{}", posture + 1, dof(response), dof(reference)),
+            frequency_hz,
+            receptance_m_per_n,
+            coherence: None,
+            force_level_n: None,
+            file: PathBuf::new(),
+        }
+    }
 }

@@ -3,46 +3,37 @@
 use num_complex::Complex64;
 use serde::Serialize;
 
-use super::place::{Amounts, Place, above_noise, excess};
-use crate::campaign::Point;
+use super::error_sums::{BANDS, Groups, Sums, band_edges_hz, band_of};
+pub use super::error_sums::{ErrorTotals, GroupError};
+use super::place::{Amounts, DominantRegion, above_noise, excess};
+use crate::data::Point;
 use crate::identify::FrfData;
-
-/// Error over everything compared.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct ErrorTotals {
-    /// sqrt(Σ|model − measured|² / Σ|measured|²).
-    pub nrms: f64,
-    /// Mean of |20 log10(|model| / |measured|)|, dB.
-    pub mean_abs_db: f64,
-    /// nrms of a perfect model: the measurement's own noise.
-    pub noise_floor_nrms: f64,
-}
 
 /// Error within a frequency band.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Band {
+    /// Lower edge, Hz.
     pub from_hz: f64,
+    /// Upper edge, Hz.
     pub to_hz: f64,
+    /// Error over the signal in the band.
     pub nrms: f64,
-    pub noise_floor_nrms: f64,
-}
-
-/// Error of one group of FRFs.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Group {
-    pub name: String,
-    pub nrms: f64,
+    /// nrms of a perfect model.
     pub noise_floor_nrms: f64,
 }
 
 /// Error of one FRF.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FrfError {
+    /// Posture and degrees of freedom, `p1 1X/1X`.
     pub name: String,
+    /// Its id.
     pub posture: String,
     /// Response axis, reference axis.
     pub direction: String,
+    /// Error over the signal.
     pub nrms: f64,
+    /// nrms of a perfect model.
     pub noise_floor_nrms: f64,
     /// Frequency response assurance criterion, 0..1; `None` where model or measurement is zero.
     pub frac: Option<f64>,
@@ -57,8 +48,11 @@ pub struct FrfError {
 /// The line of an FRF on which model and measurement differ most against the noise; magnitudes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct WorstLine {
+    /// Hz.
     pub frequency_hz: f64,
+    /// |measured|, m/N.
     pub measured_m_per_n: f64,
+    /// |model|, m/N.
     pub model_m_per_n: f64,
     /// Standard deviation of the complex value there.
     pub noise_m_per_n: f64,
@@ -81,7 +75,9 @@ impl FrfError {
 /// The error map: postures × directions × bands, nrms; `None` where nothing was measured.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ErrorMap {
+    /// Their ids, in order of first appearance in the data.
     pub postures: Vec<String>,
+    /// Response axis, reference axis: `XX`, `XY`, …
     pub directions: Vec<String>,
     /// Edges, Hz: one more than there are bands.
     pub band_edges_hz: Vec<f64>,
@@ -99,124 +95,29 @@ pub struct ErrorMap {
     pub direction_band: Vec<Vec<Option<f64>>>,
     /// Both, error over noise: 1 where only noise is left.
     pub posture_band_times_noise: Vec<Vec<Option<f64>>>,
+    /// `[direction][band]`, error over noise.
     pub direction_band_times_noise: Vec<Vec<Option<f64>>>,
 }
 
 /// Model against measurement, FRFs as receptance on the measured lines.
 #[derive(Debug, Clone)]
 pub struct FrfComparison {
+    /// Over everything.
     pub totals: ErrorTotals,
-    pub by_posture: Vec<Group>,
+    /// One a posture, in order of first appearance.
+    pub by_posture: Vec<GroupError>,
     /// Response axis, reference axis: `XX`, `XY`, …
-    pub by_direction: Vec<Group>,
+    pub by_direction: Vec<GroupError>,
     /// Node number of the response.
-    pub by_point: Vec<Group>,
+    pub by_point: Vec<GroupError>,
+    /// One a band in which something was measured.
     pub by_band: Vec<Band>,
+    /// By posture, direction and band.
     pub map: ErrorMap,
     /// Where most of what stands above the noise sits; `None` where nothing does.
-    pub mostly: Option<Place>,
+    pub mostly: Option<DominantRegion>,
     /// In the order of the data.
     pub frf_errors: Vec<FrfError>,
-}
-
-/// Sums behind an nrms.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Sums {
-    pub error: f64,
-    pub noise: f64,
-    pub signal: f64,
-    /// Σ|model − measured|²/σ²: as large as `values` where only noise is left.
-    pub weighted: f64,
-    pub values: usize,
-}
-
-impl Sums {
-    pub fn of_line(model: Complex64, measured: Complex64, noise_std: f64) -> Self {
-        let error = (model - measured).norm_sqr();
-        let noise = noise_std.powi(2);
-        Sums {
-            error,
-            noise,
-            signal: measured.norm_sqr(),
-            weighted: error / noise,
-            values: 1,
-        }
-    }
-
-    pub fn add(&mut self, other: Sums) {
-        self.error += other.error;
-        self.noise += other.noise;
-        self.signal += other.signal;
-        self.weighted += other.weighted;
-        self.values += other.values;
-    }
-
-    pub fn nrms(&self) -> f64 {
-        ratio(self.error, self.signal)
-    }
-
-    /// `None` where nothing was measured.
-    fn measured_nrms(&self) -> Option<f64> {
-        (self.signal > 0.0).then(|| self.nrms())
-    }
-
-    /// Error over noise; `None` where nothing was measured.
-    pub fn times_noise(&self) -> Option<f64> {
-        let floor = self.floor();
-        (self.signal > 0.0 && floor > 0.0).then(|| self.nrms() / floor)
-    }
-
-    pub(super) fn floor(&self) -> f64 {
-        ratio(self.noise, self.signal)
-    }
-}
-
-fn ratio(part: f64, whole: f64) -> f64 {
-    if whole > 0.0 { (part / whole).sqrt() } else { 0.0 }
-}
-
-/// Sums by name, in order of first appearance.
-#[derive(Default)]
-pub(super) struct Groups(Vec<(String, Sums)>);
-
-impl Groups {
-    pub(super) fn add(&mut self, name: &str, sums: Sums) {
-        match self.0.iter_mut().find(|(n, _)| n == name) {
-            Some((_, s)) => s.add(sums),
-            None => self.0.push((name.to_string(), sums)),
-        }
-    }
-
-    pub(super) fn finish(self) -> Vec<Group> {
-        self.0
-            .into_iter()
-            .map(|(name, s)| Group {
-                name,
-                nrms: s.nrms(),
-                noise_floor_nrms: s.floor(),
-            })
-            .collect()
-    }
-}
-
-/// Number of bands the measured range is divided into, equal on a logarithmic scale.
-pub(super) const BANDS: usize = 10;
-
-pub(super) fn band_edges_hz(data: &FrfData) -> Vec<f64> {
-    let all = || data.blocks.iter().flat_map(|b| b.frequency_hz.iter().copied());
-    let high = all().fold(0.0, f64::max);
-    let low = all().filter(|f| *f > 0.0).fold(high, f64::min).max(1e-3 * high);
-    let ratio = (high / low).max(1.0 + 1e-9);
-    (0..=BANDS)
-        .map(|i| low * ratio.powf(i as f64 / BANDS as f64))
-        .collect()
-}
-
-pub(super) fn band_of(edges: &[f64], frequency_hz: f64) -> usize {
-    edges[1..edges.len() - 1]
-        .iter()
-        .take_while(|e| frequency_hz >= **e)
-        .count()
 }
 
 impl FrfComparison {
@@ -297,7 +198,8 @@ impl FrfComparison {
             nodes.add(node, excess(own));
         }
         let above: Vec<f64> = bands.iter().map(excess).collect();
-        let mostly = above_noise(&total).then(|| Place::new(&edges, &above, &directions, &postures, &nodes));
+        let mostly =
+            above_noise(&total).then(|| DominantRegion::new(&edges, &above, &directions, &postures, &nodes));
         FrfComparison {
             totals: ErrorTotals {
                 nrms: total.nrms(),
@@ -338,8 +240,8 @@ pub fn frac(a: &[Complex64], b: &[Complex64]) -> Option<f64> {
 }
 
 fn error_map(
-    postures: &[Group],
-    directions: &[Group],
+    postures: &[GroupError],
+    directions: &[GroupError],
     edges: &[f64],
     cells: &[(String, String, usize, Sums)],
 ) -> ErrorMap {

@@ -3,9 +3,9 @@
 
 use serde::Serialize;
 
-use super::compare::{ErrorTotals, Group, Groups, Sums};
+use super::error_sums::{ErrorTotals, GroupError, Groups, Sums};
 use super::place;
-use crate::campaign::Process;
+use crate::data::Process;
 use crate::identify::cutting_data::CuttingData;
 use crate::identify::cutting_problem::CutFit;
 use crate::identify::cutting_waves::axis_waves;
@@ -13,17 +13,21 @@ use crate::identify::cutting_waves::axis_waves;
 /// Model against the steady waveforms.
 #[derive(Debug, Clone)]
 pub struct CuttingComparison {
+    /// Over everything.
     pub totals: ErrorTotals,
-    pub by_cut: Vec<Group>,
-    pub by_axis: Vec<Group>,
+    /// One a cut, in the order of the data.
+    pub by_cut: Vec<GroupError>,
+    /// One a tool axis.
+    pub by_axis: Vec<GroupError>,
     /// Cutting speed, m/min.
-    pub by_speed: Vec<Group>,
+    pub by_speed: Vec<GroupError>,
     /// Feed per tooth (milling) or revolution (drilling), mm.
-    pub by_feed: Vec<Group>,
+    pub by_feed: Vec<GroupError>,
     /// Milling: order of the tool's rotation, 0 the mean.
-    pub by_harmonic: Vec<Harmonic>,
+    pub by_harmonic: Vec<HarmonicError>,
     /// Place in the sequence of cuts, as the campaign has it; first cut first, empty where it does not say.
-    pub by_order: Vec<Group>,
+    pub by_order: Vec<GroupError>,
+    /// One a cut, with what only cuts have.
     pub cuts: Vec<CutError>,
     /// Where the error sits, in words: the axis, order of rotation and cuts that hold most of what stands above the noise.
     pub mostly: Option<String>,
@@ -31,18 +35,23 @@ pub struct CuttingComparison {
 
 /// Error of one order of rotation over all cuts and axes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Harmonic {
+pub struct HarmonicError {
+    /// Multiple of the rotation; 0 is the mean.
     pub order: usize,
     /// Relative to the whole signal, so that the squares of all orders add up to that of the total.
     pub nrms: f64,
+    /// The same of a perfect model.
     pub noise_floor_nrms: f64,
 }
 
 /// Error of one cut.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CutError {
+    /// Its id.
     pub cut: String,
+    /// Error over the signal.
     pub nrms: f64,
+    /// nrms of a perfect model.
     pub noise_floor_nrms: f64,
     /// Weighted misfit per number compared, entry, air and lines off the comb included: 1 where only noise is left.
     pub chi2_per_value: f64,
@@ -135,7 +144,7 @@ impl CuttingComparison {
                 .iter()
                 .enumerate()
                 .filter(|_| milling)
-                .map(|(order, s)| Harmonic {
+                .map(|(order, s)| HarmonicError {
                     order,
                     nrms: whole(s.error),
                     noise_floor_nrms: whole(s.noise),

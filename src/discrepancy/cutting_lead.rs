@@ -3,8 +3,8 @@
 
 use serde::Serialize;
 
-use crate::campaign::Process;
 use crate::cutting::ForceAxis;
+use crate::data::Process;
 use crate::identify::cutting_data::CutData;
 use crate::identify::{CutFit, CuttingData};
 use crate::signal::median;
@@ -17,10 +17,13 @@ pub enum LineKind {
     MeanForce,
     /// Comes and goes over several turns.
     SlowerThanTurn,
+    /// At the rotation of the spindle.
     OncePerTurn,
     /// Another whole number of turns that is none of tooth passing.
     TurnHarmonic,
+    /// At the rotation times the number of teeth.
     ToothPassing,
+    /// A multiple of the tooth passing.
     ToothHarmonic,
     /// The same frequency at every spindle speed.
     NaturalFrequency,
@@ -35,6 +38,7 @@ pub enum LineKind {
 }
 
 impl LineKind {
+    /// What it is called, for people.
     pub fn words(self) -> &'static str {
         match self {
             LineKind::MeanForce => "mean force",
@@ -68,6 +72,7 @@ impl LineKind {
         }
     }
 
+    /// What such a line usually comes from.
     pub fn usual_cause(self) -> &'static str {
         match self {
             LineKind::MeanForce => {
@@ -111,21 +116,29 @@ impl LineKind {
 /// All lines of one kind.
 #[derive(Debug, Clone, Serialize)]
 pub struct LineGroup {
+    /// What they follow.
     pub kind: LineKind,
+    /// The kind in words.
     pub what: &'static str,
     /// Of the mean square that stands above the noise, over all cuts and channels; torques count as large as thrusts.
     pub share: f64,
     /// The strongest line: recorded axis, cut, amplitude (a mean: its deviation), 0 Hz for the mean force.
     pub axis: ForceAxis,
+    /// Id of the cut with the strongest line.
     pub cut: String,
+    /// Amplitude of that line in `unit`.
     pub amplitude: f64,
+    /// N, or N·m.
     pub unit: &'static str,
+    /// Frequency of that line, Hz.
     pub frequency_hz: f64,
     /// Frequency over spindle frequency.
     pub order: f64,
     /// Cuts that show it.
     pub cuts: usize,
+    /// How many cuts there are.
     pub of_cuts: usize,
+    /// What such lines usually come from.
     pub usual_cause: &'static str,
 }
 

@@ -5,141 +5,17 @@
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::something_else;
-use super::verdict::{self, Verdict};
+use super::candidate::{BaselineFit, EffectCandidate};
+use super::diagnosis::Diagnosis;
+use super::verdict::{self, DiagnosisVerdict};
 use crate::Result;
-use crate::identify::calibrate::{Calibration, Estimate, estimates};
+use crate::identify::calibrate::{Calibration, estimates};
 use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
 use crate::identify::rest::{BeyondSlips, Rest};
 use crate::identify::study::{
-    EffectName, Effort, Extent, HeldOut, OUT_OF_RACE, Residual, Study, Tried, View, held_out, rescue,
-    try_effect, try_effects, vanished,
+    Effort, Extent, OUT_OF_RACE, Study, Tried, View, held_out, rescue, try_effect, try_effects, vanished,
 };
 use crate::progress::Progress;
-
-/// One effect at one site, tried.
-#[derive(Debug, Clone)]
-pub struct Candidate<M, I> {
-    pub instance: I,
-    pub name: EffectName,
-    pub nrms: f64,
-    /// On folds left out of the fit; `None` with one fold.
-    pub held_out: Option<HeldOut>,
-    /// BIC with the effect less BIC without: below zero the effect pays for its parameters.
-    pub delta_bic: f64,
-    /// Likelihood-ratio test, corrected for the number of candidates tried.
-    pub p_value: f64,
-    /// Weighted misfit per degree of freedom that is left with the effect: 1 is noise.
-    pub reduced_chi2: f64,
-    /// χ² that the effect takes away from the baseline's, on the data that it was fitted to.
-    pub gain: f64,
-    /// What tests of structure find in what it leaves; `None` for candidates that were not in question.
-    pub rest: Option<Rest>,
-    /// Why the effect cannot be as fitted: a size that is not possible.
-    pub not_credible: Option<String>,
-    /// The effect's own parameters.
-    pub parameters: Vec<Estimate>,
-    /// One of them stopped at the end of its range: evidence against.
-    pub at_bound: bool,
-    /// No fit with the effect is better than the one without it: the effect stands where it vanishes.
-    pub vanished: bool,
-    /// Fitted on all data; otherwise on the coarse view only, far behind the leaders there.
-    pub refined: bool,
-    pub theta: Vec<f64>,
-    pub model: M,
-}
-
-impl<M, I> Candidate<M, I> {
-    pub fn label(&self) -> String {
-        self.name.label()
-    }
-
-    /// What a reader of a table should know of it; empty as a rule.
-    pub fn remark(&self) -> &'static str {
-        match (self.vanished, &self.not_credible, self.at_bound) {
-            (true, ..) => "vanishes",
-            (_, Some(_), _) => "not possible",
-            (.., true) => "at the end of its range",
-            _ => "",
-        }
-    }
-
-    /// Share of what stands above the noise that the effect explains, and its standard deviation; `None` for candidates that
-    /// were not in question.
-    pub fn explained_share(&self) -> Option<[f64; 2]> {
-        let rest = self.rest.as_ref().filter(|r| !r.tests.is_empty())?;
-        Some(something_else::share_explained(self.gain, rest))
-    }
-
-    /// Share of what stands above the noise that the effect explains, by structure where that was tested, else by size.
-    pub fn share_above_noise(&self, baseline: &Baseline) -> f64 {
-        self.explained_share()
-            .map_or_else(|| self.share_explained(baseline), |[share, _]| share)
-    }
-
-    /// Share of the misfit above noise that the effect takes away, by the size of the misfit alone.
-    pub fn share_explained(&self, baseline: &Baseline) -> f64 {
-        (baseline.reduced_chi2 - self.reduced_chi2) / (baseline.reduced_chi2 - 1.0).max(1e-9)
-    }
-}
-
-/// The answer.
-#[derive(Debug, Clone)]
-pub struct Diagnosis<M, I> {
-    pub verdict: Verdict,
-    /// Index among the candidates of the effect that is missing, if one is.
-    pub effect: Option<usize>,
-    /// The best of the library where the verdict is unknown; index among the candidates.
-    pub best_guess: Option<usize>,
-    /// Probability that the verdict is right.
-    pub confidence: f64,
-    /// Why there is no verdict, where the data are too few for one.
-    pub too_little_data: Option<String>,
-    /// Best first, one for each effect and site.
-    pub candidates: Vec<Candidate<M, I>>,
-    /// `effect@site` of rivals that this data cannot tell from the verdict.
-    pub indistinguishable: Vec<String>,
-    /// The second effect, where two together explain what one alone does not.
-    pub companion: Option<String>,
-    pub baseline: Baseline,
-    /// Effects that this data cannot show, with the reason.
-    pub not_tried: Vec<(String, String)>,
-    /// Pairs of effects that were looked at, of how many there are beside the leaders; `None` where one effect is enough or
-    /// pairs are hopeless.
-    pub pairs: Option<[usize; 2]>,
-}
-
-impl<M, I> Diagnosis<M, I> {
-    pub fn winner(&self) -> Option<&Candidate<M, I>> {
-        self.effect.map(|w| &self.candidates[w])
-    }
-
-    /// What the best of the library makes of the data where the verdict is unknown.
-    pub fn best_guess_in_words(&self) -> Option<String> {
-        let guess = self.candidates.get(self.best_guess?)?;
-        let [share, std] = guess.explained_share()?;
-        let left = guess.rest.as_ref()?.largest()?;
-        Some(format!(
-            "Best guess: {}, which explains {:.0} % (± {:.0} %) of what stands above the noise; the rest looks like {}.",
-            guess.label(),
-            100.0 * share,
-            100.0 * std,
-            left.looks_like
-        ))
-    }
-}
-
-/// The model as it stands.
-#[derive(Debug, Clone)]
-pub struct Baseline {
-    pub calibration: Calibration,
-    pub theta: Vec<f64>,
-    pub residual: Residual,
-    pub held_out: Option<HeldOut>,
-    pub reduced_chi2: f64,
-    /// What tests of structure find in what it leaves.
-    pub rest: Rest,
-}
 
 /// Leading candidates whose rest is tested for structure.
 const TESTED: usize = 4;
@@ -185,7 +61,7 @@ pub fn diagnose<S: Study>(study: &S, model: &S::Model) -> Result<Diagnosis<S::Mo
 }
 
 type TriedOf<S> = Tried<<S as Study>::Model, <S as Study>::Instance>;
-type CandidateOf<S> = Candidate<<S as Study>::Model, <S as Study>::Instance>;
+type CandidateOf<S> = EffectCandidate<<S as Study>::Model, <S as Study>::Instance>;
 
 struct Engine<'a, S: Study> {
     study: &'a S,
@@ -327,11 +203,11 @@ impl<'a, S: Study> Engine<'a, S> {
                 let (tried, vanished) = self.nested(t, without);
                 let refined = std::ptr::eq(*without, &base);
                 let judged = self.judge(&tried, refined, &evidence)?;
-                Ok(Candidate { vanished, ..judged })
+                Ok(EffectCandidate { vanished, ..judged })
             })
             .collect::<Result<_>>()?;
         candidates.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic));
-        let mut baseline = Baseline {
+        let mut baseline = BaselineFit {
             held_out: held_out(study, model, &base.theta, Extent::Coarse, REFIT_WITHOUT_FOLD)?,
             residual: base_residual,
             reduced_chi2: base_reduced,
@@ -366,7 +242,7 @@ impl<'a, S: Study> Engine<'a, S> {
         let too_little_data = self.too_little_data();
         if too_little_data.is_some() {
             decision = verdict::Decision {
-                verdict: Verdict::Unknown,
+                verdict: DiagnosisVerdict::Unknown,
                 effect: None,
                 companion: None,
                 best_guess: None,
@@ -413,7 +289,7 @@ impl<'a, S: Study> Engine<'a, S> {
     }
 
     /// What small errors of the setup can take of the rest: the winner's, and the model's as it stands.
-    fn excuse(&self, baseline: &mut Baseline, winner: Option<&mut CandidateOf<S>>) -> Result<()> {
+    fn excuse(&self, baseline: &mut BaselineFit, winner: Option<&mut CandidateOf<S>>) -> Result<()> {
         if let Some(c) = winner {
             let Some(rest) = &mut c.rest else { return Ok(()) };
             rest.beyond_slips = self.beyond_slips(rest, &c.model, &c.theta)?;
@@ -427,7 +303,7 @@ impl<'a, S: Study> Engine<'a, S> {
 
     /// Faint effects change held-out errors by less than the scatter that refits on the coarse view bring along: there the
     /// refits of whatever else speaks for an effect use all data.
-    fn held_out_on_all(&self, baseline: &mut Baseline, candidates: &mut [CandidateOf<S>]) -> Result<()> {
+    fn held_out_on_all(&self, baseline: &mut BaselineFit, candidates: &mut [CandidateOf<S>]) -> Result<()> {
         let study = self.study;
         let in_question: Vec<&mut CandidateOf<S>> = candidates
             .iter_mut()
@@ -546,7 +422,7 @@ impl<'a, S: Study> Engine<'a, S> {
         let single = ChiSquared::new(extra).map_or(1.0, |d| d.sf(gain));
         let all = estimates(study.parameters(model), fit, reduced_chi2)?;
         let own = self.base_count..all.len();
-        Ok(Candidate {
+        Ok(EffectCandidate {
             instance: instance.clone(),
             name: study.name(instance),
             nrms: study.residual(model, &fit.theta)?.nrms,
@@ -572,7 +448,7 @@ impl<'a, S: Study> Engine<'a, S> {
         candidates: &[CandidateOf<S>],
         credible: &[bool],
         evidence: &Evidence,
-    ) -> Result<(Option<verdict::Pair>, [usize; 2])> {
+    ) -> Result<(Option<verdict::EffectPair>, [usize; 2])> {
         let study = self.study;
         let mut counts = [0, 0];
         let standing = |instance: &S::Instance| {
@@ -584,7 +460,7 @@ impl<'a, S: Study> Engine<'a, S> {
             .take(PAIR_LEADERS)
             .collect();
         let progress = Progress::new("trying pairs of effects", leaders.len() * self.instances.len());
-        let mut best: Option<verdict::Pair> = None;
+        let mut best: Option<verdict::EffectPair> = None;
         for first in leaders {
             let leader = &candidates[first];
             let bases = [leader.theta.clone()];
@@ -640,7 +516,7 @@ impl<'a, S: Study> Engine<'a, S> {
                     };
                     let mut rest = study.rest(&pair.model, &pair.fit.theta)?;
                     rest.beyond_slips = self.beyond_slips(&rest, &pair.model, &pair.fit.theta)?;
-                    best = Some(verdict::Pair {
+                    best = Some(verdict::EffectPair {
                         stronger,
                         other,
                         gain: evidence.base_chi2 - 2.0 * pair.fit.cost,

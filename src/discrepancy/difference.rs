@@ -3,35 +3,41 @@
 use nalgebra::DVector;
 
 use crate::Result;
+use crate::data::Axis;
 use crate::identify::StructureModel;
-use crate::ingest::Axis;
 use crate::robot::frf::Response;
 use crate::robot::{FrfBasis, Kinematics, Place, Slot};
 
 /// A posture at which one could measure, and the lines that are looked at there.
 #[derive(Debug, Clone)]
 pub struct Lookout<'a> {
+    /// Its id.
     pub posture: &'a str,
+    /// Where the frames are there.
     pub kinematics: &'a Kinematics,
     /// See [`crate::effects::Setting`].
     pub lowness: f64,
+    /// Lines that are looked at, Hz.
     pub frequency_hz: Vec<f64>,
 }
 
 /// An FRF on which two explanations differ.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Difference {
+    /// Id of the posture.
     pub posture: String,
     /// In words: `the tool point`, `the far end of link 3`.
     pub point: String,
     /// Base axis of the response, and of the hit at the tool point.
     pub response: char,
+    /// Base axis of the hit at the tool point.
     pub hit: char,
     /// Rms difference over the first one's rms.
     pub relative: f64,
 }
 
 impl Difference {
+    /// In words, for people.
     pub fn sentence(&self) -> String {
         format!(
             "measure {} in base {}, hitting the tool in {}, at posture {}: the two explanations differ by {:.0} % there",

@@ -3,9 +3,9 @@
 use num_complex::Complex64;
 use serde::Serialize;
 
-use super::compare::{BANDS, Sums, band_edges_hz, band_of};
-use super::place::{Amounts, Place, above_noise, excess};
-use crate::campaign::Point;
+use super::error_sums::{BANDS, Sums, band_edges_hz, band_of};
+use super::place::{Amounts, DominantRegion, above_noise, excess};
+use crate::data::Point;
 use crate::identify::FrfData;
 
 /// The residual before and after.
@@ -13,27 +13,33 @@ use crate::identify::FrfData;
 /// "Above noise" is the excess E = Σ|model − measured|²/σ² − N over N complex values, which noise alone leaves at 0 ± √N.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Explained {
+    /// Over everything.
     #[serde(flatten)]
     pub total: Part,
+    /// One a posture.
     pub by_posture: Vec<NamedPart>,
     /// Response axis, reference axis: `XX`, `XY`, …
     pub by_direction: Vec<NamedPart>,
     /// Node number of the response.
     pub by_point: Vec<NamedPart>,
+    /// One a band in which something was measured.
     pub by_band: Vec<BandPart>,
     /// Where what it takes away stood.
-    pub taken_from: Place,
+    pub taken_from: DominantRegion,
     /// Where what is left above noise stands; `None` where nothing is.
-    pub left_at: Option<Place>,
+    pub left_at: Option<DominantRegion>,
 }
 
 /// One group of values before and after.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Part {
+    /// Error over the signal before.
     pub nrms_before: f64,
+    /// Error over the signal after.
     pub nrms_after: f64,
     /// Error over noise: 1 where only noise is left.
     pub times_noise_before: Option<f64>,
+    /// The same after.
     pub times_noise_after: Option<f64>,
     /// Share of the group's own excess that is taken away, at most 1; negative where it grows. `None` where no more than
     /// noise was there before.
@@ -42,17 +48,24 @@ pub struct Part {
     pub of_all: f64,
 }
 
+/// Values of one name before and after.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NamedPart {
+    /// What the group has in common: a posture, a direction, a point.
     pub name: String,
+    /// Its values.
     #[serde(flatten)]
     pub part: Part,
 }
 
+/// Values of one frequency band before and after.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct BandPart {
+    /// Lower edge, Hz.
     pub from_hz: f64,
+    /// Upper edge, Hz.
     pub to_hz: f64,
+    /// Its values.
     #[serde(flatten)]
     pub part: Part,
 }
@@ -154,7 +167,7 @@ impl Explained {
         }
         let place = |amount: fn(&Change) -> f64| {
             let bands: Vec<f64> = bands.iter().map(amount).collect();
-            Place::new(
+            DominantRegion::new(
                 &edges,
                 &bands,
                 &directions.amounts(amount),

@@ -13,8 +13,11 @@ use crate::{Error, Result};
 /// A model fitted to all data.
 #[derive(Debug, Clone)]
 pub struct Fitted<M> {
+    /// The model that was fitted.
     pub model: M,
+    /// Its fit.
     pub calibration: Calibration,
+    /// What that leaves.
     pub residual: Residual,
     /// On folds left out of the fit; `None` with one fold.
     pub held_out: Option<HeldOut>,
@@ -23,9 +26,11 @@ pub struct Fitted<M> {
 /// What adding an effect does.
 #[derive(Debug, Clone)]
 pub struct Extension<M, I> {
+    /// The effect that was added.
     pub instance: I,
     /// The model as it stood, fitted to the same data.
     pub before: Fitted<M>,
+    /// The model with it.
     pub after: Fitted<M>,
     /// The effect vanishes in these data: the fit with it is the fit without it.
     pub vanished: bool,
@@ -53,6 +58,7 @@ impl<M> Fitted<M> {
         })
     }
 
+    /// Error on folds left out of the fit; `None` with one fold.
     pub fn held_out_nrms(&self) -> Option<f64> {
         self.held_out.as_ref().map(|h| h.nrms())
     }

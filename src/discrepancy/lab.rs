@@ -5,10 +5,9 @@ use serde::Serialize;
 use super::noise_outlook;
 use super::prospect::Prospect;
 use crate::Result;
-use crate::campaign::{AxesRef, BodyRef, MeasuredDof, Point, Posture};
+use crate::data::{AxesRef, Axis, BodyRef, MeasuredDof, Point, Posture};
 use crate::identify::frf_data::{FrfBlock, FrfDatum};
 use crate::identify::{FrfData, StructureModel};
-use crate::ingest::Axis;
 use crate::robot::{JointSpec, Kinematics, RobotModel};
 use crate::signal::noise_law::FrfNoise;
 
@@ -35,6 +34,7 @@ pub struct Stand {
     pub posture: Option<usize>,
     /// In words: `posture p2`.
     pub name: String,
+    /// Joint angles, degrees.
     pub joints_deg: Vec<f64>,
     /// All FRFs that could be taken, on the lines looked at; without values.
     pub block: FrfBlock,
@@ -50,9 +50,12 @@ pub struct Stand {
 
 /// One FRF of a stand, measured `times` times.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Part {
+pub struct MeasurementPart {
+    /// Index among the [`Lab`]'s stands.
     pub stand: usize,
+    /// Index among the stand's FRFs.
     pub frf: usize,
+    /// How often it is measured.
     pub times: f64,
 }
 
@@ -63,7 +66,8 @@ pub struct Measurement {
     pub what: String,
     /// Effort in units of one FRF with everything in place.
     pub cost: f64,
-    pub parts: Vec<Part>,
+    /// The FRFs that it consists of.
+    pub parts: Vec<MeasurementPart>,
 }
 
 /// FRFs of a [`Measurement`] taken at one posture, for a program.
@@ -71,9 +75,11 @@ pub struct Measurement {
 pub struct Setup {
     /// `null`: a new posture.
     pub posture: Option<String>,
+    /// Joint angles, degrees.
     pub joints_deg: Vec<f64>,
     /// `2X/1Y`: response / hit.
     pub frfs: Vec<String>,
+    /// How often each is measured.
     pub times: f64,
     /// Hammer force against the present one.
     pub harder: f64,
@@ -82,8 +88,11 @@ pub struct Setup {
 /// A point that the campaign does not have yet.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NewPoint {
+    /// Node number that is still free.
     pub node: i64,
+    /// The body that it sits on: `link3`, `tool`.
     pub body: String,
+    /// In the frame of that body, m.
     pub position_m: [f64; 3],
 }
 
@@ -94,7 +103,9 @@ pub struct Lab {
     pub points: Vec<Point>,
     /// How many of them are the campaign's own.
     own_points: usize,
+    /// Postures and hammer levels at which one could measure.
     pub stands: Vec<Stand>,
+    /// What could be measured there.
     pub measurements: Vec<Measurement>,
 }
 
@@ -289,12 +300,17 @@ impl Lab {
         self.measurements = all;
     }
 
-    fn parts(&self, stand: usize, times: f64, wanted: impl Fn(&FrfDatum, bool) -> bool) -> Vec<Part> {
+    fn parts(
+        &self,
+        stand: usize,
+        times: f64,
+        wanted: impl Fn(&FrfDatum, bool) -> bool,
+    ) -> Vec<MeasurementPart> {
         let Stand { block, present, .. } = &self.stands[stand];
         let chosen = block.frfs.iter().zip(present).enumerate();
         chosen
             .filter(|(_, (frf, there))| wanted(frf, **there))
-            .map(|(frf, _)| Part { stand, frf, times })
+            .map(|(frf, _)| MeasurementPart { stand, frf, times })
             .collect()
     }
 
@@ -313,7 +329,7 @@ impl Lab {
                 && axes.contains(&frf.response.axis)
                 && hits.contains(&frf.reference.axis)
         };
-        let parts: Vec<Vec<Part>> = stands.iter().map(|s| self.parts(*s, 1.0, wanted)).collect();
+        let parts: Vec<Vec<MeasurementPart>> = stands.iter().map(|s| self.parts(*s, 1.0, wanted)).collect();
         if parts.iter().any(Vec::is_empty) {
             return None;
         }
@@ -321,7 +337,7 @@ impl Lab {
             true => 0.0,
             false => NEW_PLACE,
         };
-        let parts: Vec<Part> = parts.into_iter().flatten().collect();
+        let parts: Vec<MeasurementPart> = parts.into_iter().flatten().collect();
         let at = match stands {
             [one] => format!("at {}", self.stands[*one].name),
             _ => "at every posture".into(),
@@ -340,7 +356,7 @@ impl Lab {
         };
         [(1.0, "once more"), (3.0, "three times more")]
             .map(|(times, words)| {
-                let parts: Vec<Part> = stands
+                let parts: Vec<MeasurementPart> = stands
                     .iter()
                     .flat_map(|s| self.parts(*s, times, |_, there| there))
                     .collect();
@@ -354,7 +370,7 @@ impl Lab {
     }
 
     fn harder(&self, present: usize) -> Measurement {
-        let parts: Vec<Part> = (present..2 * present)
+        let parts: Vec<MeasurementPart> = (present..2 * present)
             .flat_map(|s| self.parts(s, 1.0, |_, there| there))
             .collect();
         Measurement {
@@ -366,7 +382,7 @@ impl Lab {
 
     fn at_new_posture(&self, stand: usize) -> Vec<Measurement> {
         let name = &self.stands[stand].name;
-        let measurement = |words: String, parts: Vec<Part>| Measurement {
+        let measurement = |words: String, parts: Vec<MeasurementPart>| Measurement {
             what: format!("measure {words} at {name}"),
             cost: parts.len() as f64 + NEW_POSTURE,
             parts,

@@ -12,10 +12,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::Result;
-use crate::campaign::Point;
+use crate::data::{Axis, Point};
 use crate::identify::frf_data::{FrfBlock, FrfDatum};
 use crate::identify::{FrfData, StructureModel};
-use crate::ingest::Axis;
 use crate::robot::frf::Response;
 use crate::robot::{Dual, Element, FrfBasis, Place, Role, Slot};
 

@@ -6,17 +6,18 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::diagnose::{Candidate, Diagnosis};
+use super::candidate::EffectCandidate;
+use super::diagnosis::Diagnosis;
 use super::next_measurement::{Alternative, ENOUGH_SIGMAS, LEAST_SIGMAS, NextMeasurement};
-use super::verdict::Verdict;
+use super::verdict::DiagnosisVerdict;
 use crate::Result;
-use crate::campaign::Immersion;
 use crate::cutting::EdgeBit;
+use crate::data::Immersion;
 use crate::effects::cutting::CuttingInstance;
 use crate::identify::cutting_data::{CutData, CutKind};
 use crate::identify::{CuttingData, CuttingModel, CuttingProblem, LeastSquares, Linearisation};
 
-type CuttingCandidate = Candidate<CuttingModel, CuttingInstance>;
+type CuttingCandidate = EffectCandidate<CuttingModel, CuttingInstance>;
 
 /// A cut that could be made.
 struct Proposal {
@@ -39,9 +40,9 @@ pub fn advise_cutting(
     data: &CuttingData,
     diagnosis: &Diagnosis<CuttingModel, CuttingInstance>,
 ) -> Result<NextMeasurement> {
-    let (Verdict::Effect, Some(winner)) = (diagnosis.verdict, diagnosis.winner()) else {
+    let (DiagnosisVerdict::Effect, Some(winner)) = (diagnosis.verdict, diagnosis.winner()) else {
         return Ok(NextMeasurement::words(match diagnosis.verdict {
-            Verdict::Unknown => {
+            DiagnosisVerdict::Unknown => {
                 "the cut with the largest misfit once more, and once at half its feed: what repeats is physics"
             }
             _ => "none needed for this model; other feeds and speeds would test it further",

@@ -5,13 +5,14 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::diagnose::{Candidate, Diagnosis};
+use super::candidate::EffectCandidate;
+use super::diagnosis::Diagnosis;
 use super::lab::{Lab, NewPoint, Setup};
-use super::verdict::Verdict;
+use super::verdict::DiagnosisVerdict;
 use crate::Result;
-use crate::campaign::Posture;
+use crate::data::Posture;
 use crate::effects::Instance;
-use crate::identify::structure::{FrfProblem, Misfit};
+use crate::identify::frf_problem::{FrfProblem, Misfit};
 use crate::identify::{FrfData, LeastSquares, StructureModel};
 
 /// Standard deviations that a measurement should promise: what is found scatters by two about their square's root, and
@@ -45,8 +46,11 @@ pub struct NextMeasurement {
 /// Another measurement.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Alternative {
+    /// In words.
     pub what: String,
+    /// As [`NextMeasurement::expected_sigmas`].
     pub expected_sigmas: f64,
+    /// As [`NextMeasurement::cost`].
     pub cost: f64,
 }
 
@@ -71,7 +75,7 @@ impl fmt::Display for NextMeasurement {
     }
 }
 
-type StructureCandidate = Candidate<StructureModel, Instance>;
+type StructureCandidate = EffectCandidate<StructureModel, Instance>;
 
 /// What to measure next on a robot. `postures`: the campaign's.
 ///
@@ -83,7 +87,7 @@ pub fn advise(
     diagnosis: &Diagnosis<StructureModel, Instance>,
 ) -> Result<NextMeasurement> {
     match (diagnosis.verdict, diagnosis.winner()) {
-        (Verdict::Effect, Some(winner)) => {
+        (DiagnosisVerdict::Effect, Some(winner)) => {
             let others = || {
                 diagnosis
                     .candidates
@@ -105,7 +109,7 @@ pub fn advise(
                 ..advice
             })
         }
-        (Verdict::Unknown, _) => Ok(NextMeasurement::words(where_it_sits(data, diagnosis))),
+        (DiagnosisVerdict::Unknown, _) => Ok(NextMeasurement::words(where_it_sits(data, diagnosis))),
         _ => Ok(NextMeasurement::words(
             "none needed for this model; two more postures or a second hammer level would test it further",
         )),
@@ -123,7 +127,7 @@ fn where_it_sits(data: &FrfData, diagnosis: &Diagnosis<StructureModel, Instance>
     let measured = |link: usize| {
         let on_link = |point: usize| {
             let point = model.and_then(|m| m.points.get(point));
-            point.is_some_and(|p| p.body == crate::campaign::BodyRef::Link(link))
+            point.is_some_and(|p| p.body == crate::data::BodyRef::Link(link))
         };
         data.frfs().any(|(_, frf)| on_link(frf.response.point))
     };

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::compare::Sums;
+use super::error_sums::Sums;
 
 /// What "most" is: the fewest groups that hold this share together.
 const MOST: f64 = 0.6;
@@ -11,10 +11,14 @@ const SURE: f64 = 4.0;
 
 /// Where most of something sits; an empty list: everywhere.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Place {
+pub struct DominantRegion {
+    /// Lower end, Hz.
     pub from_hz: f64,
+    /// Upper end, Hz.
     pub to_hz: f64,
+    /// Response axis, reference axis: `XX`, `XY`, …
     pub directions: Vec<String>,
+    /// Their ids.
     pub postures: Vec<String>,
     /// Node numbers.
     pub points: Vec<String>,
@@ -63,7 +67,7 @@ impl Amounts {
     }
 }
 
-impl Place {
+impl DominantRegion {
     /// `bands`: amount in each band between neighbouring `edges` (Hz). Negative amounts count as nothing.
     pub(super) fn new(
         edges: &[f64],
@@ -71,10 +75,10 @@ impl Place {
         directions: &Amounts,
         postures: &Amounts,
         points: &Amounts,
-    ) -> Place {
+    ) -> DominantRegion {
         let amounts: Vec<f64> = bands.iter().map(|b| b.max(0.0)).collect();
         let (first, last) = shortest_run(&amounts);
-        Place {
+        DominantRegion {
             from_hz: edges[first],
             to_hz: edges[last + 1],
             directions: directions.holding_most(),

@@ -9,10 +9,10 @@ use serde::Serialize;
 
 use super::lab::Lab;
 use crate::Result;
-use crate::campaign::Posture;
+use crate::data::Posture;
 use crate::effects::{self, DataSummary, Instance};
+use crate::identify::frf_problem::{FrfProblem, Misfit};
 use crate::identify::levenberg_marquardt::{Stopping, minimise};
-use crate::identify::structure::{FrfProblem, Misfit};
 use crate::identify::{FrfData, LeastSquares, StructureModel};
 
 /// Standard deviations from which on an effect counts as seen, and two as told apart.
@@ -31,7 +31,9 @@ const STOPPING: Stopping = Stopping {
 /// How plainly an effect of usual size would show.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlannedEffect {
+    /// Its id.
     pub effect: String,
+    /// `joint-2`, `link-4`; `None` where the effect has no place of its own.
     pub site: Option<String>,
     /// Standard deviations after the baseline has taken in what it can.
     pub sigmas: f64,
@@ -42,7 +44,9 @@ pub struct PlannedEffect {
 /// Two effects that the plan would not tell apart.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Confusable {
+    /// `effect@site`.
     pub a: String,
+    /// `effect@site`.
     pub b: String,
     /// The lesser of both directions: `a` true and `b` fitted, and the other way round.
     pub sigmas: f64,
@@ -51,6 +55,7 @@ pub struct Confusable {
 /// A measurement that would mend a lack.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlannedAddition {
+    /// In words.
     pub what: String,
     /// More standard deviations for the first of `mends`.
     pub sigmas_gained: f64,
@@ -64,7 +69,7 @@ pub struct PlannedAddition {
 
 /// What the plan would show.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
+pub struct PlanOutlook {
     /// Best seen first.
     pub effects: Vec<PlannedEffect>,
     /// Pairs of effects that are seen but not told apart, nearest first.
@@ -95,7 +100,7 @@ struct Fitted {
     chi2: f64,
 }
 
-impl Plan {
+impl PlanOutlook {
     /// `model`: without effects. `data`: the FRFs planned, with their noise; their values are not looked at.
     ///
     /// # Errors
@@ -200,7 +205,7 @@ impl Plan {
         let (additions, out_of_reach) = additions(model, postures, &full, &subjects, &lacks)?;
         let mut effects: Vec<PlannedEffect> = subjects.iter().map(|s| s.planned(model)).collect();
         effects.sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
-        Ok(Plan {
+        Ok(PlanOutlook {
             effects,
             confusable,
             additions,

@@ -4,14 +4,15 @@ use serde::Serialize;
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::diagnose::{Baseline, Candidate};
+use super::candidate::{BaselineFit, EffectCandidate};
 use super::something_else;
 use crate::identify::HeldOut;
 use crate::identify::rest::Rest;
 
+/// What the loop says about missing physics.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Verdict {
+pub enum DiagnosisVerdict {
     /// A known effect is missing.
     Effect,
     /// What is left looks like noise.
@@ -43,13 +44,13 @@ pub fn least_freedom() -> usize {
 }
 
 /// Whether a candidate improves the fit by more than chance, with parameters that are not stuck at the end of their range.
-pub fn significant<M, I>(c: &Candidate<M, I>) -> bool {
+pub fn significant<M, I>(c: &EffectCandidate<M, I>) -> bool {
     is_convincing(c.p_value, c.delta_bic) && !c.at_bound
 }
 
 /// Whether a candidate is significant, of a possible size, and improves the prediction of folds left out. `chance`: what
 /// differences of χ² are divided by before they are held against noise.
-pub fn credible<M, I>(c: &Candidate<M, I>, baseline: &Baseline, chance: f64) -> bool {
+pub fn credible<M, I>(c: &EffectCandidate<M, I>, baseline: &BaselineFit, chance: f64) -> bool {
     let improves = match (&c.held_out, &baseline.held_out) {
         (Some(with), Some(without)) => is_progress(without, with, c.parameters.len(), chance),
         _ => true,
@@ -94,7 +95,7 @@ pub fn is_convincing(p_value: f64, delta_bic: f64) -> bool {
 
 /// Two effects that explain the data together.
 #[derive(Debug, Clone)]
-pub struct Pair {
+pub struct EffectPair {
     /// Index among the candidates of the one that explains more alone.
     pub stronger: usize,
     /// The other one's label.
@@ -103,10 +104,11 @@ pub struct Pair {
     pub gain: f64,
     /// Weighted misfit per degree of freedom that both together leave.
     pub reduced_chi2: f64,
+    /// What both leave.
     pub rest: Rest,
 }
 
-impl Pair {
+impl EffectPair {
     /// Odds that something else is behind what both explain.
     pub fn odds_against(&self) -> f64 {
         something_else::odds_of_pair(self.gain, &self.rest)
@@ -116,12 +118,17 @@ impl Pair {
 /// What the loop concludes.
 #[derive(Debug, Clone)]
 pub struct Decision {
-    pub verdict: Verdict,
+    /// The verdict.
+    pub verdict: DiagnosisVerdict,
+    /// Index among the candidates of the effect that is missing, if one is.
     pub effect: Option<usize>,
     /// The best of the library where the verdict is unknown.
     pub best_guess: Option<usize>,
+    /// The second effect, where two together explain what one alone does not.
     pub companion: Option<String>,
+    /// Probability that the verdict is right.
     pub confidence: f64,
+    /// `effect@site` of rivals that this data cannot tell from the verdict.
     pub indistinguishable: Vec<String>,
 }
 
@@ -137,7 +144,7 @@ fn leaves_noise(rest: &Rest, reduced_chi2: f64) -> bool {
 }
 
 /// Whether a candidate leaves more than noise.
-pub fn leaves_structure<M, I>(c: &Candidate<M, I>) -> bool {
+pub fn leaves_structure<M, I>(c: &EffectCandidate<M, I>) -> bool {
     match &c.rest {
         Some(rest) => !leaves_noise(rest, c.reduced_chi2),
         None => !is_noise(c.reduced_chi2),
@@ -148,20 +155,20 @@ pub fn leaves_structure<M, I>(c: &Candidate<M, I>) -> bool {
 const SETTLED: f64 = 0.1;
 
 /// Whether a candidate leaves room for a second effect beside it.
-pub fn leaves_room<M, I>(c: &Candidate<M, I>, baseline: &Baseline) -> bool {
+pub fn leaves_room<M, I>(c: &EffectCandidate<M, I>, baseline: &BaselineFit) -> bool {
     leaves_structure(c) && odds_against(c, baseline) > SETTLED
 }
 
 /// `pair`: the best pair of effects, where one was sought.
 pub fn decide<M, I>(
-    candidates: &[Candidate<M, I>],
+    candidates: &[EffectCandidate<M, I>],
     credible: &[bool],
-    baseline: &Baseline,
-    pair: Option<Pair>,
+    baseline: &BaselineFit,
+    pair: Option<EffectPair>,
     scale: f64,
 ) -> Decision {
     let mut decision = Decision {
-        verdict: Verdict::None,
+        verdict: DiagnosisVerdict::None,
         effect: None,
         best_guess: None,
         companion: None,
@@ -184,7 +191,7 @@ pub fn decide<M, I>(
         _ => (alone, w),
     };
     let reference = winner.delta_bic;
-    let weight = |c: &Candidate<M, I>| evidence_weight(c.delta_bic - reference).min(1.0);
+    let weight = |c: &EffectCandidate<M, I>| evidence_weight(c.delta_bic - reference).min(1.0);
     let rivals: f64 = candidates
         .iter()
         .enumerate()
@@ -194,11 +201,11 @@ pub fn decide<M, I>(
     // What the model without any effect would weigh.
     let beaten = evidence_weight(-reference).min(1.0);
     if odds_else < 1.0 {
-        decision.verdict = Verdict::Effect;
+        decision.verdict = DiagnosisVerdict::Effect;
         decision.effect = Some(named);
         decision.confidence = 1.0 / (1.0 + rivals + beaten + excused + odds_else);
         let close =
-            |c: &Candidate<M, I>| (c.delta_bic - reference).abs() * scale.max(1.0) < INDISTINGUISHABLE;
+            |c: &EffectCandidate<M, I>| (c.delta_bic - reference).abs() * scale.max(1.0) < INDISTINGUISHABLE;
         decision.indistinguishable = candidates
             .iter()
             .zip(credible)
@@ -207,7 +214,7 @@ pub fn decide<M, I>(
             .map(|(_, (c, _))| c.label())
             .collect();
     } else {
-        decision.verdict = Verdict::Unknown;
+        decision.verdict = DiagnosisVerdict::Unknown;
         decision.companion = None;
         decision.best_guess = Some(w);
         decision.confidence = 1.0 / (1.0 + (1.0 + beaten) / odds_else);
@@ -217,7 +224,7 @@ pub fn decide<M, I>(
 }
 
 /// Odds that something else is behind what a candidate explains.
-fn odds_against<M, I>(c: &Candidate<M, I>, baseline: &Baseline) -> f64 {
+fn odds_against<M, I>(c: &EffectCandidate<M, I>, baseline: &BaselineFit) -> f64 {
     match &c.rest {
         Some(rest) if !rest.tests.is_empty() => something_else::odds(c.gain, rest),
         // Too little data for tests of structure: the size of the rest has to do.
@@ -229,7 +236,7 @@ fn odds_against<M, I>(c: &Candidate<M, I>, baseline: &Baseline) -> f64 {
 
 /// Weight of the small errors of the setup alone against the same with a candidate: 1 where they need it not. Zero where such
 /// errors are not in question.
-fn weight_of_slips_alone<M, I>(c: &Candidate<M, I>, baseline: &Baseline) -> f64 {
+fn weight_of_slips_alone<M, I>(c: &EffectCandidate<M, I>, baseline: &BaselineFit) -> f64 {
     let compared = || {
         let (alone, with) = (
             baseline.rest.beyond_slips.as_ref()?,
@@ -246,24 +253,24 @@ fn weight_of_slips_alone<M, I>(c: &Candidate<M, I>, baseline: &Baseline) -> f64 
 /// No candidate is credible: nothing is missing, or something else.
 fn decide_without_candidate<M, I>(
     decision: &mut Decision,
-    candidates: &[Candidate<M, I>],
-    baseline: &Baseline,
+    candidates: &[EffectCandidate<M, I>],
+    baseline: &BaselineFit,
 ) {
     // p-values near the threshold leave doubt.
     let best = candidates.first().map_or(1.0, |c| c.p_value);
     let least = baseline.rest.tests.iter().map(|t| t.p_value).fold(1.0, f64::min);
     if leaves_noise(&baseline.rest, baseline.reduced_chi2) {
-        decision.verdict = Verdict::None;
+        decision.verdict = DiagnosisVerdict::None;
         let calm = |p: f64| p / (p + 0.01);
         decision.confidence = (0.92 * calm(best).max(0.7) * calm(least * 4.0).max(0.6)).clamp(0.3, MOST_SURE);
         return;
     }
     let foreign = something_else::odds_against_slips(&baseline.rest);
     if foreign < 1.0 {
-        decision.verdict = Verdict::None;
+        decision.verdict = DiagnosisVerdict::None;
         decision.confidence = MOST_SURE / (1.0 + foreign);
     } else {
-        decision.verdict = Verdict::Unknown;
+        decision.verdict = DiagnosisVerdict::Unknown;
         decision.best_guess = (!candidates.is_empty()).then_some(0);
         decision.confidence = 0.97 / (1.0 + 1.0 / foreign);
     }

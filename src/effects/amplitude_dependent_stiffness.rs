@@ -1,7 +1,9 @@
-use super::*;
+use super::effect::{DataSummary, Setting, Site, StructuralEffect};
+use super::{Background, Size};
+use crate::data::RobotSpec;
 use crate::effects::background::TUTTLE;
-use crate::parameter::{Prior, Scale};
-use crate::robot::Role;
+use crate::parameter::{Parameter, Prior, Scale};
+use crate::robot::{Chain, Dual, Role};
 
 /// Backlash or lost motion: a joint's stiffness differs between hammer levels.
 pub struct AmplitudeDependentStiffness;

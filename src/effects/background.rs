@@ -14,17 +14,17 @@ pub struct Background {
 /// Works that several effects rest on.
 pub const EWINS: &str = "Ewins, D. J. (2000): Modal Testing: Theory, Practice and Application. 2nd edition, Research Studies \
                          Press.";
-pub const ALTINTAS: &str = "Altintas, Y. (2012): Manufacturing Automation: Metal Cutting Mechanics, Machine Tool Vibrations, \
+pub(super) const ALTINTAS: &str = "Altintas, Y. (2012): Manufacturing Automation: Metal Cutting Mechanics, Machine Tool Vibrations, \
                             and CNC Design. 2nd edition, Cambridge University Press.";
-pub const ABELE: &str = "Abele, E.; Weigold, M.; Rothenbücher, S. (2007): Modeling and identification of an industrial robot \
+pub(super) const ABELE: &str = "Abele, E.; Weigold, M.; Rothenbücher, S. (2007): Modeling and identification of an industrial robot \
                          for machining applications. CIRP Annals 56(1).";
-pub const MOBERG: &str = "Moberg, S.; Wernholt, E.; Hanssen, S.; Brogårdh, T. (2014): Modeling and parameter estimation of \
+pub(super) const MOBERG: &str = "Moberg, S.; Wernholt, E.; Hanssen, S.; Brogårdh, T. (2014): Modeling and parameter estimation of \
                           robot manipulators using extended flexible joint models. ASME Journal of Dynamic Systems, \
                           Measurement, and Control 136(3).";
-pub const TUTTLE: &str = "Tuttle, T. D.; Seering, W. P. (1996): A nonlinear model of a harmonic drive gear transmission. \
+pub(super) const TUTTLE: &str = "Tuttle, T. D.; Seering, W. P. (1996): A nonlinear model of a harmonic drive gear transmission. \
                           IEEE Transactions on Robotics and Automation 12(3).";
-pub const BUDAK: &str = "Budak, E.; Altintas, Y.; Armarego, E. J. A. (1996): Prediction of milling force coefficients from \
+pub(super) const BUDAK: &str = "Budak, E.; Altintas, Y.; Armarego, E. J. A. (1996): Prediction of milling force coefficients from \
                          orthogonal cutting data. ASME Journal of Manufacturing Science and Engineering 118(2).";
-pub const SHAW_OXFORD: &str = "Shaw, M. C.; Oxford, C. J. (1957): On the drilling of metals, 2: the torque and thrust in \
+pub(super) const SHAW_OXFORD: &str = "Shaw, M. C.; Oxford, C. J. (1957): On the drilling of metals, 2: the torque and thrust in \
                                drilling. Transactions of the ASME 79.";
-pub const GAUTSCHI: &str = "Gautschi, G. (2002): Piezoelectric Sensorics. Springer.";
+pub(super) const GAUTSCHI: &str = "Gautschi, G. (2002): Piezoelectric Sensorics. Springer.";

@@ -1,8 +1,11 @@
-use super::*;
-use crate::effects::background::EWINS;
-use crate::parameter::{Prior, Scale};
-use crate::robot::{Element, Place, Role, Slot};
 use nalgebra::{DMatrix, Point3, Vector6};
+
+use super::Background;
+use super::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
+use crate::data::RobotSpec;
+use crate::effects::background::EWINS;
+use crate::parameter::{Parameter, Prior, Scale};
+use crate::robot::{Chain, Dual, Element, Place, Role, Slot};
 
 /// The pedestal rocks about the base x and y axes.
 pub struct BaseCompliance;

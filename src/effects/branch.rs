@@ -1,7 +1,9 @@
 //! What effects share that hang a mass on a spring.
 
-use super::*;
-use crate::parameter::{Prior, Scale};
+use super::Size;
+use super::effect::DataSummary;
+use crate::parameter::{Parameter, Prior, Scale};
+use crate::robot::Dual;
 
 /// mass_kg, frequency_hz, damping_ratio of a mass on a spring.
 pub fn parameters(data: &DataSummary, mass_kg: f64, frequency_hz: f64) -> Vec<Parameter> {

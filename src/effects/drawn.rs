@@ -2,21 +2,29 @@
 //! displacement that the model has (a link against the ground, a joint's turning), `series` adds one that it takes for
 //! stiff (a bearing, the base, the motor's side of a gear). They are added on request, not tried by `diagnose`.
 
-use super::*;
-use crate::parameter::{Prior, Scale};
-use crate::robot::{Attachment, AttachmentLaw, Branch as HungMass, Element, Grip, Role};
 use nalgebra::{DMatrix, Vector6};
 use num_complex::Complex64;
 
+use super::effect::{DataSummary, Instance, NEGLIGIBLE, Setting, Site, StructuralEffect};
+use super::{Background, Spot, branch};
+use crate::data::RobotSpec;
+use crate::parameter::{Parameter, Prior, Scale};
+use crate::robot::{Attachment, AttachmentLaw, Branch as HungMass, Chain, Dual, Element, Grip, Role};
+
 /// A law of force over displacement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Form {
+pub enum DrawnForm {
+    /// Force in proportion to the displacement.
     Spring,
+    /// Force in proportion to the speed.
     Damper,
+    /// Both next to each other.
     SpringDamper,
+    /// Force in proportion to the acceleration.
     Mass,
     /// A mass on a spring.
     Resonator,
+    /// Two masses, each on a spring of its own.
     TwoResonators,
     /// A spring with a loss factor.
     LossFactor,
@@ -26,38 +34,38 @@ pub enum Form {
     RotorOnSpring,
 }
 
-impl Form {
-    /// As in the contract: `spring-damper`.
+impl DrawnForm {
+    /// As in docs/json.md: `spring-damper`.
     pub fn label(self) -> &'static str {
         match self {
-            Form::Spring => "spring",
-            Form::Damper => "damper",
-            Form::SpringDamper => "spring-damper",
-            Form::Mass => "mass",
-            Form::Resonator => "resonator",
-            Form::TwoResonators => "two-resonators",
-            Form::LossFactor => "loss-factor",
-            Form::Maxwell => "maxwell",
-            Form::RotorOnSpring => "rotor-on-spring",
+            DrawnForm::Spring => "spring",
+            DrawnForm::Damper => "damper",
+            DrawnForm::SpringDamper => "spring-damper",
+            DrawnForm::Mass => "mass",
+            DrawnForm::Resonator => "resonator",
+            DrawnForm::TwoResonators => "two-resonators",
+            DrawnForm::LossFactor => "loss-factor",
+            DrawnForm::Maxwell => "maxwell",
+            DrawnForm::RotorOnSpring => "rotor-on-spring",
         }
     }
 }
 
-const AT_POINT: [Form; 6] = [
-    Form::Spring,
-    Form::SpringDamper,
-    Form::Mass,
-    Form::Resonator,
-    Form::TwoResonators,
-    Form::LossFactor,
+const AT_POINT: [DrawnForm; 6] = [
+    DrawnForm::Spring,
+    DrawnForm::SpringDamper,
+    DrawnForm::Mass,
+    DrawnForm::Resonator,
+    DrawnForm::TwoResonators,
+    DrawnForm::LossFactor,
 ];
 /// A spring beside a joint's stiffness is more of the same.
-const AT_JOINT: [Form; 3] = [Form::Damper, Form::LossFactor, Form::Maxwell];
-const IN_SERIES: [Form; 3] = [Form::Spring, Form::SpringDamper, Form::LossFactor];
-const IN_DRIVE: [Form; 2] = [Form::SpringDamper, Form::RotorOnSpring];
+const AT_JOINT: [DrawnForm; 3] = [DrawnForm::Damper, DrawnForm::LossFactor, DrawnForm::Maxwell];
+const IN_SERIES: [DrawnForm; 3] = [DrawnForm::Spring, DrawnForm::SpringDamper, DrawnForm::LossFactor];
+const IN_DRIVE: [DrawnForm; 2] = [DrawnForm::SpringDamper, DrawnForm::RotorOnSpring];
 
 /// Forms that a spot can have, in the order of their variants.
-pub fn forms(spot: Spot) -> &'static [Form] {
+pub fn forms(spot: Spot) -> &'static [DrawnForm] {
     match spot {
         Spot::Joint(_) => &AT_JOINT,
         Spot::LinkAxis(..) | Spot::ToolGround(_) => &AT_POINT,
@@ -67,25 +75,27 @@ pub fn forms(spot: Spot) -> &'static [Form] {
 }
 
 /// All forms, in the order of their variants: one list for all spots, so that a variant means one form everywhere.
-const FORMS: [Form; 9] = [
-    Form::Spring,
-    Form::Damper,
-    Form::SpringDamper,
-    Form::Mass,
-    Form::Resonator,
-    Form::TwoResonators,
-    Form::LossFactor,
-    Form::Maxwell,
-    Form::RotorOnSpring,
+const FORMS: [DrawnForm; 9] = [
+    DrawnForm::Spring,
+    DrawnForm::Damper,
+    DrawnForm::SpringDamper,
+    DrawnForm::Mass,
+    DrawnForm::Resonator,
+    DrawnForm::TwoResonators,
+    DrawnForm::LossFactor,
+    DrawnForm::Maxwell,
+    DrawnForm::RotorOnSpring,
 ];
 
-pub struct Branch;
+/// Acts on a displacement that the model has.
+pub struct DrawnBranch;
+/// Adds a displacement that the model takes for stiff.
 pub struct Series;
 
 /// The instance of a form at a spot.
-pub fn instance(spot: Spot, form: Form) -> Instance {
+pub fn instance(spot: Spot, form: DrawnForm) -> Instance {
     Instance {
-        effect: if spot.is_series() { &Series } else { &Branch },
+        effect: if spot.is_series() { &Series } else { &DrawnBranch },
         site: Site::At(spot),
         variant: FORMS.iter().position(|f| *f == form).unwrap_or(0),
     }
@@ -99,14 +109,14 @@ pub fn instances(robot: &RobotSpec) -> Vec<Instance> {
         .collect()
 }
 
-/// Form of an instance of [`Branch`] or [`Series`].
-pub fn form_of(variant: usize) -> Form {
+/// DrawnForm of an instance of [`DrawnBranch`] or [`Series`].
+pub fn form_of(variant: usize) -> DrawnForm {
     FORMS[variant]
 }
 
 /// Dynamic stiffness of a form at `frequency_hz`, N/m or N·m/rad; `values`: natural values of its parameters in their
 /// order.
-pub fn dynamic_stiffness(spot: Spot, form: Form, values: &[f64], frequency_hz: f64) -> Complex64 {
+pub fn dynamic_stiffness(spot: Spot, form: DrawnForm, values: &[f64], frequency_hz: f64) -> Complex64 {
     let omega = std::f64::consts::TAU * frequency_hz;
     let complex = Complex64::new;
     // −ω² (k + iωc)/(k + iωc − ω² m) times m (Den Hartog 1956, chapter 3).
@@ -116,18 +126,18 @@ pub fn dynamic_stiffness(spot: Spot, form: Form, values: &[f64], frequency_hz: f
         -own[0] * omega * omega * spring / (spring - omega * omega)
     };
     match form {
-        Form::Spring => complex(values[0], 0.0),
-        Form::Damper => complex(0.0, omega * values[0]),
-        Form::SpringDamper => complex(values[0], omega * values[1]),
-        Form::Mass => complex(-omega * omega * values[0], 0.0),
-        Form::Resonator | Form::TwoResonators => values.chunks_exact(3).map(resonator).sum(),
-        Form::LossFactor if matches!(spot, Spot::Joint(_)) => complex(0.0, values[0]),
-        Form::LossFactor => complex(values[0], values[0] * values[1]),
-        Form::Maxwell => {
+        DrawnForm::Spring => complex(values[0], 0.0),
+        DrawnForm::Damper => complex(0.0, omega * values[0]),
+        DrawnForm::SpringDamper => complex(values[0], omega * values[1]),
+        DrawnForm::Mass => complex(-omega * omega * values[0], 0.0),
+        DrawnForm::Resonator | DrawnForm::TwoResonators => values.chunks_exact(3).map(resonator).sum(),
+        DrawnForm::LossFactor if matches!(spot, Spot::Joint(_)) => complex(0.0, values[0]),
+        DrawnForm::LossFactor => complex(values[0], values[0] * values[1]),
+        DrawnForm::Maxwell => {
             let damper = complex(0.0, omega * values[1]);
             values[0] * damper / (values[0] + damper)
         }
-        Form::RotorOnSpring => complex(values[0] - omega * omega * values[2], omega * values[1]),
+        DrawnForm::RotorOnSpring => complex(values[0] - omega * omega * values[2], omega * values[1]),
     }
 }
 
@@ -162,25 +172,25 @@ fn parameters(site: Site, variant: usize, data: &DataSummary) -> Vec<Parameter> 
     let usual = if spot.is_series() { 1e7 } else { 1e5 };
     let resonator = || branch::parameters(data, 5.0, 15.0);
     match form_of(variant) {
-        Form::Spring => vec![stiffness(usual)],
-        Form::Damper => vec![damping],
-        Form::SpringDamper => vec![stiffness(usual), damping],
-        Form::Mass => vec![free("mass_kg", "kg", 3.0, [1e-3, 1e3])],
-        Form::Resonator => resonator(),
-        Form::TwoResonators => {
+        DrawnForm::Spring => vec![stiffness(usual)],
+        DrawnForm::Damper => vec![damping],
+        DrawnForm::SpringDamper => vec![stiffness(usual), damping],
+        DrawnForm::Mass => vec![free("mass_kg", "kg", 3.0, [1e-3, 1e3])],
+        DrawnForm::Resonator => resonator(),
+        DrawnForm::TwoResonators => {
             let second = resonator().into_iter().map(|p| Parameter {
                 name: format!("second_{}", p.name),
                 ..p
             });
             resonator().into_iter().chain(second).collect()
         }
-        Form::LossFactor if matches!(spot, Spot::Joint(_)) => {
+        DrawnForm::LossFactor if matches!(spot, Spot::Joint(_)) => {
             // Beside a joint's own spring there is only the loss.
             vec![free("hysteretic_nm_per_rad", "N·m/rad", 1e4, [1.0, 1e9])]
         }
-        Form::LossFactor => vec![stiffness(usual), loss],
-        Form::Maxwell => vec![stiffness(1e5), damping],
-        Form::RotorOnSpring => vec![
+        DrawnForm::LossFactor => vec![stiffness(usual), loss],
+        DrawnForm::Maxwell => vec![stiffness(1e5), damping],
+        DrawnForm::RotorOnSpring => vec![
             stiffness(usual),
             damping,
             free("inertia_kg_m2", "kg·m²", 20.0, [1e-3, 1e4]),
@@ -198,12 +208,12 @@ fn starts(site: Site, variant: usize, data: &DataSummary, peaks_hz: &[f64]) -> V
         &[1e3, 1e4, 1e6, 1e7]
     };
     match form_of(variant) {
-        Form::Spring => scale.iter().map(|k| vec![*k]).collect(),
-        Form::Damper => [10.0, 100.0, 1e4].map(|c| vec![c]).to_vec(),
-        Form::SpringDamper => scale.iter().map(|k| vec![*k, 1e-3 * k]).collect(),
-        Form::Mass => [0.2, 1.0, 10.0, 50.0].map(|m| vec![m]).to_vec(),
-        Form::Resonator => branch::starts(data, peaks_hz, 5.0),
-        Form::TwoResonators => {
+        DrawnForm::Spring => scale.iter().map(|k| vec![*k]).collect(),
+        DrawnForm::Damper => [10.0, 100.0, 1e4].map(|c| vec![c]).to_vec(),
+        DrawnForm::SpringDamper => scale.iter().map(|k| vec![*k, 1e-3 * k]).collect(),
+        DrawnForm::Mass => [0.2, 1.0, 10.0, 50.0].map(|m| vec![m]).to_vec(),
+        DrawnForm::Resonator => branch::starts(data, peaks_hz, 5.0),
+        DrawnForm::TwoResonators => {
             let firsts = branch::starts(data, peaks_hz, 5.0);
             let mut pairs = Vec::new();
             for (i, a) in firsts.iter().enumerate().step_by(2) {
@@ -213,10 +223,10 @@ fn starts(site: Site, variant: usize, data: &DataSummary, peaks_hz: &[f64]) -> V
             }
             pairs
         }
-        Form::LossFactor if matches!(spot, Spot::Joint(_)) => [1e2, 1e3, 1e5].map(|h| vec![h]).to_vec(),
-        Form::LossFactor => scale.iter().map(|k| vec![*k, 0.1]).collect(),
-        Form::Maxwell => scale.iter().map(|k| vec![*k, 1e-2 * k]).collect(),
-        Form::RotorOnSpring => scale
+        DrawnForm::LossFactor if matches!(spot, Spot::Joint(_)) => [1e2, 1e3, 1e5].map(|h| vec![h]).to_vec(),
+        DrawnForm::LossFactor => scale.iter().map(|k| vec![*k, 0.1]).collect(),
+        DrawnForm::Maxwell => scale.iter().map(|k| vec![*k, 1e-2 * k]).collect(),
+        DrawnForm::RotorOnSpring => scale
             .iter()
             .flat_map(|k| [5.0, 60.0].map(|inertia| vec![*k, 1e-3 * k, inertia]))
             .collect(),
@@ -250,7 +260,7 @@ fn attach(chain: &mut Chain, grip: &Grip, law: AttachmentLaw, size: &Dual) {
     });
 }
 
-impl StructuralEffect for Branch {
+impl StructuralEffect for DrawnBranch {
     fn id(&self) -> &'static str {
         "branch"
     }
@@ -322,17 +332,17 @@ impl StructuralEffect for Branch {
             return;
         };
         match form_of(variant) {
-            Form::Spring => attach(chain, &grip, AttachmentLaw::Spring, &values[0]),
-            Form::Damper => attach(chain, &grip, AttachmentLaw::Damper, &values[0]),
-            Form::SpringDamper => {
+            DrawnForm::Spring => attach(chain, &grip, AttachmentLaw::Spring, &values[0]),
+            DrawnForm::Damper => attach(chain, &grip, AttachmentLaw::Damper, &values[0]),
+            DrawnForm::SpringDamper => {
                 attach(chain, &grip, AttachmentLaw::Spring, &values[0]);
                 attach(chain, &grip, AttachmentLaw::Damper, &values[1]);
             }
-            Form::Mass => attach(chain, &grip, AttachmentLaw::Inertia, &values[0]),
-            Form::LossFactor if matches!(spot, Spot::Joint(_)) => {
+            DrawnForm::Mass => attach(chain, &grip, AttachmentLaw::Inertia, &values[0]),
+            DrawnForm::LossFactor if matches!(spot, Spot::Joint(_)) => {
                 attach(chain, &grip, AttachmentLaw::Hysteresis, &values[0]);
             }
-            Form::LossFactor => {
+            DrawnForm::LossFactor => {
                 attach(chain, &grip, AttachmentLaw::Spring, &values[0]);
                 attach(
                     chain,
@@ -341,7 +351,7 @@ impl StructuralEffect for Branch {
                     &(&values[0] * &values[1]),
                 );
             }
-            Form::Resonator | Form::TwoResonators => {
+            DrawnForm::Resonator | DrawnForm::TwoResonators => {
                 let Some((at, place, direction)) = spot.point(setting.kinematics) else {
                     return;
                 };
@@ -358,7 +368,7 @@ impl StructuralEffect for Branch {
                     });
                 }
             }
-            Form::Maxwell => {
+            DrawnForm::Maxwell => {
                 // The point between spring and damper is a coordinate that moves nothing else.
                 let between = chain.elements.len();
                 let Some(element) = grip.coordinates.first().map(|(element, _)| *element) else {
@@ -385,7 +395,7 @@ impl StructuralEffect for Branch {
                 attach(chain, &spring, AttachmentLaw::Spring, &values[0]);
                 attach(chain, &damper, AttachmentLaw::Damper, &values[1]);
             }
-            Form::RotorOnSpring => (),
+            DrawnForm::RotorOnSpring => (),
         }
     }
 }
@@ -407,7 +417,7 @@ impl StructuralEffect for Series {
         Background {
             lab_check: "Two accelerometers, one on each side of the place (both rings of the bearing, foot plate and floor): \
              hit the arm and see whether they move against each other at the frequencies of the drawn curve.",
-            ..Branch.background()
+            ..DrawnBranch.background()
         }
     }
 
@@ -459,7 +469,7 @@ impl StructuralEffect for Series {
             point: None,
         };
         let form = form_of(variant);
-        let damped = matches!(form, Form::SpringDamper | Form::RotorOnSpring);
+        let damped = matches!(form, DrawnForm::SpringDamper | DrawnForm::RotorOnSpring);
         chain.elements.push(Element {
             role: if place.link == 0 {
                 Role::Base
@@ -474,7 +484,7 @@ impl StructuralEffect for Series {
             damping: damped.then(|| values[1].clone()),
         });
         match form {
-            Form::LossFactor => {
+            DrawnForm::LossFactor => {
                 attach(
                     chain,
                     &coordinate,
@@ -482,7 +492,7 @@ impl StructuralEffect for Series {
                     &(&values[0] * &values[1]),
                 );
             }
-            Form::RotorOnSpring => attach(chain, &coordinate, AttachmentLaw::Inertia, &values[2]),
+            DrawnForm::RotorOnSpring => attach(chain, &coordinate, AttachmentLaw::Inertia, &values[2]),
             _ => (),
         }
     }

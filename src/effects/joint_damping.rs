@@ -1,7 +1,9 @@
-use super::*;
+use super::Background;
+use super::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
+use crate::data::RobotSpec;
 use crate::effects::background::EWINS;
-use crate::parameter::{Prior, Scale};
-use crate::robot::Role;
+use crate::parameter::{Parameter, Prior, Scale};
+use crate::robot::{Chain, Dual, Role};
 
 /// Damping sits in the joints (viscous, one coefficient each), beside what is left of the one ratio for all modes.
 ///

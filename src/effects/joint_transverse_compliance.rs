@@ -1,8 +1,11 @@
-use super::*;
-use crate::effects::background::{ABELE, MOBERG};
-use crate::parameter::{Prior, Scale};
-use crate::robot::{Element, Place, Role, Slot};
 use nalgebra::{DMatrix, Vector6};
+
+use super::Background;
+use super::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
+use crate::data::RobotSpec;
+use crate::effects::background::{ABELE, MOBERG};
+use crate::parameter::{Parameter, Prior, Scale};
+use crate::robot::{Chain, Dual, Element, Place, Role, Slot};
 
 /// A joint's bearing tilts about both axes normal to the joint's own.
 pub struct JointTransverseCompliance;

@@ -1,6 +1,9 @@
-use super::*;
+use super::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
+use super::{Background, Size};
+use crate::data::RobotSpec;
 use crate::effects::background::ABELE;
-use crate::parameter::{Prior, Scale};
+use crate::parameter::{Parameter, Prior, Scale};
+use crate::robot::{Chain, Dual};
 
 /// Links bend: every link a beam of its section, one common Young's modulus.
 pub struct LinkFlexibility;

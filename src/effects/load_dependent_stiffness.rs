@@ -1,8 +1,11 @@
-use super::*;
-use crate::effects::background::TUTTLE;
-use crate::parameter::{Prior, Scale};
-use crate::robot::Role;
 use nalgebra::Vector3;
+
+use super::Background;
+use super::effect::{DataSummary, Setting, Site, StructuralEffect};
+use crate::data::RobotSpec;
+use crate::effects::background::TUTTLE;
+use crate::parameter::{Parameter, Prior, Scale};
+use crate::robot::{Chain, Dual, Role};
 
 /// Gear stiffness rises with the static gravity torque: k (1 + beta |tau| / 1 kN·m) at every joint.
 pub struct LoadDependentStiffness;

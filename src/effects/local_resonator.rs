@@ -1,6 +1,10 @@
-use super::*;
-use crate::robot::{Branch, Place, Slot};
 use nalgebra::Vector3;
+
+use super::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
+use super::{Background, Size, branch};
+use crate::data::RobotSpec;
+use crate::parameter::Parameter;
+use crate::robot::{Branch, Chain, Dual, Place, Slot};
 
 /// Something hung on a link that resonates by itself: a mass on a spring along one axis of the link.
 pub struct LocalResonator;

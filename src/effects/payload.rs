@@ -1,7 +1,10 @@
-use super::*;
-use crate::parameter::{Prior, Scale};
-use crate::robot::{Body, Place, Slot};
 use nalgebra::{Matrix3, Point3};
+
+use super::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
+use super::{Background, Size};
+use crate::data::RobotSpec;
+use crate::parameter::{Parameter, Prior, Scale};
+use crate::robot::{Body, Chain, Dual, Place, Slot};
 
 /// Mass on the flange that the model does not have.
 pub struct Payload;

@@ -3,6 +3,7 @@
 /// A fitted value, natural units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Size {
+    /// In the parameter's unit.
     pub value: f64,
     /// Its standard deviation.
     pub std: f64,

@@ -1,8 +1,9 @@
 //! What a user means by `EFFECT[@SITE]`.
 
-use super::{DRAWN, DataSummary, Instance, STRUCTURAL, Site, StructuralEffect, find};
-use crate::campaign::suggest::{closest, shown};
+use super::effect::{DataSummary, Instance, Site, StructuralEffect};
+use super::registry::{DRAWN, STRUCTURAL, find};
 use crate::data::RobotSpec;
+use crate::text::{closest, shown_briefly};
 use crate::{InputError, Result};
 
 /// The instances (one for each discrete choice) of an effect that a user asked for.
@@ -20,7 +21,7 @@ pub fn requested(robot: &RobotSpec, data: &DataSummary, name: &str) -> Result<Ve
         let ids = STRUCTURAL.map(|e| e.id());
         let near = closest(id, ids).map_or(String::new(), |near| format!("did you mean {near}? "));
         let remedy = format!("{near}there are: {}", ids.join(", "));
-        return Err(wrong(format!("there is no effect \"{}\"", shown(id)), remedy).into());
+        return Err(wrong(format!("there is no effect \"{}\"", shown_briefly(id)), remedy).into());
     };
     let found = find(robot, name);
     if found.is_empty() {
@@ -46,11 +47,14 @@ fn no_such_site(effect: &dyn StructuralEffect, site: Option<&str>, sites: &[Site
             "see what `lobestone diagnose DIR` proposes".into(),
         ),
         Some(site) if named.is_empty() => (
-            format!("{id} sits nowhere in particular, so not at \"{}\"", shown(site)),
+            format!(
+                "{id} sits nowhere in particular, so not at \"{}\"",
+                shown_briefly(site)
+            ),
             format!("write {id}"),
         ),
         Some(site) => (
-            format!("{id} cannot sit at \"{}\"", shown(site)),
+            format!("{id} cannot sit at \"{}\"", shown_briefly(site)),
             format!("on this robot there are: {}", named.join(", ")),
         ),
         None => (

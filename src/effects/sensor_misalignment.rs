@@ -1,6 +1,9 @@
-use super::*;
+use super::effect::{ChannelFilter, DataSummary, Site, StructuralEffect};
+use super::{Background, Size};
+use crate::data::RobotSpec;
 use crate::effects::background::EWINS;
-use crate::parameter::{Prior, Scale};
+use crate::parameter::{Parameter, Prior, Scale};
+use crate::robot::Dual;
 
 /// Response axes turned by a small rotation: H_measured = Rᵀ H.
 pub struct SensorMisalignment;

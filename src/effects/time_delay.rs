@@ -1,6 +1,9 @@
-use super::*;
+use super::effect::{ChannelFilter, DataSummary, Site, StructuralEffect};
+use super::{Background, Size};
+use crate::data::RobotSpec;
 use crate::effects::background::EWINS;
-use crate::parameter::{Prior, Scale};
+use crate::parameter::{Parameter, Prior, Scale};
+use crate::robot::Dual;
 
 /// Response channel late against the force channel: factor exp(−iωτ).
 pub struct TimeDelay;

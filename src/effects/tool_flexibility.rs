@@ -1,7 +1,11 @@
-use super::*;
-use crate::effects::background::ALTINTAS;
-use crate::robot::{Branch, Place, Slot};
 use nalgebra::Vector3;
+
+use super::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
+use super::{Background, branch};
+use crate::data::RobotSpec;
+use crate::effects::background::ALTINTAS;
+use crate::parameter::Parameter;
+use crate::robot::{Branch, Chain, Dual, Place, Slot};
 
 /// Tool and holder: a lumped mass at the tool point on a spring in the two directions normal to the tool axis.
 pub struct ToolFlexibility;

@@ -8,8 +8,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::frf_data::FrfData;
+use super::frf_problem::{FrfProblem, Misfit};
 use super::levenberg_marquardt::{Ending, Fit, LeastSquares, Stopping, minimise};
-use super::structure::{FrfProblem, Misfit, StructureModel};
+use super::structure::StructureModel;
 use crate::effects::Size;
 use crate::parameter::Parameter;
 use crate::progress::Progress;
@@ -18,16 +19,22 @@ use crate::{Error, Result, stop};
 /// One fitted parameter in natural units.
 #[derive(Debug, Clone, Serialize)]
 pub struct Estimate {
+    /// As [`Parameter::name`].
     pub name: String,
+    /// Natural units.
     pub value: f64,
+    /// Of `value` and `std_error`.
     pub unit: &'static str,
+    /// Standard error, natural units.
     pub std_error: f64,
+    /// Nominal value, natural units.
     pub initial: f64,
     /// True where the estimate stopped at the end of its allowed range.
     pub at_bound: bool,
 }
 
 impl Estimate {
+    /// Value and standard error alone.
     pub fn size(&self) -> Size {
         Size {
             value: self.value,
@@ -57,6 +64,7 @@ impl Default for Options {
 /// A calibrated model.
 #[derive(Debug, Clone)]
 pub struct Calibration {
+    /// In the order of the model's parameters.
     pub parameters: Vec<Estimate>,
     /// On the solver's scale.
     pub theta: Vec<f64>,
@@ -64,7 +72,9 @@ pub struct Calibration {
     pub covariance: DMatrix<f64>,
     /// Weighted misfit per real residual: 1 where only noise is left.
     pub reduced_chi2: f64,
+    /// Steps of the solver.
     pub iterations: usize,
+    /// Why it stopped.
     pub ending: Ending,
     /// Starting points tried.
     pub starts: usize,
@@ -88,6 +98,7 @@ impl Calibration {
             .collect()
     }
 
+    /// Whether the solver found the optimum that it was looking for.
     pub fn converged(&self) -> bool {
         self.ending == Ending::Converged
     }

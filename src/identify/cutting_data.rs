@@ -5,35 +5,36 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 use super::cutting_windows::Windows;
 pub use super::force_channel::ForceChannel;
 use super::force_channel::{force_channel, sample_std, widen_for_vibration};
 use super::off_comb::{OffComb, StandingLine, find_vibration, standing_lines};
-use crate::analysis::force_records::read_in_step;
-use crate::campaign::{Campaign, Process};
 use crate::cutting::waveform::{DrillTerm, DrillingCut, MillingCut, UnitForces};
-use crate::cutting::{CutAnalysis, EdgeBit, ForceAxis, InStep, Notice, engaged_edge, feed_mm, of_notices};
+use crate::cutting::{CutAnalysis, EdgeBit, ForceAxis, engaged_edge, feed_mm};
+use crate::data::{ChannelRole, Cut, Process, TimeRecord, Tool};
 use crate::effects::cutting::{CutSetting, CuttingSummary};
-use crate::ingest::{ChannelRole, TimeRecord};
-use crate::progress::Progress;
 use crate::signal::{highest_order, line_amplitude, order_spectrum};
 use crate::{Error, InputError, Result};
 
 /// What was cut.
 #[derive(Debug, Clone)]
 pub enum CutKind {
+    /// With an end mill.
     Milling {
+        /// Tool and engagement.
         cut: MillingCut,
         /// Closed-form forces for one unit of each coefficient, up to the cut's highest order.
         unit: Box<UnitForces>,
     },
+    /// With a twist drill.
     Drilling {
+        /// Drill and hole.
         cut: DrillingCut,
         /// First contact lies in here, s.
         contact_s: [f64; 2],
     },
+    /// On a lathe.
     Turning {
         /// The edge in the work, bit by bit.
         edge: Vec<EdgeBit>,
@@ -45,14 +46,19 @@ pub enum CutKind {
 pub struct CutData {
     /// Index into `Campaign::cuts`.
     pub cut: usize,
+    /// Its id.
     pub id: String,
+    /// Rotation of the spindle, 1/min.
     pub spindle_rpm: f64,
+    /// At the tool's diameter (turning: the workpiece's), m/min.
     pub cutting_speed_m_per_min: f64,
     /// Per tooth (milling), per revolution (drilling, turning).
     pub feed_mm: f64,
+    /// What effects on it need to know.
     pub setting: CutSetting,
     /// Place in the sequence of cuts, where the campaign says it.
     pub order: Option<i64>,
+    /// Tool, engagement and forces.
     pub kind: CutKind,
     /// Recorded x, y, z, torque; `None` where there is no usable channel or the process puts no force on it.
     pub channels: [Option<ForceChannel>; 4],
@@ -62,12 +68,148 @@ pub struct CutData {
     pub block_s: Vec<[f64; 2]>,
     /// Blocks of full engagement.
     pub steady: Range<usize>,
+    /// Lines off the tooth-passing comb; `None` where none stands out (and for drilling and turning).
     pub vibration: Option<OffComb>,
     /// What stands above the noise beside the orders (drilling and turning: orders and all).
     pub lines: Vec<StandingLine>,
 }
 
 impl CutData {
+    /// One cut, the `index`-th of all, from its record and what was read off it.
+    ///
+    /// # Errors
+    /// No channel that carries the cutting force over two revolutions or more; a tool that cannot have made the cut.
+    pub fn new(
+        tool: &Tool,
+        (index, cut): (usize, &Cut),
+        record: &TimeRecord,
+        analysis: &CutAnalysis,
+    ) -> Result<CutData> {
+        let rate = record.sample_rate_hz;
+        let per_turn = rate * 60.0 / cut.spindle_rpm;
+        let window = Windows::new(analysis, record, per_turn);
+        let milling = MillingCut::new(tool, &cut.geometry);
+        let orders = match &milling {
+            Some(m) => highest_order(per_turn, (ORDERS_PER_TOOTH * m.teeth).min(MOST_ORDERS)),
+            None => 0,
+        };
+        let mut spectra = Vec::new();
+        let mut channels: [Option<ForceChannel>; 4] = std::array::from_fn(|i| {
+            let axis = ForceAxis::ALL[i];
+            // A drill puts nothing on the lateral channels; what they show is its wobble.
+            if !ForceAxis::of(cut.geometry.process()).contains(&axis) {
+                return None;
+            }
+            let channel = analysis.channels.iter().find(|c| c.axis == axis)?;
+            let role = [
+                ChannelRole::ForceX,
+                ChannelRole::ForceY,
+                ChannelRole::ForceZ,
+                ChannelRole::TorqueZ,
+            ][i];
+            let values = record.channel(role)?.samples.as_slice();
+            let zeroed: Vec<f64> = values
+                .iter()
+                .enumerate()
+                .map(|(k, v)| v - channel.drift.at(record.start_s + k as f64 / rate))
+                .collect();
+            let spectrum = order_spectrum(&zeroed[window.steady.clone()], rate, per_turn, orders)?;
+            let air_std = window
+                .air()
+                .map(|r| sample_std(&values[r]))
+                .filter(|s| *s > 0.0)
+                .fold(0.0, f64::max);
+            let quiet = window.air().max_by_key(|r| r.len());
+            let hum: Vec<(f64, f64)> = MAINS_HZ
+                .iter()
+                .map(|hz| {
+                    (
+                        *hz,
+                        quiet
+                            .clone()
+                            .map_or(0.0, |r| line_amplitude(&values[r], rate, *hz)),
+                    )
+                })
+                .collect();
+            let channel = force_channel(
+                values,
+                &zeroed,
+                rate,
+                &window,
+                &spectrum,
+                air_std,
+                &hum,
+                cut.spindle_rpm / 60.0,
+            );
+            spectra.push((i, spectrum, quiet.map(|r| values[r].to_vec()).unwrap_or_default()));
+            channel
+        });
+        if channels.iter().all(Option::is_none) {
+            return Err(Error::computation(
+                "no channel that carries the cutting force over two revolutions or more",
+            ));
+        }
+        let kind = match milling {
+            Some(m) => CutKind::Milling {
+                unit: Box::new(m.closed_form(orders)),
+                cut: m,
+            },
+            None if cut.geometry.process() == Process::Turning => CutKind::Turning {
+                edge: engaged_edge(tool, &cut.geometry)?,
+            },
+            None => {
+                let drill = DrillingCut::new(tool, &cut.geometry, cut.spindle_rpm)?;
+                let middle = window.middle_s;
+                let earliest = analysis
+                    .air_before_s
+                    .map_or(analysis.record_s[0] - 2.0 * drill.entry_s(), |a| a[0]);
+                CutKind::Drilling {
+                    contact_s: [earliest - middle, analysis.steady_s[0] - middle],
+                    cut: drill,
+                }
+            }
+        };
+        let vibration = match &kind {
+            CutKind::Milling { cut: m, .. } => {
+                find_vibration(&spectra, rate, cut.spindle_rpm / 60.0, m.teeth)
+            }
+            CutKind::Drilling { .. } | CutKind::Turning { .. } => None,
+        };
+        if let (Some(vibration), CutKind::Milling { cut: m, .. }) = (&vibration, &kind) {
+            for (i, channel) in channels.iter_mut().enumerate() {
+                if let Some(channel) = channel {
+                    widen_for_vibration(channel, vibration, i, m.teeth, window.steady_blocks());
+                }
+            }
+        }
+        let lines = standing_lines(&spectra, rate, cut.spindle_rpm / 60.0, orders > 0);
+        let mut data = CutData {
+            cut: index,
+            id: cut.id.clone(),
+            spindle_rpm: cut.spindle_rpm,
+            cutting_speed_m_per_min: analysis.cutting_speed_m_per_min,
+            feed_mm: feed_mm(&cut.geometry),
+            setting: CutSetting {
+                process: cut.geometry.process(),
+                progress: 0.0,
+                speed_ratio: 1.0,
+                feed_mm: feed_mm(&cut.geometry),
+                has_vibration: vibration.is_some(),
+            },
+            order: cut.order,
+            kind,
+            channels,
+            orders,
+            block_s: window.block_s(record),
+            steady: window.steady_blocks(),
+            vibration,
+            lines,
+        };
+        data.narrow_contact();
+        Ok(data)
+    }
+
+    /// Rotation of the spindle, 1/s.
     pub fn spindle_hz(&self) -> f64 {
         self.spindle_rpm / 60.0
     }
@@ -152,13 +294,17 @@ impl CutData {
 /// The cuts of one process.
 #[derive(Debug, Clone)]
 pub struct CuttingData {
+    /// Of all its cuts.
     pub process: Process,
+    /// In the campaign's order.
     pub cuts: Vec<Arc<CutData>>,
     /// F_tool = A F_recorded, and its inverse.
     pub tool_from_dyno: [[f64; 3]; 3],
+    /// Rows of the inverse: F_recorded = A⁻¹ F_tool.
     pub dyno_from_tool: [[f64; 3]; 3],
     /// What a torque counts as where forces and torques are added up, N per N·m: thrusts and torques are equally large then.
     pub force_per_torque: f64,
+    /// What effects need to know of the cuts.
     pub summary: CuttingSummary,
     /// Cuts left out, with the reason.
     pub warnings: Vec<String>,
@@ -169,9 +315,9 @@ const ORDERS_PER_TOOTH: usize = 24;
 const MOST_ORDERS: usize = 96;
 const MAINS_HZ: [f64; 2] = [50.0, 60.0];
 
-/// Processes of the campaign's cuts, the one with more cuts first.
-pub fn processes(campaign: &Campaign) -> Vec<Process> {
-    let count = |p| campaign.cuts.iter().filter(|c| c.geometry.process() == p).count();
+/// The processes of `cuts`, the one with more cuts first.
+pub fn processes(cuts: &[Cut]) -> Vec<Process> {
+    let count = |p| cuts.iter().filter(|c| c.geometry.process() == p).count();
     let mut all = Process::ALL.to_vec();
     all.retain(|p| count(*p) > 0);
     all.sort_by_key(|p| std::cmp::Reverse(count(*p)));
@@ -179,66 +325,29 @@ pub fn processes(campaign: &Campaign) -> Vec<Process> {
 }
 
 impl CuttingData {
-    /// Reads the records of the campaign's cuts of `process`, in parallel. A cut that cannot be used is left out with a
-    /// warning.
+    /// The cuts of one process, each read by [`CutData::new`]: turns a torque that is counted the other way round, and
+    /// places each cut in the sequence and in the range of speeds. `teeth`: of the tool. `tool_from_dyno`: rows of A in
+    /// F_tool = A F_recorded.
     ///
     /// # Errors
-    /// No usable cut; no tool; a `tool_from_dyno` that cannot be inverted.
-    pub fn load(campaign: &Campaign, process: Process) -> Result<Self> {
-        let indices: Vec<usize> = (0..campaign.cuts.len())
-            .filter(|i| campaign.cuts[*i].geometry.process() == process)
-            .collect();
-        if indices.is_empty() {
-            return Err(InputError::new(
-                "the campaign has no [[cut]] of this process: no force records to compare",
-            )
-            .file(campaign.dir.join("campaign.toml"))
-            .key("cut")
-            .remedy("add [[cut]] tables that name the force records")
-            .into());
-        }
-        let progress = Progress::new("force waveforms", indices.len());
-        let outcomes: Vec<Result<(CutData, Vec<Notice>)>> = indices
-            .par_iter()
-            .map(|&i| {
-                let (record, mut analysis) = read_in_step(campaign, i, InStep::UnlessItWanders)?;
-                let notices = std::mem::take(&mut analysis.notices);
-                let outcome = cut_data(campaign, i, &record, &analysis);
-                progress.step();
-                Ok((outcome?, notices))
-            })
-            .collect();
-        let (mut cuts, mut warnings, mut noticed) = (Vec::new(), Vec::new(), Vec::new());
-        for (&i, outcome) in indices.iter().zip(outcomes) {
-            match outcome {
-                Ok((cut, notices)) => {
-                    noticed.extend(notices.into_iter().map(|n| (cut.id.clone(), n)));
-                    cuts.push(cut);
-                }
-                Err(error) => warnings.push(format!("cut {} is left out: {error}", campaign.cuts[i].id)),
-            }
-        }
-        if cuts.is_empty() {
-            return Err(Error::computation(format!(
-                "none of the {} cuts can be used; the first: {}",
-                indices.len(),
-                warnings.first().map_or("", String::as_str)
-            )));
-        }
-        warnings.extend(of_notices(&noticed, indices.len()));
+    /// A `tool_from_dyno` that cannot be inverted.
+    pub fn new(
+        process: Process,
+        teeth: usize,
+        tool_from_dyno: [[f64; 3]; 3],
+        mut cuts: Vec<CutData>,
+    ) -> Result<Self> {
         turn_torque(&mut cuts);
-        place_in_campaign(campaign, &mut cuts);
-        let tool_from_dyno = campaign.dynamometer.tool_from_dyno;
+        place_in_sequence(&mut cuts);
         let matrix = nalgebra::Matrix3::from_fn(|i, j| tool_from_dyno[i][j]);
         let inverse = matrix
             .try_inverse()
             .filter(|m| m.iter().all(|v| v.is_finite()))
             .ok_or_else(|| {
                 InputError::new("the matrix cannot be inverted: channels are lost in it")
-                    .file(campaign.dir.join("campaign.toml"))
                     .key("dynamometer.tool_from_dyno")
             })?;
-        let summary = summary(campaign, process, &cuts);
+        let summary = summary(process, teeth, &cuts);
         let size = |axis: ForceAxis| -> f64 {
             let means = cuts.iter().filter_map(|c| c.mean_above_air(axis.index()));
             means.map(|m| m * m).sum::<f64>().sqrt()
@@ -256,7 +365,7 @@ impl CuttingData {
             tool_from_dyno,
             dyno_from_tool: std::array::from_fn(|i| std::array::from_fn(|j| inverse[(i, j)])),
             summary,
-            warnings,
+            warnings: Vec::new(),
         })
     }
 
@@ -286,139 +395,6 @@ impl CuttingData {
     }
 }
 
-fn cut_data(
-    campaign: &Campaign,
-    index: usize,
-    record: &TimeRecord,
-    analysis: &CutAnalysis,
-) -> Result<CutData> {
-    let cut = &campaign.cuts[index];
-    let tool = campaign
-        .tool
-        .as_ref()
-        .ok_or_else(|| Error::computation("[tool] is missing: cutting forces need its teeth and diameter"))?;
-    let rate = record.sample_rate_hz;
-    let per_turn = rate * 60.0 / cut.spindle_rpm;
-    let window = Windows::new(analysis, record, per_turn);
-    let milling = MillingCut::new(tool, &cut.geometry);
-    let orders = match &milling {
-        Some(m) => highest_order(per_turn, (ORDERS_PER_TOOTH * m.teeth).min(MOST_ORDERS)),
-        None => 0,
-    };
-    let mut spectra = Vec::new();
-    let mut channels: [Option<ForceChannel>; 4] = std::array::from_fn(|i| {
-        let axis = ForceAxis::ALL[i];
-        // A drill puts nothing on the lateral channels; what they show is its wobble.
-        if !ForceAxis::of(cut.geometry.process()).contains(&axis) {
-            return None;
-        }
-        let channel = analysis.channels.iter().find(|c| c.axis == axis)?;
-        let role = [
-            ChannelRole::ForceX,
-            ChannelRole::ForceY,
-            ChannelRole::ForceZ,
-            ChannelRole::TorqueZ,
-        ][i];
-        let values = record.channel(role)?.samples.as_slice();
-        let zeroed: Vec<f64> = values
-            .iter()
-            .enumerate()
-            .map(|(k, v)| v - channel.drift.at(record.start_s + k as f64 / rate))
-            .collect();
-        let spectrum = order_spectrum(&zeroed[window.steady.clone()], rate, per_turn, orders)?;
-        let air_std = window
-            .air()
-            .map(|r| sample_std(&values[r]))
-            .filter(|s| *s > 0.0)
-            .fold(0.0, f64::max);
-        let quiet = window.air().max_by_key(|r| r.len());
-        let hum: Vec<(f64, f64)> = MAINS_HZ
-            .iter()
-            .map(|hz| {
-                (
-                    *hz,
-                    quiet
-                        .clone()
-                        .map_or(0.0, |r| line_amplitude(&values[r], rate, *hz)),
-                )
-            })
-            .collect();
-        let channel = force_channel(
-            values,
-            &zeroed,
-            rate,
-            &window,
-            &spectrum,
-            air_std,
-            &hum,
-            cut.spindle_rpm / 60.0,
-        );
-        spectra.push((i, spectrum, quiet.map(|r| values[r].to_vec()).unwrap_or_default()));
-        channel
-    });
-    if channels.iter().all(Option::is_none) {
-        return Err(Error::computation(
-            "no channel that carries the cutting force over two revolutions or more",
-        ));
-    }
-    let kind = match milling {
-        Some(m) => CutKind::Milling {
-            unit: Box::new(m.closed_form(orders)),
-            cut: m,
-        },
-        None if cut.geometry.process() == Process::Turning => CutKind::Turning {
-            edge: engaged_edge(tool, &cut.geometry)?,
-        },
-        None => {
-            let drill = DrillingCut::new(tool, &cut.geometry, cut.spindle_rpm)?;
-            let middle = window.middle_s;
-            let earliest = analysis
-                .air_before_s
-                .map_or(analysis.record_s[0] - 2.0 * drill.entry_s(), |a| a[0]);
-            CutKind::Drilling {
-                contact_s: [earliest - middle, analysis.steady_s[0] - middle],
-                cut: drill,
-            }
-        }
-    };
-    let vibration = match &kind {
-        CutKind::Milling { cut: m, .. } => find_vibration(&spectra, rate, cut.spindle_rpm / 60.0, m.teeth),
-        CutKind::Drilling { .. } | CutKind::Turning { .. } => None,
-    };
-    if let (Some(vibration), CutKind::Milling { cut: m, .. }) = (&vibration, &kind) {
-        for (i, channel) in channels.iter_mut().enumerate() {
-            if let Some(channel) = channel {
-                widen_for_vibration(channel, vibration, i, m.teeth, window.steady_blocks());
-            }
-        }
-    }
-    let lines = standing_lines(&spectra, rate, cut.spindle_rpm / 60.0, orders > 0);
-    let mut data = CutData {
-        cut: index,
-        id: cut.id.clone(),
-        spindle_rpm: cut.spindle_rpm,
-        cutting_speed_m_per_min: analysis.cutting_speed_m_per_min,
-        feed_mm: feed_mm(&cut.geometry),
-        setting: CutSetting {
-            process: cut.geometry.process(),
-            progress: 0.0,
-            speed_ratio: 1.0,
-            feed_mm: feed_mm(&cut.geometry),
-            has_vibration: vibration.is_some(),
-        },
-        order: campaign.cuts[index].order,
-        kind,
-        channels,
-        orders,
-        block_s: window.block_s(record),
-        steady: window.steady_blocks(),
-        vibration,
-        lines,
-    };
-    data.narrow_contact();
-    Ok(data)
-}
-
 /// Torque opposes rotation; where all of it is negative the amplifier counts it the other way round.
 fn turn_torque(cuts: &mut [CutData]) {
     let torque = ForceAxis::Mz.index();
@@ -436,12 +412,12 @@ fn turn_torque(cuts: &mut [CutData]) {
 }
 
 /// Where each cut stands in the sequence and in the range of speeds.
-fn place_in_campaign(campaign: &Campaign, cuts: &mut [CutData]) {
-    let orders: Vec<i64> = cuts.iter().filter_map(|c| campaign.cuts[c.cut].order).collect();
+fn place_in_sequence(cuts: &mut [CutData]) {
+    let orders: Vec<i64> = cuts.iter().filter_map(|c| c.order).collect();
     let (first, last) = (orders.iter().min().copied(), orders.iter().max().copied());
     let [slow, fast] = speed_range(cuts);
     for cut in cuts {
-        if let (Some(first), Some(last), Some(own)) = (first, last, campaign.cuts[cut.cut].order) {
+        if let (Some(first), Some(last), Some(own)) = (first, last, cut.order) {
             cut.setting.progress = if last > first {
                 (own - first) as f64 / (last - first) as f64
             } else {
@@ -460,15 +436,15 @@ fn speed_range(cuts: &[CutData]) -> [f64; 2] {
     ]
 }
 
-fn summary(campaign: &Campaign, process: Process, cuts: &[CutData]) -> CuttingSummary {
+fn summary(process: Process, teeth: usize, cuts: &[CutData]) -> CuttingSummary {
     let distinct = |values: Vec<f64>| {
         let mut sorted = values;
         sorted.sort_by(f64::total_cmp);
         sorted.dedup_by(|b, a| (*b - *a).abs() <= 1e-3 * a.abs());
         sorted.len()
     };
-    let all_ordered = cuts.iter().all(|c| campaign.cuts[c.cut].order.is_some());
-    let mut order: Vec<i64> = cuts.iter().filter_map(|c| campaign.cuts[c.cut].order).collect();
+    let all_ordered = cuts.iter().all(|c| c.order.is_some());
+    let mut order: Vec<i64> = cuts.iter().filter_map(|c| c.order).collect();
     order.sort_unstable();
     order.dedup();
     let lines: Vec<f64> = cuts
@@ -487,7 +463,7 @@ fn summary(campaign: &Campaign, process: Process, cuts: &[CutData]) -> CuttingSu
     };
     CuttingSummary {
         process,
-        teeth: campaign.tool.as_ref().map_or(1, |t| t.teeth.max(1)),
+        teeth: teeth.max(1),
         straight_edge: cuts
             .iter()
             .all(|c| !matches!(&c.kind, CutKind::Milling { cut, .. } if cut.shape.is_some())),

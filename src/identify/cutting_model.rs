@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use super::cutting_data::{CutData, CutKind, CuttingData};
-use crate::campaign::Process;
 use crate::cutting::waveform::DrillTerm;
 use crate::cutting::{ForceAxis, coefficients_of, edge_row};
+use crate::data::Process;
 use crate::effects::cutting::{CutPhysics, CuttingInstance};
 use crate::parameter::{Parameter, Prior, Scale, is_vanished};
 use crate::robot::Dual;
@@ -14,6 +14,7 @@ use crate::{Error, Result};
 /// Coefficients of one material and what may be tuned.
 #[derive(Debug, Clone)]
 pub struct CuttingModel {
+    /// What the coefficients are of.
     pub process: Process,
     /// Those of the baseline (milling and turning Ktc Krc Kac Kte Kre Kae, drilling Ktc Kte Kfc Kfe; without the edge coefficients
     /// where the baseline has none), then those of each added effect.
@@ -28,7 +29,9 @@ pub struct CuttingModel {
 /// An effect in the model and where its parameters stand in the list.
 #[derive(Debug, Clone)]
 pub struct AddedCuttingEffect {
+    /// The effect with its discrete choice.
     pub instance: CuttingInstance,
+    /// Where its own parameters stand in the model's list.
     pub parameters: Range<usize>,
 }
 
@@ -101,6 +104,7 @@ impl CuttingModel {
         model
     }
 
+    /// The effects that were added, in their order.
     pub fn effects(&self) -> &[AddedCuttingEffect] {
         &self.effects
     }

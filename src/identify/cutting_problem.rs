@@ -23,7 +23,9 @@ const FREQUENCY_LOG_STD: f64 = 0.05;
 
 /// Misfit of a model to the records plus the priors on its parameters.
 pub struct CuttingProblem<'a> {
+    /// The model.
     pub model: &'a CuttingModel,
+    /// The records that it is fitted to.
     pub data: &'a CuttingData,
 }
 
@@ -34,6 +36,7 @@ pub struct CutFit {
     pub placement: f64,
     /// Σ r² of the cut.
     pub chi2: f64,
+    /// Recorded x, y, z, torque; `None` where the cut has no such channel.
     pub channels: [Option<ChannelFit>; 4],
 }
 

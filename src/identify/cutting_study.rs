@@ -8,7 +8,8 @@ use super::cutting_model::CuttingModel;
 use super::cutting_problem::{CutFit, CuttingProblem};
 use super::cutting_waves::axis_waves;
 use super::levenberg_marquardt::{Fit, Stopping, minimise};
-use super::rest::{self, Rest, RestTest, SMALL_ERROR};
+use super::rest::{Rest, RestTest, SMALL_ERROR};
+use super::rest_patterns;
 use super::study::{EffectName, Extent, HeldOut, Residual, Study, View, held_out};
 use crate::Result;
 use crate::effects::Size;
@@ -18,6 +19,7 @@ use crate::parameter::Parameter;
 /// A campaign's force records of one process, arranged for the loop.
 #[derive(Debug, Clone)]
 pub struct CuttingStudy {
+    /// All cuts.
     pub data: CuttingData,
     /// Cuts of each fold, and the data without them.
     folds: Vec<Vec<usize>>,
@@ -28,6 +30,7 @@ pub struct CuttingStudy {
 const FOLDS: usize = 5;
 
 impl CuttingStudy {
+    /// Divides the cuts into folds.
     pub fn new(data: CuttingData) -> Self {
         let count = FOLDS.min(data.cuts.len());
         let folds: Vec<Vec<usize>> = (0..count)
@@ -156,7 +159,7 @@ impl Study for CuttingStudy {
         // A limit cycle is as large as it likes in each cut: cuts that vibrate say nothing about what is the same in all.
         let calm = data.filtered(|i| data.cuts[i].vibration.is_none());
         let calm = CuttingProblem { model, data: &calm };
-        let (apart, differences) = rest::apart(&calm.by_cut(theta)?);
+        let (apart, differences) = rest_patterns::apart(&calm.by_cut(theta)?);
         let tests = [
             (LIKE_CUTS, apart, differences),
             (COMMON_WAVE, common, values),

@@ -4,8 +4,8 @@ use num_complex::Complex64;
 
 use super::cutting_data::{CutData, CuttingData, ForceChannel};
 use super::cutting_problem::{ChannelFit, CutFit};
-use crate::campaign::Process;
 use crate::cutting::ForceAxis;
+use crate::data::Process;
 
 /// Mean squares over the waveform, N²; torques as [`CuttingData::force_per_torque`] times themselves.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -21,6 +21,7 @@ pub struct WaveSums {
 /// One tool axis of one cut.
 #[derive(Debug, Clone)]
 pub struct AxisWaves {
+    /// Which tool axis.
     pub axis: ForceAxis,
     /// `[0]`: the level; then the orders of rotation (milling). They add up to the whole waveform.
     pub orders: Vec<WaveSums>,
@@ -136,11 +137,13 @@ fn level(process: Process, cut: &CutData, parts: &[Part]) -> WaveSums {
 /// The course of one tool axis in one cut, measured and modelled, both above the zero line.
 #[derive(Debug, Clone)]
 pub struct Course {
+    /// Which tool axis.
     pub axis: ForceAxis,
     /// Milling: rotation of the tool from its position at phase 0, degrees; drilling and turning: time from the first block, s.
     pub x: Vec<f64>,
     /// N (N·m), as long as `x`; NaN where a stretch of the hole (the tip breaking through) is left out of the fit.
     pub measured: Vec<f64>,
+    /// N (N·m), as long as `x`.
     pub model: Vec<f64>,
 }
 

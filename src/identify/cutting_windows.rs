@@ -2,9 +2,8 @@
 
 use std::ops::Range;
 
-use crate::campaign::Process;
 use crate::cutting::CutAnalysis;
-use crate::ingest::TimeRecord;
+use crate::data::{Process, TimeRecord};
 
 const MOST_STEADY_BLOCKS: usize = 40;
 const MOST_AIR_BLOCKS: usize = 20;

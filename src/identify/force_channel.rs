@@ -17,6 +17,7 @@ pub struct ForceChannel {
     pub order_std: Vec<f64>,
     /// Mean of each block of the record, N (N·m), drift and all.
     pub level: Vec<f64>,
+    /// Standard deviation of each level, N (N·m).
     pub level_std: Vec<f64>,
     /// ∫ (recorded − straight zero line) dt up to the middle of each block: what a leaking amplifier loses times its
     /// time constant.

@@ -5,9 +5,8 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use crate::campaign::{Campaign, FrfSet, MeasuredDof, MeasuredFrf, Posture};
+use crate::data::{Axis, MeasuredDof, MeasuredFrf, Posture};
 use crate::effects::DataSummary;
-use crate::ingest::Axis;
 use crate::robot::Kinematics;
 use crate::robot::RobotModel;
 use crate::signal::frf_noise;
@@ -16,9 +15,13 @@ use crate::{InputError, Result};
 /// One FRF as data: receptance and its noise.
 #[derive(Debug, Clone)]
 pub struct FrfDatum {
+    /// Posture and degrees of freedom, `p1 1X/1X`.
     pub name: String,
+    /// Index into the postures.
     pub posture: usize,
+    /// Point and axis of the response.
     pub response: MeasuredDof,
+    /// Point and axis of the hit.
     pub reference: MeasuredDof,
     /// Indices into the block's outputs of the response point's x, y and z.
     pub response_outputs: [usize; 3],
@@ -35,15 +38,20 @@ pub struct FrfDatum {
 /// FRFs of one posture and force level on one frequency axis: the model is set up once for all of them.
 #[derive(Debug, Clone)]
 pub struct FrfBlock {
+    /// Index into the postures.
     pub posture: usize,
+    /// Of the hammer; `None` where nobody says.
     pub force_level_n: Option<f64>,
     /// 0 at the highest force level of the campaign, 1 at the lowest, logarithmic between.
     pub lowness: f64,
+    /// Where the robot's frames are at the posture.
     pub kinematics: Kinematics,
+    /// Ascending, above zero.
     pub frequency_hz: Vec<f64>,
     /// Point (index into the campaign's points) and axis of what the model has to give: the references, and all three
     /// axes of every response point (a turned sensor mixes them).
     pub outputs: Vec<(usize, Axis)>,
+    /// In the order in which they were given.
     pub frfs: Vec<FrfDatum>,
 }
 
@@ -60,7 +68,9 @@ impl FrfBlock {
 /// All FRFs of a campaign.
 #[derive(Debug, Clone)]
 pub struct FrfData {
+    /// One a posture, hammer level and frequency axis.
     pub blocks: Vec<Arc<FrfBlock>>,
+    /// One a posture, measured or not.
     pub posture_ids: Vec<String>,
 }
 
@@ -68,15 +78,16 @@ pub struct FrfData {
 const FALLBACK_RELATIVE_NOISE: f64 = 0.05;
 
 impl FrfData {
-    pub fn new(campaign: &Campaign, model: &RobotModel, set: FrfSet) -> Result<Self> {
-        if set.frfs.is_empty() {
-            return Err(InputError::new("the campaign has no FRFs")
-                .file(campaign.dir.join("campaign.toml"))
-                .key("frf")
-                .remedy("add [[frf]] tables that name the measured FRF files")
-                .into());
+    /// FRFs arranged for fitting, with the noise that they show. `postures` and the points of the FRFs are told by their
+    /// index.
+    ///
+    /// # Errors
+    /// No FRFs, or a posture that does not fit the robot.
+    pub fn new(postures: &[Posture], model: &RobotModel, frfs: Vec<MeasuredFrf>) -> Result<Self> {
+        if frfs.is_empty() {
+            return Err(InputError::new("there are no FRFs to fit a model to").into());
         }
-        let mut data = Self::arrange(&campaign.postures, model, set.frfs)?;
+        let mut data = Self::arrange(postures, model, frfs)?;
         data.blocks
             .par_iter_mut()
             .for_each(|block| estimate_noise(Arc::make_mut(block)));
@@ -155,6 +166,7 @@ impl FrfData {
         }
     }
 
+    /// Every FRF with its block, block by block: the order of all predictions.
     pub fn frfs(&self) -> impl Iterator<Item = (&FrfBlock, &FrfDatum)> {
         let blocks = self.blocks.iter().map(Arc::as_ref);
         blocks.flat_map(|b: &FrfBlock| b.frfs.iter().map(move |f| (b, f)))

@@ -13,8 +13,11 @@ use crate::{Error, Result};
 /// Half the sum of squares at a point with its gradient and Gauss–Newton Hessian (both of `cost`).
 #[derive(Debug, Clone)]
 pub struct Linearisation {
+    /// ½ Σ r².
     pub cost: f64,
+    /// Its first derivatives.
     pub gradient: DVector<f64>,
+    /// Its second derivatives without those of the residuals.
     pub hessian: DMatrix<f64>,
 }
 
@@ -22,6 +25,7 @@ pub struct Linearisation {
 pub trait LeastSquares {
     /// ½ Σ r².
     fn cost(&self, theta: &[f64]) -> Result<f64>;
+    /// `cost` with its derivatives.
     fn linearise(&self, theta: &[f64]) -> Result<Linearisation>;
 }
 
@@ -65,12 +69,15 @@ impl Ending {
 /// Where the solver stopped, and why.
 #[derive(Debug, Clone)]
 pub struct Fit {
+    /// Solver's scale.
     pub theta: Vec<f64>,
     /// ½ Σ r² there.
     pub cost: f64,
     /// Gauss–Newton Hessian there.
     pub hessian: DMatrix<f64>,
+    /// Steps taken.
     pub iterations: usize,
+    /// Why it stopped.
     pub ending: Ending,
     /// Indices of parameters that stopped at a bound.
     pub at_bound: Vec<usize>,
@@ -79,12 +86,14 @@ pub struct Fit {
 /// When to stop.
 #[derive(Debug, Clone, Copy)]
 pub struct Stopping {
+    /// Steps taken at most.
     pub max_iterations: usize,
     /// Relative decrease of the cost that a converged step still promises.
     pub relative_decrease: f64,
 }
 
 impl Fit {
+    /// Whether the optimum was found.
     pub fn converged(&self) -> bool {
         self.ending == Ending::Converged
     }

@@ -2,6 +2,7 @@
 
 pub mod calibrate;
 pub mod case;
+mod channels;
 pub mod cutting_case;
 pub mod cutting_data;
 mod cutting_forces;
@@ -13,13 +14,16 @@ mod cutting_windows;
 pub mod departures;
 mod force_channel;
 pub mod frf_data;
+pub mod frf_problem;
 pub mod levenberg_marquardt;
 pub mod modal_start;
 pub mod modal_table;
+pub mod model_history;
 pub mod off_comb;
 pub mod posture_modes;
 pub mod resonance_study;
 pub mod rest;
+pub mod rest_patterns;
 pub mod sensitivity;
 pub mod spot_response;
 pub mod structure;

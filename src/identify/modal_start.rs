@@ -35,6 +35,7 @@ const MATCHINGS: usize = 4;
 /// The modes measured at one posture.
 #[derive(Debug, Clone)]
 pub struct PostureMeasurement {
+    /// Where the robot's frames are there.
     pub kinematics: Kinematics,
     /// Frequency (Hz) and damping ratio, ascending in frequency.
     pub modes: Vec<[f64; 2]>,
@@ -51,6 +52,7 @@ pub struct ModalStart {
     pub measured: usize,
     /// rms of ln(measured/model) of their frequencies: with the robot file's values, and at the start.
     pub frequency_error_before: f64,
+    /// The same at the start.
     pub frequency_error: f64,
     /// On the solver's scale.
     #[serde(skip)]
@@ -289,7 +291,7 @@ impl Frequencies<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::RobotSection;
+    use crate::data::RobotSection;
     use crate::robot::RobotModel;
     use crate::robot::fixture::{TAP_POSTURES, irb6640};
 

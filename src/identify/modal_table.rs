@@ -7,14 +7,17 @@ use super::levenberg_marquardt::{Fit, LeastSquares, Linearisation, Stopping, min
 use super::posture_modes::{PostureMode, posture_modes};
 use super::structure::StructureModel;
 use crate::Result;
-use crate::ingest::Axis;
+use crate::data::Axis;
 use crate::robot::Kinematics;
 
 /// One row of the table: the strongest mode of the direct receptance at the tool centre point along a base axis.
 #[derive(Debug, Clone)]
 pub struct StrongestMode {
+    /// Where the robot's frames are at the row's posture.
     pub kinematics: Kinematics,
+    /// Base axis of force and response.
     pub axis: Axis,
+    /// Natural frequency, Hz.
     pub frequency_hz: f64,
     /// Largest real part of the receptance beside the mode, m/N: 1/(4kζ(1−ζ)) of a single mode (Altintas 2012, §3).
     pub peak_real_m_per_n: f64,
@@ -23,7 +26,9 @@ pub struct StrongestMode {
 /// The model's counterpart of a [`StrongestMode`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prediction {
+    /// Natural frequency, Hz.
     pub frequency_hz: f64,
+    /// Largest real part of the receptance, m/N.
     pub peak_real_m_per_n: f64,
     /// Derivatives of the logarithms of the two with respect to the parameters on the solver's scale.
     ln_frequency_slope: Vec<f64>,
@@ -124,7 +129,7 @@ pub fn fit(model: &StructureModel, rows: &[StrongestMode]) -> Result<Fit> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::RobotSection;
+    use crate::data::RobotSection;
     use crate::robot::RobotModel;
     use crate::robot::fixture::{TAP_POSTURES, irb6640};
 

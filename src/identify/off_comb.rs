@@ -21,6 +21,7 @@ pub struct VibrationLine {
 }
 
 impl OffComb {
+    /// Numbers that it is compared in: its frequency, and each line on each channel.
     pub fn value_count(&self) -> usize {
         1 + self.lines.iter().map(|l| l.channels.len()).sum::<usize>()
     }
@@ -106,6 +107,7 @@ pub fn find_vibration(
 /// A line of a steady cut that stands above its surroundings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StandingLine {
+    /// Hz.
     pub frequency_hz: f64,
     /// Distance of the spectrum's lines, Hz: nearer than that nothing is told apart.
     pub resolution_hz: f64,

@@ -5,12 +5,13 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::structure::StructureModel;
 use crate::Result;
-use crate::ingest::Axis;
+use crate::data::Axis;
 use crate::robot::{Kinematics, ModalBasis};
 
 /// One undamped mode of the whole structure, branches included.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PostureMode {
+    /// Natural frequency, Hz.
     pub frequency_hz: f64,
     /// Modal strain energy method (Johnson & Kienholz 1982): each part's damping counts by its share of the mode's strain
     /// energy. The chain's part is exactly its one damping ratio.
@@ -19,7 +20,9 @@ pub struct PostureMode {
     pub compliance_m_per_n: [f64; 3],
     /// Derivatives with respect to the parameters on the solver's scale; empty where none were asked for.
     pub ln_frequency_slope: Vec<f64>,
+    /// The same of the damping ratio.
     pub damping_slope: Vec<f64>,
+    /// The same of the logarithm of each compliance.
     pub ln_compliance_slope: [Vec<f64>; 3],
 }
 
@@ -30,6 +33,7 @@ impl PostureMode {
         self.compliance_m_per_n[axis.index()] / (4.0 * self.damping_ratio * (1.0 - self.damping_ratio))
     }
 
+    /// The smallest real part by magnitude, m/N; see [`peak_real_m_per_n`](Self::peak_real_m_per_n).
     pub fn depth_m_per_n(&self, axis: Axis) -> f64 {
         self.compliance_m_per_n[axis.index()] / (4.0 * self.damping_ratio * (1.0 + self.damping_ratio))
     }
@@ -135,7 +139,7 @@ pub fn posture_modes(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::RobotSection;
+    use crate::data::RobotSection;
     use crate::effects::{DataSummary, find};
     use crate::robot::fixture::{TAP_POSTURES, irb6640};
     use crate::robot::{FrfBasis, RobotModel};

@@ -15,15 +15,15 @@ use super::posture_modes::{PostureMode, posture_modes};
 use super::structure::StructureModel;
 use super::study::{EffectName, Extent, HeldOut, Measure, Residual, Study, View};
 use crate::Result;
+use crate::data::Axis;
 use crate::effects::{self, DataSummary, Instance};
-use crate::ingest::Axis;
 use crate::parameter::Parameter;
 use crate::robot::{Kinematics, RobotSpec};
 
 /// How a resonance was read off its FRF.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Reading {
+pub enum ResonanceReading {
     /// Natural frequency, and the largest real part beside it.
     ModalTable,
     /// Where the real part has a minimum, and its depth.
@@ -35,8 +35,11 @@ pub enum Reading {
 pub struct Resonance {
     /// Index of the configuration.
     pub configuration: usize,
+    /// Base axis of force and response.
     pub axis: Axis,
-    pub reading: Reading,
+    /// How it was read.
+    pub reading: ResonanceReading,
+    /// As the reading has it, Hz.
     pub frequency_hz: f64,
     /// Lowest and highest reading behind it, Hz.
     pub readings_hz: [f64; 2],
@@ -51,6 +54,7 @@ pub struct Resonance {
 /// One line of a list of minima of the real part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Minimum {
+    /// Hz.
     pub frequency_hz: f64,
     /// Negative, m/N.
     pub real_m_per_n: f64,
@@ -116,6 +120,7 @@ const ROUGH: f64 = 8.0;
 pub struct Match {
     /// As the reading has it: at the minimum of the real part, or natural.
     pub frequency_hz: f64,
+    /// Real part next to the resonance by magnitude, m/N.
     pub size_m_per_n: f64,
     /// Squared distance in standard deviations, frequency and size together.
     pub distance2: f64,
@@ -153,6 +158,7 @@ pub struct ResonanceStudy {
 }
 
 impl ResonanceStudy {
+    /// A table of `resonances` measured at `configurations`.
     pub fn new(robot: &RobotSpec, configurations: Vec<Kinematics>, resonances: Vec<Resonance>) -> Self {
         let hz = || resonances.iter().map(|r| r.frequency_hz);
         let summary = DataSummary {
@@ -170,10 +176,12 @@ impl ResonanceStudy {
         }
     }
 
+    /// The table.
     pub fn resonances(&self) -> &[Resonance] {
         &self.resonances
     }
 
+    /// Where the robot's frames are at each configuration.
     pub fn configurations(&self) -> &[Kinematics] {
         &self.configurations
     }
@@ -215,8 +223,8 @@ impl ResonanceStudy {
 /// A mode as a resonance of this reading would show it: frequency in Hz, size in m/N.
 fn reading(resonance: &Resonance, mode: &PostureMode) -> (f64, f64) {
     match resonance.reading {
-        Reading::ModalTable => (mode.frequency_hz, mode.peak_real_m_per_n(resonance.axis)),
-        Reading::RealPartMinimum => (mode.minimum_hz(), mode.depth_m_per_n(resonance.axis)),
+        ResonanceReading::ModalTable => (mode.frequency_hz, mode.peak_real_m_per_n(resonance.axis)),
+        ResonanceReading::RealPartMinimum => (mode.minimum_hz(), mode.depth_m_per_n(resonance.axis)),
     }
 }
 
@@ -235,8 +243,8 @@ fn misfit_slopes(resonance: &Resonance, mode: &PostureMode, widening: f64) -> [D
     let compliance = &mode.ln_compliance_slope[resonance.axis.index()];
     // Of ½ ln(1 + 2ζ), and of −ln ζ(1 ∓ ζ).
     let (shift, scale) = match resonance.reading {
-        Reading::ModalTable => (0.0, -1.0 / zeta + 1.0 / (1.0 - zeta)),
-        Reading::RealPartMinimum => (1.0 / (1.0 + 2.0 * zeta), -1.0 / zeta - 1.0 / (1.0 + zeta)),
+        ResonanceReading::ModalTable => (0.0, -1.0 / zeta + 1.0 / (1.0 - zeta)),
+        ResonanceReading::RealPartMinimum => (1.0 / (1.0 + 2.0 * zeta), -1.0 / zeta - 1.0 / (1.0 + zeta)),
     };
     let with_damping = |own: &[f64], factor: f64| {
         let pairs = own.iter().zip(&mode.damping_slope);
@@ -510,5 +518,7 @@ impl Study for ResonanceStudy {
     }
 }
 
+#[cfg(test)]
+pub(crate) mod made_table;
 #[cfg(test)]
 mod tests;

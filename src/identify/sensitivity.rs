@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use num_complex::Complex64;
 
+use super::channels::Channels;
 use super::frf_data::{FrfBlock, FrfData};
-use super::structure::{Channels, StructureModel};
+use super::structure::StructureModel;
 use crate::Result;
 use crate::robot::frf::{Response, Slopes};
 

@@ -12,8 +12,9 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
+use super::channels::Channels;
 use super::frf_data::{FrfBlock, FrfData};
-use super::structure::{Channels, StructureModel};
+use super::structure::StructureModel;
 use crate::Result;
 use crate::effects::Spot;
 use crate::robot::frf::{Response, Slopes};
@@ -33,7 +34,9 @@ pub struct SpotLine {
 /// Lines of all blocks.
 #[derive(Debug, Clone)]
 pub struct SpotResponses {
+    /// In the order of [`at`](Self::at) within a line.
     pub spots: Vec<Spot>,
+    /// Number of the model's parameters.
     pub parameters: usize,
     /// Frequency (Hz) and block of each line.
     pub lines: Vec<(f64, usize)>,
@@ -43,6 +46,7 @@ pub struct SpotResponses {
     pub on_parameters: Vec<Complex64>,
     /// Re Jᴴ J and Re Jᴴ r over everything.
     pub information: DMatrix<f64>,
+    /// Re Jᴴ r over everything.
     pub score: DVector<f64>,
     /// Σ|r|².
     pub square: f64,

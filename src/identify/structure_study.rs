@@ -4,9 +4,11 @@ use num_complex::Complex64;
 
 use super::calibrate::{Calibration, Estimate, GLANCE_VALUES, Options, calibrate, sketch};
 use super::frf_data::FrfData;
+use super::frf_problem::{FrfProblem, Misfit};
 use super::levenberg_marquardt::Stopping;
-use super::rest::{self, AfterSlips, BeyondSlips, Rest, RestCurve, SMALL_ERROR};
-use super::structure::{FrfProblem, Misfit, StructureModel};
+use super::rest::{AfterSlips, BeyondSlips, Rest, RestCurve, SMALL_ERROR};
+use super::rest_patterns;
+use super::structure::StructureModel;
 use super::study::{EffectName, Extent, HeldOut, Measure, Residual, Study, View, held_out};
 use crate::Result;
 use crate::data::RobotSpec;
@@ -19,7 +21,9 @@ pub type AbsorbSlips = fn(&StructureModel, &FrfData, &[f64], &[RestCurve]) -> Re
 /// A campaign's FRFs, arranged for the loop.
 #[derive(Debug, Clone)]
 pub struct StructureStudy {
+    /// All FRFs.
     pub data: FrfData,
+    /// How the baseline is calibrated.
     pub options: Options,
     /// Where the measured modes put the model, solver's scale: a starting point of its calibration.
     measured: Option<Vec<f64>>,
@@ -40,6 +44,7 @@ const LARGEST_STRIDE: usize = 6;
 const COARSE_VALUES: usize = 2500;
 
 impl StructureStudy {
+    /// FRFs of a robot, with the thinner views that searches use.
     pub fn new(robot: &RobotSpec, data: FrfData, options: Options) -> Self {
         let share = data.value_count().div_ceil(COARSE_VALUES);
         // A resonance needs its few lines: measurements with coarse lines are left alone.
@@ -240,7 +245,7 @@ impl Study for StructureStudy {
 
     fn rest(&self, model: &StructureModel, theta: &[f64]) -> Result<Rest> {
         Ok(Rest {
-            tests: rest::test(&model.rest(theta, &self.data)?),
+            tests: rest_patterns::test(&model.rest(theta, &self.data)?),
             small_errors: small_errors(&self.data),
             beyond_slips: None,
         })
@@ -250,7 +255,7 @@ impl Study for StructureStudy {
         let Some(absorb) = self.slips else { return Ok(None) };
         let mut curves = model.rest(theta, &self.data)?;
         let after = absorb(model, &self.data, theta, &curves)?;
-        Ok(Some(rest::test_beyond(&mut curves, after)))
+        Ok(Some(rest_patterns::test_beyond(&mut curves, after)))
     }
 
     fn impossible(&self, model: &StructureModel, instance: &Instance, own: &[Estimate]) -> Option<String> {
@@ -290,6 +295,7 @@ const CORRELATION_LAGS: usize = 40;
 /// A frequency around which the residual stands out.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct ResidualPeak {
+    /// Hz.
     pub frequency_hz: f64,
     /// Root mean square of |model − measured|/σ around there, over all FRFs: 1 is noise.
     pub times_noise: f64,

@@ -33,18 +33,22 @@ pub enum Measure {
 /// A view of a study's data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct View {
+    /// How much of the data.
     pub extent: Extent,
+    /// What is compared.
     pub measure: Measure,
     /// A fold (posture, cut) that is left out.
     pub left_out: Option<usize>,
 }
 
 impl View {
+    /// A share of the data, by likelihood.
     pub const COARSE: View = View {
         extent: Extent::Coarse,
         measure: Measure::Likelihood,
         left_out: None,
     };
+    /// All data, by likelihood.
     pub const FULL: View = View {
         extent: Extent::Full,
         ..View::COARSE
@@ -54,6 +58,7 @@ impl View {
 /// How an effect at a site is called.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct EffectName {
+    /// Its id.
     pub effect: String,
     /// `None` where the effect has no place of its own.
     pub site: Option<String>,
@@ -89,19 +94,23 @@ pub trait Study: Sync {
     type Model: Clone + Send + Sync;
     /// An effect at a site, with its discrete choice.
     type Instance: Clone + Send + Sync;
+    /// A model's misfit to a view of the data.
     type Problem<'a>: LeastSquares + Sync
     where
         Self: 'a;
     /// What effects need for finding their starting points at a fit.
     type Hints: Sync;
 
+    /// All of them, the baseline's first.
     fn parameters<'m>(&self, model: &'m Self::Model) -> &'m [Parameter];
 
     /// Every instance that could be added to `model`, and the effects this data cannot show with the reason.
     fn instances(&self, model: &Self::Model) -> (Vec<Self::Instance>, Vec<(String, String)>);
 
+    /// What an instance is called.
     fn name(&self, instance: &Self::Instance) -> EffectName;
 
+    /// `model` with one more effect; its parameters come last.
     fn extend(&self, model: &Self::Model, instance: &Self::Instance) -> Self::Model;
 
     /// The same model, whose fits start from `theta`.
@@ -119,6 +128,7 @@ pub trait Study: Sync {
     /// Starting points for the effect's own parameters, natural values.
     fn starts(&self, instance: &Self::Instance, hints: &Self::Hints) -> Vec<Vec<f64>>;
 
+    /// The misfit of `model` to a view.
     fn problem<'a>(&'a self, model: &'a Self::Model, view: View) -> Self::Problem<'a>;
 
     /// Roughly the processor time of one evaluation of `model` with its derivatives on a view, s: what budgets are counted in.
@@ -134,6 +144,7 @@ pub trait Study: Sync {
     /// How well `theta` predicts one fold, on all of its data.
     fn predict_fold(&self, model: &Self::Model, theta: &[f64], fold: usize) -> Result<HeldOut>;
 
+    /// How much `model` at `theta` leaves of all data.
     fn residual(&self, model: &Self::Model, theta: &[f64]) -> Result<Residual>;
 
     /// What tests of structure find in what the model leaves; no tests where there is too little data.
@@ -166,6 +177,7 @@ pub trait Study: Sync {
     /// The fair fit of a model as it stands.
     fn calibrate(&self, model: &Self::Model) -> Result<Calibration>;
 
+    /// Where nothing has been fitted yet, solver's scale.
     fn nominal_theta(&self, model: &Self::Model) -> Vec<f64> {
         let parameters = self.parameters(model).iter();
         parameters.map(|p| p.internal(p.nominal)).collect()
@@ -177,6 +189,7 @@ pub trait Study: Sync {
 pub struct HeldOut {
     /// Σ|model − measured|² and Σ|measured|² on folds left out of the fit.
     pub error: f64,
+    /// Σ|measured|² on the folds left out.
     pub signal: f64,
     /// −2 ln L there: Σ r²/σ² over real values.
     pub chi2: f64,
@@ -185,6 +198,7 @@ pub struct HeldOut {
 }
 
 impl HeldOut {
+    /// Held-out error over the signal; 0 where there is no signal.
     pub fn nrms(&self) -> f64 {
         if self.signal > 0.0 {
             (self.error / self.signal).sqrt()
@@ -450,8 +464,11 @@ pub fn own_starts<S: Study>(
 /// An effect tried: the model with it and its fit.
 #[derive(Debug, Clone)]
 pub struct Tried<M, I> {
+    /// The effect with its place and discrete choice.
     pub instance: I,
+    /// The model with it.
     pub model: M,
+    /// Its fit.
     pub fit: Fit,
 }
 

@@ -12,7 +12,7 @@ use crate::analysis::DiagnosisFindings;
 use crate::analysis::diagnosis::Leading;
 use crate::campaign::Campaign;
 use crate::discrepancy::explained::Part;
-use crate::discrepancy::{Candidate, Diagnosis, NextMeasurement, Verdict};
+use crate::discrepancy::{Diagnosis, DiagnosisVerdict, EffectCandidate, NextMeasurement};
 use crate::effects::Instance;
 use crate::identify::StructureModel;
 
@@ -24,7 +24,7 @@ const LISTED: usize = 8;
 /// FRFs drawn.
 const FRFS_DRAWN: usize = 3;
 
-type StructureCandidate = Candidate<StructureModel, Instance>;
+type StructureCandidate = EffectCandidate<StructureModel, Instance>;
 
 /// The verdict in plain words.
 pub fn summary(findings: &DiagnosisFindings) -> String {
@@ -37,15 +37,15 @@ pub fn summary(findings: &DiagnosisFindings) -> String {
 pub(super) fn verdict_text<M, I>(
     d: &Diagnosis<M, I>,
     data: &str,
-    plainly: impl Fn(&Candidate<M, I>) -> (String, &'static str),
+    plainly: impl Fn(&EffectCandidate<M, I>) -> (String, &'static str),
 ) -> String {
     let sure = format!("confidence {:.0} %", 100.0 * d.confidence);
     let mut text = match (d.verdict, d.winner()) {
-        (Verdict::Effect, Some(winner)) => {
+        (DiagnosisVerdict::Effect, Some(winner)) => {
             let (title, explanation) = plainly(winner);
             format!("The model lacks {title} ({sure}). {explanation}")
         }
-        (Verdict::None, _) => match d.baseline.rest.excuse_in_words() {
+        (DiagnosisVerdict::None, _) => match d.baseline.rest.excuse_in_words() {
             Some(left) => format!(
                 "The model lacks nothing that is larger than the small errors of the setup ({sure}): what stands above the \
                  noise is {left}."
@@ -83,7 +83,7 @@ pub fn section(campaign: &Campaign, findings: &DiagnosisFindings) -> ReportSecti
     blocks.extend(how_it_shows(d, |c| c.instance.effect.fingerprint()));
     if let (Some(leading), Some(candidate)) = (&findings.leading, findings.leader()) {
         let who = match d.verdict {
-            Verdict::Unknown => format!("The best candidate, {},", candidate.instance.title()),
+            DiagnosisVerdict::Unknown => format!("The best candidate, {},", candidate.instance.title()),
             _ => "It".into(),
         };
         blocks.push(paragraph(leading.explained.sentence(&who)));
@@ -125,7 +125,7 @@ pub fn section(campaign: &Campaign, findings: &DiagnosisFindings) -> ReportSecti
 /// The fingerprint of the effect that is missing.
 pub(super) fn how_it_shows<M, I>(
     d: &Diagnosis<M, I>,
-    fingerprint: impl Fn(&Candidate<M, I>) -> &'static str,
+    fingerprint: impl Fn(&EffectCandidate<M, I>) -> &'static str,
 ) -> Option<Block> {
     d.winner()
         .map(|winner| paragraph(format!("How it shows: {}", fingerprint(winner))))
@@ -185,7 +185,7 @@ pub(super) fn candidate_chart<M, I>(
     file_name: &str,
     folds: &str,
 ) -> Block {
-    let shown: Vec<&Candidate<M, I>> = d.candidates.iter().take(LISTED).collect();
+    let shown: Vec<&EffectCandidate<M, I>> = d.candidates.iter().take(LISTED).collect();
     let percents = |first: Option<f64>, rest: Vec<Option<f64>>| {
         let all = std::iter::once(first).chain(rest);
         all.map(|v| v.map(|v| 100.0 * v)).collect::<Vec<_>>()
@@ -233,10 +233,10 @@ pub(super) fn candidate_chart<M, I>(
 
 pub(super) fn candidate_table<M, I>(
     d: &Diagnosis<M, I>,
-    title: impl Fn(&Candidate<M, I>) -> String,
+    title: impl Fn(&EffectCandidate<M, I>) -> String,
 ) -> Block {
     let all = &d.candidates;
-    let row = |c: &Candidate<M, I>| {
+    let row = |c: &EffectCandidate<M, I>| {
         let parameters: Vec<String> = c
             .parameters
             .iter()

@@ -6,11 +6,11 @@ use super::picture::Picture;
 use super::words::{self, frf_name, listed};
 use crate::analysis::{CuttingFindings, DiagnosisFindings, StructureFindings};
 use crate::campaign::{Campaign, Process};
-use crate::discrepancy::diagnose::Baseline;
+use crate::discrepancy::candidate::BaselineFit;
 use crate::discrepancy::localise::Localisation;
 use crate::discrepancy::setup::SetupFinding;
 use crate::discrepancy::verdict::is_noise;
-use crate::discrepancy::{Candidate, CutError, Diagnosis, Verdict};
+use crate::discrepancy::{CutError, Diagnosis, DiagnosisVerdict, EffectCandidate};
 use crate::effects::Instance;
 use crate::effects::cutting::CuttingInstance;
 use crate::identify::cutting_waves::courses;
@@ -79,7 +79,7 @@ fn answer<M, I>(
     added: &[String],
     data: &str,
     lead: Option<&Localisation>,
-    name: impl Fn(&Candidate<M, I>) -> Named,
+    name: impl Fn(&EffectCandidate<M, I>) -> Named,
 ) -> VerdictCard {
     let mut card = VerdictCard::default();
     let label_in_words = |label: &String| {
@@ -87,7 +87,7 @@ fn answer<M, I>(
         of.map_or_else(|| label.clone(), |c| name(c).title)
     };
     match (d.verdict, d.winner()) {
-        (Verdict::Effect, Some(winner)) => {
+        (DiagnosisVerdict::Effect, Some(winner)) => {
             let of = name(winner);
             card.tone = Tone::Missing;
             card.headline = format!("Missing: {}", of.title);
@@ -101,7 +101,7 @@ fn answer<M, I>(
                 );
             }
         }
-        (Verdict::None, _) => {
+        (DiagnosisVerdict::None, _) => {
             card.tone = Tone::Clean;
             nothing(&mut card, &d.baseline, added, data);
         }
@@ -130,7 +130,7 @@ fn answer<M, I>(
     card
 }
 
-fn nothing(card: &mut VerdictCard, baseline: &Baseline, added: &[String], data: &str) {
+fn nothing(card: &mut VerdictCard, baseline: &BaselineFit, added: &[String], data: &str) {
     let more = if added.is_empty() { "" } else { " more" };
     (card.headline, card.explanation) = match baseline.rest.excuse_in_words() {
         Some(left) => (
@@ -153,7 +153,7 @@ fn unknown<M, I>(
     card: &mut VerdictCard,
     d: &Diagnosis<M, I>,
     lead: Option<&Localisation>,
-    name: &impl Fn(&Candidate<M, I>) -> Named,
+    name: &impl Fn(&EffectCandidate<M, I>) -> Named,
 ) {
     let drawn = lead.and_then(|found| {
         let place = found.places.first()?;
@@ -274,16 +274,16 @@ pub fn structure(
                     .insert(0, ("Where it shows", place.trim_start_matches("at ").into()));
             }
             card.next = match (d.verdict, d.winner(), &found.lead) {
-                (Verdict::Effect, Some(winner), _) if d.indistinguishable.is_empty() => format!(
+                (DiagnosisVerdict::Effect, Some(winner), _) if d.indistinguishable.is_empty() => format!(
                     "make the check, then add it and fit everything anew: `lobestone add {dir} {}`",
                     winner.label()
                 ),
-                (Verdict::Effect, Some(winner), _) => format!(
+                (DiagnosisVerdict::Effect, Some(winner), _) => format!(
                     "tell the rivals apart first: {}. Then `lobestone add {dir} {}`",
                     found.next_measurement,
                     winner.label()
                 ),
-                (Verdict::None, ..) => use_it(campaign),
+                (DiagnosisVerdict::None, ..) => use_it(campaign),
                 (_, _, Some(lead)) => match lead.places.first().and_then(|p| p.best.as_ref()) {
                     Some(best) => format!(
                         "look at what the data draw: `lobestone localise {dir}`; to put it into the model: `lobestone add \
@@ -380,9 +380,9 @@ fn error_bar(
 }
 
 /// What the model with the leading candidate is called.
-fn with_candidate(verdict: Verdict) -> &'static str {
+fn with_candidate(verdict: DiagnosisVerdict) -> &'static str {
     match verdict {
-        Verdict::Effect => "with what is missing",
+        DiagnosisVerdict::Effect => "with what is missing",
         _ => "with the best guess",
     }
 }
@@ -481,16 +481,16 @@ pub fn cutting(campaign: &Campaign, files: &[SetupFinding], found: &CuttingFindi
     }
     let dir = campaign.dir.display();
     card.next = match (d.verdict, d.winner()) {
-        (Verdict::Effect, Some(winner)) if d.indistinguishable.is_empty() => format!(
+        (DiagnosisVerdict::Effect, Some(winner)) if d.indistinguishable.is_empty() => format!(
             "make the check, then add it and fit everything anew: `lobestone add {dir} {}`",
             winner.label()
         ),
-        (Verdict::Effect, Some(winner)) => format!(
+        (DiagnosisVerdict::Effect, Some(winner)) => format!(
             "tell the rivals apart first: {}. Then `lobestone add {dir} {}`",
             found.next_measurement,
             winner.label()
         ),
-        (Verdict::None, _) => format!("use the coefficients: `lobestone cfc {dir}`"),
+        (DiagnosisVerdict::None, _) => format!("use the coefficients: `lobestone cfc {dir}`"),
         _ => found.next_measurement.to_string(),
     };
     card.next = sentence(&card.next);

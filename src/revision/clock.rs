@@ -2,8 +2,13 @@
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
+/// The time of day, RFC 3339, UTC, to the second.
+pub fn now() -> String {
+    rfc3339(SystemTime::now())
+}
+
 /// RFC 3339, UTC, to the second. Times before 1970 are shown as its beginning.
-pub fn rfc3339(time: SystemTime) -> String {
+fn rfc3339(time: SystemTime) -> String {
     let seconds = time.duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
     let (year, month, day) = civil((seconds / 86_400) as i64);
     let of_day = seconds % 86_400;

@@ -7,43 +7,10 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Domain, FOLDER, RecordedEffect};
+use super::folder::FOLDER;
 use crate::files::write_atomically;
+use crate::identify::model_history::{Domain, Evidence, RecordedEffect};
 use crate::{Error, Result};
-
-/// Why an effect was added: what the diagnosis of the model before said.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Evidence {
-    /// `effect`, `none` or `unknown`.
-    pub verdict: String,
-    /// `effect@site` that it named.
-    pub effect: Option<String>,
-    /// Probability that the verdict is right.
-    pub confidence: f64,
-    /// Best first.
-    pub candidates: Vec<RecordedCandidate>,
-    /// When it was made, RFC 3339, UTC.
-    pub when: String,
-}
-
-/// An effect that was tried.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RecordedCandidate {
-    /// `effect@site`.
-    pub effect: String,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub variant: Option<String>,
-    /// Error with it; the numbers are `None` where they are none.
-    pub nrms: Option<f64>,
-    pub held_out_nrms: Option<f64>,
-    pub delta_bic: Option<f64>,
-    pub p_value: Option<f64>,
-    pub reduced_chi2: Option<f64>,
-    /// What speaks against it; empty as a rule.
-    pub remark: String,
-}
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Entry {
@@ -107,6 +74,8 @@ pub fn recall(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::identify::model_history::RecordedCandidate;
+    use crate::revision::now;
 
     fn evidence(confidence: f64) -> Evidence {
         Evidence {
@@ -123,7 +92,7 @@ mod tests {
                 reduced_chi2: Some(1.01),
                 remark: String::new(),
             }],
-            when: super::super::now(),
+            when: now(),
         }
     }
 

@@ -4,8 +4,9 @@ use std::fmt::Debug;
 use std::io::Read;
 use std::path::Path;
 
-use super::{Domain, log_file};
+use super::folder::log_file;
 use crate::campaign::{Campaign, LinkTolerances, campaign_file, named_files, paths};
+use crate::identify::model_history::Domain;
 use crate::{Error, Result};
 
 /// FNV-1a, 64 bits (Fowler, Noll & Vo): notices a change; it need not resist anyone who wants to deceive himself.

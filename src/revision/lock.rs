@@ -3,7 +3,7 @@
 use std::fs::{File, TryLockError};
 use std::path::Path;
 
-use super::FOLDER;
+use super::folder::FOLDER;
 use crate::{Error, Result};
 
 /// Waits until nobody writes the log of a campaign; while what is returned lives nobody begins to. `None` where nothing

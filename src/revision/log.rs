@@ -8,9 +8,10 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::folder::{FOLDER, log_file};
 use super::lock::lock;
-use super::{Domain, FOLDER, Revision};
 use crate::files::write_durably;
+use crate::identify::model_history::{Domain, Revision};
 use crate::{Error, InputError, Result};
 
 const SCHEMA: &str = "lobestone/revisions/1";
@@ -19,11 +20,6 @@ const TEMPORARY: &str = ".revisions-";
 
 const REMEDY: &str = "take back what was changed in it by hand, or delete the file: the model starts from the baseline \
                       then, and campaign.toml and the measurements are not touched";
-
-/// Where a campaign's log is, whether or not there is one.
-pub fn log_file(campaign_dir: &Path) -> PathBuf {
-    campaign_dir.join(FOLDER).join("revisions.json")
-}
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

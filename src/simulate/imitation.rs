@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::visibility::misfit;
 use crate::Result;
 use crate::effects::{self, DataSummary, Instance};
-use crate::identify::structure::{FrfProblem, Misfit};
+use crate::identify::frf_problem::{FrfProblem, Misfit};
 use crate::identify::{FrfData, StructureModel, levenberg_marquardt};
 
 /// The effect of the library that leaves least of what a foreign effect does, found by refits from the effect's starting

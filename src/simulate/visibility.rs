@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::request::HiddenEffect;
 use crate::Result;
 use crate::effects::DataSummary;
-use crate::identify::structure::{FrfProblem, Misfit};
+use crate::identify::frf_problem::{FrfProblem, Misfit};
 use crate::identify::{FrfData, StructureModel, levenberg_marquardt};
 
 /// What is seen of an effect when everything else is in the model.

@@ -1,7 +1,7 @@
 //! The real case's answer in plain words, from its numbers.
 
 use super::real_case::{BandCheck, Explanation, RealCase, WIDENED};
-use crate::discrepancy::Verdict;
+use crate::discrepancy::DiagnosisVerdict;
 use crate::discrepancy::verdict::is_convincing;
 
 /// A joint whose stiffness the fit moved by more than this factor is worth a word.
@@ -37,12 +37,12 @@ impl RealCase {
         };
         let (confidence, best) = (self.confidence, self.best());
         match (self.verdict, best) {
-            (Verdict::Effect, Some(best)) => format!(
+            (DiagnosisVerdict::Effect, Some(best)) => format!(
                 "Verdict: effect, {} (confidence {confidence:.2}). It {}.",
                 best.name,
                 left(best)
             ),
-            (Verdict::Unknown, Some(best)) => format!(
+            (DiagnosisVerdict::Unknown, Some(best)) => format!(
                 "Verdict: unknown (confidence {confidence:.2}). What is left is more than the assumed accuracy allows, and no \
                  single effect of the library takes it away; the best one, {}, {}.",
                 best.name,
@@ -156,9 +156,9 @@ impl RealCase {
         let w = &self.widened;
         let same = self.best().is_some_and(|b| b.name == w.best) && self.verdict == w.verdict;
         let verdict = match w.verdict {
-            Verdict::Effect => "effect",
-            Verdict::None => "none",
-            Verdict::Unknown => "unknown",
+            DiagnosisVerdict::Effect => "effect",
+            DiagnosisVerdict::None => "none",
+            DiagnosisVerdict::Unknown => "unknown",
         };
         format!(
             "With frequencies {WIDENED:.0} times less certain the loop says {verdict} (confidence {:.2}) with {} first, BIC \

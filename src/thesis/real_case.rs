@@ -6,9 +6,9 @@ use serde::Serialize;
 use super::published::{MINIMA, MODAL, ModalRow, RECURRING_BANDS, STATIC_STIFFNESS, StaticRow, rows};
 use crate::discrepancy::difference::{Difference, Lookout, greatest_difference};
 use crate::discrepancy::verdict::{STRONG_BIC, evidence_weight};
-use crate::discrepancy::{Verdict, diagnose};
+use crate::discrepancy::{DiagnosisVerdict, diagnose};
 use crate::identify::modal_table::{FREQUENCY_STD, PEAK_STD};
-use crate::identify::resonance_study::{Minimum, Reading, Resonance, ResonanceStudy, merged};
+use crate::identify::resonance_study::{Minimum, Resonance, ResonanceReading, ResonanceStudy, merged};
 use crate::identify::{Estimate, StructureModel};
 use crate::ingest::Axis;
 use crate::robot::{PostureReport, posture_deg};
@@ -31,7 +31,7 @@ const LEAST_SHARE: f64 = 0.1;
 #[derive(Debug, Clone, Serialize)]
 pub struct RealCase {
     /// What the loop answers.
-    pub verdict: Verdict,
+    pub verdict: DiagnosisVerdict,
     /// How sure it is of that, 0..1.
     pub confidence: f64,
     /// Resonances after neighbouring minima were merged; two numbers each.
@@ -74,7 +74,7 @@ pub struct MeasuredResonance {
     /// `X` or `Y`.
     pub axis: char,
     /// Which table it is from.
-    pub reading: Reading,
+    pub reading: ResonanceReading,
     /// Measured frequency, Hz.
     pub frequency_hz: f64,
     /// Lowest and highest reading behind it.
@@ -140,7 +140,7 @@ pub struct BandCheck {
 #[derive(Debug, Clone, Serialize)]
 pub struct Widened {
     /// What the loop answers.
-    pub verdict: Verdict,
+    pub verdict: DiagnosisVerdict,
     /// How sure it is of that, 0..1.
     pub confidence: f64,
     /// Name of the best explanation.
@@ -187,7 +187,7 @@ pub fn resonances(widening: f64) -> Result<Vec<Resonance>> {
         all.push(Resonance {
             configuration: configuration(&row.configuration)?,
             axis: axis(&row.axis)?,
-            reading: Reading::ModalTable,
+            reading: ResonanceReading::ModalTable,
             frequency_hz: row.frequency_hz,
             readings_hz: [row.frequency_hz; 2],
             frequency_std: widening * FREQUENCY_STD,
@@ -214,7 +214,7 @@ pub fn resonances(widening: f64) -> Result<Vec<Resonance>> {
             all.push(Resonance {
                 configuration,
                 axis,
-                reading: Reading::RealPartMinimum,
+                reading: ResonanceReading::RealPartMinimum,
                 frequency_hz: group.frequency_hz,
                 readings_hz: group.readings_hz,
                 frequency_std: widening * FREQUENCY_STD.hypot(group.spread),
@@ -466,10 +466,10 @@ mod tests {
     #[test]
     fn the_tables_leave_it_open_and_propose_the_tilt_of_joint_2() {
         let case = real_case(&untuned_model().unwrap()).unwrap();
-        assert_eq!(case.verdict, Verdict::Unknown);
+        assert_eq!(case.verdict, DiagnosisVerdict::Unknown);
         assert_eq!(case.candidates[0].name, "joint-transverse-compliance@joint-2");
         assert_eq!(case.widened.best, case.candidates[0].name);
-        assert_eq!(case.widened.verdict, Verdict::Unknown);
+        assert_eq!(case.widened.verdict, DiagnosisVerdict::Unknown);
         assert!(case.candidates[0].weight < 0.7 && !case.rivals.is_empty());
         assert!(
             case.candidates

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use lobestone::campaign::{AxesRef, BodyRef, Campaign, MeasuredDof, MeasuredFrf, Point, Posture};
 use lobestone::discrepancy::next_measurement::advise;
-use lobestone::discrepancy::{Diagnosis, NextMeasurement, Verdict, diagnose};
+use lobestone::discrepancy::{Diagnosis, DiagnosisVerdict, NextMeasurement, diagnose};
 use lobestone::effects::{self, Instance};
 use lobestone::identify::{FrfData, Options, StructureCase, StructureModel, StructureStudy};
 use lobestone::ingest::Dof;
@@ -162,10 +162,8 @@ impl Bench {
                 self.frfs.extend(frfs);
             }
         }
-        let set = lobestone::campaign::FrfSet {
-            frfs: self.frfs.clone(),
-        };
-        self.case.data = FrfData::new(&self.campaign, &model.robot, set).unwrap();
+        let frfs = self.frfs.clone();
+        self.case.data = FrfData::new(&self.campaign.postures, &model.robot, frfs).unwrap();
         self.case.model.points.clone_from(&self.campaign.points);
     }
 
@@ -190,7 +188,7 @@ struct Outcome {
 impl Outcome {
     fn resolved(&self) -> bool {
         let rivals = self.advice.between.as_ref().unwrap();
-        self.after.verdict == Verdict::Effect
+        self.after.verdict == DiagnosisVerdict::Effect
             && self.after.winner().is_some_and(|w| w.label() == self.truth)
             && !rivals.iter().any(|r| self.after.indistinguishable.contains(r))
     }
@@ -214,7 +212,7 @@ fn try_seed(folder: &Path, seed: u64) -> Option<Outcome> {
     ];
     let mut bench = Bench::simulate(folder, seed, &options);
     let before = bench.diagnose();
-    if before.verdict != Verdict::Effect || before.indistinguishable.is_empty() {
+    if before.verdict != DiagnosisVerdict::Effect || before.indistinguishable.is_empty() {
         return None;
     }
     let advice = bench.advice(&before);

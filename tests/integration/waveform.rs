@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::support::{blind, document, truth};
 use lobestone::campaign::Campaign;
-use lobestone::discrepancy::{CuttingComparison, Verdict};
+use lobestone::discrepancy::{CuttingComparison, DiagnosisVerdict};
 use lobestone::effects::cutting::{CuttingInstance, find, instances};
 use lobestone::identify::cutting_data::processes;
 use lobestone::identify::cutting_study::calibrate_cutting;
@@ -72,7 +72,7 @@ fn nrms(model: &CuttingModel, data: &CuttingData, theta: &[f64]) -> (f64, f64) {
 
 fn loaded(name: &str) -> (CuttingData, CuttingModel) {
     let campaign = Campaign::load(&blind(name)).unwrap();
-    let data = CuttingData::load(&campaign, processes(&campaign)[0]).unwrap();
+    let data = CuttingData::load(&campaign, processes(&campaign.cuts)[0]).unwrap();
     assert!(data.warnings.is_empty(), "{:?}", data.warnings);
     let model = CuttingModel::new(&data, true).unwrap();
     (data, model)
@@ -124,7 +124,7 @@ fn undisturbed_records_lack_nothing() {
         let (data, model) = loaded(name);
         let diagnosis = lobestone::discrepancy::diagnose(&CuttingStudy::new(data), &model).unwrap();
         let first = diagnosis.candidates.first().map(|c| (c.label(), c.delta_bic));
-        assert_eq!(diagnosis.verdict, Verdict::None, "{name}: {first:?}");
+        assert_eq!(diagnosis.verdict, DiagnosisVerdict::None, "{name}: {first:?}");
     }
 }
 
@@ -327,7 +327,7 @@ fn ranking() {
 fn report(name: &str, dir: &Path) {
     let clock = std::time::Instant::now();
     let Ok(campaign) = Campaign::load(dir) else { return };
-    let Some(&process) = processes(&campaign).first() else {
+    let Some(&process) = processes(&campaign.cuts).first() else {
         return;
     };
     let data = CuttingData::load(&campaign, process).unwrap();

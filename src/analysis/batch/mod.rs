@@ -15,7 +15,7 @@ use crate::analysis::force_records::identify_forces;
 use crate::campaign::{Campaign, campaign_file};
 use crate::cutting::{CfcOptions, ForceGroup};
 use crate::discrepancy::setup::{SetupCheck, SetupFinding};
-use crate::discrepancy::{Diagnosis, Verdict};
+use crate::discrepancy::{Diagnosis, DiagnosisVerdict};
 use crate::identify::structure_study::held_out_postures;
 use crate::identify::{Estimate, Options};
 use crate::revision::folder_fingerprint;
@@ -316,9 +316,9 @@ fn cutting(campaign: &Campaign, steps: &Steps) -> Result<Findings> {
 impl Findings {
     fn diagnosed<M, I>(&mut self, diagnosis: &Diagnosis<M, I>, setup: &SetupCheck) {
         let verdict = match diagnosis.verdict {
-            Verdict::Effect => "effect",
-            Verdict::None => "none",
-            Verdict::Unknown => "unknown",
+            DiagnosisVerdict::Effect => "effect",
+            DiagnosisVerdict::None => "none",
+            DiagnosisVerdict::Unknown => "unknown",
         };
         let winner = diagnosis.winner();
         self.verdict = Some(verdict.into());

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::Result;
-use crate::effects::drawn::{self, Form};
+use crate::effects::drawn::{self, DrawnForm};
 use crate::effects::{Instance, Spot};
 use crate::identify::calibrate::{Calibration, Estimate, estimates};
 use crate::identify::levenberg_marquardt::{Stopping, minimise};
@@ -28,7 +28,8 @@ use super::verdict::is_convincing;
 /// One form tried at a place.
 #[derive(Debug, Clone)]
 pub struct FormFit {
-    pub form: Form,
+    /// The law that was tried.
+    pub form: DrawnForm,
     /// BIC less that of the model without it (coarse view of the data): below zero it pays for its parameters.
     pub delta_bic: f64,
 }
@@ -36,14 +37,17 @@ pub struct FormFit {
 /// One place, best form first in `forms`.
 #[derive(Debug, Clone)]
 pub struct LocalisedPlace {
+    /// Where it is.
     pub spot: Spot,
     /// Misfit per complex value that is left: 1 is noise. Of the best form's fit where there is one, else of the screen.
     pub left: f64,
     /// Scatter of the drawn dynamic stiffness over postures, in units of its noise variance: 1 if it is the same everywhere.
     pub consistency: f64,
+    /// Dynamic stiffness that the data ask for there, line by line.
     pub curve: Vec<CurvePoint>,
     /// Empty where the place was screened only.
     pub forms: Vec<FormFit>,
+    /// The form that explains most; `None` where the place was screened only or no form led to a fit.
     pub best: Option<BestForm>,
     /// Labels of places that explain the data as well.
     pub tied_with: Vec<String>,
@@ -52,17 +56,23 @@ pub struct LocalisedPlace {
 /// The best form of a place, fitted to all data.
 #[derive(Debug, Clone)]
 pub struct BestForm {
+    /// The form at its place, as an effect.
     pub instance: Instance,
-    pub form: Form,
+    /// The law.
+    pub form: DrawnForm,
+    /// The model with it.
     pub model: StructureModel,
+    /// Where its fit stands, solver's scale.
     pub theta: Vec<f64>,
     /// The form's own parameters.
     pub parameters: Vec<Estimate>,
     /// Misfit Σ|r|²/σ² and priors.
     pub cost: f64,
+    /// BIC less that of the model without it: below zero the form pays for its parameters.
     pub delta_bic: f64,
     /// Of the likelihood ratio, corrected for the places and forms tried.
     pub p_value: f64,
+    /// One of its parameters stopped at the end of its range.
     pub at_bound: bool,
     /// On postures left out of the fit.
     pub held_out: Option<HeldOut>,
@@ -77,6 +87,7 @@ pub struct Localisation {
     pub significant: bool,
     /// The model as it stands.
     pub baseline: Calibration,
+    /// Its error on postures left out of the fit; `None` with one posture.
     pub baseline_held_out: Option<HeldOut>,
 }
 
@@ -300,7 +311,7 @@ fn fit_forms(
 }
 
 /// Starting values of a form from the drawn curve, natural units in the order of its parameters.
-fn starting_values(form: Form, screened: &Screened) -> Vec<Vec<f64>> {
+fn starting_values(form: DrawnForm, screened: &Screened) -> Vec<Vec<f64>> {
     let (mut weight, mut re, mut im) = (0.0, 0.0, 0.0);
     let (mut along, mut square, mut inertia, mut fourth) = (0.0, 0.0, 0.0, 0.0);
     for point in screened.curve.iter().filter(|p| p.std.is_finite() && p.std > 0.0) {
@@ -320,17 +331,17 @@ fn starting_values(form: Form, screened: &Screened) -> Vec<Vec<f64>> {
     let (spring, damper, mass) = (re / weight, along / square, inertia / fourth);
     let loss = im / weight;
     match form {
-        Form::Spring => vec![vec![spring]],
-        Form::Damper => vec![vec![damper]],
-        Form::SpringDamper => vec![vec![spring, damper]],
-        Form::Mass => vec![vec![mass]],
-        Form::LossFactor if matches!(screened.spot, Spot::Joint(_)) => vec![vec![loss]],
-        Form::LossFactor => vec![vec![spring, (loss / spring).abs()]],
-        Form::Resonator => screen::resonators(&screened.curve, 3)
+        DrawnForm::Spring => vec![vec![spring]],
+        DrawnForm::Damper => vec![vec![damper]],
+        DrawnForm::SpringDamper => vec![vec![spring, damper]],
+        DrawnForm::Mass => vec![vec![mass]],
+        DrawnForm::LossFactor if matches!(screened.spot, Spot::Joint(_)) => vec![vec![loss]],
+        DrawnForm::LossFactor => vec![vec![spring, (loss / spring).abs()]],
+        DrawnForm::Resonator => screen::resonators(&screened.curve, 3)
             .into_iter()
             .map(Vec::from)
             .collect(),
-        Form::TwoResonators => {
+        DrawnForm::TwoResonators => {
             let single = screen::resonators(&screened.curve, 3);
             let mut pairs = Vec::new();
             for (i, a) in single.iter().enumerate() {
@@ -338,8 +349,8 @@ fn starting_values(form: Form, screened: &Screened) -> Vec<Vec<f64>> {
             }
             pairs
         }
-        Form::Maxwell => vec![vec![spring.abs(), spring.abs() / 100.0]],
-        Form::RotorOnSpring => vec![vec![spring.abs(), damper, mass.abs()]],
+        DrawnForm::Maxwell => vec![vec![spring.abs(), spring.abs() / 100.0]],
+        DrawnForm::RotorOnSpring => vec![vec![spring.abs(), damper, mass.abs()]],
     }
 }
 

@@ -5,13 +5,14 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
 use crate::effects::Spot;
-use crate::effects::drawn::{self, Form};
+use crate::effects::drawn::{self, DrawnForm};
 use crate::identify::spot_response::{SpotLine, SpotResponses};
 use crate::parameter::Parameter;
 
 /// The dynamic stiffness that the data ask for on one line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CurvePoint {
+    /// Hz.
     pub frequency_hz: f64,
     /// N/m, or N·m/rad at a displacement that is an angle.
     pub stiffness: Complex64,
@@ -22,6 +23,7 @@ pub struct CurvePoint {
 /// One place, screened.
 #[derive(Debug, Clone)]
 pub struct Screened {
+    /// Where it is.
     pub spot: Spot,
     /// Misfit per complex value that is left with an unknown of its own for each line and posture.
     pub left_free: f64,
@@ -254,7 +256,7 @@ pub fn resonators(curve: &[CurvePoint], count: usize) -> Vec<[f64; 3]> {
 /// Dynamic stiffness of 1 kg on a spring, N/m.
 fn resonator_stiffness(frequency_hz: f64, natural_hz: f64, damping_ratio: f64) -> Complex64 {
     let values = [1.0, natural_hz, damping_ratio];
-    drawn::dynamic_stiffness(Spot::LinkAxis(1, 0), Form::Resonator, &values, frequency_hz)
+    drawn::dynamic_stiffness(Spot::LinkAxis(1, 0), DrawnForm::Resonator, &values, frequency_hz)
 }
 
 #[cfg(test)]

@@ -5,10 +5,9 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
-use crate::campaign::{AxesRef, BodyRef, MeasuredDof, Point, RobotSection};
+use crate::data::{AxesRef, Axis, BodyRef, MeasuredDof, Point, RobotSection};
 use crate::identify::frf_data::{FrfBlock, FrfDatum};
 use crate::identify::{FrfData, Options};
-use crate::ingest::Axis;
 use crate::robot::RobotModel;
 use crate::robot::fixture::{TAP_POSTURES, irb6640};
 
@@ -97,7 +96,7 @@ fn measured(truth: &StructureModel, own: &[f64], seed: u64) -> FrfData {
     data
 }
 
-fn found(hidden: Option<(Spot, Form, &[f64])>, seed: u64) -> Localisation {
+fn found(hidden: Option<(Spot, DrawnForm, &[f64])>, seed: u64) -> Localisation {
     let bare = model();
     let data = measured(&bare, &[], seed);
     let truth = hidden.map_or(bare.clone(), |(spot, form, _)| {
@@ -117,12 +116,12 @@ fn first_or_tied(found: &Localisation, spot: Spot) -> bool {
 fn a_resonator_on_link_5_is_found_and_weighed() {
     let spot = Spot::LinkAxis(5, 2);
     let truth = [5.0, 27.0, 0.04];
-    let found = found(Some((spot, Form::Resonator, &truth)), 11);
+    let found = found(Some((spot, DrawnForm::Resonator, &truth)), 11);
     assert!(found.significant);
     assert!(first_or_tied(&found, spot), "{:?}", found.places[0].spot);
     let place = found.places.iter().find(|p| p.spot == spot).unwrap();
     let best = place.best.as_ref().unwrap();
-    assert_eq!(best.form, Form::Resonator);
+    assert_eq!(best.form, DrawnForm::Resonator);
     for (estimate, truth) in best.parameters.iter().zip(truth) {
         assert!((estimate.value / truth - 1.0).abs() < 0.15, "{estimate:?}");
         assert!(
@@ -136,7 +135,7 @@ fn a_resonator_on_link_5_is_found_and_weighed() {
 #[test]
 fn a_clamp_at_the_tool_is_a_spring_to_the_ground() {
     let spot = Spot::ToolGround(2);
-    let found = found(Some((spot, Form::Spring, &[3e5])), 12);
+    let found = found(Some((spot, DrawnForm::Spring, &[3e5])), 12);
     assert!(
         found.significant && first_or_tied(&found, spot),
         "{:?}",
@@ -163,7 +162,7 @@ fn a_clamp_at_the_tool_is_a_spring_to_the_ground() {
 #[test]
 fn a_tilting_bearing_is_drawn_in_series() {
     let spot = Spot::Bearing(3, 3);
-    let found = found(Some((spot, Form::Spring, &[2e6])), 13);
+    let found = found(Some((spot, DrawnForm::Spring, &[2e6])), 13);
     assert!(
         found.significant && first_or_tied(&found, spot),
         "{:?}",

@@ -9,12 +9,12 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::decide::{Noise, Rivals, Tried, decide};
-use super::examine::{Rival, SetupCheck};
+use super::decide::{Noise, Rival, Rivals, TriedMistake, decide};
+use super::examine::SetupCheck;
 use super::finding::{SetupFinding, with_error};
 use super::readings::Turn;
 use crate::Result;
-use crate::campaign::Process;
+use crate::data::Process;
 use crate::identify::cutting_study::{NOISE_KNOWN_TO, calibrate_cutting, small_errors};
 use crate::identify::{Calibration, CuttingData, CuttingModel};
 
@@ -79,7 +79,7 @@ pub fn examine_cutting(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>
         small_errors: small_errors(data),
     };
     let chi2 = base.reduced_chi2 * values as f64;
-    let tried: Vec<Tried> = changes
+    let tried: Vec<TriedMistake> = changes
         .par_iter()
         .filter_map(|change| change.tried(data, chi2))
         .collect();
@@ -381,7 +381,7 @@ impl Change {
         (curvature > 0.0).then(|| (value, (2.0 / curvature).sqrt(), least))
     }
 
-    fn tried(self, data: &CuttingData, base: f64) -> Option<Tried> {
+    fn tried(self, data: &CuttingData, base: f64) -> Option<TriedMistake> {
         let (value, std, chi2) = self.best(data)?;
         if chi2 >= base || value == 0.0 {
             return None;
@@ -442,7 +442,7 @@ impl Change {
                 }
             }
         };
-        Some(Tried {
+        Some(TriedMistake {
             finding,
             chi2,
             parameters: 1,

@@ -1,6 +1,5 @@
 //! From trials to findings: how sure.
 
-use super::examine::Rival;
 use super::finding::SetupFinding;
 use crate::discrepancy::something_else;
 use crate::discrepancy::verdict::evidence_weight;
@@ -8,7 +7,7 @@ use crate::identify::rest::{Rest, RestTest};
 
 /// A mistake fitted to all data.
 #[derive(Debug, Clone)]
-pub struct Tried {
+pub struct TriedMistake {
     pub finding: SetupFinding,
     /// With the priors.
     pub chi2: f64,
@@ -19,7 +18,7 @@ pub struct Tried {
     pub at_bound: bool,
 }
 
-pub struct Decision {
+pub struct SetupDecision {
     pub findings: Vec<SetupFinding>,
     pub reduced_chi2: f64,
     pub explained_share: f64,
@@ -33,6 +32,17 @@ const MOST: f64 = 0.98;
 const LIBRARY: f64 = 25.0;
 /// Share of what stands above the noise from which on a mistake explains it, and below which it does not.
 const EXPLAINS: [f64; 2] = [0.9, 0.4];
+
+/// The best that the library of effects can do on these data.
+#[derive(Debug, Clone, Default)]
+pub struct Rival {
+    /// `effect@site`.
+    pub label: String,
+    /// Share of χ² that it takes away from the model as it stands, 0..1.
+    pub gain_share: f64,
+    /// Its own parameters.
+    pub parameters: usize,
+}
 
 /// What else may explain the data.
 #[derive(Debug, Default)]
@@ -69,7 +79,12 @@ fn odds_against(chi2: f64, base: f64, noise: Noise) -> f64 {
 }
 
 /// `base`: χ² of the model as it stands.
-pub fn decide(tried: &[Tried], base: f64, noise: Noise, rivals: impl FnOnce() -> Rivals) -> Option<Decision> {
+pub fn decide(
+    tried: &[TriedMistake],
+    base: f64,
+    noise: Noise,
+    rivals: impl FnOnce() -> Rivals,
+) -> Option<SetupDecision> {
     let n = noise.values as f64;
     let least = tried.iter().map(|t| t.chi2).fold(f64::INFINITY, f64::min);
     if !least.is_finite() || least >= base {
@@ -102,7 +117,9 @@ pub fn decide(tried: &[Tried], base: f64, noise: Noise, rivals: impl FnOnce() ->
     let small_errors = small_errors.map(|gain| bic(base - gain, 0, 1.0));
     let weights: Vec<f64> = bics.iter().map(|b| evidence_weight(b - lowest)).collect();
     // Two forms of one mistake (the order of a filter) are no rivals: the better one speaks for both.
-    let alike = |a: &Tried, b: &Tried| a.finding.kind == b.finding.kind && a.finding.place == b.finding.place;
+    let alike = |a: &TriedMistake, b: &TriedMistake| {
+        a.finding.kind == b.finding.kind && a.finding.place == b.finding.place
+    };
     let first_of_its_kind = |i: usize| {
         !(0..tried.len()).any(|j| {
             j != i && alike(&tried[i], &tried[j]) && { bics[j] < bics[i] || (bics[j] == bics[i] && j < i) }
@@ -134,7 +151,7 @@ pub fn decide(tried: &[Tried], base: f64, noise: Noise, rivals: impl FnOnce() ->
         .collect();
     findings.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
     let best = tried.iter().zip(&bics).min_by(|a, b| a.1.total_cmp(b.1))?.0;
-    Some(Decision {
+    Some(SetupDecision {
         findings,
         reduced_chi2: best.chi2 / n,
         explained_share: share(best.chi2).clamp(0.0, 1.0),

@@ -1,7 +1,7 @@
 //! The same FRF measured twice, and not the same.
 
 use super::finding::SetupFinding;
-use crate::campaign::Point;
+use crate::data::Point;
 use crate::identify::frf_data::{FrfBlock, FrfData, FrfDatum};
 
 /// Standard deviations of the mean weighted difference from which on noise does not explain it.
@@ -24,7 +24,7 @@ pub fn duplicates(data: &FrfData, points: &[Point]) -> Vec<SetupFinding> {
             let Some(difference) = same.then(|| contradiction(a, b)).flatten() else {
                 continue;
             };
-            let letter = |axis: crate::ingest::Axis| axis.letter();
+            let letter = |axis: crate::data::Axis| axis.letter();
             let name = format!(
                 "{}{}/{}{}",
                 points[a.response.point].node,

@@ -2,35 +2,24 @@
 
 use rayon::prelude::*;
 
-use super::decide::{Noise, Rivals, Tried, decide};
+use super::decide::{Noise, Rival, Rivals, TriedMistake, decide};
 use super::duplicates::duplicates;
 use super::finding::SetupFinding;
 use super::fit::JointProblem;
-use super::group::Group;
+use super::group::FrfGroup;
 use super::mistake::{Estimated, Mistake};
-use super::reading::{Reading, model_read};
+use super::reading::{FileReading, model_read};
 use super::score::Linearised;
 use super::{mistakes, readings, slips};
 use crate::Result;
 use crate::identify::calibrate::{Options, calibrate};
 use crate::identify::frf_data::FrfData;
+use crate::identify::frf_problem::{FrfProblem, Misfit};
 use crate::identify::levenberg_marquardt::{Stopping, minimise};
 use crate::identify::rest::BeyondSlips;
-use crate::identify::structure::{FrfProblem, Misfit};
 use crate::identify::structure_study::small_errors;
 use crate::identify::study::{Study, View, try_effects};
 use crate::identify::{StructureModel, StructureStudy};
-
-/// The best that the library of effects can do on these data.
-#[derive(Debug, Clone, Default)]
-pub struct Rival {
-    /// `effect@site`.
-    pub label: String,
-    /// Share of χ² that it takes away from the model as it stands, 0..1.
-    pub gain_share: f64,
-    /// Its own parameters.
-    pub parameters: usize,
-}
 
 /// What was found.
 #[derive(Debug, Clone, Default)]
@@ -76,8 +65,8 @@ const FINE: Stopping = Stopping {
 
 /// What a trial changes.
 enum Cause<'a> {
-    Size(&'a dyn Mistake, Group, Vec<f64>),
-    Read(&'a dyn Reading),
+    Size(&'a dyn Mistake, FrfGroup, Vec<f64>),
+    Read(&'a dyn FileReading),
 }
 
 struct Trial<'a> {
@@ -123,7 +112,7 @@ pub fn examine(
     trials.sort_by(|a, b| a.price(values).total_cmp(&b.price(values)));
     let full_base = 2.0 * cost(model, data, theta)?;
     check.reduced_chi2 = full_base / (2 * data.value_count()) as f64;
-    let tried: Vec<Tried> = trials
+    let tried: Vec<TriedMistake> = trials
         .iter()
         .take(REFINED)
         .collect::<Vec<_>>()
@@ -271,14 +260,14 @@ fn read_trials<'a>(
 }
 
 /// A trial on all data.
-fn refined(model: &StructureModel, data: &FrfData, trial: &Trial) -> Result<Tried> {
+fn refined(model: &StructureModel, data: &FrfData, trial: &Trial) -> Result<TriedMistake> {
     let freedom = 2.0 * data.value_count() as f64;
     match &trial.cause {
         Cause::Read(reading) => {
             let corrected = reading.corrected(data);
             let read = model_read(model, *reading);
             let fit = minimise(&problem(&read, &corrected), &trial.theta, &read.bounds(), FINE)?;
-            Ok(Tried {
+            Ok(TriedMistake {
                 finding: reading.finding(data, &model.points),
                 chi2: 2.0 * fit.cost,
                 parameters: 0,
@@ -305,7 +294,7 @@ fn refined(model: &StructureModel, data: &FrfData, trial: &Trial) -> Result<Trie
                 data,
                 points: &model.points,
             };
-            Ok(Tried {
+            Ok(TriedMistake {
                 finding: mistake.finding(&estimated),
                 chi2: 2.0 * fit.cost,
                 parameters: values.len(),

@@ -14,6 +14,7 @@ pub struct SetupFinding {
     pub value: Option<f64>,
     /// Standard error of `value`.
     pub std_error: Option<f64>,
+    /// Unit of `value`.
     pub unit: &'static str,
     /// Probability that this is what is wrong, 0..1.
     pub confidence: f64,
@@ -25,6 +26,7 @@ pub struct SetupFinding {
 pub const LIKELY: f64 = 0.5;
 
 impl SetupFinding {
+    /// Whether it is put first and keeps other verdicts from being certain.
     pub fn is_likely(&self) -> bool {
         self.confidence >= LIKELY
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::group::Group;
+use super::group::FrfGroup;
 use super::mistake::Mistake;
 use super::scene::{Made, predict, weighted};
 use super::score::{jacobian, size_slopes};
@@ -16,7 +16,7 @@ pub struct JointProblem<'a> {
     pub model: &'a StructureModel,
     pub data: &'a FrfData,
     pub mistake: &'a dyn Mistake,
-    pub group: Group,
+    pub group: FrfGroup,
 }
 
 impl JointProblem<'_> {

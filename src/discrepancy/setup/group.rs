@@ -1,27 +1,31 @@
 //! Which FRFs a mistake concerns.
 
-use crate::campaign::Point;
+use crate::data::{Axis, Point};
 use crate::identify::frf_data::{FrfData, FrfDatum};
-use crate::ingest::Axis;
 
 /// A selection of FRFs: those for which every given part agrees.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Group {
+pub struct FrfGroup {
+    /// Index into the campaign's postures.
     pub posture: Option<usize>,
     /// Index into the campaign's points.
     pub response_point: Option<usize>,
+    /// Axis of the response.
     pub response_axis: Option<Axis>,
+    /// Axis of the hit.
     pub reference_axis: Option<Axis>,
 }
 
-impl Group {
-    pub const ALL: Group = Group {
+impl FrfGroup {
+    /// Every FRF.
+    pub const ALL: FrfGroup = FrfGroup {
         posture: None,
         response_point: None,
         response_axis: None,
         reference_axis: None,
     };
 
+    /// Whether an FRF is one of the group.
     pub fn holds(&self, frf: &FrfDatum) -> bool {
         self.posture.is_none_or(|p| p == frf.posture)
             && self.response_point.is_none_or(|p| p == frf.response.point)
@@ -30,7 +34,7 @@ impl Group {
     }
 
     /// Whether every FRF of `other` is one of this group.
-    pub fn contains(&self, other: &Group) -> bool {
+    pub fn contains(&self, other: &FrfGroup) -> bool {
         fn part<T: PartialEq>(own: Option<T>, other: Option<T>) -> bool {
             own.is_none() || own == other
         }
@@ -65,45 +69,45 @@ impl Group {
     }
 
     /// All files, each posture.
-    pub fn postures(data: &FrfData) -> Vec<Group> {
-        let mut groups = vec![Group::ALL];
+    pub fn postures(data: &FrfData) -> Vec<FrfGroup> {
+        let mut groups = vec![FrfGroup::ALL];
         let postures = data.measured_postures();
         if postures.len() > 1 {
-            groups.extend(postures.iter().map(|&p| Group {
+            groups.extend(postures.iter().map(|&p| FrfGroup {
                 posture: Some(p),
-                ..Group::ALL
+                ..FrfGroup::ALL
             }));
         }
         groups
     }
 
     /// All files, each posture, each channel, and each channel at each posture; each selection of FRFs once.
-    pub fn channels(data: &FrfData) -> Vec<Group> {
+    pub fn channels(data: &FrfData) -> Vec<FrfGroup> {
         let axes = || Axis::ALL.into_iter().map(Some);
-        let mut parts = vec![Group::ALL];
-        parts.extend(axes().map(|response_axis| Group {
+        let mut parts = vec![FrfGroup::ALL];
+        parts.extend(axes().map(|response_axis| FrfGroup {
             response_axis,
-            ..Group::ALL
+            ..FrfGroup::ALL
         }));
-        parts.extend(axes().map(|reference_axis| Group {
+        parts.extend(axes().map(|reference_axis| FrfGroup {
             reference_axis,
-            ..Group::ALL
+            ..FrfGroup::ALL
         }));
         let points = data.response_points();
-        parts.extend(points.iter().map(|&p| Group {
+        parts.extend(points.iter().map(|&p| FrfGroup {
             response_point: Some(p),
-            ..Group::ALL
+            ..FrfGroup::ALL
         }));
         for &p in &points {
-            parts.extend(axes().map(|response_axis| Group {
+            parts.extend(axes().map(|response_axis| FrfGroup {
                 response_point: Some(p),
                 response_axis,
-                ..Group::ALL
+                ..FrfGroup::ALL
             }));
         }
         let mut groups = Vec::new();
         for posture in Self::postures(data) {
-            groups.extend(parts.iter().map(|part| Group {
+            groups.extend(parts.iter().map(|part| FrfGroup {
                 posture: posture.posture,
                 ..*part
             }));
@@ -113,7 +117,7 @@ impl Group {
 }
 
 /// Groups that hold something, each selection of FRFs once: under the first name for it.
-fn distinct(groups: Vec<Group>, data: &FrfData) -> Vec<Group> {
+fn distinct(groups: Vec<FrfGroup>, data: &FrfData) -> Vec<FrfGroup> {
     let mut seen: Vec<Vec<bool>> = Vec::new();
     groups
         .into_iter()

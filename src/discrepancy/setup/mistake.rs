@@ -3,31 +3,30 @@
 use num_complex::Complex64;
 
 use super::finding::SetupFinding;
-use super::group::Group;
-use super::scene::Truth;
-use crate::campaign::Point;
+use super::group::FrfGroup;
+use super::truth::Truth;
+use crate::data::{Axis, Point};
 use crate::identify::frf_data::{FrfData, FrfDatum};
-use crate::ingest::Axis;
 use crate::robot::Kinematics;
 
 /// One quantity of a mistake; zero means that nothing is wrong.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Size {
+pub struct MistakeSize {
     /// Standard deviation of the normal prior about zero: sizes that occur.
     pub usual: f64,
     pub bounds: [f64; 2],
 }
 
-impl Size {
+impl MistakeSize {
     pub const fn either_way(usual: f64, most: f64) -> Self {
-        Size {
+        MistakeSize {
             usual,
             bounds: [-most, most],
         }
     }
 
     pub const fn positive(usual: f64, most: f64) -> Self {
-        Size {
+        MistakeSize {
             usual,
             bounds: [0.0, most],
         }
@@ -36,7 +35,7 @@ impl Size {
 
 /// What was estimated of a mistake.
 pub struct Estimated<'a> {
-    pub group: Group,
+    pub group: FrfGroup,
     pub values: &'a [f64],
     /// Standard errors of `values`.
     pub errors: &'a [f64],
@@ -83,10 +82,11 @@ pub trait Distortion: Sync + Send {
 
 /// A mistake whose size is estimated.
 pub trait Mistake: Distortion {
-    fn sizes(&self) -> Vec<Size>;
+    /// The quantities that are estimated.
+    fn sizes(&self) -> Vec<MistakeSize>;
 
     /// Selections of FRFs that it may concern.
-    fn groups(&self, data: &FrfData) -> Vec<Group>;
+    fn groups(&self, data: &FrfData) -> Vec<FrfGroup>;
 
     /// The finding, its confidence still open.
     fn finding(&self, estimated: &Estimated) -> SetupFinding;

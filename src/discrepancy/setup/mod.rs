@@ -2,7 +2,7 @@
 //!
 //! Two kinds of mistake. A [`Mistake`] has a size (an encoder offset, a gain, a corner frequency) and changes what the model
 //! predicts for the files; its score is a linear estimate with what the baseline can absorb projected out, and the
-//! promising ones are fitted together with the baseline. A [`Reading`] has none (axes exchanged, a sign, a posture's file
+//! promising ones are fitted together with the baseline. A [`FileReading`] has none (axes exchanged, a sign, a posture's file
 //! filed under another): the data are put right and the baseline is fitted again. A finding has to be more than chance, to
 //! leave less than the physics of the library would, and to explain what stands above the noise.
 
@@ -24,12 +24,14 @@ mod slipped;
 mod slips;
 #[cfg(test)]
 mod tests;
+mod truth;
 
 pub use care::CARE;
 pub use cutting::examine_cutting;
-pub use examine::{Rival, SetupCheck, examine, library_rival};
+pub use decide::Rival;
+pub use examine::{SetupCheck, examine, library_rival};
 pub use finding::{LIKELY, SetupFinding};
-pub use group::Group;
+pub use group::FrfGroup;
 pub use mistake::Mistake;
-pub use reading::Reading;
+pub use reading::FileReading;
 pub use slips::absorb as absorb_slips;

@@ -1,12 +1,12 @@
 //! A mistake without a size: the data are read another way.
 
 use super::finding::SetupFinding;
-use crate::campaign::Point;
+use crate::data::Point;
 use crate::identify::StructureModel;
 use crate::identify::frf_data::FrfData;
 
 /// Another reading of the files.
-pub trait Reading: Send + Sync {
+pub trait FileReading: Send + Sync {
     /// The data as they are if this reading is right.
     fn corrected(&self, data: &FrfData) -> FrfData {
         data.clone()
@@ -27,7 +27,7 @@ pub trait Reading: Send + Sync {
 }
 
 /// The model with the points as they are if `reading` is right.
-pub fn model_read(model: &StructureModel, reading: &dyn Reading) -> StructureModel {
+pub fn model_read(model: &StructureModel, reading: &dyn FileReading) -> StructureModel {
     let mut read = model.without_start();
     read.points = reading.points(&model.points);
     read

@@ -3,65 +3,21 @@
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::group::Group;
+use super::group::FrfGroup;
 use super::mistake::Distortion;
+use super::truth::Truth;
 use crate::Result;
-use crate::effects::ChannelFilter;
+use crate::data::Axis;
 use crate::identify::StructureModel;
-use crate::identify::frf_data::{FrfBlock, FrfData, FrfDatum};
-use crate::ingest::Axis;
+use crate::identify::frf_data::{FrfBlock, FrfData};
 use crate::robot::FrfBasis;
 use crate::robot::frf::Response;
-
-/// The true receptances between the two points of an FRF, m/N.
-pub struct Truth<'t> {
-    basis: &'t FrfBasis,
-    response: &'t Response,
-    filter: &'t ChannelFilter,
-    /// First of the three outputs of the response point and of the reference point.
-    first: [usize; 2],
-    /// Complex rate, 1/s.
-    pub rate: Complex64,
-}
-
-impl Truth<'_> {
-    /// Displacement along `response` at the response point, as its channel would have it without the mistake, per force
-    /// along `reference` at the reference point.
-    pub fn between(&self, response: Axis, reference: Axis) -> Complex64 {
-        let row = &self.filter.mixing[response.index()];
-        let input = self.first[1] + reference.index();
-        let terms = row.iter().enumerate().filter(|(_, weight)| weight.value != 0.0);
-        terms
-            .map(|(j, weight)| self.basis.receptance(self.response, self.first[0] + j, input) * weight.value)
-            .sum()
-    }
-
-    /// With the sign of the file's axes and the delay of the channel.
-    fn recorded(&self, frf: &FrfDatum, shown: Complex64) -> Complex64 {
-        shown * Complex64::from_polar(frf.sign, -self.rate.im * self.filter.delay_s.value)
-    }
-
-    /// Between the axes of the response point itself.
-    pub fn at_response(&self, a: usize, b: usize) -> Complex64 {
-        self.basis
-            .receptance(self.response, self.first[0] + a, self.first[0] + b)
-    }
-
-    /// From the force along `reference` to axis `a` of the response point, before any channel.
-    pub fn bare(&self, a: usize, reference: Axis) -> Complex64 {
-        self.basis.receptance(
-            self.response,
-            self.first[0] + a,
-            self.first[1] + reference.index(),
-        )
-    }
-}
 
 /// A mistake of a given size in some of the files.
 #[derive(Clone, Copy)]
 pub struct Made<'m> {
     pub mistake: &'m dyn Distortion,
-    pub group: Group,
+    pub group: FrfGroup,
     pub values: &'m [f64],
 }
 

@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::group::Group;
-use super::mistake::{Mistake, Size};
+use super::group::FrfGroup;
+use super::mistake::{Mistake, MistakeSize};
 use super::scene::{Curves, Made, predict, weighted};
 use crate::Result;
 use crate::identify::StructureModel;
@@ -29,7 +29,7 @@ pub struct Linearised<'a> {
 /// A mistake's linear estimate for one group.
 #[derive(Debug, Clone)]
 pub struct Score {
-    pub group: Group,
+    pub group: FrfGroup,
     /// Decrease of χ² that it promises.
     pub gain: f64,
     pub values: Vec<f64>,
@@ -87,7 +87,7 @@ pub(super) fn size_slopes(
     data: &FrfData,
     theta: &[f64],
     made: Made,
-    sizes: &[Size],
+    sizes: &[MistakeSize],
 ) -> Result<Vec<Vec<f64>>> {
     (0..sizes.len())
         .map(|i| {
@@ -167,7 +167,7 @@ impl<'a> Linearised<'a> {
         let nothing = vec![0.0; k];
         let made = Made {
             mistake,
-            group: Group::ALL,
+            group: FrfGroup::ALL,
             values: &nothing,
         };
         let groups = mistake.groups(self.data);

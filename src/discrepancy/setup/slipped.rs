@@ -2,11 +2,11 @@
 
 use num_complex::Complex64;
 
-use super::group::Group;
+use super::group::FrfGroup;
 use super::mistake::{Distortion, turned_axis};
-use super::scene::Truth;
+use super::truth::Truth;
+use crate::data::Axis;
 use crate::identify::frf_data::FrfDatum;
-use crate::ingest::Axis;
 use crate::robot::Kinematics;
 
 /// One sort of error, one number of it.
@@ -55,7 +55,7 @@ pub struct Slipped {
 impl Slipped {
     /// Adds an error of size `value` where `place` says, the posture being this one. [`SmallError::Stiffness`] is the model's own
     /// and not seen here.
-    pub fn add(&mut self, error: SmallError, place: &Group, value: f64) {
+    pub fn add(&mut self, error: SmallError, place: &FrfGroup, value: f64) {
         let hits = |i: usize| place.reference_axis.is_none_or(|axis| axis.index() == i);
         match error {
             SmallError::Encoder(joint) => self.joints_deg.push((joint, value)),

@@ -11,16 +11,16 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::care::{self, Care};
-use super::group::Group;
+use super::group::FrfGroup;
 use super::mistake::Mistake;
 use super::mistakes::{channel_gain, encoder_offset, hit_direction, sensor_high_pass, turned_sensor};
 use super::scene::{Made, predict};
 use super::slipped::{Slipped, SmallError};
 use crate::Result;
+use crate::data::Axis;
 use crate::identify::StructureModel;
 use crate::identify::frf_data::{FrfBlock, FrfData};
 use crate::identify::rest::{AfterSlips, RestCurve};
-use crate::ingest::Axis;
 use crate::parameter::Scale;
 
 /// Standard deviations of what a careful setup is wrong by: angles of the joints and of the sensors, direction of the hits
@@ -46,7 +46,7 @@ struct Slip {
     std: f64,
     /// Change of each curve by one standard deviation, over σ.
     change: Vec<Vec<Complex64>>,
-    places: Vec<Group>,
+    places: Vec<FrfGroup>,
 }
 
 /// Takes what small errors of the setup can out of `curves`, the rest of `model` at `theta`, its optimum on `data`.
@@ -258,7 +258,7 @@ impl<'a> System<'a> {
         let mut theta: Vec<f64> = self.theta.iter().zip(sizes.iter()).map(|(t, s)| t + s).collect();
         let mut slipped = Slipped::default();
         for (slip, start) in self.slips.iter().zip(&self.starts) {
-            let here = |g: &Group| g.posture.is_none_or(|p| p == block.posture);
+            let here = |g: &FrfGroup| g.posture.is_none_or(|p| p == block.posture);
             for (place, group) in slip.places.iter().enumerate().filter(|(_, g)| here(g)) {
                 let size = slip.std * sizes[start + place];
                 match slip.error {
@@ -276,7 +276,7 @@ impl<'a> System<'a> {
         };
         let made = Made {
             mistake: &slipped,
-            group: Group::ALL,
+            group: FrfGroup::ALL,
             values: &[],
         };
         let predicted = predict(self.model, &theta, &data, Some(made))?;
@@ -315,18 +315,18 @@ fn real_product(a: &[Complex64], b: &[Complex64]) -> f64 {
 
 fn slips(model: &StructureModel, data: &FrfData, theta: &[f64], curves: &[RestCurve]) -> Result<Vec<Slip>> {
     let base = predict(model, theta, data, None)?;
-    let postures: Vec<Group> = data
+    let postures: Vec<FrfGroup> = data
         .measured_postures()
         .into_iter()
-        .map(|p| Group {
+        .map(|p| FrfGroup {
             posture: Some(p),
-            ..Group::ALL
+            ..FrfGroup::ALL
         })
         .collect();
-    let hits: Vec<Group> = postures
+    let hits: Vec<FrfGroup> = postures
         .iter()
         .flat_map(|g| {
-            Axis::ALL.map(|axis| Group {
+            Axis::ALL.map(|axis| FrfGroup {
                 reference_axis: Some(axis),
                 ..*g
             })
@@ -335,11 +335,11 @@ fn slips(model: &StructureModel, data: &FrfData, theta: &[f64], curves: &[RestCu
     let points = data.response_points();
     // Half of the variance is the same at all postures, half new at each.
     let half = std::f64::consts::FRAC_1_SQRT_2;
-    let always_and_anew = || std::iter::once(&Group::ALL).chain(&postures);
-    let encoders: Vec<Group> = always_and_anew().copied().collect();
-    let sensors: Vec<Group> = always_and_anew()
+    let always_and_anew = || std::iter::once(&FrfGroup::ALL).chain(&postures);
+    let encoders: Vec<FrfGroup> = always_and_anew().copied().collect();
+    let sensors: Vec<FrfGroup> = always_and_anew()
         .flat_map(|g| {
-            points.iter().map(|p| Group {
+            points.iter().map(|p| FrfGroup {
                 response_point: Some(*p),
                 ..*g
             })
@@ -374,7 +374,7 @@ fn slips(model: &StructureModel, data: &FrfData, theta: &[f64], curves: &[RestCu
                 Box::new(sensor_high_pass::SensorHighPass { order: 1 }),
                 Box::new(|_| SmallError::Corner),
                 std::f64::consts::TAU * CORNER_HZ,
-                &[Group::ALL],
+                &[FrfGroup::ALL],
             ),
         ])
         .collect();
@@ -386,7 +386,7 @@ fn slips(model: &StructureModel, data: &FrfData, theta: &[f64], curves: &[RestCu
             values[part] = STEP * std;
             let made = Made {
                 mistake: mistake.as_ref(),
-                group: Group::ALL,
+                group: FrfGroup::ALL,
                 values: &values,
             };
             let with = predict(model, theta, data, Some(made))?;
@@ -425,4 +425,4 @@ fn slips(model: &StructureModel, data: &FrfData, theta: &[f64], curves: &[RestCu
 /// Which error the numbers of a mistake are.
 type Part = Box<dyn Fn(usize) -> SmallError>;
 /// A mistake, which errors its numbers are, their standard deviation, and where each may be on its own.
-type Sort<'a> = (Box<dyn Mistake>, Part, f64, &'a [Group]);
+type Sort<'a> = (Box<dyn Mistake>, Part, f64, &'a [FrfGroup]);

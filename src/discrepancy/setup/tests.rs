@@ -9,13 +9,12 @@ use rand_chacha::ChaCha8Rng;
 use super::mistakes;
 use super::scene::{Made, predict};
 use super::*;
-use crate::campaign::{AxesRef, BodyRef, MeasuredDof, Point, RobotSection};
+use crate::data::{AxesRef, Axis, BodyRef, MeasuredDof, Point, RobotSection};
 use crate::identify::StructureModel;
 use crate::identify::frf_data::{FrfBlock, FrfData, FrfDatum};
+use crate::identify::frf_problem::{FrfProblem, Misfit};
 use crate::identify::levenberg_marquardt::{Stopping, minimise};
-use crate::identify::rest;
-use crate::identify::structure::{FrfProblem, Misfit};
-use crate::ingest::Axis;
+use crate::identify::{rest, rest_patterns};
 use crate::robot::RobotModel;
 use crate::robot::fixture::{TAP_POSTURES, irb6640};
 
@@ -136,13 +135,13 @@ fn nothing_is_found_where_nothing_is_wrong() {
 fn mistakes_are_found_with_their_size() {
     let model = model();
     let all = mistakes::all(&model, &arrangement(&model));
-    let at = |posture: Option<usize>| Group {
+    let at = |posture: Option<usize>| FrfGroup {
         posture,
-        ..Group::ALL
+        ..FrfGroup::ALL
     };
     let tau = std::f64::consts::TAU;
     // Index among the mistakes, where, sizes, kind, value told.
-    let cases: [(usize, Group, &[f64], &str, f64); 8] = [
+    let cases: [(usize, FrfGroup, &[f64], &str, f64); 8] = [
         (2, at(None), &[0.8], "encoder-offset", 0.8),
         (4, at(Some(1)), &[-2.0], "encoder-offset", -2.0),
         (7, at(None), &[0.03, -0.02, 0.01], "point-position", 37.42),
@@ -231,7 +230,7 @@ fn wrong_readings_are_found() {
 fn small_errors_take_what_differs_between_postures_and_no_more() {
     let model = model();
     let all = mistakes::all(&model, &arrangement(&model));
-    let share_taken = |index: usize, group: Group, values: &[f64]| {
+    let share_taken = |index: usize, group: FrfGroup, values: &[f64]| {
         let made = Made {
             mistake: all[index].as_ref(),
             group,
@@ -246,11 +245,11 @@ fn small_errors_take_what_differs_between_postures_and_no_more() {
         };
         let fit = minimise(&problem, &truth(&model), &model.bounds(), Stopping::default()).unwrap();
         let mut curves = model.rest(&fit.theta, &data).unwrap();
-        let tests = rest::test(&curves);
+        let tests = rest_patterns::test(&curves);
         let before = *rest::largest(&tests).expect("it shows");
         let after = absorb_slips(&model, &data, &fit.theta, &curves).unwrap();
         assert!(after.price > 0.0 && after.evidence > 0.0);
-        let beyond = rest::test_beyond(&mut curves, after);
+        let beyond = rest_patterns::test_beyond(&mut curves, after);
         let same = beyond
             .tests
             .iter()
@@ -258,15 +257,15 @@ fn small_errors_take_what_differs_between_postures_and_no_more() {
             .unwrap();
         1.0 - same.excess / before.excess
     };
-    let posture = Group {
+    let posture = FrfGroup {
         posture: Some(0),
-        ..Group::ALL
+        ..FrfGroup::ALL
     };
     let taken = share_taken(9, posture, &[2.0, -1.5, 1.0]);
     assert!(taken > 0.9, "{taken}");
     // Too large for slopes alone.
     let taken = share_taken(9, posture, &[12.0, -9.0, 6.0]);
     assert!(taken > 0.9, "{taken}");
-    let taken = share_taken(16, Group::ALL, &[3.0]);
+    let taken = share_taken(16, FrfGroup::ALL, &[3.0]);
     assert!(taken < 0.7, "{taken}");
 }

@@ -1,4 +1,10 @@
-use super::*;
+use super::effect::{
+    CutPhysics, CutSetting, CuttingEffect, CuttingSummary, NEGLIGIBLE, Vibration, linear, logarithmic,
+    milling_only, straight_edge_only,
+};
+use crate::effects::Background;
+use crate::parameter::Parameter;
+use crate::robot::Dual;
 
 /// Amplitude per feed below which there is none.
 const NO_AMPLITUDE_PER_FEED: f64 = 1e-9;

@@ -1,5 +1,10 @@
-use super::*;
+use super::effect::{
+    CutPhysics, CutSetting, CuttingEffect, CuttingSummary, NEGLIGIBLE, drilling_only, linear, logarithmic,
+};
+use crate::effects::Background;
 use crate::effects::background::SHAW_OXFORD;
+use crate::parameter::Parameter;
+use crate::robot::Dual;
 
 /// The chisel edge indents: thrust ∝ feed^n in holes without pilot.
 pub struct ChiselEdge;

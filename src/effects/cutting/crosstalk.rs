@@ -1,5 +1,10 @@
-use super::*;
+use super::effect::{
+    CutPhysics, CutSetting, CuttingEffect, CuttingSummary, linear, milling_only, unit_mixing,
+};
 use crate::effects::background::GAUTSCHI;
+use crate::effects::{Background, Size};
+use crate::parameter::Parameter;
+use crate::robot::Dual;
 
 /// Force channels leak into each other.
 pub struct Crosstalk;

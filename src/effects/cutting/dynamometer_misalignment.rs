@@ -1,4 +1,9 @@
-use super::*;
+use super::effect::{
+    CutPhysics, CutSetting, CuttingEffect, CuttingSummary, linear, milling_only, unit_mixing,
+};
+use crate::effects::{Background, Size};
+use crate::parameter::Parameter;
+use crate::robot::Dual;
 
 /// The dynamometer is tilted about its x or y axis.
 pub struct DynamometerMisalignment;

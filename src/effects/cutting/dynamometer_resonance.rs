@@ -1,4 +1,9 @@
-use super::*;
+use super::effect::{
+    CutPhysics, CutSetting, CuttingEffect, CuttingSummary, NEGLIGIBLE, logarithmic, milling_only,
+};
+use crate::effects::{Background, Size};
+use crate::parameter::Parameter;
+use crate::robot::Dual;
 
 /// Each channel of the dynamometer is a second-order system.
 pub struct DynamometerResonance;

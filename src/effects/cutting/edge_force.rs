@@ -1,5 +1,9 @@
-use super::*;
+use super::effect::{CutPhysics, CutSetting, CuttingEffect, CuttingSummary, linear};
+use crate::data::Process;
+use crate::effects::Background;
 use crate::effects::background::BUDAK;
+use crate::parameter::Parameter;
+use crate::robot::Dual;
 
 /// Rubbing of the edge, for a baseline that was fitted without.
 pub struct EdgeForce;

@@ -1,5 +1,8 @@
-use super::*;
+use super::effect::{CutPhysics, CutSetting, CuttingEffect, CuttingSummary, drilling_only, linear};
+use crate::effects::Background;
 use crate::effects::background::SHAW_OXFORD;
+use crate::parameter::Parameter;
+use crate::robot::Dual;
 
 /// The drill's margins rub in the hole: torque grows with depth.
 pub struct MarginFriction;

@@ -1,5 +1,9 @@
-use super::*;
+use super::effect::{CutPhysics, CutSetting, CuttingEffect, CuttingSummary, NEGLIGIBLE, logarithmic};
+use crate::data::Process;
+use crate::effects::Background;
 use crate::effects::background::GAUTSCHI;
+use crate::parameter::Parameter;
+use crate::robot::Dual;
 
 /// The zero line is no line: an exponential transient is added, or the charge amplifier leaks.
 pub struct NonlinearDrift;

@@ -1,4 +1,10 @@
-use super::*;
+use super::effect::{
+    CutPhysics, CutSetting, CuttingEffect, CuttingSummary, NEGLIGIBLE, Runout, linear, logarithmic,
+    milling_only, straight_edge_only,
+};
+use crate::effects::{Background, Size};
+use crate::parameter::Parameter;
+use crate::robot::Dual;
 
 /// The tool's axis lies beside the spindle's: every tooth has its own radius.
 pub struct RunoutEffect;

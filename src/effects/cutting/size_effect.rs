@@ -1,5 +1,9 @@
-use super::*;
+use super::effect::{CutPhysics, CutSetting, CuttingEffect, CuttingSummary, linear, straight_edge_only};
+use crate::data::Process;
 use crate::effects::background::ALTINTAS;
+use crate::effects::{Background, Size};
+use crate::parameter::Parameter;
+use crate::robot::Dual;
 
 /// Cutting coefficients rise as the chip gets thin: K ∝ (h / 0.1 mm)^−p.
 pub struct SizeEffect;

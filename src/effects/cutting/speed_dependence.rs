@@ -1,5 +1,9 @@
-use super::*;
+use super::effect::{CutPhysics, CutSetting, CuttingEffect, CuttingSummary, linear};
+use crate::data::Process;
 use crate::effects::background::{ALTINTAS, BUDAK};
+use crate::effects::{Background, Size};
+use crate::parameter::Parameter;
+use crate::robot::Dual;
 
 /// Cutting coefficients fall with cutting speed: K ∝ v^−q.
 pub struct SpeedDependence;

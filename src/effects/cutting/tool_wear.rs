@@ -1,4 +1,8 @@
-use super::*;
+use super::effect::{CutPhysics, CutSetting, CuttingEffect, CuttingSummary, linear};
+use crate::data::Process;
+use crate::effects::{Background, Size};
+use crate::parameter::Parameter;
+use crate::robot::Dual;
 
 /// Edge coefficients grow along the sequence of cuts.
 pub struct ToolWear;

@@ -1,57 +1,7 @@
+use super::made_table::{SUMMARY, baseline, table};
 use super::*;
-use crate::campaign::RobotSection;
 use crate::effects::find;
-use crate::robot::RobotModel;
-use crate::robot::fixture::{TAP_POSTURES, irb6640};
-
-fn baseline() -> StructureModel {
-    let section = RobotSection {
-        model: "irb6640".into(),
-        mass_tolerance: None,
-        stiffness_tolerance: 0.3,
-        links: Default::default(),
-    };
-    StructureModel::new(RobotModel::new(irb6640()), Vec::new(), &section)
-}
-
-const SUMMARY: DataSummary = DataSummary {
-    force_levels: 1,
-    postures: 4,
-    lowest_hz: 5.0,
-    highest_hz: 60.0,
-};
-
-/// The deepest minima of a robot, as they would be published: less than the assumed deviation off, by turns.
-fn table(model: &StructureModel, theta: &[f64]) -> ResonanceStudy {
-    const NAMED: usize = 6;
-    let configurations: Vec<Kinematics> = TAP_POSTURES
-        .iter()
-        .map(|p| model.robot.kinematics(p).unwrap())
-        .collect();
-    let mut resonances = Vec::new();
-    for (configuration, kinematics) in configurations.iter().enumerate() {
-        let modes = posture_modes(model, theta, kinematics, 60.0, false).unwrap();
-        for axis in [Axis::X, Axis::Y] {
-            let mut order: Vec<&PostureMode> = modes.iter().collect();
-            order.sort_by(|a, b| b.depth_m_per_n(axis).total_cmp(&a.depth_m_per_n(axis)));
-            for mode in order.into_iter().take(NAMED) {
-                let sign = [0.6, -0.9, 0.3, -0.2, 0.8][resonances.len() % 5];
-                let frequency_hz = mode.minimum_hz() * (1.0 + 0.02 * sign);
-                resonances.push(Resonance {
-                    configuration,
-                    axis,
-                    reading: Reading::RealPartMinimum,
-                    frequency_hz,
-                    readings_hz: [frequency_hz; 2],
-                    frequency_std: 0.02,
-                    size_m_per_n: mode.depth_m_per_n(axis) * (1.0 - 0.5 * sign),
-                    size_std: 0.7,
-                });
-            }
-        }
-    }
-    ResonanceStudy::new(&model.robot.spec, configurations, resonances)
-}
+use crate::robot::fixture::irb6640;
 
 #[test]
 fn the_gradient_agrees_with_differences_of_the_cost() {
@@ -88,32 +38,6 @@ fn the_gradient_agrees_with_differences_of_the_cost() {
             }
         }
     }
-}
-
-#[test]
-fn a_hidden_effect_is_found_from_a_table_of_resonances() {
-    let hidden = "joint-transverse-compliance@joint-3";
-    let model = baseline().with_effect(find(&irb6640(), hidden)[0], &SUMMARY);
-    let mut truth = model.nominal_theta();
-    truth[0] += 0.1;
-    truth[2] -= 0.15;
-    *truth.last_mut().unwrap() = 1.2e6f64.ln();
-    let diagnosis = crate::discrepancy::diagnose(&table(&model, &truth), &baseline()).unwrap();
-    assert_eq!(diagnosis.verdict, crate::discrepancy::Verdict::Effect);
-    let winner = diagnosis.winner().unwrap();
-    assert_eq!(winner.label(), hidden);
-    let found = &winner.parameters[0];
-    assert!((found.value - 1.2e6).abs() < 3.0 * found.std_error, "{found:?}");
-}
-
-#[test]
-fn nothing_hidden_is_nothing_found() {
-    let model = baseline();
-    let mut truth = model.nominal_theta();
-    truth[1] -= 0.2;
-    truth[4] += 0.2;
-    let diagnosis = crate::discrepancy::diagnose(&table(&model, &truth), &model).unwrap();
-    assert_eq!(diagnosis.verdict, crate::discrepancy::Verdict::None);
 }
 
 #[test]

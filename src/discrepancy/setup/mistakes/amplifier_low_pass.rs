@@ -1,9 +1,9 @@
 use num_complex::Complex64;
 
 use super::super::finding::{SetupFinding, with_error};
-use super::super::group::Group;
-use super::super::mistake::{Distortion, Estimated, Mistake, Size};
-use super::super::scene::Truth;
+use super::super::group::FrfGroup;
+use super::super::mistake::{Distortion, Estimated, Mistake, MistakeSize};
+use super::super::truth::Truth;
 use super::sensor_high_pass::responses;
 use crate::identify::frf_data::{FrfData, FrfDatum};
 
@@ -25,11 +25,11 @@ impl Distortion for AmplifierLowPass {
 }
 
 impl Mistake for AmplifierLowPass {
-    fn sizes(&self) -> Vec<Size> {
-        vec![Size::positive(1e-3, 0.1)]
+    fn sizes(&self) -> Vec<MistakeSize> {
+        vec![MistakeSize::positive(1e-3, 0.1)]
     }
 
-    fn groups(&self, data: &FrfData) -> Vec<Group> {
+    fn groups(&self, data: &FrfData) -> Vec<FrfGroup> {
         responses(data)
     }
 

@@ -1,9 +1,9 @@
 use num_complex::Complex64;
 
 use super::super::finding::{SetupFinding, with_error};
-use super::super::group::Group;
-use super::super::mistake::{Distortion, Estimated, Mistake, Size};
-use super::super::scene::Truth;
+use super::super::group::FrfGroup;
+use super::super::mistake::{Distortion, Estimated, Mistake, MistakeSize};
+use super::super::truth::Truth;
 use crate::identify::frf_data::{FrfData, FrfDatum};
 
 /// The file holds exp(value) times what was there.
@@ -16,12 +16,12 @@ impl Distortion for ChannelGain {
 }
 
 impl Mistake for ChannelGain {
-    fn sizes(&self) -> Vec<Size> {
-        vec![Size::either_way(0.5, 10.0)]
+    fn sizes(&self) -> Vec<MistakeSize> {
+        vec![MistakeSize::either_way(0.5, 10.0)]
     }
 
-    fn groups(&self, data: &FrfData) -> Vec<Group> {
-        Group::channels(data)
+    fn groups(&self, data: &FrfData) -> Vec<FrfGroup> {
+        FrfGroup::channels(data)
     }
 
     fn finding(&self, estimated: &Estimated) -> SetupFinding {

@@ -1,6 +1,6 @@
 use super::super::finding::{SetupFinding, with_error};
-use super::super::group::Group;
-use super::super::mistake::{Distortion, Estimated, Mistake, Size};
+use super::super::group::FrfGroup;
+use super::super::mistake::{Distortion, Estimated, Mistake, MistakeSize};
 use crate::identify::frf_data::FrfData;
 use crate::robot::Kinematics;
 
@@ -17,12 +17,12 @@ impl Distortion for EncoderOffset {
 }
 
 impl Mistake for EncoderOffset {
-    fn sizes(&self) -> Vec<Size> {
-        vec![Size::either_way(3.0, 30.0)]
+    fn sizes(&self) -> Vec<MistakeSize> {
+        vec![MistakeSize::either_way(3.0, 30.0)]
     }
 
-    fn groups(&self, data: &FrfData) -> Vec<Group> {
-        Group::postures(data)
+    fn groups(&self, data: &FrfData) -> Vec<FrfGroup> {
+        FrfGroup::postures(data)
     }
 
     fn finding(&self, estimated: &Estimated) -> SetupFinding {

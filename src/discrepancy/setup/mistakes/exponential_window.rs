@@ -1,6 +1,6 @@
 use super::super::finding::{SetupFinding, with_error};
-use super::super::group::Group;
-use super::super::mistake::{Distortion, Estimated, Mistake, Size};
+use super::super::group::FrfGroup;
+use super::super::mistake::{Distortion, Estimated, Mistake, MistakeSize};
 use crate::identify::frf_data::FrfData;
 
 /// An exponential window was put on the records and not taken out: every pole decays faster by `value`, 1/s. What the file
@@ -15,12 +15,12 @@ impl Distortion for ExponentialWindow {
 }
 
 impl Mistake for ExponentialWindow {
-    fn sizes(&self) -> Vec<Size> {
-        vec![Size::positive(5.0, 100.0)]
+    fn sizes(&self) -> Vec<MistakeSize> {
+        vec![MistakeSize::positive(5.0, 100.0)]
     }
 
-    fn groups(&self, data: &FrfData) -> Vec<Group> {
-        Group::postures(data)
+    fn groups(&self, data: &FrfData) -> Vec<FrfGroup> {
+        FrfGroup::postures(data)
     }
 
     fn finding(&self, estimated: &Estimated) -> SetupFinding {

@@ -1,11 +1,11 @@
 use num_complex::Complex64;
 
 use super::super::finding::{SetupFinding, with_error};
-use super::super::group::Group;
-use super::super::mistake::{Distortion, Estimated, Mistake, Size, turned_axis};
-use super::super::scene::Truth;
+use super::super::group::FrfGroup;
+use super::super::mistake::{Distortion, Estimated, Mistake, MistakeSize, turned_axis};
+use super::super::truth::Truth;
+use crate::data::Axis;
 use crate::identify::frf_data::{FrfData, FrfDatum};
-use crate::ingest::Axis;
 
 /// The force was not along the axis that the file names: turned by a rotation vector, deg about x, y, z.
 pub struct HitDirection;
@@ -21,18 +21,18 @@ impl Distortion for HitDirection {
 }
 
 impl Mistake for HitDirection {
-    fn sizes(&self) -> Vec<Size> {
-        vec![Size::either_way(5.0, 60.0); 3]
+    fn sizes(&self) -> Vec<MistakeSize> {
+        vec![MistakeSize::either_way(5.0, 60.0); 3]
     }
 
-    fn groups(&self, data: &FrfData) -> Vec<Group> {
-        let of_axis = |group: Group| {
-            Axis::ALL.map(|axis| Group {
+    fn groups(&self, data: &FrfData) -> Vec<FrfGroup> {
+        let of_axis = |group: FrfGroup| {
+            Axis::ALL.map(|axis| FrfGroup {
                 reference_axis: Some(axis),
                 ..group
             })
         };
-        let postures = Group::postures(data);
+        let postures = FrfGroup::postures(data);
         let mut groups = postures.clone();
         groups.extend(postures.into_iter().flat_map(of_axis));
         groups.retain(|g| data.frfs().any(|(_, f)| g.holds(f)));

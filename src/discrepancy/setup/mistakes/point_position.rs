@@ -1,7 +1,7 @@
 use super::super::finding::{SetupFinding, with_error};
-use super::super::group::Group;
-use super::super::mistake::{Distortion, Estimated, Mistake, Size};
-use crate::campaign::{BodyRef, Point};
+use super::super::group::FrfGroup;
+use super::super::mistake::{Distortion, Estimated, Mistake, MistakeSize};
+use crate::data::{BodyRef, Point};
 use crate::identify::frf_data::FrfData;
 
 /// A measuring point sits elsewhere on its body, m along the body's axes.
@@ -23,12 +23,12 @@ impl Distortion for PointPosition {
 }
 
 impl Mistake for PointPosition {
-    fn sizes(&self) -> Vec<Size> {
-        vec![Size::either_way(0.05, 1.0); 3]
+    fn sizes(&self) -> Vec<MistakeSize> {
+        vec![MistakeSize::either_way(0.05, 1.0); 3]
     }
 
-    fn groups(&self, _data: &FrfData) -> Vec<Group> {
-        vec![Group::ALL]
+    fn groups(&self, _data: &FrfData) -> Vec<FrfGroup> {
+        vec![FrfGroup::ALL]
     }
 
     fn finding(&self, estimated: &Estimated) -> SetupFinding {

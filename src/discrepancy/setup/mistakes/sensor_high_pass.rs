@@ -1,11 +1,11 @@
 use num_complex::Complex64;
 
 use super::super::finding::{SetupFinding, with_error};
-use super::super::group::Group;
-use super::super::mistake::{Distortion, Estimated, Mistake, Size};
-use super::super::scene::Truth;
+use super::super::group::FrfGroup;
+use super::super::mistake::{Distortion, Estimated, Mistake, MistakeSize};
+use super::super::truth::Truth;
+use crate::data::Axis;
 use crate::identify::frf_data::{FrfData, FrfDatum};
-use crate::ingest::Axis;
 
 /// The sensor's channel loses low frequencies: (s/(s + value))^order, value = 2π × corner, 1/s.
 pub struct SensorHighPass {
@@ -20,11 +20,11 @@ impl Distortion for SensorHighPass {
 }
 
 impl Mistake for SensorHighPass {
-    fn sizes(&self) -> Vec<Size> {
-        vec![Size::positive(10.0, 200.0)]
+    fn sizes(&self) -> Vec<MistakeSize> {
+        vec![MistakeSize::positive(10.0, 200.0)]
     }
 
-    fn groups(&self, data: &FrfData) -> Vec<Group> {
+    fn groups(&self, data: &FrfData) -> Vec<FrfGroup> {
         responses(data)
     }
 
@@ -49,17 +49,17 @@ impl Mistake for SensorHighPass {
 }
 
 /// All files, each posture, each response axis, each response node.
-pub(super) fn responses(data: &FrfData) -> Vec<Group> {
-    let mut groups = Group::postures(data);
-    groups.extend(Axis::ALL.map(|axis| Group {
+pub(super) fn responses(data: &FrfData) -> Vec<FrfGroup> {
+    let mut groups = FrfGroup::postures(data);
+    groups.extend(Axis::ALL.map(|axis| FrfGroup {
         response_axis: Some(axis),
-        ..Group::ALL
+        ..FrfGroup::ALL
     }));
     let points = data.response_points();
     if points.len() > 1 {
-        groups.extend(points.into_iter().map(|p| Group {
+        groups.extend(points.into_iter().map(|p| FrfGroup {
             response_point: Some(p),
-            ..Group::ALL
+            ..FrfGroup::ALL
         }));
     }
     groups.retain(|g| data.frfs().any(|(_, f)| g.holds(f)));

@@ -2,9 +2,9 @@ use nalgebra::Matrix3;
 use num_complex::Complex64;
 
 use super::super::finding::{SetupFinding, with_error};
-use super::super::group::Group;
-use super::super::mistake::{Distortion, Estimated, Mistake, Size};
-use super::super::scene::Truth;
+use super::super::group::FrfGroup;
+use super::super::mistake::{Distortion, Estimated, Mistake, MistakeSize};
+use super::super::truth::Truth;
 use crate::identify::frf_data::{FrfData, FrfDatum};
 
 /// The sensor's mass, kg, sits at each response point while that is measured (Ewins 2000, §3.12: H − H m s² (1 + m s² H)⁻¹ H).
@@ -29,15 +29,15 @@ impl Distortion for SensorMass {
 }
 
 impl Mistake for SensorMass {
-    fn sizes(&self) -> Vec<Size> {
-        vec![Size::positive(0.5, 20.0)]
+    fn sizes(&self) -> Vec<MistakeSize> {
+        vec![MistakeSize::positive(0.5, 20.0)]
     }
 
-    fn groups(&self, data: &FrfData) -> Vec<Group> {
+    fn groups(&self, data: &FrfData) -> Vec<FrfGroup> {
         // At one point only it is a payload like any other.
         let points = data.response_points();
         match points.len() > 1 {
-            true => vec![Group::ALL],
+            true => vec![FrfGroup::ALL],
             false => Vec::new(),
         }
     }

@@ -1,9 +1,9 @@
 use num_complex::Complex64;
 
 use super::super::finding::{SetupFinding, with_error};
-use super::super::group::Group;
-use super::super::mistake::{Distortion, Estimated, Mistake, Size, turned_axis};
-use super::super::scene::Truth;
+use super::super::group::FrfGroup;
+use super::super::mistake::{Distortion, Estimated, Mistake, MistakeSize, turned_axis};
+use super::super::truth::Truth;
 use crate::identify::frf_data::{FrfData, FrfDatum};
 
 /// The sensor stood askew at one posture or at one node: turned by a rotation vector, deg about x, y, z. A sensor that is
@@ -13,7 +13,7 @@ pub struct TurnedSensor;
 impl Distortion for TurnedSensor {
     fn shown(&self, values: &[f64], _omega: f64, truth: &Truth, frf: &FrfDatum) -> Complex64 {
         let direction = turned_axis(frf.response.axis, values);
-        let terms = crate::ingest::Axis::ALL.into_iter().zip(direction);
+        let terms = crate::data::Axis::ALL.into_iter().zip(direction);
         terms
             .map(|(axis, part)| truth.between(axis, frf.reference.axis) * part)
             .sum()
@@ -21,20 +21,20 @@ impl Distortion for TurnedSensor {
 }
 
 impl Mistake for TurnedSensor {
-    fn sizes(&self) -> Vec<Size> {
-        vec![Size::either_way(5.0, 60.0); 3]
+    fn sizes(&self) -> Vec<MistakeSize> {
+        vec![MistakeSize::either_way(5.0, 60.0); 3]
     }
 
-    fn groups(&self, data: &FrfData) -> Vec<Group> {
-        let mut groups = Group::postures(data);
+    fn groups(&self, data: &FrfData) -> Vec<FrfGroup> {
+        let mut groups = FrfGroup::postures(data);
         let points = data.response_points();
         if points.len() > 1 {
-            groups.extend(points.into_iter().map(|p| Group {
+            groups.extend(points.into_iter().map(|p| FrfGroup {
                 response_point: Some(p),
-                ..Group::ALL
+                ..FrfGroup::ALL
             }));
         }
-        groups.retain(|g| *g != Group::ALL);
+        groups.retain(|g| *g != FrfGroup::ALL);
         groups
     }
 

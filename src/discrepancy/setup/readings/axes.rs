@@ -1,17 +1,16 @@
 use std::sync::Arc;
 
 use super::super::finding::SetupFinding;
-use super::super::group::Group;
-use super::super::reading::Reading;
-use super::Proposed;
-use super::table::{Table, distance};
-use crate::campaign::Point;
+use super::super::group::FrfGroup;
+use super::super::reading::FileReading;
+use super::proposal::Proposed;
+use super::table::{DistanceTable, distance};
+use crate::data::{Axis, Point};
 use crate::identify::frf_data::FrfData;
-use crate::ingest::Axis;
 
 /// Whose axes are misnamed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Role {
+pub enum MisnamedAxes {
     /// Those of the sensor and of the hammer alike: another coordinate system.
     Both,
     Response,
@@ -56,8 +55,8 @@ impl Turn {
 
 /// Axes exchanged or of the wrong sign in a group of files.
 pub struct Axes {
-    pub group: Group,
-    pub role: Role,
+    pub group: FrfGroup,
+    pub role: MisnamedAxes,
     pub turn: Turn,
     used: [bool; 3],
 }
@@ -67,14 +66,14 @@ impl Axes {
     fn truth(&self, response: usize, reference: usize) -> (usize, usize, f64) {
         let Turn { to, sign } = self.turn;
         match self.role {
-            Role::Both => (to[response], to[reference], sign[response] * sign[reference]),
-            Role::Response => (to[response], reference, sign[response]),
-            Role::Reference => (response, to[reference], sign[reference]),
+            MisnamedAxes::Both => (to[response], to[reference], sign[response] * sign[reference]),
+            MisnamedAxes::Response => (to[response], reference, sign[response]),
+            MisnamedAxes::Reference => (response, to[reference], sign[reference]),
         }
     }
 }
 
-impl Reading for Axes {
+impl FileReading for Axes {
     fn corrected(&self, data: &FrfData) -> FrfData {
         let mut data = data.clone();
         for block in &mut data.blocks {
@@ -101,9 +100,9 @@ impl Reading for Axes {
 
     fn finding(&self, data: &FrfData, points: &[Point]) -> SetupFinding {
         let (who, only_signs) = match self.role {
-            Role::Both => ("sensor and hammer", false),
-            Role::Response => ("sensor", self.turn.to == [0, 1, 2]),
-            Role::Reference => ("hammer", self.turn.to == [0, 1, 2]),
+            MisnamedAxes::Both => ("sensor and hammer", false),
+            MisnamedAxes::Response => ("sensor", self.turn.to == [0, 1, 2]),
+            MisnamedAxes::Reference => ("hammer", self.turn.to == [0, 1, 2]),
         };
         let words = self.turn.words(["X", "Y", "Z"], self.used);
         SetupFinding {
@@ -126,20 +125,20 @@ impl Reading for Axes {
 }
 
 /// Which axes occur among the FRFs of a group, by role.
-fn used(data: &FrfData, group: &Group, role: Role) -> [bool; 3] {
+fn used(data: &FrfData, group: &FrfGroup, role: MisnamedAxes) -> [bool; 3] {
     let mut used = [false; 3];
     for (_, frf) in data.frfs().filter(|(_, f)| group.holds(f)) {
-        if role != Role::Reference {
+        if role != MisnamedAxes::Reference {
             used[frf.response.axis.index()] = true;
         }
-        if role != Role::Response {
+        if role != MisnamedAxes::Response {
             used[frf.reference.axis.index()] = true;
         }
     }
     used
 }
 
-pub fn proposed(table: &Table, data: &FrfData) -> Vec<Proposed> {
+pub fn proposed(table: &DistanceTable, data: &FrfData) -> Vec<Proposed> {
     // Each FRF under every true pair of axes and sign: all readings are sums of these.
     let apart: Vec<[[[f64; 2]; 3]; 3]> = data
         .frfs()
@@ -152,17 +151,21 @@ pub fn proposed(table: &Table, data: &FrfData) -> Vec<Proposed> {
             })
         })
         .collect();
-    let mut groups = Group::postures(data);
+    let mut groups = FrfGroup::postures(data);
     let points = data.response_points();
     if points.len() > 1 {
-        groups.extend(points.into_iter().map(|p| Group {
+        groups.extend(points.into_iter().map(|p| FrfGroup {
             response_point: Some(p),
-            ..Group::ALL
+            ..FrfGroup::ALL
         }));
     }
     let mut all = Vec::new();
     for group in groups {
-        for role in [Role::Both, Role::Response, Role::Reference] {
+        for role in [
+            MisnamedAxes::Both,
+            MisnamedAxes::Response,
+            MisnamedAxes::Reference,
+        ] {
             let used = used(data, &group, role);
             let mut seen: Vec<Vec<(usize, usize, f64)>> = Vec::new();
             for turn in Turn::all() {

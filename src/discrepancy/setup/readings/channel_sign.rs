@@ -1,19 +1,19 @@
 use std::sync::Arc;
 
 use super::super::finding::SetupFinding;
-use super::super::group::Group;
-use super::super::reading::Reading;
-use super::Proposed;
-use super::table::{Table, distance};
-use crate::campaign::Point;
+use super::super::group::FrfGroup;
+use super::super::reading::FileReading;
+use super::proposal::Proposed;
+use super::table::{DistanceTable, distance};
+use crate::data::Point;
 use crate::identify::frf_data::FrfData;
 
 /// A group of FRFs with the wrong sign: a sensor, a hammer or an amplifier of the other polarity.
 pub struct ChannelSign {
-    group: Group,
+    group: FrfGroup,
 }
 
-impl Reading for ChannelSign {
+impl FileReading for ChannelSign {
     fn corrected(&self, data: &FrfData) -> FrfData {
         let mut data = data.clone();
         for block in &mut data.blocks {
@@ -40,13 +40,13 @@ impl Reading for ChannelSign {
     }
 }
 
-pub fn proposed(table: &Table, data: &FrfData) -> Vec<Proposed> {
+pub fn proposed(table: &DistanceTable, data: &FrfData) -> Vec<Proposed> {
     let turned: Vec<f64> = data
         .frfs()
         .enumerate()
         .map(|(i, (_, frf))| distance(table.own(i, frf).iter().map(|m| -m), frf))
         .collect();
-    Group::channels(data)
+    FrfGroup::channels(data)
         .into_iter()
         .map(|group| Proposed {
             gain: table.gain(data, &group, |i, _| turned[i]),

@@ -5,65 +5,11 @@ mod channel_sign;
 mod phase_conjugated;
 mod point_frame;
 mod posture_swap;
+mod promising;
+mod proposal;
 mod quantity;
 mod table;
 
-use super::reading::Reading;
-use crate::Result;
-use crate::identify::StructureModel;
-use crate::identify::frf_data::FrfData;
-use table::Table;
-
 pub use axes::Turn;
-
-/// A reading with how much nearer the model comes by it.
-pub struct Proposed {
-    pub reading: Box<dyn Reading>,
-    /// In values that agreed not at all; from [`proposed`] as a share of all disagreement.
-    pub gain: f64,
-}
-
-/// Share of all disagreement that a reading must take away to be worth a fit: what is wrong in one file of many leaves
-/// the others in agreement.
-const WORTH_A_FIT: f64 = 0.03;
-
-/// Readings that bring the model at any of `thetas` nearer to the data, most promising first.
-///
-/// # Errors
-/// A model that has no response.
-pub fn proposed(
-    model: &StructureModel,
-    data: &FrfData,
-    thetas: &[&[f64]],
-    most: usize,
-) -> Result<Vec<Proposed>> {
-    let mut all: Vec<Proposed> = Vec::new();
-    for theta in thetas {
-        let table = Table::new(model, data, theta)?;
-        let mut here: Vec<Proposed> = Vec::new();
-        here.extend(axes::proposed(&table, data));
-        here.extend(channel_sign::proposed(&table, data));
-        here.extend(phase_conjugated::proposed(&table, data));
-        here.extend(quantity::proposed(&table, data));
-        here.extend(point_frame::proposed(&table, model, data, theta)?);
-        here.extend(posture_swap::proposed(&table, model, data, theta)?);
-        let disagreement: f64 = table.now.iter().sum();
-        for proposed in &mut here {
-            proposed.gain /= disagreement.max(f64::MIN_POSITIVE);
-        }
-        here.retain(|p| p.gain > WORTH_A_FIT);
-        here.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        here.truncate(most);
-        all.extend(here);
-    }
-    // The same reading is proposed from several places.
-    let mut seen: Vec<(&'static str, String)> = Vec::new();
-    all.retain(|p| {
-        let finding = p.reading.finding(data, &model.points);
-        let name = (finding.kind, finding.place);
-        let new = !seen.contains(&name);
-        seen.push(name);
-        new
-    });
-    Ok(all)
-}
+pub use promising::proposed;
+pub use proposal::Proposed;

@@ -1,19 +1,19 @@
 use std::sync::Arc;
 
 use super::super::finding::SetupFinding;
-use super::super::group::Group;
-use super::super::reading::Reading;
-use super::Proposed;
-use super::table::{Table, distance};
-use crate::campaign::Point;
+use super::super::group::FrfGroup;
+use super::super::reading::FileReading;
+use super::proposal::Proposed;
+use super::table::{DistanceTable, distance};
+use crate::data::Point;
 use crate::identify::frf_data::FrfData;
 
 /// Imaginary parts with the wrong sign: the other convention of the Fourier transform, or force over response phase.
 pub struct PhaseConjugated {
-    group: Group,
+    group: FrfGroup,
 }
 
-impl Reading for PhaseConjugated {
+impl FileReading for PhaseConjugated {
     fn corrected(&self, data: &FrfData) -> FrfData {
         let mut data = data.clone();
         for block in &mut data.blocks {
@@ -42,13 +42,13 @@ impl Reading for PhaseConjugated {
     }
 }
 
-pub fn proposed(table: &Table, data: &FrfData) -> Vec<Proposed> {
+pub fn proposed(table: &DistanceTable, data: &FrfData) -> Vec<Proposed> {
     let turned: Vec<f64> = data
         .frfs()
         .enumerate()
         .map(|(i, (_, frf))| distance(table.own(i, frf).iter().map(|m| m.conj()), frf))
         .collect();
-    Group::postures(data)
+    FrfGroup::postures(data)
         .into_iter()
         .map(|group| Proposed {
             gain: table.gain(data, &group, |i, _| turned[i]),

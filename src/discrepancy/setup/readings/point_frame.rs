@@ -1,10 +1,10 @@
 use super::super::finding::SetupFinding;
-use super::super::reading::Reading;
+use super::super::reading::FileReading;
 use super::super::scene::predict;
-use super::Proposed;
-use super::table::{Table, distance};
+use super::proposal::Proposed;
+use super::table::{DistanceTable, distance};
 use crate::Result;
-use crate::campaign::{AxesRef, BodyRef, Point};
+use crate::data::{AxesRef, BodyRef, Point};
 use crate::identify::StructureModel;
 use crate::identify::frf_data::FrfData;
 
@@ -34,7 +34,7 @@ fn axes_name(axes: AxesRef) -> &'static str {
     }
 }
 
-impl Reading for PointFrame {
+impl FileReading for PointFrame {
     fn points(&self, points: &[Point]) -> Vec<Point> {
         let mut points = points.to_vec();
         points[self.point].body = self.body;
@@ -81,7 +81,7 @@ impl Reading for PointFrame {
 }
 
 pub fn proposed(
-    table: &Table,
+    table: &DistanceTable,
     model: &StructureModel,
     data: &FrfData,
     theta: &[f64],

@@ -1,12 +1,12 @@
 use std::sync::Arc;
 
 use super::super::finding::SetupFinding;
-use super::super::reading::Reading;
+use super::super::reading::FileReading;
 use super::super::scene::predict;
-use super::Proposed;
-use super::table::{Table, distance};
+use super::proposal::Proposed;
+use super::table::{DistanceTable, distance};
 use crate::Result;
-use crate::campaign::Point;
+use crate::data::Point;
 use crate::identify::StructureModel;
 use crate::identify::frf_data::FrfData;
 use crate::robot::Kinematics;
@@ -19,7 +19,7 @@ pub struct PostureSwap {
     kinematics: Vec<Option<Kinematics>>,
 }
 
-impl Reading for PostureSwap {
+impl FileReading for PostureSwap {
     fn corrected(&self, data: &FrfData) -> FrfData {
         let mut data = data.clone();
         for block in &mut data.blocks {
@@ -80,7 +80,7 @@ impl Reading for PostureSwap {
 /// Each posture's files under every posture's angles: the best one-to-one assignment, every exchange of two, and every
 /// single file that fits elsewhere.
 pub fn proposed(
-    table: &Table,
+    table: &DistanceTable,
     model: &StructureModel,
     data: &FrfData,
     theta: &[f64],

@@ -3,17 +3,17 @@ use std::sync::Arc;
 use num_complex::Complex64;
 
 use super::super::finding::SetupFinding;
-use super::super::group::Group;
-use super::super::reading::Reading;
-use super::Proposed;
-use super::table::{Table, distance};
-use crate::campaign::Point;
+use super::super::group::FrfGroup;
+use super::super::reading::FileReading;
+use super::proposal::Proposed;
+use super::table::{DistanceTable, distance};
+use crate::data::Point;
 use crate::identify::frf_data::FrfData;
 
 /// Displacement, velocity and acceleration per force taken for one another: the file holds (iω)^power times what it is read
 /// as.
-pub struct Quantity {
-    group: Group,
+pub struct MisreadQuantity {
+    group: FrfGroup,
     power: i32,
 }
 
@@ -22,7 +22,7 @@ fn factor(frequency_hz: f64, power: i32) -> Complex64 {
     Complex64::new(0.0, std::f64::consts::TAU * frequency_hz).powi(power)
 }
 
-impl Reading for Quantity {
+impl FileReading for MisreadQuantity {
     fn corrected(&self, data: &FrfData) -> FrfData {
         let mut data = data.clone();
         for block in &mut data.blocks {
@@ -62,7 +62,7 @@ impl Reading for Quantity {
     }
 }
 
-pub fn proposed(table: &Table, data: &FrfData) -> Vec<Proposed> {
+pub fn proposed(table: &DistanceTable, data: &FrfData) -> Vec<Proposed> {
     let mut all = Vec::new();
     for power in [-2, -1, 1, 2] {
         let turned: Vec<f64> = data
@@ -73,10 +73,10 @@ pub fn proposed(table: &Table, data: &FrfData) -> Vec<Proposed> {
                 distance(lines.map(|(m, f)| m * factor(*f, power)), frf)
             })
             .collect();
-        for group in Group::postures(data) {
+        for group in FrfGroup::postures(data) {
             all.push(Proposed {
                 gain: table.gain(data, &group, |i, _| turned[i]),
-                reading: Box::new(Quantity { group, power }),
+                reading: Box::new(MisreadQuantity { group, power }),
             });
         }
     }

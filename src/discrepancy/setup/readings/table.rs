@@ -2,14 +2,14 @@
 
 use num_complex::Complex64;
 
-use super::super::group::Group;
+use super::super::group::FrfGroup;
 use super::super::scene::{Curves, predict_all_axes};
 use crate::Result;
 use crate::identify::StructureModel;
 use crate::identify::frf_data::{FrfData, FrfDatum};
 
 /// Predictions between all axes of every FRF's points.
-pub struct Table {
+pub struct DistanceTable {
     /// [response axis][reference axis], curves in the order of the data; the sign of the file's axes is in.
     pub between: [[Curves; 3]; 3],
     /// Distance as recorded, one an FRF.
@@ -25,7 +25,7 @@ pub fn distance(model: impl Iterator<Item = Complex64>, frf: &FrfDatum) -> f64 {
         .sum()
 }
 
-impl Table {
+impl DistanceTable {
     pub fn new(model: &StructureModel, data: &FrfData, theta: &[f64]) -> Result<Self> {
         let between = predict_all_axes(model, theta, data)?;
         let now = data
@@ -36,7 +36,7 @@ impl Table {
                 distance(own.iter().copied(), frf)
             })
             .collect();
-        Ok(Table { between, now })
+        Ok(DistanceTable { between, now })
     }
 
     /// The model's curve for the `i`-th FRF as recorded.
@@ -45,7 +45,7 @@ impl Table {
     }
 
     /// How much nearer the FRFs of `group` come with `distance` (of the index and the FRF) in place of the present one.
-    pub fn gain(&self, data: &FrfData, group: &Group, distance: impl Fn(usize, &FrfDatum) -> f64) -> f64 {
+    pub fn gain(&self, data: &FrfData, group: &FrfGroup, distance: impl Fn(usize, &FrfDatum) -> f64) -> f64 {
         let frfs = data.frfs().enumerate().filter(|(_, (_, f))| group.holds(f));
         frfs.map(|(i, (_, frf))| self.now[i] - distance(i, frf)).sum()
     }

@@ -1,0 +1,271 @@
+//! A campaign's structural side loaded: robot file, FRF files and the revisions of its model.
+
+use crate::campaign::{Campaign, FrfSet, LinkGroup, RobotSection};
+use crate::effects;
+use crate::identify::model_history::{Domain, Revision, recorded_effect};
+use crate::identify::{FrfData, StructureCase, StructureModel};
+use crate::revision::{RevisionLog, log_file, structure_fingerprint};
+use crate::robot::{RobotModel, RobotSpec};
+use crate::{InputError, Result};
+
+/// The robot section of a campaign, or an error that says what is missing.
+pub fn robot_section(campaign: &Campaign) -> Result<&RobotSection> {
+    campaign.robot.as_ref().ok_or_else(|| {
+        InputError::new("the campaign has no [robot]")
+            .file(campaign.dir.join("campaign.toml"))
+            .key("robot")
+            .remedy(
+                "add [robot] with model = the path of your robot's file (`lobestone init DIR --robot FILE.urdf` makes one of a \
+                 URDF), or \"irb6640\" if it is that robot",
+            )
+            .into()
+    })
+}
+
+/// The robot model of a campaign, uncalibrated and without effects.
+///
+/// # Errors
+/// No robot, or a robot file that cannot be read.
+pub fn structure_model(campaign: &Campaign) -> Result<StructureModel> {
+    structure_model_freeing(campaign, &Freed::default())
+}
+
+/// Link parameters that are free beside those that the campaign frees itself.
+#[derive(Debug, Clone, Default)]
+pub struct Freed<'a> {
+    /// Groups that are free, within their usual tolerance where the campaign gives none.
+    pub groups: &'a [LinkGroup],
+    /// Only these of all link parameters, by name; `None`: all of the groups.
+    pub only: Option<&'a [String]>,
+}
+
+fn structure_model_freeing(campaign: &Campaign, freed: &Freed) -> Result<StructureModel> {
+    let section = &robot_section(campaign)?.freeing(freed.groups);
+    let spec = RobotSpec::load(&section.model, &campaign.dir)?;
+    let kept = |name: &str| freed.only.is_none_or(|only| only.iter().any(|o| o == name));
+    Ok(StructureModel::freeing(
+        RobotModel::new(spec),
+        campaign.points.clone(),
+        section,
+        kept,
+    ))
+}
+
+/// The FRFs of a campaign arranged for fitting, with the noise that they show.
+///
+/// # Errors
+/// No FRFs, or a posture that does not fit the robot.
+pub fn frf_data(campaign: &Campaign, model: &RobotModel, set: FrfSet) -> Result<FrfData> {
+    if set.frfs.is_empty() {
+        return Err(InputError::new("the campaign has no FRFs")
+            .file(campaign.dir.join("campaign.toml"))
+            .key("frf")
+            .remedy("add [[frf]] tables that name the measured FRF files")
+            .into());
+    }
+    FrfData::new(&campaign.postures, model, set.frfs)
+}
+
+impl StructureCase {
+    /// # Errors
+    /// FRFs or robot file that cannot be read, a broken revision log, or one with effects that are none of this robot.
+    pub fn load(campaign: &Campaign) -> Result<Self> {
+        let baseline = structure_model(campaign)?;
+        let log = RevisionLog::load(&campaign.dir)?;
+        let revisions: Vec<Revision> = log.revisions(Domain::Structure).cloned().collect();
+        let (set, mut warnings) = campaign.load_frfs()?;
+        warnings.extend(baseline.robot.spec.guesses_told());
+        let data = frf_data(campaign, &baseline.robot, set)?;
+        let mut settled = false;
+        let model = match revisions.last() {
+            Some(current) => {
+                settled = current.data == structure_fingerprint(campaign)?;
+                // Of a baseline only the starting point is taken; whose data it was fitted to does not matter.
+                if current.revision > 0 && !settled {
+                    warnings.push(format!(
+                        "revision {} was made with other data (robot, postures, points or FRF files changed since): its \
+                         effects stay in the model and are fitted anew, but the errors in its history no longer compare; \
+                         `lobestone undo {dir}` takes it back, `lobestone add {dir} …` adds it again",
+                        current.revision,
+                        dir = campaign.dir.display()
+                    ));
+                }
+                with_revision(campaign, &baseline, &data, current)?
+            }
+            None => baseline.clone(),
+        };
+        Ok(StructureCase {
+            model,
+            baseline,
+            data,
+            revisions,
+            settled,
+            warnings,
+        })
+    }
+
+    /// The same data and revision, with link parameters free that the campaign may take for exact.
+    ///
+    /// # Errors
+    /// As for [`load`](Self::load).
+    pub fn freeing(&self, campaign: &Campaign, freed: &Freed) -> Result<Self> {
+        let baseline = structure_model_freeing(campaign, freed)?;
+        let model = match self.revisions.last() {
+            Some(current) => with_revision(campaign, &baseline, &self.data, current)?,
+            None => baseline.clone(),
+        };
+        Ok(StructureCase {
+            model,
+            baseline,
+            settled: false,
+            ..self.clone()
+        })
+    }
+
+    /// The model without the effects that were added, starting from where it stood when the first of them was; `None`
+    /// where the model has no effects.
+    ///
+    /// # Errors
+    /// As for [`load`](Self::load).
+    pub fn before_effects(&self, campaign: &Campaign) -> Result<Option<StructureModel>> {
+        match self.revisions.first() {
+            Some(first) if !self.model.effects().is_empty() => self.model_of(campaign, first).map(Some),
+            _ => Ok(None),
+        }
+    }
+
+    /// The model of one of the [`revisions`](Self::revisions), starting from where that stood.
+    ///
+    /// # Errors
+    /// As for [`load`](Self::load).
+    pub fn model_of(&self, campaign: &Campaign, revision: &Revision) -> Result<StructureModel> {
+        with_revision(campaign, &self.baseline, &self.data, revision)
+    }
+}
+
+/// The model of a revision, starting from where that stood.
+fn with_revision(
+    campaign: &Campaign,
+    baseline: &StructureModel,
+    data: &FrfData,
+    revision: &Revision,
+) -> Result<StructureModel> {
+    let summary = data.summary();
+    let spec = &baseline.robot.spec;
+    let mut model = baseline.clone();
+    for (i, recorded) in revision.effects.iter().enumerate() {
+        let wrong = |problem: String| {
+            InputError::new(problem)
+                .file(log_file(&campaign.dir))
+                .key(format!("revisions[{}].effects[{i}]", revision.revision))
+        };
+        let instance = effects::find(spec, &recorded.effect)
+            .into_iter()
+            .find(|instance| recorded_effect(instance) == *recorded)
+            .ok_or_else(|| {
+                let variant = recorded.variant.as_ref();
+                let choice = variant.map_or(String::new(), |v| format!(" ({v})"));
+                wrong(format!(
+                    "this robot has no effect {}{choice}",
+                    crate::text::shown_briefly(&recorded.effect)
+                ))
+                .remedy("was the robot changed? undo the revision with `lobestone undo DIR`")
+            })?;
+        if let Some(obstacle) = instance.effect.obstacle(spec, &summary) {
+            return Err(wrong(format!(
+                "{} is in the model, but cannot be any more: {obstacle}",
+                recorded.effect
+            ))
+            .remedy("were files taken away? undo the revision with `lobestone undo DIR`")
+            .into());
+        }
+        model = model.with_effect(instance, &summary);
+    }
+    // By name: a tolerance that campaign.toml got since brings parameters that the revision did not have.
+    let start = model
+        .parameters
+        .iter()
+        .map(|parameter| {
+            let known = revision.parameters.iter().find(|r| r.name == parameter.name);
+            let value = known.map_or(parameter.nominal, |r| r.value);
+            // Into the range, or at an effect's vanishing limit: `with_start` sees to it.
+            parameter.internal(value)
+        })
+        .collect();
+    Ok(model.with_start(start))
+}
+
+#[cfg(test)]
+mod tests {
+    use num_complex::Complex64;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::analysis::StructureAnalysis;
+    use crate::campaign::{AxesRef, BodyRef, MeasuredDof, MeasuredFrf, Point, Posture};
+    use crate::discrepancy::{DiagnosisVerdict, diagnose};
+    use crate::identify::Options;
+    use crate::ingest::Axis;
+    use crate::robot::fixture::{TAP_POSTURES, irb6640};
+
+    /// FRFs of the tool point, 1 % noise, of a robot whose second joint is more compliant than its file says.
+    fn measured(postures: &[Posture], points: &[Point]) -> Vec<MeasuredFrf> {
+        let mut robot = irb6640();
+        robot.joints[1].compliance_rad_per_nm *= 1.4;
+        let lines: Vec<f64> = (0..120).map(|i| 5.0 + 0.4 * f64::from(i)).collect();
+        let mut frfs = Vec::new();
+        for posture in 0..postures.len() {
+            for response in Axis::ALL.map(|axis| MeasuredDof::new(0, axis)) {
+                for reference in [Axis::X, Axis::Y].map(|axis| MeasuredDof::new(0, axis)) {
+                    let unknown = vec![Complex64::ZERO; lines.len()];
+                    frfs.push(MeasuredFrf::new(
+                        posture,
+                        response,
+                        reference,
+                        lines.clone(),
+                        unknown,
+                    ));
+                }
+            }
+        }
+        let truth = StructureCase::new(robot, postures, points.to_vec(), frfs.clone()).unwrap();
+        let exact = truth.model.predict(&truth.model.nominal_theta(), &truth.data);
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        for (frf, exact) in frfs.iter_mut().zip(exact.unwrap()) {
+            let size = exact.iter().map(|h| h.norm()).sum::<f64>() / exact.len() as f64;
+            let mut noise = || 0.017 * size * random.random_range(-1.0..1.0);
+            let noisy = |h: &Complex64| h + Complex64::new(noise(), noise());
+            frf.receptance_m_per_n = exact.iter().map(noisy).collect();
+        }
+        frfs
+    }
+
+    #[test]
+    fn a_robot_and_frfs_in_memory_are_enough_for_a_calibration_and_a_verdict() {
+        let posture = |(i, q): (usize, &[f64; 6])| Posture {
+            id: format!("p{i}"),
+            joints_deg: q.to_vec(),
+        };
+        let postures: Vec<Posture> = TAP_POSTURES.iter().enumerate().map(posture).collect();
+        let points = vec![Point {
+            node: 1,
+            body: BodyRef::Tool,
+            position_m: [0.0; 3],
+            axes: AxesRef::Base,
+        }];
+        let frfs = measured(&postures, &points);
+
+        let case = StructureCase::new(irb6640(), &postures, points, frfs).unwrap();
+        let found = StructureAnalysis::of_case(case, Options::default()).unwrap();
+        let (before, after) = (found.before.totals.nrms, found.after.totals.nrms);
+        assert!(before > 0.3 && after < 0.05, "{before} {after}");
+        let compliance = 1.0 / found.calibration.parameters[1].value;
+        assert!((compliance / (1.4 * 0.51e-6) - 1.0).abs() < 0.02, "{compliance}");
+
+        let case = found.settled_case();
+        let study = case.study(Options::default());
+        let verdict = diagnose(&study, &case.model).unwrap().verdict;
+        assert_eq!(verdict, DiagnosisVerdict::None);
+    }
+}

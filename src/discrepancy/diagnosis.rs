@@ -1,0 +1,53 @@
+//! What the loop answers: the verdict, how sure it is, and the candidates that it rests on.
+
+use super::candidate::{BaselineFit, EffectCandidate};
+use super::verdict::DiagnosisVerdict;
+
+/// The answer.
+#[derive(Debug, Clone)]
+pub struct Diagnosis<M, I> {
+    /// Whether an effect is missing.
+    pub verdict: DiagnosisVerdict,
+    /// Index among the candidates of the effect that is missing, if one is.
+    pub effect: Option<usize>,
+    /// The best of the library where the verdict is unknown; index among the candidates.
+    pub best_guess: Option<usize>,
+    /// Probability that the verdict is right.
+    pub confidence: f64,
+    /// Why there is no verdict, where the data are too few for one.
+    pub too_little_data: Option<String>,
+    /// Best first, one for each effect and site.
+    pub candidates: Vec<EffectCandidate<M, I>>,
+    /// `effect@site` of rivals that this data cannot tell from the verdict.
+    pub indistinguishable: Vec<String>,
+    /// The second effect, where two together explain what one alone does not.
+    pub companion: Option<String>,
+    /// The model as it stands.
+    pub baseline: BaselineFit,
+    /// Effects that this data cannot show, with the reason.
+    pub not_tried: Vec<(String, String)>,
+    /// Pairs of effects that were looked at, of how many there are beside the leaders; `None` where one effect is enough or
+    /// pairs are hopeless.
+    pub pairs: Option<[usize; 2]>,
+}
+
+impl<M, I> Diagnosis<M, I> {
+    /// The candidate that is missing; `None` where the verdict names none.
+    pub fn winner(&self) -> Option<&EffectCandidate<M, I>> {
+        self.effect.map(|w| &self.candidates[w])
+    }
+
+    /// What the best of the library makes of the data where the verdict is unknown.
+    pub fn best_guess_in_words(&self) -> Option<String> {
+        let guess = self.candidates.get(self.best_guess?)?;
+        let [share, std] = guess.explained_share()?;
+        let left = guess.rest.as_ref()?.largest()?;
+        Some(format!(
+            "Best guess: {}, which explains {:.0} % (± {:.0} %) of what stands above the noise; the rest looks like {}.",
+            guess.label(),
+            100.0 * share,
+            100.0 * std,
+            left.looks_like
+        ))
+    }
+}

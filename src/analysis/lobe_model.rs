@@ -12,7 +12,7 @@ use crate::identify::structure::StructureModel;
 use crate::lobes::hole::{Deflection, HoleError, HoleLoad};
 use crate::lobes::setup::tool_beam;
 use crate::lobes::tool_point::RobotHolder;
-use crate::lobes::{Blocks, DirectFrf, PoleFrf, RobotFrf, StateSpace, Tool, ToolPoint, band};
+use crate::lobes::{Blocks, DirectFrf, PoleFrf, RobotFrf, StateSpace, ToolDynamics, ToolPoint, band};
 use crate::robot::{Chain, Kinematics, PostureReport};
 use crate::{InputError, Result};
 
@@ -127,7 +127,7 @@ fn quickest_of_many(frf: RobotFrf) -> Result<Box<dyn DirectFrf>> {
 #[derive(Clone)]
 pub(super) struct Asked {
     /// Without segments where the tool is rigid.
-    pub tool: Arc<Tool>,
+    pub tool: Arc<ToolDynamics>,
     /// Whether the axial–torsional block is wanted.
     pub axial: bool,
 }
@@ -135,7 +135,7 @@ pub(super) struct Asked {
 impl Asked {
     pub fn new(section: &LobesSection, axial: bool) -> Self {
         Asked {
-            tool: Arc::new(Tool::new(tool_beam(section))),
+            tool: Arc::new(ToolDynamics::new(tool_beam(section))),
             axial,
         }
     }

@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use super::lobe_model::{Asked, Dynamics, ModelState};
+use super::lobe_setup::modes_of_table;
 use super::lobes::{BEST, LobeCase, LobesBefore};
+use super::measured_structures::measured_structures;
 use crate::campaign::{Campaign, LobeMethod, LobesSection};
 use crate::lobes::band;
 use crate::lobes::hole::{HoleCheck, HoleError};
-use crate::lobes::measured::measured_structures;
 use crate::lobes::outcome::{LimitRange, NotedCut};
-use crate::lobes::setup::{Cut, modes_of_table};
+use crate::lobes::setup::LobeCut;
 use crate::lobes::tool_point::MeasuredHolder;
 use crate::lobes::{
     BlockSolver, Blocks, DirectFrf, MultiFrequency, SemiDiscretisation, SpeedLimit, StateSpace, ToolPoint,
@@ -32,19 +33,19 @@ pub(super) struct Structure {
 }
 
 impl Dynamics {
-    fn method(&self, cut: &Cut) -> Box<dyn SpeedLimit + '_> {
+    fn method(&self, cut: &LobeCut) -> Box<dyn SpeedLimit + '_> {
         let frf = self.blocks.lateral.as_ref();
         match (cut, &self.states) {
-            (Cut::Averaged(cut), _) => Box::new(cut.on(&self.blocks)),
-            (Cut::Periodic(force), Some(states)) => {
+            (LobeCut::Averaged(cut), _) => Box::new(cut.on(&self.blocks)),
+            (LobeCut::Periodic(force), Some(states)) => {
                 Box::new(SemiDiscretisation::new(*force, states.clone(), frf))
             }
-            (Cut::Periodic(force), None) => Box::new(MultiFrequency::new(*force, frf)),
+            (LobeCut::Periodic(force), None) => Box::new(MultiFrequency::new(*force, frf)),
         }
     }
 
     /// The lobes of the model before effects were added.
-    pub(super) fn lobes_before(&self, cut: &Cut, speeds: &[f64]) -> LobesBefore {
+    pub(super) fn lobes_before(&self, cut: &LobeCut, speeds: &[f64]) -> LobesBefore {
         let method = self.method(cut);
         let curve = method.curve(speeds);
         LobesBefore {
@@ -56,15 +57,15 @@ impl Dynamics {
 
 impl Structure {
     /// The cut on the structure as drawn from its uncertainty; empty where that is not known.
-    pub fn drawn(&self, cut: &Cut) -> Vec<BlockSolver<'_>> {
+    pub fn drawn(&self, cut: &LobeCut) -> Vec<BlockSolver<'_>> {
         match cut {
-            Cut::Averaged(cut) => band::solvers(cut, &self.variants),
-            Cut::Periodic(_) => Vec::new(),
+            LobeCut::Averaged(cut) => band::solvers(cut, &self.variants),
+            LobeCut::Periodic(_) => Vec::new(),
         }
     }
 
     /// The limit at the speed of every noted cut, with what the draws make of it.
-    pub fn at_cuts(&self, cut: &Cut, noted: &[NotedCut], drawn: &[BlockSolver<'_>]) -> Vec<LimitRange> {
+    pub fn at_cuts(&self, cut: &LobeCut, noted: &[NotedCut], drawn: &[BlockSolver<'_>]) -> Vec<LimitRange> {
         let speeds: Vec<f64> = noted.iter().map(|c| c.spindle_rpm).collect();
         let band = (!drawn.is_empty()).then(|| band::band(drawn, &speeds));
         let limits = self.dynamics.method(cut).curve(&speeds).depth_limit_mm;
@@ -75,7 +76,7 @@ impl Structure {
         limits.collect()
     }
 
-    pub fn case(self, cut: &Cut, speeds: &[f64], noted: &[NotedCut]) -> LobeCase {
+    pub fn case(self, cut: &LobeCut, speeds: &[f64], noted: &[NotedCut]) -> LobeCase {
         let method = self.dynamics.method(cut);
         let curve = method.curve(speeds);
         let (absolute, mut best) = (
@@ -87,8 +88,8 @@ impl Structure {
         let at_cuts = self.at_cuts(cut, noted, &drawn);
         let band = band_at(speeds);
         let by_block = match cut {
-            Cut::Averaged(cut) => cut.on(&self.dynamics.blocks).by_block(speeds),
-            Cut::Periodic(_) => None,
+            LobeCut::Averaged(cut) => cut.on(&self.dynamics.blocks).by_block(speeds),
+            LobeCut::Periodic(_) => None,
         };
         let tips: Vec<f64> = best.iter().map(|p| p.spindle_rpm).collect();
         if let Some(at_tips) = band_at(&tips) {

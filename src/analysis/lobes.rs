@@ -2,18 +2,19 @@
 
 use std::sync::Arc;
 
+use super::hole_check::hole_check;
 use super::lobe_model::{Asked, ModelState};
+use super::lobe_setup::{coefficients_of_group, cut_of, group_of_cuts};
 use super::lobe_structure::{Structure, at_postures, from_measured, from_modes, steps_through_time};
+use super::noted_cuts::noted_cuts;
 use super::redundancy::{self, RedundancyAnalysis};
 use crate::campaign::{Campaign, LobeMethod, LobeSource, LobesSection, Process};
 use crate::cutting::ForceGroup;
 use crate::lobes::band::LobeBand;
 use crate::lobes::hole::{HoleCheck, HoleError};
-use crate::lobes::outcome::{LimitRange, Outcomes, noted_cuts};
-use crate::lobes::setup::{
-    Cut, DrilledHole, LobeCoefficients, axial_torsional_force, coefficients_of_group, cut_of, group_of_cuts,
-};
-use crate::lobes::{AbsoluteLimit, BlockLobes, LobeCurve, Peak, Tool, speed_grid};
+use crate::lobes::outcome::{LimitRange, Outcomes};
+use crate::lobes::setup::{DrilledHole, LobeCoefficients, LobeCut, axial_torsional_force};
+use crate::lobes::{AbsoluteLimit, BlockLobes, LobeCurve, Peak, ToolDynamics, speed_grid};
 use crate::{InputError, Result};
 
 /// Why a drill's axial–torsional block is left out where the FRFs do not have it.
@@ -79,7 +80,7 @@ pub struct LobeAnalysis {
     /// The hole that a drill cuts; `None` in milling, or where the tool is not known.
     pub drilled: Option<DrilledHole>,
     /// The tool as a beam; without segments where it is rigid or part of the FRFs.
-    pub tool: Arc<Tool>,
+    pub tool: Arc<ToolDynamics>,
     pub spindle_rpm: [f64; 3],
     pub cases: Vec<LobeCase>,
     /// Where the campaign asks for the surface over the redundancy angle: its angles are the cases.
@@ -133,7 +134,7 @@ impl LobeAnalysis {
             LobeSource::Model => {
                 let state = ModelState::of(campaign, asked.clone(), &mut warnings)?;
                 (effects, revision) = (state.effects.clone(), state.revision);
-                let check = HoleCheck::new(campaign, section, own_cuts.as_ref());
+                let check = hole_check(campaign, section, own_cuts.as_ref());
                 if let (Err(reason), Some(_)) = (&check, &section.hole) {
                     warnings.push(format!("the hole is not worked out: {reason}"));
                 }
@@ -196,7 +197,7 @@ impl LobeAnalysis {
             teeth: cut.average().lateral.teeth,
             axial_torsional,
             drilled: match section.process {
-                Process::Drilling => DrilledHole::of(campaign, section),
+                Process::Drilling => DrilledHole::of(campaign.tool.as_ref(), section),
                 Process::Milling | Process::Turning => None,
             },
             tool: asked.tool.clone(),
@@ -291,7 +292,7 @@ impl LobeAnalysis {
 /// The force of the cut that the `[lobes]` table asks for.
 pub(super) struct CutForce {
     pub coefficients: LobeCoefficients,
-    pub cut: Cut,
+    pub cut: LobeCut,
     /// Drilling: whether the axial–torsional block takes part, or why not.
     pub axial_torsional: Option<std::result::Result<(), String>>,
     /// The campaign's own cuts, where the coefficients come from those.
@@ -327,8 +328,8 @@ impl CutForce {
         }
         let teeth = cut.average().lateral.teeth;
         let axial = (section.process == Process::Drilling)
-            .then(|| axial_torsional_force(campaign, section, coefficients, teeth));
-        if let (Cut::Averaged(cut), Some(Ok(force))) = (&mut cut, &axial) {
+            .then(|| axial_torsional_force(campaign.tool.as_ref(), section, coefficients, teeth));
+        if let (LobeCut::Averaged(cut), Some(Ok(force))) = (&mut cut, &axial) {
             cut.axial = Some(*force);
         }
         Ok(CutForce {

@@ -13,7 +13,7 @@ use crate::ingest::units::{self, Dimension};
 use crate::ingest::{self, Channel, FrfRecord, Quantity, TimeRecord};
 use crate::modal::chosen::Choice;
 use crate::modal::delay::{self, Delay};
-use crate::modal::quality::{self, Quality, SetQuality, Verdict};
+use crate::modal::quality::{self, Quality, QualityGrade, SetQuality};
 use crate::modal::tracking::{self, Track};
 use crate::modal::{self, FrfModes, GlobalModes, Hit, Method, SetMember, Settings, TapRecord, TapSettings};
 use crate::{Error, InputError, Result};
@@ -52,7 +52,7 @@ pub struct SetModes {
     /// Degrees of freedom by the numbers that [`modal::GlobalMode::shape`] uses.
     pub dofs: Vec<String>,
     pub global: GlobalModes,
-    pub verdict: Verdict,
+    pub verdict: QualityGrade,
     /// The verdict in words.
     pub why: String,
 }
@@ -427,11 +427,11 @@ fn set_warnings(set: &SetModes) -> Vec<String> {
             set.set
         ));
     }
-    if set.verdict != Verdict::Good {
+    if set.verdict != QualityGrade::Good {
         let worst: Vec<String> = set
             .frfs
             .iter()
-            .filter(|f| f.quality.verdict != Verdict::Good)
+            .filter(|f| f.quality.verdict != QualityGrade::Good)
             .take(4)
             .map(|f| format!("{} ({})", f.input.name, f.quality.reasons.join(", ")))
             .collect();
@@ -679,7 +679,7 @@ fn from_taps(
         force_n: &hammer.samples,
         responses: &responses,
     };
-    let found = modal::frfs_from_hits(&tap, taps).map_err(|e| match e {
+    let found = modal::impact_test(&tap, taps).map_err(|e| match e {
         Error::Input(e) => (*e).file(path).into(),
         other => other,
     })?;

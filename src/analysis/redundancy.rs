@@ -12,7 +12,7 @@ use crate::lobes::optimum::{
     LimitAtAngle, SPEED_MARGIN, Search, SurfacePoint, agree, apart_deg, difference, margin_mm,
 };
 use crate::lobes::redundancy::{AnglePosture, AngleStatus, Recommendation, RedundancySweep};
-use crate::lobes::setup::Cut;
+use crate::lobes::setup::LobeCut;
 use crate::lobes::{AveragedCut, SpeedLimit};
 use crate::{InputError, Result};
 
@@ -282,7 +282,7 @@ fn at_elbow(
                 Some(model) => Some(
                     state
                         .dynamics(model, &joints, false)?
-                        .lobes_before(&Cut::Averaged(cut), speeds),
+                        .lobes_before(&LobeCut::Averaged(cut), speeds),
                 ),
                 None => None,
             };

@@ -11,7 +11,7 @@ use super::lobes::CutForce;
 use crate::campaign::{Campaign, LobeMethod, LobeSource, LobesSection, Posture};
 use crate::lobes::best_speed::{BestSpeed, best_speed};
 use crate::lobes::workspace::{PlaceStatus, Workspace};
-use crate::lobes::workspace_grid::{Place, Span, WorkspaceGrid};
+use crate::lobes::workspace_grid::{GridPlace, Span, WorkspaceGrid};
 use crate::lobes::{AbsoluteLimit, AveragedCut, SpeedLimit};
 use crate::progress::Progress;
 use crate::revision::structure_fingerprint;
@@ -58,7 +58,7 @@ pub struct PlaceFindings {
 /// One place of a map.
 #[derive(Debug, Clone, Serialize)]
 pub struct SweepRow {
-    pub place: Place,
+    pub place: GridPlace,
     pub status: PlaceStatus,
     /// `None` where the place cannot be used.
     pub findings: Option<PlaceFindings>,

@@ -1,6 +1,6 @@
 //! The measured FRFs of a campaign, as receptance between its points.
 
-use crate::data::{Axis, Dof, FrfRecord, FrfSet, MeasuredDof, MeasuredFrf, Quantity};
+use crate::data::{Dof, FrfRecord, FrfSet, MeasuredDof, MeasuredFrf, Quantity};
 use std::path::{Path, PathBuf};
 
 use num_complex::Complex64;
@@ -342,6 +342,7 @@ mod tests {
 
     use super::*;
     use crate::campaign::*;
+    use crate::data::Axis;
 
     /// Receptance of a single mass on a spring, and its derivatives.
     fn record(quantity: Option<Quantity>, dofs: Option<(i64, i64)>) -> FrfRecord {

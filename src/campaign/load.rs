@@ -1,8 +1,8 @@
 //! `campaign.toml` to a validated [`Campaign`].
 
 use crate::data::{
-    AxesRef, BodyRef, ChipFormation, CutOutcome, Dof, LinkGroup, LinkTolerances, OrthogonalSection, Point,
-    Posture, Quantity, RobotSection, RobotSpec, Tool,
+    AxesRef, BodyRef, ChipFormation, Cut, CutOutcome, Dof, LinkGroup, LinkTolerances, OrthogonalSection,
+    Point, Posture, Quantity, RobotSection, RobotSpec, Tool,
 };
 use std::path::{Path, PathBuf};
 

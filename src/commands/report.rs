@@ -5,10 +5,11 @@ use serde_json::{Value, json};
 use super::next_step::Guide;
 use super::text::warnings;
 use super::{CampaignArg, Outcome};
-use crate::analysis::{CampaignFindings, ThesisFindings};
+use crate::analysis::CampaignFindings;
 use crate::campaign::Campaign;
 use crate::discrepancy::EffectCandidate;
 use crate::report::campaign::{self, ReportFiles};
+use crate::thesis::ThesisFindings;
 use crate::{Error, Result};
 
 #[derive(clap::Args)]

@@ -6,8 +6,8 @@ use serde_json::json;
 use super::{Outcome, next_step};
 use crate::ingest::Quantity;
 use crate::simulate::{
-    EffectRequest, FrfFormat, Kind, LabRobot, Layout, LineNoise, Slip, StructureScenario, check_target,
-    departure, random, structure, truth_beside,
+    CampaignKind, EffectRequest, FrfFormat, FrfLayout, LabRobot, LineNoise, Slip, StructureScenario,
+    check_target, departure, random, structure, truth_beside,
 };
 use crate::{InputError, Result, effects, simulate};
 
@@ -55,7 +55,7 @@ pub struct Args {
     random: Option<random::Tier>,
     /// How well the campaign is measured; single options below override it.
     #[arg(long, value_enum, default_value = "careful")]
-    kind: Kind,
+    kind: CampaignKind,
     /// EFFECT[@SITE][:parameter=value,…]: physics to hide in the data; may be given several times. What is not given is
     /// drawn.
     #[arg(long = "effect", value_name = "EFFECT")]
@@ -101,7 +101,7 @@ pub struct Args {
     spread_deg: Option<f64>,
     /// Which FRFs are measured.
     #[arg(long, value_enum)]
-    points: Option<Layout>,
+    points: Option<FrfLayout>,
     /// First and last spectral line, Hz.
     #[arg(long, value_name = "FROM,TO", value_delimiter = ',', num_args = 1..=2)]
     band: Option<Vec<f64>>,

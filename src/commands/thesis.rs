@@ -5,12 +5,11 @@ use serde_json::json;
 use super::Outcome;
 use super::text::{number, percent, table};
 use crate::Result;
-use crate::analysis::ThesisFindings;
 use crate::cutting::{Known, MILLING_COEFFICIENTS};
 use crate::lobes::Peak;
 use crate::report::thesis_section;
 use crate::thesis::real_case::Explanation;
-use crate::thesis::{CaseStudy, CuttingTables, LobeTips, RealCase, Row};
+use crate::thesis::{CaseStudy, ComparedRow, CuttingTables, LobeTips, RealCase, ThesisFindings};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -38,9 +37,9 @@ fn optional(value: Option<f64>) -> String {
     value.map_or("–".into(), |v| number(v, 4))
 }
 
-fn rows(rows: &[Row]) -> String {
+fn rows(rows: &[ComparedRow]) -> String {
     let of_measured =
-        |value: f64, row: &Row| row.measured.map_or("–".into(), |m| format!("{:.2}", value / m));
+        |value: f64, row: &ComparedRow| row.measured.map_or("–".into(), |m| format!("{:.2}", value / m));
     let rows: Vec<Vec<String>> = rows
         .iter()
         .map(|row| {

@@ -30,7 +30,7 @@ enum Moment {
 /// What one component brings to one average: width (chip/reference)^p moment(p), times the force per width at the reference chip.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct KienzleTerm {
-    component: usize,
+    pub(super) component: usize,
     /// Width, mm, with sign, share of the turn, and for a torque its arm.
     scale: f64,
     /// Chip thickness; in milling that at φ = 90°.
@@ -41,7 +41,7 @@ pub(super) struct KienzleTerm {
 }
 
 impl KienzleTerm {
-    fn value(&self, m: f64, reference_mm: f64) -> f64 {
+    pub(super) fn value(&self, m: f64, reference_mm: f64) -> f64 {
         let p = 1.0 - m;
         let over = |f: &dyn Fn(f64) -> f64| f(self.angles[1]) - f(self.angles[0]);
         let moment = match self.moment {

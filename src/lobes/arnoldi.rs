@@ -106,7 +106,7 @@ fn residual<T: ComplexField<RealField = f64> + Into<Complex64> + Copy>(
         x[row - 1] = -sum / below;
         squares += x[row - 1].norm_sqr();
         if !squares.is_finite() {
-            // The last component is nothing beside the rest.
+            // The last component is nothing compared with the rest.
             return 0.0;
         }
     }

@@ -16,7 +16,9 @@ pub const QUANTILES: [f64; 2] = [0.05, 0.95];
 /// Quantiles of the limit at each speed, mm; `None` where that share of the draws has no limit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LobeBand {
+    /// The 5 % quantile at each speed, mm.
     pub lower_mm: Vec<Option<f64>>,
+    /// The 95 % quantile at each speed, mm.
     pub upper_mm: Vec<Option<f64>>,
 }
 

@@ -12,6 +12,7 @@ const STEPS_PER_MARGIN: usize = 2;
 /// A speed and the least limit within ±2 % of it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct BestSpeed {
+    /// Spindle speed, rpm.
     pub spindle_rpm: f64,
     /// `None`: nothing limits the cut there.
     pub depth_mm: Option<f64>,
@@ -44,7 +45,7 @@ mod tests {
     use super::*;
     use crate::lobes::curve::Limit;
 
-    /// A needle of a tip at 500 rpm, narrower than the margin, beside a broad hill about 800 rpm.
+    /// A needle of a tip at 500 rpm, narrower than the margin, next to a broad hill about 800 rpm.
     struct Needle {
         free_from_rpm: f64,
     }

@@ -1,4 +1,4 @@
-//! A cut with averaged forces on a structure: the lateral block and, in drilling, the axial–torsional one beside it.
+//! A cut with averaged forces on a structure: the lateral block and, in drilling, the axial–torsional one.
 //!
 //! The two blocks of a drill's force do not touch each other (Roukema & Altintas 2007), so the limit is that of the block
 //! which chatters first. Cross FRFs between them, which a robot has, are left out.
@@ -11,6 +11,7 @@ use super::solve::StabilitySolver;
 /// Forces of a cut averaged over a revolution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AveragedCut {
+    /// Force in the plane across the tool axis.
     pub lateral: RegenerativeForce,
     /// Drilling, where what it needs is known.
     pub axial: Option<RegenerativeForce>,
@@ -24,12 +25,14 @@ impl From<RegenerativeForce> for AveragedCut {
 
 /// The FRFs that a cut of [`AveragedCut`] meets.
 pub struct Blocks {
+    /// Across the tool axis: x and y.
     pub lateral: Box<dyn DirectFrf>,
     /// Along the tool axis and about it; `None` where it is not known or not asked for.
     pub axial: Option<Box<dyn DirectFrf>>,
 }
 
 impl AveragedCut {
+    /// The solver of these forces on the FRFs of `blocks`; an axial–torsional block takes part where both have one.
     pub fn on<'a>(&self, blocks: &'a Blocks) -> BlockSolver<'a> {
         BlockSolver {
             lateral: StabilitySolver::new(self.lateral, blocks.lateral.as_ref()),
@@ -43,7 +46,9 @@ impl AveragedCut {
 
 /// The limit of whichever block chatters first.
 pub struct BlockSolver<'a> {
+    /// Solver of the block across the tool axis.
     pub lateral: StabilitySolver<'a>,
+    /// Solver of the axial–torsional block; `None` where there is none.
     pub axial: Option<StabilitySolver<'a>>,
 }
 
@@ -59,7 +64,9 @@ impl Blocks {
 /// The limits of one block alone.
 #[derive(Debug, Clone)]
 pub struct BlockLobes {
+    /// Limit over spindle speed.
     pub curve: LobeCurve,
+    /// Absolute stability limit; `None` where nothing is limited.
     pub absolute: Option<AbsoluteLimit>,
 }
 

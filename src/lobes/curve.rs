@@ -10,6 +10,7 @@ use crate::{Error, Result, stop};
 pub struct Limit {
     /// Width of cut b: axial depth in milling, (diameter − pilot diameter)/2 in drilling.
     pub depth_mm: f64,
+    /// Frequency of the chatter, Hz.
     pub chatter_hz: f64,
     /// Whole waves between two teeth, k in ωT = 2πk + ε.
     pub lobe: u32,
@@ -105,8 +106,11 @@ pub trait SpeedLimit: Sync {
 /// within the band of the FRF.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LobeCurve {
+    /// Spindle speeds, rpm.
     pub spindle_rpm: Vec<f64>,
+    /// Limit of the width of cut at each speed, mm.
     pub depth_limit_mm: Vec<Option<f64>>,
+    /// Frequency of the chatter at that limit, Hz.
     pub chatter_hz: Vec<Option<f64>>,
 }
 
@@ -129,13 +133,16 @@ impl LobeCurve {
 /// The depth below which no speed whatever chatters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AbsoluteLimit {
+    /// Width of cut, mm.
     pub depth_mm: f64,
+    /// Frequency of the chatter there, Hz.
     pub chatter_hz: f64,
 }
 
 /// A local maximum of the limit over speed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Peak {
+    /// Spindle speed, rpm.
     pub spindle_rpm: f64,
     /// `None`: unlimited around this speed.
     pub depth_mm: Option<f64>,
@@ -146,6 +153,7 @@ pub struct Peak {
 }
 
 impl Peak {
+    /// A peak inside the range of speeds, without a quantile.
     pub fn new(spindle_rpm: f64, depth_mm: Option<f64>) -> Self {
         Peak {
             spindle_rpm,

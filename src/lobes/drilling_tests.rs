@@ -7,7 +7,7 @@ use approx::assert_relative_eq;
 use nalgebra::DMatrix;
 
 use super::frf::Mode;
-use super::tool_point::{Holder, ModesHolder, Tool};
+use super::tool_point::{Holder, ModesHolder, ToolDynamics};
 use super::*;
 use crate::campaign::{CutGeometry, Tool as CuttingTool, ToolKind};
 use crate::cutting::{ForceAxis, average_row};
@@ -241,7 +241,7 @@ fn a_tool_adds_its_own_give() {
     let holder = Arc::new(robot_like());
     let point = |segments| ToolPoint {
         holder: holder.clone(),
-        tool: Arc::new(Tool::new(ToolBeam { segments })),
+        tool: Arc::new(ToolDynamics::new(ToolBeam { segments })),
     };
     let bare = point(vec![]);
     let tool = carbide(0.08, 0.01);
@@ -269,7 +269,7 @@ fn neither_the_robots_nor_the_tools_modes_are_lost() {
         slim.loss_factor = 0.002;
         let point = ToolPoint {
             holder: Arc::new(robot_like()),
-            tool: Arc::new(Tool::new(ToolBeam { segments: vec![slim] })),
+            tool: Arc::new(ToolDynamics::new(ToolBeam { segments: vec![slim] })),
         };
         let force = RegenerativeForce::drilling_lateral(KTC, 619.9, 1.178, LIPS).unwrap();
         let frf = point.lateral();
@@ -292,7 +292,7 @@ fn neither_the_robots_nor_the_tools_modes_are_lost() {
     let chatter_hz = |length_m, diameter_m| {
         let point = ToolPoint {
             holder: Arc::new(robot_like()),
-            tool: Arc::new(Tool::new(ToolBeam {
+            tool: Arc::new(ToolDynamics::new(ToolBeam {
                 segments: vec![carbide(length_m, diameter_m)],
             })),
         };

@@ -27,15 +27,20 @@ pub trait DirectFrf: Sync {
 pub struct AxisMode {
     /// 0 = first axis (x), 1 = second axis (y).
     pub axis: usize,
+    /// Undamped natural frequency, Hz.
     pub frequency_hz: f64,
+    /// Viscous damping ratio ζ.
     pub damping_ratio: f64,
+    /// Modal stiffness k, N/m (N·m/rad for a rotation).
     pub stiffness_n_per_m: f64,
 }
 
 /// A mode with its mass-normalised shape at the tool point: H = φ φᵀ / (ω_n² − ω² + 2iζω_nω).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mode {
+    /// Undamped natural frequency ω_n, rad/s.
     pub omega_n_rad_per_s: f64,
+    /// Viscous damping ratio ζ.
     pub damping_ratio: f64,
     /// Mass-normalised displacement in the two axes, kg^−½.
     pub shape: [f64; 2],
@@ -125,6 +130,7 @@ impl ModalFrf {
         Ok(self)
     }
 
+    /// The modes of the sum.
     pub fn modes(&self) -> &[Mode] {
         &self.modes
     }

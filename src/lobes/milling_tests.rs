@@ -1,4 +1,4 @@
-//! The time-periodic milling methods against published and independently computed limits (references.md, A to C).
+//! The time-periodic milling methods against published and independently computed limits.
 
 use std::f64::consts::PI;
 
@@ -116,7 +116,7 @@ fn the_zero_order_solution_misses_the_flip_lobe() {
 #[test]
 fn two_modes_an_axis_are_within_a_hundredth_of_the_table() {
     let force = PeriodicForce::new(1319.4, 788.8, 2, down(0.5), None).unwrap();
-    // references.md says 0.882 at 5000 rpm, which no method here gives: converged multi-frequency solutions (15 to 70
+    // The independent table says 0.882 at 5000 rpm, which no method here gives: converged multi-frequency solutions (15 to 70
     // lines) give 0.871, and multipliers counted by the argument principle on the exact characteristic function put the
     // boundary between 0.868 and 0.873.
     let rows = [

@@ -24,7 +24,7 @@ const BEYOND: f64 = 2.0;
 const MATTERS: f64 = 0.03;
 /// Eigenvalues below this share of a θ's greatest are limits too deep to be the least one.
 const SHARE: f64 = 0.03;
-/// Even steps of θ beside those that resonances ask for.
+/// Even steps of θ, in addition to those that resonances ask for.
 const EVEN_STEPS: usize = 32;
 /// An eigenvalue may move by this share of itself between neighbouring θ …
 const STEP: f64 = 0.4;
@@ -114,6 +114,7 @@ impl Crossing {
 }
 
 impl<'a> MultiFrequency<'a> {
+    /// The limit of a periodic force on a structure that is given by its FRF.
     pub fn new(force: PeriodicForce, frf: &'a dyn DirectFrf) -> Self {
         let matters = frequencies_that_matter(frf);
         let highest = matters.last().copied().unwrap_or(frf.band_hz().1);

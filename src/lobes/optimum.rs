@@ -51,7 +51,9 @@ pub const AGREEMENT: f64 = 0.01;
 /// A place on the surface: the least limit within the speed margin there.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SurfacePoint {
+    /// Spindle speed, rpm.
     pub spindle_rpm: f64,
+    /// Redundancy angle, degrees.
     pub angle_deg: f64,
     /// Least limit within ±2 % of the speed.
     pub depth_mm: f64,
@@ -172,10 +174,13 @@ fn deepest_near(method: &dyn SpeedLimit, spindle_rpm: f64, [low, high]: [f64; 2]
 
 /// Where the deepest place is sought.
 pub struct Search<'a> {
+    /// The limit over speed and angle.
     pub surface: &'a dyn LimitAtAngle,
     /// Angles in even steps that can be used, ascending, degrees.
     pub usable_deg: &'a [f64],
+    /// Step of those angles, degrees.
     pub step_deg: f64,
+    /// Lowest and highest spindle speed, rpm.
     pub rpm_range: [f64; 2],
 }
 

@@ -2,33 +2,40 @@
 
 use serde::Serialize;
 
-use crate::campaign::{Campaign, CutGeometry, CutOutcome, LobesSection};
+use crate::campaign::CutOutcome;
 
 /// A cut as a point of the diagram.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NotedCut {
+    /// The cut's id in the campaign.
     pub id: String,
     /// Where the robot stood; `None` where the campaign does not say.
     pub posture: Option<String>,
+    /// Spindle speed, rpm.
     pub spindle_rpm: f64,
     /// As the limit counts it: axial depth in milling, (diameter − pilot diameter)/2 in drilling.
     pub depth_mm: f64,
+    /// Whether it chattered.
     pub outcome: CutOutcome,
 }
 
 /// A cut with a noted outcome that the diagram says nothing about.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NotCompared {
+    /// The cut's id in the campaign.
     pub id: String,
+    /// Why, in words.
     pub reason: String,
 }
 
 /// Where the limit may lie at one speed, mm; `None` is no limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LimitRange {
+    /// The limit of the nominal model.
     pub limit_mm: Option<f64>,
     /// From the model's uncertainty (see [`super::band`]), widened to hold the limit itself.
     pub lower_mm: Option<f64>,
+    /// Upper end of the range.
     pub upper_mm: Option<f64>,
 }
 
@@ -61,27 +68,38 @@ impl LimitRange {
     }
 }
 
+/// What the limit says of a cut that was made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
+    /// Outside the range that the model leaves open, on the side that the model says.
     Agree,
+    /// Outside that range, on the other side.
     Disagree,
     /// Between the lower and the upper limit: the model cannot say.
     WithinBand,
 }
 
-/// One cut beside the limit at its speed.
+/// One cut compared with the limit at its speed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ScoredCut {
+    /// The cut's id in the campaign.
     pub id: String,
+    /// Where the robot stood; `None` where the campaign does not say.
     pub posture: Option<String>,
+    /// Spindle speed, rpm.
     pub spindle_rpm: f64,
+    /// Depth as the limit counts it, mm (see [`NotedCut::depth_mm`]).
     pub depth_mm: f64,
+    /// Whether it chattered.
     pub outcome: CutOutcome,
     /// `None`: no limit at this speed.
     pub limit_mm: Option<f64>,
+    /// Lower end of where the limit may lie, mm.
     pub lower_mm: Option<f64>,
+    /// Upper end of where the limit may lie, mm; `None`: no limit.
     pub upper_mm: Option<f64>,
+    /// Whether the lobes agree with it.
     pub verdict: Verdict,
     /// What follows where the cut does not agree; for people.
     pub meaning: Option<String>,
@@ -92,73 +110,22 @@ pub struct ScoredCut {
 pub struct Outcomes {
     /// Outside the range that the model leaves open, and as it says.
     pub agree: usize,
+    /// Outside the range, and not as the model says.
     pub disagree: usize,
+    /// Inside the range: the model cannot say.
     pub within_band: usize,
     /// Against the limit alone.
     pub stable_below_limit: usize,
+    /// Stable cuts deeper than the limit.
     pub stable_above_limit: usize,
+    /// Cuts with chatter deeper than the limit.
     pub chatter_above_limit: usize,
+    /// Cuts with chatter not deeper than the limit.
     pub chatter_below_limit: usize,
+    /// Every cut that was compared.
     pub cuts: Vec<ScoredCut>,
+    /// Cuts with an outcome that could not be compared.
     pub not_compared: Vec<NotCompared>,
-}
-
-/// The cuts with an outcome, and those of them that are no points of the diagram that the campaign asks for.
-pub fn noted_cuts(campaign: &Campaign, section: &LobesSection) -> (Vec<NotedCut>, Vec<NotCompared>) {
-    let (mut noted, mut left_out) = (Vec::new(), Vec::new());
-    for cut in &campaign.cuts {
-        let Some(outcome) = cut.outcome else { continue };
-        let tool = campaign.tool.as_ref();
-        // Half a thousandth of a degree: angles are written in degrees.
-        let same_angle = |a: f64, b: f64| (a - b).abs() < 1e-5;
-        let reason = if cut.geometry.process() != section.process {
-            Some("it is of another process than the lobes")
-        } else if section
-            .teeth
-            .is_some_and(|teeth| tool.is_some_and(|t| t.teeth != teeth))
-        {
-            Some("it was made with [tool], whose number of teeth is not that of the lobes")
-        } else if section.ktc_n_per_mm2.is_none()
-            && campaign.material.is_some()
-            && cut.material != campaign.material
-        {
-            Some("it is of another material than the lobes")
-        } else {
-            match (cut.geometry, section.immersion) {
-                (CutGeometry::Milling { immersion: cut, .. }, Some(lobes))
-                    if !(same_angle(cut.start_rad, lobes.start_rad)
-                        && same_angle(cut.exit_rad, lobes.exit_rad)) =>
-                {
-                    Some("its immersion is not that of the lobes")
-                }
-                _ => None,
-            }
-        };
-        let depth_mm = match cut.geometry {
-            CutGeometry::Milling { axial_depth_mm, .. } => Some(axial_depth_mm),
-            CutGeometry::Drilling {
-                pilot_diameter_mm, ..
-            } => tool.map(|t| 0.5 * (t.diameter_mm - pilot_diameter_mm)),
-            CutGeometry::Turning { depth_of_cut_mm, .. } => Some(depth_of_cut_mm),
-        };
-        match (reason, depth_mm) {
-            (None, Some(depth_mm)) => noted.push(NotedCut {
-                id: cut.id.clone(),
-                posture: cut
-                    .posture
-                    .and_then(|p| campaign.postures.get(p))
-                    .map(|p| p.id.clone()),
-                spindle_rpm: cut.spindle_rpm,
-                depth_mm,
-                outcome,
-            }),
-            (reason, _) => left_out.push(NotCompared {
-                id: cut.id.clone(),
-                reason: reason.unwrap_or("its depth is not known").into(),
-            }),
-        }
-    }
-    (noted, left_out)
 }
 
 impl Outcomes {

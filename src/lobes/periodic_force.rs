@@ -24,6 +24,7 @@ const FLANK_FRICTION: f64 = 0.3;
 pub struct ProcessDamping {
     /// C, N/m (0.61e6 for AISI 1045 in the source).
     pub coefficient_n_per_m: f64,
+    /// Diameter of the tool, mm; with the spindle speed it gives the cutting speed.
     pub tool_diameter_mm: f64,
 }
 
@@ -32,6 +33,7 @@ pub struct ProcessDamping {
 pub struct PeriodicForce {
     ktc_n_per_m2: f64,
     krc_n_per_m2: f64,
+    /// Number of teeth.
     pub teeth: usize,
     immersion: Immersion,
     damping: Option<ProcessDamping>,

@@ -15,6 +15,7 @@ use crate::robot::{IkReference, InverseKinematics, RobotModel};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum AngleStatus {
+    /// On the posture's branch, within the joint limits.
     Reachable,
     /// Within a forbidden band of the campaign.
     Forbidden,
@@ -27,6 +28,7 @@ pub enum AngleStatus {
 pub struct AnglePosture {
     /// 0 to below 360; 0 is the posture to keep.
     pub angle_deg: f64,
+    /// Whether the cut can be made here.
     pub status: AngleStatus,
     /// `None` where unreachable.
     pub joints_deg: Option<Vec<f64>>,
@@ -46,6 +48,7 @@ pub struct RedundancySweep<'a> {
     tool: Isometry3<f64>,
     reference: IkReference,
     forbidden_deg: Vec<[f64; 2]>,
+    /// How the robot stands at each angle, ascending.
     pub angles: Vec<AnglePosture>,
 }
 
@@ -55,7 +58,7 @@ impl<'a> RedundancySweep<'a> {
     /// with seven joints stands turned from that of the posture.
     ///
     /// # Errors
-    /// A robot of fewer than six joints or more than seven, a posture at a singularity, an elbow where there is none.
+    /// A robot of fewer than six joints or more than seven, a posture at a singularity, an elbow angle for an arm without one.
     pub fn new(
         robot: &'a RobotModel,
         joints_deg: &[f64],
@@ -146,6 +149,7 @@ impl<'a> RedundancySweep<'a> {
         self.at(angle_deg, &reference)
     }
 
+    /// The robot that is swept.
     pub fn robot(&self) -> &RobotModel {
         self.robot
     }
@@ -168,20 +172,25 @@ pub(super) fn in_forbidden_band(forbidden_deg: &[[f64; 2]], angle_deg: f64) -> b
 /// What the surface says to do.
 #[derive(Debug, Clone, Serialize)]
 pub struct Recommendation {
+    /// Speed and angle to use, with the limit there.
     pub point: SurfacePoint,
     /// The limit at exactly that speed.
     pub tip_depth_mm: Option<f64>,
     /// The 5 % quantile of `point.depth_mm` over the model's uncertainty, mm; `None` without a calibration.
     pub lower_quantile_mm: Option<f64>,
+    /// How the robot stands at that angle.
     pub posture: AnglePosture,
+    /// Absolute stability limit at that angle; `None` where nothing is limited.
     pub absolute_limit: Option<AbsoluteLimit>,
     /// Best of the enumeration, refined.
     pub enumeration: SurfacePoint,
     /// Best of the particle swarm.
     pub swarm: SurfacePoint,
+    /// Whether enumeration and swarm found the same depth (to [`super::optimum::AGREEMENT`]).
     pub agree: bool,
     /// Difference of the two depths as a share of the deeper one.
     pub difference: f64,
+    /// Share of the speed by which it may be off on either side.
     pub speed_margin: f64,
 }
 

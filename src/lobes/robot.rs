@@ -36,6 +36,7 @@ pub fn lobe_axes(tool_axis: Vector3<f64>) -> [Vector3<f64>; 2] {
 }
 
 impl RobotFrf {
+    /// The receptance of the tool centre point in the two axes across the tool ([`lobe_axes`]).
     pub fn new(robot: &RobotModel, kinematics: &Kinematics, chain: &Chain) -> Result<Self> {
         let rows = lobe_axes(kinematics.tool_axis())
             .map(|axis| chain.output_row(kinematics.tcp(), robot.flange_place(), true, &axis));
@@ -59,7 +60,7 @@ impl RobotFrf {
         let frequencies = natural_frequencies_hz(&system)?;
         let band_hz = band_around(frequencies.iter().copied())
             .ok_or_else(|| Error::computation("lobes need at least one mode"))?;
-        // Only the density of the grid hangs on this; chains without modal damping get a narrow guess.
+        // Only the density of the grid depends on this; chains without modal damping get a narrow guess.
         let zeta = system.modal_damping_ratio.value;
         let zeta = if zeta > 0.0 { zeta } else { 0.01 };
         let resonances = frequencies.into_iter().map(|f| (f, zeta)).collect();

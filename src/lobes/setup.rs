@@ -1,22 +1,18 @@
-//! What a campaign's `[lobes]` table asks for, as a force and an FRF.
+//! What a `[lobes]` table asks for, as a force and a tool.
 
 use super::blocks::AveragedCut;
 use super::force::RegenerativeForce;
-use super::frf::{AxisMode, ModalFrf, Mode};
-use super::periodic_force::{PeriodicForce, ProcessDamping};
+use super::periodic_force::PeriodicForce;
 use super::tool_beam::{BeamSegment, ToolBeam};
-use super::tool_point::ModesHolder;
-use crate::analysis::force_records::identify_forces;
-use crate::campaign::{
-    Campaign, CutGeometry, LobeAxis, LobeMethod, LobeMode, LobesSection, Process, Tool, ToolKind, ToolSegment,
-};
-use crate::cutting::{CfcOptions, DrillGeometry, ForceGroup};
-use crate::{Error, InputError, Result};
+use crate::campaign::{CutGeometry, LobesSection, Tool, ToolSegment};
+use crate::cutting::DrillGeometry;
 
 /// Cutting coefficients that lobes need, N/mm².
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LobeCoefficients {
+    /// Tangential coefficient Ktc, N/mm².
     pub ktc_n_per_mm2: f64,
+    /// Radial coefficient Krc (drilling: the part of Kfc in the plane of the lobes), N/mm².
     pub krc_n_per_mm2: f64,
     /// Drilling: thrust per chip area, Kac = Kfc sin κ; for the axial–torsional block.
     pub kac_n_per_mm2: Option<f64>,
@@ -33,206 +29,21 @@ impl LobeCoefficients {
     }
 }
 
-fn lacks_coefficients(campaign: &Campaign, problem: impl Into<String>) -> Error {
-    InputError::new(problem)
-        .file(campaign.dir.join("campaign.toml"))
-        .key("lobes.ktc_n_per_mm2")
-        .remedy("give ktc_n_per_mm2 and krc_n_per_mm2, or add cuts at two feeds or more")
-        .into()
-}
-
-/// The coefficients of the campaign's own cuts of the same process and material, all speeds pooled.
-///
-/// # Errors
-/// No cuts of that process, or several materials of which none is named.
-pub fn group_of_cuts(
-    campaign: &Campaign,
-    section: &LobesSection,
-    warnings: &mut Vec<String>,
-) -> Result<ForceGroup> {
-    let lacks = |problem: &str| lacks_coefficients(campaign, problem);
-    if campaign.cuts.is_empty() {
-        return Err(lacks(
-            "the coefficients are not given and the campaign has no cuts",
-        ));
-    }
-    let cuts = identify_forces(campaign, CfcOptions::default())?;
-    warnings.extend(cuts.warnings.iter().cloned());
-    let of_process = || {
-        cuts.pooled
-            .iter()
-            .filter(|group| group.process == section.process)
-    };
-    match of_process().count() {
-        0 => return Err(lacks("the campaign has no cuts of the lobes' process")),
-        1 => of_process().next(),
-        // Of several materials the campaign's own one counts.
-        _ => of_process().find(|group| group.material.is_some() && group.material == campaign.material),
-    }
-    .cloned()
-    .ok_or_else(|| lacks("the cuts are of several materials and [material] names none of them"))
-}
-
-/// Ktc and Krc of a group of cuts.
-///
-/// A drilling regression gives the force normal to the lip, Kfc; its part in the plane of the lobes is Kfc cos κ
-/// (κ: half point angle), the axial part Kfc sin κ.
-///
-/// # Errors
-/// Cuts that do not determine the coefficients.
-pub fn coefficients_of_group(
-    campaign: &Campaign,
-    section: &LobesSection,
-    group: &ForceGroup,
-) -> Result<LobeCoefficients> {
-    let value = |label: &str| {
-        group.coefficient(label).and_then(|c| c.value).ok_or_else(|| {
-            let problem = format!("the campaign's cuts do not determine {label}");
-            lacks_coefficients(campaign, problem)
-        })
-    };
-    let (krc_n_per_mm2, kac_n_per_mm2) = match section.process {
-        Process::Milling | Process::Turning => (value("Krc")?, None),
-        Process::Drilling => {
-            let (kfc, kappa) = (value("Kfc")?, half_point_angle_rad(campaign, section)?);
-            (kfc * kappa.cos(), Some(kfc * kappa.sin()))
-        }
-    };
-    Ok(LobeCoefficients {
-        ktc_n_per_mm2: value("Ktc")?,
-        krc_n_per_mm2,
-        kac_n_per_mm2,
-    })
-}
-
-pub(super) fn half_point_angle_rad(campaign: &Campaign, section: &LobesSection) -> Result<f64> {
-    let tool = campaign.tool.as_ref();
-    section
-        .half_point_angle_deg
-        .or(tool.and_then(|t| t.half_point_angle_deg))
-        .map(f64::to_radians)
-        .ok_or_else(|| {
-            InputError::new("drilling lobes need the half point angle")
-                .file(campaign.dir.join("campaign.toml"))
-                .key("lobes.half_point_angle_deg")
-                .remedy("give it here or in [tool]; a 135° point has 67.5")
-                .into()
-        })
-}
-
 /// The force of a cut, as the method wants it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Cut {
+pub enum LobeCut {
     /// Zero-order milling, drilling and turning.
     Averaged(AveragedCut),
     /// Milling with its true dependence on time.
     Periodic(PeriodicForce),
 }
 
-impl Cut {
+impl LobeCut {
     /// The forces averaged over a revolution.
     pub fn average(&self) -> AveragedCut {
         match self {
-            Cut::Averaged(cut) => *cut,
-            Cut::Periodic(force) => force.average().into(),
-        }
-    }
-}
-
-/// The regenerative force of the campaign's `[lobes]` table and `[tool]`.
-///
-/// # Errors
-/// Where the table lacks something the process needs, or asks for a method that is not here.
-pub fn cut_of(campaign: &Campaign, section: &LobesSection, coefficients: LobeCoefficients) -> Result<Cut> {
-    let lacks = |key: &str, problem: &str, remedy: &str| -> Error {
-        InputError::new(problem)
-            .file(campaign.dir.join("campaign.toml"))
-            .key(key)
-            .remedy(remedy)
-            .into()
-    };
-    let tool = campaign.tool.as_ref();
-    if let Some(tool) = tool
-        && (tool.kind == ToolKind::Turning) != (section.process == Process::Turning)
-    {
-        return Err(lacks(
-            "lobes.process",
-            &format!(
-                "the lobes are of {}, and [tool] is {} tool",
-                section.process.name(),
-                match tool.kind {
-                    ToolKind::Turning => "a turning",
-                    ToolKind::Endmill | ToolKind::Drill => "no turning",
-                }
-            ),
-            "choose the process of the tool, or take [tool] or [lobes] out",
-        ));
-    }
-    let one_edge = (section.process == Process::Turning).then_some(1);
-    let teeth = one_edge
-        .or(section.teeth)
-        .or(tool.map(|t| t.teeth))
-        .ok_or_else(|| {
-            lacks(
-                "lobes.teeth",
-                "the number of teeth is not known",
-                "give it here or in [tool]",
-            )
-        })?;
-    let LobeCoefficients {
-        ktc_n_per_mm2,
-        krc_n_per_mm2,
-        ..
-    } = coefficients;
-    match section.process {
-        Process::Milling => {
-            let immersion = section.immersion.ok_or_else(|| {
-                lacks(
-                    "lobes.immersion",
-                    "milling lobes need the immersion",
-                    "give immersion = \"slot\", start_deg and exit_deg, or radial_ratio with cut = \"up\" or \"down\"",
-                )
-            })?;
-            let averaged = section.method == LobeMethod::ZeroOrder;
-            let damping = match section.process_damping_n_per_m.filter(|c| *c > 0.0) {
-                None => None,
-                Some(_) if averaged => {
-                    return Err(lacks(
-                        "lobes.process_damping_n_per_m",
-                        "the zero-order method has no process damping",
-                        "use method = \"multi-frequency\" or \"semi-discretisation\", or take it out",
-                    ));
-                }
-                Some(coefficient_n_per_m) => Some(ProcessDamping {
-                    coefficient_n_per_m,
-                    tool_diameter_mm: tool.map(|t| t.diameter_mm).ok_or_else(|| {
-                        lacks(
-                            "tool.diameter_mm",
-                            "process damping needs the cutting speed, and the tool's diameter is not known",
-                            "add a [tool] table",
-                        )
-                    })?,
-                }),
-            };
-            let force = PeriodicForce::new(ktc_n_per_mm2, krc_n_per_mm2, teeth, immersion, damping)?;
-            Ok(match averaged {
-                true => Cut::Averaged(force.average().into()),
-                false => Cut::Periodic(force),
-            })
-        }
-        Process::Drilling => RegenerativeForce::drilling_lateral(
-            ktc_n_per_mm2,
-            krc_n_per_mm2,
-            half_point_angle_rad(campaign, section)?,
-            teeth,
-        )
-        .map(|lateral| Cut::Averaged(lateral.into())),
-        Process::Turning => {
-            let kappa_deg = tool
-                .filter(|t| t.kind == ToolKind::Turning)
-                .map_or(90.0, |t| t.lead_angle_deg);
-            RegenerativeForce::turning(krc_n_per_mm2, kappa_deg.to_radians())
-                .map(|force| Cut::Averaged(force.into()))
+            LobeCut::Averaged(cut) => *cut,
+            LobeCut::Periodic(force) => force.average().into(),
         }
     }
 }
@@ -251,8 +62,8 @@ impl DrilledHole {
     ///
     /// In the full the lips begin at the chisel's half length where the web is known (see
     /// [`crate::cutting::DrillGeometry`]), else at the axis.
-    pub fn of(campaign: &Campaign, section: &LobesSection) -> Option<Self> {
-        let tool = campaign.tool.as_ref()?;
+    pub fn of(tool: Option<&Tool>, section: &LobesSection) -> Option<Self> {
+        let tool = tool?;
         let hole = section.hole.as_ref();
         let geometry = CutGeometry::Drilling {
             feed_per_rev_mm: section.feed_per_rev_mm.unwrap_or(0.0),
@@ -277,7 +88,7 @@ impl DrilledHole {
 /// # Errors
 /// In words for people: what is missing, and what to give.
 pub fn axial_torsional_force(
-    campaign: &Campaign,
+    tool: Option<&Tool>,
     section: &LobesSection,
     coefficients: LobeCoefficients,
     teeth: usize,
@@ -285,7 +96,7 @@ pub fn axial_torsional_force(
     let kac = coefficients
         .kac_n_per_mm2
         .ok_or("the thrust coefficient is not known: give lobes.kac_n_per_mm2")?;
-    let hole = DrilledHole::of(campaign, section)
+    let hole = DrilledHole::of(tool, section)
         .ok_or("the arm of the torque is not known: add a [tool] table with the drill's diameter_mm")?;
     let feed_m = 1e-3 * section.feed_per_rev_mm.unwrap_or(0.0);
     let ktc = coefficients.ktc_n_per_mm2;
@@ -308,62 +119,4 @@ pub fn tool_beam(section: &LobesSection) -> ToolBeam {
     ToolBeam {
         segments: section.tool.iter().map(segment).collect(),
     }
-}
-
-/// The modes of the `[[lobes.mode]]` table: x and y for the lateral block, z and theta for the axial–torsional one.
-///
-/// # Errors
-/// Where the table has no lateral mode, or one that is no damped mode.
-pub fn modes_of_table(campaign: &Campaign, section: &LobesSection) -> Result<ModesHolder> {
-    let of_axes = |axes: [LobeAxis; 2]| -> Vec<AxisMode> {
-        let on = |mode: &LobeMode| axes.iter().position(|a| *a == mode.axis);
-        let modes = section.modes.iter();
-        modes
-            .filter_map(|mode| {
-                Some(AxisMode {
-                    axis: on(mode)?,
-                    frequency_hz: mode.frequency_hz,
-                    damping_ratio: mode.damping_ratio,
-                    stiffness_n_per_m: mode.stiffness_n_per_m,
-                })
-            })
-            .collect()
-    };
-    let lateral = of_axes([LobeAxis::X, LobeAxis::Y]);
-    if lateral.is_empty() {
-        return Err(
-            InputError::new("source = \"modes\" needs at least one mode in x or y")
-                .file(campaign.dir.join("campaign.toml"))
-                .key("lobes.mode")
-                .remedy(
-                    "add a [[lobes.mode]] table with axis, frequency_hz, damping_ratio and stiffness_n_per_m",
-                )
-                .into(),
-        );
-    }
-    let axial = of_axes([LobeAxis::Z, LobeAxis::Theta]);
-    let axial = match axial.is_empty() {
-        true => None,
-        false => {
-            let frf = ModalFrf::from_axis_modes(&axial)?;
-            let table = section.modes.iter();
-            let extensions = table
-                .filter(|m| matches!(m.axis, LobeAxis::Z | LobeAxis::Theta))
-                .map(|m| 1e-3 * m.extension_mm_per_rad);
-            // Unwinding is a turn against the rotation, and the longer drill reaches deeper.
-            let modes = frf
-                .modes()
-                .iter()
-                .zip(extensions)
-                .map(|(mode, extension_m)| Mode {
-                    shape: [mode.shape[0] - extension_m * mode.shape[1], mode.shape[1]],
-                    ..*mode
-                });
-            Some(ModalFrf::from_mode_shapes(modes.collect(), [[0.0; 2]; 2])?)
-        }
-    };
-    Ok(ModesHolder {
-        lateral: ModalFrf::from_axis_modes(&lateral)?,
-        axial,
-    })
 }

@@ -26,6 +26,7 @@ const NOT_A_ROOT: f64 = 1e-7;
 const VERTEX_MARGIN: f64 = 0.01;
 
 impl<'a> StabilitySolver<'a> {
+    /// The limit of an averaged force on a structure that is given by its FRF.
     pub fn new(force: RegenerativeForce, frf: &'a dyn DirectFrf) -> Self {
         Self::with_halved_seeds(force, frf, 0)
     }
@@ -43,7 +44,7 @@ impl<'a> StabilitySolver<'a> {
 
     /// Lobes as a program finds them that starts at another lobe than k = 0, or has ωT = 2π(k + `extra_turns`) + ε (½:
     /// the delayed term has the wrong sign). Not for cuts: to see whether such a slip explains somebody's numbers.
-    pub(super) fn with_lobes(mut self, first_lobe: f64, extra_turns: f64) -> Self {
+    pub(crate) fn with_lobes(mut self, first_lobe: f64, extra_turns: f64) -> Self {
         (self.first_lobe, self.extra_turns) = (first_lobe, extra_turns);
         self
     }

@@ -23,18 +23,22 @@ pub type Receptance6 = Matrix6<Complex64>;
 /// A stretch of the tool of one section and material.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BeamSegment {
+    /// Length along the tool axis, m.
     pub length_m: f64,
     /// Of the round bar that is as stiff; for a fluted stretch less than the tool's own (about 0.8 of it for end mills:
     /// Kops & Vo 1990, Annals of the CIRP 39(1)).
     pub diameter_m: f64,
     /// Bore; 0 is solid.
     pub bore_m: f64,
+    /// Young's modulus E, Pa.
     pub young_pa: f64,
+    /// Shear modulus G, Pa.
     pub shear_pa: f64,
+    /// Density, kg/m³.
     pub density_kg_per_m3: f64,
     /// η in E (1 + iη), G (1 + iη).
     pub loss_factor: f64,
-    /// How twist and stretch of a helical stretch hang together, −1 < c < 1: tension N = EA z' + c √(EA·GJ) θ', torque
+    /// How twist and stretch of a helical segment are coupled, −1 < c < 1: tension N = EA z' + c √(EA·GJ) θ', torque
     /// T = c √(EA·GJ) z' + GJ θ'. Positive where unwinding by the cutting torque makes the drill longer.
     pub twist_coupling: f64,
 }
@@ -48,6 +52,7 @@ const TERMS: u32 = 20;
 const GROWTH: f64 = 6.0;
 
 impl BeamSegment {
+    /// Area of the cross-section, m².
     pub fn area_m2(&self) -> f64 {
         FRAC_PI_4 * (self.diameter_m.powi(2) - self.bore_m.powi(2))
     }
@@ -185,10 +190,12 @@ impl Stretch {
 /// The tool from the holder face to the tip; without segments the tip is at the holder face.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ToolBeam {
+    /// From the holder face to the tip.
     pub segments: Vec<BeamSegment>,
 }
 
 impl ToolBeam {
+    /// Length of all segments, m.
     pub fn length_m(&self) -> f64 {
         self.segments.iter().map(|s| s.length_m).sum()
     }

@@ -61,7 +61,7 @@ impl RobotHolder {
         let frequencies = natural_frequencies_hz(&system)?;
         let band_hz = band_around(frequencies.iter().copied())
             .ok_or_else(|| Error::computation("lobes need at least one mode"))?;
-        // As in RobotFrf: only the density of the grid hangs on this.
+        // As in RobotFrf: only the density of the grid depends on this.
         let zeta = system.modal_damping_ratio.value;
         let zeta = if zeta > 0.0 { zeta } else { 0.01 };
         Ok(RobotHolder {
@@ -94,9 +94,11 @@ impl Holder for RobotHolder {
 /// else zero: the holder face then does not turn. Above the last line the holder is a free mass (∝ 1/f²), below the first
 /// a spring.
 pub struct MeasuredHolder {
+    /// Measured receptances in x and y.
     pub lateral: SampledFrf,
     /// Entry 00 is along the tool axis, away from and towards the workpiece alike.
     pub axial: Option<SampledFrf>,
+    /// The robot model at the holder face, for what was not measured.
     pub model: Option<RobotHolder>,
 }
 
@@ -134,6 +136,7 @@ impl Holder for MeasuredHolder {
 
 /// Modes in x and y, and in z and θ: rotations about x and y are rigid.
 pub struct ModesHolder {
+    /// Modes in x and y, m/N.
     pub lateral: ModalFrf,
     /// First axis: along the tool, m/N; second: about it, rad/(N·m).
     pub axial: Option<ModalFrf>,
@@ -173,7 +176,8 @@ impl Holder for ModesHolder {
 
 /// A tool beam with the frequencies that are worth looking at.
 #[derive(Debug, Clone, Default)]
-pub struct Tool {
+pub struct ToolDynamics {
+    /// The tool as a beam.
     pub beam: ToolBeam,
     /// Of the tool clamped at the holder face, Hz: bending, and tension and twist.
     pub clamped_hz: [Vec<f64>; 2],
@@ -192,10 +196,11 @@ const BELOW: f64 = 0.3;
 /// … in steps of this share: closer than where the flank of any resonance that matters shows.
 const STEP: f64 = 0.015;
 
-impl Tool {
+impl ToolDynamics {
+    /// Finds the frequencies of the clamped tool.
     pub fn new(beam: ToolBeam) -> Self {
         if beam.segments.is_empty() {
-            return Tool::default();
+            return ToolDynamics::default();
         }
         let clamped_hz = beam.clamped_hz(HIGHEST_HZ);
         let highest = clamped_hz
@@ -203,7 +208,7 @@ impl Tool {
             .zip(MODES)
             .filter_map(|(f, count)| f.iter().take(count).next_back())
             .fold(0.0, |a: f64, b| a.max(*b));
-        Tool {
+        ToolDynamics {
             beam,
             top_hz: if highest > 0.0 {
                 (ABOVE * highest).min(HIGHEST_HZ)
@@ -235,8 +240,10 @@ impl Tool {
 /// Holder and tool, coupled at the holder face.
 #[derive(Clone)]
 pub struct ToolPoint {
+    /// What the tool is clamped in.
     pub holder: Arc<dyn Holder>,
-    pub tool: Arc<Tool>,
+    /// The tool from the holder face on.
+    pub tool: Arc<ToolDynamics>,
 }
 
 impl ToolPoint {
@@ -246,6 +253,7 @@ impl ToolPoint {
         self.tool.beam.tip(&root, frequency_hz)
     }
 
+    /// The FRFs that a cut meets; with the axial–torsional block where `axial`.
     pub fn blocks(&self, axial: bool) -> Blocks {
         Blocks {
             lateral: Box::new(self.lateral()),

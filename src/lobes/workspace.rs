@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use serde::Serialize;
 
 use super::redundancy::in_forbidden_band;
-use super::workspace_grid::Place;
+use super::workspace_grid::GridPlace;
 use crate::Result;
 use crate::robot::{IkReference, IkSolution, InverseKinematics, RobotModel};
 
@@ -12,6 +12,7 @@ use crate::robot::{IkReference, IkSolution, InverseKinematics, RobotModel};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PlaceStatus {
+    /// Within the joint limits and far enough from a singularity.
     Reachable,
     /// Within a forbidden band of the redundancy angle.
     Forbidden,
@@ -24,6 +25,7 @@ pub enum PlaceStatus {
 }
 
 impl PlaceStatus {
+    /// In the order in which tables list them.
     pub const ALL: [PlaceStatus; 5] = [
         PlaceStatus::Reachable,
         PlaceStatus::Forbidden,
@@ -50,6 +52,7 @@ pub struct Workspace<'a> {
     reference: IkReference,
     /// Tool frame of the posture: its x axis is where the redundancy angle counts from.
     tool: Isometry3<f64>,
+    /// Bands of the redundancy angle that are not used, from and to in degrees.
     pub forbidden_deg: Vec<[f64; 2]>,
     /// Postures nearer to a singularity are not taken (see [`IkSolution::singularity_margin`]).
     pub least_singularity_margin: f64,
@@ -81,7 +84,7 @@ impl<'a> Workspace<'a> {
     /// Tool frame at a place. Angle 0 is the tool frame of the posture, turned by the smallest rotation that takes its
     /// tool axis to the place's; for the posture's own direction the angle is that of
     /// [`RedundancySweep`](super::redundancy::RedundancySweep).
-    pub fn pose(&self, place: &Place) -> Isometry3<f64> {
+    pub fn pose(&self, place: &GridPlace) -> Isometry3<f64> {
         let axis = Vector3::from(place.tool_axis);
         let own = self.tool.rotation * Vector3::z();
         let tilt = UnitQuaternion::rotation_between(&own, &axis).unwrap_or_else(|| {
@@ -101,7 +104,7 @@ impl<'a> Workspace<'a> {
     ///
     /// # Errors
     /// Why there are none.
-    pub fn stand(&self, place: &Place) -> std::result::Result<IkSolution, PlaceStatus> {
+    pub fn stand(&self, place: &GridPlace) -> std::result::Result<IkSolution, PlaceStatus> {
         if in_forbidden_band(&self.forbidden_deg, place.angle_deg) {
             return Err(PlaceStatus::Forbidden);
         }
@@ -153,7 +156,7 @@ mod tests {
         let posture = &TAP_POSTURES[1];
         let workspace = Workspace::new(&robot, posture, &[], 0.0).unwrap();
         let here = robot.kinematics(posture).unwrap();
-        let own = Place {
+        let own = GridPlace {
             index: 0,
             tcp_m: here.tcp().coords.into(),
             tool_axis: here.tool_axis().into(),
@@ -161,7 +164,7 @@ mod tests {
         };
         let sweep = RedundancySweep::new(&robot, posture, 45.0, &[], 0.0).unwrap();
         for angle in &sweep.angles {
-            let place = Place {
+            let place = GridPlace {
                 angle_deg: angle.angle_deg,
                 ..own
             };
@@ -213,13 +216,13 @@ mod tests {
         let posture = &TAP_POSTURES[0];
         let free = RobotModel::new(spec.clone());
         let here = free.kinematics(posture).unwrap();
-        let own = Place {
+        let own = GridPlace {
             index: 0,
             tcp_m: here.tcp().coords.into(),
             tool_axis: here.tool_axis().into(),
             angle_deg: 10.0,
         };
-        let status = |robot: &RobotModel, forbidden: &[[f64; 2]], margin: f64, place: Place| {
+        let status = |robot: &RobotModel, forbidden: &[[f64; 2]], margin: f64, place: GridPlace| {
             let workspace = Workspace::new(robot, posture, forbidden, margin).unwrap();
             workspace.stand(&place).err()
         };
@@ -229,7 +232,7 @@ mod tests {
             Some(PlaceStatus::Forbidden)
         );
         assert_eq!(status(&free, &[], 1.1, own), Some(PlaceStatus::Singular));
-        let far = Place {
+        let far = GridPlace {
             tcp_m: [9.0, 0.0, 1.0],
             ..own
         };

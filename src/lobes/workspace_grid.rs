@@ -16,7 +16,9 @@ const MOST_PLACES: u128 = 20_000_000;
 /// Even steps from one value to another, both included; in m.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Span {
+    /// First value, m.
     pub from_m: f64,
+    /// Last value, m.
     pub to_m: f64,
     /// At least 1; a single value stands at `from_m`.
     pub count: usize,
@@ -83,8 +85,11 @@ impl FromStr for Span {
 /// The places of a map, base frame of the robot.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WorkspaceGrid {
+    /// Along x of the base.
     pub x_m: Span,
+    /// Along y of the base.
     pub y_m: Span,
+    /// Along z of the base.
     pub z_m: Span,
     /// Unit vectors along the tool, from the spindle to the workpiece.
     pub directions: Vec<[f64; 3]>,
@@ -94,11 +99,14 @@ pub struct WorkspaceGrid {
 
 /// One place of a map.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Place {
+pub struct GridPlace {
     /// Number within the grid.
     pub index: usize,
+    /// Tool centre point, base frame, m.
     pub tcp_m: [f64; 3],
+    /// Unit vector along the tool, from the spindle to the workpiece.
     pub tool_axis: [f64; 3],
+    /// Redundancy angle, degrees.
     pub angle_deg: f64,
 }
 
@@ -152,17 +160,19 @@ impl WorkspaceGrid {
         Ok(grid)
     }
 
+    /// Steps of the redundancy angle.
     pub fn angle_count(&self) -> usize {
         steps_of_a_turn(self.angle_step_deg)
     }
 
+    /// Places of the map: points × directions × angles.
     pub fn place_count(&self) -> usize {
         let places = self.x_m.count * self.y_m.count * self.z_m.count;
         places * self.directions.len() * self.angle_count()
     }
 
     /// The place of a number below [`place_count`](Self::place_count).
-    pub fn place(&self, index: usize) -> Place {
+    pub fn place(&self, index: usize) -> GridPlace {
         let mut rest = index;
         let mut next = |count: usize| {
             let here = rest % count;
@@ -173,7 +183,7 @@ impl WorkspaceGrid {
         let z = self.z_m.at_m(next(self.z_m.count));
         let y = self.y_m.at_m(next(self.y_m.count));
         let x = self.x_m.at_m(next(self.x_m.count));
-        Place {
+        GridPlace {
             index,
             tcp_m: [x, y, z],
             tool_axis: self.directions[next(self.directions.len())],
@@ -220,7 +230,7 @@ mod tests {
     fn the_numbering_covers_the_grid() {
         let grid = grid();
         assert_eq!(grid.place_count(), 3 * 2 * 2 * 4);
-        let places: Vec<Place> = (0..grid.place_count()).map(|i| grid.place(i)).collect();
+        let places: Vec<GridPlace> = (0..grid.place_count()).map(|i| grid.place(i)).collect();
         let angles: Vec<f64> = places[..5].iter().map(|p| p.angle_deg).collect();
         assert_eq!(angles, [0.0, 100.0, 200.0, 300.0, 0.0]);
         assert_eq!(places[4].tcp_m, [1.0, -0.5, 1.0]);

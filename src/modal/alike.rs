@@ -10,13 +10,14 @@ use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2};
 use rayon::prelude::*;
 
-use super::ml_fit::{self, Axis, NoisyFrf, SolvedFrf};
+use super::ml_linear::{self, NoisyFrf, PoleColumns, SolvedFrf};
 
 /// Relative difference of noises that is rounding.
 const PROPORTIONAL: f64 = 1e-9;
 /// FRFs taken together by one thread.
 const BLOCK: usize = 12;
 
+/// FRFs on the same lines whose noise differs by a factor only, weighted.
 pub(super) struct Alike {
     /// √2/σ of the first FRF, twice for each line.
     weight: Vec<f64>,
@@ -27,16 +28,16 @@ pub(super) struct Alike {
 }
 
 /// Result of [`Alike::linearise`].
-pub(super) struct Found {
+pub(super) struct AlikeFit {
     pub misfit: f64,
     pub normal: DMatrix<f64>,
     /// Each FRF's part of the gradient.
     pub scores: Vec<DVector<f64>>,
-    pub solved: Solved,
+    pub solved: AlikeLinear,
 }
 
 /// Linear parameters of all FRFs.
-pub(super) struct Solved {
+pub(super) struct AlikeLinear {
     basis: Basis,
     /// L⁻¹ basisᵀ slopes.
     slopes: DMatrix<f64>,
@@ -74,7 +75,7 @@ impl Alike {
             }
             noise.push(factor);
         }
-        let weight = ml_fit::weights(first.sigma);
+        let weight = ml_linear::weights(first.sigma);
         let mut targets = Vec::with_capacity(frfs.len() * weight.len());
         for (frf, noise) in frfs.iter().zip(&noise) {
             let parts = frf.receptance.iter().flat_map(|h| [h.re, h.im]);
@@ -89,14 +90,14 @@ impl Alike {
 
     fn weighted(&self, columns: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; columns.len()];
-        ml_fit::weigh(&mut out, columns, &self.weight);
+        ml_linear::weigh(&mut out, columns, &self.weight);
         out
     }
 
-    fn basis(&self, axis: &Axis) -> Option<Basis> {
+    fn basis(&self, axis: &PoleColumns) -> Option<Basis> {
         let columns = self.weighted(&axis.columns);
         let gram = transposed_product(&columns, &columns, axis.rows);
-        let (cholesky, scale) = ml_fit::unit_cholesky(&gram, gram.ncols(), axis.moving_columns())?;
+        let (cholesky, scale) = ml_linear::unit_cholesky(&gram, gram.ncols(), axis.moving_columns())?;
         Some(Basis {
             columns,
             rows: axis.rows,
@@ -106,7 +107,7 @@ impl Alike {
     }
 
     /// Solution of all FRFs for the poles of an axis, with the normal equations of the poles.
-    pub fn linearise(&self, axis: &Axis) -> Option<Found> {
+    pub fn linearise(&self, axis: &PoleColumns) -> Option<AlikeFit> {
         let rows = axis.rows;
         let basis = self.basis(axis)?;
         let slopes = self.weighted(&axis.slopes);
@@ -165,11 +166,11 @@ impl Alike {
             }
             sum
         });
-        Some(Found {
+        Some(AlikeFit {
             misfit,
             normal,
             scores: scores.clone(),
-            solved: Solved {
+            solved: AlikeLinear {
                 basis,
                 slopes: half,
                 of_slopes,
@@ -180,8 +181,13 @@ impl Alike {
         })
     }
 
-    /// Misfit that each of `trials` poles explains beside those of `held`, all of them where they are.
-    pub fn explained_by(&self, held: &Axis, trial_axis: &Axis, trials: usize) -> Option<Vec<f64>> {
+    /// Misfit that each of `trials` poles explains in addition to those of `held`, all of them where they are.
+    pub fn explained_by(
+        &self,
+        held: &PoleColumns,
+        trial_axis: &PoleColumns,
+        trials: usize,
+    ) -> Option<Vec<f64>> {
         let rows = held.rows;
         let basis = self.basis(held)?;
         let added = self.weighted(&trial_axis.columns[..2 * trials * rows]);
@@ -249,7 +255,7 @@ impl Basis {
         for mut column in products.column_iter_mut() {
             column.component_mul_assign(&self.scale);
         }
-        ml_fit::lower_solve(&self.cholesky, &mut products);
+        ml_linear::lower_solve(&self.cholesky, &mut products);
         products
     }
 
@@ -281,7 +287,7 @@ impl Basis {
     }
 }
 
-impl Solved {
+impl AlikeLinear {
     /// As if FRF `m` had been solved with columns of its own.
     pub fn of_frf(&self, m: usize) -> SolvedFrf {
         let scale = &self.basis.scale;
@@ -311,7 +317,7 @@ impl Solved {
             .collect();
         SolvedFrf {
             own,
-            linear: ml_fit::Solved {
+            linear: ml_linear::Solved {
                 cholesky: self.basis.cholesky.clone(),
                 scale: scale * self.noise[m],
                 x: self.x.column(m).into_owned(),
@@ -324,6 +330,6 @@ impl Solved {
 /// leftᵀ right, both with columns of `rows` values.
 fn transposed_product(left: &[f64], right: &[f64], rows: usize) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(left.len() / rows, right.len() / rows);
-    ml_fit::product(&mut out, left, right, rows);
+    ml_linear::product(&mut out, left, right, rows);
     out
 }

@@ -6,9 +6,11 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::curve::{Curve, MIN_LINES};
-use super::local_fit::{self, Pole, Problem, ROUGHLY_SETTLED, SETTLED, Solution};
-use super::peaks::{self, Peak};
-use super::{FrfMode, FrfModes, Method, ModeEstimate, Settings, circle_fit, half_power};
+use super::frf_modes::{FrfMode, FrfModes, Method, ModeEstimate};
+use super::local_fit::{self, LocalSolution, Pole, Problem, ROUGHLY_SETTLED, SETTLED};
+use super::peaks::{self, FrfPeak};
+use super::settings::Settings;
+use super::{circle_fit, half_power};
 use crate::Result;
 
 /// Half-widths (ζf₀) on either side of a peak that take part in the local fit: the window whose fit is best
@@ -41,7 +43,7 @@ const BRIEF: Effort = Effort {
 const MAX_DAMPING: f64 = 0.5;
 /// A damping estimate scattering by more than this part of itself is no finding (where lines are not too coarse).
 const MAX_RELATIVE_STD: f64 = 0.7;
-/// Where lines are coarse the damping hangs on one or two of them, and leakage between lines comes on top of
+/// Where lines are coarse the damping depends on one or two of them, and leakage between lines comes on top of
 /// the noise: an allowance of this part of the line spacing on the half-power width. (Three measured
 /// free–free beam records at 0.05–0.2 lines in the band differ from each other by about this much.)
 const LEAKAGE_LINES: f64 = 0.02;
@@ -170,13 +172,13 @@ fn analyse(
 
 /// A peak with the first estimate of its pole.
 struct Start {
-    peak: Peak,
+    peak: FrfPeak,
     pole: Pole,
     half_power: Option<half_power::HalfPower>,
 }
 
 impl Start {
-    fn new(curve: &Curve, peak: &Peak, noise_std: f64) -> Start {
+    fn new(curve: &Curve, peak: &FrfPeak, noise_std: f64) -> Start {
         let half_power = half_power::fit(curve, peak.index, noise_std);
         let f = &curve.frequency_hz;
         let f0 = f[peak.index];
@@ -290,9 +292,9 @@ fn mode_at(
 /// Is the fitted pole a mode that this peak shows?
 fn judge(
     curve: &Curve,
-    solution: &Solution,
+    solution: &LocalSolution,
     pole: usize,
-    peak: &Peak,
+    peak: &FrfPeak,
     noise_std: f64,
 ) -> std::result::Result<ModeEstimate, String> {
     let Pole {
@@ -334,8 +336,8 @@ fn judge(
 }
 
 /// The best determined local fit and the position of the peak's pole in it.
-fn local(curve: &Curve, starts: &[Start], index: usize, effort: Effort) -> Option<(Solution, usize)> {
-    let mut best: Option<(f64, Solution, usize)> = None;
+fn local(curve: &Curve, starts: &[Start], index: usize, effort: Effort) -> Option<(LocalSolution, usize)> {
+    let mut best: Option<(f64, LocalSolution, usize)> = None;
     // A window begins where the one before ended.
     let mut poles: Vec<Pole> = starts.iter().map(|s| s.pole).collect();
     for (k, &reach) in effort.windows.iter().enumerate() {
@@ -372,7 +374,7 @@ fn local(curve: &Curve, starts: &[Start], index: usize, effort: Effort) -> Optio
 struct WindowFit<'a> {
     frequency_hz: &'a [f64],
     line_weight: Vec<f64>,
-    solution: Solution,
+    solution: LocalSolution,
     /// Which starts it holds, and the position of the peak's own among them.
     group: Vec<usize>,
     pole: usize,
@@ -508,7 +510,7 @@ fn fit_window<'a>(
 
 /// 1/σ of each line from the model variance = a + b |Y|², a and b ≥ 0 from the residual of a fit.
 /// `None` where there are too few lines to tell.
-fn noise_weights(y: &[Complex64], solution: &Solution) -> Option<Vec<f64>> {
+fn noise_weights(y: &[Complex64], solution: &LocalSolution) -> Option<Vec<f64>> {
     if y.len() < local_fit::FEW_LINES {
         return None;
     }

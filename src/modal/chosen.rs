@@ -5,8 +5,10 @@ use std::f64::consts::TAU;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
+use super::global_modes::{GlobalMode, GlobalModes};
+use super::reconstruction::Reconstruction;
+use super::shape;
 use super::stabilisation::Stability;
-use super::{GlobalMode, GlobalModes, Reconstruction, shape};
 use crate::signal::median;
 
 /// What the analyst wants different from what was found.
@@ -24,6 +26,7 @@ pub struct Choice {
 const MEANT: f64 = 0.02;
 
 impl Choice {
+    /// Whether nothing different is wanted.
     pub fn is_empty(&self) -> bool {
         self.poles.is_empty() && self.without_hz.is_empty() && self.modes.is_none()
     }
@@ -273,7 +276,7 @@ fn shape_of(constants: &[Option<(Complex64, f64)>], dofs: &[Option<[usize; 2]>])
 
 #[cfg(test)]
 mod tests {
-    use super::super::synthetic::{Mode, Synthetic};
+    use super::super::synthetic::{Synthetic, SyntheticMode};
     use super::super::{FrfModes, SetMember, Settings, analyse_frf, global};
     use super::*;
 
@@ -284,10 +287,10 @@ mod tests {
             .iter()
             .enumerate()
             .map(|(k, row)| {
-                let modes: Vec<Mode> = f_zeta
+                let modes: Vec<SyntheticMode> = f_zeta
                     .iter()
                     .zip(row)
-                    .map(|(&(f, z), &a)| Mode::new(f, z, a))
+                    .map(|(&(f, z), &a)| SyntheticMode::new(f, z, a))
                     .collect();
                 Synthetic::new(3.0, 40.0, 0.1, &modes)
                     .with_noise(0.0, 0.01, k as u64)

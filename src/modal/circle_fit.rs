@@ -3,7 +3,7 @@
 //! detuning u, where it is exact). Other modes only shift the circle. The centre comes from Taubin's
 //! algebraic fit (1991) and a geometric refinement; resonance is where the fitted sweep is fastest; damping
 //! comes from all angles at once, and once more from every pair of points around the resonance:
-//! ζ = (u_b − u_a)/(tan(θ_b/2) + tan(θ_a/2)). The scatter of the pairs is reported beside it.
+//! ζ = (u_b − u_a)/(tan(θ_b/2) + tan(θ_a/2)). The scatter of the pairs is reported with it.
 
 use std::f64::consts::{PI, TAU};
 
@@ -49,7 +49,7 @@ pub(super) fn fit(curve: &Curve, frequency_hz: f64, damping_ratio: f64) -> Optio
         }
     }
     let fitted = fit_lines(curve, lines, (frequency_hz, damping_ratio))?;
-    // A first estimate may be off, but an answer that runs away is none.
+    // A first estimate may be off, but one that runs away is no answer.
     let moved = (fitted.frequency_hz - frequency_hz).abs() / frequency_hz;
     (moved <= 2.0 * damping_ratio.max(fitted.damping_ratio)).then_some(fitted)
 }
@@ -325,7 +325,7 @@ pub(super) fn turns_backwards(curve: &Curve, lines: std::ops::Range<usize>, nois
 
 #[cfg(test)]
 mod tests {
-    use super::super::synthetic::{Mode, Synthetic};
+    use super::super::synthetic::{Synthetic, SyntheticMode};
     use super::*;
 
     fn curve_of(case: Synthetic) -> Curve {
@@ -336,7 +336,12 @@ mod tests {
     #[test]
     fn a_clean_mode_is_an_exact_circle_whatever_the_damping() {
         for zeta in [0.01, 0.05, 0.3] {
-            let curve = curve_of(Synthetic::new(3.0, 60.0, 0.1, &[Mode::new(20.03, zeta, 2.0)]));
+            let curve = curve_of(Synthetic::new(
+                3.0,
+                60.0,
+                0.1,
+                &[SyntheticMode::new(20.03, zeta, 2.0)],
+            ));
             let fitted = fit(&curve, 20.3, 1.3 * zeta).unwrap();
             approx::assert_relative_eq!(fitted.frequency_hz, 20.03, max_relative = 1e-7);
             approx::assert_relative_eq!(fitted.damping_ratio, zeta, max_relative = 1e-6);
@@ -350,7 +355,12 @@ mod tests {
 
     #[test]
     fn the_sense_of_turning_tells_the_phase_convention() {
-        let mut curve = curve_of(Synthetic::new(3.0, 60.0, 0.1, &[Mode::new(20.0, 0.03, -1.0)]));
+        let mut curve = curve_of(Synthetic::new(
+            3.0,
+            60.0,
+            0.1,
+            &[SyntheticMode::new(20.0, 0.03, -1.0)],
+        ));
         let lines = curve.range(19.0, 21.0);
         assert_eq!(turns_backwards(&curve, lines.clone(), 0.0), Some(false));
         curve.conjugate();
@@ -360,7 +370,12 @@ mod tests {
 
     #[test]
     fn two_points_make_no_circle() {
-        let curve = curve_of(Synthetic::new(3.0, 60.0, 1.0, &[Mode::new(20.0, 0.01, 1.0)]));
+        let curve = curve_of(Synthetic::new(
+            3.0,
+            60.0,
+            1.0,
+            &[SyntheticMode::new(20.0, 0.01, 1.0)],
+        ));
         assert!(fit(&curve, 20.0, 0.01).is_none());
     }
 }

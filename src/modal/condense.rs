@@ -80,16 +80,17 @@ impl Data {
 
 #[cfg(test)]
 mod tests {
-    use super::super::ml_fit::{self, NoisyFrf, SETTLED};
-    use super::super::synthetic::{Mode, Synthetic};
+    use super::super::ml_fit::{self, SETTLED};
+    use super::super::ml_linear::NoisyFrf;
+    use super::super::synthetic::{Synthetic, SyntheticMode};
     use super::*;
 
     #[test]
     fn bins_give_the_same_poles_as_their_lines() {
         let modes = [
-            Mode::new(40.0, 0.01, 1.0),
-            Mode::new(41.0, 0.008, -0.7),
-            Mode::new(150.0, 0.002, 2.0),
+            SyntheticMode::new(40.0, 0.01, 1.0),
+            SyntheticMode::new(41.0, 0.008, -0.7),
+            SyntheticMode::new(150.0, 0.002, 2.0),
         ];
         let (frequency_hz, receptance) = Synthetic::new(5.0, 205.0, 0.01, &modes).frf();
         let lines = frequency_hz.len();

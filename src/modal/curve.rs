@@ -171,7 +171,7 @@ pub(super) fn detuned_hz(natural_hz: f64, u: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::synthetic::{Mode, Synthetic};
+    use super::super::synthetic::{Synthetic, SyntheticMode};
     use super::*;
 
     #[test]
@@ -183,7 +183,7 @@ mod tests {
 
     #[test]
     fn noise_is_estimated_beside_and_below_a_peak() {
-        let clean = Synthetic::new(3.0, 90.0, 0.1, &[Mode::new(20.0, 0.03, 1.0)]);
+        let clean = Synthetic::new(3.0, 90.0, 0.1, &[SyntheticMode::new(20.0, 0.03, 1.0)]);
         let peak = clean.mobility_peak();
         let (f, h) = clean.with_noise(0.02, 0.0, 7).frf();
         let curve = Curve::from_receptance(&f, &h, None).unwrap();

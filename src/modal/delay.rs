@@ -12,6 +12,7 @@ use num_complex::Complex64;
 pub struct Delay {
     /// Positive: the response comes late.
     pub seconds: f64,
+    /// Its standard deviation, s.
     pub std_s: f64,
 }
 

@@ -4,12 +4,14 @@
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-use super::global::{SET, SetMember};
+use super::global_modes::{GlobalMode, GlobalModes, RejectedMode};
 use super::joint_fit::{self, Change, Data, Group};
 use super::local_fit::Pole;
 use super::quality::{self, Power};
+use super::reconstruction::reconstruction;
+use super::set_member::{SET, SetMember};
 use super::stabilisation::{Candidate, Stabilisation};
-use super::{GlobalMode, GlobalModes, Reconstruction, RejectedMode, ml_fit, shape, verify};
+use super::{ml_fit, shape, verify};
 
 /// In a set a mode seen by one FRF alone must stand out this far (squared size over uncertainty).
 const FAR: f64 = 100.0;
@@ -22,7 +24,7 @@ const FINE_LINES: f64 = 3.0;
 const UNCERTAIN: f64 = 0.02;
 /// What poles anywhere explain scatters by about this without any model error.
 const BY_CHANCE: f64 = 1.5;
-/// A frequency that is uncertain by more than this share of the half-width is none.
+/// A frequency that is uncertain by more than this share of the half-width is not given.
 const UNPLACED: f64 = 0.3;
 /// A line whose width is not known is a mode where the residues of its FRFs have a common phase (collinearity) …
 const IN_PHASE: f64 = 0.9;
@@ -265,39 +267,6 @@ fn around(modes: &[GlobalMode]) -> [f64; 2] {
         (Some(first), Some(last)) => [first / REACH, last * REACH],
         _ => [0.0, f64::INFINITY],
     }
-}
-
-/// FRF m on the lines that a group covers; errors as mobility, within `band_hz`.
-fn reconstruction(d: &Data, groups: &[Group], m: usize, band_hz: [f64; 2]) -> Reconstruction {
-    let mut found = Reconstruction {
-        error_nrms: 0.0,
-        noise_nrms: 0.0,
-        frequency_hz: Vec::with_capacity(d.frequency_hz.len()),
-        measured_m_per_n: Vec::with_capacity(d.frequency_hz.len()),
-        fitted_m_per_n: Vec::with_capacity(d.frequency_hz.len()),
-    };
-    let mut total = 0.0;
-    for group in groups {
-        let from = d.frequency_hz.partition_point(|&f| f < group.window_hz[0]);
-        let to = d.frequency_hz.partition_point(|&f| f < group.window_hz[1]);
-        let fitted = group.solution.fitted(m, &d.frequency_hz[from..to]);
-        for (k, fitted) in (from..to).zip(fitted) {
-            let (f, h) = (d.frequency_hz[k], d.receptance[k]);
-            found.frequency_hz.push(f);
-            found.measured_m_per_n.push(h);
-            found.fitted_m_per_n.push(fitted);
-            if (band_hz[0]..=band_hz[1]).contains(&f) {
-                found.error_nrms += f * f * (h - fitted).norm_sqr();
-                found.noise_nrms += (f * d.sigma[k]).powi(2);
-                total += f * f * h.norm_sqr();
-            }
-        }
-    }
-    // Nothing measured there: nothing to be wrong about.
-    let total = if total > 0.0 { total } else { 1.0 };
-    found.error_nrms = (found.error_nrms / total).sqrt();
-    found.noise_nrms = (found.noise_nrms / total).sqrt();
-    found
 }
 
 /// Shape by response (or by FRF where degrees of freedom are not known), largest component 1.

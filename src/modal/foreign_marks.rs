@@ -1,5 +1,5 @@
 //! The marks of the global fit on sets that are not what it assumes: errors that go on from line to line, frequencies that
-//! move from FRF to FRF, hum; and on sets that are merely hard. Every mode must be found, and at most one that is none.
+//! move from FRF to FRF, hum; and on sets that are merely hard. Every mode must be found, and at most one false one.
 
 use std::f64::consts::TAU;
 
@@ -194,7 +194,7 @@ fn frequencies_that_move_from_frf_to_frf_are_one_mode_each_and_that_is_said() {
         // Even over 0.8 %: a standard deviation of 0.23 %.
         let scatter = found.quality.frequency_scatter.unwrap();
         assert!((0.0015..0.0035).contains(&scatter), "{scatter}");
-        assert_eq!(found.quality.verdict, quality::Verdict::Doubtful);
+        assert_eq!(found.quality.verdict, quality::QualityGrade::Doubtful);
         let said = found
             .quality
             .reasons
@@ -213,7 +213,7 @@ fn hum_hides_no_mode() {
     };
     let (found, errors) = test.holds(1);
     assert_eq!(found.modes.len(), SEVEN.len());
-    assert_eq!(found.quality.verdict, quality::Verdict::Good);
+    assert_eq!(found.quality.verdict, quality::QualityGrade::Good);
     assert!(errors.iter().all(|e| *e < 2.0), "{errors:?}");
 }
 
@@ -250,7 +250,7 @@ fn heavy_damping_and_heavy_noise_lose_no_mode() {
     let (found, _) = heavy(&SEVEN, 0.1).holds(1);
     assert_eq!(
         found.quality.verdict,
-        quality::Verdict::Good,
+        quality::QualityGrade::Good,
         "{:?}",
         found.quality
     );

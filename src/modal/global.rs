@@ -7,35 +7,23 @@
 use num_complex::Complex64;
 
 use super::curve::{Curve, MIN_LINES};
-use super::joint_fit::{self, Change, Data, Doubt, Group, Search};
+use super::global_modes::GlobalModes;
+use super::joint_fit::{self, Change, Data, Doubt, Group, PoleSearch};
 use super::local_fit::Pole;
 use super::lscf::{self, Row};
 use super::select::Start;
+use super::set_member::SetMember;
+use super::settings::Settings;
 use super::stabilisation::{self, Candidate, ShapeData};
-use super::{FrfModes, GlobalModes, Settings, condense, findings, select, set_noise, verify};
+use super::{condense, findings, select, set_noise, verify};
 use crate::Result;
 
 /// Poles of the highest order: at least, and at most.
 const POLES: [usize; 2] = [40, 80];
 /// More references than this are not taken together.
 const MAX_REFERENCES: usize = 6;
-/// In sets of at least this many FRFs a mode seen by one of them alone must stand out far.
-pub(super) const SET: usize = 4;
-
 /// One in so many FRFs must have a peak of its own for it to be tried in all.
 const SHARE_OF_FRFS: usize = 6;
-
-/// One FRF of a set, with what was found in it.
-#[derive(Clone, Copy)]
-pub struct SetMember<'a> {
-    /// Ascending, Hz.
-    pub frequency_hz: &'a [f64],
-    /// As given to [`super::analyse_frf`], m/N.
-    pub receptance_m_per_n: &'a [Complex64],
-    pub modes: &'a FrfModes,
-    /// Response and reference, as numbers that are equal where the degree of freedom is; `None` where not known.
-    pub dofs: Option<[usize; 2]>,
-}
 
 /// Modes common to several FRFs of the same structure in the same state. The FRFs may have lines of their own.
 ///
@@ -301,15 +289,15 @@ fn shape_data(data: &[Data]) -> Option<ShapeData<'_>> {
 /// Refinement with search, noise from the rest, refinement without search.
 fn solve(data: &mut [Data], candidates: &[Start], changes: &mut Vec<Change>) -> Option<Vec<Group>> {
     let start = select::choose(&select::some(data), candidates);
-    let mut groups = joint_fit::refine(&set_noise::alike(data), &start, Search::Roughly, changes)?;
+    let mut groups = joint_fit::refine(&set_noise::alike(data), &start, PoleSearch::Roughly, changes)?;
     // What is many fits with noises alike is few with those that each FRF has.
     for (search, alike) in [
-        (Search::Pairs, true),
-        (Search::Pairs, false),
-        (Search::Nothing, false),
+        (PoleSearch::Pairs, true),
+        (PoleSearch::Pairs, false),
+        (PoleSearch::Nothing, false),
     ] {
         // Many FRFs tell as much, whatever each one's noise is.
-        if search == Search::Pairs && !alike && data.len() > select::ENOUGH_FRFS {
+        if search == PoleSearch::Pairs && !alike && data.len() > select::ENOUGH_FRFS {
             continue;
         }
         set_noise::renew(data, &groups);
@@ -324,7 +312,7 @@ fn solve(data: &mut [Data], candidates: &[Start], changes: &mut Vec<Change>) -> 
         } else {
             joint_fit::refine(data, &poles, search, changes)?
         };
-        if search == Search::Nothing && doubts.len() == groups.len() {
+        if search == PoleSearch::Nothing && doubts.len() == groups.len() {
             for (group, doubt) in groups.iter_mut().zip(&mut doubts) {
                 let same = |d: &Doubt| d.shifts.len() == group.solution.poles.len();
                 group.doubt = doubt.take().filter(same);
@@ -336,8 +324,8 @@ fn solve(data: &mut [Data], candidates: &[Start], changes: &mut Vec<Change>) -> 
 
 #[cfg(test)]
 mod tests {
-    use super::super::analyse_frf;
-    use super::super::synthetic::{Mode, Synthetic};
+    use super::super::synthetic::{Synthetic, SyntheticMode};
+    use super::super::{FrfModes, analyse_frf};
     use super::*;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -348,10 +336,10 @@ mod tests {
             .iter()
             .enumerate()
             .map(|(k, row)| {
-                let modes: Vec<Mode> = f_zeta
+                let modes: Vec<SyntheticMode> = f_zeta
                     .iter()
                     .zip(row)
-                    .map(|(&(f, z), &a)| Mode::new(f, z, a))
+                    .map(|(&(f, z), &a)| SyntheticMode::new(f, z, a))
                     .collect();
                 Synthetic::new(3.0, 60.0, 0.2, &modes)
                     .with_noise(0.0, noise, 100 + k as u64)
@@ -421,10 +409,10 @@ mod tests {
         let mut frfs: Vec<(Vec<f64>, Vec<Complex64>)> = constants
             .iter()
             .map(|row| {
-                let modes: Vec<Mode> = modes
+                let modes: Vec<SyntheticMode> = modes
                     .iter()
                     .zip(row)
-                    .map(|(&(f, z), &a)| Mode::new(f, z, a))
+                    .map(|(&(f, z), &a)| SyntheticMode::new(f, z, a))
                     .collect();
                 Synthetic::new(0.2, 30.0, 0.1, &modes).frf()
             })
@@ -469,10 +457,10 @@ mod tests {
                 .iter()
                 .enumerate()
                 .map(|(k, row)| {
-                    let modes: Vec<Mode> = modes
+                    let modes: Vec<SyntheticMode> = modes
                         .iter()
                         .zip(row)
-                        .map(|(&(f, z), &a)| Mode::new(f, z, a))
+                        .map(|(&(f, z), &a)| SyntheticMode::new(f, z, a))
                         .collect();
                     Synthetic::new(3.0, 30.0, 0.25, &modes)
                         .with_noise(0.0, 0.03, 2 * seed + k as u64)
@@ -506,7 +494,7 @@ mod tests {
 
     #[test]
     fn frfs_may_have_lines_of_their_own() {
-        let modes = [Mode::new(12.0, 0.03, 1.0)];
+        let modes = [SyntheticMode::new(12.0, 0.03, 1.0)];
         let frfs = vec![
             Synthetic::new(3.0, 60.0, 0.2, &modes)
                 .with_noise(0.02, 0.0, 1)
@@ -528,10 +516,10 @@ mod tests {
             .iter()
             .enumerate()
             .map(|(k, row)| {
-                let modes: Vec<Mode> = modes
+                let modes: Vec<SyntheticMode> = modes
                     .iter()
                     .zip(row)
-                    .map(|(&(f, z), &a)| Mode::new(f, z, a))
+                    .map(|(&(f, z), &a)| SyntheticMode::new(f, z, a))
                     .collect();
                 Synthetic::new(5.0, 400.0, 1.0, &modes)
                     .with_noise(0.0, 0.02, k as u64)

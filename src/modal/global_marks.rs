@@ -5,7 +5,7 @@ use num_complex::Complex64;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::synthetic::{Mode, Synthetic};
+use super::synthetic::{Synthetic, SyntheticMode};
 use super::*;
 
 const POLES: [(f64, f64); 7] = [
@@ -36,10 +36,10 @@ fn frfs(step_hz: f64, noise: f64, seed: u64) -> Vec<Frf> {
     let mut all = Vec::new();
     for response in 0..RESPONSES {
         for reference in 0..REFERENCES {
-            let modes: Vec<Mode> = POLES
+            let modes: Vec<SyntheticMode> = POLES
                 .iter()
                 .zip(&shape)
-                .map(|(&(f, zeta), phi)| Mode::new(f, zeta, 0.005 * phi[response] * phi[reference]))
+                .map(|(&(f, zeta), phi)| SyntheticMode::new(f, zeta, 0.005 * phi[response] * phi[reference]))
                 .collect();
             let number = (response * REFERENCES + reference) as u64;
             all.push(
@@ -169,7 +169,7 @@ fn the_mac_tells_modes_apart_and_the_diagram_says_why() {
             .iter()
             .all(|c| c.why.contains("taken") || c.why.contains("left out"))
     );
-    // Two per cent of noise, of which the fit follows a little; a single FRF's figure hangs on the few lines of its peak.
+    // Two per cent of noise, of which the fit follows a little; a single FRF's figure depends on the few lines of its peak.
     let fits: Vec<&Reconstruction> = found.reconstructions.iter().flatten().collect();
     assert_eq!(fits.len(), RESPONSES * REFERENCES);
     let mean = |of: fn(&Reconstruction) -> f64| fits.iter().map(|f| of(f)).sum::<f64>() / fits.len() as f64;

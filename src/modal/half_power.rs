@@ -198,7 +198,7 @@ fn crossings(q: &Vector3<f64>, centre: f64, scale: f64) -> Option<(f64, f64, [f6
 
 #[cfg(test)]
 mod tests {
-    use super::super::synthetic::{Mode, Synthetic};
+    use super::super::synthetic::{Synthetic, SyntheticMode};
     use super::*;
 
     fn fit_case(case: Synthetic) -> Option<HalfPower> {
@@ -224,7 +224,13 @@ mod tests {
     #[test]
     fn a_clean_mode_is_exact_between_the_lines_at_any_damping() {
         for (f0, zeta) in [(12.337, 0.004), (12.337, 0.02), (12.337, 0.1), (12.337, 0.3)] {
-            let result = fit_case(Synthetic::new(3.0, 60.0, 0.1, &[Mode::new(f0, zeta, 1.0)])).unwrap();
+            let result = fit_case(Synthetic::new(
+                3.0,
+                60.0,
+                0.1,
+                &[SyntheticMode::new(f0, zeta, 1.0)],
+            ))
+            .unwrap();
             approx::assert_relative_eq!(result.frequency_hz, f0, max_relative = 1e-9);
             approx::assert_relative_eq!(result.damping_ratio, zeta, max_relative = 1e-6);
             approx::assert_relative_eq!(
@@ -239,7 +245,13 @@ mod tests {
     #[test]
     fn a_missing_side_is_said() {
         // The band ends just above the resonance, below the upper crossing at 20.4 Hz.
-        let result = fit_case(Synthetic::new(3.0, 20.25, 0.05, &[Mode::new(20.0, 0.02, 1.0)])).unwrap();
+        let result = fit_case(Synthetic::new(
+            3.0,
+            20.25,
+            0.05,
+            &[SyntheticMode::new(20.0, 0.02, 1.0)],
+        ))
+        .unwrap();
         assert_eq!(result.reached, [true, false]);
         approx::assert_relative_eq!(result.damping_ratio, 0.02, max_relative = 1e-6);
     }

@@ -24,6 +24,7 @@ const SEGMENTS: usize = 16;
 pub struct Hit {
     /// Time of the force's peak from the beginning of the record, s.
     pub time_s: f64,
+    /// Peak of the force, N.
     pub peak_n: f64,
     /// Why it is left out; `None` for a good one.
     pub left_out: Option<String>,

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 /// FRFs on common lines as a matrix a line.
 #[derive(Debug, Clone)]
 pub struct FrfMatrix<'a> {
+    /// Lines that all FRFs share, ascending, Hz.
     pub frequency_hz: &'a [f64],
     /// By response, then reference; every one on all lines (m/N).
     pub receptance_m_per_n: Vec<Vec<&'a [Complex64]>>,

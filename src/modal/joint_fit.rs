@@ -4,7 +4,8 @@
 use num_complex::Complex64;
 
 use super::local_fit::Pole;
-use super::ml_fit::{self, NoisyFrf, Solution};
+use super::ml_fit::{self, Solution};
+use super::ml_linear::NoisyFrf;
 use super::shape;
 use super::stabilisation::MAX_DAMPING;
 
@@ -48,16 +49,16 @@ const DOUBT_SIGMA: f64 = 3.0;
 const DOUBT_LOOKED: f64 = 6.0;
 /// Before its place is refined a pole must explain this part of what a mode must.
 const REFINED: f64 = 0.2;
-/// Below this a pole beside another is not worth a fit of its own.
+/// Below this a pole next to another is not worth a fit of its own.
 const WORTH_A_FIT_SIGMA: f64 = 1.0;
 
 /// What a refinement may do besides moving poles.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
-pub(super) enum Search {
+pub(super) enum PoleSearch {
     Nothing,
     /// That, and not more exactly than a comparison needs.
     Roughly,
-    /// Take out needless poles, add one where the rest is largest, and look for close pairs: a second pole beside each
+    /// Take out needless poles, add one where the rest is largest, and look for close pairs: a second pole next to each
     /// that is there.
     Pairs,
 }
@@ -66,7 +67,7 @@ pub(super) enum Search {
 pub(super) struct Group {
     pub window_hz: [f64; 2],
     pub solution: Solution,
-    /// Looked for with [`Search::Pairs`].
+    /// Looked for with [`PoleSearch::Pairs`].
     pub doubt: Option<Doubt>,
     /// What any pole explains, over what it would explain of white noise; at least 1.
     pub chance: f64,
@@ -119,7 +120,7 @@ impl Data {
 pub(super) fn refine(
     data: &[Data],
     candidates: &[Pole],
-    search: Search,
+    search: PoleSearch,
     changes: &mut Vec<Change>,
 ) -> Option<Vec<Group>> {
     // A pole can have run onto one of the next group.
@@ -157,7 +158,7 @@ pub(super) fn refine(
             let solution = fit
                 .fit(group)
                 .or_else(|| MERGED.into_iter().find_map(|share| fit.fit(&apart(group, share))))?;
-            if search != Search::Roughly && !solution.poles.is_empty() {
+            if search != PoleSearch::Roughly && !solution.poles.is_empty() {
                 fit.chance = fit.by_chance(&solution);
             }
             Some((fit, solution))
@@ -166,7 +167,7 @@ pub(super) fn refine(
             continue;
         };
         let mut doubt = None;
-        if search >= Search::Pairs {
+        if search >= PoleSearch::Pairs {
             solution = fit.without_needless(solution, changes);
             fit.chance = fit.by_chance(&solution);
             for _ in 0..MAX_ADDED {
@@ -317,7 +318,7 @@ fn enough(frfs: usize, chance: f64, sigma: f64, looked: f64) -> f64 {
 struct Fit<'a> {
     frfs: Vec<NoisyFrf<'a>>,
     fixed: Vec<Pole>,
-    search: Search,
+    search: PoleSearch,
     /// See [`chance`].
     chance: f64,
 }
@@ -327,9 +328,9 @@ impl Fit<'_> {
         // A search compares misfits, and a last refinement follows it.
         let by_chance = 2.0 * self.frfs.len() as f64 + 2.0;
         let settled = match self.search {
-            Search::Nothing => ml_fit::SETTLED,
-            Search::Roughly => ROUGHLY_COMPARED * by_chance,
-            Search::Pairs => COMPARED * by_chance,
+            PoleSearch::Nothing => ml_fit::SETTLED,
+            PoleSearch::Roughly => ROUGHLY_COMPARED * by_chance,
+            PoleSearch::Pairs => COMPARED * by_chance,
         };
         ml_fit::fit(&self.frfs, poles, &self.fixed, settled)
     }
@@ -425,7 +426,7 @@ impl Fit<'_> {
         }
     }
 
-    /// Adds a pole where the rest is largest, or beside one that is there, if that explains enough; one that explains
+    /// Adds a pole where the rest is largest, or next to one that is there, if that explains enough; one that explains
     /// something but not enough is a doubt.
     fn with_one_more(&self, solution: &Solution, doubt: &mut Option<Doubt>) -> Option<Solution> {
         let usual = usual_damping(solution);
@@ -540,7 +541,7 @@ impl Fit<'_> {
         }
         let centre = rest[most.1].0;
         let usual = usual_damping(solution);
-        // A pole on top of another one is a saddle: beside it the search begins on either slope.
+        // A pole on top of another one is a saddle: next to it the search begins on either slope.
         let trials = [1.0, 1.0 - usual, 1.0 + usual].map(|factor| Pole {
             frequency_hz: centre * factor,
             damping_ratio: usual,

@@ -49,7 +49,7 @@ pub(super) struct Problem<'a> {
     pub residual_terms: usize,
 }
 
-pub(super) struct Solution {
+pub(super) struct LocalSolution {
     pub poles: Vec<Pole>,
     /// Residue by pole. The peak of the mode's mobility is R/ζ.
     pub residues: Vec<Complex64>,
@@ -63,7 +63,7 @@ pub(super) struct Solution {
     pub variance: f64,
 }
 
-impl Solution {
+impl LocalSolution {
     pub fn frequency_std_hz(&self, pole: usize) -> f64 {
         self.covariance[(2 * pole, 2 * pole)].max(0.0).sqrt()
     }
@@ -163,7 +163,7 @@ struct Linearised {
 
 /// Finds the poles from a start, to a relative fall of the cost of `settled`. `None` where the lines do not determine
 /// them.
-pub(super) fn fit(problem: &Problem, start: &[Pole], settled: f64) -> Option<Solution> {
+pub(super) fn fit(problem: &Problem, start: &[Pole], settled: f64) -> Option<LocalSolution> {
     let parameters = 2 * start.len();
     let equations = 2 * problem.frequency_hz.len();
     let linear = 2 * (start.len() + problem.residual_terms);
@@ -248,7 +248,7 @@ pub(super) fn fit(problem: &Problem, start: &[Pole], settled: f64) -> Option<Sol
         covariance.row_mut(2 * j + 1).scale_mut(pole.damping_ratio);
         covariance.column_mut(2 * j + 1).scale_mut(pole.damping_ratio);
     }
-    covariance.iter().all(|c| c.is_finite()).then(|| Solution {
+    covariance.iter().all(|c| c.is_finite()).then(|| LocalSolution {
         residues: current.residues,
         residual: current
             .residual
@@ -504,12 +504,15 @@ impl Linearised {
 #[cfg(test)]
 mod tests {
     use super::super::curve::Curve;
-    use super::super::synthetic::{Mode, Synthetic};
+    use super::super::synthetic::{Synthetic, SyntheticMode};
     use super::*;
 
     #[test]
     fn two_modes_closer_than_their_widths_come_out_exactly() {
-        let modes = [Mode::new(12.0, 0.03, 1.0), Mode::new(12.4, 0.02, -0.4)];
+        let modes = [
+            SyntheticMode::new(12.0, 0.03, 1.0),
+            SyntheticMode::new(12.4, 0.02, -0.4),
+        ];
         let (f, h) = Synthetic::new(6.0, 20.0, 0.1, &modes).frf();
         let curve = Curve::from_receptance(&f, &h, None).unwrap();
         let problem = Problem {

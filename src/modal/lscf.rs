@@ -203,15 +203,15 @@ fn poles_of_order(
 
 #[cfg(test)]
 mod tests {
-    use super::super::synthetic::{Mode, Synthetic};
+    use super::super::synthetic::{Synthetic, SyntheticMode};
     use super::*;
 
     #[test]
     fn exact_data_give_the_poles_at_a_sufficient_order() {
         let modes = [
-            Mode::new(8.0, 0.03, 0.01),
-            Mode::new(8.3, 0.03, -0.02),
-            Mode::new(30.0, 0.02, 0.03),
+            SyntheticMode::new(8.0, 0.03, 0.01),
+            SyntheticMode::new(8.3, 0.03, -0.02),
+            SyntheticMode::new(30.0, 0.02, 0.03),
         ];
         let (f, h) = Synthetic::new(3.0, 60.0, 0.25, &modes).frf();
         let row = Row {

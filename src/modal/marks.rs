@@ -1,6 +1,6 @@
 //! Bias and scatter of every method on synthetic single modes, and the marks they must reach.
 
-use super::synthetic::{Mode, Synthetic};
+use super::synthetic::{Synthetic, SyntheticMode};
 use super::{Method, Settings, analyse_frf};
 
 const METHODS: [Method; 3] = [Method::LocalFit, Method::CircleFit, Method::HalfPower];
@@ -21,7 +21,7 @@ struct Score {
 fn score(f0: f64, zeta: f64, step: f64, of_peak: f64, of_local: f64) -> [Score; 3] {
     let mut scores: [Score; 3] = Default::default();
     for seed in 0..DRAWS {
-        let (f, h) = Synthetic::new(3.0, 90.0, step, &[Mode::new(f0, zeta, 0.01)])
+        let (f, h) = Synthetic::new(3.0, 90.0, step, &[SyntheticMode::new(f0, zeta, 0.01)])
             .with_noise(of_peak, of_local, seed)
             .frf();
         let found = analyse_frf(&f, &h, &Settings::default()).unwrap();

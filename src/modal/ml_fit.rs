@@ -9,40 +9,26 @@
 
 use std::f64::consts::TAU;
 
-use faer::linalg::matmul::matmul;
-use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
-use faer::{Accum, MatMut, MatRef, Par};
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2, Vector2};
+use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
-use pulp::Arch;
 use rayon::prelude::*;
 
-use super::alike::{self, Alike};
+use super::alike::{Alike, AlikeLinear};
 use super::local_fit::Pole;
+use super::ml_linear::{
+    FrfSolution, NoisyFrf, PoleColumns, RESIDUAL_TERMS, Solved, SolvedFrf, centre_hz, linearise_one, product,
+    residual_terms, weigh, weights,
+};
 use crate::stop;
 
-/// Lower residual terms, then upper ones.
-pub(super) const RESIDUAL_TERMS: usize = 6;
 const MAX_ITERATIONS: usize = 30;
 const MIN_DAMPING: f64 = 1e-7;
-/// Smallest eigenvalue of the residual terms' Gram matrix, with columns of unit length.
-const ROUNDING: f64 = 1e-12;
 /// A fall of the misfit below this part of itself is rounding.
 const RELATIVELY_SETTLED: f64 = 1e-9;
 /// Fall of the misfit that is worth no further step: a hundredth of a standard deviation.
 pub(super) const SETTLED: f64 = 1e-4;
 
-/// One FRF within the window of the fit.
-#[derive(Clone)]
-pub(super) struct NoisyFrf<'a> {
-    pub frequency_hz: &'a [f64],
-    pub receptance: &'a [Complex64],
-    /// sqrt(E|e|²) of each line, > 0.
-    pub sigma: &'a [f64],
-    /// Standard deviation of the frequencies that a line is the mean of, Hz; zero for a single one.
-    pub spread_hz: &'a [f64],
-}
-
+/// The refined poles with what the fit says of them.
 pub(super) struct Solution {
     pub poles: Vec<Pole>,
     /// By FRF.
@@ -58,21 +44,6 @@ pub(super) struct Solution {
     pub converged: bool,
     fixed: Vec<Pole>,
     centre_hz: f64,
-}
-
-pub(super) struct FrfSolution {
-    /// a₁, b₁, a₂, b₂, …, of the fixed poles too, then the residual terms.
-    pub linear: DVector<f64>,
-    /// Measured less fitted, m/N.
-    pub residual: Vec<Complex64>,
-    /// Covariance of each mode's a and b for given poles.
-    pub pair_covariance: Vec<Matrix2<f64>>,
-    /// −∂linear/∂(ln f₁, ln ζ₁, …).
-    pub linear_by_poles: DMatrix<f64>,
-    /// Part of the noise at each line that the fit follows, mean over the lines.
-    pub leverage: f64,
-    /// By moving pole: what this FRF alone says of (ln f, ln ζ): its part of the information and of the gradient.
-    pub own: Vec<(Matrix2<f64>, Vector2<f64>)>,
 }
 
 impl Solution {
@@ -208,7 +179,7 @@ impl<'a> Prepared<'a> {
     }
 
     /// Columns of the poles on the lines of each FRF that is the first with its lines.
-    fn axes(&self, moving: &[Pole], fixed: &[Pole]) -> Vec<Option<Axis>> {
+    fn axes(&self, moving: &[Pole], fixed: &[Pole]) -> Vec<Option<PoleColumns>> {
         (0..self.frfs.len())
             .map(|m| {
                 let own = self.axis_of[m] == m;
@@ -218,7 +189,7 @@ impl<'a> Prepared<'a> {
                         spread_hz,
                         ..
                     } = self.frfs[m];
-                    Axis::new(frequency_hz, spread_hz, moving, fixed, self.centre_hz)
+                    PoleColumns::new(frequency_hz, spread_hz, moving, fixed, self.centre_hz)
                 })
             })
             .collect()
@@ -227,8 +198,8 @@ impl<'a> Prepared<'a> {
     /// `work` on every FRF with its axis, in order, so that rounding does not depend on the threads.
     fn each<T: Send>(
         &self,
-        axes: &[Option<Axis>],
-        work: impl Fn(usize, &Axis, &mut Vec<f64>) -> Option<T> + Sync,
+        axes: &[Option<PoleColumns>],
+        work: impl Fn(usize, &PoleColumns, &mut Vec<f64>) -> Option<T> + Sync,
     ) -> Option<Vec<T>> {
         let each: Vec<Option<T>> = (0..self.frfs.len())
             .into_par_iter()
@@ -238,110 +209,6 @@ impl<'a> Prepared<'a> {
             .collect();
         each.into_iter().collect()
     }
-}
-
-/// √2/σ, twice for each line.
-pub(super) fn weights(sigma: &[f64]) -> Vec<f64> {
-    let of_line = sigma.iter().map(|s| std::f64::consts::SQRT_2 / s);
-    of_line.flat_map(|w| [w, w]).collect()
-}
-
-/// Columns that all FRFs on the same lines share, before weighting; each 2 × lines long.
-pub(super) struct Axis {
-    pub rows: usize,
-    /// g = 1/(1 − r² + 2iζr) and irg by pole, moving ones first, r = f/f₀; then the residual terms.
-    pub columns: Vec<f64>,
-    /// By moving pole, for numerators a + ibr: ∂/∂ln f₀ = a p + b ir(p − g) and ∂/∂ln ζ = a q + b irq,
-    /// with p = −g²(2r² − 2iζr), q = −2iζr g², in the order p, ir(p − g), q, irq.
-    pub slopes: Vec<f64>,
-}
-
-impl Axis {
-    /// Columns of the poles that move, the first ones.
-    pub fn moving_columns(&self) -> usize {
-        self.slopes.len() / (2 * self.rows)
-    }
-
-    fn new(frequency_hz: &[f64], spread_hz: &[f64], moving: &[Pole], fixed: &[Pole], centre_hz: f64) -> Axis {
-        let rows = 2 * frequency_hz.len();
-        let modes = moving.len() + fixed.len();
-        let mut columns = vec![0.0; rows * (2 * modes + RESIDUAL_TERMS)];
-        let mut slopes = vec![0.0; rows * 4 * moving.len()];
-        let add = |all: &mut [f64], column: usize, line: usize, value: Complex64| {
-            all[column * rows + 2 * line] += value.re;
-            all[column * rows + 2 * line + 1] += value.im;
-        };
-        // The mean of a smooth function over frequencies that scatter by s is that of its values at ± s.
-        let points = |k: usize| {
-            let (f, s) = (frequency_hz[k], spread_hz[k]);
-            let (points, share) = if s > 0.0 {
-                ([f - s, f + s], 0.5)
-            } else {
-                ([f, f], 1.0)
-            };
-            let count = if s > 0.0 { 2 } else { 1 };
-            points.into_iter().take(count).map(move |f| (f, share))
-        };
-        for (j, pole) in moving.iter().chain(fixed).enumerate() {
-            for k in 0..frequency_hz.len() {
-                for (f, share) in points(k) {
-                    let r = f / pole.frequency_hz;
-                    let (re, im) = (1.0 - r * r, 2.0 * pole.damping_ratio * r);
-                    let g = Complex64::new(re, -im) / (re * re + im * im);
-                    let turned = |z: Complex64| Complex64::new(-z.im * r, z.re * r);
-                    add(&mut columns, 2 * j, k, g * share);
-                    add(&mut columns, 2 * j + 1, k, turned(g) * share);
-                    if j < moving.len() {
-                        let p = -(g * g) * Complex64::new(2.0 * r * r, -im);
-                        let q = -(g * g) * Complex64::new(0.0, im);
-                        for (n, value) in [p, turned(p - g), q, turned(q)].into_iter().enumerate() {
-                            add(&mut slopes, 4 * j + n, k, value * share);
-                        }
-                    }
-                }
-            }
-        }
-        for k in 0..frequency_hz.len() {
-            for (f, share) in points(k) {
-                for (n, term) in residual_terms(f, centre_hz).into_iter().enumerate() {
-                    add(&mut columns, 2 * modes + n, k, term * share);
-                }
-            }
-        }
-        Axis {
-            rows,
-            columns,
-            slopes,
-        }
-    }
-}
-
-/// What modes outside the band leave inside it, to the second order in the ratio of the frequencies: 1/ω², i/ω³, 1/ω⁴
-/// below, 1, iω, ω² above, each scaled to one at the centre. (With 1/ω² alone the damping of a mode whose flank reaches
-/// the band's lower end comes out 0.5 % wrong.)
-fn residual_terms(f: f64, centre_hz: f64) -> [Complex64; RESIDUAL_TERMS] {
-    let x = f / centre_hz;
-    [
-        Complex64::new(-1.0 / (x * x), 0.0),
-        Complex64::new(0.0, 1.0 / (x * x * x)),
-        Complex64::new(1.0 / (x * x).powi(2), 0.0),
-        Complex64::ONE,
-        Complex64::new(0.0, x),
-        Complex64::new(x * x, 0.0),
-    ]
-}
-
-/// Frequency at which the residual terms have unit size.
-fn centre_hz(frfs: &[NoisyFrf]) -> f64 {
-    let first = frfs
-        .iter()
-        .filter_map(|c| c.frequency_hz.first())
-        .fold(f64::INFINITY, |m, f| m.min(*f));
-    let last = frfs
-        .iter()
-        .filter_map(|c| c.frequency_hz.last())
-        .fold(0.0, |m: f64, f| m.max(*f));
-    (first.max(1e-3 * last) * last).sqrt()
 }
 
 /// Refines the poles `start`; `fixed` poles take part with residues of their own but are not moved. `settled`: fall of
@@ -462,7 +329,7 @@ fn fit_prepared(
     })
 }
 
-/// Misfit that each of the `trials` would explain beside the poles of a solution, these and the trial held where they
+/// Misfit that each of the `trials` would explain in addition to the poles of a solution, these and the trial held where they
 /// are: twice the log-likelihood ratio, exact in the residues. `None` where the lines do not determine those.
 pub(super) fn explained_by(frfs: &[NoisyFrf], held: &[Pole], trials: &[Pole]) -> Option<Vec<f64>> {
     let prepared = Prepared::new(frfs);
@@ -473,7 +340,13 @@ pub(super) fn explained_by(frfs: &[NoisyFrf], held: &[Pole], trials: &[Pole]) ->
     }
     let each = prepared.each(&held_axes, |m, axis, buffer| {
         let trial_axis = trial_axes[prepared.axis_of[m]].as_ref()?;
-        let (solved, basis_columns) = Solved::new(&prepared, m, axis, 2 * trials.len(), buffer)?;
+        let (solved, basis_columns) = Solved::new(
+            &prepared.weight[m],
+            &prepared.target[m],
+            axis,
+            2 * trials.len(),
+            buffer,
+        )?;
         let (rows, weight) = (axis.rows, &prepared.weight[m]);
         let added = &mut buffer[rows * (basis_columns + 1)..];
         weigh(added, &trial_axis.columns, weight);
@@ -522,13 +395,13 @@ struct Linearised {
     /// Each FRF's part of the gradient.
     scores: Vec<DVector<f64>>,
     frfs: Linear,
-    axes: Vec<Option<Axis>>,
+    axes: Vec<Option<PoleColumns>>,
 }
 
 /// The linear parameters, by FRF.
 enum Linear {
     Own(Vec<SolvedFrf>),
-    Alike(Box<alike::Solved>),
+    Alike(Box<AlikeLinear>),
 }
 
 /// Solves for the linear parameters of every FRF and builds the normal equations of the poles.
@@ -545,7 +418,9 @@ fn linearise(prepared: &Prepared, poles: &[Pole], fixed: &[Pole]) -> Option<Line
             axes,
         });
     }
-    let each = prepared.each(&axes, |m, axis, buffer| linearise_one(prepared, m, axis, buffer))?;
+    let each = prepared.each(&axes, |m, axis, buffer| {
+        linearise_one(&prepared.weight[m], &prepared.target[m], axis, buffer)
+    })?;
     let parameters = 2 * poles.len();
     let mut sum = DMatrix::zeros(1 + parameters, 1 + parameters);
     let mut frfs = Vec::with_capacity(each.len());
@@ -565,238 +440,19 @@ fn linearise(prepared: &Prepared, poles: &[Pole], fixed: &[Pole]) -> Option<Line
     })
 }
 
-/// Every column times the weights, for as many columns as both hold.
-pub(super) fn weigh(out: &mut [f64], columns: &[f64], weight: &[f64]) {
-    let rows = weight.len();
-    Arch::new().dispatch(|| {
-        for (out, column) in out.chunks_exact_mut(rows).zip(columns.chunks_exact(rows)) {
-            for ((out, value), w) in out.iter_mut().zip(column).zip(weight) {
-                *out = value * w;
-            }
-        }
-    });
-}
-
-/// L⁻¹ `columns`, in place. (Much faster than nalgebra's for several columns.)
-pub(super) fn lower_solve(cholesky: &Cholesky<f64, Dyn>, columns: &mut DMatrix<f64>) {
-    let (rows, count) = columns.shape();
-    let lower = MatRef::from_column_major_slice(cholesky.l_dirty().as_slice(), rows, rows);
-    let columns = MatMut::from_column_major_slice_mut(columns.as_mut_slice(), rows, count);
-    solve_lower_triangular_in_place(lower, columns, Par::Seq);
-}
-
-/// `out` = leftᵀ right, both with columns of `rows` values.
-pub(super) fn product(out: &mut DMatrix<f64>, left: &[f64], right: &[f64], rows: usize) {
-    let (m, n) = out.shape();
-    let left = MatRef::from_column_major_slice(left, rows, m);
-    let right = MatRef::from_column_major_slice(right, rows, n);
-    let out = MatMut::from_column_major_slice_mut(out.as_mut_slice(), m, n);
-    matmul(out, Accum::Replace, left.transpose(), right, 1.0, Par::Seq);
-}
-
-/// The linear parameters of one FRF for given poles. The normal equations square the condition number: what they leave
-/// along the basis is taken out of everything that follows ([`Solved::half_solved`], [`Solved::correct`]).
-pub(super) struct Solved {
-    /// Of the Gram matrix with columns of unit length.
-    pub cholesky: Cholesky<f64, Dyn>,
-    /// 1/length of each column.
-    pub scale: DVector<f64>,
-    /// In units of the unit columns.
-    pub x: DVector<f64>,
-}
-
-/// That, with how it moves with the poles.
-pub(super) struct SolvedFrf {
-    pub linear: Solved,
-    /// L⁻¹ basisᵀ slopes with the Gram matrix L Lᵀ, in units of the unit columns.
-    pub by_poles: DMatrix<f64>,
-    /// See [`FrfSolution::own`].
-    pub own: Vec<(Matrix2<f64>, Vector2<f64>)>,
-}
-
-/// Factor of the first `columns` of a Gram matrix, of columns of unit length, and 1/length of each. From column `held` on
-/// they are those of poles that are not moved and of the residual terms.
-pub(super) fn unit_cholesky(
-    gram: &DMatrix<f64>,
-    columns: usize,
-    held: usize,
-) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
-    // Unit columns: the Gram matrix is then as well scaled as it can be.
-    let scale = DVector::from_fn(columns, |j, _| gram[(j, j)].sqrt().recip());
-    if scale.iter().any(|s| !(s.is_finite() && *s > 0.0)) {
-        return None;
-    }
-    let mut unit = DMatrix::from_fn(columns, columns, |i, j| gram[(i, j)] * scale[i] * scale[j]);
-    // Lines near 0 Hz make the lower residual terms all alike, and two poles close together look the same from afar: hold
-    // back the part of them that rounding would decide.
-    for term in held..columns {
-        unit[(term, term)] += ROUNDING;
-    }
-    Some((unit.cholesky()?, scale))
-}
-
-impl Solved {
-    /// Fills `buffer` with the weighted basis of FRF `m`, then its residual, then room for `more` columns; says how many
-    /// columns the basis has.
-    fn new(
-        prepared: &Prepared,
-        m: usize,
-        axis: &Axis,
-        more: usize,
-        buffer: &mut Vec<f64>,
-    ) -> Option<(Solved, usize)> {
-        let rows = axis.rows;
-        let columns = axis.columns.len() / rows;
-        buffer.resize(rows * (columns + 1 + more), 0.0);
-        let filled = &mut buffer[..rows * (columns + 1)];
-        weigh(filled, &axis.columns, &prepared.weight[m]);
-        filled[rows * columns..].copy_from_slice(&prepared.target[m]);
-        let mut gram = DMatrix::zeros(columns + 1, columns + 1);
-        product(&mut gram, filled, filled, rows);
-        let (cholesky, scale) = unit_cholesky(&gram, columns, axis.moving_columns())?;
-        let projected = gram.view((0, columns), (columns, 1)).component_mul(&scale);
-        let x = cholesky.solve(&projected);
-        let unscaled = x.component_mul(&scale);
-        let (basis, residual) = filled.split_at_mut(rows * columns);
-        let basis = MatRef::from_column_major_slice(&*basis, rows, columns);
-        let change = MatRef::from_column_major_slice(unscaled.as_slice(), columns, 1);
-        let residual = MatMut::from_column_major_slice_mut(residual, rows, 1);
-        matmul(residual, Accum::Add, basis, change, -1.0, Par::Seq);
-        Some((Solved { cholesky, scale, x }, columns))
-    }
-
-    /// One step of iterative refinement; `left`: [`Solved::half_solved`] of the residual.
-    fn correct(&mut self, left: DVector<f64>) {
-        let mut step = left;
-        self.cholesky.l_dirty().ad_solve_lower_triangular_mut(&mut step);
-        self.x += step;
-    }
-
-    /// L⁻¹ of products with the basis, L Lᵀ the Gram matrix of unit columns.
-    fn half_solved(&self, mut products: DMatrix<f64>) -> DMatrix<f64> {
-        for mut column in products.column_iter_mut() {
-            column.component_mul_assign(&self.scale);
-        }
-        lower_solve(&self.cholesky, &mut products);
-        products
-    }
-}
-
-impl SolvedFrf {
-    fn finish(&self, frf: &NoisyFrf, axis: &Axis) -> FrfSolution {
-        let Solved { cholesky, scale, x } = &self.linear;
-        let scaled = |mut matrix: DMatrix<f64>| {
-            for mut column in matrix.column_iter_mut() {
-                column.component_mul_assign(scale);
-            }
-            matrix
-        };
-        let mut by_poles = self.by_poles.clone();
-        // G⁻¹ = L⁻ᵀ L⁻¹: columns of L⁻¹ are enough for the blocks on its diagonal.
-        let mut inverse = DMatrix::identity(x.len(), by_poles.ncols());
-        lower_solve(cholesky, &mut inverse);
-        let pair_covariance = (0..by_poles.ncols() / 2)
-            .map(|mode| {
-                Matrix2::from_fn(|a, b| {
-                    let (a, b) = (2 * mode + a, 2 * mode + b);
-                    inverse.column(a).dot(&inverse.column(b)) * scale[a] * scale[b]
-                })
-            })
-            .collect();
-        cholesky.l_dirty().ad_solve_lower_triangular_mut(&mut by_poles);
-        let linear = x.component_mul(scale);
-        let mut residual = frf.receptance.to_vec();
-        for (x, column) in linear.iter().zip(axis.columns.chunks_exact(axis.rows)) {
-            for (r, c) in residual.iter_mut().zip(column.as_chunks::<2>().0) {
-                *r -= Complex64::new(c[0], c[1]) * x;
-            }
-        }
-        FrfSolution {
-            leverage: x.len() as f64 / axis.rows as f64,
-            own: self.own.clone(),
-            linear,
-            residual,
-            pair_covariance,
-            linear_by_poles: scaled(by_poles),
-        }
-    }
-}
-
-/// Solution of one FRF, and the products of its residual and slopes with each other, what the basis can follow taken out:
-/// misfit, gradient and information matrix.
-fn linearise_one(
-    prepared: &Prepared,
-    m: usize,
-    axis: &Axis,
-    buffer: &mut Vec<f64>,
-) -> Option<(DMatrix<f64>, SolvedFrf)> {
-    let rows = axis.rows;
-    let parameters = axis.slopes.len() / (2 * rows);
-    let (mut linear, columns) = Solved::new(prepared, m, axis, parameters, buffer)?;
-    let weight = &prepared.weight[m];
-    let slopes = &mut buffer[rows * (columns + 1)..];
-    Arch::new().dispatch(|| {
-        let pairs = axis.slopes.chunks_exact(2 * rows);
-        for (parameter, (out, pair)) in slopes.chunks_exact_mut(rows).zip(pairs).enumerate() {
-            let j = 2 * (parameter / 2);
-            let (a, b) = (
-                linear.x[j] * linear.scale[j],
-                linear.x[j + 1] * linear.scale[j + 1],
-            );
-            let (with_a, with_b) = pair.split_at(rows);
-            for (((out, p), q), w) in out.iter_mut().zip(with_a).zip(with_b).zip(weight) {
-                *out = (a * p + b * q) * w;
-            }
-        }
-    });
-    // Basis, residual and slopes, each with residual and slopes.
-    let mut all = DMatrix::zeros(columns + 1 + parameters, 1 + parameters);
-    product(&mut all, buffer, &buffer[rows * columns..], rows);
-    let half = linear.half_solved(all.rows(0, columns).into_owned());
-    let mut products = all.rows(columns, 1 + parameters).into_owned();
-    let size = 1 + parameters;
-    let out = MatMut::from_column_major_slice_mut(products.as_mut_slice(), size, size);
-    let half_solved = MatRef::from_column_major_slice(half.as_slice(), columns, size);
-    matmul(
-        out,
-        Accum::Add,
-        half_solved.transpose(),
-        half_solved,
-        -1.0,
-        Par::Seq,
-    );
-    linear.correct(half.column(0).into_owned());
-    let by_poles = half.columns(1, parameters).into_owned();
-    let own = (0..parameters / 2)
-        .map(|j| {
-            let at = 1 + 2 * j;
-            let gradient = products.fixed_view::<2, 1>(at, 0).into_owned();
-            (products.fixed_view::<2, 2>(at, at).into_owned(), gradient)
-        })
-        .collect();
-    Some((
-        products,
-        SolvedFrf {
-            linear,
-            by_poles,
-            own,
-        },
-    ))
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::synthetic::{Mode, Synthetic};
+    use super::super::synthetic::{Synthetic, SyntheticMode};
     use super::*;
 
     /// Residual terms are the first of a series in the modes outside the band: what is cut off stays below the marks.
     #[test]
     fn modes_outside_the_band_leave_exact_data_within_the_marks() {
         let modes = [
-            Mode::new(0.2, 0.02, 0.01),
-            Mode::new(12.0, 0.03, 0.01),
-            Mode::new(12.5, 0.02, -0.02),
-            Mode::new(400.0, 0.02, 30.0),
+            SyntheticMode::new(0.2, 0.02, 0.01),
+            SyntheticMode::new(12.0, 0.03, 0.01),
+            SyntheticMode::new(12.5, 0.02, -0.02),
+            SyntheticMode::new(400.0, 0.02, 30.0),
         ];
         let (f, h) = Synthetic::new(4.0, 40.0, 0.25, &modes).frf();
         let sigma: Vec<f64> = h.iter().map(|h| 0.01 * h.norm()).collect();
@@ -831,10 +487,10 @@ mod tests {
             .iter()
             .enumerate()
             .map(|(k, row)| {
-                let modes: Vec<Mode> = poles
+                let modes: Vec<SyntheticMode> = poles
                     .iter()
                     .zip(row)
-                    .map(|(&(f, zeta), &a)| Mode::new(f, zeta, a))
+                    .map(|(&(f, zeta), &a)| SyntheticMode::new(f, zeta, a))
                     .collect();
                 Synthetic::new(4.0, 40.0, 0.25, &modes)
                     .with_noise(0.0, 0.02, k as u64)

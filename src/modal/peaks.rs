@@ -21,7 +21,7 @@ const MAX_PEAKS: usize = 60;
 
 /// A local maximum of |mobility|.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Peak {
+pub(super) struct FrfPeak {
     pub index: usize,
     /// Prominence over the noise's standard deviation.
     pub significance: f64,
@@ -31,9 +31,9 @@ pub(super) struct Peak {
 }
 
 /// Peaks in ascending frequency. Never the first or last two lines of the band.
-pub(super) fn find(curve: &Curve, noise_std: &[f64]) -> Vec<Peak> {
+pub(super) fn find(curve: &Curve, noise_std: &[f64]) -> Vec<FrfPeak> {
     let n = curve.len();
-    let mut found: Vec<Peak> = Vec::new();
+    let mut found: Vec<FrfPeak> = Vec::new();
     for width in SMOOTHING_LINES {
         if width > 0.0 && 12.0 * width > n as f64 {
             break;
@@ -92,7 +92,7 @@ fn smoothed(mobility: &[Complex64], width_lines: f64) -> (Vec<f64>, f64) {
 }
 
 /// `margin`: lines at either end where smoothing leans on few values and a maximum proves nothing.
-fn prominent(height: &[f64], noise_std: &[f64], noise_gain: f64, margin: usize) -> Vec<Peak> {
+fn prominent(height: &[f64], noise_std: &[f64], noise_gain: f64, margin: usize) -> Vec<FrfPeak> {
     let n = height.len();
     let threshold = 2.0 * (n.max(2) as f64).ln().sqrt() + MARGIN_SIGMA;
     let mut peaks = Vec::new();
@@ -110,7 +110,7 @@ fn prominent(height: &[f64], noise_std: &[f64], noise_gain: f64, margin: usize) 
         let to = (k..n).find(|&j| height[j] < level).unwrap_or(n - 1);
         // A noise-free curve has no finite ratio; any large number will do.
         let significance = (prominence / noise.max(1e-9 * height[k])).min(1e9);
-        peaks.push(Peak {
+        peaks.push(FrfPeak {
             index: k,
             significance,
             from,
@@ -150,7 +150,7 @@ fn prominence(height: &[f64], peak: usize, wanted: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::synthetic::{Mode, Synthetic};
+    use super::super::synthetic::{Synthetic, SyntheticMode};
     use super::*;
 
     fn peaks_hz(case: Synthetic) -> Vec<f64> {
@@ -165,9 +165,9 @@ mod tests {
     #[test]
     fn every_mode_is_found_once_under_noise_broad_and_narrow_together() {
         let modes = [
-            Mode::new(6.0, 0.01, 1.0),
-            Mode::new(14.0, 0.05, 2.0),
-            Mode::new(60.0, 0.05, 30.0),
+            SyntheticMode::new(6.0, 0.01, 1.0),
+            SyntheticMode::new(14.0, 0.05, 2.0),
+            SyntheticMode::new(60.0, 0.05, 30.0),
         ];
         for seed in 0..20 {
             let found = peaks_hz(Synthetic::new(3.0, 90.0, 0.05, &modes).with_noise(0.0, 0.02, seed));
@@ -183,7 +183,8 @@ mod tests {
         for seed in 0..20 {
             // 1000 Hz is far outside: what is left in the band is a flat line with 30 % noise.
             let found = peaks_hz(
-                Synthetic::new(3.0, 90.0, 0.05, &[Mode::new(1000.0, 0.02, 1.0)]).with_noise(0.3, 0.0, seed),
+                Synthetic::new(3.0, 90.0, 0.05, &[SyntheticMode::new(1000.0, 0.02, 1.0)])
+                    .with_noise(0.3, 0.0, seed),
             );
             assert!(found.is_empty(), "seed {seed}: {found:?}");
         }
@@ -191,8 +192,24 @@ mod tests {
 
     #[test]
     fn the_rise_towards_a_band_edge_is_no_peak() {
-        assert!(peaks_hz(Synthetic::new(3.0, 20.0, 0.1, &[Mode::new(20.1, 0.02, 1.0)])).is_empty());
-        assert!(peaks_hz(Synthetic::new(3.0, 20.0, 0.1, &[Mode::new(2.9, 0.02, 1.0)])).is_empty());
+        assert!(
+            peaks_hz(Synthetic::new(
+                3.0,
+                20.0,
+                0.1,
+                &[SyntheticMode::new(20.1, 0.02, 1.0)]
+            ))
+            .is_empty()
+        );
+        assert!(
+            peaks_hz(Synthetic::new(
+                3.0,
+                20.0,
+                0.1,
+                &[SyntheticMode::new(2.9, 0.02, 1.0)]
+            ))
+            .is_empty()
+        );
     }
 
     #[test]

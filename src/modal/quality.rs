@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 use serde::Serialize;
 
-use super::Reconstruction;
+use super::reconstruction::Reconstruction;
 
 /// Noise against the FRF's size up to which it is good, and from which it is bad.
 const NOISE: [f64; 2] = [0.1, 0.5];
@@ -14,20 +14,24 @@ const COHERENCE: [f64; 2] = [0.9, 0.6];
 /// Difference of an FRF and its mirror over their size beyond noise: good up to, bad from.
 const RECIPROCITY: [f64; 2] = [0.1, 0.4];
 
+/// How far modes or an FRF may be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Verdict {
+pub enum QualityGrade {
+    /// Nothing speaks against it.
     Good,
+    /// Something does: look at the reasons.
     Doubtful,
+    /// Not to be relied on.
     Bad,
 }
 
-impl std::fmt::Display for Verdict {
+impl std::fmt::Display for QualityGrade {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
-            Verdict::Good => "good",
-            Verdict::Doubtful => "doubtful",
-            Verdict::Bad => "bad",
+            QualityGrade::Good => "good",
+            QualityGrade::Doubtful => "doubtful",
+            QualityGrade::Bad => "bad",
         })
     }
 }
@@ -35,7 +39,8 @@ impl std::fmt::Display for Verdict {
 /// What speaks for and against the modes of a set.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SetQuality {
-    pub verdict: Verdict,
+    /// The grade that the shares and the scatter below come to.
+    pub verdict: QualityGrade,
     /// Share 0..1 of what was measured (Σ|ωH|² over the FRFs, in the band of the modes) that is neither a common mode nor
     /// random noise.
     pub unexplained_share: f64,
@@ -56,7 +61,7 @@ impl Default for SetQuality {
     /// Of a set without modes: nothing is explained.
     fn default() -> Self {
         SetQuality {
-            verdict: Verdict::Bad,
+            verdict: QualityGrade::Bad,
             unexplained_share: 1.0,
             coloured_share: 0.0,
             noise_share: 0.0,
@@ -70,7 +75,8 @@ impl Default for SetQuality {
 /// What speaks for and against an FRF.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Quality {
-    pub verdict: Verdict,
+    /// The grade that the figures below come to.
+    pub verdict: QualityGrade,
     /// sqrt(Σ(ωσ)²/Σ|ωH|²) in the band.
     pub noise_nrms: Option<f64>,
     /// sqrt(Σ|ω(H − modes)|²/Σ|ωH|²).
@@ -92,7 +98,7 @@ pub fn judge(
     mirror: Option<&Reconstruction>,
 ) -> Quality {
     let mut quality = Quality {
-        verdict: Verdict::Good,
+        verdict: QualityGrade::Good,
         noise_nrms: fit.map(|f| f.noise_nrms),
         reconstruction_nrms: fit.map(|f| f.error_nrms),
         coherence: coherence.and_then(|c| weighted(c, frequency_hz, receptance_m_per_n, fit)),
@@ -107,9 +113,11 @@ pub fn judge(
             (value >= limits[0], value < limits[1])
         };
         if !good {
-            quality.verdict = quality
-                .verdict
-                .max(if bad { Verdict::Bad } else { Verdict::Doubtful });
+            quality.verdict = quality.verdict.max(if bad {
+                QualityGrade::Bad
+            } else {
+                QualityGrade::Doubtful
+            });
             quality.reasons.push(what);
         }
     };
@@ -124,7 +132,7 @@ pub fn judge(
             format!("{:.0} % is no common mode and no noise", 100.0 * beyond),
         );
     } else {
-        quality.verdict = Verdict::Bad;
+        quality.verdict = QualityGrade::Bad;
         quality.reasons.push("zero, or too few lines".into());
         return quality;
     }
@@ -224,7 +232,7 @@ pub(super) fn judge_set(found: &SetFindings) -> SetQuality {
     let noise_share = share(power.noise.min(power.left));
     let unexplained_share = share(power.left - power.noise);
     let mut quality = SetQuality {
-        verdict: Verdict::Good,
+        verdict: QualityGrade::Good,
         unexplained_share,
         coloured_share: share(power.coloured).min(share(power.left)),
         noise_share,
@@ -232,16 +240,16 @@ pub(super) fn judge_set(found: &SetFindings) -> SetQuality {
         converged: found.converged,
         reasons: Vec::new(),
     };
-    let mut note = |verdict: Verdict, why: String| {
+    let mut note = |verdict: QualityGrade, why: String| {
         quality.verdict = quality.verdict.max(verdict);
         quality.reasons.push(why);
     };
     let rest = unexplained_share.sqrt();
     if rest > UNEXPLAINED[0] {
         let verdict = if rest > UNEXPLAINED[1] {
-            Verdict::Bad
+            QualityGrade::Bad
         } else {
-            Verdict::Doubtful
+            QualityGrade::Doubtful
         };
         note(
             verdict,
@@ -253,7 +261,7 @@ pub(super) fn judge_set(found: &SetFindings) -> SetQuality {
     }
     if found.moving {
         note(
-            Verdict::Doubtful,
+            QualityGrade::Doubtful,
             format!(
                 "your frequencies move from FRF to FRF by {:.2} %: mass loading or temperature",
                 100.0 * found.frequency_scatter.unwrap_or(0.0)
@@ -262,31 +270,31 @@ pub(super) fn judge_set(found: &SetFindings) -> SetQuality {
     }
     if found.doubts > 0 {
         note(
-            Verdict::Doubtful,
+            QualityGrade::Doubtful,
             "there may be one more mode close to another".into(),
         );
     }
     if !found.converged {
-        note(Verdict::Doubtful, "a common fit did not converge".into());
+        note(QualityGrade::Doubtful, "a common fit did not converge".into());
     }
     quality
 }
 
 /// One sentence about a set.
-pub fn of_set(qualities: &[&Quality]) -> (Verdict, String) {
-    let count = |v: Verdict| qualities.iter().filter(|q| q.verdict == v).count();
+pub fn of_set(qualities: &[&Quality]) -> (QualityGrade, String) {
+    let count = |v: QualityGrade| qualities.iter().filter(|q| q.verdict == v).count();
     let (good, doubtful, bad) = (
-        count(Verdict::Good),
-        count(Verdict::Doubtful),
-        count(Verdict::Bad),
+        count(QualityGrade::Good),
+        count(QualityGrade::Doubtful),
+        count(QualityGrade::Bad),
     );
     let all = qualities.len();
     let verdict = if 2 * bad > all || all == 0 {
-        Verdict::Bad
+        QualityGrade::Bad
     } else if bad > 0 || 2 * doubtful > all {
-        Verdict::Doubtful
+        QualityGrade::Doubtful
     } else {
-        Verdict::Good
+        QualityGrade::Good
     };
     (
         verdict,
@@ -319,7 +327,7 @@ mod tests {
         let good = fit(0.03, 0.03, 1.0);
         assert_eq!(
             of(Some(&[0.99; 4]), Some(&good), Some(&good)).verdict,
-            Verdict::Good
+            QualityGrade::Good
         );
         let cases = [
             (of(None, Some(&fit(0.6, 0.6, 1.0)), None), "noise"),
@@ -329,7 +337,7 @@ mod tests {
             (of(None, None, None), "too few lines"),
         ];
         for (quality, expected) in cases {
-            assert_eq!(quality.verdict, Verdict::Bad, "{quality:?}");
+            assert_eq!(quality.verdict, QualityGrade::Bad, "{quality:?}");
             assert!(quality.reasons[0].contains(expected), "{quality:?}");
         }
     }

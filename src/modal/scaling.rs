@@ -19,6 +19,7 @@ pub struct ScaledMode {
     pub driving_dof: usize,
     /// For the shape whose largest component is 1, kg.
     pub modal_mass_kg: f64,
+    /// Standard deviation of the modal mass, kg.
     pub modal_mass_std_kg: f64,
     /// For the same shape: residue = ψ_j ψ_r / a, so a = 2i ω_d m for a real mode; kg/s (complex as re, im).
     pub modal_a: Complex64,
@@ -89,6 +90,7 @@ pub fn scaled(
 /// mobility is not either, all modal constants are positive, and an antiresonance lies between every two resonances.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DrivingPoint {
+    /// Name of the degree of freedom.
     pub name: String,
     /// Modes whose constant is negative by more than two standard deviations.
     pub wrong_sign_hz: Vec<f64>,
@@ -96,6 +98,7 @@ pub struct DrivingPoint {
     pub no_antiresonance_between_hz: Vec<[f64; 2]>,
     /// Share of Σ|mobility|² on lines whose mobility has a negative real part.
     pub negative_power_share: f64,
+    /// What the figures above come to, in words.
     pub verdict: &'static str,
 }
 

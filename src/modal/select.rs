@@ -5,7 +5,7 @@
 //! it. So a candidate is not held against white noise but against trial poles spread over its surroundings, which know
 //! neither a level nor a colour (in radar: detection with a constant rate of false alarms).
 
-use super::joint_fit::{self, Data, Search};
+use super::joint_fit::{self, Data, PoleSearch};
 use super::local_fit::Pole;
 use super::set_noise;
 
@@ -64,7 +64,7 @@ pub(super) fn choose(data: &[Data], candidates: &[Start]) -> Vec<Pole> {
             firm.remove(k);
         }
         chosen.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
-        let Some(groups) = joint_fit::refine(&even, &chosen, Search::Roughly, &mut Vec::new()) else {
+        let Some(groups) = joint_fit::refine(&even, &chosen, PoleSearch::Roughly, &mut Vec::new()) else {
             break;
         };
         set_noise::renew(&mut data, &groups);

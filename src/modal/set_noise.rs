@@ -3,8 +3,8 @@
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::global::SET;
 use super::joint_fit::{Data, Group};
+use super::set_member::SET;
 use crate::signal::frf_noise;
 use crate::signal::noise_law::{self, Departure};
 

@@ -31,6 +31,7 @@ pub struct Complexity {
 pub const COLLINEAR: f64 = 0.9;
 
 impl Complexity {
+    /// Whether the shape is a standing wave as good as any measured one: MPC of [`COLLINEAR`] or more.
     pub fn is_low(&self) -> bool {
         self.mpc < COLLINEAR
     }

@@ -23,6 +23,7 @@ const MAINS_HZ: [f64; 2] = [50.0, 60.0];
 /// A sine among the responses.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SineLine {
+    /// Frequency of the sine, Hz.
     pub frequency_hz: f64,
     /// Lowest and highest line that it spoils.
     pub spoils_hz: [f64; 2],
@@ -195,10 +196,10 @@ impl Flanks {
 
 #[cfg(test)]
 mod tests {
-    use super::super::synthetic::{Mode, Synthetic};
+    use super::super::synthetic::{Synthetic, SyntheticMode};
     use super::*;
 
-    fn found(modes: &[Mode], hum: f64) -> Vec<SineLine> {
+    fn found(modes: &[SyntheticMode], hum: f64) -> Vec<SineLine> {
         let mut frequency = Vec::new();
         let frfs: Vec<Vec<Complex64>> = (0..6)
             .map(|k| {
@@ -219,7 +220,13 @@ mod tests {
 
     #[test]
     fn hum_is_found_and_named() {
-        let found = found(&[Mode::new(60.0, 0.01, 1.0), Mode::new(130.0, 0.01, 1.0)], 20.0);
+        let found = found(
+            &[
+                SyntheticMode::new(60.0, 0.01, 1.0),
+                SyntheticMode::new(130.0, 0.01, 1.0),
+            ],
+            20.0,
+        );
         assert_eq!(found.len(), 1, "{found:?}");
         assert_eq!(found[0].frequency_hz, 100.0);
         assert!(found[0].spoils_hz[0] <= 99.5 && found[0].spoils_hz[1] >= 100.5);
@@ -231,7 +238,13 @@ mod tests {
     fn a_resonance_narrower_than_a_line_is_none() {
         for f0 in [100.0, 100.1, 100.25] {
             for damping in [1e-4, 1e-3, 5e-3] {
-                let found = found(&[Mode::new(60.0, 0.01, 1.0), Mode::new(f0, damping, 1.0)], 0.0);
+                let found = found(
+                    &[
+                        SyntheticMode::new(60.0, 0.01, 1.0),
+                        SyntheticMode::new(f0, damping, 1.0),
+                    ],
+                    0.0,
+                );
                 assert!(found.is_empty(), "{f0} Hz, {damping}: {found:?}");
             }
         }

@@ -10,7 +10,6 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::Tolerances;
 use super::local_fit::Pole;
 use super::lscf::Order;
 use super::shape::mac;
@@ -28,11 +27,37 @@ pub(super) const MAX_DAMPING: f64 = 0.3;
 /// Two chains closer than this part of their half-width and alike in shape are one.
 const SAME_WIDTHS: f64 = 0.5;
 
+/// How near a pole has to be to one of the order below to have stayed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tolerances {
+    /// Relative change of frequency, at most.
+    pub frequency: f64,
+    /// Relative change of damping, at most.
+    pub damping: f64,
+    /// MAC of the residues over all FRFs, at least.
+    pub mac: f64,
+    /// Orders in a row over which a pole must stay.
+    pub orders: usize,
+}
+
+impl Default for Tolerances {
+    fn default() -> Self {
+        Tolerances {
+            frequency: FREQUENCY_TOLERANCE,
+            damping: DAMPING_TOLERANCE,
+            mac: MAC_TOLERANCE,
+            orders: ORDERS,
+        }
+    }
+}
+
 /// How far a pole agrees with the order below.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stability {
+    /// No pole of the order below is near in frequency.
     New,
+    /// Frequency only.
     Frequency,
     /// Frequency and damping.
     Damping,
@@ -43,19 +68,26 @@ pub enum Stability {
 /// One pole in the diagram.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DiagramPole {
+    /// Order of the fit that it belongs to.
     pub order: usize,
+    /// Undamped natural frequency, Hz.
     pub frequency_hz: f64,
+    /// Viscous damping ratio.
     pub damping_ratio: f64,
+    /// What of it agrees with the order below.
     pub stability: Stability,
 }
 
 /// A pole that stayed over several orders, and what became of it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Candidate {
+    /// Undamped natural frequency, Hz.
     pub frequency_hz: f64,
+    /// Viscous damping ratio.
     pub damping_ratio: f64,
     /// Orders over which it stayed.
     pub orders: usize,
+    /// Whether it became a mode.
     pub chosen: bool,
     /// Why it was taken or left, in words.
     pub why: String,
@@ -66,7 +98,9 @@ pub struct Candidate {
 pub struct Stabilisation {
     /// References taken together (1: common denominator).
     pub references: usize,
+    /// Highest order of the diagram.
     pub max_order: usize,
+    /// Poles of all orders.
     pub poles: Vec<DiagramPole>,
     /// Ascending in frequency.
     pub candidates: Vec<Candidate>,

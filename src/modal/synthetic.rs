@@ -7,16 +7,16 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 #[derive(Debug, Clone, Copy)]
-pub struct Mode {
+pub struct SyntheticMode {
     pub frequency_hz: f64,
     pub damping_ratio: f64,
     /// Modal constant φ_out φ_in of a mass-normalised mode, 1/kg.
     pub constant: f64,
 }
 
-impl Mode {
-    pub fn new(frequency_hz: f64, damping_ratio: f64, constant: f64) -> Mode {
-        Mode {
+impl SyntheticMode {
+    pub fn new(frequency_hz: f64, damping_ratio: f64, constant: f64) -> SyntheticMode {
+        SyntheticMode {
             frequency_hz,
             damping_ratio,
             constant,
@@ -32,7 +32,7 @@ pub struct Synthetic {
 
 impl Synthetic {
     /// Receptance Σ A / (ω₀² − ω² + 2iζω₀ω) on even lines.
-    pub fn new(from_hz: f64, to_hz: f64, step_hz: f64, modes: &[Mode]) -> Synthetic {
+    pub fn new(from_hz: f64, to_hz: f64, step_hz: f64, modes: &[SyntheticMode]) -> Synthetic {
         let count = ((to_hz - from_hz) / step_hz).round() as usize + 1;
         let frequency_hz: Vec<f64> = (0..count).map(|k| from_hz + step_hz * k as f64).collect();
         let receptance = frequency_hz

@@ -2,8 +2,8 @@
 
 use num_complex::Complex64;
 
+use super::global_modes::{GlobalMode, GlobalModes};
 use super::shape::mac;
-use super::{GlobalMode, GlobalModes};
 
 /// Modes further apart than this part of their frequency are different ones.
 const APART: f64 = 0.25;
@@ -20,7 +20,9 @@ pub struct Track {
 /// Two modes of two sets that belong together, with what tells them apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pair {
+    /// Index of the mode in the first set.
     pub first: usize,
+    /// Index of the mode in the second set.
     pub second: usize,
     /// `None` where the sets have no degree of freedom in common.
     pub mac: Option<f64>,

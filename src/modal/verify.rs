@@ -3,10 +3,12 @@
 
 use num_complex::Complex64;
 
-use super::joint_fit::{self, Data, Group, Search};
+use super::global_modes::RejectedMode;
+use super::joint_fit::{self, Data, Group, PoleSearch};
 use super::local_fit::Pole;
 use super::ml_fit::{self, Solution};
-use super::{RejectedMode, set_noise, shape};
+use super::set_member::SET;
+use super::{set_noise, shape};
 
 /// Fits after poles were taken out, at most.
 const MAX_ROUNDS: usize = 6;
@@ -20,7 +22,7 @@ const DOMINANT: f64 = 0.5;
 const SHARE_OF_FRFS: f64 = 0.08;
 /// … unless one of them shows it with this squared size over uncertainty.
 const FAR: f64 = 100.0;
-/// A frequency that scatters from FRF to FRF by more than this share of the half-width is none.
+/// A frequency that scatters from FRF to FRF by more than this share of the half-width belongs to no mode.
 const SCATTER_WIDTHS: f64 = 0.3;
 /// A damping ratio uncertain by more than this part of itself, from how the FRFs scatter.
 const SCATTER_DAMPING: f64 = 0.5;
@@ -30,7 +32,7 @@ const OVER_REST: f64 = 2.0;
 const CLOSE: f64 = 1.0;
 /// Two poles nearer than this share of that sum are one mode unless both have the phases of one.
 const SAME: f64 = 0.2;
-/// Residues of a common phase: what a mode beside another one keeps.
+/// Residues of a common phase: what a mode next to another one keeps.
 const IN_PHASE: f64 = 0.7;
 /// Shapes that repeat.
 const SAME_SHAPE: f64 = 0.9;
@@ -72,9 +74,14 @@ pub(super) fn verified(
         if kept.is_empty() {
             return None;
         }
-        groups = joint_fit::refine(&set_noise::alike(data), &kept, Search::Roughly, &mut Vec::new())?;
+        groups = joint_fit::refine(
+            &set_noise::alike(data),
+            &kept,
+            PoleSearch::Roughly,
+            &mut Vec::new(),
+        )?;
         set_noise::renew(data, &groups);
-        groups = joint_fit::refine(data, &kept, Search::Nothing, &mut Vec::new())?;
+        groups = joint_fit::refine(data, &kept, PoleSearch::Nothing, &mut Vec::new())?;
     }
     Some(groups)
 }
@@ -88,7 +95,7 @@ fn reason(data: &[Data], group: &Group, j: usize) -> Option<String> {
     let local = Local::new(data, group, j, &residues);
     let (seen_in, best) = joint_fit::seen_in(solution, j);
     let wanted = ((SHARE_OF_FRFS * frfs as f64).ceil() as usize).max(2);
-    if frfs >= super::global::SET && seen_in < wanted && best < FAR {
+    if frfs >= SET && seen_in < wanted && best < FAR {
         return Some(match seen_in {
             0 => "hardly above what is left unexplained".into(),
             n => format!("shown by {n} of {frfs} FRFs only"),

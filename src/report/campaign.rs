@@ -9,11 +9,12 @@ use super::{
     waveform_section,
 };
 use crate::Result;
-use crate::analysis::{CampaignFindings, DiagnosisFindings, StructureFindings, ThesisFindings};
+use crate::analysis::{CampaignFindings, DiagnosisFindings, StructureFindings};
 use crate::campaign::Campaign;
 use crate::discrepancy::setup::{SetupCheck, SetupFinding};
 use crate::identify::StructureCase;
 use crate::revision::{self, Domain};
+use crate::thesis::ThesisFindings;
 
 /// Folder of the tables beside the page.
 #[cfg(feature = "parquet")]

@@ -235,7 +235,7 @@ mod tests {
     use crate::analysis::sweep::PlaceFindings;
     use crate::lobes::best_speed::BestSpeed;
     use crate::lobes::workspace::PlaceStatus;
-    use crate::lobes::workspace_grid::Place;
+    use crate::lobes::workspace_grid::GridPlace;
 
     fn settings(step: f64) -> Map<String, Value> {
         json!({ "angle_step_deg": step, "posture": "p1", "joints_deg": [0.0; 6] })
@@ -247,7 +247,7 @@ mod tests {
     fn row(index: usize) -> SweepRow {
         let usable = index % 3 != 0;
         SweepRow {
-            place: Place {
+            place: GridPlace {
                 index,
                 tcp_m: [1.0, 0.1 * index as f64, 0.5],
                 tool_axis: [0.0, 0.0, -1.0],

@@ -5,10 +5,9 @@ use super::number::{decimals, format_si, percent, significant};
 use super::parts::{figure, listed, paragraph};
 use super::{Block, Column, Page, Section, Table};
 use super::{real_case_section, thesis_cutting};
-use crate::analysis::ThesisFindings;
-use crate::analysis::thesis_findings::Range;
 use crate::lobes::Peak;
-use crate::thesis::{CaseStudy, FITTED_CONFIGURATIONS, LobeTips, Row};
+use crate::thesis::findings::Range;
+use crate::thesis::{CaseStudy, ComparedRow, FITTED_CONFIGURATIONS, LobeTips, ThesisFindings};
 
 /// The case study as a page of its own.
 pub fn page(findings: &ThesisFindings) -> Page {
@@ -178,7 +177,7 @@ fn unexplained_text(findings: &ThesisFindings) -> String {
     )
 }
 
-fn row_name(row: &Row) -> String {
+fn row_name(row: &ComparedRow) -> String {
     format!("{} {}", row.posture, row.quantity)
 }
 
@@ -187,13 +186,13 @@ fn value_figure(
     file: &str,
     title: &str,
     y_label: &str,
-    rows: &[Row],
+    rows: &[ComparedRow],
     scale: f64,
     caption: &str,
     log: bool,
 ) -> Block {
-    let rows: Vec<&Row> = rows.iter().filter(|r| r.measured.is_some()).collect();
-    let series = |label: &str, value: &dyn Fn(&Row) -> Option<f64>| BarSeries {
+    let rows: Vec<&ComparedRow> = rows.iter().filter(|r| r.measured.is_some()).collect();
+    let series = |label: &str, value: &dyn Fn(&ComparedRow) -> Option<f64>| BarSeries {
         label: label.into(),
         values: rows.iter().map(|r| value(r).map(|v| v * scale)).collect(),
     };
@@ -236,7 +235,7 @@ fn ratio(value: Option<f64>, measured: Option<f64>) -> String {
         .map_or("–".into(), |(v, m)| decimals(v / m, 2))
 }
 
-fn row_table(caption: &str, rows: &[Row], text: impl Fn(f64) -> String) -> Block {
+fn row_table(caption: &str, rows: &[ComparedRow], text: impl Fn(f64) -> String) -> Block {
     let optional = |v: Option<f64>| v.map_or("–".into(), &text);
     let cells = rows.iter().map(|row| {
         vec![

@@ -15,6 +15,7 @@ use super::dual::Dual;
 pub struct Place {
     /// 0 is the base, i the link behind joint i.
     pub link: usize,
+    /// Where along that link.
     pub slot: Slot,
 }
 
@@ -34,6 +35,7 @@ pub enum Slot {
 }
 
 impl Place {
+    /// The slot of a link.
     pub fn new(link: usize, slot: Slot) -> Self {
         Place { link, slot }
     }
@@ -56,12 +58,17 @@ pub enum Role {
 /// `stiffness` × `shape`.
 #[derive(Debug, Clone)]
 pub struct Element {
+    /// What it stands for.
     pub role: Role,
+    /// Where on the chain it sits.
     pub place: Place,
+    /// Point that the twists refer to, base frame, m.
     pub at: Point3<f64>,
+    /// Unit twists (displacement, rotation) in base axes, one a coordinate.
     pub directions: Vec<Vector6<f64>>,
     /// Symmetric positive definite, as many rows as directions.
     pub shape: DMatrix<f64>,
+    /// Factor on `shape`; N·m/rad where `shape` is the identity of a rotation.
     pub stiffness: Dual,
     /// Viscous damping of the element: `damping` × identity.
     pub damping: Option<Dual>,
@@ -70,11 +77,15 @@ pub struct Element {
 /// A rigid body: `scale` multiplies its mass.
 #[derive(Debug, Clone)]
 pub struct Body {
+    /// Where on the chain it sits.
     pub place: Place,
+    /// Centre of mass, base frame, m.
     pub com: Point3<f64>,
+    /// Mass before scaling, kg.
     pub mass_kg: f64,
     /// About the centre of mass, base axes.
     pub inertia_kg_m2: Matrix3<f64>,
+    /// Factor on the mass.
     pub scale: Dual,
     /// Whether `scale` multiplies its inertia, too; not where that is known, or tuned, by itself.
     pub inertia_follows_mass: bool,
@@ -84,11 +95,17 @@ pub struct Body {
 /// (rigidly otherwise). Its damper is its own.
 #[derive(Debug, Clone)]
 pub struct Branch {
+    /// Where on the chain its spring is fixed.
     pub place: Place,
+    /// Where the mass is, base frame, m.
     pub at: Point3<f64>,
+    /// Unit vectors that it moves along relative to the chain, base axes.
     pub directions: Vec<Vector3<f64>>,
+    /// The point mass, kg.
     pub mass_kg: Dual,
+    /// Its spring, the same in all directions, N/m.
     pub stiffness_n_per_m: Dual,
+    /// Its damper, the same in all directions, N·s/m.
     pub damping_ns_per_m: Dual,
     /// True if what is measured or hit at `at` is the branch's mass (a flexible tool), not the chain.
     pub carries_tool_point: bool,
@@ -107,7 +124,9 @@ pub struct Grip {
 /// Spring, damper, inertia or hysteretic spring on one displacement of the chain. At a point it acts against the ground.
 #[derive(Debug, Clone)]
 pub struct Attachment {
+    /// The displacement that it acts on.
     pub grip: Grip,
+    /// What it answers that displacement with.
     pub law: AttachmentLaw,
     /// N/m, N·s/m, kg or N/m; for an angle N·m/rad, N·m·s/rad, kg·m² or N·m/rad.
     pub size: Dual,
@@ -122,7 +141,7 @@ pub enum AttachmentLaw {
     Damper,
     /// −ω² m q
     Inertia,
-    /// i h q at every frequency: a loss factor h/k beside a spring k. Known to frequency responses only; what works on
+    /// i h q at every frequency: a loss factor h/k parallel to a spring k. Known to frequency responses only; what works on
     /// real matrices leaves it out.
     Hysteresis,
 }
@@ -130,9 +149,13 @@ pub enum AttachmentLaw {
 /// Everything that makes up the structure at one posture.
 #[derive(Debug, Clone)]
 pub struct Chain {
+    /// Compliant elements.
     pub elements: Vec<Element>,
+    /// Rigid bodies.
     pub bodies: Vec<Body>,
+    /// Point masses on springs.
     pub branches: Vec<Branch>,
+    /// Springs, dampers and inertias on single displacements.
     pub attachments: Vec<Attachment>,
     /// One damping ratio for all modes of the chain (its branches' masses held fast to it); zero where the elements carry dampers.
     pub modal_damping_ratio: Dual,
@@ -143,13 +166,17 @@ pub struct Chain {
 pub struct System {
     /// Number of element coordinates.
     pub chain_count: usize,
+    /// Stiffness matrix K, all coordinates square.
     pub stiffness: DMatrix<f64>,
+    /// Mass matrix M, all coordinates square.
     pub mass: DMatrix<f64>,
     /// Mass of the chain with the branches' masses held fast to it, `chain_count` square: what modal damping is defined on.
     pub chain_mass: DMatrix<f64>,
+    /// Viscous damping matrix C; `None` where nothing has a damper.
     pub viscous: Option<DMatrix<f64>>,
     /// Hysteretic stiffness H: the dynamic stiffness has iH at every frequency.
     pub hysteretic: Option<DMatrix<f64>>,
+    /// As [`Chain::modal_damping_ratio`].
     pub modal_damping_ratio: Dual,
     /// One entry a parameter.
     pub derivatives: Vec<SystemDerivative>,
@@ -158,10 +185,15 @@ pub struct System {
 /// Derivative of a [`System`] with respect to one parameter; `None` where it is zero.
 #[derive(Debug, Clone, Default)]
 pub struct SystemDerivative {
+    /// Of [`System::stiffness`].
     pub stiffness: Option<DMatrix<f64>>,
+    /// Of [`System::mass`].
     pub mass: Option<DMatrix<f64>>,
+    /// Of [`System::chain_mass`].
     pub chain_mass: Option<DMatrix<f64>>,
+    /// Of [`System::viscous`].
     pub viscous: Option<DMatrix<f64>>,
+    /// Of [`System::hysteretic`].
     pub hysteretic: Option<DMatrix<f64>>,
 }
 

@@ -127,6 +127,7 @@ impl Kinematics {
         }
     }
 
+    /// Number of joints.
     pub fn joint_count(&self) -> usize {
         self.frames.len() - 1
     }
@@ -185,14 +186,17 @@ impl Kinematics {
         Rotation3::from(self.frames[i].rotation).into_inner()
     }
 
+    /// Tool centre point, base frame, m.
     pub fn tcp(&self) -> Point3<f64> {
         self.tool.translation.vector.into()
     }
 
+    /// Origin of the flange, base frame, m.
     pub fn flange(&self) -> Point3<f64> {
         self.frames[self.frames.len() - 1].translation.vector.into()
     }
 
+    /// Unit vector along the tool, from the spindle to the workpiece, base axes.
     pub fn tool_axis(&self) -> Vector3<f64> {
         self.tool.rotation * Vector3::z()
     }

@@ -8,11 +8,14 @@ use std::ops::{Add, Div, Mul, Sub};
 /// Value and gradient with respect to the model's parameters. An empty gradient is that of a constant.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Dual {
+    /// The value itself.
     pub value: f64,
+    /// Derivative with respect to each parameter; empty for a constant.
     pub gradient: Vec<f64>,
 }
 
 impl Dual {
+    /// A value that depends on no parameter.
     pub fn constant(value: f64) -> Self {
         Dual {
             value,
@@ -40,24 +43,29 @@ impl Dual {
         }
     }
 
+    /// `factor` times this.
     pub fn scale(&self, factor: f64) -> Self {
         self.chain(self.value * factor, factor)
     }
 
+    /// e to the power of this.
     pub fn exp(&self) -> Self {
         let value = self.value.exp();
         self.chain(value, value)
     }
 
+    /// One over this.
     pub fn recip(&self) -> Self {
         self.chain(1.0 / self.value, -1.0 / (self.value * self.value))
     }
 
+    /// The square root.
     pub fn sqrt(&self) -> Self {
         let value = self.value.sqrt();
         self.chain(value, 0.5 / value)
     }
 
+    /// The absolute value.
     pub fn abs(&self) -> Self {
         self.scale(if self.value < 0.0 { -1.0 } else { 1.0 })
     }

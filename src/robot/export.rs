@@ -12,7 +12,9 @@ use crate::{Error, Result};
 /// the order of the chain; N/m, N, N·m/rad and kg, kg·m².
 #[derive(Debug, Clone)]
 pub struct CentreOfMassForm {
+    /// K_C, six rows a body.
     pub stiffness: DMatrix<f64>,
+    /// M_C, six rows a body.
     pub mass: DMatrix<f64>,
 }
 

@@ -1,9 +1,11 @@
-//! Numbers of the robot file beside joint stiffnesses and masses that a calibration may tune: inertia and centre of mass of
+//! Numbers of the robot file, other than joint stiffnesses and masses, that a calibration may tune: inertia and centre of mass of
 //! links, lengths of the kinematics, walls of links that bend.
 
 use nalgebra::Point3;
 
-use super::{Kinematics, RobotModel, RobotSpec};
+use super::dh::Kinematics;
+use super::model::RobotModel;
+use crate::data::RobotSpec;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -11,15 +13,34 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FileNumber {
     /// Moment of inertia about an axis through the centre of mass, kg·m²; products of inertia grow along.
-    Inertia { link: usize, axis: usize },
+    Inertia {
+        /// Number of the link, from 1.
+        link: usize,
+        /// Axis of the link's frame: 0, 1, 2 for x, y, z.
+        axis: usize,
+    },
     /// Coordinate of the centre of mass, m.
-    Centre { link: usize, axis: usize },
+    Centre {
+        /// Number of the link, from 1.
+        link: usize,
+        /// Axis of the link's frame: 0, 1, 2 for x, y, z.
+        axis: usize,
+    },
     /// Offset d along the joint's axis, m.
-    Offset { joint: usize },
+    Offset {
+        /// Number of the joint, from 1.
+        joint: usize,
+    },
     /// Length a of the common normal, m.
-    Length { joint: usize },
+    Length {
+        /// Number of the joint, from 1.
+        joint: usize,
+    },
     /// Wall of the hollow round section, m.
-    Wall { link: usize },
+    Wall {
+        /// Number of the link, from 1.
+        link: usize,
+    },
 }
 
 impl FileNumber {
@@ -34,6 +55,7 @@ impl FileNumber {
         }
     }
 
+    /// Unit of the number, `kg·m²` or `m`.
     pub fn unit(self) -> &'static str {
         match self {
             FileNumber::Inertia { .. } => "kg·m²",

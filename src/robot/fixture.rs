@@ -1,4 +1,4 @@
-//! The IRB 6640 of the source thesis, for the tests of this floor (the robot file itself is read one floor up).
+//! The IRB 6640 of the source thesis, for the tests of this module (the robot file itself is read by `campaign`).
 
 use nalgebra::Vector3;
 

@@ -10,14 +10,16 @@ pub mod dh;
 pub mod dual;
 pub mod export;
 pub mod file_number;
-
 #[cfg(test)]
 pub(crate) mod fixture;
 pub mod frf;
+mod ik_solution;
 pub mod inverse;
+mod modal_basis;
 pub mod model;
 pub mod numeric_inverse;
 pub mod posture_report;
+mod published_postures;
 pub mod rigid;
 pub mod spherical_wrist;
 pub mod static_deflection;
@@ -28,9 +30,12 @@ pub use chain::{Attachment, AttachmentLaw, Body, Branch, Chain, Element, Grip, P
 pub use dh::Kinematics;
 pub use dual::Dual;
 pub use file_number::FileNumber;
-pub use frf::{FrfBasis, ModalBasis};
-pub use inverse::{IkReference, IkSolution, InverseKinematics};
+pub use frf::FrfBasis;
+pub use ik_solution::IkSolution;
+pub use inverse::{IkReference, InverseKinematics};
+pub use modal_basis::ModalBasis;
 pub use model::{Baseline, RobotModel};
 pub use numeric_inverse::NumericInverse;
 pub use posture_report::PostureReport;
+pub use published_postures::posture_deg;
 pub use spherical_wrist::SphericalWrist;

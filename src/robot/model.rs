@@ -14,6 +14,7 @@ use crate::{InputError, Result};
 /// A robot whose structure can be set up at any posture.
 #[derive(Debug, Clone)]
 pub struct RobotModel {
+    /// What the robot file says.
     pub spec: RobotSpec,
 }
 
@@ -30,7 +31,7 @@ pub struct Baseline {
     pub young_pa: Option<Dual>,
 }
 
-/// Damping ratio a model starts from when nobody has said anything else.
+/// Damping ratio a model starts from when nothing else is given.
 pub const NOMINAL_DAMPING_RATIO: f64 = 0.03;
 
 impl Baseline {
@@ -50,10 +51,12 @@ impl Baseline {
 }
 
 impl RobotModel {
+    /// The model of a robot file.
     pub fn new(spec: RobotSpec) -> Self {
         RobotModel { spec }
     }
 
+    /// Number of joints.
     pub fn joint_count(&self) -> usize {
         self.spec.joints.len()
     }
@@ -246,7 +249,7 @@ mod tests {
         }
     }
 
-    /// Independent numbers of physics.md §2, within 0.5 %.
+    /// Computed independently of this program, within 0.5 %.
     #[test]
     fn flange_stiffness_of_postures_a_and_b() {
         let model = RobotModel::new(irb6640());
@@ -261,7 +264,7 @@ mod tests {
         }
     }
 
-    /// Independent numbers of physics.md §2, within 0.2 %.
+    /// Computed independently of this program, within 0.2 %.
     #[test]
     fn rigid_link_frequencies() {
         let model = RobotModel::new(irb6640());
@@ -280,7 +283,7 @@ mod tests {
         }
     }
 
-    /// physics.md §2: link beams at 200 GPa, config 1; and, with isotropic inertias, an independent finite-element
+    /// Computed independently: link beams at 200 GPa, configuration 1; and, with isotropic inertias, an independent finite-element
     /// program at all four postures.
     #[test]
     fn beam_frequencies_agree_with_finite_elements() {

@@ -10,7 +10,7 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{Isometry3, Point3, SMatrix, SVector, UnitQuaternion, Vector3};
 
 use super::dh::Kinematics;
-use super::inverse::farthest;
+use super::ik_solution::farthest;
 use crate::data::RobotSpec;
 use crate::{Error, Result};
 
@@ -27,7 +27,7 @@ const TOLERANCE: f64 = 1e-11;
 const ITERATIONS: usize = 60;
 /// Longest step of a joint, rad.
 const LONGEST_STEP: f64 = 0.6;
-/// Damping beside the share of the error.
+/// Damping in addition to the share of the error.
 const LEAST_DAMPING: f64 = 1e-12;
 /// Starts at most, and how many more at least after the last one that found something new.
 const STARTS: usize = 160;

@@ -11,10 +11,15 @@ use crate::{Error, Result};
 /// Frequencies in Hz, ascending; stiffness 1/C_ii in base axes, N/m.
 #[derive(Debug, Clone)]
 pub struct PostureReport {
+    /// Undamped natural frequencies, ascending, Hz.
     pub natural_frequencies_hz: Vec<f64>,
+    /// Tool centre point, base frame, m.
     pub tcp_m: [f64; 3],
+    /// Unit vector along the tool, from the spindle to the workpiece, base axes.
     pub tool_axis: [f64; 3],
+    /// Static stiffness at the tool point along x, y, z, N/m.
     pub tcp_stiffness_n_per_m: [f64; 3],
+    /// Static stiffness at the flange along x, y, z, N/m.
     pub flange_stiffness_n_per_m: [f64; 3],
 }
 

@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 use nalgebra::{Isometry3, Rotation3, Vector2, Vector3};
 
 use super::dh::joint_transform;
-use super::inverse::{IkSolution, farthest, limit_margin_rad, nearest_turn, tool_at};
+use super::ik_solution::{IkSolution, farthest, limit_margin_rad, nearest_turn, tool_at};
 use crate::data::RobotSpec;
 use crate::{Error, Result};
 

@@ -7,15 +7,25 @@ use rand_chacha::ChaCha8Rng;
 /// What a stream is drawn for; its number is part of what a seed means, so numbers are never reused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Purpose {
+    /// Settings of a campaign's kind.
     Scenario = 0,
+    /// True parameters of the robot.
     Robot = 1,
+    /// Postures.
     Postures = 2,
+    /// Hidden effects of the library.
     Effects = 3,
+    /// Noise of the FRFs.
     Noise = 4,
+    /// Physics outside the library.
     Foreign = 5,
+    /// Departures ([`super::departure`]).
     Departure = 6,
+    /// Small errors of setup ([`super::Slip`]).
     Laboratory = 7,
+    /// Errors of an FRF that are correlated over frequency.
     ColouredError = 8,
+    /// Noise that the outputs of one hit have in common.
     CommonNoise = 9,
 }
 
@@ -23,12 +33,14 @@ pub enum Purpose {
 pub struct Draws(ChaCha8Rng);
 
 impl Draws {
+    /// The stream of a seed for one purpose.
     pub fn new(seed: u64, purpose: Purpose) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(purpose as u64);
         Draws(random)
     }
 
+    /// Uniform from `low` to below `high`.
     pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.0.random::<f64>()
     }

@@ -19,6 +19,7 @@ pub enum FrfFormat {
 }
 
 impl FrfFormat {
+    /// Ending of the file name, without the dot.
     pub fn extension(self) -> &'static str {
         match self {
             FrfFormat::UffAscii | FrfFormat::UffBinary => "uff",
@@ -38,7 +39,7 @@ impl FrfFormat {
     }
 }
 
-/// Header and lines of the contract's FRF CSV; numbers in full precision.
+/// Header and lines of the FRF CSV that campaigns read; numbers in full precision.
 fn csv(frfs: &[FrfRecord]) -> String {
     let mut text = String::from("frequency_hz");
     for frf in frfs {
@@ -66,7 +67,7 @@ pub fn as_quantity(receptance: Complex64, frequency_hz: f64, quantity: Quantity)
     }
 }
 
-/// The word of the contract.
+/// As `quantity` in campaign.toml.
 pub fn quantity_word(quantity: Quantity) -> &'static str {
     match quantity {
         Quantity::Receptance => "receptance",

@@ -57,7 +57,7 @@ fn parameter(
     }
 }
 
-/// Joints of a standard linear solid: behind each gear's spring a second one with a damper beside it (Kelvin–Voigt), so
+/// Joints of a standard linear solid: behind each gear's spring a second one with a damper parallel to it (Kelvin–Voigt), so
 /// that a joint is softer when moved slowly than when moved fast.
 struct ViscoelasticJoints;
 

@@ -5,7 +5,7 @@ use num_complex::Complex64;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use super::departure::{Channel, Departure, Scene};
+use super::departure::{FrfChannel, LabDeparture, Scene};
 use super::draw::{Draws, Purpose};
 use crate::identify::FrfData;
 use crate::ingest::Axis;
@@ -119,7 +119,7 @@ impl Laboratory {
     }
 }
 
-impl Departure for Laboratory {
+impl LabDeparture for Laboratory {
     fn id(&self) -> &'static str {
         "laboratory"
     }
@@ -189,7 +189,7 @@ impl Departure for Laboratory {
         }
     }
 
-    fn factor(&self, _strength: f64, frequency_hz: f64, channel: &Channel) -> Complex64 {
+    fn factor(&self, _strength: f64, frequency_hz: f64, channel: &FrfChannel) -> Complex64 {
         let mut factor = Complex64::new(1.0, 0.0);
         if self.has(Slip::HammerGain) {
             factor *= self.hammer_gain[channel.posture][channel.reference.1.index()];

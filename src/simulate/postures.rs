@@ -2,8 +2,8 @@
 
 use super::draw::Draws;
 use crate::campaign::Posture;
-use crate::robot::{JointSpec, RobotModel};
-use crate::{Error, Result, thesis};
+use crate::robot::{JointSpec, RobotModel, posture_deg};
+use crate::{Error, Result};
 
 /// Tap-test postures of the built-in robot, in the order in which campaigns visit their neighbourhoods.
 const TAP_IDS: [&str; 4] = ["1", "2", "3", "4"];
@@ -18,6 +18,7 @@ const ATTEMPTS: usize = 2000;
 /// How postures are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PostureScheme {
+    /// How many there are.
     pub count: usize,
     /// The first so many are the tap-test postures themselves (built-in robot only).
     pub exact: usize,
@@ -45,7 +46,7 @@ pub fn draw(
     let references: Vec<Vec<f64>> = match built_in {
         true => TAP_IDS
             .iter()
-            .map(|id| Ok(thesis::posture_deg(id)?.to_vec()))
+            .map(|id| Ok(posture_deg(id)?.to_vec()))
             .collect::<Result<_>>()?,
         false => Vec::new(),
     };

@@ -1,9 +1,11 @@
 //! Campaigns of which everything is drawn, for trying a diagnosis on many.
 
 use super::draw::{Draws, Purpose};
+use super::files::FrfFormat;
+use super::laboratory::Slip;
+use super::noise::LineNoise;
 use super::request::EffectRequest;
-use super::scenario::{Kind, Layout, StructureScenario};
-use super::{FrfFormat, LineNoise, Slip};
+use super::scenario::{CampaignKind, FrfLayout, StructureScenario};
 use crate::ingest::Quantity;
 
 /// What random campaigns hide.
@@ -109,10 +111,15 @@ fn request(effect: &str) -> EffectRequest {
 
 /// Kind, layout and files, nothing hidden yet.
 fn bare(seed: u64, draws: &mut Draws) -> StructureScenario {
-    let kind = *draws.pick(&[Kind::Careful, Kind::Careful, Kind::Direct, Kind::Dirty]);
+    let kind = *draws.pick(&[
+        CampaignKind::Careful,
+        CampaignKind::Careful,
+        CampaignKind::Direct,
+        CampaignKind::Dirty,
+    ]);
     let mut scenario = StructureScenario::of_kind(kind, seed);
-    if scenario.layout == Layout::Roving && draws.chance(0.3) {
-        scenario.layout = Layout::Tool;
+    if scenario.layout == FrfLayout::Roving && draws.chance(0.3) {
+        scenario.layout = FrfLayout::Tool;
     }
     scenario.format = *draws.pick(&[FrfFormat::UffAscii, FrfFormat::UffBinary, FrfFormat::Csv]);
     scenario.quantity = *draws.pick(&[Quantity::Receptance, Quantity::Accelerance, Quantity::Mobility]);
@@ -130,7 +137,7 @@ fn mixed(seed: u64, draws: &mut Draws) -> StructureScenario {
         second = *draws.pick(&LIBRARY);
     }
     let mut foreign = *draws.pick(&FOREIGN);
-    while kind == Kind::Direct && foreign == AXIAL {
+    while kind == CampaignKind::Direct && foreign == AXIAL {
         foreign = *draws.pick(&FOREIGN);
     }
     scenario.visibility_sigmas = Some(draws.log_uniform(VISIBILITY_SIGMAS[0], VISIBILITY_SIGMAS[1]));
@@ -169,7 +176,7 @@ fn of_tier(tier: Tier, seed: u64, draws: &mut Draws) -> StructureScenario {
     let mut foreign = vec![""; FOREIGN.len() + DEPARTURES.len()];
     foreign[..FOREIGN.len()].copy_from_slice(&FOREIGN);
     foreign[FOREIGN.len()..].copy_from_slice(&DEPARTURES);
-    foreign.retain(|id| scenario.kind != Kind::Direct || *id != AXIAL);
+    foreign.retain(|id| scenario.kind != CampaignKind::Direct || *id != AXIAL);
     let foreign = *draws.pick(&foreign);
     let share = draws.log_uniform(EXCESS_SHARE[0], EXCESS_SHARE[1]);
     let sigmas = draws.log_uniform(VISIBILITY_SIGMAS[0], VISIBILITY_SIGMAS[1]);
@@ -204,7 +211,7 @@ fn of_tier(tier: Tier, seed: u64, draws: &mut Draws) -> StructureScenario {
             }
         }
         Tier::Three => {
-            scenario.layout = Layout::Roving;
+            scenario.layout = FrfLayout::Roving;
             scenario.postures.count = scenario.postures.count.max(6);
             scenario.visibility_sigmas = Some(sigmas.max(100.0));
             scenario.effects = [first, second, third_effect].map(request).to_vec();
@@ -231,7 +238,7 @@ mod tests {
             let hidden = count(&|s| s.effects.iter().any(|e| e.effect == effect));
             assert!(hidden > 0, "{effect}");
         }
-        for kind in [Kind::Careful, Kind::Direct, Kind::Dirty] {
+        for kind in [CampaignKind::Careful, CampaignKind::Direct, CampaignKind::Dirty] {
             assert!(count(&|s| s.kind == kind) > 40);
         }
         assert_eq!(scenario(Tier::Mixed, 5), scenario(Tier::Mixed, 5));

@@ -19,7 +19,7 @@ const MOST_VALUES: usize = 20_000_000;
 /// How well a campaign is measured: ready-made settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
+pub enum CampaignKind {
     /// 6 postures, 3×3 FRFs at the tool point and roving points on the links, 1.5–3 % noise.
     Careful,
     /// 4 postures, only the direct X and Y FRFs at the tool point, 3–5 % noise.
@@ -31,7 +31,7 @@ pub enum Kind {
 /// Which FRFs are measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
-pub enum Layout {
+pub enum FrfLayout {
     /// X/X and Y/Y at the tool point.
     Direct,
     /// All nine at the tool point.
@@ -43,12 +43,17 @@ pub enum Layout {
 /// What is simulated. Everything not said here is drawn from the seed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StructureScenario {
+    /// What everything else is drawn from.
     pub seed: u64,
-    pub kind: Kind,
+    /// How well the campaign is measured.
+    pub kind: CampaignKind,
+    /// How postures are drawn.
     pub postures: PostureScheme,
-    pub layout: Layout,
+    /// Which FRFs are measured.
+    pub layout: FrfLayout,
     /// First and last line, Hz.
     pub band_hz: [f64; 2],
+    /// Spacing of the lines, Hz.
     pub step_hz: f64,
     /// Complex standard deviation of the noise as a share of |H|.
     pub noise_relative: f64,
@@ -60,8 +65,11 @@ pub struct StructureScenario {
     pub stiffness_error: f64,
     /// Hammer levels, N; empty: one level that nobody wrote down.
     pub force_levels_n: Vec<f64>,
+    /// Format of the FRF files.
     pub format: FrfFormat,
+    /// Motion that the FRF files hold, per force.
     pub quantity: Quantity,
+    /// Effects that are hidden.
     pub effects: Vec<EffectRequest>,
     /// Kinds of [`super::departure`] in the lab.
     pub departures: Vec<String>,
@@ -70,6 +78,7 @@ pub struct StructureScenario {
     pub excess_share: Option<f64>,
     /// Small errors of setup.
     pub slips: Vec<Slip>,
+    /// How the noise of neighbouring lines belongs together.
     pub line_noise: LineNoise,
     /// Share of the noise's variance that all outputs of one hit have in common (noise of the force channel).
     pub common_noise: f64,
@@ -85,7 +94,7 @@ pub struct StructureScenario {
 
 impl StructureScenario {
     /// The settings of a kind, noise drawn from its range.
-    pub fn of_kind(kind: Kind, seed: u64) -> Self {
+    pub fn of_kind(kind: CampaignKind, seed: u64) -> Self {
         let mut draws = Draws::new(seed, Purpose::Scenario);
         let scheme = |count, exact| PostureScheme {
             count,
@@ -93,9 +102,9 @@ impl StructureScenario {
             spread_deg: 25.0,
         };
         let (postures, layout, noise, mass_error) = match kind {
-            Kind::Careful => (scheme(6, 2), Layout::Roving, [0.015, 0.03], 0.0),
-            Kind::Direct => (scheme(4, 4), Layout::Direct, [0.03, 0.05], 0.0),
-            Kind::Dirty => (scheme(6, 2), Layout::Roving, [0.05, 0.1], 0.05),
+            CampaignKind::Careful => (scheme(6, 2), FrfLayout::Roving, [0.015, 0.03], 0.0),
+            CampaignKind::Direct => (scheme(4, 4), FrfLayout::Direct, [0.03, 0.05], 0.0),
+            CampaignKind::Dirty => (scheme(6, 2), FrfLayout::Roving, [0.05, 0.1], 0.05),
         };
         StructureScenario {
             seed,
@@ -194,9 +203,9 @@ impl StructureScenario {
             );
         }
         let per_line = match self.layout {
-            Layout::Direct => 2,
-            Layout::Tool => 9,
-            Layout::Roving => 36,
+            FrfLayout::Direct => 2,
+            FrfLayout::Tool => 9,
+            FrfLayout::Roving => 36,
         };
         let lines = ((to - from) / step) as usize + 1;
         let values = per_line * self.postures.count * levels.len().max(1) * lines;

@@ -6,18 +6,19 @@
 use num_complex::Complex64;
 use serde_json::{Map, Value, json};
 
-use super::departure::{self, Departed, Departure};
+use super::campaign_folder::LabCampaign;
+use super::departure::{self, Departed, LabDeparture};
 use super::draw::{Draws, Purpose};
 use super::files::{self, FrfEntry, FrfFormat};
 use super::imitation::{self, Imitation};
+use super::lab_robot::LabRobot;
 use super::laboratory::{Laboratory, Slip};
 use super::noise::LineNoise;
 use super::postures;
 use super::request::HiddenEffect;
-use super::scenario::{Layout, NOISE_FLOOR_M_PER_N, StructureScenario};
+use super::scenario::{FrfLayout, NOISE_FLOOR_M_PER_N, StructureScenario};
 use super::strength::{self, Sight};
-use super::visibility::{self, Truth, Visibility};
-use super::{LabCampaign, LabRobot};
+use super::visibility::{self, HiddenTruth, Visibility};
 use crate::campaign::{AxesRef, BodyRef, MeasuredDof, MeasuredFrf, Point, Posture, RobotSection};
 use crate::identify::{FrfData, StructureModel};
 use crate::ingest::{Axis, Dof, FrfRecord};
@@ -85,7 +86,7 @@ impl TrueRobot {
 }
 
 /// Points of a layout: node 1 is the tool point.
-fn points(layout: Layout, joints: usize) -> Vec<Point> {
+fn points(layout: FrfLayout, joints: usize) -> Vec<Point> {
     let point = |node, body| Point {
         node,
         body,
@@ -93,7 +94,7 @@ fn points(layout: Layout, joints: usize) -> Vec<Point> {
         axes: AxesRef::Base,
     };
     let mut all = vec![point(1, BodyRef::Tool)];
-    if layout == Layout::Roving {
+    if layout == FrfLayout::Roving {
         // Links 1, 2 and 4 of a six-axis robot.
         let mut links: Vec<usize> = [1, 2, joints.saturating_sub(2)]
             .into_iter()
@@ -111,10 +112,10 @@ fn points(layout: Layout, joints: usize) -> Vec<Point> {
 }
 
 /// Response and reference (point, axis) of every FRF of a file.
-fn channels(layout: Layout, points: usize) -> Vec<[(usize, Axis); 2]> {
+fn channels(layout: FrfLayout, points: usize) -> Vec<[(usize, Axis); 2]> {
     match layout {
-        Layout::Direct => [Axis::X, Axis::Y].map(|a| [(0, a), (0, a)]).to_vec(),
-        Layout::Tool | Layout::Roving => (0..points)
+        FrfLayout::Direct => [Axis::X, Axis::Y].map(|a| [(0, a), (0, a)]).to_vec(),
+        FrfLayout::Tool | FrfLayout::Roving => (0..points)
             .flat_map(|p| Axis::ALL.map(|a| (p, a)))
             .flat_map(|response| Axis::ALL.map(|a| [response, (0, a)]))
             .collect(),
@@ -186,7 +187,7 @@ pub fn simulate(scenario: &StructureScenario, robot: &LabRobot) -> Result<LabCam
         &mut draws,
     )?;
     let mut data = arrange(scenario, &lab.model.robot, &postures, &lab.model.points)?;
-    let truth = Truth {
+    let truth = HiddenTruth {
         bare: &lab.model,
         bare_theta: &lab.theta,
         summary: data.summary(),

@@ -22,7 +22,7 @@ pub struct Visibility {
 }
 
 /// A model with hidden effects at their true values.
-pub struct Truth<'a> {
+pub struct HiddenTruth<'a> {
     /// Without any effect.
     pub bare: &'a StructureModel,
     /// Its true parameters, solver's scale.
@@ -30,7 +30,7 @@ pub struct Truth<'a> {
     pub summary: DataSummary,
 }
 
-impl Truth<'_> {
+impl HiddenTruth<'_> {
     /// Model and true parameters with these effects.
     pub fn with(&self, effects: &[HiddenEffect]) -> (StructureModel, Vec<f64>) {
         let mut model = self.bare.clone();
@@ -84,7 +84,7 @@ pub fn misfit(model: &StructureModel, theta: &[f64], data: &FrfData) -> Result<f
 /// How plainly effect `i` of `effects` shows in noise-free `data` made with all of them. `stride`: every how many lines
 /// the refit uses.
 pub fn of(
-    truth: &Truth,
+    truth: &HiddenTruth,
     effects: &[HiddenEffect],
     i: usize,
     data: &FrfData,
@@ -132,7 +132,7 @@ const CLOSE: f64 = 0.03;
 /// Sets the size of effect `i` so that it shows at `sigmas` standard deviations, as far as its size can do that, but not
 /// larger than `largest`, and where `possible_only` of a size that is possible. `data` is scratch.
 pub fn resize(
-    truth: &Truth,
+    truth: &HiddenTruth,
     effects: &mut [HiddenEffect],
     i: usize,
     sigmas: f64,

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::departure::{Channel, Departed, Matrices, Scene};
+use super::departure::{Departed, FrfChannel, Matrices, Scene};
 use crate::campaign::Posture;
 use crate::identify::FrfData;
 use crate::identify::StructureModel;
@@ -124,7 +124,7 @@ impl World<'_> {
             let omega = std::f64::consts::TAU * frequency_hz;
             let matrix = dynamics.between(omega, &place)?;
             for (k, (frf, h)) in block.frfs.iter().zip(matrix).enumerate() {
-                let channel = Channel {
+                let channel = FrfChannel {
                     frf: first + k,
                     posture: block.posture,
                     response: (frf.response.point, frf.response.axis),
@@ -295,7 +295,7 @@ mod tests {
     use crate::robot::RobotModel;
     use crate::robot::fixture::{TAP_POSTURES, irb6640};
     use crate::simulate::Slip;
-    use crate::simulate::departure::{self, Departure};
+    use crate::simulate::departure::{self, LabDeparture};
     use crate::simulate::laboratory::Laboratory;
 
     fn postures() -> Vec<Posture> {

@@ -1,7 +1,7 @@
 //! The tables of cutting coefficients in plain words, from their numbers.
 
 use super::cutting_tables::{
-    ACETAL_NAME, CAST, CoefficientRow, CuttingTables, Difference, PRINTED, TableTrend,
+    ACETAL_NAME, CAST, CoefficientDifference, CoefficientRow, CuttingTables, PRINTED, TableTrend,
 };
 use crate::cutting::{ChangeReading, MILLING_COEFFICIENTS};
 
@@ -123,8 +123,8 @@ impl CuttingTables {
 
     fn difference_text(&self) -> String {
         let count = self.differences.len() as f64;
-        let is_found = |d: &&Difference| d.p_value * count <= FALSE_ALARM;
-        let one = |d: &Difference| {
+        let is_found = |d: &&CoefficientDifference| d.p_value * count <= FALSE_ALARM;
+        let one = |d: &CoefficientDifference| {
             format!(
                 "{} {:.0} against {:.0} {} (difference {:.1} ± {:.1}, p = {:.4})",
                 d.coefficient,

@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::rows;
+use super::published::rows;
 use crate::cutting::{ChangeReading, CoefficientChange, Known, MILLING_COEFFICIENTS, table_trend};
 use crate::{Error, Result};
 
@@ -16,8 +16,11 @@ const MISSING_CUTS: [(&str, f64); 3] = [("A", 0.05), ("A", 0.15), ("H", 0.05)];
 /// Two tools broke in the printed titanium: no row of it has all feeds, and which ones are missing is not printed (thesis,
 /// 10.2.3 and 10.3.3).
 const INCOMPLETE: &str = PRINTED;
+/// Acetal, milled on the robot.
 pub const ACETAL_NAME: &str = "acetal";
+/// Cast titanium, milled on a machine tool.
 pub const CAST: &str = "Ti6Al4V";
+/// Printed (WAAM) titanium, milled on a machine tool.
 pub const PRINTED: &str = "WAAM Ti";
 
 /// One row of a table.
@@ -25,7 +28,9 @@ pub const PRINTED: &str = "WAAM Ti";
 pub struct CoefficientRow {
     /// The thesis's letter.
     pub graph: String,
+    /// What was cut.
     pub material: String,
+    /// Cutting speed, m/min.
     pub cutting_speed_m_per_min: f64,
     /// Tooth-passing frequency at that speed.
     pub tooth_passing_hz: f64,
@@ -33,6 +38,7 @@ pub struct CoefficientRow {
     pub coefficients: [f64; 6],
     /// Feeds that gave data; `None` where it is only known that some are missing.
     pub feeds: Option<usize>,
+    /// Feeds of the plan.
     pub feeds_planned: usize,
     /// Standard error of the edge coefficients over that of the full plan, at the same scatter of the averages; `None` where
     /// the feeds are not known.
@@ -54,38 +60,54 @@ impl CoefficientRow {
 /// A coefficient of one material over speed: least squares on log2(speed), errors from the scatter about the line.
 #[derive(Debug, Clone, Serialize)]
 pub struct TableTrend {
+    /// What was cut.
     pub material: String,
     /// `slow`, `fast` or `all` speeds.
     pub speeds: &'static str,
+    /// Lowest and highest cutting speed, m/min.
     pub speed_range_m_per_min: [f64; 2],
+    /// Name of the coefficient, such as `Ktc`.
     pub coefficient: &'static str,
+    /// Its unit.
     pub unit: &'static str,
     /// At the geometric mean of the range.
     pub value: Option<Known>,
+    /// Change per doubling of the speed.
     pub per_doubling: Option<Known>,
+    /// Probability of so steep a line where there is no trend.
     pub p_value: Option<f64>,
+    /// What may be read from it.
     pub reading: ChangeReading,
 }
 
 /// Printed less cast titanium, pair by pair at the same speed.
 #[derive(Debug, Clone, Serialize)]
-pub struct Difference {
+pub struct CoefficientDifference {
+    /// Name of the coefficient, such as `Ktc`.
     pub coefficient: &'static str,
+    /// Its unit.
     pub unit: &'static str,
+    /// Mean over the pairs, cast.
     pub cast_mean: f64,
+    /// Mean over the pairs, printed.
     pub printed_mean: f64,
     /// Mean over the pairs with its standard error.
     pub difference: Known,
+    /// Speeds at which both were cut.
     pub pairs: usize,
     /// Paired t test.
     pub p_value: f64,
 }
 
+/// The tables and what they tell.
 #[derive(Debug, Clone, Serialize)]
 pub struct CuttingTables {
+    /// Rows of both tables.
     pub rows: Vec<CoefficientRow>,
+    /// Coefficients over cutting speed.
     pub trends: Vec<TableTrend>,
-    pub differences: Vec<Difference>,
+    /// Printed against cast titanium, by coefficient.
+    pub differences: Vec<CoefficientDifference>,
     /// Correlation over the rows of a material between Ktc and Kte, and what mere scatter of the averages would give.
     pub seesaw: Vec<Seesaw>,
     /// Standard error of the slopes of the printed titanium against four feeds, if one is missing: least and most.
@@ -94,9 +116,12 @@ pub struct CuttingTables {
     pub reading: Vec<String>,
 }
 
+/// How Ktc and Kte of a material go together over its rows.
 #[derive(Debug, Clone, Serialize)]
 pub struct Seesaw {
+    /// What was cut.
     pub material: String,
+    /// Correlation between Ktc and Kte.
     pub correlation: f64,
     /// Of the errors of slope and intercept at the planned feeds.
     pub of_mere_scatter: f64,
@@ -237,6 +262,7 @@ pub fn cutting_tables() -> Result<CuttingTables> {
 }
 
 impl CuttingTables {
+    /// The rows of a material.
     pub fn of<'a>(&'a self, material: &'a str) -> impl Iterator<Item = &'a CoefficientRow> {
         self.rows.iter().filter(move |r| r.material == material)
     }
@@ -296,7 +322,7 @@ fn trends(table: &[CoefficientRow], material: &str) -> Vec<TableTrend> {
     found
 }
 
-fn differences(table: &[CoefficientRow]) -> Vec<Difference> {
+fn differences(table: &[CoefficientRow]) -> Vec<CoefficientDifference> {
     let (cast, printed) = (of(table, CAST), of(table, PRINTED));
     let one = |(j, kind): (usize, &crate::cutting::CoefficientKind)| {
         let pairs: Vec<(f64, f64)> = cast
@@ -313,7 +339,7 @@ fn differences(table: &[CoefficientRow]) -> Vec<Difference> {
         let (mean, square_sum) = spread(&apart);
         let std_error = (square_sum / (n - 1.0) / n).sqrt();
         let t = StudentsT::new(0.0, 1.0, n - 1.0).ok()?;
-        Some(Difference {
+        Some(CoefficientDifference {
             coefficient: kind.label,
             unit: kind.unit,
             cast_mean: pairs.iter().map(|p| p.0).sum::<f64>() / n,

@@ -3,8 +3,7 @@
 
 use serde::Serialize;
 
-use super::{MINIMA, MODAL, STATIC_STIFFNESS, posture_deg};
-use super::{ModalRow, RECURRING_BANDS, StaticRow, rows};
+use super::published::{MINIMA, MODAL, ModalRow, RECURRING_BANDS, STATIC_STIFFNESS, StaticRow, rows};
 use crate::discrepancy::difference::{Difference, Lookout, greatest_difference};
 use crate::discrepancy::verdict::{STRONG_BIC, evidence_weight};
 use crate::discrepancy::{DiagnosisVerdict, diagnose};
@@ -12,7 +11,7 @@ use crate::identify::modal_table::{FREQUENCY_STD, PEAK_STD};
 use crate::identify::resonance_study::{Minimum, Resonance, ResonanceReading, ResonanceStudy, merged};
 use crate::identify::{Estimate, StructureModel};
 use crate::ingest::Axis;
-use crate::robot::PostureReport;
+use crate::robot::{PostureReport, posture_deg};
 use crate::{Error, Result};
 
 /// The four configurations of the tap tests.
@@ -20,8 +19,8 @@ pub const CONFIGURATIONS: [&str; 4] = ["1", "2", "3", "4"];
 /// Standard deviation of the logarithm of a depth in the list of minima, a factor of two: damping differs from mode to
 /// mode where the model has one ratio, and neighbours add to a minimum.
 pub const DEPTH_STD: f64 = 0.7;
-/// The loop is run once more with frequencies this much less certain: a conclusion that hangs on the assumed standard
-/// deviation is none.
+/// The loop is run once more with frequencies this much less certain: a conclusion that depends on the assumed standard
+/// deviation does not count.
 pub const WIDENED: f64 = 2.0;
 /// Band in which the next measurement is sought, Hz: both bands of resonances in question.
 const LOOK_HZ: [f64; 2] = [30.0, 52.0];
@@ -31,13 +30,17 @@ const LEAST_SHARE: f64 = 0.1;
 /// The answer and what it rests on.
 #[derive(Debug, Clone, Serialize)]
 pub struct RealCase {
+    /// What the loop answers.
     pub verdict: DiagnosisVerdict,
+    /// How sure it is of that, 0..1.
     pub confidence: f64,
     /// Resonances after neighbouring minima were merged; two numbers each.
     pub resonances: Vec<MeasuredResonance>,
     /// Assumed standard deviations of logarithms: frequency; peak of the modal table; depth of a minimum.
     pub frequency_std: f64,
+    /// Of a peak of the modal table.
     pub peak_std: f64,
+    /// Of the depth of a minimum.
     pub depth_std: f64,
     /// The rigid-link model with its joints tuned to all resonances: the loop's baseline.
     pub baseline: Explanation,
@@ -45,6 +48,7 @@ pub struct RealCase {
     pub baseline_parameters: Vec<Estimate>,
     /// Starting points of that fit, and how many of them led to it.
     pub starts: usize,
+    /// Starting points that led to the same fit.
     pub starts_agreeing: usize,
     /// Best first.
     pub candidates: Vec<Explanation>,
@@ -54,8 +58,10 @@ pub struct RealCase {
     pub widened: Widened,
     /// Modes of each configuration, Hz, as far as the table reaches: baseline and best candidate.
     pub baseline_modes_hz: Vec<Vec<f64>>,
+    /// Modes of the best candidate, by configuration, Hz.
     pub best_modes_hz: Vec<Vec<f64>>,
-    pub next: Vec<NextMeasurement>,
+    /// What to measure next.
+    pub next: Vec<TellingMeasurement>,
     /// Effects that the tables cannot show, with the reason.
     pub not_tried: Vec<(String, String)>,
 }
@@ -63,17 +69,25 @@ pub struct RealCase {
 /// A measured resonance, and the mode that comes nearest in the baseline and in the best candidate.
 #[derive(Debug, Clone, Serialize)]
 pub struct MeasuredResonance {
+    /// `1` … `4`, as in the thesis.
     pub configuration: String,
+    /// `X` or `Y`.
     pub axis: char,
+    /// Which table it is from.
     pub reading: ResonanceReading,
+    /// Measured frequency, Hz.
     pub frequency_hz: f64,
     /// Lowest and highest reading behind it.
     pub readings_hz: [f64; 2],
+    /// Peak or depth of the real part of the receptance, m/N.
     pub size_m_per_n: f64,
+    /// Nearest mode of the baseline, Hz.
     pub baseline_hz: f64,
+    /// Nearest mode of the best candidate, Hz.
     pub best_hz: f64,
     /// Distance in standard deviations, frequency and size together.
     pub baseline_distance: f64,
+    /// The same for the best candidate.
     pub best_distance: f64,
     /// Whether the best candidate has a mode within four standard deviations.
     pub best_met: bool,
@@ -84,6 +98,7 @@ pub struct MeasuredResonance {
 pub struct Explanation {
     /// `effect@site`; `rigid links` for the baseline.
     pub name: String,
+    /// The same, for people.
     pub explanation: String,
     /// The effect's own parameters.
     pub parameters: Vec<Estimate>,
@@ -91,15 +106,18 @@ pub struct Explanation {
     pub delta_bic: f64,
     /// Corrected for the number of effects tried; 1 for the baseline.
     pub p_value: f64,
+    /// χ² over degrees of freedom.
     pub reduced_chi2: f64,
     /// Σ d² on configurations left out in turn.
     pub held_out_chi2: f64,
+    /// Whether a parameter ended at a bound.
     pub at_bound: bool,
     /// Tempered weight of its BIC among all explanations, baseline included; they sum to 1. Not a probability that it is
     /// right: that supposes that one of them is.
     pub weight: f64,
     /// Resonances that have a mode within four standard deviations, of all.
     pub met: usize,
+    /// The bands of recurring resonances.
     pub bands: Vec<BandCheck>,
     /// Static stiffness at the flange, model over measurement, least and greatest: never fitted.
     pub static_ratio: [f64; 2],
@@ -108,8 +126,11 @@ pub struct Explanation {
 /// A band of recurring resonances in one explanation.
 #[derive(Debug, Clone, Serialize)]
 pub struct BandCheck {
+    /// Lower end of the band, Hz.
     pub from_hz: f64,
+    /// Upper end of the band, Hz.
     pub to_hz: f64,
+    /// Resonances measured in the band.
     pub measured: usize,
     /// Those that have a mode within four standard deviations.
     pub met: usize,
@@ -118,18 +139,26 @@ pub struct BandCheck {
 /// The loop's answer with wider standard deviations.
 #[derive(Debug, Clone, Serialize)]
 pub struct Widened {
+    /// What the loop answers.
     pub verdict: DiagnosisVerdict,
+    /// How sure it is of that, 0..1.
     pub confidence: f64,
+    /// Name of the best explanation.
     pub best: String,
+    /// Its BIC less the baseline's.
     pub delta_bic: f64,
+    /// Corrected for the number of effects tried.
     pub p_value: f64,
+    /// χ² over degrees of freedom.
     pub reduced_chi2: f64,
 }
 
 /// What would tell two explanations apart.
 #[derive(Debug, Clone, Serialize)]
-pub struct NextMeasurement {
+pub struct TellingMeasurement {
+    /// Names of the two.
     pub explanations: [String; 2],
+    /// Where their FRFs differ most, against the noise.
     pub difference: Difference,
 }
 
@@ -263,9 +292,9 @@ pub fn real_case(model: &StructureModel) -> Result<RealCase> {
         .map(|c| c.name.clone())
         .collect();
 
-    let next_to = |name: &str, model: &StructureModel, theta: &[f64]| -> Result<Option<NextMeasurement>> {
+    let next_to = |name: &str, model: &StructureModel, theta: &[f64]| -> Result<Option<TellingMeasurement>> {
         let difference = difference(&study, (&best.model, &best.theta), (model, theta))?;
-        Ok(difference.map(|difference| NextMeasurement {
+        Ok(difference.map(|difference| TellingMeasurement {
             explanations: [best.label(), name.to_string()],
             difference,
         }))
@@ -430,7 +459,7 @@ fn difference(
 
 #[cfg(test)]
 mod tests {
-    use super::super::untuned_model;
+    use super::super::published::untuned_model;
     use super::*;
 
     /// What the tables say today, verdict and order; the digits may move.

@@ -361,8 +361,8 @@ fn milling_with_one_degree_of_freedom() {
         let limit = StabilitySolver::new(force, &frf).absolute_limit().unwrap();
         assert_relative_eq!(limit.depth_mm, expected_mm, max_relative = 2e-3);
     }
-    // Zero-order knows no flip lobes: 4.96 mm where semi-discretisation has 1.30 at a/D 0.05. (references.md says
-    // 4.87: the least of scattered points within 0.2 % of the speed, on a steep flank.)
+    // Zero-order knows no flip lobes: 4.96 mm where semi-discretisation has 1.30 at a/D 0.05. (The reference computation
+    // says 4.87: the least of scattered points within 0.2 % of the speed, on a steep flank.)
     let thin = StabilitySolver::new(down_milling(600.0, 200.0, 2, 0.05), &frf);
     assert_relative_eq!(
         thin.limit_at(18000.0).unwrap().depth_mm,
@@ -397,7 +397,7 @@ fn altintas_and_budak_1995() {
     let limit = solver.absolute_limit().unwrap();
     assert_relative_eq!(limit.depth_mm, 1.087, max_relative = 2e-3);
     assert!((limit.chatter_hz - 633.0).abs() < 1.0, "{} Hz", limit.chatter_hz);
-    // Second column: root-finding on each eigenvalue and lobe in another language. Third: references.md, which took
+    // Second column: root-finding on each eigenvalue and lobe in another language. Third: the reference computation, which took
     // the least of scattered points within 0.2 % of the speed, low on the flanks of lobes.
     for (rpm, exact_mm, scattered_mm) in [
         (5000.0, 1.0870218, 1.087),

@@ -2,10 +2,13 @@
 
 use num_complex::Complex64;
 
-use super::subspace::{Order, SubspacePole};
-use super::{OperationalMode, RejectedMode, Stability};
+use super::mode::OperationalMode;
+use super::subspace::{OrderPoles, SubspacePole};
+use crate::modal::global_modes::RejectedMode;
 use crate::modal::shape::{self, mac};
-use crate::modal::stabilisation::{DAMPING_TOLERANCE, DiagramPole, FREQUENCY_TOLERANCE, MAC_TOLERANCE};
+use crate::modal::stabilisation::{
+    DAMPING_TOLERANCE, DiagramPole, FREQUENCY_TOLERANCE, MAC_TOLERANCE, Stability,
+};
 use crate::signal::median;
 
 /// A pole may be missing at this many orders in a row and still be the same.
@@ -24,14 +27,14 @@ const COLLINEAR: f64 = 0.5;
 const SAME_WIDTHS: f64 = 0.7;
 
 /// One pole over the orders.
-pub(super) struct Chain<'a> {
+pub(super) struct PoleChain<'a> {
     /// From the lowest order on: index of the order, the pole and how it agrees with the one before.
     links: Vec<(usize, &'a SubspacePole, Stability)>,
 }
 
 /// Chains the poles of neighbouring orders, nearest pairs first; fills the diagram.
-pub(super) fn follow<'a>(orders: &'a [Order], diagram: &mut Vec<DiagramPole>) -> Vec<Chain<'a>> {
-    let mut chains: Vec<Chain> = Vec::new();
+pub(super) fn follow<'a>(orders: &'a [OrderPoles], diagram: &mut Vec<DiagramPole>) -> Vec<PoleChain<'a>> {
+    let mut chains: Vec<PoleChain> = Vec::new();
     for (index, order) in orders.iter().enumerate() {
         let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
         let known: Vec<bool> = order.poles.iter().map(is_known).collect();
@@ -66,7 +69,7 @@ pub(super) fn follow<'a>(orders: &'a [Order], diagram: &mut Vec<DiagramPole>) ->
                     stability
                 }
                 None => {
-                    chains.push(Chain {
+                    chains.push(PoleChain {
                         links: vec![(index, pole, Stability::New)],
                     });
                     Stability::New
@@ -101,11 +104,11 @@ fn agreement(pole: &SubspacePole, before: &SubspacePole) -> Stability {
 
 /// Modes among the chains, and long chains that are none with the reason.
 pub(super) fn choose(
-    chains: &[Chain],
+    chains: &[PoleChain],
     orders: usize,
     channels: usize,
 ) -> (Vec<OperationalMode>, Vec<RejectedMode>) {
-    let mut long: Vec<&Chain> = chains.iter().filter(|c| c.links.len() >= STAYS.0).collect();
+    let mut long: Vec<&PoleChain> = chains.iter().filter(|c| c.links.len() >= STAYS.0).collect();
     long.sort_by_key(|c| std::cmp::Reverse(c.links.len()));
     let mut modes: Vec<OperationalMode> = Vec::new();
     let mut rejected = Vec::new();
@@ -139,7 +142,7 @@ pub(super) fn choose(
 /// Mean over the upper two thirds of a chain (low orders are biased by what they cannot follow), weighted with 1/σ²: at
 /// an order that parts two nearly equal singular values all poles are badly determined. To the scatter between segments,
 /// which all orders share, comes that between orders.
-fn summary(chain: &Chain) -> OperationalMode {
+fn summary(chain: &PoleChain) -> OperationalMode {
     let upper = &chain.links[chain.links.len() / 3..];
     let weighted = |of: &dyn Fn(&SubspacePole) -> (f64, f64)| -> (f64, f64) {
         let (mut sum, mut weights) = (0.0, 0.0);
@@ -173,7 +176,7 @@ fn summary(chain: &Chain) -> OperationalMode {
 }
 
 /// Why a chain is no mode.
-fn fault(chain: &Chain, mode: &OperationalMode, orders: usize, channels: usize) -> Option<String> {
+fn fault(chain: &PoleChain, mode: &OperationalMode, orders: usize, channels: usize) -> Option<String> {
     let first = chain.links[0].0;
     let possible = orders - first;
     let held = chain.links.len();

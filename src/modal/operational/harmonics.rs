@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use realfft::RealFftPlanner;
 use serde::Serialize;
 
-use super::OperationalMode;
+use super::mode::OperationalMode;
 
 /// Lines of the periodogram on either side of a peak that are its own (Hann window) …
 const OWN: usize = 3;
@@ -22,7 +22,7 @@ const AROUND: usize = 12;
 const FALSE_ALARM: f64 = 1e-3;
 /// Hann's neighbouring lines are correlated: so many of them are worth one independent one.
 const CORRELATED: f64 = 1.5;
-/// Rounds of finding and taking out: a strong line hides weak ones beside it.
+/// Rounds of finding and taking out: a strong line hides weak ones next to it.
 const ROUNDS: usize = 3;
 /// Mean fourth power of the envelope over its squared mean square: 2 for random motion, 1 for a sine.
 const CONSTANT: f64 = 1.5;
@@ -38,6 +38,7 @@ const HIGHEST: u32 = 200;
 /// One line of a rotating part (or of the mains).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Harmonic {
+    /// Frequency of the line, Hz.
     pub frequency_hz: f64,
     /// Power of the line over that of its neighbourhood, in the channel that shows it best.
     pub over_noise: f64,

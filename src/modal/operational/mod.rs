@@ -8,31 +8,26 @@
 //! The excitation must be broad-band. A spindle is not: its harmonics are recognised beforehand as lines that are
 //! narrower than any mode, taken out, and told; what wavers too much for that is recognised by its constant envelope.
 
-use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::RejectedMode;
-use super::shape::Complexity;
-use super::stabilisation::{DiagramPole, Stability};
+use super::global_modes::RejectedMode;
+use super::stabilisation::DiagramPole;
 use crate::{InputError, Result};
 
 mod chains;
 mod correlation;
 mod harmonics;
+mod mode;
+mod record;
 mod resample;
 mod subspace;
 #[cfg(test)]
 mod tests;
 
 pub use harmonics::Harmonic;
-
-/// A record of responses, all of one length and any unit of motion.
-#[derive(Debug, Clone, Copy)]
-pub struct OperationalRecord<'a> {
-    pub sample_rate_hz: f64,
-    pub channels: &'a [&'a [f64]],
-}
+pub use mode::OperationalMode;
+pub use record::OperationalRecord;
 
 /// What to look at, and how far.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -45,24 +40,6 @@ pub struct OperationalSettings {
     pub spindle_rpm: Option<f64>,
 }
 
-/// One mode found from responses alone.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct OperationalMode {
-    pub frequency_hz: f64,
-    pub damping_ratio: f64,
-    pub frequency_std_hz: f64,
-    pub damping_std: f64,
-    /// Orders at which the pole stays.
-    pub orders: usize,
-    /// How far the shape is from a standing wave; `None` for a single channel.
-    pub complexity: Option<Complexity>,
-    /// By channel, the largest component 1; unscaled: without the force there is no modal mass.
-    #[serde(skip)]
-    pub shape: Vec<Complex64>,
-    /// Why this may be no mode of the structure, in words; empty for one without doubt.
-    pub doubts: Vec<String>,
-}
-
 /// What a record of responses says.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct OperationalModes {
@@ -70,9 +47,11 @@ pub struct OperationalModes {
     pub modes: Vec<OperationalMode>,
     /// Lines of rotating parts, ascending in frequency; taken out before the modes were sought.
     pub harmonics: Vec<Harmonic>,
+    /// What resembled a mode but is not one; ascending in frequency.
     pub rejected: Vec<RejectedMode>,
     /// Poles of all orders.
     pub poles: Vec<DiagramPole>,
+    /// Highest model order.
     pub max_order: usize,
     /// Sampling rate after thinning, Hz.
     pub sample_rate_hz: f64,
@@ -80,6 +59,7 @@ pub struct OperationalModes {
     pub segments: usize,
     /// Longest lag of the correlations, s.
     pub longest_lag_s: f64,
+    /// What changes the result, in words.
     pub warnings: Vec<String>,
 }
 

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use rayon::prelude::*;
 
-use super::OperationalRecord;
+use super::record::OperationalRecord;
 
 /// Share of the sampling rate up to which poles are sought: above it the low-pass filter bends the responses.
 pub(super) const USABLE: f64 = 0.4;

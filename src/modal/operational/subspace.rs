@@ -30,7 +30,7 @@ pub(super) struct SubspacePole {
 
 /// Poles of one order, ascending in frequency.
 #[derive(Debug, Clone)]
-pub(super) struct Order {
+pub(super) struct OrderPoles {
     pub order: usize,
     pub poles: Vec<SubspacePole>,
 }
@@ -59,12 +59,12 @@ pub(super) fn orders(
     plan: &Plan,
     rate_hz: f64,
     band_hz: [f64; 2],
-) -> Result<Vec<Order>> {
+) -> Result<Vec<OrderPoles>> {
     let decomposition = decompose(segments, plan)?;
     Ok(plan
         .orders()
         .into_par_iter()
-        .map(|order| Order {
+        .map(|order| OrderPoles {
             order,
             poles: poles(&decomposition, plan, order, rate_hz, band_hz).unwrap_or_default(),
         })

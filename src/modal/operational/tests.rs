@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use num_complex::Complex64;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -26,8 +26,11 @@ pub struct Request {
 /// A robot from a URDF.
 #[derive(Debug, Clone)]
 pub struct UrdfRobot {
+    /// The robot as a robot file has it.
     pub spec: RobotSpec,
+    /// Link of the URDF that stands on the ground.
     pub base_link: String,
+    /// Link of the URDF that carries the tool.
     pub tool_link: String,
     /// What was decided, for people: frames, links taken together, joints held.
     pub notes: Vec<String>,
@@ -402,7 +405,7 @@ fn isometry(pose: &Pose) -> Isometry3<f64> {
     )
 }
 
-/// Without what is rounding beside `size`.
+/// Without what is rounding compared with `size`.
 fn rounded(vector: Vector3<f64>, size: f64) -> [f64; 3] {
     let kept = vector.map(|v| if v.abs() < ROUNDING * size { 0.0 } else { v });
     kept.into()

@@ -1,4 +1,4 @@
-//! A robot as a URDF, and in a file beside it what a URDF has no place for.
+//! A robot as a URDF, and in a file next to it what a URDF has no place for.
 
 use std::collections::HashSet;
 use std::fmt::Write;
@@ -19,6 +19,7 @@ pub struct Sources {
     pub mass_scale: Vec<f64>,
     /// One a joint.
     pub compliance_rad_per_nm: Vec<f64>,
+    /// One damping ratio for all modes.
     pub damping_ratio: f64,
     /// Young's modulus of the links where they bend.
     pub young_pa: Option<f64>,

@@ -4,27 +4,27 @@ use nalgebra::Vector3;
 use num_complex::Complex64;
 use serde_json::{Map, Value, json};
 
-use super::{Channel, Departure, described, direction, pick_index, sign};
+use super::lab_departure::{FrfChannel, LabDeparture, described, direction, pick_index, sign};
 use crate::data::RobotSpec;
 use crate::ingest::Axis;
 use crate::simulate::draw::Draws;
 
 /// The controller shows one joint's angle wrongly, everywhere by as much.
-pub struct EncoderOffset {
+pub struct ShiftedEncoder {
     joint: usize,
     offset_deg: f64,
 }
 
-impl EncoderOffset {
-    pub fn draw(robot: &RobotSpec, draws: &mut Draws) -> Box<dyn Departure> {
-        Box::new(EncoderOffset {
+impl ShiftedEncoder {
+    pub fn draw(robot: &RobotSpec, draws: &mut Draws) -> Box<dyn LabDeparture> {
+        Box::new(ShiftedEncoder {
             joint: pick_index(robot.joints.len(), 2, 5, draws),
             offset_deg: sign(draws) * draws.log_uniform(2.0, 5.0),
         })
     }
 }
 
-impl Departure for EncoderOffset {
+impl LabDeparture for ShiftedEncoder {
     fn id(&self) -> &'static str {
         "encoder-offset"
     }
@@ -42,20 +42,20 @@ impl Departure for EncoderOffset {
     }
 }
 
-/// The tool point is measured and hit beside where it is written to be.
+/// The tool point is measured and hit next to where it is written to be.
 pub struct ToolPointOff {
     offset_m: Vector3<f64>,
 }
 
 impl ToolPointOff {
-    pub fn draw(_robot: &RobotSpec, draws: &mut Draws) -> Box<dyn Departure> {
+    pub fn draw(_robot: &RobotSpec, draws: &mut Draws) -> Box<dyn LabDeparture> {
         Box::new(ToolPointOff {
             offset_m: direction(draws) * draws.log_uniform(0.03, 0.08),
         })
     }
 }
 
-impl Departure for ToolPointOff {
+impl LabDeparture for ToolPointOff {
     fn id(&self) -> &'static str {
         "tool-point-off"
     }
@@ -78,7 +78,7 @@ pub struct HighPass {
 }
 
 impl HighPass {
-    pub fn draw(_robot: &RobotSpec, draws: &mut Draws) -> Box<dyn Departure> {
+    pub fn draw(_robot: &RobotSpec, draws: &mut Draws) -> Box<dyn LabDeparture> {
         Box::new(HighPass {
             corner_hz: draws.log_uniform(0.5, 2.0),
         })
@@ -86,12 +86,12 @@ impl HighPass {
 }
 
 /// First-order high-pass, 1 far above its corner.
-pub(in crate::simulate) fn high_pass(frequency_hz: f64, corner_hz: f64) -> Complex64 {
+pub(crate) fn high_pass(frequency_hz: f64, corner_hz: f64) -> Complex64 {
     let ratio = Complex64::new(0.0, frequency_hz);
     ratio / (ratio + corner_hz)
 }
 
-impl Departure for HighPass {
+impl LabDeparture for HighPass {
     fn id(&self) -> &'static str {
         "sensor-high-pass"
     }
@@ -100,7 +100,7 @@ impl Departure for HighPass {
         described([("corner_hz", json!(strength * self.corner_hz))])
     }
 
-    fn factor(&self, strength: f64, frequency_hz: f64, _channel: &Channel) -> Complex64 {
+    fn factor(&self, strength: f64, frequency_hz: f64, _channel: &FrfChannel) -> Complex64 {
         high_pass(frequency_hz, strength * self.corner_hz)
     }
 }
@@ -112,7 +112,7 @@ pub struct HitGain {
 }
 
 impl HitGain {
-    pub fn draw(_robot: &RobotSpec, draws: &mut Draws) -> Box<dyn Departure> {
+    pub fn draw(_robot: &RobotSpec, draws: &mut Draws) -> Box<dyn LabDeparture> {
         // X or Y: every layout has them.
         Box::new(HitGain {
             axis: *draws.pick(&[Axis::X, Axis::Y]),
@@ -121,7 +121,7 @@ impl HitGain {
     }
 }
 
-impl Departure for HitGain {
+impl LabDeparture for HitGain {
     fn id(&self) -> &'static str {
         "gain-of-one-direction"
     }
@@ -133,13 +133,13 @@ impl Departure for HitGain {
         ])
     }
 
-    fn factor(&self, strength: f64, _frequency_hz: f64, channel: &Channel) -> Complex64 {
+    fn factor(&self, strength: f64, _frequency_hz: f64, channel: &FrfChannel) -> Complex64 {
         let own = channel.reference.1 == self.axis;
         Complex64::from(if own { 1.0 + strength * self.gain } else { 1.0 })
     }
 }
 
-/// A table or stand beside the robot is felt at the tool point: one resonance that no posture moves.
+/// A table or stand next to the robot is felt at the tool point: one resonance that no posture moves.
 pub struct TableMode {
     direction: Vector3<f64>,
     frequency_hz: f64,
@@ -148,7 +148,7 @@ pub struct TableMode {
 }
 
 impl TableMode {
-    pub fn draw(_robot: &RobotSpec, draws: &mut Draws) -> Box<dyn Departure> {
+    pub fn draw(_robot: &RobotSpec, draws: &mut Draws) -> Box<dyn LabDeparture> {
         // Mostly horizontal: every layout hits along X and Y.
         let across = direction(draws);
         Box::new(TableMode {
@@ -160,7 +160,7 @@ impl TableMode {
     }
 }
 
-impl Departure for TableMode {
+impl LabDeparture for TableMode {
     fn id(&self) -> &'static str {
         "table-mode"
     }
@@ -174,7 +174,7 @@ impl Departure for TableMode {
         ])
     }
 
-    fn added_m_per_n(&self, strength: f64, frequency_hz: f64, channel: &Channel) -> Complex64 {
+    fn added_m_per_n(&self, strength: f64, frequency_hz: f64, channel: &FrfChannel) -> Complex64 {
         let ((point, out), (_, into)) = (channel.response, channel.reference);
         if point != 0 {
             return Complex64::ZERO;

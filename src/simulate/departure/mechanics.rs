@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, Point3, Vector3, Vector6};
 use serde_json::{Map, Value, json};
 
-use super::{Departure, Matrices, Scene, described, direction, pick_index, sign};
+use super::lab_departure::{LabDeparture, Matrices, Scene, described, direction, pick_index, sign};
 use crate::data::RobotSpec;
 use crate::robot::{Body, Branch, Chain, Dual, Element, Place, Role, Slot};
 use crate::simulate::draw::Draws;
@@ -17,7 +17,7 @@ pub struct Hysteretic {
 }
 
 impl Hysteretic {
-    pub fn draw(_robot: &RobotSpec, draws: &mut Draws) -> Box<dyn Departure> {
+    pub fn draw(_robot: &RobotSpec, draws: &mut Draws) -> Box<dyn LabDeparture> {
         Box::new(Hysteretic {
             ratio: draws.log_uniform(0.7, 1.4),
         })
@@ -27,7 +27,7 @@ impl Hysteretic {
 /// The damping ratio that robots of the lab have on average: what a loss factor stands in for.
 const DAMPING_RATIO: f64 = 0.03;
 
-impl Departure for Hysteretic {
+impl LabDeparture for Hysteretic {
     fn id(&self) -> &'static str {
         "hysteretic-damping"
     }
@@ -54,7 +54,7 @@ pub struct JointLossFactors {
 }
 
 impl JointLossFactors {
-    pub fn draw(robot: &RobotSpec, draws: &mut Draws) -> Box<dyn Departure> {
+    pub fn draw(robot: &RobotSpec, draws: &mut Draws) -> Box<dyn LabDeparture> {
         Box::new(JointLossFactors {
             loss_factors: robot
                 .joints
@@ -65,7 +65,7 @@ impl JointLossFactors {
     }
 }
 
-impl Departure for JointLossFactors {
+impl LabDeparture for JointLossFactors {
     fn id(&self) -> &'static str {
         "joint-loss-factors"
     }
@@ -114,7 +114,7 @@ pub struct Resonators {
 
 impl Resonators {
     /// Two on one link.
-    pub fn draw_two(robot: &RobotSpec, draws: &mut Draws) -> Box<dyn Departure> {
+    pub fn draw_two(robot: &RobotSpec, draws: &mut Draws) -> Box<dyn LabDeparture> {
         let link = pick_index(robot.links.len(), 2, 4, draws);
         let first = Resonator::draw(*draws.pick(&[0, 1, 2]), draws);
         let mut second = Resonator::draw(*draws.pick(&[0, 1, 2]), draws);
@@ -128,7 +128,7 @@ impl Resonators {
     }
 
     /// One on a link where the library has none.
-    pub fn draw_elsewhere(robot: &RobotSpec, draws: &mut Draws) -> Box<dyn Departure> {
+    pub fn draw_elsewhere(robot: &RobotSpec, draws: &mut Draws) -> Box<dyn LabDeparture> {
         let link = match draws.chance(0.4) {
             true => 1,
             false => pick_index(robot.links.len(), 5, 6, draws),
@@ -148,7 +148,7 @@ impl Resonators {
     }
 
     /// One that swings both ways, at two frequencies.
-    pub fn draw_two_axes(robot: &RobotSpec, draws: &mut Draws) -> Box<dyn Departure> {
+    pub fn draw_two_axes(robot: &RobotSpec, draws: &mut Draws) -> Box<dyn LabDeparture> {
         let link = pick_index(robot.links.len(), 2, 4, draws);
         let free = *draws.pick(&[0_usize, 1, 2]);
         let first = Resonator::draw((free + 1) % 3, draws);
@@ -162,7 +162,7 @@ impl Resonators {
     }
 }
 
-impl Departure for Resonators {
+impl LabDeparture for Resonators {
     fn id(&self) -> &'static str {
         self.id
     }
@@ -213,12 +213,12 @@ pub struct Clamp {
 
 impl Clamp {
     /// The tool touches table or workpiece.
-    pub fn draw_tool(_robot: &RobotSpec, draws: &mut Draws) -> Box<dyn Departure> {
+    pub fn draw_tool(_robot: &RobotSpec, draws: &mut Draws) -> Box<dyn LabDeparture> {
         Self::draw("clamp-to-table", None, [1e5, 1e6], 5e-4, draws)
     }
 
     /// A hose pack from a link to the ceiling.
-    pub fn draw_hose(robot: &RobotSpec, draws: &mut Draws) -> Box<dyn Departure> {
+    pub fn draw_hose(robot: &RobotSpec, draws: &mut Draws) -> Box<dyn LabDeparture> {
         let link = pick_index(robot.links.len(), 3, 5, draws);
         Self::draw("hose-to-ground", Some(link), [3e4, 3e5], 1e-2, draws)
     }
@@ -229,7 +229,7 @@ impl Clamp {
         stiffness: [f64; 2],
         damping_time_s: f64,
         draws: &mut Draws,
-    ) -> Box<dyn Departure> {
+    ) -> Box<dyn LabDeparture> {
         let stiffness_n_per_m = draws.log_uniform(stiffness[0], stiffness[1]);
         Box::new(Clamp {
             id,
@@ -241,7 +241,7 @@ impl Clamp {
     }
 }
 
-impl Departure for Clamp {
+impl LabDeparture for Clamp {
     fn id(&self) -> &'static str {
         self.id
     }
@@ -294,7 +294,7 @@ pub struct SoftServo {
 }
 
 impl SoftServo {
-    pub fn draw(robot: &RobotSpec, draws: &mut Draws) -> Box<dyn Departure> {
+    pub fn draw(robot: &RobotSpec, draws: &mut Draws) -> Box<dyn LabDeparture> {
         let joint = pick_index(robot.joints.len(), 1, 4, draws);
         Box::new(SoftServo {
             joint,
@@ -315,7 +315,7 @@ impl SoftServo {
     }
 }
 
-impl Departure for SoftServo {
+impl LabDeparture for SoftServo {
     fn id(&self) -> &'static str {
         "soft-servo"
     }
@@ -386,7 +386,7 @@ pub struct GearSaturation {
 }
 
 impl GearSaturation {
-    pub fn draw(_robot: &RobotSpec, draws: &mut Draws) -> Box<dyn Departure> {
+    pub fn draw(_robot: &RobotSpec, draws: &mut Draws) -> Box<dyn LabDeparture> {
         Box::new(GearSaturation {
             loss: draws.uniform(0.3, 0.6),
             torque_nm: draws.log_uniform(30.0, 300.0),
@@ -394,7 +394,7 @@ impl GearSaturation {
     }
 }
 
-impl Departure for GearSaturation {
+impl LabDeparture for GearSaturation {
     fn id(&self) -> &'static str {
         "gear-saturation"
     }
@@ -421,7 +421,7 @@ pub struct RadialBearing {
 }
 
 impl RadialBearing {
-    pub fn draw(robot: &RobotSpec, draws: &mut Draws) -> Box<dyn Departure> {
+    pub fn draw(robot: &RobotSpec, draws: &mut Draws) -> Box<dyn LabDeparture> {
         Box::new(RadialBearing {
             joint: pick_index(robot.joints.len(), 2, 5, draws),
             stiffness_n_per_m: draws.log_uniform(2e6, 8e6),
@@ -429,7 +429,7 @@ impl RadialBearing {
     }
 }
 
-impl Departure for RadialBearing {
+impl LabDeparture for RadialBearing {
     fn id(&self) -> &'static str {
         "bearing-radial"
     }
@@ -467,7 +467,7 @@ pub struct Drift {
 }
 
 impl Drift {
-    pub fn draw(_robot: &RobotSpec, draws: &mut Draws) -> Box<dyn Departure> {
+    pub fn draw(_robot: &RobotSpec, draws: &mut Draws) -> Box<dyn LabDeparture> {
         Box::new(Drift {
             stiffness: sign(draws) * draws.log_uniform(0.05, 0.2),
             damping: sign(draws) * draws.log_uniform(0.1, 0.4),
@@ -475,7 +475,7 @@ impl Drift {
     }
 }
 
-impl Departure for Drift {
+impl LabDeparture for Drift {
     fn id(&self) -> &'static str {
         "drift-with-order"
     }
@@ -506,7 +506,7 @@ pub struct FloorMode {
 }
 
 impl FloorMode {
-    pub fn draw(_robot: &RobotSpec, draws: &mut Draws) -> Box<dyn Departure> {
+    pub fn draw(_robot: &RobotSpec, draws: &mut Draws) -> Box<dyn LabDeparture> {
         Box::new(FloorMode {
             direction: direction(draws),
             mass_kg: draws.log_uniform(1000.0, 4000.0),
@@ -516,7 +516,7 @@ impl FloorMode {
     }
 }
 
-impl Departure for FloorMode {
+impl LabDeparture for FloorMode {
     fn id(&self) -> &'static str {
         "floor-mode"
     }
@@ -560,7 +560,7 @@ pub struct Counterbalance {
 }
 
 impl Counterbalance {
-    pub fn draw(_robot: &RobotSpec, draws: &mut Draws) -> Box<dyn Departure> {
+    pub fn draw(_robot: &RobotSpec, draws: &mut Draws) -> Box<dyn LabDeparture> {
         Box::new(Counterbalance {
             share: draws.uniform(0.2, 0.5),
             phase_rad: draws.uniform(0.0, TAU),
@@ -568,7 +568,7 @@ impl Counterbalance {
     }
 }
 
-impl Departure for Counterbalance {
+impl LabDeparture for Counterbalance {
     fn id(&self) -> &'static str {
         "counterbalance"
     }

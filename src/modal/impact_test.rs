@@ -38,7 +38,9 @@ pub enum Estimator {
 /// A raw record of one hammer and several sensors.
 #[derive(Debug, Clone, Copy)]
 pub struct TapRecord<'a> {
+    /// Sampling rate, Hz.
     pub sample_rate_hz: f64,
+    /// Force of the hammer, N.
     pub force_n: &'a [f64],
     /// Same length as the force, any unit.
     pub responses: &'a [&'a [f64]],
@@ -47,6 +49,7 @@ pub struct TapRecord<'a> {
 /// How to make FRFs of hits.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TapSettings {
+    /// How force and response are averaged over the hits.
     pub estimator: Estimator,
     /// Length of a block; from the distance of the hits where `None`.
     pub block_s: Option<f64>,
@@ -61,12 +64,15 @@ pub struct TapFrfs {
     pub frf: Vec<Vec<Complex64>>,
     /// By response, 0..1; `None` with a single hit, where it is one by definition.
     pub coherence: Option<Vec<Vec<f64>>>,
+    /// All hits found, those left out too.
     pub hits: Vec<Hit>,
+    /// Length of a block, s.
     pub block_s: f64,
     /// 1/τ of the exponential window (0 without one): what it adds to ζω of every mode.
     pub added_decay_per_s: f64,
     /// Most hits differ from what the others predict: other points or directions, or noise as large as the response.
     pub contradictory: bool,
+    /// What changes the result, in words.
     pub warnings: Vec<String>,
 }
 
@@ -80,7 +86,7 @@ struct Block {
 ///
 /// # Errors
 /// Channels of different length, no hit, or no good one.
-pub fn frfs_from_hits(record: &TapRecord, settings: &TapSettings) -> Result<TapFrfs> {
+pub fn impact_test(record: &TapRecord, settings: &TapSettings) -> Result<TapFrfs> {
     let samples = record.force_n.len();
     if record.responses.iter().any(|r| r.len() != samples) || !(record.sample_rate_hz > 0.0) {
         return Err(InputError::new("the channels of a tap record are not of one length and rate").into());
@@ -435,7 +441,7 @@ mod tests {
             force_n: &bench.force,
             responses: &[&bench.acceleration],
         };
-        frfs_from_hits(&record, &TapSettings::default())
+        impact_test(&record, &TapSettings::default())
     }
 
     /// Frequency and damping of the mode, window taken out.

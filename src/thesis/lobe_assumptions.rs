@@ -7,17 +7,14 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::curve::{LobeCurve, Peak, SpeedLimit, peaks, speed_grid};
-use super::force::RegenerativeForce;
-use super::frf::{AxisMode, DirectFrf, ModalFrf, Mode};
-use super::sampled::SampledFrf;
-use super::solve::StabilitySolver;
-use super::thesis::{ThesisLobes, conditions, thesis_force, thesis_modes};
+use super::measured_lobes::{ThesisLobes, conditions, thesis_force, thesis_modes, tip_near};
 use crate::Result;
 use crate::campaign::Immersion;
+use crate::lobes::{
+    AxisMode, DirectFrf, ModalFrf, Mode, Peak, RegenerativeForce, SampledFrf, SpeedLimit, StabilitySolver,
+    speed_grid,
+};
 
-/// Tips farther than this from where they are expected belong to something else.
-const WINDOW: f64 = 0.1;
 const SPINDLE_RPM: [f64; 3] = [100.0, 1500.0, 1.0];
 /// Lines of the thesis's tap tests, Hz.
 const LINE_SPACING_HZ: f64 = 0.1;
@@ -80,27 +77,32 @@ const SWITCHES: [(Switch, &str); 18] = [
 /// The tips of one configuration under one assumption.
 #[derive(Debug, Clone, Serialize)]
 pub struct SwitchedTips {
+    /// 1..4, as in the thesis.
     pub configuration: u32,
     /// `None`: no tip within 10 % of where that assumption puts it, 60 f/(N w).
     pub second_region: Option<Peak>,
+    /// Likewise, first region.
     pub first_region: Option<Peak>,
 }
 
 /// All of table 30 under one assumption.
 #[derive(Debug, Clone, Serialize)]
 pub struct AssumptionSwitched {
+    /// The assumption, in words.
     pub assumption: &'static str,
+    /// One entry a configuration.
     pub tips: Vec<SwitchedTips>,
     /// The commercial program's tip over ours, geometric mean over the configurations that have one: second and first
     /// region. `None` where none has.
     pub speed_ratio: [Option<f64>; 2],
+    /// The same of the depths.
     pub depth_ratio: [Option<f64>; 2],
     /// Configurations with a tip: second and first region.
     pub found: [usize; 2],
 }
 
 impl AssumptionSwitched {
-    /// How far the speeds are off on the whole: root mean square of the logarithms of both ratios, as a factor. `None`
+    /// How far the speeds are off overall: root mean square of the logarithms of both ratios, as a factor. `None`
     /// where a region has fewer tips than table 30 has configurations.
     pub fn speed_factor(&self) -> Option<f64> {
         let complete = self.found.iter().all(|f| *f == self.tips.len());
@@ -110,7 +112,7 @@ impl AssumptionSwitched {
     }
 }
 
-/// Every assumption switched by itself; the first is none.
+/// Every assumption switched by itself; the first entry switches nothing.
 ///
 /// # Errors
 /// Only where the built-in tables are damaged.
@@ -171,15 +173,6 @@ fn switched(switch: Switch, row: &ThesisLobes) -> Result<SwitchedTips> {
         second_region,
         first_region,
     })
-}
-
-/// The deepest tip within the window about a speed.
-pub(super) fn tip_near(curve: &LobeCurve, expected_rpm: f64) -> Option<Peak> {
-    let depth = |p: &Peak| p.depth_mm.unwrap_or(f64::INFINITY);
-    peaks(curve)
-        .into_iter()
-        .filter(|p| (p.spindle_rpm / expected_rpm - 1.0).abs() < WINDOW)
-        .max_by(|a, b| depth(a).total_cmp(&depth(b)))
 }
 
 fn force(switch: Switch) -> Result<RegenerativeForce> {
@@ -311,7 +304,7 @@ pub fn reading(table: &[AssumptionSwitched]) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lobes::thesis_lobes;
+    use crate::thesis::measured_lobes::thesis_lobes;
     use approx::assert_relative_eq;
 
     fn of<'a>(table: &'a [AssumptionSwitched], name: &str) -> &'a AssumptionSwitched {

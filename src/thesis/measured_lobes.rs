@@ -6,11 +6,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::curve::{AbsoluteLimit, LobeCurve, Peak, SpeedLimit, speed_grid};
-use super::force::RegenerativeForce;
-use super::frf::{AxisMode, ModalFrf};
-use super::solve::StabilitySolver;
-use super::thesis_assumptions::tip_near;
+use crate::lobes::{
+    AbsoluteLimit, AxisMode, LobeCurve, ModalFrf, Peak, RegenerativeForce, SpeedLimit, StabilitySolver,
+    peaks, speed_grid,
+};
 use crate::{Error, Result};
 
 const MINIMA: &str = include_str!("../../datasets/irb6640/real_part_minima_measured.csv");
@@ -18,7 +17,10 @@ const MODAL: &str = include_str!("../../datasets/irb6640/modal_measured.csv");
 const PEAKS: &str = include_str!("../../datasets/irb6640/stability_peaks.csv");
 const CONDITIONS: &str = include_str!("../../datasets/irb6640/cutting_conditions.toml");
 
-/// One configuration of table 30, ours beside the two published programs.
+/// Tips farther than this from where they are expected belong to something else.
+const WINDOW: f64 = 0.1;
+
+/// One configuration of table 30: our lobes and those of the two published programs.
 #[derive(Debug, Clone, Serialize)]
 pub struct ThesisLobes {
     /// 1..4, as in the thesis.
@@ -31,6 +33,7 @@ pub struct ThesisLobes {
     pub second_region: Peak,
     /// Ours at the tip near 60 f/N, between lobes 0 and 1, to the rpm.
     pub first_region: Peak,
+    /// Ours, over all speeds.
     pub absolute_limit: AbsoluteLimit,
     /// The commercial program on the measured FRFs, in the order of the thesis (lower speed first).
     pub commercial: Vec<Peak>,
@@ -183,12 +186,21 @@ pub fn thesis_lobes() -> Result<Vec<ThesisLobes>> {
         .collect()
 }
 
+/// The deepest tip within the window about a speed.
+pub(super) fn tip_near(curve: &LobeCurve, expected_rpm: f64) -> Option<Peak> {
+    let depth = |p: &Peak| p.depth_mm.unwrap_or(f64::INFINITY);
+    peaks(curve)
+        .into_iter()
+        .filter(|p| (p.spindle_rpm / expected_rpm - 1.0).abs() < WINDOW)
+        .max_by(|a, b| depth(a).total_cmp(&depth(b)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    /// The table in references.md, "Drilling lobes on the robot".
+    /// Computed independently of this program.
     #[test]
     fn table_30_is_what_the_reference_computation_gave() {
         let expected = [

@@ -2,10 +2,10 @@
 
 use num_complex::Complex64;
 
-use super::frf::Receptance;
-use super::sampled::SampledFrf;
 use crate::campaign::{BodyRef, Campaign, FrfSet, MeasuredFrf};
 use crate::ingest::Axis;
+use crate::lobes::SampledFrf;
+use crate::lobes::frf::Receptance;
 use crate::{InputError, Result};
 
 /// The 2×2 receptance of the tool point as measured at one posture.

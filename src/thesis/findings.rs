@@ -1,29 +1,37 @@
 //! What the tables of the case study come to in a few numbers.
 
+use super::case_study::{CaseStudy, ComparedRow, case_study};
+use super::measured_lobes::thesis_force;
 use crate::Result;
-use crate::lobes::thesis::thesis_force;
-use crate::thesis::{CaseStudy, Row, case_study};
 
 /// Smallest and largest of a set of ratios.
 pub type Range = [f64; 2];
 
+/// The study, and what its tables come to.
 pub struct ThesisFindings {
+    /// The tables themselves.
     pub study: CaseStudy,
     /// Static stiffness, model / measured: as published, ours before and after calibration on the modal table.
     pub static_published: Option<Range>,
+    /// Static stiffness, model / measured: ours before calibration.
     pub static_before: Option<Range>,
+    /// Static stiffness, model / measured: ours after calibration.
     pub static_after: Option<Range>,
     /// Frequency of the strongest mode, published model / measured, and ours before.
     pub frequency_published: Option<Range>,
+    /// Frequency of the strongest mode, before / measured.
     pub frequency_before: Option<Range>,
     /// On the configuration that was not fitted: after / measured, and before / measured.
     pub predicted_after: Option<Range>,
+    /// On the configuration that was not fitted: before / measured.
     pub predicted_before: Option<Range>,
     /// The same for the peak real receptance.
     pub receptance_after: Option<Range>,
+    /// Peak real receptance on the configuration that was not fitted: after / measured.
     pub predicted_receptance_after: Option<Range>,
     /// Speeds of the commercial program's tips over ours from the measured minima: second and first region.
     pub speed_second_region: Option<Range>,
+    /// Speeds of the commercial program's tips over ours, first region.
     pub speed_first_region: Option<Range>,
     /// Depths, likewise, both regions.
     pub depth: Option<Range>,
@@ -42,7 +50,7 @@ fn range(ratios: impl Iterator<Item = f64>) -> Option<Range> {
         })
 }
 
-fn over_measured(rows: &[Row], value: impl Fn(&Row) -> Option<f64>) -> Option<Range> {
+fn over_measured(rows: &[ComparedRow], value: impl Fn(&ComparedRow) -> Option<f64>) -> Option<Range> {
     range(rows.iter().filter_map(|row| Some(value(row)? / row.measured?)))
 }
 
@@ -54,7 +62,7 @@ impl ThesisFindings {
     }
 
     fn of(study: CaseStudy, teeth: usize) -> Self {
-        let predicted = |row: &Row| !row.fitted;
+        let predicted = |row: &ComparedRow| !row.fitted;
         let tips = |region: usize| {
             study.lobes.iter().filter_map(move |row| {
                 let ours = match region {

@@ -1,0 +1,84 @@
+//! The modes of one FRF, by each method.
+
+use num_complex::Complex64;
+use serde::Serialize;
+
+/// How a modal parameter was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Poles and residual terms fitted to the complex mobility around the peak.
+    LocalFit,
+    /// Angular sweep on the Nyquist circle of the mobility.
+    CircleFit,
+    /// Half-power width of |mobility|, crossings interpolated.
+    HalfPower,
+}
+
+impl Method {
+    /// As in JSON and tables.
+    pub fn id(self) -> &'static str {
+        match self {
+            Method::LocalFit => "local-fit",
+            Method::CircleFit => "circle-fit",
+            Method::HalfPower => "half-power",
+        }
+    }
+}
+
+/// One mode by one method.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ModeEstimate {
+    /// How it was found.
+    pub method: Method,
+    /// Undamped natural frequency.
+    pub frequency_hz: f64,
+    /// Viscous damping ratio, > 0.
+    pub damping_ratio: f64,
+    /// From the residual of the fit; `None` where there were only just enough lines.
+    pub frequency_std_hz: Option<f64>,
+    /// Standard deviation of the damping ratio, from the same residual.
+    pub damping_std: Option<f64>,
+    /// Circle fit: standard deviation of ζ over the point pairs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub damping_spread: Option<f64>,
+    /// Modal constant φ_out φ_in for mass-normalised modes, 1/kg (complex: real for a real mode).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub modal_constant: Option<Complex64>,
+    /// Half-power: only one crossing was measured, the other is the fitted curve's.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub one_sided: bool,
+}
+
+/// One mode of one FRF.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrfMode {
+    /// Best method first (local fit, circle fit, half-power); never empty.
+    pub estimates: Vec<ModeEstimate>,
+    /// Spectral lines in the half-power band, 2ζf₀/Δf.
+    pub lines_in_half_power_band: f64,
+    /// Prominence of the peak over the noise's standard deviation.
+    pub significance: f64,
+    /// A simpler method gave another answer than the local fit and was left out.
+    pub contradicted: bool,
+}
+
+impl FrfMode {
+    /// The estimate of the best method.
+    pub fn best(&self) -> &ModeEstimate {
+        &self.estimates[0]
+    }
+}
+
+/// All modes of one FRF.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FrfModes {
+    /// Ascending in frequency.
+    pub modes: Vec<FrfMode>,
+    /// The FRF was recorded with the sign convention e^{−iωt} and was turned before the analysis.
+    pub conjugated: bool,
+    /// What changes the result.
+    pub warnings: Vec<String>,
+    /// What is usual and worth knowing: peaks that are no modes, coarse lines, methods that disagree.
+    pub remarks: Vec<String>,
+}

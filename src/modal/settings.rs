@@ -1,0 +1,15 @@
+//! What a modal analysis looks at.
+
+use super::stabilisation::Tolerances;
+
+/// What to look at.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Settings {
+    /// From, to in Hz; everything that was measured where `None`.
+    pub band_hz: Option<[f64; 2]>,
+    /// Highest order of the stabilisation diagram: poles sought in all FRFs together; from the number of peaks where `None`.
+    /// What the lines determine (a third of them) is never exceeded.
+    pub max_order: Option<usize>,
+    /// When a pole counts as having stayed from one order to the next.
+    pub tolerances: Tolerances,
+}

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use criterion::{Criterion, criterion_group};
 use lobestone::analysis::ModalAnalysis;
-use lobestone::analysis::modal::FrfInput;
+use lobestone::analysis::modes::modal::FrfInput;
 use lobestone::modal::{Settings, TapSettings};
 use num_complex::Complex64;
 use rand::{Rng, SeedableRng};

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use lobestone::campaign::Campaign;
-use lobestone::identify::calibrate::calibrate;
+use lobestone::identify::frfs::calibrate::calibrate;
 use lobestone::identify::{Options, StructureCase};
 
 fn campaign() -> Campaign {

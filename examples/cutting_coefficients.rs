@@ -8,7 +8,7 @@
 use std::path::PathBuf;
 
 use lobestone::Campaign;
-use lobestone::analysis::force_records::identify_forces;
+use lobestone::analysis::forces::force_records::identify_forces;
 use lobestone::cutting::{CfcOptions, ForceAxis};
 
 fn main() -> lobestone::Result<()> {

@@ -7,7 +7,8 @@
 use std::f64::consts::TAU;
 
 use lobestone::Complex64;
-use lobestone::modal::{SetMember, Settings, analyse_frfs, global};
+use lobestone::modal::global;
+use lobestone::modal::{SetMember, Settings, analyse_frfs};
 use rand::{Rng, SeedableRng};
 
 /// Natural frequency (Hz), damping ratio and mass-normalised shape in x and y (kg^-1/2).

@@ -1,10 +1,10 @@
 //! An effect added to a campaign's model: everything refitted together, judged on postures left out, recorded.
 
-use super::cutting::cutting_comparison;
 use super::structure::study_of;
+use crate::analysis::forces::cutting::cutting_comparison;
 use crate::campaign::Campaign;
 use crate::discrepancy::FrfComparison;
-use crate::discrepancy::compare::ErrorTotals;
+use crate::discrepancy::comparison::compare::ErrorTotals;
 use crate::discrepancy::extension::{Extension, Fitted};
 use crate::effects::cutting::{self, CuttingInstance};
 use crate::effects::{self, Instance};

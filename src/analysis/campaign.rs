@@ -1,16 +1,16 @@
 //! Everything that can be said about a campaign, each part on its own: one that fails takes no other with it.
 
-use super::force_records::identify_forces;
 use super::model_stages::{ModelStage, earlier_stages};
-use super::stick_shapes::{self, StickShape};
 use super::structure_case::structure_model;
 use super::{
     CuttingAnalysis, CuttingFindings, DiagnosisFindings, LobeAnalysis, ModalAnalysis, StructureAnalysis,
 };
+use crate::analysis::forces::force_records::identify_forces;
+use crate::analysis::modes::stick_shapes::{self, StickShape};
 use crate::campaign::{Campaign, LobeSource};
 use crate::cutting::{CfcOptions, CfcResult};
 use crate::discrepancy::setup::SetupFinding;
-use crate::identify::structure_study::held_out_postures;
+use crate::identify::frfs::structure_study::held_out_postures;
 use crate::identify::{Options, StructureCase, StructureModel};
 use crate::revision::{Domain, Revision, RevisionLog};
 use crate::robot::PostureReport;

@@ -6,16 +6,17 @@ use super::structure::study_of;
 use crate::Result;
 use crate::campaign::Campaign;
 use crate::discrepancy::localise::{Localisation, localise};
+use crate::discrepancy::outlook::{next_cut, next_measurement};
 use crate::discrepancy::setup::{Rival, SetupCheck, examine, examine_cutting};
 use crate::discrepancy::{
     CuttingComparison, CuttingLead, Diagnosis, DiagnosisVerdict, EffectCandidate, Explained, FrfComparison,
-    NextMeasurement, cutting_lead, diagnose, next_cut, next_measurement,
+    NextMeasurement, cutting_lead, diagnose,
 };
 use crate::effects::Instance;
 use crate::effects::cutting::CuttingInstance;
-use crate::identify::cutting_problem::{CutFit, CuttingProblem};
+use crate::identify::forces::cutting_problem::{CutFit, CuttingProblem};
+use crate::identify::frfs::structure_study::{ResidualPeak, residual_peaks};
 use crate::identify::model_history::{recorded_cutting_effect, recorded_effect};
-use crate::identify::structure_study::{ResidualPeak, residual_peaks};
 use crate::identify::{CuttingCase, CuttingModel, CuttingStudy, Options, StructureCase, StructureModel};
 use crate::revision::{self, Domain, Evidence, RecordedCandidate};
 

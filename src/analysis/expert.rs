@@ -4,11 +4,13 @@
 use num_complex::Complex64;
 use serde::Serialize;
 
-use super::mode_comparison::{FixedMode, ModeComparison, ModePair, compare_modes, measured_modes};
 use crate::Result;
-use crate::discrepancy::compare::frac;
-use crate::discrepancy::locate::{Location, locate, place_words};
-use crate::identify::frf_data::FrfDatum;
+use crate::analysis::modes::mode_comparison::{
+    FixedMode, ModeComparison, ModePair, compare_modes, measured_modes,
+};
+use crate::discrepancy::comparison::compare::frac;
+use crate::discrepancy::comparison::locate::{Location, locate, place_words};
+use crate::identify::frfs::frf_data::FrfDatum;
 use crate::identify::{StructureCase, StructureModel};
 use crate::signal::median;
 

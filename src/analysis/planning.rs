@@ -6,7 +6,7 @@ use num_complex::Complex64;
 
 use super::structure_case::{frf_data, structure_model};
 use crate::campaign::{BodyRef, Campaign, MeasuredDof, MeasuredFrf, Point};
-use crate::discrepancy::plan::PlanOutlook;
+use crate::discrepancy::outlook::plan::PlanOutlook;
 use crate::identify::{FrfData, StructureModel};
 use crate::ingest::{Axis, Dof};
 use crate::signal::noise_law::FrfNoise;

@@ -2,14 +2,14 @@
 
 use num_complex::Complex64;
 
-use super::modal::ModalAnalysis;
-use super::mode_comparison::measured_modes;
 use crate::Result;
+use crate::analysis::modes::modal::ModalAnalysis;
+use crate::analysis::modes::mode_comparison::measured_modes;
 use crate::campaign::Campaign;
 use crate::discrepancy::FrfComparison;
 use crate::discrepancy::setup::{SetupCheck, absorb_slips, examine, library_rival};
-use crate::identify::calibrate::calibrate;
-use crate::identify::modal_start::{ModalStart, PostureMeasurement, modal_start};
+use crate::identify::frfs::calibrate::calibrate;
+use crate::identify::frfs::modal_start::{ModalStart, PostureMeasurement, modal_start};
 use crate::identify::{Calibration, Options, StructureCase, StructureStudy};
 
 /// The robot model of a campaign against its FRFs: as the robot file has it, and calibrated with the effects that were

@@ -1,10 +1,10 @@
 //! `[[channel]]`: what the channels of force files are, where the files do not say it.
 
-use super::bounds::Bounds;
-use super::keys::{self, names};
 use super::schema::CutChannel;
-use super::section::Section;
 use crate::Result;
+use crate::campaign::form::bounds::Bounds;
+use crate::campaign::form::keys::{self, names};
+use crate::campaign::form::section::Section;
 use crate::data::ChannelRole;
 use crate::data::Cut;
 use crate::ingest::{ChannelRule, Gain, Measures, Source, unit_of_charge_or_other};

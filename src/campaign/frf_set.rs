@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use super::paths::campaign_file;
 use super::schema::{Campaign, FrfFile};
 use super::suggest::shown;
+use crate::campaign::form::paths::campaign_file;
 use crate::{InputError, Result};
 
 impl Campaign {

@@ -6,17 +6,17 @@ use crate::data::{
 };
 use std::path::{Path, PathBuf};
 
-use super::bounds::Bounds;
-use super::document::Document;
-use super::keys::ROBOT_KEY;
-use super::keys::{self, FORM, names};
 use super::lobes_section;
-use super::paths::{self, campaign_file};
 use super::schema::*;
-use super::section::Section;
 use super::shared_keys::posture_ref;
 use super::suggest::shown;
 use super::tool_and_cut::{geometry, tool};
+use crate::campaign::form::bounds::Bounds;
+use crate::campaign::form::document::Document;
+use crate::campaign::form::keys::ROBOT_KEY;
+use crate::campaign::form::keys::{self, FORM, names};
+use crate::campaign::form::paths::{self, campaign_file};
+use crate::campaign::form::section::Section;
 use crate::{Error, InputError, Result};
 
 /// Keys of the top table.

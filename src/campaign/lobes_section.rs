@@ -5,10 +5,10 @@ use crate::data::{
     ToolSegment,
 };
 
-use super::bounds::Bounds;
-use super::keys::{self, names};
-use super::section::Section;
 use super::shared_keys::{PROCESSES, immersion, posture_ref};
+use crate::campaign::form::bounds::Bounds;
+use crate::campaign::form::keys::{self, names};
+use crate::campaign::form::section::Section;
 use crate::{Error, Result};
 
 /// E/G where only Young's modulus is given: Poisson's ratio 0.3.

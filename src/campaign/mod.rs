@@ -1,31 +1,26 @@
 //! A campaign folder: what was measured, where, and on what. SI values keep the unit of the file in their name.
 
-pub mod bounds;
 mod channels;
-pub mod document;
 pub mod draft;
+pub mod form;
 pub mod frf_set;
-mod json_schema;
-pub mod keys;
 mod load;
 mod lobes_section;
 mod named_files;
-pub mod paths;
 pub mod robot_file;
 pub mod robot_text;
 pub mod schema;
-mod section;
 mod shared_keys;
 pub mod suggest;
 mod tool_and_cut;
 
+pub use crate::campaign::form::json_schema::{SchemaOf, json_schema};
+pub use crate::campaign::form::paths::campaign_file;
+pub use crate::campaign::form::section::Section;
 pub use crate::data::{
     AxesRef, BodyRef, ChipFormation, Cut, CutGeometry, CutOutcome, FrfSet, HoleSection, Immersion, LinkGroup,
     LinkTolerances, LobeAxis, LobeMethod, LobeMode, LobeSource, LobesSection, MeasuredDof, MeasuredFrf,
     OrthogonalSection, Point, Posture, Process, Redundancy, RobotSection, Tool, ToolKind, ToolSegment,
 };
-pub use json_schema::{SchemaOf, json_schema};
 pub use named_files::named_files;
-pub use paths::campaign_file;
 pub use schema::{Campaign, CutChannel, Dynamometer, FrfFile, PlanSection};
-pub use section::Section;

@@ -2,10 +2,10 @@
 
 use std::f64::consts::PI;
 
-use super::bounds::Bounds;
-use super::section::Section;
 use super::suggest::shown;
 use crate::Result;
+use crate::campaign::form::bounds::Bounds;
+use crate::campaign::form::section::Section;
 use crate::data::{Immersion, Posture, Process};
 
 /// The processes by the names that the files have for them.

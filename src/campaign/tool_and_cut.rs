@@ -1,10 +1,10 @@
 //! What cut, and what was cut: `[tool]`, and the geometry and speed of a `[[cut]]`.
 
-use super::bounds::Bounds;
-use super::keys::{self, names};
-use super::section::Section;
 use super::shared_keys::{PROCESSES, immersion};
 use crate::Result;
+use crate::campaign::form::bounds::Bounds;
+use crate::campaign::form::keys::{self, names};
+use crate::campaign::form::section::Section;
 use crate::data::{CutGeometry, Process, Tool, ToolKind};
 
 /// Keys of `[tool]` that only some kinds have.

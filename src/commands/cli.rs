@@ -4,11 +4,13 @@ use clap::{CommandFactory, Parser, Subcommand, ValueEnum};
 
 use super::campaign_args::SideArgs;
 use super::outcome::Outcome;
-use super::{
-    add, batch, calibrate, cfc, compare, demo, diagnose, explain, fleet, history, init, inspect, lobes,
-    localise, modal, model, plan, report, schema, serve, shell, simulate, sweep, thesis, undo,
-};
 use crate::Result;
+use crate::commands::begin::{demo, init, inspect, serve};
+use crate::commands::find::{calibrate, compare, diagnose, explain, localise, plan};
+use crate::commands::grow::{add, history, model, undo};
+use crate::commands::many::{batch, fleet};
+use crate::commands::measure::{cfc, lobes, modal, sweep};
+use crate::commands::write::{report, schema, shell, simulate, thesis};
 
 /// The commands in groups, with an example each.
 const GROUPS: &str = "\

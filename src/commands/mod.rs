@@ -1,49 +1,22 @@
 //! The command line: one file a subcommand, each reads its arguments, calls the library and hands back
 //! an [`Outcome`]. Nothing is computed here.
 
-mod add;
-mod batch;
-mod bench_worker;
-mod calibrate;
+pub(crate) mod begin;
 mod campaign_args;
-mod cfc;
 mod cli;
-mod compare;
-mod demo;
-mod diagnose;
-mod entrance;
-mod explain;
-mod fleet;
-mod history;
-mod hole;
-mod init;
-mod init_robot;
-mod inspect;
-mod lobe_tool;
-mod lobes;
-mod localise;
-mod modal;
-mod modal_files;
-mod model;
+pub(crate) mod find;
+pub(crate) mod grow;
+pub(crate) mod many;
+pub(crate) mod measure;
 mod next_step;
-mod operational;
 mod outcome;
-mod plan;
 mod printed;
 mod program;
 mod progress_bar;
 mod range;
 mod relaunch;
-mod report;
-mod schema;
-mod serve;
-mod shell;
-mod simulate;
-mod sweep;
 mod text;
-mod thesis;
-mod undo;
-mod workbench;
+pub(crate) mod write;
 
 pub(crate) use campaign_args::{CampaignArg, SideArgs, by_domain, side};
 pub use cli::{Cli, run};

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::text::{number, percent};
 use crate::campaign::{Campaign, campaign_file};
 use crate::discrepancy::DiagnosisVerdict;
-use crate::discrepancy::compare::ErrorTotals;
+use crate::discrepancy::comparison::compare::ErrorTotals;
 use crate::discrepancy::verdict::is_noise;
 use crate::revision::{Domain, Revision};
 

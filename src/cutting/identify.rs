@@ -1,18 +1,18 @@
 //! From what the force records say to the cutting force coefficients.
 
-use super::average::pool_scatter;
-use super::average_force::average_row;
-use super::cut_analysis::{Average, CutAnalysis};
 use super::cutting_trials::CuttingTrials;
-use super::estimate::CfcOptions;
-use super::force_axis::ForceAxis;
-use super::group::{ForceGroup, Rows, distinct, observations};
-use super::orthogonal::{OrthogonalPrediction, predict};
-use super::outlier::misfits;
 use super::plausibility;
-use super::series::{MaterialComparison, MaterialSeries, SpeedTrends, compare, speed_trends};
 use super::turning_checks::of_turning;
 use super::warnings;
+use crate::cutting::fit::estimate::CfcOptions;
+use crate::cutting::fit::group::{ForceGroup, Rows, distinct, observations};
+use crate::cutting::fit::outlier::misfits;
+use crate::cutting::fit::series::{MaterialComparison, MaterialSeries, SpeedTrends, compare, speed_trends};
+use crate::cutting::force_model::average_force::average_row;
+use crate::cutting::force_model::force_axis::ForceAxis;
+use crate::cutting::force_model::orthogonal::{OrthogonalPrediction, predict};
+use crate::cutting::measured::average::pool_scatter;
+use crate::cutting::measured::cut_analysis::{Average, CutAnalysis};
 use crate::data::{CutGeometry, Process};
 use crate::{Error, InputError, Result};
 

@@ -1,9 +1,9 @@
 //! Units and scales that the physics of cutting forbids: the specific cutting energy is that of some material.
 
-use super::average_force::average_row;
-use super::cut_analysis::{ChannelAnalysis, CutAnalysis};
 use super::cutting_trials::CuttingTrials;
-use super::force_axis::ForceAxis;
+use crate::cutting::force_model::average_force::average_row;
+use crate::cutting::force_model::force_axis::ForceAxis;
+use crate::cutting::measured::cut_analysis::{ChannelAnalysis, CutAnalysis};
 use crate::data::{CutGeometry, Process};
 use crate::signal::median;
 use crate::text::figures;

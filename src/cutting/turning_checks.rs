@@ -1,11 +1,11 @@
 //! What a technician should know about turned cuts in particular: which channel is which, and what
 //! cuts of one depth leave open.
 
-use super::average_force::average_row;
-use super::cut_analysis::CutAnalysis;
 use super::cutting_trials::CuttingTrials;
-use super::force_axis::ForceAxis;
-use super::group::distinct;
+use crate::cutting::fit::group::distinct;
+use crate::cutting::force_model::average_force::average_row;
+use crate::cutting::force_model::force_axis::ForceAxis;
+use crate::cutting::measured::cut_analysis::CutAnalysis;
 use crate::data::CutGeometry;
 use crate::signal::median;
 use crate::text::figures;

@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use super::air::NO_AIR;
-use super::cut_analysis::{CutAnalysis, Notice, WRONG_SPEED};
 use super::cutting_trials::CuttingTrials;
-use super::estimate::{CfcOptions, RegressionMethod};
-use super::force_axis::ForceAxis;
-use super::group::{Coefficient, ForceGroup, distinct};
-use super::outlier::CutMisfit;
 use super::plausibility::unit_slip;
+use crate::cutting::fit::estimate::{CfcOptions, RegressionMethod};
+use crate::cutting::fit::group::{Coefficient, ForceGroup, distinct};
+use crate::cutting::fit::outlier::CutMisfit;
+use crate::cutting::force_model::force_axis::ForceAxis;
+use crate::cutting::measured::air::NO_AIR;
+use crate::cutting::measured::cut_analysis::{CutAnalysis, Notice, WRONG_SPEED};
 use crate::data::Process;
 
 /// Notices of all records, one sentence a kind.

@@ -1,7 +1,7 @@
 //! What was tried: one effect at one site, and the model as it stands that it is compared with.
 
 use super::something_else;
-use crate::identify::calibrate::{Calibration, Estimate};
+use crate::identify::frfs::calibrate::{Calibration, Estimate};
 use crate::identify::rest::Rest;
 use crate::identify::study::{EffectName, HeldOut, Residual};
 

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::cutting::ForceAxis;
 use crate::data::Process;
-use crate::identify::cutting_data::CutData;
+use crate::identify::forces::cutting_data::CutData;
 use crate::identify::{CutFit, CuttingData};
 use crate::signal::median;
 
@@ -418,10 +418,10 @@ impl LineGroup {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::made_force_records::{MadeCut, write_campaign};
+    use crate::analysis::forces::made_force_records::{MadeCut, write_campaign};
     use crate::identify::CuttingCase;
-    use crate::identify::cutting_problem::CuttingProblem;
-    use crate::identify::cutting_study::calibrate_cutting;
+    use crate::identify::forces::cutting_problem::CuttingProblem;
+    use crate::identify::forces::cutting_study::calibrate_cutting;
     use std::f64::consts::TAU;
 
     fn lead(more: &dyn Fn(usize, usize, f64, f64, bool) -> f64) -> Option<CuttingLead> {

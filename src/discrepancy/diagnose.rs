@@ -9,7 +9,7 @@ use super::candidate::{BaselineFit, EffectCandidate};
 use super::diagnosis::Diagnosis;
 use super::verdict::{self, DiagnosisVerdict};
 use crate::Result;
-use crate::identify::calibrate::{Calibration, estimates};
+use crate::identify::frfs::calibrate::{Calibration, estimates};
 use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
 use crate::identify::rest::{BeyondSlips, Rest};
 use crate::identify::study::{

@@ -2,7 +2,7 @@
 
 use super::{DiagnosisVerdict, diagnose};
 use crate::effects::find;
-use crate::identify::resonance_study::made_table::{SUMMARY, baseline, table};
+use crate::identify::resonances::resonance_study::made_table::{SUMMARY, baseline, table};
 use crate::robot::fixture::irb6640;
 
 #[test]

@@ -6,8 +6,9 @@ use nalgebra::{DMatrix, Vector6};
 use num_complex::Complex64;
 
 use super::effect::{DataSummary, Instance, NEGLIGIBLE, Setting, Site, StructuralEffect};
-use super::{Background, Spot, branch};
+use super::{Background, Spot};
 use crate::data::RobotSpec;
+use crate::effects::structural::branch;
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::{Attachment, AttachmentLaw, Branch as HungMass, Chain, Dual, Element, Grip, Role};
 

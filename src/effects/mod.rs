@@ -4,26 +4,15 @@
 //! it adds elements, bodies or branches to the chain, changes a stiffness, or filters the measured channels. Its
 //! derivative comes with the [`Dual`] numbers that it is written in. The loop knows effects by this trait only.
 
-mod amplitude_dependent_stiffness;
 pub mod background;
-mod base_compliance;
-mod branch;
 pub mod cutting;
 pub mod drawn;
 mod effect;
-mod joint_damping;
-mod joint_transverse_compliance;
-mod link_flexibility;
-mod load_dependent_stiffness;
-mod local_resonator;
-mod payload;
 mod possible;
 mod registry;
 mod request;
-mod sensor_misalignment;
 pub mod spot;
-mod time_delay;
-mod tool_flexibility;
+pub(crate) mod structural;
 
 pub use background::Background;
 pub use effect::{ChannelFilter, DataSummary, Instance, Setting, Site, StructuralEffect};

@@ -1,19 +1,19 @@
 //! All effects on the structure: one line an effect.
 
-use super::amplitude_dependent_stiffness::AmplitudeDependentStiffness;
-use super::base_compliance::BaseCompliance;
 use super::drawn::{self, DrawnBranch, Series};
 use super::effect::{Instance, StructuralEffect};
-use super::joint_damping::JointDamping;
-use super::joint_transverse_compliance::JointTransverseCompliance;
-use super::link_flexibility::LinkFlexibility;
-use super::load_dependent_stiffness::LoadDependentStiffness;
-use super::local_resonator::LocalResonator;
-use super::payload::Payload;
-use super::sensor_misalignment::SensorMisalignment;
-use super::time_delay::TimeDelay;
-use super::tool_flexibility::ToolFlexibility;
 use crate::data::RobotSpec;
+use crate::effects::structural::amplitude_dependent_stiffness::AmplitudeDependentStiffness;
+use crate::effects::structural::base_compliance::BaseCompliance;
+use crate::effects::structural::joint_damping::JointDamping;
+use crate::effects::structural::joint_transverse_compliance::JointTransverseCompliance;
+use crate::effects::structural::link_flexibility::LinkFlexibility;
+use crate::effects::structural::load_dependent_stiffness::LoadDependentStiffness;
+use crate::effects::structural::local_resonator::LocalResonator;
+use crate::effects::structural::payload::Payload;
+use crate::effects::structural::sensor_misalignment::SensorMisalignment;
+use crate::effects::structural::time_delay::TimeDelay;
+use crate::effects::structural::tool_flexibility::ToolFlexibility;
 
 /// All structural effects.
 pub const STRUCTURAL: [&dyn StructuralEffect; 11] = [

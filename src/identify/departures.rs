@@ -2,7 +2,7 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::calibrate::Calibration;
+use crate::identify::frfs::calibrate::Calibration;
 use crate::parameter::Parameter;
 
 /// Chance that any of the parameters is said to differ where none does.

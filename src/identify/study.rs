@@ -4,9 +4,9 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::calibrate::{Calibration, Estimate, scattered_starts};
 use super::levenberg_marquardt::{Fit, LeastSquares, Stopping, minimise, one_step};
 use super::rest::{BeyondSlips, Rest};
+use crate::identify::frfs::calibrate::{Calibration, Estimate, scattered_starts};
 use crate::parameter::Parameter;
 use crate::{Error, Result};
 

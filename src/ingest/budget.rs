@@ -12,7 +12,7 @@ const TIMES: usize = 32;
 
 /// Memory that is left for one file.
 #[derive(Debug)]
-pub(super) struct Budget {
+pub(crate) struct Budget {
     left: usize,
     whole: usize,
     file: usize,

@@ -4,13 +4,13 @@
 use std::path::Path;
 
 use super::contents::MeasurementFile;
-use super::force;
 use super::long;
 use super::read::{self, no_such, read_file};
-use super::table::Header;
 use super::text::{Notes, without_byte_order_mark};
 use super::units::{self, Dimension, Unit};
 use crate::data::{ChannelRole, TimeRecord};
+use crate::ingest::formats::force;
+use crate::ingest::tables::table::Header;
 use crate::{Error, InputError, Result};
 
 /// What a channel is.

@@ -6,9 +6,10 @@ use super::budget::Budget;
 use super::contents::{Contents, Format, count};
 use super::detect::{self, Detected};
 use super::text::{self, Notes};
-use super::{checks, dof_names, force, frf_text, lvm, mat, tdms, uff};
+use super::{checks, dof_names};
 use crate::InputError;
 use crate::data::FrfRecord;
+use crate::ingest::formats::{force, frf_text, lvm, mat, tdms, uff};
 
 /// Where a file holds one FRF that does not say where it was measured, its name may.
 pub(super) fn dofs_from_file_name(path: &Path, frfs: &mut [FrfRecord], notes: &mut Notes) {

@@ -1,15 +1,15 @@
 //! Which format a file has, by what stands in it.
 
 use super::contents::Format;
-use super::force;
-use super::frf_text;
-use super::lvm;
-use super::mat;
 use super::preview::preview;
-use super::table::Header;
 use super::text::{self, Lines};
-use super::uff;
 use crate::InputError;
+use crate::ingest::formats::force;
+use crate::ingest::formats::frf_text;
+use crate::ingest::formats::lvm;
+use crate::ingest::formats::mat;
+use crate::ingest::formats::uff;
+use crate::ingest::tables::table::Header;
 
 /// What was decided, and what the reader needs to know of it.
 pub(super) enum Detected {

@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use super::contents::{Contents, Format, MeasurementFile};
 use super::decode::{dofs_from_file_name, read_bytes};
 use super::detect::{self, Detected};
-use super::force::Pieces;
 use super::quality::{QualityCheck, quality_warnings};
 use super::text::{self, Notes};
 use crate::data::TimeRecord;
+use crate::ingest::formats::force::Pieces;
 use crate::progress::Progress;
 use crate::{Error, Result};
 

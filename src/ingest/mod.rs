@@ -6,42 +6,31 @@
 mod budget;
 mod channel_rule;
 mod checks;
-mod clock;
 mod contents;
 mod decode;
 mod detect;
 mod dof_names;
-mod force;
-mod frf_text;
-mod geometry;
+pub(crate) mod formats;
 mod long;
-mod lvm;
-mod mat;
-mod number;
 mod preview;
 mod quality;
 mod read;
-mod split_comma;
-mod table;
-mod table_rows;
-mod tdms;
+pub(crate) mod tables;
 #[cfg(test)]
 mod tests;
 mod text;
-mod uff;
 pub mod units;
-mod waveform;
 
 pub use crate::data::{Axis, Channel, ChannelRole, Dof, FrfRecord, Quantity, TimeRecord};
-pub use channel_rule::{ChannelRule, Gain, Measures, Source, read_time_with, unit_of_charge_or_other};
-pub use contents::{Contents, Format, MeasurementFile, OtherRecord};
-pub use geometry::{Geometry, NodalShape, geometry_text, read_geometry};
-pub use long::{Survey, regular_file, survey};
-pub use mat::{MatArray, mat5_bytes};
-pub use quality::quality_warnings;
-pub use read::{read_file, read_frfs, read_memory, read_time};
-pub use text::shown;
-pub use uff::{
+pub use crate::ingest::formats::geometry::{Geometry, NodalShape, geometry_text, read_geometry};
+pub use crate::ingest::formats::mat::{MatArray, mat5_bytes};
+pub use crate::ingest::formats::uff::{
     Abscissa, ByteOrder, Dataset58, Encoding58, EntityDof, Ordinate, UnitAxis, frf_dataset, time_datasets,
     uff58_bytes, write_datasets58, write_uff58,
 };
+pub use channel_rule::{ChannelRule, Gain, Measures, Source, read_time_with, unit_of_charge_or_other};
+pub use contents::{Contents, Format, MeasurementFile, OtherRecord};
+pub use long::{Survey, regular_file, survey};
+pub use quality::quality_warnings;
+pub use read::{read_file, read_frfs, read_memory, read_time};
+pub use text::shown;

@@ -1,8 +1,8 @@
 //! Tables without names: what is in them, and what to write so that they get names.
 
-use super::table::Header;
 use super::text::Notes;
 use super::units;
+use crate::ingest::tables::table::Header;
 
 /// What a table without names holds, and the lines of `campaign.toml` that give it names.
 pub(super) fn preview(bytes: &[u8], header: &Header) -> (String, String) {

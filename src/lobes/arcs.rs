@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 
 use super::force::RegenerativeForce;
-use super::frf::DirectFrf;
+use crate::lobes::dynamics::frf::DirectFrf;
 
 /// How far, relative to |λ|, the middle of an arc may lie from its chord.
 const CHORD_TOLERANCE: f64 = 4e-3;

@@ -101,7 +101,7 @@ pub fn band(solvers: &[BlockSolver<'_>], spindle_rpm: &[f64]) -> LobeBand {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lobes::frf::{AxisMode, ModalFrf};
+    use crate::lobes::dynamics::frf::{AxisMode, ModalFrf};
     use crate::lobes::{RegenerativeForce, StabilitySolver};
 
     #[test]

@@ -5,8 +5,8 @@
 
 use super::curve::{AbsoluteLimit, Limit, LobeCurve, SpeedLimit};
 use super::force::RegenerativeForce;
-use super::frf::DirectFrf;
 use super::solve::StabilitySolver;
+use crate::lobes::dynamics::frf::DirectFrf;
 
 /// Forces of a cut averaged over a revolution.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,8 +7,8 @@
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 use super::band::{QUANTILES, quantile};
-use super::robot::lobe_axes;
 use crate::campaign::{CutGeometry, Tool};
+use crate::lobes::dynamics::robot::lobe_axes;
 use crate::robot::static_deflection::wrench;
 
 /// Static forces on the tool.

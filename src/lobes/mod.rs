@@ -13,47 +13,36 @@
 //! Where nothing limits the cut at a speed within the band of the FRF, the limit is `None` (`null` in JSON).
 
 mod arcs;
-mod arnoldi;
 pub mod band;
 pub mod best_speed;
 pub mod blocks;
 pub mod curve;
 #[cfg(test)]
 mod drilling_tests;
+pub mod dynamics;
 pub mod force;
-pub mod frf;
 pub mod hole;
-#[cfg(test)]
-mod milling_tests;
-pub mod multi_frequency;
+pub mod milling;
 pub mod optimum;
 pub mod outcome;
-pub mod periodic_force;
-pub mod poles;
 pub mod redundancy;
-pub mod robot;
-pub mod sampled;
-pub mod semi_discretisation;
 pub mod setup;
 pub mod solve;
-pub mod state_space;
-pub mod tool_beam;
-pub mod tool_point;
 pub mod workspace;
 pub mod workspace_grid;
 
+pub use crate::lobes::dynamics::frf::{AxisMode, DirectFrf, ModalFrf, Mode};
+pub use crate::lobes::dynamics::poles::PoleFrf;
+pub use crate::lobes::dynamics::robot::RobotFrf;
+pub use crate::lobes::dynamics::sampled::SampledFrf;
+pub use crate::lobes::dynamics::tool_beam::{BeamSegment, ToolBeam};
+pub use crate::lobes::dynamics::tool_point::{ToolDynamics, ToolPoint};
+pub use crate::lobes::milling::multi_frequency::MultiFrequency;
+pub use crate::lobes::milling::periodic_force::{PeriodicForce, ProcessDamping};
+pub use crate::lobes::milling::semi_discretisation::SemiDiscretisation;
+pub use crate::lobes::milling::state_space::StateSpace;
 pub use band::LobeBand;
 pub use blocks::{AveragedCut, BlockLobes, BlockSolver, Blocks};
 pub use curve::{AbsoluteLimit, Limit, LobeCurve, Peak, SpeedLimit, peak_near, peaks, speed_grid};
 pub use force::RegenerativeForce;
-pub use frf::{AxisMode, DirectFrf, ModalFrf, Mode};
-pub use multi_frequency::MultiFrequency;
-pub use periodic_force::{PeriodicForce, ProcessDamping};
-pub use poles::PoleFrf;
-pub use robot::RobotFrf;
-pub use sampled::SampledFrf;
-pub use semi_discretisation::SemiDiscretisation;
 pub use solve::StabilitySolver;
-pub use state_space::StateSpace;
-pub use tool_beam::{BeamSegment, ToolBeam};
-pub use tool_point::{ToolDynamics, ToolPoint};

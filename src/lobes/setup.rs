@@ -2,10 +2,10 @@
 
 use super::blocks::AveragedCut;
 use super::force::RegenerativeForce;
-use super::periodic_force::PeriodicForce;
-use super::tool_beam::{BeamSegment, ToolBeam};
 use crate::campaign::{CutGeometry, LobesSection, Tool, ToolSegment};
 use crate::cutting::DrillGeometry;
+use crate::lobes::dynamics::tool_beam::{BeamSegment, ToolBeam};
+use crate::lobes::milling::periodic_force::PeriodicForce;
 
 /// Cutting coefficients that lobes need, N/mm².
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::arcs::{self, Arc, parabola_real};
 use super::curve::{AbsoluteLimit, Limit, SpeedLimit, golden_maximum};
 use super::force::RegenerativeForce;
-use super::frf::DirectFrf;
+use crate::lobes::dynamics::frf::DirectFrf;
 
 /// Solves det(I − b (1 − e^{−iωT}) D Φ) = 0 along the lobes of one force on one structure.
 pub struct StabilitySolver<'a> {

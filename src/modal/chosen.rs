@@ -5,10 +5,10 @@ use std::f64::consts::TAU;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-use super::global_modes::{GlobalMode, GlobalModes};
-use super::reconstruction::Reconstruction;
 use super::shape;
 use super::stabilisation::Stability;
+use crate::modal::together::global_modes::{GlobalMode, GlobalModes};
+use crate::modal::together::reconstruction::Reconstruction;
 use crate::signal::median;
 
 /// What the analyst wants different from what was found.
@@ -277,8 +277,9 @@ fn shape_of(constants: &[Option<(Complex64, f64)>], dofs: &[Option<[usize; 2]>])
 #[cfg(test)]
 mod tests {
     use super::super::synthetic::{Synthetic, SyntheticMode};
-    use super::super::{FrfModes, SetMember, Settings, analyse_frf, global};
+    use super::super::{FrfModes, SetMember, Settings, analyse_frf};
     use super::*;
+    use crate::modal::global;
 
     fn found() -> GlobalModes {
         let f_zeta = [(8.0, 0.02), (14.0, 0.015), (23.0, 0.02)];

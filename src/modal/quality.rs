@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 use serde::Serialize;
 
-use super::reconstruction::Reconstruction;
+use crate::modal::together::reconstruction::Reconstruction;
 
 /// Noise against the FRF's size up to which it is good, and from which it is bad.
 const NOISE: [f64; 2] = [0.1, 0.5];

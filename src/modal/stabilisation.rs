@@ -10,9 +10,9 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::local_fit::Pole;
-use super::lscf::Order;
 use super::shape::mac;
+use crate::modal::single::local_fit::Pole;
+use crate::modal::together::lscf::Order;
 
 /// Relative change of frequency from one order to the next, at most.
 pub const FREQUENCY_TOLERANCE: f64 = 0.01;

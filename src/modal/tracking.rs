@@ -2,8 +2,8 @@
 
 use num_complex::Complex64;
 
-use super::global_modes::{GlobalMode, GlobalModes};
 use super::shape::mac;
+use crate::modal::together::global_modes::{GlobalMode, GlobalModes};
 
 /// Modes further apart than this part of their frequency are different ones.
 const APART: f64 = 0.25;

@@ -4,16 +4,16 @@ use std::path::{Path, PathBuf};
 
 use super::parts::{failed, paragraph};
 use super::words::count;
-use super::{
-    Block, Page, ReportSection, ReportTable, TableColumn, VerdictCard, cutting_section, diagnosis_section,
-    error_map_section, history_section, lobes_section, modal_section, structure_section, thesis_section,
-    verdict_card, waveform_section,
-};
+use super::{Block, Page, ReportSection, ReportTable, TableColumn, VerdictCard, verdict_card};
 use crate::Result;
 use crate::analysis::{CampaignFindings, DiagnosisFindings, StructureFindings};
 use crate::campaign::Campaign;
 use crate::discrepancy::setup::{SetupCheck, SetupFinding};
 use crate::identify::StructureCase;
+use crate::report::sections::{
+    cutting_section, diagnosis_section, error_map_section, history_section, lobes_section, modal_section,
+    structure_section, thesis_section, waveform_section,
+};
 use crate::revision::{self, Domain};
 use crate::thesis::ThesisFindings;
 
@@ -36,7 +36,7 @@ pub(crate) struct ReportFiles {
 /// What the file system refuses, naming the file.
 pub(crate) fn write(page: &Page, findings: &CampaignFindings, folder: &Path) -> Result<ReportFiles> {
     #[cfg(feature = "parquet")]
-    let tables = super::tables::tables(findings)?;
+    let tables = crate::report::stores::tables::tables(findings)?;
     #[cfg(not(feature = "parquet"))]
     let _ = findings;
     let written = page.write(folder)?;
@@ -44,7 +44,7 @@ pub(crate) fn write(page: &Page, findings: &CampaignFindings, folder: &Path) -> 
         html: written.html,
         images: written.images,
         #[cfg(feature = "parquet")]
-        tables: super::tables::write(&tables, &folder.join(TABLES))?,
+        tables: crate::report::stores::tables::write(&tables, &folder.join(TABLES))?,
         #[cfg(not(feature = "parquet"))]
         tables: Vec::new(),
     })

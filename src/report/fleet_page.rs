@@ -5,8 +5,8 @@ use super::number::{percent, significant, with_error};
 use super::parts::{figure, paragraph};
 use super::words::count;
 use super::{Block, Page, ReportSection, ReportTable, TableColumn};
-use crate::analysis::control_chart::{Basis, ControlChart};
-use crate::analysis::fleet::{Attention, Fleet, Night, RobotHistory};
+use crate::analysis::many::control_chart::{Basis, ControlChart};
+use crate::analysis::many::fleet::{Attention, Fleet, Night, RobotHistory};
 use crate::revision;
 
 /// Robots whose charts are drawn; the table has all.
@@ -223,7 +223,7 @@ fn campaigns(robot: &RobotHistory) -> Block {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::fleet::FleetRow;
+    use crate::analysis::many::fleet::FleetRow;
 
     #[test]
     fn names_out_of_a_manifest_are_shown_and_not_obeyed() {

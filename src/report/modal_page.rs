@@ -5,22 +5,22 @@ use std::collections::BTreeSet;
 use num_complex::Complex64;
 
 use super::figure::{CellFormat, CompassFigure, HeatMap, IndicatorFigure, WirePicture, WireShapesFigure};
-use super::modal_section::{
-    coherence, mac, modes, reconstruction, reconstruction_of, stabilisation, tracked,
-};
 use super::number::{decimals, with_error};
 use super::parts::figure;
 use super::picker::picker;
 use super::words::count;
 use super::{Block, Drawing, Page, ReportSection, ReportTable, TableColumn};
 use crate::analysis::ModalAnalysis;
-use crate::analysis::modal::SetModes;
-use crate::analysis::modal_export::scaled_modes;
-use crate::analysis::mode_set::dofs_of_frfs;
-use crate::analysis::shape_comparison::{ShapeComparison, at_nodes};
+use crate::analysis::modes::modal::SetModes;
+use crate::analysis::modes::modal_export::scaled_modes;
+use crate::analysis::modes::mode_set::dofs_of_frfs;
+use crate::analysis::modes::shape_comparison::{ShapeComparison, at_nodes};
 use crate::ingest::{Dof, Geometry};
 use crate::modal::indicators::FrfMatrix;
 use crate::modal::scaling::{DrivingPoint, check_driving_point};
+use crate::report::sections::modal_section::{
+    coherence, mac, modes, reconstruction, reconstruction_of, stabilisation, tracked,
+};
 
 /// Warnings shown; the command tells all.
 const MOST_WARNINGS: usize = 12;

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::number::decimals;
 use super::{Block, Drawing};
-use crate::analysis::modal::SetModes;
+use crate::analysis::modes::modal::SetModes;
 use crate::modal::stabilisation::Stability;
 
 const WIDTH: f64 = 1200.0;

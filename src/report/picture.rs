@@ -7,8 +7,8 @@ use std::fmt::Write;
 
 use minijinja::HtmlEscape;
 
-use super::figure::axis::{FigureAxis, extent, positive_extent};
 use super::number::{format_si, significant};
+use crate::report::figure::sheet::axis::{FigureAxis, extent, positive_extent};
 
 /// Size of the drawing in its own units; the page scales it.
 const WIDTH: f64 = 620.0;

@@ -13,7 +13,7 @@ use crate::discrepancy::verdict::is_noise;
 use crate::discrepancy::{CutError, Diagnosis, DiagnosisVerdict, EffectCandidate};
 use crate::effects::Instance;
 use crate::effects::cutting::CuttingInstance;
-use crate::identify::cutting_waves::courses;
+use crate::identify::forces::cutting_waves::courses;
 use crate::identify::{CutFit, Estimate};
 
 const ROBOT: &str = "Robot against FRFs";

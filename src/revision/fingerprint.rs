@@ -5,7 +5,8 @@ use std::io::Read;
 use std::path::Path;
 
 use super::folder::log_file;
-use crate::campaign::{Campaign, LinkTolerances, campaign_file, named_files, paths};
+use crate::campaign::form::paths;
+use crate::campaign::{Campaign, LinkTolerances, campaign_file, named_files};
 use crate::identify::model_history::Domain;
 use crate::{Error, Result};
 

@@ -3,9 +3,9 @@
 
 use nalgebra::Point3;
 
-use super::dh::Kinematics;
 use super::model::RobotModel;
 use crate::data::RobotSpec;
+use crate::robot::kinematics::dh::Kinematics;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 

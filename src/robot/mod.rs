@@ -6,36 +6,32 @@
 
 pub mod beam;
 pub mod chain;
-pub mod dh;
 pub mod dual;
 pub mod export;
 pub mod file_number;
 #[cfg(test)]
 pub(crate) mod fixture;
 pub mod frf;
-mod ik_solution;
-pub mod inverse;
+pub mod kinematics;
 mod modal_basis;
 pub mod model;
-pub mod numeric_inverse;
 pub mod posture_report;
 mod published_postures;
 pub mod rigid;
-pub mod spherical_wrist;
 pub mod static_deflection;
 pub mod urdf;
 
 pub use crate::data::*;
+pub use crate::robot::kinematics::dh::Kinematics;
+pub use crate::robot::kinematics::ik_solution::IkSolution;
+pub use crate::robot::kinematics::inverse::{IkReference, InverseKinematics};
+pub use crate::robot::kinematics::numeric_inverse::NumericInverse;
+pub use crate::robot::kinematics::spherical_wrist::SphericalWrist;
 pub use chain::{Attachment, AttachmentLaw, Body, Branch, Chain, Element, Grip, Place, Role, Slot, System};
-pub use dh::Kinematics;
 pub use dual::Dual;
 pub use file_number::FileNumber;
 pub use frf::FrfBasis;
-pub use ik_solution::IkSolution;
-pub use inverse::{IkReference, InverseKinematics};
 pub use modal_basis::ModalBasis;
 pub use model::{Baseline, RobotModel};
-pub use numeric_inverse::NumericInverse;
 pub use posture_report::PostureReport;
 pub use published_postures::posture_deg;
-pub use spherical_wrist::SphericalWrist;

@@ -4,11 +4,11 @@ use nalgebra::{DMatrix, DVector, Point3, Vector3, Vector6};
 
 use super::beam;
 use super::chain::{Body, Chain, Element, Place, Role, Slot};
-use super::dh::Kinematics;
 use super::dual::Dual;
 use crate::campaign::{AxesRef, BodyRef, Point};
 use crate::data::RobotSpec;
 use crate::ingest::Axis;
+use crate::robot::kinematics::dh::Kinematics;
 use crate::{InputError, Result};
 
 /// A robot whose structure can be set up at any posture.

@@ -3,9 +3,9 @@
 use nalgebra::{Point3, Vector3};
 
 use super::chain::Chain;
-use super::dh::Kinematics;
 use super::frf::natural_frequencies_hz;
 use super::model::RobotModel;
+use crate::robot::kinematics::dh::Kinematics;
 use crate::{Error, Result};
 
 /// Frequencies in Hz, ascending; stiffness 1/C_ii in base axes, N/m.

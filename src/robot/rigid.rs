@@ -2,8 +2,8 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::dh::Kinematics;
 use super::model::RobotModel;
+use crate::robot::kinematics::dh::Kinematics;
 
 /// m/s².
 pub const STANDARD_GRAVITY: f64 = 9.80665;

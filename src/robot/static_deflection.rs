@@ -3,8 +3,8 @@
 use nalgebra::{Matrix6, Matrix6xX, Vector3, Vector6};
 
 use super::chain::Chain;
-use super::dh::Kinematics;
 use super::model::RobotModel;
+use crate::robot::kinematics::dh::Kinematics;
 use crate::{Error, Result};
 
 /// Force (N) and moment (N·m) on the tool at the tool centre point, base axes.

@@ -10,19 +10,19 @@ use super::campaign_folder::LabCampaign;
 use super::departure::{self, Departed, LabDeparture};
 use super::draw::{Draws, Purpose};
 use super::files::{self, FrfEntry, FrfFormat};
-use super::imitation::{self, Imitation};
 use super::lab_robot::LabRobot;
 use super::laboratory::{Laboratory, Slip};
 use super::noise::LineNoise;
 use super::postures;
 use super::request::HiddenEffect;
 use super::scenario::{FrfLayout, NOISE_FLOOR_M_PER_N, StructureScenario};
-use super::strength::{self, Sight};
-use super::visibility::{self, HiddenTruth, Visibility};
 use crate::campaign::{AxesRef, BodyRef, MeasuredDof, MeasuredFrf, Point, Posture, RobotSection};
 use crate::identify::{FrfData, StructureModel};
 use crate::ingest::{Axis, Dof, FrfRecord};
 use crate::robot::RobotModel;
+use crate::simulate::sizes::imitation::{self, Imitation};
+use crate::simulate::sizes::strength::{self, Sight};
+use crate::simulate::sizes::visibility::{self, HiddenTruth, Visibility};
 use crate::{InputError, Result};
 
 /// Stiffness tolerance that a campaign without the key has.

@@ -1,6 +1,6 @@
 //! FRFs of a lab that departs from the model: true angles, true chain, true channels.
 //!
-//! Written apart from [`crate::identify::structure`], which cannot express most of this; without departures both must
+//! Written apart from [`crate::identify::frfs::structure`], which cannot express most of this; without departures both must
 //! agree to rounding.
 
 use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
@@ -11,7 +11,7 @@ use super::departure::{Departed, FrfChannel, Matrices, Scene};
 use crate::campaign::Posture;
 use crate::identify::FrfData;
 use crate::identify::StructureModel;
-use crate::identify::frf_data::FrfBlock;
+use crate::identify::frfs::frf_data::FrfBlock;
 use crate::ingest::Axis;
 use crate::robot::frf::Response;
 use crate::robot::{Chain, FrfBasis, Kinematics, ModalBasis, System};

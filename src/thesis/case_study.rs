@@ -9,8 +9,8 @@ use super::published::{
 };
 use super::real_case::{RealCase, real_case};
 use crate::Result;
-use crate::identify::calibrate::estimates;
-use crate::identify::modal_table::{self, StrongestMode};
+use crate::identify::frfs::calibrate::estimates;
+use crate::identify::resonances::modal_table::{self, StrongestMode};
 use crate::identify::{Estimate, StructureModel};
 use crate::ingest::Axis;
 use crate::lobes::{AbsoluteLimit, Peak, RobotFrf, SpeedLimit, StabilitySolver, peak_near, speed_grid};

@@ -4,11 +4,13 @@
 use serde::Serialize;
 
 use super::published::{MINIMA, MODAL, ModalRow, RECURRING_BANDS, STATIC_STIFFNESS, StaticRow, rows};
-use crate::discrepancy::difference::{Difference, Lookout, greatest_difference};
+use crate::discrepancy::comparison::difference::{Difference, Lookout, greatest_difference};
 use crate::discrepancy::verdict::{STRONG_BIC, evidence_weight};
 use crate::discrepancy::{DiagnosisVerdict, diagnose};
-use crate::identify::modal_table::{FREQUENCY_STD, PEAK_STD};
-use crate::identify::resonance_study::{Minimum, Resonance, ResonanceReading, ResonanceStudy, merged};
+use crate::identify::resonances::modal_table::{FREQUENCY_STD, PEAK_STD};
+use crate::identify::resonances::resonance_study::{
+    Minimum, Resonance, ResonanceReading, ResonanceStudy, merged,
+};
 use crate::identify::{Estimate, StructureModel};
 use crate::ingest::Axis;
 use crate::robot::{PostureReport, posture_deg};

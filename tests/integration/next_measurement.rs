@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use lobestone::campaign::{AxesRef, BodyRef, Campaign, MeasuredDof, MeasuredFrf, Point, Posture};
-use lobestone::discrepancy::next_measurement::advise;
+use lobestone::discrepancy::outlook::next_measurement::advise;
 use lobestone::discrepancy::{Diagnosis, DiagnosisVerdict, NextMeasurement, diagnose};
 use lobestone::effects::{self, Instance};
 use lobestone::identify::{FrfData, Options, StructureCase, StructureModel, StructureStudy};

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use lobestone::campaign::Campaign;
 use lobestone::discrepancy::extension::Extension;
-use lobestone::identify::calibrate::calibrate;
+use lobestone::identify::frfs::calibrate::calibrate;
 use lobestone::identify::study::Study;
 use lobestone::identify::{
     Calibration, CuttingCase, CuttingStudy, FrfData, Options, StructureCase, StructureStudy,

@@ -273,12 +273,12 @@ fn the_readme_shows_a_doctest() {
 #[test]
 fn a_name_of_nothing_is_noticed() {
     let files = files();
-    let source = "//! See `cutting/faults.rs` and\n//! docs/physics.md, \"Structure\".\n\nlet a = \"b.rs\"; // robot.rs\n";
+    let source = "//! See `cutting/measured/faults.rs` and\n//! docs/physics.md, \"Structure\".\n\nlet a = \"b.rs\"; // robot.rs\n";
     let found: Vec<String> = comments(source);
     assert_eq!(found.len(), 2, "{found:?}");
     let named = named_files(&found[0]);
     let names: Vec<&str> = named.iter().map(|(name, _)| *name).collect();
-    assert_eq!(names, ["cutting/faults.rs", "docs/physics.md"]);
+    assert_eq!(names, ["cutting/measured/faults.rs", "docs/physics.md"]);
     assert_eq!(named_section(named[1].1), Some("Structure"));
     assert!(is_there("tests/integration/references.rs", "src/lib.rs", &files));
     assert!(is_there("integration/references.rs", "src/lib.rs", &files));

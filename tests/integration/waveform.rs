@@ -6,10 +6,10 @@ use crate::support::{blind, document, truth};
 use lobestone::campaign::Campaign;
 use lobestone::discrepancy::{CuttingComparison, DiagnosisVerdict};
 use lobestone::effects::cutting::{CuttingInstance, find, instances};
-use lobestone::identify::cutting_data::processes;
-use lobestone::identify::cutting_study::calibrate_cutting;
+use lobestone::identify::forces::cutting_data::processes;
+use lobestone::identify::forces::cutting_study::calibrate_cutting;
+use lobestone::identify::forces::off_comb::{OffComb, VibrationLine};
 use lobestone::identify::levenberg_marquardt::Stopping;
-use lobestone::identify::off_comb::{OffComb, VibrationLine};
 use lobestone::identify::{
     CuttingData, CuttingModel, CuttingProblem, CuttingStudy, Fit, LeastSquares, minimise,
 };

@@ -2,9 +2,8 @@
 
 use lobestone::InputError;
 use lobestone::campaign::{CutGeometry, Immersion, Process, Tool, ToolKind};
-use lobestone::cutting::{
-    Estimate, Fit, ForceAxis, Method, Observation, average_row, bootstrap, coefficients_of, estimate, fit,
-};
+use lobestone::cutting::{Estimate, Fit, ForceAxis, Method, Observation, average_row, bootstrap, coefficients_of, fit};
+use lobestone::cutting::fit::estimate;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

@@ -1,6 +1,6 @@
 //! Modes of FRFs given as arrays.
 
-use lobestone::analysis::modal::{FrfInput, TOGETHER};
+use lobestone::analysis::modes::modal::{FrfInput, TOGETHER};
 use lobestone::analysis::{ModalAnalysis, SetModes};
 use lobestone::modal::{Settings, Tolerances};
 use num_complex::Complex64;

@@ -6,7 +6,7 @@ use super::answers::Answers;
 use super::entry::{DraftTable, Entry};
 use super::found::Scan;
 use super::tables;
-use crate::campaign::paths::campaign_file;
+use crate::campaign::form::paths::campaign_file;
 use crate::campaign::schema::Campaign;
 use crate::campaign::suggest::shown;
 use crate::files::{write_atomically, write_new};

@@ -6,7 +6,7 @@ use num_complex::Complex64;
 
 use crate::effects::Spot;
 use crate::effects::drawn::{self, DrawnForm};
-use crate::identify::spot_response::{SpotLine, SpotResponses};
+use crate::identify::frfs::spot_response::{SpotLine, SpotResponses};
 use crate::parameter::Parameter;
 
 /// The dynamic stiffness that the data ask for on one line.

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::*;
 use crate::data::{AxesRef, Axis, BodyRef, MeasuredDof, Point, RobotSection};
-use crate::identify::frf_data::{FrfBlock, FrfDatum};
+use crate::identify::frfs::frf_data::{FrfBlock, FrfDatum};
 use crate::identify::{FrfData, Options};
 use crate::robot::RobotModel;
 use crate::robot::fixture::{TAP_POSTURES, irb6640};

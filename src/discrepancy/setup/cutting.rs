@@ -15,7 +15,7 @@ use super::finding::{SetupFinding, with_error};
 use super::readings::Turn;
 use crate::Result;
 use crate::data::Process;
-use crate::identify::cutting_study::{NOISE_KNOWN_TO, calibrate_cutting, small_errors};
+use crate::identify::forces::cutting_study::{NOISE_KNOWN_TO, calibrate_cutting, small_errors};
 use crate::identify::{Calibration, CuttingData, CuttingModel};
 
 /// Cuts that readings of the axes are tried on.

@@ -2,7 +2,7 @@
 
 use super::finding::SetupFinding;
 use crate::data::Point;
-use crate::identify::frf_data::{FrfBlock, FrfData, FrfDatum};
+use crate::identify::frfs::frf_data::{FrfBlock, FrfData, FrfDatum};
 
 /// Standard deviations of the mean weighted difference from which on noise does not explain it.
 const CHANCE: f64 = 8.0;

@@ -12,12 +12,12 @@ use super::reading::{FileReading, model_read};
 use super::score::Linearised;
 use super::{mistakes, readings, slips};
 use crate::Result;
-use crate::identify::calibrate::{Options, calibrate};
-use crate::identify::frf_data::FrfData;
-use crate::identify::frf_problem::{FrfProblem, Misfit};
+use crate::identify::frfs::calibrate::{Options, calibrate};
+use crate::identify::frfs::frf_data::FrfData;
+use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
+use crate::identify::frfs::structure_study::small_errors;
 use crate::identify::levenberg_marquardt::{Stopping, minimise};
 use crate::identify::rest::BeyondSlips;
-use crate::identify::structure_study::small_errors;
 use crate::identify::study::{Study, View, try_effects};
 use crate::identify::{StructureModel, StructureStudy};
 

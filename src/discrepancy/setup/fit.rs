@@ -8,7 +8,7 @@ use super::scene::{Made, predict, weighted};
 use super::score::{jacobian, size_slopes};
 use crate::Result;
 use crate::identify::StructureModel;
-use crate::identify::frf_data::FrfData;
+use crate::identify::frfs::frf_data::FrfData;
 use crate::identify::levenberg_marquardt::{Fit, LeastSquares, Linearisation, Stopping, minimise};
 
 /// Parameters of the model first (solver's scale), then the sizes of the mistake in units of what is usual.

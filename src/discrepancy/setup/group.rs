@@ -1,7 +1,7 @@
 //! Which FRFs a mistake concerns.
 
 use crate::data::{Axis, Point};
-use crate::identify::frf_data::{FrfData, FrfDatum};
+use crate::identify::frfs::frf_data::{FrfData, FrfDatum};
 
 /// A selection of FRFs: those for which every given part agrees.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -6,7 +6,7 @@ use super::finding::SetupFinding;
 use super::group::FrfGroup;
 use super::truth::Truth;
 use crate::data::{Axis, Point};
-use crate::identify::frf_data::{FrfData, FrfDatum};
+use crate::identify::frfs::frf_data::{FrfData, FrfDatum};
 use crate::robot::Kinematics;
 
 /// One quantity of a mistake; zero means that nothing is wrong.

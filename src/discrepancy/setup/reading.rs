@@ -3,7 +3,7 @@
 use super::finding::SetupFinding;
 use crate::data::Point;
 use crate::identify::StructureModel;
-use crate::identify::frf_data::FrfData;
+use crate::identify::frfs::frf_data::FrfData;
 
 /// Another reading of the files.
 pub trait FileReading: Send + Sync {

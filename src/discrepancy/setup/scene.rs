@@ -9,7 +9,7 @@ use super::truth::Truth;
 use crate::Result;
 use crate::data::Axis;
 use crate::identify::StructureModel;
-use crate::identify::frf_data::{FrfBlock, FrfData};
+use crate::identify::frfs::frf_data::{FrfBlock, FrfData};
 use crate::robot::FrfBasis;
 use crate::robot::frf::Response;
 

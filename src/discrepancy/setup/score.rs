@@ -8,7 +8,7 @@ use super::mistake::{Mistake, MistakeSize};
 use super::scene::{Curves, Made, predict, weighted};
 use crate::Result;
 use crate::identify::StructureModel;
-use crate::identify::frf_data::FrfData;
+use crate::identify::frfs::frf_data::FrfData;
 
 /// A model at its optimum, linearised once.
 pub struct Linearised<'a> {

@@ -6,7 +6,7 @@ use super::group::FrfGroup;
 use super::mistake::{Distortion, turned_axis};
 use super::truth::Truth;
 use crate::data::Axis;
-use crate::identify::frf_data::FrfDatum;
+use crate::identify::frfs::frf_data::FrfDatum;
 use crate::robot::Kinematics;
 
 /// One sort of error, one number of it.

@@ -19,7 +19,7 @@ use super::slipped::{Slipped, SmallError};
 use crate::Result;
 use crate::data::Axis;
 use crate::identify::StructureModel;
-use crate::identify::frf_data::{FrfBlock, FrfData};
+use crate::identify::frfs::frf_data::{FrfBlock, FrfData};
 use crate::identify::rest::{AfterSlips, RestCurve};
 use crate::parameter::Scale;
 
@@ -280,7 +280,7 @@ impl<'a> System<'a> {
             values: &[],
         };
         let predicted = predict(self.model, &theta, &data, Some(made))?;
-        let over_noise = |(frf, curve): (&crate::identify::frf_data::FrfDatum, Vec<Complex64>)| {
+        let over_noise = |(frf, curve): (&crate::identify::frfs::frf_data::FrfDatum, Vec<Complex64>)| {
             let lines = curve.into_iter().zip(&frf.receptance).zip(&frf.noise_std);
             lines.map(|((m, h), std)| (m - h) / std).collect()
         };

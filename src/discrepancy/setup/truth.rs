@@ -4,7 +4,7 @@ use num_complex::Complex64;
 
 use crate::data::Axis;
 use crate::effects::ChannelFilter;
-use crate::identify::frf_data::FrfDatum;
+use crate::identify::frfs::frf_data::FrfDatum;
 use crate::robot::FrfBasis;
 use crate::robot::frf::Response;
 

@@ -1,8 +1,8 @@
 use super::*;
 use crate::campaign::Immersion;
 use crate::lobes::curve::{LobeCurve, peak_near, peaks, speed_grid};
-use crate::lobes::frf::{AxisMode, ModalFrf, Mode};
-use crate::lobes::sampled::SampledFrf;
+use crate::lobes::dynamics::frf::{AxisMode, ModalFrf, Mode};
+use crate::lobes::dynamics::sampled::SampledFrf;
 use approx::assert_relative_eq;
 use num_complex::Complex64;
 use proptest::prelude::*;

@@ -4,11 +4,11 @@ use num_complex::Complex64;
 
 use super::mode::OperationalMode;
 use super::subspace::{OrderPoles, SubspacePole};
-use crate::modal::global_modes::RejectedMode;
 use crate::modal::shape::{self, mac};
 use crate::modal::stabilisation::{
     DAMPING_TOLERANCE, DiagramPole, FREQUENCY_TOLERANCE, MAC_TOLERANCE, Stability,
 };
+use crate::modal::together::global_modes::RejectedMode;
 use crate::signal::median;
 
 /// A pole may be missing at this many orders in a row and still be the same.

@@ -11,8 +11,8 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::global_modes::RejectedMode;
 use super::stabilisation::DiagramPole;
+use crate::modal::together::global_modes::RejectedMode;
 use crate::{InputError, Result};
 
 mod chains;

@@ -1,10 +1,10 @@
 //! Quantities over time with their control limits, one panel each.
 
-use super::axis::{FigureAxis, extent, usable};
-use super::canvas::{Marker, Stroke, WIDTH, nothing_to_draw, paint};
-use super::panel::{FigureHeader, Panel, Swatch};
-use super::style;
 use crate::Result;
+use crate::report::figure::sheet::axis::{FigureAxis, extent, usable};
+use crate::report::figure::sheet::canvas::{Marker, Stroke, WIDTH, nothing_to_draw, paint};
+use crate::report::figure::sheet::panel::{FigureHeader, Panel, Swatch};
+use crate::report::figure::sheet::style;
 
 /// One value.
 #[derive(Debug, Clone, Copy, Default)]

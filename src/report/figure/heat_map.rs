@@ -1,10 +1,10 @@
 //! A table of numbers as coloured cells: where the error sits.
 
-use super::axis::{FigureAxis, extent, usable};
-use super::canvas::{Align, Canvas, Stroke, WIDTH, nothing_to_draw, paint};
-use super::panel::FigureHeader;
-use super::style;
 use crate::Result;
+use crate::report::figure::sheet::axis::{FigureAxis, extent, usable};
+use crate::report::figure::sheet::canvas::{Align, Canvas, Stroke, WIDTH, nothing_to_draw, paint};
+use crate::report::figure::sheet::panel::FigureHeader;
+use crate::report::figure::sheet::style;
 use crate::report::number::{decimals, percent, significant};
 
 /// How cell values are written.

@@ -1,10 +1,10 @@
 //! The error falling, revision by revision.
 
-use super::axis::{FigureAxis, extent, usable};
-use super::canvas::{Align, Lettering, Marker, Stroke, WIDTH, nothing_to_draw, paint};
-use super::panel::{FigureHeader, Panel, Swatch};
-use super::style;
 use crate::Result;
+use crate::report::figure::sheet::axis::{FigureAxis, extent, usable};
+use crate::report::figure::sheet::canvas::{Align, Lettering, Marker, Stroke, WIDTH, nothing_to_draw, paint};
+use crate::report::figure::sheet::panel::{FigureHeader, Panel, Swatch};
+use crate::report::figure::sheet::style;
 use crate::report::number::{decimals, percent};
 
 #[derive(Debug, Clone, Default)]

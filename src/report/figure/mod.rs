@@ -4,57 +4,41 @@
 //! left out; a figure with nothing left to show is an error that names it. Text uses an embedded font
 //! (DejaVu Sans, see `fonts/LICENSE.txt`), so no system font is needed.
 
-pub(crate) mod axis;
-pub(crate) mod canvas;
-mod panel;
-pub(crate) mod style;
-
-mod coherence;
-mod compass;
 mod control_chart;
-mod drawn_curve;
-pub(crate) mod force_record;
-mod frf;
+pub(crate) mod dynamics;
 mod heat_map;
 mod history;
-mod hole;
-mod indicators;
-pub(crate) mod lobes;
-mod mode_shapes;
-mod nyquist;
+pub(crate) mod machining;
 mod parameters;
-mod regression;
-mod resonances;
-mod robot;
+pub(crate) mod sheet;
 mod side_by_side;
-mod stabilisation;
-mod waveform;
-mod wire;
 
 #[cfg(test)]
 mod samples;
 #[cfg(test)]
 mod tests;
 
-pub use coherence::{CoherenceCurve, CoherenceFigure};
-pub use compass::CompassFigure;
+pub use crate::report::figure::dynamics::coherence::{CoherenceCurve, CoherenceFigure};
+pub use crate::report::figure::dynamics::compass::CompassFigure;
+pub use crate::report::figure::dynamics::drawn_curve::DrawnCurveFigure;
+pub(crate) use crate::report::figure::dynamics::frf::lowest_phase;
+pub use crate::report::figure::dynamics::frf::{FrfCurve, FrfFigure, NoiseLevel};
+pub use crate::report::figure::dynamics::indicators::IndicatorFigure;
+pub use crate::report::figure::dynamics::mode_shapes::{ModeShapesFigure, StickPicture};
+pub use crate::report::figure::dynamics::nyquist::NyquistFigure;
+pub use crate::report::figure::dynamics::resonances::{ResonanceFigure, ResonanceRow};
+pub use crate::report::figure::dynamics::robot::{RobotFigure, posture_svg};
+pub use crate::report::figure::dynamics::stabilisation::{StabilisationFigure, StabilisationPole};
+pub use crate::report::figure::dynamics::wire::{WirePicture, WireShapesFigure};
+pub use crate::report::figure::machining::force_record::{ForceRecord, ForceTrace};
+pub use crate::report::figure::machining::hole::{HoleFigure, HolePanel};
+pub use crate::report::figure::machining::lobes::{
+    LobeMarker, LobeOutcome, LobePanel, LobeTrace, LobesFigure,
+};
+pub use crate::report::figure::machining::regression::{RegressionFigure, RegressionMark, RegressionSeries};
+pub use crate::report::figure::machining::waveform::{WaveformFigure, WaveformPanel};
 pub use control_chart::{ControlChartFigure, ControlPanel, ControlPoint, MOST_PANELS};
-pub use drawn_curve::DrawnCurveFigure;
-pub use force_record::{ForceRecord, ForceTrace};
-pub(crate) use frf::lowest_phase;
-pub use frf::{FrfCurve, FrfFigure, NoiseLevel};
 pub use heat_map::{CellFormat, HeatMap};
 pub use history::{HistoryFigure, HistoryMark};
-pub use hole::{HoleFigure, HolePanel};
-pub use indicators::IndicatorFigure;
-pub use lobes::{LobeMarker, LobeOutcome, LobePanel, LobeTrace, LobesFigure};
-pub use mode_shapes::{ModeShapesFigure, StickPicture};
-pub use nyquist::NyquistFigure;
 pub use parameters::{DrawnEstimate, ParameterFigure, ParameterRow};
-pub use regression::{RegressionFigure, RegressionMark, RegressionSeries};
-pub use resonances::{ResonanceFigure, ResonanceRow};
-pub use robot::{RobotFigure, posture_svg};
 pub use side_by_side::{BarSeries, SideBySide};
-pub use stabilisation::{StabilisationFigure, StabilisationPole};
-pub use waveform::{WaveformFigure, WaveformPanel};
-pub use wire::{WirePicture, WireShapesFigure};

@@ -1,11 +1,11 @@
 //! Parameters before and after calibration, as deviation from their nominal values.
 
-use super::axis::{FigureAxis, extent, usable};
-use super::canvas::{Align, Canvas, Color, Stroke, WIDTH, nothing_to_draw, paint};
-use super::frf::or;
-use super::panel::{FigureHeader, Panel, Swatch};
-use super::style;
 use crate::Result;
+use crate::report::figure::dynamics::frf::or;
+use crate::report::figure::sheet::axis::{FigureAxis, extent, usable};
+use crate::report::figure::sheet::canvas::{Align, Canvas, Color, Stroke, WIDTH, nothing_to_draw, paint};
+use crate::report::figure::sheet::panel::{FigureHeader, Panel, Swatch};
+use crate::report::figure::sheet::style;
 use crate::report::number::plus_minus;
 
 #[derive(Debug, Clone, Copy, PartialEq)]

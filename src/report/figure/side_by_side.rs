@@ -1,11 +1,11 @@
 //! Bars in groups: published, measured and computed values of the same things.
 
-use super::axis::{FigureAxis, extent, positive_extent, usable};
-use super::canvas::{Align, Canvas, Marker, WIDTH, nothing_to_draw, paint};
-use super::frf::or;
-use super::panel::{FigureHeader, Panel, Swatch};
-use super::style;
 use crate::Result;
+use crate::report::figure::dynamics::frf::or;
+use crate::report::figure::sheet::axis::{FigureAxis, extent, positive_extent, usable};
+use crate::report::figure::sheet::canvas::{Align, Canvas, Marker, WIDTH, nothing_to_draw, paint};
+use crate::report::figure::sheet::panel::{FigureHeader, Panel, Swatch};
+use crate::report::figure::sheet::style;
 use crate::report::number::significant;
 
 #[derive(Debug, Clone, Default)]

@@ -379,7 +379,7 @@ fn the_same_numbers_give_the_same_bytes() {
 }
 
 /// Share of the image that has exactly this colour.
-fn share_of(png: &[u8], wanted: canvas::Color) -> f64 {
+fn share_of(png: &[u8], wanted: super::sheet::canvas::Color) -> f64 {
     let mut decoder = png::Decoder::new(png);
     decoder.set_transformations(png::Transformations::EXPAND);
     let mut reader = decoder.read_info().unwrap();
@@ -404,7 +404,7 @@ fn a_cell_has_the_colour_of_its_value() {
         };
         map.png().unwrap()
     };
-    let (low, high) = (style::ramp(0.0), style::ramp(1.0));
+    let (low, high) = (super::sheet::style::ramp(0.0), super::sheet::style::ramp(1.0));
     assert!(share_of(&map(0.0), low) > 0.3 && share_of(&map(0.0), high) < 0.01);
     assert!(share_of(&map(1.0), high) > 0.3 && share_of(&map(1.0), low) < 0.01);
 }

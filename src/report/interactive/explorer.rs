@@ -10,7 +10,8 @@ use crate::analysis::StructureFindings;
 use crate::campaign::{MeasuredDof, Point};
 use crate::discrepancy::FrfComparison;
 use crate::ingest::Dof;
-use crate::report::figure::{FrfCurve, lowest_phase, style};
+use crate::report::figure::sheet::style;
+use crate::report::figure::{FrfCurve, lowest_phase};
 use crate::report::number::{percent, significant};
 
 const UNIT: &str = "m/N";

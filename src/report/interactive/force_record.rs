@@ -3,8 +3,8 @@
 use serde_json::{Value, json};
 
 use super::plot::{Plot, axis, axis_name, css, css_with, line, number, numbers, stacked, text, with};
-use crate::report::figure::canvas::Color;
-use crate::report::figure::force_record::{AIR, DRIFT, ENVELOPE, LEVEL, STEADY};
+use crate::report::figure::machining::force_record::{AIR, DRIFT, ENVELOPE, LEVEL, STEADY};
+use crate::report::figure::sheet::canvas::Color;
 use crate::report::figure::{ForceRecord, ForceTrace};
 
 /// Pairs of smallest and largest value in the page, one channel.

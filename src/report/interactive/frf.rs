@@ -4,8 +4,9 @@ use num_complex::Complex64;
 use serde_json::{Value, json};
 
 use super::plot::{Plot, axis, layout, line, number, numbers, sign, stacked, text, with};
-use crate::report::figure::canvas::{Marker, Stroke};
-use crate::report::figure::{FrfCurve, FrfFigure, NyquistFigure, style};
+use crate::report::figure::sheet::canvas::{Marker, Stroke};
+use crate::report::figure::sheet::style;
+use crate::report::figure::{FrfCurve, FrfFigure, NyquistFigure};
 
 /// What the pointer says of a magnitude: four digits with an SI prefix.
 fn magnitude_hover(unit: &str) -> String {

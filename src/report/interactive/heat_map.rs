@@ -3,7 +3,8 @@
 use serde_json::{Value, json};
 
 use super::plot::{Plot, axis, axis_key, axis_name, css, layout, number, text, with};
-use crate::report::figure::{CellFormat, HeatMap, style};
+use crate::report::figure::sheet::style;
+use crate::report::figure::{CellFormat, HeatMap};
 use crate::report::number::significant;
 
 type Table = [Vec<Option<f64>>];

@@ -3,8 +3,9 @@
 use serde_json::{Value, json};
 
 use super::plot::{Plot, axis, axis_name, css, css_with, line, number, numbers, sign, stacked, text, with};
-use crate::report::figure::lobes::{BAND, BEFORE, UNSTABLE, sign as look};
-use crate::report::figure::{LobeOutcome, LobePanel, LobeTrace, LobesFigure, style};
+use crate::report::figure::machining::lobes::{BAND, BEFORE, UNSTABLE, sign as look};
+use crate::report::figure::sheet::style;
+use crate::report::figure::{LobeOutcome, LobePanel, LobeTrace, LobesFigure};
 
 impl LobesFigure {
     pub fn plot(&self) -> Plot {

@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
-use crate::report::figure::canvas::{Color, Marker, Stroke};
-use crate::report::figure::style;
+use crate::report::figure::sheet::canvas::{Color, Marker, Stroke};
+use crate::report::figure::sheet::style;
 
 /// A figure as plotly.js takes it.
 #[derive(Debug, Clone, Default)]

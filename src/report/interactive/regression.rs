@@ -3,8 +3,9 @@
 use serde_json::{Value, json};
 
 use super::plot::{Plot, axis, axis_name, line, numbers, sign, stacked, symbol, text, with};
-use crate::report::figure::canvas::Marker;
-use crate::report::figure::{RegressionFigure, RegressionMark, RegressionSeries, style};
+use crate::report::figure::sheet::canvas::Marker;
+use crate::report::figure::sheet::style;
+use crate::report::figure::{RegressionFigure, RegressionMark, RegressionSeries};
 
 impl RegressionFigure {
     pub fn plot(&self) -> Plot {

@@ -3,7 +3,8 @@
 use serde_json::{Value, json};
 
 use super::plot::{Plot, css, layout, number, numbers, text};
-use crate::report::figure::{RobotFigure, style};
+use crate::report::figure::RobotFigure;
+use crate::report::figure::sheet::style;
 
 impl RobotFigure {
     pub fn plot(&self) -> Plot {

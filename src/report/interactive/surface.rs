@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::plot::{Plot, axis, css, layout, number, numbers, with};
-use crate::report::figure::style;
+use crate::report::figure::sheet::style;
 
 /// The surface b(n, θ) as numbers.
 #[derive(Debug, Clone, Default)]

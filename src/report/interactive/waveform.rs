@@ -4,8 +4,9 @@ use serde_json::json;
 
 use super::frf::Look;
 use super::plot::{Plot, axis, axis_name, line, numbers, sign, stacked, text, with};
-use crate::report::figure::canvas::Marker;
-use crate::report::figure::{WaveformFigure, style};
+use crate::report::figure::WaveformFigure;
+use crate::report::figure::sheet::canvas::Marker;
+use crate::report::figure::sheet::style;
 
 impl WaveformFigure {
     pub fn plot(&self) -> Plot {

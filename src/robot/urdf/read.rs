@@ -9,7 +9,7 @@ use super::body::RigidBody;
 use super::guess;
 use super::tree::{Tree, kind, turns};
 use crate::data::{JointPlacement, JointSpec, LinkSpec, RobotSpec, ToolFrame};
-use crate::robot::dh::{rotation_of_rpy, rpy_of_rotation};
+use crate::robot::kinematics::dh::{rotation_of_rpy, rpy_of_rotation};
 use crate::{InputError, Result};
 
 /// What a URDF does not say.

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use nalgebra::Isometry3;
 
 use crate::data::{JointSpec, RobotSpec};
-use crate::robot::dh::{joint_transform, rpy_of_rotation};
+use crate::robot::kinematics::dh::{joint_transform, rpy_of_rotation};
 use crate::robot::{Kinematics, RobotModel};
 use crate::text::{quoted, to_degrees};
 

@@ -5,7 +5,7 @@ use super::super::group::FrfGroup;
 use super::super::mistake::{Distortion, Estimated, Mistake, MistakeSize};
 use super::super::truth::Truth;
 use super::sensor_high_pass::responses;
-use crate::identify::frf_data::{FrfData, FrfDatum};
+use crate::identify::frfs::frf_data::{FrfData, FrfDatum};
 
 /// The response's amplifier is slow, value = 1/(2π × corner), s: 1/(1 + s·value), or Butterworth's second order. As long as
 /// only its phase shows it is a time delay; this one is told by what it takes from the magnitudes.

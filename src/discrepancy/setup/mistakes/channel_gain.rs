@@ -4,7 +4,7 @@ use super::super::finding::{SetupFinding, with_error};
 use super::super::group::FrfGroup;
 use super::super::mistake::{Distortion, Estimated, Mistake, MistakeSize};
 use super::super::truth::Truth;
-use crate::identify::frf_data::{FrfData, FrfDatum};
+use crate::identify::frfs::frf_data::{FrfData, FrfDatum};
 
 /// The file holds exp(value) times what was there.
 pub struct ChannelGain;

@@ -1,7 +1,7 @@
 use super::super::finding::{SetupFinding, with_error};
 use super::super::group::FrfGroup;
 use super::super::mistake::{Distortion, Estimated, Mistake, MistakeSize};
-use crate::identify::frf_data::FrfData;
+use crate::identify::frfs::frf_data::FrfData;
 use crate::robot::Kinematics;
 
 /// A joint stood elsewhere than its angle says, deg: at every posture (the encoder's zero), or at one (written down wrongly).

@@ -1,7 +1,7 @@
 use super::super::finding::{SetupFinding, with_error};
 use super::super::group::FrfGroup;
 use super::super::mistake::{Distortion, Estimated, Mistake, MistakeSize};
-use crate::identify::frf_data::FrfData;
+use crate::identify::frfs::frf_data::FrfData;
 
 /// An exponential window was put on the records and not taken out: every pole decays faster by `value`, 1/s. What the file
 /// shows is H(ω − i/τ) (Fladung, Rost 1997: Application and correction of the exponential window for frequency response

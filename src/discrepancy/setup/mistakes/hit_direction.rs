@@ -5,7 +5,7 @@ use super::super::group::FrfGroup;
 use super::super::mistake::{Distortion, Estimated, Mistake, MistakeSize, turned_axis};
 use super::super::truth::Truth;
 use crate::data::Axis;
-use crate::identify::frf_data::{FrfData, FrfDatum};
+use crate::identify::frfs::frf_data::{FrfData, FrfDatum};
 
 /// The force was not along the axis that the file names: turned by a rotation vector, deg about x, y, z.
 pub struct HitDirection;

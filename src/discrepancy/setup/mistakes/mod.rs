@@ -12,7 +12,7 @@ pub(super) mod turned_sensor;
 
 use super::mistake::Mistake;
 use crate::identify::StructureModel;
-use crate::identify::frf_data::FrfData;
+use crate::identify::frfs::frf_data::FrfData;
 
 /// Everything that these data could show.
 pub fn all(model: &StructureModel, data: &FrfData) -> Vec<Box<dyn Mistake>> {

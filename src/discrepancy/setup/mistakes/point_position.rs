@@ -2,7 +2,7 @@ use super::super::finding::{SetupFinding, with_error};
 use super::super::group::FrfGroup;
 use super::super::mistake::{Distortion, Estimated, Mistake, MistakeSize};
 use crate::data::{BodyRef, Point};
-use crate::identify::frf_data::FrfData;
+use crate::identify::frfs::frf_data::FrfData;
 
 /// A measuring point sits elsewhere on its body, m along the body's axes.
 pub struct PointPosition {

@@ -5,7 +5,7 @@ use super::super::group::FrfGroup;
 use super::super::mistake::{Distortion, Estimated, Mistake, MistakeSize};
 use super::super::truth::Truth;
 use crate::data::Axis;
-use crate::identify::frf_data::{FrfData, FrfDatum};
+use crate::identify::frfs::frf_data::{FrfData, FrfDatum};
 
 /// The sensor's channel loses low frequencies: (s/(s + value))^order, value = 2π × corner, 1/s.
 pub struct SensorHighPass {

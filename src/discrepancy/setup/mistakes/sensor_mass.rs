@@ -5,7 +5,7 @@ use super::super::finding::{SetupFinding, with_error};
 use super::super::group::FrfGroup;
 use super::super::mistake::{Distortion, Estimated, Mistake, MistakeSize};
 use super::super::truth::Truth;
-use crate::identify::frf_data::{FrfData, FrfDatum};
+use crate::identify::frfs::frf_data::{FrfData, FrfDatum};
 
 /// The sensor's mass, kg, sits at each response point while that is measured (Ewins 2000, §3.12: H − H m s² (1 + m s² H)⁻¹ H).
 pub struct SensorMass;

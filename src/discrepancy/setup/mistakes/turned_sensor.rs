@@ -4,7 +4,7 @@ use super::super::finding::{SetupFinding, with_error};
 use super::super::group::FrfGroup;
 use super::super::mistake::{Distortion, Estimated, Mistake, MistakeSize, turned_axis};
 use super::super::truth::Truth;
-use crate::identify::frf_data::{FrfData, FrfDatum};
+use crate::identify::frfs::frf_data::{FrfData, FrfDatum};
 
 /// The sensor stood askew at one posture or at one node: turned by a rotation vector, deg about x, y, z. A sensor that is
 /// askew in all files is the effect `sensor-misalignment`.

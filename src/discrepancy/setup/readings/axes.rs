@@ -6,7 +6,7 @@ use super::super::reading::FileReading;
 use super::proposal::Proposed;
 use super::table::{DistanceTable, distance};
 use crate::data::{Axis, Point};
-use crate::identify::frf_data::FrfData;
+use crate::identify::frfs::frf_data::FrfData;
 
 /// Whose axes are misnamed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,7 +6,7 @@ use super::super::reading::FileReading;
 use super::proposal::Proposed;
 use super::table::{DistanceTable, distance};
 use crate::data::Point;
-use crate::identify::frf_data::FrfData;
+use crate::identify::frfs::frf_data::FrfData;
 
 /// A group of FRFs with the wrong sign: a sensor, a hammer or an amplifier of the other polarity.
 pub struct ChannelSign {

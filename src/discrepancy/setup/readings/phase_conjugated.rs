@@ -6,7 +6,7 @@ use super::super::reading::FileReading;
 use super::proposal::Proposed;
 use super::table::{DistanceTable, distance};
 use crate::data::Point;
-use crate::identify::frf_data::FrfData;
+use crate::identify::frfs::frf_data::FrfData;
 
 /// Imaginary parts with the wrong sign: the other convention of the Fourier transform, or force over response phase.
 pub struct PhaseConjugated {

@@ -6,7 +6,7 @@ use super::table::{DistanceTable, distance};
 use crate::Result;
 use crate::data::{AxesRef, BodyRef, Point};
 use crate::identify::StructureModel;
-use crate::identify::frf_data::FrfData;
+use crate::identify::frfs::frf_data::FrfData;
 
 /// A point on another body, or with axes of another frame, than campaign.toml says.
 pub struct PointFrame {
@@ -88,8 +88,9 @@ pub fn proposed(
 ) -> Result<Vec<Proposed>> {
     let mut all = Vec::new();
     for (point, now) in model.points.iter().enumerate() {
-        let concerned =
-            |f: &crate::identify::frf_data::FrfDatum| f.response.point == point || f.reference.point == point;
+        let concerned = |f: &crate::identify::frfs::frf_data::FrfDatum| {
+            f.response.point == point || f.reference.point == point
+        };
         if !data.frfs().any(|(_, f)| concerned(f)) {
             continue;
         }

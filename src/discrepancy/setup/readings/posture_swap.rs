@@ -8,7 +8,7 @@ use super::table::{DistanceTable, distance};
 use crate::Result;
 use crate::data::Point;
 use crate::identify::StructureModel;
-use crate::identify::frf_data::FrfData;
+use crate::identify::frfs::frf_data::FrfData;
 use crate::robot::Kinematics;
 
 /// Files filed under other postures than those that they were measured at.

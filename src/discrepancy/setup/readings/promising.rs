@@ -5,7 +5,7 @@ use super::table::DistanceTable;
 use super::{axes, channel_sign, phase_conjugated, point_frame, posture_swap, quantity};
 use crate::Result;
 use crate::identify::StructureModel;
-use crate::identify::frf_data::FrfData;
+use crate::identify::frfs::frf_data::FrfData;
 
 /// Share of all disagreement that a reading must take away to be worth a fit: what is wrong in one file of many leaves
 /// the others in agreement.

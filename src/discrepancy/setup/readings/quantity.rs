@@ -8,7 +8,7 @@ use super::super::reading::FileReading;
 use super::proposal::Proposed;
 use super::table::{DistanceTable, distance};
 use crate::data::Point;
-use crate::identify::frf_data::FrfData;
+use crate::identify::frfs::frf_data::FrfData;
 
 /// Displacement, velocity and acceleration per force taken for one another: the file holds (iω)^power times what it is read
 /// as.

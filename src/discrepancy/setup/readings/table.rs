@@ -6,7 +6,7 @@ use super::super::group::FrfGroup;
 use super::super::scene::{Curves, predict_all_axes};
 use crate::Result;
 use crate::identify::StructureModel;
-use crate::identify::frf_data::{FrfData, FrfDatum};
+use crate::identify::frfs::frf_data::{FrfData, FrfDatum};
 
 /// Predictions between all axes of every FRF's points.
 pub struct DistanceTable {

@@ -1,0 +1,158 @@
+//! A campaign's force records: the waveform model fitted and compared, and its coefficients beside those of the mean forces.
+
+use serde_json::{Map, Value, json};
+
+use crate::Result;
+use crate::analysis::forces::channel_check::wrong_channels;
+use crate::campaign::{Campaign, Process};
+use crate::cutting::{CfcResult, ForceGroup};
+use crate::discrepancy::CuttingComparison;
+use crate::discrepancy::setup::{SetupCheck, SetupFinding, examine_cutting};
+use crate::identify::forces::cutting_data::processes;
+use crate::identify::forces::cutting_problem::CuttingProblem;
+use crate::identify::forces::cutting_study::{calibrate_cutting, held_out_cuts};
+use crate::identify::{Calibration, CuttingCase, CuttingData, CuttingModel, Estimate};
+
+/// The cutting model of a campaign's main process against its force records.
+pub struct CuttingAnalysis {
+    /// The measured forces over rotation or time.
+    pub data: CuttingData,
+    /// The force model with the effects that were added.
+    pub model: CuttingModel,
+    /// The model fitted to the data.
+    pub calibration: Calibration,
+    /// The fitted model against the data.
+    pub comparison: CuttingComparison,
+    /// nrms on cuts that were left out of the fit.
+    pub held_out_nrms: Option<f64>,
+    /// What was noticed while reading and fitting.
+    pub warnings: Vec<String>,
+}
+
+impl CuttingAnalysis {
+    /// # Errors
+    /// No cuts, or none that can be used.
+    pub fn run(campaign: &Campaign) -> Result<Self> {
+        let CuttingCase {
+            model,
+            data,
+            mut warnings,
+            ..
+        } = CuttingCase::load(campaign)?;
+        let calibration = calibrate_cutting(&model, &data)?;
+        let comparison = cutting_comparison(&model, &data, &calibration.theta)?;
+        let held_out_nrms = held_out_cuts(&model, &data, &calibration.theta)?.map(|h| h.nrms());
+        warnings.extend(warnings_of(&calibration));
+        Ok(CuttingAnalysis {
+            data,
+            model,
+            calibration,
+            comparison,
+            held_out_nrms,
+            warnings,
+        })
+    }
+}
+
+impl CuttingAnalysis {
+    /// Wrong wiring and filters, as far as the records show them. Nothing where effects were added: those may be what is
+    /// wrong.
+    ///
+    /// # Errors
+    /// Records that no model can be fitted to.
+    pub fn setup_check(&self) -> Result<SetupCheck> {
+        match self.model.effects().is_empty() {
+            true => examine_cutting(&self.data, || None),
+            false => Ok(SetupCheck::default()),
+        }
+    }
+}
+
+/// A cutting model at `theta` against the records.
+pub fn cutting_comparison(
+    model: &CuttingModel,
+    data: &CuttingData,
+    theta: &[f64],
+) -> Result<CuttingComparison> {
+    let fits = CuttingProblem { model, data }.fits(theta)?;
+    Ok(CuttingComparison::new(data, &fits))
+}
+
+/// Misfit from which on the user is told.
+const FAR_ABOVE_NOISE: f64 = 1.5;
+
+fn warnings_of(calibration: &Calibration) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if !calibration.converged() {
+        warnings.push("the fit did not converge: treat the coefficients with care".to_string());
+    }
+    if calibration.reduced_chi2 > FAR_ABOVE_NOISE {
+        warnings.push(format!(
+            "the fitted waveform leaves {:.1} times the variance of the noise: physics is missing, or campaign.toml is not \
+             what was cut (immersion, depth, speed, axes); standard errors are widened accordingly",
+            calibration.reduced_chi2
+        ));
+    }
+    warnings
+}
+
+/// Coefficients of each of `result`'s groups from the whole waveform: `{key: {value, std_error}, nrms, noise_floor_nrms,
+/// chi2_per_value, converged}`; null where the waveform does not determine a coefficient. One entry a group, null where
+/// its waveforms cannot be fitted. And what the waveforms say about channels that are wrong in all records, and about other
+/// mistakes of the setup.
+pub fn waveform_groups(
+    campaign: &Campaign,
+    result: &CfcResult,
+) -> (Vec<Value>, Vec<String>, Vec<SetupFinding>) {
+    let loaded: Vec<(Process, Option<CuttingData>)> = processes(&campaign.cuts)
+        .into_iter()
+        .map(|p| (p, CuttingData::load(campaign, p).ok()))
+        .collect();
+    let warnings = loaded
+        .iter()
+        .filter_map(|(_, data)| wrong_channels(data.as_ref()?, &result.pooled))
+        .collect();
+    // A check that cannot be made finds nothing.
+    let checks = loaded
+        .iter()
+        .filter_map(|(_, data)| examine_cutting(data.as_ref()?, || None).ok());
+    let setup = checks.flat_map(|check| check.findings).collect();
+    let groups = result
+        .groups
+        .iter()
+        .map(|group| {
+            let data = loaded
+                .iter()
+                .find(|(p, _)| *p == group.process)
+                .and_then(|(_, d)| d.as_ref());
+            data.and_then(|data| waveform_group(data, group).ok())
+                .unwrap_or(Value::Null)
+        })
+        .collect();
+    (groups, warnings, setup)
+}
+
+fn waveform_group(data: &CuttingData, group: &ForceGroup) -> Result<Value> {
+    let own = data.filtered(|i| group.cuts.contains(&data.cuts[i].id));
+    let model = CuttingModel::new(&own, true)?;
+    let calibration = calibrate_cutting(&model, &own)?;
+    let totals = cutting_comparison(&model, &own, &calibration.theta)?.totals;
+    let mut map = Map::new();
+    for (parameter, estimate) in model.parameters.iter().zip(&calibration.parameters) {
+        // What the prior says and the data do not is no answer.
+        let prior = parameter.prior.map_or(f64::INFINITY, |p| p.std);
+        let Estimate { value, std_error, .. } = estimate;
+        let known = *std_error < 0.1 * prior;
+        let entry = if known {
+            json!({"value": value, "std_error": std_error})
+        } else {
+            Value::Null
+        };
+        map.insert(parameter.name.clone(), entry);
+    }
+    map.insert("nrms".into(), json!(totals.nrms));
+    map.insert("noise_floor_nrms".into(), json!(totals.noise_floor_nrms));
+    map.insert("chi2_per_value".into(), json!(calibration.reduced_chi2));
+    map.insert("converged".into(), json!(calibration.converged()));
+    Ok(Value::Object(map))
+}

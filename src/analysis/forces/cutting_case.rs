@@ -1,0 +1,162 @@
+//! A campaign's cutting side loaded: force records and the revisions of their model.
+
+use rayon::prelude::*;
+
+use crate::analysis::forces::force_records::read_in_step;
+use crate::campaign::{Campaign, Process, Tool};
+use crate::cutting::{InStep, Notice, of_notices};
+use crate::effects::cutting;
+use crate::identify::forces::cutting_data::{CutData, processes};
+use crate::identify::model_history::{Domain, Revision, recorded_cutting_effect};
+use crate::identify::{CuttingCase, CuttingData, CuttingModel};
+use crate::progress::Progress;
+use crate::revision::{RevisionLog, log_file};
+use crate::{Error, InputError, Result};
+
+fn material(campaign: &Campaign, cut: usize) -> &str {
+    campaign.cuts[cut].material.as_deref().unwrap_or("no material")
+}
+
+/// The material of most cuts (the first of equals) and the names of the others; `None` where there is one only.
+fn materials(campaign: &Campaign, data: &CuttingData) -> Option<(String, String)> {
+    let mut counts: Vec<(&str, usize)> = Vec::new();
+    for cut in &data.cuts {
+        let material = material(campaign, cut.cut);
+        match counts.iter_mut().find(|c| c.0 == material) {
+            Some(one) => one.1 += 1,
+            None => counts.push((material, 1)),
+        }
+    }
+    let most = counts.iter().map(|c| c.1).max()?;
+    let main = counts.iter().position(|c| c.1 == most)?;
+    let (name, _) = counts.remove(main);
+    let others: Vec<&str> = counts.iter().map(|c| c.0).collect();
+    (!others.is_empty()).then(|| (name.to_string(), others.join(", ")))
+}
+
+impl CuttingCase {
+    /// The cuts of the campaign's main process.
+    ///
+    /// # Errors
+    /// No cuts, records that cannot be read, a broken revision log.
+    pub fn load(campaign: &Campaign) -> Result<Self> {
+        let processes = processes(&campaign.cuts);
+        let Some(&process) = processes.first() else {
+            return Err(
+                InputError::new("the campaign has no [[cut]]: no force records to compare")
+                    .file(campaign.dir.join("campaign.toml"))
+                    .key("cut")
+                    .remedy("add [[cut]] tables that name the force records")
+                    .into(),
+            );
+        };
+        let mut data = CuttingData::load(campaign, process)?;
+        let mut warnings = data.warnings.clone();
+        if let Some((main, others)) = materials(campaign, &data) {
+            warnings.push(format!(
+                "the cuts of {others} are not compared: one material at a time, here {main}, of which most cuts are"
+            ));
+            data = data.filtered(|i| material(campaign, data.cuts[i].cut) == main);
+        }
+        if let Some(other) = processes.get(1) {
+            let name = other.name();
+            warnings.push(format!("the {name} cuts are not compared: one process at a time"));
+        }
+        let log = RevisionLog::load(&campaign.dir)?;
+        let revisions: Vec<Revision> = log.revisions(Domain::Cutting).cloned().collect();
+        let mut model = CuttingModel::new(&data, true)?;
+        if let Some(current) = revisions.last() {
+            for (i, recorded) in current.effects.iter().enumerate() {
+                let instance = cutting::find(&recorded.effect)
+                    .into_iter()
+                    .find(|instance| recorded_cutting_effect(instance) == *recorded)
+                    .ok_or_else(|| {
+                        InputError::new(format!("there is no cutting effect {}", recorded.effect))
+                            .file(log_file(&campaign.dir))
+                            .key(format!("revisions[{}].effects[{i}]", current.revision))
+                            .remedy("undo the revision with `lobestone undo DIR`")
+                    })?;
+                model = model.with_effect(instance, &data);
+            }
+            let start = model.parameters.iter().map(|parameter| {
+                let known = current.parameters.iter().find(|r| r.name == parameter.name);
+                let value = known.map_or(parameter.nominal, |r| r.value);
+                parameter.internal(value)
+            });
+            let start = start.collect();
+            model = model.with_start(start);
+        }
+        Ok(CuttingCase {
+            model,
+            data,
+            revisions,
+            warnings,
+        })
+    }
+}
+
+fn tool(campaign: &Campaign) -> Result<&Tool> {
+    campaign
+        .tool
+        .as_ref()
+        .ok_or_else(|| Error::computation("[tool] is missing: cutting forces need its teeth and diameter"))
+}
+
+impl CuttingData {
+    /// Reads the records of the campaign's cuts of `process`, in parallel. A cut that cannot be used is left out with a
+    /// warning.
+    ///
+    /// # Errors
+    /// No usable cut; no tool; a `tool_from_dyno` that cannot be inverted.
+    pub fn load(campaign: &Campaign, process: Process) -> Result<Self> {
+        let indices: Vec<usize> = (0..campaign.cuts.len())
+            .filter(|i| campaign.cuts[*i].geometry.process() == process)
+            .collect();
+        if indices.is_empty() {
+            return Err(InputError::new(
+                "the campaign has no [[cut]] of this process: no force records to compare",
+            )
+            .file(campaign.dir.join("campaign.toml"))
+            .key("cut")
+            .remedy("add [[cut]] tables that name the force records")
+            .into());
+        }
+        let progress = Progress::new("force waveforms", indices.len());
+        let outcomes: Vec<Result<(CutData, Vec<Notice>)>> = indices
+            .par_iter()
+            .map(|&i| {
+                let (record, mut analysis) = read_in_step(campaign, i, InStep::UnlessItWanders)?;
+                let notices = std::mem::take(&mut analysis.notices);
+                let outcome = tool(campaign)
+                    .and_then(|tool| CutData::new(tool, (i, &campaign.cuts[i]), &record, &analysis));
+                progress.step();
+                Ok((outcome?, notices))
+            })
+            .collect();
+        let (mut cuts, mut warnings, mut noticed) = (Vec::new(), Vec::new(), Vec::new());
+        for (&i, outcome) in indices.iter().zip(outcomes) {
+            match outcome {
+                Ok((cut, notices)) => {
+                    noticed.extend(notices.into_iter().map(|n| (cut.id.clone(), n)));
+                    cuts.push(cut);
+                }
+                Err(error) => warnings.push(format!("cut {} is left out: {error}", campaign.cuts[i].id)),
+            }
+        }
+        if cuts.is_empty() {
+            return Err(Error::computation(format!(
+                "none of the {} cuts can be used; the first: {}",
+                indices.len(),
+                warnings.first().map_or("", String::as_str)
+            )));
+        }
+        warnings.extend(of_notices(&noticed, indices.len()));
+        let teeth = campaign.tool.as_ref().map_or(1, |t| t.teeth);
+        let data = CuttingData::new(process, teeth, campaign.dynamometer.tool_from_dyno, cuts);
+        let data = data.map_err(|error| match error {
+            Error::Input(error) => error.file(campaign.dir.join("campaign.toml")).into(),
+            other => other,
+        })?;
+        Ok(CuttingData { warnings, ..data })
+    }
+}

@@ -1,0 +1,252 @@
+//! A campaign's force records: read from their files and handed to [`crate::cutting`] as plain values.
+
+use rayon::prelude::*;
+
+use crate::campaign::Campaign;
+use crate::cutting::{
+    CfcOptions, CfcResult, CutAnalysis, CuttingTrials, InStep, Notice, analyse_in_step,
+    fit_force_coefficients, none_usable, repair_record,
+};
+use crate::ingest::{self, TimeRecord};
+use crate::progress::Progress;
+use crate::{Error, InputError, Result};
+
+/// What the reader noticed about the file.
+const READER: &str = "noticed while reading the file";
+
+/// What was cut in a campaign.
+///
+/// # Errors
+/// No tool.
+pub fn cutting_trials(campaign: &Campaign) -> Result<CuttingTrials<'_>> {
+    let tool = campaign
+        .tool
+        .as_ref()
+        .ok_or_else(|| Error::computation("[tool] is missing: cutting forces need its teeth and diameter"))?;
+    Ok(CuttingTrials {
+        tool,
+        cuts: &campaign.cuts,
+        tool_from_dyno: &campaign.dynamometer.tool_from_dyno,
+        material: campaign.material.as_deref(),
+        orthogonal: campaign.orthogonal,
+    })
+}
+
+/// The record of one cut, bad samples replaced, and what its owner should know.
+///
+/// # Errors
+/// Those of [`ingest::read_time`].
+pub fn read_record(campaign: &Campaign, cut: usize) -> Result<(TimeRecord, Vec<Notice>)> {
+    let cut = &campaign.cuts[cut];
+    let (mut record, reader_warnings) = ingest::read_time_with(&cut.file, &campaign.channel_rules(&cut.id))?;
+    let mut notices = repair_record(&mut record, cut.spindle_rpm);
+    let noticed = |detail| Notice { kind: READER, detail };
+    notices.extend(reader_warnings.into_iter().map(noticed));
+    Ok((record, notices))
+}
+
+/// The record of one cut and what it says, in step with the stated speed.
+///
+/// # Errors
+/// Those of [`read_record`] and [`crate::cutting::analyse_cut`]; no tool.
+pub fn read_in_step(campaign: &Campaign, index: usize, how: InStep) -> Result<(TimeRecord, CutAnalysis)> {
+    let (record, notices) = read_record(campaign, index)?;
+    analyse_in_step(&cutting_trials(campaign)?, index, record, notices, how)
+}
+
+/// Reads every cut's record (in parallel, one record in memory per thread) and fits the coefficients.
+/// A cut that cannot be used is left out with a warning that names it.
+///
+/// # Errors
+/// No cuts, no tool, or not one usable record.
+pub fn identify_forces(campaign: &Campaign, options: CfcOptions) -> Result<CfcResult> {
+    let campaign_file = || campaign.dir.join("campaign.toml");
+    if campaign.cuts.is_empty() {
+        return Err(
+            InputError::new("the campaign has no [[cut]]: nothing to identify cutting forces from")
+                .file(campaign_file())
+                .key("cut")
+                .remedy("add [[cut]] tables that name the force records")
+                .into(),
+        );
+    }
+    let progress = Progress::new("force records", campaign.cuts.len());
+    let outcomes: Vec<Result<CutAnalysis>> = (0..campaign.cuts.len())
+        .into_par_iter()
+        .map(|i| {
+            let outcome = read_in_step(campaign, i, InStep::Fully).map(|(_, analysis)| analysis);
+            progress.step();
+            outcome
+        })
+        .collect();
+    let result = match cutting_trials(campaign) {
+        Ok(trials) => fit_force_coefficients(&trials, outcomes, options),
+        // Without a tool no record could be analysed.
+        Err(_) => Err(none_usable(
+            campaign.cuts.len(),
+            outcomes.into_iter().find_map(Result::err),
+        )),
+    };
+    result.map_err(|error| match error {
+        Error::Input(input) if input.file.is_none() => input.file(campaign_file()).key("cut").into(),
+        other => other,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::forces::made_force_records::{
+        CUT_S, MadeCut, TRUTH, write_campaign, write_campaign_of,
+    };
+    use crate::cutting::{OTHER_SPEED, WRONG_SPEED, analyse_cut};
+    use std::f64::consts::TAU;
+
+    /// Largest relative error of a cutting coefficient.
+    fn worst(result: &CfcResult) -> f64 {
+        let off = result.pooled[0].coefficients.iter().zip(TRUTH);
+        off.take(3)
+            .map(|(c, truth)| (c.value.unwrap() / truth - 1.0).abs())
+            .fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn a_speed_that_is_off_falls_or_wanders_is_told_and_taken_out() {
+        type Speed = (&'static str, &'static dyn Fn(f64) -> f64, [f64; 3]);
+        let speeds: [Speed; 3] = [
+            ("off", &|_| 1.007, [0.007, 0.0, 0.0]),
+            ("falls", &|t| 0.99 - 0.02 * t / CUT_S, [-0.01, -0.02, 0.0]),
+            (
+                "wanders",
+                &|t| 1.0 + 0.005 * (TAU * 1.3 * t).sin(),
+                [0.0, 0.0, 0.005 * std::f64::consts::FRAC_1_SQRT_2],
+            ),
+        ];
+        for (name, speed, [offset, droop, wander]) in speeds {
+            let dir = tempfile::tempdir().unwrap();
+            let cuts: Vec<MadeCut> = [(1200.0, 0.05), (1200.0, 0.1), (1200.0, 0.16), (1700.0, 0.08)]
+                .map(|(rpm, feed_mm)| MadeCut { rpm, feed_mm, speed })
+                .into();
+            let campaign = write_campaign(dir.path(), &cuts, &|_, _, _, _, _| 0.0);
+            let before = (0..cuts.len()).map(|i| {
+                let (record, _) = read_record(&campaign, i)?;
+                analyse_cut(&cutting_trials(&campaign)?, i, &record)
+            });
+            let trials = cutting_trials(&campaign).unwrap();
+            let before = fit_force_coefficients(&trials, before.collect(), CfcOptions::default()).unwrap();
+            let after = identify_forces(&campaign, CfcOptions::default()).unwrap();
+            eprintln!("{name}: {:.4} before, {:.4} after", worst(&before), worst(&after));
+            assert!(worst(&after) < 0.01, "{name}: {}", worst(&after));
+            for cut in &after.cuts {
+                let found = cut
+                    .spindle
+                    .as_ref()
+                    .unwrap_or_else(|| panic!("{name}, cut {}", cut.id));
+                eprintln!("  {}: {found:?}", cut.id);
+                assert!((found.offset - offset).abs() < 5e-4, "{name}: {found:?}");
+                assert!((found.droop - droop).abs() < 2e-3, "{name}: {found:?}");
+                assert!(
+                    (found.wander - wander).abs() < 0.2 * wander + 3e-4,
+                    "{name}: {found:?}"
+                );
+                assert!(found.in_step[1] > 0.97 && found.in_step[0] < found.in_step[1]);
+                assert!(!cut.notices.iter().any(|n| n.kind == WRONG_SPEED));
+            }
+            assert!(
+                after
+                    .warnings
+                    .iter()
+                    .any(|w| w.contains(OTHER_SPEED) && w.contains("cut01.csv"))
+            );
+        }
+    }
+
+    #[test]
+    fn ordinary_records_are_left_as_they_are() {
+        let dir = tempfile::tempdir().unwrap();
+        let cuts: Vec<MadeCut> = (0..20)
+            .map(|i| MadeCut {
+                rpm: 900.0 + 173.0 * f64::from(i),
+                feed_mm: 0.04 + 0.01 * f64::from(i % 5),
+                speed: &|_| 1.0,
+            })
+            .collect();
+        // Runout, and a spindle that turns unevenly within its turn.
+        let campaign = write_campaign(dir.path(), &cuts, &|cut, axis, _, angle, cutting| {
+            let size = if cutting { 3.0 * cut as f64 } else { 0.0 };
+            size * (angle + axis as f64).cos()
+        });
+        for i in 0..cuts.len() {
+            let (record, analysis) = read_in_step(&campaign, i, InStep::Fully).unwrap();
+            assert_eq!(analysis.spindle, None, "cut {}", analysis.id);
+            let (as_read, _) = read_record(&campaign, i).unwrap();
+            assert_eq!(record.channels[0].samples, as_read.channels[0].samples);
+        }
+    }
+
+    #[test]
+    fn what_wanders_is_left_to_diagnose() {
+        type Speed = (&'static dyn Fn(f64) -> f64, bool);
+        let speeds: [Speed; 2] = [
+            (&|_| 1.007, false),
+            (&|t| 1.0 + 0.01 * (TAU * 1.3 * t).sin(), true),
+        ];
+        for (speed, wanders) in speeds {
+            let dir = tempfile::tempdir().unwrap();
+            let cut = MadeCut {
+                rpm: 1200.0,
+                feed_mm: 0.1,
+                speed,
+            };
+            let campaign = write_campaign(dir.path(), &[cut], &|_, _, _, _, _| 0.0);
+            let (record, analysis) = read_in_step(&campaign, 0, InStep::UnlessItWanders).unwrap();
+            assert!(analysis.spindle.is_some(), "{wanders}");
+            let (as_read, _) = read_record(&campaign, 0).unwrap();
+            let untouched = record.channels[0].samples == as_read.channels[0].samples;
+            assert_eq!(untouched, wanders);
+        }
+    }
+
+    #[test]
+    fn blind_campaigns_are_left_as_they_are() {
+        for name in ["force-9400", "force-9439"] {
+            let dir = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+                .join("tests/data/blind")
+                .join(name);
+            let campaign = Campaign::load(&dir).unwrap();
+            for i in 0..campaign.cuts.len() {
+                let (_, analysis) = read_in_step(&campaign, i, InStep::Fully).unwrap();
+                assert_eq!(analysis.spindle, None, "{name}, cut {}", analysis.id);
+            }
+        }
+    }
+
+    /// Slots with a ball end: the radial force has an axial part, so that all six coefficients depend on each other.
+    #[test]
+    fn a_ball_end_gives_back_its_coefficients() {
+        let dir = tempfile::tempdir().unwrap();
+        let cuts = [0.04, 0.08, 0.12, 0.16].map(|feed_mm| MadeCut {
+            rpm: 1500.0,
+            feed_mm,
+            speed: &|_| 1.0,
+        });
+        let campaign = write_campaign_of(dir.path(), 5.0, &cuts, &|_, _, _, _, _| 0.0);
+        let result = identify_forces(&campaign, CfcOptions::default()).unwrap();
+        let found = &result.pooled[0];
+        for (coefficient, truth) in found.coefficients.iter().zip(TRUTH) {
+            let (value, std) = (coefficient.value.unwrap(), coefficient.std_error.unwrap());
+            assert!((value - truth).abs() < 4.0 * std, "{value} ± {std} for {truth}");
+            assert!(std < 0.02 * truth.max(50.0), "± {std} of {truth}");
+        }
+        assert!(found.r2.iter().flatten().all(|r2| *r2 > 0.999));
+        assert!(result.warnings.is_empty(), "{:?}", result.warnings);
+        // Taken for a straight end mill the radial force comes out a third too small.
+        let straight = write_campaign_of(dir.path(), 0.0, &[], &|_, _, _, _, _| 0.0);
+        let wrong = Campaign {
+            tool: straight.tool,
+            ..campaign
+        };
+        let wrong = identify_forces(&wrong, CfcOptions::default()).unwrap();
+        assert!(wrong.pooled[0].coefficients[1].value.unwrap() < 0.7 * TRUTH[1]);
+    }
+}

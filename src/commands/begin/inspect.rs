@@ -1,0 +1,269 @@
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use crate::campaign::draft::measurement_files;
+use crate::commands::text::Emphasis;
+use crate::commands::{Outcome, next_step};
+use crate::ingest::{
+    self, Channel, ChannelRole, Dof, FrfRecord, MeasurementFile, Quantity, TimeRecord, units,
+};
+use crate::{InputError, Result};
+
+#[derive(clap::Args)]
+pub struct InspectArgs {
+    /// Measurement files, or folders of them: UFF 58, FRF CSV, DynoWare export, force CSV, TDMS, LVM, MAT.
+    #[arg(required = true, value_name = "FILE|DIR")]
+    files: Vec<PathBuf>,
+}
+
+/// What can be read is told; a file that cannot is an error that names it, after what was told.
+pub fn run(args: InspectArgs) -> Result<Outcome> {
+    let mut failures = Vec::new();
+    let mut files = Vec::new();
+    let mut text = String::new();
+    let mut kinds: Vec<(&Path, &'static str)> = Vec::new();
+    let mut paths = Vec::new();
+    for path in args.files {
+        match path.is_dir() {
+            true => paths.extend(files_of(&path)?),
+            false => paths.push(path),
+        }
+    }
+    for path in &paths {
+        match inspect(path) {
+            Ok(seen) => {
+                text.push_str(&seen.text());
+                files.push(seen.json());
+                kinds.push((path, seen.kind));
+            }
+            Err(error) => failures.push(error),
+        }
+    }
+    let unreadable: Vec<String> = failures.iter().map(ToString::to_string).collect();
+    let failed = match failures.len() {
+        0 => None,
+        1 => Some(failures.remove(0)),
+        n => Some(
+            InputError::new(format!(
+                "{n} of {} files cannot be read\n{}",
+                paths.len(),
+                unreadable.join("\n")
+            ))
+            .into(),
+        ),
+    };
+    match failed {
+        Some(failed) if files.is_empty() => Err(failed),
+        failed => Ok(Outcome {
+            failed,
+            ..Outcome::new(
+                json!({ "files": files, "unreadable": unreadable }),
+                // The blank line after the last file is that of the next step.
+                text.trim_end().to_string() + "\n",
+                Some(next_step::inspected(&kinds)),
+            )
+        }),
+    }
+}
+
+/// The files below a folder that may be measurements, in the order of their names.
+fn files_of(dir: &Path) -> Result<Vec<PathBuf>> {
+    let files = measurement_files(dir)?;
+    match files.is_empty() {
+        true => Err(InputError::new("holds no measurement files")
+            .file(dir)
+            .remedy("give the files, or the folder that they lie in")
+            .into()),
+        false => Ok(files),
+    }
+}
+
+/// A file and what it is for.
+struct Seen {
+    file: MeasurementFile,
+    kind: &'static str,
+    rows: Vec<Row>,
+    warnings: Vec<String>,
+}
+
+/// One channel or FRF, as JSON and as table cells.
+struct Row {
+    json: Value,
+    cells: [String; 5],
+}
+
+fn inspect(path: &Path) -> Result<Seen> {
+    let survey = ingest::survey(path)?;
+    let file = survey.file;
+    let contents = &file.contents;
+    let is_force = |record: &TimeRecord| record.channels.iter().any(|c| c.role != ChannelRole::Other);
+    let kind = match (contents.frfs.is_empty(), contents.times.as_slice()) {
+        (false, _) => "frf",
+        (true, []) => {
+            return Err(InputError::new(format!(
+                "no FRF and no time signal in this {} file, but {}",
+                file.format,
+                contents.describe()
+            ))
+            .file(path)
+            .remedy("export FRFs or time signals")
+            .into());
+        }
+        (true, times) if times.iter().any(is_force) => "force",
+        _ => "time",
+    };
+    let mut rows: Vec<Row> = contents.frfs.iter().map(frf_row).collect();
+    for (record, samples) in contents.times.iter().zip(survey.samples) {
+        rows.extend(
+            record
+                .channels
+                .iter()
+                .map(|channel| time_row(record, channel, samples)),
+        );
+    }
+    let mut warnings = file.warnings.clone();
+    warnings.extend(survey.quality);
+    if !contents.others.is_empty() {
+        warnings.push(format!(
+            "holds {}: only FRFs, coherences and time signals are used",
+            contents.describe()
+        ));
+    }
+    Ok(Seen {
+        file,
+        kind,
+        rows,
+        warnings,
+    })
+}
+
+impl Seen {
+    fn json(&self) -> Value {
+        json!({
+            "path": self.file.path.display().to_string(),
+            "format": self.file.format.to_string(),
+            "why": self.file.why,
+            "kind": self.kind,
+            "channels": self.rows.iter().map(|r| &r.json).collect::<Vec<_>>(),
+            "warnings": self.warnings,
+        })
+    }
+
+    fn text(&self) -> String {
+        let mut text = format!(
+            "{}\n  {} ({}): {}\n",
+            Emphasis::Strong.on(self.file.path.display()),
+            self.kind,
+            self.file.format,
+            self.file.why
+        );
+        let head = ["channel", "quantity", "unit", "role", "extent"].map(str::to_owned);
+        let shown: Vec<&[String; 5]> = std::iter::once(&head)
+            .chain(self.rows.iter().map(|r| &r.cells))
+            .collect();
+        let width = |i: usize| {
+            shown
+                .iter()
+                .map(|cells| cells[i].chars().count())
+                .max()
+                .unwrap_or(0)
+        };
+        let widths = [0, 1, 2, 3].map(width);
+        for cells in shown {
+            let [name, quantity, unit, role, extent] = cells;
+            let [a, b, c, d] = widths;
+            let _ = writeln!(text, "  {name:a$}  {quantity:b$}  {unit:c$}  {role:d$}  {extent}");
+        }
+        for warning in &self.warnings {
+            let _ = writeln!(text, "  {} {warning}", Emphasis::Doubtful.on("warning:"));
+        }
+        text.push('\n');
+        text
+    }
+}
+
+fn frf_row(frf: &FrfRecord) -> Row {
+    let (from, to) = (
+        frf.frequency_hz.first().copied(),
+        frf.frequency_hz.last().copied(),
+    );
+    let unit = frf.quantity.map(units::frf_unit);
+    let quantity = frf.quantity.map(|q| match q {
+        Quantity::Receptance => "receptance",
+        Quantity::Mobility => "mobility",
+        Quantity::Accelerance => "accelerance",
+    });
+    let dof = |dof: Option<Dof>| dof.map(|d| d.to_string());
+    let extent = match (from, to) {
+        (Some(from), Some(to)) => format!("{} lines, {from:.4} to {to:.4} Hz", frf.frequency_hz.len()),
+        _ => "no lines".into(),
+    };
+    let coherence = if frf.coherence.is_some() {
+        ", with coherence"
+    } else {
+        ""
+    };
+    Row {
+        json: json!({
+            "name": frf.name,
+            "response": dof(frf.response),
+            "reference": dof(frf.reference),
+            "quantity": quantity,
+            "unit": unit,
+            "role": "frf",
+            "lines": frf.frequency_hz.len(),
+            "from_hz": from,
+            "to_hz": to,
+            "coherence": frf.coherence.is_some(),
+        }),
+        cells: [
+            frf.name.clone(),
+            quantity.unwrap_or("not said").to_owned(),
+            unit.unwrap_or("?").to_owned(),
+            "frf".to_owned(),
+            extent + coherence,
+        ],
+    }
+}
+
+fn time_row(record: &TimeRecord, channel: &Channel, samples: usize) -> Row {
+    let role = match channel.role {
+        ChannelRole::ForceX => "force-x",
+        ChannelRole::ForceY => "force-y",
+        ChannelRole::ForceZ => "force-z",
+        ChannelRole::TorqueZ => "torque-z",
+        ChannelRole::Other => "other",
+    };
+    let (quantity, unit) = channel.quantity_and_unit();
+    let seconds = samples as f64 / record.sample_rate_hz;
+    let converted = if unit == channel.file_unit {
+        String::new()
+    } else {
+        format!(" (file: {})", channel.file_unit)
+    };
+    let extent = format!(
+        "{samples} samples at {} Hz, {seconds:.4} s from {} s",
+        record.sample_rate_hz, record.start_s
+    );
+    Row {
+        json: json!({
+            "name": channel.name,
+            "quantity": quantity,
+            "unit": unit,
+            "file_unit": channel.file_unit,
+            "role": role,
+            "samples": samples,
+            "sample_rate_hz": record.sample_rate_hz,
+            "start_s": record.start_s,
+        }),
+        cells: [
+            channel.name.clone(),
+            quantity.to_owned(),
+            format!("{unit}{converted}"),
+            role.to_owned(),
+            extent,
+        ],
+    }
+}

@@ -1,0 +1,247 @@
+use serde_json::json;
+
+use crate::Result;
+use crate::analysis::{FreedLinks, StructureAnalysis};
+use crate::campaign::{Campaign, LinkGroup};
+use crate::commands::next_step::Guide;
+use crate::commands::text::{Emphasis, number, percent, setup_lines, table, warnings};
+use crate::commands::{CampaignArg, Outcome};
+use crate::discrepancy::comparison::place::DominantRegion;
+use crate::identify::{Calibration, Options, Scale, StructureCase, StructureModel, Undetermined};
+
+#[derive(clap::Args)]
+pub struct CalibrateArgs {
+    #[command(flatten)]
+    campaign: CampaignArg,
+    /// Further starting points, tried where the first fit leaves more than noise.
+    #[arg(long, default_value_t = Options::default().extra_starts)]
+    starts: usize,
+    /// Seed of those starting points.
+    #[arg(long, default_value_t = Options::default().seed)]
+    seed: u64,
+    /// Start from the robot file's values alone, not from where the last revision stood or the measured modes lie.
+    #[arg(long)]
+    from_nominal: bool,
+    /// Link parameters that are fitted as well, with the usual tolerance where campaign.toml gives none: masses, inertias,
+    /// centres (of mass), lengths (of the kinematics), walls (of links that bend), or links (all of them). Keeps those that
+    /// cannot be what the robot file says; says whether postures left out are predicted better, and what the data cannot tell.
+    #[arg(
+        long,
+        value_delimiter = ',',
+        value_name = "GROUP",
+        conflicts_with = "from_nominal"
+    )]
+    free: Vec<Free>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Free {
+    Links,
+    Masses,
+    Inertias,
+    Centres,
+    Lengths,
+    Walls,
+}
+
+impl Free {
+    fn groups(self, bends: bool) -> Vec<LinkGroup> {
+        match self {
+            Free::Links => LinkGroup::ALL
+                .into_iter()
+                .filter(|g| bends || *g != LinkGroup::Walls)
+                .collect(),
+            Free::Masses => vec![LinkGroup::Masses],
+            Free::Inertias => vec![LinkGroup::Inertias],
+            Free::Centres => vec![LinkGroup::Centres],
+            Free::Lengths => vec![LinkGroup::Lengths],
+            Free::Walls => vec![LinkGroup::Walls],
+        }
+    }
+}
+
+pub fn run(args: CalibrateArgs) -> Result<Outcome> {
+    let campaign = Campaign::load(&args.campaign.dir)?;
+    let options = Options {
+        extra_starts: args.starts,
+        seed: args.seed,
+    };
+    let freed = match args.free.is_empty() {
+        true => None,
+        false => {
+            let case = StructureCase::load(&campaign)?;
+            let mut groups: Vec<LinkGroup> = args.free.iter().flat_map(|f| f.groups(case.bends())).collect();
+            groups.sort_unstable();
+            groups.dedup();
+            Some(FreedLinks::run(&campaign, case, &groups, options)?)
+        }
+    };
+    let analysis = if let Some(freed) = &freed {
+        &freed.after
+    } else if args.from_nominal {
+        let mut case = StructureCase::load(&campaign)?;
+        case.forget_start();
+        &StructureAnalysis::of(case, None, options)?
+    } else {
+        &StructureAnalysis::run(&campaign, options)?
+    };
+    let StructureAnalysis {
+        case,
+        calibration,
+        before,
+        after,
+        start,
+        warnings: notes,
+        ..
+    } = analysis;
+    let setup = analysis.setup_check()?;
+    let undetermined = match &freed {
+        Some(freed) => freed.undetermined.clone(),
+        None => Undetermined::new(&case.model.parameters, calibration)?,
+    };
+    let json = json!({
+        "domain": "structure",
+        "revision": case.revision(),
+        "effects": case.effects(),
+        "parameters": calibration.parameters,
+        "correlation": calibration.correlation(),
+        "error": after.totals,
+        "error_before": before.totals,
+        "iterations": calibration.iterations,
+        "converged": calibration.converged(),
+        "not_converged_because": calibration.ending.reason(),
+        "reduced_chi2": calibration.reduced_chi2,
+        "modal_start": start,
+        "starts": calibration.starts,
+        "starts_agreeing": calibration.starts_agreeing,
+        "undetermined": undetermined,
+        "freed": freed.as_ref().map(|freed| json!({
+            "groups": freed.groups.iter().map(|g| g.key()).collect::<Vec<_>>(),
+            "parameters_freed": freed.freed,
+            "departing": freed.departing,
+            "error_before": freed.before.after.totals,
+            "held_out_nrms_before": freed.held_out.as_ref().map(|[a, _]| a.nrms()),
+            "held_out_nrms_after": freed.held_out.as_ref().map(|[_, b]| b.nrms()),
+            "is_progress": freed.progress,
+        })),
+        "setup": setup.findings,
+        "warnings": notes,
+    });
+    let mut text = setup_lines(&setup.findings) + &format!("model: {}\n\n", case.model_description());
+    text += &describe_parameters(&case.model, calibration);
+    if let Some(start) = start {
+        text += &format!(
+            "\nstarted also from the measured modes: damping ratio {:.2} %, {} of {} modes matched, their frequencies off by \
+             {} with the robot file's stiffness, {} at the start\n",
+            100.0 * start.damping_ratio,
+            start.matched,
+            start.measured,
+            percent(start.frequency_error_before),
+            percent(start.frequency_error),
+        );
+    }
+    text += &format!(
+        "\nerror (nrms) {} -> {}, noise floor {}; {} in {} iterations\n",
+        percent(before.totals.nrms),
+        percent(after.totals.nrms),
+        percent(after.totals.noise_floor_nrms),
+        if calibration.converged() {
+            "converged".to_string()
+        } else {
+            Emphasis::Bad.on("NOT converged")
+        },
+        calibration.iterations,
+    );
+    if let Some(freed) = &freed {
+        text += &describe_freed(freed);
+    }
+    for sentence in undetermined.in_words() {
+        text += &format!("{sentence}\n");
+    }
+    text += &warnings(notes);
+    let next = Guide::structure(&campaign).calibrated(
+        calibration.converged(),
+        args.starts,
+        calibration.reduced_chi2,
+        &after.totals,
+        after.mostly.as_ref().map(DominantRegion::words),
+    );
+    Ok(Outcome::new(json, text, Some(next)))
+}
+
+/// What freeing link parameters did to the error, and how to keep it.
+fn describe_freed(freed: &FreedLinks) -> String {
+    if freed.departing.is_empty() {
+        return format!(
+            "\nall {} link parameters that were free agree with the robot file within their errors: leave them as they are\n",
+            freed.freed
+        );
+    }
+    let mut text = format!(
+        "\nof {} link parameters that were free {} cannot be what the robot file says: {}; the others agree with it and were left \
+         alone\nwith the links as in the robot file the error was {}",
+        freed.freed,
+        freed.departing.len(),
+        freed.departing.join(", "),
+        percent(freed.before.after.totals.nrms)
+    );
+    if let Some([before, after]) = &freed.held_out {
+        text += &format!(
+            "; on postures left out of the fit {} -> {}",
+            percent(before.nrms()),
+            percent(after.nrms())
+        );
+    }
+    text += match freed.progress {
+        Some(true) => ", better by more than chance\n",
+        Some(false) => ", no better than chance would make it: leave them as they are\n",
+        None => "\n",
+    };
+    if freed.progress != Some(false) {
+        text += "to keep them, give the campaign a robot file of its own with these values (docs/files.md)\n";
+    }
+    text
+}
+
+/// The fitted parameters as a table. Of an effect the robot file says nothing.
+pub fn describe_parameters(model: &StructureModel, calibration: &Calibration) -> String {
+    let rows: Vec<Vec<String>> = calibration
+        .parameters
+        .iter()
+        .enumerate()
+        .map(|(i, p)| {
+            let of_robot = i < model.baseline_parameter_count();
+            let (initial, change) = match (of_robot, model.parameters[i].scale, p.unit) {
+                // A coordinate has no natural zero that a share could be taken of.
+                (true, Scale::Linear, "m") => (
+                    number(p.initial, 4),
+                    format!("{:+.2} mm", 1e3 * (p.value - p.initial)),
+                ),
+                (true, ..) => (
+                    number(p.initial, 4),
+                    format!("{:+.1} %", 100.0 * (p.value / p.initial - 1.0)),
+                ),
+                _ => ("–".into(), "–".into()),
+            };
+            vec![
+                p.name.clone(),
+                initial,
+                number(p.value, 5),
+                number(p.std_error, 2),
+                p.unit.to_string(),
+                change,
+            ]
+        })
+        .collect();
+    table(
+        &[
+            "parameter",
+            "robot file",
+            "fitted",
+            "± std error",
+            "unit",
+            "change",
+        ],
+        &rows,
+    )
+}

@@ -1,0 +1,452 @@
+use serde_json::{Map, Value, json};
+
+use crate::Result;
+use crate::analysis::{CuttingFindings, DiagnosisFindings};
+use crate::campaign::Campaign;
+use crate::commands::find::localise;
+use crate::commands::next_step::Guide;
+use crate::commands::text::{Emphasis, number, percent, setup_lines, table, warnings, wrapped};
+use crate::commands::{Outcome, SideArgs, by_domain};
+use crate::discrepancy::candidate::BaselineFit;
+use crate::discrepancy::comparison::explained::{Explained, NamedPart};
+use crate::discrepancy::localise::Localisation;
+use crate::discrepancy::{CuttingLead, Diagnosis, DiagnosisVerdict, EffectCandidate, NextMeasurement};
+use crate::identify::Options;
+use crate::identify::rest::Rest;
+
+pub fn run(args: SideArgs) -> Result<Outcome> {
+    let campaign = Campaign::load(&args.campaign.dir)?;
+    by_domain(
+        &campaign,
+        args.domain,
+        |c| {
+            let found = DiagnosisFindings::run(c, Options::default())?;
+            // A folder that cannot be written to is no reason not to answer.
+            let _ = found.keep(c);
+            Ok(structure(c, &found))
+        },
+        |c| {
+            let found = CuttingFindings::run(c)?;
+            let _ = found.keep(c);
+            Ok(cutting(c, &found))
+        },
+    )
+}
+
+/// What was found out about the force records.
+pub fn cutting(campaign: &Campaign, findings: &CuttingFindings) -> Outcome {
+    let CuttingFindings {
+        case,
+        diagnosis: d,
+        next_measurement,
+        now,
+        ..
+    } = findings;
+    let noise_floor_nrms = now.comparison.totals.noise_floor_nrms;
+    let json = json!({
+        "domain": "cutting",
+        "process": case.data.process,
+        "revision": case.revision(),
+        "effects": case.effects(),
+        "verdict": d.verdict,
+        "effect": d.winner().map(|c| &c.name.effect),
+        "site": Value::Null,
+        "confidence": d.confidence,
+        "too_little_data": d.too_little_data,
+        "pairs": d.pairs.map(|[tried, of]| json!({ "tried": tried, "of": of })),
+        "companion": d.companion,
+        "best_guess": d.best_guess.map(|i| d.candidates[i].label()),
+        "explained_share": explained_share(d).map(|[share, _]| share),
+        "explained_share_std_error": explained_share(d).map(|[_, std]| std),
+        "rest": left_over(d),
+        "candidates": d.candidates.iter().map(candidate).collect::<Vec<_>>(),
+        "indistinguishable": d.indistinguishable,
+        "next_measurement": next_measurement,
+        "baseline": baseline(&d.baseline, noise_floor_nrms),
+        "not_tried": d.not_tried.iter().map(|(e, why)| json!({ "effect": e, "why": why })).collect::<Vec<_>>(),
+        "setup": findings.setup.findings,
+        "lead": findings.lead,
+        "warnings": case.warnings,
+    });
+    let added = case.effects();
+    let mut text = setup_lines(&findings.setup.findings);
+    text += &format!(
+        "model: baseline{}\n",
+        added.iter().map(|e| format!(" + {e}")).collect::<String>()
+    );
+    text += &as_it_stands(&d.baseline, noise_floor_nrms);
+    text += &answer(d, |c| {
+        (c.instance.effect.explanation(), c.instance.effect.fingerprint())
+    });
+    text += &findings.lead.as_ref().map_or(String::new(), lines_in_words);
+    text += &rest(d, next_measurement);
+    text += &warnings(&case.warnings);
+    let winner = d.winner().map(EffectCandidate::label);
+    let next = Guide::cutting(campaign).diagnosed(d.verdict, winner.as_deref(), &next_measurement.what);
+    Outcome::new(json, text, Some(next))
+}
+
+/// What is left by what it follows, and what usually causes that.
+fn lines_in_words(lead: &CuttingLead) -> String {
+    let mut text = wrapped(
+        &format!(
+            "A lead: what stands above the noise is {} N (root mean square); by what it follows, strongest first:",
+            number(lead.above_noise_n, 3)
+        ),
+        "  ",
+    );
+    for group in lead.lines.iter().filter(|g| g.share > SMALLEST_SHARE) {
+        text += &wrapped(
+            &format!(
+                "{}: {}, in {} of {} cuts; strongest {}",
+                group.what,
+                percent(group.share),
+                group.cuts,
+                group.of_cuts,
+                group.strongest()
+            ),
+            "    ",
+        );
+        text += &wrapped(&format!("usually {}", group.usual_cause), "      ");
+    }
+    text
+}
+
+fn baseline(b: &BaselineFit, noise_floor_nrms: f64) -> Value {
+    json!({
+        "nrms": b.residual.nrms,
+        "held_out_nrms": b.held_out.as_ref().map(|h| h.nrms()),
+        "noise_floor_nrms": noise_floor_nrms,
+        "reduced_chi2": b.reduced_chi2,
+        "independent_share": b.residual.independent_share,
+    })
+}
+
+/// What was found out about the FRFs.
+pub fn structure(campaign: &Campaign, findings: &DiagnosisFindings) -> Outcome {
+    let DiagnosisFindings {
+        case,
+        diagnosis,
+        next_measurement,
+        ..
+    } = findings;
+    let json = json!({
+        "domain": "structure",
+        "revision": case.revision(),
+        "effects": case.effects(),
+        "verdict": diagnosis.verdict,
+        "effect": diagnosis.winner().map(|c| &c.name.effect),
+        "site": diagnosis.winner().and_then(|c| c.name.site.as_ref()),
+        "confidence": diagnosis.confidence,
+        "too_little_data": diagnosis.too_little_data,
+        "pairs": diagnosis.pairs.map(|[tried, of]| json!({ "tried": tried, "of": of })),
+        "companion": diagnosis.companion,
+        "best_guess": diagnosis.best_guess.map(|i| diagnosis.candidates[i].label()),
+        "explained_share": explained_share(diagnosis).map(|[share, _]| share),
+        "explained_share_std_error": explained_share(diagnosis).map(|[_, std]| std),
+        "rest": left_over(diagnosis),
+        "candidates": diagnosis.candidates.iter().map(candidate).collect::<Vec<_>>(),
+        "indistinguishable": diagnosis.indistinguishable,
+        "explains": explains(findings),
+        "residual_peaks_hz": findings.residual_peaks.iter().map(|p| p.frequency_hz).collect::<Vec<_>>(),
+        "residual_peaks": findings.residual_peaks,
+        "next_measurement": next_measurement,
+        "baseline": baseline(&diagnosis.baseline, case.data.noise_floor_nrms()),
+        "not_tried": diagnosis.not_tried.iter().map(|(e, why)| json!({ "effect": e, "why": why })).collect::<Vec<_>>(),
+        "setup": findings.setup.findings,
+        "lead": findings.lead.as_ref().map(lead),
+        "warnings": case.warnings,
+    });
+    let text = setup_lines(&findings.setup.findings)
+        + &format!("model: {}\n", case.model_description())
+        + &describe(findings)
+        + &warnings(&case.warnings);
+    let winner = diagnosis.winner().map(EffectCandidate::label);
+    let next =
+        Guide::structure(campaign).diagnosed(diagnosis.verdict, winner.as_deref(), &next_measurement.what);
+    Outcome::new(json, text, Some(next))
+}
+
+/// The effect's own parameters by the keys of docs/json.md; `name[0]`, `name[1]`, … become one list.
+fn parameters<M, I>(candidate: &EffectCandidate<M, I>) -> Value {
+    let mut map = Map::new();
+    for p in &candidate.parameters {
+        let key = p.name.rsplit('.').next().unwrap_or(&p.name);
+        match key.split_once('[') {
+            Some((list, _)) => {
+                let entry = map.entry(list.to_string()).or_insert_with(|| json!([]));
+                if let Some(values) = entry.as_array_mut() {
+                    values.push(json!(p.value));
+                }
+            }
+            None => {
+                map.insert(key.to_string(), json!(p.value));
+            }
+        }
+    }
+    if let Some((key, value)) = &candidate.name.variant {
+        map.insert(key.clone(), json!(value));
+    }
+    map.into()
+}
+
+fn candidate<M, I>(c: &EffectCandidate<M, I>) -> Value {
+    json!({
+        "effect": c.name.effect,
+        "site": c.name.site,
+        "nrms": c.nrms,
+        "held_out_nrms": c.held_out.as_ref().map(|h| h.nrms()),
+        "delta_bic": c.delta_bic,
+        "p_value": c.p_value,
+        "reduced_chi2": c.reduced_chi2,
+        "at_bound": c.at_bound,
+        "not_credible": c.not_credible,
+        "explained_share": c.explained_share().map(|[share, _]| share),
+        "vanished": c.vanished,
+        "refined": c.refined,
+        "parameters": parameters(c),
+        "parameter_std_errors": c.parameters.iter().map(|p| json!({ "name": p.name, "value": p.value, "std_error": p.std_error, "unit": p.unit })).collect::<Vec<_>>(),
+    })
+}
+
+/// The candidate that the verdict names, or the best of the library where it names none.
+fn spoken_of<M, I>(d: &Diagnosis<M, I>) -> Option<&EffectCandidate<M, I>> {
+    let candidate = d.effect.or(d.best_guess)?;
+    d.candidates.get(candidate)
+}
+
+/// Share of what stands above the noise that the verdict's effect (or the best guess) explains, and its standard deviation.
+fn explained_share<M, I>(d: &Diagnosis<M, I>) -> Option<[f64; 2]> {
+    spoken_of(d)
+        .filter(|_| d.companion.is_none())
+        .and_then(EffectCandidate::explained_share)
+}
+
+/// What is left: of the best candidate, of the model as it stands where nothing is said to be missing.
+fn left_over<M, I>(d: &Diagnosis<M, I>) -> Value {
+    let (rest, gain) = match spoken_of(d).and_then(|c| Some((c.rest.as_ref()?, c.gain))) {
+        Some((rest, gain)) => (rest, gain),
+        None => (&d.baseline.rest, 0.0),
+    };
+    let largest = rest.largest();
+    json!({
+        "significant": rest.is_significant(),
+        "share": largest.map(|t| t.excess / (t.excess + gain.max(0.0))),
+        "looks_like": largest.map(|t| t.looks_like),
+        "small_errors_share": rest.share_of_slips(),
+        "small_errors": rest.small_errors,
+        "beyond_small_errors": rest.beyond_slips,
+        "tests": rest.tests,
+    })
+}
+
+/// Groups of lines with less than this share of what stands above the noise are in the JSON only.
+const SMALLEST_SHARE: f64 = 0.01;
+/// Candidates shown to a person; all are in the JSON.
+const SHOWN: usize = 8;
+
+/// What the missing effect (the leading candidate where none explains the rest) takes away of the residual, and where.
+fn explains(findings: &DiagnosisFindings) -> Value {
+    let (Some(leading), Some(candidate)) = (&findings.leading, findings.leader()) else {
+        return Value::Null;
+    };
+    let Explained {
+        total,
+        by_posture,
+        by_direction,
+        by_point,
+        by_band,
+        taken_from,
+        left_at,
+    } = &leading.explained;
+    let object = |parts: &[NamedPart]| -> Value {
+        let map: Map<String, Value> = parts.iter().map(|p| (p.name.clone(), json!(p.part))).collect();
+        map.into()
+    };
+    let mut json = json!(total);
+    json["effect"] = json!(candidate.name.effect);
+    json["site"] = json!(candidate.name.site);
+    json["by_posture"] = object(by_posture);
+    json["by_direction"] = object(by_direction);
+    json["by_point"] = object(by_point);
+    json["by_band"] = json!(by_band);
+    json["taken_from"] = json!(taken_from);
+    json["left_at"] = json!(left_at);
+    json
+}
+
+fn describe(findings: &DiagnosisFindings) -> String {
+    let DiagnosisFindings {
+        case,
+        diagnosis: d,
+        next_measurement,
+        ..
+    } = findings;
+    let mut text = as_it_stands(&d.baseline, case.data.noise_floor_nrms());
+    text += &answer(d, |c| {
+        (c.instance.effect.explanation(), c.instance.effect.fingerprint())
+    });
+    text += &crate::commands::find::compare::dominant(&findings.residual_peaks);
+    if let (Some(leading), Some(candidate)) = (&findings.leading, findings.leader()) {
+        let who = match d.verdict {
+            DiagnosisVerdict::Unknown => format!("The best candidate, {},", candidate.label()),
+            _ => "It".into(),
+        };
+        text += &wrapped(&leading.explained.sentence(&who), "  ");
+    }
+    if let Some(found) = &findings.lead {
+        text += &wrapped(
+            &format!(
+                "A lead: {}. `lobestone localise` draws it.",
+                localise::in_words(found)
+            ),
+            "  ",
+        );
+    }
+    text + &rest(d, next_measurement)
+}
+
+/// The best place of what the data draw.
+fn lead(found: &Localisation) -> Value {
+    found.places.first().map_or(Value::Null, localise::place)
+}
+
+fn as_it_stands(baseline: &BaselineFit, noise_floor_nrms: f64) -> String {
+    format!(
+        "model as it stands: error (nrms) {}, noise floor {}, {:.2} times the noise variance\n\n",
+        percent(baseline.residual.nrms),
+        percent(noise_floor_nrms),
+        baseline.reduced_chi2,
+    )
+}
+
+/// The verdict; `plainly` gives an effect's explanation and its fingerprint.
+fn answer<M, I>(
+    d: &Diagnosis<M, I>,
+    plainly: impl Fn(&EffectCandidate<M, I>) -> (&'static str, &'static str),
+) -> String {
+    let sure = format!("confidence {:.0} %", 100.0 * d.confidence);
+    match (d.verdict, d.winner()) {
+        (DiagnosisVerdict::Effect, Some(winner)) => {
+            let (explanation, fingerprint) = plainly(winner);
+            let excuse = winner.rest.as_ref().and_then(Rest::excuse_in_words);
+            let left = excuse.map_or(String::new(), |left| {
+                let share = 100.0 * winner.share_above_noise(&d.baseline);
+                wrapped(
+                    &format!(
+                        "It explains {share:.0} % of what stands above the noise; what it leaves is {left}."
+                    ),
+                    "  ",
+                )
+            });
+            format!(
+                "{} ({sure})\n{}{}{left}",
+                Emphasis::Strong.on(format!("MISSING: {}", winner.label())),
+                wrapped(explanation, "  "),
+                wrapped(&format!("How it shows: {fingerprint}"), "  "),
+            )
+        }
+        (DiagnosisVerdict::None, _) => match d.baseline.rest.excuse_in_words() {
+            Some(left) => format!(
+                "{} that the library knows is larger than the small errors of the setup ({sure})\n{}",
+                Emphasis::Good.on("NOTHING"),
+                wrapped(&format!("What stands above the noise is {left}."), "  ")
+            ),
+            None => format!(
+                "{} is missing: what is left looks like noise ({sure})\n",
+                Emphasis::Good.on("NOTHING")
+            ),
+        },
+        _ if d.too_little_data.is_some() => format!(
+            "{}: {}\n",
+            Emphasis::Bad.on("NO VERDICT"),
+            d.too_little_data.as_deref().unwrap_or_default()
+        ),
+        _ => {
+            let guess = d
+                .best_guess_in_words()
+                .map_or(String::new(), |words| wrapped(&words, "  "));
+            format!(
+                "{}: what is left is real, but no effect of the library explains it ({sure})\n{guess}",
+                Emphasis::Bad.on("UNKNOWN")
+            )
+        }
+    }
+}
+
+/// Rivals, candidates and what to do next.
+fn rest<M, I>(d: &Diagnosis<M, I>, next_measurement: &NextMeasurement) -> String {
+    let mut text = String::new();
+    if let Some(companion) = &d.companion {
+        text += &format!("  A second effect is likely besides: {companion}\n");
+    }
+    if !d.indistinguishable.is_empty() {
+        text += &format!(
+            "  This data cannot tell it from: {}\n",
+            d.indistinguishable.join(", ")
+        );
+    }
+    match d.pairs {
+        Some([tried, of]) if tried < of => {
+            text += &format!(
+                "  Of {of} pairs of effects {tried} were tried, the likeliest first: there was no time for more\n"
+            );
+        }
+        Some([_, of]) if d.verdict == DiagnosisVerdict::Unknown && of > 0 => {
+            text += &format!("  Nor does any of {of} pairs of effects with the best of them\n");
+        }
+        _ => {}
+    }
+    let rows: Vec<Vec<String>> = d
+        .candidates
+        .iter()
+        .take(SHOWN)
+        .map(|c| {
+            vec![
+                c.label(),
+                percent(c.nrms),
+                c.held_out.as_ref().map_or("–".into(), |h| percent(h.nrms())),
+                number(c.delta_bic, 4),
+                if c.p_value < 1e-12 {
+                    "< 1e-12".into()
+                } else {
+                    number(c.p_value, 2)
+                },
+                number(c.reduced_chi2, 3),
+                c.remark().into(),
+            ]
+        })
+        .collect();
+    for c in d.candidates.iter().take(SHOWN) {
+        if let Some(why) = &c.not_credible {
+            text += &wrapped(&format!("Not {}: {why}.", c.label()), "  ");
+        }
+    }
+    let header = ["candidate", "nrms", "held out", "ΔBIC", "p", "χ²/dof", ""];
+    text += &format!(
+        "\n{}\nMost telling further measurement: {}\n",
+        table(&header, &rows),
+        next_measurement
+    );
+    text + &alternatives(next_measurement)
+}
+
+/// Cheaper and more telling measurements than the one advised.
+fn alternatives(next: &NextMeasurement) -> String {
+    let rows: Vec<Vec<String>> = next
+        .alternatives
+        .iter()
+        .map(|a| {
+            let what = a.what.trim_start_matches("measure ");
+            vec![
+                number(a.cost, 3),
+                format!("{:.1}", a.expected_sigmas),
+                what.to_string(),
+            ]
+        })
+        .collect();
+    match rows.is_empty() {
+        true => String::new(),
+        false => table(&["instead", "effort", "σ"], &rows),
+    }
+}

@@ -1,0 +1,215 @@
+use serde_json::{Map, Value, json};
+
+use crate::Result;
+use crate::campaign::Campaign;
+use crate::commands::text::{Emphasis, number, percent, table, warnings};
+use crate::commands::{CampaignArg, Outcome};
+use crate::discrepancy::localise::{BestForm, Localisation, LocalisedPlace, localise};
+use crate::effects::drawn;
+use crate::identify::{Options, StructureCase};
+use crate::report::figure::DrawnCurveFigure;
+
+#[derive(clap::Args)]
+pub struct LocaliseArgs {
+    #[command(flatten)]
+    campaign: CampaignArg,
+    /// Places listed in the table (the document has all).
+    #[arg(long, default_value_t = 10)]
+    places: usize,
+    /// Draw the dynamic stiffness of the best place over frequency into this PNG file.
+    #[arg(long, value_name = "FILE")]
+    figure: Option<std::path::PathBuf>,
+}
+
+pub fn run(args: LocaliseArgs) -> Result<Outcome> {
+    let campaign = Campaign::load(&args.campaign.dir)?;
+    let case = StructureCase::load(&campaign)?;
+    let found = localise(&case.study(Options::default()), &case.model)?;
+    let dir = campaign.dir.display();
+    if let (Some(file), Some(place)) = (&args.figure, found.places.first()) {
+        crate::files::write_atomically(file, &figure(place).png()?)?;
+    }
+    let best = found.places.first();
+    let next = match best.and_then(|p| p.best.as_ref()) {
+        Some(form) if found.significant => {
+            format!(
+                "run `lobestone add {dir} {}` to put it into the model",
+                form.instance.label()
+            )
+        }
+        _ => format!("nothing to add here; `lobestone compare {dir}` shows where the model fails"),
+    };
+    Ok(Outcome::new(
+        document(&case, &found),
+        describe(&case, &found, args.places),
+        Some(next),
+    ))
+}
+
+fn document(case: &StructureCase, found: &Localisation) -> Value {
+    let best = found.places.first();
+    let curve = best.map(|p| {
+        json!({
+            "place": p.spot.label(),
+            "unit": unit(p),
+            "frequency_hz": p.curve.iter().map(|c| c.frequency_hz).collect::<Vec<_>>(),
+            "re": p.curve.iter().map(|c| finite(c.stiffness.re)).collect::<Vec<_>>(),
+            "im": p.curve.iter().map(|c| finite(c.stiffness.im)).collect::<Vec<_>>(),
+            "std": p.curve.iter().map(|c| finite(c.std)).collect::<Vec<_>>(),
+        })
+    });
+    json!({
+        "domain": "structure",
+        "revision": case.revision(),
+        "effects": case.effects(),
+        "significant": found.significant,
+        "places": found.places.iter().map(place).collect::<Vec<_>>(),
+        "curve": curve,
+        "baseline": {
+            "reduced_chi2": found.baseline.reduced_chi2,
+            "held_out_nrms": found.baseline_held_out.as_ref().map(|h| h.nrms()),
+        },
+        "warnings": case.warnings,
+    })
+}
+
+fn figure(place: &LocalisedPlace) -> DrawnCurveFigure {
+    let best = place.best.as_ref();
+    let values: Vec<f64> = best
+        .iter()
+        .flat_map(|b| b.parameters.iter().map(|p| p.value))
+        .collect();
+    let frequency_hz: Vec<f64> = place.curve.iter().map(|c| c.frequency_hz).collect();
+    DrawnCurveFigure {
+        title: format!("Dynamic stiffness that the data draw {}", place.spot.words()),
+        unit: unit(place).to_string(),
+        stiffness: place.curve.iter().map(|c| c.stiffness).collect(),
+        std: place.curve.iter().map(|c| c.std).collect(),
+        form: best.map_or_else(Vec::new, |b| {
+            let of = |f: &f64| drawn::dynamic_stiffness(place.spot, b.form, &values, *f);
+            frequency_hz.iter().map(of).collect()
+        }),
+        form_label: best.map_or(String::new(), |b| format!("fitted: {}", b.form.label())),
+        frequency_hz,
+    }
+}
+
+/// JSON has no infinity: null where a line says nothing.
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
+
+fn unit(place: &LocalisedPlace) -> &'static str {
+    if place.spot.is_angle() { "N·m/rad" } else { "N/m" }
+}
+
+/// One place for the document.
+pub fn place(p: &LocalisedPlace) -> Value {
+    let (mut parameters, mut errors) = (Map::new(), Map::new());
+    for estimate in p.best.iter().flat_map(|b| &b.parameters) {
+        let key = estimate.name.rsplit('.').next().unwrap_or(&estimate.name);
+        parameters.insert(key.to_string(), json!(estimate.value));
+        errors.insert(key.to_string(), json!(estimate.std_error));
+    }
+    json!({
+        "place": p.spot.label(),
+        "add": p.best.as_ref().map(|b| b.instance.label()),
+        "left": p.left,
+        "consistency": p.consistency,
+        "held_out_nrms": p.best.as_ref().and_then(|b| b.held_out.as_ref().map(|h| h.nrms())),
+        "form": p.best.as_ref().map(|b| b.form.label()),
+        "forms": p.forms.iter().map(|f| json!({ "form": f.form.label(), "delta_bic": f.delta_bic })).collect::<Vec<_>>(),
+        "parameters": parameters,
+        "errors": errors,
+        "delta_bic": p.best.as_ref().map(|b| b.delta_bic),
+        "p_value": p.best.as_ref().map(|b| b.p_value),
+        "tied_with": p.tied_with,
+    })
+}
+
+fn describe(case: &StructureCase, found: &Localisation, most: usize) -> String {
+    let mut text = format!("model: {}\n\n", case.model_description());
+    if let Some((p, best)) = found.places.first().and_then(|p| Some((p, p.best.as_ref()?))) {
+        text += &match found.significant {
+            true => format!(
+                "{}: {} {}\n",
+                Emphasis::Strong.on("The data draw"),
+                form_in_words(best),
+                p.spot.words()
+            ),
+            false => format!(
+                "{}: no place explains more than chance\n",
+                Emphasis::Strong.on("The data draw nothing")
+            ),
+        };
+        if found.significant && !p.tied_with.is_empty() {
+            text += &format!(
+                "tied with {}: this data cannot tell them apart\n",
+                p.tied_with.join(", ")
+            );
+        }
+        text += &format!(
+            "left of the misfit {} (1 is noise; {} without it)\n",
+            number(p.left, 3),
+            number(found.baseline.reduced_chi2, 3)
+        );
+        if let (Some(with), Some(without)) = (&best.held_out, &found.baseline_held_out) {
+            text += &format!(
+                "error on postures left out {} -> {}\n",
+                percent(without.nrms()),
+                percent(with.nrms())
+            );
+        }
+        text.push('\n');
+    }
+    let rows: Vec<Vec<String>> = found
+        .places
+        .iter()
+        .take(most)
+        .map(|p| {
+            vec![
+                p.spot.label(),
+                number(p.left, 4),
+                number(p.consistency, 3),
+                p.best.as_ref().map_or("–".into(), |b| b.form.label().to_string()),
+                p.best.as_ref().map_or(String::new(), values),
+                p.tied_with.join(", "),
+            ]
+        })
+        .collect();
+    text += &table(
+        &["place", "left", "scatter", "form", "parameters", "tied with"],
+        &rows,
+    );
+    text += "left: misfit over noise, 1 is noise; scatter: of the drawn stiffness over postures, 1 if it is the same everywhere\n";
+    text + &warnings(&case.warnings)
+}
+
+fn values(best: &BestForm) -> String {
+    let one = |e: &crate::identify::Estimate| {
+        let key = e.name.rsplit('.').next().unwrap_or(&e.name);
+        format!("{key} {} ± {}", number(e.value, 4), number(e.std_error, 2))
+    };
+    best.parameters.iter().map(one).collect::<Vec<_>>().join(", ")
+}
+
+/// What the data draw, as a sentence without its end.
+pub fn in_words(found: &Localisation) -> String {
+    let best = found.places.first().and_then(|p| Some((p, p.best.as_ref()?)));
+    best.map_or_else(
+        || "no place explains more than chance".into(),
+        |(p, best)| {
+            let before = found.baseline.reduced_chi2;
+            format!(
+                "the data draw {} {}, which leaves {:.2} times the noise variance of {before:.2}",
+                form_in_words(best),
+                p.spot.words(),
+                p.left
+            )
+        },
+    )
+}
+
+fn form_in_words(best: &BestForm) -> String {
+    format!("a {} ({})", best.form.label().replace('-', " "), values(best))
+}

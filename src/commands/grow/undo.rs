@@ -1,0 +1,47 @@
+use serde_json::json;
+
+use crate::Result;
+use crate::campaign::Campaign;
+use crate::commands::grow::history::document;
+use crate::commands::next_step::Guide;
+use crate::commands::text::percent;
+use crate::commands::{Outcome, SideArgs, side};
+use crate::revision::{self, RevisionLog, fingerprint};
+
+pub fn run(args: SideArgs) -> Result<Outcome> {
+    let campaign = Campaign::load(&args.campaign.dir)?;
+    let domain = side(&campaign, args.domain);
+    let log = RevisionLog::load(&campaign.dir)?;
+    after(log, &campaign, domain)
+}
+
+/// Takes the last revision of `log` back, if the campaign's log still is that.
+pub fn after(mut log: RevisionLog, campaign: &Campaign, domain: revision::Domain) -> Result<Outcome> {
+    let undone = log.undo(domain)?;
+    let current = log.current(domain);
+    let labels = current.map(|r| r.labels()).unwrap_or_default();
+    let json = json!({
+        "domain": domain,
+        "undone": document(&undone, &fingerprint(campaign, domain)?),
+        "revision": current.map(|r| r.revision),
+        "effects": labels,
+    });
+    let model = std::iter::once("baseline").chain(labels.iter().copied());
+    let mut text = format!(
+        "undone: revision {}\nmodel: {}\n",
+        undone.title(),
+        model.collect::<Vec<_>>().join(" + ")
+    );
+    if let Some(current) = current {
+        text += &format!(
+            "error (nrms) {} -> {}\n",
+            percent(undone.nrms),
+            percent(current.nrms)
+        );
+    }
+    let guide = Guide {
+        campaign,
+        side: domain,
+    };
+    Ok(Outcome::new(json, text, Some(guide.undone())))
+}

@@ -1,0 +1,4 @@
+//! Many campaigns.
+
+pub(crate) mod batch;
+pub(crate) mod fleet;

@@ -1,0 +1,163 @@
+//! What `lobestone modal` writes: a report, files for other programs, the comparison with a model.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use crate::analysis::ModalAnalysis;
+use crate::analysis::modes::modal_export::{export, scaled_modes};
+use crate::analysis::modes::shape_comparison::{ShapeComparison, compare};
+use crate::commands::next_step::word;
+use crate::commands::text::table;
+use crate::ingest::read_geometry;
+use crate::report::modal_page::{self, Extras, driving_points};
+use crate::{InputError, Result};
+
+/// Folders and files of the request.
+pub struct Files<'a> {
+    pub report: Option<&'a Path>,
+    pub export: Option<&'a Path>,
+    pub geometry: Option<&'a Path>,
+    pub model: Option<&'a Path>,
+    pub inputs: &'a [PathBuf],
+    pub together: bool,
+    pub band_hz: Option<[f64; 2]>,
+    pub window_tau_s: Option<f64>,
+}
+
+impl Files<'_> {
+    /// The command line that repeats the analysis, without poles.
+    fn command(&self) -> String {
+        let mut line = "lobestone modal".to_owned();
+        // Writing to a String cannot fail.
+        for path in self.inputs {
+            let _ = write!(line, " {}", word(path));
+        }
+        if self.together {
+            line += " --together";
+        }
+        if let Some([low, high]) = self.band_hz {
+            let _ = write!(line, " --band {low}:{high}");
+        }
+        if let Some(tau) = self.window_tau_s {
+            let _ = write!(line, " --window-tau {tau}");
+        }
+        for (option, path) in [
+            ("geometry", self.geometry),
+            ("model", self.model),
+            ("report", self.report),
+        ] {
+            if let Some(path) = path {
+                let _ = write!(line, " --{option} {}", word(path));
+            }
+        }
+        line
+    }
+}
+
+/// Adds driving points and modal masses to the document, writes what is asked for, and says so.
+pub fn write(files: &Files, analysis: &ModalAnalysis, json: &mut Value, said: &mut String) -> Result<()> {
+    scales(analysis, json);
+    let geometry = files
+        .geometry
+        .map(read_geometry)
+        .transpose()?
+        .map(|found| found.0);
+    let mut comparisons: Vec<Option<ShapeComparison>> = Vec::new();
+    if let Some(path) = files.model {
+        let (nodes, shapes) = read_geometry(path)?;
+        if shapes.is_empty() {
+            return Err(InputError::new("a model without mode shapes (dataset 55)")
+                .file(path)
+                .remedy("export the model's modes as universal dataset 55")
+                .into());
+        }
+        for set in &analysis.sets {
+            let comparison = compare(set, geometry.as_ref(), &nodes, &shapes);
+            match &comparison {
+                Some(found) => *said += &pairs(&set.set, found),
+                None => {
+                    let _ = writeln!(
+                        said,
+                        "{}: fewer than two degrees of freedom in common with the model: nothing to compare",
+                        set.set
+                    );
+                }
+            }
+            comparisons.push(comparison);
+        }
+        json["model"] = json!(comparisons);
+    }
+    if let Some(folder) = files.export {
+        let written = export(&analysis.sets, geometry.as_ref(), folder)?;
+        let _ = writeln!(said, "export   {} files in {}", written.len(), folder.display());
+        json["exported"] = json!(written);
+    }
+    if let Some(folder) = files.report {
+        let extras = Extras {
+            geometry: geometry.as_ref(),
+            comparisons,
+            command: files.command(),
+        };
+        let first = files.inputs.first().and_then(|p| p.file_name());
+        let title = first.map_or("Modal analysis".into(), |name| {
+            format!("Modal analysis of {}", name.to_string_lossy())
+        });
+        let written = modal_page::page(analysis, &extras, &title).write(folder)?;
+        let _ = writeln!(
+            said,
+            "report   {}\nfigures  {} PNG files beside it",
+            written.html.display(),
+            written.images.len()
+        );
+        json["report"] = json!({ "html": written.html, "images": written.images });
+    }
+    Ok(())
+}
+
+fn scales(analysis: &ModalAnalysis, json: &mut Value) {
+    let mut row = 0;
+    for (k, set) in analysis.sets.iter().enumerate() {
+        json["sets"][k]["driving_points"] = json!(driving_points(set));
+        for scale in scaled_modes(set) {
+            if let Some(scale) = scale {
+                let name = |dof: usize| set.dofs.get(dof).cloned().unwrap_or_default();
+                let mut value = json!({
+                    "driving_point": name(scale.driving_dof),
+                    "modal_mass_kg": scale.modal_mass_kg,
+                    "modal_mass_std_kg": scale.modal_mass_std_kg,
+                    "modal_a_re_kg_per_s": scale.modal_a.re,
+                    "modal_a_im_kg_per_s": scale.modal_a.im,
+                });
+                let unity = scale.unity_mass.iter().zip(&scale.real_normal);
+                value["unity_mass_shape"] = unity
+                    .map(|((dof, z), (_, real))| json!({ "dof": name(*dof), "re": z.re, "im": z.im, "real_normal": real }))
+                    .collect();
+                json["global"][row]["scale"] = value;
+            }
+            row += 1;
+        }
+    }
+}
+
+fn pairs(set: &str, found: &ShapeComparison) -> String {
+    let rows: Vec<Vec<String>> = found
+        .pairs
+        .iter()
+        .map(|p| {
+            vec![
+                format!("{:.2}", p.measured_hz),
+                format!("{:.2}", p.model_hz),
+                format!("{:+.1}", 100.0 * p.frequency_error),
+                format!("{:.3}", p.mac),
+            ]
+        })
+        .collect();
+    format!(
+        "\n{set}: against the model, {} degrees of freedom in common (nodes by {})\n{}",
+        found.common_dofs,
+        found.matched_by,
+        table(&["measured Hz", "model Hz", "off by %", "MAC"], &rows)
+    )
+}

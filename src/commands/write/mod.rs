@@ -1,0 +1,7 @@
+//! Write and try out.
+
+pub(crate) mod report;
+pub(crate) mod schema;
+pub(crate) mod shell;
+pub(crate) mod simulate;
+pub(crate) mod thesis;

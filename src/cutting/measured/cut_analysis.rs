@@ -1,0 +1,133 @@
+//! What one force record says: averages, the zero of each channel, and what its owner should know.
+
+use crate::cutting::force_model::force_axis::ForceAxis;
+use crate::data::Process;
+use crate::signal::{DriftLine, SpindleTrack, ToothLine};
+
+/// A mean force (N) or torque (N·m) with its standard error.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Average {
+    /// Mean force (N) or torque (N·m).
+    pub value: f64,
+    /// From the scatter between revolutions and the uncertainty of the baseline.
+    pub std_error: f64,
+}
+
+/// A channel thinned for drawing: extremes in equal stretches of time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trace {
+    /// Middle of each stretch, s on the record's time axis.
+    pub time_s: Vec<f64>,
+    /// Smallest sample of each stretch, unit of the channel.
+    pub min: Vec<f64>,
+    /// Largest sample of each stretch, unit of the channel.
+    pub max: Vec<f64>,
+}
+
+/// One recorded channel, in the dynamometer's own axes.
+#[derive(Debug, Clone)]
+pub struct ChannelAnalysis {
+    /// As the file names it.
+    pub name: String,
+    /// Which recorded axis it is.
+    pub axis: ForceAxis,
+    /// The zero of the channel over the record.
+    pub drift: DriftLine,
+    /// Over the steady window, drift taken off.
+    pub mean: TurnAverage,
+    /// Not drift compensated.
+    pub trace: Trace,
+}
+
+/// Something about a record that its owner should know. Notices of one kind become one sentence.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Notice {
+    /// What it is and what to do, the same for every cut.
+    pub kind: &'static str,
+    /// What is particular to this cut; may be empty.
+    pub detail: String,
+}
+
+/// What one record says.
+#[derive(Debug, Clone)]
+pub struct CutAnalysis {
+    /// Index into `Campaign::cuts`.
+    pub cut: usize,
+    /// The cut's id.
+    pub id: String,
+    /// How it was cut.
+    pub process: Process,
+    /// As stated, not as found.
+    pub spindle_rpm: f64,
+    /// At the diameter of the tool, in turning that of the workpiece.
+    pub cutting_speed_m_per_min: f64,
+    /// Per tooth (milling), per revolution (drilling, turning).
+    pub feed_mm: f64,
+    /// Start and end of the record, s.
+    pub record_s: [f64; 2],
+    /// Start and end of the air before the cut, s; `None` where there is none.
+    pub air_before_s: Option<[f64; 2]>,
+    /// Start and end of the air after the cut, s; `None` where there is none.
+    pub air_after_s: Option<[f64; 2]>,
+    /// Start and end of the steady window, s.
+    pub steady_s: [f64; 2],
+    /// The campaign said where; else detected.
+    pub steady_given: bool,
+    /// Revolutions in the steady window.
+    pub revolutions: f64,
+    /// The usable channels, ordered by axis.
+    pub channels: Vec<ChannelAnalysis>,
+    /// Tool axes x, y, z and torque; `None` where a channel it needs is missing or dead.
+    pub averages: [Option<Average>; 4],
+    /// Milling: the tooth-passing line of the channel that shows it most clearly; `None` where the window is too short for one.
+    pub tooth_line: Option<ToothLine>,
+    /// How the spindle ran, where it did not keep the stated speed.
+    pub spindle: Option<SpindleTrack>,
+    /// What its owner should know.
+    pub notices: Vec<Notice>,
+}
+
+/// The mean of one channel over a window.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TurnAverage {
+    /// The mean and its standard error, N or N·m.
+    pub average: Average,
+    /// Revolutions averaged.
+    pub turns: usize,
+    /// Standard deviation between the means of revolutions; `None` with one revolution only.
+    pub turn_std: Option<f64>,
+    /// Part of the standard error that the baseline brings.
+    pub zero_std: f64,
+    /// Revolutions left out as spikes.
+    pub dropped: usize,
+}
+
+/// Notice of a record whose tooth-passing line is not where speed and teeth put it.
+pub(crate) const WRONG_SPEED: &str = "coefficients rest on a wrong spindle speed or number of teeth: correct spindle_rpm \
+     (and the feed per tooth that goes with it) or [tool] teeth";
+
+/// F_tool = A F_recorded, standard errors added in squares; torque is taken as recorded.
+pub(crate) fn in_tool_axes(
+    tool_from_dyno: &[[f64; 3]; 3],
+    channels: &[ChannelAnalysis],
+) -> [Option<Average>; 4] {
+    let recorded = |axis: ForceAxis| channels.iter().find(|c| c.axis == axis).map(|c| c.mean.average);
+    let mut averages = [None; 4];
+    for (average, row) in averages.iter_mut().zip(tool_from_dyno) {
+        let largest = row.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        let mut sum = Some((0.0, 0.0));
+        for (&a, axis) in row.iter().zip(ForceAxis::ALL) {
+            if a.abs() > 1e-9 * largest {
+                sum = sum.zip(recorded(axis)).map(|((value, variance), r)| {
+                    (value + a * r.value, variance + (a * r.std_error).powi(2))
+                });
+            }
+        }
+        *average = sum.map(|(value, variance): (f64, f64)| Average {
+            value,
+            std_error: variance.sqrt(),
+        });
+    }
+    averages[ForceAxis::Mz.index()] = recorded(ForceAxis::Mz);
+    averages
+}

@@ -1,0 +1,9 @@
+//! What one force record says.
+
+pub(crate) mod air;
+pub(crate) mod average;
+pub(crate) mod cut_analysis;
+pub(crate) mod faults;
+pub(crate) mod in_step;
+pub(crate) mod record;
+pub(crate) mod teeth;

@@ -1,0 +1,487 @@
+//! One record of one cut: drift, phases, averages over whole revolutions, in tool axes.
+
+use std::ops::Range;
+
+use num_complex::Complex64;
+
+use crate::cutting::cutting_trials::CuttingTrials;
+use crate::cutting::force_model::average_force::{cut_diameter_mm, cutting_speed_m_per_min, feed_mm};
+use crate::cutting::force_model::drill_geometry::DrillGeometry;
+use crate::cutting::force_model::force_axis::ForceAxis;
+use crate::cutting::measured::air::{air_notices, believable_air};
+use crate::cutting::measured::average::average;
+use crate::cutting::measured::cut_analysis::{
+    ChannelAnalysis, CutAnalysis, Notice, Trace, WRONG_SPEED, in_tool_axes,
+};
+use crate::cutting::measured::teeth::idle_tooth;
+use crate::cutting::waveform::MillingCut;
+use crate::data::{ChannelRole, Cut, CutGeometry, Process, TimeRecord, Tool};
+use crate::signal::{
+    self, Air, Clipping, Phases, SignalBlocks, Spindle, ToothLine, find_faults, find_phases, fit_drift,
+    highest_order, tooth_line, whole_revolutions,
+};
+use crate::text::figures;
+use crate::{Error, InputError, Result};
+
+/// Points of a [`Trace`].
+const TRACE_POINTS: usize = 1000;
+const CHANNEL_MISSING: &str = "channel missing or not usable";
+const CHANNEL_DEAD: &str = "channel dead (one value throughout) and left out: check plug and amplifier";
+const CHANNEL_BROKEN: &str = "channel holds values that are no numbers and is left out";
+const CLIPPED: &str = "clipped, so that the true forces are larger: the channel is left out of this cut; choose a larger range \
+     at the amplifier and cut again";
+const CLIPPED_ELSEWHERE: &str = "clipped outside the steady window: averages are not touched, but choose a larger range at the \
+     amplifier";
+const UNSTEADY_CUT: &str = "the force changes over the steady window: a slow entry or exit, a depth that changes, or wear; look at \
+     the record and give steady_s = [from, to]";
+const IDLE_TOOTH: &str = "the teeth cut very unevenly, once per turn instead of once per tooth: one is missing or chipped, the runout \
+     is as large as the feed per tooth, or [tool] teeth is wrong; a tooth that does not cut leaves its edge force out, so that the edge \
+     coefficients come out low by its share";
+const SHORT_WINDOW: &str = "steady window shorter than 5 revolutions";
+const SPIKES: &str = "revolutions with spikes left out of the average";
+const WRONG_DURATION: &str = "the hole took another time than feed, speed and depth say: check them";
+
+/// Reads what one record says about one cut.
+///
+/// # Errors
+/// The record is unreadable, too short, holds no usable force channel, or no steady cut is found.
+pub fn analyse_cut(trials: &CuttingTrials, cut_index: usize, record: &TimeRecord) -> Result<CutAnalysis> {
+    let (tool, cut) = (trials.tool, &trials.cuts[cut_index]);
+    let refuse = |problem: String| Error::from(InputError::new(problem).file(&cut.file));
+    let rate = record.sample_rate_hz;
+    let samples = record.len();
+    let samples_per_revolution = rate * 60.0 / cut.spindle_rpm;
+    if samples == 0 {
+        return Err(refuse("the record is empty".into()));
+    }
+    if !(rate.is_finite()
+        && rate > 0.0
+        && samples_per_revolution.is_finite()
+        && samples_per_revolution >= 2.0)
+    {
+        return Err(refuse(format!(
+            "sampled at {rate} Hz, which cannot show a spindle at {} rpm",
+            cut.spindle_rpm
+        )));
+    }
+
+    let mut notices = Vec::new();
+    let usable = usable_channels(record, cut.geometry.process(), &mut notices);
+    if usable.is_empty() {
+        return Err(refuse("no usable force channel (Fx, Fy, Fz or Mz)".into()));
+    }
+    // A channel that saturates shows neither air nor cut: the others tell where they are, if there are any.
+    let clippings: Vec<Option<Clipping>> = usable.iter().map(|c| find_faults(c.2).clipping).collect();
+    let (whole, cut_off): (Vec<_>, Vec<_>) = usable
+        .into_iter()
+        .zip(clippings)
+        .partition(|(_, clipping)| clipping.is_none());
+    let mut usable: Vec<UsableChannel> = whole.into_iter().map(|(channel, _)| channel).collect();
+    let all: Vec<UsableChannel> = usable
+        .iter()
+        .copied()
+        .chain(cut_off.iter().map(|(c, _)| *c))
+        .collect();
+    let telling = if usable.is_empty() { &all } else { &usable };
+    let (phases, steady_given) = phases(cut, tool, record, telling, samples_per_revolution)?;
+    let steady = phases.steady.clone();
+    for (channel, clipping) in cut_off {
+        let clipping = clipping.unwrap_or_default();
+        if !is_spoilt(&channel, &clipping, &steady, record, &mut notices) {
+            usable.push(channel);
+        }
+    }
+    usable.sort_by_key(|channel| channel.0);
+    if usable.is_empty() {
+        return Err(refuse("every force channel is clipped".into()));
+    }
+    let revolutions = steady.len() as f64 / samples_per_revolution;
+    let seconds = |r: &Range<usize>| {
+        let at = |i: usize| record.start_s + i as f64 / rate;
+        [at(r.start), at(r.end)]
+    };
+
+    let carrying = ForceAxis::of(cut.geometry.process());
+    let carriers: Vec<(ForceAxis, &[f64])> = usable
+        .iter()
+        .filter(|c| carrying.contains(&c.0))
+        .map(|c| (c.0, c.2))
+        .collect();
+    let (air, is_short) = believable_air(
+        &carriers,
+        rate,
+        record.start_s,
+        &phases.air,
+        &steady,
+        cut.geometry.process(),
+        60.0 / cut.spindle_rpm,
+        &mut notices,
+    );
+    let phases = Phases { air, ..phases };
+    let channels: Vec<ChannelAnalysis> = usable
+        .iter()
+        .map(|&(axis, name, values)| {
+            let mut drift = fit_drift(values, rate, record.start_s, &phases.air);
+            if is_short {
+                drift.hold_back(0.0);
+            }
+            let mean = average(values, &steady, samples_per_revolution, &drift, record);
+            if mean.dropped > 0 {
+                notices.push(Notice {
+                    kind: SPIKES,
+                    detail: format!("{} on {}", mean.dropped, axis.label()),
+                });
+            }
+            ChannelAnalysis {
+                name: name.to_string(),
+                axis,
+                drift,
+                mean,
+                trace: trace(values, record),
+            }
+        })
+        .collect();
+    let carriers: Vec<&ChannelAnalysis> = channels.iter().filter(|c| carrying.contains(&c.axis)).collect();
+    air_notices(&phases.air, &carriers, samples as f64 / rate, &mut notices);
+    unsteady_notice(
+        &usable,
+        &channels,
+        &steady,
+        samples_per_revolution,
+        record,
+        &mut notices,
+    );
+    if revolutions < 4.999 {
+        notices.push(Notice {
+            kind: SHORT_WINDOW,
+            detail: format!("{revolutions:.1}"),
+        });
+    }
+    let tooth_line = match cut.geometry {
+        CutGeometry::Milling { .. } => usable
+            .iter()
+            .filter_map(|&(_, _, v)| tooth_line(&v[steady.clone()], rate, cut.spindle_rpm / 60.0, tool.teeth))
+            .max_by(|a, b| a.strongest_to_noise.total_cmp(&b.strongest_to_noise)),
+        CutGeometry::Drilling { .. } => {
+            duration_notice(cut, tool, &phases, rate, &mut notices);
+            None
+        }
+        // One edge that never leaves the work: no line to judge the speed by.
+        CutGeometry::Turning { .. } => None,
+    };
+    teeth_notice(trials, cut, &channels, &usable, &steady, record, &mut notices);
+    if let Some(line) = tooth_line.filter(ToothLine::speed_is_doubtful) {
+        notices.push(Notice {
+            kind: WRONG_SPEED,
+            detail: wrong_speed(&line, cut.spindle_rpm, tool.teeth.max(1)),
+        });
+    }
+    Ok(CutAnalysis {
+        cut: cut_index,
+        id: cut.id.clone(),
+        process: cut.geometry.process(),
+        spindle_rpm: cut.spindle_rpm,
+        cutting_speed_m_per_min: cutting_speed_m_per_min(
+            cut_diameter_mm(tool, &cut.geometry),
+            cut.spindle_rpm,
+        ),
+        feed_mm: feed_mm(&cut.geometry),
+        record_s: seconds(&(0..samples)),
+        air_before_s: phases.air.before.as_ref().map(seconds),
+        air_after_s: phases.air.after.as_ref().map(seconds),
+        steady_s: seconds(&steady),
+        steady_given,
+        revolutions,
+        averages: in_tool_axes(trials.tool_from_dyno, &channels),
+        channels,
+        tooth_line,
+        spindle: None,
+        notices,
+    })
+}
+
+/// Part of the steady window that may be clipped without much harm.
+const CLIPPED_AT_MOST: f64 = 1e-3;
+/// Is so much of the channel clipped in the steady window that its average is wrong?
+fn is_spoilt(
+    channel: &UsableChannel,
+    clipping: &Clipping,
+    steady: &Range<usize>,
+    record: &TimeRecord,
+    notices: &mut Vec<Notice>,
+) -> bool {
+    let axis = channel.0;
+    let all: usize = clipping.plateaus.iter().map(Range::len).sum();
+    let inside = clipping.samples_in(steady);
+    let share = inside as f64 / steady.len().max(1) as f64;
+    let first = clipping.plateaus.first().map_or(0, |p| p.start);
+    let spoilt = share > CLIPPED_AT_MOST;
+    notices.push(Notice {
+        kind: if spoilt { CLIPPED } else { CLIPPED_ELSEWHERE },
+        detail: format!(
+            "{}: {all} samples at {} {} from {:.3} s on, {:.1} % of the steady window",
+            axis.label(),
+            figures(clipping.level, 4),
+            axis.unit(),
+            record.start_s + first as f64 / record.sample_rate_hz,
+            100.0 * share
+        ),
+    });
+    spoilt
+}
+
+/// `the tooth-passing line stands at 61.3 Hz, 1200 rpm × 2 teeth would put it at 40.0 Hz: …`
+fn wrong_speed(line: &ToothLine, spindle_rpm: f64, teeth: usize) -> String {
+    let hz = line.tooth_hz;
+    let as_teeth = 60.0 * hz / spindle_rpm;
+    let whole = as_teeth.round();
+    let other_tool = if whole >= 1.0 && (as_teeth - whole).abs() < 0.01 * whole && whole != teeth as f64 {
+        format!(", or the tool has {whole} teeth")
+    } else {
+        String::new()
+    };
+    format!(
+        "the tooth-passing line stands at {hz:.1} Hz, {spindle_rpm} rpm × {teeth} teeth would put it at {:.1} Hz: the spindle ran at \
+         about {:.0} rpm{other_tool}",
+        spindle_rpm / 60.0 * teeth as f64,
+        60.0 * hz / teeth as f64
+    )
+}
+
+type UsableChannel<'a> = (ForceAxis, &'a str, &'a [f64]);
+
+fn usable_channels<'a>(
+    record: &'a TimeRecord,
+    process: Process,
+    notices: &mut Vec<Notice>,
+) -> Vec<UsableChannel<'a>> {
+    let roles = [
+        ChannelRole::ForceX,
+        ChannelRole::ForceY,
+        ChannelRole::ForceZ,
+        ChannelRole::TorqueZ,
+    ];
+    let mut usable = Vec::new();
+    for (axis, role) in ForceAxis::ALL.into_iter().zip(roles) {
+        let notice = |kind| Notice {
+            kind,
+            detail: axis.label().to_string(),
+        };
+        let Some(channel) = record.channel(role) else {
+            if ForceAxis::of(process).contains(&axis) {
+                notices.push(notice(CHANNEL_MISSING));
+            }
+            continue;
+        };
+        let values = channel.samples.as_slice();
+        if !values.iter().all(|v| v.is_finite()) {
+            notices.push(notice(CHANNEL_BROKEN));
+        } else if values.iter().all(|v| Some(v) == values.first()) {
+            notices.push(notice(CHANNEL_DEAD));
+        } else {
+            usable.push((axis, channel.name.as_str(), values));
+        }
+    }
+    usable
+}
+
+fn phases(
+    cut: &Cut,
+    tool: &Tool,
+    record: &TimeRecord,
+    usable: &[UsableChannel],
+    samples_per_revolution: f64,
+) -> Result<(Phases, bool)> {
+    let rate = record.sample_rate_hz;
+    let entry = DrillGeometry::new(tool, &cut.geometry).ok().and_then(|g| {
+        let feed_mm_per_s = g.feed_per_rev_mm * cut.spindle_rpm / 60.0;
+        (feed_mm_per_s > 0.0).then(|| g.entry_travel_mm() / feed_mm_per_s * rate)
+    });
+    // A drill's side forces say nothing of its engagement.
+    let carriers = ForceAxis::of(cut.geometry.process());
+    let mut carrying: Vec<&[f64]> = usable
+        .iter()
+        .filter(|c| carriers.contains(&c.0))
+        .map(|c| c.2)
+        .collect();
+    if carrying.is_empty() {
+        carrying = usable.iter().map(|c| c.2).collect();
+    }
+    let spindle = Spindle {
+        samples_per_revolution,
+        teeth: tool.teeth,
+    };
+    let found = find_phases(&carrying, spindle, entry);
+    let Some([from, to]) = cut.steady_s else {
+        let found = found.ok_or_else(|| {
+            InputError::new("no steady cut found in the record")
+                .file(&cut.file)
+                .remedy("record longer, or give steady_s = [from, to] for this cut")
+        })?;
+        return Ok((found, false));
+    };
+    let sample = |t: f64| (t - record.start_s) * rate;
+    let steady = if sample(from) >= -0.5 && sample(to) <= record.len() as f64 + 0.5 {
+        whole_revolutions(sample(from)..sample(to), samples_per_revolution, record.len())
+    } else {
+        0..0
+    };
+    if steady.is_empty() {
+        let end = record.start_s + record.len() as f64 / rate;
+        return Err(InputError::new(format!(
+            "steady_s = [{from}, {to}] holds no whole revolution of the record, which runs from {} to {end} s",
+            record.start_s
+        ))
+        .file(&cut.file)
+        .key("steady_s")
+        .into());
+    }
+    // What is said to be steady is not air, whatever was found.
+    let air = found.map(|p| p.air).unwrap_or_default();
+    let air = Air {
+        before: air.before.filter(|r| r.end <= steady.start),
+        after: air.after.filter(|r| r.start >= steady.end),
+    };
+    let cutting = steady.clone();
+    Ok((Phases { air, cutting, steady }, true))
+}
+
+/// Change of the force over the steady window that is worth telling, as a part of it.
+const UNSTEADY: f64 = 0.1;
+
+/// Does the force (root mean square about zero, turn by turn) change over the window? Without air its fluctuation does.
+fn unsteady_notice(
+    usable: &[UsableChannel],
+    channels: &[ChannelAnalysis],
+    steady: &Range<usize>,
+    samples_per_revolution: f64,
+    record: &TimeRecord,
+    notices: &mut Vec<Notice>,
+) {
+    let mut squares: Vec<f64> = Vec::new();
+    for ((axis, _, values), channel) in usable.iter().zip(channels) {
+        if *axis == ForceAxis::Mz {
+            continue;
+        }
+        let has_zero = channel.drift.air_before || channel.drift.air_after;
+        let zero = |i: usize| {
+            channel
+                .drift
+                .at(record.start_s + i as f64 / record.sample_rate_hz)
+        };
+        let compensated: Vec<f64> = steady.clone().map(|i| values[i] - zero(i)).collect();
+        let turns = SignalBlocks::new(&compensated, samples_per_revolution);
+        squares.resize(turns.len(), 0.0);
+        for (k, square) in squares.iter_mut().enumerate() {
+            let level = if has_zero { turns.mean[k] } else { 0.0 };
+            *square += turns.std_dev[k].powi(2) + level * level;
+        }
+    }
+    let loudness: Vec<f64> = squares.into_iter().map(f64::sqrt).collect();
+    let change = signal::change(&loudness);
+    if change.abs() > UNSTEADY {
+        notices.push(Notice {
+            kind: UNSTEADY_CUT,
+            detail: format!("by {:+.0} %", 100.0 * change),
+        });
+    }
+}
+
+/// Orders of a longer window are taken from its start.
+const MOST_SAMPLES: usize = 1 << 17;
+
+#[allow(clippy::too_many_arguments)]
+fn teeth_notice(
+    trials: &CuttingTrials,
+    cut: &Cut,
+    channels: &[ChannelAnalysis],
+    usable: &[UsableChannel],
+    steady: &Range<usize>,
+    record: &TimeRecord,
+    notices: &mut Vec<Notice>,
+) {
+    let Some(milling) = MillingCut::new(trials.tool, &cut.geometry).filter(|m| m.teeth > 1) else {
+        return;
+    };
+    let rate = record.sample_rate_hz;
+    let window = steady.start..steady.end.min(steady.start + MOST_SAMPLES);
+    let per_turn = rate * 60.0 / cut.spindle_rpm;
+    if highest_order(per_turn, milling.teeth) < milling.teeth {
+        return;
+    }
+    let of_channel = |axis: ForceAxis| -> Option<(Vec<Complex64>, f64, bool)> {
+        let values = usable.iter().find(|c| c.0 == axis)?.2;
+        let channel = channels.iter().find(|c| c.axis == axis)?;
+        let spectrum = signal::order_spectrum(&values[window.clone()], rate, per_turn, milling.teeth)?;
+        let has_zero = channel.drift.air_before || channel.drift.air_after;
+        Some((spectrum.coefficient, channel.mean.average.value, has_zero))
+    };
+    let recorded = [ForceAxis::X, ForceAxis::Y, ForceAxis::Z].map(of_channel);
+    let (mut orders, mut mean, mut zero_is_known) = (
+        [0, 1].map(|_| vec![Complex64::ZERO; milling.teeth]),
+        [0.0; 2],
+        true,
+    );
+    for (axis, row) in trials.tool_from_dyno.iter().take(2).enumerate() {
+        for (weight, channel) in row.iter().zip(&recorded).filter(|(w, _)| **w != 0.0) {
+            let Some((own, value, has_zero)) = channel else {
+                return;
+            };
+            for (sum, o) in orders[axis].iter_mut().zip(own) {
+                *sum += o * *weight;
+            }
+            mean[axis] += weight * value;
+            zero_is_known &= has_zero;
+        }
+    }
+    if let Some(part) = idle_tooth(&milling, [&orders[0], &orders[1]], mean, zero_is_known) {
+        notices.push(Notice {
+            kind: IDLE_TOOTH,
+            detail: format!("{:.0} % of what a missing tooth makes", 100.0 * part),
+        });
+    }
+}
+
+/// A hole's cutting time is known from its geometry.
+fn duration_notice(cut: &Cut, tool: &Tool, phases: &Phases, rate: f64, notices: &mut Vec<Notice>) {
+    let CutGeometry::Drilling {
+        hole_depth_mm: Some(depth),
+        ..
+    } = cut.geometry
+    else {
+        return;
+    };
+    let (Ok(g), true) = (
+        DrillGeometry::new(tool, &cut.geometry),
+        phases.air.before.is_some() && phases.air.after.is_some(),
+    ) else {
+        return;
+    };
+    let expected_s = (g.entry_travel_mm() + depth) / (g.feed_per_rev_mm * cut.spindle_rpm / 60.0);
+    let took_s = phases.cutting.len() as f64 / rate;
+    // A dwell at the bottom is usual; half the time again is not.
+    if expected_s.is_finite() && !(0.9..1.5).contains(&(took_s / expected_s)) {
+        notices.push(Notice {
+            kind: WRONG_DURATION,
+            detail: format!("{took_s:.2} s against {expected_s:.2} s"),
+        });
+    }
+}
+
+fn trace(values: &[f64], record: &TimeRecord) -> Trace {
+    let stretch = values.len().div_ceil(TRACE_POINTS).max(1);
+    let mut trace = Trace {
+        time_s: Vec::new(),
+        min: Vec::new(),
+        max: Vec::new(),
+    };
+    for (k, part) in values.chunks(stretch).enumerate() {
+        let middle = (k * stretch) as f64 + 0.5 * (part.len() - 1) as f64;
+        trace.time_s.push(record.start_s + middle / record.sample_rate_hz);
+        trace.min.push(part.iter().copied().fold(f64::INFINITY, f64::min));
+        trace
+            .max
+            .push(part.iter().copied().fold(f64::NEG_INFINITY, f64::max));
+    }
+    trace
+}

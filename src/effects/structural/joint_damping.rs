@@ -1,0 +1,101 @@
+use crate::data::RobotSpec;
+use crate::effects::Background;
+use crate::effects::background::EWINS;
+use crate::effects::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
+use crate::parameter::{Parameter, Prior, Scale};
+use crate::robot::{Chain, Dual, Role};
+
+/// Damping sits in the joints (viscous, one coefficient each), beside what is left of the one ratio for all modes.
+///
+/// The common ratio is multiplied by `common_share`: 0 where all damping sits in the joints, 1 in the model without the
+/// effect, so that the one model is a special case of the other. A share a little below zero is an estimate of zero with
+/// its error; kept at zero it would be no estimate and would bias the dampers.
+pub struct JointDamping;
+
+/// Damping time c/k that a few per cent of critical damping means at a robot's first modes, s.
+const DAMPING_TIME_S: f64 = 1.2e-3;
+
+impl StructuralEffect for JointDamping {
+    fn id(&self) -> &'static str {
+        "joint-damping"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "Damping sits in the joints: a viscous damper beside each gear, instead of one damping ratio for all modes."
+    }
+
+    fn fingerprint(&self) -> &'static str {
+        "Frequencies fit, peak heights do not: some modes are too sharp, others too flat, and high modes are damped far \
+         more than low ones."
+    }
+
+    fn background(&self) -> Background {
+        Background {
+            lab_check: "Compare the damping ratios of all modes that `lobestone modal` finds: structural damping keeps them about \
+             equal, joint friction makes them rise with frequency. Repeat warm and cold: grease changes it.",
+            typical: "Industrial robots at standstill: 1 to 5 % of critical in the lowest modes, more in those above.",
+            sources: &[
+                "Caughey, T. K.; O'Kelly, M. E. J. (1965): Classical normal modes in damped linear dynamic systems. \
+                 ASME Journal of Applied Mechanics 32(3).",
+                EWINS,
+            ],
+        }
+    }
+
+    fn sites(&self, _robot: &RobotSpec) -> Vec<Site> {
+        vec![Site::Everywhere]
+    }
+
+    fn parameters(&self, robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
+        let dampers = robot.joints.iter().enumerate().map(|(i, joint)| {
+            let nominal = DAMPING_TIME_S / joint.compliance_rad_per_nm;
+            Parameter {
+                name: format!("c_nms_per_rad[{i}]"),
+                unit: "N·m·s/rad",
+                scale: Scale::Logarithmic,
+                nominal,
+                prior: Some(Prior {
+                    mean: nominal.ln(),
+                    std: 1.5,
+                }),
+                bounds: [1e-3 * nominal, 1e3 * nominal],
+            }
+        });
+        let share = Parameter {
+            name: "common_share".into(),
+            unit: "1",
+            scale: Scale::Linear,
+            nominal: 0.0,
+            prior: Some(Prior { mean: 0.0, std: 1.0 }),
+            bounds: [-0.5, 1.5],
+        };
+        dampers.chain([share]).collect()
+    }
+
+    fn starts(&self, robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
+        let at = |factor: f64| {
+            let c = move |j: &crate::data::JointSpec| factor * DAMPING_TIME_S / j.compliance_rad_per_nm;
+            robot.joints.iter().map(c)
+        };
+        let with = |factor: f64, share: f64| at(factor).chain([share]).collect();
+        vec![with(0.4, 0.0), with(2.5, 0.0), with(0.05, 1.0)]
+    }
+
+    fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {
+        let (_, dampers) = parameters.split_last()?;
+        let still = dampers.iter().map(|p| NEGLIGIBLE * p.nominal);
+        Some(still.chain([1.0]).collect())
+    }
+
+    fn apply(&self, _site: Site, _variant: usize, values: &[Dual], _setting: &Setting, chain: &mut Chain) {
+        let Some((share, dampers)) = values.split_last() else {
+            return;
+        };
+        chain.modal_damping_ratio = &chain.modal_damping_ratio * share;
+        for element in &mut chain.elements {
+            if let Role::Joint(i) = element.role {
+                element.damping = dampers.get(i - 1).cloned();
+            }
+        }
+    }
+}

@@ -1,0 +1,86 @@
+use nalgebra::Vector3;
+
+use crate::data::RobotSpec;
+use crate::effects::Background;
+use crate::effects::background::TUTTLE;
+use crate::effects::effect::{DataSummary, Setting, Site, StructuralEffect};
+use crate::parameter::{Parameter, Prior, Scale};
+use crate::robot::{Chain, Dual, Role};
+
+/// Gear stiffness rises with the static gravity torque: k (1 + beta |tau| / 1 kN·m) at every joint.
+pub struct LoadDependentStiffness;
+
+const GRAVITY_M_PER_S2: f64 = 9.81;
+
+impl StructuralEffect for LoadDependentStiffness {
+    fn id(&self) -> &'static str {
+        "load-dependent-stiffness"
+    }
+
+    fn explanation(&self) -> &'static str {
+        "Gears are stiffer under load: each joint's stiffness rises with the static torque that gravity puts on it."
+    }
+
+    fn fingerprint(&self) -> &'static str {
+        "One set of joint stiffnesses cannot serve all postures: where the arm reaches far out the modes lie too high for \
+         the model, where it hangs straight too low."
+    }
+
+    fn background(&self) -> Background {
+        Background {
+            lab_check: "Measure the joint's twist under a rising torque, both ways, with the brake set: the curve is flat about \
+             zero and steepens. Or measure FRFs at two postures that load the joint differently and else look alike.",
+            typical: "Strain-wave gears gain a factor 1.5 to 4 from small to full torque (makers give three stiffnesses K1, \
+             K2, K3). Cycloidal (RV) gears of large robots are nearly straight once their lost motion is taken up.",
+            sources: &[TUTTLE],
+        }
+    }
+
+    fn sites(&self, _robot: &RobotSpec) -> Vec<Site> {
+        vec![Site::Everywhere]
+    }
+
+    fn obstacle(&self, _robot: &RobotSpec, data: &DataSummary) -> Option<String> {
+        (data.postures < 2).then(|| "one posture shows one load only".to_string())
+    }
+
+    fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
+        vec![Parameter {
+            name: "beta".into(),
+            unit: "1",
+            scale: Scale::Linear,
+            nominal: 0.05,
+            prior: Some(Prior { mean: 0.0, std: 0.5 }),
+            bounds: [0.0, 3.0],
+        }]
+    }
+
+    fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
+        vec![vec![0.2]]
+    }
+
+    fn vanishing(&self, _parameters: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vec![0.0])
+    }
+
+    fn order(&self) -> u8 {
+        2
+    }
+
+    fn apply(&self, _site: Site, _variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {
+        for i in 1..=setting.robot.joint_count() {
+            let axis = setting.kinematics.joint_axis(i);
+            let origin = setting.kinematics.joint_origin(i);
+            let mut torque = Dual::constant(0.0);
+            for body in chain.bodies.iter().filter(|b| b.place.link >= i) {
+                let weight = Vector3::new(0.0, 0.0, -GRAVITY_M_PER_S2 * body.mass_kg);
+                let moment = (body.com - origin).cross(&weight).dot(&axis);
+                torque = &torque + &body.scale.scale(moment);
+            }
+            let factor = &Dual::constant(1.0) + &(&values[0] * &torque.abs().scale(1e-3));
+            for element in chain.elements.iter_mut().filter(|e| e.role == Role::Joint(i)) {
+                element.stiffness = &element.stiffness * &factor;
+            }
+        }
+    }
+}

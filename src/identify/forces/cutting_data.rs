@@ -1,0 +1,490 @@
+//! Force records arranged for fitting a waveform: order spectra of the steady cut, levels of air and cut, lines off the
+//! tooth-passing comb, each with its noise.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::cutting::waveform::{DrillTerm, DrillingCut, MillingCut, UnitForces};
+use crate::cutting::{CutAnalysis, EdgeBit, ForceAxis, engaged_edge, feed_mm};
+use crate::data::{ChannelRole, Cut, Process, TimeRecord, Tool};
+use crate::effects::cutting::{CutSetting, CuttingSummary};
+use crate::identify::forces::cutting_windows::Windows;
+pub use crate::identify::forces::force_channel::ForceChannel;
+use crate::identify::forces::force_channel::{force_channel, sample_std, widen_for_vibration};
+use crate::identify::forces::off_comb::{OffComb, StandingLine, find_vibration, standing_lines};
+use crate::signal::{highest_order, line_amplitude, order_spectrum};
+use crate::{Error, InputError, Result};
+
+/// What was cut.
+#[derive(Debug, Clone)]
+pub enum CutKind {
+    /// With an end mill.
+    Milling {
+        /// Tool and engagement.
+        cut: MillingCut,
+        /// Closed-form forces for one unit of each coefficient, up to the cut's highest order.
+        unit: Box<UnitForces>,
+    },
+    /// With a twist drill.
+    Drilling {
+        /// Drill and hole.
+        cut: DrillingCut,
+        /// First contact lies in here, s.
+        contact_s: [f64; 2],
+    },
+    /// On a lathe.
+    Turning {
+        /// The edge in the work, bit by bit.
+        edge: Vec<EdgeBit>,
+    },
+}
+
+/// One cut as data.
+#[derive(Debug, Clone)]
+pub struct CutData {
+    /// Index into `Campaign::cuts`.
+    pub cut: usize,
+    /// Its id.
+    pub id: String,
+    /// Rotation of the spindle, 1/min.
+    pub spindle_rpm: f64,
+    /// At the tool's diameter (turning: the workpiece's), m/min.
+    pub cutting_speed_m_per_min: f64,
+    /// Per tooth (milling), per revolution (drilling, turning).
+    pub feed_mm: f64,
+    /// What effects on it need to know.
+    pub setting: CutSetting,
+    /// Place in the sequence of cuts, where the campaign says it.
+    pub order: Option<i64>,
+    /// Tool, engagement and forces.
+    pub kind: CutKind,
+    /// Recorded x, y, z, torque; `None` where there is no usable channel or the process puts no force on it.
+    pub channels: [Option<ForceChannel>; 4],
+    /// Highest order of the spectra; 0 for drilling and turning.
+    pub orders: usize,
+    /// Start and end of each block, s from the middle of the record.
+    pub block_s: Vec<[f64; 2]>,
+    /// Blocks of full engagement.
+    pub steady: Range<usize>,
+    /// Lines off the tooth-passing comb; `None` where none stands out (and for drilling and turning).
+    pub vibration: Option<OffComb>,
+    /// What stands above the noise beside the orders (drilling and turning: orders and all).
+    pub lines: Vec<StandingLine>,
+}
+
+impl CutData {
+    /// One cut, the `index`-th of all, from its record and what was read off it.
+    ///
+    /// # Errors
+    /// No channel that carries the cutting force over two revolutions or more; a tool that cannot have made the cut.
+    pub fn new(
+        tool: &Tool,
+        (index, cut): (usize, &Cut),
+        record: &TimeRecord,
+        analysis: &CutAnalysis,
+    ) -> Result<CutData> {
+        let rate = record.sample_rate_hz;
+        let per_turn = rate * 60.0 / cut.spindle_rpm;
+        let window = Windows::new(analysis, record, per_turn);
+        let milling = MillingCut::new(tool, &cut.geometry);
+        let orders = match &milling {
+            Some(m) => highest_order(per_turn, (ORDERS_PER_TOOTH * m.teeth).min(MOST_ORDERS)),
+            None => 0,
+        };
+        let mut spectra = Vec::new();
+        let mut channels: [Option<ForceChannel>; 4] = std::array::from_fn(|i| {
+            let axis = ForceAxis::ALL[i];
+            // A drill puts nothing on the lateral channels; what they show is its wobble.
+            if !ForceAxis::of(cut.geometry.process()).contains(&axis) {
+                return None;
+            }
+            let channel = analysis.channels.iter().find(|c| c.axis == axis)?;
+            let role = [
+                ChannelRole::ForceX,
+                ChannelRole::ForceY,
+                ChannelRole::ForceZ,
+                ChannelRole::TorqueZ,
+            ][i];
+            let values = record.channel(role)?.samples.as_slice();
+            let zeroed: Vec<f64> = values
+                .iter()
+                .enumerate()
+                .map(|(k, v)| v - channel.drift.at(record.start_s + k as f64 / rate))
+                .collect();
+            let spectrum = order_spectrum(&zeroed[window.steady.clone()], rate, per_turn, orders)?;
+            let air_std = window
+                .air()
+                .map(|r| sample_std(&values[r]))
+                .filter(|s| *s > 0.0)
+                .fold(0.0, f64::max);
+            let quiet = window.air().max_by_key(|r| r.len());
+            let hum: Vec<(f64, f64)> = MAINS_HZ
+                .iter()
+                .map(|hz| {
+                    (
+                        *hz,
+                        quiet
+                            .clone()
+                            .map_or(0.0, |r| line_amplitude(&values[r], rate, *hz)),
+                    )
+                })
+                .collect();
+            let channel = force_channel(
+                values,
+                &zeroed,
+                rate,
+                &window,
+                &spectrum,
+                air_std,
+                &hum,
+                cut.spindle_rpm / 60.0,
+            );
+            spectra.push((i, spectrum, quiet.map(|r| values[r].to_vec()).unwrap_or_default()));
+            channel
+        });
+        if channels.iter().all(Option::is_none) {
+            return Err(Error::computation(
+                "no channel that carries the cutting force over two revolutions or more",
+            ));
+        }
+        let kind = match milling {
+            Some(m) => CutKind::Milling {
+                unit: Box::new(m.closed_form(orders)),
+                cut: m,
+            },
+            None if cut.geometry.process() == Process::Turning => CutKind::Turning {
+                edge: engaged_edge(tool, &cut.geometry)?,
+            },
+            None => {
+                let drill = DrillingCut::new(tool, &cut.geometry, cut.spindle_rpm)?;
+                let middle = window.middle_s;
+                let earliest = analysis
+                    .air_before_s
+                    .map_or(analysis.record_s[0] - 2.0 * drill.entry_s(), |a| a[0]);
+                CutKind::Drilling {
+                    contact_s: [earliest - middle, analysis.steady_s[0] - middle],
+                    cut: drill,
+                }
+            }
+        };
+        let vibration = match &kind {
+            CutKind::Milling { cut: m, .. } => {
+                find_vibration(&spectra, rate, cut.spindle_rpm / 60.0, m.teeth)
+            }
+            CutKind::Drilling { .. } | CutKind::Turning { .. } => None,
+        };
+        if let (Some(vibration), CutKind::Milling { cut: m, .. }) = (&vibration, &kind) {
+            for (i, channel) in channels.iter_mut().enumerate() {
+                if let Some(channel) = channel {
+                    widen_for_vibration(channel, vibration, i, m.teeth, window.steady_blocks());
+                }
+            }
+        }
+        let lines = standing_lines(&spectra, rate, cut.spindle_rpm / 60.0, orders > 0);
+        let mut data = CutData {
+            cut: index,
+            id: cut.id.clone(),
+            spindle_rpm: cut.spindle_rpm,
+            cutting_speed_m_per_min: analysis.cutting_speed_m_per_min,
+            feed_mm: feed_mm(&cut.geometry),
+            setting: CutSetting {
+                process: cut.geometry.process(),
+                progress: 0.0,
+                speed_ratio: 1.0,
+                feed_mm: feed_mm(&cut.geometry),
+                has_vibration: vibration.is_some(),
+            },
+            order: cut.order,
+            kind,
+            channels,
+            orders,
+            block_s: window.block_s(record),
+            steady: window.steady_blocks(),
+            vibration,
+            lines,
+        };
+        data.narrow_contact();
+        Ok(data)
+    }
+
+    /// Rotation of the spindle, 1/s.
+    pub fn spindle_hz(&self) -> f64 {
+        self.spindle_rpm / 60.0
+    }
+
+    /// Narrows the range of the first contact (drilling): where a zero line and the shape of entry and hole, each of a
+    /// size of its own, fit the levels best, and a margin for what effects add to the shape.
+    fn narrow_contact(&mut self) {
+        let CutKind::Drilling {
+            cut: drill,
+            contact_s,
+        } = &self.kind
+        else {
+            return;
+        };
+        let block = self.block_s.first().map_or(0.0, |b| b[1] - b[0]);
+        let misfit = |contact: f64| -> f64 {
+            let terms = [
+                (ForceAxis::Z, DrillTerm::Thrust),
+                (ForceAxis::Mz, DrillTerm::Torque),
+            ];
+            let channels = terms.iter().filter_map(|(axis, term)| {
+                let channel = self.channels[axis.index()].as_ref()?;
+                let shape = |b: usize| {
+                    let [from, to] = self.block_s[b];
+                    if b < self.steady.end {
+                        drill.mean(*term, from, to, contact).0
+                    } else {
+                        0.0
+                    }
+                };
+                let basis = DMatrix::from_fn(channel.level.len(), 3, |b, k| {
+                    let value = [1.0, 0.5 * (self.block_s[b][0] + self.block_s[b][1]), shape(b)][k];
+                    value / channel.level_std[b]
+                });
+                let level = DVector::from_fn(channel.level.len(), |b, _| {
+                    channel.level[b] / channel.level_std[b]
+                });
+                let solution = (basis.transpose() * &basis)
+                    .cholesky()?
+                    .solve(&(basis.transpose() * &level));
+                Some((level - basis * solution).norm_squared())
+            });
+            channels.sum()
+        };
+        let [low, high] = *contact_s;
+        let steps = ((high - low) / block.max(1e-3)).ceil().clamp(20.0, 200.0);
+        let at = |k: f64| low + (high - low) * k / steps;
+        let best = (0..=steps as usize)
+            .map(|k| (misfit(at(k as f64)), at(k as f64)))
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map_or(low, |best| best.1);
+        let margin = 0.15 * drill.entry_s() + 3.0 * block;
+        let range = [(best - margin).max(low), (best + margin).min(high)];
+        if range[1] > range[0]
+            && let CutKind::Drilling { contact_s, .. } = &mut self.kind
+        {
+            *contact_s = range;
+        }
+    }
+
+    /// Mean steady level of a channel above its first blocks.
+    fn mean_above_air(&self, channel: usize) -> Option<f64> {
+        let level = &self.channels[channel].as_ref()?.level;
+        let of = |r: Range<usize>| {
+            let n = r.len().max(1) as f64;
+            level.get(r).map_or(0.0, |l| l.iter().sum::<f64>() / n)
+        };
+        let before = self.steady.start.min(5);
+        Some(of(self.steady.clone()) - if before > 0 { of(0..before) } else { 0.0 })
+    }
+
+    /// Numbers compared in this cut, less the zero lines and the phase (or contact) fitted to it.
+    pub fn value_count(&self) -> usize {
+        let channels = self.channels.iter().flatten();
+        let own: usize = channels
+            .map(|c| (2 * c.orders.len() + c.level.len()).saturating_sub(2))
+            .sum();
+        (own + self.vibration.as_ref().map_or(0, OffComb::value_count)).saturating_sub(1)
+    }
+}
+
+/// The cuts of one process.
+#[derive(Debug, Clone)]
+pub struct CuttingData {
+    /// Of all its cuts.
+    pub process: Process,
+    /// In the campaign's order.
+    pub cuts: Vec<Arc<CutData>>,
+    /// F_tool = A F_recorded, and its inverse.
+    pub tool_from_dyno: [[f64; 3]; 3],
+    /// Rows of the inverse: F_recorded = A⁻¹ F_tool.
+    pub dyno_from_tool: [[f64; 3]; 3],
+    /// What a torque counts as where forces and torques are added up, N per N·m: thrusts and torques are equally large then.
+    pub force_per_torque: f64,
+    /// What effects need to know of the cuts.
+    pub summary: CuttingSummary,
+    /// Cuts left out, with the reason.
+    pub warnings: Vec<String>,
+}
+
+/// Orders kept for each tooth, and in all.
+const ORDERS_PER_TOOTH: usize = 24;
+const MOST_ORDERS: usize = 96;
+const MAINS_HZ: [f64; 2] = [50.0, 60.0];
+
+/// The processes of `cuts`, the one with more cuts first.
+pub fn processes(cuts: &[Cut]) -> Vec<Process> {
+    let count = |p| cuts.iter().filter(|c| c.geometry.process() == p).count();
+    let mut all = Process::ALL.to_vec();
+    all.retain(|p| count(*p) > 0);
+    all.sort_by_key(|p| std::cmp::Reverse(count(*p)));
+    all
+}
+
+impl CuttingData {
+    /// The cuts of one process, each read by [`CutData::new`]: turns a torque that is counted the other way round, and
+    /// places each cut in the sequence and in the range of speeds. `teeth`: of the tool. `tool_from_dyno`: rows of A in
+    /// F_tool = A F_recorded.
+    ///
+    /// # Errors
+    /// A `tool_from_dyno` that cannot be inverted.
+    pub fn new(
+        process: Process,
+        teeth: usize,
+        tool_from_dyno: [[f64; 3]; 3],
+        mut cuts: Vec<CutData>,
+    ) -> Result<Self> {
+        turn_torque(&mut cuts);
+        place_in_sequence(&mut cuts);
+        let matrix = nalgebra::Matrix3::from_fn(|i, j| tool_from_dyno[i][j]);
+        let inverse = matrix
+            .try_inverse()
+            .filter(|m| m.iter().all(|v| v.is_finite()))
+            .ok_or_else(|| {
+                InputError::new("the matrix cannot be inverted: channels are lost in it")
+                    .key("dynamometer.tool_from_dyno")
+            })?;
+        let summary = summary(process, teeth, &cuts);
+        let size = |axis: ForceAxis| -> f64 {
+            let means = cuts.iter().filter_map(|c| c.mean_above_air(axis.index()));
+            means.map(|m| m * m).sum::<f64>().sqrt()
+        };
+        let (thrust, torque) = (size(ForceAxis::Z), size(ForceAxis::Mz));
+        let force_per_torque = if thrust > 0.0 && torque > 0.0 {
+            thrust / torque
+        } else {
+            1.0
+        };
+        Ok(CuttingData {
+            force_per_torque,
+            process,
+            cuts: cuts.into_iter().map(Arc::new).collect(),
+            tool_from_dyno,
+            dyno_from_tool: std::array::from_fn(|i| std::array::from_fn(|j| inverse[(i, j)])),
+            summary,
+            warnings: Vec::new(),
+        })
+    }
+
+    /// The cuts for which `keep` holds (by index into [`CuttingData::cuts`]); the summary stays that of all.
+    pub fn filtered(&self, keep: impl Fn(usize) -> bool) -> Self {
+        let cuts = self
+            .cuts
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| keep(*i))
+            .map(|(_, c)| c.clone())
+            .collect();
+        CuttingData { cuts, ..self.clone() }
+    }
+
+    /// Numbers compared.
+    pub fn value_count(&self) -> usize {
+        self.cuts.iter().map(|c| c.value_count()).sum()
+    }
+
+    /// Channels with data, over all cuts: each brings its own zero line.
+    pub fn channel_count(&self) -> usize {
+        self.cuts
+            .iter()
+            .map(|c| c.channels.iter().flatten().count())
+            .sum()
+    }
+}
+
+/// Torque opposes rotation; where all of it is negative the amplifier counts it the other way round.
+fn turn_torque(cuts: &mut [CutData]) {
+    let torque = ForceAxis::Mz.index();
+    let means: Vec<f64> = cuts.iter().filter_map(|c| c.mean_above_air(torque)).collect();
+    if means.is_empty() || means.iter().any(|m| *m >= 0.0) {
+        return;
+    }
+    for channel in cuts.iter_mut().filter_map(|c| c.channels[torque].as_mut()) {
+        channel
+            .level
+            .iter_mut()
+            .chain(&mut channel.integral)
+            .for_each(|v| *v = -*v);
+    }
+}
+
+/// Where each cut stands in the sequence and in the range of speeds.
+fn place_in_sequence(cuts: &mut [CutData]) {
+    let orders: Vec<i64> = cuts.iter().filter_map(|c| c.order).collect();
+    let (first, last) = (orders.iter().min().copied(), orders.iter().max().copied());
+    let [slow, fast] = speed_range(cuts);
+    for cut in cuts {
+        if let (Some(first), Some(last), Some(own)) = (first, last, cut.order) {
+            cut.setting.progress = if last > first {
+                (own - first) as f64 / (last - first) as f64
+            } else {
+                0.0
+            };
+        }
+        cut.setting.speed_ratio = cut.cutting_speed_m_per_min / (slow * fast).sqrt();
+    }
+}
+
+fn speed_range(cuts: &[CutData]) -> [f64; 2] {
+    let speeds = || cuts.iter().map(|c| c.cutting_speed_m_per_min);
+    [
+        speeds().fold(f64::INFINITY, f64::min),
+        speeds().fold(0.0, f64::max),
+    ]
+}
+
+fn summary(process: Process, teeth: usize, cuts: &[CutData]) -> CuttingSummary {
+    let distinct = |values: Vec<f64>| {
+        let mut sorted = values;
+        sorted.sort_by(f64::total_cmp);
+        sorted.dedup_by(|b, a| (*b - *a).abs() <= 1e-3 * a.abs());
+        sorted.len()
+    };
+    let all_ordered = cuts.iter().all(|c| c.order.is_some());
+    let mut order: Vec<i64> = cuts.iter().filter_map(|c| c.order).collect();
+    order.sort_unstable();
+    order.dedup();
+    let lines: Vec<f64> = cuts
+        .iter()
+        .filter_map(|c| c.vibration.as_ref())
+        .map(|v| v.frequency_hz)
+        .collect();
+    let holes = |full: bool| {
+        cuts.iter()
+            .filter(|c| matches!(&c.kind, CutKind::Drilling { cut, .. } if cut.full_hole == full))
+            .count()
+    };
+    let length = |c: &CutData| match (c.block_s.first(), c.block_s.last()) {
+        (Some(first), Some(last)) => last[1] - first[0],
+        _ => 0.0,
+    };
+    CuttingSummary {
+        process,
+        teeth: teeth.max(1),
+        straight_edge: cuts
+            .iter()
+            .all(|c| !matches!(&c.kind, CutKind::Milling { cut, .. } if cut.shape.is_some())),
+        cuts: cuts.len(),
+        sequence_length: if all_ordered { order.len() } else { 0 },
+        speed_m_per_min: speed_range(cuts),
+        feeds: distinct(cuts.iter().map(|c| c.feed_mm).collect()),
+        smallest_feed_mm: cuts.iter().map(|c| c.feed_mm).fold(f64::INFINITY, f64::min),
+        channels: std::array::from_fn(|i| cuts.iter().all(|c| c.channels[i].is_some())),
+        highest_hz: cuts
+            .iter()
+            .map(|c| c.orders as f64 * c.spindle_hz())
+            .fold(0.0, f64::max),
+        air_on_both_sides: cuts
+            .iter()
+            .all(|c| c.steady.start > 3 && c.block_s.len() > c.steady.end + 3),
+        full_holes: holes(true),
+        pilot_holes: holes(false),
+        has_edge: true,
+        vibration_hz: (!lines.is_empty()).then(|| crate::signal::median(&lines)),
+        longest_record_s: cuts.iter().map(length).fold(0.0, f64::max),
+        cutting_scale_n_per_mm2: 1000.0,
+    }
+}

@@ -1,0 +1,371 @@
+//! Forces on the recorded channels, with derivatives: from the chip through frame, sensor and crosstalk.
+
+use num_complex::Complex64;
+
+use crate::cutting::waveform::{ChipLaw, DrillTerm, DrillingCut, LineForces, MillingCut, UnitForces};
+use crate::cutting::{EdgeBit, ForceAxis};
+use crate::effects::cutting::{CutPhysics, Mixing};
+use crate::identify::forces::cutting_data::CutData;
+use crate::identify::forces::off_comb::MOST_SHIFT;
+use crate::robot::Dual;
+
+/// Forces on the recorded channels with their derivatives. Milling: `[mean, re 1, im 1, re 2, …]` over the orders of
+/// rotation, at phase zero. Drilling: mean of each block. Turning: `[mean]`.
+#[derive(Debug, Clone)]
+pub struct Forces {
+    pub value: [Vec<f64>; 4],
+    /// One a parameter; empty where no derivatives were asked for.
+    pub slope: Vec<[Vec<f64>; 4]>,
+    /// By the time of first contact (drilling), per s.
+    pub contact_slope: [Vec<f64>; 4],
+}
+
+impl Forces {
+    fn zero(length: usize, parameters: usize) -> Forces {
+        let channels = || std::array::from_fn(|_| vec![0.0; length]);
+        Forces {
+            value: channels(),
+            slope: (0..parameters).map(|_| channels()).collect(),
+            contact_slope: channels(),
+        }
+    }
+
+    fn length(&self) -> usize {
+        self.value[0].len()
+    }
+
+    /// Adds `weight` times what `unit` gives for a channel and an index.
+    fn add(&mut self, channel: usize, weight: &Dual, unit: &[f64]) {
+        add_scaled(&mut self.value[channel], weight.value, unit);
+        for (slope, g) in self.slope.iter_mut().zip(&weight.gradient) {
+            add_scaled(&mut slope[channel], *g, unit);
+        }
+    }
+
+    /// x, y, z become mixtures of each other.
+    fn mix(&mut self, mixing: &Mixing) {
+        let length = self.length();
+        let before: [Vec<f64>; 3] = std::array::from_fn(|i| self.value[i].clone());
+        let turned = |set: &[Vec<f64>]| -> [Vec<f64>; 3] {
+            std::array::from_fn(|i| {
+                let mut sum = vec![0.0; length];
+                for (j, part) in set.iter().take(3).enumerate() {
+                    add_scaled(&mut sum, mixing[i][j].value, part);
+                }
+                sum
+            })
+        };
+        let put = |set: &mut [Vec<f64>; 4], new: [Vec<f64>; 3]| {
+            for (old, new) in set.iter_mut().zip(new) {
+                *old = new;
+            }
+        };
+        for (p, slope) in self.slope.iter_mut().enumerate() {
+            let mut new = turned(slope);
+            for (i, row) in mixing.iter().enumerate() {
+                for (weight, part) in row.iter().zip(&before) {
+                    add_scaled(&mut new[i], weight.derivative(p), part);
+                }
+            }
+            put(slope, new);
+        }
+        let new = turned(&self.value);
+        put(&mut self.value, new);
+    }
+
+    /// Second-order dynamics G = 1 / (1 − r² + 2iζr), r = f/f₀, on the orders of each channel.
+    fn filter(&mut self, dynamics: &[[Dual; 2]; 3], spindle_hz: f64) {
+        for (channel, [frequency, damping]) in dynamics.iter().enumerate() {
+            for n in 1..=(self.length() - 1) / 2 {
+                let r = n as f64 * spindle_hz / frequency.value;
+                let g = Complex64::from(1.0) / Complex64::new(1.0 - r * r, 2.0 * damping.value * r);
+                // dG = −G² d(1 − r² + 2iζr), dr = −r df₀/f₀
+                let by_frequency =
+                    g * g * Complex64::new(-2.0 * r, 2.0 * damping.value) * (r / frequency.value);
+                let by_damping = -g * g * Complex64::new(0.0, 2.0 * r);
+                let (re, im) = (2 * n - 1, 2 * n);
+                let at = |set: &[Vec<f64>; 4]| Complex64::new(set[channel][re], set[channel][im]);
+                let before = at(&self.value);
+                for (p, slope) in self.slope.iter_mut().enumerate() {
+                    let own = by_frequency * frequency.derivative(p) + by_damping * damping.derivative(p);
+                    let new = g * at(slope) + own * before;
+                    (slope[channel][re], slope[channel][im]) = (new.re, new.im);
+                }
+                let new = g * before;
+                (self.value[channel][re], self.value[channel][im]) = (new.re, new.im);
+            }
+        }
+    }
+}
+
+fn add_scaled(sum: &mut [f64], weight: f64, part: &[f64]) {
+    if weight != 0.0 {
+        for (s, p) in sum.iter_mut().zip(part) {
+            *s += weight * p;
+        }
+    }
+}
+
+/// `[mean, re 1, im 1, …]` of the recorded channels for one unit force law, A⁻¹ applied.
+fn recorded(unit: &[Vec<Complex64>; 3], dyno_from_tool: &[[f64; 3]; 3]) -> [Vec<f64>; 3] {
+    std::array::from_fn(|i| {
+        let count = unit[0].len();
+        let mut flat = vec![0.0; 2 * count - 1];
+        for (axis, orders) in unit.iter().enumerate() {
+            let a = dyno_from_tool[i][axis];
+            if a == 0.0 {
+                continue;
+            }
+            flat[0] += a * orders[0].re;
+            for (n, c) in orders.iter().enumerate().skip(1) {
+                flat[2 * n - 1] += a * c.re;
+                flat[2 * n] += a * c.im;
+            }
+        }
+        flat
+    })
+}
+
+/// Amplitude (N) that a vibration puts on each recorded channel at the lines shifted by −2..2 tooth-passing frequencies.
+pub(crate) type LineAmplitudes = Vec<[Dual; 3]>;
+
+/// Forces of a milling cut on the recorded channels, phase zero, up to and with crosstalk; and the lines of a vibration
+/// where the cut has one. (Runout is left out of a vibrating cut.)
+pub(crate) fn milling_forces(
+    physics: &CutPhysics,
+    cut: &CutData,
+    milling: &MillingCut,
+    unit: &UnitForces,
+    dyno_from_tool: &[[f64; 3]; 3],
+    parameters: usize,
+) -> (Forces, Option<LineAmplitudes>) {
+    let mut forces = Forces::zero(2 * cut.orders + 1, parameters);
+    let mut lines = None;
+    let add_units = |forces: &mut Forces, unit: &UnitForces| {
+        for (k, unit) in unit.iter().enumerate() {
+            for (channel, part) in recorded(unit, dyno_from_tool).iter().enumerate() {
+                forces.add(channel, &physics.coefficient[k], part);
+            }
+        }
+    };
+    // By something that the unit forces depend on: only a slope, the value does not change with the derivative.
+    let add_slopes = |forces: &mut Forces, slope: &UnitForces, by: &Dual| {
+        for (k, unit) in slope.iter().enumerate() {
+            let weight = Dual {
+                value: 0.0,
+                gradient: by
+                    .gradient
+                    .iter()
+                    .map(|g| g * physics.coefficient[k].value)
+                    .collect(),
+            };
+            for (channel, part) in recorded(unit, dyno_from_tool).iter().enumerate() {
+                forces.add(channel, &weight, part);
+            }
+        }
+    };
+    if let Some(change) = chip_change(physics, cut, milling) {
+        let exponent = physics.size_exponent.as_ref().map(|p| p.value);
+        let vibrating = milling.vibrating(
+            cut.orders,
+            exponent,
+            [change[0].value, change[1].value],
+            MOST_SHIFT as usize,
+        );
+        add_units(&mut forces, &vibrating.unit);
+        if parameters > 0 {
+            let own = [physics.size_exponent.as_ref(), Some(&change[0]), Some(&change[1])];
+            for (slope, by) in vibrating.slopes.iter().zip(own) {
+                if let Some(by) = by {
+                    add_slopes(&mut forces, slope, by);
+                }
+            }
+        }
+        lines = Some(
+            (0..vibrating.lines.len())
+                .map(|r| {
+                    let slopes = [&vibrating.line_slopes[0][r], &vibrating.line_slopes[1][r]];
+                    line_amplitudes(physics, &vibrating.lines[r], slopes, &change, dyno_from_tool)
+                })
+                .collect(),
+        );
+    } else if physics.size_exponent.is_none() && physics.runout.is_none() {
+        add_units(&mut forces, unit);
+    } else {
+        let law = ChipLaw {
+            exponent: physics.size_exponent.as_ref().map(|p| p.value),
+            runout: physics
+                .runout
+                .as_ref()
+                .map(|r| [r.offset_mm.value, r.angle_rad.value]),
+        };
+        let sampled = milling.sampled(cut.orders, law, parameters > 0);
+        add_units(&mut forces, &sampled.unit);
+        let own = [
+            physics.size_exponent.as_ref(),
+            physics.runout.as_ref().map(|r| &r.offset_mm),
+            physics.runout.as_ref().map(|r| &r.angle_rad),
+        ];
+        for (slope, by) in sampled.slopes.iter().zip(own) {
+            if let (Some(slope), Some(by)) = (slope, by) {
+                add_slopes(&mut forces, slope, by);
+            }
+        }
+    }
+    if let Some(tilt) = &physics.tilt {
+        forces.mix(tilt);
+    }
+    if let Some(dynamics) = &physics.dynamics {
+        forces.filter(dynamics, cut.spindle_hz());
+    }
+    if let Some(crosstalk) = &physics.crosstalk {
+        forces.mix(crosstalk);
+    }
+    (forces, lines)
+}
+
+/// Thrust and torque of each block with the first contact at `contact_s`.
+pub(crate) fn drilling_forces(
+    physics: &CutPhysics,
+    cut: &CutData,
+    drill: &DrillingCut,
+    contact_s: f64,
+    parameters: usize,
+) -> Forces {
+    let mut forces = Forces::zero(cut.block_s.len(), parameters);
+    let h = Dual::constant(drill.geometry.chip_thickness_mm());
+    let h = match &physics.size_exponent {
+        // h (h / reference)^−p
+        Some(p) => {
+            let log = (h.value / ChipLaw::REFERENCE_MM).ln();
+            p.scale(-log).exp().scale(h.value)
+        }
+        None => h,
+    };
+    let k = &physics.coefficient;
+    let (thrust, torque) = (ForceAxis::Z.index(), ForceAxis::Mz.index());
+    let mut terms = vec![
+        (torque, DrillTerm::Torque, &(&k[0] * &h) + &k[1]),
+        (thrust, DrillTerm::Thrust, &(&k[2] * &h) + &k[3]),
+    ];
+    if let Some(chisel) = physics.chisel_thrust_n.as_ref().filter(|_| drill.full_hole) {
+        terms.push((thrust, DrillTerm::Chisel, chisel.clone()));
+    }
+    if let Some(margin) = &physics.margin_n_per_mm {
+        terms.push((torque, DrillTerm::Margin, margin.clone()));
+    }
+    for (channel, term, weight) in terms {
+        // Air after the cut has no force.
+        let cutting = |b: usize| b < cut.steady.end;
+        let (unit, by_contact): (Vec<f64>, Vec<f64>) = cut
+            .block_s
+            .iter()
+            .enumerate()
+            .map(|(b, [from, to])| {
+                if cutting(b) {
+                    drill.mean(term, *from, *to, contact_s)
+                } else {
+                    (0.0, 0.0)
+                }
+            })
+            .unzip();
+        forces.add(channel, &weight, &unit);
+        add_scaled(&mut forces.contact_slope[channel], weight.value, &by_contact);
+    }
+    forces
+}
+
+/// Force of a turned cut on the recorded channels, the same over the whole turn, up to and with crosstalk.
+pub(crate) fn turning_forces(
+    physics: &CutPhysics,
+    edge: &[EdgeBit],
+    dyno_from_tool: &[[f64; 3]; 3],
+    parameters: usize,
+) -> Forces {
+    let mut forces = Forces::zero(1, parameters);
+    // Thickness that the chip of each bit counts as.
+    let chips = edge.iter().map(|bit| {
+        let h = Dual::constant(bit.chip_mm);
+        match &physics.size_exponent {
+            // h (h / reference)^−p
+            Some(p) if bit.chip_mm > 0.0 => {
+                let log = (bit.chip_mm / ChipLaw::REFERENCE_MM).ln();
+                p.scale(-log).exp().scale(bit.chip_mm)
+            }
+            _ => h,
+        }
+    });
+    let k = &physics.coefficient;
+    for (bit, chip) in edge.iter().zip(chips) {
+        for direction in 0..3 {
+            let along =
+                [ForceAxis::X, ForceAxis::Y, ForceAxis::Z].map(|axis| bit.directions(axis)[direction]);
+            let force = (&(&k[direction] * &chip) + &k[direction + 3]).scale(bit.length_mm);
+            for (channel, row) in dyno_from_tool.iter().enumerate() {
+                let share: f64 = row.iter().zip(along).map(|(a, d)| a * d).sum();
+                forces.add(channel, &force.scale(share), &[1.0]);
+            }
+        }
+    }
+    if let Some(tilt) = &physics.tilt {
+        forces.mix(tilt);
+    }
+    if let Some(crosstalk) = &physics.crosstalk {
+        forces.mix(crosstalk);
+    }
+    forces
+}
+
+/// Change of the chip's boundary from one tooth to the next in a vibrating cut, along x and y, mm: d (1 − e^{−iωT}).
+fn chip_change(physics: &CutPhysics, cut: &CutData, milling: &MillingCut) -> Option<[Dual; 2]> {
+    let vibration = physics.vibration.as_ref()?;
+    let tooth_hz = cut.spindle_hz() * milling.teeth as f64;
+    let seen = cut
+        .vibration
+        .as_ref()
+        .map_or(vibration.frequency_hz.value, |v| v.frequency_hz);
+    let regeneration = 2.0 * (std::f64::consts::PI * seen / tooth_hz).sin().abs();
+    let angle = &vibration.direction_rad;
+    let (s, c) = angle.value.sin_cos();
+    let amplitude = vibration.amplitude_mm.scale(regeneration);
+    Some([&amplitude * &angle.chain(c, -s), &amplitude * &angle.chain(s, c)])
+}
+
+/// Amplitudes of one line on the recorded x, y, z. `slopes`: of the unit forces by the change of the chip along x and y.
+fn line_amplitudes(
+    physics: &CutPhysics,
+    line: &LineForces,
+    slopes: [&LineForces; 2],
+    change: &[Dual; 2],
+    dyno_from_tool: &[[f64; 3]; 3],
+) -> [Dual; 3] {
+    let seen = |forces: &LineForces, k: usize, channel: usize| -> Complex64 {
+        (0..3)
+            .map(|axis| forces[k][axis] * dyno_from_tool[channel][axis])
+            .sum()
+    };
+    std::array::from_fn(|channel| {
+        // Real and imaginary part, with derivatives by the coefficients and by the change of the chip.
+        let mut parts = [Dual::constant(0.0), Dual::constant(0.0)];
+        for (k, coefficient) in physics.coefficient.iter().enumerate() {
+            let mut terms = vec![(coefficient.clone(), seen(line, k, channel))];
+            for (slope, by) in slopes.iter().zip(change) {
+                let weight = Dual {
+                    value: 0.0,
+                    gradient: by.gradient.iter().map(|g| g * coefficient.value).collect(),
+                };
+                terms.push((weight, seen(slope, k, channel)));
+            }
+            for (weight, unit) in terms {
+                parts[0] = &parts[0] + &weight.scale(unit.re);
+                parts[1] = &parts[1] + &weight.scale(unit.im);
+            }
+        }
+        let square = &(&parts[0] * &parts[0]) + &(&parts[1] * &parts[1]);
+        if square.value > 0.0 {
+            square.sqrt()
+        } else {
+            Dual::constant(0.0)
+        }
+    })
+}

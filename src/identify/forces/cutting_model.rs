@@ -1,0 +1,360 @@
+//! The cutting force model as a function of its parameters.
+
+use std::ops::Range;
+
+use crate::cutting::waveform::DrillTerm;
+use crate::cutting::{ForceAxis, coefficients_of, edge_row};
+use crate::data::Process;
+use crate::effects::cutting::{CutPhysics, CuttingInstance};
+use crate::identify::forces::cutting_data::{CutData, CutKind, CuttingData};
+use crate::parameter::{Parameter, Prior, Scale, is_vanished};
+use crate::robot::Dual;
+use crate::{Error, Result};
+
+/// Coefficients of one material and what may be tuned.
+#[derive(Debug, Clone)]
+pub struct CuttingModel {
+    /// What the coefficients are of.
+    pub process: Process,
+    /// Those of the baseline (milling and turning Ktc Krc Kac Kte Kre Kae, drilling Ktc Kte Kfc Kfe; without the edge coefficients
+    /// where the baseline has none), then those of each added effect.
+    pub parameters: Vec<Parameter>,
+    /// Whether edge coefficients are part of the baseline.
+    pub has_edge: bool,
+    effects: Vec<AddedCuttingEffect>,
+    /// Where fits start on the solver's scale; the nominal values if not given.
+    start: Option<Vec<f64>>,
+}
+
+/// An effect in the model and where its parameters stand in the list.
+#[derive(Debug, Clone)]
+pub struct AddedCuttingEffect {
+    /// The effect with its discrete choice.
+    pub instance: CuttingInstance,
+    /// Where its own parameters stand in the model's list.
+    pub parameters: Range<usize>,
+}
+
+/// A coefficient's prior is this many times wider than the largest coefficient: it only keeps the fit finite where the
+/// data say nothing.
+const PRIOR_WIDTH: f64 = 3.0;
+/// Edge coefficients are some hundredths of a millimetre times the cutting coefficients.
+const EDGE_MM: f64 = 0.05;
+
+impl CuttingModel {
+    /// The baseline for `data`, its nominal values from the mean forces.
+    pub fn new(data: &CuttingData, has_edge: bool) -> Result<Self> {
+        let kinds = coefficients_of(data.process);
+        let start = mean_force_coefficients(data, has_edge)?;
+        let scale = start.iter().fold(100.0f64, |m, v| m.max(v.abs()));
+        let parameters = kinds
+            .iter()
+            .zip(&start)
+            .filter(|(kind, _)| has_edge || !kind.edge)
+            .map(|(kind, nominal)| {
+                let size = if kind.edge { EDGE_MM * scale } else { scale };
+                Parameter {
+                    name: kind.key.into(),
+                    unit: kind.unit,
+                    scale: Scale::Linear,
+                    nominal: *nominal,
+                    prior: Some(Prior {
+                        mean: *nominal,
+                        std: PRIOR_WIDTH * size,
+                    }),
+                    bounds: [nominal - 1e3 * size, nominal + 1e3 * size],
+                }
+            })
+            .collect();
+        Ok(CuttingModel {
+            process: data.process,
+            parameters,
+            has_edge,
+            effects: Vec::new(),
+            start: None,
+        })
+    }
+
+    /// What effects are asked with: the data's summary with the scale of this model's coefficients.
+    pub fn summary(&self, data: &CuttingData) -> crate::effects::cutting::CuttingSummary {
+        let own = self.parameters.iter().take(coefficients_of(self.process).len());
+        let scale = own
+            .filter(|p| p.unit == "N/mm²")
+            .fold(1.0f64, |m, p| m.max(p.nominal.abs()));
+        crate::effects::cutting::CuttingSummary {
+            has_edge: self.has_edge,
+            cutting_scale_n_per_mm2: scale,
+            ..data.summary.clone()
+        }
+    }
+
+    /// The same model with one more effect; its parameters come last.
+    pub fn with_effect(&self, instance: CuttingInstance, data: &CuttingData) -> Self {
+        let mut model = self.clone();
+        model.start = None;
+        let first = model.parameters.len();
+        for mut parameter in instance.effect.parameters(instance.variant, &self.summary(data)) {
+            parameter.name = format!("{}.{}", instance.label(), parameter.name);
+            model.parameters.push(parameter);
+        }
+        model.effects.push(AddedCuttingEffect {
+            instance,
+            parameters: first..model.parameters.len(),
+        });
+        model
+    }
+
+    /// The effects that were added, in their order.
+    pub fn effects(&self) -> &[AddedCuttingEffect] {
+        &self.effects
+    }
+
+    /// Nominal values on the solver's scale.
+    pub fn nominal_theta(&self) -> Vec<f64> {
+        self.parameters.iter().map(|p| p.internal(p.nominal)).collect()
+    }
+
+    /// The same model, whose fits start from `theta`.
+    pub fn with_start(&self, theta: Vec<f64>) -> Self {
+        let mut model = CuttingModel {
+            start: None,
+            ..self.clone()
+        };
+        if theta.len() != model.parameters.len() {
+            return model;
+        }
+        let bounds = model.bounds();
+        let mut start: Vec<f64> = theta
+            .iter()
+            .zip(&bounds)
+            .map(|(t, b)| t.clamp(b[0], b[1]))
+            .collect();
+        for added in model.effects.iter().filter(|added| model.vanished(&theta, added)) {
+            start[added.parameters.clone()].copy_from_slice(&theta[added.parameters.clone()]);
+        }
+        model.start = Some(start);
+        model
+    }
+
+    /// Values of the effect's own parameters at which it is not there, solver's scale.
+    pub fn vanishing(&self, added: &AddedCuttingEffect) -> Option<Vec<f64>> {
+        let own = &self.parameters[added.parameters.clone()];
+        let values = added.instance.effect.vanishing(added.instance.variant, own)?;
+        Some(own.iter().zip(values).map(|(p, v)| p.internal(v)).collect())
+    }
+
+    fn vanished(&self, theta: &[f64], added: &AddedCuttingEffect) -> bool {
+        let own = added.parameters.clone();
+        self.vanishing(added)
+            .is_some_and(|limit| is_vanished(&self.parameters[own.clone()], &limit, &theta[own]))
+    }
+
+    /// Where fits start, on the solver's scale.
+    pub fn start(&self) -> Vec<f64> {
+        self.start.clone().unwrap_or_else(|| self.nominal_theta())
+    }
+
+    /// Where a fit may go, solver's scale. An effect that had vanished where the model starts is held there.
+    pub fn bounds(&self) -> Vec<[f64; 2]> {
+        let mut bounds: Vec<[f64; 2]> = self.parameters.iter().map(Parameter::internal_bounds).collect();
+        if let Some(start) = &self.start {
+            for added in self.effects.iter().filter(|added| self.vanished(start, added)) {
+                for i in added.parameters.clone() {
+                    bounds[i] = [start[i]; 2];
+                }
+            }
+        }
+        bounds
+    }
+
+    /// Free amplitudes fitted to each cut and channel beyond a straight zero line.
+    pub fn nuisances_per_channel(&self) -> usize {
+        self.effects
+            .iter()
+            .map(|e| e.instance.effect.nuisances_per_channel(e.instance.variant))
+            .sum()
+    }
+
+    fn value(&self, theta: &[f64], i: usize, derivatives: bool) -> Dual {
+        let natural = self.parameters[i].natural(theta[i]);
+        if !derivatives {
+            return Dual::constant(natural);
+        }
+        let variable = Dual::variable(theta[i], i, theta.len());
+        match self.parameters[i].scale {
+            Scale::Logarithmic => variable.chain(natural, natural),
+            Scale::Linear => variable,
+        }
+    }
+
+    /// What this cut's forces are made with, all effects applied.
+    pub fn physics(&self, theta: &[f64], cut: &CutData, derivatives: bool) -> CutPhysics {
+        let mut next = 0;
+        let coefficient = coefficients_of(self.process)
+            .iter()
+            .map(|kind| {
+                if kind.edge && !self.has_edge {
+                    return Dual::constant(0.0);
+                }
+                next += 1;
+                self.value(theta, next - 1, derivatives)
+            })
+            .collect();
+        let mut physics = CutPhysics {
+            coefficient,
+            size_exponent: None,
+            runout: None,
+            chisel_thrust_n: None,
+            margin_n_per_mm: None,
+            tilt: None,
+            dynamics: None,
+            crosstalk: None,
+            transient_s: None,
+            leak_per_s: None,
+            vibration: None,
+        };
+        let mut order: Vec<&AddedCuttingEffect> = self.effects.iter().collect();
+        order.sort_by_key(|added| added.instance.effect.order());
+        for added in order {
+            let values: Vec<Dual> = added
+                .parameters
+                .clone()
+                .map(|i| self.value(theta, i, derivatives))
+                .collect();
+            let CuttingInstance { effect, variant } = added.instance;
+            effect.apply(variant, &values, &cut.setting, &mut physics);
+        }
+        physics
+    }
+}
+
+/// Coefficients that the mean steady forces suggest, zero lines through the air; pulled towards an edge coefficient of
+/// 0.02 mm times the cutting coefficient where the data do not tell the two apart.
+fn mean_force_coefficients(data: &CuttingData, has_edge: bool) -> Result<Vec<f64>> {
+    use nalgebra::{DMatrix, DVector};
+    let kinds = coefficients_of(data.process);
+    let n = kinds.len();
+    let (mut rows, mut values) = (Vec::<Vec<f64>>::new(), Vec::new());
+    for cut in &data.cuts {
+        let means = steady_means(cut);
+        let units: Vec<[f64; 4]> = match &cut.kind {
+            CutKind::Milling { unit, .. } => (0..n)
+                .map(|k| {
+                    let mut all = [0.0; 4];
+                    for (i, row) in data.dyno_from_tool.iter().enumerate() {
+                        all[i] = (0..3).map(|axis| row[axis] * unit[k][axis][0].re).sum();
+                    }
+                    all
+                })
+                .collect(),
+            CutKind::Turning { edge } => {
+                let rows = [ForceAxis::X, ForceAxis::Y, ForceAxis::Z].map(|axis| edge_row(edge, axis));
+                (0..n)
+                    .map(|k| {
+                        let mut all = [0.0; 4];
+                        for (i, row) in data.dyno_from_tool.iter().enumerate() {
+                            all[i] = (0..3).map(|axis| row[axis] * rows[axis][k]).sum();
+                        }
+                        all
+                    })
+                    .collect()
+            }
+            CutKind::Drilling { cut: drill, .. } => {
+                let full = drill.geometry.entry_travel_mm() * 1.0000001;
+                let (thrust, torque) = (
+                    drill.at(DrillTerm::Thrust, full),
+                    drill.at(DrillTerm::Torque, full),
+                );
+                let h = drill.geometry.chip_thickness_mm();
+                vec![
+                    [0.0, 0.0, 0.0, torque * h],
+                    [0.0, 0.0, 0.0, torque],
+                    [0.0, 0.0, thrust * h, 0.0],
+                    [0.0, 0.0, thrust, 0.0],
+                ]
+            }
+        };
+        for channel in 0..4 {
+            if let Some(mean) = means[channel] {
+                let row: Vec<f64> = units.iter().map(|u| u[channel]).collect();
+                // Forces and torque of very different size count alike.
+                let size = row.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+                if size > 0.0 {
+                    rows.push(row.iter().map(|v| v / size).collect());
+                    values.push(mean / size);
+                }
+            }
+        }
+    }
+    // Columns scaled to the size a coefficient has; a faint pull to the usual ratio of edge to cutting coefficient.
+    let unit = |k: usize| if kinds[k].edge { EDGE_MM } else { 1.0 };
+    let partner = |edge: usize| {
+        if data.process == Process::Drilling {
+            edge - 1
+        } else {
+            edge - 3
+        }
+    };
+    let matrix = DMatrix::from_fn(rows.len(), n, |i, k| {
+        if kinds[k].edge && !has_edge {
+            0.0
+        } else {
+            rows[i][k] * unit(k)
+        }
+    });
+    let mut normal = matrix.transpose() * &matrix;
+    let scale = normal.diagonal().max().max(f64::MIN_POSITIVE);
+    for k in 0..n {
+        if kinds[k].edge {
+            let (c, pull) = (partner(k), 1e-6 * scale);
+            let ratio = 0.02 / EDGE_MM;
+            normal[(k, k)] += pull;
+            normal[(c, c)] += pull * ratio * ratio;
+            normal[(k, c)] -= pull * ratio;
+            normal[(c, k)] -= pull * ratio;
+        }
+        normal[(k, k)] += 1e-12 * scale;
+    }
+    let right = matrix.transpose() * DVector::from_vec(values);
+    let solution = normal
+        .cholesky()
+        .ok_or_else(|| Error::computation("the mean forces determine no coefficients"))?
+        .solve(&right);
+    Ok((0..n)
+        .map(|k| {
+            if kinds[k].edge && !has_edge {
+                0.0
+            } else {
+                solution[k] * unit(k)
+            }
+        })
+        .collect())
+}
+
+/// Mean of the steady blocks above the line through the air, by channel; without air the blocks as they are.
+fn steady_means(cut: &CutData) -> [Option<f64>; 4] {
+    let middle = |b: usize| 0.5 * (cut.block_s[b][0] + cut.block_s[b][1]);
+    let first = cut.block_s.len().min(cut.steady.start);
+    let entering = match &cut.kind {
+        // Blocks between air and steady cut: all that begin after the earliest contact may hold force.
+        CutKind::Drilling { cut: drill, .. } => {
+            let start = cut.block_s.get(cut.steady.start).map_or(0.0, |b| b[0]) - 1.2 * drill.entry_s() - 0.2;
+            (0..first).take_while(|b| cut.block_s[*b][1] < start).count()
+        }
+        CutKind::Milling { .. } | CutKind::Turning { .. } => first,
+    };
+    let air: Vec<usize> = (0..entering).chain(cut.steady.end..cut.block_s.len()).collect();
+    std::array::from_fn(|i| {
+        let level = &cut.channels[i].as_ref()?.level;
+        let (offset, slope, at) =
+            crate::signal::line(air.iter().map(|b| middle(*b)), air.iter().map(|b| level[*b]));
+        let n = cut.steady.len().max(1) as f64;
+        Some(
+            cut.steady
+                .clone()
+                .map(|b| level[b] - offset - slope * (middle(b) - at))
+                .sum::<f64>()
+                / n,
+        )
+    })
+}

@@ -1,0 +1,13 @@
+//! The cutting model and its force records.
+
+pub mod cutting_case;
+pub mod cutting_data;
+pub(crate) mod cutting_forces;
+pub mod cutting_model;
+pub mod cutting_problem;
+pub mod cutting_study;
+pub mod cutting_waves;
+pub(crate) mod cutting_windows;
+pub(crate) mod force_channel;
+pub mod off_comb;
+pub(crate) mod zero_line;

@@ -1,0 +1,187 @@
+//! A channel's zero line, fitted to each cut along with the force and taken out of the residual (variable projection, Golub
+//! & Pereyra 1973): a straight line, the transient of a warming amplifier, what a leaking one loses.
+
+use crate::effects::cutting::CutPhysics;
+use crate::identify::forces::cutting_data::{CutData, ForceChannel};
+
+/// A column that the others explain up to this share of its length is left out.
+const COLLINEAR: f64 = 1e-7;
+
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+/// A channel's zero line: an orthonormal basis of what it may be, in weighted levels.
+pub(crate) struct ZeroLine {
+    basis: Vec<Vec<f64>>,
+    pub(crate) weight: Vec<f64>,
+    /// Weighted recorded level.
+    recorded: Vec<f64>,
+    /// Loss of a leaking amplifier, weighted, per unit of its rate; empty without.
+    loss: Vec<f64>,
+    rate: f64,
+    rate_gradient: Vec<f64>,
+    /// Transient: derivative of its weighted column by τ, the gradient of τ, and 1/length of its orthogonal rest.
+    transient: Option<(Vec<f64>, Vec<f64>, f64)>,
+}
+
+impl ZeroLine {
+    pub(crate) fn new(cut: &CutData, physics: &CutPhysics, channel: &ForceChannel, index: usize) -> ZeroLine {
+        let weight: Vec<f64> = channel.level_std.iter().map(|s| 1.0 / s).collect();
+        let time: Vec<f64> = cut.block_s.iter().map(|b| 0.5 * (b[0] + b[1])).collect();
+        let weighted = |f: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            weight.iter().enumerate().map(|(b, w)| w * f(b)).collect()
+        };
+        let mut line = ZeroLine {
+            basis: Vec::new(),
+            recorded: weighted(&|b| channel.level[b]),
+            loss: Vec::new(),
+            rate: 0.0,
+            rate_gradient: Vec::new(),
+            transient: None,
+            weight: weight.clone(),
+        };
+        line.add_column(weighted(&|_| 1.0));
+        line.add_column(weighted(&|b| time[b]));
+        if let Some(rates) = &physics.leak_per_s {
+            // What leaks of a straight zero line is a parabola.
+            line.add_column(weighted(&|b| time[b] * time[b]));
+            line.loss = weighted(&|b| channel.integral[b]);
+            line.rate = rates[index].value;
+            line.rate_gradient.clone_from(&rates[index].gradient);
+        }
+        if let Some(taus) = &physics.transient_s {
+            let tau = &taus[index];
+            let start = time.first().copied().unwrap_or(0.0);
+            let since = |b: usize| (time[b] - start) / tau.value;
+            if let Some(rest) = line.add_column(weighted(&|b| (-since(b)).exp())) {
+                let slope = weighted(&|b| (-since(b)).exp() * since(b) / tau.value);
+                line.transient = Some((slope, tau.gradient.clone(), 1.0 / rest));
+            }
+        }
+        line
+    }
+
+    /// Length of what is new in the column; `None` where there is nothing new.
+    fn add_column(&mut self, mut column: Vec<f64>) -> Option<f64> {
+        let before = dot(&column, &column).sqrt();
+        for _ in 0..2 {
+            self.project(&mut column);
+        }
+        let rest = dot(&column, &column).sqrt();
+        if !(rest > COLLINEAR * before) {
+            return None;
+        }
+        column.iter_mut().for_each(|v| *v /= rest);
+        self.basis.push(column);
+        Some(rest)
+    }
+
+    /// Takes out of a weighted vector what the zero line can be.
+    pub(crate) fn project(&self, vector: &mut [f64]) {
+        for q in &self.basis {
+            let share = dot(q, vector);
+            for (v, q) in vector.iter_mut().zip(q) {
+                *v -= share * q;
+            }
+        }
+    }
+
+    /// Weighted model − recorded for force levels `level`, zero line fitted.
+    pub(crate) fn residual(&self, level: &[f64]) -> Vec<f64> {
+        let mut residual = self.raw(level);
+        self.project(&mut residual);
+        residual
+    }
+
+    fn raw(&self, level: &[f64]) -> Vec<f64> {
+        let mut raw: Vec<f64> = level
+            .iter()
+            .zip(&self.weight)
+            .zip(&self.recorded)
+            .map(|((l, w), r)| l * w - r)
+            .collect();
+        for (v, loss) in raw.iter_mut().zip(&self.loss) {
+            *v -= self.rate * loss;
+        }
+        raw
+    }
+
+    /// Derivatives of the residual by the parameters; `slope(p)`: those of the force levels.
+    pub(crate) fn slopes<'a>(
+        &self,
+        level: &[f64],
+        count: usize,
+        slope: impl Fn(usize) -> std::borrow::Cow<'a, [f64]>,
+    ) -> Vec<Vec<f64>> {
+        // Amplitude of the transient: its orthogonal rest is the last of the basis.
+        let transient =
+            self.transient
+                .as_ref()
+                .zip(self.basis.last())
+                .map(|((column, gradient, per_length), q)| {
+                    let raw = self.raw(level);
+                    (column, gradient, -dot(q, &raw) * per_length)
+                });
+        (0..count)
+            .map(|p| {
+                let mut own: Vec<f64> = slope(p).iter().zip(&self.weight).map(|(s, w)| s * w).collect();
+                let rate = self.rate_gradient.get(p).copied().unwrap_or(0.0);
+                for (v, loss) in own.iter_mut().zip(&self.loss) {
+                    *v -= rate * loss;
+                }
+                if let Some((column, gradient, amplitude)) = &transient {
+                    let g = gradient.get(p).copied().unwrap_or(0.0) * amplitude;
+                    for (v, c) in own.iter_mut().zip(*column) {
+                        *v += g * c;
+                    }
+                }
+                self.project(&mut own);
+                own
+            })
+            .collect()
+    }
+
+    /// The straight line through the blocks of air alone, in the channel's unit: what a model without drift effects says the
+    /// zero is. Fitted along with the force, a line hides part of what the force model lacks. `None` where a drift effect
+    /// is in the model, whose size takes all levels to tell, or where a side has no air.
+    pub(crate) fn through_air(&self, cut: &CutData, is_air: impl Fn(usize) -> bool) -> Option<Vec<f64>> {
+        if self.transient.is_some() || !self.loss.is_empty() {
+            return None;
+        }
+        let middle = |b: usize| 0.5 * (cut.block_s[b][0] + cut.block_s[b][1]);
+        let air: Vec<usize> = (0..cut.block_s.len()).filter(|b| is_air(*b)).collect();
+        let sides = [
+            air.iter().any(|b| *b < cut.steady.start),
+            air.iter().any(|b| *b >= cut.steady.end),
+        ];
+        if air.len() < 4 || sides != [true, true] {
+            return None;
+        }
+        let (offset, slope, at) = crate::signal::line(
+            air.iter().map(|b| middle(*b)),
+            air.iter().map(|b| self.recorded[*b] / self.weight[*b]),
+        );
+        Some(
+            (0..cut.block_s.len())
+                .map(|b| offset + slope * (middle(b) - at))
+                .collect(),
+        )
+    }
+
+    /// Fitted zero line by block, in the channel's unit.
+    pub(crate) fn zero(&self, level: &[f64]) -> Vec<f64> {
+        let raw = self.raw(level);
+        let mut rest = raw.clone();
+        self.project(&mut rest);
+        raw.iter()
+            .zip(&rest)
+            .zip(&self.weight)
+            .enumerate()
+            .map(|(b, ((raw, rest), w))| {
+                let lost = self.loss.get(b).map_or(0.0, |l| self.rate * l);
+                (rest - raw - lost) / w
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,465 @@
+//! The misfit of a structural model to measured FRFs, and what it leaves of them.
+
+use faer::linalg::matmul::matmul;
+use faer::{Accum, MatMut, MatRef, Par};
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use crate::identify::frfs::channels::Channels;
+use crate::identify::frfs::frf_data::{FrfBlock, FrfData, FrfDatum};
+use crate::identify::frfs::structure::StructureModel;
+use crate::identify::levenberg_marquardt::{LeastSquares, Linearisation};
+use crate::identify::rest::RestCurve;
+use crate::robot::FrfBasis;
+use crate::robot::frf::{Response, Slopes};
+use crate::{Result, stop};
+
+/// What is compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Misfit {
+    /// ln|H| with a broad tolerance: smooth far from the optimum, where a model's peak stands beside the measured one.
+    LogMagnitude,
+    /// H itself against the measured noise: the likelihood.
+    Complex,
+}
+
+/// Tolerance on ln|H| where the model is still wrong: differences far below this do not matter yet.
+const LOG_TOLERANCE: f64 = 0.5;
+
+/// Misfit of a model to FRFs plus the priors on its parameters.
+pub struct FrfProblem<'a> {
+    /// The model.
+    pub model: &'a StructureModel,
+    /// The FRFs that it is fitted to.
+    pub data: &'a FrfData,
+    /// How far apart a prediction and a measurement are.
+    pub misfit: Misfit,
+    /// Every how many lines are used.
+    pub stride: usize,
+}
+
+/// Lines one task works on: a fixed size, so that sums do not depend on the number of threads.
+const CHUNK: usize = 64;
+
+/// Sums over the residuals of a chunk of lines.
+struct Partial {
+    cost: f64,
+    gradient: DVector<f64>,
+    hessian: DMatrix<f64>,
+}
+
+impl Partial {
+    fn zero(count: usize) -> Self {
+        Partial {
+            cost: 0.0,
+            gradient: DVector::zeros(count),
+            hessian: DMatrix::zeros(count, count),
+        }
+    }
+
+    fn add(&mut self, other: &Partial) {
+        self.cost += other.cost;
+        self.gradient += &other.gradient;
+        self.hessian += &other.hessian;
+    }
+
+    /// Adds residuals with their derivatives (residuals × parameters, column by column).
+    fn push(&mut self, residual: &[f64], jacobian: &[f64]) {
+        self.cost += 0.5 * residual.iter().map(|r| r * r).sum::<f64>();
+        let count = self.gradient.len();
+        if count == 0 {
+            return;
+        }
+        let jacobian = MatRef::from_column_major_slice(jacobian, residual.len(), count);
+        let residual = MatRef::from_column_major_slice(residual, residual.len(), 1);
+        let add = |target: &mut [f64], columns: usize, right: MatRef<f64>| {
+            let target = MatMut::from_column_major_slice_mut(target, count, columns);
+            matmul(target, Accum::Add, jacobian.transpose(), right, 1.0, Par::Seq);
+        };
+        add(self.gradient.as_mut_slice(), 1, residual);
+        add(self.hessian.as_mut_slice(), count, jacobian);
+    }
+}
+
+impl FrfProblem<'_> {
+    fn evaluate(&self, theta: &[f64], with_derivatives: bool) -> Result<Partial> {
+        let count = if with_derivatives { theta.len() } else { 0 };
+        let bases: Vec<FrfBasis> = self
+            .data
+            .blocks
+            .par_iter()
+            .map(|block| self.model.basis(theta, block, with_derivatives))
+            .collect::<Result<_>>()?;
+        let channels = Channels::new(&self.model.filter(theta, with_derivatives));
+        let tasks: Vec<(usize, usize)> = self
+            .data
+            .blocks
+            .iter()
+            .enumerate()
+            .flat_map(|(b, block)| {
+                let lines = block.frequency_hz.len().div_ceil(self.stride);
+                (0..lines.div_ceil(CHUNK)).map(move |c| (b, c))
+            })
+            .collect();
+        let parts: Vec<Partial> = tasks
+            .par_iter()
+            .map(|&(b, chunk)| self.chunk(&bases[b], &channels, &self.data.blocks[b], chunk, count))
+            .collect::<Result<_>>()?;
+        let mut total = Partial::zero(count);
+        for part in &parts {
+            total.add(part);
+        }
+        for (i, (parameter, t)) in self.model.parameters.iter().zip(theta).enumerate() {
+            if let Some(prior) = parameter.prior {
+                let [cost, slope, curvature] = prior.half_square(*t);
+                total.cost += cost;
+                if with_derivatives {
+                    total.gradient[i] += slope;
+                    total.hessian[(i, i)] += curvature;
+                }
+            }
+        }
+        Ok(total)
+    }
+
+    fn chunk(
+        &self,
+        basis: &FrfBasis,
+        channels: &Channels,
+        block: &FrfBlock,
+        chunk: usize,
+        count: usize,
+    ) -> Result<Partial> {
+        stop::point();
+        let mut partial = Partial::zero(count);
+        let mut response = Response::default();
+        let mut slopes = Slopes::of_inputs(block.inputs());
+        let mut slope = vec![Complex64::ZERO; count];
+        // Residuals of one line and their derivatives, column by column: real parts, then imaginary parts.
+        let rows = match self.misfit {
+            Misfit::Complex => 2 * block.frfs.len(),
+            Misfit::LogMagnitude => block.frfs.len(),
+        };
+        let mut residual = vec![0.0; rows];
+        let mut jacobian = vec![0.0; rows * count];
+        let lines = (chunk * CHUNK..(chunk + 1) * CHUNK).map(|k| k * self.stride);
+        for line in lines.take_while(|l| *l < block.frequency_hz.len()) {
+            let omega = std::f64::consts::TAU * block.frequency_hz[line];
+            if count > 0 {
+                basis.solve(omega, &mut response)?;
+                basis.slopes(&response, &mut slopes);
+            } else {
+                basis.solve_along(omega, slopes.inputs.iter().copied(), &mut response)?;
+            }
+            for (k, frf) in block.frfs.iter().enumerate() {
+                let model = channels.measured(omega, frf, basis, &response);
+                let measured = frf.receptance[line];
+                let std = frf.noise_std[line];
+                if count > 0 {
+                    let i = slopes.inputs.iter().position(|x| *x == frf.input).unwrap_or(0);
+                    let true_slope = |p: usize, out: usize| slopes.at(p, i, out);
+                    channels.slopes(omega, frf, model, (basis, &response), true_slope, &mut slope);
+                }
+                match self.misfit {
+                    Misfit::Complex => {
+                        // Each of the two parts has half the variance.
+                        let weight = std::f64::consts::SQRT_2 / std;
+                        let difference = (model - measured) * weight;
+                        residual[2 * k] = difference.re;
+                        residual[2 * k + 1] = difference.im;
+                        for (p, s) in slope.iter().enumerate() {
+                            jacobian[rows * p + 2 * k] = s.re * weight;
+                            jacobian[rows * p + 2 * k + 1] = s.im * weight;
+                        }
+                    }
+                    Misfit::LogMagnitude => {
+                        let (m, h) = (measured.norm(), model.norm());
+                        let weight = if m > 0.0 && h > 0.0 {
+                            1.0 / LOG_TOLERANCE.hypot(std / m)
+                        } else {
+                            0.0
+                        };
+                        residual[k] = if weight > 0.0 { (h / m).ln() * weight } else { 0.0 };
+                        for (p, s) in slope.iter().enumerate() {
+                            jacobian[rows * p + k] = if weight > 0.0 {
+                                (model.conj() * s).re / (h * h) * weight
+                            } else {
+                                0.0
+                            };
+                        }
+                    }
+                }
+            }
+            partial.push(&residual, &jacobian);
+        }
+        Ok(partial)
+    }
+}
+
+impl LeastSquares for FrfProblem<'_> {
+    fn cost(&self, theta: &[f64]) -> Result<f64> {
+        Ok(self.evaluate(theta, false)?.cost)
+    }
+
+    fn linearise(&self, theta: &[f64]) -> Result<Linearisation> {
+        let Partial {
+            cost,
+            gradient,
+            hessian,
+        } = self.evaluate(theta, true)?;
+        Ok(Linearisation {
+            cost,
+            gradient,
+            hessian,
+        })
+    }
+}
+
+impl StructureModel {
+    /// What the model at `theta` leaves of each FRF, with the patterns that an error of it may have, in the order of
+    /// `data.frfs()`.
+    pub fn rest(&self, theta: &[f64], data: &FrfData) -> Result<Vec<RestCurve>> {
+        let channels = Channels::new(&self.filter(theta, true));
+        let postures = data.measured_postures();
+        let mut hits: Vec<(usize, usize)> = Vec::new();
+        for (b, block) in data.blocks.iter().enumerate() {
+            hits.extend(block.frfs.iter().map(|frf| (b, frf.input)));
+        }
+        hits.sort_unstable();
+        hits.dedup();
+        let place = |sorted: Option<usize>| sorted.unwrap_or(0);
+        let blocks: Vec<Vec<RestCurve>> = data
+            .blocks
+            .par_iter()
+            .enumerate()
+            .map(|(b, block)| {
+                let empty = |frf: &FrfDatum| RestCurve {
+                    fold: place(postures.binary_search(&block.posture).ok()),
+                    source: place(hits.binary_search(&(b, frf.input)).ok()),
+                    rest: Vec::with_capacity(block.frequency_hz.len()),
+                    slopes: vec![Vec::with_capacity(block.frequency_hz.len()); theta.len()],
+                    // A gain and a phase, and both growing with the frequency (a delay).
+                    own: vec![Vec::new(); 2],
+                };
+                let mut curves: Vec<RestCurve> = block.frfs.iter().map(empty).collect();
+                let basis = self.basis(theta, block, true)?;
+                let mut slopes = Slopes::of_inputs(block.inputs());
+                let mut response = Response::default();
+                let mut slope = vec![Complex64::ZERO; theta.len()];
+                for (line, f) in block.frequency_hz.iter().enumerate() {
+                    let omega = std::f64::consts::TAU * f;
+                    basis.solve(omega, &mut response)?;
+                    basis.slopes(&response, &mut slopes);
+                    for (frf, curve) in block.frfs.iter().zip(&mut curves) {
+                        let model = channels.measured(omega, frf, &basis, &response);
+                        let i = slopes.inputs.iter().position(|x| *x == frf.input).unwrap_or(0);
+                        let true_slope = |p: usize, out: usize| slopes.at(p, i, out);
+                        channels.slopes(omega, frf, model, (&basis, &response), true_slope, &mut slope);
+                        let weight = 1.0 / frf.noise_std[line];
+                        curve.rest.push((model - frf.receptance[line]) * weight);
+                        for (column, s) in curve.slopes.iter_mut().zip(&slope) {
+                            column.push(s * weight);
+                        }
+                        for (column, factor) in curve.own.iter_mut().zip([1.0, *f]) {
+                            column.push(model * (weight * factor));
+                        }
+                    }
+                }
+                Ok(curves)
+            })
+            .collect::<Result<_>>()?;
+        Ok(blocks.into_iter().flatten().collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::{AxesRef, Axis, BodyRef, MeasuredDof, Point, RobotSection};
+    use crate::effects::{self, Spot};
+    use crate::robot::RobotModel;
+    use crate::robot::fixture::{TAP_POSTURES, irb6640};
+
+    fn section() -> RobotSection {
+        RobotSection {
+            model: "irb6640".into(),
+            mass_tolerance: Some(0.05),
+            stiffness_tolerance: 0.3,
+            links: Default::default(),
+        }
+    }
+
+    fn model() -> StructureModel {
+        let point = |node, body| Point {
+            node,
+            body,
+            position_m: [0.0; 3],
+            axes: AxesRef::Base,
+        };
+        let points = vec![point(1, BodyRef::Tool), point(2, BodyRef::Link(3))];
+        StructureModel::new(RobotModel::new(irb6640()), points, &section())
+    }
+
+    /// The same with all numbers of the links free.
+    fn with_free_links(exact: &StructureModel) -> StructureModel {
+        let section = section().freeing(&crate::data::LinkGroup::ALL);
+        StructureModel::new(exact.robot.clone(), exact.points.clone(), &section)
+    }
+
+    /// Two postures at two levels; a few lines; noise of 1 % of the magnitude.
+    fn data(model: &StructureModel) -> FrfData {
+        let blocks = TAP_POSTURES[..2]
+            .iter()
+            .enumerate()
+            .map(|(posture, q)| {
+                let outputs: Vec<(usize, Axis)> = [0, 1]
+                    .into_iter()
+                    .flat_map(|p| Axis::ALL.map(|a| (p, a)))
+                    .collect();
+                let dof = |point, axis| MeasuredDof {
+                    point,
+                    axis,
+                    negative: false,
+                };
+                let frfs = [(0, Axis::X, 0), (0, Axis::Y, 1), (1, Axis::Z, 1)]
+                    .into_iter()
+                    .map(|(point, axis, input)| FrfDatum {
+                        name: String::new(),
+                        posture,
+                        response: dof(point, axis),
+                        reference: dof(0, Axis::ALL[input]),
+                        response_outputs: [3 * point, 3 * point + 1, 3 * point + 2],
+                        input,
+                        sign: if point == 1 { -1.0 } else { 1.0 },
+                        receptance: vec![Complex64::new(1e-6, -2e-6); 5],
+                        noise_std: vec![1e-8; 5],
+                    })
+                    .collect();
+                FrfBlock {
+                    posture,
+                    force_level_n: None,
+                    lowness: posture as f64,
+                    kinematics: model.robot.kinematics(q).unwrap(),
+                    frequency_hz: vec![6.0, 9.0, 14.0, 22.0, 47.0],
+                    outputs,
+                    frfs,
+                }
+            })
+            .map(std::sync::Arc::new)
+            .collect();
+        FrfData {
+            blocks,
+            posture_ids: vec!["a".into(), "b".into()],
+        }
+    }
+
+    /// The gradient of both misfits at `theta` against central differences of the cost.
+    fn agrees_with_differences(model: &StructureModel, data: &FrfData, theta: &[f64], what: &str) {
+        for misfit in [Misfit::Complex, Misfit::LogMagnitude] {
+            let problem = FrfProblem {
+                model,
+                data,
+                misfit,
+                stride: 1,
+            };
+            let here = problem.linearise(theta).unwrap();
+            for p in 0..theta.len() {
+                let h = 1e-6 * theta[p].abs().max(1e-3);
+                let at = |sign: f64| {
+                    let mut t = theta.to_vec();
+                    t[p] += sign * h;
+                    problem.cost(&t).unwrap()
+                };
+                let difference = (at(1.0) - at(-1.0)) / (2.0 * h);
+                let scale = (here.hessian[(p, p)] * here.cost).sqrt() + here.gradient[p].abs();
+                let rounding = 1e-13 * here.cost / h;
+                assert!(
+                    (here.gradient[p] - difference).abs() < 2e-5 * scale + 10.0 * rounding,
+                    "{what} {misfit:?} {}: {} {difference}",
+                    model.parameters[p].name,
+                    here.gradient[p]
+                );
+            }
+        }
+    }
+
+    /// Every effect's derivatives, and those of the baseline beside it, against central differences of the cost.
+    #[test]
+    fn gradients_of_all_effects_agree_with_differences() {
+        let bare = model();
+        let data = data(&bare);
+        let summary = data.summary();
+        let resonator = effects::find(&bare.robot.spec, "local-resonator@link-3");
+        let drawn = [
+            Spot::LinkAxis(5, 2),
+            Spot::ToolGround(0),
+            Spot::Joint(2),
+            Spot::Base(3),
+            Spot::Bearing(3, 1),
+            Spot::Drive(2),
+        ];
+        let drawn = drawn.into_iter().flat_map(|spot| {
+            let forms = effects::drawn::forms(spot).iter();
+            forms.map(move |form| effects::drawn::instance(spot, *form))
+        });
+        for instance in effects::instances(&bare.robot.spec).into_iter().chain(drawn) {
+            for also in [None, resonator.first()] {
+                let mut model = bare.with_effect(instance, &summary);
+                if let Some(also) = also {
+                    model = model.with_effect(*also, &summary);
+                }
+                let mut theta = model.nominal_theta();
+                for (i, t) in theta.iter_mut().enumerate() {
+                    *t += 0.01 * (1.0 + i as f64).sin();
+                }
+                agrees_with_differences(&model, &data, &theta, &format!("{instance:?}"));
+            }
+        }
+    }
+
+    /// Moments of inertia, centres of mass, lengths and walls: the same, alone and beside effects that use what they change.
+    #[test]
+    fn gradients_of_link_parameters_agree_with_differences() {
+        let exact = model();
+        let data = data(&exact);
+        let free = with_free_links(&exact);
+        // Six stiffnesses, damping, six masses; 18 moments, 18 coordinates, 8 lengths, 5 walls.
+        assert_eq!(free.parameters.len(), 13 + 18 + 18 + 8 + 5);
+        let summary = data.summary();
+        for label in [
+            None,
+            Some("link-flexibility"),
+            Some("load-dependent-stiffness"),
+            Some("payload"),
+            Some("tool-flexibility"),
+            Some("joint-damping"),
+        ] {
+            let effect = label.map(|label| effects::find(&free.robot.spec, label)[0]);
+            let model = match effect {
+                Some(instance) => free.with_effect(instance, &summary),
+                None => free.clone(),
+            };
+            let mut theta = model.nominal_theta();
+            for (i, t) in theta.iter_mut().enumerate() {
+                *t += 0.01 * (1.0 + i as f64).sin();
+            }
+            agrees_with_differences(&model, &data, &theta, label.unwrap_or("alone"));
+        }
+    }
+
+    /// Numbers that are free but stand where the file has them change no prediction.
+    #[test]
+    fn free_numbers_at_the_files_values_are_the_file() {
+        let exact = model();
+        let data = data(&exact);
+        let free = with_free_links(&exact);
+        let (a, b) = (
+            exact.predict(&exact.nominal_theta(), &data).unwrap(),
+            free.predict(&free.nominal_theta(), &data).unwrap(),
+        );
+        for (a, b) in a.iter().flatten().zip(b.iter().flatten()) {
+            assert!((a - b).norm() < 1e-9 * a.norm(), "{a} {b}");
+        }
+    }
+}

@@ -1,0 +1,346 @@
+//! FRFs and a structural model as a [`Study`].
+
+use num_complex::Complex64;
+
+use crate::Result;
+use crate::data::RobotSpec;
+use crate::effects::{self, DataSummary, Instance};
+use crate::identify::frfs::calibrate::{Calibration, Estimate, GLANCE_VALUES, Options, calibrate, sketch};
+use crate::identify::frfs::frf_data::FrfData;
+use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
+use crate::identify::frfs::structure::StructureModel;
+use crate::identify::levenberg_marquardt::Stopping;
+use crate::identify::rest::{AfterSlips, BeyondSlips, Rest, RestCurve, SMALL_ERROR};
+use crate::identify::rest_patterns;
+use crate::identify::study::{EffectName, Extent, HeldOut, Measure, Residual, Study, View, held_out};
+use crate::parameter::Parameter;
+
+/// Takes what small errors of the setup can out of the rest of a model at its optimum on data.
+pub type AbsorbSlips = fn(&StructureModel, &FrfData, &[f64], &[RestCurve]) -> Result<AfterSlips>;
+
+/// A campaign's FRFs, arranged for the loop.
+#[derive(Debug, Clone)]
+pub struct StructureStudy {
+    /// All FRFs.
+    pub data: FrfData,
+    /// How the baseline is calibrated.
+    pub options: Options,
+    /// Where the measured modes put the model, solver's scale: a starting point of its calibration.
+    measured: Option<Vec<f64>>,
+    slips: Option<AbsorbSlips>,
+    coarse: FrfData,
+    glance: FrfData,
+    /// Postures that are left out in turn, and the data without each.
+    postures: Vec<usize>,
+    coarse_without: Vec<FrfData>,
+    full_without: Vec<FrfData>,
+    summary: DataSummary,
+    robot: RobotSpec,
+}
+
+/// Lines between those that the coarse view keeps, at most.
+const LARGEST_STRIDE: usize = 6;
+/// Complex values the coarse view has, about: enough to tell effects apart, few enough to try many starts.
+const COARSE_VALUES: usize = 2500;
+
+impl StructureStudy {
+    /// FRFs of a robot, with the thinner views that searches use.
+    pub fn new(robot: &RobotSpec, data: FrfData, options: Options) -> Self {
+        let share = data.value_count().div_ceil(COARSE_VALUES);
+        // A resonance needs its few lines: measurements with coarse lines are left alone.
+        let lines = data
+            .blocks
+            .iter()
+            .map(|b| b.frequency_hz.len())
+            .min()
+            .unwrap_or(0);
+        let stride = share.min(LARGEST_STRIDE).min((lines / 60).max(1));
+        let every = (share / stride).clamp(1, 3);
+        let coarse = data.thinned(stride, every);
+        let postures = data.measured_postures();
+        let without = |data: &FrfData| -> Vec<FrfData> {
+            postures.iter().map(|&p| data.filtered(|q| q != p)).collect()
+        };
+        StructureStudy {
+            glance: sketch(&coarse, GLANCE_VALUES),
+            coarse_without: without(&coarse),
+            full_without: without(&data),
+            summary: data.summary(),
+            robot: robot.clone(),
+            coarse,
+            postures,
+            data,
+            options,
+            measured: None,
+            slips: None,
+        }
+    }
+
+    /// The same study, whose model is calibrated also from `start` (such as [`crate::identify::frfs::modal_start`] gives).
+    pub fn with_measured(self, start: Option<Vec<f64>>) -> Self {
+        StructureStudy {
+            measured: start,
+            ..self
+        }
+    }
+
+    /// The same study, which knows what small errors of the setup do.
+    pub fn with_slips(self, absorb: AbsorbSlips) -> Self {
+        StructureStudy {
+            slips: Some(absorb),
+            ..self
+        }
+    }
+
+    fn view(&self, view: View) -> &FrfData {
+        match (view.extent, view.left_out) {
+            (Extent::Glance, None) => &self.glance,
+            (Extent::Coarse, None) => &self.coarse,
+            (Extent::Full, None) => &self.data,
+            // A fold is too little to glance at.
+            (Extent::Glance | Extent::Coarse, Some(fold)) => &self.coarse_without[fold],
+            (Extent::Full, Some(fold)) => &self.full_without[fold],
+        }
+    }
+}
+
+impl Study for StructureStudy {
+    type Model = StructureModel;
+    type Instance = Instance;
+    type Problem<'a> = FrfProblem<'a>;
+    type Hints = Vec<f64>;
+
+    fn parameters<'m>(&self, model: &'m StructureModel) -> &'m [Parameter] {
+        &model.parameters
+    }
+
+    fn instances(&self, model: &StructureModel) -> (Vec<Instance>, Vec<(String, String)>) {
+        let spec = &model.robot.spec;
+        let (mut tried, mut not_tried) = (Vec::new(), Vec::new());
+        for instance in effects::instances(spec) {
+            let label = instance.label();
+            if model.has(&label) {
+                continue;
+            }
+            match instance.effect.obstacle(spec, &self.summary) {
+                Some(reason) => not_tried.push((label, reason)),
+                None => tried.push(instance),
+            }
+        }
+        not_tried.dedup();
+        (tried, not_tried)
+    }
+
+    fn name(&self, instance: &Instance) -> EffectName {
+        let variant = instance.effect.variant_label(instance.variant);
+        EffectName {
+            effect: instance.effect.id().into(),
+            site: instance.site.label(),
+            variant: variant.map(|(key, value)| (key.into(), value.into())),
+        }
+    }
+
+    fn extend(&self, model: &StructureModel, instance: &Instance) -> StructureModel {
+        model.with_effect(*instance, &self.summary)
+    }
+
+    fn vanishing(&self, model: &StructureModel) -> Option<Vec<f64>> {
+        model.vanishing(model.effects().last()?)
+    }
+
+    fn bounds(&self, model: &StructureModel) -> Vec<[f64; 2]> {
+        model.bounds()
+    }
+
+    fn starting_from(&self, model: &StructureModel, theta: Vec<f64>) -> StructureModel {
+        model.with_start(theta)
+    }
+
+    /// Frequencies at which the weighted residual is largest, most prominent first.
+    fn hints(&self, model: &StructureModel, theta: &[f64]) -> Result<Vec<f64>> {
+        let peaks = residual_peaks(&model.predict(theta, &self.data)?, &self.data);
+        Ok(peaks.iter().map(|p| p.frequency_hz).collect())
+    }
+
+    fn starts(&self, instance: &Instance, peaks_hz: &Vec<f64>) -> Vec<Vec<f64>> {
+        instance.effect.starts_at(
+            (instance.site, instance.variant),
+            &self.robot,
+            &self.summary,
+            peaks_hz,
+        )
+    }
+
+    fn problem<'a>(&'a self, model: &'a StructureModel, view: View) -> FrfProblem<'a> {
+        FrfProblem {
+            model,
+            data: self.view(view),
+            misfit: match view.measure {
+                Measure::Rough => Misfit::LogMagnitude,
+                Measure::Likelihood => Misfit::Complex,
+            },
+            stride: 1,
+        }
+    }
+
+    fn work_s(&self, model: &StructureModel, extent: Extent) -> f64 {
+        model.work_s(self.view(View { extent, ..View::FULL }))
+    }
+
+    fn real_values(&self, extent: Extent) -> usize {
+        let view = View { extent, ..View::FULL };
+        2 * self.view(view).value_count()
+    }
+
+    fn folds(&self) -> usize {
+        self.postures.len()
+    }
+
+    fn predict_fold(&self, model: &StructureModel, theta: &[f64], fold: usize) -> Result<HeldOut> {
+        let own = self.data.filtered(|p| p == self.postures[fold]);
+        let predicted = model.predict(theta, &own)?;
+        let mut sums = HeldOut::default();
+        for ((_, frf), model) in own.frfs().zip(&predicted) {
+            for ((h, m), std) in frf.receptance.iter().zip(model).zip(&frf.noise_std) {
+                let square = (m - h).norm_sqr();
+                sums.error += square;
+                sums.signal += h.norm_sqr();
+                // Real and imaginary part have half the variance each.
+                sums.chi2 += 2.0 * square / (std * std);
+            }
+        }
+        Ok(sums)
+    }
+
+    fn residual(&self, model: &StructureModel, theta: &[f64]) -> Result<Residual> {
+        let predicted = model.predict(theta, &self.data)?;
+        let (mut error, mut signal, mut weighted, mut values) = (0.0, 0.0, 0.0, 0);
+        // Σ r̄(k) r(k + lag) over all FRFs, normalised by lag 0.
+        let mut lags = [0.0; CORRELATION_LAGS + 1];
+        for ((_, frf), model) in self.data.frfs().zip(&predicted) {
+            let difference = |k: usize| model[k] - frf.receptance[k];
+            let whitened: Vec<Complex64> = (0..model.len())
+                .map(|k| difference(k) / frf.noise_std[k])
+                .collect();
+            error += (0..model.len()).map(|k| difference(k).norm_sqr()).sum::<f64>();
+            signal += frf.receptance.iter().map(|h| h.norm_sqr()).sum::<f64>();
+            weighted += whitened.iter().map(|r| r.norm_sqr()).sum::<f64>();
+            values += model.len();
+            for (lag, sum) in lags.iter_mut().enumerate() {
+                let pairs = whitened.iter().zip(whitened.iter().skip(lag));
+                *sum += pairs.map(|(a, b)| (a.conj() * b).re).sum::<f64>();
+            }
+        }
+        let chance = 2.0 / (values.max(1) as f64).sqrt();
+        let correlation: f64 = (1..lags.len())
+            .map(|lag| lags[lag] / lags[0].max(f64::MIN_POSITIVE))
+            .take_while(|r| *r > chance)
+            .sum();
+        Ok(Residual {
+            nrms: (error / signal.max(f64::MIN_POSITIVE)).sqrt(),
+            chi2_per_value: weighted / values.max(1) as f64,
+            independent_share: 1.0 / (1.0 + 2.0 * correlation),
+        })
+    }
+
+    fn rest(&self, model: &StructureModel, theta: &[f64]) -> Result<Rest> {
+        Ok(Rest {
+            tests: rest_patterns::test(&model.rest(theta, &self.data)?),
+            small_errors: small_errors(&self.data),
+            beyond_slips: None,
+        })
+    }
+
+    fn beyond_slips(&self, model: &StructureModel, theta: &[f64]) -> Result<Option<BeyondSlips>> {
+        let Some(absorb) = self.slips else { return Ok(None) };
+        let mut curves = model.rest(theta, &self.data)?;
+        let after = absorb(model, &self.data, theta, &curves)?;
+        Ok(Some(rest_patterns::test_beyond(&mut curves, after)))
+    }
+
+    fn impossible(&self, model: &StructureModel, instance: &Instance, own: &[Estimate]) -> Option<String> {
+        let sizes: Vec<effects::Size> = own.iter().map(Estimate::size).collect();
+        instance
+            .effect
+            .impossible(instance.site, &model.robot.spec, &sizes)
+    }
+
+    fn calibrate(&self, model: &StructureModel) -> Result<Calibration> {
+        calibrate(model, &self.data, self.measured.as_deref(), self.options)
+    }
+}
+
+/// Σ r²/σ² over real values that errors of [`SMALL_ERROR`] of every FRF leave.
+pub fn small_errors(data: &FrfData) -> f64 {
+    let values = data
+        .frfs()
+        .flat_map(|(_, frf)| frf.receptance.iter().zip(&frf.noise_std));
+    2.0 * SMALL_ERROR.powi(2) * values.map(|(h, std)| h.norm_sqr() / (std * std)).sum::<f64>()
+}
+
+/// Error on postures left out one at a time, refitted from `theta` on all lines of the others. `None` with fewer than two
+/// measured postures.
+pub fn held_out_postures(model: &StructureModel, data: &FrfData, theta: &[f64]) -> Result<Option<HeldOut>> {
+    let study = StructureStudy::new(&model.robot.spec, data.clone(), Options::default());
+    let stopping = Stopping {
+        max_iterations: 30,
+        relative_decrease: 1e-6,
+    };
+    held_out(&study, model, theta, Extent::Full, stopping)
+}
+
+/// Neighbouring lines over which the residual's correlation is summed.
+const CORRELATION_LAGS: usize = 40;
+
+/// A frequency around which the residual stands out.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct ResidualPeak {
+    /// Hz.
+    pub frequency_hz: f64,
+    /// Root mean square of |model − measured|/σ around there, over all FRFs: 1 is noise.
+    pub times_noise: f64,
+}
+
+/// Frequencies at which the weighted residual is largest, most prominent first. What neighbouring lines have in common
+/// is counted: noise has nothing, however well its size is known. `predicted` in the order of `data.frfs()`.
+pub fn residual_peaks(predicted: &[Vec<Complex64>], data: &FrfData) -> Vec<ResidualPeak> {
+    const PEAKS: usize = 5;
+    const BINS: usize = 90;
+    /// Standard deviations of pure noise that a peak stands above.
+    const CHANCE: f64 = 4.0;
+    #[derive(Clone, Copy, Default)]
+    struct Bin {
+        /// Σ of the real part of r̄(k) r(k − 1).
+        shared: f64,
+        squares: f64,
+        lines: usize,
+    }
+    let summary = data.summary();
+    let ratio = (summary.highest_hz / summary.lowest_hz).ln();
+    let mut bins = vec![Bin::default(); BINS];
+    for ((block, frf), model) in data.frfs().zip(predicted) {
+        let weighted = |k: usize| (model[k] - frf.receptance[k]) / frf.noise_std[k];
+        for (k, f) in block.frequency_hz.iter().enumerate().skip(1) {
+            let position = (f / summary.lowest_hz).ln() / ratio * BINS as f64;
+            let bin = &mut bins[(position.max(0.0) as usize).min(BINS - 1)];
+            bin.shared += (weighted(k).conj() * weighted(k - 1)).re;
+            bin.squares += weighted(k).norm_sqr();
+            bin.lines += 1;
+        }
+    }
+    // The product of two independent unit complex values has variance ½ in each part.
+    let level = |i: usize| bins[i].shared / (0.5 * bins[i].lines.max(1) as f64).sqrt();
+    let mut peaks: Vec<usize> = (0..BINS)
+        .filter(|&i| {
+            let left = if i > 0 { level(i - 1) } else { 0.0 };
+            let right = if i + 1 < BINS { level(i + 1) } else { 0.0 };
+            level(i) > left && level(i) >= right && level(i) > CHANCE
+        })
+        .collect();
+    peaks.sort_by(|a, b| level(*b).total_cmp(&level(*a)));
+    let peak = |i: usize| ResidualPeak {
+        frequency_hz: summary.lowest_hz * (ratio * (i as f64 + 0.5) / BINS as f64).exp(),
+        times_noise: (bins[i].squares / bins[i].lines.max(1) as f64).sqrt(),
+    };
+    peaks.into_iter().take(PEAKS).map(peak).collect()
+}

@@ -1,0 +1,417 @@
+//! Time records from text: DynoWare exports and plain force tables. Channel roles, units, time axis.
+
+use crate::InputError;
+use crate::data::{Channel, ChannelRole, TimeRecord};
+use crate::ingest::checks;
+use crate::ingest::tables::clock;
+use crate::ingest::tables::number;
+use crate::ingest::tables::table::{Header, Table};
+use crate::ingest::text::Notes;
+use crate::ingest::units::{self, Dimension, Unit};
+
+mod time_axis;
+
+use crate::ingest::formats::force::time_axis::{Clock, Lost, Runs, fill, refused, time_axis, time_unit};
+
+/// True where the table is a time record: a time column, or a sampling rate above it.
+pub(crate) fn is_time_table(header: &Header) -> bool {
+    time_column(header).is_some() || (!header.names.is_empty() && sampling_rate(header).is_some())
+}
+
+/// Reads the rows and makes them a time record in SI.
+pub(crate) fn read(bytes: &[u8], header: &Header, notes: &mut Notes) -> Result<TimeRecord, InputError> {
+    let mut pieces = Pieces::new(bytes, header.clone(), true);
+    let table = header.read(bytes, pieces.rate, notes)?;
+    let record = pieces.next(table, header.data_line, notes)?;
+    pieces.finish(notes);
+    Ok(record)
+}
+
+/// A table of time signals that is read piece by piece: what one piece has to know of those before it.
+pub(crate) struct Pieces {
+    pub header: Header,
+    /// Of the header lines.
+    rate: Option<f64>,
+    resolution_s: f64,
+    clock: Option<Clock>,
+    /// Last row of the piece before, time included.
+    last: Vec<f64>,
+    samples: usize,
+    lost: Lost,
+    /// There is one piece only.
+    is_whole: bool,
+    /// Puts right the unit of the time column.
+    time_unit: Option<f64>,
+}
+
+impl Pieces {
+    /// `head`: the file's beginning, with the first rows.
+    pub fn new(head: &[u8], header: Header, is_whole: bool) -> Self {
+        let resolution_s = time_column(&header).map_or(0.0, |at| {
+            time_resolution(head, &header, at) * time_factor(&header, at)
+        });
+        Pieces {
+            rate: sampling_rate(&header),
+            resolution_s,
+            clock: None,
+            last: Vec::new(),
+            samples: 0,
+            lost: Lost::default(),
+            is_whole,
+            time_unit: None,
+            header,
+        }
+    }
+
+    /// The next rows as a record of their own; they begin at line `first_line`.
+    pub fn next(
+        &mut self,
+        mut table: Table,
+        first_line: usize,
+        notes: &mut Notes,
+    ) -> Result<TimeRecord, InputError> {
+        let header = &self.header;
+        check_numbers(&table, header, first_line)?;
+        let time_at = time_column(header);
+        if let Some(at) = time_at {
+            let factor = time_factor(header, at);
+            table.columns[at].iter_mut().for_each(|t| *t *= factor);
+            let seconds = &table.columns[at];
+            let again = match self.time_unit {
+                Some(again) => again,
+                None => {
+                    let again = time_unit(seconds, self.resolution_s, factor, self.rate, header, notes)?;
+                    self.resolution_s *= again;
+                    again
+                }
+            };
+            self.time_unit = Some(again);
+            table.columns[at].iter_mut().for_each(|t| *t *= again);
+        }
+        let rows = table.columns.iter().map(Vec::len).max().unwrap_or(0);
+        if self.clock.is_none() && rows < 2 {
+            return Err(InputError::new("a time record of less than two samples").line(header.data_line));
+        }
+        let clock = match (self.clock, time_at) {
+            (Some(clock), Some(at)) if clock.rounding_s.is_some() && rows > 2 => {
+                let runs = Runs::find(&table.columns[at], self.resolution_s);
+                let same = (runs.step_s * clock.rate_hz - 1.0).abs() <= 1e-3 + 2.0 * runs.rounding;
+                if !(same && runs.are_even(&table.columns[at])) {
+                    return Err(refused(
+                        "steps that change, in a file too long to be resampled at once",
+                        header,
+                    ));
+                }
+                clock
+            }
+            (Some(clock), _) => clock,
+            (None, Some(at)) => {
+                let seconds = &table.columns[at];
+                time_axis(
+                    seconds,
+                    self.resolution_s,
+                    self.rate,
+                    header,
+                    self.is_whole,
+                    notes,
+                )?
+            }
+            (None, None) => {
+                let rate_hz = self.rate.ok_or_else(|| no_time(header))?;
+                notes.file("no time column: time from the sampling rate, starting at 0 s");
+                Clock {
+                    rate_hz,
+                    start_s: 0.0,
+                    rounding_s: None,
+                    grid: None,
+                }
+            }
+        };
+        checks::plausible_clock("time", clock.rate_hz, clock.start_s)
+            .map_err(|e| e.line(header.data_line))?;
+        self.clock = Some(clock);
+        // The last row of the piece before, so that a gap between pieces is one too.
+        let overlap = usize::from(!self.last.is_empty());
+        let next_last: Vec<f64> = table.columns.iter().filter_map(|c| c.last().copied()).collect();
+        if overlap == 1 {
+            for (column, last) in table.columns.iter_mut().zip(&self.last) {
+                column.insert(0, *last);
+            }
+        }
+        if !next_last.is_empty() {
+            self.last = next_last;
+        }
+        let gaps = match (time_at, clock.rounding_s, clock.grid) {
+            (Some(at), Some(rounding_s), None) => self
+                .lost
+                .look(&table.columns[at], 1.0 / clock.rate_hz, rounding_s)
+                .map_err(|problem| refused(&problem, header))?,
+            _ => Vec::new(),
+        };
+        let times = time_at
+            .map(|at| table.columns[at].clone())
+            .filter(|_| clock.grid.is_some());
+        let mut filled = Vec::new();
+        let columns = table.columns.into_iter().enumerate();
+        let channels = columns
+            .filter(|(i, _)| Some(*i) != time_at)
+            .map(|(i, mut values)| {
+                if let (Some(times), Some(grid)) = (&times, clock.grid) {
+                    return channel(header, i, clock::resample(times, &values, grid), notes);
+                }
+                filled = fill(&mut values, &gaps);
+                values.drain(..overlap.min(values.len()));
+                channel(header, i, values, notes)
+            })
+            .collect::<Result<Vec<Channel>, _>>()?;
+        if channels.is_empty() {
+            return Err(InputError::new("a time column and no channel beside it").line(header.data_line));
+        }
+        filled
+            .iter_mut()
+            .for_each(|r| *r = r.start - overlap..r.end - overlap);
+        let mut seen: Vec<ChannelRole> = Vec::new();
+        for channel in channels.iter().filter(|c| c.role != ChannelRole::Other) {
+            if seen.contains(&channel.role) {
+                notes.about(
+                    &channel.name,
+                    "a second channel for the same force: the first one is used",
+                );
+            }
+            seen.push(channel.role);
+        }
+        let record = TimeRecord {
+            sample_rate_hz: clock.rate_hz,
+            start_s: clock.start_s + self.samples as f64 / clock.rate_hz,
+            channels,
+            filled,
+        };
+        self.samples += record.len();
+        Ok(record)
+    }
+
+    /// What the time column showed over all pieces.
+    pub fn finish(&self, notes: &mut Notes) {
+        self.lost.tell(notes);
+    }
+}
+
+fn time_factor(header: &Header, at: usize) -> f64 {
+    let unit = column_unit(header, at).filter(|u| u.dimension == Dimension::TIME);
+    unit.map_or(1.0, |u| u.factor)
+}
+
+fn no_time(header: &Header) -> InputError {
+    InputError::new("no time column and no sampling rate")
+        .line(header.data_line.saturating_sub(1).max(1))
+        .remedy("name a column `time_s` or add a line `Sampling rate [Hz]:,10000` above the names")
+}
+
+fn check_numbers(table: &Table, header: &Header, first_line: usize) -> Result<(), InputError> {
+    for (i, column) in table.columns.iter().enumerate() {
+        if let Some(row) = column.iter().position(|v| !v.is_finite()) {
+            let name = header
+                .names
+                .get(i)
+                .map_or_else(|| format!("column {}", i + 1), |n| format!("channel {n}"));
+            return Err(InputError::new(format!(
+                "{name} has no valid number in data row {}",
+                first_line - header.data_line + row + 1
+            ))
+            .line(first_line + row)
+            .remedy(
+                "a record with missing samples cannot be used: export it again or cut the row range out",
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn time_column(header: &Header) -> Option<usize> {
+    header.names.iter().position(|name| {
+        let (base, _) = split_unit(name);
+        let base = base.to_lowercase();
+        [
+            "time", "t", "zeit", "temps", "tiempo", "tempo", "cas", "čas", "x_value",
+        ]
+        .contains(&base.as_str())
+            || base.starts_with("time ")
+    })
+}
+
+/// `Sampling rate [Hz]:,10000` and its relatives.
+fn sampling_rate(header: &Header) -> Option<f64> {
+    let rate = [
+        "sampling rate",
+        "sample rate",
+        "sampling frequency",
+        "abtastrate",
+        "sampling_rate",
+        "sample_rate",
+    ];
+    let (key, value) = header.entry(&rate)?;
+    let unit = key
+        .split(['[', '('])
+        .nth(1)
+        .and_then(|u| u.split([']', ')']).next())
+        .map(str::trim);
+    // The unit may stand behind the value too.
+    let mut words = value.split_whitespace();
+    let word = words.next()?;
+    let number = number::field(word.as_bytes(), b'.').or_else(|| number::field(word.as_bytes(), b','))?;
+    let factor = unit
+        .or(words.next())
+        .and_then(units::frequency_factor)
+        .unwrap_or(1.0);
+    let rate = number * factor;
+    (rate.is_finite() && rate > 0.0).then_some(rate)
+}
+
+/// The unit that a channel's name gives: `fx_n`, `Fx [N]`.
+pub(crate) fn unit_in_name(name: &str) -> Option<Unit> {
+    split_unit(name).1
+}
+
+/// Name and unit of `Fx [N]`, `Fx (N)`, `fx_n`, `Fx`.
+fn split_unit(name: &str) -> (&str, Option<Unit>) {
+    let name = name.trim();
+    for (open, close) in [('[', ']'), ('(', ')')] {
+        if let Some((base, rest)) = name.split_once(open)
+            && let Some((unit, _)) = rest.split_once(close)
+        {
+            return (base.trim(), units::parse(unit));
+        }
+    }
+    for (at, _) in name.match_indices('_') {
+        if let Some(unit) = units::parse_suffix(&name[at + 1..]) {
+            return (&name[..at], Some(unit));
+        }
+    }
+    (name, None)
+}
+
+fn column_unit(header: &Header, at: usize) -> Option<Unit> {
+    let from_line = header.units.get(at).and_then(|label| units::parse_named(label));
+    from_line.or_else(|| header.names.get(at).and_then(|name| split_unit(name).1))
+}
+
+/// Role by name (`Fx`, `FX1`, `AFx`, `force_x`, `Mz`, `torque`) where the unit does not speak against it.
+pub(crate) fn role_of(name: &str, unit: Option<Unit>) -> ChannelRole {
+    let base = split_unit(name).0.to_lowercase();
+    let letters: String = base.chars().filter(|c| c.is_alphanumeric()).collect();
+    // Two digits (`Fx12`) are the sum of two of four sensors, not the whole force.
+    let bare = letters.trim_end_matches(|c: char| c.is_ascii_digit());
+    if letters.len() - bare.len() > 1 {
+        return ChannelRole::Other;
+    }
+    let role = match bare {
+        "fx" | "afx" | "forcex" | "xforce" | "kraftx" => ChannelRole::ForceX,
+        "fy" | "afy" | "forcey" | "yforce" | "krafty" => ChannelRole::ForceY,
+        "fz" | "afz" | "forcez" | "zforce" | "kraftz" | "thrust" | "thrustforce" => ChannelRole::ForceZ,
+        "mz" | "amz" | "momentz" | "torquez" | "torque" | "drehmoment" | "mzmoment" => ChannelRole::TorqueZ,
+        _ => return ChannelRole::Other,
+    };
+    let expected = if role == ChannelRole::TorqueZ {
+        Dimension::MOMENT
+    } else {
+        Dimension::FORCE
+    };
+    match unit {
+        Some(unit) if unit.dimension != expected && unit.dimension != Dimension::VOLTAGE => {
+            ChannelRole::Other
+        }
+        _ => role,
+    }
+}
+
+fn channel(
+    header: &Header,
+    at: usize,
+    mut samples: Vec<f64>,
+    notes: &mut Notes,
+) -> Result<Channel, InputError> {
+    let name = header
+        .names
+        .get(at)
+        .cloned()
+        .unwrap_or_else(|| format!("column {}", at + 1));
+    let unit = column_unit(header, at);
+    let role = role_of(&name, unit);
+    let label = header.units.get(at).cloned();
+    let file_unit = label.unwrap_or_else(|| {
+        let (_, unit) = split_unit(&name);
+        let in_brackets = name
+            .split_once(['[', '('])
+            .map(|(_, u)| u.trim_end_matches([']', ')']).to_owned());
+        in_brackets
+            .or_else(|| unit.and_then(|u| suffix_label(&name, u)))
+            .unwrap_or_default()
+    });
+    match unit {
+        Some(unit) => {
+            if (unit.factor - 1.0).abs() > 1e-12 {
+                samples.iter_mut().for_each(|v| *v *= unit.factor);
+            }
+            if unit.dimension == Dimension::VOLTAGE && role != ChannelRole::Other {
+                notes.about(
+                    &name,
+                    "a force in volts: values as they stand, check that they are newtons",
+                );
+            }
+        }
+        None if role == ChannelRole::TorqueZ => notes.about(&name, "no unit that is understood: N·m assumed"),
+        None if role != ChannelRole::Other => notes.about(&name, "no unit that is understood: N assumed"),
+        None => {}
+    }
+    checks::plausible_samples(&name, &samples).map_err(|e| e.line(header.data_line))?;
+    Ok(Channel {
+        name,
+        file_unit,
+        role,
+        samples,
+    })
+}
+
+/// The unit of `fx_n` as people write it.
+fn suffix_label(name: &str, unit: Unit) -> Option<String> {
+    match unit.dimension.describe() {
+        Some((_, si)) if (unit.factor - 1.0).abs() < 1e-12 => Some(si.to_owned()),
+        _ => name.split_once('_').map(|(_, suffix)| suffix.to_owned()),
+    }
+}
+
+/// Resolution of the printed time: a unit in the last place, in the coarsest of the first, middle and last stretches of rows.
+/// Within a stretch the finest counts: some programs leave trailing zeros out (`0`, `0.001`, …, `0.1`).
+fn time_resolution(bytes: &[u8], header: &Header, column: usize) -> f64 {
+    const STRETCH: usize = 12;
+    let data = bytes.get(header.data_at..).unwrap_or_default();
+    if header.decimal_comma_between_commas {
+        return 1e-6;
+    }
+    let place = |line: &[u8]| {
+        let line = crate::ingest::text::decode(line);
+        let field = crate::ingest::tables::table::split_line(&line, header.delimiter)
+            .into_iter()
+            .nth(column)?;
+        let (mantissa, exponent) = field.split_once(['e', 'E']).unwrap_or((&field, "0"));
+        let fraction = mantissa
+            .split(char::from(header.decimal))
+            .nth(1)
+            .map_or(0, str::len) as i32;
+        Some(exponent.parse::<i32>().ok()?.saturating_sub(fraction))
+    };
+    let places = |from: usize| {
+        let rest = &data[from..];
+        let start = match from {
+            0 => 0,
+            _ => rest.iter().position(|b| *b == b'\n')? + 1,
+        };
+        let lines = crate::ingest::text::Lines::new(&rest[start..]).take(STRETCH);
+        lines.filter_map(place).min()
+    };
+    let coarsest = [0, data.len() / 2, data.len().saturating_sub(600)]
+        .into_iter()
+        .filter_map(places)
+        .max();
+    10_f64.powi(coarsest.unwrap_or(-9).clamp(-12, 3))
+}

@@ -1,0 +1,436 @@
+//! FRFs as text: the campaign's FRF CSV, plain `Hz Re Im`, and CutPro-style `.frf`.
+
+use std::collections::HashMap;
+
+use num_complex::Complex64;
+
+use crate::InputError;
+use crate::data::{Dof, FrfRecord, Quantity};
+use crate::ingest::checks;
+use crate::ingest::dof_names;
+use crate::ingest::tables::table::{Header, is_row};
+use crate::ingest::text::{Lines, Notes, decode};
+use crate::ingest::units;
+
+/// What a column of an FRF table holds; the text names the FRF (empty where there is one only).
+#[derive(Debug, Clone, PartialEq)]
+enum Column {
+    Frequency { factor: f64 },
+    Re(String),
+    Im(String),
+    Magnitude(String),
+    PhaseDeg(String),
+    PhaseRad(String),
+    Coherence(String),
+    Unknown,
+}
+
+/// Reads a column name such as `frequency_hz`, `re(1X/1Y)`, `im`, `phase_deg`.
+fn column(name: &str) -> Column {
+    let lower = name.trim().to_lowercase();
+    let (head, inside) = match (lower.find('('), lower.rfind(')')) {
+        (Some(open), Some(close)) if open < close => {
+            (lower[..open].trim(), name.trim()[open + 1..close].trim())
+        }
+        _ => (lower.as_str(), ""),
+    };
+    let of = inside.to_owned();
+    match head {
+        "re" | "real" | "re_h" => Column::Re(of),
+        "im" | "imag" | "imaginary" | "im_h" => Column::Im(of),
+        "mag" | "magnitude" | "abs" | "amplitude" => Column::Magnitude(of),
+        "phase_deg" | "phase [deg]" | "phase[deg]" => Column::PhaseDeg(of),
+        "phase" if inside == "deg" || inside == "°" => Column::PhaseDeg(String::new()),
+        "phase_rad" | "phase [rad]" | "phase[rad]" => Column::PhaseRad(of),
+        "phase" if inside == "rad" => Column::PhaseRad(String::new()),
+        "coherence" | "coh" | "gamma2" => Column::Coherence(of),
+        "f" | "freq" | "frq" | "freq." | "frequency" | "frequency_hz" | "freq_hz" | "f_hz" | "hz"
+        | "frequenz" => Column::Frequency {
+            factor: units::frequency_factor(inside).unwrap_or(1.0),
+        },
+        _ => match head.split_once('[') {
+            Some(("f" | "freq" | "frequency" | "freq " | "frequency " | "f ", unit)) => Column::Frequency {
+                factor: units::frequency_factor(unit.trim_end_matches(']')).unwrap_or(1.0),
+            },
+            Some((base, _))
+                if ["re", "real", "im", "imag", "imaginary", "mag", "magnitude"].contains(&base.trim()) =>
+            {
+                column(base)
+            }
+            _ => part_behind_name(name).unwrap_or(Column::Unknown),
+        },
+    }
+}
+
+/// `amp_real`, `H1_2_imag`, `1X/1X re`: the part stands behind the name of the FRF.
+fn part_behind_name(name: &str) -> Option<Column> {
+    let name = name.trim();
+    let (of, part) = name.rsplit_once(['_', ' '])?;
+    let part = match part.to_lowercase().as_str() {
+        "re" | "real" => Column::Re,
+        "im" | "imag" | "imaginary" => Column::Im,
+        "mag" | "magnitude" => Column::Magnitude,
+        "coh" | "coherence" => Column::Coherence,
+        _ => return None,
+    };
+    // These name no FRF but the value itself.
+    let of = of.trim();
+    let bare = ["amp", "amplitude", "frf", "h", "value", "y"].contains(&of.to_lowercase().as_str());
+    Some(part(if bare { String::new() } else { of.to_owned() }))
+}
+
+/// The names line of a SignalCalc export (Data Physics), put together: its signals (`H1,2`) stand above the parts (`Real`,
+/// `Imag`), and the units under a line `Units:`. Such a header is changed to what other tables have.
+pub(crate) fn join_signalcalc(header: &mut Header) {
+    let split = |line: &String| -> Vec<String> { line.split('\t').map(|f| f.trim().to_owned()).collect() };
+    let Some(units_at) = header.lines.iter().rposition(|l| l.trim() == "Units:") else {
+        return;
+    };
+    let parts_at = header.lines[..units_at].iter().rposition(|l| {
+        let fields = split(l);
+        fields.len() >= 2 && matches!(column(&fields[0]), Column::Frequency { .. })
+    });
+    let Some(parts_at) = parts_at else { return };
+    let parts = split(&header.lines[parts_at]);
+    let signals = parts_at
+        .checked_sub(1)
+        .map(|at| split(&header.lines[at]))
+        .unwrap_or_default();
+    let mut units: Vec<String> = header.lines.get(units_at + 1).map(split).unwrap_or_default();
+    if units.is_empty() && header.names.len() > 1 {
+        units = header.names.clone();
+    }
+    let named: Vec<&String> = signals.iter().filter(|s| !s.is_empty()).collect();
+    let each = (parts.len() - 1) / named.len().max(1);
+    let name = |k: usize| {
+        let part = parts[k].to_lowercase();
+        let signal = (k > 0 && !named.is_empty() && each > 0)
+            .then(|| named.get((k - 1) / each))
+            .flatten();
+        match signal {
+            Some(signal) if part.starts_with("phase") => format!("phase_deg({signal})"),
+            Some(signal) => format!("{part}({signal})"),
+            None if part.starts_with("phase") => "phase_deg".into(),
+            None => part,
+        }
+    };
+    header.names = (0..parts.len()).map(name).collect();
+    header.columns = header.names.len();
+    units.resize(header.columns, String::new());
+    header.units = units;
+}
+
+/// What a column's unit (under its name, or in its brackets) says of the FRF: quantity and factor to SI. `(m/s2)(N)`, as
+/// SignalCalc writes it, is a ratio.
+fn quantity_of_unit(header: &Header, at: usize) -> Option<(Quantity, f64)> {
+    let name = header.names.get(at)?;
+    let in_brackets = name
+        .split_once('[')
+        .map(|(_, u)| u.trim_end_matches(']').to_owned());
+    let label = header
+        .units
+        .get(at)
+        .cloned()
+        .filter(|u| !u.is_empty())
+        .or(in_brackets)?;
+    let of = |label: &str| units::parse_named(label).and_then(|u| Some((u.dimension.frf()?, u.factor)));
+    of(&label).or_else(|| of(&label.replacen(")(", ")/(", 1)))
+}
+
+/// Response and reference that the lines above the table say: `Response: 3Z`, `Reference DOF,1X`, `DOFs: 3Z:1X`.
+fn dofs_of_header(header: &Header) -> (Option<Dof>, Option<Dof>) {
+    let said = |keys: &[&str]| {
+        header
+            .entry(keys)
+            .and_then(|(_, value)| value.trim().parse::<Dof>().ok())
+    };
+    let (response, reference) = (said(&["response", "roving"]), said(&["reference", "excitation"]));
+    if response.is_some() || reference.is_some() {
+        return (response, reference);
+    }
+    let Some((_, both)) = header.entry(&["dof"]) else {
+        return (None, None);
+    };
+    let both = both.split('[').next().unwrap_or_default();
+    let Some((response, reference)) = both.split_once([':', '/']) else {
+        return (both.trim().parse().ok(), None);
+    };
+    (response.trim().parse().ok(), reference.trim().parse().ok())
+}
+
+/// True where the column names are those of FRFs.
+pub(crate) fn is_frf_table(header: &Header) -> bool {
+    let columns: Vec<Column> = header.names.iter().map(|n| column(n)).collect();
+    matches!(columns.first(), Some(Column::Frequency { .. }))
+        && columns
+            .iter()
+            .any(|c| matches!(c, Column::Re(_) | Column::Magnitude(_)))
+}
+
+/// True where three columns of numbers stand alone, or under a heading that speaks of frequency.
+pub(crate) fn is_plain_frf(header: &Header) -> bool {
+    let mut above = header.lines.iter().chain(&header.names);
+    header.columns == 3 && (above.all(|l| l.trim().is_empty()) || speaks_of_frequency(header))
+}
+
+fn speaks_of_frequency(header: &Header) -> bool {
+    let mut above = header.lines.iter().chain(&header.names);
+    above.any(|text| text.to_lowercase().contains("freq"))
+}
+
+/// True for a rising column that is rather the time of a recording than a frequency axis: no FRF of a machine has lines
+/// every few millihertz, and no vibration is sampled less often than fifty times a second.
+fn looks_like_time(rising: &[f64]) -> bool {
+    let [first, .., last] = rising else { return false };
+    let step = (last - first) / (rising.len() - 1) as f64;
+    step <= 2e-3 || step < 0.02 && *last < 50.0
+}
+
+struct Parts {
+    name: String,
+    re: Option<usize>,
+    im: Option<usize>,
+    magnitude: Option<usize>,
+    phase: Option<(usize, f64)>,
+    coherence: Option<usize>,
+}
+
+/// Reads the FRF CSV of a campaign.
+pub(crate) fn read_table(
+    bytes: &[u8],
+    header: &Header,
+    notes: &mut Notes,
+) -> Result<Vec<FrfRecord>, InputError> {
+    let names_line = header
+        .data_line
+        .saturating_sub(1 + usize::from(!header.units.is_empty()))
+        .max(1);
+    let columns: Vec<Column> = header.names.iter().map(|n| column(n)).collect();
+    let Some(Column::Frequency { factor }) = columns.first().cloned() else {
+        return Err(InputError::new("the first column is not the frequency").line(names_line));
+    };
+    let mut parts: Vec<Parts> = Vec::new();
+    let mut index: HashMap<&str, usize> = HashMap::new();
+    for (at, column) in columns.iter().enumerate().skip(1) {
+        let name = match column {
+            Column::Re(n) | Column::Im(n) | Column::Magnitude(n) => n,
+            Column::PhaseDeg(n) | Column::PhaseRad(n) | Column::Coherence(n) => n,
+            Column::Frequency { .. } | Column::Unknown => {
+                return Err(
+                    InputError::new(format!("column {:?} is not part of an FRF", header.names[at]))
+                        .line(names_line)
+                        .remedy(
+                            "use frequency_hz, then re(1X/1X),im(1X/1X) or magnitude,phase_deg for each FRF",
+                        ),
+                );
+            }
+        };
+        let i = *index.entry(name).or_insert(parts.len());
+        if i == parts.len() {
+            let name = name.clone();
+            parts.push(Parts {
+                name,
+                re: None,
+                im: None,
+                magnitude: None,
+                phase: None,
+                coherence: None,
+            });
+        }
+        let part = &mut parts[i];
+        let twice = match column {
+            Column::Re(_) => part.re.replace(at).is_some(),
+            Column::Im(_) => part.im.replace(at).is_some(),
+            Column::Magnitude(_) => part.magnitude.replace(at).is_some(),
+            Column::PhaseDeg(_) => part.phase.replace((at, std::f64::consts::PI / 180.0)).is_some(),
+            Column::PhaseRad(_) => part.phase.replace((at, 1.0)).is_some(),
+            _ => part.coherence.replace(at).is_some(),
+        };
+        if twice {
+            return Err(
+                InputError::new(format!("column {:?} comes twice", header.names[at])).line(names_line),
+            );
+        }
+    }
+    let table = header.read(bytes, None, notes)?;
+    let frequency_hz: Vec<f64> = table.columns[0].iter().map(|f| f * factor).collect();
+    let mut frfs = Vec::with_capacity(parts.len());
+    for part in parts {
+        let pair = |a: usize, b: usize| table.columns[a].iter().zip(&table.columns[b]);
+        let value: Vec<Complex64> = match (part.re, part.im, part.magnitude, part.phase) {
+            // Magnitude and phase beside them say the same.
+            (Some(re), Some(im), ..) => pair(re, im).map(|(re, im)| Complex64::new(*re, *im)).collect(),
+            (None | Some(_), None, Some(magnitude), Some((phase, radians))) => pair(magnitude, phase)
+                .map(|(m, p)| Complex64::from_polar(*m, p * radians))
+                .collect(),
+            _ => {
+                let whose = if part.name.is_empty() {
+                    String::new()
+                } else {
+                    format!(" of {}", part.name)
+                };
+                return Err(InputError::new(format!("the columns{whose} do not make an FRF"))
+                    .line(names_line)
+                    .remedy("give re and im, or magnitude and phase_deg, under the same name"));
+            }
+        };
+        let coherence = part.coherence.map(|at| &table.columns[at]);
+        let coherence = coherence.filter(|c| c.iter().all(|v| (-0.01..=1.01).contains(v)));
+        if part.coherence.is_some() && coherence.is_none() {
+            notes.about(&part.name, "coherence outside 0..1: left out");
+        }
+        let (response, reference) = match dofs(&part.name, notes) {
+            (None, None) => dofs_of_header(header),
+            both => both,
+        };
+        let unit = part
+            .re
+            .or(part.magnitude)
+            .and_then(|at| quantity_of_unit(header, at));
+        let factor = unit.map_or(1.0, |u| u.1);
+        if (factor - 1.0).abs() > 1e-12 {
+            notes.about(&part.name, format!("converted to SI, factor {factor:.6}"));
+        }
+        let value: Vec<Complex64> = value.into_iter().map(|v| v * factor).collect();
+        frfs.extend(checks::tidy_frf(
+            FrfRecord {
+                name: if part.name.is_empty() {
+                    "FRF".into()
+                } else {
+                    part.name
+                },
+                response,
+                reference,
+                quantity: unit.map(|u| u.0),
+                frequency_hz: frequency_hz.clone(),
+                value,
+                coherence: coherence.map(|c| c.iter().map(|v| v.clamp(0.0, 1.0)).collect()),
+            },
+            notes,
+        )?);
+    }
+    Ok(frfs)
+}
+
+/// `1X/1Y` → response and reference.
+fn dofs(name: &str, notes: &mut Notes) -> (Option<Dof>, Option<Dof>) {
+    if name.is_empty() {
+        return (None, None);
+    }
+    let both = name
+        .split_once('/')
+        .and_then(|(a, b)| Some((a.parse::<Dof>().ok()?, b.parse::<Dof>().ok()?)));
+    let both = both.or(match dof_names::dofs(name) {
+        (Some(response), Some(reference)) => Some((response, reference)),
+        _ => None,
+    });
+    if both.is_none() {
+        notes.about(
+            name,
+            "not of the form 1X/1X (node and axis of response / excitation)",
+        );
+    }
+    both.unzip()
+}
+
+/// Three columns without names: frequency, real, imaginary part.
+pub(crate) fn read_plain(
+    bytes: &[u8],
+    header: &Header,
+    quantity: Option<Quantity>,
+    factor: f64,
+    notes: &mut Notes,
+) -> Result<Vec<FrfRecord>, InputError> {
+    let table = header.read(bytes, None, notes)?;
+    let [frequency, re, im] = table.columns.as_slice() else {
+        return Err(InputError::new("frequency, real and imaginary part are expected").line(header.data_line));
+    };
+    if !frequency.is_sorted_by(|a, b| a < b) || frequency.first().is_none_or(|f| *f < 0.0) {
+        return Err(InputError::new(
+            "three columns of numbers whose first does not rise from 0: no frequency axis",
+        )
+        .line(header.data_line)
+        .remedy("put a line of column names on top: frequency_hz,re,im or time_s,fx_n,fy_n"));
+    }
+    if quantity.is_none() && !speaks_of_frequency(header) && looks_like_time(frequency) {
+        return Err(InputError::new(format!(
+            "three columns of numbers without names, the first from {} to {} in steps that fit a time and no frequency",
+            frequency.first().copied().unwrap_or(0.0),
+            frequency.last().copied().unwrap_or(0.0)
+        ))
+        .line(header.data_line)
+        .remedy("put a line of column names on top: time_s,force_n,acc_m_per_s2 for a record, frequency_hz,re,im for an FRF"));
+    }
+    let (response, reference) = dofs_of_header(header);
+    let record = FrfRecord {
+        name: "FRF".into(),
+        response,
+        reference,
+        quantity,
+        frequency_hz: frequency.clone(),
+        value: re
+            .iter()
+            .zip(im)
+            .map(|(re, im)| Complex64::new(*re, *im) * factor)
+            .collect(),
+        coherence: None,
+    };
+    Ok(checks::tidy_frf(record, notes)?.into_iter().collect())
+}
+
+/// First line of a CutPro-style file: three numbers, then labels. Gives the labels.
+pub(crate) fn cutpro_labels(bytes: &[u8]) -> Option<Vec<String>> {
+    let mut lines = Lines::new(bytes);
+    let first = decode(lines.next()?);
+    let words: Vec<&str> = first.split_whitespace().collect();
+    let (numbers, labels) = words.split_at_checked(3)?;
+    let has = |word: &str| labels.iter().any(|l| l.to_lowercase().starts_with(word));
+    let labelled = has("freq") && has("real") && has("imag");
+    (labelled && is_row(numbers.join(" ").as_bytes()) && lines.next().is_none_or(is_row))
+        .then(|| labels.iter().map(|l| (*l).to_owned()).collect())
+}
+
+/// Reads a CutPro-style file: `0.0 2.0e-07 0.0 Freq Hz Real m/N Imag m/N`, then plain rows.
+pub(crate) fn read_cutpro(
+    bytes: &[u8],
+    labels: &[String],
+    notes: &mut Notes,
+) -> Result<Vec<FrfRecord>, InputError> {
+    let after = |word: &str| {
+        let at = labels.iter().position(|l| l.to_lowercase().starts_with(word))?;
+        labels.get(at + 1)
+    };
+    let unit = after("real").and_then(|label| units::parse_named(label));
+    let quantity = unit.and_then(|u| u.dimension.frf());
+    let factor = unit.filter(|_| quantity.is_some()).map_or(1.0, |u| u.factor);
+    if quantity.is_none() {
+        notes.file("the unit of the FRF is not understood: SI assumed, quantity left open");
+    } else if (factor - 1.0).abs() > 1e-12 {
+        notes.file(format!(
+            "converted to {}, factor {factor}",
+            quantity.map_or("SI", units::frf_unit)
+        ));
+    }
+    let frequency = after("freq")
+        .and_then(|label| units::frequency_factor(label))
+        .unwrap_or(1.0);
+    // The first line without its labels is a row like the others.
+    let first = decode(Lines::new(bytes).next().unwrap_or_default());
+    let mut plain = first
+        .split_whitespace()
+        .take(3)
+        .collect::<Vec<_>>()
+        .join(" ")
+        .into_bytes();
+    plain.push(b'\n');
+    for line in Lines::new(bytes).skip(1) {
+        plain.extend(line.iter().map(|b| if *b == b'\t' { b' ' } else { *b }));
+        plain.push(b'\n');
+    }
+    let header = Header::find(&plain).ok_or_else(|| InputError::new("no rows of three numbers"))?;
+    let mut frfs = read_plain(&plain, &header, quantity, factor, notes)?;
+    for frf in &mut frfs {
+        frf.frequency_hz.iter_mut().for_each(|f| *f *= frequency);
+    }
+    Ok(frfs)
+}

@@ -1,0 +1,556 @@
+//! What the arrays of a MAT-file are, by name, shape and kind of number. A MAT-file has no standard for measurements:
+//! whatever is decided here is said in the notes.
+
+#[cfg(test)]
+mod tests;
+
+use num_complex::Complex64;
+
+use crate::InputError;
+use crate::data::{FrfRecord, Quantity, TimeRecord};
+use crate::ingest::budget::Budget;
+use crate::ingest::contents::{Contents, OtherRecord};
+use crate::ingest::formats::mat::variable::{MIN_AXIS, Variable};
+use crate::ingest::formats::waveform;
+use crate::ingest::tables::clock::{self, Grid, Stamps};
+use crate::ingest::text::Notes;
+use crate::ingest::{checks, dof_names};
+
+/// Change of the step from which on times are not evenly spaced.
+const UNEVEN: f64 = 0.02;
+/// Names of arrays shown in one message.
+const SHOWN: usize = 8;
+
+pub(crate) fn contents(
+    mut variables: Vec<Variable>,
+    budget: &mut Budget,
+    notes: &mut Notes,
+) -> Result<Contents, InputError> {
+    if variables.is_empty() {
+        return Err(InputError::new("a MAT-file without numeric arrays")
+            .remedy("save the frequency axis f (Hz) or the times t (s) and the data as plain arrays"));
+    }
+    let mut used = vec![false; variables.len()];
+    let mut contents = Contents::default();
+    join_parts(&mut variables, notes);
+    tables(&variables, &mut used, &mut contents, budget, notes)?;
+    frequency_functions(&variables, &mut used, &mut contents, budget, notes)?;
+    let mut times = time_signals(&variables, &mut used, budget, notes)?;
+    contents.times.append(&mut times);
+    if contents.frfs.is_empty() && contents.times.is_empty() && contents.others.is_empty() {
+        return Err(InputError::new(format!(
+            "a MAT-file in which no FRF and no time signal is recognised ({})",
+            names(variables.iter())
+        ))
+        .remedy(
+            "name the axis f (Hz) or t (s); FRFs are complex arrays with a dimension as long as f, signals real ones \
+             with a dimension as long as t",
+        ));
+    }
+    let left: Vec<&Variable> = variables
+        .iter()
+        .zip(&used)
+        .filter(|(_, u)| !**u)
+        .map(|(v, _)| v)
+        .collect();
+    if !left.is_empty() {
+        notes.file(format!("arrays left out: {}", names(left.into_iter())));
+    }
+    Ok(contents)
+}
+
+/// Real arrays of two columns that are the real and imaginary parts of an FRF become complex.
+fn join_parts(variables: &mut [Variable], notes: &mut Notes) {
+    for variable in variables {
+        let columns = variable.size.as_slice() == [variable.re.len() / 2, 2];
+        if variable.im.is_some() || !columns || variable.re.len() < 2 * MIN_AXIS || !variable.is_called_frf()
+        {
+            continue;
+        }
+        let (re, im) = variable.re.split_at(variable.re.len() / 2);
+        if rises_evenly(re) {
+            continue;
+        }
+        notes.about(&variable.name, "two columns, taken as real and imaginary part");
+        let (re, im) = (re.to_vec(), im.to_vec());
+        variable.size = vec![re.len(), 1];
+        variable.re = re;
+        variable.im = Some(im);
+    }
+}
+
+/// True for an axis: finite, rising in even steps.
+fn rises_evenly(values: &[f64]) -> bool {
+    let [first, .., last] = values else { return false };
+    let step = (last - first) / (values.len() - 1) as f64;
+    let slack = 1e-3 * step + 1e-6 * last.abs();
+    values.len() >= MIN_AXIS
+        && step > 0.0
+        && step.is_finite()
+        && values
+            .iter()
+            .enumerate()
+            .all(|(i, v)| (first + step * i as f64 - v).abs() <= slack)
+}
+
+/// Arrays that hold their own axis in the first column, `[f, H]` or `[t, x]`, as SignalCalc (Data Physics) and hand-made
+/// files have them: `H1_2` an FRF, `C1_2` a coherence, `G1_2` and `S1` spectra, `X1` a signal.
+fn tables(
+    variables: &[Variable],
+    used: &mut [bool],
+    contents: &mut Contents,
+    budget: &mut Budget,
+    notes: &mut Notes,
+) -> Result<(), InputError> {
+    let mut coherences = Vec::new();
+    for (k, variable) in variables.iter().enumerate() {
+        let [rows, columns] = variable.size.as_slice() else {
+            continue;
+        };
+        let (rows, columns) = (*rows, *columns);
+        if columns < 2 || rows < MIN_AXIS || columns >= rows || rows * columns != variable.re.len() {
+            continue;
+        }
+        let axis = &variable.re[..rows];
+        let no_phase = |im: &Vec<f64>| im[..rows].iter().all(|v| *v == 0.0);
+        if !variable.im.as_ref().is_none_or(no_phase) || axis[0] < 0.0 || !rises_evenly(axis) {
+            continue;
+        }
+        budget.take(48 * variable.re.len(), &format!("variable {}", variable.name))?;
+        let column = |c: usize| &variable.re[c * rows..(c + 1) * rows];
+        let values = |c: usize| -> Vec<Complex64> {
+            (c * rows..(c + 1) * rows).map(|i| complex(variable, i)).collect()
+        };
+        let mut frf = |name: String, value: Vec<Complex64>, notes: &mut Notes| {
+            let record = record(variable, name, axis, value);
+            checks::tidy_frf(record, notes).map(|record| contents.frfs.extend(record))
+        };
+        let suffix = |c: usize| {
+            if columns > 2 {
+                format!("(:,{})", c + 1)
+            } else {
+                String::new()
+            }
+        };
+        let is_real = variable.im.is_none();
+        match kind(variable) {
+            Kind::Coherence if columns == 2 => coherences.push((variable, axis, column(1).to_vec())),
+            Kind::Frf if !is_real => {
+                for c in 1..columns {
+                    frf(format!("{}{}", variable.name, suffix(c)), values(c), notes)?;
+                }
+            }
+            _ if is_real && columns == 3 && variable.is_called_frf() => {
+                let both = column(1)
+                    .iter()
+                    .zip(column(2))
+                    .map(|(re, im)| Complex64::new(*re, *im))
+                    .collect();
+                frf(variable.name.clone(), both, notes)?;
+            }
+            Kind::Other(kind) => contents.others.extend((1..columns).map(|c| OtherRecord {
+                kind,
+                name: format!("{}{}", variable.name, suffix(c)),
+                abscissa: axis.to_vec(),
+                abscissa_unit: "Hz".into(),
+                value: values(c),
+                unit: String::new(),
+            })),
+            Kind::Unknown
+                if is_real && (variable.is_called_signal() || axis[1] - axis[0] <= SAMPLE_STEP_S) =>
+            {
+                let rate = (rows - 1) as f64 / (axis[rows - 1] - axis[0]);
+                for c in 1..columns {
+                    let name = format!("{}{}", variable.name, suffix(c));
+                    let channel = waveform::channel(name, String::new(), column(c).to_vec(), notes)?;
+                    waveform::put(&mut contents.times, rate, axis[0], channel)?;
+                }
+            }
+            _ => continue,
+        }
+        used[k] = true;
+        let what = if matches!(kind(variable), Kind::Unknown) {
+            "time"
+        } else {
+            "frequency"
+        };
+        notes.about(&variable.name, format!("its first column is taken as {what}"));
+    }
+    for (variable, axis, values) in coherences {
+        attach(variable, axis, &values, variables, contents, notes);
+    }
+    Ok(())
+}
+
+/// Steps up to this are those of a recording where nothing says what an axis is, s.
+const SAMPLE_STEP_S: f64 = 2e-3;
+
+/// An FRF of a variable.
+fn record(variable: &Variable, name: String, axis: &[f64], value: Vec<Complex64>) -> FrfRecord {
+    let (response, reference) = match dof_names::dofs(variable.own_name()) {
+        (Some(response), Some(reference)) => (Some(response), Some(reference)),
+        _ => (None, None),
+    };
+    FrfRecord {
+        name,
+        response,
+        reference,
+        quantity: quantity(variable),
+        frequency_hz: axis.to_vec(),
+        value,
+        coherence: None,
+    }
+}
+
+fn names<'a>(variables: impl ExactSizeIterator<Item = &'a Variable>) -> String {
+    let count = variables.len();
+    let mut shown: Vec<&str> = variables.take(SHOWN).map(|v| v.name.as_str()).collect();
+    if count > SHOWN {
+        shown.push("…");
+    }
+    shown.join(", ")
+}
+
+/// A frequency axis: a variable of its own, or made of start and step.
+struct Axis {
+    name: String,
+    hz: Vec<f64>,
+    /// Only variables that lie in this struct.
+    within: Option<String>,
+}
+
+/// All frequency axes: variables named so, start and step as scalars, and, where complex arrays have none of those, a
+/// rising vector of their length.
+fn frequency_axes(
+    variables: &[Variable],
+    used: &mut [bool],
+    budget: &mut Budget,
+    notes: &mut Notes,
+) -> Result<Vec<Axis>, InputError> {
+    let mut axes = Vec::new();
+    for (k, variable) in variables.iter().enumerate() {
+        let Some(factor) = variable
+            .frequency_factor()
+            .filter(|_| !used[k] && variable.is_axis() && variable.re[0] >= 0.0)
+        else {
+            continue;
+        };
+        used[k] = true;
+        if factor != 1.0 {
+            notes.about(&variable.name, "taken as circular frequency, rad/s");
+        }
+        axes.push(Axis {
+            name: variable.name.clone(),
+            hz: variable.re.iter().map(|f| f * factor).collect(),
+            within: None,
+        });
+    }
+    let steps: Vec<usize> = (0..variables.len())
+        .filter(|k| variables[*k].is_frequency_step())
+        .collect();
+    for k in steps {
+        let (Some(step), root) = (variables[k].scalar().filter(|s| *s > 0.0), variables[k].root()) else {
+            continue;
+        };
+        let inside = |v: &&Variable| v.root() == root;
+        let start = variables.iter().filter(inside).find(|v| v.is_frequency_start());
+        let lengths = variables
+            .iter()
+            .filter(inside)
+            .filter(|v| v.im.is_some())
+            .flat_map(|v| v.size.iter().copied());
+        let Some(length) = lengths.max().filter(|n| *n >= MIN_AXIS) else {
+            continue;
+        };
+        budget.take(8 * length, "a frequency axis")?;
+        let first = start.and_then(Variable::scalar).unwrap_or(0.0);
+        notes.about(
+            &variables[k].name,
+            format!("frequency axis of {length} lines from {first} Hz in steps of {step} Hz"),
+        );
+        for (k, v) in variables.iter().enumerate() {
+            used[k] |= v.root() == root && (v.is_frequency_start() || v.is_frequency_step());
+        }
+        axes.push(Axis {
+            name: variables[k].name.clone(),
+            hz: (0..length).map(|i| first + step * i as f64).collect(),
+            within: Some(root.to_owned()),
+        });
+    }
+    // The only rising vector that fits, whatever its name.
+    for (k, variable) in variables.iter().enumerate() {
+        let is_complex_vector = !used[k] && variable.im.is_some() && !variable.size.is_empty();
+        let has_axis = |a: &Axis| variable.size.contains(&a.hz.len());
+        if !is_complex_vector || axes.iter().any(has_axis) {
+            continue;
+        }
+        let fits = |(j, v): &(usize, &Variable)| {
+            !used[*j]
+                && v.im.is_none()
+                && v.is_vector()
+                && v.re[0] >= 0.0
+                && variable.size.contains(&v.re.len())
+                && !v.is_called_signal()
+                && rises_evenly(&v.re)
+                && v.re[1] - v.re[0] > SAMPLE_STEP_S
+        };
+        let mut candidates = variables.iter().enumerate().filter(fits);
+        if let (Some((j, axis)), None) = (candidates.next(), candidates.next()) {
+            used[j] = true;
+            notes.about(
+                &axis.name,
+                "the only rising vector as long as the FRFs: taken as frequency in Hz",
+            );
+            axes.push(Axis {
+                name: axis.name.clone(),
+                hz: axis.re.clone(),
+                within: None,
+            });
+        }
+    }
+    Ok(axes)
+}
+
+/// FRFs, coherences and spectra on the frequency axes.
+fn frequency_functions(
+    variables: &[Variable],
+    used: &mut [bool],
+    contents: &mut Contents,
+    budget: &mut Budget,
+    notes: &mut Notes,
+) -> Result<(), InputError> {
+    let axes = frequency_axes(variables, used, budget, notes)?;
+    let mut coherences: Vec<(&Variable, Vec<usize>, &Axis)> = Vec::new();
+    for axis in &axes {
+        for k in 0..variables.len() {
+            let variable = &variables[k];
+            let elsewhere = axis.within.as_ref().is_some_and(|root| root != variable.root());
+            if used[k] || elsewhere || variable.name == axis.name {
+                continue;
+            }
+            let kind = kind(variable);
+            if matches!(kind, Kind::Unknown) {
+                continue;
+            }
+            let Some(vectors) = variable.along(axis.hz.len()) else {
+                continue;
+            };
+            // Frequencies, values and indices of each, and the record itself.
+            let memory = 40 * variable.re.len() + 512 * vectors.len();
+            budget.take(memory, &format!("variable {}", variable.name))?;
+            used[k] = true;
+            for (suffix, at) in vectors {
+                let value = || at.iter().map(|&i| complex(variable, i)).collect::<Vec<_>>();
+                match kind {
+                    Kind::Frf => {
+                        let record =
+                            record(variable, format!("{}{suffix}", variable.name), &axis.hz, value());
+                        contents.frfs.extend(checks::tidy_frf(record, notes)?);
+                    }
+                    Kind::Coherence => coherences.push((variable, at, axis)),
+                    Kind::Other(kind) => contents.others.push(OtherRecord {
+                        kind,
+                        name: format!("{}{suffix}", variable.name),
+                        abscissa: axis.hz.clone(),
+                        abscissa_unit: "Hz".into(),
+                        value: value(),
+                        unit: String::new(),
+                    }),
+                    Kind::Unknown => {}
+                }
+            }
+        }
+    }
+    for (variable, at, axis) in coherences {
+        let values: Vec<f64> = at.iter().map(|&i| variable.re[i]).collect();
+        attach(variable, &axis.hz, &values, variables, contents, notes);
+    }
+    let finite =
+        |o: &OtherRecord| o.value.iter().all(|v| v.is_finite()) && o.abscissa.iter().all(|v| v.is_finite());
+    contents.others.retain(|o| {
+        let kept = finite(o);
+        if !kept {
+            notes.about(&o.name, "values that are not numbers: left out");
+        }
+        kept
+    });
+    Ok(())
+}
+
+/// A coherence goes to the FRF with the same name but for that word (`H1_2` and `C1_2`), or to the only one there is.
+fn attach(
+    variable: &Variable,
+    axis_hz: &[f64],
+    values: &[f64],
+    variables: &[Variable],
+    contents: &mut Contents,
+    notes: &mut Notes,
+) {
+    let word = |w: &String| !["coh", "coherence", "gamma2"].contains(&w.as_str());
+    let bare: Vec<String> = variable.words().into_iter().filter(word).collect();
+    let digits = |v: &Variable| v.is_analyser_name().then(|| v.own_name()[1..].to_owned());
+    let only = contents.frfs.len() == 1;
+    let frf = contents.frfs.iter_mut().find(|frf| {
+        let source = variables.iter().find(|v| v.name == frf.name);
+        let same = |s: &Variable| s.words() == bare || digits(s).is_some() && digits(s) == digits(variable);
+        frf.coherence.is_none() && (only || source.is_some_and(same))
+    });
+    match frf {
+        Some(frf) => {
+            frf.coherence = checks::on_lines(&frf.frequency_hz, axis_hz, values);
+            if frf.coherence.is_none() {
+                notes.about(&variable.name, "coherence outside 0..1: left out");
+            }
+        }
+        None => notes.about(&variable.name, "a coherence that belongs to no FRF: left out"),
+    }
+}
+
+#[derive(Clone, Copy)]
+enum Kind {
+    Frf,
+    Coherence,
+    Other(&'static str),
+    Unknown,
+}
+
+fn kind(variable: &Variable) -> Kind {
+    let letter = variable
+        .own_name()
+        .chars()
+        .next()
+        .filter(|_| variable.is_analyser_name());
+    if variable.mentions(&["coh", "gamma2"]) || letter == Some('C') {
+        Kind::Coherence
+    } else if variable.mentions(&["cross", "csd"]) {
+        Kind::Other("cross spectrum")
+    } else if variable.mentions(&["psd"]) {
+        Kind::Other("power spectral density")
+    } else if variable.mentions(&["spec", "fft"]) || matches!(letter, Some('G' | 'S')) {
+        Kind::Other("spectrum")
+    } else if variable.im.is_some() {
+        Kind::Frf
+    } else {
+        Kind::Unknown
+    }
+}
+
+fn quantity(variable: &Variable) -> Option<Quantity> {
+    if variable.mentions(&["recept", "complian"]) {
+        Some(Quantity::Receptance)
+    } else if variable.mentions(&["mobil"]) {
+        Some(Quantity::Mobility)
+    } else if variable.mentions(&["accel", "inert"]) {
+        Some(Quantity::Accelerance)
+    } else {
+        None
+    }
+}
+
+fn complex(variable: &Variable, at: usize) -> Complex64 {
+    Complex64::new(variable.re[at], variable.im.as_ref().map_or(0.0, |im| im[at]))
+}
+
+/// Real arrays along a time axis, or, where there is only a sampling rate, along the longest dimension there is.
+fn time_signals(
+    variables: &[Variable],
+    used: &mut [bool],
+    budget: &mut Budget,
+    notes: &mut Notes,
+) -> Result<Vec<TimeRecord>, InputError> {
+    let mut records = Vec::new();
+    let rate = variables.iter().enumerate().find_map(|(k, v)| {
+        let scalar = v.scalar().filter(|s| *s > 0.0)?;
+        let is_rate = v.mentions(&["sample_rate", "samplerate", "sampling_rate", "samplingrate"])
+            || v.is_called(&["fs", "fsamp", "f_s", "rate", "sr"]);
+        let is_step = v.is_called(&["dt", "ts", "delta_t", "deltat", "d_t"]);
+        match (is_rate, is_step) {
+            (true, _) => Some((k, scalar)),
+            (_, true) => Some((k, 1.0 / scalar)),
+            _ => None,
+        }
+    });
+    let is_time = |v: &Variable| {
+        v.im.is_none()
+            && v.is_vector()
+            && v.re.len() >= MIN_AXIS
+            && v.re.iter().all(|t| t.is_finite())
+            && (v.is_called(&["t", "zeit", "t_s", "tvec", "time", "time_s"])
+                || v.is_axis() && v.own_name().to_lowercase().starts_with("time"))
+    };
+    // Length, rate, start, and times with their grid where they are uneven.
+    type Uneven<'t> = Option<(&'t [f64], Grid)>;
+    let mut axes: Vec<(usize, f64, f64, Uneven)> = Vec::new();
+    for (axis, _) in variables
+        .iter()
+        .zip(used.iter())
+        .filter(|(v, u)| !**u && is_time(v))
+    {
+        let times = axis.re.as_slice();
+        let length = times.len();
+        let own = (times[length - 1] - times[0]) / (length - 1) as f64;
+        // The rate is exact where the axis was stored in single precision.
+        let said = rate
+            .map(|(_, r)| 1.0 / r)
+            .filter(|s| (s / own - 1.0).abs() < 1e-3);
+        let step = said.unwrap_or(own);
+        // Times summed up in single precision drift off the grid, but every step is one.
+        let even = |w: &[f64]| ((w[1] - w[0]) / step - 1.0).abs() < UNEVEN;
+        if said.is_some() && times.windows(2).all(even) {
+            axes.push((length, 1.0 / step, times[0], None));
+            continue;
+        }
+        match clock::look(times, 1e-6 * times[length - 1].abs()) {
+            Ok(Stamps::Even(grid)) => axes.push((length, grid.rate_hz, grid.start_s, None)),
+            Ok(Stamps::Uneven(grid, told)) => {
+                notes.about(&axis.name, told);
+                axes.push((length, grid.rate_hz, grid.start_s, Some((times, grid))));
+            }
+            Err(problem) => notes.about(
+                &axis.name,
+                format!("times are not evenly spaced ({problem}): left out"),
+            ),
+        }
+    }
+    for (k, variable) in variables.iter().enumerate() {
+        if is_time(variable) && !used[k] {
+            used[k] = true;
+        }
+    }
+    if let (true, Some((_, rate))) = (axes.is_empty(), rate) {
+        let free = variables
+            .iter()
+            .zip(used.iter())
+            .filter(|(v, u)| !**u && v.im.is_none());
+        let longest = free.flat_map(|(v, _)| v.size.iter().copied()).max();
+        axes.extend(longest.filter(|n| *n >= MIN_AXIS).map(|n| (n, rate, 0.0, None)));
+    }
+    if let Some((k, _)) = rate.filter(|_| !axes.is_empty()) {
+        used[k] = true;
+    }
+    for (length, rate, start_s, uneven) in axes {
+        for (k, variable) in variables.iter().enumerate() {
+            if used[k] || variable.im.is_some() || variable.re.iter().any(|x| !x.is_finite()) {
+                continue;
+            }
+            let Some(vectors) = variable.along(length) else {
+                continue;
+            };
+            budget.take(
+                24 * variable.re.len() + 512 * vectors.len(),
+                &format!("variable {}", variable.name),
+            )?;
+            used[k] = true;
+            for (suffix, at) in vectors {
+                let mut samples: Vec<f64> = at.iter().map(|&i| variable.re[i]).collect();
+                if let Some((times, grid)) = uneven {
+                    samples = clock::resample(times, &samples, grid);
+                }
+                let name = format!("{}{suffix}", variable.name);
+                let channel = waveform::channel(name, String::new(), samples, notes)?;
+                waveform::put(&mut records, rate, start_s, channel)?;
+            }
+        }
+    }
+    Ok(records)
+}

@@ -1,0 +1,137 @@
+use crate::ingest::formats::mat::interpret::*;
+
+fn real(name: &str, size: &[usize], re: Vec<f64>) -> Variable {
+    Variable {
+        name: name.into(),
+        size: size.to_vec(),
+        re,
+        im: None,
+    }
+}
+
+fn count(n: usize) -> Vec<f64> {
+    (0..n).map(|k| k as f64).collect()
+}
+
+#[test]
+fn frfs_are_complex_arrays_along_the_frequencies_and_find_their_coherence() {
+    let mut h = real("FRF", &[2, 6], count(12));
+    h.im = Some(vec![0.5; 12]);
+    let mut single = real("H_chan_2_accel", &[6, 1], count(6));
+    single.im = Some(vec![1.0; 6]);
+    // An analyser's value at 0 Hz says nothing.
+    let coherence = real("H_coh_chan_2_accel", &[6, 1], vec![1.3, 0.1, 0.2, 0.3, 0.4, 1.0]);
+    let mut notes = Notes::default();
+    let all = vec![
+        h,
+        real("freq", &[1, 6], count(6)),
+        single,
+        coherence,
+        real("PSD_1", &[6, 1], count(6)),
+        real("odd", &[3, 1], count(3)),
+    ];
+    let found = contents(all, &mut Budget::for_file(0), &mut notes).unwrap();
+    let names: Vec<&str> = found.frfs.iter().map(|f| f.name.as_str()).collect();
+    assert_eq!(names, ["FRF(1,:)", "FRF(2,:)", "H_chan_2_accel"]);
+    assert_eq!(found.frfs[1].value[2], Complex64::new(5.0, 0.5));
+    assert_eq!(found.frfs[0].quantity, None);
+    assert_eq!(found.frfs[2].quantity, Some(Quantity::Accelerance));
+    assert_eq!(
+        found.frfs[2].coherence.as_deref(),
+        Some(&[0.0, 0.1, 0.2, 0.3, 0.4, 1.0][..])
+    );
+    assert_eq!(found.others.len(), 1);
+    assert!(notes.into_warnings().iter().any(|w| w.contains("odd")));
+}
+
+#[test]
+fn signals_are_real_arrays_along_the_times_or_at_a_rate() {
+    let t: Vec<f64> = count(8).iter().map(|k| f64::from((0.1 * k) as f32)).collect();
+    let all = vec![
+        real("t", &[8, 1], t),
+        real("fs", &[1, 1], vec![10.0]),
+        real("fx_n", &[8, 1], count(8)),
+    ];
+    let found = contents(all.clone(), &mut Budget::for_file(0), &mut Notes::default()).unwrap();
+    assert_eq!(found.times.len(), 1);
+    assert_eq!(found.times[0].sample_rate_hz, 10.0);
+    assert_eq!(
+        found.times[0].channels[0].role,
+        crate::ingest::ChannelRole::ForceX
+    );
+    let found = contents(all[1..].to_vec(), &mut Budget::for_file(0), &mut Notes::default()).unwrap();
+    assert_eq!((found.times[0].sample_rate_hz, found.times[0].len()), (10.0, 8));
+    let error = contents(all[2..].to_vec(), &mut Budget::for_file(0), &mut Notes::default()).unwrap_err();
+    assert!(error.problem.contains("fx_n"), "{error}");
+    assert!(contents(Vec::new(), &mut Budget::for_file(0), &mut Notes::default()).is_err());
+}
+
+fn found(variables: Vec<Variable>) -> (Contents, Vec<String>) {
+    let mut notes = Notes::default();
+    let found = contents(variables, &mut Budget::for_file(0), &mut notes).unwrap();
+    (found, notes.into_warnings())
+}
+
+#[test]
+fn arrays_with_their_axis_in_the_first_column() {
+    let table =
+        |name: &str, columns: &[&[f64]]| real(name, &[columns[0].len(), columns.len()], columns.concat());
+    let f = [0.0, 2.0, 4.0, 6.0, 8.0];
+    let mut h = table("H1_2", &[&f, &[1.0, 2.0, 3.0, 4.0, 5.0]]);
+    h.im = Some([[0.0; 5], [-1.0; 5]].concat());
+    let c = table("C1_2", &[&f, &[0.5; 5]]);
+    let g = table("G1_1", &[&f, &[9.0; 5]]);
+    let x = table(
+        "X1",
+        &[&[0.0, 0.001, 0.002, 0.003, 0.004], &[1.0, 2.0, 3.0, 4.0, 5.0]],
+    );
+    let frf = table("frf_tip", &[&f, &[1.0; 5], &[-2.0; 5]]);
+    let (found, _) = found(vec![h, c, g, x, frf]);
+    assert_eq!(found.frfs.len(), 2);
+    assert_eq!(
+        (found.frfs[0].name.as_str(), found.frfs[0].frequency_hz.as_slice()),
+        ("H1_2", &f[..])
+    );
+    assert_eq!(found.frfs[0].value[2], Complex64::new(3.0, -1.0));
+    assert_eq!(found.frfs[0].coherence.as_deref(), Some(&[0.5; 5][..]));
+    assert_eq!(found.frfs[1].value[0], Complex64::new(1.0, -2.0));
+    assert_eq!((found.others.len(), found.times.len()), (1, 1));
+    approx::assert_relative_eq!(found.times[0].sample_rate_hz, 1000.0, max_relative = 1e-12);
+}
+
+#[test]
+fn axes_of_start_and_step_of_their_own_or_in_radians() {
+    let complex = |name: &str, n: usize| {
+        let mut v = real(name, &[n, 1], count(n));
+        v.im = Some(vec![-1.0; n]);
+        v
+    };
+    let scalar = |name: &str, value: f64| real(name, &[1, 1], vec![value]);
+    let (by_step, _) = found(vec![
+        complex("H_3Z_1X", 6),
+        scalar("f_start", 5.0),
+        scalar("df", 0.5),
+    ]);
+    assert_eq!(by_step.frfs[0].frequency_hz, [5.0, 5.5, 6.0, 6.5, 7.0, 7.5]);
+    assert_eq!(
+        by_step.frfs[0].response.map(|d| d.to_string()).as_deref(),
+        Some("3Z")
+    );
+    let structs = vec![
+        complex("sig.y_values.values", 5),
+        scalar("sig.x_values.start_value", 1.0),
+        scalar("sig.x_values.increment", 2.0),
+    ];
+    assert_eq!(found(structs).0.frfs[0].frequency_hz, [1.0, 3.0, 5.0, 7.0, 9.0]);
+    let own = vec![complex("H", 5), real("ax1", &[5, 1], count(5))];
+    let (own, told) = found(own);
+    assert_eq!(own.frfs[0].frequency_hz, count(5));
+    assert!(told.iter().any(|t| t.contains("only rising vector")), "{told:?}");
+    let radians = vec![complex("H", 5), real("omega", &[5, 1], count(5))];
+    approx::assert_relative_eq!(
+        found(radians).0.frfs[0].frequency_hz[4],
+        4.0 / (2.0 * std::f64::consts::PI)
+    );
+    let parts = vec![real("H", &[5, 2], vec![1.0; 10]), real("f", &[5, 1], count(5))];
+    assert_eq!(found(parts).0.frfs[0].value[0], Complex64::new(1.0, 1.0));
+}

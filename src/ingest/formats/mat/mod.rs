@@ -1,0 +1,41 @@
+//! MATLAB files: [`v5`] (to v7) and v7.3 ([`hdf5`]). Both become a list of named arrays; [`interpret`] says which of them
+//! are FRFs, coherences and time signals.
+
+use crate::InputError;
+use crate::ingest::budget::Budget;
+use crate::ingest::contents::Contents;
+use crate::ingest::text::Notes;
+
+mod hdf5;
+mod interpret;
+mod v5;
+mod variable;
+mod write;
+
+pub use crate::ingest::formats::mat::write::{MatArray, mat5_bytes};
+
+
+pub(crate) fn looks_like_v5(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"MATLAB 5.0 MAT-file")
+}
+
+/// An HDF5 file with MATLAB's block before it, or bare.
+pub(crate) fn looks_like_v73(bytes: &[u8]) -> bool {
+    crate::ingest::formats::mat::hdf5::looks_like(bytes)
+}
+
+pub(crate) fn read_v5(bytes: &[u8], budget: &mut Budget, notes: &mut Notes) -> Result<Contents, InputError> {
+    crate::ingest::formats::mat::interpret::contents(
+        crate::ingest::formats::mat::v5::read(bytes, budget, notes)?,
+        budget,
+        notes,
+    )
+}
+
+pub(crate) fn read_v73(bytes: &[u8], budget: &mut Budget, notes: &mut Notes) -> Result<Contents, InputError> {
+    crate::ingest::formats::mat::interpret::contents(
+        crate::ingest::formats::mat::hdf5::read(bytes, budget, notes)?,
+        budget,
+        notes,
+    )
+}

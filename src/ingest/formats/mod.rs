@@ -1,0 +1,10 @@
+//! A file for each format of laboratory files.
+
+pub(crate) mod force;
+pub(crate) mod frf_text;
+pub(crate) mod geometry;
+pub(crate) mod lvm;
+pub(crate) mod mat;
+pub(crate) mod tdms;
+pub(crate) mod uff;
+pub(crate) mod waveform;

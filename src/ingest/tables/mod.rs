@@ -1,0 +1,7 @@
+//! Tables of numbers in text, and their time stamps.
+
+pub(crate) mod clock;
+pub(crate) mod number;
+pub(crate) mod split_comma;
+pub(crate) mod table;
+pub(crate) mod table_rows;

@@ -1,0 +1,493 @@
+//! Columns of numbers under header lines: comma, semicolon, tab or blanks; decimal point or comma.
+
+use rayon::prelude::*;
+
+use crate::InputError;
+use crate::ingest::tables::number;
+use crate::ingest::text::{Lines, Notes, decode};
+use crate::ingest::units;
+
+/// Header lines looked at before a file is given up as "no table of numbers".
+const HEADER_LINES_AT_MOST: usize = 200;
+/// Rows that must follow before a row counts as data.
+const ROWS_TO_BELIEVE: usize = 3;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Delimiter {
+    Byte(u8),
+    Blanks,
+}
+
+/// The lines above the numbers and how the numbers are written.
+#[derive(Debug, Clone)]
+pub(crate) struct Header {
+    /// All lines above the names line (above the data where there is none).
+    pub lines: Vec<String>,
+    /// Column names, empty where the file has none.
+    pub names: Vec<String>,
+    /// Units line, empty where the file has none.
+    pub units: Vec<String>,
+    pub delimiter: Delimiter,
+    pub decimal: u8,
+    /// Decimal commas between commas: rows must be split by sense.
+    pub decimal_comma_between_commas: bool,
+    pub columns: usize,
+    /// Offset and 1-based line number of the first row.
+    pub data_at: usize,
+    pub data_line: usize,
+}
+
+/// Columns of equal length; a missing or invalid number is NaN.
+#[derive(Debug)]
+pub(crate) struct Table {
+    pub columns: Vec<Vec<f64>>,
+}
+
+impl Header {
+    /// Finds where the numbers begin and how they are separated; `None` where the text holds no table.
+    pub fn find(bytes: &[u8]) -> Option<Header> {
+        let mut lines = Lines::new(bytes);
+        let mut above: Vec<String> = Vec::new();
+        let (data_at, data_line) = loop {
+            let at = lines.position;
+            let line = lines.next()?;
+            if is_row(line) && rows_follow(lines.clone()) {
+                break (at, lines.number);
+            }
+            above.push(decode(line));
+            if above.len() > HEADER_LINES_AT_MOST {
+                return None;
+            }
+        };
+        while above.last().is_some_and(|l| l.trim().is_empty()) {
+            above.pop();
+        }
+        let data = &bytes[data_at..];
+        let first_row = decode(Lines::new(data).next()?);
+        let delimiter = find_delimiter(above.last().map(String::as_str), &first_row, data);
+        let mut names = above.last().map(|l| split_line(l, delimiter)).unwrap_or_default();
+        let mut units = Vec::new();
+        let understood = names.iter().filter(|n| units::parse(n).is_some()).count();
+        let is_units = names.len() > 1 && understood > 0 && 2 * understood >= names.len();
+        if is_units && above.len() > 1 {
+            let candidate = split_line(&above[above.len() - 2], delimiter);
+            if candidate.len() == names.len() {
+                units = std::mem::replace(&mut names, candidate);
+                above.pop();
+            }
+        }
+        let fields = split_line(&first_row, delimiter).len();
+        // A last line such as `Cycle No:,1` is no names line.
+        if names.len() < 2 && fields > 1 || names.first().is_some_and(|n| n.ends_with(':')) {
+            names.clear();
+            units.clear();
+        } else {
+            above.pop();
+        }
+        // Each row has its time in two tokens then; a single long row is only a bad one.
+        let between_commas = delimiter == Delimiter::Byte(b',')
+            && !names.is_empty()
+            && !data.contains(&b'.')
+            && !data.contains(&b'"')
+            && Lines::new(data)
+                .take(20)
+                .all(|l| l.trim_ascii().is_empty() || count_fields(l) > names.len());
+        let decimal = match delimiter {
+            Delimiter::Byte(b',') if between_commas || quoted_commas(data) => b',',
+            Delimiter::Byte(b',') => b'.',
+            _ if data.contains(&b',') => b',',
+            _ => b'.',
+        };
+        let columns = if names.is_empty() { fields } else { names.len() };
+        Some(Header {
+            lines: above,
+            names,
+            units,
+            delimiter,
+            decimal,
+            decimal_comma_between_commas: between_commas,
+            columns,
+            data_at,
+            data_line,
+        })
+    }
+
+    /// `Key:,value` of a header line whose key contains one of `keys` (lower case); the unit of `Key [Hz]` is
+    /// part of the key.
+    pub fn entry(&self, keys: &[&str]) -> Option<(&str, &str)> {
+        self.lines.iter().find_map(|line| {
+            let at = line.find([':', ';', '\t', ',', '='])?;
+            let (key, value) = line.split_at(at);
+            let lower = key.to_lowercase();
+            let value = value.trim_matches(|c: char| c.is_whitespace() || ":;,=\"".contains(c));
+            keys.iter().any(|k| lower.contains(k)).then_some((key, value))
+        })
+    }
+
+    /// How the table is written, for people.
+    pub fn describe(&self) -> String {
+        let delimiter = match self.delimiter {
+            Delimiter::Byte(b'\t') => "tab",
+            Delimiter::Byte(b';') => "semicolon",
+            Delimiter::Byte(_) => "comma",
+            Delimiter::Blanks => "blank",
+        };
+        let decimal = if self.decimal == b',' { "comma" } else { "point" };
+        format!(
+            "{delimiter} separated, decimal {decimal}, data from line {}",
+            self.data_line
+        )
+    }
+
+    /// Reads the rows of one piece of the file that ends with a line; its first line has number `first_line`. Only the last
+    /// piece may end within a row.
+    ///
+    /// # Errors
+    /// As [`Header::read`].
+    pub fn read_rows(
+        &self,
+        data: &[u8],
+        first_line: usize,
+        is_last: bool,
+        notes: &mut Notes,
+    ) -> Result<Table, InputError> {
+        let parts: Vec<Part> = split_at_lines(data)
+            .into_par_iter()
+            .map(|p| self.read_part(p))
+            .collect();
+        let rows = parts.iter().map(|p| p.columns.last().map_or(0, Vec::len)).sum();
+        let mut columns: Vec<Vec<f64>> = (0..self.columns).map(|_| Vec::with_capacity(rows)).collect();
+        let mut line = first_line;
+        let count = parts.len();
+        for (k, part) in parts.into_iter().enumerate() {
+            for (column, own) in columns.iter_mut().zip(&part.columns) {
+                column.extend_from_slice(own);
+            }
+            if let Some((text, rest_is_blank)) = part.bad {
+                let full = columns.last().is_some_and(|c| !c.is_empty());
+                if is_last && k + 1 == count && rest_is_blank && full {
+                    notes.file("the last row is incomplete and left out");
+                    break;
+                }
+                return Err(self.bad_row(&text, line + part.lines));
+            }
+            line += part.lines;
+        }
+        if is_last && columns.first().is_some_and(|c| c.len() > 3) && ends_within_a_number(data, self.decimal)
+        {
+            columns.iter_mut().for_each(|c| c.truncate(c.len() - 1));
+            notes.file(
+                "the file ends without a line end, its last number has fewer digits than those above: cut off, the last row \
+                 is left out",
+            );
+        }
+        Ok(Table { columns })
+    }
+
+    fn read_part(&self, data: &[u8]) -> Part {
+        let width = Lines::new(data).next().map_or(1, |l| l.len() + 1).max(1);
+        // A row takes two bytes a column at least: what a header announces cannot claim memory.
+        let rows = (data.len() / width).min(data.len() / (2 * self.columns.max(1))) + 16;
+        let mut columns: Vec<Vec<f64>> = (0..self.columns).map(|_| Vec::with_capacity(rows)).collect();
+        let (mut at, mut lines, mut bad) = (0, 0, None);
+        while at < data.len() {
+            match self.read_row(data, at, &mut columns) {
+                Row::Full(next) | Row::Blank(next) => at = next,
+                Row::Bad => {
+                    let length = data[at..].iter().position(|b| *b == b'\n');
+                    let rest = length.map_or(&[][..], |l| &data[at + l..]);
+                    let full = columns.last().map_or(0, Vec::len);
+                    columns.iter_mut().for_each(|c| c.truncate(full));
+                    let text = decode(&data[at..length.map_or(data.len(), |l| at + l)]);
+                    bad = Some((text, rest.trim_ascii().is_empty()));
+                    break;
+                }
+            }
+            lines += 1;
+        }
+        Part { columns, lines, bad }
+    }
+
+    fn bad_row(&self, text: &str, line: usize) -> InputError {
+        InputError::new(format!(
+            "{} numbers are expected here, not {:?}",
+            self.columns,
+            text.trim_end().chars().take(60).collect::<String>()
+        ))
+        .line(line)
+        .remedy(
+            "remove the line, or export the file again with one number per column and no thousands separator",
+        )
+    }
+
+    fn read_row(&self, data: &[u8], start: usize, columns: &mut [Vec<f64>]) -> Row {
+        let mut at = start;
+        let blank = |at: usize| match data.get(at) {
+            Some(b' ') => true,
+            Some(b'\t') => self.delimiter != Delimiter::Byte(b'\t'),
+            _ => false,
+        };
+        let line_end = |at: usize| match data.get(at) {
+            None => Some(at),
+            Some(b'\n') => Some(at + 1),
+            Some(b'\r') if matches!(data.get(at + 1), None | Some(b'\n')) => Some((at + 2).min(data.len())),
+            _ => None,
+        };
+        while blank(at) {
+            at += 1;
+        }
+        if let Some(next) = line_end(at) {
+            return Row::Blank(next);
+        }
+        let count = columns.len();
+        for (i, column) in columns.iter_mut().enumerate() {
+            match number::scan(data, at, self.decimal) {
+                Some((value, end)) => {
+                    column.push(value);
+                    at = end;
+                }
+                // An empty field is a missing sample.
+                None if self.delimiter != Delimiter::Blanks && is_field_end(data.get(at), self.delimiter) => {
+                    column.push(f64::NAN);
+                }
+                None => return Row::Bad,
+            }
+            let number_end = at;
+            while blank(at) {
+                at += 1;
+            }
+            if i + 1 < count {
+                match self.delimiter {
+                    Delimiter::Byte(b) if data.get(at) == Some(&b) => at += 1,
+                    Delimiter::Blanks if at > number_end && line_end(at).is_none() => {}
+                    _ => return Row::Bad,
+                }
+                while blank(at) {
+                    at += 1;
+                }
+            }
+        }
+        // A delimiter after the last field is a habit of spreadsheets.
+        if let Delimiter::Byte(b) = self.delimiter
+            && data.get(at) == Some(&b)
+        {
+            at += 1;
+            while blank(at) {
+                at += 1;
+            }
+        }
+        match line_end(at) {
+            Some(next) => Row::Full(next),
+            None => {
+                columns
+                    .iter_mut()
+                    .for_each(|c| c.truncate(c.len().saturating_sub(1)));
+                Row::Bad
+            }
+        }
+    }
+
+    /// Files with quoted fields, by the `csv` crate.
+    pub(crate) fn read_quoted(&self, data: &[u8], notes: &mut Notes) -> Result<Table, InputError> {
+        let delimiter = match self.delimiter {
+            Delimiter::Byte(b) => b,
+            Delimiter::Blanks => b' ',
+        };
+        let mut reader = csv::ReaderBuilder::new()
+            .delimiter(delimiter)
+            .has_headers(false)
+            .flexible(true)
+            .from_reader(data);
+        let mut columns: Vec<Vec<f64>> = vec![Vec::new(); self.columns];
+        let mut record = csv::ByteRecord::new();
+        let mut bad: Option<InputError> = None;
+        while reader.read_byte_record(&mut record).unwrap_or(false) {
+            if let Some(error) = bad {
+                return Err(error);
+            }
+            let row: Option<Vec<f64>> = record
+                .iter()
+                .take(self.columns)
+                .map(|f| number::field(f, self.decimal))
+                .collect();
+            let more = record
+                .iter()
+                .skip(self.columns)
+                .any(|f| !f.trim_ascii().is_empty());
+            match row {
+                Some(row) if row.len() == self.columns && !more => {
+                    columns
+                        .iter_mut()
+                        .zip(row)
+                        .for_each(|(column, value)| column.push(value));
+                }
+                _ => {
+                    let line = record.position().map_or(0, |p| p.line() as usize) + self.data_line - 1;
+                    let text: Vec<String> = record.iter().map(decode).collect();
+                    bad = Some(self.bad_row(&text.join(" "), line));
+                }
+            }
+        }
+        match bad {
+            Some(error) if columns.first().is_none_or(Vec::is_empty) => return Err(error),
+            Some(_) => notes.file("the last row is incomplete and left out"),
+            None => {}
+        }
+        Ok(Table { columns })
+    }
+}
+
+/// True where the last line has no end and its last number fewer digits than the last numbers of the rows above, which all
+/// have as many.
+fn ends_within_a_number(data: &[u8], decimal: u8) -> bool {
+    if data.last().is_none_or(|b| matches!(b, b'\n' | b'\r')) {
+        return false;
+    }
+    let mut rows = data.rsplit(|b| *b == b'\n');
+    let digits = |row: &[u8]| {
+        let is_end = |b: &u8| *b != decimal && b" \t;,".contains(b);
+        let last = row.trim_ascii().rsplit(is_end).next().unwrap_or_default();
+        let fraction = last.iter().rev().take_while(|b| **b != decimal).count();
+        let has_point = last.contains(&decimal);
+        (has_point, if has_point { fraction } else { 0 })
+    };
+    let Some(last) = rows.next().map(digits) else {
+        return false;
+    };
+    let above: Vec<(bool, usize)> = rows.take(8).map(digits).collect();
+    let Some(usual) = above
+        .first()
+        .filter(|first| above.len() >= 3 && above.iter().all(|a| a == *first))
+    else {
+        return false;
+    };
+    usual.0 && last.1 < usual.1
+}
+
+/// Rows that one thread read.
+struct Part {
+    columns: Vec<Vec<f64>>,
+    /// Lines read before the end or the bad row.
+    lines: usize,
+    /// A row that is none, and whether nothing follows it.
+    bad: Option<(String, bool)>,
+}
+
+/// Bytes worth a thread of their own.
+const PART: usize = 1 << 20;
+
+/// The text in parts that end with a line.
+fn split_at_lines(data: &[u8]) -> Vec<&[u8]> {
+    let (mut parts, mut rest) = (Vec::new(), data);
+    while rest.len() > 2 * PART {
+        let Some(end) = rest[PART..].iter().position(|b| *b == b'\n') else {
+            break;
+        };
+        let (part, after) = rest.split_at(PART + end + 1);
+        // What is blank to the end belongs to the row before it.
+        if after.len() <= PART && after.trim_ascii().is_empty() {
+            break;
+        }
+        parts.push(part);
+        rest = after;
+    }
+    parts.push(rest);
+    parts
+}
+
+enum Row {
+    Full(usize),
+    Blank(usize),
+    Bad,
+}
+
+fn is_field_end(byte: Option<&u8>, delimiter: Delimiter) -> bool {
+    match byte {
+        None | Some(b'\n' | b'\r') => true,
+        Some(&b) => delimiter == Delimiter::Byte(b),
+    }
+}
+
+fn count_fields(line: &[u8]) -> usize {
+    split_line(&decode(line), Delimiter::Byte(b',')).len()
+}
+
+/// True for a line of numbers and separators only.
+pub(crate) fn is_row(line: &[u8]) -> bool {
+    let line = line.trim_ascii();
+    let mut tokens = line
+        .split(|b| b" \t;,\"".contains(b))
+        .filter(|t| !t.is_empty())
+        .peekable();
+    tokens.peek().is_some() && tokens.all(|t| number::scan(t, 0, b'.').is_some_and(|(_, end)| end == t.len()))
+}
+
+fn rows_follow(lines: Lines) -> bool {
+    lines
+        .filter(|l| !l.trim_ascii().is_empty())
+        .take(ROWS_TO_BELIEVE)
+        .all(is_row)
+}
+
+/// True where a comma separated file writes its decimal commas in quotes.
+fn quoted_commas(data: &[u8]) -> bool {
+    data.contains(&b'"') && !data.contains(&b'.')
+}
+
+fn find_delimiter(names: Option<&str>, first_row: &str, data: &[u8]) -> Delimiter {
+    let first_row = first_row.trim();
+    if let Some(byte) = [b';', b'\t']
+        .into_iter()
+        .find(|b| first_row.contains(char::from(*b)))
+    {
+        return Delimiter::Byte(byte);
+    }
+    let names = names.filter(|n| n.contains([';', '\t', ',']));
+    // `1,5 2,5` are decimal commas between blanks, `1.5, 2.5` points between commas.
+    let comma_between = match names {
+        Some(names) => names.contains(','),
+        None => first_row.contains(", ") || !first_row.contains(' ') || data.contains(&b'.'),
+    };
+    if first_row.contains(',') && comma_between {
+        Delimiter::Byte(b',')
+    } else {
+        Delimiter::Blanks
+    }
+}
+
+/// Fields of a line, trimmed, without quotes and without an empty last one.
+pub(crate) fn split_line(line: &str, delimiter: Delimiter) -> Vec<String> {
+    let clean = |field: &str| field.trim().trim_matches('"').trim().to_owned();
+    match delimiter {
+        Delimiter::Blanks => {
+            // `Time [s]` is one name.
+            let mut fields: Vec<String> = Vec::new();
+            for word in line.split_whitespace().map(|w| clean(w.trim_end_matches(','))) {
+                match fields.last_mut() {
+                    Some(last) if word.starts_with(['[', '(']) => {
+                        last.push(' ');
+                        last.push_str(&word);
+                    }
+                    _ => fields.push(word),
+                }
+            }
+            fields
+        }
+        Delimiter::Byte(byte) if line.contains('"') => {
+            let mut reader = csv::ReaderBuilder::new()
+                .delimiter(byte)
+                .has_headers(false)
+                .from_reader(line.as_bytes());
+            let record = reader.records().next().and_then(Result::ok).unwrap_or_default();
+            without_last_empty(record.iter().map(clean).collect())
+        }
+        Delimiter::Byte(byte) => without_last_empty(line.split(char::from(byte)).map(clean).collect()),
+    }
+}
+
+fn without_last_empty(mut fields: Vec<String>) -> Vec<String> {
+    if fields.len() > 1 && fields.last().is_some_and(String::is_empty) {
+        fields.pop();
+    }
+    fields
+}

@@ -1,0 +1,584 @@
+//! Poles of a whole set: groups of neighbouring candidates are refined together by [`crate::modal::max_likelihood::ml_fit`]; a pole that the
+//! FRFs do not need is taken out, one is added where the rest has a resonance of its own.
+
+use num_complex::Complex64;
+
+use crate::modal::max_likelihood::ml_fit::{self, Solution};
+use crate::modal::max_likelihood::ml_linear::NoisyFrf;
+use crate::modal::shape;
+use crate::modal::single::local_fit::Pole;
+use crate::modal::stabilisation::MAX_DAMPING;
+
+/// Modes refined together at most: the normal equations grow with the square.
+const MAX_GROUP: usize = 12;
+/// Neighbours beyond a group's edge that take part with fixed poles.
+const FIXED_NEIGHBOURS: usize = 3;
+const MAX_ADDED: usize = 4;
+/// Misfit that one real parameter explains by chance has mean 1 and variance 2; this many standard deviations …
+const CHANCE_SIGMA: f64 = 8.0;
+/// … and a constant for having looked at every frequency.
+const LOOKED_EVERYWHERE: f64 = 20.0;
+/// Misfits are compared to this part of what a mode explains by chance …
+const COMPARED: f64 = 0.002;
+/// … and to this part where the noise is only guessed yet.
+const ROUGHLY_COMPARED: f64 = 0.02;
+/// Fewer lines in the half-power band than this: the damping may stay uncertain.
+const COARSE_LINES: f64 = 1.0;
+/// Squared size over uncertainty (two degrees of freedom) from which an FRF shows a mode: five standard deviations.
+const SEEN: f64 = 30.0;
+
+/// Poles nearer than this share of both half-widths are one.
+const SAME_PLACE: f64 = 0.05;
+/// And than these, one after the other, where a group cannot be fitted.
+const MERGED: [f64; 3] = [0.5, 1.0, 2.0];
+/// What explains so many times what a mode must is needed, however badly it is determined.
+const INDISPENSABLE: f64 = 10.0;
+/// Trial poles spread over a window, of each damping.
+const TRIALS: usize = 24;
+/// Damping of the trial poles over the usual one.
+const WIDER: [f64; 2] = [1.0, 3.0];
+/// A trial pole that is damped more would explain what modes do.
+const WIDEST: f64 = 0.1;
+
+/// Beside a pole a second one is tried this many half-widths away.
+const BESIDE_WIDTHS: f64 = 1.5;
+/// A pole comes in where it explains this times what a pole must explain to stay.
+const ADMITTED: f64 = 1.2;
+/// As [`CHANCE_SIGMA`] and [`LOOKED_EVERYWHERE`], for a pole that may be there.
+const DOUBT_SIGMA: f64 = 3.0;
+const DOUBT_LOOKED: f64 = 6.0;
+/// Before its place is refined a pole must explain this part of what a mode must.
+const REFINED: f64 = 0.2;
+/// Below this a pole next to another is not worth a fit of its own.
+const WORTH_A_FIT_SIGMA: f64 = 1.0;
+
+/// What a refinement may do besides moving poles.
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+pub(crate) enum PoleSearch {
+    Nothing,
+    /// That, and not more exactly than a comparison needs.
+    Roughly,
+    /// Take out needless poles, add one where the rest is largest, and look for close pairs: a second pole next to each
+    /// that is there.
+    Pairs,
+}
+
+/// A group of modes and the window that it was fitted in.
+pub(crate) struct Group {
+    pub window_hz: [f64; 2],
+    pub solution: Solution,
+    /// Looked for with [`PoleSearch::Pairs`].
+    pub doubt: Option<Doubt>,
+    /// What any pole explains, over what it would explain of white noise; at least 1.
+    pub chance: f64,
+}
+
+/// One more pole would describe the FRFs better than chance does, but not well enough to be called a mode.
+pub(crate) struct Doubt {
+    pub pole: Pole,
+    /// By mode of the solution: change of frequency (Hz) and damping ratio if that pole is one.
+    pub shifts: Vec<[f64; 2]>,
+}
+
+/// Why a pole went out or came in.
+pub(crate) enum Change {
+    /// The FRFs are described as well without it.
+    Needless(Pole),
+    /// Outside the band, too much damping, or not determined.
+    NotDetermined(Pole),
+    Added(Pole),
+}
+
+/// One FRF with its noise, on lines or on means over neighbouring lines.
+#[derive(Clone)]
+pub(crate) struct Data {
+    pub frequency_hz: Vec<f64>,
+    pub receptance: Vec<Complex64>,
+    /// sqrt(E|e|²), > 0.
+    pub sigma: Vec<f64>,
+    /// Standard deviation of the frequencies that went into the mean, Hz; may be left empty until [`crate::modal::max_likelihood::condense`].
+    pub spread_hz: Vec<f64>,
+    /// Lines that went into the mean.
+    pub count: Vec<f64>,
+}
+
+impl Data {
+    pub fn window(&self, [low, high]: [f64; 2]) -> Option<NoisyFrf<'_>> {
+        let from = self.frequency_hz.partition_point(|&f| f < low);
+        let to = self.frequency_hz.partition_point(|&f| f < high);
+        (to > from).then(|| NoisyFrf {
+            frequency_hz: &self.frequency_hz[from..to],
+            receptance: &self.receptance[from..to],
+            sigma: &self.sigma[from..to],
+            spread_hz: &self.spread_hz[from..to],
+        })
+    }
+}
+
+/// Refines all candidates (ascending in frequency). The poles of a group that cannot be fitted go out; `None` where none
+/// can.
+pub(crate) fn refine(
+    data: &[Data],
+    candidates: &[Pole],
+    search: PoleSearch,
+    changes: &mut Vec<Change>,
+) -> Option<Vec<Group>> {
+    // A pole can have run onto one of the next group.
+    let candidates = &apart(candidates, SAME_PLACE)[..];
+    let groups = groups(candidates);
+    let middle = |a: &[Pole], b: &[Pole]| Some(0.5 * (a.last()?.frequency_hz + b.first()?.frequency_hz));
+    let mut result = Vec::with_capacity(groups.len());
+    let mut before = 0;
+    for (g, group) in groups.iter().enumerate() {
+        let low = if g == 0 {
+            0.0
+        } else {
+            middle(groups[g - 1], group)?
+        };
+        let high = groups
+            .get(g + 1)
+            .map_or(Some(f64::INFINITY), |next| middle(group, next))?;
+        let after = before + group.len();
+        let fixed: Vec<Pole> = candidates[before.saturating_sub(FIXED_NEIGHBOURS)..before]
+            .iter()
+            .chain(&candidates[after..(after + FIXED_NEIGHBOURS).min(candidates.len())])
+            .copied()
+            .collect();
+        let window_hz = [low, high];
+        let frfs: Option<Vec<NoisyFrf>> = data.iter().map(|d| d.window(window_hz)).collect();
+        before = after;
+        let Some((mut fit, mut solution)) = frfs.and_then(|frfs| {
+            let mut fit = Fit {
+                frfs,
+                fixed,
+                search,
+                chance: 1.0,
+            };
+            // Poles that the lines do not tell apart (one mode that moves from FRF to FRF can have split) are too many.
+            let solution = fit
+                .fit(group)
+                .or_else(|| MERGED.into_iter().find_map(|share| fit.fit(&apart(group, share))))?;
+            if search != PoleSearch::Roughly && !solution.poles.is_empty() {
+                fit.chance = fit.by_chance(&solution);
+            }
+            Some((fit, solution))
+        }) else {
+            changes.extend(group.iter().map(|pole| Change::NotDetermined(*pole)));
+            continue;
+        };
+        let mut doubt = None;
+        if search >= PoleSearch::Pairs {
+            solution = fit.without_needless(solution, changes);
+            fit.chance = fit.by_chance(&solution);
+            for _ in 0..MAX_ADDED {
+                match fit.with_one_more(&solution, &mut doubt) {
+                    Some(more) => {
+                        changes.push(Change::Added(more.poles[more.poles.len() - 1]));
+                        solution = fit.without_needless(more, changes);
+                    }
+                    None => break,
+                }
+            }
+        }
+        result.push(Group {
+            window_hz,
+            solution,
+            doubt,
+            chance: fit.chance,
+        });
+    }
+    (!result.is_empty()).then_some(result)
+}
+
+/// Without those within a share of both half-widths of the one before: their residues cannot be told apart.
+fn apart(group: &[Pole], share: f64) -> Vec<Pole> {
+    let width = |p: &Pole| p.damping_ratio * p.frequency_hz;
+    let mut kept: Vec<Pole> = Vec::with_capacity(group.len());
+    for pole in group {
+        let same = kept
+            .last()
+            .is_some_and(|p| pole.frequency_hz - p.frequency_hz < share * (width(p) + width(pole)));
+        if !same {
+            kept.push(*pole);
+        }
+    }
+    kept
+}
+
+/// Splits at the widest gaps until no group is too large.
+fn groups(candidates: &[Pole]) -> Vec<&[Pole]> {
+    let mut todo = vec![candidates];
+    let mut done = Vec::new();
+    while let Some(group) = todo.pop() {
+        if group.len() <= MAX_GROUP {
+            done.push(group);
+            continue;
+        }
+        // Not at the very ends, or a hundred modes would make a hundred groups.
+        let quarter = group.len() / 4;
+        let at = (quarter.max(1)..group.len() - quarter)
+            .max_by(|&a, &b| {
+                let gap = |k: usize| (group[k].frequency_hz / group[k - 1].frequency_hz).ln();
+                gap(a).total_cmp(&gap(b))
+            })
+            .unwrap_or(group.len() / 2);
+        let (below, above) = group.split_at(at);
+        todo.push(above);
+        todo.push(below);
+    }
+    done
+}
+
+/// What each candidate explains over what it would have to explain to be a mode (above 1: it is one), with the poles
+/// `held` and no others. `None` where the lines do not determine the residues of those.
+pub(crate) fn worth(data: &[Data], held: &[Pole], candidates: &[Pole]) -> Option<Vec<f64>> {
+    let groups: Vec<&[Pole]> = if held.is_empty() { vec![&[]] } else { groups(held) };
+    let mut worth = vec![0.0; candidates.len()];
+    let mut before = 0;
+    let mut low = 0.0;
+    for (g, group) in groups.iter().enumerate() {
+        let after = before + group.len();
+        let high = groups.get(g + 1).map_or(f64::INFINITY, |next| {
+            0.5 * (group[group.len() - 1].frequency_hz + next[0].frequency_hz)
+        });
+        let window_hz = [low, high];
+        low = high;
+        let near = &held[before.saturating_sub(FIXED_NEIGHBOURS)..(after + FIXED_NEIGHBOURS).min(held.len())];
+        before = after;
+        let inside: Vec<usize> = (0..candidates.len())
+            .filter(|&k| (window_hz[0]..window_hz[1]).contains(&candidates[k].frequency_hz))
+            .collect();
+        if inside.is_empty() {
+            continue;
+        }
+        let Some(frfs) = data
+            .iter()
+            .map(|d| d.window(window_hz))
+            .collect::<Option<Vec<_>>>()
+        else {
+            continue;
+        };
+        let damping: Vec<f64> = inside.iter().map(|&k| candidates[k].damping_ratio).collect();
+        let mut trials: Vec<Pole> = inside.iter().map(|&k| candidates[k]).collect();
+        trials.extend(anywhere(&frfs, crate::signal::median(&damping)));
+        let explained = ml_fit::explained_by(&frfs, near, &trials)?;
+        let (of_candidates, of_any) = explained.split_at(inside.len());
+        let wanted = enough(
+            frfs.len(),
+            chance(of_any, frfs.len()),
+            CHANCE_SIGMA,
+            LOOKED_EVERYWHERE,
+        );
+        for (&k, explained) in inside.iter().zip(of_candidates) {
+            worth[k] = explained / wanted;
+        }
+    }
+    Some(worth)
+}
+
+/// Trial poles all over the lines: of the damping given, and wider.
+fn anywhere(frfs: &[NoisyFrf], damping: f64) -> Vec<Pole> {
+    let first = frfs
+        .iter()
+        .map(|c| c.frequency_hz[0])
+        .fold(f64::INFINITY, f64::min);
+    let last = frfs
+        .iter()
+        .map(|c| c.frequency_hz[c.frequency_hz.len() - 1])
+        .fold(0.0, f64::max);
+    let at = |k: usize| first + (last - first) * (k as f64 + 0.5) / TRIALS as f64;
+    WIDER
+        .iter()
+        .flat_map(|wider| {
+            (0..TRIALS).map(move |k| Pole {
+                frequency_hz: at(k),
+                damping_ratio: (damping * wider).min(damping.max(WIDEST)),
+            })
+        })
+        .collect()
+}
+
+/// What any pole explains, over what it would explain of white noise of the size assumed; at least 1.
+fn chance(explained: &[f64], frfs: usize) -> f64 {
+    // Median of a chi-squared variable (Wilson & Hilferty 1931).
+    let k = 2.0 * frfs as f64;
+    let of_white = k * (1.0 - 2.0 / (9.0 * k)).powi(3);
+    explained
+        .chunks(TRIALS)
+        .map(|of_damping| crate::signal::median(of_damping) / of_white)
+        .fold(1.0, f64::max)
+}
+
+/// Misfit that a mode must explain beyond what chance gives to any pole.
+fn enough(frfs: usize, chance: f64, sigma: f64, looked: f64) -> f64 {
+    let k = 2.0 * frfs as f64 + 2.0;
+    chance * (k + sigma * (2.0 * k).sqrt() + looked)
+}
+
+struct Fit<'a> {
+    frfs: Vec<NoisyFrf<'a>>,
+    fixed: Vec<Pole>,
+    search: PoleSearch,
+    /// See [`chance`].
+    chance: f64,
+}
+
+impl Fit<'_> {
+    fn fit(&self, poles: &[Pole]) -> Option<Solution> {
+        // A search compares misfits, and a last refinement follows it.
+        let by_chance = 2.0 * self.frfs.len() as f64 + 2.0;
+        let settled = match self.search {
+            PoleSearch::Nothing => ml_fit::SETTLED,
+            PoleSearch::Roughly => ROUGHLY_COMPARED * by_chance,
+            PoleSearch::Pairs => COMPARED * by_chance,
+        };
+        ml_fit::fit(&self.frfs, poles, &self.fixed, settled)
+    }
+
+    /// Misfit that a mode must explain to be one, for noise as large as the fit leaves.
+    fn wanted(&self, solution: &Solution) -> f64 {
+        self.beyond_chance(solution, CHANCE_SIGMA, LOOKED_EVERYWHERE)
+    }
+
+    fn beyond_chance(&self, solution: &Solution, sigma: f64, looked: f64) -> f64 {
+        let level = solution.misfit / solution.degrees_of_freedom as f64;
+        enough(self.frfs.len(), level.max(self.chance), sigma, looked)
+    }
+
+    fn by_chance(&self, solution: &Solution) -> f64 {
+        let held: Vec<Pole> = solution.poles.iter().chain(&self.fixed).copied().collect();
+        let trials = anywhere(&self.frfs, usual_damping(solution));
+        ml_fit::explained_by(&self.frfs, &held, &trials).map_or(1.0, |e| chance(&e, self.frfs.len()))
+    }
+
+    fn line_hz(&self, frequency_hz: f64) -> f64 {
+        self.frfs
+            .iter()
+            .map(|c| spacing_hz(c.frequency_hz, frequency_hz))
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// May this pole be a mode of the band?
+    fn possible(&self, pole: Pole) -> bool {
+        let inside = self.frfs.iter().any(|c| {
+            c.frequency_hz[0] <= pole.frequency_hz
+                && c.frequency_hz[c.frequency_hz.len() - 1] >= pole.frequency_hz
+        });
+        inside && pole.damping_ratio < MAX_DAMPING
+    }
+
+    /// Do the lines determine this pole?
+    fn determined(&self, solution: &Solution, j: usize) -> bool {
+        let pole = solution.poles[j];
+        let line_hz = self.line_hz(pole.frequency_hz);
+        let width = pole.damping_ratio * pole.frequency_hz;
+        let coarse = 2.0 * width < COARSE_LINES * line_hz;
+        let level = (solution.misfit / solution.degrees_of_freedom as f64)
+            .max(1.0)
+            .sqrt();
+        level * solution.frequency_std_hz(j) < 0.3 * width.max(line_hz)
+            && (coarse || level * solution.damping_std(j) < 0.4 * pole.damping_ratio)
+    }
+
+    fn sane(&self, solution: &Solution, j: usize) -> bool {
+        self.possible(solution.poles[j]) && self.determined(solution, j)
+    }
+
+    /// Takes out the least needed pole until all are needed.
+    fn without_needless(&self, mut solution: Solution, changes: &mut Vec<Change>) -> Solution {
+        loop {
+            let wanted = self.wanted(&solution);
+            let mut least: Option<(f64, usize, Solution)> = None;
+            for j in 0..solution.poles.len() {
+                let possible = self.possible(solution.poles[j]);
+                let sane = possible && self.determined(&solution, j);
+                // With the other poles held the growth is an upper bound of the true one: most need no fit.
+                let evidence: f64 = (0..self.frfs.len()).map(|m| solution.evidence(m, j)).sum();
+                if sane && evidence > 4.0 * wanted {
+                    continue;
+                }
+                let mut rest = solution.poles.clone();
+                rest.remove(j);
+                let Some(without) = self.fit(&rest) else { continue };
+                // Where the model fits badly nothing is well determined: a pole that explains that much stays all the same.
+                let grown = without.misfit - solution.misfit;
+                let growth = if possible && (sane || grown > INDISPENSABLE * wanted) {
+                    grown
+                } else {
+                    f64::NEG_INFINITY
+                };
+                if growth < wanted && least.as_ref().is_none_or(|(g, ..)| growth < *g) {
+                    least = Some((growth, j, without));
+                }
+            }
+            match least {
+                Some((growth, j, without)) => {
+                    let pole = solution.poles[j];
+                    changes.push(if growth.is_finite() {
+                        Change::Needless(pole)
+                    } else {
+                        Change::NotDetermined(pole)
+                    });
+                    solution = without;
+                }
+                None => return solution,
+            }
+        }
+    }
+
+    /// Adds a pole where the rest is largest, or next to one that is there, if that explains enough; one that explains
+    /// something but not enough is a doubt.
+    fn with_one_more(&self, solution: &Solution, doubt: &mut Option<Doubt>) -> Option<Solution> {
+        let usual = usual_damping(solution);
+        let enough = |more: &Solution| {
+            let fall = solution.misfit - more.misfit;
+            let sane = (0..more.poles.len()).all(|j| self.sane(more, j));
+            let added = more.poles[more.poles.len() - 1];
+            let alike = (usual / 4.0..usual * 4.0).contains(&added.damping_ratio);
+            sane && alike && fall > ADMITTED * self.wanted(more)
+        };
+        if let Some(more) = self.in_the_rest(solution).filter(enough) {
+            return Some(more);
+        }
+        let more = self.beside(solution)?;
+        if enough(&more) {
+            return Some(more);
+        }
+        *doubt = self.doubt(solution, &more);
+        None
+    }
+
+    /// Does one more pole explain more than chance does?
+    fn doubt(&self, solution: &Solution, more: &Solution) -> Option<Doubt> {
+        let pole = *more.poles.last()?;
+        let inside = self.frfs.iter().any(|c| {
+            c.frequency_hz[0] <= pole.frequency_hz
+                && c.frequency_hz[c.frequency_hz.len() - 1] >= pole.frequency_hz
+        });
+        let fall = solution.misfit - more.misfit;
+        // Residues of no common phase are an error of the model.
+        let residues: Vec<Complex64> = (0..self.frfs.len())
+            .map(|m| more.constant(m, more.poles.len() - 1).0)
+            .collect();
+        if residues.len() > 4 && shape::complexity(&residues).is_some_and(|c| c.mpc < 0.5) {
+            return None;
+        }
+        if !inside
+            || pole.damping_ratio > MAX_DAMPING
+            || fall < self.beyond_chance(more, DOUBT_SIGMA, DOUBT_LOOKED)
+        {
+            return None;
+        }
+        let both = solution.poles.iter().zip(&more.poles);
+        Some(Doubt {
+            pole,
+            shifts: both
+                .map(|(a, b)| [b.frequency_hz - a.frequency_hz, b.damping_ratio - a.damping_ratio])
+                .collect(),
+        })
+    }
+
+    fn and(&self, solution: &Solution, pole: Pole) -> Option<Solution> {
+        let mut poles = solution.poles.clone();
+        poles.push(pole);
+        self.fit(&poles)
+    }
+
+    /// Two modes closer than their widths leave a rest that hides in the noise: a second pole is tried on either side of
+    /// each, the others held, and the place that explains most is refined.
+    fn beside(&self, solution: &Solution) -> Option<Solution> {
+        let usual = usual_damping(solution);
+        let trials: Vec<Pole> = solution
+            .poles
+            .iter()
+            .flat_map(|pole| {
+                [-1.0, 1.0].map(|side| Pole {
+                    frequency_hz: pole.frequency_hz * (1.0 + side * BESIDE_WIDTHS * pole.damping_ratio),
+                    damping_ratio: usual,
+                })
+            })
+            .collect();
+        // No more than noise gives to any pole: not worth a fit.
+        let by_noise = self.beyond_chance(solution, WORTH_A_FIT_SIGMA, 0.0);
+        self.best_of(solution, &trials, by_noise)
+    }
+
+    /// With the trial pole that explains most, the others held, where that is more than `least`.
+    fn best_of(&self, solution: &Solution, trials: &[Pole], least: f64) -> Option<Solution> {
+        let held: Vec<Pole> = solution.poles.iter().chain(&self.fixed).copied().collect();
+        let explained = ml_fit::explained_by(&self.frfs, &held, trials)?;
+        let (fall, best) = explained
+            .into_iter()
+            .zip(trials)
+            .max_by(|a, b| a.0.total_cmp(&b.0))?;
+        (fall > least).then(|| self.and(solution, *best))?
+    }
+
+    /// One more pole where the rest is largest; none where it could not pay for a mode.
+    fn in_the_rest(&self, solution: &Solution) -> Option<Solution> {
+        // Rest by frequency, over all FRFs; FRFs may have lines of their own.
+        let mut rest: Vec<(f64, f64)> = Vec::new();
+        for (frf, found) in self.frfs.iter().zip(&solution.frfs) {
+            let lines = frf.frequency_hz.iter().zip(frf.sigma).zip(&found.residual);
+            rest.extend(lines.map(|((f, s), r)| (*f, (r / s).norm_sqr() - 1.0)));
+        }
+        rest.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let near = 5 * self.frfs.len();
+        if rest.len() < 2 * near {
+            return None;
+        }
+        let mut sum: f64 = rest[..near].iter().map(|r| r.1).sum();
+        let mut most = (sum, near / 2);
+        for k in near..rest.len() {
+            sum += rest[k].1 - rest[k - near].1;
+            if sum > most.0 {
+                most = (sum, k - near / 2);
+            }
+        }
+        // Nothing left that could pay for a mode.
+        if most.0 < 0.4 * self.wanted(solution) {
+            return None;
+        }
+        let centre = rest[most.1].0;
+        let usual = usual_damping(solution);
+        // A pole on top of another one is a saddle: next to it the search begins on either slope.
+        let trials = [1.0, 1.0 - usual, 1.0 + usual].map(|factor| Pole {
+            frequency_hz: centre * factor,
+            damping_ratio: usual,
+        });
+        self.best_of(solution, &trials, REFINED * self.wanted(solution))
+    }
+}
+
+/// Of the modes of a group; what is damped beyond that stands for something else.
+fn usual_damping(solution: &Solution) -> f64 {
+    const LIGHTLY: f64 = 0.15;
+    let damping = solution.poles.iter().map(|p| p.damping_ratio);
+    let light: Vec<f64> = damping.filter(|d| *d < LIGHTLY).collect();
+    match light.is_empty() {
+        true => 0.02,
+        false => crate::signal::median(&light),
+    }
+}
+
+/// FRFs of the group that show the mode, and the squared size over uncertainty in the one that shows it best.
+pub(crate) fn seen_in(solution: &Solution, mode: usize) -> (usize, f64) {
+    let level = (solution.misfit / solution.degrees_of_freedom as f64).max(1.0);
+    let evidence: Vec<f64> = (0..solution.frfs.len())
+        .map(|m| solution.evidence(m, mode) / level)
+        .collect();
+    (
+        evidence.iter().filter(|e| **e > SEEN).count(),
+        evidence.iter().fold(0.0, |m: f64, e| m.max(*e)),
+    )
+}
+
+/// Distance of neighbouring lines at a frequency, Hz.
+pub(crate) fn spacing_hz(frequency_hz: &[f64], at_hz: f64) -> f64 {
+    let n = frequency_hz.len();
+    if n < 2 {
+        return f64::INFINITY;
+    }
+    let k = frequency_hz.partition_point(|&f| f < at_hz).clamp(1, n - 1);
+    frequency_hz[k] - frequency_hz[k - 1]
+}

@@ -1,0 +1,13 @@
+//! One FRF by itself: peaks, then the fits at each.
+
+pub(crate) mod analysis;
+#[cfg(test)]
+pub(crate) mod analysis_tests;
+pub(crate) mod circle_fit;
+pub(crate) mod curve;
+pub(crate) mod frf_modes;
+pub(crate) mod half_power;
+pub(crate) mod local_fit;
+#[cfg(test)]
+pub(crate) mod marks;
+pub(crate) mod peaks;

@@ -1,0 +1,441 @@
+//! What a fitted set says: modes with their uncertainty and shapes, the FRFs put together again from them, and what
+//! became of every candidate.
+
+use nalgebra::DMatrix;
+use num_complex::Complex64;
+
+use crate::modal::max_likelihood::joint_fit::{self, Change, Data, Group};
+use crate::modal::max_likelihood::ml_fit;
+use crate::modal::quality::{self, Power};
+use crate::modal::shape;
+use crate::modal::single::local_fit::Pole;
+use crate::modal::stabilisation::{Candidate, Stabilisation};
+use crate::modal::together::global_modes::{GlobalMode, GlobalModes, RejectedMode};
+use crate::modal::together::reconstruction::reconstruction;
+use crate::modal::together::set_member::{SET, SetMember};
+use crate::modal::together::verify;
+
+/// In a set a mode seen by one FRF alone must stand out this far (squared size over uncertainty).
+const FAR: f64 = 100.0;
+/// Below this many lines in the half-power band the record's leakage counts, see `analysis`.
+const LEAKAGE_BELOW_LINES: f64 = 1.0;
+const LEAKAGE_LINES: f64 = 0.02;
+/// Modes with fewer lines in the half-power band are named …
+const FINE_LINES: f64 = 3.0;
+/// … where their damping is uncertain by more than this share of itself.
+const UNCERTAIN: f64 = 0.02;
+/// What poles anywhere explain scatters by about this without any model error.
+const BY_CHANCE: f64 = 1.5;
+/// A frequency that is uncertain by more than this share of the half-width is not given.
+const UNPLACED: f64 = 0.3;
+/// A line whose width is not known is a mode where the residues of its FRFs have a common phase (collinearity) …
+const IN_PHASE: f64 = 0.9;
+/// Two fits of the same lines disagree from this many standard deviations on.
+const APART: f64 = 2.0;
+
+/// `fitted`: what the groups were fitted to; `data`: every line with its random noise.
+pub(crate) fn collect(
+    groups: &[Group],
+    fitted: &[Data],
+    data: &[Data],
+    members: &[&SetMember],
+    of_member: &[usize],
+    result: &mut GlobalModes,
+) {
+    let count = result.reconstructions.len();
+    let mut hardly_seen = Vec::new();
+    let mut without_width = Vec::new();
+    let poles: Vec<Pole> = groups
+        .iter()
+        .flat_map(|g| g.solution.poles.iter().copied())
+        .collect();
+    let (mut scatters, mut moving) = (Vec::new(), 0);
+    for group in groups {
+        let solution = &group.solution;
+        if let Some(doubt) = &group.doubt {
+            result.warnings.push(format!(
+                "there may be one more mode at {:.2} Hz: the FRFs hardly tell it from its neighbour, whose standard \
+                 deviations allow for it (more response points or another hammer point would tell)",
+                doubt.pole.frequency_hz
+            ));
+        }
+        if !solution.converged {
+            result.warnings.push(format!(
+                "the common fit between {:.1} and {:.1} Hz did not converge",
+                group.window_hz[0],
+                group.window_hz[1].min(
+                    data.iter()
+                        .filter_map(|d| d.frequency_hz.last())
+                        .fold(0.0, |m: f64, f| m.max(*f))
+                )
+            ));
+        }
+        // What the fit leaves beyond the noise widens the standard deviations.
+        let level = (solution.misfit / solution.degrees_of_freedom as f64)
+            .max(group.chance / BY_CHANCE)
+            .max(1.0)
+            .sqrt();
+        for (j, pole) in solution.poles.iter().enumerate() {
+            let (found_in, best) = joint_fit::seen_in(solution, j);
+            if found_in == 0 || (data.len() >= SET && found_in < 2 && best < FAR) {
+                result.rejected.push(RejectedMode {
+                    frequency_hz: pole.frequency_hz,
+                    damping_ratio: pole.damping_ratio,
+                    reason: "hardly above the noise, in one FRF or none".into(),
+                });
+                hardly_seen.push(format!("{:.2}", pole.frequency_hz));
+                continue;
+            }
+            let shift = group.doubt.as_ref().map_or([0.0; 2], |d| d.shifts[j]);
+            // The larger of what the noise says and of how the FRFs scatter about the common pole.
+            let few = data.len() < SET;
+            let small_set = 1.0 + 1.5 / (data.len().max(2) - 1) as f64;
+            let scatter = solution
+                .scatter_std(j)
+                .map(|s| if few { 0.0 } else { small_set * s });
+            let mut frequency_std_hz = (level * solution.frequency_std_hz(j))
+                .max(scatter[0] * pole.frequency_hz)
+                .hypot(shift[0]);
+            let mut constants = vec![None; count];
+            for m in 0..data.len() {
+                let (value, std) = solution.constant(m, j);
+                constants[of_member[m]] = Some((value, level * std));
+            }
+            let line_hz = data
+                .iter()
+                .map(|d| joint_fit::spacing_hz(&d.frequency_hz, pole.frequency_hz))
+                .fold(f64::INFINITY, f64::min);
+            let lines_in_half_power_band = 2.0 * pole.damping_ratio * pole.frequency_hz / line_hz;
+            let mut damping_std = (level * solution.damping_std(j))
+                .max(scatter[1] * pole.damping_ratio)
+                .hypot(shift[1]);
+            let others: Vec<Pole> = poles.iter().filter(|p| *p != pole).copied().collect();
+            let moves = verify::moves(fitted, solution, j, *pole, &others);
+            let (mut frequency_hz, mut damping_ratio) = (pole.frequency_hz, pole.damping_ratio);
+            if let Some(moves) = moves {
+                scatters.push(moves.scatter);
+                moving += usize::from(moves.significant);
+                if moves.significant {
+                    (frequency_hz, damping_ratio) = (moves.pole.frequency_hz, moves.pole.damping_ratio);
+                    frequency_std_hz = small_set * moves.std[0];
+                    damping_std = small_set * moves.std[1];
+                }
+            }
+            if lines_in_half_power_band < LEAKAGE_BELOW_LINES {
+                damping_std = damping_std.hypot(LEAKAGE_LINES * line_hz / (2.0 * pole.frequency_hz));
+            }
+            if data.len() < SET {
+                let apart = disagreement(members, *pole, [frequency_std_hz, damping_std]);
+                frequency_std_hz = frequency_std_hz.hypot(apart[0]);
+                damping_std = damping_std.hypot(apart[1]);
+            }
+            let residues: Vec<Complex64> = (0..data.len()).map(|m| solution.constant(m, j).0).collect();
+            let collinear = shape::complexity(&residues).is_none_or(|c| c.mpc > IN_PHASE);
+            let width_hz = (pole.damping_ratio * pole.frequency_hz).max(line_hz);
+            if !collinear && frequency_std_hz > UNPLACED * width_hz.hypot(shift[0]) {
+                result.rejected.push(RejectedMode {
+                    frequency_hz: pole.frequency_hz,
+                    damping_ratio: pole.damping_ratio,
+                    reason: format!(
+                        "the FRFs know its frequency to ±{frequency_std_hz:.2} Hz only, and have no common phase"
+                    ),
+                });
+                continue;
+            }
+            // … in most of them; a disturbance has phases of its own.
+            let in_phase = collinear && 2 * found_in > data.len() && found_in > 2;
+            if damping_std >= pole.damping_ratio && group.doubt.is_none() && !in_phase {
+                result.rejected.push(RejectedMode {
+                    frequency_hz: pole.frequency_hz,
+                    damping_ratio: pole.damping_ratio,
+                    reason: "a line whose width the FRFs do not determine".into(),
+                });
+                without_width.push(format!("{:.2}", pole.frequency_hz));
+                continue;
+            }
+            let shape = shape_of(solution, j, members);
+            result.modes.push(GlobalMode {
+                frequency_hz,
+                damping_ratio,
+                frequency_std_hz,
+                damping_std,
+                found_in,
+                lines_in_half_power_band,
+                complexity: shape::complexity(&shape.iter().map(|s| s.1).collect::<Vec<_>>()),
+                shape,
+                constants,
+            });
+        }
+    }
+    if !hardly_seen.is_empty() {
+        result.warnings.push(format!(
+            "hardly above the noise, in one FRF or none, and left out: {} Hz",
+            hardly_seen.join(", ")
+        ));
+    }
+    if !without_width.is_empty() {
+        result.warnings.push(format!(
+            "lines without a width that the FRFs determine (hum, a disturbance, or too coarse lines), left out: {} Hz",
+            without_width.join(", ")
+        ));
+    }
+    result
+        .modes
+        .sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+    let complex: Vec<String> = result
+        .modes
+        .iter()
+        .filter_map(|m| {
+            let mpc = m.complexity.filter(shape::Complexity::is_low)?.mpc;
+            Some(format!("{:.2} Hz ({mpc:.2})", m.frequency_hz))
+        })
+        .collect();
+    if !complex.is_empty() {
+        result.warnings.push(format!(
+            "complex modes (phase collinearity under {}): {}: two modes taken for one, channels shifted in time, or noise",
+            shape::COLLINEAR,
+            complex.join(", ")
+        ));
+    }
+    let residues: Vec<Vec<Complex64>> = result
+        .modes
+        .iter()
+        .map(|m| m.constants.iter().flatten().map(|c| c.0).collect())
+        .collect();
+    result.mac = residues
+        .iter()
+        .map(|a| residues.iter().map(|b| shape::mac(a, b)).collect())
+        .collect();
+    let where_modes_are = around(&result.modes);
+    let mut power = Power::default();
+    for (m, d) in data.iter().enumerate() {
+        let found = reconstruction(d, groups, m, where_modes_are);
+        let from = found.frequency_hz.partition_point(|&f| f < where_modes_are[0]);
+        let to = found.frequency_hz.partition_point(|&f| f <= where_modes_are[1]);
+        power.add((from..to).map(|k| {
+            let (measured, fitted) = (found.measured_m_per_n[k], found.fitted_m_per_n[k]);
+            let line = d.frequency_hz.partition_point(|&f| f < found.frequency_hz[k]);
+            (found.frequency_hz[k], measured, measured - fitted, d.sigma[line])
+        }));
+        result.reconstructions[of_member[m]] = Some(found);
+    }
+    if !result.modes.is_empty() {
+        let doubts = groups.iter().filter(|g| g.doubt.is_some()).count();
+        let found = quality::SetFindings {
+            power,
+            frequency_scatter: (!scatters.is_empty()).then(|| crate::signal::median(&scatters)),
+            moving: moving > 0 && 2 * moving >= scatters.len(),
+            doubts,
+            converged: groups.iter().all(|g| g.solution.converged),
+        };
+        result.quality = quality::judge_set(&found);
+    }
+}
+
+/// How far the FRFs' own local fits are from a common pole (frequency, Hz; damping ratio), where that is more than the
+/// uncertainty of both; else zero. With a few FRFs both fits rest on the same lines: noise cannot part them, only what
+/// one of the two models does not know (leakage, modes drifting during the record).
+fn disagreement(members: &[&SetMember], pole: Pole, std: [f64; 2]) -> [f64; 2] {
+    let width_hz = pole.damping_ratio * pole.frequency_hz;
+    let mut most = [0.0f64; 2];
+    for mode in members.iter().flat_map(|m| &m.modes.modes) {
+        let own = mode.best();
+        let line_hz = 2.0 * own.damping_ratio * own.frequency_hz / mode.lines_in_half_power_band;
+        let apart = [
+            (own.frequency_hz - pole.frequency_hz).abs(),
+            (own.damping_ratio - pole.damping_ratio).abs(),
+        ];
+        let (Some(frequency_std_hz), Some(damping_std)) = (own.frequency_std_hz, own.damping_std) else {
+            continue;
+        };
+        // Another mode, or two that the local fit takes for one.
+        if apart[0] > 0.5 * width_hz.max(line_hz) || apart[1] > 0.5 * pole.damping_ratio {
+            continue;
+        }
+        for (k, own_std) in [frequency_std_hz, damping_std].into_iter().enumerate() {
+            if apart[k] > APART * std[k].hypot(own_std) {
+                most[k] = most[k].max(apart[k]);
+            }
+        }
+    }
+    most
+}
+
+/// The band around the modes, Hz: what lies far outside says nothing about them.
+fn around(modes: &[GlobalMode]) -> [f64; 2] {
+    const REACH: f64 = 1.5;
+    let frequencies = || modes.iter().map(|m| m.frequency_hz);
+    match (frequencies().reduce(f64::min), frequencies().reduce(f64::max)) {
+        (Some(first), Some(last)) => [first / REACH, last * REACH],
+        _ => [0.0, f64::INFINITY],
+    }
+}
+
+/// Shape by response (or by FRF where degrees of freedom are not known), largest component 1.
+fn shape_of(solution: &ml_fit::Solution, mode: usize, members: &[&SetMember]) -> Vec<(usize, Complex64)> {
+    let constant = |m: usize| solution.constant(m, mode).0;
+    let dofs: Option<Vec<[usize; 2]>> = members.iter().map(|m| m.dofs).collect();
+    let Some(dofs) = dofs else {
+        let all: Vec<Complex64> = (0..members.len()).map(constant).collect();
+        return shape::normalised(&all).into_iter().enumerate().collect();
+    };
+    let unique = |side: usize| {
+        let mut ids: Vec<usize> = dofs.iter().map(|d| d[side]).collect();
+        ids.sort_unstable();
+        ids.dedup();
+        ids
+    };
+    // A roving hammer moves the excitation: then the references carry the shape.
+    let (side, other) = if unique(1).len() > unique(0).len() {
+        (1, 0)
+    } else {
+        (0, 1)
+    };
+    let (ids, others) = (unique(side), unique(other));
+    let mut matrix = DMatrix::zeros(ids.len(), others.len());
+    let mut filled = 0;
+    for (m, dof) in dofs.iter().enumerate() {
+        let at = (
+            ids.iter().position(|i| *i == dof[side]),
+            others.iter().position(|i| *i == dof[other]),
+        );
+        if let (Some(i), Some(j)) = at {
+            matrix[(i, j)] = constant(m);
+            filled += 1;
+        }
+    }
+    if filled == ids.len() * others.len()
+        && let Some(shape) = shape::from_residues(&matrix)
+    {
+        return ids.into_iter().zip(shape).collect();
+    }
+    // Gaps in the grid: the column that shows the mode best, as far as it was measured.
+    let best = (0..others.len()).max_by(|&a, &b| matrix.column(a).norm().total_cmp(&matrix.column(b).norm()));
+    let Some(best) = best else { return Vec::new() };
+    let (measured, column): (Vec<usize>, Vec<Complex64>) = dofs
+        .iter()
+        .filter(|dof| dof[other] == others[best])
+        .filter_map(|dof| ids.iter().position(|i| *i == dof[side]))
+        .map(|i| (ids[i], matrix[(i, best)]))
+        .unzip();
+    measured.into_iter().zip(shape::normalised(&column)).collect()
+}
+
+/// Says of every candidate what became of it.
+pub(crate) fn explain(diagram: &mut Stabilisation, modes: &[GlobalMode], changes: &[Change]) {
+    let near = |a: f64, b: &Pole| (a / b.frequency_hz - 1.0).abs() < 0.7 * b.damping_ratio.max(0.003);
+    for change in changes {
+        if let Change::Added(pole) = change {
+            diagram.candidates.push(Candidate {
+                frequency_hz: pole.frequency_hz,
+                damping_ratio: pole.damping_ratio,
+                orders: 0,
+                chosen: false,
+                why: "what the fit left over has a resonance here".into(),
+            });
+        }
+    }
+    let mut owner: Vec<bool> = vec![false; modes.len()];
+    for candidate in &mut diagram.candidates {
+        let mode = modes
+            .iter()
+            .enumerate()
+            .filter(|(k, m)| {
+                let width = m.frequency_hz * m.damping_ratio.max(0.003);
+                !owner[*k] && (m.frequency_hz - candidate.frequency_hz).abs() < width
+            })
+            .min_by(|(_, a), (_, b)| {
+                let distance = |m: &GlobalMode| (m.frequency_hz - candidate.frequency_hz).abs();
+                distance(a).total_cmp(&distance(b))
+            });
+        if let Some((k, mode)) = mode {
+            owner[k] = true;
+            candidate.chosen = true;
+            candidate
+                .why
+                .push_str(&format!("; taken, seen in {} FRFs", mode.found_in));
+            continue;
+        }
+        let why = changes
+            .iter()
+            .rev()
+            .find_map(|change| match change {
+                Change::Needless(p) if near(candidate.frequency_hz, p) => {
+                    Some("left out: the FRFs are described as well without it")
+                }
+                Change::NotDetermined(p) if near(candidate.frequency_hz, p) => {
+                    Some("left out: the lines do not determine it")
+                }
+                _ => None,
+            })
+            .unwrap_or("left out: joined another mode, or explains no more than a pole anywhere near would");
+        candidate.why.push_str("; ");
+        candidate.why.push_str(why);
+    }
+    diagram
+        .candidates
+        .sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+}
+
+/// Lists what is no mode: fitted poles that did not stand the tests, and candidates that were not fitted.
+pub(crate) fn reject(tested: Vec<RejectedMode>, diagram: &mut Stabilisation, result: &mut GlobalModes) {
+    let mut rejected = std::mem::take(&mut result.rejected);
+    rejected.extend(tested);
+    for candidate in diagram.candidates.iter_mut().filter(|c| !c.chosen) {
+        let width = candidate.frequency_hz * candidate.damping_ratio.max(0.003);
+        let same = |r: &&RejectedMode| (r.frequency_hz - candidate.frequency_hz).abs() < width;
+        match rejected.iter().find(same) {
+            Some(known) => {
+                candidate.why = format!("{}; left out: {}", before_semicolon(&candidate.why), known.reason)
+            }
+            None => rejected.push(RejectedMode {
+                frequency_hz: candidate.frequency_hz,
+                damping_ratio: candidate.damping_ratio,
+                reason: candidate.why.clone(),
+            }),
+        }
+    }
+    rejected.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+    result.rejected = rejected;
+}
+
+fn before_semicolon(text: &str) -> &str {
+    text.split(';').next().unwrap_or(text)
+}
+
+/// Three digits, without zeros at the end.
+pub(crate) fn short(value: f64) -> String {
+    let places = (2.0 - value.abs().log10().floor()).clamp(0.0, 9.0) as usize;
+    let text = format!("{value:.places$}");
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
+    }
+}
+
+/// One line for the whole set.
+pub(crate) fn coarse_lines(data: &[Data], result: &mut GlobalModes) {
+    let coarse: Vec<String> = result
+        .modes
+        .iter()
+        .filter(|m| m.lines_in_half_power_band < FINE_LINES && m.damping_std > UNCERTAIN * m.damping_ratio)
+        .map(|m| {
+            format!(
+                "at {} Hz lines the damping of the {:.1} Hz mode is uncertain to {:.0} %",
+                short(
+                    data.iter()
+                        .map(|d| joint_fit::spacing_hz(&d.frequency_hz, m.frequency_hz))
+                        .fold(f64::INFINITY, f64::min)
+                ),
+                m.frequency_hz,
+                (100.0 * m.damping_std / m.damping_ratio).ceil()
+            )
+        })
+        .collect();
+    if !coarse.is_empty() {
+        result.warnings.push(format!(
+            "fewer than {FINE_LINES:.0} lines in the half-power band: {}",
+            coarse.join("; ")
+        ));
+    }
+}

@@ -1,0 +1,100 @@
+//! Which candidates explain more than a pole anywhere near would: chosen strongest first, with the noise and the error of
+//! the model taken from what those chosen so far leave.
+//!
+//! A model never fits measurements exactly, and what it leaves is smooth over lines: any pole put there explains some of
+//! it. So a candidate is not held against white noise but against trial poles spread over its surroundings, which know
+//! neither a level nor a colour (in radar: detection with a constant rate of false alarms).
+
+use crate::modal::max_likelihood::joint_fit::{self, Data, PoleSearch};
+use crate::modal::single::local_fit::Pole;
+use crate::modal::together::set_noise;
+
+/// Batches at most.
+const MAX_ROUNDS: usize = 30;
+/// The first batches come in whatever they explain: while strong modes are missing nothing can be held against the rest.
+const UNASKED: usize = 3;
+/// A candidate that stayed over so many orders is no accident …
+const LONG_CHAIN: usize = 6;
+/// … and is tried for this part of what others must explain: while close neighbours are missing, poles anywhere explain
+/// much too.
+const FIRM: f64 = 0.4;
+/// A batch holds what explains at least this share of its best …
+const BATCH: f64 = 0.25;
+/// … and is not within so many half-widths of something better.
+const APART_WIDTHS: f64 = 1.5;
+/// FRFs that the choice is made on, at most.
+pub(crate) const ENOUGH_FRFS: usize = 40;
+
+/// Evenly spread FRFs, enough to choose on.
+pub(crate) fn some(data: &[Data]) -> Vec<Data> {
+    let count = data.len().min(ENOUGH_FRFS);
+    (0..count).map(|k| data[k * data.len() / count].clone()).collect()
+}
+
+/// A pole that may be one of the structure's.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Start {
+    pub pole: Pole,
+    /// Orders over which it stayed.
+    pub orders: usize,
+}
+
+/// The candidates to begin with, ascending in frequency.
+pub(crate) fn choose(data: &[Data], candidates: &[Start]) -> Vec<Pole> {
+    let mut data = data.to_vec();
+    let mut firm: Vec<bool> = candidates.iter().map(|c| c.orders >= LONG_CHAIN).collect();
+    let mut left: Vec<Pole> = candidates.iter().map(|c| c.pole).collect();
+    let mut chosen: Vec<Pole> = Vec::new();
+    for round in 0..MAX_ROUNDS {
+        let even = set_noise::alike(&data);
+        let Some(mut worth) = joint_fit::worth(&even, &chosen, &left) else {
+            break;
+        };
+        for (worth, _) in worth.iter_mut().zip(&firm).filter(|(_, firm)| **firm) {
+            *worth /= FIRM;
+        }
+        let wanted = if round < UNASKED { 0.0 } else { 1.0 };
+        let batch = batch(&left, &worth, wanted);
+        if batch.is_empty() {
+            break;
+        }
+        chosen.extend(batch.iter().map(|&k| left[k]));
+        for k in batch.into_iter().rev() {
+            left.remove(k);
+            firm.remove(k);
+        }
+        chosen.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+        let Some(groups) = joint_fit::refine(&even, &chosen, PoleSearch::Roughly, &mut Vec::new()) else {
+            break;
+        };
+        set_noise::renew(&mut data, &groups);
+        chosen = groups
+            .iter()
+            .flat_map(|g| g.solution.poles.iter().copied())
+            .collect();
+        chosen.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+    }
+    chosen
+}
+
+/// Ascending indices of those that come in together.
+fn batch(left: &[Pole], worth: &[f64], wanted: f64) -> Vec<usize> {
+    let best = worth.iter().copied().fold(0.0, f64::max);
+    let mut order: Vec<usize> = (0..left.len())
+        .filter(|&k| worth[k] > wanted && worth[k] >= BATCH * best && worth[k] > 0.0)
+        .collect();
+    order.sort_by(|&a, &b| worth[b].total_cmp(&worth[a]));
+    let width = |p: &Pole| p.damping_ratio * p.frequency_hz;
+    let mut taken: Vec<usize> = Vec::new();
+    for k in order {
+        let apart = |&t: &usize| {
+            let reach = APART_WIDTHS * (width(&left[t]) + width(&left[k]));
+            (left[t].frequency_hz - left[k].frequency_hz).abs() > reach
+        };
+        if taken.iter().all(apart) {
+            taken.push(k);
+        }
+    }
+    taken.sort_unstable();
+    taken
+}

@@ -1,0 +1,222 @@
+//! Noise of the FRFs of a set: from the measurement before the modes are known, from what they leave over afterwards.
+
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use crate::modal::max_likelihood::joint_fit::{Data, Group};
+use crate::modal::together::set_member::SET;
+use crate::signal::frf_noise;
+use crate::signal::noise_law::{self, Departure};
+
+/// A piece of the band left with this many times the noise power is badly described.
+const MISFIT: f64 = 2.0;
+/// Lines of a piece: enough that a mode overlooked in it still stands out.
+const BLOCK: usize = 48;
+
+/// Noise of each FRF, from those on the same lines together.
+pub(crate) fn estimate(data: &mut [Data]) {
+    let mut todo: Vec<usize> = (0..data.len()).collect();
+    while let Some(&first) = todo.first() {
+        let (same, other): (Vec<usize>, Vec<usize>) = todo
+            .iter()
+            .partition(|&&k| data[k].frequency_hz == data[first].frequency_hz);
+        let curves: Vec<&[Complex64]> = same.iter().map(|&k| data[k].receptance.as_slice()).collect();
+        let estimates = frf_noise::estimate(&data[first].frequency_hz, &curves);
+        for (&k, estimate) in same.iter().zip(estimates) {
+            let size = rms(&data[k].receptance);
+            let floor = |h: Complex64| (1e-6 * h.norm()).max(1e-9 * size);
+            data[k].sigma = match estimate {
+                Some(e) => e
+                    .std
+                    .iter()
+                    .zip(&data[k].receptance)
+                    .map(|(s, h)| s.max(floor(*h)))
+                    .collect(),
+                // Too few lines to tell: relative noise, as of a hammer; the residual scales it later.
+                None => data[k]
+                    .receptance
+                    .iter()
+                    .map(|h| (0.02 * h.norm()).max(1e-3 * size))
+                    .collect(),
+            };
+        }
+        todo = other;
+    }
+}
+
+/// The FRFs with noises that differ by a factor only, where they are on the same lines: at each line the mean square over
+/// the FRFs of what each has over its own level, so that what a fit leaves there is as large as expected. A fit of such
+/// FRFs takes a fraction of the time ([`crate::modal::max_likelihood::alike`]) and is hardly less exact; its standard deviations are not those
+/// of the noise.
+pub(crate) fn alike(data: &[Data]) -> Vec<Data> {
+    let mut data = data.to_vec();
+    let lines = data.first().map_or(0, |d| d.frequency_hz.len());
+    if data
+        .windows(2)
+        .any(|w| w[0].frequency_hz != w[1].frequency_hz || w[0].spread_hz != w[1].spread_hz)
+    {
+        return data;
+    }
+    let mut squares = vec![0.0; lines];
+    let levels: Vec<f64> = data
+        .iter()
+        .map(|d| {
+            let level = (d.sigma.iter().map(|s| s.ln()).sum::<f64>() / lines as f64).exp();
+            for (sum, sigma) in squares.iter_mut().zip(&d.sigma) {
+                *sum += (sigma / level).powi(2);
+            }
+            level
+        })
+        .collect();
+    let count = data.len() as f64;
+    for (d, level) in data.iter_mut().zip(levels) {
+        for (sigma, sum) in d.sigma.iter_mut().zip(&squares) {
+            *sigma = level * (sum / count).sqrt();
+        }
+    }
+    data
+}
+
+pub(crate) fn rms(values: &[Complex64]) -> f64 {
+    (values.iter().map(|v| v.norm_sqr()).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
+/// Noise of each FRF from what the fit leaves over. Lines whose group could not be fitted keep theirs. Where a piece of
+/// the band is left far worse than the rest (leakage, drifting modes, lines below the sensor's range), it is that much
+/// noisier: one bad end of the band must not decide what is needless elsewhere.
+pub(crate) fn renew(data: &mut [Data], groups: &[Group]) {
+    let left_over: Vec<Vec<Departure>> = data
+        .par_iter()
+        .enumerate()
+        .map(|(m, data)| left_over(data, groups, m))
+        .collect();
+    let laws = noise_law::fit(&left_over);
+    for ((d, lines), law) in data.iter_mut().zip(&left_over).zip(laws) {
+        let size = rms(&d.receptance);
+        let fitted = lines.iter().filter(|l| l.squared.is_finite());
+        let sigmas = d.sigma.iter().zip(&d.count);
+        let (count, level) = fitted.zip(sigmas).fold((0, 0.0), |(n, sum), (line, (s, count))| {
+            (n + 1, sum + line.squared / (s * s * count))
+        });
+        let scale = (level / f64::from(count.max(1))).sqrt().max(1e-6);
+        for ((sigma, line), count) in d
+            .sigma
+            .iter_mut()
+            .zip(lines)
+            .zip(&d.count)
+            .filter(|((_, l), _)| l.squared.is_finite())
+        {
+            *sigma = match &law {
+                Some(law) => {
+                    let of_a_line = law.std(line.frequency_hz, line.magnitude);
+                    (of_a_line / count.sqrt())
+                        .max(1e-7 * line.magnitude)
+                        .max(1e-10 * size)
+                }
+                None => *sigma * scale,
+            };
+        }
+    }
+    // In a few FRFs alone a mode overlooked would hide in its own misfit.
+    if data.len() < SET {
+        return;
+    }
+    for [from, to] in blocks(data) {
+        let (mut count, mut level) = (0, 0.0);
+        for (d, lines) in data.iter().zip(&left_over) {
+            for ((line, sigma), lines) in lines.iter().zip(&d.sigma).zip(&d.count) {
+                if (from..to).contains(&line.frequency_hz) && line.squared.is_finite() {
+                    level += line.squared / (sigma * sigma * lines);
+                    count += 1;
+                }
+            }
+        }
+        let excess = level / f64::from(count.max(1));
+        if excess.is_finite() && excess > MISFIT {
+            for d in data.iter_mut() {
+                let sigmas = d.frequency_hz.iter().zip(&mut d.sigma);
+                sigmas
+                    .filter(|(f, _)| (from..to).contains(*f))
+                    .for_each(|(_, sigma)| *sigma *= excess.sqrt());
+            }
+        }
+    }
+}
+
+/// The band in pieces of at least [`BLOCK`] lines of the FRF that has most, Hz.
+fn blocks(data: &[Data]) -> Vec<[f64; 2]> {
+    let Some(finest) = data.iter().max_by_key(|d| d.frequency_hz.len()) else {
+        return Vec::new();
+    };
+    let lines = &finest.frequency_hz;
+    let count = (lines.len() / BLOCK).max(1);
+    let edge = |k: usize| match k {
+        0 => f64::NEG_INFINITY,
+        k if k == count => f64::INFINITY,
+        k => lines[k * lines.len() / count],
+    };
+    (0..count).map(|k| [edge(k), edge(k + 1)]).collect()
+}
+
+/// By line of FRF m, squares as they would be on a single line; infinite where no group covers it.
+fn left_over(data: &Data, groups: &[Group], m: usize) -> Vec<Departure> {
+    let mut lines: Vec<Departure> = data
+        .frequency_hz
+        .iter()
+        .zip(&data.receptance)
+        .map(|(&frequency_hz, h)| Departure {
+            frequency_hz,
+            magnitude: h.norm(),
+            squared: f64::INFINITY,
+        })
+        .collect();
+    for group in groups {
+        let found = &group.solution.frfs[m];
+        let from = data.frequency_hz.partition_point(|&f| f < group.window_hz[0]);
+        // The poles are shared by all FRFs and cost each of them next to nothing.
+        let freedom = (1.0 - found.leverage).max(0.05);
+        for (k, residual) in found.residual.iter().enumerate() {
+            let line = &mut lines[from + k];
+            line.magnitude = (data.receptance[from + k] - residual).norm();
+            line.squared = residual.norm_sqr() * data.count[from + k] / freedom;
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn data(frequency_hz: &[f64], sigma: &[f64]) -> Data {
+        let lines = frequency_hz.len();
+        Data {
+            frequency_hz: frequency_hz.to_vec(),
+            receptance: vec![Complex64::ONE; lines],
+            sigma: sigma.to_vec(),
+            spread_hz: vec![0.0; lines],
+            count: vec![1.0; lines],
+        }
+    }
+
+    #[test]
+    fn noises_made_alike_are_in_proportion_and_as_large_together() {
+        let f = [1.0, 2.0, 3.0];
+        let frfs = [data(&f, &[1.0, 2.0, 4.0]), data(&f, &[30.0, 10.0, 3.0])];
+        let even = alike(&frfs);
+        for k in 0..3 {
+            let ratio = even[1].sigma[k] / even[0].sigma[k];
+            approx::assert_relative_eq!(ratio, even[1].sigma[0] / even[0].sigma[0], max_relative = 1e-12);
+            // What a fit leaves on a line over all FRFs is as large as expected.
+            let left: f64 = (0..2)
+                .map(|m| (frfs[m].sigma[k] / even[m].sigma[k]).powi(2))
+                .sum();
+            approx::assert_relative_eq!(left, 2.0, max_relative = 1e-12);
+        }
+        let other = [
+            data(&f, &[1.0, 2.0, 4.0]),
+            data(&[1.0, 2.0, 3.5], &[3.0, 1.0, 3.0]),
+        ];
+        assert_eq!(alike(&other)[1].sigma, other[1].sigma);
+    }
+}

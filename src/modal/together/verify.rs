@@ -1,0 +1,452 @@
+//! Is a fitted pole a mode of the structure? What the FRFs together do not bear out goes out, with the reason, and the rest
+//! is fitted again.
+
+use num_complex::Complex64;
+
+use crate::modal::max_likelihood::joint_fit::{self, Data, Group, PoleSearch};
+use crate::modal::max_likelihood::ml_fit::{self, Solution};
+use crate::modal::shape;
+use crate::modal::single::local_fit::Pole;
+use crate::modal::together::global_modes::RejectedMode;
+use crate::modal::together::set_member::SET;
+use crate::modal::together::set_noise;
+
+/// Fits after poles were taken out, at most.
+const MAX_ROUNDS: usize = 6;
+/// From this many FRFs on the phase of their residues says something.
+const ENOUGH_FRFS: usize = 5;
+/// Residues of no common phase: what random phases give more often than a structure.
+const COLLINEAR: f64 = 0.5;
+/// A pole that makes this share of what was measured in its band is there, whatever its phases are.
+const DOMINANT: f64 = 0.5;
+/// Share of the FRFs that must show a mode …
+const SHARE_OF_FRFS: f64 = 0.08;
+/// … unless one of them shows it with this squared size over uncertainty.
+const FAR: f64 = 100.0;
+/// A frequency that scatters from FRF to FRF by more than this share of the half-width belongs to no mode.
+const SCATTER_WIDTHS: f64 = 0.3;
+/// A damping ratio uncertain by more than this part of itself, from how the FRFs scatter.
+const SCATTER_DAMPING: f64 = 0.5;
+/// Power of a mode over the coloured rest in its band.
+const OVER_REST: f64 = 2.0;
+/// Two poles nearer than this share of the sum of their half-widths may be one.
+const CLOSE: f64 = 1.0;
+/// Two poles nearer than this share of that sum are one mode unless both have the phases of one.
+const SAME: f64 = 0.2;
+/// Residues of a common phase: what a mode next to another one keeps.
+const IN_PHASE: f64 = 0.7;
+/// Shapes that repeat.
+const SAME_SHAPE: f64 = 0.9;
+
+/// Takes out what is no mode until all are; `data` gets the noise that belongs to the last fit.
+pub(crate) fn verified(
+    data: &mut [Data],
+    mut groups: Vec<Group>,
+    rejected: &mut Vec<RejectedMode>,
+) -> Option<Vec<Group>> {
+    for _ in 0..MAX_ROUNDS {
+        let mut kept: Vec<Pole> = Vec::new();
+        let mut out = false;
+        for group in &groups {
+            let pairs = close_pairs(data, group);
+            for (j, pole) in group.solution.poles.iter().enumerate() {
+                if let Some(merged) = pairs.iter().find_map(|p| p.merged.filter(|_| p.strong == j)) {
+                    kept.push(merged);
+                    continue;
+                }
+                let twice = pairs.iter().find(|p| p.weak == j);
+                match twice.map(|p| p.reason.clone()).or_else(|| reason(data, group, j)) {
+                    None => kept.push(*pole),
+                    Some(reason) => {
+                        out = true;
+                        rejected.push(RejectedMode {
+                            frequency_hz: pole.frequency_hz,
+                            damping_ratio: pole.damping_ratio,
+                            reason,
+                        });
+                    }
+                }
+            }
+        }
+        if !out {
+            return Some(groups);
+        }
+        kept.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+        if kept.is_empty() {
+            return None;
+        }
+        groups = joint_fit::refine(
+            &set_noise::alike(data),
+            &kept,
+            PoleSearch::Roughly,
+            &mut Vec::new(),
+        )?;
+        set_noise::renew(data, &groups);
+        groups = joint_fit::refine(data, &kept, PoleSearch::Nothing, &mut Vec::new())?;
+    }
+    Some(groups)
+}
+
+/// Why pole `j` of a group is no mode.
+fn reason(data: &[Data], group: &Group, j: usize) -> Option<String> {
+    let solution = &group.solution;
+    let pole = solution.poles[j];
+    let frfs = solution.frfs.len();
+    let residues: Vec<Complex64> = (0..frfs).map(|m| solution.constant(m, j).0).collect();
+    let local = Local::new(data, group, j, &residues);
+    let (seen_in, best) = joint_fit::seen_in(solution, j);
+    let wanted = ((SHARE_OF_FRFS * frfs as f64).ceil() as usize).max(2);
+    if frfs >= SET && seen_in < wanted && best < FAR {
+        return Some(match seen_in {
+            0 => "hardly above what is left unexplained".into(),
+            n => format!("shown by {n} of {frfs} FRFs only"),
+        });
+    }
+    if local.mode < OVER_REST * local.coloured {
+        return Some("no larger than what the modes leave unexplained around it".into());
+    }
+    if frfs >= ENOUGH_FRFS && local.mode < DOMINANT * local.measured {
+        let mpc = shape::complexity(&residues).map_or(1.0, |c| c.mpc);
+        if mpc < COLLINEAR {
+            return Some(format!(
+                "its FRFs have no common phase (collinearity {mpc:.2}): error of the measurement or of its neighbours' model"
+            ));
+        }
+    }
+    let [frequency, damping] = solution.scatter_std(j);
+    if frfs >= ENOUGH_FRFS
+        && local.mode < DOMINANT * local.measured
+        && (frequency > SCATTER_WIDTHS * pole.damping_ratio || damping > SCATTER_DAMPING)
+    {
+        return Some("the FRFs do not agree on its frequency or damping".into());
+    }
+    None
+}
+
+/// Powers in the half-power band of a mode, summed over the FRFs.
+struct Local {
+    mode: f64,
+    measured: f64,
+    /// Of what is left, the part that goes on from line to line.
+    coloured: f64,
+}
+
+impl Local {
+    fn new(data: &[Data], group: &Group, j: usize, residues: &[Complex64]) -> Local {
+        let pole = group.solution.poles[j];
+        let omega = std::f64::consts::TAU * pole.frequency_hz;
+        let mut local = Local {
+            mode: 0.0,
+            measured: 0.0,
+            coloured: 0.0,
+        };
+        for ((d, found), residue) in data.iter().zip(&group.solution.frfs).zip(residues) {
+            let from = d.frequency_hz.partition_point(|&f| f < group.window_hz[0]);
+            let line_hz = joint_fit::spacing_hz(&d.frequency_hz, pole.frequency_hz);
+            let half_hz = (pole.damping_ratio * pole.frequency_hz).max(1.5 * line_hz);
+            let lines = d
+                .frequency_hz
+                .partition_point(|&f| f < pole.frequency_hz - half_hz)
+                ..d.frequency_hz
+                    .partition_point(|&f| f <= pole.frequency_hz + half_hz);
+            let mut before: Option<Complex64> = None;
+            for k in lines {
+                let Some(residual) = k.checked_sub(from).and_then(|k| found.residual.get(k)) else {
+                    continue;
+                };
+                let r = d.frequency_hz[k] / pole.frequency_hz;
+                let g = residue / (omega * omega) / Complex64::new(1.0 - r * r, 2.0 * pole.damping_ratio * r);
+                local.mode += g.norm_sqr();
+                local.measured += d.receptance[k].norm_sqr();
+                if let Some(before) = before {
+                    local.coloured += (before.conj() * residual).re;
+                }
+                before = Some(*residual);
+            }
+        }
+        local
+    }
+}
+
+/// Two poles that stand for one mode.
+struct ClosePair {
+    strong: usize,
+    weak: usize,
+    /// What takes the place of the strong one.
+    merged: Option<Pole>,
+    reason: String,
+}
+
+/// The pairs of a group that are one mode: because its frequency moves from FRF to FRF, or because the shapes repeat. No
+/// pole is in two of them.
+fn close_pairs(data: &[Data], group: &Group) -> Vec<ClosePair> {
+    let solution = &group.solution;
+    let mut order: Vec<usize> = (0..solution.poles.len()).collect();
+    order.sort_by(|&a, &b| {
+        solution.poles[a]
+            .frequency_hz
+            .total_cmp(&solution.poles[b].frequency_hz)
+    });
+    let mut found = Vec::new();
+    let mut k = 1;
+    while k < order.len() {
+        match close_pair(data, solution, [order[k - 1], order[k]]) {
+            Some(pair) => {
+                found.push(pair);
+                k += 2;
+            }
+            None => k += 1,
+        }
+    }
+    found
+}
+
+fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2]) -> Option<ClosePair> {
+    let [a, b] = both.map(|j| solution.poles[j]);
+    let width = a.damping_ratio * a.frequency_hz + b.damping_ratio * b.frequency_hz;
+    if b.frequency_hz - a.frequency_hz > CLOSE * width {
+        return None;
+    }
+    let residues = both.map(|j| {
+        (0..solution.frfs.len())
+            .map(|m| solution.constant(m, j).0)
+            .collect::<Vec<Complex64>>()
+    });
+    // By the height of the peaks.
+    let height = |k: usize, pole: Pole| {
+        residues[k].iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt() / pole.damping_ratio
+    };
+    let (strong, weak) = if height(0, a) >= height(1, b) {
+        (both[0], both[1])
+    } else {
+        (both[1], both[0])
+    };
+    let beside = solution.poles[strong].frequency_hz;
+    if let Some(merged) = moving(data, solution, strong, weak) {
+        return Some(ClosePair {
+            strong,
+            weak,
+            merged: Some(merged),
+            reason: format!(
+                "one mode with {beside:.2} Hz, whose frequency moves from FRF to FRF: mass of the sensor, temperature"
+            ),
+        });
+    }
+    let out_of_phase = || {
+        residues
+            .iter()
+            .any(|r| shape::complexity(r).is_some_and(|c| c.mpc < IN_PHASE))
+    };
+    let cancel =
+        residues[0].len() >= ENOUGH_FRFS && b.frequency_hz - a.frequency_hz < SAME * width && out_of_phase();
+    if cancel {
+        return Some(ClosePair {
+            strong,
+            weak,
+            merged: None,
+            reason: format!("splits the mode at {beside:.2} Hz: the two nearly cancel each other"),
+        });
+    }
+    let repeats = residues[0].len() >= ENOUGH_FRFS && shape::mac(&residues[0], &residues[1]) > SAME_SHAPE;
+    repeats.then(|| ClosePair {
+        strong,
+        weak,
+        merged: None,
+        reason: format!("splits the mode at {beside:.2} Hz, whose shape it repeats"),
+    })
+}
+
+/// Does one mode that each FRF has at a place of its own describe the FRFs better than two common ones? Both have as many
+/// parameters. Its mean then.
+fn moving(data: &[Data], solution: &Solution, strong: usize, weak: usize) -> Option<Pole> {
+    if data.len() < 2 {
+        return None;
+    }
+    let pair = [solution.poles[strong], solution.poles[weak]];
+    let others: Vec<Pole> = (0..solution.poles.len())
+        .filter(|j| ![strong, weak].contains(j))
+        .map(|j| solution.poles[j])
+        .collect();
+    let single = own_poles(data, pair[0], &others)?;
+    let window = around(pair[0]);
+    let frfs: Vec<_> = data.iter().map(|d| d.window(window)).collect::<Option<_>>()?;
+    let near = near(&others, window);
+    let together = ml_fit::fit(&frfs, &pair, &near, ml_fit::SETTLED)?;
+    let misfit: f64 = single
+        .iter()
+        .map(|s| s.as_ref().map_or(f64::INFINITY, |s| s.misfit))
+        .sum();
+    if misfit > together.misfit {
+        return None;
+    }
+    let poles: Vec<Pole> = single.iter().flatten().map(|s| s.poles[0]).collect();
+    let median = |of: fn(&Pole) -> f64| crate::signal::median(&poles.iter().map(of).collect::<Vec<_>>());
+    Some(Pole {
+        frequency_hz: median(|p| p.frequency_hz),
+        damping_ratio: median(|p| p.damping_ratio),
+    })
+}
+
+/// Window of the single fits around a pole, Hz.
+fn around(pole: Pole) -> [f64; 2] {
+    const REACH_WIDTHS: f64 = 10.0;
+    let reach = REACH_WIDTHS * (pole.damping_ratio * pole.frequency_hz).max(2e-4 * pole.frequency_hz);
+    [pole.frequency_hz - reach, pole.frequency_hz + reach]
+}
+
+/// The poles that have something to say in a window.
+fn near(others: &[Pole], window: [f64; 2]) -> Vec<Pole> {
+    const MOST: usize = 4;
+    let reach = 0.5 * (window[1] - window[0]);
+    let mut near: Vec<Pole> = others
+        .iter()
+        .filter(|p| (window[0] - reach..window[1] + reach).contains(&p.frequency_hz))
+        .copied()
+        .collect();
+    let middle = 0.5 * (window[0] + window[1]);
+    near.sort_by(|a, b| {
+        (a.frequency_hz - middle)
+            .abs()
+            .total_cmp(&(b.frequency_hz - middle).abs())
+    });
+    near.truncate(MOST);
+    near
+}
+
+/// The mode as each FRF alone has it, the other poles held; `None` inside where its lines do not tell.
+pub(crate) fn own_poles(data: &[Data], pole: Pole, others: &[Pole]) -> Option<Vec<Option<Solution>>> {
+    use rayon::prelude::*;
+    let window = around(pole);
+    let near = near(others, window);
+    let found: Vec<Option<Solution>> = data
+        .par_iter()
+        .map(|d| ml_fit::fit(&[d.window(window)?], &[pole], &near, ml_fit::SETTLED))
+        .collect();
+    found.iter().any(|s| s.is_some()).then_some(found)
+}
+
+/// Mean of what each FRF says (value, standard deviation), and its standard deviation from how they scatter about it. Each
+/// counts by its own uncertainty and by how far all of them lie apart beyond that (random effects: DerSimonian & Laird
+/// 1986): one that hardly shows the mode does not decide.
+fn mean_over_frfs<T>(own: &[T], of: impl Fn(&T) -> (f64, f64)) -> (f64, f64) {
+    let values: Vec<(f64, f64)> = own.iter().map(of).collect();
+    let median =
+        |of: &dyn Fn(&(f64, f64)) -> f64| crate::signal::median(&values.iter().map(of).collect::<Vec<f64>>());
+    let middle = median(&|v| v.0);
+    let spread = 1.4826 * median(&|v| (v.0 - middle).abs());
+    let between = (spread.powi(2) - median(&|v| v.1).powi(2)).max(0.0);
+    let (mut total, mut mean) = (0.0, 0.0);
+    for (value, std) in &values {
+        let weight = 1.0 / (std * std + between);
+        total += weight;
+        mean += weight * value;
+    }
+    mean /= total;
+    let count = values.len() as f64;
+    let scatter: f64 = values
+        .iter()
+        .map(|(value, std)| ((value - mean) / (std * std + between)).powi(2))
+        .sum();
+    (mean, (scatter * count / (count - 1.0)).sqrt() / total)
+}
+
+/// How far a mode moves from FRF to FRF.
+pub(crate) struct Moves {
+    /// Relative standard deviation of the frequency beyond its uncertainty in each FRF.
+    pub scatter: f64,
+    /// More than uncertainty and a part of the half-width: a common pole does not describe it.
+    pub significant: bool,
+    /// Means over the FRFs, with their standard deviations.
+    pub pole: Pole,
+    pub std: [f64; 2],
+}
+
+/// `None` where too few FRFs tell. `j`: the mode in the solution that `pole` is of.
+pub(crate) fn moves(
+    data: &[Data],
+    solution: &Solution,
+    j: usize,
+    pole: Pole,
+    others: &[Pole],
+) -> Option<Moves> {
+    const LEAST_FRFS: usize = 4;
+    const KNOWN_WIDTHS: f64 = 0.3;
+    const BEYOND: f64 = 2.0;
+    const OF_WIDTH: f64 = 0.1;
+    // A single step from the common pole says whether an FRF's own is worth a fit.
+    const WORTH_A_FIT: f64 = 0.5;
+    let level = (solution.misfit / solution.degrees_of_freedom as f64)
+        .max(1.0)
+        .sqrt();
+    let steps: Vec<(f64, f64)> = (0..solution.frfs.len())
+        .filter_map(|m| solution.own_step(m, j))
+        .map(|(step, std)| (step[0], level * std[0]))
+        .filter(|(_, std)| *std < KNOWN_WIDTHS * pole.damping_ratio)
+        .collect();
+    if steps.len() < LEAST_FRFS {
+        return None;
+    }
+    let median =
+        |of: fn(&(f64, f64)) -> f64| crate::signal::median(&steps.iter().map(of).collect::<Vec<_>>());
+    let (middle, uncertain) = (median(|s| s.0), median(|s| s.1));
+    let spread =
+        1.4826 * crate::signal::median(&steps.iter().map(|s| (s.0 - middle).abs()).collect::<Vec<_>>());
+    if spread < WORTH_A_FIT * BEYOND * uncertain || spread < WORTH_A_FIT * OF_WIDTH * pole.damping_ratio {
+        return Some(Moves {
+            scatter: (spread * spread - uncertain * uncertain).max(0.0).sqrt(),
+            significant: false,
+            pole,
+            std: [0.0; 2],
+        });
+    }
+    let own: Vec<(Pole, [f64; 2])> = own_poles(data, pole, others)?
+        .into_iter()
+        .flatten()
+        .filter_map(|s| {
+            let level = (s.misfit / s.degrees_of_freedom as f64).max(1.0).sqrt();
+            let std = [level * s.frequency_std_hz(0), level * s.damping_std(0)];
+            let width = pole.damping_ratio * pole.frequency_hz;
+            let near = (s.poles[0].frequency_hz - pole.frequency_hz).abs() < 3.0 * width
+                && (0.3..3.0).contains(&(s.poles[0].damping_ratio / pole.damping_ratio));
+            (near && std[0] < KNOWN_WIDTHS * width).then_some((s.poles[0], std))
+        })
+        .collect();
+    if own.len() < LEAST_FRFS {
+        return None;
+    }
+    #[allow(clippy::type_complexity)]
+    let median = |of: &dyn Fn(&(Pole, [f64; 2])) -> f64| {
+        crate::signal::median(&own.iter().map(of).collect::<Vec<f64>>())
+    };
+    let middle = median(&|o| o.0.frequency_hz);
+    let spread = 1.4826 * median(&|o| (o.0.frequency_hz - middle).abs());
+    let uncertain = median(&|o| o.1[0]);
+    let scatter = (spread * spread - uncertain * uncertain).max(0.0).sqrt() / middle;
+    let (frequency_hz, frequency_std_hz) = mean_over_frfs(&own, |o| (o.0.frequency_hz, o.1[0]));
+    let (damping_ratio, damping_std) = mean_over_frfs(&own, |o| (o.0.damping_ratio, o.1[1]));
+    Some(Moves {
+        scatter,
+        significant: spread > BEYOND * uncertain && scatter > OF_WIDTH * pole.damping_ratio,
+        pole: Pole {
+            frequency_hz,
+            damping_ratio,
+        },
+        std: [frequency_std_hz, damping_std],
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_frf_that_hardly_shows_a_mode_does_not_decide_its_mean() {
+        // Alike: the plain mean and its standard error.
+        let (mean, std) = mean_over_frfs(&[(1.0, 0.1), (2.0, 0.1), (3.0, 0.1), (4.0, 0.1)], |v| *v);
+        approx::assert_relative_eq!(mean, 2.5, max_relative = 1e-12);
+        approx::assert_relative_eq!(std, (5.0f64 / 12.0).sqrt(), max_relative = 1e-12);
+        // One that knows nothing is far off: with all others at the same place they decide.
+        let (mean, std) = mean_over_frfs(&[(1.0, 0.01), (1.0, 0.01), (1.0, 0.01), (9.0, 10.0)], |v| *v);
+        assert!((mean - 1.0).abs() < 1e-4 && std < 1e-4, "{mean} {std}");
+    }
+}

@@ -1,0 +1,436 @@
+//! Which physics the model lacks: verdict, candidates, and what the missing effect takes away.
+
+use num_complex::Complex64;
+
+use crate::analysis::DiagnosisFindings;
+use crate::analysis::diagnosis::Leading;
+use crate::campaign::Campaign;
+use crate::discrepancy::comparison::explained::Part;
+use crate::discrepancy::{Diagnosis, DiagnosisVerdict, EffectCandidate, NextMeasurement};
+use crate::effects::Instance;
+use crate::identify::StructureModel;
+use crate::report::figure::{BarSeries, FrfCurve, FrfFigure, NoiseLevel, SideBySide};
+use crate::report::number::{decimals, percent, plus_minus, significant};
+use crate::report::parts::{figure, paragraph};
+use crate::report::sections::error_map_section::times_noise_map;
+use crate::report::words::{frf_name, listed};
+use crate::report::{Block, ReportSection, ReportTable, TableColumn, words};
+
+pub const ID: &str = "missing-physics";
+pub const TITLE: &str = "Which physics is missing";
+
+/// Candidates shown.
+const LISTED: usize = 8;
+/// FRFs drawn.
+const FRFS_DRAWN: usize = 3;
+
+type StructureCandidate = EffectCandidate<StructureModel, Instance>;
+
+/// The verdict in plain words.
+pub fn summary(findings: &DiagnosisFindings) -> String {
+    verdict_text(&findings.diagnosis, "FRFs", |c| {
+        (c.instance.title(), c.instance.effect.explanation())
+    })
+}
+
+/// The verdict in plain words; `plainly` gives the name and the explanation of an effect, `data` says what was measured.
+pub(crate) fn verdict_text<M, I>(
+    d: &Diagnosis<M, I>,
+    data: &str,
+    plainly: impl Fn(&EffectCandidate<M, I>) -> (String, &'static str),
+) -> String {
+    let sure = format!("confidence {:.0} %", 100.0 * d.confidence);
+    let mut text = match (d.verdict, d.winner()) {
+        (DiagnosisVerdict::Effect, Some(winner)) => {
+            let (title, explanation) = plainly(winner);
+            format!("The model lacks {title} ({sure}). {explanation}")
+        }
+        (DiagnosisVerdict::None, _) => match d.baseline.rest.excuse_in_words() {
+            Some(left) => format!(
+                "The model lacks nothing that is larger than the small errors of the setup ({sure}): what stands above the \
+                 noise is {left}."
+            ),
+            None => {
+                format!(
+                    "The model lacks nothing that these {data} show: what is left looks like noise ({sure})."
+                )
+            }
+        },
+        _ if d.too_little_data.is_some() => {
+            format!(
+                "No verdict: {}.",
+                d.too_little_data.as_deref().unwrap_or_default()
+            )
+        }
+        _ => format!(
+            "The model lacks something that no effect of the library explains ({sure}): what is left is real, but of a kind \
+             that this program does not know."
+        ),
+    };
+    if let Some(guess) = d.best_guess_in_words() {
+        text += &format!(" {guess}");
+    }
+    if let Some(companion) = &d.companion {
+        text += &format!(" A second effect is likely besides: {companion}.");
+    }
+    text
+}
+
+/// The verdict and what it rests on.
+pub fn section(campaign: &Campaign, findings: &DiagnosisFindings) -> ReportSection {
+    let d = &findings.diagnosis;
+    let mut blocks = vec![paragraph(summary(findings))];
+    blocks.extend(how_it_shows(d, |c| c.instance.effect.fingerprint()));
+    if let (Some(leading), Some(candidate)) = (&findings.leading, findings.leader()) {
+        let who = match d.verdict {
+            DiagnosisVerdict::Unknown => format!("The best candidate, {},", candidate.instance.title()),
+            _ => "It".into(),
+        };
+        blocks.push(paragraph(leading.explained.sentence(&who)));
+    }
+    blocks.extend(advice(campaign, d, "data", &findings.next_measurement));
+    if !d.candidates.is_empty() {
+        blocks.push(candidate_chart(
+            d,
+            findings.now.totals.noise_floor_nrms,
+            "missing-candidates",
+            "postures",
+        ));
+        blocks.push(candidate_table(d, |c| c.instance.title()));
+    }
+    if let (Some(leading), Some(candidate)) = (&findings.leading, findings.leader()) {
+        blocks.push(maps(findings, leading, candidate));
+        blocks.push(parts_table(leading, candidate));
+        for (rank, index) in findings
+            .now
+            .worst_first()
+            .into_iter()
+            .take(FRFS_DRAWN)
+            .enumerate()
+        {
+            blocks.extend(frf(findings, leading, candidate, rank, index));
+        }
+    }
+    blocks.extend(not_tried(d));
+    ReportSection {
+        id: ID.into(),
+        title: TITLE.into(),
+        lead: "Each effect of the library is added to the model in turn and fitted together with everything else. One that is \
+               really missing brings the error down to the noise, also at postures that the fit has not seen."
+            .into(),
+        blocks,
+    }
+}
+
+/// The fingerprint of the effect that is missing.
+pub(crate) fn how_it_shows<M, I>(
+    d: &Diagnosis<M, I>,
+    fingerprint: impl Fn(&EffectCandidate<M, I>) -> &'static str,
+) -> Option<Block> {
+    d.winner()
+        .map(|winner| paragraph(format!("How it shows: {}", fingerprint(winner))))
+}
+
+/// Rivals, what to measure next, and how to add what is missing; `data` says what was measured.
+pub(crate) fn advice<M, I>(
+    campaign: &Campaign,
+    d: &Diagnosis<M, I>,
+    data: &str,
+    next_measurement: &NextMeasurement,
+) -> Vec<Block> {
+    let mut blocks = Vec::new();
+    if !d.indistinguishable.is_empty() {
+        blocks.push(Block::Warning(format!(
+            "These {data} cannot tell it from {}.",
+            listed(&d.indistinguishable)
+        )));
+    }
+    blocks.push(paragraph(format!("Next measurement: {next_measurement}.")));
+    if let Some(winner) = d.winner() {
+        blocks.push(paragraph("To add it to the model and fit everything anew:"));
+        blocks.push(Block::Pre(format!(
+            "lobestone add {} {}",
+            campaign.dir.display(),
+            winner.label()
+        )));
+    }
+    blocks
+}
+
+/// Effects that the data cannot show, with the reasons.
+pub(crate) fn not_tried<M, I>(d: &Diagnosis<M, I>) -> Option<Block> {
+    let reasons = by_reason(&d.not_tried);
+    (!reasons.is_empty()).then(|| paragraph(format!("Not tried: {}.", reasons.join("; "))))
+}
+
+/// `a and b (why)`: what shares a reason, which sites of one effect often do, stands together.
+fn by_reason(not_tried: &[(String, String)]) -> Vec<String> {
+    let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
+    for (effect, why) in not_tried {
+        match reasons.iter_mut().find(|(known, _)| *known == why) {
+            Some((_, effects)) => effects.push(effect.clone()),
+            None => reasons.push((why, vec![effect.clone()])),
+        }
+    }
+    let said = reasons
+        .iter()
+        .map(|(why, effects)| format!("{} ({why})", listed(effects)));
+    said.collect()
+}
+
+/// Error with each candidate; `folds`: what was left out in turn.
+pub(crate) fn candidate_chart<M, I>(
+    d: &Diagnosis<M, I>,
+    noise_floor_nrms: f64,
+    file_name: &str,
+    folds: &str,
+) -> Block {
+    let shown: Vec<&EffectCandidate<M, I>> = d.candidates.iter().take(LISTED).collect();
+    let percents = |first: Option<f64>, rest: Vec<Option<f64>>| {
+        let all = std::iter::once(first).chain(rest);
+        all.map(|v| v.map(|v| 100.0 * v)).collect::<Vec<_>>()
+    };
+    let held_out = |h: &Option<crate::identify::study::HeldOut>| h.as_ref().map(|h| h.nrms());
+    let drawing = SideBySide {
+        title: "Error of the model with each effect added".into(),
+        y_label: "Error nrms (%)".into(),
+        groups: std::iter::once("model now".to_string())
+            // Spaces, so that long names break into lines.
+            .chain(shown.iter().map(|c| {
+                let site = c.name.site.as_ref().map_or(String::new(), |s| format!(" {s}"));
+                c.name.effect.replace('-', " ") + &site
+            }))
+            .collect(),
+        series: vec![
+            BarSeries {
+                label: format!("fitted {folds}"),
+                values: percents(
+                    Some(d.baseline.residual.nrms),
+                    shown.iter().map(|c| Some(c.nrms)).collect(),
+                ),
+            },
+            BarSeries {
+                label: format!("{folds} left out of the fit"),
+                values: percents(
+                    held_out(&d.baseline.held_out),
+                    shown.iter().map(|c| held_out(&c.held_out)).collect(),
+                ),
+            },
+        ],
+        log: true,
+        level: Some(("noise floor".into(), 100.0 * noise_floor_nrms)),
+    };
+    figure(
+        file_name,
+        "Error of the model now and with each candidate effect, against the noise floor",
+        format!(
+            "Error of the model as it is and with each candidate added, on {folds} that were fitted and on {folds} left out of \
+             the fit. A missing effect is one that reaches the noise floor (dotted)."
+        ),
+        drawing.png(),
+    )
+}
+
+pub(crate) fn candidate_table<M, I>(
+    d: &Diagnosis<M, I>,
+    title: impl Fn(&EffectCandidate<M, I>) -> String,
+) -> Block {
+    let all = &d.candidates;
+    let row = |c: &EffectCandidate<M, I>| {
+        let parameters: Vec<String> = c
+            .parameters
+            .iter()
+            .map(|p| {
+                let unit = if p.unit == "1" { "" } else { p.unit };
+                format!(
+                    "{} {}",
+                    words::parameter(&p.name),
+                    plus_minus(p.value, p.std_error, unit)
+                )
+            })
+            .collect();
+        vec![
+            title(c),
+            percent(c.nrms),
+            c.held_out.as_ref().map_or("–".into(), |h| percent(h.nrms())),
+            significant(c.delta_bic, 3),
+            if c.p_value < 1e-12 {
+                "< 1e-12".into()
+            } else {
+                significant(c.p_value, 2)
+            },
+            significant(c.reduced_chi2, 3),
+            parameters.join(", "),
+            c.remark().into(),
+        ]
+    };
+    let mut notes = vec![
+        "ΔBIC: below zero the effect pays for its parameters. p: chance of such an improvement where the effect is not there, \
+         corrected for the number of candidates. χ²/dof: squared error over squared noise; 1 is noise alone."
+            .into(),
+    ];
+    if all.len() > LISTED {
+        notes.push(format!("The first {LISTED} of {}.", all.len()));
+    }
+    Block::Table(ReportTable {
+        caption: "Candidates, best first".into(),
+        columns: vec![
+            TableColumn::text("effect"),
+            TableColumn::number("error"),
+            TableColumn::number("held-out error"),
+            TableColumn::number("ΔBIC"),
+            TableColumn::number("p"),
+            TableColumn::number("χ²/dof"),
+            TableColumn::text("parameters"),
+            TableColumn::text(""),
+        ],
+        rows: all.iter().take(LISTED).map(row).collect(),
+        notes,
+    })
+}
+
+fn maps(findings: &DiagnosisFindings, leading: &Leading, candidate: &StructureCandidate) -> Block {
+    let with = format!("with {}", candidate.label());
+    let drawing = times_noise_map(
+        "Error in multiples of the noise, before and after",
+        &[("model now", &findings.now.map), (&with, &leading.comparison.map)],
+    );
+    figure(
+        "missing-map",
+        "Error map before and after the effect is added",
+        format!(
+            "Error in multiples of the noise by posture, direction and frequency band: the model as it is (left) and with \
+             {} (right), on one colour scale. 1 is noise alone.",
+            candidate.instance.title()
+        ),
+        drawing.png(),
+    )
+    .with_plot(drawing.plot())
+}
+
+fn parts_table(leading: &Leading, candidate: &StructureCandidate) -> Block {
+    let explained = &leading.explained;
+    let times = |v: Option<f64>| v.map_or("–".into(), |v| significant(v, 2));
+    let row = |name: String, part: &Part| {
+        vec![
+            name,
+            format!("{} → {}", percent(part.nrms_before), percent(part.nrms_after)),
+            format!(
+                "{} → {}",
+                times(part.times_noise_before),
+                times(part.times_noise_after)
+            ),
+            part.share
+                .map_or("–".into(), |s| format!("{} %", decimals(100.0 * s, 1))),
+            format!("{} %", decimals(100.0 * part.of_all, 1)),
+        ]
+    };
+    let mut rows = vec![row("everything".into(), &explained.total)];
+    for (kind, parts) in [
+        ("posture", &explained.by_posture),
+        ("direction", &explained.by_direction),
+        ("node", &explained.by_point),
+    ] {
+        rows.extend(parts.iter().map(|p| row(format!("{kind} {}", p.name), &p.part)));
+    }
+    rows.extend(explained.by_band.iter().map(|b| {
+        let name = format!("{}–{} Hz", significant(b.from_hz, 3), significant(b.to_hz, 3));
+        row(name, &b.part)
+    }));
+    Block::Table(ReportTable {
+        caption: format!("What {} takes away, and where", candidate.instance.title()),
+        columns: vec![
+            TableColumn::text("where"),
+            TableColumn::number("error"),
+            TableColumn::number("× noise"),
+            TableColumn::number("taken away there"),
+            TableColumn::number("of all it takes away"),
+        ],
+        rows,
+        notes: vec![
+            "Taken away there: share of the squared error above noise (each difference divided by its noise) that is gone; – \
+             where there was only noise."
+                .into(),
+        ],
+    })
+}
+
+fn frf(
+    findings: &DiagnosisFindings,
+    leading: &Leading,
+    candidate: &StructureCandidate,
+    rank: usize,
+    index: usize,
+) -> Option<Block> {
+    let (block, frf) = findings.case.data.frfs().nth(index)?;
+    let (now, with) = (
+        findings.now.frf_errors.get(index)?,
+        leading.comparison.frf_errors.get(index)?,
+    );
+    let curve = |label: String, value: &[Complex64]| FrfCurve {
+        label,
+        frequency_hz: block.frequency_hz.clone(),
+        value: value.to_vec(),
+    };
+    let name = frf_name(&now.posture, &now.name);
+    let drawing = FrfFigure {
+        title: format!("{name}: what {} changes", candidate.label()),
+        quantity: "Receptance".into(),
+        unit: "m/N".into(),
+        measured: Some(curve("measured".into(), &frf.receptance)),
+        models: vec![
+            curve(
+                format!("model now (error {})", percent(now.nrms)),
+                findings.predicted.get(index)?,
+            ),
+            curve(
+                format!("with {} (error {})", candidate.label(), percent(with.nrms)),
+                leading.predicted.get(index)?,
+            ),
+        ],
+        noise: Some(NoiseLevel {
+            label: "noise level".into(),
+            frequency_hz: block.frequency_hz.clone(),
+            magnitude: frf.noise_std.clone(),
+        }),
+    };
+    let place = [
+        "The FRF with most error against its noise",
+        "Second most",
+        "Third most",
+    ]
+    .get(rank)
+    .copied()
+    .unwrap_or("Much error against noise");
+    let caption = format!(
+        "{place}: {name}. Error {} now, {} with {}; its noise is {}.",
+        percent(now.nrms),
+        percent(with.nrms),
+        candidate.instance.title(),
+        percent(now.noise_floor_nrms)
+    );
+    let file = format!("missing-frf-{}", rank + 1);
+    Some(figure(file, &drawing.title.clone(), caption, drawing.png()).with_plot(drawing.plot()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reason_is_said_once() {
+        let pair = |effect: &str, why: &str| (effect.to_string(), why.to_string());
+        let tried = [
+            pair("damping@joint-1", "one force level"),
+            pair("payload", "no tool"),
+            pair("damping@joint-2", "one force level"),
+        ];
+        assert_eq!(
+            by_reason(&tried),
+            [
+                "damping@joint-1 and damping@joint-2 (one force level)",
+                "payload (no tool)"
+            ]
+        );
+    }
+}

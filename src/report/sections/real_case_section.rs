@@ -1,0 +1,123 @@
+//! The loop on the thesis' own tables: which effect they propose, and how far to trust it.
+
+use crate::report::figure::{ResonanceFigure, ResonanceRow};
+use crate::report::number::{decimals, format_si};
+use crate::report::parts::{figure, paragraph};
+use crate::report::{Block, ReportTable, TableColumn};
+use crate::thesis::RealCase;
+use crate::thesis::real_case::{CONFIGURATIONS, Explanation};
+
+pub fn blocks(case: &RealCase) -> Vec<Block> {
+    let mut blocks = vec![paragraph(format!(
+        "Which effect is missing? The loop that diagnoses campaigns was run on the modal table and the list of minima of \
+         the real part together: {} resonances at four configurations, frequency and size of each. Its baseline is the \
+         rigid-link model with joints and damping tuned to all of them; every effect of the library that such tables can \
+         show was added in turn, refitted, and judged on configurations left out.",
+        case.resonances.len()
+    ))];
+    blocks.push(resonance_figure(case));
+    blocks.push(explanations(case));
+    blocks.extend(case.answer().into_iter().map(paragraph));
+    blocks.push(paragraph(format!("Caveats. {}", case.caveats().join(" "))));
+    blocks
+}
+
+fn best_name(case: &RealCase) -> &str {
+    case.candidates.first().map_or("best effect", |c| &c.name)
+}
+
+fn resonance_figure(case: &RealCase) -> Block {
+    let rows = CONFIGURATIONS.iter().enumerate().flat_map(|(i, configuration)| {
+        ['X', 'Y'].map(|axis| ResonanceRow {
+            label: format!("{configuration} {axis}"),
+            measured_hz: case
+                .resonances
+                .iter()
+                .filter(|r| r.configuration == *configuration && r.axis == axis)
+                .map(|r| (r.frequency_hz, r.readings_hz))
+                .collect(),
+            before_hz: case.baseline_modes_hz.get(i).cloned().unwrap_or_default(),
+            after_hz: case.best_modes_hz.get(i).cloned().unwrap_or_default(),
+        })
+    });
+    let bands = case.baseline.bands.iter().map(|b| (b.from_hz, b.to_hz));
+    let title = "Measured resonances and the model's modes";
+    let drawing = ResonanceFigure {
+        title: title.into(),
+        before_label: "modes, rigid links tuned to all resonances".into(),
+        after_label: format!("modes with {}", best_name(case)),
+        rows: rows.collect(),
+        bands_hz: bands.collect(),
+    };
+    let caption = "Each row is a configuration and an axis. Bars through the signs span merged minima; the shaded bands are \
+                   those in question. A mode may move the tool point hardly at all along the row's axis.";
+    figure("thesis-resonances", title, caption, drawing.png())
+}
+
+fn explanations(case: &RealCase) -> Block {
+    let row = |e: &Explanation| {
+        let parameters: Vec<String> = e
+            .parameters
+            .iter()
+            .map(|p| {
+                let name = p.name.rsplit('.').next().unwrap_or_default();
+                let unit = if p.unit == "1" { "" } else { p.unit };
+                format!("{name} {}", format_si(p.value, unit, 3))
+            })
+            .collect();
+        let bands: Vec<String> = e
+            .bands
+            .iter()
+            .map(|b| format!("{} of {}", b.met, b.measured))
+            .collect();
+        let [low, high] = e.static_ratio;
+        vec![
+            e.name.clone(),
+            decimals(e.delta_bic, 1),
+            format!("{:.0e}", e.p_value),
+            decimals(e.reduced_chi2, 1),
+            decimals(e.held_out_chi2, 0),
+            format!("{} of {}", e.met, case.resonances.len()),
+            bands.join("; "),
+            format!("{} to {}", decimals(low, 2), decimals(high, 2)),
+            decimals(e.weight, 2),
+            format!(
+                "{}{}",
+                parameters.join(", "),
+                if e.at_bound { " (at its bound)" } else { "" }
+            ),
+        ]
+    };
+    let bands: Vec<String> = case
+        .baseline
+        .bands
+        .iter()
+        .map(|b| format!("{}–{} Hz", b.from_hz, b.to_hz))
+        .collect();
+    let mut notes: Vec<String> = case
+        .not_tried
+        .iter()
+        .map(|(effect, reason)| format!("Not tried: {effect} ({reason})."))
+        .collect();
+    notes.dedup();
+    Block::Table(ReportTable {
+        caption: "Explanations of the tables, best first after the rigid links".into(),
+        columns: vec![
+            TableColumn::text("explanation"),
+            TableColumn::number("BIC difference"),
+            TableColumn::number("p, corrected"),
+            TableColumn::number("variance left (1 is noise)"),
+            TableColumn::number("misfit held out"),
+            TableColumn::number("resonances with a mode"),
+            TableColumn::number(format!("of those at {}", bands.join("; "))),
+            TableColumn::number("static stiffness, model / measured"),
+            TableColumn::number("weight"),
+            TableColumn::text("parameters"),
+        ],
+        rows: std::iter::once(&case.baseline)
+            .chain(&case.candidates)
+            .map(row)
+            .collect(),
+        notes,
+    })
+}

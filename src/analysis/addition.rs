@@ -75,11 +75,13 @@ impl Entry<'_> {
 pub struct Addition<M = StructureModel, I = Instance> {
     /// Number of the new revision.
     pub revision: usize,
+    /// What was added, and the fits without and with it.
     pub extension: Extension<M, I>,
     /// Error with the effect.
     pub totals: ErrorTotals,
     /// `effect@site` of all that is in the model now.
     pub effects: Vec<String>,
+    /// What was noticed while reading and fitting.
     pub warnings: Vec<String>,
 }
 

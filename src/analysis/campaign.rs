@@ -18,20 +18,25 @@ use crate::{Error, InputError, Result};
 
 /// The parts that a campaign holds; `None` where it holds nothing of the kind.
 pub struct CampaignFindings<'a> {
+    /// The campaign itself.
     pub campaign: &'a Campaign,
+    /// Model against FRFs.
     pub structure: Option<Result<StructureFindings>>,
     /// What the model lacks, where that was asked for.
     pub diagnosis: Option<Result<DiagnosisFindings>>,
     /// The robot at the campaign's postures.
     pub postures: Option<Result<Vec<PostureFindings>>>,
+    /// Modes of the measured FRFs.
     pub modal: Option<Result<ModalAnalysis>>,
     /// Shapes of the posture that shows most modes, on the robot.
     pub mode_shapes: Vec<StickShape>,
+    /// Cutting force coefficients.
     pub cutting: Option<Result<CfcResult>>,
     /// What the force model lacks, where that was asked for.
     pub cutting_diagnosis: Option<Result<CuttingFindings>>,
     /// What was added to the force model so far, the baseline first; empty where nothing was.
     pub cutting_revisions: Vec<Revision>,
+    /// Stability lobes.
     pub lobes: Option<Result<LobeFindings>>,
     /// Wrong files and other mistakes of the setup that are likely, of both sides.
     pub setup: Vec<SetupFinding>,
@@ -39,6 +44,7 @@ pub struct CampaignFindings<'a> {
 
 /// Model against FRFs.
 pub struct StructureFindings {
+    /// The model before and after calibration.
     pub analysis: StructureAnalysis,
     /// nrms on postures that were left out of the fit.
     pub held_out_nrms: Option<f64>,
@@ -49,13 +55,17 @@ pub struct StructureFindings {
 /// One posture as the robot file has it and calibrated.
 #[derive(Debug, Clone)]
 pub struct PostureFindings {
+    /// The posture's name.
     pub id: String,
+    /// By the robot file.
     pub nominal: PostureReport,
+    /// With the calibrated parameters.
     pub calibrated: Option<PostureReport>,
     /// Base, joints, flange, tool centre point; base frame, m.
     pub chain_m: Vec<[f64; 3]>,
 }
 
+/// The lobes that the campaign asks for, and a check on them.
 pub struct LobeFindings {
     /// What the campaign asks for.
     pub asked: LobeAnalysis,
@@ -166,22 +176,27 @@ impl<'a> CampaignFindings<'a> {
         self.structure.as_ref().and_then(|r| r.as_ref().ok())
     }
 
+    /// What the robot model lacks, where that was looked for and found.
     pub fn diagnosis(&self) -> Option<&DiagnosisFindings> {
         self.diagnosis.as_ref().and_then(|r| r.as_ref().ok())
     }
 
+    /// The cutting force coefficients, where they were found.
     pub fn cutting(&self) -> Option<&CfcResult> {
         self.cutting.as_ref().and_then(|r| r.as_ref().ok())
     }
 
+    /// What the force model lacks, where that was looked for and found.
     pub fn cutting_diagnosis(&self) -> Option<&CuttingFindings> {
         self.cutting_diagnosis.as_ref().and_then(|r| r.as_ref().ok())
     }
 
+    /// The lobes, where they were found.
     pub fn lobes(&self) -> Option<&LobeFindings> {
         self.lobes.as_ref().and_then(|r| r.as_ref().ok())
     }
 
+    /// The measured modes, where they were found.
     pub fn modal(&self) -> Option<&ModalAnalysis> {
         self.modal.as_ref().and_then(|r| r.as_ref().ok())
     }
@@ -214,6 +229,10 @@ fn likely_mistakes(
 }
 
 impl StructureFindings {
+    /// Calibrates the model, and once more for each posture without that posture.
+    ///
+    /// # Errors
+    /// As [`StructureAnalysis::run`].
     pub fn run(campaign: &Campaign) -> Result<Self> {
         Self::of(campaign, StructureAnalysis::run(campaign, Options::default())?)
     }
@@ -240,6 +259,10 @@ impl StructureFindings {
 }
 
 impl PostureFindings {
+    /// The robot at every posture; `structure` gives the calibrated values.
+    ///
+    /// # Errors
+    /// No robot, or a posture that it cannot take.
     pub fn run(campaign: &Campaign, structure: Option<&StructureFindings>) -> Result<Vec<PostureFindings>> {
         let model = structure_model(campaign)?;
         let nominal = posture_reports(campaign, &model, &model.nominal_theta())?;
@@ -284,6 +307,10 @@ fn posture_reports(campaign: &Campaign, model: &StructureModel, theta: &[f64]) -
 }
 
 impl LobeFindings {
+    /// The lobes as asked for; those from the model on the measured FRFs as well.
+    ///
+    /// # Errors
+    /// As [`LobeAnalysis::run`].
     pub fn run(campaign: &Campaign) -> Result<Self> {
         let asked = LobeAnalysis::run(campaign)?;
         let measured = (asked.source == LobeSource::Model && !campaign.frfs.is_empty())

@@ -20,9 +20,13 @@ const LEAST: usize = 4;
 /// A value in its turn.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChartPoint {
+    /// Where the value comes from.
     pub campaign: String,
+    /// Of the measurement, as written.
     pub date: Option<String>,
+    /// The value, in the unit of the chart's name.
     pub value: f64,
+    /// Its standard error, where known.
     pub std_error: Option<f64>,
     /// Beyond the limits.
     pub outside: bool,
@@ -32,16 +36,24 @@ pub struct ChartPoint {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Basis {
+    /// The mean absolute difference of neighbours.
     MovingRange,
+    /// The standard errors of the values.
     StandardErrors,
 }
 
+/// Between which limits a further value is expected, in the unit of the values.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Limits {
+    /// Mean of the values.
     pub centre: f64,
+    /// Lower control limit.
     pub lower: f64,
+    /// Upper control limit.
     pub upper: f64,
+    /// Standard deviation of one value.
     pub sigma: f64,
+    /// Where σ comes from.
     pub basis: Basis,
     /// Values that they were made of.
     pub values: usize,
@@ -50,7 +62,9 @@ pub struct Limits {
 /// One quantity of one robot over time, oldest first. The last value is judged by those before it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ControlChart {
+    /// The quantity, with its unit.
     pub name: String,
+    /// The values, oldest first.
     pub points: Vec<ChartPoint>,
     /// `None` with fewer than four values before the last.
     pub limits: Option<Limits>,

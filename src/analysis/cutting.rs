@@ -15,12 +15,17 @@ use crate::identify::{Calibration, CuttingCase, CuttingData, CuttingModel, Estim
 
 /// The cutting model of a campaign's main process against its force records.
 pub struct CuttingAnalysis {
+    /// The measured forces over rotation or time.
     pub data: CuttingData,
+    /// The force model with the effects that were added.
     pub model: CuttingModel,
+    /// The model fitted to the data.
     pub calibration: Calibration,
+    /// The fitted model against the data.
     pub comparison: CuttingComparison,
     /// nrms on cuts that were left out of the fit.
     pub held_out_nrms: Option<f64>,
+    /// What was noticed while reading and fitting.
     pub warnings: Vec<String>,
 }
 

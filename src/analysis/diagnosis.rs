@@ -21,12 +21,17 @@ use crate::revision::{self, Domain, Evidence, RecordedCandidate};
 
 /// The diagnosis of the campaign's current model.
 pub struct DiagnosisFindings {
+    /// Model and data.
     pub case: StructureCase,
+    /// The verdict, and what each candidate effect explains.
     pub diagnosis: Diagnosis<StructureModel, Instance>,
+    /// The measurement that would tell most.
     pub next_measurement: NextMeasurement,
     /// Predictions of the model as it stands, in the order of `case.data.frfs()`, m/N.
     pub predicted: Vec<Vec<Complex64>>,
+    /// The model as it stands against the measurement.
     pub now: FrfComparison,
+    /// Frequencies around which the residual stands out.
     pub residual_peaks: Vec<ResidualPeak>,
     /// Wrong files and other mistakes of the setup.
     pub setup: SetupCheck,
@@ -48,12 +53,19 @@ fn is_unnamed<M, I>(diagnosis: &Diagnosis<M, I>, setup: &SetupCheck) -> bool {
 pub struct Leading {
     /// Index among the candidates.
     pub candidate: usize,
+    /// Predictions with it, in the order of `case.data.frfs()`, m/N.
     pub predicted: Vec<Vec<Complex64>>,
+    /// The model with it against the measurement.
     pub comparison: FrfComparison,
+    /// The share of the residual that it explains, and where.
     pub explained: Explained,
 }
 
 impl DiagnosisFindings {
+    /// Loads the campaign and diagnoses its current model.
+    ///
+    /// # Errors
+    /// The case cannot be loaded, or the FRFs do not determine its parameters.
     pub fn run(campaign: &Campaign, options: Options) -> Result<Self> {
         Self::of(campaign, StructureCase::load(campaign)?, options)
     }
@@ -104,6 +116,7 @@ impl DiagnosisFindings {
         })
     }
 
+    /// The candidate that [`leading`](Self::leading) is about.
     pub fn leader(&self) -> Option<&EffectCandidate<StructureModel, Instance>> {
         let leading = self.leading.as_ref()?;
         self.diagnosis.candidates.get(leading.candidate)
@@ -228,8 +241,11 @@ fn leading_candidate<M, I>(diagnosis: &Diagnosis<M, I>) -> Option<usize> {
 
 /// The diagnosis of a campaign's current cutting model.
 pub struct CuttingFindings {
+    /// Model and data.
     pub case: CuttingCase,
+    /// The verdict, and what each candidate effect explains.
     pub diagnosis: Diagnosis<CuttingModel, CuttingInstance>,
+    /// The measurement that would tell most.
     pub next_measurement: NextMeasurement,
     /// The model as it stands.
     pub now: CuttingView,
@@ -245,6 +261,7 @@ pub struct CuttingFindings {
 pub struct CuttingView {
     /// In the order of the data's cuts.
     pub fits: Vec<CutFit>,
+    /// Errors by cut and axis.
     pub comparison: CuttingComparison,
 }
 

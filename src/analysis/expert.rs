@@ -17,18 +17,21 @@ use crate::signal::median;
 pub struct ExpertView {
     /// Measured at the same frequency nearly everywhere, and not in the model.
     pub fixed_modes: Vec<FixedMode>,
-    /// How many modes were measured, and how many of them have none in the model nearby.
+    /// How many modes were measured.
     pub measured_modes: usize,
+    /// Of the measured modes, how many have none in the model nearby.
     pub modes_without_partner: usize,
     /// Middle of the model's relative errors over the modes that have a partner; `None` without one.
     pub frequency_error: Option<f64>,
+    /// The same of the damping ratios.
     pub damping_error: Option<f64>,
     /// Middle of the MAC.
     pub mac: Option<f64>,
     /// The worst pair by shape, where its MAC says that it is another shape.
     pub worst_shape: Option<ModePair>,
-    /// Middle and least FRAC of the FRFs that stand clear of the noise, and the name of the one that has the least.
+    /// Median FRAC of the FRFs that stand clear of the noise.
     pub frac: Option<f64>,
+    /// Name and FRAC of the FRF that has the least.
     pub least_frac: Option<(String, f64)>,
     /// Joints and bodies by the share of the misfit that something unknown there would take away, best first; empty where
     /// only noise is left.

@@ -7,19 +7,23 @@ use super::control_chart::{ChartPoint, ControlChart};
 /// One side of one campaign, as a batch left it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FleetRow {
+    /// As the manifest names it.
     pub campaign: String,
+    /// Whose campaign it is.
     pub robot: String,
     /// As the manifest or `campaign.toml` has it.
     pub date: Option<String>,
     /// Line of the manifest.
     pub line: usize,
+    /// `structure` or `cutting`; empty where the campaign could not be read.
     pub domain: String,
     /// Why the work could not be done.
     pub error: Option<String>,
     /// `None` where none was asked for.
     pub verdict: Option<FleetVerdict>,
-    /// Ratios.
+    /// Error of the fit, a ratio.
     pub nrms: Option<f64>,
+    /// nrms that the noise alone makes.
     pub noise: Option<f64>,
     /// Likely mistakes of the files or the setup.
     pub setup: Option<String>,
@@ -27,12 +31,16 @@ pub struct FleetRow {
     pub quantities: Vec<(String, f64, Option<f64>)>,
 }
 
+/// What a diagnosis found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FleetVerdict {
     /// `effect`, `none`, `unknown`.
     pub verdict: String,
+    /// The missing effect, where the verdict is `effect`.
     pub effect: Option<String>,
+    /// Where it sits, for effects that have a place.
     pub site: Option<String>,
+    /// Probability that the verdict is right, 0 to 1.
     pub confidence: Option<f64>,
 }
 
@@ -65,6 +73,7 @@ pub enum Attention {
 }
 
 impl Attention {
+    /// As tables name it.
     pub fn name(self) -> &'static str {
         match self {
             Attention::None => "none",
@@ -79,19 +88,28 @@ impl Attention {
 /// A campaign of a robot in short.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Night {
+    /// As the manifest names it.
     pub campaign: String,
+    /// Of the measurements, as written.
     pub date: Option<String>,
+    /// Why the work could not be done.
     pub error: Option<String>,
+    /// `None` where none was asked for.
     pub verdict: Option<FleetVerdict>,
+    /// Error of the fit, a ratio.
     pub nrms: Option<f64>,
+    /// nrms that the noise alone makes.
     pub noise: Option<f64>,
 }
 
 /// One robot (one side of its campaigns) over time.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RobotHistory {
+    /// The robot's name.
     pub robot: String,
+    /// `structure` or `cutting`.
     pub domain: String,
+    /// How much it asks to be looked at.
     pub attention: Attention,
     /// Why, in sentences.
     pub reasons: Vec<String>,
@@ -104,6 +122,7 @@ pub struct RobotHistory {
 }
 
 impl RobotHistory {
+    /// The latest campaign.
     pub fn last(&self) -> Option<&Night> {
         self.nights.last()
     }
@@ -124,11 +143,14 @@ impl RobotHistory {
 /// All robots, worst first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fleet {
+    /// One entry for each robot and side.
     pub robots: Vec<RobotHistory>,
+    /// What was noticed while sorting the campaigns by date.
     pub warnings: Vec<String>,
 }
 
 impl Fleet {
+    /// Puts the rows of all campaigns in order by robot and time, and judges each robot's latest values.
     pub fn new(mut rows: Vec<FleetRow>) -> Self {
         // A campaign that could not be read says nothing of its side: it belongs to every side of its robot.
         rows.sort_by(|a, b| (&a.robot, &a.domain).cmp(&(&b.robot, &b.domain)));

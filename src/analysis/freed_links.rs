@@ -12,6 +12,7 @@ use crate::{InputError, Result};
 
 /// What freeing groups of link parameters does.
 pub struct FreedLinks {
+    /// The groups of link parameters that were freed.
     pub groups: Vec<LinkGroup>,
     /// As the campaign stands.
     pub before: StructureAnalysis,

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
+use super::lobe_case::{BEST, LobeCase, LobesBefore};
 use super::lobe_model::{Asked, Dynamics, ModelState};
 use super::lobe_setup::modes_of_table;
-use super::lobes::{BEST, LobeCase, LobesBefore};
 use super::measured_structures::measured_structures;
 use crate::campaign::{Campaign, LobeMethod, LobesSection};
 use crate::lobes::band;

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::hole_check::hole_check;
+pub use super::lobe_case::{BEST, LobeCase, LobesBefore};
 use super::lobe_model::{Asked, ModelState};
 use super::lobe_setup::{coefficients_of_group, cut_of, group_of_cuts};
 use super::lobe_structure::{Structure, at_postures, from_measured, from_modes, steps_through_time};
@@ -10,70 +11,30 @@ use super::noted_cuts::noted_cuts;
 use super::redundancy::{self, RedundancyAnalysis};
 use crate::campaign::{Campaign, LobeMethod, LobeSource, LobesSection, Process};
 use crate::cutting::ForceGroup;
-use crate::lobes::band::LobeBand;
-use crate::lobes::hole::{HoleCheck, HoleError};
+use crate::lobes::hole::HoleCheck;
 use crate::lobes::outcome::{LimitRange, Outcomes};
 use crate::lobes::setup::{DrilledHole, LobeCoefficients, LobeCut, axial_torsional_force};
-use crate::lobes::{AbsoluteLimit, BlockLobes, LobeCurve, Peak, ToolDynamics, speed_grid};
+use crate::lobes::{AbsoluteLimit, Peak, ToolDynamics, speed_grid};
 use crate::{InputError, Result};
 
 /// Why a drill's axial–torsional block is left out where the FRFs do not have it.
 const NOTHING_ALONG: &str = "the FRFs have nothing along the tool or about it: add [[lobes.mode]] tables with axis = \"z\" \
                              or \"theta\", FRFs ZZ of the tool point, or [lobes.tool]";
-/// Best speeds that are listed.
-pub const BEST: usize = 10;
 /// Changes of the limit below this share are not worth a word.
 const SAME: f64 = 0.005;
-
-/// Lobes of one structure.
-#[derive(Debug, Clone)]
-pub struct LobeCase {
-    /// `None` where the FRF belongs to no posture (modes from the campaign file).
-    pub posture: Option<String>,
-    pub angle_deg: Option<f64>,
-    /// For people: where the FRF comes from.
-    pub description: String,
-    /// Where chatter was sought, Hz.
-    pub band_hz: (f64, f64),
-    pub curve: LobeCurve,
-    pub absolute: Option<AbsoluteLimit>,
-    /// Drilling with both blocks: the limits of the lateral and of the axial–torsional one alone.
-    pub by_block: Option<[BlockLobes; 2]>,
-    pub best: Vec<Peak>,
-    /// From the uncertainty of the calibrated parameters; averaged forces only.
-    pub band: Option<LobeBand>,
-    /// Without the effects that were added to the model; `None` where there are none.
-    pub before: Option<LobesBefore>,
-    /// Where the static forces of the cut put the tool; from the model only.
-    pub hole: Option<HoleError>,
-    /// At the speed of every cut with a noted outcome.
-    pub(super) at_cuts: Vec<LimitRange>,
-}
-
-impl LobeCase {
-    /// For people: ` at p1`, empty where the FRFs belong to no posture.
-    pub fn at_posture(&self) -> String {
-        self.posture
-            .as_ref()
-            .map(|p| format!(" at {p}"))
-            .unwrap_or_default()
-    }
-}
-
-/// Lobes of the baseline (revision 0), fitted to the same data as the model with its effects.
-#[derive(Debug, Clone)]
-pub struct LobesBefore {
-    pub curve: LobeCurve,
-    pub absolute: Option<AbsoluteLimit>,
-}
 
 /// All lobes of a campaign.
 #[derive(Debug, Clone)]
 pub struct LobeAnalysis {
+    /// What is cut, and how.
     pub process: Process,
+    /// Where the FRFs come from.
     pub source: LobeSource,
+    /// How the limit is computed.
     pub method: LobeMethod,
+    /// Cutting force coefficients.
     pub coefficients: LobeCoefficients,
+    /// Number of cutting edges.
     pub teeth: usize,
     /// The axial–torsional block of a drill, or why it is left out, in words for people; `None` in milling.
     pub axial_torsional: Option<std::result::Result<(), String>>,
@@ -81,7 +42,9 @@ pub struct LobeAnalysis {
     pub drilled: Option<DrilledHole>,
     /// The tool as a beam; without segments where it is rigid or part of the FRFs.
     pub tool: Arc<ToolDynamics>,
+    /// First and last spindle speed and the step, rpm.
     pub spindle_rpm: [f64; 3],
+    /// The lobes of each posture, or of each redundancy angle.
     pub cases: Vec<LobeCase>,
     /// Where the campaign asks for the surface over the redundancy angle: its angles are the cases.
     pub redundancy: Option<RedundancyAnalysis>,
@@ -94,6 +57,7 @@ pub struct LobeAnalysis {
     /// The forces on the tool and the tolerances behind the cases' `hole`, or why there are none; `None` where lobes do
     /// not come from the model.
     pub hole: Option<std::result::Result<HoleCheck, String>>,
+    /// What was noticed while reading, fitting and computing.
     pub warnings: Vec<String>,
 }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use num_complex::Complex64;
 
-use super::modal::SetModes;
+use super::mode_set::{SetModes, dofs_of_frfs};
 use super::shape_comparison::at_nodes;
 use crate::files::write_atomically;
 use crate::ingest::{
@@ -21,18 +21,6 @@ pub fn scaled_modes(set: &SetModes) -> Vec<Option<ScaledMode>> {
         .modes
         .iter()
         .map(|m| scaling::scaled(m.frequency_hz, m.damping_ratio, &m.constants, &dofs))
-        .collect()
-}
-
-/// Response and reference of each FRF as numbers of [`SetModes::dofs`].
-pub fn dofs_of_frfs(set: &SetModes) -> Vec<Option<[usize; 2]>> {
-    let number = |name: &String| set.dofs.iter().position(|d| d == name);
-    set.frfs
-        .iter()
-        .map(|f| {
-            let [response, reference] = f.input.dofs.as_ref()?;
-            Some([number(response)?, number(reference)?])
-        })
         .collect()
 }
 

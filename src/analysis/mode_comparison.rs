@@ -17,13 +17,19 @@ use crate::signal::median;
 /// One measured mode and the model's that comes nearest in frequency and shape.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModePair {
+    /// The posture's name.
     pub posture: String,
+    /// Frequency of the measured mode.
     pub measured_hz: f64,
+    /// Standard error of that frequency.
     pub measured_std_hz: f64,
+    /// Damping ratio of the measured mode.
     pub measured_damping: f64,
+    /// Standard error of that damping ratio.
     pub measured_damping_std: f64,
     /// `None` where the model has no mode within a quarter of the frequency.
     pub model_hz: Option<f64>,
+    /// Damping ratio of the model's mode.
     pub model_damping: Option<f64>,
     /// From the modal constants in all FRFs of the posture; `None` with fewer than two.
     pub mac: Option<f64>,
@@ -45,9 +51,11 @@ impl ModePair {
 /// A mode that was measured at the same frequency at all postures but a few, and that the model does not have there.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FixedMode {
+    /// Where it was measured, Hz.
     pub frequency_hz: f64,
     /// Highest less lowest.
     pub spread_hz: f64,
+    /// Measured damping ratio.
     pub damping_ratio: f64,
     /// Where it was measured.
     pub postures: Vec<String>,

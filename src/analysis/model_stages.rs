@@ -14,6 +14,7 @@ pub struct ModelStage {
     pub title: String,
     /// Predictions in the order of `case.data.frfs()`, m/N.
     pub predicted: Vec<Vec<Complex64>>,
+    /// These predictions against the measurement.
     pub comparison: FrfComparison,
 }
 

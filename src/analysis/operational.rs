@@ -12,11 +12,15 @@ use crate::{Error, InputError, Result};
 /// One file (records of the same channels in it are one record) and its modes.
 #[derive(Debug, Clone)]
 pub struct OperationalSet {
+    /// Path of the file, as given.
     pub file: String,
     /// Names of the channels, in the order of the shapes.
     pub channels: Vec<String>,
+    /// Length of the record that was used, s.
     pub length_s: f64,
+    /// The modes in it.
     pub modes: OperationalModes,
+    /// What was noticed while reading and fitting.
     pub warnings: Vec<String>,
 }
 

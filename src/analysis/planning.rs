@@ -23,7 +23,9 @@ pub struct PlanRequest {
     pub band_hz: Option<[f64; 2]>,
     /// Spacing of the lines, Hz.
     pub lines_hz: Option<f64>,
+    /// Where responses are planned; empty: as `[plan]` has it.
     pub responses: Vec<Dof>,
+    /// Where hits are planned; empty: as `[plan]` has it.
     pub hits: Vec<Dof>,
 }
 
@@ -37,12 +39,17 @@ const MOST_LINES: f64 = 20_000.0;
 
 /// The plan and what it was made for.
 pub struct PlanFindings {
+    /// What the planned FRFs would show.
     pub plan: PlanOutlook,
-    /// Planned FRFs (measured ones are not counted), and measured ones.
+    /// Planned FRFs; measured ones are not counted.
     pub planned: usize,
+    /// FRFs that were measured already.
     pub measured: usize,
+    /// Names of the postures.
     pub postures: Vec<String>,
+    /// Noise that was assumed.
     pub noise: FrfNoise,
+    /// What was noticed while the plan was made.
     pub warnings: Vec<String>,
 }
 

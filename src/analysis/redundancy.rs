@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::lobe_case::{BEST, LobeCase};
 use super::lobe_model::ModelState;
-use super::lobes::{BEST, LobeCase};
 use crate::campaign::{Campaign, LobeMethod, LobesSection, Redundancy};
 use crate::lobes::band::{QUANTILES, quantile};
 use crate::lobes::hole::{HoleCheck, HoleError};
@@ -21,8 +21,11 @@ use crate::{InputError, Result};
 pub struct RedundancyAnalysis {
     /// Whose tool point and axis are kept.
     pub posture: String,
+    /// Step of the sweep over the angle, °.
     pub step_deg: f64,
+    /// How the robot stands at each angle.
     pub angles: Vec<AnglePosture>,
+    /// Where to cut.
     pub recommendation: Recommendation,
     /// How the hole's tolerances bore on the choice; `None` where the hole is not worked out.
     pub hole: Option<HoleWeighing>,

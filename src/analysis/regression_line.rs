@@ -8,6 +8,7 @@ use crate::cutting::{ForceAxis, ForceGroup, RegressionPoint};
 pub struct FeedLine<'a> {
     /// What sets them apart from the others, such as `pilot hole 5 mm`.
     pub what: String,
+    /// Average forces of these cuts along the axis.
     pub points: Vec<&'a RegressionPoint>,
     /// Intercept and slope of the fitted average (N and N/mm; for torque N·m and N·m/mm); `None` with one feed only.
     pub line: Option<(f64, f64)>,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use num_complex::Complex64;
 
-use super::modal::SetModes;
+use super::mode_set::SetModes;
 use crate::ingest::{Dof, Geometry, NodalShape};
 use crate::modal::GlobalMode;
 use crate::modal::shape::mac;
@@ -26,17 +26,23 @@ pub struct ShapeComparison {
     /// By measured mode, then model mode.
     pub mac: Vec<Vec<f64>>,
     /// Best likeness first taken, each mode once.
-    pub pairs: Vec<Pair>,
+    pub pairs: Vec<ShapePair>,
     /// Of the model's modes, Hz.
     pub model_frequency_hz: Vec<f64>,
 }
 
+/// A measured mode and the model's that is most like it.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct Pair {
+pub struct ShapePair {
+    /// Number of the measured mode, from 0.
     pub measured: usize,
+    /// Number of the model's mode, from 0.
     pub model: usize,
+    /// Measured frequency, Hz.
     pub measured_hz: f64,
+    /// The model's frequency, Hz.
     pub model_hz: f64,
+    /// Likeness of the shapes, 0 to 1.
     pub mac: f64,
     /// Model over measured frequency, less one.
     pub frequency_error: f64,
@@ -109,13 +115,13 @@ pub fn compare(
         .filter(|(i, j)| table[*i][*j] >= PAIRED)
         .collect();
     order.sort_by(|a, b| table[b.0][b.1].total_cmp(&table[a.0][a.1]));
-    let mut pairs: Vec<Pair> = Vec::new();
+    let mut pairs: Vec<ShapePair> = Vec::new();
     for (i, j) in order {
         if pairs.iter().any(|p| p.measured == i || p.model == j) {
             continue;
         }
         let (measured_hz, model_hz) = (set.global.modes[i].frequency_hz, shapes[j].frequency_hz);
-        pairs.push(Pair {
+        pairs.push(ShapePair {
             measured: i,
             model: j,
             measured_hz,

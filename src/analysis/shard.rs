@@ -8,7 +8,9 @@ use crate::{Error, InputError, Result};
 /// Which part of a piece of work: the `number`th (from 1) of `of` even parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
+    /// Which part, from 1.
     pub number: usize,
+    /// How many parts there are.
     pub of: usize,
 }
 
@@ -39,6 +41,7 @@ impl Shard {
         (self.number - 1..count).step_by(self.of)
     }
 
+    /// `shard-00003-of-00020` with an ending.
     pub fn file_name(&self, ending: &str) -> String {
         format!("shard-{:05}-of-{:05}.{ending}", self.number, self.of)
     }

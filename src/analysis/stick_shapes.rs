@@ -11,7 +11,9 @@ use crate::robot::{Kinematics, RobotModel, RobotSpec};
 /// One mode of one posture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StickShape {
+    /// Measured frequency, Hz.
     pub frequency_hz: f64,
+    /// Measured damping ratio.
     pub damping_ratio: f64,
     /// Base, joints, flange, tool centre point; base frame, m.
     pub chain_m: Vec<[f64; 3]>,

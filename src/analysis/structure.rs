@@ -15,12 +15,17 @@ use crate::identify::{Calibration, Options, StructureCase, StructureStudy};
 /// The robot model of a campaign against its FRFs: as the robot file has it, and calibrated with the effects that were
 /// added.
 pub struct StructureAnalysis {
+    /// Model and data.
     pub case: StructureCase,
+    /// The model fitted to the data.
     pub calibration: Calibration,
     /// Predictions in the order of `case.data.frfs()`, m/N.
     pub nominal: Vec<Vec<Complex64>>,
+    /// The same after calibration.
     pub calibrated: Vec<Vec<Complex64>>,
+    /// The model by the robot file against the measurement.
     pub before: FrfComparison,
+    /// The calibrated model against the measurement.
     pub after: FrfComparison,
     /// The starting point that the measured modes gave; `None` where a revision gave one, or there are no modes.
     pub start: Option<ModalStart>,

@@ -40,6 +40,7 @@ pub struct SweepRequest {
 /// What the model says of one place that can be used.
 #[derive(Debug, Clone, Serialize)]
 pub struct PlaceFindings {
+    /// Joint angles, base first, °.
     pub joints_deg: Vec<f64>,
     /// Which of the solutions of the inverse kinematics, see [`IkSolution::branch`].
     pub ik_branch: u32,
@@ -49,16 +50,20 @@ pub struct PlaceFindings {
     pub singularity_margin: f64,
     /// `None`: no depth whatever chatters.
     pub absolute: Option<AbsoluteLimit>,
+    /// The best of the speeds asked for, and the depth limit there.
     pub best: BestSpeed,
     /// 1/C_ii at the tool point, base axes.
     pub tcp_stiffness_n_per_m: [f64; 3],
+    /// Of the model's modes at this posture, Hz; `None` where it has none.
     pub lowest_frequency_hz: Option<f64>,
 }
 
 /// One place of a map.
 #[derive(Debug, Clone, Serialize)]
 pub struct SweepRow {
+    /// Tool point, direction and redundancy angle.
     pub place: GridPlace,
+    /// Whether it can be used, or why not.
     pub status: PlaceStatus,
     /// `None` where the place cannot be used.
     pub findings: Option<PlaceFindings>,
@@ -72,10 +77,12 @@ pub struct Sweep {
     least_singularity_margin: f64,
     cut: AveragedCut,
     spindle_rpm: [f64; 2],
+    /// The places, in the order of their numbers.
     pub grid: WorkspaceGrid,
     /// All that the rows hang on, for people and to tell one map from another; no floating-point results, so that every
     /// machine of a cluster has the same.
     pub settings: Map<String, Value>,
+    /// What was noticed while reading and fitting.
     pub warnings: Vec<String>,
 }
 

@@ -13,7 +13,7 @@ use crate::identify::{Calibration, Options};
 use crate::revision::RevisionLog;
 
 #[derive(clap::Args)]
-pub struct Args {
+pub struct AddArgs {
     #[command(flatten)]
     campaign: CampaignArg,
     /// The effect and, where it has one, its site: payload, local-resonator@link-3.
@@ -21,7 +21,7 @@ pub struct Args {
     effect: String,
 }
 
-pub fn run(args: Args) -> Result<Outcome> {
+pub fn run(args: AddArgs) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
     let log = RevisionLog::load(&campaign.dir)?;
     after(log, &campaign, &args.effect)

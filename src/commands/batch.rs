@@ -10,7 +10,9 @@ use super::next_step::word;
 use super::text::{Emphasis, number, wrapped};
 use crate::Result;
 use crate::analysis::Shard;
-use crate::analysis::batch::{Entry, Manifest, Record, Status, Step, Steps, examine, fingerprint};
+use crate::analysis::batch::{
+    BatchStep, Manifest, ManifestEntry, Record, Status, Steps, examine, fingerprint,
+};
 use crate::progress::Progress;
 use crate::report::batch_folder::BatchFolder;
 use crate::report::batch_table::{BatchTable, reserved};
@@ -26,7 +28,7 @@ use crate::report::batch_table::{BatchTable, reserved};
                   What is done is not done again, unless a file, the steps or the program changed. The campaign folders stay as \
                   they are.\nscripts/batch holds a Slurm array script and a Snakemake workflow."
 )]
-pub struct Args {
+pub struct BatchArgs {
     /// The list of campaigns.
     manifest: PathBuf,
     /// Where results go: campaigns/ (a file each), shards/ (tables).
@@ -40,7 +42,7 @@ pub struct Args {
         default_value = "calibrate,diagnose",
         value_name = "STEPS"
     )]
-    steps: Vec<Step>,
+    steps: Vec<BatchStep>,
     /// Only this part of the list, such as 3/20: the third line and every twentieth after it; slurm: as the job array says.
     #[arg(long, value_name = "K/N")]
     shard: Option<String>,
@@ -49,7 +51,7 @@ pub struct Args {
     retry: bool,
 }
 
-pub fn run(args: Args) -> Result<Outcome> {
+pub fn run(args: BatchArgs) -> Result<Outcome> {
     let shard = match args.shard.as_deref() {
         None => Shard { number: 1, of: 1 },
         Some("slurm") => Shard::of_slurm(|name| std::env::var(name).ok())?,
@@ -59,13 +61,13 @@ pub fn run(args: Args) -> Result<Outcome> {
     let steps = Steps::new(args.steps);
     let folder = BatchFolder::begin(&args.out)?;
     let begun = Instant::now();
-    let mine: Vec<&Entry> = shard
+    let mine: Vec<&ManifestEntry> = shard
         .rows(manifest.entries.len())
         .map(|i| &manifest.entries[i])
         .collect();
     let progress = Progress::new("campaigns", mine.len());
     let mut skipped = 0;
-    let mut work: Vec<(&Entry, Record)> = Vec::new();
+    let mut work: Vec<(&ManifestEntry, Record)> = Vec::new();
     for entry in mine {
         let fingerprint = fingerprint(&entry.dir, &steps);
         let kept = folder.kept(&entry.campaign, &fingerprint);
@@ -80,7 +82,8 @@ pub fn run(args: Args) -> Result<Outcome> {
     }
     drop(progress);
     let tables = folder.write_shard(shard, &BatchTable::new(&manifest, &work))?;
-    let failures: Vec<(&Entry, &str)> = work.iter().filter_map(|(e, r)| Some((*e, failure(r)?))).collect();
+    let failures: Vec<(&ManifestEntry, &str)> =
+        work.iter().filter_map(|(e, r)| Some((*e, failure(r)?))).collect();
     let seconds = begun.elapsed().as_secs_f64();
     let json = json!({
         "manifest": args.manifest,

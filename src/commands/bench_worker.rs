@@ -12,7 +12,7 @@ use base64::prelude::{BASE64_STANDARD, Engine};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::program::once_more;
+use super::relaunch::once_more;
 use super::{Outcome, add, diagnose, undo};
 use crate::analysis::{CampaignFindings, CuttingAnalysis, CuttingFindings, DiagnosisFindings};
 use crate::campaign::{Campaign, campaign_file};
@@ -20,7 +20,7 @@ use crate::identify::Options;
 use crate::progress::{Gauge, Reading, shown_on};
 use crate::report::{campaign as pages, diagnosis_section, waveform_section};
 use crate::revision::{Domain, RecordedEffect, RevisionLog, fingerprint, log_file};
-use crate::serve::{Order, Refusal, Stage, locked};
+use crate::serve::{JobStage, PageOrder, Refusal, locked};
 use crate::{Error, InputError, Result};
 
 /// What the worker says.
@@ -45,7 +45,7 @@ pub struct Answer {
 #[derive(Clone, Serialize, Deserialize)]
 pub struct Diagnosed {
     pub side: Domain,
-    pub of: ModelState,
+    pub of: BenchModel,
     pub document: Value,
     /// The verdict in plain words.
     pub answer: String,
@@ -71,7 +71,7 @@ pub struct DrawnReport {
 }
 
 /// Data (their fingerprint) and effects.
-pub type ModelState = (String, Vec<RecordedEffect>);
+pub type BenchModel = (String, Vec<RecordedEffect>);
 
 /// Diagnoses kept, at most; each holds all FRFs several times.
 pub const KEPT: usize = 6;
@@ -128,7 +128,7 @@ impl Hand {
     }
 
     /// `None` where the worker ended before it was done.
-    pub fn answer(&mut self, order: &Order, stage: &Stage) -> Option<Answer> {
+    pub fn answer(&mut self, order: &PageOrder, stage: &JobStage) -> Option<Answer> {
         let line = serde_json::to_string(order).ok()? + "\n";
         self.orders.write_all(line.as_bytes()).ok()?;
         self.orders.flush().ok()?;
@@ -164,7 +164,7 @@ struct Worker {
 
 struct Known {
     side: Domain,
-    of: ModelState,
+    of: BenchModel,
     /// Lent to the report while that is drawn.
     findings: Option<Findings>,
 }
@@ -184,7 +184,7 @@ pub fn work(dir: &Path) -> Result<()> {
         for line in std::io::stdin().lock().lines() {
             let Some(order) = line
                 .ok()
-                .and_then(|line| serde_json::from_str::<Order>(&line).ok())
+                .and_then(|line| serde_json::from_str::<PageOrder>(&line).ok())
             else {
                 break;
             };
@@ -254,7 +254,7 @@ pub fn sides(campaign: &Campaign) -> Vec<Domain> {
         .collect()
 }
 
-pub fn model_state(campaign: &Campaign, log: &RevisionLog, side: Domain) -> Result<ModelState> {
+pub fn model_state(campaign: &Campaign, log: &RevisionLog, side: Domain) -> Result<BenchModel> {
     let effects = log.current(side).map(|r| r.effects.clone());
     Ok((fingerprint(campaign, side)?, effects.unwrap_or_default()))
 }
@@ -311,17 +311,17 @@ pub fn log_at(dir: &Path, side: Domain, head: &str) -> std::result::Result<Revis
 }
 
 impl Worker {
-    fn done(&mut self, order: Order, teller: &Teller) -> Result<Answer> {
+    fn done(&mut self, order: PageOrder, teller: &Teller) -> Result<Answer> {
         let campaign = Campaign::load(&self.dir)?;
         let text = match order {
-            Order::Refresh {} => String::new(),
-            Order::Diagnose { side } => return self.diagnose(side, teller),
-            Order::Add { side, head, effect } => {
+            PageOrder::Refresh {} => String::new(),
+            PageOrder::Diagnose { side } => return self.diagnose(side, teller),
+            PageOrder::Add { side, head, effect } => {
                 let log = log_at(&self.dir, side, &head)?;
                 teller.now("fitting everything again, with the effect");
                 add::after(log, &campaign, &effect)?.text
             }
-            Order::Undo { side, head } => {
+            PageOrder::Undo { side, head } => {
                 let log = log_at(&self.dir, side, &head)?;
                 teller.now("taking the last revision back");
                 undo::after(log, &campaign, side)?.text
@@ -451,7 +451,7 @@ impl Worker {
     }
 
     /// What is known of a side in a state.
-    fn known<T>(&mut self, side: Domain, of: &ModelState, look: impl FnOnce(&mut Known) -> T) -> Option<T> {
+    fn known<T>(&mut self, side: Domain, of: &BenchModel, look: impl FnOnce(&mut Known) -> T) -> Option<T> {
         let known = self.known.iter_mut().find(|k| k.side == side && k.of == *of);
         known.map(look)
     }

@@ -10,7 +10,7 @@ use crate::discrepancy::place::DominantRegion;
 use crate::identify::{Calibration, Options, Scale, StructureCase, StructureModel, Undetermined};
 
 #[derive(clap::Args)]
-pub struct Args {
+pub struct CalibrateArgs {
     #[command(flatten)]
     campaign: CampaignArg,
     /// Further starting points, tried where the first fit leaves more than noise.
@@ -60,7 +60,7 @@ impl Free {
     }
 }
 
-pub fn run(args: Args) -> Result<Outcome> {
+pub fn run(args: CalibrateArgs) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
     let options = Options {
         extra_starts: args.starts,

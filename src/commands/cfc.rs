@@ -16,7 +16,7 @@ use crate::cutting::{
 };
 
 #[derive(clap::Args)]
-pub struct Args {
+pub struct CfcArgs {
     #[command(flatten)]
     campaign: CampaignArg,
     /// Hold edge coefficients at zero or above.
@@ -28,7 +28,7 @@ pub struct Args {
     robust: bool,
 }
 
-pub fn run(args: Args) -> Result<Outcome> {
+pub fn run(args: CfcArgs) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
     let options = CfcOptions {
         nonnegative_edges: args.nonnegative_edges,

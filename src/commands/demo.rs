@@ -22,7 +22,7 @@ use crate::revision::{RevisionLog, log_file};
 use crate::{Error, InputError, Result, ingest};
 
 #[derive(clap::Args)]
-pub struct Args {
+pub struct DemoArgs {
     /// Folder to work in; made if it does not exist.
     #[arg(default_value = "lobestone-demo")]
     dir: PathBuf,
@@ -69,7 +69,7 @@ impl Story {
     }
 }
 
-pub fn run(args: Args) -> Result<Outcome> {
+pub fn run(args: DemoArgs) -> Result<Outcome> {
     let began = Instant::now();
     let dir = &args.dir;
     prepare(dir)?;

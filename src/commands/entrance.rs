@@ -14,7 +14,7 @@ use crate::campaign::draft::{self, Answers, Draft, Form, Scan};
 use crate::files::write_new;
 use crate::report::figure::posture_svg;
 use crate::robot::{RobotModel, RobotSpec};
-use crate::serve::{Entrance, Parcel, Reply, Request, Wish, locked};
+use crate::serve::{Entrance, EntranceRequest, Parcel, Reply, Wish, locked};
 use crate::{Error, InputError, Result};
 
 /// Names shown of a folder.
@@ -311,12 +311,12 @@ impl Drafted {
 }
 
 impl Entrance for Drafting {
-    fn answer(&self, request: Request) -> Result<Reply> {
+    fn answer(&self, request: EntranceRequest) -> Result<Reply> {
         Ok(match request {
-            Request::Look { folder } => Reply::Told(look(folder.as_deref())?),
-            Request::Folder { parent, name } => Reply::Told(self.make_folder(&parent, &name)?),
-            Request::Draft { wish } => Reply::Told(self.draft(&wish)?.document()),
-            Request::Write { wish } => {
+            EntranceRequest::Look { folder } => Reply::Told(look(folder.as_deref())?),
+            EntranceRequest::Folder { parent, name } => Reply::Told(self.make_folder(&parent, &name)?),
+            EntranceRequest::Draft { wish } => Reply::Told(self.draft(&wish)?.document()),
+            EntranceRequest::Write { wish } => {
                 let Drafted { dir, draft, .. } = self.draft(&wish)?;
                 if let Some(first) = draft.missing().first() {
                     return Err(InputError::new(format!("is missing: {}", first.what))
@@ -327,8 +327,10 @@ impl Entrance for Drafting {
                 draft.write(&dir, false)?;
                 Reply::Opened(Arc::new(CampaignBench::open(&dir)?))
             }
-            Request::Open { dir } => Reply::Opened(Arc::new(CampaignBench::open(&real_folder(&dir)?)?)),
-            Request::Leave {} => Reply::Left,
+            EntranceRequest::Open { dir } => {
+                Reply::Opened(Arc::new(CampaignBench::open(&real_folder(&dir)?)?))
+            }
+            EntranceRequest::Leave {} => Reply::Left,
         })
     }
 

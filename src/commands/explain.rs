@@ -13,7 +13,7 @@ use crate::effects::{Background, STRUCTURAL};
 use crate::{InputError, Result};
 
 #[derive(clap::Args)]
-pub struct Args {
+pub struct ExplainArgs {
     /// The effect, as `diagnose` names it (payload, local-resonator@link-3, …); left out: a list of all.
     effect: Option<String>,
 }
@@ -54,7 +54,7 @@ pub fn all(robot: &RobotSpec) -> Value {
     library(robot).iter().map(Entry::json).collect()
 }
 
-pub fn run(args: Args) -> Result<Outcome> {
+pub fn run(args: ExplainArgs) -> Result<Outcome> {
     let library = library(&RobotSpec::load("irb6640", Path::new(""))?);
     let Some(name) = args.effect else {
         return Ok(Outcome::new(
@@ -148,7 +148,7 @@ mod tests {
     use super::*;
 
     fn explained(name: &str) -> Result<Outcome> {
-        run(Args {
+        run(ExplainArgs {
             effect: Some(name.into()),
         })
     }

@@ -14,7 +14,7 @@ use crate::report::fleet_page;
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  lobestone fleet results\n\
                   It writes fleet/report.html (with images beside it) and fleet/all.csv, the tables of all shards as one.")]
-pub struct Args {
+pub struct FleetArgs {
     /// The folder of `lobestone batch --out`.
     results: PathBuf,
     /// Where page and table are written [default: the folder fleet in the results].
@@ -27,7 +27,7 @@ const SHOWN: usize = 20;
 /// Missing shards that are named.
 const NAMED: usize = 12;
 
-pub fn run(args: Args) -> Result<Outcome> {
+pub fn run(args: FleetArgs) -> Result<Outcome> {
     let shards = BatchFolder::shards(&args.results)?;
     let rows = shards.table.fleet_rows();
     let failed = rows.iter().filter(|r| r.error.is_some()).count();

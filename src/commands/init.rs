@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use serde_json::json;
 
-use super::init_robot::MadeRobot;
+use super::init_robot::{MadeRobot, RobotArgs};
 use super::text::{Emphasis, setup_lines, table, warnings};
 use super::{Outcome, next_step};
 use crate::analysis::setup::likely_mistakes;
@@ -22,9 +22,9 @@ use crate::{Error, InputError, Result};
                   lobestone init trial --process milling --diameter-mm 16 --teeth 6 --helix-deg 42 --immersion slot \
                   --cut-list cuts.csv"
 )]
-pub struct Args {
+pub struct InitArgs {
     /// The folder with the measurement files; campaign.toml is written there.
-    pub(super) dir: PathBuf,
+    dir: PathBuf,
     /// Replace a campaign.toml that is there.
     #[arg(long)]
     force: bool,
@@ -34,18 +34,8 @@ pub struct Args {
     /// Name of the campaign [default: the folder's].
     #[arg(long)]
     name: Option<String>,
-    /// Robot: irb6640, the path of a robot file in the folder, or a URDF (.urdf) anywhere: a robot file is made of it.
-    #[arg(long, value_name = "MODEL")]
-    pub(super) robot: Option<String>,
-    /// URDF: the link that stands still [default: the root].
-    #[arg(long, value_name = "LINK")]
-    pub(super) base_link: Option<String>,
-    /// URDF: the link that is the tool, its z axis along the tool [default: tool0, else flange, else the farthest out].
-    #[arg(long, value_name = "LINK")]
-    pub(super) tool_link: Option<String>,
-    /// URDF: payload that the maker rates the arm for; chooses the class of the guessed compliances [default: by its mass].
-    #[arg(long, value_name = "KG")]
-    pub(super) payload_kg: Option<f64>,
+    #[command(flatten)]
+    robot: RobotArgs,
     /// Joint angles of a posture, base first; once for each.
     #[arg(long = "posture", value_name = "ID=DEG,DEG,…", value_parser = pair, allow_hyphen_values = true)]
     postures: Vec<(String, String)>,
@@ -127,10 +117,10 @@ fn pair(text: &str) -> std::result::Result<(String, String), String> {
     }
 }
 
-impl Args {
+impl InitArgs {
     fn answers(&self, made: Option<&MadeRobot>) -> Answers {
         let mut answers = Answers::default();
-        let robot = made.map(|m| m.name.clone()).or(self.robot.clone());
+        let robot = made.map(|m| m.name.clone()).or(self.robot.robot.clone());
         for (table, key, value) in [
             ("robot", "model", &robot),
             ("frf", "quantity", &self.quantity),
@@ -172,7 +162,7 @@ impl Args {
     }
 }
 
-pub fn run(args: Args, as_json: bool) -> Result<Outcome> {
+pub fn run(args: InitArgs, as_json: bool) -> Result<Outcome> {
     let dir = &args.dir;
     let file = campaign_file(dir);
     if !dir.is_dir() {
@@ -187,7 +177,7 @@ pub fn run(args: Args, as_json: bool) -> Result<Outcome> {
             .remedy("--force replaces it (its comments and values are lost)")
             .into());
     }
-    let Some(made) = MadeRobot::of(&args)? else {
+    let Some(made) = MadeRobot::of(&args.dir, &args.robot)? else {
         return begin(&args, None, as_json);
     };
     let was_there = made.write(args.force)?;
@@ -200,7 +190,7 @@ pub fn run(args: Args, as_json: bool) -> Result<Outcome> {
 }
 
 /// Scans the folder, asks, writes `campaign.toml`.
-fn begin(args: &Args, made: Option<&MadeRobot>, as_json: bool) -> Result<Outcome> {
+fn begin(args: &InitArgs, made: Option<&MadeRobot>, as_json: bool) -> Result<Outcome> {
     let dir = &args.dir;
     let scan = draft::scan(dir)?;
     if scan.frfs.is_empty() && scan.forces.is_empty() && made.is_none() {
@@ -285,7 +275,7 @@ fn begin(args: &Args, made: Option<&MadeRobot>, as_json: bool) -> Result<Outcome
     ))
 }
 
-fn nothing_found(args: &Args, scan: &Scan) -> Error {
+fn nothing_found(args: &InitArgs, scan: &Scan) -> Error {
     let mut problem = "holds no FRFs and no force records".to_string();
     for (file, why) in scan.not_used.iter().take(5) {
         problem += &format!("\n  {file}: {why}");

@@ -1,14 +1,30 @@
 //! The robot file that `lobestone init --robot FILE.urdf` makes.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::init::Args;
 use super::text::Emphasis;
 use crate::files::{write_atomically, write_new};
 use crate::robot::urdf::{Request, UrdfRobot, read};
 use crate::{Error, InputError, Result};
+
+/// Which robot `lobestone init` writes into the campaign file.
+#[derive(clap::Args)]
+pub(super) struct RobotArgs {
+    /// Robot: irb6640, the path of a robot file in the folder, or a URDF (.urdf) anywhere: a robot file is made of it.
+    #[arg(long, value_name = "MODEL")]
+    pub(super) robot: Option<String>,
+    /// URDF: the link that stands still [default: the root].
+    #[arg(long, value_name = "LINK")]
+    pub(super) base_link: Option<String>,
+    /// URDF: the link that is the tool, its z axis along the tool [default: tool0, else flange, else the farthest out].
+    #[arg(long, value_name = "LINK")]
+    pub(super) tool_link: Option<String>,
+    /// URDF: payload that the maker rates the arm for; chooses the class of the guessed compliances [default: by its mass].
+    #[arg(long, value_name = "KG")]
+    pub(super) payload_kg: Option<f64>,
+}
 
 /// A robot from a URDF, and the file that it goes into.
 pub struct MadeRobot {
@@ -28,7 +44,7 @@ impl MadeRobot {
     ///
     /// # Errors
     /// Flags for a URDF without one, a URDF that cannot be read or is none, a payload without sense.
-    pub fn of(args: &Args) -> Result<Option<Self>> {
+    pub fn of(folder: &Path, args: &RobotArgs) -> Result<Option<Self>> {
         let is_urdf = |name: &String| {
             let name = name.to_lowercase();
             [".urdf", ".xacro", ".urdf.xml"]
@@ -55,7 +71,7 @@ impl MadeRobot {
                 .remedy("give kilograms, as the data sheet rates the arm")
                 .into());
         }
-        let urdf = [PathBuf::from(named), args.dir.join(named)]
+        let urdf = [PathBuf::from(named), folder.join(named)]
             .into_iter()
             .find(|path| path.is_file())
             .ok_or_else(|| {
@@ -99,7 +115,7 @@ impl MadeRobot {
         Ok(Some(MadeRobot {
             robot,
             urdf,
-            file: args.dir.join(&name),
+            file: folder.join(&name),
             name,
         }))
     }

@@ -12,14 +12,14 @@ use crate::ingest::{
 use crate::{InputError, Result};
 
 #[derive(clap::Args)]
-pub struct Args {
+pub struct InspectArgs {
     /// Measurement files, or folders of them: UFF 58, FRF CSV, DynoWare export, force CSV, TDMS, LVM, MAT.
     #[arg(required = true, value_name = "FILE|DIR")]
     files: Vec<PathBuf>,
 }
 
 /// What can be read is told; a file that cannot is an error that names it, after what was told.
-pub fn run(args: Args) -> Result<Outcome> {
+pub fn run(args: InspectArgs) -> Result<Outcome> {
     let mut failures = Vec::new();
     let mut files = Vec::new();
     let mut text = String::new();

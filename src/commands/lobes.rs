@@ -16,12 +16,12 @@ use crate::lobes::redundancy::AngleStatus;
 const MOST_SENTENCES: usize = 8;
 
 #[derive(clap::Args)]
-pub struct Args {
+pub struct LobesArgs {
     #[command(flatten)]
     campaign: CampaignArg,
 }
 
-pub fn run(args: Args) -> Result<Outcome> {
+pub fn run(args: LobesArgs) -> Result<Outcome> {
     outcome(&Campaign::load(&args.campaign.dir)?)
 }
 

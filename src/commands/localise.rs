@@ -10,7 +10,7 @@ use crate::identify::{Options, StructureCase};
 use crate::report::figure::DrawnCurveFigure;
 
 #[derive(clap::Args)]
-pub struct Args {
+pub struct LocaliseArgs {
     #[command(flatten)]
     campaign: CampaignArg,
     /// Places listed in the table (the document has all).
@@ -21,7 +21,7 @@ pub struct Args {
     figure: Option<std::path::PathBuf>,
 }
 
-pub fn run(args: Args) -> Result<Outcome> {
+pub fn run(args: LocaliseArgs) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
     let case = StructureCase::load(&campaign)?;
     let found = localise(&case.study(Options::default()), &case.model)?;

@@ -18,7 +18,7 @@ use crate::modal::{Estimator, Method, Settings, TapSettings, Tolerances};
 use crate::{InputError, Result};
 
 #[derive(clap::Args)]
-pub struct Args {
+pub struct ModalArgs {
     /// FRF files (UFF 58, CSV, …), time records of tap tests (hammer and sensors), or one campaign folder.
     #[arg(required = true, value_name = "FILE|DIR")]
     paths: Vec<PathBuf>,
@@ -152,7 +152,7 @@ fn tolerances(text: &str) -> std::result::Result<Tolerances, String> {
     }
 }
 
-pub fn run(args: Args) -> Result<Outcome> {
+pub fn run(args: ModalArgs) -> Result<Outcome> {
     let settings = Settings {
         band_hz: args.band,
         max_order: args.order.map(|n| n as usize),
@@ -218,7 +218,7 @@ pub fn run(args: Args) -> Result<Outcome> {
     Ok(Outcome::new(json, said, Some(next)))
 }
 
-impl Args {
+impl ModalArgs {
     /// What is to be written besides, and with what.
     fn files(&self) -> Files<'_> {
         Files {
@@ -234,7 +234,7 @@ impl Args {
     }
 }
 
-fn output_only(args: &Args, folder: bool) -> Result<Outcome> {
+fn output_only(args: &ModalArgs, folder: bool) -> Result<Outcome> {
     if folder {
         return Err(InputError::new("--output-only is for records, not for a folder")
             .remedy("give the files of recorded accelerations")

@@ -17,7 +17,7 @@ use crate::robot::{Baseline, Dual, PostureReport, export};
 use crate::{InputError, Result};
 
 #[derive(clap::Args)]
-pub struct Args {
+pub struct ModelArgs {
     #[command(flatten)]
     campaign: CampaignArg,
     /// Add the 6n×6n stiffness and mass matrices in centre-of-mass coordinates (k_c, m_c).
@@ -34,7 +34,7 @@ pub struct Args {
 /// Young's modulus of the links where the matrices need one and nobody has said: steel.
 const STEEL_PA: f64 = 200e9;
 
-pub fn run(args: Args) -> Result<Outcome> {
+pub fn run(args: ModelArgs) -> Result<Outcome> {
     if let Some(young) = args.young_pa.filter(|y| !(*y > 0.0 && y.is_finite())) {
         return Err(InputError::new(format!("{young} is no Young's modulus"))
             .key("--young-pa")
@@ -137,7 +137,7 @@ fn write_urdf(file: &Path, model: &StructureModel, sources: &Sources) -> Result<
 }
 
 /// Young's modulus that the user asked for, where the model does not bring its own.
-fn young_pa(model: &StructureModel, args: &Args) -> Result<Option<f64>> {
+fn young_pa(model: &StructureModel, args: &ModelArgs) -> Result<Option<f64>> {
     if !model.has("link-flexibility") {
         return Ok(args.young_pa);
     }
@@ -157,7 +157,7 @@ fn postures(
     campaign: &Campaign,
     model: &StructureModel,
     theta: &[f64],
-    args: &Args,
+    args: &ModelArgs,
     left_out: &mut Vec<String>,
 ) -> Result<Vec<Value>> {
     let mut baseline = model.baseline(theta, false);

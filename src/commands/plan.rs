@@ -14,7 +14,7 @@ use crate::{InputError, Result};
                         What is measured there stands in [plan] or in the options below.\n\nExamples:\n  lobestone plan \
                         cell1\n  lobestone plan cell1 --responses 1X,1Y,1Z,2X --hits 1X,1Y --noise 0.05"
 )]
-pub struct Args {
+pub struct PlanArgs {
     #[command(flatten)]
     campaign: CampaignArg,
     /// Expected noise as a share of the response (0.03: 3 %).
@@ -37,7 +37,7 @@ pub struct Args {
     hits: Vec<Dof>,
 }
 
-pub fn run(args: Args) -> Result<Outcome> {
+pub fn run(args: PlanArgs) -> Result<Outcome> {
     let campaign = Campaign::load_planned(&args.campaign.dir)?;
     let findings = PlanFindings::run(&campaign, &request(&args)?)?;
     let plan = &findings.plan;
@@ -62,7 +62,7 @@ pub fn run(args: Args) -> Result<Outcome> {
     ))
 }
 
-fn request(args: &Args) -> Result<PlanRequest> {
+fn request(args: &PlanArgs) -> Result<PlanRequest> {
     let wrong = |key: &str, what: String, remedy: &str| InputError::new(what).key(key).remedy(remedy);
     if let Some(noise) = args.noise.filter(|n| !(0.0..=1.0).contains(n)) {
         return Err(wrong(

@@ -2,11 +2,12 @@
 
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
-use std::sync::OnceLock;
 
 use clap::Parser;
 
-use super::{Cli, Color, error_label, run, shown, shown_json};
+use super::cli::{Cli, ColorChoice, run};
+use super::printed::{shown, shown_json};
+use super::text::error_label;
 
 /// Does what `arguments` say (the first of them is the program's name) and returns the exit status.
 pub fn program<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> u8 {
@@ -20,9 +21,9 @@ pub fn program<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>
         }
     };
     match cli.color {
-        Color::Auto => {}
-        Color::Always => anstream::ColorChoice::Always.write_global(),
-        Color::Never => anstream::ColorChoice::Never.write_global(),
+        ColorChoice::Auto => {}
+        ColorChoice::Always => anstream::ColorChoice::Always.write_global(),
+        ColorChoice::Never => anstream::ColorChoice::Never.write_global(),
     }
     let as_json = cli.json;
     let failed = match run(cli) {
@@ -49,27 +50,6 @@ pub fn program<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>
             1
         }
     }
-}
-
-static STARTED_BY: OnceLock<Vec<OsString>> = OnceLock::new();
-
-/// Says how this program is started once more (program and first arguments) where that is not by the executable that runs:
-/// within an interpreter. The first word counts.
-pub fn started_by(command: Vec<OsString>) {
-    let _ = STARTED_BY.set(command);
-}
-
-/// Program and first arguments that start this program once more.
-///
-/// # Errors
-/// The operating system does not tell.
-pub(super) fn once_more() -> std::io::Result<std::process::Command> {
-    let Some([program, first @ ..]) = STARTED_BY.get().map(Vec::as_slice) else {
-        return Ok(std::process::Command::new(std::env::current_exe()?));
-    };
-    let mut command = std::process::Command::new(program);
-    command.args(first);
-    Ok(command)
 }
 
 /// Colours go to a terminal only, and not where NO_COLOR is set, unless somebody asked for them.

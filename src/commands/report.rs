@@ -13,7 +13,7 @@ use crate::thesis::ThesisFindings;
 use crate::{Error, Result};
 
 #[derive(clap::Args)]
-pub struct Args {
+pub struct ReportArgs {
     #[command(flatten)]
     campaign: CampaignArg,
     /// Where to write [default: the folder report in the campaign's folder].
@@ -33,7 +33,7 @@ pub struct Args {
     partial: bool,
 }
 
-pub fn run(args: Args) -> Result<Outcome> {
+pub fn run(args: ReportArgs) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
     let findings = CampaignFindings::run(&campaign, !args.no_diagnosis)?;
     let unusable = findings.input_errors();

@@ -11,7 +11,7 @@ use super::entrance::Drafting;
 use super::text::Emphasis;
 use super::workbench::CampaignBench;
 use super::{Outcome, bench_worker};
-use crate::serve::{Scene, Server};
+use crate::serve::{PageScene, Server};
 use crate::{Error, InputError, Result};
 
 #[derive(clap::Args)]
@@ -22,7 +22,7 @@ use crate::{Error, InputError, Result};
                   carries a secret, so do not pass it on. Ctrl-C ends it; whatever was recorded until then stays.\n\n\
                   Examples:\n  lobestone serve --open\n  lobestone serve cell7"
 )]
-pub struct Args {
+pub struct ServeArgs {
     /// The campaign folder (with campaign.toml in it); without one it is chosen on the page.
     dir: Option<PathBuf>,
     /// Port on this computer; 0: any that is free.
@@ -37,7 +37,7 @@ pub struct Args {
 }
 
 /// Says the address at once and comes back when it is told to end.
-pub fn run(args: Args, as_json: bool) -> Result<Outcome> {
+pub fn run(args: ServeArgs, as_json: bool) -> Result<Outcome> {
     if let (true, Some(dir)) = (args.worker, &args.dir) {
         bench_worker::work(dir)?;
         return Ok(Outcome {
@@ -50,9 +50,9 @@ pub fn run(args: Args, as_json: bool) -> Result<Outcome> {
         Some(dir) => {
             let bench = CampaignBench::open(dir)?;
             let dir = bench.dir().to_path_buf();
-            (Scene::Bench(Arc::new(bench)), Some(dir))
+            (PageScene::Bench(Arc::new(bench)), Some(dir))
         }
-        None => (Scene::Entrance(Arc::new(Drafting::default())), None),
+        None => (PageScene::Entrance(Arc::new(Drafting::default())), None),
     };
     let server = Server::bind(scene, args.port)?;
     let url = server.url();

@@ -2,11 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::CommandFactory;
 use clap_complete::Shell;
 use serde_json::json;
 
-use super::{Cli, Outcome};
+use super::outcome::Outcome;
 use crate::files::write_atomically;
 use crate::{Error, Result};
 
@@ -31,8 +30,8 @@ pub struct ManArgs {
     out: Option<PathBuf>,
 }
 
-pub fn completions(args: CompletionArgs) -> Result<Outcome> {
-    let mut command = Cli::command();
+/// The script for a shell; `command`: the whole program's.
+pub fn completions(args: CompletionArgs, mut command: clap::Command) -> Result<Outcome> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut command, "lobestone", &mut script);
     let script = String::from_utf8_lossy(&script).into_owned();
@@ -43,8 +42,9 @@ pub fn completions(args: CompletionArgs) -> Result<Outcome> {
     ))
 }
 
-pub fn man(args: ManArgs) -> Result<Outcome> {
-    let mut command = Cli::command().disable_help_subcommand(true);
+/// The manual pages; `command`: the whole program's.
+pub fn man(args: ManArgs, command: clap::Command) -> Result<Outcome> {
+    let mut command = command.disable_help_subcommand(true);
     command.build();
     let pages = pages(command)?;
     let Some(dir) = args.out else {

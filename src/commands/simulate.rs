@@ -30,7 +30,7 @@ enum QuantityArg {
                         cell3 --kind dirty --effect joint-transverse-compliance@joint-3 --visibility 20\n  lobestone \
                         simulate --out cell4 --unknown\n  lobestone simulate --out cell5 --random --seed 5"
 )]
-pub struct Args {
+pub struct SimulateArgs {
     /// Folder to write; must not exist, or be empty.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -128,7 +128,7 @@ pub struct Args {
     robot: String,
 }
 
-pub fn run(args: Args) -> Result<Outcome> {
+pub fn run(args: SimulateArgs) -> Result<Outcome> {
     let truth = match &args.truth {
         Some(truth) => truth.clone(),
         None => truth_beside(&args.out)?,
@@ -151,7 +151,7 @@ pub fn run(args: Args) -> Result<Outcome> {
     ))
 }
 
-fn scenario(args: &Args) -> Result<StructureScenario> {
+fn scenario(args: &SimulateArgs) -> Result<StructureScenario> {
     let mut scenario = match args.random {
         Some(tier) => random::scenario(tier, args.seed),
         None => StructureScenario::of_kind(args.kind, args.seed),

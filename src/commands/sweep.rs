@@ -18,7 +18,7 @@ const USUAL_SINGULARITY_MARGIN: f64 = 0.05;
                   lobestone sweep --merge --out map                  # the parts as one table\n\
                   scripts/sweep holds a Snakemake workflow that runs the parts on one machine or a cluster."
 )]
-pub struct Args {
+pub struct SweepArgs {
     /// The campaign folder (with campaign.toml in it).
     #[arg(required_unless_present = "merge")]
     dir: Option<PathBuf>,
@@ -73,7 +73,7 @@ fn direction(text: &str) -> std::result::Result<[f64; 3], String> {
 
 /// The map is a Parquet table, and this program was built without them.
 #[cfg(not(feature = "parquet"))]
-pub fn run(args: Args) -> Result<Outcome> {
+pub fn run(args: SweepArgs) -> Result<Outcome> {
     Err(InputError::new(
         "this program was built without Parquet tables, which a map of the workspace is written as",
     )
@@ -92,17 +92,18 @@ mod with_tables {
 
     use serde_json::{Value, json};
 
-    use super::super::next_step::word;
-    use super::super::text::{number, warnings};
-    use super::*;
     use crate::analysis::{Shard, Sweep, SweepRequest};
     use crate::campaign::Campaign;
+    use crate::commands::next_step::word;
+    use crate::commands::outcome::Outcome;
+    use crate::commands::sweep::SweepArgs;
+    use crate::commands::text::{number, warnings};
     use crate::files::write_atomically;
     use crate::lobes::workspace::PlaceStatus;
     use crate::report::figure::CellFormat;
     use crate::report::sweep_folder::SweepFolder;
     use crate::report::sweep_table::{columns, row};
-    use crate::{Error, InputError};
+    use crate::{Error, InputError, Result};
 
     /// Quantity, label, name of the picture.
     const PICTURES: [(&str, &str, &str); 2] = [
@@ -114,7 +115,7 @@ mod with_tables {
         ),
     ];
 
-    pub fn run(args: Args) -> Result<Outcome> {
+    pub fn run(args: SweepArgs) -> Result<Outcome> {
         let Some(dir) = args.dir.as_ref().filter(|_| !args.merge) else {
             return merge(&args.out, Vec::new());
         };

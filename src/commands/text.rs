@@ -204,6 +204,11 @@ fn words(paragraph: &str) -> Vec<String> {
     words
 }
 
+/// What an error message begins with on a terminal.
+pub(super) fn error_label() -> String {
+    Emphasis::Bad.on("error:")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -12,13 +12,13 @@ use crate::thesis::real_case::Explanation;
 use crate::thesis::{CaseStudy, ComparedRow, CuttingTables, LobeTips, RealCase, ThesisFindings};
 
 #[derive(clap::Args)]
-pub struct Args {
+pub struct ThesisArgs {
     /// Write it as a page with figures (report.html and PNG files) into this folder as well.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
 
-pub fn run(args: Args) -> Result<Outcome> {
+pub fn run(args: ThesisArgs) -> Result<Outcome> {
     let findings = ThesisFindings::run()?;
     let mut json = json!(findings.study);
     let next = match args.out {

@@ -15,7 +15,7 @@ use super::{explain, history};
 use crate::campaign::Campaign;
 use crate::revision::{Domain, RevisionLog, hold};
 use crate::robot::RobotSpec;
-use crate::serve::{Job, Order, Refusal, Report, Stage, Workbench, locked};
+use crate::serve::{Job, JobStage, PageOrder, PageSubject, Refusal, Report, locked};
 use crate::{Error, Result};
 
 /// One campaign folder, and what was found out about it since the server began.
@@ -67,7 +67,7 @@ impl CampaignBench {
     }
 
     /// Has an order done.
-    fn have_done(&self, order: Order, stage: &Stage) -> Result<String> {
+    fn have_done(&self, order: PageOrder, stage: &JobStage) -> Result<String> {
         let mut worker = locked(&self.worker);
         let mut hand = match worker.take() {
             Some(hand) => hand,
@@ -88,9 +88,9 @@ impl CampaignBench {
     }
 
     /// What a worker that was ended left behind.
-    fn cancelled(&self, order: &Order) -> String {
+    fn cancelled(&self, order: &PageOrder) -> String {
         let recorded = match order {
-            Order::Add { side, head, .. } | Order::Undo { side, head } => {
+            PageOrder::Add { side, head, .. } | PageOrder::Undo { side, head } => {
                 RevisionLog::load(&self.dir).is_ok_and(|log| log.mark(*side) != *head)
             }
             _ => false,
@@ -169,7 +169,7 @@ impl CampaignBench {
     }
 }
 
-impl Workbench for CampaignBench {
+impl PageSubject for CampaignBench {
     fn title(&self) -> String {
         self.title.clone()
     }
@@ -203,11 +203,11 @@ impl Workbench for CampaignBench {
         }))
     }
 
-    fn prepare(self: Arc<Self>, order: Order) -> std::result::Result<Job, Refusal> {
+    fn prepare(self: Arc<Self>, order: PageOrder) -> std::result::Result<Job, Refusal> {
         let name = match &order {
-            Order::Refresh {} => "drawing the report".into(),
-            Order::Diagnose { .. } => "the diagnosis".into(),
-            Order::Add { side, head, effect } => {
+            PageOrder::Refresh {} => "drawing the report".into(),
+            PageOrder::Diagnose { .. } => "the diagnosis".into(),
+            PageOrder::Add { side, head, effect } => {
                 log_at(&self.dir, *side, head)?;
                 let cutting = !crate::effects::cutting::find(effect).is_empty();
                 if cutting != (*side == Domain::Cutting) {
@@ -217,7 +217,7 @@ impl Workbench for CampaignBench {
                 }
                 format!("adding {effect}")
             }
-            Order::Undo { side, head } => {
+            PageOrder::Undo { side, head } => {
                 log_at(&self.dir, *side, head)?;
                 "the undo".into()
             }

@@ -413,7 +413,6 @@ fn chance_text(p: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::kienzle_law::sine_power;
     use super::*;
     use crate::data::{Immersion, ToolKind};
     use approx::assert_relative_eq;
@@ -531,26 +530,6 @@ mod tests {
         start_rad: 1.9,
         exit_rad: PI,
     };
-
-    #[test]
-    fn moments_are_the_integrals() {
-        for (p, from, to) in [(0.3, 0.0, PI), (1.7, 0.4, 1.2), (0.75, 1.2, 2.9), (1.0, 0.0, 2.0)] {
-            let steps = 400_000;
-            let width = (to - from) / f64::from(steps);
-            let sum: f64 = (0..steps)
-                .map(|k| (from + (f64::from(k) + 0.5) * width).sin().powf(p) * width)
-                .sum();
-            assert_relative_eq!(sine_power(p, to) - sine_power(p, from), sum, max_relative = 1e-7);
-        }
-        // m = 0 is the linear law without edges, on every axis.
-        let geometry = milling(0.1, PART);
-        for axis in [ForceAxis::X, ForceAxis::Y, ForceAxis::Z] {
-            let row = average_row(&tool(), &geometry, axis).unwrap();
-            for t in terms(&tool(), &geometry, axis).unwrap() {
-                assert_relative_eq!(t.value(0.0, 1.0), row[t.component], max_relative = 1e-12);
-            }
-        }
-    }
 
     #[test]
     fn kienzle_averages_give_back_their_law_and_prefer_it() {

@@ -55,7 +55,7 @@ impl KienzleTerm {
 }
 
 /// ∫ sin^p from 0 to `angle` (0…π), p > −1: half an incomplete beta function (NIST DLMF 8.17.1 with t = sin²).
-pub(super) fn sine_power(p: f64, angle: f64) -> f64 {
+fn sine_power(p: f64, angle: f64) -> f64 {
     let (a, b) = (0.5 * (p + 1.0), 0.5);
     let half = 0.5 * beta(a, b);
     let part = |angle: f64| half * beta_reg(a, b, angle.sin().powi(2).clamp(0.0, 1.0));
@@ -290,4 +290,42 @@ fn deviance(observations: &[Observation], weight: &[f64], fitted: impl Iterator<
 pub(super) fn linear_deviance(observations: &[Observation], fit: &CoefficientFit) -> f64 {
     let fitted = observations.iter().map(|o| fit.predict(&o.row));
     deviance(observations, &fit.weight, fitted)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::made_tools::endmill;
+    use super::*;
+    use crate::data::Immersion;
+    use approx::assert_relative_eq;
+
+    const PART: Immersion = Immersion {
+        start_rad: 1.9,
+        exit_rad: PI,
+    };
+
+    #[test]
+    fn moments_are_the_integrals() {
+        for (p, from, to) in [(0.3, 0.0, PI), (1.7, 0.4, 1.2), (0.75, 1.2, 2.9), (1.0, 0.0, 2.0)] {
+            let steps = 400_000;
+            let width = (to - from) / f64::from(steps);
+            let sum: f64 = (0..steps)
+                .map(|k| (from + (f64::from(k) + 0.5) * width).sin().powf(p) * width)
+                .sum();
+            assert_relative_eq!(sine_power(p, to) - sine_power(p, from), sum, max_relative = 1e-7);
+        }
+        // m = 0 is the linear law without edges, on every axis.
+        let tool = endmill(0.0, 90.0);
+        let geometry = CutGeometry::Milling {
+            feed_per_tooth_mm: 0.1,
+            axial_depth_mm: 3.0,
+            immersion: PART,
+        };
+        for axis in [ForceAxis::X, ForceAxis::Y, ForceAxis::Z] {
+            let row = average_row(&tool, &geometry, axis).unwrap();
+            for t in terms(&tool, &geometry, axis).unwrap() {
+                assert_relative_eq!(t.value(0.0, 1.0), row[t.component], max_relative = 1e-12);
+            }
+        }
+    }
 }

@@ -180,7 +180,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         assert!(BatchFolder::shards(folder.path()).is_err());
         let batch = BatchFolder::begin(folder.path()).unwrap();
-        let work: [(&crate::analysis::batch::Entry, Record); 0] = [];
+        let work: [(&crate::analysis::batch::ManifestEntry, Record); 0] = [];
         let manifest = crate::analysis::batch::Manifest {
             file: "m.csv".into(),
             columns: Vec::new(),

@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use crate::analysis::batch::{Entry, Manifest, Quantity, Record, SideResult};
+use crate::analysis::batch::{BatchQuantity, Manifest, ManifestEntry, Record, SideResult};
 use crate::analysis::fleet::{FleetRow, FleetVerdict};
 use crate::{Error, InputError, Result};
 
@@ -51,7 +51,7 @@ pub struct BatchTable {
 
 impl BatchTable {
     /// A row a side of each campaign, in the order of the entries.
-    pub fn new(manifest: &Manifest, work: &[(&Entry, Record)]) -> Self {
+    pub fn new(manifest: &Manifest, work: &[(&ManifestEntry, Record)]) -> Self {
         let carried = manifest.columns.iter().filter(|c| !FIRST.contains(&c.as_str()));
         let quantities: BTreeSet<&str> = work
             .iter()
@@ -86,7 +86,7 @@ impl BatchTable {
                 let found = quantities.iter().flat_map(|name| {
                     let all = &side.findings.quantities;
                     let found = all.iter().find(|q| q.name == *name);
-                    let number = |pick: fn(&Quantity) -> Option<f64>| text(found.and_then(pick));
+                    let number = |pick: fn(&BatchQuantity) -> Option<f64>| text(found.and_then(pick));
                     [number(|q| q.value), number(|q| q.std_error)]
                 });
                 rows.push(head.iter().cloned().chain(results).chain(found).collect());
@@ -250,7 +250,7 @@ impl BatchTable {
     }
 }
 
-fn cell(column: &str, entry: &Entry, record: &Record, side: &SideResult) -> String {
+fn cell(column: &str, entry: &ManifestEntry, record: &Record, side: &SideResult) -> String {
     let found = &side.findings;
     let said = |value: &Option<String>| value.clone().unwrap_or_default();
     match column {
@@ -349,7 +349,7 @@ mod tests {
             seconds: 0.25,
             findings: Findings {
                 nrms: Some(0.1 + 0.2),
-                quantities: vec![Quantity {
+                quantities: vec![BatchQuantity {
                     name: quantity.into(),
                     value: Some(1.5e9),
                     std_error: None,

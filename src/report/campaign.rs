@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use super::parts::{count, failed, paragraph};
+use super::parts::{failed, paragraph};
+use super::words::count;
 use super::{
-    Block, Column, Page, Section, Table, VerdictCard, cutting_section, diagnosis_section, error_map_section,
-    history_section, lobes_section, modal_section, structure_section, thesis_section, verdict_card,
-    waveform_section,
+    Block, Page, ReportSection, ReportTable, TableColumn, VerdictCard, cutting_section, diagnosis_section,
+    error_map_section, history_section, lobes_section, modal_section, structure_section, thesis_section,
+    verdict_card, waveform_section,
 };
 use crate::Result;
 use crate::analysis::{CampaignFindings, DiagnosisFindings, StructureFindings};
@@ -22,7 +23,7 @@ const TABLES: &str = "tables";
 
 /// What [`write()`] left on the disk.
 #[derive(Debug, Clone)]
-pub struct ReportFiles {
+pub(crate) struct ReportFiles {
     pub html: PathBuf,
     pub images: Vec<PathBuf>,
     /// Empty where the program was built without the feature `parquet`.
@@ -33,7 +34,7 @@ pub struct ReportFiles {
 ///
 /// # Errors
 /// What the file system refuses, naming the file.
-pub fn write(page: &Page, findings: &CampaignFindings, folder: &Path) -> Result<ReportFiles> {
+pub(crate) fn write(page: &Page, findings: &CampaignFindings, folder: &Path) -> Result<ReportFiles> {
     #[cfg(feature = "parquet")]
     let tables = super::tables::tables(findings)?;
     #[cfg(not(feature = "parquet"))]
@@ -132,10 +133,10 @@ fn cards(findings: &CampaignFindings) -> Vec<VerdictCard> {
 }
 
 /// A step of the demo as its page tells it: name, what it found, what to type for the same.
-pub type StepRow = [String; 3];
+pub(crate) type StepRow = [String; 3];
 
 /// The demo's second campaign.
-pub struct SecondCell<'a> {
+pub(crate) struct SecondCell<'a> {
     pub campaign: &'a Campaign,
     /// The model without what is missing.
     pub before: &'a StructureFindings,
@@ -145,7 +146,7 @@ pub struct SecondCell<'a> {
 }
 
 /// The demo's page: a campaign that the model explains, and one that it does not.
-pub fn demo_page(findings: &CampaignFindings, second: &SecondCell, steps: &[StepRow]) -> Page {
+pub(crate) fn demo_page(findings: &CampaignFindings, second: &SecondCell, steps: &[StepRow]) -> Page {
     // Most of the work is drawing figures.
     let (mut page, second_sections) = rayon::join(|| page(findings, None), || second_cell(second));
     page.title = "Lobestone demo".into();
@@ -167,26 +168,26 @@ pub fn demo_page(findings: &CampaignFindings, second: &SecondCell, steps: &[Step
     page
 }
 
-fn demo_story(steps: &[StepRow]) -> Section {
+fn demo_story(steps: &[StepRow]) -> ReportSection {
     let intro = "The first cell is a robot whose joints are up to 27 % off its data sheet, and a series of milling cuts with a \
                  drifting dynamometer: the model can explain all of it. The second has something that the model does not.";
-    Section {
+    ReportSection {
         id: "story".into(),
         title: "How it got there, and how to do the same with files of your own".into(),
         blocks: vec![
             paragraph(intro),
-            Block::Table(Table {
+            Block::Table(ReportTable {
                 caption: "What each step found, and its command".into(),
                 columns: vec![
-                    Column::text("step"),
-                    Column::text("found"),
-                    Column::text("command"),
+                    TableColumn::text("step"),
+                    TableColumn::text("found"),
+                    TableColumn::text("command"),
                 ],
                 rows: steps.iter().map(|row| row.to_vec()).collect(),
                 notes: vec![],
             }),
         ],
-        ..Section::default()
+        ..ReportSection::default()
     }
 }
 
@@ -197,7 +198,7 @@ fn lower_first(title: &str) -> String {
         .map_or(String::new(), |c| c.to_lowercase().chain(letters).collect())
 }
 
-fn second_cell(cell: &SecondCell) -> Vec<Section> {
+fn second_cell(cell: &SecondCell) -> Vec<ReportSection> {
     let mut frfs = structure_section::frf_section(cell.before);
     frfs.blocks
         .insert(0, paragraph(structure_section::summary(cell.before)));
@@ -233,11 +234,11 @@ fn contents(findings: &CampaignFindings) -> String {
     if parts.is_empty() {
         parts.push("a model alone, nothing measured".into());
     }
-    super::parts::listed(&parts)
+    super::words::listed(&parts)
 }
 
 /// Every part that the campaign holds, in the order of the story.
-fn parts(findings: &CampaignFindings) -> Vec<Section> {
+fn parts(findings: &CampaignFindings) -> Vec<ReportSection> {
     let mut sections = Vec::new();
     match &findings.structure {
         Some(Ok(structure)) => sections.extend(structure_section::sections(structure)),
@@ -278,7 +279,7 @@ fn parts(findings: &CampaignFindings) -> Vec<Section> {
     sections
 }
 
-fn summary(findings: &CampaignFindings) -> Section {
+fn summary(findings: &CampaignFindings) -> ReportSection {
     let mistakes = findings
         .setup
         .iter()
@@ -313,11 +314,11 @@ fn summary(findings: &CampaignFindings) -> Section {
         .map(|e| Block::Warning(format!("A part is missing from this report. {e}")));
     blocks.extend(lost);
     blocks.extend(warnings(findings).into_iter().map(Block::Warning));
-    Section {
+    ReportSection {
         id: "summary".into(),
         title: "Summary".into(),
         blocks,
-        ..Section::default()
+        ..ReportSection::default()
     }
 }
 

@@ -1,12 +1,11 @@
 //! Cutting forces: records, averages, regression, coefficients.
 
-use super::figure::{
-    ForceChannel, ForceRecord, HeatMap, RegressionFigure, RegressionPoint, RegressionSeries,
-};
+use super::figure::{ForceRecord, ForceTrace, HeatMap, RegressionFigure, RegressionMark, RegressionSeries};
 use super::interactive::Plot;
 use super::number::{decimals, percent, significant, with_error};
-use super::parts::{count, figure, listed, setting};
-use super::{Block, Column, Section, Table};
+use super::parts::figure;
+use super::words::{count, listed, setting};
+use super::{Block, ReportSection, ReportTable, TableColumn};
 use crate::analysis::force_records::cutting_trials;
 use crate::analysis::regression_line::{FeedLine, feed_lines};
 use crate::campaign::Campaign;
@@ -119,7 +118,7 @@ fn worst(group: &ForceGroup) -> Option<Misfit> {
         .max_by(|a, b| a.share.abs().total_cmp(&b.share.abs()))
 }
 
-pub fn sections(campaign: &Campaign, result: &CfcResult) -> Vec<Section> {
+pub fn sections(campaign: &Campaign, result: &CfcResult) -> Vec<ReportSection> {
     let mut sections = vec![records(result)];
     for pooled in &result.pooled {
         sections.push(regression(campaign, result, pooled));
@@ -131,7 +130,7 @@ pub fn sections(campaign: &Campaign, result: &CfcResult) -> Vec<Section> {
 const CUTS_TO_CHOOSE: usize = 30;
 
 /// The first record, and that of the cut which fits worst.
-fn records(result: &CfcResult) -> Section {
+fn records(result: &CfcResult) -> ReportSection {
     let mut shown: Vec<(&CutAnalysis, &str)> = Vec::new();
     if let Some(first) = result.cuts.first() {
         shown.push((first, "The first cut"));
@@ -154,7 +153,7 @@ fn records(result: &CfcResult) -> Section {
         *first = first.clone().with_plot(Plot::one_of("Cut", choices.collect()));
     }
     blocks.push(cut_table(result));
-    Section {
+    ReportSection {
         id: "records".into(),
         title: "Force records".into(),
         lead: "What the dynamometer recorded, in its own axes. The drift line goes through the air before and after \
@@ -173,7 +172,7 @@ fn record_drawing(cut: &CutAnalysis) -> ForceRecord {
             _ => 0.0,
         };
         let middle_s = 0.5 * (cut.steady_s[0] + cut.steady_s[1]);
-        ForceChannel {
+        ForceTrace {
             label: channel.axis.label().into(),
             unit: channel.axis.unit().into(),
             start_s: trace.time_s.first().map_or(0.0, |t| t - 0.25 * stretch_s),
@@ -233,15 +232,15 @@ fn cut_table(result: &CfcResult) -> Block {
         })
     };
     let mut columns = vec![
-        Column::text("cut"),
-        Column::number("rpm"),
-        Column::number("feed mm"),
-        Column::number("turns"),
-        Column::text("air"),
+        TableColumn::text("cut"),
+        TableColumn::number("rpm"),
+        TableColumn::number("feed mm"),
+        TableColumn::number("turns"),
+        TableColumn::text("air"),
     ];
     for axis in axes() {
-        columns.push(Column::number(format!("{} {}", axis.label(), axis.unit())));
-        columns.push(Column::number("off"));
+        columns.push(TableColumn::number(format!("{} {}", axis.label(), axis.unit())));
+        columns.push(TableColumn::number("off"));
     }
     let rows = result.cuts.iter().map(|cut| {
         let mut row = vec![
@@ -271,7 +270,7 @@ fn cut_table(result: &CfcResult) -> Block {
         }
         row
     });
-    Block::Table(Table {
+    Block::Table(ReportTable {
         caption: "Average forces in tool axes ± standard error".into(),
         columns,
         rows: rows.collect(),
@@ -279,7 +278,7 @@ fn cut_table(result: &CfcResult) -> Block {
     })
 }
 
-fn regression(campaign: &Campaign, result: &CfcResult, pooled: &ForceGroup) -> Section {
+fn regression(campaign: &Campaign, result: &CfcResult, pooled: &ForceGroup) -> ReportSection {
     let mut blocks = Vec::new();
     let axes = ForceAxis::of(pooled.process);
     for unit in ["N", "N·m"] {
@@ -291,7 +290,7 @@ fn regression(campaign: &Campaign, result: &CfcResult, pooled: &ForceGroup) -> S
     blocks.push(coefficient_table(result, pooled));
     blocks.extend(kienzle_table(campaign, result, pooled));
     blocks.extend(misfit_map(result, pooled));
-    Section {
+    ReportSection {
         id: format!("regression-{}", slug(result, pooled)),
         title: format!("Force coefficients, {}", series_name(result, pooled)),
         lead: "Average forces against feed: the slope is the cutting part, what is left at zero feed the edge part. R² \
@@ -322,7 +321,7 @@ fn line_figure(
                 },
                 points: points
                     .iter()
-                    .map(|p| RegressionPoint {
+                    .map(|p| RegressionMark {
                         label: p.cut.clone(),
                         x: p.feed_mm,
                         y: p.measured,
@@ -373,15 +372,21 @@ fn line_figure(
 }
 
 fn coefficient_table(result: &CfcResult, pooled: &ForceGroup) -> Block {
-    let mut columns = vec![Column::text("cutting speed"), Column::number("cuts / feeds")];
+    let mut columns = vec![
+        TableColumn::text("cutting speed"),
+        TableColumn::number("cuts / feeds"),
+    ];
     columns.extend(
         pooled
             .coefficients
             .iter()
-            .map(|c| Column::number(format!("{} {}", c.label, c.unit))),
+            .map(|c| TableColumn::number(format!("{} {}", c.label, c.unit))),
     );
     let axes = ForceAxis::of(pooled.process);
-    columns.extend(axes.iter().map(|a| Column::number(format!("R² {}", a.label()))));
+    columns.extend(
+        axes.iter()
+            .map(|a| TableColumn::number(format!("R² {}", a.label()))),
+    );
     let groups = result.groups.iter().filter(|g| g.is_beside(pooled));
     let row = |group: &ForceGroup, name: String| {
         let mut row = vec![name, format!("{} / {}", group.cuts.len(), group.feeds)];
@@ -397,7 +402,7 @@ fn coefficient_table(result: &CfcResult, pooled: &ForceGroup) -> Block {
         .map(|g| row(g, format!("{} m/min", speed_text(g))))
         .collect();
     rows.push(row(pooled, "all together".into()));
-    Block::Table(Table {
+    Block::Table(ReportTable {
         caption: "Coefficients ± standard error".into(),
         columns,
         rows,
@@ -423,12 +428,12 @@ fn kienzle_table(campaign: &Campaign, result: &CfcResult, pooled: &ForceGroup) -
     };
     let rows = law.components.iter();
     let rows = rows.map(|c| vec![c.name.to_string(), text(c.k1_1), text(c.m)]);
-    Some(Block::Table(Table {
+    Some(Block::Table(ReportTable {
         caption: "Kienzle's law of the same averages, all together: force = k1.1 · width · thickness^(1−m), ± standard error".into(),
         columns: vec![
-            Column::text("force"),
-            Column::number("k1.1 N/mm²"),
-            Column::number("m"),
+            TableColumn::text("force"),
+            TableColumn::number("k1.1 N/mm²"),
+            TableColumn::number("m"),
         ],
         rows: rows.collect(),
         notes: vec![format!("Which law: {}.", law.reading())],

@@ -5,9 +5,9 @@ use num_complex::Complex64;
 use super::error_map_section::times_noise_map;
 use super::figure::{BarSeries, FrfCurve, FrfFigure, NoiseLevel, SideBySide};
 use super::number::{decimals, percent, plus_minus, significant};
-use super::parts::{figure, listed, paragraph};
-use super::structure_section::frf_name;
-use super::{Block, Column, Section, Table, words};
+use super::parts::{figure, paragraph};
+use super::words::{frf_name, listed};
+use super::{Block, ReportSection, ReportTable, TableColumn, words};
 use crate::analysis::DiagnosisFindings;
 use crate::analysis::diagnosis::Leading;
 use crate::campaign::Campaign;
@@ -77,7 +77,7 @@ pub(super) fn verdict_text<M, I>(
 }
 
 /// The verdict and what it rests on.
-pub fn section(campaign: &Campaign, findings: &DiagnosisFindings) -> Section {
+pub fn section(campaign: &Campaign, findings: &DiagnosisFindings) -> ReportSection {
     let d = &findings.diagnosis;
     let mut blocks = vec![paragraph(summary(findings))];
     blocks.extend(how_it_shows(d, |c| c.instance.effect.fingerprint()));
@@ -112,7 +112,7 @@ pub fn section(campaign: &Campaign, findings: &DiagnosisFindings) -> Section {
         }
     }
     blocks.extend(not_tried(d));
-    Section {
+    ReportSection {
         id: ID.into(),
         title: TITLE.into(),
         lead: "Each effect of the library is added to the model in turn and fitted together with everything else. One that is \
@@ -272,17 +272,17 @@ pub(super) fn candidate_table<M, I>(
     if all.len() > LISTED {
         notes.push(format!("The first {LISTED} of {}.", all.len()));
     }
-    Block::Table(Table {
+    Block::Table(ReportTable {
         caption: "Candidates, best first".into(),
         columns: vec![
-            Column::text("effect"),
-            Column::number("error"),
-            Column::number("held-out error"),
-            Column::number("ΔBIC"),
-            Column::number("p"),
-            Column::number("χ²/dof"),
-            Column::text("parameters"),
-            Column::text(""),
+            TableColumn::text("effect"),
+            TableColumn::number("error"),
+            TableColumn::number("held-out error"),
+            TableColumn::number("ΔBIC"),
+            TableColumn::number("p"),
+            TableColumn::number("χ²/dof"),
+            TableColumn::text("parameters"),
+            TableColumn::text(""),
         ],
         rows: all.iter().take(LISTED).map(row).collect(),
         notes,
@@ -337,14 +337,14 @@ fn parts_table(leading: &Leading, candidate: &StructureCandidate) -> Block {
         let name = format!("{}–{} Hz", significant(b.from_hz, 3), significant(b.to_hz, 3));
         row(name, &b.part)
     }));
-    Block::Table(Table {
+    Block::Table(ReportTable {
         caption: format!("What {} takes away, and where", candidate.instance.title()),
         columns: vec![
-            Column::text("where"),
-            Column::number("error"),
-            Column::number("× noise"),
-            Column::number("taken away there"),
-            Column::number("of all it takes away"),
+            TableColumn::text("where"),
+            TableColumn::number("error"),
+            TableColumn::number("× noise"),
+            TableColumn::number("taken away there"),
+            TableColumn::number("of all it takes away"),
         ],
         rows,
         notes: vec![

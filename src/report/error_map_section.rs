@@ -4,7 +4,7 @@ use super::figure::{CellFormat, HeatMap};
 use super::interactive::stages;
 use super::number::{percent, significant};
 use super::parts::figure;
-use super::{Block, Column, Section, Table};
+use super::{Block, ReportSection, ReportTable, TableColumn};
 use crate::analysis::StructureFindings;
 use crate::discrepancy::FrfComparison;
 use crate::discrepancy::compare::{ErrorMap, FrfError};
@@ -215,7 +215,7 @@ fn worst(
 }
 
 /// Where the error sits.
-pub fn map_section(findings: &StructureFindings) -> Section {
+pub fn map_section(findings: &StructureFindings) -> ReportSection {
     let after = &findings.analysis.after;
     let stages = stages(findings);
     let bands: Vec<[f64; 2]> = after.map.band_edges_hz.windows(2).map(|w| [w[0], w[1]]).collect();
@@ -258,18 +258,18 @@ pub fn map_section(findings: &StructureFindings) -> Section {
             significant(times, 2),
         ]
     });
-    blocks.push(Block::Table(Table {
+    blocks.push(Block::Table(ReportTable {
         caption: "Error by frequency band, all FRFs together".into(),
         columns: vec![
-            Column::text("band"),
-            Column::number("error"),
-            Column::number("noise"),
-            Column::number("× noise"),
+            TableColumn::text("band"),
+            TableColumn::number("error"),
+            TableColumn::number("noise"),
+            TableColumn::number("× noise"),
         ],
         rows: rows.collect(),
         notes: vec![],
     }));
-    Section {
+    ReportSection {
         id: "error-map".into(),
         title: "Where the error is".into(),
         lead: "Dark cells are where the model and the measurement differ most for the noise; where only noise is left, cells \

@@ -2,8 +2,9 @@
 
 use super::figure::{ControlChartFigure, ControlPanel, ControlPoint, MOST_PANELS};
 use super::number::{percent, significant, with_error};
-use super::parts::{count, figure, paragraph};
-use super::{Block, Column, Page, Section, Table};
+use super::parts::{figure, paragraph};
+use super::words::count;
+use super::{Block, Page, ReportSection, ReportTable, TableColumn};
 use crate::analysis::control_chart::{Basis, ControlChart};
 use crate::analysis::fleet::{Attention, Fleet, Night, RobotHistory};
 use crate::revision;
@@ -50,9 +51,9 @@ pub fn page(fleet: &Fleet, title: &str, [rows, failed]: [usize; 2], remarks: &[S
 }
 
 /// The worst first.
-fn overview(fleet: &Fleet, remarks: &[String]) -> Section {
-    let columns = ["robot", "side", "look at it", "last campaign", "missing"].map(Column::text);
-    let numbers = ["confidence", "error", "noise", "farthest, σ", "campaigns"].map(Column::number);
+fn overview(fleet: &Fleet, remarks: &[String]) -> ReportSection {
+    let columns = ["robot", "side", "look at it", "last campaign", "missing"].map(TableColumn::text);
+    let numbers = ["confidence", "error", "noise", "farthest, σ", "campaigns"].map(TableColumn::number);
     let rows = fleet.robots.iter().map(|robot| {
         let last = robot.last();
         let verdict = last.and_then(|n| n.verdict.as_ref());
@@ -73,13 +74,13 @@ fn overview(fleet: &Fleet, remarks: &[String]) -> Section {
         ]
     });
     let mut blocks: Vec<Block> = remarks.iter().cloned().map(Block::Warning).collect();
-    blocks.push(Block::Table(Table {
+    blocks.push(Block::Table(ReportTable {
         columns: columns.into_iter().chain(numbers).collect(),
         rows: rows.collect(),
         notes: vec![ABOUT_LIMITS.to_string()],
-        ..Table::default()
+        ..ReportTable::default()
     }));
-    Section {
+    ReportSection {
         id: "robots".into(),
         title: "Robots, worst first".into(),
         lead: "New verdicts first, then values that left their limits, files that could not be used, and verdicts that are known."
@@ -101,7 +102,7 @@ fn farthest(robot: &RobotHistory) -> String {
     }
 }
 
-fn of_robot(robot: &RobotHistory) -> Section {
+fn of_robot(robot: &RobotHistory) -> ReportSection {
     let mut blocks: Vec<Block> = robot.reasons.iter().map(paragraph).collect();
     let nights: Vec<&Night> = robot.nights.iter().filter(|n| n.error.is_none()).collect();
     let names: Vec<String> = nights.iter().map(|n| when(n)).collect();
@@ -128,7 +129,7 @@ fn of_robot(robot: &RobotHistory) -> Section {
     }
     blocks.extend(quantities(robot));
     blocks.push(campaigns(robot));
-    Section {
+    ReportSection {
         id: format!("{}-{}", robot.robot, robot.domain),
         title: format!("{} ({}): {}", robot.robot, robot.domain, robot.attention.name()),
         lead: String::new(),
@@ -173,14 +174,14 @@ fn quantities(robot: &RobotHistory) -> Option<Block> {
         "from the mean, σ",
         "since the one before, σ",
     ];
-    let mut columns = vec![Column::text("quantity")];
-    columns.extend(names.map(Column::number));
-    columns.push(Column::text("σ from"));
+    let mut columns = vec![TableColumn::text("quantity")];
+    columns.extend(names.map(TableColumn::number));
+    columns.push(TableColumn::text("σ from"));
     (!rows.is_empty()).then(|| {
-        Block::Table(Table {
+        Block::Table(ReportTable {
             columns,
             rows,
-            ..Table::default()
+            ..ReportTable::default()
         })
     })
 }
@@ -195,8 +196,8 @@ pub fn basis(basis: Basis) -> &'static str {
 
 /// The last campaigns, newest first.
 fn campaigns(robot: &RobotHistory) -> Block {
-    let columns = ["campaign", "date", "missing", "could not be worked on"].map(Column::text);
-    let numbers = ["error", "noise"].map(Column::number);
+    let columns = ["campaign", "date", "missing", "could not be worked on"].map(TableColumn::text);
+    let numbers = ["error", "noise"].map(TableColumn::number);
     let rows = robot.nights.iter().rev().take(LISTED).map(|night| {
         vec![
             night.campaign.clone(),
@@ -208,14 +209,14 @@ fn campaigns(robot: &RobotHistory) -> Block {
         ]
     });
     let more = robot.nights.len().saturating_sub(LISTED);
-    Block::Table(Table {
+    Block::Table(ReportTable {
         columns: columns.into_iter().chain(numbers).collect(),
         rows: rows.collect(),
         notes: (more > 0)
             .then(|| format!("and {more} earlier ones"))
             .into_iter()
             .collect(),
-        ..Table::default()
+        ..ReportTable::default()
     })
 }
 

@@ -5,9 +5,9 @@ use num_complex::Complex64;
 use super::error_map_section::times_noise_map;
 use super::figure::{self, FrfCurve, FrfFigure, HistoryFigure, NoiseLevel};
 use super::number::{percent, plus_minus, significant};
-use super::parts::{figure, listed, paragraph};
-use super::structure_section::frf_name;
-use super::{Block, Column, Fold, Section, Table, words};
+use super::parts::{figure, paragraph};
+use super::words::{frf_name, listed};
+use super::{Block, Fold, ReportSection, ReportTable, TableColumn, words};
 use crate::discrepancy::FrfComparison;
 use crate::effects::{self, cutting};
 use crate::identify::FrfData;
@@ -29,7 +29,7 @@ type Told = [&'static str; 3];
 
 /// `steps`: the FRFs, and the model before and after each revision from the first on, where that is known. `None` where no
 /// effect was ever added.
-pub fn section(revisions: &[Revision], steps: &[(&FrfData, [Stage; 2])]) -> Option<Section> {
+pub fn section(revisions: &[Revision], steps: &[(&FrfData, [Stage; 2])]) -> Option<ReportSection> {
     of_revisions("history", revisions, "postures", steps, |id| {
         let all = effects::STRUCTURAL.into_iter().chain(effects::DRAWN);
         let effect = all.into_iter().find(|e| e.id() == id)?;
@@ -42,7 +42,7 @@ pub fn section(revisions: &[Revision], steps: &[(&FrfData, [Stage; 2])]) -> Opti
 }
 
 /// The same of the cutting model.
-pub fn cutting_section(revisions: &[Revision]) -> Option<Section> {
+pub fn cutting_section(revisions: &[Revision]) -> Option<ReportSection> {
     of_revisions("history-cutting", revisions, "cuts", &[], |id| {
         let effect = cutting::find(id).first()?.effect;
         Some([
@@ -60,13 +60,13 @@ fn of_revisions(
     folds: &str,
     steps: &[(&FrfData, [Stage; 2])],
     told: impl Fn(&str) -> Option<Told>,
-) -> Option<Section> {
+) -> Option<ReportSection> {
     let current = revisions.last()?;
     let drawing = HistoryFigure {
         title: "Error of the model, revision by revision".into(),
         revisions: revisions
             .iter()
-            .map(|r| figure::Revision {
+            .map(|r| figure::HistoryMark {
                 label: r.title(),
                 fit_nrms: r.nrms,
                 held_out_nrms: r.held_out_nrms,
@@ -105,7 +105,7 @@ fn of_revisions(
         });
         blocks.push(step(id, [&pair[0], &pair[1]], folds, known, steps.get(i)));
     }
-    Some(Section {
+    Some(ReportSection {
         id: id.into(),
         title: match folds {
             "cuts" => "The error of the force model, revision by revision".into(),
@@ -220,15 +220,15 @@ fn evidence(why: &Evidence) -> Vec<Block> {
             why.when.replace('T', " ").replace('Z', " UTC"),
             words::confidence(why.confidence)
         )),
-        Block::Table(Table {
+        Block::Table(ReportTable {
             caption: "Candidates then, best first".into(),
             columns: vec![
-                Column::text("effect"),
-                Column::number("error"),
-                Column::number("held-out error"),
-                Column::number("ΔBIC"),
-                Column::number("χ²/dof"),
-                Column::text(""),
+                TableColumn::text("effect"),
+                TableColumn::number("error"),
+                TableColumn::number("held-out error"),
+                TableColumn::number("ΔBIC"),
+                TableColumn::number("χ²/dof"),
+                TableColumn::text(""),
             ],
             rows: why.candidates.iter().take(LISTED).map(row).collect(),
             notes,
@@ -315,15 +315,15 @@ fn table(revisions: &[Revision]) -> Block {
             progress.into(),
         ]
     });
-    Block::Table(Table {
+    Block::Table(ReportTable {
         caption: "Revisions of the model".into(),
         columns: vec![
-            Column::text("revision"),
-            Column::number("error"),
-            Column::number("held-out error"),
-            Column::number("noise"),
-            Column::number("× noise"),
-            Column::text("progress"),
+            TableColumn::text("revision"),
+            TableColumn::number("error"),
+            TableColumn::number("held-out error"),
+            TableColumn::number("noise"),
+            TableColumn::number("× noise"),
+            TableColumn::text("progress"),
         ],
         rows: rows.collect(),
         notes: vec![

@@ -3,7 +3,7 @@
 use super::figure::{HoleFigure, HolePanel};
 use super::number::{decimals, significant};
 use super::parts::{figure, paragraph};
-use super::{Block, Column, Table};
+use super::{Block, ReportTable, TableColumn};
 use crate::analysis::LobeAnalysis;
 use crate::lobes::hole::{HoleCheck, HoleError, Uncertain};
 
@@ -107,19 +107,19 @@ fn errors<'a>(holes: impl IntoIterator<Item = (String, &'a HoleError)>, check: &
         row.push(significant(hole.axial_mm, 3));
         row
     });
-    Block::Table(Table {
+    Block::Table(ReportTable {
         caption: "Static error of the hole".into(),
         columns: vec![
-            Column::text("place"),
-            Column::number("position error (mm)"),
-            Column::number("± (mm)"),
-            Column::number("95 % (mm)"),
-            Column::text("position"),
-            Column::number("tilt (°)"),
-            Column::number("± (°)"),
-            Column::number("95 % (°)"),
-            Column::text("perpendicularity"),
-            Column::number("along the axis (mm)"),
+            TableColumn::text("place"),
+            TableColumn::number("position error (mm)"),
+            TableColumn::number("± (mm)"),
+            TableColumn::number("95 % (mm)"),
+            TableColumn::text("position"),
+            TableColumn::number("tilt (°)"),
+            TableColumn::number("± (°)"),
+            TableColumn::number("95 % (°)"),
+            TableColumn::text("perpendicularity"),
+            TableColumn::number("along the axis (mm)"),
         ],
         rows: rows.collect(),
         notes: vec!["Along the axis: negative where the tool is pushed back from the workpiece.".into()],

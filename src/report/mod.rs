@@ -4,40 +4,45 @@
 //! readable text, and [`page`] puts all of them into one HTML file that needs nothing beside itself. [`campaign`] says what stands on that page, one
 //! `*_section` a part; `tables` (feature `parquet`) writes the same numbers for other programs.
 
-pub mod batch_folder;
-pub mod batch_table;
+pub(crate) mod batch_folder;
+pub(crate) mod batch_table;
+mod block;
 pub mod campaign;
-pub mod cutting_section;
-pub mod diagnosis_section;
-pub mod error_map_section;
-pub mod figure;
-pub mod fleet_page;
-pub mod history_section;
+mod card;
+pub(crate) mod cutting_section;
+pub(crate) mod diagnosis_section;
+pub(crate) mod error_map_section;
+pub(crate) mod figure;
+pub(crate) mod fleet_page;
+pub(crate) mod history_section;
 mod hole_section;
-pub mod interactive;
-pub mod lobes_section;
-pub mod modal_page;
-pub mod modal_section;
+pub(crate) mod interactive;
+mod lobes_figure;
+pub(crate) mod lobes_section;
+pub(crate) mod modal_page;
+pub(crate) mod modal_section;
 pub mod number;
-pub mod page;
+pub(crate) mod page;
 pub(crate) mod parts;
 mod picker;
 mod picture;
 mod real_case_section;
 mod redundancy_section;
-pub mod structure_section;
+pub(crate) mod structure_section;
 #[cfg(feature = "parquet")]
-pub mod sweep_folder;
-pub mod sweep_summary;
+pub(crate) mod sweep_folder;
+#[cfg_attr(not(feature = "parquet"), allow(dead_code))] // only the Parquet map of a sweep is summed up
+pub(crate) mod sweep_summary;
 #[cfg(feature = "parquet")]
-pub mod sweep_table;
+pub(crate) mod sweep_table;
 #[cfg(feature = "parquet")]
-pub mod tables;
-pub mod thesis_cutting;
-pub mod thesis_section;
-pub mod verdict_card;
-pub mod waveform_section;
+pub(crate) mod tables;
+pub(crate) mod thesis_cutting;
+pub(crate) mod thesis_section;
+pub(crate) mod verdict_card;
+pub(crate) mod waveform_section;
 mod words;
 
-pub use page::{Block, Column, Drawing, Figure, Fold, OnScreen, Page, Section, Table, Written};
-pub use verdict_card::VerdictCard;
+pub(crate) use block::{Block, Drawing, Figure, Fold, OnScreen, ReportSection, ReportTable, TableColumn};
+pub(crate) use card::VerdictCard;
+pub use page::{Page, WrittenPage};

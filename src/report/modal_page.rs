@@ -9,12 +9,14 @@ use super::modal_section::{
     coherence, mac, modes, reconstruction, reconstruction_of, stabilisation, tracked,
 };
 use super::number::{decimals, with_error};
-use super::parts::{count, figure};
+use super::parts::figure;
 use super::picker::picker;
-use super::{Block, Column, Drawing, Page, Section, Table};
+use super::words::count;
+use super::{Block, Drawing, Page, ReportSection, ReportTable, TableColumn};
 use crate::analysis::ModalAnalysis;
 use crate::analysis::modal::SetModes;
-use crate::analysis::modal_export::{dofs_of_frfs, scaled_modes};
+use crate::analysis::modal_export::scaled_modes;
+use crate::analysis::mode_set::dofs_of_frfs;
 use crate::analysis::shape_comparison::{ShapeComparison, at_nodes};
 use crate::ingest::{Dof, Geometry};
 use crate::modal::indicators::FrfMatrix;
@@ -48,7 +50,7 @@ pub fn page(analysis: &ModalAnalysis, extras: &Extras, title: &str) -> Page {
             _ => format!(" · {}", set.set),
         };
         let comparison = extras.comparisons.get(k).and_then(Option::as_ref);
-        let section = |id: &str, title: &str, lead: &str, blocks: Vec<Block>| Section {
+        let section = |id: &str, title: &str, lead: &str, blocks: Vec<Block>| ReportSection {
             id: format!("{id}-{}", k + 1),
             title: format!("{title}{number}"),
             lead: lead.into(),
@@ -111,11 +113,11 @@ pub fn page(analysis: &ModalAnalysis, extras: &Extras, title: &str) -> Page {
     }
 }
 
-fn overview(analysis: &ModalAnalysis) -> Section {
+fn overview(analysis: &ModalAnalysis) -> ReportSection {
     let mut blocks = vec![modes(analysis)];
     if let Some(Block::Table(table)) = blocks.first_mut() {
         table.caption = "Modes, all FRFs of a set together".into();
-        table.columns[0] = Column::text("set");
+        table.columns[0] = TableColumn::text("set");
     }
     if analysis.sets.len() > 1 {
         blocks.extend(tracked(analysis));
@@ -133,7 +135,7 @@ fn overview(analysis: &ModalAnalysis) -> Section {
             count(analysis.warnings.len() - MOST_WARNINGS, "warning", "warnings")
         )));
     }
-    Section {
+    ReportSection {
         id: "modes".into(),
         title: "Modes".into(),
         lead: "Frequencies and damping of all FRFs of a set together, with one standard deviation.".into(),
@@ -154,12 +156,12 @@ fn rejected(set: &SetModes) -> Option<Block> {
         ]
     });
     let more = rejected.len().saturating_sub(MOST_REJECTED);
-    Some(Block::Table(Table {
+    Some(Block::Table(ReportTable {
         caption: "Poles that are no modes, or that these FRFs do not prove".into(),
         columns: vec![
-            Column::number("frequency (Hz)"),
-            Column::number("damping ratio (%)"),
-            Column::text("why not"),
+            TableColumn::number("frequency (Hz)"),
+            TableColumn::number("damping ratio (%)"),
+            TableColumn::text("why not"),
         ],
         rows: rows.collect(),
         notes: if more > 0 {
@@ -303,14 +305,14 @@ fn per_frf(set: &SetModes) -> Block {
                 frf.quality.reasons.join(", "),
             ]
         });
-    Block::Table(Table {
+    Block::Table(ReportTable {
         caption: "Each FRF".into(),
         columns: vec![
-            Column::text("FRF"),
-            Column::number("left over (%)"),
-            Column::number("its noise (%)"),
-            Column::text("quality"),
-            Column::text("because"),
+            TableColumn::text("FRF"),
+            TableColumn::number("left over (%)"),
+            TableColumn::number("its noise (%)"),
+            TableColumn::text("quality"),
+            TableColumn::text("because"),
         ],
         rows: rows.collect(),
         notes: vec!["Of the mobility, root mean square over the band.".into()],
@@ -457,14 +459,14 @@ fn scale(set: &SetModes) -> Vec<Block> {
             decimals(100.0 * p.negative_power_share, 1),
         ]
     });
-    let mut blocks = vec![Block::Table(Table {
+    let mut blocks = vec![Block::Table(ReportTable {
         caption: "Driving points".into(),
         columns: vec![
-            Column::text("FRF"),
-            Column::text("is"),
-            Column::text("wrong sign at (Hz)"),
-            Column::text("no antiresonance between (Hz)"),
-            Column::number("negative power (%)"),
+            TableColumn::text("FRF"),
+            TableColumn::text("is"),
+            TableColumn::text("wrong sign at (Hz)"),
+            TableColumn::text("no antiresonance between (Hz)"),
+            TableColumn::number("negative power (%)"),
         ],
         rows: rows.collect(),
         notes: vec![
@@ -487,14 +489,14 @@ fn scale(set: &SetModes) -> Vec<Block> {
                 cell(&|s| super::number::significant(s.modal_a.im, 3)),
             ]
         });
-        blocks.push(Block::Table(Table {
+        blocks.push(Block::Table(ReportTable {
             caption: "Modal mass and modal A (shapes with the largest component 1)".into(),
             columns: vec![
-                Column::number("frequency (Hz)"),
-                Column::text("driving point"),
-                Column::number("modal mass (kg)"),
-                Column::number("Re a (kg/s)"),
-                Column::number("Im a (kg/s)"),
+                TableColumn::number("frequency (Hz)"),
+                TableColumn::text("driving point"),
+                TableColumn::number("modal mass (kg)"),
+                TableColumn::number("Re a (kg/s)"),
+                TableColumn::number("Im a (kg/s)"),
             ],
             rows: rows.collect(),
             notes: vec!["Residue = ψψ/a. Shapes of unity modal mass and real normal modes: --export.".into()],
@@ -570,13 +572,13 @@ fn against(set: &SetModes, comparison: &ShapeComparison) -> Vec<Block> {
             picture.png(),
         )
         .with_plot(picture.plot()),
-        Block::Table(Table {
+        Block::Table(ReportTable {
             caption: "Pairs, each mode once, from a likeness of 0.5 on".into(),
             columns: vec![
-                Column::number("measured (Hz)"),
-                Column::number("model (Hz)"),
-                Column::number("model off by (%)"),
-                Column::number("MAC"),
+                TableColumn::number("measured (Hz)"),
+                TableColumn::number("model (Hz)"),
+                TableColumn::number("model off by (%)"),
+                TableColumn::number("MAC"),
             ],
             rows: rows.collect(),
             notes,

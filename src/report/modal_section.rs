@@ -7,8 +7,9 @@ use super::figure::{
     NyquistFigure, StabilisationFigure, StabilisationPole, StickPicture,
 };
 use super::number::{decimals, with_error};
-use super::parts::{count, figure};
-use super::{Block, Column, Drawing, Fold, Section, Table};
+use super::parts::figure;
+use super::words::count;
+use super::{Block, Drawing, Fold, ReportSection, ReportTable, TableColumn};
 use crate::analysis::ModalAnalysis;
 use crate::analysis::modal::{AnalysedFrf, SetModes};
 use crate::analysis::stick_shapes::StickShape;
@@ -36,7 +37,7 @@ pub fn summary(analysis: &ModalAnalysis) -> Option<String> {
     ))
 }
 
-pub fn section(analysis: &ModalAnalysis, shapes: &[StickShape]) -> Section {
+pub fn section(analysis: &ModalAnalysis, shapes: &[StickShape]) -> ReportSection {
     let tracked = if analysis.sets.len() > 1 {
         tracked(analysis)
     } else {
@@ -77,7 +78,7 @@ pub fn section(analysis: &ModalAnalysis, shapes: &[StickShape]) -> Section {
             count(rest, "warning", "warnings")
         )));
     }
-    Section {
+    ReportSection {
         id: "modes".into(),
         title: "Modes of the measured FRFs".into(),
         lead: "Frequencies and damping that the measurement shows by itself; no robot model is used.".into(),
@@ -101,14 +102,14 @@ pub(super) fn modes(analysis: &ModalAnalysis) -> Block {
             ]);
         }
     }
-    Block::Table(Table {
+    Block::Table(ReportTable {
         caption: "Modes, all FRFs of a posture together".into(),
         columns: vec![
-            Column::text("posture"),
-            Column::number("frequency (Hz)"),
-            Column::number("damping ratio (%)"),
-            Column::number("seen in FRFs"),
-            Column::number("phase collinearity"),
+            TableColumn::text("posture"),
+            TableColumn::number("frequency (Hz)"),
+            TableColumn::number("damping ratio (%)"),
+            TableColumn::number("seen in FRFs"),
+            TableColumn::number("phase collinearity"),
         ],
         rows,
         notes: vec![
@@ -123,12 +124,12 @@ pub(super) fn tracked(analysis: &ModalAnalysis) -> Option<Block> {
     if tracks.is_empty() {
         return None;
     }
-    let mut columns = vec![Column::text("mode")];
+    let mut columns = vec![TableColumn::text("mode")];
     columns.extend(
         analysis
             .sets
             .iter()
-            .map(|s| Column::number(format!("{} (Hz, %)", s.set))),
+            .map(|s| TableColumn::number(format!("{} (Hz, %)", s.set))),
     );
     let cell = |track: &Track, set: usize| {
         track.mode_of_set[set].map_or("–".to_string(), |m| {
@@ -140,7 +141,7 @@ pub(super) fn tracked(analysis: &ModalAnalysis) -> Option<Block> {
             )
         })
     };
-    Some(Block::Table(Table {
+    Some(Block::Table(ReportTable {
         caption: "The modes from posture to posture: frequency and damping ratio".into(),
         columns,
         rows: tracks

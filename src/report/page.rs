@@ -12,7 +12,8 @@ use minijinja::{Environment, Value, context};
 use serde_json::json;
 
 use super::VerdictCard;
-use super::interactive::{Explorer, GLUE, Plot, packed, plotly_js};
+use super::block::{Block, Figure, OnScreen, ReportSection, ReportTable};
+use super::interactive::{GLUE, packed, plotly_js};
 use super::number::percent;
 use crate::files::write_atomically;
 use crate::{Error, Result};
@@ -20,9 +21,12 @@ use crate::{Error, Result};
 /// Name of the HTML file in the report's folder.
 pub const HTML_NAME: &str = "report.html";
 
+/// An HTML page: cards and sections.
 #[derive(Debug, Clone, Default)]
 pub struct Page {
+    /// In the browser's tab and at the top.
     pub title: String,
+    /// Below the title.
     pub subtitle: String,
     /// Where the page comes from: name and value, such as the date and the program's version.
     pub origin: Vec<(String, String)>,
@@ -30,113 +34,18 @@ pub struct Page {
     pub opening: String,
     /// The answers, before all sections.
     pub cards: Vec<VerdictCard>,
-    pub sections: Vec<Section>,
+    /// What follows the cards, in order.
+    pub sections: Vec<ReportSection>,
     /// How many sections stand open; of the others a reader sees the titles and opens what he wants. `None`: all.
     pub open_sections: Option<usize>,
     /// Images only, no scripts: a small file.
     pub without_scripts: bool,
 }
 
-#[derive(Debug, Clone, Default)]
-pub struct Section {
-    /// Anchor in the page; made from the title where empty.
-    pub id: String,
-    pub title: String,
-    /// One plain sentence that says what the section shows; left out where empty.
-    pub lead: String,
-    pub blocks: Vec<Block>,
-}
-
-#[derive(Debug, Clone)]
-pub enum Block {
-    Paragraph(String),
-    Figure(Figure),
-    /// FRFs to choose from; nothing in a page without scripts.
-    Explorer(Box<Explorer>),
-    Drawing(Drawing),
-    Table(Table),
-    Warning(String),
-    /// Name and value, one a line.
-    KeyValues(Vec<(String, String)>),
-    /// Shown as it is, in a fixed-width font.
-    Pre(String),
-    Fold(Fold),
-}
-
-/// Blocks behind a line that a reader opens.
-#[derive(Debug, Clone, Default)]
-pub struct Fold {
-    pub title: String,
-    pub blocks: Vec<Block>,
-    /// Open from the beginning.
-    pub open: bool,
-}
-
-#[derive(Debug, Clone, Default)]
-pub struct Figure {
-    /// Name of the image beside the page; anything but letters, digits, `-` and `_` is replaced, `.png` added.
-    pub file_name: String,
-    /// What a reader who cannot see the image should know.
-    pub alt: String,
-    pub caption: String,
-    /// A whole PNG file, as the functions of [`super::figure`] return it.
-    pub png: Vec<u8>,
-    pub on_screen: OnScreen,
-}
-
-/// What a screen shows of a figure where scripts run; paper always gets the image.
-#[derive(Debug, Clone, Default)]
-pub enum OnScreen {
-    #[default]
-    Image,
-    Plot(Box<Plot>),
-    /// Nothing: another block of the page shows the same and more.
-    Elsewhere,
-}
-
-/// Vector graphics that live in the page only, such as a moving picture.
-#[derive(Debug, Clone, Default)]
-pub struct Drawing {
-    /// A whole `<svg>` element made by this program: it goes into the page as it is.
-    pub svg: String,
-    pub caption: String,
-}
-
-#[derive(Debug, Clone, Default)]
-pub struct Table {
-    pub caption: String,
-    pub columns: Vec<Column>,
-    /// The first cell of a row is its heading. Missing cells stay empty, surplus ones are dropped.
-    pub rows: Vec<Vec<String>>,
-    pub notes: Vec<String>,
-}
-
-#[derive(Debug, Clone, Default)]
-pub struct Column {
-    pub name: String,
-    /// Set flush right.
-    pub numeric: bool,
-}
-
-impl Column {
-    pub fn text(name: impl Into<String>) -> Self {
-        Column {
-            name: name.into(),
-            numeric: false,
-        }
-    }
-
-    pub fn number(name: impl Into<String>) -> Self {
-        Column {
-            name: name.into(),
-            numeric: true,
-        }
-    }
-}
-
 /// What [`Page::write`] left on the disk.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Written {
+pub struct WrittenPage {
+    /// The HTML file.
     pub html: PathBuf,
     /// In the order of the page.
     pub images: Vec<PathBuf>,
@@ -216,7 +125,7 @@ impl Page {
     ///
     /// # Errors
     /// What the file system refuses, naming the file.
-    pub fn write(&self, folder: &Path) -> Result<Written> {
+    pub fn write(&self, folder: &Path) -> Result<WrittenPage> {
         std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, e))?;
         let html = self.html()?;
         let path = folder.join(HTML_NAME);
@@ -233,7 +142,7 @@ impl Page {
                 std::fs::remove_file(&stale).map_err(|e| Error::io(&stale, e))?;
             }
         }
-        Ok(Written { html: path, images })
+        Ok(WrittenPage { html: path, images })
     }
 }
 
@@ -401,7 +310,7 @@ impl Block {
     }
 }
 
-impl Table {
+impl ReportTable {
     fn value(&self) -> Value {
         let columns = self
             .columns
@@ -496,6 +405,7 @@ fn png_size(png: &[u8]) -> (u32, u32) {
 mod tests {
     use super::*;
     use crate::report::figure::HeatMap;
+    use crate::report::{Fold, TableColumn};
 
     #[test]
     fn what_stands_between_backticks_is_code_and_everything_is_escaped() {
@@ -522,13 +432,13 @@ mod tests {
             png: map.png().unwrap(),
             ..Figure::default()
         };
-        let table = Table {
+        let table = ReportTable {
             caption: name.to_owned(),
-            columns: vec![Column::text(name), Column::number("value")],
+            columns: vec![TableColumn::text(name), TableColumn::number("value")],
             rows: vec![vec![name.to_owned(), "1.5".to_owned()], vec!["short".to_owned()]],
             notes: vec![name.to_owned()],
         };
-        let section = |id: &str| Section {
+        let section = |id: &str| ReportSection {
             id: id.to_owned(),
             title: name.to_owned(),
             lead: name.to_owned(),
@@ -692,7 +602,7 @@ mod tests {
             png: vec![1, 2, 3],
             ..Default::default()
         })];
-        let section = Section {
+        let section = ReportSection {
             blocks,
             ..Default::default()
         };

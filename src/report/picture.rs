@@ -7,7 +7,7 @@ use std::fmt::Write;
 
 use minijinja::HtmlEscape;
 
-use super::figure::axis::{Axis, extent, positive_extent};
+use super::figure::axis::{FigureAxis, extent, positive_extent};
 use super::number::{format_si, significant};
 
 /// Size of the drawing in its own units; the page scales it.
@@ -84,18 +84,18 @@ impl Picture {
     }
 
     /// `None` where there is nothing to draw.
-    fn axes(&self) -> Option<(Axis, Axis)> {
+    fn axes(&self) -> Option<(FigureAxis, FigureAxis)> {
         let curves = || {
             let models = [&self.before, &self.after].into_iter().flatten();
             models.chain([&self.measured]).flatten().copied()
         };
-        let x = Axis::linear("", extent(self.x.iter().copied())?, 6);
+        let x = FigureAxis::linear("", extent(self.x.iter().copied())?, 6);
         let y = match self.log {
             true => {
                 let (low, high) = positive_extent(curves())?;
-                Axis::log("", (low.max(high / 10f64.powf(DECADES)) / 1.3, high * 1.3))
+                FigureAxis::log("", (low.max(high / 10f64.powf(DECADES)) / 1.3, high * 1.3))
             }
-            false => Axis::padded("", extent(curves())?, 0.06, 5),
+            false => FigureAxis::padded("", extent(curves())?, 0.06, 5),
         };
         Some((x, y))
     }
@@ -103,8 +103,8 @@ impl Picture {
 
 /// The rectangle that curves are drawn in.
 struct Frame<'a> {
-    x: &'a Axis,
-    y: &'a Axis,
+    x: &'a FigureAxis,
+    y: &'a FigureAxis,
 }
 
 impl Frame<'_> {

@@ -3,7 +3,7 @@
 use super::figure::{ResonanceFigure, ResonanceRow};
 use super::number::{decimals, format_si};
 use super::parts::{figure, paragraph};
-use super::{Block, Column, Table};
+use super::{Block, ReportTable, TableColumn};
 use crate::thesis::RealCase;
 use crate::thesis::real_case::{CONFIGURATIONS, Explanation};
 
@@ -100,19 +100,19 @@ fn explanations(case: &RealCase) -> Block {
         .map(|(effect, reason)| format!("Not tried: {effect} ({reason})."))
         .collect();
     notes.dedup();
-    Block::Table(Table {
+    Block::Table(ReportTable {
         caption: "Explanations of the tables, best first after the rigid links".into(),
         columns: vec![
-            Column::text("explanation"),
-            Column::number("BIC difference"),
-            Column::number("p, corrected"),
-            Column::number("variance left (1 is noise)"),
-            Column::number("misfit held out"),
-            Column::number("resonances with a mode"),
-            Column::number(format!("of those at {}", bands.join("; "))),
-            Column::number("static stiffness, model / measured"),
-            Column::number("weight"),
-            Column::text("parameters"),
+            TableColumn::text("explanation"),
+            TableColumn::number("BIC difference"),
+            TableColumn::number("p, corrected"),
+            TableColumn::number("variance left (1 is noise)"),
+            TableColumn::number("misfit held out"),
+            TableColumn::number("resonances with a mode"),
+            TableColumn::number(format!("of those at {}", bands.join("; "))),
+            TableColumn::number("static stiffness, model / measured"),
+            TableColumn::number("weight"),
+            TableColumn::text("parameters"),
         ],
         rows: std::iter::once(&case.baseline)
             .chain(&case.candidates)

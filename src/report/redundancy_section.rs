@@ -4,7 +4,7 @@ use super::figure::{CellFormat, HeatMap};
 use super::interactive::Surface;
 use super::number::{decimals, significant};
 use super::parts::{figure, paragraph};
-use super::{Block, Column, Table, lobes_section};
+use super::{Block, ReportTable, TableColumn, lobes_figure};
 use crate::analysis::{LobeAnalysis, RedundancyAnalysis};
 use crate::lobes::redundancy::AngleStatus;
 
@@ -45,7 +45,7 @@ pub fn blocks(analysis: &LobeAnalysis, found: &RedundancyAnalysis) -> Vec<Block>
         map.png(),
     )
     .with_plot(surface.plot()));
-    blocks.extend(lobes_section::as_it_stands_and_recommended(
+    blocks.extend(lobes_figure::as_it_stands_and_recommended(
         analysis,
         r.point.angle_deg,
     ));
@@ -85,9 +85,9 @@ pub fn blocks(analysis: &LobeAnalysis, found: &RedundancyAnalysis) -> Vec<Block>
     if let Some(elbow_deg) = r.posture.elbow_deg {
         rows.insert(1, ("elbow angle (°)", decimals(elbow_deg, 1)));
     }
-    blocks.push(Block::Table(Table {
+    blocks.push(Block::Table(ReportTable {
         caption: "The recommended place".into(),
-        columns: vec![Column::text("quantity"), Column::text("value")],
+        columns: vec![TableColumn::text("quantity"), TableColumn::text("value")],
         rows: rows
             .into_iter()
             .map(|(name, value)| vec![name.to_string(), value])

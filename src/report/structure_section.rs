@@ -4,8 +4,9 @@ use super::figure::{self, FrfCurve, FrfFigure, NoiseLevel, ParameterFigure, Para
 use super::history_section::Stage;
 use super::interactive::Explorer;
 use super::number::{decimals, percent, plus_minus, significant};
-use super::parts::{count, figure, listed, paragraph};
-use super::{Block, Column, OnScreen, Section, Table, error_map_section, history_section};
+use super::parts::{figure, paragraph};
+use super::words::{count, frf_name, listed};
+use super::{Block, OnScreen, ReportSection, ReportTable, TableColumn, error_map_section, history_section};
 use crate::analysis::{PostureFindings, StructureFindings};
 use crate::identify::FrfData;
 
@@ -93,7 +94,7 @@ fn verdict(findings: &StructureFindings) -> String {
     text + " Parameters of a model that does not fit are not the robot's: they bend to make up for what is missing."
 }
 
-pub fn sections(findings: &StructureFindings) -> Vec<Section> {
+pub fn sections(findings: &StructureFindings) -> Vec<ReportSection> {
     let mut sections = vec![frf_section(findings), error_map_section::map_section(findings)];
     let now = &findings.analysis;
     let earlier = findings.earlier.iter();
@@ -117,7 +118,7 @@ pub fn sections(findings: &StructureFindings) -> Vec<Section> {
 }
 
 /// Model against measurement as curves.
-pub fn frf_section(findings: &StructureFindings) -> Section {
+pub fn frf_section(findings: &StructureFindings) -> ReportSection {
     let errors = &findings.analysis.after.frf_errors;
     let order = findings.analysis.after.worst_first();
     let best = order
@@ -156,7 +157,7 @@ pub fn frf_section(findings: &StructureFindings) -> Section {
         ));
     }
     blocks.push(frf_table(findings, &order));
-    Section {
+    ReportSection {
         id: "frfs".into(),
         title: "Model against measured FRFs".into(),
         lead: "Receptance: how far the robot moves for each newton, over frequency. Points are measured, lines are the model."
@@ -231,18 +232,6 @@ fn frf_figure(findings: &StructureFindings, index: usize, file: &str, place: &st
     figure(file, &drawing.title.clone(), caption, drawing.png()).on_screen(OnScreen::Elsewhere)
 }
 
-/// FRF names often hold the posture already.
-pub(super) fn frf_name(posture: &str, name: &str) -> String {
-    if name.split_once(' ').is_some_and(|(first, _)| first == posture) {
-        format!(
-            "Posture {posture}, {}",
-            name.trim_start_matches(posture).trim_start()
-        )
-    } else {
-        format!("Posture {posture}, {name}")
-    }
-}
-
 fn frf_table(findings: &StructureFindings, order: &[usize]) -> Block {
     let (before, after) = (&findings.analysis.before, &findings.analysis.after);
     let row = |&index: &usize| {
@@ -268,14 +257,14 @@ fn frf_table(findings: &StructureFindings, order: &[usize]) -> Block {
     if order.len() > LISTED {
         notes.push(format!("The first {LISTED} of {}.", order.len()));
     }
-    Block::Table(Table {
+    Block::Table(ReportTable {
         caption: "FRFs by error against noise, worst first".into(),
         columns: vec![
-            Column::text("FRF (response/force)"),
-            Column::number("robot file"),
-            Column::number("calibrated"),
-            Column::number("noise"),
-            Column::number("× noise"),
+            TableColumn::text("FRF (response/force)"),
+            TableColumn::number("robot file"),
+            TableColumn::number("calibrated"),
+            TableColumn::number("noise"),
+            TableColumn::number("× noise"),
         ],
         rows: order.iter().take(LISTED).filter_map(row).collect(),
         notes,
@@ -283,7 +272,7 @@ fn frf_table(findings: &StructureFindings, order: &[usize]) -> Block {
 }
 
 /// What was tuned.
-pub fn parameter_section(findings: &StructureFindings) -> Section {
+pub fn parameter_section(findings: &StructureFindings) -> ReportSection {
     let calibration = &findings.analysis.calibration;
     // Of an effect the robot file says nothing: its parameters deviate from nothing.
     let of_robot = findings.analysis.case.model.baseline_parameter_count();
@@ -296,7 +285,7 @@ pub fn parameter_section(findings: &StructureFindings) -> Section {
             unit: unit(p.unit).to_string(),
             nominal: p.initial,
             before: None,
-            after: Some(figure::Estimate {
+            after: Some(figure::DrawnEstimate {
                 value: p.value,
                 std_error: Some(p.std_error).filter(|s| s.is_finite()),
             }),
@@ -341,7 +330,7 @@ pub fn parameter_section(findings: &StructureFindings) -> Section {
         },
         significant(calibration.reduced_chi2, 3),
     );
-    Section {
+    ReportSection {
         id: "parameters".into(),
         title: "Parameters".into(),
         lead: "What calibration made of the robot file's values.".into(),
@@ -353,14 +342,14 @@ pub fn parameter_section(findings: &StructureFindings) -> Section {
                  error to either side; it may be too short to see.",
                 drawing.png(),
             ),
-            Block::Table(Table {
+            Block::Table(ReportTable {
                 caption: "Parameters".into(),
                 columns: vec![
-                    Column::text("parameter"),
-                    Column::number("robot file"),
-                    Column::number("calibrated ± standard error"),
-                    Column::number("change"),
-                    Column::text(""),
+                    TableColumn::text("parameter"),
+                    TableColumn::number("robot file"),
+                    TableColumn::number("calibrated ± standard error"),
+                    TableColumn::number("change"),
+                    TableColumn::text(""),
                 ],
                 rows: table.collect(),
                 notes: vec![],
@@ -376,7 +365,7 @@ fn unit(unit: &str) -> &str {
 }
 
 /// Natural frequencies and static stiffness at the campaign's postures.
-pub fn posture_section(postures: &[PostureFindings]) -> Section {
+pub fn posture_section(postures: &[PostureFindings]) -> ReportSection {
     let mega = |v: f64| significant(v / 1e6, 4);
     let mut rows = Vec::new();
     for posture in postures {
@@ -398,7 +387,7 @@ pub fn posture_section(postures: &[PostureFindings]) -> Section {
             rows.push(row);
         }
     }
-    let mut columns = vec![Column::text("posture"), Column::text("state")];
+    let mut columns = vec![TableColumn::text("posture"), TableColumn::text("state")];
     let numbers = [
         "tool Kx",
         "tool Ky",
@@ -407,18 +396,18 @@ pub fn posture_section(postures: &[PostureFindings]) -> Section {
         "flange Ky",
         "flange Kz",
     ];
-    columns.extend(numbers.map(Column::number));
-    columns.push(Column::text("first natural frequencies (Hz)"));
+    columns.extend(numbers.map(TableColumn::number));
+    columns.push(TableColumn::text("first natural frequencies (Hz)"));
     let ids: Vec<String> = postures.iter().map(|p| p.id.clone()).collect();
     let lead = match ids.len() {
         0..=8 => format!("What the model says of {}.", listed(&ids)),
         n => format!("What the model says of the {n} postures."),
     };
-    Section {
+    ReportSection {
         id: "postures".into(),
         title: "The robot at the postures".into(),
         lead,
-        blocks: vec![robot(postures), Block::Table(Table {
+        blocks: vec![robot(postures), Block::Table(ReportTable {
             caption: "Static stiffness (MN/m) and natural frequencies".into(),
             columns,
             rows,

@@ -1,9 +1,9 @@
 //! The thesis's tables of milling coefficients: cast against printed titanium over speed, and what may be read from them.
 
-use super::figure::{RegressionFigure, RegressionPoint, RegressionSeries};
+use super::figure::{RegressionFigure, RegressionMark, RegressionSeries};
 use super::number::significant;
 use super::parts::{figure, paragraph};
-use super::{Block, Column, Table};
+use super::{Block, ReportTable, TableColumn};
 use crate::cutting::MILLING_COEFFICIENTS;
 use crate::thesis::CuttingTables;
 use crate::thesis::cutting_tables::{CAST, PRINTED};
@@ -23,7 +23,7 @@ fn titanium_figure(tables: &CuttingTables) -> Block {
                 label: format!("{} {name}", kind.label),
                 points: tables
                     .of(material)
-                    .map(|row| RegressionPoint {
+                    .map(|row| RegressionMark {
                         label: String::new(),
                         x: row.cutting_speed_m_per_min,
                         y: row.coefficients[j],
@@ -54,15 +54,15 @@ fn titanium_figure(tables: &CuttingTables) -> Block {
 
 fn coefficient_table(tables: &CuttingTables) -> Block {
     let mut columns = vec![
-        Column::text("material"),
-        Column::text("row"),
-        Column::number("m/min"),
-        Column::number("feeds"),
+        TableColumn::text("material"),
+        TableColumn::text("row"),
+        TableColumn::number("m/min"),
+        TableColumn::number("feeds"),
     ];
     columns.extend(
         MILLING_COEFFICIENTS
             .iter()
-            .map(|c| Column::number(format!("{} {}", c.label, c.unit))),
+            .map(|c| TableColumn::number(format!("{} {}", c.label, c.unit))),
     );
     let rows = tables.rows.iter().map(|r| {
         let mut row = vec![
@@ -74,7 +74,7 @@ fn coefficient_table(tables: &CuttingTables) -> Block {
         row.extend(r.coefficients.iter().map(|k| significant(*k, 3)));
         row
     });
-    Block::Table(Table {
+    Block::Table(ReportTable {
         caption: "Milling coefficients of the thesis (tables 20 and 23)".into(),
         columns,
         rows: rows.collect(),

@@ -2,8 +2,9 @@
 
 use super::figure::{BarSeries, SideBySide};
 use super::number::{decimals, format_si, percent, significant};
-use super::parts::{figure, listed, paragraph};
-use super::{Block, Column, Page, Section, Table};
+use super::parts::{figure, paragraph};
+use super::words::listed;
+use super::{Block, Page, ReportSection, ReportTable, TableColumn};
 use super::{real_case_section, thesis_cutting};
 use crate::lobes::Peak;
 use crate::thesis::findings::Range;
@@ -19,7 +20,7 @@ pub fn page(findings: &ThesisFindings) -> Page {
     }
 }
 
-pub fn section(findings: &ThesisFindings) -> Section {
+pub fn section(findings: &ThesisFindings) -> ReportSection {
     let study = &findings.study;
     let mut blocks = vec![paragraph(format!(
         "Measured are the static stiffness of two postures (tables 5 and 6), the strongest mode of four configurations \
@@ -61,7 +62,7 @@ pub fn section(findings: &ThesisFindings) -> Section {
     blocks.push(assumption_table(&findings.study));
     blocks.extend(findings.study.lobe_reading.iter().cloned().map(paragraph));
     blocks.extend(thesis_cutting::blocks(&study.cutting));
-    Section {
+    ReportSection {
         id: "thesis".into(),
         title: "The source thesis put right (ABB IRB 6640)".into(),
         lead: "Published model, measurement and this program side by side, with what remains unexplained."
@@ -255,18 +256,18 @@ fn row_table(caption: &str, rows: &[ComparedRow], text: impl Fn(f64) -> String) 
             .to_string(),
         ]
     });
-    Block::Table(Table {
+    Block::Table(ReportTable {
         caption: caption.into(),
         columns: vec![
-            Column::text(""),
-            Column::number("published"),
-            Column::number("measured"),
-            Column::number("ours, before"),
-            Column::number("ours, after"),
-            Column::number("published / measured"),
-            Column::number("before / measured"),
-            Column::number("after / measured"),
-            Column::text(""),
+            TableColumn::text(""),
+            TableColumn::number("published"),
+            TableColumn::number("measured"),
+            TableColumn::number("ours, before"),
+            TableColumn::number("ours, after"),
+            TableColumn::number("published / measured"),
+            TableColumn::number("before / measured"),
+            TableColumn::number("after / measured"),
+            TableColumn::text(""),
         ],
         rows: cells.collect(),
         notes: vec![],
@@ -290,12 +291,12 @@ fn parameter_table(findings: &ThesisFindings) -> Block {
             super::number::plus_minus(p.value, p.std_error, unit),
         ]
     });
-    Block::Table(Table {
+    Block::Table(ReportTable {
         caption: "What the fit to the modal tables made of the published compliances".into(),
         columns: vec![
-            Column::text("parameter"),
-            Column::number("published"),
-            Column::number("fitted ± standard error"),
+            TableColumn::text("parameter"),
+            TableColumn::number("published"),
+            TableColumn::number("fitted ± standard error"),
         ],
         rows: rows.collect(),
         notes: vec![],
@@ -339,13 +340,13 @@ fn lobe_table(findings: &ThesisFindings) -> Block {
         rows.push(ours("ours, model before", &row.from_model_before));
         rows.push(ours("ours, model after", &row.from_model_after));
     }
-    Block::Table(Table {
+    Block::Table(ReportTable {
         caption: "Drilling lobes (table 30): tips of the envelope as rpm / mm, and the absolute limit".into(),
         columns: vec![
-            Column::text("configuration"),
-            Column::number("second region"),
-            Column::number("first region"),
-            Column::number("absolute limit (mm)"),
+            TableColumn::text("configuration"),
+            TableColumn::number("second region"),
+            TableColumn::number("first region"),
+            TableColumn::number("absolute limit (mm)"),
         ],
         rows,
         notes: vec![],
@@ -362,15 +363,15 @@ fn assumption_table(study: &CaseStudy) -> Block {
             .chain([found])
             .collect()
     });
-    Block::Table(Table {
+    Block::Table(ReportTable {
         caption: "Table 30 with one assumption switched at a time: the commercial program's tips over ours".into(),
         columns: vec![
-            Column::text("assumption"),
-            Column::number("speed, second region"),
-            Column::number("speed, first region"),
-            Column::number("depth, second region"),
-            Column::number("depth, first region"),
-            Column::text("tips found"),
+            TableColumn::text("assumption"),
+            TableColumn::number("speed, second region"),
+            TableColumn::number("speed, first region"),
+            TableColumn::number("depth, second region"),
+            TableColumn::number("depth, first region"),
+            TableColumn::text("tips found"),
         ],
         rows: rows.collect(),
         notes: vec![

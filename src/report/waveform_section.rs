@@ -6,8 +6,9 @@ use super::diagnosis_section::{
 use super::error_map_section::{LEAST_TOP, TIMES_NOISE};
 use super::figure::{BarSeries, CellFormat, HeatMap, SideBySide, WaveformFigure, WaveformPanel};
 use super::number::{percent, with_error};
-use super::parts::{figure, listed, paragraph, setting};
-use super::{Block, Column, Section, Table};
+use super::parts::{figure, paragraph};
+use super::words::{listed, setting};
+use super::{Block, ReportSection, ReportTable, TableColumn};
 use crate::analysis::CuttingFindings;
 use crate::analysis::diagnosis::CuttingView;
 use crate::campaign::{Campaign, Process};
@@ -45,7 +46,7 @@ pub fn summary(findings: &CuttingFindings) -> String {
     )
 }
 
-pub fn sections(campaign: &Campaign, findings: &CuttingFindings) -> Vec<Section> {
+pub fn sections(campaign: &Campaign, findings: &CuttingFindings) -> Vec<ReportSection> {
     vec![comparison(findings), missing(campaign, findings)]
 }
 
@@ -56,7 +57,7 @@ fn with(findings: &CuttingFindings) -> Option<(String, &CuttingView)> {
     Some((format!("with {}", candidate.label()), view))
 }
 
-fn comparison(findings: &CuttingFindings) -> Section {
+fn comparison(findings: &CuttingFindings) -> ReportSection {
     let now = &findings.now.comparison;
     let held_out = &findings.diagnosis.baseline.held_out;
     let mut text = format!(
@@ -79,7 +80,7 @@ fn comparison(findings: &CuttingFindings) -> Section {
     for (rank, cut) in worst.into_iter().take(CUTS_DRAWN).enumerate() {
         blocks.push(waveform(findings, rank, cut));
     }
-    Section {
+    ReportSection {
         id: "waveforms".into(),
         title: "Force model against the records".into(),
         lead: "Beyond average forces: the force over a revolution of the tool (milling), over the hole (drilling) or over the cut (turning)."
@@ -106,13 +107,13 @@ fn parameters(findings: &CuttingFindings) -> Block {
                 note.to_string(),
             ]
         });
-    Block::Table(Table {
+    Block::Table(ReportTable {
         caption: "Parameters of the force model, fitted to the waveforms, ± standard error".into(),
         columns: vec![
-            Column::text("parameter"),
-            Column::number("value"),
-            Column::text("unit"),
-            Column::text(""),
+            TableColumn::text("parameter"),
+            TableColumn::number("value"),
+            TableColumn::text("unit"),
+            TableColumn::text(""),
         ],
         rows: rows.collect(),
         notes: vec![],
@@ -263,7 +264,7 @@ fn waveform(findings: &CuttingFindings, rank: usize, cut: usize) -> Block {
     figure(format!("waveform-{}", rank + 1), &title, caption, drawing.png()).with_plot(drawing.plot())
 }
 
-fn missing(campaign: &Campaign, findings: &CuttingFindings) -> Section {
+fn missing(campaign: &Campaign, findings: &CuttingFindings) -> ReportSection {
     let d = &findings.diagnosis;
     let mut blocks = vec![paragraph(summary(findings))];
     blocks.extend(how_it_shows(d, |c| c.instance.effect.fingerprint()));
@@ -274,7 +275,7 @@ fn missing(campaign: &Campaign, findings: &CuttingFindings) -> Section {
         blocks.push(candidate_table(d, |c| c.instance.label()));
     }
     blocks.extend(not_tried(d));
-    Section {
+    ReportSection {
         id: ID.into(),
         title: TITLE.into(),
         lead: "Each effect of the library is added to the force model in turn and fitted together with the coefficients. One \

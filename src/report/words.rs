@@ -1,5 +1,6 @@
 //! What people call things that have a key: effects, places, parameters, how sure a verdict is.
 
+use super::number::significant;
 use crate::effects::Site;
 
 /// `local-resonator` → `local resonator`.
@@ -101,6 +102,45 @@ pub fn confidence(probability: f64) -> String {
     format!("{words} (about {hundred:.0} of 100 such verdicts are right)")
 }
 
+/// `3 cuts`, `1 cut`.
+pub fn count(number: usize, one: &str, many: &str) -> String {
+    match number {
+        1 => format!("1 {one}"),
+        n => format!("{n} {many}"),
+    }
+}
+
+/// `a`, `a and b`, `a, b and c`.
+pub fn listed(items: &[String]) -> String {
+    match items {
+        [] => String::new(),
+        [one] => one.clone(),
+        [most @ .., last] => format!("{} and {last}", most.join(", ")),
+    }
+}
+
+/// A setting as somebody wrote it: `1160`, `0.05`.
+pub fn setting(value: f64) -> String {
+    if value.is_finite() && value.abs() < 1e9 {
+        // Display gives the shortest form that reads back the same.
+        format!("{value}")
+    } else {
+        significant(value, 5)
+    }
+}
+
+/// FRF names often hold the posture already.
+pub fn frf_name(posture: &str, name: &str) -> String {
+    if name.split_once(' ').is_some_and(|(first, _)| first == posture) {
+        format!(
+            "Posture {posture}, {}",
+            name.trim_start_matches(posture).trim_start()
+        )
+    } else {
+        format!("Posture {posture}, {name}")
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -141,5 +181,27 @@ mod tests {
         for pair in steps.windows(2) {
             assert_ne!(pair[0].split('(').next(), pair[1].split('(').next());
         }
+    }
+
+    #[test]
+    fn lists_read_as_people_write_them() {
+        let items = |n: usize| {
+            ["a", "b", "c"][..n]
+                .iter()
+                .map(|s| s.to_string())
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(listed(&items(0)), "");
+        assert_eq!(listed(&items(1)), "a");
+        assert_eq!(listed(&items(2)), "a and b");
+        assert_eq!(listed(&items(3)), "a, b and c");
+        assert_eq!(count(1, "cut", "cuts"), "1 cut");
+        assert_eq!(count(0, "cut", "cuts"), "0 cuts");
+    }
+
+    #[test]
+    fn settings_keep_their_digits() {
+        assert_eq!(setting(1160.0), "1160");
+        assert_eq!(setting(0.05), "0.05");
     }
 }

@@ -7,12 +7,12 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 
-use super::Refusal;
+use super::refusal::Refusal;
 use crate::progress::Reading;
 use crate::{Error, Result};
 
 /// Gives the text that the page shows when it is done.
-type Work = Box<dyn FnOnce(&Stage) -> Result<String> + Send>;
+type Work = Box<dyn FnOnce(&JobStage) -> Result<String> + Send>;
 
 /// What is to be done, and its name as a reader meets it ("the diagnosis").
 pub struct Job {
@@ -23,7 +23,7 @@ pub struct Job {
 impl Job {
     pub fn new(
         name: impl Into<String>,
-        work: impl FnOnce(&Stage) -> Result<String> + Send + 'static,
+        work: impl FnOnce(&JobStage) -> Result<String> + Send + 'static,
     ) -> Self {
         Job {
             name: name.into(),
@@ -34,7 +34,7 @@ impl Job {
 
 /// Where a job says which part of it is being done, and how it can be stopped.
 #[derive(Default)]
-pub struct Stage(Mutex<At>);
+pub struct JobStage(Mutex<At>);
 
 #[derive(Default)]
 struct At {
@@ -44,7 +44,7 @@ struct At {
     cancelled: bool,
 }
 
-impl Stage {
+impl JobStage {
     pub fn now(&self, text: &str, part: Option<Reading>) {
         let mut at = locked(&self.0);
         at.text = text.to_string();
@@ -96,7 +96,7 @@ struct Running {
     number: u64,
     name: String,
     since: Instant,
-    stage: Arc<Stage>,
+    stage: Arc<JobStage>,
 }
 
 /// The lock, also where a thread panicked with it: what such locks guard is whole at every moment.
@@ -124,7 +124,7 @@ impl Desk {
         }
         let Job { name, work } = prepare()?;
         let number = state.count + 1;
-        let stage = Arc::new(Stage::default());
+        let stage = Arc::new(JobStage::default());
         let desk = self.clone();
         let own_stage = stage.clone();
         std::thread::Builder::new()

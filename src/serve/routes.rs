@@ -18,7 +18,8 @@ use tokio::sync::Semaphore;
 
 use super::desk::Desk;
 use super::guard::Guard;
-use super::{Entrance, Order, Parcel, Refusal, Reply, Request, Scene, Workbench};
+use super::refusal::Refusal;
+use super::subject::{Entrance, EntranceRequest, PageOrder, PageScene, PageSubject, Parcel, Reply};
 use crate::{Error, Result};
 
 const HTML: &str = "text/html; charset=utf-8";
@@ -42,23 +43,23 @@ const REPORT_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; sty
                              frame-ancestors 'self'; sandbox allow-scripts allow-downloads allow-popups";
 
 /// What the page is about at the moment.
-pub struct Stand {
+pub struct PageStand {
     entrance: Option<Arc<dyn Entrance>>,
-    bench: RwLock<Option<Arc<dyn Workbench>>>,
+    bench: RwLock<Option<Arc<dyn PageSubject>>>,
 }
 
-impl Stand {
-    pub fn bench(&self) -> Option<Arc<dyn Workbench>> {
+impl PageStand {
+    pub fn bench(&self) -> Option<Arc<dyn PageSubject>> {
         self.bench.read().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    fn is_now_about(&self, bench: Option<Arc<dyn Workbench>>) {
+    fn is_now_about(&self, bench: Option<Arc<dyn PageSubject>>) {
         *self.bench.write().unwrap_or_else(PoisonError::into_inner) = bench;
     }
 }
 
 struct App {
-    stand: Arc<Stand>,
+    stand: Arc<PageStand>,
     desk: Arc<Desk>,
     guard: Guard,
     /// Large files are held in memory: one at a time.
@@ -67,12 +68,12 @@ struct App {
     session: String,
 }
 
-pub fn router(scene: Scene, guard: Guard) -> (Router, Arc<Stand>) {
+pub fn router(scene: PageScene, guard: Guard) -> (Router, Arc<PageStand>) {
     let (entrance, bench) = match scene {
-        Scene::Bench(bench) => (None, Some(bench)),
-        Scene::Entrance(entrance) => (Some(entrance), None),
+        PageScene::Bench(bench) => (None, Some(bench)),
+        PageScene::Entrance(entrance) => (Some(entrance), None),
     };
-    let stand = Arc::new(Stand {
+    let stand = Arc::new(PageStand {
         entrance,
         bench: RwLock::new(bench),
     });
@@ -230,7 +231,7 @@ fn read<T: for<'a> Deserialize<'a>>(body: &[u8], what: &str) -> std::result::Res
 const NO_ENTRANCE: &str = "this page was started for one campaign; start `lobestone serve` without a folder";
 
 async fn order(State(app): State<Arc<App>>, body: Bytes) -> Response {
-    let order: Order = match read(&body, "order") {
+    let order: PageOrder = match read(&body, "order") {
         Ok(order) => order,
         Err(response) => return *response,
     };
@@ -264,7 +265,7 @@ async fn cancel(State(app): State<Arc<App>>, body: Bytes) -> Response {
 }
 
 async fn begin(State(app): State<Arc<App>>, body: Bytes) -> Response {
-    let request: Request = match read(&body, "request") {
+    let request: EntranceRequest = match read(&body, "request") {
         Ok(request) => request,
         Err(response) => return *response,
     };
@@ -272,7 +273,8 @@ async fn begin(State(app): State<Arc<App>>, body: Bytes) -> Response {
         let Some(entrance) = &app.stand.entrance else {
             return Err(Refusal::Impossible(NO_ENTRANCE.into()));
         };
-        let about = |bench: Option<Arc<dyn Workbench>>| app.desk.while_idle(|| app.stand.is_now_about(bench));
+        let about =
+            |bench: Option<Arc<dyn PageSubject>>| app.desk.while_idle(|| app.stand.is_now_about(bench));
         match entrance.answer(request)? {
             Reply::Told(told) => return Ok(told),
             Reply::Opened(bench) => about(Some(bench))?,
@@ -348,7 +350,7 @@ async fn figure(State(app): State<Arc<App>>, Path((_key, name)): Path<(String, S
 mod tests {
     use super::*;
 
-    fn order(text: &str) -> std::result::Result<Order, String> {
+    fn order(text: &str) -> std::result::Result<PageOrder, String> {
         serde_json::from_str(text).map_err(|e| e.to_string())
     }
 
@@ -357,13 +359,13 @@ mod tests {
         use crate::revision::Domain;
         assert_eq!(
             order(r#"{"do": "add", "side": "cutting", "head": "0-0", "effect": "runout"}"#),
-            Ok(Order::Add {
+            Ok(PageOrder::Add {
                 side: Domain::Cutting,
                 head: "0-0".into(),
                 effect: "runout".into()
             })
         );
-        assert_eq!(order(r#"{"do": "refresh"}"#), Ok(Order::Refresh {}));
+        assert_eq!(order(r#"{"do": "refresh"}"#), Ok(PageOrder::Refresh {}));
         for wrong in [
             r#"{"do": "delete"}"#,
             r#"{"do": "add", "side": "cutting", "effect": "runout"}"#,

@@ -8,19 +8,22 @@ use crate::{Error, InputError, Result};
 /// A list of campaigns.
 #[derive(Debug, Clone)]
 pub struct Manifest {
+    /// The file that the list was read from.
     pub file: PathBuf,
     /// Names of the columns besides `campaign`, in lower case, in their order.
     pub columns: Vec<String>,
-    pub entries: Vec<Entry>,
+    /// The campaigns, in the order of the lines.
+    pub entries: Vec<ManifestEntry>,
 }
 
 /// A line of the list.
 #[derive(Debug, Clone)]
-pub struct Entry {
+pub struct ManifestEntry {
     /// In the manifest, from 1.
     pub line: usize,
     /// As written; forward slashes.
     pub campaign: String,
+    /// The campaign's folder.
     pub dir: PathBuf,
     /// Cells of [`Manifest::columns`].
     pub cells: Vec<String>,
@@ -82,7 +85,7 @@ impl Manifest {
         })?;
         check_names(&names, reserved).map_err(|(problem, remedy)| refuse(problem, 1, remedy))?;
         let folder = file.parent().unwrap_or(Path::new(""));
-        let mut entries: Vec<Entry> = Vec::new();
+        let mut entries: Vec<ManifestEntry> = Vec::new();
         let mut seen: HashMap<String, usize> = HashMap::new();
         for row in reader.records() {
             let row = row.map_err(broken)?;
@@ -111,7 +114,7 @@ impl Manifest {
                 return Err(refuse(problem, line, "name each campaign once"));
             }
             let others = (0..names.len()).filter(|i| *i != of_campaign);
-            entries.push(Entry {
+            entries.push(ManifestEntry {
                 line,
                 dir: folder.join(&campaign),
                 campaign,
@@ -135,7 +138,7 @@ impl Manifest {
     }
 
     /// The cell of a column; `None` where there is no such column or nothing in it.
-    pub fn cell<'a>(&self, entry: &'a Entry, column: &str) -> Option<&'a str> {
+    pub fn cell<'a>(&self, entry: &'a ManifestEntry, column: &str) -> Option<&'a str> {
         let index = self.columns.iter().position(|c| c == column)?;
         entry
             .cells

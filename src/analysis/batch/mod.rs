@@ -2,7 +2,7 @@
 
 mod manifest;
 
-pub use manifest::{Entry, Manifest};
+pub use manifest::{Manifest, ManifestEntry};
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -23,7 +23,7 @@ use crate::{Error, InputError, Result};
 
 /// What is done with every campaign.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
-pub enum Step {
+pub enum BatchStep {
     /// The model fitted: joint stiffness, damping; of cuts their coefficients and the error of the waveform.
     Calibrate,
     /// Cutting force coefficients.
@@ -34,29 +34,30 @@ pub enum Step {
     Diagnose,
 }
 
-impl Step {
+impl BatchStep {
     fn name(self) -> &'static str {
         match self {
-            Step::Calibrate => "calibrate",
-            Step::Cfc => "cfc",
-            Step::Compare => "compare",
-            Step::Diagnose => "diagnose",
+            BatchStep::Calibrate => "calibrate",
+            BatchStep::Cfc => "cfc",
+            BatchStep::Compare => "compare",
+            BatchStep::Diagnose => "diagnose",
         }
     }
 }
 
 /// What is done with every campaign, each step once, in one order.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Steps(Vec<Step>);
+pub struct Steps(Vec<BatchStep>);
 
 impl Steps {
-    pub fn new(mut steps: Vec<Step>) -> Self {
+    /// `steps` in the one order, without repetitions.
+    pub fn new(mut steps: Vec<BatchStep>) -> Self {
         steps.sort_unstable();
         steps.dedup();
         Steps(steps)
     }
 
-    fn has(&self, step: Step) -> bool {
+    fn has(&self, step: BatchStep) -> bool {
         self.0.contains(&step)
     }
 
@@ -74,11 +75,14 @@ pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
+    /// All of it.
     Done,
+    /// It ended with an error.
     Failed,
 }
 
 impl Status {
+    /// As tables name it.
     pub fn name(self) -> &'static str {
         match self {
             Status::Done => "done",
@@ -89,10 +93,12 @@ impl Status {
 
 /// A number that was estimated, with its standard error.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Quantity {
+pub struct BatchQuantity {
     /// With its unit: `joint-1.stiffness_nm_per_rad`.
     pub name: String,
+    /// The estimate; `None` where it is not finite.
     pub value: Option<f64>,
+    /// Its standard error, in the same unit.
     pub std_error: Option<f64>,
 }
 
@@ -101,29 +107,39 @@ pub struct Quantity {
 pub struct SideResult {
     /// `structure` or `cutting`; empty where the campaign could not be read.
     pub domain: String,
+    /// Whether the work was done.
     pub status: Status,
+    /// Why it was not.
     pub error: Option<String>,
+    /// What it took, s.
     pub seconds: f64,
+    /// What was found; empty after an error.
     pub findings: Findings,
 }
 
 /// Nothing where it was not asked for.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Findings {
-    /// Error of the fit and of the noise alone, as ratios.
+    /// Error of the fit, a ratio.
     pub nrms: Option<f64>,
+    /// nrms that the noise alone makes.
     pub noise: Option<f64>,
+    /// nrms on data that were left out of the fit.
     pub held_out_nrms: Option<f64>,
+    /// Whether the calibration converged.
     pub converged: Option<bool>,
     /// `effect`, `none`, `unknown`.
     pub verdict: Option<String>,
+    /// The missing effect, where the verdict is `effect`.
     pub effect: Option<String>,
+    /// Where it sits, for effects that have a place.
     pub site: Option<String>,
     /// 0..1.
     pub confidence: Option<f64>,
     /// Mistakes of the files or the setup that are likely.
     pub setup: Vec<String>,
-    pub quantities: Vec<Quantity>,
+    /// Estimated parameters or coefficients.
+    pub quantities: Vec<BatchQuantity>,
 }
 
 /// What is kept of one campaign: complete, or not there.
@@ -131,13 +147,17 @@ pub struct Findings {
 pub struct Record {
     /// As the manifest names it.
     pub campaign: String,
+    /// As [`fingerprint`] of the campaign when it was worked on.
     pub fingerprint: String,
+    /// Of the program that made the record.
     pub version: String,
     /// `calibrate,diagnose`.
     pub command: String,
     /// What `campaign.toml` says, for a manifest that does not.
     pub robot: Option<String>,
+    /// Date of the measurements by `campaign.toml`, likewise.
     pub date: Option<String>,
+    /// One for each side of the campaign.
     pub sides: Vec<SideResult>,
 }
 
@@ -147,7 +167,7 @@ pub fn fingerprint(dir: &Path, steps: &Steps) -> String {
 }
 
 /// Works on a campaign; nothing is written into its folder. What cannot be done is told in the record.
-pub fn examine(entry: &Entry, steps: &Steps, fingerprint: &str) -> Record {
+pub fn examine(entry: &ManifestEntry, steps: &Steps, fingerprint: &str) -> Record {
     let begun = Instant::now();
     let loaded = guarded(|| {
         let campaign = Campaign::load(&entry.dir)?;
@@ -214,7 +234,7 @@ type Work = fn(&Campaign, &Steps) -> Result<Findings>;
 fn sides(campaign: &Campaign, steps: &Steps) -> Result<Vec<(&'static str, Work)>> {
     let mut sides: Vec<(&'static str, Work)> = Vec::new();
     // Coefficients are all that `cfc` is about.
-    if !campaign.frfs.is_empty() && steps.0 != [Step::Cfc] {
+    if !campaign.frfs.is_empty() && steps.0 != [BatchStep::Cfc] {
         sides.push(("structure", structure));
     }
     if !campaign.cuts.is_empty() {
@@ -252,11 +272,11 @@ fn structure(campaign: &Campaign, steps: &Steps) -> Result<Findings> {
         quantities: calibration.parameters.iter().map(quantity).collect(),
         ..Findings::default()
     };
-    if steps.has(Step::Compare) {
+    if steps.has(BatchStep::Compare) {
         let held_out = held_out_postures(&case.model, &case.data, &calibration.theta)?;
         found.held_out_nrms = held_out.and_then(|h| finite(h.nrms()));
     }
-    if steps.has(Step::Diagnose) {
+    if steps.has(BatchStep::Diagnose) {
         let d = DiagnosisFindings::of(campaign, analysis.settled_case(), Options::default())?;
         found.diagnosed(&d.diagnosis, &d.setup);
     } else {
@@ -267,25 +287,25 @@ fn structure(campaign: &Campaign, steps: &Steps) -> Result<Findings> {
 
 fn cutting(campaign: &Campaign, steps: &Steps) -> Result<Findings> {
     let mut found = Findings::default();
-    if steps.has(Step::Calibrate) || steps.has(Step::Cfc) {
+    if steps.has(BatchStep::Calibrate) || steps.has(BatchStep::Cfc) {
         let result = identify_forces(campaign, CfcOptions::default())?;
         found.quantities = result.pooled.iter().flat_map(coefficients).collect();
     }
-    if steps.has(Step::Diagnose) {
+    if steps.has(BatchStep::Diagnose) {
         let d = CuttingFindings::run(campaign)?;
         let totals = &d.now.comparison.totals;
         (found.nrms, found.noise) = (finite(totals.nrms), finite(totals.noise_floor_nrms));
         found.diagnosed(&d.diagnosis, &d.setup);
     }
-    if steps.has(Step::Compare) || (steps.has(Step::Calibrate) && !steps.has(Step::Diagnose)) {
+    if steps.has(BatchStep::Compare) || (steps.has(BatchStep::Calibrate) && !steps.has(BatchStep::Diagnose)) {
         let analysis = CuttingAnalysis::run(campaign)?;
         let totals = &analysis.comparison.totals;
         (found.nrms, found.noise) = (finite(totals.nrms), finite(totals.noise_floor_nrms));
         found.converged = Some(analysis.calibration.converged());
-        if steps.has(Step::Compare) {
+        if steps.has(BatchStep::Compare) {
             found.held_out_nrms = analysis.held_out_nrms.and_then(finite);
         }
-        if !steps.has(Step::Diagnose) {
+        if !steps.has(BatchStep::Diagnose) {
             found.setup = likely(&analysis.setup_check()?);
         }
     }
@@ -317,8 +337,8 @@ fn finite(value: f64) -> Option<f64> {
     Some(value).filter(|v| v.is_finite())
 }
 
-fn quantity(estimate: &Estimate) -> Quantity {
-    Quantity {
+fn quantity(estimate: &Estimate) -> BatchQuantity {
+    BatchQuantity {
         name: with_unit(&estimate.name, estimate.unit),
         value: finite(estimate.value),
         std_error: finite(estimate.std_error),
@@ -341,7 +361,7 @@ fn with_unit(name: &str, unit: &str) -> String {
 
 /// The coefficients of a group over all speeds. Their names say process and material, so that those of different ones are
 /// never on one chart: `milling.Ti-6Al-4V.ktc_n_per_mm2`.
-fn coefficients(group: &ForceGroup) -> Vec<Quantity> {
+fn coefficients(group: &ForceGroup) -> Vec<BatchQuantity> {
     let process = group.process.name();
     let prefix = match &group.material {
         Some(material) => format!("{process}.{material}."),
@@ -349,7 +369,7 @@ fn coefficients(group: &ForceGroup) -> Vec<Quantity> {
     };
     let of_group = group.coefficients.iter();
     of_group
-        .map(|c| Quantity {
+        .map(|c| BatchQuantity {
             name: format!("{prefix}{}", c.key),
             value: c.value.and_then(finite),
             std_error: c.std_error.and_then(finite),
@@ -387,7 +407,11 @@ mod tests {
 
     #[test]
     fn steps_have_one_order() {
-        let steps = Steps::new(vec![Step::Diagnose, Step::Calibrate, Step::Diagnose]);
+        let steps = Steps::new(vec![
+            BatchStep::Diagnose,
+            BatchStep::Calibrate,
+            BatchStep::Diagnose,
+        ]);
         assert_eq!(steps.name(), "calibrate,diagnose");
     }
 }

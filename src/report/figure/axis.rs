@@ -47,7 +47,7 @@ pub struct Tick {
 }
 
 #[derive(Debug, Clone)]
-pub struct Axis {
+pub struct FigureAxis {
     pub label: String,
     pub low: f64,
     pub high: f64,
@@ -55,7 +55,7 @@ pub struct Axis {
     scale: Scale,
 }
 
-impl Axis {
+impl FigureAxis {
     /// Exactly from `low` to `high` (widened where both are the same), about `count` labelled ticks.
     pub fn linear(label: &str, (low, high): (f64, f64), count: usize) -> Self {
         let (low, high) = widened(low, high);
@@ -76,7 +76,7 @@ impl Axis {
             0 => label.to_owned(),
             _ => with_factor(label, exponent),
         };
-        Axis {
+        FigureAxis {
             label,
             low,
             high,
@@ -89,7 +89,7 @@ impl Axis {
     pub fn padded(label: &str, (low, high): (f64, f64), margin: f64, count: usize) -> Self {
         let (low, high) = widened(low, high);
         let room = margin * (high - low);
-        Axis::linear(label, (low - room, high + room), count)
+        FigureAxis::linear(label, (low - room, high + room), count)
     }
 
     /// From zero to a little above `high` (below, where all values are negative).
@@ -98,7 +98,7 @@ impl Axis {
         let room = 0.06 * (high - low);
         let below = if low < 0.0 { low - room } else { 0.0 };
         let above = if high > 0.0 { high + room } else { 0.0 };
-        Axis::linear(label, (below, above), count)
+        FigureAxis::linear(label, (below, above), count)
     }
 
     /// Logarithmic; `low` and `high` must be positive (see [`positive_extent`]).
@@ -134,7 +134,7 @@ impl Axis {
             })
             .filter(|tick| tick.at >= low * 0.999_999 && tick.at <= high * 1.000_001)
             .collect();
-        Axis {
+        FigureAxis {
             label: label.to_owned(),
             low,
             high,
@@ -146,7 +146,7 @@ impl Axis {
     /// Places `names` at 0, 1, 2, … with half a step of room at both ends.
     pub fn categories(label: &str, names: &[String]) -> Self {
         let ticks = names.iter().enumerate();
-        Axis {
+        FigureAxis {
             label: label.to_owned(),
             low: -0.5,
             high: names.len().max(1) as f64 - 0.5,
@@ -232,7 +232,7 @@ fn with_factor(label: &str, exponent: i32) -> String {
 mod tests {
     use super::*;
 
-    fn labels(axis: &Axis) -> Vec<&str> {
+    fn labels(axis: &FigureAxis) -> Vec<&str> {
         axis.ticks
             .iter()
             .map(|t| t.label.as_str())
@@ -242,28 +242,34 @@ mod tests {
 
     #[test]
     fn linear_ticks_are_round_and_the_factor_goes_to_the_unit() {
-        let axis = Axis::linear("Speed (rpm)", (100.0, 1500.0), 7);
+        let axis = FigureAxis::linear("Speed (rpm)", (100.0, 1500.0), 7);
         assert_eq!(
             labels(&axis),
             ["200", "400", "600", "800", "1000", "1200", "1400"]
         );
-        let axis = Axis::linear("Re (m/N)", (-3.1e-6, 2.2e-6), 5);
+        let axis = FigureAxis::linear("Re (m/N)", (-3.1e-6, 2.2e-6), 5);
         assert_eq!(axis.label, "Re (10⁻⁶ m/N)");
-        let mobility = Axis::linear("Re (m/(N·s))", (-3.1e-6, 2.2e-6), 5);
+        let mobility = FigureAxis::linear("Re (m/(N·s))", (-3.1e-6, 2.2e-6), 5);
         assert_eq!(mobility.label, "Re (10⁻⁶ m/(N·s))");
         assert_eq!(labels(&axis), ["−2", "0", "2"]);
         assert_eq!(
-            labels(&Axis::linear("f (mm)", (0.0, 0.25), 5)),
+            labels(&FigureAxis::linear("f (mm)", (0.0, 0.25), 5)),
             ["0.00", "0.05", "0.10", "0.15", "0.20", "0.25"]
         );
     }
 
     #[test]
     fn log_ticks_fit_the_span() {
-        assert_eq!(labels(&Axis::log("", (2e-8, 3e-5))), ["10⁻⁷", "10⁻⁶", "10⁻⁵"]);
-        assert_eq!(labels(&Axis::log("", (1.0, 30.0))), ["1", "2", "5", "10", "20"]);
-        assert!(labels(&Axis::log("", (1e-150, 1e150))).len() <= 9);
-        assert!(labels(&Axis::log("", (40.0, 41.0))).len() >= 2);
+        assert_eq!(
+            labels(&FigureAxis::log("", (2e-8, 3e-5))),
+            ["10⁻⁷", "10⁻⁶", "10⁻⁵"]
+        );
+        assert_eq!(
+            labels(&FigureAxis::log("", (1.0, 30.0))),
+            ["1", "2", "5", "10", "20"]
+        );
+        assert!(labels(&FigureAxis::log("", (1e-150, 1e150))).len() <= 9);
+        assert!(labels(&FigureAxis::log("", (40.0, 41.0))).len() >= 2);
     }
 
     #[test]
@@ -276,7 +282,7 @@ mod tests {
             (1e9, 1e9 + 1e-3),
             (2.0, 1.0),
         ] {
-            let axis = Axis::linear("x", (low, high), 6);
+            let axis = FigureAxis::linear("x", (low, high), 6);
             assert!(
                 axis.high > axis.low && (2..40).contains(&axis.ticks.len()),
                 "{low} {high}: {axis:?}"

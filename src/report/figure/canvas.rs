@@ -21,7 +21,15 @@ const LINE_PER_EM: f64 = 1.164;
 /// Height of a capital letter in em.
 const CAP_HEIGHT: f64 = 0.729;
 
-pub type Point = (f64, f64);
+/// All figures are this wide, pixels.
+pub(super) const WIDTH: u32 = 1200;
+
+/// The error of a figure with nothing left to show.
+pub(super) fn nothing_to_draw(title: &str, what: &str) -> Error {
+    Error::computation(format!("figure \"{title}\" has nothing to draw: {what}"))
+}
+
+pub type CanvasPoint = (f64, f64);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Color(pub u8, pub u8, pub u8);
@@ -336,23 +344,23 @@ impl Canvas<'_> {
     }
 
     /// Filled rectangle between two corners.
-    pub fn rect(&self, a: Point, b: Point, color: Color, opacity: f64) {
+    pub fn rect(&self, a: CanvasPoint, b: CanvasPoint, color: Color, opacity: f64) {
         let (a, b) = (device(a), device(b));
         self.keep(self.area.draw(&Rectangle::new([a, b], color.fill(opacity))));
     }
 
     /// Filled convex polygon.
-    pub fn polygon(&self, corners: &[Point], color: Color, opacity: f64) {
+    pub fn polygon(&self, corners: &[CanvasPoint], color: Color, opacity: f64) {
         let corners: Vec<_> = corners.iter().copied().map(device).collect();
         self.keep(self.area.draw(&Polygon::new(corners, color.fill(opacity))));
     }
 
-    pub fn line(&self, a: Point, b: Point, stroke: Stroke) {
+    pub fn line(&self, a: CanvasPoint, b: CanvasPoint, stroke: Stroke) {
         self.polyline(&[a, b], stroke);
     }
 
     /// Connected straight lines, dashes running on around the corners.
-    pub fn polyline(&self, points: &[Point], stroke: Stroke) {
+    pub fn polyline(&self, points: &[CanvasPoint], stroke: Stroke) {
         let period: f64 = stroke.dash.iter().sum();
         if stroke.dash.is_empty() || period <= 0.0 {
             for pair in points.windows(2) {
@@ -394,7 +402,7 @@ impl Canvas<'_> {
     }
 
     /// A straight piece with round ends, as a polygon: plotters' own thick paths leave holes where a path folds back.
-    fn segment(&self, a: Point, b: Point, stroke: Stroke) {
+    fn segment(&self, a: CanvasPoint, b: CanvasPoint, stroke: Stroke) {
         let length = (b.0 - a.0).hypot(b.1 - a.1);
         let half = 0.5 * stroke.width;
         if a.0 == b.0 || a.1 == b.1 {
@@ -425,7 +433,7 @@ impl Canvas<'_> {
     }
 
     /// A sign of about `size` pixels across.
-    pub fn marker(&self, at: Point, marker: Marker, size: f64, color: Color) {
+    pub fn marker(&self, at: CanvasPoint, marker: Marker, size: f64, color: Color) {
         let (x, y) = at;
         let r = 0.5 * size;
         let disc = |radius: f64, color: Color| {
@@ -459,7 +467,7 @@ impl Canvas<'_> {
         }
     }
 
-    pub fn text(&self, at: Point, text: &str, lettering: Lettering) {
+    pub fn text(&self, at: CanvasPoint, text: &str, lettering: Lettering) {
         let text: String = text
             .chars()
             .map(|c| if c.is_control() { ' ' } else { c })
@@ -488,7 +496,7 @@ impl Canvas<'_> {
 }
 
 /// Whole pixels of the fine bitmap; far outside is as good as farther outside.
-fn device(point: Point) -> (i32, i32) {
+fn device(point: CanvasPoint) -> (i32, i32) {
     let place = |value: f64| {
         let value = value * OVERSAMPLING as f64;
         if value.is_finite() {

@@ -1,9 +1,9 @@
 //! Coherence over frequency.
 
-use super::axis::{Axis, extent, usable};
-use super::canvas::paint;
-use super::panel::{Header, Panel, Swatch};
-use super::{WIDTH, nothing_to_draw, style};
+use super::axis::{FigureAxis, extent, usable};
+use super::canvas::{WIDTH, nothing_to_draw, paint};
+use super::panel::{FigureHeader, Panel, Swatch};
+use super::style;
 use crate::Result;
 
 /// One curve over its own lines.
@@ -29,15 +29,15 @@ impl CoherenceFigure {
         let Some(frequencies) = extent(frequencies.filter(|f| usable(*f))) else {
             return Err(nothing_to_draw(&self.title, "no coherence"));
         };
-        let x = Axis::linear("Frequency (Hz)", frequencies, 10);
-        let y = Axis::linear("Coherence (–)", (0.0, 1.02), 5);
+        let x = FigureAxis::linear("Frequency (Hz)", frequencies, 10);
+        let y = FigureAxis::linear("Coherence (–)", (0.0, 1.02), 5);
         let left = Panel::left_margin(&[&y]);
         let right = f64::from(WIDTH) - Panel::RIGHT_MARGIN;
         let named = self.curves.iter().enumerate();
         let legend: Vec<_> = named
             .map(|(k, c)| (Swatch::Line(style::series(k)), c.label.clone()))
             .collect();
-        let header = Header::new(&self.title, &legend, left, right);
+        let header = FigureHeader::new(&self.title, &legend, left, right);
         let top = header.bottom();
         let panel = Panel {
             left,

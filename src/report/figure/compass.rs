@@ -2,9 +2,9 @@
 
 use num_complex::Complex64;
 
-use super::canvas::{Align, Marker, Stroke, paint};
-use super::panel::Header;
-use super::{WIDTH, nothing_to_draw, style};
+use super::canvas::{Align, Marker, Stroke, WIDTH, nothing_to_draw, paint};
+use super::panel::FigureHeader;
+use super::style;
 use crate::Result;
 
 #[derive(Debug, Clone, Default)]
@@ -34,7 +34,7 @@ impl CompassFigure {
             return Err(nothing_to_draw(&self.title, "no mode with a shape"));
         }
         let (left, right) = (30.0, f64::from(WIDTH) - 30.0);
-        let header = Header::new(&self.title, &[], left, right);
+        let header = FigureHeader::new(&self.title, &[], left, right);
         let width = (right - left) / COLUMNS as f64;
         let rows = modes.len().div_ceil(COLUMNS);
         let height = header.bottom() + HEIGHT * rows as f64 + 10.0;

@@ -1,9 +1,9 @@
 //! Quantities over time with their control limits, one panel each.
 
-use super::axis::{Axis, extent, usable};
-use super::canvas::{Marker, Stroke, paint};
-use super::panel::{Header, Panel, Swatch};
-use super::{WIDTH, nothing_to_draw, style};
+use super::axis::{FigureAxis, extent, usable};
+use super::canvas::{Marker, Stroke, WIDTH, nothing_to_draw, paint};
+use super::panel::{FigureHeader, Panel, Swatch};
+use super::style;
 use crate::Result;
 
 /// One value.
@@ -70,9 +70,9 @@ impl ControlChartFigure {
         if shown.len() > MOST_PANELS {
             return Err(nothing_to_draw(&self.title, "more panels than fit"));
         }
-        let y: Vec<Axis> = shown
+        let y: Vec<FigureAxis> = shown
             .iter()
-            .map(|(_, range)| Axis::padded("", *range, 0.12, 4))
+            .map(|(_, range)| FigureAxis::padded("", *range, 0.12, 4))
             .collect();
         let left = Panel::left_margin(&y.iter().collect::<Vec<_>>());
         let right = f64::from(WIDTH) - Panel::RIGHT_MARGIN;
@@ -88,7 +88,7 @@ impl ControlChartFigure {
                 },
             )
             .collect();
-        let x = Axis::categories("", &labels);
+        let x = FigureAxis::categories("", &labels);
         let legend = [
             (
                 Swatch::LineAndSign(LINE, Marker::Disc, SIGN),
@@ -101,7 +101,7 @@ impl ControlChartFigure {
             (Swatch::Line(style::LEVEL), "mean of the earlier ones".to_string()),
             (Swatch::Line(LIMIT), "limits".to_string()),
         ];
-        let header = Header::new(&self.title, &legend, left, right);
+        let header = FigureHeader::new(&self.title, &legend, left, right);
         let panels = Panel::stack(&x, y, [left, right], header.bottom() + 24.0, HEIGHT, GAP);
         let bottom = panels.last().map_or(0.0, |p| p.bottom);
         paint(WIDTH, (bottom + 34.0) as u32, |canvas| {

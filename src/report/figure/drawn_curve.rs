@@ -1,9 +1,9 @@
 //! A dynamic stiffness that the data drew: real and imaginary part over frequency, with the form fitted to it.
 
-use super::axis::{Axis, extent, quantile};
-use super::canvas::{Color, Marker, Stroke, paint};
-use super::panel::{Header, Panel, Swatch};
-use super::{WIDTH, nothing_to_draw, style};
+use super::axis::{FigureAxis, extent, quantile};
+use super::canvas::{Color, Marker, Stroke, WIDTH, nothing_to_draw, paint};
+use super::panel::{FigureHeader, Panel, Swatch};
+use super::style;
 use crate::Result;
 use num_complex::Complex64;
 
@@ -38,7 +38,7 @@ impl DrawnCurveFigure {
         let middle = quantile(lines.iter().map(|k| self.std[*k]), 0.5).unwrap_or(f64::INFINITY);
         let parts = ["real part", "imaginary part"];
         let part = |name: &str, z: Complex64| if name == parts[0] { z.re } else { z.im };
-        let axes: Vec<Axis> = parts
+        let axes: Vec<FigureAxis> = parts
             .iter()
             .map(|name| {
                 let part = |z| part(name, z);
@@ -48,10 +48,10 @@ impl DrawnCurveFigure {
                     .chain(self.form.iter().map(|z| part(*z)))
                     .chain([0.0]);
                 let range = extent(values).unwrap_or((-1.0, 1.0));
-                Axis::padded(&format!("{name} ({})", self.unit), range, 0.15, 6)
+                FigureAxis::padded(&format!("{name} ({})", self.unit), range, 0.15, 6)
             })
             .collect();
-        let x = Axis::linear("Frequency (Hz)", frequencies, 10);
+        let x = FigureAxis::linear("Frequency (Hz)", frequencies, 10);
         let left = Panel::left_margin(&axes.iter().collect::<Vec<_>>());
         let right = f64::from(WIDTH) - Panel::RIGHT_MARGIN;
         let fitted = Stroke::solid(style::ORANGE, 2.4);
@@ -65,7 +65,7 @@ impl DrawnCurveFigure {
         if !self.form.is_empty() {
             legend.push((Swatch::Line(fitted), self.form_label.clone()));
         }
-        let header = Header::new(&self.title, &legend, left, right);
+        let header = FigureHeader::new(&self.title, &legend, left, right);
         let panels = Panel::stack(&x, axes, [left, right], header.bottom(), 260.0, 24.0);
         let bottom = panels.last().map_or(0.0, |p| p.bottom) + Panel::BOTTOM_MARGIN;
         paint(WIDTH, bottom as u32, |canvas| {

@@ -1,15 +1,15 @@
 //! A dynamometer record: raw signal, drift, air segments and the window that was averaged.
 
-use super::axis::{Axis, extent, usable};
-use super::canvas::{Canvas, Color, Stroke, paint};
+use super::axis::{FigureAxis, extent, usable};
+use super::canvas::{Canvas, Color, Stroke, WIDTH, nothing_to_draw, paint};
 use super::frf::or;
-use super::panel::{Header, Panel, Swatch};
-use super::{WIDTH, nothing_to_draw, style};
+use super::panel::{FigureHeader, Panel, Swatch};
+use super::style;
 use crate::Result;
 
 /// One channel, evenly sampled.
 #[derive(Debug, Clone, Default)]
-pub struct ForceChannel {
+pub struct ForceTrace {
     /// Such as `Fx`.
     pub label: String,
     pub unit: String,
@@ -25,24 +25,24 @@ pub struct ForceChannel {
 #[derive(Debug, Clone, Default)]
 pub struct ForceRecord {
     pub title: String,
-    pub channels: Vec<ForceChannel>,
+    pub channels: Vec<ForceTrace>,
     /// Where the tool cut nothing: (from, to) in s.
     pub air_s: Vec<(f64, f64)>,
     /// The window that was averaged: (from, to) in s.
     pub steady_s: Option<(f64, f64)>,
 }
 
-pub(in crate::report) const ENVELOPE: Color = Color(112, 128, 146);
-pub(in crate::report) const DRIFT: Stroke = Stroke::dashed(style::RED, 2.0, &[9.0, 4.0]);
-pub(in crate::report) const LEVEL: Stroke = Stroke::solid(style::INK, 2.2);
-pub(in crate::report) const AIR: (Color, f64) = (style::PALE_BLUE, 0.34);
-pub(in crate::report) const STEADY: (Color, f64) = (style::PALE_GREEN, 0.55);
+pub(crate) const ENVELOPE: Color = Color(112, 128, 146);
+pub(crate) const DRIFT: Stroke = Stroke::dashed(style::RED, 2.0, &[9.0, 4.0]);
+pub(crate) const LEVEL: Stroke = Stroke::solid(style::INK, 2.2);
+pub(crate) const AIR: (Color, f64) = (style::PALE_BLUE, 0.34);
+pub(crate) const STEADY: (Color, f64) = (style::PALE_GREEN, 0.55);
 
 impl ForceRecord {
     /// # Errors
     /// No channel with a finite sample and a positive sample interval, or more than 12 of them.
     pub fn png(&self) -> Result<Vec<u8>> {
-        let channels: Vec<&ForceChannel> = self.channels.iter().filter(|c| c.is_drawable()).collect();
+        let channels: Vec<&ForceTrace> = self.channels.iter().filter(|c| c.is_drawable()).collect();
         if channels.is_empty() || channels.len() > 12 {
             let what = "1 to 12 channels with finite samples at a positive sample interval are needed";
             return Err(nothing_to_draw(&self.title, what));
@@ -56,12 +56,12 @@ impl ForceRecord {
         let Some(times) = extent(ends) else {
             return Err(nothing_to_draw(&self.title, "no usable time axis"));
         };
-        let time = Axis::linear("Time (s)", times, 10);
-        let forces: Vec<Axis> = channels.iter().map(|c| c.axis()).collect();
+        let time = FigureAxis::linear("Time (s)", times, 10);
+        let forces: Vec<FigureAxis> = channels.iter().map(|c| c.axis()).collect();
 
         let left = Panel::left_margin(&forces.iter().collect::<Vec<_>>());
         let right = f64::from(WIDTH) - Panel::RIGHT_MARGIN;
-        let header = Header::new(&self.title, &self.legend(&channels), left, right);
+        let header = FigureHeader::new(&self.title, &self.legend(&channels), left, right);
         let each = if channels.len() <= 4 { 190.0 } else { 140.0 };
         let panels = Panel::stack(&time, forces, [left, right], header.bottom(), each, 16.0);
         let bottom = panels.last().map_or(header.bottom(), |p| p.bottom);
@@ -87,7 +87,7 @@ impl ForceRecord {
         })
     }
 
-    fn legend(&self, channels: &[&ForceChannel]) -> Vec<(Swatch, String)> {
+    fn legend(&self, channels: &[&ForceTrace]) -> Vec<(Swatch, String)> {
         let entries = [
             (
                 true,
@@ -118,17 +118,17 @@ impl ForceRecord {
     }
 }
 
-impl ForceChannel {
+impl ForceTrace {
     fn is_drawable(&self) -> bool {
         let timed = usable(self.start_s) && usable(self.sample_interval_s) && self.sample_interval_s > 0.0;
         timed && self.samples.iter().any(|v| usable(*v))
     }
 
-    fn axis(&self) -> Axis {
+    fn axis(&self) -> FigureAxis {
         let label = format!("{} ({})", or(&self.label, "force"), or(&self.unit, "–"));
         let levels = self.drift.iter().map(|d| d.1).chain(self.steady_level);
         let range = extent(self.samples.iter().copied().chain(levels)).unwrap_or((0.0, 0.0));
-        Axis::padded(&label, range, 0.06, 4)
+        FigureAxis::padded(&label, range, 0.06, 4)
     }
 
     /// One bar a pixel column from the smallest to the largest sample in it; a plain line where samples are few.

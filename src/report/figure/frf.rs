@@ -2,10 +2,10 @@
 
 use num_complex::Complex64;
 
-use super::axis::{Axis, extent, positive_extent, quantile, usable};
-use super::canvas::{Marker, paint};
-use super::panel::{Header, Panel, Swatch};
-use super::{WIDTH, nothing_to_draw, style};
+use super::axis::{FigureAxis, extent, positive_extent, quantile, usable};
+use super::canvas::{Marker, WIDTH, nothing_to_draw, paint};
+use super::panel::{FigureHeader, Panel, Swatch};
+use super::style;
 use crate::Result;
 use crate::report::number::decimals;
 
@@ -23,12 +23,12 @@ impl FrfCurve {
     }
 
     /// Frequency, Hz, and phase, degrees, from `lowest` to `lowest` + 360°.
-    pub(in crate::report) fn phases(&self, lowest: f64) -> Vec<(f64, f64)> {
+    pub(crate) fn phases(&self, lowest: f64) -> Vec<(f64, f64)> {
         self.points().map(|(f, v)| (f, degrees(v, lowest))).collect()
     }
 
     /// The same for a line, with a gap where it would jump from one end of the range to the other.
-    pub(in crate::report) fn phases_of_line(&self, lowest: f64) -> Vec<(f64, f64)> {
+    pub(crate) fn phases_of_line(&self, lowest: f64) -> Vec<(f64, f64)> {
         broken_at_wraps(self, lowest)
     }
 
@@ -105,16 +105,16 @@ impl FrfFigure {
             or(&self.quantity, "FRF"),
             or(&self.unit, "–")
         );
-        let magnitude = Axis::log(&left_title, (low, high));
+        let magnitude = FigureAxis::log(&left_title, (low, high));
         let lowest = lowest_phase(&curves);
         let ticks = [0.0, 90.0, 180.0, 270.0, 360.0].map(|a| lowest + a);
-        let phase = Axis::linear("Phase (°)", (lowest - 15.0, lowest + 375.0), 4)
+        let phase = FigureAxis::linear("Phase (°)", (lowest - 15.0, lowest + 375.0), 4)
             .with_ticks(&ticks, |v| decimals(v, 0));
-        let frequency = Axis::linear("Frequency (Hz)", frequencies, 10);
+        let frequency = FigureAxis::linear("Frequency (Hz)", frequencies, 10);
 
         let left = Panel::left_margin(&[&magnitude, &phase]);
         let right = f64::from(WIDTH) - Panel::RIGHT_MARGIN;
-        let header = Header::new(&self.title, &self.legend(noise.is_some()), left, right);
+        let header = FigureHeader::new(&self.title, &self.legend(noise.is_some()), left, right);
         let top = header.bottom();
         let upper = Panel {
             left,
@@ -177,7 +177,7 @@ impl FrfFigure {
     }
 
     /// Where the phase axis begins, degrees.
-    pub(in crate::report) fn lowest_phase(&self) -> f64 {
+    pub(crate) fn lowest_phase(&self) -> f64 {
         lowest_phase(&self.measured.iter().chain(&self.models).collect::<Vec<_>>())
     }
 
@@ -214,7 +214,7 @@ fn degrees(value: Complex64, lowest: f64) -> f64 {
 }
 
 /// Where the phase axis begins: a measured phase around ±180° must not jump between both edges of the figure.
-pub(in crate::report) fn lowest_phase(curves: &[&FrfCurve]) -> f64 {
+pub(crate) fn lowest_phase(curves: &[&FrfCurve]) -> f64 {
     let jumps = |lowest: f64| -> usize {
         let of = |curve: &&FrfCurve| {
             let angles: Vec<f64> = curve.points().map(|(_, v)| degrees(v, lowest)).collect();

@@ -1,9 +1,9 @@
 //! A table of numbers as coloured cells: where the error sits.
 
-use super::axis::{Axis, extent, usable};
-use super::canvas::{Align, Canvas, Stroke, paint};
-use super::panel::Header;
-use super::{WIDTH, nothing_to_draw, style};
+use super::axis::{FigureAxis, extent, usable};
+use super::canvas::{Align, Canvas, Stroke, WIDTH, nothing_to_draw, paint};
+use super::panel::FigureHeader;
+use super::style;
 use crate::Result;
 use crate::report::number::{decimals, percent, significant};
 
@@ -78,7 +78,7 @@ impl HeatMap {
         let cell_height = (840.0 / rows as f64)
             .min((190.0 / rows as f64).max(46.0))
             .max(6.0);
-        let header = Header::new(&self.title, &[], left.min(58.0), f64::from(WIDTH) - 30.0);
+        let header = FigureHeader::new(&self.title, &[], left.min(58.0), f64::from(WIDTH) - 30.0);
         let titled = self.table_titles.iter().any(|t| !t.is_empty());
         let top = header.bottom() + if titled { 24.0 } else { 6.0 };
         let bottom = top + cell_height * rows as f64;
@@ -138,7 +138,7 @@ impl HeatMap {
     }
 
     /// The ends of the colour scale; `None` where no cell has a finite value.
-    pub(in crate::report) fn scale(&self) -> Option<(f64, f64)> {
+    pub(crate) fn scale(&self) -> Option<(f64, f64)> {
         let (rows, columns) = (self.rows.len(), self.columns.len());
         let cells = |table: &[Vec<Option<f64>>]| extent(Cells(table).all(rows, columns));
         let all: Vec<(f64, f64)> = std::iter::once(self.coloured())
@@ -156,7 +156,7 @@ impl HeatMap {
     }
 
     /// What gives the colours of the first table.
-    pub(in crate::report) fn coloured(&self) -> &[Vec<Option<f64>>] {
+    pub(crate) fn coloured(&self) -> &[Vec<Option<f64>>] {
         match self.shades.is_empty() {
             true => &self.values,
             false => &self.shades,
@@ -164,14 +164,14 @@ impl HeatMap {
     }
 
     /// How the numbers of the colour scale are written.
-    pub(in crate::report) fn scale_format(&self) -> CellFormat {
+    pub(crate) fn scale_format(&self) -> CellFormat {
         match self.shades.is_empty() {
             true => self.format,
             false => CellFormat::Significant(2),
         }
     }
 
-    pub(in crate::report) fn written(&self, value: f64) -> String {
+    pub(crate) fn written(&self, value: f64) -> String {
         match self.format {
             CellFormat::Percent => percent(value),
             CellFormat::Significant(digits) => significant(value, digits.min(6)),
@@ -291,8 +291,8 @@ impl HeatMap {
         };
         let ends = (sheet.low * unit, sheet.high * unit);
         let axis = match sheet.log {
-            true => Axis::log("", ends),
-            false => Axis::linear("", ends, 6),
+            true => FigureAxis::log("", ends),
+            false => FigureAxis::linear("", ends, 6),
         };
         for tick in axis.ticks.iter().filter(|t| !sheet.log || !t.label.is_empty()) {
             let share = sheet.share(tick.at / unit);

@@ -1,14 +1,14 @@
 //! The error falling, revision by revision.
 
-use super::axis::{Axis, extent, usable};
-use super::canvas::{Align, Lettering, Marker, Stroke, paint};
-use super::panel::{Header, Panel, Swatch};
-use super::{WIDTH, nothing_to_draw, style};
+use super::axis::{FigureAxis, extent, usable};
+use super::canvas::{Align, Lettering, Marker, Stroke, WIDTH, nothing_to_draw, paint};
+use super::panel::{FigureHeader, Panel, Swatch};
+use super::style;
 use crate::Result;
 use crate::report::number::{decimals, percent};
 
 #[derive(Debug, Clone, Default)]
-pub struct Revision {
+pub struct HistoryMark {
     /// Such as `0 baseline` or `1 + link-flexibility`.
     pub label: String,
     /// Error on the data that was fitted, as a ratio.
@@ -20,7 +20,7 @@ pub struct Revision {
 #[derive(Debug, Clone, Default)]
 pub struct HistoryFigure {
     pub title: String,
-    pub revisions: Vec<Revision>,
+    pub revisions: Vec<HistoryMark>,
     /// No model can do better than this.
     pub noise_floor_nrms: Option<f64>,
 }
@@ -51,8 +51,8 @@ impl HistoryFigure {
         let label = "Error nrms (%)";
         // Over such a span the small errors would lie on the axis.
         let y = match worst > 8.0 * best {
-            true => Axis::log(label, (0.7 * best, 1.6 * worst)),
-            false => Axis::from_zero(label, (0.0, 1.08 * worst.max(floor.unwrap_or(0.0))), 6),
+            true => FigureAxis::log(label, (0.7 * best, 1.6 * worst)),
+            false => FigureAxis::from_zero(label, (0.0, 1.08 * worst.max(floor.unwrap_or(0.0))), 6),
         };
         let names: Vec<String> = self.revisions.iter().map(|r| r.label.clone()).collect();
         let left = Panel::left_margin(&[&y]);
@@ -72,7 +72,7 @@ impl HistoryFigure {
                 format!("noise floor {}", percent(0.01 * floor)),
             ));
         }
-        let header = Header::new(&self.title, &legend, left, right);
+        let header = FigureHeader::new(&self.title, &legend, left, right);
         let top = header.bottom();
         let room = (right - left) / names.len().max(1) as f64;
         let wrapped: Vec<Vec<String>> = names
@@ -90,7 +90,7 @@ impl HistoryFigure {
                     .min(160.0)
             }
         };
-        let x = Axis::categories("", &vec![String::new(); names.len()]);
+        let x = FigureAxis::categories("", &vec![String::new(); names.len()]);
         let panel = Panel {
             left,
             top,
@@ -111,7 +111,7 @@ impl HistoryFigure {
                     style::LEVEL,
                 );
             }
-            let points = |pick: fn(&Revision) -> Option<f64>| {
+            let points = |pick: fn(&HistoryMark) -> Option<f64>| {
                 let values = self.revisions.iter().map(move |r| pick(r).filter(|v| shown(*v)));
                 values
                     .enumerate()

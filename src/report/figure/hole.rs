@@ -1,9 +1,9 @@
 //! Errors of a hole over the redundancy angle, each above its tolerance or below it.
 
-use super::axis::{Axis, extent, usable};
-use super::canvas::{Marker, Stroke, paint};
-use super::panel::{Header, Panel, Swatch};
-use super::{WIDTH, nothing_to_draw, style};
+use super::axis::{FigureAxis, extent, usable};
+use super::canvas::{Marker, Stroke, WIDTH, nothing_to_draw, paint};
+use super::panel::{FigureHeader, Panel, Swatch};
+use super::style;
 use crate::Result;
 
 /// One kind of error at every angle.
@@ -41,14 +41,14 @@ impl HoleFigure {
         if self.angle_deg.is_empty() || !values.clone().any(|v| usable(*v)) {
             return Err(nothing_to_draw(&self.title, "no angle can be used"));
         }
-        let x = Axis::linear("Redundancy angle (°)", (0.0, 360.0), 9);
-        let scales: Vec<Axis> = self
+        let x = FigureAxis::linear("Redundancy angle (°)", (0.0, 360.0), 9);
+        let scales: Vec<FigureAxis> = self
             .panels
             .iter()
             .map(|p| {
                 let all = p.value.iter().chain(&p.bound).copied().chain([p.tolerance]);
                 let range = extent(all.filter(|v| usable(*v))).unwrap_or((0.0, 1.0));
-                Axis::from_zero(&p.label, range, 5)
+                FigureAxis::from_zero(&p.label, range, 5)
             })
             .collect();
         let left = Panel::left_margin(&scales.iter().collect::<Vec<_>>());
@@ -67,7 +67,7 @@ impl HoleFigure {
         if self.recommended_deg.is_some() {
             legend.push((Swatch::Line(RECOMMENDED), "recommended".to_string()));
         }
-        let header = Header::new(&self.title, &legend, left, right);
+        let header = FigureHeader::new(&self.title, &legend, left, right);
         let panels = Panel::stack(&x, scales, [left, right], header.bottom(), PANEL_HEIGHT, GAP);
         let bottom = panels.last().map_or(header.bottom(), |p| p.bottom);
         paint(WIDTH, (bottom + Panel::BOTTOM_MARGIN) as u32, |canvas| {

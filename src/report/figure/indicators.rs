@@ -1,9 +1,9 @@
 //! Curves of equal rank over frequency, with the modes marked: mode indicator functions.
 
-use super::axis::{Axis, extent, positive_extent, quantile, usable};
-use super::canvas::paint;
-use super::panel::{Header, Panel, Swatch};
-use super::{WIDTH, nothing_to_draw, style};
+use super::axis::{FigureAxis, extent, positive_extent, quantile, usable};
+use super::canvas::{WIDTH, nothing_to_draw, paint};
+use super::panel::{FigureHeader, Panel, Swatch};
+use super::style;
 use crate::Result;
 
 #[derive(Debug, Clone, Default)]
@@ -34,13 +34,13 @@ impl IndicatorFigure {
         let (Some(frequencies), Some((low, high))) = (frequencies, positive_extent(values())) else {
             return Err(nothing_to_draw(&self.title, "no finite value"));
         };
-        let x = Axis::linear("Frequency (Hz)", frequencies, 10);
+        let x = FigureAxis::linear("Frequency (Hz)", frequencies, 10);
         let y = match self.log {
             true => {
                 let low = quantile(values().filter(|v| *v > 0.0), 0.002).map_or(low, |q| low.max(q / 10.0));
-                Axis::log(&self.label, (low.min(high), high))
+                FigureAxis::log(&self.label, (low.min(high), high))
             }
-            false => Axis::linear(&self.label, (0.0, 1.0), 5),
+            false => FigureAxis::linear(&self.label, (0.0, 1.0), 5),
         };
         let left = Panel::left_margin(&[&y]);
         let right = f64::from(WIDTH) - Panel::RIGHT_MARGIN;
@@ -51,7 +51,7 @@ impl IndicatorFigure {
             .map(|(k, (name, _))| (Swatch::Line(style::series(k)), name.clone()))
             .collect();
         legend.push((Swatch::Line(style::LEVEL), "modes taken".into()));
-        let header = Header::new(&self.title, &legend, left, right);
+        let header = FigureHeader::new(&self.title, &legend, left, right);
         let top = header.bottom();
         let panel = Panel {
             left,

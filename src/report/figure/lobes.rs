@@ -1,15 +1,15 @@
 //! Stability lobes: the depth of cut that is just stable, over spindle speed.
 
-use super::axis::{Axis, extent, quantile, usable};
-use super::canvas::{Align, Canvas, Color, Marker, Stroke, paint};
+use super::axis::{FigureAxis, extent, quantile, usable};
+use super::canvas::{Align, Canvas, Color, Marker, Stroke, WIDTH, nothing_to_draw, paint};
 use super::frf::or;
-use super::panel::{Header, Panel, Swatch};
-use super::{WIDTH, nothing_to_draw, style};
+use super::panel::{FigureHeader, Panel, Swatch};
+use super::style;
 use crate::Result;
 use crate::report::number::significant;
 
 #[derive(Debug, Clone, Default)]
-pub struct LobeCurve {
+pub struct LobeTrace {
     pub label: String,
     pub spindle_rpm: Vec<f64>,
     /// None where no limit exists at that speed.
@@ -44,7 +44,7 @@ pub struct LobeMarker {
 pub struct LobePanel {
     /// Written into the frame where there are several.
     pub name: String,
-    pub curves: Vec<LobeCurve>,
+    pub curves: Vec<LobeTrace>,
     pub markers: Vec<LobeMarker>,
     /// The depth below which every speed is stable.
     pub absolute_limit_mm: Option<f64>,
@@ -59,15 +59,15 @@ pub struct LobesFigure {
     pub depth_cap_mm: Option<f64>,
 }
 
-pub(in crate::report) const BEFORE: Stroke = Stroke::dashed(style::GREY, 1.9, &[9.0, 5.0]);
-pub(in crate::report) const BAND: Color = Color(198, 216, 232);
+pub(crate) const BEFORE: Stroke = Stroke::dashed(style::GREY, 1.9, &[9.0, 5.0]);
+pub(crate) const BAND: Color = Color(198, 216, 232);
 /// Above the limit.
-pub(in crate::report) const UNSTABLE: Color = Color(251, 232, 226);
+pub(crate) const UNSTABLE: Color = Color(251, 232, 226);
 const ALONE: f64 = 470.0;
 const STACKED: f64 = 290.0;
 const BETWEEN: f64 = 26.0;
 
-impl LobeCurve {
+impl LobeTrace {
     fn over_speed<'a>(&'a self, depths: &'a [Option<f64>]) -> impl Iterator<Item = (f64, f64)> + 'a {
         let depths = depths.iter().map(|d| d.unwrap_or(f64::NAN));
         self.spindle_rpm.iter().copied().zip(depths)
@@ -80,7 +80,7 @@ impl LobeCurve {
 
 impl LobePanel {
     fn points(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
-        let points = self.curves.iter().flat_map(LobeCurve::points);
+        let points = self.curves.iter().flat_map(LobeTrace::points);
         points.filter(|(x, y)| usable(*x) && usable(*y))
     }
 
@@ -90,15 +90,15 @@ impl LobePanel {
     }
 
     /// None where there is nothing to see.
-    pub(in crate::report) fn deepest(&self) -> Option<f64> {
+    pub(crate) fn deepest(&self) -> Option<f64> {
         let markers = self.usable_markers().map(|m| m.depth_mm);
         extent(self.points().map(|p| p.1).chain(markers)).map(|(_, deepest)| deepest)
     }
 
     /// High enough to see the pockets, low enough to see the limit: single sharp peaks run out at the top.
-    pub(in crate::report) fn cap(&self, deepest: f64) -> f64 {
+    pub(crate) fn cap(&self, deepest: f64) -> f64 {
         let deepest_marker = self.usable_markers().map(|m| m.depth_mm).fold(0.0, f64::max);
-        let depths = || self.curves.iter().flat_map(LobeCurve::points).map(|p| p.1);
+        let depths = || self.curves.iter().flat_map(LobeTrace::points).map(|p| p.1);
         let low = quantile(depths(), 0.05).unwrap_or(0.0).max(0.0);
         let most = quantile(depths(), 0.9).unwrap_or(deepest);
         let chosen = most.max(4.0 * low).max(1.1 * deepest_marker);
@@ -188,7 +188,7 @@ fn shade(
 
 impl LobesFigure {
     /// The end of the depth axis of every frame.
-    pub(in crate::report) fn cap(&self) -> f64 {
+    pub(crate) fn cap(&self) -> f64 {
         let panels = self.panels.iter().filter_map(|p| Some(p.cap(p.deepest()?)));
         panels.fold(0.0, f64::max)
     }
@@ -209,20 +209,20 @@ impl LobesFigure {
         // One scale for all: which posture bears more must be seen.
         let cap = asked.unwrap_or_else(|| self.cap());
         let caps = vec![cap; count];
-        let axes: Vec<Axis> = caps
+        let axes: Vec<FigureAxis> = caps
             .iter()
-            .map(|cap| Axis::from_zero("Depth limit (mm)", (0.0, *cap), if count > 1 { 5 } else { 7 }))
+            .map(|cap| FigureAxis::from_zero("Depth limit (mm)", (0.0, *cap), if count > 1 { 5 } else { 7 }))
             .collect();
         let left = Panel::left_margin(&axes.iter().collect::<Vec<_>>());
         let right = f64::from(WIDTH) - Panel::RIGHT_MARGIN;
-        let header = Header::new(&self.title, &self.legend(), left, right);
+        let header = FigureHeader::new(&self.title, &self.legend(), left, right);
         let (height, between) = if count > 1 {
             (STACKED, BETWEEN)
         } else {
             (ALONE, 0.0)
         };
         let first = header.bottom() + 14.0;
-        let speed = Axis::linear("Spindle speed (rpm)", speeds, 10);
+        let speed = FigureAxis::linear("Spindle speed (rpm)", speeds, 10);
         let frames = Panel::stack(&speed, axes, [left, right], first, height, between);
         let bottom = frames.last().map_or(first, |p| p.bottom);
         paint(WIDTH, (bottom + Panel::BOTTOM_MARGIN) as u32, |canvas| {
@@ -300,7 +300,7 @@ impl LobesFigure {
     }
 }
 
-pub(in crate::report) fn sign(outcome: LobeOutcome) -> (Marker, f64, Color) {
+pub(crate) fn sign(outcome: LobeOutcome) -> (Marker, f64, Color) {
     match outcome {
         LobeOutcome::Stable => (Marker::Disc, 11.0, style::INK),
         LobeOutcome::Chatter => (Marker::Cross, 12.0, style::RED),

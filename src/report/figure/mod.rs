@@ -4,22 +4,22 @@
 //! left out; a figure with nothing left to show is an error that names it. Text uses an embedded font
 //! (DejaVu Sans, see `fonts/LICENSE.txt`), so no system font is needed.
 
-pub(in crate::report) mod axis;
-pub(in crate::report) mod canvas;
+pub(crate) mod axis;
+pub(crate) mod canvas;
 mod panel;
-pub(in crate::report) mod style;
+pub(crate) mod style;
 
 mod coherence;
 mod compass;
 mod control_chart;
 mod drawn_curve;
-pub(in crate::report) mod force_record;
+pub(crate) mod force_record;
 mod frf;
 mod heat_map;
 mod history;
 mod hole;
 mod indicators;
-pub(in crate::report) mod lobes;
+pub(crate) mod lobes;
 mod mode_shapes;
 mod nyquist;
 mod parameters;
@@ -40,30 +40,21 @@ pub use coherence::{CoherenceCurve, CoherenceFigure};
 pub use compass::CompassFigure;
 pub use control_chart::{ControlChartFigure, ControlPanel, ControlPoint, MOST_PANELS};
 pub use drawn_curve::DrawnCurveFigure;
-pub use force_record::{ForceChannel, ForceRecord};
-pub(in crate::report) use frf::lowest_phase;
+pub use force_record::{ForceRecord, ForceTrace};
+pub(crate) use frf::lowest_phase;
 pub use frf::{FrfCurve, FrfFigure, NoiseLevel};
 pub use heat_map::{CellFormat, HeatMap};
-pub use history::{HistoryFigure, Revision};
+pub use history::{HistoryFigure, HistoryMark};
 pub use hole::{HoleFigure, HolePanel};
 pub use indicators::IndicatorFigure;
-pub use lobes::{LobeCurve, LobeMarker, LobeOutcome, LobePanel, LobesFigure};
+pub use lobes::{LobeMarker, LobeOutcome, LobePanel, LobeTrace, LobesFigure};
 pub use mode_shapes::{ModeShapesFigure, StickPicture};
 pub use nyquist::NyquistFigure;
-pub use parameters::{Estimate, ParameterFigure, ParameterRow};
-pub use regression::{RegressionFigure, RegressionPoint, RegressionSeries};
+pub use parameters::{DrawnEstimate, ParameterFigure, ParameterRow};
+pub use regression::{RegressionFigure, RegressionMark, RegressionSeries};
 pub use resonances::{ResonanceFigure, ResonanceRow};
 pub use robot::{RobotFigure, posture_svg};
 pub use side_by_side::{BarSeries, SideBySide};
 pub use stabilisation::{StabilisationFigure, StabilisationPole};
 pub use waveform::{WaveformFigure, WaveformPanel};
 pub use wire::{WirePicture, WireShapesFigure};
-
-use crate::Error;
-
-/// All figures are this wide.
-const WIDTH: u32 = 1200;
-
-fn nothing_to_draw(title: &str, what: &str) -> Error {
-    Error::computation(format!("figure \"{title}\" has nothing to draw: {what}"))
-}

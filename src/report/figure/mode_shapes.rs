@@ -1,8 +1,8 @@
 //! Mode shapes on a stick figure: one small picture a mode, at rest and at both ends of the swing.
 
-use super::canvas::{Align, Canvas, Color, Marker, Stroke, paint};
-use super::panel::{Header, Swatch};
-use super::{WIDTH, nothing_to_draw, style};
+use super::canvas::{Align, Canvas, Color, Marker, Stroke, WIDTH, nothing_to_draw, paint};
+use super::panel::{FigureHeader, Swatch};
+use super::style;
 use crate::Result;
 
 /// One mode; positions in m, displacements in any common scale.
@@ -76,7 +76,7 @@ impl ModeShapesFigure {
         );
         for (k, picture) in pictures.into_iter().enumerate() {
             let at = (width * (k % columns) as f64, HEIGHT * (k / columns) as f64);
-            let layout = Layout::new(picture, at, (width, HEIGHT));
+            let layout = PictureLayout::new(picture, at, (width, HEIGHT));
             let [there, back] = [1.0, -1.0].map(|factor| points(layout.chain(factor)));
             let title = picture.title.replace('&', "&amp;").replace('<', "&lt;");
             svg += &format!(
@@ -121,7 +121,7 @@ impl ModeShapesFigure {
                 "measured points".to_owned(),
             ),
         ];
-        let header = Header::new(&self.title, &legend, left, right);
+        let header = FigureHeader::new(&self.title, &legend, left, right);
         let columns = COLUMNS.min(pictures.len());
         let width = (right - left) / columns as f64;
         let rows = pictures.len().div_ceil(columns);
@@ -138,7 +138,7 @@ impl ModeShapesFigure {
 }
 
 /// Where a mode's points lie on the sheet.
-pub(super) struct Layout<'a> {
+pub(super) struct PictureLayout<'a> {
     picture: &'a StickPicture,
     /// Factor on displacements.
     swing: f64,
@@ -149,7 +149,7 @@ pub(super) struct Layout<'a> {
     middle: (f64, f64),
 }
 
-impl<'a> Layout<'a> {
+impl<'a> PictureLayout<'a> {
     pub(super) fn new(picture: &'a StickPicture, at: (f64, f64), size: (f64, f64)) -> Self {
         let length = |u: &[f64; 3]| u.iter().map(|v| v * v).sum::<f64>().sqrt();
         let span = |k: usize| {
@@ -159,7 +159,7 @@ impl<'a> Layout<'a> {
         let extent = (0..3).map(span).fold(0.0, f64::max).max(1e-6);
         let moves = picture.points.iter().map(|p| &p.1).chain(&picture.chain_moved);
         let largest = moves.map(length).fold(0.0, f64::max);
-        let mut layout = Layout {
+        let mut layout = PictureLayout {
             picture,
             swing: match largest > 0.0 {
                 true => SWING * extent / largest,
@@ -205,7 +205,7 @@ impl<'a> Layout<'a> {
 }
 
 fn draw(canvas: &Canvas, picture: &StickPicture, at: (f64, f64), size: (f64, f64)) {
-    let layout = Layout::new(picture, at, size);
+    let layout = PictureLayout::new(picture, at, size);
     let line = |factor: f64, stroke: Stroke| {
         let points = layout.chain(factor);
         canvas.polyline(&points, stroke);

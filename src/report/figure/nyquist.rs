@@ -1,10 +1,10 @@
 //! FRFs in the complex plane, both axes to the same scale.
 
-use super::axis::{Axis, extent, usable};
-use super::canvas::paint;
+use super::axis::{FigureAxis, extent, usable};
+use super::canvas::{nothing_to_draw, paint};
 use super::frf::{FrfCurve, MEASURED, or};
-use super::panel::{Header, Panel, Swatch};
-use super::{nothing_to_draw, style};
+use super::panel::{FigureHeader, Panel, Swatch};
+use super::style;
 use crate::Result;
 
 #[derive(Debug, Clone, Default)]
@@ -45,8 +45,8 @@ impl NyquistFigure {
             let middle = 0.5 * low + 0.5 * high;
             (middle - 0.5 * span * length, middle + 0.5 * span * length)
         };
-        let x = Axis::linear(&format!("Real part ({unit})"), around(re, wide), 8);
-        let y = Axis::linear(&format!("Imaginary part ({unit})"), around(im, high), 6);
+        let x = FigureAxis::linear(&format!("Real part ({unit})"), around(re, wide), 8);
+        let y = FigureAxis::linear(&format!("Imaginary part ({unit})"), around(im, high), 6);
 
         let left = SIDE - Panel::RIGHT_MARGIN - wide;
         let mut legend = vec![];
@@ -58,7 +58,7 @@ impl NyquistFigure {
             let stroke = style::model(i, self.models.len());
             legend.push((Swatch::Line(stroke), or(&model.label, "model").to_owned()));
         }
-        let header = Header::new(&self.title, &legend, left, left + wide);
+        let header = FigureHeader::new(&self.title, &legend, left, left + wide);
         let top = header.bottom();
         let panel = Panel {
             left,

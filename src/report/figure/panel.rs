@@ -1,7 +1,7 @@
 //! One coordinate frame on the sheet, and what every figure has around it: title, legend, margins.
 
-use super::axis::Axis;
-use super::canvas::{Align, Canvas, Color, Lettering, Marker, Point, Stroke};
+use super::axis::FigureAxis;
+use super::canvas::{Align, Canvas, CanvasPoint, Color, Lettering, Marker, Stroke};
 use super::style;
 
 /// A frame with axes; `left … bottom` are the sides of the plotting area.
@@ -10,15 +10,15 @@ pub struct Panel {
     pub top: f64,
     pub right: f64,
     pub bottom: f64,
-    pub x: Axis,
-    pub y: Axis,
+    pub x: FigureAxis,
+    pub y: FigureAxis,
     /// Panels stacked above another share the x labels of the lowest one.
     pub x_labels: bool,
 }
 
 impl Panel {
     /// Room that an axis' labels and title take left of the frame.
-    pub fn left_margin(axes: &[&Axis]) -> f64 {
+    pub fn left_margin(axes: &[&FigureAxis]) -> f64 {
         let labels = axes.iter().flat_map(|axis| &axis.ticks);
         labels
             .map(|tick| style::TICK.width(&tick.label))
@@ -34,8 +34,8 @@ impl Panel {
     /// Frames of one height above each other, with one x axis for all; `sides`: left and right, `gap`: from one to the
     /// next.
     pub fn stack(
-        x: &Axis,
-        y: Vec<Axis>,
+        x: &FigureAxis,
+        y: Vec<FigureAxis>,
         [left, right]: [f64; 2],
         top: f64,
         height: f64,
@@ -69,11 +69,11 @@ impl Panel {
             .map(|f| self.bottom - f * (self.bottom - self.top))
     }
 
-    pub fn place(&self, x: f64, y: f64) -> Option<Point> {
+    pub fn place(&self, x: f64, y: f64) -> Option<CanvasPoint> {
         Some((self.x_at(x)?, self.y_at(y)?))
     }
 
-    fn holds(&self, (x, y): Point) -> bool {
+    fn holds(&self, (x, y): CanvasPoint) -> bool {
         x >= self.left - 0.5 && x <= self.right + 0.5 && y >= self.top - 0.5 && y <= self.bottom + 0.5
     }
 
@@ -147,9 +147,9 @@ impl Panel {
 
     /// A line through the points, cut at the frame and interrupted where there is no number.
     pub fn curve(&self, canvas: &Canvas, points: impl IntoIterator<Item = (f64, f64)>, stroke: Stroke) {
-        let mut piece: Vec<Point> = vec![];
-        let mut before: Option<Point> = None;
-        let flush = |piece: &mut Vec<Point>| {
+        let mut piece: Vec<CanvasPoint> = vec![];
+        let mut before: Option<CanvasPoint> = None;
+        let flush = |piece: &mut Vec<CanvasPoint>| {
             canvas.polyline(piece, stroke);
             piece.clear();
         };
@@ -186,7 +186,7 @@ impl Panel {
         color: Color,
         spacing: f64,
     ) {
-        let mut last: Option<Point> = None;
+        let mut last: Option<CanvasPoint> = None;
         for (x, y) in points {
             let Some(here) = self.place(x, y).filter(|p| self.holds(*p)) else {
                 continue;
@@ -222,7 +222,7 @@ impl Panel {
     }
 
     /// The part of the segment inside the frame (Liang and Barsky, 1984).
-    fn clip(&self, a: Point, b: Point) -> Option<(Point, Point)> {
+    fn clip(&self, a: CanvasPoint, b: CanvasPoint) -> Option<(CanvasPoint, CanvasPoint)> {
         let (dx, dy) = (b.0 - a.0, b.1 - a.1);
         let (mut enter, mut leave) = (0.0f64, 1.0f64);
         let sides = [
@@ -257,7 +257,7 @@ pub enum Swatch {
 }
 
 /// Title and legend above the plots, laid out before the sheet's height is known.
-pub struct Header {
+pub struct FigureHeader {
     title: Vec<String>,
     /// (x, row, swatch, name)
     entries: Vec<(f64, usize, Swatch, String)>,
@@ -270,7 +270,7 @@ const TITLE_LINE: f64 = 25.0;
 const LEGEND_LINE: f64 = 24.0;
 const SWATCH: f64 = 34.0;
 
-impl Header {
+impl FigureHeader {
     /// `left` and `right` are the sides of the plots below.
     pub fn new(title: &str, legend: &[(Swatch, String)], left: f64, right: f64) -> Self {
         let room = (right - left).max(100.0);
@@ -288,7 +288,7 @@ impl Header {
         }
         let rows = if entries.is_empty() { 0 } else { row + 1 };
         let height = TOP + TITLE_LINE * title.len() as f64 + LEGEND_LINE * rows as f64;
-        Header {
+        FigureHeader {
             title,
             entries,
             left,

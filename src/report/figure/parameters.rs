@@ -1,15 +1,15 @@
 //! Parameters before and after calibration, as deviation from their nominal values.
 
-use super::axis::{Axis, extent, usable};
-use super::canvas::{Align, Canvas, Color, Stroke, paint};
+use super::axis::{FigureAxis, extent, usable};
+use super::canvas::{Align, Canvas, Color, Stroke, WIDTH, nothing_to_draw, paint};
 use super::frf::or;
-use super::panel::{Header, Panel, Swatch};
-use super::{WIDTH, nothing_to_draw, style};
+use super::panel::{FigureHeader, Panel, Swatch};
+use super::style;
 use crate::Result;
 use crate::report::number::plus_minus;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Estimate {
+pub struct DrawnEstimate {
     pub value: f64,
     pub std_error: Option<f64>,
 }
@@ -21,8 +21,8 @@ pub struct ParameterRow {
     pub unit: String,
     /// What the deviation is measured from; a row without a nonzero nominal shows its numbers only.
     pub nominal: f64,
-    pub before: Option<Estimate>,
-    pub after: Option<Estimate>,
+    pub before: Option<DrawnEstimate>,
+    pub after: Option<DrawnEstimate>,
 }
 
 /// Horizontal bars of value / nominal − 1 with standard errors, and the values in numbers beside them.
@@ -61,7 +61,7 @@ impl ParameterFigure {
         let (low, high) = (low.min(0.0), high.max(0.0));
         // All at their nominal: a span of a percent, not a magnified rounding error.
         let room = (0.06 * (high - low)).max(0.5);
-        let axis = Axis::linear("Deviation from nominal (%)", (low - room, high + room), 8);
+        let axis = FigureAxis::linear("Deviation from nominal (%)", (low - room, high + room), 8);
 
         let names = rows
             .iter()
@@ -70,7 +70,8 @@ impl ParameterFigure {
             .min(330.0);
         let left = names + 34.0;
         let right = f64::from(WIDTH) - NUMBERS;
-        let any = |state: fn(&ParameterRow) -> Option<Estimate>| rows.iter().any(|row| state(row).is_some());
+        let any =
+            |state: fn(&ParameterRow) -> Option<DrawnEstimate>| rows.iter().any(|row| state(row).is_some());
         let mut legend = vec![];
         if any(|row| row.before) {
             legend.push((
@@ -82,7 +83,7 @@ impl ParameterFigure {
             let label = format!("{}, with standard error", or(&self.after_label, "after"));
             legend.push((Swatch::Area(AFTER, 1.0), label));
         }
-        let header = Header::new(&self.title, &legend, left, f64::from(WIDTH) - 20.0);
+        let header = FigureHeader::new(&self.title, &legend, left, f64::from(WIDTH) - 20.0);
         let top = header.bottom() + 4.0;
         let bottom = top + ROW * rows.len() as f64;
         let panel = Panel {
@@ -91,7 +92,7 @@ impl ParameterFigure {
             right,
             bottom,
             x: axis,
-            y: Axis::categories("", &[]),
+            y: FigureAxis::categories("", &[]),
             x_labels: true,
         };
 
@@ -159,7 +160,7 @@ fn draw_row(canvas: &Canvas, panel: &Panel, row: &ParameterRow, y: f64) {
 }
 
 impl ParameterRow {
-    fn shown(&self) -> impl Iterator<Item = Estimate> {
+    fn shown(&self) -> impl Iterator<Item = DrawnEstimate> {
         [self.before, self.after]
             .into_iter()
             .flatten()
@@ -167,7 +168,7 @@ impl ParameterRow {
     }
 
     /// Deviation from nominal and its error, in percent of the nominal.
-    fn deviation(&self, estimate: Estimate) -> Option<(f64, f64)> {
+    fn deviation(&self, estimate: DrawnEstimate) -> Option<(f64, f64)> {
         let percent = |value: f64| Some(100.0 * value / self.nominal).filter(|v| usable(*v));
         let error = estimate.std_error.filter(|e| usable(*e)).unwrap_or(0.0);
         Some((percent(estimate.value - self.nominal)?, percent(error)?.abs()))

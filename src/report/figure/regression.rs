@@ -1,14 +1,14 @@
 //! Average force over feed with the fitted straight lines.
 
-use super::axis::{Axis, extent, usable};
-use super::canvas::{Canvas, Marker, paint};
+use super::axis::{FigureAxis, extent, usable};
+use super::canvas::{Canvas, Marker, WIDTH, nothing_to_draw, paint};
 use super::frf::or;
-use super::panel::{Header, Panel, Swatch};
-use super::{WIDTH, nothing_to_draw, style};
+use super::panel::{FigureHeader, Panel, Swatch};
+use super::style;
 use crate::Result;
 
 #[derive(Debug, Clone, Default)]
-pub struct RegressionPoint {
+pub struct RegressionMark {
     /// Such as the cut.
     pub label: String,
     pub x: f64,
@@ -22,7 +22,7 @@ pub struct RegressionPoint {
 pub struct RegressionSeries {
     /// Such as `Fx, R² = 0.998`.
     pub label: String,
-    pub points: Vec<RegressionPoint>,
+    pub points: Vec<RegressionMark>,
     /// (intercept, slope) of the fitted line in the units of the axes.
     pub line: Option<(f64, f64)>,
 }
@@ -50,7 +50,7 @@ impl RegressionFigure {
             return Err(nothing_to_draw(&self.title, "no series has a finite point"));
         };
         // From zero: the intercept is the edge force, half of what is looked for.
-        let x = Axis::from_zero(&self.x_label, xs, 8);
+        let x = FigureAxis::from_zero(&self.x_label, xs, 8);
         let bars = points().flat_map(|p| {
             let error = p.std_error.filter(|e| usable(*e)).unwrap_or(0.0);
             [p.y - error, p.y + error]
@@ -59,7 +59,7 @@ impl RegressionFigure {
         let ends =
             lines.flat_map(|(intercept, slope)| [intercept + slope * x.low, intercept + slope * x.high]);
         let ys = extent(bars.chain(ends).chain([0.0])).unwrap_or((0.0, 1.0));
-        let y = Axis::padded(&self.y_label, ys, 0.06, 7);
+        let y = FigureAxis::padded(&self.y_label, ys, 0.06, 7);
 
         // What the lines leave over is small beside the forces: it needs a scale of its own.
         let rests = self.series.iter().flat_map(RegressionSeries::rests);
@@ -68,7 +68,7 @@ impl RegressionFigure {
             [rest - error, rest + error]
         });
         let rests = extent(rests.filter(|v| usable(*v)).chain([0.0])).unwrap_or((0.0, 1.0));
-        let rest_axis = Axis::padded(&self.rest_label(), rests, 0.12, 5);
+        let rest_axis = FigureAxis::padded(&self.rest_label(), rests, 0.12, 5);
         let left = Panel::left_margin(&[&y, &rest_axis]);
         let right = f64::from(WIDTH) - Panel::RIGHT_MARGIN;
         let excluded = points().any(|p| p.excluded);
@@ -87,7 +87,7 @@ impl RegressionFigure {
                 "left out of the fit".to_owned(),
             )
         });
-        let header = Header::new(
+        let header = FigureHeader::new(
             &self.title,
             &legend.chain(crosses).collect::<Vec<_>>(),
             left,
@@ -148,7 +148,7 @@ impl RegressionFigure {
 
 impl RegressionFigure {
     /// `Residual (N)` where the forces are in N.
-    pub(in crate::report) fn rest_label(&self) -> String {
+    pub(crate) fn rest_label(&self) -> String {
         match self.y_label.rsplit_once(" (") {
             Some((_, unit)) => format!("Residual ({unit}"),
             None => "Residual".to_string(),
@@ -173,7 +173,7 @@ impl RegressionFigure {
 
 impl RegressionSeries {
     /// Points of the fit and how far each lies above the line; none without a line.
-    pub(in crate::report) fn rests(&self) -> impl Iterator<Item = (&RegressionPoint, f64)> {
+    pub(crate) fn rests(&self) -> impl Iterator<Item = (&RegressionMark, f64)> {
         let points = self.points.iter().filter(|p| !p.excluded);
         points.filter_map(|p| {
             let (intercept, slope) = self.line?;

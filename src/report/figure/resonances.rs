@@ -1,9 +1,9 @@
 //! Measured resonances against a model's modes before and after, row by row.
 
-use super::axis::{Axis, extent, usable};
-use super::canvas::{Marker, Stroke, paint};
-use super::panel::{Header, Panel, Swatch};
-use super::{WIDTH, nothing_to_draw, style};
+use super::axis::{FigureAxis, extent, usable};
+use super::canvas::{Marker, Stroke, WIDTH, nothing_to_draw, paint};
+use super::panel::{FigureHeader, Panel, Swatch};
+use super::style;
 use crate::Result;
 
 #[derive(Debug, Clone, Default)]
@@ -49,8 +49,8 @@ impl ResonanceFigure {
             .rev()
             .map(|r| style::TICK.fit(&r.label, 160.0))
             .collect();
-        let x = Axis::linear("Frequency (Hz)", (0.0, 1.1 * highest), 12);
-        let y = Axis::categories("Configuration and axis", &names);
+        let x = FigureAxis::linear("Frequency (Hz)", (0.0, 1.1 * highest), 12);
+        let y = FigureAxis::categories("Configuration and axis", &names);
         let left = Panel::left_margin(&[&y]);
         let right = f64::from(WIDTH) - Panel::RIGHT_MARGIN;
         let legend = [
@@ -61,7 +61,7 @@ impl ResonanceFigure {
             (Swatch::Line(BEFORE), self.before_label.clone()),
             (Swatch::Line(AFTER), self.after_label.clone()),
         ];
-        let header = Header::new(&self.title, &legend, left, right);
+        let header = FigureHeader::new(&self.title, &legend, left, right);
         let top = header.bottom();
         let panel = Panel {
             left,

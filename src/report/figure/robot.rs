@@ -1,10 +1,11 @@
 //! The robot as a stick figure, one small picture a posture.
 
-use super::WIDTH;
-use super::canvas::{Marker, paint};
-use super::mode_shapes::{COLUMNS, HEIGHT, Layout, MOVED, StickPicture, base_axes, picture_title, project};
-use super::panel::Header;
-use super::{nothing_to_draw, style};
+use super::canvas::{Marker, WIDTH, nothing_to_draw, paint};
+use super::mode_shapes::{
+    COLUMNS, HEIGHT, MOVED, PictureLayout, StickPicture, base_axes, picture_title, project,
+};
+use super::panel::FigureHeader;
+use super::style;
 use crate::Result;
 
 /// Postures drawn.
@@ -38,7 +39,7 @@ impl RobotFigure {
             return Err(nothing_to_draw(&self.title, "no posture"));
         }
         let (left, right) = (30.0, f64::from(WIDTH) - 30.0);
-        let header = Header::new(&self.title, &[], left, right);
+        let header = FigureHeader::new(&self.title, &[], left, right);
         let columns = COLUMNS.min(pictures.len());
         let size = ((right - left) / columns as f64, HEIGHT);
         let height = header.bottom() + HEIGHT * pictures.len().div_ceil(columns) as f64 + 16.0;
@@ -49,7 +50,7 @@ impl RobotFigure {
                     left + size.0 * (k % columns) as f64,
                     header.bottom() + HEIGHT * (k / columns) as f64,
                 );
-                let joints = Layout::new(picture, at, size).chain(0.0);
+                let joints = PictureLayout::new(picture, at, size).chain(0.0);
                 canvas.polyline(&joints, MOVED);
                 for joint in joints {
                     canvas.marker(joint, Marker::Disc, 4.5, style::INK);

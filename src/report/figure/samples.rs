@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use num_complex::Complex64;
 
 use super::*;
+use crate::Error;
 
 /// A deterministic stand-in for noise, −1 … 1.
 pub fn jitter(i: usize) -> f64 {
@@ -117,11 +118,11 @@ pub fn parameters() -> ParameterFigure {
         name: format!("joint {} stiffness", i + 1),
         unit: "N·m/rad".into(),
         nominal: 2.5e6 / (i + 1) as f64,
-        before: Some(Estimate {
+        before: Some(DrawnEstimate {
             value: 2.5e6 / (i + 1) as f64,
             std_error: None,
         }),
-        after: Some(Estimate {
+        after: Some(DrawnEstimate {
             value: 2.5e6 / (i + 1) as f64 * (1.0 + 0.3 * jitter(i)),
             std_error: Some(2.5e6 / (i + 1) as f64 * (0.002 + 0.03 * i as f64 * 0.4)),
         }),
@@ -130,11 +131,11 @@ pub fn parameters() -> ParameterFigure {
     rows.push(ParameterRow {
         name: "damping ratio".into(),
         nominal: 0.02,
-        before: Some(Estimate {
+        before: Some(DrawnEstimate {
             value: 0.02,
             std_error: None,
         }),
-        after: Some(Estimate {
+        after: Some(DrawnEstimate {
             value: 0.0263,
             std_error: Some(0.0004),
         }),
@@ -158,7 +159,7 @@ pub fn force_record() -> ForceRecord {
             let teeth = mean * (1.0 + 0.8 * (2.0 * PI * 120.0 * t).sin());
             drift + 2.0 * jitter(i) + if cutting { teeth } else { 0.0 }
         });
-        ForceChannel {
+        ForceTrace {
             label: label.into(),
             unit: "N".into(),
             start_s: 0.0,
@@ -187,7 +188,7 @@ pub fn regression() -> RegressionFigure {
             .map(|i| {
                 let x = 0.03 + 0.03 * i as f64;
                 let y = intercept + slope * x + 3.0 * jitter(i + 10 * k);
-                RegressionPoint {
+                RegressionMark {
                     label: format!("cut {i}"),
                     x,
                     y,
@@ -210,7 +211,7 @@ pub fn regression() -> RegressionFigure {
     }
 }
 
-pub fn lobe_curve(label: &str, least: f64, frequency_hz: f64) -> LobeCurve {
+pub fn lobe_curve(label: &str, least: f64, frequency_hz: f64) -> LobeTrace {
     let spindle_rpm: Vec<f64> = (100..=1500).map(f64::from).collect();
     let depth = |n: f64| {
         let waves = 60.0 * frequency_hz / (2.0 * n);
@@ -221,7 +222,7 @@ pub fn lobe_curve(label: &str, least: f64, frequency_hz: f64) -> LobeCurve {
         .iter()
         .map(|n| (!(700.0..740.0).contains(n)).then(|| depth(*n)))
         .collect();
-    LobeCurve {
+    LobeTrace {
         label: label.into(),
         spindle_rpm,
         depth_limit_mm,
@@ -326,7 +327,7 @@ pub fn side_by_side() -> SideBySide {
 }
 
 pub fn history() -> HistoryFigure {
-    let revision = |label: &str, fit, held_out| Revision {
+    let revision = |label: &str, fit, held_out| HistoryMark {
         label: label.into(),
         fit_nrms: fit,
         held_out_nrms: Some(held_out),

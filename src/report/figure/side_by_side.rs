@@ -1,10 +1,10 @@
 //! Bars in groups: published, measured and computed values of the same things.
 
-use super::axis::{Axis, extent, positive_extent, usable};
-use super::canvas::{Align, Canvas, Marker, paint};
+use super::axis::{FigureAxis, extent, positive_extent, usable};
+use super::canvas::{Align, Canvas, Marker, WIDTH, nothing_to_draw, paint};
 use super::frf::or;
-use super::panel::{Header, Panel, Swatch};
-use super::{WIDTH, nothing_to_draw, style};
+use super::panel::{FigureHeader, Panel, Swatch};
+use super::style;
 use crate::Result;
 use crate::report::number::significant;
 
@@ -65,7 +65,7 @@ impl SideBySide {
         let y = match self.log {
             true => positive_extent(shown()).map(|(low, high)| {
                 let low = 0.7 * low;
-                Axis::log(
+                FigureAxis::log(
                     &self.y_label,
                     (
                         low,
@@ -79,7 +79,7 @@ impl SideBySide {
                     if low < 0.0 { low - room } else { low },
                     if high > 0.0 { high + room } else { high },
                 );
-                Axis::from_zero(&self.y_label, (low, high), 7)
+                FigureAxis::from_zero(&self.y_label, (low, high), 7)
             }),
         };
         let Some(y) = y else {
@@ -102,7 +102,7 @@ impl SideBySide {
             )
         });
         let level_legend = level.map(|(name, _)| (Swatch::Line(style::LEVEL), name.clone()));
-        let header = Header::new(
+        let header = FigureHeader::new(
             &self.title,
             &legend.chain(level_legend).collect::<Vec<_>>(),
             left,
@@ -120,7 +120,7 @@ impl SideBySide {
                     .min(150.0)
             }
         };
-        let x = Axis::categories("", &vec![String::new(); count]);
+        let x = FigureAxis::categories("", &vec![String::new(); count]);
         let panel = Panel {
             left,
             top,

@@ -1,9 +1,9 @@
 //! Stabilisation diagram: poles over the model order, on top of the sum of the measured FRFs.
 
-use super::axis::{Axis, extent, positive_extent, usable};
-use super::canvas::{Color, Marker, paint};
-use super::panel::{Header, Panel, Swatch};
-use super::{WIDTH, nothing_to_draw, style};
+use super::axis::{FigureAxis, extent, positive_extent, usable};
+use super::canvas::{Color, Marker, WIDTH, nothing_to_draw, paint};
+use super::panel::{FigureHeader, Panel, Swatch};
+use super::style;
 use crate::Result;
 use crate::modal::stabilisation::Stability;
 
@@ -61,8 +61,8 @@ impl StabilisationFigure {
         else {
             return Err(nothing_to_draw(&self.title, "no poles"));
         };
-        let x = Axis::linear("Frequency (Hz)", frequencies, 10);
-        let y = Axis::from_zero("Model order", (0.0, highest), 8);
+        let x = FigureAxis::linear("Frequency (Hz)", frequencies, 10);
+        let y = FigureAxis::from_zero("Model order", (0.0, highest), 8);
         let left = Panel::left_margin(&[&y]);
         let right = f64::from(WIDTH) - 40.0;
         let mut legend: Vec<(Swatch, String)> = SIGNS
@@ -73,7 +73,7 @@ impl StabilisationFigure {
             Swatch::Line(style::LEVEL),
             "modes taken; behind: sum of the FRFs (log)".to_string(),
         ));
-        let header = Header::new(&self.title, &legend, left, right);
+        let header = FigureHeader::new(&self.title, &legend, left, right);
         let top = header.bottom();
         let panel = Panel {
             left,

@@ -6,6 +6,7 @@ use num_complex::Complex64;
 
 use super::samples::{frf_figure, gallery, jitter};
 use super::*;
+use crate::Error;
 
 /// Width, height and number of distinct colours.
 fn decoded(png: &[u8]) -> (u32, u32, usize) {
@@ -102,7 +103,7 @@ fn odd_curves(xs: &[f64], ys: &[f64]) -> Vec<Result<Vec<u8>, Error>> {
     let some = |v: &[f64]| v.iter().copied().map(Some).collect::<Vec<_>>();
     let lobes = LobesFigure {
         panels: vec![LobePanel {
-            curves: vec![LobeCurve {
+            curves: vec![LobeTrace {
                 spindle_rpm: xs.to_vec(),
                 depth_limit_mm: some(ys),
                 before_mm: some(xs),
@@ -127,7 +128,7 @@ fn odd_curves(xs: &[f64], ys: &[f64]) -> Vec<Result<Vec<u8>, Error>> {
 fn odd_points(xs: &[f64], ys: &[f64]) -> Vec<Result<Vec<u8>, Error>> {
     let pairs = || xs.iter().copied().zip(ys.iter().copied()).take(30);
     let first = |v: &[f64]| v.first().copied().unwrap_or(f64::NAN);
-    let points = pairs().map(|(x, y)| RegressionPoint {
+    let points = pairs().map(|(x, y)| RegressionMark {
         label: String::new(),
         x,
         y,
@@ -143,7 +144,7 @@ fn odd_points(xs: &[f64], ys: &[f64]) -> Vec<Result<Vec<u8>, Error>> {
         series: vec![series],
         ..Default::default()
     };
-    let revisions = pairs().map(|(x, y)| Revision {
+    let revisions = pairs().map(|(x, y)| HistoryMark {
         label: LONG.into(),
         fit_nrms: x,
         held_out_nrms: Some(y),
@@ -157,7 +158,7 @@ fn odd_points(xs: &[f64], ys: &[f64]) -> Vec<Result<Vec<u8>, Error>> {
         name: LONG.into(),
         unit: "N".into(),
         nominal: x,
-        before: Some(Estimate {
+        before: Some(DrawnEstimate {
             value: y,
             std_error: Some(x),
         }),
@@ -209,7 +210,7 @@ fn odd_numbers_never_panic() {
 fn odd_records_never_panic() {
     for (i, values) in odd_values().into_iter().enumerate() {
         for interval in [1e-4, 0.0, -1.0, f64::NAN, 1e250, 1e-250] {
-            let channel = ForceChannel {
+            let channel = ForceTrace {
                 label: LONG.into(),
                 sample_interval_s: interval,
                 samples: values.clone(),
@@ -411,7 +412,7 @@ fn a_cell_has_the_colour_of_its_value() {
 /// The gallery as a report, to look at in a browser (kept with `LOBESTONE_GALLERY`).
 #[test]
 fn the_gallery_makes_a_report_of_bearable_size() {
-    use crate::report::{Block, Column, Figure, Page, Section, Table};
+    use crate::report::{Block, Figure, Page, ReportSection, ReportTable, TableColumn};
     let figures = gallery().into_iter().map(|(name, png)| {
         Block::Figure(Figure {
             file_name: name.into(),
@@ -423,13 +424,13 @@ fn the_gallery_makes_a_report_of_bearable_size() {
             ..Figure::default()
         })
     });
-    let table = Table {
+    let table = ReportTable {
         caption: "Joint stiffness".into(),
         columns: vec![
-            Column::text("Parameter"),
-            Column::number("Nominal"),
-            Column::number("Calibrated"),
-            Column::text("Remark"),
+            TableColumn::text("Parameter"),
+            TableColumn::number("Nominal"),
+            TableColumn::number("Calibrated"),
+            TableColumn::text("Remark"),
         ],
         rows: (1..=6)
             .map(|i| {
@@ -441,7 +442,7 @@ fn the_gallery_makes_a_report_of_bearable_size() {
             .collect(),
         notes: vec!["Errors are one standard deviation.".into()],
     };
-    let summary = Section {
+    let summary = ReportSection {
         title: "Summary".into(),
         lead: "The calibrated model explains the measurement down to 11 %; the noise alone is 2 %.".into(),
         blocks: vec![
@@ -459,7 +460,7 @@ fn the_gallery_makes_a_report_of_bearable_size() {
         ],
         ..Default::default()
     };
-    let all = Section {
+    let all = ReportSection {
         title: "All figures".into(),
         blocks: figures.collect(),
         ..Default::default()

@@ -1,10 +1,10 @@
 //! Forces over a revolution or a hole: one panel an axis, one scale of time for all.
 
-use super::axis::{Axis, extent, usable};
-use super::canvas::{Marker, paint};
+use super::axis::{FigureAxis, extent, usable};
+use super::canvas::{Marker, WIDTH, nothing_to_draw, paint};
 use super::frf::or;
-use super::panel::{Header, Panel, Swatch};
-use super::{WIDTH, nothing_to_draw, style};
+use super::panel::{FigureHeader, Panel, Swatch};
+use super::style;
 use crate::Result;
 
 /// One axis: measured and modelled values over the same abscissa.
@@ -48,14 +48,14 @@ impl WaveformFigure {
                 "there is no cut with usable channels",
             ));
         };
-        let x = Axis::linear(&self.x_label, xs, 9);
-        let scales: Vec<Axis> = self
+        let x = FigureAxis::linear(&self.x_label, xs, 9);
+        let scales: Vec<FigureAxis> = self
             .panels
             .iter()
             .map(|panel| {
                 let all = panel.measured.iter().chain(panel.models.iter().flatten());
                 let range = extent(all.copied().filter(|v| usable(*v))).unwrap_or((0.0, 1.0));
-                Axis::padded(&panel.label, range, 0.08, 4)
+                FigureAxis::padded(&panel.label, range, 0.08, 4)
             })
             .collect();
         let left = Panel::left_margin(&scales.iter().collect::<Vec<_>>());
@@ -69,7 +69,7 @@ impl WaveformFigure {
             let stroke = style::model(i, count);
             (Swatch::Line(stroke), or(name, "model").to_owned())
         }));
-        let header = Header::new(&self.title, &legend.collect::<Vec<_>>(), left, right);
+        let header = FigureHeader::new(&self.title, &legend.collect::<Vec<_>>(), left, right);
         let panels = Panel::stack(&x, scales, [left, right], header.bottom(), PANEL_HEIGHT, GAP);
         let bottom = panels.last().map_or(header.bottom(), |p| p.bottom);
         paint(WIDTH, (bottom + Panel::BOTTOM_MARGIN) as u32, |canvas| {

@@ -2,10 +2,10 @@
 
 use num_complex::Complex64;
 
-use super::canvas::{Color, Marker, Stroke, paint};
+use super::canvas::{Color, Marker, Stroke, WIDTH, nothing_to_draw, paint};
 use super::mode_shapes::{HEIGHT, base_axes, project};
-use super::panel::{Header, Swatch};
-use super::{WIDTH, nothing_to_draw, style};
+use super::panel::{FigureHeader, Swatch};
+use super::style;
 use crate::Result;
 
 /// One mode on all nodes.
@@ -202,7 +202,7 @@ impl WireShapesFigure {
                 "measured points".to_owned(),
             ),
         ];
-        let header = Header::new(&self.title, &legend, left, right);
+        let header = FigureHeader::new(&self.title, &legend, left, right);
         let columns = COLUMNS.min(self.pictures.len());
         let width = (right - left) / columns as f64;
         let rows = self.pictures.len().div_ceil(columns);

@@ -4,8 +4,8 @@ use num_complex::Complex64;
 use serde_json::{Value, json};
 
 use super::frf::{Look, bode_layout, bode_trace, nyquist_layout, nyquist_trace};
-use super::numbers;
 use super::packed::{magnitudes, phases};
+use super::plot::numbers;
 use crate::analysis::StructureFindings;
 use crate::campaign::{MeasuredDof, Point};
 use crate::discrepancy::FrfComparison;
@@ -26,26 +26,26 @@ pub struct Explorer {
 }
 
 /// A model of the FRFs: what it is called, what it predicts and how well.
-pub struct Stage<'a> {
+pub struct ExplorerStage<'a> {
     pub title: String,
     predicted: &'a [Vec<Complex64>],
     pub comparison: &'a FrfComparison,
 }
 
 /// The models of a campaign from the robot file's to the present one.
-pub fn stages(findings: &StructureFindings) -> Vec<Stage<'_>> {
+pub fn stages(findings: &StructureFindings) -> Vec<ExplorerStage<'_>> {
     let analysis = &findings.analysis;
-    let first = Stage {
+    let first = ExplorerStage {
         title: ROBOT_FILE.into(),
         predicted: &analysis.nominal,
         comparison: &analysis.before,
     };
-    let earlier = findings.earlier.iter().map(|stage| Stage {
+    let earlier = findings.earlier.iter().map(|stage| ExplorerStage {
         title: revision_title(&stage.title),
         predicted: &stage.predicted,
         comparison: &stage.comparison,
     });
-    let now = Stage {
+    let now = ExplorerStage {
         title: match analysis.case.revisions.last() {
             Some(current) => revision_title(&current.title()),
             None => CALIBRATED.into(),
@@ -56,7 +56,7 @@ pub fn stages(findings: &StructureFindings) -> Vec<Stage<'_>> {
     std::iter::once(first).chain(earlier).chain([now]).collect()
 }
 
-impl Stage<'_> {
+impl ExplorerStage<'_> {
     /// At the beginning of a title.
     pub fn named(&self) -> String {
         match self.title.as_str() {
@@ -158,7 +158,7 @@ impl Explorer {
         Explorer { value, every }
     }
 
-    pub(in crate::report) fn value(&self) -> &Value {
+    pub(crate) fn value(&self) -> &Value {
         &self.value
     }
 }

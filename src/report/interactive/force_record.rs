@@ -2,10 +2,10 @@
 
 use serde_json::{Value, json};
 
-use super::{Plot, axis, axis_name, css, css_with, line, number, numbers, stacked, text, with};
+use super::plot::{Plot, axis, axis_name, css, css_with, line, number, numbers, stacked, text, with};
 use crate::report::figure::canvas::Color;
 use crate::report::figure::force_record::{AIR, DRIFT, ENVELOPE, LEVEL, STEADY};
-use crate::report::figure::{ForceChannel, ForceRecord};
+use crate::report::figure::{ForceRecord, ForceTrace};
 
 /// Pairs of smallest and largest value in the page, one channel.
 const MOST_PAIRS: usize = 1000;
@@ -41,7 +41,7 @@ impl ForceRecord {
                 );
             }
         }
-        let axis_of = |c: &ForceChannel| (axis(&format!("{} ({})", text(&c.label), text(&c.unit))), 1.0);
+        let axis_of = |c: &ForceTrace| (axis(&format!("{} ({})", text(&c.label), text(&c.unit))), 1.0);
         let mut layout = stacked(axis("Time (s)"), self.channels.iter().map(axis_of).collect());
         let air = self.air_s.iter().map(|s| (*s, AIR));
         let steady = self.steady_s.iter().map(|s| (*s, STEADY));
@@ -97,7 +97,7 @@ fn heading(x: f64, name: &str) -> Value {
 }
 
 /// Time and value of the smallest and the largest sample of each of up to [`MOST_PAIRS`] stretches, in their order.
-fn extremes(channel: &ForceChannel) -> Vec<(f64, f64)> {
+fn extremes(channel: &ForceTrace) -> Vec<(f64, f64)> {
     let time = |i: usize| channel.start_s + channel.sample_interval_s * i as f64;
     let stretch = channel.samples.len().div_ceil(2 * MOST_PAIRS).max(1) * 2;
     let mut points = Vec::new();
@@ -129,11 +129,11 @@ mod tests {
         let mut samples: Vec<f64> = (0..100_000).map(|i| (f64::from(i) * 0.01).sin()).collect();
         samples[54_321] = 9.0;
         samples[54_322] = -9.0;
-        let channel = ForceChannel {
+        let channel = ForceTrace {
             samples,
             sample_interval_s: 1e-3,
             start_s: 1.0,
-            ..ForceChannel::default()
+            ..ForceTrace::default()
         };
         let points = extremes(&channel);
         assert!(points.len() <= 2 * MOST_PAIRS, "{}", points.len());
@@ -141,10 +141,10 @@ mod tests {
         let at = |value: f64| points.iter().find(|p| p.1 == value).unwrap().0;
         assert!((at(9.0) - 55.321).abs() < 1e-9 && (at(-9.0) - 55.322).abs() < 1e-9);
         // Few samples are all there.
-        let few = ForceChannel {
+        let few = ForceTrace {
             samples: vec![3.0, f64::NAN, 1.0, 2.0],
             sample_interval_s: 1.0,
-            ..ForceChannel::default()
+            ..ForceTrace::default()
         };
         assert_eq!(extremes(&few), [(0.0, 3.0), (2.0, 1.0), (3.0, 2.0)]);
     }

@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 use serde_json::{Value, json};
 
-use super::{Plot, axis, layout, line, number, numbers, sign, stacked, text, with};
+use super::plot::{Plot, axis, layout, line, number, numbers, sign, stacked, text, with};
 use crate::report::figure::canvas::{Marker, Stroke};
 use crate::report::figure::{FrfCurve, FrfFigure, NyquistFigure, style};
 
@@ -63,7 +63,7 @@ pub fn bode_trace(label: &str, look: Look, panel: usize, unit: &str) -> Value {
         _ => PHASE_HOVER.to_string(),
     };
     let mut trace = trace(label, look);
-    trace["yaxis"] = json!(super::axis_name('y', panel));
+    trace["yaxis"] = json!(super::plot::axis_name('y', panel));
     trace["showlegend"] = json!(panel == 0);
     trace["hovertemplate"] = json!(hover);
     trace

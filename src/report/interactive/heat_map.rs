@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::{Plot, axis, axis_key, axis_name, css, layout, number, text, with};
+use super::plot::{Plot, axis, axis_key, axis_name, css, layout, number, text, with};
 use crate::report::figure::{CellFormat, HeatMap, style};
 use crate::report::number::significant;
 

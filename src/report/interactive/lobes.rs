@@ -2,9 +2,9 @@
 
 use serde_json::{Value, json};
 
-use super::{Plot, axis, axis_name, css, css_with, line, number, numbers, sign, stacked, text, with};
+use super::plot::{Plot, axis, axis_name, css, css_with, line, number, numbers, sign, stacked, text, with};
 use crate::report::figure::lobes::{BAND, BEFORE, UNSTABLE, sign as look};
-use crate::report::figure::{LobeCurve, LobeOutcome, LobePanel, LobesFigure, style};
+use crate::report::figure::{LobeOutcome, LobePanel, LobeTrace, LobesFigure, style};
 
 impl LobesFigure {
     pub fn plot(&self) -> Plot {
@@ -69,7 +69,7 @@ impl Traces {
     }
 
     /// The side above the limit.
-    fn unstable(&mut self, curve: &LobeCurve, top: f64, i: usize) {
+    fn unstable(&mut self, curve: &LobeTrace, top: f64, i: usize) {
         let rpm = numbers(curve.spindle_rpm.iter().copied());
         let edge = json!({ "width": 0 });
         let limit = curve.depth_limit_mm.iter().map(|d| d.unwrap_or(top).min(top));
@@ -81,7 +81,7 @@ impl Traces {
         self.add("unstable", i, above);
     }
 
-    fn curve(&mut self, curve: &LobeCurve, k: usize, i: usize) {
+    fn curve(&mut self, curve: &LobeTrace, k: usize, i: usize) {
         let rpm = numbers(curve.spindle_rpm.iter().copied());
         let depths = |values: &[Option<f64>]| numbers(values.iter().map(|d| d.unwrap_or(f64::NAN)));
         let hover = "%{x:.0f} rpm: %{y:.3g} mm";
@@ -170,11 +170,11 @@ mod tests {
     fn bands_have_an_end_and_each_name_stands_once_in_the_legend() {
         let panel = |name: &str| LobePanel {
             name: name.into(),
-            curves: vec![LobeCurve {
+            curves: vec![LobeTrace {
                 spindle_rpm: vec![100.0, 200.0],
                 depth_limit_mm: vec![Some(1.0), None],
                 band_mm: Some([vec![Some(0.8), Some(2.0)], vec![Some(1.2), None]]),
-                ..LobeCurve::default()
+                ..LobeTrace::default()
             }],
             markers: vec![LobeMarker {
                 spindle_rpm: 150.0,

@@ -2,9 +2,9 @@
 
 use serde_json::{Value, json};
 
-use super::{Plot, axis, axis_name, line, numbers, sign, stacked, symbol, text, with};
+use super::plot::{Plot, axis, axis_name, line, numbers, sign, stacked, symbol, text, with};
 use crate::report::figure::canvas::Marker;
-use crate::report::figure::{RegressionFigure, RegressionPoint, RegressionSeries, style};
+use crate::report::figure::{RegressionFigure, RegressionMark, RegressionSeries, style};
 
 impl RegressionFigure {
     pub fn plot(&self) -> Plot {
@@ -55,9 +55,9 @@ impl RegressionFigure {
 }
 
 /// `points` of a series in the upper (0) or lower (1) panel.
-fn signs(series: &RegressionSeries, i: usize, panel: usize, points: Vec<(&RegressionPoint, f64)>) -> Value {
+fn signs(series: &RegressionSeries, i: usize, panel: usize, points: Vec<(&RegressionMark, f64)>) -> Value {
     let name = text(&series.label);
-    let shape = |p: &RegressionPoint| match p.excluded {
+    let shape = |p: &RegressionMark| match p.excluded {
         true => Marker::Cross,
         false => style::series_marker(i),
     };
@@ -92,7 +92,7 @@ mod tests {
 
     #[test]
     fn residuals_are_what_the_line_leaves_over() {
-        let point = |x, y, excluded| RegressionPoint {
+        let point = |x, y, excluded| RegressionMark {
             label: "cut 1".into(),
             x,
             y,

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::{Plot, css, layout, number, numbers, text};
+use super::plot::{Plot, css, layout, number, numbers, text};
 use crate::report::figure::{RobotFigure, style};
 
 impl RobotFigure {

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::{Plot, axis, css, layout, number, numbers, with};
+use super::plot::{Plot, axis, css, layout, number, numbers, with};
 use crate::report::figure::style;
 
 /// The surface b(n, θ) as numbers.

@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use super::frf::Look;
-use super::{Plot, axis, axis_name, line, numbers, sign, stacked, text, with};
+use super::plot::{Plot, axis, axis_name, line, numbers, sign, stacked, text, with};
 use crate::report::figure::canvas::Marker;
 use crate::report::figure::{WaveformFigure, style};
 

@@ -1,0 +1,248 @@
+//! FRFs to analyse, out of FRF files and raw tap tests.
+
+use std::f64::consts::TAU;
+use std::path::Path;
+
+use num_complex::Complex64;
+
+use super::mode_set::FrfInput;
+use crate::ingest::units::{self, Dimension};
+use crate::ingest::{self, Channel, FrfRecord, Quantity, TimeRecord};
+use crate::modal::{self, Hit, TapRecord, TapSettings};
+use crate::{Error, InputError, Result};
+
+/// FRFs of one file: as they stand there, or from the hits of a raw record.
+pub(super) fn read(
+    path: &Path,
+    taps: &TapSettings,
+    hits: &mut Vec<(String, Vec<Hit>)>,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<FrfInput>> {
+    let set = path.display().to_string();
+    let file = ingest::read_file(path)?;
+    warnings.extend(file.warnings.iter().map(|w| format!("{set}: {w}")));
+    if !file.contents.frfs.is_empty() {
+        let unsaid = file.contents.frfs.iter().filter(|r| r.quantity.is_none()).count();
+        if unsaid > 0 {
+            warnings.push(format!(
+                "{set}: the file does not say what its {unsaid} FRFs are; taken as receptance (m/N)"
+            ));
+        }
+        return Ok(file
+            .contents
+            .frfs
+            .into_iter()
+            .map(|r| frf_input(&set, r))
+            .collect());
+    }
+    if file.contents.times.is_empty() {
+        return Err(InputError::new(format!(
+            "neither FRFs nor a raw tap test in this {} file, but {}",
+            file.format,
+            file.contents.describe()
+        ))
+        .file(path)
+        .remedy("give a UFF 58 file or a CSV with FRFs, or a time record of hammer and sensors")
+        .into());
+    }
+    let mut inputs = Vec::new();
+    for alike in file.contents.times.chunk_by(TimeRecord::same_channels) {
+        inputs.extend(from_segments(&set, path, alike, taps, hits, warnings)?);
+    }
+    Ok(inputs)
+}
+
+/// FRFs of records with the same channels: of all hits together, unless they contradict each other (a hammer that goes
+/// from point to point).
+fn from_segments(
+    set: &str,
+    path: &Path,
+    segments: &[TimeRecord],
+    taps: &TapSettings,
+    hits: &mut Vec<(String, Vec<Hit>)>,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<FrfInput>> {
+    let [first, others @ ..] = segments else {
+        return Ok(Vec::new());
+    };
+    if others.is_empty() {
+        return Ok(from_taps(set, path, first, taps, hits, warnings)?.frfs);
+    }
+    let mut whole = first.clone();
+    others.iter().for_each(|segment| whole.append(segment));
+    let (mut their_hits, mut their_warnings) = (Vec::new(), Vec::new());
+    let together = from_taps(set, path, &whole, taps, &mut their_hits, &mut their_warnings)?;
+    if !together.contradictory {
+        warnings.push(format!(
+            "{set}: {} records with the same channels: their hits are averaged",
+            segments.len()
+        ));
+        warnings.extend(their_warnings);
+        hits.extend(their_hits);
+        return Ok(together.frfs);
+    }
+    warnings.push(format!(
+        "{set}: {} records with the same channels, whose hits contradict each other (other points or directions, or noise \
+         as large as the response): FRFs of each record alone",
+        segments.len()
+    ));
+    let mut inputs = Vec::new();
+    for (k, segment) in segments.iter().enumerate() {
+        let alone = from_taps(set, path, segment, taps, hits, warnings)?.frfs;
+        inputs.extend(alone.into_iter().map(|input| FrfInput {
+            name: format!("{} record {}", input.name, k + 1),
+            ..input
+        }));
+    }
+    Ok(inputs)
+}
+
+/// FRFs of a tap record, and whether its hits contradict each other.
+struct FromTaps {
+    frfs: Vec<FrfInput>,
+    contradictory: bool,
+}
+
+fn frf_input(set: &str, record: FrfRecord) -> FrfInput {
+    FrfInput {
+        set: set.to_owned(),
+        receptance_m_per_n: receptance(&record.frequency_hz, &record.value, record.quantity),
+        dofs: record
+            .response
+            .zip(record.reference)
+            .map(|(a, b)| [a.to_string(), b.to_string()]),
+        name: record.name,
+        frequency_hz: record.frequency_hz,
+        coherence: record.coherence,
+        added_decay_per_s: 0.0,
+    }
+}
+
+/// H = V/(iω) = A/(iω)². The 0 Hz line of a mobility or accelerance says nothing about receptance; it comes
+/// out as not finite and the analysis leaves it out anyway.
+fn receptance(frequency_hz: &[f64], value: &[Complex64], quantity: Option<Quantity>) -> Vec<Complex64> {
+    let order = match quantity {
+        None | Some(Quantity::Receptance) => return value.to_vec(),
+        Some(Quantity::Mobility) => 1,
+        Some(Quantity::Accelerance) => 2,
+    };
+    let lines = frequency_hz.iter().zip(value);
+    lines
+        .map(|(f, v)| v / Complex64::new(0.0, TAU * f).powi(order))
+        .collect()
+}
+
+/// The hammer's channel: the only one in newtons, or else the only one that is called so.
+fn hammer<'a>(record: &'a TimeRecord, path: &Path) -> Result<&'a Channel> {
+    let in_newtons =
+        |c: &&Channel| units::parse(&c.file_unit).is_some_and(|u| u.dimension == Dimension::FORCE);
+    let called = |c: &&Channel| {
+        let name = c.name.to_lowercase();
+        ["hammer", "force", "impact", "kladivo", "kraft"]
+            .iter()
+            .any(|w| name.contains(w))
+    };
+    let by = |test: &dyn Fn(&&Channel) -> bool| -> Vec<&'a Channel> {
+        record.channels.iter().filter(|c| test(c)).collect()
+    };
+    let (newtons, named) = (by(&in_newtons), by(&called));
+    match (newtons.as_slice(), named.as_slice()) {
+        ([one], _) | ([], [one]) => Ok(one),
+        _ => {
+            let names: Vec<&str> = record.channels.iter().map(|c| c.name.as_str()).collect();
+            let both: Vec<&&Channel> = newtons.iter().filter(|c| called(c)).collect();
+            match both.as_slice() {
+                [one] => Ok(one),
+                _ => Err(InputError::new(format!(
+                    "a time record without exactly one hammer channel ({})",
+                    names.join(", ")
+                ))
+                .file(path)
+                .remedy("give the hammer's channel the unit N, or call it force; cutting forces go to `lobestone cfc`")
+                .into()),
+            }
+        }
+    }
+}
+
+fn from_taps(
+    set: &str,
+    path: &Path,
+    record: &TimeRecord,
+    taps: &TapSettings,
+    hits: &mut Vec<(String, Vec<Hit>)>,
+    warnings: &mut Vec<String>,
+) -> Result<FromTaps> {
+    let hammer = hammer(record, path)?;
+    let sensors: Vec<(&Channel, Quantity)> = record
+        .channels
+        .iter()
+        .filter(|c| !std::ptr::eq(*c, hammer))
+        .filter_map(|c| {
+            let motion = units::parse(&c.file_unit).and_then(|u| u.dimension.motion());
+            if motion.is_none() {
+                warnings.push(format!(
+                    "{set}: channel {} ({}) is no displacement, velocity or acceleration: left out",
+                    c.name, c.file_unit
+                ));
+            }
+            Some((c, motion?))
+        })
+        .collect();
+    if sensors.is_empty() {
+        return Err(InputError::new("a tap record without a response channel")
+            .file(path)
+            .remedy("give the sensors' channels a unit: m/s² or g, m/s, m or µm")
+            .into());
+    }
+    let responses: Vec<&[f64]> = sensors.iter().map(|(c, _)| c.samples.as_slice()).collect();
+    let tap = TapRecord {
+        sample_rate_hz: record.sample_rate_hz,
+        force_n: &hammer.samples,
+        responses: &responses,
+    };
+    let found = modal::impact_test(&tap, taps).map_err(|e| match e {
+        Error::Input(e) => (*e).file(path).into(),
+        other => other,
+    })?;
+    warnings.extend(found.warnings.iter().map(|w| format!("{set}: {w}")));
+    hits.push((set.to_owned(), found.hits));
+    let frfs = sensors
+        .iter()
+        .enumerate()
+        .map(|(k, (channel, quantity))| FrfInput {
+            name: format!("{}/{}", channel.name, hammer.name),
+            set: set.to_owned(),
+            dofs: None,
+            receptance_m_per_n: receptance(&found.frequency_hz, &found.frf[k], Some(*quantity)),
+            frequency_hz: found.frequency_hz.clone(),
+            coherence: found.coherence.as_ref().map(|c| c[k].clone()),
+            added_decay_per_s: found.added_decay_per_s,
+        })
+        .collect();
+    Ok(FromTaps {
+        frfs,
+        contradictory: found.contradictory,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn accelerance_and_mobility_become_receptance() {
+        let f = 10.0;
+        let omega = TAU * f;
+        let of = |value: Complex64, quantity| receptance(&[f], &[value], quantity)[0].re;
+        let a = of(
+            Complex64::new(-omega * omega * 2e-6, 0.0),
+            Some(Quantity::Accelerance),
+        );
+        let v = of(Complex64::new(0.0, omega * 2e-6), Some(Quantity::Mobility));
+        let x = of(Complex64::new(2e-6, 0.0), None);
+        for value in [a, v, x] {
+            approx::assert_relative_eq!(value, 2e-6, max_relative = 1e-12);
+        }
+    }
+}

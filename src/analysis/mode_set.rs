@@ -1,0 +1,302 @@
+//! The FRFs of one posture or file, and the modes that they share.
+
+use std::borrow::Cow;
+use std::f64::consts::TAU;
+
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use crate::Result;
+use crate::modal::delay::{self, Delay};
+use crate::modal::quality::{self, Quality, QualityGrade};
+use crate::modal::{self, FrfModes, GlobalModes, SetMember, Settings};
+
+/// One FRF to analyse.
+#[derive(Debug, Clone)]
+pub struct FrfInput {
+    /// For people, and to tell one FRF of the set from another.
+    pub name: String,
+    /// Posture or file: FRFs of one set share their modes.
+    pub set: String,
+    /// Response and reference, as text that is equal where the degree of freedom is.
+    pub dofs: Option<[String; 2]>,
+    /// Lines, ascending.
+    pub frequency_hz: Vec<f64>,
+    /// By line.
+    pub receptance_m_per_n: Vec<Complex64>,
+    /// By line, 0 to 1; `None` where the file has none.
+    pub coherence: Option<Vec<f64>>,
+    /// What an exponential window added to ζω of every mode; taken out of the results.
+    pub added_decay_per_s: f64,
+}
+
+/// One FRF and what was found in it.
+#[derive(Debug, Clone)]
+pub struct AnalysedFrf {
+    /// The FRF.
+    pub input: FrfInput,
+    /// Modes found in this FRF alone.
+    pub modes: FrfModes,
+    /// How far it can be trusted.
+    pub quality: Quality,
+}
+
+/// One posture or file.
+#[derive(Debug, Clone)]
+pub struct SetModes {
+    /// The posture or file.
+    pub set: String,
+    /// In the order of the inputs.
+    pub frfs: Vec<AnalysedFrf>,
+    /// Degrees of freedom by the numbers that [`modal::GlobalMode::shape`] uses.
+    pub dofs: Vec<String>,
+    /// The modes that all FRFs share.
+    pub global: GlobalModes,
+    /// How far the set can be trusted: the worse of its FRFs and of the shared fit.
+    pub verdict: QualityGrade,
+    /// The verdict in words.
+    pub why: String,
+}
+
+/// Response and reference of each FRF as numbers of [`SetModes::dofs`].
+pub fn dofs_of_frfs(set: &SetModes) -> Vec<Option<[usize; 2]>> {
+    let number = |name: &String| set.dofs.iter().position(|d| d == name);
+    set.frfs
+        .iter()
+        .map(|f| {
+            let [response, reference] = f.input.dofs.as_ref()?;
+            Some([number(response)?, number(reference)?])
+        })
+        .collect()
+}
+
+/// The modes of one set.
+///
+/// # Errors
+/// Frequencies that are not ascending.
+pub(super) fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Settings) -> Result<SetModes> {
+    let sines = sines_of(&inputs);
+    #[allow(clippy::type_complexity)]
+    let clean: Vec<(Cow<[f64]>, Cow<[Complex64]>)> = inputs
+        .iter()
+        .map(|input| {
+            let (f, h) = (&input.frequency_hz[..], &input.receptance_m_per_n[..]);
+            if sines.is_empty() {
+                return (Cow::Borrowed(f), Cow::Borrowed(h));
+            }
+            let (f, h) = modal::without_sines(f, h, &sines);
+            (Cow::Owned(f), Cow::Owned(h))
+        })
+        .collect();
+    let single = modal::analyse_frfs(&clean, settings)?;
+    let mut dofs: Vec<String> = inputs
+        .iter()
+        .filter_map(|i| i.dofs.as_ref())
+        .flatten()
+        .cloned()
+        .collect();
+    dofs.sort();
+    dofs.dedup();
+    let number = |name: &String| dofs.binary_search(name).ok();
+    let members: Vec<SetMember> = inputs
+        .iter()
+        .zip(&clean)
+        .zip(&single)
+        .map(|((input, (frequency_hz, receptance_m_per_n)), modes)| SetMember {
+            frequency_hz,
+            receptance_m_per_n,
+            modes,
+            dofs: input
+                .dofs
+                .as_ref()
+                .and_then(|[a, b]| Some([number(a)?, number(b)?])),
+        })
+        .collect();
+    let mut global = modal::global(&members, settings)?;
+    if !sines.is_empty() {
+        let told: Vec<String> = sines
+            .iter()
+            .map(|s| format!("{:.2} Hz ({})", s.frequency_hz, s.what))
+            .collect();
+        global.warnings.push(format!(
+            "sine lines without a resonance, taken out before the fits: {}",
+            told.join(", ")
+        ));
+    }
+    global.sine_lines = sines;
+    let mirror = |k: usize| {
+        let [response, reference] = inputs[k].dofs.as_ref()?;
+        if response == reference {
+            return None;
+        }
+        let other = inputs.iter().position(|i| {
+            i.dofs
+                .as_ref()
+                .is_some_and(|[a, b]| a == reference && b == response)
+        })?;
+        global.reconstructions[other].as_ref()
+    };
+    let qualities: Vec<Quality> = inputs
+        .par_iter()
+        .enumerate()
+        .map(|(k, input)| {
+            quality::judge(
+                &input.frequency_hz,
+                &input.receptance_m_per_n,
+                input.coherence.as_deref(),
+                global.reconstructions[k].as_ref(),
+                mirror(k),
+            )
+        })
+        .collect();
+    let (of_frfs, why) = quality::of_set(&qualities.iter().collect::<Vec<_>>());
+    let verdict = of_frfs.max(global.quality.verdict);
+    let why = [why].into_iter().chain(global.quality.reasons.iter().cloned());
+    let why = why.collect::<Vec<_>>().join("; ");
+    // A record's window is the same for all its FRFs.
+    let added = inputs.iter().map(|i| i.added_decay_per_s).fold(0.0, f64::max);
+    let mut lost = Vec::new();
+    if added > 0.0 {
+        let without = |f: f64, zeta: f64| zeta - added / (TAU * f);
+        global.modes.retain_mut(|mode| {
+            mode.damping_ratio = without(mode.frequency_hz, mode.damping_ratio);
+            let left = mode.damping_ratio > 0.0;
+            if !left {
+                lost.push(format!("{:.2} Hz", mode.frequency_hz));
+            }
+            left
+        });
+        if !lost.is_empty() {
+            global.warnings.push(format!(
+                "no damping is left when the window's is taken out (left out): {}",
+                lost.join(", ")
+            ));
+        }
+    }
+    let frfs = inputs
+        .into_iter()
+        .zip(single)
+        .zip(qualities)
+        .map(|((input, mut modes), quality)| {
+            for mode in &mut modes.modes {
+                for e in &mut mode.estimates {
+                    e.damping_ratio -= input.added_decay_per_s / (TAU * e.frequency_hz);
+                }
+                mode.estimates.retain(|e| e.damping_ratio > 0.0);
+            }
+            modes.modes.retain(|m| !m.estimates.is_empty());
+            AnalysedFrf {
+                input,
+                modes,
+                quality,
+            }
+        })
+        .collect();
+    Ok(SetModes {
+        set,
+        frfs,
+        dofs,
+        global,
+        verdict,
+        why,
+    })
+}
+
+/// Sines among FRFs that share their lines.
+fn sines_of(inputs: &[FrfInput]) -> Vec<modal::SineLine> {
+    let Some(first) = inputs.first() else {
+        return Vec::new();
+    };
+    if inputs.iter().any(|i| i.frequency_hz != first.frequency_hz) {
+        return Vec::new();
+    }
+    let curves: Vec<&[Complex64]> = inputs.iter().map(|i| i.receptance_m_per_n.as_slice()).collect();
+    modal::sine_lines(&first.frequency_hz, &curves)
+}
+
+/// What is worth saying of a set, one line for each kind of trouble.
+pub(super) fn set_warnings(set: &SetModes) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for frf in &set.frfs {
+        lines.extend(
+            frf.modes
+                .warnings
+                .iter()
+                .map(|w| format!("{} {}: {w}", set.set, frf.input.name)),
+        );
+    }
+    // The same trouble in several FRFs is one line.
+    const BACKWARDS: &str = "turns the wrong way round";
+    let backwards: Vec<&str> = set
+        .frfs
+        .iter()
+        .filter(|f| f.modes.warnings.iter().any(|w| w.contains(BACKWARDS)))
+        .map(|f| f.input.name.as_str())
+        .collect();
+    if backwards.len() > 1 {
+        lines.retain(|l| !l.contains(BACKWARDS));
+        let shown = backwards.iter().take(4).copied().collect::<Vec<_>>().join(", ");
+        let more = backwards.len().saturating_sub(4);
+        lines.push(format!(
+            "{}: {} of {} FRFs have peaks that turn the wrong way round (negative damping), left out: {shown}{} (where: \
+             --json)",
+            set.set,
+            backwards.len(),
+            set.frfs.len(),
+            if more > 0 { format!(" and {more} more") } else { String::new() },
+        ));
+    }
+    let conjugated: Vec<&AnalysedFrf> = set.frfs.iter().filter(|f| f.modes.conjugated).collect();
+    if conjugated.len() > 3 {
+        lines.retain(|l| !l.contains("conjugated"));
+        lines.push(format!(
+            "{}: the phase of {} of {} FRFs is conjugated (sign convention e^(-iωt)): they were turned to e^(+iωt)",
+            set.set,
+            conjugated.len(),
+            set.frfs.len()
+        ));
+    }
+    lines.extend(set.global.warnings.iter().map(|w| format!("{}: {w}", set.set)));
+    lines.extend(delay::in_words(&delays(set)).map(|w| format!("{}: {w}", set.set)));
+    let refused = set
+        .frfs
+        .iter()
+        .filter(|f| f.modes.remarks.iter().any(|r| r.contains("not reported")))
+        .count();
+    if refused > 0 {
+        lines.push(format!(
+            "{}: {refused} FRFs have peaks that are no modes (which: --json)",
+            set.set
+        ));
+    }
+    if set.verdict != QualityGrade::Good {
+        let worst: Vec<String> = set
+            .frfs
+            .iter()
+            .filter(|f| f.quality.verdict != QualityGrade::Good)
+            .take(4)
+            .map(|f| format!("{} ({})", f.input.name, f.quality.reasons.join(", ")))
+            .collect();
+        lines.push(format!("{}: {}: {}", set.set, set.why, worst.join("; ")));
+    }
+    lines
+}
+
+/// By FRF: its response (its name where that is not known), and how late it is against the force.
+fn delays(set: &SetModes) -> Vec<(String, Option<Delay>)> {
+    let own = set.frfs.iter().enumerate();
+    own.map(|(k, frf)| {
+        let modes: Vec<(f64, Complex64, f64)> = set
+            .global
+            .modes
+            .iter()
+            .filter_map(|m| {
+                let (constant, std) = (*m.constants.get(k)?)?;
+                Some((m.frequency_hz, constant, std))
+            })
+            .collect();
+        let name = frf.input.dofs.as_ref().map_or(&frf.input.name, |d| &d[0]);
+        (name.clone(), delay::delay(&modes))
+    })
+    .collect()
+}

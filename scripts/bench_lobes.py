@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The lobe surface over the redundancy angle with numpy, timed beside `benches/lobes.rs` in one run.
 
-    cargo build --release --no-default-features --bench lobes && python3 scripts/bench_lobes.py
+    cargo build --release --no-default-features --features program --bench lobes && python3 scripts/bench_lobes.py
 
 A straightforward numpy version of the same task: 72 structures of 12 modes with cross FRFs, 3000 spindle speeds. On a
 frequency grid it takes the eigenvalues of D Phi, turns every point with a positive real part into depth and speed on
@@ -75,7 +75,7 @@ def main():
     args = parser.parse_args()
     speeds = np.arange(3000) * 0.5 + 100.0
 
-    command = ["cargo", "bench", "--no-default-features", "--bench", "lobes", "--", "--surface-json"]
+    command = ["cargo", "bench", "--no-default-features", "--features", "program", "--bench", "lobes", "--", "--surface-json"]
     ours = json.loads(subprocess.run(command, check=True, capture_output=True, text=True, cwd=HERE).stdout)
 
     start = time.perf_counter()

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Output-only analysis side by side with pyOMA2 (PyPI: `pip install pyOMA-2`), in one run on the same records.
 
-    cargo build --release --no-default-features --bins && python3 scripts/compare_pyoma2.py
+    cargo build --release --no-default-features --features program --bins && python3 scripts/compare_pyoma2.py
 
 Makes records of five accelerations of a structure (five modes from 7 to 33 Hz, two of them close) under random forces,
 without and with a spindle's harmonics, and prints what both programs find and the time both take. pyOMA2 is given what

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Side by side with sdypy-EMA (PyPI: `pip install sdypy-EMA`), in one run on the same files.
 
-    cargo build --release --no-default-features --bins --bench modal && python3 scripts/compare_sdypy_ema.py
+    cargo build --release --no-default-features --features program --bins --bench modal && python3 scripts/compare_sdypy_ema.py
 
 Makes robot-like sets of FRFs (seven modes from 6 to 60 Hz, two of them closer than their widths, 12 responses at 3
 references), with and without noise, and prints the errors of both programs and the time both take.
@@ -76,7 +76,7 @@ def computation(paths):
     built = sorted((ROOT / "target/release/deps").glob("modal-*"), key=lambda p: p.stat().st_mtime)
     built = [p for p in built if p.suffix == "" and p.stat().st_mode & 0o111]
     if not built:
-        sys.exit("no bench: run `cargo build --release --no-default-features --bench modal` first")
+        sys.exit("no bench: run `cargo build --release --no-default-features --features program --bench modal` first")
     return json.loads(subprocess.run([built[-1], "--seconds-json", *paths], stdout=subprocess.PIPE, check=True).stdout)
 
 

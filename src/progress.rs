@@ -1,31 +1,50 @@
-//! Progress of work that takes longer than a second: on stderr, or on a [`Gauge`] where somebody reads one instead.
+//! How far work is that takes longer than a moment. The library itself prints nothing: the work tells its steps to a
+//! [`Gauge`] that somebody looks at, else to the [`Meter`] that a program has installed ([`shown_by`]), else to nobody.
 
 use std::cell::RefCell;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
-
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use crate::stop;
 
-/// Counts steps of a piece of work. Silent for the first second; then a bar where stderr is a terminal.
+/// Counts the steps of a piece of work and tells them to whoever shows them.
 pub struct Progress {
-    gauge: Option<Arc<Gauge>>,
-    bar: ProgressBar,
+    shown_on: Option<Display>,
     label: String,
+    done: AtomicU64,
     total: u64,
-    started: Instant,
+}
+
+enum Display {
+    Gauge(Arc<Gauge>),
+    Meter(Box<dyn Meter>),
+}
+
+/// Shows one piece of work to a person, as long as it exists.
+pub trait Meter: Send + Sync {
+    /// One more step is done. Called from several threads.
+    fn step(&self);
+}
+
+/// Begins to show a piece of work: what it is called, how many steps it has.
+pub type NewMeter = fn(label: &str, total: u64) -> Box<dyn Meter>;
+
+static METER: OnceLock<NewMeter> = OnceLock::new();
+
+/// Has every piece of work in this process shown by a meter of its own, unless a [`Gauge`] shows it. The first call counts.
+pub fn shown_by(meter: NewMeter) {
+    let _ = METER.set(meter);
 }
 
 /// Nothing is to be shown.
 static SILENT: AtomicBool = AtomicBool::new(false);
 
-/// From now on nobody is told how far work is.
+/// From now on no meter should show anything.
 pub fn silence() {
     SILENT.store(true, Ordering::Relaxed);
 }
 
+/// Whether [`silence`] was called.
 pub fn is_silent() -> bool {
     SILENT.load(Ordering::Relaxed)
 }
@@ -33,8 +52,11 @@ pub fn is_silent() -> bool {
 /// Steps of the piece of work that is being done.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Reading {
+    /// What is being done, in words.
     pub label: String,
+    /// Steps done.
     pub done: u64,
+    /// Steps in all.
     pub total: u64,
 }
 
@@ -43,6 +65,7 @@ pub struct Reading {
 pub struct Gauge(Mutex<Option<Reading>>);
 
 impl Gauge {
+    /// How far the work is now; `None` while none is being done.
     pub fn reading(&self) -> Option<Reading> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
@@ -56,7 +79,7 @@ thread_local! {
     static GAUGE: RefCell<Option<Arc<Gauge>>> = const { RefCell::new(None) };
 }
 
-/// Does `work`; what this thread begins to count meanwhile is shown on `gauge` and not on stderr.
+/// Does `work`; what this thread begins to count meanwhile is shown on `gauge` and by no meter.
 pub fn shown_on<T>(gauge: &Arc<Gauge>, work: impl FnOnce() -> T) -> T {
     /// Puts the gauge of before back, also when the work panics.
     struct Before(Option<Arc<Gauge>>);
@@ -70,59 +93,50 @@ pub fn shown_on<T>(gauge: &Arc<Gauge>, work: impl FnOnce() -> T) -> T {
 }
 
 impl Progress {
+    /// A piece of work of `total` steps begins on this thread.
     pub fn new(label: impl Into<String>, total: usize) -> Self {
         stop::point();
-        let label = label.into();
-        let bar = ProgressBar::with_draw_target(Some(total as u64), ProgressDrawTarget::hidden());
-        if let Ok(style) = ProgressStyle::with_template("{prefix} [{bar:30}] {pos}/{len} {elapsed}") {
-            bar.set_style(style);
-        }
-        bar.set_prefix(label.clone());
-        let gauge = GAUGE.with_borrow(Clone::clone);
-        if let Some(gauge) = &gauge {
-            gauge.show(Some(Reading {
-                label: label.clone(),
-                done: 0,
-                total: total as u64,
-            }));
-        }
-        Progress {
-            gauge,
-            bar,
+        let (label, total) = (label.into(), total as u64);
+        let shown_on = match GAUGE.with_borrow(Clone::clone) {
+            Some(gauge) => Some(Display::Gauge(gauge)),
+            None => METER.get().map(|begin| Display::Meter(begin(&label, total))),
+        };
+        let progress = Progress {
+            shown_on,
             label,
-            total: total as u64,
-            started: Instant::now(),
+            done: AtomicU64::new(0),
+            total,
+        };
+        if let Some(Display::Gauge(gauge)) = &progress.shown_on {
+            gauge.show(Some(progress.reading(0)));
+        }
+        progress
+    }
+
+    fn reading(&self, done: u64) -> Reading {
+        Reading {
+            label: self.label.clone(),
+            done,
+            total: self.total,
         }
     }
 
     /// One step done. May be called from several threads. Work that is asked to end ends here ([`stop::point`]).
     pub fn step(&self) {
         stop::point();
-        self.bar.inc(1);
-        if let Some(gauge) = &self.gauge {
-            gauge.show(Some(Reading {
-                label: self.label.clone(),
-                done: self.bar.position(),
-                total: self.total,
-            }));
-            return;
-        }
-        let elapsed = self.started.elapsed();
-        if elapsed < Duration::from_secs(1) {
-            return;
-        }
-        // On a terminal only: nothing is seen elsewhere.
-        if self.bar.is_hidden() && !is_silent() {
-            self.bar.set_draw_target(ProgressDrawTarget::stderr());
+        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+        match &self.shown_on {
+            Some(Display::Gauge(gauge)) => gauge.show(Some(self.reading(done))),
+            Some(Display::Meter(meter)) => meter.step(),
+            None => {}
         }
     }
 }
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        match &self.gauge {
-            Some(gauge) => gauge.show(None),
-            None => self.bar.finish_and_clear(),
+        if let Some(Display::Gauge(gauge)) = &self.shown_on {
+            gauge.show(None);
         }
     }
 }

@@ -9,7 +9,8 @@ use super::bounds::Bounds;
 use super::keys::{Holds, Key, ROBOT_FILE, TOP};
 
 /// The files that have a schema.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum SchemaOf {
     /// campaign.toml
     Campaign,

@@ -299,7 +299,7 @@ mod tests {
         assert_eq!(robot.tool.tcp_in_flange_m, [0.1989, 0.0, 0.5599]);
         let mass: f64 = robot.links.iter().map(|l| l.mass_kg).sum();
         assert_relative_eq!(mass, 1119.37979083, epsilon = 1e-8);
-        // Sections as physics.md §2 estimates them: link 5 has no length and stays rigid.
+        // Sections as datasets/irb6640/robot.toml estimates them: link 5 has no length and stays rigid.
         let sections: Vec<_> = robot
             .links
             .iter()

@@ -167,7 +167,7 @@ pub fn structure(campaign: &Campaign, findings: &DiagnosisFindings) -> Outcome {
     Outcome::new(json, text, Some(next))
 }
 
-/// The effect's own parameters by the keys of the contract; `name[0]`, `name[1]`, … become one list.
+/// The effect's own parameters by the keys of docs/json.md; `name[0]`, `name[1]`, … become one list.
 fn parameters<M, I>(candidate: &EffectCandidate<M, I>) -> Value {
     let mut map = Map::new();
     for p in &candidate.parameters {

@@ -31,6 +31,7 @@ mod outcome;
 mod plan;
 mod printed;
 mod program;
+mod progress_bar;
 mod range;
 mod relaunch;
 mod report;

@@ -2,7 +2,7 @@
 
 use super::text;
 
-/// What a command has to say: the document of the contract, and the same for a person.
+/// What a command has to say: the document of docs/json.md, and the same for a person.
 pub struct Outcome {
     /// Printed with `--json`; null where there is nothing to say (any more).
     pub json: serde_json::Value,

@@ -12,6 +12,7 @@ use super::text::error_label;
 /// Does what `arguments` say (the first of them is the program's name) and returns the exit status.
 pub fn program<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> u8 {
     crate::sums_in_order();
+    crate::progress::shown_by(super::progress_bar::progress_bar);
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(said) => {

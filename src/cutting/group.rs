@@ -331,7 +331,7 @@ impl ForceGroup {
 }
 
 /// `{x, y, z}` and for drilling `mz`; what the process does not use is null.
-pub(crate) fn by_axis(process: Process, values: &[Option<f64>; 4]) -> Value {
+pub fn by_axis(process: Process, values: &[Option<f64>; 4]) -> Value {
     let used = |axis: ForceAxis| values[axis.index()].filter(|_| ForceAxis::of(process).contains(&axis));
     let mut map = json!({"x": used(ForceAxis::X), "y": used(ForceAxis::Y), "z": used(ForceAxis::Z)});
     if process == Process::Drilling {

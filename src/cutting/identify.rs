@@ -259,7 +259,7 @@ impl CfcResult {
 }
 
 /// Depth that a cut is known by: axial depth (milling), hole depth (drilling), depth of cut (turning), mm.
-pub(crate) fn depth_mm(geometry: &CutGeometry) -> Option<f64> {
+pub fn depth_mm(geometry: &CutGeometry) -> Option<f64> {
     match *geometry {
         CutGeometry::Milling { axial_depth_mm, .. } => Some(axial_depth_mm),
         CutGeometry::Drilling { hole_depth_mm, .. } => hole_depth_mm,

@@ -45,9 +45,9 @@ pub use estimate::{
 };
 pub use faults::repair_record;
 pub use force_axis::ForceAxis;
-pub(crate) use group::by_axis;
+pub use group::by_axis;
 pub use group::{Coefficient, ForceGroup, Influence, Known, RegressionPoint};
-pub(crate) use identify::depth_mm;
+pub use identify::depth_mm;
 pub(crate) use identify::none_usable;
 pub use identify::{CfcResult, fit_force_coefficients};
 #[cfg(test)]
@@ -63,4 +63,5 @@ pub use regression::{CoefficientFit, Observation, fit};
 pub use series::{MaterialComparison, SpeedTrends};
 pub use trend::{ChangeReading, CoefficientChange, table_trend};
 pub use turning::{EdgeBit, edge_row, engaged_edge};
-pub(crate) use warnings::{of_notices, speed_text};
+pub(crate) use warnings::of_notices;
+pub use warnings::speed_text;

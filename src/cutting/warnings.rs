@@ -380,7 +380,7 @@ fn of_coefficient(groups: &[&ForceGroup], j: usize, warnings: &mut Vec<String>) 
 }
 
 /// `58.3` or `45.1–81.4`, m/min.
-pub(crate) fn speed_text(group: &ForceGroup) -> String {
+pub fn speed_text(group: &ForceGroup) -> String {
     let [low, high] = group.cutting_speed_range_m_per_min;
     if high - low <= 2e-3 * high {
         format!("{:.1}", group.cutting_speed_m_per_min)

@@ -35,7 +35,7 @@ pub enum DrawnForm {
 }
 
 impl DrawnForm {
-    /// As in the contract: `spring-damper`.
+    /// As in docs/json.md: `spring-damper`.
     pub fn label(self) -> &'static str {
         match self {
             DrawnForm::Spring => "spring",

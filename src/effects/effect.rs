@@ -80,7 +80,7 @@ pub struct DataSummary {
 
 /// One physical effect on the structure or its measurement.
 pub trait StructuralEffect: Sync {
-    /// As in the contract: `joint-transverse-compliance`.
+    /// As in docs/effects.md: `joint-transverse-compliance`.
     fn id(&self) -> &'static str;
 
     /// The physics in plain words, one or two sentences.
@@ -110,7 +110,7 @@ pub trait StructuralEffect: Sync {
         None
     }
 
-    /// Tunable quantities; names are the keys of the contract. `nominal` is the first starting value.
+    /// Tunable quantities; names are the keys in docs/json.md. `nominal` is the first starting value.
     fn parameters(&self, robot: &RobotSpec, data: &DataSummary) -> Vec<Parameter>;
 
     /// Further starting points, natural values in the order of the parameters. `peaks_hz`: where the residual peaks.

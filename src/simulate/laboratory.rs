@@ -12,7 +12,8 @@ use crate::ingest::Axis;
 use crate::robot::{Chain, Role};
 
 /// One kind of small error.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Slip {
     /// Joint angles 0.1° off (rms): half of the variance the same at all postures, half new at each.

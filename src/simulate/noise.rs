@@ -6,7 +6,8 @@ use serde::Serialize;
 use super::draw::Draws;
 
 /// How the noise of neighbouring lines belongs together.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum LineNoise {
     /// Every line on its own.

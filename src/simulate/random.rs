@@ -9,7 +9,8 @@ use super::scenario::{CampaignKind, FrfLayout, StructureScenario};
 use crate::ingest::Quantity;
 
 /// What random campaigns hide.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Tier {
     /// Nothing, one effect of the library, two of them, or strong foreign physics.
     Mixed,

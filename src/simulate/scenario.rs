@@ -17,7 +17,8 @@ pub const NOISE_FLOOR_M_PER_N: f64 = 2e-8;
 const MOST_VALUES: usize = 20_000_000;
 
 /// How well a campaign is measured: ready-made settings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum CampaignKind {
     /// 6 postures, 3×3 FRFs at the tool point and roving points on the links, 1.5–3 % noise.
@@ -29,7 +30,8 @@ pub enum CampaignKind {
 }
 
 /// Which FRFs are measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum FrfLayout {
     /// X/X and Y/Y at the tool point.

@@ -452,6 +452,7 @@ mod tests {
     }
 
     /// Each slip does something by itself, of the size of a per cent, and the truth file tells it.
+    #[cfg(feature = "cli")]
     #[test]
     fn slips_are_small_and_told() {
         let model = model(None);

@@ -120,7 +120,7 @@ mod tests {
     #[test]
     fn the_ranges_are_those_of_the_tables() {
         let findings = ThesisFindings::run().unwrap();
-        // physics.md and the thesis's own tables.
+        // docs/physics.md and the thesis's own tables.
         let [low, high] = findings.static_published.unwrap();
         assert!(low > 1.0 && high > 10.0 && high < 10.5, "{low} {high}");
         assert!(findings.static_got_worse());

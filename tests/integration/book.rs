@@ -15,7 +15,7 @@ fn page(name: &str) -> String {
     std::fs::read_to_string(project().join("docs").join(name)).unwrap()
 }
 
-/// The pages that SUMMARY.md names, in its order.
+/// The pages that docs/SUMMARY.md names, in its order.
 fn pages() -> Vec<String> {
     let summary = page("SUMMARY.md");
     let links = summary.split("](").skip(1);

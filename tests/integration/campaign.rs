@@ -9,7 +9,7 @@ use lobestone::robot::RobotSpec;
 use lobestone::{Error, InputError};
 use proptest::prelude::*;
 
-/// Every key of the contract.
+/// Every key of docs/campaign.md.
 const FULL: &str = include_str!("../data/campaign_full.toml");
 
 /// A folder with the files that `FULL` names.

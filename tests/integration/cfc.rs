@@ -51,7 +51,7 @@ fn plan() -> Vec<MadeCut> {
     cuts
 }
 
-/// Tool forces of physics.md §4 summed over teeth and helix slices, 0° to 90° immersion, 2 mm deep.
+/// Tool forces of docs/physics.md, "Cutting forces", summed over teeth and helix slices, 0° to 90° immersion, 2 mm deep.
 fn force(k: &[f64; 6], turn_rad: f64, feed_mm: f64) -> [f64; 3] {
     let mut sum = [0.0; 3];
     let slices = 12;

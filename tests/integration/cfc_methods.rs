@@ -188,7 +188,7 @@ fn material_and_speed_that_change_together_are_not_told_apart() {
     );
 }
 
-/// The orthogonal table of references.md against cuts of another material: both numbers stand side by side.
+/// The orthogonal table of docs/physics.md, "Reference cases" against cuts of another material: both numbers stand side by side.
 #[test]
 fn an_orthogonal_database_predicts_the_coefficients() {
     let copy = copy_of("force-9400");

@@ -1,4 +1,4 @@
-//! `lobestone inspect`: the JSON of the contract, the text for people, and errors that name the file.
+//! `lobestone inspect`: the JSON of docs/json.md, the text for people, and errors that name the file.
 
 use std::path::Path;
 use std::process::Output;

@@ -24,6 +24,7 @@ mod odd;
 mod optimum;
 mod plan;
 mod records;
+mod references;
 mod report;
 mod revisions;
 mod robots;

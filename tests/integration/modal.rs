@@ -1,4 +1,4 @@
-//! `lobestone modal`: the document of the contract, and honesty about what is not there.
+//! `lobestone modal`: the document of docs/json.md, and honesty about what is not there.
 
 use std::f64::consts::TAU;
 use std::fmt::Write;

@@ -22,7 +22,8 @@ use crate::revision::folder_fingerprint;
 use crate::{Error, InputError, Result};
 
 /// What is done with every campaign.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum BatchStep {
     /// The model fitted: joint stiffness, damping; of cuts their coefficients and the error of the waveform.
     Calibrate,

@@ -5,7 +5,7 @@ use serde::Serialize;
 /// A mistake in how something was set up, wired, written down or filed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SetupFinding {
-    /// As in the contract: `encoder-offset`, `axes`, `channel-gain`, …
+    /// As in docs/json.md: `encoder-offset`, `axes`, `channel-gain`, …
     pub kind: &'static str,
     /// The files, channels or places that it concerns, for people: `posture p3, response X`.
     #[serde(rename = "where")]

@@ -113,7 +113,7 @@ pub struct CutSetting {
 
 /// One physical effect on cutting forces or their measurement.
 pub trait CuttingEffect: Sync {
-    /// As in the contract: `tool-wear`.
+    /// As in docs/effects.md: `tool-wear`.
     fn id(&self) -> &'static str;
 
     /// The physics in plain words, one or two sentences.

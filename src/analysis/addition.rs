@@ -2,6 +2,7 @@
 
 use super::structure::study_of;
 use crate::analysis::forces::cutting::cutting_comparison;
+use crate::analysis::workbench::Workbench;
 use crate::campaign::Campaign;
 use crate::discrepancy::FrfComparison;
 use crate::discrepancy::comparison::compare::ErrorTotals;
@@ -13,10 +14,7 @@ use crate::identify::study::Residual;
 use crate::identify::{
     Calibration, CuttingCase, CuttingModel, CuttingStudy, Options, StructureCase, StructureModel,
 };
-use crate::revision::{
-    self, Domain, RecordedEffect, RecordedParameter, Revision, RevisionLog, cutting_fingerprint,
-    structure_fingerprint,
-};
+use crate::revision::{self, Domain, RecordedEffect, RecordedParameter, Revision, RevisionLog};
 use crate::{InputError, Result};
 
 /// A fit as it stands in the log.
@@ -100,8 +98,9 @@ impl Addition<CuttingModel, CuttingInstance> {
     /// # Errors
     /// As there.
     pub fn cutting_after(mut log: RevisionLog, campaign: &Campaign, name: &str) -> Result<Self> {
-        let case = CuttingCase::load(campaign)?;
-        let fingerprint = cutting_fingerprint(campaign)?;
+        let campaign = &Workbench::with_revisions(campaign, log.clone());
+        let case = CuttingCase::on(campaign)?;
+        let fingerprint = campaign.fingerprint(Domain::Cutting)?;
         let instances = cutting::find(name);
         let wrong = |problem: String| {
             InputError::new(problem).key("EFFECT").remedy(format!(
@@ -179,7 +178,8 @@ impl Addition {
     /// # Errors
     /// As there.
     pub fn after(log: RevisionLog, campaign: &Campaign, name: &str, options: Options) -> Result<Self> {
-        Self::to(StructureCase::load(campaign)?, log, campaign, name, options)
+        let campaign = &Workbench::with_revisions(campaign, log.clone());
+        Self::to(StructureCase::on(campaign)?, log, campaign, name, options)
     }
 
     /// As [`after`](Self::after), to a case that is there already.
@@ -189,13 +189,13 @@ impl Addition {
     pub fn to(
         case: StructureCase,
         mut log: RevisionLog,
-        campaign: &Campaign,
+        campaign: &Workbench,
         name: &str,
         options: Options,
     ) -> Result<Self> {
         let data = &case.data;
         // Taken with the data that were read, not after the fit.
-        let fingerprint = structure_fingerprint(campaign)?;
+        let fingerprint = campaign.fingerprint(Domain::Structure)?;
         let instances = effects::requested(&case.model.robot.spec, &data.summary(), name)?;
         if case.model.has(name) {
             return Err(InputError::new(format!("{name} is in the model already"))

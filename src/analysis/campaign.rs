@@ -2,6 +2,7 @@
 
 use super::model_stages::{ModelStage, earlier_stages};
 use super::structure_case::structure_model;
+use super::workbench::Workbench;
 use super::{
     CuttingAnalysis, CuttingFindings, DiagnosisFindings, LobeAnalysis, ModalAnalysis, StructureAnalysis,
 };
@@ -12,7 +13,8 @@ use crate::cutting::{CfcOptions, CfcResult};
 use crate::discrepancy::setup::SetupFinding;
 use crate::identify::frfs::structure_study::held_out_postures;
 use crate::identify::{Options, StructureCase, StructureModel};
-use crate::revision::{Domain, Revision, RevisionLog};
+use crate::modal::Settings;
+use crate::revision::{Domain, Revision};
 use crate::robot::PostureReport;
 use crate::{Error, InputError, Result};
 
@@ -20,6 +22,8 @@ use crate::{Error, InputError, Result};
 pub struct CampaignFindings<'a> {
     /// The campaign itself.
     pub campaign: &'a Campaign,
+    /// The same with its files.
+    pub bench: Workbench<'a>,
     /// Model against FRFs.
     pub structure: Option<Result<StructureFindings>>,
     /// What the model lacks, where that was asked for.
@@ -81,9 +85,10 @@ impl<'a> CampaignFindings<'a> {
     pub fn run(campaign: &'a Campaign, wanted: bool) -> Result<Self> {
         // FRFs without a robot are to be had, too: for their modes.
         let modelled = !campaign.frfs.is_empty() && campaign.robot.is_some();
-        let modal = (!campaign.frfs.is_empty()).then(|| ModalAnalysis::run(campaign));
+        let bench = &Workbench::new(campaign);
+        let modal = (!campaign.frfs.is_empty()).then(|| ModalAnalysis::on(bench, &Settings::default()));
         let modes = modal.as_ref().and_then(|m| m.as_ref().ok());
-        let structure = modelled.then(|| StructureFindings::with_modes(campaign, modes));
+        let structure = modelled.then(|| StructureFindings::with_modes(bench, modes));
         let calibrated = structure.as_ref().and_then(|s| s.as_ref().ok());
         // Where nothing can be calibrated nothing can be diagnosed, for the same reason.
         let diagnosis = calibrated.filter(|_| wanted).map(|structure| {
@@ -91,14 +96,14 @@ impl<'a> CampaignFindings<'a> {
         });
         let cutting = (!campaign.cuts.is_empty()).then(|| identify_forces(campaign, CfcOptions::default()));
         let cutting_diagnosis =
-            (wanted && matches!(cutting, Some(Ok(_)))).then(|| CuttingFindings::run(campaign));
+            (wanted && matches!(cutting, Some(Ok(_)))).then(|| CuttingFindings::on(bench));
         let postures = (campaign.robot.is_some() && !campaign.postures.is_empty())
             .then(|| PostureFindings::run(campaign, calibrated));
-        let log = RevisionLog::load(&campaign.dir)?;
+        let log = bench.revisions()?;
         let findings = CampaignFindings {
             campaign,
             cutting_revisions: log.revisions(Domain::Cutting).cloned().collect(),
-            setup: likely_mistakes(campaign, (&structure, &diagnosis), (&cutting, &cutting_diagnosis)),
+            setup: likely_mistakes(bench, (&structure, &diagnosis), (&cutting, &cutting_diagnosis)),
             postures,
             diagnosis,
             structure,
@@ -106,7 +111,8 @@ impl<'a> CampaignFindings<'a> {
             modal,
             cutting,
             cutting_diagnosis,
-            lobes: campaign.lobes.is_some().then(|| LobeFindings::run(campaign)),
+            lobes: campaign.lobes.is_some().then(|| LobeFindings::on(bench)),
+            bench: bench.clone(),
         };
         findings.checked()
     }
@@ -204,7 +210,7 @@ impl<'a> CampaignFindings<'a> {
 
 /// From the diagnoses where they were made; a check that cannot be made finds nothing.
 fn likely_mistakes(
-    campaign: &Campaign,
+    campaign: &Workbench,
     (structure, diagnosis): (
         &Option<Result<StructureFindings>>,
         &Option<Result<DiagnosisFindings>>,
@@ -218,7 +224,7 @@ fn likely_mistakes(
     };
     let of_cutting = match (cutting_diagnosis, cutting) {
         (Some(Ok(d)), _) => Some(d.setup.clone()),
-        (_, Some(Ok(_))) => CuttingAnalysis::run(campaign).and_then(|c| c.setup_check()).ok(),
+        (_, Some(Ok(_))) => CuttingAnalysis::on(campaign).and_then(|c| c.setup_check()).ok(),
         _ => None,
     };
     let all = of_structure
@@ -238,8 +244,8 @@ impl StructureFindings {
     }
 
     /// As [`StructureFindings::run`], with the measured modes that are there already.
-    fn with_modes(campaign: &Campaign, modal: Option<&ModalAnalysis>) -> Result<Self> {
-        let case = StructureCase::load(campaign)?;
+    fn with_modes(campaign: &Workbench, modal: Option<&ModalAnalysis>) -> Result<Self> {
+        let case = StructureCase::on(campaign)?;
         Self::of(campaign, StructureAnalysis::of(case, modal, Options::default())?)
     }
 
@@ -312,9 +318,19 @@ impl LobeFindings {
     /// # Errors
     /// As [`LobeAnalysis::run`].
     pub fn run(campaign: &Campaign) -> Result<Self> {
-        let asked = LobeAnalysis::run(campaign)?;
-        let measured = (asked.source == LobeSource::Model && !campaign.frfs.is_empty())
-            .then(|| LobeAnalysis::run(&with_source(campaign, LobeSource::Measured)));
+        Self::on(&Workbench::new(campaign))
+    }
+
+    /// As [`run`](Self::run), of files that other analyses read as well.
+    ///
+    /// # Errors
+    /// As [`LobeAnalysis::run`].
+    pub fn on(campaign: &Workbench) -> Result<Self> {
+        let asked = LobeAnalysis::on(campaign)?;
+        let measured = (asked.source == LobeSource::Model && !campaign.frfs.is_empty()).then(|| {
+            let other = with_source(campaign, LobeSource::Measured);
+            LobeAnalysis::on(&campaign.for_request(&other))
+        });
         Ok(LobeFindings { asked, measured })
     }
 }

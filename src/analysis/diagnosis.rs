@@ -3,6 +3,7 @@
 use num_complex::Complex64;
 
 use super::structure::study_of;
+use super::workbench::Workbench;
 use crate::Result;
 use crate::campaign::Campaign;
 use crate::discrepancy::localise::{Localisation, localise};
@@ -68,7 +69,15 @@ impl DiagnosisFindings {
     /// # Errors
     /// The case cannot be loaded, or the FRFs do not determine its parameters.
     pub fn run(campaign: &Campaign, options: Options) -> Result<Self> {
-        Self::of(campaign, StructureCase::load(campaign)?, options)
+        Self::on(&Workbench::new(campaign), options)
+    }
+
+    /// As [`run`](Self::run), of files that other analyses read as well.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run).
+    pub fn on(campaign: &Workbench, options: Options) -> Result<Self> {
+        Self::of(campaign, StructureCase::on(campaign)?, options)
     }
 
     /// As [`run`](Self::run), of a case that is there already: best one that was calibrated
@@ -156,10 +165,10 @@ impl DiagnosisFindings {
     ///
     /// # Errors
     /// What the file system refuses: the diagnosis is as good without.
-    pub fn keep(&self, campaign: &Campaign) -> Result<()> {
+    pub fn keep(&self, campaign: &Workbench) -> Result<()> {
         let effects = self.case.model.effects().iter();
         let effects = effects.map(|a| recorded_effect(&a.instance)).collect();
-        let of = (revision::structure_fingerprint(campaign)?, effects);
+        let of = (campaign.fingerprint(Domain::Structure)?, effects);
         revision::keep(&campaign.dir, Domain::Structure, of, evidence(&self.diagnosis))
     }
 }
@@ -169,10 +178,10 @@ impl CuttingFindings {
     ///
     /// # Errors
     /// As there.
-    pub fn keep(&self, campaign: &Campaign) -> Result<()> {
+    pub fn keep(&self, campaign: &Workbench) -> Result<()> {
         let effects = self.case.model.effects().iter();
         let effects = effects.map(|a| recorded_cutting_effect(&a.instance)).collect();
-        let of = (revision::cutting_fingerprint(campaign)?, effects);
+        let of = (campaign.fingerprint(Domain::Cutting)?, effects);
         revision::keep(&campaign.dir, Domain::Cutting, of, evidence(&self.diagnosis))
     }
 }
@@ -270,7 +279,15 @@ impl CuttingFindings {
     /// # Errors
     /// No cuts, or none that can be used.
     pub fn run(campaign: &Campaign) -> Result<Self> {
-        let case = CuttingCase::load(campaign)?;
+        Self::on(&Workbench::new(campaign))
+    }
+
+    /// As [`run`](Self::run), of files that other analyses read as well.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run).
+    pub fn on(campaign: &Workbench) -> Result<Self> {
+        let case = CuttingCase::on(campaign)?;
         let mut diagnosis = diagnose(&CuttingStudy::new(case.data.clone()), &case.model)?;
         // With effects in the model what they took up may be what is wrong.
         let setup = match case.model.effects().is_empty() {

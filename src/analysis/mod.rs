@@ -14,6 +14,7 @@ pub mod setup;
 pub mod stability;
 pub mod structure;
 pub mod structure_case;
+pub mod workbench;
 
 pub use crate::analysis::forces::cutting::CuttingAnalysis;
 pub use crate::analysis::many::shard::Shard;
@@ -28,3 +29,4 @@ pub use expert::ExpertView;
 pub use freed_links::FreedLinks;
 pub use model_stages::ModelStage;
 pub use structure::StructureAnalysis;
+pub use workbench::Workbench;

@@ -1,10 +1,11 @@
 //! A campaign's structural side loaded: robot file, FRF files and the revisions of its model.
 
+use super::workbench::Workbench;
 use crate::campaign::{Campaign, FrfSet, LinkGroup, RobotSection};
 use crate::effects;
 use crate::identify::model_history::{Domain, Revision, recorded_effect};
 use crate::identify::{FrfData, StructureCase, StructureModel};
-use crate::revision::{RevisionLog, log_file, structure_fingerprint};
+use crate::revision::log_file;
 use crate::robot::{RobotModel, RobotSpec};
 use crate::{InputError, Result};
 
@@ -70,8 +71,16 @@ impl StructureCase {
     /// # Errors
     /// FRFs or robot file that cannot be read, a broken revision log, or one with effects that are none of this robot.
     pub fn load(campaign: &Campaign) -> Result<Self> {
+        Self::on(&Workbench::new(campaign))
+    }
+
+    /// As [`load`](Self::load), of files that other analyses read as well.
+    ///
+    /// # Errors
+    /// As for [`load`](Self::load).
+    pub fn on(campaign: &Workbench) -> Result<Self> {
         let baseline = structure_model(campaign)?;
-        let log = RevisionLog::load(&campaign.dir)?;
+        let log = campaign.revisions()?;
         let revisions: Vec<Revision> = log.revisions(Domain::Structure).cloned().collect();
         let (set, mut warnings) = campaign.load_frfs()?;
         warnings.extend(baseline.robot.spec.guesses_told());
@@ -79,7 +88,7 @@ impl StructureCase {
         let mut settled = false;
         let model = match revisions.last() {
             Some(current) => {
-                settled = current.data == structure_fingerprint(campaign)?;
+                settled = current.data == campaign.fingerprint(Domain::Structure)?;
                 // Of a baseline only the starting point is taken; whose data it was fitted to does not matter.
                 if current.revision > 0 && !settled {
                     warnings.push(format!(

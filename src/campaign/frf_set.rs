@@ -18,14 +18,24 @@ impl Campaign {
     /// The first file (in the order of `campaign.toml`) that cannot be read, does not say what it holds, or names
     /// a node without a `[[point]]`.
     pub fn load_frfs(&self) -> Result<(FrfSet, Vec<String>)> {
-        // In parallel, but looked at in order: result and first error do not depend on the threads.
-        let read: Vec<Result<(Vec<FrfRecord>, Vec<String>)>> =
-            self.frfs.par_iter().map(|frf| read_file(&frf.file)).collect();
-        let mut files = Vec::with_capacity(read.len());
-        for one in read {
-            files.push(one?);
-        }
-        self.collect_frfs(&files)
+        let read = self.frfs.par_iter().map(|frf| read_file(&frf.file));
+        self.collect_frfs(&in_order(read.collect())?)
+    }
+
+    /// The content of every `[[frf]]` file, in the order of `campaign.toml`, or why it cannot be read.
+    pub fn frf_contents(&self) -> Vec<Result<Vec<u8>>> {
+        let files = self.frfs.iter();
+        files.map(|frf| crate::ingest::read_content(&frf.file)).collect()
+    }
+
+    /// As [`load_frfs`](Self::load_frfs), of files whose [contents](Self::frf_contents) were read already.
+    ///
+    /// # Errors
+    /// As for [`load_frfs`](Self::load_frfs).
+    pub fn frfs_in(&self, contents: Vec<Result<Vec<u8>>>) -> Result<(FrfSet, Vec<String>)> {
+        let files = self.frfs.par_iter().zip(contents);
+        let read = files.map(|(frf, bytes)| crate::ingest::read_frfs_in(&frf.file, &bytes?));
+        self.collect_frfs(&in_order(read.collect())?)
     }
 
     /// Takes the records of each `[[frf]]` file (same order) to one set.
@@ -169,6 +179,14 @@ impl Campaign {
             .into()
     }
 }
+
+/// Read in parallel, but looked at in order: result and first error do not depend on the threads.
+fn in_order(read: Vec<Result<FrfContents>>) -> Result<Vec<FrfContents>> {
+    read.into_iter().collect()
+}
+
+/// FRFs of one file, and what was noticed while reading it.
+type FrfContents = (Vec<FrfRecord>, Vec<String>);
 
 /// The one place where this module meets the file readers.
 fn read_file(path: &Path) -> Result<(Vec<FrfRecord>, Vec<String>)> {

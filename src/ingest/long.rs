@@ -151,18 +151,22 @@ fn open_by(path: &Path, piece: usize) -> Result<Opened> {
         })));
     }
     file.read_to_end(&mut head).map_err(refused)?;
-    let is_dwd_named = is_dwd_named(path);
+    Ok(Opened::Read(decoded(path, &head)?))
+}
+
+/// The file at `path`, whose whole content is `bytes`.
+pub(super) fn decoded(path: &Path, bytes: &[u8]) -> Result<MeasurementFile> {
     let mut notes = Notes::default();
     let (format, why, mut contents) =
-        read_bytes(&head, is_dwd_named, &mut notes).map_err(|e| e.file(path))?;
+        read_bytes(bytes, is_dwd_named(path), &mut notes).map_err(|e| e.file(path))?;
     dofs_from_file_name(path, &mut contents.frfs, &mut notes);
-    Ok(Opened::Read(MeasurementFile {
+    Ok(MeasurementFile {
         path: path.to_path_buf(),
         format,
         why,
         contents,
         warnings: notes.into_warnings(),
-    }))
+    })
 }
 
 fn is_dwd_named(path: &Path) -> bool {

@@ -32,5 +32,5 @@ pub use channel_rule::{ChannelRule, Gain, Measures, Source, read_time_with, unit
 pub use contents::{Contents, Format, MeasurementFile, OtherRecord};
 pub use long::{Survey, regular_file, survey};
 pub use quality::quality_warnings;
-pub use read::{read_file, read_frfs, read_memory, read_time};
+pub use read::{read_content, read_file, read_frfs, read_frfs_in, read_memory, read_time};
 pub use text::shown;

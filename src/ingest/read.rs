@@ -41,11 +41,31 @@ pub fn read_memory(bytes: &[u8]) -> std::result::Result<MeasurementFile, InputEr
 /// # Errors
 /// As [`read_file`], and a file without FRFs.
 pub fn read_frfs(path: &Path) -> Result<(Vec<FrfRecord>, Vec<String>)> {
-    let file = read_file(path)?;
+    frfs_of(read_file(path)?)
+}
+
+/// As [`read_frfs`], where the content of the file is `bytes`.
+///
+/// # Errors
+/// As [`read_frfs`].
+pub fn read_frfs_in(path: &Path, bytes: &[u8]) -> Result<(Vec<FrfRecord>, Vec<String>)> {
+    frfs_of(long::decoded(path, bytes)?)
+}
+
+fn frfs_of(file: MeasurementFile) -> Result<(Vec<FrfRecord>, Vec<String>)> {
     if file.contents.frfs.is_empty() {
         return Err(no_such(&file, "FRF", "give a UFF 58 file or a CSV with FRFs"));
     }
     Ok((file.contents.frfs, file.warnings))
+}
+
+/// The whole content of a file.
+///
+/// # Errors
+/// The operating system's; a folder, pipe or device, by its path.
+pub fn read_content(path: &Path) -> Result<Vec<u8>> {
+    long::regular_file(path)?;
+    std::fs::read(path).map_err(|e| Error::io(path, e))
 }
 
 /// The time record of a file, and its warnings.

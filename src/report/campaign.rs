@@ -6,7 +6,7 @@ use super::parts::{failed, paragraph};
 use super::words::count;
 use super::{Block, Page, ReportSection, ReportTable, TableColumn, VerdictCard, verdict_card};
 use crate::Result;
-use crate::analysis::{CampaignFindings, DiagnosisFindings, StructureFindings};
+use crate::analysis::{CampaignFindings, DiagnosisFindings, StructureFindings, Workbench};
 use crate::campaign::Campaign;
 use crate::discrepancy::setup::{SetupCheck, SetupFinding};
 use crate::identify::StructureCase;
@@ -58,7 +58,7 @@ pub fn page(findings: &CampaignFindings, thesis: Option<&ThesisFindings>) -> Pag
     Page {
         title: findings.campaign.name.clone(),
         subtitle: format!("Lobestone report on {}", contents(findings)),
-        origin: origin(findings.campaign),
+        origin: origin(&findings.bench),
         cards: cards(findings),
         sections,
         ..Page::default()
@@ -66,7 +66,7 @@ pub fn page(findings: &CampaignFindings, thesis: Option<&ThesisFindings>) -> Pag
 }
 
 /// Who measured and when, when the page was made, and which data it is of.
-fn origin(campaign: &Campaign) -> Vec<(String, String)> {
+fn origin(campaign: &Workbench) -> Vec<(String, String)> {
     let entry = |name: &str, value: String| (name.to_string(), value);
     let mut origin = Vec::new();
     origin.extend(campaign.date.clone().map(|date| entry("measured", date)));
@@ -78,9 +78,7 @@ fn origin(campaign: &Campaign) -> Vec<(String, String)> {
         (!campaign.frfs.is_empty(), "FRF data", Domain::Structure),
         (!campaign.cuts.is_empty(), "force data", Domain::Cutting),
     ] {
-        let hash = there
-            .then(|| revision::fingerprint(campaign, domain).ok())
-            .flatten();
+        let hash = there.then(|| campaign.fingerprint(domain).ok()).flatten();
         origin.extend(hash.map(|hash| entry(name, hash)));
     }
     origin

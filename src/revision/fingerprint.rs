@@ -69,6 +69,25 @@ impl Fnv {
 /// # Errors
 /// A file that cannot be read.
 pub fn structure_fingerprint(campaign: &Campaign) -> Result<String> {
+    structure_hash(campaign, |hash, frf| hash.file(&campaign.frfs[frf].file))
+}
+
+/// As [`structure_fingerprint`], with the contents of the FRF files in the order of the campaign.
+///
+/// # Errors
+/// A robot file that cannot be read, or an FRF file that could not.
+pub fn structure_fingerprint_of(campaign: &Campaign, frf_contents: &[Result<Vec<u8>>]) -> Result<String> {
+    structure_hash(campaign, |hash, frf| match &frf_contents[frf] {
+        Ok(bytes) => {
+            hash.part(bytes);
+            Ok(())
+        }
+        Err(error) => Err(Error::computation(error.to_string())),
+    })
+}
+
+/// `content` adds the content of an FRF file by its number.
+fn structure_hash(campaign: &Campaign, content: impl Fn(&mut Fnv, usize) -> Result<()>) -> Result<String> {
     let mut hash = Fnv::new();
     if let Some(robot) = &campaign.robot {
         hash.value(&(robot.mass_tolerance, robot.stiffness_tolerance));
@@ -89,9 +108,9 @@ pub fn structure_fingerprint(campaign: &Campaign) -> Result<String> {
     for point in &campaign.points {
         hash.value(&(point.node, point.body, point.position_m, point.axes));
     }
-    for frf in &campaign.frfs {
+    for (i, frf) in campaign.frfs.iter().enumerate() {
         hash.value(&(frf.posture, frf.quantity, frf.force_level_n));
-        hash.file(&frf.file)?;
+        content(&mut hash, i)?;
     }
     Ok(format!("{:016x}", hash.0))
 }

@@ -4,6 +4,7 @@ use serde_json::{Map, Value, json};
 
 use crate::Result;
 use crate::analysis::forces::channel_check::wrong_channels;
+use crate::analysis::workbench::Workbench;
 use crate::campaign::{Campaign, Process};
 use crate::cutting::{CfcResult, ForceGroup};
 use crate::discrepancy::CuttingComparison;
@@ -33,12 +34,20 @@ impl CuttingAnalysis {
     /// # Errors
     /// No cuts, or none that can be used.
     pub fn run(campaign: &Campaign) -> Result<Self> {
+        Self::on(&Workbench::new(campaign))
+    }
+
+    /// As [`run`](Self::run), of files that other analyses read as well.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run).
+    pub fn on(campaign: &Workbench) -> Result<Self> {
         let CuttingCase {
             model,
             data,
             mut warnings,
             ..
-        } = CuttingCase::load(campaign)?;
+        } = CuttingCase::on(campaign)?;
         let calibration = calibrate_cutting(&model, &data)?;
         let comparison = cutting_comparison(&model, &data, &calibration.theta)?;
         let held_out_nrms = held_out_cuts(&model, &data, &calibration.theta)?.map(|h| h.nrms());

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::analysis::forces::force_records::read_in_step;
+use crate::analysis::workbench::Workbench;
 use crate::campaign::{Campaign, Process, Tool};
 use crate::cutting::{InStep, Notice, of_notices};
 use crate::effects::cutting;
@@ -10,7 +11,7 @@ use crate::identify::forces::cutting_data::{CutData, processes};
 use crate::identify::model_history::{Domain, Revision, recorded_cutting_effect};
 use crate::identify::{CuttingCase, CuttingData, CuttingModel};
 use crate::progress::Progress;
-use crate::revision::{RevisionLog, log_file};
+use crate::revision::log_file;
 use crate::{Error, InputError, Result};
 
 fn material(campaign: &Campaign, cut: usize) -> &str {
@@ -40,6 +41,14 @@ impl CuttingCase {
     /// # Errors
     /// No cuts, records that cannot be read, a broken revision log.
     pub fn load(campaign: &Campaign) -> Result<Self> {
+        Self::on(&Workbench::new(campaign))
+    }
+
+    /// As [`load`](Self::load), of files that other analyses read as well.
+    ///
+    /// # Errors
+    /// As for [`load`](Self::load).
+    pub fn on(campaign: &Workbench) -> Result<Self> {
         let processes = processes(&campaign.cuts);
         let Some(&process) = processes.first() else {
             return Err(
@@ -62,7 +71,7 @@ impl CuttingCase {
             let name = other.name();
             warnings.push(format!("the {name} cuts are not compared: one process at a time"));
         }
-        let log = RevisionLog::load(&campaign.dir)?;
+        let log = campaign.revisions()?;
         let revisions: Vec<Revision> = log.revisions(Domain::Cutting).cloned().collect();
         let mut model = CuttingModel::new(&data, true)?;
         if let Some(current) = revisions.last() {

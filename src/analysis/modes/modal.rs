@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use crate::analysis::modes::frf_inputs::read;
 pub use crate::analysis::modes::mode_set::{AnalysedFrf, FrfInput, SetModes};
 use crate::analysis::modes::mode_set::{analyse_set, dofs_of_frfs, set_warnings};
+use crate::analysis::workbench::Workbench;
 use crate::campaign::{Campaign, MeasuredDof, Point};
 use crate::modal::chosen::Choice;
 use crate::modal::quality::SetQuality;
@@ -43,6 +44,14 @@ impl ModalAnalysis {
     /// # Errors
     /// As [`ModalAnalysis::run`].
     pub fn of_campaign(campaign: &Campaign, settings: &Settings) -> Result<Self> {
+        Self::on(&Workbench::new(campaign), settings)
+    }
+
+    /// As [`ModalAnalysis::of_campaign`], of files that other analyses read as well.
+    ///
+    /// # Errors
+    /// As [`ModalAnalysis::run`].
+    pub fn on(campaign: &Workbench, settings: &Settings) -> Result<Self> {
         let (set, warnings) = campaign.load_frfs()?;
         let dof = |d: &MeasuredDof| dof_name(&campaign.points, d);
         let inputs = set

@@ -5,10 +5,11 @@ use std::sync::Arc;
 
 use crate::analysis::StructureAnalysis;
 use crate::analysis::structure_case::structure_model;
+use crate::analysis::workbench::Workbench;
 use crate::campaign::{Campaign, LobesSection};
-use crate::identify::Options;
 use crate::identify::frfs::calibrate::calibrate;
 use crate::identify::frfs::structure::StructureModel;
+use crate::identify::{Options, StructureCase};
 use crate::lobes::dynamics::tool_point::RobotHolder;
 use crate::lobes::hole::{Deflection, HoleError, HoleLoad};
 use crate::lobes::setup::tool_beam;
@@ -174,16 +175,16 @@ impl ModelState {
     ///
     /// # Errors
     /// No posture, or what calibrating or reading the revisions refuses.
-    pub fn of(campaign: &Campaign, asked: Asked, warnings: &mut Vec<String>) -> Result<Self> {
+    pub fn of(campaign: &Workbench, asked: Asked, warnings: &mut Vec<String>) -> Result<Self> {
         Self::fitted(campaign, asked, warnings, true)
     }
 
     /// As [`of`](Self::of), but for `before`, which takes another calibration.
-    pub fn without_history(campaign: &Campaign, asked: Asked, warnings: &mut Vec<String>) -> Result<Self> {
+    pub fn without_history(campaign: &Workbench, asked: Asked, warnings: &mut Vec<String>) -> Result<Self> {
         Self::fitted(campaign, asked, warnings, false)
     }
 
-    fn fitted(campaign: &Campaign, asked: Asked, warnings: &mut Vec<String>, history: bool) -> Result<Self> {
+    fn fitted(campaign: &Workbench, asked: Asked, warnings: &mut Vec<String>, history: bool) -> Result<Self> {
         if campaign.postures.is_empty() {
             return Err(InputError::new("lobes from the model need at least one posture")
                 .file(campaign.dir.join("campaign.toml"))
@@ -216,14 +217,14 @@ impl ModelState {
     }
 
     fn calibrated(
-        campaign: &Campaign,
+        campaign: &Workbench,
         asked: Asked,
         warnings: &mut Vec<String>,
         history: bool,
     ) -> Result<Self> {
         let StructureAnalysis {
             case, calibration, ..
-        } = StructureAnalysis::run(campaign, Options::default())?;
+        } = StructureAnalysis::of_case(StructureCase::on(campaign)?, Options::default())?;
         let options = case.options(Options::default());
         let effects = case.effects();
         let description = match effects.is_empty() {

@@ -6,6 +6,7 @@ use crate::analysis::stability::lobe_case::{BEST, LobeCase, LobesBefore};
 use crate::analysis::stability::lobe_model::{Asked, Dynamics, ModelState};
 use crate::analysis::stability::lobe_setup::modes_of_table;
 use crate::analysis::stability::measured_structures::measured_structures;
+use crate::analysis::workbench::Workbench;
 use crate::campaign::{Campaign, LobeMethod, LobesSection};
 use crate::lobes::band;
 use crate::lobes::dynamics::tool_point::MeasuredHolder;
@@ -185,7 +186,7 @@ pub(crate) fn at_postures(
 }
 
 pub(crate) fn from_measured(
-    campaign: &Campaign,
+    campaign: &Workbench,
     section: &LobesSection,
     asked: &Asked,
     warnings: &mut Vec<String>,

@@ -11,6 +11,7 @@ use crate::analysis::stability::lobe_structure::{
 };
 use crate::analysis::stability::noted_cuts::noted_cuts;
 use crate::analysis::stability::redundancy::{self, RedundancyAnalysis};
+use crate::analysis::workbench::Workbench;
 use crate::campaign::{Campaign, LobeMethod, LobeSource, LobesSection, Process};
 use crate::cutting::ForceGroup;
 use crate::lobes::hole::HoleCheck;
@@ -67,6 +68,14 @@ impl LobeAnalysis {
     /// # Errors
     /// No `[lobes]` table, something that the process needs is missing, or the structure cannot be had.
     pub fn run(campaign: &Campaign) -> Result<Self> {
+        Self::on(&Workbench::new(campaign))
+    }
+
+    /// As [`run`](Self::run), of files that other analyses read as well.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run).
+    pub fn on(campaign: &Workbench) -> Result<Self> {
         let section = campaign.lobes.as_ref().ok_or_else(|| {
             InputError::new("the campaign has no [lobes] table")
                 .file(campaign.dir.join("campaign.toml"))

@@ -8,13 +8,14 @@ use serde_json::{Map, Value};
 
 use crate::analysis::stability::lobe_model::{Asked, ModelState};
 use crate::analysis::stability::lobes::CutForce;
+use crate::analysis::workbench::Workbench;
 use crate::campaign::{Campaign, LobeMethod, LobeSource, LobesSection, Posture};
 use crate::lobes::best_speed::{BestSpeed, best_speed};
 use crate::lobes::workspace::{PlaceStatus, Workspace};
 use crate::lobes::workspace_grid::{GridPlace, Span, WorkspaceGrid};
 use crate::lobes::{AbsoluteLimit, AveragedCut, SpeedLimit};
 use crate::progress::Progress;
-use crate::revision::structure_fingerprint;
+use crate::revision::Domain;
 use crate::robot::{IkSolution, RobotModel};
 use crate::{InputError, Result};
 
@@ -90,6 +91,7 @@ impl Sweep {
     /// # Errors
     /// No `[lobes]` table, no posture, no robot, a grid without sense, or what calibrating refuses.
     pub fn new(campaign: &Campaign, request: &SweepRequest) -> Result<Self> {
+        let campaign = &Workbench::new(campaign);
         let section = campaign.lobes.as_ref().ok_or_else(|| {
             InputError::new(
                 "a map of the workspace needs to know the cut, and the campaign has no [lobes] table",
@@ -147,7 +149,7 @@ impl Sweep {
         let spindle_rpm = [section.spindle_rpm[0], section.spindle_rpm[1]];
         let settings = serde_json::json!({
             "program": concat!("lobestone ", env!("CARGO_PKG_VERSION")),
-            "data": structure_fingerprint(campaign)?,
+            "data": campaign.fingerprint(Domain::Structure)?,
             "robot": campaign.robot.as_ref().map(|r| &r.model),
             "effects": state.effects,
             "revision": state.revision,

@@ -12,7 +12,7 @@ use base64::prelude::{BASE64_STANDARD, Engine};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::analysis::{CampaignFindings, CuttingAnalysis, CuttingFindings, DiagnosisFindings};
+use crate::analysis::{CampaignFindings, CuttingAnalysis, CuttingFindings, DiagnosisFindings, Workbench};
 use crate::campaign::{Campaign, campaign_file};
 use crate::commands::Outcome;
 use crate::commands::find::diagnose;
@@ -340,10 +340,11 @@ impl Worker {
     fn diagnose(&mut self, side: Domain, teller: &Teller) -> Result<Answer> {
         let campaign = Campaign::load(&self.dir)?;
         let of = model_state(&campaign, &RevisionLog::load(&self.dir)?, side)?;
+        let bench = Workbench::new(&campaign);
         teller.now("looking for what is missing");
         let (Outcome { json, text, .. }, answer, findings) = match side {
             Domain::Structure => {
-                let found = Box::new(DiagnosisFindings::run(&campaign, Options::default())?);
+                let found = Box::new(DiagnosisFindings::on(&bench, Options::default())?);
                 let outcome = diagnose::structure(&campaign, &found);
                 (
                     outcome,
@@ -352,7 +353,7 @@ impl Worker {
                 )
             }
             Domain::Cutting => {
-                let found = Box::new(CuttingFindings::run(&campaign)?);
+                let found = Box::new(CuttingFindings::on(&bench)?);
                 let outcome = diagnose::cutting(&campaign, &found);
                 (
                     outcome,
@@ -364,8 +365,8 @@ impl Worker {
         if stays_inside(&self.dir).is_ok() {
             // A folder that cannot be written to is no reason not to answer.
             let _ = match &findings {
-                Findings::Structure(found) => found.keep(&campaign),
-                Findings::Cutting(found) => found.keep(&campaign),
+                Findings::Structure(found) => found.keep(&bench),
+                Findings::Cutting(found) => found.keep(&bench),
             };
         }
         self.known.retain(|k| !(k.side == side && k.of == of));

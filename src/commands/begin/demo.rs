@@ -10,7 +10,7 @@ use crate::analysis::forces::force_records::identify_forces;
 use crate::analysis::modes::stick_shapes;
 use crate::analysis::{
     Addition, CampaignFindings, DiagnosisFindings, LobeAnalysis, LobeFindings, ModalAnalysis,
-    PostureFindings, StructureFindings,
+    PostureFindings, StructureFindings, Workbench,
 };
 use crate::builtin::{BuiltinCampaign, FIRST_CELL, SECOND_CELL};
 use crate::campaign::Campaign;
@@ -103,6 +103,7 @@ pub fn run(args: DemoArgs) -> Result<Outcome> {
 
     let findings = CampaignFindings {
         campaign: &first,
+        bench: Workbench::new(&first),
         setup: Vec::new(),
         structure: Some(Ok(structure)),
         diagnosis: None,
@@ -225,14 +226,14 @@ fn second_story(
     let missing = diagnosis.diagnosis.winner().map(|w| w.label());
     let missing =
         missing.ok_or_else(|| Error::computation("the built-in second cell shows no missing effect"))?;
-    diagnosis.keep(second)?;
+    diagnosis.keep(&Workbench::new(second))?;
     story.step(
         "add",
         of("add", second) + " " + &missing,
         || {
             let case = unexplained.analysis.settled_case();
             let log = RevisionLog::load(&second.dir)?;
-            Addition::to(case, log, second, &missing, Options::default())
+            Addition::to(case, log, &Workbench::new(second), &missing, Options::default())
         },
         added,
     )?;

@@ -1,7 +1,7 @@
 use serde_json::{Map, Value, json};
 
 use crate::Result;
-use crate::analysis::{CuttingFindings, DiagnosisFindings};
+use crate::analysis::{CuttingFindings, DiagnosisFindings, Workbench};
 use crate::campaign::Campaign;
 use crate::commands::find::localise;
 use crate::commands::next_step::Guide;
@@ -20,14 +20,16 @@ pub fn run(args: SideArgs) -> Result<Outcome> {
         &campaign,
         args.domain,
         |c| {
-            let found = DiagnosisFindings::run(c, Options::default())?;
+            let bench = Workbench::new(c);
+            let found = DiagnosisFindings::on(&bench, Options::default())?;
             // A folder that cannot be written to is no reason not to answer.
-            let _ = found.keep(c);
+            let _ = found.keep(&bench);
             Ok(structure(c, &found))
         },
         |c| {
-            let found = CuttingFindings::run(c)?;
-            let _ = found.keep(c);
+            let bench = Workbench::new(c);
+            let found = CuttingFindings::on(&bench)?;
+            let _ = found.keep(&bench);
             Ok(cutting(c, &found))
         },
     )

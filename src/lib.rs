@@ -138,7 +138,7 @@
 )]
 #![cfg_attr(feature = "cli", doc = "| [`commands`] | the command line (feature `cli`) |")]
 //!
-//! Below all of them: [`error`], [`files`], [`parameter`], [`progress`], [`stop`], [`text`], and [`builtin`] data.
+//! Below all of them: [`error`], [`files`](crate), [`parameter`], [`progress`], [`stop`], [`text`], and [`builtin`] data.
 //!
 //! # Features
 //!

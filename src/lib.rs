@@ -134,7 +134,7 @@
 )]
 #![cfg_attr(
     feature = "serve",
-    doc = "| [`serve`](crate) | the page in a browser, reached through the command (feature `serve`) |"
+    doc = "| [`serve`] | the page in a browser (feature `serve`) |"
 )]
 #![cfg_attr(feature = "cli", doc = "| [`commands`] | the command line (feature `cli`) |")]
 //!
@@ -161,7 +161,7 @@ pub mod data;
 pub mod discrepancy;
 pub mod effects;
 pub mod error;
-pub(crate) mod files;
+pub mod files;
 pub mod identify;
 pub mod ingest;
 pub mod lobes;
@@ -172,10 +172,8 @@ pub mod progress;
 pub mod report;
 pub mod revision;
 pub mod robot;
-// Reached through the command only.
 #[cfg(feature = "serve")]
-#[cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))]
-pub(crate) mod serve;
+pub mod serve;
 pub mod signal;
 #[cfg(feature = "lab")]
 pub mod simulate;

@@ -26,6 +26,8 @@ impl House {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
         let mut files = BTreeMap::new();
         collect(&root, &mut Vec::new(), &mut files);
+        let tests = test_modules(&files);
+        files.retain(|module, _| !tests.iter().any(|t| module.starts_with(t)));
         let code: BTreeMap<Module, String> = files
             .iter()
             .map(|(module, path)| (module.clone(), code_of(&std::fs::read_to_string(path).unwrap())))
@@ -154,6 +156,26 @@ fn collect(dir: &Path, module: &mut Module, files: &mut BTreeMap<Module, PathBuf
             files.insert(name, path);
         }
     }
+}
+
+/// Modules that exist for tests only: `#[cfg(test)]` stands before their `mod`.
+fn test_modules(files: &BTreeMap<Module, PathBuf>) -> Vec<Module> {
+    let mut found = Vec::new();
+    for (module, path) in files {
+        let text = std::fs::read_to_string(path).unwrap();
+        for part in text.split("#[cfg(test)]\n").skip(1) {
+            let line = part.lines().find(|l| !l.starts_with("#[")).unwrap_or_default();
+            let name = line
+                .rsplit_once("mod ")
+                .and_then(|(_, rest)| rest.strip_suffix(';'));
+            if let Some(name) = name {
+                let mut test = module.clone();
+                test.push(name.to_string());
+                found.push(test);
+            }
+        }
+    }
+    found
 }
 
 /// Without comments, strings and everything from the inline tests on (they stand last in a file).

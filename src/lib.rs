@@ -134,11 +134,11 @@
 )]
 #![cfg_attr(
     feature = "serve",
-    doc = "| [`serve`] | the page in a browser (feature `serve`) |"
+    doc = "| [`serve`](crate) | the page in a browser, reached through the command (feature `serve`) |"
 )]
 #![cfg_attr(feature = "cli", doc = "| [`commands`] | the command line (feature `cli`) |")]
 //!
-//! Below all of them: [`error`], [`files`](crate), [`parameter`], [`progress`], [`stop`], [`text`], and [`builtin`] data.
+//! Below all of them: [`error`], [`files`], [`parameter`], [`progress`], [`stop`], [`text`], [`threads`], and [`builtin`] data.
 //!
 //! # Features
 //!
@@ -172,8 +172,10 @@ pub mod progress;
 pub mod report;
 pub mod revision;
 pub mod robot;
+// Reached through the command only.
 #[cfg(feature = "serve")]
-pub mod serve;
+#[cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))]
+pub(crate) mod serve;
 pub mod signal;
 #[cfg(feature = "lab")]
 pub mod simulate;
@@ -181,6 +183,7 @@ pub mod stop;
 pub mod text;
 #[cfg(feature = "report")]
 pub mod thesis;
+pub mod threads;
 
 pub use analysis::{ModalAnalysis, StructureAnalysis};
 pub use campaign::Campaign;
@@ -188,10 +191,4 @@ pub use error::{Error, InputError, Result};
 pub use identify::StructureCase;
 /// The complex number of FRFs; of the crate `num-complex`.
 pub use num_complex::Complex64;
-
-/// Keeps each decomposition and each product of dense matrices on one thread: split over threads their sums would run in
-/// another order, and results would differ in the last digits with the number of threads. (The loops around them run in
-/// parallel.)
-pub fn sums_in_order() {
-    faer::set_global_parallelism(faer::Par::Seq);
-}
+pub use threads::sums_in_order;

@@ -1,3 +1,5 @@
+//! The program `lobestone`: everything it does is in the library, from [`lobestone::commands`] on.
+
 use std::process::ExitCode;
 
 fn main() -> ExitCode {

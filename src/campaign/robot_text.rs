@@ -1,23 +1,8 @@
 //! A robot as the text of a robot file; what [`RobotSpec::load`] reads back.
 
 use crate::data::{JointSpec, LinkSpec, RobotSpec};
+use crate::text::{quoted, to_degrees};
 use std::fmt::Write;
-
-/// Degrees of an angle, without the last digits that a conversion to radians leaves behind (1e-12 of a degree).
-pub fn to_degrees(rad: f64) -> f64 {
-    let degrees = rad.to_degrees();
-    let round = (degrees * 1e12).round() * 1e-12;
-    match degrees.abs() < 1e3 {
-        // Through text: 90.0, not 90.00000000000001.
-        true => format!("{round:.12}").parse().unwrap_or(degrees) + 0.0,
-        false => degrees,
-    }
-}
-
-/// Text in quotes as TOML has it.
-pub fn quoted(text: &str) -> String {
-    toml::Value::from(text).to_string()
-}
 
 fn list(values: &[f64]) -> String {
     let all: Vec<String> = values.iter().map(|v| format!("{:?}", v + 0.0)).collect();

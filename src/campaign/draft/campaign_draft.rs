@@ -7,10 +7,10 @@ use super::entry::{DraftTable, Entry};
 use super::found::Scan;
 use super::tables;
 use crate::campaign::paths::campaign_file;
-use crate::campaign::robot_text::quoted;
 use crate::campaign::schema::Campaign;
 use crate::campaign::suggest::shown;
 use crate::files::{write_atomically, write_new};
+use crate::text::quoted;
 use crate::{Error, InputError, Result};
 
 /// A campaign file in the making.

@@ -1,6 +1,6 @@
 //! One line of the file to be, and how what a person types becomes TOML.
 
-use crate::campaign::robot_text::quoted;
+use crate::text::quoted;
 
 /// What a value looks like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -5,10 +5,10 @@ use std::fmt::Write;
 
 use nalgebra::Isometry3;
 
-use crate::campaign::robot_text::{quoted, to_degrees};
 use crate::data::{JointSpec, RobotSpec};
 use crate::robot::dh::{joint_transform, rpy_of_rotation};
 use crate::robot::{Kinematics, RobotModel};
+use crate::text::{quoted, to_degrees};
 
 /// The values that go into the files, and where they are from.
 #[derive(Debug, Clone)]

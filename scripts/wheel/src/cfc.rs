@@ -2,8 +2,10 @@
 
 use lobestone::InputError;
 use lobestone::campaign::{CutGeometry, Immersion, Process, Tool, ToolKind};
-use lobestone::cutting::{Estimate, Fit, ForceAxis, Method, Observation, average_row, bootstrap, coefficients_of, fit};
-use lobestone::cutting::fit::estimate;
+use lobestone::cutting::{
+    CoefficientEstimate, CoefficientFit, ForceAxis, Observation, RegressionMethod, average_row, bootstrap,
+    coefficients_of, estimate, fit,
+};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -120,8 +122,8 @@ fn observations(
 
 struct Found {
     observations: Vec<Observation>,
-    free: Fit,
-    chosen: Option<Estimate>,
+    free: CoefficientFit,
+    chosen: Option<CoefficientEstimate>,
     bootstrap: Option<Vec<f64>>,
 }
 
@@ -141,9 +143,9 @@ fn regression(
     let kinds = coefficients_of(cutting.process());
     let bounds: Vec<bool> = kinds.iter().map(|k| nonnegative_edges && k.edge).collect();
     let method = if robust {
-        Method::Huber
+        RegressionMethod::Huber
     } else {
-        Method::LeastSquares
+        RegressionMethod::LeastSquares
     };
     let determined = free.inseparable.is_empty() && free.value.iter().all(Option::is_some);
     if !determined && (robust || nonnegative_edges) {
@@ -227,7 +229,7 @@ pub fn coefficients<'py>(
     Ok(answer)
 }
 
-fn covariance<'py>(py: Python<'py>, free: &Fit) -> PyResult<Bound<'py, PyArray2<f64>>> {
+fn covariance<'py>(py: Python<'py>, free: &CoefficientFit) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let matrix = &free.covariance;
     let flat: Vec<f64> = matrix
         .row_iter()

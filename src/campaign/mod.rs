@@ -14,13 +14,13 @@ mod shared_keys;
 pub mod suggest;
 mod tool_and_cut;
 
-pub use crate::campaign::form::json_schema::{SchemaOf, json_schema};
-pub use crate::campaign::form::paths::campaign_file;
-pub use crate::campaign::form::section::Section;
 pub use crate::data::{
     AxesRef, BodyRef, ChipFormation, Cut, CutGeometry, CutOutcome, FrfSet, HoleSection, Immersion, LinkGroup,
     LinkTolerances, LobeAxis, LobeMethod, LobeMode, LobeSource, LobesSection, MeasuredDof, MeasuredFrf,
     OrthogonalSection, Point, Posture, Process, Redundancy, RobotSection, Tool, ToolKind, ToolSegment,
 };
+pub use form::json_schema::{SchemaOf, json_schema};
+pub use form::paths::campaign_file;
+pub use form::section::Section;
 pub use named_files::named_files;
 pub use schema::{Campaign, CutChannel, Dynamometer, FrfFile, PlanSection};

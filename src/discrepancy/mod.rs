@@ -14,12 +14,12 @@ pub mod setup;
 pub mod something_else;
 pub mod verdict;
 
-pub use crate::discrepancy::comparison::compare::{Band, FrfComparison, FrfError};
-pub use crate::discrepancy::comparison::compare_cutting::{CutError, CuttingComparison};
-pub use crate::discrepancy::comparison::explained::Explained;
-pub use crate::discrepancy::outlook::next_measurement::NextMeasurement;
 pub use candidate::EffectCandidate;
+pub use comparison::compare::{Band, FrfComparison, FrfError};
+pub use comparison::compare_cutting::{CutError, CuttingComparison};
+pub use comparison::explained::Explained;
 pub use cutting_lead::{CuttingLead, LineGroup, LineKind, cutting_lead};
 pub use diagnose::diagnose;
 pub use diagnosis::Diagnosis;
+pub use outlook::next_measurement::NextMeasurement;
 pub use verdict::DiagnosisVerdict;

@@ -22,14 +22,14 @@ mod text;
 pub mod units;
 
 pub use crate::data::{Axis, Channel, ChannelRole, Dof, FrfRecord, Quantity, TimeRecord};
-pub use crate::ingest::formats::geometry::{Geometry, NodalShape, geometry_text, read_geometry};
-pub use crate::ingest::formats::mat::{MatArray, mat5_bytes};
-pub use crate::ingest::formats::uff::{
+pub use channel_rule::{ChannelRule, Gain, Measures, Source, read_time_with, unit_of_charge_or_other};
+pub use contents::{Contents, Format, MeasurementFile, OtherRecord};
+pub use formats::geometry::{Geometry, NodalShape, geometry_text, read_geometry};
+pub use formats::mat::{MatArray, mat5_bytes};
+pub use formats::uff::{
     Abscissa, ByteOrder, Dataset58, Encoding58, EntityDof, Ordinate, UnitAxis, frf_dataset, time_datasets,
     uff58_bytes, write_datasets58, write_uff58,
 };
-pub use channel_rule::{ChannelRule, Gain, Measures, Source, read_time_with, unit_of_charge_or_other};
-pub use contents::{Contents, Format, MeasurementFile, OtherRecord};
 pub use long::{Survey, regular_file, survey};
 pub use quality::quality_warnings;
 pub use read::{read_content, read_file, read_frfs, read_frfs_in, read_memory, read_time};

@@ -23,7 +23,6 @@ pub(crate) mod sizes;
 pub mod structure;
 mod world;
 
-pub use crate::simulate::sizes::visibility::Visibility;
 pub use campaign_folder::{LabCampaign, Written, check_target, truth_beside};
 pub use files::FrfFormat;
 pub use lab_robot::LabRobot;
@@ -32,3 +31,4 @@ pub use noise::LineNoise;
 pub use postures::PostureScheme;
 pub use request::EffectRequest;
 pub use scenario::{CampaignKind, FrfLayout, StructureScenario};
+pub use sizes::visibility::Visibility;

@@ -18,27 +18,25 @@ mod samples;
 #[cfg(test)]
 mod tests;
 
-pub use crate::report::figure::dynamics::coherence::{CoherenceCurve, CoherenceFigure};
-pub use crate::report::figure::dynamics::compass::CompassFigure;
-pub use crate::report::figure::dynamics::drawn_curve::DrawnCurveFigure;
-pub(crate) use crate::report::figure::dynamics::frf::lowest_phase;
-pub use crate::report::figure::dynamics::frf::{FrfCurve, FrfFigure, NoiseLevel};
-pub use crate::report::figure::dynamics::indicators::IndicatorFigure;
-pub use crate::report::figure::dynamics::mode_shapes::{ModeShapesFigure, StickPicture};
-pub use crate::report::figure::dynamics::nyquist::NyquistFigure;
-pub use crate::report::figure::dynamics::resonances::{ResonanceFigure, ResonanceRow};
-pub use crate::report::figure::dynamics::robot::{RobotFigure, posture_svg};
-pub use crate::report::figure::dynamics::stabilisation::{StabilisationFigure, StabilisationPole};
-pub use crate::report::figure::dynamics::wire::{WirePicture, WireShapesFigure};
-pub use crate::report::figure::machining::force_record::{ForceRecord, ForceTrace};
-pub use crate::report::figure::machining::hole::{HoleFigure, HolePanel};
-pub use crate::report::figure::machining::lobes::{
-    LobeMarker, LobeOutcome, LobePanel, LobeTrace, LobesFigure,
-};
-pub use crate::report::figure::machining::regression::{RegressionFigure, RegressionMark, RegressionSeries};
-pub use crate::report::figure::machining::waveform::{WaveformFigure, WaveformPanel};
 pub use control_chart::{ControlChartFigure, ControlPanel, ControlPoint, MOST_PANELS};
+pub use dynamics::coherence::{CoherenceCurve, CoherenceFigure};
+pub use dynamics::compass::CompassFigure;
+pub use dynamics::drawn_curve::DrawnCurveFigure;
+pub(crate) use dynamics::frf::lowest_phase;
+pub use dynamics::frf::{FrfCurve, FrfFigure, NoiseLevel};
+pub use dynamics::indicators::IndicatorFigure;
+pub use dynamics::mode_shapes::{ModeShapesFigure, StickPicture};
+pub use dynamics::nyquist::NyquistFigure;
+pub use dynamics::resonances::{ResonanceFigure, ResonanceRow};
+pub use dynamics::robot::{RobotFigure, posture_svg};
+pub use dynamics::stabilisation::{StabilisationFigure, StabilisationPole};
+pub use dynamics::wire::{WirePicture, WireShapesFigure};
 pub use heat_map::{CellFormat, HeatMap};
 pub use history::{HistoryFigure, HistoryMark};
+pub use machining::force_record::{ForceRecord, ForceTrace};
+pub use machining::hole::{HoleFigure, HolePanel};
+pub use machining::lobes::{LobeMarker, LobeOutcome, LobePanel, LobeTrace, LobesFigure};
+pub use machining::regression::{RegressionFigure, RegressionMark, RegressionSeries};
+pub use machining::waveform::{WaveformFigure, WaveformPanel};
 pub use parameters::{DrawnEstimate, ParameterFigure, ParameterRow};
 pub use side_by_side::{BarSeries, SideBySide};

@@ -2,7 +2,7 @@
 
 mod manifest;
 
-pub use crate::analysis::many::batch::manifest::{Manifest, ManifestEntry};
+pub use manifest::{Manifest, ManifestEntry};
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;

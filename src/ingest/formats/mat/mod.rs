@@ -12,7 +12,7 @@ mod v5;
 mod variable;
 mod write;
 
-pub use crate::ingest::formats::mat::write::{MatArray, mat5_bytes};
+pub use write::{MatArray, mat5_bytes};
 
 pub(crate) fn looks_like_v5(bytes: &[u8]) -> bool {
     bytes.starts_with(b"MATLAB 5.0 MAT-file")

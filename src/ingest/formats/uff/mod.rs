@@ -15,10 +15,10 @@ mod separator;
 mod tests;
 mod write;
 
-pub use crate::ingest::formats::uff::dataset58::{Abscissa, Dataset58, EntityDof, Ordinate, UnitAxis};
-pub use crate::ingest::formats::uff::write::{
+pub use dataset58::{Abscissa, Dataset58, EntityDof, Ordinate, UnitAxis};
+pub use write::{
     ByteOrder, Encoding58, frf_dataset, time_datasets, uff58_bytes, write_datasets58, write_uff58,
 };
 
-pub(crate) use crate::ingest::formats::uff::datasets::contents;
-pub(crate) use crate::ingest::formats::uff::separator::{is_separator, looks_like};
+pub(crate) use datasets::contents;
+pub(crate) use separator::{is_separator, looks_like};

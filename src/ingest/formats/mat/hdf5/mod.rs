@@ -16,10 +16,10 @@ mod header;
 #[cfg(test)]
 mod tests;
 
-use crate::ingest::formats::mat::hdf5::chunks::{ChunkGrid, unpacked};
-use crate::ingest::formats::mat::hdf5::cursor::{Cursor, Fault, NAME, Step, Widths, damaged};
-use crate::ingest::formats::mat::hdf5::group::Visits;
-use crate::ingest::formats::mat::hdf5::header::{Layout, Object, Type};
+use chunks::{ChunkGrid, unpacked};
+use cursor::{Cursor, Fault, NAME, Step, Widths, damaged};
+use group::Visits;
+use header::{Layout, Object, Type};
 
 const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 /// Structs and cells are followed this deep.

@@ -1,8 +1,11 @@
 //! Which data a revision was fitted to.
 
 use std::fmt::Debug;
+use std::hash::Hasher;
 use std::io::Read;
 use std::path::Path;
+
+use fnv::FnvHasher;
 
 use super::folder::log_file;
 use crate::campaign::form::paths;
@@ -11,17 +14,21 @@ use crate::identify::model_history::Domain;
 use crate::{Error, Result};
 
 /// FNV-1a, 64 bits (Fowler, Noll & Vo): notices a change; it need not resist anyone who wants to deceive himself.
-struct Fnv(u64);
+#[derive(Default)]
+struct Fnv(FnvHasher);
 
 impl Fnv {
     fn new() -> Self {
-        Fnv(0xcbf2_9ce4_8422_2325)
+        Fnv::default()
     }
 
     fn bytes(&mut self, bytes: &[u8]) {
-        for byte in bytes {
-            self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3);
-        }
+        self.0.write(bytes);
+    }
+
+    /// 16 hexadecimal digits.
+    fn text(&self) -> String {
+        format!("{:016x}", self.0.finish())
     }
 
     /// With its length, so that two parts cannot run into each other.
@@ -112,7 +119,7 @@ fn structure_hash(campaign: &Campaign, content: impl Fn(&mut Fnv, usize) -> Resu
         hash.value(&(frf.posture, frf.quantity, frf.force_level_n));
         content(&mut hash, i)?;
     }
-    Ok(format!("{:016x}", hash.0))
+    Ok(hash.text())
 }
 
 /// Fingerprint of all that the fit of the force records rests on: tool, dynamometer, cuts and the content of the records.
@@ -127,7 +134,7 @@ pub fn cutting_fingerprint(campaign: &Campaign) -> Result<String> {
         hash.value(&(cut.spindle_rpm, &cut.geometry, cut.order, cut.steady_s));
         hash.file(&cut.file)?;
     }
-    Ok(format!("{:016x}", hash.0))
+    Ok(hash.text())
 }
 
 /// Fingerprint of one side of a campaign.
@@ -161,14 +168,14 @@ pub fn folder_fingerprint(dir: &Path, options: &[&str]) -> String {
             Err(_) => hash.part(b"absent"),
         }
     }
-    format!("{:016x}", hash.0)
+    hash.text()
 }
 
 /// FNV-1a of a text, 16 hexadecimal digits: a file name for whatever characters are in it.
 pub fn text_fingerprint(text: &str) -> String {
     let mut hash = Fnv::new();
     hash.bytes(text.as_bytes());
-    format!("{:016x}", hash.0)
+    hash.text()
 }
 
 #[cfg(test)]
@@ -210,7 +217,7 @@ mod tests {
         for (text, expected) in [("", 0xcbf2_9ce4_8422_2325), ("foobar", 0x8594_4171_f739_67e8)] {
             let mut hash = Fnv::new();
             hash.bytes(text.as_bytes());
-            assert_eq!(hash.0, expected, "{text}");
+            assert_eq!(hash.0.finish(), expected, "{text}");
         }
     }
 }

@@ -20,7 +20,7 @@ pub struct Campaign {
     pub robot: Option<RobotSection>,
     /// Where the robot stood, in the order of the file.
     pub postures: Vec<Posture>,
-    /// Where on the robot was measured, in the order of the file; node numbers differ.
+    /// Where on the robot was measured, in the order of the file; each has a node number of its own.
     pub points: Vec<Point>,
     /// The `[[frf]]` tables, in the order of the file.
     pub frfs: Vec<FrfFile>,

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 pub enum Process {
     /// Milling with an end mill.
     Milling,
-    /// Drilling with a twist drill.
+    /// Drilling with a twist drill, into the full or a pilot hole.
     Drilling,
     /// Turning with a tool of one edge.
     Turning,
@@ -65,16 +65,16 @@ pub enum CutGeometry {
         /// Angles at which a tooth is in the workpiece.
         immersion: Immersion,
     },
-    /// A drilled hole.
+    /// A hole drilled along the tool axis.
     Drilling {
-        /// Feed per revolution, along the tool axis.
+        /// Feed per revolution of the drill.
         feed_per_rev_mm: f64,
         /// Zero: drilled into the full.
         pilot_diameter_mm: f64,
         /// Depth at full diameter.
         hole_depth_mm: Option<f64>,
     },
-    /// A turned cut.
+    /// A cut on a turning workpiece.
     Turning {
         /// Feed per revolution of the workpiece.
         feed_per_rev_mm: f64,

@@ -25,7 +25,7 @@ pub enum LobeMethod {
     MultiFrequency,
     /// Milling: semi-discretisation of one tooth period in time, of first order; needs modes.
     SemiDiscretisation,
-    /// Drilling: lateral and, where its coefficients are known, axial–torsional vibration.
+    /// Drilling, in the frequency domain: lateral and, where Kac is known, axial–torsional vibration.
     FrequencyDomain,
 }
 
@@ -58,12 +58,12 @@ pub struct LobeMode {
     pub extension_mm_per_rad: f64,
 }
 
-/// A sweep over the robot's turn about the tool axis: the tool point and axis stay where they are.
+/// `[lobes.redundancy]`: the robot is turned about the tool axis, while tool point and axis stay where they are.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Redundancy {
     /// Index into `Campaign::postures`.
     pub posture: usize,
-    /// Step of the angle about the tool axis, 0.01 to 180.
+    /// Step of the angle about the tool axis; angles run from 0 through a whole turn.
     pub step_deg: f64,
     /// Bands \[from, to\] of that angle which are not to be used; whole turns do not count.
     pub forbidden_deg: Vec<[f64; 2]>,
@@ -82,7 +82,7 @@ pub struct LobesSection {
     pub method: LobeMethod,
     /// Tangential cutting coefficient Ktc; `None`: this and Krc come from the campaign's cuts.
     pub ktc_n_per_mm2: Option<f64>,
-    /// Radial cutting coefficient Krc; `None`: this and Ktc come from the campaign's cuts.
+    /// Radial cutting coefficient Krc (turning: normal to the edge); `None`: this and Ktc come from the campaign's cuts.
     pub krc_n_per_mm2: Option<f64>,
     /// Drilling: axial cutting coefficient Kac; `None`: from the campaign's cuts if Ktc or Krc is, else not known.
     pub kac_n_per_mm2: Option<f64>,
@@ -94,7 +94,7 @@ pub struct LobesSection {
     pub process_damping_n_per_m: Option<f64>,
     /// Drilling: half of the point angle; `None`: that of the campaign's tool.
     pub half_point_angle_deg: Option<f64>,
-    /// Drilling: feed per revolution, for the axial–torsional lobes and the thrust.
+    /// Drilling: feed per revolution; `None`: no thrust is predicted, and axial–torsional lobes take 0.
     pub feed_per_rev_mm: Option<f64>,
     /// From, to, step.
     pub spindle_rpm: [f64; 3],

@@ -33,7 +33,7 @@ pub enum LinkGroup {
     Masses,
     /// Principal moments of inertia.
     Inertias,
-    /// Centres of mass.
+    /// Centres of mass, along all three axes of the link's frame.
     Centres,
     /// Lengths and offsets of the kinematics.
     Lengths,

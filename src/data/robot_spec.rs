@@ -64,7 +64,7 @@ pub struct JointPlacement {
 pub struct LinkSpec {
     /// What the link is called elsewhere, such as in a URDF.
     pub name: Option<String>,
-    /// Mass, zero or more.
+    /// Zero for a link without mass of its own.
     pub mass_kg: f64,
     /// Moments Ixx, Iyy, Izz about the centre of mass, axes along the link's frame.
     pub inertia_kg_m2: [f64; 3],

@@ -56,7 +56,7 @@ pub struct ToolSegment {
     pub young_gpa: f64,
     /// Shear modulus G.
     pub shear_gpa: f64,
-    /// Density.
+    /// Of the material, such as 7850 for steel.
     pub density_kg_per_m3: f64,
     /// Loss factor η in E (1 + iη): about twice the damping ratio.
     pub loss_factor: f64,

@@ -48,9 +48,9 @@ pub enum Abscissa {
 /// The values of a dataset, in the units of the file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ordinate {
-    /// Real values.
+    /// One number a point: time signals, coherences, power spectra.
     Real(Vec<f64>),
-    /// Complex values.
+    /// Real and imaginary part of each point: FRFs, cross spectra.
     Complex(Vec<Complex64>),
 }
 

@@ -151,6 +151,8 @@
 //! m/N for e^{+iωt}, frequencies in Hz ascending. Results do not depend on the number of threads after [`sums_in_order`]. The
 //! library prints nothing: [`progress`] tells how far long work is, and [`stop`] ends it.
 
+#![warn(missing_docs)]
+
 pub mod analysis;
 pub mod builtin;
 pub mod campaign;

@@ -8,25 +8,37 @@ use crate::ingest::ChannelRule;
 /// A validated campaign. Paths are absolute or relative to the working directory (already joined with `dir`).
 #[derive(Debug, Clone)]
 pub struct Campaign {
+    /// Folder of the campaign: the one with `campaign.toml` in it.
     pub dir: PathBuf,
+    /// Name of the campaign; the folder's where the file gives none.
     pub name: String,
     /// Who measured, as the head of a report names him or her.
     pub operator: Option<String>,
     /// When it was measured, as it was written down.
     pub date: Option<String>,
+    /// `None`: no `[robot]`; then there is no model of the structure.
     pub robot: Option<RobotSection>,
+    /// Where the robot stood, in the order of the file.
     pub postures: Vec<Posture>,
+    /// Where on the robot was measured, in the order of the file; each has a node number of its own.
     pub points: Vec<Point>,
+    /// The `[[frf]]` tables, in the order of the file.
     pub frfs: Vec<FrfFile>,
+    /// `None`: no `[tool]`; then there are no cuts.
     pub tool: Option<Tool>,
+    /// How the axes of the recorded forces lie to those of the tool.
     pub dynamometer: Dynamometer,
     /// What the channels of the force files are, where the files do not say it.
     pub channels: Vec<CutChannel>,
+    /// The `[[cut]]` tables, in the order of the file.
     pub cuts: Vec<Cut>,
+    /// `None`: no lobes are asked for.
     pub lobes: Option<LobesSection>,
     /// Workpiece material: of every cut that names none itself.
     pub material: Option<String>,
+    /// What orthogonal cuts of the material gave; `None`: no prediction of coefficients.
     pub orthogonal: Option<OrthogonalSection>,
+    /// What is to be measured next; without a `[plan]` the usual.
     pub plan: PlanSection,
 }
 
@@ -35,6 +47,7 @@ pub struct Campaign {
 pub struct CutChannel {
     /// Id of the only cut that it holds for.
     pub cut: Option<String>,
+    /// What the channel measures, where it stands in the file, and its gain.
     pub rule: ChannelRule,
 }
 
@@ -54,7 +67,9 @@ impl Campaign {
 /// What is to be measured where there are no files yet; `None` and empty: the usual.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PlanSection {
+    /// Where motion is to be measured; empty: every point in three directions.
     pub responses: Vec<Dof>,
+    /// Where the hammer is to hit; empty: the first point on the tool in three directions.
     pub hits: Vec<Dof>,
     /// First and last line.
     pub band_hz: Option<[f64; 2]>,
@@ -66,17 +81,22 @@ pub struct PlanSection {
     pub noise_floor_m_per_n: Option<f64>,
 }
 
+/// A `[[frf]]` table: one file with the FRFs of one posture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrfFile {
+    /// Path of the file, `dir` included.
     pub file: PathBuf,
     /// Index into `Campaign::postures`.
     pub posture: usize,
+    /// What its FRFs are; `None`: as the file says.
     pub quantity: Option<Quantity>,
+    /// Level of the hammer or shaker; `None` where nobody says.
     pub force_level_n: Option<f64>,
     /// Line of `campaign.toml`, for messages.
     pub line: usize,
 }
 
+/// How the axes of the dynamometer lie to those of the tool.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dynamometer {
     /// Rows of A in F_tool = A F_recorded; identity where the campaign does not say.

@@ -2,15 +2,20 @@
 
 use std::path::PathBuf;
 
+/// What kind of machining a cut is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Process {
+    /// Milling with an end mill.
     Milling,
+    /// Drilling with a twist drill, into the full or a pilot hole.
     Drilling,
+    /// Turning with a tool of one edge.
     Turning,
 }
 
 impl Process {
+    /// All three, milling first.
     pub const ALL: [Process; 3] = [Process::Milling, Process::Drilling, Process::Turning];
 
     /// As `campaign.toml` and people call it.
@@ -34,11 +39,14 @@ impl Process {
 /// Immersion angles from +y, clockwise, rad; 0 ≤ start < exit ≤ 2π.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Immersion {
+    /// Where a tooth enters the workpiece.
     pub start_rad: f64,
+    /// Where a tooth leaves the workpiece.
     pub exit_rad: f64,
 }
 
 impl Immersion {
+    /// The full width of the cutter, 0 to π.
     pub const SLOT: Immersion = Immersion {
         start_rad: 0.0,
         exit_rad: std::f64::consts::PI,
@@ -48,19 +56,27 @@ impl Immersion {
 /// What was cut: geometry and feed of one record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum CutGeometry {
+    /// A milled cut; the feed is along +x.
     Milling {
+        /// Feed per tooth.
         feed_per_tooth_mm: f64,
+        /// Axial depth of cut ap, along the tool axis.
         axial_depth_mm: f64,
+        /// Angles at which a tooth is in the workpiece.
         immersion: Immersion,
     },
+    /// A hole drilled along the tool axis.
     Drilling {
+        /// Feed per revolution of the drill.
         feed_per_rev_mm: f64,
         /// Zero: drilled into the full.
         pilot_diameter_mm: f64,
         /// Depth at full diameter.
         hole_depth_mm: Option<f64>,
     },
+    /// A cut on a turning workpiece.
     Turning {
+        /// Feed per revolution of the workpiece.
         feed_per_rev_mm: f64,
         /// ap, across the feed.
         depth_of_cut_mm: f64,
@@ -70,6 +86,7 @@ pub enum CutGeometry {
 }
 
 impl CutGeometry {
+    /// The process that this geometry belongs to.
     pub fn process(&self) -> Process {
         match self {
             CutGeometry::Milling { .. } => Process::Milling,
@@ -79,14 +96,18 @@ impl CutGeometry {
     }
 }
 
+/// How a cut went, as somebody heard or saw it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum CutOutcome {
+    /// Without chatter.
     Stable,
+    /// With chatter: self-excited vibration.
     Chatter,
 }
 
 impl CutOutcome {
+    /// `stable` or `chatter`.
     pub fn label(self) -> &'static str {
         match self {
             CutOutcome::Stable => "stable",

@@ -7,18 +7,24 @@ use crate::InputError;
 /// One of the three axes of a measurement frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 pub enum Axis {
+    /// First axis of the frame.
     X,
+    /// Second axis of the frame.
     Y,
+    /// Third axis of the frame.
     Z,
 }
 
 impl Axis {
+    /// X, Y, Z.
     pub const ALL: [Axis; 3] = [Axis::X, Axis::Y, Axis::Z];
 
+    /// 0, 1 or 2: its place in a vector.
     pub fn index(self) -> usize {
         self as usize
     }
 
+    /// `X`, `Y` or `Z`.
     pub fn letter(self) -> char {
         ['X', 'Y', 'Z'][self.index()]
     }
@@ -27,7 +33,9 @@ impl Axis {
 /// A degree of freedom as measurement files name it: node number, axis, and sense along it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 pub struct Dof {
+    /// Node number of the measurement file.
     pub node: i64,
+    /// Axis of the frame that the node's signals are in.
     pub axis: Axis,
     /// True where the file says −X, −Y or −Z.
     pub negative: bool,

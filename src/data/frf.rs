@@ -23,7 +23,9 @@ pub enum Quantity {
 pub struct FrfRecord {
     /// What the file calls it, e.g. `1X/1X`.
     pub name: String,
+    /// Where and along what the motion was measured; `None` where the file does not say.
     pub response: Option<Dof>,
+    /// Where and along what the force acted; `None` where the file does not say.
     pub reference: Option<Dof>,
     /// `None` where the file does not say (the campaign file must).
     pub quantity: Option<Quantity>,

@@ -9,6 +9,7 @@ use super::dof::Axis;
 /// All measured FRFs of a robot, in the order in which they were given.
 #[derive(Debug, Clone, Default)]
 pub struct FrfSet {
+    /// Of all postures and force levels.
     pub frfs: Vec<MeasuredFrf>,
 }
 
@@ -17,6 +18,7 @@ pub struct FrfSet {
 pub struct MeasuredDof {
     /// Index into the points of the measurement.
     pub point: usize,
+    /// Axis of the frame that the point's `axes` name.
     pub axis: Axis,
     /// True where the file says −X, −Y or −Z: values hold for the negative direction.
     pub negative: bool,
@@ -38,7 +40,9 @@ impl MeasuredDof {
 pub struct MeasuredFrf {
     /// Index into its postures.
     pub posture: usize,
+    /// Where and along what the displacement is.
     pub response: MeasuredDof,
+    /// Where and along what the force acts.
     pub reference: MeasuredDof,
     /// Posture and degrees of freedom, `p1 1X/1X`.
     pub name: String,
@@ -48,7 +52,9 @@ pub struct MeasuredFrf {
     pub receptance_m_per_n: Vec<Complex64>,
     /// Same length as `frequency_hz`, 0..1.
     pub coherence: Option<Vec<f64>>,
+    /// Level of the hammer or shaker; `None` where nobody says.
     pub force_level_n: Option<f64>,
+    /// File that it was read from; empty where it is made in memory.
     pub file: PathBuf,
 }
 

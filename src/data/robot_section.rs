@@ -1,5 +1,6 @@
 //! Which robot it is, and what of its file a calibration may change.
 
+/// The `[robot]` section of a campaign.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotSection {
     /// Built-in name (`irb6640`) or path of a robot file.
@@ -28,14 +29,20 @@ pub struct LinkTolerances {
 /// What of a robot's links a calibration may free.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LinkGroup {
+    /// Masses, and the inertias with them.
     Masses,
+    /// Principal moments of inertia.
     Inertias,
+    /// Centres of mass, along all three axes of the link's frame.
     Centres,
+    /// Lengths and offsets of the kinematics.
     Lengths,
+    /// Wall thicknesses of the sections of links that bend.
     Walls,
 }
 
 impl LinkGroup {
+    /// All five, masses first.
     pub const ALL: [LinkGroup; 5] = [
         LinkGroup::Masses,
         LinkGroup::Inertias,

@@ -5,10 +5,13 @@
 /// about any axis. Link i is fixed to frame i.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotSpec {
+    /// Name of the robot; of a file without one, `robot`.
     pub name: String,
+    /// Base first; at least one.
     pub joints: Vec<JointSpec>,
     /// As many as joints; link i is the body after joint i.
     pub links: Vec<LinkSpec>,
+    /// Tool centre point and tool axis on the flange.
     pub tool: ToolFrame,
     /// What in the file is a guess and not of this robot (`guesses`): told wherever the file's values are used.
     pub guesses: Vec<String>,
@@ -23,13 +26,18 @@ impl RobotSpec {
     }
 }
 
+/// A revolute joint: where it is, how compliant, how far it turns.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct JointSpec {
     /// What the joint is called elsewhere, such as in a URDF.
     pub name: Option<String>,
+    /// Denavit–Hartenberg offset d along z of frame i−1.
     pub d_m: f64,
+    /// Denavit–Hartenberg length a along x of frame i.
     pub a_m: f64,
+    /// Denavit–Hartenberg twist α about x of frame i.
     pub alpha_rad: f64,
+    /// Added to the joint's angle q.
     pub offset_rad: f64,
     /// rad/(N·m), greater than zero.
     pub compliance_rad_per_nm: f64,
@@ -43,6 +51,7 @@ pub struct JointSpec {
 /// T_i = T(origin) Rz(yaw) Ry(pitch) Rx(roll) R(axis, q_i).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointPlacement {
+    /// Origin of the joint's frame in the frame of the link before it.
     pub origin_m: [f64; 3],
     /// Roll, pitch, yaw about the fixed axes x, y, z.
     pub rpy_rad: [f64; 3],
@@ -50,10 +59,12 @@ pub struct JointPlacement {
     pub axis: [f64; 3],
 }
 
+/// The body that a joint carries.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LinkSpec {
     /// What the link is called elsewhere, such as in a URDF.
     pub name: Option<String>,
+    /// Zero for a link without mass of its own.
     pub mass_kg: f64,
     /// Moments Ixx, Iyy, Izz about the centre of mass, axes along the link's frame.
     pub inertia_kg_m2: [f64; 3],
@@ -69,10 +80,13 @@ pub struct LinkSpec {
 /// Hollow round cross-section.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BeamSection {
+    /// Outer diameter, greater than zero.
     pub outer_diameter_m: f64,
+    /// Wall thickness, at most half the outer diameter (solid).
     pub wall_m: f64,
 }
 
+/// Where the tool sits on the flange, and where it points.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ToolFrame {
     /// Tool centre point in the flange frame (frame of the last joint).

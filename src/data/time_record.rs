@@ -9,6 +9,7 @@ pub struct Channel {
     pub name: String,
     /// Unit as in the file.
     pub file_unit: String,
+    /// What it records, as far as the analyses of cuts go.
     pub role: ChannelRole,
     /// Samples in SI (N, N·m, m/s², m, …; volts and unknown units as they stand).
     pub samples: Vec<f64>,
@@ -17,20 +18,26 @@ pub struct Channel {
 /// What a channel records, decided from its name and unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum ChannelRole {
+    /// Force along x of the dynamometer, N.
     ForceX,
+    /// Force along y of the dynamometer, N.
     ForceY,
+    /// Force along z of the dynamometer, N.
     ForceZ,
     /// Moment about the spindle axis, N·m.
     TorqueZ,
+    /// Anything else, such as an acceleration or a part of a force.
     Other,
 }
 
 /// A uniformly sampled record of one or more channels.
 #[derive(Debug, Clone)]
 pub struct TimeRecord {
+    /// Samples per second.
     pub sample_rate_hz: f64,
     /// Time of the first sample, s.
     pub start_s: f64,
+    /// In the order of the file, all of one length.
     pub channels: Vec<Channel>,
     /// Samples that the recorder dropped: stretches filled by a straight line, so that the times behind them are right.
     pub filled: Vec<std::ops::Range<usize>>,
@@ -55,6 +62,7 @@ impl TimeRecord {
         self.filled.extend(filled);
     }
 
+    /// The first channel with this role; `None` where there is none.
     pub fn channel(&self, role: ChannelRole) -> Option<&Channel> {
         self.channels.iter().find(|c| c.role == role)
     }
@@ -64,6 +72,7 @@ impl TimeRecord {
         self.channels.first().map_or(0, |c| c.samples.len())
     }
 
+    /// Are there no samples?
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

@@ -1,19 +1,26 @@
 //! The tool.
 
+/// What kind of cutting tool it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ToolKind {
+    /// An end mill, ball ends included.
     Endmill,
+    /// A twist drill.
     Drill,
     /// A turning tool with one insert; `teeth` is 1.
     Turning,
 }
 
+/// The tool that cuts, as the `[tool]` section gives it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tool {
+    /// Kind of tool; it says which of the numbers below count.
     pub kind: ToolKind,
     /// 0 for a turning tool, which has none: the workpiece turns.
     pub diameter_mm: f64,
+    /// Number of teeth, or of lips of a drill; at least 1.
     pub teeth: usize,
+    /// Helix angle; 0: straight teeth, turning tools.
     pub helix_deg: f64,
     /// End mills: radius of the corner between face and side; half the diameter is a ball end, 0 a sharp corner. Turning:
     /// the nose radius rε.
@@ -37,14 +44,21 @@ impl Tool {
 /// `[[lobes.tool.segment]]`: a stretch of the tool of one section and material, from the holder face to the tip.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct ToolSegment {
+    /// Length along the tool axis.
     pub length_mm: f64,
+    /// Outer diameter; over the flutes where there are any.
     pub diameter_mm: f64,
+    /// Diameter of the bore; 0: solid.
     pub bore_mm: f64,
     /// Diameter of the round bar that is as stiff over `diameter_mm`: below 1 for flutes.
     pub flute_ratio: f64,
+    /// Young's modulus E.
     pub young_gpa: f64,
+    /// Shear modulus G.
     pub shear_gpa: f64,
+    /// Of the material, such as 7850 for steel.
     pub density_kg_per_m3: f64,
+    /// Loss factor η in E (1 + iη): about twice the damping ratio.
     pub loss_factor: f64,
     /// See [`crate::lobes::BeamSegment::twist_coupling`].
     pub twist_coupling: f64,

@@ -16,7 +16,9 @@ use crate::{Error, InputError, Result};
 /// What a channel is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Measures {
+    /// The time of the samples.
     Time,
+    /// A force, or the torque about z, by its role.
     Force(ChannelRole),
 }
 
@@ -44,13 +46,17 @@ pub enum Gain {
 /// One channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChannelRule {
+    /// What the channel is.
     pub measures: Measures,
+    /// Where it stands in its file.
     pub source: Source,
     /// Of the values in the file, where the file does not say it.
     pub unit: Option<Unit>,
+    /// From the values to newtons, or N·m for the torque.
     pub gain: Gain,
     /// Value at no force, in the unit of the file; taken off first.
     pub offset: f64,
+    /// The force counts in the other sense: it is multiplied by −1.
     pub is_reversed: bool,
     /// Sampling rate of a file without a time column.
     pub rate_hz: Option<f64>,

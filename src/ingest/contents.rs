@@ -57,6 +57,7 @@ impl std::fmt::Display for Format {
 /// All that a measurement file holds; a universal file may hold several kinds at once.
 #[derive(Debug, Clone, Default)]
 pub struct Contents {
+    /// Frequency response functions, each with frequencies of its own.
     pub frfs: Vec<FrfRecord>,
     /// One record for each time axis.
     pub times: Vec<TimeRecord>,
@@ -69,20 +70,28 @@ pub struct Contents {
 pub struct OtherRecord {
     /// Such as `power spectral density`.
     pub kind: &'static str,
+    /// What the file calls it; may be empty.
     pub name: String,
+    /// Finite; in the order of the file.
     pub abscissa: Vec<f64>,
+    /// Unit label of the abscissa.
     pub abscissa_unit: String,
+    /// Same length as `abscissa`; real functions have no imaginary part.
     pub value: Vec<Complex64>,
+    /// Unit label of the values; empty where the file has none.
     pub unit: String,
 }
 
 /// A file that was read.
 #[derive(Debug, Clone)]
 pub struct MeasurementFile {
+    /// Path of the file, as it was given; empty for bytes from memory.
     pub path: PathBuf,
+    /// How it is written.
     pub format: Format,
     /// Why it was taken for this format.
     pub why: String,
+    /// All that could be read of it.
     pub contents: Contents,
     /// What was assumed, contradicted or left out.
     pub warnings: Vec<String>,

@@ -11,7 +11,9 @@ const INCH: f64 = 0.0254;
 /// A unit: `value in SI = value × factor`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unit {
+    /// Value in SI for one of the unit, greater than zero.
     pub factor: f64,
+    /// What it is a unit of.
     pub dimension: Dimension,
 }
 
@@ -20,15 +22,25 @@ pub struct Unit {
 pub struct Dimension(pub [i32; 4]);
 
 impl Dimension {
+    /// Pure numbers: ratios, angles.
     pub const NONE: Dimension = Dimension([0; 4]);
+    /// Second.
     pub const TIME: Dimension = Dimension([0, 1, 0, 0]);
+    /// Hertz.
     pub const FREQUENCY: Dimension = Dimension([0, -1, 0, 0]);
+    /// Metre.
     pub const LENGTH: Dimension = Dimension([1, 0, 0, 0]);
+    /// Metre per second.
     pub const VELOCITY: Dimension = Dimension([1, -1, 0, 0]);
+    /// Metre per second squared.
     pub const ACCELERATION: Dimension = Dimension([1, -2, 0, 0]);
+    /// Newton.
     pub const FORCE: Dimension = Dimension([1, -2, 1, 0]);
+    /// Newton metre.
     pub const MOMENT: Dimension = Dimension([2, -2, 1, 0]);
+    /// Pascal.
     pub const PRESSURE: Dimension = Dimension([-1, -2, 1, 0]);
+    /// Volt; charges of piezoelectric sensors count as voltages.
     pub const VOLTAGE: Dimension = Dimension([0, 0, 0, 1]);
 
     /// Of this for one of `other`.

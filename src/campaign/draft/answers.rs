@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 pub struct Answers(BTreeMap<(String, String), String>);
 
 impl Answers {
+    /// Keeps what was typed for a key of one table (`cut 01`) or of all of a kind (`cut`); a later answer replaces it.
     pub fn set(&mut self, table: impl Into<String>, key: impl Into<String>, value: impl Into<String>) {
         self.0.insert((table.into(), key.into()), value.into());
     }

@@ -16,7 +16,9 @@ use crate::{Error, InputError, Result};
 /// A campaign file in the making.
 #[derive(Debug, Clone)]
 pub struct Draft {
+    /// Name of the campaign.
     pub name: String,
+    /// Sections, in the order of the file.
     pub tables: Vec<DraftTable>,
 }
 
@@ -25,9 +27,11 @@ pub struct Draft {
 pub struct Missing {
     /// `cut`, `posture`, …
     pub table: &'static str,
+    /// Key of `campaign.toml`.
     pub key: &'static str,
     /// What it is, with its unit.
     pub what: &'static str,
+    /// A value as it may be typed.
     pub example: &'static str,
     /// Of which of the tables; empty where there is one.
     pub of: Vec<String>,
@@ -36,9 +40,13 @@ pub struct Missing {
 /// Something that was concluded from a name, or taken for usual.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Guess {
+    /// Kind and name of the table: `cut 01`; the kind alone where there is one.
     pub table: String,
+    /// Key of `campaign.toml`.
     pub key: String,
+    /// The value that was taken, as TOML.
     pub value: String,
+    /// What it was concluded from.
     pub why: String,
 }
 
@@ -105,6 +113,7 @@ impl Draft {
         missing
     }
 
+    /// Every value that nobody gave, in the order of the file.
     pub fn guesses(&self) -> Vec<Guess> {
         let of_table = |table: &DraftTable| -> Vec<Guess> {
             let guessed = table.entries.iter().filter_map(|e| {

@@ -5,9 +5,13 @@ use crate::text::quoted;
 /// What a value looks like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
+    /// Any text that is not empty.
     Text,
+    /// One of these words; case does not count.
     Choice(&'static [&'static str]),
+    /// A finite number; a comma is a decimal point.
     Number,
+    /// A whole number.
     Whole,
     /// A list of numbers.
     Numbers,
@@ -20,12 +24,15 @@ pub enum Kind {
 /// A key of the file to be.
 #[derive(Debug, Clone)]
 pub struct Entry {
+    /// Key of `campaign.toml`.
     pub key: &'static str,
+    /// What its value looks like.
     pub kind: Kind,
     /// In words, with the unit: what is asked for.
     pub what: &'static str,
     /// As typed, and as it stands after `key =` in a comment.
     pub example: &'static str,
+    /// The file is incomplete without it.
     pub required: bool,
     /// Stands in the file only where it is given.
     pub unmentioned: bool,
@@ -36,7 +43,7 @@ pub struct Entry {
 }
 
 impl Entry {
-    pub fn new(key: &'static str, kind: Kind, what: &'static str, example: &'static str) -> Self {
+    pub(crate) fn new(key: &'static str, kind: Kind, what: &'static str, example: &'static str) -> Self {
         Entry {
             key,
             kind,
@@ -49,7 +56,7 @@ impl Entry {
         }
     }
 
-    pub fn optional(mut self) -> Self {
+    pub(crate) fn optional(mut self) -> Self {
         self.required = false;
         self
     }
@@ -60,11 +67,11 @@ impl Entry {
         self.optional()
     }
 
-    pub fn is_given(&self) -> bool {
+    pub(crate) fn is_given(&self) -> bool {
         !self.value.is_empty()
     }
 
-    pub fn is_missing(&self) -> bool {
+    pub(crate) fn is_missing(&self) -> bool {
         self.required && self.value.is_empty()
     }
 
@@ -226,6 +233,7 @@ pub struct DraftTable {
     pub name: String,
     /// Stands in double brackets.
     pub repeated: bool,
+    /// One for each key, in the order of the file.
     pub entries: Vec<Entry>,
 }
 

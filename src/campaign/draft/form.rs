@@ -12,17 +12,22 @@ pub struct Form {
     pub kind: &'static str,
     /// Which of them; empty where there is one.
     pub name: String,
+    /// One for each key, in the order of the file.
     pub fields: Vec<Field>,
 }
 
+/// One key of the file to be, for somebody to fill in.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Field {
+    /// Key of `campaign.toml`.
     pub key: &'static str,
     /// What it is, with its unit; empty: a fact that is not to be changed.
     pub what: &'static str,
+    /// A value as it may be typed.
     pub example: &'static str,
     /// Empty: anything.
     pub choices: &'static [&'static str],
+    /// The file is incomplete without it.
     pub required: bool,
     /// As a person would type it.
     pub value: Option<String>,

@@ -9,8 +9,11 @@ use crate::data::Quantity;
 /// A folder's measurement files, in the order of their paths (from the folder, with forward slashes).
 #[derive(Debug, Default, Clone)]
 pub struct Scan {
+    /// Files with FRFs.
     pub frfs: Vec<FoundFrf>,
+    /// Files with cutting forces over time.
     pub forces: Vec<FoundForce>,
+    /// Robot files, as paths.
     pub robots: Vec<String>,
     /// Tables that look like lists of cuts.
     pub cut_lists: Vec<PathBuf>,
@@ -18,23 +21,29 @@ pub struct Scan {
     pub not_used: Vec<(String, String)>,
 }
 
+/// A file with FRFs, all of them at known nodes.
 #[derive(Debug, Clone)]
 pub struct FoundFrf {
+    /// From the folder, with forward slashes.
     pub path: String,
+    /// Id of the posture that its name or folder tells.
     pub posture: String,
     /// How the posture was concluded, where that is a guess.
     pub posture_guess: Option<&'static str>,
     /// `None` where the file does not say for every FRF.
     pub quantity: Option<Quantity>,
+    /// Node numbers of its responses and references.
     pub nodes: BTreeSet<i64>,
-    pub facts: Facts,
+    pub(crate) facts: Facts,
 }
 
+/// A file with cutting forces over time.
 #[derive(Debug, Clone)]
 pub struct FoundForce {
+    /// From the folder, with forward slashes.
     pub path: String,
-    pub from_name: Facts,
-    pub from_header: Facts,
+    pub(crate) from_name: Facts,
+    pub(crate) from_header: Facts,
 }
 
 /// Name without folders and ending.

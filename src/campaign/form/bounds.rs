@@ -12,10 +12,14 @@ pub struct Bounds {
 }
 
 impl Bounds {
+    /// Every number but NaN.
     pub const ANY: Bounds = Bounds::closed(f64::NEG_INFINITY, f64::INFINITY);
+    /// Above zero.
     pub const POSITIVE: Bounds = Bounds::open(0.0, f64::INFINITY);
+    /// Zero or above.
     pub const NOT_NEGATIVE: Bounds = Bounds::closed(0.0, f64::INFINITY);
 
+    /// From `low` to `high`, both included; an infinite end is none.
     pub const fn closed(low: f64, high: f64) -> Bounds {
         Bounds {
             low,
@@ -25,6 +29,7 @@ impl Bounds {
         }
     }
 
+    /// From `low` to `high`, both left out; an infinite end is none.
     pub const fn open(low: f64, high: f64) -> Bounds {
         Bounds {
             low,

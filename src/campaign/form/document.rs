@@ -24,7 +24,7 @@ impl Document {
         Document::from_bytes(file, bytes)
     }
 
-    pub fn from_bytes(file: &Path, bytes: Vec<u8>) -> Result<Document> {
+    pub(crate) fn from_bytes(file: &Path, bytes: Vec<u8>) -> Result<Document> {
         let text = String::from_utf8(bytes).map_err(|e| {
             let valid = e.utf8_error().valid_up_to();
             let line = 1 + e.as_bytes()[..valid].iter().filter(|b| **b == b'\n').count();
@@ -36,7 +36,7 @@ impl Document {
         Ok(Document::from_text(file, &text))
     }
 
-    pub fn from_text(file: &Path, text: &str) -> Document {
+    pub(crate) fn from_text(file: &Path, text: &str) -> Document {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text).to_string();
         Document {
             file: file.to_path_buf(),

@@ -10,7 +10,9 @@ pub(crate) const ROBOT_KEY: &str = "robot.model";
 /// One key of a table.
 #[derive(Debug, Clone, Copy)]
 pub struct Key {
+    /// As it stands before the equals sign.
     pub name: &'static str,
+    /// What its value must be.
     pub holds: Holds,
     /// In every table of this kind. What depends on other keys (the feed of a milling cut) the loader alone knows.
     pub required: bool,
@@ -21,11 +23,13 @@ pub struct Key {
 /// What stands behind the equals sign.
 #[derive(Debug, Clone, Copy)]
 pub enum Holds {
+    /// Any text that is not blank.
     Text,
     /// One of these.
     Words(&'static [&'static str]),
     /// Text of this form (a regular expression).
     Form(&'static str),
+    /// A finite number within these bounds.
     Number(Bounds),
     /// From, to.
     Whole(i64, i64),
@@ -37,7 +41,9 @@ pub enum Holds {
     Array(usize),
     /// Rows of so many numbers; how many rows, where that is fixed.
     Rows(usize, Option<usize>),
+    /// One table `[key]` with these keys.
     Section(&'static [Key]),
+    /// Tables `[[key]]`, each with these keys.
     Sections(&'static [Key]),
 }
 
@@ -140,7 +146,7 @@ pub const TOP: [Key; 16] = [
     ),
 ];
 
-pub const ROBOT: [Key; 7] = [
+pub(crate) const ROBOT: [Key; 7] = [
     must(
         "model",
         Holds::Text,
@@ -178,7 +184,7 @@ pub const ROBOT: [Key; 7] = [
     ),
 ];
 
-pub const POSTURE: [Key; 2] = [
+pub(crate) const POSTURE: [Key; 2] = [
     must("id", Holds::Text, "Such as \"p1\""),
     must(
         "joints_deg",
@@ -187,7 +193,7 @@ pub const POSTURE: [Key; 2] = [
     ),
 ];
 
-pub const POINT: [Key; 4] = [
+pub(crate) const POINT: [Key; 4] = [
     must(
         "node",
         Holds::Whole(i64::MIN, i64::MAX),
@@ -206,7 +212,7 @@ pub const POINT: [Key; 4] = [
     ),
 ];
 
-pub const FRF: [Key; 4] = [
+pub(crate) const FRF: [Key; 4] = [
     must("file", Holds::Text, "Path in this folder: UFF 58, CSV, …"),
     must("posture", Holds::Text, "Id of a [[posture]]"),
     may(
@@ -217,7 +223,7 @@ pub const FRF: [Key; 4] = [
     may("force_level_n", POSITIVE, "Level of the hammer or shaker, N"),
 ];
 
-pub const TOOL: [Key; 10] = [
+pub(crate) const TOOL: [Key; 10] = [
     must(
         "kind",
         Holds::Words(&["endmill", "ballend", "drill", "turning"]),
@@ -258,13 +264,13 @@ pub const TOOL: [Key; 10] = [
     ),
 ];
 
-pub const MATERIAL: [Key; 1] = [must(
+pub(crate) const MATERIAL: [Key; 1] = [must(
     "name",
     Holds::Text,
     "Such as \"Ti-6Al-4V\"; of every cut that names none itself",
 )];
 
-pub const ORTHOGONAL: [Key; 6] = [
+pub(crate) const ORTHOGONAL: [Key; 6] = [
     must(
         "shear_stress_mpa",
         POSITIVE,
@@ -297,13 +303,13 @@ pub const ORTHOGONAL: [Key; 6] = [
     ),
 ];
 
-pub const DYNAMOMETER: [Key; 1] = [must(
+pub(crate) const DYNAMOMETER: [Key; 1] = [must(
     "tool_from_dyno",
     Holds::Rows(3, Some(3)),
     "A in F_tool = A F_recorded: row 1 is tool x in dynamometer axes",
 )];
 
-pub const CHANNEL: [Key; 10] = [
+pub(crate) const CHANNEL: [Key; 10] = [
     must(
         "name",
         Holds::Words(&["fx", "fy", "fz", "mz", "time"]),
@@ -344,7 +350,7 @@ pub const CHANNEL: [Key; 10] = [
     ),
 ];
 
-pub const CUT: [Key; 20] = [
+pub(crate) const CUT: [Key; 20] = [
     must("id", Holds::Text, "Such as \"01\""),
     must("file", Holds::Text, "Path of the force record in this folder"),
     must("process", PROCESS, "Milling, drilling or turning"),
@@ -411,7 +417,7 @@ pub const CUT: [Key; 20] = [
     may("material", Holds::Text, "Of this cut, where cuts are of several"),
 ];
 
-pub const LOBES: [Key; 20] = [
+pub(crate) const LOBES: [Key; 20] = [
     must("process", PROCESS, "Milling, drilling or turning"),
     must(
         "source",
@@ -496,7 +502,7 @@ pub const LOBES: [Key; 20] = [
     may("tool", Holds::Section(&LOBE_TOOL), "The tool as a beam"),
 ];
 
-pub const MODE: [Key; 5] = [
+pub(crate) const MODE: [Key; 5] = [
     must(
         "axis",
         Holds::Words(&["x", "y", "z", "theta"]),
@@ -520,7 +526,7 @@ pub const MODE: [Key; 5] = [
     ),
 ];
 
-pub const REDUNDANCY: [Key; 4] = [
+pub(crate) const REDUNDANCY: [Key; 4] = [
     must("posture", Holds::Text, "Id of the [[posture]] whose tool is kept"),
     must(
         "step_deg",
@@ -539,7 +545,7 @@ pub const REDUNDANCY: [Key; 4] = [
     ),
 ];
 
-pub const HOLE: [Key; 6] = [
+pub(crate) const HOLE: [Key; 6] = [
     may("thrust_n", ANY, "Against the tool, N [from the coefficients]"),
     may(
         "torque_nm",
@@ -568,13 +574,13 @@ pub const HOLE: [Key; 6] = [
     ),
 ];
 
-pub const LOBE_TOOL: [Key; 1] = [must(
+pub(crate) const LOBE_TOOL: [Key; 1] = [must(
     "segment",
     Holds::Sections(&SEGMENT),
     "A stretch of one section and material, from the holder face to the tip",
 )];
 
-pub const SEGMENT: [Key; 9] = [
+pub(crate) const SEGMENT: [Key; 9] = [
     must("length_mm", POSITIVE, "Length, mm"),
     must("diameter_mm", POSITIVE, "Outer diameter, mm"),
     may("bore_mm", NOT_NEGATIVE, "Bore, mm [0]"),
@@ -606,7 +612,7 @@ pub const SEGMENT: [Key; 9] = [
     ),
 ];
 
-pub const PLAN: [Key; 6] = [
+pub(crate) const PLAN: [Key; 6] = [
     may(
         "responses",
         Holds::Text,
@@ -648,7 +654,7 @@ pub const ROBOT_FILE: [Key; 5] = [
     may("tool", Holds::Section(&TOOL_FRAME), "The tool centre point"),
 ];
 
-pub const JOINT: [Key; 10] = [
+pub(crate) const JOINT: [Key; 10] = [
     may("name", Holds::Text, "Name of the joint"),
     may(
         "d_m",
@@ -685,7 +691,7 @@ pub const JOINT: [Key; 10] = [
     ),
 ];
 
-pub const LINK: [Key; 7] = [
+pub(crate) const LINK: [Key; 7] = [
     may("name", Holds::Text, "Name of the link"),
     must("mass_kg", NOT_NEGATIVE, "Mass, kg"),
     must(
@@ -711,7 +717,7 @@ pub const LINK: [Key; 7] = [
     may("section_wall_m", POSITIVE, "Wall of that tube, m"),
 ];
 
-pub const TOOL_FRAME: [Key; 3] = [
+pub(crate) const TOOL_FRAME: [Key; 3] = [
     may(
         "tcp_in_flange_m",
         Holds::Array(3),

@@ -40,6 +40,7 @@ impl<'d> Section<'d> {
         self.document.line_of(self.start)
     }
 
+    /// Does the table have this key, whatever its value?
     pub fn has(&self, key: &str) -> bool {
         self.table.contains_key(key)
     }

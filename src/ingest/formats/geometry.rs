@@ -26,8 +26,11 @@ pub struct Geometry {
 /// One mode at nodes, as dataset 55 holds it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct NodalShape {
+    /// First line of the dataset's text.
     pub title: String,
+    /// Undamped natural frequency.
     pub frequency_hz: f64,
+    /// Viscous damping ratio ζ.
     pub damping_ratio: f64,
     /// For the shape as it stands, kg; 0 where the file does not say.
     pub modal_mass_kg: f64,

@@ -9,8 +9,11 @@ use num_complex::Complex64;
 pub struct MatArray {
     /// Letters, digits and underscores, a letter first.
     pub name: String,
+    /// Number of rows.
     pub rows: usize,
+    /// Number of columns.
     pub columns: usize,
+    /// Real parts, one column after the other: `rows` × `columns` of them.
     pub re: Vec<f64>,
     /// Same length as `re`; `None` for a real matrix.
     pub im: Option<Vec<f64>>,

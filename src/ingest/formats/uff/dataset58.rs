@@ -12,8 +12,11 @@ use crate::ingest::text::{Lines, Notes, decode};
 /// One side of record 6: entity name, node number and direction (±1..3 translation, ±4..6 rotation, 0 scalar).
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct EntityDof {
+    /// Entity name, ten characters in the file; `NONE` where there is none.
     pub name: String,
+    /// Node number; 0 where there is none.
     pub node: i64,
+    /// ±1 to ±3 along, ±4 to ±6 about X, Y, Z; 0 for a scalar.
     pub direction: i32,
 }
 
@@ -22,27 +25,37 @@ pub struct EntityDof {
 pub struct UnitAxis {
     /// Specific data type: 8 displacement, 11 velocity, 12 acceleration, 13 excitation force, 17 time, 18 frequency, …
     pub kind: i32,
+    /// What the axis is called, twenty characters in the file.
     pub label: String,
+    /// Unit label, twenty characters in the file; `NONE` or blank where there is none.
     pub unit: String,
 }
 
+/// Where the values of a dataset stand, in the unit of its first axis.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Abscissa {
+    /// At even distances.
     Even {
+        /// Abscissa of the first value.
         start: f64,
+        /// Distance from one value to the next.
         step: f64,
     },
     /// Same length as the ordinate.
     Uneven(Vec<f64>),
 }
 
+/// The values of a dataset, in the units of the file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ordinate {
+    /// One number a point: time signals, coherences, power spectra.
     Real(Vec<f64>),
+    /// Real and imaginary part of each point: FRFs, cross spectra.
     Complex(Vec<Complex64>),
 }
 
 impl Ordinate {
+    /// Number of values.
     pub fn len(&self) -> usize {
         match self {
             Ordinate::Real(values) => values.len(),
@@ -50,6 +63,7 @@ impl Ordinate {
         }
     }
 
+    /// Are there no values?
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -62,11 +76,15 @@ pub struct Dataset58 {
     pub id_lines: Vec<String>,
     /// 1 time response, 2 auto, 3 cross spectrum, 4 FRF, 6 coherence, …
     pub function_type: i32,
+    /// Where and along what was measured.
     pub response: EntityDof,
+    /// Where and along what was excited; node 0 where that does not apply.
     pub reference: EntityDof,
     /// Abscissa, ordinate numerator, ordinate denominator, z axis.
     pub axes: [UnitAxis; 4],
+    /// Times, frequencies or whatever the first of `axes` says.
     pub abscissa: Abscissa,
+    /// One value for each abscissa.
     pub ordinate: Ordinate,
 }
 

@@ -9,9 +9,12 @@ use crate::ingest::formats::uff::dataset58::{Abscissa, Dataset58, EntityDof, Ord
 use crate::ingest::units;
 use crate::{Error, Result};
 
+/// Order of the bytes of a number in a binary dataset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ByteOrder {
+    /// Least significant byte first.
     Little,
+    /// Most significant byte first.
     Big,
 }
 

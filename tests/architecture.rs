@@ -64,16 +64,13 @@ impl House {
     fn paths(&self, module: &Module, code: &str) -> Vec<(Module, bool, Module)> {
         let mut found = Vec::new();
         let mut rest = String::new();
-        let mut statements = code.split_inclusive(';').peekable();
-        while let Some(statement) = statements.next() {
+        for statement in code.split_inclusive(';') {
             let Some(at) = use_at(statement) else {
                 rest.push_str(statement);
                 continue;
             };
             rest.push_str(&statement[..at]);
-            let is_public = statement[..at]
-                .trim_end()
-                .ends_with(|c: char| c == ')' || c == 'b')
+            let is_public = statement[..at].trim_end().ends_with([')', 'b'])
                 && statement[..at]
                     .trim_end()
                     .rsplit(char::is_whitespace)

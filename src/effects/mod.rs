@@ -2,7 +2,7 @@
 //!
 //! An effect says what it is and where it may sit, gives its parameters with priors and bounds, and changes the model:
 //! it adds elements, bodies or branches to the chain, changes a stiffness, or filters the measured channels. Its
-//! derivative comes with the [`Dual`] numbers that it is written in. The loop knows effects by this trait only.
+//! derivative comes with the [`Dual`](crate::robot::Dual) numbers that it is written in. The loop knows effects by this trait only.
 
 pub mod background;
 pub mod cutting;

@@ -43,8 +43,9 @@ impl<'a> StabilitySolver<'a> {
     }
 
     /// Lobes as a program finds them that starts at another lobe than k = 0, or has ωT = 2π(k + `extra_turns`) + ε (½:
-    /// the delayed term has the wrong sign). Not for cuts: to see whether such a slip explains somebody's numbers.
-    pub(crate) fn with_lobes(mut self, first_lobe: f64, extra_turns: f64) -> Self {
+    /// the delayed term has the wrong sign). Not for cuts: to see whether such a slip explains somebody's
+    /// numbers. `first_lobe`: k of the first one; `extra_turns` in turns.
+    pub fn with_lobes(mut self, first_lobe: f64, extra_turns: f64) -> Self {
         (self.first_lobe, self.extra_turns) = (first_lobe, extra_turns);
         self
     }

@@ -1,8 +1,8 @@
 //! Draws what the floors below computed; computes nothing itself.
 //!
-//! [`figure`] turns plain numbers into PNG images, [`interactive`] into figures that answer to the mouse, [`number`] into
-//! readable text, and [`page`] puts all of them into one HTML file that needs nothing beside itself. [`campaign`] says what stands on that page, one
-//! `*_section` a part; `tables` (feature `parquet`) writes the same numbers for other programs.
+//! `figure` turns plain numbers into PNG images, `interactive` into figures that answer to the mouse, [`number`] into
+//! readable text, and [`Page`] is all of them as one HTML file that needs nothing else. [`campaign`] says what stands on that
+//! page, `sections` has its parts; `stores` (feature `parquet`) writes the same numbers for other programs.
 
 mod block;
 pub mod campaign;

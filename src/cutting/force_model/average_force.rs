@@ -13,7 +13,7 @@ use crate::data::{CutGeometry, Immersion, Tool};
 use crate::{Error, Result};
 
 /// Row of the linear model: average force (N; torque N·m) on `axis` = row · coefficients, coefficients in
-/// N/mm² and N/mm as [`coefficients_of`] lists them.
+/// N/mm² and N/mm as [`coefficients_of`](crate::cutting::coefficients_of) lists them.
 ///
 /// # Errors
 /// Drilling with a tool whose point is not given, or a geometry that cuts nothing.

@@ -52,7 +52,7 @@ pub const DRILLING_COEFFICIENTS: [CoefficientKind; 4] = [
     edge("kfe_n_per_mm", "Kfe"),
 ];
 
-/// The unknowns of a process, in the order of the columns of [`average_row`].
+/// The unknowns of a process, in the order of the columns of [`average_row`](crate::cutting::average_row).
 pub fn coefficients_of(process: Process) -> &'static [CoefficientKind] {
     match process {
         Process::Milling | Process::Turning => &MILLING_COEFFICIENTS,

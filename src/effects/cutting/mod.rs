@@ -10,7 +10,7 @@
 //! 5. crosstalk between the channels;
 //! 6. drift of each channel.
 //!
-//! Chatter adds lines off the tooth-passing comb. Derivatives come with the [`Dual`] numbers that all is written in.
+//! Chatter adds lines off the tooth-passing comb. Derivatives come with the [`Dual`](crate::robot::Dual) numbers that all is written in.
 
 mod chatter;
 mod chisel_edge;

@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 #[cfg(not(feature = "parquet"))]
-use crate::InputError;
-use crate::Result;
 use crate::commands::Outcome;
 use crate::lobes::workspace_grid::Span;
+#[cfg(not(feature = "parquet"))]
+use crate::{InputError, Result};
 
 /// Postures nearer to a singularity are usually of no use.
 const USUAL_SINGULARITY_MARGIN: f64 = 0.05;

@@ -238,7 +238,7 @@ mod tests {
     use crate::lobes::workspace_grid::GridPlace;
 
     fn settings(step: f64) -> Map<String, Value> {
-        json!({ "angle_step_deg": step, "posture": "p1", "joints_deg": [0.0; 6] })
+        json!({ "angle_step_deg": step, "posture": "p1", "joints_deg": vec![0.0; 6] })
             .as_object()
             .unwrap()
             .clone()

@@ -4,6 +4,7 @@ use std::fmt;
 
 use super::{Background, Size, Spot};
 use crate::data::RobotSpec;
+use crate::effects::usual_size::UsualSize;
 use crate::parameter::Parameter;
 use crate::robot::{Chain, Dual, Kinematics, RobotModel};
 
@@ -136,6 +137,11 @@ pub trait StructuralEffect: Sync {
         peaks_hz: &[f64],
     ) -> Vec<Vec<f64>> {
         self.starts(robot, data, peaks_hz)
+    }
+
+    /// How large it is where it is hidden in a simulated campaign: a line a parameter (lists once).
+    fn usual_sizes(&self) -> &'static [UsualSize] {
+        &[]
     }
 
     /// Why this effect cannot be of the size that was fitted (parameters in their order); `None` if it can.

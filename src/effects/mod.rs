@@ -13,6 +13,7 @@ mod registry;
 mod request;
 pub mod spot;
 pub(crate) mod structural;
+pub mod usual_size;
 
 pub use background::Background;
 pub use effect::{ChannelFilter, DataSummary, Instance, Setting, Site, StructuralEffect};

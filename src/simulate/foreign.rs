@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, Point3, Vector3, Vector6};
 
 use super::draw::{Draws, Purpose};
 use crate::data::RobotSpec;
+use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{Background, ChannelFilter, DataSummary, Instance, Setting, Site, StructuralEffect};
 use crate::parameter::{Parameter, Scale};
 use crate::robot::{Branch, Chain, Dual, Element, Place, Role, Slot};
@@ -82,6 +83,19 @@ impl StructuralEffect for ViscoelasticJoints {
         vec![Site::Everywhere]
     }
 
+    fn usual_sizes(&self) -> &'static [UsualSize] {
+        const {
+            &[
+                UsualSize::new(
+                    "stiffness_ratio",
+                    SizeRange::Log(1.5, 4.0),
+                    FollowsSize::Power(-1.0),
+                ),
+                UsualSize::new("relaxation_hz", SizeRange::Log(5.0, 20.0), FollowsSize::Not),
+            ]
+        }
+    }
+
     fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
         vec![
             parameter("stiffness_ratio", "1", Scale::Logarithmic, 2.5, [0.05, 1e6]),
@@ -137,6 +151,16 @@ impl StructuralEffect for BaseSliding {
 
     fn sites(&self, _robot: &RobotSpec) -> Vec<Site> {
         vec![Site::Everywhere]
+    }
+
+    fn usual_sizes(&self) -> &'static [UsualSize] {
+        const {
+            &[UsualSize::new(
+                "sliding_n_per_m",
+                SizeRange::Log(3e6, 1e7),
+                FollowsSize::Power(-1.0),
+            )]
+        }
     }
 
     fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
@@ -196,6 +220,16 @@ impl StructuralEffect for CrossAxisLeak {
         vec![Site::Everywhere]
     }
 
+    fn usual_sizes(&self) -> &'static [UsualSize] {
+        const {
+            &[UsualSize::new(
+                "leak",
+                SizeRange::Either(0.15),
+                FollowsSize::Power(1.0),
+            )]
+        }
+    }
+
     fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
         LEAKS
             .map(|(name, ..)| parameter(name, "1", Scale::Linear, 0.05, [-0.5, 0.5]))
@@ -240,6 +274,20 @@ impl StructuralEffect for ToolAxialFlexibility {
 
     fn sites(&self, _robot: &RobotSpec) -> Vec<Site> {
         vec![Site::Everywhere]
+    }
+
+    fn usual_sizes(&self) -> &'static [UsualSize] {
+        const {
+            &[
+                UsualSize::new("mass_kg", SizeRange::Log(3.0, 8.0), FollowsSize::Not),
+                UsualSize::new(
+                    "frequency_hz",
+                    SizeRange::Log(20.0, 60.0),
+                    FollowsSize::Power(-0.5),
+                ),
+                UsualSize::new("damping_ratio", SizeRange::Log(0.015, 0.04), FollowsSize::Not),
+            ]
+        }
     }
 
     fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {

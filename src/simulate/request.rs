@@ -61,11 +61,11 @@ pub struct HiddenEffect {
 impl HiddenEffect {
     /// Values at the present size, natural units.
     pub fn values(&self) -> Vec<f64> {
-        let id = self.instance.effect.id();
+        let effect = self.instance.effect;
         let each = self.parameters.iter().zip(&self.values).zip(&self.given);
         each.map(|((parameter, value), given)| match given {
             true => *value,
-            false => magnitude::at_size(id, parameter, *value, self.size),
+            false => magnitude::at_size(effect, parameter, *value, self.size),
         })
         .collect()
     }
@@ -96,10 +96,10 @@ impl HiddenEffect {
 
     /// Whether any value follows the size.
     pub fn has_size(&self) -> bool {
-        let id = self.instance.effect.id();
+        let effect = self.instance.effect;
         let each = self.parameters.iter().zip(&self.given);
         each.into_iter()
-            .any(|(parameter, given)| !given && magnitude::follows_size(id, parameter))
+            .any(|(parameter, given)| !given && magnitude::follows_size(effect, parameter))
     }
 }
 
@@ -119,7 +119,7 @@ impl EffectRequest {
         let parameters = instance.effect.parameters(robot, data);
         let mut values: Vec<f64> = parameters
             .iter()
-            .map(|p| magnitude::drawn(instance.effect.id(), p, draws))
+            .map(|p| magnitude::drawn(instance.effect, p, draws))
             .collect();
         let mut given = vec![false; parameters.len()];
         let choice = instance.effect.variant_label(0).map(|(key, _)| key);

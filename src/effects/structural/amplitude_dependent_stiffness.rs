@@ -1,6 +1,7 @@
 use crate::data::RobotSpec;
 use crate::effects::background::TUTTLE;
 use crate::effects::effect::{DataSummary, Setting, Site, StructuralEffect};
+use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{Background, Size};
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::{Chain, Dual, Role};
@@ -67,6 +68,16 @@ impl StructuralEffect for AmplitudeDependentStiffness {
 
     fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![0.7], vec![1.2]]
+    }
+
+    fn usual_sizes(&self) -> &'static [UsualSize] {
+        const {
+            &[UsualSize::new(
+                "low_level_ratio",
+                SizeRange::Log(0.6, 0.9),
+                FollowsSize::Ratio,
+            )]
+        }
     }
 
     fn vanishing(&self, _parameters: &[Parameter]) -> Option<Vec<f64>> {

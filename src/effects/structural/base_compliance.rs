@@ -4,6 +4,7 @@ use crate::data::RobotSpec;
 use crate::effects::Background;
 use crate::effects::background::EWINS;
 use crate::effects::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
+use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::{Chain, Dual, Element, Place, Role, Slot};
 
@@ -55,6 +56,16 @@ impl StructuralEffect for BaseCompliance {
 
     fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![3e6], vec![5e7]]
+    }
+
+    fn usual_sizes(&self) -> &'static [UsualSize] {
+        const {
+            &[UsualSize::new(
+                "rocking_nm_per_rad",
+                SizeRange::Log(4e6, 1.2e7),
+                FollowsSize::Power(-1.0),
+            )]
+        }
     }
 
     fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {

@@ -2,6 +2,7 @@ use crate::data::RobotSpec;
 use crate::effects::Background;
 use crate::effects::background::EWINS;
 use crate::effects::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
+use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::{Chain, Dual, Role};
 
@@ -79,6 +80,16 @@ impl StructuralEffect for JointDamping {
         };
         let with = |factor: f64, share: f64| at(factor).chain([share]).collect();
         vec![with(0.4, 0.0), with(2.5, 0.0), with(0.05, 1.0)]
+    }
+
+    fn usual_sizes(&self) -> &'static [UsualSize] {
+        const {
+            &[
+                UsualSize::new("c_nms_per_rad", SizeRange::Times(0.25, 3.3), FollowsSize::Not),
+                // All damping sits in the joints.
+                UsualSize::new("common_share", SizeRange::Either(1e-9), FollowsSize::Not),
+            ]
+        }
     }
 
     fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {

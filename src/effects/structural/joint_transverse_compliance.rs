@@ -4,6 +4,7 @@ use crate::data::RobotSpec;
 use crate::effects::Background;
 use crate::effects::background::{ABELE, MOBERG};
 use crate::effects::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
+use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::{Chain, Dual, Element, Place, Role, Slot};
 
@@ -57,6 +58,16 @@ impl StructuralEffect for JointTransverseCompliance {
 
     fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![7e5], vec![1.5e7]]
+    }
+
+    fn usual_sizes(&self) -> &'static [UsualSize] {
+        const {
+            &[UsualSize::new(
+                "transverse_nm_per_rad",
+                SizeRange::Log(1e6, 4e6),
+                FollowsSize::Power(-1.0),
+            )]
+        }
     }
 
     fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {

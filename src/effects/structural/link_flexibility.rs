@@ -1,6 +1,7 @@
 use crate::data::RobotSpec;
 use crate::effects::background::ABELE;
 use crate::effects::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
+use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{Background, Size};
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::{Chain, Dual};
@@ -75,6 +76,16 @@ impl StructuralEffect for LinkFlexibility {
 
     fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![70e9], vec![500e9]]
+    }
+
+    fn usual_sizes(&self) -> &'static [UsualSize] {
+        const {
+            &[UsualSize::new(
+                "young_pa",
+                SizeRange::Log(60e9, 200e9),
+                FollowsSize::Power(-1.0),
+            )]
+        }
     }
 
     fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {

@@ -4,6 +4,7 @@ use crate::data::RobotSpec;
 use crate::effects::Background;
 use crate::effects::background::TUTTLE;
 use crate::effects::effect::{DataSummary, Setting, Site, StructuralEffect};
+use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::{Chain, Dual, Role};
 
@@ -57,6 +58,16 @@ impl StructuralEffect for LoadDependentStiffness {
 
     fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![0.2]]
+    }
+
+    fn usual_sizes(&self) -> &'static [UsualSize] {
+        const {
+            &[UsualSize::new(
+                "beta",
+                SizeRange::Log(0.05, 0.2),
+                FollowsSize::Power(1.0),
+            )]
+        }
     }
 
     fn vanishing(&self, _parameters: &[Parameter]) -> Option<Vec<f64>> {

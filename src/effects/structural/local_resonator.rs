@@ -3,6 +3,7 @@ use nalgebra::Vector3;
 use crate::data::RobotSpec;
 use crate::effects::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
 use crate::effects::structural::branch;
+use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{Background, Size};
 use crate::parameter::Parameter;
 use crate::robot::{Branch, Chain, Dual, Place, Slot};
@@ -61,6 +62,16 @@ impl StructuralEffect for LocalResonator {
 
     fn starts(&self, _robot: &RobotSpec, data: &DataSummary, peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         branch::starts(data, peaks_hz, MASS_KG)
+    }
+
+    fn usual_sizes(&self) -> &'static [UsualSize] {
+        const {
+            &[
+                UsualSize::new("mass_kg", SizeRange::Log(4.0, 12.0), FollowsSize::Power(1.0)),
+                UsualSize::new("frequency_hz", SizeRange::Log(8.0, 25.0), FollowsSize::Not),
+                UsualSize::new("damping_ratio", SizeRange::Log(0.03, 0.08), FollowsSize::Not),
+            ]
+        }
     }
 
     fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {

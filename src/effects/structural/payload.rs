@@ -2,6 +2,7 @@ use nalgebra::{Matrix3, Point3};
 
 use crate::data::RobotSpec;
 use crate::effects::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
+use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{Background, Size};
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::{Body, Chain, Dual, Place, Slot};
@@ -69,6 +70,16 @@ impl StructuralEffect for Payload {
 
     fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![5.0], vec![60.0]]
+    }
+
+    fn usual_sizes(&self) -> &'static [UsualSize] {
+        const {
+            &[UsualSize::new(
+                "mass_kg",
+                SizeRange::Log(10.0, 40.0),
+                FollowsSize::Power(1.0),
+            )]
+        }
     }
 
     fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {

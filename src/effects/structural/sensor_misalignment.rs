@@ -1,6 +1,7 @@
 use crate::data::RobotSpec;
 use crate::effects::background::EWINS;
 use crate::effects::effect::{ChannelFilter, DataSummary, Site, StructuralEffect};
+use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{Background, Size};
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::Dual;
@@ -71,6 +72,16 @@ impl StructuralEffect for SensorMisalignment {
 
     fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![-3.0, 3.0, -3.0]]
+    }
+
+    fn usual_sizes(&self) -> &'static [UsualSize] {
+        const {
+            &[UsualSize::new(
+                "rotation_vector_deg",
+                SizeRange::Either(9.0),
+                FollowsSize::Power(1.0),
+            )]
+        }
     }
 
     fn vanishing(&self, _parameters: &[Parameter]) -> Option<Vec<f64>> {

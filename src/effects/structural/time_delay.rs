@@ -1,6 +1,7 @@
 use crate::data::RobotSpec;
 use crate::effects::background::EWINS;
 use crate::effects::effect::{ChannelFilter, DataSummary, Site, StructuralEffect};
+use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{Background, Size};
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::Dual;
@@ -61,6 +62,16 @@ impl StructuralEffect for TimeDelay {
 
     fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![2e-3], vec![-5e-4]]
+    }
+
+    fn usual_sizes(&self) -> &'static [UsualSize] {
+        const {
+            &[UsualSize::new(
+                "delay_s",
+                SizeRange::Log(2e-4, 1.2e-3),
+                FollowsSize::Power(1.0),
+            )]
+        }
     }
 
     fn vanishing(&self, _parameters: &[Parameter]) -> Option<Vec<f64>> {

@@ -5,6 +5,7 @@ use crate::effects::Background;
 use crate::effects::background::ALTINTAS;
 use crate::effects::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
 use crate::effects::structural::branch;
+use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::parameter::Parameter;
 use crate::robot::{Branch, Chain, Dual, Place, Slot};
 
@@ -52,6 +53,21 @@ impl StructuralEffect for ToolFlexibility {
 
     fn starts(&self, _robot: &RobotSpec, data: &DataSummary, peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         branch::starts(data, peaks_hz, MASS_KG)
+    }
+
+    fn usual_sizes(&self) -> &'static [UsualSize] {
+        const {
+            &[
+                UsualSize::new("mass_kg", SizeRange::Log(2.0, 8.0), FollowsSize::Not),
+                // Its compliance is 1/(m ω²).
+                UsualSize::new(
+                    "frequency_hz",
+                    SizeRange::Log(35.0, 80.0),
+                    FollowsSize::Power(-0.5),
+                ),
+                UsualSize::new("damping_ratio", SizeRange::Log(0.015, 0.04), FollowsSize::Not),
+            ]
+        }
     }
 
     fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {

@@ -7,8 +7,8 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::schema::{Campaign, FrfFile};
-use super::suggest::shown;
 use crate::campaign::form::paths::campaign_file;
+use crate::text::shown_briefly as shown;
 use crate::{InputError, Result};
 
 impl Campaign {

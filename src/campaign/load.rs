@@ -9,7 +9,6 @@ use std::path::{Path, PathBuf};
 use super::lobes_section;
 use super::schema::*;
 use super::shared_keys::posture_ref;
-use super::suggest::shown;
 use super::tool_and_cut::{geometry, tool};
 use crate::campaign::form::bounds::Bounds;
 use crate::campaign::form::document::Document;
@@ -17,6 +16,7 @@ use crate::campaign::form::keys::ROBOT_KEY;
 use crate::campaign::form::keys::{self, FORM, names};
 use crate::campaign::form::paths::{self, campaign_file};
 use crate::campaign::form::section::Section;
+use crate::text::shown_briefly as shown;
 use crate::{Error, InputError, Result};
 
 /// Keys of the top table.

@@ -11,7 +11,6 @@ pub mod robot_file;
 pub mod robot_text;
 pub mod schema;
 mod shared_keys;
-pub mod suggest;
 mod tool_and_cut;
 
 pub use crate::data::{

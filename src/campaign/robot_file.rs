@@ -3,13 +3,13 @@
 use crate::data::{BeamSection, JointPlacement, JointSpec, LinkSpec, RobotSpec, ToolFrame};
 use std::path::Path;
 
-use super::suggest::closest;
 use crate::campaign::form::bounds::Bounds;
 use crate::campaign::form::document::Document;
 use crate::campaign::form::keys::ROBOT_KEY;
 use crate::campaign::form::keys::{self, names};
 use crate::campaign::form::paths::{self, campaign_file};
 use crate::campaign::form::section::Section;
+use crate::text::closest;
 use crate::{InputError, Result};
 
 /// Built-in models: name and robot file.

@@ -2,11 +2,11 @@
 
 use std::f64::consts::PI;
 
-use super::suggest::shown;
 use crate::Result;
 use crate::campaign::form::bounds::Bounds;
 use crate::campaign::form::section::Section;
 use crate::data::{Immersion, Posture, Process};
+use crate::text::shown_briefly as shown;
 
 /// The processes by the names that the files have for them.
 pub(super) const PROCESSES: [(&str, Process); 3] = [

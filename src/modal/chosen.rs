@@ -288,11 +288,7 @@ mod tests {
             .iter()
             .enumerate()
             .map(|(k, row)| {
-                let modes: Vec<SyntheticMode> = f_zeta
-                    .iter()
-                    .zip(row)
-                    .map(|(&(f, z), &a)| SyntheticMode::new(f, z, a))
-                    .collect();
+                let modes = SyntheticMode::row(&f_zeta, row);
                 Synthetic::new(3.0, 40.0, 0.1, &modes)
                     .with_noise(0.0, 0.01, k as u64)
                     .frf()

@@ -22,6 +22,12 @@ impl SyntheticMode {
             constant,
         }
     }
+
+    /// The modes of one FRF of a set: frequency (Hz) and damping ratio, which the set shares, and the FRF's own constants.
+    pub fn row(shared: &[(f64, f64)], constants: &[f64]) -> Vec<SyntheticMode> {
+        let each = shared.iter().zip(constants);
+        each.map(|(&(f, z), &a)| SyntheticMode::new(f, z, a)).collect()
+    }
 }
 
 #[derive(Debug, Clone)]

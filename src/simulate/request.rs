@@ -2,11 +2,11 @@
 
 use super::draw::Draws;
 use super::foreign;
-use crate::campaign::suggest::closest;
 use crate::data::RobotSpec;
 use crate::effects::{self, DataSummary, Instance, STRUCTURAL, Size};
 use crate::parameter::Parameter;
 use crate::simulate::sizes::magnitude;
+use crate::text::closest;
 use crate::{InputError, Result};
 
 /// An effect to be hidden in a campaign, as a person writes it.

@@ -8,9 +8,9 @@ use super::found::Scan;
 use super::tables;
 use crate::campaign::form::paths::campaign_file;
 use crate::campaign::schema::Campaign;
-use crate::campaign::suggest::shown;
 use crate::files::{write_atomically, write_new};
 use crate::text::quoted;
+use crate::text::shown_briefly as shown;
 use crate::{Error, InputError, Result};
 
 /// A campaign file in the making.

@@ -7,7 +7,7 @@ use super::found::{Scan, stem};
 use super::list_columns::{Column, DIAMETER, DIRECTION, NUMBER, TEETH, column, english, is_down, plain};
 use super::tables::cut_ids;
 use crate::campaign::load::CUT;
-use crate::campaign::suggest::{closest, shown};
+use crate::text::{closest, shown_briefly as shown};
 use crate::{Error, InputError, Result};
 
 /// A key of `[[cut]]` that a list cannot give: it names a posture that `init` does not know yet.

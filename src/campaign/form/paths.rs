@@ -3,7 +3,7 @@
 use std::path::{Component, Path, PathBuf};
 
 use crate::InputError;
-use crate::campaign::suggest::{closest, shown};
+use crate::text::{closest, shown_briefly as shown};
 
 /// The file that makes a folder a campaign.
 pub fn campaign_file(dir: &Path) -> PathBuf {

@@ -5,7 +5,7 @@ use toml::de::{DeTable, DeValue};
 
 use crate::campaign::form::bounds::Bounds;
 use crate::campaign::form::document::Document;
-use crate::campaign::suggest::{closest, shown};
+use crate::text::{closest, shown_briefly as shown};
 use crate::{Error, InputError, Result};
 
 /// Numbers beyond these, in whatever unit a key has, are slips of the keyboard or a damaged file; they would only overflow

@@ -4,12 +4,12 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use crate::campaign::suggest::{closest, shown};
 use crate::commands::Outcome;
 use crate::commands::text::{Emphasis, wrapped};
 use crate::data::RobotSpec;
 use crate::effects::cutting::CUTTING;
 use crate::effects::{Background, STRUCTURAL};
+use crate::text::{closest, shown_briefly as shown};
 use crate::{InputError, Result};
 
 #[derive(clap::Args)]

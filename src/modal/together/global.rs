@@ -337,11 +337,7 @@ mod tests {
             .iter()
             .enumerate()
             .map(|(k, row)| {
-                let modes: Vec<SyntheticMode> = f_zeta
-                    .iter()
-                    .zip(row)
-                    .map(|(&(f, z), &a)| SyntheticMode::new(f, z, a))
-                    .collect();
+                let modes = SyntheticMode::row(f_zeta, row);
                 Synthetic::new(3.0, 60.0, 0.2, &modes)
                     .with_noise(0.0, noise, 100 + k as u64)
                     .frf()
@@ -410,11 +406,7 @@ mod tests {
         let mut frfs: Vec<(Vec<f64>, Vec<Complex64>)> = constants
             .iter()
             .map(|row| {
-                let modes: Vec<SyntheticMode> = modes
-                    .iter()
-                    .zip(row)
-                    .map(|(&(f, z), &a)| SyntheticMode::new(f, z, a))
-                    .collect();
+                let modes = SyntheticMode::row(&modes, row);
                 Synthetic::new(0.2, 30.0, 0.1, &modes).frf()
             })
             .collect();
@@ -458,11 +450,7 @@ mod tests {
                 .iter()
                 .enumerate()
                 .map(|(k, row)| {
-                    let modes: Vec<SyntheticMode> = modes
-                        .iter()
-                        .zip(row)
-                        .map(|(&(f, z), &a)| SyntheticMode::new(f, z, a))
-                        .collect();
+                    let modes = SyntheticMode::row(&modes, row);
                     Synthetic::new(3.0, 30.0, 0.25, &modes)
                         .with_noise(0.0, 0.03, 2 * seed + k as u64)
                         .frf()
@@ -517,11 +505,7 @@ mod tests {
             .iter()
             .enumerate()
             .map(|(k, row)| {
-                let modes: Vec<SyntheticMode> = modes
-                    .iter()
-                    .zip(row)
-                    .map(|(&(f, z), &a)| SyntheticMode::new(f, z, a))
-                    .collect();
+                let modes = SyntheticMode::row(&modes, row);
                 Synthetic::new(5.0, 400.0, 1.0, &modes)
                     .with_noise(0.0, 0.02, k as u64)
                     .frf()

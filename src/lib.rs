@@ -64,8 +64,8 @@
 //! #         }
 //! #     }
 //! #     let case = StructureCase::new(robot.clone(), postures, vec![at.clone()], frfs.clone())?;
-//! #     let payload = lobestone::effects::find(robot, "payload")[0];
-//! #     let model = case.model.with_effect(payload, &case.data.summary());
+//! #     let payload = lobestone::effects::Registry::structure().find(robot, "payload")[0];
+//! #     let model = case.model.with_effect(payload, &case.model.known(&case.data.summary()));
 //! #     let mut theta = model.nominal_theta();
 //! #     let last = theta.len() - 1;
 //! #     theta[last] = model.parameters[last].internal(35.0);
@@ -152,6 +152,11 @@
 //! library prints nothing: [`progress`] tells how far long work is, and [`stop`] ends it.
 
 #![warn(missing_docs)]
+
+/// The page for developers, whose example is compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/adding-an-effect.md")]
+pub struct AddingAnEffect;
 
 pub mod analysis;
 pub mod builtin;

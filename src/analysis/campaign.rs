@@ -14,7 +14,7 @@ use crate::discrepancy::setup::SetupFinding;
 use crate::identify::frfs::structure_study::held_out_postures;
 use crate::identify::{Options, StructureCase, StructureModel};
 use crate::modal::Settings;
-use crate::revision::{Domain, Revision};
+use crate::revision::{Revision, Side};
 use crate::robot::PostureReport;
 use crate::{Error, InputError, Result};
 
@@ -95,14 +95,14 @@ impl<'a> CampaignFindings<'a> {
             DiagnosisFindings::of(campaign, structure.analysis.settled_case(), Options::default())
         });
         let cutting = (!campaign.cuts.is_empty()).then(|| identify_forces(campaign, CfcOptions::default()));
-        let cutting_diagnosis =
-            (wanted && matches!(cutting, Some(Ok(_)))).then(|| CuttingFindings::on(bench));
+        let cutting_diagnosis = (wanted && matches!(cutting, Some(Ok(_))))
+            .then(|| CuttingFindings::on(bench, Options::default()));
         let postures = (campaign.robot.is_some() && !campaign.postures.is_empty())
             .then(|| PostureFindings::run(campaign, calibrated));
         let log = bench.revisions()?;
         let findings = CampaignFindings {
             campaign,
-            cutting_revisions: log.revisions(Domain::Cutting).cloned().collect(),
+            cutting_revisions: log.revisions(Side::Cutting).cloned().collect(),
             setup: likely_mistakes(bench, (&structure, &diagnosis), (&cutting, &cutting_diagnosis)),
             postures,
             diagnosis,

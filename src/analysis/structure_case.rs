@@ -1,11 +1,11 @@
 //! A campaign's structural side loaded: robot file, FRF files and the revisions of its model.
 
+use super::grown::with_revision;
 use super::workbench::Workbench;
 use crate::campaign::{Campaign, FrfSet, LinkGroup, RobotSection};
-use crate::effects;
-use crate::identify::model_history::{Domain, Revision, recorded_effect};
+use crate::effects::Registry;
+use crate::identify::model_history::{Revision, Side};
 use crate::identify::{FrfData, StructureCase, StructureModel};
-use crate::revision::log_file;
 use crate::robot::{RobotModel, RobotSpec};
 use crate::{InputError, Result};
 
@@ -81,14 +81,14 @@ impl StructureCase {
     pub fn on(campaign: &Workbench) -> Result<Self> {
         let baseline = structure_model(campaign)?;
         let log = campaign.revisions()?;
-        let revisions: Vec<Revision> = log.revisions(Domain::Structure).cloned().collect();
+        let revisions: Vec<Revision> = log.revisions(Side::Structure).cloned().collect();
         let (set, mut warnings) = campaign.load_frfs()?;
         warnings.extend(baseline.robot.spec.guesses_told());
         let data = frf_data(campaign, &baseline.robot, set)?;
         let mut settled = false;
         let model = match revisions.last() {
             Some(current) => {
-                settled = current.data == campaign.fingerprint(Domain::Structure)?;
+                settled = current.data == campaign.fingerprint(Side::Structure)?;
                 // Of a baseline only the starting point is taken; whose data it was fitted to does not matter.
                 if current.revision > 0 && !settled {
                     warnings.push(format!(
@@ -99,7 +99,13 @@ impl StructureCase {
                         dir = campaign.dir.display()
                     ));
                 }
-                with_revision(campaign, &baseline, &data, current)?
+                with_revision(
+                    campaign,
+                    &Registry::structure(),
+                    &baseline,
+                    &baseline.known(&data.summary()),
+                    current,
+                )?
             }
             None => baseline.clone(),
         };
@@ -120,7 +126,13 @@ impl StructureCase {
     pub fn freeing(&self, campaign: &Campaign, freed: &Freed) -> Result<Self> {
         let baseline = structure_model_freeing(campaign, freed)?;
         let model = match self.revisions.last() {
-            Some(current) => with_revision(campaign, &baseline, &self.data, current)?,
+            Some(current) => with_revision(
+                campaign,
+                &Registry::structure(),
+                &baseline,
+                &baseline.known(&self.data.summary()),
+                current,
+            )?,
             None => baseline.clone(),
         };
         Ok(StructureCase {
@@ -148,60 +160,14 @@ impl StructureCase {
     /// # Errors
     /// As for [`load`](Self::load).
     pub fn model_of(&self, campaign: &Campaign, revision: &Revision) -> Result<StructureModel> {
-        with_revision(campaign, &self.baseline, &self.data, revision)
+        with_revision(
+            campaign,
+            &Registry::structure(),
+            &self.baseline,
+            &self.baseline.known(&self.data.summary()),
+            revision,
+        )
     }
-}
-
-/// The model of a revision, starting from where that stood.
-fn with_revision(
-    campaign: &Campaign,
-    baseline: &StructureModel,
-    data: &FrfData,
-    revision: &Revision,
-) -> Result<StructureModel> {
-    let summary = data.summary();
-    let spec = &baseline.robot.spec;
-    let mut model = baseline.clone();
-    for (i, recorded) in revision.effects.iter().enumerate() {
-        let wrong = |problem: String| {
-            InputError::new(problem)
-                .file(log_file(&campaign.dir))
-                .key(format!("revisions[{}].effects[{i}]", revision.revision))
-        };
-        let instance = effects::find(spec, &recorded.effect)
-            .into_iter()
-            .find(|instance| recorded_effect(instance) == *recorded)
-            .ok_or_else(|| {
-                let variant = recorded.variant.as_ref();
-                let choice = variant.map_or(String::new(), |v| format!(" ({v})"));
-                wrong(format!(
-                    "this robot has no effect {}{choice}",
-                    crate::text::shown_briefly(&recorded.effect)
-                ))
-                .remedy("was the robot changed? undo the revision with `lobestone undo DIR`")
-            })?;
-        if let Some(obstacle) = instance.effect.obstacle(spec, &summary) {
-            return Err(wrong(format!(
-                "{} is in the model, but cannot be any more: {obstacle}",
-                recorded.effect
-            ))
-            .remedy("were files taken away? undo the revision with `lobestone undo DIR`")
-            .into());
-        }
-        model = model.with_effect(instance, &summary);
-    }
-    // By name: a tolerance that campaign.toml got since brings parameters that the revision did not have.
-    let start = model
-        .parameters
-        .iter()
-        .map(|parameter| {
-            let known = revision.parameters.iter().find(|r| r.name == parameter.name);
-            let value = known.map_or(parameter.nominal, |r| r.value);
-            // Into the range, or at an effect's vanishing limit: `with_start` sees to it.
-            parameter.internal(value)
-        })
-        .collect();
-    Ok(model.with_start(start))
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 
 use crate::Result;
 use crate::campaign::{Campaign, FrfSet};
-use crate::identify::model_history::Domain;
+use crate::identify::model_history::Side;
 use crate::revision::{self, RevisionLog};
 
 /// A campaign with what was read of its files so far. It stands for the campaign itself wherever only that is needed.
@@ -108,14 +108,14 @@ impl<'a> Workbench<'a> {
     ///
     /// # Errors
     /// A file that cannot be read.
-    pub fn fingerprint(&self, domain: Domain) -> Result<String> {
-        match domain {
+    pub fn fingerprint(&self, side: Side) -> Result<String> {
+        match side {
             // FRF files that say nothing have a fingerprint, too.
-            Domain::Structure => match self.frf_files().ok().and_then(|f| f.fingerprint.clone()) {
+            Side::Structure => match self.frf_files().ok().and_then(|f| f.fingerprint.clone()) {
                 Some(known) => Ok(known),
                 None => revision::structure_fingerprint(self.campaign),
             },
-            Domain::Cutting => once(&self.read.cutting_fingerprint, || {
+            Side::Cutting => once(&self.read.cutting_fingerprint, || {
                 revision::cutting_fingerprint(self.campaign)
             })
             .cloned(),

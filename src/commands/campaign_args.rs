@@ -45,11 +45,11 @@ pub(crate) fn by_domain(
 }
 
 /// The side whose revisions are meant: the one asked for, else that which the campaign holds (both: the structure).
-pub(crate) fn side(campaign: &Campaign, domain: Option<SideChoice>) -> crate::revision::Domain {
+pub(crate) fn side(campaign: &Campaign, domain: Option<SideChoice>) -> crate::revision::Side {
     match domain {
-        Some(SideChoice::Cutting) => crate::revision::Domain::Cutting,
-        None if campaign.frfs.is_empty() && !campaign.cuts.is_empty() => crate::revision::Domain::Cutting,
-        _ => crate::revision::Domain::Structure,
+        Some(SideChoice::Cutting) => crate::revision::Side::Cutting,
+        None if campaign.frfs.is_empty() && !campaign.cuts.is_empty() => crate::revision::Side::Cutting,
+        _ => crate::revision::Side::Structure,
     }
 }
 

@@ -7,27 +7,27 @@ use crate::campaign::{Campaign, campaign_file};
 use crate::discrepancy::DiagnosisVerdict;
 use crate::discrepancy::comparison::compare::ErrorTotals;
 use crate::discrepancy::verdict::is_noise;
-use crate::revision::{Domain, Revision};
+use crate::revision::{Revision, Side};
 
 /// A campaign and the side of it that a command looked at.
 #[derive(Clone, Copy)]
 pub struct Guide<'a> {
     pub campaign: &'a Campaign,
-    pub side: Domain,
+    pub side: Side,
 }
 
 impl<'a> Guide<'a> {
     pub fn structure(campaign: &'a Campaign) -> Self {
         Guide {
             campaign,
-            side: Domain::Structure,
+            side: Side::Structure,
         }
     }
 
     pub fn cutting(campaign: &'a Campaign) -> Self {
         Guide {
             campaign,
-            side: Domain::Cutting,
+            side: Side::Cutting,
         }
     }
 
@@ -41,8 +41,8 @@ impl<'a> Guide<'a> {
         let both = !self.campaign.frfs.is_empty() && !self.campaign.cuts.is_empty();
         let side = match self.side {
             _ if !both => "",
-            Domain::Structure => " --domain structure",
-            Domain::Cutting => " --domain cutting",
+            Side::Structure => " --domain structure",
+            Side::Cutting => " --domain cutting",
         };
         format!("`lobestone {command} {}{side}`", word(&self.campaign.dir))
     }
@@ -151,8 +151,8 @@ impl<'a> Guide<'a> {
             (DiagnosisVerdict::None, _) => format!("nothing is missing: {}", self.use_it()),
             _ => {
                 let verb = match self.side {
-                    Domain::Structure => "measure",
-                    Domain::Cutting => "make",
+                    Side::Structure => "measure",
+                    Side::Cutting => "make",
                 };
                 format!(
                     "{verb} {}; list it in campaign.toml, then run {} again",

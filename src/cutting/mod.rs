@@ -19,7 +19,7 @@ pub use fit::estimate::{
     bootstrap, estimate,
 };
 pub use fit::group::by_axis;
-pub use fit::group::{Coefficient, ForceGroup, Influence, Known, RegressionPoint};
+pub use fit::group::{Coefficient, ForceGroup, Influence, KnownValue, RegressionPoint};
 pub use fit::kienzle::{KienzleComponent, KienzleFit, Preferred, TellingFeed, kienzle};
 pub use fit::outlier::{CutMisfit, misfits, studentized};
 pub use fit::regression::{CoefficientFit, Observation, fit};

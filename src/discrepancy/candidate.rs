@@ -1,15 +1,17 @@
 //! What was tried: one effect at one site, and the model as it stands that it is compared with.
 
 use super::something_else;
+use crate::effects::{EffectName, Instance};
 use crate::identify::frfs::calibrate::{Calibration, Estimate};
 use crate::identify::rest::Rest;
-use crate::identify::study::{EffectName, HeldOut, Residual};
+use crate::identify::study::{HeldOut, Residual};
+use crate::identify::{Model, Modelled};
 
 /// One effect at one site, tried.
 #[derive(Debug, Clone)]
-pub struct EffectCandidate<M, I> {
+pub struct EffectCandidate<D: Modelled> {
     /// The effect with its place and discrete choice.
-    pub instance: I,
+    pub instance: Instance<D>,
     /// What it is called.
     pub name: EffectName,
     /// Error with it: sqrt(Σ|model − measured|² / Σ|measured|²).
@@ -39,10 +41,10 @@ pub struct EffectCandidate<M, I> {
     /// Where its fit stands, solver's scale; the effect's own parameters last.
     pub theta: Vec<f64>,
     /// The model with it.
-    pub model: M,
+    pub model: Model<D>,
 }
 
-impl<M, I> EffectCandidate<M, I> {
+impl<D: Modelled> EffectCandidate<D> {
     /// `effect@site`, or the bare id.
     pub fn label(&self) -> String {
         self.name.label()

@@ -13,7 +13,8 @@ use crate::identify::frfs::calibrate::{Calibration, estimates};
 use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
 use crate::identify::rest::{BeyondSlips, Rest};
 use crate::identify::study::{
-    Effort, Extent, OUT_OF_RACE, Study, Tried, View, held_out, rescue, try_effect, try_effects, vanished,
+    Effort, Extent, InstanceOf, ModelOf, OUT_OF_RACE, Study, Tried, View, held_out, rescue, try_effect,
+    try_effects, vanished,
 };
 use crate::progress::Progress;
 
@@ -56,19 +57,19 @@ const REFIT_WITHOUT_FOLD: Stopping = Stopping {
 };
 
 /// Diagnoses `model` (with the effects it already has).
-pub fn diagnose<S: Study>(study: &S, model: &S::Model) -> Result<Diagnosis<S::Model, S::Instance>> {
+pub fn diagnose<S: Study>(study: &S, model: &ModelOf<S>) -> Result<Diagnosis<S::Domain>> {
     Engine::new(study, model)?.run()
 }
 
-type TriedOf<S> = Tried<<S as Study>::Model, <S as Study>::Instance>;
-type CandidateOf<S> = EffectCandidate<<S as Study>::Model, <S as Study>::Instance>;
+type TriedOf<S> = Tried<<S as Study>::Domain>;
+type CandidateOf<S> = EffectCandidate<<S as Study>::Domain>;
 
 struct Engine<'a, S: Study> {
     study: &'a S,
-    model: &'a S::Model,
+    model: &'a ModelOf<S>,
     calibration: Calibration,
-    hints: S::Hints,
-    instances: Vec<S::Instance>,
+    hints: Vec<f64>,
+    instances: Vec<InstanceOf<S>>,
     not_tried: Vec<(String, String)>,
     base_count: usize,
 }
@@ -85,7 +86,7 @@ struct Evidence {
 }
 
 impl<'a, S: Study> Engine<'a, S> {
-    fn new(study: &'a S, model: &'a S::Model) -> Result<Self> {
+    fn new(study: &'a S, model: &'a ModelOf<S>) -> Result<Self> {
         let calibration = study.calibrate(model)?;
         let (instances, not_tried) = study.instances(model);
         let hints = study.hints(model, &calibration.theta)?;
@@ -96,25 +97,25 @@ impl<'a, S: Study> Engine<'a, S> {
             hints,
             instances,
             not_tried,
-            base_count: study.parameters(model).len(),
+            base_count: model.parameters.len(),
         })
     }
 
-    fn label(&self, instance: &S::Instance) -> String {
-        self.study.name(instance).label()
+    fn label(&self, instance: &InstanceOf<S>) -> String {
+        instance.name().label()
     }
 
-    fn freedom(&self, model: &S::Model, extent: Extent) -> f64 {
+    fn freedom(&self, model: &ModelOf<S>, extent: Extent) -> f64 {
         let values = self.study.real_values(extent) as f64;
-        (values - self.study.parameters(model).len() as f64).max(1.0)
+        (values - model.parameters.len() as f64).max(1.0)
     }
 
     fn reduced_chi2(&self, tried: &TriedOf<S>) -> f64 {
         2.0 * tried.fit.cost / self.freedom(&tried.model, Extent::Full)
     }
 
-    fn minimise(&self, model: &S::Model, view: View, start: &[f64], stopping: Stopping) -> Result<Fit> {
-        let bounds = self.study.bounds(model);
+    fn minimise(&self, model: &ModelOf<S>, view: View, start: &[f64], stopping: Stopping) -> Result<Fit> {
+        let bounds = model.bounds();
         minimise(&self.study.problem(model, view), start, &bounds, stopping)
     }
 
@@ -132,7 +133,7 @@ impl<'a, S: Study> Engine<'a, S> {
             let Some(start) = better.filter(|_| rebased < REBASED) else {
                 return Ok((coarse, base, tried));
             };
-            let calibration = study.calibrate(&study.starting_from(model, start))?;
+            let calibration = study.calibrate(&model.with_start(start))?;
             let other = self.minimise(model, View::FULL, &calibration.theta, REFINE)?;
             if other.cost > base.cost * (1.0 - BETTER) {
                 return Ok((coarse, base, tried));
@@ -146,17 +147,17 @@ impl<'a, S: Study> Engine<'a, S> {
     /// `tried`, or where it is no better than `base`, the fit without the effect as one with it; and whether it is that.
     fn nested(&self, tried: &TriedOf<S>, base: &Fit) -> (TriedOf<S>, bool) {
         let worse = tried.fit.cost >= base.cost;
-        match vanished(self.study, &tried.model, base).filter(|_| worse) {
+        match vanished(&tried.model, base).filter(|_| worse) {
             Some(fit) => {
-                let model = self.study.starting_from(&tried.model, fit.theta.clone());
-                let instance = tried.instance.clone();
+                let model = tried.model.with_start(fit.theta.clone());
+                let instance = tried.instance;
                 (Tried { instance, model, fit }, true)
             }
             None => (tried.clone(), false),
         }
     }
 
-    fn run(mut self) -> Result<Diagnosis<S::Model, S::Instance>> {
+    fn run(mut self) -> Result<Diagnosis<S::Domain>> {
         let (study, model) = (self.study, self.model);
         let (coarse_base, base, tried) = self.on_one_baseline()?;
         let mut refined = self.refine(&tried)?;
@@ -281,7 +282,7 @@ impl<'a, S: Study> Engine<'a, S> {
     }
 
     /// What small errors of the setup leave of a rest that is more than noise.
-    fn beyond_slips(&self, rest: &Rest, model: &S::Model, theta: &[f64]) -> Result<Option<BeyondSlips>> {
+    fn beyond_slips(&self, rest: &Rest, model: &ModelOf<S>, theta: &[f64]) -> Result<Option<BeyondSlips>> {
         match rest.is_significant() {
             true => self.study.beyond_slips(model, theta),
             false => Ok(None),
@@ -312,8 +313,9 @@ impl<'a, S: Study> Engine<'a, S> {
         if in_question.is_empty() {
             return Ok(());
         }
-        let all =
-            |model: &S::Model, theta: &[f64]| held_out(study, model, theta, Extent::Full, REFIT_WITHOUT_FOLD);
+        let all = |model: &ModelOf<S>, theta: &[f64]| {
+            held_out(study, model, theta, Extent::Full, REFIT_WITHOUT_FOLD)
+        };
         baseline.held_out = all(self.model, &baseline.theta)?;
         in_question.into_par_iter().try_for_each(|c| {
             c.held_out = all(&c.model, &c.theta)?;
@@ -342,7 +344,7 @@ impl<'a, S: Study> Engine<'a, S> {
     #[allow(clippy::type_complexity)]
     fn screen_all(&self, base: &Fit) -> Result<(Vec<TriedOf<S>>, Option<Vec<f64>>)> {
         let (study, model) = (self.study, self.model);
-        let bases = [base.theta.clone(), study.nominal_theta(model)];
+        let bases = [base.theta.clone(), model.nominal_theta()];
         let progress = Progress::new("trying effects", self.instances.len());
         let step = || progress.step();
         let mut tried = try_effects(study, model, &self.instances, &bases, &self.hints, step);
@@ -407,7 +409,7 @@ impl<'a, S: Study> Engine<'a, S> {
     fn judge(&self, tried: &TriedOf<S>, refined: bool, evidence: &Evidence) -> Result<CandidateOf<S>> {
         let study = self.study;
         let Tried { instance, model, fit } = tried;
-        let extra = (study.parameters(model).len() - self.base_count) as f64;
+        let extra = (model.parameters.len() - self.base_count) as f64;
         let chi2 = 2.0 * fit.cost;
         // On the coarse view the evidence is that of the coarse view: scaled up, chance would look like an effect.
         let (raw_gain, reduced_chi2, values) = if refined {
@@ -420,11 +422,11 @@ impl<'a, S: Study> Engine<'a, S> {
         };
         let gain = (raw_gain / evidence.scale).max(0.0);
         let single = ChiSquared::new(extra).map_or(1.0, |d| d.sf(gain));
-        let all = estimates(study.parameters(model), fit, reduced_chi2)?;
+        let all = estimates(&model.parameters, fit, reduced_chi2)?;
         let own = self.base_count..all.len();
         Ok(EffectCandidate {
-            instance: instance.clone(),
-            name: study.name(instance),
+            instance: *instance,
+            name: instance.name(),
             nrms: study.residual(model, &fit.theta)?.nrms,
             held_out: held_out(study, model, &fit.theta, Extent::Coarse, REFIT_WITHOUT_FOLD)?,
             delta_bic: extra * (evidence.share * values as f64).ln() - gain,
@@ -451,7 +453,7 @@ impl<'a, S: Study> Engine<'a, S> {
     ) -> Result<(Option<verdict::EffectPair>, [usize; 2])> {
         let study = self.study;
         let mut counts = [0, 0];
-        let standing = |instance: &S::Instance| {
+        let standing = |instance: &InstanceOf<S>| {
             let label = self.label(instance);
             candidates.iter().position(|c| c.label() == label)
         };
@@ -465,7 +467,7 @@ impl<'a, S: Study> Engine<'a, S> {
             let leader = &candidates[first];
             let bases = [leader.theta.clone()];
             let hints = study.hints(&leader.model, &leader.theta)?;
-            let mut seconds: Vec<&S::Instance> = self
+            let mut seconds: Vec<&InstanceOf<S>> = self
                 .instances
                 .iter()
                 .filter(|s| self.label(s) != leader.label())
@@ -536,7 +538,7 @@ impl<'a, S: Study> Engine<'a, S> {
     /// Whether one of a pair, fitted with `leader` and then its own effect, is of a size that is not possible.
     fn is_impossible(&self, pair: &TriedOf<S>, leader: &CandidateOf<S>) -> Result<bool> {
         let study = self.study;
-        let all = estimates(study.parameters(&pair.model), &pair.fit, 1.0)?;
+        let all = estimates(&pair.model.parameters, &pair.fit, 1.0)?;
         let first = self.base_count..self.base_count + leader.parameters.len();
         let second = first.end..all.len();
         let impossible = |instance, own: std::ops::Range<usize>| {

@@ -2,10 +2,11 @@
 
 use super::candidate::{BaselineFit, EffectCandidate};
 use super::verdict::DiagnosisVerdict;
+use crate::identify::Modelled;
 
 /// The answer.
 #[derive(Debug, Clone)]
-pub struct Diagnosis<M, I> {
+pub struct Diagnosis<D: Modelled> {
     /// Whether an effect is missing.
     pub verdict: DiagnosisVerdict,
     /// Index among the candidates of the effect that is missing, if one is.
@@ -17,7 +18,7 @@ pub struct Diagnosis<M, I> {
     /// Why there is no verdict, where the data are too few for one.
     pub too_little_data: Option<String>,
     /// Best first, one for each effect and site.
-    pub candidates: Vec<EffectCandidate<M, I>>,
+    pub candidates: Vec<EffectCandidate<D>>,
     /// `effect@site` of rivals that this data cannot tell from the verdict.
     pub indistinguishable: Vec<String>,
     /// The second effect, where two together explain what one alone does not.
@@ -31,9 +32,9 @@ pub struct Diagnosis<M, I> {
     pub pairs: Option<[usize; 2]>,
 }
 
-impl<M, I> Diagnosis<M, I> {
+impl<D: Modelled> Diagnosis<D> {
     /// The candidate that is missing; `None` where the verdict names none.
-    pub fn winner(&self) -> Option<&EffectCandidate<M, I>> {
+    pub fn winner(&self) -> Option<&EffectCandidate<D>> {
         self.effect.map(|w| &self.candidates[w])
     }
 

@@ -3,18 +3,19 @@
 use rayon::prelude::*;
 
 use super::verdict::{gain_by_chance, is_noise, is_progress};
-use crate::identify::Calibration;
+use crate::effects::Instance;
 use crate::identify::levenberg_marquardt::{Stopping, minimise};
 use crate::identify::study::{
-    Effort, Extent, HeldOut, Residual, Study, Tried, View, held_out, rescue, try_effect,
+    Effort, Extent, HeldOut, Residual, Study, Tried, View, held_out, rescue, try_effect, vanishing_limit,
 };
+use crate::identify::{Calibration, Model, Modelled};
 use crate::{Error, Result};
 
 /// A model fitted to all data.
 #[derive(Debug, Clone)]
-pub struct Fitted<M> {
+pub struct Fitted<D: Modelled> {
     /// The model that was fitted.
-    pub model: M,
+    pub model: Model<D>,
     /// Its fit.
     pub calibration: Calibration,
     /// What that leaves.
@@ -25,13 +26,13 @@ pub struct Fitted<M> {
 
 /// What adding an effect does.
 #[derive(Debug, Clone)]
-pub struct Extension<M, I> {
+pub struct Extension<D: Modelled> {
     /// The effect that was added.
-    pub instance: I,
+    pub instance: Instance<D>,
     /// The model as it stood, fitted to the same data.
-    pub before: Fitted<M>,
+    pub before: Fitted<D>,
     /// The model with it.
-    pub after: Fitted<M>,
+    pub after: Fitted<D>,
     /// The effect vanishes in these data: the fit with it is the fit without it.
     pub vanished: bool,
     /// Whether the held-out error fell by more than chance would let it; `None` with one fold.
@@ -47,8 +48,8 @@ const REFIT_WITHOUT_FOLD: Stopping = Stopping {
     relative_decrease: 1e-6,
 };
 
-impl<M> Fitted<M> {
-    fn new<S: Study<Model = M>>(study: &S, model: M, calibration: Calibration) -> Result<Self> {
+impl<D: Modelled> Fitted<D> {
+    fn new<S: Study<Domain = D>>(study: &S, model: Model<D>, calibration: Calibration) -> Result<Self> {
         let theta = &calibration.theta;
         Ok(Fitted {
             residual: study.residual(&model, theta)?,
@@ -64,32 +65,27 @@ impl<M> Fitted<M> {
     }
 }
 
-impl<M, I> Extension<M, I> {
+impl<D: Modelled> Extension<D> {
     /// Adds to `model` that one of `instances` (an effect's discrete choices at one site) which fits best.
     ///
     /// # Errors
     /// No form of the effect could be fitted.
-    pub fn new<S>(study: &S, model: &M, instances: &[I]) -> Result<Self>
-    where
-        S: Study<Model = M, Instance = I>,
-        M: Clone + Send + Sync,
-        I: Clone + Send + Sync,
-    {
+    pub fn new<S: Study<Domain = D>>(study: &S, model: &Model<D>, instances: &[Instance<D>]) -> Result<Self> {
         let mut before = study.calibrate(model)?;
         let hints = study.hints(model, &before.theta)?;
-        let bases = [before.theta.clone(), study.nominal_theta(model)];
-        let tried: Vec<Tried<M, I>> = instances
+        let bases = [before.theta.clone(), model.nominal_theta()];
+        let tried: Vec<Tried<D>> = instances
             .par_iter()
             .filter_map(|instance| try_effect(study, model, instance, &bases, &hints, Effort::Staged))
             .collect();
         // A discrete choice with more parameters has to pay for them (Schwarz 1978).
         let price = 0.5 * (study.real_values(Extent::Coarse) as f64).ln();
-        let paid = |t: &Tried<M, I>| t.fit.cost + price * t.fit.theta.len() as f64;
+        let paid = |t: &Tried<D>| t.fit.cost + price * t.fit.theta.len() as f64;
         let mut best = tried
             .into_iter()
             .min_by(|a, b| paid(a).total_cmp(&paid(b)))
             .ok_or_else(|| Error::computation("no form of the effect could be fitted"))?;
-        let bounds = study.bounds(&best.model);
+        let bounds = best.model.bounds();
         let problem = study.problem(&best.model, View::FULL);
         best.fit = minimise(&problem, &best.fit.theta, &bounds, REFINE)?;
         drop(problem);
@@ -99,12 +95,12 @@ impl<M, I> Extension<M, I> {
         {
             best.fit = fit;
         }
-        let mut after = study.calibrate(&study.starting_from(&best.model, best.fit.theta.clone()))?;
+        let mut after = study.calibrate(&best.model.with_start(best.fit.theta.clone()))?;
 
         // The fit without the effect, also tried from where the one with it put the common parameters: a trapped
         // `before` would make any effect look good.
         let common = after.theta[..before.theta.len()].to_vec();
-        let again = study.calibrate(&study.starting_from(model, common))?;
+        let again = study.calibrate(&model.with_start(common))?;
         if again.reduced_chi2 < before.reduced_chi2 {
             before = again;
         }
@@ -118,15 +114,15 @@ impl<M, I> Extension<M, I> {
         let gain = (was.chi2_per_value - is.chi2_per_value) * study.real_values(Extent::Full) as f64;
         let chance = after.reduced_chi2.max(1.0) / is.independent_share.min(1.0);
         let by_chance = gain < chance * gain_by_chance(after.theta.len() - before.theta.len());
-        let limit = study.vanishing(&best.model);
+        let limit = vanishing_limit(&best.model);
         let mut extended = best.model;
         let mut vanished = false;
         if let Some(limit) = limit
             && (gain < 0.0 || by_chance && is.nrms > was.nrms)
         {
-            let own = &study.parameters(&extended)[before.theta.len()..];
+            let own = &extended.parameters[before.theta.len()..];
             after = before.with_vanished(own, &limit);
-            extended = study.starting_from(&extended, after.theta.clone());
+            extended = extended.with_start(after.theta.clone());
             vanished = true;
         }
         let before = Fitted::new(study, model.clone(), before)?;
@@ -141,7 +137,7 @@ impl<M, I> Extension<M, I> {
             Fitted::new(study, extended, after)?
         };
         Ok(Extension {
-            progress: progress::<S>(study, &before, &after),
+            progress: progress(&before, &after),
             instance: best.instance,
             vanished,
             before,
@@ -151,9 +147,9 @@ impl<M, I> Extension<M, I> {
 }
 
 /// Whether the error on folds left out of the fit fell by more than chance.
-fn progress<S: Study>(study: &S, before: &Fitted<S::Model>, after: &Fitted<S::Model>) -> Option<bool> {
+fn progress<D: Modelled>(before: &Fitted<D>, after: &Fitted<D>) -> Option<bool> {
     let (was, is) = (before.held_out.as_ref()?, after.held_out.as_ref()?);
-    let count = |f: &Fitted<S::Model>| study.parameters(&f.model).len();
+    let count = |f: &Fitted<D>| f.model.parameters.len();
     let chance = after.calibration.reduced_chi2.max(1.0) / after.residual.independent_share.min(1.0);
     Some(is_progress(was, is, count(after) - count(before), chance))
 }

@@ -1,14 +1,17 @@
 //! The loop on a table of resonances instead of FRFs.
 
 use super::{DiagnosisVerdict, diagnose};
-use crate::effects::find;
+use crate::effects::Registry;
 use crate::identify::resonances::resonance_study::made_table::{SUMMARY, baseline, table};
 use crate::robot::fixture::irb6640;
 
 #[test]
 fn a_hidden_effect_is_found_from_a_table_of_resonances() {
     let hidden = "joint-transverse-compliance@joint-3";
-    let model = baseline().with_effect(find(&irb6640(), hidden)[0], &SUMMARY);
+    let model = baseline().with_effect(
+        Registry::structure().find(&irb6640(), hidden)[0],
+        &baseline().known(&SUMMARY),
+    );
     let mut truth = model.nominal_theta();
     truth[0] += 0.1;
     truth[2] -= 0.15;

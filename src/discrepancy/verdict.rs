@@ -1,5 +1,6 @@
 //! From candidates to a verdict: effect, none or unknown, and how sure.
 
+use crate::identify::Modelled;
 use serde::Serialize;
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -44,13 +45,13 @@ pub fn least_freedom() -> usize {
 }
 
 /// Whether a candidate improves the fit by more than chance, with parameters that are not stuck at the end of their range.
-pub fn significant<M, I>(c: &EffectCandidate<M, I>) -> bool {
+pub fn significant<D: Modelled>(c: &EffectCandidate<D>) -> bool {
     is_convincing(c.p_value, c.delta_bic) && !c.at_bound
 }
 
 /// Whether a candidate is significant, of a possible size, and improves the prediction of folds left out. `chance`: what
 /// differences of χ² are divided by before they are held against noise.
-pub fn credible<M, I>(c: &EffectCandidate<M, I>, baseline: &BaselineFit, chance: f64) -> bool {
+pub fn credible<D: Modelled>(c: &EffectCandidate<D>, baseline: &BaselineFit, chance: f64) -> bool {
     let improves = match (&c.held_out, &baseline.held_out) {
         (Some(with), Some(without)) => is_progress(without, with, c.parameters.len(), chance),
         _ => true,
@@ -144,7 +145,7 @@ fn leaves_noise(rest: &Rest, reduced_chi2: f64) -> bool {
 }
 
 /// Whether a candidate leaves more than noise.
-pub fn leaves_structure<M, I>(c: &EffectCandidate<M, I>) -> bool {
+pub fn leaves_structure<D: Modelled>(c: &EffectCandidate<D>) -> bool {
     match &c.rest {
         Some(rest) => !leaves_noise(rest, c.reduced_chi2),
         None => !is_noise(c.reduced_chi2),
@@ -155,13 +156,13 @@ pub fn leaves_structure<M, I>(c: &EffectCandidate<M, I>) -> bool {
 const SETTLED: f64 = 0.1;
 
 /// Whether a candidate leaves room for a second effect beside it.
-pub fn leaves_room<M, I>(c: &EffectCandidate<M, I>, baseline: &BaselineFit) -> bool {
+pub fn leaves_room<D: Modelled>(c: &EffectCandidate<D>, baseline: &BaselineFit) -> bool {
     leaves_structure(c) && odds_against(c, baseline) > SETTLED
 }
 
 /// `pair`: the best pair of effects, where one was sought.
-pub fn decide<M, I>(
-    candidates: &[EffectCandidate<M, I>],
+pub fn decide<D: Modelled>(
+    candidates: &[EffectCandidate<D>],
     credible: &[bool],
     baseline: &BaselineFit,
     pair: Option<EffectPair>,
@@ -191,7 +192,7 @@ pub fn decide<M, I>(
         _ => (alone, w),
     };
     let reference = winner.delta_bic;
-    let weight = |c: &EffectCandidate<M, I>| evidence_weight(c.delta_bic - reference).min(1.0);
+    let weight = |c: &EffectCandidate<D>| evidence_weight(c.delta_bic - reference).min(1.0);
     let rivals: f64 = candidates
         .iter()
         .enumerate()
@@ -205,7 +206,7 @@ pub fn decide<M, I>(
         decision.effect = Some(named);
         decision.confidence = 1.0 / (1.0 + rivals + beaten + excused + odds_else);
         let close =
-            |c: &EffectCandidate<M, I>| (c.delta_bic - reference).abs() * scale.max(1.0) < INDISTINGUISHABLE;
+            |c: &EffectCandidate<D>| (c.delta_bic - reference).abs() * scale.max(1.0) < INDISTINGUISHABLE;
         decision.indistinguishable = candidates
             .iter()
             .zip(credible)
@@ -224,7 +225,7 @@ pub fn decide<M, I>(
 }
 
 /// Odds that something else is behind what a candidate explains.
-fn odds_against<M, I>(c: &EffectCandidate<M, I>, baseline: &BaselineFit) -> f64 {
+fn odds_against<D: Modelled>(c: &EffectCandidate<D>, baseline: &BaselineFit) -> f64 {
     match &c.rest {
         Some(rest) if !rest.tests.is_empty() => something_else::odds(c.gain, rest),
         // Too little data for tests of structure: the size of the rest has to do.
@@ -236,7 +237,7 @@ fn odds_against<M, I>(c: &EffectCandidate<M, I>, baseline: &BaselineFit) -> f64 
 
 /// Weight of the small errors of the setup alone against the same with a candidate: 1 where they need it not. Zero where such
 /// errors are not in question.
-fn weight_of_slips_alone<M, I>(c: &EffectCandidate<M, I>, baseline: &BaselineFit) -> f64 {
+fn weight_of_slips_alone<D: Modelled>(c: &EffectCandidate<D>, baseline: &BaselineFit) -> f64 {
     let compared = || {
         let (alone, with) = (
             baseline.rest.beyond_slips.as_ref()?,
@@ -251,9 +252,9 @@ fn weight_of_slips_alone<M, I>(c: &EffectCandidate<M, I>, baseline: &BaselineFit
 }
 
 /// No candidate is credible: nothing is missing, or something else.
-fn decide_without_candidate<M, I>(
+fn decide_without_candidate<D: Modelled>(
     decision: &mut Decision,
-    candidates: &[EffectCandidate<M, I>],
+    candidates: &[EffectCandidate<D>],
     baseline: &BaselineFit,
 ) {
     // p-values near the threshold leave doubt.

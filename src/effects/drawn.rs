@@ -5,10 +5,11 @@
 use nalgebra::{DMatrix, Vector6};
 use num_complex::Complex64;
 
-use super::effect::{DataSummary, Instance, NEGLIGIBLE, Setting, Site, StructuralEffect};
 use super::{Background, Spot};
 use crate::data::RobotSpec;
 use crate::effects::structural::branch;
+use crate::effects::structural::{DataSummary, PostureSetting, Structure};
+use crate::effects::{At, Effect, Instance, Known, NEGLIGIBLE, Site};
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::{Attachment, AttachmentLaw, Branch as HungMass, Chain, Dual, Element, Grip, Role};
 
@@ -94,7 +95,7 @@ pub struct DrawnBranch;
 pub struct Series;
 
 /// The instance of a form at a spot.
-pub fn instance(spot: Spot, form: DrawnForm) -> Instance {
+pub fn instance(spot: Spot, form: DrawnForm) -> Instance<Structure> {
     Instance {
         effect: if spot.is_series() { &Series } else { &DrawnBranch },
         site: Site::At(spot),
@@ -102,12 +103,11 @@ pub fn instance(spot: Spot, form: DrawnForm) -> Instance {
     }
 }
 
-/// Every form at every spot of a robot.
-pub fn instances(robot: &RobotSpec) -> Vec<Instance> {
-    let spots = Spot::parallel(robot).into_iter().chain(Spot::series(robot));
-    spots
-        .flat_map(|spot| forms(spot).iter().map(move |form| instance(spot, *form)))
-        .collect()
+/// The forms that a site can have, by number.
+fn variants(site: Site) -> Vec<usize> {
+    let Site::At(spot) = site else { return Vec::new() };
+    let number = |form| FORMS.iter().position(|f| f == form);
+    forms(spot).iter().filter_map(number).collect()
 }
 
 /// DrawnForm of an instance of [`DrawnBranch`] or [`Series`].
@@ -261,7 +261,7 @@ fn attach(chain: &mut Chain, grip: &Grip, law: AttachmentLaw, size: &Dual) {
     });
 }
 
-impl StructuralEffect for DrawnBranch {
+impl Effect<Structure> for DrawnBranch {
     fn id(&self) -> &'static str {
         "branch"
     }
@@ -293,41 +293,32 @@ impl StructuralEffect for DrawnBranch {
         Spot::parallel(robot).into_iter().map(Site::At).collect()
     }
 
-    fn variants(&self) -> usize {
-        FORMS.len()
+    fn variants(&self, site: Site) -> Vec<usize> {
+        variants(site)
     }
 
     fn variant_label(&self, variant: usize) -> Option<(&'static str, &'static str)> {
         FORMS.get(variant).map(|form| ("form", form.label()))
     }
 
-    fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
-        Vec::new()
-    }
-
-    fn parameters_at(&self, site: Site, variant: usize, _: &RobotSpec, data: &DataSummary) -> Vec<Parameter> {
+    fn parameters(&self, At { site, variant }: At, Known { data, .. }: &Known<Structure>) -> Vec<Parameter> {
         parameters(site, variant, data)
     }
 
-    fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
-        Vec::new()
-    }
-
-    fn starts_at(
+    fn starts(
         &self,
-        (site, variant): (Site, usize),
-        _: &RobotSpec,
-        data: &DataSummary,
+        At { site, variant }: At,
+        Known { data, .. }: &Known<Structure>,
         peaks_hz: &[f64],
     ) -> Vec<Vec<f64>> {
         starts(site, variant, data, peaks_hz)
     }
 
-    fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, parameters: &[Parameter]) -> Option<Vec<f64>> {
         Some(vanishing(parameters, NEGLIGIBLE))
     }
 
-    fn apply(&self, site: Site, variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {
+    fn apply(&self, At { site, variant }: At, values: &[Dual], setting: &PostureSetting, chain: &mut Chain) {
         let Site::At(spot) = site else { return };
         let Some(grip) = spot.grip(setting.kinematics, &chain.elements) else {
             return;
@@ -401,7 +392,7 @@ impl StructuralEffect for DrawnBranch {
     }
 }
 
-impl StructuralEffect for Series {
+impl Effect<Structure> for Series {
     fn id(&self) -> &'static str {
         "series"
     }
@@ -426,41 +417,32 @@ impl StructuralEffect for Series {
         Spot::series(robot).into_iter().map(Site::At).collect()
     }
 
-    fn variants(&self) -> usize {
-        FORMS.len()
+    fn variants(&self, site: Site) -> Vec<usize> {
+        variants(site)
     }
 
     fn variant_label(&self, variant: usize) -> Option<(&'static str, &'static str)> {
         FORMS.get(variant).map(|form| ("form", form.label()))
     }
 
-    fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
-        Vec::new()
-    }
-
-    fn parameters_at(&self, site: Site, variant: usize, _: &RobotSpec, data: &DataSummary) -> Vec<Parameter> {
+    fn parameters(&self, At { site, variant }: At, Known { data, .. }: &Known<Structure>) -> Vec<Parameter> {
         parameters(site, variant, data)
     }
 
-    fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
-        Vec::new()
-    }
-
-    fn starts_at(
+    fn starts(
         &self,
-        (site, variant): (Site, usize),
-        _: &RobotSpec,
-        data: &DataSummary,
+        At { site, variant }: At,
+        Known { data, .. }: &Known<Structure>,
         peaks_hz: &[f64],
     ) -> Vec<Vec<f64>> {
         starts(site, variant, data, peaks_hz)
     }
 
-    fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, parameters: &[Parameter]) -> Option<Vec<f64>> {
         Some(vanishing(parameters, 1.0 / NEGLIGIBLE))
     }
 
-    fn apply(&self, site: Site, variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {
+    fn apply(&self, At { site, variant }: At, values: &[Dual], setting: &PostureSetting, chain: &mut Chain) {
         let Site::At(spot) = site else { return };
         let Some((place, at, twist)) = spot.twist(setting.kinematics) else {
             return;

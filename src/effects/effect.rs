@@ -1,104 +1,58 @@
-//! What an effect on the structure is to the loop: its place, its parameters, and what it does to the model.
+//! What an effect is to the loop (fit, compare, add, fit again), for every kind of model: the structure of a robot, the
+//! forces of a cut, and whatever else brings its own [`Domain`].
 
 use std::fmt;
 
-use super::{Background, Size, Spot};
-use crate::data::RobotSpec;
+use super::site::{At, EffectName, Site};
+use super::{Background, Size};
 use crate::effects::usual_size::UsualSize;
 use crate::parameter::Parameter;
-use crate::robot::{Chain, Dual, Kinematics, RobotModel};
+use crate::robot::Dual;
 
-/// Where an effect sits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Site {
-    /// The effect has no place of its own.
-    Everywhere,
-    /// 1-based joint.
-    Joint(usize),
-    /// 1-based link.
-    Link(usize),
-    /// A place where the data drew something.
-    At(Spot),
+/// A kind of model that effects are added to: what they sit on, what is known before a fit, and what they change.
+pub trait Domain: Copy + PartialEq + fmt::Debug + Send + Sync + Sized + 'static {
+    /// What has the places that effects sit at, such as the robot; `()` where there are no places.
+    type Object: ?Sized;
+    /// What is known of the data when an effect is asked for its parameters or whether this data can show it.
+    type Summary: Clone;
+    /// The posture or cut that an effect is applied to.
+    type Setting<'a>;
+    /// The physics of that posture or cut, which effects change.
+    type Physics;
+    /// What records it, where that is kept apart from the physics; `()` where it is not.
+    type Sensors;
 }
 
-impl Site {
-    /// `joint-2`, `link-4`; `None` where the effect has no place of its own.
-    pub fn label(self) -> Option<String> {
-        match self {
-            Site::Everywhere => None,
-            Site::Joint(i) => Some(format!("joint-{i}")),
-            Site::Link(i) => Some(format!("link-{i}")),
-            Site::At(spot) => Some(spot.label()),
-        }
-    }
+/// What an effect is told before anything is fitted.
+pub struct Known<'a, D: Domain> {
+    /// What it may sit on.
+    pub object: &'a D::Object,
+    /// Of the data.
+    pub data: D::Summary,
 }
 
-/// What the model is set up for when an effect changes it.
-pub struct Setting<'a> {
-    /// The robot without effects.
-    pub robot: &'a RobotModel,
-    /// Where its frames are.
-    pub kinematics: &'a Kinematics,
-    /// 0 at the highest hammer level of the campaign, 1 at the lowest, logarithmic between; 0 where there is one level.
-    pub lowness: f64,
-}
-
-/// Share of an effect's usual size (a mass, a compliance) that no measurement can show.
-pub(super) const NEGLIGIBLE: f64 = 1e-10;
-
-/// What happens to the response channels between the structure and the file.
-#[derive(Debug, Clone)]
-pub struct ChannelFilter {
-    /// Rows of the matrix that turns true displacements (x, y, z of the point's axes) into measured ones.
-    pub mixing: [[Dual; 3]; 3],
-    /// The response is this late against the force, s.
-    pub delay_s: Dual,
-}
-
-impl ChannelFilter {
-    /// Channels that show what is there.
-    pub fn faithful() -> Self {
-        let unit = |i: usize, j: usize| Dual::constant(if i == j { 1.0 } else { 0.0 });
-        ChannelFilter {
-            mixing: [0, 1, 2].map(|i| [0, 1, 2].map(|j| unit(i, j))),
-            delay_s: Dual::constant(0.0),
-        }
-    }
-}
-
-/// What is known of a campaign when an effect is asked whether it can be told from this data.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DataSummary {
-    /// Different hammer levels.
-    pub force_levels: usize,
-    /// Postures with FRFs.
-    pub postures: usize,
-    /// Lowest measured frequency, Hz.
-    pub lowest_hz: f64,
-    /// Highest measured frequency, Hz.
-    pub highest_hz: f64,
-}
-
-/// One physical effect on the structure or its measurement.
-pub trait StructuralEffect: Sync {
+/// One physical effect: its place, its parameters, and what it does to the model. One file an effect.
+pub trait Effect<D: Domain>: Sync {
     /// As in docs/effects.md: `joint-transverse-compliance`.
     fn id(&self) -> &'static str;
 
     /// The physics in plain words, one or two sentences.
     fn explanation(&self) -> &'static str;
 
-    /// How it shows in FRFs, one sentence.
+    /// How it shows in the measurements, one sentence.
     fn fingerprint(&self) -> &'static str;
 
     /// How to check it in the lab, usual sizes, sources.
     fn background(&self) -> Background;
 
-    /// Where it may sit on this robot.
-    fn sites(&self, robot: &RobotSpec) -> Vec<Site>;
+    /// Where it may sit.
+    fn sites(&self, _object: &D::Object) -> Vec<Site> {
+        vec![Site::Everywhere]
+    }
 
-    /// Discrete choices at one site (an axis of the link, say).
-    fn variants(&self) -> usize {
-        1
+    /// Discrete choices at a site (an axis of the link, say), by number.
+    fn variants(&self, _site: Site) -> Vec<usize> {
+        vec![0]
     }
 
     /// Name of a discrete choice as (key, value) for the JSON; `None` where there is no choice.
@@ -106,37 +60,18 @@ pub trait StructuralEffect: Sync {
         None
     }
 
-    /// Why this robot or this data cannot show the effect; `None` if it can.
-    fn obstacle(&self, _robot: &RobotSpec, _data: &DataSummary) -> Option<String> {
+    /// Why this object or this data cannot show the effect; `None` if they can.
+    fn obstacle(&self, _known: &Known<D>) -> Option<String> {
         None
     }
 
     /// Tunable quantities; names are the keys in docs/json.md. `nominal` is the first starting value.
-    fn parameters(&self, robot: &RobotSpec, data: &DataSummary) -> Vec<Parameter>;
+    fn parameters(&self, at: At, known: &Known<D>) -> Vec<Parameter>;
 
-    /// Further starting points, natural values in the order of the parameters. `peaks_hz`: where the residual peaks.
-    fn starts(&self, robot: &RobotSpec, data: &DataSummary, peaks_hz: &[f64]) -> Vec<Vec<f64>>;
-
-    /// As [`Self::parameters`], where they depend on the site or the discrete choice.
-    fn parameters_at(
-        &self,
-        _site: Site,
-        _variant: usize,
-        robot: &RobotSpec,
-        data: &DataSummary,
-    ) -> Vec<Parameter> {
-        self.parameters(robot, data)
-    }
-
-    /// As [`Self::starts`], where they depend on the site or the discrete choice.
-    fn starts_at(
-        &self,
-        _at: (Site, usize),
-        robot: &RobotSpec,
-        data: &DataSummary,
-        peaks_hz: &[f64],
-    ) -> Vec<Vec<f64>> {
-        self.starts(robot, data, peaks_hz)
+    /// Further starting points, natural values in the order of the parameters. `peaks_hz`: where the residual peaks, most
+    /// prominent first.
+    fn starts(&self, _at: At, _known: &Known<D>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
+        Vec::new()
     }
 
     /// How large it is where it is hidden in a simulated campaign: a line a parameter (lists once).
@@ -145,15 +80,20 @@ pub trait StructuralEffect: Sync {
     }
 
     /// Why this effect cannot be of the size that was fitted (parameters in their order); `None` if it can.
-    fn impossible(&self, _site: Site, _robot: &RobotSpec, _sizes: &[Size]) -> Option<String> {
+    fn impossible(&self, _site: Site, _object: &D::Object, _sizes: &[Size]) -> Option<String> {
         None
     }
 
     /// Values of [`Self::parameters`] (given), natural units, at which the effect is not there: the model is the one without
     /// it, to rounding. They may lie outside the parameters' bounds, which are those of an effect worth a name. `None` only
     /// for what is simulated and never fitted.
-    fn vanishing(&self, _parameters: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, _parameters: &[Parameter]) -> Option<Vec<f64>> {
         None
+    }
+
+    /// Free amplitudes for each record and channel that are fitted along without standing in the list of parameters.
+    fn nuisances_per_channel(&self, _at: At) -> usize {
+        0
     }
 
     /// Effects with lower order are applied first (a payload weighs on the joints before their load is counted).
@@ -161,50 +101,70 @@ pub trait StructuralEffect: Sync {
         1
     }
 
-    /// Changes the chain.
-    fn apply(&self, _site: Site, _variant: usize, _values: &[Dual], _setting: &Setting, _chain: &mut Chain) {}
+    /// Changes the physics of a posture or cut; `values`: natural values of its parameters in their order.
+    fn apply(&self, _at: At, _values: &[Dual], _setting: &D::Setting<'_>, _physics: &mut D::Physics) {}
 
-    /// Changes the channels.
-    fn filter(&self, _values: &[Dual], _filter: &mut ChannelFilter) {}
+    /// Changes what is recorded of it.
+    fn distort(&self, _values: &[Dual], _sensors: &mut D::Sensors) {}
 }
 
 /// An effect at a site: what is added to a model.
 #[derive(Clone, Copy)]
-pub struct Instance {
+pub struct Instance<D: Domain> {
     /// The effect.
-    pub effect: &'static dyn StructuralEffect,
+    pub effect: &'static dyn Effect<D>,
     /// Where it sits.
     pub site: Site,
     /// Its discrete choice, from 0.
     pub variant: usize,
 }
 
-impl Instance {
+impl<D: Domain> Instance<D> {
+    /// Its place and choice.
+    pub fn at(&self) -> At {
+        At {
+            site: self.site,
+            variant: self.variant,
+        }
+    }
+
+    /// What it is called.
+    pub fn name(&self) -> EffectName {
+        let variant = self.variant_label();
+        EffectName {
+            effect: self.effect.id().into(),
+            site: self.site.label(),
+            variant: variant.map(|(key, value)| (key.into(), value.into())),
+        }
+    }
+
+    /// Its discrete choice as (key, value); `None` where there is no choice.
+    pub fn variant_label(&self) -> Option<(&'static str, &'static str)> {
+        self.effect.variant_label(self.variant)
+    }
+
     /// `effect@site`, or the bare id; the discrete choice is not part of it.
     pub fn label(&self) -> String {
-        match self.site.label() {
-            Some(site) => format!("{}@{site}", self.effect.id()),
-            None => self.effect.id().to_string(),
-        }
+        self.name().label()
     }
 
     /// For people: the label, and the discrete choice where there is one.
     pub fn title(&self) -> String {
-        match self.effect.variant_label(self.variant) {
+        match self.variant_label() {
             Some((key, value)) => format!("{} ({key} {value})", self.label()),
             None => self.label(),
         }
     }
 }
 
-impl fmt::Debug for Instance {
+impl<D: Domain> fmt::Debug for Instance<D> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}#{}", self.label(), self.variant)
     }
 }
 
-impl PartialEq for Instance {
+impl<D: Domain> PartialEq for Instance<D> {
     fn eq(&self, other: &Self) -> bool {
-        self.effect.id() == other.effect.id() && self.site == other.site && self.variant == other.variant
+        self.effect.id() == other.effect.id() && self.at() == other.at()
     }
 }

@@ -1,5 +1,8 @@
 //! Sizes that an effect can have: what the hard ends of its prior say about a fitted value.
 
+/// Share of an effect's usual size (a mass, a compliance) that no measurement can show.
+pub(crate) const NEGLIGIBLE: f64 = 1e-10;
+
 /// A fitted value, natural units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Size {

@@ -1,8 +1,8 @@
 //! What a user means by `EFFECT[@SITE]`.
 
-use super::effect::{DataSummary, Instance, Site, StructuralEffect};
-use super::registry::{DRAWN, STRUCTURAL, find};
-use crate::data::RobotSpec;
+use super::effect::{Domain, Effect, Instance, Known};
+use super::registry::Registry;
+use super::site::Site;
 use crate::text::{closest, shown_briefly};
 use crate::{InputError, Result};
 
@@ -11,31 +11,36 @@ use crate::{InputError, Result};
 /// # Errors
 /// One that says what there is where the effect or its site is none, or a site is missing; the reason where this robot
 /// or this data cannot show the effect.
-pub fn requested(robot: &RobotSpec, data: &DataSummary, name: &str) -> Result<Vec<Instance>> {
+pub fn requested<D: Domain>(
+    registry: &Registry<D>,
+    known: &Known<'_, D>,
+    name: &str,
+) -> Result<Vec<Instance<D>>> {
     let wrong = |problem: String, remedy: String| InputError::new(problem).key("EFFECT").remedy(remedy);
     let (id, site) = match name.split_once('@') {
         Some((id, site)) => (id, Some(site)),
         None => (name, None),
     };
-    let Some(effect) = STRUCTURAL.into_iter().chain(DRAWN).find(|e| e.id() == id) else {
-        let ids = STRUCTURAL.map(|e| e.id());
-        let near = closest(id, ids).map_or(String::new(), |near| format!("did you mean {near}? "));
+    let Some(effect) = registry.effect(id) else {
+        let ids: Vec<&str> = registry.tried().iter().map(|e| e.id()).collect();
+        let near =
+            closest(id, ids.iter().copied()).map_or(String::new(), |near| format!("did you mean {near}? "));
         let remedy = format!("{near}there are: {}", ids.join(", "));
         return Err(wrong(format!("there is no effect \"{}\"", shown_briefly(id)), remedy).into());
     };
-    let found = find(robot, name);
+    let found = registry.find(known.object, name);
     if found.is_empty() {
-        let (problem, remedy) = no_such_site(effect, site, &effect.sites(robot));
+        let (problem, remedy) = no_such_site(effect, site, &effect.sites(known.object));
         return Err(wrong(problem, remedy).into());
     }
-    if let Some(obstacle) = effect.obstacle(robot, data) {
+    if let Some(obstacle) = effect.obstacle(known) {
         let remedy = "measure what it needs, or see what `lobestone diagnose DIR` proposes".to_string();
         return Err(wrong(format!("this campaign cannot show {name}: {obstacle}"), remedy).into());
     }
     Ok(found)
 }
 
-fn no_such_site(effect: &dyn StructuralEffect, site: Option<&str>, sites: &[Site]) -> (String, String) {
+fn no_such_site<D: Domain>(effect: &dyn Effect<D>, site: Option<&str>, sites: &[Site]) -> (String, String) {
     let id = effect.id();
     let named: Vec<String> = sites
         .iter()
@@ -67,6 +72,7 @@ fn no_such_site(effect: &dyn StructuralEffect, site: Option<&str>, sites: &[Site
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects::DataSummary;
     use crate::robot::fixture::irb6640;
 
     const DATA: DataSummary = DataSummary {
@@ -84,7 +90,7 @@ mod tests {
             ("joint-transverse-compliance@joint-3", 1),
             ("local-resonator@link-2", 3),
         ] {
-            let found = requested(&robot, &DATA, name).unwrap();
+            let found = requested(&Registry::structure(), &Known::robot(&robot, DATA), name).unwrap();
             assert_eq!(found.len(), count, "{name}");
             assert!(found.iter().all(|i| i.label() == name));
         }
@@ -109,7 +115,9 @@ mod tests {
                 "measure",
             ),
         ] {
-            let error = requested(&robot, &DATA, name).unwrap_err().to_string();
+            let error = requested(&Registry::structure(), &Known::robot(&robot, DATA), name)
+                .unwrap_err()
+                .to_string();
             assert!(
                 error.contains(problem) && error.contains(remedy),
                 "{name}: {error}"

@@ -3,13 +3,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::effects::Instance;
-use crate::effects::cutting::CuttingInstance;
+use crate::effects::{self, Instance};
 
 /// The side of a campaign that a revision belongs to; each side has a model of its own and counts for itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Domain {
+pub enum Side {
     /// Robot model against FRFs.
     Structure,
     /// Force model against force records.
@@ -50,7 +49,7 @@ pub struct Revision {
     /// 0: the baseline without effects.
     pub revision: usize,
     /// The side that it belongs to.
-    pub domain: Domain,
+    pub domain: Side,
     /// In the order in which they were added.
     pub effects: Vec<RecordedEffect>,
     /// As fitted.
@@ -134,17 +133,8 @@ pub struct RecordedCandidate {
 }
 
 /// How an instance stands in the log.
-pub fn recorded_effect(instance: &Instance) -> RecordedEffect {
-    let variant = instance.effect.variant_label(instance.variant);
-    RecordedEffect {
-        effect: instance.label(),
-        variant: variant.map(|(_, value)| value.to_string()),
-    }
-}
-
-/// How an instance stands in the log.
-pub fn recorded_cutting_effect(instance: &CuttingInstance) -> RecordedEffect {
-    let variant = instance.effect.variant_label(instance.variant);
+pub fn recorded_effect<D: effects::Domain>(instance: &Instance<D>) -> RecordedEffect {
+    let variant = instance.variant_label();
     RecordedEffect {
         effect: instance.label(),
         variant: variant.map(|(_, value)| value.to_string()),

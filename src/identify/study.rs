@@ -5,9 +5,10 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::levenberg_marquardt::{Fit, LeastSquares, Stopping, minimise, one_step};
+use super::model::{Model, Modelled};
 use super::rest::{BeyondSlips, Rest};
+use crate::effects::{Effect, Instance, Known, Registry, Size};
 use crate::identify::frfs::calibrate::{Calibration, Estimate, scattered_starts};
-use crate::parameter::Parameter;
 use crate::{Error, Result};
 
 /// How much of the data a fit uses.
@@ -55,27 +56,6 @@ impl View {
     };
 }
 
-/// How an effect at a site is called.
-#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
-pub struct EffectName {
-    /// Its id.
-    pub effect: String,
-    /// `None` where the effect has no place of its own.
-    pub site: Option<String>,
-    /// A discrete choice as key and value (`direction`, `y`).
-    pub variant: Option<(String, String)>,
-}
-
-impl EffectName {
-    /// `effect@site`, or the bare id; the discrete choice is not part of it.
-    pub fn label(&self) -> String {
-        match &self.site {
-            Some(site) => format!("{}@{site}", self.effect),
-            None => self.effect.clone(),
-        }
-    }
-}
-
 /// What a model's residual says about itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Residual {
@@ -88,52 +68,37 @@ pub struct Residual {
     pub independent_share: f64,
 }
 
-/// A model that effects can be added to, and the data it is fitted to.
+/// Models of one domain, and the data that they are fitted to.
 pub trait Study: Sync {
-    /// A model: its last parameters are those of the effect added last.
-    type Model: Clone + Send + Sync;
-    /// An effect at a site, with its discrete choice.
-    type Instance: Clone + Send + Sync;
+    /// What is modelled.
+    type Domain: Modelled;
     /// A model's misfit to a view of the data.
     type Problem<'a>: LeastSquares + Sync
     where
         Self: 'a;
-    /// What effects need for finding their starting points at a fit.
-    type Hints: Sync;
 
-    /// All of them, the baseline's first.
-    fn parameters<'m>(&self, model: &'m Self::Model) -> &'m [Parameter];
+    /// The effects that may be missing.
+    fn registry(&self) -> &Registry<Self::Domain>;
 
-    /// Every instance that could be added to `model`, and the effects this data cannot show with the reason.
-    fn instances(&self, model: &Self::Model) -> (Vec<Self::Instance>, Vec<(String, String)>);
+    /// What effects are told of the model and the data.
+    fn known<'a>(&'a self, model: &'a Model<Self::Domain>) -> Known<'a, Self::Domain>;
 
-    /// What an instance is called.
-    fn name(&self, instance: &Self::Instance) -> EffectName;
+    /// Why data of this kind cannot show the effect, whatever is measured; `None` if they can.
+    fn blind_to(&self, _effect: &dyn Effect<Self::Domain>) -> Option<String> {
+        None
+    }
 
-    /// `model` with one more effect; its parameters come last.
-    fn extend(&self, model: &Self::Model, instance: &Self::Instance) -> Self::Model;
-
-    /// The same model, whose fits start from `theta`.
-    fn starting_from(&self, model: &Self::Model, theta: Vec<f64>) -> Self::Model;
-
-    /// Values of the parameters of the effect added last, solver's scale, at which it is not there; `None` without effects.
-    fn vanishing(&self, model: &Self::Model) -> Option<Vec<f64>>;
-
-    /// Where a fit of `model` may go, solver's scale.
-    fn bounds(&self, model: &Self::Model) -> Vec<[f64; 2]>;
-
-    /// What the residual of `model` at `theta` suggests.
-    fn hints(&self, model: &Self::Model, theta: &[f64]) -> Result<Self::Hints>;
-
-    /// Starting points for the effect's own parameters, natural values.
-    fn starts(&self, instance: &Self::Instance, hints: &Self::Hints) -> Vec<Vec<f64>>;
+    /// What the residual of `model` at `theta` suggests: frequencies around which it stands out, most prominent first, Hz.
+    fn hints(&self, _model: &Model<Self::Domain>, _theta: &[f64]) -> Result<Vec<f64>> {
+        Ok(Vec::new())
+    }
 
     /// The misfit of `model` to a view.
-    fn problem<'a>(&'a self, model: &'a Self::Model, view: View) -> Self::Problem<'a>;
+    fn problem<'a>(&'a self, model: &'a Model<Self::Domain>, view: View) -> Self::Problem<'a>;
 
     /// Roughly the processor time of one evaluation of `model` with its derivatives on a view, s: what budgets are counted in.
     /// From the sizes of the model and the data, not from a clock, so that the same work is done everywhere.
-    fn work_s(&self, model: &Self::Model, extent: Extent) -> f64;
+    fn work_s(&self, model: &Model<Self::Domain>, extent: Extent) -> f64;
 
     /// Real values in a view.
     fn real_values(&self, extent: Extent) -> usize;
@@ -142,30 +107,20 @@ pub trait Study: Sync {
     fn folds(&self) -> usize;
 
     /// How well `theta` predicts one fold, on all of its data.
-    fn predict_fold(&self, model: &Self::Model, theta: &[f64], fold: usize) -> Result<HeldOut>;
+    fn predict_fold(&self, model: &Model<Self::Domain>, theta: &[f64], fold: usize) -> Result<HeldOut>;
 
     /// How much `model` at `theta` leaves of all data.
-    fn residual(&self, model: &Self::Model, theta: &[f64]) -> Result<Residual>;
+    fn residual(&self, model: &Model<Self::Domain>, theta: &[f64]) -> Result<Residual>;
 
     /// What tests of structure find in what the model leaves; no tests where there is too little data.
-    fn rest(&self, _model: &Self::Model, _theta: &[f64]) -> Result<Rest> {
+    fn rest(&self, _model: &Model<Self::Domain>, _theta: &[f64]) -> Result<Rest> {
         Ok(Rest::default())
     }
 
     /// What tests of structure find in what small errors of the setup cannot take of that; `None` where nothing is known of
     /// such errors.
-    fn beyond_slips(&self, _model: &Self::Model, _theta: &[f64]) -> Result<Option<BeyondSlips>> {
+    fn beyond_slips(&self, _model: &Model<Self::Domain>, _theta: &[f64]) -> Result<Option<BeyondSlips>> {
         Ok(None)
-    }
-
-    /// Why the effect cannot be that large or that small, from the estimates of its own parameters; `None` if it can.
-    fn impossible(
-        &self,
-        _model: &Self::Model,
-        _instance: &Self::Instance,
-        _own: &[Estimate],
-    ) -> Option<String> {
-        None
     }
 
     /// Whether the values' errors were given with them: then few values are enough. Where they are estimated from the scatter
@@ -175,13 +130,54 @@ pub trait Study: Sync {
     }
 
     /// The fair fit of a model as it stands.
-    fn calibrate(&self, model: &Self::Model) -> Result<Calibration>;
+    fn calibrate(&self, model: &Model<Self::Domain>) -> Result<Calibration>;
 
-    /// Where nothing has been fitted yet, solver's scale.
-    fn nominal_theta(&self, model: &Self::Model) -> Vec<f64> {
-        let parameters = self.parameters(model).iter();
-        parameters.map(|p| p.internal(p.nominal)).collect()
+    /// Every instance that could be added to `model`, and the effects this data cannot show with the reason.
+    #[allow(clippy::type_complexity)]
+    fn instances(&self, model: &Model<Self::Domain>) -> (Vec<Instance<Self::Domain>>, Vec<(String, String)>) {
+        let known = self.known(model);
+        let (mut tried, mut not_tried) = (Vec::new(), Vec::new());
+        for instance in self.registry().instances(known.object) {
+            let label = instance.label();
+            if model.has(&label) {
+                continue;
+            }
+            let blind = self.blind_to(instance.effect);
+            match blind.or_else(|| instance.effect.obstacle(&known)) {
+                Some(reason) => not_tried.push((label, reason)),
+                None => tried.push(instance),
+            }
+        }
+        not_tried.dedup();
+        (tried, not_tried)
     }
+
+    /// Why the effect cannot be that large or that small, from the estimates of its own parameters; `None` if it can.
+    fn impossible(
+        &self,
+        model: &Model<Self::Domain>,
+        instance: &Instance<Self::Domain>,
+        own: &[Estimate],
+    ) -> Option<String> {
+        let sizes: Vec<Size> = own.iter().map(Estimate::size).collect();
+        let object = self.known(model).object;
+        instance.effect.impossible(instance.site, object, &sizes)
+    }
+
+    /// `model` with one more effect; its parameters come last.
+    fn extend(&self, model: &Model<Self::Domain>, instance: &Instance<Self::Domain>) -> Model<Self::Domain> {
+        model.with_effect(*instance, &self.known(model))
+    }
+}
+
+/// A model of a study.
+pub type ModelOf<S> = Model<<S as Study>::Domain>;
+/// An effect at a site, of a study.
+pub type InstanceOf<S> = Instance<<S as Study>::Domain>;
+
+/// Values of the parameters of the effect added last, solver's scale, at which it is not there; `None` without effects.
+pub fn vanishing_limit<D: Modelled>(model: &Model<D>) -> Option<Vec<f64>> {
+    model.vanishing(model.effects().last()?)
 }
 
 /// Sums behind held-out errors of one fit.
@@ -212,7 +208,7 @@ impl HeldOut {
 /// two folds.
 pub fn held_out<S: Study>(
     study: &S,
-    model: &S::Model,
+    model: &ModelOf<S>,
     theta: &[f64],
     extent: Extent,
     stopping: Stopping,
@@ -220,7 +216,7 @@ pub fn held_out<S: Study>(
     if study.folds() < 2 {
         return Ok(None);
     }
-    let bounds = study.bounds(model);
+    let bounds = model.bounds();
     let folds: Vec<HeldOut> = (0..study.folds())
         .into_par_iter()
         .map(|fold| {
@@ -275,7 +271,7 @@ const SETTLE: Stopping = Stopping {
 /// `bases`: points for the parameters in front of the effect's; `own`: points for its own; both on the solver's scale.
 pub fn screen<S: Study>(
     study: &S,
-    model: &S::Model,
+    model: &ModelOf<S>,
     bases: &[Vec<f64>],
     own: &[Vec<f64>],
     effort: Effort,
@@ -290,12 +286,12 @@ pub fn screen<S: Study>(
 /// The first steps of [`screen`]: where short fits from the most promising starting points lead, best first; at least one.
 fn look<S: Study>(
     study: &S,
-    model: &S::Model,
+    model: &ModelOf<S>,
     bases: &[Vec<f64>],
     own: &[Vec<f64>],
     effort: Effort,
 ) -> Result<Vec<Fit>> {
-    let bounds = study.bounds(model);
+    let bounds = model.bounds();
     let extent = match effort {
         Effort::Look => Extent::Glance,
         Effort::Direct | Effort::Staged => Extent::Coarse,
@@ -354,7 +350,7 @@ fn look<S: Study>(
     }
     // A fit that ends above where the effect is hardly there was led away: then it begins there.
     let lowest_fit = fits.iter().map(|f| f.cost).fold(f64::INFINITY, f64::min);
-    let faint = hardly_there(study, model, bases)
+    let faint = hardly_there(model, bases)
         .into_iter()
         .map(|start| (likelihood.cost(&start).unwrap_or(f64::INFINITY), start))
         .min_by(|a, b| a.0.total_cmp(&b.0));
@@ -371,11 +367,11 @@ fn look<S: Study>(
 }
 
 /// Starting points at the end of the range next to where the effect added last vanishes, one a base.
-fn hardly_there<S: Study>(study: &S, model: &S::Model, bases: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let Some(limit) = study.vanishing(model) else {
+fn hardly_there<D: Modelled>(model: &Model<D>, bases: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let Some(limit) = vanishing_limit(model) else {
         return Vec::new();
     };
-    let parameters = study.parameters(model);
+    let parameters = model.parameters.as_slice();
     let own = &parameters[parameters.len() - limit.len()..];
     let faint: Vec<f64> = own
         .iter()
@@ -393,10 +389,10 @@ fn hardly_there<S: Study>(study: &S, model: &S::Model, bases: &[Vec<f64>]) -> Ve
 
 /// The fit of a model without the effect added last to `model`, as one of `model`: the effect stands where it vanishes,
 /// its prior uncharged (that prior is of an effect that is there). `None` where the effect has no such limit.
-pub fn vanished<S: Study>(study: &S, model: &S::Model, without: &Fit) -> Option<Fit> {
-    let limit = study.vanishing(model)?;
+pub fn vanished<D: Modelled>(model: &Model<D>, without: &Fit) -> Option<Fit> {
+    let limit = vanishing_limit(model)?;
     let (front, count) = (without.theta.len(), without.theta.len() + limit.len());
-    let parameters = study.parameters(model);
+    let parameters = model.parameters.as_slice();
     let mut hessian = DMatrix::zeros(count, count);
     hessian
         .view_mut((0, 0), (front, front))
@@ -416,8 +412,8 @@ pub fn vanished<S: Study>(study: &S, model: &S::Model, without: &Fit) -> Option<
 
 /// Follows what [`look`] found to its end on the coarse view. The runner-up goes to the end too where it is close: the
 /// leader of a short look need not win.
-fn settle<S: Study>(study: &S, model: &S::Model, looks: &[Fit]) -> Result<Fit> {
-    let bounds = study.bounds(model);
+fn settle<S: Study>(study: &S, model: &ModelOf<S>, looks: &[Fit]) -> Result<Fit> {
+    let bounds = model.bounds();
     let likelihood = study.problem(model, View::COARSE);
     let close = |fit: &&Fit| fit.cost < 1.5 * looks[0].cost;
     looks
@@ -436,15 +432,19 @@ fn settle<S: Study>(study: &S, model: &S::Model, looks: &[Fit]) -> Result<Fit> {
 /// near both ends of the range, where an effect that is hardly there begins.
 pub fn own_starts<S: Study>(
     study: &S,
-    extended: &S::Model,
+    extended: &ModelOf<S>,
     count_before: usize,
-    instance: &S::Instance,
-    hints: &S::Hints,
+    instance: &InstanceOf<S>,
+    hints: &[f64],
 ) -> Vec<Vec<f64>> {
-    let parameters = &study.parameters(extended)[count_before..];
+    let parameters = &extended.parameters[count_before..];
     let nominal: Vec<f64> = parameters.iter().map(|p| p.nominal).collect();
     let mut starts: Vec<Vec<f64>> = std::iter::once(nominal)
-        .chain(study.starts(instance, hints))
+        .chain(
+            instance
+                .effect
+                .starts(instance.at(), &study.known(extended), hints),
+        )
         .map(|start| {
             let pairs = parameters.iter().zip(start);
             pairs
@@ -463,11 +463,11 @@ pub fn own_starts<S: Study>(
 
 /// An effect tried: the model with it and its fit.
 #[derive(Debug, Clone)]
-pub struct Tried<M, I> {
+pub struct Tried<D: Modelled> {
     /// The effect with its place and discrete choice.
-    pub instance: I,
+    pub instance: Instance<D>,
     /// The model with it.
-    pub model: M,
+    pub model: Model<D>,
     /// Its fit.
     pub fit: Fit,
 }
@@ -476,18 +476,18 @@ pub struct Tried<M, I> {
 /// no start leads to a fit.
 pub fn try_effect<S: Study>(
     study: &S,
-    model: &S::Model,
-    instance: &S::Instance,
+    model: &ModelOf<S>,
+    instance: &InstanceOf<S>,
     bases: &[Vec<f64>],
-    hints: &S::Hints,
+    hints: &[f64],
     effort: Effort,
-) -> Option<Tried<S::Model, S::Instance>> {
+) -> Option<Tried<S::Domain>> {
     let extended = study.extend(model, instance);
-    let before = study.parameters(model).len();
+    let before = model.parameters.len();
     let own = own_starts(study, &extended, before, instance, hints);
     let fit = screen(study, &extended, bases, &own, effort).ok()?;
     Some(Tried {
-        instance: instance.clone(),
+        instance: *instance,
         model: extended,
         fit,
     })
@@ -501,14 +501,14 @@ pub const OUT_OF_RACE: f64 = 10.0;
 /// that no start led to a fit of. `done` is called after each.
 pub fn try_effects<S: Study>(
     study: &S,
-    model: &S::Model,
-    instances: &[S::Instance],
+    model: &ModelOf<S>,
+    instances: &[InstanceOf<S>],
     bases: &[Vec<f64>],
-    hints: &S::Hints,
+    hints: &[f64],
     done: impl Fn() + Sync,
-) -> Vec<Tried<S::Model, S::Instance>> {
-    let before = study.parameters(model).len();
-    let looks: Vec<(&S::Instance, S::Model, Vec<Fit>)> = instances
+) -> Vec<Tried<S::Domain>> {
+    let before = model.parameters.len();
+    let looks: Vec<(&InstanceOf<S>, ModelOf<S>, Vec<Fit>)> = instances
         .par_iter()
         .filter_map(|instance| {
             let extended = study.extend(model, instance);
@@ -527,7 +527,7 @@ pub fn try_effects<S: Study>(
             } else {
                 looks.swap_remove(0)
             };
-            let instance = instance.clone();
+            let instance = *instance;
             Some(Tried { instance, model, fit })
         })
         .collect()
@@ -537,16 +537,16 @@ pub fn try_effects<S: Study>(
 /// `tried` is fitted on all data; `model` is the one without the effect.
 pub fn rescue<S: Study>(
     study: &S,
-    model: &S::Model,
-    tried: &Tried<S::Model, S::Instance>,
-    hints: &S::Hints,
+    model: &ModelOf<S>,
+    tried: &Tried<S::Domain>,
+    hints: &[f64],
     stopping: Stopping,
 ) -> Result<Option<Fit>> {
     /// Starting points, and their seed.
     const STARTS: (usize, u64) = (4, 1);
-    let parameters = study.parameters(model);
+    let parameters = model.parameters.as_slice();
     let own = own_starts(study, &tried.model, parameters.len(), &tried.instance, hints);
-    let bounds = study.bounds(&tried.model);
+    let bounds = tried.model.bounds();
     let fit =
         |view: View, start: &[f64]| minimise(&study.problem(&tried.model, view), start, &bounds, stopping);
     let coarse = fit(View::COARSE, &tried.fit.theta)?;

@@ -14,7 +14,7 @@ use crate::report::sections::{
     cutting_section, diagnosis_section, error_map_section, history_section, lobes_section, modal_section,
     structure_section, thesis_section, waveform_section,
 };
-use crate::revision::{self, Domain};
+use crate::revision::{self, Side};
 use crate::thesis::ThesisFindings;
 
 /// Folder of the tables beside the page.
@@ -75,8 +75,8 @@ fn origin(campaign: &Workbench) -> Vec<(String, String)> {
     origin.push(entry("made", made));
     origin.push(entry("with Lobestone", env!("CARGO_PKG_VERSION").to_string()));
     for (there, name, domain) in [
-        (!campaign.frfs.is_empty(), "FRF data", Domain::Structure),
-        (!campaign.cuts.is_empty(), "force data", Domain::Cutting),
+        (!campaign.frfs.is_empty(), "FRF data", Side::Structure),
+        (!campaign.cuts.is_empty(), "force data", Side::Cutting),
     ] {
         let hash = there.then(|| campaign.fingerprint(domain).ok()).flatten();
         origin.extend(hash.map(|hash| entry(name, hash)));

@@ -4,6 +4,7 @@ use super::card::{BeforeAfter, ErrorBar, Tone, VerdictCard};
 use super::number::{percent, plus_minus, significant};
 use super::picture::Picture;
 use super::words::{self, frf_name, listed};
+use crate::analysis::diagnosis::Leading;
 use crate::analysis::{CuttingFindings, DiagnosisFindings, StructureFindings};
 use crate::campaign::{Campaign, Process};
 use crate::discrepancy::candidate::BaselineFit;
@@ -11,8 +12,8 @@ use crate::discrepancy::localise::Localisation;
 use crate::discrepancy::setup::SetupFinding;
 use crate::discrepancy::verdict::is_noise;
 use crate::discrepancy::{CutError, Diagnosis, DiagnosisVerdict, EffectCandidate};
-use crate::effects::Instance;
-use crate::effects::cutting::CuttingInstance;
+use crate::effects::{Domain, Instance};
+use crate::identify::Modelled;
 use crate::identify::forces::cutting_waves::courses;
 use crate::identify::{CutFit, Estimate};
 
@@ -29,26 +30,13 @@ struct Named {
     lab_check: &'static str,
 }
 
-fn named(instance: &Instance) -> Named {
+fn named<D: Domain>(instance: &Instance<D>) -> Named {
     let effect = instance.effect;
     let mut title = words::effect(effect.id());
     if let Some(place) = words::place(instance.site) {
         title += &format!(" {place}");
     }
-    if let Some((key, value)) = effect.variant_label(instance.variant) {
-        title += &format!(" ({key} {value})");
-    }
-    Named {
-        title,
-        explanation: effect.explanation(),
-        lab_check: effect.background().lab_check,
-    }
-}
-
-fn named_cutting(instance: &CuttingInstance) -> Named {
-    let effect = instance.effect;
-    let mut title = words::effect(effect.id());
-    if let Some((key, value)) = effect.variant_label(instance.variant) {
+    if let Some((key, value)) = instance.variant_label() {
         title += &format!(" ({} {value})", key.replace('_', " "));
     }
     Named {
@@ -74,12 +62,12 @@ pub fn sizes(parameters: &[Estimate]) -> String {
 }
 
 /// Headline, explanation, facts and check of a verdict.
-fn answer<M, I>(
-    d: &Diagnosis<M, I>,
+fn answer<D: Modelled>(
+    d: &Diagnosis<D>,
     added: &[String],
     data: &str,
     lead: Option<&Localisation>,
-    name: impl Fn(&EffectCandidate<M, I>) -> Named,
+    name: impl Fn(&EffectCandidate<D>) -> Named,
 ) -> VerdictCard {
     let mut card = VerdictCard::default();
     let label_in_words = |label: &String| {
@@ -149,11 +137,11 @@ fn nothing(card: &mut VerdictCard, baseline: &BaselineFit, added: &[String], dat
     }
 }
 
-fn unknown<M, I>(
+fn unknown<D: Modelled>(
     card: &mut VerdictCard,
-    d: &Diagnosis<M, I>,
+    d: &Diagnosis<D>,
     lead: Option<&Localisation>,
-    name: &impl Fn(&EffectCandidate<M, I>) -> Named,
+    name: &impl Fn(&EffectCandidate<D>) -> Named,
 ) {
     let drawn = lead.and_then(|found| {
         let place = found.places.first()?;
@@ -349,7 +337,7 @@ fn error_bar(
     let mut bar = ErrorBar::default();
     let first = structure.and_then(|s| s.earlier.first());
     let now = match (diagnosis, structure) {
-        (Some(d), _) => d.now.totals,
+        (Some(d), _) => d.now.comparison.totals,
         (None, Some(s)) => s.analysis.after.totals,
         (None, None) => return bar,
     };
@@ -374,7 +362,7 @@ fn error_bar(
     bar.steps.push((name, now.nrms));
     if let Some((d, leading)) = leading {
         let name = with_candidate(d.diagnosis.verdict);
-        bar.steps.push((name.into(), leading.comparison.totals.nrms));
+        bar.steps.push((name.into(), leading.view.comparison.totals.nrms));
     }
     bar
 }
@@ -395,8 +383,8 @@ fn frf(structure: Option<&StructureFindings>, diagnosis: Option<&DiagnosisFindin
             let with = with_candidate(d.diagnosis.verdict);
             (
                 &d.case.data,
-                (&d.predicted, &d.now, "as it stands"),
-                Some((&leading.predicted, &leading.comparison, with)),
+                (&d.now.predicted, &d.now.comparison, "as it stands"),
+                Some((&leading.view.predicted, &leading.view.comparison, with)),
             )
         }
         (_, Some(s)) => {
@@ -415,7 +403,11 @@ fn frf(structure: Option<&StructureFindings>, diagnosis: Option<&DiagnosisFindin
                 ),
             }
         }
-        (Some(d), None) => (&d.case.data, (&d.predicted, &d.now, "calibrated"), None),
+        (Some(d), None) => (
+            &d.case.data,
+            (&d.now.predicted, &d.now.comparison, "calibrated"),
+            None,
+        ),
         (None, None) => return None,
     };
     let index = before.1.worst_first().into_iter().next()?;
@@ -460,8 +452,8 @@ fn frf(structure: Option<&StructureFindings>, diagnosis: Option<&DiagnosisFindin
 pub fn cutting(campaign: &Campaign, files: &[SetupFinding], found: &CuttingFindings) -> VerdictCard {
     let d = &found.diagnosis;
     let effects = found.case.model.effects();
-    let added: Vec<String> = effects.iter().map(|a| named_cutting(&a.instance).title).collect();
-    let mut card = answer(d, &added, "force records", None, |c| named_cutting(&c.instance));
+    let added: Vec<String> = effects.iter().map(|a| named(&a.instance).title).collect();
+    let mut card = answer(d, &added, "force records", None, |c| named(&c.instance));
     card.id = "verdict-cutting";
     card.side = FORCES;
     if let Some(first) = found.lead.as_ref().and_then(|l| l.lines.first()) {
@@ -507,7 +499,7 @@ pub fn cutting(campaign: &Campaign, files: &[SetupFinding], found: &CuttingFindi
         some => format!("with {}", listed(some)),
     };
     bar.steps.push((name, now.nrms));
-    if let Some((_, view)) = &found.leading {
+    if let Some(Leading { view, .. }) = &found.leading {
         bar.steps
             .push((with_candidate(d.verdict).into(), view.comparison.totals.nrms));
     }
@@ -541,7 +533,7 @@ fn force(found: &CuttingFindings) -> Option<BeforeAfter> {
         all.into_iter().find(|c| c.axis.label() == axis)
     };
     let now = course(&found.now.fits)?;
-    let with = found.leading.as_ref().and_then(|(_, view)| course(&view.fits));
+    let with = found.leading.as_ref().and_then(|l| course(&l.view.fits));
     // A fit has a zero line and a phase of its own: only its difference from the record counts.
     let after = with.map(|with| -> Vec<f64> {
         let rests = with.model.iter().zip(&with.measured).map(|(m, r)| m - r);

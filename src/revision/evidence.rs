@@ -9,12 +9,12 @@ use serde::{Deserialize, Serialize};
 
 use super::folder::FOLDER;
 use crate::files::write_atomically;
-use crate::identify::model_history::{Domain, Evidence, RecordedEffect};
+use crate::identify::model_history::{Evidence, RecordedEffect, Side};
 use crate::{Error, Result};
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Entry {
-    domain: Domain,
+    domain: Side,
     /// Fingerprint of the data.
     data: String,
     /// In the model that was diagnosed.
@@ -38,7 +38,7 @@ fn entries(campaign_dir: &Path) -> Vec<Entry> {
 /// What the file system refuses.
 pub fn keep(
     campaign_dir: &Path,
-    domain: Domain,
+    domain: Side,
     (data, effects): (String, Vec<RecordedEffect>),
     evidence: Evidence,
 ) -> Result<()> {
@@ -60,12 +60,7 @@ pub fn keep(
 }
 
 /// What was kept of these data and this model.
-pub fn recall(
-    campaign_dir: &Path,
-    domain: Domain,
-    data: &str,
-    effects: &[RecordedEffect],
-) -> Option<Evidence> {
+pub fn recall(campaign_dir: &Path, domain: Side, data: &str, effects: &[RecordedEffect]) -> Option<Evidence> {
     let all = entries(campaign_dir).into_iter();
     let mut own = all.filter(|e| e.domain == domain && e.data == data && e.effects == effects);
     own.next().map(|e| e.evidence)
@@ -103,17 +98,16 @@ mod tests {
             effect: "payload".into(),
             variant: None,
         };
-        let of =
-            |data: &str, effects: &[RecordedEffect]| recall(dir.path(), Domain::Structure, data, effects);
+        let of = |data: &str, effects: &[RecordedEffect]| recall(dir.path(), Side::Structure, data, effects);
         assert_eq!(of("a", &[]), None);
-        keep(dir.path(), Domain::Structure, ("a".into(), vec![]), evidence(0.9)).unwrap();
-        keep(dir.path(), Domain::Cutting, ("a".into(), vec![]), evidence(0.5)).unwrap();
+        keep(dir.path(), Side::Structure, ("a".into(), vec![]), evidence(0.9)).unwrap();
+        keep(dir.path(), Side::Cutting, ("a".into(), vec![]), evidence(0.5)).unwrap();
         assert_eq!(of("a", &[]).unwrap().confidence, 0.9);
         assert_eq!(of("b", &[]), None);
         assert_eq!(of("a", std::slice::from_ref(&payload)), None);
         keep(
             dir.path(),
-            Domain::Structure,
+            Side::Structure,
             ("a".into(), vec![payload.clone()]),
             evidence(0.7),
         )
@@ -121,12 +115,12 @@ mod tests {
         assert_eq!(of("a", &[]), None, "the last one only");
         assert_eq!(of("a", &[payload]).unwrap().confidence, 0.7);
         assert_eq!(
-            recall(dir.path(), Domain::Cutting, "a", &[]).unwrap().confidence,
+            recall(dir.path(), Side::Cutting, "a", &[]).unwrap().confidence,
             0.5
         );
         std::fs::write(file(dir.path()), "{").unwrap();
-        assert_eq!(recall(dir.path(), Domain::Cutting, "a", &[]), None);
-        keep(dir.path(), Domain::Cutting, ("c".into(), vec![]), evidence(0.6)).unwrap();
-        assert!(recall(dir.path(), Domain::Cutting, "c", &[]).is_some());
+        assert_eq!(recall(dir.path(), Side::Cutting, "a", &[]), None);
+        keep(dir.path(), Side::Cutting, ("c".into(), vec![]), evidence(0.6)).unwrap();
+        assert!(recall(dir.path(), Side::Cutting, "c", &[]).is_some());
     }
 }

@@ -10,7 +10,7 @@ use fnv::FnvHasher;
 use super::folder::log_file;
 use crate::campaign::form::paths;
 use crate::campaign::{Campaign, LinkTolerances, campaign_file, named_files};
-use crate::identify::model_history::Domain;
+use crate::identify::model_history::Side;
 use crate::{Error, Result};
 
 /// FNV-1a, 64 bits (Fowler, Noll & Vo): notices a change; it need not resist anyone who wants to deceive himself.
@@ -141,10 +141,10 @@ pub fn cutting_fingerprint(campaign: &Campaign) -> Result<String> {
 ///
 /// # Errors
 /// A file that cannot be read.
-pub fn fingerprint(campaign: &Campaign, domain: Domain) -> Result<String> {
-    match domain {
-        Domain::Structure => structure_fingerprint(campaign),
-        Domain::Cutting => cutting_fingerprint(campaign),
+pub fn fingerprint(campaign: &Campaign, side: Side) -> Result<String> {
+    match side {
+        Side::Structure => structure_fingerprint(campaign),
+        Side::Cutting => cutting_fingerprint(campaign),
     }
 }
 

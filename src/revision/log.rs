@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::folder::{FOLDER, log_file};
 use super::lock::lock;
 use crate::files::write_durably;
-use crate::identify::model_history::{Domain, Revision};
+use crate::identify::model_history::{Revision, Side};
 use crate::{Error, InputError, Result};
 
 const SCHEMA: &str = "lobestone/revisions/1";
@@ -61,25 +61,25 @@ impl RevisionLog {
     }
 
     /// The revisions of one side, oldest first; the baseline is the first.
-    pub fn revisions(&self, domain: Domain) -> impl DoubleEndedIterator<Item = &Revision> {
-        self.document.revisions.iter().filter(move |r| r.domain == domain)
+    pub fn revisions(&self, side: Side) -> impl DoubleEndedIterator<Item = &Revision> {
+        self.document.revisions.iter().filter(move |r| r.domain == side)
     }
 
     /// What was undone on one side, oldest first.
-    pub fn undone(&self, domain: Domain) -> impl Iterator<Item = &Revision> {
-        self.document.undone.iter().filter(move |r| r.domain == domain)
+    pub fn undone(&self, side: Side) -> impl Iterator<Item = &Revision> {
+        self.document.undone.iter().filter(move |r| r.domain == side)
     }
 
     /// The model as it stands; `None` where nothing was recorded.
-    pub fn current(&self, domain: Domain) -> Option<&Revision> {
-        self.revisions(domain).next_back()
+    pub fn current(&self, side: Side) -> Option<&Revision> {
+        self.revisions(side).next_back()
     }
 
     /// What stands in the log of one side, as a short mark that no other state of this log has: revision number and
     /// number of undone revisions (both together only grow).
-    pub fn mark(&self, domain: Domain) -> String {
-        let revision = self.current(domain).map_or(0, |r| r.revision);
-        format!("{revision}-{}", self.undone(domain).count())
+    pub fn mark(&self, side: Side) -> String {
+        let revision = self.current(side).map_or(0, |r| r.revision);
+        format!("{revision}-{}", self.undone(side).count())
     }
 
     /// Adds a revision; its number is set here. `baseline`: what to record as revision 0 where none of this side is
@@ -109,8 +109,8 @@ impl RevisionLog {
     ///
     /// # Errors
     /// There is no added effect to undo; another process changed the log since it was loaded; the file system refuses.
-    pub fn undo(&mut self, domain: Domain) -> Result<Revision> {
-        if self.current(domain).is_none_or(|r| r.revision == 0) {
+    pub fn undo(&mut self, side: Side) -> Result<Revision> {
+        if self.current(side).is_none_or(|r| r.revision == 0) {
             return Err(
                 InputError::new("nothing to undo: no effect was added to this campaign's model")
                     .file(log_file(&self.campaign_dir))
@@ -119,7 +119,7 @@ impl RevisionLog {
             );
         }
         self.change(|document| {
-            let last = document.revisions.iter().rposition(|r| r.domain == domain);
+            let last = document.revisions.iter().rposition(|r| r.domain == side);
             let undone = match last {
                 Some(last) => document.revisions.remove(last),
                 None => return Err(Error::computation("the log lost its last revision")),
@@ -195,8 +195,8 @@ fn check(document: &Document) -> std::result::Result<(), (String, String)> {
     for (i, revision) in document.revisions.iter().enumerate() {
         let wrong = |key: &str, problem: String| Err((format!("revisions[{i}].{key}"), problem));
         let side = match revision.domain {
-            Domain::Structure => 0,
-            Domain::Cutting => 1,
+            Side::Structure => 0,
+            Side::Cutting => 1,
         };
         let before = last[side].replace(revision);
         let expected = before.map_or(0, |b| b.revision + 1);
@@ -235,7 +235,7 @@ mod tests {
     fn revision(labels: &[&str], nrms: f64) -> Revision {
         Revision {
             revision: 0,
-            domain: Domain::Structure,
+            domain: Side::Structure,
             effects: labels
                 .iter()
                 .map(|l| RecordedEffect {
@@ -264,7 +264,7 @@ mod tests {
     /// Adds one effect to what is there.
     fn add(log: &mut RevisionLog, label: &str) -> Result<usize> {
         let before: Vec<String> = log
-            .current(Domain::Structure)
+            .current(Side::Structure)
             .map(|r| r.labels().iter().map(|l| l.to_string()).collect())
             .unwrap_or_default();
         let labels: Vec<&str> = before.iter().map(String::as_str).chain([label]).collect();
@@ -273,48 +273,48 @@ mod tests {
 
     fn numbers(dir: &Path) -> Vec<usize> {
         let log = RevisionLog::load(dir).unwrap();
-        log.revisions(Domain::Structure).map(|r| r.revision).collect()
+        log.revisions(Side::Structure).map(|r| r.revision).collect()
     }
 
     #[test]
     fn what_was_appended_is_read_and_what_was_undone_is_kept() {
         let dir = tempfile::tempdir().unwrap();
         let mut log = RevisionLog::load(dir.path()).unwrap();
-        assert!(log.current(Domain::Structure).is_none());
+        assert!(log.current(Side::Structure).is_none());
         assert_eq!(add(&mut log, "payload").unwrap(), 1);
         assert_eq!(add(&mut log, "local-resonator@link-3").unwrap(), 2);
         let read = RevisionLog::load(dir.path()).unwrap();
         assert_eq!(read.document, log.document);
         assert_eq!(numbers(dir.path()), [0, 1, 2]);
-        assert!(read.current(Domain::Cutting).is_none());
+        assert!(read.current(Side::Cutting).is_none());
 
-        let undone = log.undo(Domain::Structure).unwrap();
+        let undone = log.undo(Side::Structure).unwrap();
         assert_eq!(undone.labels(), ["payload", "local-resonator@link-3"]);
         assert_eq!(add(&mut log, "time-delay").unwrap(), 2);
-        log.undo(Domain::Structure).unwrap();
-        log.undo(Domain::Structure).unwrap();
-        let error = log.undo(Domain::Structure).unwrap_err().to_string();
+        log.undo(Side::Structure).unwrap();
+        log.undo(Side::Structure).unwrap();
+        let error = log.undo(Side::Structure).unwrap_err().to_string();
         assert!(error.contains("nothing to undo"), "{error}");
         let read = RevisionLog::load(dir.path()).unwrap();
         assert_eq!(numbers(dir.path()), [0]);
-        assert_eq!(read.undone(Domain::Structure).count(), 3);
+        assert_eq!(read.undone(Side::Structure).count(), 3);
     }
 
     #[test]
     fn every_state_of_a_log_has_its_own_mark() {
         let dir = tempfile::tempdir().unwrap();
         let mut log = RevisionLog::load(dir.path()).unwrap();
-        let mut marks = vec![log.mark(Domain::Structure)];
+        let mut marks = vec![log.mark(Side::Structure)];
         for label in ["payload", "time-delay", "", "payload", "", "", "payload"] {
             match label {
-                "" => drop(log.undo(Domain::Structure).unwrap()),
+                "" => drop(log.undo(Side::Structure).unwrap()),
                 _ => drop(add(&mut log, label).unwrap()),
             }
-            let mark = log.mark(Domain::Structure);
+            let mark = log.mark(Side::Structure);
             assert!(!marks.contains(&mark), "{mark} {marks:?}");
             marks.push(mark);
         }
-        assert_eq!(log.mark(Domain::Cutting), "0-0");
+        assert_eq!(log.mark(Side::Cutting), "0-0");
     }
 
     #[test]
@@ -322,10 +322,10 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let mut log = RevisionLog::load(dir.path()).unwrap();
         add(&mut log, "payload").unwrap();
-        log.undo(Domain::Structure).unwrap();
+        log.undo(Side::Structure).unwrap();
         log.append(revision(&[], 0.7), revision(&["time-delay"], 0.1))
             .unwrap();
-        let first = log.revisions(Domain::Structure).next().unwrap();
+        let first = log.revisions(Side::Structure).next().unwrap();
         assert_eq!((first.revision, first.nrms), (0, 0.7));
         assert_eq!(numbers(dir.path()), [0, 1]);
     }
@@ -361,7 +361,7 @@ mod tests {
             scope.spawn(|| {
                 for _ in 0..20 {
                     add(&mut log, "payload").unwrap();
-                    log.undo(Domain::Structure).unwrap();
+                    log.undo(Side::Structure).unwrap();
                 }
                 done.store(true, std::sync::atomic::Ordering::Relaxed);
             });
@@ -402,7 +402,7 @@ mod tests {
         assert_eq!(results.len(), 8);
         assert_eq!(numbers(dir.path()), (0..=24).collect::<Vec<_>>());
         let log = RevisionLog::load(dir.path()).unwrap();
-        let last = log.current(Domain::Structure).unwrap();
+        let last = log.current(Side::Structure).unwrap();
         for i in 0..8 {
             let own = format!("payload@joint-{i}");
             assert_eq!(last.labels().iter().filter(|l| **l == own).count(), 3);

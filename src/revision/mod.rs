@@ -12,7 +12,7 @@ mod lock;
 mod log;
 
 pub use crate::identify::model_history::{
-    Domain, Evidence, RecordedCandidate, RecordedEffect, RecordedParameter, Revision,
+    Evidence, RecordedCandidate, RecordedEffect, RecordedParameter, Revision, Side,
 };
 pub use clock::now;
 pub use evidence::{keep, recall};

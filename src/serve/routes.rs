@@ -356,11 +356,11 @@ mod tests {
 
     #[test]
     fn orders_are_read_strictly() {
-        use crate::revision::Domain;
+        use crate::revision::Side;
         assert_eq!(
             order(r#"{"do": "add", "side": "cutting", "head": "0-0", "effect": "runout"}"#),
             Ok(PageOrder::Add {
-                side: Domain::Cutting,
+                side: Side::Cutting,
                 head: "0-0".into(),
                 effect: "runout".into()
             })

@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::desk::Job;
 use super::refusal::Refusal;
 use crate::Result;
-use crate::revision::Domain;
+use crate::revision::Side;
 
 /// What the page is about.
 pub trait PageSubject: Send + Sync + 'static {
@@ -110,15 +110,15 @@ pub enum Reply {
 pub enum PageOrder {
     Refresh {},
     Diagnose {
-        side: Domain,
+        side: Side,
     },
     Add {
-        side: Domain,
+        side: Side,
         head: String,
         effect: String,
     },
     Undo {
-        side: Domain,
+        side: Side,
         head: String,
     },
 }

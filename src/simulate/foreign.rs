@@ -8,12 +8,14 @@ use nalgebra::{DMatrix, Point3, Vector3, Vector6};
 use super::draw::{Draws, Purpose};
 use crate::data::RobotSpec;
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
-use crate::effects::{Background, ChannelFilter, DataSummary, Instance, Setting, Site, StructuralEffect};
+use crate::effects::{
+    At, Background, ChannelFilter, Effect, Instance, Known, PostureSetting, Site, Structure,
+};
 use crate::parameter::{Parameter, Scale};
 use crate::robot::{Branch, Chain, Dual, Element, Place, Role, Slot};
 
 /// All foreign effects, each at its one site.
-pub const FOREIGN: [&dyn StructuralEffect; 4] = [
+pub const FOREIGN: [&dyn Effect<Structure>; 4] = [
     &ViscoelasticJoints,
     &BaseSliding,
     &CrossAxisLeak,
@@ -28,7 +30,7 @@ const FOREIGN_BACKGROUND: Background = Background {
 };
 
 /// The foreign effect of this id.
-pub fn find(id: &str) -> Option<Instance> {
+pub fn find(id: &str) -> Option<Instance<Structure>> {
     FOREIGN.into_iter().find(|e| e.id() == id).map(|effect| Instance {
         effect,
         site: Site::Everywhere,
@@ -37,7 +39,7 @@ pub fn find(id: &str) -> Option<Instance> {
 }
 
 /// A foreign effect drawn from a seed.
-pub fn any(seed: u64) -> &'static dyn StructuralEffect {
+pub fn any(seed: u64) -> &'static dyn Effect<Structure> {
     *Draws::new(seed, Purpose::Foreign).pick(&FOREIGN)
 }
 
@@ -62,7 +64,7 @@ fn parameter(
 /// that a joint is softer when moved slowly than when moved fast.
 struct ViscoelasticJoints;
 
-impl StructuralEffect for ViscoelasticJoints {
+impl Effect<Structure> for ViscoelasticJoints {
     fn id(&self) -> &'static str {
         "viscoelastic-joints"
     }
@@ -96,18 +98,14 @@ impl StructuralEffect for ViscoelasticJoints {
         }
     }
 
-    fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, _known: &Known<Structure>) -> Vec<Parameter> {
         vec![
             parameter("stiffness_ratio", "1", Scale::Logarithmic, 2.5, [0.05, 1e6]),
             parameter("relaxation_hz", "Hz", Scale::Logarithmic, 10.0, [0.1, 1e3]),
         ]
     }
 
-    fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
-        Vec::new()
-    }
-
-    fn apply(&self, _site: Site, _variant: usize, values: &[Dual], _setting: &Setting, chain: &mut Chain) {
+    fn apply(&self, _at: At, values: &[Dual], _setting: &PostureSetting, chain: &mut Chain) {
         let time_s = values[1].scale(std::f64::consts::TAU).recip();
         let creeping: Vec<Element> = chain
             .elements
@@ -132,7 +130,7 @@ impl StructuralEffect for ViscoelasticJoints {
 /// The pedestal slides along the base x and y axes on its fixing (the library's base only rocks).
 struct BaseSliding;
 
-impl StructuralEffect for BaseSliding {
+impl Effect<Structure> for BaseSliding {
     fn id(&self) -> &'static str {
         "base-sliding"
     }
@@ -163,7 +161,7 @@ impl StructuralEffect for BaseSliding {
         }
     }
 
-    fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, _known: &Known<Structure>) -> Vec<Parameter> {
         vec![parameter(
             "sliding_n_per_m",
             "N/m",
@@ -173,11 +171,7 @@ impl StructuralEffect for BaseSliding {
         )]
     }
 
-    fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
-        Vec::new()
-    }
-
-    fn apply(&self, _site: Site, _variant: usize, values: &[Dual], _setting: &Setting, chain: &mut Chain) {
+    fn apply(&self, _at: At, values: &[Dual], _setting: &PostureSetting, chain: &mut Chain) {
         chain.elements.push(Element {
             role: Role::Base,
             place: Place::new(0, Slot::Joint),
@@ -199,7 +193,7 @@ struct CrossAxisLeak;
 
 const LEAKS: [(&str, usize, usize); 3] = [("leak[0]", 0, 1), ("leak[1]", 0, 2), ("leak[2]", 1, 2)];
 
-impl StructuralEffect for CrossAxisLeak {
+impl Effect<Structure> for CrossAxisLeak {
     fn id(&self) -> &'static str {
         "cross-axis-leak"
     }
@@ -230,17 +224,13 @@ impl StructuralEffect for CrossAxisLeak {
         }
     }
 
-    fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, _known: &Known<Structure>) -> Vec<Parameter> {
         LEAKS
             .map(|(name, ..)| parameter(name, "1", Scale::Linear, 0.05, [-0.5, 0.5]))
             .to_vec()
     }
 
-    fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
-        Vec::new()
-    }
-
-    fn filter(&self, values: &[Dual], filter: &mut ChannelFilter) {
+    fn distort(&self, values: &[Dual], filter: &mut ChannelFilter) {
         let before = filter.mixing.clone();
         for ((_, i, j), share) in LEAKS.into_iter().zip(values) {
             for (into, from) in [(i, j), (j, i)] {
@@ -255,7 +245,7 @@ impl StructuralEffect for CrossAxisLeak {
 /// The tool gives way along its own axis (the library's only normal to it).
 struct ToolAxialFlexibility;
 
-impl StructuralEffect for ToolAxialFlexibility {
+impl Effect<Structure> for ToolAxialFlexibility {
     fn id(&self) -> &'static str {
         "tool-axial-flexibility"
     }
@@ -290,7 +280,7 @@ impl StructuralEffect for ToolAxialFlexibility {
         }
     }
 
-    fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, _known: &Known<Structure>) -> Vec<Parameter> {
         vec![
             parameter("mass_kg", "kg", Scale::Logarithmic, 5.0, [0.02, 300.0]),
             parameter("frequency_hz", "Hz", Scale::Logarithmic, 40.0, [1.0, 1e4]),
@@ -298,11 +288,7 @@ impl StructuralEffect for ToolAxialFlexibility {
         ]
     }
 
-    fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
-        Vec::new()
-    }
-
-    fn apply(&self, _site: Site, _variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {
+    fn apply(&self, _at: At, values: &[Dual], setting: &PostureSetting, chain: &mut Chain) {
         let omega = values[1].scale(std::f64::consts::TAU);
         let momentum = &values[0] * &omega;
         chain.branches.push(Branch {
@@ -335,13 +321,13 @@ mod tests {
         }
         let mut chain = model.chain(&kinematics, &baseline);
         if let Some(values) = viscoelastic {
-            let setting = Setting {
+            let setting = PostureSetting {
                 robot: &model,
                 kinematics: &kinematics,
                 lowness: 0.0,
             };
             let values = values.map(Dual::constant);
-            ViscoelasticJoints.apply(Site::Everywhere, 0, &values, &setting, &mut chain);
+            ViscoelasticJoints.apply(At::EVERYWHERE, &values, &setting, &mut chain);
         }
         let row = chain.output_row(kinematics.tcp(), model.flange_place(), true, &Vector3::y());
         let basis = FrfBasis::new(&chain.system(0), &[row]).unwrap();

@@ -3,7 +3,8 @@
 use super::draw::Draws;
 use super::foreign;
 use crate::data::RobotSpec;
-use crate::effects::{self, DataSummary, Instance, STRUCTURAL, Size};
+use crate::effects::Registry;
+use crate::effects::{DataSummary, Instance, Known, STRUCTURAL, Size, Structure};
 use crate::parameter::Parameter;
 use crate::simulate::sizes::magnitude;
 use crate::text::closest;
@@ -46,7 +47,7 @@ impl std::str::FromStr for EffectRequest {
 /// An effect with its values settled.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HiddenEffect {
-    pub instance: Instance,
+    pub instance: Instance<Structure>,
     /// Not in the library: the right verdict on it is `unknown`.
     pub foreign: bool,
     pub parameters: Vec<Parameter>,
@@ -110,19 +111,20 @@ impl EffectRequest {
     /// An effect, site or parameter that there is not; a value out of bounds; data that cannot show the effect.
     pub fn settle(&self, robot: &RobotSpec, data: &DataSummary, draws: &mut Draws) -> Result<HiddenEffect> {
         let (instance, foreign) = self.instance(robot, draws)?;
-        if let Some(obstacle) = instance.effect.obstacle(robot, data) {
+        let known = Known::robot(robot, *data);
+        if let Some(obstacle) = instance.effect.obstacle(&known) {
             return Err(self
                 .error(format!("this campaign cannot show it: {obstacle}"))
                 .remedy("for hammer levels give --force-levels 200,50; for postures --postures 6")
                 .into());
         }
-        let parameters = instance.effect.parameters(robot, data);
+        let parameters = instance.effect.parameters(instance.at(), &known);
         let mut values: Vec<f64> = parameters
             .iter()
             .map(|p| magnitude::drawn(instance.effect, p, draws))
             .collect();
         let mut given = vec![false; parameters.len()];
-        let choice = instance.effect.variant_label(0).map(|(key, _)| key);
+        let choice = instance.variant_label().map(|(key, _)| key);
         for (key, text) in self
             .values
             .iter()
@@ -161,7 +163,7 @@ impl EffectRequest {
         })
     }
 
-    fn instance(&self, robot: &RobotSpec, draws: &mut Draws) -> Result<(Instance, bool)> {
+    fn instance(&self, robot: &RobotSpec, draws: &mut Draws) -> Result<(Instance<Structure>, bool)> {
         if let Some(instance) = foreign::find(&self.effect) {
             return match &self.site {
                 None => Ok((instance, true)),
@@ -171,8 +173,9 @@ impl EffectRequest {
                     .into()),
             };
         }
-        let all = effects::instances(robot);
-        let of_effect: Vec<Instance> = all.into_iter().filter(|i| i.effect.id() == self.effect).collect();
+        let all = Registry::structure().instances(robot);
+        let of_effect: Vec<Instance<Structure>> =
+            all.into_iter().filter(|i| i.effect.id() == self.effect).collect();
         if of_effect.is_empty() {
             let known = STRUCTURAL.into_iter().chain(foreign::FOREIGN);
             let ids: Vec<&str> = known.map(|e| e.id()).collect();
@@ -180,12 +183,12 @@ impl EffectRequest {
                 .not_found("there is no such effect on this robot", &self.effect, &ids)
                 .into());
         }
-        let of_site: Vec<Instance> = match &self.site {
+        let of_site: Vec<Instance<Structure>> = match &self.site {
             None => of_effect,
             Some(site) => {
                 let mut sites: Vec<String> = of_effect.iter().filter_map(|i| i.site.label()).collect();
                 sites.dedup();
-                let found: Vec<Instance> = of_effect
+                let found: Vec<Instance<Structure>> = of_effect
                     .into_iter()
                     .filter(|i| i.site.label().as_deref() == Some(site))
                     .collect();
@@ -204,9 +207,9 @@ impl EffectRequest {
         };
         // A site is drawn first and a choice at it second, so that giving one does not change the other.
         let site = draws.pick(&of_site).site;
-        let at_site: Vec<Instance> = of_site.into_iter().filter(|i| i.site == site).collect();
+        let at_site: Vec<Instance<Structure>> = of_site.into_iter().filter(|i| i.site == site).collect();
         let drawn = *draws.pick(&at_site);
-        let label = |i: &Instance| i.effect.variant_label(i.variant);
+        let label = |i: &Instance<Structure>| i.variant_label();
         let asked = self
             .values
             .iter()

@@ -489,7 +489,7 @@ fn described(hidden: &HiddenEffect, seen: &Visibility) -> Value {
             }
         }
     }
-    if let Some((key, choice)) = hidden.instance.effect.variant_label(hidden.instance.variant) {
+    if let Some((key, choice)) = hidden.instance.variant_label() {
         parameters.insert(key.into(), json!(choice));
     }
     json!({

@@ -291,7 +291,7 @@ impl Dynamics {
 mod tests {
     use super::*;
     use crate::campaign::{AxesRef, BodyRef, MeasuredDof, MeasuredFrf, Point, RobotSection};
-    use crate::effects;
+    use crate::effects::Registry;
     use crate::robot::RobotModel;
     use crate::robot::fixture::{TAP_POSTURES, irb6640};
     use crate::simulate::Slip;
@@ -324,8 +324,8 @@ mod tests {
         let bare = StructureModel::new(RobotModel::new(irb6640()), points, &section);
         match effect {
             Some(name) => {
-                let instance = effects::find(&bare.robot.spec, name)[0];
-                bare.with_effect(instance, &data(&bare, &postures()).summary())
+                let instance = Registry::structure().find(&bare.robot.spec, name)[0];
+                bare.with_effect(instance, &bare.known(&data(&bare, &postures()).summary()))
             }
             None => bare,
         }

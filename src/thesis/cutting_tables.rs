@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::published::rows;
-use crate::cutting::{ChangeReading, CoefficientChange, Known, MILLING_COEFFICIENTS, table_trend};
+use crate::cutting::{ChangeReading, CoefficientChange, KnownValue, MILLING_COEFFICIENTS, table_trend};
 use crate::{Error, Result};
 
 const ACETAL: &str = include_str!("../../datasets/irb6640/cfc_acetal_milling.csv");
@@ -71,9 +71,9 @@ pub struct TableTrend {
     /// Its unit.
     pub unit: &'static str,
     /// At the geometric mean of the range.
-    pub value: Option<Known>,
+    pub value: Option<KnownValue>,
     /// Change per doubling of the speed.
-    pub per_doubling: Option<Known>,
+    pub per_doubling: Option<KnownValue>,
     /// Probability of so steep a line where there is no trend.
     pub p_value: Option<f64>,
     /// What may be read from it.
@@ -92,7 +92,7 @@ pub struct CoefficientDifference {
     /// Mean over the pairs, printed.
     pub printed_mean: f64,
     /// Mean over the pairs with its standard error.
-    pub difference: Known,
+    pub difference: KnownValue,
     /// Speeds at which both were cut.
     pub pairs: usize,
     /// Paired t test.
@@ -344,7 +344,7 @@ fn differences(table: &[CoefficientRow]) -> Vec<CoefficientDifference> {
             unit: kind.unit,
             cast_mean: pairs.iter().map(|p| p.0).sum::<f64>() / n,
             printed_mean: pairs.iter().map(|p| p.1).sum::<f64>() / n,
-            difference: Known {
+            difference: KnownValue {
                 value: mean,
                 std_error: Some(std_error),
             },

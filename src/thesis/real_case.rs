@@ -233,11 +233,7 @@ fn study(model: &StructureModel, widening: f64) -> Result<ResonanceStudy> {
         .iter()
         .map(|id| model.robot.kinematics(&posture_deg(id)?))
         .collect::<Result<_>>()?;
-    Ok(ResonanceStudy::new(
-        &model.robot.spec,
-        configurations,
-        resonances(widening)?,
-    ))
+    Ok(ResonanceStudy::new(configurations, resonances(widening)?))
 }
 
 /// Runs the loop on the tables, from the untuned `model`.

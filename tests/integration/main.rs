@@ -39,6 +39,7 @@ mod simulate;
 mod structure;
 mod support;
 mod sweep;
+mod third_domain;
 mod turning;
 mod waveform;
 mod where_it_fails;

@@ -6,7 +6,7 @@ use std::path::Path;
 use lobestone::campaign::{AxesRef, BodyRef, Campaign, MeasuredDof, MeasuredFrf, Point, Posture};
 use lobestone::discrepancy::outlook::next_measurement::advise;
 use lobestone::discrepancy::{Diagnosis, DiagnosisVerdict, NextMeasurement, diagnose};
-use lobestone::effects::{self, Instance};
+use lobestone::effects::{Registry, Structure};
 use lobestone::identify::{FrfData, Options, StructureCase, StructureModel, StructureStudy};
 use lobestone::ingest::Dof;
 use num_complex::Complex64;
@@ -25,7 +25,7 @@ struct Bench {
     rng: ChaCha8Rng,
 }
 
-type Found = Diagnosis<StructureModel, Instance>;
+type Found = Diagnosis<Structure>;
 
 impl Bench {
     fn simulate(folder: &Path, seed: u64, options: &[&str]) -> Self {
@@ -45,8 +45,7 @@ impl Bench {
     }
 
     fn diagnose(&self) -> Found {
-        let spec = &self.case.model.robot.spec;
-        let study = StructureStudy::new(spec, self.case.data.clone(), Options::default());
+        let study = StructureStudy::new(self.case.data.clone(), Options::default());
         diagnose(&study, &self.case.model).unwrap()
     }
 
@@ -68,14 +67,15 @@ impl Bench {
         let label = self.true_effect();
         let bare = &self.case.baseline;
         let given = &self.truth["parameters"];
-        let instance = effects::find(&bare.robot.spec, &label)
+        let instance = Registry::structure()
+            .find(&bare.robot.spec, &label)
             .into_iter()
             .find(|i| {
-                let choice = i.effect.variant_label(i.variant);
+                let choice = i.variant_label();
                 choice.is_none_or(|(key, value)| given[key] == value)
             })
             .unwrap();
-        let model = bare.with_effect(instance, &self.case.data.summary());
+        let model = bare.with_effect(instance, &bare.known(&self.case.data.summary()));
         let theta = model
             .parameters
             .iter()
@@ -98,7 +98,7 @@ impl Bench {
 
     /// Takes the advice: measures what it names, with the noise that all was measured with.
     fn take(&mut self, advice: &NextMeasurement) {
-        let (mut model, theta) = self.true_model();
+        let (model, theta) = self.true_model();
         for new in &advice.new_points {
             let body = match new.body.strip_prefix("link") {
                 Some(link) => BodyRef::Link(link.parse().unwrap()),
@@ -111,8 +111,8 @@ impl Bench {
                 axes: AxesRef::Base,
             });
         }
-        model.points.clone_from(&self.campaign.points);
         let points = self.campaign.points.clone();
+        let model = model.with_fixed(|fixed| fixed.points.clone_from(&points));
         let dof = |text: &str| {
             let dof: Dof = text.parse().unwrap();
             MeasuredDof {
@@ -164,7 +164,11 @@ impl Bench {
         }
         let frfs = self.frfs.clone();
         self.case.data = FrfData::new(&self.campaign.postures, &model.robot, frfs).unwrap();
-        self.case.model.points.clone_from(&self.campaign.points);
+        let points = &self.campaign.points;
+        self.case.model = self
+            .case
+            .model
+            .with_fixed(|fixed| fixed.points.clone_from(points));
     }
 
     fn noise(&mut self, magnitude: f64, harder: f64) -> Complex64 {

@@ -6,7 +6,7 @@ use std::path::Path;
 use lobestone::campaign::Campaign;
 use lobestone::discrepancy::extension::Extension;
 use lobestone::identify::frfs::calibrate::calibrate;
-use lobestone::identify::study::Study;
+use lobestone::identify::study::{InstanceOf, ModelOf, Study, vanishing_limit};
 use lobestone::identify::{
     Calibration, CuttingCase, CuttingStudy, FrfData, Options, StructureCase, StructureStudy,
 };
@@ -40,9 +40,9 @@ fn thinned(case: &StructureCase, values: usize) -> FrfData {
 }
 
 /// Every effect at every site, added to the bare model: χ² after against χ² before.
-fn no_effect_fits_worse<S: Study>(study: &S, model: &S::Model, name: &str) {
+fn no_effect_fits_worse<S: Study>(study: &S, model: &ModelOf<S>, name: &str) {
     let (instances, _) = study.instances(model);
-    let label = |i: &S::Instance| study.name(i).label();
+    let label = |i: &InstanceOf<S>| i.name().label();
     for of_label in instances.chunk_by(|a, b| label(a) == label(b)) {
         let extension = Extension::new(study, model, of_label).unwrap();
         let chi2 = |r: &lobestone::identify::study::Residual| r.chi2_per_value;
@@ -53,7 +53,7 @@ fn no_effect_fits_worse<S: Study>(study: &S, model: &S::Model, name: &str) {
             label(&of_label[0])
         );
         // The limit is one: a model that stands there predicts what the model without the effect predicts.
-        let limit = study.vanishing(&extension.after.model).unwrap();
+        let limit = vanishing_limit(&extension.after.model).unwrap();
         let at_limit = [extension.before.calibration.theta.as_slice(), &limit].concat();
         let there = chi2(&study.residual(&extension.after.model, &at_limit).unwrap());
         assert!(
@@ -71,7 +71,7 @@ fn structure_never_worse(name: &str, values: usize) {
         extra_starts: 0,
         ..Options::default()
     };
-    let study = StructureStudy::new(&case.model.robot.spec, data, options);
+    let study = StructureStudy::new(data, options);
     no_effect_fits_worse(&study, &case.model, name);
 }
 

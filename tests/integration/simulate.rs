@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use lobestone::campaign::Campaign;
-use lobestone::effects::{self, STRUCTURAL};
+use lobestone::effects::{Registry, STRUCTURAL};
 use lobestone::identify::StructureCase;
 use serde_json::Value;
 
@@ -194,16 +194,17 @@ fn chi2_per_value(cell: &Simulated) -> f64 {
             Some(site) => format!("{effect}@{site}"),
             None => effect.to_string(),
         };
-        let instance = effects::find(&model.robot.spec, &name)
+        let instance = Registry::structure()
+            .find(&model.robot.spec, &name)
             .into_iter()
             .find(|i| {
-                let label = i.effect.variant_label(i.variant);
+                let label = i.variant_label();
                 label.is_none_or(|(key, value)| truth["parameters"][key] == value)
             })
             .unwrap();
-        let own = instance.effect.parameters(&model.robot.spec, &summary);
+        let own = instance.effect.parameters(instance.at(), &model.known(&summary));
         values.extend(own.iter().map(|p| parameter(&truth, &p.name)));
-        model = model.with_effect(instance, &summary);
+        model = model.with_effect(instance, &model.known(&summary));
     }
     let theta: Vec<f64> = model
         .parameters

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::support::{blind, document, truth};
 use lobestone::campaign::Campaign;
 use lobestone::discrepancy::{CuttingComparison, DiagnosisVerdict};
-use lobestone::effects::cutting::{CuttingInstance, find, instances};
+use lobestone::effects::{Cutting, Instance, Known, Registry};
 use lobestone::identify::forces::cutting_data::processes;
 use lobestone::identify::forces::cutting_study::calibrate_cutting;
 use lobestone::identify::forces::off_comb::{OffComb, VibrationLine};
@@ -26,13 +26,12 @@ fn extended(
     base: &CuttingModel,
     data: &CuttingData,
     theta: &[f64],
-    instance: CuttingInstance,
+    instance: Instance<Cutting>,
 ) -> Option<(CuttingModel, Fit)> {
-    let model = base.with_effect(instance, data);
+    let model = base.with_effect(instance, &base.known(data));
     let own = base.parameters.len();
-    let summary = base.summary(data);
     let mut starts = vec![model.nominal_theta()[own..].to_vec()];
-    for natural in instance.effect.starts(instance.variant, &summary) {
+    for natural in instance.effect.starts(instance.at(), &base.known(data), &[]) {
         starts.push(
             model.parameters[own..]
                 .iter()
@@ -148,7 +147,7 @@ fn with_vibration(data: &CuttingData) -> CuttingData {
         *cut = std::sync::Arc::new(own);
     }
     let base = CuttingModel::new(&data, true).unwrap();
-    let model = base.with_effect(find("chatter")[0], &data);
+    let model = base.with_effect(Registry::cutting().find(&(), "chatter")[0], &base.known(&data));
     let fits = CuttingProblem {
         model: &model,
         data: &data,
@@ -176,7 +175,7 @@ fn gradients_of_all_effects_equal_differences() {
     for name in ["force-9400", "force-9439"] {
         let (plain, _) = loaded(name);
         let plain = plain.filtered(|i| i < 4);
-        for instance in instances() {
+        for instance in Registry::cutting().instances(&()) {
             let chatter = instance.label() == "chatter";
             let data = if chatter {
                 with_vibration(&plain)
@@ -189,10 +188,10 @@ fn gradients_of_all_effects_equal_differences() {
             (summary.sequence_length, summary.feeds) = (4, 4);
             (summary.full_holes, summary.pilot_holes) = (2, 2);
             summary.speed_m_per_min = [50.0, 90.0];
-            if instance.effect.obstacle(&summary).is_some() {
+            if instance.effect.obstacle(&Known::cuts(summary.clone())).is_some() {
                 continue;
             }
-            let model = base.with_effect(instance, &data);
+            let model = base.with_effect(instance, &base.known(&data));
             let problem = CuttingProblem {
                 model: &model,
                 data: &data,
@@ -392,8 +391,8 @@ fn report(name: &str, dir: &Path) {
     println!("   chi2/n by cut {}", worst.join(" "));
     let summary = base.summary(&data);
     let mut rows = Vec::new();
-    for instance in instances() {
-        if let Some(why) = instance.effect.obstacle(&summary) {
+    for instance in Registry::cutting().instances(&()) {
+        if let Some(why) = instance.effect.obstacle(&Known::cuts(summary.clone())) {
             println!("   {:26} not tried: {why}", format!("{instance:?}"));
             continue;
         }

@@ -3,15 +3,15 @@
 use rayon::prelude::*;
 
 use crate::analysis::forces::force_records::read_in_step;
+use crate::analysis::grown::with_revision;
 use crate::analysis::workbench::Workbench;
 use crate::campaign::{Campaign, Process, Tool};
 use crate::cutting::{InStep, Notice, of_notices};
-use crate::effects::cutting;
+use crate::effects::Registry;
 use crate::identify::forces::cutting_data::{CutData, processes};
-use crate::identify::model_history::{Domain, Revision, recorded_cutting_effect};
-use crate::identify::{CuttingCase, CuttingData, CuttingModel};
+use crate::identify::model_history::Side;
+use crate::identify::{Case, CuttingCase, CuttingData, CuttingModel};
 use crate::progress::Progress;
-use crate::revision::log_file;
 use crate::{Error, InputError, Result};
 
 fn material(campaign: &Campaign, cut: usize) -> &str {
@@ -71,36 +71,15 @@ impl CuttingCase {
             let name = other.name();
             warnings.push(format!("the {name} cuts are not compared: one process at a time"));
         }
+        let baseline = CuttingModel::new(&data, true)?;
+        let mut case = Case::without_history(baseline, data, warnings);
         let log = campaign.revisions()?;
-        let revisions: Vec<Revision> = log.revisions(Domain::Cutting).cloned().collect();
-        let mut model = CuttingModel::new(&data, true)?;
-        if let Some(current) = revisions.last() {
-            for (i, recorded) in current.effects.iter().enumerate() {
-                let instance = cutting::find(&recorded.effect)
-                    .into_iter()
-                    .find(|instance| recorded_cutting_effect(instance) == *recorded)
-                    .ok_or_else(|| {
-                        InputError::new(format!("there is no cutting effect {}", recorded.effect))
-                            .file(log_file(&campaign.dir))
-                            .key(format!("revisions[{}].effects[{i}]", current.revision))
-                            .remedy("undo the revision with `lobestone undo DIR`")
-                    })?;
-                model = model.with_effect(instance, &data);
-            }
-            let start = model.parameters.iter().map(|parameter| {
-                let known = current.parameters.iter().find(|r| r.name == parameter.name);
-                let value = known.map_or(parameter.nominal, |r| r.value);
-                parameter.internal(value)
-            });
-            let start = start.collect();
-            model = model.with_start(start);
+        case.revisions = log.revisions(Side::Cutting).cloned().collect();
+        if let Some(current) = case.revisions.last() {
+            let known = case.baseline.known(&case.data);
+            case.model = with_revision(campaign, &Registry::cutting(), &case.baseline, &known, current)?;
         }
-        Ok(CuttingCase {
-            model,
-            data,
-            revisions,
-            warnings,
-        })
+        Ok(case)
     }
 }
 

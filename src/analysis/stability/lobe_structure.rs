@@ -22,7 +22,7 @@ use crate::{InputError, Result};
 const FACE_OFF_M: f64 = 0.01;
 
 /// One structure that lobes are drawn for.
-pub(crate) struct Structure {
+pub(crate) struct LobeStructure {
     pub posture: Option<String>,
     pub dynamics: Dynamics,
     /// The same before effects were added.
@@ -56,7 +56,7 @@ impl Dynamics {
     }
 }
 
-impl Structure {
+impl LobeStructure {
     /// The cut on the structure as drawn from its uncertainty; empty where that is not known.
     pub fn drawn(&self, cut: &LobeCut) -> Vec<BlockSolver<'_>> {
         match cut {
@@ -119,7 +119,7 @@ pub(crate) fn from_modes(
     campaign: &Campaign,
     section: &LobesSection,
     asked: &Asked,
-) -> Result<Vec<Structure>> {
+) -> Result<Vec<LobeStructure>> {
     let modes = modes_of_table(campaign, section)?;
     let count = modes.lateral.modes().len();
     let along = section.modes.len() - count;
@@ -144,7 +144,7 @@ pub(crate) fn from_modes(
         };
         point.blocks(asked.axial)
     };
-    Ok(vec![Structure {
+    Ok(vec![LobeStructure {
         posture: None,
         dynamics: Dynamics { blocks, states },
         before: None,
@@ -164,14 +164,14 @@ pub(crate) fn at_postures(
     section: &LobesSection,
     state: &ModelState,
     check: Option<&HoleCheck>,
-) -> Result<Vec<Structure>> {
+) -> Result<Vec<LobeStructure>> {
     campaign
         .postures
         .iter()
         .map(|posture| {
             let (joints, through_time) = (&posture.joints_deg, steps_through_time(section));
             let before = state.before.as_ref();
-            Ok(Structure {
+            Ok(LobeStructure {
                 posture: Some(posture.id.clone()),
                 dynamics: state.dynamics(&state.current, joints, through_time)?,
                 before: before
@@ -190,7 +190,7 @@ pub(crate) fn from_measured(
     section: &LobesSection,
     asked: &Asked,
     warnings: &mut Vec<String>,
-) -> Result<Vec<Structure>> {
+) -> Result<Vec<LobeStructure>> {
     if steps_through_time(section) {
         return Err(InputError::new("semi-discretisation needs modes, and measured FRFs are none")
             .file(campaign.dir.join("campaign.toml"))
@@ -253,7 +253,7 @@ pub(crate) fn from_measured(
                         .map(|frf| Box::new(frf) as Box<dyn DirectFrf>),
                 }
             };
-            Ok(Structure {
+            Ok(LobeStructure {
                 posture: Some(posture.id.clone()),
                 dynamics: Dynamics { blocks, states: None },
                 before: None,

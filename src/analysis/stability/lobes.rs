@@ -7,7 +7,7 @@ pub use crate::analysis::stability::lobe_case::{BEST, LobeCase, LobesBefore};
 use crate::analysis::stability::lobe_model::{Asked, ModelState};
 use crate::analysis::stability::lobe_setup::{coefficients_of_group, cut_of, group_of_cuts};
 use crate::analysis::stability::lobe_structure::{
-    Structure, at_postures, from_measured, from_modes, steps_through_time,
+    LobeStructure, at_postures, from_measured, from_modes, steps_through_time,
 };
 use crate::analysis::stability::noted_cuts::noted_cuts;
 use crate::analysis::stability::redundancy::{self, RedundancyAnalysis};
@@ -147,7 +147,7 @@ impl LobeAnalysis {
             .collect();
         let standing: Vec<(Option<String>, Vec<LimitRange>)> = as_they_stand
             .into_iter()
-            .map(|s: Structure| (s.posture.clone(), s.at_cuts(&cut, &noted, &s.drawn(&cut))))
+            .map(|s: LobeStructure| (s.posture.clone(), s.at_cuts(&cut, &noted, &s.drawn(&cut))))
             .collect();
         let limits: Vec<(Option<&str>, &[LimitRange])> = match redundancy {
             Some(_) => standing.iter().map(|(p, at)| (p.as_deref(), &at[..])).collect(),

@@ -15,7 +15,7 @@ use crate::lobes::workspace::{PlaceStatus, Workspace};
 use crate::lobes::workspace_grid::{GridPlace, Span, WorkspaceGrid};
 use crate::lobes::{AbsoluteLimit, AveragedCut, SpeedLimit};
 use crate::progress::Progress;
-use crate::revision::Domain;
+use crate::revision::Side;
 use crate::robot::{IkSolution, RobotModel};
 use crate::{InputError, Result};
 
@@ -149,7 +149,7 @@ impl Sweep {
         let spindle_rpm = [section.spindle_rpm[0], section.spindle_rpm[1]];
         let settings = serde_json::json!({
             "program": concat!("lobestone ", env!("CARGO_PKG_VERSION")),
-            "data": campaign.fingerprint(Domain::Structure)?,
+            "data": campaign.fingerprint(Side::Structure)?,
             "robot": campaign.robot.as_ref().map(|r| &r.model),
             "effects": state.effects,
             "revision": state.revision,

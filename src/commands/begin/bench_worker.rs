@@ -22,7 +22,7 @@ use crate::identify::Options;
 use crate::progress::{Gauge, Reading, shown_on};
 use crate::report::campaign as pages;
 use crate::report::sections::{diagnosis_section, waveform_section};
-use crate::revision::{Domain, RecordedEffect, RevisionLog, fingerprint, log_file};
+use crate::revision::{RecordedEffect, RevisionLog, Side, fingerprint, log_file};
 use crate::serve::{JobStage, PageOrder, Refusal, locked};
 use crate::{Error, InputError, Result};
 
@@ -47,7 +47,7 @@ pub struct Answer {
 /// A diagnosis, for as long as data and model are those that it was made of; also if they come back by an undo.
 #[derive(Clone, Serialize, Deserialize)]
 pub struct Diagnosed {
-    pub side: Domain,
+    pub side: Side,
     pub of: BenchModel,
     pub document: Value,
     /// The verdict in plain words.
@@ -63,7 +63,7 @@ pub struct Drawn {
     /// What the report lacks, and why.
     pub problems: Vec<String>,
     /// Error and noise, side by side.
-    pub now: Vec<(Domain, Value)>,
+    pub now: Vec<(Side, Value)>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -166,7 +166,7 @@ struct Worker {
 }
 
 struct Known {
-    side: Domain,
+    side: Side,
     of: BenchModel,
     /// Lent to the report while that is drawn.
     findings: Option<Findings>,
@@ -247,17 +247,17 @@ fn plain(text: &str) -> String {
 }
 
 /// The sides that a campaign holds.
-pub fn sides(campaign: &Campaign) -> Vec<Domain> {
+pub fn sides(campaign: &Campaign) -> Vec<Side> {
     let structure = !campaign.frfs.is_empty() && campaign.robot.is_some();
     let cutting = !campaign.cuts.is_empty();
-    let all = [(structure, Domain::Structure), (cutting, Domain::Cutting)];
+    let all = [(structure, Side::Structure), (cutting, Side::Cutting)];
     all.into_iter()
         .filter(|(there, _)| *there)
         .map(|(_, side)| side)
         .collect()
 }
 
-pub fn model_state(campaign: &Campaign, log: &RevisionLog, side: Domain) -> Result<BenchModel> {
+pub fn model_state(campaign: &Campaign, log: &RevisionLog, side: Side) -> Result<BenchModel> {
     let effects = log.current(side).map(|r| r.effects.clone());
     Ok((fingerprint(campaign, side)?, effects.unwrap_or_default()))
 }
@@ -300,7 +300,7 @@ pub fn stays_inside(dir: &Path) -> Result<()> {
 }
 
 /// The log, if one side of it still is what the page showed.
-pub fn log_at(dir: &Path, side: Domain, head: &str) -> std::result::Result<RevisionLog, Refusal> {
+pub fn log_at(dir: &Path, side: Side, head: &str) -> std::result::Result<RevisionLog, Refusal> {
     stays_inside(dir)?;
     let log = RevisionLog::load(dir)?;
     match log.mark(side) == head {
@@ -337,13 +337,13 @@ impl Worker {
         })
     }
 
-    fn diagnose(&mut self, side: Domain, teller: &Teller) -> Result<Answer> {
+    fn diagnose(&mut self, side: Side, teller: &Teller) -> Result<Answer> {
         let campaign = Campaign::load(&self.dir)?;
         let of = model_state(&campaign, &RevisionLog::load(&self.dir)?, side)?;
         let bench = Workbench::new(&campaign);
         teller.now("looking for what is missing");
         let (Outcome { json, text, .. }, answer, findings) = match side {
-            Domain::Structure => {
+            Side::Structure => {
                 let found = Box::new(DiagnosisFindings::on(&bench, Options::default())?);
                 let outcome = diagnose::structure(&campaign, &found);
                 (
@@ -352,8 +352,8 @@ impl Worker {
                     Findings::Structure(found),
                 )
             }
-            Domain::Cutting => {
-                let found = Box::new(CuttingFindings::on(&bench)?);
+            Side::Cutting => {
+                let found = Box::new(CuttingFindings::on(&bench, Options::default())?);
                 let outcome = diagnose::cutting(&campaign, &found);
                 (
                     outcome,
@@ -433,12 +433,12 @@ impl Worker {
             .collect();
         for (side, of) in lent {
             let back = match side {
-                Domain::Structure => findings
+                Side::Structure => findings
                     .diagnosis
                     .take()
                     .and_then(Result::ok)
                     .map(|f| Findings::Structure(Box::new(f))),
-                Domain::Cutting => findings
+                Side::Cutting => findings
                     .cutting_diagnosis
                     .take()
                     .and_then(Result::ok)
@@ -455,7 +455,7 @@ impl Worker {
     }
 
     /// What is known of a side in a state.
-    fn known<T>(&mut self, side: Domain, of: &BenchModel, look: impl FnOnce(&mut Known) -> T) -> Option<T> {
+    fn known<T>(&mut self, side: Side, of: &BenchModel, look: impl FnOnce(&mut Known) -> T) -> Option<T> {
         let known = self.known.iter_mut().find(|k| k.side == side && k.of == *of);
         known.map(look)
     }
@@ -466,14 +466,14 @@ fn error_now(
     campaign: &Campaign,
     log: &RevisionLog,
     findings: &CampaignFindings,
-    side: Domain,
+    side: Side,
 ) -> Option<Value> {
     let (totals, held_out_nrms) = match side {
-        Domain::Structure => {
+        Side::Structure => {
             let structure = findings.structure()?;
             (structure.analysis.after.totals, structure.held_out_nrms)
         }
-        Domain::Cutting => match findings.cutting_diagnosis() {
+        Side::Cutting => match findings.cutting_diagnosis() {
             Some(found) => {
                 let held_out = &found.diagnosis.baseline.held_out;
                 (found.now.comparison.totals, held_out.as_ref().map(|h| h.nrms()))

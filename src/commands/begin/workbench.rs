@@ -1,6 +1,7 @@
 //! A campaign as the page of `serve` works on it: the documents and texts are those of the commands of the same names. What
 //! takes long a worker does (`bench_worker`).
 
+use crate::effects::Registry;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -14,7 +15,7 @@ use crate::commands::begin::bench_worker::{
 };
 use crate::commands::find::explain;
 use crate::commands::grow::history;
-use crate::revision::{Domain, RevisionLog, hold};
+use crate::revision::{RevisionLog, Side, hold};
 use crate::robot::RobotSpec;
 use crate::serve::{Job, JobStage, PageOrder, PageSubject, Refusal, Report, locked};
 use crate::{Error, Result};
@@ -38,7 +39,7 @@ struct Found {
     drawn_of: Option<String>,
     problems: Vec<String>,
     /// The model as it stands then, side by side.
-    now: Vec<(Domain, Value)>,
+    now: Vec<(Side, Value)>,
     /// Oldest first.
     diagnoses: Vec<Diagnosed>,
 }
@@ -141,7 +142,7 @@ impl CampaignBench {
         answer.text.map_err(Error::Computation)
     }
 
-    fn side_document(&self, campaign: &Campaign, log: &RevisionLog, side: Domain) -> Result<Value> {
+    fn side_document(&self, campaign: &Campaign, log: &RevisionLog, side: Side) -> Result<Value> {
         let of = model_state(campaign, log, side)?;
         let found = self.found();
         let diagnosis = found
@@ -210,8 +211,8 @@ impl PageSubject for CampaignBench {
             PageOrder::Diagnose { .. } => "the diagnosis".into(),
             PageOrder::Add { side, head, effect } => {
                 log_at(&self.dir, *side, head)?;
-                let cutting = !crate::effects::cutting::find(effect).is_empty();
-                if cutting != (*side == Domain::Cutting) {
+                let cutting = !Registry::cutting().find(&(), effect).is_empty();
+                if cutting != (*side == Side::Cutting) {
                     return Err(Refusal::Impossible(format!(
                         "\"{effect}\" is no effect of this side of the campaign"
                     )));

@@ -1,7 +1,8 @@
+use crate::identify::Modelled;
 use serde_json::{Map, Value, json};
 
 use crate::Result;
-use crate::analysis::{CuttingFindings, DiagnosisFindings, Workbench};
+use crate::analysis::{CampaignSide, CuttingFindings, DiagnosisFindings, Findings, Workbench};
 use crate::campaign::Campaign;
 use crate::commands::find::localise;
 use crate::commands::next_step::Guide;
@@ -19,40 +20,60 @@ pub fn run(args: SideArgs) -> Result<Outcome> {
     by_domain(
         &campaign,
         args.domain,
-        |c| {
-            let bench = Workbench::new(c);
-            let found = DiagnosisFindings::on(&bench, Options::default())?;
-            // A folder that cannot be written to is no reason not to answer.
-            let _ = found.keep(&bench);
-            Ok(structure(c, &found))
-        },
-        |c| {
-            let bench = Workbench::new(c);
-            let found = CuttingFindings::on(&bench)?;
-            let _ = found.keep(&bench);
-            Ok(cutting(c, &found))
-        },
+        |c| Ok(structure(c, &diagnosed(c)?)),
+        |c| Ok(cutting(c, &diagnosed(c)?)),
     )
+}
+
+/// The diagnosis of one side, kept for `add`.
+fn diagnosed<D: CampaignSide>(campaign: &Campaign) -> Result<Findings<D>> {
+    let bench = Workbench::new(campaign);
+    let found = Findings::on(&bench, Options::default())?;
+    // A folder that cannot be written to is no reason not to answer.
+    let _ = found.keep(&bench);
+    Ok(found)
 }
 
 /// What was found out about the force records.
 pub fn cutting(campaign: &Campaign, findings: &CuttingFindings) -> Outcome {
-    let CuttingFindings {
+    let own = json!({
+        "process": findings.case.data.process,
+        "lead": findings.lead,
+    });
+    let told = findings.lead.as_ref().map_or(String::new(), lines_in_words);
+    outcome(Guide::cutting(campaign), findings, own, &told)
+}
+
+/// What was found out about the FRFs.
+pub fn structure(campaign: &Campaign, findings: &DiagnosisFindings) -> Outcome {
+    let peaks = &findings.now.residual_peaks;
+    let own = json!({
+        "explains": explains(findings),
+        "residual_peaks_hz": peaks.iter().map(|p| p.frequency_hz).collect::<Vec<_>>(),
+        "residual_peaks": peaks,
+        "lead": findings.lead.as_ref().map(lead),
+    });
+    let told = crate::commands::find::compare::dominant(peaks) + &where_it_shows(findings);
+    outcome(Guide::structure(campaign), findings, own, &told)
+}
+
+/// What both sides say alike; `own`: keys of this side alone, `told`: its own words.
+fn outcome<D: CampaignSide>(guide: Guide<'_>, findings: &Findings<D>, own: Value, told: &str) -> Outcome {
+    let Findings {
         case,
         diagnosis: d,
         next_measurement,
-        now,
+        setup,
         ..
     } = findings;
-    let noise_floor_nrms = now.comparison.totals.noise_floor_nrms;
-    let json = json!({
-        "domain": "cutting",
-        "process": case.data.process,
+    let noise_floor_nrms = D::totals(&findings.now).noise_floor_nrms;
+    let mut json = json!({
+        "domain": D::SIDE,
         "revision": case.revision(),
         "effects": case.effects(),
         "verdict": d.verdict,
         "effect": d.winner().map(|c| &c.name.effect),
-        "site": Value::Null,
+        "site": d.winner().and_then(|c| c.name.site.as_ref()),
         "confidence": d.confidence,
         "too_little_data": d.too_little_data,
         "pairs": d.pairs.map(|[tried, of]| json!({ "tried": tried, "of": of })),
@@ -66,25 +87,21 @@ pub fn cutting(campaign: &Campaign, findings: &CuttingFindings) -> Outcome {
         "next_measurement": next_measurement,
         "baseline": baseline(&d.baseline, noise_floor_nrms),
         "not_tried": d.not_tried.iter().map(|(e, why)| json!({ "effect": e, "why": why })).collect::<Vec<_>>(),
-        "setup": findings.setup.findings,
-        "lead": findings.lead,
+        "setup": setup.findings,
         "warnings": case.warnings,
     });
-    let added = case.effects();
-    let mut text = setup_lines(&findings.setup.findings);
-    text += &format!(
-        "model: baseline{}\n",
-        added.iter().map(|e| format!(" + {e}")).collect::<String>()
-    );
-    text += &as_it_stands(&d.baseline, noise_floor_nrms);
-    text += &answer(d, |c| {
-        (c.instance.effect.explanation(), c.instance.effect.fingerprint())
-    });
-    text += &findings.lead.as_ref().map_or(String::new(), lines_in_words);
-    text += &rest(d, next_measurement);
-    text += &warnings(&case.warnings);
+    if let (Some(all), Value::Object(own)) = (json.as_object_mut(), own) {
+        all.extend(own);
+    }
+    let text = setup_lines(&setup.findings)
+        + &format!("model: {}\n", case.model_description())
+        + &as_it_stands(&d.baseline, noise_floor_nrms)
+        + &answer(d)
+        + told
+        + &rest(d, next_measurement)
+        + &warnings(&case.warnings);
     let winner = d.winner().map(EffectCandidate::label);
-    let next = Guide::cutting(campaign).diagnosed(d.verdict, winner.as_deref(), &next_measurement.what);
+    let next = guide.diagnosed(d.verdict, winner.as_deref(), &next_measurement.what);
     Outcome::new(json, text, Some(next))
 }
 
@@ -124,53 +141,8 @@ fn baseline(b: &BaselineFit, noise_floor_nrms: f64) -> Value {
     })
 }
 
-/// What was found out about the FRFs.
-pub fn structure(campaign: &Campaign, findings: &DiagnosisFindings) -> Outcome {
-    let DiagnosisFindings {
-        case,
-        diagnosis,
-        next_measurement,
-        ..
-    } = findings;
-    let json = json!({
-        "domain": "structure",
-        "revision": case.revision(),
-        "effects": case.effects(),
-        "verdict": diagnosis.verdict,
-        "effect": diagnosis.winner().map(|c| &c.name.effect),
-        "site": diagnosis.winner().and_then(|c| c.name.site.as_ref()),
-        "confidence": diagnosis.confidence,
-        "too_little_data": diagnosis.too_little_data,
-        "pairs": diagnosis.pairs.map(|[tried, of]| json!({ "tried": tried, "of": of })),
-        "companion": diagnosis.companion,
-        "best_guess": diagnosis.best_guess.map(|i| diagnosis.candidates[i].label()),
-        "explained_share": explained_share(diagnosis).map(|[share, _]| share),
-        "explained_share_std_error": explained_share(diagnosis).map(|[_, std]| std),
-        "rest": left_over(diagnosis),
-        "candidates": diagnosis.candidates.iter().map(candidate).collect::<Vec<_>>(),
-        "indistinguishable": diagnosis.indistinguishable,
-        "explains": explains(findings),
-        "residual_peaks_hz": findings.residual_peaks.iter().map(|p| p.frequency_hz).collect::<Vec<_>>(),
-        "residual_peaks": findings.residual_peaks,
-        "next_measurement": next_measurement,
-        "baseline": baseline(&diagnosis.baseline, case.data.noise_floor_nrms()),
-        "not_tried": diagnosis.not_tried.iter().map(|(e, why)| json!({ "effect": e, "why": why })).collect::<Vec<_>>(),
-        "setup": findings.setup.findings,
-        "lead": findings.lead.as_ref().map(lead),
-        "warnings": case.warnings,
-    });
-    let text = setup_lines(&findings.setup.findings)
-        + &format!("model: {}\n", case.model_description())
-        + &describe(findings)
-        + &warnings(&case.warnings);
-    let winner = diagnosis.winner().map(EffectCandidate::label);
-    let next =
-        Guide::structure(campaign).diagnosed(diagnosis.verdict, winner.as_deref(), &next_measurement.what);
-    Outcome::new(json, text, Some(next))
-}
-
 /// The effect's own parameters by the keys of docs/json.md; `name[0]`, `name[1]`, … become one list.
-fn parameters<M, I>(candidate: &EffectCandidate<M, I>) -> Value {
+fn parameters<D: Modelled>(candidate: &EffectCandidate<D>) -> Value {
     let mut map = Map::new();
     for p in &candidate.parameters {
         let key = p.name.rsplit('.').next().unwrap_or(&p.name);
@@ -192,7 +164,7 @@ fn parameters<M, I>(candidate: &EffectCandidate<M, I>) -> Value {
     map.into()
 }
 
-fn candidate<M, I>(c: &EffectCandidate<M, I>) -> Value {
+fn candidate<D: Modelled>(c: &EffectCandidate<D>) -> Value {
     json!({
         "effect": c.name.effect,
         "site": c.name.site,
@@ -212,20 +184,20 @@ fn candidate<M, I>(c: &EffectCandidate<M, I>) -> Value {
 }
 
 /// The candidate that the verdict names, or the best of the library where it names none.
-fn spoken_of<M, I>(d: &Diagnosis<M, I>) -> Option<&EffectCandidate<M, I>> {
+fn spoken_of<D: Modelled>(d: &Diagnosis<D>) -> Option<&EffectCandidate<D>> {
     let candidate = d.effect.or(d.best_guess)?;
     d.candidates.get(candidate)
 }
 
 /// Share of what stands above the noise that the verdict's effect (or the best guess) explains, and its standard deviation.
-fn explained_share<M, I>(d: &Diagnosis<M, I>) -> Option<[f64; 2]> {
+fn explained_share<D: Modelled>(d: &Diagnosis<D>) -> Option<[f64; 2]> {
     spoken_of(d)
         .filter(|_| d.companion.is_none())
         .and_then(EffectCandidate::explained_share)
 }
 
 /// What is left: of the best candidate, of the model as it stands where nothing is said to be missing.
-fn left_over<M, I>(d: &Diagnosis<M, I>) -> Value {
+fn left_over<D: Modelled>(d: &Diagnosis<D>) -> Value {
     let (rest, gain) = match spoken_of(d).and_then(|c| Some((c.rest.as_ref()?, c.gain))) {
         Some((rest, gain)) => (rest, gain),
         None => (&d.baseline.rest, 0.0),
@@ -277,20 +249,11 @@ fn explains(findings: &DiagnosisFindings) -> Value {
     json
 }
 
-fn describe(findings: &DiagnosisFindings) -> String {
-    let DiagnosisFindings {
-        case,
-        diagnosis: d,
-        next_measurement,
-        ..
-    } = findings;
-    let mut text = as_it_stands(&d.baseline, case.data.noise_floor_nrms());
-    text += &answer(d, |c| {
-        (c.instance.effect.explanation(), c.instance.effect.fingerprint())
-    });
-    text += &crate::commands::find::compare::dominant(&findings.residual_peaks);
+/// What the best candidate takes away, and where; and what the data draw where there is no name for it.
+fn where_it_shows(findings: &DiagnosisFindings) -> String {
+    let mut text = String::new();
     if let (Some(leading), Some(candidate)) = (&findings.leading, findings.leader()) {
-        let who = match d.verdict {
+        let who = match findings.diagnosis.verdict {
             DiagnosisVerdict::Unknown => format!("The best candidate, {},", candidate.label()),
             _ => "It".into(),
         };
@@ -305,7 +268,7 @@ fn describe(findings: &DiagnosisFindings) -> String {
             "  ",
         );
     }
-    text + &rest(d, next_measurement)
+    text
 }
 
 /// The best place of what the data draw.
@@ -322,15 +285,12 @@ fn as_it_stands(baseline: &BaselineFit, noise_floor_nrms: f64) -> String {
     )
 }
 
-/// The verdict; `plainly` gives an effect's explanation and its fingerprint.
-fn answer<M, I>(
-    d: &Diagnosis<M, I>,
-    plainly: impl Fn(&EffectCandidate<M, I>) -> (&'static str, &'static str),
-) -> String {
+/// The verdict.
+fn answer<D: Modelled>(d: &Diagnosis<D>) -> String {
     let sure = format!("confidence {:.0} %", 100.0 * d.confidence);
     match (d.verdict, d.winner()) {
         (DiagnosisVerdict::Effect, Some(winner)) => {
-            let (explanation, fingerprint) = plainly(winner);
+            let effect = winner.instance.effect;
             let excuse = winner.rest.as_ref().and_then(Rest::excuse_in_words);
             let left = excuse.map_or(String::new(), |left| {
                 let share = 100.0 * winner.share_above_noise(&d.baseline);
@@ -344,8 +304,8 @@ fn answer<M, I>(
             format!(
                 "{} ({sure})\n{}{}{left}",
                 Emphasis::Strong.on(format!("MISSING: {}", winner.label())),
-                wrapped(explanation, "  "),
-                wrapped(&format!("How it shows: {fingerprint}"), "  "),
+                wrapped(effect.explanation(), "  "),
+                wrapped(&format!("How it shows: {}", effect.fingerprint()), "  "),
             )
         }
         (DiagnosisVerdict::None, _) => match d.baseline.rest.excuse_in_words() {
@@ -377,7 +337,7 @@ fn answer<M, I>(
 }
 
 /// Rivals, candidates and what to do next.
-fn rest<M, I>(d: &Diagnosis<M, I>, next_measurement: &NextMeasurement) -> String {
+fn rest<D: Modelled>(d: &Diagnosis<D>, next_measurement: &NextMeasurement) -> String {
     let mut text = String::new();
     if let Some(companion) = &d.companion {
         text += &format!("  A second effect is likely besides: {companion}\n");

@@ -7,8 +7,7 @@ use serde_json::{Value, json};
 use crate::commands::Outcome;
 use crate::commands::text::{Emphasis, wrapped};
 use crate::data::RobotSpec;
-use crate::effects::cutting::CUTTING;
-use crate::effects::{Background, STRUCTURAL};
+use crate::effects::{Background, CUTTING, STRUCTURAL};
 use crate::text::{closest, shown_briefly as shown};
 use crate::{InputError, Result};
 

@@ -1,14 +1,15 @@
+use crate::effects::{Cutting, Registry, Structure};
+use crate::identify::Modelled;
 use serde_json::{Value, json};
 
 use crate::Result;
-use crate::analysis::Addition;
+use crate::analysis::{Addition, CampaignSide};
 use crate::campaign::Campaign;
 use crate::commands::find::calibrate::describe_parameters;
 use crate::commands::next_step::Guide;
 use crate::commands::text::{Emphasis, number, percent, table, warnings, wrapped};
 use crate::commands::{CampaignArg, Outcome};
 use crate::discrepancy::extension::{Extension, Fitted};
-use crate::effects::cutting;
 use crate::identify::{Calibration, Options};
 use crate::revision::RevisionLog;
 
@@ -29,63 +30,26 @@ pub fn run(args: AddArgs) -> Result<Outcome> {
 
 /// Adds `effect` if the campaign's log still is `log` in the end.
 pub fn after(log: RevisionLog, campaign: &Campaign, effect: &str) -> Result<Outcome> {
-    if !cutting::find(effect).is_empty() {
-        let addition = Addition::cutting_after(log, campaign, effect)?;
-        let Extension { instance, after, .. } = &addition.extension;
-        let variant = instance.effect.variant_label(instance.variant);
-        let parameters = describe_estimates(&after.calibration);
-        let plain = Plain {
-            title: instance.label(),
-            explanation: instance.effect.explanation(),
-            parameters,
-            folds: "cuts",
-        };
-        return Ok(Outcome::new(
-            document("cutting", instance.effect.id(), None, variant, &addition),
-            describe(&addition, &plain),
-            Some(next_step(Guide::cutting(campaign), &addition)),
-        ));
+    if Registry::cutting().effect(effect).is_some() {
+        let addition = Addition::<Cutting>::after(log, campaign, effect, Options::default())?;
+        let parameters = describe_estimates(&addition.extension.after.calibration);
+        return Ok(outcome(&addition, parameters, Guide::cutting(campaign)));
     }
-    let addition = Addition::after(log, campaign, effect, Options::default())?;
-    let Extension { instance, after, .. } = &addition.extension;
-    let variant = instance.effect.variant_label(instance.variant);
-    let plain = Plain {
-        title: instance.title(),
-        explanation: instance.effect.explanation(),
-        parameters: describe_parameters(&after.model, &after.calibration),
-        folds: "postures",
-    };
-    Ok(Outcome::new(
-        document(
-            "structure",
-            instance.effect.id(),
-            instance.site.label(),
-            variant,
-            &addition,
-        ),
-        describe(&addition, &plain),
-        Some(next_step(Guide::structure(campaign), &addition)),
-    ))
+    let addition = Addition::<Structure>::after(log, campaign, effect, Options::default())?;
+    let after = &addition.extension.after;
+    let parameters = describe_parameters(&after.model, &after.calibration);
+    Ok(outcome(&addition, parameters, Guide::structure(campaign)))
 }
 
-/// What a person is told of the effect.
-struct Plain {
-    title: String,
-    explanation: &'static str,
-    /// A table.
-    parameters: String,
-    /// What is left out for the held-out error.
-    folds: &'static str,
+/// `parameters`: a table of them.
+fn outcome<D: CampaignSide>(addition: &Addition<D>, parameters: String, guide: Guide<'_>) -> Outcome {
+    let next = next_step(guide, addition);
+    Outcome::new(document(addition), describe(addition, &parameters), Some(next))
 }
 
-fn document<M, I>(
-    domain: &str,
-    effect: &str,
-    site: Option<String>,
-    variant: Option<(&str, &str)>,
-    addition: &Addition<M, I>,
-) -> Value {
+fn document<D: CampaignSide>(addition: &Addition<D>) -> Value {
     let Extension {
+        instance,
         before,
         after,
         progress,
@@ -95,11 +59,11 @@ fn document<M, I>(
     let mut error = json!(addition.totals);
     error["held_out_nrms"] = json!(after.held_out_nrms());
     json!({
-        "domain": domain,
+        "domain": D::SIDE,
         "revision": addition.revision,
-        "effect": effect,
-        "site": site,
-        "variant": variant.map(|(key, value)| json!({ key: value })),
+        "effect": instance.effect.id(),
+        "site": instance.site.label(),
+        "variant": instance.variant_label().map(|(key, value)| json!({ key: value })),
         "effects": addition.effects,
         "parameters": calibration.parameters,
         "error": error,
@@ -133,7 +97,7 @@ fn describe_estimates(calibration: &Calibration) -> String {
     table(&["parameter", "fitted", "± std error", "unit"], &rows)
 }
 
-fn side<M>(fitted: &Fitted<M>) -> Value {
+fn side<D: Modelled>(fitted: &Fitted<D>) -> Value {
     json!({
         "nrms": fitted.residual.nrms,
         "held_out_nrms": fitted.held_out_nrms(),
@@ -141,12 +105,12 @@ fn side<M>(fitted: &Fitted<M>) -> Value {
     })
 }
 
-fn next_step<M, I>(guide: Guide<'_>, addition: &Addition<M, I>) -> String {
+fn next_step<D: CampaignSide>(guide: Guide<'_>, addition: &Addition<D>) -> String {
     let Extension { after, progress, .. } = &addition.extension;
     guide.added(*progress, after.calibration.reduced_chi2, &addition.totals)
 }
 
-fn describe<M, I>(addition: &Addition<M, I>, plain: &Plain) -> String {
+fn describe<D: CampaignSide>(addition: &Addition<D>, parameters: &str) -> String {
     let Addition {
         revision,
         extension,
@@ -155,18 +119,18 @@ fn describe<M, I>(addition: &Addition<M, I>, plain: &Plain) -> String {
         ..
     } = addition;
     let Extension {
+        instance,
         before,
         after,
         progress,
         vanished,
-        ..
     } = extension;
     let mut text = format!(
         "revision {revision}: + {}\n{}\n",
-        Emphasis::Strong.on(&plain.title),
-        wrapped(plain.explanation, "  ")
+        Emphasis::Strong.on(instance.title()),
+        wrapped(instance.effect.explanation(), "  ")
     );
-    text += &plain.parameters;
+    text += parameters;
     text += &format!(
         "\nerror (nrms)    {} -> {}, noise floor {}\n",
         percent(before.residual.nrms),
@@ -178,7 +142,7 @@ fn describe<M, I>(addition: &Addition<M, I>, plain: &Plain) -> String {
             "held-out error  {} -> {} (on {} left out of the fit)\n",
             percent(was),
             percent(is),
-            plain.folds
+            D::FOLDS
         );
     }
     text += &warnings(notes);
@@ -193,7 +157,7 @@ fn describe<M, I>(addition: &Addition<M, I>, plain: &Plain) -> String {
             "{}: the error on {} left out of the fit did not fall by more than chance would let it. The revision is \
              recorded all the same.\n",
             Emphasis::Bad.on("THIS IS NOT PROGRESS"),
-            plain.folds
+            D::FOLDS
         );
     }
     text

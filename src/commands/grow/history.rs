@@ -14,23 +14,20 @@ pub fn run(args: SideArgs) -> Result<Outcome> {
 }
 
 /// The history of one side of a campaign.
-pub fn of(campaign: &Campaign, domain: revision::Domain) -> Result<Outcome> {
+pub fn of(campaign: &Campaign, side: revision::Side) -> Result<Outcome> {
     let log = RevisionLog::load(&campaign.dir)?;
-    let revisions: Vec<&Revision> = log.revisions(domain).collect();
-    let undone: Vec<&Revision> = log.undone(domain).collect();
+    let revisions: Vec<&Revision> = log.revisions(side).collect();
+    let undone: Vec<&Revision> = log.undone(side).collect();
     let dir = campaign.dir.display();
-    let guide = Guide {
-        campaign,
-        side: domain,
-    };
+    let guide = Guide { campaign, side };
     let Some(current) = revisions.last() else {
         return Ok(Outcome::new(
-            json!({ "domain": domain, "revisions": [], "noise_floor_nrms": null, "undone": [], "warnings": [] }),
+            json!({ "domain": side, "revisions": [], "noise_floor_nrms": null, "undone": [], "warnings": [] }),
             "no effect was added to this campaign's model yet\n".into(),
             Some(guide.history(None, false)),
         ));
     };
-    let fingerprint = fingerprint(campaign, domain)?;
+    let fingerprint = fingerprint(campaign, side)?;
     let old: Vec<String> = revisions
         .iter()
         .filter(|r| r.data != fingerprint)
@@ -45,7 +42,7 @@ pub fn of(campaign: &Campaign, domain: revision::Domain) -> Result<Outcome> {
         )],
     };
     let json = json!({
-        "domain": domain,
+        "domain": side,
         "revisions": revisions.iter().map(|r| document(r, &fingerprint)).collect::<Vec<_>>(),
         "noise_floor_nrms": current.noise_floor_nrms,
         "undone": undone.iter().map(|r| document(r, &fingerprint)).collect::<Vec<_>>(),

@@ -16,13 +16,13 @@ pub fn run(args: SideArgs) -> Result<Outcome> {
 }
 
 /// Takes the last revision of `log` back, if the campaign's log still is that.
-pub fn after(mut log: RevisionLog, campaign: &Campaign, domain: revision::Domain) -> Result<Outcome> {
-    let undone = log.undo(domain)?;
-    let current = log.current(domain);
+pub fn after(mut log: RevisionLog, campaign: &Campaign, side: revision::Side) -> Result<Outcome> {
+    let undone = log.undo(side)?;
+    let current = log.current(side);
     let labels = current.map(|r| r.labels()).unwrap_or_default();
     let json = json!({
-        "domain": domain,
-        "undone": document(&undone, &fingerprint(campaign, domain)?),
+        "domain": side,
+        "undone": document(&undone, &fingerprint(campaign, side)?),
         "revision": current.map(|r| r.revision),
         "effects": labels,
     });
@@ -39,9 +39,6 @@ pub fn after(mut log: RevisionLog, campaign: &Campaign, domain: revision::Domain
             percent(current.nrms)
         );
     }
-    let guide = Guide {
-        campaign,
-        side: domain,
-    };
+    let guide = Guide { campaign, side };
     Ok(Outcome::new(json, text, Some(guide.undone())))
 }

@@ -12,8 +12,8 @@ use crate::commands::{CampaignArg, Outcome};
 use crate::cutting::kienzle;
 use crate::cutting::{
     CfcOptions, CfcResult, ChangeReading, CoefficientChange, CutAnalysis, ForceAxis, ForceGroup, KienzleFit,
-    Known, MaterialComparison, OrthogonalPrediction, RegressionMethod, SpeedTrends, by_axis, coefficients_of,
-    depth_mm, speed_text,
+    KnownValue, MaterialComparison, OrthogonalPrediction, RegressionMethod, SpeedTrends, by_axis,
+    coefficients_of, depth_mm, speed_text,
 };
 
 #[derive(clap::Args)]
@@ -259,7 +259,7 @@ fn p_text(p: f64) -> String {
     }
 }
 
-fn maybe(known: Option<Known>) -> String {
+fn maybe(known: Option<KnownValue>) -> String {
     known.map_or("–".into(), |k| {
         k.std_error
             .map_or_else(|| format!("{:.4}", k.value), |e| with_error(k.value, e))

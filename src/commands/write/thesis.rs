@@ -5,7 +5,7 @@ use serde_json::json;
 use crate::Result;
 use crate::commands::Outcome;
 use crate::commands::text::{number, percent, table};
-use crate::cutting::{Known, MILLING_COEFFICIENTS};
+use crate::cutting::{KnownValue, MILLING_COEFFICIENTS};
 use crate::lobes::Peak;
 use crate::report::sections::thesis_section;
 use crate::thesis::real_case::Explanation;
@@ -312,7 +312,7 @@ fn cutting(tables: &CuttingTables) -> String {
         .iter()
         .filter(|t| t.speeds == "all")
         .map(|t| {
-            let known = |k: Option<Known>| {
+            let known = |k: Option<KnownValue>| {
                 k.map_or("–".into(), |k| {
                     let error = k
                         .std_error

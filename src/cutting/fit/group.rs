@@ -33,14 +33,14 @@ pub struct Coefficient {
     /// Held at zero by `--nonnegative-edges`.
     pub constraint_active: bool,
     /// What it would be with no constraint on any coefficient; only where a constraint is active on this one.
-    pub unconstrained: Option<Known>,
+    pub unconstrained: Option<KnownValue>,
     /// By the other of the two methods; `None` where there are too few cuts for a robust one.
-    pub other_method: Option<Known>,
+    pub other_method: Option<KnownValue>,
 }
 
 /// A value and its standard error.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct Known {
+pub struct KnownValue {
     /// The value, in the unit of what it is a value of.
     pub value: f64,
     /// Its standard error, same unit; `None` where it is not known.
@@ -248,7 +248,7 @@ impl ForceGroup {
             .then(|| estimate(observations, free, &vec![false; bounds.len()], method).ok())
             .flatten();
         let drawn = bootstrap(observations, &chosen, &bounds, method);
-        let known = |estimate: &CoefficientEstimate, j: usize| Known {
+        let known = |estimate: &CoefficientEstimate, j: usize| KnownValue {
             value: estimate.value[j],
             std_error: estimate.std_error[j],
         };

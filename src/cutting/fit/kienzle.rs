@@ -15,7 +15,7 @@ use serde_json::{Map, Value, json};
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::cutting::cutting_trials::CuttingTrials;
-use crate::cutting::fit::group::{ForceGroup, Known, by_axis, distinct};
+use crate::cutting::fit::group::{ForceGroup, KnownValue, by_axis, distinct};
 use crate::cutting::fit::regression::{CoefficientFit, Observation, fit, r2};
 use crate::cutting::force_model::average_force::{average_row, feed_mm};
 use crate::cutting::force_model::force_axis::ForceAxis;
@@ -34,9 +34,9 @@ pub struct KienzleComponent {
     /// Symbol of the specific force: `kt1.1` is the kc1.1 of the tables.
     pub label: &'static str,
     /// Specific force at b = h = 1 mm, N/mm²; `None` where the data does not determine it.
-    pub k1_1: Option<Known>,
+    pub k1_1: Option<KnownValue>,
     /// How the specific force falls with chip thickness; `None` where the data does not determine it.
-    pub m: Option<Known>,
+    pub m: Option<KnownValue>,
 }
 
 /// Which law the averages prefer.
@@ -212,11 +212,11 @@ fn component(
     KienzleComponent {
         name: name.0,
         label: name.1,
-        k1_1: known.map(|_| Known {
+        k1_1: known.map(|_| KnownValue {
             value: k,
             std_error: Some(k.abs() * variance.max(0.0).sqrt()),
         }),
-        m: known.map(|(_, error)| Known {
+        m: known.map(|(_, error)| KnownValue {
             value: m,
             std_error: Some(error),
         }),

@@ -5,7 +5,7 @@ use std::f64::consts::LN_2;
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use crate::cutting::fit::group::{Known, distinct};
+use crate::cutting::fit::group::{KnownValue, distinct};
 use crate::cutting::fit::regression::{CoefficientFit, Observation, fit};
 use crate::cutting::force_model::force_axis::ForceAxis;
 
@@ -27,11 +27,11 @@ pub enum ChangeReading {
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoefficientChange {
     /// At the reference (mean speed, reference material).
-    pub reference: Option<Known>,
+    pub reference: Option<KnownValue>,
     /// Same unit.
-    pub change: Option<Known>,
+    pub change: Option<KnownValue>,
     /// (reference + change)/reference; `None` where the reference is not clearly (two standard errors) off zero.
-    pub ratio: Option<Known>,
+    pub ratio: Option<KnownValue>,
     /// Chance of a change as large as this where there is none (Student's t).
     pub p_value: Option<f64>,
     /// What that amounts to.
@@ -87,7 +87,7 @@ fn one_change(
     unknowns: usize,
 ) -> CoefficientChange {
     let known = |k: usize| {
-        Some(Known {
+        Some(KnownValue {
             value: fit.value[k]?,
             std_error: fit.std_error[k],
         })
@@ -116,7 +116,7 @@ fn one_change(
         let slope = d.value / k.value;
         let (a, b) = (unknowns + j, j);
         let variance = (c(a, a) - 2.0 * slope * c(a, b) + slope * slope * c(b, b)) / (k.value * k.value);
-        (k.value.abs() > 2.0 * error).then(|| Known {
+        (k.value.abs() > 2.0 * error).then(|| KnownValue {
             value: 1.0 + slope,
             std_error: Some(variance.max(0.0).sqrt()),
         })
@@ -143,8 +143,8 @@ fn one_change(
 
 impl CoefficientChange {
     /// Exponent m of the power law K ∝ speed^m that has this trend at the reference, where the factor is doublings.
-    pub fn exponent(&self) -> Option<Known> {
-        self.ratio.map(|r| Known {
+    pub fn exponent(&self) -> Option<KnownValue> {
+        self.ratio.map(|r| KnownValue {
             value: (r.value - 1.0) / LN_2,
             std_error: r.std_error.map(|e| e / LN_2),
         })

@@ -10,6 +10,7 @@ pub mod screen;
 #[cfg(test)]
 mod tests;
 
+use crate::effects::Structure;
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -57,7 +58,7 @@ pub struct LocalisedPlace {
 #[derive(Debug, Clone)]
 pub struct BestForm {
     /// The form at its place, as an effect.
-    pub instance: Instance,
+    pub instance: Instance<Structure>,
     /// The law.
     pub form: DrawnForm,
     /// The model with it.
@@ -127,19 +128,19 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
     let coarse_base = minimise(
         &study.problem(model, View::COARSE),
         theta,
-        &study.bounds(model),
+        &model.bounds(),
         REFINE,
     )?;
-    let tried: Vec<(usize, Vec<Tried<StructureModel, Instance>>)> = leaders(&screened)
+    let tried: Vec<(usize, Vec<Tried<Structure>>)> = leaders(&screened)
         .into_par_iter()
         .map(|i| (i, fit_forms(study, model, theta, &screened[i])))
         .collect();
     let values = study.real_values(Extent::Coarse) as f64;
     let base_count = model.parameters.len();
-    let bic = |t: &Tried<StructureModel, Instance>| {
+    let bic = |t: &Tried<Structure>| {
         2.0 * (t.fit.cost - coarse_base.cost) + (t.fit.theta.len() - base_count) as f64 * values.ln()
     };
-    let mut fitted: Vec<(usize, Vec<Tried<StructureModel, Instance>>)> = tried
+    let mut fitted: Vec<(usize, Vec<Tried<Structure>>)> = tried
         .into_iter()
         .filter(|(_, forms)| !forms.is_empty())
         .map(|(i, mut forms)| {
@@ -151,13 +152,7 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
     let tests: usize =
         fitted.iter().map(|(_, forms)| forms.len()).sum::<usize>().max(1) * spots.len() / FITTED;
 
-    let base_cost = minimise(
-        &study.problem(model, View::FULL),
-        theta,
-        &study.bounds(model),
-        REFINE,
-    )?
-    .cost;
+    let base_cost = minimise(&study.problem(model, View::FULL), theta, &model.bounds(), REFINE)?.cost;
     let mut settled: Vec<LocalisedPlace> = fitted
         .par_iter()
         .take(SETTLED)
@@ -247,8 +242,8 @@ fn leaders(screened: &[Screened]) -> Vec<usize> {
 
 fn place(
     screened: &Screened,
-    forms: &[Tried<StructureModel, Instance>],
-    bic: &impl Fn(&Tried<StructureModel, Instance>) -> f64,
+    forms: &[Tried<Structure>],
+    bic: &impl Fn(&Tried<Structure>) -> f64,
     best: Option<BestForm>,
 ) -> LocalisedPlace {
     LocalisedPlace {
@@ -274,8 +269,8 @@ fn fit_forms(
     model: &StructureModel,
     theta: &[f64],
     screened: &Screened,
-) -> Vec<Tried<StructureModel, Instance>> {
-    let bounds = study.bounds(model);
+) -> Vec<Tried<Structure>> {
+    let bounds = model.bounds();
     let moved: Vec<f64> = theta
         .iter()
         .zip(&screened.step)
@@ -289,9 +284,10 @@ fn fit_forms(
             let instance = drawn::instance(screened.spot, *form);
             let extended = study.extend(model, &instance);
             let own = &extended.parameters[model.parameters.len()..];
+            let proposed = instance.effect.starts(instance.at(), &study.known(model), &[]);
             let starts: Vec<Vec<f64>> = starting_values(*form, screened)
                 .into_iter()
-                .chain(study.starts(&instance, &Vec::new()).into_iter().take(4))
+                .chain(proposed.into_iter().take(4))
                 .map(|start| {
                     own.iter()
                         .zip(start)
@@ -357,7 +353,7 @@ fn starting_values(form: DrawnForm, screened: &Screened) -> Vec<Vec<f64>> {
 /// A form fitted to all data and tested on postures left out.
 fn settle(
     study: &StructureStudy,
-    tried: &Tried<StructureModel, Instance>,
+    tried: &Tried<Structure>,
     base_cost: f64,
     base_count: usize,
     tests: usize,
@@ -366,7 +362,7 @@ fn settle(
     let fit = minimise(
         &study.problem(model, View::FULL),
         &fit.theta,
-        &study.bounds(model),
+        &model.bounds(),
         REFINE,
     )?;
     let values = study.real_values(Extent::Full) as f64;

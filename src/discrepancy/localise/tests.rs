@@ -100,10 +100,10 @@ fn found(hidden: Option<(Spot, DrawnForm, &[f64])>, seed: u64) -> Localisation {
     let bare = model();
     let data = measured(&bare, &[], seed);
     let truth = hidden.map_or(bare.clone(), |(spot, form, _)| {
-        bare.with_effect(drawn::instance(spot, form), &data.summary())
+        bare.with_effect(drawn::instance(spot, form), &bare.known(&data.summary()))
     });
     let data = measured(&truth, hidden.map_or(&[], |h| h.2), seed);
-    let study = StructureStudy::new(&bare.robot.spec, data, Options::default());
+    let study = StructureStudy::new(data, Options::default());
     localise(&study, &bare).unwrap()
 }
 

@@ -438,8 +438,7 @@ impl Lab {
 
     /// The model with the points of the lab.
     pub fn with_points(&self, model: &StructureModel) -> StructureModel {
-        let mut model = model.clone();
-        model.points.clone_from(&self.points);
+        let model = model.with_fixed(|fixed| fixed.points.clone_from(&self.points));
         model
     }
 

@@ -15,11 +15,11 @@ use crate::discrepancy::outlook::next_measurement::{
     Alternative, ENOUGH_SIGMAS, LEAST_SIGMAS, NextMeasurement,
 };
 use crate::discrepancy::verdict::DiagnosisVerdict;
-use crate::effects::cutting::CuttingInstance;
+use crate::effects::Cutting;
 use crate::identify::forces::cutting_data::{CutData, CutKind};
-use crate::identify::{CuttingData, CuttingModel, CuttingProblem, LeastSquares, Linearisation};
+use crate::identify::{CuttingData, CuttingProblem, LeastSquares, Linearisation};
 
-type CuttingCandidate = EffectCandidate<CuttingModel, CuttingInstance>;
+type CuttingCandidate = EffectCandidate<Cutting>;
 
 /// A cut that could be made.
 struct Proposal {
@@ -38,10 +38,7 @@ const BASES: usize = 3;
 ///
 /// # Errors
 /// A cut that the force model cannot be worked out for.
-pub fn advise_cutting(
-    data: &CuttingData,
-    diagnosis: &Diagnosis<CuttingModel, CuttingInstance>,
-) -> Result<NextMeasurement> {
+pub fn advise_cutting(data: &CuttingData, diagnosis: &Diagnosis<Cutting>) -> Result<NextMeasurement> {
     let (DiagnosisVerdict::Effect, Some(winner)) = (diagnosis.verdict, diagnosis.winner()) else {
         return Ok(NextMeasurement::words(match diagnosis.verdict {
             DiagnosisVerdict::Unknown => {

@@ -1,6 +1,7 @@
 //! The next measurement: the one that is expected to tell two explanations apart, against the noise and after each has
 //! taken in what it can, at the least effort.
 
+use crate::effects::Structure;
 use std::fmt;
 
 use serde::Serialize;
@@ -11,9 +12,8 @@ use crate::discrepancy::candidate::EffectCandidate;
 use crate::discrepancy::diagnosis::Diagnosis;
 use crate::discrepancy::outlook::lab::{Lab, NewPoint, Setup};
 use crate::discrepancy::verdict::DiagnosisVerdict;
-use crate::effects::Instance;
 use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
-use crate::identify::{FrfData, LeastSquares, StructureModel};
+use crate::identify::{FrfData, LeastSquares};
 
 /// Standard deviations that a measurement should promise: what is found scatters by two about their square's root, and
 /// must still stand clear of chance.
@@ -75,7 +75,7 @@ impl fmt::Display for NextMeasurement {
     }
 }
 
-type StructureCandidate = EffectCandidate<StructureModel, Instance>;
+type StructureCandidate = EffectCandidate<Structure>;
 
 /// What to measure next on a robot. `postures`: the campaign's.
 ///
@@ -84,7 +84,7 @@ type StructureCandidate = EffectCandidate<StructureModel, Instance>;
 pub fn advise(
     data: &FrfData,
     postures: &[Posture],
-    diagnosis: &Diagnosis<StructureModel, Instance>,
+    diagnosis: &Diagnosis<Structure>,
 ) -> Result<NextMeasurement> {
     match (diagnosis.verdict, diagnosis.winner()) {
         (DiagnosisVerdict::Effect, Some(winner)) => {
@@ -117,7 +117,7 @@ pub fn advise(
 }
 
 /// For a rest that nothing explains: what would show its shape.
-fn where_it_sits(data: &FrfData, diagnosis: &Diagnosis<StructureModel, Instance>) -> String {
+fn where_it_sits(data: &FrfData, diagnosis: &Diagnosis<Structure>) -> String {
     let posture = data
         .measured_postures()
         .first()

@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::Result;
 use crate::data::Posture;
 use crate::discrepancy::outlook::lab::Lab;
-use crate::effects::{self, DataSummary, Instance};
+use crate::effects::{DataSummary, Instance, Registry, Structure};
 use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
 use crate::identify::levenberg_marquardt::{Stopping, minimise};
 use crate::identify::{FrfData, LeastSquares, StructureModel};
@@ -122,10 +122,10 @@ impl PlanOutlook {
             .max(1);
         let thin = full.thinned(stride, 1);
         let share = full.value_count() as f64 / thin.value_count().max(1) as f64;
-        let spec = &model.robot.spec;
         let (mut possible, mut not_possible) = (Vec::new(), Vec::new());
-        for instance in effects::instances(spec) {
-            match instance.effect.obstacle(spec, &summary) {
+        let known = model.known(&summary);
+        for instance in Registry::structure().instances(known.object) {
+            match instance.effect.obstacle(&known) {
                 Some(why) => not_possible.push((instance.label(), why)),
                 None => possible.push(instance),
             }
@@ -136,7 +136,7 @@ impl PlanOutlook {
             .map(|instance| Subject::new(model, &base, *instance, &summary, &thin, share))
             .collect::<Result<_>>()?;
         let subjects = one_each(all, &possible);
-        let instances: Vec<(String, Vec<Instance>)> = subjects
+        let instances: Vec<(String, Vec<Instance<Structure>>)> = subjects
             .iter()
             .map(|s| {
                 let same = possible.iter().filter(|i| i.label() == s.label);
@@ -229,12 +229,12 @@ impl Subject {
     fn new(
         base_model: &StructureModel,
         base: &[f64],
-        instance: Instance,
+        instance: Instance<Structure>,
         summary: &DataSummary,
         thin: &FrfData,
         share: f64,
     ) -> Result<Self> {
-        let model = base_model.with_effect(instance, summary);
+        let model = base_model.with_effect(instance, &base_model.known(summary));
         let own = model.parameters[base.len()..]
             .iter()
             .map(|p| p.internal(p.nominal));
@@ -271,7 +271,7 @@ impl Subject {
 }
 
 /// One subject for each label: of the discrete choices the one that shows least.
-fn one_each(all: Vec<Subject>, instances: &[Instance]) -> Vec<Subject> {
+fn one_each(all: Vec<Subject>, instances: &[Instance<Structure>]) -> Vec<Subject> {
     let mut out: Vec<Subject> = Vec::new();
     for (subject, instance) in all.into_iter().zip(instances) {
         match out.iter_mut().find(|s| s.label == instance.label()) {
@@ -320,15 +320,15 @@ fn prior_cost(model: &StructureModel, theta: &[f64]) -> f64 {
 fn imitate(
     base: &StructureModel,
     truth: &Subject,
-    instances: &[Instance],
+    instances: &[Instance<Structure>],
     summary: &DataSummary,
     share: f64,
 ) -> Result<(StructureModel, Fitted)> {
     let mut best: Option<(StructureModel, Fitted)> = None;
     for instance in instances {
-        let model = base.with_effect(*instance, summary);
+        let model = base.with_effect(*instance, &base.known(summary));
         let own = &model.parameters[truth.baseline.theta.len()..];
-        let proposed = instance.effect.starts(&base.robot.spec, summary, &[]);
+        let proposed = instance.effect.starts(instance.at(), &base.known(summary), &[]);
         let starts = std::iter::once(own.iter().map(|p| p.nominal).collect::<Vec<f64>>()).chain(proposed);
         let problem = FrfProblem {
             model: &model,

@@ -307,10 +307,10 @@ fn refined(model: &StructureModel, data: &FrfData, trial: &Trial) -> Result<Trie
 
 /// The best single effect of the library on few data, for commands that do not try them all anyway.
 pub fn library_rival(model: &StructureModel, data: &FrfData, theta: &[f64]) -> Option<Rival> {
-    let study = StructureStudy::new(&model.robot.spec, data.clone(), Options::default());
+    let study = StructureStudy::new(data.clone(), Options::default());
     let (instances, _) = study.instances(model);
     let hints = study.hints(model, theta).ok()?;
-    let bounds = study.bounds(model);
+    let bounds = model.bounds();
     let base = minimise(&study.problem(model, View::COARSE), theta, &bounds, ROUGH).ok()?;
     let tried = try_effects(
         &study,
@@ -322,8 +322,8 @@ pub fn library_rival(model: &StructureModel, data: &FrfData, theta: &[f64]) -> O
     );
     let best = tried.iter().min_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost))?;
     Some(Rival {
-        label: study.name(&best.instance).label(),
+        label: best.instance.name().label(),
         gain_share: (1.0 - best.fit.cost / base.cost).max(0.0),
-        parameters: study.parameters(&best.model).len() - model.parameters.len(),
+        parameters: best.model.parameters.len() - model.parameters.len(),
     })
 }

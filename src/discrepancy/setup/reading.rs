@@ -28,7 +28,6 @@ pub trait FileReading: Send + Sync {
 
 /// The model with the points as they are if `reading` is right.
 pub fn model_read(model: &StructureModel, reading: &dyn FileReading) -> StructureModel {
-    let mut read = model.without_start();
-    read.points = reading.points(&model.points);
-    read
+    let read = model.without_start();
+    read.with_fixed(|fixed| fixed.points = reading.points(&model.points))
 }

@@ -1,8 +1,7 @@
-use super::effect::{
-    CutPhysics, CutSetting, CuttingEffect, CuttingSummary, NEGLIGIBLE, Vibration, linear, logarithmic,
-    milling_only, straight_edge_only,
-};
+use super::common::{linear, logarithmic, milling_only, straight_edge_only};
+use super::{CutPhysics, CutSetting, Cutting, Vibration};
 use crate::effects::Background;
+use crate::effects::{At, Effect, Known, NEGLIGIBLE};
 use crate::parameter::Parameter;
 use crate::robot::Dual;
 
@@ -12,7 +11,7 @@ const NO_AMPLITUDE_PER_FEED: f64 = 1e-9;
 /// A self-excited vibration off the tooth-passing comb.
 pub struct Chatter;
 
-impl CuttingEffect for Chatter {
+impl Effect<Cutting> for Chatter {
     fn id(&self) -> &'static str {
         "chatter"
     }
@@ -44,7 +43,7 @@ impl CuttingEffect for Chatter {
         }
     }
 
-    fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
+    fn obstacle(&self, Known { data, .. }: &Known<Cutting>) -> Option<String> {
         milling_only(data)
             .or_else(|| straight_edge_only(data))
             .or_else(|| {
@@ -54,7 +53,7 @@ impl CuttingEffect for Chatter {
             })
     }
 
-    fn parameters(&self, _variant: usize, data: &CuttingSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, Known { data, .. }: &Known<Cutting>) -> Vec<Parameter> {
         let frequency = data.vibration_hz.unwrap_or(500.0);
         vec![
             logarithmic(
@@ -69,7 +68,7 @@ impl CuttingEffect for Chatter {
         ]
     }
 
-    fn starts(&self, _variant: usize, data: &CuttingSummary) -> Vec<Vec<f64>> {
+    fn starts(&self, _at: At, Known { data, .. }: &Known<Cutting>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         let frequency = data.vibration_hz.unwrap_or(500.0);
         [
             (0.03, 0.0),
@@ -82,11 +81,11 @@ impl CuttingEffect for Chatter {
         .to_vec()
     }
 
-    fn vanishing(&self, _variant: usize, p: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, p: &[Parameter]) -> Option<Vec<f64>> {
         Some(vec![p[0].nominal, NEGLIGIBLE * p[1].nominal, p[2].nominal])
     }
 
-    fn apply(&self, _variant: usize, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
+    fn apply(&self, _at: At, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
         // A vibration of no size has no frequency that could be wrong, either.
         if setting.has_vibration && values[1].value > NO_AMPLITUDE_PER_FEED {
             physics.vibration = Some(Vibration {

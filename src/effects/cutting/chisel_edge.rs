@@ -1,15 +1,15 @@
-use super::effect::{
-    CutPhysics, CutSetting, CuttingEffect, CuttingSummary, NEGLIGIBLE, drilling_only, linear, logarithmic,
-};
+use super::common::{drilling_only, linear, logarithmic};
+use super::{CutPhysics, CutSetting, Cutting};
 use crate::effects::Background;
 use crate::effects::background::SHAW_OXFORD;
+use crate::effects::{At, Effect, Known, NEGLIGIBLE};
 use crate::parameter::Parameter;
 use crate::robot::Dual;
 
 /// The chisel edge indents: thrust ∝ feed^n in holes without pilot.
 pub struct ChiselEdge;
 
-impl CuttingEffect for ChiselEdge {
+impl Effect<Cutting> for ChiselEdge {
     fn id(&self) -> &'static str {
         "chisel-edge"
     }
@@ -36,7 +36,7 @@ impl CuttingEffect for ChiselEdge {
         }
     }
 
-    fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
+    fn obstacle(&self, Known { data, .. }: &Known<Cutting>) -> Option<String> {
         drilling_only(data).or_else(|| {
             (data.full_holes == 0 || data.pilot_holes == 0).then(|| {
                 "needs both full and pilot holes: with one kind it is other thrust coefficients".to_string()
@@ -44,7 +44,7 @@ impl CuttingEffect for ChiselEdge {
         })
     }
 
-    fn parameters(&self, _variant: usize, data: &CuttingSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, Known { data, .. }: &Known<Cutting>) -> Vec<Parameter> {
         // About the thrust of a chip as wide as the chisel, ten times as hard to cut.
         let nominal = data.cutting_scale_n_per_mm2.max(1.0);
         vec![
@@ -59,15 +59,15 @@ impl CuttingEffect for ChiselEdge {
         ]
     }
 
-    fn starts(&self, _variant: usize, data: &CuttingSummary) -> Vec<Vec<f64>> {
+    fn starts(&self, _at: At, Known { data, .. }: &Known<Cutting>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![0.1 * data.cutting_scale_n_per_mm2.max(1.0), 0.6]]
     }
 
-    fn vanishing(&self, _variant: usize, p: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, p: &[Parameter]) -> Option<Vec<f64>> {
         Some(vec![NEGLIGIBLE * p[0].nominal, p[1].nominal])
     }
 
-    fn apply(&self, _variant: usize, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
+    fn apply(&self, _at: At, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
         let power = values[1].scale(setting.feed_mm.max(1e-9).ln()).exp();
         physics.chisel_thrust_n = Some(&values[0] * &power);
     }

@@ -1,7 +1,7 @@
-use super::effect::{
-    CutPhysics, CutSetting, CuttingEffect, CuttingSummary, linear, milling_only, unit_mixing,
-};
+use super::common::{linear, milling_only, unit_mixing};
+use super::{CutPhysics, CutSetting, Cutting};
 use crate::effects::background::GAUTSCHI;
+use crate::effects::{At, Effect, Known, Site};
 use crate::effects::{Background, Size};
 use crate::parameter::Parameter;
 use crate::robot::Dual;
@@ -12,7 +12,7 @@ pub struct Crosstalk;
 /// Off-diagonal elements as (row, column).
 const LEAKS: [(usize, usize); 6] = [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)];
 
-impl CuttingEffect for Crosstalk {
+impl Effect<Cutting> for Crosstalk {
     fn id(&self) -> &'static str {
         "crosstalk"
     }
@@ -37,20 +37,20 @@ impl CuttingEffect for Crosstalk {
         }
     }
 
-    fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
+    fn obstacle(&self, Known { data, .. }: &Known<Cutting>) -> Option<String> {
         milling_only(data).or_else(|| {
             (!data.channels[..3].iter().all(|c| *c)).then(|| "needs the three force channels".to_string())
         })
     }
 
-    fn parameters(&self, _variant: usize, _data: &CuttingSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, _known: &Known<Cutting>) -> Vec<Parameter> {
         LEAKS
             .iter()
             .map(|(i, j)| linear(format!("matrix[{i}][{j}]"), "1", 0.0, 0.06, 0.0, [-0.5, 0.5]))
             .collect()
     }
 
-    fn impossible(&self, sizes: &[Size]) -> Option<String> {
+    fn impossible(&self, _site: Site, _object: &(), sizes: &[Size]) -> Option<String> {
         let leak = |size: &Size| {
             size.outside(
                 "a leak between channels",
@@ -62,11 +62,11 @@ impl CuttingEffect for Crosstalk {
         sizes.iter().find_map(leak)
     }
 
-    fn vanishing(&self, _variant: usize, p: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, p: &[Parameter]) -> Option<Vec<f64>> {
         Some(vec![0.0; p.len()])
     }
 
-    fn apply(&self, _variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
+    fn apply(&self, _at: At, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
         let mut mixing = unit_mixing();
         for ((i, j), value) in LEAKS.iter().zip(values) {
             mixing[*i][*j] = value.clone();

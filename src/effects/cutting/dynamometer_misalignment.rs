@@ -1,6 +1,6 @@
-use super::effect::{
-    CutPhysics, CutSetting, CuttingEffect, CuttingSummary, linear, milling_only, unit_mixing,
-};
+use super::common::{linear, milling_only, unit_mixing};
+use super::{CutPhysics, CutSetting, Cutting};
+use crate::effects::{At, Effect, Known, Site};
 use crate::effects::{Background, Size};
 use crate::parameter::Parameter;
 use crate::robot::Dual;
@@ -8,7 +8,7 @@ use crate::robot::Dual;
 /// The dynamometer is tilted about its x or y axis.
 pub struct DynamometerMisalignment;
 
-impl CuttingEffect for DynamometerMisalignment {
+impl Effect<Cutting> for DynamometerMisalignment {
     fn id(&self) -> &'static str {
         "dynamometer-misalignment"
     }
@@ -31,39 +31,45 @@ impl CuttingEffect for DynamometerMisalignment {
         }
     }
 
-    fn variants(&self) -> usize {
-        2
+    fn variants(&self, _site: Site) -> Vec<usize> {
+        (0..2).collect()
     }
 
     fn variant_label(&self, variant: usize) -> Option<(&'static str, &'static str)> {
         ["x", "y"].get(variant).map(|axis| ("axis", *axis))
     }
 
-    fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
+    fn obstacle(&self, Known { data, .. }: &Known<Cutting>) -> Option<String> {
         milling_only(data).or_else(|| {
             (!data.channels[..3].iter().all(|c| *c)).then(|| "needs the three force channels".to_string())
         })
     }
 
-    fn parameters(&self, _variant: usize, _data: &CuttingSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, _known: &Known<Cutting>) -> Vec<Parameter> {
         vec![linear("angle_deg", "deg", 1.0, 6.0, 0.0, [-45.0, 45.0])]
     }
 
-    fn starts(&self, _variant: usize, _data: &CuttingSummary) -> Vec<Vec<f64>> {
+    fn starts(&self, _at: At, _known: &Known<Cutting>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![-4.0], vec![4.0]]
     }
 
-    fn impossible(&self, sizes: &[Size]) -> Option<String> {
+    fn impossible(&self, _site: Site, _object: &(), sizes: &[Size]) -> Option<String> {
         sizes
             .first()?
             .outside("a tilt", [-20.0, 20.0], (1.0, "°"), "every eye sees that")
     }
 
-    fn vanishing(&self, _variant: usize, _parameters: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, _parameters: &[Parameter]) -> Option<Vec<f64>> {
         Some(vec![0.0])
     }
 
-    fn apply(&self, variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
+    fn apply(
+        &self,
+        At { variant, .. }: At,
+        values: &[Dual],
+        _setting: &CutSetting,
+        physics: &mut CutPhysics,
+    ) {
         let angle = values[0].scale(1f64.to_radians());
         let (s, c) = angle.value.sin_cos();
         let (sin, cos) = (angle.chain(s, c), angle.chain(c, -s));

@@ -1,6 +1,6 @@
-use super::effect::{
-    CutPhysics, CutSetting, CuttingEffect, CuttingSummary, NEGLIGIBLE, logarithmic, milling_only,
-};
+use super::common::{logarithmic, milling_only};
+use super::{CutPhysics, CutSetting, Cutting};
+use crate::effects::{At, Effect, Known, NEGLIGIBLE, Site};
 use crate::effects::{Background, Size};
 use crate::parameter::Parameter;
 use crate::robot::Dual;
@@ -8,7 +8,7 @@ use crate::robot::Dual;
 /// Each channel of the dynamometer is a second-order system.
 pub struct DynamometerResonance;
 
-impl CuttingEffect for DynamometerResonance {
+impl Effect<Cutting> for DynamometerResonance {
     fn id(&self) -> &'static str {
         "dynamometer-resonance"
     }
@@ -37,13 +37,13 @@ impl CuttingEffect for DynamometerResonance {
         }
     }
 
-    fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
+    fn obstacle(&self, Known { data, .. }: &Known<Cutting>) -> Option<String> {
         milling_only(data).or_else(|| {
             (!data.channels[..3].iter().all(|c| *c)).then(|| "needs the three force channels".to_string())
         })
     }
 
-    fn parameters(&self, _variant: usize, data: &CuttingSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, Known { data, .. }: &Known<Cutting>) -> Vec<Parameter> {
         let highest = data.highest_hz.max(50.0);
         let nominal = 0.5 * highest;
         let frequency = |i: usize| {
@@ -59,7 +59,7 @@ impl CuttingEffect for DynamometerResonance {
         (0..3).map(frequency).chain((0..3).map(damping)).collect()
     }
 
-    fn starts(&self, _variant: usize, data: &CuttingSummary) -> Vec<Vec<f64>> {
+    fn starts(&self, _at: At, Known { data, .. }: &Known<Cutting>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         // A tuned channel attracts only from nearby; high starting points leave low orders untouched.
         let highest = data.highest_hz.max(50.0);
         [0.2, 0.3, 0.42, 0.55, 0.75, 1.0, 1.4, 2.5]
@@ -70,7 +70,7 @@ impl CuttingEffect for DynamometerResonance {
             .to_vec()
     }
 
-    fn impossible(&self, sizes: &[Size]) -> Option<String> {
+    fn impossible(&self, _site: Site, _object: &(), sizes: &[Size]) -> Option<String> {
         let damping = |size: &Size| {
             size.outside(
                 "a damping ratio",
@@ -82,14 +82,14 @@ impl CuttingEffect for DynamometerResonance {
         sizes.iter().skip(3).find_map(damping)
     }
 
-    fn vanishing(&self, _variant: usize, p: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, p: &[Parameter]) -> Option<Vec<f64>> {
         // Its natural frequencies far above all that is measured.
         let (frequencies, dampings) = p.split_at(3);
         let far = frequencies.iter().map(|f| f.nominal / NEGLIGIBLE);
         Some(far.chain(dampings.iter().map(|z| z.nominal)).collect())
     }
 
-    fn apply(&self, _variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
+    fn apply(&self, _at: At, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
         physics.dynamics = Some([0, 1, 2].map(|i| [values[i].clone(), values[3 + i].clone()]));
     }
 }

@@ -1,14 +1,16 @@
-use super::effect::{CutPhysics, CutSetting, CuttingEffect, CuttingSummary, linear};
+use super::common::linear;
+use super::{CutPhysics, CutSetting, Cutting};
 use crate::data::Process;
 use crate::effects::Background;
 use crate::effects::background::BUDAK;
+use crate::effects::{At, Effect, Known};
 use crate::parameter::Parameter;
 use crate::robot::Dual;
 
 /// Rubbing of the edge, for a baseline that was fitted without.
 pub struct EdgeForce;
 
-impl CuttingEffect for EdgeForce {
+impl Effect<Cutting> for EdgeForce {
     fn id(&self) -> &'static str {
         "edge-force"
     }
@@ -37,12 +39,12 @@ impl CuttingEffect for EdgeForce {
         }
     }
 
-    fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
+    fn obstacle(&self, Known { data, .. }: &Known<Cutting>) -> Option<String> {
         data.has_edge
             .then(|| "the baseline has edge coefficients already".to_string())
     }
 
-    fn parameters(&self, _variant: usize, data: &CuttingSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, Known { data, .. }: &Known<Cutting>) -> Vec<Parameter> {
         let scale = 0.05 * data.cutting_scale_n_per_mm2.max(1.0);
         let names: &[&str] = match data.process {
             Process::Milling | Process::Turning => &["kte_n_per_mm", "kre_n_per_mm", "kae_n_per_mm"],
@@ -63,7 +65,7 @@ impl CuttingEffect for EdgeForce {
             .collect()
     }
 
-    fn vanishing(&self, _variant: usize, p: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, p: &[Parameter]) -> Option<Vec<f64>> {
         Some(vec![0.0; p.len()])
     }
 
@@ -71,7 +73,7 @@ impl CuttingEffect for EdgeForce {
         0
     }
 
-    fn apply(&self, _variant: usize, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
+    fn apply(&self, _at: At, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
         let edges: &[usize] = match setting.process {
             Process::Milling | Process::Turning => &[3, 4, 5],
             Process::Drilling => &[1, 3],

@@ -1,13 +1,15 @@
-use super::effect::{CutPhysics, CutSetting, CuttingEffect, CuttingSummary, drilling_only, linear};
+use super::common::{drilling_only, linear};
+use super::{CutPhysics, CutSetting, Cutting};
 use crate::effects::Background;
 use crate::effects::background::SHAW_OXFORD;
+use crate::effects::{At, Effect, Known};
 use crate::parameter::Parameter;
 use crate::robot::Dual;
 
 /// The drill's margins rub in the hole: torque grows with depth.
 pub struct MarginFriction;
 
-impl CuttingEffect for MarginFriction {
+impl Effect<Cutting> for MarginFriction {
     fn id(&self) -> &'static str {
         "margin-friction"
     }
@@ -31,11 +33,11 @@ impl CuttingEffect for MarginFriction {
         }
     }
 
-    fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
+    fn obstacle(&self, Known { data, .. }: &Known<Cutting>) -> Option<String> {
         drilling_only(data).or_else(|| (!data.channels[3]).then(|| "needs the torque".to_string()))
     }
 
-    fn parameters(&self, _variant: usize, data: &CuttingSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, Known { data, .. }: &Known<Cutting>) -> Vec<Parameter> {
         let scale = 0.02 * data.cutting_scale_n_per_mm2.max(1.0);
         vec![linear(
             "k_margin_n_per_mm",
@@ -47,11 +49,11 @@ impl CuttingEffect for MarginFriction {
         )]
     }
 
-    fn vanishing(&self, _variant: usize, _parameters: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, _parameters: &[Parameter]) -> Option<Vec<f64>> {
         Some(vec![0.0])
     }
 
-    fn apply(&self, _variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
+    fn apply(&self, _at: At, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
         physics.margin_n_per_mm = Some(values[0].clone());
     }
 }

@@ -12,22 +12,19 @@
 //!
 //! Chatter adds lines off the tooth-passing comb. Derivatives come with the [`Dual`](crate::robot::Dual) numbers that all is written in.
 
-mod chatter;
-mod chisel_edge;
-mod crosstalk;
-mod dynamometer_misalignment;
-mod dynamometer_resonance;
-mod edge_force;
-mod effect;
-mod margin_friction;
-mod nonlinear_drift;
-mod registry;
-mod runout;
-mod size_effect;
-mod speed_dependence;
-mod tool_wear;
+pub(super) mod chatter;
+pub(super) mod chisel_edge;
+mod common;
+pub(super) mod crosstalk;
+mod domain;
+pub(super) mod dynamometer_misalignment;
+pub(super) mod dynamometer_resonance;
+pub(super) mod edge_force;
+pub(super) mod margin_friction;
+pub(super) mod nonlinear_drift;
+pub(super) mod runout;
+pub(super) mod size_effect;
+pub(super) mod speed_dependence;
+pub(super) mod tool_wear;
 
-pub use effect::{
-    CutPhysics, CutSetting, CuttingEffect, CuttingInstance, CuttingSummary, Mixing, Runout, Vibration,
-};
-pub use registry::{CUTTING, find, instances};
+pub use domain::{CutPhysics, CutSetting, Cutting, CuttingSummary, Mixing, Runout, Vibration};

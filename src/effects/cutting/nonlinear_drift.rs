@@ -1,7 +1,9 @@
-use super::effect::{CutPhysics, CutSetting, CuttingEffect, CuttingSummary, NEGLIGIBLE, logarithmic};
+use super::common::logarithmic;
+use super::{CutPhysics, CutSetting, Cutting};
 use crate::data::Process;
 use crate::effects::Background;
 use crate::effects::background::GAUTSCHI;
+use crate::effects::{At, Effect, Known, NEGLIGIBLE, Site};
 use crate::parameter::Parameter;
 use crate::robot::Dual;
 
@@ -21,7 +23,7 @@ const AT_ONCE_S: f64 = 1e-8;
 /// A leak slower than this leaks nothing.
 const FOR_EVER_S: f64 = 1e9;
 
-impl CuttingEffect for NonlinearDrift {
+impl Effect<Cutting> for NonlinearDrift {
     fn id(&self) -> &'static str {
         "nonlinear-drift"
     }
@@ -46,33 +48,33 @@ impl CuttingEffect for NonlinearDrift {
         }
     }
 
-    fn variants(&self) -> usize {
-        2
+    fn variants(&self, _site: Site) -> Vec<usize> {
+        (0..2).collect()
     }
 
     fn variant_label(&self, variant: usize) -> Option<(&'static str, &'static str)> {
         ["additive", "leak"].get(variant).map(|kind| ("kind", *kind))
     }
 
-    fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
+    fn obstacle(&self, Known { data, .. }: &Known<Cutting>) -> Option<String> {
         (!data.air_on_both_sides).then(|| "needs air before and after the cut".to_string())
     }
 
-    fn parameters(&self, _variant: usize, data: &CuttingSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, Known { data, .. }: &Known<Cutting>) -> Vec<Parameter> {
         let nominal = data.longest_record_s.clamp(0.5, 20.0);
         channels(data.process)
             .map(|i| logarithmic(format!("tau_s[{i}]"), "s", nominal, 1.5, [0.1, 1000.0]))
             .collect()
     }
 
-    fn starts(&self, _variant: usize, data: &CuttingSummary) -> Vec<Vec<f64>> {
+    fn starts(&self, _at: At, Known { data, .. }: &Known<Cutting>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         let count = channels(data.process).count();
         [0.2, 3.0]
             .map(|share| vec![(share * data.longest_record_s).clamp(0.2, 100.0); count])
             .to_vec()
     }
 
-    fn vanishing(&self, variant: usize, p: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, At { variant, .. }: At, p: &[Parameter]) -> Option<Vec<f64>> {
         // A transient that is over at once; a leak that takes for ever.
         let factor = if variant == 0 {
             NEGLIGIBLE
@@ -82,12 +84,12 @@ impl CuttingEffect for NonlinearDrift {
         Some(p.iter().map(|tau| factor * tau.nominal).collect())
     }
 
-    fn nuisances_per_channel(&self, variant: usize) -> usize {
+    fn nuisances_per_channel(&self, At { variant, .. }: At) -> usize {
         // The transient's amplitude; what a leak makes of the drift line.
         if variant == 0 { 1 } else { 0 }
     }
 
-    fn apply(&self, variant: usize, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
+    fn apply(&self, At { variant, .. }: At, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
         let is_gone = |tau: &Dual| match variant {
             0 => tau.value < AT_ONCE_S,
             _ => tau.value > FOR_EVER_S,

@@ -1,7 +1,6 @@
-use super::effect::{
-    CutPhysics, CutSetting, CuttingEffect, CuttingSummary, NEGLIGIBLE, Runout, linear, logarithmic,
-    milling_only, straight_edge_only,
-};
+use super::common::{linear, logarithmic, milling_only, straight_edge_only};
+use super::{CutPhysics, CutSetting, Cutting, Runout};
+use crate::effects::{At, Effect, Known, NEGLIGIBLE, Site};
 use crate::effects::{Background, Size};
 use crate::parameter::Parameter;
 use crate::robot::Dual;
@@ -9,7 +8,7 @@ use crate::robot::Dual;
 /// The tool's axis lies beside the spindle's: every tooth has its own radius.
 pub struct RunoutEffect;
 
-impl CuttingEffect for RunoutEffect {
+impl Effect<Cutting> for RunoutEffect {
     fn id(&self) -> &'static str {
         "runout"
     }
@@ -36,13 +35,13 @@ impl CuttingEffect for RunoutEffect {
         }
     }
 
-    fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
+    fn obstacle(&self, Known { data, .. }: &Known<Cutting>) -> Option<String> {
         milling_only(data)
             .or_else(|| straight_edge_only(data))
             .or_else(|| (data.teeth < 2).then(|| "a single tooth has no runout against others".to_string()))
     }
 
-    fn parameters(&self, _variant: usize, data: &CuttingSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, Known { data, .. }: &Known<Cutting>) -> Vec<Parameter> {
         vec![
             logarithmic("offset_mm", "mm", 0.01, 1.5, [1e-4, 1.0]),
             linear(
@@ -56,7 +55,7 @@ impl CuttingEffect for RunoutEffect {
         ]
     }
 
-    fn starts(&self, _variant: usize, data: &CuttingSummary) -> Vec<Vec<f64>> {
+    fn starts(&self, _at: At, Known { data, .. }: &Known<Cutting>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         let pitch_deg = 360.0 / data.teeth as f64;
         let offsets = [0.1, 0.3, 0.8].map(|share| (share * data.smallest_feed_mm).clamp(0.002, 0.2));
         let angles = [0.05, 0.4, 0.75];
@@ -66,7 +65,7 @@ impl CuttingEffect for RunoutEffect {
             .collect()
     }
 
-    fn impossible(&self, sizes: &[Size]) -> Option<String> {
+    fn impossible(&self, _site: Site, _object: &(), sizes: &[Size]) -> Option<String> {
         sizes.first()?.outside(
             "a runout",
             [5e-4, 0.2],
@@ -75,11 +74,11 @@ impl CuttingEffect for RunoutEffect {
         )
     }
 
-    fn vanishing(&self, _variant: usize, p: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, p: &[Parameter]) -> Option<Vec<f64>> {
         Some(vec![NEGLIGIBLE * p[0].nominal, p[1].nominal])
     }
 
-    fn apply(&self, _variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
+    fn apply(&self, _at: At, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
         physics.runout = Some(Runout {
             offset_mm: values[0].clone(),
             angle_rad: values[1].scale(1f64.to_radians()),

@@ -1,6 +1,8 @@
-use super::effect::{CutPhysics, CutSetting, CuttingEffect, CuttingSummary, linear, straight_edge_only};
+use super::common::{linear, straight_edge_only};
+use super::{CutPhysics, CutSetting, Cutting};
 use crate::data::Process;
 use crate::effects::background::ALTINTAS;
+use crate::effects::{At, Effect, Known, Site};
 use crate::effects::{Background, Size};
 use crate::parameter::Parameter;
 use crate::robot::Dual;
@@ -8,7 +10,7 @@ use crate::robot::Dual;
 /// Cutting coefficients rise as the chip gets thin: K ∝ (h / 0.1 mm)^−p.
 pub struct SizeEffect;
 
-impl CuttingEffect for SizeEffect {
+impl Effect<Cutting> for SizeEffect {
     fn id(&self) -> &'static str {
         "size-effect"
     }
@@ -37,21 +39,21 @@ impl CuttingEffect for SizeEffect {
         }
     }
 
-    fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
+    fn obstacle(&self, Known { data, .. }: &Known<Cutting>) -> Option<String> {
         let flat = data.process != Process::Milling && data.feeds < 3;
         flat.then(|| "needs three feeds: with fewer it is other cutting and edge coefficients".to_string())
             .or_else(|| straight_edge_only(data))
     }
 
-    fn parameters(&self, _variant: usize, _data: &CuttingSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, _known: &Known<Cutting>) -> Vec<Parameter> {
         vec![linear("p", "1", 0.15, 0.3, 0.0, [-0.5, 0.8])]
     }
 
-    fn starts(&self, _variant: usize, _data: &CuttingSummary) -> Vec<Vec<f64>> {
+    fn starts(&self, _at: At, _known: &Known<Cutting>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![0.35]]
     }
 
-    fn impossible(&self, sizes: &[Size]) -> Option<String> {
+    fn impossible(&self, _site: Site, _object: &(), sizes: &[Size]) -> Option<String> {
         sizes.first()?.outside(
             "an exponent",
             [0.0, 0.6],
@@ -60,11 +62,11 @@ impl CuttingEffect for SizeEffect {
         )
     }
 
-    fn vanishing(&self, _variant: usize, _parameters: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, _parameters: &[Parameter]) -> Option<Vec<f64>> {
         Some(vec![0.0])
     }
 
-    fn apply(&self, _variant: usize, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
+    fn apply(&self, _at: At, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
         physics.size_exponent = Some(values[0].clone());
     }
 }

@@ -1,6 +1,8 @@
-use super::effect::{CutPhysics, CutSetting, CuttingEffect, CuttingSummary, linear};
+use super::common::linear;
+use super::{CutPhysics, CutSetting, Cutting};
 use crate::data::Process;
 use crate::effects::background::{ALTINTAS, BUDAK};
+use crate::effects::{At, Effect, Known, Site};
 use crate::effects::{Background, Size};
 use crate::parameter::Parameter;
 use crate::robot::Dual;
@@ -8,7 +10,7 @@ use crate::robot::Dual;
 /// Cutting coefficients fall with cutting speed: K ∝ v^−q.
 pub struct SpeedDependence;
 
-impl CuttingEffect for SpeedDependence {
+impl Effect<Cutting> for SpeedDependence {
     fn id(&self) -> &'static str {
         "speed-dependence"
     }
@@ -32,20 +34,20 @@ impl CuttingEffect for SpeedDependence {
         }
     }
 
-    fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
+    fn obstacle(&self, Known { data, .. }: &Known<Cutting>) -> Option<String> {
         let [slow, fast] = data.speed_m_per_min;
         (fast < 1.05 * slow).then(|| "all cuts were made at one speed".to_string())
     }
 
-    fn parameters(&self, _variant: usize, _data: &CuttingSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, _known: &Known<Cutting>) -> Vec<Parameter> {
         vec![linear("q", "1", 0.1, 0.4, 0.0, [-2.0, 2.0])]
     }
 
-    fn starts(&self, _variant: usize, _data: &CuttingSummary) -> Vec<Vec<f64>> {
+    fn starts(&self, _at: At, _known: &Known<Cutting>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![-0.1], vec![0.4]]
     }
 
-    fn impossible(&self, sizes: &[Size]) -> Option<String> {
+    fn impossible(&self, _site: Site, _object: &(), sizes: &[Size]) -> Option<String> {
         sizes.first()?.outside(
             "an exponent",
             [-0.5, 0.7],
@@ -54,11 +56,11 @@ impl CuttingEffect for SpeedDependence {
         )
     }
 
-    fn vanishing(&self, _variant: usize, _parameters: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, _parameters: &[Parameter]) -> Option<Vec<f64>> {
         Some(vec![0.0])
     }
 
-    fn apply(&self, _variant: usize, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
+    fn apply(&self, _at: At, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
         let cutting: &[usize] = match setting.process {
             Process::Milling | Process::Turning => &[0, 1, 2],
             Process::Drilling => &[0, 2],

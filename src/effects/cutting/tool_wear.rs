@@ -1,5 +1,7 @@
-use super::effect::{CutPhysics, CutSetting, CuttingEffect, CuttingSummary, linear};
+use super::common::linear;
+use super::{CutPhysics, CutSetting, Cutting};
 use crate::data::Process;
+use crate::effects::{At, Effect, Known, Site};
 use crate::effects::{Background, Size};
 use crate::parameter::Parameter;
 use crate::robot::Dual;
@@ -7,7 +9,7 @@ use crate::robot::Dual;
 /// Edge coefficients grow along the sequence of cuts.
 pub struct ToolWear;
 
-impl CuttingEffect for ToolWear {
+impl Effect<Cutting> for ToolWear {
     fn id(&self) -> &'static str {
         "tool-wear"
     }
@@ -34,13 +36,13 @@ impl CuttingEffect for ToolWear {
         }
     }
 
-    fn obstacle(&self, data: &CuttingSummary) -> Option<String> {
+    fn obstacle(&self, Known { data, .. }: &Known<Cutting>) -> Option<String> {
         (data.sequence_length < 3)
             .then(|| "the campaign does not say in which order the cuts were made (order = n)".to_string())
             .or_else(|| (!data.has_edge).then(|| "the baseline has no edge coefficients".to_string()))
     }
 
-    fn parameters(&self, _variant: usize, data: &CuttingSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, Known { data, .. }: &Known<Cutting>) -> Vec<Parameter> {
         let directions: &[&str] = match data.process {
             Process::Milling | Process::Turning => &["t", "r", "a"],
             Process::Drilling => &["t", "f"],
@@ -51,7 +53,7 @@ impl CuttingEffect for ToolWear {
             .collect()
     }
 
-    fn impossible(&self, sizes: &[Size]) -> Option<String> {
+    fn impossible(&self, _site: Site, _object: &(), sizes: &[Size]) -> Option<String> {
         let growth = |size: &Size| {
             size.outside(
                 "a growth",
@@ -63,7 +65,7 @@ impl CuttingEffect for ToolWear {
         sizes.iter().find_map(growth)
     }
 
-    fn vanishing(&self, _variant: usize, p: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, p: &[Parameter]) -> Option<Vec<f64>> {
         Some(vec![1.0; p.len()])
     }
 
@@ -71,7 +73,7 @@ impl CuttingEffect for ToolWear {
         2
     }
 
-    fn apply(&self, _variant: usize, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
+    fn apply(&self, _at: At, values: &[Dual], setting: &CutSetting, physics: &mut CutPhysics) {
         let edges: &[usize] = match setting.process {
             Process::Milling | Process::Turning => &[3, 4, 5],
             Process::Drilling => &[1, 3],

@@ -1,7 +1,8 @@
 use crate::data::RobotSpec;
 use crate::effects::background::TUTTLE;
-use crate::effects::effect::{DataSummary, Setting, Site, StructuralEffect};
+use crate::effects::structural::{PostureSetting, Structure};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
+use crate::effects::{At, Effect, Known, Site};
 use crate::effects::{Background, Size};
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::{Chain, Dual, Role};
@@ -9,7 +10,7 @@ use crate::robot::{Chain, Dual, Role};
 /// Backlash or lost motion: a joint's stiffness differs between hammer levels.
 pub struct AmplitudeDependentStiffness;
 
-impl StructuralEffect for AmplitudeDependentStiffness {
+impl Effect<Structure> for AmplitudeDependentStiffness {
     fn id(&self) -> &'static str {
         "amplitude-dependent-stiffness"
     }
@@ -41,12 +42,12 @@ impl StructuralEffect for AmplitudeDependentStiffness {
         (1..=robot.joints.len()).map(Site::Joint).collect()
     }
 
-    fn obstacle(&self, _robot: &RobotSpec, data: &DataSummary) -> Option<String> {
+    fn obstacle(&self, Known { data, .. }: &Known<Structure>) -> Option<String> {
         (data.force_levels < 2)
             .then(|| "needs FRFs at two hammer levels (force_level_n in campaign.toml)".to_string())
     }
 
-    fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, _known: &Known<Structure>) -> Vec<Parameter> {
         vec![Parameter {
             name: "low_level_ratio".into(),
             unit: "1",
@@ -66,7 +67,7 @@ impl StructuralEffect for AmplitudeDependentStiffness {
         )
     }
 
-    fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
+    fn starts(&self, _at: At, _known: &Known<Structure>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![0.7], vec![1.2]]
     }
 
@@ -80,11 +81,11 @@ impl StructuralEffect for AmplitudeDependentStiffness {
         }
     }
 
-    fn vanishing(&self, _parameters: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, _parameters: &[Parameter]) -> Option<Vec<f64>> {
         Some(vec![1.0])
     }
 
-    fn apply(&self, site: Site, _variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {
+    fn apply(&self, At { site, .. }: At, values: &[Dual], setting: &PostureSetting, chain: &mut Chain) {
         let Site::Joint(i) = site else { return };
         // Exactly the ratio at the lowest level, geometric between the levels.
         let ln_ratio = values[0].chain(values[0].value.ln(), 1.0 / values[0].value);

@@ -3,15 +3,16 @@ use nalgebra::{DMatrix, Point3, Vector6};
 use crate::data::RobotSpec;
 use crate::effects::Background;
 use crate::effects::background::EWINS;
-use crate::effects::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
+use crate::effects::structural::{PostureSetting, Structure};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
+use crate::effects::{At, Effect, Known, NEGLIGIBLE, Site};
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::{Chain, Dual, Element, Place, Role, Slot};
 
 /// The pedestal rocks about the base x and y axes.
 pub struct BaseCompliance;
 
-impl StructuralEffect for BaseCompliance {
+impl Effect<Structure> for BaseCompliance {
     fn id(&self) -> &'static str {
         "base-compliance"
     }
@@ -40,7 +41,7 @@ impl StructuralEffect for BaseCompliance {
         vec![Site::Everywhere]
     }
 
-    fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, _known: &Known<Structure>) -> Vec<Parameter> {
         vec![Parameter {
             name: "rocking_nm_per_rad".into(),
             unit: "N·m/rad",
@@ -54,7 +55,7 @@ impl StructuralEffect for BaseCompliance {
         }]
     }
 
-    fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
+    fn starts(&self, _at: At, _known: &Known<Structure>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![3e6], vec![5e7]]
     }
 
@@ -68,11 +69,11 @@ impl StructuralEffect for BaseCompliance {
         }
     }
 
-    fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, parameters: &[Parameter]) -> Option<Vec<f64>> {
         Some(vec![NEGLIGIBLE.recip() * parameters[0].nominal])
     }
 
-    fn apply(&self, _site: Site, _variant: usize, values: &[Dual], _setting: &Setting, chain: &mut Chain) {
+    fn apply(&self, _at: At, values: &[Dual], _setting: &PostureSetting, chain: &mut Chain) {
         chain.elements.push(Element {
             role: Role::Base,
             place: Place::new(0, Slot::Joint),

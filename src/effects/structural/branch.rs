@@ -1,7 +1,7 @@
 //! What effects share that hang a mass on a spring.
 
 use crate::effects::Size;
-use crate::effects::effect::DataSummary;
+use crate::effects::structural::DataSummary;
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::Dual;
 

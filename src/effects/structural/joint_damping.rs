@@ -1,8 +1,9 @@
 use crate::data::RobotSpec;
 use crate::effects::Background;
 use crate::effects::background::EWINS;
-use crate::effects::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
+use crate::effects::structural::{PostureSetting, Structure};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
+use crate::effects::{At, Effect, Known, NEGLIGIBLE, Site};
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::{Chain, Dual, Role};
 
@@ -16,7 +17,7 @@ pub struct JointDamping;
 /// Damping time c/k that a few per cent of critical damping means at a robot's first modes, s.
 const DAMPING_TIME_S: f64 = 1.2e-3;
 
-impl StructuralEffect for JointDamping {
+impl Effect<Structure> for JointDamping {
     fn id(&self) -> &'static str {
         "joint-damping"
     }
@@ -47,7 +48,7 @@ impl StructuralEffect for JointDamping {
         vec![Site::Everywhere]
     }
 
-    fn parameters(&self, robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, Known { object: robot, .. }: &Known<Structure>) -> Vec<Parameter> {
         let dampers = robot.joints.iter().enumerate().map(|(i, joint)| {
             let nominal = DAMPING_TIME_S / joint.compliance_rad_per_nm;
             Parameter {
@@ -73,7 +74,12 @@ impl StructuralEffect for JointDamping {
         dampers.chain([share]).collect()
     }
 
-    fn starts(&self, robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
+    fn starts(
+        &self,
+        _at: At,
+        Known { object: robot, .. }: &Known<Structure>,
+        _peaks_hz: &[f64],
+    ) -> Vec<Vec<f64>> {
         let at = |factor: f64| {
             let c = move |j: &crate::data::JointSpec| factor * DAMPING_TIME_S / j.compliance_rad_per_nm;
             robot.joints.iter().map(c)
@@ -92,13 +98,13 @@ impl StructuralEffect for JointDamping {
         }
     }
 
-    fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, parameters: &[Parameter]) -> Option<Vec<f64>> {
         let (_, dampers) = parameters.split_last()?;
         let still = dampers.iter().map(|p| NEGLIGIBLE * p.nominal);
         Some(still.chain([1.0]).collect())
     }
 
-    fn apply(&self, _site: Site, _variant: usize, values: &[Dual], _setting: &Setting, chain: &mut Chain) {
+    fn apply(&self, _at: At, values: &[Dual], _setting: &PostureSetting, chain: &mut Chain) {
         let Some((share, dampers)) = values.split_last() else {
             return;
         };

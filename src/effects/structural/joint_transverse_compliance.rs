@@ -3,15 +3,16 @@ use nalgebra::{DMatrix, Vector6};
 use crate::data::RobotSpec;
 use crate::effects::Background;
 use crate::effects::background::{ABELE, MOBERG};
-use crate::effects::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
+use crate::effects::structural::{PostureSetting, Structure};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
+use crate::effects::{At, Effect, Known, NEGLIGIBLE, Site};
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::{Chain, Dual, Element, Place, Role, Slot};
 
 /// A joint's bearing tilts about both axes normal to the joint's own.
 pub struct JointTransverseCompliance;
 
-impl StructuralEffect for JointTransverseCompliance {
+impl Effect<Structure> for JointTransverseCompliance {
     fn id(&self) -> &'static str {
         "joint-transverse-compliance"
     }
@@ -42,7 +43,7 @@ impl StructuralEffect for JointTransverseCompliance {
         (2..robot.joints.len()).map(Site::Joint).collect()
     }
 
-    fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, _known: &Known<Structure>) -> Vec<Parameter> {
         vec![Parameter {
             name: "transverse_nm_per_rad".into(),
             unit: "N·m/rad",
@@ -56,7 +57,7 @@ impl StructuralEffect for JointTransverseCompliance {
         }]
     }
 
-    fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
+    fn starts(&self, _at: At, _known: &Known<Structure>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![7e5], vec![1.5e7]]
     }
 
@@ -70,11 +71,11 @@ impl StructuralEffect for JointTransverseCompliance {
         }
     }
 
-    fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, parameters: &[Parameter]) -> Option<Vec<f64>> {
         Some(vec![NEGLIGIBLE.recip() * parameters[0].nominal])
     }
 
-    fn apply(&self, site: Site, _variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {
+    fn apply(&self, At { site, .. }: At, values: &[Dual], setting: &PostureSetting, chain: &mut Chain) {
         let Site::Joint(i) = site else { return };
         let frame = setting.kinematics.joint_frame(i);
         let tilt = |axis: nalgebra::Vector3<f64>| {

@@ -1,7 +1,8 @@
 use crate::data::RobotSpec;
 use crate::effects::background::ABELE;
-use crate::effects::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
+use crate::effects::structural::{PostureSetting, Structure};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
+use crate::effects::{At, Effect, Known, NEGLIGIBLE, Site};
 use crate::effects::{Background, Size};
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::{Chain, Dual};
@@ -9,7 +10,7 @@ use crate::robot::{Chain, Dual};
 /// Links bend: every link a beam of its section, one common Young's modulus.
 pub struct LinkFlexibility;
 
-impl StructuralEffect for LinkFlexibility {
+impl Effect<Structure> for LinkFlexibility {
     fn id(&self) -> &'static str {
         "link-flexibility"
     }
@@ -43,7 +44,7 @@ impl StructuralEffect for LinkFlexibility {
         vec![Site::Everywhere]
     }
 
-    fn obstacle(&self, robot: &RobotSpec, _data: &DataSummary) -> Option<String> {
+    fn obstacle(&self, Known { object: robot, .. }: &Known<Structure>) -> Option<String> {
         robot
             .links
             .iter()
@@ -51,7 +52,7 @@ impl StructuralEffect for LinkFlexibility {
             .then(|| "the robot file gives no link a section".to_string())
     }
 
-    fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, _known: &Known<Structure>) -> Vec<Parameter> {
         vec![Parameter {
             name: "young_pa".into(),
             unit: "Pa",
@@ -74,7 +75,7 @@ impl StructuralEffect for LinkFlexibility {
         )
     }
 
-    fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
+    fn starts(&self, _at: At, _known: &Known<Structure>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![70e9], vec![500e9]]
     }
 
@@ -88,11 +89,11 @@ impl StructuralEffect for LinkFlexibility {
         }
     }
 
-    fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, parameters: &[Parameter]) -> Option<Vec<f64>> {
         Some(vec![NEGLIGIBLE.recip() * parameters[0].nominal])
     }
 
-    fn apply(&self, _site: Site, _variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {
+    fn apply(&self, _at: At, values: &[Dual], setting: &PostureSetting, chain: &mut Chain) {
         for i in 1..=setting.robot.joint_count() {
             chain
                 .elements

@@ -3,8 +3,9 @@ use nalgebra::Vector3;
 use crate::data::RobotSpec;
 use crate::effects::Background;
 use crate::effects::background::TUTTLE;
-use crate::effects::effect::{DataSummary, Setting, Site, StructuralEffect};
+use crate::effects::structural::{PostureSetting, Structure};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
+use crate::effects::{At, Effect, Known, Site};
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::{Chain, Dual, Role};
 
@@ -13,7 +14,7 @@ pub struct LoadDependentStiffness;
 
 const GRAVITY_M_PER_S2: f64 = 9.81;
 
-impl StructuralEffect for LoadDependentStiffness {
+impl Effect<Structure> for LoadDependentStiffness {
     fn id(&self) -> &'static str {
         "load-dependent-stiffness"
     }
@@ -41,11 +42,11 @@ impl StructuralEffect for LoadDependentStiffness {
         vec![Site::Everywhere]
     }
 
-    fn obstacle(&self, _robot: &RobotSpec, data: &DataSummary) -> Option<String> {
+    fn obstacle(&self, Known { data, .. }: &Known<Structure>) -> Option<String> {
         (data.postures < 2).then(|| "one posture shows one load only".to_string())
     }
 
-    fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, _known: &Known<Structure>) -> Vec<Parameter> {
         vec![Parameter {
             name: "beta".into(),
             unit: "1",
@@ -56,7 +57,7 @@ impl StructuralEffect for LoadDependentStiffness {
         }]
     }
 
-    fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
+    fn starts(&self, _at: At, _known: &Known<Structure>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![0.2]]
     }
 
@@ -70,7 +71,7 @@ impl StructuralEffect for LoadDependentStiffness {
         }
     }
 
-    fn vanishing(&self, _parameters: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, _parameters: &[Parameter]) -> Option<Vec<f64>> {
         Some(vec![0.0])
     }
 
@@ -78,7 +79,7 @@ impl StructuralEffect for LoadDependentStiffness {
         2
     }
 
-    fn apply(&self, _site: Site, _variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {
+    fn apply(&self, _at: At, values: &[Dual], setting: &PostureSetting, chain: &mut Chain) {
         for i in 1..=setting.robot.joint_count() {
             let axis = setting.kinematics.joint_axis(i);
             let origin = setting.kinematics.joint_origin(i);

@@ -1,9 +1,10 @@
 use nalgebra::Vector3;
 
 use crate::data::RobotSpec;
-use crate::effects::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
 use crate::effects::structural::branch;
+use crate::effects::structural::{PostureSetting, Structure};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
+use crate::effects::{At, Effect, Known, NEGLIGIBLE, Site};
 use crate::effects::{Background, Size};
 use crate::parameter::Parameter;
 use crate::robot::{Branch, Chain, Dual, Place, Slot};
@@ -13,7 +14,7 @@ pub struct LocalResonator;
 
 const MASS_KG: f64 = 6.0;
 
-impl StructuralEffect for LocalResonator {
+impl Effect<Structure> for LocalResonator {
     fn id(&self) -> &'static str {
         "local-resonator"
     }
@@ -43,15 +44,15 @@ impl StructuralEffect for LocalResonator {
         (2..=4.min(robot.links.len())).map(Site::Link).collect()
     }
 
-    fn variants(&self) -> usize {
-        3
+    fn variants(&self, _site: Site) -> Vec<usize> {
+        (0..3).collect()
     }
 
     fn variant_label(&self, variant: usize) -> Option<(&'static str, &'static str)> {
         ["x", "y", "z"].get(variant).map(|axis| ("direction", *axis))
     }
 
-    fn parameters(&self, _robot: &RobotSpec, data: &DataSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, Known { data, .. }: &Known<Structure>) -> Vec<Parameter> {
         branch::parameters(data, MASS_KG, 15.0)
     }
 
@@ -60,7 +61,7 @@ impl StructuralEffect for LocalResonator {
         branch::impossible(robot.links.get(i - 1)?.mass_kg, sizes)
     }
 
-    fn starts(&self, _robot: &RobotSpec, data: &DataSummary, peaks_hz: &[f64]) -> Vec<Vec<f64>> {
+    fn starts(&self, _at: At, Known { data, .. }: &Known<Structure>, peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         branch::starts(data, peaks_hz, MASS_KG)
     }
 
@@ -74,7 +75,7 @@ impl StructuralEffect for LocalResonator {
         }
     }
 
-    fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, parameters: &[Parameter]) -> Option<Vec<f64>> {
         Some(vec![
             NEGLIGIBLE * parameters[0].nominal,
             parameters[1].nominal,
@@ -82,7 +83,7 @@ impl StructuralEffect for LocalResonator {
         ])
     }
 
-    fn apply(&self, site: Site, variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {
+    fn apply(&self, At { site, variant }: At, values: &[Dual], setting: &PostureSetting, chain: &mut Chain) {
         let Site::Link(i) = site else { return };
         let (stiffness, damping) = branch::spring_and_damper(values);
         let (start, end) = setting.kinematics.link_ends(i);

@@ -3,6 +3,7 @@
 pub(crate) mod amplitude_dependent_stiffness;
 pub(crate) mod base_compliance;
 pub(crate) mod branch;
+mod domain;
 pub(crate) mod joint_damping;
 pub(crate) mod joint_transverse_compliance;
 pub(crate) mod link_flexibility;
@@ -12,3 +13,5 @@ pub(crate) mod payload;
 pub(crate) mod sensor_misalignment;
 pub(crate) mod time_delay;
 pub(crate) mod tool_flexibility;
+
+pub use domain::{ChannelFilter, DataSummary, PostureSetting, Structure};

@@ -1,8 +1,9 @@
 use nalgebra::{Matrix3, Point3};
 
 use crate::data::RobotSpec;
-use crate::effects::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
+use crate::effects::structural::{PostureSetting, Structure};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
+use crate::effects::{At, Effect, Known, NEGLIGIBLE, Site};
 use crate::effects::{Background, Size};
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::{Body, Chain, Dual, Place, Slot};
@@ -13,7 +14,7 @@ pub struct Payload;
 /// Where the mass sits: outside the flange along its z, m.
 const OUTSIDE_FLANGE_M: f64 = 0.05;
 
-impl StructuralEffect for Payload {
+impl Effect<Structure> for Payload {
     fn id(&self) -> &'static str {
         "payload"
     }
@@ -44,7 +45,7 @@ impl StructuralEffect for Payload {
         vec![Site::Everywhere]
     }
 
-    fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, _known: &Known<Structure>) -> Vec<Parameter> {
         vec![Parameter {
             name: "mass_kg".into(),
             unit: "kg",
@@ -68,7 +69,7 @@ impl StructuralEffect for Payload {
         )
     }
 
-    fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
+    fn starts(&self, _at: At, _known: &Known<Structure>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![5.0], vec![60.0]]
     }
 
@@ -82,7 +83,7 @@ impl StructuralEffect for Payload {
         }
     }
 
-    fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, parameters: &[Parameter]) -> Option<Vec<f64>> {
         Some(vec![NEGLIGIBLE * parameters[0].nominal])
     }
 
@@ -90,7 +91,7 @@ impl StructuralEffect for Payload {
         0
     }
 
-    fn apply(&self, _site: Site, _variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {
+    fn apply(&self, _at: At, values: &[Dual], setting: &PostureSetting, chain: &mut Chain) {
         let n = setting.robot.joint_count();
         chain.bodies.push(Body {
             place: Place::new(n, Slot::Body),

@@ -1,7 +1,8 @@
 use crate::data::RobotSpec;
 use crate::effects::background::EWINS;
-use crate::effects::effect::{ChannelFilter, DataSummary, Site, StructuralEffect};
+use crate::effects::structural::{ChannelFilter, Structure};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
+use crate::effects::{At, Effect, Known, Site};
 use crate::effects::{Background, Size};
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::Dual;
@@ -9,7 +10,7 @@ use crate::robot::Dual;
 /// Response axes turned by a small rotation: H_measured = Rᵀ H.
 pub struct SensorMisalignment;
 
-impl StructuralEffect for SensorMisalignment {
+impl Effect<Structure> for SensorMisalignment {
     fn id(&self) -> &'static str {
         "sensor-misalignment"
     }
@@ -43,7 +44,7 @@ impl StructuralEffect for SensorMisalignment {
         vec![Site::Everywhere]
     }
 
-    fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, _known: &Known<Structure>) -> Vec<Parameter> {
         (0..3)
             .map(|i| Parameter {
                 name: format!("rotation_vector_deg[{i}]"),
@@ -70,7 +71,7 @@ impl StructuralEffect for SensorMisalignment {
         )
     }
 
-    fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
+    fn starts(&self, _at: At, _known: &Known<Structure>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![-3.0, 3.0, -3.0]]
     }
 
@@ -84,11 +85,11 @@ impl StructuralEffect for SensorMisalignment {
         }
     }
 
-    fn vanishing(&self, _parameters: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, _parameters: &[Parameter]) -> Option<Vec<f64>> {
         Some(vec![0.0; 3])
     }
 
-    fn filter(&self, values: &[Dual], filter: &mut ChannelFilter) {
+    fn distort(&self, values: &[Dual], filter: &mut ChannelFilter) {
         let v: Vec<Dual> = values.iter().map(|d| d.scale(1f64.to_radians())).collect();
         let square = |d: &Dual| d * d;
         let s = &(&square(&v[0]) + &square(&v[1])) + &square(&v[2]);
@@ -147,7 +148,7 @@ mod tests {
         let degrees = [10.0, -20.0, 5.0f64];
         let values: Vec<Dual> = degrees.iter().map(|d| Dual::constant(*d)).collect();
         let mut filter = ChannelFilter::faithful();
-        SensorMisalignment.filter(&values, &mut filter);
+        SensorMisalignment.distort(&values, &mut filter);
         let v = nalgebra::Vector3::from(degrees.map(f64::to_radians));
         let rotation = nalgebra::Rotation3::new(v).into_inner().transpose();
         for i in 0..3 {

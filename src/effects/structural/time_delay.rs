@@ -1,7 +1,8 @@
 use crate::data::RobotSpec;
 use crate::effects::background::EWINS;
-use crate::effects::effect::{ChannelFilter, DataSummary, Site, StructuralEffect};
+use crate::effects::structural::{ChannelFilter, Structure};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
+use crate::effects::{At, Effect, Known, Site};
 use crate::effects::{Background, Size};
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::Dual;
@@ -9,7 +10,7 @@ use crate::robot::Dual;
 /// Response channel late against the force channel: factor exp(−iωτ).
 pub struct TimeDelay;
 
-impl StructuralEffect for TimeDelay {
+impl Effect<Structure> for TimeDelay {
     fn id(&self) -> &'static str {
         "time-delay"
     }
@@ -40,7 +41,7 @@ impl StructuralEffect for TimeDelay {
         vec![Site::Everywhere]
     }
 
-    fn parameters(&self, _robot: &RobotSpec, _data: &DataSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, _known: &Known<Structure>) -> Vec<Parameter> {
         vec![Parameter {
             name: "delay_s".into(),
             unit: "s",
@@ -60,7 +61,7 @@ impl StructuralEffect for TimeDelay {
         )
     }
 
-    fn starts(&self, _robot: &RobotSpec, _data: &DataSummary, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
+    fn starts(&self, _at: At, _known: &Known<Structure>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![2e-3], vec![-5e-4]]
     }
 
@@ -74,11 +75,11 @@ impl StructuralEffect for TimeDelay {
         }
     }
 
-    fn vanishing(&self, _parameters: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, _parameters: &[Parameter]) -> Option<Vec<f64>> {
         Some(vec![0.0])
     }
 
-    fn filter(&self, values: &[Dual], filter: &mut ChannelFilter) {
+    fn distort(&self, values: &[Dual], filter: &mut ChannelFilter) {
         filter.delay_s = &filter.delay_s + &values[0];
     }
 }

@@ -3,9 +3,10 @@ use nalgebra::Vector3;
 use crate::data::RobotSpec;
 use crate::effects::Background;
 use crate::effects::background::ALTINTAS;
-use crate::effects::effect::{DataSummary, NEGLIGIBLE, Setting, Site, StructuralEffect};
 use crate::effects::structural::branch;
+use crate::effects::structural::{PostureSetting, Structure};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
+use crate::effects::{At, Effect, Known, NEGLIGIBLE, Site};
 use crate::parameter::Parameter;
 use crate::robot::{Branch, Chain, Dual, Place, Slot};
 
@@ -14,7 +15,7 @@ pub struct ToolFlexibility;
 
 const MASS_KG: f64 = 4.0;
 
-impl StructuralEffect for ToolFlexibility {
+impl Effect<Structure> for ToolFlexibility {
     fn id(&self) -> &'static str {
         "tool-flexibility"
     }
@@ -47,11 +48,11 @@ impl StructuralEffect for ToolFlexibility {
         vec![Site::Everywhere]
     }
 
-    fn parameters(&self, _robot: &RobotSpec, data: &DataSummary) -> Vec<Parameter> {
+    fn parameters(&self, _at: At, Known { data, .. }: &Known<Structure>) -> Vec<Parameter> {
         branch::parameters(data, MASS_KG, 50.0)
     }
 
-    fn starts(&self, _robot: &RobotSpec, data: &DataSummary, peaks_hz: &[f64]) -> Vec<Vec<f64>> {
+    fn starts(&self, _at: At, Known { data, .. }: &Known<Structure>, peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         branch::starts(data, peaks_hz, MASS_KG)
     }
 
@@ -70,7 +71,7 @@ impl StructuralEffect for ToolFlexibility {
         }
     }
 
-    fn vanishing(&self, parameters: &[Parameter]) -> Option<Vec<f64>> {
+    fn vanishing(&self, _at: At, parameters: &[Parameter]) -> Option<Vec<f64>> {
         // A light tip on a hard spring: k = m ω² has to grow while the mass goes.
         Some(vec![
             NEGLIGIBLE * parameters[0].nominal,
@@ -79,7 +80,7 @@ impl StructuralEffect for ToolFlexibility {
         ])
     }
 
-    fn apply(&self, _site: Site, _variant: usize, values: &[Dual], setting: &Setting, chain: &mut Chain) {
+    fn apply(&self, _at: At, values: &[Dual], setting: &PostureSetting, chain: &mut Chain) {
         let (stiffness, damping) = branch::spring_and_damper(values);
         let rotation = setting.kinematics.tool.rotation;
         chain.branches.push(Branch {

@@ -1,38 +1,32 @@
 //! The cutting force model as a function of its parameters.
 
-use std::ops::Range;
-
 use crate::cutting::waveform::DrillTerm;
 use crate::cutting::{ForceAxis, coefficients_of, edge_row};
 use crate::data::Process;
-use crate::effects::cutting::{CutPhysics, CuttingInstance};
+use crate::effects::cutting::{CutPhysics, CuttingSummary};
+use crate::effects::{Cutting, Known};
 use crate::identify::forces::cutting_data::{CutData, CutKind, CuttingData};
-use crate::parameter::{Parameter, Prior, Scale, is_vanished};
+use crate::identify::model::{Model, Modelled};
+use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::Dual;
 use crate::{Error, Result};
 
-/// Coefficients of one material and what may be tuned.
+/// Coefficients of one material and what may be tuned: milling and turning Ktc Krc Kac Kte Kre Kae, drilling Ktc Kte Kfc Kfe
+/// (without the edge coefficients where the baseline has none), then the parameters of each added effect.
+pub type CuttingModel = Model<Cutting>;
+
+/// What of a cutting model is not tuned.
 #[derive(Debug, Clone)]
-pub struct CuttingModel {
+pub struct CuttingParts {
     /// What the coefficients are of.
     pub process: Process,
-    /// Those of the baseline (milling and turning Ktc Krc Kac Kte Kre Kae, drilling Ktc Kte Kfc Kfe; without the edge coefficients
-    /// where the baseline has none), then those of each added effect.
-    pub parameters: Vec<Parameter>,
     /// Whether edge coefficients are part of the baseline.
     pub has_edge: bool,
-    effects: Vec<AddedCuttingEffect>,
-    /// Where fits start on the solver's scale; the nominal values if not given.
-    start: Option<Vec<f64>>,
 }
 
-/// An effect in the model and where its parameters stand in the list.
-#[derive(Debug, Clone)]
-pub struct AddedCuttingEffect {
-    /// The effect with its discrete choice.
-    pub instance: CuttingInstance,
-    /// Where its own parameters stand in the model's list.
-    pub parameters: Range<usize>,
+impl Modelled for Cutting {
+    type Fixed = CuttingParts;
+    type Data = CuttingData;
 }
 
 /// A coefficient's prior is this many times wider than the largest coefficient: it only keeps the fit finite where the
@@ -66,125 +60,37 @@ impl CuttingModel {
                 }
             })
             .collect();
-        Ok(CuttingModel {
+        let parts = CuttingParts {
             process: data.process,
-            parameters,
             has_edge,
-            effects: Vec::new(),
-            start: None,
-        })
+        };
+        Ok(Model::of(parts, parameters))
     }
 
-    /// What effects are asked with: the data's summary with the scale of this model's coefficients.
-    pub fn summary(&self, data: &CuttingData) -> crate::effects::cutting::CuttingSummary {
+    /// What effects are told of the cuts.
+    pub fn known(&self, data: &CuttingData) -> Known<'static, Cutting> {
+        Known::cuts(self.summary(data))
+    }
+
+    /// The data's summary with the scale of this model's coefficients.
+    pub fn summary(&self, data: &CuttingData) -> CuttingSummary {
         let own = self.parameters.iter().take(coefficients_of(self.process).len());
         let scale = own
             .filter(|p| p.unit == "N/mm²")
             .fold(1.0f64, |m, p| m.max(p.nominal.abs()));
-        crate::effects::cutting::CuttingSummary {
+        CuttingSummary {
             has_edge: self.has_edge,
             cutting_scale_n_per_mm2: scale,
             ..data.summary.clone()
         }
     }
 
-    /// The same model with one more effect; its parameters come last.
-    pub fn with_effect(&self, instance: CuttingInstance, data: &CuttingData) -> Self {
-        let mut model = self.clone();
-        model.start = None;
-        let first = model.parameters.len();
-        for mut parameter in instance.effect.parameters(instance.variant, &self.summary(data)) {
-            parameter.name = format!("{}.{}", instance.label(), parameter.name);
-            model.parameters.push(parameter);
-        }
-        model.effects.push(AddedCuttingEffect {
-            instance,
-            parameters: first..model.parameters.len(),
-        });
-        model
-    }
-
-    /// The effects that were added, in their order.
-    pub fn effects(&self) -> &[AddedCuttingEffect] {
-        &self.effects
-    }
-
-    /// Nominal values on the solver's scale.
-    pub fn nominal_theta(&self) -> Vec<f64> {
-        self.parameters.iter().map(|p| p.internal(p.nominal)).collect()
-    }
-
-    /// The same model, whose fits start from `theta`.
-    pub fn with_start(&self, theta: Vec<f64>) -> Self {
-        let mut model = CuttingModel {
-            start: None,
-            ..self.clone()
-        };
-        if theta.len() != model.parameters.len() {
-            return model;
-        }
-        let bounds = model.bounds();
-        let mut start: Vec<f64> = theta
-            .iter()
-            .zip(&bounds)
-            .map(|(t, b)| t.clamp(b[0], b[1]))
-            .collect();
-        for added in model.effects.iter().filter(|added| model.vanished(&theta, added)) {
-            start[added.parameters.clone()].copy_from_slice(&theta[added.parameters.clone()]);
-        }
-        model.start = Some(start);
-        model
-    }
-
-    /// Values of the effect's own parameters at which it is not there, solver's scale.
-    pub fn vanishing(&self, added: &AddedCuttingEffect) -> Option<Vec<f64>> {
-        let own = &self.parameters[added.parameters.clone()];
-        let values = added.instance.effect.vanishing(added.instance.variant, own)?;
-        Some(own.iter().zip(values).map(|(p, v)| p.internal(v)).collect())
-    }
-
-    fn vanished(&self, theta: &[f64], added: &AddedCuttingEffect) -> bool {
-        let own = added.parameters.clone();
-        self.vanishing(added)
-            .is_some_and(|limit| is_vanished(&self.parameters[own.clone()], &limit, &theta[own]))
-    }
-
-    /// Where fits start, on the solver's scale.
-    pub fn start(&self) -> Vec<f64> {
-        self.start.clone().unwrap_or_else(|| self.nominal_theta())
-    }
-
-    /// Where a fit may go, solver's scale. An effect that had vanished where the model starts is held there.
-    pub fn bounds(&self) -> Vec<[f64; 2]> {
-        let mut bounds: Vec<[f64; 2]> = self.parameters.iter().map(Parameter::internal_bounds).collect();
-        if let Some(start) = &self.start {
-            for added in self.effects.iter().filter(|added| self.vanished(start, added)) {
-                for i in added.parameters.clone() {
-                    bounds[i] = [start[i]; 2];
-                }
-            }
-        }
-        bounds
-    }
-
     /// Free amplitudes fitted to each cut and channel beyond a straight zero line.
     pub fn nuisances_per_channel(&self) -> usize {
-        self.effects
+        self.effects()
             .iter()
-            .map(|e| e.instance.effect.nuisances_per_channel(e.instance.variant))
+            .map(|e| e.instance.effect.nuisances_per_channel(e.instance.at()))
             .sum()
-    }
-
-    fn value(&self, theta: &[f64], i: usize, derivatives: bool) -> Dual {
-        let natural = self.parameters[i].natural(theta[i]);
-        if !derivatives {
-            return Dual::constant(natural);
-        }
-        let variable = Dual::variable(theta[i], i, theta.len());
-        match self.parameters[i].scale {
-            Scale::Logarithmic => variable.chain(natural, natural),
-            Scale::Linear => variable,
-        }
     }
 
     /// What this cut's forces are made with, all effects applied.
@@ -213,16 +119,12 @@ impl CuttingModel {
             leak_per_s: None,
             vibration: None,
         };
-        let mut order: Vec<&AddedCuttingEffect> = self.effects.iter().collect();
-        order.sort_by_key(|added| added.instance.effect.order());
-        for added in order {
-            let values: Vec<Dual> = added
-                .parameters
-                .clone()
-                .map(|i| self.value(theta, i, derivatives))
-                .collect();
-            let CuttingInstance { effect, variant } = added.instance;
-            effect.apply(variant, &values, &cut.setting, &mut physics);
+        for added in self.effects_in_order() {
+            let values = self.values(theta, added, derivatives);
+            let instance = added.instance;
+            instance
+                .effect
+                .apply(instance.at(), &values, &cut.setting, &mut physics);
         }
         physics
     }

@@ -3,18 +3,16 @@
 use num_complex::Complex64;
 
 use crate::Result;
-use crate::effects::Size;
-use crate::effects::cutting::{CuttingInstance, CuttingSummary, instances};
+use crate::effects::{Cutting, Known, Registry};
 use crate::identify::forces::cutting_data::CuttingData;
 use crate::identify::forces::cutting_model::CuttingModel;
 use crate::identify::forces::cutting_problem::{CutFit, CuttingProblem};
 use crate::identify::forces::cutting_waves::axis_waves;
-use crate::identify::frfs::calibrate::{Calibration, Estimate, covariance, estimates};
-use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
+use crate::identify::frfs::calibrate::Calibration;
+use crate::identify::levenberg_marquardt::{Stopping, minimise};
 use crate::identify::rest::{Rest, RestTest, SMALL_ERROR};
 use crate::identify::rest_patterns;
-use crate::identify::study::{EffectName, Extent, HeldOut, Residual, Study, View, held_out};
-use crate::parameter::Parameter;
+use crate::identify::study::{Extent, HeldOut, Residual, Study, View, held_out};
 
 /// A campaign's force records of one process, arranged for the loop.
 #[derive(Debug, Clone)]
@@ -24,6 +22,7 @@ pub struct CuttingStudy {
     /// Cuts of each fold, and the data without them.
     folds: Vec<Vec<usize>>,
     without: Vec<CuttingData>,
+    registry: Registry<Cutting>,
 }
 
 /// Cuts are left out in this many groups, spread over the campaign.
@@ -40,72 +39,30 @@ impl CuttingStudy {
             .iter()
             .map(|fold| data.filtered(|i| !fold.contains(&i)))
             .collect();
-        CuttingStudy { data, folds, without }
+        CuttingStudy {
+            data,
+            folds,
+            without,
+            registry: Registry::cutting(),
+        }
+    }
+
+    /// The same study, which tries these effects.
+    pub fn with_registry(self, registry: Registry<Cutting>) -> Self {
+        CuttingStudy { registry, ..self }
     }
 }
 
 impl Study for CuttingStudy {
-    type Model = CuttingModel;
-    type Instance = CuttingInstance;
+    type Domain = Cutting;
     type Problem<'a> = CuttingProblem<'a>;
-    type Hints = CuttingSummary;
 
-    fn parameters<'m>(&self, model: &'m CuttingModel) -> &'m [Parameter] {
-        &model.parameters
+    fn registry(&self) -> &Registry<Cutting> {
+        &self.registry
     }
 
-    fn instances(&self, model: &CuttingModel) -> (Vec<CuttingInstance>, Vec<(String, String)>) {
-        let summary = model.summary(&self.data);
-        let (mut tried, mut not_tried) = (Vec::new(), Vec::new());
-        for instance in instances() {
-            let label = instance.label();
-            if model
-                .effects()
-                .iter()
-                .any(|added| added.instance.label() == label)
-            {
-                continue;
-            }
-            match instance.effect.obstacle(&summary) {
-                Some(reason) => not_tried.push((label, reason)),
-                None => tried.push(instance),
-            }
-        }
-        not_tried.dedup();
-        (tried, not_tried)
-    }
-
-    fn name(&self, instance: &CuttingInstance) -> EffectName {
-        let variant = instance.effect.variant_label(instance.variant);
-        EffectName {
-            effect: instance.effect.id().into(),
-            site: None,
-            variant: variant.map(|(key, value)| (key.into(), value.into())),
-        }
-    }
-
-    fn extend(&self, model: &CuttingModel, instance: &CuttingInstance) -> CuttingModel {
-        model.with_effect(*instance, &self.data)
-    }
-
-    fn vanishing(&self, model: &CuttingModel) -> Option<Vec<f64>> {
-        model.vanishing(model.effects().last()?)
-    }
-
-    fn bounds(&self, model: &CuttingModel) -> Vec<[f64; 2]> {
-        model.bounds()
-    }
-
-    fn starting_from(&self, model: &CuttingModel, theta: Vec<f64>) -> CuttingModel {
-        model.with_start(theta)
-    }
-
-    fn hints(&self, model: &CuttingModel, _theta: &[f64]) -> Result<CuttingSummary> {
-        Ok(model.summary(&self.data))
-    }
-
-    fn starts(&self, instance: &CuttingInstance, summary: &CuttingSummary) -> Vec<Vec<f64>> {
-        instance.effect.starts(instance.variant, summary)
+    fn known<'a>(&'a self, model: &'a CuttingModel) -> Known<'a, Cutting> {
+        model.known(&self.data)
     }
 
     /// One misfit serves near and far, and all data are few enough for every view.
@@ -175,16 +132,6 @@ impl Study for CuttingStudy {
         })
     }
 
-    fn impossible(
-        &self,
-        _model: &CuttingModel,
-        instance: &CuttingInstance,
-        own: &[Estimate],
-    ) -> Option<String> {
-        let sizes: Vec<Size> = own.iter().map(Estimate::size).collect();
-        instance.effect.impossible(&sizes)
-    }
-
     fn calibrate(&self, model: &CuttingModel) -> Result<Calibration> {
         calibrate_cutting(model, &self.data)
     }
@@ -195,26 +142,11 @@ impl Study for CuttingStudy {
 pub fn calibrate_cutting(model: &CuttingModel, data: &CuttingData) -> Result<Calibration> {
     let fit = minimise(
         &CuttingProblem { model, data },
-        &model.start(),
+        model.start().unwrap_or(&model.nominal_theta()),
         &model.bounds(),
         Stopping::default(),
     )?;
-    calibration(model, data, fit)
-}
-
-fn calibration(model: &CuttingModel, data: &CuttingData, fit: Fit) -> Result<Calibration> {
-    let freedom = data.value_count() as f64 - model.parameters.len() as f64;
-    let reduced_chi2 = 2.0 * fit.cost / freedom.max(1.0);
-    Ok(Calibration {
-        parameters: estimates(&model.parameters, &fit, reduced_chi2)?,
-        covariance: covariance(&fit, reduced_chi2)?,
-        theta: fit.theta,
-        reduced_chi2,
-        iterations: fit.iterations,
-        ending: fit.ending,
-        starts: 1,
-        starts_agreeing: 1,
-    })
+    Calibration::of_fit(&model.parameters, fit, data.value_count())
 }
 
 /// Error on cuts left out in turn, refitted from `theta` on the others. `None` with fewer than two cuts.

@@ -98,6 +98,26 @@ impl Calibration {
             .collect()
     }
 
+    /// A fit from one starting point to so many real values: estimates with errors that are widened where the misfit exceeds
+    /// the noise.
+    ///
+    /// # Errors
+    /// Parameters that the fit does not determine.
+    pub fn of_fit(parameters: &[Parameter], fit: Fit, real_values: usize) -> Result<Self> {
+        let freedom = real_values as f64 - parameters.len() as f64;
+        let reduced_chi2 = 2.0 * fit.cost / freedom.max(1.0);
+        Ok(Calibration {
+            parameters: estimates(parameters, &fit, reduced_chi2)?,
+            covariance: covariance(&fit, reduced_chi2)?,
+            theta: fit.theta,
+            reduced_chi2,
+            iterations: fit.iterations,
+            ending: fit.ending,
+            starts: 1,
+            starts_agreeing: 1,
+        })
+    }
+
     /// Whether the solver found the optimum that it was looking for.
     pub fn converged(&self) -> bool {
         self.ending == Ending::Converged

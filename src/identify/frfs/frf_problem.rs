@@ -277,7 +277,7 @@ impl StructureModel {
 mod tests {
     use super::*;
     use crate::data::{AxesRef, Axis, BodyRef, MeasuredDof, Point, RobotSection};
-    use crate::effects::{self, Spot};
+    use crate::effects::{self, Registry, Spot};
     use crate::robot::RobotModel;
     use crate::robot::fixture::{TAP_POSTURES, irb6640};
 
@@ -390,7 +390,7 @@ mod tests {
         let bare = model();
         let data = data(&bare);
         let summary = data.summary();
-        let resonator = effects::find(&bare.robot.spec, "local-resonator@link-3");
+        let resonator = Registry::structure().find(&bare.robot.spec, "local-resonator@link-3");
         let drawn = [
             Spot::LinkAxis(5, 2),
             Spot::ToolGround(0),
@@ -403,11 +403,15 @@ mod tests {
             let forms = effects::drawn::forms(spot).iter();
             forms.map(move |form| effects::drawn::instance(spot, *form))
         });
-        for instance in effects::instances(&bare.robot.spec).into_iter().chain(drawn) {
+        for instance in Registry::structure()
+            .instances(&bare.robot.spec)
+            .into_iter()
+            .chain(drawn)
+        {
             for also in [None, resonator.first()] {
-                let mut model = bare.with_effect(instance, &summary);
+                let mut model = bare.with_effect(instance, &bare.known(&summary));
                 if let Some(also) = also {
-                    model = model.with_effect(*also, &summary);
+                    model = model.with_effect(*also, &model.known(&summary));
                 }
                 let mut theta = model.nominal_theta();
                 for (i, t) in theta.iter_mut().enumerate() {
@@ -435,9 +439,9 @@ mod tests {
             Some("tool-flexibility"),
             Some("joint-damping"),
         ] {
-            let effect = label.map(|label| effects::find(&free.robot.spec, label)[0]);
+            let effect = label.map(|label| Registry::structure().find(&free.robot.spec, label)[0]);
             let model = match effect {
-                Some(instance) => free.with_effect(instance, &summary),
+                Some(instance) => free.with_effect(instance, &free.known(&summary)),
                 None => free.clone(),
             };
             let mut theta = model.nominal_theta();

@@ -1,7 +1,6 @@
 //! The structural model and its FRFs.
 
 pub mod calibrate;
-pub mod case;
 pub(crate) mod channels;
 pub mod frf_data;
 pub mod frf_problem;
@@ -10,5 +9,6 @@ pub mod posture_modes;
 pub mod sensitivity;
 pub mod spot_response;
 pub mod structure;
+pub mod structure_case;
 pub mod structure_study;
 pub mod undetermined;

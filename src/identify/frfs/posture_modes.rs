@@ -140,7 +140,7 @@ pub fn posture_modes(
 mod tests {
     use super::*;
     use crate::data::RobotSection;
-    use crate::effects::{DataSummary, find};
+    use crate::effects::{DataSummary, Registry};
     use crate::robot::fixture::{TAP_POSTURES, irb6640};
     use crate::robot::{FrfBasis, RobotModel};
 
@@ -158,7 +158,10 @@ mod tests {
             lowest_hz: 5.0,
             highest_hz: 50.0,
         };
-        model.with_effect(find(&irb6640(), effect)[0], &data)
+        model.with_effect(
+            Registry::structure().find(&irb6640(), effect)[0],
+            &model.known(&data),
+        )
     }
 
     #[test]

@@ -1,49 +1,42 @@
 //! The structural model as a function of its parameters.
 
 use std::borrow::Cow;
-use std::ops::Range;
 
 use nalgebra::DVector;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
 use crate::data::{Point, RobotSection};
-use crate::effects::{ChannelFilter, DataSummary, Instance, Setting};
+use crate::effects::{ChannelFilter, DataSummary, Known, PostureSetting, Structure};
 use crate::identify::frfs::channels::Channels;
 use crate::identify::frfs::frf_data::{FrfBlock, FrfData};
-use crate::parameter::{Parameter, Prior, Scale, is_vanished};
+use crate::identify::model::{Model, Modelled};
+use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::frf::{Response, RowSlopes};
 use crate::robot::model::NOMINAL_DAMPING_RATIO;
 use crate::robot::{Baseline, Chain, Dual, FileNumber, FrfBasis, Kinematics, RobotModel, System};
 use crate::{Result, stop};
 
 /// Robot, measurement points and the list of what may be tuned.
+pub type StructureModel = Model<Structure>;
+
+/// What of a structural model is not tuned, and which parameter each of the robot file's numbers is that are.
 #[derive(Debug, Clone)]
-pub struct StructureModel {
+pub struct StructureParts {
     /// As the robot file has it.
     pub robot: RobotModel,
     /// Where FRFs were measured; FRFs name them by index.
     pub points: Vec<Point>,
-    /// Those of the baseline, then those of each added effect.
-    pub parameters: Vec<Parameter>,
     /// For each link, which parameter its mass is, where it is tuned.
     masses: Vec<Option<usize>>,
     /// Further numbers of the robot file that are tuned, in the order of their parameters, and the first of those.
     file_numbers: Vec<FileNumber>,
     first_file_number: usize,
-    /// In the order in which they were added.
-    effects: Vec<AddedEffect>,
-    /// A solution found earlier, solver's scale: where fits start.
-    start: Option<Vec<f64>>,
 }
 
-/// An effect in the model and where its parameters stand in the list.
-#[derive(Debug, Clone)]
-pub struct AddedEffect {
-    /// The effect with its place and discrete choice.
-    pub instance: Instance,
-    /// Where its own parameters stand in the model's list.
-    pub parameters: Range<usize>,
+impl Modelled for Structure {
+    type Fixed = StructureParts;
+    type Data = FrfData;
 }
 
 /// The groups of the robot file's numbers that a section frees, each with the standard deviation of its parameters on the
@@ -176,132 +169,19 @@ impl StructureModel {
                 file_numbers.push(number);
             }
         }
-        StructureModel {
+        let parts = StructureParts {
             robot,
             points,
-            parameters,
             masses,
             file_numbers,
             first_file_number,
-            effects: Vec::new(),
-            start: None,
-        }
+        };
+        Model::of(parts, parameters)
     }
 
-    /// The same model with a solution found earlier (solver's scale) to start from.
-    pub fn with_start(&self, theta: Vec<f64>) -> Self {
-        let mut model = self.without_start();
-        if theta.len() != model.parameters.len() {
-            return model;
-        }
-        let bounds = model.bounds();
-        let mut start: Vec<f64> = theta
-            .iter()
-            .zip(&bounds)
-            .map(|(t, b)| t.clamp(b[0], b[1]))
-            .collect();
-        for added in model.effects.iter().filter(|added| model.vanished(&theta, added)) {
-            start[added.parameters.clone()].copy_from_slice(&theta[added.parameters.clone()]);
-        }
-        model.start = Some(start);
-        model
-    }
-
-    /// Values of the effect's own parameters at which it is not there, solver's scale.
-    pub fn vanishing(&self, added: &AddedEffect) -> Option<Vec<f64>> {
-        let own = &self.parameters[added.parameters.clone()];
-        let values = added.instance.effect.vanishing(own)?;
-        Some(own.iter().zip(values).map(|(p, v)| p.internal(v)).collect())
-    }
-
-    fn vanished(&self, theta: &[f64], added: &AddedEffect) -> bool {
-        let own = added.parameters.clone();
-        self.vanishing(added)
-            .is_some_and(|limit| is_vanished(&self.parameters[own.clone()], &limit, &theta[own]))
-    }
-
-    /// The same model, whose fits start from the nominal values.
-    pub fn without_start(&self) -> Self {
-        StructureModel {
-            start: None,
-            ..self.clone()
-        }
-    }
-
-    /// A solution found earlier, solver's scale; effects added since stand at their nominal values.
-    pub fn start(&self) -> Option<&[f64]> {
-        self.start.as_deref()
-    }
-
-    /// The same model with one more effect; its parameters come last.
-    pub fn with_effect(&self, instance: Instance, data: &DataSummary) -> Self {
-        let mut model = self.clone();
-        let first = model.parameters.len();
-        for mut parameter in
-            instance
-                .effect
-                .parameters_at(instance.site, instance.variant, &self.robot.spec, data)
-        {
-            parameter.name = format!("{}.{}", instance.label(), parameter.name);
-            if let Some(start) = &mut model.start {
-                start.push(parameter.internal(parameter.nominal));
-            }
-            model.parameters.push(parameter);
-        }
-        model.effects.push(AddedEffect {
-            instance,
-            parameters: first..model.parameters.len(),
-        });
-        model
-    }
-
-    /// The effects that were added, in their order.
-    pub fn effects(&self) -> &[AddedEffect] {
-        &self.effects
-    }
-
-    /// Whether `effect@site` is in the model, with whatever discrete choice.
-    pub fn has(&self, label: &str) -> bool {
-        self.effects.iter().any(|added| added.instance.label() == label)
-    }
-
-    /// Number of parameters of the baseline; those of the effects come after them.
-    pub fn baseline_parameter_count(&self) -> usize {
-        self.effects
-            .first()
-            .map_or(self.parameters.len(), |added| added.parameters.start)
-    }
-
-    /// Nominal values on the solver's scale.
-    pub fn nominal_theta(&self) -> Vec<f64> {
-        self.parameters.iter().map(|p| p.internal(p.nominal)).collect()
-    }
-
-    /// Where a fit may go, solver's scale. An effect that had vanished where the model starts is held there: its
-    /// parameters mean nothing, and every step back into their range would make the fit worse.
-    pub fn bounds(&self) -> Vec<[f64; 2]> {
-        let mut bounds: Vec<[f64; 2]> = self.parameters.iter().map(Parameter::internal_bounds).collect();
-        if let Some(start) = &self.start {
-            for added in self.effects.iter().filter(|added| self.vanished(start, added)) {
-                for i in added.parameters.clone() {
-                    bounds[i] = [start[i]; 2];
-                }
-            }
-        }
-        bounds
-    }
-
-    /// Parameter `i` in natural units as a variable of the solver's scale.
-    fn value(&self, theta: &[f64], i: usize, with_derivatives: bool) -> Dual {
-        let natural = self.parameters[i].natural(theta[i]);
-        if !with_derivatives {
-            return Dual::constant(natural);
-        }
-        let variable = Dual::variable(theta[i], i, theta.len());
-        match self.parameters[i].scale {
-            Scale::Logarithmic => variable.chain(natural, natural),
-            Scale::Linear => variable,
-        }
+    /// What effects are told: this robot, and a summary of its FRFs.
+    pub fn known(&self, data: &DataSummary) -> Known<'_, Structure> {
+        Known::robot(&self.robot.spec, *data)
     }
 
     /// The baseline's quantities at `theta` (solver's scale), with derivatives if asked for.
@@ -357,7 +237,7 @@ impl StructureModel {
         (robot, kinematics)
     }
 
-    /// The chain at a posture with all effects; `kinematics` as the robot file has them. `lowness`: see [`Setting`].
+    /// The chain at a posture with all effects; `kinematics` as the robot file has them. `lowness`: see [`PostureSetting`].
     pub fn chain(
         &self,
         theta: &[f64],
@@ -386,39 +266,27 @@ impl StructureModel {
                 body.inertia_follows_mass = false;
             }
         }
-        let setting = Setting {
+        let setting = PostureSetting {
             robot: &robot,
             kinematics: &kinematics,
             lowness,
         };
-        let mut order: Vec<&AddedEffect> = self.effects.iter().collect();
-        order.sort_by_key(|added| added.instance.effect.order());
-        for added in order {
+        for added in self.effects_in_order() {
             let values = self.values(theta, added, with_derivatives);
-            let Instance {
-                effect,
-                site,
-                variant,
-            } = added.instance;
-            effect.apply(site, variant, &values, &setting, &mut chain);
+            let instance = added.instance;
+            instance
+                .effect
+                .apply(instance.at(), &values, &setting, &mut chain);
         }
         chain
-    }
-
-    fn values(&self, theta: &[f64], added: &AddedEffect, with_derivatives: bool) -> Vec<Dual> {
-        added
-            .parameters
-            .clone()
-            .map(|i| self.value(theta, i, with_derivatives))
-            .collect()
     }
 
     /// What the effects do to the response channels.
     pub fn filter(&self, theta: &[f64], with_derivatives: bool) -> ChannelFilter {
         let mut filter = ChannelFilter::faithful();
-        for added in &self.effects {
+        for added in self.effects() {
             let values = self.values(theta, added, with_derivatives);
-            added.instance.effect.filter(&values, &mut filter);
+            added.instance.effect.distort(&values, &mut filter);
         }
         filter
     }

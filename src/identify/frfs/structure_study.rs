@@ -3,17 +3,15 @@
 use num_complex::Complex64;
 
 use crate::Result;
-use crate::data::RobotSpec;
-use crate::effects::{self, DataSummary, Instance};
-use crate::identify::frfs::calibrate::{Calibration, Estimate, GLANCE_VALUES, Options, calibrate, sketch};
+use crate::effects::{DataSummary, Known, Registry, Structure};
+use crate::identify::frfs::calibrate::{Calibration, GLANCE_VALUES, Options, calibrate, sketch};
 use crate::identify::frfs::frf_data::FrfData;
 use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
 use crate::identify::frfs::structure::StructureModel;
 use crate::identify::levenberg_marquardt::Stopping;
 use crate::identify::rest::{AfterSlips, BeyondSlips, Rest, RestCurve, SMALL_ERROR};
 use crate::identify::rest_patterns;
-use crate::identify::study::{EffectName, Extent, HeldOut, Measure, Residual, Study, View, held_out};
-use crate::parameter::Parameter;
+use crate::identify::study::{Extent, HeldOut, Measure, Residual, Study, View, held_out};
 
 /// Takes what small errors of the setup can out of the rest of a model at its optimum on data.
 pub type AbsorbSlips = fn(&StructureModel, &FrfData, &[f64], &[RestCurve]) -> Result<AfterSlips>;
@@ -35,7 +33,7 @@ pub struct StructureStudy {
     coarse_without: Vec<FrfData>,
     full_without: Vec<FrfData>,
     summary: DataSummary,
-    robot: RobotSpec,
+    registry: Registry<Structure>,
 }
 
 /// Lines between those that the coarse view keeps, at most.
@@ -44,8 +42,8 @@ const LARGEST_STRIDE: usize = 6;
 const COARSE_VALUES: usize = 2500;
 
 impl StructureStudy {
-    /// FRFs of a robot, with the thinner views that searches use.
-    pub fn new(robot: &RobotSpec, data: FrfData, options: Options) -> Self {
+    /// FRFs, with the thinner views that searches use.
+    pub fn new(data: FrfData, options: Options) -> Self {
         let share = data.value_count().div_ceil(COARSE_VALUES);
         // A resonance needs its few lines: measurements with coarse lines are left alone.
         let lines = data
@@ -66,7 +64,7 @@ impl StructureStudy {
             coarse_without: without(&coarse),
             full_without: without(&data),
             summary: data.summary(),
-            robot: robot.clone(),
+            registry: Registry::structure(),
             coarse,
             postures,
             data,
@@ -82,6 +80,11 @@ impl StructureStudy {
             measured: start,
             ..self
         }
+    }
+
+    /// The same study, which tries these effects.
+    pub fn with_registry(self, registry: Registry<Structure>) -> Self {
+        StructureStudy { registry, ..self }
     }
 
     /// The same study, which knows what small errors of the setup do.
@@ -105,70 +108,21 @@ impl StructureStudy {
 }
 
 impl Study for StructureStudy {
-    type Model = StructureModel;
-    type Instance = Instance;
+    type Domain = Structure;
     type Problem<'a> = FrfProblem<'a>;
-    type Hints = Vec<f64>;
 
-    fn parameters<'m>(&self, model: &'m StructureModel) -> &'m [Parameter] {
-        &model.parameters
+    fn registry(&self) -> &Registry<Structure> {
+        &self.registry
     }
 
-    fn instances(&self, model: &StructureModel) -> (Vec<Instance>, Vec<(String, String)>) {
-        let spec = &model.robot.spec;
-        let (mut tried, mut not_tried) = (Vec::new(), Vec::new());
-        for instance in effects::instances(spec) {
-            let label = instance.label();
-            if model.has(&label) {
-                continue;
-            }
-            match instance.effect.obstacle(spec, &self.summary) {
-                Some(reason) => not_tried.push((label, reason)),
-                None => tried.push(instance),
-            }
-        }
-        not_tried.dedup();
-        (tried, not_tried)
-    }
-
-    fn name(&self, instance: &Instance) -> EffectName {
-        let variant = instance.effect.variant_label(instance.variant);
-        EffectName {
-            effect: instance.effect.id().into(),
-            site: instance.site.label(),
-            variant: variant.map(|(key, value)| (key.into(), value.into())),
-        }
-    }
-
-    fn extend(&self, model: &StructureModel, instance: &Instance) -> StructureModel {
-        model.with_effect(*instance, &self.summary)
-    }
-
-    fn vanishing(&self, model: &StructureModel) -> Option<Vec<f64>> {
-        model.vanishing(model.effects().last()?)
-    }
-
-    fn bounds(&self, model: &StructureModel) -> Vec<[f64; 2]> {
-        model.bounds()
-    }
-
-    fn starting_from(&self, model: &StructureModel, theta: Vec<f64>) -> StructureModel {
-        model.with_start(theta)
+    fn known<'a>(&'a self, model: &'a StructureModel) -> Known<'a, Structure> {
+        model.known(&self.summary)
     }
 
     /// Frequencies at which the weighted residual is largest, most prominent first.
     fn hints(&self, model: &StructureModel, theta: &[f64]) -> Result<Vec<f64>> {
         let peaks = residual_peaks(&model.predict(theta, &self.data)?, &self.data);
         Ok(peaks.iter().map(|p| p.frequency_hz).collect())
-    }
-
-    fn starts(&self, instance: &Instance, peaks_hz: &Vec<f64>) -> Vec<Vec<f64>> {
-        instance.effect.starts_at(
-            (instance.site, instance.variant),
-            &self.robot,
-            &self.summary,
-            peaks_hz,
-        )
     }
 
     fn problem<'a>(&'a self, model: &'a StructureModel, view: View) -> FrfProblem<'a> {
@@ -258,13 +212,6 @@ impl Study for StructureStudy {
         Ok(Some(rest_patterns::test_beyond(&mut curves, after)))
     }
 
-    fn impossible(&self, model: &StructureModel, instance: &Instance, own: &[Estimate]) -> Option<String> {
-        let sizes: Vec<effects::Size> = own.iter().map(Estimate::size).collect();
-        instance
-            .effect
-            .impossible(instance.site, &model.robot.spec, &sizes)
-    }
-
     fn calibrate(&self, model: &StructureModel) -> Result<Calibration> {
         calibrate(model, &self.data, self.measured.as_deref(), self.options)
     }
@@ -281,7 +228,7 @@ pub fn small_errors(data: &FrfData) -> f64 {
 /// Error on postures left out one at a time, refitted from `theta` on all lines of the others. `None` with fewer than two
 /// measured postures.
 pub fn held_out_postures(model: &StructureModel, data: &FrfData, theta: &[f64]) -> Result<Option<HeldOut>> {
-    let study = StructureStudy::new(&model.robot.spec, data.clone(), Options::default());
+    let study = StructureStudy::new(data.clone(), Options::default());
     let stopping = Stopping {
         max_iterations: 30,
         relative_decrease: 1e-6,

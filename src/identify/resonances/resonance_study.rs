@@ -11,14 +11,13 @@ use rayon::prelude::*;
 
 use crate::Result;
 use crate::data::Axis;
-use crate::effects::{self, DataSummary, Instance};
-use crate::identify::frfs::calibrate::{Calibration, covariance, estimates, scattered_starts};
+use crate::effects::{DataSummary, Effect, Known, Registry, Structure};
+use crate::identify::frfs::calibrate::{Calibration, scattered_starts};
 use crate::identify::frfs::posture_modes::{PostureMode, posture_modes};
 use crate::identify::frfs::structure::StructureModel;
 use crate::identify::levenberg_marquardt::{Fit, LeastSquares, Linearisation, Stopping, minimise};
-use crate::identify::study::{EffectName, Extent, HeldOut, Measure, Residual, Study, View};
-use crate::parameter::Parameter;
-use crate::robot::{Kinematics, RobotSpec};
+use crate::identify::study::{Extent, HeldOut, Measure, Residual, Study, View};
+use crate::robot::Kinematics;
 
 /// How a resonance was read off its FRF.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -152,14 +151,14 @@ pub struct ResonanceStudy {
     configurations: Vec<Kinematics>,
     resonances: Vec<Resonance>,
     summary: DataSummary,
-    robot: RobotSpec,
+    registry: Registry<Structure>,
     /// Starting points of the calibration besides the nominal values.
     extra_starts: usize,
 }
 
 impl ResonanceStudy {
     /// A table of `resonances` measured at `configurations`.
-    pub fn new(robot: &RobotSpec, configurations: Vec<Kinematics>, resonances: Vec<Resonance>) -> Self {
+    pub fn new(configurations: Vec<Kinematics>, resonances: Vec<Resonance>) -> Self {
         let hz = || resonances.iter().map(|r| r.frequency_hz);
         let summary = DataSummary {
             force_levels: 1,
@@ -171,7 +170,7 @@ impl ResonanceStudy {
             configurations,
             resonances,
             summary,
-            robot: robot.clone(),
+            registry: Registry::structure(),
             extra_starts: 30,
         }
     }
@@ -336,64 +335,24 @@ impl LeastSquares for ResonanceProblem<'_> {
 }
 
 impl Study for ResonanceStudy {
-    type Model = StructureModel;
-    type Instance = Instance;
+    type Domain = Structure;
     type Problem<'a> = ResonanceProblem<'a>;
-    /// Frequencies that no mode meets, Hz.
-    type Hints = Vec<f64>;
 
-    fn parameters<'m>(&self, model: &'m StructureModel) -> &'m [Parameter] {
-        &model.parameters
+    fn registry(&self) -> &Registry<Structure> {
+        &self.registry
     }
 
-    fn instances(&self, model: &StructureModel) -> (Vec<Instance>, Vec<(String, String)>) {
-        let spec = &model.robot.spec;
-        let (mut tried, mut not_tried) = (Vec::new(), Vec::new());
-        for instance in effects::instances(spec)
-            .into_iter()
-            .filter(|i| !model.has(&i.label()))
-        {
-            let invisible = INVISIBLE.iter().find(|(id, _)| *id == instance.effect.id());
-            let obstacle = match invisible {
-                Some((_, reason)) => Some((*reason).to_string()),
-                None => instance.effect.obstacle(spec, &self.summary),
-            };
-            match obstacle {
-                Some(reason) => not_tried.push((instance.label(), reason)),
-                None => tried.push(instance),
-            }
-        }
-        not_tried.dedup();
-        (tried, not_tried)
+    fn known<'a>(&'a self, model: &'a StructureModel) -> Known<'a, Structure> {
+        model.known(&self.summary)
     }
 
-    fn name(&self, instance: &Instance) -> EffectName {
-        let variant = instance.effect.variant_label(instance.variant);
-        EffectName {
-            effect: instance.effect.id().into(),
-            site: instance.site.label(),
-            variant: variant.map(|(key, value)| (key.into(), value.into())),
-        }
-    }
-
-    fn extend(&self, model: &StructureModel, instance: &Instance) -> StructureModel {
-        model.with_effect(*instance, &self.summary)
+    fn blind_to(&self, effect: &dyn Effect<Structure>) -> Option<String> {
+        let invisible = INVISIBLE.iter().find(|(id, _)| *id == effect.id())?;
+        Some(invisible.1.to_string())
     }
 
     fn noise_is_given(&self) -> bool {
         true
-    }
-
-    fn vanishing(&self, model: &StructureModel) -> Option<Vec<f64>> {
-        model.vanishing(model.effects().last()?)
-    }
-
-    fn bounds(&self, model: &StructureModel) -> Vec<[f64; 2]> {
-        model.bounds()
-    }
-
-    fn starting_from(&self, model: &StructureModel, theta: Vec<f64>) -> StructureModel {
-        model.with_start(theta)
     }
 
     /// The frequencies that are furthest from any mode, one for each tenth of an octave or so.
@@ -414,10 +373,6 @@ impl Study for ResonanceStudy {
             }
         }
         Ok(hints)
-    }
-
-    fn starts(&self, instance: &Instance, hints: &Vec<f64>) -> Vec<Vec<f64>> {
-        instance.effect.starts(&self.robot, &self.summary, hints)
     }
 
     fn problem<'a>(&'a self, model: &'a StructureModel, view: View) -> ResonanceProblem<'a> {
@@ -503,17 +458,11 @@ impl Study for ResonanceStudy {
             .into_iter()
             .find(|f| f.cost <= lowest)
             .ok_or_else(|| crate::Error::computation("no starting point leads to a fit"))?;
-        let freedom = self.real_values(Extent::Full) as f64 - model.parameters.len() as f64;
-        let reduced_chi2 = 2.0 * best.cost / freedom.max(1.0);
+        let values = self.real_values(Extent::Full);
         Ok(Calibration {
-            parameters: estimates(&model.parameters, &best, reduced_chi2)?,
-            covariance: covariance(&best, reduced_chi2)?,
-            theta: best.theta,
-            reduced_chi2,
-            iterations: best.iterations,
-            ending: best.ending,
             starts: points.len(),
             starts_agreeing,
+            ..Calibration::of_fit(&model.parameters, best, values)?
         })
     }
 }

@@ -4,7 +4,7 @@ use crate::analysis::forces::force_records::cutting_trials;
 use crate::analysis::forces::regression_line::{FeedLine, feed_lines};
 use crate::campaign::Campaign;
 use crate::cutting::kienzle;
-use crate::cutting::{CfcResult, Coefficient, CutAnalysis, ForceAxis, ForceGroup, Known, speed_text};
+use crate::cutting::{CfcResult, Coefficient, CutAnalysis, ForceAxis, ForceGroup, KnownValue, speed_text};
 use crate::report::figure::{
     ForceRecord, ForceTrace, HeatMap, RegressionFigure, RegressionMark, RegressionSeries,
 };
@@ -422,7 +422,7 @@ fn kienzle_table(campaign: &Campaign, result: &CfcResult, pooled: &ForceGroup) -
         std::slice::from_ref(pooled),
     )
     .pop()??;
-    let text = |known: Option<Known>| {
+    let text = |known: Option<KnownValue>| {
         known
             .and_then(|k| Some(with_error(k.value, k.std_error?)))
             .unwrap_or_else(|| "not determined".into())

@@ -1,5 +1,7 @@
 //! Which physics the model lacks: verdict, candidates, and what the missing effect takes away.
 
+use crate::effects::Structure;
+use crate::identify::Modelled;
 use num_complex::Complex64;
 
 use crate::analysis::DiagnosisFindings;
@@ -7,8 +9,6 @@ use crate::analysis::diagnosis::Leading;
 use crate::campaign::Campaign;
 use crate::discrepancy::comparison::explained::Part;
 use crate::discrepancy::{Diagnosis, DiagnosisVerdict, EffectCandidate, NextMeasurement};
-use crate::effects::Instance;
-use crate::identify::StructureModel;
 use crate::report::figure::{BarSeries, FrfCurve, FrfFigure, NoiseLevel, SideBySide};
 use crate::report::number::{decimals, percent, plus_minus, significant};
 use crate::report::parts::{figure, paragraph};
@@ -24,25 +24,20 @@ const LISTED: usize = 8;
 /// FRFs drawn.
 const FRFS_DRAWN: usize = 3;
 
-type StructureCandidate = EffectCandidate<StructureModel, Instance>;
+type StructureCandidate = EffectCandidate<Structure>;
 
 /// The verdict in plain words.
 pub fn summary(findings: &DiagnosisFindings) -> String {
-    verdict_text(&findings.diagnosis, "FRFs", |c| {
-        (c.instance.title(), c.instance.effect.explanation())
-    })
+    verdict_text(&findings.diagnosis, "FRFs")
 }
 
-/// The verdict in plain words; `plainly` gives the name and the explanation of an effect, `data` says what was measured.
-pub(crate) fn verdict_text<M, I>(
-    d: &Diagnosis<M, I>,
-    data: &str,
-    plainly: impl Fn(&EffectCandidate<M, I>) -> (String, &'static str),
-) -> String {
+/// The verdict in plain words; `data` says what was measured.
+pub(crate) fn verdict_text<D: Modelled>(d: &Diagnosis<D>, data: &str) -> String {
     let sure = format!("confidence {:.0} %", 100.0 * d.confidence);
     let mut text = match (d.verdict, d.winner()) {
         (DiagnosisVerdict::Effect, Some(winner)) => {
-            let (title, explanation) = plainly(winner);
+            let title = winner.instance.title();
+            let explanation = winner.instance.effect.explanation();
             format!("The model lacks {title} ({sure}). {explanation}")
         }
         (DiagnosisVerdict::None, _) => match d.baseline.rest.excuse_in_words() {
@@ -80,7 +75,7 @@ pub(crate) fn verdict_text<M, I>(
 pub fn section(campaign: &Campaign, findings: &DiagnosisFindings) -> ReportSection {
     let d = &findings.diagnosis;
     let mut blocks = vec![paragraph(summary(findings))];
-    blocks.extend(how_it_shows(d, |c| c.instance.effect.fingerprint()));
+    blocks.extend(how_it_shows(d));
     if let (Some(leading), Some(candidate)) = (&findings.leading, findings.leader()) {
         let who = match d.verdict {
             DiagnosisVerdict::Unknown => format!("The best candidate, {},", candidate.instance.title()),
@@ -92,17 +87,18 @@ pub fn section(campaign: &Campaign, findings: &DiagnosisFindings) -> ReportSecti
     if !d.candidates.is_empty() {
         blocks.push(candidate_chart(
             d,
-            findings.now.totals.noise_floor_nrms,
+            findings.now.comparison.totals.noise_floor_nrms,
             "missing-candidates",
             "postures",
         ));
-        blocks.push(candidate_table(d, |c| c.instance.title()));
+        blocks.push(candidate_table(d));
     }
     if let (Some(leading), Some(candidate)) = (&findings.leading, findings.leader()) {
         blocks.push(maps(findings, leading, candidate));
         blocks.push(parts_table(leading, candidate));
         for (rank, index) in findings
             .now
+            .comparison
             .worst_first()
             .into_iter()
             .take(FRFS_DRAWN)
@@ -123,18 +119,15 @@ pub fn section(campaign: &Campaign, findings: &DiagnosisFindings) -> ReportSecti
 }
 
 /// The fingerprint of the effect that is missing.
-pub(crate) fn how_it_shows<M, I>(
-    d: &Diagnosis<M, I>,
-    fingerprint: impl Fn(&EffectCandidate<M, I>) -> &'static str,
-) -> Option<Block> {
-    d.winner()
-        .map(|winner| paragraph(format!("How it shows: {}", fingerprint(winner))))
+pub(crate) fn how_it_shows<D: Modelled>(d: &Diagnosis<D>) -> Option<Block> {
+    let effect = d.winner()?.instance.effect;
+    Some(paragraph(format!("How it shows: {}", effect.fingerprint())))
 }
 
 /// Rivals, what to measure next, and how to add what is missing; `data` says what was measured.
-pub(crate) fn advice<M, I>(
+pub(crate) fn advice<D: Modelled>(
     campaign: &Campaign,
-    d: &Diagnosis<M, I>,
+    d: &Diagnosis<D>,
     data: &str,
     next_measurement: &NextMeasurement,
 ) -> Vec<Block> {
@@ -158,7 +151,7 @@ pub(crate) fn advice<M, I>(
 }
 
 /// Effects that the data cannot show, with the reasons.
-pub(crate) fn not_tried<M, I>(d: &Diagnosis<M, I>) -> Option<Block> {
+pub(crate) fn not_tried<D: Modelled>(d: &Diagnosis<D>) -> Option<Block> {
     let reasons = by_reason(&d.not_tried);
     (!reasons.is_empty()).then(|| paragraph(format!("Not tried: {}.", reasons.join("; "))))
 }
@@ -179,13 +172,13 @@ fn by_reason(not_tried: &[(String, String)]) -> Vec<String> {
 }
 
 /// Error with each candidate; `folds`: what was left out in turn.
-pub(crate) fn candidate_chart<M, I>(
-    d: &Diagnosis<M, I>,
+pub(crate) fn candidate_chart<D: Modelled>(
+    d: &Diagnosis<D>,
     noise_floor_nrms: f64,
     file_name: &str,
     folds: &str,
 ) -> Block {
-    let shown: Vec<&EffectCandidate<M, I>> = d.candidates.iter().take(LISTED).collect();
+    let shown: Vec<&EffectCandidate<D>> = d.candidates.iter().take(LISTED).collect();
     let percents = |first: Option<f64>, rest: Vec<Option<f64>>| {
         let all = std::iter::once(first).chain(rest);
         all.map(|v| v.map(|v| 100.0 * v)).collect::<Vec<_>>()
@@ -231,12 +224,9 @@ pub(crate) fn candidate_chart<M, I>(
     )
 }
 
-pub(crate) fn candidate_table<M, I>(
-    d: &Diagnosis<M, I>,
-    title: impl Fn(&EffectCandidate<M, I>) -> String,
-) -> Block {
+pub(crate) fn candidate_table<D: Modelled>(d: &Diagnosis<D>) -> Block {
     let all = &d.candidates;
-    let row = |c: &EffectCandidate<M, I>| {
+    let row = |c: &EffectCandidate<D>| {
         let parameters: Vec<String> = c
             .parameters
             .iter()
@@ -250,7 +240,7 @@ pub(crate) fn candidate_table<M, I>(
             })
             .collect();
         vec![
-            title(c),
+            c.instance.title(),
             percent(c.nrms),
             c.held_out.as_ref().map_or("–".into(), |h| percent(h.nrms())),
             significant(c.delta_bic, 3),
@@ -289,11 +279,14 @@ pub(crate) fn candidate_table<M, I>(
     })
 }
 
-fn maps(findings: &DiagnosisFindings, leading: &Leading, candidate: &StructureCandidate) -> Block {
+fn maps(findings: &DiagnosisFindings, leading: &Leading<Structure>, candidate: &StructureCandidate) -> Block {
     let with = format!("with {}", candidate.label());
     let drawing = times_noise_map(
         "Error in multiples of the noise, before and after",
-        &[("model now", &findings.now.map), (&with, &leading.comparison.map)],
+        &[
+            ("model now", &findings.now.comparison.map),
+            (&with, &leading.view.comparison.map),
+        ],
     );
     figure(
         "missing-map",
@@ -308,7 +301,7 @@ fn maps(findings: &DiagnosisFindings, leading: &Leading, candidate: &StructureCa
     .with_plot(drawing.plot())
 }
 
-fn parts_table(leading: &Leading, candidate: &StructureCandidate) -> Block {
+fn parts_table(leading: &Leading<Structure>, candidate: &StructureCandidate) -> Block {
     let explained = &leading.explained;
     let times = |v: Option<f64>| v.map_or("–".into(), |v| significant(v, 2));
     let row = |name: String, part: &Part| {
@@ -357,15 +350,15 @@ fn parts_table(leading: &Leading, candidate: &StructureCandidate) -> Block {
 
 fn frf(
     findings: &DiagnosisFindings,
-    leading: &Leading,
+    leading: &Leading<Structure>,
     candidate: &StructureCandidate,
     rank: usize,
     index: usize,
 ) -> Option<Block> {
     let (block, frf) = findings.case.data.frfs().nth(index)?;
     let (now, with) = (
-        findings.now.frf_errors.get(index)?,
-        leading.comparison.frf_errors.get(index)?,
+        findings.now.comparison.frf_errors.get(index)?,
+        leading.view.comparison.frf_errors.get(index)?,
     );
     let curve = |label: String, value: &[Complex64]| FrfCurve {
         label,
@@ -381,11 +374,11 @@ fn frf(
         models: vec![
             curve(
                 format!("model now (error {})", percent(now.nrms)),
-                findings.predicted.get(index)?,
+                findings.now.predicted.get(index)?,
             ),
             curve(
                 format!("with {} (error {})", candidate.label(), percent(with.nrms)),
-                leading.predicted.get(index)?,
+                leading.view.predicted.get(index)?,
             ),
         ],
         noise: Some(NoiseLevel {

@@ -1,9 +1,9 @@
 //! The error, revision by revision, and what was added.
 
+use crate::effects::Registry;
 use num_complex::Complex64;
 
 use crate::discrepancy::FrfComparison;
-use crate::effects::{self, cutting};
 use crate::identify::FrfData;
 use crate::report::figure::{self, FrfCurve, FrfFigure, HistoryFigure, NoiseLevel};
 use crate::report::number::{percent, plus_minus, significant};
@@ -31,8 +31,7 @@ type Told = [&'static str; 3];
 /// effect was ever added.
 pub fn section(revisions: &[Revision], steps: &[(&FrfData, [Stage; 2])]) -> Option<ReportSection> {
     of_revisions("history", revisions, "postures", steps, |id| {
-        let all = effects::STRUCTURAL.into_iter().chain(effects::DRAWN);
-        let effect = all.into_iter().find(|e| e.id() == id)?;
+        let effect = Registry::structure().effect(id)?;
         Some([
             effect.explanation(),
             effect.fingerprint(),
@@ -44,7 +43,7 @@ pub fn section(revisions: &[Revision], steps: &[(&FrfData, [Stage; 2])]) -> Opti
 /// The same of the cutting model.
 pub fn cutting_section(revisions: &[Revision]) -> Option<ReportSection> {
     of_revisions("history-cutting", revisions, "cuts", &[], |id| {
-        let effect = cutting::find(id).first()?.effect;
+        let effect = Registry::cutting().effect(id)?;
         Some([
             effect.explanation(),
             effect.fingerprint(),

@@ -1,7 +1,6 @@
 //! Force model against the recorded waveforms, and which physics it lacks.
 
-use crate::analysis::CuttingFindings;
-use crate::analysis::diagnosis::CuttingView;
+use crate::analysis::{CuttingFindings, CuttingView};
 use crate::campaign::{Campaign, Process};
 use crate::discrepancy::CutError;
 use crate::identify::forces::cutting_waves::courses;
@@ -25,9 +24,7 @@ const ORDERS: usize = 12;
 
 /// The verdict in plain words.
 pub fn summary(findings: &CuttingFindings) -> String {
-    let text = verdict_text(&findings.diagnosis, "force records", |c| {
-        (c.instance.label(), c.instance.effect.explanation())
-    });
+    let text = verdict_text(&findings.diagnosis, "force records");
     let text = text.replacen("The model", "The force model", 1);
     let added: Vec<String> = findings
         .case
@@ -52,8 +49,9 @@ pub fn sections(campaign: &Campaign, findings: &CuttingFindings) -> Vec<ReportSe
 
 /// What the leading candidate is called, and the model with it.
 fn with(findings: &CuttingFindings) -> Option<(String, &CuttingView)> {
-    let (number, view) = findings.leading.as_ref()?;
-    let candidate = findings.diagnosis.candidates.get(*number)?;
+    let leading = findings.leading.as_ref()?;
+    let (number, view) = (leading.candidate, &leading.view);
+    let candidate = findings.diagnosis.candidates.get(number)?;
     Some((format!("with {}", candidate.label()), view))
 }
 
@@ -267,12 +265,12 @@ fn waveform(findings: &CuttingFindings, rank: usize, cut: usize) -> Block {
 fn missing(campaign: &Campaign, findings: &CuttingFindings) -> ReportSection {
     let d = &findings.diagnosis;
     let mut blocks = vec![paragraph(summary(findings))];
-    blocks.extend(how_it_shows(d, |c| c.instance.effect.fingerprint()));
+    blocks.extend(how_it_shows(d));
     blocks.extend(advice(campaign, d, "records", &findings.next_measurement));
     if !d.candidates.is_empty() {
         let floor = findings.now.comparison.totals.noise_floor_nrms;
         blocks.push(candidate_chart(d, floor, "missing-candidates-cutting", "cuts"));
-        blocks.push(candidate_table(d, |c| c.instance.label()));
+        blocks.push(candidate_table(d));
     }
     blocks.extend(not_tried(d));
     ReportSection {

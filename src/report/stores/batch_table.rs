@@ -328,7 +328,7 @@ mod parquet {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::many::batch::{Findings, Status};
+    use crate::analysis::many::batch::{BatchFindings, Status};
 
     fn manifest() -> Manifest {
         let folder = tempfile::tempdir().unwrap();
@@ -347,14 +347,14 @@ mod tests {
             status,
             error: error.map(str::to_string),
             seconds: 0.25,
-            findings: Findings {
+            findings: BatchFindings {
                 nrms: Some(0.1 + 0.2),
                 quantities: vec![BatchQuantity {
                     name: quantity.into(),
                     value: Some(1.5e9),
                     std_error: None,
                 }],
-                ..Findings::default()
+                ..BatchFindings::default()
             },
         };
         Record {

@@ -1,10 +1,11 @@
 //! How near the library comes to physics that it does not have.
 
+use crate::effects::Registry;
 use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::Result;
-use crate::effects::{self, DataSummary, Instance};
+use crate::effects::{DataSummary, Instance, Structure};
 use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
 use crate::identify::{FrfData, StructureModel, levenberg_marquardt};
 use crate::simulate::sizes::visibility::misfit;
@@ -32,17 +33,18 @@ pub fn nearest(
     data: &FrfData,
     stride: usize,
 ) -> Result<Imitation> {
-    let spec = &model.robot.spec;
-    let instances: Vec<Instance> = effects::instances(spec)
+    let known = model.known(summary);
+    let instances: Vec<Instance<Structure>> = Registry::structure()
+        .instances(known.object)
         .into_iter()
-        .filter(|i| i.effect.obstacle(spec, summary).is_none())
-        .filter(|i| model.effects().iter().all(|a| a.instance.label() != i.label()))
+        .filter(|i| i.effect.obstacle(&known).is_none())
+        .filter(|i| !model.has(&i.label()))
         .collect();
     let left: Vec<Option<f64>> = instances
         .par_iter()
         .map(|instance| {
             refit(
-                &model.with_effect(*instance, summary),
+                &model.with_effect(*instance, &model.known(summary)),
                 theta,
                 summary,
                 data,
@@ -84,7 +86,8 @@ fn refit(
     let own = &model.parameters[theta.len()..];
     let mut starts: Vec<Vec<f64>> = vec![own.iter().map(|p| p.nominal).collect()];
     if let Some(added) = model.effects().last().filter(|_| !own.is_empty()) {
-        starts.extend(added.instance.effect.starts(&model.robot.spec, summary, &[]));
+        let known = model.known(summary);
+        starts.extend(added.instance.effect.starts(added.instance.at(), &known, &[]));
     }
     let mut ranked: Vec<(f64, Vec<f64>)> = starts
         .into_iter()

@@ -1,13 +1,14 @@
 //! How large a simulated effect is: what its file gives as usual sizes, and how a parameter follows the effect's size.
 
-use crate::effects::StructuralEffect;
+use crate::effects::Effect;
+use crate::effects::Structure;
 use crate::effects::usual_size::FollowsSize::{Not, Power, Ratio};
 use crate::effects::usual_size::SizeRange::{Either, Log, Times};
 use crate::effects::usual_size::{FollowsSize, SizeRange};
 use crate::parameter::{Parameter, Scale};
 use crate::simulate::draw::Draws;
 
-fn usual(effect: &dyn StructuralEffect, parameter: &str) -> (SizeRange, FollowsSize) {
+fn usual(effect: &dyn Effect<Structure>, parameter: &str) -> (SizeRange, FollowsSize) {
     let name = parameter.split('[').next().unwrap_or(parameter);
     let line = effect.usual_sizes().iter().find(|usual| usual.parameter == name);
     // What has no line of its own is drawn about its nominal value.
@@ -15,7 +16,7 @@ fn usual(effect: &dyn StructuralEffect, parameter: &str) -> (SizeRange, FollowsS
 }
 
 /// A value of an effect's parameter as a robot may have it, natural units, within the parameter's bounds.
-pub fn drawn(effect: &dyn StructuralEffect, parameter: &Parameter, draws: &mut Draws) -> f64 {
+pub fn drawn(effect: &dyn Effect<Structure>, parameter: &Parameter, draws: &mut Draws) -> f64 {
     let value = match usual(effect, &parameter.name).0 {
         Log(low, high) => draws.log_uniform(low, high),
         Times(low, high) => parameter.nominal * draws.log_uniform(low, high),
@@ -37,7 +38,7 @@ fn kept_inside(parameter: &Parameter, value: f64) -> f64 {
 }
 
 /// The value that belongs to an effect of this size, within the parameter's bounds.
-pub fn at_size(effect: &dyn StructuralEffect, parameter: &Parameter, value: f64, size: f64) -> f64 {
+pub fn at_size(effect: &dyn Effect<Structure>, parameter: &Parameter, value: f64, size: f64) -> f64 {
     let sized = match usual(effect, &parameter.name).1 {
         Power(exponent) => value * size.powf(exponent),
         Ratio => value.powf(size),
@@ -47,7 +48,7 @@ pub fn at_size(effect: &dyn StructuralEffect, parameter: &Parameter, value: f64,
 }
 
 /// Whether the parameter follows the size of its effect at all.
-pub fn follows_size(effect: &dyn StructuralEffect, parameter: &Parameter) -> bool {
+pub fn follows_size(effect: &dyn Effect<Structure>, parameter: &Parameter) -> bool {
     usual(effect, &parameter.name).1 != Not
 }
 
@@ -61,7 +62,7 @@ pub fn in_bounds(parameter: &Parameter, value: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::{DataSummary, STRUCTURAL};
+    use crate::effects::{At, DataSummary, Known, STRUCTURAL};
     use crate::robot::fixture::irb6640;
     use crate::simulate::draw::Purpose;
     use crate::simulate::foreign::FOREIGN;
@@ -78,7 +79,7 @@ mod tests {
         let mut draws = Draws::new(1, Purpose::Effects);
         for effect in STRUCTURAL.into_iter().chain(FOREIGN) {
             let mut names: Vec<String> = Vec::new();
-            for parameter in effect.parameters(&irb6640(), &data) {
+            for parameter in effect.parameters(At::EVERYWHERE, &Known::robot(&irb6640(), data)) {
                 let name = parameter.name.split('[').next().unwrap().to_string();
                 let known = effect.usual_sizes().iter().any(|usual| usual.parameter == name);
                 assert!(known, "{} {name}", effect.id());

@@ -36,7 +36,7 @@ impl HiddenTruth<'_> {
         let mut model = self.bare.clone();
         let mut theta = self.bare_theta.to_vec();
         for hidden in effects {
-            model = model.with_effect(hidden.instance, &self.summary);
+            model = model.with_effect(hidden.instance, &model.known(&self.summary));
             let values = hidden.values();
             theta.extend(hidden.parameters.iter().zip(values).map(|(p, v)| p.internal(v)));
         }

@@ -2,6 +2,7 @@
 
 mod manifest;
 
+use crate::identify::Modelled;
 pub use manifest::{Manifest, ManifestEntry};
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -115,12 +116,12 @@ pub struct SideResult {
     /// What it took, s.
     pub seconds: f64,
     /// What was found; empty after an error.
-    pub findings: Findings,
+    pub findings: BatchFindings,
 }
 
 /// Nothing where it was not asked for.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Findings {
+pub struct BatchFindings {
     /// Error of the fit, a ratio.
     pub nrms: Option<f64>,
     /// nrms that the noise alone makes.
@@ -199,10 +200,10 @@ pub fn examine(entry: &ManifestEntry, steps: &Steps, fingerprint: &str) -> Recor
     record
 }
 
-fn side(domain: &str, found: Result<Findings>, begun: Instant) -> SideResult {
+fn side(domain: &str, found: Result<BatchFindings>, begun: Instant) -> SideResult {
     let (status, error, findings) = match found {
         Ok(findings) => (Status::Done, None, findings),
-        Err(error) => (Status::Failed, Some(error.to_string()), Findings::default()),
+        Err(error) => (Status::Failed, Some(error.to_string()), BatchFindings::default()),
     };
     SideResult {
         domain: domain.to_string(),
@@ -226,7 +227,7 @@ fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
     })
 }
 
-type Work = fn(&Campaign, &Steps) -> Result<Findings>;
+type Work = fn(&Campaign, &Steps) -> Result<BatchFindings>;
 
 /// The sides that the campaign holds and the steps are about.
 ///
@@ -263,15 +264,15 @@ fn sides(campaign: &Campaign, steps: &Steps) -> Result<Vec<(&'static str, Work)>
         .into())
 }
 
-fn structure(campaign: &Campaign, steps: &Steps) -> Result<Findings> {
+fn structure(campaign: &Campaign, steps: &Steps) -> Result<BatchFindings> {
     let analysis = StructureAnalysis::run(campaign, Options::default())?;
     let (case, calibration) = (&analysis.case, &analysis.calibration);
-    let mut found = Findings {
+    let mut found = BatchFindings {
         nrms: finite(analysis.after.totals.nrms),
         noise: finite(analysis.after.totals.noise_floor_nrms),
         converged: Some(calibration.converged()),
         quantities: calibration.parameters.iter().map(quantity).collect(),
-        ..Findings::default()
+        ..BatchFindings::default()
     };
     if steps.has(BatchStep::Compare) {
         let held_out = held_out_postures(&case.model, &case.data, &calibration.theta)?;
@@ -286,14 +287,14 @@ fn structure(campaign: &Campaign, steps: &Steps) -> Result<Findings> {
     Ok(found)
 }
 
-fn cutting(campaign: &Campaign, steps: &Steps) -> Result<Findings> {
-    let mut found = Findings::default();
+fn cutting(campaign: &Campaign, steps: &Steps) -> Result<BatchFindings> {
+    let mut found = BatchFindings::default();
     if steps.has(BatchStep::Calibrate) || steps.has(BatchStep::Cfc) {
         let result = identify_forces(campaign, CfcOptions::default())?;
         found.quantities = result.pooled.iter().flat_map(coefficients).collect();
     }
     if steps.has(BatchStep::Diagnose) {
-        let d = CuttingFindings::run(campaign)?;
+        let d = CuttingFindings::run(campaign, Options::default())?;
         let totals = &d.now.comparison.totals;
         (found.nrms, found.noise) = (finite(totals.nrms), finite(totals.noise_floor_nrms));
         found.diagnosed(&d.diagnosis, &d.setup);
@@ -313,8 +314,8 @@ fn cutting(campaign: &Campaign, steps: &Steps) -> Result<Findings> {
     Ok(found)
 }
 
-impl Findings {
-    fn diagnosed<M, I>(&mut self, diagnosis: &Diagnosis<M, I>, setup: &SetupCheck) {
+impl BatchFindings {
+    fn diagnosed<D: Modelled>(&mut self, diagnosis: &Diagnosis<D>, setup: &SetupCheck) {
         let verdict = match diagnosis.verdict {
             DiagnosisVerdict::Effect => "effect",
             DiagnosisVerdict::None => "none",

@@ -118,8 +118,7 @@ pub fn proposed(
             on_other_body: true,
         }));
         for reading in readings {
-            let mut read = model.clone();
-            read.points = reading.points(&model.points);
+            let read = model.with_fixed(|fixed| fixed.points = reading.points(&model.points));
             let curves = predict(&read, theta, data, None)?;
             let gain = data
                 .frfs()

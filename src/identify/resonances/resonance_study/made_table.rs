@@ -56,5 +56,5 @@ pub(crate) fn table(model: &StructureModel, theta: &[f64]) -> ResonanceStudy {
             }
         }
     }
-    ResonanceStudy::new(&model.robot.spec, configurations, resonances)
+    ResonanceStudy::new(configurations, resonances)
 }

@@ -1,4 +1,4 @@
-use crate::effects::find;
+use crate::effects::Registry;
 use crate::identify::resonances::resonance_study::made_table::{SUMMARY, baseline, table};
 use crate::identify::resonances::resonance_study::*;
 use crate::robot::fixture::irb6640;
@@ -6,7 +6,10 @@ use crate::robot::fixture::irb6640;
 #[test]
 fn the_gradient_agrees_with_differences_of_the_cost() {
     for effect in ["local-resonator@link-3", "joint-transverse-compliance@joint-2"] {
-        let model = baseline().with_effect(find(&irb6640(), effect)[0], &SUMMARY);
+        let model = baseline().with_effect(
+            Registry::structure().find(&irb6640(), effect)[0],
+            &baseline().known(&SUMMARY),
+        );
         let mut theta = model.nominal_theta();
         let study = table(&model, &theta);
         for (i, t) in theta.iter_mut().enumerate() {

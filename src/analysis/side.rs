@@ -1,0 +1,74 @@
+//! A side of a campaign: how its measurements become a case, what the model is looked at with, and where a lead is sought.
+//! All that the loop over campaigns (diagnose, add) needs to know of FRFs and force records.
+
+use crate::Result;
+use crate::analysis::workbench::Workbench;
+use crate::campaign::Campaign;
+use crate::discrepancy::comparison::compare::ErrorTotals;
+use crate::discrepancy::setup::SetupCheck;
+use crate::discrepancy::{Diagnosis, NextMeasurement};
+use crate::identify::model_history::Side;
+use crate::identify::{Calibration, Case, Model, Modelled, Options, Study};
+
+/// A domain that campaigns have measurements of.
+pub trait CampaignSide: Modelled {
+    /// In the log of revisions.
+    const SIDE: Side;
+    /// What is left out of a fit in turn: `postures`.
+    const FOLDS: &'static str;
+    /// A model against the measurements: predictions and errors.
+    type View;
+    /// What an effect takes away of the misfit, and where.
+    type Explained;
+    /// What is known of a rest that no effect of the library explains.
+    type Lead;
+    /// The case as the loop works on it.
+    type Study: Study<Domain = Self>;
+
+    /// Model and measurements of a campaign.
+    ///
+    /// # Errors
+    /// Files that cannot be read, a broken log of revisions.
+    fn case(campaign: &Workbench) -> Result<Case<Self>>;
+
+    /// The case as the loop works on it.
+    fn study(case: &Case<Self>, options: Options) -> Self::Study;
+
+    /// The model at `theta` (solver's scale) against the measurements.
+    ///
+    /// # Errors
+    /// A model that does not respond.
+    fn view(case: &Case<Self>, model: &Model<Self>, theta: &[f64]) -> Result<Self::View>;
+
+    /// Its error over everything.
+    fn totals(view: &Self::View) -> ErrorTotals;
+
+    /// What `with` takes away of what `now` leaves.
+    fn explained(case: &Case<Self>, now: &Self::View, with: &Self::View) -> Self::Explained;
+
+    /// Wrong files and other mistakes of the setup.
+    ///
+    /// # Errors
+    /// A model that does not respond.
+    fn setup(case: &Case<Self>, diagnosis: &Diagnosis<Self>) -> Result<SetupCheck>;
+
+    /// Where what has no name sits and what it does; `None` where nothing can be said of it.
+    ///
+    /// # Errors
+    /// A fit that fails.
+    fn lead(case: &Case<Self>, study: &Self::Study, now: &Self::View) -> Result<Option<Self::Lead>>;
+
+    /// The measurement that would tell most.
+    ///
+    /// # Errors
+    /// A model that does not respond.
+    fn next(case: &Case<Self>, campaign: &Campaign, diagnosis: &Diagnosis<Self>) -> Result<NextMeasurement>;
+
+    /// What the user should know of a fit before believing it.
+    fn warnings(calibration: &Calibration) -> Vec<String>;
+
+    /// What to say where nothing can be left out of the fit.
+    fn one_fold() -> Option<String> {
+        None
+    }
+}

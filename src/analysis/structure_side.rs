@@ -1,0 +1,94 @@
+//! The structural side of a campaign: robot model and FRFs.
+
+use num_complex::Complex64;
+
+use super::diagnosis::rival;
+use super::side::CampaignSide;
+use super::structure::study_of;
+use super::workbench::Workbench;
+use crate::Result;
+use crate::campaign::Campaign;
+use crate::discrepancy::comparison::compare::ErrorTotals;
+use crate::discrepancy::localise::{Localisation, localise};
+use crate::discrepancy::outlook::next_measurement;
+use crate::discrepancy::setup::{SetupCheck, examine};
+use crate::discrepancy::{Diagnosis, Explained, FrfComparison, NextMeasurement};
+use crate::effects::Structure;
+use crate::identify::frfs::structure_study::{ResidualPeak, residual_peaks};
+use crate::identify::model_history::Side;
+use crate::identify::{Calibration, Options, StructureCase, StructureModel, StructureStudy};
+
+/// A robot model against the FRFs.
+pub struct FrfView {
+    /// Predictions in the order of `case.data.frfs()`, m/N.
+    pub predicted: Vec<Vec<Complex64>>,
+    /// Their errors.
+    pub comparison: FrfComparison,
+    /// Frequencies around which the residual stands out.
+    pub residual_peaks: Vec<ResidualPeak>,
+}
+
+impl CampaignSide for Structure {
+    const SIDE: Side = Side::Structure;
+    const FOLDS: &'static str = "postures";
+    type View = FrfView;
+    type Explained = Explained;
+    type Lead = Localisation;
+    type Study = StructureStudy;
+
+    fn case(campaign: &Workbench) -> Result<StructureCase> {
+        StructureCase::on(campaign)
+    }
+
+    fn study(case: &StructureCase, options: Options) -> StructureStudy {
+        study_of(case, options)
+    }
+
+    fn view(case: &StructureCase, model: &StructureModel, theta: &[f64]) -> Result<FrfView> {
+        let predicted = model.predict(theta, &case.data)?;
+        Ok(FrfView {
+            comparison: FrfComparison::new(&case.data, &model.points, &predicted),
+            residual_peaks: residual_peaks(&predicted, &case.data),
+            predicted,
+        })
+    }
+
+    fn totals(view: &FrfView) -> ErrorTotals {
+        view.comparison.totals
+    }
+
+    fn explained(case: &StructureCase, now: &FrfView, with: &FrfView) -> Explained {
+        Explained::new(&case.data, &case.model.points, &now.predicted, &with.predicted)
+    }
+
+    fn setup(case: &StructureCase, diagnosis: &Diagnosis<Structure>) -> Result<SetupCheck> {
+        let baseline = &diagnosis.baseline;
+        let slips = baseline.rest.beyond_slips.as_ref();
+        examine(&case.model, &case.data, &baseline.theta, slips, || {
+            rival(diagnosis, |_| true)
+        })
+    }
+
+    /// Kept where one place explains more than chance.
+    fn lead(case: &StructureCase, study: &StructureStudy, _now: &FrfView) -> Result<Option<Localisation>> {
+        Ok(Some(localise(study, &case.model)?).filter(|found| found.significant))
+    }
+
+    fn next(
+        case: &StructureCase,
+        campaign: &Campaign,
+        diagnosis: &Diagnosis<Structure>,
+    ) -> Result<NextMeasurement> {
+        next_measurement::advise(&case.data, &campaign.postures, diagnosis)
+    }
+
+    fn warnings(calibration: &Calibration) -> Vec<String> {
+        calibration.warnings()
+    }
+
+    fn one_fold() -> Option<String> {
+        let text = "FRFs of one posture only: no posture can be left out of the fit, so whether the error fell for the right \
+                    reason cannot be checked";
+        Some(text.into())
+    }
+}

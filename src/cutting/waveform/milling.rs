@@ -434,6 +434,10 @@ impl MillingCut {
         let least = (2..=edges.len()).fold(1, |least, m| if left(m) < left(least) { m } else { least });
         let (h, before) = (left(least), edges[(j + least) % edges.len()]);
         let by = [here.cos - before.cos, -offset * (here.sin - before.sin)];
+        if law.runout.is_none() && here.radius_mm == before.radius_mm {
+            // Feed alone: it cuts all the way.
+            return Chip::new(h, 1.0, 0.0, [0.0; 2], law.exponent, derivatives);
+        }
         // The tooth leaves the cut within a quadrature cell: the share of it that is engaged.
         let rise = (ahead(least) * c * cos).abs() * width;
         let inside = if rise > 0.0 {

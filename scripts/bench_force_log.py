@@ -1,16 +1,18 @@
 #!/usr/bin/env python3
-"""A long force log read by `lobestone inspect` and by `pandas.read_csv` (C engine), timed in one run.
+"""A long force log read by `lobestone inspect`, by `pandas.read_csv` (C engine), and by `polars.scan_csv` and `duckdb` where
+they are installed, timed in one run.
 
     python3 scripts/bench_force_log.py [--mb 1000] [--repeat 3] [--lobestone PATH] [--keep FILE] [--cfc]
 
 Makes the log itself: 10 kHz, time and four channels, DynoWare header, air before and after a cut. Prints the time (best of
 the repeats), the throughput, the peak memory and the processor time (all cores; it says more on a busy machine) of each
-program, and their ratios. pandas only reads; `inspect` reads and
+program, and their ratios. The others only read; `inspect` reads and
 looks for faults as well. Each run is a process of its own, start included for both. With --cfc the log is also the one
 record of a campaign.
 """
 
 import argparse
+import importlib.util
 import os
 import pathlib
 import subprocess
@@ -26,6 +28,17 @@ PANDAS = (
     "import sys, pandas; t = pandas.read_csv(sys.argv[1], skiprows=[0, 1, 3], engine='c'); "
     "assert t.shape[1] == 5; print(len(t))"
 )
+# Every number read, nothing kept but sums.
+OTHERS = {
+    "polars": (
+        "import sys, polars; n = ['t', 'fx', 'fy', 'fz', 'mz']; "
+        "t = polars.scan_csv(sys.argv[1], has_header=False, skip_rows=4, new_columns=n); print(t.sum().collect())"
+    ),
+    "duckdb": (
+        "import sys, duckdb; print(duckdb.sql(\"select sum(column0), sum(column1), sum(column2), sum(column3), sum(column4) \""
+        "\"from read_csv('\" + sys.argv[1] + \"', header=false, skip=4)\"))"
+    ),
+}
 CAMPAIGN = """schema = "lobestone/campaign/1"
 name = "long log"
 [tool]
@@ -94,6 +107,9 @@ def main():
             "pandas.read_csv": [sys.executable, "-c", PANDAS, str(file)],
             "lobestone inspect": [options.lobestone, "inspect", "--json", str(file)],
         }
+        for name, program in OTHERS.items():
+            if importlib.util.find_spec(name):
+                commands[name] = [sys.executable, "-c", program, str(file)]
         if options.cfc:
             campaign = pathlib.Path(folder) / "campaign"
             campaign.mkdir()
@@ -110,6 +126,8 @@ def main():
         pandas = results["pandas.read_csv"]
         ours = results["lobestone inspect"]
         print(f"inspect is {pandas[0] / ours[0]:.1f} times as fast as pandas and takes {ours[1] / pandas[1]:.2f} of its memory")
+        for name in OTHERS.keys() & results.keys():
+            print(f"{name} takes {results[name][0] / ours[0]:.2f} times as long as inspect, processor {results[name][2] / ours[2]:.2f}")
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 mod channels;
 pub mod draft;
+mod each_tooth;
 pub mod form;
 pub mod frf_set;
 mod load;
@@ -16,7 +17,7 @@ mod tool_and_cut;
 pub use crate::data::{
     AxesRef, BodyRef, ChipFormation, Cut, CutGeometry, CutOutcome, FrfSet, HoleSection, Immersion, LinkGroup,
     LinkTolerances, LobeAxis, LobeMethod, LobeMode, LobeSource, LobesSection, MeasuredDof, MeasuredFrf,
-    OrthogonalSection, Point, Posture, Process, Redundancy, RobotSection, Tool, ToolKind, ToolSegment,
+    OrthogonalSection, Point, Posture, Process, Redundancy, RobotSection, Tool, ToolKind, ToolSegment, Tooth,
 };
 pub use form::json_schema::{SchemaOf, json_schema};
 pub use form::paths::campaign_file;

@@ -1,5 +1,6 @@
 //! What cut, and what was cut: `[tool]`, and the geometry and speed of a `[[cut]]`.
 
+use super::each_tooth;
 use super::shared_keys::{PROCESSES, immersion};
 use crate::Result;
 use crate::campaign::form::bounds::Bounds;
@@ -8,12 +9,18 @@ use crate::campaign::form::section::Section;
 use crate::data::{CutGeometry, Process, Tool, ToolKind};
 
 /// Keys of `[tool]` that only some kinds have.
-const OF_MILLS: [&str; 2] = ["corner_radius_mm", "lead_angle_deg"];
+const OF_MILLS: [&str; 5] = [
+    "corner_radius_mm",
+    "lead_angle_deg",
+    "pitch_deg",
+    "tooth_helix_deg",
+    "tooth_radius_offset_mm",
+];
 const OF_DRILLS: [&str; 2] = ["half_point_angle_deg", "web_thickness_mm"];
 const OF_TURNING: [&str; 2] = ["nose_radius_mm", "cutting_edge_angle_deg"];
 
 pub(super) fn tool(top: &Section<'_>) -> Result<Option<Tool>> {
-    let Some(tool) = top.section("tool", &names(&keys::TOOL))? else {
+    let Some(section) = top.section("tool", &names(&keys::TOOL))? else {
         return Ok(None);
     };
     // A ball end is an end mill whose corner is as round as can be.
@@ -23,37 +30,42 @@ pub(super) fn tool(top: &Section<'_>) -> Result<Option<Tool>> {
         ("drill", (ToolKind::Drill, false)),
         ("turning", (ToolKind::Turning, false)),
     ];
-    let (kind, ball) = tool.required(
+    let (kind, ball) = section.required(
         "kind",
-        tool.choice("kind", &kinds)?,
+        section.choice("kind", &kinds)?,
         "\"endmill\", \"ballend\", \"drill\" or \"turning\"",
     )?;
-    no_foreign_keys(&tool, kind)?;
+    no_foreign_keys(&section, kind)?;
     if kind == ToolKind::Turning {
-        return turning_tool(&tool).map(Some);
+        return turning_tool(&section).map(Some);
     }
-    let diameter_mm = tool.required(
+    let diameter_mm = section.required(
         "diameter_mm",
-        tool.number("diameter_mm", Bounds::POSITIVE)?,
+        section.number("diameter_mm", Bounds::POSITIVE)?,
         "16.0",
     )?;
-    let teeth = tool.required("teeth", tool.whole("teeth", 1, 1000)?, "4")?;
-    Ok(Some(Tool {
+    let teeth = section.required("teeth", section.whole("teeth", 1, 1000)?, "4")?;
+    let each_tooth = each_tooth::read(&section, teeth as usize)?;
+    let helix_deg = section.number("helix_deg", Bounds::open(-90.0, 90.0))?;
+    let tool = Tool {
         kind,
         diameter_mm,
         teeth: teeth as usize,
-        helix_deg: tool
-            .number("helix_deg", Bounds::open(-90.0, 90.0))?
-            .unwrap_or(0.0),
-        corner_radius_mm: tool
+        helix_deg: helix_deg.unwrap_or_else(|| each_tooth::mean_helix_deg(&each_tooth)),
+        corner_radius_mm: section
             .number("corner_radius_mm", Bounds::closed(0.0, 0.5 * diameter_mm))?
             .unwrap_or(if ball { 0.5 * diameter_mm } else { 0.0 }),
-        lead_angle_deg: tool
+        lead_angle_deg: section
             .number("lead_angle_deg", Bounds::above_up_to(0.0, 90.0))?
             .unwrap_or(90.0),
-        half_point_angle_deg: tool.number("half_point_angle_deg", Bounds::above_up_to(0.0, 90.0))?,
-        web_thickness_mm: tool.number("web_thickness_mm", Bounds::open(0.0, diameter_mm))?,
-    }))
+        half_point_angle_deg: section.number("half_point_angle_deg", Bounds::above_up_to(0.0, 90.0))?,
+        web_thickness_mm: section.number("web_thickness_mm", Bounds::open(0.0, diameter_mm))?,
+        each_tooth,
+    };
+    if !tool.each_tooth.is_empty() && !tool.has_straight_edge() {
+        return Err(each_tooth::on_a_shaped_edge(&section));
+    }
+    Ok(Some(tool))
 }
 
 /// Keys, whose they are, and the word for its kind.
@@ -136,6 +148,7 @@ fn turning_tool(tool: &Section<'_>) -> Result<Tool> {
             .unwrap_or(90.0),
         half_point_angle_deg: None,
         web_thickness_mm: None,
+        each_tooth: Vec::new(),
     })
 }
 
@@ -199,7 +212,11 @@ pub(super) fn geometry(cut: &Section<'_>, tool: &Tool) -> Result<(CutGeometry, f
     let geometry = match process {
         Process::Milling => CutGeometry::Milling {
             feed_per_tooth_mm: number("feed_per_tooth_mm", Bounds::POSITIVE, "0.05")?,
-            axial_depth_mm: number("axial_depth_mm", Bounds::POSITIVE, "2.0")?,
+            axial_depth_mm: {
+                let depth_mm = number("axial_depth_mm", Bounds::POSITIVE, "2.0")?;
+                each_tooth::check_depth(cut, tool, depth_mm)?;
+                depth_mm
+            },
             immersion: cut.required(
                 "immersion",
                 immersion(cut)?,

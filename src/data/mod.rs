@@ -22,4 +22,4 @@ pub use orthogonal::{ChipFormation, OrthogonalSection};
 pub use robot_section::{LinkGroup, LinkTolerances, RobotSection};
 pub use robot_spec::{BeamSection, JointPlacement, JointSpec, LinkSpec, RobotSpec, ToolFrame};
 pub use time_record::{Channel, ChannelRole, TimeRecord};
-pub use tool::{Tool, ToolKind, ToolSegment};
+pub use tool::{Tool, ToolKind, ToolSegment, Tooth};

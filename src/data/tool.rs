@@ -32,6 +32,20 @@ pub struct Tool {
     pub half_point_angle_deg: Option<f64>,
     /// Drills: web thickness.
     pub web_thickness_mm: Option<f64>,
+    /// End mills whose teeth differ: each of the `teeth`, in the order in which they cut. Empty: all alike, evenly spaced.
+    pub each_tooth: Vec<Tooth>,
+}
+
+/// One tooth of an end mill whose teeth differ.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tooth {
+    /// Angle at the tip from this tooth to the one that cuts next; those of all teeth add up to 360°.
+    pub pitch_deg: f64,
+    /// Its own helix angle.
+    pub helix_deg: f64,
+    /// How far its edge stands beyond the tool's radius; negative for one that is chipped, by more than the feed per
+    /// revolution for one that is missing.
+    pub radius_offset_mm: f64,
 }
 
 impl Tool {

@@ -125,7 +125,7 @@ pub fn read_time_with(path: &Path, rules: &[ChannelRule]) -> Result<(TimeRecord,
     if rules.is_empty() {
         return read::read_time(path);
     }
-    let (times, warnings) = match read_file(path) {
+    let (times, mut warnings) = match read_file(path) {
         Ok(MeasurementFile {
             contents, warnings, ..
         }) if !contents.times.is_empty() => (contents.times, warnings),
@@ -164,7 +164,7 @@ pub fn read_time_with(path: &Path, rules: &[ChannelRule]) -> Result<(TimeRecord,
         .remedy("write the channel's name as the file has it after in_file, or its place after column")
         .into());
     };
-    apply(&mut record, &forces).map_err(|e| Error::from(e.file(path)))?;
+    warnings.extend(apply(&mut record, &forces).map_err(|e| Error::from(e.file(path)))?);
     Ok((record, warnings))
 }
 
@@ -184,7 +184,9 @@ fn index(record: &TimeRecord, rule: &ChannelRule) -> Option<usize> {
     record.channels.iter().position(|c| own(&c.name))
 }
 
-fn apply(record: &mut TimeRecord, rules: &[&ChannelRule]) -> std::result::Result<(), InputError> {
+/// Makes forces of the channels; gives what was assumed.
+fn apply(record: &mut TimeRecord, rules: &[&ChannelRule]) -> std::result::Result<Vec<String>, InputError> {
+    let mut notes = Notes::default();
     let places: Vec<usize> = rules.iter().filter_map(|rule| index(record, rule)).collect();
     // What the file's names say of these forces no longer counts.
     let given: Vec<Measures> = rules.iter().map(|r| r.measures).collect();
@@ -228,13 +230,23 @@ fn apply(record: &mut TimeRecord, rules: &[&ChannelRule]) -> std::result::Result
         };
         let factor = unit.map_or(1.0, |u| u.factor);
         let gain = match rule.gain {
-            Gain::None => match unit {
-                Some(unit) if unit.dimension != expected => {
-                    let remedy = "give the amplifier's: gain = \"500 N/V\" or gain = \"-3.9 pC/N\"";
-                    return Err(refuse("its values are no forces and have no gain".into(), remedy));
+            Gain::None => {
+                match unit {
+                    None => {
+                        let assumed = if role == ChannelRole::TorqueZ { "N·m" } else { "N" };
+                        notes.about(
+                        &channel.name,
+                        format!("neither the file nor its [[channel]] gives a unit or a gain: {assumed} assumed"),
+                    );
+                        1.0
+                    }
+                    Some(unit) if unit.dimension != expected => {
+                        let remedy = "give the amplifier's: gain = \"500 N/V\" or gain = \"-3.9 pC/N\"";
+                        return Err(refuse("its values are no forces and have no gain".into(), remedy));
+                    }
+                    _ => 1.0,
                 }
-                _ => 1.0,
-            },
+            }
             Gain::PerUnit(gain) => gain / factor,
             Gain::PerVolt(gain, _) => match unit {
                 Some(unit) if unit.dimension == Dimension::VOLTAGE => gain,
@@ -262,7 +274,7 @@ fn apply(record: &mut TimeRecord, rules: &[&ChannelRule]) -> std::result::Result
         .to_string();
     }
     // Of forces that a rule names twice the last one counts; checked where rules are made.
-    Ok(())
+    Ok(notes.into_warnings())
 }
 
 /// A table of text that has no names, or no time: columns are named as the rules name them.

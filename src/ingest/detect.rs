@@ -1,7 +1,7 @@
 //! Which format a file has, by what stands in it.
 
 use super::contents::Format;
-use super::preview::preview;
+use super::preview::{columns, preview};
 use super::text::{self, Lines};
 use crate::InputError;
 use crate::ingest::formats::force;
@@ -109,7 +109,12 @@ pub(super) fn detect(bytes: &[u8], is_dwd_named: bool) -> Result<(Detected, Form
         let why = format!("{what} and column names ({}), {how}", abbreviated(&header.names));
         return Ok((Detected::TimeTable(header), format, why));
     }
-    if frf_text::is_plain_frf(&header) {
+    // Forces in three columns are as nameless as an FRF, but none of them rises all the time.
+    let is_nameless = |header: &Header| {
+        let first = columns(bytes, header).into_iter().next();
+        header.names.is_empty() && first.is_some_and(|c| !c.rises)
+    };
+    if frf_text::is_plain_frf(&header) && (frf_text::speaks_of_frequency(&header) || !is_nameless(&header)) {
         let why = format!("three columns of numbers, taken as Hz, Re, Im; {how}");
         return Ok((Detected::PlainFrf(header), Format::FrfText, why));
     }

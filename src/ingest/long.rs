@@ -11,6 +11,7 @@ use super::quality::{QualityCheck, quality_warnings};
 use super::text::{self, Notes};
 use crate::data::TimeRecord;
 use crate::ingest::formats::force::Pieces;
+use crate::ingest::tables::table::{Table, holds};
 use crate::progress::Progress;
 use crate::{Error, Result};
 
@@ -69,26 +70,23 @@ pub fn survey(path: &Path) -> Result<Survey> {
         Opened::Long(long) => long,
     };
     let mut check: Option<QualityCheck> = None;
-    let (mut first, mut samples) = (None, 0);
-    while let Some(piece) = long.next_piece()? {
+    let (mut first, mut rows) = (None, 0);
+    while let Some(mut piece) = long.next_piece()? {
         let expected = long.expected_samples();
         check
             .get_or_insert_with(|| QualityCheck::for_length(expected))
             .add(&piece);
-        samples += piece.len();
-        first.get_or_insert_with(|| without_samples(piece));
+        rows += piece.len();
+        let samples = piece.channels.iter_mut().map(|c| std::mem::take(&mut c.samples));
+        long.pieces.spare.extend(samples);
+        piece.filled = Vec::new();
+        first.get_or_insert(piece);
     }
     Ok(Survey {
         file: long.file_with(first.into_iter().collect()),
-        samples: vec![samples],
+        samples: vec![rows],
         quality: check.map_or(Vec::new(), |c| c.warnings()),
     })
-}
-
-fn without_samples(mut record: TimeRecord) -> TimeRecord {
-    record.channels.iter_mut().for_each(|c| c.samples = Vec::new());
-    record.filled = Vec::new();
-    record
 }
 
 /// Reads a file, or opens it as a long record.
@@ -121,7 +119,7 @@ fn open_by(path: &Path, piece: usize) -> Result<Opened> {
     regular_file(path)?;
     let mut file = File::open(path).map_err(refused)?;
     let bytes = file.metadata().map_err(refused)?.len();
-    let mut head = Vec::new();
+    let mut head = Vec::with_capacity(bytes.min(piece as u64) as usize + 1);
     (&mut file)
         .take(piece as u64)
         .read_to_end(&mut head)
@@ -179,7 +177,7 @@ fn long_record(path: &Path, head: &mut Vec<u8>, bytes: u64) -> Option<(Format, S
     if head.starts_with(b"\xFF\xFE") || head.starts_with(b"\xFE\xFF") {
         return None;
     }
-    let whole_lines = head.iter().rposition(|b| *b == b'\n')? + 1;
+    let whole_lines = memchr::memrchr(b'\n', head)? + 1;
     let text = text::without_byte_order_mark(&head[..whole_lines]);
     let mark = whole_lines - text.len();
     let (detected, format, why) = detect::detect(&text, is_dwd_named(path)).ok()?;
@@ -187,7 +185,7 @@ fn long_record(path: &Path, head: &mut Vec<u8>, bytes: u64) -> Option<(Format, S
         return None;
     };
     let rows = text.get(header.data_at..).unwrap_or_default();
-    if header.decimal_comma_between_commas || rows.contains(&b'"') {
+    if header.decimal_comma_between_commas || holds(rows, b'"') {
         return None;
     }
     let pieces = Pieces::new(&text, header, false);
@@ -207,23 +205,25 @@ impl LongRecord {
         let missing = self.piece.saturating_sub(self.text.len());
         let read = (&mut self.file).take(missing as u64).read_to_end(&mut self.text);
         self.at_end = read.map_err(refused)? < missing;
-        let end = match self.text.iter().rposition(|b| *b == b'\n') {
+        let end = match memchr::memrchr(b'\n', &self.text) {
             Some(at) if !self.at_end => at + 1,
             _ => self.text.len(),
         };
         let text = &self.text[..end];
         let fail = |e: crate::InputError| Error::from(e.file(&self.path));
-        let table = self
-            .pieces
+        let mut columns = std::mem::take(&mut self.pieces.spare);
+        columns.iter_mut().for_each(Vec::clear);
+        self.pieces
             .header
-            .read_rows(text, self.line, self.at_end, &mut self.notes)
+            .append_rows(text, self.line, self.at_end, &mut self.notes, &mut columns)
             .map_err(fail)?;
+        let table = Table { columns };
         let record = self
             .pieces
             .next(table, self.line, &mut self.notes)
             .map_err(fail)?;
         self.bytes_per_sample = end as f64 / record.len().max(1) as f64;
-        self.line += text.iter().filter(|b| **b == b'\n').count();
+        self.line += memchr::memchr_iter(b'\n', text).count();
         self.text.drain(..end);
         self.progress.step();
         if self.at_end {

@@ -1,58 +1,108 @@
 //! Tables without names: what is in them, and what to write so that they get names.
 
-use super::text::Notes;
+use std::io::Read;
+use std::path::Path;
+
+use super::text::{Notes, without_byte_order_mark};
 use super::units;
 use crate::ingest::tables::table::Header;
+use crate::{Error, Result};
 
-/// What a table without names holds, and the lines of `campaign.toml` that give it names.
-pub(super) fn preview(bytes: &[u8], header: &Header) -> (String, String) {
-    const ROWS: usize = 2000;
-    let end = bytes[header.data_at..]
-        .iter()
-        .enumerate()
-        .filter(|(_, b)| **b == b'\n')
-        .nth(ROWS)
-        .map_or(bytes.len(), |(i, _)| header.data_at + i + 1);
-    let columns = header
-        .read(&bytes[..end], None, &mut Notes::default())
-        .map_or_else(|_| Vec::new(), |t| t.columns);
-    let even = |values: &[f64]| -> Option<f64> {
-        let [first, .., last] = values else { return None };
-        let step = (last - first) / (values.len() - 1) as f64;
-        let is_even = values
-            .iter()
-            .enumerate()
-            .all(|(i, v)| (first + i as f64 * step - v).abs() <= 0.51 * step);
-        (step > 0.0 && values.len() > 3 && is_even).then_some(step)
-    };
-    let mut seen = Vec::new();
-    let mut lines = String::new();
-    let mut forces = ["fx", "fy", "fz", "mz"].into_iter();
-    let mut has_time = false;
-    for (i, values) in columns.iter().enumerate() {
+/// Rows that are looked at.
+const ROWS: usize = 2000;
+/// Bytes read of a file to see them.
+const START: u64 = 1 << 20;
+
+/// A column of a table without names, as its first rows show it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlainColumn {
+    /// Least and greatest value, in the unit of the file.
+    pub range: [f64; 2],
+    /// Step of the first column where it rises evenly, as times do; in the unit of the file.
+    pub step: Option<f64>,
+    /// Each value is above the one before.
+    pub rises: bool,
+}
+
+impl PlainColumn {
+    fn of(values: &[f64], is_first: bool) -> PlainColumn {
+        let even = || -> Option<f64> {
+            let [first, .., last] = values else { return None };
+            let step = (last - first) / (values.len() - 1) as f64;
+            let is_even = values
+                .iter()
+                .enumerate()
+                .all(|(i, v)| (first + i as f64 * step - v).abs() <= 0.51 * step);
+            (step > 0.0 && values.len() > 3 && is_even).then_some(step)
+        };
         let (low, high) = values
             .iter()
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
                 (a.min(*v), b.max(*v))
             });
-        let step = even(values).filter(|_| i == 0);
-        seen.push(match step {
-            Some(step) => format!("1: rises by {} (time?)", units::figures(step, 4)),
+        PlainColumn {
+            range: [low, high],
+            step: even().filter(|_| is_first),
+            rises: values.is_sorted_by(|a, b| a < b),
+        }
+    }
+
+    /// `rises by 0.0001 (time?)`, `-0.12 to 3.4`.
+    pub fn describe(&self) -> String {
+        match self.step {
+            Some(step) => format!("rises by {} (time?)", units::figures(step, 4)),
             None => format!(
-                "{}: {} to {}",
-                i + 1,
-                units::figures(low, 4),
-                units::figures(high, 4)
+                "{} to {}",
+                units::figures(self.range[0], 4),
+                units::figures(self.range[1], 4)
             ),
-        });
-        has_time |= step.is_some();
-        let name = if step.is_some() {
-            Some("time")
-        } else {
-            forces.next()
-        };
+        }
+    }
+}
+
+/// The columns of a file that is a table of numbers without names; `None` for all else.
+///
+/// # Errors
+/// The operating system's.
+pub fn plain_columns(path: &Path) -> Result<Option<Vec<PlainColumn>>> {
+    let refused = |e| Error::io(path, e);
+    let mut bytes = Vec::new();
+    let file = std::fs::File::open(path).map_err(refused)?;
+    file.take(START).read_to_end(&mut bytes).map_err(refused)?;
+    let text = without_byte_order_mark(&bytes);
+    let whole = memchr::memrchr(b'\n', &text).map_or(text.len(), |at| at + 1);
+    if text.contains(&0) {
+        return Ok(None);
+    }
+    let found = Header::find(&text[..whole]).filter(|header| header.names.is_empty());
+    Ok(found.map(|header| columns(&text[..whole], &header)))
+}
+
+/// What the first rows show; empty where they cannot be read.
+pub(super) fn columns(bytes: &[u8], header: &Header) -> Vec<PlainColumn> {
+    let end = memchr::memchr_iter(b'\n', &bytes[header.data_at..])
+        .nth(ROWS)
+        .map_or(bytes.len(), |at| header.data_at + at + 1);
+    let table = header.read(&bytes[..end], None, &mut Notes::default());
+    let columns = table.map_or_else(|_| Vec::new(), |t| t.columns);
+    let of = |(i, values): (usize, &Vec<f64>)| PlainColumn::of(values, i == 0);
+    columns.iter().enumerate().map(of).collect()
+}
+
+/// What a table without names holds, and the lines of `campaign.toml` that give it names.
+pub(super) fn preview(bytes: &[u8], header: &Header) -> (String, String) {
+    let columns = columns(bytes, header);
+    let mut seen = Vec::new();
+    let mut lines = String::new();
+    let mut forces = ["fx", "fy", "fz", "mz"].into_iter();
+    let mut has_time = false;
+    for (i, column) in columns.iter().enumerate() {
+        seen.push(format!("{}: {}", i + 1, column.describe()));
+        let is_time = column.step.is_some();
+        has_time |= is_time;
+        let name = if is_time { Some("time") } else { forces.next() };
         if let Some(name) = name {
-            let gain = if name == "time" {
+            let gain = if is_time {
                 "unit = \"s\""
             } else {
                 "unit = \"V\"\ngain = \"500 N/V\""
@@ -71,7 +121,7 @@ pub(super) fn preview(bytes: &[u8], header: &Header) -> (String, String) {
     );
     let remedy = format!(
         "put a line of column names on top (frequency_hz,re,im or time_s,fx_n,fy_n,fz_n), or, for forces, say in campaign.toml \
-         what they are, such as{lines}"
+         what they are (`lobestone init` writes and asks it), such as{lines}"
     );
     (what, remedy)
 }

@@ -3,9 +3,11 @@
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use super::units::figures;
 use crate::data::{Channel, ChannelRole, TimeRecord};
-use crate::signal::{self, DriftLine, Spindle, find_faults, find_phases, fit_drift};
+use crate::signal::{self, DriftLine, Spindle, find_faults, find_phases, fit_drift, least_and_greatest};
 
 /// What looks wrong with a record. Works on the samples alone; dropped samples are found while reading.
 pub fn quality_warnings(record: &TimeRecord) -> Vec<String> {
@@ -75,13 +77,12 @@ impl QualityCheck {
         self.channels
             .resize_with(channels.len().max(self.channels.len()), Found::default);
         let first_piece = self.seen == 0;
-        for (i, channel) in channels.iter().enumerate() {
+        let look = |(i, (channel, found)): (usize, (&Channel, &mut Found))| {
             let samples = &channel.samples;
             let alike = |j: usize| channels[j].role != ChannelRole::Other && channels[j].samples == *samples;
             let twin = (channel.role != ChannelRole::Other)
                 .then(|| (0..i).find(|j| alike(*j)))
                 .flatten();
-            let found = &mut self.channels[i];
             found.same_as = twin.filter(|j| first_piece || found.same_as == Some(*j));
             let faults = find_faults(samples);
             let before = found.range;
@@ -90,7 +91,7 @@ impl QualityCheck {
                 .chain(before)
                 .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
             if faults.dead && found.range.is_some_and(|r| r.0 == r.1) {
-                continue;
+                return;
             }
             let time = |sample: usize| piece.start_s + sample as f64 / piece.sample_rate_hz;
             let value = |sample: usize| samples[sample];
@@ -104,7 +105,12 @@ impl QualityCheck {
             if let Some(clipping) = &faults.clipping {
                 found.clipped.add(&clipping.plateaus, time, |_| clipping.level);
             }
-        }
+        };
+        channels
+            .par_iter()
+            .zip(&mut self.channels)
+            .enumerate()
+            .for_each(look);
         let from = self.seen.next_multiple_of(every) - self.seen;
         let thin = |c: &Channel| {
             c.samples
@@ -204,12 +210,7 @@ impl Found {
 }
 
 fn range(samples: &[f64]) -> Option<(f64, f64)> {
-    let first = *samples.first()?;
-    Some(
-        samples
-            .iter()
-            .fold((first, first), |(low, high), v| (low.min(*v), high.max(*v))),
-    )
+    (!samples.is_empty()).then(|| least_and_greatest(samples))
 }
 
 fn forces(record: &TimeRecord) -> impl Iterator<Item = (usize, &Channel)> {

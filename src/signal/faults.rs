@@ -48,16 +48,18 @@ pub fn find_faults(samples: &[f64]) -> Faults {
     }
     let spikes = spikes(samples);
     let range = extremes(samples, &spikes);
-    if repeats_by_nature(samples, range) {
+    let runs = runs(samples);
+    if repeats_by_nature(samples, &runs, range) {
         return Faults {
             spikes,
             ..Faults::default()
         };
     }
-    let windowed = is_windowed(samples);
-    let clipping = clipping(samples, range).filter(|c| !(windowed && c.level == 0.0));
+    let windowed = is_windowed(samples, &runs);
+    let clipping = clipping(samples, &runs, range).filter(|c| !(windowed && c.level == 0.0));
     let clipped = |run: &Range<usize>| clipping.as_ref().is_some_and(|c| c.plateaus.contains(run));
-    let stuck = runs(samples)
+    let stuck = runs
+        .into_iter()
         .filter(|run| run.len() >= STUCK && !clipped(run) && !(windowed && samples[run.start] == 0.0))
         .collect();
     Faults {
@@ -70,18 +72,50 @@ pub fn find_faults(samples: &[f64]) -> Faults {
 
 /// More than half of the samples are exactly zero, in long stretches: a force window left the contacts only (or a trigger
 /// the blocks). What freezes or drops out makes up a part of a record.
-fn is_windowed(samples: &[f64]) -> bool {
-    let zeros = runs(samples).filter(|run| run.len() >= STUCK && samples[run.start] == 0.0);
+fn is_windowed(samples: &[f64], runs: &[Range<usize>]) -> bool {
+    let zeros = runs
+        .iter()
+        .filter(|run| run.len() >= STUCK && samples[run.start] == 0.0);
     2 * zeros.map(|run| run.len()).sum::<usize>() > samples.len()
 }
 
-/// Runs of equal samples.
-fn runs(samples: &[f64]) -> impl Iterator<Item = Range<usize>> + '_ {
-    let mut at = 0;
-    samples.chunk_by(|a, b| a == b).map(move |run| {
-        at += run.len();
-        at - run.len()..at
-    })
+/// Samples looked at in one go by loops without branches.
+const BLOCK: usize = 256;
+
+/// Runs of two and more equal samples. Measured values hardly ever repeat: most blocks hold none.
+fn runs(samples: &[f64]) -> Vec<Range<usize>> {
+    let mut runs: Vec<Range<usize>> = Vec::new();
+    for from in (0..samples.len().saturating_sub(1)).step_by(BLOCK) {
+        let block = &samples[from..(from + BLOCK + 1).min(samples.len())];
+        let pairs = || block.iter().zip(&block[1..]);
+        if !pairs().fold(false, |any, (a, b)| any | (a == b)) {
+            continue;
+        }
+        for (i, _) in pairs().enumerate().filter(|(_, (a, b))| a == b) {
+            match runs.last_mut() {
+                Some(last) if last.end == from + i + 1 => last.end += 1,
+                _ => runs.push(from + i..from + i + 2),
+            }
+        }
+    }
+    runs
+}
+
+/// Least and greatest value; infinite the wrong way round where there is none.
+pub(crate) fn least_and_greatest(samples: &[f64]) -> (f64, f64) {
+    // Eight by eight, without a branch.
+    let (eights, rest) = samples.as_chunks::<8>();
+    let (mut low, mut high) = ([f64::INFINITY; 8], [f64::NEG_INFINITY; 8]);
+    for eight in eights {
+        for k in 0..8 {
+            low[k] = if eight[k] < low[k] { eight[k] } else { low[k] };
+            high[k] = if eight[k] > high[k] { eight[k] } else { high[k] };
+        }
+    }
+    (
+        low.iter().chain(rest).copied().fold(f64::INFINITY, f64::min),
+        high.iter().chain(rest).copied().fold(f64::NEG_INFINITY, f64::max),
+    )
 }
 
 /// Samples in a row without any change that mean a stuck channel.
@@ -94,11 +128,11 @@ const STRETCHES_AT_MOST: usize = 50;
 
 /// Signals of few digits repeat values by nature: nothing can be said about plateaus and rests there. A long stretch
 /// speaks for that only where its value is seen elsewhere too, as the zeros of coarse quiet air are.
-fn repeats_by_nature(samples: &[f64], (low, high): (f64, f64)) -> bool {
+fn repeats_by_nature(samples: &[f64], runs: &[Range<usize>], (low, high): (f64, f64)) -> bool {
     let (mut repeats, mut stretches) = (0, Vec::new());
-    for run in runs(samples) {
+    for run in runs {
         if run.len() >= STUCK {
-            stretches.push(run);
+            stretches.push(run.clone());
         } else if samples[run.start] != low && samples[run.start] != high {
             repeats += run.len() - 1;
         }
@@ -122,17 +156,21 @@ fn repeats_by_nature(samples: &[f64], (low, high): (f64, f64)) -> bool {
 fn extremes(samples: &[f64], spikes: &[Range<usize>]) -> (f64, f64) {
     let starts = std::iter::once(0).chain(spikes.iter().map(|s| s.end));
     let ends = spikes.iter().map(|s| s.start).chain([samples.len()]);
-    let sound = starts.zip(ends).flat_map(|(from, to)| &samples[from..to]);
-    sound.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
-        (low.min(*v), high.max(*v))
+    let sound = starts
+        .zip(ends)
+        .map(|(from, to)| least_and_greatest(&samples[from..to]));
+    sound.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (l, h)| {
+        (low.min(l), high.max(h))
     })
 }
 
 /// At least two plateaus at one of the extreme values.
-fn clipping(samples: &[f64], (low, high): (f64, f64)) -> Option<Clipping> {
+fn clipping(samples: &[f64], runs: &[Range<usize>], (low, high): (f64, f64)) -> Option<Clipping> {
     [high, low].into_iter().find_map(|level| {
-        let plateaus: Vec<Range<usize>> = runs(samples)
+        let plateaus: Vec<Range<usize>> = runs
+            .iter()
             .filter(|run| run.len() >= PLATEAU && samples[run.start] == level)
+            .cloned()
             .collect();
         // A single long one is a stuck channel rather than a peak cut off.
         (plateaus.len() >= 2).then_some(Clipping { level, plateaus })
@@ -156,20 +194,13 @@ fn spikes(samples: &[f64]) -> Vec<Range<usize>> {
     if n < 200 {
         return Vec::new();
     }
-    let height = |i: usize| {
-        let (before, after) = (
-            samples[i] - samples[i - WIDEST_SPIKE],
-            samples[i] - samples[i + WIDEST_SPIKE],
-        );
-        if before * after > 0.0 {
-            before.abs().min(after.abs())
-        } else {
-            0.0
-        }
-    };
+    let height = |i: usize| height(samples[i - WIDEST_SPIKE], samples[i], samples[i + WIDEST_SPIKE]);
     let within = WIDEST_SPIKE..n - WIDEST_SPIKE;
+    let rank = (within.len() as f64 * 0.995) as usize;
+    if none_stands_out(samples, within.len() - rank) {
+        return Vec::new();
+    }
     let mut heights: Vec<f64> = within.clone().map(height).collect();
-    let rank = (heights.len() as f64 * 0.995) as usize;
     let (_, &mut usual, _) = heights.select_nth_unstable_by(rank, f64::total_cmp);
     if usual == 0.0 {
         return Vec::new();
@@ -197,6 +228,43 @@ fn spikes(samples: &[f64]) -> Vec<Range<usize>> {
     } else {
         found
     }
+}
+
+/// How far a sample stands above (or below) the one before and the one after it.
+#[inline]
+fn height(before: f64, here: f64, after: f64) -> f64 {
+    let (rise, fall) = (here - before, here - after);
+    let least = if rise.abs() < fall.abs() {
+        rise.abs()
+    } else {
+        fall.abs()
+    };
+    if rise * fall > 0.0 { least } else { 0.0 }
+}
+
+/// True where `upper` samples or more are at least a [`SPIKE`]th as high as the highest: then so is the usual height, and none
+/// can be [`SPIKE`] times that. Sound records are known by it without their heights being kept and sorted.
+fn none_stands_out(samples: &[f64], upper: usize) -> bool {
+    let blocks = || {
+        let before = samples.chunks(BLOCK);
+        let here = samples[WIDEST_SPIKE..].chunks(BLOCK);
+        let after = samples[2 * WIDEST_SPIKE..].chunks(BLOCK);
+        before.zip(here).zip(after).map(|((before, here), after)| {
+            let mut heights = [0.0; BLOCK];
+            for (((h, b), c), a) in heights.iter_mut().zip(before).zip(here).zip(after) {
+                *h = height(*b, *c, *a);
+            }
+            heights
+        })
+    };
+    let highest = blocks().fold(0.0_f64, |most, heights| most.max(least_and_greatest(&heights).1));
+    let enough = highest / SPIKE;
+    let mut count = 0;
+    highest > 0.0
+        && blocks().any(|heights| {
+            count += heights.iter().map(|h| usize::from(*h >= enough)).sum::<usize>();
+            count >= upper
+        })
 }
 
 fn come_back_evenly(found: &[Range<usize>]) -> bool {

@@ -18,6 +18,7 @@ pub(crate) use blocks::line;
 pub use blocks::{SignalBlocks, mean, median, quantile};
 pub use drift::{Air, DriftLine, fit_drift};
 pub use engagement::change;
+pub(crate) use faults::least_and_greatest;
 pub use faults::{Clipping, Faults, find_faults, samples_in};
 pub use order_spectrum::{OrderSpectrum, highest_order, line_amplitude, mean_between, order_spectrum};
 pub use spindle_track::{SpindleTrack, spindle_track};

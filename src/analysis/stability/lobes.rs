@@ -298,6 +298,17 @@ impl CutForce {
                     .into(),
             );
         }
+        let differ = campaign
+            .tool
+            .as_ref()
+            .is_some_and(|tool| !tool.each_tooth.is_empty());
+        if section.process == Process::Milling && differ {
+            warnings.push(
+                "the lobes take all teeth as alike and evenly spaced: pitch_deg, tooth_helix_deg and tooth_radius_offset_mm of [tool] are \
+                 left out of the dynamics (they are in the coefficients); a variable pitch moves the lobes"
+                    .into(),
+            );
+        }
         if section.process == Process::Turning {
             warnings.extend(what_turning_lobes_leave_out(campaign));
         }

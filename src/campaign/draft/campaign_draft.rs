@@ -142,8 +142,8 @@ impl Draft {
                     missing.table,
                     missing.what
                 );
-                // Postures and points differ from each other; cuts and files often do not.
-                let alike = ["cut", "frf"].contains(&missing.table);
+                // Postures and points differ from each other; cuts, files and channels often do not.
+                let alike = ["cut", "frf", "channel"].contains(&missing.table);
                 if alike && self.put(&missing, &missing.of, &question, ask)? {
                     continue;
                 }

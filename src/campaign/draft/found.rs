@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use super::names::Facts;
 use crate::data::Quantity;
+use crate::ingest::PlainColumn;
 
 /// A folder's measurement files, in the order of their paths (from the folder, with forward slashes).
 #[derive(Debug, Default, Clone)]
@@ -13,6 +14,8 @@ pub struct Scan {
     pub frfs: Vec<FoundFrf>,
     /// Files with cutting forces over time.
     pub forces: Vec<FoundForce>,
+    /// What the columns of the force files hold, where none of them names any: all have as many.
+    pub columns: Vec<PlainColumn>,
     /// Robot files, as paths.
     pub robots: Vec<String>,
     /// Tables that look like lists of cuts.

@@ -5,6 +5,7 @@
 
 mod answers;
 mod campaign_draft;
+mod channels;
 mod cut_list;
 mod entry;
 mod form;

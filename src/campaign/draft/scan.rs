@@ -11,7 +11,7 @@ use super::cut_list;
 use super::found::{FoundForce, FoundFrf, Scan, stem};
 use super::names::{Facts, facts_of, facts_of_header, posture_of};
 use crate::campaign::campaign_file;
-use crate::ingest::survey;
+use crate::ingest::{PlainColumn, plain_columns, survey};
 use crate::{Error, InputError, Result};
 
 /// Files looked at.
@@ -31,6 +31,8 @@ enum Seen {
     CutList(PathBuf),
     Frf(FoundFrf),
     Force(FoundForce),
+    /// Numbers without names, and why they were not understood.
+    Nameless(FoundForce, Vec<PlainColumn>, String),
     NotUsed(String, String),
 }
 
@@ -68,14 +70,17 @@ pub fn scan(dir: &Path) -> Result<Scan> {
         .into_par_iter()
         .map(|(name, file)| look(name, &file))
         .collect();
+    let mut nameless = Vec::new();
     for one in seen {
         match one {
             Seen::CutList(path) => scan.cut_lists.push(path),
             Seen::Frf(frf) => scan.frfs.push(frf),
             Seen::Force(force) => scan.forces.push(force),
+            Seen::Nameless(force, columns, why) => nameless.push((force, columns, why)),
             Seen::NotUsed(path, why) => scan.not_used.push((path, why)),
         }
     }
+    take_nameless(&mut scan, nameless);
     // Several FRF files in each of several folders: a folder is a posture.
     let mut folders: BTreeMap<String, usize> = BTreeMap::new();
     for frf in &scan.frfs {
@@ -230,7 +235,12 @@ fn look(name: String, file: &Path) -> Seen {
                 Some(remedy) => format!("{} ({remedy})", error.problem),
                 None => error.problem.clone(),
             };
-            return Seen::NotUsed(name, why);
+            return match plain_columns(file) {
+                Ok(Some(columns)) if may_be_forces(&columns) => {
+                    Seen::Nameless(force_of(name, file), columns, why)
+                }
+                _ => Seen::NotUsed(name, why),
+            };
         }
         Err(error) => return Seen::NotUsed(name, error.to_string()),
     };
@@ -259,12 +269,7 @@ fn look(name: String, file: &Path) -> Seen {
     }
     let mut channels = contents.times.iter().flat_map(|t| &t.channels);
     if channels.any(|c| c.role != ChannelRole::Other) {
-        return Seen::Force(FoundForce {
-            // The whole path: folders are named by what was cut, too.
-            from_name: facts_of(name.rsplit_once('.').map_or(name.as_str(), |(stem, _)| stem)),
-            from_header: header(file),
-            path: name,
-        });
+        return Seen::Force(force_of(name, file));
     }
     let why = match contents.times.is_empty() {
         true => format!("holds {}", contents.describe()),
@@ -273,6 +278,47 @@ fn look(name: String, file: &Path) -> Seen {
         }
     };
     Seen::NotUsed(name, why)
+}
+
+fn force_of(name: String, file: &Path) -> FoundForce {
+    FoundForce {
+        // The whole path: folders are named by what was cut, too.
+        from_name: facts_of(name.rsplit_once('.').map_or(name.as_str(), |(stem, _)| stem)),
+        from_header: header(file),
+        path: name,
+    }
+}
+
+/// Slowest sampling of a force record, s.
+const SLOWEST_STEP: f64 = 0.02;
+
+/// Two to four signals, with a time column before them or none; what rises without being a clock is something else.
+fn may_be_forces(columns: &[PlainColumn]) -> bool {
+    let signals = match columns {
+        [time, signals @ ..] if time.step.is_some_and(|step| step <= SLOWEST_STEP) => signals,
+        all => all,
+    };
+    (2..=4).contains(&signals.len()) && signals.iter().all(|c| !c.rises)
+}
+
+/// Tables without names are the folder's force records where no file has names and all have the same columns: what these are
+/// is asked once.
+fn take_nameless(scan: &mut Scan, nameless: Vec<(FoundForce, Vec<PlainColumn>, String)>) {
+    let layout = |columns: &[PlainColumn]| (columns.len(), columns.first().is_some_and(|c| c.step.is_some()));
+    let alike = nameless
+        .iter()
+        .all(|(_, columns, _)| layout(columns) == layout(&nameless[0].1));
+    if !scan.forces.is_empty() || !alike {
+        let not_used = nameless.into_iter().map(|(force, _, why)| (force.path, why));
+        scan.not_used.extend(not_used);
+        return;
+    }
+    for (force, columns, _) in nameless {
+        scan.forces.push(force);
+        if scan.columns.is_empty() {
+            scan.columns = columns;
+        }
+    }
 }
 
 fn header(file: &Path) -> Facts {

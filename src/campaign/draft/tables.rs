@@ -4,6 +4,7 @@ use crate::data::Quantity;
 use std::collections::BTreeSet;
 
 use super::answers::Answers;
+use super::channels::channels;
 use super::entry::{DraftTable, Entry, Kind};
 use super::found::{FoundForce, FoundFrf, Scan, stem};
 use super::list_columns::{CUTTING_SPEED, DIAMETER, DIRECTION, FEED_PER_TURN, FEED_RATE, RADIAL_DEPTH};
@@ -31,19 +32,20 @@ pub fn of(scan: &Scan, answers: &Answers) -> Result<Vec<DraftTable>> {
         let cuts = cuts(scan, answers)?;
         tables.push(tool(&cuts, answers)?);
         tables.push(dynamometer(answers)?);
+        tables.extend(channels(&scan.columns, answers)?);
         tables.extend(cuts.into_iter().map(|(_, table)| table));
     }
     Ok(tables)
 }
 
 /// A table in the making.
-struct Making<'a> {
+pub(super) struct Making<'a> {
     answers: &'a Answers,
-    table: DraftTable,
+    pub table: DraftTable,
 }
 
 impl<'a> Making<'a> {
-    fn new(answers: &'a Answers, kind: &'static str, name: &str, repeated: bool) -> Self {
+    pub fn new(answers: &'a Answers, kind: &'static str, name: &str, repeated: bool) -> Self {
         Making {
             answers,
             table: DraftTable {
@@ -60,7 +62,7 @@ impl<'a> Making<'a> {
     }
 
     /// Adds `entry` with the answer given for it, else what `guesses` (value, why) say, the first that is there.
-    fn add(&mut self, mut entry: Entry, guesses: &[(Option<&str>, &str)]) -> Result<()> {
+    pub fn add(&mut self, mut entry: Entry, guesses: &[(Option<&str>, &str)]) -> Result<()> {
         let DraftTable { kind, name, .. } = &self.table;
         match self.answers.get(kind, name, entry.key) {
             Some(typed) => entry.give(typed).map_err(|problem| {
@@ -79,7 +81,7 @@ impl<'a> Making<'a> {
     }
 
     /// A value that is known for certain, and nobody's to change.
-    fn fact(&mut self, key: &'static str, kind: Kind, value: &str) {
+    pub fn fact(&mut self, key: &'static str, kind: Kind, value: &str) {
         self.known(Entry::new(key, kind, "", ""), value);
     }
 

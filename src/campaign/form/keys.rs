@@ -223,7 +223,7 @@ pub(crate) const FRF: [Key; 4] = [
     may("force_level_n", POSITIVE, "Level of the hammer or shaker, N"),
 ];
 
-pub(crate) const TOOL: [Key; 10] = [
+pub(crate) const TOOL: [Key; 13] = [
     must(
         "kind",
         Holds::Words(&["endmill", "ballend", "drill", "turning"]),
@@ -245,6 +245,22 @@ pub(crate) const TOOL: [Key; 10] = [
         "lead_angle_deg",
         UP_TO_RIGHT_ANGLE,
         "End mills: angle between the feed's plane and the edge (kappa_r of inserts), degrees [90]",
+    ),
+    may(
+        "pitch_deg",
+        Holds::Numbers,
+        "End mills of variable pitch: for each tooth the angle to the one that cuts next, degrees; together 360",
+    ),
+    may(
+        "tooth_helix_deg",
+        Holds::Numbers,
+        "End mills of variable helix: the helix angle of each tooth, in the order in which they cut, degrees [helix_deg]",
+    ),
+    may(
+        "tooth_radius_offset_mm",
+        Holds::Numbers,
+        "End mills: how far each tooth stands beyond half the diameter, in the order in which they cut, mm; negative: chipped, \
+         by more than the feed: missing [0]",
     ),
     may(
         "half_point_angle_deg",

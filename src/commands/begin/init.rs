@@ -103,6 +103,15 @@ pub struct InitArgs {
     /// Turning: cutting speed of all cuts; with the diameter it gives the spindle speed.
     #[arg(long, value_name = "M/MIN")]
     cutting_speed_m_per_min: Option<String>,
+    /// Force files without names: unit of the values (N, kN, V, mV, pC).
+    #[arg(long, value_name = "UNIT")]
+    channel_unit: Option<String>,
+    /// Force files without names: what the amplifier makes of them, such as "500 N/V".
+    #[arg(long, value_name = "GAIN", allow_hyphen_values = true)]
+    channel_gain: Option<String>,
+    /// Force files without names and time: samples a second.
+    #[arg(long, value_name = "HZ")]
+    rate_hz: Option<String>,
     /// CSV with a row a cut: column file, and any of the keys of [[cut]] (spindle_rpm, feed_per_tooth_mm, order, …).
     #[arg(long, value_name = "FILE")]
     cut_list: Option<PathBuf>,
@@ -131,6 +140,8 @@ impl InitArgs {
             ("tool", "half_point_angle_deg", &self.half_point_angle_deg),
             ("tool", "web_thickness_mm", &self.web_thickness_mm),
             ("dynamometer", "tool_from_dyno", &self.tool_from_dyno),
+            ("channel", "gain", &self.channel_gain),
+            ("channel", "rate_hz", &self.rate_hz),
             ("cut", "process", &self.process),
             ("cut", "spindle_rpm", &self.spindle_rpm),
             ("cut", "feed_per_tooth_mm", &self.feed_per_tooth_mm),
@@ -148,6 +159,9 @@ impl InitArgs {
                 answers.set(table, key, value);
             }
         }
+        if let Some(unit) = &self.channel_unit {
+            set_channel_unit(&mut answers, unit);
+        }
         for (id, joints) in &self.postures {
             answers.set(format!("posture {id}"), "joints_deg", joints);
         }
@@ -159,6 +173,13 @@ impl InitArgs {
             }
         }
         answers
+    }
+}
+
+/// The unit of the signals; the time has its own.
+fn set_channel_unit(answers: &mut Answers, unit: &str) {
+    for name in ["fx", "fy", "fz", "mz"] {
+        answers.set(format!("channel {name}"), "unit", unit);
     }
 }
 
@@ -223,6 +244,18 @@ fn begin(args: &InitArgs, made: Option<&MadeRobot>, as_json: bool) -> Result<Out
             if !process.trim().is_empty() {
                 answers.set("cut", "process", process.trim());
                 draft = Draft::new(&name, &scan, &answers)?;
+            }
+        }
+        // Whether a channel needs a gain depends on its unit.
+        if draft
+            .missing()
+            .iter()
+            .any(|m| m.table == "channel" && m.key == "unit")
+        {
+            let question = "the force files name no columns; unit of the signals: N, kN, V, mV or pC (empty: one by one)";
+            let unit = ask(question, "V")?;
+            if !unit.trim().is_empty() {
+                set_channel_unit(&mut answers, unit.trim());
             }
         }
         // Feeds and engagement in other units need the tool to be understood.

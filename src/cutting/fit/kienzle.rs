@@ -428,6 +428,7 @@ mod tests {
             lead_angle_deg: 90.0,
             half_point_angle_deg: None,
             web_thickness_mm: None,
+            each_tooth: Vec::new(),
         }
     }
 
@@ -616,6 +617,7 @@ mod tests {
             lead_angle_deg: 90.0,
             half_point_angle_deg: Some(59.0),
             web_thickness_mm: Some(1.2),
+            each_tooth: Vec::new(),
             teeth: 2,
         };
         let kappa = 59f64.to_radians();

@@ -23,7 +23,7 @@ pub fn average_row(tool: &Tool, geometry: &CutGeometry, axis: ForceAxis) -> Resu
             feed_per_tooth_mm,
             axial_depth_mm,
             immersion,
-        } if tool.has_straight_edge() => {
+        } if tool.has_straight_edge() && tool.each_tooth.is_empty() => {
             milling_row(tool.teeth, feed_per_tooth_mm, axial_depth_mm, immersion, axis).to_vec()
         }
         CutGeometry::Milling { .. } => shaped_row(tool, geometry, axis),
@@ -71,12 +71,12 @@ fn milling_row(teeth: usize, feed_mm: f64, depth_mm: f64, immersion: Immersion, 
     }
 }
 
-/// As [`milling_row`], of an edge that is not straight: the waveform's mean.
+/// As [`milling_row`], of an edge that is not straight or teeth that differ: the waveform's mean.
 fn shaped_row(tool: &Tool, geometry: &CutGeometry, axis: ForceAxis) -> Vec<f64> {
     let Some(cut) = MillingCut::new(tool, geometry).filter(|_| axis != ForceAxis::Mz) else {
         return vec![0.0; MILLING_COEFFICIENTS.len()];
     };
-    let unit = cut.closed_form(0);
+    let unit = cut.linear(0);
     unit.iter().map(|forces| forces[axis.index()][0].re).collect()
 }
 

@@ -74,8 +74,8 @@ pub(crate) fn terms(tool: &Tool, geometry: &CutGeometry, axis: ForceAxis) -> Opt
             axial_depth_mm,
             immersion,
         } => {
-            // Where the chip differs along the edge the law has no closed form.
-            if !tool.has_straight_edge() {
+            // Where the chip differs along the edge or from tooth to tooth the law has no closed form.
+            if !tool.has_straight_edge() || !tool.each_tooth.is_empty() {
                 return None;
             }
             let scale = tool.teeth as f64 * axial_depth_mm / (2.0 * PI);

@@ -142,6 +142,7 @@ mod tests {
             lead_angle_deg: kappa_deg,
             half_point_angle_deg: None,
             web_thickness_mm: None,
+            each_tooth: Vec::new(),
         };
         let geometry = CutGeometry::Turning {
             feed_per_rev_mm: feed_mm,

@@ -400,7 +400,9 @@ fn teeth_notice(
     record: &TimeRecord,
     notices: &mut Vec<Notice>,
 ) {
-    let Some(milling) = MillingCut::new(trials.tool, &cut.geometry).filter(|m| m.teeth > 1) else {
+    let Some(milling) =
+        MillingCut::new(trials.tool, &cut.geometry).filter(|m| m.teeth > 1 && m.places.is_empty())
+    else {
         return;
     };
     let rate = record.sample_rate_hz;

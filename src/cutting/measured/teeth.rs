@@ -35,6 +35,7 @@ pub(crate) fn idle_tooth(
     let n = teeth as f64;
     let single = MillingCut {
         teeth: 1,
+        places: Vec::new(),
         ..cut.clone()
     };
     let unit = single.closed_form(teeth);
@@ -101,6 +102,7 @@ mod tests {
             },
             lag_rad: 0.15,
             shape: None,
+            places: Vec::new(),
         }
     }
 

@@ -11,6 +11,7 @@ use num_complex::Complex64;
 
 use super::edge_shape::EdgeShape;
 use super::quadrature::gauss_legendre;
+use super::tooth_place::ToothPlace;
 use crate::data::{CutGeometry, Immersion, Tool};
 
 /// Ktc Krc Kac Kte Kre Kae.
@@ -19,7 +20,7 @@ pub const UNIT_COUNT: usize = 6;
 /// What a milling cut's waveform depends on besides its coefficients.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MillingCut {
-    /// Number of teeth, evenly spaced.
+    /// Number of teeth.
     pub teeth: usize,
     /// Feed per tooth, mm.
     pub feed_per_tooth_mm: f64,
@@ -31,6 +32,8 @@ pub struct MillingCut {
     pub lag_rad: f64,
     /// `None` for an edge that runs straight up the side. Only [`Self::closed_form`] knows of others.
     pub shape: Option<EdgeShape>,
+    /// The teeth where they differ; empty where they are alike and evenly spaced. [`Self::closed_form`] takes them for alike.
+    pub places: Vec<ToothPlace>,
 }
 
 /// How the chip differs from c sin φ and the force from one proportional to it.
@@ -85,7 +88,25 @@ impl MillingCut {
             immersion,
             lag_rad: 2.0 * axial_depth_mm * tool.helix_deg.to_radians().tan() / tool.diameter_mm,
             shape: EdgeShape::of(tool),
+            places: ToothPlace::all(tool, axial_depth_mm),
         })
+    }
+
+    /// The same cut at `factor` times its depth.
+    pub fn deeper(&self, factor: f64) -> MillingCut {
+        let mut cut = self.clone();
+        cut.axial_depth_mm *= factor;
+        cut.lag_rad *= factor;
+        cut.places.iter_mut().for_each(|p| p.lag_rad *= factor);
+        cut
+    }
+
+    /// Forces linear in the chip thickness: in closed form where all teeth are alike.
+    pub fn linear(&self, orders: usize) -> UnitForces {
+        match self.places.is_empty() {
+            true => self.closed_form(orders),
+            false => self.sampled(orders, ChipLaw::default(), false).unit,
+        }
     }
 
     fn nothing(orders: usize) -> UnitForces {
@@ -182,7 +203,8 @@ impl MillingCut {
     pub fn sampled(&self, orders: usize, law: ChipLaw, derivatives: bool) -> SampledForces {
         let span = self.immersion.exit_rad - self.immersion.start_rad;
         // Two nodes for each period of the highest order, some more for what is not smooth.
-        let count = 40 + (0.5 * orders as f64 * span).ceil() as usize;
+        let smooth = if self.places.is_empty() { 40 } else { 160 };
+        let count = smooth + (0.5 * orders as f64 * span).ceil() as usize;
         let nodes = gauss_legendre(self.immersion.start_rad, self.immersion.exit_rad, count);
         let depths = match law.runout {
             Some([offset, _]) => {
@@ -192,6 +214,13 @@ impl MillingCut {
             }
             None => 1,
         };
+        // Lags that differ turn each tooth by its own angle, at the highest order by so many radians.
+        let own_lag = |p: &ToothPlace| (p.lag_rad - self.lag_rad).abs();
+        let turn = self.places.iter().map(own_lag).fold(0.0, f64::max) * orders.max(self.teeth) as f64;
+        let depths = match turn > 0.0 {
+            true => depths.max(8 + turn.ceil() as usize),
+            false => depths,
+        };
         let depth_nodes: Vec<f64> = gauss_legendre(0.0, 1.0, depths).iter().map(|n| n.0).collect();
         let wanted = [law.exponent.is_some(), law.runout.is_some(), law.runout.is_some()];
         let mut sampled = SampledForces {
@@ -199,8 +228,14 @@ impl MillingCut {
             slopes: wanted.map(|w| (w && derivatives).then(|| Box::new(Self::nothing(orders)))),
         };
         // Teeth that are alike leave multiples of their number; teeth that are not leave every order, and those with the
-        // same remainder see the same sum over the teeth.
-        let remainders = if law.runout.is_some() { self.teeth } else { 1 };
+        // same remainder see the same sum over the teeth. Where they are not evenly spaced each order sees its own.
+        let differ = law.runout.is_some() || !self.places.is_empty();
+        let stride = if self.is_evenly_spaced() {
+            self.teeth
+        } else {
+            orders + 1
+        };
+        let remainders = if differ { stride } else { 1 };
         let parts = if derivatives { Chip::PARTS } else { Chip::VALUES };
         let weights = self.depth_weights(&depth_nodes, orders, remainders);
         let directions: Vec<[f64; 3]> = nodes
@@ -211,12 +246,12 @@ impl MillingCut {
             })
             .collect();
         let waves: Vec<Vec<Complex64>> = (0..remainders.min(orders + 1))
-            .map(|r| self.waves(&nodes, r, orders))
+            .map(|r| waves(&nodes, r, stride, orders))
             .collect();
         let mut folded = vec![Complex64::ZERO; nodes.len() * 3 * parts];
         let mut products = Vec::new();
         for (q, &z) in depth_nodes.iter().enumerate() {
-            let sums = self.tooth_sums(&nodes, z, law, derivatives, parts);
+            let sums = self.tooth_sums(&nodes, z, law, derivatives, (parts, remainders.min(orders + 1)));
             for (r, (wave, sum)) in waves.iter().zip(&sums).enumerate() {
                 // ∫ part · {cos φ, sin φ, 1} e^{−inφ} dφ / 2π for all orders and parts at once.
                 for (k, direction) in directions.iter().enumerate() {
@@ -237,7 +272,7 @@ impl MillingCut {
                     Par::Seq,
                 );
                 for row in 0..rows {
-                    let n = r + self.teeth * row;
+                    let n = r + stride * row;
                     let at = |part: usize| {
                         let at = |d: usize| products[row + rows * (3 * part + d)];
                         [at(0), at(1), at(2)]
@@ -249,20 +284,6 @@ impl MillingCut {
             }
         }
         sampled
-    }
-
-    /// e^{−inφ} for n = `remainder`, `remainder` + teeth, … up to `orders` at each node, column by column.
-    fn waves(&self, nodes: &[(f64, f64)], remainder: usize, orders: usize) -> Vec<Complex64> {
-        let mut waves = Vec::new();
-        for (phi, _) in nodes {
-            let turn = Complex64::from_polar(1.0, -(self.teeth as f64) * phi);
-            let mut wave = Complex64::from_polar(1.0, -(remainder as f64) * phi);
-            for _ in (remainder..=orders).step_by(self.teeth) {
-                waves.push(wave);
-                wave *= turn;
-            }
-        }
-        waves
     }
 
     /// a ∫ L_q(z) e^{−inψz} dz with L_q the Lagrange polynomial of node q (Filon's rule): `[order][q]`. With one remainder
@@ -306,32 +327,72 @@ impl MillingCut {
         weights
     }
 
-    /// Σ_j e^{2πi rj/N} part_j for r = 0..N at depth `z`: `[r][node · parts + part]`; one entry where teeth are alike.
+    /// Whether every order with the same remainder over the teeth sees the same sum over them.
+    fn is_evenly_spaced(&self) -> bool {
+        let even = |(j, p): (usize, &ToothPlace)| {
+            (p.ahead_rad - TAU * j as f64 / self.teeth as f64).abs() < 1e-12 && p.lag_rad == self.lag_rad
+        };
+        self.places.iter().enumerate().all(even)
+    }
+
+    /// The edges of the teeth at depth `z`; one where they are alike.
+    fn edges(&self, z: f64, law: ChipLaw) -> Vec<Edge> {
+        let pitch = TAU / self.teeth as f64;
+        let places = self.places.iter().enumerate();
+        match (law.runout, self.places.is_empty()) {
+            (None, true) => vec![Edge::at(0.0, 0)],
+            // Against the offset of the axis: the teeth differ by that alone.
+            (Some([_, angle]), true) => (0..self.teeth)
+                .map(|j| Edge::at(angle - TAU * j as f64 / self.teeth as f64 + self.lag_rad * z, j))
+                .collect(),
+            (runout, false) => places
+                .map(|(j, place)| {
+                    let ahead = place.ahead_rad - (place.lag_rad - self.lag_rad) * z;
+                    let angle = runout.map_or(0.0, |r| r[1]);
+                    Edge {
+                        ahead_teeth: if self.is_evenly_spaced() {
+                            j as f64
+                        } else {
+                            ahead / pitch
+                        },
+                        radius_mm: place.radius_mm,
+                        ..Edge::at(angle - ahead + self.lag_rad * z, j)
+                    }
+                })
+                .collect(),
+        }
+    }
+
+    /// Σ_j e^{i r a_j} part_j for r below `remainders` at depth `z`, tooth j being ahead of tooth 0 by a_j there (2πj/N where
+    /// they are evenly spaced): `[r][node · parts + part]`.
     fn tooth_sums(
         &self,
         nodes: &[(f64, f64)],
         z: f64,
         law: ChipLaw,
         derivatives: bool,
-        parts: usize,
+        (parts, remainders): (usize, usize),
     ) -> Vec<Vec<Complex64>> {
-        // Where the edge of each tooth stands against the offset of the axis: the teeth differ by that alone.
-        let stands = |j: usize, angle: f64| angle - TAU * j as f64 / self.teeth as f64 + self.lag_rad * z;
-        let edges: Vec<Edge> = match law.runout {
-            Some([_, angle]) => (0..self.teeth).map(|j| Edge::at(stands(j, angle))).collect(),
-            None => vec![Edge::at(0.0)],
+        let edges = self.edges(z, law);
+        let mut sums = vec![vec![Complex64::ZERO; nodes.len() * parts]; remainders];
+        let even = self.is_evenly_spaced();
+        let pitch = TAU / self.teeth as f64;
+        let turn = |r: usize, j: usize| {
+            let teeth = match even {
+                true => ((r * j) % self.teeth) as f64,
+                false => r as f64 * edges[j].ahead_teeth,
+            };
+            Complex64::from_polar(1.0, pitch * teeth)
         };
-        let mut sums = vec![vec![Complex64::ZERO; nodes.len() * parts]; edges.len()];
-        // Tooth j is ahead of tooth 0.
-        let ahead = |m: usize| Complex64::from_polar(1.0, TAU * m as f64 / self.teeth as f64);
-        let ahead: Vec<Complex64> = (0..self.teeth).map(ahead).collect();
         let alike = if edges.len() == 1 { self.teeth as f64 } else { 1.0 };
+        let turns: Vec<Vec<Complex64>> = (0..edges.len())
+            .map(|j| (0..remainders).map(|r| turn(r, j) * alike).collect())
+            .collect();
         for (k, &(phi, width)) in nodes.iter().enumerate() {
             let direction = phi.sin_cos();
             for j in 0..edges.len() {
                 let chip = self.chip(direction, width, law, (&edges, j), derivatives);
-                for (r, sum) in sums.iter_mut().enumerate() {
-                    let turn = ahead[(r * j) % self.teeth] * alike;
+                for (turn, sum) in turns[j].iter().zip(&mut sums) {
                     for (sum, part) in sum[k * parts..(k + 1) * parts].iter_mut().zip(&chip.part) {
                         *sum += turn * part;
                     }
@@ -352,20 +413,33 @@ impl MillingCut {
         derivatives: bool,
     ) -> Chip {
         let c = self.feed_per_tooth_mm;
-        let Some([offset, _]) = law.runout else {
-            return Chip::new(c * sin, 1.0, 0.0, [0.0; 2], law.exponent, derivatives);
+        let offset = match law.runout {
+            Some([offset, _]) => offset,
+            None if self.places.is_empty() => {
+                return Chip::new(c * sin, 1.0, 0.0, [0.0; 2], law.exponent, derivatives);
+            }
+            None => 0.0,
         };
         // What is left to cut is the least that any earlier tooth left, the tooth itself a revolution ago among them.
         let here = edges[j];
+        // How far ahead that tooth is, in even pitches: a whole turn more where the count begins again.
+        let ahead = |m: usize| {
+            let turns = ((j + m) / edges.len() * edges.len()) as f64;
+            turns + edges[(j + m) % edges.len()].ahead_teeth - here.ahead_teeth
+        };
         let left = |m: usize| {
             let before = edges[(j + m) % edges.len()];
-            m as f64 * c * sin + offset * (here.cos - before.cos)
+            ahead(m) * c * sin + offset * (here.cos - before.cos) + (here.radius_mm - before.radius_mm)
         };
         let least = (2..=edges.len()).fold(1, |least, m| if left(m) < left(least) { m } else { least });
         let (h, before) = (left(least), edges[(j + least) % edges.len()]);
         let by = [here.cos - before.cos, -offset * (here.sin - before.sin)];
+        if law.runout.is_none() && here.radius_mm == before.radius_mm {
+            // Feed alone: it cuts all the way.
+            return Chip::new(h, 1.0, 0.0, [0.0; 2], law.exponent, derivatives);
+        }
         // The tooth leaves the cut within a quadrature cell: the share of it that is engaged.
-        let rise = (least as f64 * c * cos).abs() * width;
+        let rise = (ahead(least) * c * cos).abs() * width;
         let inside = if rise > 0.0 {
             0.5 + h / rise
         } else {
@@ -387,6 +461,20 @@ impl MillingCut {
     }
 }
 
+/// e^{−inφ} for n = `remainder`, `remainder` + `stride`, … up to `orders` at each node, column by column.
+fn waves(nodes: &[(f64, f64)], remainder: usize, stride: usize, orders: usize) -> Vec<Complex64> {
+    let mut waves = Vec::new();
+    for (phi, _) in nodes {
+        let turn = Complex64::from_polar(1.0, -(stride as f64) * phi);
+        let mut wave = Complex64::from_polar(1.0, -(remainder as f64) * phi);
+        for _ in (remainder..=orders).step_by(stride) {
+            waves.push(wave);
+            wave *= turn;
+        }
+    }
+    waves
+}
+
 /// (1/2π) ∫ e^{−imφ} dφ over an immersion.
 fn window(immersion: Immersion, m: i64) -> Complex64 {
     let Immersion { start_rad, exit_rad } = immersion;
@@ -398,17 +486,28 @@ fn window(immersion: Immersion, m: i64) -> Complex64 {
     (end(exit_rad) - end(start_rad)) * Complex64::new(0.0, 1.0 / (TAU * m))
 }
 
-/// Direction in which the edge of a tooth stands, seen from that of the axis' offset.
+/// Where the edge of a tooth stands.
 #[derive(Debug, Clone, Copy)]
 struct Edge {
+    /// Of its direction, seen from that of the axis' offset.
     sin: f64,
     cos: f64,
+    /// How far ahead of tooth 0, in even pitches.
+    ahead_teeth: f64,
+    /// Beyond the tool's radius.
+    radius_mm: f64,
 }
 
 impl Edge {
-    fn at(angle_rad: f64) -> Edge {
+    /// Tooth `j` of teeth that are evenly spaced.
+    fn at(angle_rad: f64, j: usize) -> Edge {
         let (sin, cos) = angle_rad.sin_cos();
-        Edge { sin, cos }
+        Edge {
+            sin,
+            cos,
+            ahead_teeth: j as f64,
+            radius_mm: 0.0,
+        }
     }
 }
 
@@ -514,6 +613,7 @@ mod tests {
             },
             lag_rad,
             shape: None,
+            places: Vec::new(),
         }
     }
 
@@ -723,6 +823,7 @@ mod tests {
                 immersion,
                 lag_rad: 0.24,
                 shape: EdgeShape::of(&tool),
+                places: Vec::new(),
             };
             // Points along the outline (distance from the axis, height), close enough to be straight between.
             let lead = f64::to_radians(lead_angle_deg);

@@ -8,10 +8,12 @@ mod drilling;
 mod edge_shape;
 mod milling;
 mod quadrature;
+mod tooth_place;
 mod vibrating;
 
 pub use drilling::{DrillTerm, DrillingCut};
 pub use edge_shape::EdgeShape;
 pub use milling::{ChipLaw, MillingCut, SampledForces, UNIT_COUNT, UnitForces};
 pub(super) use quadrature::gauss_legendre;
+pub use tooth_place::ToothPlace;
 pub use vibrating::{LineForces, VibratingForces};

@@ -197,6 +197,7 @@ mod tests {
             immersion: Immersion::SLOT,
             lag_rad: 0.0,
             shape: None,
+            places: Vec::new(),
         }
     }
 

@@ -272,7 +272,7 @@ fn proposals(data: &CuttingData) -> Vec<Proposal> {
                 other.feed_mm = cut.feed_per_tooth_mm;
                 other.setting.feed_mm = cut.feed_per_tooth_mm;
                 other.kind = CutKind::Milling {
-                    unit: Box::new(cut.closed_form(orders)),
+                    unit: Box::new(cut.linear(orders)),
                     cut,
                 };
                 other
@@ -281,10 +281,8 @@ fn proposals(data: &CuttingData) -> Vec<Proposal> {
             fed.feed_per_tooth_mm *= factor;
             propose(format!("cut {} at {words} its feed", base.id), 1.0, with(fed));
             if (0.5..=2.0).contains(&factor) {
-                let mut deep = cut.clone();
-                deep.axial_depth_mm *= factor;
-                deep.lag_rad *= factor;
-                propose(format!("cut {} at {words} its depth", base.id), 1.0, with(deep));
+                let deep = with(cut.deeper(factor));
+                propose(format!("cut {} at {words} its depth", base.id), 1.0, deep);
             }
         }
         if let CutKind::Milling { cut, .. } = &plain.kind {
@@ -303,7 +301,7 @@ fn proposals(data: &CuttingData) -> Vec<Proposal> {
                     ..cut.clone()
                 };
                 other.kind = CutKind::Milling {
-                    unit: Box::new(cut.closed_form(plain.orders)),
+                    unit: Box::new(cut.linear(plain.orders)),
                     cut,
                 };
                 propose(format!("cut {} {words}", base.id), 2.0, other);

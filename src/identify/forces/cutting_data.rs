@@ -151,7 +151,7 @@ impl CutData {
         }
         let kind = match milling {
             Some(m) => CutKind::Milling {
-                unit: Box::new(m.closed_form(orders)),
+                unit: Box::new(m.linear(orders)),
                 cut: m,
             },
             None if cut.geometry.process() == Process::Turning => CutKind::Turning {
@@ -170,6 +170,8 @@ impl CutData {
             }
         };
         let vibration = match &kind {
+            // The model of chatter takes all teeth as alike.
+            CutKind::Milling { cut: m, .. } if !m.places.is_empty() => None,
             CutKind::Milling { cut: m, .. } => {
                 find_vibration(&spectra, rate, cut.spindle_rpm / 60.0, m.teeth)
             }

@@ -42,6 +42,8 @@ pub(crate) struct Pieces {
     is_whole: bool,
     /// Puts right the unit of the time column.
     time_unit: Option<f64>,
+    /// Memory of columns that nobody needs any more.
+    pub spare: Vec<Vec<f64>>,
 }
 
 impl Pieces {
@@ -59,6 +61,7 @@ impl Pieces {
             lost: Lost::default(),
             is_whole,
             time_unit: None,
+            spare: Vec::new(),
             header,
         }
     }
@@ -133,14 +136,15 @@ impl Pieces {
         // The last row of the piece before, so that a gap between pieces is one too.
         let overlap = usize::from(!self.last.is_empty());
         let next_last: Vec<f64> = table.columns.iter().filter_map(|c| c.last().copied()).collect();
-        if overlap == 1 {
-            for (column, last) in table.columns.iter_mut().zip(&self.last) {
-                column.insert(0, *last);
-            }
+        let last = std::mem::take(&mut self.last);
+        if let (Some(at), [_, ..]) = (time_at, last.as_slice()) {
+            table.columns[at].insert(0, last[at]);
         }
-        if !next_last.is_empty() {
-            self.last = next_last;
-        }
+        self.last = if next_last.is_empty() {
+            last.clone()
+        } else {
+            next_last
+        };
         let gaps = match (time_at, clock.rounding_s, clock.grid) {
             (Some(at), Some(rounding_s), None) => self
                 .lost
@@ -148,22 +152,24 @@ impl Pieces {
                 .map_err(|problem| refused(&problem, header))?,
             _ => Vec::new(),
         };
-        let times = time_at
-            .map(|at| table.columns[at].clone())
-            .filter(|_| clock.grid.is_some());
         let mut filled = Vec::new();
+        let times_column = time_at.map(|at| std::mem::take(&mut table.columns[at]));
         let columns = table.columns.into_iter().enumerate();
         let channels = columns
             .filter(|(i, _)| Some(*i) != time_at)
             .map(|(i, mut values)| {
-                if let (Some(times), Some(grid)) = (&times, clock.grid) {
+                if let (Some(times), Some(grid)) = (&times_column, clock.grid) {
                     return channel(header, i, clock::resample(times, &values, grid), notes);
                 }
-                filled = fill(&mut values, &gaps);
-                values.drain(..overlap.min(values.len()));
+                if !gaps.is_empty() {
+                    values.splice(0..0, last.get(i).copied());
+                    filled = fill(&mut values, &gaps);
+                    values.drain(..overlap.min(values.len()));
+                }
                 channel(header, i, values, notes)
             })
             .collect::<Result<Vec<Channel>, _>>()?;
+        self.spare.extend(times_column);
         if channels.is_empty() {
             return Err(InputError::new("a time column and no channel beside it").line(header.data_line));
         }

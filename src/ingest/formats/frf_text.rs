@@ -173,7 +173,8 @@ pub(crate) fn is_plain_frf(header: &Header) -> bool {
     header.columns == 3 && (above.all(|l| l.trim().is_empty()) || speaks_of_frequency(header))
 }
 
-fn speaks_of_frequency(header: &Header) -> bool {
+/// Whether the lines above the numbers name a frequency.
+pub(crate) fn speaks_of_frequency(header: &Header) -> bool {
     let mut above = header.lines.iter().chain(&header.names);
     above.any(|text| text.to_lowercase().contains("freq"))
 }

@@ -87,15 +87,15 @@ impl Header {
         // Each row has its time in two tokens then; a single long row is only a bad one.
         let between_commas = delimiter == Delimiter::Byte(b',')
             && !names.is_empty()
-            && !data.contains(&b'.')
-            && !data.contains(&b'"')
+            && !holds(data, b'.')
+            && !holds(data, b'"')
             && Lines::new(data)
                 .take(20)
                 .all(|l| l.trim_ascii().is_empty() || count_fields(l) > names.len());
         let decimal = match delimiter {
             Delimiter::Byte(b',') if between_commas || quoted_commas(data) => b',',
             Delimiter::Byte(b',') => b'.',
-            _ if data.contains(&b',') => b',',
+            _ if holds(data, b',') => b',',
             _ => b'.',
         };
         let columns = if names.is_empty() { fields } else { names.len() };
@@ -151,53 +151,101 @@ impl Header {
         is_last: bool,
         notes: &mut Notes,
     ) -> Result<Table, InputError> {
-        let parts: Vec<Part> = split_at_lines(data)
+        let mut columns = Vec::new();
+        self.append_rows(data, first_line, is_last, notes, &mut columns)?;
+        Ok(Table { columns })
+    }
+
+    /// As [`Header::read_rows`]; puts the rows behind those that are in `columns`, whose memory is used again.
+    ///
+    /// # Errors
+    /// As [`Header::read`].
+    pub fn append_rows(
+        &self,
+        data: &[u8],
+        first_line: usize,
+        is_last: bool,
+        notes: &mut Notes,
+        columns: &mut Vec<Vec<f64>>,
+    ) -> Result<(), InputError> {
+        columns.resize_with(self.columns, Vec::new);
+        let before = columns.first().map_or(0, Vec::len);
+        let texts = split_at_lines(data);
+        // Each part gets a stretch of the columns of its own; where rows are blank it stays longer than what is written.
+        let room: Vec<usize> = texts.par_iter().map(|text| self.rows_at_most(text)).collect();
+        for column in columns.iter_mut() {
+            column.resize(before + room.iter().sum::<usize>(), 0.0);
+        }
+        let mut rests: Vec<&mut [f64]> = columns.iter_mut().map(|c| &mut c[before..]).collect();
+        let mut stretches = Vec::with_capacity(texts.len());
+        for rows in &room {
+            let stretch: Vec<&mut [f64]> = rests
+                .iter_mut()
+                .map(|rest| rest.split_off_mut(..*rows).unwrap_or_default())
+                .collect();
+            stretches.push(stretch);
+        }
+        let parts: Vec<Part> = texts
             .into_par_iter()
-            .map(|p| self.read_part(p))
+            .zip(stretches)
+            .map(|(text, mut stretch)| self.read_part(text, &mut stretch))
             .collect();
-        let rows = parts.iter().map(|p| p.columns.last().map_or(0, Vec::len)).sum();
-        let mut columns: Vec<Vec<f64>> = (0..self.columns).map(|_| Vec::with_capacity(rows)).collect();
-        let mut line = first_line;
-        let count = parts.len();
-        for (k, part) in parts.into_iter().enumerate() {
-            for (column, own) in columns.iter_mut().zip(&part.columns) {
-                column.extend_from_slice(own);
+        let (mut rows, mut from, mut line) = (before, before, first_line);
+        let mut bad_row = None;
+        for (k, (part, room)) in parts.iter().zip(&room).enumerate() {
+            if rows < from {
+                columns
+                    .iter_mut()
+                    .for_each(|c| c.copy_within(from..from + part.rows, rows));
             }
-            if let Some((text, rest_is_blank)) = part.bad {
-                let full = columns.last().is_some_and(|c| !c.is_empty());
-                if is_last && k + 1 == count && rest_is_blank && full {
+            rows += part.rows;
+            from += room;
+            if let Some((text, rest_is_blank)) = &part.bad {
+                if is_last && k + 1 == parts.len() && *rest_is_blank && rows > 0 {
                     notes.file("the last row is incomplete and left out");
-                    break;
+                } else {
+                    bad_row = Some(self.bad_row(text, line + part.lines));
                 }
-                return Err(self.bad_row(&text, line + part.lines));
+                break;
             }
             line += part.lines;
         }
-        if is_last && columns.first().is_some_and(|c| c.len() > 3) && ends_within_a_number(data, self.decimal)
-        {
+        columns.iter_mut().for_each(|c| c.truncate(rows));
+        if let Some(error) = bad_row {
+            return Err(error);
+        }
+        if is_last && rows - before.min(rows) > 3 && ends_within_a_number(data, self.decimal) {
             columns.iter_mut().for_each(|c| c.truncate(c.len() - 1));
             notes.file(
                 "the file ends without a line end, its last number has fewer digits than those above: cut off, the last row \
                  is left out",
             );
         }
-        Ok(Table { columns })
+        Ok(())
     }
 
-    fn read_part(&self, data: &[u8]) -> Part {
-        let width = Lines::new(data).next().map_or(1, |l| l.len() + 1).max(1);
-        // A row takes two bytes a column at least: what a header announces cannot claim memory.
-        let rows = (data.len() / width).min(data.len() / (2 * self.columns.max(1))) + 16;
-        let mut columns: Vec<Vec<f64>> = (0..self.columns).map(|_| Vec::with_capacity(rows)).collect();
-        let (mut at, mut lines, mut bad) = (0, 0, None);
+    /// Rows that a text can hold: one a line, and a byte for each column. What a header announces cannot claim memory.
+    fn rows_at_most(&self, text: &[u8]) -> usize {
+        let lines = memchr::memchr_iter(b'\n', text).count() + 1;
+        lines.min(text.len() / self.columns.max(1) + 1)
+    }
+
+    fn read_part(&self, data: &[u8], columns: &mut [&mut [f64]]) -> Part {
+        let (mut at, mut lines, mut rows, mut bad) = (0, 0, 0, None);
         while at < data.len() {
-            match self.read_row(data, at, &mut columns) {
-                Row::Full(next) | Row::Blank(next) => at = next,
+            let row = match self.read_plain_row(data, at, rows, columns) {
+                Some(next) => Row::Full(next),
+                None => self.read_row(data, at, rows, columns),
+            };
+            match row {
+                Row::Full(next) => {
+                    rows += 1;
+                    at = next;
+                }
+                Row::Blank(next) => at = next,
                 Row::Bad => {
-                    let length = data[at..].iter().position(|b| *b == b'\n');
+                    let length = memchr::memchr(b'\n', &data[at..]);
                     let rest = length.map_or(&[][..], |l| &data[at + l..]);
-                    let full = columns.last().map_or(0, Vec::len);
-                    columns.iter_mut().for_each(|c| c.truncate(full));
                     let text = decode(&data[at..length.map_or(data.len(), |l| at + l)]);
                     bad = Some((text, rest.trim_ascii().is_empty()));
                     break;
@@ -205,7 +253,7 @@ impl Header {
             }
             lines += 1;
         }
-        Part { columns, lines, bad }
+        Part { rows, lines, bad }
     }
 
     fn bad_row(&self, text: &str, line: usize) -> InputError {
@@ -220,7 +268,41 @@ impl Header {
         )
     }
 
-    fn read_row(&self, data: &[u8], start: usize, columns: &mut [Vec<f64>]) -> Row {
+    /// A row as recorders print it: plain numbers with one delimiter between them. Gives where the next begins; `None` for all
+    /// else, which [`Header::read_row`] looks at.
+    #[inline]
+    fn read_plain_row(
+        &self,
+        data: &[u8],
+        start: usize,
+        row: usize,
+        columns: &mut [&mut [f64]],
+    ) -> Option<usize> {
+        let (delimiter, blank) = match self.delimiter {
+            Delimiter::Byte(byte) => (byte, b' '),
+            Delimiter::Blanks => (b' ', b' '),
+        };
+        let mut at = start;
+        let last = columns.len().checked_sub(1)?;
+        for (i, column) in columns.iter_mut().enumerate() {
+            while *data.get(at)? == blank {
+                at += 1;
+            }
+            let (value, end) = number::scan_plain(data, at, self.decimal)?;
+            *column.get_mut(row)? = value;
+            at = end;
+            if i < last {
+                if *data.get(at)? != delimiter {
+                    return None;
+                }
+                at += 1;
+            }
+        }
+        at += usize::from(*data.get(at)? == b'\r');
+        (*data.get(at)? == b'\n').then_some(at + 1)
+    }
+
+    fn read_row(&self, data: &[u8], start: usize, row: usize, columns: &mut [&mut [f64]]) -> Row {
         let mut at = start;
         let blank = |at: usize| match data.get(at) {
             Some(b' ') => true,
@@ -240,15 +322,20 @@ impl Header {
             return Row::Blank(next);
         }
         let count = columns.len();
+        let put = |column: &mut [f64], value| {
+            if let Some(place) = column.get_mut(row) {
+                *place = value;
+            }
+        };
         for (i, column) in columns.iter_mut().enumerate() {
             match number::scan(data, at, self.decimal) {
                 Some((value, end)) => {
-                    column.push(value);
+                    put(column, value);
                     at = end;
                 }
                 // An empty field is a missing sample.
                 None if self.delimiter != Delimiter::Blanks && is_field_end(data.get(at), self.delimiter) => {
-                    column.push(f64::NAN);
+                    put(column, f64::NAN);
                 }
                 None => return Row::Bad,
             }
@@ -278,12 +365,7 @@ impl Header {
         }
         match line_end(at) {
             Some(next) => Row::Full(next),
-            None => {
-                columns
-                    .iter_mut()
-                    .for_each(|c| c.truncate(c.len().saturating_sub(1)));
-                Row::Bad
-            }
+            None => Row::Bad,
         }
     }
 
@@ -364,9 +446,9 @@ fn ends_within_a_number(data: &[u8], decimal: u8) -> bool {
     usual.0 && last.1 < usual.1
 }
 
-/// Rows that one thread read.
+/// What one thread read.
 struct Part {
-    columns: Vec<Vec<f64>>,
+    rows: usize,
     /// Lines read before the end or the bad row.
     lines: usize,
     /// A row that is none, and whether nothing follows it.
@@ -380,7 +462,7 @@ const PART: usize = 1 << 20;
 fn split_at_lines(data: &[u8]) -> Vec<&[u8]> {
     let (mut parts, mut rest) = (Vec::new(), data);
     while rest.len() > 2 * PART {
-        let Some(end) = rest[PART..].iter().position(|b| *b == b'\n') else {
+        let Some(end) = memchr::memchr(b'\n', &rest[PART..]) else {
             break;
         };
         let (part, after) = rest.split_at(PART + end + 1);
@@ -429,9 +511,13 @@ fn rows_follow(lines: Lines) -> bool {
         .all(is_row)
 }
 
+pub(crate) fn holds(data: &[u8], byte: u8) -> bool {
+    memchr::memchr(byte, data).is_some()
+}
+
 /// True where a comma separated file writes its decimal commas in quotes.
 fn quoted_commas(data: &[u8]) -> bool {
-    data.contains(&b'"') && !data.contains(&b'.')
+    holds(data, b'"') && !holds(data, b'.')
 }
 
 fn find_delimiter(names: Option<&str>, first_row: &str, data: &[u8]) -> Delimiter {
@@ -446,7 +532,7 @@ fn find_delimiter(names: Option<&str>, first_row: &str, data: &[u8]) -> Delimite
     // `1,5 2,5` are decimal commas between blanks, `1.5, 2.5` points between commas.
     let comma_between = match names {
         Some(names) => names.contains(','),
-        None => first_row.contains(", ") || !first_row.contains(' ') || data.contains(&b'.'),
+        None => first_row.contains(", ") || !first_row.contains(' ') || holds(data, b'.'),
     };
     if first_row.contains(',') && comma_between {
         Delimiter::Byte(b',')

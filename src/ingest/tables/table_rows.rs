@@ -2,7 +2,7 @@
 
 use crate::InputError;
 use crate::ingest::tables::split_comma;
-use crate::ingest::tables::table::{Header, Table};
+use crate::ingest::tables::table::{Header, Table, holds};
 use crate::ingest::text::Notes;
 
 impl Header {
@@ -15,7 +15,7 @@ impl Header {
         if self.decimal_comma_between_commas {
             return split_comma::read(data, self, rate_hz, notes);
         }
-        if data.contains(&b'"') {
+        if holds(data, b'"') {
             return self.read_quoted(data, notes);
         }
         self.read_rows(data, self.data_line, true, notes)

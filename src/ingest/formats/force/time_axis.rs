@@ -137,6 +137,10 @@ pub(crate) fn time_unit(
     header: &Header,
     notes: &mut Notes,
 ) -> Result<f64, InputError> {
+    let is_ms = (factor - 1e-3).abs() < 1e-9;
+    if header_rate.is_none() && !is_ms {
+        return Ok(1.0);
+    }
     let own = 1.0 / Runs::find(seconds, resolution).step_s;
     if !(own.is_finite() && own > 0.0) {
         return Ok(1.0);
@@ -153,7 +157,7 @@ pub(crate) fn time_unit(
         return Ok(1.0);
     }
     // Milliseconds are written for slow clocks; a megahertz of them is one second called one millisecond.
-    if (factor - 1e-3).abs() < 1e-9 && own >= MS_AT_MOST {
+    if is_ms && own >= MS_AT_MOST {
         return Err(InputError::new(format!(
             "the time column is in ms and gives {own:.0} samples a second: seconds called ms"
         ))
@@ -178,29 +182,24 @@ pub(crate) struct Runs {
 
 impl Runs {
     pub fn find(seconds: &[f64], resolution: f64) -> Runs {
-        let mut steps: Vec<f64> = seconds.windows(2).map(|w| w[1] - w[0]).collect();
+        let steps = || seconds.windows(2).map(|w| w[1] - w[0]);
         let mut runs = Runs {
             step_s: f64::NAN,
             rounding: 0.0,
             stretches: Vec::new(),
             resolution_s: resolution,
         };
-        if steps.is_empty() {
+        let Some(median) = median_step(seconds) else {
             return runs;
-        }
-        let mean = steps.iter().sum::<f64>() / steps.len() as f64;
-        let middle = steps.len() / 2;
-        let (_, &mut median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
+        };
+        let count = seconds.len() - 1;
+        let mean = steps().sum::<f64>() / count as f64;
         // Nine steps of ten agree, and what the others add up to does not speak against them: nothing was rounded.
-        let agree = steps
-            .iter()
-            .filter(|s| (**s - median).abs() <= 1e-3 * median)
-            .count();
-        let (sum, count) = steps
-            .iter()
-            .filter(|s| **s <= 1.5 * median)
-            .fold((0.0, 0.0), |(sum, count), s| (sum + s, count + 1.0));
-        let is_exact = 10 * agree >= 9 * steps.len() && (sum / count / median - 1.0).abs() <= 1e-5;
+        let agree = steps().filter(|s| (s - median).abs() <= 1e-3 * median).count();
+        let (sum, short) = steps()
+            .filter(|s| *s <= 1.5 * median)
+            .fold((0.0, 0.0), |(sum, short), s| (sum + s, short + 1.0));
+        let is_exact = 10 * agree >= 9 * count && (sum / short / median - 1.0).abs() <= 1e-5;
         let resolution = if is_exact { 0.0 } else { resolution };
         runs.resolution_s = resolution;
         // Where times are printed coarsely most steps are zero and the median says nothing.
@@ -230,6 +229,31 @@ impl Runs {
         let even = |r: &Range<usize>| clock::is_even(&seconds[r.clone()], self.step_s, self.resolution_s);
         self.stretches.iter().all(even)
     }
+}
+
+/// Steps of the beginning from which the median of all is guessed.
+const GUESSED_FROM: usize = 1024;
+/// Part of it by which a guess may miss the median: what rounding of `f64` leaves in steps, and nothing beside any limit here.
+const SAME_STEP: f64 = 1e-7;
+
+/// Median of the steps of a time column, to within [`SAME_STEP`]: that of the beginning, where neither half of all steps lies
+/// below it nor half above; else all are sorted. `None` without steps.
+fn median_step(seconds: &[f64]) -> Option<f64> {
+    let median = |seconds: &[f64]| {
+        let mut steps: Vec<f64> = seconds.windows(2).map(|w| w[1] - w[0]).collect();
+        let middle = steps.len() / 2;
+        (!steps.is_empty()).then(|| *steps.select_nth_unstable_by(middle, f64::total_cmp).1)
+    };
+    let guess = median(&seconds[..seconds.len().min(GUESSED_FROM + 1)])?;
+    let (low, high) = (guess - SAME_STEP * guess.abs(), guess + SAME_STEP * guess.abs());
+    let steps = seconds.windows(2).map(|w| w[1] - w[0]);
+    let (below, above) = steps.fold((0_usize, 0_usize), |(below, above), s| {
+        (below + usize::from(s < low), above + usize::from(s > high))
+    });
+    if 2 * below.max(above) + 1 < seconds.len() {
+        return Some(guess);
+    }
+    median(seconds)
 }
 
 /// Rate of a step: a whole number of hertz where the rounding of the times allows it.

@@ -1,0 +1,60 @@
+//! `[[channel]]` sections for force files whose columns have no names.
+
+use super::answers::Answers;
+use super::entry::{DraftTable, Entry, Kind};
+use super::tables::Making;
+use crate::Result;
+use crate::ingest::PlainColumn;
+
+/// A section for the time, where there is one, and for each signal, taken as x, y, z and torque in their order.
+pub(super) fn channels(columns: &[PlainColumn], answers: &Answers) -> Result<Vec<DraftTable>> {
+    let mut tables = Vec::new();
+    let mut forces = ["fx", "fy", "fz", "mz"].into_iter();
+    let has_time = columns.first().is_some_and(|c| c.step.is_some());
+    for (i, column) in columns.iter().enumerate() {
+        let name = match column.step {
+            Some(_) => Some("time"),
+            None => forces.next(),
+        };
+        let Some(name) = name else {
+            break;
+        };
+        let mut making = Making::new(answers, "channel", name, true);
+        making.fact("name", Kind::Text, name);
+        let at = (i + 1).to_string();
+        let shows = column.describe();
+        if column.step.is_some() {
+            making.fact("column", Kind::Whole, &at);
+            let unit = Entry::new(
+                "unit",
+                Kind::Choice(&["s", "ms"]),
+                "unit of the time: s or ms",
+                "s",
+            );
+            making.add(unit, &[(Some("s"), format!("the column {shows}").as_str())])?;
+        } else {
+            let place = Entry::new("column", Kind::Whole, "which column it is, from 1", "1");
+            let why = format!("signals taken as fx, fy, fz, mz in their order; this one: {shows}");
+            making.add(place, &[(Some(at.as_str()), why.as_str())])?;
+            let unit = Entry::new(
+                "unit",
+                Kind::Text,
+                "unit of the values in the file: N, kN, V, mV, pC",
+                "V",
+            );
+            making.add(unit, &[])?;
+            let unit = making.table.entries.last().and_then(Entry::value_text);
+            let is_electric = unit.is_some_and(|u| u.contains(['V', 'C']));
+            let gain =
+                "what the amplifier makes of it, with its unit: N/V, mV/N, pC/N (none for values in N)";
+            let gain = Entry::new("gain", Kind::Text, gain, "500 N/V");
+            making.add(if is_electric { gain } else { gain.optional() }, &[])?;
+            if !has_time && name == "fx" {
+                let rate = Entry::new("rate_hz", Kind::Number, "samples a second, Hz", "10000.0");
+                making.add(rate, &[])?;
+            }
+        }
+        tables.push(making.table);
+    }
+    Ok(tables)
+}

@@ -273,8 +273,8 @@ pub fn map_section(findings: &StructureFindings) -> ReportSection {
         id: "error-map".into(),
         title: "Where the error is".into(),
         lead: "Dark cells are where the model and the measurement differ most for the noise; where only noise is left, cells \
-               are light. On a screen a click on a cell shows the FRF behind it (of several the one with most error), and the \
-               buttons above a map show it for other states of the model."
+               are light. On a screen a click on a cell (keyboard: arrow keys, Enter) shows the FRF behind it (of several the \
+               one with most error), and the buttons above a map show it for other states of the model."
             .into(),
         blocks,
     }

@@ -286,7 +286,7 @@ fn average(fine: &[u8], width: usize) -> Vec<u8> {
 /// edges of lines and letters, which have the most shades, take a quarter less room.
 const ALIKE: u32 = 18;
 
-/// The commonest colours, at most 256 and none [`ALIKE`], and for each pixel the nearest of them. What is drawn has few
+/// The commonest colours, at most 256 and none [`ALIKE`] but those of areas, and for each pixel the nearest of them. What is drawn has few
 /// colours; the rare ones are the edges of lines.
 fn indexed(rgb: &[u8]) -> (Vec<u8>, Vec<u8>) {
     let mut counts: HashMap<[u8; 3], usize> = HashMap::new();
@@ -300,8 +300,10 @@ fn indexed(rgb: &[u8]) -> (Vec<u8>, Vec<u8>) {
         steps.sum()
     };
     let mut palette: Vec<[u8; 3]> = Vec::new();
-    for (color, _) in &colors {
-        if palette.len() < 256 && palette.iter().all(|p| distance(color, p) > ALIKE.pow(2)) {
+    for (color, pixels) in &colors {
+        // What covers more than edges do, such as the shade behind a panel, stays as it is.
+        let area = 500 * pixels > rgb.len() / 3;
+        if palette.len() < 256 && (area || palette.iter().all(|p| distance(color, p) > ALIKE.pow(2))) {
             palette.push(*color);
         }
     }

@@ -192,8 +192,10 @@ impl Parts {
             return Ok(None);
         }
         let mut arrays = Arrays::default();
-        let figures: Vec<serde_json::Value> = self.figures.iter().map(|figure| arrays.shared(figure)).collect();
-        let figures = json!({ "figures": figures, "explorers": self.explorers, "arrays": arrays.table() }).to_string();
+        let figures: Vec<serde_json::Value> =
+            self.figures.iter().map(|figure| arrays.shared(figure)).collect();
+        let figures =
+            json!({ "figures": figures, "explorers": self.explorers, "arrays": arrays.table() }).to_string();
         // Packed they have no character that HTML knows, whatever names they hold.
         Ok(Some(context! {
             plotly => Value::from_safe_string(plotly_js()),

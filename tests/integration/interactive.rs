@@ -81,7 +81,12 @@ fn unpacked(html: &str, id: &str) -> String {
 
 /// Magnitudes out of the whole numbers that the page holds: differences, of calculated curves (`order` 2) differences of those.
 fn magnitudes(packed: &Value, order: usize) -> Vec<f64> {
-    let mut steps: Vec<i64> = packed.as_array().unwrap().iter().map(|d| d.as_i64().unwrap()).collect();
+    let mut steps: Vec<i64> = packed
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|d| d.as_i64().unwrap())
+        .collect();
     for _ in 0..order {
         let mut sum = 0;
         for step in &mut steps {

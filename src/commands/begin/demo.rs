@@ -347,9 +347,7 @@ fn coefficients(result: &CfcResult) -> String {
             .coefficients
             .iter()
             .filter(|c| !c.edge)
-            .filter_map(|c| {
-                Some(format!("{} {}", c.label, with_error(c.value?, c.std_error?)))
-            })
+            .filter_map(|c| Some(format!("{} {}", c.label, with_error(c.value?, c.std_error?))))
             .collect();
         format!("{} N/mm² from {} cuts", values.join(", "), group.cuts.len())
     };

@@ -71,7 +71,10 @@ impl Arrays {
 
 /// `None` where a number is missing or has too many digits.
 fn stepwise(list: &[Value]) -> Option<Value> {
-    let texts: Vec<String> = list.iter().map(|v| Some(v.as_f64()?.to_string())).collect::<Option<_>>()?;
+    let texts: Vec<String> = list
+        .iter()
+        .map(|v| Some(v.as_f64()?.to_string()))
+        .collect::<Option<_>>()?;
     let decimals_of = |text: &String| text.split_once('.').map_or(0, |(_, after)| after.len());
     let decimals = texts.iter().map(decimals_of).max()?;
     let whole = |text: &String| {
@@ -79,11 +82,19 @@ fn stepwise(list: &[Value]) -> Option<Value> {
         digits.parse().ok().filter(|n: &i64| n.abs() < EXACT / 8)
     };
     // JavaScript divides by powers of ten, which are exact up to here.
-    let whole: Vec<i64> = texts.iter().map(whole).collect::<Option<_>>().filter(|_| decimals <= 22)?;
+    let whole: Vec<i64> = texts
+        .iter()
+        .map(whole)
+        .collect::<Option<_>>()
+        .filter(|_| decimals <= 22)?;
     let first = differences(whole.into_iter());
     let second = differences(first.iter().copied());
     let length = |steps: &[i64]| steps.iter().map(|s| s.to_string().len()).sum::<usize>();
-    let (order, steps) = if length(&second) < length(&first) { (2, second) } else { (1, first) };
+    let (order, steps) = if length(&second) < length(&first) {
+        (2, second)
+    } else {
+        (1, first)
+    };
     Some(json!({ "decimals": decimals, "order": order, "steps": steps }))
 }
 
@@ -161,17 +172,30 @@ mod tests {
     #[test]
     fn long_lists_stand_in_the_page_once_and_come_back_as_they_were() {
         let long: Vec<f64> = (0..100).map(|k| f64::from(k * k) * 1e-7).collect();
-        let gap: Vec<Value> = (0..40).map(|k| if k == 7 { Value::Null } else { json!(k) }).collect();
+        let gap: Vec<Value> = (0..40)
+            .map(|k| if k == 7 { Value::Null } else { json!(k) })
+            .collect();
         let figure = json!({ "a": { "x": long, "y": [long, [1, 2, 3]] }, "b": gap, "c": ["text"; 30] });
         let mut arrays = Arrays::default();
         let shared = arrays.shared(&figure);
-        assert_eq!(shared["a"], json!({ "x": { "$": 0 }, "y": [{ "$": 0 }, [1, 2, 3]] }));
+        assert_eq!(
+            shared["a"],
+            json!({ "x": { "$": 0 }, "y": [{ "$": 0 }, [1, 2, 3]] })
+        );
         assert_eq!((&shared["b"], &shared["c"]), (&json!({ "$": 1 }), &figure["c"]));
         let table = arrays.table();
         assert_eq!(table[1], figure["b"], "with a gap in it, as it is");
-        assert_eq!((&table[0]["decimals"], &table[0]["order"]), (&json!(7), &json!(2)));
+        assert_eq!(
+            (&table[0]["decimals"], &table[0]["order"]),
+            (&json!(7), &json!(2))
+        );
         // As page.js does it.
-        let mut numbers: Vec<i64> = table[0]["steps"].as_array().unwrap().iter().map(|s| s.as_i64().unwrap()).collect();
+        let mut numbers: Vec<i64> = table[0]["steps"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|s| s.as_i64().unwrap())
+            .collect();
         for _ in 0..2 {
             let mut sum = 0;
             numbers.iter_mut().for_each(|n| {
@@ -180,7 +204,10 @@ mod tests {
             });
         }
         let back: Vec<f64> = numbers.iter().map(|n| *n as f64 / 1e7).collect();
-        assert_eq!(back.iter().map(f64::to_string).collect::<Vec<_>>(), long.iter().map(f64::to_string).collect::<Vec<_>>());
+        assert_eq!(
+            back.iter().map(f64::to_string).collect::<Vec<_>>(),
+            long.iter().map(f64::to_string).collect::<Vec<_>>()
+        );
         for far in [vec![1e-30; 30], vec![1e300; 30], vec![1.0, 1e-20].repeat(20)] {
             let list: Vec<Value> = far.iter().map(|v| json!(v)).collect();
             assert_eq!(stepwise(&list), None, "{far:?}");

@@ -9,7 +9,9 @@ const parsed = new Promise((done) => document.addEventListener("DOMContentLoaded
   await parsed;
   const config = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
   const unpack = async (id) => {
-    const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (c) => c.charCodeAt(0));
+    const letters = atob(document.getElementById(id).textContent);
+    const bytes = new Uint8Array(letters.length);
+    for (let k = 0; k < letters.length; k += 1) bytes[k] = letters.charCodeAt(k);
     const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
     return new Response(stream).text();
   };
@@ -258,15 +260,17 @@ const parsed = new Promise((done) => document.addEventListener("DOMContentLoaded
 
   const live = [...document.querySelectorAll("[data-plot], [data-explorer]")];
   const opened = () => live.some(isOpen);
+  // Begun at once, so that the first figure that is opened need not wait for it.
+  const [script, described] = [unpack("plotly"), unpack("figures")];
   if (!opened()) {
     // Nothing to draw before a reader opens a part of the page.
     document.documentElement.dataset.ready = "true";
     await new Promise((done) => document.addEventListener("toggle", () => opened() && done(), true));
   }
   const library = document.createElement("script");
-  library.textContent = await unpack("plotly");
+  library.textContent = await script;
   document.head.append(library);
-  const { figures, explorers, arrays: table } = JSON.parse(await unpack("figures"));
+  const { figures, explorers, arrays: table } = JSON.parse(await described);
   const arrays = table.map(numbers);
 
   // Every figure with the explorer before it, which its map follows; drawn when its part of the page is open.

@@ -4,7 +4,7 @@
     python3 scripts/plotly_bundle.py [--out FILE]
 
 The whole of plotly.js is 1.4 MB compressed, and every report carries it; with these kinds of traces it is 0.5 MB. Made as plotly.js
-describes it (CUSTOM_BUNDLE.md there), from the package in the npm registry, in a folder that is removed afterwards. Needs node and
+describes it ("custom bundle"), from the package in the npm registry, in a folder that is removed afterwards. Needs node and
 npm; only whoever changes VERSION or TRACES runs it. The licence is in src/report/interactive/plotly-LICENSE.txt.
 """
 

@@ -15,8 +15,8 @@ use crate::report::figure::{FrfCurve, lowest_phase};
 use crate::report::number::{percent, significant};
 
 const UNIT: &str = "m/N";
-/// Complex values in the page at most, measured and of all models: some 4 MB of it.
-const MOST_VALUES: usize = 1_000_000;
+/// Complex values in the page at most, measured and of all models: some 1.2 MB of it, so that all of it stays below 3 MB.
+const MOST_VALUES: usize = 400_000;
 
 /// FRFs, models, and what to show first.
 #[derive(Debug, Clone)]

@@ -171,11 +171,11 @@ mod tests {
 
     #[test]
     fn long_lists_stand_in_the_page_once_and_come_back_as_they_were() {
-        let long: Vec<f64> = (0..100).map(|k| f64::from(k * k) * 1e-7).collect();
+        let long: Vec<f64> = (0..100).map(|k| f64::from(k * k) / 1e7).collect();
         let gap: Vec<Value> = (0..40)
             .map(|k| if k == 7 { Value::Null } else { json!(k) })
             .collect();
-        let figure = json!({ "a": { "x": long, "y": [long, [1, 2, 3]] }, "b": gap, "c": ["text"; 30] });
+        let figure = json!({ "a": { "x": long, "y": [long, [1, 2, 3]] }, "b": gap, "c": vec!["text"; 30] });
         let mut arrays = Arrays::default();
         let shared = arrays.shared(&figure);
         assert_eq!(

@@ -4,7 +4,7 @@
     python3 scripts/check_report.py report.html [--shots FOLDER] [--browser chromium]
 
 Fails where the page logs an error or loads anything, where a figure is empty, where a button for another model changes
-neither curve nor stated error, where a cell of an error map does not lead to an FRF, or where paper lacks the figures.
+neither curve nor stated error, where a cell of an error map does not lead to an FRF (mouse, keyboard), or where paper lacks the figures.
 What was found is printed as JSON. Only the standard library is used; the browser is spoken to over its debugging pipe
 (https://chromedevtools.github.io/devtools-protocol/).
 """
@@ -277,6 +277,15 @@ def use_explorer(browser, shots):
     browser.run("new Promise((done) => setTimeout(done, 1500))")
     after = browser.run(MODEL)
     check(after["frf"] != before["frf"] and after["y"] != before["y"], "a click on a cell of the error map shows no other FRF")
+    # The same without a mouse: arrow keys choose a cell, which is told, and Enter leads to the FRF.
+    browser.run("document.querySelector('[data-plot]:has(.models) .plot').focus()")
+    for key in ("ArrowDown", "ArrowRight", "Enter"):
+        for kind in ("rawKeyDown", "keyUp"):
+            browser.send("Input.dispatchKeyEvent", type=kind, key=key, code=key)
+    told = browser.run("document.querySelector('[data-plot]:has(.models) .told').textContent")
+    check(": " in told, f"arrow keys choose no cell of the error map: {told!r}")
+    check(browser.run("document.activeElement.name") == "posture", "Enter on a cell of the error map leads nowhere")
+    browser.run("new Promise((done) => setTimeout(done, 1000))")
     if shots:
         browser.shot(shots / "after-click.png")
         browser.run(click.format(0))

@@ -22,6 +22,11 @@ ALLOWED = {
     "ISC", "MIT", "MIT-0", "MPL-2.0", "NCSA", "Unicode-3.0", "Unlicense", "Zlib", "bzip2-1.0.6",
 }  # fmt: skip
 TEXTS = re.compile(r"^(licen[sc]e|copying|notice|unlicense)", re.IGNORECASE)
+# What pages and figures hold that is no crate: name, licence, where its text is.
+EMBEDDED = [
+    ("plotly.js", "MIT", "src/report/interactive/plotly-LICENSE.txt"),
+    ("DejaVu Sans", "Bitstream Vera", "src/report/fonts/LICENSE.txt"),
+]
 # A crate counts as large from so many crates on that nothing else brings.
 LARGE = 5
 
@@ -123,6 +128,8 @@ def page(packages, edges, root):
     for count, name, own in brings:
         if count >= LARGE:
             lines.append(f"| {name} | {count} | {', '.join(own[:6])}{', …' if len(own) > 6 else ''} |")
+    lines += ["", "## Not crates", "", "In the pages and figures that the program writes.", "", "| what | licence | text |", "|---|---|---|"]
+    lines += [f"| {name} | {licence} | `{text}` |" for name, licence, text in EMBEDDED]
     lines += ["", "## All", "", "| crate | version | licence | source |", "|---|---|---|---|"]
     for p in others:
         lines.append(f"| {p['name']} | {p['version']} | {p['license']} | {p['repository'] or p['homepage'] or 'crates.io'} |")
@@ -137,6 +144,8 @@ def texts(packages, root):
             if TEXTS.match(path.name) and path.is_file():
                 text = path.read_text(errors="replace").strip()
                 by_text.setdefault(text, []).append(f"{p['name']} {p['version']}")
+    for name, _, path in EMBEDDED:
+        by_text.setdefault((ROOT / path).read_text().strip(), []).append(name)
     parts = [", ".join(sorted(set(names))) + "\n\n" + text for text, names in by_text.items()]
     return ("\n\n" + "=" * 78 + "\n\n").join(sorted(parts)) + "\n"
 

@@ -162,8 +162,18 @@ pub(crate) fn demo_page(findings: &CampaignFindings, second: &SecondCell, steps:
     page.sections.push(demo_story(steps));
     page.sections.extend(second_sections);
     page.sections.extend(first);
+    for section in &mut page.sections {
+        section.blocks.retain(|block| !is_further_frf(block));
+    }
     page.open_sections = Some(1);
     page
+}
+
+/// The demo's paper shows the worst and the best FRF of each cell; the second and the third worst are, like all others, in the
+/// explorer.
+fn is_further_frf(block: &Block) -> bool {
+    let further = ["frf-worst-2", "frf-worst-3"];
+    matches!(block, Block::Figure(figure) if further.iter().any(|name| figure.file_name.ends_with(name)))
 }
 
 fn demo_story(steps: &[StepRow]) -> ReportSection {

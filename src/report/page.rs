@@ -13,7 +13,7 @@ use serde_json::json;
 
 use super::VerdictCard;
 use super::block::{Block, Figure, OnScreen, ReportSection, ReportTable};
-use super::interactive::{GLUE, packed, plotly_js};
+use super::interactive::{Arrays, GLUE, packed, plotly_js};
 use super::number::percent;
 use crate::files::write_atomically;
 use crate::{Error, Result};
@@ -191,10 +191,14 @@ impl Parts {
         if self.figures.is_empty() && self.explorers.is_empty() {
             return Ok(None);
         }
-        let figures = json!({ "figures": self.figures, "explorers": self.explorers }).to_string();
+        let mut arrays = Arrays::default();
+        let figures: Vec<serde_json::Value> =
+            self.figures.iter().map(|figure| arrays.shared(figure)).collect();
+        let figures =
+            json!({ "figures": figures, "explorers": self.explorers, "arrays": arrays.table() }).to_string();
         // Packed they have no character that HTML knows, whatever names they hold.
         Ok(Some(context! {
-            plotly => Value::from_safe_string(plotly_js()?.to_owned()),
+            plotly => Value::from_safe_string(plotly_js()),
             figures => Value::from_safe_string(packed(&figures)?),
             glue => Value::from_safe_string(GLUE.to_owned()),
         }))

@@ -44,7 +44,7 @@ fn the_demo_tells_the_whole_story() {
 
     let html = std::fs::read_to_string(json["html"].as_str().unwrap()).unwrap();
     assert_self_contained(&html);
-    assert!(html.len() < 6_000_000, "{}", html.len());
+    assert!(html.len() < 3_000_000, "{}", html.len());
     let images = json["images"].as_array().unwrap();
     assert!(images.len() >= 15);
     for image in images {

@@ -20,6 +20,7 @@ use crate::commands::write::report;
 use crate::cutting::{CfcOptions, CfcResult};
 use crate::identify::{Options, StructureCase};
 use crate::report::campaign as pages;
+use crate::report::number::with_error;
 use crate::revision::{RevisionLog, log_file};
 use crate::{Error, InputError, Result, ingest};
 
@@ -346,14 +347,7 @@ fn coefficients(result: &CfcResult) -> String {
             .coefficients
             .iter()
             .filter(|c| !c.edge)
-            .filter_map(|c| {
-                Some(format!(
-                    "{} {} ± {}",
-                    c.label,
-                    number(c.value?, 4),
-                    number(c.std_error?, 2)
-                ))
-            })
+            .filter_map(|c| Some(format!("{} {}", c.label, with_error(c.value?, c.std_error?))))
             .collect();
         format!("{} N/mm² from {} cuts", values.join(", "), group.cuts.len())
     };

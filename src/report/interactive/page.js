@@ -9,7 +9,9 @@ const parsed = new Promise((done) => document.addEventListener("DOMContentLoaded
   await parsed;
   const config = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
   const unpack = async (id) => {
-    const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (c) => c.charCodeAt(0));
+    const letters = atob(document.getElementById(id).textContent);
+    const bytes = new Uint8Array(letters.length);
+    for (let k = 0; k < letters.length; k += 1) bytes[k] = letters.charCodeAt(k);
     const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
     return new Response(stream).text();
   };
@@ -19,6 +21,19 @@ const parsed = new Promise((done) => document.addEventListener("DOMContentLoaded
   };
   // As packed.rs packs them: ln of the magnitude in 1e-4, phase in 0.01°.
   const magnitudes = (packed) => sums(packed).map((n) => (n > -1e6 ? Number(Math.exp(n * 1e-4).toPrecision(5)) : null));
+  /** Lists of numbers as packed.rs has them in its table, and what refers to them as it was. */
+  const numbers = (list) => {
+    if (Array.isArray(list)) return list;
+    let whole = list.steps;
+    for (let k = 0; k < list.order; k += 1) whole = sums(whole);
+    return whole.map((n) => n / 10 ** list.decimals);
+  };
+  const whole = (value, arrays) => {
+    if (Array.isArray(value)) return value.map((v) => whole(v, arrays));
+    if (value === null || typeof value !== "object") return value;
+    if ("$" in value) return arrays[value.$];
+    return Object.fromEntries(Object.entries(value).map(([key, v]) => [key, whole(v, arrays)]));
+  };
   const phases = (packed, lowest) => sums(packed).map((n) => lowest + ((((n * 0.01 - lowest) % 360) + 360) % 360));
   // A line has a gap where the phase jumps from one end of its range to the other.
   const unbroken = (x, y) => {
@@ -119,7 +134,7 @@ const parsed = new Promise((done) => document.addEventListener("DOMContentLoaded
       root.dataset.model = model;
       const x = data.grids[f.grid];
       const measured = { magnitude: magnitudes(f.magnitude), phase: phases(f.phase, f.lowest) };
-      const modelled = { magnitude: magnitudes(m.magnitude[frf]), phase: phases(m.phase[frf], f.lowest) };
+      const modelled = { magnitude: magnitudes(sums(m.magnitude[frf])), phase: phases(sums(m.phase[frf]), f.lowest) };
       const filled = [
         { x, y: magnitudes(f.level) },
         { x, y: measured.magnitude },
@@ -177,17 +192,65 @@ const parsed = new Promise((done) => document.addEventListener("DOMContentLoaded
       explorer.maps.push(follow);
       if (explorer.model !== plot.stages.length - 1) await follow(explorer.model);
     }
-    if (explorer && plot.links) {
-      div.on("plotly_click", (event) => {
-        const [row, column] = [].concat(event.points[0].pointIndex);
-        const frf = plot.links.frf[row]?.[column];
-        if (!Number.isInteger(frf)) return;
-        explorer.band = plot.links.bands_hz[column] ?? null;
-        open(explorer.root);
-        explorer.show(frf, explorer.model);
-        explorer.root.scrollIntoView({ behavior: "smooth" });
-      });
-    }
+    const lead = explorer && plot.links && ((row, column) => {
+      const frf = plot.links.frf[row]?.[column];
+      if (!Number.isInteger(frf)) return;
+      explorer.band = plot.links.bands_hz[column] ?? null;
+      open(explorer.root);
+      explorer.show(frf, explorer.model);
+      explorer.root.scrollIntoView({ behavior: "smooth" });
+    });
+    if (lead) div.on("plotly_click", (event) => lead(...[].concat(event.points[0].pointIndex)));
+    if (!plot.choice && plot.data.every((trace) => trace.type === "heatmap")) byKeyboard(figure, div, lead, explorer);
+  };
+
+  /** A map without a mouse: arrow keys choose a cell, which is marked and told; Enter does what a click does. */
+  const byKeyboard = (figure, div, lead, explorer) => {
+    const at = { table: 0, row: 0, column: 0 };
+    const told = document.createElement("p");
+    told.className = "told";
+    told.setAttribute("aria-live", "polite");
+    figure.append(told);
+    div.tabIndex = 0;
+    div.setAttribute("role", "application");
+    const does = lead ? "Arrow keys choose a cell, Enter shows its FRF." : "Arrow keys choose a cell.";
+    div.setAttribute("aria-label", `${div.getAttribute("aria-label")} ${does}`);
+    const plain = (html) => new DOMParser().parseFromString(html, "text/html").body.textContent;
+    const show = () => {
+      const { xaxis = "x", yaxis = "y", text } = div.data[at.table];
+      const name = (axis, k) => plain(div.layout[axis[0] + "axis" + axis.slice(1)].ticktext[k]);
+      told.textContent = `${name("y", at.row)}, ${name(xaxis, at.column)}: ${text[at.row][at.column] ?? "no value"}`;
+      const cell = { x0: at.column - 0.5, x1: at.column + 0.5, y0: at.row - 0.5, y1: at.row + 0.5 };
+      const mark = { type: "rect", xref: xaxis, yref: yaxis, ...cell, line: { color: "#0b57d0", width: 3 } };
+      Plotly.relayout(div, { shapes: [mark] });
+      div.querySelector(".shapelayer path")?.scrollIntoView({ block: "nearest", behavior: "instant" });
+      Plotly.Fx.hover(div, { xval: at.column, yval: at.row }, xaxis + yaxis);
+    };
+    const steps = { ArrowLeft: [0, -1], ArrowRight: [0, 1], ArrowUp: [-1, 0], ArrowDown: [1, 0] };
+    div.addEventListener("keydown", (event) => {
+      if (event.ctrlKey || event.altKey || event.metaKey) return;
+      if (event.key === "Enter" && lead) {
+        lead(at.row, at.column);
+        explorer.chosen.posture.focus({ preventScroll: true });
+      } else if (steps[event.key]) {
+        const { z } = div.data[at.table];
+        const [down, right] = steps[event.key];
+        at.row = Math.min(Math.max(at.row + down, 0), z.length - 1);
+        at.column += right;
+        // From one map to the one beside it.
+        if (at.column < 0) [at.table, at.column] = at.table > 0 ? [at.table - 1, z[0].length - 1] : [0, 0];
+        else if (at.column >= z[0].length) {
+          [at.table, at.column] = at.table + 1 < div.data.length ? [at.table + 1, 0] : [at.table, z[0].length - 1];
+        }
+        show();
+      } else return;
+      event.preventDefault();
+    });
+    div.addEventListener("focus", () => div.matches(":focus-visible") && show());
+    div.addEventListener("blur", () => {
+      Plotly.relayout(div, { shapes: [] });
+      Plotly.Fx.unhover(div);
+    });
   };
 
   /** Opens all folds around an element. */
@@ -197,15 +260,18 @@ const parsed = new Promise((done) => document.addEventListener("DOMContentLoaded
 
   const live = [...document.querySelectorAll("[data-plot], [data-explorer]")];
   const opened = () => live.some(isOpen);
+  // Begun at once, so that the first figure that is opened need not wait for it.
+  const [script, described] = [unpack("plotly"), unpack("figures")];
   if (!opened()) {
     // Nothing to draw before a reader opens a part of the page.
     document.documentElement.dataset.ready = "true";
     await new Promise((done) => document.addEventListener("toggle", () => opened() && done(), true));
   }
   const library = document.createElement("script");
-  library.textContent = await unpack("plotly");
+  library.textContent = await script;
   document.head.append(library);
-  const { figures, explorers } = JSON.parse(await unpack("figures"));
+  const { figures, explorers, arrays: table } = JSON.parse(await described);
+  const arrays = table.map(numbers);
 
   // Every figure with the explorer before it, which its map follows; drawn when its part of the page is open.
   let explorer = null;
@@ -223,7 +289,7 @@ const parsed = new Promise((done) => document.addEventListener("DOMContentLoaded
       if (!isOpen(element)) continue;
       if (element.dataset.explorer === undefined) {
         waiting.delete(part);
-        await draw(element, figures[element.dataset.plot], explorer);
+        await draw(element, whole(figures[element.dataset.plot], arrays), explorer);
       } else if (!explorer.drawn) {
         // It stays: folded up, it may be told to show something else.
         await explorer.show(explorer.frf, explorer.model);

@@ -10,13 +10,6 @@ impl RobotFigure {
     pub fn plot(&self) -> Plot {
         let all = || self.postures.iter().flat_map(|(_, chain)| chain).flatten();
         let reach = all().fold(0.1, |most: f64, v| most.max(v.abs())) * 1.05;
-        let shown = |i: usize, chosen: usize| {
-            if i == chosen {
-                json!(true)
-            } else {
-                json!("legendonly")
-            }
-        };
         let data = self.postures.iter().enumerate().map(|(i, (name, chain))| {
             let stroke = style::series(i);
             let last = chain.len().saturating_sub(1);
@@ -31,7 +24,6 @@ impl RobotFigure {
                 "type": "scatter3d",
                 "mode": "lines+markers",
                 "name": text(name),
-                "visible": shown(i, 0),
                 "x": coordinate(0),
                 "y": coordinate(1),
                 "z": coordinate(2),
@@ -42,19 +34,6 @@ impl RobotFigure {
             })
         });
         let data: Vec<Value> = data.collect();
-        let button = |label: String, visible: Vec<Value>| json!({ "label": label, "method": "restyle", "args": ["visible", visible] });
-        let mut buttons: Vec<Value> = self
-            .postures
-            .iter()
-            .enumerate()
-            .map(|(chosen, (name, _))| {
-                button(
-                    text(name),
-                    (0..self.postures.len()).map(|i| shown(i, chosen)).collect(),
-                )
-            })
-            .collect();
-        buttons.push(button("all".into(), vec![json!(true); self.postures.len()]));
         let axis = |title: &str, low: f64| {
             json!({ "title": { "text": title }, "range": [low, reach], "backgroundcolor": "#fff", "gridcolor": "#dee1e5",
                     "zerolinecolor": "#9aa0a8" })
@@ -66,19 +45,25 @@ impl RobotFigure {
             "yaxis": axis("y (m)", -reach),
             "zaxis": axis("z (m)", floor),
             "aspectmode": "data",
-        "camera": self.camera(),
+            "camera": self.camera(),
         });
         layout["margin"] = json!({ "l": 0, "r": 0, "t": 8, "b": 0 });
         layout["showlegend"] = json!(false);
-        layout["updatemenus"] = json!([{
-            "buttons": buttons, "x": 0, "xanchor": "left", "y": 1, "yanchor": "top", "pad": { "l": 8, "t": 8 },
-        }]);
-        Plot {
+        // Turned as the reader has turned it, whichever posture he chooses.
+        layout["uirevision"] = json!("robot");
+        let plot = |data: Vec<Value>| Plot {
             title: self.title.clone(),
             height_px: 560.0,
             data,
-            layout,
+            layout: layout.clone(),
             ..Plot::default()
+        };
+        let one = self.postures.iter().zip(&data);
+        let one = one.map(|((name, _), trace)| (name.clone(), plot(vec![trace.clone()])));
+        let all = ("all".to_string(), plot(data.clone()));
+        match data.len() {
+            0 | 1 => plot(data),
+            _ => Plot::one_of("Posture", one.chain([all]).collect()),
         }
     }
 }

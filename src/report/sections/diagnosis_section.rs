@@ -245,7 +245,7 @@ pub(crate) fn candidate_table<D: Modelled>(d: &Diagnosis<D>) -> Block {
             c.held_out.as_ref().map_or("–".into(), |h| percent(h.nrms())),
             significant(c.delta_bic, 3),
             if c.p_value < 1e-12 {
-                "< 1e-12".into()
+                "< 10⁻¹²".into()
             } else {
                 significant(c.p_value, 2)
             },

@@ -77,7 +77,7 @@ const KINDS: [Kind; 5] = [
         file: "error-map",
         alt: "Error of the calibrated model in multiples of the noise, by posture, direction and frequency band",
         caption: "Error of the model in multiples of the measurement's noise, by posture and direction (rows) and \
-                  frequency band (columns): 1 is noise alone. What is dark is where to look first.",
+                  frequency band (columns): 1 is noise alone. What stands out is where to look first.",
         map: |model, c| {
             times_noise_map(
                 &format!("{model}: error in multiples of the noise, everywhere"),
@@ -272,9 +272,9 @@ pub fn map_section(findings: &StructureFindings) -> ReportSection {
     ReportSection {
         id: "error-map".into(),
         title: "Where the error is".into(),
-        lead: "Dark cells are where the model and the measurement differ most for the noise; where only noise is left, cells \
-               are light. On a screen a click on a cell shows the FRF behind it (of several the one with most error), and the \
-               buttons above a map show it for other states of the model."
+        lead: "The more a cell stands out from the page, the more model and measurement differ there for the noise; where only noise \
+               is left, cells fade. On a screen a click on a cell (keyboard: arrow keys, Enter) shows the FRF behind it (of several \
+               the one with most error), and the buttons above a map show it for other states of the model."
             .into(),
         blocks,
     }

@@ -60,8 +60,16 @@ pub fn section(analysis: &ModalAnalysis, shapes: &[StickShape]) -> ReportSection
         blocks.push(stabilisation(set));
         blocks.extend(reconstruction(set));
         blocks.extend(coherence(set));
-        blocks.extend(mode_shapes(set, shapes));
-        blocks.extend(mac(set));
+        if measured_points(set) < 2 {
+            blocks.push(Block::Paragraph(
+                "Mode shapes and their likeness (MAC) are not shown: one point, whatever its directions, cannot tell shapes \
+                 apart. Two or three more points along the arm can."
+                    .into(),
+            ));
+        } else {
+            blocks.extend(mode_shapes(set, shapes));
+            blocks.extend(mac(set));
+        }
     }
     blocks.extend(
         analysis
@@ -189,7 +197,8 @@ pub(crate) fn stabilisation(set: &SetModes) -> Block {
     figure(
         "modal-stabilisation",
         "Poles over the model order; those that stay form columns",
-        "Poles that stay from order to order are modes; the others follow noise.",
+        "Poles that stay from order to order are modes; the others follow noise. A mode without a stable pole under it comes from \
+         the fit of all curves alone: look at it twice.",
         picture.png(),
     )
 }
@@ -313,6 +322,19 @@ pub(crate) fn coherence(set: &SetModes) -> Option<Block> {
         "1: the response comes from the hammer alone; dips at antiresonances are usual, dips at resonances are not.",
         picture.png(),
     ))
+}
+
+/// Places that the set's FRFs are of, in whatever directions: `1X` and `-1Z` are one.
+fn measured_points(set: &SetModes) -> usize {
+    let place = |dof: &String| {
+        let name = dof.trim_start_matches(['+', '-']);
+        name.trim_end_matches(|c: char| !c.is_ascii_digit()).to_string()
+    };
+    set.dofs
+        .iter()
+        .map(place)
+        .collect::<std::collections::HashSet<_>>()
+        .len()
 }
 
 /// Shapes on the robot's stick figure.

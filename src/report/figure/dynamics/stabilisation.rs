@@ -3,7 +3,7 @@
 use crate::Result;
 use crate::modal::stabilisation::Stability;
 use crate::report::figure::sheet::axis::{FigureAxis, extent, positive_extent, usable};
-use crate::report::figure::sheet::canvas::{Color, Marker, WIDTH, nothing_to_draw, paint};
+use crate::report::figure::sheet::canvas::{Color, Marker, Stroke, WIDTH, nothing_to_draw, paint};
 use crate::report::figure::sheet::panel::{FigureHeader, Panel, Swatch};
 use crate::report::figure::sheet::style;
 
@@ -46,7 +46,19 @@ const SIGNS: [(Stability, Marker, f64, Color, &str); 4] = [
     (Stability::Full, Marker::Disc, 4.0, style::BLUE, "and shape"),
 ];
 
+/// Share of its frequency within which a mode's stable poles lie.
+const NEAR: f64 = 0.01;
+/// A mode that no stable pole speaks for.
+const UNSUPPORTED: Stroke = Stroke::dashed(style::RED, 1.6, &[7.0, 4.0]);
+
 impl StabilisationFigure {
+    /// Whether a pole that agrees with the order below in frequency and damping lies at `frequency_hz`.
+    fn has_pole_at(&self, frequency_hz: f64) -> bool {
+        let stable = |p: &&StabilisationPole| matches!(p.stability, Stability::Damping | Stability::Full);
+        let mut poles = self.poles.iter().filter(stable);
+        poles.any(|p| (p.frequency_hz - frequency_hz).abs() <= NEAR * frequency_hz)
+    }
+
     /// # Errors
     /// No pole with a finite frequency.
     pub fn png(&self) -> Result<Vec<u8>> {
@@ -73,6 +85,12 @@ impl StabilisationFigure {
             Swatch::Line(style::LEVEL),
             "modes taken; behind: sum of the FRFs (log)".to_string(),
         ));
+        if self.chosen_hz.iter().any(|f| !self.has_pole_at(*f)) {
+            legend.push((
+                Swatch::Line(UNSUPPORTED),
+                "modes taken without a stable pole".to_string(),
+            ));
+        }
         let header = FigureHeader::new(&self.title, &legend, left, right);
         let top = header.bottom();
         let panel = Panel {
@@ -102,7 +120,12 @@ impl StabilisationFigure {
                 panel.curve(canvas, points, style::FRAME);
             }
             for f in &self.chosen_hz {
-                panel.curve(canvas, [(*f, 0.0), (*f, panel.y.high)], style::LEVEL);
+                let stroke = if self.has_pole_at(*f) {
+                    style::LEVEL
+                } else {
+                    UNSUPPORTED
+                };
+                panel.curve(canvas, [(*f, 0.0), (*f, panel.y.high)], stroke);
             }
             for (stability, marker, size, color, _) in SIGNS {
                 let points = self.poles.iter().filter(|p| p.stability == stability);

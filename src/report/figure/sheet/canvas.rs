@@ -282,8 +282,12 @@ fn average(fine: &[u8], width: usize) -> Vec<u8> {
     coarse
 }
 
-/// The commonest colours, at most 256, and for each pixel the nearest of them. What is drawn has few colours; the rare
-/// ones are the edges of lines.
+/// Colours nearer to each other than this (root of the sum of squares, of 255) are one: nobody sees the difference, and the soft
+/// edges of lines and letters, which have the most shades, take a quarter less room.
+const ALIKE: u32 = 18;
+
+/// The commonest colours, at most 256 and none [`ALIKE`] but those of areas, and for each pixel the nearest of them. What is drawn has few
+/// colours; the rare ones are the edges of lines.
 fn indexed(rgb: &[u8]) -> (Vec<u8>, Vec<u8>) {
     let mut counts: HashMap<[u8; 3], usize> = HashMap::new();
     for (color, length) in runs(rgb) {
@@ -291,11 +295,18 @@ fn indexed(rgb: &[u8]) -> (Vec<u8>, Vec<u8>) {
     }
     let mut colors: Vec<([u8; 3], usize)> = counts.into_iter().collect();
     colors.sort_unstable_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(&b.0)));
-    let palette: Vec<[u8; 3]> = colors.iter().take(256).map(|c| c.0).collect();
     let distance = |a: &[u8; 3], b: &[u8; 3]| -> u32 {
         let steps = a.iter().zip(b).map(|(a, b)| u32::from(a.abs_diff(*b)).pow(2));
         steps.sum()
     };
+    let mut palette: Vec<[u8; 3]> = Vec::new();
+    for (color, pixels) in &colors {
+        // What covers more than edges do, such as the shade behind a panel, stays as it is.
+        let area = 500 * pixels > rgb.len() / 3;
+        if palette.len() < 256 && (area || palette.iter().all(|p| distance(color, p) > ALIKE.pow(2))) {
+            palette.push(*color);
+        }
+    }
     let nearest = |color: &[u8; 3]| {
         let places = (0..=255u8).zip(&palette);
         places

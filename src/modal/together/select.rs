@@ -44,6 +44,7 @@ pub(crate) fn choose(data: &[Data], candidates: &[Start]) -> Vec<Pole> {
     let mut data = data.to_vec();
     let mut firm: Vec<bool> = candidates.iter().map(|c| c.orders >= LONG_CHAIN).collect();
     let mut left: Vec<Pole> = candidates.iter().map(|c| c.pole).collect();
+    let mut taken: Vec<Pole> = Vec::new();
     let mut chosen: Vec<Pole> = Vec::new();
     for round in 0..MAX_ROUNDS {
         let even = set_noise::alike(&data);
@@ -59,6 +60,7 @@ pub(crate) fn choose(data: &[Data], candidates: &[Start]) -> Vec<Pole> {
             break;
         }
         chosen.extend(batch.iter().map(|&k| left[k]));
+        taken.extend(batch.iter().map(|&k| left[k]));
         for k in batch.into_iter().rev() {
             left.remove(k);
             firm.remove(k);
@@ -72,9 +74,22 @@ pub(crate) fn choose(data: &[Data], candidates: &[Start]) -> Vec<Pole> {
             .iter()
             .flat_map(|g| g.solution.poles.iter().copied())
             .collect();
+        // While modes are missing a pole may leave its own to stand for two others: it begins again where it was found.
+        let lost = |c: &&Pole| !chosen.iter().any(|p| near(p, c));
+        let back: Vec<Pole> = taken.iter().filter(lost).copied().collect();
+        if !back.is_empty() {
+            chosen.retain(|p| taken.iter().any(|c| near(p, c)));
+            chosen.extend(back);
+        }
         chosen.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
     }
     chosen
+}
+
+/// Within both half-widths of each other?
+fn near(a: &Pole, b: &Pole) -> bool {
+    let width = |p: &Pole| p.damping_ratio * p.frequency_hz;
+    (a.frequency_hz - b.frequency_hz).abs() < width(a) + width(b)
 }
 
 /// Ascending indices of those that come in together.

@@ -31,8 +31,6 @@ const SEEN: f64 = 30.0;
 const SAME_PLACE: f64 = 0.05;
 /// And than these, one after the other, where a group cannot be fitted.
 const MERGED: [f64; 3] = [0.5, 1.0, 2.0];
-/// What explains so many times what a mode must is needed, however badly it is determined.
-const INDISPENSABLE: f64 = 10.0;
 /// Trial poles spread over a window, of each damping.
 const TRIALS: usize = 24;
 /// Damping of the trial poles over the usual one.
@@ -315,8 +313,9 @@ fn enough(frfs: usize, chance: f64, sigma: f64, looked: f64) -> f64 {
     chance * (k + sigma * (2.0 * k).sqrt() + looked)
 }
 
-struct Fit<'a> {
-    frfs: Vec<NoisyFrf<'a>>,
+/// A group of poles and the lines that it is fitted to.
+pub(super) struct Fit<'a> {
+    pub(super) frfs: Vec<NoisyFrf<'a>>,
     fixed: Vec<Pole>,
     search: PoleSearch,
     /// See [`chance`].
@@ -324,7 +323,7 @@ struct Fit<'a> {
 }
 
 impl Fit<'_> {
-    fn fit(&self, poles: &[Pole]) -> Option<Solution> {
+    pub(super) fn fit(&self, poles: &[Pole]) -> Option<Solution> {
         // A search compares misfits, and a last refinement follows it.
         let by_chance = 2.0 * self.frfs.len() as f64 + 2.0;
         let settled = match self.search {
@@ -336,7 +335,7 @@ impl Fit<'_> {
     }
 
     /// Misfit that a mode must explain to be one, for noise as large as the fit leaves.
-    fn wanted(&self, solution: &Solution) -> f64 {
+    pub(super) fn wanted(&self, solution: &Solution) -> f64 {
         self.beyond_chance(solution, CHANCE_SIGMA, LOOKED_EVERYWHERE)
     }
 
@@ -359,7 +358,7 @@ impl Fit<'_> {
     }
 
     /// May this pole be a mode of the band?
-    fn possible(&self, pole: Pole) -> bool {
+    pub(super) fn possible(&self, pole: Pole) -> bool {
         let inside = self.frfs.iter().any(|c| {
             c.frequency_hz[0] <= pole.frequency_hz
                 && c.frequency_hz[c.frequency_hz.len() - 1] >= pole.frequency_hz
@@ -368,7 +367,7 @@ impl Fit<'_> {
     }
 
     /// Do the lines determine this pole?
-    fn determined(&self, solution: &Solution, j: usize) -> bool {
+    pub(super) fn determined(&self, solution: &Solution, j: usize) -> bool {
         let pole = solution.poles[j];
         let line_hz = self.line_hz(pole.frequency_hz);
         let width = pole.damping_ratio * pole.frequency_hz;
@@ -382,64 +381,6 @@ impl Fit<'_> {
 
     fn sane(&self, solution: &Solution, j: usize) -> bool {
         self.possible(solution.poles[j]) && self.determined(solution, j)
-    }
-
-    /// Takes out the least needed pole until all are needed.
-    fn without_needless(&self, mut solution: Solution, changes: &mut Vec<Change>) -> Solution {
-        while let Some((needless, without)) = self.needless(&solution) {
-            changes.push(needless);
-            solution = without;
-        }
-        solution
-    }
-
-    /// The pole that is needed least, if it is not needed, and the fit without it.
-    fn needless(&self, solution: &Solution) -> Option<(Change, Solution)> {
-        let wanted = self.wanted(solution);
-        let poles = solution.poles.iter().enumerate().map(|(j, &pole)| {
-            let possible = self.possible(pole);
-            Evidence {
-                pole,
-                possible,
-                sane: possible && self.determined(solution, j),
-                evidence: (0..self.frfs.len()).map(|m| solution.evidence(m, j)).sum(),
-            }
-        });
-        let poles: Vec<Evidence> = poles.collect();
-        let without = |j: usize| {
-            let mut rest = solution.poles.clone();
-            rest.remove(j);
-            self.fit(&rest)
-        };
-        // With the other poles held the growth is an upper bound of the true one: what is needless by that is so without a
-        // fit, and one fit is enough to take out the least of them.
-        let certainly = (0..poles.len())
-            .filter(|&j| poles[j].evidence < wanted)
-            .min_by(|&a, &b| {
-                let key = |j: usize| (poles[j].sane, poles[j].evidence);
-                let ((a_sane, a), (b_sane, b)) = (key(a), key(b));
-                a_sane.cmp(&b_sane).then(a.total_cmp(&b))
-            });
-        if let Some(j) = certainly
-            && let Some(without) = without(j)
-        {
-            return Some((poles[j].change(), without));
-        }
-        let mut least: Option<(f64, usize, Solution)> = None;
-        for (j, of_pole) in poles.iter().enumerate() {
-            if of_pole.sane && of_pole.evidence > 4.0 * wanted {
-                continue;
-            }
-            let Some(without) = without(j) else { continue };
-            // Where the model fits badly nothing is well determined: a pole that explains that much stays all the same.
-            let grown = without.misfit - solution.misfit;
-            let may_stay = of_pole.possible && (of_pole.sane || grown > INDISPENSABLE * wanted);
-            let growth = if may_stay { grown } else { f64::NEG_INFINITY };
-            if growth < wanted && least.as_ref().is_none_or(|(g, ..)| growth < *g) {
-                least = Some((growth, j, without));
-            }
-        }
-        least.map(|(_, j, without)| (poles[j].change(), without))
     }
 
     /// Adds a pole where the rest is largest, or next to one that is there, if that explains enough; one that explains
@@ -563,27 +504,6 @@ impl Fit<'_> {
             damping_ratio: usual,
         });
         self.best_of(solution, &trials, REFINED * self.wanted(solution))
-    }
-}
-
-/// What speaks for a pole of a fit.
-struct Evidence {
-    pole: Pole,
-    /// See [`Fit::possible`].
-    possible: bool,
-    /// And determined.
-    sane: bool,
-    /// Growth of the misfit without it, the other poles held.
-    evidence: f64,
-}
-
-impl Evidence {
-    /// Why it goes out.
-    fn change(&self) -> Change {
-        match self.sane {
-            true => Change::Needless(self.pole),
-            false => Change::NotDetermined(self.pole),
-        }
     }
 }
 

@@ -198,7 +198,7 @@ impl Sweep {
             covariance[(1, 1)].max(0.0).sqrt() * zeta,
         ];
         let sane = f0.is_finite() && zeta > 0.0 && zeta < 1.0 && std.iter().all(|s| s.is_finite());
-        sane.then(|| Sweep {
+        sane.then_some(Sweep {
             frequency_hz: f0,
             damping_ratio: zeta,
             resonance_angle: best.1,

@@ -31,8 +31,6 @@ const SEEN: f64 = 30.0;
 const SAME_PLACE: f64 = 0.05;
 /// And than these, one after the other, where a group cannot be fitted.
 const MERGED: [f64; 3] = [0.5, 1.0, 2.0];
-/// What explains so many times what a mode must is needed, however badly it is determined.
-const INDISPENSABLE: f64 = 10.0;
 /// Trial poles spread over a window, of each damping.
 const TRIALS: usize = 24;
 /// Damping of the trial poles over the usual one.
@@ -315,8 +313,9 @@ fn enough(frfs: usize, chance: f64, sigma: f64, looked: f64) -> f64 {
     chance * (k + sigma * (2.0 * k).sqrt() + looked)
 }
 
-struct Fit<'a> {
-    frfs: Vec<NoisyFrf<'a>>,
+/// A group of poles and the lines that it is fitted to.
+pub(super) struct Fit<'a> {
+    pub(super) frfs: Vec<NoisyFrf<'a>>,
     fixed: Vec<Pole>,
     search: PoleSearch,
     /// See [`chance`].
@@ -324,7 +323,7 @@ struct Fit<'a> {
 }
 
 impl Fit<'_> {
-    fn fit(&self, poles: &[Pole]) -> Option<Solution> {
+    pub(super) fn fit(&self, poles: &[Pole]) -> Option<Solution> {
         // A search compares misfits, and a last refinement follows it.
         let by_chance = 2.0 * self.frfs.len() as f64 + 2.0;
         let settled = match self.search {
@@ -336,7 +335,7 @@ impl Fit<'_> {
     }
 
     /// Misfit that a mode must explain to be one, for noise as large as the fit leaves.
-    fn wanted(&self, solution: &Solution) -> f64 {
+    pub(super) fn wanted(&self, solution: &Solution) -> f64 {
         self.beyond_chance(solution, CHANCE_SIGMA, LOOKED_EVERYWHERE)
     }
 
@@ -359,7 +358,7 @@ impl Fit<'_> {
     }
 
     /// May this pole be a mode of the band?
-    fn possible(&self, pole: Pole) -> bool {
+    pub(super) fn possible(&self, pole: Pole) -> bool {
         let inside = self.frfs.iter().any(|c| {
             c.frequency_hz[0] <= pole.frequency_hz
                 && c.frequency_hz[c.frequency_hz.len() - 1] >= pole.frequency_hz
@@ -368,7 +367,7 @@ impl Fit<'_> {
     }
 
     /// Do the lines determine this pole?
-    fn determined(&self, solution: &Solution, j: usize) -> bool {
+    pub(super) fn determined(&self, solution: &Solution, j: usize) -> bool {
         let pole = solution.poles[j];
         let line_hz = self.line_hz(pole.frequency_hz);
         let width = pole.damping_ratio * pole.frequency_hz;
@@ -382,48 +381,6 @@ impl Fit<'_> {
 
     fn sane(&self, solution: &Solution, j: usize) -> bool {
         self.possible(solution.poles[j]) && self.determined(solution, j)
-    }
-
-    /// Takes out the least needed pole until all are needed.
-    fn without_needless(&self, mut solution: Solution, changes: &mut Vec<Change>) -> Solution {
-        loop {
-            let wanted = self.wanted(&solution);
-            let mut least: Option<(f64, usize, Solution)> = None;
-            for j in 0..solution.poles.len() {
-                let possible = self.possible(solution.poles[j]);
-                let sane = possible && self.determined(&solution, j);
-                // With the other poles held the growth is an upper bound of the true one: most need no fit.
-                let evidence: f64 = (0..self.frfs.len()).map(|m| solution.evidence(m, j)).sum();
-                if sane && evidence > 4.0 * wanted {
-                    continue;
-                }
-                let mut rest = solution.poles.clone();
-                rest.remove(j);
-                let Some(without) = self.fit(&rest) else { continue };
-                // Where the model fits badly nothing is well determined: a pole that explains that much stays all the same.
-                let grown = without.misfit - solution.misfit;
-                let growth = if possible && (sane || grown > INDISPENSABLE * wanted) {
-                    grown
-                } else {
-                    f64::NEG_INFINITY
-                };
-                if growth < wanted && least.as_ref().is_none_or(|(g, ..)| growth < *g) {
-                    least = Some((growth, j, without));
-                }
-            }
-            match least {
-                Some((growth, j, without)) => {
-                    let pole = solution.poles[j];
-                    changes.push(if growth.is_finite() {
-                        Change::Needless(pole)
-                    } else {
-                        Change::NotDetermined(pole)
-                    });
-                    solution = without;
-                }
-                None => return solution,
-            }
-        }
     }
 
     /// Adds a pole where the rest is largest, or next to one that is there, if that explains enough; one that explains

@@ -5,3 +5,4 @@ pub(crate) mod condense;
 pub(crate) mod joint_fit;
 pub(crate) mod ml_fit;
 pub(crate) mod ml_linear;
+mod needless;

@@ -146,32 +146,26 @@ impl Sweep {
 
     fn fit(f: &[f64], angles: &[f64], start: (f64, f64)) -> Option<Sweep> {
         let (mut f0, mut zeta) = start;
-        let model = |f: f64, f0: f64, zeta: f64| -2.0 * (detuning(f, f0) / zeta).atan();
-        let offset = |f0: f64, zeta: f64| {
-            f.iter()
-                .zip(angles)
-                .map(|(&f, &a)| a - model(f, f0, zeta))
-                .sum::<f64>()
-                / f.len() as f64
-        };
-        let cost = |f0: f64, zeta: f64| {
-            let theta0 = offset(f0, zeta);
-            f.iter()
-                .zip(angles)
-                .map(|(&f, &a)| (a - theta0 - model(f, f0, zeta)).powi(2))
-                .sum::<f64>()
+        // Angles less those of the sweep, their mean, and the squares about it.
+        let left = |f0: f64, zeta: f64| {
+            let left = f.iter().zip(angles);
+            let left: Vec<f64> = left
+                .map(|(&f, &a)| a + 2.0 * (detuning(f, f0) / zeta).atan())
+                .collect();
+            let mean = left.iter().sum::<f64>() / left.len() as f64;
+            let cost = left.iter().map(|l| (l - mean).powi(2)).sum::<f64>();
+            (left, mean, cost)
         };
         let mut lambda = 1e-3;
-        let mut best = cost(f0, zeta);
+        let mut best = left(f0, zeta);
         let mut normal = Matrix3::zeros();
         for _ in 0..50 {
-            let theta0 = offset(f0, zeta);
             normal = Matrix3::zeros();
             let mut gradient = Vector3::zeros();
-            for (&f, &a) in f.iter().zip(angles) {
+            for (&f, l) in f.iter().zip(&best.0) {
                 let row = Sweep::slopes(f, f0, zeta);
                 normal += row * row.transpose();
-                gradient += row * (a - theta0 - model(f, f0, zeta));
+                gradient += row * (l - best.1);
             }
             let damped = normal + Matrix3::from_diagonal(&(normal.diagonal() * lambda));
             let step = damped.lu().solve(&gradient)?;
@@ -180,9 +174,9 @@ impl Sweep {
                 f0 + step[0].clamp(-widest, widest),
                 zeta * step[1].clamp(-1.0, 1.0).exp(),
             );
-            let next = cost(trial.0, trial.1);
-            if trial.0 > 0.0 && next <= best {
-                let done = best - next <= 1e-13 * best;
+            let next = left(trial.0, trial.1);
+            if trial.0 > 0.0 && next.2 <= best.2 {
+                let done = best.2 - next.2 <= 1e-13 * best.2;
                 (f0, zeta) = trial;
                 best = next;
                 lambda = (lambda * 0.2).max(1e-12);
@@ -198,16 +192,16 @@ impl Sweep {
         }
         let free = f.len().checked_sub(3).filter(|&n| n > 0)?;
         let cofactor = normal.try_inverse()?;
-        let covariance = cofactor * (best / free as f64);
+        let covariance = cofactor * (best.2 / free as f64);
         let std = [
             covariance[(0, 0)].max(0.0).sqrt(),
             covariance[(1, 1)].max(0.0).sqrt() * zeta,
         ];
         let sane = f0.is_finite() && zeta > 0.0 && zeta < 1.0 && std.iter().all(|s| s.is_finite());
-        sane.then(|| Sweep {
+        sane.then_some(Sweep {
             frequency_hz: f0,
             damping_ratio: zeta,
-            resonance_angle: offset(f0, zeta),
+            resonance_angle: best.1,
             std,
             cofactor,
         })
@@ -219,13 +213,18 @@ impl Sweep {
 fn pair_spread(points: &[(f64, f64)]) -> (usize, Option<f64>) {
     let [least, most] = PAIR_ANGLE_RAD;
     let usable = |angle: f64| (least..most).contains(&angle);
-    let mut pairs = Vec::new();
-    for &(u_a, angle_a) in points.iter().filter(|p| p.0 < 0.0 && usable(-p.1)) {
-        for &(u_b, angle_b) in points.iter().filter(|p| p.0 > 0.0 && usable(p.1)) {
-            let (a, b) = ((-0.5 * angle_a).tan(), (0.5 * angle_b).tan());
+    // Detuning and tan(θ/2) of the points on one side of the resonance.
+    let side = |sign: f64| -> Vec<(f64, f64)> {
+        let of_side = points.iter().filter(|p| sign * p.0 > 0.0 && usable(sign * p.1));
+        of_side.map(|p| (p.0, (0.5 * sign * p.1).tan())).collect()
+    };
+    let (below, above) = (side(-1.0), side(1.0));
+    let mut pairs = Vec::with_capacity(below.len() * above.len());
+    for &(u_a, a) in &below {
+        for &(u_b, b) in &above {
             let zeta = (u_b - u_a) / (a + b);
-            let relative_std = (1.0 + a * a).hypot(1.0 + b * b) / (a + b);
-            pairs.push((zeta, relative_std.powi(-2)));
+            let relative_square = ((1.0 + a * a).powi(2) + (1.0 + b * b).powi(2)) / (a + b).powi(2);
+            pairs.push((zeta, relative_square.recip()));
         }
     }
     if pairs.len() < 2 {

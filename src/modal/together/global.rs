@@ -8,7 +8,7 @@ use num_complex::Complex64;
 
 use crate::Result;
 use crate::modal::max_likelihood::condense;
-use crate::modal::max_likelihood::joint_fit::{self, Change, Data, Doubt, Group, PoleSearch};
+use crate::modal::max_likelihood::joint_fit::Data;
 use crate::modal::settings::Settings;
 use crate::modal::single::curve::{Curve, MIN_LINES};
 use crate::modal::single::local_fit::Pole;
@@ -17,7 +17,7 @@ use crate::modal::together::global_modes::GlobalModes;
 use crate::modal::together::lscf::{self, Row};
 use crate::modal::together::select::Start;
 use crate::modal::together::set_member::SetMember;
-use crate::modal::together::{findings, select, set_noise, verify};
+use crate::modal::together::{findings, set_noise, solve, verify};
 
 /// Poles of the highest order: at least, and at most.
 const POLES: [usize; 2] = [40, 80];
@@ -87,8 +87,8 @@ pub fn global(frfs: &[SetMember], settings: &Settings) -> Result<GlobalModes> {
     start.sort_by(|a, b| a.pole.frequency_hz.total_cmp(&b.pole.frequency_hz));
     let mut changes = Vec::new();
     let mut rejected = Vec::new();
-    let groups = solve(&mut data, &start, &mut changes)
-        .and_then(|groups| verify::verified(&mut data, groups, &mut rejected));
+    let groups = solve::solve(&mut data, &start, &mut changes)
+        .and_then(|groups| verify::verified(&data, groups, &mut rejected));
     let Some(groups) = groups else {
         result
             .warnings
@@ -285,42 +285,6 @@ fn shape_data(data: &[Data]) -> Option<ShapeData<'_>> {
         weight: weight.collect(),
         receptance: data.iter().map(|d| d.receptance.as_slice()).collect(),
     })
-}
-
-/// Refinement with search, noise from the rest, refinement without search.
-fn solve(data: &mut [Data], candidates: &[Start], changes: &mut Vec<Change>) -> Option<Vec<Group>> {
-    let start = select::choose(&select::some(data), candidates);
-    let mut groups = joint_fit::refine(&set_noise::alike(data), &start, PoleSearch::Roughly, changes)?;
-    // What is many fits with noises alike is few with those that each FRF has.
-    for (search, alike) in [
-        (PoleSearch::Pairs, true),
-        (PoleSearch::Pairs, false),
-        (PoleSearch::Nothing, false),
-    ] {
-        // Many FRFs tell as much, whatever each one's noise is.
-        if search == PoleSearch::Pairs && !alike && data.len() > select::ENOUGH_FRFS {
-            continue;
-        }
-        set_noise::renew(data, &groups);
-        let mut poles: Vec<Pole> = groups
-            .iter()
-            .flat_map(|g| g.solution.poles.iter().copied())
-            .collect();
-        poles.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
-        let mut doubts: Vec<Option<Doubt>> = groups.into_iter().map(|g| g.doubt).collect();
-        groups = if alike {
-            joint_fit::refine(&set_noise::alike(data), &poles, search, changes)?
-        } else {
-            joint_fit::refine(data, &poles, search, changes)?
-        };
-        if search == PoleSearch::Nothing && doubts.len() == groups.len() {
-            for (group, doubt) in groups.iter_mut().zip(&mut doubts) {
-                let same = |d: &Doubt| d.shifts.len() == group.solution.poles.len();
-                group.doubt = doubt.take().filter(same);
-            }
-        }
-    }
-    Some(groups)
 }
 
 #[cfg(test)]

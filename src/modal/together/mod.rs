@@ -12,4 +12,5 @@ pub(crate) mod reconstruction;
 pub(crate) mod select;
 pub(crate) mod set_member;
 pub(crate) mod set_noise;
+pub(crate) mod solve;
 pub(crate) mod verify;

@@ -1,5 +1,5 @@
-//! Which candidates explain more than a pole anywhere near would: chosen strongest first, with the noise and the error of
-//! the model taken from what those chosen so far leave.
+//! Which candidates explain more than a pole anywhere near would: chosen strongest first, over what those chosen so far
+//! leave.
 //!
 //! A model never fits measurements exactly, and what it leaves is smooth over lines: any pole put there explains some of
 //! it. So a candidate is not held against white noise but against trial poles spread over its surroundings, which know
@@ -41,12 +41,13 @@ pub(crate) struct Start {
 
 /// The candidates to begin with, ascending in frequency.
 pub(crate) fn choose(data: &[Data], candidates: &[Start]) -> Vec<Pole> {
-    let mut data = data.to_vec();
+    // With the noise that was measured: taken from what is left, strong modes that are missing would hide in it.
+    let even = set_noise::alike(data);
     let mut firm: Vec<bool> = candidates.iter().map(|c| c.orders >= LONG_CHAIN).collect();
     let mut left: Vec<Pole> = candidates.iter().map(|c| c.pole).collect();
+    let mut taken: Vec<Pole> = Vec::new();
     let mut chosen: Vec<Pole> = Vec::new();
     for round in 0..MAX_ROUNDS {
-        let even = set_noise::alike(&data);
         let Some(mut worth) = joint_fit::worth(&even, &chosen, &left) else {
             break;
         };
@@ -59,6 +60,7 @@ pub(crate) fn choose(data: &[Data], candidates: &[Start]) -> Vec<Pole> {
             break;
         }
         chosen.extend(batch.iter().map(|&k| left[k]));
+        taken.extend(batch.iter().map(|&k| left[k]));
         for k in batch.into_iter().rev() {
             left.remove(k);
             firm.remove(k);
@@ -67,14 +69,26 @@ pub(crate) fn choose(data: &[Data], candidates: &[Start]) -> Vec<Pole> {
         let Some(groups) = joint_fit::refine(&even, &chosen, PoleSearch::Roughly, &mut Vec::new()) else {
             break;
         };
-        set_noise::renew(&mut data, &groups);
         chosen = groups
             .iter()
             .flat_map(|g| g.solution.poles.iter().copied())
             .collect();
+        // While modes are missing a pole may leave its own to stand for two others: it begins again where it was found.
+        let lost = |c: &&Pole| !chosen.iter().any(|p| near(p, c));
+        let back: Vec<Pole> = taken.iter().filter(lost).copied().collect();
+        if !back.is_empty() {
+            chosen.retain(|p| taken.iter().any(|c| near(p, c)));
+            chosen.extend(back);
+        }
         chosen.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
     }
     chosen
+}
+
+/// Within both half-widths of each other?
+fn near(a: &Pole, b: &Pole) -> bool {
+    let width = |p: &Pole| p.damping_ratio * p.frequency_hz;
+    (a.frequency_hz - b.frequency_hz).abs() < width(a) + width(b)
 }
 
 /// Ascending indices of those that come in together.

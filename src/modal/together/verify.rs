@@ -9,7 +9,6 @@ use crate::modal::shape;
 use crate::modal::single::local_fit::Pole;
 use crate::modal::together::global_modes::RejectedMode;
 use crate::modal::together::set_member::SET;
-use crate::modal::together::set_noise;
 
 /// Fits after poles were taken out, at most.
 const MAX_ROUNDS: usize = 6;
@@ -38,9 +37,9 @@ const IN_PHASE: f64 = 0.7;
 /// Shapes that repeat.
 const SAME_SHAPE: f64 = 0.9;
 
-/// Takes out what is no mode until all are; `data` gets the noise that belongs to the last fit.
+/// Takes out what is no mode until all are.
 pub(crate) fn verified(
-    data: &mut [Data],
+    data: &[Data],
     mut groups: Vec<Group>,
     rejected: &mut Vec<RejectedMode>,
 ) -> Option<Vec<Group>> {
@@ -75,13 +74,8 @@ pub(crate) fn verified(
         if kept.is_empty() {
             return None;
         }
-        groups = joint_fit::refine(
-            &set_noise::alike(data),
-            &kept,
-            PoleSearch::Roughly,
-            &mut Vec::new(),
-        )?;
-        set_noise::renew(data, &groups);
+        // With the noise as it was: what a pole stood for that is no mode is no noise either, and taken for some it would
+        // outweigh the peaks of the modes next to it.
         groups = joint_fit::refine(data, &kept, PoleSearch::Nothing, &mut Vec::new())?;
     }
     Some(groups)

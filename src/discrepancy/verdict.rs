@@ -219,7 +219,7 @@ pub fn decide<M, I>(
         decision.best_guess = Some(w);
         decision.confidence = 1.0 / (1.0 + (1.0 + beaten) / odds_else);
     }
-    decision.confidence = decision.confidence.clamp(0.05, MOST_SURE);
+    decision.confidence = decision.confidence.clamp(LEAST_SURE, MOST_SURE);
     decision
 }
 
@@ -250,19 +250,42 @@ fn weight_of_slips_alone<M, I>(c: &EffectCandidate<M, I>, baseline: &BaselineFit
     })
 }
 
+/// Odds of something faint above which an alarm is raised although no single test is sure of it: an alarm at nothing costs as
+/// much as so many faint effects that were missed.
+const ALARM: f64 = 20.0;
+/// No verdict is less sure than this.
+const LEAST_SURE: f64 = 0.05;
+
+/// Chance that noise alone looks as unlikely as the best candidate, credible or not, and what the tests of structure find:
+/// both look at the rest in their own way (Fisher 1932).
+fn chance_of_all<M, I>(candidates: &[EffectCandidate<M, I>], rest: &Rest) -> f64 {
+    let refined = candidates.iter().filter(|c| c.refined);
+    let best = refined.map(|c| c.p_value).fold(1.0, f64::min);
+    let least = rest.tests.iter().map(|t| t.p_value).fold(1.0, f64::min);
+    let product = best * (least * rest.tests.len().max(1) as f64).min(1.0);
+    match product > 0.0 {
+        true => product * (1.0 - product.ln()),
+        false => 0.0,
+    }
+}
+
 /// No candidate is credible: nothing is missing, or something else.
 fn decide_without_candidate<M, I>(
     decision: &mut Decision,
     candidates: &[EffectCandidate<M, I>],
     baseline: &BaselineFit,
 ) {
-    // p-values near the threshold leave doubt.
-    let best = candidates.first().map_or(1.0, |c| c.p_value);
-    let least = baseline.rest.tests.iter().map(|t| t.p_value).fold(1.0, f64::min);
     if leaves_noise(&baseline.rest, baseline.reduced_chi2) {
-        decision.verdict = DiagnosisVerdict::None;
-        let calm = |p: f64| p / (p + 0.01);
-        decision.confidence = (0.92 * calm(best).max(0.7) * calm(least * 4.0).max(0.6)).clamp(0.3, MOST_SURE);
+        let hidden = something_else::odds_of_something_faint(chance_of_all(candidates, &baseline.rest));
+        if hidden < ALARM {
+            decision.verdict = DiagnosisVerdict::None;
+            decision.confidence = MOST_SURE / (1.0 + hidden);
+        } else {
+            decision.verdict = DiagnosisVerdict::Unknown;
+            decision.best_guess = (!candidates.is_empty()).then_some(0);
+            decision.confidence = MOST_SURE / (1.0 + 1.0 / hidden);
+        }
+        decision.confidence = decision.confidence.max(LEAST_SURE);
         return;
     }
     let foreign = something_else::odds_against_slips(&baseline.rest);

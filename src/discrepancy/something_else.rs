@@ -86,17 +86,22 @@ pub fn odds_against_slips(rest: &Rest) -> f64 {
 /// powers of ten, of which the tests miss the lowest.
 const FAINT_ODDS: f64 = 0.2;
 
-/// Odds that something is hidden, the library's or not, against nothing, where noise alone would look at least as unlikely
-/// with probability `p`. For something hidden p has a density ξ p^(ξ−1), steeper the more of it shows; every ξ from 0 to 1
-/// is as likely (after Sellke, Bayarri and Berger 2001, who take the ξ that speaks most against noise).
-pub fn odds_of_something_faint(p: f64) -> f64 {
-    let a = -p.max(f64::MIN_POSITIVE).min(1.0).ln();
+/// Bayes factor of something hidden against nothing, where noise alone would look at least as unlikely with probability
+/// `p`: something hidden gives p a density ξ p^(ξ−1), steeper the more of it shows, every ξ from 0 to 1 as likely (after
+/// Sellke, Bayarri and Berger 2001, who take the ξ that speaks most against noise).
+pub fn evidence_of_chance(p: f64) -> f64 {
+    let a = -p.clamp(f64::MIN_POSITIVE, 1.0).ln();
     // (e^a − 1 − a) / a², which is 1/2 at a = 0.
-    let density = match a < 1e-3 {
+    match a < 1e-3 {
         true => 0.5 + a / 6.0,
         false => (a.exp_m1() - a) / (a * a),
-    };
-    FAINT_ODDS * density
+    }
+}
+
+/// Odds that something is hidden, the library's or not, against nothing. Bayes factors of what the tests of the rest and
+/// what the candidates have seen; what is hidden shows to either, both or neither, with even odds.
+pub fn odds_of_something_faint(of_tests: f64, of_candidates: f64) -> f64 {
+    FAINT_ODDS * 0.5 * (1.0 + of_tests) * 0.5 * (1.0 + of_candidates)
 }
 
 /// `stand_in`: density of rest / gain if the effect stands in for something else.
@@ -233,18 +238,20 @@ mod tests {
 
     #[test]
     fn what_noise_hardly_leaves_is_something() {
-        // A density over p from 0 to 1.
+        // On average over what noise does, Bayes factors against noise are one.
         let steps = 200_000;
         let sum: f64 = (0..steps)
-            .map(|i| (f64::from(i) + 0.5) / f64::from(steps))
-            .map(odds_of_something_faint)
+            .map(|i| evidence_of_chance((f64::from(i) + 0.5) / f64::from(steps)))
             .sum();
-        let mean = sum / f64::from(steps) / FAINT_ODDS;
+        let mean = sum / f64::from(steps);
         assert!((0.85..=1.0).contains(&mean), "{mean}");
-        assert!(odds_of_something_faint(1.0) < 0.2);
-        assert!((0.5..2.0).contains(&odds_of_something_faint(0.01)));
-        assert!(odds_of_something_faint(1e-5) > 100.0);
-        assert!(odds_of_something_faint(0.0).is_finite() && odds_of_something_faint(0.0) > 1e100);
+        assert!(evidence_of_chance(0.0).is_finite() && evidence_of_chance(0.0) > 1e100);
+        // Nothing seen, a hint in one of both, hints in both, no doubt.
+        let odds = |p, evidence| odds_of_something_faint(evidence_of_chance(p), evidence);
+        assert!(odds(1.0, 0.0) < 0.1);
+        assert!((0.1..0.5).contains(&odds(0.01, 0.01)));
+        assert!(odds(0.01, 10.0) > 2.0);
+        assert!(odds(1e-5, 0.0) > 20.0 && odds(1.0, 1e6) > 20.0);
     }
 
     /// What the sharp test for one place does not see is no proof: half of all else is not at one place.
@@ -254,7 +261,11 @@ mod tests {
         blind.tests[0].looks_like = LIKE_A_PLACE;
         assert!(odds(1e5, &blind) > 0.5 / LIBRARY_ODDS && odds(1e5, &rest(0.0, 5.0)) < 0.01);
         // What it finds counts in full.
-        blind.tests[0] = RestTest { excess: 4e4, p_value: 0.0, ..blind.tests[0] };
+        blind.tests[0] = RestTest {
+            excess: 4e4,
+            p_value: 0.0,
+            ..blind.tests[0]
+        };
         assert!(odds(5e4, &blind) > 1.0);
     }
 

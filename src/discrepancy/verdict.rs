@@ -253,20 +253,22 @@ fn weight_of_slips_alone<M, I>(c: &EffectCandidate<M, I>, baseline: &BaselineFit
 /// Odds of something faint above which an alarm is raised although no single test is sure of it: an alarm at nothing costs as
 /// much as so many faint effects that were missed.
 const ALARM: f64 = 20.0;
+/// ln of a Bayes factor beyond which more is no more.
+const MOST_EVIDENCE: f64 = 100.0;
 /// No verdict is less sure than this.
 const LEAST_SURE: f64 = 0.05;
 
-/// Chance that noise alone looks as unlikely as the best candidate, credible or not, and what the tests of structure find:
-/// both look at the rest in their own way (Fisher 1932).
-fn chance_of_all<M, I>(candidates: &[EffectCandidate<M, I>], rest: &Rest) -> f64 {
-    let refined = candidates.iter().filter(|c| c.refined);
-    let best = refined.map(|c| c.p_value).fold(1.0, f64::min);
+/// Odds that something is hidden although no candidate is credible and no test is sure, against nothing.
+fn odds_of_something_faint<M, I>(candidates: &[EffectCandidate<M, I>], rest: &Rest) -> f64 {
     let least = rest.tests.iter().map(|t| t.p_value).fold(1.0, f64::min);
-    let product = best * (least * rest.tests.len().max(1) as f64).min(1.0);
-    match product > 0.0 {
-        true => product * (1.0 - product.ln()),
-        false => 0.0,
-    }
+    let of_tests = something_else::evidence_of_chance(least * rest.tests.len().max(1) as f64);
+    // Credible or not: an effect of an impossible size may stand in for what there is. BIC counts what a free frequency or
+    // place can make of noise, which the p-value does not.
+    let refined = candidates.iter().filter(|c| c.refined);
+    let sum: f64 = refined
+        .map(|c| (-0.5 * c.delta_bic).min(MOST_EVIDENCE).exp())
+        .sum();
+    something_else::odds_of_something_faint(of_tests, sum / candidates.len().max(1) as f64)
 }
 
 /// No candidate is credible: nothing is missing, or something else.
@@ -276,7 +278,7 @@ fn decide_without_candidate<M, I>(
     baseline: &BaselineFit,
 ) {
     if leaves_noise(&baseline.rest, baseline.reduced_chi2) {
-        let hidden = something_else::odds_of_something_faint(chance_of_all(candidates, &baseline.rest));
+        let hidden = odds_of_something_faint(candidates, &baseline.rest);
         if hidden < ALARM {
             decision.verdict = DiagnosisVerdict::None;
             decision.confidence = MOST_SURE / (1.0 + hidden);

@@ -242,7 +242,9 @@ impl Energy {
         let cross = DMatrix::from_fn(parameters, unknowns, |p, i| {
             scale(i) * part(bands[i / 2].on_parameters[p], i)
         });
-        let scores = DMatrix::from_fn(unknowns, TURNS, |i, t| scale(i) * part(bands[i / 2].on_rest[t], i));
+        let scores = DMatrix::from_fn(unknowns, TURNS, |i, t| {
+            scale(i) * part(bands[i / 2].on_rest[t], i)
+        });
         let follow = model.information.solve(&cross);
         let information = DMatrix::identity(unknowns, unknowns) - cross.tr_mul(&follow);
         let scores = scores - follow.tr_mul(&model.scores);
@@ -263,7 +265,10 @@ impl Energy {
             .collect();
         let (now, late) = seen.split_first()?;
         let expected = late.iter().map(DVector::norm_squared).sum::<f64>() / late.len() as f64;
-        let pairs = late.iter().enumerate().flat_map(|(i, a)| late[..i].iter().map(move |b| a.dot(b).powi(2)));
+        let pairs = late
+            .iter()
+            .enumerate()
+            .flat_map(|(i, a)| late[..i].iter().map(move |b| a.dot(b).powi(2)));
         let (sum, count) = pairs.fold((0.0, 0.0), |(sum, count), x| (sum + x, count + 1.0));
         let values = told.len() as f64;
         let freedom = (expected * expected * count / sum).min(values);

@@ -176,7 +176,8 @@ impl SpotResponses {
                 let start = part.on_parameters.len();
                 part.on_parameters.resize(start + count, Complex64::ZERO);
                 for (k, frf) in block.frfs.iter().enumerate() {
-                    let a = channels.mixed(omega, frf, |out| reach[out]) * reach[frf.input] / frf.noise_std[line];
+                    let a =
+                        channels.mixed(omega, frf, |out| reach[out]) * reach[frf.input] / frf.noise_std[line];
                     at.strength += a.norm_sqr();
                     at.on_residual += a.conj() * residual[k];
                     let own = &jacobian[k * count..(k + 1) * count];

@@ -203,7 +203,7 @@ fn a_law_at_one_place_is_seen_where_nothing_else_sees_it() {
         );
         place[0]
     };
-    let faint = rest_of(&[4e3], 12);
+    let faint = rest_of(&[1.2e3], 12);
     assert!(faint.is_significant() && faint.sigmas() > 5.0, "{faint:?}");
     for seed in [21, 22, 23] {
         let nothing = rest_of(&[], seed);

@@ -8,10 +8,13 @@
 use std::f64::consts::TAU;
 
 use super::setup::CARE;
-use crate::identify::rest::{Rest, RestTest};
+use crate::identify::rest::{LIKE_A_PLACE, Rest, RestTest};
 
 /// Probability that the errors of the setup are large enough to be seen.
 const VISIBLE_ERRORS: f64 = 0.15;
+/// Share of what else there is that is not a law at one place of the structure (files, sensors, geometry, several places at
+/// once), so that the test for that need not see it.
+const BESIDES_PLACES: f64 = 0.5;
 /// Prior odds of an effect of the library against something else.
 const LIBRARY_ODDS: f64 = 2.0;
 /// A pair of effects is one of many that were tried, and two effects at once are rarer than one.
@@ -79,15 +82,43 @@ pub fn odds_against_slips(rest: &Rest) -> f64 {
     (foreign - slips - VISIBLE_ERRORS.ln()).exp() / LIBRARY_ODDS
 }
 
+/// Prior odds of something too faint to be seen beyond doubt against nothing: sizes of what may be hidden spread over many
+/// powers of ten, of which the tests miss the lowest.
+const FAINT_ODDS: f64 = 0.2;
+
+/// Bayes factor of something hidden against nothing, where noise alone would look at least as unlikely with probability
+/// `p`: something hidden gives p a density ξ p^(ξ−1), steeper the more of it shows, every ξ from 0 to 1 as likely (after
+/// Sellke, Bayarri and Berger 2001, who take the ξ that speaks most against noise).
+pub fn evidence_of_chance(p: f64) -> f64 {
+    let a = -p.clamp(f64::MIN_POSITIVE, 1.0).ln();
+    // (e^a − 1 − a) / a², which is 1/2 at a = 0.
+    match a < 1e-3 {
+        true => 0.5 + a / 6.0,
+        false => (a.exp_m1() - a) / (a * a),
+    }
+}
+
+/// Odds that something is hidden, the library's or not, against nothing. Bayes factors of what the tests of the rest and
+/// what the candidates have seen; what is hidden shows to either, both or neither, with even odds.
+pub fn odds_of_something_faint(of_tests: f64, of_candidates: f64) -> f64 {
+    FAINT_ODDS * 0.5 * (1.0 + of_tests) * 0.5 * (1.0 + of_candidates)
+}
+
 /// `stand_in`: density of rest / gain if the effect stands in for something else.
 fn of_test(gain: f64, test: &RestTest, small_errors: f64, stand_in: fn(f64) -> f64) -> f64 {
     // Less than noise is no better than noise.
     let excess = test.excess.max(0.0);
+    let noise = log_normal(excess, test.std);
     let there = [
-        (1.0 - VISIBLE_ERRORS).ln() + log_normal(excess, test.std),
+        (1.0 - VISIBLE_ERRORS).ln() + noise,
         VISIBLE_ERRORS.ln() + log_density(excess, test.std, small_errors, |u| (-u).exp()),
     ];
-    log_sum(&there) - log_density(excess, test.std, gain, stand_in)
+    let blind = match test.looks_like == LIKE_A_PLACE {
+        true => BESIDES_PLACES,
+        false => 0.0,
+    };
+    let seen = log_density(excess, test.std, gain, stand_in);
+    log_sum(&there) - log_sum(&[(1.0 - blind).ln() + seen, blind.ln() + noise])
 }
 
 /// Density of x = rest / gain for a stand-in: the share 1/(1 + x) that it explains is anything from none to all.
@@ -203,6 +234,39 @@ mod tests {
         // One that a good setup leaves anyway is not, if the effect is far larger.
         assert!(odds(2e5, &rest(400.0, 50.0)) < 0.2);
         assert!(odds_of_pair(5e3, &rest(0.0, 50.0)) > odds(5e3, &rest(0.0, 50.0)));
+    }
+
+    #[test]
+    fn what_noise_hardly_leaves_is_something() {
+        // On average over what noise does, Bayes factors against noise are one.
+        let steps = 200_000;
+        let sum: f64 = (0..steps)
+            .map(|i| evidence_of_chance((f64::from(i) + 0.5) / f64::from(steps)))
+            .sum();
+        let mean = sum / f64::from(steps);
+        assert!((0.85..=1.0).contains(&mean), "{mean}");
+        assert!(evidence_of_chance(0.0).is_finite() && evidence_of_chance(0.0) > 1e100);
+        // Nothing seen, a hint in one of both, hints in both, no doubt.
+        let odds = |p, evidence| odds_of_something_faint(evidence_of_chance(p), evidence);
+        assert!(odds(1.0, 0.0) < 0.1);
+        assert!((0.1..0.5).contains(&odds(0.01, 0.01)));
+        assert!(odds(0.01, 10.0) > 2.0);
+        assert!(odds(1e-5, 0.0) > 20.0 && odds(1.0, 1e6) > 20.0);
+    }
+
+    /// What the sharp test for one place does not see is no proof: half of all else is not at one place.
+    #[test]
+    fn a_test_that_may_be_blind_proves_little() {
+        let mut blind = rest(0.0, 5.0);
+        blind.tests[0].looks_like = LIKE_A_PLACE;
+        assert!(odds(1e5, &blind) > 0.5 / LIBRARY_ODDS && odds(1e5, &rest(0.0, 5.0)) < 0.01);
+        // What it finds counts in full.
+        blind.tests[0] = RestTest {
+            excess: 4e4,
+            p_value: 0.0,
+            ..blind.tests[0]
+        };
+        assert!(odds(5e4, &blind) > 1.0);
     }
 
     fn with_slips(excess: f64, after: f64, unlikely: f64) -> Rest {

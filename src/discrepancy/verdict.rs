@@ -220,7 +220,7 @@ pub fn decide<D: Modelled>(
         decision.best_guess = Some(w);
         decision.confidence = 1.0 / (1.0 + (1.0 + beaten) / odds_else);
     }
-    decision.confidence = decision.confidence.clamp(0.05, MOST_SURE);
+    decision.confidence = decision.confidence.clamp(LEAST_SURE, MOST_SURE);
     decision
 }
 
@@ -251,19 +251,44 @@ fn weight_of_slips_alone<D: Modelled>(c: &EffectCandidate<D>, baseline: &Baselin
     })
 }
 
+/// Odds of something faint above which an alarm is raised although no single test is sure of it: an alarm at nothing costs as
+/// much as so many faint effects that were missed.
+const ALARM: f64 = 20.0;
+/// ln of a Bayes factor beyond which more is no more.
+const MOST_EVIDENCE: f64 = 100.0;
+/// No verdict is less sure than this.
+const LEAST_SURE: f64 = 0.05;
+
+/// Odds that something is hidden although no candidate is credible and no test is sure, against nothing.
+fn odds_of_something_faint<M, I>(candidates: &[EffectCandidate<M, I>], rest: &Rest) -> f64 {
+    let least = rest.tests.iter().map(|t| t.p_value).fold(1.0, f64::min);
+    let of_tests = something_else::evidence_of_chance(least * rest.tests.len().max(1) as f64);
+    // Credible or not: an effect of an impossible size may stand in for what there is. BIC counts what a free frequency or
+    // place can make of noise, which the p-value does not.
+    let refined = candidates.iter().filter(|c| c.refined);
+    let sum: f64 = refined
+        .map(|c| (-0.5 * c.delta_bic).min(MOST_EVIDENCE).exp())
+        .sum();
+    something_else::odds_of_something_faint(of_tests, sum / candidates.len().max(1) as f64)
+}
+
 /// No candidate is credible: nothing is missing, or something else.
 fn decide_without_candidate<D: Modelled>(
     decision: &mut Decision,
     candidates: &[EffectCandidate<D>],
     baseline: &BaselineFit,
 ) {
-    // p-values near the threshold leave doubt.
-    let best = candidates.first().map_or(1.0, |c| c.p_value);
-    let least = baseline.rest.tests.iter().map(|t| t.p_value).fold(1.0, f64::min);
     if leaves_noise(&baseline.rest, baseline.reduced_chi2) {
-        decision.verdict = DiagnosisVerdict::None;
-        let calm = |p: f64| p / (p + 0.01);
-        decision.confidence = (0.92 * calm(best).max(0.7) * calm(least * 4.0).max(0.6)).clamp(0.3, MOST_SURE);
+        let hidden = odds_of_something_faint(candidates, &baseline.rest);
+        if hidden < ALARM {
+            decision.verdict = DiagnosisVerdict::None;
+            decision.confidence = MOST_SURE / (1.0 + hidden);
+        } else {
+            decision.verdict = DiagnosisVerdict::Unknown;
+            decision.best_guess = (!candidates.is_empty()).then_some(0);
+            decision.confidence = MOST_SURE / (1.0 + 1.0 / hidden);
+        }
+        decision.confidence = decision.confidence.max(LEAST_SURE);
         return;
     }
     let foreign = something_else::odds_against_slips(&baseline.rest);

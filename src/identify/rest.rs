@@ -75,6 +75,8 @@ pub const SMALL_ERROR: f64 = 0.01;
 /// Chance at which noise passes for structure. Of hundreds of campaigns with four tests each none should; what is as
 /// improbable as this is physics without a name far more often than noise.
 const SIGNIFICANT_P: f64 = 1e-5;
+/// What the patterns of one place look like.
+pub const LIKE_A_PLACE: &str = "one law at one place of the structure, the same at all postures";
 /// What the patterns of folds with parameters of their own look like.
 pub(super) const LIKE_FOLDS: &str = "parameters that differ from posture to posture";
 

@@ -69,7 +69,8 @@ impl Energies {
     }
 }
 
-fn turn(sixteenths: usize, line: usize) -> Complex64 {
+/// e^{−iφk}, φ in sixteenths of a full turn.
+pub(super) fn turn(sixteenths: usize, line: usize) -> Complex64 {
     Complex64::from_polar(
         1.0,
         -TAU * ((sixteenths * line) % SIXTEENTHS) as f64 / SIXTEENTHS as f64,
@@ -316,7 +317,7 @@ fn against_late(looks_like: &'static str, groups: &[Energies], colour: [f64; 2])
 
 /// The noise at φ = 0 over the mean of that at the late turns, and what that is known to: 1 and 0 for white noise. `None`
 /// where there are too few lines.
-fn colour(curves: &[RestCurve]) -> Option<[f64; 2]> {
+pub(super) fn colour(curves: &[RestCurve]) -> Option<[f64; 2]> {
     /// Sixteenths of a turn from which on structures have rung down.
     const QUIET: std::ops::RangeInclusive<usize> = 3..=13;
     /// Cosines and sines of φ and 2φ: what a Hann window's correlation over two lines is made of.

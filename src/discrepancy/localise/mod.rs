@@ -18,7 +18,7 @@ use crate::Result;
 use crate::effects::drawn::{self, DrawnForm};
 use crate::effects::{Instance, Spot};
 use crate::identify::frfs::calibrate::{Calibration, Estimate, estimates};
-use crate::identify::frfs::spot_response::SpotResponses;
+use crate::identify::frfs::spot_response::{SpotResponses, free_spots};
 use crate::identify::levenberg_marquardt::{Stopping, minimise};
 use crate::identify::study::{Effort, Extent, HeldOut, Study, Tried, View, held_out};
 use crate::identify::{StructureModel, StructureStudy};
@@ -117,7 +117,7 @@ const REFIT_WITHOUT_FOLD: Stopping = Stopping {
 pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Localisation> {
     let baseline = study.calibrate(model)?;
     let theta = &baseline.theta;
-    let spots = candidates(model);
+    let spots = free_spots(model);
     let lines: usize = study.data.blocks.iter().map(|b| b.frequency_hz.len()).sum();
     let thinned = study.data.thinned(lines.div_ceil(SCREENED_LINES).max(1), 1);
     let responses = SpotResponses::new(model, theta, &thinned, &spots)?;
@@ -208,17 +208,6 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
 /// Order of the settled places: BIC on all data.
 fn rank(place: &LocalisedPlace) -> f64 {
     place.best.as_ref().map_or(f64::INFINITY, |b| b.delta_bic)
-}
-
-/// Spots that are not taken by a drawn part of the model.
-fn candidates(model: &StructureModel) -> Vec<Spot> {
-    let spec = &model.robot.spec;
-    let taken: Vec<Option<String>> = model.effects().iter().map(|e| e.instance.site.label()).collect();
-    Spot::parallel(spec)
-        .into_iter()
-        .chain(Spot::series(spec))
-        .filter(|spot| !taken.contains(&Some(spot.label())))
-        .collect()
 }
 
 /// The best of the screen by either measure.

@@ -7,6 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use super::*;
 use crate::data::{AxesRef, Axis, BodyRef, MeasuredDof, Point, RobotSection};
 use crate::identify::frfs::frf_data::{FrfBlock, FrfDatum};
+use crate::identify::rest::{LIKE_A_PLACE, RestTest};
 use crate::identify::{FrfData, Options};
 use crate::robot::RobotModel;
 use crate::robot::fixture::{TAP_POSTURES, irb6640};
@@ -178,5 +179,37 @@ fn nothing_is_drawn_where_nothing_is_missing() {
     for seed in [21, 22] {
         let found = found(None, seed);
         assert!(!found.significant, "{:?}", found.places[0].spot);
+    }
+}
+
+/// Far below what the tests see that look everywhere.
+#[test]
+fn a_law_at_one_place_is_seen_where_nothing_else_sees_it() {
+    let rest_of = |own: &[f64], seed| {
+        let bare = model();
+        let mut data = measured(&bare, &[], seed);
+        if !own.is_empty() {
+            let clamp = drawn::instance(Spot::ToolGround(2), DrawnForm::Spring);
+            data = measured(&bare.with_effect(clamp, &data.summary()), own, seed);
+        }
+        let study = StructureStudy::new(&bare.robot.spec, data, Options::default());
+        let calibrated = study.calibrate(&bare).unwrap();
+        let rest = study.rest(&bare, &calibrated.theta).unwrap();
+        let (place, others): (Vec<RestTest>, Vec<RestTest>) =
+            rest.tests.iter().partition(|t| t.looks_like == LIKE_A_PLACE);
+        assert!(
+            !others.is_empty() && others.iter().all(|t| !t.is_significant()),
+            "{others:?}"
+        );
+        place[0]
+    };
+    let faint = rest_of(&[1.2e3], 12);
+    assert!(faint.is_significant() && faint.sigmas() > 5.0, "{faint:?}");
+    for seed in [21, 22, 23] {
+        let nothing = rest_of(&[], seed);
+        assert!(
+            nothing.p_value > 1e-3 && nothing.sigmas().abs() < 3.5,
+            "{nothing:?}"
+        );
     }
 }

@@ -5,6 +5,7 @@ pub(crate) mod channels;
 pub mod frf_data;
 pub mod frf_problem;
 pub mod modal_start;
+mod place_test;
 pub mod posture_modes;
 pub mod sensitivity;
 pub mod spot_response;

@@ -20,6 +20,17 @@ use crate::identify::frfs::structure::StructureModel;
 use crate::robot::frf::{Response, Slopes};
 use crate::robot::{Dual, Element, FrfBasis, Role};
 
+/// Spots that are not taken by a drawn part of the model.
+pub fn free_spots(model: &StructureModel) -> Vec<Spot> {
+    let spec = &model.robot.spec;
+    let taken: Vec<Option<String>> = model.effects().iter().map(|e| e.instance.site.label()).collect();
+    Spot::parallel(spec)
+        .into_iter()
+        .chain(Spot::series(spec))
+        .filter(|spot| !taken.contains(&Some(spot.label())))
+        .collect()
+}
+
 /// One line of one block seen from one spot, FRFs whitened by their noise.
 #[derive(Debug, Clone, Copy)]
 pub struct SpotLine {
@@ -109,16 +120,12 @@ impl SpotResponses {
     ) -> Result<Self> {
         let count = theta.len();
         let with_slopes = model.basis(theta, block, true)?;
-        let (rows, outputs) = spot_rows(model, theta, block, spots);
-        let chain = model.chain(theta, &block.kinematics, block.lowness, false);
-        let mut all_rows = outputs;
-        let first = all_rows.len();
-        all_rows.extend(rows.iter().map(|r| r.row.clone()));
-        let basis = FrfBasis::new(&chain.system(0), &all_rows)?;
+        let places = SpotBasis::new(model, theta, block, spots)?;
         let channels = Channels::new(&model.filter(theta, true));
 
         let mut slopes = Slopes::of_inputs(block.inputs());
         let (mut sloped, mut response) = (Response::default(), Response::default());
+        let mut reach = Vec::new();
         let mut slope = vec![Complex64::ZERO; count];
         let frfs = block.frfs.len();
         let mut residual = vec![Complex64::ZERO; frfs];
@@ -128,7 +135,7 @@ impl SpotResponses {
             let omega = std::f64::consts::TAU * f;
             with_slopes.solve(omega, &mut sloped)?;
             with_slopes.slopes(&sloped, &mut slopes);
-            basis.solve(omega, &mut response)?;
+            places.basis.solve(omega, &mut response)?;
             for (k, frf) in block.frfs.iter().enumerate() {
                 let weight = 1.0 / frf.noise_std[line];
                 let modelled = channels.measured(omega, frf, &with_slopes, &sloped);
@@ -159,20 +166,8 @@ impl SpotResponses {
             }
             part.values += frfs;
             part.lines.push((*f, index));
-            for (s, spot) in rows.iter().enumerate() {
-                let row = first + s;
-                let reach = |output: usize| {
-                    let along = basis.receptance(&response, row, output);
-                    match &spot.series {
-                        Some((_, moves)) => moves[output] + omega * omega * along,
-                        None => along,
-                    }
-                };
-                let inner = basis.receptance(&response, row, row);
-                let own = match &spot.series {
-                    Some((mass, _)) => -omega * omega * mass - omega.powi(4) * inner,
-                    None => inner,
-                };
+            for s in 0..spots.len() {
+                let own = places.reach(omega, &response, s, &mut reach);
                 let mut at = SpotLine {
                     strength: 0.0,
                     on_residual: Complex64::ZERO,
@@ -181,7 +176,8 @@ impl SpotResponses {
                 let start = part.on_parameters.len();
                 part.on_parameters.resize(start + count, Complex64::ZERO);
                 for (k, frf) in block.frfs.iter().enumerate() {
-                    let a = channels.mixed(omega, frf, reach) * reach(frf.input) / frf.noise_std[line];
+                    let a =
+                        channels.mixed(omega, frf, |out| reach[out]) * reach[frf.input] / frf.noise_std[line];
                     at.strength += a.norm_sqr();
                     at.on_residual += a.conj() * residual[k];
                     let own = &jacobian[k * count..(k + 1) * count];
@@ -203,6 +199,45 @@ impl SpotResponses {
             &self.at[i],
             &self.on_parameters[i * self.parameters..(i + 1) * self.parameters],
         )
+    }
+}
+
+/// What a block's outputs see of the spots.
+pub(super) struct SpotBasis {
+    rows: Vec<SpotRow>,
+    /// The block's outputs, then the rows of the spots.
+    pub basis: FrfBasis,
+    outputs: usize,
+}
+
+impl SpotBasis {
+    pub fn new(model: &StructureModel, theta: &[f64], block: &FrfBlock, spots: &[Spot]) -> Result<Self> {
+        let (rows, mut all_rows) = spot_rows(model, theta, block, spots);
+        let chain = model.chain(theta, &block.kinematics, block.lowness, false);
+        let outputs = all_rows.len();
+        all_rows.extend(rows.iter().map(|r| r.row.clone()));
+        let basis = FrfBasis::new(&chain.system(0), &all_rows)?;
+        Ok(SpotBasis { rows, basis, outputs })
+    }
+
+    /// b of spot `s` at each output, into `reach`; Y_dd of a parallel spot, Z_qq of a series spot. `response`: of
+    /// [`basis`](Self::basis) at `omega`.
+    pub fn reach(&self, omega: f64, response: &Response, s: usize, reach: &mut Vec<Complex64>) -> Complex64 {
+        let row = self.outputs + s;
+        let series = self.rows[s].series.as_ref();
+        reach.clear();
+        reach.extend((0..self.outputs).map(|output| {
+            let along = self.basis.receptance(response, row, output);
+            match series {
+                Some((_, moves)) => moves[output] + omega * omega * along,
+                None => along,
+            }
+        }));
+        let inner = self.basis.receptance(response, row, row);
+        match series {
+            Some((mass, _)) => -omega * omega * mass - omega.powi(4) * inner,
+            None => inner,
+        }
     }
 }
 

@@ -7,9 +7,10 @@ use crate::effects::{DataSummary, Known, Registry, Structure};
 use crate::identify::frfs::calibrate::{Calibration, GLANCE_VALUES, Options, calibrate, sketch};
 use crate::identify::frfs::frf_data::FrfData;
 use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
+use crate::identify::frfs::place_test;
 use crate::identify::frfs::structure::StructureModel;
 use crate::identify::levenberg_marquardt::Stopping;
-use crate::identify::rest::{AfterSlips, BeyondSlips, Rest, RestCurve, SMALL_ERROR};
+use crate::identify::rest::{self, AfterSlips, BeyondSlips, Rest, RestCurve, SMALL_ERROR};
 use crate::identify::rest_patterns;
 use crate::identify::study::{Extent, HeldOut, Measure, Residual, Study, View, held_out};
 
@@ -198,8 +199,14 @@ impl Study for StructureStudy {
     }
 
     fn rest(&self, model: &StructureModel, theta: &[f64]) -> Result<Rest> {
+        let curves = model.rest(theta, &self.data)?;
+        let mut tests = rest_patterns::test(&curves);
+        // The sharpest test, and the most expensive one: where the others find nothing.
+        if rest::largest(&tests).is_none() {
+            tests.extend(place_test::test(model, theta, &self.data, &curves)?);
+        }
         Ok(Rest {
-            tests: rest_patterns::test(&model.rest(theta, &self.data)?),
+            tests,
             small_errors: small_errors(&self.data),
             beyond_slips: None,
         })
@@ -208,8 +215,15 @@ impl Study for StructureStudy {
     fn beyond_slips(&self, model: &StructureModel, theta: &[f64]) -> Result<Option<BeyondSlips>> {
         let Some(absorb) = self.slips else { return Ok(None) };
         let mut curves = model.rest(theta, &self.data)?;
+        let only_a_place = rest::largest(&rest_patterns::test(&curves)).is_none();
         let after = absorb(model, &self.data, theta, &curves)?;
-        Ok(Some(rest_patterns::test_beyond(&mut curves, after)))
+        let price = after.price;
+        let mut beyond = rest_patterns::test_beyond(&mut curves, after);
+        if only_a_place && let Some(mut test) = place_test::test(model, theta, &self.data, &curves)? {
+            test.excess += price;
+            beyond.tests.push(test);
+        }
+        Ok(Some(beyond))
     }
 
     fn calibrate(&self, model: &StructureModel) -> Result<Calibration> {

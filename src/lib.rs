@@ -138,7 +138,7 @@
 )]
 #![cfg_attr(feature = "cli", doc = "| [`commands`] | the command line (feature `cli`) |")]
 //!
-//! Below all of them: [`error`], [`files`], [`parameter`], [`progress`], [`stop`], [`text`], [`threads`], and [`builtin`] data.
+//! Below all of them: [`error`], [`files`], [`parameter`], [`progress`], [`statistics`], [`stop`], [`text`], [`threads`], and [`builtin`] data.
 //!
 //! # Features
 //!
@@ -186,6 +186,7 @@ pub(crate) mod serve;
 pub mod signal;
 #[cfg(feature = "lab")]
 pub mod simulate;
+pub mod statistics;
 pub mod stop;
 pub mod text;
 #[cfg(feature = "report")]

@@ -260,7 +260,7 @@ const MOST_EVIDENCE: f64 = 100.0;
 const LEAST_SURE: f64 = 0.05;
 
 /// Odds that something is hidden although no candidate is credible and no test is sure, against nothing.
-fn odds_of_something_faint<M, I>(candidates: &[EffectCandidate<M, I>], rest: &Rest) -> f64 {
+fn odds_of_something_faint<D: Modelled>(candidates: &[EffectCandidate<D>], rest: &Rest) -> f64 {
     let least = rest.tests.iter().map(|t| t.p_value).fold(1.0, f64::min);
     let of_tests = something_else::evidence_of_chance(least * rest.tests.len().max(1) as f64);
     // Credible or not: an effect of an impossible size may stand in for what there is. BIC counts what a free frequency or

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 
 use super::force::RegenerativeForce;
-use crate::lobes::dynamics::frf::DirectFrf;
+use crate::lobes::dynamics::frf::ToolPointFrf;
 
 /// How far, relative to |λ|, the middle of an arc may lie from its chord.
 const CHORD_TOLERANCE: f64 = 4e-3;
@@ -43,7 +43,7 @@ impl Arc {
     }
 
     /// λ itself: the eigenvalue of D Φ that belongs to this branch.
-    pub fn exact(&self, force: &RegenerativeForce, frf: &dyn DirectFrf, s: f64) -> Complex64 {
+    pub fn exact(&self, force: &RegenerativeForce, frf: &dyn ToolPointFrf, s: f64) -> Complex64 {
         let [a, b] = eigenvalues(force, frf, self.frequency_hz(s));
         let expected = self.lambda_at(s);
         if (a - expected).norm_sqr() <= (b - expected).norm_sqr() {
@@ -69,7 +69,7 @@ pub(super) fn epsilon(lambda: Complex64) -> f64 {
 /// Both eigenvalues of D Φ at a frequency.
 pub(super) fn eigenvalues(
     force: &RegenerativeForce,
-    frf: &dyn DirectFrf,
+    frf: &dyn ToolPointFrf,
     frequency_hz: f64,
 ) -> [Complex64; 2] {
     let d = &force.matrix_n_per_m2;
@@ -105,7 +105,7 @@ impl Sample {
 ///
 /// `halvings` splits every interval of the seed grid that often before refinement starts (0 in use; a test
 /// shows with 1 that nothing moves).
-pub(super) fn build(force: &RegenerativeForce, frf: &dyn DirectFrf, halvings: usize) -> Vec<Arc> {
+pub(super) fn build(force: &RegenerativeForce, frf: &dyn ToolPointFrf, halvings: usize) -> Vec<Arc> {
     let sample = |frequency_hz: f64| Sample {
         frequency_hz,
         lambda: eigenvalues(force, frf, frequency_hz),

@@ -1,5 +1,6 @@
 //! What the uncertainty of a model's parameters leaves open of its lobes: quantiles over draws.
 
+use crate::statistics::quantile;
 use nalgebra::{DMatrix, DVector};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -58,22 +59,6 @@ pub fn draws(
         .collect())
 }
 
-/// The quantile of values (limits in mm, errors of a hole) where unlimited counts as infinite (linear between order statistics).
-pub fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
-    if values.is_empty() {
-        return None;
-    }
-    values.sort_by(f64::total_cmp);
-    let place = share * (values.len() - 1) as f64;
-    let (low, high) = (values[place.floor() as usize], values[place.ceil() as usize]);
-    let value = if low == high {
-        low
-    } else {
-        low + (high - low) * place.fract()
-    };
-    value.is_finite().then_some(value)
-}
-
 /// A cut on each of the structures, one a draw.
 pub fn solvers<'a>(cut: &AveragedCut, structures: &'a [Blocks]) -> Vec<BlockSolver<'a>> {
     structures.par_iter().map(|blocks| cut.on(blocks)).collect()
@@ -92,7 +77,7 @@ pub fn band(solvers: &[BlockSolver<'_>], spindle_rpm: &[f64]) -> LobeBand {
         .collect();
     let [lower_mm, upper_mm] = QUANTILES.map(|share| {
         (0..spindle_rpm.len())
-            .map(|i| quantile(limits.iter().map(|l| l[i]).collect(), share))
+            .map(|i| quantile(limits.iter().map(|l| l[i]), share))
             .collect()
     });
     LobeBand { lower_mm, upper_mm }
@@ -128,15 +113,6 @@ mod tests {
                 .iter()
                 .all(|d| (0.999..=1.001).contains(&d[0]) && (-3.0..=-2.9).contains(&d[1]))
         );
-    }
-
-    #[test]
-    fn quantiles_with_unlimited_draws() {
-        let values: Vec<f64> = (0..=100).map(f64::from).collect();
-        assert_eq!(quantile(values.clone(), 0.05), Some(5.0));
-        assert_eq!(quantile(vec![1.0, f64::INFINITY, f64::INFINITY], 0.95), None);
-        assert_eq!(quantile(vec![1.0, f64::INFINITY, 1.0, 1.0], 0.05), Some(1.0));
-        assert_eq!(quantile(vec![], 0.5), None);
     }
 
     /// Stiffness off by a factor moves the limit by that factor: the band at any speed is the one of the factor.

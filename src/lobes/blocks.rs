@@ -6,7 +6,7 @@
 use super::curve::{AbsoluteLimit, Limit, LobeCurve, SpeedLimit};
 use super::force::RegenerativeForce;
 use super::solve::StabilitySolver;
-use crate::lobes::dynamics::frf::DirectFrf;
+use crate::lobes::dynamics::frf::ToolPointFrf;
 
 /// Forces of a cut averaged over a revolution.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,9 +26,9 @@ impl From<RegenerativeForce> for AveragedCut {
 /// The FRFs that a cut of [`AveragedCut`] meets.
 pub struct Blocks {
     /// Across the tool axis: x and y.
-    pub lateral: Box<dyn DirectFrf>,
+    pub lateral: Box<dyn ToolPointFrf>,
     /// Along the tool axis and about it; `None` where it is not known or not asked for.
-    pub axial: Option<Box<dyn DirectFrf>>,
+    pub axial: Option<Box<dyn ToolPointFrf>>,
 }
 
 impl AveragedCut {

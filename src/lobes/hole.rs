@@ -6,10 +6,11 @@
 
 use nalgebra::{Matrix6, Vector3, Vector6};
 
-use super::band::{QUANTILES, quantile};
+use super::band::QUANTILES;
 use crate::campaign::{CutGeometry, Tool};
 use crate::lobes::dynamics::robot::lobe_axes;
 use crate::robot::static_deflection::wrench;
+use crate::statistics::quantile;
 
 /// Static forces on the tool.
 #[derive(Debug, Clone, PartialEq)]

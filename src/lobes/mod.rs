@@ -8,7 +8,7 @@
 //! - b = ½ g_R (1 + (g_I/g_R)²) = 1/(2 Re λ),
 //! - ωT = 2πk + ε with ε = 2 atan2(g_R, g_I) = 2 atan2(Re λ, −Im λ) in (0, 2π), k = 0, 1, 2, … the lobe.
 //!
-//! [`force`] builds D for a process, [`DirectFrf`] says what Φ is, [`solve`] finds the smallest b at a speed.
+//! [`force`] builds D for a process, [`ToolPointFrf`] says what Φ is, [`solve`] finds the smallest b at a speed.
 //!
 //! Where nothing limits the cut at a speed within the band of the FRF, the limit is `None` (`null` in JSON).
 
@@ -34,7 +34,7 @@ pub mod workspace_grid;
 pub use band::LobeBand;
 pub use blocks::{AveragedCut, BlockLobes, BlockSolver, Blocks};
 pub use curve::{AbsoluteLimit, Limit, LobeCurve, Peak, SpeedLimit, peak_near, peaks, speed_grid};
-pub use dynamics::frf::{AxisMode, DirectFrf, ModalFrf, Mode};
+pub use dynamics::frf::{AxisMode, ModalFrf, Mode, ToolPointFrf};
 pub use dynamics::poles::PoleFrf;
 pub use dynamics::robot::RobotFrf;
 pub use dynamics::sampled::SampledFrf;

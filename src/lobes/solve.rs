@@ -5,12 +5,12 @@ use std::f64::consts::TAU;
 use super::arcs::{self, Arc, parabola_real};
 use super::curve::{AbsoluteLimit, Limit, SpeedLimit, golden_maximum};
 use super::force::RegenerativeForce;
-use crate::lobes::dynamics::frf::DirectFrf;
+use crate::lobes::dynamics::frf::ToolPointFrf;
 
 /// Solves det(I − b (1 − e^{−iωT}) D Φ) = 0 along the lobes of one force on one structure.
 pub struct StabilitySolver<'a> {
     force: RegenerativeForce,
-    frf: &'a dyn DirectFrf,
+    frf: &'a dyn ToolPointFrf,
     arcs: Vec<Arc>,
     /// First lobe that counts.
     first_lobe: f64,
@@ -27,12 +27,12 @@ const VERTEX_MARGIN: f64 = 0.01;
 
 impl<'a> StabilitySolver<'a> {
     /// The limit of an averaged force on a structure that is given by its FRF.
-    pub fn new(force: RegenerativeForce, frf: &'a dyn DirectFrf) -> Self {
+    pub fn new(force: RegenerativeForce, frf: &'a dyn ToolPointFrf) -> Self {
         Self::with_halved_seeds(force, frf, 0)
     }
 
     /// As [`new`](Self::new) with every interval of the frequency grid halved so often: for convergence studies.
-    pub fn with_halved_seeds(force: RegenerativeForce, frf: &'a dyn DirectFrf, halvings: usize) -> Self {
+    pub fn with_halved_seeds(force: RegenerativeForce, frf: &'a dyn ToolPointFrf, halvings: usize) -> Self {
         StabilitySolver {
             force,
             frf,

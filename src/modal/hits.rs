@@ -1,6 +1,7 @@
 //! Hits in a raw tap test: where they are, and which of them are no good.
 
 use crate::signal::median;
+use crate::statistics::quantile;
 
 /// Samples of the force above this many standard deviations of its noise may belong to a hit …
 const ABOVE_NOISE: f64 = 10.0;
@@ -71,11 +72,7 @@ pub(super) fn find(force_n: &[f64], responses: &[&[f64]], sample_rate_hz: f64, b
                 .collect();
             let to_end = (force_n.len() - first.peak_at) as f64;
             // Rebounds make short gaps, so not the median: two thirds of the way up.
-            let usual = if gaps.is_empty() {
-                to_end
-            } else {
-                crate::signal::quantile(&gaps, 0.67)
-            };
+            let usual = quantile(gaps.iter().copied(), 0.67).unwrap_or(to_end);
             let shortest = gaps
                 .iter()
                 .copied()

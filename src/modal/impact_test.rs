@@ -8,7 +8,8 @@ use num_complex::Complex64;
 use realfft::RealFftPlanner;
 
 use super::hits::{self, Hit};
-use crate::signal::{median, quantile};
+use crate::signal::median;
+use crate::statistics::quantile;
 use crate::{InputError, Result};
 
 /// The window ends the response at this part of its size …
@@ -299,7 +300,7 @@ fn consistent(blocks: &[Block], hits: &mut [Hit]) -> (Vec<usize>, bool) {
                 .fold(0.0, f64::max)
         })
         .collect();
-    let usual = quantile(&misfit, 0.4);
+    let usual = quantile(misfit.iter().copied(), 0.4).unwrap_or(0.0);
     // Of two nobody can say which is right.
     if blocks.len() == 2 {
         return (all, usual > CONTRADICTORY);

@@ -1,5 +1,7 @@
 //! A record cut into blocks of whole tool revolutions, and order statistics.
 
+use crate::statistics::quantile;
+
 /// Mean and fluctuation of each consecutive block of a channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SignalBlocks {
@@ -53,19 +55,6 @@ impl SignalBlocks {
     }
 }
 
-/// The `q` quantile (0..1) of `values`, interpolated; 0 where there are none.
-pub fn quantile(values: &[f64], q: f64) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let Some(last) = sorted.len().checked_sub(1) else {
-        return 0.0;
-    };
-    let at = q.clamp(0.0, 1.0) * last as f64;
-    let low = at.floor() as usize;
-    let high = (low + 1).min(last);
-    sorted[low] + (at - low as f64) * (sorted[high] - sorted[low])
-}
-
 /// Arithmetic mean; 0 of nothing.
 pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
@@ -73,7 +62,7 @@ pub fn mean(values: &[f64]) -> f64 {
 
 /// Middle of the sorted values, interpolated; 0 of nothing.
 pub fn median(values: &[f64]) -> f64 {
-    quantile(values, 0.5)
+    quantile(values.iter().copied(), 0.5).unwrap_or(0.0)
 }
 
 /// Standard deviation from the median absolute deviation (normal consistency factor 1.4826).
@@ -126,7 +115,6 @@ mod tests {
 
     #[test]
     fn quantiles_interpolate_and_empty_input_is_harmless() {
-        assert_eq!(quantile(&[3.0, 1.0, 2.0], 0.25), 1.5);
         assert_eq!(median(&[]), 0.0);
         assert!(SignalBlocks::new(&[], 10.0).is_empty());
         assert!(SignalBlocks::new(&[1.0], 0.0).is_empty());

@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use super::blocks::{SignalBlocks, line, median, quantile};
+use super::blocks::{SignalBlocks, line, median};
+use crate::statistics::quantile;
 
 /// Too few blocks for a state to be told from noise.
 pub(super) const MIN_STATE_BLOCKS: usize = 4;
@@ -39,8 +40,9 @@ impl<'a> Limits<'a> {
         let steps: Vec<f64> = blocks.mean.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
         Limits {
             blocks,
-            sigma: quantile(&steps, 0.25) / (0.3186 * std::f64::consts::SQRT_2),
-            range: quantile(&blocks.mean, 0.95) - quantile(&blocks.mean, 0.05),
+            sigma: quantile(steps.iter().copied(), 0.25).unwrap_or(0.0) / (0.3186 * std::f64::consts::SQRT_2),
+            range: quantile(blocks.mean.iter().copied(), 0.95).unwrap_or(0.0)
+                - quantile(blocks.mean.iter().copied(), 0.05).unwrap_or(0.0),
             fluctuation: 0.25f64.max(DEPARTURE_SIGMA / (2.0 * blocks.samples_per_block).sqrt()),
         }
     }
@@ -139,7 +141,11 @@ pub(super) fn air_states(
     let energy = |r: &Range<usize>| of(r, |b| &b.std_dev);
     let quietest: Vec<f64> = blocks
         .iter()
-        .map(|b| quantile(&b.std_dev, 0.05).max(f64::MIN_POSITIVE))
+        .map(|b| {
+            quantile(b.std_dev.iter().copied(), 0.05)
+                .unwrap_or(0.0)
+                .max(f64::MIN_POSITIVE)
+        })
         .collect();
     let loudness = |r: &Range<usize>| -> f64 {
         let e = energy(r);
@@ -158,7 +164,11 @@ pub(super) fn air_states(
     let level = |r: &Range<usize>| of(r, |b| &b.mean);
     let scale: Vec<f64> = blocks
         .iter()
-        .map(|b| (quantile(&b.mean, 0.95) - quantile(&b.mean, 0.05)).max(f64::MIN_POSITIVE))
+        .map(|b| {
+            (quantile(b.mean.iter().copied(), 0.95).unwrap_or(0.0)
+                - quantile(b.mean.iter().copied(), 0.05).unwrap_or(0.0))
+            .max(f64::MIN_POSITIVE)
+        })
         .collect();
     let distance = |a: &[f64], b: &[f64]| -> f64 {
         a.iter()

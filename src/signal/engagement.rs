@@ -3,7 +3,8 @@
 
 use std::ops::Range;
 
-use super::blocks::{SignalBlocks, line, median, quantile};
+use super::blocks::{SignalBlocks, line, median};
+use crate::statistics::quantile;
 
 /// An entry begins below this part of the full force; a cut whose force merely changes does not.
 const ENTRY_BEGINS_BELOW: f64 = 0.6;
@@ -89,7 +90,7 @@ pub(super) fn full_engagement(loudness: &[f64], cut: Range<usize>) -> Range<usiz
 /// least squares. 0 where it does not begin low.
 fn ramp(series: &[f64]) -> usize {
     // Beyond the last block at full force is the way out.
-    let full = quantile(series, 0.9);
+    let full = quantile(series.iter().copied(), 0.9).unwrap_or(0.0);
     let last = series.iter().rposition(|v| *v > 0.9 * full).unwrap_or(0) + 1;
     let part = &series[..last];
     let first = part[..part.len().min(2)]

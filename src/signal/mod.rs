@@ -15,7 +15,7 @@ mod steady_window;
 mod tooth_line;
 
 pub(crate) use blocks::line;
-pub use blocks::{SignalBlocks, mean, median, quantile};
+pub use blocks::{SignalBlocks, mean, median};
 pub use drift::{Air, DriftLine, fit_drift};
 pub use engagement::change;
 pub(crate) use faults::least_and_greatest;

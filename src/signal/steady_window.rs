@@ -8,10 +8,11 @@
 use std::ops::Range;
 
 use super::air_check::air_in;
-use super::blocks::{SignalBlocks, line, median, quantile, robust_std};
+use super::blocks::{SignalBlocks, line, median, robust_std};
 use super::drift::Air;
 use super::end_states::{MIN_STATE_BLOCKS, air_states, departure};
 use super::engagement::{full_engagement, loudness};
+use crate::statistics::quantile;
 
 /// What turns, and how the record is sampled.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -189,7 +190,8 @@ fn steady_blocks(blocks: &[SignalBlocks], cut: Range<usize>) -> Range<usize> {
                     kept = core.clone().collect();
                 }
             }
-            let level = quantile(&b.mean, 0.98) - quantile(&b.mean, 0.02);
+            let level = quantile(b.mean.iter().copied(), 0.98).unwrap_or(0.0)
+                - quantile(b.mean.iter().copied(), 0.02).unwrap_or(0.0);
             let std: Vec<f64> = core.clone().map(|i| b.std_dev[i]).collect();
             let std_dev = median(&std);
             Core {

@@ -324,7 +324,7 @@ mod tests {
             let setting = PostureSetting {
                 robot: &model,
                 kinematics: &kinematics,
-                lowness: 0.0,
+                level_fraction: 0.0,
             };
             let values = values.map(Dual::constant);
             ViscoelasticJoints.apply(At::EVERYWHERE, &values, &setting, &mut chain);

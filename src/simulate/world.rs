@@ -72,7 +72,9 @@ impl World<'_> {
                 .turn_joints(d.strength, block.posture, &mut joints_deg);
         }
         let kinematics = robot.kinematics(&joints_deg)?;
-        let mut chain = self.model.chain(self.theta, &kinematics, block.lowness, false);
+        let mut chain = self
+            .model
+            .chain(self.theta, &kinematics, block.level_fraction, false);
         let scene = Scene {
             robot,
             kinematics: &kinematics,

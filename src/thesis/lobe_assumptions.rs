@@ -11,7 +11,7 @@ use super::measured_lobes::{ThesisLobes, conditions, thesis_force, thesis_modes,
 use crate::Result;
 use crate::campaign::Immersion;
 use crate::lobes::{
-    AxisMode, DirectFrf, ModalFrf, Mode, Peak, RegenerativeForce, SampledFrf, SpeedLimit, StabilitySolver,
+    AxisMode, ModalFrf, Mode, Peak, RegenerativeForce, SampledFrf, SpeedLimit, StabilitySolver, ToolPointFrf,
     speed_grid,
 };
 
@@ -191,7 +191,7 @@ fn force(switch: Switch) -> Result<RegenerativeForce> {
     }
 }
 
-fn frf(switch: Switch, configuration: u32) -> Result<Box<dyn DirectFrf>> {
+fn frf(switch: Switch, configuration: u32) -> Result<Box<dyn ToolPointFrf>> {
     let mut modes = thesis_modes(configuration)?;
     match switch {
         Switch::StrongestModeOnly => {

@@ -448,7 +448,7 @@ fn difference(
         .map(|(posture, kinematics)| Lookout {
             posture,
             kinematics,
-            lowness: 0.0,
+            level_fraction: 0.0,
             frequency_hz: (0..LINES).map(|i| LOOK_HZ[0] + step * i as f64).collect(),
         })
         .collect();

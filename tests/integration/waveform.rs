@@ -6,9 +6,9 @@ use crate::support::{blind, document, truth};
 use lobestone::campaign::Campaign;
 use lobestone::discrepancy::{CuttingComparison, DiagnosisVerdict};
 use lobestone::effects::{Cutting, Instance, Known, Registry};
+use lobestone::identify::forces::asynchronous_lines::{AsynchronousLines, VibrationLine};
 use lobestone::identify::forces::cutting_data::processes;
 use lobestone::identify::forces::cutting_study::calibrate_cutting;
-use lobestone::identify::forces::off_comb::{OffComb, VibrationLine};
 use lobestone::identify::levenberg_marquardt::Stopping;
 use lobestone::identify::{
     CuttingData, CuttingModel, CuttingProblem, CuttingStudy, Fit, LeastSquares, minimise,
@@ -139,7 +139,7 @@ fn with_vibration(data: &CuttingData) -> CuttingData {
                 .map(|c| (c, 20.0 / (1.0 + shift.abs() as f64), 0.5))
                 .collect(),
         });
-        own.vibration = Some(OffComb {
+        own.vibration = Some(AsynchronousLines {
             frequency_hz: 431.0,
             lines: lines.collect(),
         });

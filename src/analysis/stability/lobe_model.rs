@@ -13,7 +13,7 @@ use crate::identify::{Options, StructureCase};
 use crate::lobes::dynamics::tool_point::RobotHolder;
 use crate::lobes::hole::{Deflection, HoleError, HoleLoad};
 use crate::lobes::setup::tool_beam;
-use crate::lobes::{Blocks, DirectFrf, PoleFrf, RobotFrf, StateSpace, ToolDynamics, ToolPoint, band};
+use crate::lobes::{Blocks, PoleFrf, RobotFrf, StateSpace, ToolDynamics, ToolPoint, ToolPointFrf, band};
 use crate::robot::{Chain, Kinematics, PostureReport};
 use crate::{InputError, Result};
 
@@ -64,7 +64,7 @@ impl FittedModel {
         kinematics: &Kinematics,
         chain: &Chain,
         asked: &Asked,
-        form: impl Fn(RobotFrf) -> Result<Box<dyn DirectFrf>>,
+        form: impl Fn(RobotFrf) -> Result<Box<dyn ToolPointFrf>>,
     ) -> Result<Blocks> {
         let robot = &self.model.robot;
         if !asked.tool.beam.segments.is_empty() {
@@ -106,7 +106,7 @@ impl FittedModel {
     }
 }
 
-fn quickest(frf: RobotFrf) -> Result<Box<dyn DirectFrf>> {
+fn quickest(frf: RobotFrf) -> Result<Box<dyn ToolPointFrf>> {
     Ok(match frf.modal()? {
         Some(modal) => Box::new(modal),
         None => Box::new(frf),
@@ -114,7 +114,7 @@ fn quickest(frf: RobotFrf) -> Result<Box<dyn DirectFrf>> {
 }
 
 /// Coupled modes as a sum over their poles, which pays where one FRF is asked for very often.
-fn quickest_of_many(frf: RobotFrf) -> Result<Box<dyn DirectFrf>> {
+fn quickest_of_many(frf: RobotFrf) -> Result<Box<dyn ToolPointFrf>> {
     if let Some(modal) = frf.modal()? {
         return Ok(Box::new(modal));
     }

@@ -14,7 +14,7 @@ use crate::lobes::hole::{HoleCheck, HoleError};
 use crate::lobes::outcome::{LimitRange, NotedCut};
 use crate::lobes::setup::LobeCut;
 use crate::lobes::{
-    BlockSolver, Blocks, DirectFrf, MultiFrequency, SemiDiscretisation, SpeedLimit, StateSpace, ToolPoint,
+    BlockSolver, Blocks, MultiFrequency, SemiDiscretisation, SpeedLimit, StateSpace, ToolPoint, ToolPointFrf,
 };
 use crate::{InputError, Result};
 
@@ -135,7 +135,7 @@ pub(crate) fn from_modes(
         let axial = modes.axial.filter(|_| asked.axial);
         Blocks {
             lateral: Box::new(modes.lateral),
-            axial: axial.map(|frf| Box::new(frf) as Box<dyn DirectFrf>),
+            axial: axial.map(|frf| Box::new(frf) as Box<dyn ToolPointFrf>),
         }
     } else {
         let point = ToolPoint {
@@ -250,7 +250,7 @@ pub(crate) fn from_measured(
                     axial: s
                         .axial
                         .filter(|_| asked.axial)
-                        .map(|frf| Box::new(frf) as Box<dyn DirectFrf>),
+                        .map(|frf| Box::new(frf) as Box<dyn ToolPointFrf>),
                 }
             };
             Ok(LobeStructure {

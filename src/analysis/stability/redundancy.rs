@@ -6,7 +6,7 @@ use serde::Serialize;
 use crate::analysis::stability::lobe_case::{BEST, LobeCase};
 use crate::analysis::stability::lobe_model::ModelState;
 use crate::campaign::{Campaign, LobeMethod, LobesSection, Redundancy};
-use crate::lobes::band::{QUANTILES, quantile};
+use crate::lobes::band::QUANTILES;
 use crate::lobes::hole::{HoleCheck, HoleError};
 use crate::lobes::optimum::{
     LimitAtAngle, SPEED_MARGIN, Search, SurfacePoint, agree, apart_deg, difference, margin_mm,
@@ -14,6 +14,7 @@ use crate::lobes::optimum::{
 use crate::lobes::redundancy::{AnglePosture, AngleStatus, Recommendation, RedundancySweep};
 use crate::lobes::setup::LobeCut;
 use crate::lobes::{AveragedCut, SpeedLimit};
+use crate::statistics::quantile;
 use crate::{InputError, Result};
 
 /// b(n, θ) at one place.

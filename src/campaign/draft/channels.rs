@@ -2,7 +2,7 @@
 
 use super::answers::Answers;
 use super::entry::{DraftTable, Entry, Kind};
-use super::tables::Making;
+use super::making::Making;
 use crate::Result;
 use crate::ingest::PlainColumn;
 

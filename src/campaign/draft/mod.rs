@@ -11,6 +11,7 @@ mod entry;
 mod form;
 mod found;
 mod list_columns;
+mod making;
 mod names;
 mod scan;
 mod tables;

@@ -8,8 +8,9 @@ use super::channels::channels;
 use super::entry::{DraftTable, Entry, Kind};
 use super::found::{FoundForce, FoundFrf, Scan, stem};
 use super::list_columns::{CUTTING_SPEED, DIAMETER, DIRECTION, FEED_PER_TURN, FEED_RATE, RADIAL_DEPTH};
+use super::making::Making;
 use super::names::FROM_NAME;
-use crate::{InputError, Result};
+use crate::Result;
 
 const PROCESSES: &[&str] = &["milling", "drilling", "turning"];
 const FROM_HEADER: &str = "from the file's header";
@@ -36,62 +37,6 @@ pub fn of(scan: &Scan, answers: &Answers) -> Result<Vec<DraftTable>> {
         tables.extend(cuts.into_iter().map(|(_, table)| table));
     }
     Ok(tables)
-}
-
-/// A table in the making.
-pub(super) struct Making<'a> {
-    answers: &'a Answers,
-    pub table: DraftTable,
-}
-
-impl<'a> Making<'a> {
-    pub fn new(answers: &'a Answers, kind: &'static str, name: &str, repeated: bool) -> Self {
-        Making {
-            answers,
-            table: DraftTable {
-                kind,
-                name: name.to_string(),
-                repeated,
-                entries: Vec::new(),
-            },
-        }
-    }
-
-    fn single(answers: &'a Answers, kind: &'static str) -> Self {
-        Making::new(answers, kind, "", false)
-    }
-
-    /// Adds `entry` with the answer given for it, else what `guesses` (value, why) say, the first that is there.
-    pub fn add(&mut self, mut entry: Entry, guesses: &[(Option<&str>, &str)]) -> Result<()> {
-        let DraftTable { kind, name, .. } = &self.table;
-        match self.answers.get(kind, name, entry.key) {
-            Some(typed) => entry.give(typed).map_err(|problem| {
-                InputError::new(problem)
-                    .key(format!("{kind} {name}").trim_end().to_string() + "." + entry.key)
-                    .remedy(format!("give {}, such as {}", entry.what, entry.example))
-            })?,
-            None => {
-                if let Some((Some(value), why)) = guesses.iter().find(|(v, _)| v.is_some()) {
-                    entry.guess(value, why);
-                }
-            }
-        }
-        self.table.entries.push(entry);
-        Ok(())
-    }
-
-    /// A value that is known for certain, and nobody's to change.
-    pub fn fact(&mut self, key: &'static str, kind: Kind, value: &str) {
-        self.known(Entry::new(key, kind, "", ""), value);
-    }
-
-    /// A value that is known for certain.
-    fn known(&mut self, mut entry: Entry, value: &str) {
-        // What a scan found is always of its form.
-        if entry.give(value).is_ok() {
-            self.table.entries.push(entry);
-        }
-    }
 }
 
 /// The posture that an FRF file belongs to: as somebody said, else as its name or folder does.

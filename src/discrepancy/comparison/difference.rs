@@ -16,7 +16,7 @@ pub struct Lookout<'a> {
     /// Where the frames are there.
     pub kinematics: &'a Kinematics,
     /// See [`crate::effects::Setting`].
-    pub lowness: f64,
+    pub level_fraction: f64,
     /// Lines that are looked at, Hz.
     pub frequency_hz: Vec<f64>,
 }
@@ -114,7 +114,7 @@ pub fn greatest_difference(
 }
 
 fn point_basis(model: &StructureModel, theta: &[f64], lookout: &Lookout) -> Result<FrfBasis> {
-    let chain = model.chain(theta, lookout.kinematics, lookout.lowness, false);
+    let chain = model.chain(theta, lookout.kinematics, lookout.level_fraction, false);
     let kinematics = model.kinematics_at(theta, lookout.kinematics);
     let mut rows: Vec<DVector<f64>> = Vec::new();
     let mut push = |point, place, tool| {

@@ -69,7 +69,7 @@ fn measured(truth: &StructureModel, own: &[f64], seed: u64) -> FrfData {
         FrfBlock {
             posture,
             force_level_n: None,
-            lowness: 0.0,
+            level_fraction: 0.0,
             kinematics: truth.robot.kinematics(q).unwrap(),
             frequency_hz: frequency_hz.clone(),
             outputs: outputs.clone(),
@@ -190,9 +190,9 @@ fn a_law_at_one_place_is_seen_where_nothing_else_sees_it() {
         let mut data = measured(&bare, &[], seed);
         if !own.is_empty() {
             let clamp = drawn::instance(Spot::ToolGround(2), DrawnForm::Spring);
-            data = measured(&bare.with_effect(clamp, &data.summary()), own, seed);
+            data = measured(&bare.with_effect(clamp, &bare.known(&data.summary())), own, seed);
         }
-        let study = StructureStudy::new(&bare.robot.spec, data, Options::default());
+        let study = StructureStudy::new(data, Options::default());
         let calibrated = study.calibrate(&bare).unwrap();
         let rest = study.rest(&bare, &calibrated.theta).unwrap();
         let (place, others): (Vec<RestTest>, Vec<RestTest>) =

@@ -126,8 +126,9 @@ impl Lab {
         let mut seen: Vec<usize> = Vec::new();
         for block in &data.blocks {
             // Of several levels the hardest hits: the least noise.
-            let lowest =
-                |b: &&std::sync::Arc<FrfBlock>| b.posture == block.posture && b.lowness < block.lowness;
+            let lowest = |b: &&std::sync::Arc<FrfBlock>| {
+                b.posture == block.posture && b.level_fraction < block.level_fraction
+            };
             if seen.contains(&block.posture) || data.blocks.iter().any(|b| lowest(&b)) {
                 continue;
             }
@@ -212,7 +213,7 @@ impl Lab {
             block: FrfBlock {
                 posture: like.posture,
                 force_level_n: None,
-                lowness: like.lowness,
+                level_fraction: like.level_fraction,
                 kinematics: like.kinematics.clone(),
                 frequency_hz,
                 outputs,

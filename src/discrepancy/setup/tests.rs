@@ -72,7 +72,7 @@ fn arrangement(model: &StructureModel) -> FrfData {
         Arc::new(FrfBlock {
             posture,
             force_level_n: None,
-            lowness: 0.0,
+            level_fraction: 0.0,
             kinematics: model.robot.kinematics(joints).unwrap(),
             frequency_hz: frequency_hz.clone(),
             outputs,

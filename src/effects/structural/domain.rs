@@ -30,7 +30,7 @@ pub struct PostureSetting<'a> {
     /// Where its frames are.
     pub kinematics: &'a Kinematics,
     /// 0 at the highest hammer level of the campaign, 1 at the lowest, logarithmic between; 0 where there is one level.
-    pub lowness: f64,
+    pub level_fraction: f64,
 }
 
 /// What happens to the response channels between the structure and the file.

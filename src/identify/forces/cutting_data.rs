@@ -10,10 +10,12 @@ use crate::cutting::waveform::{DrillTerm, DrillingCut, MillingCut, UnitForces};
 use crate::cutting::{CutAnalysis, EdgeBit, ForceAxis, engaged_edge, feed_mm};
 use crate::data::{ChannelRole, Cut, Process, TimeRecord, Tool};
 use crate::effects::cutting::{CutSetting, CuttingSummary};
+use crate::identify::forces::asynchronous_lines::{
+    AsynchronousLines, StandingLine, find_vibration, standing_lines,
+};
 use crate::identify::forces::cutting_windows::Windows;
 pub use crate::identify::forces::force_channel::ForceChannel;
 use crate::identify::forces::force_channel::{force_channel, sample_std, widen_for_vibration};
-use crate::identify::forces::off_comb::{OffComb, StandingLine, find_vibration, standing_lines};
 use crate::signal::{highest_order, line_amplitude, order_spectrum};
 use crate::{Error, InputError, Result};
 
@@ -69,7 +71,7 @@ pub struct CutData {
     /// Blocks of full engagement.
     pub steady: Range<usize>,
     /// Lines off the tooth-passing comb; `None` where none stands out (and for drilling and turning).
-    pub vibration: Option<OffComb>,
+    pub vibration: Option<AsynchronousLines>,
     /// What stands above the noise beside the orders (drilling and turning: orders and all).
     pub lines: Vec<StandingLine>,
 }
@@ -289,7 +291,7 @@ impl CutData {
         let own: usize = channels
             .map(|c| (2 * c.orders.len() + c.level.len()).saturating_sub(2))
             .sum();
-        (own + self.vibration.as_ref().map_or(0, OffComb::value_count)).saturating_sub(1)
+        (own + self.vibration.as_ref().map_or(0, AsynchronousLines::value_count)).saturating_sub(1)
     }
 }
 

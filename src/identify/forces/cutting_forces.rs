@@ -5,8 +5,8 @@ use num_complex::Complex64;
 use crate::cutting::waveform::{ChipLaw, DrillTerm, DrillingCut, LineForces, MillingCut, UnitForces};
 use crate::cutting::{EdgeBit, ForceAxis};
 use crate::effects::cutting::{CutPhysics, Mixing};
+use crate::identify::forces::asynchronous_lines::MOST_SHIFT;
 use crate::identify::forces::cutting_data::CutData;
-use crate::identify::forces::off_comb::MOST_SHIFT;
 use crate::robot::Dual;
 
 /// Forces on the recorded channels with their derivatives. Milling: `[mean, re 1, im 1, re 2, …]` over the orders of

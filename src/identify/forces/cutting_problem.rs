@@ -9,12 +9,12 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use crate::effects::cutting::CutPhysics;
+use crate::identify::forces::baseline_drift::{BaselineDrift, dot};
 use crate::identify::forces::cutting_data::{CutData, CutKind, CuttingData, ForceChannel};
 use crate::identify::forces::cutting_forces::{
     Forces, LineAmplitudes, drilling_forces, milling_forces, turning_forces,
 };
 use crate::identify::forces::cutting_model::CuttingModel;
-use crate::identify::forces::zero_line::{ZeroLine, dot};
 use crate::identify::levenberg_marquardt::{LeastSquares, Linearisation};
 use crate::{Result, stop};
 
@@ -119,10 +119,10 @@ impl CuttingProblem<'_> {
         stop::point();
         let count = if derivatives { theta.len() } else { 0 };
         let physics = self.model.physics(theta, cut, derivatives);
-        let lines: [Option<ZeroLine>; 4] = std::array::from_fn(|i| {
+        let lines: [Option<BaselineDrift>; 4] = std::array::from_fn(|i| {
             cut.channels[i]
                 .as_ref()
-                .map(|channel| ZeroLine::new(cut, &physics, channel, i))
+                .map(|channel| BaselineDrift::new(cut, &physics, channel, i))
         });
         let mut sums = Sums::zero(count);
         let (forces, lines_off_comb, placement) = match &cut.kind {
@@ -282,8 +282,9 @@ fn push_vibration(
     }
     for line in &seen.lines {
         for (channel, amplitude, noise) in &line.channels {
-            let predicted = model
-                .map(|m| &m[(line.shift + crate::identify::forces::off_comb::MOST_SHIFT) as usize][*channel]);
+            let predicted = model.map(|m| {
+                &m[(line.shift + crate::identify::forces::asynchronous_lines::MOST_SHIFT) as usize][*channel]
+            });
             let value = predicted.map_or(0.0, |p| p.value);
             let square = value * value + noise * noise;
             let seen = amplitude.max(1e-3 * noise).max(f64::MIN_POSITIVE);
@@ -406,7 +407,7 @@ fn best_phase(cut: &CutData, forces: &Forces, step: usize) -> f64 {
 }
 
 /// First contact at which model and record agree best, within `range` (s).
-fn best_contact(lines: &[Option<ZeroLine>; 4], range: [f64; 2], forces: impl Fn(f64) -> Forces) -> f64 {
+fn best_contact(lines: &[Option<BaselineDrift>; 4], range: [f64; 2], forces: impl Fn(f64) -> Forces) -> f64 {
     // Cost, its slope and its Gauss–Newton curvature.
     let at = |contact: f64| {
         let f = forces(contact);

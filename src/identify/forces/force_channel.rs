@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use num_complex::Complex64;
 
+use crate::identify::forces::asynchronous_lines::AsynchronousLines;
 use crate::identify::forces::cutting_windows::Windows;
-use crate::identify::forces::off_comb::OffComb;
 use crate::signal::{OrderSpectrum, mean_between};
 
 /// One recorded channel of one cut.
@@ -107,7 +107,7 @@ const VIBRATION_WANDERS: f64 = 0.25;
 /// puts on the lines beside its own; and it does so no more steadily than its amplitude is.
 pub(crate) fn widen_for_vibration(
     channel: &mut ForceChannel,
-    vibration: &OffComb,
+    vibration: &AsynchronousLines,
     index: usize,
     teeth: usize,
     steady: Range<usize>,

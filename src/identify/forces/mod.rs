@@ -1,5 +1,7 @@
 //! The cutting model and its force records.
 
+pub mod asynchronous_lines;
+pub(crate) mod baseline_drift;
 pub mod cutting_case;
 pub mod cutting_data;
 pub(crate) mod cutting_forces;
@@ -9,5 +11,3 @@ pub mod cutting_study;
 pub mod cutting_waves;
 pub(crate) mod cutting_windows;
 pub(crate) mod force_channel;
-pub mod off_comb;
-pub(crate) mod zero_line;

@@ -43,7 +43,7 @@ pub struct FrfBlock {
     /// Of the hammer; `None` where nobody says.
     pub force_level_n: Option<f64>,
     /// 0 at the highest force level of the campaign, 1 at the lowest, logarithmic between.
-    pub lowness: f64,
+    pub level_fraction: f64,
     /// Where the robot's frames are at the posture.
     pub kinematics: Kinematics,
     /// Ascending, above zero.
@@ -113,7 +113,7 @@ impl FrfData {
                     blocks.push(FrfBlock {
                         posture: frf.posture,
                         force_level_n: frf.force_level_n,
-                        lowness: 0.0,
+                        level_fraction: 0.0,
                         kinematics,
                         frequency_hz: frf.frequency_hz.clone(),
                         outputs: Vec::new(),
@@ -233,7 +233,7 @@ impl FrfData {
     /// What effects need to know of the data.
     pub fn summary(&self) -> DataSummary {
         let lines = || self.blocks.iter().flat_map(|b| b.frequency_hz.iter().copied());
-        let mut levels: Vec<f64> = self.blocks.iter().map(|b| b.lowness).collect();
+        let mut levels: Vec<f64> = self.blocks.iter().map(|b| b.level_fraction).collect();
         levels.sort_by(f64::total_cmp);
         levels.dedup();
         DataSummary {
@@ -273,7 +273,7 @@ fn set_lowness(blocks: &mut [FrfBlock]) {
     if high > low && low > 0.0 {
         for block in blocks.iter_mut() {
             let level = block.force_level_n.unwrap_or(high);
-            block.lowness = (high / level).ln() / (high / low).ln();
+            block.level_fraction = (high / level).ln() / (high / low).ln();
         }
     }
 }

@@ -339,7 +339,7 @@ mod tests {
                 FrfBlock {
                     posture,
                     force_level_n: None,
-                    lowness: posture as f64,
+                    level_fraction: posture as f64,
                     kinematics: model.robot.kinematics(q).unwrap(),
                     frequency_hz: vec![6.0, 9.0, 14.0, 22.0, 47.0],
                     outputs,

@@ -237,16 +237,16 @@ impl StructureModel {
         (robot, kinematics)
     }
 
-    /// The chain at a posture with all effects; `kinematics` as the robot file has them. `lowness`: see [`PostureSetting`].
+    /// The chain at a posture with all effects; `kinematics` as the robot file has them. `level_fraction`: see [`PostureSetting`].
     pub fn chain(
         &self,
         theta: &[f64],
         kinematics: &Kinematics,
-        lowness: f64,
+        level_fraction: f64,
         with_derivatives: bool,
     ) -> Chain {
         let baseline = self.baseline(theta, with_derivatives);
-        self.chain_on(&baseline, theta, kinematics, lowness, with_derivatives)
+        self.chain_on(&baseline, theta, kinematics, level_fraction, with_derivatives)
     }
 
     /// As [`Self::chain`], on a baseline that was changed by hand.
@@ -255,7 +255,7 @@ impl StructureModel {
         baseline: &Baseline,
         theta: &[f64],
         kinematics: &Kinematics,
-        lowness: f64,
+        level_fraction: f64,
         with_derivatives: bool,
     ) -> Chain {
         let (robot, kinematics) = self.at(theta, kinematics);
@@ -269,7 +269,7 @@ impl StructureModel {
         let setting = PostureSetting {
             robot: &robot,
             kinematics: &kinematics,
-            lowness,
+            level_fraction,
         };
         for added in self.effects_in_order() {
             let values = self.values(theta, added, with_derivatives);
@@ -293,13 +293,13 @@ impl StructureModel {
 
     pub(crate) fn basis(&self, theta: &[f64], block: &FrfBlock, with_derivatives: bool) -> Result<FrfBasis> {
         stop::point();
-        let chain = self.chain(theta, &block.kinematics, block.lowness, with_derivatives);
+        let chain = self.chain(theta, &block.kinematics, block.level_fraction, with_derivatives);
         let rows = self.output_rows(theta, &chain, block);
         if !with_derivatives {
             return FrfBasis::new(&chain.system(0), &rows);
         }
         let mut system = chain.system(theta.len());
-        self.add_file_slopes(&mut system, theta, &block.kinematics, block.lowness);
+        self.add_file_slopes(&mut system, theta, &block.kinematics, block.level_fraction);
         FrfBasis::with_moved_outputs(&system, &rows, &self.row_slopes(theta, block))
     }
 
@@ -342,11 +342,11 @@ impl StructureModel {
         system: &mut System,
         theta: &[f64],
         kinematics: &Kinematics,
-        lowness: f64,
+        level_fraction: f64,
     ) {
         for k in 0..self.file_numbers.len() {
             let (moved, per_unit) = self.beside(theta, k);
-            let [above, below] = moved.map(|t| self.chain(&t, kinematics, lowness, false).system(0));
+            let [above, below] = moved.map(|t| self.chain(&t, kinematics, level_fraction, false).system(0));
             system.derivatives[self.first_file_number + k] = System::difference(&above, &below, per_unit);
         }
     }
@@ -359,7 +359,7 @@ impl StructureModel {
             .map(|(k, _)| {
                 let (moved, per_unit) = self.beside(theta, k);
                 let [above, below] = moved.map(|t| {
-                    let chain = self.chain(&t, &block.kinematics, block.lowness, false);
+                    let chain = self.chain(&t, &block.kinematics, block.level_fraction, false);
                     self.output_rows(&t, &chain, block)
                 });
                 let slopes = above.iter().zip(&below).map(|(a, b)| (a - b) * per_unit);
@@ -375,7 +375,7 @@ impl StructureModel {
         let count = self.parameters.len() as f64;
         let theta = self.nominal_theta();
         let of_block = |block: &FrfBlock| {
-            let chain = self.chain(&theta, &block.kinematics, block.lowness, false);
+            let chain = self.chain(&theta, &block.kinematics, block.level_fraction, false);
             // Six coordinates of each body move with mass, the others give way without.
             let most =
                 6 * chain.bodies.len() + chain.branches.iter().map(|b| b.directions.len()).sum::<usize>();

@@ -10,7 +10,7 @@ use crate::{Error, Result};
 pub type Receptance = [[Complex64; 2]; 2];
 
 /// The direct FRF of the tool point in the two axes of a regenerative force.
-pub trait DirectFrf: Sync {
+pub trait ToolPointFrf: Sync {
     /// Receptance at a frequency within [`band_hz`](Self::band_hz), time factor e^{+iωt}.
     fn receptance(&self, frequency_hz: f64) -> Receptance;
 
@@ -141,7 +141,7 @@ impl ModalFrf {
     }
 }
 
-impl DirectFrf for ModalFrf {
+impl ToolPointFrf for ModalFrf {
     fn receptance(&self, frequency_hz: f64) -> Receptance {
         let w = TAU * frequency_hz;
         let mut h = self.residual_m_per_n.map(|row| row.map(Complex64::from));

@@ -11,7 +11,7 @@ use faer::prelude::Solve;
 use num_complex::Complex64;
 
 use crate::Result;
-use crate::lobes::dynamics::frf::{DirectFrf, Receptance, resonance_grid};
+use crate::lobes::dynamics::frf::{Receptance, ToolPointFrf, resonance_grid};
 use crate::lobes::dynamics::robot::RobotFrf;
 use crate::lobes::milling::state_space::StateSpace;
 
@@ -75,7 +75,7 @@ impl PoleFrf {
     }
 }
 
-impl DirectFrf for PoleFrf {
+impl ToolPointFrf for PoleFrf {
     fn receptance(&self, frequency_hz: f64) -> Receptance {
         let mut h = self.residual_m_per_n.map(|row| row.map(Complex64::from));
         for (pole, residue) in &self.poles {
@@ -137,7 +137,7 @@ mod tests {
         }
         let force = RegenerativeForce::drilling_lateral(1014.2, 619.9, 1.178, 2).unwrap();
         let speeds = speed_grid([100.0, 900.0, 50.0]).unwrap();
-        let curve = |frf: &dyn DirectFrf| StabilitySolver::new(force, frf).curve(&speeds).depth_limit_mm;
+        let curve = |frf: &dyn ToolPointFrf| StabilitySolver::new(force, frf).curve(&speeds).depth_limit_mm;
         for (a, b) in curve(&exact).iter().zip(curve(&poles)) {
             approx::assert_relative_eq!(a.unwrap(), b.unwrap(), max_relative = 1e-3);
         }

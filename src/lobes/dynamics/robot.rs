@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::{DVector, Vector3};
 use num_complex::Complex64;
 
-use crate::lobes::dynamics::frf::{DirectFrf, ModalFrf, Mode, Receptance, band_around, resonance_grid};
+use crate::lobes::dynamics::frf::{ModalFrf, Mode, Receptance, ToolPointFrf, band_around, resonance_grid};
 use crate::lobes::milling::state_space::StateSpace;
 use crate::robot::frf::{Response, natural_frequencies_hz};
 use crate::robot::{Chain, FrfBasis, Kinematics, ModalBasis, RobotModel, System};
@@ -109,7 +109,7 @@ impl RobotFrf {
     }
 }
 
-impl DirectFrf for RobotFrf {
+impl ToolPointFrf for RobotFrf {
     fn receptance(&self, frequency_hz: f64) -> Receptance {
         let mut response = Response::default();
         // Only an undamped system at its resonance has no response; no depth is safe there.

@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use crate::lobes::dynamics::frf::{DirectFrf, Receptance};
+use crate::lobes::dynamics::frf::{Receptance, ToolPointFrf};
 use crate::{Error, Result};
 
 /// Measured lines with a smooth curve through them.
@@ -149,7 +149,7 @@ fn barycentric_weights(t: [f64; 4]) -> [f64; 4] {
     })
 }
 
-impl DirectFrf for SampledFrf {
+impl ToolPointFrf for SampledFrf {
     fn receptance(&self, frequency_hz: f64) -> Receptance {
         let (low, high) = self.band_hz();
         let f = frequency_hz.clamp(low, high);

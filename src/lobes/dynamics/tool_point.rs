@@ -11,7 +11,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 
 use crate::lobes::blocks::Blocks;
-use crate::lobes::dynamics::frf::{DirectFrf, ModalFrf, Receptance, band_around, resonance_grid};
+use crate::lobes::dynamics::frf::{ModalFrf, Receptance, ToolPointFrf, band_around, resonance_grid};
 use crate::lobes::dynamics::robot::lobe_axes;
 use crate::lobes::dynamics::sampled::SampledFrf;
 use crate::lobes::dynamics::tool_beam::{Receptance6, ToolBeam};
@@ -257,21 +257,21 @@ impl ToolPoint {
     pub fn blocks(&self, axial: bool) -> Blocks {
         Blocks {
             lateral: Box::new(self.lateral()),
-            axial: axial.then(|| Box::new(self.axial()) as Box<dyn DirectFrf>),
+            axial: axial.then(|| Box::new(self.axial()) as Box<dyn ToolPointFrf>),
         }
     }
 
     /// The FRF of the lateral block: x, y.
-    pub fn lateral(&self) -> ToolPointFrf {
-        ToolPointFrf {
+    pub fn lateral(&self) -> ToolPointBlock {
+        ToolPointBlock {
             point: self.clone(),
             at: [0, 2],
         }
     }
 
     /// The FRF of the axial–torsional block: along the tool (m, N), about it (rad, N·m).
-    pub fn axial(&self) -> ToolPointFrf {
-        ToolPointFrf {
+    pub fn axial(&self) -> ToolPointBlock {
+        ToolPointBlock {
             point: self.clone(),
             at: [4, 5],
         }
@@ -279,12 +279,12 @@ impl ToolPoint {
 }
 
 /// Two of the six degrees of freedom of a tool point.
-pub struct ToolPointFrf {
+pub struct ToolPointBlock {
     point: ToolPoint,
     at: [usize; 2],
 }
 
-impl DirectFrf for ToolPointFrf {
+impl ToolPointFrf for ToolPointBlock {
     fn receptance(&self, frequency_hz: f64) -> Receptance {
         let all = self.point.receptance(frequency_hz);
         self.at.map(|i| self.at.map(|j| all[(i, j)]))

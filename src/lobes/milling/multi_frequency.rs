@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
 use crate::lobes::curve::{Limit, SpeedLimit};
-use crate::lobes::dynamics::frf::{DirectFrf, Receptance};
+use crate::lobes::dynamics::frf::{Receptance, ToolPointFrf};
 use crate::lobes::milling::arnoldi;
 use crate::lobes::milling::periodic_force::PeriodicForce;
 
@@ -37,7 +37,7 @@ const MAX_HALVINGS: usize = 9;
 /// The multi-frequency solution for one force on one structure.
 pub struct MultiFrequency<'a> {
     force: PeriodicForce,
-    frf: &'a dyn DirectFrf,
+    frf: &'a dyn ToolPointFrf,
     /// Frequencies near resonances, Hz.
     seeds_hz: Vec<f64>,
     /// Axes that move at all.
@@ -46,7 +46,7 @@ pub struct MultiFrequency<'a> {
 }
 
 /// Frequencies at which the structure matters, ascending, Hz.
-pub(crate) fn frequencies_that_matter(frf: &dyn DirectFrf) -> Vec<f64> {
+pub(crate) fn frequencies_that_matter(frf: &dyn ToolPointFrf) -> Vec<f64> {
     let norm = |f: &f64| -> f64 {
         let h = frf.receptance(*f);
         h.iter().flatten().map(|v| v.norm_sqr()).sum::<f64>().sqrt()
@@ -63,7 +63,7 @@ pub(crate) fn frequencies_that_matter(frf: &dyn DirectFrf) -> Vec<f64> {
 }
 
 /// The line |θ + 2πl|/(2πT) on which the structure answers most, Hz.
-pub(crate) fn strongest_line(frf: &dyn DirectFrf, theta: f64, period_s: f64, top_hz: f64) -> f64 {
+pub(crate) fn strongest_line(frf: &dyn ToolPointFrf, theta: f64, period_s: f64, top_hz: f64) -> f64 {
     let mut best = (theta / (TAU * period_s), 0.0);
     let most = (top_hz * period_s).ceil() as i64 + 1;
     for l in -most..=most {
@@ -115,7 +115,7 @@ impl Crossing {
 
 impl<'a> MultiFrequency<'a> {
     /// The limit of a periodic force on a structure that is given by its FRF.
-    pub fn new(force: PeriodicForce, frf: &'a dyn DirectFrf) -> Self {
+    pub fn new(force: PeriodicForce, frf: &'a dyn ToolPointFrf) -> Self {
         let matters = frequencies_that_matter(frf);
         let highest = matters.last().copied().unwrap_or(frf.band_hz().1);
         let moves = |axis: usize| {

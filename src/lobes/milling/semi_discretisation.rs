@@ -13,7 +13,7 @@ use num_complex::Complex64;
 
 use crate::lobes::arcs::eigenvalues;
 use crate::lobes::curve::{Limit, SpeedLimit};
-use crate::lobes::dynamics::frf::DirectFrf;
+use crate::lobes::dynamics::frf::ToolPointFrf;
 use crate::lobes::milling::arnoldi;
 use crate::lobes::milling::multi_frequency::{frequencies_that_matter, strongest_line};
 use crate::lobes::milling::periodic_force::PeriodicForce;
@@ -35,7 +35,7 @@ const TOLERANCE: f64 = 2e-4;
 pub struct SemiDiscretisation<'a> {
     force: PeriodicForce,
     structure: StateSpace,
-    frf: &'a dyn DirectFrf,
+    frf: &'a dyn ToolPointFrf,
     steps_per_wave: f64,
     top_hz: f64,
     /// 1/(2 max|λ|) of the averaged force, m.
@@ -44,7 +44,7 @@ pub struct SemiDiscretisation<'a> {
 
 impl<'a> SemiDiscretisation<'a> {
     /// `structure` and `frf` are the same structure.
-    pub fn new(force: PeriodicForce, structure: StateSpace, frf: &'a dyn DirectFrf) -> Self {
+    pub fn new(force: PeriodicForce, structure: StateSpace, frf: &'a dyn ToolPointFrf) -> Self {
         let matters = frequencies_that_matter(frf);
         let highest = matters.last().copied().unwrap_or(structure.highest_hz);
         let average = force.average();

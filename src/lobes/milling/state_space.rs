@@ -141,7 +141,7 @@ impl StateSpace {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lobes::dynamics::frf::{AxisMode, DirectFrf};
+    use crate::lobes::dynamics::frf::{AxisMode, ToolPointFrf};
 
     #[test]
     fn modes_keep_their_receptance() {

@@ -84,7 +84,7 @@ fn single_axis(k_n_per_m2: f64, teeth: usize) -> RegenerativeForce {
 }
 
 /// |det(I − b (1 − e^{−iωT}) D Φ)|.
-fn characteristic(force: &RegenerativeForce, frf: &dyn DirectFrf, rpm: f64, limit: &Limit) -> f64 {
+fn characteristic(force: &RegenerativeForce, frf: &dyn ToolPointFrf, rpm: f64, limit: &Limit) -> f64 {
     let h = frf.receptance(limit.chatter_hz);
     let delay = Complex64::new(0.0, -TAU * limit.chatter_hz * 60.0 / (rpm * force.teeth as f64)).exp();
     let factor = limit.depth_mm * 1e-3 * (1.0 - delay);
@@ -107,7 +107,7 @@ fn least_within(solver: &StabilitySolver, rpm: f64, distance: f64) -> f64 {
 #[test]
 fn every_limit_solves_the_characteristic_equation() {
     let (robot, tool) = (robot_frf(), tool_frf());
-    let cases: [(RegenerativeForce, &dyn DirectFrf, [f64; 3]); 3] = [
+    let cases: [(RegenerativeForce, &dyn ToolPointFrf, [f64; 3]); 3] = [
         (drilling(), &robot, [60.0, 1500.0, 7.3]),
         (down_milling(800.0, 240.0, 3, 0.4), &tool, [3000.0, 20000.0, 61.0]),
         (down_milling(800.0, 240.0, 4, 0.4), &robot, [60.0, 900.0, 7.0]),
@@ -184,7 +184,7 @@ fn halving_the_frequency_step_moves_nothing_by_a_hundredth() {
     let lines: Vec<f64> = (8..1000).map(|i| 0.1 * f64::from(i)).collect();
     let values = lines.iter().map(|f| robot.receptance(*f)).collect();
     let measured = SampledFrf::new(lines, values).unwrap();
-    let cases: [(&str, RegenerativeForce, &dyn DirectFrf, [f64; 3]); 4] = [
+    let cases: [(&str, RegenerativeForce, &dyn ToolPointFrf, [f64; 3]); 4] = [
         ("drilling, robot", drilling(), &robot, [100.0, 1500.0, 1.0]),
         ("drilling, measured", drilling(), &measured, [100.0, 1500.0, 1.0]),
         (
@@ -277,7 +277,7 @@ fn noise_on_measured_lines_makes_no_false_limit() {
             );
         }
     }
-    let limit = |frf: &dyn DirectFrf| {
+    let limit = |frf: &dyn ToolPointFrf| {
         StabilitySolver::new(drilling(), frf)
             .absolute_limit()
             .unwrap()

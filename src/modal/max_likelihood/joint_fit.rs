@@ -146,7 +146,7 @@ pub(crate) fn refine(
         let frfs: Option<Vec<NoisyFrf>> = data.iter().map(|d| d.window(window_hz)).collect();
         before = after;
         let Some((mut fit, mut solution)) = frfs.and_then(|frfs| {
-            let mut fit = Fit {
+            let mut fit = PoleGroup {
                 frfs,
                 fixed,
                 search,
@@ -314,7 +314,7 @@ fn enough(frfs: usize, chance: f64, sigma: f64, looked: f64) -> f64 {
 }
 
 /// A group of poles and the lines that it is fitted to.
-pub(super) struct Fit<'a> {
+pub(super) struct PoleGroup<'a> {
     pub(super) frfs: Vec<NoisyFrf<'a>>,
     fixed: Vec<Pole>,
     search: PoleSearch,
@@ -322,7 +322,7 @@ pub(super) struct Fit<'a> {
     chance: f64,
 }
 
-impl Fit<'_> {
+impl PoleGroup<'_> {
     pub(super) fn fit(&self, poles: &[Pole]) -> Option<Solution> {
         // A search compares misfits, and a last refinement follows it.
         let by_chance = 2.0 * self.frfs.len() as f64 + 2.0;

@@ -1,6 +1,6 @@
 //! Which poles of a fit the FRFs do not need.
 
-use crate::modal::max_likelihood::joint_fit::{Change, Fit};
+use crate::modal::max_likelihood::joint_fit::{Change, PoleGroup};
 use crate::modal::max_likelihood::ml_fit::Solution;
 use crate::modal::single::local_fit::Pole;
 
@@ -12,7 +12,7 @@ const BEYOND_DOUBT: f64 = 4.0;
 /// What speaks for a pole of a fit.
 struct Evidence {
     pole: Pole,
-    /// See [`Fit::possible`].
+    /// See [`PoleGroup::possible`].
     possible: bool,
     /// And determined.
     sane: bool,
@@ -30,7 +30,7 @@ impl Evidence {
     }
 }
 
-impl Fit<'_> {
+impl PoleGroup<'_> {
     /// Takes out the least needed pole until all are needed.
     pub(super) fn without_needless(&self, mut solution: Solution, changes: &mut Vec<Change>) -> Solution {
         while let Some((needless, without)) = self.needless(&solution) {

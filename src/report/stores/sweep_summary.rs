@@ -2,9 +2,9 @@
 
 use serde_json::{Map, Value, json};
 
-use crate::lobes::band::quantile;
 use crate::lobes::workspace::PlaceStatus;
 use crate::report::figure::{CellFormat, HeatMap};
+use crate::statistics::quantile;
 
 /// Shares of the usable places at which quantities are told.
 const SHARES: [(&str, f64); 7] = [

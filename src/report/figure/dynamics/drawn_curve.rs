@@ -1,10 +1,11 @@
 //! A dynamic stiffness that the data drew: real and imaginary part over frequency, with the form fitted to it.
 
 use crate::Result;
-use crate::report::figure::sheet::axis::{FigureAxis, extent, quantile};
+use crate::report::figure::sheet::axis::{FigureAxis, extent};
 use crate::report::figure::sheet::canvas::{Color, Marker, Stroke, WIDTH, nothing_to_draw, paint};
 use crate::report::figure::sheet::panel::{FigureHeader, Panel, Swatch};
 use crate::report::figure::sheet::style;
+use crate::statistics::quantile;
 use num_complex::Complex64;
 
 #[derive(Debug, Clone, Default)]

@@ -3,11 +3,12 @@
 use num_complex::Complex64;
 
 use crate::Result;
-use crate::report::figure::sheet::axis::{FigureAxis, extent, positive_extent, quantile, usable};
+use crate::report::figure::sheet::axis::{FigureAxis, extent, positive_extent, usable};
 use crate::report::figure::sheet::canvas::{Marker, WIDTH, nothing_to_draw, paint};
 use crate::report::figure::sheet::panel::{FigureHeader, Panel, Swatch};
 use crate::report::figure::sheet::style;
 use crate::report::number::decimals;
+use crate::statistics::quantile;
 
 /// One curve over its own frequency grid; both vectors of the same length.
 #[derive(Debug, Clone, Default)]

@@ -1,10 +1,11 @@
 //! Curves of equal rank over frequency, with the modes marked: mode indicator functions.
 
 use crate::Result;
-use crate::report::figure::sheet::axis::{FigureAxis, extent, positive_extent, quantile, usable};
+use crate::report::figure::sheet::axis::{FigureAxis, extent, positive_extent, usable};
 use crate::report::figure::sheet::canvas::{WIDTH, nothing_to_draw, paint};
 use crate::report::figure::sheet::panel::{FigureHeader, Panel, Swatch};
 use crate::report::figure::sheet::style;
+use crate::statistics::quantile;
 
 #[derive(Debug, Clone, Default)]
 pub struct IndicatorFigure {

@@ -2,13 +2,14 @@
 
 use crate::Result;
 use crate::report::figure::dynamics::frf::or;
-use crate::report::figure::sheet::axis::{FigureAxis, extent, quantile, usable};
+use crate::report::figure::sheet::axis::{FigureAxis, extent, usable};
 use crate::report::figure::sheet::canvas::{
     Align, Canvas, Color, Marker, Stroke, WIDTH, nothing_to_draw, paint,
 };
 use crate::report::figure::sheet::panel::{FigureHeader, Panel, Swatch};
 use crate::report::figure::sheet::style;
 use crate::report::number::significant;
+use crate::statistics::quantile;
 
 #[derive(Debug, Clone, Default)]
 pub struct LobeTrace {

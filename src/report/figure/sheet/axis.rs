@@ -25,14 +25,6 @@ pub fn positive_extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f6
     extent(values.into_iter().filter(|v| *v > 1e-200))
 }
 
-/// The value below which the share `share` of the usable values lies.
-pub fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64> {
-    let mut sorted: Vec<f64> = values.into_iter().filter(|v| usable(*v)).collect();
-    sorted.sort_by(f64::total_cmp);
-    let index = ((sorted.len().checked_sub(1)?) as f64 * share.clamp(0.0, 1.0)).round() as usize;
-    sorted.get(index).copied()
-}
-
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Scale {
     Linear,
@@ -293,7 +285,5 @@ mod tests {
             assert_eq!(distinct.len(), axis.ticks.len(), "{axis:?}");
         }
         assert_eq!(extent([f64::NAN, f64::INFINITY, 1e300]), None);
-        assert_eq!(quantile([f64::NAN], 0.5), None);
-        assert_eq!(quantile([3.0, 1.0, 2.0, f64::NAN], 0.5), Some(2.0));
     }
 }

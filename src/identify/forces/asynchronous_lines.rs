@@ -4,7 +4,7 @@ use crate::signal::{OrderSpectrum, line_amplitude, median};
 
 /// What one cut shows off the comb.
 #[derive(Debug, Clone, PartialEq)]
-pub struct OffComb {
+pub struct AsynchronousLines {
     /// The strongest line, Hz.
     pub frequency_hz: f64,
     /// It and the lines shifted from it by multiples of the tooth-passing frequency.
@@ -20,7 +20,7 @@ pub struct VibrationLine {
     pub channels: Vec<(usize, f64, f64)>,
 }
 
-impl OffComb {
+impl AsynchronousLines {
     /// Numbers that it is compared in: its frequency, and each line on each channel.
     pub fn value_count(&self) -> usize {
         1 + self.lines.iter().map(|l| l.channels.len()).sum::<usize>()
@@ -42,7 +42,7 @@ pub fn find_vibration(
     sample_rate_hz: f64,
     spindle_hz: f64,
     teeth: usize,
-) -> Option<OffComb> {
+) -> Option<AsynchronousLines> {
     let (_, first, _) = spectra.first()?;
     let (count, line_hz) = (first.rest.len(), first.line_hz);
     let tooth_hz = spindle_hz * teeth as f64;
@@ -101,7 +101,7 @@ pub fn find_vibration(
             })
         })
         .collect();
-    Some(OffComb { frequency_hz, lines })
+    Some(AsynchronousLines { frequency_hz, lines })
 }
 
 /// A line of a steady cut that stands above its surroundings.

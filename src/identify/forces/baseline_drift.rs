@@ -12,7 +12,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// A channel's zero line: an orthonormal basis of what it may be, in weighted levels.
-pub(crate) struct ZeroLine {
+pub(crate) struct BaselineDrift {
     basis: Vec<Vec<f64>>,
     pub(crate) weight: Vec<f64>,
     /// Weighted recorded level.
@@ -25,14 +25,19 @@ pub(crate) struct ZeroLine {
     transient: Option<(Vec<f64>, Vec<f64>, f64)>,
 }
 
-impl ZeroLine {
-    pub(crate) fn new(cut: &CutData, physics: &CutPhysics, channel: &ForceChannel, index: usize) -> ZeroLine {
+impl BaselineDrift {
+    pub(crate) fn new(
+        cut: &CutData,
+        physics: &CutPhysics,
+        channel: &ForceChannel,
+        index: usize,
+    ) -> BaselineDrift {
         let weight: Vec<f64> = channel.level_std.iter().map(|s| 1.0 / s).collect();
         let time: Vec<f64> = cut.block_s.iter().map(|b| 0.5 * (b[0] + b[1])).collect();
         let weighted = |f: &dyn Fn(usize) -> f64| -> Vec<f64> {
             weight.iter().enumerate().map(|(b, w)| w * f(b)).collect()
         };
-        let mut line = ZeroLine {
+        let mut line = BaselineDrift {
             basis: Vec::new(),
             recorded: weighted(&|b| channel.level[b]),
             loss: Vec::new(),

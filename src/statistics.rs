@@ -1,0 +1,33 @@
+//! Order statistics.
+
+/// The value that the share `share` (0..1) of `values` lies below, interpolated linearly between order statistics (Hyndman and
+/// Fan 1996, type 7). What is not a number is left out; what is unlimited counts as infinite. `None` where nothing is left, or
+/// where the answer is infinite.
+pub fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64> {
+    let mut sorted: Vec<f64> = values.into_iter().filter(|v| !v.is_nan()).collect();
+    sorted.sort_by(f64::total_cmp);
+    let place = share.clamp(0.0, 1.0) * sorted.len().checked_sub(1)? as f64;
+    let (low, high) = (sorted[place.floor() as usize], sorted[place.ceil() as usize]);
+    let value = if low == high {
+        low
+    } else {
+        low + (high - low) * place.fract()
+    };
+    value.is_finite().then_some(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_interpolate_leave_out_what_is_no_number_and_count_the_unlimited() {
+        let infinite = f64::INFINITY;
+        assert_eq!(quantile([3.0, 1.0, 2.0], 0.25), Some(1.5));
+        assert_eq!(quantile([3.0, 1.0, 2.0, f64::NAN], 0.5), Some(2.0));
+        assert_eq!(quantile([1.0, infinite, infinite], 0.95), None);
+        assert_eq!(quantile([1.0, infinite, 1.0, 1.0], 0.05), Some(1.0));
+        assert_eq!(quantile([], 0.5), None);
+        assert_eq!(quantile([f64::NAN], 0.5), None);
+    }
+}

@@ -56,6 +56,14 @@ const REFIT_WITHOUT_FOLD: Stopping = Stopping {
     relative_decrease: 1e-4,
 };
 
+/// What each parameter must gain in χ², for so many independent values: their logarithm (Schwarz 1978), and in any case what
+/// a parameter that means nothing gains by chance, twice (Akaike 1974). Far from the noise so much of the misfit hangs together
+/// that hardly a value counts as independent; parameters would be rewarded there.
+fn price_of_a_parameter(independent_values: f64) -> f64 {
+    const BY_CHANCE_TWICE: f64 = 2.0;
+    independent_values.ln().max(BY_CHANCE_TWICE)
+}
+
 /// Diagnoses `model` (with the effects it already has).
 pub fn diagnose<S: Study>(study: &S, model: &ModelOf<S>) -> Result<Diagnosis<S::Domain>> {
     Engine::new(study, model)?.run()
@@ -429,7 +437,7 @@ impl<'a, S: Study> Engine<'a, S> {
             name: instance.name(),
             nrms: study.residual(model, &fit.theta)?.nrms,
             held_out: held_out(study, model, &fit.theta, Extent::Coarse, REFIT_WITHOUT_FOLD)?,
-            delta_bic: extra * (evidence.share * values as f64).ln() - gain,
+            delta_bic: extra * price_of_a_parameter(evidence.share * values as f64) - gain,
             p_value: (single * evidence.tests as f64).min(1.0),
             reduced_chi2,
             gain: raw_gain,

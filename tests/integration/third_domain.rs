@@ -315,7 +315,8 @@ fn a_hidden_harmonic_is_found_added_and_the_error_falls() {
     }
 
     let mut case = Case::without_history(bare(), study.data.clone(), Vec::new());
-    case.model = extension.after.model;
+    let after = extension.after;
+    case.model = after.model.with_start(after.calibration.theta);
     assert_eq!(case.model_description(), "baseline + harmonic, no effect added");
     let again = diagnose(&study, &case.model).unwrap();
     assert_eq!(again.verdict, DiagnosisVerdict::None);

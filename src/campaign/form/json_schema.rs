@@ -282,7 +282,14 @@ mod tests {
             without.iter().for_each(|key| drop(table.remove(*key)));
         };
         match path {
-            ["tool", "corner_radius_mm" | "lead_angle_deg"] => {
+            [
+                "tool",
+                "corner_radius_mm"
+                | "lead_angle_deg"
+                | "pitch_deg"
+                | "tooth_helix_deg"
+                | "tooth_radius_offset_mm",
+            ] => {
                 let tool = campaign["tool"].as_table_mut().unwrap();
                 tool.insert("kind".into(), Toml::String("endmill".into()));
                 tool.remove("half_point_angle_deg");

@@ -67,7 +67,7 @@ fn sound(name: &str, result: Result<Vec<u8>, Error>) {
         Ok(png) => {
             let (width, height, colours) = decoded(&png);
             assert!(
-                width >= 1000 && (140..4000).contains(&height) && colours > 20,
+                width >= 1000 && (140..4000).contains(&height) && colours > 10,
                 "{name}: {width} × {height}, {colours} colours"
             );
         }

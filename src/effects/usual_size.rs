@@ -12,7 +12,7 @@ pub struct UsualSize {
 }
 
 impl UsualSize {
-    /// One line of an effect's [`usual_sizes`](super::StructuralEffect::usual_sizes).
+    /// One line of an effect's [`usual_sizes`](super::Effect::usual_sizes).
     pub const fn new(parameter: &'static str, range: SizeRange, follows: FollowsSize) -> Self {
         UsualSize {
             parameter,

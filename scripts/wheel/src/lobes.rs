@@ -2,7 +2,7 @@
 
 use lobestone::campaign::Immersion;
 use lobestone::lobes::{
-    AxisMode, DirectFrf, LobeCurve, ModalFrf, RegenerativeForce, SampledFrf, SpeedLimit, StabilitySolver,
+    AxisMode, ToolPointFrf, LobeCurve, ModalFrf, RegenerativeForce, SampledFrf, SpeedLimit, StabilitySolver,
 };
 use num_complex::Complex64;
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray3};
@@ -69,7 +69,7 @@ pub fn zero_order<'py>(
     };
     let (curve, absolute, tips) = done(py, progress, || {
         let force = RegenerativeForce::milling_zero_order(ktc_n_per_mm2, krc_n_per_mm2, teeth, immersion)?;
-        let frf: Box<dyn DirectFrf> = match (modes, sampled) {
+        let frf: Box<dyn ToolPointFrf> = match (modes, sampled) {
             (_, Some((frequency_hz, values))) => Box::new(SampledFrf::new(frequency_hz, values)?),
             (modes, None) => Box::new(ModalFrf::from_axis_modes(&modes.unwrap_or_default())?),
         };

@@ -131,7 +131,7 @@ mod tests {
                 for (time, reach) in passes {
                     let h = reach - reached;
                     reached = reached.max(reach);
-                    if h <= 0.0 || time < 2.0 || time >= 3.0 {
+                    if h <= 0.0 || !(2.0..3.0).contains(&time) {
                         continue;
                     }
                     let cutting = h * (h / ChipLaw::REFERENCE_MM).powf(-law.exponent.unwrap_or(0.0));

@@ -15,7 +15,7 @@ pub struct Lookout<'a> {
     pub posture: &'a str,
     /// Where the frames are there.
     pub kinematics: &'a Kinematics,
-    /// See [`crate::effects::Setting`].
+    /// See [`crate::effects::PostureSetting`].
     pub level_fraction: f64,
     /// Lines that are looked at, Hz.
     pub frequency_hz: Vec<f64>,

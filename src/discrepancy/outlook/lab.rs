@@ -439,8 +439,7 @@ impl Lab {
 
     /// The model with the points of the lab.
     pub fn with_points(&self, model: &StructureModel) -> StructureModel {
-        let model = model.with_fixed(|fixed| fixed.points.clone_from(&self.points));
-        model
+        model.with_fixed(|fixed| fixed.points.clone_from(&self.points))
     }
 
     /// What each FRF of each stand would say against `rival`, were `truth` true: `[stand][frf]`. Both are a model and its

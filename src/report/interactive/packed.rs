@@ -208,7 +208,7 @@ mod tests {
             back.iter().map(f64::to_string).collect::<Vec<_>>(),
             long.iter().map(f64::to_string).collect::<Vec<_>>()
         );
-        for far in [vec![1e-30; 30], vec![1e300; 30], vec![1.0, 1e-20].repeat(20)] {
+        for far in [vec![1e-30; 30], vec![1e300; 30], [1.0, 1e-20].repeat(20)] {
             let list: Vec<Value> = far.iter().map(|v| json!(v)).collect();
             assert_eq!(stepwise(&list), None, "{far:?}");
         }

@@ -2,7 +2,7 @@
 
 use lobestone::campaign::Immersion;
 use lobestone::lobes::{
-    AxisMode, ToolPointFrf, LobeCurve, ModalFrf, RegenerativeForce, SampledFrf, SpeedLimit, StabilitySolver,
+    AxisMode, LobeCurve, ModalFrf, RegenerativeForce, SampledFrf, SpeedLimit, StabilitySolver, ToolPointFrf,
 };
 use num_complex::Complex64;
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray3};

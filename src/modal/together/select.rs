@@ -41,13 +41,15 @@ pub(crate) struct Start {
 
 /// The candidates to begin with, ascending in frequency.
 pub(crate) fn choose(data: &[Data], candidates: &[Start]) -> Vec<Pole> {
-    // With the noise that was measured: taken from what is left, strong modes that are missing would hide in it.
-    let even = set_noise::alike(data);
+    // The strongest come in, and what they leave is looked at, before the noise is taken from that: while strong modes are
+    // missing, they would hide in it. Later it tells what the model cannot describe from what is missing.
+    let mut data = data.to_vec();
     let mut firm: Vec<bool> = candidates.iter().map(|c| c.orders >= LONG_CHAIN).collect();
     let mut left: Vec<Pole> = candidates.iter().map(|c| c.pole).collect();
     let mut taken: Vec<Pole> = Vec::new();
     let mut chosen: Vec<Pole> = Vec::new();
     for round in 0..MAX_ROUNDS {
+        let even = set_noise::alike(&data);
         let Some(mut worth) = joint_fit::worth(&even, &chosen, &left) else {
             break;
         };
@@ -69,6 +71,9 @@ pub(crate) fn choose(data: &[Data], candidates: &[Start]) -> Vec<Pole> {
         let Some(groups) = joint_fit::refine(&even, &chosen, PoleSearch::Roughly, &mut Vec::new()) else {
             break;
         };
+        if round > 0 {
+            set_noise::renew(&mut data, &groups);
+        }
         chosen = groups
             .iter()
             .flat_map(|g| g.solution.poles.iter().copied())

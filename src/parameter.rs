@@ -60,6 +60,45 @@ pub struct Parameter {
 }
 
 impl Parameter {
+    /// What may be off by a factor, as likely up as down from `nominal`; `std`: of its logarithm.
+    pub fn logarithmic(
+        name: impl Into<String>,
+        unit: &'static str,
+        nominal: f64,
+        std: f64,
+        bounds: [f64; 2],
+    ) -> Self {
+        Parameter {
+            name: name.into(),
+            unit,
+            scale: Scale::Logarithmic,
+            nominal,
+            prior: Some(Prior {
+                mean: nominal.ln(),
+                std,
+            }),
+            bounds,
+        }
+    }
+
+    /// What may be off by an amount, and of either sign; `prior` in its unit.
+    pub fn linear(
+        name: impl Into<String>,
+        unit: &'static str,
+        nominal: f64,
+        prior: Prior,
+        bounds: [f64; 2],
+    ) -> Self {
+        Parameter {
+            name: name.into(),
+            unit,
+            scale: Scale::Linear,
+            nominal,
+            prior: Some(prior),
+            bounds,
+        }
+    }
+
     /// Natural value → solver scale.
     pub fn internal(&self, value: f64) -> f64 {
         match self.scale {

@@ -6,8 +6,8 @@ use crate::campaign::Campaign;
 use crate::discrepancy::comparison::compare::ErrorTotals;
 use crate::discrepancy::extension::{Extension, Fitted};
 use crate::effects::{self, Structure};
-use crate::identify::model_history::recorded_effect;
-use crate::identify::{Case, Options, Study};
+use crate::identify::model_history::recorded_effects;
+use crate::identify::{Case, Options};
 use crate::revision::{self, RecordedParameter, Revision, RevisionLog};
 use crate::{InputError, Result};
 
@@ -43,12 +43,11 @@ impl Entry<'_> {
             std_error: Some(p.std_error).filter(|s| s.is_finite()),
             initial: p.initial,
         });
-        let effects = fitted.model.effects().iter();
         Revision {
             // The log numbers them.
             revision: 0,
             domain: D::SIDE,
-            effects: effects.map(|added| recorded_effect(&added.instance)).collect(),
+            effects: recorded_effects(&fitted.model),
             parameters: parameters.collect(),
             nrms: fitted.residual.nrms,
             held_out_nrms: fitted.held_out_nrms(),
@@ -94,8 +93,7 @@ impl<D: CampaignSide> Addition<D> {
     ) -> Result<Self> {
         // Taken with the data that were read, not after the fit.
         let fingerprint = campaign.fingerprint(D::SIDE)?;
-        let study = D::study(&case, options);
-        let instances = effects::requested(study.registry(), &study.known(&case.model), name)?;
+        let instances = effects::requested(&D::registry(), &D::known(&case), name)?;
         if case.model.has(name) {
             return Err(InputError::new(format!("{name} is in the model already"))
                 .key("EFFECT")
@@ -106,7 +104,7 @@ impl<D: CampaignSide> Addition<D> {
                 ))
                 .into());
         }
-        let extension = Extension::new(&study, &case.model, &instances)?;
+        let extension = Extension::new(&D::study(&case, options), &case.model, &instances)?;
         let (before, after) = (&extension.before, &extension.after);
         let totals = D::totals(&D::view(&case, &after.model, &after.calibration.theta)?);
         let when = revision::now();

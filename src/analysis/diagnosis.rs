@@ -7,7 +7,7 @@ use crate::campaign::Campaign;
 use crate::discrepancy::setup::{Rival, SetupCheck};
 use crate::discrepancy::{Diagnosis, DiagnosisVerdict, EffectCandidate, NextMeasurement, diagnose};
 use crate::effects::{Cutting, Structure};
-use crate::identify::model_history::recorded_effect;
+use crate::identify::model_history::recorded_effects;
 use crate::identify::{Case, Modelled, Options};
 use crate::revision::{self, Evidence, RecordedCandidate};
 
@@ -116,9 +116,7 @@ impl<D: CampaignSide> Findings<D> {
     /// # Errors
     /// What the file system refuses: the diagnosis is as good without.
     pub fn keep(&self, campaign: &Workbench) -> Result<()> {
-        let effects = self.case.model.effects().iter();
-        let effects = effects.map(|a| recorded_effect(&a.instance)).collect();
-        let of = (campaign.fingerprint(D::SIDE)?, effects);
+        let of = (campaign.fingerprint(D::SIDE)?, recorded_effects(&self.case.model));
         revision::keep(&campaign.dir, D::SIDE, of, evidence(&self.diagnosis))
     }
 }

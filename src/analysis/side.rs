@@ -7,6 +7,7 @@ use crate::campaign::Campaign;
 use crate::discrepancy::comparison::compare::ErrorTotals;
 use crate::discrepancy::setup::SetupCheck;
 use crate::discrepancy::{Diagnosis, NextMeasurement};
+use crate::effects::{Known, Registry};
 use crate::identify::model_history::Side;
 use crate::identify::{Calibration, Case, Model, Modelled, Options, Study};
 
@@ -24,6 +25,12 @@ pub trait CampaignSide: Modelled {
     type Lead;
     /// The case as the loop works on it.
     type Study: Study<Domain = Self>;
+
+    /// The effects of its models.
+    fn registry() -> Registry<Self>;
+
+    /// What effects are told of a case.
+    fn known(case: &Case<Self>) -> Known<'_, Self>;
 
     /// Model and measurements of a campaign.
     ///

@@ -13,8 +13,7 @@ use crate::discrepancy::localise::{Localisation, localise};
 use crate::discrepancy::outlook::next_measurement;
 use crate::discrepancy::setup::{SetupCheck, examine};
 use crate::discrepancy::{Diagnosis, Explained, FrfComparison, NextMeasurement};
-use crate::effects::Structure;
-use crate::identify::frfs::structure_study::{ResidualPeak, residual_peaks};
+use crate::effects::{Known, Registry, Structure};
 use crate::identify::model_history::Side;
 use crate::identify::{Calibration, Options, StructureCase, StructureModel, StructureStudy};
 
@@ -24,8 +23,6 @@ pub struct FrfView {
     pub predicted: Vec<Vec<Complex64>>,
     /// Their errors.
     pub comparison: FrfComparison,
-    /// Frequencies around which the residual stands out.
-    pub residual_peaks: Vec<ResidualPeak>,
 }
 
 impl CampaignSide for Structure {
@@ -35,6 +32,14 @@ impl CampaignSide for Structure {
     type Explained = Explained;
     type Lead = Localisation;
     type Study = StructureStudy;
+
+    fn registry() -> Registry<Structure> {
+        Registry::structure()
+    }
+
+    fn known(case: &StructureCase) -> Known<'_, Structure> {
+        case.model.known(&case.data.summary())
+    }
 
     fn case(campaign: &Workbench) -> Result<StructureCase> {
         StructureCase::on(campaign)
@@ -48,7 +53,6 @@ impl CampaignSide for Structure {
         let predicted = model.predict(theta, &case.data)?;
         Ok(FrfView {
             comparison: FrfComparison::new(&case.data, &model.points, &predicted),
-            residual_peaks: residual_peaks(&predicted, &case.data),
             predicted,
         })
     }

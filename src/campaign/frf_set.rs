@@ -1,6 +1,5 @@
 //! The measured FRFs of a campaign, as receptance between its points.
 
-use crate::data::{Dof, FrfRecord, FrfSet, MeasuredDof, MeasuredFrf, Quantity};
 use std::path::{Path, PathBuf};
 
 use num_complex::Complex64;
@@ -8,6 +7,7 @@ use rayon::prelude::*;
 
 use super::schema::{Campaign, FrfFile};
 use crate::campaign::form::paths::campaign_file;
+use crate::data::{Dof, FrfRecord, FrfSet, MeasuredDof, MeasuredFrf, Quantity};
 use crate::text::shown_briefly as shown;
 use crate::{InputError, Result};
 

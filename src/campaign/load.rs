@@ -1,9 +1,5 @@
 //! `campaign.toml` to a validated [`Campaign`].
 
-use crate::data::{
-    AxesRef, BodyRef, ChipFormation, Cut, CutOutcome, Dof, LinkGroup, LinkTolerances, OrthogonalSection,
-    Point, Posture, Quantity, RobotSection, RobotSpec, Tool,
-};
 use std::path::{Path, PathBuf};
 
 use super::lobes_section;
@@ -16,6 +12,10 @@ use crate::campaign::form::keys::ROBOT_KEY;
 use crate::campaign::form::keys::{self, FORM, names};
 use crate::campaign::form::paths::{self, campaign_file};
 use crate::campaign::form::section::Section;
+use crate::data::{
+    AxesRef, BodyRef, ChipFormation, Cut, CutOutcome, Dof, LinkGroup, LinkTolerances, OrthogonalSection,
+    Point, Posture, Quantity, RobotSection, RobotSpec, Tool,
+};
 use crate::text::shown_briefly as shown;
 use crate::{Error, InputError, Result};
 

@@ -1,6 +1,5 @@
 //! Robot files: the built-in robots, and files of the same form in a campaign's folder.
 
-use crate::data::{BeamSection, JointPlacement, JointSpec, LinkSpec, RobotSpec, ToolFrame};
 use std::path::Path;
 
 use crate::campaign::form::bounds::Bounds;
@@ -9,6 +8,7 @@ use crate::campaign::form::keys::ROBOT_KEY;
 use crate::campaign::form::keys::{self, names};
 use crate::campaign::form::paths::{self, campaign_file};
 use crate::campaign::form::section::Section;
+use crate::data::{BeamSection, JointPlacement, JointSpec, LinkSpec, RobotSpec, ToolFrame};
 use crate::text::closest;
 use crate::{InputError, Result};
 

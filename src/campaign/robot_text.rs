@@ -1,8 +1,9 @@
 //! A robot as the text of a robot file; what [`RobotSpec::load`] reads back.
 
+use std::fmt::Write;
+
 use crate::data::{JointSpec, LinkSpec, RobotSpec};
 use crate::text::{quoted, to_degrees};
-use std::fmt::Write;
 
 fn list(values: &[f64]) -> String {
     let all: Vec<String> = values.iter().map(|v| format!("{:?}", v + 0.0)).collect();

@@ -1,8 +1,8 @@
 //! The validated content of `campaign.toml`.
 
-use crate::data::{Cut, Dof, LobesSection, OrthogonalSection, Point, Posture, Quantity, RobotSection, Tool};
 use std::path::PathBuf;
 
+use crate::data::{Cut, Dof, LobesSection, OrthogonalSection, Point, Posture, Quantity, RobotSection, Tool};
 use crate::ingest::ChannelRule;
 
 /// A validated campaign. Paths are absolute or relative to the working directory (already joined with `dir`).

@@ -292,7 +292,7 @@ impl<'a, S: Study> Engine<'a, S> {
     /// What small errors of the setup leave of a rest that is more than noise.
     fn beyond_slips(&self, rest: &Rest, model: &ModelOf<S>, theta: &[f64]) -> Result<Option<BeyondSlips>> {
         match rest.is_significant() {
-            true => self.study.beyond_slips(model, theta),
+            true => self.study.beyond_slips(model, theta, rest),
             false => Ok(None),
         }
     }

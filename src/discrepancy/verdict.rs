@@ -1,6 +1,5 @@
 //! From candidates to a verdict: effect, none or unknown, and how sure.
 
-use crate::identify::Modelled;
 use serde::Serialize;
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -8,6 +7,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::candidate::{BaselineFit, EffectCandidate};
 use super::something_else;
 use crate::identify::HeldOut;
+use crate::identify::Modelled;
 use crate::identify::rest::Rest;
 
 /// What the loop says about missing physics.

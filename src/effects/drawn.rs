@@ -10,7 +10,7 @@ use crate::data::RobotSpec;
 use crate::effects::structural::branch;
 use crate::effects::structural::{DataSummary, PostureSetting, Structure};
 use crate::effects::{At, Effect, Instance, Known, NEGLIGIBLE, Site};
-use crate::parameter::{Parameter, Prior, Scale};
+use crate::parameter::Parameter;
 use crate::robot::{Attachment, AttachmentLaw, Branch as HungMass, Chain, Dual, Element, Grip, Role};
 
 /// A law of force over displacement.
@@ -143,17 +143,7 @@ pub fn dynamic_stiffness(spot: Spot, form: DrawnForm, values: &[f64], frequency_
 }
 
 fn free(name: &str, unit: &'static str, nominal: f64, bounds: [f64; 2]) -> Parameter {
-    Parameter {
-        name: name.into(),
-        unit,
-        scale: Scale::Logarithmic,
-        nominal,
-        prior: Some(Prior {
-            mean: nominal.ln(),
-            std: 3.0,
-        }),
-        bounds,
-    }
+    Parameter::logarithmic(name, unit, nominal, 3.0, bounds)
 }
 
 fn parameters(site: Site, variant: usize, data: &DataSummary) -> Vec<Parameter> {

@@ -4,6 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::effects::{self, Instance};
+use crate::identify::model::{Model, Modelled};
 
 /// The side of a campaign that a revision belongs to; each side has a model of its own and counts for itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -139,4 +140,10 @@ pub fn recorded_effect<D: effects::Domain>(instance: &Instance<D>) -> RecordedEf
         effect: instance.label(),
         variant: variant.map(|(_, value)| value.to_string()),
     }
+}
+
+/// How the effects of a model stand in the log.
+pub fn recorded_effects<D: Modelled>(model: &Model<D>) -> Vec<RecordedEffect> {
+    let effects = model.effects().iter();
+    effects.map(|added| recorded_effect(&added.instance)).collect()
 }

@@ -118,8 +118,13 @@ pub trait Study: Sync {
     }
 
     /// What tests of structure find in what small errors of the setup cannot take of that; `None` where nothing is known of
-    /// such errors.
-    fn beyond_slips(&self, _model: &Model<Self::Domain>, _theta: &[f64]) -> Result<Option<BeyondSlips>> {
+    /// such errors. `rest`: what [`Self::rest`] found.
+    fn beyond_slips(
+        &self,
+        _model: &Model<Self::Domain>,
+        _theta: &[f64],
+        _rest: &Rest,
+    ) -> Result<Option<BeyondSlips>> {
         Ok(None)
     }
 
@@ -371,7 +376,7 @@ fn hardly_there<D: Modelled>(model: &Model<D>, bases: &[Vec<f64>]) -> Vec<Vec<f6
     let Some(limit) = vanishing_limit(model) else {
         return Vec::new();
     };
-    let parameters = model.parameters.as_slice();
+    let parameters = &model.parameters;
     let own = &parameters[parameters.len() - limit.len()..];
     let faint: Vec<f64> = own
         .iter()
@@ -392,7 +397,7 @@ fn hardly_there<D: Modelled>(model: &Model<D>, bases: &[Vec<f64>]) -> Vec<Vec<f6
 pub fn vanished<D: Modelled>(model: &Model<D>, without: &Fit) -> Option<Fit> {
     let limit = vanishing_limit(model)?;
     let (front, count) = (without.theta.len(), without.theta.len() + limit.len());
-    let parameters = model.parameters.as_slice();
+    let parameters = &model.parameters;
     let mut hessian = DMatrix::zeros(count, count);
     hessian
         .view_mut((0, 0), (front, front))
@@ -544,7 +549,7 @@ pub fn rescue<S: Study>(
 ) -> Result<Option<Fit>> {
     /// Starting points, and their seed.
     const STARTS: (usize, u64) = (4, 1);
-    let parameters = model.parameters.as_slice();
+    let parameters = &model.parameters;
     let own = own_starts(study, &tried.model, parameters.len(), &tried.instance, hints);
     let bounds = tried.model.bounds();
     let fit =

@@ -31,7 +31,7 @@ pub use formats::uff::{
     uff58_bytes, write_datasets58, write_uff58,
 };
 pub use long::{Survey, regular_file, survey};
-pub use preview::{PlainColumn, plain_columns};
+pub use preview::{PlainColumn, SIGNALS, plain_columns, taken_for};
 pub use quality::quality_warnings;
 pub use read::{read_content, read_file, read_frfs, read_frfs_in, read_memory, read_time};
 pub use text::shown;

@@ -60,6 +60,22 @@ impl PlainColumn {
     }
 }
 
+/// Signals in the order in which recorders write them.
+pub const SIGNALS: [&str; 4] = ["fx", "fy", "fz", "mz"];
+
+/// What each column of a force record is taken for: a clock for `time`, all else for [`SIGNALS`] in their order. Ends where
+/// these do.
+pub fn taken_for(columns: &[PlainColumn]) -> impl Iterator<Item = (&PlainColumn, &'static str)> {
+    let mut signals = SIGNALS.into_iter();
+    columns.iter().map_while(move |column| {
+        let name = match column.step {
+            Some(_) => "time",
+            None => signals.next()?,
+        };
+        Some((column, name))
+    })
+}
+
 /// The columns of a file that is a table of numbers without names; `None` for all else.
 ///
 /// # Errors
@@ -92,26 +108,22 @@ pub(super) fn columns(bytes: &[u8], header: &Header) -> Vec<PlainColumn> {
 /// What a table without names holds, and the lines of `campaign.toml` that give it names.
 pub(super) fn preview(bytes: &[u8], header: &Header) -> (String, String) {
     let columns = columns(bytes, header);
-    let mut seen = Vec::new();
+    let seen = columns.iter().enumerate();
+    let seen: Vec<String> = seen
+        .map(|(i, column)| format!("{}: {}", i + 1, column.describe()))
+        .collect();
     let mut lines = String::new();
-    let mut forces = ["fx", "fy", "fz", "mz"].into_iter();
     let mut has_time = false;
-    for (i, column) in columns.iter().enumerate() {
-        seen.push(format!("{}: {}", i + 1, column.describe()));
-        let is_time = column.step.is_some();
-        has_time |= is_time;
-        let name = if is_time { Some("time") } else { forces.next() };
-        if let Some(name) = name {
-            let gain = if is_time {
-                "unit = \"s\""
-            } else {
-                "unit = \"V\"\ngain = \"500 N/V\""
-            };
-            lines += &format!("\n[[channel]]\nname = \"{name}\"\ncolumn = {}\n{gain}", i + 1);
-            if !has_time {
-                lines += "\nrate_hz = 10000.0";
-                has_time = true;
-            }
+    for (i, (column, name)) in taken_for(&columns).enumerate() {
+        let gain = match column.step {
+            Some(_) => "unit = \"s\"",
+            None => "unit = \"V\"\ngain = \"500 N/V\"",
+        };
+        has_time |= column.step.is_some();
+        lines += &format!("\n[[channel]]\nname = \"{name}\"\ncolumn = {}\n{gain}", i + 1);
+        if !has_time {
+            lines += "\nrate_hz = 10000.0";
+            has_time = true;
         }
     }
     let what = format!(

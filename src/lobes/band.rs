@@ -1,6 +1,5 @@
 //! What the uncertainty of a model's parameters leaves open of its lobes: quantiles over draws.
 
-use crate::statistics::quantile;
 use nalgebra::{DMatrix, DVector};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -9,6 +8,7 @@ use serde::Serialize;
 
 use super::blocks::{AveragedCut, BlockSolver, Blocks};
 use super::curve::SpeedLimit;
+use crate::statistics::quantile;
 use crate::{Error, Result};
 
 /// The band's lower and upper quantile.

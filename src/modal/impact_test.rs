@@ -300,7 +300,7 @@ fn consistent(blocks: &[Block], hits: &mut [Hit]) -> (Vec<usize>, bool) {
                 .fold(0.0, f64::max)
         })
         .collect();
-    let usual = quantile(misfit.iter().copied(), 0.4).unwrap_or(0.0);
+    let usual = quantile(misfit.iter().copied(), 0.4).unwrap_or(f64::INFINITY);
     // Of two nobody can say which is right.
     if blocks.len() == 2 {
         return (all, usual > CONTRADICTORY);

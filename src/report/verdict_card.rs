@@ -11,7 +11,7 @@ use crate::discrepancy::candidate::BaselineFit;
 use crate::discrepancy::localise::Localisation;
 use crate::discrepancy::setup::SetupFinding;
 use crate::discrepancy::verdict::is_noise;
-use crate::discrepancy::{CutError, Diagnosis, DiagnosisVerdict, EffectCandidate};
+use crate::discrepancy::{CutError, Diagnosis, DiagnosisVerdict};
 use crate::effects::{Domain, Instance};
 use crate::identify::Modelled;
 use crate::identify::forces::cutting_waves::courses;
@@ -67,16 +67,15 @@ fn answer<D: Modelled>(
     added: &[String],
     data: &str,
     lead: Option<&Localisation>,
-    name: impl Fn(&EffectCandidate<D>) -> Named,
 ) -> VerdictCard {
     let mut card = VerdictCard::default();
     let label_in_words = |label: &String| {
         let of = d.candidates.iter().find(|c| c.label() == *label);
-        of.map_or_else(|| label.clone(), |c| name(c).title)
+        of.map_or_else(|| label.clone(), |c| named(&c.instance).title)
     };
     match (d.verdict, d.winner()) {
         (DiagnosisVerdict::Effect, Some(winner)) => {
-            let of = name(winner);
+            let of = named(&winner.instance);
             card.tone = Tone::Missing;
             card.headline = format!("Missing: {}", of.title);
             card.explanation = of.explanation.into();
@@ -97,7 +96,7 @@ fn answer<D: Modelled>(
             card.headline = "No verdict: too few data for one".into();
             card.explanation = sentence(d.too_little_data.as_deref().unwrap_or_default());
         }
-        _ => unknown(&mut card, d, lead, &name),
+        _ => unknown(&mut card, d, lead),
     }
     if d.too_little_data.is_none() {
         card.facts.push(("How sure", words::confidence(d.confidence)));
@@ -137,12 +136,7 @@ fn nothing(card: &mut VerdictCard, baseline: &BaselineFit, added: &[String], dat
     }
 }
 
-fn unknown<D: Modelled>(
-    card: &mut VerdictCard,
-    d: &Diagnosis<D>,
-    lead: Option<&Localisation>,
-    name: &impl Fn(&EffectCandidate<D>) -> Named,
-) {
+fn unknown<D: Modelled>(card: &mut VerdictCard, d: &Diagnosis<D>, lead: Option<&Localisation>) {
     let drawn = lead.and_then(|found| {
         let place = found.places.first()?;
         Some((place, place.best.as_ref()?))
@@ -165,7 +159,7 @@ fn unknown<D: Modelled>(
     };
     let guess = d.best_guess.and_then(|i| d.candidates.get(i));
     if let (Some(guess), Some(words)) = (guess, d.best_guess_in_words()) {
-        let of = name(guess);
+        let of = named(&guess.instance);
         let words = words.strip_prefix("Best guess: ").unwrap_or(&words);
         card.facts
             .push(("Best guess", words.replacen(&guess.label(), &of.title, 1)));
@@ -255,7 +249,7 @@ pub fn structure(
     let mut card = match (diagnosis, structure) {
         (Some(found), _) => {
             let d = &found.diagnosis;
-            let mut card = answer(d, &added, "FRFs", found.lead.as_ref(), |c| named(&c.instance));
+            let mut card = answer(d, &added, "FRFs", found.lead.as_ref());
             if let Some(leading) = &found.leading {
                 let place = leading.explained.taken_from.words();
                 card.facts
@@ -453,7 +447,7 @@ pub fn cutting(campaign: &Campaign, files: &[SetupFinding], found: &CuttingFindi
     let d = &found.diagnosis;
     let effects = found.case.model.effects();
     let added: Vec<String> = effects.iter().map(|a| named(&a.instance).title).collect();
-    let mut card = answer(d, &added, "force records", None, |c| named(&c.instance));
+    let mut card = answer(d, &added, "force records", None);
     card.id = "verdict-cutting";
     card.side = FORCES;
     if let Some(first) = found.lead.as_ref().and_then(|l| l.lines.first()) {

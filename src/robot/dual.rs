@@ -23,6 +23,11 @@ impl Dual {
         }
     }
 
+    /// The unit matrix of three coordinates.
+    pub fn unit_matrix() -> [[Dual; 3]; 3] {
+        [0, 1, 2].map(|i| [0, 1, 2].map(|j| Dual::constant(if i == j { 1.0 } else { 0.0 })))
+    }
+
     /// The parameter `index` of `count` itself.
     pub fn variable(value: f64, index: usize, count: usize) -> Self {
         let mut gradient = vec![0.0; count];

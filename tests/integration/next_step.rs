@@ -1,8 +1,9 @@
 //! The loop as a conversation: every command names the next step, in the text and in the document, and it depends on what
 //! was found. And what the text looks like: bars, and colours on terminals only.
 
-use crate::support::{blind, copy_of, document, lobestone, program};
 use serde_json::Value;
+
+use crate::support::{blind, copy_of, document, lobestone, program};
 
 /// The next step, which must be the same in document and text, and name the folder.
 fn next(command: &str, dir: &str, rest: &[&str]) -> String {

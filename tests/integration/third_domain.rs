@@ -11,7 +11,7 @@ use lobestone::effects::{At, Background, Domain, Effect, Known, Registry};
 use lobestone::identify::levenberg_marquardt::Stopping;
 use lobestone::identify::study::{Extent, Residual, View};
 use lobestone::identify::{
-    Calibration, Case, HeldOut, LeastSquares, Linearisation, Model, Modelled, Parameter, Prior, Scale, Study,
+    Calibration, Case, HeldOut, LeastSquares, Linearisation, Model, Modelled, Parameter, Prior, Study,
     minimise,
 };
 use lobestone::robot::Dual;
@@ -45,14 +45,7 @@ impl Modelled for Curve {
 }
 
 fn linear(name: &str, nominal: f64, std: f64, bounds: [f64; 2]) -> Parameter {
-    Parameter {
-        name: name.into(),
-        unit: "1",
-        scale: Scale::Linear,
-        nominal,
-        prior: Some(Prior { mean: nominal, std }),
-        bounds,
-    }
+    Parameter::linear(name, "1", nominal, Prior { mean: nominal, std }, bounds)
 }
 
 const NOTHING_TO_READ: Background = Background {

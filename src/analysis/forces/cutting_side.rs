@@ -11,7 +11,7 @@ use crate::discrepancy::setup::{SetupCheck, examine_cutting};
 use crate::discrepancy::{
     CuttingComparison, CuttingLead, Diagnosis, EffectCandidate, NextMeasurement, cutting_lead,
 };
-use crate::effects::Cutting;
+use crate::effects::{Cutting, Known, Registry};
 use crate::identify::forces::cutting_problem::{CutFit, CuttingProblem};
 use crate::identify::model_history::Side;
 use crate::identify::{Calibration, CuttingCase, CuttingModel, CuttingStudy, Options};
@@ -31,6 +31,14 @@ impl CampaignSide for Cutting {
     type Explained = ();
     type Lead = CuttingLead;
     type Study = CuttingStudy;
+
+    fn registry() -> Registry<Cutting> {
+        Registry::cutting()
+    }
+
+    fn known(case: &CuttingCase) -> Known<'_, Cutting> {
+        case.model.known(&case.data)
+    }
 
     fn case(campaign: &Workbench) -> Result<CuttingCase> {
         CuttingCase::on(campaign)

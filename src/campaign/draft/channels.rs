@@ -4,21 +4,13 @@ use super::answers::Answers;
 use super::entry::{DraftTable, Entry, Kind};
 use super::making::Making;
 use crate::Result;
-use crate::ingest::PlainColumn;
+use crate::ingest::{PlainColumn, taken_for};
 
 /// A section for the time, where there is one, and for each signal, taken as x, y, z and torque in their order.
 pub(super) fn channels(columns: &[PlainColumn], answers: &Answers) -> Result<Vec<DraftTable>> {
     let mut tables = Vec::new();
-    let mut forces = ["fx", "fy", "fz", "mz"].into_iter();
     let has_time = columns.first().is_some_and(|c| c.step.is_some());
-    for (i, column) in columns.iter().enumerate() {
-        let name = match column.step {
-            Some(_) => Some("time"),
-            None => forces.next(),
-        };
-        let Some(name) = name else {
-            break;
-        };
+    for (i, (column, name)) in taken_for(columns).enumerate() {
         let mut making = Making::new(answers, "channel", name, true);
         making.fact("name", Kind::Text, name);
         let at = (i + 1).to_string();

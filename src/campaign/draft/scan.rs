@@ -1,6 +1,5 @@
 //! What lies in a folder: every file read as `inspect` reads it.
 
-use crate::data::{ChannelRole, Quantity, RobotSpec};
 use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -11,6 +10,7 @@ use super::cut_list;
 use super::found::{FoundForce, FoundFrf, Scan, stem};
 use super::names::{Facts, facts_of, facts_of_header, posture_of};
 use crate::campaign::campaign_file;
+use crate::data::{ChannelRole, Quantity, RobotSpec};
 use crate::ingest::{PlainColumn, plain_columns, survey};
 use crate::{Error, InputError, Result};
 

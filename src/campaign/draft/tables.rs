@@ -1,6 +1,5 @@
 //! The sections of a first campaign file.
 
-use crate::data::Quantity;
 use std::collections::BTreeSet;
 
 use super::answers::Answers;
@@ -11,6 +10,7 @@ use super::list_columns::{CUTTING_SPEED, DIAMETER, DIRECTION, FEED_PER_TURN, FEE
 use super::making::Making;
 use super::names::FROM_NAME;
 use crate::Result;
+use crate::data::Quantity;
 
 const PROCESSES: &[&str] = &["milling", "drilling", "turning"];
 const FROM_HEADER: &str = "from the file's header";

@@ -11,6 +11,7 @@ use crate::campaign::{Campaign, campaign_file};
 use crate::commands::begin::init_robot::{MadeRobot, RobotArgs};
 use crate::commands::text::{Emphasis, setup_lines, table, warnings};
 use crate::commands::{Outcome, next_step};
+use crate::ingest::SIGNALS;
 use crate::{Error, InputError, Result};
 
 #[derive(clap::Args)]
@@ -178,7 +179,7 @@ impl InitArgs {
 
 /// The unit of the signals; the time has its own.
 fn set_channel_unit(answers: &mut Answers, unit: &str) {
-    for name in ["fx", "fy", "fz", "mz"] {
+    for name in SIGNALS {
         answers.set(format!("channel {name}"), "unit", unit);
     }
 }

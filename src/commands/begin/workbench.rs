@@ -1,7 +1,6 @@
 //! A campaign as the page of `serve` works on it: the documents and texts are those of the commands of the same names. What
 //! takes long a worker does (`bench_worker`).
 
-use crate::effects::Registry;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -15,6 +14,7 @@ use crate::commands::begin::bench_worker::{
 };
 use crate::commands::find::explain;
 use crate::commands::grow::history;
+use crate::effects::Registry;
 use crate::revision::{RevisionLog, Side, hold};
 use crate::robot::RobotSpec;
 use crate::serve::{Job, JobStage, PageOrder, PageSubject, Refusal, Report, locked};
@@ -211,7 +211,7 @@ impl PageSubject for CampaignBench {
             PageOrder::Diagnose { .. } => "the diagnosis".into(),
             PageOrder::Add { side, head, effect } => {
                 log_at(&self.dir, *side, head)?;
-                let cutting = !Registry::cutting().find(&(), effect).is_empty();
+                let cutting = Registry::cutting().effect(effect).is_some();
                 if cutting != (*side == Side::Cutting) {
                     return Err(Refusal::Impossible(format!(
                         "\"{effect}\" is no effect of this side of the campaign"

@@ -1,4 +1,3 @@
-use crate::identify::Modelled;
 use serde_json::{Map, Value, json};
 
 use crate::Result;
@@ -12,7 +11,9 @@ use crate::discrepancy::candidate::BaselineFit;
 use crate::discrepancy::comparison::explained::{Explained, NamedPart};
 use crate::discrepancy::localise::Localisation;
 use crate::discrepancy::{CuttingLead, Diagnosis, DiagnosisVerdict, EffectCandidate, NextMeasurement};
+use crate::identify::Modelled;
 use crate::identify::Options;
+use crate::identify::frfs::structure_study::residual_peaks;
 use crate::identify::rest::Rest;
 
 pub fn run(args: SideArgs) -> Result<Outcome> {
@@ -46,7 +47,7 @@ pub fn cutting(campaign: &Campaign, findings: &CuttingFindings) -> Outcome {
 
 /// What was found out about the FRFs.
 pub fn structure(campaign: &Campaign, findings: &DiagnosisFindings) -> Outcome {
-    let peaks = &findings.now.residual_peaks;
+    let peaks = &residual_peaks(&findings.now.predicted, &findings.case.data);
     let own = json!({
         "explains": explains(findings),
         "residual_peaks_hz": peaks.iter().map(|p| p.frequency_hz).collect::<Vec<_>>(),

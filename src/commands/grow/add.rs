@@ -1,5 +1,3 @@
-use crate::effects::{Cutting, Registry, Structure};
-use crate::identify::Modelled;
 use serde_json::{Value, json};
 
 use crate::Result;
@@ -10,6 +8,8 @@ use crate::commands::next_step::Guide;
 use crate::commands::text::{Emphasis, number, percent, table, warnings, wrapped};
 use crate::commands::{CampaignArg, Outcome};
 use crate::discrepancy::extension::{Extension, Fitted};
+use crate::effects::{Cutting, Registry, Structure};
+use crate::identify::Modelled;
 use crate::identify::{Calibration, Options};
 use crate::revision::RevisionLog;
 

@@ -338,6 +338,7 @@ impl MillingCut {
     /// The edges of the teeth at depth `z`; one where they are alike.
     fn edges(&self, z: f64, law: ChipLaw) -> Vec<Edge> {
         let pitch = TAU / self.teeth as f64;
+        let is_even = self.is_evenly_spaced();
         let places = self.places.iter().enumerate();
         match (law.runout, self.places.is_empty()) {
             (None, true) => vec![Edge::at(0.0, 0)],
@@ -350,11 +351,7 @@ impl MillingCut {
                     let ahead = place.ahead_rad - (place.lag_rad - self.lag_rad) * z;
                     let angle = runout.map_or(0.0, |r| r[1]);
                     Edge {
-                        ahead_teeth: if self.is_evenly_spaced() {
-                            j as f64
-                        } else {
-                            ahead / pitch
-                        },
+                        ahead_teeth: if is_even { j as f64 } else { ahead / pitch },
                         radius_mm: place.radius_mm,
                         ..Edge::at(angle - ahead + self.lag_rad * z, j)
                     }

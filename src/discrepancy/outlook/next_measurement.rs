@@ -1,7 +1,6 @@
 //! The next measurement: the one that is expected to tell two explanations apart, against the noise and after each has
 //! taken in what it can, at the least effort.
 
-use crate::effects::Structure;
 use std::fmt;
 
 use serde::Serialize;
@@ -12,6 +11,7 @@ use crate::discrepancy::candidate::EffectCandidate;
 use crate::discrepancy::diagnosis::Diagnosis;
 use crate::discrepancy::outlook::lab::{Lab, NewPoint, Setup};
 use crate::discrepancy::verdict::DiagnosisVerdict;
+use crate::effects::Structure;
 use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
 use crate::identify::{FrfData, LeastSquares};
 

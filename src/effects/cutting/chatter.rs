@@ -1,8 +1,8 @@
-use super::common::{linear, logarithmic, milling_only, straight_edge_only};
+use super::common::{milling_only, straight_edge_only};
 use super::{CutPhysics, CutSetting, Cutting, Vibration};
 use crate::effects::Background;
 use crate::effects::{At, Effect, Known, NEGLIGIBLE};
-use crate::parameter::Parameter;
+use crate::parameter::{Parameter, Prior};
 use crate::robot::Dual;
 
 /// Amplitude per feed below which there is none.
@@ -56,15 +56,24 @@ impl Effect<Cutting> for Chatter {
     fn parameters(&self, _at: At, Known { data, .. }: &Known<Cutting>) -> Vec<Parameter> {
         let frequency = data.vibration_hz.unwrap_or(500.0);
         vec![
-            logarithmic(
+            Parameter::logarithmic(
                 "frequency_hz",
                 "Hz",
                 frequency,
                 0.5,
                 [0.5 * frequency, 2.0 * frequency],
             ),
-            logarithmic("amplitude_per_feed", "1", 0.1, 2.0, [1e-5, 10.0]),
-            linear("direction_deg", "deg", 45.0, 180.0, 0.0, [-360.0, 360.0]),
+            Parameter::logarithmic("amplitude_per_feed", "1", 0.1, 2.0, [1e-5, 10.0]),
+            Parameter::linear(
+                "direction_deg",
+                "deg",
+                45.0,
+                Prior {
+                    mean: 0.0,
+                    std: 180.0,
+                },
+                [-360.0, 360.0],
+            ),
         ]
     }
 

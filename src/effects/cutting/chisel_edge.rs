@@ -1,9 +1,9 @@
-use super::common::{drilling_only, linear, logarithmic};
+use super::common::drilling_only;
 use super::{CutPhysics, CutSetting, Cutting};
 use crate::effects::Background;
 use crate::effects::background::SHAW_OXFORD;
 use crate::effects::{At, Effect, Known, NEGLIGIBLE};
-use crate::parameter::Parameter;
+use crate::parameter::{Parameter, Prior};
 use crate::robot::Dual;
 
 /// The chisel edge indents: thrust ∝ feed^n in holes without pilot.
@@ -48,14 +48,14 @@ impl Effect<Cutting> for ChiselEdge {
         // About the thrust of a chip as wide as the chisel, ten times as hard to cut.
         let nominal = data.cutting_scale_n_per_mm2.max(1.0);
         vec![
-            logarithmic(
+            Parameter::logarithmic(
                 "coefficient_n",
                 "N",
                 nominal,
                 2.0,
                 [1e-3 * nominal, 100.0 * nominal],
             ),
-            linear("exponent", "1", 0.8, 0.4, 0.8, [-0.5, 3.0]),
+            Parameter::linear("exponent", "1", 0.8, Prior { mean: 0.8, std: 0.4 }, [-0.5, 3.0]),
         ]
     }
 

@@ -1,9 +1,9 @@
-use super::common::{linear, milling_only, unit_mixing};
+use super::common::milling_only;
 use super::{CutPhysics, CutSetting, Cutting};
 use crate::effects::background::GAUTSCHI;
 use crate::effects::{At, Effect, Known, Site};
 use crate::effects::{Background, Size};
-use crate::parameter::Parameter;
+use crate::parameter::{Parameter, Prior};
 use crate::robot::Dual;
 
 /// Force channels leak into each other.
@@ -46,7 +46,15 @@ impl Effect<Cutting> for Crosstalk {
     fn parameters(&self, _at: At, _known: &Known<Cutting>) -> Vec<Parameter> {
         LEAKS
             .iter()
-            .map(|(i, j)| linear(format!("matrix[{i}][{j}]"), "1", 0.0, 0.06, 0.0, [-0.5, 0.5]))
+            .map(|(i, j)| {
+                Parameter::linear(
+                    format!("matrix[{i}][{j}]"),
+                    "1",
+                    0.0,
+                    Prior { mean: 0.0, std: 0.06 },
+                    [-0.5, 0.5],
+                )
+            })
             .collect()
     }
 
@@ -67,7 +75,7 @@ impl Effect<Cutting> for Crosstalk {
     }
 
     fn apply(&self, _at: At, values: &[Dual], _setting: &CutSetting, physics: &mut CutPhysics) {
-        let mut mixing = unit_mixing();
+        let mut mixing = Dual::unit_matrix();
         for ((i, j), value) in LEAKS.iter().zip(values) {
             mixing[*i][*j] = value.clone();
         }

@@ -1,8 +1,8 @@
-use super::common::{linear, milling_only, unit_mixing};
+use super::common::milling_only;
 use super::{CutPhysics, CutSetting, Cutting};
 use crate::effects::{At, Effect, Known, Site};
 use crate::effects::{Background, Size};
-use crate::parameter::Parameter;
+use crate::parameter::{Parameter, Prior};
 use crate::robot::Dual;
 
 /// The dynamometer is tilted about its x or y axis.
@@ -46,7 +46,13 @@ impl Effect<Cutting> for DynamometerMisalignment {
     }
 
     fn parameters(&self, _at: At, _known: &Known<Cutting>) -> Vec<Parameter> {
-        vec![linear("angle_deg", "deg", 1.0, 6.0, 0.0, [-45.0, 45.0])]
+        vec![Parameter::linear(
+            "angle_deg",
+            "deg",
+            1.0,
+            Prior { mean: 0.0, std: 6.0 },
+            [-45.0, 45.0],
+        )]
     }
 
     fn starts(&self, _at: At, _known: &Known<Cutting>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
@@ -73,7 +79,7 @@ impl Effect<Cutting> for DynamometerMisalignment {
         let angle = values[0].scale(1f64.to_radians());
         let (s, c) = angle.value.sin_cos();
         let (sin, cos) = (angle.chain(s, c), angle.chain(c, -s));
-        let mut tilt = unit_mixing();
+        let mut tilt = Dual::unit_matrix();
         // Right-handed about the axis: (y, z) for x, (z, x) for y.
         let (a, b) = if variant == 0 { (1, 2) } else { (2, 0) };
         (tilt[a][a], tilt[b][b]) = (cos.clone(), cos);

@@ -1,4 +1,4 @@
-use super::common::{logarithmic, milling_only};
+use super::common::milling_only;
 use super::{CutPhysics, CutSetting, Cutting};
 use crate::effects::{At, Effect, Known, NEGLIGIBLE, Site};
 use crate::effects::{Background, Size};
@@ -47,7 +47,7 @@ impl Effect<Cutting> for DynamometerResonance {
         let highest = data.highest_hz.max(50.0);
         let nominal = 0.5 * highest;
         let frequency = |i: usize| {
-            logarithmic(
+            Parameter::logarithmic(
                 format!("frequency_hz[{i}]"),
                 "Hz",
                 nominal,
@@ -55,7 +55,7 @@ impl Effect<Cutting> for DynamometerResonance {
                 [0.03 * highest, 8.0 * highest],
             )
         };
-        let damping = |i: usize| logarithmic(format!("zeta[{i}]"), "1", 0.04, 1.0, [1e-3, 1.0]);
+        let damping = |i: usize| Parameter::logarithmic(format!("zeta[{i}]"), "1", 0.04, 1.0, [1e-3, 1.0]);
         (0..3).map(frequency).chain((0..3).map(damping)).collect()
     }
 

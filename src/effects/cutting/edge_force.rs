@@ -1,10 +1,9 @@
-use super::common::linear;
 use super::{CutPhysics, CutSetting, Cutting};
 use crate::data::Process;
 use crate::effects::Background;
 use crate::effects::background::BUDAK;
 use crate::effects::{At, Effect, Known};
-use crate::parameter::Parameter;
+use crate::parameter::{Parameter, Prior};
 use crate::robot::Dual;
 
 /// Rubbing of the edge, for a baseline that was fitted without.
@@ -53,12 +52,14 @@ impl Effect<Cutting> for EdgeForce {
         names
             .iter()
             .map(|name| {
-                linear(
+                Parameter::linear(
                     *name,
                     "N/mm",
                     0.2 * scale,
-                    3.0 * scale,
-                    0.0,
+                    Prior {
+                        mean: 0.0,
+                        std: 3.0 * scale,
+                    },
                     [-20.0 * scale, 20.0 * scale],
                 )
             })

@@ -1,9 +1,9 @@
-use super::common::{drilling_only, linear};
+use super::common::drilling_only;
 use super::{CutPhysics, CutSetting, Cutting};
 use crate::effects::Background;
 use crate::effects::background::SHAW_OXFORD;
 use crate::effects::{At, Effect, Known};
-use crate::parameter::Parameter;
+use crate::parameter::{Parameter, Prior};
 use crate::robot::Dual;
 
 /// The drill's margins rub in the hole: torque grows with depth.
@@ -39,12 +39,14 @@ impl Effect<Cutting> for MarginFriction {
 
     fn parameters(&self, _at: At, Known { data, .. }: &Known<Cutting>) -> Vec<Parameter> {
         let scale = 0.02 * data.cutting_scale_n_per_mm2.max(1.0);
-        vec![linear(
+        vec![Parameter::linear(
             "k_margin_n_per_mm",
             "N/mm",
             0.05 * scale,
-            scale,
-            0.0,
+            Prior {
+                mean: 0.0,
+                std: scale,
+            },
             [-10.0 * scale, 10.0 * scale],
         )]
     }

@@ -1,4 +1,3 @@
-use super::common::logarithmic;
 use super::{CutPhysics, CutSetting, Cutting};
 use crate::data::Process;
 use crate::effects::Background;
@@ -63,7 +62,7 @@ impl Effect<Cutting> for NonlinearDrift {
     fn parameters(&self, _at: At, Known { data, .. }: &Known<Cutting>) -> Vec<Parameter> {
         let nominal = data.longest_record_s.clamp(0.5, 20.0);
         channels(data.process)
-            .map(|i| logarithmic(format!("tau_s[{i}]"), "s", nominal, 1.5, [0.1, 1000.0]))
+            .map(|i| Parameter::logarithmic(format!("tau_s[{i}]"), "s", nominal, 1.5, [0.1, 1000.0]))
             .collect()
     }
 

@@ -1,8 +1,8 @@
-use super::common::{linear, logarithmic, milling_only, straight_edge_only};
+use super::common::{milling_only, straight_edge_only};
 use super::{CutPhysics, CutSetting, Cutting, Runout};
 use crate::effects::{At, Effect, Known, NEGLIGIBLE, Site};
 use crate::effects::{Background, Size};
-use crate::parameter::Parameter;
+use crate::parameter::{Parameter, Prior};
 use crate::robot::Dual;
 
 /// The tool's axis lies beside the spindle's: every tooth has its own radius.
@@ -43,13 +43,15 @@ impl Effect<Cutting> for RunoutEffect {
 
     fn parameters(&self, _at: At, Known { data, .. }: &Known<Cutting>) -> Vec<Parameter> {
         vec![
-            logarithmic("offset_mm", "mm", 0.01, 1.5, [1e-4, 1.0]),
-            linear(
+            Parameter::logarithmic("offset_mm", "mm", 0.01, 1.5, [1e-4, 1.0]),
+            Parameter::linear(
                 "angle_deg",
                 "deg",
                 0.3 * 360.0 / data.teeth as f64,
-                360.0,
-                0.0,
+                Prior {
+                    mean: 0.0,
+                    std: 360.0,
+                },
                 [-720.0, 720.0],
             ),
         ]

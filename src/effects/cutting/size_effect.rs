@@ -1,10 +1,10 @@
-use super::common::{linear, straight_edge_only};
+use super::common::straight_edge_only;
 use super::{CutPhysics, CutSetting, Cutting};
 use crate::data::Process;
 use crate::effects::background::ALTINTAS;
 use crate::effects::{At, Effect, Known, Site};
 use crate::effects::{Background, Size};
-use crate::parameter::Parameter;
+use crate::parameter::{Parameter, Prior};
 use crate::robot::Dual;
 
 /// Cutting coefficients rise as the chip gets thin: K ∝ (h / 0.1 mm)^−p.
@@ -46,7 +46,13 @@ impl Effect<Cutting> for SizeEffect {
     }
 
     fn parameters(&self, _at: At, _known: &Known<Cutting>) -> Vec<Parameter> {
-        vec![linear("p", "1", 0.15, 0.3, 0.0, [-0.5, 0.8])]
+        vec![Parameter::linear(
+            "p",
+            "1",
+            0.15,
+            Prior { mean: 0.0, std: 0.3 },
+            [-0.5, 0.8],
+        )]
     }
 
     fn starts(&self, _at: At, _known: &Known<Cutting>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {

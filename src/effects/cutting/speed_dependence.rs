@@ -1,10 +1,9 @@
-use super::common::linear;
 use super::{CutPhysics, CutSetting, Cutting};
 use crate::data::Process;
 use crate::effects::background::{ALTINTAS, BUDAK};
 use crate::effects::{At, Effect, Known, Site};
 use crate::effects::{Background, Size};
-use crate::parameter::Parameter;
+use crate::parameter::{Parameter, Prior};
 use crate::robot::Dual;
 
 /// Cutting coefficients fall with cutting speed: K ∝ v^−q.
@@ -40,7 +39,13 @@ impl Effect<Cutting> for SpeedDependence {
     }
 
     fn parameters(&self, _at: At, _known: &Known<Cutting>) -> Vec<Parameter> {
-        vec![linear("q", "1", 0.1, 0.4, 0.0, [-2.0, 2.0])]
+        vec![Parameter::linear(
+            "q",
+            "1",
+            0.1,
+            Prior { mean: 0.0, std: 0.4 },
+            [-2.0, 2.0],
+        )]
     }
 
     fn starts(&self, _at: At, _known: &Known<Cutting>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {

@@ -1,9 +1,8 @@
-use super::common::linear;
 use super::{CutPhysics, CutSetting, Cutting};
 use crate::data::Process;
 use crate::effects::{At, Effect, Known, Site};
 use crate::effects::{Background, Size};
-use crate::parameter::Parameter;
+use crate::parameter::{Parameter, Prior};
 use crate::robot::Dual;
 
 /// Edge coefficients grow along the sequence of cuts.
@@ -49,7 +48,15 @@ impl Effect<Cutting> for ToolWear {
         };
         directions
             .iter()
-            .map(|d| linear(format!("growth[{d}]"), "1", 1.5, 1.5, 1.0, [-5.0, 30.0]))
+            .map(|d| {
+                Parameter::linear(
+                    format!("growth[{d}]"),
+                    "1",
+                    1.5,
+                    Prior { mean: 1.0, std: 1.5 },
+                    [-5.0, 30.0],
+                )
+            })
             .collect()
     }
 

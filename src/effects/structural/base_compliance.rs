@@ -6,7 +6,7 @@ use crate::effects::background::EWINS;
 use crate::effects::structural::{PostureSetting, Structure};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{At, Effect, Known, NEGLIGIBLE, Site};
-use crate::parameter::{Parameter, Prior, Scale};
+use crate::parameter::Parameter;
 use crate::robot::{Chain, Dual, Element, Place, Role, Slot};
 
 /// The pedestal rocks about the base x and y axes.
@@ -42,17 +42,13 @@ impl Effect<Structure> for BaseCompliance {
     }
 
     fn parameters(&self, _at: At, _known: &Known<Structure>) -> Vec<Parameter> {
-        vec![Parameter {
-            name: "rocking_nm_per_rad".into(),
-            unit: "N·m/rad",
-            scale: Scale::Logarithmic,
-            nominal: 1e7,
-            prior: Some(Prior {
-                mean: 1e7f64.ln(),
-                std: 2.0,
-            }),
-            bounds: [1e5, 5e9],
-        }]
+        vec![Parameter::logarithmic(
+            "rocking_nm_per_rad",
+            "N·m/rad",
+            1e7,
+            2.0,
+            [1e5, 5e9],
+        )]
     }
 
     fn starts(&self, _at: At, _known: &Known<Structure>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {

@@ -2,34 +2,23 @@
 
 use crate::effects::Size;
 use crate::effects::structural::DataSummary;
-use crate::parameter::{Parameter, Prior, Scale};
+use crate::parameter::Parameter;
 use crate::robot::Dual;
 
 /// mass_kg, frequency_hz, damping_ratio of a mass on a spring.
 pub fn parameters(data: &DataSummary, mass_kg: f64, frequency_hz: f64) -> Vec<Parameter> {
-    let logarithmic = |name: &str, unit, nominal: f64, std, bounds| Parameter {
-        name: name.into(),
-        unit,
-        scale: Scale::Logarithmic,
-        nominal,
-        prior: Some(Prior {
-            mean: nominal.ln(),
-            std,
-        }),
-        bounds,
-    };
     // A resonance outside the measured band is a stiffness or a mass, not a resonance: other effects are that.
     let band = [0.7 * data.lowest_hz, 1.6 * data.highest_hz];
     vec![
-        logarithmic("mass_kg", "kg", mass_kg, 1.5, [0.02, 300.0]),
-        logarithmic(
+        Parameter::logarithmic("mass_kg", "kg", mass_kg, 1.5, [0.02, 300.0]),
+        Parameter::logarithmic(
             "frequency_hz",
             "Hz",
             frequency_hz.clamp(band[0], band[1]),
             2.0,
             band,
         ),
-        logarithmic("damping_ratio", "1", 0.03, 1.0, [5e-4, 0.6]),
+        Parameter::logarithmic("damping_ratio", "1", 0.03, 1.0, [5e-4, 0.6]),
     ]
 }
 

@@ -45,9 +45,8 @@ pub struct ChannelFilter {
 impl ChannelFilter {
     /// Channels that show what is there.
     pub fn faithful() -> Self {
-        let unit = |i: usize, j: usize| Dual::constant(if i == j { 1.0 } else { 0.0 });
         ChannelFilter {
-            mixing: [0, 1, 2].map(|i| [0, 1, 2].map(|j| unit(i, j))),
+            mixing: Dual::unit_matrix(),
             delay_s: Dual::constant(0.0),
         }
     }

@@ -4,7 +4,7 @@ use crate::effects::background::EWINS;
 use crate::effects::structural::{PostureSetting, Structure};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{At, Effect, Known, NEGLIGIBLE, Site};
-use crate::parameter::{Parameter, Prior, Scale};
+use crate::parameter::{Parameter, Prior};
 use crate::robot::{Chain, Dual, Role};
 
 /// Damping sits in the joints (viscous, one coefficient each), beside what is left of the one ratio for all modes.
@@ -51,26 +51,21 @@ impl Effect<Structure> for JointDamping {
     fn parameters(&self, _at: At, Known { object: robot, .. }: &Known<Structure>) -> Vec<Parameter> {
         let dampers = robot.joints.iter().enumerate().map(|(i, joint)| {
             let nominal = DAMPING_TIME_S / joint.compliance_rad_per_nm;
-            Parameter {
-                name: format!("c_nms_per_rad[{i}]"),
-                unit: "N·m·s/rad",
-                scale: Scale::Logarithmic,
+            Parameter::logarithmic(
+                format!("c_nms_per_rad[{i}]"),
+                "N·m·s/rad",
                 nominal,
-                prior: Some(Prior {
-                    mean: nominal.ln(),
-                    std: 1.5,
-                }),
-                bounds: [1e-3 * nominal, 1e3 * nominal],
-            }
+                1.5,
+                [1e-3 * nominal, 1e3 * nominal],
+            )
         });
-        let share = Parameter {
-            name: "common_share".into(),
-            unit: "1",
-            scale: Scale::Linear,
-            nominal: 0.0,
-            prior: Some(Prior { mean: 0.0, std: 1.0 }),
-            bounds: [-0.5, 1.5],
-        };
+        let share = Parameter::linear(
+            "common_share",
+            "1",
+            0.0,
+            Prior { mean: 0.0, std: 1.0 },
+            [-0.5, 1.5],
+        );
         dampers.chain([share]).collect()
     }
 

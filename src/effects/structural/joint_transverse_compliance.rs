@@ -6,7 +6,7 @@ use crate::effects::background::{ABELE, MOBERG};
 use crate::effects::structural::{PostureSetting, Structure};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{At, Effect, Known, NEGLIGIBLE, Site};
-use crate::parameter::{Parameter, Prior, Scale};
+use crate::parameter::Parameter;
 use crate::robot::{Chain, Dual, Element, Place, Role, Slot};
 
 /// A joint's bearing tilts about both axes normal to the joint's own.
@@ -44,17 +44,13 @@ impl Effect<Structure> for JointTransverseCompliance {
     }
 
     fn parameters(&self, _at: At, _known: &Known<Structure>) -> Vec<Parameter> {
-        vec![Parameter {
-            name: "transverse_nm_per_rad".into(),
-            unit: "N·m/rad",
-            scale: Scale::Logarithmic,
-            nominal: 3e6,
-            prior: Some(Prior {
-                mean: 3e6f64.ln(),
-                std: 2.0,
-            }),
-            bounds: [2e4, 1e9],
-        }]
+        vec![Parameter::logarithmic(
+            "transverse_nm_per_rad",
+            "N·m/rad",
+            3e6,
+            2.0,
+            [2e4, 1e9],
+        )]
     }
 
     fn starts(&self, _at: At, _known: &Known<Structure>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {

@@ -6,7 +6,7 @@ use crate::effects::background::TUTTLE;
 use crate::effects::structural::{PostureSetting, Structure};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{At, Effect, Known, Site};
-use crate::parameter::{Parameter, Prior, Scale};
+use crate::parameter::{Parameter, Prior};
 use crate::robot::{Chain, Dual, Role};
 
 /// Gear stiffness rises with the static gravity torque: k (1 + beta |tau| / 1 kN·m) at every joint.
@@ -47,14 +47,13 @@ impl Effect<Structure> for LoadDependentStiffness {
     }
 
     fn parameters(&self, _at: At, _known: &Known<Structure>) -> Vec<Parameter> {
-        vec![Parameter {
-            name: "beta".into(),
-            unit: "1",
-            scale: Scale::Linear,
-            nominal: 0.05,
-            prior: Some(Prior { mean: 0.0, std: 0.5 }),
-            bounds: [0.0, 3.0],
-        }]
+        vec![Parameter::linear(
+            "beta",
+            "1",
+            0.05,
+            Prior { mean: 0.0, std: 0.5 },
+            [0.0, 3.0],
+        )]
     }
 
     fn starts(&self, _at: At, _known: &Known<Structure>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {

@@ -4,7 +4,7 @@ use crate::effects::structural::{ChannelFilter, Structure};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{At, Effect, Known, Site};
 use crate::effects::{Background, Size};
-use crate::parameter::{Parameter, Prior, Scale};
+use crate::parameter::{Parameter, Prior};
 use crate::robot::Dual;
 
 /// Response channel late against the force channel: factor exp(−iωτ).
@@ -42,14 +42,13 @@ impl Effect<Structure> for TimeDelay {
     }
 
     fn parameters(&self, _at: At, _known: &Known<Structure>) -> Vec<Parameter> {
-        vec![Parameter {
-            name: "delay_s".into(),
-            unit: "s",
-            scale: Scale::Linear,
-            nominal: 2e-4,
-            prior: Some(Prior { mean: 0.0, std: 3e-3 }),
-            bounds: [-0.02, 0.02],
-        }]
+        vec![Parameter::linear(
+            "delay_s",
+            "s",
+            2e-4,
+            Prior { mean: 0.0, std: 3e-3 },
+            [-0.02, 0.02],
+        )]
     }
 
     fn impossible(&self, _site: Site, _robot: &RobotSpec, sizes: &[Size]) -> Option<String> {

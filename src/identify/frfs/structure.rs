@@ -117,29 +117,21 @@ impl StructureModel {
         let mut parameters = Vec::new();
         for (i, joint) in robot.spec.joints.iter().enumerate() {
             let nominal = 1.0 / joint.compliance_rad_per_nm;
-            parameters.push(Parameter {
-                name: format!("joint-{}.stiffness", i + 1),
-                unit: "N·m/rad",
-                scale: Scale::Logarithmic,
+            parameters.push(Parameter::logarithmic(
+                format!("joint-{}.stiffness", i + 1),
+                "N·m/rad",
                 nominal,
-                prior: Some(Prior {
-                    mean: nominal.ln(),
-                    std: section.stiffness_tolerance,
-                }),
-                bounds: [nominal / STIFFNESS_FACTOR, nominal * STIFFNESS_FACTOR],
-            });
+                section.stiffness_tolerance,
+                [nominal / STIFFNESS_FACTOR, nominal * STIFFNESS_FACTOR],
+            ));
         }
-        parameters.push(Parameter {
-            name: "damping-ratio".into(),
-            unit: "1",
-            scale: Scale::Logarithmic,
-            nominal: NOMINAL_DAMPING_RATIO,
-            prior: Some(Prior {
-                mean: NOMINAL_DAMPING_RATIO.ln(),
-                std: DAMPING_LOG_STD,
-            }),
-            bounds: [5e-4, 0.3],
-        });
+        parameters.push(Parameter::logarithmic(
+            "damping-ratio",
+            "1",
+            NOMINAL_DAMPING_RATIO,
+            DAMPING_LOG_STD,
+            [5e-4, 0.3],
+        ));
         let mut masses = vec![None; robot.spec.links.len()];
         if let Some(tolerance) = section.mass_tolerance {
             for (i, link) in robot.spec.links.iter().enumerate() {

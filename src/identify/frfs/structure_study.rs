@@ -212,10 +212,16 @@ impl Study for StructureStudy {
         })
     }
 
-    fn beyond_slips(&self, model: &StructureModel, theta: &[f64]) -> Result<Option<BeyondSlips>> {
+    fn beyond_slips(
+        &self,
+        model: &StructureModel,
+        theta: &[f64],
+        rest: &Rest,
+    ) -> Result<Option<BeyondSlips>> {
         let Some(absorb) = self.slips else { return Ok(None) };
         let mut curves = model.rest(theta, &self.data)?;
-        let only_a_place = rest::largest(&rest_patterns::test(&curves)).is_none();
+        let of_a_place = |test: &rest::RestTest| test.looks_like == rest::LIKE_A_PLACE;
+        let only_a_place = rest.tests.iter().all(|t| of_a_place(t) || !t.is_significant());
         let after = absorb(model, &self.data, theta, &curves)?;
         let price = after.price;
         let mut beyond = rest_patterns::test_beyond(&mut curves, after);

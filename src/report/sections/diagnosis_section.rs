@@ -1,7 +1,5 @@
 //! Which physics the model lacks: verdict, candidates, and what the missing effect takes away.
 
-use crate::effects::Structure;
-use crate::identify::Modelled;
 use num_complex::Complex64;
 
 use crate::analysis::DiagnosisFindings;
@@ -9,6 +7,8 @@ use crate::analysis::diagnosis::Leading;
 use crate::campaign::Campaign;
 use crate::discrepancy::comparison::explained::Part;
 use crate::discrepancy::{Diagnosis, DiagnosisVerdict, EffectCandidate, NextMeasurement};
+use crate::effects::Structure;
+use crate::identify::Modelled;
 use crate::report::figure::{BarSeries, FrfCurve, FrfFigure, NoiseLevel, SideBySide};
 use crate::report::number::{decimals, percent, plus_minus, significant};
 use crate::report::parts::{figure, paragraph};

@@ -1,9 +1,9 @@
 //! The error, revision by revision, and what was added.
 
-use crate::effects::Registry;
 use num_complex::Complex64;
 
 use crate::discrepancy::FrfComparison;
+use crate::effects::Registry;
 use crate::identify::FrfData;
 use crate::report::figure::{self, FrfCurve, FrfFigure, HistoryFigure, NoiseLevel};
 use crate::report::number::{percent, plus_minus, significant};

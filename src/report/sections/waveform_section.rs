@@ -26,13 +26,7 @@ const ORDERS: usize = 12;
 pub fn summary(findings: &CuttingFindings) -> String {
     let text = verdict_text(&findings.diagnosis, "force records");
     let text = text.replacen("The model", "The force model", 1);
-    let added: Vec<String> = findings
-        .case
-        .model
-        .effects()
-        .iter()
-        .map(|a| a.instance.label())
-        .collect();
+    let added = findings.case.effects();
     if added.is_empty() {
         return text;
     }

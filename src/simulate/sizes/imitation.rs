@@ -1,10 +1,10 @@
 //! How near the library comes to physics that it does not have.
 
-use crate::effects::Registry;
 use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::Result;
+use crate::effects::Registry;
 use crate::effects::{DataSummary, Instance, Structure};
 use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
 use crate::identify::{FrfData, StructureModel, levenberg_marquardt};

@@ -1,12 +1,13 @@
 //! A dynamic stiffness that the data drew: real and imaginary part over frequency, with the form fitted to it.
 
+use num_complex::Complex64;
+
 use crate::Result;
-use crate::report::figure::sheet::axis::{FigureAxis, extent};
+use crate::report::figure::sheet::axis::{FigureAxis, extent, usable};
 use crate::report::figure::sheet::canvas::{Color, Marker, Stroke, WIDTH, nothing_to_draw, paint};
 use crate::report::figure::sheet::panel::{FigureHeader, Panel, Swatch};
 use crate::report::figure::sheet::style;
 use crate::statistics::quantile;
-use num_complex::Complex64;
 
 #[derive(Debug, Clone, Default)]
 pub struct DrawnCurveFigure {
@@ -36,7 +37,8 @@ impl DrawnCurveFigure {
             return Err(nothing_to_draw(&self.title, "no line with a finite value"));
         };
         // Lines that say little must not press the others flat: those with the smaller half of the errors set the scale.
-        let middle = quantile(lines.iter().map(|k| self.std[*k]), 0.5).unwrap_or(f64::INFINITY);
+        let middle =
+            quantile(lines.iter().map(|k| self.std[*k]).filter(|s| usable(*s)), 0.5).unwrap_or(f64::INFINITY);
         let parts = ["real part", "imaginary part"];
         let part = |name: &str, z: Complex64| if name == parts[0] { z.re } else { z.im };
         let axes: Vec<FigureAxis> = parts

@@ -91,7 +91,7 @@ impl FrfFigure {
             ));
         };
         // A few exact near-zeros must not press the peaks into the upper edge.
-        let low = quantile(magnitudes(), 0.002)
+        let low = quantile(magnitudes().filter(|v| usable(*v)), 0.002)
             .map_or(low, |q| low.max(q / 30.0))
             .min(high);
         let noise = self

@@ -101,7 +101,10 @@ impl LobePanel {
     /// High enough to see the pockets, low enough to see the limit: single sharp peaks run out at the top.
     pub(crate) fn cap(&self, deepest: f64) -> f64 {
         let deepest_marker = self.usable_markers().map(|m| m.depth_mm).fold(0.0, f64::max);
-        let depths = || self.curves.iter().flat_map(LobeTrace::points).map(|p| p.1);
+        let depths = || {
+            let depths = self.curves.iter().flat_map(LobeTrace::points).map(|p| p.1);
+            depths.filter(|d| usable(*d))
+        };
         let low = quantile(depths(), 0.05).unwrap_or(0.0).max(0.0);
         let most = quantile(depths(), 0.9).unwrap_or(deepest);
         let chosen = most.max(4.0 * low).max(1.1 * deepest_marker);

@@ -8,6 +8,7 @@
 use std::path::PathBuf;
 
 use lobestone::Campaign;
+use lobestone::analysis::Workbench;
 use lobestone::analysis::forces::force_records::identify_forces;
 use lobestone::cutting::{CfcOptions, ForceAxis};
 
@@ -15,7 +16,7 @@ fn main() -> lobestone::Result<()> {
     let built_in = concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/campaigns/first-cell");
     let folder = std::env::args_os().nth(1).map_or(built_in.into(), PathBuf::from);
     let campaign = Campaign::load(&folder)?;
-    let found = identify_forces(&campaign, CfcOptions::default())?;
+    let found = identify_forces(&Workbench::new(&campaign), CfcOptions::default())?;
 
     println!("cut           feed, mm   mean Fx, N   mean Fy, N   mean Fz, N");
     for cut in &found.cuts {

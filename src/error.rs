@@ -2,12 +2,13 @@
 
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Result of whatever can fail in this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// Why a piece of work could not be done.
-#[derive(Debug, thiserror::Error)]
+/// Why a piece of work could not be done. Cheap to pass on to everyone who asked for it.
+#[derive(Debug, Clone, thiserror::Error)]
 pub enum Error {
     /// A file or a request of the user's does not say what it should.
     #[error("{0}")]
@@ -18,7 +19,7 @@ pub enum Error {
         /// What was to be read or written.
         path: PathBuf,
         /// Why it could not be.
-        source: std::io::Error,
+        source: Arc<std::io::Error>,
     },
     /// The input is well formed but the numbers allow no answer (singular system, no mode in the band, …).
     #[error("{0}")]
@@ -30,7 +31,7 @@ impl Error {
     pub fn io(path: impl Into<PathBuf>, source: std::io::Error) -> Self {
         Error::Io {
             path: path.into(),
-            source,
+            source: Arc::new(source),
         }
     }
 

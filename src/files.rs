@@ -1,11 +1,31 @@
-//! Files that are never seen half written.
+//! Files that are files, and are never seen half written.
 
 use std::io::Write;
 use std::path::Path;
 
 use tempfile::NamedTempFile;
 
-use crate::{Error, Result};
+use crate::{Error, InputError, Result};
+
+/// Refuses what is no file, before it is opened: a pipe would wait for a writer, a device never end.
+///
+/// # Errors
+/// The operating system's; a folder, pipe or device, by its path.
+pub fn regular_file(path: &Path) -> Result<()> {
+    let kind = std::fs::metadata(path).map_err(|e| Error::io(path, e))?;
+    if kind.is_file() {
+        return Ok(());
+    }
+    let what = if kind.is_dir() {
+        "a folder"
+    } else {
+        "a pipe or device"
+    };
+    Err(InputError::new(format!("{what}, not a file"))
+        .file(path)
+        .remedy("give a file; what comes through a pipe, save to one first")
+        .into())
+}
 
 /// Writes beside the target and renames: a reader sees the old file or the new one, never half of it.
 ///

@@ -1,5 +1,7 @@
 //! Everything that can be said about a campaign, each part on its own: one that fails takes no other with it.
 
+use std::sync::Arc;
+
 use super::model_stages::{ModelStage, earlier_stages};
 use super::structure_case::structure_model;
 use super::workbench::Workbench;
@@ -12,8 +14,7 @@ use crate::campaign::{Campaign, LobeSource};
 use crate::cutting::{CfcOptions, CfcResult};
 use crate::discrepancy::setup::SetupFinding;
 use crate::identify::frfs::structure_study::held_out_postures;
-use crate::identify::{Options, StructureCase, StructureModel};
-use crate::modal::Settings;
+use crate::identify::{Options, StructureModel};
 use crate::revision::{Revision, Side};
 use crate::robot::PostureReport;
 use crate::{Error, InputError, Result};
@@ -31,7 +32,7 @@ pub struct CampaignFindings<'a> {
     /// The robot at the campaign's postures.
     pub postures: Option<Result<Vec<PostureFindings>>>,
     /// Modes of the measured FRFs.
-    pub modal: Option<Result<ModalAnalysis>>,
+    pub modal: Option<Result<Arc<ModalAnalysis>>>,
     /// Shapes of the posture that shows most modes, on the robot.
     pub mode_shapes: Vec<StickShape>,
     /// Cutting force coefficients.
@@ -49,7 +50,7 @@ pub struct CampaignFindings<'a> {
 /// Model against FRFs.
 pub struct StructureFindings {
     /// The model before and after calibration.
-    pub analysis: StructureAnalysis,
+    pub analysis: Arc<StructureAnalysis>,
     /// nrms on postures that were left out of the fit.
     pub held_out_nrms: Option<f64>,
     /// The model at the revisions before the present one, oldest first.
@@ -86,15 +87,15 @@ impl<'a> CampaignFindings<'a> {
         // FRFs without a robot are to be had, too: for their modes.
         let modelled = !campaign.frfs.is_empty() && campaign.robot.is_some();
         let bench = &Workbench::new(campaign);
-        let modal = (!campaign.frfs.is_empty()).then(|| ModalAnalysis::on(bench, &Settings::default()));
+        let modal = (!campaign.frfs.is_empty()).then(|| ModalAnalysis::usual(bench));
         let modes = modal.as_ref().and_then(|m| m.as_ref().ok());
-        let structure = modelled.then(|| StructureFindings::with_modes(bench, modes));
+        let structure = modelled.then(|| StructureFindings::on(bench));
         let calibrated = structure.as_ref().and_then(|s| s.as_ref().ok());
         // Where nothing can be calibrated nothing can be diagnosed, for the same reason.
         let diagnosis = calibrated.filter(|_| wanted).map(|structure| {
             DiagnosisFindings::of(campaign, structure.analysis.settled_case(), Options::default())
         });
-        let cutting = (!campaign.cuts.is_empty()).then(|| identify_forces(campaign, CfcOptions::default()));
+        let cutting = (!campaign.cuts.is_empty()).then(|| identify_forces(bench, CfcOptions::default()));
         let cutting_diagnosis = (wanted && matches!(cutting, Some(Ok(_))))
             .then(|| CuttingFindings::on(bench, Options::default()));
         let postures = (campaign.robot.is_some() && !campaign.postures.is_empty())
@@ -204,7 +205,7 @@ impl<'a> CampaignFindings<'a> {
 
     /// The measured modes, where they were found.
     pub fn modal(&self) -> Option<&ModalAnalysis> {
-        self.modal.as_ref().and_then(|r| r.as_ref().ok())
+        self.modal.as_ref().and_then(|r| r.as_deref().ok())
     }
 }
 
@@ -239,17 +240,8 @@ impl StructureFindings {
     ///
     /// # Errors
     /// As [`StructureAnalysis::run`].
-    pub fn run(campaign: &Campaign) -> Result<Self> {
-        Self::of(campaign, StructureAnalysis::run(campaign, Options::default())?)
-    }
-
-    /// As [`StructureFindings::run`], with the measured modes that are there already.
-    fn with_modes(campaign: &Workbench, modal: Option<&ModalAnalysis>) -> Result<Self> {
-        let case = StructureCase::on(campaign)?;
-        Self::of(campaign, StructureAnalysis::of(case, modal, Options::default())?)
-    }
-
-    fn of(campaign: &Campaign, analysis: StructureAnalysis) -> Result<Self> {
+    pub fn on(campaign: &Workbench) -> Result<Self> {
+        let analysis = StructureAnalysis::on(campaign)?;
         let held_out_nrms = held_out_postures(
             &analysis.case.model,
             &analysis.case.data,

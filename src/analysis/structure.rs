@@ -1,10 +1,13 @@
 //! A campaign's FRFs: calibration and comparison before and after.
 
+use std::sync::Arc;
+
 use num_complex::Complex64;
 
 use crate::Result;
 use crate::analysis::modes::modal::ModalAnalysis;
 use crate::analysis::modes::mode_comparison::measured_modes;
+use crate::analysis::workbench::Workbench;
 use crate::campaign::Campaign;
 use crate::discrepancy::FrfComparison;
 use crate::discrepancy::setup::{SetupCheck, absorb_slips, examine, library_rival};
@@ -38,6 +41,19 @@ impl StructureAnalysis {
     /// A case that cannot be loaded, or FRFs that do not determine the parameters.
     pub fn run(campaign: &Campaign, options: Options) -> Result<Self> {
         Self::of_case(StructureCase::load(campaign)?, options)
+    }
+
+    /// With the usual options, worked out once of what lies on the bench.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run).
+    pub fn on(campaign: &Workbench) -> Result<Arc<Self>> {
+        campaign.once(|| {
+            let case = StructureCase::on(campaign)?;
+            // FRFs that show no modes can still be fitted.
+            let modal = ModalAnalysis::usual(campaign).ok();
+            Self::of(case, modal.as_deref(), Options::default())
+        })
     }
 
     /// As [`run`](Self::run), of a case that is there already.

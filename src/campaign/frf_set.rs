@@ -1,6 +1,6 @@
 //! The measured FRFs of a campaign, as receptance between its points.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use num_complex::Complex64;
 use rayon::prelude::*;
@@ -8,38 +8,56 @@ use rayon::prelude::*;
 use super::schema::{Campaign, FrfFile};
 use crate::campaign::form::paths::campaign_file;
 use crate::data::{Dof, FrfRecord, FrfSet, MeasuredDof, MeasuredFrf, Quantity};
+use crate::ingest::{Digest, MeasurementFile, read_frf_file};
 use crate::text::shown_briefly as shown;
 use crate::{InputError, Result};
+
+/// What the `[[frf]]` files of a campaign hold.
+#[derive(Debug, Clone)]
+pub struct FrfFiles {
+    /// As receptance between the campaign's points.
+    pub set: FrfSet,
+    /// What was noticed while reading.
+    pub warnings: Vec<String>,
+    /// Of each file, in the order of `campaign.toml`.
+    pub digests: Vec<Digest>,
+}
 
 impl Campaign {
     /// Reads every `[[frf]]` file and converts it to receptance; second: warnings.
     ///
     /// # Errors
-    /// The first file (in the order of `campaign.toml`) that cannot be read, does not say what it holds, or names
-    /// a node without a `[[point]]`.
+    /// As [`read_frf_files`](Self::read_frf_files).
     pub fn load_frfs(&self) -> Result<(FrfSet, Vec<String>)> {
-        let read = self.frfs.par_iter().map(|frf| read_file(&frf.file));
-        self.collect_frfs(&in_order(read.collect())?)
+        let files = self.read_frf_files()?;
+        Ok((files.set, files.warnings))
     }
 
-    /// The content of every `[[frf]]` file, in the order of `campaign.toml`, or why it cannot be read.
-    pub fn frf_contents(&self) -> Vec<Result<Vec<u8>>> {
-        let files = self.frfs.iter();
-        files.map(|frf| crate::ingest::read_content(&frf.file)).collect()
-    }
-
-    /// As [`load_frfs`](Self::load_frfs), of files whose [contents](Self::frf_contents) were read already.
+    /// Reads every `[[frf]]` file and converts it to receptance.
     ///
     /// # Errors
-    /// As for [`load_frfs`](Self::load_frfs).
-    pub fn frfs_in(&self, contents: Vec<Result<Vec<u8>>>) -> Result<(FrfSet, Vec<String>)> {
-        let files = self.frfs.par_iter().zip(contents);
-        let read = files.map(|(frf, bytes)| crate::ingest::read_frfs_in(&frf.file, &bytes?));
-        self.collect_frfs(&in_order(read.collect())?)
+    /// The first file (in the order of `campaign.toml`) that cannot be read, does not say what it holds, or names
+    /// a node without a `[[point]]`.
+    pub fn read_frf_files(&self) -> Result<FrfFiles> {
+        // Read in parallel, but looked at in order: result and first error do not depend on the threads.
+        let read = self.frfs.par_iter().map(|frf| read_frf_file(&frf.file));
+        let read: Vec<Result<MeasurementFile>> = read.collect();
+        let (mut contents, mut digests) = (Vec::new(), Vec::new());
+        for file in read {
+            let file = file?;
+            contents.push((file.contents.frfs, file.warnings));
+            digests.push(file.digest);
+        }
+        let (set, warnings) = self.collect_frfs(&contents)?;
+        Ok(FrfFiles {
+            set,
+            warnings,
+            digests,
+        })
     }
 
     /// Takes the records of each `[[frf]]` file (same order) to one set.
-    fn collect_frfs(&self, files: &[(Vec<FrfRecord>, Vec<String>)]) -> Result<(FrfSet, Vec<String>)> {
+    fn collect_frfs(&self, files: &[FrfContents]) -> Result<(FrfSet, Vec<String>)> {
         let mut set = FrfSet::default();
         let mut warnings = Vec::new();
         for (i, (frf, (records, notes))) in self.frfs.iter().zip(files).enumerate() {
@@ -180,18 +198,8 @@ impl Campaign {
     }
 }
 
-/// Read in parallel, but looked at in order: result and first error do not depend on the threads.
-fn in_order(read: Vec<Result<FrfContents>>) -> Result<Vec<FrfContents>> {
-    read.into_iter().collect()
-}
-
 /// FRFs of one file, and what was noticed while reading it.
 type FrfContents = (Vec<FrfRecord>, Vec<String>);
-
-/// The one place where this module meets the file readers.
-fn read_file(path: &Path) -> Result<(Vec<FrfRecord>, Vec<String>)> {
-    crate::ingest::read_frfs(path)
-}
 
 /// What is said once a file, not once an FRF.
 #[derive(Default)]
@@ -236,7 +244,7 @@ fn word(quantity: Quantity) -> &'static str {
 }
 
 /// Pairs (later, earlier) of files with the same data.
-fn identical(files: &[(Vec<FrfRecord>, Vec<String>)]) -> Vec<(usize, usize)> {
+fn identical(files: &[FrfContents]) -> Vec<(usize, usize)> {
     let same = |a: &[FrfRecord], b: &[FrfRecord]| {
         a.len() == b.len()
             && a.iter()

@@ -22,5 +22,6 @@ pub use crate::data::{
 pub use form::json_schema::{SchemaOf, json_schema};
 pub use form::paths::campaign_file;
 pub use form::section::Section;
+pub use frf_set::FrfFiles;
 pub use named_files::named_files;
 pub use schema::{Campaign, CutChannel, Dynamometer, FrfFile, PlanSection};

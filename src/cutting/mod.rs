@@ -44,7 +44,7 @@ pub use measured::cut_analysis::{Average, ChannelAnalysis, CutAnalysis, Notice, 
 pub use measured::faults::repair_record;
 #[cfg(test)]
 pub(crate) use measured::in_step::OTHER_SPEED;
-pub use measured::in_step::{InStep, analyse_in_step};
+pub use measured::in_step::{RecordReading, analyse_in_step};
 pub use measured::record::analyse_cut;
 pub(crate) use warnings::of_notices;
 pub use warnings::speed_text;

@@ -3,12 +3,12 @@
 
 use std::path::Path;
 
-use super::contents::MeasurementFile;
-use super::long;
-use super::read::{self, no_such, read_file};
+use super::contents::Digest;
+use super::read::{self, TimeFile, no_such, read_file};
 use super::text::{Notes, without_byte_order_mark};
 use super::units::{self, Dimension, Unit};
 use crate::data::{ChannelRole, TimeRecord};
+use crate::files::regular_file;
 use crate::ingest::formats::force;
 use crate::ingest::tables::table::Header;
 use crate::{Error, InputError, Result};
@@ -117,18 +117,16 @@ impl Gain {
     }
 }
 
-/// The time record of a file with its forces as `rules` have them, and the warnings. Without rules: [`super::read_time`].
+/// The time record of a file with its forces as `rules` have them. Without rules: [`super::read_time`].
 ///
 /// # Errors
 /// Those of [`super::read_time`]; a channel that is not there, or not in the unit that its rule needs.
-pub fn read_time_with(path: &Path, rules: &[ChannelRule]) -> Result<(TimeRecord, Vec<String>)> {
+pub fn read_time_with(path: &Path, rules: &[ChannelRule]) -> Result<TimeFile> {
     if rules.is_empty() {
-        return read::read_time(path);
+        return read::read_time_file(path);
     }
-    let (times, mut warnings) = match read_file(path) {
-        Ok(MeasurementFile {
-            contents, warnings, ..
-        }) if !contents.times.is_empty() => (contents.times, warnings),
+    let (times, mut warnings, digest) = match read_file(path) {
+        Ok(file) if !file.contents.times.is_empty() => (file.contents.times, file.warnings, file.digest),
         other => match plain_table(path, rules)? {
             Some(found) => found,
             None => match other {
@@ -165,7 +163,11 @@ pub fn read_time_with(path: &Path, rules: &[ChannelRule]) -> Result<(TimeRecord,
         .into());
     };
     warnings.extend(apply(&mut record, &forces).map_err(|e| Error::from(e.file(path)))?);
-    Ok((record, warnings))
+    Ok(TimeFile {
+        record,
+        warnings,
+        digest,
+    })
 }
 
 fn source_text(source: &Source) -> String {
@@ -277,10 +279,14 @@ fn apply(record: &mut TimeRecord, rules: &[&ChannelRule]) -> std::result::Result
     Ok(notes.into_warnings())
 }
 
+/// Records, warnings, and what identifies the file.
+type PlainTable = (Vec<TimeRecord>, Vec<String>, Digest);
+
 /// A table of text that has no names, or no time: columns are named as the rules name them.
-fn plain_table(path: &Path, rules: &[ChannelRule]) -> Result<Option<(Vec<TimeRecord>, Vec<String>)>> {
-    long::regular_file(path)?;
+fn plain_table(path: &Path, rules: &[ChannelRule]) -> Result<Option<PlainTable>> {
+    regular_file(path)?;
     let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
+    let digest = Digest::of(&bytes);
     let bytes = &*without_byte_order_mark(&bytes);
     if bytes.iter().take(8192).any(|b| *b == 0) {
         return Ok(None);
@@ -325,7 +331,7 @@ fn plain_table(path: &Path, rules: &[ChannelRule]) -> Result<Option<(Vec<TimeRec
     }
     let mut notes = Notes::default();
     let record = force::read(bytes, &header, &mut notes).map_err(|e| Error::from(e.file(path)))?;
-    Ok(Some((vec![record], notes.into_warnings())))
+    Ok(Some((vec![record], notes.into_warnings(), digest)))
 }
 
 #[cfg(test)]
@@ -348,7 +354,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("r.txt");
         std::fs::write(&path, text).unwrap();
-        read_time_with(&path, rules).map(|r| r.0)
+        read_time_with(&path, rules).map(|r| r.record)
     }
 
     #[test]

@@ -1,12 +1,15 @@
 //! What a measurement file is and holds.
 
-use std::path::PathBuf;
+use std::io::Read;
+use std::path::{Path, PathBuf};
 
 use num_complex::Complex64;
 use serde::Serialize;
 
 use super::text;
 use crate::data::{FrfRecord, TimeRecord};
+use crate::files::regular_file;
+use crate::{Error, Result};
 
 /// How a file is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -82,6 +85,49 @@ pub struct OtherRecord {
     pub unit: String,
 }
 
+/// What tells one content of a file from another: enough to notice a change, no defence against a forger.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Digest {
+    /// Length of the file, bytes.
+    pub bytes: u64,
+    /// Its cyclic redundancy check, as in zip files (IEEE 802.3).
+    pub crc32: u32,
+}
+
+impl Digest {
+    /// Of a file that is `content`.
+    pub fn of(content: &[u8]) -> Self {
+        let mut digest = Digest::default();
+        digest.extend(content);
+        digest
+    }
+
+    /// Of the file at `path`, in bounded memory.
+    ///
+    /// # Errors
+    /// The operating system's; a folder, pipe or device, by its path.
+    pub fn read(path: &Path) -> Result<Self> {
+        let refused = |e| Error::io(path, e);
+        regular_file(path)?;
+        let mut file = std::fs::File::open(path).map_err(refused)?;
+        let (mut digest, mut buffer) = (Digest::default(), vec![0; 1 << 16]);
+        loop {
+            match file.read(&mut buffer).map_err(refused)? {
+                0 => return Ok(digest),
+                read => digest.extend(&buffer[..read]),
+            }
+        }
+    }
+
+    /// `more` stands after what was seen so far.
+    pub(super) fn extend(&mut self, more: &[u8]) {
+        let mut check = crc32fast::Hasher::new_with_initial_len(self.crc32, self.bytes);
+        check.update(more);
+        self.bytes += more.len() as u64;
+        self.crc32 = check.finalize();
+    }
+}
+
 /// A file that was read.
 #[derive(Debug, Clone)]
 pub struct MeasurementFile {
@@ -95,6 +141,8 @@ pub struct MeasurementFile {
     pub contents: Contents,
     /// What was assumed, contradicted or left out.
     pub warnings: Vec<String>,
+    /// Of the content as it was read.
+    pub digest: Digest,
 }
 
 impl Contents {
@@ -140,4 +188,25 @@ impl Contents {
 /// `1 FRF`, `2 FRFs`.
 pub(super) fn count(n: usize, what: &str) -> String {
     format!("{n} {what}{}", if n == 1 { "" } else { "s" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_digest_is_the_same_in_pieces() {
+        // The check value of the standard.
+        let whole = Digest::of(b"123456789");
+        assert_eq!((whole.bytes, whole.crc32), (9, 0xcbf4_3926));
+        let mut pieces = Digest::default();
+        for piece in [&b"1234"[..], b"", b"56789"] {
+            pieces.extend(piece);
+        }
+        assert_eq!(pieces, whole);
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), b"123456789").unwrap();
+        assert_eq!(Digest::read(file.path()).unwrap(), whole);
+        assert_ne!(Digest::of(b"123456780"), whole);
+    }
 }

@@ -4,12 +4,13 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::contents::{Contents, Format, MeasurementFile};
+use super::contents::{Contents, Digest, Format, MeasurementFile};
 use super::decode::{dofs_from_file_name, read_bytes};
 use super::detect::{self, Detected};
 use super::quality::{QualityCheck, quality_warnings};
 use super::text::{self, Notes};
 use crate::data::TimeRecord;
+use crate::files::regular_file;
 use crate::ingest::formats::force::Pieces;
 use crate::ingest::tables::table::{Table, holds};
 use crate::progress::Progress;
@@ -29,6 +30,8 @@ pub(super) struct LongRecord {
     path: PathBuf,
     file: File,
     bytes: u64,
+    /// Of what was read of it so far.
+    digest: Digest,
     piece: usize,
     format: Format,
     why: String,
@@ -94,26 +97,6 @@ pub(super) fn open(path: &Path) -> Result<Opened> {
     open_by(path, PIECE)
 }
 
-/// Refuses what is no file, before it is opened: a pipe would wait for a writer, a device never end.
-///
-/// # Errors
-/// The operating system's; a folder, pipe or device, by its path.
-pub fn regular_file(path: &Path) -> Result<()> {
-    let kind = std::fs::metadata(path).map_err(|e| Error::io(path, e))?;
-    if kind.is_file() {
-        return Ok(());
-    }
-    let what = if kind.is_dir() {
-        "a folder"
-    } else {
-        "a pipe or device"
-    };
-    Err(crate::InputError::new(format!("{what}, not a file"))
-        .file(path)
-        .remedy("give a file; what comes through a pipe, save to one first")
-        .into())
-}
-
 fn open_by(path: &Path, piece: usize) -> Result<Opened> {
     let refused = |e| Error::io(path, e);
     regular_file(path)?;
@@ -124,6 +107,8 @@ fn open_by(path: &Path, piece: usize) -> Result<Opened> {
         .take(piece as u64)
         .read_to_end(&mut head)
         .map_err(refused)?;
+    // Of the rows of a long record nothing but what is not yet read stays in `head`.
+    let head_digest = Digest::of(&head);
     if bytes > piece as u64
         && let Some(long) = long_record(path, &mut head, bytes)
     {
@@ -133,6 +118,7 @@ fn open_by(path: &Path, piece: usize) -> Result<Opened> {
             path: path.to_path_buf(),
             file,
             bytes,
+            digest: head_digest,
             piece,
             format,
             why,
@@ -164,6 +150,7 @@ pub(super) fn decoded(path: &Path, bytes: &[u8]) -> Result<MeasurementFile> {
         why,
         contents,
         warnings: notes.into_warnings(),
+        digest: Digest::of(bytes),
     })
 }
 
@@ -202,9 +189,11 @@ impl LongRecord {
             return Ok(None);
         }
         let refused = |e| Error::io(&self.path, e);
-        let missing = self.piece.saturating_sub(self.text.len());
+        let kept = self.text.len();
+        let missing = self.piece.saturating_sub(kept);
         let read = (&mut self.file).take(missing as u64).read_to_end(&mut self.text);
         self.at_end = read.map_err(refused)? < missing;
+        self.digest.extend(&self.text[kept..]);
         let end = match memchr::memrchr(b'\n', &self.text) {
             Some(at) if !self.at_end => at + 1,
             _ => self.text.len(),
@@ -272,6 +261,7 @@ impl LongRecord {
                 ..Contents::default()
             },
             warnings: self.notes.into_warnings(),
+            digest: self.digest,
         }
     }
 }
@@ -325,6 +315,7 @@ mod tests {
                 assert!(a.samples == b.samples, "{piece}: {}", a.name);
             }
             assert_eq!(whole.warnings, long.warnings);
+            assert_eq!(whole.digest, long.digest);
         }
     }
 

@@ -23,15 +23,15 @@ pub mod units;
 
 pub use crate::data::{Axis, Channel, ChannelRole, Dof, FrfRecord, Quantity, TimeRecord};
 pub use channel_rule::{ChannelRule, Gain, Measures, Source, read_time_with, unit_of_charge_or_other};
-pub use contents::{Contents, Format, MeasurementFile, OtherRecord};
+pub use contents::{Contents, Digest, Format, MeasurementFile, OtherRecord};
 pub use formats::geometry::{Geometry, NodalShape, geometry_text, read_geometry};
 pub use formats::mat::{MatArray, mat5_bytes};
 pub use formats::uff::{
     Abscissa, ByteOrder, Dataset58, Encoding58, EntityDof, Ordinate, UnitAxis, frf_dataset, time_datasets,
     uff58_bytes, write_datasets58, write_uff58,
 };
-pub use long::{Survey, regular_file, survey};
+pub use long::{Survey, survey};
 pub use preview::{PlainColumn, SIGNALS, plain_columns, taken_for};
 pub use quality::quality_warnings;
-pub use read::{read_content, read_file, read_frfs, read_frfs_in, read_memory, read_time};
+pub use read::{TimeFile, read_file, read_frf_file, read_frfs, read_memory, read_time};
 pub use text::shown;

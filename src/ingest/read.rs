@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::contents::MeasurementFile;
+use super::contents::{Digest, MeasurementFile};
 use super::decode::read_bytes;
 use super::long;
 use super::text::Notes;
@@ -33,39 +33,29 @@ pub fn read_memory(bytes: &[u8]) -> std::result::Result<MeasurementFile, InputEr
         why,
         contents,
         warnings: notes.into_warnings(),
+        digest: Digest::of(bytes),
     })
 }
 
 /// FRFs of a file, and its warnings.
 ///
 /// # Errors
-/// As [`read_file`], and a file without FRFs.
+/// As [`read_frf_file`].
 pub fn read_frfs(path: &Path) -> Result<(Vec<FrfRecord>, Vec<String>)> {
-    frfs_of(read_file(path)?)
-}
-
-/// As [`read_frfs`], where the content of the file is `bytes`.
-///
-/// # Errors
-/// As [`read_frfs`].
-pub fn read_frfs_in(path: &Path, bytes: &[u8]) -> Result<(Vec<FrfRecord>, Vec<String>)> {
-    frfs_of(long::decoded(path, bytes)?)
-}
-
-fn frfs_of(file: MeasurementFile) -> Result<(Vec<FrfRecord>, Vec<String>)> {
-    if file.contents.frfs.is_empty() {
-        return Err(no_such(&file, "FRF", "give a UFF 58 file or a CSV with FRFs"));
-    }
+    let file = read_frf_file(path)?;
     Ok((file.contents.frfs, file.warnings))
 }
 
-/// The whole content of a file.
+/// A file that holds FRFs.
 ///
 /// # Errors
-/// The operating system's; a folder, pipe or device, by its path.
-pub fn read_content(path: &Path) -> Result<Vec<u8>> {
-    long::regular_file(path)?;
-    std::fs::read(path).map_err(|e| Error::io(path, e))
+/// As [`read_file`], and a file without FRFs.
+pub fn read_frf_file(path: &Path) -> Result<MeasurementFile> {
+    let file = read_file(path)?;
+    if file.contents.frfs.is_empty() {
+        return Err(no_such(&file, "FRF", "give a UFF 58 file or a CSV with FRFs"));
+    }
+    Ok(file)
 }
 
 /// The time record of a file, and its warnings.
@@ -73,9 +63,29 @@ pub fn read_content(path: &Path) -> Result<Vec<u8>> {
 /// # Errors
 /// As [`read_file`], and a file without time signals or with several that do not share one time axis.
 pub fn read_time(path: &Path) -> Result<(TimeRecord, Vec<String>)> {
+    let read = read_time_file(path)?;
+    Ok((read.record, read.warnings))
+}
+
+/// The one time record of a file.
+#[derive(Debug, Clone)]
+pub struct TimeFile {
+    /// Its channels.
+    pub record: TimeRecord,
+    /// What was assumed, contradicted or left out.
+    pub warnings: Vec<String>,
+    /// Of the file's content.
+    pub digest: Digest,
+}
+
+pub(super) fn read_time_file(path: &Path) -> Result<TimeFile> {
     let mut file = read_file(path)?;
     match (file.contents.times.pop(), file.contents.times.len()) {
-        (Some(record), 0) => Ok((record, file.warnings)),
+        (Some(record), 0) => Ok(TimeFile {
+            record,
+            warnings: file.warnings,
+            digest: file.digest,
+        }),
         (None, _) => Err(no_such(
             &file,
             "time signal",

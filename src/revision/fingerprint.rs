@@ -2,16 +2,16 @@
 
 use std::fmt::Debug;
 use std::hash::Hasher;
-use std::io::Read;
 use std::path::Path;
 
 use fnv::FnvHasher;
 
 use super::folder::log_file;
+use crate::Result;
 use crate::campaign::form::paths;
 use crate::campaign::{Campaign, LinkTolerances, campaign_file, named_files};
 use crate::identify::model_history::Side;
-use crate::{Error, Result};
+use crate::ingest::Digest;
 
 /// FNV-1a, 64 bits (Fowler, Noll & Vo): notices a change; it need not resist anyone who wants to deceive himself.
 #[derive(Default)]
@@ -42,59 +42,32 @@ impl Fnv {
     }
 
     fn file(&mut self, path: &Path) -> Result<()> {
-        let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
-        self.part(&bytes);
+        self.value(&Digest::read(path)?);
         Ok(())
     }
 
     /// A file of any size, or that it cannot be read.
     fn file_or_absence(&mut self, path: &Path) {
-        let mut length = 0u64;
-        // A named pipe would make the reader wait for ever.
-        let file = crate::ingest::regular_file(path).and_then(|()| {
-            let mut file = std::fs::File::open(path).map_err(|e| Error::io(path, e))?;
-            let mut buffer = vec![0; 1 << 16];
-            loop {
-                let read = file.read(&mut buffer).map_err(|e| Error::io(path, e))?;
-                if read == 0 {
-                    return Ok(());
-                }
-                self.bytes(&buffer[..read]);
-                length += read as u64;
-            }
-        });
-        match file {
-            Ok(()) => self.value(&("there", length)),
+        match Digest::read(path) {
+            Ok(digest) => self.value(&digest),
             Err(_) => self.part(b"absent"),
         }
     }
 }
 
+/// Of each file, as it was read; of the file as it lies on the disk where that is not known.
+fn known_or_read(known: Option<Digest>, path: &Path) -> Result<Digest> {
+    known.map_or_else(|| Digest::read(path), Ok)
+}
+
 /// Fingerprint of all that the structural fit rests on: robot, postures, points, and the content of the FRF files. Where
 /// the folder lies, what its files are called and what else is in it do not matter.
 ///
-/// # Errors
-/// A file that cannot be read.
-pub fn structure_fingerprint(campaign: &Campaign) -> Result<String> {
-    structure_hash(campaign, |hash, frf| hash.file(&campaign.frfs[frf].file))
-}
-
-/// As [`structure_fingerprint`], with the contents of the FRF files in the order of the campaign.
+/// `frfs`: what is known of the FRF files, in the order of the campaign; a file beyond its end is read.
 ///
 /// # Errors
-/// A robot file that cannot be read, or an FRF file that could not.
-pub fn structure_fingerprint_of(campaign: &Campaign, frf_contents: &[Result<Vec<u8>>]) -> Result<String> {
-    structure_hash(campaign, |hash, frf| match &frf_contents[frf] {
-        Ok(bytes) => {
-            hash.part(bytes);
-            Ok(())
-        }
-        Err(error) => Err(Error::computation(error.to_string())),
-    })
-}
-
-/// `content` adds the content of an FRF file by its number.
-fn structure_hash(campaign: &Campaign, content: impl Fn(&mut Fnv, usize) -> Result<()>) -> Result<String> {
+/// A file that cannot be read.
+pub fn structure_fingerprint(campaign: &Campaign, frfs: &[Digest]) -> Result<String> {
     let mut hash = Fnv::new();
     if let Some(robot) = &campaign.robot {
         hash.value(&(robot.mass_tolerance, robot.stiffness_tolerance));
@@ -117,22 +90,24 @@ fn structure_hash(campaign: &Campaign, content: impl Fn(&mut Fnv, usize) -> Resu
     }
     for (i, frf) in campaign.frfs.iter().enumerate() {
         hash.value(&(frf.posture, frf.quantity, frf.force_level_n));
-        content(&mut hash, i)?;
+        hash.value(&known_or_read(frfs.get(i).copied(), &frf.file)?);
     }
     Ok(hash.text())
 }
 
 /// Fingerprint of all that the fit of the force records rests on: tool, dynamometer, cuts and the content of the records.
 ///
+/// `records`: what is known of the record of each cut.
+///
 /// # Errors
 /// A file that cannot be read.
-pub fn cutting_fingerprint(campaign: &Campaign) -> Result<String> {
+pub fn cutting_fingerprint(campaign: &Campaign, records: &[Option<Digest>]) -> Result<String> {
     let mut hash = Fnv::new();
     hash.value(&campaign.tool);
     hash.value(&campaign.dynamometer);
-    for cut in &campaign.cuts {
+    for (i, cut) in campaign.cuts.iter().enumerate() {
         hash.value(&(cut.spindle_rpm, &cut.geometry, cut.order, cut.steady_s));
-        hash.file(&cut.file)?;
+        hash.value(&known_or_read(records.get(i).copied().flatten(), &cut.file)?);
     }
     Ok(hash.text())
 }
@@ -143,8 +118,8 @@ pub fn cutting_fingerprint(campaign: &Campaign) -> Result<String> {
 /// A file that cannot be read.
 pub fn fingerprint(campaign: &Campaign, side: Side) -> Result<String> {
     match side {
-        Side::Structure => structure_fingerprint(campaign),
-        Side::Cutting => cutting_fingerprint(campaign),
+        Side::Structure => structure_fingerprint(campaign, &[]),
+        Side::Cutting => cutting_fingerprint(campaign, &[]),
     }
 }
 
@@ -157,7 +132,7 @@ pub fn folder_fingerprint(dir: &Path, options: &[&str]) -> String {
     let file = campaign_file(dir);
     hash.file_or_absence(&file);
     hash.file_or_absence(&log_file(dir));
-    let text = match crate::ingest::regular_file(&file) {
+    let text = match crate::files::regular_file(&file) {
         Ok(()) => std::fs::read_to_string(&file).unwrap_or_default(),
         Err(_) => String::new(),
     };

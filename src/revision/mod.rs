@@ -17,8 +17,7 @@ pub use crate::identify::model_history::{
 pub use clock::now;
 pub use evidence::{keep, recall};
 pub use fingerprint::{
-    cutting_fingerprint, fingerprint, folder_fingerprint, structure_fingerprint, structure_fingerprint_of,
-    text_fingerprint,
+    cutting_fingerprint, fingerprint, folder_fingerprint, structure_fingerprint, text_fingerprint,
 };
 pub use folder::log_file;
 pub use lock::hold;

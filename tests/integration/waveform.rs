@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::support::{blind, document, truth};
+use lobestone::analysis::Workbench;
 use lobestone::campaign::Campaign;
 use lobestone::discrepancy::{CuttingComparison, DiagnosisVerdict};
 use lobestone::effects::{Cutting, Instance, Known, Registry};
@@ -71,7 +72,7 @@ fn nrms(model: &CuttingModel, data: &CuttingData, theta: &[f64]) -> (f64, f64) {
 
 fn loaded(name: &str) -> (CuttingData, CuttingModel) {
     let campaign = Campaign::load(&blind(name)).unwrap();
-    let data = CuttingData::load(&campaign, processes(&campaign.cuts)[0]).unwrap();
+    let data = CuttingData::on(&Workbench::new(&campaign), processes(&campaign.cuts)[0]).unwrap();
     assert!(data.warnings.is_empty(), "{:?}", data.warnings);
     let model = CuttingModel::new(&data, true).unwrap();
     (data, model)
@@ -329,7 +330,7 @@ fn report(name: &str, dir: &Path) {
     let Some(&process) = processes(&campaign.cuts).first() else {
         return;
     };
-    let data = CuttingData::load(&campaign, process).unwrap();
+    let data = CuttingData::on(&Workbench::new(&campaign), process).unwrap();
     let loaded = clock.elapsed().as_secs_f64();
     let base = CuttingModel::new(&data, true).unwrap();
     let first = fit(&base, &data, &base.nominal_theta(), 40).unwrap();

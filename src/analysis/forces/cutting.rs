@@ -110,12 +110,12 @@ fn warnings_of(calibration: &Calibration) -> Vec<String> {
 /// its waveforms cannot be fitted. And what the waveforms say about channels that are wrong in all records, and about other
 /// mistakes of the setup.
 pub fn waveform_groups(
-    campaign: &Campaign,
+    campaign: &Workbench,
     result: &CfcResult,
 ) -> (Vec<Value>, Vec<String>, Vec<SetupFinding>) {
     let loaded: Vec<(Process, Option<CuttingData>)> = processes(&campaign.cuts)
         .into_iter()
-        .map(|p| (p, CuttingData::load(campaign, p).ok()))
+        .map(|p| (p, CuttingData::on(campaign, p).ok()))
         .collect();
     let warnings = loaded
         .iter()

@@ -1,17 +1,14 @@
 //! A campaign's cutting side loaded: force records and the revisions of their model.
 
-use rayon::prelude::*;
-
-use crate::analysis::forces::force_records::read_in_step;
+use crate::analysis::forces::force_records::ForceRecords;
 use crate::analysis::grown::with_revision;
 use crate::analysis::workbench::Workbench;
-use crate::campaign::{Campaign, Process, Tool};
-use crate::cutting::{InStep, Notice, of_notices};
+use crate::campaign::{Campaign, Process};
+use crate::cutting::of_notices;
 use crate::effects::Registry;
-use crate::identify::forces::cutting_data::{CutData, processes};
+use crate::identify::forces::cutting_data::processes;
 use crate::identify::model_history::Side;
 use crate::identify::{Case, CuttingCase, CuttingData, CuttingModel};
-use crate::progress::Progress;
 use crate::{Error, InputError, Result};
 
 fn material(campaign: &Campaign, cut: usize) -> &str {
@@ -59,7 +56,7 @@ impl CuttingCase {
                     .into(),
             );
         };
-        let mut data = CuttingData::load(campaign, process)?;
+        let mut data = CuttingData::on(campaign, process)?;
         let mut warnings = data.warnings.clone();
         if let Some((main, others)) = materials(campaign, &data) {
             warnings.push(format!(
@@ -83,20 +80,12 @@ impl CuttingCase {
     }
 }
 
-fn tool(campaign: &Campaign) -> Result<&Tool> {
-    campaign
-        .tool
-        .as_ref()
-        .ok_or_else(|| Error::computation("[tool] is missing: cutting forces need its teeth and diameter"))
-}
-
 impl CuttingData {
-    /// Reads the records of the campaign's cuts of `process`, in parallel. A cut that cannot be used is left out with a
-    /// warning.
+    /// The records of the campaign's cuts of `process`. A cut that cannot be used is left out with a warning.
     ///
     /// # Errors
     /// No usable cut; no tool; a `tool_from_dyno` that cannot be inverted.
-    pub fn load(campaign: &Campaign, process: Process) -> Result<Self> {
+    pub fn on(campaign: &Workbench, process: Process) -> Result<Self> {
         let indices: Vec<usize> = (0..campaign.cuts.len())
             .filter(|i| campaign.cuts[*i].geometry.process() == process)
             .collect();
@@ -109,24 +98,13 @@ impl CuttingData {
             .remedy("add [[cut]] tables that name the force records")
             .into());
         }
-        let progress = Progress::new("force waveforms", indices.len());
-        let outcomes: Vec<Result<(CutData, Vec<Notice>)>> = indices
-            .par_iter()
-            .map(|&i| {
-                let (record, mut analysis) = read_in_step(campaign, i, InStep::UnlessItWanders)?;
-                let notices = std::mem::take(&mut analysis.notices);
-                let outcome = tool(campaign)
-                    .and_then(|tool| CutData::new(tool, (i, &campaign.cuts[i]), &record, &analysis));
-                progress.step();
-                Ok((outcome?, notices))
-            })
-            .collect();
+        let records = ForceRecords::of(campaign);
         let (mut cuts, mut warnings, mut noticed) = (Vec::new(), Vec::new(), Vec::new());
-        for (&i, outcome) in indices.iter().zip(outcomes) {
-            match outcome {
+        for &i in &indices {
+            match &records.waveforms[i] {
                 Ok((cut, notices)) => {
-                    noticed.extend(notices.into_iter().map(|n| (cut.id.clone(), n)));
-                    cuts.push(cut);
+                    noticed.extend(notices.iter().map(|n| (cut.id.clone(), n.clone())));
+                    cuts.push(cut.clone());
                 }
                 Err(error) => warnings.push(format!("cut {} is left out: {error}", campaign.cuts[i].id)),
             }

@@ -1,13 +1,17 @@
 //! A campaign's force records: read from their files and handed to [`crate::cutting`] as plain values.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
+use crate::analysis::workbench::Workbench;
 use crate::campaign::Campaign;
 use crate::cutting::{
-    CfcOptions, CfcResult, CutAnalysis, CuttingTrials, InStep, Notice, analyse_in_step,
+    CfcOptions, CfcResult, CutAnalysis, CuttingTrials, Notice, RecordReading, analyse_in_step,
     fit_force_coefficients, none_usable, repair_record,
 };
-use crate::ingest::{self, TimeRecord};
+use crate::identify::forces::cutting_data::CutData;
+use crate::ingest::{self, Digest, TimeRecord};
 use crate::progress::Progress;
 use crate::{Error, InputError, Result};
 
@@ -33,33 +37,93 @@ pub fn cutting_trials(campaign: &Campaign) -> Result<CuttingTrials<'_>> {
 }
 
 /// The record of one cut, bad samples replaced, and what its owner should know.
-///
-/// # Errors
-/// Those of [`ingest::read_time`].
-pub fn read_record(campaign: &Campaign, cut: usize) -> Result<(TimeRecord, Vec<Notice>)> {
-    let cut = &campaign.cuts[cut];
-    let (mut record, reader_warnings) = ingest::read_time_with(&cut.file, &campaign.channel_rules(&cut.id))?;
-    let mut notices = repair_record(&mut record, cut.spindle_rpm);
-    let noticed = |detail| Notice { kind: READER, detail };
-    notices.extend(reader_warnings.into_iter().map(noticed));
-    Ok((record, notices))
+struct ReadRecord {
+    record: TimeRecord,
+    notices: Vec<Notice>,
+    digest: Digest,
 }
 
-/// The record of one cut and what it says, in step with the stated speed.
-///
-/// # Errors
-/// Those of [`read_record`] and [`crate::cutting::analyse_cut`]; no tool.
-pub fn read_in_step(campaign: &Campaign, index: usize, how: InStep) -> Result<(TimeRecord, CutAnalysis)> {
-    let (record, notices) = read_record(campaign, index)?;
-    analyse_in_step(&cutting_trials(campaign)?, index, record, notices, how)
+impl ReadRecord {
+    fn of(campaign: &Campaign, cut: usize) -> Result<Self> {
+        let cut = &campaign.cuts[cut];
+        let file = ingest::read_time_with(&cut.file, &campaign.channel_rules(&cut.id))?;
+        let mut record = file.record;
+        let mut notices = repair_record(&mut record, cut.spindle_rpm);
+        let noticed = |detail| Notice { kind: READER, detail };
+        notices.extend(file.warnings.into_iter().map(noticed));
+        Ok(ReadRecord {
+            record,
+            notices,
+            digest: file.digest,
+        })
+    }
+
+    /// What it says, in step with the stated speed.
+    fn reading(self, campaign: &Campaign, cut: usize) -> Result<RecordReading> {
+        analyse_in_step(&cutting_trials(campaign)?, cut, self.record, self.notices)
+    }
 }
 
-/// Reads every cut's record (in parallel, one record in memory per thread) and fits the coefficients.
-/// A cut that cannot be used is left out with a warning that names it.
+/// A cut's forces as `compare` and `diagnose` look at them, and what their owner should know.
+pub type Waveform = (CutData, Vec<Notice>);
+
+/// What the force records of a campaign say, cut by cut in the order of `campaign.toml`.
+pub struct ForceRecords {
+    /// Averages over turns, or why there are none.
+    pub averages: Vec<Result<CutAnalysis>>,
+    /// Waveforms, or why there are none.
+    pub waveforms: Vec<Result<Waveform>>,
+}
+
+impl ForceRecords {
+    /// Each record is read once (in parallel, one record in memory per thread), however often this is asked for.
+    pub fn of(campaign: &Workbench) -> Arc<Self> {
+        campaign
+            .known()
+            .unwrap_or_else(|| campaign.keep(Self::read(campaign)))
+    }
+
+    fn read(campaign: &Workbench) -> Self {
+        let plain: &Campaign = campaign;
+        let progress = Progress::new("force records", plain.cuts.len());
+        let one = |cut: usize| {
+            let read = ReadRecord::of(plain, cut);
+            let digest = read.as_ref().ok().map(|read| read.digest);
+            let reading = read.and_then(|read| read.reading(plain, cut));
+            progress.step();
+            match reading {
+                Ok(reading) => {
+                    let waveform = waveform(plain, cut, &reading);
+                    (Ok(reading.averages), waveform, digest)
+                }
+                Err(error) => (Err(error.clone()), Err(error), digest),
+            }
+        };
+        let cuts = (0..plain.cuts.len()).into_par_iter().map(one);
+        let read: Vec<(Result<CutAnalysis>, Result<Waveform>, Option<Digest>)> = cuts.collect();
+        let (mut averages, mut waveforms, mut digests) = (Vec::new(), Vec::new(), Vec::new());
+        for (average, waveform, digest) in read {
+            averages.push(average);
+            waveforms.push(waveform);
+            digests.push(digest);
+        }
+        campaign.records_were_read(&digests);
+        ForceRecords { averages, waveforms }
+    }
+}
+
+fn waveform(campaign: &Campaign, cut: usize, reading: &RecordReading) -> Result<Waveform> {
+    let tool = cutting_trials(campaign)?.tool;
+    let (record, analysis) = (&reading.waveform_record, &reading.waveform);
+    let data = CutData::new(tool, (cut, &campaign.cuts[cut]), record, analysis)?;
+    Ok((data, analysis.notices.clone()))
+}
+
+/// Fits the coefficients to the averages of every cut. A cut that cannot be used is left out with a warning that names it.
 ///
 /// # Errors
 /// No cuts, no tool, or not one usable record.
-pub fn identify_forces(campaign: &Campaign, options: CfcOptions) -> Result<CfcResult> {
+pub fn identify_forces(campaign: &Workbench, options: CfcOptions) -> Result<CfcResult> {
     let campaign_file = || campaign.dir.join("campaign.toml");
     if campaign.cuts.is_empty() {
         return Err(
@@ -70,15 +134,7 @@ pub fn identify_forces(campaign: &Campaign, options: CfcOptions) -> Result<CfcRe
                 .into(),
         );
     }
-    let progress = Progress::new("force records", campaign.cuts.len());
-    let outcomes: Vec<Result<CutAnalysis>> = (0..campaign.cuts.len())
-        .into_par_iter()
-        .map(|i| {
-            let outcome = read_in_step(campaign, i, InStep::Fully).map(|(_, analysis)| analysis);
-            progress.step();
-            outcome
-        })
-        .collect();
+    let outcomes = ForceRecords::of(campaign).averages.clone();
     let result = match cutting_trials(campaign) {
         Ok(trials) => fit_force_coefficients(&trials, outcomes, options),
         // Without a tool no record could be analysed.
@@ -129,12 +185,12 @@ mod tests {
                 .into();
             let campaign = write_campaign(dir.path(), &cuts, &|_, _, _, _, _| 0.0);
             let before = (0..cuts.len()).map(|i| {
-                let (record, _) = read_record(&campaign, i)?;
-                analyse_cut(&cutting_trials(&campaign)?, i, &record)
+                let read = ReadRecord::of(&campaign, i)?;
+                analyse_cut(&cutting_trials(&campaign)?, i, &read.record)
             });
             let trials = cutting_trials(&campaign).unwrap();
             let before = fit_force_coefficients(&trials, before.collect(), CfcOptions::default()).unwrap();
-            let after = identify_forces(&campaign, CfcOptions::default()).unwrap();
+            let after = identify_forces(&Workbench::new(&campaign), CfcOptions::default()).unwrap();
             eprintln!("{name}: {:.4} before, {:.4} after", worst(&before), worst(&after));
             assert!(worst(&after) < 0.01, "{name}: {}", worst(&after));
             for cut in &after.cuts {
@@ -177,10 +233,14 @@ mod tests {
             size * (angle + axis as f64).cos()
         });
         for i in 0..cuts.len() {
-            let (record, analysis) = read_in_step(&campaign, i, InStep::Fully).unwrap();
-            assert_eq!(analysis.spindle, None, "cut {}", analysis.id);
-            let (as_read, _) = read_record(&campaign, i).unwrap();
-            assert_eq!(record.channels[0].samples, as_read.channels[0].samples);
+            let as_read = ReadRecord::of(&campaign, i).unwrap().record;
+            let reading = ReadRecord::of(&campaign, i)
+                .unwrap()
+                .reading(&campaign, i)
+                .unwrap();
+            assert_eq!(reading.averages.spindle, None, "cut {i}");
+            let samples = |record: &TimeRecord| record.channels[0].samples.clone();
+            assert_eq!(samples(&reading.waveform_record), samples(&as_read));
         }
     }
 
@@ -199,10 +259,13 @@ mod tests {
                 speed,
             };
             let campaign = write_campaign(dir.path(), &[cut], &|_, _, _, _, _| 0.0);
-            let (record, analysis) = read_in_step(&campaign, 0, InStep::UnlessItWanders).unwrap();
-            assert!(analysis.spindle.is_some(), "{wanders}");
-            let (as_read, _) = read_record(&campaign, 0).unwrap();
-            let untouched = record.channels[0].samples == as_read.channels[0].samples;
+            let as_read = ReadRecord::of(&campaign, 0).unwrap().record;
+            let reading = ReadRecord::of(&campaign, 0)
+                .unwrap()
+                .reading(&campaign, 0)
+                .unwrap();
+            assert!(reading.waveform.spindle.is_some(), "{wanders}");
+            let untouched = reading.waveform_record.channels[0].samples == as_read.channels[0].samples;
             assert_eq!(untouched, wanders);
         }
     }
@@ -215,8 +278,11 @@ mod tests {
                 .join(name);
             let campaign = Campaign::load(&dir).unwrap();
             for i in 0..campaign.cuts.len() {
-                let (_, analysis) = read_in_step(&campaign, i, InStep::Fully).unwrap();
-                assert_eq!(analysis.spindle, None, "{name}, cut {}", analysis.id);
+                let reading = ReadRecord::of(&campaign, i)
+                    .unwrap()
+                    .reading(&campaign, i)
+                    .unwrap();
+                assert_eq!(reading.averages.spindle, None, "{name}, cut {i}");
             }
         }
     }
@@ -231,7 +297,7 @@ mod tests {
             speed: &|_| 1.0,
         });
         let campaign = write_campaign_of(dir.path(), 5.0, &cuts, &|_, _, _, _, _| 0.0);
-        let result = identify_forces(&campaign, CfcOptions::default()).unwrap();
+        let result = identify_forces(&Workbench::new(&campaign), CfcOptions::default()).unwrap();
         let found = &result.pooled[0];
         for (coefficient, truth) in found.coefficients.iter().zip(TRUTH) {
             let (value, std) = (coefficient.value.unwrap(), coefficient.std_error.unwrap());
@@ -246,7 +312,7 @@ mod tests {
             tool: straight.tool,
             ..campaign
         };
-        let wrong = identify_forces(&wrong, CfcOptions::default()).unwrap();
+        let wrong = identify_forces(&Workbench::new(&wrong), CfcOptions::default()).unwrap();
         assert!(wrong.pooled[0].coefficients[1].value.unwrap() < 0.7 * TRUTH[1]);
     }
 }

@@ -2,6 +2,7 @@
 //! a file).
 
 use std::path::Path;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
@@ -68,6 +69,14 @@ impl ModalAnalysis {
             })
             .collect();
         Self::of(inputs, warnings, settings)
+    }
+
+    /// In the usual way, worked out once of what lies on the bench.
+    ///
+    /// # Errors
+    /// As [`ModalAnalysis::run`].
+    pub fn usual(campaign: &Workbench) -> Result<Arc<Self>> {
+        campaign.once(|| Self::on(campaign, &Settings::default()))
     }
 
     /// FRF files and raw tap tests: one set a file, or all files as one set (FRFs exported one by one).

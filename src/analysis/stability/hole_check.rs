@@ -3,6 +3,7 @@
 use std::fmt::Display;
 
 use crate::analysis::stability::lobe_setup::{group_of_cuts, half_point_angle_rad};
+use crate::analysis::workbench::Workbench;
 use crate::campaign::{Campaign, CutGeometry, HoleSection, LobesSection, Process, Tool};
 use crate::cutting::{ForceAxis, ForceGroup, average_row, coefficients_of};
 use crate::lobes::hole::{HoleCheck, HoleLoad, HoleTolerance, milling_torque_nm};
@@ -13,7 +14,7 @@ use crate::lobes::hole::{HoleCheck, HoleLoad, HoleTolerance, milling_torque_nm};
 /// # Errors
 /// In words for people: why the thrust is not known, and what to give.
 pub fn hole_check(
-    campaign: &Campaign,
+    campaign: &Workbench,
     section: &LobesSection,
     own: Option<&ForceGroup>,
 ) -> std::result::Result<HoleCheck, String> {
@@ -67,7 +68,7 @@ fn words(error: impl Display) -> String {
 
 /// What the cutting coefficients predict.
 fn predicted(
-    campaign: &Campaign,
+    campaign: &Workbench,
     section: &LobesSection,
     asked: &HoleSection,
     own: Option<&ForceGroup>,

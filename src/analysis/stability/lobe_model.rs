@@ -7,9 +7,9 @@ use crate::analysis::StructureAnalysis;
 use crate::analysis::structure_case::structure_model;
 use crate::analysis::workbench::Workbench;
 use crate::campaign::{Campaign, LobesSection};
+use crate::identify::Options;
 use crate::identify::frfs::calibrate::calibrate;
 use crate::identify::frfs::structure::StructureModel;
-use crate::identify::{Options, StructureCase};
 use crate::lobes::dynamics::tool_point::RobotHolder;
 use crate::lobes::hole::{Deflection, HoleError, HoleLoad};
 use crate::lobes::setup::tool_beam;
@@ -222,9 +222,8 @@ impl ModelState {
         warnings: &mut Vec<String>,
         history: bool,
     ) -> Result<Self> {
-        let StructureAnalysis {
-            case, calibration, ..
-        } = StructureAnalysis::of_case(StructureCase::on(campaign)?, Options::default())?;
+        let analysis = StructureAnalysis::on(campaign)?;
+        let (case, calibration) = (&analysis.case, &analysis.calibration);
         let options = case.options(Options::default());
         let effects = case.effects();
         let description = match effects.is_empty() {
@@ -254,11 +253,11 @@ impl ModelState {
         )?;
         warnings.extend(calibration.warnings());
         let revision = case.revision();
-        warnings.extend(case.warnings);
+        warnings.extend(case.warnings.iter().cloned());
         Ok(ModelState {
             current: FittedModel {
-                model: case.model,
-                theta: calibration.theta,
+                model: case.model.clone(),
+                theta: calibration.theta.clone(),
             },
             before,
             effects,

@@ -1,6 +1,7 @@
 //! What a campaign's `[lobes]` table, its tool and its cuts give for the lobes: coefficients, force and modes.
 
 use crate::analysis::forces::force_records::identify_forces;
+use crate::analysis::workbench::Workbench;
 use crate::campaign::{Campaign, LobeAxis, LobeMethod, LobeMode, LobesSection, Process, ToolKind};
 use crate::cutting::{CfcOptions, ForceGroup};
 use crate::lobes::dynamics::tool_point::ModesHolder;
@@ -21,7 +22,7 @@ fn lacks_coefficients(campaign: &Campaign, problem: impl Into<String>) -> Error 
 /// # Errors
 /// No cuts of that process, or several materials of which none is named.
 pub fn group_of_cuts(
-    campaign: &Campaign,
+    campaign: &Workbench,
     section: &LobesSection,
     warnings: &mut Vec<String>,
 ) -> Result<ForceGroup> {

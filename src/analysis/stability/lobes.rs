@@ -277,7 +277,7 @@ pub(crate) struct CutForce {
 impl CutForce {
     /// # Errors
     /// Something that the process needs is missing.
-    pub fn of(campaign: &Campaign, section: &LobesSection, warnings: &mut Vec<String>) -> Result<Self> {
+    pub fn of(campaign: &Workbench, section: &LobesSection, warnings: &mut Vec<String>) -> Result<Self> {
         let (coefficients, own_cuts) = match LobeCoefficients::given(section) {
             Some(given) => (given, None),
             None => {

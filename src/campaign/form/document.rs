@@ -19,7 +19,7 @@ pub struct Document {
 impl Document {
     /// Reads a file. A UTF-8 byte order mark is accepted, another encoding is refused with the line.
     pub fn read(file: &Path) -> Result<Document> {
-        crate::ingest::regular_file(file)?;
+        crate::files::regular_file(file)?;
         let bytes = std::fs::read(file).map_err(|e| Error::io(file, e))?;
         Document::from_bytes(file, bytes)
     }

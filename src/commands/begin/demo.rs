@@ -1,6 +1,7 @@
 //! `lobestone demo [DIR]`: the whole story on the built-in campaigns, each step as the command of its name does it.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
@@ -94,6 +95,7 @@ pub fn run(args: DemoArgs) -> Result<Outcome> {
     let told = told_first?;
     story.steps.extend(told.story.steps);
     let FirstCell {
+        bench,
         structure,
         postures,
         modal,
@@ -104,7 +106,7 @@ pub fn run(args: DemoArgs) -> Result<Outcome> {
 
     let findings = CampaignFindings {
         campaign: &first,
-        bench: Workbench::new(&first),
+        bench,
         setup: Vec::new(),
         structure: Some(Ok(structure)),
         diagnosis: None,
@@ -158,18 +160,19 @@ pub fn run(args: DemoArgs) -> Result<Outcome> {
 }
 
 /// What the model explains.
-struct FirstCell {
+struct FirstCell<'a> {
+    bench: Workbench<'a>,
     story: Story,
     structure: StructureFindings,
     postures: Vec<PostureFindings>,
-    modal: ModalAnalysis,
+    modal: Arc<ModalAnalysis>,
     cutting: CfcResult,
     lobes: LobeFindings,
 }
 
 /// `of`: a command on a campaign as it is typed.
-fn first_story(first: &Campaign, of: impl Fn(&str, &Campaign) -> String) -> Result<FirstCell> {
-    let mut story = Story::default();
+fn first_story(first: &Campaign, of: impl Fn(&str, &Campaign) -> String) -> Result<FirstCell<'_>> {
+    let (mut story, bench) = (Story::default(), &Workbench::new(first));
     story.step(
         "inspect",
         of("inspect", first) + "/frf/*.uff",
@@ -179,7 +182,7 @@ fn first_story(first: &Campaign, of: impl Fn(&str, &Campaign) -> String) -> Resu
     let structure = story.step(
         "calibrate",
         of("calibrate", first),
-        || StructureFindings::run(first),
+        || StructureFindings::on(bench),
         calibrated,
     )?;
     let postures = story.step(
@@ -188,15 +191,21 @@ fn first_story(first: &Campaign, of: impl Fn(&str, &Campaign) -> String) -> Resu
         || PostureFindings::run(first, Some(&structure)),
         |postures| modelled(postures),
     )?;
-    let modal = story.step("modal", of("modal", first), || ModalAnalysis::run(first), modes)?;
+    let modal = story.step(
+        "modal",
+        of("modal", first),
+        || ModalAnalysis::usual(bench),
+        |found| modes(found),
+    )?;
     let cutting = story.step(
         "cfc",
         of("cfc", first),
-        || identify_forces(first, CfcOptions::default()),
+        || identify_forces(bench, CfcOptions::default()),
         coefficients,
     )?;
-    let lobes = story.step("lobes", of("lobes", first), || LobeFindings::run(first), lobes)?;
+    let lobes = story.step("lobes", of("lobes", first), || LobeFindings::on(bench), lobes)?;
     Ok(FirstCell {
+        bench: bench.clone(),
         story,
         structure,
         postures,
@@ -211,11 +220,11 @@ fn second_story(
     second: &Campaign,
     of: impl Fn(&str, &Campaign) -> String,
 ) -> Result<(Story, StructureFindings, DiagnosisFindings, StructureCase)> {
-    let mut story = Story::default();
+    let (mut story, bench) = (Story::default(), &Workbench::new(second));
     let unexplained = story.step(
         "compare",
         of("compare", second),
-        || StructureFindings::run(second),
+        || StructureFindings::on(bench),
         compared,
     )?;
     let diagnosis = story.step(
@@ -227,7 +236,7 @@ fn second_story(
     let missing = diagnosis.diagnosis.winner().map(|w| w.label());
     let missing =
         missing.ok_or_else(|| Error::computation("the built-in second cell shows no missing effect"))?;
-    diagnosis.keep(&Workbench::new(second))?;
+    diagnosis.keep(bench)?;
     story.step(
         "add",
         of("add", second) + " " + &missing,

@@ -5,6 +5,7 @@ use serde_json::json;
 use crate::Result;
 use crate::analysis::forces::cutting::waveform_groups;
 use crate::analysis::forces::force_records::{cutting_trials, identify_forces};
+use crate::analysis::workbench::Workbench;
 use crate::campaign::Campaign;
 use crate::commands::next_step::Guide;
 use crate::commands::text::{Emphasis, setup_lines};
@@ -35,8 +36,9 @@ pub fn run(args: CfcArgs) -> Result<Outcome> {
         nonnegative_edges: args.nonnegative_edges,
         robust: args.robust,
     };
-    let mut result = identify_forces(&campaign, options)?;
-    let (waveforms, warnings, setup) = waveform_groups(&campaign, &result);
+    let bench = Workbench::new(&campaign);
+    let mut result = identify_forces(&bench, options)?;
+    let (waveforms, warnings, setup) = waveform_groups(&bench, &result);
     result.warnings.extend(warnings);
     let trials = cutting_trials(&campaign)?;
     let power_laws = PowerLaws {

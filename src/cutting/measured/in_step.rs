@@ -13,48 +13,67 @@ pub(crate) const OTHER_SPEED: &str = "the spindle did not keep the stated speed:
      only where it does not wander); correct spindle_rpm (and the feed per tooth that goes with it), and look why it changes \
      under load";
 
-/// Which part of the speed's changes is taken out of a record.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum InStep {
-    /// All of them: averages over turns.
-    Fully,
-    /// All of them, unless the speed wanders: then the record stays as it is, for `diagnose` to find that as a mistake of the
-    /// setup (`spindle-speed-variation`).
-    UnlessItWanders,
+/// What one record says, put in step with the stated speed.
+pub struct RecordReading {
+    /// For averages over turns: all changes of the speed are taken out.
+    pub averages: CutAnalysis,
+    /// For waveforms: the same, but where the speed wanders the record stays as it is, for `diagnose` to find that as a
+    /// mistake of the setup (`spindle-speed-variation`).
+    pub waveform: CutAnalysis,
+    /// The record that `waveform` was read off.
+    pub waveform_record: TimeRecord,
 }
 
-/// Puts the record of one cut in step with the stated speed and reads it: the record as it is then, and what it says.
-/// `notices`: what is known of the record already.
+/// Puts the record of one cut in step with the stated speed and reads it. `notices`: what is known of the record already.
 ///
 /// # Errors
 /// Those of [`analyse_cut`].
 pub fn analyse_in_step(
     trials: &CuttingTrials,
     index: usize,
-    mut record: TimeRecord,
+    record: TimeRecord,
     mut notices: Vec<Notice>,
-    how: InStep,
-) -> Result<(TimeRecord, CutAnalysis)> {
-    let mut analysis = analyse_cut(trials, index, &record)?;
-    if let Some(found) = followed(trials.tool, &analysis, &record) {
-        let removed = match how {
-            InStep::Fully => Some(found.clone()),
-            InStep::UnlessItWanders => found.without_wander(),
-        };
-        if let Some(track) = removed {
-            let own = record.channels.iter_mut().filter(|c| axis_of(c.role).is_some());
-            own.for_each(|channel| channel.samples = track.in_step_samples(&channel.samples));
-            analysis = analyse_cut(trials, index, &record)?;
-        }
-        let file = &trials.cuts[index].file;
-        notices.push(Notice {
-            kind: OTHER_SPEED,
-            detail: in_words(&found, &file.display().to_string(), analysis.spindle_rpm),
+) -> Result<RecordReading> {
+    let as_read = analyse_cut(trials, index, &record)?;
+    let Some(found) = followed(trials.tool, &as_read, &record) else {
+        let mut averages = as_read;
+        averages.notices.extend(notices);
+        return Ok(RecordReading {
+            waveform: averages.clone(),
+            averages,
+            waveform_record: record,
         });
-        analysis.spindle = Some(found);
-    }
-    analysis.notices.extend(notices);
-    Ok((record, analysis))
+    };
+    let file = &trials.cuts[index].file;
+    notices.push(Notice {
+        kind: OTHER_SPEED,
+        detail: in_words(&found, &file.display().to_string(), as_read.spindle_rpm),
+    });
+    let told = |mut analysis: CutAnalysis| {
+        analysis.spindle = Some(found.clone());
+        analysis.notices.extend(notices.iter().cloned());
+        analysis
+    };
+    let averages = analyse_cut(trials, index, &turned_evenly(record.clone(), &found))?;
+    let (waveform_record, waveform) = match found.without_wander() {
+        Some(track) => {
+            let even = turned_evenly(record, &track);
+            let analysis = analyse_cut(trials, index, &even)?;
+            (even, analysis)
+        }
+        None => (record, as_read),
+    };
+    Ok(RecordReading {
+        averages: told(averages),
+        waveform: told(waveform),
+        waveform_record,
+    })
+}
+
+fn turned_evenly(mut record: TimeRecord, track: &SpindleTrack) -> TimeRecord {
+    let own = record.channels.iter_mut().filter(|c| axis_of(c.role).is_some());
+    own.for_each(|channel| channel.samples = track.in_step_samples(&channel.samples));
+    record
 }
 
 fn followed(tool: &Tool, analysis: &CutAnalysis, record: &TimeRecord) -> Option<SpindleTrack> {

@@ -36,7 +36,7 @@ impl Manifest {
     /// No table, no column `campaign`, a name that stands twice or in `reserved`, a line without a campaign, a campaign
     /// that is named twice, or none at all.
     pub fn read(file: &Path, reserved: &[&str]) -> Result<Manifest> {
-        crate::ingest::regular_file(file)?;
+        crate::files::regular_file(file)?;
         let bytes = std::fs::read(file).map_err(|e| Error::io(file, e))?;
         let text = String::from_utf8(bytes).map_err(|_| {
             InputError::new("the text is not UTF-8")

@@ -12,6 +12,7 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 
 use crate::analysis::forces::force_records::identify_forces;
+use crate::analysis::workbench::Workbench;
 use crate::analysis::{CuttingAnalysis, CuttingFindings, DiagnosisFindings, StructureAnalysis};
 use crate::campaign::{Campaign, campaign_file};
 use crate::cutting::{CfcOptions, ForceGroup};
@@ -288,19 +289,20 @@ fn structure(campaign: &Campaign, steps: &Steps) -> Result<BatchFindings> {
 }
 
 fn cutting(campaign: &Campaign, steps: &Steps) -> Result<BatchFindings> {
+    let campaign = &Workbench::new(campaign);
     let mut found = BatchFindings::default();
     if steps.has(BatchStep::Calibrate) || steps.has(BatchStep::Cfc) {
         let result = identify_forces(campaign, CfcOptions::default())?;
         found.quantities = result.pooled.iter().flat_map(coefficients).collect();
     }
     if steps.has(BatchStep::Diagnose) {
-        let d = CuttingFindings::run(campaign, Options::default())?;
+        let d = CuttingFindings::on(campaign, Options::default())?;
         let totals = &d.now.comparison.totals;
         (found.nrms, found.noise) = (finite(totals.nrms), finite(totals.noise_floor_nrms));
         found.diagnosed(&d.diagnosis, &d.setup);
     }
     if steps.has(BatchStep::Compare) || (steps.has(BatchStep::Calibrate) && !steps.has(BatchStep::Diagnose)) {
-        let analysis = CuttingAnalysis::run(campaign)?;
+        let analysis = CuttingAnalysis::on(campaign)?;
         let totals = &analysis.comparison.totals;
         (found.nrms, found.noise) = (finite(totals.nrms), finite(totals.noise_floor_nrms));
         found.converged = Some(analysis.calibration.converged());

@@ -49,6 +49,7 @@ def main():
             page += paragraph(effect["explanation"])
             page += paragraph("**How it shows.** " + effect["fingerprint"])
             page += paragraph("**In the lab.** " + effect["lab_check"])
+            page += paragraph("**Best measured.** " + effect["best_measured"])
             page += paragraph("**Usual sizes.** " + effect["typical"])
             for source in effect["sources"]:
                 page += paragraph("Source: " + source)

@@ -61,10 +61,9 @@ impl StructureAnalysis {
     /// # Errors
     /// FRFs that do not determine the parameters.
     pub fn of_case(case: StructureCase, options: Options) -> Result<Self> {
-        // FRFs that show no modes can still be fitted.
         let modal = match case.model.start() {
             Some(_) => None,
-            None => measured_modes(&case).ok(),
+            None => modes_to_start_from(&case),
         };
         Self::of(case, modal.as_ref(), options)
     }
@@ -122,12 +121,24 @@ impl StructureAnalysis {
 pub fn study_of(case: &StructureCase, options: Options) -> StructureStudy {
     let modal = match case.model.start() {
         Some(_) => None,
-        None => measured_modes(case).ok(),
+        None => modes_to_start_from(case),
     };
     // Modes that lead nowhere are no reason to give up.
     let start = modal.and_then(|modal| start_of_modes(case, &modal).ok().flatten());
     let study = case.study(options).with_measured(start.map(|s| s.theta));
     study.with_slips(absorb_slips)
+}
+
+/// FRFs of a posture that show the modes well enough to start from.
+const FRFS_TO_START_FROM: usize = 120;
+
+/// The modes that a calibration starts from; `None` where the FRFs show none: they can still be fitted.
+fn modes_to_start_from(case: &StructureCase) -> Option<ModalAnalysis> {
+    let few = StructureCase {
+        data: case.data.fewer_frfs(FRFS_TO_START_FROM),
+        ..case.clone()
+    };
+    measured_modes(&few).ok()
 }
 
 /// Where the modes measured at the campaign's postures put the model.

@@ -7,6 +7,8 @@ pub struct Background {
     pub lab_check: &'static str,
     /// Sizes met in practice. Rules of thumb unless a source is named in the text.
     pub typical: &'static str,
+    /// What to measure, and how, for the effect to show best in a campaign.
+    pub best_measured: &'static str,
     /// Author, year, title, place. Empty where there is none that we vouch for.
     pub sources: &'static [&'static str],
 }

@@ -270,6 +270,8 @@ impl Effect<Structure> for DrawnBranch {
             lab_check: "Look at the place: what touches, hangs or rubs there? Take it off, wedge it or add a known mass there and \
              hit again; the drawn curve must change with it.",
             typical: "Whatever the fit gives; a size that nothing at the place can have means that the cause is elsewhere.",
+            best_measured: "A point at the place itself, all three axes, and postures that turn it against gravity and against \
+             the direction of the hits.",
             sources: &[
                 "Mottershead, J. E., Link, M., Friswell, M. I. (2011): The sensitivity method in finite element model \
                  updating: a tutorial. Mechanical Systems and Signal Processing 25, 2275–2296.",

@@ -165,6 +165,7 @@ fn instances_of<D: Domain>(effect: &'static dyn Effect<D>, object: &D::Object) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects::Background;
 
     /// What `explain` tells must be there for every effect, and a source must name a year.
     #[test]
@@ -172,10 +173,14 @@ mod tests {
         let structural = STRUCTURAL.map(|e| (e.id(), e.background()));
         let cutting = CUTTING.map(|e| (e.id(), e.background()));
         for (id, background) in structural.into_iter().chain(cutting) {
-            assert!(
-                background.lab_check.len() > 60 && background.typical.len() > 40,
-                "{id}"
-            );
+            let Background {
+                lab_check,
+                best_measured,
+                typical,
+                ..
+            } = background;
+            let long_enough = lab_check.len() > 60 && best_measured.len() > 60 && typical.len() > 40;
+            assert!(long_enough, "{id}");
             for source in background.sources {
                 let year = source.split(|c: char| !c.is_ascii_digit()).any(|n| n.len() == 4);
                 assert!(year && source.ends_with('.'), "{id}: {source}");

@@ -350,7 +350,8 @@ function explanation(effect, key) {
   const list = make("dl", {});
   for (const [name, text] of [
     ["What it is", effect.explanation], ["How it shows", effect.fingerprint],
-    ["How to check it in the lab", effect.lab_check], ["Usual sizes (rules of thumb)", effect.typical],
+    ["How to check it in the lab", effect.lab_check], ["What measurement shows it best", effect.best_measured],
+    ["Usual sizes (rules of thumb)", effect.typical],
   ]) list.append(make("dt", {}, name), make("dd", {}, text));
   return make("details", { "data-key": `${key}-explained` }, make("summary", {}, "what is it?"), list);
 }

@@ -26,6 +26,7 @@ pub const FOREIGN: [&dyn Effect<Structure>; 4] = [
 const FOREIGN_BACKGROUND: Background = Background {
     lab_check: "",
     typical: "",
+    best_measured: "",
     sources: &[],
 };
 

@@ -51,6 +51,7 @@ fn linear(name: &str, nominal: f64, std: f64, bounds: [f64; 2]) -> Parameter {
 const NOTHING_TO_READ: Background = Background {
     lab_check: "",
     typical: "",
+    best_measured: "",
     sources: &[],
 };
 

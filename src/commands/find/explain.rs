@@ -117,6 +117,7 @@ impl Entry {
             "explanation": self.explanation,
             "fingerprint": self.fingerprint,
             "lab_check": self.background.lab_check,
+            "best_measured": self.background.best_measured,
             "typical": self.background.typical,
             "sources": self.background.sources,
         })
@@ -133,6 +134,7 @@ impl Entry {
         }
         part("How it shows", self.fingerprint);
         part("How to check it in the lab", self.background.lab_check);
+        part("What measurement shows it best", self.background.best_measured);
         part("Usual sizes (rules of thumb)", self.background.typical);
         match self.background.sources {
             [] => part("Sources", "None that we vouch for: this is workshop practice."),

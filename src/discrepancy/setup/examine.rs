@@ -1,5 +1,7 @@
 //! Tries every mistake on a fitted model.
 
+use std::borrow::Cow;
+
 use rayon::prelude::*;
 
 use super::decide::{Noise, Rival, Rivals, TriedMistake, decide};
@@ -41,6 +43,8 @@ impl SetupCheck {
 
 /// Complex values that mistakes are tried on, about.
 const THIN_VALUES: usize = 4000;
+/// Complex values that mistakes are fitted to at most, about (ten campaigns of 54 FRFs and 436 lines).
+const MOST_VALUES: usize = 240_000;
 /// Decrease of χ² below which nothing is followed.
 const LEAST_GAIN: f64 = 30.0;
 /// Mistakes with a size that are fitted to the end on few lines.
@@ -100,6 +104,9 @@ pub fn examine(
         findings: duplicates(data, &model.points),
         ..SetupCheck::default()
     };
+    let whole = data;
+    let data = &*enough(whole);
+    let share = data.value_count() as f64 / whole.value_count() as f64;
     let thin = thinned(data);
     let here = Linearised::new(model, &thin, theta)?;
     let values = 2 * thin.value_count();
@@ -122,7 +129,7 @@ pub fn examine(
     let rivals = || Rivals {
         library: rival(),
         small_errors: match beyond_slips {
-            Some(known) => Some(known.gain()),
+            Some(known) => Some(share * known.gain()),
             None => slips::gain(model, data, theta).ok(),
         },
     };
@@ -140,6 +147,15 @@ pub fn examine(
             .sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
     }
     Ok(check)
+}
+
+/// As many lines of every FRF as tell a mistake for certain: of thousands of FRFs not all are needed, and a check that took
+/// longer than the fit itself would not be made.
+fn enough(data: &FrfData) -> Cow<'_, FrfData> {
+    match data.value_count() / MOST_VALUES {
+        0 => Cow::Borrowed(data),
+        times => Cow::Owned(data.thinned(times + 1, 1)),
+    }
 }
 
 /// Few lines of every FRF, for many trials.
@@ -307,7 +323,7 @@ fn refined(model: &StructureModel, data: &FrfData, trial: &Trial) -> Result<Trie
 
 /// The best single effect of the library on few data, for commands that do not try them all anyway.
 pub fn library_rival(model: &StructureModel, data: &FrfData, theta: &[f64]) -> Option<Rival> {
-    let study = StructureStudy::new(data.clone(), Options::default());
+    let study = StructureStudy::new(enough(data).into_owned(), Options::default());
     let (instances, _) = study.instances(model);
     let hints = study.hints(model, theta).ok()?;
     let bounds = model.bounds();

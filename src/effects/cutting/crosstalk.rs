@@ -33,6 +33,8 @@ impl Effect<Cutting> for Crosstalk {
              The plate must be level and the screws tightened as for cutting.",
             typical: "Makers of piezoelectric dynamometers promise 2 % or less between axes; loose screws or a workpiece that \
              overhangs give 5 to 10 %.",
+            best_measured: "Up and down milling of the same width: the force changes sides, its copy with it. \
+             Otherwise cuts at immersions whose mean forces point in different directions.",
             sources: &[GAUTSCHI],
         }
     }

@@ -27,6 +27,8 @@ impl Effect<Cutting> for DynamometerMisalignment {
             lab_check: "Level and dial gauge over the dynamometer's plate along the machine's axes: 1 mm in 100 mm is 0.6°. A \
              static load along the tool axis must show on the axial channel only.",
             typical: "Set up with a gauge: below 0.2°. Bolted by eye, or a robot's tool frame a little off: 1 to 5°.",
+            best_measured: "Slots of several depths with a straight-edged cutter, up and down milling: the lateral force turns \
+             round, and with it what the axial channel takes of it.",
             sources: &[],
         }
     }

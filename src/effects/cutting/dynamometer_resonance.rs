@@ -28,6 +28,8 @@ impl Effect<Cutting> for DynamometerResonance {
              hammer's force: the FRF must be 1 up to the highest tooth-passing harmonic used.",
             typical: "Table dynamometers: 1 to 3.5 kHz bare on a stiff base (data sheets), down to 300 to 1000 Hz with vice and \
              workpiece; damping 1 to 5 %. Stay below a third of it, or correct for it.",
+            best_measured: "Spindle speeds that put a harmonic of tooth passing on either side of the suspected \
+             frequency, sampled at ten times it, no low-pass in between.",
             sources: &[
                 "Tounsi, N.; Otho, A. (2000): Dynamic cutting force measuring. International Journal of Machine Tools \
                  and Manufacture 40(8).",

@@ -29,6 +29,8 @@ impl Effect<Cutting> for EdgeForce {
              new tool has little of it.",
             typical: "10 to 60 N for each mm of edge in metals with sharp carbide (a tenth to a third of the force at usual \
              feeds), more with honed or worn edges.",
+            best_measured: "Five feeds at one speed, the smallest as small as the tool still cuts: the shorter the way to feed \
+             zero, the better the offset there is known.",
             sources: &[
                 "Albrecht, P. (1960): New developments in the theory of the metal-cutting process, part I: the \
                  ploughing process in metal cutting. ASME Journal of Engineering for Industry 82.",

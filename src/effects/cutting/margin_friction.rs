@@ -29,6 +29,8 @@ impl Effect<Cutting> for MarginFriction {
              deep and a shallow hole.",
             typical: "Torque grows by 2 to 10 % for each diameter of depth, far more once the flutes pack with chips (beyond \
              about three diameters without pecking).",
+            best_measured: "Holes of three diameters of depth and more, torque recorded from the first contact \
+             on; a shallow one to compare with.",
             sources: &[SHAW_OXFORD],
         }
     }

@@ -43,6 +43,8 @@ impl Effect<Cutting> for NonlinearDrift {
              and the plugs are dry.",
             typical: "Leakage of a charge amplifier: 0.03 to 0.07 pC/s (about 0.01 N/s) when clean; thermal drift while cutting \
              0.1 to 5 N/s; amplifier time constants of 1 to 100 s on SHORT and MEDIUM.",
+            best_measured: "Some seconds without load before and after each cut, with the amplifier reset before; \
+             its time constant on LONG.",
             sources: &[GAUTSCHI],
         }
     }

@@ -28,6 +28,8 @@ impl Effect<Cutting> for RunoutEffect {
              Turn the tool in its holder by 180° and look whether the pattern of the teeth goes with it.",
             typical: "Shrink and hydraulic holders 3 to 5 µm, collets 5 to 20 µm, robot spindles with worn collets up to 50 µm. \
              It matters from about a tenth of the feed per tooth.",
+            best_measured: "Small feeds, below ten times the runout, with ten turns or more in the steady part \
+             and at least 30 samples a tooth.",
             sources: &[
                 "Kline, W. A.; DeVor, R. E. (1983): The effect of runout on cutting geometry and forces in end milling. \
                  International Journal of Machine Tool Design and Research 23(2–3).",

@@ -29,6 +29,8 @@ impl Effect<Cutting> for SpeedDependence {
              compare the mean forces.",
             typical: "Exponent q of 0 to 0.2: forces fall by up to 15 % when the speed doubles. Built-up edge at low speed in \
              steel and aluminium can turn the sign.",
+            best_measured: "Three speeds over a factor of two or more at one feed, in an order that is not that \
+             of the speeds, so that wear does not look like it.",
             sources: &[ALTINTAS, BUDAK],
         }
     }

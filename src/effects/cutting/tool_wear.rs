@@ -28,6 +28,8 @@ impl Effect<Cutting> for ToolWear {
              first cut at the end: its force is higher by what the tool lost.",
             typical: "ISO 8688-2 ends the life of an end mill at a uniform wear land of 0.3 mm; edge coefficients may double on \
              the way there.",
+            best_measured: "Every cut with its place in the order (`order`), the first cut repeated at the end, \
+             feeds not in the order of time.",
             sources: &[
                 "ISO 8688-2: Tool life testing in milling – Part 2: End milling.",
                 "Taylor, F. W. (1907): On the art of cutting metals. Transactions of the ASME 28.",

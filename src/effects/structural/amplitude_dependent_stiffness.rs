@@ -30,6 +30,9 @@ impl Effect<Structure> for AmplitudeDependentStiffness {
              sign.",
             typical: "Gears: lost motion of 0.5 to 3 arc minutes; stiffness at small torque half to nine tenths of that at full \
              torque.",
+            best_measured: "The same FRFs at two or three hammer levels (`force_level_n`), hit so that this joint \
+             is twisted, with the load that gravity leaves it as small as possible: a preloaded gear hides its \
+             backlash.",
             sources: &[
                 TUTTLE,
                 "Worden, K.; Tomlinson, G. R. (2001): Nonlinearity in Structural Dynamics: Detection, Identification \

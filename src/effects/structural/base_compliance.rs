@@ -33,6 +33,9 @@ impl Effect<Structure> for BaseCompliance {
              Check the torque of the anchor bolts first.",
             typical: "A foot plate bolted to a good foundation: above 50 MN·m/rad. Steel frames, pallets and pedestals on shims: \
              2 to 20 MN·m/rad.",
+            best_measured: "Accelerometers low down: on the first link and on the base, both horizontal \
+             directions, hit at the tool in the same directions. The tool alone cannot tell the base from the \
+             first two joints.",
             sources: &[EWINS],
         }
     }

@@ -34,6 +34,8 @@ impl Effect<Structure> for JointTransverseCompliance {
              turn show it, too.",
             typical: "Cross roller and gear bearings of large robots: 1 to 20 MN·m/rad, of the size of the gear's own stiffness \
              or a few times above it.",
+            best_measured: "Points on both sides of this joint, in the directions that its gear cannot move, at \
+             postures that turn the next joints by 90°.",
             sources: &[MOBERG, ABELE],
         }
     }

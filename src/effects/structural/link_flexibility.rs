@@ -32,6 +32,8 @@ impl Effect<Structure> for LinkFlexibility {
              carry it. Or hit along the arm: a bending mode is curved between the joints, a rigid one straight.",
             typical: "Cast steel or aluminium arms behave as 70 to 210 GPa with the section of the drawing. On a large six-axis \
              robot the links give about a tenth to a quarter of the softness at the tool; the joints give the rest.",
+            best_measured: "A point at each end of a long link and a band up to the first bending mode; arm \
+             stretched out and folded, so that links and joints share the load differently.",
             sources: &[
                 ABELE,
                 "Book, W. J. (1984): Recursive Lagrangian dynamics of flexible manipulator arms. The International \

@@ -34,6 +34,8 @@ impl Effect<Structure> for LoadDependentStiffness {
              zero and steepens. Or measure FRFs at two postures that load the joint differently and else look alike.",
             typical: "Strain-wave gears gain a factor 1.5 to 4 from small to full torque (makers give three stiffnesses K1, \
              K2, K3). Cycloidal (RV) gears of large robots are nearly straight once their lost motion is taken up.",
+            best_measured: "Postures that differ in gravity's torque and in little else: arm stretched out and \
+             upright, with the wrist as it is. Three loads or more show the law, two only a difference.",
             sources: &[TUTTLE],
         }
     }

@@ -33,6 +33,8 @@ impl Effect<Structure> for LocalResonator {
             lab_check: "Hold or wedge what hangs on the link (cable pack, cover, valve box) by hand or with a strap and hit again: \
              the small peak goes. A sensor on the part itself shows it large.",
             typical: "Cable packs and covers: 2 to 30 kg at 5 to 60 Hz, damping 2 to 10 % of critical.",
+            best_measured: "A response point on the link that carries it, all three axes, and lines of a tenth of \
+             its width around its frequency; one more posture shows that it turns with the link.",
             sources: &[
                 "Den Hartog, J. P. (1956): Mechanical Vibrations. 4th edition, McGraw-Hill (chapter on the dynamic \
                  vibration absorber).",

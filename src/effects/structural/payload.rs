@@ -32,6 +32,9 @@ impl Effect<Structure> for Payload {
             lab_check: "Weigh what hangs on the flange: spindle, holder, adapter plates, hoses. Or drive the wrist slowly with and \
              without it and compare motor currents: most controllers have a routine that identifies the load.",
             typical: "Milling spindles 10 to 60 kg, tool changers 2 to 15 kg, dress packs 3 to 10 kg.",
+            best_measured: "FRFs at the flange or tool point in all three directions, at postures with the wrist \
+             bent and straight: a mass at the flange and a softer wrist then differ. A weighed mass added on \
+             purpose settles it.",
             sources: &[
                 "Khalil, W.; Gautier, M.; Lemoine, P. (2007): Identification of the payload inertial parameters of \
                  industrial manipulators. IEEE International Conference on Robotics and Automation.",

@@ -32,6 +32,8 @@ impl Effect<Structure> for SensorMisalignment {
              agree.",
             typical: "Sensors glued by eye: 2 to 10°. The sensor's own cross sensitivity (up to 5 % on most data sheets) looks \
              like 3°.",
+            best_measured: "All nine FRFs of a point (three directions hit, three measured) at one posture; a \
+             second posture tells a turned sensor from a wrong posture.",
             sources: &[
                 EWINS,
                 "ISO 7626-5: Vibration and shock – Experimental determination of mechanical mobility – Part 5: \

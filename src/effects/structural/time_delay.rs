@@ -29,6 +29,8 @@ impl Effect<Structure> for TimeDelay {
              force with no phase. A phase that falls in proportion to frequency is a delay. Look for different filters, \
              wireless sensors and multiplexed inputs.",
             typical: "One sampling interval of a multiplexed card: 20 to 500 µs. Wireless and camera systems: 1 to 20 ms.",
+            best_measured: "A wide band: the phase that a delay takes grows with frequency. One direct FRF up to \
+             the highest frequency of the sensor says more than ten up to 50 Hz.",
             sources: &[
                 "Bendat, J. S.; Piersol, A. G. (2010): Random Data: Analysis and Measurement Procedures. 4th edition, \
                  Wiley.",

@@ -36,6 +36,8 @@ impl Effect<Structure> for ToolFlexibility {
              at the nose. A shorter tool, or another holder, moves it.",
             typical: "Slender tools and light spindles on robots: 30 to 2000 Hz, damping 1 to 5 % of critical; short stiff tools \
              lie above what a robot's test covers.",
+            best_measured: "Tool point and spindle nose or flange, both directions normal to the tool, hit at the \
+             tool point, in a band that reaches beyond the tool's own resonance.",
             sources: &[
                 "Schmitz, T. L.; Donaldson, R. R. (2000): Predicting high-speed machining dynamics by substructure \
                  analysis. CIRP Annals 49(1).",

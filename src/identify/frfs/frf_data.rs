@@ -249,6 +249,26 @@ impl FrfData {
         self.frfs().map(|(_, f)| f.receptance.len()).sum()
     }
 
+    /// At most `most` FRFs of each block, evenly chosen.
+    pub fn fewer_frfs(&self, most: usize) -> FrfData {
+        let fewer = |block: &Arc<FrfBlock>| {
+            let count = block.frfs.len();
+            if count <= most {
+                return block.clone();
+            }
+            let mut block = block.as_ref().clone();
+            let mut index = 0..;
+            // Where i · most / count passes a whole number.
+            let kept = |i: usize| i * most / count != (i + 1) * most / count;
+            block.frfs.retain(|_| index.next().is_some_and(kept));
+            Arc::new(block)
+        };
+        FrfData {
+            blocks: self.blocks.iter().map(fewer).collect(),
+            posture_ids: self.posture_ids.clone(),
+        }
+    }
+
     /// sqrt(Σ σ² / Σ |H|²): the error that a perfect model would show.
     pub fn noise_floor_nrms(&self) -> f64 {
         let (mut noise, mut signal) = (0.0, 0.0);

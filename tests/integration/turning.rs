@@ -478,6 +478,44 @@ fn a_cut_list_of_a_lathe_makes_a_campaign() {
     }
 }
 
+/// A feed per turn, a depth and neither teeth nor immersion; or the operation in the lathe operator's own words.
+#[test]
+fn a_list_of_a_lathe_is_known_without_being_told() {
+    for (head, row) in [
+        (
+            "archivo;rpm;f [mm/rev];ap [mm];D [mm]",
+            "f416_a100.csv;1060;0,2;1;40",
+        ),
+        (
+            "archivo;rpm;f [mm/rev];ap [mm];D [mm];operacion",
+            "f416_a100.csv;1060;0,2;1;40;cilindrado",
+        ),
+        (
+            "Datei;n [1/min];f [mm/U];ap [mm];D [mm];Bearbeitung",
+            "f416_a100.csv;1060;0,2;1;40;Drehen",
+        ),
+    ] {
+        let dir = tempfile::tempdir().unwrap();
+        write_campaign(dir.path(), &cuts(&[0.2], &[1.0]), &plain(INSERT), &linear);
+        std::fs::remove_file(dir.path().join("campaign.toml")).unwrap();
+        // What the name seems to say is no feed rate.
+        let record = dir.path().join("f416_a100.csv");
+        std::fs::rename(dir.path().join("force/01.csv"), record).unwrap();
+        std::fs::write(dir.path().join("list.csv"), format!("{head}\n{row}\n")).unwrap();
+        let run = lobestone(&["init", dir.path().to_str().unwrap()]);
+        let toml = std::fs::read_to_string(dir.path().join("campaign.toml")).unwrap_or_default();
+        assert_eq!(run.status, Some(0), "{}", run.stderr);
+        for line in [
+            "process = \"turning\"",
+            "feed_per_rev_mm = 0.2",
+            "depth_of_cut_mm = 1",
+            "kind = \"turning\"",
+        ] {
+            assert!(toml.contains(line), "{head}: {line}\n{toml}");
+        }
+    }
+}
+
 #[test]
 fn keys_of_other_processes_are_refused_with_the_right_name() {
     let dir = tempfile::tempdir().unwrap();

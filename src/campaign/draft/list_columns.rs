@@ -176,7 +176,17 @@ const NAMES: [(&str, &[&str]); 21] = [
     ("material", &["workpiece", "werkstoff", "matiere", "materiau"]),
     (
         "process",
-        &["operation", "prozess", "verfahren", "procede", "proceso"],
+        &[
+            "operation",
+            "operacion",
+            "prozess",
+            "verfahren",
+            "bearbeitung",
+            "procede",
+            "usinage",
+            "proceso",
+            "mecanizado",
+        ],
     ),
     (
         "pilot_diameter_mm",

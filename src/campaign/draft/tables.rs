@@ -266,6 +266,14 @@ pub(super) fn cut_ids(forces: &[FoundForce]) -> Vec<String> {
     }
 }
 
+/// Keys of which one, where it is answered, leaves nothing for a file's name or header to say of the others.
+const SAYING_THE_SAME: [&[&str]; 4] = [
+    &[FEED_RATE, FEED_PER_TURN, "feed_per_tooth_mm", "feed_per_rev_mm"],
+    &["spindle_rpm", CUTTING_SPEED],
+    &["axial_depth_mm", "depth_of_cut_mm"],
+    &["immersion", RADIAL_DEPTH],
+];
+
 /// Each cut's process, where it is known, and its section.
 fn cuts(scan: &Scan, answers: &Answers) -> Result<Vec<(Option<String>, DraftTable)>> {
     let mut out = Vec::new();
@@ -273,11 +281,18 @@ fn cuts(scan: &Scan, answers: &Answers) -> Result<Vec<(Option<String>, DraftTabl
         let mut making = Making::new(answers, "cut", &id, true);
         making.fact("id", Kind::Text, answers.get("cut", &id, "id").unwrap_or(&id));
         making.fact("file", Kind::Text, &force.path);
+        // A list's feed per turn says that `f416` in a file's name is no feed rate.
+        let is_answered = |key: &str| {
+            let mut alike = SAYING_THE_SAME.iter().filter(|keys| keys.contains(&key));
+            alike.any(|keys| keys.iter().any(|k| answers.get("cut", &id, k).is_some()))
+        };
         let said = |key: &str| {
-            [
-                (force.from_header.get(key).map(String::as_str), FROM_HEADER),
-                (force.from_name.get(key).map(String::as_str), FROM_NAME),
-            ]
+            let says = match is_answered(key) {
+                true => [None, None],
+                false => [&force.from_header, &force.from_name].map(|facts| facts.get(key)),
+            };
+            let [header, name] = says.map(|text| text.map(String::as_str));
+            [(header, FROM_HEADER), (name, FROM_NAME)]
         };
         let known = |key: &str| -> Option<&str> {
             let found = said(key).into_iter().find_map(|(value, _)| value);
@@ -302,8 +317,12 @@ fn cuts(scan: &Scan, answers: &Answers) -> Result<Vec<(Option<String>, DraftTabl
         let turned = ["depth_of_cut_mm"];
         let given = |keys: &[&'static str]| keys.iter().any(|k| known(k).is_some());
         let kind_of_tool = answers.get("tool", "", "kind");
+        // A feed per turn and a depth, and neither teeth nor how far they are in the work: a lathe's list.
+        let sideways = ["feed_per_tooth_mm", "immersion", RADIAL_DEPTH, DIRECTION];
+        let of_a_lathe = given(&[FEED_PER_TURN]) && given(&["axial_depth_mm"]) && !given(&sideways);
+        let of_a_lathe = of_a_lathe && kind_of_tool.or(answers.get("tool", "", "teeth")).is_none();
         let concluded = match () {
-            _ if given(&turned) || kind_of_tool == Some("turning") => Some("turning"),
+            _ if given(&turned) || of_a_lathe || kind_of_tool == Some("turning") => Some("turning"),
             _ if given(&milled) || matches!(kind_of_tool, Some("endmill" | "ballend")) => Some("milling"),
             _ if given(&drilled) || kind_of_tool == Some("drill") => Some("drilling"),
             _ => None,

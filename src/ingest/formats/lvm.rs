@@ -231,6 +231,13 @@ fn of_segment(segment: Segment, layout: &Layout, notes: &mut Notes) -> Result<Ve
             notes.about(&name, format!("runs over {dimension}, not over time: left out"));
             continue;
         }
+        if is_spectrum(&name) {
+            notes.about(
+                &name,
+                "a spectrum by its name, though the header says time: left out",
+            );
+            continue;
+        }
         let times = match layout.x_columns {
             XColumns::None => None,
             XColumns::One => Some(numbers(&segment, 0)?),
@@ -266,6 +273,15 @@ fn of_segment(segment: Segment, layout: &Layout, notes: &mut Notes) -> Result<Ve
         waveform::put(&mut records, 1.0 / step, start_s, channel)?;
     }
     Ok(records)
+}
+
+/// LabVIEW's spectral measurements keep `Time` as their dimension; what they add to a signal's name tells:
+/// `Acceleration (FFT - (RMS))`.
+fn is_spectrum(name: &str) -> bool {
+    let name = name.to_lowercase();
+    ["(fft", "power spectr", "(psd", "spectral density"]
+        .iter()
+        .any(|mark| name.contains(mark))
 }
 
 /// Step and start, and the grid to put the samples on where the times are uneven.
@@ -382,6 +398,19 @@ mod tests {
             .replace("Hammer\tTip", "Hammer\tX_Value\tTip");
         let multi = format!("{header}0\t1.5\t0\t10\n0.001\t2\t0.001\t20\n0.002\t3.0\t0.002\t30\n");
         assert_two_channels(&records(&file("\t", ".", "Multi", &multi)));
+    }
+
+    #[test]
+    fn a_spectrum_is_no_time_record_whatever_the_header_says() {
+        let header = HEADER.replace("Hammer\tTip", "Hammer\tTip (FFT - (RMS))");
+        let found = records(&file(
+            "\t",
+            ".",
+            "No",
+            &format!("{header}\t1.5\t-77\n\t2\t-90\n\t3.0\t-95\n"),
+        ));
+        let names: Vec<&str> = found[0].channels.iter().map(|c| c.name.as_str()).collect();
+        assert_eq!(names, ["Hammer"]);
     }
 
     #[test]

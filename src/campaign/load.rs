@@ -20,7 +20,7 @@ use crate::text::shown_briefly as shown;
 use crate::{Error, InputError, Result};
 
 /// Keys of the top table.
-const TOP: [&str; 16] = names(&keys::TOP);
+const TOP: [&str; 17] = names(&keys::TOP);
 /// Keys of `[[cut]]`.
 pub(super) const CUT: [&str; 20] = names(&keys::CUT);
 
@@ -112,6 +112,7 @@ fn read(dir: &Path, top: &Section<'_>, find: Find) -> Result<Campaign> {
         tool,
         dynamometer,
         channels: super::channels::channels(top, &cuts)?,
+        contacts: super::contacts::read(top)?,
         cuts,
         lobes,
         material,

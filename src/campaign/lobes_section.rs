@@ -273,6 +273,7 @@ fn tool(section: &Section<'_>) -> Result<Vec<ToolSegment>> {
 
 fn hole(section: &Section<'_>) -> Result<HoleSection> {
     let usual = HoleSection::default();
+    let grades: [(&str, u32); 8] = std::array::from_fn(|i| (keys::HOLE_TOLERANCES[i], 6 + i as u32));
     let tolerance = |key, usual| Ok::<_, Error>(section.number(key, Bounds::POSITIVE)?.unwrap_or(usual));
     Ok(HoleSection {
         thrust_n: section.number("thrust_n", Bounds::ANY)?,
@@ -284,5 +285,6 @@ fn hole(section: &Section<'_>) -> Result<HoleSection> {
             "perpendicularity_tolerance_deg",
             usual.perpendicularity_tolerance_deg,
         )?,
+        diameter_grade: section.choice("diameter_tolerance", &grades)?,
     })
 }

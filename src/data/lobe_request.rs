@@ -124,6 +124,8 @@ pub struct HoleSection {
     pub position_tolerance_mm: f64,
     /// How far the axis of the hole may be tilted.
     pub perpendicularity_tolerance_deg: f64,
+    /// Drilling: grade of the diameter's tolerance, 8 for H8 (ISO 286-1); `None`: the diameter is not judged.
+    pub diameter_grade: Option<u32>,
 }
 
 impl Default for HoleSection {
@@ -136,6 +138,7 @@ impl Default for HoleSection {
             pilot_diameter_mm: None,
             position_tolerance_mm: 0.25,
             perpendicularity_tolerance_deg: 0.5,
+            diameter_grade: None,
         }
     }
 }

@@ -1,5 +1,6 @@
 //! What was measured, on what: plain values without files, which every other room speaks in.
 
+mod contact;
 mod cut;
 mod dof;
 mod frf;
@@ -12,6 +13,7 @@ mod robot_spec;
 mod time_record;
 mod tool;
 
+pub use contact::{Contact, ContactDirection};
 pub use cut::{Cut, CutGeometry, CutOutcome, Immersion, Process};
 pub use dof::{Axis, Dof};
 pub use frf::{FrfRecord, Quantity};

@@ -247,3 +247,108 @@ fn the_recommended_angle_keeps_the_hole_in_tolerance() {
     );
     assert!(said.contains("out of tolerance at every usable angle"), "{said}");
 }
+
+/// The commanded pose makes up for thrust and torque; the lateral force turns, so it cannot be allowed for. Checked with the
+/// `model` command alone: at the commanded joints the free tool point stands opposite to where the load pushes it.
+#[test]
+fn the_pose_to_command_makes_up_for_the_deflection() {
+    let load =
+        "[lobes.hole]\nthrust_n = 400.0\ntorque_nm = 2.0\nlateral_n = 50.0\ndiameter_tolerance = \"H11\"\n";
+    let folder = campaign(&[ROBOT, DRILL, DRILLING, load]);
+    let found = document(&["lobes", text(folder.path())]);
+    let still = campaign(&[ROBOT, DRILL, DRILLING, &load.replace("50.0", "0.0")]);
+    let steady = document(&["lobes", text(still.path())]);
+    let free = document(&["model", text(folder.path())]);
+    for (i, hole) in found["hole"].as_array().unwrap().iter().enumerate() {
+        let pose = &hole["compensation"];
+        assert!(number(&pose["residual_um"]) < 1.0, "{pose}");
+        let commanded = ROBOT.split("[[posture]]").next().unwrap().to_string()
+            + &format!("[[posture]]\nid = \"c\"\njoints_deg = {}\n", pose["joints_deg"]);
+        let there = campaign(&[&commanded, DRILL, DRILLING, &load.replace("50.0", "0.0")]);
+        let deflected = &document(&["lobes", text(there.path())])["hole"][0]["displacement_mm"];
+        let tcp = &document(&["model", text(there.path())])["postures"][0]["tcp_m"];
+        for axis in 0..3 {
+            // Where the tool then stands, mm, against the target; a micrometre.
+            let stands = 1e3 * number(&tcp[axis]) + number(&deflected[axis]);
+            let target = 1e3 * number(&free["postures"][i]["tcp_m"][axis]);
+            assert!((stands - target).abs() < 1e-3, "{stands} {target}");
+            let pushed = number(&steady["hole"][i]["displacement_mm"][axis]);
+            assert!((number(&pose["offset_mm"][axis]) + pushed).abs() < 0.05 * pushed.abs() + 2e-3);
+        }
+        // H11 of 9.5 mm is 0.09 mm; what the lateral force adds is twice what it moves at most.
+        assert_eq!(found["hole_basis"]["diameter_tolerance_mm"], 0.09);
+        let oversize = number(&hole["diameter_oversize_mm"]);
+        assert_eq!(hole["within_diameter_tolerance"], oversize <= 0.09);
+        let worst = number(&hole["position_error_mm"]);
+        let balanced = number(&steady["hole"][i]["position_error_mm"]);
+        assert!(
+            oversize > 2.0 * (worst - balanced) * 0.999 && oversize > 0.0,
+            "{oversize} {worst}"
+        );
+        assert_eq!(number(&steady["hole"][i]["diameter_oversize_mm"]), 0.0);
+    }
+    let said = lobestone(&["lobes", text(folder.path())]).stdout;
+    assert!(
+        said.contains("To command instead") && said.contains("Diameter, H11"),
+        "{said}"
+    );
+    assert!(said.contains("Static stiffness of the tool point"), "{said}");
+    let feed = &found["feed_stiffness"][0];
+    let index = number(&feed["index"]);
+    assert!(index > 0.0 && index <= 1.0);
+    assert_eq!(feed["along_feed_n_per_m"], feed["along_axis_n_per_m"]);
+}
+
+/// A foot takes its share of the thrust: the robot is pushed back less, is stiffer along the tool by the foot's stiffness,
+/// and where it takes more than its preload the answer says that it lifts off. A foot of no stiffness changes no number.
+#[test]
+fn a_pressure_foot_holds_the_tool() {
+    let load =
+        "kac_n_per_mm2 = 900.0\nfeed_per_rev_mm = 0.1\n[lobes.hole]\nthrust_n = 400.0\ntorque_nm = 2.0\n";
+    let foot = |stiffness: f64| {
+        format!(
+            "[[contact]]\nname = \"foot\"\ndirection = \"axial\"\nstiffness_n_per_m = {stiffness:?}\npreload_n = 150.0\n"
+        )
+    };
+    let run = |more: &str| {
+        document(&[
+            "lobes",
+            text(campaign(&[ROBOT, DRILL, DRILLING, load, more]).path()),
+        ])
+    };
+    let (free, none, held) = (run(""), run(&foot(0.0)), run(&foot(4e6)));
+    let axial = |found: &Value, i: usize| number(&found["hole"][i]["axial_displacement_mm"]);
+    for i in 0..2 {
+        near(&none["hole"][i]["axial_displacement_mm"], axial(&free, i), 1e-9);
+        near(
+            &none["curves"][i]["absolute_limit_mm"],
+            number(&free["curves"][i]["absolute_limit_mm"]),
+            1e-5,
+        );
+        let stiffness = |found: &Value| number(&found["feed_stiffness"][i]["along_axis_n_per_m"]);
+        assert!((stiffness(&held) - stiffness(&free) - 4e6).abs() < 1.0);
+        assert!(axial(&held, i).abs() < 0.3 * axial(&free, i).abs());
+        let contact = &held["hole"][i]["contacts"][0];
+        let taken = -4e3 * axial(&held, i);
+        near(&contact["force_n"], taken, 1e-6);
+        assert_eq!(contact["gives_way"], taken > 150.0);
+        assert!(number(&held["hole"][i]["skating_mm"]) > 0.0);
+        // The axial–torsional block is held; it chatters later.
+        let along = |found: &Value| number(&found["curves"][i]["axial_torsional"]["absolute_limit_mm"]);
+        assert!(along(&held) > along(&free), "{} {}", along(&held), along(&free));
+    }
+    let folder = campaign(&[ROBOT, DRILL, DRILLING, load, &foot(4e6)]);
+    let said = lobestone(&["lobes", text(folder.path())]).stdout;
+    assert!(
+        said.contains("held by foot") && said.contains("it lifts off"),
+        "{said}"
+    );
+    let model = document(&["model", text(folder.path())]);
+    let posture = &model["postures"][0];
+    assert!(
+        number(&posture["held"]["tcp_stiffness_n_per_m"]["z"])
+            > 3.0 * number(&posture["tcp_stiffness_n_per_m"]["z"])
+    );
+    let told = lobestone(&["model", text(folder.path())]).stdout;
+    assert!(told.contains("held by [[contact]]"), "{told}");
+}

@@ -5,7 +5,8 @@ use std::fmt::Display;
 use crate::analysis::stability::lobe_setup::{group_of_cuts, half_point_angle_rad};
 use crate::campaign::{Campaign, CutGeometry, HoleSection, LobesSection, Process, Tool};
 use crate::cutting::{ForceAxis, ForceGroup, average_row, coefficients_of};
-use crate::lobes::hole::{HoleCheck, HoleLoad, HoleTolerance, milling_torque_nm};
+use crate::lobes::drilling::hole::{HoleCheck, HoleLoad, HoleTolerance, milling_torque_nm};
+use crate::lobes::drilling::iso_tolerance::DiameterTolerance;
 
 /// What loads the tool, from `[lobes.hole]`, and what is not given there from the cutting coefficients. `own`: the coefficients of the
 /// campaign's cuts where somebody has already worked them out.
@@ -22,6 +23,7 @@ pub fn hole_check(
     let tolerance = HoleTolerance {
         position_mm: asked.position_tolerance_mm,
         perpendicularity_deg: asked.perpendicularity_tolerance_deg,
+        diameter: diameter_tolerance(campaign, section, asked)?,
     };
     let load = match (asked.thrust_n, asked.torque_nm, asked.lateral_n) {
         (Some(thrust_n), Some(torque_nm), Some(lateral_n)) => HoleLoad {
@@ -59,6 +61,29 @@ pub fn hole_check(
     } else {
         Err("the cutting coefficients give no finite force; give thrust_n, torque_nm and lateral_n in [lobes.hole]".into())
     }
+}
+
+/// The tolerance of the diameter that is asked for.
+fn diameter_tolerance(
+    campaign: &Campaign,
+    section: &LobesSection,
+    asked: &HoleSection,
+) -> std::result::Result<Option<DiameterTolerance>, String> {
+    let Some(grade) = asked.diameter_grade else {
+        return Ok(None);
+    };
+    if section.process != Process::Drilling {
+        return Err("diameter_tolerance of [lobes.hole] is that of a drilled hole; take it out".into());
+    }
+    let tool = campaign
+        .tool
+        .as_ref()
+        .ok_or("the diameter that diameter_tolerance refers to is not known: add a [tool] table")?;
+    let tolerance = DiameterTolerance::h(grade, tool.diameter_mm);
+    tolerance.map(Some).ok_or(format!(
+        "ISO 286 has no H{grade} for a diameter of {} mm; take diameter_tolerance out of [lobes.hole]",
+        tool.diameter_mm
+    ))
 }
 
 fn words(error: impl Display) -> String {

@@ -12,9 +12,9 @@ use crate::analysis::stability::lobe_structure::{
 use crate::analysis::stability::noted_cuts::noted_cuts;
 use crate::analysis::stability::redundancy::{self, RedundancyAnalysis};
 use crate::analysis::workbench::Workbench;
-use crate::campaign::{Campaign, LobeMethod, LobeSource, LobesSection, Process};
+use crate::campaign::{Campaign, ContactDirection, LobeMethod, LobeSource, LobesSection, Process};
 use crate::cutting::ForceGroup;
-use crate::lobes::hole::HoleCheck;
+use crate::lobes::drilling::hole::HoleCheck;
 use crate::lobes::outcome::{LimitRange, Outcomes};
 use crate::lobes::setup::{DrilledHole, LobeCoefficients, LobeCut, axial_torsional_force};
 use crate::lobes::{AbsoluteLimit, Peak, ToolDynamics, speed_grid};
@@ -89,13 +89,20 @@ impl LobeAnalysis {
             mut axial_torsional,
             own_cuts,
         } = CutForce::of(campaign, section, &mut warnings)?;
-        let asked = Asked::new(section, cut.average().axial.is_some());
-        if steps_through_time(section) && !section.tool.is_empty() {
+        let asked = Asked {
+            contacts: campaign.contacts.clone(),
+            ..Asked::new(section, cut.average().axial.is_some())
+        };
+        if steps_through_time(section) && asked.couples() {
+            let what = match section.tool.is_empty() {
+                true => "a structure held by [[contact]]",
+                false => "the tool as a beam",
+            };
             return Err(
-                InputError::new("semi-discretisation needs modes, and the tool as a beam has none")
+                InputError::new(format!("semi-discretisation needs modes, and {what} has none"))
                     .file(campaign.dir.join("campaign.toml"))
                     .key("lobes.method")
-                    .remedy("use method = \"multi-frequency\" or \"zero-order\" with [lobes.tool]")
+                    .remedy("use method = \"multi-frequency\" or \"zero-order\" with [lobes.tool] and [[contact]]")
                     .into(),
             );
         }
@@ -156,6 +163,7 @@ impl LobeAnalysis {
                 .map(|case| (case.posture.as_deref(), &case.at_cuts[..]))
                 .collect(),
         };
+        warnings.extend(contacts_that_give_way(&cases));
         let outcomes = Outcomes::score(&noted, &limits, not_compared);
         if limits.len() > 1 && noted.iter().any(|c| c.posture.is_none()) {
             warnings.push(
@@ -325,6 +333,41 @@ impl CutForce {
             own_cuts,
         })
     }
+}
+
+/// Feet that lift off and clamps that slip: what was computed with them does not hold there.
+fn contacts_that_give_way(cases: &[LobeCase]) -> Vec<String> {
+    let mut told: Vec<String> = Vec::new();
+    for case in cases {
+        let contacts = case.hole.iter().flat_map(|hole| &hole.contacts);
+        for contact in contacts.filter(|c| c.gives_way) {
+            let gives_way = match contact.direction {
+                ContactDirection::Axial => "lifts off",
+                _ => "slips",
+            };
+            let angle = case
+                .angle_deg
+                .map(|a| format!(" and {a:.1}°"))
+                .unwrap_or_default();
+            told.push(format!(
+                "{}{}{angle}: the cutting forces take {:.0} N of the {:.0} N that hold it, so it {gives_way}: limits and hole there \
+                 are those of a contact that holds; press harder, or cut with less thrust",
+                contact.name,
+                case.at_posture(),
+                contact.force_n,
+                contact.preload_n.unwrap_or(0.0),
+            ));
+        }
+    }
+    let (count, most) = (told.len(), 4);
+    if count > most {
+        told.truncate(most);
+        told.push(format!(
+            "and {} more places where a contact gives way",
+            count - most
+        ));
+    }
+    told
 }
 
 /// What the lobes of turning take for granted.

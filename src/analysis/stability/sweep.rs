@@ -125,6 +125,9 @@ impl Sweep {
         let posture = posture_of(campaign, section, request)?.clone();
         let state = ModelState::without_history(campaign, asked, &mut warnings)?;
         warnings.extend(remarks(section, &state.current.model.robot));
+        if !campaign.contacts.is_empty() {
+            warnings.push("the map is that of the free robot: [[contact]] holds at one place only".into());
+        }
         let redundancy = section.redundancy.as_ref();
         let forbidden_deg = redundancy.map(|r| r.forbidden_deg.clone()).unwrap_or_default();
         let here = state.current.model.robot.kinematics(&posture.joints_deg)?;

@@ -91,7 +91,7 @@ const TEETH: Holds = Holds::Whole(1, 1000);
 const BODY: Holds = Holds::Form("^(base|tool|link[1-9][0-9]*)$");
 
 /// The top of `campaign.toml`.
-pub const TOP: [Key; 16] = [
+pub const TOP: [Key; 17] = [
     must("schema", Holds::Words(&[FORM]), "Form of this file"),
     may(
         "name",
@@ -134,6 +134,11 @@ pub const TOP: [Key; 16] = [
         "A channel of the force files, where they do not say what it is",
     ),
     may("cut", Holds::Sections(&CUT), "A cut whose forces were recorded"),
+    may(
+        "contact",
+        Holds::Sections(&CONTACT),
+        "Pressure foot or clamp: a spring from the tool point to the ground while it cuts",
+    ),
     may(
         "lobes",
         Holds::Section(&LOBES),
@@ -561,7 +566,27 @@ pub(crate) const REDUNDANCY: [Key; 4] = [
     ),
 ];
 
-pub(crate) const HOLE: [Key; 6] = [
+pub(crate) const CONTACT: [Key; 5] = [
+    may("name", Holds::Text, "Such as \"pressure foot\""),
+    must(
+        "direction",
+        Holds::Words(&["axial", "lateral", "x", "y"]),
+        "Along the tool, across it in all directions, or across it along one axis",
+    ),
+    must("stiffness_n_per_m", NOT_NEGATIVE, "Contact stiffness, N/m"),
+    may(
+        "damping_ns_per_m",
+        NOT_NEGATIVE,
+        "Viscous contact damping, N·s/m [0]",
+    ),
+    may(
+        "preload_n",
+        NOT_NEGATIVE,
+        "Force at which it gives way, N: along the tool the foot's pressure, across it what friction holds [it never does]",
+    ),
+];
+
+pub(crate) const HOLE: [Key; 7] = [
     may("thrust_n", ANY, "Against the tool, N [from the coefficients]"),
     may(
         "torque_nm",
@@ -588,7 +613,15 @@ pub(crate) const HOLE: [Key; 6] = [
         POSITIVE,
         "Tolerance of the axis, degrees [0.5]",
     ),
+    may(
+        "diameter_tolerance",
+        Holds::Words(&HOLE_TOLERANCES),
+        "Tolerance of the diameter (ISO 286), such as \"H8\"; drilling",
+    ),
 ];
+
+/// Tolerances of a diameter that `[lobes.hole]` knows: ISO 286, position H, in the order of the grades from 6 on.
+pub(crate) const HOLE_TOLERANCES: [&str; 8] = ["H6", "H7", "H8", "H9", "H10", "H11", "H12", "H13"];
 
 pub(crate) const LOBE_TOOL: [Key; 1] = [must(
     "segment",

@@ -103,6 +103,7 @@ fn document(analysis: &LobeAnalysis) -> Value {
         "outcomes": analysis.outcomes,
         "hole": hole,
         "hole_basis": hole_basis,
+        "feed_stiffness": hole::feed_stiffness(analysis),
         "redundancy": analysis.redundancy.as_ref().map(|found| redundancy(found, hole::weighing(analysis))),
         "warnings": analysis.warnings,
     })
@@ -334,6 +335,7 @@ fn text(analysis: &LobeAnalysis) -> String {
         out += &redundancy_text(found);
     }
     out += &hole::text(analysis);
+    out += &hole::feed_stiffness_text(analysis);
     out + &warnings(&analysis.warnings)
 }
 
@@ -391,6 +393,7 @@ mod tests {
             channels: Vec::new(),
             orthogonal: None,
             plan: Default::default(),
+            contacts: Vec::new(),
         }
     }
 

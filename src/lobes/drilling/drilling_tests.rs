@@ -6,11 +6,11 @@ use std::sync::Arc;
 use approx::assert_relative_eq;
 use nalgebra::DMatrix;
 
-use super::*;
 use crate::campaign::{CutGeometry, Tool as CuttingTool, ToolKind};
 use crate::cutting::{ForceAxis, average_row};
 use crate::lobes::dynamics::frf::Mode;
 use crate::lobes::dynamics::tool_point::{Holder, ModesHolder, ToolDynamics};
+use crate::lobes::*;
 
 const KTC: f64 = 1014.2;
 const KAC: f64 = 572.0;

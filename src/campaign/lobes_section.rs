@@ -57,6 +57,7 @@ pub(super) fn read(
         ktc_n_per_mm2: lobes.number("ktc_n_per_mm2", Bounds::POSITIVE)?,
         krc_n_per_mm2: lobes.number("krc_n_per_mm2", Bounds::ANY)?,
         kac_n_per_mm2: lobes.number("kac_n_per_mm2", Bounds::ANY)?,
+        from_orthogonal: from_orthogonal(&lobes, process)?,
         teeth: lobes.whole("teeth", 1, 1000)?.map(|n| n as usize),
         immersion: immersion(&lobes)?,
         process_damping_n_per_m: lobes.number("process_damping_n_per_m", Bounds::NOT_NEGATIVE)?,
@@ -68,6 +69,25 @@ pub(super) fn read(
         tool,
         hole,
     }))
+}
+
+fn from_orthogonal(lobes: &Section<'_>, process: Process) -> Result<bool> {
+    let asked = lobes
+        .choice("coefficients", &[("orthogonal", true)])?
+        .unwrap_or(false);
+    if asked && process != Process::Drilling {
+        return Err(lobes
+            .error("coefficients", "only those of a drill are predicted for the lobes")
+            .remedy("take it out and give ktc_n_per_mm2 and krc_n_per_mm2; `lobestone cfc` prints the prediction for end mills")
+            .into());
+    }
+    if asked && lobes.has("ktc_n_per_mm2") {
+        return Err(lobes
+            .error("coefficients", "given beside ktc_n_per_mm2, which says the same")
+            .remedy("keep one of the two")
+            .into());
+    }
+    Ok(asked)
 }
 
 fn source(lobes: &Section<'_>, has_robot: bool, has_frfs: bool, has_modes: bool) -> Result<LobeSource> {

@@ -86,6 +86,8 @@ pub struct LobesSection {
     pub krc_n_per_mm2: Option<f64>,
     /// Drilling: axial cutting coefficient Kac; `None`: from the campaign's cuts if Ktc or Krc is, else not known.
     pub kac_n_per_mm2: Option<f64>,
+    /// Drilling: the coefficients are predicted from the orthogonal database and the drill's geometry.
+    pub from_orthogonal: bool,
     /// Number of teeth; `None`: that of the campaign's tool.
     pub teeth: Option<usize>,
     /// Milling: where a tooth is in the workpiece; milling lobes need it.

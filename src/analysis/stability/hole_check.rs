@@ -4,12 +4,12 @@ use std::fmt::Display;
 
 use crate::analysis::stability::lobe_setup::{group_of_cuts, half_point_angle_rad};
 use crate::campaign::{Campaign, CutGeometry, HoleSection, LobesSection, Process, Tool};
-use crate::cutting::{ForceAxis, ForceGroup, average_row, coefficients_of};
+use crate::cutting::{DrillPrediction, ForceAxis, ForceGroup, average_row, coefficients_of};
 use crate::lobes::drilling::hole::{HoleCheck, HoleLoad, HoleTolerance, milling_torque_nm};
 use crate::lobes::drilling::iso_tolerance::DiameterTolerance;
 
 /// What loads the tool, from `[lobes.hole]`, and what is not given there from the cutting coefficients. `own`: the coefficients of the
-/// campaign's cuts where somebody has already worked them out.
+/// campaign's cuts where somebody has already worked them out; `drill`: predicted from an orthogonal database.
 ///
 /// # Errors
 /// In words for people: why the thrust is not known, and what to give.
@@ -17,6 +17,7 @@ pub fn hole_check(
     campaign: &Campaign,
     section: &LobesSection,
     own: Option<&ForceGroup>,
+    drill: Option<&DrillPrediction>,
 ) -> std::result::Result<HoleCheck, String> {
     let usual = HoleSection::default();
     let asked = section.hole.as_ref().unwrap_or(&usual);
@@ -32,7 +33,8 @@ pub fn hole_check(
             lateral_n,
             source: "[lobes.hole]".into(),
         },
-        (thrust_n, torque_nm, lateral_n) => match (predicted(campaign, section, asked, own), thrust_n) {
+        (thrust_n, torque_nm, lateral_n) => match (predicted(campaign, section, asked, own, drill), thrust_n)
+        {
             (Ok(p), _) => HoleLoad {
                 thrust_n: thrust_n.unwrap_or(p.thrust_n),
                 torque_nm: torque_nm.unwrap_or(p.torque_nm),
@@ -96,7 +98,22 @@ fn predicted(
     section: &LobesSection,
     asked: &HoleSection,
     own: Option<&ForceGroup>,
+    drill: Option<&DrillPrediction>,
 ) -> std::result::Result<HoleLoad, String> {
+    if let Some(drill) = drill {
+        let total = drill.total();
+        let parts = match &drill.chisel {
+            Some(Ok(_)) => "lips and chisel edge",
+            Some(Err(_)) => "the lips alone: a lower bound",
+            None => "the lips",
+        };
+        return Ok(HoleLoad {
+            thrust_n: total.thrust_n,
+            torque_nm: total.torque_nm,
+            lateral_n: 0.0,
+            source: format!("the orthogonal database and the drill's geometry, {parts}"),
+        });
+    }
     let tool = campaign
         .tool
         .as_ref()

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::analysis::stability::hole_check::hole_check;
 pub use crate::analysis::stability::lobe_case::{BEST, LobeCase, LobesBefore};
 use crate::analysis::stability::lobe_model::{Asked, ModelState};
-use crate::analysis::stability::lobe_setup::{coefficients_of_group, cut_of, group_of_cuts};
+use crate::analysis::stability::lobe_setup::{coefficients_of_group, cut_of, group_of_cuts, predicted_drill};
 use crate::analysis::stability::lobe_structure::{
     LobeStructure, at_postures, from_measured, from_modes, steps_through_time,
 };
@@ -13,7 +13,7 @@ use crate::analysis::stability::noted_cuts::noted_cuts;
 use crate::analysis::stability::redundancy::{self, RedundancyAnalysis};
 use crate::analysis::workbench::Workbench;
 use crate::campaign::{Campaign, ContactDirection, LobeMethod, LobeSource, LobesSection, Process};
-use crate::cutting::ForceGroup;
+use crate::cutting::{DrillPrediction, ForceGroup};
 use crate::lobes::drilling::hole::HoleCheck;
 use crate::lobes::outcome::{LimitRange, Outcomes};
 use crate::lobes::setup::{DrilledHole, LobeCoefficients, LobeCut, axial_torsional_force};
@@ -43,6 +43,8 @@ pub struct LobeAnalysis {
     pub axial_torsional: Option<std::result::Result<(), String>>,
     /// The hole that a drill cuts; `None` in milling, or where the tool is not known.
     pub drilled: Option<DrilledHole>,
+    /// The drill predicted from an orthogonal database; `None` where that is not asked for.
+    pub drill: Option<DrillPrediction>,
     /// The tool as a beam; without segments where it is rigid or part of the FRFs.
     pub tool: Arc<ToolDynamics>,
     /// First and last spindle speed and the step, rpm.
@@ -88,6 +90,7 @@ impl LobeAnalysis {
             cut,
             mut axial_torsional,
             own_cuts,
+            drill,
         } = CutForce::of(campaign, section, &mut warnings)?;
         let asked = Asked {
             contacts: campaign.contacts.clone(),
@@ -116,7 +119,7 @@ impl LobeAnalysis {
             LobeSource::Model => {
                 let state = ModelState::of(campaign, asked.clone(), &mut warnings)?;
                 (effects, revision) = (state.effects.clone(), state.revision);
-                let check = hole_check(campaign, section, own_cuts.as_ref());
+                let check = hole_check(campaign, section, own_cuts.as_ref(), drill.as_ref());
                 if let (Err(reason), Some(_)) = (&check, &section.hole) {
                     warnings.push(format!("the hole is not worked out: {reason}"));
                 }
@@ -183,6 +186,7 @@ impl LobeAnalysis {
                 Process::Drilling => DrilledHole::of(campaign.tool.as_ref(), section),
                 Process::Milling | Process::Turning => None,
             },
+            drill,
             tool: asked.tool.clone(),
             spindle_rpm: section.spindle_rpm,
             cases,
@@ -280,15 +284,25 @@ pub(crate) struct CutForce {
     pub axial_torsional: Option<std::result::Result<(), String>>,
     /// The campaign's own cuts, where the coefficients come from those.
     pub own_cuts: Option<ForceGroup>,
+    /// The drill, where the coefficients are predicted from an orthogonal database.
+    pub drill: Option<DrillPrediction>,
 }
 
 impl CutForce {
     /// # Errors
     /// Something that the process needs is missing.
     pub fn of(campaign: &Campaign, section: &LobesSection, warnings: &mut Vec<String>) -> Result<Self> {
-        let (coefficients, own_cuts) = match LobeCoefficients::given(section) {
-            Some(given) => (given, None),
-            None => {
+        let drill = match section.from_orthogonal {
+            true => Some(predicted_drill(campaign, section)?),
+            false => None,
+        };
+        if let Some(Err(reason)) = drill.as_ref().and_then(|d| d.chisel.as_ref()) {
+            warnings.push(format!("the chisel edge is left out: {reason}"));
+        }
+        let (coefficients, own_cuts) = match (&drill, LobeCoefficients::given(section)) {
+            (Some(drill), _) => (LobeCoefficients::of_drill(drill), None),
+            (None, Some(given)) => (given, None),
+            (None, None) => {
                 let group = group_of_cuts(campaign, section, warnings)?;
                 (coefficients_of_group(campaign, section, &group)?, Some(group))
             }
@@ -331,6 +345,7 @@ impl CutForce {
             cut,
             axial_torsional: axial.map(|force| force.map(|_| ())),
             own_cuts,
+            drill,
         })
     }
 }

@@ -228,7 +228,7 @@ pub(crate) const FRF: [Key; 4] = [
     may("force_level_n", POSITIVE, "Level of the hammer or shaker, N"),
 ];
 
-pub(crate) const TOOL: [Key; 13] = [
+pub(crate) const TOOL: [Key; 14] = [
     must(
         "kind",
         Holds::Words(&["endmill", "ballend", "drill", "turning"]),
@@ -277,6 +277,11 @@ pub(crate) const TOOL: [Key; 13] = [
         POSITIVE,
         "Drills: web thickness, mm; below the diameter",
     ),
+    may(
+        "chisel_edge_angle_deg",
+        Holds::Number(Bounds::open(90.0, 180.0)),
+        "Drills: angle from a lip to the chisel edge, degrees [125]",
+    ),
     may("nose_radius_mm", NOT_NEGATIVE, "Turning: nose radius, mm [0]"),
     may(
         "cutting_edge_angle_deg",
@@ -291,7 +296,7 @@ pub(crate) const MATERIAL: [Key; 1] = [must(
     "Such as \"Ti-6Al-4V\"; of every cut that names none itself",
 )];
 
-pub(crate) const ORTHOGONAL: [Key; 6] = [
+pub(crate) const ORTHOGONAL: [Key; 11] = [
     must(
         "shear_stress_mpa",
         POSITIVE,
@@ -321,6 +326,31 @@ pub(crate) const ORTHOGONAL: [Key; 6] = [
         "inclination_deg",
         WITHIN_RIGHT_ANGLES,
         "Inclination of the edge, degrees [the helix angle]",
+    ),
+    may(
+        "shear_stress_law",
+        Holds::Array(4),
+        "Drills: shear stress in MPa at rake (degrees), chip thickness (mm), speed (m/min): [constant, per rake, per chip, per speed]",
+    ),
+    may(
+        "friction_angle_law",
+        Holds::Array(4),
+        "Drills: friction angle in degrees, likewise: [19.1, 0.29, 0.0, 0.0]",
+    ),
+    may(
+        "chip_ratio_law",
+        Holds::Array(4),
+        "Drills: chip ratio (a + b rake) chip^(c + d rake): [1.755, -0.028, 0.331, -0.0082]",
+    ),
+    may(
+        "edge_force_tangential_n_per_mm",
+        NOT_NEGATIVE,
+        "Drills: edge force along the speed, N per mm of lip [0]",
+    ),
+    may(
+        "edge_force_normal_n_per_mm",
+        NOT_NEGATIVE,
+        "Drills: edge force normal to the lip, N per mm of lip [0]",
     ),
 ];
 
@@ -438,7 +468,7 @@ pub(crate) const CUT: [Key; 20] = [
     may("material", Holds::Text, "Of this cut, where cuts are of several"),
 ];
 
-pub(crate) const LOBES: [Key; 20] = [
+pub(crate) const LOBES: [Key; 21] = [
     must("process", PROCESS, "Milling, drilling or turning"),
     must(
         "source",
@@ -467,6 +497,11 @@ pub(crate) const LOBES: [Key; 20] = [
         "Radial cutting coefficient, N/mm² [of the campaign's cuts]",
     ),
     may("kac_n_per_mm2", ANY, "Axial cutting coefficient, N/mm²"),
+    may(
+        "coefficients",
+        Holds::Words(&["orthogonal"]),
+        "Drilling: predict them from [orthogonal] and the drill's geometry, in place of ktc, krc, kac and cuts",
+    ),
     may("teeth", TEETH, "Number of teeth [that of the tool]"),
     may(
         "immersion",

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use crate::Result;
 use crate::analysis::{LobeAnalysis, RedundancyAnalysis};
 use crate::campaign::{Campaign, LobeMethod, Process};
-use crate::commands::measure::{hole, lobe_tool};
+use crate::commands::measure::{drill, hole, lobe_tool};
 use crate::commands::next_step::Guide;
 use crate::commands::text::{number, table, warnings};
 use crate::commands::{CampaignArg, Outcome};
@@ -92,6 +92,7 @@ fn document(analysis: &LobeAnalysis) -> Value {
             "included": block.is_ok(),
             "left_out_because": block.as_ref().err(),
         })),
+        "drill": drill::document(analysis),
         "hole_width_mm": analysis.drilled.map(|hole| hole.width_mm),
         "tool": lobe_tool::document(analysis),
         "revision": analysis.revision,
@@ -279,6 +280,7 @@ fn text(analysis: &LobeAnalysis) -> String {
         ),
         None => "\nStable at every speed and depth\n".to_string(),
     };
+    out += &drill::text(analysis);
     out += &lobe_tool::text(analysis);
     let did = analysis.what_effects_did();
     if !did.is_empty() {
@@ -374,6 +376,7 @@ mod tests {
                 ktc_n_per_mm2: Some(1014.2),
                 krc_n_per_mm2: Some(619.9),
                 kac_n_per_mm2: None,
+                from_orthogonal: false,
                 teeth: Some(2),
                 immersion: None,
                 half_point_angle_deg: Some(67.5),

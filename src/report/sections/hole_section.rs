@@ -1,6 +1,7 @@
 //! The hole itself: where the static forces put the tool, against its tolerances.
 
 use crate::analysis::LobeAnalysis;
+use crate::cutting::{DrillCoefficients, DrillForces};
 use crate::lobes::drilling::hole::{HoleCheck, HoleError, Uncertain};
 use crate::report::figure::{HoleFigure, HolePanel};
 use crate::report::number::{decimals, significant};
@@ -130,6 +131,43 @@ fn remedies(holes: &[(String, &HoleError)]) -> Vec<Block> {
         }));
     }
     blocks
+}
+
+/// What the orthogonal database predicts of the drill; `None` where it is not asked.
+pub fn drill(analysis: &LobeAnalysis) -> Option<Block> {
+    let drill = analysis.drill.as_ref()?;
+    let row = |name: &str, of: &DrillForces, k: &DrillCoefficients| {
+        let mut row = vec![
+            name.to_string(),
+            significant(of.thrust_n, 4),
+            significant(of.torque_nm, 3),
+        ];
+        row.extend([k.ktc_n_per_mm2, k.krc_n_per_mm2, k.kac_n_per_mm2].map(|v| significant(v, 4)));
+        row
+    };
+    let mut rows = vec![row("lips", &drill.lips, &drill.lip_coefficients)];
+    let mut notes = vec![format!(
+        "{} mm per revolution; coefficients per chip area of the part's own radial width.",
+        drill.feed_per_rev_mm
+    )];
+    match &drill.chisel {
+        Some(Ok(chisel)) => rows.push(row("chisel edge", &chisel.forces, &chisel.coefficients)),
+        Some(Err(reason)) => notes.push(format!("The chisel edge is left out: {reason}.")),
+        None => {}
+    }
+    Some(Block::Table(ReportTable {
+        caption: "The drill from the orthogonal database".into(),
+        columns: vec![
+            TableColumn::text("part"),
+            TableColumn::number("thrust (N)"),
+            TableColumn::number("torque (N·m)"),
+            TableColumn::number("Ktc (N/mm²)"),
+            TableColumn::number("Krc (N/mm²)"),
+            TableColumn::number("Kac (N/mm²)"),
+        ],
+        rows,
+        notes,
+    }))
 }
 
 /// Static stiffness along the feed, posture by posture; over the redundancy angle the stiffest.

@@ -60,7 +60,9 @@ pub(super) fn read(
         from_orthogonal: from_orthogonal(&lobes, process)?,
         teeth: lobes.whole("teeth", 1, 1000)?.map(|n| n as usize),
         immersion: immersion(&lobes)?,
-        process_damping_n_per_m: lobes.number("process_damping_n_per_m", Bounds::NOT_NEGATIVE)?,
+        process_damping_n_per_m: process_damping(&lobes, process)?,
+        margin_stiffness_n_per_m: lobes.number("margin_stiffness_n_per_m", Bounds::NOT_NEGATIVE)?,
+        margin_damping_ns_per_m: lobes.number("margin_damping_ns_per_m", Bounds::NOT_NEGATIVE)?,
         half_point_angle_deg: lobes.number("half_point_angle_deg", Bounds::above_up_to(0.0, 90.0))?,
         feed_per_rev_mm: lobes.number("feed_per_rev_mm", Bounds::POSITIVE)?,
         spindle_rpm: speeds(&lobes)?,
@@ -69,6 +71,35 @@ pub(super) fn read(
         tool,
         hole,
     }))
+}
+
+/// C of process damping C/V, N/m: given, or of indentation stiffness and wear land, K_sp L²/2.
+fn process_damping(lobes: &Section<'_>, process: Process) -> Result<Option<f64>> {
+    let given = lobes.number("process_damping_n_per_m", Bounds::NOT_NEGATIVE)?;
+    let indentation = lobes.number("indentation_n_per_mm3", Bounds::POSITIVE)?;
+    let land = lobes.number("wear_land_mm", Bounds::POSITIVE)?;
+    if indentation.is_none() && land.is_none() {
+        return Ok(given);
+    }
+    if given.is_some() {
+        return Err(lobes
+            .error(
+                "process_damping_n_per_m",
+                "given beside indentation_n_per_mm3 and wear_land_mm, which say the same",
+            )
+            .remedy("keep one of the two ways")
+            .into());
+    }
+    let indentation = lobes.required("indentation_n_per_mm3", indentation, "40000.0")?;
+    let land = lobes.required("wear_land_mm", land, "0.08")?;
+    match process {
+        // N/mm³ mm² = N/mm.
+        Process::Drilling => Ok(Some(1e3 * 0.5 * indentation * land * land)),
+        _ => Err(lobes
+            .error("indentation_n_per_mm3", "is for the lobes of a drill")
+            .remedy("give process_damping_n_per_m for milling")
+            .into()),
+    }
 }
 
 fn from_orthogonal(lobes: &Section<'_>, process: Process) -> Result<bool> {

@@ -92,8 +92,13 @@ pub struct LobesSection {
     pub teeth: Option<usize>,
     /// Milling: where a tooth is in the workpiece; milling lobes need it.
     pub immersion: Option<Immersion>,
-    /// Milling, methods other than zero-order: see [`crate::lobes::ProcessDamping`].
+    /// Milling, methods other than zero-order: see [`crate::lobes::ProcessDamping`]; drilling: see
+    /// [`crate::lobes::drilling::flank_damping`].
     pub process_damping_n_per_m: Option<f64>,
+    /// Drilling: stiffness of the contact between the margins and the wall; `None`: the tip is free.
+    pub margin_stiffness_n_per_m: Option<f64>,
+    /// Drilling: damping of that contact; `None`: none.
+    pub margin_damping_ns_per_m: Option<f64>,
     /// Drilling: half of the point angle; `None`: that of the campaign's tool.
     pub half_point_angle_deg: Option<f64>,
     /// Drilling: feed per revolution; `None`: no thrust is predicted, and axial–torsional lobes take 0.

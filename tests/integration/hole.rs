@@ -105,11 +105,9 @@ fn forces_come_from_the_coefficients() {
             reason.contains(wanted) && reason.contains("[lobes.hole]"),
             "{reason}"
         );
-        assert_eq!(
-            found["warnings"].as_array().unwrap().len(),
-            1,
-            "only that nothing is calibrated"
-        );
+        let warnings = found["warnings"].as_array().unwrap();
+        let others = warnings.iter().filter(|w| !w.as_str().unwrap().contains("whirl"));
+        assert_eq!(others.count(), 1, "only that nothing is calibrated");
         append(folder.path(), "[lobes.hole]\nposition_tolerance_mm = 0.1\n");
         let warned = lobestone(&["lobes", text(folder.path())]).stdout;
         assert!(warned.contains("warning: the hole is not worked out"), "{warned}");

@@ -2,6 +2,7 @@
 
 use crate::lobes::band::LobeBand;
 use crate::lobes::drilling::hole::HoleError;
+use crate::lobes::drilling::whirling::WhirlSpeed;
 use crate::lobes::dynamics::feed_stiffness::FeedStiffness;
 use crate::lobes::outcome::LimitRange;
 use crate::lobes::{AbsoluteLimit, BlockLobes, LobeCurve, Peak};
@@ -35,6 +36,8 @@ pub struct LobeCase {
     pub hole: Option<HoleError>,
     /// How stiff the tool point is along the feed; from the model only.
     pub feed_stiffness: Option<FeedStiffness>,
+    /// Drilling: speeds at which the drill may whirl; of a posture as it stands.
+    pub whirling: Vec<WhirlSpeed>,
     /// At the speed of every cut with a noted outcome.
     pub(crate) at_cuts: Vec<LimitRange>,
 }

@@ -14,6 +14,7 @@ use crate::identify::frfs::structure::StructureModel;
 use crate::identify::{Options, StructureCase};
 use crate::lobes::drilling::contact::{HeldHolder, contact_forces, held_compliance, skating_m};
 use crate::lobes::drilling::hole::{Deflection, HoleError, HoleLoad};
+use crate::lobes::drilling::margin::{MarginContact, MarginFrf};
 use crate::lobes::dynamics::feed_stiffness::FeedStiffness;
 use crate::lobes::dynamics::tool_point::{Holder, RobotHolder};
 use crate::lobes::setup::tool_beam;
@@ -94,16 +95,16 @@ impl FittedModel {
         if asked.couples() {
             let behind_m = asked.tool.beam.length_m();
             let holder = RobotHolder::new(robot, kinematics, chain, behind_m)?;
-            return Ok(asked.point(holder).blocks(asked.axial));
+            return Ok(asked.in_hole(asked.point(holder).blocks(asked.axial)));
         }
         let axial = match asked.axial {
             true => Some(form(RobotFrf::axial_torsional(robot, kinematics, chain)?)?),
             false => None,
         };
-        Ok(Blocks {
+        Ok(asked.in_hole(Blocks {
             lateral: form(RobotFrf::new(robot, kinematics, chain)?)?,
             axial,
-        })
+        }))
     }
 
     /// The tool point's FRFs with frequencies and static stiffness there, coupled modes as a sum over their poles: for
@@ -154,6 +155,18 @@ pub(crate) struct Asked {
     pub axial: bool,
     /// What holds the tool point from outside.
     pub contacts: Vec<Contact>,
+    /// The wall of the hole that holds the tip of a drill; `None`: it is free.
+    pub margin: Option<MarginContact>,
+}
+
+/// What `[lobes]` says of the margins; `None` where they touch nothing.
+fn margin_of(section: &LobesSection) -> Option<MarginContact> {
+    let margin = MarginContact {
+        stiffness_n_per_m: section.margin_stiffness_n_per_m.unwrap_or(0.0),
+        damping_ns_per_m: section.margin_damping_ns_per_m.unwrap_or(0.0),
+    };
+    let touches = margin.stiffness_n_per_m > 0.0 || margin.damping_ns_per_m > 0.0;
+    (section.process == Process::Drilling && touches).then_some(margin)
 }
 
 impl Asked {
@@ -163,6 +176,18 @@ impl Asked {
             tool: Arc::new(ToolDynamics::new(tool_beam(section))),
             axial,
             contacts: Vec::new(),
+            margin: margin_of(section),
+        }
+    }
+
+    /// The FRFs with the margins of a drill held by the wall of its hole.
+    pub fn in_hole(&self, blocks: Blocks) -> Blocks {
+        match self.margin {
+            Some(margin) => Blocks {
+                lateral: Box::new(MarginFrf::new(blocks.lateral, margin)),
+                axial: blocks.axial,
+            },
+            None => blocks,
         }
     }
 
@@ -192,6 +217,10 @@ impl Asked {
                 if n == 1 { "segment" } else { "segments" },
                 1e3 * self.tool.beam.length_m()
             ),
+        };
+        let tool = match self.margin {
+            Some(_) => format!("{tool}, margins held by the wall"),
+            None => tool,
         };
         match &self.contacts[..] {
             [] => tool,

@@ -5,8 +5,9 @@ use crate::campaign::{
     Campaign, CutGeometry, LobeAxis, LobeMethod, LobeMode, LobesSection, Process, Tool, ToolKind,
 };
 use crate::cutting::{CfcOptions, DrillPrediction, ForceGroup};
+use crate::lobes::drilling::flank_damping::FlankDamping;
 use crate::lobes::dynamics::tool_point::ModesHolder;
-use crate::lobes::setup::{LobeCoefficients, LobeCut};
+use crate::lobes::setup::{DrilledHole, LobeCoefficients, LobeCut};
 use crate::lobes::{AxisMode, ModalFrf, Mode, PeriodicForce, ProcessDamping, RegenerativeForce};
 use crate::{Error, InputError, Result};
 
@@ -249,6 +250,36 @@ pub fn cut_of(
                 .map(|force| LobeCut::Averaged(force.into()))
         }
     }
+}
+
+/// Process damping of a drill's flanks; `None` where it is not asked for.
+///
+/// # Errors
+/// A drill whose point or diameter is not known.
+pub fn flank_damping(
+    campaign: &Campaign,
+    section: &LobesSection,
+    lips: usize,
+) -> Result<Option<FlankDamping>> {
+    let asked = section.process_damping_n_per_m.filter(|c| *c > 0.0);
+    let Some(coefficient_n_per_m) = asked.filter(|_| section.process == Process::Drilling) else {
+        return Ok(None);
+    };
+    let hole = DrilledHole::of(campaign.tool.as_ref(), section).ok_or_else(|| {
+        InputError::new("process damping needs the cutting speed along the lips, and the drill is not known")
+            .file(campaign.dir.join("campaign.toml"))
+            .key("tool.diameter_mm")
+            .remedy("add a [tool] table with the drill's diameter_mm and half_point_angle_deg")
+    })?;
+    let kappa = half_point_angle_rad(campaign, section)?;
+    let slowest_rpm = section.spindle_rpm[0];
+    Ok(Some(FlankDamping::new(
+        coefficient_n_per_m,
+        &hole,
+        kappa,
+        lips,
+        slowest_rpm,
+    )))
 }
 
 /// The modes of the `[[lobes.mode]]` table: x and y for the lateral block, z and theta for the axial–torsional one.

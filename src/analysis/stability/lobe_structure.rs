@@ -8,10 +8,11 @@ use crate::analysis::workbench::Workbench;
 use crate::campaign::{Campaign, LobeMethod, LobesSection};
 use crate::lobes::band;
 use crate::lobes::drilling::hole::{HoleCheck, HoleError};
+use crate::lobes::drilling::whirling::whirl_speeds;
 use crate::lobes::dynamics::feed_stiffness::FeedStiffness;
 use crate::lobes::dynamics::tool_point::MeasuredHolder;
 use crate::lobes::outcome::{LimitRange, NotedCut};
-use crate::lobes::setup::LobeCut;
+use crate::lobes::setup::{DrilledHole, LobeCut};
 use crate::lobes::{
     BlockSolver, Blocks, MultiFrequency, SemiDiscretisation, SpeedLimit, StateSpace, ToolPointFrf,
 };
@@ -77,7 +78,14 @@ impl LobeStructure {
         limits.collect()
     }
 
-    pub fn case(self, cut: &LobeCut, speeds: &[f64], noted: &[NotedCut]) -> LobeCase {
+    /// `drilled`: in drilling the hole, where it is known; `None` in other processes.
+    pub fn case(
+        self,
+        cut: &LobeCut,
+        speeds: &[f64],
+        noted: &[NotedCut],
+        drilled: Option<Option<DrilledHole>>,
+    ) -> LobeCase {
         let method = self.dynamics.method(cut);
         let curve = method.curve(speeds);
         let (absolute, mut best) = (
@@ -91,6 +99,19 @@ impl LobeStructure {
         let by_block = match cut {
             LobeCut::Averaged(cut) => cut.on(&self.dynamics.blocks).by_block(speeds),
             LobeCut::Periodic(_) => None,
+        };
+        let whirling = match drilled {
+            Some(hole) => whirl_speeds(
+                self.dynamics.blocks.lateral.as_ref(),
+                &cut.average().on(&self.dynamics.blocks).lateral,
+                cut.average().lateral.teeth,
+                [
+                    speeds.first().copied().unwrap_or(0.0),
+                    speeds.last().copied().unwrap_or(0.0),
+                ],
+                hole.map(|h| h.width_mm),
+            ),
+            None => Vec::new(),
         };
         let tips: Vec<f64> = best.iter().map(|p| p.spindle_rpm).collect();
         if let Some(at_tips) = band_at(&tips) {
@@ -108,6 +129,7 @@ impl LobeStructure {
             before: self.before.as_ref().map(|b| b.lobes_before(cut, speeds)),
             hole: self.hole,
             feed_stiffness: self.feed_stiffness,
+            whirling,
             at_cuts,
             curve,
             posture: self.posture,
@@ -141,6 +163,7 @@ pub(crate) fn from_modes(
             axial: axial.map(|frf| Box::new(frf) as Box<dyn ToolPointFrf>),
         }
     };
+    let blocks = asked.in_hole(blocks);
     Ok(vec![LobeStructure {
         posture: None,
         dynamics: Dynamics { blocks, states },
@@ -259,6 +282,7 @@ pub(crate) fn from_measured(
                         .map(|frf| Box::new(frf) as Box<dyn ToolPointFrf>),
                 }
             };
+            let blocks = asked.in_hole(blocks);
             Ok(LobeStructure {
                 posture: Some(posture.id.clone()),
                 dynamics: Dynamics { blocks, states: None },

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use crate::analysis::stability::hole_check::hole_check;
 pub use crate::analysis::stability::lobe_case::{BEST, LobeCase, LobesBefore};
 use crate::analysis::stability::lobe_model::{Asked, ModelState};
-use crate::analysis::stability::lobe_setup::{coefficients_of_group, cut_of, group_of_cuts, predicted_drill};
+use crate::analysis::stability::lobe_setup::{
+    coefficients_of_group, cut_of, flank_damping, group_of_cuts, predicted_drill,
+};
 use crate::analysis::stability::lobe_structure::{
     LobeStructure, at_postures, from_measured, from_modes, steps_through_time,
 };
@@ -150,9 +152,13 @@ impl LobeAnalysis {
                 .push("lobes.redundancy needs source = \"model\": there is no surface over the angle".into());
         }
         let (redundancy, swept) = surface.unzip();
+        let drilling = section.process == Process::Drilling;
+        let drilled = drilling
+            .then(|| DrilledHole::of(campaign.tool.as_ref(), section))
+            .flatten();
         let cases: Vec<LobeCase> = structures
             .into_iter()
-            .map(|structure| structure.case(&cut, &speeds, &noted))
+            .map(|structure| structure.case(&cut, &speeds, &noted, drilling.then_some(drilled)))
             .chain(swept.unwrap_or_default())
             .collect();
         let standing: Vec<(Option<String>, Vec<LimitRange>)> = as_they_stand
@@ -167,6 +173,7 @@ impl LobeAnalysis {
                 .collect(),
         };
         warnings.extend(contacts_that_give_way(&cases));
+        warnings.extend(cases.iter().filter_map(where_it_may_whirl));
         let outcomes = Outcomes::score(&noted, &limits, not_compared);
         if limits.len() > 1 && noted.iter().any(|c| c.posture.is_none()) {
             warnings.push(
@@ -182,10 +189,7 @@ impl LobeAnalysis {
             coefficients,
             teeth: cut.average().lateral.teeth,
             axial_torsional,
-            drilled: match section.process {
-                Process::Drilling => DrilledHole::of(campaign.tool.as_ref(), section),
-                Process::Milling | Process::Turning => None,
-            },
+            drilled,
             drill,
             tool: asked.tool.clone(),
             spindle_rpm: section.spindle_rpm,
@@ -337,6 +341,9 @@ impl CutForce {
         let teeth = cut.average().lateral.teeth;
         let axial = (section.process == Process::Drilling)
             .then(|| axial_torsional_force(campaign.tool.as_ref(), section, coefficients, teeth));
+        if let LobeCut::Averaged(cut) = &mut cut {
+            cut.damping = flank_damping(campaign, section, teeth)?;
+        }
         if let (LobeCut::Averaged(cut), Some(Ok(force))) = (&mut cut, &axial) {
             cut.axial = Some(*force);
         }
@@ -348,6 +355,32 @@ impl CutForce {
             drill,
         })
     }
+}
+
+/// The speeds at which a drill may whirl at a posture, in words.
+fn where_it_may_whirl(case: &LobeCase) -> Option<String> {
+    let speeds: Vec<String> = case
+        .whirling
+        .iter()
+        .filter(|w| w.may_occur == Some(true))
+        .map(|w| {
+            format!(
+                "{:.0} rpm ({:.1} Hz is {} times the turn: {} or {} lobes)",
+                w.spindle_rpm,
+                w.mode_hz,
+                w.lobes[0] + 1,
+                w.lobes[0],
+                w.lobes[1]
+            )
+        })
+        .collect();
+    (!speeds.is_empty()).then(|| {
+        format!(
+            "the drill may whirl{} and leave a hole that is not round at and up to a tenth above {}: take another speed or a pilot hole",
+            case.at_posture(),
+            speeds.join(", ")
+        )
+    })
 }
 
 /// Feet that lift off and clamps that slip: what was computed with them does not hold there.

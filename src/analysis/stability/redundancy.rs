@@ -304,6 +304,7 @@ fn at_elbow(
                 before,
                 hole: check.map(|c| state.hole(&joints, &c.load)).transpose()?,
                 feed_stiffness: state.feed_stiffness(&joints, process)?,
+                whirling: Vec::new(),
                 at_cuts: Vec::new(),
             })
         })

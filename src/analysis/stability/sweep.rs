@@ -163,6 +163,8 @@ impl Sweep {
             "force_matrix_n_per_m2": cut.lateral.matrix_n_per_m2,
             "axial_force_matrix_n_per_m2": cut.axial.map(|a| a.matrix_n_per_m2),
             "tool": section.tool,
+            "flank_damping_n_per_m2": cut.damping.map(|d| [d.lateral_n_per_m2, d.axial_n_per_m2]),
+            "margin": [section.margin_stiffness_n_per_m, section.margin_damping_ns_per_m],
             "spindle_rpm": spindle_rpm,
             "posture": posture.id,
             "joints_deg": posture.joints_deg,

@@ -320,6 +320,11 @@ mod tests {
                 let lobes = campaign["lobes"].as_table_mut().unwrap();
                 lobes.insert("process".into(), Toml::String("drilling".into()));
             }
+            ["lobes", "indentation_n_per_mm3" | "wear_land_mm"] => {
+                lobes(campaign, &["method"]);
+                let lobes = campaign["lobes"].as_table_mut().unwrap();
+                lobes.insert("process".into(), Toml::String("drilling".into()));
+            }
             ["lobes", "immersion"] => lobes(campaign, &["radial_ratio", "cut"]),
             ["lobes", "start_deg"] => {
                 lobes(campaign, &["radial_ratio", "cut"]);

@@ -468,7 +468,7 @@ pub(crate) const CUT: [Key; 20] = [
     may("material", Holds::Text, "Of this cut, where cuts are of several"),
 ];
 
-pub(crate) const LOBES: [Key; 21] = [
+pub(crate) const LOBES: [Key; 25] = [
     must("process", PROCESS, "Milling, drilling or turning"),
     must(
         "source",
@@ -531,7 +531,23 @@ pub(crate) const LOBES: [Key; 21] = [
     may(
         "process_damping_n_per_m",
         NOT_NEGATIVE,
-        "Milling: C in the damping C/V of the flank, N/m; not zero-order",
+        "Milling (not zero-order) and drilling: C in the damping C/V of the flank, N/m",
+    ),
+    may(
+        "indentation_n_per_mm3",
+        POSITIVE,
+        "Drilling: indentation stiffness of the material, N/mm³, with wear_land_mm in place of process_damping_n_per_m",
+    ),
+    may("wear_land_mm", POSITIVE, "Drilling: width of the worn flank, mm"),
+    may(
+        "margin_stiffness_n_per_m",
+        NOT_NEGATIVE,
+        "Drilling: stiffness between the margins and the wall of the hole, N/m [the tip is free]",
+    ),
+    may(
+        "margin_damping_ns_per_m",
+        NOT_NEGATIVE,
+        "Drilling: damping between the margins and the wall, N·s/m [0]",
     ),
     may(
         "half_point_angle_deg",

@@ -59,6 +59,7 @@ fn document(analysis: &LobeAnalysis) -> Value {
                 })),
                 "lateral": case.by_block.as_ref().map(|b| lobe_tool::block(&b[0])),
                 "axial_torsional": case.by_block.as_ref().map(|b| lobe_tool::block(&b[1])),
+                "whirling": case.whirling,
                 "frf": case.description,
                 "band_hz": [case.band_hz.0, case.band_hz.1],
             })
@@ -381,6 +382,8 @@ mod tests {
                 immersion: None,
                 half_point_angle_deg: Some(67.5),
                 process_damping_n_per_m: None,
+                margin_stiffness_n_per_m: None,
+                margin_damping_ns_per_m: None,
                 feed_per_rev_mm: None,
                 spindle_rpm: [100.0, 900.0, 1.0],
                 modes: vec![

@@ -13,6 +13,7 @@ use serde::Serialize;
 
 use crate::Result;
 use crate::data::{Contact, ContactDirection};
+use crate::lobes::drilling::margin::moved_resonance_grid;
 use crate::lobes::dynamics::robot::lobe_axes;
 use crate::lobes::dynamics::tool_beam::Receptance6;
 use crate::lobes::dynamics::tool_point::Holder;
@@ -83,7 +84,7 @@ impl<H: Holder> Holder for HeldHolder<H> {
     }
 
     fn seed_grid_hz(&self) -> Vec<f64> {
-        self.free.seed_grid_hz()
+        moved_resonance_grid(self.free.seed_grid_hz(), self.free.band_hz())
     }
 }
 

@@ -3,5 +3,8 @@
 pub mod contact;
 #[cfg(test)]
 mod drilling_tests;
+pub mod flank_damping;
 pub mod hole;
 pub mod iso_tolerance;
+pub mod margin;
+pub mod whirling;

@@ -350,3 +350,124 @@ fn a_pressure_foot_holds_the_tool() {
     let told = lobestone(&["model", text(folder.path())]).stdout;
     assert!(told.contains("held by [[contact]]"), "{told}");
 }
+
+const TITANIUM: &str = "[orthogonal]\nshear_stress_mpa = 613.0\nfriction_angle_deg = 22.58\nchip_ratio = 0.7\nrake_deg = 12.0\n\
+                        friction_angle_law = [19.1, 0.29, 0.0, 0.0]\nchip_ratio_law = [1.755, -0.028, 0.331, -0.0082]\n\
+                        edge_force_tangential_n_per_mm = 24.0\nedge_force_normal_n_per_mm = 43.0\n";
+const TWISTED: &str = "[tool]\nkind = \"drill\"\ndiameter_mm = 9.5\nteeth = 2\nhelix_deg = 30.0\nhalf_point_angle_deg = 59.0\n\
+                       web_thickness_mm = 1.425\n";
+const PREDICTED: &str = "[lobes]\nprocess = \"drilling\"\nsource = \"model\"\ncoefficients = \"orthogonal\"\nfeed_per_rev_mm = 0.1\n\
+                         spindle_rpm = [200.0, 500.0, 10.0]\n";
+
+/// Roukema's drill: thrust, torque and coefficients from the orthogonal database and the drill's geometry go into lobes and hole.
+/// The numbers were worked out beside this program (Python, the same formulas written anew): lips 398 N, 2.20 N·m, chisel edge
+/// 684 N and 18 N of pressing in, 0.199 N·m.
+#[test]
+fn a_drill_from_the_orthogonal_database() {
+    let folder = campaign(&[ROBOT, TWISTED, TITANIUM, PREDICTED]);
+    let found = document(&["lobes", text(folder.path())]);
+    let drill = &found["drill"];
+    near(&drill["lips"]["thrust_n"], 398.0, 3e-3);
+    near(&drill["lips"]["torque_nm"], 2.20, 3e-3);
+    let chisel = &drill["chisel"];
+    let pressed = number(&chisel["indentation_thrust_n"]);
+    near(&chisel["thrust_n"], 684.0 + pressed, 3e-3);
+    assert!(pressed > 5.0 && pressed < 40.0, "{pressed}");
+    let hole = &found["hole"][0];
+    near(&hole["thrust_n"], number(&drill["thrust_n"]), 1e-12);
+    near(&hole["torque_nm"], number(&drill["torque_nm"]), 1e-12);
+    assert_eq!(found["ktc_n_per_mm2"], drill["lips"]["ktc_n_per_mm2"]);
+    let lips_kac = number(&drill["lips"]["kac_n_per_mm2"]);
+    assert!(
+        number(&found["kac_n_per_mm2"]) > lips_kac,
+        "the chisel edge is in"
+    );
+    assert_eq!(found["axial_torsional"]["included"], true);
+    let elements = drill["elements"].as_array().unwrap();
+    assert!(number(&elements[0]["rake_deg"]) < -15.0);
+    assert!(number(&elements[elements.len() - 1]["rake_deg"]) > 25.0);
+    let said = lobestone(&["lobes", text(folder.path())]).stdout;
+    assert!(
+        said.contains("The drill from the orthogonal database") && said.contains("chisel edge: thrust"),
+        "{said}"
+    );
+
+    let piloted = campaign(&[
+        ROBOT,
+        TWISTED,
+        TITANIUM,
+        PREDICTED,
+        "[lobes.hole]\npilot_diameter_mm = 4.0\n",
+    ]);
+    let piloted = document(&["lobes", text(piloted.path())]);
+    assert_eq!(piloted["drill"]["chisel"], Value::Null);
+    assert!(number(&piloted["hole"][0]["thrust_n"]) < 0.5 * number(&hole["thrust_n"]));
+    for (parts, key) in [
+        ([ROBOT, TWISTED, PREDICTED], "orthogonal"),
+        ([ROBOT, TITANIUM, PREDICTED], "tool"),
+    ] {
+        let folder = campaign(&parts);
+        let error = lobestone(&["lobes", text(folder.path())]).stderr;
+        assert!(error.contains(key) && error.contains("remedy"), "{error}");
+    }
+}
+
+/// Process damping and margins are off unless asked for; both raise the lateral limit, the flanks' damping most where the drill
+/// turns slowly. Speeds at which the drill may whirl are told with the number of lobes.
+#[test]
+fn damped_flanks_margins_and_whirling() {
+    let run = |more: &str| {
+        let folder = campaign(&[ROBOT, DRILL, DRILLING, more]);
+        document(&["lobes", text(folder.path())])
+    };
+    let plain = run("");
+    let none = run("process_damping_n_per_m = 0.0\nmargin_stiffness_n_per_m = 0.0\n");
+    assert_eq!(plain["curves"], none["curves"]);
+    let damped = run("indentation_n_per_mm3 = 40000.0\nwear_land_mm = 0.08\n");
+    let same = run("process_damping_n_per_m = 128000.0\n");
+    assert_eq!(
+        damped["curves"][0]["depth_limit_mm"],
+        same["curves"][0]["depth_limit_mm"]
+    );
+    let held = run("margin_stiffness_n_per_m = 1.0e6\n");
+    for i in 0..2 {
+        let limits = |found: &Value| -> Vec<f64> {
+            let limits = found["curves"][i]["depth_limit_mm"].as_array().unwrap();
+            limits
+                .iter()
+                .map(|d| d.as_f64().unwrap_or(f64::INFINITY))
+                .collect()
+        };
+        let (free, damped) = (limits(&plain), limits(&damped));
+        let gains: Vec<f64> = damped.iter().zip(&free).map(|(d, f)| d / f).collect();
+        assert!(gains.iter().all(|g| *g > 1.0), "{gains:?}");
+        let least = |found: &Value| number(&found["curves"][i]["absolute_limit_mm"]);
+        assert!(
+            least(&held) > 1.5 * least(&plain),
+            "{} {}",
+            least(&held),
+            least(&plain)
+        );
+    }
+    let whirling = plain["curves"][0]["whirling"].as_array().unwrap();
+    assert!(!whirling.is_empty());
+    for speed in whirling {
+        let order = number(&speed["order"]);
+        near(
+            &speed["spindle_rpm"],
+            60.0 * number(&speed["mode_hz"]) / (2.0 * order),
+            1e-9,
+        );
+        assert_eq!(
+            speed["lobes"],
+            json!([2.0 * order - 1.0, 2.0 * order + 1.0].map(|l| l as u32))
+        );
+    }
+    let warnings = plain["warnings"].as_array().unwrap();
+    assert!(
+        warnings
+            .iter()
+            .any(|w| w.as_str().unwrap().contains("may whirl at p1")),
+        "{warnings:?}"
+    );
+}

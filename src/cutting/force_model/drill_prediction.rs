@@ -383,6 +383,7 @@ mod tests {
         };
         let tool = Tool {
             web_thickness_mm: Some(1e-9),
+            helix_deg: 0.0,
             ..drill()
         };
         let found = DrillPrediction::new(&tool, &hole(0.2, 3.5), 1000.0, &plain).unwrap();

@@ -272,7 +272,13 @@ mod tests {
             let plain = StabilitySolver::new(force, &frf);
             let gain = |n: f64| solver.limit_at(n).unwrap().depth_mm / plain.limit_at(n).unwrap().depth_mm;
             assert!(gain(n) > 1.5 && gain(0.5 * n) > 1.5);
-            assert!((gain(200.0 * n) - 1.0).abs() < 0.02);
+            // The lobe k = 0, many times as fast: a small part of that damping is left.
+            let fastest = 60.0 / (2.0 * epsilon / omega);
+            assert!(
+                fastest > 4.0 * n && (1.0..1.25).contains(&gain(fastest)),
+                "{}",
+                gain(fastest)
+            );
         }
     }
 

@@ -8,8 +8,9 @@ use rayon::prelude::*;
 use crate::Result;
 use crate::modal::settings::Settings;
 use crate::modal::single::curve::{Curve, MIN_LINES};
-use crate::modal::single::frf_modes::{FrfMode, FrfModes, Method, ModeEstimate};
+use crate::modal::single::frf_modes::{Disturbance, FrfMode, FrfModes, Method, ModeEstimate};
 use crate::modal::single::local_fit::{self, LocalSolution, Pole, Problem, ROUGHLY_SETTLED, SETTLED};
+use crate::modal::single::method_bias::{FittedCurves, MethodBias};
 use crate::modal::single::peaks::{self, FrfPeak};
 use crate::modal::single::{circle_fit, half_power};
 
@@ -47,6 +48,10 @@ const MAX_RELATIVE_STD: f64 = 0.7;
 /// the noise: an allowance of this part of the line spacing on the half-power width. (Three measured
 /// free–free beam records at 0.05–0.2 lines in the band differ from each other by about this much.)
 const LEAKAGE_LINES: f64 = 0.02;
+/// A bias of the damping below this part of it is not worth a word.
+const WORTH_TELLING: f64 = 0.02;
+/// A simpler method whose error is below this part of the local fit's is to be taken instead.
+const MUCH_BETTER: f64 = 0.7;
 /// Modes of one FRF closer than this part of their half-width are one.
 const SAME_WIDTHS: f64 = 0.1;
 /// Fewer lines than this inside the half-power band are worth a warning.
@@ -215,7 +220,7 @@ fn mode_at(
     let mut estimates = Vec::with_capacity(3);
     let local = local(curve, starts, index, effort);
     let mut why = "its lines do not determine a pole".to_string();
-    if let Some((solution, pole)) = &local {
+    if let Some((solution, pole, _)) = &local {
         match judge(curve, solution, *pole, &start.peak, noise_std) {
             Ok(estimate) => estimates.push(estimate),
             Err(problem) => why = problem,
@@ -233,6 +238,8 @@ fn mode_at(
             damping_ratio: circle.damping_ratio,
             frequency_std_hz: Some(circle.frequency_std_hz),
             damping_std: Some(circle.damping_std),
+            frequency_bias_hz: None,
+            damping_bias: None,
             damping_spread: circle.damping_spread,
             modal_constant: Some(circle.diameter * (2.0 * circle.damping_ratio * w0)),
             one_sided: false,
@@ -245,6 +252,8 @@ fn mode_at(
             damping_ratio: half.damping_ratio,
             frequency_std_hz: half.std.map(|s| s.frequency_hz),
             damping_std: half.std.map(|s| s.damping_ratio),
+            frequency_bias_hz: None,
+            damping_bias: None,
             damping_spread: None,
             modal_constant: None,
             one_sided: half.reached != [true, true],
@@ -274,6 +283,23 @@ fn mode_at(
             && (0.5..=2.0).contains(&(e.damping_ratio / best.damping_ratio))
     });
     let contradicted = estimates.len() < methods;
+    let fitted = local.as_ref().and_then(|(solution, pole, first_line)| {
+        FittedCurves::new(curve, solution, *pole, *first_line, start.peak.index)
+    });
+    let mut disturbance = None;
+    for estimate in estimates.iter_mut().filter(|e| e.method != Method::LocalFit) {
+        let bias = fitted.as_ref().and_then(|f| f.bias(estimate.method));
+        disturbance = disturbance.or(add_bias(estimate, bias, &best));
+    }
+    if contradicted {
+        disturbance = disturbance.or_else(|| {
+            let methods = [Method::CircleFit, Method::HalfPower];
+            let gone = methods
+                .iter()
+                .find(|m| estimates.iter().all(|e| e.method != **m))?;
+            fitted.as_ref()?.bias(*gone).map(|bias| bias.cause)
+        });
+    }
     let lines_in_half_power_band = 2.0 * best.damping_ratio * best.frequency_hz / line_hz;
     if lines_in_half_power_band < FINE_LINES {
         let leakage = LEAKAGE_LINES * line_hz / (2.0 * best.frequency_hz);
@@ -281,12 +307,85 @@ fn mode_at(
             estimate.damping_std = estimate.damping_std.map(|std| std.hypot(leakage));
         }
     }
+    let (recommended, reason) = recommended(&estimates, disturbance, contradicted);
     Ok(FrfMode {
         lines_in_half_power_band,
         significance: start.peak.significance,
         contradicted,
+        disturbance,
+        recommended,
+        reason,
         estimates,
     })
+}
+
+/// Puts a method's bias at this peak into its errors (where it is not known: its distance from the local fit), and says
+/// whether it is more than the noise makes of it anyway.
+fn add_bias(
+    estimate: &mut ModeEstimate,
+    bias: Option<MethodBias>,
+    local: &ModeEstimate,
+) -> Option<Disturbance> {
+    let (frequency_hz, damping) = bias.map_or_else(
+        || {
+            (
+                estimate.frequency_hz - local.frequency_hz,
+                estimate.damping_ratio - local.damping_ratio,
+            )
+        },
+        |b| (b.frequency_hz, b.damping_ratio),
+    );
+    let noise = estimate.damping_std.unwrap_or(0.0);
+    (estimate.frequency_bias_hz, estimate.damping_bias) = (Some(frequency_hz), Some(damping));
+    estimate.frequency_std_hz = estimate.frequency_std_hz.map(|std| std + frequency_hz.abs());
+    estimate.damping_std = estimate.damping_std.map(|std| std + damping.abs());
+    let matters = damping.abs() > (0.5 * noise).max(WORTH_TELLING * local.damping_ratio);
+    bias.filter(|_| matters).map(|b| b.cause)
+}
+
+/// The answer to take and why: the local fit, unless a simpler one is known much better.
+fn recommended(
+    estimates: &[ModeEstimate],
+    disturbance: Option<Disturbance>,
+    contradicted: bool,
+) -> (Method, String) {
+    let error = |e: &ModeEstimate| e.damping_std.unwrap_or(f64::INFINITY);
+    let percent = |e: &ModeEstimate| 100.0 * error(e) / e.damping_ratio;
+    let local = &estimates[0];
+    let simpler = estimates[1..]
+        .iter()
+        .filter(|e| error(e) < MUCH_BETTER * error(local))
+        .min_by(|a, b| error(a).total_cmp(&error(b)));
+    if let Some(best) = simpler {
+        let reason = format!(
+            "it has fewer unknowns, nothing disturbs it here, and its damping is known to {:.1} %, that of the local fit to {:.1} %",
+            percent(best),
+            percent(local)
+        );
+        return (best.method, reason);
+    }
+    let biases: Vec<String> = estimates[1..]
+        .iter()
+        .filter_map(|e| {
+            let share = 100.0 * e.damping_bias? / local.damping_ratio;
+            Some(format!("{} by {share:+.1} %", e.method.id()))
+        })
+        .collect();
+    let reason = match disturbance {
+        Some(cause) => {
+            let off = match (contradicted, &biases[..]) {
+                (true, []) => "the others are far off".to_string(),
+                (_, biases) => format!("it puts the damping of {} off", biases.join(", of ")),
+            };
+            format!("{} here: only the local fit has that in it; {off}", cause.words())
+        }
+        None if contradicted => {
+            "the other methods contradict it, and it has the neighbours and a residual in it".into()
+        }
+        None if biases.is_empty() => "the only answer that these lines give".into(),
+        None => "all methods agree, and it uses all lines around the peak".into(),
+    };
+    (local.method, reason)
 }
 
 /// Is the fitted pole a mode that this peak shows?
@@ -328,6 +427,8 @@ fn judge(
         damping_ratio,
         frequency_std_hz: Some(frequency_std_hz),
         damping_std: Some(damping_std),
+        frequency_bias_hz: None,
+        damping_bias: None,
         damping_spread: None,
         // Y = R/(ζ + iu) is iωA/(ω₀² − ω² + 2iζω₀ω) with R = A/(2ω₀).
         modal_constant: Some(residue * (2.0 * TAU * frequency_hz)),
@@ -335,9 +436,14 @@ fn judge(
     })
 }
 
-/// The best determined local fit and the position of the peak's pole in it.
-fn local(curve: &Curve, starts: &[Start], index: usize, effort: Effort) -> Option<(LocalSolution, usize)> {
-    let mut best: Option<(f64, LocalSolution, usize)> = None;
+/// The best determined local fit, the position of the peak's pole in it, and its first line.
+fn local(
+    curve: &Curve,
+    starts: &[Start],
+    index: usize,
+    effort: Effort,
+) -> Option<(LocalSolution, usize, usize)> {
+    let mut best: Option<(f64, LocalSolution, usize, usize)> = None;
     // A window begins where the one before ended.
     let mut poles: Vec<Pole> = starts.iter().map(|s| s.pole).collect();
     for (k, &reach) in effort.windows.iter().enumerate() {
@@ -346,6 +452,7 @@ fn local(curve: &Curve, starts: &[Start], index: usize, effort: Effort) -> Optio
         };
         let narrower = effort.windows.get(k + 1);
         let enough = narrower.is_some_and(|reach| window.as_noisy_within(*reach));
+        let first_line = window.first_line;
         let WindowFit {
             solution,
             group,
@@ -361,17 +468,18 @@ fn local(curve: &Curve, starts: &[Start], index: usize, effort: Effort) -> Optio
         }
         let relative_std = solution.damping_std(pole) / solution.poles[pole].damping_ratio;
         if best.as_ref().is_none_or(|(least, ..)| relative_std < *least) {
-            best = Some((relative_std, solution, pole));
+            best = Some((relative_std, solution, pole, first_line));
         }
         if enough {
             break;
         }
     }
-    best.map(|(_, solution, pole)| (solution, pole))
+    best.map(|(_, solution, pole, first_line)| (solution, pole, first_line))
 }
 
 /// The fit of the lines around a peak.
 struct WindowFit<'a> {
+    first_line: usize,
     frequency_hz: &'a [f64],
     line_weight: Vec<f64>,
     solution: LocalSolution,
@@ -456,6 +564,7 @@ fn fit_window<'a>(
 
     let pole = group.iter().position(|&g| g == index)?;
     let poles: Vec<Pole> = group.iter().map(|&g| poles[g]).collect();
+    let first_line = lines.start;
     let f = &curve.frequency_hz[lines.clone()];
     let y = &curve.mobility[lines];
     let mut problem = Problem {
@@ -500,6 +609,7 @@ fn fit_window<'a>(
         solution = refined;
     }
     Some(WindowFit {
+        first_line,
         frequency_hz: f,
         line_weight: problem.line_weight,
         solution,
@@ -594,6 +704,20 @@ fn quality_remarks(modes: &[FrfMode], remarks: &mut Vec<String>) {
             "circle fit or half-power contradict the local fit (close modes or coarse lines) and are left out: {}",
             contradicted.join(", ")
         ));
+    }
+    for cause in [Disturbance::Overlap, Disturbance::Residual] {
+        let disturbed: Vec<String> = modes
+            .iter()
+            .filter(|m| m.disturbance == Some(cause))
+            .map(|m| format!("{:.2} Hz", m.best().frequency_hz))
+            .collect();
+        if !disturbed.is_empty() {
+            remarks.push(format!(
+                "{}: half-power and circle fit are off there (in their stated errors), take the local fit: {}",
+                cause.words(),
+                disturbed.join(", ")
+            ));
+        }
     }
     let one_sided: Vec<String> = modes
         .iter()

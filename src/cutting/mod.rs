@@ -31,7 +31,7 @@ pub use force_model::coefficients::{
 };
 pub use force_model::drill_geometry::DrillGeometry;
 pub use force_model::drill_prediction::{
-    ChiselEdge, DrillCoefficients, DrillForces, DrillPrediction, LipElement,
+    ChiselShare, DrillCoefficients, DrillForces, DrillPrediction, LipElement,
 };
 pub use force_model::force_axis::ForceAxis;
 pub use force_model::orthogonal::{ObliqueCoefficients, ObliqueEdge, OrthogonalPrediction};

@@ -68,6 +68,11 @@ pub struct DrilledHole {
 }
 
 impl DrilledHole {
+    /// Where the lips begin and end, mm from the axis.
+    pub fn radii_mm(&self) -> [f64; 2] {
+        [-0.5, 0.5].map(|side| self.arm_mm + side * self.width_mm)
+    }
+
     /// From `[tool]` and the pilot of `[lobes.hole]`; `None` where the diameter is not known.
     ///
     /// In the full the lips begin at the chisel's half length where the web is known (see

@@ -275,7 +275,7 @@ pub fn flank_damping(
     let slowest_rpm = section.spindle_rpm[0];
     Ok(Some(FlankDamping::new(
         coefficient_n_per_m,
-        &hole,
+        hole.radii_mm(),
         kappa,
         lips,
         slowest_rpm,

@@ -68,7 +68,7 @@ impl DrillForces {
 
 /// The chisel edge in the full.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ChiselEdge {
+pub struct ChiselShare {
     /// Static rake −γ_w.
     pub rake_rad: f64,
     /// Within this radius it is pressed in like a wedge.
@@ -97,7 +97,7 @@ pub struct DrillPrediction {
     /// Of the lips' cutting, edge forces left out.
     pub lip_coefficients: DrillCoefficients,
     /// `None` with a pilot hole that is wider than the chisel edge; in words why not, where the database allows no chip there.
-    pub chisel: Option<std::result::Result<ChiselEdge, String>>,
+    pub chisel: Option<std::result::Result<ChiselShare, String>>,
 }
 
 /// A law at a rake (°), chip thickness (mm) and cutting speed (m/min); `otherwise` where there is none.
@@ -266,7 +266,7 @@ fn chisel_edge(
     pilot_mm: f64,
     rpm: f64,
     database: &OrthogonalSection,
-) -> std::result::Result<ChiselEdge, String> {
+) -> std::result::Result<ChiselShare, String> {
     let wedge = drill.chisel_wedge_rad();
     let indentation_radius_mm = drill.indentation_radius_mm(feed_per_rev_mm);
     let from_mm = indentation_radius_mm.max(pilot_mm);
@@ -300,7 +300,7 @@ fn chisel_edge(
     );
     let indentation_thrust_n = drill.lips * pressed_mm * indentation_n_per_mm(wedge, stress, depth_mm);
     forces.thrust_n += indentation_thrust_n;
-    Ok(ChiselEdge {
+    Ok(ChiselShare {
         rake_rad: -wedge,
         indentation_radius_mm,
         coefficients: forces.coefficients(feed_per_rev_mm, pilot_mm, drill.chisel_mm),

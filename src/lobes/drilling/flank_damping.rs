@@ -17,7 +17,6 @@ use num_complex::Complex64;
 use crate::lobes::curve::{Limit, SpeedLimit};
 use crate::lobes::dynamics::frf::{Receptance, ToolPointFrf};
 use crate::lobes::force::RegenerativeForce;
-use crate::lobes::setup::DrilledHole;
 
 /// Damping per width of cut, the greater the slower the drill turns.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,18 +30,15 @@ pub struct FlankDamping {
 }
 
 impl FlankDamping {
-    /// `coefficient_n_per_m`: C.
+    /// `coefficient_n_per_m`: C; `radii_mm`: where the lips begin and end.
     pub fn new(
         coefficient_n_per_m: f64,
-        hole: &DrilledHole,
+        radii_mm: [f64; 2],
         half_point_rad: f64,
         lips: usize,
         slowest_rpm: f64,
     ) -> Self {
-        let (outer_m, inner_m) = (
-            1e-3 * (hole.arm_mm + 0.5 * hole.width_mm),
-            1e-3 * (hole.arm_mm - 0.5 * hole.width_mm),
-        );
+        let [inner_m, outer_m] = radii_mm.map(|mm| 1e-3 * mm);
         // A drill without web: the lips begin a thousandth of the radius off the axis, where V vanishes.
         let inner_m = inner_m.max(1e-3 * outer_m);
         let per_width = (outer_m / inner_m).ln() / (outer_m - inner_m);
@@ -285,12 +281,8 @@ mod tests {
     /// The sums over a lip against the integral of C/(Ω r) over its length, element by element.
     #[test]
     fn the_damping_is_the_integral_over_the_lip() {
-        let hole = DrilledHole {
-            width_mm: 3.5,
-            arm_mm: 3.0,
-        };
         let (kappa, lips, c) = (1.1f64, 2, 4e4);
-        let found = FlankDamping::new(c, &hole, kappa, lips, 100.0);
+        let found = FlankDamping::new(c, [1.25, 4.75], kappa, lips, 100.0);
         let (mut axial, mut lateral) = (0.0, 0.0);
         let steps = 20_000;
         for i in 0..steps {

@@ -48,6 +48,8 @@ const MAX_RELATIVE_STD: f64 = 0.7;
 /// the noise: an allowance of this part of the line spacing on the half-power width. (Three measured
 /// free–free beam records at 0.05–0.2 lines in the band differ from each other by about this much.)
 const LEAKAGE_LINES: f64 = 0.02;
+/// Modes nearer to each other than this many sums of their half-widths overlap.
+const OVERLAP_WIDTHS: f64 = 4.0;
 /// A bias of the damping below this part of it is not worth a word.
 const WORTH_TELLING: f64 = 0.02;
 /// A simpler method whose error is below this part of the local fit's is to be taken instead.
@@ -145,14 +147,17 @@ fn analyse(
         .map(|p| Start::new(&curve, p, noise_std[p.index]))
         .collect();
     let mut refused = Vec::new();
+    let mut found = Vec::new();
     for (index, start) in starts.iter().enumerate() {
         match mode_at(&curve, &starts, index, noise_std[start.peak.index], effort) {
-            Ok(mode) => result.modes.push(mode),
+            Ok(mode) => found.push(mode),
             Err(why) => {
                 refused.push(format!("{:.2} Hz ({why})", curve.frequency_hz[start.peak.index]));
             }
         }
     }
+    settle(&curve, &mut found);
+    result.modes = found.into_iter().map(|f| f.mode).collect();
     result
         .modes
         .sort_by(|a, b| a.best().frequency_hz.total_cmp(&b.best().frequency_hz));
@@ -213,7 +218,7 @@ fn mode_at(
     index: usize,
     noise_std: f64,
     effort: Effort,
-) -> std::result::Result<FrfMode, String> {
+) -> std::result::Result<Found, String> {
     let start = &starts[index];
     let f = &curve.frequency_hz;
     let line_hz = curve.spacing_hz(start.peak.index);
@@ -283,8 +288,8 @@ fn mode_at(
             && (0.5..=2.0).contains(&(e.damping_ratio / best.damping_ratio))
     });
     let contradicted = estimates.len() < methods;
-    let fitted = local.as_ref().and_then(|(solution, pole, first_line)| {
-        FittedCurves::new(curve, solution, *pole, *first_line, start.peak.index)
+    let fitted = local.as_ref().and_then(|(solution, pole, lines)| {
+        FittedCurves::new(curve, solution, *pole, lines.first, start.peak.index)
     });
     let mut disturbance = None;
     for estimate in estimates.iter_mut().filter(|e| e.method != Method::LocalFit) {
@@ -307,16 +312,88 @@ fn mode_at(
             estimate.damping_std = estimate.damping_std.map(|std| std.hypot(leakage));
         }
     }
-    let (recommended, reason) = recommended(&estimates, disturbance, contradicted);
-    Ok(FrfMode {
+    let Some((solution, pole, lines)) = local else {
+        return Err(why);
+    };
+    let mode = FrfMode {
         lines_in_half_power_band,
         significance: start.peak.significance,
         contradicted,
         disturbance,
-        recommended,
-        reason,
+        recommended: Method::LocalFit,
+        reason: String::new(),
         estimates,
+    };
+    Ok(Found {
+        mode,
+        solution,
+        pole,
+        lines,
     })
+}
+
+/// What can be said of a mode only when the others are known: how far they push the local fit, whose window does not hold
+/// them all; whether one of them overlaps; which answer is to be taken.
+fn settle(curve: &Curve, found: &mut [Found]) {
+    let poles: Vec<(Pole, Complex64)> = found
+        .iter()
+        .map(|f| (f.solution.poles[f.pole], f.solution.residues[f.pole]))
+        .collect();
+    for (own, one) in found.iter_mut().enumerate() {
+        let bias = local_bias(curve, one, &poles);
+        for estimate in &mut one.mode.estimates {
+            estimate.frequency_std_hz = estimate.frequency_std_hz.map(|std| std + bias[0].abs());
+            estimate.damping_std = estimate.damping_std.map(|std| std + bias[1].abs());
+        }
+        let half_width = |p: &Pole| p.damping_ratio * p.frequency_hz;
+        let here = poles[own].0;
+        let overlaps = poles.iter().enumerate().any(|(other, (p, _))| {
+            let apart = (p.frequency_hz - here.frequency_hz).abs();
+            other != own && apart < OVERLAP_WIDTHS * (half_width(p) + half_width(&here))
+        });
+        if one.mode.contradicted || one.mode.disturbance.is_some() {
+            let near = overlaps.then_some(Disturbance::Overlap);
+            one.mode.disturbance = near.or(one.mode.disturbance);
+        }
+        (one.mode.recommended, one.mode.reason) =
+            recommended(&one.mode.estimates, one.mode.disturbance, one.mode.contradicted);
+    }
+}
+
+/// By how much the local fit is off (frequency in Hz, damping ratio) on a curve that is the sum of all modes found, fitted on
+/// the lines and with the neighbours that it had.
+fn local_bias(curve: &Curve, one: &Found, poles: &[(Pole, Complex64)]) -> [f64; 2] {
+    let lines = one.lines.first..one.lines.first + one.lines.weight.len();
+    let Some(frequency_hz) = curve.frequency_hz.get(lines) else {
+        return [0.0; 2];
+    };
+    let sum = |f: &f64| -> Complex64 {
+        poles
+            .iter()
+            .map(|(p, residue)| {
+                let u = crate::modal::single::curve::detuning(*f, p.frequency_hz);
+                residue / Complex64::new(p.damping_ratio, u)
+            })
+            .sum()
+    };
+    let mobility: Vec<Complex64> = frequency_hz.iter().map(sum).collect();
+    let problem = Problem {
+        frequency_hz,
+        mobility: &mobility,
+        line_weight: one.lines.weight.clone(),
+        residual_terms: residual_terms(frequency_hz.len()),
+    };
+    let own = one.solution.poles[one.pole];
+    match local_fit::fit(&problem, &one.solution.poles, SETTLED) {
+        Some(again) => {
+            let found = again.poles[one.pole];
+            [
+                found.frequency_hz - own.frequency_hz,
+                found.damping_ratio - own.damping_ratio,
+            ]
+        }
+        None => [0.0; 2],
+    }
 }
 
 /// Puts a method's bias at this peak into its errors (where it is not known: its distance from the local fit), and says
@@ -436,14 +513,28 @@ fn judge(
     })
 }
 
-/// The best determined local fit, the position of the peak's pole in it, and its first line.
+/// The lines of a local fit.
+struct Lines {
+    first: usize,
+    weight: Vec<f64>,
+}
+
+/// A mode and the local fit behind it.
+struct Found {
+    mode: FrfMode,
+    solution: LocalSolution,
+    pole: usize,
+    lines: Lines,
+}
+
+/// The best determined local fit, the position of the peak's pole in it, and its lines.
 fn local(
     curve: &Curve,
     starts: &[Start],
     index: usize,
     effort: Effort,
-) -> Option<(LocalSolution, usize, usize)> {
-    let mut best: Option<(f64, LocalSolution, usize, usize)> = None;
+) -> Option<(LocalSolution, usize, Lines)> {
+    let mut best: Option<(f64, LocalSolution, usize, Lines)> = None;
     // A window begins where the one before ended.
     let mut poles: Vec<Pole> = starts.iter().map(|s| s.pole).collect();
     for (k, &reach) in effort.windows.iter().enumerate() {
@@ -452,11 +543,12 @@ fn local(
         };
         let narrower = effort.windows.get(k + 1);
         let enough = narrower.is_some_and(|reach| window.as_noisy_within(*reach));
-        let first_line = window.first_line;
         let WindowFit {
             solution,
             group,
             pole,
+            first_line,
+            line_weight,
             ..
         } = window;
         for (&member, found) in group.iter().zip(&solution.poles) {
@@ -468,13 +560,21 @@ fn local(
         }
         let relative_std = solution.damping_std(pole) / solution.poles[pole].damping_ratio;
         if best.as_ref().is_none_or(|(least, ..)| relative_std < *least) {
-            best = Some((relative_std, solution, pole, first_line));
+            best = Some((
+                relative_std,
+                solution,
+                pole,
+                Lines {
+                    first: first_line,
+                    weight: line_weight,
+                },
+            ));
         }
         if enough {
             break;
         }
     }
-    best.map(|(_, solution, pole, first_line)| (solution, pole, first_line))
+    best.map(|(_, solution, pole, lines)| (solution, pole, lines))
 }
 
 /// The fit of the lines around a peak.
@@ -571,7 +671,7 @@ fn fit_window<'a>(
         frequency_hz: f,
         mobility: y,
         line_weight: vec![1.0; f.len()],
-        residual_terms: if f.len() > 6 { 2 } else { 1 },
+        residual_terms: residual_terms(f.len()),
     };
 
     // Where the peak is a few lines only, its width is anyone's guess: try several.
@@ -616,6 +716,11 @@ fn fit_window<'a>(
         group,
         pole,
     })
+}
+
+/// Terms of the residual beside the poles, for so many lines.
+fn residual_terms(lines: usize) -> usize {
+    if lines > 6 { 2 } else { 1 }
 }
 
 /// 1/σ of each line from the model variance = a + b |Y|², a and b ≥ 0 from the residual of a fit.

@@ -16,6 +16,7 @@ use crate::analysis::stability::redundancy::{self, RedundancyAnalysis};
 use crate::analysis::workbench::Workbench;
 use crate::campaign::{Campaign, ContactDirection, LobeMethod, LobeSource, LobesSection, Process};
 use crate::cutting::{DrillPrediction, ForceGroup};
+use crate::lobes::drilling::flank_damping::FlankDamping;
 use crate::lobes::drilling::hole::HoleCheck;
 use crate::lobes::outcome::{LimitRange, Outcomes};
 use crate::lobes::setup::{DrilledHole, LobeCoefficients, LobeCut, axial_torsional_force};
@@ -47,6 +48,8 @@ pub struct LobeAnalysis {
     pub drilled: Option<DrilledHole>,
     /// The drill predicted from an orthogonal database; `None` where that is not asked for.
     pub drill: Option<DrillPrediction>,
+    /// Process damping of a drill's flanks; `None` where it is not asked for.
+    pub flank_damping: Option<FlankDamping>,
     /// The tool as a beam; without segments where it is rigid or part of the FRFs.
     pub tool: Arc<ToolDynamics>,
     /// First and last spindle speed and the step, rpm.
@@ -191,6 +194,7 @@ impl LobeAnalysis {
             axial_torsional,
             drilled,
             drill,
+            flank_damping: cut.average().damping,
             tool: asked.tool.clone(),
             spindle_rpm: section.spindle_rpm,
             cases,

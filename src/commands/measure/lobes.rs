@@ -94,6 +94,10 @@ fn document(analysis: &LobeAnalysis) -> Value {
             "left_out_because": block.as_ref().err(),
         })),
         "drill": drill::document(analysis),
+        "flank_damping": analysis.flank_damping.map(|d| json!({
+            "lateral_n_per_m2": d.lateral_n_per_m2,
+            "axial_n_per_m2": d.axial_n_per_m2,
+        })),
         "hole_width_mm": analysis.drilled.map(|hole| hole.width_mm),
         "tool": lobe_tool::document(analysis),
         "revision": analysis.revision,
@@ -259,6 +263,19 @@ fn text(analysis: &LobeAnalysis) -> String {
         number(analysis.coefficients.ktc_n_per_mm2, 4),
         number(analysis.coefficients.krc_n_per_mm2, 4),
     );
+    if let Some(damping) = &analysis.flank_damping {
+        out += &format!(
+            "Process damping of the flanks: at n rpm {} kN·s/m² across the tool and {} along it, per metre of width, times 1000/n\n",
+            number(
+                1e-3 * damping.lateral_n_per_m2 / (std::f64::consts::TAU * 1000.0 / 60.0),
+                3
+            ),
+            number(
+                1e-3 * damping.axial_n_per_m2 / (std::f64::consts::TAU * 1000.0 / 60.0),
+                3
+            ),
+        );
+    }
     // Over the redundancy angle all cases are alike.
     let shown = if analysis.redundancy.is_some() {
         1

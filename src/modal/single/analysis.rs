@@ -48,6 +48,10 @@ const MAX_RELATIVE_STD: f64 = 0.7;
 /// the noise: an allowance of this part of the line spacing on the half-power width. (Three measured
 /// free–free beam records at 0.05–0.2 lines in the band differ from each other by about this much.)
 const LEAKAGE_LINES: f64 = 0.02;
+/// A local fit that leaves this many times the noise power lacks something.
+const MORE_THAN_NOISE: f64 = 2.0;
+/// One more pole that leaves less than this part of the variance is a mode.
+const MOST_TAKEN_AWAY: f64 = 0.5;
 /// Modes nearer to each other than this many sums of their half-widths overlap.
 const OVERLAP_WIDTHS: f64 = 4.0;
 /// A bias of the damping below this part of it is not worth a word.
@@ -156,7 +160,7 @@ fn analyse(
             }
         }
     }
-    settle(&curve, &mut found);
+    settle(&curve, &mut found, &noise_std);
     result.modes = found.into_iter().map(|f| f.mode).collect();
     result
         .modes
@@ -334,13 +338,14 @@ fn mode_at(
 
 /// What can be said of a mode only when the others are known: how far they push the local fit, whose window does not hold
 /// them all; whether one of them overlaps; which answer is to be taken.
-fn settle(curve: &Curve, found: &mut [Found]) {
+fn settle(curve: &Curve, found: &mut [Found], noise_std: &[f64]) {
     let poles: Vec<(Pole, Complex64)> = found
         .iter()
         .map(|f| (f.solution.poles[f.pole], f.solution.residues[f.pole]))
         .collect();
     for (own, one) in found.iter_mut().enumerate() {
-        let bias = local_bias(curve, one, &poles);
+        let hidden = hidden_neighbour(curve, one, noise_std);
+        let bias = hidden.unwrap_or_else(|| local_bias(curve, one, &poles));
         for estimate in &mut one.mode.estimates {
             estimate.frequency_std_hz = estimate.frequency_std_hz.map(|std| std + bias[0].abs());
             estimate.damping_std = estimate.damping_std.map(|std| std + bias[1].abs());
@@ -351,13 +356,56 @@ fn settle(curve: &Curve, found: &mut [Found]) {
             let apart = (p.frequency_hz - here.frequency_hz).abs();
             other != own && apart < OVERLAP_WIDTHS * (half_width(p) + half_width(&here))
         });
-        if one.mode.contradicted || one.mode.disturbance.is_some() {
-            let near = overlaps.then_some(Disturbance::Overlap);
+        if one.mode.contradicted || one.mode.disturbance.is_some() || hidden.is_some() {
+            let near = (overlaps || hidden.is_some()).then_some(Disturbance::Overlap);
             one.mode.disturbance = near.or(one.mode.disturbance);
         }
         (one.mode.recommended, one.mode.reason) =
             recommended(&one.mode.estimates, one.mode.disturbance, one.mode.contradicted);
     }
+}
+
+/// Where the local fit leaves more than noise, a mode without a peak of its own may stand beside: one more pole is tried on
+/// either side. Where that takes away most of what is left, the answer is by how much the fit without it was off
+/// (frequency in Hz, damping ratio).
+fn hidden_neighbour(curve: &Curve, one: &Found, noise_std: &[f64]) -> Option<[f64; 2]> {
+    let lines = one.lines.first..one.lines.first + one.lines.weight.len();
+    let (frequency_hz, mobility) = (
+        curve.frequency_hz.get(lines.clone())?,
+        curve.mobility.get(lines.clone())?,
+    );
+    let noise: f64 = noise_std.get(lines)?.iter().map(|s| s * s).sum();
+    let left: f64 = one.solution.residual.iter().map(|r| r.norm_sqr()).sum();
+    let freedom = frequency_hz.len().checked_sub(2 * one.solution.poles.len() + 4)?;
+    if freedom < 4 || left < MORE_THAN_NOISE * noise {
+        return None;
+    }
+    let problem = Problem {
+        frequency_hz,
+        mobility,
+        line_weight: one.lines.weight.clone(),
+        residual_terms: residual_terms(frequency_hz.len()),
+    };
+    let own = one.solution.poles[one.pole];
+    let starts = [-4.0, -1.5, 1.5, 4.0].map(|widths| Pole {
+        frequency_hz: own.frequency_hz * (1.0 + widths * own.damping_ratio),
+        ..own
+    });
+    let best = starts
+        .into_iter()
+        .filter_map(|extra| {
+            let mut poles = one.solution.poles.clone();
+            poles.push(extra);
+            local_fit::fit(&problem, &poles, ROUGHLY_SETTLED)
+        })
+        .min_by(|a, b| a.variance.total_cmp(&b.variance))?;
+    let found = best.poles[one.pole];
+    (best.variance < MOST_TAKEN_AWAY * one.solution.variance).then(|| {
+        [
+            found.frequency_hz - own.frequency_hz,
+            found.damping_ratio - own.damping_ratio,
+        ]
+    })
 }
 
 /// By how much the local fit is off (frequency in Hz, damping ratio) on a curve that is the sum of all modes found, fitted on

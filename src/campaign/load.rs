@@ -20,7 +20,7 @@ use crate::text::shown_briefly as shown;
 use crate::{Error, InputError, Result};
 
 /// Keys of the top table.
-const TOP: [&str; 16] = names(&keys::TOP);
+const TOP: [&str; 17] = names(&keys::TOP);
 /// Keys of `[[cut]]`.
 pub(super) const CUT: [&str; 20] = names(&keys::CUT);
 
@@ -112,6 +112,7 @@ fn read(dir: &Path, top: &Section<'_>, find: Find) -> Result<Campaign> {
         tool,
         dynamometer,
         channels: super::channels::channels(top, &cuts)?,
+        contacts: super::contacts::read(top)?,
         cuts,
         lobes,
         material,
@@ -350,6 +351,15 @@ fn orthogonal(top: &Section<'_>) -> Result<Option<OrthogonalSection>> {
         chip,
         rake_deg: number("rake_deg", Bounds::open(-90.0, 90.0), "12.0")?,
         inclination_deg: section.number("inclination_deg", Bounds::open(-90.0, 90.0))?,
+        shear_stress_law: section.array("shear_stress_law", "[613.0, 0.0, 0.0, 0.0]")?,
+        friction_angle_law: section.array("friction_angle_law", "[19.1, 0.29, 0.0, 0.0]")?,
+        chip_ratio_law: section.array("chip_ratio_law", "[1.755, -0.028, 0.331, -0.0082]")?,
+        edge_force_tangential_n_per_mm: section
+            .number("edge_force_tangential_n_per_mm", Bounds::NOT_NEGATIVE)?
+            .unwrap_or(0.0),
+        edge_force_normal_n_per_mm: section
+            .number("edge_force_normal_n_per_mm", Bounds::NOT_NEGATIVE)?
+            .unwrap_or(0.0),
     }))
 }
 

@@ -57,9 +57,12 @@ pub(super) fn read(
         ktc_n_per_mm2: lobes.number("ktc_n_per_mm2", Bounds::POSITIVE)?,
         krc_n_per_mm2: lobes.number("krc_n_per_mm2", Bounds::ANY)?,
         kac_n_per_mm2: lobes.number("kac_n_per_mm2", Bounds::ANY)?,
+        from_orthogonal: from_orthogonal(&lobes, process)?,
         teeth: lobes.whole("teeth", 1, 1000)?.map(|n| n as usize),
         immersion: immersion(&lobes)?,
-        process_damping_n_per_m: lobes.number("process_damping_n_per_m", Bounds::NOT_NEGATIVE)?,
+        process_damping_n_per_m: process_damping(&lobes, process)?,
+        margin_stiffness_n_per_m: lobes.number("margin_stiffness_n_per_m", Bounds::NOT_NEGATIVE)?,
+        margin_damping_ns_per_m: lobes.number("margin_damping_ns_per_m", Bounds::NOT_NEGATIVE)?,
         half_point_angle_deg: lobes.number("half_point_angle_deg", Bounds::above_up_to(0.0, 90.0))?,
         feed_per_rev_mm: lobes.number("feed_per_rev_mm", Bounds::POSITIVE)?,
         spindle_rpm: speeds(&lobes)?,
@@ -68,6 +71,54 @@ pub(super) fn read(
         tool,
         hole,
     }))
+}
+
+/// C of process damping C/V, N/m: given, or of indentation stiffness and wear land, K_sp L²/2.
+fn process_damping(lobes: &Section<'_>, process: Process) -> Result<Option<f64>> {
+    let given = lobes.number("process_damping_n_per_m", Bounds::NOT_NEGATIVE)?;
+    let indentation = lobes.number("indentation_n_per_mm3", Bounds::POSITIVE)?;
+    let land = lobes.number("wear_land_mm", Bounds::POSITIVE)?;
+    if indentation.is_none() && land.is_none() {
+        return Ok(given);
+    }
+    if given.is_some() {
+        return Err(lobes
+            .error(
+                "process_damping_n_per_m",
+                "given beside indentation_n_per_mm3 and wear_land_mm, which say the same",
+            )
+            .remedy("keep one of the two ways")
+            .into());
+    }
+    let indentation = lobes.required("indentation_n_per_mm3", indentation, "40000.0")?;
+    let land = lobes.required("wear_land_mm", land, "0.08")?;
+    match process {
+        // N/mm³ mm² = N/mm.
+        Process::Drilling => Ok(Some(1e3 * 0.5 * indentation * land * land)),
+        _ => Err(lobes
+            .error("indentation_n_per_mm3", "is for the lobes of a drill")
+            .remedy("give process_damping_n_per_m for milling")
+            .into()),
+    }
+}
+
+fn from_orthogonal(lobes: &Section<'_>, process: Process) -> Result<bool> {
+    let asked = lobes
+        .choice("coefficients", &[("orthogonal", true)])?
+        .unwrap_or(false);
+    if asked && process != Process::Drilling {
+        return Err(lobes
+            .error("coefficients", "only those of a drill are predicted for the lobes")
+            .remedy("take it out and give ktc_n_per_mm2 and krc_n_per_mm2; `lobestone cfc` prints the prediction for end mills")
+            .into());
+    }
+    if asked && lobes.has("ktc_n_per_mm2") {
+        return Err(lobes
+            .error("coefficients", "given beside ktc_n_per_mm2, which says the same")
+            .remedy("keep one of the two")
+            .into());
+    }
+    Ok(asked)
 }
 
 fn source(lobes: &Section<'_>, has_robot: bool, has_frfs: bool, has_modes: bool) -> Result<LobeSource> {
@@ -273,6 +324,7 @@ fn tool(section: &Section<'_>) -> Result<Vec<ToolSegment>> {
 
 fn hole(section: &Section<'_>) -> Result<HoleSection> {
     let usual = HoleSection::default();
+    let grades: [(&str, u32); 8] = std::array::from_fn(|i| (keys::HOLE_TOLERANCES[i], 6 + i as u32));
     let tolerance = |key, usual| Ok::<_, Error>(section.number(key, Bounds::POSITIVE)?.unwrap_or(usual));
     Ok(HoleSection {
         thrust_n: section.number("thrust_n", Bounds::ANY)?,
@@ -284,5 +336,6 @@ fn hole(section: &Section<'_>) -> Result<HoleSection> {
             "perpendicularity_tolerance_deg",
             usual.perpendicularity_tolerance_deg,
         )?,
+        diameter_grade: section.choice("diameter_tolerance", &grades)?,
     })
 }

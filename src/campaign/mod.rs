@@ -1,6 +1,7 @@
 //! A campaign folder: what was measured, where, and on what. SI values keep the unit of the file in their name.
 
 mod channels;
+mod contacts;
 pub mod draft;
 mod each_tooth;
 pub mod form;
@@ -15,9 +16,10 @@ mod shared_keys;
 mod tool_and_cut;
 
 pub use crate::data::{
-    AxesRef, BodyRef, ChipFormation, Cut, CutGeometry, CutOutcome, FrfSet, HoleSection, Immersion, LinkGroup,
-    LinkTolerances, LobeAxis, LobeMethod, LobeMode, LobeSource, LobesSection, MeasuredDof, MeasuredFrf,
-    OrthogonalSection, Point, Posture, Process, Redundancy, RobotSection, Tool, ToolKind, ToolSegment, Tooth,
+    AxesRef, BodyRef, ChipFormation, Contact, ContactDirection, Cut, CutGeometry, CutOutcome, FrfSet,
+    HoleSection, Immersion, LinkGroup, LinkTolerances, LobeAxis, LobeMethod, LobeMode, LobeSource,
+    LobesSection, MeasuredDof, MeasuredFrf, OrthogonalSection, Point, Posture, Process, Redundancy,
+    RobotSection, Tool, ToolKind, ToolSegment, Tooth,
 };
 pub use form::json_schema::{SchemaOf, json_schema};
 pub use form::paths::campaign_file;

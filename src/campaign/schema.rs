@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-use crate::data::{Cut, Dof, LobesSection, OrthogonalSection, Point, Posture, Quantity, RobotSection, Tool};
+use crate::data::{
+    Contact, Cut, Dof, LobesSection, OrthogonalSection, Point, Posture, Quantity, RobotSection, Tool,
+};
 use crate::ingest::ChannelRule;
 
 /// A validated campaign. Paths are absolute or relative to the working directory (already joined with `dir`).
@@ -32,6 +34,8 @@ pub struct Campaign {
     pub channels: Vec<CutChannel>,
     /// The `[[cut]]` tables, in the order of the file.
     pub cuts: Vec<Cut>,
+    /// What holds the tool point from outside while it cuts (not while it was tapped), in the order of the file.
+    pub contacts: Vec<Contact>,
     /// `None`: no lobes are asked for.
     pub lobes: Option<LobesSection>,
     /// Workpiece material: of every cut that names none itself.

@@ -6,7 +6,7 @@ use crate::Result;
 use crate::campaign::form::bounds::Bounds;
 use crate::campaign::form::keys::{self, names};
 use crate::campaign::form::section::Section;
-use crate::data::{CutGeometry, Process, Tool, ToolKind};
+use crate::data::{CutGeometry, Process, Tool, ToolKind, USUAL_CHISEL_EDGE_ANGLE_DEG};
 
 /// Keys of `[tool]` that only some kinds have.
 const OF_MILLS: [&str; 5] = [
@@ -16,7 +16,11 @@ const OF_MILLS: [&str; 5] = [
     "tooth_helix_deg",
     "tooth_radius_offset_mm",
 ];
-const OF_DRILLS: [&str; 2] = ["half_point_angle_deg", "web_thickness_mm"];
+const OF_DRILLS: [&str; 3] = [
+    "half_point_angle_deg",
+    "web_thickness_mm",
+    "chisel_edge_angle_deg",
+];
 const OF_TURNING: [&str; 2] = ["nose_radius_mm", "cutting_edge_angle_deg"];
 
 pub(super) fn tool(top: &Section<'_>) -> Result<Option<Tool>> {
@@ -60,6 +64,9 @@ pub(super) fn tool(top: &Section<'_>) -> Result<Option<Tool>> {
             .unwrap_or(90.0),
         half_point_angle_deg: section.number("half_point_angle_deg", Bounds::above_up_to(0.0, 90.0))?,
         web_thickness_mm: section.number("web_thickness_mm", Bounds::open(0.0, diameter_mm))?,
+        chisel_edge_angle_deg: section
+            .number("chisel_edge_angle_deg", Bounds::open(90.0, 180.0))?
+            .unwrap_or(USUAL_CHISEL_EDGE_ANGLE_DEG),
         each_tooth,
     };
     if !tool.each_tooth.is_empty() && !tool.has_straight_edge() {
@@ -148,6 +155,7 @@ fn turning_tool(tool: &Section<'_>) -> Result<Tool> {
             .unwrap_or(90.0),
         half_point_angle_deg: None,
         web_thickness_mm: None,
+        chisel_edge_angle_deg: USUAL_CHISEL_EDGE_ANGLE_DEG,
         each_tooth: Vec::new(),
     })
 }

@@ -12,6 +12,7 @@ pub fn drill() -> Tool {
         lead_angle_deg: 90.0,
         half_point_angle_deg: Some(67.5),
         web_thickness_mm: Some(1.425),
+        chisel_edge_angle_deg: 125.0,
         each_tooth: Vec::new(),
     }
 }
@@ -27,6 +28,7 @@ pub fn endmill(corner_radius_mm: f64, lead_angle_deg: f64) -> Tool {
         lead_angle_deg,
         half_point_angle_deg: None,
         web_thickness_mm: None,
+        chisel_edge_angle_deg: 125.0,
         each_tooth: Vec::new(),
     }
 }

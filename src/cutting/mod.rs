@@ -30,9 +30,13 @@ pub use force_model::coefficients::{
     CoefficientKind, DRILLING_COEFFICIENTS, MILLING_COEFFICIENTS, coefficients_of,
 };
 pub use force_model::drill_geometry::DrillGeometry;
+pub use force_model::drill_prediction::{
+    ChiselShare, DrillCoefficients, DrillForces, DrillPrediction, LipElement,
+};
 pub use force_model::force_axis::ForceAxis;
 pub use force_model::orthogonal::{ObliqueCoefficients, ObliqueEdge, OrthogonalPrediction};
 pub use force_model::turning::{EdgeBit, edge_row, engaged_edge};
+pub use force_model::twist_drill::{LipPlace, TwistDrill};
 pub use identify::depth_mm;
 pub(crate) use identify::none_usable;
 pub use identify::{CfcResult, fit_force_coefficients};

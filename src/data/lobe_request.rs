@@ -86,12 +86,19 @@ pub struct LobesSection {
     pub krc_n_per_mm2: Option<f64>,
     /// Drilling: axial cutting coefficient Kac; `None`: from the campaign's cuts if Ktc or Krc is, else not known.
     pub kac_n_per_mm2: Option<f64>,
+    /// Drilling: the coefficients are predicted from the orthogonal database and the drill's geometry.
+    pub from_orthogonal: bool,
     /// Number of teeth; `None`: that of the campaign's tool.
     pub teeth: Option<usize>,
     /// Milling: where a tooth is in the workpiece; milling lobes need it.
     pub immersion: Option<Immersion>,
-    /// Milling, methods other than zero-order: see [`crate::lobes::ProcessDamping`].
+    /// Milling, methods other than zero-order: see [`crate::lobes::ProcessDamping`]; drilling: see
+    /// [`crate::lobes::drilling::flank_damping`].
     pub process_damping_n_per_m: Option<f64>,
+    /// Drilling: stiffness of the contact between the margins and the wall; `None`: the tip is free.
+    pub margin_stiffness_n_per_m: Option<f64>,
+    /// Drilling: damping of that contact; `None`: none.
+    pub margin_damping_ns_per_m: Option<f64>,
     /// Drilling: half of the point angle; `None`: that of the campaign's tool.
     pub half_point_angle_deg: Option<f64>,
     /// Drilling: feed per revolution; `None`: no thrust is predicted, and axial–torsional lobes take 0.
@@ -124,6 +131,8 @@ pub struct HoleSection {
     pub position_tolerance_mm: f64,
     /// How far the axis of the hole may be tilted.
     pub perpendicularity_tolerance_deg: f64,
+    /// Drilling: grade of the diameter's tolerance, 8 for H8 (ISO 286-1); `None`: the diameter is not judged.
+    pub diameter_grade: Option<u32>,
 }
 
 impl Default for HoleSection {
@@ -136,6 +145,7 @@ impl Default for HoleSection {
             pilot_diameter_mm: None,
             position_tolerance_mm: 0.25,
             perpendicularity_tolerance_deg: 0.5,
+            diameter_grade: None,
         }
     }
 }

@@ -11,6 +11,9 @@ pub enum ToolKind {
     Turning,
 }
 
+/// Chisel edge angle of common twist drills, °.
+pub const USUAL_CHISEL_EDGE_ANGLE_DEG: f64 = 125.0;
+
 /// The tool that cuts, as the `[tool]` section gives it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tool {
@@ -32,6 +35,8 @@ pub struct Tool {
     pub half_point_angle_deg: Option<f64>,
     /// Drills: web thickness.
     pub web_thickness_mm: Option<f64>,
+    /// Drills: chisel edge angle ψ, from a lip to the chisel edge in the view along the axis; 125° where nobody says.
+    pub chisel_edge_angle_deg: f64,
     /// End mills whose teeth differ: each of the `teeth`, in the order in which they cut. Empty: all alike, evenly spaced.
     pub each_tooth: Vec<Tooth>,
 }

@@ -6,6 +6,7 @@
 use super::curve::{AbsoluteLimit, Limit, LobeCurve, SpeedLimit};
 use super::force::RegenerativeForce;
 use super::solve::StabilitySolver;
+use crate::lobes::drilling::flank_damping::{DampedSolver, FlankDamping};
 use crate::lobes::dynamics::frf::ToolPointFrf;
 
 /// Forces of a cut averaged over a revolution.
@@ -15,11 +16,17 @@ pub struct AveragedCut {
     pub lateral: RegenerativeForce,
     /// Drilling, where what it needs is known.
     pub axial: Option<RegenerativeForce>,
+    /// Drilling: process damping of the flanks; `None` where it is not asked for.
+    pub damping: Option<FlankDamping>,
 }
 
 impl From<RegenerativeForce> for AveragedCut {
     fn from(lateral: RegenerativeForce) -> Self {
-        AveragedCut { lateral, axial: None }
+        AveragedCut {
+            lateral,
+            axial: None,
+            damping: None,
+        }
     }
 }
 
@@ -34,22 +41,61 @@ pub struct Blocks {
 impl AveragedCut {
     /// The solver of these forces on the FRFs of `blocks`; an axial–torsional block takes part where both have one.
     pub fn on<'a>(&self, blocks: &'a Blocks) -> BlockSolver<'a> {
+        let [lateral, axial] = match self.damping {
+            Some(d) => [[d.lateral_n_per_m2; 2], [d.axial_n_per_m2, 0.0]],
+            None => [[0.0; 2]; 2],
+        };
+        let solver = |force, frf: &'a dyn ToolPointFrf, damping| match self.damping {
+            Some(d) => BlockLimit::Damped(DampedSolver::new(force, frf, damping, d.slowest_rpm)),
+            None => BlockLimit::Regenerative(StabilitySolver::new(force, frf)),
+        };
         BlockSolver {
-            lateral: StabilitySolver::new(self.lateral, blocks.lateral.as_ref()),
+            lateral: solver(self.lateral, blocks.lateral.as_ref(), lateral),
             axial: self
                 .axial
                 .zip(blocks.axial.as_ref())
-                .map(|(force, frf)| StabilitySolver::new(force, frf.as_ref())),
+                .map(|(force, frf)| solver(force, frf.as_ref(), axial)),
         }
+    }
+}
+
+/// The limit of one block.
+pub enum BlockLimit<'a> {
+    /// Regeneration alone.
+    Regenerative(StabilitySolver<'a>),
+    /// With process damping of the flanks.
+    Damped(DampedSolver<'a>),
+}
+
+impl<'a> BlockLimit<'a> {
+    fn solver(&self) -> &(dyn SpeedLimit + 'a) {
+        match self {
+            BlockLimit::Regenerative(solver) => solver,
+            BlockLimit::Damped(solver) => solver,
+        }
+    }
+}
+
+impl SpeedLimit for BlockLimit<'_> {
+    fn limit_at(&self, spindle_rpm: f64) -> Option<Limit> {
+        self.solver().limit_at(spindle_rpm)
+    }
+
+    fn absolute_limit(&self) -> Option<AbsoluteLimit> {
+        self.solver().absolute_limit()
+    }
+
+    fn speeds_per_task(&self) -> usize {
+        self.solver().speeds_per_task()
     }
 }
 
 /// The limit of whichever block chatters first.
 pub struct BlockSolver<'a> {
     /// Solver of the block across the tool axis.
-    pub lateral: StabilitySolver<'a>,
+    pub lateral: BlockLimit<'a>,
     /// Solver of the axial–torsional block; `None` where there is none.
-    pub axial: Option<StabilitySolver<'a>>,
+    pub axial: Option<BlockLimit<'a>>,
 }
 
 impl Blocks {
@@ -74,9 +120,14 @@ impl BlockSolver<'_> {
     /// Lateral and axial–torsional limits; `None` where there is but one block.
     pub fn by_block(&self, spindle_rpm: &[f64]) -> Option<[BlockLobes; 2]> {
         let axial = self.axial.as_ref()?;
-        Some([&self.lateral, axial].map(|solver| BlockLobes {
-            curve: solver.curve(spindle_rpm),
-            absolute: solver.absolute_limit(),
+        Some([&self.lateral, axial].map(|solver| {
+            BlockLobes {
+                // With process damping no limit holds at every speed: the least of these speeds.
+                absolute: solver
+                    .absolute_limit()
+                    .or_else(|| solver.curve(spindle_rpm).least()),
+                curve: solver.curve(spindle_rpm),
+            }
         }))
     }
 }

@@ -17,11 +17,9 @@ pub mod band;
 pub mod best_speed;
 pub mod blocks;
 pub mod curve;
-#[cfg(test)]
-mod drilling_tests;
+pub mod drilling;
 pub mod dynamics;
 pub mod force;
-pub mod hole;
 pub mod milling;
 pub mod optimum;
 pub mod outcome;

@@ -3,7 +3,7 @@
 use super::blocks::AveragedCut;
 use super::force::RegenerativeForce;
 use crate::campaign::{CutGeometry, LobesSection, Tool, ToolSegment};
-use crate::cutting::DrillGeometry;
+use crate::cutting::{DrillGeometry, DrillPrediction};
 use crate::lobes::dynamics::tool_beam::{BeamSegment, ToolBeam};
 use crate::lobes::milling::periodic_force::PeriodicForce;
 
@@ -26,6 +26,16 @@ impl LobeCoefficients {
             krc_n_per_mm2: section.krc_n_per_mm2?,
             kac_n_per_mm2: section.kac_n_per_mm2,
         })
+    }
+
+    /// Those of a drill that is predicted from an orthogonal database.
+    pub fn of_drill(drill: &DrillPrediction) -> Self {
+        let found = drill.for_lobes();
+        LobeCoefficients {
+            ktc_n_per_mm2: found.ktc_n_per_mm2,
+            krc_n_per_mm2: found.krc_n_per_mm2,
+            kac_n_per_mm2: Some(found.kac_n_per_mm2),
+        }
     }
 }
 
@@ -58,6 +68,11 @@ pub struct DrilledHole {
 }
 
 impl DrilledHole {
+    /// Where the lips begin and end, mm from the axis.
+    pub fn radii_mm(&self) -> [f64; 2] {
+        [-0.5, 0.5].map(|side| self.arm_mm + side * self.width_mm)
+    }
+
     /// From `[tool]` and the pilot of `[lobes.hole]`; `None` where the diameter is not known.
     ///
     /// In the full the lips begin at the chisel's half length where the web is known (see

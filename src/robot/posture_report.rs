@@ -30,8 +30,26 @@ impl PostureReport {
     /// # Errors
     /// A chain whose stiffness is not positive definite.
     pub fn new(robot: &RobotModel, kinematics: &Kinematics, chain: &Chain) -> Result<Self> {
+        Self::with_ground_springs(robot, kinematics, chain, [])
+    }
+
+    /// As [`new`](Self::new) with springs between the tool point and the ground: unit vector (base axes) and stiffness
+    /// (N/m) of each.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn with_ground_springs(
+        robot: &RobotModel,
+        kinematics: &Kinematics,
+        chain: &Chain,
+        springs: impl IntoIterator<Item = (Vector3<f64>, f64)>,
+    ) -> Result<Self> {
         let place = robot.flange_place();
-        let system = chain.system(0);
+        let mut system = chain.system(0);
+        for (axis, stiffness_n_per_m) in springs {
+            let row = chain.output_row(kinematics.tcp(), place, true, &axis);
+            system.stiffness += &row * row.transpose() * stiffness_n_per_m;
+        }
         let cholesky = system
             .stiffness
             .clone()

@@ -105,11 +105,9 @@ fn forces_come_from_the_coefficients() {
             reason.contains(wanted) && reason.contains("[lobes.hole]"),
             "{reason}"
         );
-        assert_eq!(
-            found["warnings"].as_array().unwrap().len(),
-            1,
-            "only that nothing is calibrated"
-        );
+        let warnings = found["warnings"].as_array().unwrap();
+        let others = warnings.iter().filter(|w| !w.as_str().unwrap().contains("whirl"));
+        assert_eq!(others.count(), 1, "only that nothing is calibrated");
         append(folder.path(), "[lobes.hole]\nposition_tolerance_mm = 0.1\n");
         let warned = lobestone(&["lobes", text(folder.path())]).stdout;
         assert!(warned.contains("warning: the hole is not worked out"), "{warned}");
@@ -246,4 +244,230 @@ fn the_recommended_angle_keeps_the_hole_in_tolerance() {
         loose["redundancy"]["recommended"]
     );
     assert!(said.contains("out of tolerance at every usable angle"), "{said}");
+}
+
+/// The commanded pose makes up for thrust and torque; the lateral force turns, so it cannot be allowed for. Checked with the
+/// `model` command alone: at the commanded joints the free tool point stands opposite to where the load pushes it.
+#[test]
+fn the_pose_to_command_makes_up_for_the_deflection() {
+    let load =
+        "[lobes.hole]\nthrust_n = 400.0\ntorque_nm = 2.0\nlateral_n = 50.0\ndiameter_tolerance = \"H11\"\n";
+    let folder = campaign(&[ROBOT, DRILL, DRILLING, load]);
+    let found = document(&["lobes", text(folder.path())]);
+    let still = campaign(&[ROBOT, DRILL, DRILLING, &load.replace("50.0", "0.0")]);
+    let steady = document(&["lobes", text(still.path())]);
+    let free = document(&["model", text(folder.path())]);
+    for (i, hole) in found["hole"].as_array().unwrap().iter().enumerate() {
+        let pose = &hole["compensation"];
+        assert!(number(&pose["residual_um"]) < 1.0, "{pose}");
+        let commanded = ROBOT.split("[[posture]]").next().unwrap().to_string()
+            + &format!("[[posture]]\nid = \"c\"\njoints_deg = {}\n", pose["joints_deg"]);
+        let there = campaign(&[&commanded, DRILL, DRILLING, &load.replace("50.0", "0.0")]);
+        let deflected = &document(&["lobes", text(there.path())])["hole"][0]["displacement_mm"];
+        let tcp = &document(&["model", text(there.path())])["postures"][0]["tcp_m"];
+        for axis in 0..3 {
+            // Where the tool then stands, mm, against the target; a micrometre.
+            let stands = 1e3 * number(&tcp[axis]) + number(&deflected[axis]);
+            let target = 1e3 * number(&free["postures"][i]["tcp_m"][axis]);
+            assert!((stands - target).abs() < 1e-3, "{stands} {target}");
+            let pushed = number(&steady["hole"][i]["displacement_mm"][axis]);
+            assert!((number(&pose["offset_mm"][axis]) + pushed).abs() < 0.05 * pushed.abs() + 2e-3);
+        }
+        // H11 of 9.5 mm is 0.09 mm; what the lateral force adds is twice what it moves at most.
+        assert_eq!(found["hole_basis"]["diameter_tolerance_mm"], 0.09);
+        let oversize = number(&hole["diameter_oversize_mm"]);
+        assert_eq!(hole["within_diameter_tolerance"], oversize <= 0.09);
+        let worst = number(&hole["position_error_mm"]);
+        let balanced = number(&steady["hole"][i]["position_error_mm"]);
+        assert!(
+            oversize > 2.0 * (worst - balanced) * 0.999 && oversize > 0.0,
+            "{oversize} {worst}"
+        );
+        assert_eq!(number(&steady["hole"][i]["diameter_oversize_mm"]), 0.0);
+    }
+    let said = lobestone(&["lobes", text(folder.path())]).stdout;
+    assert!(
+        said.contains("To command instead") && said.contains("Diameter, H11"),
+        "{said}"
+    );
+    assert!(said.contains("Static stiffness of the tool point"), "{said}");
+    let feed = &found["feed_stiffness"][0];
+    let index = number(&feed["index"]);
+    assert!(index > 0.0 && index <= 1.0);
+    assert_eq!(feed["along_feed_n_per_m"], feed["along_axis_n_per_m"]);
+}
+
+/// A foot takes its share of the thrust: the robot is pushed back less, is stiffer along the tool by the foot's stiffness,
+/// and where it takes more than its preload the answer says that it lifts off. A foot of no stiffness changes no number.
+#[test]
+fn a_pressure_foot_holds_the_tool() {
+    let load =
+        "kac_n_per_mm2 = 900.0\nfeed_per_rev_mm = 0.1\n[lobes.hole]\nthrust_n = 400.0\ntorque_nm = 2.0\n";
+    let foot = |stiffness: f64| {
+        format!(
+            "[[contact]]\nname = \"foot\"\ndirection = \"axial\"\nstiffness_n_per_m = {stiffness:?}\npreload_n = 150.0\n"
+        )
+    };
+    let run = |more: &str| {
+        document(&[
+            "lobes",
+            text(campaign(&[ROBOT, DRILL, DRILLING, load, more]).path()),
+        ])
+    };
+    let (free, none, held) = (run(""), run(&foot(0.0)), run(&foot(4e6)));
+    let axial = |found: &Value, i: usize| number(&found["hole"][i]["axial_displacement_mm"]);
+    for i in 0..2 {
+        near(&none["hole"][i]["axial_displacement_mm"], axial(&free, i), 1e-9);
+        near(
+            &none["curves"][i]["absolute_limit_mm"],
+            number(&free["curves"][i]["absolute_limit_mm"]),
+            1e-5,
+        );
+        let stiffness = |found: &Value| number(&found["feed_stiffness"][i]["along_axis_n_per_m"]);
+        assert!((stiffness(&held) - stiffness(&free) - 4e6).abs() < 1.0);
+        assert!(axial(&held, i).abs() < 0.3 * axial(&free, i).abs());
+        let contact = &held["hole"][i]["contacts"][0];
+        let taken = -4e3 * axial(&held, i);
+        near(&contact["force_n"], taken, 1e-6);
+        assert_eq!(contact["gives_way"], taken > 150.0);
+        assert!(number(&held["hole"][i]["skating_mm"]) > 0.0);
+        // The axial–torsional block is held; it chatters later.
+        let along = |found: &Value| number(&found["curves"][i]["axial_torsional"]["absolute_limit_mm"]);
+        assert!(along(&held) > along(&free), "{} {}", along(&held), along(&free));
+    }
+    let folder = campaign(&[ROBOT, DRILL, DRILLING, load, &foot(4e6)]);
+    let said = lobestone(&["lobes", text(folder.path())]).stdout;
+    assert!(
+        said.contains("held by foot") && said.contains("it lifts off"),
+        "{said}"
+    );
+    let model = document(&["model", text(folder.path())]);
+    let posture = &model["postures"][0];
+    assert!(
+        number(&posture["held"]["tcp_stiffness_n_per_m"]["z"])
+            > 3.0 * number(&posture["tcp_stiffness_n_per_m"]["z"])
+    );
+    let told = lobestone(&["model", text(folder.path())]).stdout;
+    assert!(told.contains("held by [[contact]]"), "{told}");
+}
+
+const TITANIUM: &str = "[orthogonal]\nshear_stress_mpa = 613.0\nfriction_angle_deg = 22.58\nchip_ratio = 0.7\nrake_deg = 12.0\n\
+                        friction_angle_law = [19.1, 0.29, 0.0, 0.0]\nchip_ratio_law = [1.755, -0.028, 0.331, -0.0082]\n\
+                        edge_force_tangential_n_per_mm = 24.0\nedge_force_normal_n_per_mm = 43.0\n";
+const TWISTED: &str = "[tool]\nkind = \"drill\"\ndiameter_mm = 9.5\nteeth = 2\nhelix_deg = 30.0\nhalf_point_angle_deg = 59.0\n\
+                       web_thickness_mm = 1.425\n";
+const PREDICTED: &str = "[lobes]\nprocess = \"drilling\"\nsource = \"model\"\ncoefficients = \"orthogonal\"\nfeed_per_rev_mm = 0.1\n\
+                         spindle_rpm = [200.0, 500.0, 10.0]\n";
+
+/// Roukema's drill: thrust, torque and coefficients from the orthogonal database and the drill's geometry go into lobes and hole.
+/// The numbers were worked out beside this program (Python, the same formulas written anew): lips 398 N, 2.20 N·m, chisel edge
+/// 684 N and 18 N of pressing in, 0.199 N·m.
+#[test]
+fn a_drill_from_the_orthogonal_database() {
+    let folder = campaign(&[ROBOT, TWISTED, TITANIUM, PREDICTED]);
+    let found = document(&["lobes", text(folder.path())]);
+    let drill = &found["drill"];
+    near(&drill["lips"]["thrust_n"], 398.0, 3e-3);
+    near(&drill["lips"]["torque_nm"], 2.20, 3e-3);
+    let chisel = &drill["chisel"];
+    let pressed = number(&chisel["indentation_thrust_n"]);
+    near(&chisel["thrust_n"], 684.0 + pressed, 3e-3);
+    assert!(pressed > 5.0 && pressed < 40.0, "{pressed}");
+    let hole = &found["hole"][0];
+    near(&hole["thrust_n"], number(&drill["thrust_n"]), 1e-12);
+    near(&hole["torque_nm"], number(&drill["torque_nm"]), 1e-12);
+    assert_eq!(found["ktc_n_per_mm2"], drill["lips"]["ktc_n_per_mm2"]);
+    let lips_kac = number(&drill["lips"]["kac_n_per_mm2"]);
+    assert!(
+        number(&found["kac_n_per_mm2"]) > lips_kac,
+        "the chisel edge is in"
+    );
+    assert_eq!(found["axial_torsional"]["included"], true);
+    let elements = drill["elements"].as_array().unwrap();
+    assert!(number(&elements[0]["rake_deg"]) < -15.0);
+    assert!(number(&elements[elements.len() - 1]["rake_deg"]) > 25.0);
+    let said = lobestone(&["lobes", text(folder.path())]).stdout;
+    assert!(
+        said.contains("The drill from the orthogonal database") && said.contains("chisel edge: thrust"),
+        "{said}"
+    );
+
+    let piloted = campaign(&[
+        ROBOT,
+        TWISTED,
+        TITANIUM,
+        PREDICTED,
+        "[lobes.hole]\npilot_diameter_mm = 4.0\n",
+    ]);
+    let piloted = document(&["lobes", text(piloted.path())]);
+    assert_eq!(piloted["drill"]["chisel"], Value::Null);
+    assert!(number(&piloted["hole"][0]["thrust_n"]) < 0.5 * number(&hole["thrust_n"]));
+    for (parts, key) in [
+        ([ROBOT, TWISTED, PREDICTED], "orthogonal"),
+        ([ROBOT, TITANIUM, PREDICTED], "tool"),
+    ] {
+        let folder = campaign(&parts);
+        let error = lobestone(&["lobes", text(folder.path())]).stderr;
+        assert!(error.contains(key) && error.contains("remedy"), "{error}");
+    }
+}
+
+/// Process damping and margins are off unless asked for; both raise the lateral limit, the flanks' damping most where the drill
+/// turns slowly. Speeds at which the drill may whirl are told with the number of lobes.
+#[test]
+fn damped_flanks_margins_and_whirling() {
+    let run = |more: &str| {
+        let folder = campaign(&[ROBOT, DRILL, DRILLING, more]);
+        document(&["lobes", text(folder.path())])
+    };
+    let plain = run("");
+    let none = run("process_damping_n_per_m = 0.0\nmargin_stiffness_n_per_m = 0.0\n");
+    assert_eq!(plain["curves"], none["curves"]);
+    let damped = run("indentation_n_per_mm3 = 40000.0\nwear_land_mm = 0.08\n");
+    let same = run("process_damping_n_per_m = 128000.0\n");
+    assert_eq!(
+        damped["curves"][0]["depth_limit_mm"],
+        same["curves"][0]["depth_limit_mm"]
+    );
+    let held = run("margin_stiffness_n_per_m = 1.0e6\n");
+    for i in 0..2 {
+        let limits = |found: &Value| -> Vec<f64> {
+            let limits = found["curves"][i]["depth_limit_mm"].as_array().unwrap();
+            limits
+                .iter()
+                .map(|d| d.as_f64().unwrap_or(f64::INFINITY))
+                .collect()
+        };
+        let (free, damped) = (limits(&plain), limits(&damped));
+        let gains: Vec<f64> = damped.iter().zip(&free).map(|(d, f)| d / f).collect();
+        assert!(gains.iter().all(|g| *g > 1.0), "{gains:?}");
+        let least = |found: &Value| number(&found["curves"][i]["absolute_limit_mm"]);
+        assert!(
+            least(&held) > 1.5 * least(&plain),
+            "{} {}",
+            least(&held),
+            least(&plain)
+        );
+    }
+    let whirling = plain["curves"][0]["whirling"].as_array().unwrap();
+    assert!(!whirling.is_empty());
+    for speed in whirling {
+        let order = number(&speed["order"]);
+        near(
+            &speed["spindle_rpm"],
+            60.0 * number(&speed["mode_hz"]) / (2.0 * order),
+            1e-9,
+        );
+        assert_eq!(
+            speed["lobes"],
+            json!([2.0 * order - 1.0, 2.0 * order + 1.0].map(|l| l as u32))
+        );
+    }
+    let warnings = plain["warnings"].as_array().unwrap();
+    assert!(
+        warnings
+            .iter()
+            .any(|w| w.as_str().unwrap().contains("may whirl at p1")),
+        "{warnings:?}"
+    );
 }

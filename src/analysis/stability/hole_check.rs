@@ -5,11 +5,12 @@ use std::fmt::Display;
 use crate::analysis::stability::lobe_setup::{group_of_cuts, half_point_angle_rad};
 use crate::analysis::workbench::Workbench;
 use crate::campaign::{Campaign, CutGeometry, HoleSection, LobesSection, Process, Tool};
-use crate::cutting::{ForceAxis, ForceGroup, average_row, coefficients_of};
-use crate::lobes::hole::{HoleCheck, HoleLoad, HoleTolerance, milling_torque_nm};
+use crate::cutting::{DrillPrediction, ForceAxis, ForceGroup, average_row, coefficients_of};
+use crate::lobes::drilling::hole::{HoleCheck, HoleLoad, HoleTolerance, milling_torque_nm};
+use crate::lobes::drilling::iso_tolerance::DiameterTolerance;
 
 /// What loads the tool, from `[lobes.hole]`, and what is not given there from the cutting coefficients. `own`: the coefficients of the
-/// campaign's cuts where somebody has already worked them out.
+/// campaign's cuts where somebody has already worked them out; `drill`: predicted from an orthogonal database.
 ///
 /// # Errors
 /// In words for people: why the thrust is not known, and what to give.
@@ -17,12 +18,14 @@ pub fn hole_check(
     campaign: &Workbench,
     section: &LobesSection,
     own: Option<&ForceGroup>,
+    drill: Option<&DrillPrediction>,
 ) -> std::result::Result<HoleCheck, String> {
     let usual = HoleSection::default();
     let asked = section.hole.as_ref().unwrap_or(&usual);
     let tolerance = HoleTolerance {
         position_mm: asked.position_tolerance_mm,
         perpendicularity_deg: asked.perpendicularity_tolerance_deg,
+        diameter: diameter_tolerance(campaign, section, asked)?,
     };
     let load = match (asked.thrust_n, asked.torque_nm, asked.lateral_n) {
         (Some(thrust_n), Some(torque_nm), Some(lateral_n)) => HoleLoad {
@@ -31,7 +34,8 @@ pub fn hole_check(
             lateral_n,
             source: "[lobes.hole]".into(),
         },
-        (thrust_n, torque_nm, lateral_n) => match (predicted(campaign, section, asked, own), thrust_n) {
+        (thrust_n, torque_nm, lateral_n) => match (predicted(campaign, section, asked, own, drill), thrust_n)
+        {
             (Ok(p), _) => HoleLoad {
                 thrust_n: thrust_n.unwrap_or(p.thrust_n),
                 torque_nm: torque_nm.unwrap_or(p.torque_nm),
@@ -62,6 +66,29 @@ pub fn hole_check(
     }
 }
 
+/// The tolerance of the diameter that is asked for.
+fn diameter_tolerance(
+    campaign: &Campaign,
+    section: &LobesSection,
+    asked: &HoleSection,
+) -> std::result::Result<Option<DiameterTolerance>, String> {
+    let Some(grade) = asked.diameter_grade else {
+        return Ok(None);
+    };
+    if section.process != Process::Drilling {
+        return Err("diameter_tolerance of [lobes.hole] is that of a drilled hole; take it out".into());
+    }
+    let tool = campaign
+        .tool
+        .as_ref()
+        .ok_or("the diameter that diameter_tolerance refers to is not known: add a [tool] table")?;
+    let tolerance = DiameterTolerance::h(grade, tool.diameter_mm);
+    tolerance.map(Some).ok_or(format!(
+        "ISO 286 has no H{grade} for a diameter of {} mm; take diameter_tolerance out of [lobes.hole]",
+        tool.diameter_mm
+    ))
+}
+
 fn words(error: impl Display) -> String {
     error.to_string()
 }
@@ -72,7 +99,22 @@ fn predicted(
     section: &LobesSection,
     asked: &HoleSection,
     own: Option<&ForceGroup>,
+    drill: Option<&DrillPrediction>,
 ) -> std::result::Result<HoleLoad, String> {
+    if let Some(drill) = drill {
+        let total = drill.total();
+        let parts = match &drill.chisel {
+            Some(Ok(_)) => "lips and chisel edge",
+            Some(Err(_)) => "the lips alone: a lower bound",
+            None => "the lips",
+        };
+        return Ok(HoleLoad {
+            thrust_n: total.thrust_n,
+            torque_nm: total.torque_nm,
+            lateral_n: 0.0,
+            source: format!("the orthogonal database and the drill's geometry, {parts}"),
+        });
+    }
     let tool = campaign
         .tool
         .as_ref()

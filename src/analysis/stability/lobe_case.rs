@@ -1,7 +1,9 @@
 //! The lobes of one structure, as an analysis of a campaign has them.
 
 use crate::lobes::band::LobeBand;
-use crate::lobes::hole::HoleError;
+use crate::lobes::drilling::hole::HoleError;
+use crate::lobes::drilling::whirling::WhirlSpeed;
+use crate::lobes::dynamics::feed_stiffness::FeedStiffness;
 use crate::lobes::outcome::LimitRange;
 use crate::lobes::{AbsoluteLimit, BlockLobes, LobeCurve, Peak};
 
@@ -32,6 +34,10 @@ pub struct LobeCase {
     pub before: Option<LobesBefore>,
     /// Where the static forces of the cut put the tool; from the model only.
     pub hole: Option<HoleError>,
+    /// How stiff the tool point is along the feed; from the model only.
+    pub feed_stiffness: Option<FeedStiffness>,
+    /// Drilling: speeds at which the drill may whirl; of a posture as it stands.
+    pub whirling: Vec<WhirlSpeed>,
     /// At the speed of every cut with a noted outcome.
     pub(crate) at_cuts: Vec<LimitRange>,
 }

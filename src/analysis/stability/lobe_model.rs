@@ -3,19 +3,25 @@
 
 use std::sync::Arc;
 
+use nalgebra::Matrix6;
+
 use crate::analysis::StructureAnalysis;
 use crate::analysis::structure_case::structure_model;
 use crate::analysis::workbench::Workbench;
-use crate::campaign::{Campaign, LobesSection};
+use crate::campaign::{Campaign, Contact, LobesSection, Process};
 use crate::identify::Options;
 use crate::identify::frfs::calibrate::calibrate;
 use crate::identify::frfs::structure::StructureModel;
-use crate::lobes::dynamics::tool_point::RobotHolder;
-use crate::lobes::hole::{Deflection, HoleError, HoleLoad};
+use crate::lobes::drilling::contact::{HeldHolder, contact_forces, held_compliance, skating_m};
+use crate::lobes::drilling::hole::{Deflection, HoleError, HoleLoad};
+use crate::lobes::drilling::margin::{MarginContact, MarginFrf};
+use crate::lobes::dynamics::feed_stiffness::FeedStiffness;
+use crate::lobes::dynamics::tool_point::{Holder, RobotHolder};
 use crate::lobes::setup::tool_beam;
 use crate::lobes::{Blocks, PoleFrf, RobotFrf, StateSpace, ToolDynamics, ToolPoint, ToolPointFrf, band};
+use crate::robot::pose_compensation::compensated_pose;
 use crate::robot::{Chain, Kinematics, PostureReport};
-use crate::{InputError, Result};
+use crate::{Error, InputError, Result};
 
 /// Draws of the parameters for the band.
 const DRAWS: usize = 100;
@@ -46,10 +52,29 @@ impl FittedModel {
         RobotFrf::new(&self.model.robot, &kinematics, &chain)
     }
 
-    fn deflection(&self, theta: &[f64], joints_deg: &[f64], load: &HoleLoad) -> Result<Deflection> {
+    /// Kinematics, and the tool point's compliance (base axes) free and held by the contacts.
+    fn compliances(
+        &self,
+        theta: &[f64],
+        joints_deg: &[f64],
+        contacts: &[Contact],
+    ) -> Result<(Kinematics, [Matrix6<f64>; 2])> {
         let (kinematics, chain) = self.chain(theta, joints_deg)?;
-        let compliance = chain.tool_compliance(&self.model.robot, &kinematics)?;
-        Ok(Deflection::new(&compliance, kinematics.tool_axis(), load))
+        let free = chain.tool_compliance(&self.model.robot, &kinematics)?;
+        let held = held_compliance(&free, kinematics.tool_axis(), contacts)
+            .ok_or_else(|| Error::computation("the contacts leave no finite compliance"))?;
+        Ok((kinematics, [free, held]))
+    }
+
+    fn deflection(
+        &self,
+        theta: &[f64],
+        joints_deg: &[f64],
+        load: &HoleLoad,
+        contacts: &[Contact],
+    ) -> Result<Deflection> {
+        let (kinematics, [_, held]) = self.compliances(theta, joints_deg, contacts)?;
+        Ok(Deflection::new(&held, kinematics.tool_axis(), load))
     }
 
     /// The tool point's FRFs; of the robot alone as modal sums where the modes are not coupled.
@@ -67,22 +92,19 @@ impl FittedModel {
         form: impl Fn(RobotFrf) -> Result<Box<dyn ToolPointFrf>>,
     ) -> Result<Blocks> {
         let robot = &self.model.robot;
-        if !asked.tool.beam.segments.is_empty() {
+        if asked.couples() {
             let behind_m = asked.tool.beam.length_m();
-            let point = ToolPoint {
-                holder: Arc::new(RobotHolder::new(robot, kinematics, chain, behind_m)?),
-                tool: asked.tool.clone(),
-            };
-            return Ok(point.blocks(asked.axial));
+            let holder = RobotHolder::new(robot, kinematics, chain, behind_m)?;
+            return Ok(asked.in_hole(asked.point(holder).blocks(asked.axial)));
         }
         let axial = match asked.axial {
             true => Some(form(RobotFrf::axial_torsional(robot, kinematics, chain)?)?),
             false => None,
         };
-        Ok(Blocks {
+        Ok(asked.in_hole(Blocks {
             lateral: form(RobotFrf::new(robot, kinematics, chain)?)?,
             axial,
-        })
+        }))
     }
 
     /// The tool point's FRFs with frequencies and static stiffness there, coupled modes as a sum over their poles: for
@@ -131,25 +153,81 @@ pub(crate) struct Asked {
     pub tool: Arc<ToolDynamics>,
     /// Whether the axial–torsional block is wanted.
     pub axial: bool,
+    /// What holds the tool point from outside.
+    pub contacts: Vec<Contact>,
+    /// The wall of the hole that holds the tip of a drill; `None`: it is free.
+    pub margin: Option<MarginContact>,
+}
+
+/// What `[lobes]` says of the margins; `None` where they touch nothing.
+fn margin_of(section: &LobesSection) -> Option<MarginContact> {
+    let margin = MarginContact {
+        stiffness_n_per_m: section.margin_stiffness_n_per_m.unwrap_or(0.0),
+        damping_ns_per_m: section.margin_damping_ns_per_m.unwrap_or(0.0),
+    };
+    let touches = margin.stiffness_n_per_m > 0.0 || margin.damping_ns_per_m > 0.0;
+    (section.process == Process::Drilling && touches).then_some(margin)
 }
 
 impl Asked {
+    /// Without contacts.
     pub fn new(section: &LobesSection, axial: bool) -> Self {
         Asked {
             tool: Arc::new(ToolDynamics::new(tool_beam(section))),
             axial,
+            contacts: Vec::new(),
+            margin: margin_of(section),
         }
     }
 
-    /// ` + tool of 2 segments, 120 mm`; empty where there is none.
+    /// The FRFs with the margins of a drill held by the wall of its hole.
+    pub fn in_hole(&self, blocks: Blocks) -> Blocks {
+        match self.margin {
+            Some(margin) => Blocks {
+                lateral: Box::new(MarginFrf::new(blocks.lateral, margin)),
+                axial: blocks.axial,
+            },
+            None => blocks,
+        }
+    }
+
+    /// Whether something is coupled to the structure: a tool beam, a contact.
+    pub fn couples(&self) -> bool {
+        !(self.tool.beam.segments.is_empty() && self.contacts.is_empty())
+    }
+
+    /// The tool point with contacts and tool on this holder.
+    pub fn point(&self, holder: impl Holder + 'static) -> ToolPoint {
+        let lever_m = self.tool.beam.length_m();
+        ToolPoint {
+            holder: match self.contacts.is_empty() {
+                true => Arc::new(holder),
+                false => Arc::new(HeldHolder::new(holder, &self.contacts, lever_m)),
+            },
+            tool: self.tool.clone(),
+        }
+    }
+
+    /// ` + tool of 2 segments, 120 mm, held by pressure foot`; empty where there is neither.
     pub fn with_tool(&self) -> String {
-        match self.tool.beam.segments.len() {
+        let tool = match self.tool.beam.segments.len() {
             0 => String::new(),
             n => format!(
                 " + tool of {n} {}, {:.1} mm (receptance coupling)",
                 if n == 1 { "segment" } else { "segments" },
                 1e3 * self.tool.beam.length_m()
             ),
+        };
+        let tool = match self.margin {
+            Some(_) => format!("{tool}, margins held by the wall"),
+            None => tool,
+        };
+        match &self.contacts[..] {
+            [] => tool,
+            contacts => {
+                let names: Vec<String> = contacts.iter().map(Contact::title).collect();
+                format!("{tool}, held by {} (receptance coupling)", names.join(", "))
+            }
         }
     }
 }
@@ -230,6 +308,13 @@ impl ModelState {
             true => "calibrated robot model".to_string(),
             false => format!("calibrated robot model ({})", case.model_description()),
         } + &asked.with_tool();
+        if !asked.contacts.is_empty() && effects.iter().any(|e| e.starts_with("tool-flexibility")) {
+            warnings.push(
+                "the model has tool-flexibility, and [[contact]] holds the tool point at the far end of that spring: a foot that \
+                 stands on the spindle's housing holds less of the tool"
+                    .into(),
+            );
+        }
         if !asked.tool.beam.segments.is_empty() && effects.iter().any(|e| e.starts_with("tool-flexibility")) {
             warnings.push(
                 "the model has tool-flexibility and [lobes.tool] gives the tool as a beam: the tool's give may be counted twice. \
@@ -291,17 +376,43 @@ impl ModelState {
 
     /// What a load does to the tool, with nothing said of its uncertainty.
     pub fn deflection(&self, joints_deg: &[f64], load: &HoleLoad) -> Result<Deflection> {
-        self.current.deflection(&self.current.theta, joints_deg, load)
+        self.current
+            .deflection(&self.current.theta, joints_deg, load, &self.asked.contacts)
     }
 
-    /// The same with its uncertainty, from the draws of the parameters.
+    /// The same with its uncertainty, from the draws of the parameters, what the contacts take of the load, and the pose
+    /// that makes up for it.
     pub fn hole(&self, joints_deg: &[f64], load: &HoleLoad) -> Result<HoleError> {
+        let contacts = &self.asked.contacts;
         let drawn: Vec<Deflection> = self
             .draws
             .iter()
-            .map(|theta| self.current.deflection(theta, joints_deg, load))
+            .map(|theta| self.current.deflection(theta, joints_deg, load, contacts))
             .collect::<Result<_>>()?;
-        Ok(HoleError::new(&self.deflection(joints_deg, load)?, &drawn))
+        let theta = &self.current.theta;
+        let (kinematics, [free, held]) = self.current.compliances(theta, joints_deg, contacts)?;
+        let axis = kinematics.tool_axis();
+        let here = Deflection::new(&held, axis, load);
+        let pushed = |joints: &[f64]| {
+            let (kinematics, [_, held]) = self.current.compliances(theta, joints, contacts)?;
+            let steady = Deflection::new(&held, kinematics.tool_axis(), &load.without_lateral()).steady;
+            Ok((kinematics, steady))
+        };
+        Ok(HoleError {
+            contacts: contact_forces(contacts, axis, &here.all),
+            skating_mm: skating_m(&free, axis, contacts).map(|m| 1e3 * m),
+            compensation: Some(compensated_pose(joints_deg, pushed).map_err(|e| e.to_string())),
+            ..HoleError::new(&here, &drawn)
+        })
+    }
+
+    /// How stiff the tool point is along the feed, held by the contacts.
+    pub fn feed_stiffness(&self, joints_deg: &[f64], process: Process) -> Result<Option<FeedStiffness>> {
+        let theta = &self.current.theta;
+        let (kinematics, [_, held]) = self
+            .current
+            .compliances(theta, joints_deg, &self.asked.contacts)?;
+        Ok(FeedStiffness::new(&held, kinematics.tool_axis(), process))
     }
 
     /// The tool point's FRFs for each draw of the parameters.

@@ -2,10 +2,13 @@
 
 use crate::analysis::forces::force_records::identify_forces;
 use crate::analysis::workbench::Workbench;
-use crate::campaign::{Campaign, LobeAxis, LobeMethod, LobeMode, LobesSection, Process, ToolKind};
-use crate::cutting::{CfcOptions, ForceGroup};
+use crate::campaign::{
+    Campaign, CutGeometry, LobeAxis, LobeMethod, LobeMode, LobesSection, Process, Tool, ToolKind,
+};
+use crate::cutting::{CfcOptions, DrillPrediction, ForceGroup};
+use crate::lobes::drilling::flank_damping::FlankDamping;
 use crate::lobes::dynamics::tool_point::ModesHolder;
-use crate::lobes::setup::{LobeCoefficients, LobeCut};
+use crate::lobes::setup::{DrilledHole, LobeCoefficients, LobeCut};
 use crate::lobes::{AxisMode, ModalFrf, Mode, PeriodicForce, ProcessDamping, RegenerativeForce};
 use crate::{Error, InputError, Result};
 
@@ -13,7 +16,7 @@ fn lacks_coefficients(campaign: &Campaign, problem: impl Into<String>) -> Error 
     InputError::new(problem)
         .file(campaign.dir.join("campaign.toml"))
         .key("lobes.ktc_n_per_mm2")
-        .remedy("give ktc_n_per_mm2 and krc_n_per_mm2, or add cuts at two feeds or more")
+        .remedy("give ktc_n_per_mm2 and krc_n_per_mm2, or add cuts at two feeds or more (drilling: or [orthogonal] and coefficients = \"orthogonal\")")
         .into()
 }
 
@@ -47,6 +50,58 @@ pub fn group_of_cuts(
     }
     .cloned()
     .ok_or_else(|| lacks("the cuts are of several materials and [material] names none of them"))
+}
+
+/// The drill of the campaign at full engagement, predicted from its orthogonal database; the cutting speed is that in the
+/// middle (geometric mean) of the lobes' speeds.
+///
+/// # Errors
+/// No `[orthogonal]`, `[tool]` or feed, or a drill whose angles allow no chip.
+pub fn predicted_drill(campaign: &Campaign, section: &LobesSection) -> Result<DrillPrediction> {
+    let lacks = |key: &str, problem: &str, remedy: &str| -> Error {
+        InputError::new(problem)
+            .file(campaign.dir.join("campaign.toml"))
+            .key(key)
+            .remedy(remedy)
+            .into()
+    };
+    let database = campaign.orthogonal.as_ref().ok_or_else(|| {
+        lacks(
+            "orthogonal",
+            "lobes.coefficients = \"orthogonal\" needs an orthogonal database, and there is none",
+            "add [orthogonal] with shear_stress_mpa, friction_angle_deg, chip_ratio and rake_deg",
+        )
+    })?;
+    let tool = campaign.tool.as_ref().filter(|t| t.kind == ToolKind::Drill).ok_or_else(|| {
+        lacks(
+            "tool",
+            "lobes.coefficients = \"orthogonal\" needs the drill's geometry",
+            "add [tool] with kind = \"drill\", diameter_mm, teeth, helix_deg, half_point_angle_deg and web_thickness_mm",
+        )
+    })?;
+    let feed_per_rev_mm = section.feed_per_rev_mm.ok_or_else(|| {
+        lacks(
+            "lobes.feed_per_rev_mm",
+            "lobes.coefficients = \"orthogonal\" needs the feed",
+            "add feed_per_rev_mm to [lobes]",
+        )
+    })?;
+    let tool = Tool {
+        teeth: section.teeth.unwrap_or(tool.teeth),
+        half_point_angle_deg: section.half_point_angle_deg.or(tool.half_point_angle_deg),
+        ..tool.clone()
+    };
+    let geometry = CutGeometry::Drilling {
+        feed_per_rev_mm,
+        pilot_diameter_mm: section
+            .hole
+            .as_ref()
+            .and_then(|h| h.pilot_diameter_mm)
+            .unwrap_or(0.0),
+        hole_depth_mm: None,
+    };
+    let rpm = (section.spindle_rpm[0] * section.spindle_rpm[1]).sqrt();
+    DrillPrediction::new(&tool, &geometry, rpm, database)
 }
 
 /// Ktc and Krc of a group of cuts.
@@ -196,6 +251,36 @@ pub fn cut_of(
                 .map(|force| LobeCut::Averaged(force.into()))
         }
     }
+}
+
+/// Process damping of a drill's flanks; `None` where it is not asked for.
+///
+/// # Errors
+/// A drill whose point or diameter is not known.
+pub fn flank_damping(
+    campaign: &Campaign,
+    section: &LobesSection,
+    lips: usize,
+) -> Result<Option<FlankDamping>> {
+    let asked = section.process_damping_n_per_m.filter(|c| *c > 0.0);
+    let Some(coefficient_n_per_m) = asked.filter(|_| section.process == Process::Drilling) else {
+        return Ok(None);
+    };
+    let hole = DrilledHole::of(campaign.tool.as_ref(), section).ok_or_else(|| {
+        InputError::new("process damping needs the cutting speed along the lips, and the drill is not known")
+            .file(campaign.dir.join("campaign.toml"))
+            .key("tool.diameter_mm")
+            .remedy("add a [tool] table with the drill's diameter_mm and half_point_angle_deg")
+    })?;
+    let kappa = half_point_angle_rad(campaign, section)?;
+    let slowest_rpm = section.spindle_rpm[0];
+    Ok(Some(FlankDamping::new(
+        coefficient_n_per_m,
+        hole.radii_mm(),
+        kappa,
+        lips,
+        slowest_rpm,
+    )))
 }
 
 /// The modes of the `[[lobes.mode]]` table: x and y for the lateral block, z and theta for the axial–torsional one.

@@ -1,7 +1,5 @@
 //! The structures that lobes are drawn for, from modes, the model or measured FRFs, and their lobes.
 
-use std::sync::Arc;
-
 use crate::analysis::stability::lobe_case::{BEST, LobeCase, LobesBefore};
 use crate::analysis::stability::lobe_model::{Asked, Dynamics, ModelState};
 use crate::analysis::stability::lobe_setup::modes_of_table;
@@ -9,12 +7,14 @@ use crate::analysis::stability::measured_structures::measured_structures;
 use crate::analysis::workbench::Workbench;
 use crate::campaign::{Campaign, LobeMethod, LobesSection};
 use crate::lobes::band;
+use crate::lobes::drilling::hole::{HoleCheck, HoleError};
+use crate::lobes::drilling::whirling::whirl_speeds;
+use crate::lobes::dynamics::feed_stiffness::FeedStiffness;
 use crate::lobes::dynamics::tool_point::MeasuredHolder;
-use crate::lobes::hole::{HoleCheck, HoleError};
 use crate::lobes::outcome::{LimitRange, NotedCut};
-use crate::lobes::setup::LobeCut;
+use crate::lobes::setup::{DrilledHole, LobeCut};
 use crate::lobes::{
-    BlockSolver, Blocks, MultiFrequency, SemiDiscretisation, SpeedLimit, StateSpace, ToolPoint, ToolPointFrf,
+    BlockSolver, Blocks, MultiFrequency, SemiDiscretisation, SpeedLimit, StateSpace, ToolPointFrf,
 };
 use crate::{InputError, Result};
 
@@ -28,6 +28,7 @@ pub(crate) struct LobeStructure {
     /// The same before effects were added.
     before: Option<Dynamics>,
     hole: Option<HoleError>,
+    feed_stiffness: Option<FeedStiffness>,
     /// The same structure with parameters drawn from their uncertainty.
     variants: Vec<Blocks>,
     description: String,
@@ -77,7 +78,14 @@ impl LobeStructure {
         limits.collect()
     }
 
-    pub fn case(self, cut: &LobeCut, speeds: &[f64], noted: &[NotedCut]) -> LobeCase {
+    /// `drilled`: in drilling the hole, where it is known; `None` in other processes.
+    pub fn case(
+        self,
+        cut: &LobeCut,
+        speeds: &[f64],
+        noted: &[NotedCut],
+        drilled: Option<Option<DrilledHole>>,
+    ) -> LobeCase {
         let method = self.dynamics.method(cut);
         let curve = method.curve(speeds);
         let (absolute, mut best) = (
@@ -91,6 +99,19 @@ impl LobeStructure {
         let by_block = match cut {
             LobeCut::Averaged(cut) => cut.on(&self.dynamics.blocks).by_block(speeds),
             LobeCut::Periodic(_) => None,
+        };
+        let whirling = match drilled {
+            Some(hole) => whirl_speeds(
+                self.dynamics.blocks.lateral.as_ref(),
+                &cut.average().on(&self.dynamics.blocks).lateral,
+                cut.average().lateral.teeth,
+                [
+                    speeds.first().copied().unwrap_or(0.0),
+                    speeds.last().copied().unwrap_or(0.0),
+                ],
+                hole.map(|h| h.width_mm),
+            ),
+            None => Vec::new(),
         };
         let tips: Vec<f64> = best.iter().map(|p| p.spindle_rpm).collect();
         if let Some(at_tips) = band_at(&tips) {
@@ -107,6 +128,8 @@ impl LobeStructure {
             band,
             before: self.before.as_ref().map(|b| b.lobes_before(cut, speeds)),
             hole: self.hole,
+            feed_stiffness: self.feed_stiffness,
+            whirling,
             at_cuts,
             curve,
             posture: self.posture,
@@ -131,24 +154,22 @@ pub(crate) fn from_modes(
     }
     description += &asked.with_tool();
     let states = steps_through_time(section).then(|| StateSpace::from(&modes.lateral));
-    let blocks = if asked.tool.beam.segments.is_empty() {
+    let blocks = if asked.couples() {
+        asked.point(modes).blocks(asked.axial)
+    } else {
         let axial = modes.axial.filter(|_| asked.axial);
         Blocks {
             lateral: Box::new(modes.lateral),
             axial: axial.map(|frf| Box::new(frf) as Box<dyn ToolPointFrf>),
         }
-    } else {
-        let point = ToolPoint {
-            holder: Arc::new(modes),
-            tool: asked.tool.clone(),
-        };
-        point.blocks(asked.axial)
     };
+    let blocks = asked.in_hole(blocks);
     Ok(vec![LobeStructure {
         posture: None,
         dynamics: Dynamics { blocks, states },
         before: None,
         hole: None,
+        feed_stiffness: None,
         variants: Vec::new(),
         description,
     }])
@@ -178,6 +199,7 @@ pub(crate) fn at_postures(
                     .map(|b| state.dynamics(b, joints, through_time))
                     .transpose()?,
                 hole: check.map(|c| state.hole(joints, &c.load)).transpose()?,
+                feed_stiffness: state.feed_stiffness(joints, section.process)?,
                 variants: state.variants(joints)?,
                 description: state.description.clone(),
             })
@@ -202,7 +224,8 @@ pub(crate) fn from_measured(
     warnings.extend(read_warnings);
     let structures = measured_structures(campaign, &set)?;
     let has_tool = !asked.tool.beam.segments.is_empty();
-    let model = match (has_tool, &campaign.robot) {
+    let coupled = asked.couples();
+    let model = match (coupled, &campaign.robot) {
         (true, Some(_)) => Some(ModelState::of(campaign, asked.clone(), warnings)?),
         _ => None,
     };
@@ -213,6 +236,16 @@ pub(crate) fn from_measured(
                 .into(),
             None => "the tool of [lobes.tool] is coupled to the measured FRFs: the holder face is taken not to turn, as \
                      rotations were not measured and there is no [robot] to take them from"
+                .into(),
+        });
+    }
+    if !asked.contacts.is_empty() {
+        warnings.push(match model {
+            Some(_) => "[[contact]] is coupled to the measured FRFs: how motion along the tool and across it go together, which was \
+                        not measured, is the calibrated robot model's"
+                .into(),
+            None => "[[contact]] is coupled to the measured FRFs: motion along the tool and across it are taken as having nothing \
+                     to do with each other, as there is no [robot] to take that from"
                 .into(),
         });
     }
@@ -233,17 +266,13 @@ pub(crate) fn from_measured(
                     1e3 * length_m
                 ));
             }
-            let blocks = if has_tool {
+            let blocks = if coupled {
                 let holder = MeasuredHolder {
                     lateral: s.frf,
                     axial: s.axial,
                     model: model.as_ref().map(|m| m.holder(&posture.joints_deg)).transpose()?,
                 };
-                let point = ToolPoint {
-                    holder: Arc::new(holder),
-                    tool: asked.tool.clone(),
-                };
-                point.blocks(asked.axial)
+                asked.point(holder).blocks(asked.axial)
             } else {
                 Blocks {
                     lateral: Box::new(s.frf),
@@ -253,11 +282,13 @@ pub(crate) fn from_measured(
                         .map(|frf| Box::new(frf) as Box<dyn ToolPointFrf>),
                 }
             };
+            let blocks = asked.in_hole(blocks);
             Ok(LobeStructure {
                 posture: Some(posture.id.clone()),
                 dynamics: Dynamics { blocks, states: None },
                 before: None,
                 hole: None,
+                feed_stiffness: None,
                 variants: Vec::new(),
                 description: format!("measured FRFs{}", asked.with_tool()),
             })

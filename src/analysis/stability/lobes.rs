@@ -5,16 +5,19 @@ use std::sync::Arc;
 use crate::analysis::stability::hole_check::hole_check;
 pub use crate::analysis::stability::lobe_case::{BEST, LobeCase, LobesBefore};
 use crate::analysis::stability::lobe_model::{Asked, ModelState};
-use crate::analysis::stability::lobe_setup::{coefficients_of_group, cut_of, group_of_cuts};
+use crate::analysis::stability::lobe_setup::{
+    coefficients_of_group, cut_of, flank_damping, group_of_cuts, predicted_drill,
+};
 use crate::analysis::stability::lobe_structure::{
     LobeStructure, at_postures, from_measured, from_modes, steps_through_time,
 };
 use crate::analysis::stability::noted_cuts::noted_cuts;
 use crate::analysis::stability::redundancy::{self, RedundancyAnalysis};
 use crate::analysis::workbench::Workbench;
-use crate::campaign::{Campaign, LobeMethod, LobeSource, LobesSection, Process};
-use crate::cutting::ForceGroup;
-use crate::lobes::hole::HoleCheck;
+use crate::campaign::{Campaign, ContactDirection, LobeMethod, LobeSource, LobesSection, Process};
+use crate::cutting::{DrillPrediction, ForceGroup};
+use crate::lobes::drilling::flank_damping::FlankDamping;
+use crate::lobes::drilling::hole::HoleCheck;
 use crate::lobes::outcome::{LimitRange, Outcomes};
 use crate::lobes::setup::{DrilledHole, LobeCoefficients, LobeCut, axial_torsional_force};
 use crate::lobes::{AbsoluteLimit, Peak, ToolDynamics, speed_grid};
@@ -43,6 +46,10 @@ pub struct LobeAnalysis {
     pub axial_torsional: Option<std::result::Result<(), String>>,
     /// The hole that a drill cuts; `None` in milling, or where the tool is not known.
     pub drilled: Option<DrilledHole>,
+    /// The drill predicted from an orthogonal database; `None` where that is not asked for.
+    pub drill: Option<DrillPrediction>,
+    /// Process damping of a drill's flanks; `None` where it is not asked for.
+    pub flank_damping: Option<FlankDamping>,
     /// The tool as a beam; without segments where it is rigid or part of the FRFs.
     pub tool: Arc<ToolDynamics>,
     /// First and last spindle speed and the step, rpm.
@@ -88,14 +95,22 @@ impl LobeAnalysis {
             cut,
             mut axial_torsional,
             own_cuts,
+            drill,
         } = CutForce::of(campaign, section, &mut warnings)?;
-        let asked = Asked::new(section, cut.average().axial.is_some());
-        if steps_through_time(section) && !section.tool.is_empty() {
+        let asked = Asked {
+            contacts: campaign.contacts.clone(),
+            ..Asked::new(section, cut.average().axial.is_some())
+        };
+        if steps_through_time(section) && asked.couples() {
+            let what = match section.tool.is_empty() {
+                true => "a structure held by [[contact]]",
+                false => "the tool as a beam",
+            };
             return Err(
-                InputError::new("semi-discretisation needs modes, and the tool as a beam has none")
+                InputError::new(format!("semi-discretisation needs modes, and {what} has none"))
                     .file(campaign.dir.join("campaign.toml"))
                     .key("lobes.method")
-                    .remedy("use method = \"multi-frequency\" or \"zero-order\" with [lobes.tool]")
+                    .remedy("use method = \"multi-frequency\" or \"zero-order\" with [lobes.tool] and [[contact]]")
                     .into(),
             );
         }
@@ -109,7 +124,7 @@ impl LobeAnalysis {
             LobeSource::Model => {
                 let state = ModelState::of(campaign, asked.clone(), &mut warnings)?;
                 (effects, revision) = (state.effects.clone(), state.revision);
-                let check = hole_check(campaign, section, own_cuts.as_ref());
+                let check = hole_check(campaign, section, own_cuts.as_ref(), drill.as_ref());
                 if let (Err(reason), Some(_)) = (&check, &section.hole) {
                     warnings.push(format!("the hole is not worked out: {reason}"));
                 }
@@ -140,9 +155,13 @@ impl LobeAnalysis {
                 .push("lobes.redundancy needs source = \"model\": there is no surface over the angle".into());
         }
         let (redundancy, swept) = surface.unzip();
+        let drilling = section.process == Process::Drilling;
+        let drilled = drilling
+            .then(|| DrilledHole::of(campaign.tool.as_ref(), section))
+            .flatten();
         let cases: Vec<LobeCase> = structures
             .into_iter()
-            .map(|structure| structure.case(&cut, &speeds, &noted))
+            .map(|structure| structure.case(&cut, &speeds, &noted, drilling.then_some(drilled)))
             .chain(swept.unwrap_or_default())
             .collect();
         let standing: Vec<(Option<String>, Vec<LimitRange>)> = as_they_stand
@@ -156,6 +175,8 @@ impl LobeAnalysis {
                 .map(|case| (case.posture.as_deref(), &case.at_cuts[..]))
                 .collect(),
         };
+        warnings.extend(contacts_that_give_way(&cases));
+        warnings.extend(cases.iter().filter_map(where_it_may_whirl));
         let outcomes = Outcomes::score(&noted, &limits, not_compared);
         if limits.len() > 1 && noted.iter().any(|c| c.posture.is_none()) {
             warnings.push(
@@ -171,10 +192,9 @@ impl LobeAnalysis {
             coefficients,
             teeth: cut.average().lateral.teeth,
             axial_torsional,
-            drilled: match section.process {
-                Process::Drilling => DrilledHole::of(campaign.tool.as_ref(), section),
-                Process::Milling | Process::Turning => None,
-            },
+            drilled,
+            drill,
+            flank_damping: cut.average().damping,
             tool: asked.tool.clone(),
             spindle_rpm: section.spindle_rpm,
             cases,
@@ -272,15 +292,25 @@ pub(crate) struct CutForce {
     pub axial_torsional: Option<std::result::Result<(), String>>,
     /// The campaign's own cuts, where the coefficients come from those.
     pub own_cuts: Option<ForceGroup>,
+    /// The drill, where the coefficients are predicted from an orthogonal database.
+    pub drill: Option<DrillPrediction>,
 }
 
 impl CutForce {
     /// # Errors
     /// Something that the process needs is missing.
     pub fn of(campaign: &Workbench, section: &LobesSection, warnings: &mut Vec<String>) -> Result<Self> {
-        let (coefficients, own_cuts) = match LobeCoefficients::given(section) {
-            Some(given) => (given, None),
-            None => {
+        let drill = match section.from_orthogonal {
+            true => Some(predicted_drill(campaign, section)?),
+            false => None,
+        };
+        if let Some(Err(reason)) = drill.as_ref().and_then(|d| d.chisel.as_ref()) {
+            warnings.push(format!("the chisel edge is left out: {reason}"));
+        }
+        let (coefficients, own_cuts) = match (&drill, LobeCoefficients::given(section)) {
+            (Some(drill), _) => (LobeCoefficients::of_drill(drill), None),
+            (None, Some(given)) => (given, None),
+            (None, None) => {
                 let group = group_of_cuts(campaign, section, warnings)?;
                 (coefficients_of_group(campaign, section, &group)?, Some(group))
             }
@@ -315,6 +345,9 @@ impl CutForce {
         let teeth = cut.average().lateral.teeth;
         let axial = (section.process == Process::Drilling)
             .then(|| axial_torsional_force(campaign.tool.as_ref(), section, coefficients, teeth));
+        if let LobeCut::Averaged(cut) = &mut cut {
+            cut.damping = flank_damping(campaign, section, teeth)?;
+        }
         if let (LobeCut::Averaged(cut), Some(Ok(force))) = (&mut cut, &axial) {
             cut.axial = Some(*force);
         }
@@ -323,8 +356,70 @@ impl CutForce {
             cut,
             axial_torsional: axial.map(|force| force.map(|_| ())),
             own_cuts,
+            drill,
         })
     }
+}
+
+/// The speeds at which a drill may whirl at a posture, in words.
+fn where_it_may_whirl(case: &LobeCase) -> Option<String> {
+    let speeds: Vec<String> = case
+        .whirling
+        .iter()
+        .filter(|w| w.may_occur == Some(true))
+        .map(|w| {
+            format!(
+                "{:.0} rpm ({:.1} Hz is {} times the turn: {} or {} lobes)",
+                w.spindle_rpm,
+                w.mode_hz,
+                w.lobes[0] + 1,
+                w.lobes[0],
+                w.lobes[1]
+            )
+        })
+        .collect();
+    (!speeds.is_empty()).then(|| {
+        format!(
+            "the drill may whirl{} and leave a hole that is not round at and up to a tenth above {}: take another speed or a pilot hole",
+            case.at_posture(),
+            speeds.join(", ")
+        )
+    })
+}
+
+/// Feet that lift off and clamps that slip: what was computed with them does not hold there.
+fn contacts_that_give_way(cases: &[LobeCase]) -> Vec<String> {
+    let mut told: Vec<String> = Vec::new();
+    for case in cases {
+        let contacts = case.hole.iter().flat_map(|hole| &hole.contacts);
+        for contact in contacts.filter(|c| c.gives_way) {
+            let gives_way = match contact.direction {
+                ContactDirection::Axial => "lifts off",
+                _ => "slips",
+            };
+            let angle = case
+                .angle_deg
+                .map(|a| format!(" and {a:.1}°"))
+                .unwrap_or_default();
+            told.push(format!(
+                "{}{}{angle}: the cutting forces take {:.0} N of the {:.0} N that hold it, so it {gives_way}: limits and hole there \
+                 are those of a contact that holds; press harder, or cut with less thrust",
+                contact.name,
+                case.at_posture(),
+                contact.force_n,
+                contact.preload_n.unwrap_or(0.0),
+            ));
+        }
+    }
+    let (count, most) = (told.len(), 4);
+    if count > most {
+        told.truncate(most);
+        told.push(format!(
+            "and {} more places where a contact gives way",
+            count - most
+        ));
+    }
+    told
 }
 
 /// What the lobes of turning take for granted.

@@ -5,9 +5,9 @@ use serde::Serialize;
 
 use crate::analysis::stability::lobe_case::{BEST, LobeCase};
 use crate::analysis::stability::lobe_model::ModelState;
-use crate::campaign::{Campaign, LobeMethod, LobesSection, Redundancy};
+use crate::campaign::{Campaign, LobeMethod, LobesSection, Process, Redundancy};
 use crate::lobes::band::QUANTILES;
-use crate::lobes::hole::{HoleCheck, HoleError};
+use crate::lobes::drilling::hole::{HoleCheck, HoleError};
 use crate::lobes::optimum::{
     LimitAtAngle, SPEED_MARGIN, Search, SurfacePoint, agree, apart_deg, difference, margin_mm,
 };
@@ -263,6 +263,7 @@ fn at_elbow(
     elbow_deg: f64,
 ) -> Result<Option<Found>> {
     let posture = &campaign.postures[redundancy.posture];
+    let process = campaign.lobes.as_ref().map_or(Process::Drilling, |l| l.process);
     let sweep = RedundancySweep::new(
         &state.current.model.robot,
         &posture.joints_deg,
@@ -302,6 +303,8 @@ fn at_elbow(
                 band: None,
                 before,
                 hole: check.map(|c| state.hole(&joints, &c.load)).transpose()?,
+                feed_stiffness: state.feed_stiffness(&joints, process)?,
+                whirling: Vec::new(),
                 at_cuts: Vec::new(),
             })
         })

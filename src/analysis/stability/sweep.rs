@@ -125,6 +125,9 @@ impl Sweep {
         let posture = posture_of(campaign, section, request)?.clone();
         let state = ModelState::without_history(campaign, asked, &mut warnings)?;
         warnings.extend(remarks(section, &state.current.model.robot));
+        if !campaign.contacts.is_empty() {
+            warnings.push("the map is that of the free robot: [[contact]] holds at one place only".into());
+        }
         let redundancy = section.redundancy.as_ref();
         let forbidden_deg = redundancy.map(|r| r.forbidden_deg.clone()).unwrap_or_default();
         let here = state.current.model.robot.kinematics(&posture.joints_deg)?;
@@ -160,6 +163,8 @@ impl Sweep {
             "force_matrix_n_per_m2": cut.lateral.matrix_n_per_m2,
             "axial_force_matrix_n_per_m2": cut.axial.map(|a| a.matrix_n_per_m2),
             "tool": section.tool,
+            "flank_damping_n_per_m2": cut.damping.map(|d| [d.lateral_n_per_m2, d.axial_n_per_m2]),
+            "margin": [section.margin_stiffness_n_per_m, section.margin_damping_ns_per_m],
             "spindle_rpm": spindle_rpm,
             "posture": posture.id,
             "joints_deg": posture.joints_deg,

@@ -294,6 +294,7 @@ mod tests {
                 tool.insert("kind".into(), Toml::String("endmill".into()));
                 tool.remove("half_point_angle_deg");
                 tool.remove("web_thickness_mm");
+                tool.remove("chisel_edge_angle_deg");
             }
             ["tool", "nose_radius_mm" | "cutting_edge_angle_deg"] => {
                 campaign.insert("tool".into(), parsed("kind = \"turning\""));
@@ -313,6 +314,16 @@ mod tests {
                     .as_table_mut()
                     .unwrap()
                     .remove("chip_ratio");
+            }
+            ["lobes", "coefficients"] => {
+                lobes(campaign, &["ktc_n_per_mm2", "method"]);
+                let lobes = campaign["lobes"].as_table_mut().unwrap();
+                lobes.insert("process".into(), Toml::String("drilling".into()));
+            }
+            ["lobes", "indentation_n_per_mm3" | "wear_land_mm"] => {
+                lobes(campaign, &["method"]);
+                let lobes = campaign["lobes"].as_table_mut().unwrap();
+                lobes.insert("process".into(), Toml::String("drilling".into()));
             }
             ["lobes", "immersion"] => lobes(campaign, &["radial_ratio", "cut"]),
             ["lobes", "start_deg"] => {

@@ -91,7 +91,7 @@ const TEETH: Holds = Holds::Whole(1, 1000);
 const BODY: Holds = Holds::Form("^(base|tool|link[1-9][0-9]*)$");
 
 /// The top of `campaign.toml`.
-pub const TOP: [Key; 16] = [
+pub const TOP: [Key; 17] = [
     must("schema", Holds::Words(&[FORM]), "Form of this file"),
     may(
         "name",
@@ -134,6 +134,11 @@ pub const TOP: [Key; 16] = [
         "A channel of the force files, where they do not say what it is",
     ),
     may("cut", Holds::Sections(&CUT), "A cut whose forces were recorded"),
+    may(
+        "contact",
+        Holds::Sections(&CONTACT),
+        "Pressure foot or clamp: a spring from the tool point to the ground while it cuts",
+    ),
     may(
         "lobes",
         Holds::Section(&LOBES),
@@ -223,7 +228,7 @@ pub(crate) const FRF: [Key; 4] = [
     may("force_level_n", POSITIVE, "Level of the hammer or shaker, N"),
 ];
 
-pub(crate) const TOOL: [Key; 13] = [
+pub(crate) const TOOL: [Key; 14] = [
     must(
         "kind",
         Holds::Words(&["endmill", "ballend", "drill", "turning"]),
@@ -272,6 +277,11 @@ pub(crate) const TOOL: [Key; 13] = [
         POSITIVE,
         "Drills: web thickness, mm; below the diameter",
     ),
+    may(
+        "chisel_edge_angle_deg",
+        Holds::Number(Bounds::open(90.0, 180.0)),
+        "Drills: angle from a lip to the chisel edge, degrees [125]",
+    ),
     may("nose_radius_mm", NOT_NEGATIVE, "Turning: nose radius, mm [0]"),
     may(
         "cutting_edge_angle_deg",
@@ -286,7 +296,7 @@ pub(crate) const MATERIAL: [Key; 1] = [must(
     "Such as \"Ti-6Al-4V\"; of every cut that names none itself",
 )];
 
-pub(crate) const ORTHOGONAL: [Key; 6] = [
+pub(crate) const ORTHOGONAL: [Key; 11] = [
     must(
         "shear_stress_mpa",
         POSITIVE,
@@ -316,6 +326,31 @@ pub(crate) const ORTHOGONAL: [Key; 6] = [
         "inclination_deg",
         WITHIN_RIGHT_ANGLES,
         "Inclination of the edge, degrees [the helix angle]",
+    ),
+    may(
+        "shear_stress_law",
+        Holds::Array(4),
+        "Drills: shear stress in MPa at rake (degrees), chip thickness (mm), speed (m/min): [constant, per rake, per chip, per speed]",
+    ),
+    may(
+        "friction_angle_law",
+        Holds::Array(4),
+        "Drills: friction angle in degrees, likewise: [19.1, 0.29, 0.0, 0.0]",
+    ),
+    may(
+        "chip_ratio_law",
+        Holds::Array(4),
+        "Drills: chip ratio (a + b rake) chip^(c + d rake): [1.755, -0.028, 0.331, -0.0082]",
+    ),
+    may(
+        "edge_force_tangential_n_per_mm",
+        NOT_NEGATIVE,
+        "Drills: edge force along the speed, N per mm of lip [0]",
+    ),
+    may(
+        "edge_force_normal_n_per_mm",
+        NOT_NEGATIVE,
+        "Drills: edge force normal to the lip, N per mm of lip [0]",
     ),
 ];
 
@@ -433,7 +468,7 @@ pub(crate) const CUT: [Key; 20] = [
     may("material", Holds::Text, "Of this cut, where cuts are of several"),
 ];
 
-pub(crate) const LOBES: [Key; 20] = [
+pub(crate) const LOBES: [Key; 25] = [
     must("process", PROCESS, "Milling, drilling or turning"),
     must(
         "source",
@@ -462,6 +497,11 @@ pub(crate) const LOBES: [Key; 20] = [
         "Radial cutting coefficient, N/mm² [of the campaign's cuts]",
     ),
     may("kac_n_per_mm2", ANY, "Axial cutting coefficient, N/mm²"),
+    may(
+        "coefficients",
+        Holds::Words(&["orthogonal"]),
+        "Drilling: predict them from [orthogonal] and the drill's geometry, in place of ktc, krc, kac and cuts",
+    ),
     may("teeth", TEETH, "Number of teeth [that of the tool]"),
     may(
         "immersion",
@@ -491,7 +531,23 @@ pub(crate) const LOBES: [Key; 20] = [
     may(
         "process_damping_n_per_m",
         NOT_NEGATIVE,
-        "Milling: C in the damping C/V of the flank, N/m; not zero-order",
+        "Milling (not zero-order) and drilling: C in the damping C/V of the flank, N/m",
+    ),
+    may(
+        "indentation_n_per_mm3",
+        POSITIVE,
+        "Drilling: indentation stiffness of the material, N/mm³, with wear_land_mm in place of process_damping_n_per_m",
+    ),
+    may("wear_land_mm", POSITIVE, "Drilling: width of the worn flank, mm"),
+    may(
+        "margin_stiffness_n_per_m",
+        NOT_NEGATIVE,
+        "Drilling: stiffness between the margins and the wall of the hole, N/m [the tip is free]",
+    ),
+    may(
+        "margin_damping_ns_per_m",
+        NOT_NEGATIVE,
+        "Drilling: damping between the margins and the wall, N·s/m [0]",
     ),
     may(
         "half_point_angle_deg",
@@ -561,7 +617,27 @@ pub(crate) const REDUNDANCY: [Key; 4] = [
     ),
 ];
 
-pub(crate) const HOLE: [Key; 6] = [
+pub(crate) const CONTACT: [Key; 5] = [
+    may("name", Holds::Text, "Such as \"pressure foot\""),
+    must(
+        "direction",
+        Holds::Words(&["axial", "lateral", "x", "y"]),
+        "Along the tool, across it in all directions, or across it along one axis",
+    ),
+    must("stiffness_n_per_m", NOT_NEGATIVE, "Contact stiffness, N/m"),
+    may(
+        "damping_ns_per_m",
+        NOT_NEGATIVE,
+        "Viscous contact damping, N·s/m [0]",
+    ),
+    may(
+        "preload_n",
+        NOT_NEGATIVE,
+        "Force at which it gives way, N: along the tool the foot's pressure, across it what friction holds [it never does]",
+    ),
+];
+
+pub(crate) const HOLE: [Key; 7] = [
     may("thrust_n", ANY, "Against the tool, N [from the coefficients]"),
     may(
         "torque_nm",
@@ -588,7 +664,15 @@ pub(crate) const HOLE: [Key; 6] = [
         POSITIVE,
         "Tolerance of the axis, degrees [0.5]",
     ),
+    may(
+        "diameter_tolerance",
+        Holds::Words(&HOLE_TOLERANCES),
+        "Tolerance of the diameter (ISO 286), such as \"H8\"; drilling",
+    ),
 ];
+
+/// Tolerances of a diameter that `[lobes.hole]` knows: ISO 286, position H, in the order of the grades from 6 on.
+pub(crate) const HOLE_TOLERANCES: [&str; 8] = ["H6", "H7", "H8", "H9", "H10", "H11", "H12", "H13"];
 
 pub(crate) const LOBE_TOOL: [Key; 1] = [must(
     "segment",

@@ -11,6 +11,7 @@ use crate::commands::text::{number, table, warnings};
 use crate::commands::{CampaignArg, Outcome};
 use crate::files::write_new;
 use crate::identify::{Options, StructureModel};
+use crate::lobes::drilling::contact::held_report;
 use crate::robot::rigid::STANDARD_GRAVITY;
 use crate::robot::urdf::{self, Sources};
 use crate::robot::{Baseline, Dual, PostureReport, export};
@@ -181,6 +182,14 @@ fn postures(
                     .robot
                     .gravity_torques_nm(&kinematics, Vector3::new(0.0, 0.0, -STANDARD_GRAVITY)),
             });
+            if !campaign.contacts.is_empty() {
+                let held = held_report(&model.robot, &kinematics, &chain(&baseline), &campaign.contacts)?;
+                value["held"] = json!({
+                    "natural_frequencies_hz": held.natural_frequencies_hz,
+                    "tcp_stiffness_n_per_m": axes(held.tcp_stiffness_n_per_m),
+                    "flange_stiffness_n_per_m": axes(held.flange_stiffness_n_per_m),
+                });
+            }
             if args.matrices {
                 let mut bending = baseline.clone();
                 if !model.has("link-flexibility") {
@@ -218,7 +227,28 @@ fn rows(matrix: &nalgebra::DMatrix<f64>) -> Value {
         .into()
 }
 
+/// The postures free, and held by the contacts where the campaign has any.
 fn describe(postures: &[Value]) -> String {
+    let held: Vec<Value> = postures
+        .iter()
+        .filter(|p| p["held"].is_object())
+        .map(|p| {
+            let mut held = p["held"].clone();
+            held["id"] = p["id"].clone();
+            held
+        })
+        .collect();
+    let free = stiffness_table(postures);
+    match held.is_empty() {
+        true => free,
+        false => format!(
+            "{free}\nwith the tool point held by [[contact]]\n{}",
+            stiffness_table(&held)
+        ),
+    }
+}
+
+fn stiffness_table(postures: &[Value]) -> String {
     let stiffness = |p: &Value, key: &str, axis: &str| number(p[key][axis].as_f64().unwrap_or(0.0) / 1e6, 4);
     let rows: Vec<Vec<String>> = postures
         .iter()

@@ -3,8 +3,9 @@
 use serde_json::{Value, json};
 
 use crate::analysis::{LobeAnalysis, LobeCase};
+use crate::campaign::Process;
 use crate::commands::text::{number, table};
-use crate::lobes::hole::{HoleCheck, HoleError, Uncertain};
+use crate::lobes::drilling::hole::{HoleCheck, HoleError, Uncertain};
 
 /// An entry of `hole[]`.
 fn entry(posture: Option<&str>, angle_deg: Option<f64>, hole: &HoleError, check: &HoleCheck) -> Value {
@@ -22,10 +23,45 @@ fn entry(posture: Option<&str>, angle_deg: Option<f64>, hole: &HoleError, check:
         "tilt_p95_deg": hole.tilt_deg.upper,
         "within_position_tolerance": tolerance.position_met(hole),
         "within_perpendicularity_tolerance": tolerance.perpendicularity_met(hole),
+        "diameter_oversize_mm": hole.oversize_mm.value,
+        "diameter_oversize_std_mm": hole.oversize_mm.std,
+        "diameter_oversize_p95_mm": hole.oversize_mm.upper,
+        "within_diameter_tolerance": tolerance.diameter_met(hole),
+        "compensation": compensation(hole),
+        "contacts": hole.contacts,
+        "skating_mm": hole.skating_mm,
         "thrust_n": load.thrust_n,
         "torque_nm": load.torque_nm,
         "lateral_n": load.lateral_n,
     })
+}
+
+/// The pose to command instead; null where there is none.
+fn compensation(hole: &HoleError) -> Value {
+    let Some(Ok(pose)) = &hole.compensation else {
+        return Value::Null;
+    };
+    json!({
+        "joints_deg": pose.joints_deg,
+        "position_m": pose.position_m,
+        "rpy_deg": pose.rpy_rad.map(f64::to_degrees),
+        "offset_mm": pose.offset_m.map(|m| 1e3 * m),
+        "turn_deg": pose.turn_rad.map(f64::to_degrees),
+        "residual_um": 1e6 * pose.residual_m,
+        "residual_deg": pose.residual_rad.to_degrees(),
+    })
+}
+
+/// `feed_stiffness[]`.
+pub fn feed_stiffness(analysis: &LobeAnalysis) -> Value {
+    let entries = analysis.cases.iter().filter_map(|case| {
+        let found = case.feed_stiffness.as_ref()?;
+        let mut entry = json!(found);
+        entry["posture"] = json!(case.posture);
+        entry["angle_deg"] = json!(case.angle_deg);
+        Some(entry)
+    });
+    entries.collect()
 }
 
 /// `hole[]` and what it rests on.
@@ -43,6 +79,8 @@ pub fn documents(analysis: &LobeAnalysis) -> (Value, Value) {
         "source": basis.load.source,
         "position_tolerance_mm": basis.tolerance.position_mm,
         "perpendicularity_tolerance_deg": basis.tolerance.perpendicularity_deg,
+        "diameter_tolerance": basis.tolerance.diameter.map(|d| d.name()),
+        "diameter_tolerance_mm": basis.tolerance.diameter.map(|d| d.width_mm),
         "not_worked_out": Value::Null,
     });
     (entries.collect(), said)
@@ -136,10 +174,171 @@ pub fn text(analysis: &LobeAnalysis) -> String {
         "perpendicularity",
     ];
     out += &table(&header, &rows);
+    let holes: Vec<(String, &HoleError)> = match weighed {
+        Some((found, weighed)) => {
+            let angle = format!("{:.1}°, recommended", found.recommendation.point.angle_deg);
+            vec![(format!("{} at {angle}", found.posture), &weighed.recommended)]
+        }
+        None => {
+            let cases = analysis.cases.iter();
+            cases
+                .filter_map(|c| Some((c.posture.clone().unwrap_or_else(|| "–".into()), c.hole.as_ref()?)))
+                .collect()
+        }
+    };
+    out += &diameter_text(&holes, check);
+    out += &compensation_text(&holes);
+    out += &contacts_text(&holes);
     if let Some((found, weighed)) = weighed {
         out += &format!("{}\n", weighed.sentence(found));
     }
     out
+}
+
+/// The diameter against its tolerance; empty where that is not judged.
+fn diameter_text(holes: &[(String, &HoleError)], check: &HoleCheck) -> String {
+    let Some(diameter) = &check.tolerance.diameter else {
+        return String::new();
+    };
+    let mut out = format!(
+        "Diameter, {}: up to {} mm over nominal; what the turning lateral force of {} N adds to what the drill itself cuts\n",
+        diameter.name(),
+        diameter.width_mm,
+        number(check.load.lateral_n, 4)
+    );
+    if check.load.lateral_n == 0.0 {
+        return out + "  nothing: give lateral_n in [lobes.hole] to have it judged\n";
+    }
+    let rows: Vec<Vec<String>> = holes
+        .iter()
+        .map(|(place, hole)| {
+            let mut row = vec![place.clone()];
+            row.extend(figures(&hole.oversize_mm));
+            let met = check.tolerance.diameter_met(hole) == Some(true);
+            row.push(if met { "within" } else { "OUT" }.into());
+            row
+        })
+        .collect();
+    out += &table(&["posture", "oversize mm", "± mm", "95 % mm", "diameter"], &rows);
+    out
+}
+
+/// The poses to command so that thrust and torque push the tool to where it should be.
+fn compensation_text(holes: &[(String, &HoleError)]) -> String {
+    let mut reasons = String::new();
+    let mut rows = Vec::new();
+    for (place, hole) in holes {
+        match &hole.compensation {
+            Some(Ok(pose)) => {
+                let mut row = vec![place.clone()];
+                row.extend(pose.offset_m.map(|m| format!("{:+.3}", 1e3 * m)));
+                row.extend(pose.turn_rad.map(|a| format!("{:+.4}", a.to_degrees())));
+                let joints: Vec<String> = pose.joints_deg.iter().map(|q| format!("{q:.4}")).collect();
+                row.push(joints.join(" "));
+                row.push(format!("{:.1e}", 1e6 * pose.residual_m));
+                rows.push(row);
+            }
+            Some(Err(reason)) => reasons += &format!("  {place}: not compensated: {reason}\n"),
+            None => {}
+        }
+    }
+    if rows.is_empty() {
+        return reasons;
+    }
+    let header = [
+        "posture",
+        "dx mm",
+        "dy mm",
+        "dz mm",
+        "turn x °",
+        "y °",
+        "z °",
+        "joints °",
+        "left µm",
+    ];
+    format!(
+        "To command instead, so that thrust and torque push the tool to where it should be (base axes)\n{}{reasons}",
+        table(&header, &rows)
+    )
+}
+
+/// What the contacts take; empty without any.
+fn contacts_text(holes: &[(String, &HoleError)]) -> String {
+    let mut out = String::new();
+    for (place, hole) in holes {
+        for contact in &hole.contacts {
+            let held = contact
+                .preload_n
+                .map_or("no preload given".into(), |p| format!("holds {} N", number(p, 4)));
+            let verdict = if contact.gives_way { ": GIVES WAY" } else { "" };
+            out += &format!(
+                "  {place}: {} takes {} N ({held}){verdict}\n",
+                contact.name,
+                number(contact.force_n, 4)
+            );
+        }
+        if let Some(skating_mm) = hole.skating_mm {
+            out += &format!(
+                "  {place}: pressing the foot on moves the tool point by {skating_mm:.4} mm across its axis, if nothing but the free \
+                 robot holds it (not in the position error)\n"
+            );
+        }
+    }
+    match out.is_empty() {
+        true => out,
+        false => format!("Contacts\n{out}"),
+    }
+}
+
+/// How stiff the tool point is along the feed at each posture.
+pub fn feed_stiffness_text(analysis: &LobeAnalysis) -> String {
+    let cases = analysis.cases.iter();
+    let mut rows: Vec<Vec<String>> = cases
+        .filter_map(|case| {
+            let found = case.feed_stiffness.as_ref()?;
+            let mega = |v: f64| format!("{:.4}", 1e-6 * v);
+            Some(vec![
+                case.posture.clone().unwrap_or_else(|| "–".into()),
+                case.angle_deg.map_or("–".into(), |a| format!("{a:.1}")),
+                mega(found.along_feed_n_per_m),
+                format!("{:.3}", found.index),
+                mega(found.along_axis_n_per_m),
+                mega(found.across_least_n_per_m),
+                mega(found.across_greatest_n_per_m),
+                format!("{:.1}", found.stiffest_across_deg),
+            ])
+        })
+        .collect();
+    if rows.is_empty() {
+        return String::new();
+    }
+    if analysis.redundancy.is_some() {
+        // Over the angle: the five stiffest along the feed.
+        rows.sort_by(|a, b| {
+            b[2].parse::<f64>()
+                .unwrap_or(0.0)
+                .total_cmp(&a[2].parse().unwrap_or(0.0))
+        });
+        rows.truncate(5);
+    }
+    let feed = match analysis.process {
+        Process::Drilling => "the feed runs along the tool",
+        _ => "feed across the tool in the stiffest direction",
+    };
+    let header = [
+        "posture",
+        "angle °",
+        "along feed MN/m",
+        "index",
+        "along tool",
+        "across, least",
+        "greatest",
+        "at °",
+    ];
+    format!(
+        "\nStatic stiffness of the tool point ({feed}; index: over the stiffest direction there is)\n{}",
+        table(&header, &rows)
+    )
 }
 
 fn figures(of: &Uncertain) -> [String; 3] {

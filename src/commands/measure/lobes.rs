@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use crate::Result;
 use crate::analysis::{LobeAnalysis, RedundancyAnalysis};
 use crate::campaign::{Campaign, LobeMethod, Process};
-use crate::commands::measure::{hole, lobe_tool};
+use crate::commands::measure::{drill, hole, lobe_tool};
 use crate::commands::next_step::Guide;
 use crate::commands::text::{number, table, warnings};
 use crate::commands::{CampaignArg, Outcome};
@@ -59,6 +59,7 @@ fn document(analysis: &LobeAnalysis) -> Value {
                 })),
                 "lateral": case.by_block.as_ref().map(|b| lobe_tool::block(&b[0])),
                 "axial_torsional": case.by_block.as_ref().map(|b| lobe_tool::block(&b[1])),
+                "whirling": case.whirling,
                 "frf": case.description,
                 "band_hz": [case.band_hz.0, case.band_hz.1],
             })
@@ -92,6 +93,11 @@ fn document(analysis: &LobeAnalysis) -> Value {
             "included": block.is_ok(),
             "left_out_because": block.as_ref().err(),
         })),
+        "drill": drill::document(analysis),
+        "flank_damping": analysis.flank_damping.map(|d| json!({
+            "lateral_n_per_m2": d.lateral_n_per_m2,
+            "axial_n_per_m2": d.axial_n_per_m2,
+        })),
         "hole_width_mm": analysis.drilled.map(|hole| hole.width_mm),
         "tool": lobe_tool::document(analysis),
         "revision": analysis.revision,
@@ -103,6 +109,7 @@ fn document(analysis: &LobeAnalysis) -> Value {
         "outcomes": analysis.outcomes,
         "hole": hole,
         "hole_basis": hole_basis,
+        "feed_stiffness": hole::feed_stiffness(analysis),
         "redundancy": analysis.redundancy.as_ref().map(|found| redundancy(found, hole::weighing(analysis))),
         "warnings": analysis.warnings,
     })
@@ -256,6 +263,19 @@ fn text(analysis: &LobeAnalysis) -> String {
         number(analysis.coefficients.ktc_n_per_mm2, 4),
         number(analysis.coefficients.krc_n_per_mm2, 4),
     );
+    if let Some(damping) = &analysis.flank_damping {
+        out += &format!(
+            "Process damping of the flanks: at n rpm {} kN·s/m² across the tool and {} along it, per metre of width, times 1000/n\n",
+            number(
+                1e-3 * damping.lateral_n_per_m2 / (std::f64::consts::TAU * 1000.0 / 60.0),
+                3
+            ),
+            number(
+                1e-3 * damping.axial_n_per_m2 / (std::f64::consts::TAU * 1000.0 / 60.0),
+                3
+            ),
+        );
+    }
     // Over the redundancy angle all cases are alike.
     let shown = if analysis.redundancy.is_some() {
         1
@@ -278,6 +298,7 @@ fn text(analysis: &LobeAnalysis) -> String {
         ),
         None => "\nStable at every speed and depth\n".to_string(),
     };
+    out += &drill::text(analysis);
     out += &lobe_tool::text(analysis);
     let did = analysis.what_effects_did();
     if !did.is_empty() {
@@ -334,6 +355,7 @@ fn text(analysis: &LobeAnalysis) -> String {
         out += &redundancy_text(found);
     }
     out += &hole::text(analysis);
+    out += &hole::feed_stiffness_text(analysis);
     out + &warnings(&analysis.warnings)
 }
 
@@ -372,10 +394,13 @@ mod tests {
                 ktc_n_per_mm2: Some(1014.2),
                 krc_n_per_mm2: Some(619.9),
                 kac_n_per_mm2: None,
+                from_orthogonal: false,
                 teeth: Some(2),
                 immersion: None,
                 half_point_angle_deg: Some(67.5),
                 process_damping_n_per_m: None,
+                margin_stiffness_n_per_m: None,
+                margin_damping_ns_per_m: None,
                 feed_per_rev_mm: None,
                 spindle_rpm: [100.0, 900.0, 1.0],
                 modes: vec![
@@ -391,6 +416,7 @@ mod tests {
             channels: Vec::new(),
             orthogonal: None,
             plan: Default::default(),
+            contacts: Vec::new(),
         }
     }
 

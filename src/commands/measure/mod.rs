@@ -1,7 +1,8 @@
 //! Measure and cut.
 
 pub(crate) mod cfc;
-pub(crate) mod hole;
+pub(crate) mod drill;
+mod hole;
 pub(crate) mod lobe_tool;
 pub(crate) mod lobes;
 pub(crate) mod modal;

@@ -15,7 +15,7 @@ use crate::commands::next_step::{self, Guide};
 use crate::commands::text::{Emphasis, table};
 use crate::modal::chosen::Choice;
 use crate::modal::operational::OperationalSettings;
-use crate::modal::{Estimator, Method, Settings, TapSettings, Tolerances};
+use crate::modal::{Estimator, FrfMode, Method, Settings, TapSettings, Tolerances};
 use crate::{InputError, Result};
 
 #[derive(clap::Args)]
@@ -256,6 +256,19 @@ fn output_only(args: &ModalArgs, folder: bool) -> Result<Outcome> {
     ))
 }
 
+/// The answers of all methods for a mode, the recommended one marked.
+fn estimates(mode: &FrfMode) -> impl Iterator<Item = serde_json::Value> + '_ {
+    mode.estimates.iter().map(|estimate| {
+        let mut value = json!(estimate);
+        value["recommended"] = json!(estimate.method == mode.recommended);
+        if estimate.method == mode.recommended {
+            value["reason"] = json!(mode.reason);
+            value["disturbance"] = json!(mode.disturbance);
+        }
+        value
+    })
+}
+
 fn document(analysis: &ModalAnalysis, campaign: bool) -> serde_json::Value {
     // The set is a posture in a campaign, else a file.
     let set_key = if campaign { "posture" } else { "file" };
@@ -265,7 +278,7 @@ fn document(analysis: &ModalAnalysis, campaign: bool) -> serde_json::Value {
     let mut sets = Vec::new();
     for set in &analysis.sets {
         for frf in &set.frfs {
-            let modes: Vec<_> = frf.modes.modes.iter().flat_map(|m| &m.estimates).collect();
+            let modes: Vec<_> = frf.modes.modes.iter().flat_map(estimates).collect();
             frfs.push(json!({
                 "name": frf.input.name,
                 set_key: set.set,
@@ -478,6 +491,7 @@ fn single(set: &SetModes, out: &mut String) {
                     e.method.id(),
                 );
             }
+            let _ = writeln!(out, "      take the {}: {}", mode.recommended.id(), mode.reason);
         }
     }
 }

@@ -428,6 +428,7 @@ mod tests {
             lead_angle_deg: 90.0,
             half_point_angle_deg: None,
             web_thickness_mm: None,
+            chisel_edge_angle_deg: 125.0,
             each_tooth: Vec::new(),
         }
     }
@@ -617,6 +618,7 @@ mod tests {
             lead_angle_deg: 90.0,
             half_point_angle_deg: Some(59.0),
             web_thickness_mm: Some(1.2),
+            chisel_edge_angle_deg: 125.0,
             each_tooth: Vec::new(),
             teeth: 2,
         };

@@ -308,6 +308,7 @@ mod tests {
             lead_angle_deg: 90.0,
             half_point_angle_deg: None,
             web_thickness_mm: None,
+            chisel_edge_angle_deg: 125.0,
             each_tooth: Vec::new(),
         };
         let mut all = Vec::new();

@@ -19,8 +19,10 @@ pub struct DrillGeometry {
     pub feed_per_rev_mm: f64,
 }
 
-/// Chisel edge angle (docs/physics.md, "Cutting forces"), from which its half length follows.
-const CHISEL_ANGLE_DEG: f64 = 125.0;
+/// Half the length of the chisel edge, w/(2 sin ψ): where the lips begin (docs/physics.md, "Cutting forces").
+pub fn chisel_half_length_mm(tool: &Tool, web_thickness_mm: f64) -> f64 {
+    0.5 * web_thickness_mm / tool.chisel_edge_angle_deg.to_radians().sin()
+}
 
 impl DrillGeometry {
     /// # Errors
@@ -43,7 +45,7 @@ impl DrillGeometry {
             let web = tool.web_thickness_mm.ok_or_else(|| {
                 Error::computation("a hole without pilot needs [tool] web_thickness_mm, which is not given")
             })?;
-            0.5 * web / CHISEL_ANGLE_DEG.to_radians().sin()
+            chisel_half_length_mm(tool, web)
         };
         let radius_mm = 0.5 * tool.diameter_mm;
         if inner_radius_mm >= radius_mm {

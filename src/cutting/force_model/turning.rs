@@ -142,6 +142,7 @@ mod tests {
             lead_angle_deg: kappa_deg,
             half_point_angle_deg: None,
             web_thickness_mm: None,
+            chisel_edge_angle_deg: 125.0,
             each_tooth: Vec::new(),
         };
         let geometry = CutGeometry::Turning {

@@ -1,5 +1,6 @@
 //! Φ(iω) at the tool: of modes, of the robot model, of measured lines, with the tool as a beam.
 
+pub mod feed_stiffness;
 pub mod frf;
 pub mod poles;
 pub mod robot;

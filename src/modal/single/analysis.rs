@@ -8,8 +8,9 @@ use rayon::prelude::*;
 use crate::Result;
 use crate::modal::settings::Settings;
 use crate::modal::single::curve::{Curve, MIN_LINES};
-use crate::modal::single::frf_modes::{FrfMode, FrfModes, Method, ModeEstimate};
+use crate::modal::single::frf_modes::{Disturbance, FrfMode, FrfModes, Method, ModeEstimate};
 use crate::modal::single::local_fit::{self, LocalSolution, Pole, Problem, ROUGHLY_SETTLED, SETTLED};
+use crate::modal::single::method_bias::{FittedCurves, MethodBias};
 use crate::modal::single::peaks::{self, FrfPeak};
 use crate::modal::single::{circle_fit, half_power};
 
@@ -47,6 +48,16 @@ const MAX_RELATIVE_STD: f64 = 0.7;
 /// the noise: an allowance of this part of the line spacing on the half-power width. (Three measured
 /// free–free beam records at 0.05–0.2 lines in the band differ from each other by about this much.)
 const LEAKAGE_LINES: f64 = 0.02;
+/// A local fit that leaves this many times the noise power lacks something.
+const MORE_THAN_NOISE: f64 = 2.0;
+/// One more pole that leaves less than this part of the variance is a mode.
+const MOST_TAKEN_AWAY: f64 = 0.5;
+/// Modes nearer to each other than this many sums of their half-widths overlap.
+const OVERLAP_WIDTHS: f64 = 4.0;
+/// A bias of the damping below this part of it is not worth a word.
+const WORTH_TELLING: f64 = 0.02;
+/// A simpler method whose error is below this part of the local fit's is to be taken instead.
+const MUCH_BETTER: f64 = 0.7;
 /// Modes of one FRF closer than this part of their half-width are one.
 const SAME_WIDTHS: f64 = 0.1;
 /// Fewer lines than this inside the half-power band are worth a warning.
@@ -140,14 +151,17 @@ fn analyse(
         .map(|p| Start::new(&curve, p, noise_std[p.index]))
         .collect();
     let mut refused = Vec::new();
+    let mut found = Vec::new();
     for (index, start) in starts.iter().enumerate() {
         match mode_at(&curve, &starts, index, noise_std[start.peak.index], effort) {
-            Ok(mode) => result.modes.push(mode),
+            Ok(mode) => found.push(mode),
             Err(why) => {
                 refused.push(format!("{:.2} Hz ({why})", curve.frequency_hz[start.peak.index]));
             }
         }
     }
+    settle(&curve, &mut found, &noise_std);
+    result.modes = found.into_iter().map(|f| f.mode).collect();
     result
         .modes
         .sort_by(|a, b| a.best().frequency_hz.total_cmp(&b.best().frequency_hz));
@@ -208,14 +222,14 @@ fn mode_at(
     index: usize,
     noise_std: f64,
     effort: Effort,
-) -> std::result::Result<FrfMode, String> {
+) -> std::result::Result<Found, String> {
     let start = &starts[index];
     let f = &curve.frequency_hz;
     let line_hz = curve.spacing_hz(start.peak.index);
     let mut estimates = Vec::with_capacity(3);
     let local = local(curve, starts, index, effort);
     let mut why = "its lines do not determine a pole".to_string();
-    if let Some((solution, pole)) = &local {
+    if let Some((solution, pole, _)) = &local {
         match judge(curve, solution, *pole, &start.peak, noise_std) {
             Ok(estimate) => estimates.push(estimate),
             Err(problem) => why = problem,
@@ -233,6 +247,8 @@ fn mode_at(
             damping_ratio: circle.damping_ratio,
             frequency_std_hz: Some(circle.frequency_std_hz),
             damping_std: Some(circle.damping_std),
+            frequency_bias_hz: None,
+            damping_bias: None,
             damping_spread: circle.damping_spread,
             modal_constant: Some(circle.diameter * (2.0 * circle.damping_ratio * w0)),
             one_sided: false,
@@ -245,6 +261,8 @@ fn mode_at(
             damping_ratio: half.damping_ratio,
             frequency_std_hz: half.std.map(|s| s.frequency_hz),
             damping_std: half.std.map(|s| s.damping_ratio),
+            frequency_bias_hz: None,
+            damping_bias: None,
             damping_spread: None,
             modal_constant: None,
             one_sided: half.reached != [true, true],
@@ -274,6 +292,23 @@ fn mode_at(
             && (0.5..=2.0).contains(&(e.damping_ratio / best.damping_ratio))
     });
     let contradicted = estimates.len() < methods;
+    let fitted = local.as_ref().and_then(|(solution, pole, lines)| {
+        FittedCurves::new(curve, solution, *pole, lines.first, start.peak.index)
+    });
+    let mut disturbance = None;
+    for estimate in estimates.iter_mut().filter(|e| e.method != Method::LocalFit) {
+        let bias = fitted.as_ref().and_then(|f| f.bias(estimate.method));
+        disturbance = disturbance.or(add_bias(estimate, bias, &best));
+    }
+    if contradicted {
+        disturbance = disturbance.or_else(|| {
+            let methods = [Method::CircleFit, Method::HalfPower];
+            let gone = methods
+                .iter()
+                .find(|m| estimates.iter().all(|e| e.method != **m))?;
+            fitted.as_ref()?.bias(*gone).map(|bias| bias.cause)
+        });
+    }
     let lines_in_half_power_band = 2.0 * best.damping_ratio * best.frequency_hz / line_hz;
     if lines_in_half_power_band < FINE_LINES {
         let leakage = LEAKAGE_LINES * line_hz / (2.0 * best.frequency_hz);
@@ -281,12 +316,201 @@ fn mode_at(
             estimate.damping_std = estimate.damping_std.map(|std| std.hypot(leakage));
         }
     }
-    Ok(FrfMode {
+    let Some((solution, pole, lines)) = local else {
+        return Err(why);
+    };
+    let mode = FrfMode {
         lines_in_half_power_band,
         significance: start.peak.significance,
         contradicted,
+        disturbance,
+        recommended: Method::LocalFit,
+        reason: String::new(),
         estimates,
+    };
+    Ok(Found {
+        mode,
+        solution,
+        pole,
+        lines,
     })
+}
+
+/// What can be said of a mode only when the others are known: how far they push the local fit, whose window does not hold
+/// them all; whether one of them overlaps; which answer is to be taken.
+fn settle(curve: &Curve, found: &mut [Found], noise_std: &[f64]) {
+    let poles: Vec<(Pole, Complex64)> = found
+        .iter()
+        .map(|f| (f.solution.poles[f.pole], f.solution.residues[f.pole]))
+        .collect();
+    for (own, one) in found.iter_mut().enumerate() {
+        let hidden = hidden_neighbour(curve, one, noise_std);
+        let bias = hidden.unwrap_or_else(|| local_bias(curve, one, &poles));
+        for estimate in &mut one.mode.estimates {
+            estimate.frequency_std_hz = estimate.frequency_std_hz.map(|std| std + bias[0].abs());
+            estimate.damping_std = estimate.damping_std.map(|std| std + bias[1].abs());
+        }
+        let half_width = |p: &Pole| p.damping_ratio * p.frequency_hz;
+        let here = poles[own].0;
+        let overlaps = poles.iter().enumerate().any(|(other, (p, _))| {
+            let apart = (p.frequency_hz - here.frequency_hz).abs();
+            other != own && apart < OVERLAP_WIDTHS * (half_width(p) + half_width(&here))
+        });
+        if one.mode.contradicted || one.mode.disturbance.is_some() || hidden.is_some() {
+            let near = (overlaps || hidden.is_some()).then_some(Disturbance::Overlap);
+            one.mode.disturbance = near.or(one.mode.disturbance);
+        }
+        (one.mode.recommended, one.mode.reason) =
+            recommended(&one.mode.estimates, one.mode.disturbance, one.mode.contradicted);
+    }
+}
+
+/// Where the local fit leaves more than noise, a mode without a peak of its own may stand beside: one more pole is tried on
+/// either side. Where that takes away most of what is left, the answer is by how much the fit without it was off
+/// (frequency in Hz, damping ratio).
+fn hidden_neighbour(curve: &Curve, one: &Found, noise_std: &[f64]) -> Option<[f64; 2]> {
+    let lines = one.lines.first..one.lines.first + one.lines.weight.len();
+    let (frequency_hz, mobility) = (
+        curve.frequency_hz.get(lines.clone())?,
+        curve.mobility.get(lines.clone())?,
+    );
+    let noise: f64 = noise_std.get(lines)?.iter().map(|s| s * s).sum();
+    let left: f64 = one.solution.residual.iter().map(|r| r.norm_sqr()).sum();
+    let freedom = frequency_hz.len().checked_sub(2 * one.solution.poles.len() + 4)?;
+    if freedom < 4 || left < MORE_THAN_NOISE * noise {
+        return None;
+    }
+    let problem = Problem {
+        frequency_hz,
+        mobility,
+        line_weight: one.lines.weight.clone(),
+        residual_terms: residual_terms(frequency_hz.len()),
+    };
+    let own = one.solution.poles[one.pole];
+    let starts = [-4.0, -1.5, 1.5, 4.0].map(|widths| Pole {
+        frequency_hz: own.frequency_hz * (1.0 + widths * own.damping_ratio),
+        ..own
+    });
+    let best = starts
+        .into_iter()
+        .filter_map(|extra| {
+            let mut poles = one.solution.poles.clone();
+            poles.push(extra);
+            local_fit::fit(&problem, &poles, ROUGHLY_SETTLED)
+        })
+        .min_by(|a, b| a.variance.total_cmp(&b.variance))?;
+    let found = best.poles[one.pole];
+    (best.variance < MOST_TAKEN_AWAY * one.solution.variance).then(|| {
+        [
+            found.frequency_hz - own.frequency_hz,
+            found.damping_ratio - own.damping_ratio,
+        ]
+    })
+}
+
+/// By how much the local fit is off (frequency in Hz, damping ratio) on a curve that is the sum of all modes found, fitted on
+/// the lines and with the neighbours that it had.
+fn local_bias(curve: &Curve, one: &Found, poles: &[(Pole, Complex64)]) -> [f64; 2] {
+    let lines = one.lines.first..one.lines.first + one.lines.weight.len();
+    let Some(frequency_hz) = curve.frequency_hz.get(lines) else {
+        return [0.0; 2];
+    };
+    let sum = |f: &f64| -> Complex64 {
+        poles
+            .iter()
+            .map(|(p, residue)| {
+                let u = crate::modal::single::curve::detuning(*f, p.frequency_hz);
+                residue / Complex64::new(p.damping_ratio, u)
+            })
+            .sum()
+    };
+    let mobility: Vec<Complex64> = frequency_hz.iter().map(sum).collect();
+    let problem = Problem {
+        frequency_hz,
+        mobility: &mobility,
+        line_weight: one.lines.weight.clone(),
+        residual_terms: residual_terms(frequency_hz.len()),
+    };
+    let own = one.solution.poles[one.pole];
+    match local_fit::fit(&problem, &one.solution.poles, SETTLED) {
+        Some(again) => {
+            let found = again.poles[one.pole];
+            [
+                found.frequency_hz - own.frequency_hz,
+                found.damping_ratio - own.damping_ratio,
+            ]
+        }
+        None => [0.0; 2],
+    }
+}
+
+/// Puts a method's bias at this peak into its errors (where it is not known: its distance from the local fit), and says
+/// whether it is more than the noise makes of it anyway.
+fn add_bias(
+    estimate: &mut ModeEstimate,
+    bias: Option<MethodBias>,
+    local: &ModeEstimate,
+) -> Option<Disturbance> {
+    let (frequency_hz, damping) = bias.map_or_else(
+        || {
+            (
+                estimate.frequency_hz - local.frequency_hz,
+                estimate.damping_ratio - local.damping_ratio,
+            )
+        },
+        |b| (b.frequency_hz, b.damping_ratio),
+    );
+    let noise = estimate.damping_std.unwrap_or(0.0);
+    (estimate.frequency_bias_hz, estimate.damping_bias) = (Some(frequency_hz), Some(damping));
+    estimate.frequency_std_hz = estimate.frequency_std_hz.map(|std| std + frequency_hz.abs());
+    estimate.damping_std = estimate.damping_std.map(|std| std + damping.abs());
+    let matters = damping.abs() > (0.5 * noise).max(WORTH_TELLING * local.damping_ratio);
+    bias.filter(|_| matters).map(|b| b.cause)
+}
+
+/// The answer to take and why: the local fit, unless a simpler one is known much better.
+fn recommended(
+    estimates: &[ModeEstimate],
+    disturbance: Option<Disturbance>,
+    contradicted: bool,
+) -> (Method, String) {
+    let error = |e: &ModeEstimate| e.damping_std.unwrap_or(f64::INFINITY);
+    let percent = |e: &ModeEstimate| 100.0 * error(e) / e.damping_ratio;
+    let local = &estimates[0];
+    let simpler = estimates[1..]
+        .iter()
+        .filter(|e| error(e) < MUCH_BETTER * error(local))
+        .min_by(|a, b| error(a).total_cmp(&error(b)));
+    if let Some(best) = simpler {
+        let reason = format!(
+            "it has fewer unknowns, nothing disturbs it here, and its damping is known to {:.1} %, that of the local fit to {:.1} %",
+            percent(best),
+            percent(local)
+        );
+        return (best.method, reason);
+    }
+    let biases: Vec<String> = estimates[1..]
+        .iter()
+        .filter_map(|e| {
+            let share = 100.0 * e.damping_bias? / local.damping_ratio;
+            Some(format!("{} by {share:+.1} %", e.method.id()))
+        })
+        .collect();
+    let reason = match disturbance {
+        Some(cause) => {
+            let off = match (contradicted, &biases[..]) {
+                (true, []) => "the others are far off".to_string(),
+                (_, biases) => format!("it puts the damping of {} off", biases.join(", of ")),
+            };
+            format!("{} here: only the local fit has that in it; {off}", cause.words())
+        }
+        None if contradicted => {
+            "the other methods contradict it, and it has the neighbours and a residual in it".into()
+        }
+        None if biases.is_empty() => "the only answer that these lines give".into(),
+        None => "all methods agree, and it uses all lines around the peak".into(),
+    };
+    (local.method, reason)
 }
 
 /// Is the fitted pole a mode that this peak shows?
@@ -328,6 +552,8 @@ fn judge(
         damping_ratio,
         frequency_std_hz: Some(frequency_std_hz),
         damping_std: Some(damping_std),
+        frequency_bias_hz: None,
+        damping_bias: None,
         damping_spread: None,
         // Y = R/(ζ + iu) is iωA/(ω₀² − ω² + 2iζω₀ω) with R = A/(2ω₀).
         modal_constant: Some(residue * (2.0 * TAU * frequency_hz)),
@@ -335,9 +561,28 @@ fn judge(
     })
 }
 
-/// The best determined local fit and the position of the peak's pole in it.
-fn local(curve: &Curve, starts: &[Start], index: usize, effort: Effort) -> Option<(LocalSolution, usize)> {
-    let mut best: Option<(f64, LocalSolution, usize)> = None;
+/// The lines of a local fit.
+struct Lines {
+    first: usize,
+    weight: Vec<f64>,
+}
+
+/// A mode and the local fit behind it.
+struct Found {
+    mode: FrfMode,
+    solution: LocalSolution,
+    pole: usize,
+    lines: Lines,
+}
+
+/// The best determined local fit, the position of the peak's pole in it, and its lines.
+fn local(
+    curve: &Curve,
+    starts: &[Start],
+    index: usize,
+    effort: Effort,
+) -> Option<(LocalSolution, usize, Lines)> {
+    let mut best: Option<(f64, LocalSolution, usize, Lines)> = None;
     // A window begins where the one before ended.
     let mut poles: Vec<Pole> = starts.iter().map(|s| s.pole).collect();
     for (k, &reach) in effort.windows.iter().enumerate() {
@@ -350,6 +595,8 @@ fn local(curve: &Curve, starts: &[Start], index: usize, effort: Effort) -> Optio
             solution,
             group,
             pole,
+            first_line,
+            line_weight,
             ..
         } = window;
         for (&member, found) in group.iter().zip(&solution.poles) {
@@ -361,17 +608,26 @@ fn local(curve: &Curve, starts: &[Start], index: usize, effort: Effort) -> Optio
         }
         let relative_std = solution.damping_std(pole) / solution.poles[pole].damping_ratio;
         if best.as_ref().is_none_or(|(least, ..)| relative_std < *least) {
-            best = Some((relative_std, solution, pole));
+            best = Some((
+                relative_std,
+                solution,
+                pole,
+                Lines {
+                    first: first_line,
+                    weight: line_weight,
+                },
+            ));
         }
         if enough {
             break;
         }
     }
-    best.map(|(_, solution, pole)| (solution, pole))
+    best.map(|(_, solution, pole, lines)| (solution, pole, lines))
 }
 
 /// The fit of the lines around a peak.
 struct WindowFit<'a> {
+    first_line: usize,
     frequency_hz: &'a [f64],
     line_weight: Vec<f64>,
     solution: LocalSolution,
@@ -456,13 +712,14 @@ fn fit_window<'a>(
 
     let pole = group.iter().position(|&g| g == index)?;
     let poles: Vec<Pole> = group.iter().map(|&g| poles[g]).collect();
+    let first_line = lines.start;
     let f = &curve.frequency_hz[lines.clone()];
     let y = &curve.mobility[lines];
     let mut problem = Problem {
         frequency_hz: f,
         mobility: y,
         line_weight: vec![1.0; f.len()],
-        residual_terms: if f.len() > 6 { 2 } else { 1 },
+        residual_terms: residual_terms(f.len()),
     };
 
     // Where the peak is a few lines only, its width is anyone's guess: try several.
@@ -500,12 +757,18 @@ fn fit_window<'a>(
         solution = refined;
     }
     Some(WindowFit {
+        first_line,
         frequency_hz: f,
         line_weight: problem.line_weight,
         solution,
         group,
         pole,
     })
+}
+
+/// Terms of the residual beside the poles, for so many lines.
+fn residual_terms(lines: usize) -> usize {
+    if lines > 6 { 2 } else { 1 }
 }
 
 /// 1/σ of each line from the model variance = a + b |Y|², a and b ≥ 0 from the residual of a fit.
@@ -594,6 +857,20 @@ fn quality_remarks(modes: &[FrfMode], remarks: &mut Vec<String>) {
             "circle fit or half-power contradict the local fit (close modes or coarse lines) and are left out: {}",
             contradicted.join(", ")
         ));
+    }
+    for cause in [Disturbance::Overlap, Disturbance::Residual] {
+        let disturbed: Vec<String> = modes
+            .iter()
+            .filter(|m| m.disturbance == Some(cause))
+            .map(|m| format!("{:.2} Hz", m.best().frequency_hz))
+            .collect();
+        if !disturbed.is_empty() {
+            remarks.push(format!(
+                "{}: half-power and circle fit are off there (in their stated errors), take the local fit: {}",
+                cause.words(),
+                disturbed.join(", ")
+            ));
+        }
     }
     let one_sided: Vec<String> = modes
         .iter()

@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 
 use crate::modal::synthetic::{Synthetic, SyntheticMode};
-use crate::modal::{FrfModes, Settings, analyse_frf, analyse_frfs};
+use crate::modal::{Disturbance, FrfMode, FrfModes, Method, Settings, analyse_frf, analyse_frfs};
 
 const MODES: [SyntheticMode; 3] = [
     SyntheticMode {
@@ -160,4 +160,176 @@ fn many_frfs_are_analysed_as_one_is() {
     let mut wrong = frfs;
     wrong[7].0.swap(2, 3);
     assert!(analyse_frfs(&wrong, &settings).is_err());
+}
+
+/// A mode of 12 Hz beside another, over distance (in sums of their half-widths), damping and noise: for each method the
+/// error of its damping and frequency over what is stated.
+struct Trial {
+    distance: f64,
+    mode: FrfMode,
+    off: Vec<(Method, f64, f64)>,
+}
+
+fn trials(seeds: u64) -> Vec<Trial> {
+    let mut found = Vec::new();
+    for distance in [1.6, 3.0, 6.0, 25.0] {
+        for zeta in [0.01, 0.03] {
+            for noise in [0.005, 0.02] {
+                for seed in 0..seeds {
+                    let sign = if seed % 2 == 0 { 1.0 } else { -1.0 };
+                    let at = 12.0 * (1.0 + 2.0 * distance * zeta);
+                    let pair = [
+                        SyntheticMode::new(12.0, zeta, 0.01),
+                        SyntheticMode::new(at, zeta, 0.01 * sign),
+                    ];
+                    let case = Synthetic::new(3.0, 40.0, 0.05, &pair).with_noise(noise, 0.0, 1000 + seed);
+                    for mode in analyse(case).modes {
+                        if (mode.best().frequency_hz - 12.0).abs() > 0.5 * zeta * 12.0 {
+                            continue;
+                        }
+                        let off = mode
+                            .estimates
+                            .iter()
+                            .filter_map(|e| {
+                                let damping = (e.damping_ratio - zeta) / e.damping_std?;
+                                Some((e.method, damping, (e.frequency_hz - 12.0) / e.frequency_std_hz?))
+                            })
+                            .collect();
+                        found.push(Trial { distance, mode, off });
+                    }
+                }
+            }
+        }
+    }
+    found
+}
+
+/// Shares of the errors within one and two stated errors, and how many there were.
+fn covered(errors: impl Iterator<Item = f64>) -> (f64, f64, usize) {
+    let errors: Vec<f64> = errors.map(f64::abs).collect();
+    let within =
+        |most: f64| errors.iter().filter(|e| **e <= most).count() as f64 / errors.len().max(1) as f64;
+    (within(1.0), within(1.96), errors.len())
+}
+
+/// The stated errors of all three methods hold the truth at least as often as they say, over distance, damping and noise,
+/// and at each distance by itself.
+fn errors_are_honest(seeds: u64, allowance: f64) {
+    let trials = trials(seeds);
+    let mut report = String::new();
+    let mut wrong = false;
+    for method in [Method::LocalFit, Method::CircleFit, Method::HalfPower] {
+        for distance in [None, Some(1.6), Some(3.0), Some(6.0), Some(25.0)] {
+            let of = |which: fn(&(Method, f64, f64)) -> f64| {
+                let here = trials
+                    .iter()
+                    .filter(move |t| distance.is_none_or(|d| t.distance == d));
+                covered(here.flat_map(|t| &t.off).filter(|o| o.0 == method).map(which))
+            };
+            for (what, (one, two, count)) in [("damping", of(|o| o.1)), ("frequency", of(|o| o.2))] {
+                report += &format!(
+                    "{} {distance:?} {what}: {one:.3} {two:.3} of {count}\n",
+                    method.id()
+                );
+                // Three standard deviations of a share of so many trials.
+                let chance =
+                    |share: f64| 3.0 * (share * (1.0 - share) / count.max(1) as f64).sqrt() + allowance;
+                wrong |= count > 20 && (one < 0.68 - chance(0.68) || two < 0.95 - chance(0.95));
+            }
+        }
+    }
+    assert!(!wrong, "{report}");
+    println!("{report}");
+}
+
+#[test]
+fn stated_errors_hold_the_truth() {
+    errors_are_honest(12, 0.0);
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn stated_errors_hold_the_truth_in_thousands() {
+    errors_are_honest(400, 0.02);
+}
+
+/// Close modes are told as such with the local fit recommended for that reason; a mode that stands alone disturbs nobody.
+#[test]
+fn overlap_is_told_and_an_answer_recommended() {
+    let trials = trials(6);
+    let (close, far): (Vec<&Trial>, Vec<&Trial>) = trials
+        .iter()
+        .filter(|t| t.distance == 1.6 || t.distance == 25.0)
+        .partition(|t| t.distance == 1.6);
+    let overlapping = close
+        .iter()
+        .filter(|t| t.mode.disturbance == Some(Disturbance::Overlap))
+        .count();
+    assert!(
+        close.len() > 10 && overlapping * 10 >= close.len() * 9,
+        "{overlapping} of {}",
+        close.len()
+    );
+    for trial in &close {
+        if trial.mode.disturbance.is_some() {
+            assert_eq!(trial.mode.recommended, Method::LocalFit);
+            assert!(
+                trial.mode.reason.contains("overlap") || trial.mode.reason.contains("residual"),
+                "{}",
+                trial.mode.reason
+            );
+        }
+    }
+    let disturbed = far.iter().filter(|t| t.mode.disturbance.is_some()).count();
+    assert!(
+        far.len() > 20 && disturbed * 20 <= far.len(),
+        "{disturbed} of {}",
+        far.len()
+    );
+    assert!(far.iter().all(|t| !t.mode.reason.is_empty()));
+    let remarks = analyse(
+        Synthetic::new(
+            3.0,
+            40.0,
+            0.05,
+            &[
+                SyntheticMode::new(12.0, 0.03, 0.01),
+                SyntheticMode::new(13.15, 0.03, 0.01),
+            ],
+        )
+        .with_noise(0.005, 0.0, 3),
+    )
+    .remarks;
+    assert!(remarks.iter().any(|r| r.contains("modes overlap")), "{remarks:?}");
+}
+
+/// A mode on the flank of strong ones far away, of which no peak is in the lines: the residual is named, and half-power, which
+/// knows none, is off by what is said.
+#[test]
+fn a_residual_is_told() {
+    let found = analyse(
+        Synthetic::new(
+            8.0,
+            16.0,
+            0.02,
+            &[
+                SyntheticMode::new(12.0, 0.02, 0.01),
+                SyntheticMode::new(30.0, 0.02, 2.0),
+            ],
+        )
+        .with_noise(0.0002, 0.0, 4),
+    );
+    let mode = found
+        .modes
+        .iter()
+        .find(|m| (m.best().frequency_hz - 12.0).abs() < 0.1)
+        .unwrap();
+    assert_eq!(mode.disturbance, Some(Disturbance::Residual), "{mode:?}");
+    if let Some(half) = mode.estimates.iter().find(|e| e.method == Method::HalfPower) {
+        let off = half.damping_ratio - 0.02;
+        assert!(
+            (half.damping_bias.unwrap() - off).abs() < 0.3 * off.abs(),
+            "{half:?}"
+        );
+    }
 }

@@ -35,10 +35,17 @@ pub struct ModeEstimate {
     pub frequency_hz: f64,
     /// Viscous damping ratio, > 0.
     pub damping_ratio: f64,
-    /// From the residual of the fit; `None` where there were only just enough lines.
+    /// From the residual of the fit, and what neighbours and residual do to the method (`frequency_bias_hz`) on top; `None`
+    /// where there were only just enough lines.
     pub frequency_std_hz: Option<f64>,
-    /// Standard deviation of the damping ratio, from the same residual.
+    /// Standard deviation of the damping ratio, from the same residual, and `damping_bias` on top.
     pub damping_std: Option<f64>,
+    /// By how much the method is off on the curve that the local fit has found, where that is known (simpler methods only).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frequency_bias_hz: Option<f64>,
+    /// The same of the damping ratio.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub damping_bias: Option<f64>,
     /// Circle fit: standard deviation of ζ over the point pairs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damping_spread: Option<f64>,
@@ -61,6 +68,32 @@ pub struct FrfMode {
     pub significance: f64,
     /// A simpler method gave another answer than the local fit and was left out.
     pub contradicted: bool,
+    /// What makes half-power or circle fit wrong here; `None` where they stand.
+    pub disturbance: Option<Disturbance>,
+    /// The answer to take, of those in `estimates`.
+    pub recommended: Method,
+    /// Why that one, for people.
+    pub reason: String,
+}
+
+/// What makes the methods of one mode wrong at a peak.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Disturbance {
+    /// Another mode lies close.
+    Overlap,
+    /// The flanks of modes farther away bend the circle and lift one flank of the peak.
+    Residual,
+}
+
+impl Disturbance {
+    /// For people.
+    pub fn words(self) -> &'static str {
+        match self {
+            Disturbance::Overlap => "modes overlap",
+            Disturbance::Residual => "the residual of other modes bends the circle",
+        }
+    }
 }
 
 impl FrfMode {

@@ -10,4 +10,5 @@ pub(crate) mod half_power;
 pub(crate) mod local_fit;
 #[cfg(test)]
 pub(crate) mod marks;
+pub(crate) mod method_bias;
 pub(crate) mod peaks;

@@ -1,7 +1,8 @@
 //! The hole itself: where the static forces put the tool, against its tolerances.
 
 use crate::analysis::LobeAnalysis;
-use crate::lobes::hole::{HoleCheck, HoleError, Uncertain};
+use crate::cutting::{DrillCoefficients, DrillForces};
+use crate::lobes::drilling::hole::{HoleCheck, HoleError, Uncertain};
 use crate::report::figure::{HoleFigure, HolePanel};
 use crate::report::number::{decimals, significant};
 use crate::report::parts::{figure, paragraph};
@@ -49,15 +50,172 @@ pub fn blocks(analysis: &LobeAnalysis) -> Vec<Block> {
                 found.posture,
                 decimals(found.recommendation.point.angle_deg, 1)
             );
-            blocks.push(errors([(place, &weighed.recommended)], check));
+            blocks.push(errors([(place.clone(), &weighed.recommended)], check));
+            blocks.extend(remedies(&[(place, &weighed.recommended)]));
         }
         None => {
             let cases = analysis.cases.iter();
-            let holes = cases.filter_map(|c| Some((c.posture.clone().unwrap_or_default(), c.hole.as_ref()?)));
-            blocks.push(errors(holes, check));
+            let holes: Vec<(String, &HoleError)> = cases
+                .filter_map(|c| Some((c.posture.clone().unwrap_or_default(), c.hole.as_ref()?)))
+                .collect();
+            blocks.push(errors(holes.iter().cloned(), check));
+            blocks.extend(remedies(&holes));
         }
     }
     blocks
+}
+
+/// What to command instead, and what the contacts take.
+fn remedies(holes: &[(String, &HoleError)]) -> Vec<Block> {
+    let poses = holes.iter().filter_map(|(place, hole)| match &hole.compensation {
+        Some(Ok(pose)) => Some((place, pose)),
+        _ => None,
+    });
+    let rows: Vec<Vec<String>> = poses
+        .map(|(place, pose)| {
+            let mut row = vec![place.clone()];
+            row.extend(pose.offset_m.map(|m| decimals(1e3 * m, 3)));
+            row.extend(pose.turn_rad.map(|a| decimals(a.to_degrees(), 4)));
+            let joints: Vec<String> = pose.joints_deg.iter().map(|q| decimals(*q, 4)).collect();
+            row.push(joints.join(" "));
+            row
+        })
+        .collect();
+    let mut blocks = Vec::new();
+    if !rows.is_empty() {
+        blocks.push(Block::Table(ReportTable {
+            caption: "Pose to command instead".into(),
+            columns: vec![
+                TableColumn::text("place"),
+                TableColumn::number("Δx (mm)"),
+                TableColumn::number("Δy (mm)"),
+                TableColumn::number("Δz (mm)"),
+                TableColumn::number("turn about x (°)"),
+                TableColumn::number("about y (°)"),
+                TableColumn::number("about z (°)"),
+                TableColumn::text("joints (°)"),
+            ],
+            rows,
+            notes: vec![
+                "Base axes, on top of the target: thrust and torque then push the tool to where it should be. The lateral force \
+                 turns with the tool and stays."
+                    .into(),
+            ],
+        }));
+    }
+    let contacts: Vec<Vec<String>> = holes
+        .iter()
+        .flat_map(|(place, hole)| hole.contacts.iter().map(move |contact| (place, contact)))
+        .map(|(place, contact)| {
+            vec![
+                place.clone(),
+                contact.name.clone(),
+                significant(contact.force_n, 3),
+                contact.preload_n.map_or("–".into(), |p| significant(p, 3)),
+                if contact.gives_way { "GIVES WAY" } else { "holds" }.into(),
+            ]
+        })
+        .collect();
+    if !contacts.is_empty() {
+        blocks.push(Block::Table(ReportTable {
+            caption: "What the contacts take of the cutting forces".into(),
+            columns: vec![
+                TableColumn::text("place"),
+                TableColumn::text("contact"),
+                TableColumn::number("takes (N)"),
+                TableColumn::number("holds up to (N)"),
+                TableColumn::text(""),
+            ],
+            rows: contacts,
+            notes: Vec::new(),
+        }));
+    }
+    blocks
+}
+
+/// What the orthogonal database predicts of the drill; `None` where it is not asked.
+pub fn drill(analysis: &LobeAnalysis) -> Option<Block> {
+    let drill = analysis.drill.as_ref()?;
+    let row = |name: &str, of: &DrillForces, k: &DrillCoefficients| {
+        let mut row = vec![
+            name.to_string(),
+            significant(of.thrust_n, 4),
+            significant(of.torque_nm, 3),
+        ];
+        row.extend([k.ktc_n_per_mm2, k.krc_n_per_mm2, k.kac_n_per_mm2].map(|v| significant(v, 4)));
+        row
+    };
+    let mut rows = vec![row("lips", &drill.lips, &drill.lip_coefficients)];
+    let mut notes = vec![format!(
+        "{} mm per revolution; coefficients per chip area of the part's own radial width.",
+        drill.feed_per_rev_mm
+    )];
+    match &drill.chisel {
+        Some(Ok(chisel)) => rows.push(row("chisel edge", &chisel.forces, &chisel.coefficients)),
+        Some(Err(reason)) => notes.push(format!("The chisel edge is left out: {reason}.")),
+        None => {}
+    }
+    Some(Block::Table(ReportTable {
+        caption: "The drill from the orthogonal database".into(),
+        columns: vec![
+            TableColumn::text("part"),
+            TableColumn::number("thrust (N)"),
+            TableColumn::number("torque (N·m)"),
+            TableColumn::number("Ktc (N/mm²)"),
+            TableColumn::number("Krc (N/mm²)"),
+            TableColumn::number("Kac (N/mm²)"),
+        ],
+        rows,
+        notes,
+    }))
+}
+
+/// Static stiffness along the feed, posture by posture; over the redundancy angle the stiffest.
+pub fn feed_stiffness(analysis: &LobeAnalysis) -> Option<Block> {
+    let mut cases: Vec<_> = analysis
+        .cases
+        .iter()
+        .filter_map(|case| Some((case, case.feed_stiffness.as_ref()?)))
+        .collect();
+    if analysis.redundancy.is_some() {
+        cases.sort_by(|a, b| b.1.along_feed_n_per_m.total_cmp(&a.1.along_feed_n_per_m));
+        cases.truncate(5);
+    }
+    let rows: Vec<Vec<String>> = cases
+        .into_iter()
+        .map(|(case, found)| {
+            let mega = |v: f64| significant(1e-6 * v, 4);
+            let posture = case.posture.clone().unwrap_or_default();
+            vec![
+                case.angle_deg
+                    .map_or(posture.clone(), |a| format!("{posture}, {}°", decimals(a, 1))),
+                mega(found.along_feed_n_per_m),
+                significant(found.index, 3),
+                mega(found.along_axis_n_per_m),
+                mega(found.across_least_n_per_m),
+                mega(found.across_greatest_n_per_m),
+            ]
+        })
+        .collect();
+    (!rows.is_empty()).then(|| {
+        Block::Table(ReportTable {
+            caption: "Static stiffness along the feed".into(),
+            columns: vec![
+                TableColumn::text("place"),
+                TableColumn::number("along the feed (MN/m)"),
+                TableColumn::number("index"),
+                TableColumn::number("along the tool (MN/m)"),
+                TableColumn::number("across, least (MN/m)"),
+                TableColumn::number("across, greatest (MN/m)"),
+            ],
+            rows,
+            notes: vec![
+                "At the tool point. Drilling feeds along the tool; otherwise the feed is taken across it in the stiffest direction. \
+                 Index: over the stiffness in the stiffest direction there is."
+                    .into(),
+            ],
+        })
+    })
 }
 
 fn over_the_angle(analysis: &LobeAnalysis, check: &HoleCheck) -> HoleFigure {
@@ -105,23 +263,42 @@ fn errors<'a>(holes: impl IntoIterator<Item = (String, &'a HoleError)>, check: &
             ]);
         }
         row.push(significant(hole.axial_mm, 3));
+        if let Some(good) = tolerance.diameter_met(hole) {
+            row.push(significant(hole.oversize_mm.bound(), 3));
+            row.push(met(good));
+        }
         row
     });
+    let mut columns = columns();
+    let mut notes = vec!["Along the axis: negative where the tool is pushed back from the workpiece.".into()];
+    if let Some(diameter) = &tolerance.diameter {
+        columns.push(TableColumn::number("oversize, 95 % (mm)"));
+        columns.push(TableColumn::text(&diameter.name()));
+        notes.push(format!(
+            "Oversize: what the turning lateral force adds to the diameter that the drill itself cuts; {} allows {} mm.",
+            diameter.name(),
+            diameter.width_mm
+        ));
+    }
     Block::Table(ReportTable {
         caption: "Static error of the hole".into(),
-        columns: vec![
-            TableColumn::text("place"),
-            TableColumn::number("position error (mm)"),
-            TableColumn::number("± (mm)"),
-            TableColumn::number("95 % (mm)"),
-            TableColumn::text("position"),
-            TableColumn::number("tilt (°)"),
-            TableColumn::number("± (°)"),
-            TableColumn::number("95 % (°)"),
-            TableColumn::text("perpendicularity"),
-            TableColumn::number("along the axis (mm)"),
-        ],
+        columns,
         rows: rows.collect(),
-        notes: vec!["Along the axis: negative where the tool is pushed back from the workpiece.".into()],
+        notes,
     })
+}
+
+fn columns() -> Vec<TableColumn> {
+    vec![
+        TableColumn::text("place"),
+        TableColumn::number("position error (mm)"),
+        TableColumn::number("± (mm)"),
+        TableColumn::number("95 % (mm)"),
+        TableColumn::text("position"),
+        TableColumn::number("tilt (°)"),
+        TableColumn::number("± (°)"),
+        TableColumn::number("95 % (°)"),
+        TableColumn::text("perpendicularity"),
+        TableColumn::number("along the axis (mm)"),
+    ]
 }

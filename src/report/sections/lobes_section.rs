@@ -88,7 +88,9 @@ pub fn section(findings: &LobeFindings, structure: Option<&StructureFindings>) -
             blocks.push(limits(findings));
         }
     }
+    blocks.extend(hole_section::drill(analysis));
     blocks.extend(hole_section::blocks(analysis));
+    blocks.extend(hole_section::feed_stiffness(analysis));
     blocks.extend(analysis.outcomes.iter().flat_map(outcomes));
     blocks.push(best(analysis));
     match &findings.measured {

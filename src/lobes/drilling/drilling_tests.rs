@@ -6,11 +6,11 @@ use std::sync::Arc;
 use approx::assert_relative_eq;
 use nalgebra::DMatrix;
 
-use super::*;
 use crate::campaign::{CutGeometry, Tool as CuttingTool, ToolKind};
 use crate::cutting::{ForceAxis, average_row};
 use crate::lobes::dynamics::frf::Mode;
 use crate::lobes::dynamics::tool_point::{Holder, ModesHolder, ToolDynamics};
+use crate::lobes::*;
 
 const KTC: f64 = 1014.2;
 const KAC: f64 = 572.0;
@@ -110,6 +110,7 @@ fn the_force_is_the_baseline_of_the_campaign() {
         lead_angle_deg: 90.0,
         half_point_angle_deg: Some(67.5),
         web_thickness_mm: Some(1.4),
+        chisel_edge_angle_deg: 125.0,
         each_tooth: Vec::new(),
     };
     let coefficients = [900.0, 30.0, 450.0, 20.0];

@@ -4,11 +4,14 @@
 //! displacement normal to the tool axis is the hole's position error, the turn of the axis its error of perpendicularity
 //! (small angles). Vibration, friction (lost motion) and the robot's own positioning errors come on top.
 
-use nalgebra::{Matrix6, Vector3, Vector6};
+use nalgebra::{Matrix2, Matrix6, Vector3, Vector6};
 
-use super::band::QUANTILES;
 use crate::campaign::{CutGeometry, Tool};
+use crate::lobes::band::QUANTILES;
+use crate::lobes::drilling::contact::ContactForce;
+use crate::lobes::drilling::iso_tolerance::DiameterTolerance;
 use crate::lobes::dynamics::robot::lobe_axes;
+use crate::robot::CompensatedPose;
 use crate::robot::static_deflection::wrench;
 use crate::statistics::quantile;
 
@@ -26,6 +29,16 @@ pub struct HoleLoad {
     pub source: String,
 }
 
+impl HoleLoad {
+    /// Thrust and torque alone.
+    pub fn without_lateral(&self) -> HoleLoad {
+        HoleLoad {
+            lateral_n: 0.0,
+            ..self.clone()
+        }
+    }
+}
+
 /// What a hole may be off by.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HoleTolerance {
@@ -33,6 +46,8 @@ pub struct HoleTolerance {
     pub position_mm: f64,
     /// Turn of the tool axis, degrees.
     pub perpendicularity_deg: f64,
+    /// Of the diameter; `None`: it is not judged.
+    pub diameter: Option<DiameterTolerance>,
 }
 
 /// What loads the tool and what the hole may be off by.
@@ -93,6 +108,16 @@ pub struct HoleError {
     pub position_mm: Uncertain,
     /// Turn of the tool axis, with the lateral force where it tilts most.
     pub tilt_deg: Uncertain,
+    /// How much wider than the drill the lateral force makes the hole, as it turns with the drill.
+    pub oversize_mm: Uncertain,
+    /// What the contacts take of the load; empty without contacts.
+    pub contacts: Vec<ContactForce>,
+    /// How far the tool point skates while the foot is pressed on, if only the free robot holds it; `None` without an axial
+    /// contact that says its preload.
+    pub skating_mm: Option<f64>,
+    /// The pose to command so that the tool stands where it should under thrust and torque, or in words why there is none;
+    /// `None` where nobody asked.
+    pub compensation: Option<std::result::Result<CompensatedPose, String>>,
 }
 
 impl HoleError {
@@ -109,6 +134,10 @@ impl HoleError {
             axial_mm: 1e3 * nominal.axial_m,
             position_mm: of(|d| d.position_m, |m| 1e3 * m),
             tilt_deg: of(|d| d.tilt_rad, f64::to_degrees),
+            oversize_mm: of(|d| d.oversize_m, |m| 1e3 * m),
+            contacts: Vec::new(),
+            skating_mm: None,
+            compensation: None,
         }
     }
 }
@@ -124,9 +153,17 @@ impl HoleTolerance {
         error.tilt_deg.bound() <= self.perpendicularity_deg
     }
 
-    /// Whether both tolerances are kept.
+    /// Whether the bound of the oversize keeps the tolerance of the diameter; `None` where that is not judged.
+    pub fn diameter_met(&self, error: &HoleError) -> Option<bool> {
+        let diameter = self.diameter?;
+        Some(error.oversize_mm.bound() <= diameter.width_mm)
+    }
+
+    /// Whether all tolerances are kept.
     pub fn met(&self, error: &HoleError) -> bool {
-        self.position_met(error) && self.perpendicularity_met(error)
+        self.position_met(error)
+            && self.perpendicularity_met(error)
+            && self.diameter_met(error).unwrap_or(true)
     }
 
     /// Whether a place without draws of its own keeps the tolerance, when its uncertainty is in proportion that of a
@@ -134,7 +171,10 @@ impl HoleTolerance {
     pub fn met_near(&self, here: &Deflection, neighbour: &HoleError) -> bool {
         let position_mm = 1e3 * here.position_m * neighbour.position_mm.allowance();
         let tilt_deg = here.tilt_rad.to_degrees() * neighbour.tilt_deg.allowance();
-        position_mm <= self.position_mm && tilt_deg <= self.perpendicularity_deg
+        let oversize_mm = 1e3 * here.oversize_m * neighbour.oversize_mm.allowance();
+        position_mm <= self.position_mm
+            && tilt_deg <= self.perpendicularity_deg
+            && self.diameter.is_none_or(|d| oversize_mm <= d.width_mm)
     }
 }
 
@@ -149,6 +189,13 @@ pub struct Deflection {
     pub position_m: f64,
     /// Turn of the tool axis, with the lateral force where it tilts most.
     pub tilt_rad: f64,
+    /// Width of what the tool's axis runs through while the lateral force turns: 2 L times the greatest singular value of
+    /// the compliance across the axis, L the force.
+    pub oversize_m: f64,
+    /// Displacement and turn (base axes) under thrust and torque alone, which can be allowed for in the commanded pose.
+    pub steady: Vector6<f64>,
+    /// The same for each direction of the lateral force; the steady one alone where there is none.
+    pub all: Vec<Vector6<f64>>,
 }
 
 /// Directions of the lateral force that are tried: the worst one is met within cos 0.5°.
@@ -165,9 +212,13 @@ impl Deflection {
         let tilt = |twist: &Vector6<f64>| across(twist.fixed_rows::<3>(3).into_owned()).norm();
         let mut worst = steady;
         let mut tilt_rad = tilt(&steady);
+        let mut oversize_m = 0.0;
+        let mut all = Vec::new();
         if load.lateral_n > 0.0 {
-            let sides =
-                lobe_axes(tool_axis).map(|side| compliance * wrench(side * load.lateral_n, Vector3::zeros()));
+            let axes = lobe_axes(tool_axis);
+            let sides = axes.map(|side| compliance * wrench(side * load.lateral_n, Vector3::zeros()));
+            let across = Matrix2::from_fn(|row, column| shift(&sides[column]).dot(&axes[row]));
+            oversize_m = 2.0 * across.singular_values().max();
             for i in 0..DIRECTIONS {
                 let (sin, cos) = f64::from(i).to_radians().sin_cos();
                 let twist = steady + sides[0] * cos + sides[1] * sin;
@@ -175,13 +226,19 @@ impl Deflection {
                     worst = twist;
                 }
                 tilt_rad = tilt_rad.max(tilt(&twist));
+                all.push(twist);
             }
+        } else {
+            all.push(steady);
         }
         Deflection {
             displacement_m: shift(&worst),
             axial_m: shift(&worst).dot(&tool_axis),
             position_m: position(&worst),
             tilt_rad,
+            oversize_m,
+            steady,
+            all,
         }
     }
 }
@@ -231,6 +288,15 @@ mod tests {
         assert_relative_eq!(found.position_m, 3e-4, max_relative = 1e-12);
         assert_relative_eq!(found.displacement_m.y.abs(), 3e-4, max_relative = 1e-12);
         assert!(found.tilt_rad.abs() < 1e-15);
+        // A force of 100 N that turns with the drill carries it 0.3 mm to either side of y.
+        assert_relative_eq!(found.oversize_m, 6e-4, max_relative = 1e-12);
+        assert_relative_eq!(
+            found.steady,
+            Vector6::new(0.0, 0.0, 4e-4, 0.0, 0.0, 3e-6),
+            max_relative = 1e-12
+        );
+        let balanced = Deflection::new(&compliance, down, &load(400.0, 5.0, 0.0));
+        assert_eq!((balanced.oversize_m, balanced.all.len()), (0.0, 1));
     }
 
     /// A drill at the end of a lever of one spring (compliance c about the base's y, lever a along x, tool down): the
@@ -256,6 +322,9 @@ mod tests {
             axial_m: 0.0,
             position_m,
             tilt_rad,
+            oversize_m: 0.2 * position_m,
+            steady: Vector6::zeros(),
+            all: Vec::new(),
         };
         let drawn: Vec<Deflection> = (0..=100)
             .map(|i| deflection(1e-4 + 1e-6 * f64::from(i), 1e-3))
@@ -268,6 +337,7 @@ mod tests {
         let tolerance = |position_mm, perpendicularity_deg| HoleTolerance {
             position_mm,
             perpendicularity_deg,
+            diameter: None,
         };
         assert!(!tolerance(0.19, 0.5).met(&error) && tolerance(0.20, 0.5).met(&error));
         assert!(!tolerance(0.20, 0.05).met(&error) && tolerance(0.20, 0.05).position_met(&error));
@@ -278,6 +348,16 @@ mod tests {
         let certain = HoleError::new(&deflection(1.5e-4, 1e-3), &[]);
         assert_eq!((certain.position_mm.std, certain.position_mm.upper), (None, None));
         assert!(tolerance(0.15001, 0.5).met(&certain));
+        // The bound of the oversize, 0.039 mm, against H8 (0.022 mm) and H10 (0.058 mm) of 6.35 mm.
+        let judged = |grade| HoleTolerance {
+            diameter: DiameterTolerance::h(grade, 6.35),
+            ..tolerance(0.20, 0.5)
+        };
+        assert_eq!(tolerance(0.20, 0.5).diameter_met(&error), None);
+        assert_eq!(judged(8).diameter_met(&error), Some(false));
+        assert_eq!(judged(10).diameter_met(&error), Some(true));
+        assert!(!judged(8).met(&error) && judged(10).met(&error));
+        assert!(!judged(8).met_near(&near, &error) || near.oversize_m < 2e-5);
     }
 
     /// Slot: mean tangential force times radius, N a/(2π) (2 Ktc c + π Kte) D/2.

@@ -82,8 +82,19 @@ impl Partial {
     }
 }
 
+impl From<Partial> for Linearisation {
+    fn from(sums: Partial) -> Self {
+        Linearisation {
+            cost: sums.cost,
+            gradient: sums.gradient,
+            hessian: sums.hessian,
+        }
+    }
+}
+
 impl FrfProblem<'_> {
-    fn evaluate(&self, theta: &[f64], with_derivatives: bool) -> Result<Partial> {
+    /// Sums by block of the data and chunk of its lines, block by block; priors are left out.
+    fn partials(&self, theta: &[f64], with_derivatives: bool) -> Result<Vec<(usize, usize, Partial)>> {
         let count = if with_derivatives { theta.len() } else { 0 };
         let bases: Vec<FrfBasis> = self
             .data
@@ -102,12 +113,28 @@ impl FrfProblem<'_> {
                 (0..lines.div_ceil(CHUNK)).map(move |c| (b, c))
             })
             .collect();
-        let parts: Vec<Partial> = tasks
+        tasks
             .par_iter()
-            .map(|&(b, chunk)| self.chunk(&bases[b], &channels, &self.data.blocks[b], chunk, count))
-            .collect::<Result<_>>()?;
-        let mut total = Partial::zero(count);
-        for part in &parts {
+            .map(|&(b, chunk)| {
+                let partial = self.chunk(&bases[b], &channels, &self.data.blocks[b], chunk, count)?;
+                Ok((b, chunk, partial))
+            })
+            .collect()
+    }
+
+    /// The misfit by block of the data and by stretch of [`CHUNK`] of its lines, block by block; priors are left out.
+    ///
+    /// # Errors
+    /// A model that cannot be set up at `theta`.
+    pub fn by_block_and_stretch(&self, theta: &[f64]) -> Result<Vec<(usize, usize, Linearisation)>> {
+        let partials = self.partials(theta, true)?.into_iter();
+        let linearised = |(block, stretch, sums): (usize, usize, Partial)| (block, stretch, sums.into());
+        Ok(partials.map(linearised).collect())
+    }
+
+    fn evaluate(&self, theta: &[f64], with_derivatives: bool) -> Result<Partial> {
+        let mut total = Partial::zero(if with_derivatives { theta.len() } else { 0 });
+        for (_, _, part) in &self.partials(theta, with_derivatives)? {
             total.add(part);
         }
         for (i, (parameter, t)) in self.model.parameters.iter().zip(theta).enumerate() {
@@ -203,16 +230,7 @@ impl LeastSquares for FrfProblem<'_> {
     }
 
     fn linearise(&self, theta: &[f64]) -> Result<Linearisation> {
-        let Partial {
-            cost,
-            gradient,
-            hessian,
-        } = self.evaluate(theta, true)?;
-        Ok(Linearisation {
-            cost,
-            gradient,
-            hessian,
-        })
+        Ok(self.evaluate(theta, true)?.into())
     }
 }
 

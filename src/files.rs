@@ -39,6 +39,14 @@ pub fn write_new(path: &Path, bytes: &[u8]) -> Result<bool> {
     }
 }
 
+/// Renames a file or a folder.
+///
+/// # Errors
+/// What the file system refuses.
+pub fn rename(from: &Path, to: &Path) -> io::Result<()> {
+    call(Call::Rename, || std::fs::rename(from, to))
+}
+
 fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,

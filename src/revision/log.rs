@@ -230,7 +230,7 @@ fn check(document: &Document) -> std::result::Result<(), (String, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::files::tests::every_fault;
+    use crate::files::faults::every_fault;
     use crate::revision::{RecordedEffect, RecordedParameter};
 
     fn revision(labels: &[&str], nrms: f64) -> Revision {

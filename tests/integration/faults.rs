@@ -314,7 +314,7 @@ fn a_campaign_that_may_not_be_written_can_be_read() {
         );
     }
     for (command, file) in [
-        ("add /mnt runout", "/mnt"),
+        ("add /mnt size-effect", "/mnt"),
         ("report /mnt", "/mnt/report"),
         ("init /mnt --force", "/mnt/campaign.toml"),
     ] {

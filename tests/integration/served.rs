@@ -61,13 +61,13 @@ impl Served {
     }
 
     fn started(arguments: &[&str]) -> Served {
-        let said = tempfile::NamedTempFile::new().unwrap();
+        let errors = tempfile::NamedTempFile::new().unwrap();
         let mut child = program()
             .arg("serve")
             .args(arguments)
             .args(["--port", "0", "--json"])
             .stdout(Stdio::piped())
-            .stderr(said.reopen().unwrap())
+            .stderr(errors.reopen().unwrap())
             .spawn()
             .unwrap();
         let mut line = String::new();
@@ -86,7 +86,7 @@ impl Served {
             host,
             report_key: String::new(),
             token: String::new(),
-            said,
+            said: errors,
         };
         let page = served.get("/").text();
         let meta = |name: &str| {

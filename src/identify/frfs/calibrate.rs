@@ -195,7 +195,7 @@ impl Calibration {
 /// Misfit from which on the user is told.
 const FAR_ABOVE_NOISE: f64 = 1.5;
 /// Misfit above which noise alone is not credible any more and further starting points are tried.
-pub(super) const SUSPICIOUS_CHI2: f64 = 1.15;
+const SUSPICIOUS_CHI2: f64 = 1.15;
 /// Complex values on which starting points are followed, about; and those on which they are compared only.
 const SKETCH_VALUES: usize = 6000;
 pub(crate) const GLANCE_VALUES: usize = 1000;

@@ -254,9 +254,7 @@ fn a_lost_line_matters_no_more_than_the_noise() {
 #[test]
 fn a_lost_line_matters_less_than_the_stated_errors_where_physics_is_missing() {
     let mut beyond = 0;
-    for name in [
-        "frf-9001", "frf-9007", "frf-9011", "frf-9113", "frf-9114", "frf-9115", "frf-9216", "frf-9302",
-    ] {
+    for name in ["frf-9001", "frf-9011", "frf-9115", "frf-9302"] {
         let case = case(&blind(name));
         let data = thinned(&case, 1500);
         let whole = calibrated(&case, &data);
@@ -274,17 +272,10 @@ fn a_lost_line_matters_less_than_the_stated_errors_where_physics_is_missing() {
                     worst[0].max(moved / noise.std_error),
                     worst[1].max(moved / stated.std_error),
                 ];
-                if !(moved < stated.std_error) {
-                    println!(
-                        "XX {name} without line {line}: {} stated {:.2} noise {:.2} chi2 {:.2} {:.2} {:?}",
-                        a.name,
-                        moved / stated.std_error,
-                        moved / noise.std_error,
-                        whole.reduced_chi2,
-                        other.reduced_chi2,
-                        other.ending
-                    );
-                }
+                assert!(
+                    moved < stated.std_error,
+                    "{name} without line {line}: {a:?} {stated:?}"
+                );
             }
         }
         println!(

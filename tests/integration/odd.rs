@@ -182,6 +182,14 @@ fn numbers_that_are_none_never_leave_a_reader() {
     )
     .unwrap();
     refused(&path, &["1X/1X: 1e300 at 2e0 Hz"]);
+    // What stands at 0 Hz is left out wherever in the file it stands (found by the fuzz test, seed 2000072363).
+    std::fs::write(
+        &path,
+        "frq,amp_real,amp_imag\n6.0,0.07,0.0\n0.0,-0.0002,-999999999999999999191\n7.0,0.1,0.0\n",
+    )
+    .unwrap();
+    let file = read_file(&path).unwrap();
+    assert_eq!(file.contents.frfs[0].frequency_hz, [6.0, 7.0]);
 }
 
 #[test]

@@ -1,9 +1,10 @@
-//! Files that are files, and are never seen half written.
+//! Files that are files, and are never seen half written. Whatever this crate writes is written here, so that what a full disk, a
+//! failing one or an interrupted call leaves behind is decided, and tested, in one place.
 
-use std::io::Write;
+use std::io::{self, ErrorKind, Write};
 use std::path::Path;
 
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, PersistError};
 
 use crate::{Error, InputError, Result};
 
@@ -27,10 +28,13 @@ pub fn regular_file(path: &Path) -> Result<()> {
         .into())
 }
 
+#[cfg(test)]
+pub(crate) mod faults;
+
 /// Writes beside the target and renames: a reader sees the old file or the new one, never half of it.
 ///
 /// # Errors
-/// What the file system refuses, naming the file.
+/// What the file system refuses, naming the file; then the old one is there as it was.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     replace(path, bytes, ".lobestone-", false)
 }
@@ -39,7 +43,7 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
 /// temporary file's name begins with `prefix`.
 ///
 /// # Errors
-/// What the file system refuses, naming the file.
+/// What the file system refuses, naming the file; then the old one is there as it was, or the error says that the new one is.
 pub fn write_durably(path: &Path, bytes: &[u8], prefix: &str) -> Result<()> {
     replace(path, bytes, prefix, true)
 }
@@ -49,11 +53,21 @@ pub fn write_durably(path: &Path, bytes: &[u8], prefix: &str) -> Result<()> {
 /// # Errors
 /// What the file system refuses, naming the file.
 pub fn write_new(path: &Path, bytes: &[u8]) -> Result<bool> {
-    match beside(path, bytes, ".lobestone-")?.persist_noclobber(path) {
+    match renamed(beside(path, bytes, ".lobestone-")?, |file| {
+        file.persist_noclobber(path)
+    }) {
         Ok(_) => Ok(true),
-        Err(e) if e.error.kind() == std::io::ErrorKind::AlreadyExists => Ok(false),
-        Err(e) => Err(Error::io(path, e.error)),
+        Err(e) if e.kind() == ErrorKind::AlreadyExists => Ok(false),
+        Err(e) => Err(Error::io(path, e)),
     }
+}
+
+/// Renames a file or a folder.
+///
+/// # Errors
+/// What the file system refuses.
+pub fn rename(from: &Path, to: &Path) -> io::Result<()> {
+    call(Call::Rename, || std::fs::rename(from, to))
 }
 
 fn folder_of(path: &Path) -> &Path {
@@ -63,34 +77,93 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
+/// What a write asks of the operating system, one after the other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Call {
+    Create,
+    Write,
+    Sync,
+    Rename,
+    SyncFolder,
+}
+
+/// Asks, and asks again where a signal interrupted that. Tests let single calls fail.
+fn call<T>(which: Call, mut ask: impl FnMut() -> io::Result<T>) -> io::Result<T> {
+    loop {
+        match fails(which).and_then(|()| ask()) {
+            Err(e) if e.kind() == ErrorKind::Interrupted => {}
+            done => return done,
+        }
+    }
+}
+
+#[cfg(not(test))]
+fn fails(_: Call) -> io::Result<()> {
+    Ok(())
+}
+
+#[cfg(test)]
+use self::faults::fails;
+
 /// A temporary file in the folder of `path` that holds `bytes`.
 fn beside(path: &Path, bytes: &[u8], prefix: &str) -> Result<NamedTempFile> {
     let folder = folder_of(path);
-    let mut file = tempfile::Builder::new();
+    let mut options = tempfile::Builder::new();
     // Temporary files are private by default; results are to be read by whoever may read the folder.
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
-        file.permissions(std::fs::Permissions::from_mode(0o644));
+        options.permissions(std::fs::Permissions::from_mode(0o644));
     }
-    let mut file = file
-        .prefix(prefix)
-        .tempfile_in(folder)
-        .map_err(|e| Error::io(folder, e))?;
-    file.write_all(bytes).map_err(|e| Error::io(path, e))?;
+    options.prefix(prefix);
+    let mut file = call(Call::Create, || options.tempfile_in(folder)).map_err(|e| Error::io(path, e))?;
+    // In pieces, as the system takes them: a disk that is full has some of them already.
+    let mut left = bytes;
+    while !left.is_empty() {
+        let taken = call(Call::Write, || file.write(&left[..left.len().min(PIECE)]));
+        let taken = taken.and_then(|taken| match taken {
+            0 => Err(ErrorKind::WriteZero.into()),
+            taken => Ok(taken),
+        });
+        left = &left[taken.map_err(|e| Error::io(path, e))?..];
+    }
     Ok(file)
 }
 
+/// Bytes that are written at once.
+const PIECE: usize = 1 << 20;
+
+/// Gives a temporary file its name.
+fn renamed(
+    file: NamedTempFile,
+    rename: impl Fn(NamedTempFile) -> std::result::Result<std::fs::File, PersistError>,
+) -> io::Result<std::fs::File> {
+    let mut file = Some(file);
+    call(Call::Rename, || match file.take().map(&rename) {
+        Some(Ok(done)) => Ok(done),
+        Some(Err(failed)) => {
+            file = Some(failed.file);
+            Err(failed.error)
+        }
+        None => Err(ErrorKind::NotFound.into()),
+    })
+}
+
 fn replace(path: &Path, bytes: &[u8], prefix: &str, durable: bool) -> Result<()> {
+    let failed = |e| Error::io(path, e);
     let file = beside(path, bytes, prefix)?;
     if durable {
-        file.as_file().sync_all().map_err(|e| Error::io(path, e))?;
+        call(Call::Sync, || file.as_file().sync_all()).map_err(failed)?;
     }
-    file.persist(path).map_err(|e| Error::io(path, e.error))?;
+    renamed(file, |file| file.persist(path)).map_err(failed)?;
     if durable {
-        // The rename itself. Where folders cannot be opened (Windows) the system sees to it.
-        if let Ok(folder) = std::fs::File::open(folder_of(path)) {
-            let _ = folder.sync_all();
+        // The rename itself. Where folders cannot be opened (Windows) or flushed (some network disks) the system sees to it.
+        if let Ok(folder) = std::fs::File::open(folder_of(path))
+            && let Err(e) = call(Call::SyncFolder, || folder.sync_all())
+            && !matches!(e.kind(), ErrorKind::InvalidInput | ErrorKind::Unsupported)
+        {
+            let told = format!("{e}: the file is written, but a power cut now may bring back the old one");
+            return Err(failed(io::Error::new(e.kind(), told)));
         }
     }
     Ok(())

@@ -454,3 +454,23 @@ fn physics_knows_no_files() {
     }
     assert!(wrong.is_empty(), "\n{wrong}");
 }
+
+/// One place decides, and tests, what a full disk or an interrupted call leaves behind: `src/files.rs`.
+#[test]
+fn files_are_written_in_one_place() {
+    const WRITERS: [&str; 5] = [
+        "fs::write(",
+        "fs::rename(",
+        "fs::copy(",
+        "File::create(",
+        "OpenOptions",
+    ];
+    let house = House::read();
+    let mut wrong = String::new();
+    for (module, code) in house.code.iter().filter(|(module, _)| **module != ["files"]) {
+        for writer in WRITERS.iter().filter(|writer| code.contains(**writer)) {
+            let _ = writeln!(wrong, "{} writes by itself ({writer})", shown(module));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong}");
+}

@@ -78,7 +78,8 @@ impl StructureAnalysis {
             _ => None,
         };
         let measured = start.as_ref().map(|s| s.theta.as_slice());
-        let calibration = calibrate(&case.model, &case.data, measured, case.options(options))?;
+        let calibration = calibrate(&case.model, &case.data, measured, case.options(options))?
+            .covering(&case.model, &case.data)?;
         let nominal = case
             .baseline
             .predict(&case.baseline.nominal_theta(), &case.data)?;

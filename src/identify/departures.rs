@@ -76,6 +76,7 @@ mod tests {
             parameters: Vec::new(),
             theta,
             covariance: covariance.clone(),
+            widened: vec![1.0; 4],
             reduced_chi2: 1.0,
             iterations: 1,
             ending: Ending::Converged,

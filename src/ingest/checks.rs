@@ -108,11 +108,11 @@ pub(super) fn tidy_frf(mut record: FrfRecord, notes: &mut Notes) -> Result<Optio
                 .remedy("the file is damaged, or its unit or scale is wrong: export it again"),
         );
     }
-    if let (Some(f), Some(v)) = (record.frequency_hz.first(), record.value.first_mut())
-        && *f == 0.0
-        && !(v.norm() <= LARGEST_VALUE)
-    {
-        *v = num_complex::Complex64::new(f64::NAN, 0.0);
+    // Wherever in the file that line stands.
+    for (f, v) in record.frequency_hz.iter().zip(&mut record.value) {
+        if *f == 0.0 && !(v.norm() <= LARGEST_VALUE) {
+            *v = num_complex::Complex64::new(f64::NAN, 0.0);
+        }
     }
     let count = record.frequency_hz.len().min(record.value.len());
     let finite = |&i: &usize| record.frequency_hz[i].is_finite() && record.value[i].is_finite();

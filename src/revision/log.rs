@@ -230,6 +230,7 @@ fn check(document: &Document) -> std::result::Result<(), (String, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::files::faults::every_fault;
     use crate::revision::{RecordedEffect, RecordedParameter};
 
     fn revision(labels: &[&str], nrms: f64) -> Revision {
@@ -407,6 +408,61 @@ mod tests {
             let own = format!("payload@joint-{i}");
             assert_eq!(last.labels().iter().filter(|l| **l == own).count(), 3);
         }
+    }
+
+    /// A disk that is full, broken or interrupted at any call: the old log or the new one, and the next writer goes on from it.
+    #[test]
+    fn a_fault_at_any_call_leaves_the_old_log_or_the_new_one() {
+        let prepare = |dir: &Path| {
+            add(&mut RevisionLog::load(dir).unwrap(), "payload").unwrap();
+        };
+        let adds = |dir: &Path| add(&mut RevisionLog::load(dir).unwrap(), "time-delay");
+        let state = |dir: &Path| (numbers(dir), std::fs::read_dir(dir.join(FOLDER)).unwrap().count());
+        // The log and its lock, nothing beside them.
+        every_fault(
+            prepare,
+            adds,
+            |dir| state(dir) == (vec![0, 1], 2),
+            |dir| state(dir) == (vec![0, 1, 2], 2),
+            "revisions.json: ",
+        );
+        // What failed is no hindrance; what was recorded all the same is seen.
+        let undoes = |dir: &Path| {
+            let mut log = RevisionLog::load(dir).unwrap();
+            let before = log.revisions(Side::Structure).count();
+            let undone = log.undo(Side::Structure);
+            let kept = log.revisions(Side::Structure).count();
+            assert_eq!(kept, before - usize::from(undone.is_ok()));
+            undone
+        };
+        every_fault(
+            prepare,
+            undoes,
+            |dir| state(dir) == (vec![0, 1], 2),
+            |dir| state(dir) == (vec![0], 2),
+            "revisions.json: ",
+        );
+    }
+
+    /// A clock that goes backwards changes no order: revisions are numbered.
+    #[test]
+    fn revisions_from_the_future_stay_where_they_are() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut log = RevisionLog::load(dir.path()).unwrap();
+        let later = Revision {
+            when: "2999-12-31T23:59:59Z".into(),
+            ..revision(&["payload"], 0.1)
+        };
+        log.append(revision(&[], 0.5), later).unwrap();
+        add(&mut log, "time-delay").unwrap();
+        assert_eq!(numbers(dir.path()), [0, 1, 2]);
+        let last = RevisionLog::load(dir.path()).unwrap();
+        let last = last.current(Side::Structure).unwrap();
+        assert_eq!(last.labels(), ["payload", "time-delay"]);
+        assert_eq!(
+            log.undo(Side::Structure).unwrap().labels(),
+            ["payload", "time-delay"]
+        );
     }
 
     /// A lock file that a killed process left is only a file.

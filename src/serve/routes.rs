@@ -31,6 +31,8 @@ const LARGEST_REQUEST: usize = 4 << 20;
 const LARGEST_FILE: usize = 256 << 20;
 /// In which a request must be read and answered.
 const PATIENCE: Duration = Duration::from_secs(300);
+/// In which the body of an order must be there.
+const BODY: Duration = Duration::from_secs(10);
 
 /// The page: its own style and script, its own server, and nothing else.
 const PAGE_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; \
@@ -120,11 +122,25 @@ async fn guarded(State(app): State<Arc<App>>, request: axum::extract::Request, n
         .guard
         .check(request.method(), request.uri(), request.headers())
     {
-        Ok(()) => match tokio::time::timeout(PATIENCE, next.run(request)).await {
-            Ok(response) => response,
-            Err(_) => (StatusCode::REQUEST_TIMEOUT, "that took too long\n").into_response(),
-        },
-        Err(why) => (StatusCode::FORBIDDEN, format!("{why}\n")).into_response(),
+        Ok(()) => {
+            let answer = async {
+                match whole(request).await {
+                    Ok(request) => next.run(request).await,
+                    Err(refused) => refused,
+                }
+            };
+            match tokio::time::timeout(PATIENCE, answer).await {
+                Ok(response) => response,
+                Err(_) => too_slow(),
+            }
+        }
+        // Whoever has no business here takes no place either.
+        Err(why) => (
+            StatusCode::FORBIDDEN,
+            [(header::CONNECTION, "close")],
+            format!("{why}\n"),
+        )
+            .into_response(),
     };
     let headers = response.headers_mut();
     headers
@@ -144,6 +160,27 @@ async fn guarded(State(app): State<Arc<App>>, request: axum::extract::Request, n
         headers.insert(name, HeaderValue::from_static(value));
     }
     response
+}
+
+/// A request whose body is there; files that are dropped on the page alone come in their own time.
+async fn whole(request: axum::extract::Request) -> std::result::Result<axum::extract::Request, Response> {
+    if request.uri().path().ends_with("/upload") {
+        return Ok(request);
+    }
+    let (head, body) = request.into_parts();
+    match tokio::time::timeout(BODY, axum::body::to_bytes(body, LARGEST_REQUEST)).await {
+        Ok(Ok(bytes)) => Ok(axum::extract::Request::from_parts(head, bytes.into())),
+        Ok(Err(_)) => Err(refuse(
+            StatusCode::PAYLOAD_TOO_LARGE,
+            "the request is too large, or it was cut off",
+        )),
+        Err(_) => Err(too_slow()),
+    }
+}
+
+fn too_slow() -> Response {
+    let close = [(header::CONNECTION, "close")];
+    (StatusCode::REQUEST_TIMEOUT, close, "that took too long\n").into_response()
 }
 
 async fn text(kind: &'static str, text: &'static str) -> Response {

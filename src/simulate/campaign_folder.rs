@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
+use crate::files::{rename, write_new};
 use crate::{Error, InputError, Result};
 
 /// A simulated campaign, not yet on disk.
@@ -69,7 +70,7 @@ pub fn truth_beside(dir: &Path) -> Result<PathBuf> {
 }
 
 impl LabCampaign {
-    /// Writes the folder (to a temporary one, then renamed) and the truth.
+    /// Writes the truth and the folder (to a temporary one, then renamed): both or none.
     ///
     /// # Errors
     /// What [`check_target`] refuses, and what the file system does.
@@ -91,21 +92,27 @@ impl LabCampaign {
             let path = staged.join(name);
             let folder = parent_of(&path);
             std::fs::create_dir_all(&folder).map_err(|e| Error::io(&folder, e))?;
-            std::fs::write(&path, content).map_err(|e| Error::io(&path, e))?;
+            write_new(&path, content)?;
         }
-        let truth_folder = parent_of(truth);
         let text = format!("{:#}\n", self.truth);
-        let staged_truth = staging.path().join("truth.json");
-        std::fs::write(&staged_truth, text).map_err(|e| Error::io(&staged_truth, e))?;
-        if dir.is_dir() {
-            std::fs::remove_dir(dir).map_err(|e| Error::io(dir, e))?;
-        }
-        std::fs::rename(&staged, dir).map_err(|e| Error::io(dir, e))?;
+        // Asked for inside the folder, the truth comes with it.
+        let inside = truth.strip_prefix(dir).ok();
+        let own = inside.map_or_else(|| truth.to_path_buf(), |name| staged.join(name));
+        let truth_folder = parent_of(&own);
         std::fs::create_dir_all(&truth_folder).map_err(|e| Error::io(&truth_folder, e))?;
-        // A copy, not a move: the truth may go to another disk.
-        std::fs::rename(&staged_truth, truth)
-            .or_else(|_| std::fs::copy(&staged_truth, truth).map(|_| ()))
-            .map_err(|e| Error::io(truth, e))?;
+        if !write_new(&own, text.as_bytes())? {
+            check_target(dir, truth)?;
+            return Err(Error::io(truth, std::io::ErrorKind::AlreadyExists.into()));
+        }
+        // Only an empty folder gives way.
+        let renamed = match dir.is_dir() {
+            true => std::fs::remove_dir(dir).and_then(|()| rename(&staged, dir)),
+            false => rename(&staged, dir),
+        };
+        if let Err(e) = renamed {
+            let _ = std::fs::remove_file(&own);
+            return Err(Error::io(dir, e));
+        }
         Ok(Written {
             dir: dir.to_path_buf(),
             truth: truth.to_path_buf(),

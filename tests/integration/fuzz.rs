@@ -1,10 +1,11 @@
-//! Damaged input: small valid files, mutated from a seed, through every reader, the campaign file, the robot file and the
-//! log of revisions. A run may give an error; it may not panic, take long, take much memory, or give a number that is none.
+//! Damaged input: small valid files, mutated from a seed, through every reader, the campaign file, the robot file, the log of
+//! revisions, and what browsers ask of `serve`. A run may give an error; it may not panic, take long, take much memory, or give a number that is none.
 //!
 //! The short version runs with the other tests. The long one takes its limits from the environment:
 //! `FUZZ_SECONDS=3600 FUZZ_SEED=7 cargo test --release --test integration -- --ignored fuzz_for_long --nocapture`;
 //! `FUZZ_CORPUS` names a folder with further files to begin with. What was run is in reports/fuzz.md.
 
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -14,6 +15,9 @@ use lobestone::campaign::Campaign;
 use lobestone::data::RobotSpec;
 use lobestone::ingest::{self, Contents};
 use lobestone::revision::{RevisionLog, log_file};
+
+use crate::served::Served;
+use crate::support::copy_of;
 
 /// No input of some kilobytes takes so long, even on a busy machine.
 const LONGEST: Duration = Duration::from_secs(20);
@@ -174,11 +178,81 @@ enum Target {
     Campaign,
     Robot,
     Revisions,
+    Requests,
+}
+
+/// Where inputs are run.
+struct Place {
+    folder: tempfile::TempDir,
+    /// A server of its own, for requests.
+    served: Option<Served>,
+}
+
+impl Place {
+    fn of(target: Target) -> Place {
+        let folder = match target {
+            Target::Requests => copy_of("frf-9112"),
+            _ => tempfile::tempdir().unwrap(),
+        };
+        let served = matches!(target, Target::Requests).then(|| Served::start(folder.path()));
+        Place { folder, served }
+    }
+
+    /// Peak memory, MB: of the server where there is one, else of this process.
+    fn peak_mb(&self) -> u64 {
+        self.served
+            .as_ref()
+            .map_or_else(peak_mb, |s| s.memory_kb("VmHWM") / 1024)
+    }
+}
+
+/// Sends bytes as they are (but for the secrets, which stand in the corpus by their names) and looks at what comes back.
+fn asked(served: &Served, bytes: &[u8]) -> bool {
+    let mut request = bytes.to_vec();
+    for (name, value) in [
+        ("HOST", &served.host),
+        ("PAGEKEY", &served.key),
+        ("REPORTKEY", &served.report_key),
+        ("TOKEN", &served.token),
+    ] {
+        request = replaced(&request, name.as_bytes(), value.as_bytes());
+    }
+    let mut stream = served.connect();
+    // A server that has heard enough closes.
+    let _ = stream.write_all(&request);
+    let _ = stream.shutdown(std::net::Shutdown::Write);
+    let mut answer = Vec::new();
+    let _ = stream.read_to_end(&mut answer);
+    if answer.is_empty() {
+        return false;
+    }
+    let shown = || String::from_utf8_lossy(&answer[..answer.len().min(300)]).into_owned();
+    assert!(answer.starts_with(b"HTTP/1."), "{}", shown());
+    let status = std::str::from_utf8(&answer[9..12])
+        .ok()
+        .and_then(|s| s.parse::<u16>().ok());
+    let status = status.unwrap_or_else(|| panic!("{}", shown()));
+    assert!((100..500).contains(&status), "{}", shown());
+    (200..300).contains(&status)
+}
+
+fn replaced(bytes: &[u8], name: &[u8], value: &[u8]) -> Vec<u8> {
+    let mut out = Vec::with_capacity(bytes.len() + value.len());
+    let mut rest = bytes;
+    while let Some(at) = rest.windows(name.len()).position(|w| w == name) {
+        out.extend_from_slice(&rest[..at]);
+        out.extend_from_slice(value);
+        rest = &rest[at + name.len()..];
+    }
+    out.extend_from_slice(rest);
+    out
 }
 
 /// Runs one input; true where it was read.
-fn run(target: Target, bytes: &[u8], folder: &Path) -> bool {
+fn run(target: Target, bytes: &[u8], place: &Place) -> bool {
+    let folder = place.folder.path();
     match target {
+        Target::Requests => place.served.as_ref().is_some_and(|served| asked(served, bytes)),
         Target::Reader => match ingest::read_memory(bytes) {
             Ok(file) => {
                 assert_sound(&file.contents);
@@ -226,8 +300,8 @@ struct Outcome {
 /// Runs from `seed` on until `runs` or `time` are over. A panic, a hang or too much memory ends the process with the seed
 /// of the run, which repeats it.
 fn fuzz(target: Target, corpus: &[Vec<u8>], seed: u64, runs: u64, time: Duration) -> Outcome {
-    let folder = tempfile::tempdir().unwrap();
-    let (begin, before_mb) = (Instant::now(), peak_mb());
+    let place = Place::of(target);
+    let (begin, before_mb) = (Instant::now(), place.peak_mb());
     // Milliseconds since the beginning at which the run began, and its number; the watchdog reads them.
     let state = Arc::new((AtomicU64::new(0), AtomicU64::new(0), AtomicU64::new(0)));
     let watched = Arc::clone(&state);
@@ -259,7 +333,7 @@ fn fuzz(target: Target, corpus: &[Vec<u8>], seed: u64, runs: u64, time: Duration
             .1
             .store(begin.elapsed().as_millis() as u64, Ordering::Relaxed);
         let start = Instant::now();
-        let caught = std::panic::catch_unwind(|| run(target, &bytes, folder.path()));
+        let caught = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| run(target, &bytes, &place)));
         outcome.slowest = outcome.slowest.max(start.elapsed());
         outcome.runs += 1;
         match caught {
@@ -274,7 +348,7 @@ fn fuzz(target: Target, corpus: &[Vec<u8>], seed: u64, runs: u64, time: Duration
             }
         }
         if outcome.runs.is_multiple_of(16) {
-            outcome.memory_mb = peak_mb().saturating_sub(before_mb);
+            outcome.memory_mb = place.peak_mb().saturating_sub(before_mb);
             assert!(
                 outcome.memory_mb < MEMORY_MB,
                 "fuzz {target:?}: {} MB by seed {own}",
@@ -284,6 +358,10 @@ fn fuzz(target: Target, corpus: &[Vec<u8>], seed: u64, runs: u64, time: Duration
     }
     state.2.store(1, Ordering::Relaxed);
     watchdog.join().unwrap();
+    if let Some(served) = &place.served {
+        assert_eq!(served.get("/status").status, 200);
+        assert_eq!(served.said(), "", "fuzz {target:?}: from seed {seed}");
+    }
     outcome
 }
 
@@ -357,13 +435,60 @@ fn corpus_of(target: Target) -> Vec<Vec<u8>> {
             text_of("tests/data/blind/force-9400/campaign.toml"),
         ],
         Target::Robot => vec![text_of("tests/data/cobot7.toml")],
+        Target::Requests => requests(),
         Target::Revisions => vec![
             br#"{"schema":"lobestone/revisions/1","revisions":[{"n":0,"domain":"structure","effect":null,"scope":null,"parameters":[],"recorded":"2026-11-22T05:00:00Z"}],"undone":[]}"#.to_vec(),
         ],
     }
 }
 
-const TARGETS: [Target; 4] = [Target::Reader, Target::Campaign, Target::Robot, Target::Revisions];
+/// What the page asks for, and orders that are too late to be done: nothing here begins a job.
+fn requests() -> Vec<Vec<u8>> {
+    let get = |path: &str| format!("GET {path} HTTP/1.1\r\nHost: HOST\r\nConnection: close\r\n\r\n");
+    let post = |path: &str, body: &str| {
+        format!(
+            "POST /PAGEKEY/{path} HTTP/1.1\r\nHost: HOST\r\nOrigin: http://HOST\r\nX-Lobestone-Token: TOKEN\r\n\
+             Content-Type: application/json\r\nContent-Length: {}\r\n\r\n{body}",
+            body.len()
+        )
+    };
+    let mut all: Vec<String> = [
+        "/PAGEKEY/",
+        "/PAGEKEY/page.js",
+        "/PAGEKEY/status",
+        "/REPORTKEY/report",
+        "/REPORTKEY/report/x.png",
+        "/",
+    ]
+    .map(get)
+    .to_vec();
+    all.extend([
+        post(
+            "order",
+            r#"{"do": "add", "side": "structure", "effect": "payload", "head": "9-9"}"#,
+        ),
+        post("order", r#"{"do": "undo", "side": "cutting", "head": "9-9"}"#),
+        post("cancel", r#"{"number": 99}"#),
+        post("begin", r#"{"do": "leave"}"#),
+        post("upload", "{\"folder\": \"/nowhere\", \"name\": \"a/b.uff\"}\nx"),
+    ]);
+    all.push(
+        "POST /PAGEKEY/order HTTP/1.1\r\nHost: HOST\r\nX-Lobestone-Token: TOKEN\r\nTransfer-Encoding: chunked\r\n\r\n\
+         5\r\n{\"do\"\r\n0\r\n\r\n"
+            .into(),
+    );
+    // Two on one connection, the second without a body that was announced.
+    all.push("GET /PAGEKEY/status HTTP/1.1\r\nHost: HOST\r\n\r\nPUT / HTTP/1.1\r\nHost: HOST\r\nExpect: 100-continue\r\nContent-Length: 9\r\n\r\n".into());
+    all.into_iter().map(String::into_bytes).collect()
+}
+
+const TARGETS: [Target; 5] = [
+    Target::Reader,
+    Target::Campaign,
+    Target::Robot,
+    Target::Revisions,
+    Target::Requests,
+];
 
 #[test]
 fn mutated_files_do_no_harm() {
@@ -388,7 +513,7 @@ fn fuzz_for_long() {
             .unwrap_or(otherwise)
     };
     let (seconds, seed) = (number("FUZZ_SECONDS", 60), number("FUZZ_SEED", 1));
-    for (target, share) in TARGETS.into_iter().zip([0.91, 0.03, 0.03, 0.03]) {
+    for (target, share) in TARGETS.into_iter().zip([0.8, 0.03, 0.03, 0.03, 0.11]) {
         let time = Duration::from_secs_f64(seconds as f64 * share);
         let found = fuzz(target, &corpus_of(target), seed, u64::MAX, time);
         println!(

@@ -13,7 +13,7 @@ use lobestone::identify::{
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 
-use super::support::{blind, copy_of, document, program};
+use super::support::{append, blind, copy_folder, copy_of, document, program};
 
 const FRF_CAMPAIGNS: [&str; 10] = [
     "frf-9000", "frf-9001", "frf-9007", "frf-9011", "frf-9112", "frf-9113", "frf-9114", "frf-9115",
@@ -207,33 +207,83 @@ fn the_order_of_the_measurements_changes_nothing() {
         .unwrap();
 }
 
-/// One frequency line less moves the parameters by less than their errors.
+fn without_line(data: &FrfData, line: usize) -> FrfData {
+    let mut less = data.clone();
+    for block in &mut less.blocks {
+        let block = std::sync::Arc::make_mut(block);
+        block.frequency_hz.remove(line);
+        for frf in &mut block.frfs {
+            frf.receptance.remove(line);
+            frf.noise_std.remove(line);
+        }
+    }
+    less
+}
+
+/// Where noise alone is left, one frequency line less moves the parameters within their errors. An estimate from all data and one
+/// from a part of them differ by a quantity of the variance s² of the part less s² of all (Hausman 1978): a resonance that one
+/// line alone shows may move its parameters by a standard error of the rest, a line among many by next to nothing.
 #[test]
-#[ignore = "not met: neighbouring lines of a misfit err together, the standard errors do not know it"]
-fn a_lost_line_matters_less_than_the_noise() {
+fn a_lost_line_matters_no_more_than_the_noise() {
     let case = case(&blind("frf-9000"));
     let data = thinned(&case, 1500);
     let whole = calibrated(&case, &data);
-    let lines = data.blocks[0].frequency_hz.len();
-    let mut runner = runner(6);
-    runner
-        .run(&(0..lines), |line| {
-            let mut less = data.clone();
-            for block in &mut less.blocks {
-                let block = std::sync::Arc::make_mut(block);
-                block.frequency_hz.remove(line);
-                for frf in &mut block.frfs {
-                    frf.receptance.remove(line);
-                    frf.noise_std.remove(line);
-                }
-            }
+    let (mut sum, mut count) = (0.0, 0.0);
+    for line in 0..data.blocks[0].frequency_hz.len() {
+        let other = calibrated(&case, &without_line(&data, line));
+        for (a, b) in whole.parameters.iter().zip(&other.parameters) {
+            // Fits end where steps promise less than a hundredth of a standard error.
+            let least = 0.02 * b.std_error;
+            let expected = (b.std_error.powi(2) - a.std_error.powi(2))
+                .max(0.0)
+                .sqrt()
+                .hypot(least);
+            let moved = (a.value - b.value) / expected;
+            assert!(moved.abs() < 5.0, "without line {line}: {moved} {a:?} {b:?}");
+            sum += moved * moved;
+            count += 1.0;
+        }
+    }
+    let rms = f64::sqrt(sum / count);
+    println!("frf-9000: {rms:.2} of what is expected");
+    assert!((0.4..1.5).contains(&rms), "{rms}");
+}
+
+/// Where the model lacks physics, neighbouring lines and the FRFs of a posture err together: the errors that `calibrate` states know it,
+/// those of independent noise do not.
+#[test]
+fn a_lost_line_matters_less_than_the_stated_errors_where_physics_is_missing() {
+    let mut beyond = 0;
+    for name in ["frf-9001", "frf-9011", "frf-9115", "frf-9302"] {
+        let case = case(&blind(name));
+        let data = thinned(&case, 1500);
+        let whole = calibrated(&case, &data);
+        let lines = data.blocks[0].frequency_hz.len();
+        let mut worst = [0.0_f64; 2];
+        for line in (0..lines).step_by(lines.div_ceil(12)) {
+            let less = without_line(&data, line);
             let other = calibrated(&case, &less);
-            for (a, b) in whole.parameters.iter().zip(&other.parameters) {
-                prop_assert!((a.value - b.value).abs() < b.std_error, "{a:?} {b:?}");
+            let stated = other.clone().covering(&case.model, &less).unwrap();
+            let of_noise = other.parameters.iter().zip(&stated.parameters);
+            for (a, (noise, stated)) in whole.parameters.iter().zip(of_noise) {
+                let moved = (a.value - stated.value).abs();
+                beyond += usize::from(moved > noise.std_error);
+                worst = [
+                    worst[0].max(moved / noise.std_error),
+                    worst[1].max(moved / stated.std_error),
+                ];
+                assert!(
+                    moved < stated.std_error,
+                    "{name} without line {line}: {a:?} {stated:?}"
+                );
             }
-            Ok(())
-        })
-        .unwrap();
+        }
+        println!(
+            "{name}: {:.1} standard errors of noise, {:.2} of those stated",
+            worst[0], worst[1]
+        );
+    }
+    assert!(beyond > 0, "the cases are too easy");
 }
 
 /// Newton, kilogram and N·m/rad scaled together leave every dimensionless number alone.
@@ -327,35 +377,87 @@ fn a_few_numbers_give_no_verdict() {
     assert!(enough["too_little_data"].is_null());
 }
 
-/// One thread or four: the same bytes.
+/// What the program says with one thread and with four is the same, byte for byte: sums run in the order of the data, whoever
+/// works their parts out.
+fn same_with_one_thread_and_four(arguments: &[&str], campaign: &Path) {
+    let with = |threads: &[&str], variable: &str| {
+        // Diagnoses are kept in the campaign.
+        let folder = tempfile::tempdir().unwrap();
+        copy_folder(campaign, &folder.path().join("cell"));
+        let output = program()
+            .current_dir(folder.path())
+            .env("RAYON_NUM_THREADS", variable)
+            .args(arguments)
+            .args(["cell", "--json"])
+            .args(threads)
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success(), "{arguments:?} {campaign:?}: {said}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    // The option is stronger than the environment.
+    let (one, four) = (with(&["--jobs", "1"], "4"), with(&[], "4"));
+    assert!(one.len() > 100, "{arguments:?} {campaign:?}: {one}");
+    let difference = || first_difference(&one, &four);
+    assert!(one == four, "{arguments:?} {campaign:?}: {}", difference());
+}
+
+/// The first postures of a campaign, each with its file.
+fn first_postures(name: &str, count: usize) -> tempfile::TempDir {
+    let few = copy_of(name);
+    let file = few.path().join("campaign.toml");
+    let text = std::fs::read_to_string(&file).unwrap();
+    let end = text.match_indices("[[posture]]").nth(count).unwrap().0;
+    std::fs::write(&file, &text[..end]).unwrap();
+    few
+}
+
 #[test]
-#[ignore = "not met yet: the last digits of some commands differ"]
 fn the_number_of_threads_changes_no_byte() {
-    let commands: [&[&str]; 8] = [
-        &["calibrate", "frf-9115"],
-        &["compare", "frf-9115"],
-        &["diagnose", "frf-9115"],
-        &["modal", "frf-9115"],
-        &["model", "frf-9115"],
-        &["lobes", "frf-9115"],
-        &["cfc", "force-9439"],
-        &["diagnose", "force-9439"],
-    ];
-    for [command, campaign] in commands.map(|c| [c[0], c[1]]) {
-        let with = |threads: &str| {
-            let mut program = program();
-            program.env("RAYON_NUM_THREADS", threads);
-            let output = program
-                .args([command, blind(campaign).to_str().unwrap(), "--json"])
-                .output();
-            String::from_utf8(output.unwrap().stdout).unwrap()
-        };
-        let (one, four) = (with("1"), with("4"));
-        assert!(
-            !one.is_empty() && one == four,
-            "{command} {campaign}: {}",
-            first_difference(&one, &four)
-        );
+    let two = first_postures("frf-9115", 2);
+    for command in ["calibrate", "compare", "model", "modal", "localise", "diagnose"] {
+        same_with_one_thread_and_four(&[command], two.path());
+    }
+    for command in ["cfc", "compare", "diagnose"] {
+        same_with_one_thread_and_four(&[command], &blind("force-9439"));
+    }
+    // Lobes of a calibrated model with their band, and the hole.
+    let lobes = "\n[lobes]\nprocess = \"drilling\"\nsource = \"model\"\nktc_n_per_mm2 = 1014.2\nkrc_n_per_mm2 = 619.9\nteeth = 2\n\
+                 half_point_angle_deg = 67.5\nspindle_rpm = [200.0, 500.0, 10.0]\n[lobes.hole]\nthrust_n = 400.0\ntorque_nm = 2.0\n";
+    append(two.path(), lobes);
+    same_with_one_thread_and_four(&["lobes"], two.path());
+    // A plan of FRFs that are not measured.
+    let planned = first_postures("frf-9115", 1);
+    std::fs::remove_dir_all(planned.path().join("frf")).unwrap();
+    append(
+        planned.path(),
+        "[plan]\nresponses = \"1X, 1Y\"\nhits = \"1X\"\nlines_hz = 0.5\n",
+    );
+    same_with_one_thread_and_four(&["plan"], planned.path());
+}
+
+/// As above on every campaign.
+#[test]
+#[ignore = "takes minutes"]
+fn the_number_of_threads_changes_no_byte_of_any_campaign() {
+    for campaign in FRF_CAMPAIGNS {
+        for command in [
+            "calibrate",
+            "compare",
+            "diagnose",
+            "localise",
+            "plan",
+            "modal",
+            "model",
+        ] {
+            same_with_one_thread_and_four(&[command], &blind(campaign));
+        }
+    }
+    for campaign in ["force-9400", "force-9439"] {
+        for command in ["cfc", "compare", "diagnose"] {
+            same_with_one_thread_and_four(&[command], &blind(campaign));
+        }
     }
 }
 

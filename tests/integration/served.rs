@@ -22,6 +22,8 @@ pub struct Served {
     /// The same of the report's.
     pub report_key: String,
     pub token: String,
+    /// What it says on stderr.
+    said: tempfile::NamedTempFile,
 }
 
 impl Drop for Served {
@@ -59,12 +61,13 @@ impl Served {
     }
 
     fn started(arguments: &[&str]) -> Served {
+        let errors = tempfile::NamedTempFile::new().unwrap();
         let mut child = program()
             .arg("serve")
             .args(arguments)
             .args(["--port", "0", "--json"])
             .stdout(Stdio::piped())
-            .stderr(Stdio::null())
+            .stderr(errors.reopen().unwrap())
             .spawn()
             .unwrap();
         let mut line = String::new();
@@ -83,6 +86,7 @@ impl Served {
             host,
             report_key: String::new(),
             token: String::new(),
+            said: errors,
         };
         let page = served.get("/").text();
         let meta = |name: &str| {
@@ -97,6 +101,21 @@ impl Served {
             .unwrap()
             .to_string();
         served
+    }
+
+    /// What it said on stderr so far.
+    pub fn said(&self) -> String {
+        std::fs::read_to_string(self.said.path()).unwrap()
+    }
+
+    /// Memory of the server in kB, by its name in `/proc/PID/status` (`VmRSS`, `VmHWM`); 0 where the system does not say.
+    pub fn memory_kb(&self, name: &str) -> u64 {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).unwrap_or_default();
+        let line = status
+            .lines()
+            .find_map(|l| l.strip_prefix(name)?.strip_prefix(':'));
+        line.and_then(|l| l.trim().split(' ').next()?.parse().ok())
+            .unwrap_or(0)
     }
 
     /// The whole path of what the page or the report asks for.
@@ -152,7 +171,7 @@ impl Served {
         self.raw_bytes(&[head.replace("HOST", &self.host).as_bytes(), body].concat())
     }
 
-    fn own_headers(&self) -> String {
+    pub fn own_headers(&self) -> String {
         format!(
             "Origin: http://{}\r\nX-Lobestone-Token: {}\r\n",
             self.host, self.token

@@ -19,6 +19,7 @@ use crate::commands::Outcome;
 use crate::commands::text::{number, percent};
 use crate::commands::write::report;
 use crate::cutting::{CfcOptions, CfcResult};
+use crate::files::write_atomically;
 use crate::identify::{Options, StructureCase};
 use crate::report::campaign as pages;
 use crate::report::number::with_error;
@@ -272,7 +273,7 @@ fn prepare(dir: &Path) -> Result<()> {
         }
     }
     std::fs::create_dir_all(dir).map_err(|e| Error::io(dir, e))?;
-    std::fs::write(&marker, MARKER_TEXT).map_err(|e| Error::io(&marker, e))
+    write_atomically(&marker, MARKER_TEXT.as_bytes())
 }
 
 /// A built-in campaign as it came, whatever was added to its model since the last demo.

@@ -15,7 +15,7 @@ use crate::lobes::drilling::contact::held_report;
 use crate::robot::rigid::STANDARD_GRAVITY;
 use crate::robot::urdf::{self, Sources};
 use crate::robot::{Baseline, Dual, PostureReport, export};
-use crate::{InputError, Result};
+use crate::{Error, InputError, Result};
 
 #[derive(clap::Args)]
 pub struct ModelArgs {
@@ -125,14 +125,26 @@ fn write_urdf(file: &Path, model: &StructureModel, sources: &Sources) -> Result<
         (file, urdf::urdf(&model.robot, sources)),
         (beside.as_path(), urdf::compliances(&model.robot.spec, sources)),
     ];
-    if let Some((there, _)) = texts.iter().find(|(path, _)| path.symlink_metadata().is_ok()) {
-        return Err(InputError::new("is there already; nothing was written")
+    let taken = |there: &Path| -> Error {
+        InputError::new("is there already; nothing was written")
             .file(there)
             .remedy("give another name to --urdf, or take the file away")
-            .into());
+            .into()
+    };
+    if let Some((there, _)) = texts.iter().find(|(path, _)| path.symlink_metadata().is_ok()) {
+        return Err(taken(there));
     }
-    for (path, text) in &texts {
-        write_new(path, text.as_bytes())?;
+    for (i, (path, text)) in texts.iter().enumerate() {
+        let written = match write_new(path, text.as_bytes()) {
+            Ok(true) => continue,
+            Ok(false) => taken(path),
+            Err(error) => error,
+        };
+        // Both or none: one alone is half a robot.
+        for (path, _) in &texts[..i] {
+            let _ = std::fs::remove_file(path);
+        }
+        return Err(written);
     }
     Ok([file.to_path_buf(), beside.clone()])
 }

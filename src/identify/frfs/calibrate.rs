@@ -70,6 +70,9 @@ pub struct Calibration {
     pub theta: Vec<f64>,
     /// Covariance on the solver's scale, scaled up where the misfit exceeds the noise.
     pub covariance: DMatrix<f64>,
+    /// By how much more than that each standard error was widened, because parts of the data disagree (see
+    /// [`covering`](Self::covering)): 1 where they do not.
+    pub widened: Vec<f64>,
     /// Weighted misfit per real residual: 1 where only noise is left.
     pub reduced_chi2: f64,
     /// Steps of the solver.
@@ -109,6 +112,7 @@ impl Calibration {
         Ok(Calibration {
             parameters: estimates(parameters, &fit, reduced_chi2)?,
             covariance: covariance(&fit, reduced_chi2)?,
+            widened: vec![1.0; fit.theta.len()],
             theta: fit.theta,
             reduced_chi2,
             iterations: fit.iterations,
@@ -149,6 +153,7 @@ impl Calibration {
             parameters,
             theta: [self.theta.as_slice(), limit].concat(),
             covariance,
+            widened: [self.widened.as_slice(), &vec![1.0; own.len()]].concat(),
             ..self.clone()
         }
     }
@@ -455,6 +460,7 @@ pub fn calibrate(
     let parameters = estimates(&model.parameters, &best, reduced_chi2)?;
     Ok(Calibration {
         parameters,
+        widened: vec![1.0; best.theta.len()],
         theta: best.theta,
         covariance,
         reduced_chi2,

@@ -1,5 +1,7 @@
 //! The misfit of a structural model to measured FRFs, and what it leaves of them.
 
+use std::ops::Range;
+
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
@@ -82,8 +84,25 @@ impl Partial {
     }
 }
 
+impl From<Partial> for Linearisation {
+    fn from(sums: Partial) -> Self {
+        Linearisation {
+            cost: sums.cost,
+            gradient: sums.gradient,
+            hessian: sums.hessian,
+        }
+    }
+}
+
 impl FrfProblem<'_> {
-    fn evaluate(&self, theta: &[f64], with_derivatives: bool) -> Result<Partial> {
+    /// Sums by block of the data and chunk of its lines, block by block; priors are left out. `size`: lines of a chunk, of a
+    /// block of so many lines.
+    fn partials(
+        &self,
+        theta: &[f64],
+        with_derivatives: bool,
+        size: impl Fn(usize) -> usize,
+    ) -> Result<Vec<(usize, usize, Partial)>> {
         let count = if with_derivatives { theta.len() } else { 0 };
         let bases: Vec<FrfBasis> = self
             .data
@@ -92,22 +111,45 @@ impl FrfProblem<'_> {
             .map(|block| self.model.basis(theta, block, with_derivatives))
             .collect::<Result<_>>()?;
         let channels = Channels::new(&self.model.filter(theta, with_derivatives));
-        let tasks: Vec<(usize, usize)> = self
+        let tasks: Vec<(usize, usize, Range<usize>)> = self
             .data
             .blocks
             .iter()
             .enumerate()
             .flat_map(|(b, block)| {
                 let lines = block.frequency_hz.len().div_ceil(self.stride);
-                (0..lines.div_ceil(CHUNK)).map(move |c| (b, c))
+                let size = size(lines).max(1);
+                (0..lines.div_ceil(size)).map(move |c| (b, c, c * size..(c + 1) * size))
             })
             .collect();
-        let parts: Vec<Partial> = tasks
-            .par_iter()
-            .map(|&(b, chunk)| self.chunk(&bases[b], &channels, &self.data.blocks[b], chunk, count))
-            .collect::<Result<_>>()?;
-        let mut total = Partial::zero(count);
-        for part in &parts {
+        tasks
+            .into_par_iter()
+            .map(|(b, chunk, lines)| {
+                let partial = self.chunk(&bases[b], &channels, &self.data.blocks[b], lines, count)?;
+                Ok((b, chunk, partial))
+            })
+            .collect()
+    }
+
+    /// The misfit by block of the data and by stretch of its lines, of which there are so many (fewer where there are fewer lines),
+    /// block by block; priors are left out.
+    ///
+    /// # Errors
+    /// A model that cannot be set up at `theta`.
+    pub fn by_block_and_stretch(
+        &self,
+        theta: &[f64],
+        stretches: usize,
+    ) -> Result<Vec<(usize, usize, Linearisation)>> {
+        let size = |lines: usize| lines.div_ceil(stretches.max(1));
+        let partials = self.partials(theta, true, size)?.into_iter();
+        let linearised = |(block, stretch, sums): (usize, usize, Partial)| (block, stretch, sums.into());
+        Ok(partials.map(linearised).collect())
+    }
+
+    fn evaluate(&self, theta: &[f64], with_derivatives: bool) -> Result<Partial> {
+        let mut total = Partial::zero(if with_derivatives { theta.len() } else { 0 });
+        for (_, _, part) in &self.partials(theta, with_derivatives, |_| CHUNK)? {
             total.add(part);
         }
         for (i, (parameter, t)) in self.model.parameters.iter().zip(theta).enumerate() {
@@ -128,7 +170,7 @@ impl FrfProblem<'_> {
         basis: &FrfBasis,
         channels: &Channels,
         block: &FrfBlock,
-        chunk: usize,
+        lines: Range<usize>,
         count: usize,
     ) -> Result<Partial> {
         stop::point();
@@ -143,7 +185,7 @@ impl FrfProblem<'_> {
         };
         let mut residual = vec![0.0; rows];
         let mut jacobian = vec![0.0; rows * count];
-        let lines = (chunk * CHUNK..(chunk + 1) * CHUNK).map(|k| k * self.stride);
+        let lines = lines.map(|k| k * self.stride);
         for line in lines.take_while(|l| *l < block.frequency_hz.len()) {
             let omega = std::f64::consts::TAU * block.frequency_hz[line];
             if count > 0 {
@@ -203,16 +245,7 @@ impl LeastSquares for FrfProblem<'_> {
     }
 
     fn linearise(&self, theta: &[f64]) -> Result<Linearisation> {
-        let Partial {
-            cost,
-            gradient,
-            hessian,
-        } = self.evaluate(theta, true)?;
-        Ok(Linearisation {
-            cost,
-            gradient,
-            hessian,
-        })
+        Ok(self.evaluate(theta, true)?.into())
     }
 }
 

@@ -2,6 +2,7 @@
 
 pub mod calibrate;
 pub(crate) mod channels;
+mod covering;
 pub mod frf_data;
 pub mod frf_problem;
 pub mod modal_start;

@@ -37,10 +37,11 @@ impl Undetermined {
             .filter_map(|(i, p)| Some((i, p.prior?.std)))
             .collect();
         // Widened for a misfit above the noise; how much the data say does not depend on that.
-        let widened = calibration.reduced_chi2.max(1.0);
+        let misfit = calibration.reduced_chi2.max(1.0);
+        let widened = &calibration.widened;
         let scaled = DMatrix::from_fn(prior.len(), prior.len(), |i, j| {
             let ((a, std_a), (b, std_b)) = (prior[i], prior[j]);
-            calibration.covariance[(a, b)] / (widened * std_a * std_b)
+            calibration.covariance[(a, b)] / (misfit * widened[a] * widened[b] * std_a * std_b)
         });
         let name = |i: usize| parameters[prior[i].0].name.clone();
         let unsaid = |i: &usize| scaled[(*i, *i)].sqrt() > KEPT;
@@ -119,6 +120,7 @@ mod tests {
             parameters: Vec::new(),
             theta: vec![0.0; 4],
             covariance: information.clone().try_inverse().unwrap() * widened,
+            widened: vec![1.0; 4],
             reduced_chi2: widened,
             iterations: 1,
             ending: Ending::Converged,

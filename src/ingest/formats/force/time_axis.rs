@@ -156,7 +156,7 @@ pub(crate) fn time_unit(
         }
         return Ok(1.0);
     }
-    // Milliseconds are written for slow clocks; a megahertz of them is one second called one millisecond.
+    // Milliseconds are written for slow clocks; hundreds of kilohertz of them are seconds called milliseconds.
     if is_ms && own >= MS_AT_MOST {
         return Err(InputError::new(format!(
             "the time column is in ms and gives {own:.0} samples a second: seconds called ms"
@@ -167,8 +167,9 @@ pub(crate) fn time_unit(
     Ok(1.0)
 }
 
-/// Sampling rate from which times in "ms" must be something else, Hz.
-const MS_AT_MOST: f64 = 1e6;
+/// Sampling rate from which times in "ms" must be something else, Hz: analysers of forces and vibrations end at 262 kHz (a bandwidth
+/// of 102.4 kHz), and forces in seconds are hardly ever sampled below 300 Hz, which is 300 kHz where the seconds are called ms.
+const MS_AT_MOST: f64 = 300e3;
 
 /// Stretches of a time column without gaps, and the step in them.
 pub(crate) struct Runs {

@@ -3,7 +3,7 @@
 
     thin_campaign.py FROM TO [--every N] [--postures p1,p2] [--references 1X,1Y] [--cuts 01,05]
 
---every N       keep every N-th spectral line of the (evenly spaced, ASCII) UFF 58 files
+--every N       keep every N-th spectral line of the (evenly spaced, ASCII) UFF 58 files and FRF tables
 --postures      keep these postures and their FRFs
 --references    keep FRFs excited there: node and direction
 --cuts          keep these cuts (their records are copied as they are)
@@ -61,10 +61,21 @@ def thin_uff(text, every, references):
     return "".join(out)
 
 
+def thin_csv(text, every, references):
+    """A table of FRFs: frequency_hz,re(2X/1Y),im(2X/1Y),…"""
+    head, *rows = text.splitlines()
+    names = head.split(",")
+    columns = [i for i, name in enumerate(names) if i == 0 or not references or name.split("/")[-1].rstrip(")") in references]
+    lines = [names] + [row.split(",") for row in rows[::every]]
+    return "".join(",".join(line[i] for i in columns) + "\n" for line in lines)
+
+
 def thin(source, target, args):
     """Only ASCII files can be thinned; others are copied as they are where nothing but postures is left out."""
     if args.every == 1 and not args.references:
         shutil.copyfile(source, target)
+    elif source.suffix == ".csv":
+        target.write_text(thin_csv(source.read_text(), args.every, args.references))
     else:
         target.write_text(thin_uff(source.read_text(), args.every, args.references))
 

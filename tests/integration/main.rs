@@ -25,6 +25,7 @@ mod next_step;
 mod odd;
 mod optimum;
 mod plan;
+mod practice;
 mod records;
 mod references;
 mod report;

@@ -162,7 +162,7 @@ fn analyse(
             }
         }
     }
-    settle(&curve, &mut found, &noise_std);
+    settle(&curve, &mut found, &noise_std, effort);
     result.modes = found.into_iter().map(|f| f.mode).collect();
     result
         .modes
@@ -340,14 +340,22 @@ fn mode_at(
 
 /// What can be said of a mode only when the others are known: how far they push the local fit, whose window does not hold
 /// them all; whether one of them overlaps; which answer is to be taken.
-fn settle(curve: &Curve, found: &mut [Found], noise_std: &[f64]) {
+fn settle(curve: &Curve, found: &mut [Found], noise_std: &[f64], effort: Effort) {
     let poles: Vec<(Pole, Complex64)> = found
         .iter()
         .map(|f| (f.solution.poles[f.pole], f.solution.residues[f.pole]))
         .collect();
     for (own, one) in found.iter_mut().enumerate() {
-        let hidden = hidden_neighbour(curve, one, noise_std);
-        let bias = hidden.map_or_else(|| local_bias(curve, one, &poles), |(bias, _)| bias);
+        // Of many FRFs the modes are those of the set; these are but their starts.
+        let is_thorough = effort.windows.len() > 1;
+        let hidden = is_thorough
+            .then(|| hidden_neighbour(curve, one, noise_std))
+            .flatten();
+        let bias = match hidden {
+            Some((bias, _)) => bias,
+            None if is_thorough => local_bias(curve, one, &poles),
+            None => [0.0; 2],
+        };
         for estimate in &mut one.mode.estimates {
             estimate.frequency_std_hz = estimate.frequency_std_hz.map(|std| std + bias[0].abs());
             estimate.damping_std = estimate.damping_std.map(|std| std + bias[1].abs());

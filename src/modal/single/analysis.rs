@@ -401,8 +401,11 @@ fn hidden_neighbour(curve: &Curve, one: &Found, noise_std: &[f64]) -> Option<([f
         frequency_hz: own.frequency_hz * (1.0 + widths * own.damping_ratio),
         ..own
     });
+    // A broad mode has its half-widths reach below zero; a pole begins among the lines.
+    let lines_hz = *frequency_hz.first()?..=*frequency_hz.last()?;
     let best = starts
         .into_iter()
+        .filter(|extra| lines_hz.contains(&extra.frequency_hz))
         .filter_map(|extra| {
             let mut poles = one.solution.poles.clone();
             poles.push(extra);
@@ -410,7 +413,7 @@ fn hidden_neighbour(curve: &Curve, one: &Found, noise_std: &[f64]) -> Option<([f
         })
         .min_by(|a, b| a.variance.total_cmp(&b.variance))?;
     let (found, extra) = (best.poles[one.pole], best.poles.last()?);
-    let inside = extra.frequency_hz > *frequency_hz.first()? && extra.frequency_hz < *frequency_hz.last()?;
+    let inside = lines_hz.contains(&extra.frequency_hz);
     let cause = match inside && extra.damping_ratio < MOST_DAMPED * own.damping_ratio {
         true => Disturbance::Overlap,
         false => Disturbance::Residual,

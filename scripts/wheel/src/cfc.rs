@@ -51,6 +51,7 @@ impl Cutting {
             lead_angle_deg: 90.0,
             half_point_angle_deg: self.half_point_angle_deg,
             web_thickness_mm: self.web_thickness_mm,
+            chisel_edge_angle_deg: lobestone::data::USUAL_CHISEL_EDGE_ANGLE_DEG,
             each_tooth: Vec::new(),
         }
     }

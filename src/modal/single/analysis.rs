@@ -52,6 +52,8 @@ const LEAKAGE_LINES: f64 = 0.02;
 const MORE_THAN_NOISE: f64 = 2.0;
 /// One more pole that leaves less than this part of the variance is a mode.
 const MOST_TAKEN_AWAY: f64 = 0.5;
+/// One more pole that is damped this many times as much as its neighbour is no mode there but a shape of the residual.
+const MOST_DAMPED: f64 = 5.0;
 /// Modes nearer to each other than this many sums of their half-widths overlap.
 const OVERLAP_WIDTHS: f64 = 4.0;
 /// A bias of the damping below this part of it is not worth a word.
@@ -160,7 +162,7 @@ fn analyse(
             }
         }
     }
-    settle(&curve, &mut found, &noise_std);
+    settle(&curve, &mut found, &noise_std, effort);
     result.modes = found.into_iter().map(|f| f.mode).collect();
     result
         .modes
@@ -338,14 +340,22 @@ fn mode_at(
 
 /// What can be said of a mode only when the others are known: how far they push the local fit, whose window does not hold
 /// them all; whether one of them overlaps; which answer is to be taken.
-fn settle(curve: &Curve, found: &mut [Found], noise_std: &[f64]) {
+fn settle(curve: &Curve, found: &mut [Found], noise_std: &[f64], effort: Effort) {
     let poles: Vec<(Pole, Complex64)> = found
         .iter()
         .map(|f| (f.solution.poles[f.pole], f.solution.residues[f.pole]))
         .collect();
     for (own, one) in found.iter_mut().enumerate() {
-        let hidden = hidden_neighbour(curve, one, noise_std);
-        let bias = hidden.unwrap_or_else(|| local_bias(curve, one, &poles));
+        // Of many FRFs the modes are those of the set; these are but their starts.
+        let is_thorough = effort.windows.len() > 1;
+        let hidden = is_thorough
+            .then(|| hidden_neighbour(curve, one, noise_std))
+            .flatten();
+        let bias = match hidden {
+            Some((bias, _)) => bias,
+            None if is_thorough => local_bias(curve, one, &poles),
+            None => [0.0; 2],
+        };
         for estimate in &mut one.mode.estimates {
             estimate.frequency_std_hz = estimate.frequency_std_hz.map(|std| std + bias[0].abs());
             estimate.damping_std = estimate.damping_std.map(|std| std + bias[1].abs());
@@ -357,8 +367,8 @@ fn settle(curve: &Curve, found: &mut [Found], noise_std: &[f64]) {
             other != own && apart < OVERLAP_WIDTHS * (half_width(p) + half_width(&here))
         });
         if one.mode.contradicted || one.mode.disturbance.is_some() || hidden.is_some() {
-            let near = (overlaps || hidden.is_some()).then_some(Disturbance::Overlap);
-            one.mode.disturbance = near.or(one.mode.disturbance);
+            let near = overlaps.then_some(Disturbance::Overlap);
+            one.mode.disturbance = near.or(hidden.map(|(_, cause)| cause)).or(one.mode.disturbance);
         }
         (one.mode.recommended, one.mode.reason) =
             recommended(&one.mode.estimates, one.mode.disturbance, one.mode.contradicted);
@@ -367,8 +377,8 @@ fn settle(curve: &Curve, found: &mut [Found], noise_std: &[f64]) {
 
 /// Where the local fit leaves more than noise, a mode without a peak of its own may stand beside: one more pole is tried on
 /// either side. Where that takes away most of what is left, the answer is by how much the fit without it was off
-/// (frequency in Hz, damping ratio).
-fn hidden_neighbour(curve: &Curve, one: &Found, noise_std: &[f64]) -> Option<[f64; 2]> {
+/// (frequency in Hz, damping ratio), and whether that mode is among the lines or stands for what lies beyond them.
+fn hidden_neighbour(curve: &Curve, one: &Found, noise_std: &[f64]) -> Option<([f64; 2], Disturbance)> {
     let lines = one.lines.first..one.lines.first + one.lines.weight.len();
     let (frequency_hz, mobility) = (
         curve.frequency_hz.get(lines.clone())?,
@@ -391,21 +401,28 @@ fn hidden_neighbour(curve: &Curve, one: &Found, noise_std: &[f64]) -> Option<[f6
         frequency_hz: own.frequency_hz * (1.0 + widths * own.damping_ratio),
         ..own
     });
+    // A broad mode has its half-widths reach below zero; a pole begins among the lines.
+    let lines_hz = *frequency_hz.first()?..=*frequency_hz.last()?;
     let best = starts
         .into_iter()
+        .filter(|extra| lines_hz.contains(&extra.frequency_hz))
         .filter_map(|extra| {
             let mut poles = one.solution.poles.clone();
             poles.push(extra);
             local_fit::fit(&problem, &poles, ROUGHLY_SETTLED)
         })
         .min_by(|a, b| a.variance.total_cmp(&b.variance))?;
-    let found = best.poles[one.pole];
-    (best.variance < MOST_TAKEN_AWAY * one.solution.variance).then(|| {
-        [
-            found.frequency_hz - own.frequency_hz,
-            found.damping_ratio - own.damping_ratio,
-        ]
-    })
+    let (found, extra) = (best.poles[one.pole], best.poles.last()?);
+    let inside = lines_hz.contains(&extra.frequency_hz);
+    let cause = match inside && extra.damping_ratio < MOST_DAMPED * own.damping_ratio {
+        true => Disturbance::Overlap,
+        false => Disturbance::Residual,
+    };
+    let bias = [
+        found.frequency_hz - own.frequency_hz,
+        found.damping_ratio - own.damping_ratio,
+    ];
+    (best.variance < MOST_TAKEN_AWAY * one.solution.variance).then_some((bias, cause))
 }
 
 /// By how much the local fit is off (frequency in Hz, damping ratio) on a curve that is the sum of all modes found, fitted on

@@ -333,3 +333,16 @@ fn a_residual_is_told() {
         );
     }
 }
+
+/// A mode so broad that four of its half-widths reach below 0 Hz, beside what one pole cannot follow: no pole is sought there.
+#[test]
+fn a_very_broad_mode_is_no_trouble() {
+    for zeta in [0.26, 0.3, 0.4] {
+        let modes = [
+            SyntheticMode::new(12.0, zeta, 0.01),
+            SyntheticMode::new(15.0, 0.2, 0.008),
+        ];
+        let found = analyse(Synthetic::new(1.0, 40.0, 0.05, &modes).with_noise(0.0005, 0.0, 9));
+        assert!(found.modes.iter().all(|m| m.best().frequency_hz > 0.0));
+    }
+}

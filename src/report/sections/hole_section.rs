@@ -273,7 +273,7 @@ fn errors<'a>(holes: impl IntoIterator<Item = (String, &'a HoleError)>, check: &
     let mut notes = vec!["Along the axis: negative where the tool is pushed back from the workpiece.".into()];
     if let Some(diameter) = &tolerance.diameter {
         columns.push(TableColumn::number("oversize, 95 % (mm)"));
-        columns.push(TableColumn::text(&diameter.name()));
+        columns.push(TableColumn::text(diameter.name()));
         notes.push(format!(
             "Oversize: what the turning lateral force adds to the diameter that the drill itself cuts; {} allows {} mm.",
             diameter.name(),

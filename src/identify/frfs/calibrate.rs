@@ -70,7 +70,7 @@ pub struct Calibration {
     pub theta: Vec<f64>,
     /// Covariance on the solver's scale, scaled up where the misfit exceeds the noise.
     pub covariance: DMatrix<f64>,
-    /// By how much more than that each standard error was widened, because parts of the data disagree (see
+    /// By how much more than `covariance` says each standard error was widened, because parts of the data disagree (see
     /// [`covering`](Self::covering)): 1 where they do not.
     pub widened: Vec<f64>,
     /// Weighted misfit per real residual: 1 where only noise is left.

@@ -24,9 +24,9 @@ const STRETCHES: usize = 12;
 const BY_CHANCE: f64 = 3.0;
 
 impl Calibration {
-    /// The calibration of `model` to `data` with standard errors (and covariance) that are no smaller than what leaving out
+    /// The calibration of `model` to `data` with standard errors that are no smaller than what leaving out
     /// postures and stretches of the frequency in turn moves the parameters by. Unchanged where the misfit is what noise
-    /// leaves: there the errors are known better from the noise than from a few groups.
+    /// leaves: there the errors are known better from the noise than from a few groups. The covariance stays that of the noise.
     ///
     /// # Errors
     /// A model that cannot be set up where the calibration has it.
@@ -58,10 +58,7 @@ impl Calibration {
                 continue;
             }
             calibration.widened[i] = factor;
-            // Correlations stay what they are.
-            calibration.covariance.row_mut(i).scale_mut(factor);
-            calibration.covariance.column_mut(i).scale_mut(factor);
-            let std = calibration.covariance[(i, i)].sqrt();
+            let std = factor * calibration.covariance[(i, i)].sqrt();
             calibration.parameters[i].std_error = parameter.natural_std(calibration.theta[i], std);
         }
         Ok(calibration)
@@ -221,7 +218,7 @@ mod tests {
         (0..6)
             .map(|i| {
                 let gone = before.theta[i] - nominal[i];
-                [&before, &after].map(|c| gone / c.covariance[(i, i)].sqrt())
+                [&before, &after].map(|c| gone / (c.widened[i] * c.covariance[(i, i)].sqrt()))
             })
             .collect()
     }

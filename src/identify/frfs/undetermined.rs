@@ -38,10 +38,9 @@ impl Undetermined {
             .collect();
         // Widened for a misfit above the noise; how much the data say does not depend on that.
         let misfit = calibration.reduced_chi2.max(1.0);
-        let widened = &calibration.widened;
         let scaled = DMatrix::from_fn(prior.len(), prior.len(), |i, j| {
             let ((a, std_a), (b, std_b)) = (prior[i], prior[j]);
-            calibration.covariance[(a, b)] / (misfit * widened[a] * widened[b] * std_a * std_b)
+            calibration.covariance[(a, b)] / (misfit * std_a * std_b)
         });
         let name = |i: usize| parameters[prior[i].0].name.clone();
         let unsaid = |i: &usize| scaled[(*i, *i)].sqrt() > KEPT;

@@ -392,6 +392,21 @@ fn a_drill_from_the_orthogonal_database() {
         "{said}"
     );
 
+    let warned = |document: &Value| {
+        document["warnings"]
+            .to_string()
+            .contains("friction_angle_law and chip_ratio_law")
+    };
+    assert!(!warned(&found), "{}", found["warnings"]);
+    let one_rake: String = TITANIUM
+        .lines()
+        .filter(|l| !l.contains("_law"))
+        .map(|l| l.to_string() + "\n")
+        .collect();
+    let one_rake = campaign(&[ROBOT, TWISTED, &one_rake, PREDICTED]);
+    let one_rake = document(&["lobes", text(one_rake.path())]);
+    assert!(warned(&one_rake), "{}", one_rake["warnings"]);
+
     let piloted = campaign(&[
         ROBOT,
         TWISTED,

@@ -307,6 +307,16 @@ impl CutForce {
         if let Some(Err(reason)) = drill.as_ref().and_then(|d| d.chisel.as_ref()) {
             warnings.push(format!("the chisel edge is left out: {reason}"));
         }
+        if let (Some(Some(Ok(_))), Some(database)) = (drill.as_ref().map(|d| &d.chisel), &campaign.orthogonal)
+            && (database.friction_angle_law.is_none() || database.chip_ratio_law.is_none())
+        {
+            warnings.push(format!(
+                "friction and chip ratio of [orthogonal] are those of one rake angle ({}°) and are taken for the whole lip, whose rake changes by \
+                 tens of degrees, and for the chisel edge, whose rake is strongly negative: thrust and limits may be off by a factor of several; \
+                 give friction_angle_law and chip_ratio_law, or coefficients from drilling cuts",
+                database.rake_deg
+            ));
+        }
         let (coefficients, own_cuts) = match (&drill, LobeCoefficients::given(section)) {
             (Some(drill), _) => (LobeCoefficients::of_drill(drill), None),
             (None, Some(given)) => (given, None),

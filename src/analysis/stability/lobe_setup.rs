@@ -12,12 +12,18 @@ use crate::lobes::setup::{DrilledHole, LobeCoefficients, LobeCut};
 use crate::lobes::{AxisMode, ModalFrf, Mode, PeriodicForce, ProcessDamping, RegenerativeForce};
 use crate::{Error, InputError, Result};
 
-fn lacks_coefficients(campaign: &Campaign, problem: impl Into<String>) -> Error {
+/// Something that the lobes need and `campaign.toml` does not say.
+fn lacking(campaign: &Campaign, key: &str, problem: impl Into<String>, remedy: &str) -> Error {
     InputError::new(problem)
         .file(campaign.dir.join("campaign.toml"))
-        .key("lobes.ktc_n_per_mm2")
-        .remedy("give ktc_n_per_mm2 and krc_n_per_mm2, or add cuts at two feeds or more (drilling: or [orthogonal] and coefficients = \"orthogonal\")")
+        .key(key)
+        .remedy(remedy)
         .into()
+}
+
+fn lacks_coefficients(campaign: &Campaign, problem: impl Into<String>) -> Error {
+    let remedy = "give ktc_n_per_mm2 and krc_n_per_mm2, or add cuts at two feeds or more";
+    lacking(campaign, "lobes.ktc_n_per_mm2", problem, remedy)
 }
 
 /// The coefficients of the campaign's own cuts of the same process and material, all speeds pooled.
@@ -58,13 +64,7 @@ pub fn group_of_cuts(
 /// # Errors
 /// No `[orthogonal]`, `[tool]` or feed, or a drill whose angles allow no chip.
 pub fn predicted_drill(campaign: &Campaign, section: &LobesSection) -> Result<DrillPrediction> {
-    let lacks = |key: &str, problem: &str, remedy: &str| -> Error {
-        InputError::new(problem)
-            .file(campaign.dir.join("campaign.toml"))
-            .key(key)
-            .remedy(remedy)
-            .into()
-    };
+    let lacks = |key: &str, problem: &str, remedy: &str| lacking(campaign, key, problem, remedy);
     let database = campaign.orthogonal.as_ref().ok_or_else(|| {
         lacks(
             "orthogonal",
@@ -160,13 +160,7 @@ pub fn cut_of(
     section: &LobesSection,
     coefficients: LobeCoefficients,
 ) -> Result<LobeCut> {
-    let lacks = |key: &str, problem: &str, remedy: &str| -> Error {
-        InputError::new(problem)
-            .file(campaign.dir.join("campaign.toml"))
-            .key(key)
-            .remedy(remedy)
-            .into()
-    };
+    let lacks = |key: &str, problem: &str, remedy: &str| lacking(campaign, key, problem, remedy);
     let tool = campaign.tool.as_ref();
     if let Some(tool) = tool
         && (tool.kind == ToolKind::Turning) != (section.process == Process::Turning)

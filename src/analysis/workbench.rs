@@ -129,12 +129,16 @@ impl<'a> Workbench<'a> {
     /// # Errors
     /// A file that cannot be read.
     pub fn fingerprint(&self, side: Side) -> Result<String> {
-        let known = match side {
+        let of_files = || revision::fingerprint(self.campaign, side);
+        match side {
             // FRF files that say nothing have a fingerprint, too.
-            Side::Structure => self.read_frfs().ok().and_then(|read| read.fingerprint.clone()),
-            Side::Cutting => self.known::<CuttingFingerprint>().map(|known| known.0.clone()),
-        };
-        known.map_or_else(|| revision::fingerprint(self.campaign, side), Ok)
+            Side::Structure => {
+                let read = self.read_frfs().ok();
+                read.and_then(|read| read.fingerprint.clone())
+                    .map_or_else(of_files, Ok)
+            }
+            Side::Cutting => Ok(self.once(|| of_files().map(CuttingFingerprint))?.0.clone()),
+        }
     }
 }
 

@@ -121,13 +121,10 @@ impl BlockSolver<'_> {
     pub fn by_block(&self, spindle_rpm: &[f64]) -> Option<[BlockLobes; 2]> {
         let axial = self.axial.as_ref()?;
         Some([&self.lateral, axial].map(|solver| {
-            BlockLobes {
-                // With process damping no limit holds at every speed: the least of these speeds.
-                absolute: solver
-                    .absolute_limit()
-                    .or_else(|| solver.curve(spindle_rpm).least()),
-                curve: solver.curve(spindle_rpm),
-            }
+            let curve = solver.curve(spindle_rpm);
+            // With process damping no limit holds at every speed: the least of these speeds.
+            let absolute = solver.absolute_limit().or_else(|| curve.least());
+            BlockLobes { curve, absolute }
         }))
     }
 }

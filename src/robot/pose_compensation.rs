@@ -4,7 +4,7 @@
 //! compensation in robotic-based milling", eq. 6: the target is moved against the deflection that is found at the moved
 //! target), solved by Newton's method on the joints.
 
-use nalgebra::{DMatrix, Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6xX, Translation3, UnitQuaternion, Vector3, Vector6};
 
 use crate::robot::kinematics::dh::{Kinematics, rpy_of_rotation};
 use crate::{Error, Result};
@@ -52,19 +52,6 @@ fn apart(from: &Isometry3<f64>, to: &Isometry3<f64>) -> Vector6<f64> {
     Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
 }
 
-/// Twist of the tool centre point per joint, rigid robot.
-fn jacobian(kinematics: &Kinematics) -> DMatrix<f64> {
-    let mut jacobian = DMatrix::zeros(6, kinematics.joint_count());
-    for joint in 1..=kinematics.joint_count() {
-        let axis = kinematics.joint_axis(joint);
-        let shift = axis.cross(&(kinematics.tcp() - kinematics.joint_origin(joint)));
-        let mut column = jacobian.column_mut(joint - 1);
-        column.fixed_rows_mut::<3>(0).copy_from(&shift);
-        column.fixed_rows_mut::<3>(3).copy_from(&axis);
-    }
-    jacobian
-}
-
 /// The pose to command so that the deflected tool stands where the undeflected one stands at `target_deg`.
 ///
 /// `at`: kinematics and deflection (twist of the tool centre point, base axes) at joint angles in degrees.
@@ -89,7 +76,8 @@ pub fn compensated_pose(
             break;
         }
         // Seven joints: the smallest move. A direction that the arm cannot go is left out.
-        let svd = jacobian(&kinematics).svd(true, true);
+        let twists: Vec<Vector6<f64>> = kinematics.tool_twists().collect();
+        let svd = Matrix6xX::from_columns(&twists).svd(true, true);
         let least = 1e-6 * svd.singular_values.max();
         let turn = svd.solve(&missing, least).map_err(|_| beyond_reach())?;
         if !(turn.amax() < FARTHEST_TURN_RAD) {

@@ -261,10 +261,12 @@ pub fn flank_damping(
         return Ok(None);
     };
     let hole = DrilledHole::of(campaign.tool.as_ref(), section).ok_or_else(|| {
-        InputError::new("process damping needs the cutting speed along the lips, and the drill is not known")
-            .file(campaign.dir.join("campaign.toml"))
-            .key("tool.diameter_mm")
-            .remedy("add a [tool] table with the drill's diameter_mm and half_point_angle_deg")
+        lacking(
+            campaign,
+            "tool.diameter_mm",
+            "process damping needs the cutting speed along the lips, and the drill is not known",
+            "add a [tool] table with the drill's diameter_mm and half_point_angle_deg",
+        )
     })?;
     let kappa = half_point_angle_rad(campaign, section)?;
     let slowest_rpm = section.spindle_rpm[0];

@@ -5,7 +5,7 @@ use crate::analysis::stability::lobe_model::{Asked, Dynamics, ModelState};
 use crate::analysis::stability::lobe_setup::modes_of_table;
 use crate::analysis::stability::measured_structures::measured_structures;
 use crate::analysis::workbench::Workbench;
-use crate::campaign::{Campaign, LobeMethod, LobesSection};
+use crate::campaign::{Campaign, LobeMethod, LobesSection, Process};
 use crate::lobes::band;
 use crate::lobes::drilling::hole::{HoleCheck, HoleError};
 use crate::lobes::drilling::whirling::whirl_speeds;
@@ -78,13 +78,14 @@ impl LobeStructure {
         limits.collect()
     }
 
-    /// `drilled`: in drilling the hole, where it is known; `None` in other processes.
+    /// `drilled`: the hole, where it is known.
     pub fn case(
         self,
         cut: &LobeCut,
         speeds: &[f64],
         noted: &[NotedCut],
-        drilled: Option<Option<DrilledHole>>,
+        process: Process,
+        drilled: Option<DrilledHole>,
     ) -> LobeCase {
         let method = self.dynamics.method(cut);
         let curve = method.curve(speeds);
@@ -100,8 +101,8 @@ impl LobeStructure {
             LobeCut::Averaged(cut) => cut.on(&self.dynamics.blocks).by_block(speeds),
             LobeCut::Periodic(_) => None,
         };
-        let whirling = match drilled {
-            Some(hole) => whirl_speeds(
+        let whirling = match process {
+            Process::Drilling => whirl_speeds(
                 self.dynamics.blocks.lateral.as_ref(),
                 &cut.average().on(&self.dynamics.blocks).lateral,
                 cut.average().lateral.teeth,
@@ -109,9 +110,9 @@ impl LobeStructure {
                     speeds.first().copied().unwrap_or(0.0),
                     speeds.last().copied().unwrap_or(0.0),
                 ],
-                hole.map(|h| h.width_mm),
+                drilled.map(|h| h.width_mm),
             ),
-            None => Vec::new(),
+            Process::Milling | Process::Turning => Vec::new(),
         };
         let tips: Vec<f64> = best.iter().map(|p| p.spindle_rpm).collect();
         if let Some(at_tips) = band_at(&tips) {

@@ -155,13 +155,13 @@ impl LobeAnalysis {
                 .push("lobes.redundancy needs source = \"model\": there is no surface over the angle".into());
         }
         let (redundancy, swept) = surface.unzip();
-        let drilling = section.process == Process::Drilling;
-        let drilled = drilling
-            .then(|| DrilledHole::of(campaign.tool.as_ref(), section))
-            .flatten();
+        let drilled = match section.process {
+            Process::Drilling => DrilledHole::of(campaign.tool.as_ref(), section),
+            Process::Milling | Process::Turning => None,
+        };
         let cases: Vec<LobeCase> = structures
             .into_iter()
-            .map(|structure| structure.case(&cut, &speeds, &noted, drilling.then_some(drilled)))
+            .map(|structure| structure.case(&cut, &speeds, &noted, section.process, drilled))
             .chain(swept.unwrap_or_default())
             .collect();
         let standing: Vec<(Option<String>, Vec<LimitRange>)> = as_they_stand
@@ -304,10 +304,11 @@ impl CutForce {
             true => Some(predicted_drill(campaign, section)?),
             false => None,
         };
-        if let Some(Err(reason)) = drill.as_ref().and_then(|d| d.chisel.as_ref()) {
+        let chisel = drill.as_ref().and_then(|d| d.chisel.as_ref());
+        if let Some(Err(reason)) = chisel {
             warnings.push(format!("the chisel edge is left out: {reason}"));
         }
-        if let (Some(Some(Ok(_))), Some(database)) = (drill.as_ref().map(|d| &d.chisel), &campaign.orthogonal)
+        if let (Some(Ok(_)), Some(database)) = (chisel, &campaign.orthogonal)
             && (database.friction_angle_law.is_none() || database.chip_ratio_law.is_none())
         {
             warnings.push(format!(

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::analysis::stability::lobe_case::{BEST, LobeCase};
 use crate::analysis::stability::lobe_model::ModelState;
-use crate::campaign::{Campaign, LobeMethod, LobesSection, Process, Redundancy};
+use crate::campaign::{Campaign, LobeMethod, LobesSection, Redundancy};
 use crate::lobes::band::QUANTILES;
 use crate::lobes::drilling::hole::{HoleCheck, HoleError};
 use crate::lobes::optimum::{
@@ -192,7 +192,15 @@ pub(crate) fn sweep(
     let mut elbows = Vec::new();
     let mut best: Option<(usize, Found)> = None;
     for turned_deg in elbow_angles(redundancy.elbow_step_deg) {
-        let found = at_elbow(campaign, redundancy, state, cut, speeds, check, turned_deg)?;
+        let found = at_elbow(
+            campaign,
+            (section, redundancy),
+            state,
+            cut,
+            speeds,
+            check,
+            turned_deg,
+        )?;
         elbows.push(ElbowChoice {
             turned_deg,
             usable_angles: found.as_ref().map_or(0, |(_, cases)| cases.len()),
@@ -255,7 +263,7 @@ fn elbow_angles(step_deg: Option<f64>) -> Vec<f64> {
 /// [`sweep`] with the elbow turned by an angle; `None` where no redundancy angle can be used then.
 fn at_elbow(
     campaign: &Campaign,
-    redundancy: &Redundancy,
+    (section, redundancy): (&LobesSection, &Redundancy),
     state: &ModelState,
     cut: AveragedCut,
     speeds: &[f64],
@@ -263,7 +271,6 @@ fn at_elbow(
     elbow_deg: f64,
 ) -> Result<Option<Found>> {
     let posture = &campaign.postures[redundancy.posture];
-    let process = campaign.lobes.as_ref().map_or(Process::Drilling, |l| l.process);
     let sweep = RedundancySweep::new(
         &state.current.model.robot,
         &posture.joints_deg,
@@ -303,7 +310,7 @@ fn at_elbow(
                 band: None,
                 before,
                 hole: check.map(|c| state.hole(&joints, &c.load)).transpose()?,
-                feed_stiffness: state.feed_stiffness(&joints, process)?,
+                feed_stiffness: state.feed_stiffness(&joints, section.process)?,
                 whirling: Vec::new(),
                 at_cuts: Vec::new(),
             })

@@ -19,6 +19,21 @@ pub struct DrillGeometry {
     pub feed_per_rev_mm: f64,
 }
 
+/// Feed per revolution and diameter of the pilot hole (0: none) of a drilled hole.
+///
+/// # Errors
+/// Another process.
+pub(crate) fn feed_and_pilot_mm(geometry: &CutGeometry) -> Result<[f64; 2]> {
+    match *geometry {
+        CutGeometry::Drilling {
+            feed_per_rev_mm,
+            pilot_diameter_mm,
+            ..
+        } => Ok([feed_per_rev_mm, pilot_diameter_mm]),
+        _ => Err(Error::computation("not a drilling cut")),
+    }
+}
+
 /// Half the length of the chisel edge, w/(2 sin ψ): where the lips begin (docs/physics.md, "Cutting forces").
 pub fn chisel_half_length_mm(tool: &Tool, web_thickness_mm: f64) -> f64 {
     0.5 * web_thickness_mm / tool.chisel_edge_angle_deg.to_radians().sin()
@@ -28,14 +43,7 @@ impl DrillGeometry {
     /// # Errors
     /// No point angle, no web thickness where the hole has no pilot, or a pilot as large as the drill.
     pub fn new(tool: &Tool, geometry: &CutGeometry) -> Result<DrillGeometry> {
-        let CutGeometry::Drilling {
-            feed_per_rev_mm,
-            pilot_diameter_mm,
-            ..
-        } = *geometry
-        else {
-            return Err(Error::computation("not a drilling cut"));
-        };
+        let [feed_per_rev_mm, pilot_diameter_mm] = feed_and_pilot_mm(geometry)?;
         let half_point_deg = tool.half_point_angle_deg.ok_or_else(|| {
             Error::computation("drilling needs [tool] half_point_angle_deg, which is not given")
         })?;

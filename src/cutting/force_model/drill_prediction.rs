@@ -4,6 +4,7 @@
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
+use crate::cutting::force_model::drill_geometry::feed_and_pilot_mm;
 use crate::cutting::force_model::orthogonal::ObliqueEdge;
 use crate::cutting::force_model::twist_drill::{LipPlace, TwistDrill};
 use crate::data::{ChipFormation, CutGeometry, LinearLaw, OrthogonalSection, Tool};
@@ -154,14 +155,7 @@ impl DrillPrediction {
     /// # Errors
     /// A drill whose geometry is not complete, a pilot as wide as the drill, or angles at which the database allows no chip.
     pub fn new(tool: &Tool, geometry: &CutGeometry, rpm: f64, database: &OrthogonalSection) -> Result<Self> {
-        let CutGeometry::Drilling {
-            feed_per_rev_mm,
-            pilot_diameter_mm,
-            ..
-        } = *geometry
-        else {
-            return Err(Error::computation("not a drilling cut"));
-        };
+        let [feed_per_rev_mm, pilot_diameter_mm] = feed_and_pilot_mm(geometry)?;
         let drill = TwistDrill::new(tool)?;
         let pilot_mm = 0.5 * pilot_diameter_mm;
         let inner_radius_mm = drill.chisel_mm.max(pilot_mm);

@@ -1,6 +1,7 @@
 //! Drilling: thrust and torque while the drill enters and bores, averaged over stretches of time (docs/physics.md, "Cutting forces").
 
 use crate::cutting::DrillGeometry;
+use crate::cutting::force_model::drill_geometry::feed_and_pilot_mm;
 use crate::data::{CutGeometry, Tool};
 use crate::{Error, Result};
 
@@ -33,12 +34,7 @@ impl DrillingCut {
     /// As [`DrillGeometry::new`]; a feed that is not positive.
     pub fn new(tool: &Tool, geometry: &CutGeometry, spindle_rpm: f64) -> Result<DrillingCut> {
         let drill = DrillGeometry::new(tool, geometry)?;
-        let CutGeometry::Drilling {
-            pilot_diameter_mm, ..
-        } = *geometry
-        else {
-            return Err(Error::computation("not a drilling cut"));
-        };
+        let [_, pilot_diameter_mm] = feed_and_pilot_mm(geometry)?;
         let feed_mm_per_s = drill.feed_per_rev_mm * spindle_rpm / 60.0;
         if !(feed_mm_per_s > 0.0 && feed_mm_per_s.is_finite()) {
             return Err(Error::computation("a drilled hole needs a feed above zero"));

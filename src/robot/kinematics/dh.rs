@@ -1,7 +1,7 @@
 //! Forward kinematics: joints in the standard (distal) Denavit–Hartenberg convention (Denavit & Hartenberg 1955; Craig
 //! 2005), or placed anywhere and turning about any axis (as in a URDF).
 
-use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3, Vector6};
 
 use crate::data::{JointPlacement, JointSpec, LinkSpec, RobotSpec, ToolFrame};
 
@@ -189,6 +189,15 @@ impl Kinematics {
     /// Tool centre point, base frame, m.
     pub fn tcp(&self) -> Point3<f64> {
         self.tool.translation.vector.into()
+    }
+
+    /// Twist of the tool centre point for a unit turn of each joint: displacement (m/rad) over rotation, base axes.
+    pub fn tool_twists(&self) -> impl Iterator<Item = Vector6<f64>> + '_ {
+        (1..=self.joint_count()).map(|i| {
+            let axis = self.joint_axis(i);
+            let shift = axis.cross(&(self.tcp() - self.joint_origin(i)));
+            Vector6::new(shift.x, shift.y, shift.z, axis.x, axis.y, axis.z)
+        })
     }
 
     /// Origin of the flange, base frame, m.

@@ -286,12 +286,9 @@ impl<'a> NumericInverse<'a> {
     /// Twist of the tool point per joint angle: position over the arm's length, rotation.
     fn tool_jacobian(&self, kinematics: &Kinematics) -> Jacobian {
         let mut jacobian = Jacobian::zeros();
-        let tcp = kinematics.tcp();
-        for i in 1..=kinematics.joint_count() {
-            let axis = kinematics.joint_axis(i);
-            let motion = axis.cross(&(tcp - kinematics.joint_origin(i))) / self.reach_m;
-            jacobian.fixed_view_mut::<3, 1>(0, i - 1).copy_from(&motion);
-            jacobian.fixed_view_mut::<3, 1>(3, i - 1).copy_from(&axis);
+        for (i, mut twist) in kinematics.tool_twists().enumerate() {
+            twist.fixed_rows_mut::<3>(0).unscale_mut(self.reach_m);
+            jacobian.fixed_view_mut::<6, 1>(0, i).copy_from(&twist);
         }
         jacobian
     }

@@ -23,8 +23,11 @@ pub struct FrfNoise {
 impl FrfNoise {
     /// Standard deviation of the complex value where the true magnitude is `magnitude`.
     pub fn std(&self, frequency_hz: f64, magnitude: f64) -> f64 {
-        let floor = self.floor / ratio(frequency_hz, self.reference_hz).powi(self.power);
-        (self.relative * magnitude).hypot(floor)
+        (self.relative * magnitude).hypot(self.floor_at(frequency_hz))
+    }
+
+    fn floor_at(&self, frequency_hz: f64) -> f64 {
+        self.floor / ratio(frequency_hz, self.reference_hz).powi(self.power)
     }
 }
 
@@ -38,6 +41,15 @@ const CUT: f64 = 7.0;
 const LEAST_FLOOR: f64 = 1e-6;
 /// A relative change of the variances that is far below what they are known to.
 const SETTLED: f64 = 1e-4;
+
+/// How alike FRFs measured together are in the relative part (one hammer, one gain): what all of them show counts in each as
+/// so many lines. An FRF of which only a few lines stand above its floor, or on whose peaks the fit takes all there is, would
+/// otherwise come out without a relative part, and its peaks with many times the weight that they deserve.
+const COMMON_LINES: usize = 5;
+/// These lines are so much larger than any other that the floor has no say in them.
+const COMMON_MAGNITUDE: f64 = 100.0;
+/// So many FRFs are enough to tell what all have in common.
+const ENOUGH_FRFS: usize = 60;
 
 /// f/f₀, never zero: a line at 0 Hz has no acceleration to speak of.
 fn ratio(frequency_hz: f64, reference_hz: f64) -> f64 {
@@ -67,9 +79,14 @@ pub fn fit<D: AsRef<[Departure]> + Sync>(frfs: &[D]) -> Vec<Option<FrfNoise>> {
     } else {
         1.0
     };
+    let common = if frfs.len() > 1 {
+        common_lines(frfs, reference_hz)
+    } else {
+        Vec::new()
+    };
     let by_power: Vec<[Option<Fitted>; POWERS.len()]> = frfs
         .par_iter()
-        .map(|d| fit_laws(d.as_ref(), reference_hz))
+        .map(|d| fit_laws(d.as_ref(), &common, reference_hz))
         .collect();
     let mut best: Option<(f64, usize, usize)> = None;
     for (k, power) in POWERS.into_iter().enumerate() {
@@ -90,16 +107,59 @@ pub fn fit<D: AsRef<[Departure]> + Sync>(frfs: &[D]) -> Vec<Option<FrfNoise>> {
         .collect()
 }
 
+/// What FRFs measured together say of the relative part, as lines to be added to those of each FRF: the median of their own
+/// laws, each counting by its lines in which the relative part is the larger one.
+fn common_lines<D: AsRef<[Departure]> + Sync>(frfs: &[D], reference_hz: f64) -> Vec<Departure> {
+    let asked: Vec<&[Departure]> = frfs
+        .iter()
+        .step_by(frfs.len().div_ceil(ENOUGH_FRFS).max(1))
+        .map(AsRef::as_ref)
+        .collect();
+    let by_frf = asked.par_iter().map(|departures| {
+        let laws = fit_laws(departures, &[], reference_hz).into_iter().flatten();
+        let likeliest = laws.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))?;
+        let law = likeliest.noise;
+        let telling = |d: &&Departure| {
+            law.std(d.frequency_hz, d.magnitude) > 2f64.sqrt() * law.floor_at(d.frequency_hz)
+        };
+        Some((law.relative, departures.iter().filter(telling).count()))
+    });
+    let mut relative: Vec<(f64, usize)> = by_frf.flatten().collect();
+    relative.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = relative.iter().map(|(_, lines)| lines).sum::<usize>().div_ceil(2);
+    let mut below = 0;
+    let median = relative.iter().find(|(_, lines)| {
+        below += lines;
+        below >= half
+    });
+    let magnitudes = asked.iter().flat_map(|d| d.iter()).map(|d| d.magnitude);
+    let magnitude = COMMON_MAGNITUDE * magnitudes.filter(|m| m.is_finite()).fold(0.0, f64::max);
+    let line = |(relative, _): &(f64, usize)| Departure {
+        frequency_hz: reference_hz,
+        magnitude,
+        squared: (relative * magnitude).powi(2),
+    };
+    match median.filter(|(relative, _)| *relative > 0.0) {
+        Some(median) => vec![line(median); COMMON_LINES],
+        None => Vec::new(),
+    }
+}
+
 struct Fitted {
     noise: FrfNoise,
     /// Of exponentially distributed squares; one far beyond its mean counts as if it were at the cut.
     log_likelihood: f64,
 }
 
-/// The law of one FRF for each power of its floor: of f^p H, whose floor is even.
-fn fit_laws(departures: &[Departure], reference_hz: f64) -> [Option<Fitted>; POWERS.len()] {
+/// The law of one FRF for each power of its floor: of f^p H, whose floor is even. `common`: [`common_lines`].
+fn fit_laws(
+    departures: &[Departure],
+    common: &[Departure],
+    reference_hz: f64,
+) -> [Option<Fitted>; POWERS.len()] {
     let finite = |d: &&Departure| d.magnitude.is_finite() && d.squared.is_finite();
-    let finite = || departures.iter().filter(finite);
+    let own = departures.iter().filter(finite).count();
+    let finite = || departures.iter().filter(finite).chain(common);
     let scales: Vec<f64> = finite()
         .map(|d| ratio(d.frequency_hz, reference_hz).powi(2))
         .collect();
@@ -115,7 +175,7 @@ fn fit_laws(departures: &[Departure], reference_hz: f64) -> [Option<Fitted>; POW
             }
         }
         last_power = power;
-        let [a2, b2] = fit_even_law(&powers, &squares)?;
+        let [a2, b2] = fit_even_law(&powers, &squares, own)?;
         let expected = powers.iter().map(|power| a2 * power + b2);
         let likelihood: f64 = expected
             .zip(&squares)
@@ -135,18 +195,19 @@ fn fit_laws(departures: &[Departure], reference_hz: f64) -> [Option<Fitted>; POW
 
 /// a² and b²: maximum likelihood of E square = a² power + b² for exponentially distributed squares (complex Gaussian
 /// noise), by iteratively reweighted least squares; squares beyond `CUT` times their mean are taken for misfit and
-/// trimmed with the bias that this brings taken back out.
-fn fit_even_law(powers: &[f64], squares: &[f64]) -> Option<[f64; 2]> {
-    if powers.len() < 20 {
+/// trimmed with the bias that this brings taken back out. The first `own` samples are the FRF's; what follows speaks for the
+/// relative part only.
+fn fit_even_law(powers: &[f64], squares: &[f64], own: usize) -> Option<[f64; 2]> {
+    if own < 20 {
         return None;
     }
-    let largest = powers.iter().copied().fold(0.0, f64::max);
+    let largest = powers[..own].iter().copied().fold(0.0, f64::max);
     // Start: all floor, from the median of an exponential distribution.
-    let mut law = [0.0, middle(&mut squares.to_vec()) / std::f64::consts::LN_2];
+    let mut law = [0.0, middle(&mut squares[..own].to_vec()) / std::f64::consts::LN_2];
     if !(largest > 0.0) || !law[1].is_finite() || law[1] <= 0.0 {
         return None;
     }
-    let low = lowest(powers, squares);
+    let low = lowest(&powers[..own], &squares[..own]);
     // Mean of an exponential variable given that it is below CUT times its mean.
     let kept_mean = 1.0 - CUT / (CUT.exp() - 1.0);
     for pass in 0..60 {
@@ -330,6 +391,29 @@ mod tests {
         disturbed[7].squared = f64::INFINITY;
         let found = fit(&[disturbed])[0].unwrap();
         assert!((found.relative / 0.02 - 1.0).abs() < 0.2, "{found:?}");
+    }
+
+    /// Coarse lines: of one FRF all but a few lines lie below the floor, and the fit took its peaks whole. What the others
+    /// show of the relative part holds for it; an FRF that has enough to say keeps its own.
+    #[test]
+    fn frfs_measured_together_share_what_one_of_them_cannot_tell() {
+        let (common, noisy) = (law(0.03, 1e-8, 0), law(0.09, 1e-8, 0));
+        let mut quiet = departures(common, 60);
+        for (k, line) in quiet.iter_mut().enumerate() {
+            line.magnitude *= 1e-3;
+            let quantile = (((k * 37) % 60) as f64 + 0.5) / 60.0;
+            line.squared = -common.std(line.frequency_hz, line.magnitude).powi(2) * (1.0 - quantile).ln();
+        }
+        let mut together = vec![departures(common, 60); 6];
+        together.push(quiet.clone());
+        together.push(departures(noisy, 60));
+        let found: Vec<FrfNoise> = fit(&together).into_iter().flatten().collect();
+        assert!((found[6].relative / 0.03 - 1.0).abs() < 0.3, "{:?}", found[6]);
+        assert!((found[6].floor / 1e-8 - 1.0).abs() < 0.2, "{:?}", found[6]);
+        assert!((found[7].relative / 0.09 - 1.0).abs() < 0.2, "{:?}", found[7]);
+        // Alone it has no relative part, or one that is far off.
+        let alone = fit(&[quiet])[0].unwrap().relative;
+        assert!((alone / 0.03 - 1.0).abs() > 0.5, "{alone}");
     }
 
     #[test]

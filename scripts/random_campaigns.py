@@ -48,8 +48,8 @@ def main():
     arguments.add_argument("--lobestone", default=str(ROOT / "target/release/lobestone"))
     arguments.add_argument("--simulate-with", help="another lobestone that makes the campaigns, to try an older one on them")
     arguments.add_argument("--loops", action="store_true", help="diagnose, add what is named, and so on until nothing is")
-    arguments.add_argument("--lines-hz", type=float, help="spacing of the spectral lines, to try this script quickly: with coarse "
-                           "lines the noise is estimated badly and verdicts with it (default: as simulate has it)")
+    arguments.add_argument("--lines-hz", type=float, help="spacing of the spectral lines, to try this script quickly (default: as "
+                           "simulate has it)")
     arguments.add_argument("--report", type=pathlib.Path, help="default: reports/diagnosis_TIER.md")
     arguments.add_argument("--keep", type=pathlib.Path, help="keep the campaigns in this folder")
     options = arguments.parse_args()

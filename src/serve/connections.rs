@@ -14,9 +14,13 @@ use hyper_util::service::TowerToHyperService;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Semaphore;
 use tokio::task::AbortHandle;
+use tokio::time::Instant;
 
 /// Connections at a time. A browser has six.
-pub const MOST: usize = 64;
+pub const MOST: usize = 128;
+/// What a connection may take to say something although others wait for its place: on a busy machine a browser does not
+/// get to its request at once.
+const GRACE: Duration = Duration::from_millis(200);
 /// In which a request must have said what it wants; also how long a connection may lie idle.
 const HEAD: Duration = Duration::from_secs(10);
 /// What it may take to say so: bytes of a request before its body, and how much of one is held while it is read.
@@ -29,7 +33,27 @@ const PAUSE: Duration = Duration::from_millis(500);
 struct Guest {
     /// It has asked for something.
     asked: Arc<AtomicBool>,
+    came: Instant,
     task: AbortHandle,
+}
+
+/// Where all places are taken: sends away the one who has been silent longest, once its time is over.
+async fn make_room(guests: &mut VecDeque<Guest>) {
+    loop {
+        guests.retain(|guest| !guest.task.is_finished());
+        let silent = guests
+            .iter()
+            .position(|guest| !guest.asked.load(Ordering::Relaxed));
+        let Some(at) = silent.filter(|_| guests.len() >= MOST) else {
+            return;
+        };
+        let due = guests[at].came + GRACE;
+        if due > Instant::now() {
+            tokio::time::sleep_until(due).await;
+        } else if let Some(guest) = guests.remove(at) {
+            guest.task.abort();
+        }
+    }
 }
 
 /// Answers for ever. Where all places are taken, the one goes who has been silent longest: a crowd that connects and says nothing keeps
@@ -43,15 +67,7 @@ pub async fn serve(listener: TcpListener, router: Router) {
             tokio::time::sleep(PAUSE).await;
             continue;
         };
-        guests.retain(|guest| !guest.task.is_finished());
-        if guests.len() >= MOST {
-            let silent = guests
-                .iter()
-                .position(|guest| !guest.asked.load(Ordering::Relaxed));
-            if let Some(guest) = silent.and_then(|at| guests.remove(at)) {
-                guest.task.abort();
-            }
-        }
+        make_room(&mut guests).await;
         // The semaphore is never closed.
         let Ok(place) = places.clone().acquire_owned().await else {
             return;
@@ -64,6 +80,7 @@ pub async fn serve(listener: TcpListener, router: Router) {
         });
         guests.push_back(Guest {
             asked,
+            came: Instant::now(),
             task: task.abort_handle(),
         });
         // Who has sent a request already is heard before the next one comes in.

@@ -72,11 +72,11 @@ fn lobes_after_add_show_the_limit_before_it() {
         );
         assert_eq!(then.len(), now.len());
         for (a, b) in then.iter().zip(&now) {
-            assert!((a / b - 1.0).abs() < 5e-3, "{a} {b}");
+            assert!((a / b - 1.0).abs() < 1e-6, "{a} {b}");
         }
         let [was, is] =
             [&before["absolute_limit_mm"], &new["absolute_limit_mm"]].map(|v| v.as_f64().unwrap());
-        assert!((was / old["absolute_limit_mm"].as_f64().unwrap() - 1.0).abs() < 5e-3);
+        assert!((was / old["absolute_limit_mm"].as_f64().unwrap() - 1.0).abs() < 1e-6);
         assert!(
             is < 0.9 * was || is > 1.1 * was,
             "the tool does something: {was} {is}"

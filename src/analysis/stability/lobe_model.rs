@@ -9,8 +9,7 @@ use crate::analysis::StructureAnalysis;
 use crate::analysis::structure_case::structure_model;
 use crate::analysis::workbench::Workbench;
 use crate::campaign::{Campaign, Contact, LobesSection, Process};
-use crate::identify::Options;
-use crate::identify::frfs::calibrate::calibrate;
+use crate::identify::frfs::calibrate::refine;
 use crate::identify::frfs::structure::StructureModel;
 use crate::lobes::drilling::contact::{HeldHolder, contact_forces, held_compliance, skating_m};
 use crate::lobes::drilling::hole::{Deflection, HoleError, HoleLoad};
@@ -302,7 +301,6 @@ impl ModelState {
     ) -> Result<Self> {
         let analysis = StructureAnalysis::on(campaign)?;
         let (case, calibration) = (&analysis.case, &analysis.calibration);
-        let options = case.options(Options::default());
         let effects = case.effects();
         let description = match effects.is_empty() {
             true => "calibrated robot model".to_string(),
@@ -324,7 +322,10 @@ impl ModelState {
         }
         let before = match case.before_effects(campaign)?.filter(|_| history) {
             Some(model) => {
-                let theta = calibrate(&model, &case.data, None, options)?.theta;
+                // Where it stood then; a search might find another place in a valley, and the limits would seem to have moved.
+                let stood = model.start().map(<[f64]>::to_vec);
+                let start = stood.unwrap_or_else(|| model.nominal_theta());
+                let theta = refine(&model, &case.data, &start)?.theta;
                 Some(FittedModel { model, theta })
             }
             None => None,

@@ -452,7 +452,14 @@ pub fn calibrate(
             points.clear();
         }
     }
-    let best = refine(model, data, &first.theta)?;
+    // A solution that the model brings along is left only for a better one: where physics is missing the optimum lies in a flat
+    // valley, and a way round by the sketch would end elsewhere in it.
+    let whole = problem(model, data, Misfit::Complex);
+    let from = match model.start() {
+        Some(start) if whole.cost(start)? <= whole.cost(&first.theta)? => start,
+        _ => &first.theta,
+    };
+    let best = refine(model, data, from)?;
     iterations += best.iterations;
 
     let reduced_chi2 = misfit(&best, data);

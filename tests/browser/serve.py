@@ -36,7 +36,9 @@ class Driver:
         flags = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
                  "--disable-background-networking", "--disable-dev-shm-usage", "--window-size=1500,1000",
                  f"--user-data-dir={profile}"]
+        patience_ms = int(1000 * PATIENCE_S)
         options = {"browserName": "chrome", "goog:chromeOptions": {"args": flags},
+                   "timeouts": {"script": patience_ms, "pageLoad": patience_ms},
                    "goog:loggingPrefs": {"browser": "ALL", "performance": "ALL"}}
         self.session = ""
         answer = self.call("POST", "/session", {"capabilities": {"alwaysMatch": options}})
@@ -47,7 +49,7 @@ class Driver:
         request = urllib.request.Request(self.base + self.session + path, data, {"Content-Type": "application/json"},
                                          method=method)
         try:
-            with urllib.request.urlopen(request, timeout=120) as answer:
+            with urllib.request.urlopen(request, timeout=PATIENCE_S) as answer:
                 return json.load(answer)["value"]
         except urllib.error.HTTPError as error:
             raise Failed(f"{method} {path}: {json.load(error)['value']['message']}") from error

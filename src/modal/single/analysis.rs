@@ -75,9 +75,15 @@ where
     H: AsRef<[Complex64]> + Sync,
 {
     let effort = if frfs.len() > MANY_FRFS { BRIEF } else { FULL };
-    frfs.par_iter()
+    let t0 = std::time::Instant::now();
+    let found = frfs
+        .par_iter()
         .map(|(f, h)| analyse(f.as_ref(), h.as_ref(), settings, effort))
-        .collect()
+        .collect();
+    if std::env::var_os("LOBE_DEBUG").is_some() {
+        eprintln!("TIME {:.3} singles", t0.elapsed().as_secs_f64());
+    }
+    found
 }
 
 /// Finds the modes of one FRF.

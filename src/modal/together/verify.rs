@@ -30,6 +30,8 @@ const SCATTER_DAMPING: f64 = 0.5;
 const OVER_REST: f64 = 2.0;
 /// Two poles nearer than this share of the sum of their half-widths may be one.
 const CLOSE: f64 = 1.0;
+/// Or than so many lines, where those are coarser than the peaks.
+const LEAKS_LINES: f64 = 1.5;
 /// Two poles nearer than this share of that sum are one mode unless both have the phases of one.
 const SAME: f64 = 0.2;
 /// Residues of a common phase: what a mode next to another one keeps.
@@ -89,6 +91,30 @@ fn reason(data: &[Data], group: &Group, j: usize) -> Option<String> {
     let residues: Vec<Complex64> = (0..frfs).map(|m| solution.constant(m, j).0).collect();
     let local = Local::new(data, group, j, &residues);
     let (seen_in, best) = joint_fit::seen_in(solution, j);
+    if std::env::var_os("LOBE_DEBUG").is_some() {
+        let mpc = shape::complexity(&residues).map_or(1.0, |c| c.mpc);
+        let s = solution.scatter_std(j);
+        let jk = solution.jackknife_std(j);
+        let wanted: f64 = (0..frfs).map(|m| solution.evidence(m, j)).sum();
+        eprintln!(
+            "DBG {:9.3} z {:6.3}% of-measured {:7.3} over-coloured {:8.2} over-left {:7.2} mpc {:.2} scatter {:.3} {:.3} jack {:.3} {:.3} in {}/{} best {:.0} evid/frf {:.1} level {:.2}",
+            pole.frequency_hz,
+            100.0 * pole.damping_ratio,
+            local.mode / local.measured,
+            local.mode / local.coloured.max(1e-300),
+            local.mode / local.left,
+            mpc,
+            s[0] / pole.damping_ratio,
+            s[1],
+            jk[0] / pole.damping_ratio,
+            jk[1],
+            seen_in,
+            frfs,
+            best,
+            wanted / frfs as f64,
+            (solution.misfit / solution.degrees_of_freedom as f64)
+        );
+    }
     let wanted = ((SHARE_OF_FRFS * frfs as f64).ceil() as usize).max(2);
     if frfs >= SET && seen_in < wanted && best < FAR {
         return Some(match seen_in {
@@ -121,6 +147,7 @@ fn reason(data: &[Data], group: &Group, j: usize) -> Option<String> {
 struct Local {
     mode: f64,
     measured: f64,
+    left: f64,
     /// Of what is left, the part that goes on from line to line.
     coloured: f64,
 }
@@ -132,6 +159,7 @@ impl Local {
         let mut local = Local {
             mode: 0.0,
             measured: 0.0,
+            left: 0.0,
             coloured: 0.0,
         };
         for ((d, found), residue) in data.iter().zip(&group.solution.frfs).zip(residues) {
@@ -152,6 +180,7 @@ impl Local {
                 let g = residue / (omega * omega) / Complex64::new(1.0 - r * r, 2.0 * pole.damping_ratio * r);
                 local.mode += g.norm_sqr();
                 local.measured += d.receptance[k].norm_sqr();
+                local.left += residual.norm_sqr();
                 if let Some(before) = before {
                     local.coloured += (before.conj() * residual).re;
                 }
@@ -198,7 +227,17 @@ fn close_pairs(data: &[Data], group: &Group) -> Vec<ClosePair> {
 fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2]) -> Option<ClosePair> {
     let [a, b] = both.map(|j| solution.poles[j]);
     let width = a.damping_ratio * a.frequency_hz + b.damping_ratio * b.frequency_hz;
-    if b.frequency_hz - a.frequency_hz > CLOSE * width {
+    let line_hz = data
+        .iter()
+        .map(|d| joint_fit::spacing_hz(&d.frequency_hz, a.frequency_hz))
+        .fold(f64::INFINITY, f64::min);
+    // Where a line is wider than a peak, what leaks from one line into the next takes a pole of its own.
+    let reach = if width < line_hz {
+        (CLOSE * width).max(LEAKS_LINES * line_hz)
+    } else {
+        CLOSE * width
+    };
+    if b.frequency_hz - a.frequency_hz > reach {
         return None;
     }
     let residues = both.map(|j| {
@@ -216,6 +255,17 @@ fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2]) -> Option<Cl
         (both[1], both[0])
     };
     let beside = solution.poles[strong].frequency_hz;
+    if std::env::var_os("LOBE_DEBUG").is_some() {
+        eprintln!(
+            "PAIR {:.3} {:.3} widths {:.3} mac {:.3} mpc {:.2} {:.2}",
+            a.frequency_hz,
+            b.frequency_hz,
+            width,
+            shape::mac(&residues[0], &residues[1]),
+            shape::complexity(&residues[0]).map_or(1.0, |c| c.mpc),
+            shape::complexity(&residues[1]).map_or(1.0, |c| c.mpc)
+        );
+    }
     if let Some(merged) = moving(data, solution, strong, weak) {
         return Some(ClosePair {
             strong,
@@ -342,6 +392,46 @@ fn mean_over_frfs<T>(own: &[T], of: impl Fn(&T) -> (f64, f64)) -> (f64, f64) {
         .map(|(value, std)| ((value - mean) / (std * std + between)).powi(2))
         .sum();
     (mean, (scatter * count / (count - 1.0)).sqrt() / total)
+}
+
+/// What the mean over the FRFs would change of a common pole.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Otherwise {
+    /// Relative change …
+    pub change: f64,
+    /// … and relative standard deviation.
+    pub std: f64,
+}
+
+/// Where the FRFs put a mode (frequency, damping ratio) when each counts by how far all of them lie apart, and not only by
+/// how well it knows the mode: to the first order, from the common pole. What the two differ by, the model does not know.
+/// `None` where too few FRFs tell.
+pub(crate) fn otherwise(solution: &Solution, j: usize) -> Option<[Otherwise; 2]> {
+    const LEAST_FRFS: usize = 4;
+    const KNOWN_WIDTHS: f64 = 0.3;
+    const NEAR_WIDTHS: f64 = 3.0;
+    const KNOWN_DAMPING: f64 = 0.5;
+    const NEAR_DAMPING: f64 = 1.0;
+    let level = (solution.misfit / solution.degrees_of_freedom as f64)
+        .max(1.0)
+        .sqrt();
+    let width = solution.poles[j].damping_ratio;
+    let steps: Vec<([f64; 2], [f64; 2])> = (0..solution.frfs.len())
+        .filter_map(|m| solution.own_step(m, j))
+        .map(|(step, std)| (step, std.map(|s| level * s)))
+        .filter(|(step, std)| {
+            std[0] < KNOWN_WIDTHS * width
+                && step[0].abs() < NEAR_WIDTHS * width
+                && std[1] < KNOWN_DAMPING
+                && step[1].abs() < NEAR_DAMPING
+        })
+        .collect();
+    (steps.len() >= LEAST_FRFS).then(|| {
+        [0, 1].map(|k| {
+            let (change, std) = mean_over_frfs(&steps, |(step, std)| (step[k], std[k]));
+            Otherwise { change, std }
+        })
+    })
 }
 
 /// How far a mode moves from FRF to FRF.

@@ -32,12 +32,6 @@ const SHARE_OF_FRFS: usize = 6;
 /// As [`crate::modal::analyse_frf`].
 pub fn global(frfs: &[SetMember], settings: &Settings) -> Result<GlobalModes> {
     let mut result = GlobalModes::default();
-    let t0 = std::time::Instant::now();
-    let dbg = |what: &str| {
-        if std::env::var_os("LOBE_DEBUG").is_some() {
-            eprintln!("TIME {:.3} {what}", t0.elapsed().as_secs_f64());
-        }
-    };
     let (data, of_member) = prepare(frfs, settings, &mut result.warnings)?;
     result.reconstructions = vec![None; frfs.len()];
     let Some(band_hz) = band(&data) else {
@@ -47,7 +41,6 @@ pub fn global(frfs: &[SetMember], settings: &Settings) -> Result<GlobalModes> {
     let single = single_peaks(&members);
     let full = data;
     let mut data: Vec<Data> = full.iter().map(|d| condense::condense(d, &single)).collect();
-    dbg("prepared");
     let rows = rows(&data, &members);
     let references = rows.first().map_or(1, |r| r.receptance.len());
     let lines = data.iter().map(|d| d.frequency_hz.len()).min().unwrap_or(0);
@@ -61,11 +54,9 @@ pub fn global(frfs: &[SetMember], settings: &Settings) -> Result<GlobalModes> {
         ));
     }
     let orders = lscf::poles(&rows, band_hz, order);
-    dbg("lscf");
     let shapes = shape_data(&data);
     let mut diagram = stabilisation::read(&orders, shapes.as_ref(), references, &settings.tolerances);
 
-    dbg("stabilisation");
     let mut start: Vec<Start> = diagram
         .candidates
         .iter()
@@ -96,10 +87,8 @@ pub fn global(frfs: &[SetMember], settings: &Settings) -> Result<GlobalModes> {
     start.sort_by(|a, b| a.pole.frequency_hz.total_cmp(&b.pole.frequency_hz));
     let mut changes = Vec::new();
     let mut rejected = Vec::new();
-    let groups = solve::solve(&mut data, &start, &mut changes);
-    dbg("solved");
-    let groups = groups.and_then(|groups| verify::verified(&data, groups, &mut rejected));
-    dbg("verified");
+    let groups = solve::solve(&mut data, &start, &mut changes)
+        .and_then(|groups| verify::verified(&data, groups, &mut rejected));
     let Some(groups) = groups else {
         result
             .warnings
@@ -109,7 +98,6 @@ pub fn global(frfs: &[SetMember], settings: &Settings) -> Result<GlobalModes> {
         return Ok(result);
     };
     findings::collect(&groups, &data, &full, &members, &of_member, &mut result);
-    dbg("collected");
     findings::explain(&mut diagram, &result.modes, &changes);
     findings::reject(rejected, &mut diagram, &mut result);
     result.stabilisation = diagram;

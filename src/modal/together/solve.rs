@@ -11,16 +11,8 @@ pub(crate) fn solve(
     candidates: &[Start],
     changes: &mut Vec<Change>,
 ) -> Option<Vec<Group>> {
-    let t0 = std::time::Instant::now();
-    let dbg = |what: &str, n: usize| {
-        if std::env::var_os("LOBE_DEBUG").is_some() {
-            eprintln!("  TIME {:.3} {what} {n}", t0.elapsed().as_secs_f64());
-        }
-    };
-    dbg("start", candidates.len());
     let start = select::choose(&select::some(data), candidates);
     let mut groups = joint_fit::refine(&set_noise::alike(data), &start, PoleSearch::Roughly, changes)?;
-    dbg("chosen and refined roughly", start.len());
     let many = data.len() > select::ENOUGH_FRFS;
     // What is many fits with noises alike is few with those that each FRF has.
     for (search, alike) in [
@@ -32,7 +24,6 @@ pub(crate) fn solve(
         if search == PoleSearch::Pairs && !alike && many {
             continue;
         }
-        dbg("round", groups.iter().map(|g| g.solution.poles.len()).sum());
         set_noise::renew(data, &groups);
         let poles = poles_of(&groups);
         let mut doubts: Vec<Option<Doubt>> = groups.into_iter().map(|g| g.doubt).collect();
@@ -54,7 +45,6 @@ pub(crate) fn solve(
             take_doubts(&mut groups, doubts.drain(..));
         }
     }
-    dbg("final", groups.iter().map(|g| g.solution.poles.len()).sum());
     Some(groups)
 }
 

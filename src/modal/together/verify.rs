@@ -9,9 +9,13 @@ use crate::modal::shape;
 use crate::modal::single::local_fit::Pole;
 use crate::modal::together::global_modes::RejectedMode;
 use crate::modal::together::set_member::SET;
+use crate::modal::together::set_noise;
 
 /// Fits after poles were taken out, at most.
-const MAX_ROUNDS: usize = 6;
+const MAX_ROUNDS: usize = 10;
+/// Of poles nearer than so many sums of their half-widths, and so many lines, one goes out at a time.
+const APART_WIDTHS: f64 = 2.0;
+const APART_LINES: f64 = 2.0;
 /// From this many FRFs on the phase of their residues says something.
 const ENOUGH_FRFS: usize = 5;
 /// Residues of no common phase: what random phases give more often than a structure.
@@ -26,18 +30,25 @@ const FAR: f64 = 100.0;
 const SCATTER_WIDTHS: f64 = 0.3;
 /// A damping ratio uncertain by more than this part of itself, from how the FRFs scatter.
 const SCATTER_DAMPING: f64 = 0.5;
+/// Of what was measured in its band a mode makes at least this share …
+const SMALL_SHARE: f64 = 0.1;
+/// … or its residues have a phase this common: what repairs the model of a strong neighbour has neither.
+const CLEARLY_IN_PHASE: f64 = 0.95;
 /// Power of a mode over the coloured rest in its band.
 const OVER_REST: f64 = 2.0;
 /// Two poles nearer than this share of the sum of their half-widths may be one.
 const CLOSE: f64 = 1.0;
-/// Or than so many lines, where those are coarser than the peaks.
+/// Or than so many lines, where the sum is less than so many of them.
 const LEAKS_LINES: f64 = 1.5;
+const COARSE_LINES: f64 = 1.2;
 /// Two poles nearer than this share of that sum are one mode unless both have the phases of one.
 const SAME: f64 = 0.2;
 /// Residues of a common phase: what a mode next to another one keeps.
 const IN_PHASE: f64 = 0.7;
-/// Shapes that repeat.
+/// Shapes that repeat …
 const SAME_SHAPE: f64 = 0.9;
+/// … and that do where two poles are at the same place.
+const ALIKE_SHAPE: f64 = 0.85;
 
 /// Takes out what is no mode until all are.
 pub(crate) fn verified(
@@ -45,18 +56,41 @@ pub(crate) fn verified(
     mut groups: Vec<Group>,
     rejected: &mut Vec<RejectedMode>,
 ) -> Option<Vec<Group>> {
+    let mut data = data.to_vec();
     for _ in 0..MAX_ROUNDS {
         let mut kept: Vec<Pole> = Vec::new();
         let mut out = false;
         for group in &groups {
-            let pairs = close_pairs(data, group);
-            for (j, pole) in group.solution.poles.iter().enumerate() {
+            let pairs = close_pairs(&data, group);
+            let poles = &group.solution.poles;
+            let mut doubtful: Vec<(usize, f64, String)> = Vec::new();
+            let mut leaves: Vec<Option<String>> = vec![None; poles.len()];
+            for j in 0..poles.len() {
+                match pairs.iter().find(|p| p.weak == j) {
+                    Some(pair) => leaves[j] = Some(pair.reason.clone()),
+                    None => doubtful.extend(reason(&data, group, j).map(|(s, why)| (j, s, why))),
+                }
+            }
+            // Of neighbours the one that makes least of what was measured goes first: poles that share a mode among them look
+            // all alike, and one of them is to stay.
+            doubtful.sort_by(|a, b| a.1.total_cmp(&b.1));
+            for (j, _, why) in doubtful {
+                let near = |k: usize| {
+                    let width = |p: &Pole| p.damping_ratio * p.frequency_hz;
+                    let reach = APART_WIDTHS * (width(&poles[j]) + width(&poles[k]))
+                        + APART_LINES * line_hz(&data, poles[j].frequency_hz);
+                    (poles[j].frequency_hz - poles[k].frequency_hz).abs() < reach
+                };
+                if !(0..poles.len()).any(|k| leaves[k].is_some() && near(k)) {
+                    leaves[j] = Some(why);
+                }
+            }
+            for (j, (pole, leaves)) in poles.iter().zip(leaves).enumerate() {
                 if let Some(merged) = pairs.iter().find_map(|p| p.merged.filter(|_| p.strong == j)) {
                     kept.push(merged);
                     continue;
                 }
-                let twice = pairs.iter().find(|p| p.weak == j);
-                match twice.map(|p| p.reason.clone()).or_else(|| reason(data, group, j)) {
+                match leaves {
                     None => kept.push(*pole),
                     Some(reason) => {
                         out = true;
@@ -76,45 +110,45 @@ pub(crate) fn verified(
         if kept.is_empty() {
             return None;
         }
-        // With the noise as it was: what a pole stood for that is no mode is no noise either, and taken for some it would
-        // outweigh the peaks of the modes next to it.
-        groups = joint_fit::refine(data, &kept, PoleSearch::Nothing, &mut Vec::new())?;
+        groups = joint_fit::refine(&data, &kept, PoleSearch::Nothing, &mut Vec::new())?;
+        louder(&mut data, &groups);
     }
     Some(groups)
 }
 
-/// Why pole `j` of a group is no mode.
-fn reason(data: &[Data], group: &Group, j: usize) -> Option<String> {
-    let solution = &group.solution;
+/// What a pole stood for that is no mode is left over now: held to the noise as it was, the others would leave their places to
+/// follow it. Nowhere the noise falls: what has little of it decides as before.
+fn louder(data: &mut [Data], groups: &[Group]) {
+    let before: Vec<Vec<f64>> = data.iter().map(|d| d.sigma.clone()).collect();
+    set_noise::renew(data, groups);
+    for (d, before) in data.iter_mut().zip(before) {
+        for (sigma, before) in d.sigma.iter_mut().zip(before) {
+            *sigma = sigma.max(before);
+        }
+    }
+}
+
+/// Distance of the finest lines at a frequency, Hz.
+fn line_hz(data: &[Data], frequency_hz: f64) -> f64 {
+    data.iter()
+        .map(|d| joint_fit::spacing_hz(&d.frequency_hz, frequency_hz))
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// Why pole `j` of a group is no mode, and the share that it makes of what was measured around it.
+fn reason(data: &[Data], group: &Group, j: usize) -> Option<(f64, String)> {
+    let frfs = group.solution.frfs.len();
+    let residues: Vec<Complex64> = (0..frfs).map(|m| group.solution.constant(m, j).0).collect();
+    let local = Local::new(data, group, j, &residues);
+    let why = against(&group.solution, j, &residues, &local)?;
+    Some((local.mode / local.measured, why))
+}
+
+/// What speaks against pole `j` of a fit.
+fn against(solution: &Solution, j: usize, residues: &[Complex64], local: &Local) -> Option<String> {
     let pole = solution.poles[j];
     let frfs = solution.frfs.len();
-    let residues: Vec<Complex64> = (0..frfs).map(|m| solution.constant(m, j).0).collect();
-    let local = Local::new(data, group, j, &residues);
     let (seen_in, best) = joint_fit::seen_in(solution, j);
-    if std::env::var_os("LOBE_DEBUG").is_some() {
-        let mpc = shape::complexity(&residues).map_or(1.0, |c| c.mpc);
-        let s = solution.scatter_std(j);
-        let jk = solution.jackknife_std(j);
-        let wanted: f64 = (0..frfs).map(|m| solution.evidence(m, j)).sum();
-        eprintln!(
-            "DBG {:9.3} z {:6.3}% of-measured {:7.3} over-coloured {:8.2} over-left {:7.2} mpc {:.2} scatter {:.3} {:.3} jack {:.3} {:.3} in {}/{} best {:.0} evid/frf {:.1} level {:.2}",
-            pole.frequency_hz,
-            100.0 * pole.damping_ratio,
-            local.mode / local.measured,
-            local.mode / local.coloured.max(1e-300),
-            local.mode / local.left,
-            mpc,
-            s[0] / pole.damping_ratio,
-            s[1],
-            jk[0] / pole.damping_ratio,
-            jk[1],
-            seen_in,
-            frfs,
-            best,
-            wanted / frfs as f64,
-            (solution.misfit / solution.degrees_of_freedom as f64)
-        );
-    }
     let wanted = ((SHARE_OF_FRFS * frfs as f64).ceil() as usize).max(2);
     if frfs >= SET && seen_in < wanted && best < FAR {
         return Some(match seen_in {
@@ -126,7 +160,14 @@ fn reason(data: &[Data], group: &Group, j: usize) -> Option<String> {
         return Some("no larger than what the modes leave unexplained around it".into());
     }
     if frfs >= ENOUGH_FRFS && local.mode < DOMINANT * local.measured {
-        let mpc = shape::complexity(&residues).map_or(1.0, |c| c.mpc);
+        let mpc = shape::complexity(residues).map_or(1.0, |c| c.mpc);
+        if local.mode < SMALL_SHARE * local.measured && mpc < CLEARLY_IN_PHASE {
+            return Some(format!(
+                "it makes {:.0} % of what was measured around it and its FRFs have no clear common phase (collinearity {mpc:.2}): \
+                 what the model of stronger neighbours lacks",
+                100.0 * local.mode / local.measured
+            ));
+        }
         if mpc < COLLINEAR {
             return Some(format!(
                 "its FRFs have no common phase (collinearity {mpc:.2}): error of the measurement or of its neighbours' model"
@@ -147,7 +188,6 @@ fn reason(data: &[Data], group: &Group, j: usize) -> Option<String> {
 struct Local {
     mode: f64,
     measured: f64,
-    left: f64,
     /// Of what is left, the part that goes on from line to line.
     coloured: f64,
 }
@@ -159,7 +199,6 @@ impl Local {
         let mut local = Local {
             mode: 0.0,
             measured: 0.0,
-            left: 0.0,
             coloured: 0.0,
         };
         for ((d, found), residue) in data.iter().zip(&group.solution.frfs).zip(residues) {
@@ -180,7 +219,6 @@ impl Local {
                 let g = residue / (omega * omega) / Complex64::new(1.0 - r * r, 2.0 * pole.damping_ratio * r);
                 local.mode += g.norm_sqr();
                 local.measured += d.receptance[k].norm_sqr();
-                local.left += residual.norm_sqr();
                 if let Some(before) = before {
                     local.coloured += (before.conj() * residual).re;
                 }
@@ -227,15 +265,11 @@ fn close_pairs(data: &[Data], group: &Group) -> Vec<ClosePair> {
 fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2]) -> Option<ClosePair> {
     let [a, b] = both.map(|j| solution.poles[j]);
     let width = a.damping_ratio * a.frequency_hz + b.damping_ratio * b.frequency_hz;
-    let line_hz = data
-        .iter()
-        .map(|d| joint_fit::spacing_hz(&d.frequency_hz, a.frequency_hz))
-        .fold(f64::INFINITY, f64::min);
-    // Where a line is wider than a peak, what leaks from one line into the next takes a pole of its own.
-    let reach = if width < line_hz {
-        (CLOSE * width).max(LEAKS_LINES * line_hz)
-    } else {
-        CLOSE * width
+    let line_hz = line_hz(data, a.frequency_hz);
+    // Where a line is about as wide as a peak, what leaks from one line into the next takes a pole of its own.
+    let reach = match width < COARSE_LINES * line_hz {
+        true => (CLOSE * width).max(LEAKS_LINES * line_hz),
+        false => CLOSE * width,
     };
     if b.frequency_hz - a.frequency_hz > reach {
         return None;
@@ -255,17 +289,6 @@ fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2]) -> Option<Cl
         (both[1], both[0])
     };
     let beside = solution.poles[strong].frequency_hz;
-    if std::env::var_os("LOBE_DEBUG").is_some() {
-        eprintln!(
-            "PAIR {:.3} {:.3} widths {:.3} mac {:.3} mpc {:.2} {:.2}",
-            a.frequency_hz,
-            b.frequency_hz,
-            width,
-            shape::mac(&residues[0], &residues[1]),
-            shape::complexity(&residues[0]).map_or(1.0, |c| c.mpc),
-            shape::complexity(&residues[1]).map_or(1.0, |c| c.mpc)
-        );
-    }
     if let Some(merged) = moving(data, solution, strong, weak) {
         return Some(ClosePair {
             strong,
@@ -281,8 +304,10 @@ fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2]) -> Option<Cl
             .iter()
             .any(|r| shape::complexity(r).is_some_and(|c| c.mpc < IN_PHASE))
     };
-    let cancel =
-        residues[0].len() >= ENOUGH_FRFS && b.frequency_hz - a.frequency_hz < SAME * width && out_of_phase();
+    let enough = residues[0].len() >= ENOUGH_FRFS;
+    let leaks = width < COARSE_LINES * line_hz && b.frequency_hz - a.frequency_hz < reach;
+    let same_place = b.frequency_hz - a.frequency_hz < SAME * width || leaks;
+    let cancel = enough && same_place && out_of_phase();
     if cancel {
         return Some(ClosePair {
             strong,
@@ -291,7 +316,8 @@ fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2]) -> Option<Cl
             reason: format!("splits the mode at {beside:.2} Hz: the two nearly cancel each other"),
         });
     }
-    let repeats = residues[0].len() >= ENOUGH_FRFS && shape::mac(&residues[0], &residues[1]) > SAME_SHAPE;
+    let alike = if same_place { ALIKE_SHAPE } else { SAME_SHAPE };
+    let repeats = enough && shape::mac(&residues[0], &residues[1]) > alike;
     repeats.then(|| ClosePair {
         strong,
         weak,

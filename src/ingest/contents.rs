@@ -34,6 +34,7 @@ pub enum Format {
     /// LabVIEW measurement file.
     Lvm,
     /// MATLAB, version 5 to 7.
+    Mat4,
     Mat5,
     /// MATLAB 7.3, or other HDF5 with plain arrays.
     Mat73,
@@ -51,6 +52,7 @@ impl std::fmt::Display for Format {
             Format::TimeCsv => "time CSV",
             Format::Tdms => "TDMS",
             Format::Lvm => "LabVIEW LVM",
+            Format::Mat4 => "MAT v4",
             Format::Mat5 => "MAT v5",
             Format::Mat73 => "MAT v7.3",
         })

@@ -62,6 +62,7 @@ fn read_as_it_is(
     Ok(match detected {
         Detected::Tdms => (format, why, signals(tdms::read(bytes, notes)?)),
         Detected::Lvm => (format, why, signals(lvm::read(bytes, &mut budget, notes)?)),
+        Detected::Mat4 => (format, why, mat::read_v4(bytes, &mut budget, notes)?),
         Detected::Mat5 => (format, why, mat::read_v5(bytes, &mut budget, notes)?),
         Detected::Mat73 => (format, why, mat::read_v73(bytes, &mut budget, notes)?),
         Detected::Universal => {

@@ -20,6 +20,7 @@ pub(super) enum Detected {
     TimeTable(Header),
     Tdms,
     Lvm,
+    Mat4,
     Mat5,
     Mat73,
 }
@@ -40,6 +41,13 @@ pub(super) fn detect(bytes: &[u8], is_dwd_named: bool) -> Result<(Detected, Form
             Detected::Mat5,
             Format::Mat5,
             "begins with MATLAB 5.0 MAT-file".into(),
+        ));
+    }
+    if mat::looks_like_v4(bytes) {
+        return Ok((
+            Detected::Mat4,
+            Format::Mat4,
+            "begins with a variable as MATLAB 4 wrote them".into(),
         ));
     }
     if mat::looks_like_v73(bytes) {
@@ -93,6 +101,7 @@ pub(super) fn detect(bytes: &[u8], is_dwd_named: bool) -> Result<(Detected, Form
         );
     };
     frf_text::join_signalcalc(&mut header);
+    frf_text::join_said_above(&mut header);
     let how = header.describe();
     if frf_text::is_frf_table(&header) {
         let why = format!("column names of FRFs ({}), {how}", abbreviated(&header.names));

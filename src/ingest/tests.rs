@@ -323,6 +323,36 @@ fn tables_of_other_programs() {
     assert_eq!(frf.reference.map(|d| d.to_string()).as_deref(), Some("1-X"));
 }
 
+/// Lines above the numbers say what the columns are: the text export of Simcenter Testlab has no line of names, other
+/// programs name all columns but the frequencies.
+#[test]
+fn columns_that_header_lines_describe() {
+    let testlab = "Resolution\t0.5 Hz\t\t\t\nX axis\t0-1 Hz\t\t\t\nX axis unit\tHz\t\t\t\nValue type\tComplex\t\t\t\n\
+        Y axis unit\tg/N\t\t\t\nReference actual sensitivity\t22.7 mV/N\t\t\t\nReference DOF id\tPoint:10:-Z\t\t\t\n\
+        DOF id\tPoint:3:+Z\t\t\t\nFunction class\tFRF\t\t\t\nCreated\tTue Feb 23 2021\t\t\t\n\
+        \x20  0.0e+00\t   1.0e+00\t   0.0e+00\t\t\n   5.0e-01\t   2.0e+00\t  -1.0e+00\t\t\n\
+        \x20  1.0e+00\t   3.0e+00\t  -2.0e+00\t\t\n";
+    let (_, contents, _) = read(testlab);
+    let frf = &contents.frfs[0];
+    assert_eq!(frf.frequency_hz, [0.0, 0.5, 1.0]);
+    assert_eq!(frf.quantity, Some(Quantity::Accelerance));
+    approx::assert_relative_eq!(frf.value[2].im, -2.0 * 9.80665, max_relative = 1e-12);
+    assert_eq!(frf.response.map(|d| d.to_string()).as_deref(), Some("3Z"));
+    assert_eq!(frf.reference.map(|d| d.to_string()).as_deref(), Some("10-Z"));
+    // A spectrum is no FRF, whatever its header says.
+    assert!(!problem(&testlab.replace("\tFRF\t", "\tSpectrum\t")).is_empty());
+    let analyser = "CSVFormatType;Spectrum2DComplex\nAxisUnit;Hz\nSignals;2\n\n\
+        ';Signal 2 (Real);Signal 2 (Imag.);Signal 3 (Real);Signal 3 (Imag.)\n\
+        ';(m/s^2)/N;(m/s^2)/N;(m/s^2)/N;(m/s^2)/N\n\
+        0,0E+00;1,5;0,0;4,0;-1,0\n5,0E-01;2,5;-1,0;5,0;-2,0\n1,0E+00;3,5;-2,0;6,0;-3,0\n";
+    let (_, contents, _) = read(analyser);
+    let names: Vec<&str> = contents.frfs.iter().map(|f| f.name.as_str()).collect();
+    assert_eq!(names, ["Signal 2", "Signal 3"]);
+    assert_eq!(contents.frfs[0].value[1], Complex64::new(2.5, -1.0));
+    assert_eq!(contents.frfs[1].frequency_hz, [0.0, 0.5, 1.0]);
+    assert_eq!(contents.frfs[1].quantity, Some(Quantity::Accelerance));
+}
+
 #[test]
 fn times_without_names_are_no_frequencies() {
     let record: String = (0..200)

@@ -62,11 +62,12 @@ fn column(name: &str) -> Column {
     }
 }
 
-/// `amp_real`, `H1_2_imag`, `1X/1X re`: the part stands behind the name of the FRF.
+/// `amp_real`, `H1_2_imag`, `1X/1X re`, `Signal 2 (Imag.)`: the part stands behind the name of the FRF.
 fn part_behind_name(name: &str) -> Option<Column> {
     let name = name.trim();
     let (of, part) = name.rsplit_once(['_', ' '])?;
-    let part = match part.to_lowercase().as_str() {
+    let part = part.to_lowercase();
+    let part = match part.trim_matches(|c: char| "()[].".contains(c)) {
         "re" | "real" => Column::Re,
         "im" | "imag" | "imaginary" => Column::Im,
         "mag" | "magnitude" => Column::Magnitude,
@@ -118,6 +119,53 @@ pub(crate) fn join_signalcalc(header: &mut Header) {
     header.columns = header.names.len();
     units.resize(header.columns, String::new());
     header.units = units;
+}
+
+/// Header lines of a table without column names, or with none for the first column, that say what its columns are: the
+/// text exports of Simcenter Testlab (`X axis unit`, `Value type`, `DOF id`, …; frequency, real and imaginary part
+/// below) and those whose first column is the `AxisUnit`. Such a header is changed to what other tables have.
+pub(crate) fn join_said_above(header: &mut Header) {
+    let mut said: HashMap<String, String> = HashMap::new();
+    let last = header.names.join("\t");
+    for line in header.lines.iter().chain([&last]) {
+        let mut fields = line.split(['\t', ';']).map(str::trim);
+        if let (Some(key), Some(value)) = (fields.next(), fields.next())
+            && !key.is_empty()
+            && !value.is_empty()
+        {
+            said.entry(key.to_lowercase()).or_insert_with(|| value.to_owned());
+        }
+    }
+    let get = |key: &str| said.get(key).map(String::as_str);
+    let is = |key: &str, value: &str| get(key).is_some_and(|v| v.eq_ignore_ascii_case(value));
+    if is("function class", "frf") && is("x axis unit", "hz") && is("value type", "complex") {
+        // The last of them is no line of names.
+        header.lines.push(last);
+        header.names = ["frequency_hz", "re", "im"].map(String::from).to_vec();
+        header.columns = header.names.len();
+        let unit = get("y axis unit").unwrap_or_default();
+        header.units = ["Hz", unit, unit].map(String::from).to_vec();
+        // Behind what the keys of other programs say, so in front of all lines that hold the same words.
+        for (name, key) in [("Reference", "reference dof id"), ("Response", "dof id")] {
+            if let Some(dof) = get(key).and_then(testlab_dof) {
+                header.lines.insert(0, format!("{name}: {dof}"));
+            }
+        }
+    } else if is("axisunit", "hz")
+        && header.names.len() > 1
+        && header.names[1..].iter().all(|n| column(n) != Column::Unknown)
+        && !header.names[0].chars().any(char::is_alphanumeric)
+    {
+        header.names[0] = "frequency_hz".into();
+    }
+}
+
+/// `Point:10:-Z` of Testlab: component, node, direction.
+fn testlab_dof(id: &str) -> Option<String> {
+    let mut from_the_end = id.rsplit(':');
+    let (direction, node) = (from_the_end.next()?, from_the_end.next()?);
+    let dof = format!("{}{}", node.trim(), direction.trim());
+    dof.parse::<Dof>().ok().map(|dof| dof.to_string())
 }
 
 /// What a column's unit (under its name, or in its brackets) says of the FRF: quantity and factor to SI. `(m/s2)(N)`, as

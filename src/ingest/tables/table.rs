@@ -354,8 +354,8 @@ impl Header {
                 }
             }
         }
-        // A delimiter after the last field is a habit of spreadsheets.
-        if let Delimiter::Byte(b) = self.delimiter
+        // Delimiters after the last field are a habit of spreadsheets.
+        while let Delimiter::Byte(b) = self.delimiter
             && data.get(at) == Some(&b)
         {
             at += 1;

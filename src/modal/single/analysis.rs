@@ -18,7 +18,7 @@ use crate::modal::single::{circle_fit, half_power};
 /// determined is kept, so that a wide one averages noise and a narrow one avoids what is not modelled.
 const WINDOWS_HALF_WIDTHS: [f64; 3] = [8.0, 5.0, 3.0];
 /// More FRFs than this are fitted singly in one window each, with fewer neighbours: their modes are those of the set.
-const MANY_FRFS: usize = 40;
+const MANY_FRFS: usize = 12;
 /// A window is wide enough where its inner lines are left with at least this share of the power of all.
 const NOISE_SHARE: f64 = 0.8;
 /// Lines on either side of a peak that take part at least.
@@ -65,7 +65,7 @@ const SAME_WIDTHS: f64 = 0.1;
 /// Fewer lines than this inside the half-power band are worth a warning.
 const FINE_LINES: f64 = 3.0;
 
-/// Finds the modes of each of many FRFs: [`analyse_frf`], with less effort on each where there are more than forty.
+/// Finds the modes of each of many FRFs: [`analyse_frf`], with less effort on each where there are more than twelve.
 ///
 /// # Errors
 /// As [`analyse_frf`].

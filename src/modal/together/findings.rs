@@ -30,6 +30,8 @@ const BY_CHANCE: f64 = 1.5;
 const UNPLACED: f64 = 0.3;
 /// A line whose width is not known is a mode where the residues of its FRFs have a common phase (collinearity) …
 const IN_PHASE: f64 = 0.9;
+/// Of what the mean over the FRFs and the common pole of a mode that moves are apart, this part is uncertainty.
+const BETWEEN: f64 = 0.5;
 /// Two fits of the same lines disagree from this many standard deviations on.
 const APART: f64 = 2.0;
 
@@ -87,14 +89,15 @@ pub(crate) fn collect(
                 continue;
             }
             let shift = group.doubt.as_ref().map_or([0.0; 2], |d| d.shifts[j]);
-            // The larger of what the noise says and of how the FRFs scatter about the common pole.
+            // The larger of what the noise says and of how the FRFs scatter about the common pole; and what another weighting of
+            // the FRFs would make of it.
             let few = data.len() < SET;
-            let small_set = 1.0 + 1.5 / (data.len().max(2) - 1) as f64;
-            let scatter = solution
-                .scatter_std(j)
-                .map(|s| if few { 0.0 } else { small_set * s });
+            let scatter = if few { [0.0; 2] } else { solution.jackknife_std(j) };
+            let otherwise = verify::otherwise(solution, j).filter(|_| !few);
+            let [by_frequency, by_damping] = otherwise.unwrap_or_default();
             let mut frequency_std_hz = (level * solution.frequency_std_hz(j))
-                .max(scatter[0] * pole.frequency_hz)
+                .max(scatter[0].max(by_frequency.std) * pole.frequency_hz)
+                .hypot(by_frequency.change * pole.frequency_hz)
                 .hypot(shift[0]);
             let mut constants = vec![None; count];
             for m in 0..data.len() {
@@ -107,7 +110,8 @@ pub(crate) fn collect(
                 .fold(f64::INFINITY, f64::min);
             let lines_in_half_power_band = 2.0 * pole.damping_ratio * pole.frequency_hz / line_hz;
             let mut damping_std = (level * solution.damping_std(j))
-                .max(scatter[1] * pole.damping_ratio)
+                .max(scatter[1].max(by_damping.std) * pole.damping_ratio)
+                .hypot(by_damping.change * pole.damping_ratio)
                 .hypot(shift[1]);
             let others: Vec<Pole> = poles.iter().filter(|p| *p != pole).copied().collect();
             let moves = verify::moves(fitted, solution, j, *pole, &others);
@@ -117,8 +121,16 @@ pub(crate) fn collect(
                 moving += usize::from(moves.significant);
                 if moves.significant {
                     (frequency_hz, damping_ratio) = (moves.pole.frequency_hz, moves.pole.damping_ratio);
-                    frequency_std_hz = small_set * moves.std[0];
-                    damping_std = small_set * moves.std[1];
+                    let apart = [
+                        frequency_hz - pole.frequency_hz,
+                        damping_ratio - pole.damping_ratio,
+                    ];
+                    frequency_std_hz = moves.std[0]
+                        .max(scatter[0] * pole.frequency_hz)
+                        .hypot(BETWEEN * apart[0]);
+                    damping_std = moves.std[1]
+                        .max(scatter[1] * pole.damping_ratio)
+                        .hypot(BETWEEN * apart[1]);
                 }
             }
             if lines_in_half_power_band < LEAKAGE_BELOW_LINES {

@@ -9,9 +9,13 @@ use crate::modal::shape;
 use crate::modal::single::local_fit::Pole;
 use crate::modal::together::global_modes::RejectedMode;
 use crate::modal::together::set_member::SET;
+use crate::modal::together::set_noise;
 
 /// Fits after poles were taken out, at most.
-const MAX_ROUNDS: usize = 6;
+const MAX_ROUNDS: usize = 10;
+/// Of poles nearer than so many sums of their half-widths, and so many lines, one goes out at a time.
+const APART_WIDTHS: f64 = 2.0;
+const APART_LINES: f64 = 2.0;
 /// From this many FRFs on the phase of their residues says something.
 const ENOUGH_FRFS: usize = 5;
 /// Residues of no common phase: what random phases give more often than a structure.
@@ -26,16 +30,25 @@ const FAR: f64 = 100.0;
 const SCATTER_WIDTHS: f64 = 0.3;
 /// A damping ratio uncertain by more than this part of itself, from how the FRFs scatter.
 const SCATTER_DAMPING: f64 = 0.5;
+/// Of what was measured in its band a mode makes at least this share …
+const SMALL_SHARE: f64 = 0.1;
+/// … or its residues have a phase this common: what repairs the model of a strong neighbour has neither.
+const CLEARLY_IN_PHASE: f64 = 0.95;
 /// Power of a mode over the coloured rest in its band.
 const OVER_REST: f64 = 2.0;
 /// Two poles nearer than this share of the sum of their half-widths may be one.
 const CLOSE: f64 = 1.0;
+/// Or than so many lines, where the sum is less than so many of them.
+const LEAKS_LINES: f64 = 1.5;
+const COARSE_LINES: f64 = 1.2;
 /// Two poles nearer than this share of that sum are one mode unless both have the phases of one.
 const SAME: f64 = 0.2;
 /// Residues of a common phase: what a mode next to another one keeps.
 const IN_PHASE: f64 = 0.7;
-/// Shapes that repeat.
+/// Shapes that repeat …
 const SAME_SHAPE: f64 = 0.9;
+/// … and that do where two poles are at the same place.
+const ALIKE_SHAPE: f64 = 0.85;
 
 /// Takes out what is no mode until all are.
 pub(crate) fn verified(
@@ -43,18 +56,41 @@ pub(crate) fn verified(
     mut groups: Vec<Group>,
     rejected: &mut Vec<RejectedMode>,
 ) -> Option<Vec<Group>> {
+    let mut data = data.to_vec();
     for _ in 0..MAX_ROUNDS {
         let mut kept: Vec<Pole> = Vec::new();
         let mut out = false;
         for group in &groups {
-            let pairs = close_pairs(data, group);
-            for (j, pole) in group.solution.poles.iter().enumerate() {
+            let pairs = close_pairs(&data, group);
+            let poles = &group.solution.poles;
+            let mut doubtful: Vec<(usize, f64, String)> = Vec::new();
+            let mut leaves: Vec<Option<String>> = vec![None; poles.len()];
+            for j in 0..poles.len() {
+                match pairs.iter().find(|p| p.weak == j) {
+                    Some(pair) => leaves[j] = Some(pair.reason.clone()),
+                    None => doubtful.extend(reason(&data, group, j).map(|(s, why)| (j, s, why))),
+                }
+            }
+            // Of neighbours the one that makes least of what was measured goes first: poles that share a mode among them look
+            // all alike, and one of them is to stay.
+            doubtful.sort_by(|a, b| a.1.total_cmp(&b.1));
+            for (j, _, why) in doubtful {
+                let near = |k: usize| {
+                    let width = |p: &Pole| p.damping_ratio * p.frequency_hz;
+                    let reach = APART_WIDTHS * (width(&poles[j]) + width(&poles[k]))
+                        + APART_LINES * line_hz(&data, poles[j].frequency_hz);
+                    (poles[j].frequency_hz - poles[k].frequency_hz).abs() < reach
+                };
+                if !(0..poles.len()).any(|k| leaves[k].is_some() && near(k)) {
+                    leaves[j] = Some(why);
+                }
+            }
+            for (j, (pole, leaves)) in poles.iter().zip(leaves).enumerate() {
                 if let Some(merged) = pairs.iter().find_map(|p| p.merged.filter(|_| p.strong == j)) {
                     kept.push(merged);
                     continue;
                 }
-                let twice = pairs.iter().find(|p| p.weak == j);
-                match twice.map(|p| p.reason.clone()).or_else(|| reason(data, group, j)) {
+                match leaves {
                     None => kept.push(*pole),
                     Some(reason) => {
                         out = true;
@@ -74,20 +110,44 @@ pub(crate) fn verified(
         if kept.is_empty() {
             return None;
         }
-        // With the noise as it was: what a pole stood for that is no mode is no noise either, and taken for some it would
-        // outweigh the peaks of the modes next to it.
-        groups = joint_fit::refine(data, &kept, PoleSearch::Nothing, &mut Vec::new())?;
+        groups = joint_fit::refine(&data, &kept, PoleSearch::Nothing, &mut Vec::new())?;
+        louder(&mut data, &groups);
     }
     Some(groups)
 }
 
-/// Why pole `j` of a group is no mode.
-fn reason(data: &[Data], group: &Group, j: usize) -> Option<String> {
-    let solution = &group.solution;
+/// What a pole stood for that is no mode is left over now: held to the noise as it was, the others would leave their places to
+/// follow it. Nowhere the noise falls: what has little of it decides as before.
+fn louder(data: &mut [Data], groups: &[Group]) {
+    let before: Vec<Vec<f64>> = data.iter().map(|d| d.sigma.clone()).collect();
+    set_noise::renew(data, groups);
+    for (d, before) in data.iter_mut().zip(before) {
+        for (sigma, before) in d.sigma.iter_mut().zip(before) {
+            *sigma = sigma.max(before);
+        }
+    }
+}
+
+/// Distance of the finest lines at a frequency, Hz.
+fn line_hz(data: &[Data], frequency_hz: f64) -> f64 {
+    data.iter()
+        .map(|d| joint_fit::spacing_hz(&d.frequency_hz, frequency_hz))
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// Why pole `j` of a group is no mode, and the share that it makes of what was measured around it.
+fn reason(data: &[Data], group: &Group, j: usize) -> Option<(f64, String)> {
+    let frfs = group.solution.frfs.len();
+    let residues: Vec<Complex64> = (0..frfs).map(|m| group.solution.constant(m, j).0).collect();
+    let local = Local::new(data, group, j, &residues);
+    let why = against(&group.solution, j, &residues, &local)?;
+    Some((local.mode / local.measured, why))
+}
+
+/// What speaks against pole `j` of a fit.
+fn against(solution: &Solution, j: usize, residues: &[Complex64], local: &Local) -> Option<String> {
     let pole = solution.poles[j];
     let frfs = solution.frfs.len();
-    let residues: Vec<Complex64> = (0..frfs).map(|m| solution.constant(m, j).0).collect();
-    let local = Local::new(data, group, j, &residues);
     let (seen_in, best) = joint_fit::seen_in(solution, j);
     let wanted = ((SHARE_OF_FRFS * frfs as f64).ceil() as usize).max(2);
     if frfs >= SET && seen_in < wanted && best < FAR {
@@ -100,7 +160,14 @@ fn reason(data: &[Data], group: &Group, j: usize) -> Option<String> {
         return Some("no larger than what the modes leave unexplained around it".into());
     }
     if frfs >= ENOUGH_FRFS && local.mode < DOMINANT * local.measured {
-        let mpc = shape::complexity(&residues).map_or(1.0, |c| c.mpc);
+        let mpc = shape::complexity(residues).map_or(1.0, |c| c.mpc);
+        if local.mode < SMALL_SHARE * local.measured && mpc < CLEARLY_IN_PHASE {
+            return Some(format!(
+                "it makes {:.0} % of what was measured around it and its FRFs have no clear common phase (collinearity {mpc:.2}): \
+                 what the model of stronger neighbours lacks",
+                100.0 * local.mode / local.measured
+            ));
+        }
         if mpc < COLLINEAR {
             return Some(format!(
                 "its FRFs have no common phase (collinearity {mpc:.2}): error of the measurement or of its neighbours' model"
@@ -198,7 +265,13 @@ fn close_pairs(data: &[Data], group: &Group) -> Vec<ClosePair> {
 fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2]) -> Option<ClosePair> {
     let [a, b] = both.map(|j| solution.poles[j]);
     let width = a.damping_ratio * a.frequency_hz + b.damping_ratio * b.frequency_hz;
-    if b.frequency_hz - a.frequency_hz > CLOSE * width {
+    let line_hz = line_hz(data, a.frequency_hz);
+    // Where a line is about as wide as a peak, what leaks from one line into the next takes a pole of its own.
+    let reach = match width < COARSE_LINES * line_hz {
+        true => (CLOSE * width).max(LEAKS_LINES * line_hz),
+        false => CLOSE * width,
+    };
+    if b.frequency_hz - a.frequency_hz > reach {
         return None;
     }
     let residues = both.map(|j| {
@@ -231,8 +304,10 @@ fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2]) -> Option<Cl
             .iter()
             .any(|r| shape::complexity(r).is_some_and(|c| c.mpc < IN_PHASE))
     };
-    let cancel =
-        residues[0].len() >= ENOUGH_FRFS && b.frequency_hz - a.frequency_hz < SAME * width && out_of_phase();
+    let enough = residues[0].len() >= ENOUGH_FRFS;
+    let leaks = width < COARSE_LINES * line_hz && b.frequency_hz - a.frequency_hz < reach;
+    let same_place = b.frequency_hz - a.frequency_hz < SAME * width || leaks;
+    let cancel = enough && same_place && out_of_phase();
     if cancel {
         return Some(ClosePair {
             strong,
@@ -241,7 +316,8 @@ fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2]) -> Option<Cl
             reason: format!("splits the mode at {beside:.2} Hz: the two nearly cancel each other"),
         });
     }
-    let repeats = residues[0].len() >= ENOUGH_FRFS && shape::mac(&residues[0], &residues[1]) > SAME_SHAPE;
+    let alike = if same_place { ALIKE_SHAPE } else { SAME_SHAPE };
+    let repeats = enough && shape::mac(&residues[0], &residues[1]) > alike;
     repeats.then(|| ClosePair {
         strong,
         weak,
@@ -342,6 +418,46 @@ fn mean_over_frfs<T>(own: &[T], of: impl Fn(&T) -> (f64, f64)) -> (f64, f64) {
         .map(|(value, std)| ((value - mean) / (std * std + between)).powi(2))
         .sum();
     (mean, (scatter * count / (count - 1.0)).sqrt() / total)
+}
+
+/// What the mean over the FRFs would change of a common pole.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Otherwise {
+    /// Relative change …
+    pub change: f64,
+    /// … and relative standard deviation.
+    pub std: f64,
+}
+
+/// Where the FRFs put a mode (frequency, damping ratio) when each counts by how far all of them lie apart, and not only by
+/// how well it knows the mode: to the first order, from the common pole. What the two differ by, the model does not know.
+/// `None` where too few FRFs tell.
+pub(crate) fn otherwise(solution: &Solution, j: usize) -> Option<[Otherwise; 2]> {
+    const LEAST_FRFS: usize = 4;
+    const KNOWN_WIDTHS: f64 = 0.3;
+    const NEAR_WIDTHS: f64 = 3.0;
+    const KNOWN_DAMPING: f64 = 0.5;
+    const NEAR_DAMPING: f64 = 1.0;
+    let level = (solution.misfit / solution.degrees_of_freedom as f64)
+        .max(1.0)
+        .sqrt();
+    let width = solution.poles[j].damping_ratio;
+    let steps: Vec<([f64; 2], [f64; 2])> = (0..solution.frfs.len())
+        .filter_map(|m| solution.own_step(m, j))
+        .map(|(step, std)| (step, std.map(|s| level * s)))
+        .filter(|(step, std)| {
+            std[0] < KNOWN_WIDTHS * width
+                && step[0].abs() < NEAR_WIDTHS * width
+                && std[1] < KNOWN_DAMPING
+                && step[1].abs() < NEAR_DAMPING
+        })
+        .collect();
+    (steps.len() >= LEAST_FRFS).then(|| {
+        [0, 1].map(|k| {
+            let (change, std) = mean_over_frfs(&steps, |(step, std)| (step[k], std[k]));
+            Otherwise { change, std }
+        })
+    })
 }
 
 /// How far a mode moves from FRF to FRF.

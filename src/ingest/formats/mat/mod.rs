@@ -1,4 +1,4 @@
-//! MATLAB files: [`v5`] (to v7) and v7.3 ([`hdf5`]). Both become a list of named arrays; [`interpret`] says which of them
+//! MATLAB files: [`v4`], [`v5`] (to v7) and v7.3 ([`hdf5`]). All become a list of named arrays; [`interpret`] says which of them
 //! are FRFs, coherences and time signals.
 
 use crate::InputError;
@@ -8,6 +8,7 @@ use crate::ingest::text::Notes;
 
 mod hdf5;
 mod interpret;
+mod v4;
 mod v5;
 mod variable;
 mod write;
@@ -21,6 +22,18 @@ pub(crate) fn looks_like_v5(bytes: &[u8]) -> bool {
 /// An HDF5 file with MATLAB's block before it, or bare.
 pub(crate) fn looks_like_v73(bytes: &[u8]) -> bool {
     crate::ingest::formats::mat::hdf5::looks_like(bytes)
+}
+
+pub(crate) fn looks_like_v4(bytes: &[u8]) -> bool {
+    crate::ingest::formats::mat::v4::looks_like(bytes)
+}
+
+pub(crate) fn read_v4(bytes: &[u8], budget: &mut Budget, notes: &mut Notes) -> Result<Contents, InputError> {
+    crate::ingest::formats::mat::interpret::contents(
+        crate::ingest::formats::mat::v4::read(bytes, budget, notes)?,
+        budget,
+        notes,
+    )
 }
 
 pub(crate) fn read_v5(bytes: &[u8], budget: &mut Budget, notes: &mut Notes) -> Result<Contents, InputError> {

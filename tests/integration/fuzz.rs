@@ -434,7 +434,10 @@ fn corpus_of(target: Target) -> Vec<Vec<u8>> {
         Target::Reader => {
             let mut files = measurement_files();
             if let Some(folder) = std::env::var_os("FUZZ_CORPUS") {
-                let mut more: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
+                let mut more: Vec<PathBuf> = std::fs::read_dir(folder)
+                    .unwrap()
+                    .map(|e| e.unwrap().path())
+                    .collect();
                 more.sort();
                 let more = more.iter().filter_map(|p| std::fs::read(p).ok());
                 files.extend(more.filter(|b| b.len() <= MOST_BYTES));
@@ -516,7 +519,10 @@ fn mutated_files_do_no_harm() {
         if !matches!(target, Target::Reader | Target::Requests) {
             let place = Place::of(target);
             for (i, bytes) in corpus.iter().enumerate() {
-                assert!(run(target, bytes, &place), "{target:?}: file {i} of the corpus is not read");
+                assert!(
+                    run(target, bytes, &place),
+                    "{target:?}: file {i} of the corpus is not read"
+                );
             }
         }
         let runs = match target {

@@ -33,7 +33,7 @@ impl RobotSpec {
     /// file, key and line of the robot file where that is wrong.
     pub fn load(model: &str, campaign_dir: &Path) -> Result<RobotSpec> {
         if let Some((name, text)) = BUILT_IN.iter().find(|(name, _)| *name == model) {
-            return parse(&Document::from_text(Path::new(&format!("built-in {name}")), text));
+            return RobotSpec::from_text(Path::new(&format!("built-in {name}")), text);
         }
         if model.to_lowercase().ends_with(".urdf") || model.to_lowercase().ends_with(".xacro") {
             return Err(InputError::new(format!(
@@ -62,6 +62,14 @@ impl RobotSpec {
                 .remedy(remedy)
         })?;
         parse(&Document::read(&path)?)
+    }
+
+    /// The robot of a robot file's text; `file` is what errors call it.
+    ///
+    /// # Errors
+    /// An [`InputError`] about file, key and line.
+    pub fn from_text(file: &Path, text: &str) -> Result<RobotSpec> {
+        parse(&Document::from_text(file, text))
     }
 }
 
@@ -287,7 +295,7 @@ mod tests {
     use super::*;
 
     fn read(text: &str) -> Result<RobotSpec> {
-        parse(&Document::from_text(Path::new("robot.toml"), text))
+        RobotSpec::from_text(Path::new("robot.toml"), text)
     }
 
     #[test]

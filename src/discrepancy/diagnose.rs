@@ -13,7 +13,7 @@ use crate::identify::frfs::calibrate::{Calibration, estimates};
 use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
 use crate::identify::rest::{BeyondSlips, Rest};
 use crate::identify::study::{
-    Effort, Extent, InstanceOf, ModelOf, OUT_OF_RACE, Study, Tried, View, held_out, rescue, try_effect,
+    Effort, Extent, InstanceOf, ModelOf, Study, Tried, View, held_out, rescue, try_again, try_effect,
     try_effects, vanished,
 };
 use crate::progress::Progress;
@@ -24,6 +24,8 @@ const TESTED: usize = 4;
 const NO_CONFIDENCE: f64 = 0.05;
 /// Candidates that are refined on all data, at most.
 const REFINED: usize = 8;
+/// Times the lowest misfit on the coarse view from which on a candidate is not refined: all data do not turn that round.
+const BEHIND: f64 = 4.0;
 /// Misfit per degree of freedom of the baseline below which what is missing is faint.
 const FAINT: f64 = 1.5;
 /// Times the baseline is fitted anew, and all candidates from it, where a candidate's fit leads to a better baseline.
@@ -54,6 +56,11 @@ const REFINE: Stopping = Stopping {
 const REFIT_WITHOUT_FOLD: Stopping = Stopping {
     max_iterations: 4,
     relative_decrease: 1e-4,
+};
+/// Of candidates that are behind anyway: one step of Gauss and Newton.
+const REFIT_BRIEFLY: Stopping = Stopping {
+    max_iterations: 1,
+    ..REFIT_WITHOUT_FOLD
 };
 
 /// What each parameter must gain in χ², for so many independent values: their logarithm (Schwarz 1978), and in any case what
@@ -134,9 +141,10 @@ impl<'a, S: Study> Engine<'a, S> {
     fn on_one_baseline(&mut self) -> Result<(Fit, Fit, Vec<TriedOf<S>>)> {
         let (study, model) = (self.study, self.model);
         let mut rebased = 0;
+        let mut before = None;
         loop {
             let coarse = self.minimise(model, View::COARSE, &self.calibration.theta, REFINE)?;
-            let (tried, better) = self.screen_all(&coarse)?;
+            let (tried, better) = self.screen_all(&coarse, before)?;
             let base = self.minimise(model, View::FULL, &self.calibration.theta, REFINE)?;
             let Some(start) = better.filter(|_| rebased < REBASED) else {
                 return Ok((coarse, base, tried));
@@ -149,6 +157,7 @@ impl<'a, S: Study> Engine<'a, S> {
             rebased += 1;
             self.hints = study.hints(model, &calibration.theta)?;
             self.calibration = calibration;
+            before = Some(tried);
         }
     }
 
@@ -348,14 +357,24 @@ impl<'a, S: Study> Engine<'a, S> {
     }
 
     /// Every effect on the coarse view, best first, one for each effect and site; and a better starting point for the
-    /// baseline, if one turned up.
+    /// baseline, if one turned up. `before`: what was found from another baseline.
     #[allow(clippy::type_complexity)]
-    fn screen_all(&self, base: &Fit) -> Result<(Vec<TriedOf<S>>, Option<Vec<f64>>)> {
+    fn screen_all(
+        &self,
+        base: &Fit,
+        before: Option<Vec<TriedOf<S>>>,
+    ) -> Result<(Vec<TriedOf<S>>, Option<Vec<f64>>)> {
         let (study, model) = (self.study, self.model);
-        let bases = [base.theta.clone(), model.nominal_theta()];
-        let progress = Progress::new("trying effects", self.instances.len());
+        let count = before.as_ref().map_or(self.instances.len(), Vec::len);
+        let progress = Progress::new("trying effects", count);
         let step = || progress.step();
-        let mut tried = try_effects(study, model, &self.instances, &bases, &self.hints, step);
+        let mut tried = match before {
+            None => {
+                let bases = [base.theta.clone(), model.nominal_theta()];
+                try_effects(study, model, &self.instances, &bases, &self.hints, step)
+            }
+            Some(before) => try_again(study, model, before, &base.theta, &self.hints, step),
+        };
         drop(progress);
         let by_cost = |a: &TriedOf<S>, b: &TriedOf<S>| a.fit.cost.total_cmp(&b.fit.cost);
         tried.sort_by(by_cost);
@@ -404,7 +423,7 @@ impl<'a, S: Study> Engine<'a, S> {
         let mut refined: Vec<TriedOf<S>> = tried
             .par_iter()
             .take(REFINED)
-            .filter(|t| t.fit.cost <= OUT_OF_RACE * lowest)
+            .filter(|t| t.fit.cost <= BEHIND * lowest)
             .map(|t| {
                 let fit = self.minimise(&t.model, View::FULL, &t.fit.theta, REFINE)?;
                 Ok(Tried { fit, ..t.clone() })
@@ -430,13 +449,18 @@ impl<'a, S: Study> Engine<'a, S> {
         };
         let gain = (raw_gain / evidence.scale).max(0.0);
         let single = ChiSquared::new(extra).map_or(1.0, |d| d.sf(gain));
+        let refit = if refined {
+            REFIT_WITHOUT_FOLD
+        } else {
+            REFIT_BRIEFLY
+        };
         let all = estimates(&model.parameters, fit, reduced_chi2)?;
         let own = self.base_count..all.len();
         Ok(EffectCandidate {
             instance: *instance,
             name: instance.name(),
             nrms: study.residual(model, &fit.theta)?.nrms,
-            held_out: held_out(study, model, &fit.theta, Extent::Coarse, REFIT_WITHOUT_FOLD)?,
+            held_out: held_out(study, model, &fit.theta, Extent::Coarse, refit)?,
             delta_bic: extra * price_of_a_parameter(evidence.share * values as f64) - gain,
             p_value: (single * evidence.tests as f64).min(1.0),
             reduced_chi2,

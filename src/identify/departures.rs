@@ -82,6 +82,7 @@ mod tests {
             ending: Ending::Converged,
             starts: 1,
             starts_agreeing: 1,
+            rivals: Vec::new(),
         };
         // Alone, b is hardly one and a half of its standard errors off.
         assert!(theta[1].abs() / covariance[(1, 1)].sqrt() < 2.0);

@@ -307,7 +307,14 @@ fn look<S: Study>(
         ..View::COARSE
     };
     let likelihood = study.problem(model, view(Measure::Likelihood));
-    let rough = study.problem(model, view(Measure::Rough));
+    // It only has to lead into the right basin.
+    let rough = study.problem(
+        model,
+        View {
+            extent: Extent::Glance,
+            ..view(Measure::Rough)
+        },
+    );
     let lowest = |problem: &S::Problem<'_>, base: &[f64]| -> Option<(f64, Vec<f64>)> {
         let starts = own.iter().map(|own| [base, own.as_slice()].concat());
         starts
@@ -499,7 +506,7 @@ pub fn try_effect<S: Study>(
 }
 
 /// Times the lowest misfit from which on a candidate is out of the race: it is not followed to its end.
-pub const OUT_OF_RACE: f64 = 10.0;
+const OUT_OF_RACE: f64 = 10.0;
 
 /// Adds each instance to `model` in turn and fits it on the coarse view from the given points of the parameters in front;
 /// those out of the race after a first look stay where that look ended. In the order of the instances, without those
@@ -534,6 +541,60 @@ pub fn try_effects<S: Study>(
             };
             let instance = *instance;
             Some(Tried { instance, model, fit })
+        })
+        .collect()
+}
+
+/// Candidates that [`try_again`] follows.
+const FOLLOWED: usize = 10;
+
+/// Effects that were tried from another baseline, tried again from `base`: a few steps of each on a glance at the data tell
+/// which of them the new baseline changes; those and the leaders are followed on the coarse view, and whichever fit is better
+/// is kept. `done` is called after each.
+pub fn try_again<S: Study>(
+    study: &S,
+    model: &ModelOf<S>,
+    tried: Vec<Tried<S::Domain>>,
+    base: &[f64],
+    hints: &[f64],
+    done: impl Fn() + Sync,
+) -> Vec<Tried<S::Domain>> {
+    let bases = [base.to_vec()];
+    let glance = View {
+        extent: Extent::Glance,
+        ..View::COARSE
+    };
+    let looked: Vec<f64> = tried
+        .par_iter()
+        .map(|t| {
+            let before = study
+                .problem(&t.model, glance)
+                .cost(&t.fit.theta)
+                .unwrap_or(f64::INFINITY);
+            let now = try_effect(study, model, &t.instance, &bases, hints, Effort::Look);
+            done();
+            now.map_or(before, |now| now.fit.cost.min(before))
+        })
+        .collect();
+    let best_by = |cost: &(dyn Fn(usize) -> f64 + Sync)| {
+        let mut order: Vec<usize> = (0..tried.len()).collect();
+        order.sort_by(|a, b| cost(*a).total_cmp(&cost(*b)));
+        order.truncate(FOLLOWED);
+        order
+    };
+    let mut followed = best_by(&|i| looked[i]);
+    followed.extend(best_by(&|i| tried[i].fit.cost));
+    tried
+        .into_par_iter()
+        .enumerate()
+        .map(|(i, t)| {
+            let again = followed
+                .contains(&i)
+                .then(|| try_effect(study, model, &t.instance, &bases, hints, Effort::Direct));
+            match again.flatten() {
+                Some(again) if again.fit.cost < t.fit.cost => again,
+                _ => t,
+            }
         })
         .collect()
 }

@@ -60,6 +60,17 @@ impl RevisionLog {
         })
     }
 
+    /// The log of a campaign from the bytes of its file.
+    ///
+    /// # Errors
+    /// As for [`load`](Self::load).
+    pub fn from_bytes(campaign_dir: &Path, bytes: &[u8]) -> Result<Self> {
+        Ok(RevisionLog {
+            campaign_dir: campaign_dir.to_path_buf(),
+            document: parse(&log_file(campaign_dir), bytes)?,
+        })
+    }
+
     /// The revisions of one side, oldest first; the baseline is the first.
     pub fn revisions(&self, side: Side) -> impl DoubleEndedIterator<Item = &Revision> {
         self.document.revisions.iter().filter(move |r| r.domain == side)
@@ -160,11 +171,15 @@ impl RevisionLog {
 }
 
 fn read(path: &Path) -> Result<Document> {
-    let bytes = match std::fs::read(path) {
-        Ok(bytes) => bytes,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Document::empty()),
-        Err(e) => return Err(Error::io(path, e)),
-    };
+    match std::fs::read(path) {
+        Ok(bytes) => parse(path, &bytes),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(Document::empty()),
+        Err(e) => Err(Error::io(path, e)),
+    }
+}
+
+/// What the file `path` holds.
+fn parse(path: &Path, bytes: &[u8]) -> Result<Document> {
     let wrong = |problem: String| InputError::new(problem).file(path).remedy(REMEDY);
     // The schema first: of a later version nothing else may be known.
     #[derive(Deserialize)]
@@ -175,7 +190,7 @@ fn read(path: &Path) -> Result<Document> {
         let line = Some(e.line()).filter(|l| *l > 0);
         wrong(format!("no revision log: {e}")).line(line)
     };
-    let head: Head = serde_json::from_slice(&bytes).map_err(syntax)?;
+    let head: Head = serde_json::from_slice(bytes).map_err(syntax)?;
     if head.schema.as_deref() != Some(SCHEMA) {
         let found = head.schema.unwrap_or_else(|| "none".into());
         return Err(
@@ -184,7 +199,7 @@ fn read(path: &Path) -> Result<Document> {
                 .into(),
         );
     }
-    let document: Document = serde_json::from_slice(&bytes).map_err(syntax)?;
+    let document: Document = serde_json::from_slice(bytes).map_err(syntax)?;
     check(&document).map_err(|(key, problem)| wrong(problem).key(key))?;
     Ok(document)
 }

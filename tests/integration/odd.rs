@@ -82,6 +82,16 @@ fn a_packed_file_that_would_fill_the_memory_is_refused() {
     refused(&path, &["MB of memory granted to a file of"]);
 }
 
+/// Digits that nobody needs and a unit that is none are not shown.
+#[test]
+fn inspect_shows_rates_and_units_for_people() {
+    let shown = |name: &str| lobestone(&["inspect", odd(name).to_str().unwrap()]).stdout;
+    let drift = shown("dt_drift.csv");
+    assert!(drift.contains("samples at 998.4088 Hz"), "{drift}");
+    let whole = shown("mat5-whole.mat");
+    assert!(!whole.contains("(file: )"), "{whole}");
+}
+
 #[test]
 fn stdout_holds_one_document_whatever_the_file() {
     let seen = document(&["inspect", odd("mat5-stdout.mat").to_str().unwrap()]);

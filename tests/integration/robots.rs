@@ -195,7 +195,15 @@ fn what_is_no_arm_is_refused_in_words() {
         "<axis xyz=\"0 0 1\"/><mimic joint=\"j2\"/>",
         1,
     );
-    let cases: [(&str, String, &[&str], &[&str]); 13] = [
+    // Each attribute is looked at for every other one by the parser, and each name space is kept: 2 MB would take minutes.
+    let many = format!(
+        "<robot name=\"x\" {}/>",
+        (0..200_000)
+            .map(|i| format!("xmlns:a{i}=\"\" "))
+            .collect::<String>()
+    );
+    let cases: [(&str, String, &[&str], &[&str]); 14] = [
+        ("many.urdf", many, &[], &["an element with 200001 attributes"]),
         (
             "slides.urdf",
             slides,

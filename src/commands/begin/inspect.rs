@@ -238,14 +238,16 @@ fn time_row(record: &TimeRecord, channel: &Channel, samples: usize) -> Row {
     };
     let (quantity, unit) = channel.quantity_and_unit();
     let seconds = samples as f64 / record.sample_rate_hz;
-    let converted = if unit == channel.file_unit {
+    let converted = if unit == channel.file_unit || channel.file_unit.is_empty() {
         String::new()
     } else {
         format!(" (file: {})", channel.file_unit)
     };
     let extent = format!(
         "{samples} samples at {} Hz, {seconds:.4} s from {} s",
-        record.sample_rate_hz, record.start_s
+        // A resampled record's rate has no end of digits.
+        (record.sample_rate_hz * 1e4).round() / 1e4,
+        record.start_s
     );
     Row {
         json: json!({

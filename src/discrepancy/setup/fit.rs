@@ -96,8 +96,9 @@ impl LeastSquares for JointProblem<'_> {
             group: self.group,
             values: &values,
         };
-        let residual = weighted(&predict(self.model, theta, self.data, Some(made))?, self.data);
-        let mut columns = jacobian(self.model, self.data, theta, Some(made))?;
+        let here = predict(self.model, theta, self.data, Some(made))?;
+        let residual = weighted(&here, self.data);
+        let mut columns = jacobian(self.model, self.data, theta, Some(made), &here)?;
         let slopes = size_slopes(self.model, self.data, theta, made, &self.mistake.sizes())?;
         for (mut slope, size) in slopes.into_iter().zip(self.mistake.sizes()) {
             for s in &mut slope {

@@ -10,6 +10,7 @@ use serde::Serialize;
 use crate::effects::Size;
 use crate::identify::frfs::frf_data::FrfData;
 use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
+use crate::identify::frfs::rival_optima;
 use crate::identify::frfs::structure::StructureModel;
 use crate::identify::levenberg_marquardt::{Ending, Fit, LeastSquares, Stopping, minimise};
 use crate::parameter::Parameter;
@@ -83,6 +84,9 @@ pub struct Calibration {
     pub starts: usize,
     /// How many of them came to the answer given here (within 0.1 % of its misfit).
     pub starts_agreeing: usize,
+    /// Other optima of about the same misfit that were found on the way, solver's scale; after [`covering`](Self::covering) those that
+    /// the data do not tell from this one.
+    pub rivals: Vec<Vec<f64>>,
 }
 
 impl Calibration {
@@ -119,6 +123,7 @@ impl Calibration {
             ending: fit.ending,
             starts: 1,
             starts_agreeing: 1,
+            rivals: Vec::new(),
         })
     }
 
@@ -154,8 +159,36 @@ impl Calibration {
             theta: [self.theta.as_slice(), limit].concat(),
             covariance,
             widened: [self.widened.as_slice(), &vec![1.0; own.len()]].concat(),
+            rivals: self
+                .rivals
+                .iter()
+                .map(|r| [r.as_slice(), limit].concat())
+                .collect(),
             ..self.clone()
         }
+    }
+
+    fn told_of_rivals(&self) -> String {
+        let far = |i: usize| {
+            let std = self.covariance[(i, i)].sqrt();
+            self.rivals.iter().any(|r| (r[i] - self.theta[i]).abs() > std)
+        };
+        let names: Vec<&str> = self
+            .parameters
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| far(*i))
+            .map(|(_, p)| p.name.as_str())
+            .collect();
+        format!(
+            "the data do not determine the parameters: {} of them, far from these, explains the data about as well \
+             (a posture or a stretch of the frequency less would decide otherwise); standard errors are widened to hold both: {}",
+            match self.rivals.len() {
+                1 => "another set".to_string(),
+                more => format!("{more} other sets"),
+            },
+            names.join(", ")
+        )
     }
 
     /// Why the fit did not converge, as a warning; `None` where it did.
@@ -181,6 +214,9 @@ impl Calibration {
                  what campaign.toml says (units, quantity, posture, node); standard errors are widened accordingly",
                 self.reduced_chi2
             ));
+        }
+        if !self.rivals.is_empty() {
+            warnings.push(self.told_of_rivals());
         }
         if self.starts > 1 && self.starts_agreeing < 2 && self.reduced_chi2 > SUSPICIOUS_CHI2 {
             warnings.push(format!(
@@ -261,11 +297,17 @@ fn problem<'a>(model: &'a StructureModel, data: &'a FrfData, misfit: Misfit) -> 
 
 /// Refines from a point that is already in the right basin, on all lines.
 pub fn refine(model: &StructureModel, data: &FrfData, start: &[f64]) -> Result<Fit> {
+    let values = (2 * data.value_count()).max(1) as f64;
+    // Of N values a share of 10⁻³/N is what a thirtieth of a standard error brings, the errors being as wide as the misfit makes them.
+    let stopping = Stopping {
+        relative_decrease: (1e-3 / values).clamp(1e-9, 5e-8),
+        ..Stopping::default()
+    };
     minimise(
         &problem(model, data, Misfit::Complex),
         start,
         &model.bounds(),
-        Stopping::default(),
+        stopping,
     )
 }
 
@@ -410,6 +452,8 @@ pub fn calibrate(
         None => approach(model, &sketch_data, &nominal, ROUGH)?,
     };
     let (mut starts, mut agreeing) = (1, 1);
+    // Optima beside the answer.
+    let mut others = Vec::new();
     let misfit = |fit: &Fit, data: &FrfData| {
         2.0 * fit.cost / ((2 * data.value_count()) as f64 - model.parameters.len() as f64).max(1.0)
     };
@@ -422,8 +466,9 @@ pub fn calibrate(
         iterations += more;
         let alike = (other.cost / first.cost - 1.0).abs() < 1e-3;
         agreeing += usize::from(alike);
-        if other.cost < first.cost {
-            first = other;
+        match other.cost < first.cost {
+            true => others.push(std::mem::replace(&mut first, other)),
+            false => others.push(other),
         }
     }
     if misfit(&first, &sketch_data) > SUSPICIOUS_CHI2 && options.extra_starts > 0 {
@@ -444,7 +489,8 @@ pub fn calibrate(
             starts += points.len();
             let lowest = fits[0].cost;
             agreeing = fits.iter().filter(|f| f.cost < lowest * 1.001).count();
-            first = fits.swap_remove(0);
+            first = fits.remove(0);
+            others.extend(fits);
             // A joint that was trapped lets go of the others: from a better point the next look along each joint may help.
             if first.cost > before * (1.0 - 1e-3) || misfit(&first, &sketch_data) < SUSPICIOUS_CHI2 {
                 break;
@@ -452,6 +498,11 @@ pub fn calibrate(
             points.clear();
         }
     }
+    let of_sketch = misfit(&first, &sketch_data);
+    let others = match of_sketch > SUSPICIOUS_CHI2 {
+        true => rival_optima::close_to(&first, others, of_sketch),
+        false => Vec::new(),
+    };
     // A solution that the model brings along is left only for a better one: where physics is missing the optimum lies in a flat
     // valley, and a way round by the sketch would end elsewhere in it.
     let whole = problem(model, data, Misfit::Complex);
@@ -460,6 +511,7 @@ pub fn calibrate(
         _ => &first.theta,
     };
     let best = refine(model, data, from)?;
+    let (best, rivals) = rival_optima::settled(model, data, best, &others);
     iterations += best.iterations;
 
     let reduced_chi2 = misfit(&best, data);
@@ -475,6 +527,7 @@ pub fn calibrate(
         ending: best.ending,
         starts,
         starts_agreeing: agreeing,
+        rivals,
     })
 }
 

@@ -15,8 +15,10 @@ use crate::Result;
 use crate::identify::frfs::calibrate::Calibration;
 use crate::identify::frfs::frf_data::FrfData;
 use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
+use crate::identify::frfs::rival_optima;
 use crate::identify::frfs::structure::StructureModel;
 use crate::identify::levenberg_marquardt::Linearisation;
+use crate::parameter::Parameter;
 
 /// Stretches of the frequency that are left out in turn.
 const STRETCHES: usize = 12;
@@ -33,7 +35,8 @@ impl Calibration {
     pub fn covering(self, model: &StructureModel, data: &FrfData) -> Result<Self> {
         let by_chance = BY_CHANCE * (1.0 / data.value_count() as f64).sqrt();
         if self.reduced_chi2 <= 1.0 + by_chance {
-            return Ok(self);
+            let rivals = Vec::new();
+            return Ok(Calibration { rivals, ..self });
         }
         let problem = FrfProblem {
             model,
@@ -57,11 +60,31 @@ impl Calibration {
             if !(factor > 1.0 && factor.is_finite()) {
                 continue;
             }
-            calibration.widened[i] = factor;
-            let std = factor * calibration.covariance[(i, i)].sqrt();
-            calibration.parameters[i].std_error = parameter.natural_std(calibration.theta[i], std);
+            calibration.widen(i, parameter, factor);
+        }
+        // Where the data do not tell which of two optima it is, the error of one holds the other with its own.
+        calibration.rivals = rival_optima::undecided(&calibration, model, data)?;
+        for (i, parameter) in model.parameters.iter().enumerate() {
+            let here = calibration.theta[i];
+            let way = calibration
+                .rivals
+                .iter()
+                .map(|r| (r[i] - here).abs())
+                .fold(0.0, f64::max);
+            let factor = calibration.widened[i] + way / calibration.covariance[(i, i)].sqrt();
+            if way > 0.0 && factor.is_finite() {
+                calibration.widen(i, parameter, factor);
+            }
         }
         Ok(calibration)
+    }
+}
+
+impl Calibration {
+    fn widen(&mut self, i: usize, parameter: &Parameter, factor: f64) {
+        self.widened[i] = factor;
+        let std = factor * self.covariance[(i, i)].sqrt();
+        self.parameters[i].std_error = parameter.natural_std(self.theta[i], std);
     }
 }
 

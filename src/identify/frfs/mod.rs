@@ -8,6 +8,7 @@ pub mod frf_problem;
 pub mod modal_start;
 mod place_test;
 pub mod posture_modes;
+mod rival_optima;
 pub mod sensitivity;
 pub mod spot_response;
 pub mod structure;

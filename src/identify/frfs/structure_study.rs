@@ -53,8 +53,9 @@ impl StructureStudy {
             .map(|b| b.frequency_hz.len())
             .min()
             .unwrap_or(0);
-        let stride = share.min(LARGEST_STRIDE).min((lines / 60).max(1));
-        let every = (share / stride).clamp(1, 3);
+        let largest = LARGEST_STRIDE.min((lines / 60).max(1));
+        let every = share.div_ceil(share.min(largest)).clamp(1, 3);
+        let stride = share.div_ceil(every).min(largest);
         let coarse = data.thinned(stride, every);
         let postures = data.measured_postures();
         let without = |data: &FrfData| -> Vec<FrfData> {

@@ -125,6 +125,7 @@ mod tests {
             ending: Ending::Converged,
             starts: 1,
             starts_agreeing: 1,
+            rivals: Vec::new(),
         };
         for widened in [1.0, 7.0] {
             let found = Undetermined::new(&parameters, &calibration(widened)).unwrap();

@@ -38,6 +38,8 @@ pub struct UrdfRobot {
 
 /// Elements within each other; a robot has about five.
 const DEEPEST: usize = 200;
+/// Attributes of one element; a robot has about four.
+const MOST_ATTRIBUTES: usize = 200;
 /// Lengths and parts of a tensor below this share of their size are rounding.
 const ROUNDING: f64 = 1e-15;
 
@@ -154,12 +156,23 @@ fn can_be_parsed(file: &Path, text: &str) -> Result<()> {
             deepest = deepest.max(depth);
         }
     }
-    match deepest > DEEPEST {
-        true => refuse(
+    if deepest > DEEPEST {
+        return refuse(
             "has elements nested more than 200 deep, as no robot has",
             "give the URDF of a robot arm",
+        );
+    }
+    // quick-xml looks at each attribute of an element for every other one (RUSTSEC-2026-0194).
+    let elements = text
+        .split('<')
+        .skip(1)
+        .filter(|piece| !piece.starts_with(['!', '?']));
+    match elements.map(|piece| piece.matches('=').count()).max() {
+        Some(most) if most > MOST_ATTRIBUTES => refuse(
+            &format!("has an element with {most} attributes, as no robot has"),
+            "give the URDF of a robot arm",
         ),
-        false => Ok(()),
+        _ => Ok(()),
     }
 }
 

@@ -513,6 +513,19 @@ mod tests {
         }
     }
 
+    #[test]
+    fn few_frfs_widen_as_students_t_does() {
+        // 97.5 % points of tables.
+        for (freedom, point) in [(2.0, 4.3027), (5.0, 2.5706), (20.0, 2.0860)] {
+            let normal = 1.95996;
+            approx::assert_relative_eq!(
+                students_t_over_normal(freedom),
+                point / normal,
+                max_relative = 0.035
+            );
+        }
+    }
+
     /// FRFs with noises that differ by a factor only are fitted with one basis for all: the same poles, residues, deviations.
     #[test]
     fn a_common_basis_gives_what_a_basis_for_each_frf_gives() {

@@ -255,7 +255,8 @@ pub(crate) fn collect(
 fn scatter(solution: &ml_fit::Solution, j: usize, noise: [f64; 2]) -> [Otherwise; 2] {
     let (std, few) = solution.jackknife_std(j);
     let otherwise = verify::otherwise(solution, j).unwrap_or_default();
-    [0, 1].map(|k| match std[k] > BEYOND_NOISE * noise[k] {
+    // A few FRFs scatter much by chance.
+    [0, 1].map(|k| match std[k] > BEYOND_NOISE * few * noise[k] {
         true => Otherwise {
             change: otherwise[k].change,
             std: (few * std[k]).max(otherwise[k].std),

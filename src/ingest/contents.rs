@@ -33,8 +33,9 @@ pub enum Format {
     Tdms,
     /// LabVIEW measurement file.
     Lvm,
-    /// MATLAB, version 5 to 7.
+    /// MATLAB, version 4.
     Mat4,
+    /// MATLAB, version 5 to 7.
     Mat5,
     /// MATLAB 7.3, or other HDF5 with plain arrays.
     Mat73,

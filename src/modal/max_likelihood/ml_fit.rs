@@ -68,18 +68,19 @@ impl Solution {
     }
 
     /// As [`Self::scatter_std`], as large as a few FRFs make it that say most of a mode: each left out in turn (an FRF that
-    /// makes the share h of what is known pulls the pole so far that only 1 − h of its pull is seen; Bell & McCaffrey 2002),
-    /// and twice it holds 95 % for as many FRFs as there are in effect (Student's t with 1/Σh² − 1 degrees of freedom).
-    pub fn jackknife_std(&self, mode: usize) -> [f64; 2] {
+    /// makes the share h of what is known pulls the pole so far that only 1 − h of its pull is seen; Bell & McCaffrey 2002).
+    /// With it the factor by which twice that holds 95 % for as many FRFs as there are in effect (Student's t with
+    /// 1/Σh² − 1 degrees of freedom).
+    pub fn jackknife_std(&self, mode: usize) -> ([f64; 2], f64) {
         /// An FRF that knows nearly all says nothing about its own scatter.
         const LEAST_SEEN: f64 = 0.2;
         const LEAST_FREEDOM: f64 = 1.5;
         if self.influence.len() < 2 {
-            return [0.0; 2];
+            return ([0.0; 2], 1.0);
         }
         let total: Matrix2<f64> = self.frfs.iter().map(|f| f.own[mode].0).sum();
         let Some(inverse) = total.try_inverse() else {
-            return self.scatter_std(mode);
+            return (self.scatter_std(mode), 1.0);
         };
         let share: Vec<f64> = self
             .frfs
@@ -88,13 +89,14 @@ impl Solution {
             .collect();
         let in_effect = 1.0 / share.iter().map(|h| h * h).sum::<f64>();
         let few = students_t_over_normal((in_effect - 1.0).max(LEAST_FREEDOM));
-        [0, 1].map(|k| {
+        let std = [0, 1].map(|k| {
             let squares = self.influence.iter().zip(&share);
             let sum: f64 = squares
                 .map(|(i, h)| (i[2 * mode + k] / (1.0 - h).max(LEAST_SEEN)).powi(2))
                 .sum();
-            few * sum.sqrt()
-        })
+            sum.sqrt()
+        });
+        (std, few)
     }
 
     /// Where an FRF alone would have a pole, the others held, to the first order: change of (ln f, ln ζ), and the standard
@@ -508,6 +510,19 @@ mod tests {
         for (j, mode) in modes[1..3].iter().enumerate() {
             let (constant, _) = solution.constant(0, j);
             approx::assert_relative_eq!(constant.re, mode.constant, max_relative = 1e-2);
+        }
+    }
+
+    #[test]
+    fn few_frfs_widen_as_students_t_does() {
+        // 97.5 % points of tables.
+        for (freedom, point) in [(2.0, 4.3027), (5.0, 2.5706), (20.0, 2.0860)] {
+            let normal = 1.95996;
+            approx::assert_relative_eq!(
+                students_t_over_normal(freedom),
+                point / normal,
+                max_relative = 0.035
+            );
         }
     }
 

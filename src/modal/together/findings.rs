@@ -13,7 +13,7 @@ use crate::modal::stabilisation::{Candidate, Stabilisation};
 use crate::modal::together::global_modes::{GlobalMode, GlobalModes, RejectedMode};
 use crate::modal::together::reconstruction::reconstruction;
 use crate::modal::together::set_member::{SET, SetMember};
-use crate::modal::together::verify;
+use crate::modal::together::verify::{self, Otherwise};
 
 /// In a set a mode seen by one FRF alone must stand out this far (squared size over uncertainty).
 const FAR: f64 = 100.0;
@@ -30,6 +30,8 @@ const BY_CHANCE: f64 = 1.5;
 const UNPLACED: f64 = 0.3;
 /// A line whose width is not known is a mode where the residues of its FRFs have a common phase (collinearity) …
 const IN_PHASE: f64 = 0.9;
+/// FRFs that scatter this many times as much as their noise makes them have more than noise.
+const BEYOND_NOISE: f64 = 1.5;
 /// Of what the mean over the FRFs and the common pole of a mode that moves are apart, this part is uncertainty.
 const BETWEEN: f64 = 0.5;
 /// Two fits of the same lines disagree from this many standard deviations on.
@@ -89,16 +91,23 @@ pub(crate) fn collect(
                 continue;
             }
             let shift = group.doubt.as_ref().map_or([0.0; 2], |d| d.shifts[j]);
-            // The larger of what the noise says and of how the FRFs scatter about the common pole; and what another weighting of
-            // the FRFs would make of it.
             let few = data.len() < SET;
-            let scatter = if few { [0.0; 2] } else { solution.jackknife_std(j) };
-            let otherwise = verify::otherwise(solution, j).filter(|_| !few);
-            let [by_frequency, by_damping] = otherwise.unwrap_or_default();
-            let mut frequency_std_hz = (level * solution.frequency_std_hz(j))
-                .max(scatter[0].max(by_frequency.std) * pole.frequency_hz)
-                .hypot(by_frequency.change * pole.frequency_hz)
-                .hypot(shift[0]);
+            let small_set = 1.0 + 1.5 / (data.len().max(2) - 1) as f64;
+            let noise = [
+                level * solution.frequency_std_hz(j) / pole.frequency_hz,
+                level * solution.damping_std(j) / pole.damping_ratio,
+            ];
+            let scatter = scatter(solution, j, noise);
+            // The larger of what the noise says and of how the FRFs scatter about the common pole; where they do so beyond the
+            // noise, what another weighting of them would make of it comes on top.
+            let relative = [0, 1].map(|k| match few {
+                true => noise[k],
+                false => noise[k]
+                    .max(small_set * solution.scatter_std(j)[k])
+                    .max(scatter[k].std)
+                    .hypot(scatter[k].change),
+            });
+            let mut frequency_std_hz = (relative[0] * pole.frequency_hz).hypot(shift[0]);
             let mut constants = vec![None; count];
             for m in 0..data.len() {
                 let (value, std) = solution.constant(m, j);
@@ -109,10 +118,7 @@ pub(crate) fn collect(
                 .map(|d| joint_fit::spacing_hz(&d.frequency_hz, pole.frequency_hz))
                 .fold(f64::INFINITY, f64::min);
             let lines_in_half_power_band = 2.0 * pole.damping_ratio * pole.frequency_hz / line_hz;
-            let mut damping_std = (level * solution.damping_std(j))
-                .max(scatter[1].max(by_damping.std) * pole.damping_ratio)
-                .hypot(by_damping.change * pole.damping_ratio)
-                .hypot(shift[1]);
+            let mut damping_std = (relative[1] * pole.damping_ratio).hypot(shift[1]);
             let others: Vec<Pole> = poles.iter().filter(|p| *p != pole).copied().collect();
             let moves = verify::moves(fitted, solution, j, *pole, &others);
             let (mut frequency_hz, mut damping_ratio) = (pole.frequency_hz, pole.damping_ratio);
@@ -125,11 +131,11 @@ pub(crate) fn collect(
                         frequency_hz - pole.frequency_hz,
                         damping_ratio - pole.damping_ratio,
                     ];
-                    frequency_std_hz = moves.std[0]
-                        .max(scatter[0] * pole.frequency_hz)
+                    frequency_std_hz = (small_set * moves.std[0])
+                        .max(scatter[0].std * pole.frequency_hz)
                         .hypot(BETWEEN * apart[0]);
-                    damping_std = moves.std[1]
-                        .max(scatter[1] * pole.damping_ratio)
+                    damping_std = (small_set * moves.std[1])
+                        .max(scatter[1].std * pole.damping_ratio)
                         .hypot(BETWEEN * apart[1]);
                 }
             }
@@ -242,6 +248,21 @@ pub(crate) fn collect(
         };
         result.quality = quality::judge_set(&found);
     }
+}
+
+/// How the FRFs scatter about a common pole (frequency, damping ratio), where that is beyond `noise` (relative): the model
+/// lacks something then. Nothing where it is not: the noise tells the same more exactly.
+fn scatter(solution: &ml_fit::Solution, j: usize, noise: [f64; 2]) -> [Otherwise; 2] {
+    let (std, few) = solution.jackknife_std(j);
+    let otherwise = verify::otherwise(solution, j).unwrap_or_default();
+    // A few FRFs scatter much by chance.
+    [0, 1].map(|k| match std[k] > BEYOND_NOISE * few * noise[k] {
+        true => Otherwise {
+            change: otherwise[k].change,
+            std: (few * std[k]).max(otherwise[k].std),
+        },
+        false => Otherwise::default(),
+    })
 }
 
 /// How far the FRFs' own local fits are from a common pole (frequency, Hz; damping ratio), where that is more than the

@@ -339,6 +339,8 @@ const LARGEST_LN_FACTOR: f64 = 3.5;
 const ONE_JOINT: i32 = 8;
 /// … this far apart, natural logarithm.
 const ONE_JOINT_STEP: f64 = 0.25;
+/// A joint that is further than this from the robot file, natural logarithm, is tried there, too.
+const FAR_LN_FACTOR: f64 = 1.5;
 /// Starting points that a scan may give, and how often single joints are scanned.
 const SCANNED: usize = 3;
 const ROUNDS: usize = 4;
@@ -390,6 +392,17 @@ impl Scan<'_> {
         let joints: Vec<usize> = (0..self.model.robot.joint_count()).collect();
         let step = LARGEST_LN_FACTOR / f64::from(FACTORS);
         lowest(self.valleys(&self.model.nominal_theta(), &joints, FACTORS, step))
+    }
+
+    /// Joints that `found` has far from where the robot file does, put back there: beyond the reach of the scan along each joint
+    /// a joint may have gone where another one could have taken up the misfit.
+    fn joints_put_back(&self, found: &[f64]) -> Option<Vec<f64>> {
+        let nominal = self.model.nominal_theta();
+        let far = |i: &usize| (found[*i] - nominal[*i]).abs() > FAR_LN_FACTOR;
+        let gone: Vec<usize> = (0..self.model.robot.joint_count()).filter(far).collect();
+        let mut back = found.to_vec();
+        gone.iter().for_each(|&i| back[i] = nominal[i]);
+        (!gone.is_empty()).then_some(back)
     }
 
     /// Single joints beside where `found` has them.
@@ -484,6 +497,7 @@ pub fn calibrate(
         points.extend(scattered);
         for _ in 0..ROUNDS {
             points.extend(scan.single_joints(&first.theta));
+            points.extend(scan.joints_put_back(&first.theta));
             let before = first.cost;
             let mut fits = race(model, &sketch_data, &points, first);
             starts += points.len();

@@ -18,7 +18,7 @@ use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
 use crate::identify::frfs::rival_optima;
 use crate::identify::frfs::structure::StructureModel;
 use crate::identify::levenberg_marquardt::Linearisation;
-use crate::parameter::Parameter;
+use crate::parameter::{Parameter, Scale};
 
 /// Stretches of the frequency that are left out in turn.
 const STRETCHES: usize = 12;
@@ -57,23 +57,25 @@ impl Calibration {
         for (i, parameter) in model.parameters.iter().enumerate() {
             let largest = variances.iter().flatten().map(|v| v[i]).fold(0.0, f64::max);
             let factor = (largest / calibration.covariance[(i, i)]).sqrt();
-            if !(factor > 1.0 && factor.is_finite()) {
-                continue;
-            }
+            let factor = if factor.is_finite() { factor.max(1.0) } else { 1.0 };
             calibration.widen(i, parameter, factor);
         }
         // Where the data do not tell which of two optima it is, the error of one holds the other with its own.
         calibration.rivals = rival_optima::undecided(&calibration, model, data)?;
         for (i, parameter) in model.parameters.iter().enumerate() {
-            let here = calibration.theta[i];
-            let way = calibration
-                .rivals
-                .iter()
-                .map(|r| (r[i] - here).abs())
-                .fold(0.0, f64::max);
-            let factor = calibration.widened[i] + way / calibration.covariance[(i, i)].sqrt();
+            let (here, value) = (calibration.theta[i], parameter.natural(calibration.theta[i]));
+            let (mut way, mut natural_way) = (0.0_f64, 0.0_f64);
+            for rival in &calibration.rivals {
+                way = way.max((rival[i] - here).abs());
+                natural_way = natural_way.max((parameter.natural(rival[i]) - value).abs());
+            }
+            let std = calibration.covariance[(i, i)].sqrt();
+            let factor = calibration.widened[i] + way / std;
             if way > 0.0 && factor.is_finite() {
+                // Of a logarithm so far away the slope says nothing: the way itself counts.
+                let own = calibration.parameters[i].std_error;
                 calibration.widen(i, parameter, factor);
+                calibration.parameters[i].std_error = own + natural_way;
             }
         }
         Ok(calibration)
@@ -84,7 +86,14 @@ impl Calibration {
     fn widen(&mut self, i: usize, parameter: &Parameter, factor: f64) {
         self.widened[i] = factor;
         let std = factor * self.covariance[(i, i)].sqrt();
-        self.parameters[i].std_error = parameter.natural_std(self.theta[i], std);
+        self.parameters[i].std_error = match parameter.scale {
+            // Of what may be off by a factor e and more the error upwards, which is the larger one.
+            Scale::Logarithmic if std > 1.0 => {
+                let range = parameter.bounds[1] - parameter.bounds[0];
+                (parameter.natural(self.theta[i]) * std.exp_m1()).min(range)
+            }
+            _ => parameter.natural_std(self.theta[i], std),
+        };
     }
 }
 

@@ -340,7 +340,7 @@ fn columns_that_header_lines_describe() {
     assert_eq!(frf.response.map(|d| d.to_string()).as_deref(), Some("3Z"));
     assert_eq!(frf.reference.map(|d| d.to_string()).as_deref(), Some("10-Z"));
     // A spectrum is no FRF, whatever its header says.
-    assert!(!problem(&testlab.replace("\tFRF\t", "\tSpectrum\t")).is_empty());
+    assert!(!problem(testlab.replace("\tFRF\t", "\tSpectrum\t")).is_empty());
     let analyser = "CSVFormatType;Spectrum2DComplex\nAxisUnit;Hz\nSignals;2\n\n\
         ';Signal 2 (Real);Signal 2 (Imag.);Signal 3 (Real);Signal 3 (Imag.)\n\
         ';(m/s^2)/N;(m/s^2)/N;(m/s^2)/N;(m/s^2)/N\n\

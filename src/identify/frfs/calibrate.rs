@@ -181,11 +181,11 @@ impl Calibration {
             .map(|(_, p)| p.name.as_str())
             .collect();
         format!(
-            "the data do not determine the parameters: {} of them, far from these, explains the data about as well \
+            "the data do not determine the parameters: {} the data about as well \
              (a posture or a stretch of the frequency less would decide otherwise); standard errors are widened to hold both: {}",
             match self.rivals.len() {
-                1 => "another set".to_string(),
-                more => format!("{more} other sets"),
+                1 => "another set of them, far from these, explains".to_string(),
+                more => format!("{more} other sets of them, far from these, explain"),
             },
             names.join(", ")
         )

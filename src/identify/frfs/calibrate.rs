@@ -525,7 +525,7 @@ pub fn calibrate(
         _ => &first.theta,
     };
     let best = refine(model, data, from)?;
-    let (best, rivals) = rival_optima::settled(model, data, best, &others);
+    let (best, rivals) = rival_optima::settled(data, best, &others, |theta| refine(model, data, theta));
     iterations += best.iterations;
 
     let reduced_chi2 = misfit(&best, data);

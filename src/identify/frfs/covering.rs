@@ -61,7 +61,7 @@ impl Calibration {
             calibration.widen(i, parameter, factor);
         }
         // Where the data do not tell which of two optima it is, the error of one holds the other with its own.
-        calibration.rivals = rival_optima::undecided(&calibration, model, data)?;
+        calibration.rivals = rival_optima::undecided(&calibration.theta, &calibration.rivals, model, data)?;
         for (i, parameter) in model.parameters.iter().enumerate() {
             let (here, value) = (calibration.theta[i], parameter.natural(calibration.theta[i]));
             let (mut way, mut natural_way) = (0.0_f64, 0.0_f64);

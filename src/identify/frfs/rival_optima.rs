@@ -9,7 +9,6 @@ use std::collections::BTreeMap;
 
 use nalgebra::DVector;
 
-use super::calibrate::{Calibration, refine};
 use super::frf_data::FrfData;
 use super::frf_problem::{FrfProblem, Misfit};
 use super::structure::StructureModel;
@@ -52,17 +51,18 @@ pub(super) fn close_to(best: &Fit, mut found: Vec<Fit>, reduced_chi2: f64) -> Ve
     kept
 }
 
-/// The lowest of `best` and `others` on all data, and where those others stand there that are close to it.
+/// The lowest of `best` and `others` on all data, and where those others stand there that are close to it. `refine`: a fit on all data
+/// from a point.
 pub(super) fn settled(
-    model: &StructureModel,
     data: &FrfData,
     mut best: Fit,
     others: &[Fit],
+    refine: impl Fn(&[f64]) -> Result<Fit>,
 ) -> (Fit, Vec<Vec<f64>>) {
     let mut rest = Vec::new();
     for other in others {
         // As with further starting points, one that leads nowhere is no reason to give up.
-        let Ok(mut fit) = refine(model, data, &other.theta) else {
+        let Ok(mut fit) = refine(&other.theta) else {
             continue;
         };
         if fit.cost < best.cost {
@@ -79,16 +79,17 @@ pub(super) fn settled(
     (best, rivals)
 }
 
-/// Those of the calibration's [`rivals`](Calibration::rivals) that the data do not tell from it.
+/// Those of the `rivals` of a solution `theta` that the data do not tell from it.
 ///
 /// # Errors
 /// A model that cannot be set up at one of them.
 pub(super) fn undecided(
-    calibration: &Calibration,
+    theta: &[f64],
+    rivals: &[Vec<f64>],
     model: &StructureModel,
     data: &FrfData,
 ) -> Result<Vec<Vec<f64>>> {
-    if calibration.rivals.is_empty() {
+    if rivals.is_empty() {
         return Ok(Vec::new());
     }
     let problem = FrfProblem {
@@ -105,9 +106,9 @@ pub(super) fn undecided(
             };
         Ok(parts.map(of).collect())
     };
-    let here = costs(&calibration.theta)?;
+    let here = costs(theta)?;
     let mut undecided = Vec::new();
-    for rival in &calibration.rivals {
+    for rival in rivals {
         let there = costs(rival)?;
         let differences: Vec<[f64; 3]> = here
             .iter()

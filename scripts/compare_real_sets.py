@@ -28,17 +28,13 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
-import pyuff
 from sdypy import EMA
 
-FRF = 4
+from split_coverage import datasets
 
 
 def read(path):
-    universal = pyuff.UFF(str(path))
-    kinds = universal.get_set_types()
-    found = [universal.read_sets(k) for k, kind in enumerate(kinds) if kind == 58]
-    found = [d for d in found if d["func_type"] == FRF]
+    found = datasets(path)
     return np.asarray(found[0]["x"]), np.array([d["data"] for d in found])
 
 

@@ -25,12 +25,17 @@ import pyuff
 FRF = 4
 
 
-def frfs(path):
-    """The datasets 58 of a file that are FRFs, by reference then in the order of the file."""
+def datasets(path):
+    """The datasets 58 of a file that are FRFs."""
     universal = pyuff.UFF(str(path))
     types = universal.get_set_types()
     found = [universal.read_sets(k) for k, kind in enumerate(types) if kind == 58]
-    found = [d for d in found if d["func_type"] == FRF]
+    return [d for d in found if d["func_type"] == FRF]
+
+
+def frfs(path):
+    """The FRFs of a file, by reference then in the order of the file."""
+    found = datasets(path)
     references = sorted({(d["ref_node"], d["ref_dir"]) for d in found})
     responses = {(d["rsp_node"], d["rsp_dir"]) for d in found}
     # A roving hammer has one response and many references: those are one run.

@@ -323,9 +323,8 @@ impl ModelState {
         let before = match case.before_effects(campaign)?.filter(|_| history) {
             Some(model) => {
                 // Where it stood then; a search might find another place in a valley, and the limits would seem to have moved.
-                let stood = model.start().map(<[f64]>::to_vec);
-                let start = stood.unwrap_or_else(|| model.nominal_theta());
-                let theta = refine(&model, &case.data, &start)?.theta;
+                let nominal = model.nominal_theta();
+                let theta = refine(&model, &case.data, model.start().unwrap_or(&nominal))?.theta;
                 Some(FittedModel { model, theta })
             }
             None => None,

@@ -15,13 +15,11 @@ use crate::Result;
 use crate::identify::frfs::calibrate::Calibration;
 use crate::identify::frfs::frf_data::FrfData;
 use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
-use crate::identify::frfs::rival_optima;
+use crate::identify::frfs::rival_optima::{self, STRETCHES};
 use crate::identify::frfs::structure::StructureModel;
 use crate::identify::levenberg_marquardt::Linearisation;
 use crate::parameter::{Parameter, Scale};
 
-/// Stretches of the frequency that are left out in turn.
-const STRETCHES: usize = 12;
 /// Standard deviations of χ² by chance within which a misfit is one that noise leaves.
 const BY_CHANCE: f64 = 3.0;
 
@@ -61,7 +59,7 @@ impl Calibration {
             calibration.widen(i, parameter, factor);
         }
         // Where the data do not tell which of two optima it is, the error of one holds the other with its own.
-        calibration.rivals = rival_optima::undecided(&calibration.theta, &calibration.rivals, model, data)?;
+        calibration.rivals = rival_optima::undecided(&calibration.rivals, &problem, &parts)?;
         for (i, parameter) in model.parameters.iter().enumerate() {
             let (here, value) = (calibration.theta[i], parameter.natural(calibration.theta[i]));
             let (mut way, mut natural_way) = (0.0_f64, 0.0_f64);
@@ -73,9 +71,8 @@ impl Calibration {
             let factor = calibration.widened[i] + way / std;
             if way > 0.0 && factor.is_finite() {
                 // Of a logarithm so far away the slope says nothing: the way itself counts.
-                let own = calibration.parameters[i].std_error;
-                calibration.widen(i, parameter, factor);
-                calibration.parameters[i].std_error = own + natural_way;
+                calibration.widened[i] = factor;
+                calibration.parameters[i].std_error += natural_way;
             }
         }
         Ok(calibration)

@@ -10,10 +10,9 @@ use std::collections::BTreeMap;
 use nalgebra::DVector;
 
 use super::frf_data::FrfData;
-use super::frf_problem::{FrfProblem, Misfit};
-use super::structure::StructureModel;
+use super::frf_problem::FrfProblem;
 use crate::Result;
-use crate::identify::levenberg_marquardt::Fit;
+use crate::identify::levenberg_marquardt::{Fit, Linearisation};
 
 /// Times the lowest misfit up to which another optimum is looked at, …
 const CLOSE: f64 = 1.15;
@@ -23,8 +22,8 @@ const MOST: usize = 2;
 const APART: f64 = 5.0;
 /// Standard errors of the sum of the differences within which the data do not decide.
 const UNDECIDED: f64 = 2.0;
-/// Stretches of the frequency in which differences are summed.
-const STRETCHES: usize = 12;
+/// Stretches of the frequency of which each may err as a whole.
+pub(super) const STRETCHES: usize = 12;
 
 /// Whether `b` is another optimum than `a`, `reduced_chi2` being what that leaves.
 fn apart(a: &Fit, b: &Fit, reduced_chi2: f64) -> bool {
@@ -79,41 +78,25 @@ pub(super) fn settled(
     (best, rivals)
 }
 
-/// Those of the `rivals` of a solution `theta` that the data do not tell from it.
+/// Those of the `rivals` that the data do not tell from a solution, `here` being what `problem` says of its blocks and stretches.
 ///
 /// # Errors
 /// A model that cannot be set up at one of them.
 pub(super) fn undecided(
-    theta: &[f64],
     rivals: &[Vec<f64>],
-    model: &StructureModel,
-    data: &FrfData,
+    problem: &FrfProblem<'_>,
+    here: &[(usize, usize, Linearisation)],
 ) -> Result<Vec<Vec<f64>>> {
-    if rivals.is_empty() {
-        return Ok(Vec::new());
-    }
-    let problem = FrfProblem {
-        model,
-        data,
-        misfit: Misfit::Complex,
-        stride: 1,
-    };
-    let costs = |theta: &[f64]| -> Result<Vec<[f64; 3]>> {
-        let parts = problem.by_block_and_stretch(theta, STRETCHES)?.into_iter();
-        let of =
-            |(block, stretch, part): (usize, usize, crate::identify::levenberg_marquardt::Linearisation)| {
-                [data.blocks[block].posture as f64, stretch as f64, part.cost]
-            };
-        Ok(parts.map(of).collect())
-    };
-    let here = costs(theta)?;
     let mut undecided = Vec::new();
     for rival in rivals {
-        let there = costs(rival)?;
+        let there = problem.by_block_and_stretch(rival, STRETCHES)?;
         let differences: Vec<[f64; 3]> = here
             .iter()
             .zip(&there)
-            .map(|(a, b)| [a[0], a[1], b[2] - a[2]])
+            .map(|((block, stretch, here), (.., there))| {
+                let posture = problem.data.blocks[*block].posture;
+                [posture as f64, *stretch as f64, there.cost - here.cost]
+            })
             .collect();
         let total: f64 = differences.iter().map(|d| d[2]).sum();
         // What errs together is a posture or a stretch of the frequency: the larger scatter counts.

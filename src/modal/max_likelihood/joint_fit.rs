@@ -372,9 +372,7 @@ impl PoleGroup<'_> {
         let line_hz = self.line_hz(pole.frequency_hz);
         let width = pole.damping_ratio * pole.frequency_hz;
         let coarse = 2.0 * width < COARSE_LINES * line_hz;
-        let level = (solution.misfit / solution.degrees_of_freedom as f64)
-            .max(1.0)
-            .sqrt();
+        let level = solution.level();
         level * solution.frequency_std_hz(j) < 0.3 * width.max(line_hz)
             && (coarse || level * solution.damping_std(j) < 0.4 * pole.damping_ratio)
     }
@@ -528,6 +526,13 @@ pub(crate) fn seen_in(solution: &Solution, mode: usize) -> (usize, f64) {
         evidence.iter().filter(|e| **e > SEEN).count(),
         evidence.iter().fold(0.0, |m: f64, e| m.max(*e)),
     )
+}
+
+/// Distance of the finest lines of some FRFs at a frequency, Hz.
+pub(crate) fn line_hz(data: &[Data], at_hz: f64) -> f64 {
+    data.iter()
+        .map(|d| spacing_hz(&d.frequency_hz, at_hz))
+        .fold(f64::INFINITY, f64::min)
 }
 
 /// Distance of neighbouring lines at a frequency, Hz.

@@ -54,6 +54,11 @@ impl Solution {
         self.covariance[(2 * mode + 1, 2 * mode + 1)].max(0.0).sqrt() * self.poles[mode].damping_ratio
     }
 
+    /// By how much more than its noise the fit leaves, never less than 1: what standard deviations are widened by.
+    pub fn level(&self) -> f64 {
+        (self.misfit / self.degrees_of_freedom as f64).max(1.0).sqrt()
+    }
+
     /// Relative standard deviations of frequency and damping ratio from how the FRFs scatter about the common pole, whatever
     /// their noise is (Liang & Zeger 1986, one cluster an FRF); zero for a single FRF.
     pub fn scatter_std(&self, mode: usize) -> [f64; 2] {

@@ -98,12 +98,13 @@ pub(crate) fn collect(
                 level * solution.damping_std(j) / pole.damping_ratio,
             ];
             let scatter = scatter(solution, j, noise);
+            let seen = solution.scatter_std(j);
             // The larger of what the noise says and of how the FRFs scatter about the common pole; where they do so beyond the
             // noise, what another weighting of them would make of it comes on top.
             let relative = [0, 1].map(|k| match few {
                 true => noise[k],
                 false => noise[k]
-                    .max(small_set * solution.scatter_std(j)[k])
+                    .max(small_set * seen[k])
                     .max(scatter[k].std)
                     .hypot(scatter[k].change),
             });
@@ -113,10 +114,7 @@ pub(crate) fn collect(
                 let (value, std) = solution.constant(m, j);
                 constants[of_member[m]] = Some((value, level * std));
             }
-            let line_hz = data
-                .iter()
-                .map(|d| joint_fit::spacing_hz(&d.frequency_hz, pole.frequency_hz))
-                .fold(f64::INFINITY, f64::min);
+            let line_hz = joint_fit::line_hz(data, pole.frequency_hz);
             let lines_in_half_power_band = 2.0 * pole.damping_ratio * pole.frequency_hz / line_hz;
             let mut damping_std = (relative[1] * pole.damping_ratio).hypot(shift[1]);
             let others: Vec<Pole> = poles.iter().filter(|p| *p != pole).copied().collect();
@@ -455,11 +453,7 @@ pub(crate) fn coarse_lines(data: &[Data], result: &mut GlobalModes) {
         .map(|m| {
             format!(
                 "at {} Hz lines the damping of the {:.1} Hz mode is uncertain to {:.0} %",
-                short(
-                    data.iter()
-                        .map(|d| joint_fit::spacing_hz(&d.frequency_hz, m.frequency_hz))
-                        .fold(f64::INFINITY, f64::min)
-                ),
+                short(joint_fit::line_hz(data, m.frequency_hz)),
                 m.frequency_hz,
                 (100.0 * m.damping_std / m.damping_ratio).ceil()
             )

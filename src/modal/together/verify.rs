@@ -1,6 +1,8 @@
 //! Is a fitted pole a mode of the structure? What the FRFs together do not bear out goes out, with the reason, and the rest
 //! is fitted again.
 
+use std::borrow::Cow;
+
 use num_complex::Complex64;
 
 use crate::modal::max_likelihood::joint_fit::{self, Data, Group, PoleSearch};
@@ -56,7 +58,7 @@ pub(crate) fn verified(
     mut groups: Vec<Group>,
     rejected: &mut Vec<RejectedMode>,
 ) -> Option<Vec<Group>> {
-    let mut data = data.to_vec();
+    let mut data = Cow::Borrowed(data);
     for _ in 0..MAX_ROUNDS {
         let mut kept: Vec<Pole> = Vec::new();
         let mut out = false;
@@ -78,7 +80,7 @@ pub(crate) fn verified(
                 let near = |k: usize| {
                     let width = |p: &Pole| p.damping_ratio * p.frequency_hz;
                     let reach = APART_WIDTHS * (width(&poles[j]) + width(&poles[k]))
-                        + APART_LINES * line_hz(&data, poles[j].frequency_hz);
+                        + APART_LINES * joint_fit::line_hz(&data, poles[j].frequency_hz);
                     (poles[j].frequency_hz - poles[k].frequency_hz).abs() < reach
                 };
                 if !(0..poles.len()).any(|k| leaves[k].is_some() && near(k)) {
@@ -111,7 +113,7 @@ pub(crate) fn verified(
             return None;
         }
         groups = joint_fit::refine(&data, &kept, PoleSearch::Nothing, &mut Vec::new())?;
-        louder(&mut data, &groups);
+        louder(data.to_mut(), &groups);
     }
     Some(groups)
 }
@@ -126,13 +128,6 @@ fn louder(data: &mut [Data], groups: &[Group]) {
             *sigma = sigma.max(before);
         }
     }
-}
-
-/// Distance of the finest lines at a frequency, Hz.
-fn line_hz(data: &[Data], frequency_hz: f64) -> f64 {
-    data.iter()
-        .map(|d| joint_fit::spacing_hz(&d.frequency_hz, frequency_hz))
-        .fold(f64::INFINITY, f64::min)
 }
 
 /// Why pole `j` of a group is no mode, and the share that it makes of what was measured around it.
@@ -265,7 +260,7 @@ fn close_pairs(data: &[Data], group: &Group) -> Vec<ClosePair> {
 fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2]) -> Option<ClosePair> {
     let [a, b] = both.map(|j| solution.poles[j]);
     let width = a.damping_ratio * a.frequency_hz + b.damping_ratio * b.frequency_hz;
-    let line_hz = line_hz(data, a.frequency_hz);
+    let line_hz = joint_fit::line_hz(data, a.frequency_hz);
     // Where a line is about as wide as a peak, what leaks from one line into the next takes a pole of its own.
     let reach = match width < COARSE_LINES * line_hz {
         true => (CLOSE * width).max(LEAKS_LINES * line_hz),
@@ -420,6 +415,14 @@ fn mean_over_frfs<T>(own: &[T], of: impl Fn(&T) -> (f64, f64)) -> (f64, f64) {
     (mean, (scatter * count / (count - 1.0)).sqrt() / total)
 }
 
+/// [`Solution::own_step`] of each FRF that tells, standard deviations for noise as large as the fit leaves.
+fn own_steps(solution: &Solution, j: usize) -> impl Iterator<Item = ([f64; 2], [f64; 2])> {
+    let level = solution.level();
+    (0..solution.frfs.len())
+        .filter_map(move |m| solution.own_step(m, j))
+        .map(move |(step, std)| (step, std.map(|s| level * s)))
+}
+
 /// What the mean over the FRFs would change of a common pole.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Otherwise {
@@ -438,13 +441,8 @@ pub(crate) fn otherwise(solution: &Solution, j: usize) -> Option<[Otherwise; 2]>
     const NEAR_WIDTHS: f64 = 3.0;
     const KNOWN_DAMPING: f64 = 0.5;
     const NEAR_DAMPING: f64 = 1.0;
-    let level = (solution.misfit / solution.degrees_of_freedom as f64)
-        .max(1.0)
-        .sqrt();
     let width = solution.poles[j].damping_ratio;
-    let steps: Vec<([f64; 2], [f64; 2])> = (0..solution.frfs.len())
-        .filter_map(|m| solution.own_step(m, j))
-        .map(|(step, std)| (step, std.map(|s| level * s)))
+    let steps: Vec<([f64; 2], [f64; 2])> = own_steps(solution, j)
         .filter(|(step, std)| {
             std[0] < KNOWN_WIDTHS * width
                 && step[0].abs() < NEAR_WIDTHS * width
@@ -485,12 +483,8 @@ pub(crate) fn moves(
     const OF_WIDTH: f64 = 0.1;
     // A single step from the common pole says whether an FRF's own is worth a fit.
     const WORTH_A_FIT: f64 = 0.5;
-    let level = (solution.misfit / solution.degrees_of_freedom as f64)
-        .max(1.0)
-        .sqrt();
-    let steps: Vec<(f64, f64)> = (0..solution.frfs.len())
-        .filter_map(|m| solution.own_step(m, j))
-        .map(|(step, std)| (step[0], level * std[0]))
+    let steps: Vec<(f64, f64)> = own_steps(solution, j)
+        .map(|(step, std)| (step[0], std[0]))
         .filter(|(_, std)| *std < KNOWN_WIDTHS * pole.damping_ratio)
         .collect();
     if steps.len() < LEAST_FRFS {
@@ -513,7 +507,7 @@ pub(crate) fn moves(
         .into_iter()
         .flatten()
         .filter_map(|s| {
-            let level = (s.misfit / s.degrees_of_freedom as f64).max(1.0).sqrt();
+            let level = s.level();
             let std = [level * s.frequency_std_hz(0), level * s.damping_std(0)];
             let width = pole.damping_ratio * pole.frequency_hz;
             let near = (s.poles[0].frequency_hz - pole.frequency_hz).abs() < 3.0 * width

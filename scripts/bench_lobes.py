@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The lobe surface over the redundancy angle with numpy, timed beside `benches/lobes.rs` in one run.
+"""The lobe surface over the redundancy angle with numpy, timed against `benches/lobes.rs` in one run.
 
     cargo build --release --no-default-features --features program --bench lobes && python3 scripts/bench_lobes.py
 

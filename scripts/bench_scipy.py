@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""The same fit with numpy and scipy, timed beside `lobestone` in one run.
+"""The same fit with numpy and scipy, timed against `lobestone` in one run.
 
     python3 scripts/bench_scipy.py [CAMPAIGN] [--effect base-compliance] [--lobestone PATH] [--repeat N]
 
-Without --effect: the calibration, beside `lobestone calibrate`. With it: the fit of one candidate effect together with
-the baseline, from nominal values, beside `lobestone calibrate --from-nominal` on a copy of the campaign that has the
+Without --effect: the calibration, against `lobestone calibrate`. With it: the fit of one candidate effect together with
+the baseline, from nominal values, against `lobestone calibrate --from-nominal` on a copy of the campaign that has the
 effect in its model (put there by `lobestone add`, not timed).
 
 An independent check as well: kinematics, mass and stiffness matrices, modal damping, FRFs and the fit are written

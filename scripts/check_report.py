@@ -155,7 +155,7 @@ class Browser:
         return found
 
     def loaded(self):
-        """What the page asked for beside itself and what it holds inside."""
+        """What the page asked for besides itself and what it holds inside."""
         asked = [e["params"]["request"]["url"] for e in self.events if e["method"] == "Network.requestWillBeSent"]
         return [url for url in asked[1:] if not url.startswith(("data:", "blob:"))]
 
@@ -222,7 +222,7 @@ def use(browser, page, shots):
     check(not faults, "; ".join(faults))
     visible = "(e) => e.getBoundingClientRect().height > 0"
     both = browser.run(f"[...document.querySelectorAll('[data-plot] img')].filter({visible}).length")
-    check(both == 0, f"{both} images stand beside the figures that replace them")
+    check(both == 0, f"{both} images stand next to the figures that replace them")
     if shots:
         browser.shot(shots / "top.png")
         for kind, selector in (("explorer", ".explorer"), ("figure", "[data-plot]")):

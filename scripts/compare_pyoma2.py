@@ -96,7 +96,7 @@ def main():
                 print(f"  {f:6.2f} {100 * zeta:5.2f}   {text:34}  {fp:7.3f} {100 * zp:6.2f}")
             extra = len(found["modes"]) - len(MODES)
             lines = ", ".join(f"{h['frequency_hz']:.2f}" for h in found["harmonics"])
-            print(f"  lobestone: {extra:+d} modes beside the true ones; lines told: {lines or 'none'}")
+            print(f"  lobestone: {extra:+d} modes besides the true ones; lines told: {lines or 'none'}")
             print(f"  time: lobestone process {seconds:.2f} s; pyOMA2 {plain:.2f} s, with standard deviations "
                   f"{with_deviations:.2f} s")
 

@@ -7,7 +7,7 @@
 Campaign by campaign: `lobestone simulate --random TIER --seed S`, `lobestone diagnose --json`, verdict against truth. Tiers
 are those of `lobestone simulate --help`: controls, faint effects, foreign physics, the mixture that the confidence is
 tried on (`trial`), the laboratory, three effects at once. `--loops` goes on with `add` until nothing is found. Writes a report (confusion matrix, false alarms, misses by how plainly the effect shows, calibration of the
-confidence, time), beside it a CSV with one row a campaign and, where matplotlib is there, the reliability diagram. A CSV
+confidence, time), next to it a CSV with one row a campaign and, where matplotlib is there, the reliability diagram. A CSV
 that is there already is continued: campaigns in it are not run again, so a long run may be stopped and goes on.
 """
 

@@ -31,7 +31,7 @@ pub fn regular_file(path: &Path) -> Result<()> {
 #[cfg(test)]
 pub(crate) mod faults;
 
-/// Writes beside the target and renames: a reader sees the old file or the new one, never half of it.
+/// Writes next to the target and renames: a reader sees the old file or the new one, never half of it.
 ///
 /// # Errors
 /// What the file system refuses, naming the file; then the old one is there as it was.

@@ -1,4 +1,4 @@
-//! A calibration with link parameters free that the campaign takes for exact, beside the one without.
+//! A calibration with link parameters free that the campaign takes for exact, compared with the one without.
 
 use super::StructureAnalysis;
 use super::structure_case::Freed;

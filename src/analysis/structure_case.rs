@@ -31,7 +31,7 @@ pub fn structure_model(campaign: &Campaign) -> Result<StructureModel> {
     structure_model_freeing(campaign, &Freed::default())
 }
 
-/// Link parameters that are free beside those that the campaign frees itself.
+/// Link parameters that are free besides those that the campaign frees itself.
 #[derive(Debug, Clone, Default)]
 pub struct Freed<'a> {
     /// Groups that are free, within their usual tolerance where the campaign gives none.

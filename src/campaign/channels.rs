@@ -39,7 +39,7 @@ pub(super) fn channels(top: &Section<'_>, cuts: &[Cut]) -> Result<Vec<CutChannel
         let source = match (section.text("in_file")?, section.whole("column", 1, 10_000)?) {
             (Some(_), Some(_)) => {
                 return Err(section
-                    .error("column", "beside in_file: only one of them can hold")
+                    .error("column", "given together with in_file: only one of them can hold")
                     .remedy("in_file for files with names, column for files without")
                     .into());
             }
@@ -67,7 +67,7 @@ pub(super) fn channels(top: &Section<'_>, cuts: &[Cut]) -> Result<Vec<CutChannel
             (None, None) => Gain::None,
             _ => {
                 return Err(section
-                    .error("gain_n_per_unit", "beside gain, or zero")
+                    .error("gain_n_per_unit", "given together with gain, or zero")
                     .remedy("give one of the two")
                     .into());
             }

@@ -336,7 +336,10 @@ fn orthogonal(top: &Section<'_>) -> Result<Option<OrthogonalSection>> {
         (None, Some(angle)) => ChipFormation::ShearAngleRad(angle.to_radians()),
         (Some(_), Some(_)) => {
             return Err(section
-                .error("shear_angle_deg", "given beside chip_ratio, which says the same")
+                .error(
+                    "shear_angle_deg",
+                    "given together with chip_ratio, which says the same",
+                )
                 .remedy("keep one of the two")
                 .into());
         }

@@ -85,7 +85,7 @@ fn process_damping(lobes: &Section<'_>, process: Process) -> Result<Option<f64>>
         return Err(lobes
             .error(
                 "process_damping_n_per_m",
-                "given beside indentation_n_per_mm3 and wear_land_mm, which say the same",
+                "given together with indentation_n_per_mm3 and wear_land_mm, which say the same",
             )
             .remedy("keep one of the two ways")
             .into());
@@ -114,7 +114,10 @@ fn from_orthogonal(lobes: &Section<'_>, process: Process) -> Result<bool> {
     }
     if asked && lobes.has("ktc_n_per_mm2") {
         return Err(lobes
-            .error("coefficients", "given beside ktc_n_per_mm2, which says the same")
+            .error(
+                "coefficients",
+                "given together with ktc_n_per_mm2, which says the same",
+            )
             .remedy("keep one of the two")
             .into());
     }

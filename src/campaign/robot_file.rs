@@ -137,7 +137,10 @@ fn placement(joint: &Section<'_>) -> Result<Option<JointPlacement>> {
     };
     if let Some(other) = CONVENTION.into_iter().find(|key| joint.has(key)) {
         return Err(joint
-            .error(other, format!("stands beside {first}: the joint is placed twice"))
+            .error(
+                other,
+                format!("given together with {first}: the joint is placed twice"),
+            )
             .remedy(format!(
                 "either {} or {}",
                 CONVENTION.join(", "),
@@ -274,7 +277,7 @@ fn tool(top: &Section<'_>) -> Result<ToolFrame> {
         return Err(tool
             .error(
                 keys[2],
-                format!("stands beside {}: the tool is turned twice", keys[1]),
+                format!("given together with {}: the tool is turned twice", keys[1]),
             )
             .remedy("keep one of the two")
             .into());
@@ -359,7 +362,7 @@ mod tests {
             ),
             (
                 format!("{joint}axis = [0, 1, 0]\n{link}"),
-                "joint[0].d_m: stands beside axis: the joint is placed twice",
+                "joint[0].d_m: given together with axis: the joint is placed twice",
             ),
             (
                 format!("{joint}{link}products_kg_m2 = [2, 0, 0]\n"),

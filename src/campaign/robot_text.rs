@@ -11,7 +11,7 @@ fn list(values: &[f64]) -> String {
 }
 
 impl RobotSpec {
-    /// The robot file of this robot; `notes` stand as comments at its head, guesses under `guesses` and beside the values.
+    /// The robot file of this robot; `notes` stand as comments at its head, guesses under `guesses` and next to the values.
     pub fn to_toml(&self, notes: &[String]) -> String {
         let mut text = String::new();
         for note in notes {

@@ -131,7 +131,7 @@ impl<'a> Guide<'a> {
         }
         let mut place = mostly.map_or(String::new(), |m| format!(", mostly {m}"));
         if error.nrms < 1.1 * error.noise_floor_nrms {
-            // The sum does not show it: lines beside the steady waveform, or many small errors of one kind.
+            // The sum does not show it: lines besides the steady waveform, or many small errors of one kind.
             place = format!(
                 ", but the misfit is {} times that of noise",
                 number(reduced_chi2, 2)

@@ -19,7 +19,7 @@ pub enum LineKind {
     SlowerThanTurn,
     /// At the rotation of the spindle.
     OncePerTurn,
-    /// Another whole number of turns that is none of tooth passing.
+    /// Another whole number of turns, not of tooth passing.
     TurnHarmonic,
     /// At the rotation times the number of teeth.
     ToothPassing,
@@ -49,7 +49,7 @@ impl LineKind {
             LineKind::ToothHarmonic => "harmonics of tooth passing",
             LineKind::NaturalFrequency => "natural frequency (the same at every speed)",
             LineKind::Chatter => "not a whole number of turns, another at each speed (chatter)",
-            LineKind::BesideTeeth => "close beside tooth passing",
+            LineKind::BesideTeeth => "close to tooth passing",
             LineKind::Mains => "mains",
             LineKind::NotCutting => "in the air, too",
         }
@@ -105,7 +105,7 @@ impl LineKind {
             LineKind::BesideTeeth => {
                 "a spindle speed that wavers, a load that comes and goes (feed not steady, chips), beating with another source"
             }
-            LineKind::Mains => "electrical pickup: earth loop, cable beside a motor's, amplifier supply",
+            LineKind::Mains => "electrical pickup: earth loop, cable next to a motor's, amplifier supply",
             LineKind::NotCutting => {
                 "something that runs without cutting: spindle bearings, coolant pump, extraction, a neighbouring machine"
             }
@@ -174,7 +174,7 @@ const MAINS_HARMONICS: f64 = 12.0;
 const SAME_FREQUENCY: f64 = 0.005;
 /// Share of the speed by which cuts must differ to tell.
 const OTHER_SPEED: f64 = 0.02;
-/// Share of the tooth-passing frequency within which a line is beside it.
+/// Share of the tooth-passing frequency within which a line is close to it.
 const BESIDE: f64 = 0.12;
 /// Share of the spindle frequency below which a line is slow.
 const SLOW: f64 = 0.5;
@@ -303,7 +303,7 @@ fn of_orders(index: usize, cut: &CutData, fit: &CutFit, teeth: usize) -> Vec<Lin
     lines
 }
 
-/// Lines beside the orders, each named by the strongest reason that there is.
+/// Lines off the orders, each named by the strongest reason that there is.
 fn beside_orders(data: &CuttingData, index: usize, teeth: usize) -> Vec<Line> {
     let cut = &data.cuts[index];
     let (spindle_hz, tooth_hz) = (cut.spindle_hz(), cut.spindle_hz() * teeth as f64);

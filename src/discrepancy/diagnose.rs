@@ -64,7 +64,7 @@ const REFIT_BRIEFLY: Stopping = Stopping {
 };
 
 /// What each parameter must gain in χ², for so many independent values: their logarithm (Schwarz 1978), and in any case what
-/// a parameter that means nothing gains by chance, twice (Akaike 1974). Far from the noise so much of the misfit hangs together
+/// a parameter that means nothing gains by chance, twice (Akaike 1974). Far from the noise so much of the misfit is correlated
 /// that hardly a value counts as independent; parameters would be rewarded there.
 fn price_of_a_parameter(independent_values: f64) -> f64 {
     const BY_CHANCE_TWICE: f64 = 2.0;
@@ -93,6 +93,9 @@ struct Engine<'a, S: Study> {
 struct Evidence {
     base_chi2: f64,
     coarse_base_chi2: f64,
+    /// Misfit per degree of freedom of the baseline on all data, in multiples of that on the coarse view: the coarse view holds other
+    /// shares of the FRFs and lines that fit worst.
+    full_over_coarse: f64,
     /// Divides differences of χ²: the misfit that remains, and the values that are not independent.
     scale: f64,
     /// Share of the values that are independent.
@@ -161,9 +164,10 @@ impl<'a, S: Study> Engine<'a, S> {
         }
     }
 
-    /// `tried`, or where it is no better than `base`, the fit without the effect as one with it; and whether it is that.
-    fn nested(&self, tried: &TriedOf<S>, base: &Fit) -> (TriedOf<S>, bool) {
-        let worse = tried.fit.cost >= base.cost;
+    /// `tried`, or where it is no better than the fit `without` the effect to the same view, `base` as one with it (the fit without the
+    /// effect to all data); and whether it is that.
+    fn nested(&self, tried: &TriedOf<S>, without: &Fit, base: &Fit) -> (TriedOf<S>, bool) {
+        let worse = tried.fit.cost >= without.cost;
         match vanished(&tried.model, base).filter(|_| worse) {
             Some(fit) => {
                 let model = tried.model.with_start(fit.theta.clone());
@@ -202,6 +206,7 @@ impl<'a, S: Study> Engine<'a, S> {
         let evidence = Evidence {
             base_chi2: 2.0 * base.cost,
             coarse_base_chi2: 2.0 * coarse_base.cost,
+            full_over_coarse: base_reduced * self.freedom(model, Extent::Coarse) / (2.0 * coarse_base.cost),
             scale: (best_reduced.max(1.0) / share).max(base_rest.noise_factor()),
             share: share.min(1.0 / base_rest.noise_factor()),
             tests: self.instances.len(),
@@ -218,8 +223,8 @@ impl<'a, S: Study> Engine<'a, S> {
         let mut candidates: Vec<CandidateOf<S>> = all
             .par_iter()
             .map(|(t, without)| {
-                let (tried, vanished) = self.nested(t, without);
-                let refined = std::ptr::eq(*without, &base);
+                let (tried, vanished) = self.nested(t, without, &base);
+                let refined = vanished || std::ptr::eq(*without, &base);
                 let judged = self.judge(&tried, refined, &evidence)?;
                 Ok(EffectCandidate { vanished, ..judged })
             })
@@ -444,7 +449,7 @@ impl<'a, S: Study> Engine<'a, S> {
             (gain, self.reduced_chi2(tried), study.real_values(Extent::Full))
         } else {
             let gain = evidence.coarse_base_chi2 - chi2;
-            let reduced = chi2 / self.freedom(model, Extent::Coarse);
+            let reduced = chi2 / self.freedom(model, Extent::Coarse) * evidence.full_over_coarse;
             (gain, reduced, study.real_values(Extent::Coarse))
         };
         let gain = (raw_gain / evidence.scale).max(0.0);

@@ -27,7 +27,7 @@ pub struct Diagnosis<D: Modelled> {
     pub baseline: BaselineFit,
     /// Effects that this data cannot show, with the reason.
     pub not_tried: Vec<(String, String)>,
-    /// Pairs of effects that were looked at, of how many there are beside the leaders; `None` where one effect is enough or
+    /// Pairs of effects that were looked at, of how many there are with the leaders; `None` where one effect is enough or
     /// pairs are hopeless.
     pub pairs: Option<[usize; 2]>,
 }

@@ -291,7 +291,7 @@ mod tests {
             let odds = odds(1e5, &other);
             assert!(odds > 1.0 && odds > 10.0 * usual, "{odds}");
         }
-        // The more an effect explains beside it, the surer.
+        // The more an effect explains besides, the surer.
         assert!(odds(1e6, &with_slips(2e4, 0.0, 0.5)) < usual);
     }
 

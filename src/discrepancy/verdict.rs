@@ -152,10 +152,10 @@ pub fn leaves_structure<D: Modelled>(c: &EffectCandidate<D>) -> bool {
     }
 }
 
-/// Odds of something else below which nothing is sought beside an effect: what it leaves is what every setup leaves.
+/// Odds of something else below which nothing is sought besides an effect: what it leaves is what every setup leaves.
 const SETTLED: f64 = 0.1;
 
-/// Whether a candidate leaves room for a second effect beside it.
+/// Whether a candidate leaves room for a second effect besides it.
 pub fn leaves_room<D: Modelled>(c: &EffectCandidate<D>, baseline: &BaselineFit) -> bool {
     leaves_structure(c) && odds_against(c, baseline) > SETTLED
 }

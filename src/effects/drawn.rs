@@ -61,7 +61,7 @@ const AT_POINT: [DrawnForm; 6] = [
     DrawnForm::TwoResonators,
     DrawnForm::LossFactor,
 ];
-/// A spring beside a joint's stiffness is more of the same.
+/// A spring in parallel with a joint's stiffness is more of the same.
 const AT_JOINT: [DrawnForm; 3] = [DrawnForm::Damper, DrawnForm::LossFactor, DrawnForm::Maxwell];
 const IN_SERIES: [DrawnForm; 3] = [DrawnForm::Spring, DrawnForm::SpringDamper, DrawnForm::LossFactor];
 const IN_DRIVE: [DrawnForm; 2] = [DrawnForm::SpringDamper, DrawnForm::RotorOnSpring];
@@ -176,7 +176,7 @@ fn parameters(site: Site, variant: usize, data: &DataSummary) -> Vec<Parameter> 
             resonator().into_iter().chain(second).collect()
         }
         DrawnForm::LossFactor if matches!(spot, Spot::Joint(_)) => {
-            // Beside a joint's own spring there is only the loss.
+            // In parallel with a joint's own spring there is only the loss.
             vec![free("hysteretic_nm_per_rad", "N·m/rad", 1e4, [1.0, 1e9])]
         }
         DrawnForm::LossFactor => vec![stiffness(usual), loss],
@@ -236,7 +236,7 @@ fn vanishing(parameters: &[Parameter], factor: f64) -> Vec<f64> {
     };
     let size = |p: &Parameter| match is(p, held) {
         true => factor * p.nominal,
-        // Beside a spring that is not there a damper must not be there either.
+        // In parallel with a spring that is not there a damper must not be there either.
         false if factor < 1.0 && is(p, &["damping_n"]) => factor * p.nominal,
         false => p.nominal,
     };

@@ -8,7 +8,7 @@ use crate::robot::{Element, Grip, Kinematics, Place, Role, Slot};
 /// One displacement of the structure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Spot {
-    /// The turning of a joint (1-based): something beside its stiffness.
+    /// The turning of a joint (1-based): something in parallel with its stiffness.
     Joint(usize),
     /// The middle of a link (1-based) along an axis (0 to 2) of its frame, against the ground.
     LinkAxis(usize, usize),
@@ -43,7 +43,7 @@ impl Spot {
     /// In words.
     pub fn words(self) -> String {
         match self {
-            Spot::Joint(i) => format!("beside the stiffness of joint {i}"),
+            Spot::Joint(i) => format!("in parallel with the stiffness of joint {i}"),
             Spot::LinkAxis(i, axis) => format!("on link {i} along {}", AXES[axis]),
             Spot::ToolGround(axis) => format!("between tool and ground along base {}", AXES[axis]),
             Spot::Base(k) => format!("under the base ({})", BASE[k]),

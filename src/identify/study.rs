@@ -25,7 +25,7 @@ pub enum Extent {
 /// What is compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Measure {
-    /// A smooth misfit for far away, where a model's peak stands beside the measured one.
+    /// A smooth misfit for far away, where a model's peak stands next to the measured one.
     Rough,
     /// The likelihood.
     Likelihood,
@@ -244,7 +244,7 @@ pub fn held_out<S: Study>(
     Ok(Some(total))
 }
 
-/// Weighted squares per real value from which on the rough misfit is fitted first: peaks may stand beside their places.
+/// Weighted squares per real value from which on the rough misfit is fitted first: peaks may stand away from their places.
 const TRAP_MISFIT: f64 = 3.0;
 
 /// How hard a fit of an effect is tried.
@@ -599,7 +599,7 @@ pub fn try_again<S: Study>(
         .collect()
 }
 
-/// The effect added last may be stuck beside its best fit: from further starting points a better one, if there is any.
+/// The effect added last may be stuck away from its best fit: from further starting points a better one, if there is any.
 /// `tried` is fitted on all data; `model` is the one without the effect.
 pub fn rescue<S: Study>(
     study: &S,
@@ -622,7 +622,7 @@ pub fn rescue<S: Study>(
             let base = std::slice::from_ref(base);
             look(study, &tried.model, base, &own, Effort::Staged).ok()
         })
-        // What a look leaves that far above would only end beside.
+        // What a look leaves that far above would only end in another optimum.
         .filter(|looks| looks[0].cost <= OUT_OF_RACE * coarse.cost)
         .filter_map(|looks| settle(study, &tried.model, &looks).ok())
         .collect();

@@ -39,7 +39,7 @@ pub struct Fold {
 
 #[derive(Debug, Clone, Default)]
 pub struct Figure {
-    /// Name of the image beside the page; anything but letters, digits, `-` and `_` is replaced, `.png` added.
+    /// Name of the image next to the page; anything but letters, digits, `-` and `_` is replaced, `.png` added.
     pub file_name: String,
     /// What a reader who cannot see the image should know.
     pub alt: String,

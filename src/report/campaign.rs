@@ -17,7 +17,7 @@ use crate::report::sections::{
 use crate::revision::{self, Side};
 use crate::thesis::ThesisFindings;
 
-/// Folder of the tables beside the page.
+/// Folder of the tables next to the page.
 #[cfg(feature = "parquet")]
 const TABLES: &str = "tables";
 

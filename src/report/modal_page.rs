@@ -32,7 +32,7 @@ const MOST_REFERENCES: usize = 6;
 /// Steps of the frequency axis that a figure can show.
 const MOST_LINES: usize = 4000;
 
-/// What the page is made of beside the analysis.
+/// What the page is made of besides the analysis.
 #[derive(Debug, Clone, Default)]
 pub struct Extras<'a> {
     pub geometry: Option<&'a Geometry>,

@@ -546,7 +546,7 @@ mod tests {
         assert!(files("new.png").exists() && files("new-2.png").exists());
         assert!(!files("old.png").exists());
         assert!(files("old-2.png").exists() && files("mine.png").exists());
-        // A page that is none of ours names files, too.
+        // A page that this program did not write names files, too.
         std::fs::create_dir(files("below")).unwrap();
         std::fs::write(files("secret.png"), "").unwrap();
         let foreign = "<figure><img src=\"data:image/png;base64,\"><a class=\"file\" href=\"../secret.png\">x</a></figure>";

@@ -1,6 +1,6 @@
 //! The revision log: `lobestone/revisions.json` in the campaign's folder.
 //!
-//! Written beside itself, flushed and renamed, so that whoever reads it at whatever moment reads the old log or the new
+//! Written under another name, flushed and renamed, so that whoever reads it at whatever moment reads the old log or the new
 //! one. Writers take turns by a lock of the operating system on `revisions.lock`, which a killed process cannot leave
 //! behind, and refuse to write where the log is no longer the one that they started from.
 
@@ -346,7 +346,7 @@ mod tests {
         assert_eq!(numbers(dir.path()), [0, 1]);
     }
 
-    /// Killed before the rename: a part of the new log lies beside the old one.
+    /// Killed before the rename: a part of the new log lies next to the old one.
     #[test]
     fn a_killed_writer_leaves_the_old_log() {
         let dir = tempfile::tempdir().unwrap();
@@ -433,7 +433,7 @@ mod tests {
         };
         let adds = |dir: &Path| add(&mut RevisionLog::load(dir).unwrap(), "time-delay");
         let state = |dir: &Path| (numbers(dir), std::fs::read_dir(dir.join(FOLDER)).unwrap().count());
-        // The log and its lock, nothing beside them.
+        // The log and its lock, nothing else.
         every_fault(
             prepare,
             adds,

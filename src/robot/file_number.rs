@@ -82,7 +82,7 @@ impl FileNumber {
     }
 
     /// Lengths and offsets of the kinematics, without d of the first joint, which only lifts the whole robot along its axis,
-    /// and without those of the last, which the tool's position beside it says as well. Joints that are placed otherwise than by
+    /// and without those of the last, which the tool's position says as well. Joints that are placed otherwise than by
     /// the Denavit–Hartenberg convention have none.
     pub fn lengths(spec: &RobotSpec) -> Vec<FileNumber> {
         let last = spec.joints.len();

@@ -191,7 +191,7 @@ impl RealCase {
             if same {
                 "the same answer"
             } else {
-                "not the same answer, so it hangs on the assumed accuracy"
+                "not the same answer, so it depends on the assumed accuracy"
             }
         )
     }

@@ -76,7 +76,7 @@ fn can_trace() -> bool {
 }
 
 /// Lets each call of a command that writes or renames fail in turn. `arguments` gets the folder that `prepare` filled;
-/// `is_answer_enough` where what the command keeps beside its answer is a help and nothing more.
+/// `is_answer_enough` where what the command keeps besides its answer is a help and nothing more.
 fn every_call_may_fail(
     prepare: impl Fn(&Path),
     arguments: impl Fn(&Path) -> Vec<String>,
@@ -226,7 +226,7 @@ fn a_robot_is_exported_whole_or_not_at_all() {
     );
 }
 
-/// A folder of many files, and the truth beside it.
+/// A folder of many files, and the truth next to it.
 #[test]
 fn a_simulated_campaign_is_there_with_its_truth_or_not_at_all() {
     if !can_trace() {

@@ -1,5 +1,5 @@
 //! Damaged input: small valid files, mutated from a seed, through every reader, the campaign file, the robot file, the log of
-//! revisions, and what browsers ask of `serve`. A run may give an error; it may not panic, take long, take much memory, or give a number that is none.
+//! revisions, and what browsers ask of `serve`. A run may give an error; it may not panic, take long, take much memory, or give a number that is not finite.
 //!
 //! The short version runs with the other tests. The long one takes its limits from the environment:
 //! `FUZZ_SECONDS=3600 FUZZ_SEED=7 cargo test --release --test integration -- --ignored fuzz_for_long --nocapture`;

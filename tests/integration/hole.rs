@@ -377,7 +377,7 @@ const PREDICTED: &str = "[lobes]\nprocess = \"drilling\"\nsource = \"model\"\nco
                          spindle_rpm = [200.0, 500.0, 10.0]\n";
 
 /// Roukema's drill: thrust, torque and coefficients from the orthogonal database and the drill's geometry go into lobes and hole.
-/// The numbers were worked out beside this program (Python, the same formulas written anew): lips 398 N, 2.20 N·m, chisel edge
+/// The numbers were worked out independently of this program (Python, the same formulas written anew): lips 398 N, 2.20 N·m, chisel edge
 /// 684 N and 18 N of pressing in, 0.199 N·m.
 #[test]
 fn a_drill_from_the_orthogonal_database() {

@@ -179,7 +179,7 @@ fn hits_in_segments_of_one_file_are_averaged_unless_they_contradict_each_other()
     assert!(warnings.contains("contradict each other"), "{warnings}");
 }
 
-/// FRFs of three points (hit at the first) of a structure with three real modes, as CSV; the geometry beside it.
+/// FRFs of three points (hit at the first) of a structure with three real modes, as CSV; the geometry next to it.
 fn three_points(dir: &Path) -> (String, String) {
     const MODES: [(f64, f64, [f64; 3]); 3] = [
         (9.0, 0.02, [1.0, 0.6, -0.5]),

@@ -82,7 +82,7 @@ fn a_packed_file_that_would_fill_the_memory_is_refused() {
     refused(&path, &["MB of memory granted to a file of"]);
 }
 
-/// Digits that nobody needs and a unit that is none are not shown.
+/// Digits that nobody needs and a unit that does not exist are not shown.
 #[test]
 fn inspect_shows_rates_and_units_for_people() {
     let shown = |name: &str| lobestone(&["inspect", odd(name).to_str().unwrap()]).stdout;

@@ -240,7 +240,7 @@ fn what_is_no_arm_is_refused_in_words() {
             "seven.urdf",
             seven.clone(),
             &["--base-link", "a5", "--tool-link", "a2"],
-            &["a2 does not hang on a5"],
+            &["a2 is not attached to a5"],
         ),
         (
             "seven.urdf",

@@ -1,4 +1,4 @@
-//! Damaged, odd and meaningless input: a clear error or a sound result, never a panic, never a number that is none.
+//! Damaged, odd and meaningless input: a clear error or a sound result, never a panic, never a number that is not finite.
 
 use std::path::Path;
 

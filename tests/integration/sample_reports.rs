@@ -105,7 +105,7 @@ impl Sample {
         assert!(page.contains(&stated), "{path}: {stated} is not in the page");
     }
 
-    /// Every image that the page links to lies beside it, and the sample stays small, in bytes.
+    /// Every image that the page links to lies next to it, and the sample stays small, in bytes.
     fn assert_complete_and_small(&self, most: u64) {
         let page = read(&self.folder.join("report.html"));
         for link in page.split("class=\"file\" href=\"").skip(1) {
@@ -176,7 +176,7 @@ pub fn same_line(a: &str, b: &str) -> bool {
 }
 
 fn same_word(a: &str, b: &str) -> bool {
-    /// Bars of a table: their numbers stand beside them.
+    /// Bars of a table: their numbers stand next to them.
     const BARS: &str = "#█▉▊▋▌▍▎▏";
     let bar = |word: &str| !word.is_empty() && word.chars().all(|c| BARS.contains(c));
     let number = |word: &str| -> Option<(f64, f64)> {

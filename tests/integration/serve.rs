@@ -559,7 +559,7 @@ fn from_nothing_to_a_diagnosis() {
 
 #[test]
 fn files_from_the_page_replace_nothing_and_stay_where_they_belong() {
-    // One folder deeper than the temporary one: what lies beside it is nobody else's.
+    // One folder deeper than the temporary one: what lies next to it is nobody else's.
     let around = tempfile::tempdir().unwrap();
     let here = around.path().join("here");
     std::fs::create_dir(&here).unwrap();

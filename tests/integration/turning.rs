@@ -113,7 +113,7 @@ fn linear(h: f64) -> [f64; 3] {
     [0, 1, 2].map(|i| TRUTH[i] * h + TRUTH[i + 3])
 }
 
-/// What stands in a campaign beside its cuts.
+/// What stands in a campaign besides its cuts.
 struct Setup<'a> {
     /// `[dynamometer]` of the file.
     matrix: &'a str,

@@ -66,7 +66,7 @@ type Frf<'py> = (
     Line<'py, f64>,
 );
 
-/// The FRFs of a campaign beside those of the calibrated model.
+/// The FRFs of a campaign and those of the calibrated model.
 #[pyfunction]
 #[pyo3(signature = (dir, progress=None))]
 pub fn frfs<'py>(

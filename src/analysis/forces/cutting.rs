@@ -1,4 +1,4 @@
-//! A campaign's force records: the waveform model fitted and compared, and its coefficients beside those of the mean forces.
+//! A campaign's force records: the waveform model fitted and compared, and its coefficients compared with those of the mean forces.
 
 use serde_json::{Map, Value, json};
 

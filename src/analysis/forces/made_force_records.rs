@@ -75,7 +75,7 @@ fn turn(feed_mm: f64, corner_radius_mm: f64) -> Vec<[f64; 3]> {
     (0..POINTS).map(|k| at(TAU * k as f64 / POINTS as f64)).collect()
 }
 
-/// Writes a campaign of slots. `more(cut, axis, time, angle, cutting)` is added to every sample, beside white noise of 3 N.
+/// Writes a campaign of slots. `more(cut, axis, time, angle, cutting)` is added to every sample, on top of white noise of 3 N.
 pub fn write_campaign(
     dir: &Path,
     cuts: &[MadeCut],

@@ -58,7 +58,7 @@ pub struct LobeAnalysis {
     pub cases: Vec<LobeCase>,
     /// Where the campaign asks for the surface over the redundancy angle: its angles are the cases.
     pub redundancy: Option<RedundancyAnalysis>,
-    /// `effect@site` of what is in the model beside the baseline.
+    /// `effect@site` of what is in the model besides the baseline.
     pub effects: Vec<String>,
     /// Revision of the model; `None` where nothing was ever added, or the model is not what lobes come from.
     pub revision: Option<usize>,

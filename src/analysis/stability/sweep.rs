@@ -80,7 +80,7 @@ pub struct Sweep {
     spindle_rpm: [f64; 2],
     /// The places, in the order of their numbers.
     pub grid: WorkspaceGrid,
-    /// All that the rows hang on, for people and to tell one map from another; no floating-point results, so that every
+    /// All that the rows depend on, for people and to tell one map from another; no floating-point results, so that every
     /// machine of a cluster has the same.
     pub settings: Map<String, Value>,
     /// What was noticed while reading and fitting.

@@ -50,7 +50,7 @@ pub struct Guess {
     pub why: String,
 }
 
-/// Times a question is put again after an answer that is none.
+/// Times a question is put again after an answer that cannot be used.
 const PATIENCE: usize = 3;
 
 impl Draft {

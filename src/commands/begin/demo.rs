@@ -81,7 +81,7 @@ pub fn run(args: DemoArgs) -> Result<Outcome> {
     let first = fresh(&FIRST_CELL, dir)?;
     let second = fresh(&SECOND_CELL, dir)?;
     let of = |command: &str, campaign: &Campaign| format!("lobestone {command} {}", campaign.dir.display());
-    // One cell beside the other: neither needs what the other finds.
+    // Both cells at once: neither needs what the other finds.
     let (told_first, told_second) = std::thread::scope(|scope| {
         let of_first = scope.spawn(|| first_story(&first, of));
         let of_second = second_story(&second, of);

@@ -328,7 +328,7 @@ pub fn dominant(peaks: &[ResidualPeak]) -> String {
 
 /// Times noise from which on a character of the error map is used.
 const SHADES: [(f64, char); 5] = [(0.0, '·'), (1.5, '░'), (3.0, '▒'), (10.0, '▓'), (30.0, '█')];
-/// Directions beside each other, so that a line fits a terminal of 80 columns.
+/// Directions side by side, so that a line fits a terminal of 80 columns.
 const DIRECTIONS_A_LINE: usize = 5;
 
 /// The error map at a glance: a row a posture, a block a direction, a character a band.

@@ -27,7 +27,7 @@ pub struct ModelArgs {
     /// Let the links bend with this Young's modulus (rigid links if left out; --matrices takes 200e9 then).
     #[arg(long, value_name = "PA")]
     young_pa: Option<f64>,
-    /// Write the robot with its masses (calibrated where there are FRFs) as a URDF, and the compliances into a file beside it.
+    /// Write the robot with its masses (calibrated where there are FRFs) as a URDF, and the compliances into a file next to it.
     #[arg(long, value_name = "FILE")]
     urdf: Option<PathBuf>,
 }
@@ -118,7 +118,7 @@ fn calibrated(campaign: &Campaign, model: &StructureModel, theta: &[f64], effect
     of_baseline(&model.baseline(theta, false), source, beyond.collect())
 }
 
-/// The URDF and what it cannot hold in a file beside it: `robot.urdf`, `robot.compliances.toml`.
+/// The URDF and what it cannot hold in a file next to it: `robot.urdf`, `robot.compliances.toml`.
 fn write_urdf(file: &Path, model: &StructureModel, sources: &Sources) -> Result<[PathBuf; 2]> {
     let beside = file.with_extension("compliances.toml");
     let texts = [

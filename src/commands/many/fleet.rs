@@ -13,7 +13,7 @@ use crate::report::stores::batch_folder::{self, BatchFolder};
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  lobestone fleet results\n\
-                  It writes fleet/report.html (with images beside it) and fleet/all.csv, the tables of all shards as one.")]
+                  It writes fleet/report.html (with images next to it) and fleet/all.csv, the tables of all shards as one.")]
 pub struct FleetArgs {
     /// The folder of `lobestone batch --out`.
     results: PathBuf,

@@ -107,7 +107,7 @@ pub fn write(files: &Files, analysis: &ModalAnalysis, json: &mut Value, said: &m
         let written = modal_page::page(analysis, &extras, &title).write(folder)?;
         let _ = writeln!(
             said,
-            "report   {}\nfigures  {} PNG files beside it",
+            "report   {}\nfigures  {} PNG files next to it",
             written.html.display(),
             written.images.len()
         );

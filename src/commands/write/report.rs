@@ -85,7 +85,7 @@ pub fn document(files: &ReportFiles) -> Value {
 
 fn describe(files: &ReportFiles) -> String {
     let mut text = format!(
-        "report   {}\nfigures  {} PNG files beside it\n",
+        "report   {}\nfigures  {} PNG files next to it\n",
         files.html.display(),
         files.images.len()
     );

@@ -24,7 +24,7 @@ enum QuantityArg {
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "The folder stays blind: what was hidden stands in DIR.truth.json beside it, not in it. The data \
+    after_help = "The folder stays blind: what was hidden stands in DIR.truth.json next to it, not in it. The data \
                         come from the same model that the fits use.\n\nExamples:\n  lobestone simulate --out cell1\n  \
                         lobestone simulate --out cell2 --effect payload:mass_kg=25 --seed 3\n  lobestone simulate --out \
                         cell3 --kind dirty --effect joint-transverse-compliance@joint-3 --visibility 20\n  lobestone \

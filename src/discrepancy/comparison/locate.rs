@@ -154,7 +154,7 @@ fn candidates(model: &StructureModel) -> Vec<Candidate> {
         .collect()
 }
 
-/// The model's parameters refitted beside a free law at `axes`.
+/// The model's parameters refitted together with a free law at `axes`.
 fn fit(
     model: &StructureModel,
     theta: &[f64],

@@ -27,7 +27,7 @@ pub struct Screened {
     pub spot: Spot,
     /// Misfit per complex value that is left with an unknown of its own for each line and posture.
     pub left_free: f64,
-    /// The same with one unknown a line, common to all postures, for a part that is small beside the structure.
+    /// The same with one unknown a line, common to all postures, for a part that is small compared with the structure.
     pub left_common: f64,
     /// Scatter of the dynamic stiffness over postures beyond its noise: 1 where it is the same everywhere.
     pub consistency: f64,

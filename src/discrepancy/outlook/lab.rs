@@ -20,7 +20,7 @@ const TURN_DEG: f64 = 20.0;
 /// Share of the arm's length that the tool keeps from the base axis.
 const LEAST_REACH: f64 = 0.2;
 
-/// Effort beside the FRFs themselves, in units of one FRF (some ten hits with everything in place): glueing a sensor to a
+/// Effort on top of the FRFs themselves, in units of one FRF (some ten hits with everything in place): glueing a sensor to a
 /// new place, driving back to a posture, setting up at a new one, changing the hammer's mass and tip.
 const NEW_PLACE: f64 = 2.0;
 const DRIVE_BACK: f64 = 2.0;

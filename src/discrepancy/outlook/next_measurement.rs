@@ -137,7 +137,7 @@ fn where_it_sits(data: &FrfData, diagnosis: &Diagnosis<Structure>) -> String {
         .collect();
     match unseen.as_slice() {
         [] => format!(
-            "response points on the floor, the base and beside the tool, three directions, at posture {posture}: the rest is \
+            "response points on the floor, the base and next to the tool, three directions, at posture {posture}: the rest is \
              real, every link is measured, and what moves there would say whether it sits outside the arm"
         ),
         some => format!(

@@ -22,7 +22,7 @@ impl Effect<Cutting> for Chatter {
     }
 
     fn fingerprint(&self) -> &'static str {
-        "Lines beside the tooth-passing comb, at one frequency and that shifted by the tooth-passing frequency."
+        "Lines off the tooth-passing comb, at one frequency and that shifted by the tooth-passing frequency."
     }
 
     fn background(&self) -> Background {

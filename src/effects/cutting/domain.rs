@@ -92,7 +92,7 @@ pub struct CutPhysics {
 /// Rows of a 3×3 matrix.
 pub type Mixing = [[Dual; 3]; 3];
 
-/// The tool's axis beside the spindle's.
+/// The tool's axis off the spindle's.
 #[derive(Debug, Clone)]
 pub struct Runout {
     /// Distance of the two axes, mm.

@@ -5,7 +5,7 @@ use crate::effects::{Background, Size};
 use crate::parameter::{Parameter, Prior};
 use crate::robot::Dual;
 
-/// The tool's axis lies beside the spindle's: every tooth has its own radius.
+/// The tool's axis lies off the spindle's: every tooth has its own radius.
 pub struct RunoutEffect;
 
 impl Effect<Cutting> for RunoutEffect {
@@ -14,12 +14,12 @@ impl Effect<Cutting> for RunoutEffect {
     }
 
     fn explanation(&self) -> &'static str {
-        "The tool's axis lies beside the spindle's axis, so that every tooth cuts a chip of its own thickness and some may \
+        "The tool's axis lies off the spindle's axis, so that every tooth cuts a chip of its own thickness and some may \
          miss the cut. The direction is counted from one of the teeth; which one, forces cannot tell."
     }
 
     fn fingerprint(&self) -> &'static str {
-        "Lines at once per revolution and its multiples beside the tooth-passing comb, the stronger the smaller the feed."
+        "Lines at once per revolution and its multiples, off the tooth-passing comb, the stronger the smaller the feed."
     }
 
     fn background(&self) -> Background {

@@ -28,7 +28,7 @@ impl Effect<Structure> for BaseCompliance {
 
     fn background(&self) -> Background {
         Background {
-            lab_check: "Put accelerometers on the pedestal's foot plate and on the floor beside it, hit the arm: a pedestal that \
+            lab_check: "Put accelerometers on the pedestal's foot plate and on the floor next to it, hit the arm: a pedestal that \
              rocks moves against the floor. Dial gauges at two edges of the foot under a pull at the arm do as well. \
              Check the torque of the anchor bolts first.",
             typical: "A foot plate bolted to a good foundation: above 50 MN·m/rad. Steel frames, pallets and pedestals on shims: \

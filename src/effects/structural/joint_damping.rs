@@ -7,7 +7,7 @@ use crate::effects::{At, Effect, Known, NEGLIGIBLE, Site};
 use crate::parameter::{Parameter, Prior};
 use crate::robot::{Chain, Dual, Role};
 
-/// Damping sits in the joints (viscous, one coefficient each), beside what is left of the one ratio for all modes.
+/// Damping sits in the joints (viscous, one coefficient each), on top of what is left of the one ratio for all modes.
 ///
 /// The common ratio is multiplied by `common_share`: 0 where all damping sits in the joints, 1 in the model without the
 /// effect, so that the one model is a special case of the other. A share a little below zero is an estimate of zero with
@@ -23,7 +23,7 @@ impl Effect<Structure> for JointDamping {
     }
 
     fn explanation(&self) -> &'static str {
-        "Damping sits in the joints: a viscous damper beside each gear, instead of one damping ratio for all modes."
+        "Damping sits in the joints: a viscous damper in parallel with each gear, instead of one damping ratio for all modes."
     }
 
     fn fingerprint(&self) -> &'static str {

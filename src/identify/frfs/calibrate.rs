@@ -1,4 +1,4 @@
-//! Tunes the structural model to measured FRFs: maximum a posteriori, staged so that no peak is trapped beside the
+//! Tunes the structural model to measured FRFs: maximum a posteriori, staged so that no peak is trapped next to the
 //! one it belongs to, repeated from other starting points where the fit is not as good as the noise allows.
 
 use nalgebra::DMatrix;
@@ -346,7 +346,7 @@ const SCANNED: usize = 3;
 const ROUNDS: usize = 4;
 
 /// Where a scan of `values` along `direction` from `theta` has its local minima of the log magnitudes' misfit, with their
-/// costs, beside the one in the middle.
+/// costs, other than the one in the middle.
 fn valleys(
     problem: &FrfProblem<'_>,
     theta: &[f64],
@@ -405,7 +405,7 @@ impl Scan<'_> {
         (!gone.is_empty()).then_some(back)
     }
 
-    /// Single joints beside where `found` has them.
+    /// Single joints away from where `found` has them.
     fn single_joints(&self, found: &[f64]) -> Vec<Vec<f64>> {
         let joints = 0..self.model.robot.joint_count();
         lowest(
@@ -438,7 +438,7 @@ fn race(model: &StructureModel, sketch: &FrfData, points: &[Vec<f64>], first: Fi
             fit
         })
         .collect();
-    // Starts that a look leaves far behind the others would only end beside the answer.
+    // Starts that a look leaves far behind the others would only end in another optimum.
     let lowest = looks.iter().map(|f| f.cost).fold(first.cost, f64::min);
     let mut fits: Vec<Fit> = looks
         .par_iter()
@@ -465,7 +465,7 @@ pub fn calibrate(
         None => approach(model, &sketch_data, &nominal, ROUGH)?,
     };
     let (mut starts, mut agreeing) = (1, 1);
-    // Optima beside the answer.
+    // Optima other than the answer.
     let mut others = Vec::new();
     let misfit = |fit: &Fit, data: &FrfData| {
         2.0 * fit.cost / ((2 * data.value_count()) as f64 - model.parameters.len() as f64).max(1.0)

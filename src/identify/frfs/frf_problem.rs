@@ -20,7 +20,7 @@ use crate::{Result, stop};
 /// What is compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Misfit {
-    /// ln|H| with a broad tolerance: smooth far from the optimum, where a model's peak stands beside the measured one.
+    /// ln|H| with a broad tolerance: smooth far from the optimum, where a model's peak stands next to the measured one.
     LogMagnitude,
     /// H itself against the measured noise: the likelihood.
     Complex,
@@ -417,7 +417,7 @@ mod tests {
         }
     }
 
-    /// Every effect's derivatives, and those of the baseline beside it, against central differences of the cost.
+    /// Every effect's derivatives, and those of the baseline with it, against central differences of the cost.
     #[test]
     fn gradients_of_all_effects_agree_with_differences() {
         let bare = model();
@@ -455,7 +455,7 @@ mod tests {
         }
     }
 
-    /// Moments of inertia, centres of mass, lengths and walls: the same, alone and beside effects that use what they change.
+    /// Moments of inertia, centres of mass, lengths and walls: the same, alone and with effects that use what they change.
     #[test]
     fn gradients_of_link_parameters_agree_with_differences() {
         let exact = model();

@@ -27,7 +27,7 @@ pub struct PostureMode {
 }
 
 impl PostureMode {
-    /// Largest and smallest real part of the receptance beside the mode, as if it stood alone: 1/(4kζ(1−ζ)) and
+    /// Largest and smallest real part of the receptance near the mode, as if it stood alone: 1/(4kζ(1−ζ)) and
     /// −1/(4kζ(1+ζ)) (Altintas 2012, §3), m/N, by magnitude.
     pub fn peak_real_m_per_n(&self, axis: Axis) -> f64 {
         self.compliance_m_per_n[axis.index()] / (4.0 * self.damping_ratio * (1.0 - self.damping_ratio))

@@ -3,7 +3,7 @@
 //!
 //! A law of force over displacement at one displacement of the structure changes the receptance matrix by a matrix of rank
 //! one, ΔH_oi = b_o g b_i (Sherman and Morrison 1950; the added-part form of frequency-based substructuring, de Klerk,
-//! Rixen and Voormeeren 2008). For a dynamic stiffness z beside a displacement d that the model has, b = Y_d· and
+//! Rixen and Voormeeren 2008). For a dynamic stiffness z in parallel with a displacement d that the model has, b = Y_d· and
 //! g = −z/(1 + z Y_dd). For a displacement q that the model takes for stiff, with dynamic stiffness κ,
 //! b_o = r_qo + ω² Y(m_q, o) and g = 1/(κ + Z_qq), Z_qq = −ω² m_qq − ω⁴ Y(m_q, m_q), where m_q is the mass that couples q
 //! with the model's coordinates.
@@ -65,7 +65,7 @@ pub struct SpotResponses {
     pub values: usize,
 }
 
-/// A displacement's row in the model's coordinates; for a series spot the mass coupling, with what stands beside it.
+/// A displacement's row in the model's coordinates; for a series spot the mass coupling, with what stands in parallel with it.
 struct SpotRow {
     row: DVector<f64>,
     /// Series: mass of the displacement itself and displacement of each output per unit of it.

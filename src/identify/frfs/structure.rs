@@ -197,7 +197,7 @@ impl StructureModel {
         }
     }
 
-    /// The robot with the numbers of its file that are tuned (beside joint stiffnesses and masses) as they are at `theta`.
+    /// The robot with the numbers of its file that are tuned (other than joint stiffnesses and masses) as they are at `theta`.
     pub fn robot_at(&self, theta: &[f64]) -> Cow<'_, RobotModel> {
         if self.file_numbers.is_empty() {
             return Cow::Borrowed(&self.robot);

@@ -19,7 +19,7 @@ pub struct StrongestMode {
     pub axis: Axis,
     /// Natural frequency, Hz.
     pub frequency_hz: f64,
-    /// Largest real part of the receptance beside the mode, m/N: 1/(4kζ(1−ζ)) of a single mode (Altintas 2012, §3).
+    /// Largest real part of the receptance next to the mode, m/N: 1/(4kζ(1−ζ)) of a single mode (Altintas 2012, §3).
     pub peak_real_m_per_n: f64,
 }
 

@@ -23,7 +23,7 @@ use crate::robot::Kinematics;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ResonanceReading {
-    /// Natural frequency, and the largest real part beside it.
+    /// Natural frequency, and the largest real part near it.
     ModalTable,
     /// Where the real part has a minimum, and its depth.
     RealPartMinimum,
@@ -44,7 +44,7 @@ pub struct Resonance {
     pub readings_hz: [f64; 2],
     /// Standard deviation of the frequency's logarithm.
     pub frequency_std: f64,
-    /// Real part beside the resonance by magnitude, m/N.
+    /// Real part near the resonance by magnitude, m/N.
     pub size_m_per_n: f64,
     /// Standard deviation of its logarithm.
     pub size_std: f64,

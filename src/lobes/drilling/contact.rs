@@ -105,7 +105,7 @@ pub fn held_compliance(
     (Matrix6::identity() + free * ground).lu().solve(free)
 }
 
-/// Natural frequencies and stiffness at a posture where the contacts hold the tool point. The springs stand beside those
+/// Natural frequencies and stiffness at a posture where the contacts hold the tool point. The springs act in parallel with those
 /// of the chain; the flange and the tool point move with them.
 ///
 /// # Errors

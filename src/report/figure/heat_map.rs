@@ -39,7 +39,7 @@ pub struct HeatMap {
     pub range: Option<(f64, f64)>,
     /// A logarithmic colour scale; needs a `range` above zero.
     pub log: bool,
-    /// Further tables of the same rows and columns, drawn beside the first on the same colour scale.
+    /// Further tables of the same rows and columns, drawn next to the first on the same colour scale.
     pub beside: Vec<Vec<Vec<Option<f64>>>>,
     /// One a table, above it; none needed for a single table.
     pub table_titles: Vec<String>,
@@ -74,7 +74,7 @@ impl HeatMap {
         let gaps = GAP * (tables.len() - 1) as f64;
         let table_width = (right - left - gaps) / tables.len() as f64;
         let cell_width = table_width / columns as f64;
-        // Few rows are drawn taller, so that the colour scale beside them has room.
+        // Few rows are drawn taller, so that the colour scale next to them has room.
         let cell_height = (840.0 / rows as f64)
             .min((190.0 / rows as f64).max(46.0))
             .max(6.0);

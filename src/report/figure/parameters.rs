@@ -25,7 +25,7 @@ pub struct ParameterRow {
     pub after: Option<DrawnEstimate>,
 }
 
-/// Horizontal bars of value / nominal − 1 with standard errors, and the values in numbers beside them.
+/// Horizontal bars of value / nominal − 1 with standard errors, and the values in numbers next to them.
 #[derive(Debug, Clone, Default)]
 pub struct ParameterFigure {
     pub title: String,

@@ -33,7 +33,7 @@ fn the_gallery_is_valid_not_blank_and_small() {
         );
         // Edges of lines and letters have few shades each; a blank sheet has one colour.
         assert!(colours > 10, "{name}: {colours} colours");
-        // Two maps beside each other have the cells of two.
+        // Two maps side by side have the cells of two.
         let most = if name.ends_with("_pair") { 300_000 } else { 200_000 };
         assert!(png.len() < most, "{name}: {} bytes", png.len());
         if let Some(folder) = &keep {

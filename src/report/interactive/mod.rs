@@ -1,7 +1,7 @@
 //! Figures that answer to the mouse: zoom, values under the pointer, cells that lead on.
 //!
 //! Each file here describes one kind of figure in the terms of plotly.js (<https://plotly.com/javascript/reference/>), from
-//! the same plain numbers that the static figure of [`super::figure`] is drawn from. plotly.js itself lies beside them, without
+//! the same plain numbers that the static figure of [`super::figure`] is drawn from. plotly.js itself lies next to them, without
 //! what no figure here uses (`scripts/plotly_bundle.py`); `page.js` unpacks both and holds what little joins them: choosing an FRF, choosing a model.
 //! Printed, and where scripts are off, the page shows the static figures.
 

@@ -237,7 +237,7 @@ const parsed = new Promise((done) => document.addEventListener("DOMContentLoaded
         const [down, right] = steps[event.key];
         at.row = Math.min(Math.max(at.row + down, 0), z.length - 1);
         at.column += right;
-        // From one map to the one beside it.
+        // From one map to the one next to it.
         if (at.column < 0) [at.table, at.column] = at.table > 0 ? [at.table - 1, z[0].length - 1] : [0, 0];
         else if (at.column >= z[0].length) {
           [at.table, at.column] = at.table + 1 < div.data.length ? [at.table + 1, 0] : [at.table, z[0].length - 1];

@@ -16,7 +16,7 @@ fn band_names(map: &ErrorMap) -> Vec<String> {
         .collect()
 }
 
-/// Posture and direction over band in multiples of the noise, several maps of the same data beside each other on one
+/// Posture and direction over band in multiples of the noise, several maps of the same data side by side on one
 /// colour scale.
 pub fn times_noise_map(title: &str, maps: &[(&str, &ErrorMap)]) -> HeatMap {
     let Some((_, first)) = maps.first() else {

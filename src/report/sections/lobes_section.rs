@@ -97,7 +97,7 @@ pub fn section(findings: &LobeFindings, structure: Option<&StructureFindings>) -
         Some(Ok(measured)) => {
             blocks.push(paragraph(
                 "The same cut on the FRFs as measured, with no model in between. Measured FRFs end at their last line \
-                 and carry noise; where both curves agree, the lobes do not hang on the model.",
+                 and carry noise; where both curves agree, the lobes do not depend on the model.",
             ));
             blocks.extend(figures(measured, "lobes-measured", "measured FRFs: "));
         }
@@ -201,7 +201,7 @@ fn outcomes(outcomes: &Outcomes) -> Vec<Block> {
     let rows: Vec<Vec<String>> = rows.collect();
     if !rows.is_empty() {
         blocks.push(Block::Table(ReportTable {
-            caption: "Cuts with a noted outcome, beside the limit at their speed".into(),
+            caption: "Cuts with a noted outcome, next to the limit at their speed".into(),
             columns: vec![
                 TableColumn::text("cut"),
                 TableColumn::text("posture"),

@@ -1,6 +1,6 @@
 //! The folder of a batch: a file a campaign, tables of the shards, and what they are put together to.
 //!
-//! A file is written beside its name and renamed: what has the name of a result is a whole one, and a worker that is
+//! A file is written under a temporary name and renamed: what has the name of a result is a whole one, and a worker that is
 //! killed loses the campaign in hand.
 
 use std::path::{Path, PathBuf};

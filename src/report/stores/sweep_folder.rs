@@ -1,7 +1,7 @@
 //! The folder of a map of the workspace: shards as Parquet files, and all of them as one.
 //!
 //! Every file carries the settings it was made with in its metadata, under the key `lobestone.sweep`; a file is written
-//! beside its name and renamed, so what has the name of a shard is a whole shard.
+//! under a temporary name and renamed, so what has the name of a shard is a whole shard.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};

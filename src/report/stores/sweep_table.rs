@@ -19,10 +19,10 @@ const QUANTITIES: [&str; 7] = [
     "lowest_frequency_hz",
 ];
 
-/// The columns of a merged table for its summary, and beside them the least of the three stiffnesses.
+/// The columns of a merged table for its summary, and with them the least of the three stiffnesses.
 ///
 /// # Errors
-/// A table that is none of this program's.
+/// A table that this program did not write.
 pub fn columns(frame: &DataFrame) -> Result<MapColumns> {
     let failed = |e: PolarsError| Error::computation(format!("the merged map: {e}"));
     let numbers = |name: &str| -> Result<Vec<Option<f64>>> {

@@ -228,7 +228,7 @@ fn refuse_what_does_not_turn(tree: &Tree<'_>, way: &[&Joint], base: &str, tool: 
     Ok(())
 }
 
-/// What hangs together with a link of the chain.
+/// What is fixed to a link of the chain.
 struct Segment<'a> {
     /// In the frame of its first link.
     body: RigidBody,

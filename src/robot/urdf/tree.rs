@@ -10,7 +10,7 @@ use crate::{InputError, Result};
 /// Names that tool frames usually have, most wanted first.
 const TOOL_NAMES: [&str; 2] = ["tool0", "flange"];
 
-/// The links of a file and what hangs on what.
+/// The links of a file and what is attached to what.
 pub struct Tree<'a> {
     pub file: &'a Path,
     pub robot: &'a Robot,
@@ -101,7 +101,7 @@ impl<'a> Tree<'a> {
         }
         for link in &robot.links {
             if tree.way(None, &link.name).is_none() {
-                let problem = "the link hangs on itself through its joints".to_string();
+                let problem = "the link is its own ancestor".to_string();
                 return wrong(
                     &link.name,
                     problem,
@@ -117,7 +117,7 @@ impl<'a> Tree<'a> {
         self.below.get(link).map_or(&[], Vec::as_slice)
     }
 
-    /// Joints from `base` (from the root, where `None`) to `link`, base first; `None` where `link` does not hang on `base`.
+    /// Joints from `base` (from the root, where `None`) to `link`, base first; `None` where `link` is not attached to `base`.
     pub fn way(&self, base: Option<&str>, link: &str) -> Option<Vec<&'a Joint>> {
         let mut way = Vec::new();
         let mut at = link;
@@ -176,12 +176,12 @@ impl<'a> Tree<'a> {
     /// (of several one behind no other kind of joint, then the one behind most links).
     ///
     /// # Errors
-    /// No link of that name, or one that does not hang on the base.
+    /// No link of that name, or one that is not attached to the base.
     pub fn tool(&self, asked: Option<&str>, base: &str) -> Result<(&'a str, String)> {
         if let Some(name) = asked {
             let link = self.known(name, "--tool-link")?;
             if self.way(Some(base), link).is_none() {
-                return Err(InputError::new(format!("{link} does not hang on {base}"))
+                return Err(InputError::new(format!("{link} is not attached to {base}"))
                     .file(self.file)
                     .key("--tool-link")
                     .remedy("choose base and tool so that the way from one to the other leads outwards")

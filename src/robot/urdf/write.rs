@@ -152,7 +152,7 @@ pub fn urdf(robot: &RobotModel, sources: &Sources) -> String {
 /// What a URDF cannot hold, as TOML: compliance of each joint, damping ratio, Young's modulus.
 pub fn compliances(spec: &RobotSpec, sources: &Sources) -> String {
     let mut text = format!(
-        "# What the URDF beside this file has no place for. Written by lobestone.\nrobot = {}\nsource = {}\n",
+        "# What the URDF next to this file has no place for. Written by lobestone.\nrobot = {}\nsource = {}\n",
         quoted(&spec.name),
         quoted(&sources.source)
     );

@@ -178,7 +178,7 @@ class Campaign(Shown):
         return Lobes.of(self._document("lobes", progress=progress))
 
     def frfs(self, *, progress: Progress | None = None) -> Frfs:
-        """Measured FRFs beside those of the model as it stands, which is calibrated for that.
+        """Measured FRFs and those of the model as it stands, which is calibrated for that.
 
         >>> frfs = Campaign.load("cell3").frfs()
         >>> len(frfs), frfs[0].posture

@@ -14,7 +14,7 @@ __all__ = ["Frf", "Frfs"]
 
 @dataclass(frozen=True, repr=False)
 class Frf(Shown):
-    """One measured FRF beside the calibrated model's: receptances in m/N (time factor e^{+iωt}) on ``frequency_hz``.
+    """One measured FRF and the calibrated model's: receptances in m/N (time factor e^{+iωt}) on ``frequency_hz``.
 
     ``robot_file`` is the model before calibration; ``noise_std`` the standard deviation of the measured complex value.
     """

@@ -17,7 +17,7 @@ pub struct DistanceTable {
 }
 
 /// Σ |m − h|² / (|m|² + |h|² + 2σ²) over the lines: 0 where they agree, 1 for a line of another size, 2 for the opposite
-/// sign. No line counts more than another, so that peaks beside their places and large values do not decide.
+/// sign. No line counts more than another, so that peaks away from their places and large values do not decide.
 pub fn distance(model: impl Iterator<Item = Complex64>, frf: &FrfDatum) -> f64 {
     let lines = model.zip(&frf.receptance).zip(&frf.noise_std);
     lines

@@ -38,7 +38,7 @@ pub struct LobeMarker {
     pub spindle_rpm: f64,
     pub depth_mm: f64,
     pub outcome: LobeOutcome,
-    /// Written beside the sign; may be empty.
+    /// Written next to the sign; may be empty.
     pub label: String,
 }
 

@@ -61,7 +61,7 @@ impl RegressionFigure {
         let ys = extent(bars.chain(ends).chain([0.0])).unwrap_or((0.0, 1.0));
         let y = FigureAxis::padded(&self.y_label, ys, 0.06, 7);
 
-        // What the lines leave over is small beside the forces: it needs a scale of its own.
+        // What the lines leave over is small compared with the forces: it needs a scale of its own.
         let rests = self.series.iter().flat_map(RegressionSeries::rests);
         let rests = rests.flat_map(|(point, rest)| {
             let error = point.std_error.filter(|e| usable(*e)).unwrap_or(0.0);

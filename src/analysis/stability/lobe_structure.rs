@@ -1,5 +1,6 @@
 //! The structures that lobes are drawn for, from modes, the model or measured FRFs, and their lobes.
 
+use crate::analysis::modes::modal::ModalAnalysis;
 use crate::analysis::stability::lobe_case::{BEST, LobeCase, LobesBefore};
 use crate::analysis::stability::lobe_model::{Asked, Dynamics, ModelState};
 use crate::analysis::stability::lobe_setup::modes_of_table;
@@ -20,6 +21,8 @@ use crate::{InputError, Result};
 
 /// FRFs measured farther than this from the holder face get a warning, m.
 const FACE_OFF_M: f64 = 0.01;
+/// Share of the lines on the modes' curve from which on that is said.
+const MOSTLY: f64 = 0.5;
 
 /// One structure that lobes are drawn for.
 pub(crate) struct LobeStructure {
@@ -223,7 +226,9 @@ pub(crate) fn from_measured(
     }
     let (set, read_warnings) = campaign.load_frfs()?;
     warnings.extend(read_warnings);
-    let structures = measured_structures(campaign, &set)?;
+    // Too few lines for modes: as measured.
+    let modes = ModalAnalysis::usual(campaign).ok();
+    let structures = measured_structures(campaign, &set, modes.as_deref())?;
     let has_tool = !asked.tool.beam.segments.is_empty();
     let coupled = asked.couples();
     let model = match (coupled, &campaign.robot) {
@@ -291,7 +296,14 @@ pub(crate) fn from_measured(
                 hole: None,
                 feed_stiffness: None,
                 variants: Vec::new(),
-                description: format!("measured FRFs{}", asked.with_tool()),
+                description: format!(
+                    "measured FRFs{}{}",
+                    match s.smoothed_share > MOSTLY {
+                        true => ", noise taken out by their modes",
+                        false => "",
+                    },
+                    asked.with_tool()
+                ),
             })
         })
         .collect()

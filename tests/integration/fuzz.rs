@@ -11,13 +11,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use lobestone::campaign::Campaign;
-use lobestone::data::RobotSpec;
-use lobestone::ingest::{self, Contents};
-use lobestone::revision::RevisionLog;
-
 use crate::served::Served;
 use crate::support::copy_of;
+
+#[path = "../fuzz/promises.rs"]
+mod promises;
 
 /// No input of some kilobytes takes so long, even on a busy machine.
 const LONGEST: Duration = Duration::from_secs(20);
@@ -135,43 +133,6 @@ fn mutated(random: &mut Random, corpus: &[Vec<u8>]) -> Vec<u8> {
     bytes
 }
 
-/// The promise of every reader to its callers.
-fn assert_sound(contents: &Contents) {
-    for frf in &contents.frfs {
-        assert_eq!(frf.frequency_hz.len(), frf.value.len());
-        assert!(!frf.value.is_empty());
-        assert!(frf.frequency_hz.windows(2).all(|w| w[0] < w[1]));
-        assert!(frf.frequency_hz.iter().all(|f| f.is_finite() && *f >= 0.0));
-        assert!(frf.value.iter().all(|v| v.norm() <= 1e15));
-        let coherence = frf.coherence.iter().flatten();
-        assert!(coherence.clone().all(|c| (0.0..=1.0).contains(c)));
-        assert!(frf.coherence.as_ref().is_none_or(|c| c.len() == frf.value.len()));
-        assert!(
-            !frf.name.contains(|c: char| c.is_control() && c != '\t'),
-            "{:?}",
-            frf.name
-        );
-    }
-    for record in &contents.times {
-        assert!(
-            record.sample_rate_hz > 0.0 && record.sample_rate_hz.is_finite() && record.start_s.is_finite()
-        );
-        for channel in &record.channels {
-            assert_eq!(channel.samples.len(), record.len());
-            assert!(channel.samples.iter().all(|v| v.abs() <= 1e15));
-            assert!(
-                !channel.name.contains(|c: char| c.is_control() && c != '\t'),
-                "{:?}",
-                channel.name
-            );
-        }
-        let _ = ingest::quality_warnings(record);
-    }
-    for other in &contents.others {
-        assert!(other.abscissa.iter().all(|v| v.is_finite()) && other.value.iter().all(|v| v.is_finite()));
-    }
-}
-
 /// What is fed with mutated bytes.
 #[derive(Clone, Copy, Debug)]
 enum Target {
@@ -198,12 +159,7 @@ impl Place {
         if matches!(target, Target::Campaign) {
             // A campaign whose files are missing is not read to its end.
             for toml in corpus_of(target) {
-                let toml = String::from_utf8(toml).unwrap();
-                for file in toml.lines().filter_map(|l| l.strip_prefix("file = ")) {
-                    let file = folder.path().join(file.split('"').nth(1).unwrap());
-                    std::fs::create_dir_all(file.parent().unwrap()).unwrap();
-                    std::fs::write(file, "").unwrap();
-                }
+                promises::put_files(folder.path(), &String::from_utf8(toml).unwrap());
             }
         }
         let served = matches!(target, Target::Requests).then(|| Served::start(folder.path()));
@@ -265,25 +221,10 @@ fn run(target: Target, bytes: &[u8], place: &Place) -> bool {
     let folder = place.folder.path();
     match target {
         Target::Requests => place.served.as_ref().is_some_and(|served| asked(served, bytes)),
-        Target::Reader => match ingest::read_memory(bytes) {
-            Ok(file) => {
-                assert_sound(&file.contents);
-                true
-            }
-            Err(error) => {
-                let shown = error.to_string();
-                assert!(
-                    !shown.contains(|c: char| c.is_control() && c != '\t' && c != '\n'),
-                    "{shown:?}"
-                );
-                false
-            }
-        },
-        Target::Campaign => Campaign::from_text(folder, &String::from_utf8_lossy(bytes)).is_ok(),
-        Target::Robot => {
-            RobotSpec::from_text(Path::new("robot.toml"), &String::from_utf8_lossy(bytes)).is_ok()
-        }
-        Target::Revisions => RevisionLog::from_bytes(folder, bytes).is_ok(),
+        Target::Reader => promises::reads_measurements(bytes),
+        Target::Campaign => promises::reads_campaign(folder, bytes),
+        Target::Robot => promises::reads_robot(bytes),
+        Target::Revisions => promises::reads_revisions(folder, bytes),
     }
 }
 
@@ -531,6 +472,19 @@ fn mutated_files_do_no_harm() {
         };
         let outcome = fuzz(target, &corpus, 1, runs, Duration::from_secs(60));
         assert!(outcome.read > 0, "{target:?}: nothing is read to its end");
+    }
+}
+
+#[test]
+#[ignore = "writes the seeds of cargo-fuzz: tests/fuzz/README.md"]
+fn corpus_for_cargo_fuzz() {
+    let fuzz = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/corpus");
+    for target in [Target::Reader, Target::Campaign, Target::Robot, Target::Revisions] {
+        let folder = fuzz.join(format!("{target:?}").to_lowercase());
+        std::fs::create_dir_all(&folder).unwrap();
+        for (i, bytes) in corpus_of(target).iter().enumerate() {
+            std::fs::write(folder.join(format!("seed-{i:02}")), bytes).unwrap();
+        }
     }
 }
 

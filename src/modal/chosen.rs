@@ -2,9 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
+use super::pole_fit::PoleFit;
 use super::shape;
 use super::stabilisation::Stability;
 use crate::modal::together::global_modes::{GlobalMode, GlobalModes};
@@ -73,7 +73,7 @@ impl Choice {
         }
         modes.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
         let poles: Vec<(f64, f64)> = modes.iter().map(|m| (m.frequency_hz, m.damping_ratio)).collect();
-        let fits: Vec<Option<Fit>> = found
+        let fits: Vec<Option<PoleFit>> = found
             .reconstructions
             .iter()
             .map(|r| r.as_ref().map(|r| fit(r, &poles)).transpose())
@@ -93,12 +93,17 @@ impl Choice {
             if let (Some(r), Some(fit)) = (reconstruction, fit) {
                 let mobility = |z: &Complex64, f: &f64| (TAU * f * z.norm()).powi(2);
                 let (mut error, mut total) = (0.0, 0.0);
-                for ((f, h), model) in r.frequency_hz.iter().zip(&r.measured_m_per_n).zip(&fit.fitted) {
+                for ((f, h), model) in r
+                    .frequency_hz
+                    .iter()
+                    .zip(&r.measured_m_per_n)
+                    .zip(&fit.fitted_m_per_n)
+                {
                     error += mobility(&(h - model), f);
                     total += mobility(h, f);
                 }
                 r.error_nrms = (error / total).sqrt();
-                r.fitted_m_per_n = fit.fitted;
+                r.fitted_m_per_n = fit.fitted_m_per_n;
             }
         }
         let residues: Vec<Vec<Complex64>> = modes
@@ -178,61 +183,10 @@ fn meant(found: &GlobalModes, f: f64, zeta: Option<f64>) -> std::result::Result<
     })
 }
 
-struct Fit {
-    /// By mode: constant, 1/kg, and the standard deviation of its real and imaginary part.
-    constants: Vec<(Complex64, f64)>,
-    fitted: Vec<Complex64>,
-}
-
-/// Least squares of one FRF's mobility in the modal constants and two residual terms (mass below, stiffness above).
-fn fit(of: &Reconstruction, poles: &[(f64, f64)]) -> std::result::Result<Fit, String> {
-    let (lines, unknowns) = (of.frequency_hz.len(), poles.len() + 2);
-    if lines <= unknowns {
-        return Err(format!("{lines} lines are too few for {} poles", poles.len()));
-    }
-    let term = |k: usize, column: usize| {
-        let w = TAU * of.frequency_hz[k];
-        match poles.get(column) {
-            Some((f, zeta)) => {
-                let w0 = TAU * f;
-                1.0 / Complex64::new(w0 * w0 - w * w, 2.0 * zeta * w0 * w)
-            }
-            None if column == poles.len() => Complex64::from(-1.0 / (w * w)),
-            None => Complex64::ONE,
-        }
-    };
-    let matrix = DMatrix::from_fn(lines, unknowns, |k, j| term(k, j) * (TAU * of.frequency_hz[k]));
-    let scale: Vec<f64> = matrix
-        .column_iter()
-        .map(|c| c.norm().max(f64::MIN_POSITIVE))
-        .collect();
-    let scaled = DMatrix::from_fn(lines, unknowns, |k, j| matrix[(k, j)] / scale[j]);
-    let right = DVector::from_fn(lines, |k, _| of.measured_m_per_n[k] * (TAU * of.frequency_hz[k]));
-    // A trace on the diagonal keeps two poles at one place from breaking it.
-    let normal = scaled.adjoint() * &scaled + DMatrix::identity(unknowns, unknowns) * Complex64::from(1e-12);
-    let inverse = normal
-        .cholesky()
-        .map(|c| c.inverse())
-        .ok_or("the poles cannot be told apart")?;
-    let solution = &inverse * scaled.adjoint() * &right;
-    let rest = &right - &scaled * &solution;
-    let variance = rest.norm_squared() / (lines - unknowns) as f64;
-    let constants = (0..poles.len())
-        .map(|j| {
-            let std = (0.5 * variance * inverse[(j, j)].re.max(0.0)).sqrt() / scale[j];
-            (solution[j] / scale[j], std)
-        })
-        .collect();
-    let model = &scaled * &solution;
-    let fitted = of
-        .frequency_hz
-        .iter()
-        .enumerate()
-        .map(|(k, f)| model[k] / (TAU * f));
-    Ok(Fit {
-        constants,
-        fitted: fitted.collect(),
-    })
+/// Constants and curve of one FRF, fitted as mobility: in receptance a robot's lowest mode alone would count.
+fn fit(of: &Reconstruction, poles: &[(f64, f64)]) -> std::result::Result<PoleFit, String> {
+    let weights: Vec<f64> = of.frequency_hz.iter().map(|f| TAU * f).collect();
+    PoleFit::of(&of.frequency_hz, &of.measured_m_per_n, &weights, poles)
 }
 
 /// Constants of the reference that shows the mode best, by response; by FRF where the places are not known.

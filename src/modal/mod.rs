@@ -12,6 +12,7 @@ mod impact_test;
 pub mod indicators;
 pub(crate) mod max_likelihood;
 pub mod operational;
+pub(crate) mod pole_fit;
 pub mod quality;
 pub mod scaling;
 mod settings;

@@ -314,7 +314,6 @@ mod tests {
             frequency_hz: vec![1.0, 2.0, 3.0, 4.0],
             measured_m_per_n: h.clone(),
             fitted_m_per_n: h,
-            noise_std_m_per_n: vec![noise; 4],
         }
     }
 

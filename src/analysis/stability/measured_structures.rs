@@ -7,12 +7,12 @@
 use num_complex::Complex64;
 
 use crate::analysis::modes::modal::ModalAnalysis;
-use crate::analysis::modes::mode_set::SetModes;
 use crate::campaign::{BodyRef, Campaign, FrfSet, MeasuredFrf};
 use crate::ingest::Axis;
 use crate::lobes::SampledFrf;
 use crate::lobes::dynamics::frf::Receptance;
-use crate::modal::Reconstruction;
+use crate::modal::pole_fit::PoleFit;
+use crate::signal::frf_noise;
 use crate::{InputError, Result};
 
 /// The 2×2 receptance of the tool point as measured at one posture.
@@ -36,6 +36,13 @@ const AROUND: usize = 8;
 /// error, of which the second is then the smaller one.
 const NO_WORSE: f64 = 2.0;
 
+/// The lines of one posture's tool point.
+struct ToolPoint<'a> {
+    frequency_hz: &'a [f64],
+    /// Frequency, Hz, and damping ratio of the posture's modes.
+    poles: Vec<(f64, f64)>,
+}
+
 /// An FRF as it goes into Φ, along positive directions.
 struct Lines {
     receptance_m_per_n: Vec<Complex64>,
@@ -43,19 +50,15 @@ struct Lines {
     on_curve: usize,
 }
 
-impl Lines {
-    /// `modes`: those of the FRF's posture.
-    fn of(frf: &MeasuredFrf, modes: Option<&SetModes>) -> Self {
-        let fit = modes.and_then(|modes| {
-            let k = modes.frfs.iter().position(|f| f.input.name == frf.name)?;
-            modes.global.reconstructions[k].as_ref()
-        });
+impl ToolPoint<'_> {
+    fn lines(&self, frf: &MeasuredFrf) -> Lines {
         let mut lines = Lines {
             receptance_m_per_n: frf.receptance_m_per_n.clone(),
             on_curve: 0,
         };
-        if let Some(fit) = fit {
-            lines.take_noise_out(&frf.frequency_hz, fit);
+        let noise = frf_noise::estimate(self.frequency_hz, &[&frf.receptance_m_per_n]).remove(0);
+        if let (Some(noise), false) = (noise, self.poles.is_empty()) {
+            self.take_noise_out(&mut lines, &noise.std);
         }
         if frf.response.negative != frf.reference.negative {
             lines.receptance_m_per_n.iter_mut().for_each(|h| *h = -*h);
@@ -63,23 +66,26 @@ impl Lines {
         lines
     }
 
-    fn take_noise_out(&mut self, frequency_hz: &[f64], fit: &Reconstruction) {
-        let left: Vec<f64> = (0..fit.frequency_hz.len())
-            .map(|k| {
-                (fit.measured_m_per_n[k] - fit.fitted_m_per_n[k]).norm_sqr()
-                    / fit.noise_std_m_per_n[k].powi(2)
-            })
+    /// `noise_std`: of each line, m/N.
+    fn take_noise_out(&self, lines: &mut Lines, noise_std: &[f64]) {
+        let weights: Vec<f64> = noise_std.iter().map(|std| 1.0 / std).collect();
+        // Too few lines for these modes: as measured.
+        let Ok(fit) = PoleFit::of(
+            self.frequency_hz,
+            &lines.receptance_m_per_n,
+            &weights,
+            &self.poles,
+        ) else {
+            return;
+        };
+        let left: Vec<f64> = (0..weights.len())
+            .map(|k| ((lines.receptance_m_per_n[k] - fit.fitted_m_per_n[k]) * weights[k]).norm_sqr())
             .collect();
-        for (k, f) in fit.frequency_hz.iter().enumerate() {
+        for (k, fitted) in fit.fitted_m_per_n.iter().enumerate() {
             let near = &left[k.saturating_sub(AROUND)..(k + AROUND + 1).min(left.len())];
-            if near.iter().sum::<f64>() > NO_WORSE * near.len() as f64 {
-                continue;
-            }
-            // Fine lines were averaged for the fit, and an FRF may have been conjugated: only what is the same line is replaced.
-            let line = frequency_hz.partition_point(|other| other < f);
-            if frequency_hz.get(line) == Some(f) && self.receptance_m_per_n[line] == fit.measured_m_per_n[k] {
-                self.receptance_m_per_n[line] = fit.fitted_m_per_n[k];
-                self.on_curve += 1;
+            if near.iter().sum::<f64>() <= NO_WORSE * near.len() as f64 {
+                lines.receptance_m_per_n[k] = *fitted;
+                lines.on_curve += 1;
             }
         }
     }
@@ -122,7 +128,15 @@ pub fn measured_structures(
         let mut notes = Vec::new();
         let id = &campaign.postures[posture].id;
         let modes = modes.and_then(|m| m.sets.iter().find(|set| set.set == *id));
-        let values = |frf: &MeasuredFrf| Lines::of(frf, modes).receptance_m_per_n;
+        let tool_point = ToolPoint {
+            frequency_hz: &xx.frequency_hz,
+            poles: modes
+                .iter()
+                .flat_map(|set| &set.global.modes)
+                .map(|mode| (mode.frequency_hz, mode.damping_ratio))
+                .collect(),
+        };
+        let values = |frf: &MeasuredFrf| tool_point.lines(frf).receptance_m_per_n;
         let on_these_lines =
             |frf: Option<&MeasuredFrf>| frf.filter(|f| f.frequency_hz == xx.frequency_hz).map(values);
         let cross = (
@@ -141,7 +155,7 @@ pub fn measured_structures(
                 (vec![Complex64::ZERO; lines], vec![Complex64::ZERO; lines])
             }
         };
-        let (xx_lines, yy_lines) = (Lines::of(xx, modes), Lines::of(yy, modes));
+        let (xx_lines, yy_lines) = (tool_point.lines(xx), tool_point.lines(yy));
         let receptance: Vec<Receptance> = (0..lines)
             .map(|k| {
                 let direct = |of: &Lines| of.receptance_m_per_n[k];
@@ -179,59 +193,44 @@ mod tests {
 
     const NOISE: f64 = 1e-8;
 
-    /// Lines of a mode with noise of alternating sign, and a fit that is the truth but for lines 60 to 79, where it lacks something.
-    fn noisy() -> (Vec<f64>, Vec<Complex64>, Reconstruction) {
-        let frequency_hz: Vec<f64> = (0..100).map(|k| 5.0 + 0.2 * f64::from(k)).collect();
-        let truth: Vec<Complex64> = frequency_hz
-            .iter()
-            .map(|f| 1e-6 / Complex64::new(1.0 - (f / 14.0).powi(2), 0.06 * f / 14.0))
-            .collect();
+    fn mode(f0: f64, f: f64) -> Complex64 {
+        1e-6 / Complex64::new(1.0 - (f / f0).powi(2), 0.06 * f / f0)
+    }
+
+    /// Lines of modes at the given frequencies with noise of alternating sign, where only the mode at 14 Hz is known, and what became
+    /// of them; the truth besides.
+    fn smoothed(modes_hz: &[f64]) -> (Vec<Complex64>, Lines, Vec<Complex64>) {
+        let frequency_hz: Vec<f64> = (0..200).map(|k| 5.0 + 0.2 * f64::from(k)).collect();
+        let at = |f: &f64| modes_hz.iter().map(|f0| mode(*f0, *f)).sum();
+        let truth: Vec<Complex64> = frequency_hz.iter().map(at).collect();
         let sign = |k: usize| if k.is_multiple_of(2) { NOISE } else { -NOISE };
         let measured: Vec<Complex64> = truth.iter().enumerate().map(|(k, h)| h + sign(k)).collect();
-        let lacking = |k: usize| if (60..80).contains(&k) { 10.0 * NOISE } else { 0.0 };
-        let fitted = truth.iter().enumerate().map(|(k, h)| h + lacking(k)).collect();
-        let fit = Reconstruction {
-            error_nrms: 0.0,
-            noise_nrms: 0.0,
-            frequency_hz: frequency_hz.clone(),
-            measured_m_per_n: measured.clone(),
-            fitted_m_per_n: fitted,
-            noise_std_m_per_n: vec![NOISE; 100],
-        };
-        (frequency_hz, measured, fit)
-    }
-
-    fn smoothed(frequency_hz: &[f64], measured: &[Complex64], fit: &Reconstruction) -> Lines {
         let mut lines = Lines {
-            receptance_m_per_n: measured.to_vec(),
+            receptance_m_per_n: measured.clone(),
             on_curve: 0,
         };
-        lines.take_noise_out(frequency_hz, fit);
-        lines
+        let tool_point = ToolPoint {
+            frequency_hz: &frequency_hz,
+            poles: vec![(14.0, 0.03)],
+        };
+        tool_point.take_noise_out(&mut lines, &[NOISE; 200]);
+        (measured, lines, truth)
     }
 
     #[test]
-    fn lines_go_to_the_curve_only_where_it_explains_them() {
-        let (frequency_hz, measured, fit) = noisy();
-        let lines = smoothed(&frequency_hz, &measured, &fit);
-        for k in 0..100 {
-            let expected = match k {
-                0..52 | 88..100 => fit.fitted_m_per_n[k],
-                55..85 => measured[k],
-                // At the ends of the stretch it depends on how many of its lines are near.
-                _ => continue,
-            };
-            assert_eq!(lines.receptance_m_per_n[k], expected, "line {k}");
+    fn noise_goes_where_the_modes_explain_the_lines() {
+        let (_, lines, truth) = smoothed(&[14.0]);
+        assert_eq!(lines.on_curve, 200);
+        for (k, (line, truth)) in lines.receptance_m_per_n.iter().zip(&truth).enumerate() {
+            assert!((line - truth).norm() < 0.3 * NOISE, "line {k}");
         }
-        assert!((64..=70).contains(&lines.on_curve), "{}", lines.on_curve);
     }
 
     #[test]
-    fn averaged_and_conjugated_lines_stay_as_they_were_measured() {
-        let (frequency_hz, measured, fit) = noisy();
-        let between: Vec<f64> = frequency_hz.iter().map(|f| f + 0.01).collect();
-        assert_eq!(smoothed(&between, &measured, &fit).on_curve, 0);
-        let turned: Vec<Complex64> = measured.iter().map(Complex64::conj).collect();
-        assert_eq!(smoothed(&frequency_hz, &turned, &fit).on_curve, 0);
+    fn lines_that_the_modes_do_not_explain_stay_as_measured() {
+        let (measured, lines, _) = smoothed(&[14.0, 30.0]);
+        // The mode at 30 Hz stands on lines 100 to 150, and is not among those that are known.
+        assert_eq!(lines.receptance_m_per_n[110..140], measured[110..140]);
+        assert!(lines.on_curve < 100, "{}", lines.on_curve);
     }
 }

@@ -18,8 +18,6 @@ pub struct Reconstruction {
     pub measured_m_per_n: Vec<Complex64>,
     /// The common modes and their residual terms on the same lines.
     pub fitted_m_per_n: Vec<Complex64>,
-    /// Standard deviation sqrt(E|e|²) of the measured lines, m/N.
-    pub noise_std_m_per_n: Vec<f64>,
 }
 
 /// FRF m on the lines that a group covers; errors as mobility, within `band_hz`.
@@ -30,7 +28,6 @@ pub(crate) fn reconstruction(d: &Data, groups: &[Group], m: usize, band_hz: [f64
         frequency_hz: Vec::with_capacity(d.frequency_hz.len()),
         measured_m_per_n: Vec::with_capacity(d.frequency_hz.len()),
         fitted_m_per_n: Vec::with_capacity(d.frequency_hz.len()),
-        noise_std_m_per_n: Vec::with_capacity(d.frequency_hz.len()),
     };
     let mut total = 0.0;
     for group in groups {
@@ -42,7 +39,6 @@ pub(crate) fn reconstruction(d: &Data, groups: &[Group], m: usize, band_hz: [f64
             found.frequency_hz.push(f);
             found.measured_m_per_n.push(h);
             found.fitted_m_per_n.push(fitted);
-            found.noise_std_m_per_n.push(d.sigma[k]);
             if (band_hz[0]..=band_hz[1]).contains(&f) {
                 found.error_nrms += f * f * (h - fitted).norm_sqr();
                 found.noise_nrms += (f * d.sigma[k]).powi(2);

@@ -9,6 +9,8 @@ use crate::modal::together::reconstruction::Reconstruction;
 const NOISE: [f64; 2] = [0.1, 0.5];
 /// Part of the FRF that the common modes leave unexplained beyond its noise: good up to, bad from.
 const UNEXPLAINED: [f64; 2] = [0.1, 0.4];
+/// Share of what is left that is most of it.
+const MOST: f64 = 0.8;
 /// Power-weighted coherence: good from, bad below.
 const COHERENCE: [f64; 2] = [0.9, 0.6];
 /// Difference of an FRF and its mirror over their size beyond noise: good up to, bad from.
@@ -180,7 +182,7 @@ fn weighted(coherence: &[f64], f: &[f64], h: &[Complex64], fit: Option<&Reconstr
 }
 
 /// Power of what was measured in a set and of what its modes leave of it, as mobility, any unit.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Power {
     pub measured: f64,
     pub left: f64,
@@ -188,13 +190,23 @@ pub(super) struct Power {
     pub noise: f64,
     /// Covariance of what is left on neighbouring lines: random noise has none, what a model lacks goes on.
     pub coloured: f64,
+    /// Lines of the first FRF, Hz, and what is left beyond the noise from each of them to the next.
+    beyond_noise: Vec<(f64, f64)>,
 }
 
 impl Power {
     /// Adds lines in ascending order: frequency, measured, left over (both any motion per force), σ of the random noise.
     pub fn add(&mut self, lines: impl Iterator<Item = (f64, Complex64, Complex64, f64)>) {
         let mut before: Option<Complex64> = None;
+        let first = self.beyond_noise.is_empty();
         for (f, measured, left, sigma) in lines {
+            let beyond = f * f * (left.norm_sqr() - sigma * sigma);
+            if first {
+                self.beyond_noise.push((f, beyond));
+            } else {
+                let line = self.beyond_noise.partition_point(|(of, _)| *of <= f);
+                self.beyond_noise[line.saturating_sub(1)].1 += beyond;
+            }
             self.measured += f * f * measured.norm_sqr();
             self.left += f * f * left.norm_sqr();
             self.noise += (f * sigma).powi(2);
@@ -204,6 +216,29 @@ impl Power {
             }
             before = Some(left);
         }
+    }
+}
+
+impl Power {
+    /// The shortest stretch of the band that holds [`MOST`] of what is left beyond the noise, Hz; `None` where that is spread over the band.
+    fn most_of_the_rest(&self) -> Option<[f64; 2]> {
+        let rest: Vec<f64> = self.beyond_noise.iter().map(|(_, rest)| rest.max(0.0)).collect();
+        let wanted = MOST * rest.iter().sum::<f64>();
+        let (mut from, mut held) = (0, 0.0);
+        let mut shortest: Option<[usize; 2]> = None;
+        for to in 0..rest.len() {
+            held += rest[to];
+            while held - rest[from] >= wanted && from < to {
+                held -= rest[from];
+                from += 1;
+            }
+            if held >= wanted && shortest.is_none_or(|[a, b]| to - from < b - a) {
+                shortest = Some([from, to]);
+            }
+        }
+        let [from, to] = shortest?;
+        (wanted > 0.0 && 2 * (to - from) < rest.len())
+            .then(|| [self.beyond_noise[from].0, self.beyond_noise[to].0])
     }
 }
 
@@ -220,7 +255,7 @@ pub(super) struct SetFindings {
 
 /// Judges the modes of a set.
 pub(super) fn judge_set(found: &SetFindings) -> SetQuality {
-    let power = found.power;
+    let power = &found.power;
     let share = |part: f64| {
         let share = part / power.measured;
         if share.is_finite() {
@@ -254,8 +289,13 @@ pub(super) fn judge_set(found: &SetFindings) -> SetQuality {
         note(
             verdict,
             format!(
-                "{:.1} % of what was measured is no common mode and no noise",
-                100.0 * unexplained_share
+                "{:.1} % of what was measured is no common mode and no noise{}",
+                100.0 * unexplained_share,
+                power
+                    .most_of_the_rest()
+                    .map_or_else(String::new, |[from, to]| format!(
+                        ", most of that at {from:.1} to {to:.1} Hz"
+                    ))
             ),
         );
     }
@@ -315,6 +355,30 @@ mod tests {
             measured_m_per_n: h.clone(),
             fitted_m_per_n: h,
         }
+    }
+
+    #[test]
+    fn where_most_is_left_is_told() {
+        let left_at = |bad: std::ops::Range<usize>| {
+            let mut power = Power::default();
+            for _ in 0..3 {
+                power.add((0..100).map(|k| {
+                    let left = if bad.contains(&k) { 0.5 } else { 0.01 };
+                    // As mobility every line counts the same.
+                    let f = 10.0 + k as f64;
+                    (f, Complex64::ONE / f, Complex64::from(left / f), 0.01 / f)
+                }));
+            }
+            power.most_of_the_rest()
+        };
+        let [from, to] = left_at(80..100).unwrap();
+        assert!(
+            (90.0..=94.0).contains(&from) && (105.0..=109.0).contains(&to),
+            "{from} {to}"
+        );
+        assert_eq!(left_at(0..100), None);
+        assert_eq!(left_at(0..0), None);
+        assert_eq!(Power::default().most_of_the_rest(), None);
     }
 
     #[test]

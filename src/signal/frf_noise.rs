@@ -10,7 +10,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::local_rational::{self, FittedLine, HALF_WINDOW, LINES, LineProducts};
-use super::noise_law::{self, Departure, FrfNoise};
+use super::noise_law::{self, Departure, NoiseAlongBand};
 use crate::stop;
 
 /// Lines from one window to the next: at least, and at most (each window speaks for the lines up to the next).
@@ -26,7 +26,7 @@ const LEAST_FREEDOM: f64 = 0.1;
 #[derive(Debug, Clone)]
 pub struct FrfNoiseEstimate {
     /// How the noise depends on frequency and magnitude.
-    pub law: FrfNoise,
+    pub law: NoiseAlongBand,
     /// Standard deviation of the complex value on each line: the law at the magnitude of a smooth curve through the other
     /// lines. (At the noisy magnitude a line that noise made small would get more weight than it deserves: every FRF
     /// would be fitted too small by a share a², and by a third of that at a curve that the line itself has drawn.)
@@ -77,7 +77,7 @@ pub fn estimate(frequency_hz: &[f64], frfs: &[&[Complex64]]) -> Vec<Option<FrfNo
         }
     }
     let departures: Vec<&[Departure]> = local.iter().map(|l| l.departures.as_slice()).collect();
-    noise_law::fit(&departures)
+    noise_law::fit_along_band(&departures)
         .into_iter()
         .zip(&local)
         .map(|(law, local)| {
@@ -139,7 +139,7 @@ fn window(data: &LineProducts, centre: usize, lines: Range<usize>) -> Option<Win
 
 #[cfg(test)]
 mod tests {
-    use super::super::noise_law::POWERS;
+    use super::super::noise_law::{FrfNoise, POWERS};
     use super::*;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -193,7 +193,7 @@ mod tests {
         let laws: Vec<FrfNoise> = estimate(&frequency, &slices)
             .into_iter()
             .flatten()
-            .map(|e| e.law)
+            .map(|e| *e.law.at(16.0))
             .collect();
         assert_eq!(laws.len(), frfs.len());
         assert!(laws.iter().all(|l| l.power == power), "{laws:?}");

@@ -31,6 +31,34 @@ impl FrfNoise {
     }
 }
 
+/// Noise of one FRF along the band: a law for each stretch of it. Hammers roll off, sensors resonate, filters alias: above what the
+/// excitation reaches an FRF is another measurement, and one law for both would be wrong in both.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NoiseAlongBand {
+    /// Upper end, Hz, of each stretch, ascending and the last without end, and its law.
+    stretches: Vec<(f64, FrfNoise)>,
+}
+
+impl NoiseAlongBand {
+    /// Standard deviation of the complex value where the true magnitude is `magnitude`.
+    pub fn std(&self, frequency_hz: f64, magnitude: f64) -> f64 {
+        self.at(frequency_hz).std(frequency_hz, magnitude)
+    }
+
+    /// The law that holds at a frequency.
+    pub fn at(&self, frequency_hz: f64) -> &FrfNoise {
+        let beyond = self.stretches.len() - 1;
+        let stretch = self.stretches[..beyond].partition_point(|(end, _)| *end <= frequency_hz);
+        &self.stretches[stretch].1
+    }
+}
+
+/// Departures of an FRF that a stretch of the band must hold to have a law of its own.
+const LEAST_STRETCH: usize = 100;
+/// Two laws in the place of one must be this much likelier (natural logarithm) an FRF. Where one law holds, the two more numbers of each
+/// bring 1 on the average.
+const LIKELIER_EACH: f64 = 5.0;
+
 /// Powers of the frequency with which a floor may fall, ascending: displacement, velocity, acceleration.
 pub(super) const POWERS: [i32; 3] = [0, 1, 2];
 /// A floor that falls must be this much likelier (natural logarithm) than an even one.
@@ -105,6 +133,76 @@ pub fn fit<D: AsRef<[Departure]> + Sync>(frfs: &[D]) -> Vec<Option<FrfNoise>> {
         .into_iter()
         .map(|of_frf| of_frf[chosen].as_ref().map(|law| law.noise))
         .collect()
+}
+
+/// As [`fit`], with a law for each stretch of the band where one for all is not the likelier. Departures ascend in frequency.
+pub fn fit_along_band<D: AsRef<[Departure]> + Sync>(frfs: &[D]) -> Vec<Option<NoiseAlongBand>> {
+    let whole: Vec<&[Departure]> = frfs.iter().map(AsRef::as_ref).collect();
+    let laws = fit(&whole);
+    let mut stretches = Vec::new();
+    split(&whole, laws, f64::INFINITY, &mut stretches);
+    (0..frfs.len())
+        .map(|m| {
+            let of_frf = stretches.iter().map(|(end, laws)| Some((*end, laws[m]?)));
+            Some(NoiseAlongBand {
+                stretches: of_frf.collect::<Option<_>>()?,
+            })
+        })
+        .collect()
+}
+
+/// Appends the stretches of a part of the band, which `laws` describe as one and which ends at `end_hz`.
+fn split(
+    part: &[&[Departure]],
+    laws: Vec<Option<FrfNoise>>,
+    end_hz: f64,
+    stretches: &mut Vec<(f64, Vec<Option<FrfNoise>>)>,
+) {
+    let longest = part.iter().max_by_key(|d| d.len());
+    let middle_hz = match longest {
+        Some(d) if d.len() >= 2 * LEAST_STRETCH => d[d.len() / 2].frequency_hz,
+        _ => return stretches.push((end_hz, laws)),
+    };
+    let at = |d: &[Departure]| d.partition_point(|d| d.frequency_hz < middle_hz);
+    let halves: [Vec<&[Departure]>; 2] = [
+        part.iter().map(|d| &d[..at(d)]).collect(),
+        part.iter().map(|d| &d[at(d)..]).collect(),
+    ];
+    let own = halves.each_ref().map(|half| fit(half));
+    // An FRF that a half says too little of keeps the others with the one law, too: all change at the same places.
+    let known = own.iter().all(|of| {
+        of.iter()
+            .zip(&laws)
+            .all(|(own, law)| own.is_some() == law.is_some())
+    });
+    let gain: f64 = halves
+        .iter()
+        .zip(&own)
+        .map(|(half, own)| log_likelihood(half, own) - log_likelihood(half, &laws))
+        .sum();
+    if !known || !(gain > LIKELIER + LIKELIER_EACH * part.len() as f64) {
+        return stretches.push((end_hz, laws));
+    }
+    let ([below, above], [below_laws, above_laws]) = (halves, own);
+    split(&below, below_laws, middle_hz, stretches);
+    split(&above, above_laws, end_hz, stretches);
+}
+
+/// Of exponentially distributed squares under a law for each FRF; one far beyond its mean counts as if it were at the cut.
+fn log_likelihood(frfs: &[&[Departure]], laws: &[Option<FrfNoise>]) -> f64 {
+    let of_frf = |(departures, law): (&&[Departure], &Option<FrfNoise>)| -> f64 {
+        let Some(law) = law else { return 0.0 };
+        let finite = departures
+            .iter()
+            .filter(|d| d.magnitude.is_finite() && d.squared.is_finite());
+        finite
+            .map(|d| {
+                let mean = law.std(d.frequency_hz, d.magnitude).powi(2);
+                -mean.ln() - (d.squared / mean).min(CUT)
+            })
+            .sum()
+    };
+    frfs.iter().zip(laws).map(of_frf).sum()
 }
 
 /// What FRFs measured together say of the relative part, as lines to be added to those of each FRF: the median of their own
@@ -414,6 +512,51 @@ mod tests {
         // Alone it has no relative part, or one that is far off.
         let alone = fit(&[quiet])[0].unwrap().relative;
         assert!((alone / 0.03 - 1.0).abs() > 0.5, "{alone}");
+    }
+
+    #[test]
+    fn one_law_stays_one_along_the_band() {
+        for power in POWERS {
+            let frfs = vec![departures(law(0.02, 1e-7, power), 900); 4];
+            let (along, one) = (fit_along_band(&frfs), fit(&frfs));
+            for (along, one) in along.iter().zip(one) {
+                assert_eq!(
+                    along.as_ref().unwrap().stretches,
+                    vec![(f64::INFINITY, one.unwrap())]
+                );
+            }
+        }
+    }
+
+    /// Two thirds of the band lie beyond what the hammer excites.
+    #[test]
+    fn beyond_the_excitation_another_law_holds_and_leaves_the_first_alone() {
+        let (sound, beyond) = (law(0.01, 1e-8, 0), law(0.5, 1e-6, 0));
+        let mut frf = departures(sound, 900);
+        frf.truncate(300);
+        frf.extend_from_slice(&departures(beyond, 900)[300..]);
+        let frfs = vec![frf; 4];
+        let one = fit(&frfs)[0].unwrap();
+        assert!(
+            one.relative > 0.03,
+            "one law for all is wrong where it matters: {one:?}"
+        );
+        let along = fit_along_band(&frfs)[0].clone().unwrap();
+        // Lines of 5 Hz to 184.8 Hz, of which those from 65 Hz on are beyond.
+        for f in [10.0, 40.0] {
+            assert!(
+                (along.at(f).relative / 0.01 - 1.0).abs() < 0.25,
+                "{f} Hz: {:?}",
+                along.at(f)
+            );
+        }
+        for f in [100.0, 170.0] {
+            assert!(
+                (along.at(f).relative / 0.5 - 1.0).abs() < 0.25,
+                "{f} Hz: {:?}",
+                along.at(f)
+            );
+        }
     }
 
     #[test]

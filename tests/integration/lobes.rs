@@ -382,12 +382,22 @@ fn noise_of_measured_frfs_hardly_moves_the_limit() {
     let limits = |noise: &str| -> Vec<f64> {
         let dir = folder.path().join(noise);
         document(&[
-            "simulate", "--out", text(&dir), "--kind", "direct", "--seed", "13", "--noise", noise,
+            "simulate",
+            "--out",
+            text(&dir),
+            "--kind",
+            "direct",
+            "--seed",
+            "13",
+            "--noise",
+            noise,
         ]);
         append(&dir, &LOBES.replace("\"model\"", "\"measured\""));
         let lobes = document(&["lobes", text(&dir)]);
         let curves = lobes["curves"].as_array().unwrap().iter();
-        curves.flat_map(|curve| numbers(&curve["depth_limit_mm"])).collect()
+        curves
+            .flat_map(|curve| numbers(&curve["depth_limit_mm"]))
+            .collect()
     };
     let (clean, noisy) = (limits("0"), limits("0.05"));
     assert_eq!(clean.len(), noisy.len());

@@ -8,9 +8,9 @@ use crate::modal::together::set_member::SET;
 use crate::signal::frf_noise;
 use crate::signal::noise_law::{self, Departure};
 
-/// A piece of the band left with this many times the noise power is badly described.
+/// A stretch of the band left with this many times the noise power is badly described.
 const MISFIT: f64 = 2.0;
-/// Lines of a piece: enough that a mode overlooked in it still stands out.
+/// Lines of a stretch: enough that a mode overlooked in it still stands out.
 const BLOCK: usize = 48;
 
 /// Noise of each FRF, from those on the same lines together.
@@ -81,7 +81,7 @@ pub(crate) fn rms(values: &[Complex64]) -> f64 {
     (values.iter().map(|v| v.norm_sqr()).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
-/// Noise of each FRF from what the fit leaves over. Lines whose group could not be fitted keep theirs. Where a piece of
+/// Noise of each FRF from what the fit leaves over. Lines whose group could not be fitted keep theirs. Where a stretch of
 /// the band is left far worse than the rest (leakage, drifting modes, lines below the sensor's range), it is that much
 /// noisier: one bad end of the band must not decide what is needless elsewhere.
 pub(crate) fn renew(data: &mut [Data], groups: &[Group]) {
@@ -90,7 +90,7 @@ pub(crate) fn renew(data: &mut [Data], groups: &[Group]) {
         .enumerate()
         .map(|(m, data)| left_over(data, groups, m))
         .collect();
-    let laws = noise_law::fit(&left_over);
+    let laws = noise_law::fit_along_band(&left_over);
     for ((d, lines), law) in data.iter_mut().zip(&left_over).zip(laws) {
         let size = rms(&d.receptance);
         let fitted = lines.iter().filter(|l| l.squared.is_finite());
@@ -121,41 +121,58 @@ pub(crate) fn renew(data: &mut [Data], groups: &[Group]) {
     if data.len() < SET {
         return;
     }
-    for [from, to] in blocks(data) {
-        let (mut count, mut level) = (0, 0.0);
-        for (d, lines) in data.iter().zip(&left_over) {
-            for ((line, sigma), lines) in lines.iter().zip(&d.sigma).zip(&d.count) {
-                if (from..to).contains(&line.frequency_hz) && line.squared.is_finite() {
-                    level += line.squared / (sigma * sigma * lines);
-                    count += 1;
-                }
+    let finest = data.iter().max_by_key(|d| d.frequency_hz.len());
+    let lines_hz = finest.map_or_else(Vec::new, |d| d.frequency_hz.clone());
+    if lines_hz.is_empty() {
+        return;
+    }
+    let line = |f: f64| lines_hz.partition_point(|of| *of < f).min(lines_hz.len() - 1);
+    let mut left = vec![(0.0, 0.0); lines_hz.len()];
+    for (d, lines) in data.iter().zip(&left_over) {
+        for ((departure, sigma), count) in lines.iter().zip(&d.sigma).zip(&d.count) {
+            if departure.squared.is_finite() {
+                let (sum, lines) = &mut left[line(departure.frequency_hz)];
+                *sum += departure.squared / (sigma * sigma * count);
+                *lines += 1.0;
             }
         }
-        let excess = level / f64::from(count.max(1));
-        if excess.is_finite() && excess > MISFIT {
-            for d in data.iter_mut() {
-                let sigmas = d.frequency_hz.iter().zip(&mut d.sigma);
-                sigmas
-                    .filter(|(f, _)| (from..to).contains(*f))
-                    .for_each(|(_, sigma)| *sigma *= excess.sqrt());
+    }
+    let excess = lasting_excess(&left);
+    for d in data.iter_mut() {
+        for (f, sigma) in d.frequency_hz.iter().zip(&mut d.sigma) {
+            let excess = excess[line(*f)];
+            if excess > MISFIT {
+                *sigma *= excess.sqrt();
             }
         }
     }
 }
 
-/// The band in pieces of at least [`BLOCK`] lines of the FRF that has most, Hz.
-fn blocks(data: &[Data]) -> Vec<[f64; 2]> {
-    let Some(finest) = data.iter().max_by_key(|d| d.frequency_hz.len()) else {
-        return Vec::new();
-    };
-    let lines = &finest.frequency_hz;
-    let count = (lines.len() / BLOCK).max(1);
-    let edge = |k: usize| match k {
-        0 => f64::NEG_INFINITY,
-        k if k == count => f64::INFINITY,
-        k => lines[k * lines.len() / count],
-    };
-    (0..count).map(|k| [edge(k), edge(k + 1)]).collect()
+/// By line, the smallest mean that any stretch of [`BLOCK`] lines around it has: what is far too large on a few lines only (drift at the
+/// end of the band) does not reach the sound lines next to them, and a mode overlooked still stands out. `left`: sum and count by line.
+fn lasting_excess(left: &[(f64, f64)]) -> Vec<f64> {
+    let mut sums = Vec::with_capacity(left.len() + 1);
+    sums.push((0.0, 0.0));
+    for (sum, count) in left {
+        let (before, lines) = sums[sums.len() - 1];
+        sums.push((before + sum, lines + count));
+    }
+    let block = BLOCK.min(left.len());
+    let means: Vec<f64> = (0..=left.len() - block)
+        .map(|from| {
+            let (sum, lines) = (
+                sums[from + block].0 - sums[from].0,
+                sums[from + block].1 - sums[from].1,
+            );
+            if lines > 0.0 { sum / lines } else { 0.0 }
+        })
+        .collect();
+    (0..left.len())
+        .map(|line| {
+            let around = line.saturating_sub(block - 1)..=line.min(means.len() - 1);
+            means[around].iter().copied().fold(f64::INFINITY, f64::min)
+        })
+        .collect()
 }
 
 /// By line of FRF m, squares as they would be on a single line; infinite where no group covers it.
@@ -197,6 +214,26 @@ mod tests {
             spread_hz: vec![0.0; lines],
             count: vec![1.0; lines],
         }
+    }
+
+    /// Fifteen lines of drift, then 200 sound ones.
+    #[test]
+    fn a_bad_end_of_the_band_does_not_reach_the_lines_next_to_it() {
+        let mut left = vec![(18.0, 18.0); 215];
+        left[..15].fill((1800.0, 18.0));
+        let excess = lasting_excess(&left);
+        assert!(excess[0] > 30.0, "{}", excess[0]);
+        assert!(
+            excess[15..].iter().all(|e| (e - 1.0).abs() < 1e-9),
+            "{:?}",
+            &excess[15..30]
+        );
+        // As many lines as a mode has, in the middle: a stretch that begins among them holds half of them at least.
+        let mut left = vec![(18.0, 18.0); 215];
+        left[100..110].fill((1800.0, 18.0));
+        let expected = (43.0 + 5.0 * 100.0) / 48.0;
+        assert!((lasting_excess(&left)[105] - expected).abs() < 1e-9);
+        assert_eq!(lasting_excess(&[]), Vec::<f64>::new());
     }
 
     #[test]

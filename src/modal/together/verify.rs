@@ -154,8 +154,13 @@ fn against(solution: &Solution, j: usize, residues: &[Complex64], local: &Local)
     if local.mode < OVER_REST * local.coloured {
         return Some("no larger than what the modes leave unexplained around it".into());
     }
+    let mpc = shape::complexity(residues).map_or(1.0, |c| c.mpc);
+    if frfs >= ENOUGH_FRFS && local.one_sided && mpc < IN_PHASE {
+        return Some(format!(
+            "only one side of its peak was measured, and its FRFs have no common phase (collinearity {mpc:.2}): what lies beyond the band"
+        ));
+    }
     if frfs >= ENOUGH_FRFS && local.mode < DOMINANT * local.measured {
-        let mpc = shape::complexity(residues).map_or(1.0, |c| c.mpc);
         if local.mode < SMALL_SHARE * local.measured && mpc < CLEARLY_IN_PHASE {
             return Some(format!(
                 "it makes {:.0} % of what was measured around it and its FRFs have no clear common phase (collinearity {mpc:.2}): \
@@ -185,6 +190,8 @@ struct Local {
     measured: f64,
     /// Of what is left, the part that goes on from line to line.
     coloured: f64,
+    /// Its half-power band reaches beyond the lines.
+    one_sided: bool,
 }
 
 impl Local {
@@ -195,6 +202,7 @@ impl Local {
             mode: 0.0,
             measured: 0.0,
             coloured: 0.0,
+            one_sided: false,
         };
         for ((d, found), residue) in data.iter().zip(&group.solution.frfs).zip(residues) {
             let from = d.frequency_hz.partition_point(|&f| f < group.window_hz[0]);
@@ -205,6 +213,11 @@ impl Local {
                 .partition_point(|&f| f < pole.frequency_hz - half_hz)
                 ..d.frequency_hz
                     .partition_point(|&f| f <= pole.frequency_hz + half_hz);
+            let half_power_hz = pole.damping_ratio * pole.frequency_hz;
+            let ends = d.frequency_hz.first().zip(d.frequency_hz.last());
+            local.one_sided |= ends.is_some_and(|(first, last)| {
+                pole.frequency_hz - half_power_hz < *first || pole.frequency_hz + half_power_hz > *last
+            });
             let mut before: Option<Complex64> = None;
             for k in lines {
                 let Some(residual) = k.checked_sub(from).and_then(|k| found.residual.get(k)) else {

@@ -4,7 +4,7 @@ use crate::analysis::LobeAnalysis;
 use crate::cutting::{DrillCoefficients, DrillForces};
 use crate::lobes::drilling::hole::{HoleCheck, HoleError, Uncertain};
 use crate::report::figure::{HoleFigure, HolePanel};
-use crate::report::number::{decimals, significant};
+use crate::report::number::{decimals, significant, with_error};
 use crate::report::parts::{figure, paragraph};
 use crate::report::{Block, ReportTable, TableColumn};
 
@@ -247,7 +247,6 @@ fn over_the_angle(analysis: &LobeAnalysis, check: &HoleCheck) -> HoleFigure {
 
 fn errors<'a>(holes: impl IntoIterator<Item = (String, &'a HoleError)>, check: &HoleCheck) -> Block {
     let tolerance = &check.tolerance;
-    let optional = |v: Option<f64>, digits| v.map_or("–".to_string(), |v| significant(v, digits));
     let met = |good| if good { "within" } else { "OUT" }.to_string();
     let rows = holes.into_iter().map(|(place, hole)| {
         let mut row = vec![place];
@@ -255,12 +254,12 @@ fn errors<'a>(holes: impl IntoIterator<Item = (String, &'a HoleError)>, check: &
             (&hole.position_mm, tolerance.position_met(hole)),
             (&hole.tilt_deg, tolerance.perpendicularity_met(hole)),
         ] {
-            row.extend([
-                significant(of.value, 3),
-                optional(of.std, 2),
-                optional(of.upper, 3),
-                met(good),
-            ]);
+            let value = match of.std {
+                Some(std) => with_error(of.value, std),
+                None => significant(of.value, 3),
+            };
+            let upper = of.upper.map_or("–".to_string(), |v| significant(v, 3));
+            row.extend([value, upper, met(good)]);
         }
         row.push(significant(hole.axial_mm, 3));
         if let Some(good) = tolerance.diameter_met(hole) {
@@ -291,12 +290,10 @@ fn errors<'a>(holes: impl IntoIterator<Item = (String, &'a HoleError)>, check: &
 fn columns() -> Vec<TableColumn> {
     vec![
         TableColumn::text("place"),
-        TableColumn::number("position error (mm)"),
-        TableColumn::number("± (mm)"),
+        TableColumn::number("position error ± std. dev. (mm)"),
         TableColumn::number("95 % (mm)"),
         TableColumn::text("position"),
-        TableColumn::number("tilt (°)"),
-        TableColumn::number("± (°)"),
+        TableColumn::number("tilt ± std. dev. (°)"),
         TableColumn::number("95 % (°)"),
         TableColumn::text("perpendicularity"),
         TableColumn::number("along the axis (mm)"),

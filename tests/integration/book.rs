@@ -264,6 +264,7 @@ fn the_json_reference_names_every_key() {
         vec!["lobes", &cell],
         vec!["report", &frf, "--no-diagnosis"],
         vec!["simulate", "--out", &out, "--kind", "direct", "--seed", "11"],
+        vec!["export", &frf, "--what", "frf,modes", "--out", &out],
         vec!["completions", "bash"],
         vec!["man"],
         vec!["man", "--out", &out],

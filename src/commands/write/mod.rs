@@ -1,5 +1,6 @@
 //! Write and try out.
 
+pub(crate) mod document_schemas;
 pub(crate) mod export;
 pub(crate) mod report;
 pub(crate) mod schema;

@@ -143,7 +143,7 @@ def structure(folder, formats):
     # One dataset is no list.
     nodes = next(x for x in (sets if isinstance(sets, list) else [sets]) if x["type"] == 2411)
     tcp = document("model", STRUCTURE)["postures"][0]["tcp_m"]
-    at = list(np.asarray(nodes["grid_global"] if "grid_global" in nodes else nodes["node_nums"]).ravel()).index(1)
+    at = list(np.asarray(nodes["node_nums"]).ravel()).index(1)
     near([nodes["x"][at], nodes["y"][at], nodes["z"][at]], tcp, "geometry", 1e-9)
 
     # Lobes.

@@ -120,6 +120,7 @@ def runs(work):
         ["simulate", "--out", out / "lab", "--kind", "direct", "--seed", "11"],
         ["batch", nights, "--out", out / "batch", "--do", "calibrate"],
         ["fleet", out / "batch"],
+        ["thesis"],
         ["completions", "bash"],
         ["man"],
         ["man", "--out", out / "man"],

@@ -149,13 +149,27 @@ fn renamed(
     })
 }
 
+/// In the place of what has the name. Windows refuses that while a reader, an indexer or a scanner of viruses has the old file open,
+/// which passes within a moment.
+fn persisted(file: NamedTempFile, path: &Path) -> std::result::Result<std::fs::File, PersistError> {
+    let mut file = file;
+    for _ in 0..if cfg!(windows) { 40 } else { 0 } {
+        match file.persist(path) {
+            Err(failed) if failed.error.kind() == ErrorKind::PermissionDenied => file = failed.file,
+            done => return done,
+        }
+        std::thread::sleep(std::time::Duration::from_millis(25));
+    }
+    file.persist(path)
+}
+
 fn replace(path: &Path, bytes: &[u8], prefix: &str, durable: bool) -> Result<()> {
     let failed = |e| Error::io(path, e);
     let file = beside(path, bytes, prefix)?;
     if durable {
         call(Call::Sync, || file.as_file().sync_all()).map_err(failed)?;
     }
-    renamed(file, |file| file.persist(path)).map_err(failed)?;
+    renamed(file, |file| persisted(file, path)).map_err(failed)?;
     if durable {
         // The rename itself. Where folders cannot be opened (Windows) or flushed (some network disks) the system sees to it.
         if let Ok(folder) = std::fs::File::open(folder_of(path))

@@ -4,6 +4,7 @@ pub mod addition;
 pub mod campaign;
 pub mod diagnosis;
 pub mod expert;
+pub mod export;
 pub mod forces;
 pub mod freed_links;
 pub mod grown;

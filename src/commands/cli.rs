@@ -10,7 +10,7 @@ use crate::commands::find::{calibrate, compare, diagnose, explain, localise, pla
 use crate::commands::grow::{add, history, model, undo};
 use crate::commands::many::{batch, fleet};
 use crate::commands::measure::{cfc, lobes, modal, sweep};
-use crate::commands::write::{report, schema, shell, simulate, thesis};
+use crate::commands::write::{export, report, schema, shell, simulate, thesis};
 
 /// The commands in groups, with an example each.
 const GROUPS: &str = "\
@@ -46,6 +46,7 @@ Many campaigns
 
 Write and try out
   report       HTML and PNG report of a campaign                 lobestone report cell7
+  export       FRFs, modes, lobes, records for other programs    lobestone export cell7 --out numbers
   simulate     A virtual lab with chosen (or random) physics     lobestone simulate lab --random 7
   thesis       The source thesis put right                       lobestone thesis
   schema       The form of campaign.toml, for editors            lobestone schema campaign
@@ -125,6 +126,8 @@ pub(super) enum Command {
     Fleet(fleet::FleetArgs),
     /// HTML and PNG report of a campaign.
     Report(report::ReportArgs),
+    /// FRFs, model, modes, lobes, coefficients and records as files for other programs.
+    Export(export::ExportArgs),
     /// The campaign as a page in a browser: diagnose, add, undo, and watch the error fall.
     Serve(serve::ServeArgs),
     /// A virtual lab: write a campaign with chosen (or random) physics and noise, and its truth.
@@ -175,6 +178,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Batch(args) => batch::run(args),
         Command::Fleet(args) => fleet::run(args),
         Command::Report(args) => report::run(args),
+        Command::Export(args) => export::run(args),
         Command::Serve(args) => serve::run(args, cli.json),
         Command::Simulate(args) => simulate::run(*args),
         Command::Thesis(args) => thesis::run(args),

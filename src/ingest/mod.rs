@@ -24,7 +24,11 @@ pub mod units;
 pub use crate::data::{Axis, Channel, ChannelRole, Dof, FrfRecord, Quantity, TimeRecord};
 pub use channel_rule::{ChannelRule, Gain, Measures, Source, read_time_with, unit_of_charge_or_other};
 pub use contents::{Contents, Digest, Format, MeasurementFile, OtherRecord};
-pub use formats::geometry::{Geometry, NodalShape, geometry_text, read_geometry};
+pub use formats::columns::{
+    Cells, Column, ColumnTable, MOST_ROWS, NamedArray, csv_bytes, mat_bytes, npz_bytes, variable_name,
+    xlsx_bytes,
+};
+pub use formats::geometry::{Geometry, NodalShape, geometry_text, nodes_text, read_geometry};
 pub use formats::mat::{MatArray, mat5_bytes};
 pub use formats::uff::{
     Abscissa, ByteOrder, Dataset58, Encoding58, EntityDof, Ordinate, UnitAxis, frf_dataset, time_datasets,

@@ -215,8 +215,93 @@ fn undocumented(section: &str, document: &Value) -> Vec<String> {
     keys.filter(|key| !named(key)).cloned().collect()
 }
 
-/// Fails where a document has a key that the JSON reference does not name for its command.
+/// What of a document is not as the schema of its command says, and which keys the schema does not know. Knows the words of JSON
+/// Schema that those schemas use; `scripts/document_schemas.py check` asks an independent validator.
+fn against_schema(value: &Value, schema: &Value, root: &Value, path: &str, wrong: &mut Vec<String>) {
+    let schema = match schema.get("$ref") {
+        Some(whole) if whole == "#" => root,
+        _ => schema,
+    };
+    // Anything: what is there was never seen when the schema was drawn.
+    if schema.as_object().is_none_or(|words| words.is_empty()) {
+        return;
+    }
+    let kind = match value {
+        Value::Null => "null",
+        Value::Bool(_) => "boolean",
+        Value::Number(n) if n.is_f64() => "number",
+        Value::Number(_) => "integer",
+        Value::String(_) => "string",
+        Value::Array(_) => "array",
+        Value::Object(_) => "object",
+    };
+    let is = |word: &Value| word == kind || (word == "number" && kind == "integer");
+    let right = match &schema["type"] {
+        Value::Array(words) => words.iter().any(is),
+        Value::Null => true,
+        word => is(word),
+    };
+    if !right {
+        wrong.push(format!("{path} is {kind}, should be {}", schema["type"]));
+    }
+    for key in schema["required"].as_array().into_iter().flatten() {
+        if value.get(key.as_str().unwrap()).is_none() {
+            wrong.push(format!("{path} lacks {key}"));
+        }
+    }
+    for (k, item) in value.as_array().into_iter().flatten().enumerate() {
+        against_schema(item, &schema["items"], root, &format!("{path}[{k}]"), wrong);
+    }
+    for (key, inner) in value.as_object().into_iter().flatten() {
+        let of_key = schema["properties"]
+            .get(key)
+            .or(schema.get("additionalProperties"));
+        match of_key {
+            Some(of_key) => against_schema(inner, of_key, root, &format!("{path}.{key}"), wrong),
+            None => wrong.push(format!("{path}.{key} is not in the schema")),
+        }
+    }
+}
+
+#[test]
+fn a_document_of_another_form_is_noticed() {
+    let schema = serde_json::json!({
+        "type": "object",
+        "required": ["a"],
+        "properties": {
+            "a": { "type": ["null", "number"] },
+            "list": { "type": "array", "items": { "type": "object", "properties": { "x": { "type": "string" } } } },
+            "both": { "$ref": "#" },
+        },
+    });
+    let wrong = |document: Value| {
+        let mut wrong = Vec::new();
+        against_schema(&document, &schema, &schema, "$", &mut wrong);
+        wrong
+    };
+    assert!(wrong(serde_json::json!({ "a": null, "list": [{ "x": "y" }], "both": { "a": 1 } })).is_empty());
+    let told = wrong(serde_json::json!({ "list": [{ "x": 5 }, { "z": 1 }], "both": { "a": "text" } }));
+    assert_eq!(
+        told,
+        [
+            "$ lacks \"a\"",
+            "$.both.a is string, should be [\"null\",\"number\"]",
+            "$.list[0].x is integer, should be \"string\"",
+            "$.list[1].z is not in the schema",
+        ]
+    );
+}
+
+/// Fails where a document has a key that the JSON reference or the schema of its command does not name, or is not as that says.
 pub fn assert_documented(command: &str, document: &Value) {
+    let printed = crate::support::lobestone(&["schema", command]).stdout;
+    let schema: Value = serde_json::from_str(&printed).unwrap();
+    let mut wrong = Vec::new();
+    against_schema(document, &schema, &schema, "$", &mut wrong);
+    assert!(
+        wrong.is_empty(),
+        "{command}: {wrong:#?}\na new key: python3 scripts/document_schemas.py draw PROGRAM {command}"
+    );
     let keys = undocumented(&section(command), document);
     assert!(
         keys.is_empty(),
@@ -264,6 +349,7 @@ fn the_json_reference_names_every_key() {
         vec!["lobes", &cell],
         vec!["report", &frf, "--no-diagnosis"],
         vec!["simulate", "--out", &out, "--kind", "direct", "--seed", "11"],
+        vec!["export", &frf, "--what", "frf,modes", "--out", &out],
         vec!["completions", "bash"],
         vec!["man"],
         vec!["man", "--out", &out],

@@ -11,6 +11,7 @@ mod crowd;
 mod demo;
 mod diagnose;
 mod expert;
+mod export;
 mod faults;
 mod fuzz;
 mod hole;

@@ -1,6 +1,5 @@
 //! Modes for other programs: universal files (55 and synthesised 58), CSV, MATLAB.
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use num_complex::Complex64;
@@ -9,9 +8,12 @@ use crate::analysis::modes::mode_set::{SetModes, dofs_of_frfs};
 use crate::analysis::modes::shape_comparison::at_nodes;
 use crate::files::write_atomically;
 use crate::ingest::{
-    self, Dof, Encoding58, FrfRecord, Geometry, MatArray, NodalShape, Quantity, geometry_text, mat5_bytes,
+    self, Cells, Column, ColumnTable, Dof, Encoding58, FrfRecord, Geometry, MatArray, NamedArray, NodalShape,
+    Quantity, csv_bytes, geometry_text, mat5_bytes,
 };
+use crate::modal::GlobalMode;
 use crate::modal::scaling::{self, ScaledMode};
+use crate::modal::shape::Complexity;
 use crate::{Error, Result};
 
 /// By mode; `None` where no driving point gives it a scale.
@@ -48,15 +50,21 @@ pub fn export(sets: &[SetModes], geometry: Option<&Geometry>, folder: &Path) -> 
         };
         put("modes.uff", uff55(set, geometry).as_bytes())?;
         put("synthesised.uff", &uff58(set))?;
-        put("modes.csv", modes_csv(set).as_bytes())?;
-        put("shapes.csv", shapes_csv(set).as_bytes())?;
+        put(
+            "modes.csv",
+            &csv_bytes(&ColumnTable::new("modes", modes_columns(set)))?,
+        )?;
+        put(
+            "shapes.csv",
+            &csv_bytes(&ColumnTable::new("shapes", shapes_columns(set)))?,
+        )?;
         put("modes.mat", &mat(set))?;
     }
     Ok(written)
 }
 
 /// Shapes with unity modal mass where there is a driving point (else largest component 1), as complex modes.
-fn uff55(set: &SetModes, geometry: Option<&Geometry>) -> String {
+pub fn uff55(set: &SetModes, geometry: Option<&Geometry>) -> String {
     let scaled = scaled_modes(set);
     let shapes: Vec<NodalShape> = set
         .global
@@ -127,34 +135,31 @@ fn uff58(set: &SetModes) -> Vec<u8> {
     )
 }
 
-fn modes_csv(set: &SetModes) -> String {
-    let mut out = String::from(
-        "mode,frequency_hz,frequency_std_hz,damping_ratio,damping_std,found_in,mpc,mpd_deg,modal_mass_kg,modal_mass_std_kg,\
-         modal_a_re_kg_per_s,modal_a_im_kg_per_s\n",
-    );
-    for (k, (mode, scale)) in set.global.modes.iter().zip(scaled_modes(set)).enumerate() {
-        let complexity = mode.complexity;
-        let cell = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
-        // Writing to a String cannot fail.
-        let _ = writeln!(
-            out,
-            "{},{},{},{},{},{},{},{},{},{},{},{}",
-            k + 1,
-            mode.frequency_hz,
-            mode.frequency_std_hz,
-            mode.damping_ratio,
-            mode.damping_std,
-            mode.found_in,
-            cell(complexity.map(|c| c.mpc)),
-            cell(complexity.map(|c| c.mpd_deg)),
-            cell(scale.as_ref().map(|s| s.modal_mass_kg)),
-            cell(scale.as_ref().map(|s| s.modal_mass_std_kg)),
-            cell(scale.as_ref().map(|s| s.modal_a.re)),
-            cell(scale.as_ref().map(|s| s.modal_a.im)),
-        );
-    }
-    out
+/// One row a mode.
+pub fn modes_columns(set: &SetModes) -> Vec<Column> {
+    let modes = &set.global.modes;
+    let scaled = scaled_modes(set);
+    let of_mode = |of: fn(&GlobalMode) -> f64| modes.iter().map(of).collect::<Vec<f64>>();
+    let of_scale = |of: fn(&ScaledMode) -> f64| scaled.iter().map(move |s| s.as_ref().map(of));
+    let modal_a = scaled.iter().map(|s| s.as_ref().map_or(NOTHING, |s| s.modal_a));
+    let complexity = |of: fn(Complexity) -> f64| modes.iter().map(move |m| m.complexity.map(of));
+    vec![
+        Column::numbers("mode", "", (1..=modes.len()).map(|k| k as f64).collect()),
+        Column::numbers("frequency", "hz", of_mode(|m| m.frequency_hz)),
+        Column::numbers("frequency_std", "hz", of_mode(|m| m.frequency_std_hz)),
+        Column::numbers("damping_ratio", "", of_mode(|m| m.damping_ratio)),
+        Column::numbers("damping_std", "", of_mode(|m| m.damping_std)),
+        Column::numbers("found_in", "", of_mode(|m| m.found_in as f64)),
+        Column::known("mpc", "", complexity(|c| c.mpc)),
+        Column::known("mpd", "deg", complexity(|c| c.mpd_deg)),
+        Column::known("modal_mass", "kg", of_scale(|s| s.modal_mass_kg)),
+        Column::known("modal_mass_std", "kg", of_scale(|s| s.modal_mass_std_kg)),
+        Column::complex("modal_a", "kg_per_s", modal_a.collect()),
+    ]
 }
+
+/// What stands for a complex number that is not there.
+const NOTHING: Complex64 = Complex64::new(f64::NAN, f64::NAN);
 
 /// Name of a degree of freedom of the set; that of the FRF where the file has none.
 fn dof_name(set: &SetModes, dof: usize) -> String {
@@ -164,8 +169,11 @@ fn dof_name(set: &SetModes, dof: usize) -> String {
     }
 }
 
-fn shapes_csv(set: &SetModes) -> String {
-    let mut out = String::from("mode,dof,re,im,unity_mass_re,unity_mass_im,real_normal\n");
+/// One row a mode and degree of freedom. A shape's largest component is 1; `unity_mass` (1/√kg) and `real_normal` where a
+/// driving point gives it a scale.
+pub fn shapes_columns(set: &SetModes) -> Vec<Column> {
+    let (mut number, mut dofs, mut shape) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut unity_mass, mut real_normal) = (Vec::new(), Vec::new());
     for (k, (mode, scale)) in set.global.modes.iter().zip(scaled_modes(set)).enumerate() {
         for (dof, z) in &mode.shape {
             let unity = scale
@@ -174,19 +182,55 @@ fn shapes_csv(set: &SetModes) -> String {
             let real = scale
                 .as_ref()
                 .and_then(|s| s.real_normal.iter().find(|u| u.0 == *dof));
-            let pair = unity.map_or(",".into(), |(_, z)| format!("{},{}", z.re, z.im));
-            let real = real.map_or(String::new(), |(_, x)| x.to_string());
-            let name = dof_name(set, *dof).replace([',', '"', '\n'], " ");
-            let _ = writeln!(out, "{},{name},{},{},{pair},{real}", k + 1, z.re, z.im);
+            number.push((k + 1) as f64);
+            dofs.push(dof_name(set, *dof));
+            shape.push(*z);
+            unity_mass.push(unity.map_or(NOTHING, |u| u.1));
+            real_normal.push(real.map(|r| r.1));
         }
     }
-    out
+    let part = |of: fn(&Complex64) -> f64| shape.iter().map(of).collect();
+    vec![
+        Column::numbers("mode", "", number),
+        Column::text("dof", dofs),
+        Column::numbers("re", "", part(|z| z.re)),
+        Column::numbers("im", "", part(|z| z.im)),
+        Column::complex("unity_mass", "", unity_mass),
+        Column::known("real_normal", "", real_normal),
+    ]
+}
+
+/// Shapes as a matrix (mode × degree of freedom, NaN where one was not measured), with frequencies and names.
+pub fn shape_arrays(set: &SetModes, prefix: &str) -> Vec<NamedArray> {
+    let modes = &set.global.modes;
+    let mut dofs: Vec<usize> = modes.iter().flat_map(|m| m.shape.iter().map(|s| s.0)).collect();
+    dofs.sort_unstable();
+    dofs.dedup();
+    let at =
+        |mode: &GlobalMode, dof: &usize| mode.shape.iter().find(|s| s.0 == *dof).map_or(NOTHING, |s| s.1);
+    let dofs = &dofs;
+    let shapes: Vec<Complex64> = modes
+        .iter()
+        .flat_map(|m| dofs.iter().map(move |d| at(m, d)))
+        .collect();
+    let array = |name: &str, shape: Vec<usize>, cells: Cells| NamedArray {
+        name: format!("{prefix}_{name}"),
+        shape,
+        cells,
+    };
+    let frequency_hz = modes.iter().map(|m| m.frequency_hz).collect();
+    let names = dofs.iter().map(|d| dof_name(set, *d)).collect();
+    vec![
+        array("frequency_hz", vec![modes.len()], Cells::Number(frequency_hz)),
+        array("dof", vec![dofs.len()], Cells::Text(names)),
+        array("shape", vec![modes.len(), dofs.len()], Cells::Complex(shapes)),
+    ]
 }
 
 /// `frequency_hz`, `damping_ratio`, both with `_std`, and `shape` (degree of freedom × mode).
 fn mat(set: &SetModes) -> Vec<u8> {
     let modes = &set.global.modes;
-    let column = |name: &str, of: &dyn Fn(&crate::modal::GlobalMode) -> f64| {
+    let column = |name: &str, of: &dyn Fn(&GlobalMode) -> f64| {
         MatArray::column(name, &modes.iter().map(of).collect::<Vec<_>>())
     };
     let mut dofs: Vec<usize> = modes.iter().flat_map(|m| m.shape.iter().map(|s| s.0)).collect();

@@ -1,5 +1,7 @@
 //! Write and try out.
 
+pub(crate) mod document_schemas;
+pub(crate) mod export;
 pub(crate) mod report;
 pub(crate) mod schema;
 pub(crate) mod shell;

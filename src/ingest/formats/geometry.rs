@@ -273,6 +273,27 @@ pub fn geometry_text(geometry: &Geometry, shapes: &[NodalShape]) -> String {
         }
         out += "    -1\n";
     }
+    push_lines(&mut out, geometry);
+    for (k, shape) in shapes.iter().enumerate() {
+        push_shape(&mut out, k + 1, shape);
+    }
+    out
+}
+
+/// A universal file with nodes in double precision (2411) and trace lines (82).
+pub fn nodes_text(geometry: &Geometry) -> String {
+    let mut out = String::from("    -1\n  2411\n");
+    for (node, [x, y, z]) in &geometry.nodes {
+        // Coordinate systems of place and displacement, colour; Fortran's D25.16.
+        let _ = writeln!(out, "{node:10}{:10}{:10}{:10}", 1, 1, 11);
+        let _ = writeln!(out, "{}{}{}", d25(*x), d25(*y), d25(*z));
+    }
+    out += "    -1\n";
+    push_lines(&mut out, geometry);
+    out
+}
+
+fn push_lines(out: &mut String, geometry: &Geometry) {
     if !geometry.lines.is_empty() {
         let pen: Vec<i64> = geometry.lines.iter().flat_map(|[a, b]| [*a, *b, 0]).collect();
         let _ = writeln!(out, "    -1\n    82\n{:10}{:10}{:10}\nlines", 1, pen.len(), 8);
@@ -280,12 +301,8 @@ pub fn geometry_text(geometry: &Geometry, shapes: &[NodalShape]) -> String {
             let row: String = row.iter().map(|n| format!("{n:10}")).collect();
             let _ = writeln!(out, "{row}");
         }
-        out += "    -1\n";
+        *out += "    -1\n";
     }
-    for (k, shape) in shapes.iter().enumerate() {
-        push_shape(&mut out, k + 1, shape);
-    }
-    out
 }
 
 fn push_shape(out: &mut String, number: usize, shape: &NodalShape) {
@@ -325,13 +342,22 @@ fn push_shape(out: &mut String, number: usize, shape: &NodalShape) {
 
 /// Fortran's E13.5: two digits of the exponent at least.
 fn e13(value: f64) -> String {
-    let text = format!("{value:.5e}");
+    format!("{:>13}", exponential(value, 5, 'e'))
+}
+
+/// Fortran's D25.16.
+fn d25(value: f64) -> String {
+    format!("{:>25}", exponential(value, 16, 'D'))
+}
+
+fn exponential(value: f64, digits: usize, letter: char) -> String {
+    let text = format!("{value:.digits$e}");
     let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
     let (sign, digits) = match exponent.strip_prefix('-') {
         Some(digits) => ('-', digits),
         None => ('+', exponent),
     };
-    format!("{:>13}", format!("{mantissa}e{sign}{digits:0>2}"))
+    format!("{mantissa}{letter}{sign}{digits:0>2}")
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! A file for each format of laboratory files.
 
+pub(crate) mod columns;
 pub(crate) mod force;
 pub(crate) mod frf_text;
 pub(crate) mod geometry;

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
 from . import _native
@@ -139,6 +139,32 @@ class Campaign(Shown):
     def history(self, *, domain: Domain | None = None) -> list[dict[str, Any]]:
         """The revisions, first to last, as ``lobestone history --json`` has them."""
         return list(self._document("history", *self._side(domain), progress=None)["revisions"])
+
+    def export(
+        self,
+        folder: str | os.PathLike[str],
+        *,
+        what: Sequence[str] = (),
+        format: Sequence[str] = ("csv",),
+        progress: Progress | None = None,
+    ) -> list[str]:
+        """Writes files for other programs; their paths.
+
+        ``what``: of ``frf``, ``model``, ``residual``, ``modes``, ``lobes``, ``coefficients``, ``records`` (all that the
+        campaign holds where left out); ``format``: of ``csv``, ``uff``, ``mat``, ``npz``, ``xlsx``, ``parquet``.
+
+        >>> written = Campaign.load("cell7").export("numbers", what=["frf"], format=["npz"])
+        >>> [os.path.basename(path) for path in written]
+        ['frf.npz']
+        >>> import numpy as np
+        >>> np.load(written[0])["p1_receptance_m_per_n"].dtype
+        dtype('complex128')
+        """
+        chosen = [f"--what={','.join(what)}"] if what else []
+        document = self._document(
+            "export", f"--out={os.fspath(folder)}", f"--format={','.join(format)}", *chosen, progress=progress
+        )
+        return [str(file["path"]) for file in document["files"]]
 
     def localise(self, *, progress: Progress | None = None) -> Localisation:
         """Where the missing part sits and what it does, drawn from the data without a library of effects.

@@ -4,7 +4,7 @@
 
 use num_complex::Complex64;
 
-/// A matrix of doubles by columns, as MATLAB stores it.
+/// A matrix of doubles (or of characters) by columns, as MATLAB stores it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MatArray {
     /// Letters, digits and underscores, a letter first.
@@ -17,6 +17,8 @@ pub struct MatArray {
     pub re: Vec<f64>,
     /// Same length as `re`; `None` for a real matrix.
     pub im: Option<Vec<f64>>,
+    /// Are the numbers characters (UTF-16), a text a row?
+    pub text: bool,
 }
 
 impl MatArray {
@@ -28,6 +30,24 @@ impl MatArray {
             columns: 1,
             re: values.to_vec(),
             im: None,
+            text: false,
+        }
+    }
+
+    /// A text a row, filled up with blanks: MATLAB's char matrix.
+    pub fn text(name: &str, rows: &[String]) -> MatArray {
+        let rows: Vec<Vec<u16>> = rows.iter().map(|t| t.encode_utf16().collect()).collect();
+        let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+        let at = |row: &Vec<u16>, k: usize| f64::from(row.get(k).copied().unwrap_or(u16::from(b' ')));
+        MatArray {
+            name: name.into(),
+            rows: rows.len(),
+            columns,
+            re: (0..columns)
+                .flat_map(|k| rows.iter().map(move |row| at(row, k)))
+                .collect(),
+            im: None,
+            text: true,
         }
     }
 
@@ -40,17 +60,20 @@ impl MatArray {
             columns: columns.len(),
             re: values().map(|z| z.re).collect(),
             im: Some(values().map(|z| z.im).collect()),
+            text: false,
         }
     }
 }
 
 /// Data types of the format.
 const INT8: u32 = 1;
+const UINT16: u32 = 4;
 const INT32: u32 = 5;
 const UINT32: u32 = 6;
 const DOUBLE: u32 = 9;
 const MATRIX: u32 = 14;
-/// Class of double matrices, and the flag for complex ones.
+/// Classes of characters and of double matrices, and the flag for complex ones.
+const CHAR_CLASS: u32 = 4;
 const DOUBLE_CLASS: u32 = 6;
 const COMPLEX: u32 = 0x0800;
 
@@ -62,7 +85,11 @@ pub fn mat5_bytes(arrays: &[MatArray]) -> Vec<u8> {
     bytes.extend(b"IM");
     for array in arrays {
         let mut body = Vec::new();
-        let flags = DOUBLE_CLASS | if array.im.is_some() { COMPLEX } else { 0 };
+        let flags = match (array.text, &array.im) {
+            (true, _) => CHAR_CLASS,
+            (false, Some(_)) => DOUBLE_CLASS | COMPLEX,
+            (false, None) => DOUBLE_CLASS,
+        };
         let words = |values: &[u32]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
         push(&mut body, UINT32, &words(&[flags, 0]));
         push(
@@ -71,6 +98,12 @@ pub fn mat5_bytes(arrays: &[MatArray]) -> Vec<u8> {
             &words(&[array.rows as u32, array.columns as u32]),
         );
         push(&mut body, INT8, array.name.as_bytes());
+        if array.text {
+            let units: Vec<u8> = array.re.iter().flat_map(|v| (*v as u16).to_le_bytes()).collect();
+            push(&mut body, UINT16, &units);
+            push(&mut bytes, MATRIX, &body);
+            continue;
+        }
         for part in std::iter::once(&array.re).chain(&array.im) {
             let part: Vec<u8> = part.iter().flat_map(|v| v.to_le_bytes()).collect();
             push(&mut body, DOUBLE, &part);

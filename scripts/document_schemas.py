@@ -46,8 +46,6 @@ UNSEEN = {
 # Keys that other programs rely on: always there.
 NEVER_NULL = {"verdict", "domain", "name", "dir", "html", "kind", "path", "format", "process", "method", "unit", "error", "iterations",
               "converged", "out", "what", "places", "truth"}
-# Seen so often without being null that it never is.
-OFTEN = 30
 KEY = re.compile(r"^[a-z][a-z0-9_]*$")
 # Of commands on a campaign with both sides.
 SIDES = {"compare", "diagnose", "history", "undo"}
@@ -85,6 +83,7 @@ def runs(work):
         ["cfc", both],
         ["cfc", ROOT / "datasets/campaigns/milling-wear"],
         ["modal", plain],
+        ["modal", BLIND / "frf-9302"],
         ["modal", uff, "--together"],
         ["modal", uff, "--export", out / "modes"],
         ["model", plain],
@@ -152,11 +151,10 @@ class Node:
 
     def __init__(self):
         self.kinds, self.keys, self.items, self.entries = set(), {}, None, None
-        self.always, self.seen = None, 0
+        self.always = None
 
     def see(self, value, name=""):
         self.kinds.add(kind(value))
-        self.seen += 1
         if isinstance(value, list):
             self.items = self.items or Node()
             for item in value:
@@ -180,8 +178,8 @@ class Node:
         # A number that does not exist is null (docs/json.md).
         if "number" in kinds:
             kinds = (kinds - {"integer"}) | {"null"}
-        # So may anything else be that was seen a few times only, but for lists, which are empty.
-        if name and "array" not in kinds and self.seen < OFTEN and name not in NEVER_NULL:
+        # So may anything else be, however often it was seen, but for lists, which are empty.
+        if name and "array" not in kinds and name not in NEVER_NULL:
             kinds.add("null")
         out = {"type": min(kinds) if len(kinds) == 1 else sorted(kinds)}
         if self.items is not None:

@@ -153,7 +153,9 @@ fn renamed(
 /// which passes within a moment.
 fn persisted(file: NamedTempFile, path: &Path) -> std::result::Result<std::fs::File, PersistError> {
     let mut file = file;
-    for _ in 0..if cfg!(windows) { 40 } else { 0 } {
+    let mut tries = if cfg!(windows) { 40 } else { 0 };
+    while tries > 0 {
+        tries -= 1;
         match file.persist(path) {
             Err(failed) if failed.error.kind() == ErrorKind::PermissionDenied => file = failed.file,
             done => return done,

@@ -25,7 +25,7 @@ pub use crate::data::{Axis, Channel, ChannelRole, Dof, FrfRecord, Quantity, Time
 pub use channel_rule::{ChannelRule, Gain, Measures, Source, read_time_with, unit_of_charge_or_other};
 pub use contents::{Contents, Digest, Format, MeasurementFile, OtherRecord};
 pub use formats::columns::{
-    Cells, Column, ColumnTable, MOST_ROWS, NamedArray, csv_bytes, mat_bytes, npz_bytes, variable_name,
+    Cells, ColumnTable, MOST_ROWS, NamedArray, NamedColumn, csv_bytes, mat_bytes, npz_bytes, variable_name,
     xlsx_bytes,
 };
 pub use formats::geometry::{Geometry, NodalShape, geometry_text, nodes_text, read_geometry};

@@ -4,7 +4,7 @@ use crate::Result;
 use crate::analysis::workbench::Workbench;
 use crate::cutting::CfcResult;
 use crate::ingest::{
-    self, Channel, Column, ColumnTable, Encoding58, TimeRecord, uff58_bytes, units, variable_name,
+    self, Channel, ColumnTable, Encoding58, NamedColumn, TimeRecord, uff58_bytes, units, variable_name,
 };
 
 /// A row a group and coefficient; the name of a coefficient has its unit.
@@ -17,26 +17,26 @@ pub(super) fn coefficient_table(result: &CfcResult) -> ColumnTable {
     ColumnTable::new(
         "coefficients",
         vec![
-            Column::text("group", all.iter().map(|(_, of, _)| of.to_string()).collect()),
-            Column::text(
+            NamedColumn::text("group", all.iter().map(|(_, of, _)| of.to_string()).collect()),
+            NamedColumn::text(
                 "process",
                 all.iter().map(|(g, ..)| g.process.name().into()).collect(),
             ),
-            Column::text(
+            NamedColumn::text(
                 "material",
                 all.iter()
                     .map(|(g, ..)| g.material.clone().unwrap_or_default())
                     .collect(),
             ),
-            Column::numbers(
+            NamedColumn::numbers(
                 "cutting_speed",
                 "m_per_min",
                 all.iter().map(|(g, ..)| g.cutting_speed_m_per_min).collect(),
             ),
-            Column::text("coefficient", all.iter().map(|(.., c)| c.key.into()).collect()),
-            Column::text("unit", all.iter().map(|(.., c)| c.unit.into()).collect()),
-            Column::known("value", "", all.iter().map(|(.., c)| c.value)),
-            Column::known("std_error", "", all.iter().map(|(.., c)| c.std_error)),
+            NamedColumn::text("coefficient", all.iter().map(|(.., c)| c.key.into()).collect()),
+            NamedColumn::text("unit", all.iter().map(|(.., c)| c.unit.into()).collect()),
+            NamedColumn::known("value", "", all.iter().map(|(.., c)| c.value)),
+            NamedColumn::known("std_error", "", all.iter().map(|(.., c)| c.std_error)),
         ],
     )
 }
@@ -71,16 +71,16 @@ fn file_name(id: &str) -> String {
         .collect()
 }
 
-fn record_columns(record: &TimeRecord) -> Vec<Column> {
+fn record_columns(record: &TimeRecord) -> Vec<NamedColumn> {
     let time = |k: usize| record.start_s + k as f64 / record.sample_rate_hz;
-    let mut columns = vec![Column::numbers(
+    let mut columns = vec![NamedColumn::numbers(
         "time",
         "s",
         (0..record.len()).map(time).collect(),
     )];
     for channel in &record.channels {
         let (quantity, unit) = channel_name(channel);
-        let mut column = Column::numbers(&quantity, unit, channel.samples.clone());
+        let mut column = NamedColumn::numbers(&quantity, unit, channel.samples.clone());
         let mut number = 1;
         while columns.iter().any(|c| c.name() == column.name()) {
             number += 1;

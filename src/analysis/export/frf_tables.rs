@@ -8,7 +8,7 @@ use crate::analysis::structure::StructureAnalysis;
 use crate::analysis::workbench::Workbench;
 use crate::campaign::{Campaign, MeasuredDof};
 use crate::ingest::{
-    self, Cells, Column, ColumnTable, Dof, Encoding58, FrfRecord, NamedArray, Quantity, uff58_bytes,
+    self, Cells, ColumnTable, Dof, Encoding58, FrfRecord, NamedArray, NamedColumn, Quantity, uff58_bytes,
 };
 
 /// Unit of receptance, as names have it.
@@ -122,17 +122,17 @@ fn files(names: &Names, rows: &[Row]) -> TableAndUniversal {
     (table, (names.file.into(), universal(rows)))
 }
 
-fn columns(names: &Names, rows: &[Row]) -> Vec<Column> {
+fn columns(names: &Names, rows: &[Row]) -> Vec<NamedColumn> {
     let each = |of: fn(&Row) -> String| -> Vec<String> {
         let repeated = |row: &Row| vec![of(row); row.frequency_hz.len()];
         rows.iter().flat_map(repeated).collect()
     };
     let mut columns = vec![
-        Column::text("posture", each(|r| r.posture.into())),
-        Column::text("frf", each(|r| r.name.into())),
-        Column::text("response", each(|r| r.response.clone())),
-        Column::text("reference", each(|r| r.reference.clone())),
-        Column::numbers(
+        NamedColumn::text("posture", each(|r| r.posture.into())),
+        NamedColumn::text("frf", each(|r| r.name.into())),
+        NamedColumn::text("response", each(|r| r.response.clone())),
+        NamedColumn::text("reference", each(|r| r.reference.clone())),
+        NamedColumn::numbers(
             "frequency",
             "hz",
             rows.iter().flat_map(|r| r.frequency_hz).copied().collect(),
@@ -140,13 +140,13 @@ fn columns(names: &Names, rows: &[Row]) -> Vec<Column> {
     ];
     for (k, name) in names.curves.iter().enumerate() {
         let values = rows.iter().flat_map(|r| &r.curves[k]).copied().collect();
-        columns.push(Column::complex(name, RECEPTANCE, values));
+        columns.push(NamedColumn::complex(name, RECEPTANCE, values));
     }
     for (k, (name, unit)) in names.reals.iter().enumerate() {
         // Nobody wants a column of nothing.
         if rows.iter().any(|r| !r.reals[k].is_empty()) {
             let values = rows.iter().flat_map(|r| on_its_lines(r, k)).collect();
-            columns.push(Column::numbers(name, unit, values));
+            columns.push(NamedColumn::numbers(name, unit, values));
         }
     }
     columns
@@ -207,7 +207,7 @@ fn arrays(names: &Names, rows: &[Row]) -> Vec<NamedArray> {
         for (k, (name, unit)) in names.reals.iter().enumerate() {
             if group.iter().any(|r| !r.reals[k].is_empty()) {
                 let values = group.iter().flat_map(|r| on_its_lines(r, k)).collect();
-                let name = Column::numbers(name, unit, Vec::new()).name();
+                let name = NamedColumn::numbers(name, unit, Vec::new()).name();
                 put(name, vec![count, lines], Cells::Number(values));
             }
         }

@@ -2,7 +2,7 @@
 
 use crate::analysis::stability::lobes::LobeAnalysis;
 use crate::campaign::LobeSource;
-use crate::ingest::{Column, ColumnTable};
+use crate::ingest::{ColumnTable, NamedColumn};
 
 /// All curves below each other. A limit that is not there: stable at any depth.
 pub(super) fn lobe_table(analysis: &LobeAnalysis) -> ColumnTable {
@@ -35,14 +35,14 @@ pub(super) fn lobe_table(analysis: &LobeAnalysis) -> ColumnTable {
     ColumnTable::new(
         "lobes",
         vec![
-            Column::text("source", vec![source.into(); rows]),
-            Column::text("posture", posture),
-            Column::known("angle", "deg", angle),
-            Column::numbers("spindle", "rpm", rpm),
-            Column::known("depth_limit", "mm", limit),
-            Column::known("depth_p05", "mm", lower),
-            Column::known("depth_p95", "mm", upper),
-            Column::known("chatter", "hz", chatter),
+            NamedColumn::text("source", vec![source.into(); rows]),
+            NamedColumn::text("posture", posture),
+            NamedColumn::known("angle", "deg", angle),
+            NamedColumn::numbers("spindle", "rpm", rpm),
+            NamedColumn::known("depth_limit", "mm", limit),
+            NamedColumn::known("depth_p05", "mm", lower),
+            NamedColumn::known("depth_p95", "mm", upper),
+            NamedColumn::known("chatter", "hz", chatter),
         ],
     )
 }

@@ -5,7 +5,7 @@ use crate::analysis::modes::modal::{ModalAnalysis, SetModes};
 use crate::analysis::modes::modal_export::{modes_columns, shape_arrays, shapes_columns, uff55};
 use crate::analysis::workbench::Workbench;
 use crate::campaign::{BodyRef, Campaign};
-use crate::ingest::{Cells, Column, ColumnTable, Geometry, nodes_text, variable_name};
+use crate::ingest::{Cells, ColumnTable, Geometry, NamedColumn, nodes_text, variable_name};
 use crate::robot::{RobotModel, RobotSpec};
 
 type Universals = Vec<(String, Vec<u8>)>;
@@ -36,12 +36,12 @@ pub(super) fn mode_files(campaign: &Workbench) -> Result<(Vec<ColumnTable>, Univ
 }
 
 /// The columns of all sets below each other, with the posture before them.
-fn stacked(sets: &[SetModes], of: fn(&SetModes) -> Vec<Column>) -> Vec<Column> {
-    let mut all: Vec<Column> = Vec::new();
+fn stacked(sets: &[SetModes], of: fn(&SetModes) -> Vec<NamedColumn>) -> Vec<NamedColumn> {
+    let mut all: Vec<NamedColumn> = Vec::new();
     for set in sets {
         let mut columns = of(set);
         let rows = columns.first().map_or(0, |c| c.cells.len());
-        columns.insert(0, Column::text("posture", vec![set.set.clone(); rows]));
+        columns.insert(0, NamedColumn::text("posture", vec![set.set.clone(); rows]));
         if all.is_empty() {
             all = columns;
             continue;

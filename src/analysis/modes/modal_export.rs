@@ -8,8 +8,8 @@ use crate::analysis::modes::mode_set::{SetModes, dofs_of_frfs};
 use crate::analysis::modes::shape_comparison::at_nodes;
 use crate::files::write_atomically;
 use crate::ingest::{
-    self, Cells, Column, ColumnTable, Dof, Encoding58, FrfRecord, Geometry, MatArray, NamedArray, NodalShape,
-    Quantity, csv_bytes, geometry_text, mat5_bytes,
+    self, Cells, ColumnTable, Dof, Encoding58, FrfRecord, Geometry, MatArray, NamedArray, NamedColumn,
+    NodalShape, Quantity, csv_bytes, geometry_text, mat5_bytes,
 };
 use crate::modal::GlobalMode;
 use crate::modal::scaling::{self, ScaledMode};
@@ -136,7 +136,7 @@ fn uff58(set: &SetModes) -> Vec<u8> {
 }
 
 /// One row a mode.
-pub fn modes_columns(set: &SetModes) -> Vec<Column> {
+pub fn modes_columns(set: &SetModes) -> Vec<NamedColumn> {
     let modes = &set.global.modes;
     let scaled = scaled_modes(set);
     let of_mode = |of: fn(&GlobalMode) -> f64| modes.iter().map(of).collect::<Vec<f64>>();
@@ -144,17 +144,17 @@ pub fn modes_columns(set: &SetModes) -> Vec<Column> {
     let modal_a = scaled.iter().map(|s| s.as_ref().map_or(NOTHING, |s| s.modal_a));
     let complexity = |of: fn(Complexity) -> f64| modes.iter().map(move |m| m.complexity.map(of));
     vec![
-        Column::numbers("mode", "", (1..=modes.len()).map(|k| k as f64).collect()),
-        Column::numbers("frequency", "hz", of_mode(|m| m.frequency_hz)),
-        Column::numbers("frequency_std", "hz", of_mode(|m| m.frequency_std_hz)),
-        Column::numbers("damping_ratio", "", of_mode(|m| m.damping_ratio)),
-        Column::numbers("damping_std", "", of_mode(|m| m.damping_std)),
-        Column::numbers("found_in", "", of_mode(|m| m.found_in as f64)),
-        Column::known("mpc", "", complexity(|c| c.mpc)),
-        Column::known("mpd", "deg", complexity(|c| c.mpd_deg)),
-        Column::known("modal_mass", "kg", of_scale(|s| s.modal_mass_kg)),
-        Column::known("modal_mass_std", "kg", of_scale(|s| s.modal_mass_std_kg)),
-        Column::complex("modal_a", "kg_per_s", modal_a.collect()),
+        NamedColumn::numbers("mode", "", (1..=modes.len()).map(|k| k as f64).collect()),
+        NamedColumn::numbers("frequency", "hz", of_mode(|m| m.frequency_hz)),
+        NamedColumn::numbers("frequency_std", "hz", of_mode(|m| m.frequency_std_hz)),
+        NamedColumn::numbers("damping_ratio", "", of_mode(|m| m.damping_ratio)),
+        NamedColumn::numbers("damping_std", "", of_mode(|m| m.damping_std)),
+        NamedColumn::numbers("found_in", "", of_mode(|m| m.found_in as f64)),
+        NamedColumn::known("mpc", "", complexity(|c| c.mpc)),
+        NamedColumn::known("mpd", "deg", complexity(|c| c.mpd_deg)),
+        NamedColumn::known("modal_mass", "kg", of_scale(|s| s.modal_mass_kg)),
+        NamedColumn::known("modal_mass_std", "kg", of_scale(|s| s.modal_mass_std_kg)),
+        NamedColumn::complex("modal_a", "kg_per_s", modal_a.collect()),
     ]
 }
 
@@ -171,7 +171,7 @@ fn dof_name(set: &SetModes, dof: usize) -> String {
 
 /// One row a mode and degree of freedom. A shape's largest component is 1; `unity_mass` (1/√kg) and `real_normal` where a
 /// driving point gives it a scale.
-pub fn shapes_columns(set: &SetModes) -> Vec<Column> {
+pub fn shapes_columns(set: &SetModes) -> Vec<NamedColumn> {
     let (mut number, mut dofs, mut shape) = (Vec::new(), Vec::new(), Vec::new());
     let (mut unity_mass, mut real_normal) = (Vec::new(), Vec::new());
     for (k, (mode, scale)) in set.global.modes.iter().zip(scaled_modes(set)).enumerate() {
@@ -191,12 +191,12 @@ pub fn shapes_columns(set: &SetModes) -> Vec<Column> {
     }
     let part = |of: fn(&Complex64) -> f64| shape.iter().map(of).collect();
     vec![
-        Column::numbers("mode", "", number),
-        Column::text("dof", dofs),
-        Column::numbers("re", "", part(|z| z.re)),
-        Column::numbers("im", "", part(|z| z.im)),
-        Column::complex("unity_mass", "", unity_mass),
-        Column::known("real_normal", "", real_normal),
+        NamedColumn::numbers("mode", "", number),
+        NamedColumn::text("dof", dofs),
+        NamedColumn::numbers("re", "", part(|z| z.re)),
+        NamedColumn::numbers("im", "", part(|z| z.im)),
+        NamedColumn::complex("unity_mass", "", unity_mass),
+        NamedColumn::known("real_normal", "", real_normal),
     ]
 }
 

@@ -31,7 +31,7 @@ impl Cells {
 
 /// A named column. Complex ones become two where a format has no complex numbers: `model_re_m_per_n`, `model_im_m_per_n`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Column {
+pub struct NamedColumn {
     /// What it is: `model`.
     pub quantity: String,
     /// Its unit as names have it (`m_per_n`); empty where it has none.
@@ -40,10 +40,10 @@ pub struct Column {
     pub cells: Cells,
 }
 
-impl Column {
+impl NamedColumn {
     /// A column of names.
     pub fn text(quantity: &str, cells: Vec<String>) -> Self {
-        Column {
+        NamedColumn {
             quantity: quantity.into(),
             unit: "",
             cells: Cells::Text(cells),
@@ -52,7 +52,7 @@ impl Column {
 
     /// A column of numbers; what there is none of is NaN.
     pub fn numbers(quantity: &str, unit: &'static str, cells: Vec<f64>) -> Self {
-        Column {
+        NamedColumn {
             quantity: quantity.into(),
             unit,
             cells: Cells::Number(cells),
@@ -62,12 +62,12 @@ impl Column {
     /// As [`numbers`](Self::numbers), where some are not there.
     pub fn known(quantity: &str, unit: &'static str, cells: impl IntoIterator<Item = Option<f64>>) -> Self {
         let cells = cells.into_iter().map(|c| c.unwrap_or(f64::NAN));
-        Column::numbers(quantity, unit, cells.collect())
+        NamedColumn::numbers(quantity, unit, cells.collect())
     }
 
     /// A column of complex numbers.
     pub fn complex(quantity: &str, unit: &'static str, cells: Vec<Complex64>) -> Self {
-        Column {
+        NamedColumn {
             quantity: quantity.into(),
             unit,
             cells: Cells::Complex(cells),
@@ -114,14 +114,14 @@ pub struct ColumnTable {
     /// Of the file, without its ending.
     pub name: String,
     /// All of one length.
-    pub columns: Vec<Column>,
+    pub columns: Vec<NamedColumn>,
     /// Empty: an array a column.
     pub arrays: Vec<NamedArray>,
 }
 
 impl ColumnTable {
     /// A table whose arrays are its columns.
-    pub fn new(name: impl Into<String>, columns: Vec<Column>) -> Self {
+    pub fn new(name: impl Into<String>, columns: Vec<NamedColumn>) -> Self {
         ColumnTable {
             name: name.into(),
             columns,
@@ -136,7 +136,7 @@ impl ColumnTable {
 
     /// Columns of text and real numbers, by name.
     pub fn plain_columns(&self) -> Vec<(String, Cells)> {
-        self.columns.iter().flat_map(Column::parts).collect()
+        self.columns.iter().flat_map(NamedColumn::parts).collect()
     }
 
     /// The table as arrays.
@@ -144,7 +144,7 @@ impl ColumnTable {
         if !self.arrays.is_empty() {
             return self.arrays.clone();
         }
-        let array = |column: &Column| NamedArray {
+        let array = |column: &NamedColumn| NamedArray {
             name: column.name(),
             shape: vec![column.cells.len()],
             cells: column.cells.clone(),

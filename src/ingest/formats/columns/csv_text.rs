@@ -36,16 +36,16 @@ mod tests {
     use num_complex::Complex64;
 
     use super::*;
-    use crate::ingest::formats::columns::Column;
+    use crate::ingest::formats::columns::NamedColumn;
 
     #[test]
     fn what_there_is_none_of_is_empty_and_complex_numbers_are_two_columns() {
         let table = ColumnTable::new(
             "t",
             vec![
-                Column::text("name", vec!["a, \"b\"".into(), String::new()]),
-                Column::known("depth", "mm", [Some(2.0), None]),
-                Column::complex(
+                NamedColumn::text("name", vec!["a, \"b\"".into(), String::new()]),
+                NamedColumn::known("depth", "mm", [Some(2.0), None]),
+                NamedColumn::complex(
                     "model",
                     "m_per_n",
                     vec![Complex64::new(1e-7, -0.25), Complex64::ZERO],

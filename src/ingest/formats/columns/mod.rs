@@ -8,7 +8,7 @@ mod mat;
 mod npz;
 mod sheet;
 
-pub use column::{Cells, Column, ColumnTable, NamedArray, variable_name};
+pub use column::{Cells, ColumnTable, NamedArray, NamedColumn, variable_name};
 pub use csv_text::csv_bytes;
 pub use mat::mat_bytes;
 pub use npz::npz_bytes;

@@ -12,6 +12,7 @@ mod demo;
 mod diagnose;
 mod expert;
 mod faults;
+mod further_effects;
 mod fuzz;
 mod hole;
 mod init;

@@ -528,8 +528,12 @@ fn promising<'i, S: Study>(
         ..View::COARSE
     };
     let problem = study.problem(model, glance);
-    let costs = bases.iter().filter_map(|base| problem.cost(base).ok());
-    let without = costs.fold(f64::INFINITY, f64::min);
+    // Fitted to the glance like the effects: else each of them would be credited with what that alone takes away.
+    let bounds = model.bounds();
+    let fits = bases
+        .iter()
+        .filter_map(|base| minimise(&problem, base, &bounds, LOOK).ok());
+    let without = fits.map(|fit| fit.cost).fold(f64::INFINITY, f64::min);
     let mut promises: Vec<(f64, &InstanceOf<S>)> = instances
         .par_iter()
         .filter_map(|instance| {

@@ -22,7 +22,7 @@ use super::structural::Structure;
 use super::structural::amplitude_dependent_stiffness::AmplitudeDependentStiffness;
 use super::structural::base_compliance::BaseCompliance;
 use super::structural::base_mounting::BaseMounting;
-use super::structural::contact::Contact;
+use super::structural::contact::ToolContact;
 use super::structural::joint_damping::JointDamping;
 use super::structural::joint_transverse_compliance::JointTransverseCompliance;
 use super::structural::joints::bearing_compliance::BearingCompliance;
@@ -52,7 +52,7 @@ pub const STRUCTURAL: [&dyn Effect<Structure>; 17] = [
     &AmplitudeDependentStiffness,
     &HystereticDamping,
     &DriveDynamics,
-    &Contact,
+    &ToolContact,
     &ThermalDrift,
     &BearingCompliance,
     &BaseMounting,

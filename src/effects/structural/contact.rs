@@ -11,12 +11,12 @@ use crate::robot::{Attachment, AttachmentLaw, Chain, Dual, Element, Grip, Place,
 
 /// The tool touches something: a spring and a damper from the tool point to the ground along one direction, or to a table
 /// that is itself a mass on a spring along that direction.
-pub struct Contact;
+pub struct ToolContact;
 
 /// By number of the choice.
 const GROUNDS: [&str; 2] = ["table", "rigid"];
 
-impl Effect<Structure> for Contact {
+impl Effect<Structure> for ToolContact {
     fn id(&self) -> &'static str {
         "contact"
     }
@@ -277,7 +277,7 @@ mod tests {
                 variant: usize::from(values.len() == 4),
             };
             let values: Vec<Dual> = values.iter().map(|v| Dual::constant(*v)).collect();
-            Contact.apply(at, &values, &setting, &mut chain);
+            ToolContact.apply(at, &values, &setting, &mut chain);
         }
         let rows: Vec<_> = [Vector3::x(), Vector3::y(), Vector3::z()]
             .iter()

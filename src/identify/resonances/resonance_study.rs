@@ -133,7 +133,7 @@ impl Match {
 }
 
 /// Effects that such a table cannot show, with the reason.
-const INVISIBLE: [(&str, &str); 7] = [
+const INVISIBLE: [(&str, &str); 9] = [
     ("time-delay", "a table of resonances holds no phase"),
     (
         "sensor-misalignment",
@@ -158,6 +158,14 @@ const INVISIBLE: [(&str, &str); 7] = [
     (
         "thermal-drift",
         "a table of resonances does not say in which order its configurations were measured",
+    ),
+    (
+        "bearing-compliance",
+        "a table of resonances holds too few numbers to choose among rarer places as well",
+    ),
+    (
+        "base-mounting",
+        "a table of resonances holds too few numbers to choose among rarer places as well",
     ),
 ];
 

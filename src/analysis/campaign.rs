@@ -298,7 +298,7 @@ fn posture_reports(campaign: &Campaign, model: &StructureModel, theta: &[f64]) -
         .iter()
         .map(|posture| {
             let kinematics = model.robot.kinematics(&posture.joints_deg)?;
-            let chain = model.chain(theta, &kinematics, 0.0, false);
+            let chain = model.chain(theta, &kinematics, Default::default(), false);
             PostureReport::new(&model.robot, &model.kinematics_at(theta, &kinematics), &chain)
         })
         .collect()

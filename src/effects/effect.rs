@@ -65,6 +65,12 @@ pub trait Effect<D: Domain>: Sync {
         None
     }
 
+    /// Whether a diagnosis follows it only where a first look on few data promises something: for effects that are rare, or
+    /// that have many places.
+    fn on_promise(&self) -> bool {
+        false
+    }
+
     /// Tunable quantities; names are the keys in docs/json.md. `nominal` is the first starting value.
     fn parameters(&self, at: At, known: &Known<D>) -> Vec<Parameter>;
 

@@ -21,8 +21,14 @@ use super::site::Site;
 use super::structural::Structure;
 use super::structural::amplitude_dependent_stiffness::AmplitudeDependentStiffness;
 use super::structural::base_compliance::BaseCompliance;
+use super::structural::base_mounting::BaseMounting;
+use super::structural::contact::ToolContact;
 use super::structural::joint_damping::JointDamping;
 use super::structural::joint_transverse_compliance::JointTransverseCompliance;
+use super::structural::joints::bearing_compliance::BearingCompliance;
+use super::structural::joints::drive_dynamics::DriveDynamics;
+use super::structural::joints::hysteretic_damping::HystereticDamping;
+use super::structural::joints::thermal_drift::ThermalDrift;
 use super::structural::link_flexibility::LinkFlexibility;
 use super::structural::load_dependent_stiffness::LoadDependentStiffness;
 use super::structural::local_resonator::LocalResonator;
@@ -32,7 +38,7 @@ use super::structural::time_delay::TimeDelay;
 use super::structural::tool_flexibility::ToolFlexibility;
 
 /// All effects on the structure, in the order in which they are tried.
-pub const STRUCTURAL: [&dyn Effect<Structure>; 11] = [
+pub const STRUCTURAL: [&dyn Effect<Structure>; 17] = [
     &LinkFlexibility,
     &JointTransverseCompliance,
     &BaseCompliance,
@@ -44,6 +50,12 @@ pub const STRUCTURAL: [&dyn Effect<Structure>; 11] = [
     &TimeDelay,
     &SensorMisalignment,
     &AmplitudeDependentStiffness,
+    &HystereticDamping,
+    &DriveDynamics,
+    &ToolContact,
+    &ThermalDrift,
+    &BearingCompliance,
+    &BaseMounting,
 ];
 
 /// Effects on the structure whose form the data drew: added on request, not tried by `diagnose`.

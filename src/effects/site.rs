@@ -11,6 +11,8 @@ pub enum Site {
     Joint(usize),
     /// 1-based link.
     Link(usize),
+    /// The tool.
+    Tool,
     /// A place where the data drew something.
     At(Spot),
 }
@@ -22,6 +24,7 @@ impl Site {
             Site::Everywhere => None,
             Site::Joint(i) => Some(format!("joint-{i}")),
             Site::Link(i) => Some(format!("link-{i}")),
+            Site::Tool => Some("tool".into()),
             Site::At(spot) => Some(spot.label()),
         }
     }

@@ -508,28 +508,89 @@ pub fn try_effect<S: Study>(
 /// Times the lowest misfit from which on a candidate is out of the race: it is not followed to its end.
 const OUT_OF_RACE: f64 = 10.0;
 
-/// Adds each instance to `model` in turn and fits it on the coarse view from the given points of the parameters in front;
-/// those out of the race after a first look stay where that look ended. In the order of the instances, without those
-/// that no start led to a fit of. `done` is called after each.
-pub fn try_effects<S: Study>(
+/// Effects on promise that are followed, at most.
+const PROMISES: usize = 4;
+/// Share of what the best other effect takes away that an effect on promise must take away at first sight.
+const PROMISING_SHARE: f64 = 0.1;
+
+/// Of `instances`, on promise all of them, those that take away most at a first look on a glance at the data, if that is more
+/// than their parameters do by chance and not next to nothing against `best`: the lowest misfit there of another effect.
+fn promising<'i, S: Study>(
     study: &S,
     model: &ModelOf<S>,
-    instances: &[InstanceOf<S>],
+    instances: &[&'i InstanceOf<S>],
+    bases: &[Vec<f64>],
+    hints: &[f64],
+    best: f64,
+) -> Vec<&'i InstanceOf<S>> {
+    let glance = View {
+        extent: Extent::Glance,
+        ..View::COARSE
+    };
+    let problem = study.problem(model, glance);
+    // Fitted to the glance like the effects: else each of them would be credited with what that alone takes away.
+    let bounds = model.bounds();
+    let fits = bases
+        .iter()
+        .filter_map(|base| minimise(&problem, base, &bounds, LOOK).ok());
+    let without = fits.map(|fit| fit.cost).fold(f64::INFINITY, f64::min);
+    let mut promises: Vec<(f64, &InstanceOf<S>)> = instances
+        .par_iter()
+        .filter_map(|instance| {
+            let tried = try_effect(study, model, instance, bases, hints, Effort::Look)?;
+            let gain = without - tried.fit.cost;
+            let by_chance = (tried.model.parameters.len() - model.parameters.len()) as f64;
+            let enough = gain > by_chance && gain > PROMISING_SHARE * (without - best);
+            enough.then_some((gain - by_chance, *instance))
+        })
+        .collect();
+    promises.sort_by(|a, b| b.0.total_cmp(&a.0));
+    promises.truncate(PROMISES);
+    promises.into_iter().map(|(_, instance)| instance).collect()
+}
+
+/// Adds each instance to `model` in turn and fits it on the coarse view from the given points of the parameters in front;
+/// those out of the race after a first look stay where that look ended. In the order of the instances, those on promise
+/// last, without those that promise nothing or that no start led to a fit of. `done` is called after each.
+pub fn try_effects<'i, S: Study>(
+    study: &S,
+    model: &ModelOf<S>,
+    instances: &'i [InstanceOf<S>],
     bases: &[Vec<f64>],
     hints: &[f64],
     done: impl Fn() + Sync,
 ) -> Vec<Tried<S::Domain>> {
     let before = model.parameters.len();
-    let looks: Vec<(&InstanceOf<S>, ModelOf<S>, Vec<Fit>)> = instances
-        .par_iter()
-        .filter_map(|instance| {
-            let extended = study.extend(model, instance);
-            let own = own_starts(study, &extended, before, instance, hints);
-            let looks = look(study, &extended, bases, &own, Effort::Staged);
-            done();
-            Some((instance, extended, looks.ok()?))
-        })
-        .collect();
+    type Looked<'i, S> = Vec<(&'i InstanceOf<S>, ModelOf<S>, Vec<Fit>)>;
+    let look_at = |instances: Vec<&'i InstanceOf<S>>| -> Looked<'i, S> {
+        instances
+            .into_par_iter()
+            .filter_map(|instance| {
+                let extended = study.extend(model, instance);
+                let own = own_starts(study, &extended, before, instance, hints);
+                let looks = look(study, &extended, bases, &own, Effort::Staged);
+                done();
+                Some((instance, extended, looks.ok()?))
+            })
+            .collect()
+    };
+    let (on_promise, always): (Vec<_>, Vec<_>) = instances.iter().partition(|i| i.effect.on_promise());
+    let mut looks = look_at(always);
+    let at_a_glance = |(_, model, looks): &(&InstanceOf<S>, ModelOf<S>, Vec<Fit>)| {
+        let glance = View {
+            extent: Extent::Glance,
+            ..View::COARSE
+        };
+        let cost = study.problem(model, glance).cost(&looks[0].theta);
+        cost.unwrap_or(f64::INFINITY)
+    };
+    let leading = looks.iter().min_by(|a, b| a.2[0].cost.total_cmp(&b.2[0].cost));
+    let best = leading.map_or(f64::INFINITY, at_a_glance);
+    let promising = promising(study, model, &on_promise, bases, hints, best);
+    for _ in promising.len()..on_promise.len() {
+        done();
+    }
+    looks.extend(look_at(promising));
     let lowest = looks.iter().map(|l| l.2[0].cost).fold(f64::INFINITY, f64::min);
     looks
         .into_par_iter()

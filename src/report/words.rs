@@ -14,6 +14,7 @@ pub fn place(site: Site) -> Option<String> {
         Site::Everywhere => None,
         Site::Joint(i) => Some(format!("at joint {i}")),
         Site::Link(i) => Some(format!("on link {i}")),
+        Site::Tool => Some("at the tool".into()),
         Site::At(spot) => Some(spot.words()),
     }
 }

@@ -1,4 +1,5 @@
-//! Physics that the library of effects does not have, for campaigns whose right verdict is `unknown`.
+//! Physics under no name of the library of effects, for campaigns whose right verdict is `unknown`, or the effect that comes
+//! next to it (a sliding base is `base-mounting` by now).
 //!
 //! They are written as effects because that is the form the model takes, but they are not in
 //! [`crate::effects::STRUCTURAL`]: no diagnosis can name them.
@@ -128,7 +129,7 @@ impl Effect<Structure> for ViscoelasticJoints {
     }
 }
 
-/// The pedestal slides along the base x and y axes on its fixing (the library's base only rocks).
+/// The pedestal slides along the base x and y axes on its fixing (in the library: `base-mounting`).
 struct BaseSliding;
 
 impl Effect<Structure> for BaseSliding {
@@ -325,7 +326,7 @@ mod tests {
             let setting = PostureSetting {
                 robot: &model,
                 kinematics: &kinematics,
-                level_fraction: 0.0,
+                conditions: Default::default(),
             };
             let values = values.map(Dual::constant);
             ViscoelasticJoints.apply(At::EVERYWHERE, &values, &setting, &mut chain);

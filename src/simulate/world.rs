@@ -72,9 +72,7 @@ impl World<'_> {
                 .turn_joints(d.strength, block.posture, &mut joints_deg);
         }
         let kinematics = robot.kinematics(&joints_deg)?;
-        let mut chain = self
-            .model
-            .chain(self.theta, &kinematics, block.level_fraction, false);
+        let mut chain = self.model.chain(self.theta, &kinematics, block.conditions, false);
         let scene = Scene {
             robot,
             kinematics: &kinematics,

@@ -215,7 +215,7 @@ fn static_rows(model: &StructureModel, nominal: &[f64], fitted: &[f64]) -> Resul
             let report = PostureReport::new(
                 &model.robot,
                 &kinematics,
-                &model.chain(theta, &kinematics, 0.0, false),
+                &model.chain(theta, &kinematics, Default::default(), false),
             )?;
             Ok(report.flange_stiffness_n_per_m)
         };
@@ -247,7 +247,7 @@ fn tool_over_flange(model: &StructureModel, theta: &[f64]) -> Result<[f64; 2]> {
             continue;
         }
         let kinematics = model.robot.kinematics(&posture_deg(&row.posture)?)?;
-        let chain = model.chain(theta, &kinematics, 0.0, false);
+        let chain = model.chain(theta, &kinematics, Default::default(), false);
         let report = PostureReport::new(&model.robot, &kinematics, &chain)?;
         for axis in 0..2 {
             let ratio = report.tcp_stiffness_n_per_m[axis] / report.flange_stiffness_n_per_m[axis];
@@ -329,7 +329,7 @@ fn unexplained(model: &StructureModel, theta: &[f64]) -> Result<Vec<Unexplained>
         let report = PostureReport::new(
             &model.robot,
             &kinematics,
-            &model.chain(theta, &kinematics, 0.0, false),
+            &model.chain(theta, &kinematics, Default::default(), false),
         )?;
         model_hz.extend(report.natural_frequencies_hz);
     }

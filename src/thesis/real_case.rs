@@ -477,7 +477,7 @@ fn static_ratio(model: &StructureModel, theta: &[f64]) -> Result<[f64; 2]> {
     let mut range = [f64::INFINITY, 0.0f64];
     for row in rows::<StaticRow>(STATIC_STIFFNESS)? {
         let kinematics = model.robot.kinematics(&posture_deg(&row.posture)?)?;
-        let chain = model.chain(theta, &kinematics, 0.0, false);
+        let chain = model.chain(theta, &kinematics, Default::default(), false);
         let stiffness = PostureReport::new(&model.robot, &kinematics, &chain)?.flange_stiffness_n_per_m;
         for (axis, measured) in [row.kx_measured_n_per_m, row.ky_measured_n_per_m]
             .into_iter()
@@ -505,7 +505,7 @@ fn difference(
         .map(|(posture, kinematics)| Lookout {
             posture,
             kinematics,
-            level_fraction: 0.0,
+            conditions: Default::default(),
             frequency_hz: (0..LINES).map(|i| LOOK_HZ[0] + step * i as f64).collect(),
         })
         .collect();

@@ -13,6 +13,7 @@ mod diagnose;
 mod expert;
 mod export;
 mod faults;
+mod further_effects;
 mod fuzz;
 mod hole;
 mod init;

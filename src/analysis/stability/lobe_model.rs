@@ -42,7 +42,7 @@ pub(crate) struct FittedModel {
 impl FittedModel {
     fn chain(&self, theta: &[f64], joints_deg: &[f64]) -> Result<(Kinematics, Chain)> {
         let kinematics = self.model.robot.kinematics(joints_deg)?;
-        let chain = self.model.chain(theta, &kinematics, 0.0, false);
+        let chain = self.model.chain(theta, &kinematics, Default::default(), false);
         Ok((self.model.kinematics_at(theta, &kinematics).into_owned(), chain))
     }
 

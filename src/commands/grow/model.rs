@@ -180,7 +180,8 @@ fn postures(
         .iter()
         .map(|posture| {
             let kinematics = model.robot.kinematics(&posture.joints_deg)?;
-            let chain = |baseline: &Baseline| model.chain_on(baseline, theta, &kinematics, 0.0, false);
+            let chain =
+                |baseline: &Baseline| model.chain_on(baseline, theta, &kinematics, Default::default(), false);
             let report = PostureReport::new(&model.robot, &kinematics, &chain(&baseline))?;
             let mut value = json!({
                 "id": posture.id,

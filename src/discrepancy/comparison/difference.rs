@@ -4,6 +4,7 @@ use nalgebra::DVector;
 
 use crate::Result;
 use crate::data::Axis;
+use crate::effects::Conditions;
 use crate::identify::StructureModel;
 use crate::robot::frf::Response;
 use crate::robot::{FrfBasis, Kinematics, Place, Slot};
@@ -16,7 +17,7 @@ pub struct Lookout<'a> {
     /// Where the frames are there.
     pub kinematics: &'a Kinematics,
     /// See [`crate::effects::PostureSetting`].
-    pub level_fraction: f64,
+    pub conditions: Conditions,
     /// Lines that are looked at, Hz.
     pub frequency_hz: Vec<f64>,
 }
@@ -114,7 +115,7 @@ pub fn greatest_difference(
 }
 
 fn point_basis(model: &StructureModel, theta: &[f64], lookout: &Lookout) -> Result<FrfBasis> {
-    let chain = model.chain(theta, lookout.kinematics, lookout.level_fraction, false);
+    let chain = model.chain(theta, lookout.kinematics, lookout.conditions, false);
     let kinematics = model.kinematics_at(theta, lookout.kinematics);
     let mut rows: Vec<DVector<f64>> = Vec::new();
     let mut push = |point, place, tool| {

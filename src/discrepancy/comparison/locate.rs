@@ -376,7 +376,7 @@ fn probe(
     let (robot, kinematics) = model.at(theta, &block.kinematics);
     let joints = robot.joint_count();
     let number = axes.start / 3;
-    let mut chain = model.chain(theta, &block.kinematics, block.level_fraction, false);
+    let mut chain = model.chain(theta, &block.kinematics, block.conditions, false);
     let joint_stiffness = chain.elements.iter().filter(|e| matches!(e.role, Role::Joint(_)));
     let stiffest = joint_stiffness.map(|e| e.stiffness.value).fold(0.0, f64::max);
     let mut coordinates = Vec::new();

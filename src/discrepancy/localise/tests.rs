@@ -69,7 +69,7 @@ fn measured(truth: &StructureModel, own: &[f64], seed: u64) -> FrfData {
         FrfBlock {
             posture,
             force_level_n: None,
-            level_fraction: 0.0,
+            conditions: Default::default(),
             kinematics: truth.robot.kinematics(q).unwrap(),
             frequency_hz: frequency_hz.clone(),
             outputs: outputs.clone(),

@@ -127,7 +127,7 @@ impl Lab {
         for block in &data.blocks {
             // Of several levels the hardest hits: the least noise.
             let lowest = |b: &&std::sync::Arc<FrfBlock>| {
-                b.posture == block.posture && b.level_fraction < block.level_fraction
+                b.posture == block.posture && b.conditions.level_fraction < block.conditions.level_fraction
             };
             if seen.contains(&block.posture) || data.blocks.iter().any(|b| lowest(&b)) {
                 continue;
@@ -213,7 +213,7 @@ impl Lab {
             block: FrfBlock {
                 posture: like.posture,
                 force_level_n: None,
-                level_fraction: like.level_fraction,
+                conditions: like.conditions,
                 kinematics: like.kinematics.clone(),
                 frequency_hz,
                 outputs,

@@ -124,7 +124,9 @@ impl PlanOutlook {
         let share = full.value_count() as f64 / thin.value_count().max(1) as f64;
         let (mut possible, mut not_possible) = (Vec::new(), Vec::new());
         let known = model.known(&summary);
-        for instance in Registry::structure().instances(known.object) {
+        // Every pair of effects is compared: rare ones, and those that have many places, would make that several times longer.
+        let instances = Registry::structure().instances(known.object);
+        for instance in instances.into_iter().filter(|i| !i.effect.on_promise()) {
             match instance.effect.obstacle(&known) {
                 Some(why) => not_possible.push((instance.label(), why)),
                 None => possible.push(instance),

@@ -99,7 +99,7 @@ fn pass(
         Some(m) => m.mistake.kinematics(m.values, &block.kinematics),
         None => block.kinematics.clone(),
     };
-    let chain = model.chain(theta, &kinematics, block.level_fraction, false);
+    let chain = model.chain(theta, &kinematics, block.conditions, false);
     let kinematics = model.kinematics_at(theta, &kinematics);
     let mut points: Vec<usize> = members
         .iter()

@@ -72,7 +72,7 @@ fn arrangement(model: &StructureModel) -> FrfData {
         Arc::new(FrfBlock {
             posture,
             force_level_n: None,
-            level_fraction: 0.0,
+            conditions: Default::default(),
             kinematics: model.robot.kinematics(joints).unwrap(),
             frequency_hz: frequency_hz.clone(),
             outputs,

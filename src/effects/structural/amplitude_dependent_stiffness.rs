@@ -92,7 +92,7 @@ impl Effect<Structure> for AmplitudeDependentStiffness {
         let Site::Joint(i) = site else { return };
         // Exactly the ratio at the lowest level, geometric between the levels.
         let ln_ratio = values[0].chain(values[0].value.ln(), 1.0 / values[0].value);
-        let factor = ln_ratio.scale(setting.level_fraction).exp();
+        let factor = ln_ratio.scale(setting.conditions.level_fraction).exp();
         for element in chain.elements.iter_mut().filter(|e| e.role == Role::Joint(i)) {
             element.stiffness = &element.stiffness * &factor;
         }

@@ -29,8 +29,17 @@ pub struct PostureSetting<'a> {
     pub robot: &'a RobotModel,
     /// Where its frames are.
     pub kinematics: &'a Kinematics,
+    /// How it was measured.
+    pub conditions: Conditions,
+}
+
+/// Conditions under which a block of FRFs was measured.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Conditions {
     /// 0 at the highest hammer level of the campaign, 1 at the lowest, logarithmic between; 0 where there is one level.
     pub level_fraction: f64,
+    /// 0 at the first posture of the campaign, 1 at the last, in their order; 0 where there is one posture.
+    pub order_fraction: f64,
 }
 
 /// What happens to the response channels between the structure and the file.

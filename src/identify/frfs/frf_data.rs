@@ -6,7 +6,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use crate::data::{Axis, MeasuredDof, MeasuredFrf, Posture};
-use crate::effects::DataSummary;
+use crate::effects::{Conditions, DataSummary};
 use crate::robot::Kinematics;
 use crate::robot::RobotModel;
 use crate::signal::frf_noise;
@@ -42,8 +42,8 @@ pub struct FrfBlock {
     pub posture: usize,
     /// Of the hammer; `None` where nobody says.
     pub force_level_n: Option<f64>,
-    /// 0 at the highest force level of the campaign, 1 at the lowest, logarithmic between.
-    pub level_fraction: f64,
+    /// Level of the hammer and order of the posture.
+    pub conditions: Conditions,
     /// Where the robot's frames are at the posture.
     pub kinematics: Kinematics,
     /// Ascending, above zero.
@@ -113,7 +113,10 @@ impl FrfData {
                     blocks.push(FrfBlock {
                         posture: frf.posture,
                         force_level_n: frf.force_level_n,
-                        level_fraction: 0.0,
+                        conditions: Conditions {
+                            level_fraction: 0.0,
+                            order_fraction: frf.posture as f64 / (postures.len().max(2) - 1) as f64,
+                        },
                         kinematics,
                         frequency_hz: frf.frequency_hz.clone(),
                         outputs: Vec::new(),
@@ -233,7 +236,7 @@ impl FrfData {
     /// What effects need to know of the data.
     pub fn summary(&self) -> DataSummary {
         let lines = || self.blocks.iter().flat_map(|b| b.frequency_hz.iter().copied());
-        let mut levels: Vec<f64> = self.blocks.iter().map(|b| b.level_fraction).collect();
+        let mut levels: Vec<f64> = self.blocks.iter().map(|b| b.conditions.level_fraction).collect();
         levels.sort_by(f64::total_cmp);
         levels.dedup();
         DataSummary {
@@ -293,7 +296,7 @@ fn set_lowness(blocks: &mut [FrfBlock]) {
     if high > low && low > 0.0 {
         for block in blocks.iter_mut() {
             let level = block.force_level_n.unwrap_or(high);
-            block.level_fraction = (high / level).ln() / (high / low).ln();
+            block.conditions.level_fraction = (high / level).ln() / (high / low).ln();
         }
     }
 }

@@ -372,7 +372,10 @@ mod tests {
                 FrfBlock {
                     posture,
                     force_level_n: None,
-                    level_fraction: posture as f64,
+                    conditions: effects::Conditions {
+                        level_fraction: posture as f64,
+                        order_fraction: posture as f64,
+                    },
                     kinematics: model.robot.kinematics(q).unwrap(),
                     frequency_hz: vec![6.0, 9.0, 14.0, 22.0, 47.0],
                     outputs,

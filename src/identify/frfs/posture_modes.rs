@@ -55,11 +55,11 @@ pub fn posture_modes(
     highest_hz: f64,
     with_derivatives: bool,
 ) -> Result<Vec<PostureMode>> {
-    let chain = model.chain(theta, kinematics, 0.0, with_derivatives);
+    let chain = model.chain(theta, kinematics, Default::default(), with_derivatives);
     let count = if with_derivatives { theta.len() } else { 0 };
     let mut system = chain.system(count);
     if with_derivatives {
-        model.add_file_slopes(&mut system, theta, kinematics, 0.0);
+        model.add_file_slopes(&mut system, theta, kinematics, Default::default());
     }
     let kinematics = &*model.kinematics_at(theta, kinematics);
     let modes = ModalBasis::new(&system.stiffness, &system.mass)?;
@@ -217,7 +217,7 @@ mod tests {
         let axis = 0;
         let most = |m: &&&PostureMode| m.compliance_m_per_n[axis];
         let mode = *tool.iter().max_by(|a, b| most(a).total_cmp(&most(b))).unwrap();
-        let chain = model.chain(&theta, &kinematics, 0.0, false);
+        let chain = model.chain(&theta, &kinematics, Default::default(), false);
         let row = chain.output_row(kinematics.tcp(), model.robot.flange_place(), true, &Vector3::x());
         let basis = FrfBasis::new(&chain.system(0), &[row]).unwrap();
         let real = |f: f64| basis.receptance_at(std::f64::consts::TAU * f, 0, 0).unwrap().re;

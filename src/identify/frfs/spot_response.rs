@@ -213,7 +213,7 @@ pub(super) struct SpotBasis {
 impl SpotBasis {
     pub fn new(model: &StructureModel, theta: &[f64], block: &FrfBlock, spots: &[Spot]) -> Result<Self> {
         let (rows, mut all_rows) = spot_rows(model, theta, block, spots);
-        let chain = model.chain(theta, &block.kinematics, block.level_fraction, false);
+        let chain = model.chain(theta, &block.kinematics, block.conditions, false);
         let outputs = all_rows.len();
         all_rows.extend(rows.iter().map(|r| r.row.clone()));
         let basis = FrfBasis::new(&chain.system(0), &all_rows)?;
@@ -249,7 +249,7 @@ fn spot_rows(
     spots: &[Spot],
 ) -> (Vec<SpotRow>, Vec<DVector<f64>>) {
     let kinematics = &*model.kinematics_at(theta, &block.kinematics);
-    let chain = model.chain(theta, &block.kinematics, block.level_fraction, false);
+    let chain = model.chain(theta, &block.kinematics, block.conditions, false);
     let output_rows = |chain: &crate::robot::Chain| model.output_rows(theta, chain, block);
     let outputs = output_rows(&chain);
     // All series spots at once, behind the model's own elements.

@@ -7,7 +7,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use crate::data::{Point, RobotSection};
-use crate::effects::{ChannelFilter, DataSummary, Known, PostureSetting, Structure};
+use crate::effects::{ChannelFilter, Conditions, DataSummary, Known, PostureSetting, Structure};
 use crate::identify::frfs::channels::Channels;
 use crate::identify::frfs::frf_data::{FrfBlock, FrfData};
 use crate::identify::model::{Model, Modelled};
@@ -229,16 +229,16 @@ impl StructureModel {
         (robot, kinematics)
     }
 
-    /// The chain at a posture with all effects; `kinematics` as the robot file has them. `level_fraction`: see [`PostureSetting`].
+    /// The chain at a posture with all effects; `kinematics` as the robot file has them. `conditions`: see [`PostureSetting`].
     pub fn chain(
         &self,
         theta: &[f64],
         kinematics: &Kinematics,
-        level_fraction: f64,
+        conditions: Conditions,
         with_derivatives: bool,
     ) -> Chain {
         let baseline = self.baseline(theta, with_derivatives);
-        self.chain_on(&baseline, theta, kinematics, level_fraction, with_derivatives)
+        self.chain_on(&baseline, theta, kinematics, conditions, with_derivatives)
     }
 
     /// As [`Self::chain`], on a baseline that was changed by hand.
@@ -247,7 +247,7 @@ impl StructureModel {
         baseline: &Baseline,
         theta: &[f64],
         kinematics: &Kinematics,
-        level_fraction: f64,
+        conditions: Conditions,
         with_derivatives: bool,
     ) -> Chain {
         let (robot, kinematics) = self.at(theta, kinematics);
@@ -261,7 +261,7 @@ impl StructureModel {
         let setting = PostureSetting {
             robot: &robot,
             kinematics: &kinematics,
-            level_fraction,
+            conditions,
         };
         for added in self.effects_in_order() {
             let values = self.values(theta, added, with_derivatives);
@@ -285,13 +285,13 @@ impl StructureModel {
 
     pub(crate) fn basis(&self, theta: &[f64], block: &FrfBlock, with_derivatives: bool) -> Result<FrfBasis> {
         stop::point();
-        let chain = self.chain(theta, &block.kinematics, block.level_fraction, with_derivatives);
+        let chain = self.chain(theta, &block.kinematics, block.conditions, with_derivatives);
         let rows = self.output_rows(theta, &chain, block);
         if !with_derivatives {
             return FrfBasis::new(&chain.system(0), &rows);
         }
         let mut system = chain.system(theta.len());
-        self.add_file_slopes(&mut system, theta, &block.kinematics, block.level_fraction);
+        self.add_file_slopes(&mut system, theta, &block.kinematics, block.conditions);
         FrfBasis::with_moved_outputs(&system, &rows, &self.row_slopes(theta, block))
     }
 
@@ -334,11 +334,11 @@ impl StructureModel {
         system: &mut System,
         theta: &[f64],
         kinematics: &Kinematics,
-        level_fraction: f64,
+        conditions: Conditions,
     ) {
         for k in 0..self.file_numbers.len() {
             let (moved, per_unit) = self.beside(theta, k);
-            let [above, below] = moved.map(|t| self.chain(&t, kinematics, level_fraction, false).system(0));
+            let [above, below] = moved.map(|t| self.chain(&t, kinematics, conditions, false).system(0));
             system.derivatives[self.first_file_number + k] = System::difference(&above, &below, per_unit);
         }
     }
@@ -351,7 +351,7 @@ impl StructureModel {
             .map(|(k, _)| {
                 let (moved, per_unit) = self.beside(theta, k);
                 let [above, below] = moved.map(|t| {
-                    let chain = self.chain(&t, &block.kinematics, block.level_fraction, false);
+                    let chain = self.chain(&t, &block.kinematics, block.conditions, false);
                     self.output_rows(&t, &chain, block)
                 });
                 let slopes = above.iter().zip(&below).map(|(a, b)| (a - b) * per_unit);
@@ -367,7 +367,7 @@ impl StructureModel {
         let count = self.parameters.len() as f64;
         let theta = self.nominal_theta();
         let of_block = |block: &FrfBlock| {
-            let chain = self.chain(&theta, &block.kinematics, block.level_fraction, false);
+            let chain = self.chain(&theta, &block.kinematics, block.conditions, false);
             // Six coordinates of each body move with mass, the others give way without.
             let most =
                 6 * chain.bodies.len() + chain.branches.iter().map(|b| b.directions.len()).sum::<usize>();

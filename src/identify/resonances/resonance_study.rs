@@ -133,7 +133,7 @@ impl Match {
 }
 
 /// Effects that such a table cannot show, with the reason.
-const INVISIBLE: [(&str, &str); 3] = [
+const INVISIBLE: [(&str, &str); 9] = [
     ("time-delay", "a table of resonances holds no phase"),
     (
         "sensor-misalignment",
@@ -142,6 +142,30 @@ const INVISIBLE: [(&str, &str); 3] = [
     (
         "joint-damping",
         "a table of resonances does not hold the damping of each mode",
+    ),
+    (
+        "hysteretic-damping",
+        "a table of resonances does not hold the damping of each mode",
+    ),
+    (
+        "drive-dynamics",
+        "a table of resonances does not hold the damping by which a drive tells itself from a gear",
+    ),
+    (
+        "contact",
+        "a table of resonances along two axes does not hold the direction of a contact",
+    ),
+    (
+        "thermal-drift",
+        "a table of resonances does not say in which order its configurations were measured",
+    ),
+    (
+        "bearing-compliance",
+        "a table of resonances holds too few numbers to choose among rarer places as well",
+    ),
+    (
+        "base-mounting",
+        "a table of resonances holds too few numbers to choose among rarer places as well",
     ),
 ];
 

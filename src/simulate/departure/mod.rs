@@ -1,5 +1,6 @@
-//! Physics and setups that neither the library of effects nor the baseline model can express, each with a strength that
-//! can be made as faint as wanted.
+//! Physics and setups that the baseline model cannot express, each with a strength that can be made as faint as wanted. Most
+//! have no name in the library of effects; for the others (a loss factor, a drive, a contact, a bearing, a drift) this is the
+//! program apart from the model on which the library's verdict can be tried.
 //!
 //! Unlike [`super::foreign`], which is written as effects of the model, a departure acts where the fits have no parameters:
 //! on the true posture, on the dynamic stiffness at each frequency, on single channels and single hits. `simulate::world`

@@ -1,0 +1,65 @@
+//! Drive, gear loss, bearing, base, contact, warming: hidden in a campaign each, named, added, measured.
+
+use crate::support::document;
+
+/// What is hidden, with its parameters as asked for, and the key of the choice.
+const HIDDEN: [&str; 7] = [
+    "hysteretic-damping:extent=one,loss_factor=0.07,common_share=0",
+    "drive-dynamics@joint-2:servo_ratio=3,frequency_hz=14,damping_ratio=0.5",
+    "contact@tool:ground=rigid,stiffness_n_per_m=2e5,damping_ns_per_m=150,elevation_deg=60,azimuth_deg=30",
+    "thermal-drift:stiffness_change=-0.08,damping_change=0.2",
+    "bearing-compliance@joint-3:direction=radial,stiffness_n_per_m=6e6",
+    "base-mounting:direction=horizontal,stiffness_n_per_m=8e6",
+    "base-mounting:direction=vertical,stiffness_n_per_m=8e6",
+];
+
+/// The effect and its place are named, `add` brings the misfit to the noise, and the parameters are those that were hidden,
+/// to four of their standard errors.
+#[test]
+fn each_is_named_and_added_with_its_parameters() {
+    for (seed, hidden) in (31..).zip(HIDDEN) {
+        let folder = tempfile::tempdir().unwrap();
+        let dir = folder.path().join("cell");
+        let path = dir.to_str().unwrap();
+        let seed: u64 = seed;
+        document(&[
+            "simulate",
+            "--out",
+            path,
+            "--seed",
+            &seed.to_string(),
+            "--postures",
+            "4",
+            "--lines-hz",
+            "0.5",
+            "--effect",
+            hidden,
+        ]);
+        let (label, values) = hidden.split_once(':').unwrap();
+        let found = document(&["diagnose", path]);
+        assert_eq!(found["verdict"], "effect", "{hidden}: {}", found["best_guess"]);
+        let site = found["site"]
+            .as_str()
+            .map_or(String::new(), |site| format!("@{site}"));
+        assert_eq!(
+            format!("{}{site}", found["effect"].as_str().unwrap()),
+            label,
+            "{hidden}"
+        );
+        let added = document(&["add", path, label]);
+        assert_eq!(added["progress"], true, "{hidden}");
+        let after = added["after"]["reduced_chi2"].as_f64().unwrap();
+        assert!((0.9..1.1).contains(&after), "{hidden}: {after}");
+        for (key, value) in values.split(',').filter_map(|pair| pair.split_once('=')) {
+            let Ok(value) = value.parse::<f64>() else { continue };
+            let fitted = added["parameters"].as_array().unwrap().iter();
+            let own = fitted
+                .filter(|p| p["name"].as_str().unwrap().ends_with(key))
+                .next_back();
+            let own = own.unwrap_or_else(|| panic!("{hidden}: no {key} in {}", added["parameters"]));
+            let off = own["value"].as_f64().unwrap() - value;
+            let std = own["std_error"].as_f64().unwrap();
+            assert!(off.abs() <= 4.0 * std, "{hidden} {key}: {} ± {std}", own["value"]);
+        }
+    }
+}

@@ -382,8 +382,10 @@ impl<'a, S: Study> Engine<'a, S> {
         };
         drop(progress);
         let by_cost = |a: &TriedOf<S>, b: &TriedOf<S>| a.fit.cost.total_cmp(&b.fit.cost);
-        tried.sort_by(by_cost);
-        // One for each effect and site: its best discrete choice.
+        // One for each effect and site: its best discrete choice. One with more parameters has to pay for them (Schwarz 1978).
+        let price = 0.5 * (study.real_values(Extent::Coarse) as f64).ln();
+        let paid = |t: &TriedOf<S>| t.fit.cost + price * t.fit.theta.len() as f64;
+        tried.sort_by(|a, b| paid(a).total_cmp(&paid(b)));
         let mut labels = Vec::new();
         tried.retain(|t| {
             let label = self.label(&t.instance);
@@ -391,6 +393,7 @@ impl<'a, S: Study> Engine<'a, S> {
             labels.push(label);
             new
         });
+        tried.sort_by(by_cost);
         let Some(best) = tried.first() else {
             return Ok((tried, None));
         };

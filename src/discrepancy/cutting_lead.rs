@@ -3,6 +3,7 @@
 
 use serde::Serialize;
 
+use super::cutting_trends::{Trend, cutting_trends};
 use crate::cutting::ForceAxis;
 use crate::data::Process;
 use crate::identify::forces::cutting_data::CutData;
@@ -147,6 +148,8 @@ pub struct LineGroup {
 pub struct CuttingLead {
     /// Root mean square of model less record above the noise, over all cuts and channels, N.
     pub above_noise_n: f64,
+    /// The rest against what was different, least probable by chance first.
+    pub trends: Vec<Trend>,
     /// Strongest first.
     pub lines: Vec<LineGroup>,
 }
@@ -245,6 +248,7 @@ pub fn cutting_lead(data: &CuttingData, fits: &[CutFit]) -> Option<CuttingLead> 
         .sum();
     Some(CuttingLead {
         above_noise_n: (total / channels.max(1) as f64).sqrt(),
+        trends: cutting_trends(data, fits),
         lines: groups,
     })
 }

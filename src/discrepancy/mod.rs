@@ -3,6 +3,7 @@
 pub mod candidate;
 pub mod comparison;
 pub mod cutting_lead;
+pub mod cutting_trends;
 pub mod diagnose;
 pub mod diagnosis;
 pub mod extension;
@@ -19,6 +20,7 @@ pub use comparison::compare::{Band, FrfComparison, FrfError};
 pub use comparison::compare_cutting::{CutError, CuttingComparison};
 pub use comparison::explained::Explained;
 pub use cutting_lead::{CuttingLead, LineGroup, LineKind, cutting_lead};
+pub use cutting_trends::{Against, Trend, TrendPoint, cutting_trends};
 pub use diagnose::diagnose;
 pub use diagnosis::Diagnosis;
 pub use outlook::next_measurement::NextMeasurement;

@@ -71,6 +71,11 @@ pub trait Effect<D: Domain>: Sync {
         false
     }
 
+    /// Why a discrete choice is not worth trying on this data while others may be; `None` if it is.
+    fn choice_obstacle(&self, _variant: usize, _known: &Known<D>) -> Option<String> {
+        None
+    }
+
     /// Tunable quantities; names are the keys in docs/json.md. `nominal` is the first starting value.
     fn parameters(&self, at: At, known: &Known<D>) -> Vec<Parameter>;
 

@@ -11,9 +11,12 @@ use super::cutting::dynamometer_resonance::DynamometerResonance;
 use super::cutting::edge_force::EdgeForce;
 use super::cutting::margin_friction::MarginFriction;
 use super::cutting::nonlinear_drift::NonlinearDrift;
-use super::cutting::runout::RunoutEffect;
+use super::cutting::push_off::PushOff;
 use super::cutting::size_effect::SizeEffect;
 use super::cutting::speed_dependence::SpeedDependence;
+use super::cutting::teeth::runout::RunoutEffect;
+use super::cutting::teeth::tooth_radii::ToothRadii;
+use super::cutting::teeth::uneven_pitch::UnevenPitch;
 use super::cutting::tool_wear::ToolWear;
 use super::drawn::{DrawnBranch, Series};
 use super::effect::{Domain, Effect, Instance};
@@ -62,7 +65,7 @@ pub const STRUCTURAL: [&dyn Effect<Structure>; 17] = [
 pub const DRAWN: [&dyn Effect<Structure>; 2] = [&DrawnBranch, &Series];
 
 /// All effects on cutting forces, in the order in which they are tried.
-pub const CUTTING: [&dyn Effect<Cutting>; 12] = [
+pub const CUTTING: [&dyn Effect<Cutting>; 15] = [
     &SizeEffect,
     &RunoutEffect,
     &ToolWear,
@@ -75,6 +78,9 @@ pub const CUTTING: [&dyn Effect<Cutting>; 12] = [
     &ChiselEdge,
     &MarginFriction,
     &EdgeForce,
+    &ToothRadii,
+    &UnevenPitch,
+    &PushOff,
 ];
 
 impl Registry<Structure> {

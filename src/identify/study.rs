@@ -144,7 +144,12 @@ pub trait Study: Sync {
         let (mut tried, mut not_tried) = (Vec::new(), Vec::new());
         for instance in self.registry().instances(known.object) {
             let label = instance.label();
-            if model.has(&label) {
+            if model.has(&label)
+                || instance
+                    .effect
+                    .choice_obstacle(instance.variant, &known)
+                    .is_some()
+            {
                 continue;
             }
             let blind = self.blind_to(instance.effect);

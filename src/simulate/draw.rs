@@ -27,6 +27,12 @@ pub enum Purpose {
     ColouredError = 8,
     /// Noise that the outputs of one hit have in common.
     CommonNoise = 9,
+    /// Tool, material and cuts of force records.
+    Cutting = 10,
+    /// What is hidden in force records.
+    CuttingEffects = 11,
+    /// Noise of force records.
+    ForceNoise = 12,
 }
 
 /// A stream of random numbers.

@@ -1,6 +1,6 @@
 //! The virtual lab: writes a campaign whose truth is known.
 //!
-//! A side of a campaign (here [`structure`]; force records would be a second one) turns its scenario into a
+//! A side of a campaign ([`structure`], or [`forces`] of milled cuts) turns its scenario into a
 //! [`LabCampaign`]: the files of the folder and the truth. [`LabCampaign::write`] puts both on disk, the truth next to
 //! the folder, so that the folder itself stays blind.
 //!
@@ -11,6 +11,7 @@ mod campaign_folder;
 pub mod departure;
 pub mod draw;
 mod files;
+pub mod forces;
 pub mod foreign;
 mod lab_robot;
 mod laboratory;

@@ -8,6 +8,7 @@ mod cfc_methods;
 mod channels;
 mod contract;
 mod crowd;
+mod cutting_effects;
 mod demo;
 mod diagnose;
 mod expert;

@@ -10,7 +10,7 @@ use crate::commands::{Outcome, SideArgs, by_domain};
 use crate::discrepancy::candidate::BaselineFit;
 use crate::discrepancy::comparison::explained::{Explained, NamedPart};
 use crate::discrepancy::localise::Localisation;
-use crate::discrepancy::{CuttingLead, Diagnosis, DiagnosisVerdict, EffectCandidate, NextMeasurement};
+use crate::discrepancy::{CuttingLead, Diagnosis, DiagnosisVerdict, EffectCandidate, NextMeasurement, Trend};
 use crate::identify::Modelled;
 use crate::identify::Options;
 use crate::identify::frfs::structure_study::residual_peaks;
@@ -106,9 +106,10 @@ fn outcome<D: CampaignSide>(guide: Guide<'_>, findings: &Findings<D>, own: Value
     Outcome::new(json, text, Some(next))
 }
 
-/// What is left by what it follows, and what usually causes that.
+/// What is left by what it follows, and what usually causes that: what differed between the cuts and within them, then the lines.
 fn lines_in_words(lead: &CuttingLead) -> String {
-    let mut text = wrapped(
+    let mut text = trends_in_words(&lead.trends);
+    text += &wrapped(
         &format!(
             "A lead: what stands above the noise is {} N (root mean square); by what it follows, strongest first:",
             number(lead.above_noise_n, 3)
@@ -128,6 +129,41 @@ fn lines_in_words(lead: &CuttingLead) -> String {
             "    ",
         );
         text += &wrapped(&format!("usually {}", group.usual_cause), "      ");
+    }
+    text
+}
+
+/// Against what the rest was held, and what it follows.
+fn trends_in_words(trends: &[Trend]) -> String {
+    let words = |all: &[&Trend]| {
+        all.iter()
+            .map(|t| t.against.words())
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    let (follows, not): (Vec<&Trend>, Vec<&Trend>) = trends.iter().partition(|t| t.is_significant());
+    let mut text = String::new();
+    for trend in &follows {
+        let axis = trend.axis.map_or(String::new(), |a| format!(" of {}", a.label()));
+        text += &wrapped(
+            &format!(
+                "The rest{axis} follows {} (p = {:.1e} after {} tests): {}",
+                trend.against.words(),
+                trend.p_value,
+                trend.tests,
+                trend.course()
+            ),
+            "  ",
+        );
+        text += &wrapped(&format!("usually {}", trend.usual_cause), "      ");
+    }
+    if !not.is_empty() {
+        let of = if follows.is_empty() {
+            "The rest follows none of"
+        } else {
+            "It does not follow"
+        };
+        text += &wrapped(&format!("{of}: {}", words(&not)), "  ");
     }
     text
 }

@@ -5,6 +5,7 @@ use serde_json::json;
 
 use crate::commands::{Outcome, next_step};
 use crate::ingest::Quantity;
+use crate::simulate::forces::{self, ForceScenario};
 use crate::simulate::{
     CampaignKind, EffectRequest, FrfFormat, FrfLayout, LabRobot, LineNoise, Slip, StructureScenario,
     check_target, departure, random, structure, truth_beside,
@@ -28,7 +29,8 @@ enum QuantityArg {
                         come from the same model that the fits use.\n\nExamples:\n  lobestone simulate --out cell1\n  \
                         lobestone simulate --out cell2 --effect payload:mass_kg=25 --seed 3\n  lobestone simulate --out \
                         cell3 --kind dirty --effect joint-transverse-compliance@joint-3 --visibility 20\n  lobestone \
-                        simulate --out cell4 --unknown\n  lobestone simulate --out cell5 --random --seed 5"
+                        simulate --out cell4 --unknown\n  lobestone simulate --out cell5 --random --seed 5\n  lobestone simulate --out cell6 \
+                        --effect tooth-radii:short_mm=0.03"
 )]
 pub struct SimulateArgs {
     /// Folder to write; must not exist, or be empty.
@@ -56,6 +58,14 @@ pub struct SimulateArgs {
     /// How well the campaign is measured; single options below override it.
     #[arg(long, value_enum, default_value = "careful")]
     kind: CampaignKind,
+    /// Force records of milled cuts instead of FRFs; an --effect on cutting forces says that, too. Of the other options only --out,
+    /// --truth, --seed, --effect, --strength and --noise-n count.
+    #[arg(long, conflicts_with_all = ["unknown", "visibility", "noise", "noise_floor", "postures", "spread_deg", "points", "band",
+        "format", "quantity", "mass_error", "stiffness_error", "force_levels", "laboratory", "line_noise", "common_noise", "random"])]
+    milling: bool,
+    /// Noise of each channel of force records, N; drawn where it is left out.
+    #[arg(long, value_name = "N")]
+    noise_n: Option<f64>,
     /// EFFECT[@SITE][:parameter=value,…]: physics to hide in the data; may be given several times. What is not given is
     /// drawn.
     #[arg(long = "effect", value_name = "EFFECT")]
@@ -134,10 +144,17 @@ pub fn run(args: SimulateArgs) -> Result<Outcome> {
         None => truth_beside(&args.out)?,
     };
     check_target(&args.out, &truth)?;
-    let robot = LabRobot::load(&args.robot)?;
-    let lab = structure::simulate(&scenario(&args)?, &robot)?;
+    let is_on_forces = |e: &EffectRequest| forces::is_on_forces(&e.effect);
+    let (lab, kind) = match args.milling || args.effects.iter().any(is_on_forces) {
+        true => (forces::simulate(&force_scenario(&args)?)?, "force"),
+        false => {
+            let robot = LabRobot::load(&args.robot)?;
+            (structure::simulate(&scenario(&args)?, &robot)?, "FRF")
+        }
+    };
     let written = lab.write(&args.out, &truth)?;
-    let frf_files = lab.files.iter().filter(|f| f.0.starts_with("frf/")).count();
+    let folder = format!("{}/", kind.to_lowercase());
+    let records = lab.files.iter().filter(|f| f.0.starts_with(&folder)).count();
     let dir = written.dir.display();
     Ok(Outcome::new(
         json!({
@@ -146,9 +163,25 @@ pub fn run(args: SimulateArgs) -> Result<Outcome> {
             "seed": args.seed,
             "files": lab.files.iter().map(|f| &f.0).collect::<Vec<_>>(),
         }),
-        format!("{dir}: a simulated campaign, {frf_files} FRF files\n"),
+        format!("{dir}: a simulated campaign, {records} {kind} files\n"),
         Some(next_step::simulated(&written.dir, &written.truth)),
     ))
+}
+
+fn force_scenario(args: &SimulateArgs) -> Result<ForceScenario> {
+    let positive = |v: f64| v.is_finite() && v >= 0.0;
+    if !args.noise_n.is_none_or(positive) {
+        return Err(InputError::new("is no noise")
+            .key("--noise-n")
+            .remedy("give a standard deviation in N, such as 4")
+            .into());
+    }
+    Ok(ForceScenario {
+        seed: args.seed,
+        effects: args.effects.clone(),
+        strength: args.strength,
+        noise_n: args.noise_n,
+    })
 }
 
 fn scenario(args: &SimulateArgs) -> Result<StructureScenario> {

@@ -109,7 +109,7 @@ impl MillingCut {
         }
     }
 
-    fn nothing(orders: usize) -> UnitForces {
+    pub(super) fn nothing(orders: usize) -> UnitForces {
         std::array::from_fn(|_| std::array::from_fn(|_| vec![Complex64::ZERO; orders + 1]))
     }
 
@@ -328,7 +328,7 @@ impl MillingCut {
     }
 
     /// Whether every order with the same remainder over the teeth sees the same sum over them.
-    fn is_evenly_spaced(&self) -> bool {
+    pub fn is_evenly_spaced(&self) -> bool {
         let even = |(j, p): (usize, &ToothPlace)| {
             (p.ahead_rad - TAU * j as f64 / self.teeth as f64).abs() < 1e-12 && p.lag_rad == self.lag_rad
         };
@@ -473,7 +473,7 @@ fn waves(nodes: &[(f64, f64)], remainder: usize, stride: usize, orders: usize) -
 }
 
 /// (1/2π) ∫ e^{−imφ} dφ over an immersion.
-fn window(immersion: Immersion, m: i64) -> Complex64 {
+pub(super) fn window(immersion: Immersion, m: i64) -> Complex64 {
     let Immersion { start_rad, exit_rad } = immersion;
     if m == 0 {
         return Complex64::from((exit_rad - start_rad) / TAU);

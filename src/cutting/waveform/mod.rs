@@ -7,6 +7,7 @@
 mod drilling;
 mod edge_shape;
 mod milling;
+mod own_teeth;
 mod quadrature;
 mod tooth_place;
 mod vibrating;
@@ -14,6 +15,7 @@ mod vibrating;
 pub use drilling::{DrillTerm, DrillingCut};
 pub use edge_shape::EdgeShape;
 pub use milling::{ChipLaw, MillingCut, SampledForces, UNIT_COUNT, UnitForces};
+pub use own_teeth::OwnTeethForces;
 pub(super) use quadrature::gauss_legendre;
 pub use tooth_place::ToothPlace;
 pub use vibrating::{LineForces, VibratingForces};

@@ -87,6 +87,9 @@ fn lab_test(effect: &str) -> &'static str {
     match effect {
         "size-effect" => "the same cut at a quarter and at four times the feed",
         "runout" => "the same cut with the tool turned by half a pitch in its holder",
+        "tooth-radii" => "the radius of each tooth, on a setting device or with a dial gauge",
+        "uneven-pitch" => "the angles between the teeth, from a photograph along the tool's axis",
+        "push-off" => "the depth of the slots of the smallest and the largest feed, measured",
         "tool-wear" => "the first cut repeated now, and once more with a new tool",
         "speed-dependence" => "the same cut at half and at twice the cutting speed",
         "crosstalk" => "a known static load along one axis at a time",

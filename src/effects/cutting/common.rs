@@ -18,3 +18,8 @@ pub(super) fn straight_edge_only(data: &CuttingSummary) -> Option<String> {
 pub(super) fn drilling_only(data: &CuttingSummary) -> Option<String> {
     (data.process != Process::Drilling).then(|| "drilling only".to_string())
 }
+
+pub(super) fn one_helix_only(data: &CuttingSummary) -> Option<String> {
+    (!data.one_helix)
+        .then(|| "not worked out for teeth of several helix angles (tooth_helix_deg of [tool])".to_string())
+}

@@ -1,6 +1,7 @@
 use super::common::milling_only;
 use super::{CutPhysics, CutSetting, Cutting};
 use crate::effects::background::GAUTSCHI;
+use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{At, Effect, Known, Site};
 use crate::effects::{Background, Size};
 use crate::parameter::{Parameter, Prior};
@@ -58,6 +59,16 @@ impl Effect<Cutting> for Crosstalk {
                 )
             })
             .collect()
+    }
+
+    fn usual_sizes(&self) -> &'static [UsualSize] {
+        const {
+            &[UsualSize::new(
+                "matrix",
+                SizeRange::Either(0.05),
+                FollowsSize::Power(1.0),
+            )]
+        }
     }
 
     fn impossible(&self, _site: Site, _object: &(), sizes: &[Size]) -> Option<String> {

@@ -1,5 +1,6 @@
 //! The forces of a cut as a [`Domain`]: effects write into the [`CutPhysics`] of each cut.
 
+use crate::cutting::waveform::MillingCut;
 use crate::data::Process;
 use crate::effects::{Domain, Known};
 use crate::robot::Dual;
@@ -32,6 +33,12 @@ pub struct CuttingSummary {
     pub teeth: usize,
     /// The edge runs straight up the side of the tool.
     pub straight_edge: bool,
+    /// All teeth have one helix angle.
+    pub one_helix: bool,
+    /// The teeth are evenly spaced, as the campaign has them.
+    pub even_pitch: bool,
+    /// Different engagements of the cutter: depth, entry and exit angle.
+    pub engagements: usize,
     /// Number of cuts.
     pub cuts: usize,
     /// Different positions in the sequence of cuts; 0 where the campaign does not say.
@@ -42,6 +49,8 @@ pub struct CuttingSummary {
     pub feeds: usize,
     /// Smallest feed per tooth or revolution, mm.
     pub smallest_feed_mm: f64,
+    /// Largest feed per tooth or revolution, mm.
+    pub largest_feed_mm: f64,
     /// Recorded channels x, y, z, torque that every cut has.
     pub channels: [bool; 4],
     /// Highest frequency that the order spectra hold, Hz; 0 where there are none.
@@ -71,6 +80,10 @@ pub struct CutPhysics {
     pub size_exponent: Option<Dual>,
     /// Eccentric tool; `None` where it runs true.
     pub runout: Option<Runout>,
+    /// Teeth that differ beyond what the tool's description says; `None` where they do not.
+    pub own_teeth: Option<OwnTeeth>,
+    /// Way of the tool along its axis out of the work for the mean axial force on it, mm/N.
+    pub axial_compliance_mm_per_n: Option<Dual>,
     /// Thrust of the chisel edge in a full hole, N.
     pub chisel_thrust_n: Option<Dual>,
     /// Friction force on the circumference for each mm of depth, N.
@@ -89,6 +102,27 @@ pub struct CutPhysics {
     pub vibration: Option<Vibration>,
 }
 
+impl CutPhysics {
+    /// A plain cut with these coefficients.
+    pub fn of(coefficient: Vec<Dual>) -> Self {
+        CutPhysics {
+            coefficient,
+            size_exponent: None,
+            runout: None,
+            own_teeth: None,
+            axial_compliance_mm_per_n: None,
+            chisel_thrust_n: None,
+            margin_n_per_mm: None,
+            tilt: None,
+            dynamics: None,
+            crosstalk: None,
+            transient_s: None,
+            leak_per_s: None,
+            vibration: None,
+        }
+    }
+}
+
 /// Rows of a 3×3 matrix.
 pub type Mixing = [[Dual; 3]; 3];
 
@@ -99,6 +133,58 @@ pub struct Runout {
     pub offset_mm: Dual,
     /// From tooth 0.
     pub angle_rad: Dual,
+}
+
+/// What is added to radius and angle of single teeth, in the order in which [`MillingCut`] counts them: each is ahead of the one before
+/// and cuts before it.
+#[derive(Debug, Clone, Default)]
+pub struct OwnTeeth {
+    /// Beyond the radius, mm: number of the tooth, amount.
+    radius_mm: Vec<(usize, Dual)>,
+    /// Ahead of its place, rad.
+    ahead_rad: Vec<(usize, Dual)>,
+}
+
+impl OwnTeeth {
+    /// Adds to the radius of a tooth, by its number in the order of cutting (that of campaign.toml), from 0.
+    pub fn add_radius(&mut self, tooth: usize, teeth: usize, radius_mm: Dual) {
+        self.radius_mm.push(((teeth - tooth % teeth) % teeth, radius_mm));
+    }
+
+    /// Puts a tooth later, by its number in the order of cutting, from 0: by an angle of the tool.
+    pub fn add_delay(&mut self, tooth: usize, teeth: usize, delay_rad: &Dual) {
+        let index = (teeth - tooth % teeth) % teeth;
+        self.ahead_rad.push((index, delay_rad.scale(-1.0)));
+    }
+
+    /// Numbers of teeth and what is added to their radii, mm.
+    pub fn radii(&self) -> impl Iterator<Item = (usize, &Dual)> {
+        self.radius_mm.iter().map(|(index, by)| (*index, by))
+    }
+
+    /// Numbers of teeth and what is added to their angles, rad.
+    pub fn angles(&self) -> impl Iterator<Item = (usize, &Dual)> {
+        self.ahead_rad.iter().map(|(index, by)| (*index, by))
+    }
+
+    /// The cut with these teeth.
+    pub fn on(&self, cut: &MillingCut) -> MillingCut {
+        let mut places = cut.places_or_even();
+        for (index, by) in self.radii() {
+            if let Some(place) = places.get_mut(index) {
+                place.radius_mm += by.value;
+            }
+        }
+        for (index, by) in self.angles() {
+            if let Some(place) = places.get_mut(index) {
+                place.ahead_rad += by.value;
+            }
+        }
+        MillingCut {
+            places,
+            ..cut.clone()
+        }
+    }
 }
 
 /// A self-excited vibration of the tool against the workpiece, in cuts whose records show one.
@@ -123,6 +209,8 @@ pub struct CutSetting {
     pub speed_ratio: f64,
     /// Per tooth (milling), per revolution (drilling, turning).
     pub feed_mm: f64,
+    /// Teeth of the tool.
+    pub teeth: usize,
     /// The record shows lines off the tooth-passing comb.
     pub has_vibration: bool,
 }

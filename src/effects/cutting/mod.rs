@@ -3,7 +3,7 @@
 //! An effect states its parameters and writes them into the [`CutPhysics`] of a cut. The way from the chip to the file
 //! is the same whatever effects there are, in this order:
 //!
-//! 1. geometry: chip thickness, with [`runout`](Runout);
+//! 1. geometry: chip thickness, with [`runout`](Runout) and [teeth that differ](OwnTeeth); depth, with what the force pushes off;
 //! 2. force law: coefficients of this cut (speed, wear), size effect, chisel and margin of a drill;
 //! 3. frame: the dynamometer's tilt against the tool;
 //! 4. sensor dynamics, channel by channel;
@@ -22,9 +22,10 @@ pub(super) mod dynamometer_resonance;
 pub(super) mod edge_force;
 pub(super) mod margin_friction;
 pub(super) mod nonlinear_drift;
-pub(super) mod runout;
+pub(super) mod push_off;
 pub(super) mod size_effect;
 pub(super) mod speed_dependence;
+pub(super) mod teeth;
 pub(super) mod tool_wear;
 
-pub use domain::{CutPhysics, CutSetting, Cutting, CuttingSummary, Mixing, Runout, Vibration};
+pub use domain::{CutPhysics, CutSetting, Cutting, CuttingSummary, Mixing, OwnTeeth, Runout, Vibration};

@@ -2,6 +2,7 @@ use super::common::straight_edge_only;
 use super::{CutPhysics, CutSetting, Cutting};
 use crate::data::Process;
 use crate::effects::background::ALTINTAS;
+use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{At, Effect, Known, Site};
 use crate::effects::{Background, Size};
 use crate::parameter::{Parameter, Prior};
@@ -59,6 +60,16 @@ impl Effect<Cutting> for SizeEffect {
 
     fn starts(&self, _at: At, _known: &Known<Cutting>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         vec![vec![0.35]]
+    }
+
+    fn usual_sizes(&self) -> &'static [UsualSize] {
+        const {
+            &[UsualSize::new(
+                "p",
+                SizeRange::Log(0.12, 0.35),
+                FollowsSize::Power(1.0),
+            )]
+        }
     }
 
     fn impossible(&self, _site: Site, _object: &(), sizes: &[Size]) -> Option<String> {

@@ -1,5 +1,6 @@
 use super::{CutPhysics, CutSetting, Cutting};
 use crate::data::Process;
+use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{At, Effect, Known, Site};
 use crate::effects::{Background, Size};
 use crate::parameter::{Parameter, Prior};
@@ -60,6 +61,16 @@ impl Effect<Cutting> for ToolWear {
                 )
             })
             .collect()
+    }
+
+    fn usual_sizes(&self) -> &'static [UsualSize] {
+        const {
+            &[UsualSize::new(
+                "growth",
+                SizeRange::Log(1.3, 3.0),
+                FollowsSize::Ratio,
+            )]
+        }
     }
 
     fn impossible(&self, _site: Site, _object: &(), sizes: &[Size]) -> Option<String> {

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::cutting::waveform::{DrillTerm, DrillingCut, MillingCut, UnitForces};
 use crate::cutting::{CutAnalysis, EdgeBit, ForceAxis, engaged_edge, feed_mm};
-use crate::data::{ChannelRole, Cut, Process, TimeRecord, Tool};
+use crate::data::{ChannelRole, Cut, Immersion, Process, TimeRecord, Tool};
 use crate::effects::cutting::{CutSetting, CuttingSummary};
 use crate::identify::forces::asynchronous_lines::{
     AsynchronousLines, StandingLine, find_vibration, standing_lines,
@@ -198,6 +198,7 @@ impl CutData {
                 progress: 0.0,
                 speed_ratio: 1.0,
                 feed_mm: feed_mm(&cut.geometry),
+                teeth: tool.teeth.max(1),
                 has_vibration: vibration.is_some(),
             },
             order: cut.order,
@@ -440,6 +441,23 @@ fn speed_range(cuts: &[CutData]) -> [f64; 2] {
     ]
 }
 
+/// Different depths and immersions of milled cuts.
+fn engagements(cuts: &[CutData]) -> usize {
+    let mut all: Vec<[i64; 3]> = cuts
+        .iter()
+        .filter_map(|c| match &c.kind {
+            CutKind::Milling { cut, .. } => {
+                let Immersion { start_rad, exit_rad } = cut.immersion;
+                Some([cut.axial_depth_mm, start_rad, exit_rad].map(|v| (v * 1e6).round() as i64))
+            }
+            CutKind::Drilling { .. } | CutKind::Turning { .. } => None,
+        })
+        .collect();
+    all.sort_unstable();
+    all.dedup();
+    all.len()
+}
+
 fn summary(process: Process, teeth: usize, cuts: &[CutData]) -> CuttingSummary {
     let distinct = |values: Vec<f64>| {
         let mut sorted = values;
@@ -471,11 +489,19 @@ fn summary(process: Process, teeth: usize, cuts: &[CutData]) -> CuttingSummary {
         straight_edge: cuts
             .iter()
             .all(|c| !matches!(&c.kind, CutKind::Milling { cut, .. } if cut.shape.is_some())),
+        one_helix: cuts
+            .iter()
+            .all(|c| !matches!(&c.kind, CutKind::Milling { cut, .. } if !cut.has_one_helix())),
+        even_pitch: cuts
+            .iter()
+            .all(|c| !matches!(&c.kind, CutKind::Milling { cut, .. } if !cut.is_evenly_spaced())),
+        engagements: engagements(cuts),
         cuts: cuts.len(),
         sequence_length: if all_ordered { order.len() } else { 0 },
         speed_m_per_min: speed_range(cuts),
         feeds: distinct(cuts.iter().map(|c| c.feed_mm).collect()),
         smallest_feed_mm: cuts.iter().map(|c| c.feed_mm).fold(f64::INFINITY, f64::min),
+        largest_feed_mm: cuts.iter().map(|c| c.feed_mm).fold(0.0, f64::max),
         channels: std::array::from_fn(|i| cuts.iter().all(|c| c.channels[i].is_some())),
         highest_hz: cuts
             .iter()

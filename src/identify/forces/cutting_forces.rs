@@ -4,7 +4,7 @@ use num_complex::Complex64;
 
 use crate::cutting::waveform::{ChipLaw, DrillTerm, DrillingCut, LineForces, MillingCut, UnitForces};
 use crate::cutting::{EdgeBit, ForceAxis};
-use crate::effects::cutting::{CutPhysics, Mixing};
+use crate::effects::cutting::{CutPhysics, Mixing, OwnTeeth};
 use crate::identify::forces::asynchronous_lines::MOST_SHIFT;
 use crate::identify::forces::cutting_data::CutData;
 use crate::robot::Dual;
@@ -126,11 +126,226 @@ fn recorded(unit: &[Vec<Complex64>; 3], dyno_from_tool: &[[f64; 3]; 3]) -> [Vec<
     })
 }
 
+/// Adds what unit forces make of the coefficients.
+fn add_units(forces: &mut Forces, unit: &UnitForces, physics: &CutPhysics, dyno_from_tool: &[[f64; 3]; 3]) {
+    for (k, unit) in unit.iter().enumerate() {
+        for (channel, part) in recorded(unit, dyno_from_tool).iter().enumerate() {
+            forces.add(channel, &physics.coefficient[k], part);
+        }
+    }
+}
+
+/// Adds the derivative by something that the unit forces depend on: only a slope, the value does not change with it.
+fn add_slopes(
+    forces: &mut Forces,
+    slope: &UnitForces,
+    by: &Dual,
+    physics: &CutPhysics,
+    dyno_from_tool: &[[f64; 3]; 3],
+) {
+    for (k, unit) in slope.iter().enumerate() {
+        let weight = Dual {
+            value: 0.0,
+            gradient: by
+                .gradient
+                .iter()
+                .map(|g| g * physics.coefficient[k].value)
+                .collect(),
+        };
+        for (channel, part) in recorded(unit, dyno_from_tool).iter().enumerate() {
+            forces.add(channel, &weight, part);
+        }
+    }
+}
+
+/// Forces of a cut that vibrates, and the amplitudes of its lines. `change`: of the chip's boundary, as [`chip_change`] gives it.
+fn vibrating_forces(
+    physics: &CutPhysics,
+    cut: &CutData,
+    milling: &MillingCut,
+    change: &[Dual; 2],
+    dyno_from_tool: &[[f64; 3]; 3],
+    parameters: usize,
+) -> (Forces, LineAmplitudes) {
+    let mut forces = Forces::zero(2 * cut.orders + 1, parameters);
+    let exponent = physics.size_exponent.as_ref().map(|p| p.value);
+    let vibrating = milling.vibrating(
+        cut.orders,
+        exponent,
+        [change[0].value, change[1].value],
+        MOST_SHIFT as usize,
+    );
+    add_units(&mut forces, &vibrating.unit, physics, dyno_from_tool);
+    if parameters > 0 {
+        let own = [physics.size_exponent.as_ref(), Some(&change[0]), Some(&change[1])];
+        for (slope, by) in vibrating.slopes.iter().zip(own) {
+            if let Some(by) = by {
+                add_slopes(&mut forces, slope, by, physics, dyno_from_tool);
+            }
+        }
+    }
+    let lines = (0..vibrating.lines.len())
+        .map(|r| {
+            let slopes = [&vibrating.line_slopes[0][r], &vibrating.line_slopes[1][r]];
+            line_amplitudes(physics, &vibrating.lines[r], slopes, change, dyno_from_tool)
+        })
+        .collect();
+    (forces, lines)
+}
+
+/// Forces of the chip as `milling` has it. `unit`: its linear forces, where they are worked out already.
+fn chip_forces(
+    physics: &CutPhysics,
+    cut: &CutData,
+    milling: &MillingCut,
+    unit: Option<&UnitForces>,
+    dyno_from_tool: &[[f64; 3]; 3],
+    parameters: usize,
+) -> Forces {
+    let mut forces = Forces::zero(2 * cut.orders + 1, parameters);
+    let is_linear = physics.size_exponent.is_none() && physics.runout.is_none();
+    let own = physics.own_teeth.as_ref().filter(|_| parameters > 0);
+    if is_linear && physics.own_teeth.is_some() && milling.shape.is_none() && milling.has_one_helix() {
+        let teeth = milling.own_teeth(cut.orders, parameters > 0);
+        add_units(&mut forces, &teeth.unit, physics, dyno_from_tool);
+        for (index, by) in own.into_iter().flat_map(OwnTeeth::radii) {
+            add_slopes(&mut forces, &teeth.by_radius[index], by, physics, dyno_from_tool);
+        }
+        for (index, by) in own.into_iter().flat_map(OwnTeeth::angles) {
+            add_slopes(&mut forces, &teeth.by_angle[index], by, physics, dyno_from_tool);
+        }
+        return forces;
+    }
+    if is_linear {
+        match unit {
+            Some(unit) => add_units(&mut forces, unit, physics, dyno_from_tool),
+            None => add_units(&mut forces, &milling.linear(cut.orders), physics, dyno_from_tool),
+        }
+        // Fall through: own teeth of several helix angles have their derivatives from differences, below.
+    } else {
+        let sampled = milling.sampled(cut.orders, chip_law(physics), parameters > 0);
+        add_units(&mut forces, &sampled.unit, physics, dyno_from_tool);
+        let own = [
+            physics.size_exponent.as_ref(),
+            physics.runout.as_ref().map(|r| &r.offset_mm),
+            physics.runout.as_ref().map(|r| &r.angle_rad),
+        ];
+        for (slope, by) in sampled.slopes.iter().zip(own) {
+            if let (Some(slope), Some(by)) = (slope, by) {
+                add_slopes(&mut forces, slope, by, physics, dyno_from_tool);
+            }
+        }
+    }
+    // Together with another law of the chip there is no closed form: differences.
+    for (index, by) in own.into_iter().flat_map(OwnTeeth::radii) {
+        let slope = tooth_slope(physics, cut, milling, |m, step| m.places[index].radius_mm += step);
+        add_slopes(&mut forces, &slope, by, physics, dyno_from_tool);
+    }
+    for (index, by) in own.into_iter().flat_map(OwnTeeth::angles) {
+        let slope = tooth_slope(physics, cut, milling, |m, step| m.places[index].ahead_rad += step);
+        add_slopes(&mut forces, &slope, by, physics, dyno_from_tool);
+    }
+    forces
+}
+
+fn chip_law(physics: &CutPhysics) -> ChipLaw {
+    ChipLaw {
+        exponent: physics.size_exponent.as_ref().map(|p| p.value),
+        runout: physics
+            .runout
+            .as_ref()
+            .map(|r| [r.offset_mm.value, r.angle_rad.value]),
+    }
+}
+
+/// Derivative of the unit forces by what `change` moves, by central differences (mm or rad).
+fn tooth_slope(
+    physics: &CutPhysics,
+    cut: &CutData,
+    milling: &MillingCut,
+    change: impl Fn(&mut MillingCut, f64),
+) -> UnitForces {
+    const STEP: f64 = 1e-5;
+    let moved = |step: f64| {
+        let mut other = milling.clone();
+        change(&mut other, step);
+        other.sampled(cut.orders, chip_law(physics), false).unit
+    };
+    let (mut slope, low) = (moved(STEP), moved(-STEP));
+    let pairs = slope
+        .iter_mut()
+        .flatten()
+        .flatten()
+        .zip(low.iter().flatten().flatten());
+    for (high, low) in pairs {
+        *high = (*high - low) / (2.0 * STEP);
+    }
+    slope
+}
+
+/// Smallest and largest share of the stated depth that a tool pushed off (or drawn in) cuts.
+const DEPTH_SHARES: [f64; 2] = [0.05, 4.0];
+
+/// Share of the stated depth a that is cut where the mean axial force pushes the tool off by `compliance` (mm/N): the mean force is
+/// proportional to the depth, F = F₀ s, so a (1 − s) = C F₀ s and s = 1 / (1 + C F₀ / a). `at_full`: forces at the stated depth.
+fn depth_share(
+    at_full: &Forces,
+    compliance: &Dual,
+    axial_depth_mm: f64,
+    dyno_from_tool: &[[f64; 3]; 3],
+) -> Dual {
+    let matrix = nalgebra::Matrix3::from_fn(|i, j| dyno_from_tool[i][j]);
+    let row = matrix
+        .try_inverse()
+        .map_or([0.0, 0.0, 1.0], |m| [m[(2, 0)], m[(2, 1)], m[(2, 2)]]);
+    let axial = |set: &[Vec<f64>; 4]| (0..3).map(|i| row[i] * set[i][0]).sum::<f64>();
+    let force = Dual {
+        value: axial(&at_full.value),
+        gradient: at_full.slope.iter().map(axial).collect(),
+    };
+    let share = (&Dual::constant(1.0) + &(compliance * &force).scale(1.0 / axial_depth_mm)).recip();
+    match share.value {
+        s if s > DEPTH_SHARES[0] && s < DEPTH_SHARES[1] => share,
+        s if s > 0.0 => Dual::constant(s.clamp(DEPTH_SHARES[0], DEPTH_SHARES[1])),
+        // Drawn in without end.
+        _ => Dual::constant(DEPTH_SHARES[1]),
+    }
+}
+
+/// Forces at a share of the stated depth; the lag of the helix follows the depth.
+fn at_depth_share(
+    physics: &CutPhysics,
+    cut: &CutData,
+    milling: &MillingCut,
+    share: &Dual,
+    dyno_from_tool: &[[f64; 3]; 3],
+    parameters: usize,
+) -> Forces {
+    const STEP: f64 = 1e-4;
+    let at = |share: f64, parameters: usize| {
+        let deeper = milling.deeper(share);
+        chip_forces(physics, cut, &deeper, None, dyno_from_tool, parameters)
+    };
+    let mut forces = at(share.value, parameters);
+    if parameters > 0 {
+        let (high, low) = (at(share.value + STEP, 0), at(share.value - STEP, 0));
+        for channel in 0..3 {
+            let pairs = high.value[channel].iter().zip(&low.value[channel]);
+            let by_share: Vec<f64> = pairs.map(|(h, l)| (h - l) / (2.0 * STEP)).collect();
+            for (p, slope) in forces.slope.iter_mut().enumerate() {
+                add_scaled(&mut slope[channel], share.derivative(p), &by_share);
+            }
+        }
+    }
+    forces
+}
+
 /// Amplitude (N) that a vibration puts on each recorded channel at the lines shifted by −2..2 tooth-passing frequencies.
 pub(crate) type LineAmplitudes = Vec<[Dual; 3]>;
 
 /// Forces of a milling cut on the recorded channels, phase zero, up to and with crosstalk; and the lines of a vibration
-/// where the cut has one. (Runout is left out of a vibrating cut.)
+/// where the cut has one. (Runout, teeth that differ and push-off are left out of a
+/// vibrating cut.)
 pub(crate) fn milling_forces(
     physics: &CutPhysics,
     cut: &CutData,
@@ -139,79 +354,27 @@ pub(crate) fn milling_forces(
     dyno_from_tool: &[[f64; 3]; 3],
     parameters: usize,
 ) -> (Forces, Option<LineAmplitudes>) {
-    let mut forces = Forces::zero(2 * cut.orders + 1, parameters);
-    let mut lines = None;
-    let add_units = |forces: &mut Forces, unit: &UnitForces| {
-        for (k, unit) in unit.iter().enumerate() {
-            for (channel, part) in recorded(unit, dyno_from_tool).iter().enumerate() {
-                forces.add(channel, &physics.coefficient[k], part);
-            }
+    let own_teeth = physics.own_teeth.as_ref().map(|own| own.on(milling));
+    let milling = own_teeth.as_ref().unwrap_or(milling);
+    let (mut forces, lines) = match chip_change(physics, cut, milling) {
+        Some(change) => {
+            let (forces, lines) =
+                vibrating_forces(physics, cut, milling, &change, dyno_from_tool, parameters);
+            (forces, Some(lines))
         }
-    };
-    // By something that the unit forces depend on: only a slope, the value does not change with the derivative.
-    let add_slopes = |forces: &mut Forces, slope: &UnitForces, by: &Dual| {
-        for (k, unit) in slope.iter().enumerate() {
-            let weight = Dual {
-                value: 0.0,
-                gradient: by
-                    .gradient
-                    .iter()
-                    .map(|g| g * physics.coefficient[k].value)
-                    .collect(),
-            };
-            for (channel, part) in recorded(unit, dyno_from_tool).iter().enumerate() {
-                forces.add(channel, &weight, part);
-            }
-        }
-    };
-    if let Some(change) = chip_change(physics, cut, milling) {
-        let exponent = physics.size_exponent.as_ref().map(|p| p.value);
-        let vibrating = milling.vibrating(
-            cut.orders,
-            exponent,
-            [change[0].value, change[1].value],
-            MOST_SHIFT as usize,
-        );
-        add_units(&mut forces, &vibrating.unit);
-        if parameters > 0 {
-            let own = [physics.size_exponent.as_ref(), Some(&change[0]), Some(&change[1])];
-            for (slope, by) in vibrating.slopes.iter().zip(own) {
-                if let Some(by) = by {
-                    add_slopes(&mut forces, slope, by);
+        None => {
+            let unit = own_teeth.is_none().then_some(unit);
+            let forces = chip_forces(physics, cut, milling, unit, dyno_from_tool, parameters);
+            let forces = match &physics.axial_compliance_mm_per_n {
+                Some(compliance) => {
+                    let depth = depth_share(&forces, compliance, milling.axial_depth_mm, dyno_from_tool);
+                    at_depth_share(physics, cut, milling, &depth, dyno_from_tool, parameters)
                 }
-            }
+                None => forces,
+            };
+            (forces, None)
         }
-        lines = Some(
-            (0..vibrating.lines.len())
-                .map(|r| {
-                    let slopes = [&vibrating.line_slopes[0][r], &vibrating.line_slopes[1][r]];
-                    line_amplitudes(physics, &vibrating.lines[r], slopes, &change, dyno_from_tool)
-                })
-                .collect(),
-        );
-    } else if physics.size_exponent.is_none() && physics.runout.is_none() {
-        add_units(&mut forces, unit);
-    } else {
-        let law = ChipLaw {
-            exponent: physics.size_exponent.as_ref().map(|p| p.value),
-            runout: physics
-                .runout
-                .as_ref()
-                .map(|r| [r.offset_mm.value, r.angle_rad.value]),
-        };
-        let sampled = milling.sampled(cut.orders, law, parameters > 0);
-        add_units(&mut forces, &sampled.unit);
-        let own = [
-            physics.size_exponent.as_ref(),
-            physics.runout.as_ref().map(|r| &r.offset_mm),
-            physics.runout.as_ref().map(|r| &r.angle_rad),
-        ];
-        for (slope, by) in sampled.slopes.iter().zip(own) {
-            if let (Some(slope), Some(by)) = (slope, by) {
-                add_slopes(&mut forces, slope, by);
-            }
-        }
-    }
+    };
     if let Some(tilt) = &physics.tilt {
         forces.mix(tilt);
     }

@@ -106,19 +106,7 @@ impl CuttingModel {
                 self.value(theta, next - 1, derivatives)
             })
             .collect();
-        let mut physics = CutPhysics {
-            coefficient,
-            size_exponent: None,
-            runout: None,
-            chisel_thrust_n: None,
-            margin_n_per_mm: None,
-            tilt: None,
-            dynamics: None,
-            crosstalk: None,
-            transient_s: None,
-            leak_per_s: None,
-            vibration: None,
-        };
+        let mut physics = CutPhysics::of(coefficient);
         for added in self.effects_in_order() {
             let values = self.values(theta, added, derivatives);
             let instance = added.instance;

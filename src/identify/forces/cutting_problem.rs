@@ -129,11 +129,10 @@ impl CuttingProblem<'_> {
             CutKind::Milling { cut: milling, unit } => {
                 let (forces, lines) =
                     milling_forces(&physics, cut, milling, unit, &self.data.dyno_from_tool, count);
-                let step = if physics.runout.is_some() {
-                    1
-                } else {
-                    milling.teeth
-                };
+                // Teeth that are alike leave multiples of their number; which of them is which shows in the others alone.
+                let differ =
+                    physics.runout.is_some() || physics.own_teeth.is_some() || !milling.places.is_empty();
+                let step = if differ { 1 } else { milling.teeth };
                 let phase = best_phase(cut, &forces, step);
                 (forces, lines, phase)
             }

@@ -37,6 +37,7 @@ pub use machining::force_record::{ForceRecord, ForceTrace};
 pub use machining::hole::{HoleFigure, HolePanel};
 pub use machining::lobes::{LobeMarker, LobeOutcome, LobePanel, LobeTrace, LobesFigure};
 pub use machining::regression::{RegressionFigure, RegressionMark, RegressionSeries};
+pub use machining::trend::TrendFigure;
 pub use machining::waveform::{WaveformFigure, WaveformPanel};
 pub use parameters::{DrawnEstimate, ParameterFigure, ParameterRow};
 pub use side_by_side::{BarSeries, SideBySide};

@@ -4,7 +4,9 @@ use crate::analysis::{CuttingFindings, CuttingView};
 use crate::campaign::{Campaign, Process};
 use crate::discrepancy::CutError;
 use crate::identify::forces::cutting_waves::courses;
-use crate::report::figure::{BarSeries, CellFormat, HeatMap, SideBySide, WaveformFigure, WaveformPanel};
+use crate::report::figure::{
+    BarSeries, CellFormat, HeatMap, SideBySide, TrendFigure, WaveformFigure, WaveformPanel,
+};
 use crate::report::number::{percent, with_error};
 use crate::report::parts::{figure, paragraph};
 use crate::report::sections::diagnosis_section::{
@@ -63,6 +65,7 @@ fn comparison(findings: &CuttingFindings) -> ReportSection {
     let mut blocks = vec![paragraph(text), parameters(findings)];
     blocks.push(misfit_map(findings));
     blocks.extend(orders(findings));
+    blocks.extend(trend(findings));
     let mut worst: Vec<usize> = (0..now.cuts.len()).collect();
     worst.sort_by(|a, b| {
         now.cuts[*b]
@@ -199,6 +202,51 @@ fn orders(findings: &CuttingFindings) -> Option<Block> {
          teeth that do not cut alike), the orders with most error.",
         drawing.png(),
     ))
+}
+
+/// What the rest follows most surely, where it follows anything.
+fn trend(findings: &CuttingFindings) -> Option<Block> {
+    let first = findings.lead.as_ref()?.trends.first()?;
+    let words = first.against.words();
+    let (unit, factor) = match first.unit {
+        "1" => ("%", 100.0),
+        unit => (unit, 1.0),
+    };
+    let capital = |text: &str| text[..1].to_uppercase() + &text[1..];
+    let name = words.trim_start_matches("the ");
+    let x_label = match first.x_unit {
+        "" => capital(name),
+        unit => format!("{} ({unit})", capital(name)),
+    };
+    let of = first.axis.map_or("Rest of the force".to_string(), |a| {
+        format!("Rest of {}", a.label())
+    });
+    let drawing = TrendFigure {
+        title: format!("What the force model leaves, against {words}"),
+        x_label,
+        y_label: format!("{of} ({unit})"),
+        points: first
+            .points
+            .iter()
+            .map(|p| [p.x, factor * p.rest, factor * p.std])
+            .collect(),
+    };
+    let caption = match first.is_significant() {
+        true => format!(
+            "Of {} quantities tested the rest follows this one most surely (p = {:.1e} after {} tests): {}. Usually {}.",
+            first.tests,
+            first.p_value,
+            first.tests,
+            first.course(),
+            first.usual_cause
+        ),
+        false => format!(
+            "Of {} quantities tested the rest follows none by more than chance; this one comes closest (p = {:.2}).",
+            first.tests, first.p_value
+        ),
+    };
+    let alt = format!("Record less model against {words}");
+    Some(figure("waveform-trend", alt.as_str(), &caption, drawing.png()))
 }
 
 fn waveform(findings: &CuttingFindings, rank: usize, cut: usize) -> Block {

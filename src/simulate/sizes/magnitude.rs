@@ -1,14 +1,13 @@
 //! How large a simulated effect is: what its file gives as usual sizes, and how a parameter follows the effect's size.
 
-use crate::effects::Effect;
-use crate::effects::Structure;
 use crate::effects::usual_size::FollowsSize::{Not, Power, Ratio};
 use crate::effects::usual_size::SizeRange::{Either, Log, Times};
 use crate::effects::usual_size::{FollowsSize, SizeRange};
+use crate::effects::{Domain, Effect};
 use crate::parameter::{Parameter, Scale};
 use crate::simulate::draw::Draws;
 
-fn usual(effect: &dyn Effect<Structure>, parameter: &str) -> (SizeRange, FollowsSize) {
+fn usual<D: Domain>(effect: &dyn Effect<D>, parameter: &str) -> (SizeRange, FollowsSize) {
     let name = parameter.split('[').next().unwrap_or(parameter);
     let line = effect.usual_sizes().iter().find(|usual| usual.parameter == name);
     // What has no line of its own is drawn about its nominal value.
@@ -16,7 +15,7 @@ fn usual(effect: &dyn Effect<Structure>, parameter: &str) -> (SizeRange, Follows
 }
 
 /// A value of an effect's parameter as a robot may have it, natural units, within the parameter's bounds.
-pub fn drawn(effect: &dyn Effect<Structure>, parameter: &Parameter, draws: &mut Draws) -> f64 {
+pub fn drawn<D: Domain>(effect: &dyn Effect<D>, parameter: &Parameter, draws: &mut Draws) -> f64 {
     let value = match usual(effect, &parameter.name).0 {
         Log(low, high) => draws.log_uniform(low, high),
         Times(low, high) => parameter.nominal * draws.log_uniform(low, high),
@@ -38,7 +37,7 @@ fn kept_inside(parameter: &Parameter, value: f64) -> f64 {
 }
 
 /// The value that belongs to an effect of this size, within the parameter's bounds.
-pub fn at_size(effect: &dyn Effect<Structure>, parameter: &Parameter, value: f64, size: f64) -> f64 {
+pub fn at_size<D: Domain>(effect: &dyn Effect<D>, parameter: &Parameter, value: f64, size: f64) -> f64 {
     let sized = match usual(effect, &parameter.name).1 {
         Power(exponent) => value * size.powf(exponent),
         Ratio => value.powf(size),
@@ -48,7 +47,7 @@ pub fn at_size(effect: &dyn Effect<Structure>, parameter: &Parameter, value: f64
 }
 
 /// Whether the parameter follows the size of its effect at all.
-pub fn follows_size(effect: &dyn Effect<Structure>, parameter: &Parameter) -> bool {
+pub fn follows_size<D: Domain>(effect: &dyn Effect<D>, parameter: &Parameter) -> bool {
     usual(effect, &parameter.name).1 != Not
 }
 

@@ -1,5 +1,6 @@
-use super::common::{milling_only, straight_edge_only};
-use super::{CutPhysics, CutSetting, Cutting, Runout};
+use crate::effects::cutting::common::{milling_only, straight_edge_only};
+use crate::effects::cutting::{CutPhysics, CutSetting, Cutting, Runout};
+use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{At, Effect, Known, NEGLIGIBLE, Site};
 use crate::effects::{Background, Size};
 use crate::parameter::{Parameter, Prior};
@@ -67,6 +68,15 @@ impl Effect<Cutting> for RunoutEffect {
             .iter()
             .flat_map(|o| angles.map(|a| vec![*o, a * pitch_deg]))
             .collect()
+    }
+
+    fn usual_sizes(&self) -> &'static [UsualSize] {
+        const {
+            &[
+                UsualSize::new("offset_mm", SizeRange::Log(0.006, 0.05), FollowsSize::Power(1.0)),
+                UsualSize::new("angle_deg", SizeRange::Either(180.0), FollowsSize::Not),
+            ]
+        }
     }
 
     fn impossible(&self, _site: Site, _object: &(), sizes: &[Size]) -> Option<String> {

@@ -1,0 +1,364 @@
+//! Teeth that are not all alike, in closed form: angles and radii of their own, a force linear in the chip thickness.
+//!
+//! Tooth j leads tooth 0 by a_j and stands r_j beyond the tool's radius. At the angle of immersion φ it cuts what the deepest of
+//! the passes before it left, h_j(φ) = min_m [ (a_{j+m} − a_j)/(2π/N) · c sin φ + r_j − r_{j+m} ], m = 1..N, and nothing where that
+//! is negative (Kline & DeVor 1983 for radii; Altintas, Engin, Budak 1999 for angles). As a function of sin φ this is a minimum of
+//! straight lines, so the immersion falls into stretches on which the forces have the closed forms of alike teeth. Radii and angles
+//! hold over the whole depth: a helix of one angle is a factor, as there.
+
+use std::f64::consts::{PI, TAU};
+
+use num_complex::Complex64;
+
+use super::milling::{MillingCut, UnitForces, window};
+use super::tooth_place::ToothPlace;
+use crate::data::Immersion;
+
+/// Forces with their derivatives by what belongs to each tooth.
+#[derive(Debug, Clone)]
+pub struct OwnTeethForces {
+    /// The forces themselves.
+    pub unit: UnitForces,
+    /// By the radius of each tooth, per mm; empty where none were asked for.
+    pub by_radius: Vec<UnitForces>,
+    /// By the angle of each tooth ahead of tooth 0, per rad; empty where none were asked for.
+    pub by_angle: Vec<UnitForces>,
+}
+
+/// A part of the immersion on which a tooth cuts what one and the same earlier pass left: h = `slope` sin φ + `offset`.
+#[derive(Debug, Clone, Copy)]
+struct Stretch {
+    immersion: Immersion,
+    /// Teeth ahead of it the earlier pass was.
+    passes: usize,
+    slope_mm: f64,
+    offset_mm: f64,
+    /// Whether the chip begins, and ends, from nothing there.
+    from_nothing: [bool; 2],
+}
+
+/// Share of the feed below which a chip has no thickness.
+const NOTHING: f64 = 1e-9;
+
+impl MillingCut {
+    /// Places of the teeth as they are: alike and evenly spaced where no others are given.
+    pub fn places_or_even(&self) -> Vec<ToothPlace> {
+        if !self.places.is_empty() {
+            return self.places.clone();
+        }
+        (0..self.teeth)
+            .map(|j| ToothPlace {
+                ahead_rad: TAU * j as f64 / self.teeth as f64,
+                lag_rad: self.lag_rad,
+                radius_mm: 0.0,
+            })
+            .collect()
+    }
+
+    /// Whether all teeth have the helix of the tool: what [`Self::own_teeth`] is made for.
+    pub fn has_one_helix(&self) -> bool {
+        self.places.iter().all(|p| p.lag_rad == self.lag_rad)
+    }
+
+    /// Forces of the teeth as [`Self::places`] has them (one helix, straight edge), linear in the chip thickness.
+    pub fn own_teeth(&self, orders: usize, derivatives: bool) -> OwnTeethForces {
+        let places = self.places_or_even();
+        let teeth = places.len();
+        let slopes = if derivatives { teeth } else { 0 };
+        let mut all = OwnTeethForces {
+            unit: Self::nothing(orders),
+            by_radius: (0..slopes).map(|_| Self::nothing(orders)).collect(),
+            by_angle: (0..slopes).map(|_| Self::nothing(orders)).collect(),
+        };
+        let feed_per_rad = self.feed_per_tooth_mm * teeth as f64 / TAU;
+        for (j, place) in places.iter().enumerate() {
+            for stretch in self.stretches(&places, j) {
+                let before = (j + stretch.passes) % teeth;
+                for n in 0..=orders {
+                    let turn =
+                        self.helix_at(n as i64) * Complex64::from_polar(1.0, n as f64 * place.ahead_rad);
+                    let integral = Integrals::over(stretch.immersion, n);
+                    let cutting: [Complex64; 3] = std::array::from_fn(|d| {
+                        turn * (integral.by_sine[d] * stretch.slope_mm
+                            + integral.plain[d] * stretch.offset_mm)
+                    });
+                    let edge = integral.plain.map(|v| turn * v);
+                    put(&mut all.unit, n, &cutting, &edge);
+                    if !derivatives {
+                        continue;
+                    }
+                    // Where the chip begins or ends from nothing the stretch grows with the chip: only the edge notices.
+                    let mut grows = [[Complex64::ZERO; 3]; 2];
+                    let Immersion { start_rad, exit_rad } = stretch.immersion;
+                    for (at, is_free) in [start_rad, exit_rad].into_iter().zip(stretch.from_nothing) {
+                        let rise = (stretch.slope_mm * at.cos()).abs();
+                        if is_free && rise > NOTHING * self.feed_per_tooth_mm {
+                            let value = turn * Complex64::from_polar(1.0 / (TAU * rise), -(n as f64) * at);
+                            for (d, factor) in [at.cos(), at.sin(), 1.0].into_iter().enumerate() {
+                                grows[0][d] += value * factor;
+                                grows[1][d] += value * (factor * at.sin());
+                            }
+                        }
+                    }
+                    // By the offset (radius of this tooth less that of the one before) and by the slope of the chip.
+                    let by_offset = edge;
+                    let by_slope = integral.by_sine.map(|v| turn * v * feed_per_rad);
+                    let edge_by_slope = grows[1].map(|v| v * feed_per_rad);
+                    if before != j {
+                        put(&mut all.by_radius[j], n, &by_offset, &grows[0]);
+                        put(&mut all.by_angle[before], n, &by_slope, &edge_by_slope);
+                        let minus = |set: [Complex64; 3]| set.map(|v| -v);
+                        put(&mut all.by_radius[before], n, &minus(by_offset), &minus(grows[0]));
+                        put(&mut all.by_angle[j], n, &minus(by_slope), &minus(edge_by_slope));
+                    }
+                    let turning = Complex64::new(0.0, n as f64);
+                    let moved = |set: [Complex64; 3]| set.map(|v| v * turning);
+                    put(&mut all.by_angle[j], n, &moved(cutting), &moved(edge));
+                }
+            }
+        }
+        all
+    }
+
+    /// What tooth `j` cuts over the immersion, stretch by stretch.
+    fn stretches(&self, places: &[ToothPlace], j: usize) -> Vec<Stretch> {
+        let teeth = places.len();
+        let pitch = TAU / teeth as f64;
+        let here = places[j];
+        let lines: Vec<(f64, f64)> = (1..=teeth)
+            .map(|m| {
+                let before = places[(j + m) % teeth];
+                let turns = ((j + m) / teeth) as f64;
+                let ahead = before.ahead_rad + TAU * turns - here.ahead_rad;
+                let offset = here.radius_mm - before.radius_mm;
+                (ahead / pitch * self.feed_per_tooth_mm, offset)
+            })
+            .collect();
+        let Immersion { start_rad, exit_rad } = self.immersion;
+        let mut ends = vec![start_rad, exit_rad];
+        let mut at_sine = |sine: f64| {
+            if (0.0..=1.0).contains(&sine) {
+                let angle = sine.asin();
+                ends.extend(
+                    [angle, PI - angle]
+                        .into_iter()
+                        .filter(|a| (start_rad..exit_rad).contains(a)),
+                );
+            }
+        };
+        for (m, (slope, offset)) in lines.iter().enumerate() {
+            at_sine(-offset / slope);
+            for (other_slope, other_offset) in &lines[m + 1..] {
+                at_sine((other_offset - offset) / (slope - other_slope));
+            }
+        }
+        ends.sort_by(f64::total_cmp);
+        let mut all: Vec<Stretch> = Vec::new();
+        for pair in ends.windows(2) {
+            let middle = (0.5 * (pair[0] + pair[1])).sin();
+            let left = |m: usize| lines[m].0 * middle + lines[m].1;
+            let least = (1..teeth).fold(0, |least, m| if left(m) < left(least) { m } else { least });
+            if pair[1] <= pair[0] || left(least) <= 0.0 {
+                continue;
+            }
+            match all.last_mut() {
+                Some(last) if last.passes == least + 1 && last.immersion.exit_rad == pair[0] => {
+                    last.immersion.exit_rad = pair[1];
+                }
+                _ => all.push(Stretch {
+                    immersion: Immersion {
+                        start_rad: pair[0],
+                        exit_rad: pair[1],
+                    },
+                    passes: least + 1,
+                    slope_mm: lines[least].0,
+                    offset_mm: lines[least].1,
+                    from_nothing: [false; 2],
+                }),
+            }
+        }
+        for stretch in &mut all {
+            let Immersion {
+                start_rad: from,
+                exit_rad: to,
+            } = stretch.immersion;
+            let is_nothing = |at: f64| {
+                (stretch.slope_mm * at.sin() + stretch.offset_mm).abs() < NOTHING * self.feed_per_tooth_mm
+            };
+            stretch.from_nothing = [
+                from > start_rad && is_nothing(from),
+                to < exit_rad && is_nothing(to),
+            ];
+        }
+        all
+    }
+}
+
+/// (1/2π) ∫ {cos φ, sin φ, 1} e^{−inφ} dφ over a stretch, as it is and with sin φ besides.
+struct Integrals {
+    plain: [Complex64; 3],
+    by_sine: [Complex64; 3],
+}
+
+impl Integrals {
+    fn over(immersion: Immersion, n: usize) -> Integrals {
+        let i = Complex64::I;
+        let w = [-2i64, -1, 0, 1, 2].map(|m| window(immersion, n as i64 + m));
+        let cos = 0.5 * (w[1] + w[3]);
+        let sin = (w[1] - w[3]) / (2.0 * i);
+        let sin_cos = (w[0] - w[4]) / (4.0 * i);
+        let sin_sin = 0.5 * w[2] - 0.25 * (w[0] + w[4]);
+        Integrals {
+            plain: [cos, sin, w[2]],
+            by_sine: [sin_cos, sin_sin, sin],
+        }
+    }
+}
+
+fn put(unit: &mut UnitForces, n: usize, cutting: &[Complex64; 3], edge: &[Complex64; 3]) {
+    for (first, [cos, sin, one]) in [(0, cutting), (3, edge)] {
+        unit[first][0][n] -= cos;
+        unit[first][1][n] += sin;
+        unit[first + 1][0][n] -= sin;
+        unit[first + 1][1][n] -= cos;
+        unit[first + 2][2][n] += one;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cutting::waveform::ChipLaw;
+
+    fn cut(immersion_deg: [f64; 2], pitches_deg: &[f64], radii_mm: &[f64]) -> MillingCut {
+        let mut ahead = 0.0;
+        let places = pitches_deg.iter().zip(radii_mm).map(|(pitch, radius_mm)| {
+            let place = ToothPlace {
+                ahead_rad: ahead,
+                lag_rad: 0.3,
+                radius_mm: *radius_mm,
+            };
+            ahead += pitch.to_radians();
+            place
+        });
+        MillingCut {
+            teeth: pitches_deg.len(),
+            feed_per_tooth_mm: 0.1,
+            axial_depth_mm: 2.0,
+            immersion: Immersion {
+                start_rad: immersion_deg[0].to_radians(),
+                exit_rad: immersion_deg[1].to_radians(),
+            },
+            lag_rad: 0.3,
+            shape: None,
+            places: places.collect(),
+        }
+    }
+
+    fn cases() -> Vec<MillingCut> {
+        vec![
+            cut([0.0, 180.0], &[90.0; 4], &[0.0, -0.02, 0.0, 0.0]),
+            cut([0.0, 180.0], &[90.0; 4], &[0.0, -1.0, 0.0, 0.0]),
+            cut([60.0, 180.0], &[120.0; 3], &[0.01, -0.03, 0.0]),
+            cut([0.0, 110.0], &[84.0, 98.0, 84.0, 94.0], &[0.0; 4]),
+            cut([20.0, 160.0], &[100.0, 110.0, 150.0], &[0.0, -0.02, 0.015]),
+        ]
+    }
+
+    fn worst(a: &UnitForces, b: &UnitForces) -> f64 {
+        let pairs = a.iter().flatten().flatten().zip(b.iter().flatten().flatten());
+        pairs.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+    }
+
+    /// A count pass by pass on a fine grid of angles, which knows nothing of stretches.
+    #[test]
+    fn closed_form_equals_a_fine_sum_over_the_angle() {
+        for cut in cases() {
+            let (orders, steps) = (12, 40_000);
+            let Immersion { start_rad, exit_rad } = cut.immersion;
+            let mut sum = MillingCut::nothing(orders);
+            let teeth = cut.teeth;
+            for j in 0..teeth {
+                for step in 0..steps {
+                    let phi = start_rad + (step as f64 + 0.5) / steps as f64 * (exit_rad - start_rad);
+                    let reach = |k: usize| {
+                        let place = cut.places[k % teeth];
+                        let ahead = place.ahead_rad + TAU * (k / teeth) as f64;
+                        place.radius_mm - ahead / TAU * teeth as f64 * cut.feed_per_tooth_mm * phi.sin()
+                    };
+                    let deepest = (j + 1..=j + teeth).map(reach).fold(f64::NEG_INFINITY, f64::max);
+                    let h = reach(j) - deepest;
+                    if h <= 0.0 {
+                        continue;
+                    }
+                    let share = (exit_rad - start_rad) / steps as f64 / TAU;
+                    for n in 0..=orders {
+                        let turn = cut.helix_at(n as i64)
+                            * Complex64::from_polar(share, n as f64 * (cut.places[j].ahead_rad - phi));
+                        let edge = [phi.cos(), phi.sin(), 1.0].map(|d| turn * d);
+                        put(&mut sum, n, &edge.map(|v| v * h), &edge);
+                    }
+                }
+            }
+            let off = worst(&sum, &cut.own_teeth(orders, false).unit);
+            assert!(off < 2e-4, "{:?}: {off}", cut.places);
+        }
+    }
+
+    /// The quadrature of the same cut, and teeth that are alike.
+    #[test]
+    fn closed_form_equals_quadrature_and_alike_teeth() {
+        for cut in cases() {
+            let sampled = cut.sampled(24, ChipLaw::default(), false).unit;
+            let off = worst(&sampled, &cut.own_teeth(24, false).unit);
+            assert!(off < 3e-3, "{:?}: {off}", cut.places);
+        }
+        let mut alike = cut([0.0, 180.0], &[90.0; 4], &[0.0; 4]);
+        let own = alike.own_teeth(24, false).unit;
+        alike.places.clear();
+        assert!(worst(&alike.closed_form(24), &own) < 1e-12);
+        assert!(worst(&alike.own_teeth(24, false).unit, &own) < 1e-12);
+    }
+
+    #[test]
+    fn derivatives_equal_differences() {
+        for cut in cases() {
+            let own = cut.own_teeth(24, true);
+            for j in 0..cut.teeth {
+                // A missing tooth's radius changes nothing, a tooth on the verge of missing is not among the cases.
+                for (analytic, change) in [
+                    (
+                        &own.by_radius[j],
+                        (|p, d| p.radius_mm += d) as fn(&mut ToothPlace, f64),
+                    ),
+                    (&own.by_angle[j], |p, d| p.ahead_rad += d),
+                ] {
+                    let moved = |step: f64| {
+                        let mut other = cut.clone();
+                        change(&mut other.places[j], step);
+                        other.own_teeth(24, false).unit
+                    };
+                    let step = 1e-6;
+                    let (high, low) = (moved(step), moved(-step));
+                    let mut difference = high;
+                    for (a, b) in difference
+                        .iter_mut()
+                        .flatten()
+                        .flatten()
+                        .zip(low.iter().flatten().flatten())
+                    {
+                        *a = (*a - b) / (2.0 * step);
+                    }
+                    let size = analytic
+                        .iter()
+                        .flatten()
+                        .flatten()
+                        .map(|v| v.norm())
+                        .fold(1.0, f64::max);
+                    let off = worst(&difference, analytic) / size;
+                    assert!(off < 1e-4, "tooth {j} of {:?}: {off}", cut.places);
+                }
+            }
+        }
+    }
+}

@@ -20,12 +20,12 @@ fn named_and_added(path: &str, effect: &str) -> Vec<(String, f64, f64)> {
     assert_eq!(found["effect"], effect);
     let added = document(&["add", path, effect]);
     let compared = document(&["compare", path]);
-    let number = |key: &str| compared[key].as_f64().unwrap();
+    let number = |key: &str| compared["error"][key].as_f64().unwrap();
     assert!(
         number("nrms") < 1.1 * number("noise_floor_nrms"),
         "{} against {}",
-        compared["nrms"],
-        compared["noise_floor_nrms"]
+        compared["error"]["nrms"],
+        compared["error"]["noise_floor_nrms"]
     );
     let own = added["parameters"].as_array().unwrap().iter();
     own.filter(|p| p["name"].as_str().unwrap().starts_with(effect))

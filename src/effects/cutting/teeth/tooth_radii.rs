@@ -97,7 +97,11 @@ impl Effect<Cutting> for ToothRadii {
     fn starts(&self, at: At, Known { data, .. }: &Known<Cutting>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
         let feed = data.smallest_feed_mm.clamp(1e-3, 10.0);
         if at.variant == ONE {
-            return [0.1, 0.5, 1.2].map(|share| vec![share * feed]).to_vec();
+            // The misfit has a kink wherever the tooth leaves the cut at one of the feeds: a start between any two of them.
+            let most = data.largest_feed_mm.clamp(feed, 10.0);
+            let small = [0.1, 0.5].map(|share| vec![share * feed]);
+            let large = [0.1, 0.4, 0.7, 0.95].map(|share| vec![feed * (most / feed).powf(share)]);
+            return [small.as_slice(), large.as_slice()].concat();
         }
         // One tooth proud of the others.
         let mut proud = vec![0.0; data.teeth.saturating_sub(1)];

@@ -114,7 +114,8 @@ mod tests {
     use super::*;
     use crate::effects::structural::Conditions;
     use crate::robot::fixture::{TAP_POSTURES, irb6640};
-    use crate::robot::{Baseline, RobotModel, natural_frequencies_hz};
+    use crate::robot::frf::natural_frequencies_hz;
+    use crate::robot::{Baseline, RobotModel};
 
     /// With all joints softer by one share every natural frequency falls by its root.
     #[test]

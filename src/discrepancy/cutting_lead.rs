@@ -148,7 +148,7 @@ pub struct LineGroup {
 pub struct CuttingLead {
     /// Root mean square of model less record above the noise, over all cuts and channels, N.
     pub above_noise_n: f64,
-    /// The rest against what was different, least probable by chance first.
+    /// The rest against what was different, what is no chance and explains most first.
     pub trends: Vec<Trend>,
     /// Strongest first.
     pub lines: Vec<LineGroup>,

@@ -97,6 +97,9 @@ pub struct Trend {
     pub unit: &'static str,
     /// Probability that noise follows it as much, times the number of tests made.
     pub p_value: f64,
+    /// χ² of the rest that goes where it is taken out.
+    #[serde(skip)]
+    pub explained: f64,
     /// Number of tests made.
     pub tests: usize,
     /// What it usually comes from.
@@ -159,8 +162,8 @@ fn digits(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
-/// What the model, fitted as `fits` (in the order of the cuts), leaves of the records, against all that the data can tell; the least
-/// probable first.
+/// What the model, fitted as `fits` (in the order of the cuts), leaves of the records, against all that the data can tell: what is no chance
+/// first, of that what explains most (probabilities far below any doubt rank nothing), then the least probable.
 pub fn cutting_trends(data: &CuttingData, fits: &[CutFit]) -> Vec<Trend> {
     let pairs = || data.cuts.iter().map(|c| &**c).zip(fits);
     let excess: Vec<Option<(f64, f64)>> = pairs().map(|(cut, fit)| excess_share(cut, fit)).collect();
@@ -192,7 +195,10 @@ pub fn cutting_trends(data: &CuttingData, fits: &[CutFit]) -> Vec<Trend> {
         trend.tests = tests;
         trend.p_value = (trend.p_value * tests as f64).min(1.0);
     }
-    all.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
+    all.sort_by(|a, b| match (a.is_significant(), b.is_significant()) {
+        (true, true) => b.explained.total_cmp(&a.explained),
+        _ => a.p_value.total_cmp(&b.p_value),
+    });
     all
 }
 
@@ -273,6 +279,7 @@ fn along(against: Against, points: Vec<TrendPoint>) -> Option<Trend> {
         x_unit: against.unit(),
         unit: "1",
         p_value,
+        explained: without - with,
         tests: 1,
         usual_cause: against.usual_cause(),
         points: means(&points, low, span),
@@ -386,6 +393,7 @@ fn over_the_tooth(data: &CuttingData, fits: &[CutFit]) -> Option<Trend> {
         x_unit: Against::ToothAngle.unit(),
         unit: ForceAxis::ALL[axis].unit(),
         p_value,
+        explained: (total - freedom).max(0.0),
         tests: 1,
         usual_cause: Against::ToothAngle.usual_cause(),
         points: points.collect(),

@@ -262,6 +262,8 @@ mod tests {
             cut([60.0, 180.0], &[120.0; 3], &[0.01, -0.03, 0.0]),
             cut([0.0, 110.0], &[84.0, 98.0, 84.0, 94.0], &[0.0; 4]),
             cut([20.0, 160.0], &[100.0, 110.0, 150.0], &[0.0, -0.02, 0.015]),
+            cut([0.0, 180.0], &[90.0; 4], &[0.0, -0.02, 0.004, 0.011]),
+            cut([10.0, 110.0], &[84.0, 98.0, 84.0, 94.0], &[0.0; 4]),
         ]
     }
 
@@ -320,9 +322,23 @@ mod tests {
         assert!(worst(&alike.own_teeth(24, false).unit, &own) < 1e-12);
     }
 
+    /// Teeth of one radius come into a slot with chips of no thickness: there a longer tooth changes what a shorter one does not, and no
+    /// derivative exists.
+    fn has_derivatives(cut: &MillingCut) -> bool {
+        let next = cut.places.iter().cycle().skip(1);
+        let alike = cut
+            .places
+            .iter()
+            .zip(next)
+            .any(|(a, b)| a.radius_mm == b.radius_mm);
+        !alike || (cut.immersion.start_rad > 0.0 && cut.immersion.exit_rad < PI)
+    }
+
     #[test]
     fn derivatives_equal_differences() {
-        for cut in cases() {
+        let smooth: Vec<MillingCut> = cases().into_iter().filter(has_derivatives).collect();
+        assert_eq!(smooth.len(), 4);
+        for cut in smooth {
             let own = cut.own_teeth(24, true);
             for j in 0..cut.teeth {
                 // A missing tooth's radius changes nothing, a tooth on the verge of missing is not among the cases.
@@ -339,29 +355,19 @@ mod tests {
                         other.own_teeth(24, false).unit
                     };
                     let step = 1e-6;
-                    let here = &own.unit;
-                    let slope = |from: &UnitForces, to: &UnitForces| {
-                        let mut slope = to.clone();
-                        let values = slope.iter_mut().flatten().flatten();
-                        for (b, a) in values.zip(from.iter().flatten().flatten()) {
-                            *b = (*b - a) / step;
-                        }
-                        slope
-                    };
+                    let (high, low) = (moved(step), moved(-step));
+                    let mut difference = high;
+                    let values = difference.iter_mut().flatten().flatten();
+                    for (a, b) in values.zip(low.iter().flatten().flatten()) {
+                        *a = (*a - b) / (2.0 * step);
+                    }
                     let size = analytic
                         .iter()
                         .flatten()
                         .flatten()
                         .map(|v| v.norm())
                         .fold(1.0, f64::max);
-                    // Where teeth of one radius come into the cut at one feed per tooth of nothing (a slot begins there), a longer tooth
-                    // changes what a shorter one does not: one side's slope is the derivative.
-                    let sides = [slope(here, &moved(step)), slope(&moved(-step), here)];
-                    let off = sides
-                        .iter()
-                        .map(|s| worst(s, analytic))
-                        .fold(f64::INFINITY, f64::min)
-                        / size;
+                    let off = worst(&difference, analytic) / size;
                     assert!(off < 1e-4, "tooth {j} of {:?}: {off}", cut.places);
                 }
             }

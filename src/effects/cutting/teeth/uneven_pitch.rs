@@ -15,7 +15,7 @@ fn even_deg(data: &CuttingSummary) -> f64 {
 
 /// Teeth whose pitches are alternately wider and narrower by `share` of an even one.
 fn alternating(data: &CuttingSummary, share: f64) -> Vec<f64> {
-    let sign = |j: usize| if j % 2 == 0 { 1.0 } else { -1.0 };
+    let sign = |j: usize| if j.is_multiple_of(2) { 1.0 } else { -1.0 };
     (0..data.teeth.saturating_sub(1))
         .map(|j| even_deg(data) * (1.0 + sign(j) * share))
         .collect()

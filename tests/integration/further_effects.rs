@@ -52,7 +52,7 @@ fn each_is_named_and_added_with_its_parameters() {
         assert!((0.9..1.1).contains(&after), "{hidden}: {after}");
         for (key, value) in values.split(',').filter_map(|pair| pair.split_once('=')) {
             let Ok(value) = value.parse::<f64>() else { continue };
-            let fitted = added["parameters"].as_array().unwrap().iter();
+            let mut fitted = added["parameters"].as_array().unwrap().iter();
             let own = fitted.rfind(|p| p["name"].as_str().unwrap().ends_with(key));
             let own = own.unwrap_or_else(|| panic!("{hidden}: no {key} in {}", added["parameters"]));
             let off = own["value"].as_f64().unwrap() - value;

@@ -96,6 +96,8 @@ async fn one(stream: TcpStream, router: Router, asked: Arc<AtomicBool>) {
     });
     // What goes wrong between a browser and us is the browser's affair.
     let _ = http1::Builder::new()
+        // Who has sent a whole order and leaves has given it all the same.
+        .half_close(true)
         .timer(TokioTimer::new())
         .header_read_timeout(HEAD)
         .max_header_size(LARGEST_HEAD)

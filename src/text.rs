@@ -12,6 +12,23 @@ pub fn figures(value: f64, count: i32) -> String {
     format!("{value:.decimals$}")
 }
 
+/// Text as XML holds it, also within quotes; control characters, which it cannot hold, are left out.
+pub fn xml_escaped(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out += "&amp;",
+            '<' => out += "&lt;",
+            '>' => out += "&gt;",
+            '"' => out += "&quot;",
+            c if c.is_control() && !matches!(c, '\n' | '\t') => {}
+            '\u{fffe}' | '\u{ffff}' => {}
+            c => out.push(c),
+        }
+    }
+    out
+}
+
 /// Text of a file as it may be shown on a terminal: control characters, and those that turn the direction of writing
 /// around or cannot be seen, become `\u{1b}`.
 pub fn shown(text: &str) -> Cow<'_, str> {

@@ -12,6 +12,7 @@ mod effect;
 mod possible;
 mod registry;
 mod request;
+mod shift;
 mod site;
 pub mod spot;
 pub(crate) mod structural;

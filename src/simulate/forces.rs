@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 
 use super::campaign_folder::LabCampaign;
 use super::draw::{Draws, Purpose};
-use super::request::EffectRequest;
+use super::request::{EffectRequest, described_parameters};
 use super::sizes::magnitude;
 use crate::cutting::waveform::ToothPlace;
 use crate::data::Process;
@@ -437,23 +437,7 @@ impl Lab {
 }
 
 fn described(hidden: &Hidden) -> Value {
-    let mut parameters = Map::new();
-    for (parameter, value) in hidden.parameters.iter().zip(&hidden.values) {
-        match parameter.name.split_once('[') {
-            Some((list, _)) => {
-                let entry = parameters.entry(list.to_string()).or_insert_with(|| json!([]));
-                if let Some(values) = entry.as_array_mut() {
-                    values.push(json!(value));
-                }
-            }
-            None => {
-                parameters.insert(parameter.name.clone(), json!(value));
-            }
-        }
-    }
-    if let Some((key, choice)) = hidden.instance.variant_label() {
-        parameters.insert(key.into(), json!(choice));
-    }
+    let parameters = described_parameters(&hidden.instance, &hidden.parameters, &hidden.values);
     json!({ "effect": hidden.instance.effect.id(), "site": null, "parameters": parameters })
 }
 

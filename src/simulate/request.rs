@@ -1,10 +1,11 @@
 //! What effect is asked for: `EFFECT[@SITE][:parameter=value,…]`.
 
+use serde_json::{Map, Value, json};
+
 use super::draw::Draws;
 use super::foreign;
 use crate::data::RobotSpec;
-use crate::effects::Registry;
-use crate::effects::{DataSummary, Instance, Known, STRUCTURAL, Size, Structure};
+use crate::effects::{DataSummary, Domain, Instance, Known, Registry, STRUCTURAL, Size, Structure};
 use crate::parameter::Parameter;
 use crate::simulate::sizes::magnitude;
 use crate::text::closest;
@@ -42,6 +43,32 @@ impl std::str::FromStr for EffectRequest {
             values,
         })
     }
+}
+
+/// Parameters by name for the truth's document, lists (`name[i]`) as arrays, and the discrete choice.
+pub fn described_parameters<D: Domain>(
+    instance: &Instance<D>,
+    parameters: &[Parameter],
+    values: &[f64],
+) -> Map<String, Value> {
+    let mut described = Map::new();
+    for (parameter, value) in parameters.iter().zip(values) {
+        match parameter.name.split_once('[') {
+            Some((list, _)) => {
+                let entry = described.entry(list.to_string()).or_insert_with(|| json!([]));
+                if let Some(values) = entry.as_array_mut() {
+                    values.push(json!(value));
+                }
+            }
+            None => {
+                described.insert(parameter.name.clone(), json!(value));
+            }
+        }
+    }
+    if let Some((key, choice)) = instance.variant_label() {
+        described.insert(key.into(), json!(choice));
+    }
+    described
 }
 
 /// An effect with its values settled.

@@ -14,7 +14,7 @@ use super::lab_robot::LabRobot;
 use super::laboratory::{Laboratory, Slip};
 use super::noise::LineNoise;
 use super::postures;
-use super::request::HiddenEffect;
+use super::request::{HiddenEffect, described_parameters};
 use super::scenario::{FrfLayout, NOISE_FLOOR_M_PER_N, StructureScenario};
 use crate::campaign::{AxesRef, BodyRef, MeasuredDof, MeasuredFrf, Point, Posture, RobotSection};
 use crate::identify::{FrfData, StructureModel};
@@ -471,26 +471,10 @@ fn described_departure(departed: &Departed, seen: &Visibility) -> Value {
 }
 
 fn described(hidden: &HiddenEffect, seen: &Visibility) -> Value {
-    let mut parameters = Map::new();
     let id = hidden.instance.effect.id();
+    let mut parameters = described_parameters(&hidden.instance, &hidden.parameters, &hidden.values());
     if hidden.foreign {
         parameters.insert("kind".into(), json!(id));
-    }
-    for (parameter, value) in hidden.parameters.iter().zip(hidden.values()) {
-        match parameter.name.split_once('[') {
-            Some((list, _)) => {
-                let entry = parameters.entry(list.to_string()).or_insert_with(|| json!([]));
-                if let Some(values) = entry.as_array_mut() {
-                    values.push(json!(value));
-                }
-            }
-            None => {
-                parameters.insert(parameter.name.clone(), json!(value));
-            }
-        }
-    }
-    if let Some((key, choice)) = hidden.instance.variant_label() {
-        parameters.insert(key.into(), json!(choice));
     }
     json!({
         "effect": if hidden.foreign { "unknown" } else { id },

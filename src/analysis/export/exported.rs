@@ -13,6 +13,7 @@ use crate::{InputError, Result};
 
 /// A part of a campaign.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum ExportPart {
     /// The measured FRFs, as receptance.

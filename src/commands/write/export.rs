@@ -23,7 +23,7 @@ pub struct ExportArgs {
     campaign: CampaignArg,
     /// Which parts [default: all that the campaign holds].
     #[arg(long, value_delimiter = ',', value_name = "PART", value_enum)]
-    what: Vec<WhatArg>,
+    what: Vec<ExportPart>,
     /// As what: CSV, universal files, MATLAB, NumPy, Parquet, Excel.
     #[arg(
         long,
@@ -38,17 +38,6 @@ pub struct ExportArgs {
     out: PathBuf,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum WhatArg {
-    Frf,
-    Model,
-    Residual,
-    Modes,
-    Lobes,
-    Coefficients,
-    Records,
-}
-
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum FormatArg {
     Csv,
@@ -57,20 +46,6 @@ enum FormatArg {
     Npz,
     Parquet,
     Xlsx,
-}
-
-impl WhatArg {
-    fn part(self) -> ExportPart {
-        match self {
-            WhatArg::Frf => ExportPart::Frf,
-            WhatArg::Model => ExportPart::Model,
-            WhatArg::Residual => ExportPart::Residual,
-            WhatArg::Modes => ExportPart::Modes,
-            WhatArg::Lobes => ExportPart::Lobes,
-            WhatArg::Coefficients => ExportPart::Coefficients,
-            WhatArg::Records => ExportPart::Records,
-        }
-    }
 }
 
 impl FormatArg {
@@ -114,8 +89,7 @@ fn parquet(_: &ColumnTable) -> Result<Vec<u8>> {
 
 pub fn run(args: ExportArgs) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
-    let wanted: Vec<ExportPart> = args.what.iter().map(|w| w.part()).collect();
-    let found = exported(&Workbench::new(&campaign), &wanted)?;
+    let found = exported(&Workbench::new(&campaign), &args.what)?;
     // Everything is made before the first file is written.
     let mut made = Vec::new();
     let mut left_out = Vec::new();

@@ -1,13 +1,10 @@
-use nalgebra::{DMatrix, Vector6};
-
 use crate::data::RobotSpec;
 use crate::effects::background::EWINS;
 use crate::effects::structural::{PostureSetting, Structure};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
-use crate::effects::{At, Effect, Known, NEGLIGIBLE, Site, Spot};
-use crate::effects::{Background, Size};
+use crate::effects::{At, Background, Effect, Known, Site, Size, Spot, shift};
 use crate::parameter::Parameter;
-use crate::robot::{Chain, Dual, Element, Role};
+use crate::robot::{Chain, Dual, Role};
 
 /// The base shifts: sideways along base x and y, or up and down. Its rocking is `base-compliance`; its turning about the
 /// vertical is joint 1 by another name.
@@ -58,17 +55,11 @@ impl Effect<Structure> for BaseMounting {
     }
 
     fn parameters(&self, _at: At, _known: &Known<Structure>) -> Vec<Parameter> {
-        vec![Parameter::logarithmic(
-            "stiffness_n_per_m",
-            "N/m",
-            1e7,
-            2.5,
-            [1e4, 1e11],
-        )]
+        shift::parameters()
     }
 
     fn starts(&self, _at: At, _known: &Known<Structure>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
-        vec![vec![1e6], vec![1e8]]
+        shift::starts()
     }
 
     fn impossible(&self, _site: Site, _robot: &RobotSpec, sizes: &[Size]) -> Option<String> {
@@ -91,28 +82,12 @@ impl Effect<Structure> for BaseMounting {
     }
 
     fn vanishing(&self, _at: At, parameters: &[Parameter]) -> Option<Vec<f64>> {
-        Some(vec![parameters[0].nominal / NEGLIGIBLE])
+        shift::vanishing(parameters)
     }
 
     fn apply(&self, At { variant, .. }: At, values: &[Dual], setting: &PostureSetting, chain: &mut Chain) {
-        let spots: Vec<_> = DIRECTIONS[variant]
-            .1
-            .iter()
-            .filter_map(|k| Spot::Base(*k).twist(setting.kinematics))
-            .collect();
-        let Some((place, at, _)) = spots.first().copied() else {
-            return;
-        };
-        let directions: Vec<Vector6<f64>> = spots.iter().map(|(_, _, twist)| *twist).collect();
-        chain.elements.push(Element {
-            role: Role::Base,
-            place,
-            at,
-            shape: DMatrix::identity(directions.len(), directions.len()),
-            directions,
-            stiffness: values[0].clone(),
-            damping: None,
-        });
+        let spots = DIRECTIONS[variant].1.iter().map(|k| Spot::Base(*k));
+        shift::apply(spots, Role::Base, &values[0], setting, chain);
     }
 }
 

@@ -8,7 +8,7 @@ use nalgebra::Isometry3;
 use crate::data::{JointSpec, RobotSpec};
 use crate::robot::kinematics::dh::{joint_transform, rpy_of_rotation};
 use crate::robot::{Kinematics, RobotModel};
-use crate::text::{quoted, to_degrees};
+use crate::text::{quoted, to_degrees, xml_escaped};
 
 /// The values that go into the files, and where they are from.
 #[derive(Debug, Clone)]
@@ -40,27 +40,12 @@ struct Names(HashSet<String>);
 
 impl Names {
     fn new_one(&mut self, wanted: &str) -> String {
-        let mut name = escaped(wanted);
+        let mut name = xml_escaped(wanted);
         while !self.0.insert(name.clone()) {
             name.push('_');
         }
         name
     }
-}
-
-/// Text as XML holds it within quotes.
-fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out += "&amp;",
-            '<' => out += "&lt;",
-            '>' => out += "&gt;",
-            '"' => out += "&quot;",
-            c => out.push(c),
-        }
-    }
-    out
 }
 
 fn numbers<'a>(values: impl IntoIterator<Item = &'a f64>) -> String {
@@ -87,8 +72,8 @@ pub fn urdf(robot: &RobotModel, sources: &Sources) -> String {
     let mut text = format!(
         "<?xml version=\"1.0\"?>\n<!-- Written by lobestone. Masses and inertias: {}.\n     Limits of effort and velocity are not \
          known here and stand as 0. -->\n<robot name=\"{}\">\n  <link name=\"{base}\"/>\n",
-        escaped(&sources.source).replace("--", "- -"),
-        escaped(&spec.name)
+        xml_escaped(&sources.source).replace("--", "- -"),
+        xml_escaped(&spec.name)
     );
     let mut parent = base;
     let mut behind = Isometry3::identity();

@@ -1,13 +1,10 @@
-use nalgebra::{DMatrix, Vector6};
-
 use crate::data::RobotSpec;
 use crate::effects::background::{ABELE, MOBERG};
 use crate::effects::structural::{PostureSetting, Structure};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
-use crate::effects::{At, Effect, Known, NEGLIGIBLE, Site, Spot};
-use crate::effects::{Background, Size};
+use crate::effects::{At, Background, Effect, Known, Site, Size, Spot, shift};
 use crate::parameter::Parameter;
-use crate::robot::{Chain, Dual, Element, Role};
+use crate::robot::{Chain, Dual, Role};
 
 /// A joint's bearing shifts: radially (both ways across the joint's axis) or axially. Its tilt is
 /// `joint-transverse-compliance`.
@@ -64,17 +61,11 @@ impl Effect<Structure> for BearingCompliance {
     }
 
     fn parameters(&self, _at: At, _known: &Known<Structure>) -> Vec<Parameter> {
-        vec![Parameter::logarithmic(
-            "stiffness_n_per_m",
-            "N/m",
-            1e7,
-            2.5,
-            [1e4, 1e11],
-        )]
+        shift::parameters()
     }
 
     fn starts(&self, _at: At, _known: &Known<Structure>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
-        vec![vec![1e6], vec![1e8]]
+        shift::starts()
     }
 
     fn impossible(&self, _site: Site, _robot: &RobotSpec, sizes: &[Size]) -> Option<String> {
@@ -97,29 +88,13 @@ impl Effect<Structure> for BearingCompliance {
     }
 
     fn vanishing(&self, _at: At, parameters: &[Parameter]) -> Option<Vec<f64>> {
-        Some(vec![parameters[0].nominal / NEGLIGIBLE])
+        shift::vanishing(parameters)
     }
 
     fn apply(&self, At { site, variant }: At, values: &[Dual], setting: &PostureSetting, chain: &mut Chain) {
         let Site::Joint(i) = site else { return };
-        let spots: Vec<_> = DIRECTIONS[variant]
-            .1
-            .iter()
-            .filter_map(|k| Spot::Bearing(i, *k).twist(setting.kinematics))
-            .collect();
-        let Some((place, at, _)) = spots.first().copied() else {
-            return;
-        };
-        let directions: Vec<Vector6<f64>> = spots.iter().map(|(_, _, twist)| *twist).collect();
-        chain.elements.push(Element {
-            role: Role::Bearing,
-            place,
-            at,
-            shape: DMatrix::identity(directions.len(), directions.len()),
-            directions,
-            stiffness: values[0].clone(),
-            damping: None,
-        });
+        let spots = DIRECTIONS[variant].1.iter().map(|k| Spot::Bearing(i, *k));
+        shift::apply(spots, Role::Bearing, &values[0], setting, chain);
     }
 }
 

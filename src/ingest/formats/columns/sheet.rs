@@ -7,6 +7,7 @@ use std::fmt::Write as _;
 
 use super::archive::zip_bytes;
 use super::column::{Cells, ColumnTable, number_text};
+use crate::text::xml_escaped;
 use crate::{Error, Result};
 
 /// Rows that a sheet of Excel holds, names included.
@@ -53,7 +54,7 @@ pub fn xlsx_bytes(table: &ColumnTable) -> Result<Vec<u8>> {
     let workbook = format!(
         "{DECLARATION}<workbook xmlns=\"{MAIN}\" xmlns:r=\"{RELATIONS}\"><sheets><sheet name=\"{}\" sheetId=\"1\" \
          r:id=\"rId1\"/></sheets></workbook>",
-        escaped(&title)
+        xml_escaped(&title)
     );
     zip_bytes(&[
         ("[Content_Types].xml".into(), types.into_bytes()),
@@ -79,7 +80,7 @@ fn sheet(table: &ColumnTable) -> String {
         let _ = write!(
             out,
             "<c r=\"{at}{row}\" t=\"inlineStr\"><is><t xml:space=\"preserve\">{}</t></is></c>",
-            escaped(text)
+            xml_escaped(text)
         );
     };
     out += "<row r=\"1\">";
@@ -112,23 +113,6 @@ fn letters(column: usize) -> String {
         rest = (rest - 1) / 26;
     }
     letters.iter().rev().collect()
-}
-
-/// Text as XML holds it; control characters, which it cannot hold, are left out.
-fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out += "&amp;",
-            '<' => out += "&lt;",
-            '>' => out += "&gt;",
-            '"' => out += "&quot;",
-            c if c.is_control() && !matches!(c, '\n' | '\t') => {}
-            '\u{fffe}' | '\u{ffff}' => {}
-            c => out.push(c),
-        }
-    }
-    out
 }
 
 #[cfg(test)]

@@ -2,11 +2,12 @@
 """Tries `lobestone diagnose` on simulated campaigns of which everything was drawn.
 
     random_campaigns.py [--tier mixed] [--count 50] [--first-seed 1000] [--lobestone target/release/lobestone]
-                        [--loops] [--lines-hz HZ] [--report reports/diagnosis_TIER.md] [--keep DIR]
+                        [--loops] [--lines-hz HZ] [--report reports/diagnosis_TIER.md] [--keep DIR] [--effect EFFECT ...]
 
 Campaign by campaign: `lobestone simulate --random TIER --seed S`, `lobestone diagnose --json`, verdict against truth. Tiers
 are those of `lobestone simulate --help`: controls, faint effects, foreign physics, the mixture that the confidence is
-tried on (`trial`), the laboratory, three effects at once. `--loops` goes on with `add` until nothing is found. Writes a report (confusion matrix, false alarms, misses by how plainly the effect shows, calibration of the
+tried on (`trial`), the laboratory, three effects at once. `--effect` hides the effects named in turn, at their usual sizes, in
+campaigns of all kinds instead (force records where the first is one on cutting forces). `--loops` goes on with `add` until nothing is found. Writes a report (confusion matrix, false alarms, misses by how plainly the effect shows, calibration of the
 confidence, time), next to it a CSV with one row a campaign and, where matplotlib is there, the reliability diagram. A CSV
 that is there already is continued: campaigns in it are not run again, so a long run may be stopped and goes on.
 """
@@ -30,6 +31,8 @@ FIELDS = [
 TIERS = ["mixed", "control", "faint", "foreign", "trial", "laboratory", "three"]
 # Upper ends of the classes of visibility, in standard deviations.
 CLASSES = [10, 30, 100, 300, 1000, math.inf]
+# Of measurement, for effects that are named.
+KINDS = ["careful", "direct", "dirty"]
 # Ends of the bins of the reliability diagram.
 BINS = [0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 1.0001]
 # An effect that sticks out of the noise less than this may honestly be called absent.
@@ -48,6 +51,7 @@ def main():
     arguments.add_argument("--lobestone", default=str(ROOT / "target/release/lobestone"))
     arguments.add_argument("--simulate-with", help="another lobestone that makes the campaigns, to try an older one on them")
     arguments.add_argument("--loops", action="store_true", help="diagnose, add what is named, and so on until nothing is")
+    arguments.add_argument("--effect", action="append", default=[], help="hide this effect of the library instead (several: in turn)")
     arguments.add_argument("--lines-hz", type=float, help="spacing of the spectral lines, to try this script quickly (default: as "
                            "simulate has it)")
     arguments.add_argument("--report", type=pathlib.Path, help="default: reports/diagnosis_TIER.md")
@@ -55,6 +59,8 @@ def main():
     options = arguments.parse_args()
     if options.report is None:
         name = "confusion" if options.tier == "mixed" else options.tier
+        if options.effect:
+            name = "effects"
         parts = ["diagnosis", name, "loops" if options.loops else ""]
         options.report = ROOT / "reports" / ("_".join(p for p in parts if p) + ".md")
     table = options.report.with_suffix(".csv")
@@ -115,8 +121,14 @@ def simulated(options, seed, folder):
     name = str(folder / f"campaign-{seed}")
     tier = [] if options.tier == "mixed" else [options.tier]
     spacing = ["--lines-hz", str(options.lines_hz)] if options.lines_hz else []
-    written = lobestone(options.simulate_with or options.lobestone, "simulate", "--out", name, "--seed", str(seed), *spacing,
-                        "--random", *tier)
+    what = ["--random", *tier]
+    if options.effect:
+        turn = seed - options.first_seed
+        effect = options.effect[turn % len(options.effect)]
+        what = ["--effect", effect, "--kind", KINDS[turn // len(options.effect) % len(KINDS)]]
+        if effect.startswith("amplitude"):
+            what += ["--force-levels", "200,50"]
+    written = lobestone(options.simulate_with or options.lobestone, "simulate", "--out", name, "--seed", str(seed), *spacing, *what)
     return written["dir"], json.loads(pathlib.Path(written["truth"]).read_text())
 
 
@@ -145,19 +157,21 @@ def one(options, seed):
         seconds = processor_time() - started
     others = [label(a["effect"], a["site"]) for a in truth["also"]]
     nearest = truth.get("nearest_library_effect") or {}
-    visible = truth["visibility"] or {}
+    visible = truth.get("visibility") or {}
     # With several effects the campaign is as plain as the plainest one.
     seen = [v["sigmas"] for v in [visible, *(a.get("visibility") for a in truth["also"])] if v]
-    noise = truth["noise"]
+    # Force records have their noise in newtons.
+    noise = truth.get("noise") or [truth["noise_n"]]
     kinds = [truth.get("line_noise", "white")] + (["common"] if truth.get("common_noise") else [])
     row = {
         "seed": seed,
-        "kind": truth["kind"],
+        "kind": truth.get("kind", truth.get("domain", "")),
         "truth": truth["effect"],
         "site": truth["site"] or "",
         "also": " ".join(others),
         "hidden": truth["parameters"].get("kind", "") if truth["effect"] == "unknown" else "",
-        "sigmas": f"{max(seen):.1f}" if seen else "",
+        # Force records do not say how plainly their effect shows.
+        "sigmas": f"{max(seen):.1f}" if seen else "inf" if truth.get("domain") == "cutting" else "",
         "excess_chi2": f"{visible['excess_chi2_per_value']:.3g}" if "excess_chi2_per_value" in visible else "",
         "nearest_library_effect": nearest.get("effect") or "",
         "nearest_excess_chi2": f"{nearest['excess_chi2_per_value']:.3g}" if nearest else "",

@@ -164,6 +164,26 @@ pub fn warnings(warnings: &[String]) -> String {
     warnings.iter().map(|w| format!("{label} {w}\n")).collect()
 }
 
+/// What is said of several files in the same words is said once: `a.csv and 11 more: …`. In the order of the first of each.
+pub fn said_once(warnings: &[String]) -> Vec<String> {
+    let mut groups: Vec<(&str, &str, usize)> = Vec::new();
+    for warning in warnings {
+        let (about, what) = warning.split_once(": ").unwrap_or(("", warning));
+        match groups.iter_mut().find(|(_, said, _)| *said == what) {
+            Some((_, _, more)) => *more += 1,
+            None => groups.push((about, what, 0)),
+        }
+    }
+    groups
+        .into_iter()
+        .map(|(about, what, more)| match (about, more) {
+            ("", _) => what.to_string(),
+            (about, 0) => format!("{about}: {what}"),
+            (about, more) => format!("{about} and {more} more: {what}"),
+        })
+        .collect()
+}
+
 /// Words broken to lines of at most 100 characters, each line after `indent`. Line breaks of the text stay, and so do
 /// commands between backticks, which somebody may want to copy.
 pub fn wrapped(text: &str, indent: &str) -> String {
@@ -212,6 +232,15 @@ pub(super) fn error_label() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_same_of_several_files_is_said_once() {
+        let said = ["a.csv: no unit", "b.csv: late", "c.csv: no unit", "alone"].map(str::to_string);
+        assert_eq!(
+            said_once(&said),
+            ["a.csv and 1 more: no unit", "b.csv: late", "alone"]
+        );
+    }
 
     #[test]
     fn columns_line_up() {

@@ -4,6 +4,7 @@ use num_complex::Complex64;
 use serde::Serialize;
 
 use crate::modal::together::reconstruction::Reconstruction;
+use crate::text::figures;
 
 /// Noise against the FRF's size up to which it is good, and from which it is bad.
 const NOISE: [f64; 2] = [0.1, 0.5];
@@ -303,8 +304,8 @@ pub(super) fn judge_set(found: &SetFindings) -> SetQuality {
         note(
             QualityGrade::Doubtful,
             format!(
-                "your frequencies move from FRF to FRF by {:.2} %: mass loading or temperature",
-                100.0 * found.frequency_scatter.unwrap_or(0.0)
+                "your frequencies move from FRF to FRF by {} %: mass loading or temperature",
+                figures(100.0 * found.frequency_scatter.unwrap_or(0.0), 2)
             ),
         );
     }

@@ -12,7 +12,7 @@ use crate::campaign::Campaign;
 use crate::commands::Outcome;
 use crate::commands::measure::modal_files::Files;
 use crate::commands::next_step::{self, Guide};
-use crate::commands::text::{Emphasis, table};
+use crate::commands::text::{Emphasis, said_once, table};
 use crate::modal::chosen::Choice;
 use crate::modal::operational::OperationalSettings;
 use crate::modal::{Estimator, FrfMode, Method, Settings, TapSettings, Tolerances};
@@ -451,15 +451,12 @@ fn text(analysis: &ModalAnalysis, each: bool) -> String {
     }
     if !analysis.warnings.is_empty() {
         let _ = writeln!(out, "\n{}", Emphasis::Doubtful.on("warnings"));
-        for warning in analysis.warnings.iter().take(MOST_WARNINGS) {
+        let warnings = said_once(&analysis.warnings);
+        for warning in warnings.iter().take(MOST_WARNINGS) {
             let _ = writeln!(out, "  {warning}");
         }
-        if analysis.warnings.len() > MOST_WARNINGS {
-            let _ = writeln!(
-                out,
-                "  … and {} more: see --json",
-                analysis.warnings.len() - MOST_WARNINGS
-            );
+        if warnings.len() > MOST_WARNINGS {
+            let _ = writeln!(out, "  … and {} more: see --json", warnings.len() - MOST_WARNINGS);
         }
     }
     out

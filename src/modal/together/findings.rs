@@ -54,7 +54,8 @@ pub(crate) fn collect(
         .flat_map(|g| g.solution.poles.iter().copied())
         .collect();
     let (mut scatters, mut moving) = (Vec::new(), 0);
-    for group in groups {
+    let parts = verify::parts_of_others(fitted, groups);
+    for (g, group) in groups.iter().enumerate() {
         let solution = &group.solution;
         if let Some(doubt) = &group.doubt {
             result.warnings.push(format!(
@@ -80,6 +81,16 @@ pub(crate) fn collect(
             .max(1.0)
             .sqrt();
         for (j, pole) in solution.poles.iter().enumerate() {
+            if parts.contains(&(g, j)) {
+                result.rejected.push(RejectedMode {
+                    frequency_hz: pole.frequency_hz,
+                    damping_ratio: pole.damping_ratio,
+                    reason: "its FRFs have no common phase where those of the other modes have: a part of its neighbours, which move \
+                             or bend"
+                        .into(),
+                });
+                continue;
+            }
             let (found_in, best) = joint_fit::seen_in(solution, j);
             if found_in == 0 || (data.len() >= SET && found_in < 2 && best < FAR) {
                 result.rejected.push(RejectedMode {

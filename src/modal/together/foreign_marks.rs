@@ -7,6 +7,7 @@ use num_complex::Complex64;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use crate::modal::synthetic::{Synthetic, SyntheticMode};
 use crate::modal::*;
 
 const SEVEN: [(f64, f64); 7] = [
@@ -33,6 +34,8 @@ struct Test {
     loading: f64,
     /// Sines of four times the rms of each FRF, Hz.
     hum_hz: Vec<f64>,
+    /// Modes, by number, whose phase is drawn anew for each response.
+    turned: Vec<usize>,
 }
 
 impl Test {
@@ -45,6 +48,7 @@ impl Test {
             coloured: 0.0,
             loading: 0.0,
             hum_hz: Vec::new(),
+            turned: Vec::new(),
         }
     }
 
@@ -61,8 +65,13 @@ impl Test {
                     .collect()
             })
             .collect();
+        let mut turns = ChaCha8Rng::seed_from_u64(!seed);
         let mut all = Vec::new();
         for i in 0..self.responses {
+            let mut turn = vec![Complex64::ONE; self.poles.len()];
+            for mode in &self.turned {
+                turn[*mode] = Complex64::from_polar(1.0, TAU * turns.random::<f64>());
+            }
             let moved: Vec<f64> = self
                 .poles
                 .iter()
@@ -72,11 +81,12 @@ impl Test {
                 let mut h: Vec<Complex64> = f
                     .iter()
                     .map(|f| {
-                        let modes = self.poles.iter().zip(&moved).zip(&shapes);
+                        let modes = self.poles.iter().zip(&moved).zip(&shapes).zip(&turn);
                         modes
-                            .map(|(((_, zeta), f0), phi)| {
+                            .map(|((((_, zeta), f0), phi), turn)| {
                                 let (w, w0) = (TAU * f, TAU * f0);
-                                phi[i] * phi[j] * f0 / Complex64::new(w0 * w0 - w * w, 2.0 * zeta * w0 * w)
+                                turn * phi[i] * phi[j] * f0
+                                    / Complex64::new(w0 * w0 - w * w, 2.0 * zeta * w0 * w)
                             })
                             .sum()
                     })
@@ -162,6 +172,69 @@ impl Test {
                 ((nearest.damping_ratio - zeta) / nearest.damping_std).powi(2) / self.poles.len() as f64;
         }
         (found, squares.map(f64::sqrt))
+    }
+}
+
+/// Next to a mode whatever has phases by chance is a part of it, where the modes of the set have common phases; a fault of the channels
+/// takes them from all.
+#[test]
+fn phases_by_chance_next_to_a_mode_are_none_unless_all_have_them() {
+    let eight = [&SEVEN[..4], &[(136.0, 0.012)], &SEVEN[4..]].concat();
+    for seed in 1..4 {
+        let one = Test {
+            turned: vec![4],
+            responses: 15,
+            ..Test::of(&eight)
+        };
+        let found = one.found(seed);
+        let at: Vec<f64> = found.modes.iter().map(|m| m.frequency_hz).collect();
+        assert_eq!(at.len(), 7, "seed {seed}: {at:?}, {:?}", found.rejected);
+        let why = found
+            .rejected
+            .iter()
+            .find(|r| (r.frequency_hz - 136.0).abs() < 0.5);
+        assert!(
+            why.is_some_and(|r| r.reason.contains("no common phase")),
+            "{:?}",
+            found.rejected
+        );
+        let all = Test {
+            turned: (0..8).collect(),
+            ..one
+        };
+        let found = all.found(seed);
+        let there = found.modes.iter().any(|m| (m.frequency_hz - 136.0).abs() < 0.5);
+        assert!(there, "seed {seed}: {:?}", found.rejected);
+    }
+}
+
+/// FRFs that a program worked out, written with so many figures: what rounding leaves over is no mode.
+#[test]
+fn rounded_figures_are_no_mode() {
+    let modes =
+        [(452.77, 0.123718, 1.05), (1448.53, 0.01651, 5.54)].map(|(f, z, a)| SyntheticMode::new(f, z, a));
+    for figures in [4, 6, 9, 12] {
+        let (f, exact) = Synthetic::new(0.0, 8000.0, 1.0, &modes).frf();
+        let rounded = |v: f64| format!("{v:.figures$e}").parse::<f64>().unwrap();
+        let h: Vec<Complex64> = exact
+            .iter()
+            .map(|h| Complex64::new(rounded(h.re), rounded(h.im)))
+            .collect();
+        let settings = Settings::default();
+        let single = analyse_frf(&f, &h, &settings).unwrap();
+        let member = SetMember {
+            frequency_hz: &f,
+            receptance_m_per_n: &h,
+            modes: &single,
+            dofs: None,
+        };
+        let found = global(&[member], &settings).unwrap();
+        let at: Vec<f64> = found.modes.iter().map(|m| m.frequency_hz).collect();
+        assert_eq!(at.len(), 2, "{figures} figures: {at:?}");
+        assert!(
+            (at[0] - 452.77).abs() < 0.5 && (at[1] - 1448.53).abs() < 0.1,
+            "{at:?}"
+        );
     }
 }
 

@@ -22,8 +22,16 @@ const APART_LINES: f64 = 2.0;
 const ENOUGH_FRFS: usize = 5;
 /// Residues of no common phase: what random phases give more often than a structure.
 const COLLINEAR: f64 = 0.5;
-/// A pole that makes this share of what was measured in its band is there, whatever its phases are.
+/// A pole that makes this share of what was measured in its band is there, whatever its phases are …
 const DOMINANT: f64 = 0.5;
+/// … unless they are those of chance next to a stronger one, where the modes of the set have common ones, more than so many.
+const BY_CHANCE: f64 = 0.25;
+const OTHERS: usize = 3;
+/// … or where it makes so many times what was measured there: its neighbours take away what it adds.
+const CANCELLED: f64 = 2.0;
+/// Less of what was measured in its band than this (0.3 % of the amplitude) is beyond what a test can show, however little the noise
+/// is: what a file rounds, or a little of what every model lacks.
+const BEYOND_TEST: f64 = 1e-5;
 /// Share of the FRFs that must show a mode …
 const SHARE_OF_FRFS: f64 = 0.08;
 /// … unless one of them shows it with this squared size over uncertainty.
@@ -77,13 +85,7 @@ pub(crate) fn verified(
             // all alike, and one of them is to stay.
             doubtful.sort_by(|a, b| a.1.total_cmp(&b.1));
             for (j, _, why) in doubtful {
-                let near = |k: usize| {
-                    let width = |p: &Pole| p.damping_ratio * p.frequency_hz;
-                    let reach = APART_WIDTHS * (width(&poles[j]) + width(&poles[k]))
-                        + APART_LINES * joint_fit::line_hz(&data, poles[j].frequency_hz);
-                    (poles[j].frequency_hz - poles[k].frequency_hz).abs() < reach
-                };
-                if !(0..poles.len()).any(|k| leaves[k].is_some() && near(k)) {
+                if !(0..poles.len()).any(|k| leaves[k].is_some() && neighbours(&data, poles[j], poles[k])) {
                     leaves[j] = Some(why);
                 }
             }
@@ -130,17 +132,104 @@ fn louder(data: &mut [Data], groups: &[Group]) {
     }
 }
 
-/// Why pole `j` of a group is no mode, and the share that it makes of what was measured around it.
-fn reason(data: &[Data], group: &Group, j: usize) -> Option<(f64, String)> {
-    let frfs = group.solution.frfs.len();
-    let residues: Vec<Complex64> = (0..frfs).map(|m| group.solution.constant(m, j).0).collect();
-    let local = Local::new(data, group, j, &residues);
-    let why = against(&group.solution, j, &residues, &local)?;
-    Some((local.mode / local.measured, why))
+/// Are two poles so near that one may make up for what the other lacks?
+fn neighbours(data: &[Data], a: Pole, b: Pole) -> bool {
+    let widths = a.damping_ratio * a.frequency_hz + b.damping_ratio * b.frequency_hz;
+    let reach = APART_WIDTHS * widths + APART_LINES * joint_fit::line_hz(data, a.frequency_hz);
+    (a.frequency_hz - b.frequency_hz).abs() < reach
 }
 
-/// What speaks against pole `j` of a fit.
-fn against(solution: &Solution, j: usize, residues: &[Complex64], local: &Local) -> Option<String> {
+/// A pole of a group, and what was measured around it.
+struct Candidate<'a> {
+    solution: &'a Solution,
+    pole: usize,
+    residues: Vec<Complex64>,
+    local: Local,
+}
+
+impl<'a> Candidate<'a> {
+    fn new(data: &[Data], group: &'a Group, j: usize) -> Candidate<'a> {
+        let solution = &group.solution;
+        let frfs = 0..solution.frfs.len();
+        let residues: Vec<Complex64> = frfs.map(|m| solution.constant(m, j).0).collect();
+        Candidate {
+            local: Local::new(data, group, j, &residues),
+            solution,
+            pole: j,
+            residues,
+        }
+    }
+
+    /// Modal phase collinearity, 0 to 1; 1 where there is nothing to compare.
+    fn mpc(&self) -> f64 {
+        shape::complexity(&self.residues).map_or(1.0, |c| c.mpc)
+    }
+
+    /// Of its peak, over all FRFs, to compare.
+    fn height(&self) -> f64 {
+        let squares: f64 = self.residues.iter().map(|c| c.norm_sqr()).sum();
+        squares.sqrt() / self.solution.poles[self.pole].damping_ratio
+    }
+
+    fn dominates(&self) -> bool {
+        self.local.mode >= DOMINANT * self.local.measured
+    }
+}
+
+/// Whether the modes of this set have common phases: the median of those that stand alone. Sets whose references or channels are
+/// shifted in time have none.
+fn common_phase(data: &[Data], groups: &[Group]) -> bool {
+    let mut all: Vec<f64> = groups
+        .iter()
+        .flat_map(|group| (0..group.solution.poles.len()).map(move |j| Candidate::new(data, group, j)))
+        .filter(|candidate| candidate.residues.len() >= ENOUGH_FRFS && candidate.dominates())
+        .map(|candidate| candidate.mpc())
+        .collect();
+    all.sort_by(f64::total_cmp);
+    all.len() > OTHERS && all[all.len() / 2] > IN_PHASE
+}
+
+/// The poles, by group and number, that have phases by chance next to a stronger one, or that others cancel, in a set whose modes have
+/// common phases: parts of those which the model of one mode does not hold. They stay in the fit, where they do no harm and what they stand for would.
+pub(super) fn parts_of_others(data: &[Data], groups: &[Group]) -> Vec<(usize, usize)> {
+    if data.len() < ENOUGH_FRFS || !common_phase(data, groups) {
+        return Vec::new();
+    }
+    let mut found = Vec::new();
+    for (g, group) in groups.iter().enumerate() {
+        let poles = &group.solution.poles;
+        for j in 0..poles.len() {
+            let candidate = Candidate::new(data, group, j);
+            let beside_a_stronger = |k: usize| {
+                k != j
+                    && neighbours(data, poles[j], poles[k])
+                    && Candidate::new(data, group, k).height() > candidate.height()
+            };
+            let cancelled = candidate.local.mode > CANCELLED * candidate.local.measured;
+            if candidate.mpc() < BY_CHANCE && (cancelled || (0..poles.len()).any(beside_a_stronger)) {
+                found.push((g, j));
+            }
+        }
+    }
+    found
+}
+
+/// Why pole `j` of a group is no mode, and the share that it makes of what was measured around it.
+fn reason(data: &[Data], group: &Group, j: usize) -> Option<(f64, String)> {
+    let candidate = Candidate::new(data, group, j);
+    let share = candidate.local.mode / candidate.local.measured;
+    Some((share, against(&candidate)?))
+}
+
+/// What speaks against a pole.
+fn against(candidate: &Candidate) -> Option<String> {
+    let Candidate {
+        solution,
+        pole: j,
+        local,
+        ..
+    } = candidate;
+    let j = *j;
     let pole = solution.poles[j];
     let frfs = solution.frfs.len();
     let (seen_in, best) = joint_fit::seen_in(solution, j);
@@ -154,13 +243,19 @@ fn against(solution: &Solution, j: usize, residues: &[Complex64], local: &Local)
     if local.mode < OVER_REST * local.coloured {
         return Some("no larger than what the modes leave unexplained around it".into());
     }
-    let mpc = shape::complexity(residues).map_or(1.0, |c| c.mpc);
+    if local.mode < BEYOND_TEST * local.measured {
+        return Some(format!(
+            "it makes {:.0e} of the power measured around it: less than a test can show",
+            local.mode / local.measured
+        ));
+    }
+    let mpc = candidate.mpc();
     if frfs >= ENOUGH_FRFS && local.one_sided && mpc < IN_PHASE {
         return Some(format!(
             "only one side of its peak was measured, and its FRFs have no common phase (collinearity {mpc:.2}): what lies beyond the band"
         ));
     }
-    if frfs >= ENOUGH_FRFS && local.mode < DOMINANT * local.measured {
+    if frfs >= ENOUGH_FRFS && !candidate.dominates() {
         if local.mode < SMALL_SHARE * local.measured && mpc < CLEARLY_IN_PHASE {
             return Some(format!(
                 "it makes {:.0} % of what was measured around it and its FRFs have no clear common phase (collinearity {mpc:.2}): \
@@ -176,7 +271,7 @@ fn against(solution: &Solution, j: usize, residues: &[Complex64], local: &Local)
     }
     let [frequency, damping] = solution.scatter_std(j);
     if frfs >= ENOUGH_FRFS
-        && local.mode < DOMINANT * local.measured
+        && !candidate.dominates()
         && (frequency > SCATTER_WIDTHS * pole.damping_ratio || damping > SCATTER_DAMPING)
     {
         return Some("the FRFs do not agree on its frequency or damping".into());

@@ -10,11 +10,11 @@ use crate::InputError;
 use crate::data::{FrfRecord, Quantity, TimeRecord};
 use crate::ingest::budget::Budget;
 use crate::ingest::contents::{Contents, OtherRecord};
-use crate::ingest::formats::mat::variable::{MIN_AXIS, Variable};
+use crate::ingest::formats::mat::variable::{Labels, MIN_AXIS, Variable};
 use crate::ingest::formats::waveform;
 use crate::ingest::tables::clock::{self, Grid, Stamps};
 use crate::ingest::text::Notes;
-use crate::ingest::{checks, dof_names};
+use crate::ingest::{checks, dof_names, units};
 
 /// Change of the step from which on times are not evenly spaced.
 const UNEVEN: f64 = 0.02;
@@ -23,6 +23,7 @@ const SHOWN: usize = 8;
 
 pub(crate) fn contents(
     mut variables: Vec<Variable>,
+    labels: &[Labels],
     budget: &mut Budget,
     notes: &mut Notes,
 ) -> Result<Contents, InputError> {
@@ -33,7 +34,7 @@ pub(crate) fn contents(
     let mut used = vec![false; variables.len()];
     let mut contents = Contents::default();
     join_parts(&mut variables, notes);
-    tables(&variables, &mut used, &mut contents, budget, notes)?;
+    tables(&variables, labels, &mut used, &mut contents, budget, notes)?;
     frequency_functions(&variables, &mut used, &mut contents, budget, notes)?;
     let mut times = time_signals(&variables, &mut used, budget, notes)?;
     contents.times.append(&mut times);
@@ -97,6 +98,7 @@ fn rises_evenly(values: &[f64]) -> bool {
 /// files have them: `H1_2` an FRF, `C1_2` a coherence, `G1_2` and `S1` spectra, `X1` a signal.
 fn tables(
     variables: &[Variable],
+    labels: &[Labels],
     used: &mut [bool],
     contents: &mut Contents,
     budget: &mut Budget,
@@ -122,7 +124,13 @@ fn tables(
             (c * rows..(c + 1) * rows).map(|i| complex(variable, i)).collect()
         };
         let mut frf = |name: String, value: Vec<Complex64>, notes: &mut Notes| {
-            let record = record(variable, name, axis, value);
+            let mut record = record(variable, name, axis, value);
+            if let Some((quantity, factor)) = units::parse(&channel_unit(variable, variables, labels))
+                .and_then(|unit| unit.dimension.frf().zip(Some(unit.factor)))
+            {
+                record.quantity = Some(quantity);
+                record.value.iter_mut().for_each(|v| *v *= factor);
+            }
             checks::tidy_frf(record, notes).map(|record| contents.frfs.extend(record))
         };
         let suffix = |c: usize| {
@@ -162,7 +170,8 @@ fn tables(
                 let rate = (rows - 1) as f64 / (axis[rows - 1] - axis[0]);
                 for c in 1..columns {
                     let name = format!("{}{}", variable.name, suffix(c));
-                    let channel = waveform::channel(name, String::new(), column(c).to_vec(), notes)?;
+                    let unit = channel_unit(variable, variables, labels);
+                    let channel = waveform::channel(name, unit, column(c).to_vec(), notes)?;
                     waveform::put(&mut contents.times, rate, axis[0], channel)?;
                 }
             }
@@ -180,6 +189,33 @@ fn tables(
         attach(variable, axis, &values, variables, contents, notes);
     }
     Ok(())
+}
+
+/// What SignalCalc's lists of channels (`ChanNum`, `Unit`) give for a function of its: `g/N` for `H1_2` where channel 1 is a force;
+/// blank where the file says nothing.
+fn channel_unit(variable: &Variable, variables: &[Variable], labels: &[Labels]) -> String {
+    let units = labels.iter().find(|l| l.name.eq_ignore_ascii_case("unit"));
+    let (Some(units), Some(channels)) = (units, variable.analyser_channels()) else {
+        return String::new();
+    };
+    let numbers = variables.iter().find(|v| v.is_called(&["channum"]));
+    let of = |channel: usize| {
+        let row = match numbers {
+            Some(numbers) => numbers.re.iter().position(|n| *n == channel as f64),
+            None => channel.checked_sub(1),
+        };
+        units.rows.get(row?).filter(|unit| !units::is_blank(unit))
+    };
+    match channels.as_slice() {
+        [channel] => of(*channel).cloned().unwrap_or_default(),
+        // The response over the reference, which stands first; an impulse response is of the same unit for each line.
+        [reference, response] if reference != response => of(*response)
+            .zip(of(*reference))
+            .map_or_else(String::new, |(response, reference)| {
+                format!("({response})/({reference})")
+            }),
+        _ => String::new(),
+    }
 }
 
 /// Steps up to this are those of a recording where nothing says what an axis is, s.

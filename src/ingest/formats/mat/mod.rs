@@ -31,22 +31,21 @@ pub(crate) fn looks_like_v4(bytes: &[u8]) -> bool {
 pub(crate) fn read_v4(bytes: &[u8], budget: &mut Budget, notes: &mut Notes) -> Result<Contents, InputError> {
     crate::ingest::formats::mat::interpret::contents(
         crate::ingest::formats::mat::v4::read(bytes, budget, notes)?,
+        &[],
         budget,
         notes,
     )
 }
 
 pub(crate) fn read_v5(bytes: &[u8], budget: &mut Budget, notes: &mut Notes) -> Result<Contents, InputError> {
-    crate::ingest::formats::mat::interpret::contents(
-        crate::ingest::formats::mat::v5::read(bytes, budget, notes)?,
-        budget,
-        notes,
-    )
+    let (variables, labels) = crate::ingest::formats::mat::v5::read(bytes, budget, notes)?;
+    crate::ingest::formats::mat::interpret::contents(variables, &labels, budget, notes)
 }
 
 pub(crate) fn read_v73(bytes: &[u8], budget: &mut Budget, notes: &mut Notes) -> Result<Contents, InputError> {
     crate::ingest::formats::mat::interpret::contents(
         crate::ingest::formats::mat::hdf5::read(bytes, budget, notes)?,
+        &[],
         budget,
         notes,
     )

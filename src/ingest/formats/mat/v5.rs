@@ -12,7 +12,7 @@ use std::io::Read;
 
 use crate::InputError;
 use crate::ingest::budget::Budget;
-use crate::ingest::formats::mat::variable::Variable;
+use crate::ingest::formats::mat::variable::{Labels, Variable};
 use crate::ingest::text::{Notes, decode};
 
 const HEADER: usize = 128;
@@ -31,7 +31,10 @@ const SPARSE: u8 = 5;
 const FUNCTION: u8 = 16;
 const OPAQUE: u8 = 17;
 
-/// Reads all numeric arrays, those in structs (`s.f`, `s(2).f`) and cells (`c{3}`) too.
+/// More text than this says nothing of channels.
+const MOST_TEXT: usize = 1 << 16;
+
+/// Reads all numeric arrays, those in structs (`s.f`, `s(2).f`) and cells (`c{3}`) too, and what text there is.
 ///
 /// # Errors
 /// No valid header, no variable that can be read, or more memory than the budget of the file.
@@ -39,7 +42,7 @@ pub(crate) fn read(
     bytes: &[u8],
     budget: &mut Budget,
     notes: &mut Notes,
-) -> Result<Vec<Variable>, InputError> {
+) -> Result<(Vec<Variable>, Vec<Labels>), InputError> {
     let big = match bytes.get(126..HEADER) {
         Some(b"IM") => false,
         Some(b"MI") => true,
@@ -52,6 +55,7 @@ pub(crate) fn read(
     };
     let mut found = Found {
         variables: Vec::new(),
+        labels: Vec::new(),
         budget,
         notes,
     };
@@ -118,7 +122,7 @@ pub(crate) fn read(
             ),
         );
     }
-    Ok(found.variables)
+    Ok((found.variables, found.labels))
 }
 
 /// Why a variable was not read.
@@ -130,6 +134,7 @@ enum Trouble {
 
 struct Found<'a> {
     variables: Vec<Variable>,
+    labels: Vec<Labels>,
     budget: &'a mut Budget,
     notes: &'a mut Notes,
 }
@@ -353,7 +358,12 @@ impl Found<'_> {
             SPARSE => self
                 .notes
                 .about(&name, "a sparse matrix: left out; in MATLAB, save full(…) of it"),
-            CHAR => {}
+            CHAR => {
+                let text = cursor.element().filter(|_| (1..=MOST_TEXT).contains(&count));
+                if let Some(rows) = text.and_then(|(kind, data)| rows(kind, data, big, &head.size)) {
+                    self.labels.push(Labels { name, rows });
+                }
+            }
             CELL | STRUCT | OBJECT if depth == 0 => {
                 self.notes
                     .about(&name, "structs or cells in too many others: left out");
@@ -455,6 +465,32 @@ fn fields(cursor: &mut Cursor) -> Option<Vec<String>> {
         return names.is_empty().then(Vec::new);
     }
     Some(names.chunks_exact(width).map(name_of).collect())
+}
+
+/// The rows of a matrix of characters, without the blanks at their ends; `None` where it is damaged.
+fn rows(kind: u32, data: &[u8], big: bool, size: &[usize]) -> Option<Vec<String>> {
+    const UTF8: u32 = 16;
+    const UTF16: u32 = 17;
+    let &[count, columns] = size else { return None };
+    let characters: Vec<char> = match kind {
+        UTF8 => decode(data).chars().collect(),
+        1 | 2 => data.iter().map(|b| char::from(*b)).collect(),
+        4 | UTF16 => {
+            let units = numbers(4, data, big).into_iter().map(|v| v as u16);
+            char::decode_utf16(units)
+                .map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER))
+                .collect()
+        }
+        _ => return None,
+    };
+    (characters.len() == count * columns).then(|| {
+        (0..count)
+            .map(|row| {
+                let line: String = characters.iter().skip(row).step_by(count).collect();
+                line.trim_end_matches([' ', '\0']).to_string()
+            })
+            .collect()
+    })
 }
 
 /// Bytes of a number.

@@ -14,6 +14,13 @@ pub(crate) struct Variable {
     pub im: Option<Vec<f64>>,
 }
 
+/// Text of a MAT-file, a line each row.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Labels {
+    pub name: String,
+    pub rows: Vec<String>,
+}
+
 impl Variable {
     /// The name without the structs it lies in.
     pub fn own_name(&self) -> &str {
@@ -46,6 +53,12 @@ impl Variable {
         characters.next().is_some_and(|c| c.is_ascii_uppercase())
             && characters.next().is_some_and(|c| c.is_ascii_digit())
             && characters.all(|c| c.is_ascii_digit() || c == '_')
+    }
+
+    /// The channels in a name of SignalCalc: 1 and 2 of `H1_2` (2 over 1), 3 of `X3`.
+    pub fn analyser_channels(&self) -> Option<Vec<usize>> {
+        let numbers = self.own_name().get(1..).filter(|_| self.is_analyser_name())?;
+        numbers.split('_').map(|n| n.parse().ok()).collect()
     }
 
     pub fn is_called_frf(&self) -> bool {

@@ -30,7 +30,7 @@ fn frfs_are_complex_arrays_along_the_frequencies_and_find_their_coherence() {
         real("PSD_1", &[6, 1], count(6)),
         real("odd", &[3, 1], count(3)),
     ];
-    let found = contents(all, &mut Budget::for_file(0), &mut notes).unwrap();
+    let found = contents(all, &[], &mut Budget::for_file(0), &mut notes).unwrap();
     let names: Vec<&str> = found.frfs.iter().map(|f| f.name.as_str()).collect();
     assert_eq!(names, ["FRF(1,:)", "FRF(2,:)", "H_chan_2_accel"]);
     assert_eq!(found.frfs[1].value[2], Complex64::new(5.0, 0.5));
@@ -52,23 +52,35 @@ fn signals_are_real_arrays_along_the_times_or_at_a_rate() {
         real("fs", &[1, 1], vec![10.0]),
         real("fx_n", &[8, 1], count(8)),
     ];
-    let found = contents(all.clone(), &mut Budget::for_file(0), &mut Notes::default()).unwrap();
+    let found = contents(all.clone(), &[], &mut Budget::for_file(0), &mut Notes::default()).unwrap();
     assert_eq!(found.times.len(), 1);
     assert_eq!(found.times[0].sample_rate_hz, 10.0);
     assert_eq!(
         found.times[0].channels[0].role,
         crate::ingest::ChannelRole::ForceX
     );
-    let found = contents(all[1..].to_vec(), &mut Budget::for_file(0), &mut Notes::default()).unwrap();
+    let found = contents(
+        all[1..].to_vec(),
+        &[],
+        &mut Budget::for_file(0),
+        &mut Notes::default(),
+    )
+    .unwrap();
     assert_eq!((found.times[0].sample_rate_hz, found.times[0].len()), (10.0, 8));
-    let error = contents(all[2..].to_vec(), &mut Budget::for_file(0), &mut Notes::default()).unwrap_err();
+    let error = contents(
+        all[2..].to_vec(),
+        &[],
+        &mut Budget::for_file(0),
+        &mut Notes::default(),
+    )
+    .unwrap_err();
     assert!(error.problem.contains("fx_n"), "{error}");
-    assert!(contents(Vec::new(), &mut Budget::for_file(0), &mut Notes::default()).is_err());
+    assert!(contents(Vec::new(), &[], &mut Budget::for_file(0), &mut Notes::default()).is_err());
 }
 
 fn found(variables: Vec<Variable>) -> (Contents, Vec<String>) {
     let mut notes = Notes::default();
-    let found = contents(variables, &mut Budget::for_file(0), &mut notes).unwrap();
+    let found = contents(variables, &[], &mut Budget::for_file(0), &mut notes).unwrap();
     (found, notes.into_warnings())
 }
 
@@ -134,4 +146,42 @@ fn axes_of_start_and_step_of_their_own_or_in_radians() {
     );
     let parts = vec![real("H", &[5, 2], vec![1.0; 10]), real("f", &[5, 1], count(5))];
     assert_eq!(found(parts).0.frfs[0].value[0], Complex64::new(1.0, 1.0));
+}
+
+/// SignalCalc lists its channels: what is in g over N is an accelerance, and what it recorded is a force and two accelerations.
+#[test]
+fn the_list_of_channels_gives_the_units() {
+    let axis = |step: f64| (0..8).map(move |k| step * f64::from(k));
+    let table = |name: &str, step: f64| {
+        let values = axis(step).chain((0..8).map(|_| 2.0)).collect();
+        real(name, &[8, 2], values)
+    };
+    let mut frf = table("H2_5", 1.0);
+    frf.im = Some([vec![0.0; 8], vec![1.0; 8]].concat());
+    let all = vec![
+        real("ChanNum", &[3, 1], vec![2.0, 5.0, 7.0]),
+        frf,
+        table("X2", 1e-3),
+        table("X5", 1e-3),
+    ];
+    let labels = [Labels {
+        name: "Unit".into(),
+        rows: ["N", "g", "mm"].map(str::to_string).to_vec(),
+    }];
+    let read = |labels: &[Labels]| {
+        contents(
+            all.clone(),
+            labels,
+            &mut Budget::for_file(0),
+            &mut Notes::default(),
+        )
+        .unwrap()
+    };
+    let found = read(&labels);
+    assert_eq!(found.frfs[0].quantity, Some(Quantity::Accelerance));
+    assert!((found.frfs[0].value[3] - Complex64::new(2.0, 1.0) * 9.80665).norm() < 1e-9);
+    let samples: Vec<f64> = found.times[0].channels.iter().map(|c| c.samples[0]).collect();
+    assert_eq!(samples, [2.0, 2.0 * 9.80665]);
+    let unsaid = read(&[]);
+    assert_eq!((unsaid.frfs[0].quantity, unsaid.frfs[0].value[3].re), (None, 2.0));
 }

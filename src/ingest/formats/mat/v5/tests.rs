@@ -53,7 +53,7 @@ fn file(big: bool, elements: &[Vec<u8>]) -> Vec<u8> {
 
 fn read_all(bytes: &[u8]) -> (Result<Vec<Variable>, InputError>, Vec<String>) {
     let mut notes = Notes::default();
-    let found = read(bytes, &mut Budget::for_file(bytes.len()), &mut notes);
+    let found = read(bytes, &mut Budget::for_file(bytes.len()), &mut notes).map(|(variables, _)| variables);
     (found, notes.into_warnings())
 }
 
@@ -179,4 +179,25 @@ fn ends(bytes: &[u8]) -> Vec<usize> {
         ends.push(cursor.at);
     }
     ends
+}
+
+#[test]
+fn text_is_read_row_by_row() {
+    let one = [
+        array(4, false, &[2, 3], "Unit", false),
+        element(16, b"Ngm /s", false),
+    ]
+    .concat();
+    let wide: Vec<u8> = "µg".encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let two = [array(4, false, &[1, 2], "mark", false), element(17, &wide, false)].concat();
+    // One character of two.
+    let cut = [array(4, false, &[1, 2], "cut", false), element(16, b"a", false)].concat();
+    let all = [one, two, cut].map(|text| element(MATRIX, &text, false));
+    let bytes = file(false, &[real("n", &[1.0, 2.0], false), all.concat()]);
+    let (_, labels) = read(&bytes, &mut Budget::for_file(bytes.len()), &mut Notes::default()).unwrap();
+    let rows: Vec<&[String]> = labels.iter().map(|l| l.rows.as_slice()).collect();
+    assert_eq!(
+        rows,
+        [&["Nm/".to_string(), "g s".to_string()][..], &["µg".to_string()]]
+    );
 }

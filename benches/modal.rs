@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use criterion::{Criterion, criterion_group};
 use lobestone::analysis::ModalAnalysis;
-use lobestone::analysis::modes::modal::FrfInput;
-use lobestone::modal::{Settings, TapSettings};
+use lobestone::analysis::modes::modal::{FileReading, FrfInput};
+use lobestone::modal::Settings;
 use num_complex::Complex64;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -89,7 +89,7 @@ fn seconds_of_files(files: &[String]) -> lobestone::Result<Vec<f64>> {
     let sets: Vec<Vec<FrfInput>> = files
         .iter()
         .map(|file| {
-            let analysis = ModalAnalysis::of_files(&[file], false, &settings(), &TapSettings::default())?;
+            let analysis = ModalAnalysis::of_files(&[file], false, &FileReading::default(), &settings())?;
             let frfs = analysis.sets.into_iter().flat_map(|set| set.frfs);
             Ok(frfs.map(|frf| frf.input).collect())
         })

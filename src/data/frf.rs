@@ -6,10 +6,12 @@ use serde::Serialize;
 use super::dof::Dof;
 
 /// What an FRF's response is: displacement, velocity or acceleration per newton.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Quantity {
     /// Displacement per force, m/N.
+    #[default]
     Receptance,
     /// Velocity per force, (m/s)/N.
     Mobility,

@@ -101,6 +101,31 @@ fn a_band_leaves_out_the_modes_outside_and_conjugated_phase_is_said() {
     );
 }
 
+/// The same FRF as accelerance, mobility and receptance, in files that do not say which.
+#[test]
+fn what_files_do_not_say_can_be_said() {
+    let dir = tempfile::tempdir().unwrap();
+    for (power, quantity) in ["receptance", "mobility", "accelerance"].into_iter().enumerate() {
+        let mut text = String::new();
+        for k in 0..=570 {
+            let w = TAU * (3.0 + 0.1 * f64::from(k));
+            let w0 = TAU * 12.34;
+            let h = 0.01 / Complex64::new(w0 * w0 - w * w, 0.06 * w0 * w)
+                * Complex64::new(0.0, w).powi(power as i32);
+            writeln!(text, "{:.1},{:e},{:e}", w / TAU, h.re, h.im).unwrap();
+        }
+        let file = dir.path().join(format!("{quantity}.csv"));
+        std::fs::write(&file, text).unwrap();
+        let document = json_of(&[file.to_str().unwrap(), "--quantity", quantity]);
+        let constant = &document["frfs"][0]["modes"][0]["modal_constant"];
+        let [re, im] = [0, 1].map(|k| constant[k].as_f64().unwrap());
+        assert!(
+            (re - 0.01).abs() < 1e-4 && im.abs() < 1e-4,
+            "{quantity}: {re} {im}"
+        );
+    }
+}
+
 #[test]
 fn a_band_that_is_none_is_wrong_usage() {
     let run = program()

@@ -11,10 +11,22 @@ use crate::ingest::{self, Channel, FrfRecord, Quantity, TimeRecord};
 use crate::modal::{self, Hit, TapRecord, TapSettings};
 use crate::{Error, InputError, Result};
 
+/// How files are read that do not say all of it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FileReading {
+    /// What FRFs are where their file does not say.
+    pub unsaid: Quantity,
+    /// FRF files were measured with an exponential window e^(−decay t) on the responses (and the force): what it added to the damping
+    /// is taken out. 1/s.
+    pub added_decay_per_s: f64,
+    /// How FRFs are made of the hits of a raw record.
+    pub taps: TapSettings,
+}
+
 /// FRFs of one file: as they stand there, or from the hits of a raw record.
 pub(crate) fn read(
     path: &Path,
-    taps: &TapSettings,
+    reading: &FileReading,
     hits: &mut Vec<(String, Vec<Hit>)>,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<FrfInput>> {
@@ -25,14 +37,18 @@ pub(crate) fn read(
         let unsaid = file.contents.frfs.iter().filter(|r| r.quantity.is_none()).count();
         if unsaid > 0 {
             warnings.push(format!(
-                "{set}: the file does not say what its {unsaid} FRFs are; taken as receptance (m/N)"
+                "{set}: the file does not say what its {unsaid} FRFs are; taken as {} (another: --quantity)",
+                units::frf_unit(reading.unsaid)
             ));
         }
         return Ok(file
             .contents
             .frfs
             .into_iter()
-            .map(|r| frf_input(&set, r))
+            .map(|mut record| {
+                record.quantity.get_or_insert(reading.unsaid);
+                frf_input(&set, record)
+            })
             .collect());
     }
     if file.contents.times.is_empty() {
@@ -47,7 +63,7 @@ pub(crate) fn read(
     }
     let mut inputs = Vec::new();
     for alike in file.contents.times.chunk_by(TimeRecord::same_channels) {
-        inputs.extend(from_segments(&set, path, alike, taps, hits, warnings)?);
+        inputs.extend(from_segments(&set, path, alike, &reading.taps, hits, warnings)?);
     }
     Ok(inputs)
 }

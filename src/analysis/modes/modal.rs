@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+pub use crate::analysis::modes::frf_inputs::FileReading;
 use crate::analysis::modes::frf_inputs::read;
 pub use crate::analysis::modes::mode_set::{AnalysedFrf, FrfInput, SetModes};
 use crate::analysis::modes::mode_set::{analyse_set, dofs_of_frfs, set_warnings};
@@ -14,7 +15,7 @@ use crate::campaign::{Campaign, MeasuredDof, Point};
 use crate::modal::chosen::Choice;
 use crate::modal::quality::SetQuality;
 use crate::modal::tracking::{self, Track};
-use crate::modal::{Hit, Method, Settings, TapSettings};
+use crate::modal::{Hit, Method, Settings};
 use crate::{Error, InputError, Result};
 
 /// Name of the set that files together make.
@@ -86,33 +87,19 @@ impl ModalAnalysis {
     pub fn of_files(
         files: &[impl AsRef<Path>],
         together: bool,
+        reading: &FileReading,
         settings: &Settings,
-        taps: &TapSettings,
-    ) -> Result<Self> {
-        Self::of_windowed_files(files, together, 0.0, settings, taps)
-    }
-
-    /// As [`ModalAnalysis::of_files`] for FRF files measured with an exponential window e^(−decay t) on the responses (and
-    /// the force): what it added to the damping is taken out.
-    ///
-    /// # Errors
-    /// As [`ModalAnalysis::of_files`].
-    pub fn of_windowed_files(
-        files: &[impl AsRef<Path>],
-        together: bool,
-        decay_per_s: f64,
-        settings: &Settings,
-        taps: &TapSettings,
     ) -> Result<Self> {
         let mut inputs = Vec::new();
         let mut warnings = Vec::new();
         let mut hits = Vec::new();
         for file in files {
             let before = hits.len();
-            let mut of_file = read(file.as_ref(), taps, &mut hits, &mut warnings)?;
+            let mut of_file = read(file.as_ref(), reading, &mut hits, &mut warnings)?;
             // A raw record has its window from here, not from the analyser.
-            if decay_per_s > 0.0 && hits.len() == before {
-                of_file.iter_mut().for_each(|i| i.added_decay_per_s = decay_per_s);
+            if reading.added_decay_per_s > 0.0 && hits.len() == before {
+                let decay = reading.added_decay_per_s;
+                of_file.iter_mut().for_each(|i| i.added_decay_per_s = decay);
             }
             inputs.extend(of_file);
         }

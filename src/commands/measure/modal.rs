@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 use serde_json::json;
 
+use crate::analysis::modes::modal::FileReading;
 use crate::analysis::modes::operational;
 use crate::analysis::{ModalAnalysis, SetModes};
 use crate::campaign::Campaign;
@@ -13,6 +14,7 @@ use crate::commands::Outcome;
 use crate::commands::measure::modal_files::Files;
 use crate::commands::next_step::{self, Guide};
 use crate::commands::text::{Emphasis, said_once, table};
+use crate::data::Quantity;
 use crate::modal::chosen::Choice;
 use crate::modal::operational::OperationalSettings;
 use crate::modal::{Estimator, FrfMode, Method, Settings, TapSettings, Tolerances};
@@ -29,6 +31,14 @@ pub struct ModalArgs {
     /// The files are one set: FRFs of the same structure, exported one by one.
     #[arg(long)]
     together: bool,
+    /// What the FRFs are of files that do not say.
+    #[arg(
+        long,
+        value_enum,
+        default_value = "receptance",
+        conflicts_with = "output_only"
+    )]
+    quantity: Quantity,
     /// Print the modes of every single FRF, however many there are.
     #[arg(long)]
     each: bool,
@@ -193,13 +203,12 @@ pub fn run(args: ModalArgs) -> Result<Outcome> {
             );
         }
         files => {
-            let analysis = ModalAnalysis::of_windowed_files(
-                files,
-                args.together,
-                args.window_tau.map_or(0.0, |tau| 1.0 / tau),
-                &settings,
-                &taps,
-            )?;
+            let reading = FileReading {
+                unsaid: args.quantity,
+                added_decay_per_s: args.window_tau.map_or(0.0, |tau| 1.0 / tau),
+                taps,
+            };
+            let analysis = ModalAnalysis::of_files(files, args.together, &reading, &settings)?;
             let paths: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
             let next = next_step::modes_of_files(&paths, analysis.mode_count());
             (analysis, next)

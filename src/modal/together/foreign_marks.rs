@@ -183,7 +183,7 @@ fn phases_by_chance_next_to_a_mode_are_none_unless_all_have_them() {
     for seed in 1..4 {
         let one = Test {
             turned: vec![4],
-            responses: 15,
+            responses: 40,
             ..Test::of(&eight)
         };
         let found = one.found(seed);

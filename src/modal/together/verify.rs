@@ -27,7 +27,7 @@ const DOMINANT: f64 = 0.5;
 /// … unless they are those of chance next to a stronger one, where the modes of the set have common ones, more than so many.
 const BY_CHANCE: f64 = 0.25;
 const OTHERS: usize = 3;
-/// … or where it makes so many times what was measured there: its neighbours take away what it adds.
+/// … or where, alone, it makes so many times what was measured there: what is far away takes away what it adds.
 const CANCELLED: f64 = 2.0;
 /// Less of what was measured in its band than this (0.3 % of the amplitude) is beyond what a test can show, however little the noise
 /// is: what a file rounds, or a little of what every model lacks.
@@ -70,8 +70,9 @@ pub(crate) fn verified(
     for _ in 0..MAX_ROUNDS {
         let mut kept: Vec<Pole> = Vec::new();
         let mut out = false;
+        let common = common_phase(&data, &groups);
         for group in &groups {
-            let pairs = close_pairs(&data, group);
+            let pairs = close_pairs(&data, group, common);
             let poles = &group.solution.poles;
             let mut doubtful: Vec<(usize, f64, String)> = Vec::new();
             let mut leaves: Vec<Option<String>> = vec![None; poles.len()];
@@ -198,15 +199,22 @@ pub(super) fn parts_of_others(data: &[Data], groups: &[Group]) -> Vec<(usize, us
     let mut found = Vec::new();
     for (g, group) in groups.iter().enumerate() {
         let poles = &group.solution.poles;
-        for j in 0..poles.len() {
-            let candidate = Candidate::new(data, group, j);
-            let beside_a_stronger = |k: usize| {
-                k != j
-                    && neighbours(data, poles[j], poles[k])
-                    && Candidate::new(data, group, k).height() > candidate.height()
+        let all: Vec<Candidate> = (0..poles.len()).map(|j| Candidate::new(data, group, j)).collect();
+        for (j, candidate) in all.iter().enumerate().filter(|(_, c)| c.mpc() < BY_CHANCE) {
+            let mut beside = (0..poles.len())
+                .filter(|&k| k != j && neighbours(data, poles[j], poles[k]))
+                .peekable();
+            let wide = poles[j].damping_ratio * poles[j].frequency_hz
+                > joint_fit::line_hz(data, poles[j].frequency_hz);
+            let cancelled = wide && candidate.local.mode > CANCELLED * candidate.local.measured;
+            let is_part = match beside.peek() {
+                // Of two that have no phases both it cannot be told which is the mode.
+                Some(_) => beside.any(|k| {
+                    all[k].height() > candidate.height() && all[k].mpc() > candidate.mpc() + BY_CHANCE
+                }),
+                None => cancelled,
             };
-            let cancelled = candidate.local.mode > CANCELLED * candidate.local.measured;
-            if candidate.mpc() < BY_CHANCE && (cancelled || (0..poles.len()).any(beside_a_stronger)) {
+            if is_part {
                 found.push((g, j));
             }
         }
@@ -342,8 +350,8 @@ struct ClosePair {
 }
 
 /// The pairs of a group that are one mode: because its frequency moves from FRF to FRF, or because the shapes repeat. No
-/// pole is in two of them.
-fn close_pairs(data: &[Data], group: &Group) -> Vec<ClosePair> {
+/// pole is in two of them. `common`: the modes of the set have common phases.
+fn close_pairs(data: &[Data], group: &Group, common: bool) -> Vec<ClosePair> {
     let solution = &group.solution;
     let mut order: Vec<usize> = (0..solution.poles.len()).collect();
     order.sort_by(|&a, &b| {
@@ -354,7 +362,7 @@ fn close_pairs(data: &[Data], group: &Group) -> Vec<ClosePair> {
     let mut found = Vec::new();
     let mut k = 1;
     while k < order.len() {
-        match close_pair(data, solution, [order[k - 1], order[k]]) {
+        match close_pair(data, solution, [order[k - 1], order[k]], common) {
             Some(pair) => {
                 found.push(pair);
                 k += 2;
@@ -365,7 +373,7 @@ fn close_pairs(data: &[Data], group: &Group) -> Vec<ClosePair> {
     found
 }
 
-fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2]) -> Option<ClosePair> {
+fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2], common: bool) -> Option<ClosePair> {
     let [a, b] = both.map(|j| solution.poles[j]);
     let width = a.damping_ratio * a.frequency_hz + b.damping_ratio * b.frequency_hz;
     let line_hz = joint_fit::line_hz(data, a.frequency_hz);
@@ -402,15 +410,13 @@ fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2]) -> Option<Cl
             ),
         });
     }
-    let out_of_phase = || {
-        residues
-            .iter()
-            .any(|r| shape::complexity(r).is_some_and(|c| c.mpc < IN_PHASE))
-    };
+    let out_of_phase = |r: &Vec<Complex64>| shape::complexity(r).is_some_and(|c| c.mpc < IN_PHASE);
     let enough = residues[0].len() >= ENOUGH_FRFS;
     let leaks = width < COARSE_LINES * line_hz && b.frequency_hz - a.frequency_hz < reach;
     let same_place = b.frequency_hz - a.frequency_hz < SAME * width || leaks;
-    let cancel = enough && same_place && out_of_phase();
+    // Two modes as near as that have common phases both, if the others of the set have.
+    let cancel = enough
+        && (same_place && residues.iter().any(out_of_phase) || common && residues.iter().all(out_of_phase));
     if cancel {
         return Some(ClosePair {
             strong,

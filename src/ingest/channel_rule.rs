@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use super::contents::Digest;
+use super::decode::read_bytes_at;
 use super::read::{self, TimeFile, no_such, read_file};
 use super::text::{Notes, without_byte_order_mark};
 use super::units::{self, Dimension, Unit};
@@ -127,15 +128,17 @@ pub fn read_time_with(path: &Path, rules: &[ChannelRule]) -> Result<TimeFile> {
     }
     let (times, mut warnings, digest) = match read_file(path) {
         Ok(file) if !file.contents.times.is_empty() => (file.contents.times, file.warnings, file.digest),
-        other => match plain_table(path, rules)? {
-            Some(found) => found,
-            None => match other {
-                Ok(file) => {
-                    return Err(no_such(&file, "time signal", "give a file with force signals"));
-                }
-                Err(error) => return Err(error),
-            },
-        },
+        other => {
+            match with_rate(path, rules)?.map_or_else(|| plain_table(path, rules), |found| Ok(Some(found)))? {
+                Some(found) => found,
+                None => match other {
+                    Ok(file) => {
+                        return Err(no_such(&file, "time signal", "give a file with force signals"));
+                    }
+                    Err(error) => return Err(error),
+                },
+            }
+        }
     };
     let forces: Vec<&ChannelRule> = rules
         .iter()
@@ -281,6 +284,22 @@ fn apply(record: &mut TimeRecord, rules: &[&ChannelRule]) -> std::result::Result
 
 /// Records, warnings, and what identifies the file.
 type PlainTable = (Vec<TimeRecord>, Vec<String>, Digest);
+
+/// A binary file that holds signals and no rate, with the rate that a rule gives.
+fn with_rate(path: &Path, rules: &[ChannelRule]) -> Result<Option<PlainTable>> {
+    let Some(rate) = rules.iter().find_map(|r| r.rate_hz) else {
+        return Ok(None);
+    };
+    regular_file(path)?;
+    let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
+    if !bytes.iter().take(8192).any(|b| *b == 0) {
+        return Ok(None);
+    }
+    let mut notes = Notes::default();
+    let (_, _, contents) =
+        read_bytes_at(&bytes, false, Some(rate), &mut notes).map_err(|e| Error::from(e.file(path)))?;
+    Ok((!contents.times.is_empty()).then(|| (contents.times, notes.into_warnings(), Digest::of(&bytes))))
+}
 
 /// A table of text that has no names, or no time: columns are named as the rules name them.
 fn plain_table(path: &Path, rules: &[ChannelRule]) -> Result<Option<PlainTable>> {

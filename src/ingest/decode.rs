@@ -9,7 +9,7 @@ use super::text::{self, Notes};
 use super::{checks, dof_names};
 use crate::InputError;
 use crate::data::FrfRecord;
-use crate::ingest::formats::{force, frf_text, lvm, mat, tdms, uff};
+use crate::ingest::formats::{force, frf_text, lvm, mat, numpy, tdms, uff, workbook};
 use crate::ingest::tables::{channel_names, stamps};
 
 /// Where a file holds one FRF that does not say where it was measured, its name may.
@@ -64,6 +64,12 @@ fn read_as_it_is(
     notes: &mut Notes,
 ) -> std::result::Result<(Format, String, Contents), InputError> {
     let bytes = &*text::without_byte_order_mark(bytes);
+    let sheet = workbook::first_sheet(bytes)?;
+    if let Some((_, told)) = &sheet {
+        notes.file("from a workbook");
+        told.iter().for_each(|told| notes.file(told));
+    }
+    let bytes = sheet.as_ref().map_or(bytes, |(text, _)| text.as_bytes());
     let mut seconds = None;
     let found = detect::detect(bytes, is_dwd_named).or_else(|problem| {
         // Rows that begin with a clock are no table of numbers yet.
@@ -90,6 +96,10 @@ fn read_as_it_is(
         Detected::Mat4 => (format, why, mat::read_v4(bytes, rate_hz, &mut budget, notes)?),
         Detected::Mat5 => (format, why, mat::read_v5(bytes, rate_hz, &mut budget, notes)?),
         Detected::Mat73 => (format, why, mat::read_v73(bytes, rate_hz, &mut budget, notes)?),
+        Detected::Numpy => {
+            let arrays = numpy::read(bytes, &mut budget, notes)?;
+            (format, why, mat::of_arrays(arrays, rate_hz, &mut budget, notes)?)
+        }
         Detected::Universal => {
             let (summary, contents) = uff::contents(bytes, notes)?;
             let skipped: Vec<String> = summary.skipped.iter().map(u32::to_string).collect();

@@ -529,7 +529,11 @@ fn records_are_read_as_other_recorders_write_them() {
             let values = [0, 1, 2].map(|k| format!("{:.3}", 10.0 * (k + 1) as f64 + 0.5 * i as f64));
             let fields: Vec<String> = time.map(|f| f(t)).into_iter().chain(values).collect();
             let line = fields.join(separator);
-            if comma { line.replace('.', ",") + "\n" } else { line + "\n" }
+            if comma {
+                line.replace('.', ",") + "\n"
+            } else {
+                line + "\n"
+            }
         };
         (0..40).map(row).collect()
     };
@@ -575,10 +579,23 @@ fn records_are_read_as_other_recorders_write_them() {
     ];
     for (what, text) in files {
         let (record, warnings) = time(&text);
-        assert!((record.sample_rate_hz / 2000.0 - 1.0).abs() < 1e-6, "{what}: {}", record.sample_rate_hz);
-        for (k, role) in [ChannelRole::ForceX, ChannelRole::ForceY, ChannelRole::ForceZ].into_iter().enumerate() {
-            let channel = record.channel(role).unwrap_or_else(|| panic!("{what}: no {role:?}: {warnings:?}"));
-            assert_eq!((channel.samples[0], channel.samples[39]), (10.0 * (k + 1) as f64, 10.0 * (k + 1) as f64 + 19.5), "{what}");
+        assert!(
+            (record.sample_rate_hz / 2000.0 - 1.0).abs() < 1e-6,
+            "{what}: {}",
+            record.sample_rate_hz
+        );
+        for (k, role) in [ChannelRole::ForceX, ChannelRole::ForceY, ChannelRole::ForceZ]
+            .into_iter()
+            .enumerate()
+        {
+            let channel = record
+                .channel(role)
+                .unwrap_or_else(|| panic!("{what}: no {role:?}: {warnings:?}"));
+            assert_eq!(
+                (channel.samples[0], channel.samples[39]),
+                (10.0 * (k + 1) as f64, 10.0 * (k + 1) as f64 + 19.5),
+                "{what}"
+            );
         }
     }
 }
@@ -591,5 +608,8 @@ fn of_several_cycles_the_first_is_read_and_it_is_told() {
     );
     let (record, warnings) = time(text);
     assert_eq!(record.len(), 4);
-    assert!(warnings[0].contains("2 cycles in one file: the first is read"), "{warnings:?}");
+    assert!(
+        warnings[0].contains("2 cycles in one file: the first is read"),
+        "{warnings:?}"
+    );
 }

@@ -280,7 +280,7 @@ mod tests {
         for (start, exit) in [(0.0, 180.0), (0.0, 90.0), (110.0, 180.0)] {
             for teeth in 4..=6 {
                 let cut = cut(teeth, start, exit);
-                for d in [0.02, 0.05, 0.09] {
+                for d in [0.03, 0.05, 0.09] {
                     let mut radii = vec![0.0; teeth];
                     radii[1] = -d;
                     let found =

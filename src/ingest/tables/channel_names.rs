@@ -55,7 +55,7 @@ const MOMENT_WORDS: [&str; 9] = [
     "扭矩",
 ];
 /// What a channel with a force's name is not the force itself for.
-const NO_FORCE: [&str; 20] = [
+const NO_FORCE: [&str; 29] = [
     "max",
     "min",
     "mean",
@@ -76,6 +76,15 @@ const NO_FORCE: [&str; 20] = [
     "hammer",
     "impact",
     "fft",
+    "sim",
+    "simulated",
+    "model",
+    "pred",
+    "predicted",
+    "calc",
+    "cmd",
+    "command",
+    "psd",
 ];
 
 /// Name and unit of `Fx [N]`, `Fx (N)`, `fx_n`, `Fx`.
@@ -347,6 +356,7 @@ mod tests {
             "Force",
             "x",
             "Fx12",
+            "f_x_sim",
             "m",
             "temperature",
             "F1",

@@ -110,6 +110,13 @@ fn stamp(text: &str) -> Option<Stamp> {
     })
 }
 
+/// Digits behind the seconds of a clock.
+fn places(clock: &str) -> usize {
+    let seconds = clock.rsplit(':').next().unwrap_or_default();
+    let fraction = seconds.split(['.', ',']).nth(1).unwrap_or_default();
+    fraction.bytes().take_while(u8::is_ascii_digit).count()
+}
+
 /// How many fields of a row are its time (date and clock may stand apart), and that time; `None` for no such row.
 fn stamped(line: &str, delimiter: char) -> Option<(usize, i128)> {
     let mut fields = line.split(delimiter);
@@ -163,6 +170,8 @@ pub(crate) fn as_seconds(bytes: &[u8]) -> Option<(Vec<u8>, String)> {
         out.push_str(line);
         out.push('\n');
     }
+    // As many digits as the clock has: what comes after tells from them how the times were rounded.
+    let places = row.split(delimiter).nth(width - 1).map_or(0, places).min(9);
     let mut days = 0;
     let mut before = first;
     for line in Lines::new(&bytes[at..]) {
@@ -184,12 +193,11 @@ pub(crate) fn as_seconds(bytes: &[u8]) -> Option<(Vec<u8>, String)> {
         before = time;
         let since = time - first;
         let sign = if since < 0 { "-" } else { "" };
-        let _ = write!(
-            out,
-            "{sign}{}{point}{:09}",
-            since.abs() / NANOSECONDS,
-            since.abs() % NANOSECONDS
-        );
+        let _ = write!(out, "{sign}{}", since.abs() / NANOSECONDS);
+        if places > 0 {
+            let fraction = since.abs() % NANOSECONDS / 10_i128.pow(9 - places as u32);
+            let _ = write!(out, "{point}{fraction:0places$}");
+        }
         for field in text.split(delimiter).skip(width) {
             out.push(delimiter);
             out.push_str(field);
@@ -212,16 +220,13 @@ mod tests {
         let iso = of(
             "time;fx\n2024-03-12T23:59:59.9995;1.5\n2024-03-13T00:00:00.0000;2.5\n2024-03-13T00:00:00.0005;3\n",
         );
-        assert_eq!(iso, "time;fx\n0.000000000;1.5\n0.000500000;2.5\n0.001000000;3\n");
+        assert_eq!(iso, "time;fx\n0.0000;1.5\n0.0005;2.5\n0.0010;3\n");
         let apart = of(
             "Date,Time,Fx\n12.03.2024,10:11:12.25,1\n12.03.2024,10:11:12.50,2\n12.03.2024,10:11:12.75,3\n",
         );
-        assert_eq!(apart, "Time,Fx\n0.000000000,1\n0.250000000,2\n0.500000000,3\n");
+        assert_eq!(apart, "Time,Fx\n0.00,1\n0.25,2\n0.50,3\n");
         let clock = of("t\tFx\n11:59:59 PM\t1.0\n12:00:00 AM\t2.0\n12:00:01 AM\t3.0\n");
-        assert_eq!(
-            clock,
-            "t\tFx\n0.000000000\t1.0\n1.000000000\t2.0\n2.000000000\t3.0\n"
-        );
+        assert_eq!(clock, "t\tFx\n0\t1.0\n1\t2.0\n2\t3.0\n");
         assert!(as_seconds(b"time,fx\n0.1,2\n0.2,3\n0.3,4\n").is_none());
         assert!(as_seconds(b"2024-03-12 10:11,abc\n").is_none());
     }

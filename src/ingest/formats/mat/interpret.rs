@@ -27,8 +27,10 @@ pub(crate) fn contents(
     notes: &mut Notes,
 ) -> Result<Contents, InputError> {
     if variables.is_empty() {
-        return Err(InputError::new("a MAT-file without numeric arrays")
-            .remedy("save the frequency axis f (Hz) or the times t (s) and the data as plain arrays"));
+        return Err(
+            InputError::new("a file of arrays (MATLAB, HDF5, NumPy) without one of numbers")
+                .remedy("save the frequency axis f (Hz) or the times t (s) and the data as plain arrays"),
+        );
     }
     let mut used = vec![false; variables.len()];
     let mut contents = Contents::default();
@@ -39,7 +41,7 @@ pub(crate) fn contents(
     contents.times.append(&mut times);
     if contents.frfs.is_empty() && contents.times.is_empty() && contents.others.is_empty() {
         return Err(InputError::new(format!(
-            "a MAT-file in which no FRF and no time signal is recognised ({})",
+            "arrays in which no FRF and no time signal is recognised ({})",
             names(variables.iter())
         ))
         .remedy(

@@ -4,7 +4,6 @@
 use crate::InputError;
 use crate::ingest::budget::Budget;
 use crate::ingest::contents::Contents;
-use crate::ingest::formats::mat::variable::Variable;
 use crate::ingest::text::Notes;
 
 mod hdf5;
@@ -14,6 +13,7 @@ mod v5;
 mod variable;
 mod write;
 
+pub(crate) use variable::Variable;
 pub use write::{MatArray, mat5_bytes};
 
 pub(crate) fn looks_like_v5(bytes: &[u8]) -> bool {
@@ -56,6 +56,16 @@ pub(crate) fn read_v73(
     notes: &mut Notes,
 ) -> Result<Contents, InputError> {
     let variables = crate::ingest::formats::mat::hdf5::read(bytes, budget, notes)?;
+    interpret::contents(with_rate(variables, rate_hz), budget, notes)
+}
+
+/// Named arrays of another format, taken as those of a MAT-file.
+pub(crate) fn of_arrays(
+    variables: Vec<Variable>,
+    rate_hz: Option<f64>,
+    budget: &mut Budget,
+    notes: &mut Notes,
+) -> Result<Contents, InputError> {
     interpret::contents(with_rate(variables, rate_hz), budget, notes)
 }
 

@@ -316,9 +316,12 @@ fn may_be_forces(columns: &[PlainColumn]) -> bool {
     (2..=MOST_SIGNALS).contains(&signals.len()) && is_record && signals.iter().all(|c| !c.rises)
 }
 
+/// A file, what its channels are and how they are called, and why it was not understood.
+type TimelessForce = (FoundForce, Vec<(&'static str, String)>, String);
+
 /// Files whose forces have names and no times are the folder's force records where no other says its times and all have the
 /// same channels: the sampling rate is asked once.
-fn take_timeless(scan: &mut Scan, timeless: Vec<(FoundForce, Vec<(&'static str, String)>, String)>) {
+fn take_timeless(scan: &mut Scan, timeless: Vec<TimelessForce>) {
     let alike = timeless.iter().all(|(_, channels, _)| *channels == timeless[0].1);
     for (force, channels, why) in timeless {
         if alike && (scan.forces.is_empty() || !scan.timeless.is_empty()) {

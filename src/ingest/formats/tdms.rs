@@ -711,8 +711,11 @@ mod tests {
         }
     }
 
+    /// Name, raw data index and properties.
+    type Written<'n> = (&'n str, Vec<u8>, Vec<(&'n str, Property)>);
+
     /// Objects of one group with their raw data indices and properties, by the specification.
-    fn written(objects: &[(&str, Vec<u8>, Vec<(&str, Property)>)], raw: &[u8]) -> Vec<u8> {
+    fn written(objects: &[Written], raw: &[u8]) -> Vec<u8> {
         let text = |t: &str| [(t.len() as u32).to_le_bytes().to_vec(), t.as_bytes().to_vec()].concat();
         let mut meta = (objects.len() as u32).to_le_bytes().to_vec();
         for (name, index, properties) in objects {

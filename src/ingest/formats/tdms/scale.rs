@@ -22,18 +22,18 @@ const MOST: usize = 4096;
 
 /// One scale.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Scale {
+pub(super) enum RawScale {
     /// Constant first.
     Polynomial(Vec<f64>),
     /// Raw values, rising, and what they mean; straight between them.
     Table(Vec<(f64, f64)>),
 }
 
-impl Scale {
+impl RawScale {
     fn value(&self, x: f64) -> f64 {
         match self {
-            Scale::Polynomial(coefficients) => coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c),
-            Scale::Table(points) => {
+            RawScale::Polynomial(coefficients) => coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c),
+            RawScale::Table(points) => {
                 let at = points.partition_point(|p| p.0 < x);
                 match (points.get(at.wrapping_sub(1)), points.get(at)) {
                     (Some(a), Some(b)) => a.1 + (b.1 - a.1) * (x - a.0) / (b.0 - a.0),
@@ -46,7 +46,7 @@ impl Scale {
 }
 
 /// Applies scales one after another.
-pub(super) fn apply(scales: &[Scale], values: &mut [f64]) {
+pub(super) fn apply(scales: &[RawScale], values: &mut [f64]) {
     for value in values {
         *value = scales.iter().fold(*value, |x, scale| scale.value(x));
     }
@@ -57,7 +57,7 @@ pub(super) fn apply(scales: &[Scale], values: &mut [f64]) {
 ///
 /// # Errors
 /// The kind of a scale that is not known here.
-pub(super) fn scales(properties: &Properties) -> Result<Vec<Scale>, String> {
+pub(super) fn scales(properties: &Properties) -> Result<Vec<RawScale>, String> {
     let number = |key: &str| match properties.get(key) {
         Some(Property::Number(value)) if value.is_finite() => Some(*value),
         _ => None,
@@ -94,11 +94,11 @@ pub(super) fn scales(properties: &Properties) -> Result<Vec<Scale>, String> {
                 let (Some(intercept), Some(slope)) = (of("Y_Intercept"), of("Slope")) else {
                     return Err(damaged());
                 };
-                chain.push(Scale::Polynomial(vec![intercept, slope]));
+                chain.push(RawScale::Polynomial(vec![intercept, slope]));
             }
             "Polynomial" => {
                 let length = of("Coefficients_Size").unwrap_or(4.0);
-                chain.push(Scale::Polynomial(
+                chain.push(RawScale::Polynomial(
                     list("Coefficients", length).ok_or_else(damaged)?,
                 ));
             }
@@ -111,7 +111,7 @@ pub(super) fn scales(properties: &Properties) -> Result<Vec<Scale>, String> {
                 if points.is_empty() || points.windows(2).any(|w| w[0].0 == w[1].0) {
                     return Err(damaged());
                 }
-                chain.push(Scale::Table(points));
+                chain.push(RawScale::Table(points));
             }
             // Without numbers of its own.
             "AdvancedAPI" => {}
@@ -174,7 +174,7 @@ mod tests {
 
     #[test]
     fn a_table_is_straight_between_its_points() {
-        let table = Scale::Table(vec![(0.0, 0.0), (1.0, 10.0), (3.0, 20.0)]);
+        let table = RawScale::Table(vec![(0.0, 0.0), (1.0, 10.0), (3.0, 20.0)]);
         assert_eq!(
             [-1.0, 0.5, 2.0, 9.0].map(|x| table.value(x)),
             [0.0, 5.0, 15.0, 20.0]

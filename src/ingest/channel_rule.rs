@@ -4,10 +4,11 @@
 use std::path::Path;
 
 use super::contents::Digest;
+use super::decode::read_bytes_at;
 use super::read::{self, TimeFile, no_such, read_file};
 use super::text::{Notes, without_byte_order_mark};
 use super::units::{self, Dimension, Unit};
-use crate::data::{ChannelRole, TimeRecord};
+use crate::data::{Channel, ChannelRole, TimeRecord};
 use crate::files::regular_file;
 use crate::ingest::formats::force;
 use crate::ingest::tables::table::Header;
@@ -125,18 +126,21 @@ pub fn read_time_with(path: &Path, rules: &[ChannelRule]) -> Result<TimeFile> {
     if rules.is_empty() {
         return read::read_time_file(path);
     }
-    let (times, mut warnings, digest) = match read_file(path) {
+    let (mut times, mut warnings, digest) = match read_file(path) {
         Ok(file) if !file.contents.times.is_empty() => (file.contents.times, file.warnings, file.digest),
-        other => match plain_table(path, rules)? {
-            Some(found) => found,
-            None => match other {
-                Ok(file) => {
-                    return Err(no_such(&file, "time signal", "give a file with force signals"));
-                }
-                Err(error) => return Err(error),
-            },
-        },
+        other => {
+            match with_rate(path, rules)?.map_or_else(|| plain_table(path, rules), |found| Ok(Some(found)))? {
+                Some(found) => found,
+                None => match other {
+                    Ok(file) => {
+                        return Err(no_such(&file, "time signal", "give a file with force signals"));
+                    }
+                    Err(error) => return Err(error),
+                },
+            }
+        }
     };
+    warnings.extend(stated_rate(path, rules, &mut times)?);
     let forces: Vec<&ChannelRule> = rules
         .iter()
         .filter(|r| matches!(r.measures, Measures::Force(_)))
@@ -168,6 +172,37 @@ pub fn read_time_with(path: &Path, rules: &[ChannelRule]) -> Result<TimeFile> {
         warnings,
         digest,
     })
+}
+
+/// Where a rule gives a rate that is not the file's, the rule counts, and it is told: a time column may count samples, or
+/// milliseconds without saying so.
+fn stated_rate(path: &Path, rules: &[ChannelRule], times: &mut Vec<TimeRecord>) -> Result<Option<String>> {
+    /// Parts by which rates may differ.
+    const ALIKE: f64 = 1e-3;
+    let Some(rate) = rules.iter().find_map(|r| r.rate_hz) else {
+        return Ok(None);
+    };
+    let differs = |record: &TimeRecord| (record.sample_rate_hz / rate - 1.0).abs() > ALIKE;
+    if rules.iter().any(|r| r.measures == Measures::Time) || !times.iter().any(differs) {
+        return Ok(None);
+    }
+    let own = times
+        .iter()
+        .find(|t| differs(t))
+        .map_or(rate, |t| t.sample_rate_hz);
+    match plain_table(path, rules)? {
+        // Read again, for uneven times may have moved the samples.
+        Some((again, _, _)) => *times = again,
+        None => {
+            for record in times.iter_mut() {
+                (record.sample_rate_hz, record.start_s) = (rate, 0.0);
+            }
+        }
+    }
+    Ok(Some(format!(
+        "the file's own times give {} Hz, the campaign's [[channel]] {rate} Hz: that of the campaign is taken, time from 0 s",
+        units::figures(own, 6)
+    )))
 }
 
 fn source_text(source: &Source) -> String {
@@ -282,6 +317,67 @@ fn apply(record: &mut TimeRecord, rules: &[&ChannelRule]) -> std::result::Result
 /// Records, warnings, and what identifies the file.
 type PlainTable = (Vec<TimeRecord>, Vec<String>, Digest);
 
+/// A binary file that holds signals and no rate, with the rate that a rule gives.
+fn with_rate(path: &Path, rules: &[ChannelRule]) -> Result<Option<PlainTable>> {
+    let Some(rate) = rules.iter().find_map(|r| r.rate_hz) else {
+        return Ok(None);
+    };
+    regular_file(path)?;
+    let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
+    if !bytes.iter().take(8192).any(|b| *b == 0) {
+        return Ok(None);
+    }
+    let mut notes = Notes::default();
+    let (_, _, contents) =
+        read_bytes_at(&bytes, false, Some(rate), &mut notes).map_err(|e| Error::from(e.file(path)))?;
+    Ok((!contents.times.is_empty()).then(|| (contents.times, notes.into_warnings(), Digest::of(&bytes))))
+}
+
+/// The forces of a file that says neither times nor a sampling rate: what each is (`fx`) and how its channel is called; empty
+/// where the file holds none, or says its times.
+///
+/// # Errors
+/// The operating system's.
+pub fn timeless_forces(path: &Path) -> Result<Vec<(&'static str, String)>> {
+    /// Any will do.
+    const RATE_HZ: f64 = 1000.0;
+    /// A shorter table is a list of results.
+    const SHORTEST: usize = 500;
+    regular_file(path)?;
+    let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
+    let mut notes = Notes::default();
+    if read_bytes_at(&bytes, false, None, &mut notes).is_ok() {
+        return Ok(Vec::new());
+    }
+    let times = if bytes.iter().take(8192).any(|b| *b == 0) {
+        read_bytes_at(&bytes, false, Some(RATE_HZ), &mut notes).map(|(_, _, contents)| contents.times)
+    } else {
+        let text = &*without_byte_order_mark(&bytes);
+        match Header::find(text).filter(|header| !header.names.is_empty()) {
+            Some(mut header) => {
+                header.without_time();
+                header.lines.push(format!("Sampling rate [Hz]:,{RATE_HZ}"));
+                force::read(text, &header, &mut notes).map(|record| vec![record])
+            }
+            None => return Ok(Vec::new()),
+        }
+    };
+    let of = |channel: &Channel| {
+        let what = match channel.role {
+            ChannelRole::ForceX => "fx",
+            ChannelRole::ForceY => "fy",
+            ChannelRole::ForceZ => "fz",
+            ChannelRole::TorqueZ => "mz",
+            ChannelRole::Other => return None,
+        };
+        Some((what, channel.name.clone()))
+    };
+    let first = times
+        .ok()
+        .and_then(|times| times.into_iter().find(|t| t.len() >= SHORTEST));
+    Ok(first.map_or_else(Vec::new, |record| record.channels.iter().filter_map(of).collect()))
+}
+
 /// A table of text that has no names, or no time: columns are named as the rules name them.
 fn plain_table(path: &Path, rules: &[ChannelRule]) -> Result<Option<PlainTable>> {
     regular_file(path)?;
@@ -318,6 +414,10 @@ fn plain_table(path: &Path, rules: &[ChannelRule]) -> Result<Option<PlainTable>>
         header.names[at] = format!("time [{}]", unit.map_or("s", |u| u.1));
     }
     if let Some(rate) = rules.iter().find_map(|r| r.rate_hz) {
+        if rules.iter().all(|r| r.measures != Measures::Time) {
+            // A time column that is there and cannot be used: the rate counts.
+            header.without_time();
+        }
         header.lines.push(format!("Sampling rate [Hz]:,{rate}"));
     }
     if !force::is_time_table(&header) {
@@ -430,5 +530,48 @@ mod tests {
                 .to_string()
                 .contains("another unit")
         );
+    }
+
+    #[test]
+    fn a_rate_makes_a_record_of_a_file_without_times_or_with_useless_ones() {
+        let rows: String = (0..600)
+            .map(|i| format!("{},{},{}\n", 2048 + i, 20480 - i, i / 7))
+            .collect();
+        let text = format!("Torque,Thrust,Time\n{rows}");
+        let mut z = rule(ChannelRole::ForceZ, Source::Name("Thrust".into()));
+        (z.gain, z.offset) = (Gain::PerUnit(2.5), 20480.0);
+        // Counted in units that nobody names: seven rows each.
+        assert_eq!(read(&text, &[z.clone()]).unwrap().sample_rate_hz.round(), 7.0);
+        z.rate_hz = Some(10_000.0);
+        let record = read(&text, &[z]).unwrap();
+        assert_eq!(record.sample_rate_hz, 10_000.0);
+        assert_eq!(record.channel(ChannelRole::ForceZ).unwrap().samples[4], -10.0);
+        let rows: String = (0..600)
+            .map(|i| format!("{},{},0\n", 2048 + i, 20480 - i))
+            .collect();
+        let useless = format!("Torque,Thrust,Time\n{rows}");
+        assert!(
+            read(
+                &useless,
+                &[rule(ChannelRole::ForceZ, Source::Name("Thrust".into()))]
+            )
+            .is_err()
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let forces = |name: &str, bytes: &[u8]| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, bytes).unwrap();
+            (timeless_forces(&path).unwrap(), path)
+        };
+        let ramp: Vec<f64> = (0..600).map(f64::from).collect();
+        let mat = crate::ingest::mat5_bytes(&[crate::ingest::MatArray::column("Fx", &ramp)]);
+        let (found, path) = forces("a.mat", &mat);
+        assert_eq!(found, [("fx", "Fx".to_owned())]);
+        let mut x = rule(ChannelRole::ForceX, Source::Name("fx".into()));
+        x.rate_hz = Some(500.0);
+        assert_eq!(read_time_with(&path, &[x]).unwrap().record.sample_rate_hz, 500.0);
+        assert_eq!(forces("b.csv", useless.as_bytes()).0.len(), 2);
+        assert!(forces("c.csv", b"time_s,fx\n0,1\n1,2\n2,3\n3,4\n").0.is_empty());
+        assert!(forces("d.csv", b"1,2\n2,1\n3,3\n4,3\n").0.is_empty());
     }
 }

@@ -39,6 +39,8 @@ pub enum Format {
     Mat5,
     /// MATLAB 7.3, or other HDF5 with plain arrays.
     Mat73,
+    /// NumPy's NPY or NPZ.
+    Numpy,
 }
 
 impl std::fmt::Display for Format {
@@ -56,6 +58,7 @@ impl std::fmt::Display for Format {
             Format::Mat4 => "MAT v4",
             Format::Mat5 => "MAT v5",
             Format::Mat73 => "MAT v7.3",
+            Format::Numpy => "NumPy",
         })
     }
 }

@@ -9,7 +9,8 @@ use super::text::{self, Notes};
 use super::{checks, dof_names};
 use crate::InputError;
 use crate::data::FrfRecord;
-use crate::ingest::formats::{force, frf_text, lvm, mat, tdms, uff};
+use crate::ingest::formats::{force, frf_text, lvm, mat, numpy, tdms, uff, workbook};
+use crate::ingest::tables::{channel_names, stamps};
 
 /// Where a file holds one FRF that does not say where it was measured, its name may.
 pub(super) fn dofs_from_file_name(path: &Path, frfs: &mut [FrfRecord], notes: &mut Notes) {
@@ -33,8 +34,21 @@ pub(super) fn read_bytes(
     is_dwd_named: bool,
     notes: &mut Notes,
 ) -> std::result::Result<(Format, String, Contents), InputError> {
-    match read_as_it_is(bytes, is_dwd_named, notes) {
+    read_bytes_at(bytes, is_dwd_named, None, notes)
+}
+
+/// As [`read_bytes`]; `rate_hz` is that of signals in binary formats that say no rate.
+pub(super) fn read_bytes_at(
+    bytes: &[u8],
+    is_dwd_named: bool,
+    rate_hz: Option<f64>,
+    notes: &mut Notes,
+) -> std::result::Result<(Format, String, Contents), InputError> {
+    match read_as_it_is(bytes, is_dwd_named, rate_hz, notes) {
         Ok((format, why, mut contents)) => {
+            for record in &mut contents.times {
+                channel_names::settle(&mut record.channels, notes);
+            }
             contents.show_control_characters();
             checks::drop_copies(&mut contents.frfs, notes);
             Ok((format, text::shown(&why).into_owned(), contents))
@@ -46,10 +60,27 @@ pub(super) fn read_bytes(
 fn read_as_it_is(
     bytes: &[u8],
     is_dwd_named: bool,
+    rate_hz: Option<f64>,
     notes: &mut Notes,
 ) -> std::result::Result<(Format, String, Contents), InputError> {
     let bytes = &*text::without_byte_order_mark(bytes);
-    let (detected, format, why) = detect::detect(bytes, is_dwd_named)?;
+    let sheet = workbook::first_sheet(bytes)?;
+    if let Some((_, told)) = &sheet {
+        notes.file("from a workbook");
+        told.iter().for_each(|told| notes.file(told));
+    }
+    let bytes = sheet.as_ref().map_or(bytes, |(text, _)| text.as_bytes());
+    let mut seconds = None;
+    let found = detect::detect(bytes, is_dwd_named).or_else(|problem| {
+        // Rows that begin with a clock are no table of numbers yet.
+        let (text, told) = stamps::as_seconds(bytes).ok_or_else(|| problem.clone())?;
+        let found = detect::detect(&text, is_dwd_named).map_err(|_| problem)?;
+        notes.file(told);
+        seconds = Some(text);
+        Ok(found)
+    });
+    let (detected, format, why) = found?;
+    let bytes = seconds.as_deref().unwrap_or(bytes);
     let mut budget = Budget::for_file(bytes.len());
     let frfs = |frfs| Contents {
         frfs,
@@ -60,11 +91,15 @@ fn read_as_it_is(
         ..Contents::default()
     };
     Ok(match detected {
-        Detected::Tdms => (format, why, signals(tdms::read(bytes, notes)?)),
+        Detected::Tdms => (format, why, signals(tdms::read(bytes, rate_hz, notes)?)),
         Detected::Lvm => (format, why, signals(lvm::read(bytes, &mut budget, notes)?)),
-        Detected::Mat4 => (format, why, mat::read_v4(bytes, &mut budget, notes)?),
-        Detected::Mat5 => (format, why, mat::read_v5(bytes, &mut budget, notes)?),
-        Detected::Mat73 => (format, why, mat::read_v73(bytes, &mut budget, notes)?),
+        Detected::Mat4 => (format, why, mat::read_v4(bytes, rate_hz, &mut budget, notes)?),
+        Detected::Mat5 => (format, why, mat::read_v5(bytes, rate_hz, &mut budget, notes)?),
+        Detected::Mat73 => (format, why, mat::read_v73(bytes, rate_hz, &mut budget, notes)?),
+        Detected::Numpy => {
+            let arrays = numpy::read(bytes, &mut budget, notes)?;
+            (format, why, mat::of_arrays(arrays, rate_hz, &mut budget, notes)?)
+        }
         Detected::Universal => {
             let (summary, contents) = uff::contents(bytes, notes)?;
             let skipped: Vec<String> = summary.skipped.iter().map(u32::to_string).collect();

@@ -8,6 +8,7 @@ use crate::ingest::formats::force;
 use crate::ingest::formats::frf_text;
 use crate::ingest::formats::lvm;
 use crate::ingest::formats::mat;
+use crate::ingest::formats::numpy;
 use crate::ingest::formats::uff;
 use crate::ingest::tables::table::Header;
 
@@ -23,6 +24,7 @@ pub(super) enum Detected {
     Mat4,
     Mat5,
     Mat73,
+    Numpy,
 }
 
 /// How many bytes decide whether a file is text.
@@ -52,6 +54,13 @@ pub(super) fn detect(bytes: &[u8], is_dwd_named: bool) -> Result<(Detected, Form
     }
     if mat::looks_like_v73(bytes) {
         return Ok((Detected::Mat73, Format::Mat73, "has the signature of HDF5".into()));
+    }
+    if numpy::looks_like(bytes) {
+        return Ok((
+            Detected::Numpy,
+            Format::Numpy,
+            "has arrays as NumPy writes them".into(),
+        ));
     }
     if lvm::looks_like(bytes) {
         return Ok((
@@ -167,8 +176,8 @@ fn foreign(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
         )
     } else if starts(b"PK\x03\x04") {
         (
-            "a zip archive or spreadsheet (xlsx, ods)",
-            "save the sheet as CSV, or unpack the archive",
+            "a zip archive or a document in one (ods, docx)",
+            "save a sheet as CSV or xlsx, or unpack the archive",
         )
     } else if starts(b"\xD0\xCF\x11\xE0\xA1\xB1\x1A\xE1") {
         ("an old Office document (xls)", "save the sheet as CSV")

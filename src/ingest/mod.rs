@@ -22,7 +22,9 @@ mod text;
 pub mod units;
 
 pub use crate::data::{Axis, Channel, ChannelRole, Dof, FrfRecord, Quantity, TimeRecord};
-pub use channel_rule::{ChannelRule, Gain, Measures, Source, read_time_with, unit_of_charge_or_other};
+pub use channel_rule::{
+    ChannelRule, Gain, Measures, Source, read_time_with, timeless_forces, unit_of_charge_or_other,
+};
 pub use contents::{Contents, Digest, Format, MeasurementFile, OtherRecord};
 pub use formats::columns::{
     Cells, ColumnTable, MOST_ROWS, NamedArray, NamedColumn, csv_bytes, mat_bytes, npz_bytes, variable_name,
@@ -39,3 +41,8 @@ pub use preview::{PlainColumn, SIGNALS, plain_columns, taken_for};
 pub use quality::quality_warnings;
 pub use read::{TimeFile, read_file, read_frf_file, read_frfs, read_memory, read_time};
 pub use text::shown;
+
+/// The first sheet of a workbook (xlsx) as tab separated text; `None` for all else.
+pub fn sheet_text(bytes: &[u8]) -> Option<String> {
+    formats::workbook::first_sheet(bytes).ok()?.map(|(text, _)| text)
+}

@@ -22,6 +22,8 @@ pub struct PlainColumn {
     pub step: Option<f64>,
     /// Each value is above the one before.
     pub rises: bool,
+    /// Rows that were looked at.
+    pub rows: usize,
 }
 
 impl PlainColumn {
@@ -44,6 +46,7 @@ impl PlainColumn {
             range: [low, high],
             step: even().filter(|_| is_first),
             rises: values.is_sorted_by(|a, b| a < b),
+            rows: values.len(),
         }
     }
 
@@ -64,9 +67,12 @@ impl PlainColumn {
 pub const SIGNALS: [&str; 4] = ["fx", "fy", "fz", "mz"];
 
 /// What each column of a force record is taken for: a clock for `time`, all else for [`SIGNALS`] in their order. Ends where
-/// these do.
+/// these do; where there are more columns than these, what follows the three forces is as likely an accelerometer as a torque.
 pub fn taken_for(columns: &[PlainColumn]) -> impl Iterator<Item = (&PlainColumn, &'static str)> {
-    let mut signals = SIGNALS.into_iter();
+    let count = columns.iter().filter(|c| c.step.is_none()).count();
+    let mut signals = SIGNALS
+        .into_iter()
+        .take(if count > SIGNALS.len() { 3 } else { SIGNALS.len() });
     columns.iter().map_while(move |column| {
         let name = match column.step {
             Some(_) => "time",

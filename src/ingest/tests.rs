@@ -519,3 +519,97 @@ proptest! {
         prop_assert_eq!(read, rows);
     }
 }
+
+/// What recorders and their programs put above and into the same record: forces at 2 kHz.
+#[test]
+fn records_are_read_as_other_recorders_write_them() {
+    let rows = |separator: &str, comma: bool, time: Option<fn(f64) -> String>| -> String {
+        let row = |i: usize| {
+            let t = i as f64 * 5e-4;
+            let values = [0, 1, 2].map(|k| format!("{:.3}", 10.0 * (k + 1) as f64 + 0.5 * i as f64));
+            let fields: Vec<String> = time.map(|f| f(t)).into_iter().chain(values).collect();
+            let line = fields.join(separator);
+            if comma {
+                line.replace('.', ",") + "\n"
+            } else {
+                line + "\n"
+            }
+        };
+        (0..40).map(row).collect()
+    };
+    let s: fn(f64) -> String = |t| format!("{t:.4}");
+    let ms: fn(f64) -> String = |t| format!("{:.1}", 1e3 * t);
+    let clock: fn(f64) -> String = |t| format!("2024-03-12T23:59:{:07.4}", 59.0 + t);
+    let files: Vec<(&str, String)> = vec![
+        (
+            "catman",
+            "HBM_CATMAN\nDatum: 12.03.2024\n\nZeit  1 - Standardmessrate [s]\tFx [N]\tFy [N]\tFz [N]\n".to_owned()
+                + &rows("\t", true, Some(s)),
+        ),
+        (
+            "a line between units and numbers",
+            "Zeit  1\tKraft X\tKraft Y\tKraft Z\ns\tN\tN\tN\nSR=2000 Hz\tTyp=DMS\tTyp\tTyp\n".to_owned()
+                + &rows("\t", true, Some(s)),
+        ),
+        (
+            "SignalExpress",
+            "channel names:\nDev1/ai0 Fx\tDev1/ai1 Fy\tDev1/ai2 Fz\nstart times:\n1\t1\t1 \ndt:\n0.0005\t0.0005\t0.0005\ndata:\n"
+                .replace("1\t1\t1 ", "12.03.2024\t12.03.2024\t12.03.2024")
+                + &rows("\t", false, None),
+        ),
+        (
+            "Dewesoft",
+            "Data1\n\nTime (s),AI 1/Fx (N),AI 2/Fy (N),AI 3/Fz (N)\n".to_owned() + &rows(",", false, Some(s)),
+        ),
+        ("interval", "dt,0.0005\nFx,Fy,Fz\nN,N,N\n".to_owned() + &rows(",", false, None)),
+        (
+            "interval in ms",
+            "Sample interval [ms];0,5\nFx [N];Fy [N];Fz [N]\n".to_owned() + &rows(";", true, None),
+        ),
+        ("comments", "# fs = 2 kHz\n# Fx Fy Fz in N\n".to_owned() + &rows(" ", false, None)),
+        ("a comment sign", "#time fx fy fz\n".to_owned() + &rows(" ", false, Some(s))),
+        (
+            "elapsed",
+            "Elapsed Time (ms),Force X (N),Force Y (N),Force Z (N)\n".to_owned() + &rows(",", false, Some(ms)),
+        ),
+        ("Spanish", "Tiempo (s);Fuerza X (N);Fuerza Y (N);Fuerza Z (N)\n".to_owned() + &rows(";", true, Some(s))),
+        ("Chinese", "时间(s),X向力(N),Y向力(N),Z向力(N)\n".to_owned() + &rows(",", false, Some(s))),
+        ("ISO 80000", "t / s,F_x / N,F_y / N,F_z / N\n".to_owned() + &rows(",", false, Some(s))),
+        ("clock", "timestamp,Dyno_Fx,Dyno_Fy,Dyno_Fz\n".to_owned() + &rows(",", false, Some(clock))),
+    ];
+    for (what, text) in files {
+        let (record, warnings) = time(&text);
+        assert!(
+            (record.sample_rate_hz / 2000.0 - 1.0).abs() < 1e-6,
+            "{what}: {}",
+            record.sample_rate_hz
+        );
+        for (k, role) in [ChannelRole::ForceX, ChannelRole::ForceY, ChannelRole::ForceZ]
+            .into_iter()
+            .enumerate()
+        {
+            let channel = record
+                .channel(role)
+                .unwrap_or_else(|| panic!("{what}: no {role:?}: {warnings:?}"));
+            assert_eq!(
+                (channel.samples[0], channel.samples[39]),
+                (10.0 * (k + 1) as f64, 10.0 * (k + 1) as f64 + 19.5),
+                "{what}"
+            );
+        }
+    }
+}
+
+#[test]
+fn of_several_cycles_the_first_is_read_and_it_is_told() {
+    let rows = "0.000\t1.0\t2.0\n0.001\t1.5\t2.0\n0.002\t1.0\t2.5\n0.003\t1.0\t2.0\n";
+    let text = format!(
+        "File Type:\tDynoWare ASCII Data\nSampling rate [Hz]:\t1000\nCycle No:\t1\nTime\tFx\tFy\ns\tN\tN\n{rows}\nCycle No:\t2\n{rows}"
+    );
+    let (record, warnings) = time(text);
+    assert_eq!(record.len(), 4);
+    assert!(
+        warnings[0].contains("2 cycles in one file: the first is read"),
+        "{warnings:?}"
+    );
+}

@@ -45,6 +45,13 @@ pub fn principal_angle(shape: &[Complex64]) -> f64 {
     0.5 * (2.0 * across).atan2(along)
 }
 
+/// A component as far as it is known, shrunk by |A|²/(|A|² + σ²): what one FRF does not determine must not decide on the phases or the
+/// shape of all.
+pub fn as_known(value: Complex64, std: f64) -> Complex64 {
+    let square = value.norm_sqr();
+    value * (square / (square + std * std).max(f64::MIN_POSITIVE))
+}
+
 /// Complexity of a shape; `None` for fewer than two degrees of freedom (one is always collinear with itself).
 pub fn complexity(shape: &[Complex64]) -> Option<Complexity> {
     if shape.len() < 2 {

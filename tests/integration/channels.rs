@@ -126,3 +126,96 @@ fn what_cannot_be_is_refused_by_key() {
         }
     }
 }
+
+/// All records of a campaign in one file, each in channels of its own: every cut counts.
+#[test]
+fn several_cuts_in_one_file_are_several_cuts() {
+    let folder = copy_of("force-9400");
+    let dir = folder.path().to_str().unwrap();
+    let before = document(&["cfc", dir]);
+    let ids: Vec<String> = before["cuts"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|c| c["id"].as_str().unwrap().to_owned())
+        .collect();
+    let file = folder.path().join("campaign.toml");
+    let toml = std::fs::read_to_string(&file).unwrap();
+    let (mut columns, mut rules, mut text) = (Vec::new(), String::new(), toml.clone());
+    for id in &ids {
+        let name = toml
+            .split("[[cut]]")
+            .find(|t| t.contains(&format!("id = \"{id}\"")))
+            .and_then(|t| t.split("file = \"").nth(1)?.split('"').next())
+            .unwrap();
+        let record = std::fs::read_to_string(folder.path().join(name))
+            .unwrap()
+            .replace(',', ".");
+        let rows: Vec<Vec<String>> = record
+            .lines()
+            .filter(|l| l.starts_with(|c: char| c.is_ascii_digit()))
+            .map(|l| l.split(';').skip(1).take(3).map(str::to_owned).collect())
+            .collect();
+        columns.push(rows);
+        text = text.replace(&format!("\"{name}\""), "\"all.csv\"");
+        for axis in ["x", "y", "z"] {
+            rules +=
+                &format!("[[channel]]\nname = \"f{axis}\"\nin_file = \"F{axis}_{id}\"\ncut = \"{id}\"\n");
+        }
+        rules += "rate_hz = 5000.0\n";
+    }
+    let length = columns.iter().map(Vec::len).min().unwrap();
+    let head: Vec<String> = ids
+        .iter()
+        .flat_map(|id| ["x", "y", "z"].map(|a| format!("F{a}_{id}")))
+        .collect();
+    let mut table = head.join(",") + "\n";
+    for i in 0..length {
+        let row: Vec<&str> = columns
+            .iter()
+            .flat_map(|rows| rows[i].iter().map(String::as_str))
+            .collect();
+        table += &(row.join(",") + "\n");
+    }
+    std::fs::write(folder.path().join("all.csv"), table).unwrap();
+    std::fs::write(&file, text.replacen("[[cut]]", &format!("{rules}\n[[cut]]"), 1)).unwrap();
+    let after = document(&["cfc", dir]);
+    let warnings = after["warnings"].to_string();
+    assert!(!warnings.contains("same data"), "{warnings}");
+    for key in ["ktc_n_per_mm2", "krc_n_per_mm2", "kac_n_per_mm2"] {
+        let of = |d: &serde_json::Value| d["pooled"][0][key]["value"].as_f64().unwrap();
+        assert!(
+            (of(&after) / of(&before) - 1.0).abs() < 0.02,
+            "{key}: {} {}",
+            of(&after),
+            of(&before)
+        );
+    }
+    // One cut listed twice still counts once.
+    let twice = std::fs::read_to_string(&file).unwrap();
+    let first = twice.find("[[cut]]").unwrap();
+    let end = twice[first + 7..]
+        .find("[[cut]]")
+        .map_or(twice.len(), |at| first + 7 + at);
+    let again = twice[first..end].replacen("id = \"", "id = \"again-", 1);
+    let rules: String = ["x", "y", "z"]
+        .iter()
+        .map(|a| {
+            format!(
+                "[[channel]]\nname = \"f{a}\"\nin_file = \"F{a}_{}\"\ncut = \"again-{0}\"\n",
+                ids[0]
+            )
+        })
+        .collect();
+    std::fs::write(
+        &file,
+        format!(
+            "{}{rules}rate_hz = 5000.0\n\n{again}{}",
+            &twice[..first],
+            &twice[first..]
+        ),
+    )
+    .unwrap();
+    let warnings = document(&["cfc", dir])["warnings"].to_string();
+    assert!(warnings.contains("same data"), "{warnings}");
+}

@@ -11,7 +11,7 @@ use crate::cutting::{
     fit_force_coefficients, none_usable, repair_record,
 };
 use crate::identify::forces::cutting_data::CutData;
-use crate::ingest::{self, Digest, TimeRecord};
+use crate::ingest::{self, ChannelRole, Digest, TimeRecord};
 use crate::progress::Progress;
 use crate::{Error, InputError, Result};
 
@@ -48,6 +48,10 @@ impl ReadRecord {
         let cut = &campaign.cuts[cut];
         let file = ingest::read_time_with(&cut.file, &campaign.channel_rules(&cut.id))?;
         let mut record = file.record;
+        // Accelerations and the like were recorded with the forces; long records need their memory.
+        if record.channels.iter().any(|c| c.role != ChannelRole::Other) {
+            record.channels.retain(|c| c.role != ChannelRole::Other);
+        }
         let mut notices = repair_record(&mut record, cut.spindle_rpm);
         let noticed = |detail| Notice { kind: READER, detail };
         notices.extend(file.warnings.into_iter().map(noticed));

@@ -50,3 +50,24 @@ pub(super) fn channels(columns: &[PlainColumn], answers: &Answers) -> Result<Vec
     }
     Ok(tables)
 }
+
+/// Sections for channels that have names in files that say neither times nor a rate: the rate is what is missing.
+pub(super) fn timeless(forces: &[(&'static str, String)], answers: &Answers) -> Result<Vec<DraftTable>> {
+    let mut tables = Vec::new();
+    for (i, (what, called)) in forces.iter().enumerate() {
+        let mut making = Making::new(answers, "channel", what, true);
+        making.fact("name", Kind::Text, what);
+        making.fact("in_file", Kind::Text, called);
+        if i == 0 {
+            let rate = Entry::new(
+                "rate_hz",
+                Kind::Number,
+                "samples a second, Hz (the files do not say it)",
+                "10000.0",
+            );
+            making.add(rate, &[])?;
+        }
+        tables.push(making.table);
+    }
+    Ok(tables)
+}

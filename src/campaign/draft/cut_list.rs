@@ -7,6 +7,7 @@ use super::found::{Scan, stem};
 use super::list_columns::{Column, DIAMETER, DIRECTION, NUMBER, TEETH, column, english, is_down, plain};
 use super::tables::cut_ids;
 use crate::campaign::load::CUT;
+use crate::ingest::sheet_text;
 use crate::text::{closest, shown_briefly as shown};
 use crate::{Error, InputError, Result};
 
@@ -81,7 +82,8 @@ pub fn read_cut_list(file: &Path, scan: &Scan, answers: &mut Answers) -> Result<
     let wrong = |problem: String, line: usize, remedy: String| {
         InputError::new(problem).file(file).line(line).remedy(remedy)
     };
-    let text = decoded(std::fs::read(file).map_err(|e| Error::io(file, e))?);
+    let bytes = std::fs::read(file).map_err(|e| Error::io(file, e))?;
+    let text = sheet_text(&bytes).unwrap_or_else(|| decoded(bytes));
     let skipped = names_line(&text).unwrap_or(0);
     let offset: usize = text.split_inclusive('\n').take(skipped).map(str::len).sum();
     let text = &text[offset..];

@@ -16,6 +16,9 @@ pub struct Scan {
     pub forces: Vec<FoundForce>,
     /// What the columns of the force files hold, where none of them names any: all have as many.
     pub columns: Vec<PlainColumn>,
+    /// What the channels of the force files are (`fx`) and how they are called, where none of the files says its times or
+    /// sampling rate: all have the same.
+    pub timeless: Vec<(&'static str, String)>,
     /// Robot files, as paths.
     pub robots: Vec<String>,
     /// Tables that look like lists of cuts.

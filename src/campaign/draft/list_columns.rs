@@ -272,7 +272,16 @@ pub(super) fn column(head: &str, keys: &[&'static str]) -> Result<Option<Column>
     let spaced = name.replace('_', " ");
     let named = |(key, names): &(&'static str, &[&str])| names.contains(&spaced.as_str()).then_some(*key);
     let own = keys.iter().find(|k| **k == name).copied();
-    let Some(key) = own.or_else(|| NAMES.iter().find_map(named)) else {
+    let key_of = |spaced: &str| {
+        NAMES
+            .iter()
+            .find(|(_, names)| names.contains(&spaced))
+            .map(|(key, _)| *key)
+    };
+    let Some(key) = own
+        .or_else(|| NAMES.iter().find_map(named))
+        .or_else(|| key_with_symbol(&spaced, &key_of))
+    else {
         return Ok(None);
     };
     let unit = plain(unit).replace([' ', '*'], "");
@@ -351,8 +360,45 @@ pub(super) fn column(head: &str, keys: &[&'static str]) -> Result<Option<Column>
     Ok(Some(Column { key, factor }))
 }
 
-/// `Drehzahl [1/min]`, `ap (mm)`, `ap in mm`: name and unit.
+/// A name with its symbol, `Drehzahl n`, `Axial depth, ap`, `fz feed per tooth`, or with a word for number, `N° essai`, `Cut no`.
+fn key_with_symbol(spaced: &str, key_of: &impl Fn(&str) -> Option<&'static str>) -> Option<&'static str> {
+    const LONGEST_SYMBOL: usize = 3;
+    let bare = spaced.replace(',', " ");
+    let words: Vec<&str> = bare.split_whitespace().collect();
+    let (first, last) = (*words.first()?, *words.last()?);
+    if words.len() < 2 {
+        return None;
+    }
+    let (front, back) = (words[..words.len() - 1].join(" "), words[1..].join(" "));
+    for (name, symbol) in [(front, last), (back, first)] {
+        let Some(key) = key_of(&name) else {
+            continue;
+        };
+        let is_number = symbol == "#" || symbol == "number" || key_of(symbol) == Some(NUMBER);
+        if is_number && matches!(key, "file" | NUMBER) {
+            return Some(NUMBER);
+        }
+        if symbol.chars().count() <= LONGEST_SYMBOL
+            && (key_of(symbol) == Some(key) || key_of(symbol) == Some(FEED))
+        {
+            return Some(key);
+        }
+    }
+    None
+}
+
+/// Units that stand behind a stroke, `ap / mm`, as ISO 80000 writes headings.
+const AFTER_STROKE: [&str; 14] = [
+    "mm", "µm", "um", "m", "1/min", "min-1", "rpm", "u/min", "mm/min", "m/min", "mm/rev", "mm/u", "°", "deg",
+];
+
+/// `Drehzahl [1/min]`, `ap (mm)`, `ap in mm`, `ap / mm`: name and unit.
 fn split_unit(head: &str) -> (&str, &str) {
+    if let Some((name, unit)) = head.split_once('/')
+        && AFTER_STROKE.contains(&plain(unit).as_str())
+    {
+        return (name.trim(), unit.trim());
+    }
     for (open, close) in [('[', ']'), ('(', ')')] {
         if let Some((name, rest)) = head.split_once(open) {
             return (name.trim(), rest.split(close).next().unwrap_or("").trim());
@@ -432,10 +478,20 @@ mod tests {
             ("f [mm/U]", FEED_PER_TURN, 1.0),
             ("Schnittgeschwindigkeit (m/s)", CUTTING_SPEED, 60.0),
             ("steady_s", "steady_s", 1.0),
+            ("N° essai", NUMBER, 1.0),
+            ("Versuch Nr.", NUMBER, 1.0),
+            ("Cut #", NUMBER, 1.0),
+            ("Drehzahl n [1/min]", "spindle_rpm", 1.0),
+            ("Feed per tooth, fz (mm)", "feed_per_tooth_mm", 1.0),
+            ("ap depth of cut [mm]", "axial_depth_mm", 1.0),
+            ("n / 1/min", "spindle_rpm", 1.0),
+            ("ap / mm", "axial_depth_mm", 1.0),
+            ("Vorschub f [mm/min]", FEED_RATE, 1.0),
         ] {
             assert_eq!(column(head, &CUT), Ok(Some(Column { key, factor })), "{head}");
         }
         assert_eq!(column("Bemerkung", &CUT), Ok(None));
+        assert_eq!(column("Drehzahl max", &CUT), Ok(None));
         for head in ["Vorschub", "f [mm]", "ap [furlong]", "n [m/min]"] {
             assert!(column(head, &CUT).is_err(), "{head}");
         }

@@ -11,7 +11,7 @@ use super::found::{FoundForce, FoundFrf, Scan, stem};
 use super::names::{Facts, facts_of, facts_of_header, posture_of};
 use crate::campaign::campaign_file;
 use crate::data::{ChannelRole, Quantity, RobotSpec};
-use crate::ingest::{PlainColumn, plain_columns, survey};
+use crate::ingest::{PlainColumn, SIGNALS, plain_columns, sheet_text, survey, timeless_forces};
 use crate::{Error, InputError, Result};
 
 /// Files looked at.
@@ -19,9 +19,9 @@ const MOST_FILES: usize = 5000;
 /// Folders deep.
 const DEEPEST: usize = 8;
 /// Endings of files that nobody exports measurements to.
-const OTHERS: [&str; 16] = [
-    "html", "png", "jpg", "jpeg", "pdf", "md", "json", "docx", "xlsx", "zip", "xz", "py", "m", "svg",
-    "parquet", "log",
+const OTHERS: [&str; 15] = [
+    "html", "png", "jpg", "jpeg", "pdf", "md", "json", "docx", "zip", "xz", "py", "m", "svg", "parquet",
+    "log",
 ];
 
 /// Words in the name of a copy.
@@ -33,6 +33,8 @@ enum Seen {
     Force(FoundForce),
     /// Numbers without names, and why they were not understood.
     Nameless(FoundForce, Vec<PlainColumn>, String),
+    /// Forces without times: what each is and its channel, and why the file was not understood.
+    Timeless(FoundForce, Vec<(&'static str, String)>, String),
     NotUsed(String, String),
 }
 
@@ -70,16 +72,18 @@ pub fn scan(dir: &Path) -> Result<Scan> {
         .into_par_iter()
         .map(|(name, file)| look(name, &file))
         .collect();
-    let mut nameless = Vec::new();
+    let (mut nameless, mut timeless) = (Vec::new(), Vec::new());
     for one in seen {
         match one {
             Seen::CutList(path) => scan.cut_lists.push(path),
             Seen::Frf(frf) => scan.frfs.push(frf),
             Seen::Force(force) => scan.forces.push(force),
             Seen::Nameless(force, columns, why) => nameless.push((force, columns, why)),
+            Seen::Timeless(force, channels, why) => timeless.push((force, channels, why)),
             Seen::NotUsed(path, why) => scan.not_used.push((path, why)),
         }
     }
+    take_timeless(&mut scan, timeless);
     take_nameless(&mut scan, nameless);
     // Several FRF files in each of several folders: a folder is a posture.
     let mut folders: BTreeMap<String, usize> = BTreeMap::new();
@@ -239,7 +243,12 @@ fn look(name: String, file: &Path) -> Seen {
                 Ok(Some(columns)) if may_be_forces(&columns) => {
                     Seen::Nameless(force_of(name, file), columns, why)
                 }
-                _ => Seen::NotUsed(name, why),
+                _ => match timeless_forces(file) {
+                    Ok(channels) if !channels.is_empty() => {
+                        Seen::Timeless(force_of(name, file), channels, why)
+                    }
+                    _ => Seen::NotUsed(name, why),
+                },
             };
         }
         Err(error) => return Seen::NotUsed(name, error.to_string()),
@@ -292,13 +301,36 @@ fn force_of(name: String, file: &Path) -> FoundForce {
 /// Slowest sampling of a force record, s.
 const SLOWEST_STEP: f64 = 0.02;
 
-/// Two to four signals, with a time column before them or none; what rises without being a clock is something else.
+/// Rows from which on many columns are a record and no list of results.
+const ROWS_OF_A_RECORD: usize = 500;
+/// Signals of one record: forces, and what else was recorded with them.
+const MOST_SIGNALS: usize = 12;
+
+/// Two signals or more, with a time column before them or none; what rises without being a clock is something else.
 fn may_be_forces(columns: &[PlainColumn]) -> bool {
     let signals = match columns {
         [time, signals @ ..] if time.step.is_some_and(|step| step <= SLOWEST_STEP) => signals,
         all => all,
     };
-    (2..=4).contains(&signals.len()) && signals.iter().all(|c| !c.rises)
+    let is_record = signals.len() <= SIGNALS.len() || signals.iter().all(|c| c.rows >= ROWS_OF_A_RECORD);
+    (2..=MOST_SIGNALS).contains(&signals.len()) && is_record && signals.iter().all(|c| !c.rises)
+}
+
+/// A file, what its channels are and how they are called, and why it was not understood.
+type TimelessForce = (FoundForce, Vec<(&'static str, String)>, String);
+
+/// Files whose forces have names and no times are the folder's force records where no other says its times and all have the
+/// same channels: the sampling rate is asked once.
+fn take_timeless(scan: &mut Scan, timeless: Vec<TimelessForce>) {
+    let alike = timeless.iter().all(|(_, channels, _)| *channels == timeless[0].1);
+    for (force, channels, why) in timeless {
+        if alike && (scan.forces.is_empty() || !scan.timeless.is_empty()) {
+            scan.forces.push(force);
+            scan.timeless = channels;
+        } else {
+            scan.not_used.push((force.path, why));
+        }
+    }
 }
 
 /// Tables without names are the folder's force records where no file has names and all have the same columns: what these are
@@ -327,7 +359,12 @@ fn header(file: &Path) -> Facts {
 
 /// Its first 4 kB; empty where it cannot be read.
 fn start_of(file: &Path) -> Vec<u8> {
+    const LONG: usize = 4096;
+    if file.extension().is_some_and(|e| e.eq_ignore_ascii_case("xlsx")) {
+        let text = std::fs::read(file).ok().and_then(|bytes| sheet_text(&bytes));
+        return text.map_or_else(Vec::new, |t| t.into_bytes().into_iter().take(LONG).collect());
+    }
     let mut start = Vec::new();
-    let read = std::fs::File::open(file).and_then(|f| f.take(4096).read_to_end(&mut start));
+    let read = std::fs::File::open(file).and_then(|f| f.take(LONG as u64).read_to_end(&mut start));
     read.map_or_else(|_| Vec::new(), |_| start)
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::answers::Answers;
-use super::channels::channels;
+use super::channels::{channels, timeless};
 use super::entry::{DraftTable, Entry, Kind};
 use super::found::{FoundForce, FoundFrf, Scan, stem};
 use super::list_columns::{CUTTING_SPEED, DIAMETER, DIRECTION, FEED_PER_TURN, FEED_RATE, RADIAL_DEPTH};
@@ -34,6 +34,7 @@ pub fn of(scan: &Scan, answers: &Answers) -> Result<Vec<DraftTable>> {
         tables.push(tool(&cuts, answers)?);
         tables.push(dynamometer(answers)?);
         tables.extend(channels(&scan.columns, answers)?);
+        tables.extend(timeless(&scan.timeless, answers)?);
         tables.extend(cuts.into_iter().map(|(_, table)| table));
     }
     Ok(tables)

@@ -13,7 +13,7 @@ use crate::cutting::measured::average::average;
 use crate::cutting::measured::cut_analysis::{
     ChannelAnalysis, CutAnalysis, Notice, Trace, WRONG_SPEED, in_tool_axes,
 };
-use crate::cutting::measured::teeth::idle_tooth;
+use crate::cutting::measured::teeth::{idle_tooth, tooth_back_mm};
 use crate::cutting::waveform::MillingCut;
 use crate::data::{ChannelRole, Cut, CutGeometry, Process, TimeRecord, Tool};
 use crate::signal::{
@@ -37,6 +37,12 @@ const UNSTEADY_CUT: &str = "the force changes over the steady window: a slow ent
 const IDLE_TOOTH: &str = "the teeth cut very unevenly, once per turn instead of once per tooth: one is missing or chipped, the runout \
      is as large as the feed per tooth, or [tool] teeth is wrong; a tooth that does not cut leaves its edge force out, so that the edge \
      coefficients come out low by its share";
+const TOOTH_STANDS_BACK: &str = "one tooth cuts less than the others and the next one more, as no offset of the tool's axis makes it: \
+     chipped, worn or set low, or the teeth stand at uneven angles; near the ends of the immersion it does not cut, so that the edge \
+     coefficients come out low (tooth_radius_offset_mm or pitch_deg in [tool] take it into account)";
+const TEETH_DIFFER: &str = "the teeth cut unevenly: the tool runs out, or one of them is chipped or set low; near the ends of the \
+     immersion the lower one does not cut, so that the edge coefficients come out low (tooth_radius_offset_mm in [tool] takes it into \
+     account)";
 const SHORT_WINDOW: &str = "steady window shorter than 5 revolutions";
 const SPIKES: &str = "revolutions with spikes left out of the average";
 const WRONG_DURATION: &str = "the hole took another time than feed, speed and depth say: check them";
@@ -411,26 +417,27 @@ fn teeth_notice(
     if highest_order(per_turn, milling.teeth) < milling.teeth {
         return;
     }
-    let of_channel = |axis: ForceAxis| -> Option<(Vec<Complex64>, f64, bool)> {
+    let of_channel = |axis: ForceAxis| -> Option<(signal::OrderSpectrum, f64, bool)> {
         let values = usable.iter().find(|c| c.0 == axis)?.2;
         let channel = channels.iter().find(|c| c.axis == axis)?;
         let spectrum = signal::order_spectrum(&values[window.clone()], rate, per_turn, milling.teeth)?;
         let has_zero = channel.drift.air_before || channel.drift.air_after;
-        Some((spectrum.coefficient, channel.mean.average.value, has_zero))
+        Some((spectrum, channel.mean.average.value, has_zero))
     };
     let recorded = [ForceAxis::X, ForceAxis::Y, ForceAxis::Z].map(of_channel);
-    let (mut orders, mut mean, mut zero_is_known) = (
-        [0, 1].map(|_| vec![Complex64::ZERO; milling.teeth]),
-        [0.0; 2],
-        true,
-    );
+    let mut orders = [0, 1].map(|_| vec![Complex64::ZERO; milling.teeth]);
+    let mut variance = [0, 1].map(|_| vec![0.0; milling.teeth]);
+    let (mut mean, mut zero_is_known) = ([0.0; 2], true);
     for (axis, row) in trials.tool_from_dyno.iter().take(2).enumerate() {
         for (weight, channel) in row.iter().zip(&recorded).filter(|(w, _)| **w != 0.0) {
             let Some((own, value, has_zero)) = channel else {
                 return;
             };
-            for (sum, o) in orders[axis].iter_mut().zip(own) {
+            for (sum, o) in orders[axis].iter_mut().zip(&own.coefficient) {
                 *sum += o * *weight;
+            }
+            for (sum, s) in variance[axis].iter_mut().zip(&own.std) {
+                *sum += (s * weight).powi(2);
             }
             mean[axis] += weight * value;
             zero_is_known &= has_zero;
@@ -440,6 +447,25 @@ fn teeth_notice(
         notices.push(Notice {
             kind: IDLE_TOOTH,
             detail: format!("{:.0} % of what a missing tooth makes", 100.0 * part),
+        });
+        return;
+    }
+    let std = variance.map(|v| v.into_iter().map(f64::sqrt).collect::<Vec<f64>>());
+    let back = tooth_back_mm(
+        &milling,
+        [&orders[0], &orders[1]],
+        [&std[0], &std[1]],
+        mean,
+        zero_is_known,
+    );
+    if let Some(back) = back {
+        notices.push(Notice {
+            kind: if milling.teeth < 4 {
+                TEETH_DIFFER
+            } else {
+                TOOTH_STANDS_BACK
+            },
+            detail: format!("by about {} mm", figures(back, 2)),
         });
     }
 }

@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
-use crate::cutting::waveform::MillingCut;
+use crate::cutting::waveform::{MillingCut, UnitForces};
 
 /// Part of a missing tooth's unevenness that is worth a notice: runout that lets every tooth cut stays below it.
 const TOLD: f64 = 0.7;
@@ -86,9 +86,97 @@ pub(crate) fn idle_tooth(
     (told && all.is_finite()).then_some(all / missing)
 }
 
+/// A tooth that stands back by this part of the feed per tooth is worth a notice: from four teeth on, where an offset of the
+/// tool's axis is told apart from it, and below, where both look the same.
+const STANDS_BACK: f64 = 0.15;
+const STANDS_BACK_OR_RUNOUT: f64 = 0.4;
+/// Standard errors above nothing.
+const CERTAIN: f64 = 6.0;
+
+/// How far one tooth stands back against the others, mm, where that is no offset of the tool's axis (four teeth and more) or may
+/// be one (two, three); `None` where that is little, or not certain. `std`: of the orders, N.
+///
+/// While every tooth cuts, tooth j has the chip c sin φ + ρ_j − ρ_(j−1): at orders that are no multiple of N only the constant
+/// part stands, D_k = Σ (ρ_j − ρ_(j−1)) e^(−2πijk/N), on the waveform of a chip of even thickness. An axis offset makes D_1 and
+/// D_(N−1) alone; a tooth that stands back by d makes |D_k|² = d² (2 − 2 cos 2πk/N).
+pub(crate) fn tooth_back_mm(
+    cut: &MillingCut,
+    orders: [&[Complex64]; 2],
+    std: [&[f64]; 2],
+    mean: [f64; 2],
+    zero_is_known: bool,
+) -> Option<f64> {
+    let teeth = cut.teeth;
+    if teeth < 2 || orders.iter().any(|o| o.len() < teeth) || std.iter().any(|s| s.len() < teeth) {
+        return None;
+    }
+    let n = teeth as f64;
+    let single = MillingCut {
+        teeth: 1,
+        places: Vec::new(),
+        ..cut.clone()
+    };
+    let unit = single.closed_form(teeth);
+    let (k_t, k_r) = direction(&unit, n, orders, mean, zero_is_known)?;
+    let even_chip = |k: usize| -> f64 {
+        let axis = |axis: usize| (unit[3][axis][k] * k_t + unit[4][axis][k] * k_r).norm_sqr();
+        axis(0) + axis(1)
+    };
+    let strongest = (1..=teeth).map(even_chip).fold(0.0, f64::max);
+    let tell = if teeth < 4 { 1..teeth } else { 2..teeth - 1 };
+    let (mut power, mut noise, mut of_tooth) = (0.0, 0.0, 0.0);
+    for k in tell {
+        let gain = even_chip(k);
+        if gain <= WEAK * strongest {
+            continue;
+        }
+        let square = |values: [f64; 2]| values.iter().map(|v| v * v).sum::<f64>();
+        power += (orders[0][k - 1].norm_sqr() + orders[1][k - 1].norm_sqr()) / gain;
+        noise += square([std[0][k - 1], std[1][k - 1]]) / gain;
+        of_tooth += 2.0 - 2.0 * (TAU * k as f64 / n).cos();
+    }
+    let back = (power / of_tooth).sqrt();
+    let part = if teeth < 4 {
+        STANDS_BACK_OR_RUNOUT
+    } else {
+        STANDS_BACK
+    };
+    let told = back > part * cut.feed_per_tooth_mm && power > CERTAIN * CERTAIN * noise;
+    (told && back.is_finite()).then_some(back)
+}
+
+/// Tangential and radial force for a chip of 1 mm and 1 mm of depth, as the means have it; with an unknown zero as the
+/// tooth-passing order and a usual direction have it.
+fn direction(
+    unit: &UnitForces,
+    teeth: f64,
+    orders: [&[Complex64]; 2],
+    mean: [f64; 2],
+    zero_is_known: bool,
+) -> Option<(f64, f64)> {
+    if zero_is_known {
+        let at_zero = |k: usize, axis: usize| unit[k][axis][0].re;
+        let (a, b, c, d) = (at_zero(0, 0), at_zero(1, 0), at_zero(0, 1), at_zero(1, 1));
+        let determinant = teeth * (a * d - b * c);
+        let (k_t, k_r) = (
+            (d * mean[0] - b * mean[1]) / determinant,
+            (a * mean[1] - c * mean[0]) / determinant,
+        );
+        return (k_t.is_finite() && k_r.is_finite()).then_some((k_t, k_r));
+    }
+    let (k_t, k_r) = USUAL_DIRECTION;
+    let at = teeth as usize;
+    let axis = |axis: usize| (unit[0][axis][at] * k_t + unit[1][axis][at] * k_r).norm_sqr();
+    let expected = (axis(0) + axis(1)) * teeth * teeth;
+    let measured = orders[0][at - 1].norm_sqr() + orders[1][at - 1].norm_sqr();
+    let scale = (measured / expected).sqrt();
+    scale.is_finite().then_some((scale * k_t, scale * k_r))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cutting::waveform::ToothPlace;
     use crate::data::Immersion;
 
     fn cut(teeth: usize, start_deg: f64, exit_deg: f64) -> MillingCut {
@@ -161,5 +249,58 @@ mod tests {
         let cut = cut(3, 120.0, 180.0);
         assert!(told(&cut, &[0.0, 2.0, 1.0], Some(12.0)).is_some());
         assert_eq!(told(&cut, &[1.0, 1.1, 0.9], Some(12.0)), None);
+    }
+
+    /// What is found for radii of the teeth, by the closed form of such teeth; noise of `std` N on every order.
+    fn back(cut: &MillingCut, radii: &[f64], std: f64) -> Option<f64> {
+        let teeth = cut.teeth;
+        let place = |(j, r): (usize, &f64)| ToothPlace {
+            ahead_rad: TAU * j as f64 / teeth as f64,
+            lag_rad: cut.lag_rad,
+            radius_mm: *r,
+        };
+        let own = MillingCut {
+            places: radii.iter().enumerate().map(place).collect(),
+            ..cut.clone()
+        };
+        let unit = own.own_teeth(teeth, false).unit;
+        let coefficient = [900.0, 350.0, 0.0, 15.0, 18.0, 0.0];
+        let order = |axis: usize, k: usize| -> Complex64 {
+            let force: Complex64 = (0..6).map(|c| unit[c][axis][k] * coefficient[c]).sum();
+            force * Complex64::from_polar(1.0, 0.7 * k as f64)
+        };
+        let orders: [Vec<Complex64>; 2] = [0, 1].map(|axis| (1..=teeth).map(|k| order(axis, k)).collect());
+        let mean = [0, 1].map(|axis| order(axis, 0).re);
+        let std = vec![std; teeth];
+        tooth_back_mm(cut, [&orders[0], &orders[1]], [&std, &std], mean, true)
+    }
+
+    #[test]
+    fn a_tooth_that_stands_back_is_told_at_every_feed_and_an_axis_offset_is_not() {
+        for (start, exit) in [(0.0, 180.0), (0.0, 90.0), (110.0, 180.0)] {
+            for teeth in 4..=6 {
+                let cut = cut(teeth, start, exit);
+                for d in [0.03, 0.05, 0.09] {
+                    let mut radii = vec![0.0; teeth];
+                    radii[1] = -d;
+                    let found =
+                        back(&cut, &radii, 0.01).unwrap_or_else(|| panic!("{start}–{exit} {teeth} {d}"));
+                    assert!(
+                        (0.5 * d..1.4 * d).contains(&found),
+                        "{start}–{exit} {teeth}: {d} found as {found}"
+                    );
+                    assert_eq!(back(&cut, &radii, 100.0), None);
+                }
+                let offset: Vec<f64> = (0..teeth)
+                    .map(|j| 0.01 * (TAU * j as f64 / teeth as f64 + 0.5).cos())
+                    .collect();
+                assert_eq!(back(&cut, &offset, 0.01), None, "{start}–{exit} {teeth}");
+            }
+        }
+        let two = cut(2, 0.0, 180.0);
+        assert!(back(&two, &[0.0, -0.06], 0.01).is_some_and(|d| (0.03..0.09).contains(&d)));
+        assert_eq!(back(&two, &[0.0, -0.02], 0.01), None);
+        let three = cut(3, 0.0, 180.0);
+        assert!(back(&three, &[0.0, -0.06, 0.0], 0.01).is_some());
     }
 }

@@ -799,14 +799,46 @@ mod tests {
         }
     }
 
+    /// A tapered end mill in a slot, in closed form: κ is the same all along, a slice is dz / sin κ of edge with the chip c sin φ sin κ.
+    #[test]
+    fn a_tapered_end_mill_has_the_averages_of_its_closed_form() {
+        for taper_deg in [3.0f64, 10.0, 45.0] {
+            let tool = crate::cutting::made_tools::endmill(0.0, 90.0 - taper_deg);
+            let (sin, cos) = (90.0 - taper_deg).to_radians().sin_cos();
+            let own = MillingCut {
+                shape: EdgeShape::of(&tool),
+                ..cut(4, 0.0, 180.0, 0.3)
+            };
+            let unit = own.closed_form(8);
+            let (n, a, c) = (4.0, 2.5, 0.12);
+            for (got, want) in [
+                (unit[0][1][0].re, n * a * c / 4.0),
+                (unit[1][0][0].re, -n * a * c / 4.0 * sin),
+                (unit[1][2][0].re, n * a * c / PI * cos),
+                (unit[2][0][0].re, n * a * c / 4.0 * cos),
+                (unit[2][2][0].re, n * a * c / PI * sin),
+                (unit[3][1][0].re, n * a / (PI * sin)),
+                (unit[4][0][0].re, -n * a / PI),
+                (unit[4][2][0].re, n * a / 2.0 * cos / sin),
+                (unit[5][0][0].re, n * a / PI * cos / sin),
+                (unit[5][2][0].re, n * a / 2.0),
+            ] {
+                assert!((got - want).abs() < 1e-12, "{taper_deg}: {got} {want}");
+            }
+        }
+    }
+
     /// A ball end and an insert with a lead angle, in a slot and in a narrow cut: the force of each bit of edge in space, as a
     /// vector, with its own position and direction; nothing in common with the slices' formulas.
     #[test]
     fn shaped_edges_equal_vectors_summed_over_the_edge() {
         let (orders, steps, bits) = (6, 1440, 600);
-        for (corner_radius_mm, lead_angle_deg, start_deg) in
-            [(6.0, 90.0, 0.0), (6.0, 90.0, 110.0), (1.0, 60.0, 0.0)]
-        {
+        for (corner_radius_mm, lead_angle_deg, start_deg) in [
+            (6.0, 90.0, 0.0),
+            (6.0, 90.0, 110.0),
+            (1.0, 60.0, 0.0),
+            (2.0, 80.0, 0.0),
+        ] {
             let tool = crate::cutting::made_tools::endmill(corner_radius_mm, lead_angle_deg);
             let (depth, feed) = (2.5, 0.12);
             let immersion = Immersion {

@@ -3,6 +3,7 @@
 use crate::InputError;
 use crate::data::{Channel, ChannelRole, TimeRecord};
 use crate::ingest::checks;
+use crate::ingest::tables::channel_names::{self, role_of, split_unit};
 use crate::ingest::tables::clock;
 use crate::ingest::tables::number;
 use crate::ingest::tables::table::{Header, Table};
@@ -20,11 +21,31 @@ pub(crate) fn is_time_table(header: &Header) -> bool {
 
 /// Reads the rows and makes them a time record in SI.
 pub(crate) fn read(bytes: &[u8], header: &Header, notes: &mut Notes) -> Result<TimeRecord, InputError> {
+    let bytes = first_cycle(bytes, header, notes);
     let mut pieces = Pieces::new(bytes, header.clone(), true);
     let table = header.read(bytes, pieces.rate, notes)?;
     let record = pieces.next(table, header.data_line, notes)?;
     pieces.finish(notes);
     Ok(record)
+}
+
+/// DynoWare writes the cycles of a triggered recording below one another, each under a line of its own: the first is read, and
+/// it is told. They are not one record, for there may be any time between them.
+fn first_cycle<'b>(bytes: &'b [u8], header: &Header, notes: &mut Notes) -> &'b [u8] {
+    let rows = bytes.get(header.data_at..).unwrap_or_default();
+    let starts = |word: &str| -> Vec<usize> {
+        memchr::memmem::find_iter(rows, format!("\n{word}").as_bytes()).collect()
+    };
+    let cycles = [starts("Cycle No"), starts("Zyklus Nr")].concat();
+    let Some(first) = cycles.iter().min() else {
+        return bytes;
+    };
+    notes.file(format!(
+        "{} cycles in one file: the first is read, {} left out; export each to a file of its own",
+        cycles.len() + 1,
+        cycles.len()
+    ));
+    &bytes[..header.data_at + first + 1]
 }
 
 /// A table of time signals that is read piece by piece: what one piece has to know of those before it.
@@ -155,7 +176,7 @@ impl Pieces {
         let mut filled = Vec::new();
         let times_column = time_at.map(|at| std::mem::take(&mut table.columns[at]));
         let columns = table.columns.into_iter().enumerate();
-        let channels = columns
+        let mut channels = columns
             .filter(|(i, _)| Some(*i) != time_at)
             .map(|(i, mut values)| {
                 if let (Some(times), Some(grid)) = (&times_column, clock.grid) {
@@ -176,6 +197,7 @@ impl Pieces {
         filled
             .iter_mut()
             .for_each(|r| *r = r.start - overlap..r.end - overlap);
+        channel_names::settle(&mut channels, notes);
         let mut seen: Vec<ChannelRole> = Vec::new();
         for channel in channels.iter().filter(|c| c.role != ChannelRole::Other) {
             if seen.contains(&channel.role) {
@@ -234,100 +256,105 @@ fn check_numbers(table: &Table, header: &Header, first_line: usize) -> Result<()
 }
 
 fn time_column(header: &Header) -> Option<usize> {
-    header.names.iter().position(|name| {
-        let (base, _) = split_unit(name);
-        let base = base.to_lowercase();
-        [
-            "time", "t", "zeit", "temps", "tiempo", "tempo", "cas", "čas", "x_value",
-        ]
-        .contains(&base.as_str())
-            || base.starts_with("time ")
+    let by_name = header.names.iter().position(|name| channel_names::is_time(name));
+    // A first column in seconds or milliseconds is the time, whatever language its name is in.
+    by_name.or_else(|| {
+        let first = column_unit(header, 0).is_some_and(|u| u.dimension == Dimension::TIME);
+        (first && header.names.len() > 1).then_some(0)
     })
 }
 
-/// `Sampling rate [Hz]:,10000` and its relatives.
+/// Keys of the sampling rate in header lines, parts of a key in small letters.
+const RATES: [&str; 15] = [
+    "sampling rate",
+    "sample rate",
+    "samplerate",
+    "samplingrate",
+    "sampling frequency",
+    "sample frequency",
+    "sampling_rate",
+    "sample_rate",
+    "sampling_frequency",
+    "abtastrate",
+    "abtastfrequenz",
+    "messrate",
+    "frecuencia de muestreo",
+    "d'échantillonnage",
+    "采样频率",
+];
+/// Keys of the sampling interval.
+const INTERVALS: [&str; 14] = [
+    "sampling interval",
+    "sample interval",
+    "sampling_interval",
+    "sample_interval",
+    "sampling period",
+    "sample period",
+    "time interval",
+    "time step",
+    "timestep",
+    "delta t",
+    "delta_t",
+    "abtastintervall",
+    "intervalo de muestreo",
+    "采样间隔",
+];
+
+/// `Sampling rate [Hz]:,10000`, `# fs = 5 kHz`, `dt,0.0002`, `Sample interval [ms];0,2` and their relatives, Hz.
 fn sampling_rate(header: &Header) -> Option<f64> {
-    let rate = [
-        "sampling rate",
-        "sample rate",
-        "sampling frequency",
-        "abtastrate",
-        "sampling_rate",
-        "sample_rate",
-    ];
-    let (key, value) = header.entry(&rate)?;
-    let unit = key
-        .split(['[', '('])
-        .nth(1)
-        .and_then(|u| u.split([']', ')']).next())
-        .map(str::trim);
-    // The unit may stand behind the value too.
-    let mut words = value.split_whitespace();
-    let word = words.next()?;
-    let number = number::field(word.as_bytes(), b'.').or_else(|| number::field(word.as_bytes(), b','))?;
-    let factor = unit
-        .or(words.next())
-        .and_then(units::frequency_factor)
-        .unwrap_or(1.0);
-    let rate = number * factor;
-    (rate.is_finite() && rate > 0.0).then_some(rate)
-}
-
-/// The unit that a channel's name gives: `fx_n`, `Fx [N]`.
-pub(crate) fn unit_in_name(name: &str) -> Option<Unit> {
-    split_unit(name).1
-}
-
-/// Name and unit of `Fx [N]`, `Fx (N)`, `fx_n`, `Fx`.
-fn split_unit(name: &str) -> (&str, Option<Unit>) {
-    let name = name.trim();
-    for (open, close) in [('[', ']'), ('(', ')')] {
-        if let Some((base, rest)) = name.split_once(open)
-            && let Some((unit, _)) = rest.split_once(close)
-        {
-            return (base.trim(), units::parse(unit));
+    let entries = header.lines.iter().enumerate().filter_map(|(i, line)| {
+        let line = line.trim_start_matches(['#', '%', '/', '*', ' ', '"']);
+        let at = line.find([':', ';', '\t', ',', '='])?;
+        let (key, value) = line.split_at(at);
+        let clean = |text: &str| -> String {
+            text.trim_matches(|c: char| c.is_whitespace() || ":;,=\"".contains(c))
+                .into()
+        };
+        let value = clean(value);
+        // SignalExpress writes the value below its key.
+        let below = || header.lines.get(i + 1).map(|l| clean(l)).unwrap_or_default();
+        Some((key.trim(), if value.is_empty() { below() } else { value }))
+    });
+    entries.into_iter().find_map(|(key, value)| {
+        let lower = key.to_lowercase();
+        let base = lower.split(['[', '(']).next().unwrap_or_default().trim();
+        let is_rate = RATES.iter().any(|k| lower.contains(k)) || ["fs", "sr", "f_s", "rate"].contains(&base);
+        let is_interval =
+            INTERVALS.iter().any(|k| lower.contains(k)) || ["dt", "delta_x", "x_delta"].contains(&base);
+        if !(is_rate || is_interval) || lower.contains("average") {
+            return None;
         }
-    }
-    for (at, _) in name.match_indices('_') {
-        if let Some(unit) = units::parse_suffix(&name[at + 1..]) {
-            return (&name[..at], Some(unit));
-        }
-    }
-    (name, None)
+        let unit = key
+            .split(['[', '('])
+            .nth(1)
+            .and_then(|u| u.split([']', ')']).next())
+            .map(str::trim);
+        // The unit may stand behind the value too.
+        let mut words = value.split([' ', '\t', ';', '\u{a0}']).filter(|w| !w.is_empty());
+        let word = words.next()?.trim_end_matches(',');
+        let (number, glued) = word.split_at(
+            word.find(|c: char| c.is_alphabetic() && c != 'e' && c != 'E')
+                .unwrap_or(word.len()),
+        );
+        let number =
+            number::field(number.as_bytes(), b'.').or_else(|| number::field(number.as_bytes(), b','))?;
+        let glued = Some(glued).filter(|g| !g.is_empty());
+        let unit = unit.or(glued).or_else(|| words.next());
+        let rate = if is_rate {
+            number * unit.and_then(units::frequency_factor).unwrap_or(1.0)
+        } else {
+            let seconds = unit
+                .and_then(units::parse)
+                .filter(|u| u.dimension == Dimension::TIME);
+            1.0 / (number * seconds.map_or(1.0, |u| u.factor))
+        };
+        (rate.is_finite() && rate > 0.0).then_some(rate)
+    })
 }
 
 fn column_unit(header: &Header, at: usize) -> Option<Unit> {
     let from_line = header.units.get(at).and_then(|label| units::parse_named(label));
     from_line.or_else(|| header.names.get(at).and_then(|name| split_unit(name).1))
-}
-
-/// Role by name (`Fx`, `FX1`, `AFx`, `force_x`, `Mz`, `torque`) where the unit does not speak against it.
-pub(crate) fn role_of(name: &str, unit: Option<Unit>) -> ChannelRole {
-    let base = split_unit(name).0.to_lowercase();
-    let letters: String = base.chars().filter(|c| c.is_alphanumeric()).collect();
-    // Two digits (`Fx12`) are the sum of two of four sensors, not the whole force.
-    let bare = letters.trim_end_matches(|c: char| c.is_ascii_digit());
-    if letters.len() - bare.len() > 1 {
-        return ChannelRole::Other;
-    }
-    let role = match bare {
-        "fx" | "afx" | "forcex" | "xforce" | "kraftx" => ChannelRole::ForceX,
-        "fy" | "afy" | "forcey" | "yforce" | "krafty" => ChannelRole::ForceY,
-        "fz" | "afz" | "forcez" | "zforce" | "kraftz" | "thrust" | "thrustforce" => ChannelRole::ForceZ,
-        "mz" | "amz" | "momentz" | "torquez" | "torque" | "drehmoment" | "mzmoment" => ChannelRole::TorqueZ,
-        _ => return ChannelRole::Other,
-    };
-    let expected = if role == ChannelRole::TorqueZ {
-        Dimension::MOMENT
-    } else {
-        Dimension::FORCE
-    };
-    match unit {
-        Some(unit) if unit.dimension != expected && unit.dimension != Dimension::VOLTAGE => {
-            ChannelRole::Other
-        }
-        _ => role,
-    }
 }
 
 fn channel(

@@ -3,7 +3,7 @@
 use crate::InputError;
 use crate::data::{Channel, ChannelRole, TimeRecord};
 use crate::ingest::checks;
-use crate::ingest::formats::force::{role_of, unit_in_name};
+use crate::ingest::tables::channel_names::{role_of, unit_in_name};
 use crate::ingest::text::Notes;
 use crate::ingest::units::{self, Dimension};
 

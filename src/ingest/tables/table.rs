@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::InputError;
+use crate::ingest::tables::channel_names;
 use crate::ingest::tables::number;
 use crate::ingest::text::{Lines, Notes, decode};
 use crate::ingest::units;
@@ -65,18 +66,37 @@ impl Header {
         let data = &bytes[data_at..];
         let first_row = decode(Lines::new(data).next()?);
         let delimiter = find_delimiter(above.last().map(String::as_str), &first_row, data);
-        let mut names = above.last().map(|l| split_line(l, delimiter)).unwrap_or_default();
+        let fields = split_line(&first_row, delimiter).len();
+        let mut below: Vec<String> = Vec::new();
+        if let Some(at) = names_line(&above, delimiter, fields) {
+            below = above.split_off(at + 1);
+        }
+        let mut names = above
+            .last()
+            .map(|l| split_names(l, delimiter))
+            .unwrap_or_default();
         let mut units = Vec::new();
-        let understood = names.iter().filter(|n| units::parse(n).is_some()).count();
-        let is_units = names.len() > 1 && understood > 0 && 2 * understood >= names.len();
-        if is_units && above.len() > 1 {
-            let candidate = split_line(&above[above.len() - 2], delimiter);
+        let is_units = |names: &[String]| {
+            let understood = names.iter().filter(|n| units::parse(n).is_some()).count();
+            names.len() > 1 && understood > 0 && 2 * understood >= names.len()
+        };
+        if let Some(line) = below.first().map(|l| split_line(l, delimiter))
+            && is_units(&line)
+            && line.len() == names.len()
+        {
+            units = line;
+        } else if below.is_empty() && is_units(&names) && above.len() > 1 {
+            let candidate = split_names(&above[above.len() - 2], delimiter);
             if candidate.len() == names.len() {
                 units = std::mem::replace(&mut names, candidate);
                 above.pop();
             }
         }
-        let fields = split_line(&first_row, delimiter).len();
+        // Behind a comment sign more may stand than names: `# Fx Fy Fz in N`.
+        let is_comment = above.last().is_some_and(|l| l.trim_start().starts_with(COMMENTS));
+        if is_comment && names.len() > fields && names[..fields].iter().all(|n| channel_names::is_known(n)) {
+            names.truncate(fields);
+        }
         // A last line such as `Cycle No:,1` is no names line.
         if names.len() < 2 && fields > 1 || names.first().is_some_and(|n| n.ends_with(':')) {
             names.clear();
@@ -84,6 +104,7 @@ impl Header {
         } else {
             above.pop();
         }
+        above.extend(below);
         // Each row has its time in two tokens then; a single long row is only a bad one.
         let between_commas = delimiter == Delimiter::Byte(b',')
             && !names.is_empty()
@@ -110,6 +131,22 @@ impl Header {
             data_at,
             data_line,
         })
+    }
+
+    /// Takes their meaning from the columns of times: the sampling rate is to count.
+    pub fn without_time(&mut self) {
+        let is_time =
+            |label: &String| units::parse(label).is_some_and(|u| u.dimension == units::Dimension::TIME);
+        for (i, name) in self.names.iter_mut().enumerate() {
+            let in_time = self.units.get(i).is_some_and(is_time)
+                || channel_names::unit_in_name(name).is_some_and(|u| u.dimension == units::Dimension::TIME);
+            if channel_names::is_time(name) || i == 0 && in_time {
+                *name = format!("unused {}", i + 1);
+                if let Some(unit) = self.units.get_mut(i) {
+                    unit.clear();
+                }
+            }
+        }
     }
 
     /// `Key:,value` of a header line whose key contains one of `keys` (lower case); the unit of `Key [Hz]` is
@@ -492,6 +529,34 @@ fn is_field_end(byte: Option<&u8>, delimiter: Delimiter) -> bool {
 
 fn count_fields(line: &[u8]) -> usize {
     split_line(&decode(line), Delimiter::Byte(b',')).len()
+}
+
+/// Signs that begin a comment line.
+const COMMENTS: [char; 2] = ['#', '%'];
+
+/// Names as they stand behind a comment sign too.
+fn split_names(line: &str, delimiter: Delimiter) -> Vec<String> {
+    split_line(line.trim_start().trim_start_matches(COMMENTS), delimiter)
+}
+
+/// The line of names where it is not the last one above the numbers (units below it are looked at by the caller): as many
+/// fields as a row has, and one of them a name that is understood, while the last line has none.
+fn names_line(above: &[String], delimiter: Delimiter, fields: usize) -> Option<usize> {
+    const LINES: usize = 8;
+    let is_names = |line: &String| {
+        let names = split_names(line, delimiter);
+        names.len() > 1 && names.len() == fields && names.iter().any(|n| channel_names::is_known(n))
+    };
+    let from = above.len().saturating_sub(LINES);
+    let at = from + above[from..].iter().rposition(is_names)?;
+    // The last line, or the last but one above units: as ever.
+    (at + 2 < above.len() || at + 2 == above.len() && !is_unit_line(above.last()?, delimiter)).then_some(at)
+}
+
+fn is_unit_line(line: &str, delimiter: Delimiter) -> bool {
+    let fields = split_line(line, delimiter);
+    let understood = fields.iter().filter(|n| units::parse(n).is_some()).count();
+    understood > 0 && 2 * understood >= fields.len()
 }
 
 /// True for a line of numbers and separators only.

@@ -18,6 +18,7 @@ use crate::modal::max_likelihood::ml_linear::{
     FrfSolution, NoisyFrf, PoleColumns, RESIDUAL_TERMS, Solved, SolvedFrf, centre_hz, linearise_one, product,
     residual_terms, weigh, weights,
 };
+use crate::modal::shape;
 use crate::modal::single::local_fit::Pole;
 use crate::stop;
 
@@ -150,6 +151,12 @@ impl Solution {
         let by_poles = found.linear_by_poles.rows(2 * mode, 2);
         let total = found.pair_covariance[mode] + by_poles * &self.covariance * by_poles.transpose();
         (value, (0.5 * total.trace()).max(0.0).sqrt() * omega * omega)
+    }
+
+    /// Modal constants of a mode in all FRFs, 1/kg, each as far as it is known.
+    pub fn known_constants(&self, mode: usize) -> Vec<Complex64> {
+        let each = (0..self.frfs.len()).map(|frf| self.constant(frf, mode));
+        each.map(|(value, std)| shape::as_known(value, std)).collect()
     }
 
     /// Squared size of a mode in an FRF against its uncertainty (two degrees of freedom).

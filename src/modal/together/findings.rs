@@ -156,8 +156,8 @@ pub(crate) fn collect(
                 frequency_std_hz = frequency_std_hz.hypot(apart[0]);
                 damping_std = damping_std.hypot(apart[1]);
             }
-            let residues: Vec<Complex64> = (0..data.len()).map(|m| solution.constant(m, j).0).collect();
-            let collinear = shape::complexity(&residues).is_none_or(|c| c.mpc > IN_PHASE);
+            let known = solution.known_constants(j);
+            let collinear = shape::complexity(&known).is_none_or(|c| c.mpc > IN_PHASE);
             let width_hz = (pole.damping_ratio * pole.frequency_hz).max(line_hz);
             if !collinear && frequency_std_hz > UNPLACED * width_hz.hypot(shift[0]) {
                 result.rejected.push(RejectedMode {
@@ -227,7 +227,13 @@ pub(crate) fn collect(
     let residues: Vec<Vec<Complex64>> = result
         .modes
         .iter()
-        .map(|m| m.constants.iter().flatten().map(|c| c.0).collect())
+        .map(|m| {
+            m.constants
+                .iter()
+                .flatten()
+                .map(|(value, std)| shape::as_known(*value, *std))
+                .collect()
+        })
         .collect();
     result.mac = residues
         .iter()
@@ -315,7 +321,8 @@ fn around(modes: &[GlobalMode]) -> [f64; 2] {
 
 /// Shape by response (or by FRF where degrees of freedom are not known), largest component 1.
 fn shape_of(solution: &ml_fit::Solution, mode: usize, members: &[&SetMember]) -> Vec<(usize, Complex64)> {
-    let constant = |m: usize| solution.constant(m, mode).0;
+    let known = solution.known_constants(mode);
+    let constant = |m: usize| known[m];
     let dofs: Option<Vec<[usize; 2]>> = members.iter().map(|m| m.dofs).collect();
     let Some(dofs) = dofs else {
         let all: Vec<Complex64> = (0..members.len()).map(constant).collect();

@@ -23,20 +23,15 @@ pub(crate) fn estimate(data: &mut [Data]) {
         let curves: Vec<&[Complex64]> = same.iter().map(|&k| data[k].receptance.as_slice()).collect();
         let estimates = frf_noise::estimate(&data[first].frequency_hz, &curves);
         for (&k, estimate) in same.iter().zip(estimates) {
-            let size = rms(&data[k].receptance);
-            let floor = |h: Complex64| (1e-6 * h.norm()).max(1e-9 * size);
+            let lines = data[k].receptance.iter().zip(sizes(&data[k]));
             data[k].sigma = match estimate {
-                Some(e) => e
-                    .std
-                    .iter()
-                    .zip(&data[k].receptance)
-                    .map(|(s, h)| s.max(floor(*h)))
+                Some(e) => lines
+                    .zip(&e.std)
+                    .map(|((h, size), s)| s.max(1e-6 * h.norm()).max(1e-9 * size))
                     .collect(),
                 // Too few lines to tell: relative noise, as of a hammer; the residual scales it later.
-                None => data[k]
-                    .receptance
-                    .iter()
-                    .map(|h| (0.02 * h.norm()).max(1e-3 * size))
+                None => lines
+                    .map(|(h, size)| (0.02 * h.norm()).max(1e-3 * size))
                     .collect(),
             };
         }
@@ -77,6 +72,21 @@ pub(crate) fn alike(data: &[Data]) -> Vec<Data> {
     data
 }
 
+/// By line, what an FRF's size is about: the smaller of its rms and of what the rms of its acceleration is there, so that lines at
+/// frequencies far below the rest, where what an accelerometer measured becomes huge as a displacement, decide nothing.
+fn sizes(data: &Data) -> Vec<f64> {
+    let accelerances = data
+        .frequency_hz
+        .iter()
+        .zip(&data.receptance)
+        .map(|(f, h)| h * (f * f));
+    let (whole, accelerance) = (rms(&data.receptance), rms(&accelerances.collect::<Vec<_>>()));
+    data.frequency_hz
+        .iter()
+        .map(|f| whole.min(accelerance / (f * f).max(f64::MIN_POSITIVE)))
+        .collect()
+}
+
 pub(crate) fn rms(values: &[Complex64]) -> f64 {
     (values.iter().map(|v| v.norm_sqr()).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
@@ -92,19 +102,20 @@ pub(crate) fn renew(data: &mut [Data], groups: &[Group]) {
         .collect();
     let laws = noise_law::fit_along_band(&left_over);
     for ((d, lines), law) in data.iter_mut().zip(&left_over).zip(laws) {
-        let size = rms(&d.receptance);
+        let sizes = sizes(d);
         let fitted = lines.iter().filter(|l| l.squared.is_finite());
         let sigmas = d.sigma.iter().zip(&d.count);
         let (count, level) = fitted.zip(sigmas).fold((0, 0.0), |(n, sum), (line, (s, count))| {
             (n + 1, sum + line.squared / (s * s * count))
         });
         let scale = (level / f64::from(count.max(1))).sqrt().max(1e-6);
-        for ((sigma, line), count) in d
+        for (((sigma, line), count), size) in d
             .sigma
             .iter_mut()
             .zip(lines)
             .zip(&d.count)
-            .filter(|((_, l), _)| l.squared.is_finite())
+            .zip(sizes)
+            .filter(|(((_, l), _), _)| l.squared.is_finite())
         {
             *sigma = match &law {
                 Some(law) => {
@@ -214,6 +225,20 @@ mod tests {
             spread_hz: vec![0.0; lines],
             count: vec![1.0; lines],
         }
+    }
+
+    /// An accelerometer's drift at 0.1 Hz is metres as a displacement; the floor of the lines that count must not follow it.
+    #[test]
+    fn lines_far_below_the_rest_do_not_say_what_size_is() {
+        let f = [0.1, 50.0, 100.0];
+        let mut frf = data(&f, &[1.0; 3]);
+        frf.receptance = f.map(|f| Complex64::from(1.0 / (f * f))).to_vec();
+        let size = sizes(&frf);
+        assert!((size[2] - 1e-4).abs() < 1e-9, "{size:?}");
+        assert!((size[0] - rms(&frf.receptance)).abs() < 1e-9, "{size:?}");
+        // Even displacements: their own rms.
+        frf.receptance = vec![Complex64::ONE; 3];
+        assert_eq!(sizes(&frf)[..2], [1.0; 2]);
     }
 
     /// Fifteen lines of drift, then 200 sound ones.

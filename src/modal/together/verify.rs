@@ -145,16 +145,20 @@ struct Candidate<'a> {
     solution: &'a Solution,
     pole: usize,
     residues: Vec<Complex64>,
+    /// As far as they are known.
+    known: Vec<Complex64>,
     local: Local,
 }
 
 impl<'a> Candidate<'a> {
     fn new(data: &[Data], group: &'a Group, j: usize) -> Candidate<'a> {
         let solution = &group.solution;
-        let frfs = 0..solution.frfs.len();
-        let residues: Vec<Complex64> = frfs.map(|m| solution.constant(m, j).0).collect();
+        let residues: Vec<Complex64> = (0..solution.frfs.len())
+            .map(|m| solution.constant(m, j).0)
+            .collect();
         Candidate {
             local: Local::new(data, group, j, &residues),
+            known: solution.known_constants(j),
             solution,
             pole: j,
             residues,
@@ -163,7 +167,7 @@ impl<'a> Candidate<'a> {
 
     /// Modal phase collinearity, 0 to 1; 1 where there is nothing to compare.
     fn mpc(&self) -> f64 {
-        shape::complexity(&self.residues).map_or(1.0, |c| c.mpc)
+        shape::complexity(&self.known).map_or(1.0, |c| c.mpc)
     }
 
     /// Of its peak, over all FRFs, to compare.
@@ -385,11 +389,7 @@ fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2], common: bool
     if b.frequency_hz - a.frequency_hz > reach {
         return None;
     }
-    let residues = both.map(|j| {
-        (0..solution.frfs.len())
-            .map(|m| solution.constant(m, j).0)
-            .collect::<Vec<Complex64>>()
-    });
+    let residues = both.map(|j| solution.known_constants(j));
     // By the height of the peaks.
     let height = |k: usize, pole: Pole| {
         residues[k].iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt() / pole.damping_ratio

@@ -124,7 +124,10 @@ pub(crate) fn time_axis(
 pub(crate) fn refused(problem: &str, header: &Header) -> InputError {
     InputError::new(format!("the samples are not evenly spaced in time: {problem}"))
         .line(header.data_line)
-        .remedy("export the record again with even steps, or cut the row range out that has them")
+        .remedy(
+            "export the record again with even steps, or cut the row range out that has them; where the samples are even and the \
+             times are not to be trusted: give rate_hz in a [[channel]] of campaign.toml",
+        )
 }
 
 /// Factor that puts right a time column whose unit is called wrongly ("ms" on values in seconds): what the header's rate

@@ -28,8 +28,10 @@ pub(crate) fn contents(
     notes: &mut Notes,
 ) -> Result<Contents, InputError> {
     if variables.is_empty() {
-        return Err(InputError::new("a MAT-file without numeric arrays")
-            .remedy("save the frequency axis f (Hz) or the times t (s) and the data as plain arrays"));
+        return Err(
+            InputError::new("a file of arrays (MATLAB, HDF5, NumPy) without one of numbers")
+                .remedy("save the frequency axis f (Hz) or the times t (s) and the data as plain arrays"),
+        );
     }
     let mut used = vec![false; variables.len()];
     let mut contents = Contents::default();
@@ -40,12 +42,12 @@ pub(crate) fn contents(
     contents.times.append(&mut times);
     if contents.frfs.is_empty() && contents.times.is_empty() && contents.others.is_empty() {
         return Err(InputError::new(format!(
-            "a MAT-file in which no FRF and no time signal is recognised ({})",
+            "arrays in which no FRF and no time signal is recognised ({})",
             names(variables.iter())
         ))
         .remedy(
             "name the axis f (Hz) or t (s); FRFs are complex arrays with a dimension as long as f, signals real ones \
-             with a dimension as long as t",
+             with a dimension as long as t; forces without a time axis: give rate_hz in a [[channel]] of campaign.toml",
         ));
     }
     let left: Vec<&Variable> = variables
@@ -495,24 +497,17 @@ fn time_signals(
     notes: &mut Notes,
 ) -> Result<Vec<TimeRecord>, InputError> {
     let mut records = Vec::new();
-    let rate = variables.iter().enumerate().find_map(|(k, v)| {
-        let scalar = v.scalar().filter(|s| *s > 0.0)?;
-        let is_rate = v.mentions(&["sample_rate", "samplerate", "sampling_rate", "samplingrate"])
-            || v.is_called(&["fs", "fsamp", "f_s", "rate", "sr"]);
-        let is_step = v.is_called(&["dt", "ts", "delta_t", "deltat", "d_t"]);
-        match (is_rate, is_step) {
-            (true, _) => Some((k, scalar)),
-            (_, true) => Some((k, 1.0 / scalar)),
-            _ => None,
-        }
-    });
+    let mut said = variables.iter().enumerate();
+    let rate = said.find_map(|(k, v)| Some((k, v.says_rate_hz()?)));
     let is_time = |v: &Variable| {
         v.im.is_none()
             && v.is_vector()
             && v.re.len() >= MIN_AXIS
             && v.re.iter().all(|t| t.is_finite())
             && (v.is_called(&["t", "zeit", "t_s", "tvec", "time", "time_s"])
-                || v.is_axis() && v.own_name().to_lowercase().starts_with("time"))
+                || v.is_axis()
+                    && (v.own_name().to_lowercase().starts_with("time")
+                        || v.words().iter().any(|w| w == "time")))
     };
     // Length, rate, start, and times with their grid where they are uneven.
     type Uneven<'t> = Option<(&'t [f64], Grid)>;

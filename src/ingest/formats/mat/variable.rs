@@ -139,6 +139,40 @@ impl Variable {
         ])
     }
 
+    /// The sampling rate, where the variable is one number that says it or the interval.
+    pub fn says_rate_hz(&self) -> Option<f64> {
+        let scalar = self.scalar().filter(|s| *s > 0.0)?;
+        let name = self.own_name().to_lowercase();
+        let name = name.trim_end_matches("_hz").trim_end_matches("_s");
+        let is_rate = [
+            "sample_rate",
+            "samplerate",
+            "sampling_rate",
+            "samplingrate",
+            "sampling_freq",
+            "sample_freq",
+            "samplingfreq",
+        ]
+        .iter()
+        .any(|part| name.contains(part))
+            || ["fs", "fsamp", "f_s", "rate", "sr"].contains(&name);
+        let is_step = [
+            "dt",
+            "ts",
+            "delta_t",
+            "deltat",
+            "d_t",
+            "sample_interval",
+            "sampling_interval",
+        ]
+        .contains(&name);
+        match (is_rate, is_step) {
+            (true, _) => Some(scalar),
+            (_, true) => Some(1.0 / scalar).filter(|r| r.is_finite()),
+            _ => None,
+        }
+    }
+
     pub fn is_vector(&self) -> bool {
         self.size.iter().filter(|n| **n > 1).count() == 1
     }

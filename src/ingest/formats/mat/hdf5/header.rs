@@ -65,6 +65,9 @@ pub(crate) enum Layout {
     },
 }
 
+/// Attributes of one object that are kept.
+const NUMBERS_AT_MOST: usize = 64;
+
 /// All that is used of an object header.
 #[derive(Debug, Default)]
 pub(crate) struct Object {
@@ -83,6 +86,8 @@ pub(crate) struct Object {
     pub dense_links: Option<(u64, u64)>,
     /// Text of the attribute `MATLAB_class`.
     pub class: String,
+    /// Attributes that hold one number: name, kind and bytes.
+    pub numbers: Vec<(String, Type, Vec<u8>)>,
     /// Whether there is an attribute `MATLAB_empty`.
     pub is_empty: bool,
     is_group: bool,
@@ -239,8 +244,21 @@ impl Object {
         m.take(usize::from(version == 3))?;
         let padded = |size: usize| if version == 1 { size.div_ceil(8) * 8 } else { size };
         let name = text(m.take(padded(name))?);
-        m.take(padded(kind))?;
-        m.take(padded(space))?;
+        let kind = m.take(padded(kind))?;
+        let space = m.take(padded(space))?;
+        let part = |bytes| Cursor {
+            bytes,
+            at: 0,
+            widths: m.widths,
+        };
+        let (kind, space) = (datatype(&mut part(kind)), dataspace(&mut part(space)));
+        if let (Ok(kind @ (Type::Integer { .. } | Type::Float { .. })), Ok((Some(sizes), _))) = (kind, space)
+            && sizes.iter().all(|n| *n == 1)
+            && self.numbers.len() < NUMBERS_AT_MOST
+            && let Some(bytes) = m.bytes.get(m.at..m.at + kind.size(m.widths))
+        {
+            self.numbers.push((name.clone(), kind, bytes.to_vec()));
+        }
         match name.as_str() {
             "MATLAB_class" => self.class = text(&m.bytes[m.at..]),
             "MATLAB_empty" => self.is_empty = true,

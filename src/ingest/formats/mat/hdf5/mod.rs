@@ -124,6 +124,7 @@ impl Walk<'_> {
     fn object(&mut self, address: u64, path: &str, depth: usize) -> Step<()> {
         self.visits.one()?;
         let object = Object::read(self.file, address, self.widths)?;
+        self.attributes(&object, path);
         if !object.is_group() {
             return self.dataset(&object, path, depth);
         }
@@ -149,6 +150,27 @@ impl Walk<'_> {
             }
         }
         Ok(())
+    }
+
+    /// A sampling rate or interval that stands beside the data, as h5py programs write it.
+    fn attributes(&mut self, object: &Object, path: &str) {
+        for (name, kind, bytes) in &object.numbers {
+            let variable = |re| Variable {
+                name: if path.is_empty() {
+                    name.clone()
+                } else {
+                    format!("{path}.{name}")
+                },
+                size: vec![1, 1],
+                re,
+                im: None,
+            };
+            let (re, _) = of_bytes(bytes, kind);
+            let variable = variable(re);
+            if variable.says_rate_hz().is_some() {
+                self.variables.push(variable);
+            }
+        }
     }
 
     /// An object in another one: what is damaged is named, and the rest is read.

@@ -24,9 +24,12 @@ const ENOUGH_FRFS: usize = 5;
 const COLLINEAR: f64 = 0.5;
 /// A pole that makes this share of what was measured in its band is there, whatever its phases are …
 const DOMINANT: f64 = 0.5;
-/// … unless they are those of chance next to a stronger one, where the modes of the set have common ones, more than so many.
+/// … unless they are those of chance next to a stronger one, in a set whose modes have common ones: at least three and one in three of
+/// them.
 const BY_CHANCE: f64 = 0.25;
+const ALIKE_PHASE: f64 = 0.8;
 const OTHERS: usize = 3;
+const A_GOOD_PART: usize = 3;
 /// … or where, alone, it makes so many times what was measured there: what is far away takes away what it adds.
 const CANCELLED: f64 = 2.0;
 /// Less of what was measured in its band than this (0.3 % of the amplitude) is beyond what a test can show, however little the noise
@@ -181,21 +184,22 @@ impl<'a> Candidate<'a> {
     }
 }
 
-/// Whether the modes of this set have common phases: the median of those that stand alone. Sets whose references or channels are
-/// shifted in time have none.
+/// Whether the modes of this set have common phases: a good part of those that stand alone. Sets whose references or channels are
+/// shifted in time have none, and parts of modes are no modes.
 fn common_phase(data: &[Data], groups: &[Group]) -> bool {
-    let mut all: Vec<f64> = groups
+    let all: Vec<f64> = groups
         .iter()
         .flat_map(|group| (0..group.solution.poles.len()).map(move |j| Candidate::new(data, group, j)))
-        .filter(|candidate| candidate.residues.len() >= ENOUGH_FRFS && candidate.dominates())
+        .filter(|candidate| candidate.known.len() >= ENOUGH_FRFS && candidate.dominates())
         .map(|candidate| candidate.mpc())
         .collect();
-    all.sort_by(f64::total_cmp);
-    all.len() > OTHERS && all[all.len() / 2] > IN_PHASE
+    let in_phase = all.iter().filter(|mpc| **mpc > ALIKE_PHASE).count();
+    in_phase >= OTHERS && A_GOOD_PART * in_phase >= all.len()
 }
 
 /// The poles, by group and number, that have phases by chance next to a stronger one, or that others cancel, in a set whose modes have
-/// common phases: parts of those which the model of one mode does not hold. They stay in the fit, where they do no harm and what they stand for would.
+/// common phases: parts of those which the model of one mode does not hold. They stay in the fit: what they stand for would do harm to
+/// the others.
 pub(super) fn parts_of_others(data: &[Data], groups: &[Group]) -> Vec<(usize, usize)> {
     if data.len() < ENOUGH_FRFS || !common_phase(data, groups) {
         return Vec::new();

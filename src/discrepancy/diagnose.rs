@@ -9,12 +9,13 @@ use super::candidate::{BaselineFit, EffectCandidate};
 use super::diagnosis::Diagnosis;
 use super::verdict::{self, DiagnosisVerdict};
 use crate::Result;
+use crate::effects::Site;
 use crate::identify::frfs::calibrate::{Calibration, estimates};
 use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
 use crate::identify::rest::{BeyondSlips, Rest};
 use crate::identify::study::{
-    Effort, Extent, InstanceOf, ModelOf, Study, Tried, View, held_out, rescue, try_again, try_effect,
-    try_effects, vanished,
+    Effort, Extent, InstanceOf, ModelOf, Study, Tried, View, from_possible_size, held_out, rescue, try_again,
+    try_effect, try_effects, vanished,
 };
 use crate::progress::Progress;
 
@@ -188,6 +189,12 @@ impl<'a, S: Study> Engine<'a, S> {
             && let Some(fit) = rescue(study, model, best, &self.hints, REFINE)?
         {
             best.fit = fit;
+        }
+        if refined
+            .first()
+            .is_some_and(|best| !verdict::is_noise(self.reduced_chi2(best)))
+        {
+            self.from_possible_sizes(&tried, &mut refined)?;
         }
 
         let base_reduced = 2.0 * base.cost / self.freedom(model, Extent::Full);
@@ -440,6 +447,37 @@ impl<'a, S: Study> Engine<'a, S> {
             .collect::<Result<_>>()?;
         refined.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
         Ok(refined)
+    }
+
+    /// Where nothing explains the data: effects of the whole structure that have ended at sizes which cannot be, from possible ones. What
+    /// comes to lie before others is put among the leaders.
+    fn from_possible_sizes(&self, tried: &[TriedOf<S>], refined: &mut Vec<TriedOf<S>>) -> Result<()> {
+        let bases = [self.calibration.theta.clone(), self.model.nominal_theta()];
+        let cannot_be = |t: &&TriedOf<S>| {
+            let own = self.base_count..t.model.parameters.len();
+            let sizes = estimates(&t.model.parameters, &t.fit, 1.0);
+            let impossible = sizes.is_ok_and(|all| {
+                self.study
+                    .impossible(&t.model, &t.instance, &all[own.clone()])
+                    .is_some()
+            });
+            impossible || own.clone().any(|i| t.fit.at_bound.contains(&i))
+        };
+        let found: Vec<Option<TriedOf<S>>> = tried
+            .par_iter()
+            .filter(|t| t.instance.site == Site::Everywhere)
+            .filter(cannot_be)
+            .map(|t| from_possible_size(self.study, t, &bases, REFINE))
+            .collect::<Result<_>>()?;
+        for found in found.into_iter().flatten() {
+            match refined.iter_mut().find(|t| t.instance == found.instance) {
+                Some(known) if known.fit.cost <= found.fit.cost => {}
+                Some(known) => *known = found,
+                None => refined.push(found),
+            }
+        }
+        refined.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
+        Ok(())
     }
 
     fn judge(&self, tried: &TriedOf<S>, refined: bool, evidence: &Evidence) -> Result<CandidateOf<S>> {

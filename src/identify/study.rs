@@ -665,6 +665,60 @@ pub fn try_again<S: Study>(
         .collect()
 }
 
+/// Share of the misfit by which a fit from a possible size must be better to be followed.
+const CLEARLY_BETTER: f64 = 0.05;
+
+/// `tried`, whose effect has led to a size that cannot be: fitted anew with the effect held at its nominal size until the parameters in
+/// front, from `bases`, have made room for it, then with all free. `tried` stands on the coarse view; what is found is fitted to all
+/// data. `None` where it is not clearly better.
+pub fn from_possible_size<S: Study>(
+    study: &S,
+    tried: &Tried<S::Domain>,
+    bases: &[Vec<f64>],
+    stopping: Stopping,
+) -> Result<Option<Tried<S::Domain>>> {
+    let model = &tried.model;
+    let bounds = model.bounds();
+    let view = |measure| View {
+        extent: Extent::Glance,
+        measure,
+        ..View::COARSE
+    };
+    let (rough, likelihood) = (
+        study.problem(model, view(Measure::Rough)),
+        study.problem(model, view(Measure::Likelihood)),
+    );
+    let from = |base: &Vec<f64>| -> Result<Fit> {
+        let mut start = base.clone();
+        let mut held = bounds.clone();
+        for (parameter, bound) in model.parameters.iter().zip(&mut held).skip(base.len()) {
+            let nominal = parameter.internal(parameter.nominal);
+            start.push(nominal);
+            *bound = [nominal; 2];
+        }
+        let near = minimise(&rough, &start, &held, LOOK)?;
+        let near = minimise(&likelihood, &near.theta, &held, LOOK)?;
+        minimise(&likelihood, &near.theta, &bounds, SETTLE)
+    };
+    let fits = bases.iter().filter_map(|base| from(base).ok());
+    let best = fits.min_by(|a, b| a.cost.total_cmp(&b.cost));
+    let before = likelihood.cost(&tried.fit.theta)?;
+    let Some(best) = best.filter(|fit| fit.cost < before * (1.0 - CLEARLY_BETTER)) else {
+        return Ok(None);
+    };
+    let coarse = minimise(&study.problem(model, View::COARSE), &best.theta, &bounds, SETTLE)?;
+    if coarse.cost > tried.fit.cost * (1.0 - CLEARLY_BETTER) {
+        return Ok(None);
+    }
+    let fit = minimise(
+        &study.problem(model, View::FULL),
+        &coarse.theta,
+        &bounds,
+        stopping,
+    )?;
+    Ok(Some(Tried { fit, ..tried.clone() }))
+}
+
 /// The effect added last may be stuck away from its best fit: from further starting points a better one, if there is any.
 /// `tried` is fitted on all data; `model` is the one without the effect.
 pub fn rescue<S: Study>(

@@ -61,3 +61,17 @@ fn each_is_named_and_added_with_its_parameters() {
         }
     }
 }
+
+/// A campaign on which the fit with flexible links ran away to 1180 GPa, beyond the other candidates: `add` found the optimum that
+/// `diagnose` had called unknown.
+#[test]
+fn what_add_finds_diagnose_finds() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("cell");
+    let path = dir.to_str().unwrap();
+    let arguments = ["simulate", "--out", path, "--seed", "970131", "--random", "trial"];
+    document(&[&arguments[..], &["--lines-hz", "0.5"]].concat());
+    let found = document(&["diagnose", path]);
+    assert_eq!(found["effect"], "link-flexibility", "{}", found["best_guess"]);
+    assert!(found["candidates"][0]["reduced_chi2"].as_f64().unwrap() < 1.05);
+}

@@ -194,7 +194,7 @@ impl<'a, S: Study> Engine<'a, S> {
             .first()
             .is_some_and(|best| !verdict::is_noise(self.reduced_chi2(best)))
         {
-            self.from_possible_sizes(&tried, &mut refined)?;
+            self.begin_at_possible_sizes(&tried, &mut refined)?;
         }
 
         let base_reduced = 2.0 * base.cost / self.freedom(model, Extent::Full);
@@ -451,7 +451,7 @@ impl<'a, S: Study> Engine<'a, S> {
 
     /// Where nothing explains the data: effects of the whole structure that have ended at sizes which cannot be, from possible ones. What
     /// comes to lie before others is put among the leaders.
-    fn from_possible_sizes(&self, tried: &[TriedOf<S>], refined: &mut Vec<TriedOf<S>>) -> Result<()> {
+    fn begin_at_possible_sizes(&self, tried: &[TriedOf<S>], refined: &mut Vec<TriedOf<S>>) -> Result<()> {
         let bases = [self.calibration.theta.clone(), self.model.nominal_theta()];
         let cannot_be = |t: &&TriedOf<S>| {
             let own = self.base_count..t.model.parameters.len();

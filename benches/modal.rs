@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use criterion::{Criterion, criterion_group};
 use lobestone::analysis::ModalAnalysis;
-use lobestone::analysis::modes::modal::{FileReading, FrfInput};
+use lobestone::analysis::modes::modal::{FrfInput, FrfReading};
 use lobestone::modal::Settings;
 use num_complex::Complex64;
 use rand::{Rng, SeedableRng};
@@ -89,7 +89,7 @@ fn seconds_of_files(files: &[String]) -> lobestone::Result<Vec<f64>> {
     let sets: Vec<Vec<FrfInput>> = files
         .iter()
         .map(|file| {
-            let analysis = ModalAnalysis::of_files(&[file], false, &FileReading::default(), &settings())?;
+            let analysis = ModalAnalysis::of_files(&[file], false, &FrfReading::default(), &settings())?;
             let frfs = analysis.sets.into_iter().flat_map(|set| set.frfs);
             Ok(frfs.map(|frf| frf.input).collect())
         })

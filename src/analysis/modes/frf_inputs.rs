@@ -13,7 +13,7 @@ use crate::{Error, InputError, Result};
 
 /// How files are read that do not say all of it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct FileReading {
+pub struct FrfReading {
     /// What FRFs are where their file does not say.
     pub unsaid: Quantity,
     /// FRF files were measured with an exponential window e^(−decay t) on the responses (and the force): what it added to the damping
@@ -26,7 +26,7 @@ pub struct FileReading {
 /// FRFs of one file: as they stand there, or from the hits of a raw record.
 pub(crate) fn read(
     path: &Path,
-    reading: &FileReading,
+    reading: &FrfReading,
     hits: &mut Vec<(String, Vec<Hit>)>,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<FrfInput>> {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-pub use crate::analysis::modes::frf_inputs::FileReading;
+pub use crate::analysis::modes::frf_inputs::FrfReading;
 use crate::analysis::modes::frf_inputs::read;
 pub use crate::analysis::modes::mode_set::{AnalysedFrf, FrfInput, SetModes};
 use crate::analysis::modes::mode_set::{analyse_set, dofs_of_frfs, set_warnings};
@@ -87,7 +87,7 @@ impl ModalAnalysis {
     pub fn of_files(
         files: &[impl AsRef<Path>],
         together: bool,
-        reading: &FileReading,
+        reading: &FrfReading,
         settings: &Settings,
     ) -> Result<Self> {
         let mut inputs = Vec::new();

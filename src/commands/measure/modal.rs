@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 use serde_json::json;
 
-use crate::analysis::modes::modal::FileReading;
+use crate::analysis::modes::modal::FrfReading;
 use crate::analysis::modes::operational;
 use crate::analysis::{ModalAnalysis, SetModes};
 use crate::campaign::Campaign;
@@ -203,7 +203,7 @@ pub fn run(args: ModalArgs) -> Result<Outcome> {
             );
         }
         files => {
-            let reading = FileReading {
+            let reading = FrfReading {
                 unsaid: args.quantity,
                 added_decay_per_s: args.window_tau.map_or(0.0, |tau| 1.0 / tau),
                 taps,

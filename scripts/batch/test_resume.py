@@ -1,18 +1,24 @@
 """Kill the workers of a batch again and again, and compare what they leave with a batch that was never interrupted.
 
-    python3 scripts/batch/test_resume.py [--lobestone target/release/lobestone] [--campaigns 40] [--snakemake snakemake]
+    python3 scripts/batch/test_resume.py [--engine array,snakemake,dask,ray] [--campaigns 200] [--lobestone PROGRAM]
 
-Makes many tiny campaigns (one of ten broken), starts a worker a shard, kills all of them (SIGKILL, as a power cut would)
-after a while, cuts one result in half, and starts them again until they come to their end. Fails unless every result that
-was there before a kill is left as it was, no row is lost or double, the merged table is the same, cell by cell but for
-the column `seconds`, as that of one uninterrupted run in a single shard, and the campaign folders are as they were. With
---snakemake the workers of the last round are those of scripts/batch/Snakefile. Python 3.9 or newer, nothing else; Linux.
+Makes many tiny campaigns (one of ten broken) and works on them in one go. Then, with each engine, the same again: some rounds in
+which single workers are killed (SIGKILL) while the engine runs, until the engine with all its workers is killed, too, as a power
+cut would, and one result is cut in half; and a last round in which workers are killed and the engine has to come to the end by
+itself. Fails unless every result that was there before a kill is left as it was, no row is lost or double, the merged table is the
+same, cell by cell but for the column `seconds`, as that of the uninterrupted run, and the campaign folders are as they were.
+
+`array` runs scripts/batch/array.sbatch as Slurm would, two tasks at a time, and hands it in again until no task fails; the others
+are the recipes of this folder, and need what these need. Python 3.10 or newer; Linux.
 """
 
 import argparse
 import csv
 import hashlib
+import os
 import random
+import re
+import shlex
 import shutil
 import signal
 import subprocess
@@ -21,7 +27,10 @@ import tempfile
 import time
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+# What runs at the same time.
+JOBS = 2
 
 
 def need(holds, what):
@@ -37,17 +46,31 @@ def digest(folder):
     return found.hexdigest()
 
 
+def thinned(source, to, posture="p1"):
+    """A copy of a campaign with one of its postures."""
+    shutil.copytree(source, to)
+    toml = to / "campaign.toml"
+    tables = re.split(r"(?m)^(?=\[)", toml.read_text())
+    others = [t for t in tables if re.search(r'^(id|posture) = "', t, re.M) and f'"{posture}"' not in t]
+    toml.write_text("".join(t for t in tables if t not in others))
+    for table in others:
+        for name in re.findall(r'^file = "(.*)"', table, re.M):
+            (to / name).unlink()
+
+
 def make_campaigns(folder, source, count):
     """Copies of a campaign; every tenth lacks a file. The comment makes each another one."""
+    tiny = folder / "source"
+    thinned(source, tiny)
     lines = ["campaign,robot,date"]
     for i in range(count):
-        name = f"cell {i % 4}/night{i // 4:02d}"
-        shutil.copytree(source, folder / name)
+        name = f"cell {i % 8}/night{i // 8:02d}"
+        shutil.copytree(tiny, folder / name)
         toml = folder / name / "campaign.toml"
         toml.write_text(toml.read_text() + f"\n# night {i}\n")
         if i % 10 == 9:
             min(p for p in (folder / name).rglob("*") if p.is_file() and p.suffix != ".toml").unlink()
-        lines.append(f"{name},cell{i % 4},2026-11-{1 + i // 4:02d}")
+        lines.append(f"{name},cell{i % 8},2026-11-{1 + i // 8:02d}")
     manifest = folder / "nights.csv"
     manifest.write_text("\n".join(lines) + "\n")
     return manifest
@@ -62,14 +85,139 @@ def results_in(out):
     return {p.name: (p.stat().st_mtime_ns, p.stat().st_ino) for p in (out / "campaigns").glob("[!.]*.json")}
 
 
+def processes_of_session(session):
+    """Ids and command lines of the processes of a session, from /proc."""
+    found = {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            # Behind the name in brackets: state, parent, group, session.
+            fields = stat.read_text().rpartition(")")[2].split()
+            if int(fields[3]) == session and fields[0] != "Z":
+                found[int(stat.parent.name)] = (stat.parent / "cmdline").read_bytes().split(b"\0")
+        except OSError:
+            continue
+    return found
+
+
+def kill(process):
+    try:
+        os.kill(process, signal.SIGKILL)
+    except ProcessLookupError:
+        pass
+
+
+class Engine:
+    """How one engine is started, started again after a power cut, and which of its processes are workers."""
+
+    def __init__(self, name, lobestone, manifest, out, wanted, folder):
+        self.name, self.lobestone, self.folder = name, lobestone, folder
+        self.again, shards, steps = False, wanted.shards, wanted.steps
+        python = sys.executable
+        recipe = [str(manifest), str(out), "--shards", str(shards), "--do", steps, "--workers", str(JOBS), "--lobestone", lobestone]
+        tasks = f"SLURM_ARRAY_TASK_MIN=1 SLURM_ARRAY_TASK_MAX={shards} SLURM_ARRAY_TASK_COUNT={shards} SLURM_CPUS_PER_TASK=1"
+        task = [str(HERE / "array.sbatch"), str(manifest), str(out), "--do", steps]
+        # A task that fails is no reason to leave the others; all are handed in again.
+        one = f"LOBESTONE={shlex.quote(lobestone)} {tasks} SLURM_ARRAY_TASK_ID=$0 bash {shlex.join(task)} || exit 1"
+        array = f"until seq 1 {shards} | xargs -P {JOBS} -n 1 bash -c {shlex.quote(one)}; do :; done"
+        self.command = {
+            "array": ["bash", "-c", f"{array}; {shlex.join([lobestone, 'fleet', str(out)])}"],
+            "snakemake": [
+                wanted.snakemake, "--snakefile", str(HERE / "Snakefile"), "--directory", str(folder), "--cores", str(JOBS),
+                "--retries", "5", "--config", f"manifest={manifest}", f"out={out}", f"shards={shards}", f"do={steps}",
+                f"lobestone={lobestone}",
+            ],
+            "dask": [python, str(HERE / "dask_batch.py"), *recipe],
+            "ray": [python, str(HERE / "ray_batch.py"), *recipe],
+        }[name]  # fmt: skip
+
+    def start(self, log):
+        if self.again and self.name == "snakemake":
+            subprocess.run([*self.command, "--unlock"], check=True, stdout=log, stderr=log)
+        command = self.command + (["--rerun-incomplete"] if self.again and self.name == "snakemake" else [])
+        self.again = True
+        return subprocess.Popen(command, start_new_session=True, stdout=log, stderr=log)
+
+    def workers(self, run):
+        """The program at work on a shard, and what runs it where an engine has processes for that."""
+        of_program = [self.lobestone.encode(), b"--quiet"]
+        all_of_it = processes_of_session(run.pid)
+        of_engine = {
+            "dask": lambda words: any(b"spawn_main" in word for word in words),
+            "ray": lambda words: words[0].startswith(b"ray::shard"),
+        }.get(self.name, lambda words: False)
+        at_work = [process for process, words in all_of_it.items() if words[:2] == of_program]
+        # Before anything is at work the engine itself is still starting.
+        return at_work and at_work + [process for process, words in all_of_it.items() if of_engine(words)]
+
+
+def killed_and_resumed(engine, out, wanted, dice):
+    """Rounds of kills, and the last one to the end. How many workers were killed."""
+    count, killed, kept = wanted.campaigns, 0, 0
+    log = open(engine.folder / "log", "w+")
+
+    def told():
+        log.seek(0)
+        return log.read()[-4000:]
+
+    for cut in range(wanted.kills):
+        there = results_in(out)
+        # Until some more are done, so that a slow machine comes to its end as well.
+        aim = len(there) + max(1, count // (wanted.kills + 2))
+        run = engine.start(log)
+        begun = last = time.monotonic()
+        while len(results_in(out)) < aim:
+            need(run.poll() is None, f"{engine.name} ended early, with status {run.returncode}:\n{told()}")
+            need(time.monotonic() - begun < 600, f"{engine.name} did not get to {aim} results:\n{told()}")
+            time.sleep(0.02)
+            if time.monotonic() - last > 2.0 and (workers := engine.workers(run)):
+                kill(dice.choice(workers))
+                killed, last = killed + 1, time.monotonic()
+        time.sleep(dice.uniform(0, 0.3))
+        # Again until none is left: one may just have been starting another.
+        while left := processes_of_session(run.pid):
+            for process in left:
+                kill(process)
+            run.poll()
+            time.sleep(0.02)
+        run.wait()
+        now = results_in(out)
+        redone = [name for name, when in there.items() if now.get(name) != when]
+        need(len(redone) <= (1 if cut else 0), f"results that were there were written again: {redone}")
+        kept += len(there) - len(redone)
+        print(f"  power cut {cut + 1}: {len(now)} of {count} results are there, {len(redone)} redone, {killed} workers killed so far")
+        # A file cut off by a full disk: the next round has to notice.
+        victim = out / "campaigns" / sorted(now)[dice.randrange(len(now))]
+        data = victim.read_bytes()
+        victim.write_bytes(data[: len(data) // 2])
+    need(kept > 0, "nothing was kept over a power cut")
+    left = list((out / "campaigns").glob(".lobestone-*"))
+    print(f"  {len(left)} half-written files of killed workers lie about")
+
+    begun = last = time.monotonic()
+    run, alone = engine.start(log), 0
+    while run.poll() is None:
+        need(time.monotonic() - begun < 900, f"{engine.name} did not come to its end:\n{told()}")
+        time.sleep(0.02)
+        if alone < wanted.kills and time.monotonic() - last > 1.0 and (workers := engine.workers(run)):
+            kill(dice.choice(workers))
+            alone, last = alone + 1, time.monotonic()
+    need(run.returncode == 0, f"{engine.name} failed:\n{told()}")
+    need(alone > 0, "no worker was killed in the last round")
+    print(f"  the rest and the fleet: {time.monotonic() - begun:.1f} s, {alone} workers killed")
+    return killed + alone
+
+
 def main():
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("--lobestone", default=str(ROOT / "target/release/lobestone"))
-    arguments.add_argument("--snakemake", help="finish with this Snakemake")
+    arguments.add_argument("--engine", default="array", help="array, snakemake, dask or ray; several with commas")
+    # The one next to this Python, where there is one.
+    beside = Path(sys.executable).with_name("snakemake")
+    arguments.add_argument("--snakemake", default=str(beside) if beside.exists() else "snakemake")
     arguments.add_argument("--source", default=str(ROOT / "tests/data/blind/frf-9115"))
-    arguments.add_argument("--campaigns", type=int, default=40)
-    arguments.add_argument("--shards", type=int, default=4)
-    arguments.add_argument("--kills", type=int, default=4)
+    arguments.add_argument("--campaigns", type=int, default=200)
+    arguments.add_argument("--shards", type=int, default=20)
+    arguments.add_argument("--kills", type=int, default=3, help="power cuts, and workers killed in the last round")
     arguments.add_argument("--steps", default="calibrate")
     arguments.add_argument("--seed", type=int, default=1)
     wanted = arguments.parse_args()
@@ -81,71 +229,36 @@ def main():
         manifest = make_campaigns(folder / "data", Path(wanted.source), wanted.campaigns)
         before = digest(folder / "data")
         # Paths with a blank in them, as people have them.
-        once, pieces = folder / "at once", folder / "in pieces"
-
-        def batch(out, shard):
-            return [lobestone, "--quiet", "--jobs", "1", "batch", str(manifest), "--out", str(out), "--do", wanted.steps,
-                    "--shard", shard]  # fmt: skip
-
+        once = folder / "at once"
         begun = time.monotonic()
-        subprocess.run(batch(once, "1/1"), check=True, stdout=subprocess.DEVNULL)
+        command = [lobestone, "--quiet", "--jobs", "1", "batch", str(manifest), "--out", str(once), "--do", wanted.steps]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         whole_s = time.monotonic() - begun
         subprocess.run([lobestone, "fleet", str(once)], check=True, stdout=subprocess.DEVNULL)
+        whole = without_seconds(once / "fleet/all.csv")
         print(f"uninterrupted, one worker: {wanted.campaigns} campaigns in {whole_s:.1f} s")
 
-        kept = 0
-        for kill in range(wanted.kills):
-            there = results_in(pieces)
-            workers = [
-                subprocess.Popen(batch(pieces, f"{k}/{wanted.shards}"), stdout=subprocess.DEVNULL)
-                for k in range(1, wanted.shards + 1)
-            ]
-            # Until some more are done, so that a slow machine comes to its end as well.
-            aim = len(there) + max(1, wanted.campaigns // (wanted.kills + 2))
-            while len(results_in(pieces)) < aim and any(w.poll() is None for w in workers):
-                time.sleep(0.01)
-            time.sleep(dice.uniform(0, 0.3))
-            for worker in workers:
-                worker.send_signal(signal.SIGKILL)
-            for worker in workers:
-                worker.wait()
-            now = results_in(pieces)
-            redone = [name for name, when in there.items() if now.get(name) != when]
-            need(len(redone) <= (1 if kill else 0), f"results that were there were written again: {redone}")
-            kept += len(there) - len(redone)
-            print(f"kill {kill + 1}: {len(now)} of {wanted.campaigns} results are there, {len(redone)} redone")
-            # A file cut off by a full disk: the next round has to notice.
-            victim = pieces / "campaigns" / sorted(now)[dice.randrange(len(now))]
-            data = victim.read_bytes()
-            victim.write_bytes(data[: len(data) // 2])
-        need(kept > 0, "nothing was kept over a kill")
-        left = list((pieces / "campaigns").glob(".lobestone-*"))
-        print(f"{len(left)} half-written files of killed workers lie about")
-
-        begun = time.monotonic()
-        if wanted.snakemake:
-            workflow = [
-                wanted.snakemake, "--snakefile", str(ROOT / "scripts/batch/Snakefile"), "--directory", str(folder), "--cores",
-                "2", "--config", f"manifest={manifest}", f"out={pieces}", f"shards={wanted.shards}", f"do={wanted.steps}",
-                f"lobestone={lobestone}",
-            ]  # fmt: skip
-            run = subprocess.run(workflow, capture_output=True, text=True)
-            need(run.returncode == 0, f"the workflow failed:\n{run.stderr}")
-        else:
-            for k in range(1, wanted.shards + 1):
-                subprocess.run(batch(pieces, f"{k}/{wanted.shards}"), check=True, stdout=subprocess.DEVNULL)
-            subprocess.run([lobestone, "fleet", str(pieces)], check=True, stdout=subprocess.DEVNULL)
-        print(f"the rest and the fleet: {time.monotonic() - begun:.1f} s")
-
-        whole, merged = (without_seconds(out / "fleet/all.csv") for out in (once, pieces))
-        names = [row["campaign"] for row in merged]
-        need(len(set(names)) == len(names) == wanted.campaigns, f"{len(names)} rows of {wanted.campaigns} campaigns")
-        need(whole == merged, "the merged tables differ")
-        failed = [row for row in merged if row["status"] == "failed"]
-        need(len(failed) == wanted.campaigns // 10, f"{len(failed)} failed rows")
-        need(all(row["error"] for row in failed), "a failed row without its error")
-        need(digest(folder / "data") == before, "a campaign folder was changed")
-        print(f"the same merged table, cell by cell: {len(merged)} rows, {len(failed)} of them failed as they should: holds")
+        for name in wanted.engine.split(","):
+            print(f"{name}:", flush=True)
+            place = folder / name
+            place.mkdir()
+            out = place / "in pieces"
+            begun = time.monotonic()
+            engine = Engine(name, lobestone, manifest, out, wanted, place)
+            killed = killed_and_resumed(engine, out, wanted, dice)
+            merged = without_seconds(out / "fleet/all.csv")
+            names = [row["campaign"] for row in merged]
+            need(len(set(names)) == len(names) == wanted.campaigns, f"{len(names)} rows of {wanted.campaigns} campaigns")
+            need(whole == merged, "the merged tables differ")
+            failed = [row for row in merged if row["status"] == "failed"]
+            need(len(failed) == wanted.campaigns // 10, f"{len(failed)} failed rows")
+            need(all(row["error"] for row in failed), "a failed row without its error")
+            need(digest(folder / "data") == before, "a campaign folder was changed")
+            print(
+                f"  the same merged table, cell by cell, after {wanted.kills} power cuts and {killed} killed workers: {len(merged)} rows,"
+                f" {len(failed)} of them failed as they should; {time.monotonic() - begun:.1f} s: holds",
+                flush=True,
+            )
 
 
 if __name__ == "__main__":

@@ -10,8 +10,10 @@ use super::diagnosis::Diagnosis;
 use super::verdict::{self, DiagnosisVerdict};
 use crate::Result;
 use crate::effects::Site;
+use crate::identify::first_size::linear_size;
 use crate::identify::frfs::calibrate::{Calibration, estimates};
-use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
+use crate::identify::levenberg_marquardt::{Fit, LeastSquares, Stopping, minimise};
+use crate::identify::model::Modelled;
 use crate::identify::rest::{BeyondSlips, Rest};
 use crate::identify::study::{
     Effort, Extent, InstanceOf, ModelOf, Study, Tried, View, from_possible_size, held_out, rescue, try_again,
@@ -79,6 +81,18 @@ pub fn diagnose<S: Study>(study: &S, model: &ModelOf<S>) -> Result<Diagnosis<S::
 
 type TriedOf<S> = Tried<<S as Study>::Domain>;
 type CandidateOf<S> = EffectCandidate<<S as Study>::Domain>;
+
+/// Puts fits on all data among those that there are, the better one of each instance, best first.
+fn put_among<D: Modelled>(refined: &mut Vec<Tried<D>>, found: impl IntoIterator<Item = Tried<D>>) {
+    for found in found {
+        match refined.iter_mut().find(|t| t.instance == found.instance) {
+            Some(known) if known.fit.cost <= found.fit.cost => {}
+            Some(known) => *known = found,
+            None => refined.push(found),
+        }
+    }
+    refined.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
+}
 
 struct Engine<'a, S: Study> {
     study: &'a S,
@@ -198,6 +212,9 @@ impl<'a, S: Study> Engine<'a, S> {
         }
 
         let base_reduced = 2.0 * base.cost / self.freedom(model, Extent::Full);
+        if base_reduced < FAINT {
+            self.begin_at_linear_sizes(&tried, &base, &mut refined)?;
+        }
         let base_residual = study.residual(model, &base.theta)?;
         // Where even the best explanation leaves more than noise, that rest scales what counts as chance, and its
         // correlation from value to value says how many of them are independent.
@@ -469,14 +486,38 @@ impl<'a, S: Study> Engine<'a, S> {
             .filter(cannot_be)
             .map(|t| from_possible_size(self.study, t, &bases, REFINE))
             .collect::<Result<_>>()?;
-        for found in found.into_iter().flatten() {
-            match refined.iter_mut().find(|t| t.instance == found.instance) {
-                Some(known) if known.fit.cost <= found.fit.cost => {}
-                Some(known) => *known = found,
-                None => refined.push(found),
-            }
-        }
-        refined.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
+        put_among(refined, found.into_iter().flatten());
+        Ok(())
+    }
+
+    /// Where little is missing: the coarse view may show too little of an effect to lead its fit away from where it vanishes, and all
+    /// data show it. Those whose size they ask for are fitted from there.
+    fn begin_at_linear_sizes(
+        &self,
+        tried: &[TriedOf<S>],
+        base: &Fit,
+        refined: &mut Vec<TriedOf<S>>,
+    ) -> Result<()> {
+        let lowest = |instance: &InstanceOf<S>, refined: &[TriedOf<S>]| {
+            let known = refined.iter().find(|t| t.instance == *instance);
+            known.map_or(base.cost, |t| t.fit.cost.min(base.cost))
+        };
+        let found: Vec<TriedOf<S>> = tried
+            .par_iter()
+            .filter_map(|t| {
+                let problem = self.study.problem(&t.model, View::FULL);
+                let start = linear_size(&problem, &t.model, &base.theta)?;
+                let promising = problem
+                    .cost(&start)
+                    .is_ok_and(|cost| cost < lowest(&t.instance, refined));
+                promising.then_some((t, start))
+            })
+            .map(|(t, start)| {
+                let fit = self.minimise(&t.model, View::FULL, &start, REFINE)?;
+                Ok(Tried { fit, ..t.clone() })
+            })
+            .collect::<Result<_>>()?;
+        put_among(refined, found);
         Ok(())
     }
 

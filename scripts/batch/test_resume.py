@@ -15,12 +15,10 @@ are the recipes of this folder, and need what these need. Python 3.10 or newer; 
 import argparse
 import csv
 import hashlib
-import os
 import random
 import re
 import shlex
 import shutil
-import signal
 import subprocess
 import sys
 import tempfile
@@ -29,13 +27,11 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
+sys.path.insert(0, str(ROOT / "scripts"))
+from power_cut import kill, kill_all_of, need, processes_of_session  # noqa: E402
+
 # What runs at the same time.
 JOBS = 2
-
-
-def need(holds, what):
-    if not holds:
-        sys.exit(f"FAILED: {what}")
 
 
 def digest(folder):
@@ -83,27 +79,6 @@ def without_seconds(table):
 
 def results_in(out):
     return {p.name: (p.stat().st_mtime_ns, p.stat().st_ino) for p in (out / "campaigns").glob("[!.]*.json")}
-
-
-def processes_of_session(session):
-    """Ids and command lines of the processes of a session, from /proc."""
-    found = {}
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            # Behind the name in brackets: state, parent, group, session.
-            fields = stat.read_text().rpartition(")")[2].split()
-            if int(fields[3]) == session and fields[0] != "Z":
-                found[int(stat.parent.name)] = (stat.parent / "cmdline").read_bytes().split(b"\0")
-        except OSError:
-            continue
-    return found
-
-
-def kill(process):
-    try:
-        os.kill(process, signal.SIGKILL)
-    except ProcessLookupError:
-        pass
 
 
 class Engine:
@@ -173,13 +148,7 @@ def killed_and_resumed(engine, out, wanted, dice):
                 kill(dice.choice(workers))
                 killed, last = killed + 1, time.monotonic()
         time.sleep(dice.uniform(0, 0.3))
-        # Again until none is left: one may just have been starting another.
-        while left := processes_of_session(run.pid):
-            for process in left:
-                kill(process)
-            run.poll()
-            time.sleep(0.02)
-        run.wait()
+        kill_all_of(run)
         now = results_in(out)
         redone = [name for name, when in there.items() if now.get(name) != when]
         need(len(redone) <= (1 if cut else 0), f"results that were there were written again: {redone}")

@@ -9,8 +9,6 @@ in a single shard. Needs Python 3.9 or newer, and Snakemake 8 or newer (pip inst
 """
 
 import argparse
-import os
-import signal
 import subprocess
 import sys
 import tempfile
@@ -18,30 +16,14 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "scripts"))
+from power_cut import kill_all_of, need  # noqa: E402
+
 JOBS = 2
-
-
-def processes_of_session(session):
-    """Ids of the processes of a session, from /proc."""
-    found = []
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            # Behind the name in brackets: state, parent, group, session.
-            fields = stat.read_text().rpartition(")")[2].split()
-        except OSError:
-            continue
-        if int(fields[3]) == session and fields[0] != "Z":
-            found.append(int(stat.parent.name))
-    return found
 
 
 def shards_in(out):
     return {p.name: p.stat().st_mtime_ns for p in (out / "shards").glob("shard-*.parquet")}
-
-
-def need(holds, what):
-    if not holds:
-        sys.exit(f"FAILED: {what}")
 
 
 def main():
@@ -79,15 +61,8 @@ def main():
                 log.seek(0)
                 need(False, f"the workflow did not get to {enough} shards:\n{log.read()}")
             time.sleep(0.02)
-        os.killpg(run.pid, signal.SIGKILL)
         # Snakemake may have put jobs into groups of their own; the session is theirs all the same.
-        deadline = time.monotonic() + 10
-        while left := processes_of_session(run.pid):
-            for process in left:
-                os.kill(process, signal.SIGKILL)
-            need(time.monotonic() < deadline, "jobs outlived the kill")
-            time.sleep(0.05)
-        run.wait()
+        kill_all_of(run)
         there = shards_in(pieces)
         print(f"killed after {time.monotonic() - begun:.1f} s with {len(there)} of {wanted.shards} shards written")
         need(0 < len(there) < wanted.shards, "the kill came too early or too late: choose other --shards")

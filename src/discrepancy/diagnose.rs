@@ -31,6 +31,9 @@ const REFINED: usize = 8;
 const BEHIND: f64 = 4.0;
 /// Misfit per degree of freedom of the baseline below which what is missing is faint.
 const FAINT: f64 = 1.5;
+/// Fall of χ² on the coarse view from which on a faint effect is looked for in all data. What means nothing and can only grow gains as
+/// much in one case of six.
+const HINT: f64 = 1.0;
 /// Times the baseline is fitted anew, and all candidates from it, where a candidate's fit leads to a better baseline.
 const REBASED: usize = 2;
 /// Share of its misfit by which a baseline must be better for that.
@@ -213,7 +216,7 @@ impl<'a, S: Study> Engine<'a, S> {
 
         let base_reduced = 2.0 * base.cost / self.freedom(model, Extent::Full);
         if base_reduced < FAINT {
-            self.begin_at_linear_sizes(&tried, &base, &mut refined)?;
+            self.begin_at_linear_sizes(&tried, &coarse_base, &base, &mut refined)?;
         }
         let base_residual = study.residual(model, &base.theta)?;
         // Where even the best explanation leaves more than noise, that rest scales what counts as chance, and its
@@ -491,25 +494,27 @@ impl<'a, S: Study> Engine<'a, S> {
     }
 
     /// Where little is missing: the coarse view may show too little of an effect to lead its fit away from where it vanishes, and all
-    /// data show it. Those whose size they ask for are fitted from there.
+    /// data show it. Those that gain nothing on the coarse view but whose size it hints at are fitted from the size that all data give.
     fn begin_at_linear_sizes(
         &self,
         tried: &[TriedOf<S>],
+        coarse_base: &Fit,
         base: &Fit,
         refined: &mut Vec<TriedOf<S>>,
     ) -> Result<()> {
-        let lowest = |instance: &InstanceOf<S>, refined: &[TriedOf<S>]| {
-            let known = refined.iter().find(|t| t.instance == *instance);
-            known.map_or(base.cost, |t| t.fit.cost.min(base.cost))
+        let hinted_at = |t: &TriedOf<S>| {
+            let coarse = self.study.problem(&t.model, View::COARSE);
+            linear_size(&coarse, &t.model, &coarse_base.theta).is_some_and(|size| size.gain > HINT)
         };
         let found: Vec<TriedOf<S>> = tried
             .par_iter()
+            .filter(|t| 2.0 * (coarse_base.cost - t.fit.cost) < HINT && hinted_at(t))
             .filter_map(|t| {
                 let problem = self.study.problem(&t.model, View::FULL);
-                let start = linear_size(&problem, &t.model, &base.theta)?;
-                let promising = problem
-                    .cost(&start)
-                    .is_ok_and(|cost| cost < lowest(&t.instance, refined));
+                let start = linear_size(&problem, &t.model, &base.theta)?.theta;
+                let known = refined.iter().find(|r| r.instance == t.instance);
+                let lowest = known.map_or(base.cost, |r| r.fit.cost.min(base.cost));
+                let promising = problem.cost(&start).is_ok_and(|cost| cost < lowest);
                 promising.then_some((t, start))
             })
             .map(|(t, start)| {

@@ -24,13 +24,22 @@ fn own_parameters<D: Modelled>(model: &Model<D>, count: usize) -> &[Parameter] {
     &model.parameters[model.parameters.len() - count..]
 }
 
-/// A start (solver's scale) at the size that the data give the effect added last to `model` if the response is linear in that size; from
-/// `base`, the best fit without it. `None` where the data do not ask for the effect, or it has no end where it vanishes.
+/// What the data say of the effect added last, were the response linear in its size.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinearSize {
+    /// All parameters at that size, solver's scale.
+    pub theta: Vec<f64>,
+    /// By how much χ² would fall, values.
+    pub gain: f64,
+}
+
+/// The size that the data give the effect added last to `model`, from `base`, the best fit without it. `None` where they do not ask for
+/// it, or it has no end where it vanishes.
 pub fn linear_size<D: Modelled, P: LeastSquares>(
     problem: &P,
     model: &Model<D>,
     base: &[f64],
-) -> Option<Vec<f64>> {
+) -> Option<LinearSize> {
     let faint = faintest(model)?;
     let own = own_parameters(model, faint.len());
     let start = [base, faint.as_slice()].concat();
@@ -58,7 +67,9 @@ pub fn linear_size<D: Modelled, P: LeastSquares>(
         size[i] = (start[i] + away).clamp(low, high);
         asked_for |= i >= base.len() && size[i] != start[i];
     }
-    (asked_for && size.iter().all(|t| t.is_finite())).then_some(size)
+    // The parameters in front stand at their best: what the step gains, the effect gains.
+    let gain = -here.gradient.dot(&step);
+    (asked_for && size.iter().all(|t| t.is_finite())).then_some(LinearSize { theta: size, gain })
 }
 
 /// −H⁻¹g with the columns scaled to a unit diagonal; parameters that change nothing stay.

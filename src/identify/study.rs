@@ -4,7 +4,7 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::first_size::{faintest, linear_size};
+use super::first_size::faintest;
 use super::levenberg_marquardt::{Fit, LeastSquares, Stopping, minimise, one_step};
 use super::model::{Model, Modelled};
 use super::rest::{BeyondSlips, Rest};
@@ -331,11 +331,6 @@ fn look<S: Study>(
     let mut starts: Vec<(f64, Vec<f64>)> = bases
         .iter()
         .flat_map(|base| own.iter().map(move |own| [base.as_slice(), own].concat()))
-        .chain(
-            bases
-                .iter()
-                .filter_map(|base| linear_size(&likelihood, model, base)),
-        )
         .map(|start| (likelihood.cost(&start).unwrap_or(f64::INFINITY), start))
         .collect();
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));

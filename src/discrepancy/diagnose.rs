@@ -10,8 +10,10 @@ use super::diagnosis::Diagnosis;
 use super::verdict::{self, DiagnosisVerdict};
 use crate::Result;
 use crate::effects::Site;
+use crate::identify::first_size::linear_size;
 use crate::identify::frfs::calibrate::{Calibration, estimates};
-use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
+use crate::identify::levenberg_marquardt::{Fit, LeastSquares, Stopping, minimise};
+use crate::identify::model::Modelled;
 use crate::identify::rest::{BeyondSlips, Rest};
 use crate::identify::study::{
     Effort, Extent, InstanceOf, ModelOf, Study, Tried, View, from_possible_size, held_out, rescue, try_again,
@@ -29,6 +31,9 @@ const REFINED: usize = 8;
 const BEHIND: f64 = 4.0;
 /// Misfit per degree of freedom of the baseline below which what is missing is faint.
 const FAINT: f64 = 1.5;
+/// Fall of χ² on the coarse view from which on a faint effect is looked for in all data. What means nothing and can only grow gains as
+/// much in one case of six.
+const HINT: f64 = 1.0;
 /// Times the baseline is fitted anew, and all candidates from it, where a candidate's fit leads to a better baseline.
 const REBASED: usize = 2;
 /// Share of its misfit by which a baseline must be better for that.
@@ -79,6 +84,18 @@ pub fn diagnose<S: Study>(study: &S, model: &ModelOf<S>) -> Result<Diagnosis<S::
 
 type TriedOf<S> = Tried<<S as Study>::Domain>;
 type CandidateOf<S> = EffectCandidate<<S as Study>::Domain>;
+
+/// Puts fits on all data among those that there are, the better one of each instance, best first.
+fn put_among<D: Modelled>(refined: &mut Vec<Tried<D>>, found: impl IntoIterator<Item = Tried<D>>) {
+    for found in found {
+        match refined.iter_mut().find(|t| t.instance == found.instance) {
+            Some(known) if known.fit.cost <= found.fit.cost => {}
+            Some(known) => *known = found,
+            None => refined.push(found),
+        }
+    }
+    refined.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
+}
 
 struct Engine<'a, S: Study> {
     study: &'a S,
@@ -198,6 +215,9 @@ impl<'a, S: Study> Engine<'a, S> {
         }
 
         let base_reduced = 2.0 * base.cost / self.freedom(model, Extent::Full);
+        if base_reduced < FAINT {
+            self.begin_at_linear_sizes(&tried, &coarse_base, &base, &mut refined)?;
+        }
         let base_residual = study.residual(model, &base.theta)?;
         // Where even the best explanation leaves more than noise, that rest scales what counts as chance, and its
         // correlation from value to value says how many of them are independent.
@@ -469,14 +489,40 @@ impl<'a, S: Study> Engine<'a, S> {
             .filter(cannot_be)
             .map(|t| from_possible_size(self.study, t, &bases, REFINE))
             .collect::<Result<_>>()?;
-        for found in found.into_iter().flatten() {
-            match refined.iter_mut().find(|t| t.instance == found.instance) {
-                Some(known) if known.fit.cost <= found.fit.cost => {}
-                Some(known) => *known = found,
-                None => refined.push(found),
-            }
-        }
-        refined.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
+        put_among(refined, found.into_iter().flatten());
+        Ok(())
+    }
+
+    /// Where little is missing: the coarse view may show too little of an effect to lead its fit away from where it vanishes, and all
+    /// data show it. Those that gain nothing on the coarse view but whose size it hints at are fitted from the size that all data give.
+    fn begin_at_linear_sizes(
+        &self,
+        tried: &[TriedOf<S>],
+        coarse_base: &Fit,
+        base: &Fit,
+        refined: &mut Vec<TriedOf<S>>,
+    ) -> Result<()> {
+        let hinted_at = |t: &TriedOf<S>| {
+            let coarse = self.study.problem(&t.model, View::COARSE);
+            linear_size(&coarse, &t.model, &coarse_base.theta).is_some_and(|size| size.gain > HINT)
+        };
+        let found: Vec<TriedOf<S>> = tried
+            .par_iter()
+            .filter(|t| 2.0 * (coarse_base.cost - t.fit.cost) < HINT && hinted_at(t))
+            .filter_map(|t| {
+                let problem = self.study.problem(&t.model, View::FULL);
+                let start = linear_size(&problem, &t.model, &base.theta)?.theta;
+                let known = refined.iter().find(|r| r.instance == t.instance);
+                let lowest = known.map_or(base.cost, |r| r.fit.cost.min(base.cost));
+                let promising = problem.cost(&start).is_ok_and(|cost| cost < lowest);
+                promising.then_some((t, start))
+            })
+            .map(|(t, start)| {
+                let fit = self.minimise(&t.model, View::FULL, &start, REFINE)?;
+                Ok(Tried { fit, ..t.clone() })
+            })
+            .collect::<Result<_>>()?;
+        put_among(refined, found);
         Ok(())
     }
 

@@ -6,7 +6,7 @@ use super::verdict::{gain_by_chance, is_noise, is_progress};
 use crate::effects::Instance;
 use crate::identify::levenberg_marquardt::{Stopping, minimise};
 use crate::identify::study::{
-    Effort, Extent, HeldOut, Residual, Study, Tried, View, held_out, rescue, try_effect, vanishing_limit,
+    Effort, Extent, HeldOut, Residual, Study, Tried, View, held_out, rescue, try_effect,
 };
 use crate::identify::{Calibration, Model, Modelled};
 use crate::{Error, Result};
@@ -114,7 +114,7 @@ impl<D: Modelled> Extension<D> {
         let gain = (was.chi2_per_value - is.chi2_per_value) * study.real_values(Extent::Full) as f64;
         let chance = after.reduced_chi2.max(1.0) / is.independent_share.min(1.0);
         let by_chance = gain < chance * gain_by_chance(after.theta.len() - before.theta.len());
-        let limit = vanishing_limit(&best.model);
+        let limit = best.model.vanishing_limit();
         let mut extended = best.model;
         let mut vanished = false;
         if let Some(limit) = limit

@@ -2,6 +2,7 @@
 
 pub mod case;
 pub mod departures;
+pub mod first_size;
 pub mod forces;
 pub mod frfs;
 pub mod levenberg_marquardt;

@@ -153,6 +153,11 @@ impl<D: Modelled> Model<D> {
         Some(own.iter().zip(values).map(|(p, v)| p.internal(v)).collect())
     }
 
+    /// Values of the parameters of the effect added last, solver's scale, at which it is not there; `None` without effects.
+    pub fn vanishing_limit(&self) -> Option<Vec<f64>> {
+        self.vanishing(self.effects().last()?)
+    }
+
     fn vanished(&self, theta: &[f64], added: &AddedEffect<D>) -> bool {
         let own = added.parameters.clone();
         self.vanishing(added)

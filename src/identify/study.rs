@@ -4,6 +4,7 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
+use super::first_size::faintest;
 use super::levenberg_marquardt::{Fit, LeastSquares, Stopping, minimise, one_step};
 use super::model::{Model, Modelled};
 use super::rest::{BeyondSlips, Rest};
@@ -185,11 +186,6 @@ pub type ModelOf<S> = Model<<S as Study>::Domain>;
 /// An effect at a site, of a study.
 pub type InstanceOf<S> = Instance<<S as Study>::Domain>;
 
-/// Values of the parameters of the effect added last, solver's scale, at which it is not there; `None` without effects.
-pub fn vanishing_limit<D: Modelled>(model: &Model<D>) -> Option<Vec<f64>> {
-    model.vanishing(model.effects().last()?)
-}
-
 /// Sums behind held-out errors of one fit.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct HeldOut {
@@ -367,8 +363,9 @@ fn look<S: Study>(
     }
     // A fit that ends above where the effect is hardly there was led away: then it begins there.
     let lowest_fit = fits.iter().map(|f| f.cost).fold(f64::INFINITY, f64::min);
-    let faint = hardly_there(model, bases)
-        .into_iter()
+    let faint = faintest(model)
+        .iter()
+        .flat_map(|own| bases.iter().map(|base| [base.as_slice(), own].concat()))
         .map(|start| (likelihood.cost(&start).unwrap_or(f64::INFINITY), start))
         .min_by(|a, b| a.0.total_cmp(&b.0));
     if let Some((_, start)) = faint.filter(|(cost, _)| *cost < lowest_fit)
@@ -383,31 +380,10 @@ fn look<S: Study>(
     Ok(fits)
 }
 
-/// Starting points at the end of the range next to where the effect added last vanishes, one a base.
-fn hardly_there<D: Modelled>(model: &Model<D>, bases: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let Some(limit) = vanishing_limit(model) else {
-        return Vec::new();
-    };
-    let parameters = &model.parameters;
-    let own = &parameters[parameters.len() - limit.len()..];
-    let faint: Vec<f64> = own
-        .iter()
-        .zip(&limit)
-        .map(|(p, l)| {
-            let [low, high] = p.internal_bounds();
-            l.clamp(low, high)
-        })
-        .collect();
-    bases
-        .iter()
-        .map(|base| [base.as_slice(), &faint].concat())
-        .collect()
-}
-
 /// The fit of a model without the effect added last to `model`, as one of `model`: the effect stands where it vanishes,
 /// its prior uncharged (that prior is of an effect that is there). `None` where the effect has no such limit.
 pub fn vanished<D: Modelled>(model: &Model<D>, without: &Fit) -> Option<Fit> {
-    let limit = vanishing_limit(model)?;
+    let limit = model.vanishing_limit()?;
     let (front, count) = (without.theta.len(), without.theta.len() + limit.len());
     let parameters = &model.parameters;
     let mut hessian = DMatrix::zeros(count, count);

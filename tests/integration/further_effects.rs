@@ -75,3 +75,17 @@ fn what_add_finds_diagnose_finds() {
     assert_eq!(found["effect"], "link-flexibility", "{}", found["best_guess"]);
     assert!(found["candidates"][0]["reduced_chi2"].as_f64().unwrap() < 1.05);
 }
+
+/// A compliant base that leaves a thousandth above the noise: the coarse view shows next to nothing of it, and next to where it vanishes its
+/// prior pulls harder than the data. All data show it by ΔBIC −60; the verdict was `unknown`.
+#[test]
+fn what_only_all_data_show_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("cell");
+    let path = dir.to_str().unwrap();
+    document(&["simulate", "--out", path, "--seed", "970155", "--random", "trial"]);
+    let found = document(&["diagnose", path]);
+    assert_eq!(found["effect"], "base-compliance", "{}", found["best_guess"]);
+    let leader = &found["candidates"][0];
+    assert!(leader["delta_bic"].as_f64().unwrap() < -50.0, "{leader}");
+}

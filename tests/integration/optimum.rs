@@ -6,7 +6,7 @@ use std::path::Path;
 use lobestone::campaign::Campaign;
 use lobestone::discrepancy::extension::Extension;
 use lobestone::identify::frfs::calibrate::calibrate;
-use lobestone::identify::study::{InstanceOf, ModelOf, Study, vanishing_limit};
+use lobestone::identify::study::{InstanceOf, ModelOf, Study};
 use lobestone::identify::{
     Calibration, CuttingCase, CuttingStudy, FrfData, Options, StructureCase, StructureStudy,
 };
@@ -53,7 +53,7 @@ fn no_effect_fits_worse<S: Study>(study: &S, model: &ModelOf<S>, name: &str) {
             label(&of_label[0])
         );
         // The limit is one: a model that stands there predicts what the model without the effect predicts.
-        let limit = vanishing_limit(&extension.after.model).unwrap();
+        let limit = extension.after.model.vanishing_limit().unwrap();
         let at_limit = [extension.before.calibration.theta.as_slice(), &limit].concat();
         let there = chi2(&study.residual(&extension.after.model, &at_limit).unwrap());
         assert!(

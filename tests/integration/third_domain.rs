@@ -8,6 +8,7 @@ use lobestone::Result;
 use lobestone::discrepancy::extension::Extension;
 use lobestone::discrepancy::{DiagnosisVerdict, diagnose};
 use lobestone::effects::{At, Background, Domain, Effect, Known, Registry};
+use lobestone::identify::first_size::linear_size;
 use lobestone::identify::levenberg_marquardt::Stopping;
 use lobestone::identify::study::{Extent, Residual, View};
 use lobestone::identify::{
@@ -131,6 +132,38 @@ impl Effect<Curve> for Step {
         let argument = (&Dual::constant(*x) - &values[1]).scale(SHARPNESS);
         let tanh = argument.value.tanh();
         *y = &*y + &(&values[0] * &argument.chain(0.5 * (1.0 + tanh), 0.5 * (1.0 - tanh * tanh)));
+    }
+}
+
+/// A rounded hill in the middle, of a height that is known to a factor beforehand.
+struct Hill;
+
+/// Without its height.
+fn hill(x: f64) -> f64 {
+    (-(x - 2.0_f64).powi(2) / 0.08).exp()
+}
+
+impl Effect<Curve> for Hill {
+    fn id(&self) -> &'static str {
+        "hill"
+    }
+    fn explanation(&self) -> &'static str {
+        "The curve has a hill."
+    }
+    fn fingerprint(&self) -> &'static str {
+        "The residual rises once."
+    }
+    fn background(&self) -> Background {
+        NOTHING_TO_READ
+    }
+    fn parameters(&self, _at: At, _known: &Known<Curve>) -> Vec<Parameter> {
+        vec![Parameter::logarithmic("height", "1", 0.5, 0.4, [1e-6, 10.0])]
+    }
+    fn vanishing(&self, _at: At, _parameters: &[Parameter]) -> Option<Vec<f64>> {
+        Some(vec![0.0])
+    }
+    fn apply(&self, _at: At, values: &[Dual], x: &f64, y: &mut Dual) {
+        *y = &*y + &values[0].scale(hill(*x));
     }
 }
 
@@ -322,4 +355,39 @@ fn a_step_is_no_harmonic_and_noise_is_nothing() {
     assert_eq!(step.winner().unwrap().label(), "step");
     let nothing = diagnose(&study(|_| 0.0), &bare()).unwrap();
     assert_eq!(nothing.verdict, DiagnosisVerdict::None);
+}
+
+/// A height to which the prior says twelve times as much, to a factor of e^0.4: the size is that of linear least squares.
+#[test]
+fn the_size_of_an_effect_that_is_linear_in_it_is_found_in_one_step_whatever_the_prior() {
+    const HEIGHT: f64 = 0.04;
+    let of = |height: f64| {
+        let study = CurveStudy {
+            registry: Registry::new(&[&Hill]),
+            ..study(|x| height * hill(x))
+        };
+        let base = study.calibrate(&bare()).unwrap();
+        let instance = study.registry().find(&(), "hill").remove(0);
+        let model = bare().with_effect(instance, &study.known(&bare()));
+        let found = linear_size(&study.problem(&model, View::FULL), &model, &base.theta);
+        (study.data, found)
+    };
+    let (data, found) = of(HEIGHT);
+    let found = found.unwrap();
+    let column = |k: usize, x: f64| if k < 3 { x.powi(k as i32) } else { hill(x) };
+    let columns = DMatrix::from_fn(data.x.len(), 4, |i, k| column(k, data.x[i]));
+    let inverse = (columns.transpose() * &columns).try_inverse().unwrap();
+    let height = (&inverse * columns.transpose() * DVector::from_column_slice(&data.y))[3];
+    let std = data.std * inverse[(3, 3)].sqrt();
+    assert!((height - HEIGHT).abs() < 3.0 * std, "{height} ± {std}");
+    let size = found.theta[3].exp();
+    assert!((size / height - 1.0).abs() < 1e-3, "{size}, not {height}");
+    let gain = (height / std).powi(2);
+    assert!(
+        (found.gain / gain - 1.0).abs() < 1e-3,
+        "{}, not {gain}",
+        found.gain
+    );
+    // A hollow is not asked for.
+    assert_eq!(of(-HEIGHT).1, None);
 }

@@ -40,33 +40,21 @@ pub(crate) fn idle_tooth(
     };
     let unit = single.closed_form(teeth);
     // The edge is left out: its waveform differs little, and the scale comes from the mean.
-    let at_zero = |k: usize, axis: usize| unit[k][axis][0].re;
-    let (a, b, c, d) = (at_zero(0, 0), at_zero(1, 0), at_zero(0, 1), at_zero(1, 1));
-    let determinant = a * d - b * c;
-    let (k_t, k_r) = if zero_is_known {
-        let turned = (d * mean[0] - b * mean[1], a * mean[1] - c * mean[0]);
-        (turned.0 / (n * determinant), turned.1 / (n * determinant))
-    } else {
-        USUAL_DIRECTION
-    };
+    let (k_t, k_r) = direction(&unit, n, orders, mean, zero_is_known)?;
     let of_tooth = |k: usize| -> f64 {
         let axis = |axis: usize| (unit[0][axis][k] * k_t + unit[1][axis][k] * k_r).norm_sqr();
         axis(0) + axis(1)
     };
     let measured = |k: usize| orders[0][k - 1].norm_sqr() + orders[1][k - 1].norm_sqr();
     let strongest = (1..=teeth).map(of_tooth).fold(0.0, f64::max);
-    let scale = if zero_is_known {
-        1.0
-    } else if of_tooth(teeth) > WEAK * strongest {
-        measured(teeth) / (n * n * of_tooth(teeth))
-    } else {
+    if !zero_is_known && of_tooth(teeth) <= WEAK * strongest {
         return None;
-    };
+    }
     // |A_k| = |A_{N−k}|: both orders together.
     let share = |k: usize| -> f64 {
         let pair = of_tooth(k) + of_tooth(teeth - k);
         if pair > WEAK * strongest {
-            (measured(k) + measured(teeth - k)) / (pair * scale * n * n)
+            (measured(k) + measured(teeth - k)) / (pair * n * n)
         } else {
             0.0
         }

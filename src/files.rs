@@ -39,6 +39,27 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     replace(path, bytes, ".lobestone-", false)
 }
 
+/// As [`write_atomically`], for a file too long to be held whole: `write` is given what the bytes go into, one after the other.
+///
+/// # Errors
+/// What the file system refuses, naming the file, or what `write` comes to; then the old one is there as it was.
+// Only a Parquet table is that long.
+#[cfg_attr(not(feature = "parquet"), allow(dead_code))]
+pub fn write_streamed<T>(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<T>) -> Result<T> {
+    let mut pieces = Pieces {
+        file: temporary(path, ".lobestone-")?,
+        refused: None,
+    };
+    let done = write(&mut pieces);
+    // The system's own words, and not what became of them on the way through `write`.
+    if let Some(refused) = pieces.refused {
+        return Err(Error::io(path, refused));
+    }
+    let done = done?;
+    renamed(pieces.file, |file| persisted(file, path)).map_err(|e| Error::io(path, e))?;
+    Ok(done)
+}
+
 /// As [`write_atomically`], and on the disk when it returns: a power cut leaves the old file or the new one, too. The
 /// temporary file's name begins with `prefix`.
 ///
@@ -105,8 +126,8 @@ fn fails(_: Call) -> io::Result<()> {
 #[cfg(test)]
 use self::faults::fails;
 
-/// A temporary file in the folder of `path` that holds `bytes`.
-fn beside(path: &Path, bytes: &[u8], prefix: &str) -> Result<NamedTempFile> {
+/// An empty temporary file in the folder of `path`.
+fn temporary(path: &Path, prefix: &str) -> Result<NamedTempFile> {
     let folder = folder_of(path);
     let mut options = tempfile::Builder::new();
     // Temporary files are private by default; results are to be read by whoever may read the folder.
@@ -116,18 +137,43 @@ fn beside(path: &Path, bytes: &[u8], prefix: &str) -> Result<NamedTempFile> {
         options.permissions(std::fs::Permissions::from_mode(0o644));
     }
     options.prefix(prefix);
-    let mut file = call(Call::Create, || options.tempfile_in(folder)).map_err(|e| Error::io(path, e))?;
-    // In pieces, as the system takes them: a disk that is full has some of them already.
-    let mut left = bytes;
-    while !left.is_empty() {
-        let taken = call(Call::Write, || file.write(&left[..left.len().min(PIECE)]));
-        let taken = taken.and_then(|taken| match taken {
-            0 => Err(ErrorKind::WriteZero.into()),
-            taken => Ok(taken),
-        });
-        left = &left[taken.map_err(|e| Error::io(path, e))?..];
+    call(Call::Create, || options.tempfile_in(folder)).map_err(|e| Error::io(path, e))
+}
+
+/// A temporary file in the folder of `path` that holds `bytes`.
+fn beside(path: &Path, bytes: &[u8], prefix: &str) -> Result<NamedTempFile> {
+    let mut pieces = Pieces {
+        file: temporary(path, prefix)?,
+        refused: None,
+    };
+    pieces.write_all(bytes).map_err(|e| Error::io(path, e))?;
+    Ok(pieces.file)
+}
+
+/// A file that is written in pieces, as the system takes them: a disk that is full has some of them already.
+struct Pieces {
+    file: NamedTempFile,
+    /// Why the system took no more.
+    refused: Option<io::Error>,
+}
+
+impl Write for Pieces {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let piece = &bytes[..bytes.len().min(PIECE)];
+        let taken = match call(Call::Write, || self.file.write(piece)) {
+            Ok(0) if !piece.is_empty() => Err(ErrorKind::WriteZero.into()),
+            taken => taken,
+        };
+        taken.inspect_err(|e| {
+            let same = e.raw_os_error().map(io::Error::from_raw_os_error);
+            self.refused
+                .get_or_insert(same.unwrap_or_else(|| e.kind().into()));
+        })
     }
-    Ok(file)
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
 }
 
 /// Bytes that are written at once.

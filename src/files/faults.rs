@@ -130,6 +130,36 @@ fn a_fault_leaves_the_old_file_or_the_new_one_and_nothing_beside_it() {
     );
 }
 
+/// Also where the error was put in other words on its way, and where the writer went on regardless.
+#[test]
+fn a_fault_in_a_stream_leaves_the_old_file_or_the_new_one() {
+    let old = |dir: &Path| std::fs::write(dir.join("f"), "old").unwrap();
+    let (is_old, is_new) = (|dir: &Path| holds(dir, b"old"), |dir: &Path| holds(dir, &new()));
+    let halves = |out: &mut dyn Write| {
+        let new = new();
+        let (first, second) = new.split_at(PIECE + 7);
+        (out.write_all(first), out.write_all(second))
+    };
+    let reworded = |dir: &Path| {
+        write_streamed(&dir.join("f"), |out| match halves(out) {
+            (Ok(()), Ok(())) => Ok(()),
+            _ => Err(Error::computation("other words")),
+        })
+    };
+    every_fault(old, reworded, is_old, is_new, "f: ");
+    let regardless = |dir: &Path| write_streamed(&dir.join("f"), |out| Ok(drop(halves(out))));
+    every_fault(old, regardless, is_old, is_new, "f: ");
+    // What the writer itself finds wrong.
+    let dir = tempfile::tempdir().unwrap();
+    old(dir.path());
+    let refused = write_streamed(&dir.path().join("f"), |out| {
+        out.write_all(b"new").unwrap();
+        Err::<(), _>(Error::computation("other words"))
+    });
+    assert!(refused.unwrap_err().to_string().contains("other words"));
+    assert!(is_old(dir.path()));
+}
+
 #[test]
 fn a_fault_leaves_no_file_where_there_was_none() {
     let none = |dir: &Path| names(dir).is_empty();

@@ -201,9 +201,46 @@ const Begin = (() => {
 
   async function begin(dir) {
     wish = { dir, name: null, answers: [], left_out: [], cut_list: null, again: true };
-    main().replaceChildren(alertNode(), make("p", { role: "status" }, "Reading the files of the folder …"));
-    if (await redraft()) return;
+    main().replaceChildren(alertNode());
+    if (await reading(dir, () => go(dir))) return;
     main().append(button("Choose another folder", () => go(dir)));
+  }
+
+  /** Has the files of a folder read, shows how far that is, and ends it where that is wanted: then `back` is done. False: it failed. */
+  async function reading(dir, back) {
+    const bar = make("progress", { "aria-label": "files read" });
+    const said = make("p", { role: "status" }, "Reading the files of the folder …");
+    let over = false;
+    const cancel = button("Cancel", async () => {
+      if (over) return;
+      over = true;
+      asking += 1; // Whatever is answered now to what was asked before is no news.
+      try { await ask({ do: "stop", dir }); } catch { /* `back` says that nobody answers */ }
+      node.remove();
+      main().removeAttribute("aria-busy");
+      await back();
+      tell("Cancelled while the files were read; nothing was written.");
+    }, { id: "read-cancel" });
+    const node = make("section", { id: "reading" }, said, make("div", { class: "line" }, bar, cancel));
+    $("begin-alert").after(node);
+    const look = async () => {
+      if (over) return;
+      try {
+        const { files } = await ask({ do: "reading", dir });
+        if (files && !over) {
+          bar.max = files.total;
+          bar.value = files.done;
+          setText(said, `Reading the files of the folder: ${files.done} of ${files.total}`);
+        }
+      } catch { /* the question that matters fails, too */ }
+      setTimeout(look, 300);
+    };
+    setTimeout(look, 300);
+    const done = await redraft();
+    if (over) return true;
+    over = true;
+    node.remove();
+    return done;
   }
 
   async function redraft() {
@@ -214,6 +251,13 @@ const Begin = (() => {
     if (wish.name === null) wish.name = told.name;
     drafting();
     return true;
+  }
+
+  /** The same folder, read once more; the answers stay. */
+  async function readAgain() {
+    if ($("reading")) return;
+    wish.again = true;
+    await reading(wish.dir, () => {});
   }
 
   const tableName = (table) => `${table.kind} ${table.name}`.trim();
@@ -390,7 +434,7 @@ const Begin = (() => {
       make("div", { class: "actions" },
         button("Write campaign.toml and begin", (event) => { if (event.currentTarget.getAttribute("aria-disabled") !== "true") write(); },
           { class: "first", id: "write", "data-key": "write", "aria-disabled": String(!ready) }),
-        button("Read files again", () => { wish.again = true; redraft(); }, { "data-key": "again" }),
+        button("Read files again", readAgain, { "data-key": "again" }),
         button("Choose another folder", () => go(draft.dir), { "data-key": "other" })));
   }
 

@@ -63,7 +63,11 @@ pub enum EntranceRequest {
     Folder { parent: PathBuf, name: String },
     /// A campaign file for a folder, as far as it is known.
     Draft { wish: Wish },
-    /// The same, written.
+    /// How far the files of a folder are read, while that is being done.
+    Reading { dir: PathBuf },
+    /// Reading the files of a folder ends: nobody waits for it any more.
+    Stop { dir: PathBuf },
+    /// The same as a draft, written.
     Write { wish: Wish },
     /// The page is about this campaign from now on.
     Open { dir: PathBuf },

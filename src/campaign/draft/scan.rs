@@ -12,6 +12,8 @@ use super::names::{Facts, facts_of, facts_of_header, posture_of};
 use crate::campaign::campaign_file;
 use crate::data::{ChannelRole, Quantity, RobotSpec};
 use crate::ingest::{PlainColumn, SIGNALS, plain_columns, sheet_text, survey, timeless_forces};
+use crate::progress::Progress;
+use crate::stop;
 use crate::{Error, InputError, Result};
 
 /// Files looked at.
@@ -39,7 +41,7 @@ enum Seen {
 }
 
 /// Looks through `dir` and the folders below. Hidden files, the folder `report` and campaigns of their own are passed
-/// over; links are followed to files inside the folder only.
+/// over; links are followed to files inside the folder only. Can be asked to end between two files ([`crate::stop`]).
 ///
 /// # Errors
 /// A folder that cannot be read, or holds more files than anybody measures.
@@ -67,10 +69,17 @@ pub fn scan(dir: &Path) -> Result<Scan> {
     }
     scan.robots = robots;
     leave_out_copies(&mut measurements, &mut scan.not_used);
+    let progress = Progress::new("files", measurements.len());
     // In parallel, but collected in order: the result does not depend on the threads.
     let seen: Vec<Seen> = measurements
         .into_par_iter()
-        .map(|(name, file)| look(name, &file))
+        .map(|(name, file)| {
+            // Also before a file: where one ends, rayon still begins with all that it has dealt out.
+            stop::point();
+            let seen = look(name, &file);
+            progress.step();
+            seen
+        })
         .collect();
     let (mut nameless, mut timeless) = (Vec::new(), Vec::new());
     for one in seen {

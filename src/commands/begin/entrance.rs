@@ -12,9 +12,11 @@ use crate::campaign::campaign_file;
 use crate::campaign::draft::{self, Answers, Draft, Form, Scan};
 use crate::commands::begin::workbench::CampaignBench;
 use crate::files::write_new;
+use crate::progress::{Gauge, shown_on};
 use crate::report::figure::posture_svg;
 use crate::robot::{RobotModel, RobotSpec};
 use crate::serve::{Entrance, EntranceRequest, Parcel, Reply, Wish, locked};
+use crate::stop::{Stop, stoppable};
 use crate::{Error, InputError, Result};
 
 /// Names shown of a folder.
@@ -38,6 +40,15 @@ struct State {
     made: HashSet<PathBuf>,
     /// Received since the beginning: files and bytes.
     received: (u64, u64),
+    /// Folders whose files are being read.
+    readings: Vec<FolderReading>,
+}
+
+/// A folder whose files are being read: how far that is, and how it is ended.
+struct FolderReading {
+    dir: PathBuf,
+    gauge: Arc<Gauge>,
+    stop: Stop,
 }
 
 fn wrong(path: &Path, problem: &str, remedy: &str) -> Error {
@@ -185,9 +196,38 @@ impl Drafting {
         {
             return Ok(scan.clone());
         }
-        let scan = Arc::new(draft::scan(dir)?);
-        self.state().scanned = Some((dir.to_path_buf(), scan.clone()));
+        let (gauge, stop) = (Arc::new(Gauge::default()), Stop::default());
+        self.state().readings.push(FolderReading {
+            dir: dir.to_path_buf(),
+            gauge: gauge.clone(),
+            stop: stop.clone(),
+        });
+        let read = stoppable(&stop, || shown_on(&gauge, || draft::scan(dir)));
+        let mut state = self.state();
+        state
+            .readings
+            .retain(|reading| !Arc::ptr_eq(&reading.gauge, &gauge));
+        let scan = read?.unwrap_or_else(|| {
+            let stopped = "cancelled while the files of the folder were read; nothing was written";
+            Err(Error::computation(stopped))
+        })?;
+        let scan = Arc::new(scan);
+        state.scanned = Some((dir.to_path_buf(), scan.clone()));
         Ok(scan)
+    }
+
+    /// Of the files of a folder; null where they are not being read.
+    fn how_far(&self, dir: &Path) -> Value {
+        let state = self.state();
+        let reading = state.readings.iter().rev().find(|reading| reading.dir == dir);
+        reading.map_or(Value::Null, |reading| json!(reading.gauge.reading()))
+    }
+
+    /// Ends reading the files of a folder; how often they were being read.
+    fn stop_reading(&self, dir: &Path) -> usize {
+        let state = self.state();
+        let of_it = state.readings.iter().filter(|reading| reading.dir == dir);
+        of_it.map(|reading| reading.stop.ask()).count()
     }
 
     fn draft(&self, wish: &Wish) -> Result<Drafted> {
@@ -315,6 +355,12 @@ impl Entrance for Drafting {
         Ok(match request {
             EntranceRequest::Look { folder } => Reply::Told(look(folder.as_deref())?),
             EntranceRequest::Folder { parent, name } => Reply::Told(self.make_folder(&parent, &name)?),
+            EntranceRequest::Reading { dir } => {
+                Reply::Told(json!({ "files": self.how_far(&real_folder(&dir)?) }))
+            }
+            EntranceRequest::Stop { dir } => {
+                Reply::Told(json!({ "stopped": self.stop_reading(&real_folder(&dir)?) }))
+            }
             EntranceRequest::Draft { wish } => Reply::Told(self.draft(&wish)?.document()),
             EntranceRequest::Write { wish } => {
                 let Drafted { dir, draft, .. } = self.draft(&wish)?;

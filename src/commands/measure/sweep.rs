@@ -102,7 +102,7 @@ mod with_tables {
     use crate::lobes::workspace::PlaceStatus;
     use crate::report::figure::CellFormat;
     use crate::report::stores::sweep_folder::SweepFolder;
-    use crate::report::stores::sweep_table::{columns, row};
+    use crate::report::stores::sweep_summary;
     use crate::{Error, InputError, Result};
 
     /// Quantity, label, name of the picture.
@@ -195,15 +195,17 @@ mod with_tables {
 
     fn merge(out: &Path, sweep_warnings: Vec<String>) -> Result<Outcome> {
         let folder = SweepFolder::open(out)?;
-        let (table, frame) = folder.merge()?;
-        let columns = columns(&frame)?;
-        let best = |quantity: &str| {
-            let found = columns.greatest(quantity).map(|i| row(&frame, i));
-            found.map_or(Value::Null, Value::Object)
+        let table = folder.merge()?;
+        let best = |quantity: &str| -> Result<Value> {
+            let found = sweep_summary::greatest(&table, quantity)?;
+            let row = found.map(|place| table.row(place)).transpose()?;
+            Ok(row.map_or(Value::Null, Value::Object))
         };
+        let steps = sweep_summary::steps(&table)?;
         let mut images = Vec::new();
         for (quantity, label, name) in PICTURES {
-            if let Some(picture) = columns.picture(quantity, label, CellFormat::Significant(3)) {
+            let format = CellFormat::Significant(3);
+            if let Some(picture) = sweep_summary::picture(&table, &steps, quantity, label, format)? {
                 let path = out.join(name);
                 write_atomically(&path, &picture.png()?)?;
                 images.push(path);
@@ -211,16 +213,16 @@ mod with_tables {
         }
         let summary = out.join("summary.json");
         let document = json!({
-            "table": table,
+            "table": table.path,
             "summary": summary,
             "images": images,
-            "places": frame.height(),
+            "places": table.places,
             "shards": folder.shards,
-            "counts": columns.counts(),
-            "quantiles": columns.quantiles(),
-            "deepest_cut": best("best_depth_mm"),
-            "highest_absolute_limit": best("absolute_limit_mm"),
-            "stiffest": best("least_stiffness_n_per_m"),
+            "counts": sweep_summary::counts(&table)?,
+            "quantiles": sweep_summary::quantiles(&table)?,
+            "deepest_cut": best("best_depth_mm")?,
+            "highest_absolute_limit": best("absolute_limit_mm")?,
+            "stiffest": best("least_stiffness_n_per_m")?,
             "settings": folder.settings,
             "warnings": sweep_warnings,
         });

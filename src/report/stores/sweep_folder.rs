@@ -4,15 +4,16 @@
 //! under a temporary name and renamed, so what has the name of a shard is a whole shard.
 
 use std::fs::File;
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use polars::io::parquet::write::KeyValueMetadata;
-use polars::prelude::{DataFrame, ParquetReader, ParquetWriter, PolarsError, PolarsResult, SerReader};
+use polars::prelude::{ParquetReader, ParquetWriter, PolarsError, SerReader};
 use serde_json::{Map, Value, json};
 
 use crate::analysis::{Shard, SweepRow};
-use crate::files::{write_atomically, write_new};
-use crate::report::stores::sweep_table::frame;
+use crate::files::{write_atomically, write_new, write_streamed};
+use crate::report::stores::sweep_table::{MergedTable, ROWS_AT_A_TIME, frame, read};
 use crate::{Error, InputError, Result};
 
 /// Key of the settings in a file's metadata.
@@ -136,18 +137,10 @@ impl SweepFolder {
             .and_then(Value::as_array)
             .map_or(0, Vec::len);
         let mut frame = frame(rows, joints).map_err(failed)?;
-        write_atomically(&path, &self.bytes(&mut frame).map_err(failed)?)?;
-        Ok(path)
-    }
-
-    fn bytes(&self, frame: &mut DataFrame) -> PolarsResult<Vec<u8>> {
-        let settings = Value::Object(self.settings.clone()).to_string();
-        let metadata = KeyValueMetadata::from_static(vec![(SETTINGS.into(), settings)]);
         let mut bytes = Vec::new();
-        ParquetWriter::new(&mut bytes)
-            .with_key_value_metadata(Some(metadata))
-            .finish(frame)?;
-        Ok(bytes)
+        self.writer(&mut bytes).finish(&mut frame).map_err(failed)?;
+        write_atomically(&path, &bytes)?;
+        Ok(path)
     }
 
     /// All shards as one table, in the order of the places, written as `sweep.parquet`; byte for byte the same however
@@ -155,7 +148,11 @@ impl SweepFolder {
     ///
     /// # Errors
     /// Shards that are missing, by name, or made with other settings.
-    pub fn merge(&self) -> Result<(PathBuf, DataFrame)> {
+    pub fn merge(&self) -> Result<MergedTable> {
+        self.merge_in(ROWS_AT_A_TIME)
+    }
+
+    fn merge_in(&self, rows_a_group: usize) -> Result<MergedTable> {
         let all = (1..=self.shards).map(|number| Shard {
             number,
             of: self.shards,
@@ -181,25 +178,67 @@ impl SweepFolder {
             .remedy("run them with the same settings and --shard NUMBER/HOW_MANY, then merge again")
             .into());
         }
-        let mut whole: Option<DataFrame> = None;
-        for shard in all {
-            let path = self.path(shard);
-            let failed = |e: PolarsError| Error::computation(format!("{}: {e}", path.display()));
-            let file = File::open(&path).map_err(|e| Error::io(&path, e))?;
-            let part = ParquetReader::new(file).finish().map_err(failed)?;
-            match &mut whole {
-                None => whole = Some(part),
-                Some(whole) => {
-                    whole.vstack_mut_owned(part).map_err(failed)?;
+        let all: Vec<Shard> = all.collect();
+        let path = self.merged();
+        write_streamed(&path, |out| self.join(&all, rows_a_group, out))?;
+        Ok(MergedTable {
+            path,
+            places: self.places,
+        })
+    }
+
+    /// The rows of all shards, one behind the other, in groups of so many: a group is in memory, not the map.
+    fn join(&self, shards: &[Shard], rows_a_group: usize, out: &mut dyn Write) -> Result<()> {
+        let mut out = BufWriter::new(out);
+        let Some(first) = shards.first() else {
+            return Ok(());
+        };
+        // No rows, but the columns.
+        let mut group = read(&self.path(*first), None, 0, 0)?;
+        let faulty = |e: PolarsError| Error::computation(format!("the merged table: {e}"));
+        let mut writer = self.writer(&mut out).batched(group.schema()).map_err(faulty)?;
+        for shard in shards {
+            let path = self.path(*shard);
+            let rows = shard.places(self.places).len();
+            let mut taken = 0;
+            while taken < rows {
+                let part = read(&path, None, taken, rows_a_group - group.height())?;
+                if part.height() == 0 || part.schema() != group.schema() {
+                    let now = format!(
+                        "{}: changed while it was merged, or written with other columns",
+                        path.display()
+                    );
+                    return Err(Error::computation(now));
+                }
+                taken += part.height();
+                group.vstack_mut_owned(part).map_err(faulty)?;
+                if group.height() == rows_a_group {
+                    group.rechunk_mut();
+                    writer.write_batch(&group).map_err(faulty)?;
+                    group = group.clear();
                 }
             }
         }
-        let mut whole = whole.unwrap_or_default();
-        whole.rechunk_mut();
-        let path = self.dir.join("sweep.parquet");
-        let failed = |e| Error::computation(format!("{}: {e}", path.display()));
-        write_atomically(&path, &self.bytes(&mut whole).map_err(failed)?)?;
-        Ok((path, whole))
+        if group.height() > 0 {
+            group.rechunk_mut();
+            writer.write_batch(&group).map_err(faulty)?;
+        }
+        writer.finish().map_err(faulty)?;
+        drop(writer);
+        out.flush().map_err(|e| Error::io(&self.merged(), e))
+    }
+
+    fn merged(&self) -> PathBuf {
+        self.dir.join("sweep.parquet")
+    }
+
+    /// Of tables of this map.
+    fn writer<W: Write>(&self, out: W) -> ParquetWriter<W> {
+        let settings = Value::Object(self.settings.clone()).to_string();
+        let metadata = KeyValueMetadata::from_static(vec![(SETTINGS.into(), settings)]);
+        ParquetWriter::new(out)
+            .with_row_group_size(Some(ROWS_AT_A_TIME))
+            .with_key_value_metadata(Some(metadata))
     }
 }
 
@@ -231,11 +270,14 @@ fn head_of(path: &Path) -> std::result::Result<(usize, Map<String, Value>), Stri
 
 #[cfg(test)]
 mod tests {
+    use polars::prelude::DataFrame;
+
     use super::*;
     use crate::analysis::stability::sweep::PlaceFindings;
     use crate::lobes::best_speed::BestSpeed;
     use crate::lobes::workspace::PlaceStatus;
     use crate::lobes::workspace_grid::GridPlace;
+    use crate::report::stores::sweep_summary::MapTable;
 
     fn settings(step: f64) -> Map<String, Value> {
         json!({ "angle_step_deg": step, "posture": "p1", "joints_deg": vec![0.0; 6] })
@@ -274,7 +316,7 @@ mod tests {
         }
     }
 
-    fn merged(shards: usize, places: usize) -> Vec<u8> {
+    fn merged(shards: usize, places: usize, rows_a_group: usize) -> Vec<u8> {
         let dir = tempfile::tempdir().unwrap();
         let folder = SweepFolder::begin(dir.path(), &settings(30.0), shards, places).unwrap();
         for number in (1..=shards).rev() {
@@ -284,7 +326,12 @@ mod tests {
             folder.write(shard, &rows).unwrap();
             assert!(folder.has(shard).unwrap());
         }
-        let (path, frame) = SweepFolder::open(dir.path()).unwrap().merge().unwrap();
+        let table = SweepFolder::open(dir.path())
+            .unwrap()
+            .merge_in(rows_a_group)
+            .unwrap();
+        assert_eq!(table.places, places);
+        let frame = read(&table.path, None, 0, usize::MAX).unwrap();
         assert_eq!(frame.height(), places);
         let number = |name: &str, i: usize| frame.column(name).unwrap().f64().unwrap().get(i);
         assert_eq!(number("q6_deg", 4), Some(4.0));
@@ -296,14 +343,98 @@ mod tests {
             frame.column("status").unwrap().str().unwrap().get(6),
             Some("joint-limit")
         );
-        std::fs::read(path).unwrap()
+        std::fs::read(&table.path).unwrap()
+    }
+
+    /// As it was merged when the whole map was held: one table on top of the other, written at once.
+    fn held_whole(shards: usize, places: usize) -> (DataFrame, Vec<u8>) {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = SweepFolder::begin(dir.path(), &settings(30.0), shards, places).unwrap();
+        let mut whole = DataFrame::default();
+        for number in 1..=shards {
+            let rows: Vec<SweepRow> = Shard { number, of: shards }.places(places).map(row).collect();
+            whole.vstack_mut_owned(frame(&rows, 6).unwrap()).unwrap();
+        }
+        whole.rechunk_mut();
+        let mut bytes = Vec::new();
+        folder.writer(&mut bytes).finish(&mut whole).unwrap();
+        (whole, bytes)
     }
 
     #[test]
     fn the_merged_table_does_not_know_how_many_shards_there_were() {
-        let one = merged(1, 11);
-        assert_eq!(one, merged(4, 11));
-        assert_eq!(one, merged(11, 11));
+        let (_, held) = held_whole(1, 11);
+        for shards in [1, 4, 11] {
+            assert_eq!(merged(shards, 11, ROWS_AT_A_TIME), held, "{shards} shards");
+        }
+        // Groups that begin and end within shards, at their ends, and hold several of them.
+        for rows_a_group in [1, 3, 5, 11, 12] {
+            let one = merged(1, 11, rows_a_group);
+            for shards in [2, 4, 11] {
+                assert_eq!(
+                    merged(shards, 11, rows_a_group),
+                    one,
+                    "{shards} shards, groups of {rows_a_group}"
+                );
+            }
+        }
+    }
+
+    /// Several groups of the size that is used: every cell and its place as in a table that is held whole, and what is
+    /// read of it a stretch at a time.
+    #[test]
+    fn a_long_map_is_the_table_that_it_was() {
+        let places = 2 * ROWS_AT_A_TIME + 5;
+        let dir = tempfile::tempdir().unwrap();
+        let folder = SweepFolder::begin(dir.path(), &settings(30.0), 3, places).unwrap();
+        for number in 1..=3 {
+            let shard = Shard { number, of: 3 };
+            let rows: Vec<SweepRow> = shard.places(places).map(row).collect();
+            folder.write(shard, &rows).unwrap();
+        }
+        let table = folder.merge().unwrap();
+        let (held, _) = held_whole(3, places);
+        let read_back = read(&table.path, None, 0, usize::MAX).unwrap();
+        assert_eq!(read_back.schema(), held.schema());
+        assert!(read_back.equals_missing(&held));
+        let metadata = ParquetReader::new(File::open(&table.path).unwrap())
+            .get_metadata()
+            .unwrap()
+            .clone();
+        let groups: Vec<usize> = metadata.row_groups.iter().map(|group| group.num_rows()).collect();
+        assert_eq!(groups, [ROWS_AT_A_TIME, ROWS_AT_A_TIME, 5]);
+
+        let column = |name: &str| {
+            held.column(name)
+                .unwrap()
+                .f64()
+                .unwrap()
+                .iter()
+                .collect::<Vec<_>>()
+        };
+        let (depth, y) = (column("best_depth_mm"), column("y_m"));
+        let mut place = 0;
+        table
+            .numbers(&["best_depth_mm", "y_m"], &mut |values| {
+                assert_eq!(values, [depth[place], y[place]], "{place}");
+                place += 1;
+            })
+            .unwrap();
+        assert_eq!(place, places);
+        let mut statuses = Vec::new();
+        table
+            .statuses(&mut |name| statuses.push(name.to_string()))
+            .unwrap();
+        let status = held.column("status").unwrap().str().unwrap();
+        assert!(status.iter().eq(statuses.iter().map(|s| Some(s.as_str()))));
+        for place in [0, 1, ROWS_AT_A_TIME, places - 1] {
+            let row = table.row(place).unwrap();
+            assert_eq!(
+                (&row["place"], &row["q6_deg"]),
+                (&json!(place), &json!(column("q6_deg")[place]))
+            );
+        }
+        assert!(table.numbers(&["no_such_column"], &mut |_| {}).is_err());
     }
 
     #[test]
@@ -327,12 +458,35 @@ mod tests {
         let second = Shard { number: 2, of: 3 };
         let rows: Vec<SweepRow> = second.places(9).map(row).collect();
         folder.write(second, &rows).unwrap();
-        let message = folder.merge().unwrap_err().to_string();
+        let message = folder.merge().err().unwrap().to_string();
         assert!(
             message.contains("2 of 3 shards are missing: 1/3, 3/3"),
             "{message}"
         );
         assert!(!dir.path().join("sweep.parquet").exists());
+
+        // Settings as they should be, and other columns: of another version of this program.
+        for shard in [Shard { number: 1, of: 3 }, Shard { number: 3, of: 3 }] {
+            folder
+                .write(shard, &shard.places(9).map(row).collect::<Vec<_>>())
+                .unwrap();
+        }
+        let mut other = Vec::new();
+        let mut five_joints = frame(&rows, 5).unwrap();
+        folder.writer(&mut other).finish(&mut five_joints).unwrap();
+        std::fs::write(folder.path(second), other).unwrap();
+        let message = folder.merge().err().unwrap().to_string();
+        assert!(
+            message.contains("00002-of-00003") && message.contains("other columns"),
+            "{message}"
+        );
+        let left: Vec<_> = std::fs::read_dir(dir.path())
+            .unwrap()
+            .map(|e| e.unwrap().file_name())
+            .collect();
+        assert_eq!(left.len(), 2, "{left:?}");
+        folder.write(second, &rows).unwrap();
+        folder.merge().unwrap();
 
         // Cut off by a full disk, short of rows, or from another map: none of them passes for the shard.
         let whole = std::fs::read(folder.path(second)).unwrap();

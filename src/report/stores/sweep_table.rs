@@ -1,56 +1,91 @@
 //! The rows of a map of the workspace as a table of polars, and back.
 
-use polars::prelude::{AnyValue, Column, DataFrame, PolarsError, PolarsResult, df};
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use polars::prelude::{AnyValue, Column, DataFrame, ParquetReader, PolarsError, PolarsResult, SerReader, df};
 use serde_json::{Map, Value, json};
 
 use crate::analysis::SweepRow;
 use crate::analysis::stability::sweep::PlaceFindings;
-use crate::report::stores::sweep_summary::MapColumns;
+use crate::report::stores::sweep_summary::MapTable;
 use crate::{Error, Result};
 
-/// Quantities that a summary tells the spread of.
-const QUANTITIES: [&str; 7] = [
-    "absolute_limit_mm",
-    "best_depth_mm",
-    "stiffness_x_n_per_m",
-    "stiffness_y_n_per_m",
-    "stiffness_z_n_per_m",
-    "least_stiffness_n_per_m",
-    "lowest_frequency_hz",
-];
+/// Rows that are in memory at a time: those of a group in the merged file, which readers take in one piece, too.
+pub const ROWS_AT_A_TIME: usize = 1 << 16;
 
-/// The columns of a merged table for its summary, and with them the least of the three stiffnesses.
+/// A merged table; stays in its file.
+pub struct MergedTable {
+    pub path: PathBuf,
+    pub places: usize,
+}
+
+impl MergedTable {
+    fn fault(&self, error: PolarsError) -> Error {
+        Error::computation(format!("{}: {error}", self.path.display()))
+    }
+
+    /// The named columns, a stretch of places after the other.
+    fn stretches(&self, names: &[&str], mut each: impl FnMut(&DataFrame) -> PolarsResult<()>) -> Result<()> {
+        for from in (0..self.places).step_by(ROWS_AT_A_TIME) {
+            let stretch = read(&self.path, Some(names), from, ROWS_AT_A_TIME)?;
+            each(&stretch).map_err(|e| self.fault(e))?;
+        }
+        Ok(())
+    }
+
+    /// One row under its columns' names.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn row(&self, place: usize) -> Result<Map<String, Value>> {
+        let one = read(&self.path, None, place, 1)?;
+        Ok(row(&one, 0))
+    }
+}
+
+impl MapTable for MergedTable {
+    fn numbers(&self, names: &[&str], each: &mut dyn FnMut(&[Option<f64>])) -> Result<()> {
+        self.stretches(names, |stretch| {
+            let columns = names.iter().map(|name| stretch.column(name)?.f64());
+            let columns = columns.collect::<PolarsResult<Vec<_>>>()?;
+            let mut columns: Vec<_> = columns.into_iter().map(|c| c.iter()).collect();
+            let mut values = vec![None; columns.len()];
+            for _ in 0..stretch.height() {
+                for (value, column) in values.iter_mut().zip(&mut columns) {
+                    *value = column.next().flatten();
+                }
+                each(&values);
+            }
+            Ok(())
+        })
+    }
+
+    fn statuses(&self, each: &mut dyn FnMut(&str)) -> Result<()> {
+        self.stretches(&["status"], |stretch| {
+            let status = stretch.column("status")?.str()?;
+            status.iter().for_each(|s| each(s.unwrap_or_default()));
+            Ok(())
+        })
+    }
+}
+
+/// Rows of a table's file, `count` of them at most; all columns, or those of the names.
 ///
 /// # Errors
-/// A table that this program did not write.
-pub fn columns(frame: &DataFrame) -> Result<MapColumns> {
-    let failed = |e: PolarsError| Error::computation(format!("the merged map: {e}"));
-    let numbers = |name: &str| -> Result<Vec<Option<f64>>> {
-        let column = frame.column(name).and_then(|c| c.f64()).map_err(failed)?;
-        Ok(column.iter().collect())
-    };
-    let place = |name: &str| Ok::<_, Error>(numbers(name)?.into_iter().flatten().collect::<Vec<f64>>());
-    let status = frame.column("status").and_then(|c| c.str()).map_err(failed)?;
-    let [x, y, z] = ["x", "y", "z"].map(|axis| numbers(&format!("stiffness_{axis}_n_per_m")));
-    let (x, y, z) = (x?, y?, z?);
-    let least = (0..x.len()).map(|i| Some(x[i]?.min(y[i]?).min(z[i]?)));
-    let least: Vec<Option<f64>> = least.collect();
-    let quantities = QUANTITIES
-        .into_iter()
-        .map(|name| match name {
-            "least_stiffness_n_per_m" => Ok((name, least.clone())),
-            _ => Ok((name, numbers(name)?)),
-        })
-        .collect::<Result<Vec<_>>>()?;
-    Ok(MapColumns {
-        tcp_m: [place("x_m")?, place("y_m")?, place("z_m")?],
-        status: status.iter().map(|s| s.unwrap_or_default().to_string()).collect(),
-        quantities,
-    })
+/// A file that cannot be read, by its name.
+pub fn read(path: &Path, columns: Option<&[&str]>, from: usize, count: usize) -> Result<DataFrame> {
+    let file = File::open(path).map_err(|e| Error::io(path, e))?;
+    let columns = columns.map(|names| names.iter().map(|name| name.to_string()).collect());
+    ParquetReader::new(file)
+        .with_columns(columns)
+        .with_slice(Some((from, count)))
+        .finish()
+        .map_err(|e| Error::computation(format!("{}: {e}", path.display())))
 }
 
 /// One row of a table under its columns' names.
-pub fn row(frame: &DataFrame, index: usize) -> Map<String, Value> {
+fn row(frame: &DataFrame, index: usize) -> Map<String, Value> {
     let value = |value: AnyValue| match value {
         AnyValue::Float64(v) => json!(v),
         AnyValue::UInt32(v) => json!(v),

@@ -377,13 +377,12 @@ function otherEffect(side, effects) {
     make("div", { class: "other" }, make("label", { for: `${side.side}-other`, class: "muted" }, "effect"), select, add));
 }
 
-// The report in its frame has no origin: where it is scrolled to it tells, and is told again after it was drawn anew.
-let reportScroll = 0;
+// The report in its frame has no origin: where its reader is and what is unfolded it tells, and is told again after it was drawn anew.
+let reportPlace = { section: null, down: 0, unfolded: [] };
 window.addEventListener("message", (event) => {
-  if (event.source !== $("frame").contentWindow || !Number.isFinite(event.data?.lobestoneScroll)) return;
-  reportScroll = event.data.lobestoneScroll;
+  if (event.source === $("frame").contentWindow && event.data?.lobestonePlace) reportPlace = event.data.lobestonePlace;
 });
-$("frame").addEventListener("load", () => $("frame").contentWindow.postMessage({ lobestoneScroll: reportScroll }, "*"));
+$("frame").addEventListener("load", () => $("frame").contentWindow.postMessage({ lobestonePlace: reportPlace }, "*"));
 
 $("cancel").addEventListener("click", async () => {
   if (running === null) return;

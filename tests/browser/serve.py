@@ -82,6 +82,7 @@ class Driver:
 
 IDLE = """return document.getElementById('job').hidden
     && document.querySelector('[data-key=structure-diagnose]')?.getAttribute('aria-disabled') === 'false'"""
+FOLD = "document.querySelector('#modes details')"
 ERROR = "return document.querySelector('.big .now')?.innerText"
 ROWS = "return document.querySelectorAll('.errors tbody tr').length"
 
@@ -128,6 +129,12 @@ def story(driver, url, pictures):
     driver.until("the end of the diagnosis", IDLE)
     in_report(driver, "return document.body.innerText.includes('Which physics is missing')")
     driver.picture(pictures, "3-diagnosed")
+    # The reader goes down to a part that is folded up and unfolds it.
+    in_report(driver, f"""const fold = {FOLD};
+        fold.open = true;
+        scrollBy(0, fold.getBoundingClientRect().top);
+        return scrollY > 300""")
+    time.sleep(0.5)
 
     driver.click(f"[data-key='structure-{EFFECT}-explained'] summary")
     driver.click(f"[data-key='structure-add-{EFFECT}']")
@@ -142,6 +149,11 @@ def story(driver, url, pictures):
 
     # The report in its frame is that of the new revision, and cannot reach the page around it.
     in_report(driver, f"return document.body.innerText.includes('1 + {EFFECT}')")
+    # Its reader is where the reader was.
+    in_report(driver, "return document.documentElement.dataset.ready === 'true'")
+    there = in_report(driver, f"return [{FOLD}.open, {FOLD}.getBoundingClientRect().top]")
+    if not there[0] or abs(there[1]) > 50:
+        raise Failed(f"the reader had unfolded what was at the top, and after adding it is unfolded and at: {there}")
     inside = in_report(driver, "try { return parent.document.title } catch (e) { return e.name }")
     if inside != "SecurityError":
         raise Failed(f"the report reaches the page around it: {inside}")

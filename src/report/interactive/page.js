@@ -307,13 +307,28 @@ const parsed = new Promise((done) => document.addEventListener("DOMContentLoaded
   console.error(error);
 });
 
-// In the page of `lobestone serve`: where the reader is, for the next drawing of the report.
+// In the page of `lobestone serve`: where the reader is, for the next drawing of the report, in which sections may have grown: the section
+// at the top of the window, how far into it (px), and what is unfolded. Told only once the reader is there again: a page that was just
+// read has folds of its own.
 if (window.parent !== window) {
+  const name = (fold) => `${fold.closest("[id]")?.id ?? ""}: ${fold.querySelector(":scope > summary")?.textContent ?? ""}`;
+  const folds = () => [...document.querySelectorAll("details")];
+  const topOf = (section) => section?.getBoundingClientRect().top ?? -window.scrollY;
+  const tell = () => {
+    const passed = [...document.querySelectorAll("section[id]")].filter((section) => topOf(section) < 1);
+    const section = passed.at(-1);
+    const unfolded = folds().filter((fold) => fold.open).map(name);
+    window.parent.postMessage({ lobestonePlace: { section: section?.id ?? null, down: -topOf(section), unfolded } }, "*");
+  };
   window.addEventListener("message", (event) => {
-    const top = event.data?.lobestoneScroll;
-    if (event.source === window.parent && Number.isFinite(top)) window.scrollTo({ top, behavior: "instant" });
+    const place = event.data?.lobestonePlace;
+    if (event.source !== window.parent || !Number.isFinite(place?.down) || !Array.isArray(place.unfolded)) return;
+    for (const fold of folds()) if (place.unfolded.includes(name(fold))) fold.open = true;
+    const section = place.section === null ? null : document.getElementById(place.section);
+    window.scrollBy({ top: topOf(section) + place.down, behavior: "instant" });
+    window.addEventListener("scroll", tell, { passive: true });
+    document.addEventListener("toggle", tell, true);
   });
-  window.addEventListener("scroll", () => window.parent.postMessage({ lobestoneScroll: window.scrollY }, "*"), { passive: true });
 }
 
 // A link into a part that is folded up opens it; paper has everything open.

@@ -106,10 +106,8 @@ pub fn greatest(table: &impl MapTable, name: &str) -> Result<Option<usize>> {
     let mut best: Option<(usize, f64)> = None;
     let mut place = 0_usize;
     quantity(table, name, |value| {
-        match (best, value) {
-            (Some((_, b)), Some(v)) if b >= v => {}
-            (_, Some(v)) => best = Some((place, v)),
-            (_, None) => {}
+        if let Some(v) = value.filter(|v| best.map_or(!v.is_nan(), |(_, b)| *v > b)) {
+            best = Some((place, v));
         }
         place += 1;
     })?;
@@ -280,6 +278,7 @@ mod tests {
         // The first of 3, 3 with all three stiffnesses.
         assert_eq!(greatest(&table, LEAST_STIFFNESS).unwrap(), Some(10));
         assert_eq!(greatest(&table, "absolute_limit_mm").unwrap(), None);
+        assert_eq!(greatest(&table, "lowest_frequency_hz").unwrap(), None);
         assert!(greatest(&table, "unknown").is_err());
     }
 
@@ -299,7 +298,7 @@ mod tests {
         assert!(of(&table(), "absolute_limit_mm").is_none());
         let mut line = table();
         line.columns[1].1 = vec![Some(0.0); 12];
-        line.columns[2].1 = vec![Some(-0.0), Some(0.0)].repeat(6);
+        line.columns[2].1 = [Some(-0.0), Some(0.0)].repeat(6);
         assert_eq!(steps(&line).unwrap()[2].len(), 1);
         assert!(of(&line, "best_depth_mm").is_none());
     }

@@ -154,6 +154,7 @@ def story(driver, url, pictures):
     there = in_report(driver, f"return [{FOLD}.open, {FOLD}.getBoundingClientRect().top]")
     if not there[0] or abs(there[1]) > 50:
         raise Failed(f"the reader had unfolded what was at the top, and after adding it is unfolded and at: {there}")
+    driver.picture(pictures, "4-where-the-reader-was")
     inside = in_report(driver, "try { return parent.document.title } catch (e) { return e.name }")
     if inside != "SecurityError":
         raise Failed(f"the report reaches the page around it: {inside}")

@@ -3,7 +3,7 @@ on the page, its list of cuts edited in place, reading files cancelled.
 
     python3 tests/browser/begin.py LOBESTONE [FOLDER FOR SCREENSHOTS]
 
-Ends as serve.py does, whose driver it uses: 0; 77 where there is no browser; 1 with what went wrong.
+Ends with status 0 and a line of JSON; 77 where there is no browser; 1 with what went wrong.
 """
 
 import json
@@ -12,10 +12,8 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import time
-import urllib.request
 
-from serve import Driver, Failed, complaints, free_port
+from driver import Failed, tell
 
 RECORDS = pathlib.Path(__file__).parents[1] / "data/blind/force-9400/force"
 # As a German spreadsheet saves it.
@@ -86,14 +84,7 @@ def story(driver, url, here, pictures):
 
 
 def main():
-    pictures = pathlib.Path(sys.argv[2]) if len(sys.argv) > 2 else None
-    if pictures:
-        pictures.mkdir(parents=True, exist_ok=True)
-    chromedriver = shutil.which("chromedriver")
-    if not chromedriver or not (shutil.which("chromium") or shutil.which("google-chrome")):
-        print("skipped: no chromium and chromedriver here")
-        return 77
-    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as profile:
+    with tempfile.TemporaryDirectory() as folder:
         here = pathlib.Path(folder).resolve()
         for name in ("many", "cell 7", "copies"):
             (here / name).mkdir()
@@ -104,38 +95,14 @@ def main():
             shutil.copy(RECORDS / "cut01.txt", here / "many" / f"cut{i:03}.txt")
         served = subprocess.Popen([sys.argv[1], "serve", "--port", "0", "--json"], cwd=here, stdout=subprocess.PIPE,
                                   stderr=subprocess.DEVNULL)
-        port = free_port()
-        process = subprocess.Popen([chromedriver, f"--port={port}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        driver = None
         try:
             url = json.loads(served.stdout.readline())["url"]
-            for _ in range(100):
-                try:
-                    urllib.request.urlopen(f"http://127.0.0.1:{port}/status", timeout=5).close()
-                    break
-                except OSError:
-                    time.sleep(0.1)
-            driver = Driver(port, profile)
-            told = story(driver, url, here, pictures)
-            wrong = [line for line in complaints(driver, url) if "422" not in line]
-            if wrong:
-                raise Failed("the browser complains:\n" + "\n".join(wrong))
-            print(json.dumps(told, ensure_ascii=False))
-            return 0
-        except Failed as failed:
-            if driver:
-                driver.picture(pictures, "begin-failed")
-            print(failed, file=sys.stderr)
-            return 1
+            pictures = sys.argv[2] if len(sys.argv) > 2 else None
+            return tell(lambda driver, url, pictures: story(driver, url, here, pictures), url, pictures, refused="422",
+                        failed="begin-failed")
         finally:
-            if driver:
-                try:
-                    driver.call("DELETE", "")
-                except (Failed, OSError):
-                    pass
-            for started in (process, served):
-                started.terminate()
-                started.wait(10)
+            served.terminate()
+            served.wait(10)
 
 
 if __name__ == "__main__":

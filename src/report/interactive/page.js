@@ -318,6 +318,17 @@ const parsed = new Promise((done) => document.addEventListener("DOMContentLoaded
       await new Promise((done) => setTimeout(done));
     }
   };
+  // After the window has grown plotly.js leaves a legend where it was on the narrow one, over the curves.
+  let settled = 0;
+  window.addEventListener("resize", () => {
+    clearTimeout(settled);
+    settled = setTimeout(() => {
+      for (const div of document.querySelectorAll(".js-plotly-plot")) {
+        const y = div.layout.legend?.y;
+        if (y !== undefined && isOpen(div)) Plotly.relayout(div, { "legend.y": y });
+      }
+    }, 400);
+  });
   let drawing = drawOpen();
   document.addEventListener("toggle", () => (drawing = drawing.then(drawOpen)), true);
   await drawing;

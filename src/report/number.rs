@@ -114,6 +114,22 @@ pub fn with_error(value: f64, error: f64) -> String {
     rounded(value, error)
 }
 
+/// The same with the error in brackets, in units of the last digit, where it is smaller than 1: `47.2670(9)`, `2.963(10)`.
+/// Short, for tables of many columns.
+pub fn concise(value: f64, error: f64) -> String {
+    let long = with_error(value, error);
+    match long.split_once(" ± ") {
+        Some((value, small)) if !long.starts_with('(') => {
+            let digits = small.strip_prefix("0.").map(|d| d.trim_start_matches('0'));
+            match digits {
+                Some(digits) if !digits.is_empty() => format!("{value}({digits})"),
+                _ => long,
+            }
+        }
+        _ => long,
+    }
+}
+
 fn rounded(value: f64, error: f64) -> String {
     let order = error.log10().floor() as i32;
     let two_digits = error / 10f64.powi(order) < 3.55;

@@ -56,7 +56,7 @@ impl Picture {
         frame.shade(&mut svg, self.shaded);
         frame.grid(&mut svg, |value| match self.log {
             true => format_si(value, &self.unit, 1),
-            false => significant(value, 3),
+            false => plain(value),
         });
         if let Some(noise) = &self.noise {
             frame.line(&mut svg, "noise", &self.x, noise);
@@ -98,6 +98,15 @@ impl Picture {
             false => FigureAxis::padded("", extent(curves())?, 0.06, 5),
         };
         Some((x, y))
+    }
+}
+
+/// A mark of an axis without zeros that say nothing: `50`, not `50.0` next to `100`.
+fn plain(value: f64) -> String {
+    let text = significant(value, 3);
+    match text.contains('.') && !text.contains('·') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_string(),
+        false => text,
     }
 }
 

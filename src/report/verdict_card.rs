@@ -282,6 +282,14 @@ pub fn structure(
         (None, None) => return None,
     };
     card.next = sentence(&card.next);
+    let fitted = diagnosis
+        .map(|d| &d.diagnosis.baseline.calibration.parameters)
+        .or_else(|| structure.map(|s| &s.analysis.calibration.parameters));
+    tell_added(
+        &mut card,
+        case.model.effects().iter().map(|a| &a.instance),
+        fitted,
+    );
     card.side = ROBOT;
     card.bar = Some(error_bar(structure, diagnosis, &added));
     card.curves = frf(structure, diagnosis);
@@ -292,6 +300,25 @@ pub fn structure(
     card.remarks = case.warnings.clone();
     files_first(&mut card, &files.iter().collect::<Vec<_>>());
     Some(card)
+}
+
+/// What was added to the model, and how big it came out.
+fn tell_added<'a, D: Domain + 'a>(
+    card: &mut VerdictCard,
+    added: impl Iterator<Item = &'a Instance<D>>,
+    fitted: Option<&Vec<Estimate>>,
+) {
+    let told: Vec<String> = added
+        .filter_map(|instance| {
+            let owner = format!("{}.", instance.label());
+            let own = fitted?.iter().filter(|p| p.name.starts_with(&owner));
+            let own: Vec<Estimate> = own.cloned().collect();
+            (!own.is_empty()).then(|| format!("{}: {}", named(instance).title, sizes(&own)))
+        })
+        .collect();
+    if !told.is_empty() {
+        card.facts.insert(0, ("Added", told.join("; ")));
+    }
 }
 
 /// Where nobody looked for what is missing.
@@ -480,6 +507,8 @@ pub fn cutting(campaign: &Campaign, files: &[SetupFinding], found: &CuttingFindi
         _ => found.next_measurement.to_string(),
     };
     card.next = sentence(&card.next);
+    let fitted = &d.baseline.calibration.parameters;
+    tell_added(&mut card, effects.iter().map(|a| &a.instance), Some(fitted));
     let now = &found.now.comparison.totals;
     let mut bar = ErrorBar {
         noise: now.noise_floor_nrms,

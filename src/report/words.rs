@@ -20,13 +20,15 @@ pub fn place(site: Site) -> Option<String> {
 }
 
 /// Endings of keys that are units, longest first where one ends in another.
-const UNITS: [&str; 18] = [
+const UNITS: [&str; 20] = [
     "_nms_per_rad",
+    "_um_per_n",
     "_nm_per_rad",
     "_n_per_mm2",
     "_n_per_mm",
     "_ns_per_m",
     "_n_per_m",
+    "_kg_m2",
     "_kg",
     "_hz",
     "_mm",
@@ -64,17 +66,18 @@ const NAMES: [(&str, &str); 18] = [
 ];
 
 /// A parameter's key in words: `joint-transverse-compliance@joint-2.transverse_nm_per_rad` → `stiffness across the axis`.
-/// What stands in brackets is kept: `frequency_hz[1]` → `frequency [1]`.
+/// What stands in brackets becomes a joint, a tooth, a channel: `c_nms_per_rad[0]` → `damping of joint 1`.
 pub fn parameter(key: &str) -> String {
     let last = key.rsplit('.').next().unwrap_or(key);
     let (last, index) = match last.split_once('[') {
-        Some((name, rest)) => (name, format!(" [{rest}")),
-        None => (last, String::new()),
+        Some((name, rest)) => (name, rest),
+        None => (last, ""),
     };
     let bare = UNITS
         .iter()
         .find_map(|unit| last.strip_suffix(unit))
         .unwrap_or(last);
+    let index = of_which(bare, index);
     let named = NAMES.iter().find(|(name, _)| *name == bare);
     let words = match named {
         Some((_, words)) => (*words).to_string(),
@@ -84,9 +87,50 @@ pub fn parameter(key: &str) -> String {
                 .next()
                 .map_or(String::new(), |c| c.to_uppercase().chain(letters).collect())
         }
-        None => bare.replace('_', " "),
+        None => bare.replace(['_', '-'], " "),
     };
     words + &index
+}
+
+/// A parameter's key in words, with what it is a parameter of: `joint-1.stiffness` → `joint 1: stiffness`.
+pub fn parameter_of(key: &str) -> String {
+    match key.rsplit_once('.') {
+        Some((owner, _)) => {
+            let (effect, place) = owner.split_once('@').unwrap_or((owner, ""));
+            let comma = if place.is_empty() { "" } else { ", " };
+            let owner = format!("{effect}{comma}{place}").replace('-', " ");
+            format!("{owner}: {}", parameter(key))
+        }
+        None => parameter(key),
+    }
+}
+
+/// The rest of a key after its first bracket in words; keys count from 0, people from 1.
+fn of_which(bare: &str, rest: &str) -> String {
+    if rest.is_empty() {
+        return String::new();
+    }
+    const CHANNELS: [&str; 4] = ["Fx", "Fy", "Fz", "Mz"];
+    let places: Vec<&str> = rest.trim_end_matches(']').split("][").collect();
+    let number = |k: usize| places.get(k).and_then(|p| p.parse::<usize>().ok());
+    let channel = |k: usize| number(k).and_then(|i| CHANNELS.get(i));
+    let told = match (bare, places.as_slice()) {
+        ("c" | "loss_factor", [_]) => number(0).map(|i| format!("of joint {}", i + 1)),
+        ("offset" | "pitch", [_]) => number(0).map(|i| format!("of tooth {}", i + 1)),
+        ("frequency" | "zeta" | "tau", [_]) => channel(0).map(|c| format!("of {c}")),
+        ("matrix", [_, _]) => channel(0)
+            .zip(channel(1))
+            .map(|(into, from)| format!("of {from} into {into}")),
+        ("rotation_vector", [_]) => number(0)
+            .and_then(|i| ["x", "y", "z"].get(i))
+            .map(|axis| format!("about {axis}")),
+        (_, ["t"]) => Some("(tangential)".into()),
+        (_, ["r"]) => Some("(radial)".into()),
+        (_, ["a"]) => Some("(axial)".into()),
+        (_, ["f"]) => Some("(feed)".into()),
+        _ => None,
+    };
+    format!(" {}", told.unwrap_or_else(|| format!("[{rest}")))
 }
 
 /// How sure a probability is, in words: `very likely (97 of 100 such verdicts are right)`.
@@ -160,13 +204,31 @@ mod tests {
                 "joint-transverse-compliance@joint-2.transverse_nm_per_rad",
                 "stiffness across the axis",
             ),
-            ("dynamometer-resonance.frequency_hz[1]", "frequency [1]"),
-            ("joint-damping.c_nms_per_rad[0]", "damping [0]"),
+            ("dynamometer-resonance.frequency_hz[1]", "frequency of Fy"),
+            ("joint-damping.c_nms_per_rad[0]", "damping of joint 1"),
+            ("tooth-radii.offset_mm[4]", "offset of tooth 5"),
+            ("crosstalk.matrix[0][2]", "leak of Fz into Fx"),
+            ("tool-wear.growth[t]", "growth of the edge force (tangential)"),
+            ("x.strange[q]", "strange [q]"),
+            ("push-off.compliance_um_per_n", "compliance"),
+            ("damping-ratio", "damping ratio"),
             ("edge-force.kte_n_per_mm", "Kte"),
             ("time-delay.delay_s", "delay"),
             ("tool-flexibility.damping_ratio", "damping ratio"),
         ] {
             assert_eq!(parameter(key), words, "{key}");
+        }
+        for (key, words) in [
+            ("joint-1.stiffness", "joint 1: stiffness"),
+            ("damping-ratio", "damping ratio"),
+            ("ktc_n_per_mm2", "Ktc"),
+            ("tool-flexibility.mass_kg", "tool flexibility: mass"),
+            (
+                "local-resonator@link-3.frequency_hz",
+                "local resonator, link 3: frequency",
+            ),
+        ] {
+            assert_eq!(parameter_of(key), words, "{key}");
         }
     }
 

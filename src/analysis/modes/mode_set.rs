@@ -264,8 +264,12 @@ pub(crate) fn set_warnings(set: &SetModes) -> Vec<String> {
         .filter(|f| f.modes.remarks.iter().any(|r| r.contains("not reported")))
         .count();
     if refused > 0 {
+        let frfs = match refused {
+            1 => "1 FRF has".to_string(),
+            n => format!("{n} FRFs have"),
+        };
         lines.push(format!(
-            "{}: {refused} FRFs have peaks that are no modes (which: --json)",
+            "{}: {frfs} peaks that are no modes (which: --json)",
             set.set
         ));
     }

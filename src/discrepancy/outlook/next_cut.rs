@@ -155,7 +155,7 @@ fn best(
             })
             .collect(),
         ..NextMeasurement::words(format!(
-            "{}: {:.1} standard deviations expected between {} and {}",
+            "{}: {:.0} standard deviations expected between {} and {}",
             proposals[chosen].what,
             sigmas[chosen],
             a.label(),

@@ -188,7 +188,7 @@ fn best(
     let names = [a.label(), b.label()];
     let measurement = &lab.measurements[chosen];
     let promise = format!(
-        "{:.1} standard deviations expected between {} and {}",
+        "{:.0} standard deviations expected between {} and {}",
         sigmas[chosen], names[0], names[1]
     );
     let what = match sigmas[chosen] < LEAST_SIGMAS {

@@ -97,7 +97,7 @@ impl SideBySide {
         let flat = room >= 44.0;
         let legend = self.series.iter().enumerate().map(|(i, series)| {
             (
-                Swatch::Area(style::bar(i), 1.0),
+                Swatch::Sign(Marker::Disc, 6.5, style::bar(i)),
                 or(&series.label, "series").to_owned(),
             )
         });

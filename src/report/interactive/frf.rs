@@ -73,6 +73,10 @@ pub fn bode_trace(label: &str, look: Look, panel: usize, unit: &str) -> Value {
 /// A trace in the complex plane without its numbers; `customdata` are frequencies, Hz.
 pub fn nyquist_trace(label: &str, look: Look, unit: &str) -> Value {
     let mut trace = trace(label, look);
+    // Between two lines of the spectrum a mode goes along its circle, not along the chord.
+    if trace["line"].is_object() {
+        trace["line"]["shape"] = json!("spline");
+    }
     trace["hovertemplate"] = json!(format!(
         "%{{customdata:.2f}} Hz: %{{x:.4s}} %{{y:+.4s}}i {}",
         text(unit)

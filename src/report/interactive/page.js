@@ -160,6 +160,13 @@ const parsed = new Promise((done) => document.addEventListener("DOMContentLoaded
     }
   }
 
+  const inSpace = (() => {
+    const context = document.createElement("canvas").getContext("webgl");
+    context?.getExtension("WEBGL_lose_context")?.loseContext();
+    return !!context;
+  })();
+  const isSpatial = (plot) => "scene" in plot.layout || !!plot.choice?.plots.some((p) => "scene" in p.plot.layout);
+
   /** Whether an element is not within a part that is folded up. */
   const isOpen = (element) => !element.closest("details:not([open])");
 
@@ -169,6 +176,12 @@ const parsed = new Promise((done) => document.addEventListener("DOMContentLoaded
   const draw = async (figure, plot, explorer) => {
     const heading = figure.querySelector(".heading");
     const div = figure.querySelector(".plot");
+    if (!inSpace && isSpatial(plot)) {
+      // No figure that turns without WebGL: the image stays.
+      figure.classList.add("still");
+      return;
+    }
+    if (plot.data.some((trace) => trace.type === "heatmap")) figure.classList.add("map");
     await Plotly.newPlot(div, plot.data, plot.layout, config);
     if (plot.choice) {
       const label = figure.querySelector(".choice");
@@ -283,14 +296,21 @@ const parsed = new Promise((done) => document.addEventListener("DOMContentLoaded
     }
     waiting.add({ element, explorer });
   }
+  /** How far out of the window, px. */
+  const away = ({ element }) => {
+    const { top, bottom } = element.getBoundingClientRect();
+    return Math.max(top - window.innerHeight, -bottom, 0);
+  };
+  const due = ({ element, explorer }) => isOpen(element) && (element.dataset.explorer === undefined || !explorer.drawn);
+  // What the reader sees comes first.
+  const next = () => [...waiting].filter(due).sort((a, b) => away(a) - away(b))[0];
   const drawOpen = async () => {
-    for (const part of waiting) {
+    for (let part = next(); part; part = next()) {
       const { element, explorer } = part;
-      if (!isOpen(element)) continue;
       if (element.dataset.explorer === undefined) {
         waiting.delete(part);
         await draw(element, whole(figures[element.dataset.plot], arrays), explorer);
-      } else if (!explorer.drawn) {
+      } else {
         // It stays: folded up, it may be told to show something else.
         await explorer.show(explorer.frf, explorer.model);
       }
@@ -311,6 +331,10 @@ const parsed = new Promise((done) => document.addEventListener("DOMContentLoaded
 // at the top of the window, how far into it (px), and what is unfolded. Told only once the reader is there again: a page that was just
 // read has folds of its own.
 if (window.parent !== window) {
+  // Nothing is seen before the reader is there again: else the top of the page would flash.
+  const seen = (yes) => (document.documentElement.style.visibility = yes ? "" : "hidden");
+  seen(false);
+  setTimeout(() => seen(true), 3000);
   const name = (fold) => `${fold.closest("[id]")?.id ?? ""}: ${fold.querySelector(":scope > summary")?.textContent ?? ""}`;
   const folds = () => [...document.querySelectorAll("details")];
   const topOf = (section) => section?.getBoundingClientRect().top ?? -window.scrollY;
@@ -326,6 +350,7 @@ if (window.parent !== window) {
     for (const fold of folds()) if (place.unfolded.includes(name(fold))) fold.open = true;
     const section = place.section === null ? null : document.getElementById(place.section);
     window.scrollBy({ top: topOf(section) + place.down, behavior: "instant" });
+    seen(true);
     window.addEventListener("scroll", tell, { passive: true });
     document.addEventListener("toggle", tell, true);
   });

@@ -1,6 +1,6 @@
 //! Stability lobes.
 
-use crate::analysis::{LobeAnalysis, LobeFindings, StructureFindings};
+use crate::analysis::{LobeAnalysis, LobeCase, LobeFindings, StructureFindings};
 use crate::campaign::{LobeSource, Process};
 use crate::lobes::outcome::{Outcomes, Verdict};
 use crate::report::number::{decimals, percent, significant};
@@ -9,7 +9,7 @@ use crate::report::sections::lobes_figure::{figures, process, source};
 use crate::report::sections::structure_section::NOISE_LIKE;
 use crate::report::sections::{hole_section, redundancy_section};
 use crate::report::words::count;
-use crate::report::{Block, ReportSection, ReportTable, TableColumn};
+use crate::report::{Block, Fold, ReportSection, ReportTable, TableColumn};
 
 pub fn summary(findings: &LobeFindings) -> String {
     let analysis = &findings.asked;
@@ -106,7 +106,16 @@ pub fn section(findings: &LobeFindings, structure: Option<&StructureFindings>) -
         ))),
         None => {}
     }
-    blocks.extend(analysis.warnings.iter().cloned().map(Block::Warning));
+    let (whirls, others): (Vec<&String>, Vec<&String>) =
+        analysis.warnings.iter().partition(|w| w.starts_with(MAY_WHIRL));
+    blocks.extend(others.into_iter().cloned().map(Block::Warning));
+    if !whirls.is_empty() {
+        blocks.push(Block::Warning(format!(
+            "The drill may whirl and leave a hole that is not round, {}: take another speed (table below) or a pilot hole.",
+            count(whirls.len(), "case", "cases")
+        )));
+        blocks.extend(whirling(&analysis.cases));
+    }
     ReportSection {
         id: "lobes".into(),
         title: "Stability lobes".into(),
@@ -115,6 +124,47 @@ pub fn section(findings: &LobeFindings, structure: Option<&StructureFindings>) -
             .into(),
         blocks,
     }
+}
+
+/// How the warnings of `lobes` begin that the table of [`whirling`] tells.
+const MAY_WHIRL: &str = "the drill may whirl";
+
+/// The speeds at which the drill may whirl, posture by posture, folded up.
+fn whirling(cases: &[LobeCase]) -> Option<Block> {
+    let mut rows = Vec::new();
+    for case in cases {
+        for w in case.whirling.iter().filter(|w| w.may_occur == Some(true)) {
+            rows.push(vec![
+                case.posture.clone().unwrap_or_default(),
+                decimals(w.spindle_rpm, 0),
+                decimals(w.mode_hz, 1),
+                (w.lobes[0] + 1).to_string(),
+                format!("{} or {}", w.lobes[0], w.lobes[1]),
+            ]);
+        }
+    }
+    let table = Block::Table(ReportTable {
+        caption: "Speeds at which the drill may whirl".into(),
+        columns: vec![
+            TableColumn::text("posture"),
+            TableColumn::number("speed (rpm)"),
+            TableColumn::number("mode (Hz)"),
+            TableColumn::number("times the turn"),
+            TableColumn::text("lobes of the hole"),
+        ],
+        rows: rows.clone(),
+        notes: vec!["At that speed and up to a tenth above it.".into()],
+    });
+    (!rows.is_empty()).then(|| {
+        Block::Fold(Fold {
+            title: format!(
+                "Speeds at which the drill may whirl ({})",
+                count(rows.len(), "speed", "speeds")
+            ),
+            open: false,
+            blocks: vec![table],
+        })
+    })
 }
 
 /// The tool as a beam, and which blocks of a drill count; `None` where there is nothing to say.

@@ -11,7 +11,7 @@ use crate::report::figure::{
     CellFormat, CoherenceCurve, CoherenceFigure, FrfCurve, FrfFigure, HeatMap, ModeShapesFigure, NoiseLevel,
     NyquistFigure, StabilisationFigure, StabilisationPole, StickPicture,
 };
-use crate::report::number::{decimals, with_error};
+use crate::report::number::{concise, decimals, with_error};
 use crate::report::parts::figure;
 use crate::report::words::count;
 use crate::report::{Block, Drawing, Fold, ReportSection, ReportTable, TableColumn};
@@ -144,8 +144,8 @@ pub(crate) fn tracked(analysis: &ModalAnalysis) -> Option<Block> {
             let mode = &analysis.sets[set].global.modes[m];
             format!(
                 "{}, {}",
-                with_error(mode.frequency_hz, mode.frequency_std_hz),
-                with_error(100.0 * mode.damping_ratio, 100.0 * mode.damping_std)
+                concise(mode.frequency_hz, mode.frequency_std_hz),
+                concise(100.0 * mode.damping_ratio, 100.0 * mode.damping_std)
             )
         })
     };
@@ -162,6 +162,7 @@ pub(crate) fn tracked(analysis: &ModalAnalysis) -> Option<Block> {
             })
             .collect(),
         notes: vec![
+            "In brackets: one standard deviation, in units of the last digit.".into(),
             "Paired by frequency and shape; the order of close modes may change between postures.".into(),
         ],
     }))

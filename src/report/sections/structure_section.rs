@@ -10,7 +10,7 @@ use crate::report::number::{decimals, percent, plus_minus, significant};
 use crate::report::parts::{figure, paragraph};
 use crate::report::sections::history_section::Stage;
 use crate::report::sections::{error_map_section, history_section};
-use crate::report::words::{count, frf_name, listed};
+use crate::report::words::{count, frf_name, listed, parameter_of};
 use crate::report::{Block, OnScreen, ReportSection, ReportTable, TableColumn};
 
 /// FRFs shown as figures: the worst and the best.
@@ -284,7 +284,7 @@ pub fn parameter_section(findings: &StructureFindings) -> ReportSection {
         .iter()
         .take(of_robot)
         .map(|p| ParameterRow {
-            name: p.name.clone(),
+            name: parameter_of(&p.name),
             unit: unit(p.unit).to_string(),
             nominal: p.initial,
             before: None,
@@ -308,7 +308,7 @@ pub fn parameter_section(findings: &StructureFindings) -> ReportSection {
             false => ("–".into(), "–".into()),
         };
         vec![
-            p.name.clone(),
+            parameter_of(&p.name),
             initial,
             plus_minus(p.value, p.std_error, unit(p.unit)),
             change,

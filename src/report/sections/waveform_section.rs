@@ -13,7 +13,7 @@ use crate::report::sections::diagnosis_section::{
     advice, candidate_chart, candidate_table, how_it_shows, not_tried, verdict_text,
 };
 use crate::report::sections::error_map_section::{LEAST_TOP, TIMES_NOISE};
-use crate::report::words::{listed, setting};
+use crate::report::words::{listed, parameter_of, setting};
 use crate::report::{Block, ReportSection, ReportTable, TableColumn};
 
 pub const ID: &str = "missing-physics-cutting";
@@ -96,7 +96,7 @@ fn parameters(findings: &CuttingFindings) -> Block {
             let unit = if p.unit == "1" { "" } else { p.unit };
             let note = if p.at_bound { "at the end of its range" } else { "" };
             vec![
-                p.name.clone(),
+                parameter_of(&p.name),
                 with_error(p.value, p.std_error),
                 unit.to_string(),
                 note.to_string(),

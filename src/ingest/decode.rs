@@ -9,7 +9,7 @@ use super::text::{self, Notes};
 use super::{checks, dof_names};
 use crate::InputError;
 use crate::data::FrfRecord;
-use crate::ingest::formats::mat::Arrays;
+use crate::ingest::formats::mat::NamedArrays;
 use crate::ingest::formats::{force, frf_text, lvm, numpy, tdms, uff, workbook};
 use crate::ingest::tables::{channel_names, stamps};
 
@@ -96,9 +96,9 @@ fn read_as_it_is(
         Detected::Lvm => (format, why, signals(lvm::read(bytes, &mut budget, notes)?)),
         Detected::Mat4 | Detected::Mat5 | Detected::Mat73 | Detected::Numpy => {
             let arrays = match detected {
-                Detected::Mat4 => Arrays::of_v4(bytes, &mut budget, notes)?,
-                Detected::Mat5 => Arrays::of_v5(bytes, &mut budget, notes)?,
-                Detected::Mat73 => Arrays::of_v73(bytes, &mut budget, notes)?,
+                Detected::Mat4 => NamedArrays::of_v4(bytes, &mut budget, notes)?,
+                Detected::Mat5 => NamedArrays::of_v5(bytes, &mut budget, notes)?,
+                Detected::Mat73 => NamedArrays::of_v73(bytes, &mut budget, notes)?,
                 _ => numpy::read(bytes, &mut budget, notes)?.into(),
             };
             (format, why, arrays.contents(rate_hz, &mut budget, notes)?)

@@ -31,31 +31,31 @@ pub(crate) fn looks_like_v4(bytes: &[u8]) -> bool {
 }
 
 /// Named arrays, and labels of their rows and columns where the format has such.
-pub(crate) struct Arrays {
+pub(crate) struct NamedArrays {
     variables: Vec<Variable>,
     labels: Vec<Labels>,
 }
 
-impl From<Vec<Variable>> for Arrays {
+impl From<Vec<Variable>> for NamedArrays {
     fn from(variables: Vec<Variable>) -> Self {
-        Arrays {
+        NamedArrays {
             variables,
             labels: Vec::new(),
         }
     }
 }
 
-impl Arrays {
+impl NamedArrays {
     pub(crate) fn of_v4(bytes: &[u8], budget: &mut Budget, notes: &mut Notes) -> Result<Self, InputError> {
-        v4::read(bytes, budget, notes).map(Arrays::from)
+        v4::read(bytes, budget, notes).map(NamedArrays::from)
     }
 
     pub(crate) fn of_v5(bytes: &[u8], budget: &mut Budget, notes: &mut Notes) -> Result<Self, InputError> {
-        v5::read(bytes, budget, notes).map(|(variables, labels)| Arrays { variables, labels })
+        v5::read(bytes, budget, notes).map(|(variables, labels)| NamedArrays { variables, labels })
     }
 
     pub(crate) fn of_v73(bytes: &[u8], budget: &mut Budget, notes: &mut Notes) -> Result<Self, InputError> {
-        hdf5::read(bytes, budget, notes).map(Arrays::from)
+        hdf5::read(bytes, budget, notes).map(NamedArrays::from)
     }
 
     /// What the arrays hold. `rate_hz`: of the samples, if the campaign says it.

@@ -9,7 +9,8 @@ use super::text::{self, Notes};
 use super::{checks, dof_names};
 use crate::InputError;
 use crate::data::FrfRecord;
-use crate::ingest::formats::{force, frf_text, lvm, mat, numpy, tdms, uff, workbook};
+use crate::ingest::formats::mat::NamedArrays;
+use crate::ingest::formats::{force, frf_text, lvm, numpy, tdms, uff, workbook};
 use crate::ingest::tables::{channel_names, stamps};
 
 /// Where a file holds one FRF that does not say where it was measured, its name may.
@@ -93,12 +94,14 @@ fn read_as_it_is(
     Ok(match detected {
         Detected::Tdms => (format, why, signals(tdms::read(bytes, rate_hz, notes)?)),
         Detected::Lvm => (format, why, signals(lvm::read(bytes, &mut budget, notes)?)),
-        Detected::Mat4 => (format, why, mat::read_v4(bytes, rate_hz, &mut budget, notes)?),
-        Detected::Mat5 => (format, why, mat::read_v5(bytes, rate_hz, &mut budget, notes)?),
-        Detected::Mat73 => (format, why, mat::read_v73(bytes, rate_hz, &mut budget, notes)?),
-        Detected::Numpy => {
-            let arrays = numpy::read(bytes, &mut budget, notes)?;
-            (format, why, mat::of_arrays(arrays, rate_hz, &mut budget, notes)?)
+        Detected::Mat4 | Detected::Mat5 | Detected::Mat73 | Detected::Numpy => {
+            let arrays = match detected {
+                Detected::Mat4 => NamedArrays::of_v4(bytes, &mut budget, notes)?,
+                Detected::Mat5 => NamedArrays::of_v5(bytes, &mut budget, notes)?,
+                Detected::Mat73 => NamedArrays::of_v73(bytes, &mut budget, notes)?,
+                _ => numpy::read(bytes, &mut budget, notes)?.into(),
+            };
+            (format, why, arrays.contents(rate_hz, &mut budget, notes)?)
         }
         Detected::Universal => {
             let (summary, contents) = uff::contents(bytes, notes)?;

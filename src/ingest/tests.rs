@@ -291,6 +291,94 @@ fn frf_tables() {
     }
 }
 
+/// The tables of a Bode plot: magnitudes in dB and phases in degrees, with the units said in every way, or not at all.
+#[test]
+fn frf_tables_in_decibels() {
+    // 20 dB at 0°, 40 dB at −90°, −20 dB at −180°, 0 dB at 170°.
+    let rows = |separator: &str| {
+        let lines = [(1, 20, 0), (2, 40, -90), (3, -20, -180), (4, 0, 170)];
+        let row = |(f, m, p)| [f, m, p].map(|v: i32| v.to_string()).join(separator) + "\n";
+        lines.map(row).concat()
+    };
+    for (heading, what_it_is, remarks) in [
+        ("Frequency (Hz),Magnitude (dB),Phase (deg)", None, 0),
+        ("frequency_hz,magnitude_db,phase_deg", None, 0),
+        ("freq [Hz],FRF_mag_dB,FRF_phase_deg", None, 0),
+        ("Frequency [Hz],Amplitude [dB],Phase [°]", None, 0),
+        (
+            "Frequency [Hz],Magnitude [dB m/N],Phase [degrees]",
+            Some(Quantity::Receptance),
+            0,
+        ),
+        (
+            "Frequency (Hz),Magnitude (dB re 1 (m/s²)/N),Phase (deg)",
+            Some(Quantity::Accelerance),
+            0,
+        ),
+        ("Frequency,Magnitude,Phase", None, 2),
+        ("f,mag,phase", None, 2),
+    ] {
+        let (_, contents, warnings) = read(format!("{heading}\n{}", rows(",")));
+        let frf = &contents.frfs[0];
+        assert_eq!(
+            (frf.quantity, warnings.len()),
+            (what_it_is, remarks),
+            "{heading}: {warnings:?}"
+        );
+        assert!(frf.response.is_none(), "{heading}");
+        approx::assert_relative_eq!(frf.value[0].re, 10.0, max_relative = 1e-12);
+        approx::assert_relative_eq!(frf.value[1].im, -100.0, max_relative = 1e-12);
+        approx::assert_relative_eq!(frf.value[2].re, -0.1, max_relative = 1e-12);
+    }
+    // A reference other than 1, a unit that is not SI, and units below the names.
+    let (_, contents, _) = read(format!(
+        "Frequency (Hz),Magnitude (dB re 1e-3 mm/N),Phase (deg)\n{}",
+        rows(",")
+    ));
+    approx::assert_relative_eq!(contents.frfs[0].value[0].re, 1e-5, max_relative = 1e-12);
+    let (_, contents, warnings) = read(format!(
+        "Frequency\tMagnitude\tPhase\nHz\tdB\tdeg\n{}",
+        rows("\t")
+    ));
+    assert!(warnings.is_empty(), "{warnings:?}");
+    approx::assert_relative_eq!(contents.frfs[0].value[0].re, 10.0, max_relative = 1e-12);
+    // Several FRFs.
+    let two =
+        "f (Hz),1X/1X Mag (dB),1X/1X Phase (deg),2Z/1X Mag (dB),2Z/1X Phase (deg)\n1,20,0,0,0\n2,20,0,0,90\n";
+    let (_, contents, _) = read(two);
+    assert_eq!(
+        contents.frfs[1].response.map(|d| d.to_string()).as_deref(),
+        Some("2Z")
+    );
+    approx::assert_relative_eq!(contents.frfs[1].value[1].im, 1.0, max_relative = 1e-12);
+}
+
+/// What the units behind the names of linear columns say, and phases whose heading says none.
+#[test]
+fn units_behind_frf_columns() {
+    let (_, contents, warnings) = read("Frequency (Hz),Real (g/N),Imag (g/N)\n1,1,2\n2,3,4\n3,5,6\n");
+    assert_eq!(contents.frfs[0].quantity, Some(Quantity::Accelerance));
+    approx::assert_relative_eq!(contents.frfs[0].value[0].re, 9.80665);
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    let (_, contents, _) = read("f (Hz),Real ((m/s)/N),Imag ((m/s)/N)\n1,1,2\n2,3,4\n3,5,6\n");
+    assert_eq!(contents.frfs[0].quantity, Some(Quantity::Mobility));
+    let phases = |phases: [f64; 4]| {
+        let rows: Vec<String> = (0..4).map(|k| format!("{},1,{}\n", k + 1, phases[k])).collect();
+        format!("frequency,magnitude,phase\n{}", rows.concat())
+    };
+    // Radians in one turn; radians unwrapped over more than one are not told from few degrees.
+    let (_, contents, warnings) = read(phases([0.0, -1.5, -3.1, 3.1]));
+    approx::assert_relative_eq!(contents.frfs[0].value[1].im, -(1.5_f64.sin()));
+    assert!(warnings.iter().any(|w| w.contains("radians")), "{warnings:?}");
+    assert!(problem(phases([0.0, -3.0, -6.0, -9.0])).contains("degrees, or radians"));
+    // A jump of more than half a turn from line to line is none of unwrapped radians.
+    let (_, contents, _) = read(phases([0.0, -30.0, -60.0, -90.0]));
+    approx::assert_relative_eq!(contents.frfs[0].value[3].im, -1.0);
+    // A magnitude with a unit is no level, whatever its sign.
+    let (_, contents, _) = read("f,Magnitude [m/N],phase_deg\n1,1,0\n2,-1,0\n3,1,0\n");
+    approx::assert_relative_eq!(contents.frfs[0].value[1].re, -1.0);
+}
+
 #[test]
 fn tables_of_other_programs() {
     let open_modal = "frq,amp_real,amp_imag\n0.0,0.07,0.0\n0.3125,-0.0002,-0.028\n0.625,-0.002,-0.011\n";

@@ -234,6 +234,46 @@ fn shards_are_the_whole() {
 }
 
 #[test]
+fn a_warm_start_ends_where_a_cold_one_does() {
+    let nights = Nights::new();
+    copy_folder(&blind("frf-9216"), &nights.path("later"));
+    let list = "campaign,robot\nfrf,r1\ncuts,r1\nlater,r1\nfrf/../later,r2\n";
+    std::fs::write(nights.path("nights.csv"), list).unwrap();
+    nights.run("cold", &[]);
+    assert_eq!(nights.run("warm", &["--warm-start"])["skipped"], 0);
+    let table = |name: &str| rows(&nights.path(name).join("shards/shard-00001-of-00001.csv"));
+    let (cold, warm) = (table("cold"), table("warm"));
+    // The cuts between gave no structure; another robot starts afresh.
+    let from = |campaign: &str| warm[campaign].get("started_from").map_or("", String::as_str);
+    assert_eq!(
+        ["frf", "cuts", "later", "frf/../later"].map(from),
+        ["", "", "frf", ""]
+    );
+    let mut compared = 0;
+    for (name, value) in &cold["later"] {
+        if let Some(error) = cold["later"].get(&format!("{name}_std_error")) {
+            let number = |text: &str| text.parse::<f64>().unwrap();
+            let moved = (number(&warm["later"][name]) - number(value)).abs() / number(error);
+            assert!(moved < 0.1, "{name}: {moved} standard errors");
+            compared += 1;
+        }
+    }
+    assert!(compared >= 6, "{cold:?}");
+
+    // Broken off and run again: the same table, of the same starts.
+    let lost = contents(&nights.path("warm/campaigns")).into_keys();
+    let lost: Vec<PathBuf> = lost.filter(|path| text(path).contains("later")).collect();
+    lost.iter().for_each(|path| std::fs::remove_file(path).unwrap());
+    assert_eq!(nights.run("warm", &["--warm-start"])["skipped"], 2);
+    assert_eq!(table("warm"), warm);
+    // What a start was made of counts as what a campaign is made of; r2 has none.
+    let about = nights.path("frf/campaign.toml");
+    let changed = format!("{}\n# seen again\n", std::fs::read_to_string(&about).unwrap());
+    std::fs::write(&about, changed).unwrap();
+    assert_eq!(nights.run("warm", &["--warm-start"])["skipped"], 3);
+}
+
+#[test]
 fn a_fleet_over_nights() {
     let nights = Nights::new();
     // Seven quiet nights of r1, and one in which joint 2 gave way: rows as a batch writes them.
@@ -326,5 +366,8 @@ fn wrong_manifests_and_folders_are_told() {
         message.contains("nights.csv:3: frf stands in line 2, too"),
         "{message}"
     );
+    std::fs::write(&manifest, "campaign\nfrf\n").unwrap();
+    let message = refused(&["batch", text(&manifest), "--out", text(&out), "--warm-start"]);
+    assert!(message.contains("add a column robot"), "{message}");
     assert!(!out.exists(), "a folder for work that was refused");
 }

@@ -1,14 +1,14 @@
 //! `lobestone batch`: many campaigns, in shards.
 
+use std::collections::HashMap;
 use std::path::PathBuf;
 use std::time::Instant;
 
 use serde_json::json;
 
-use crate::Result;
 use crate::analysis::Shard;
 use crate::analysis::many::batch::{
-    BatchStep, Manifest, ManifestEntry, Record, Status, Steps, examine, fingerprint,
+    BatchStep, Manifest, ManifestEntry, Record, Status, Steps, WarmStart, examine, fingerprint,
 };
 use crate::commands::Outcome;
 use crate::commands::next_step::word;
@@ -16,6 +16,7 @@ use crate::commands::text::{Emphasis, number, wrapped};
 use crate::progress::Progress;
 use crate::report::stores::batch_folder::BatchFolder;
 use crate::report::stores::batch_table::{BatchTable, reserved};
+use crate::{InputError, Result};
 
 #[derive(clap::Args)]
 #[command(
@@ -46,6 +47,10 @@ pub struct BatchArgs {
     /// Only this part of the list, such as 3/20: the third line and every twentieth after it; slurm: as the job array says.
     #[arg(long, value_name = "K/N")]
     shard: Option<String>,
+    /// Start each calibration from that of the robot's last campaign above it in this part of the list (list the nights in their
+    /// order).
+    #[arg(long)]
+    warm_start: bool,
     /// Work again on campaigns that failed although nothing changed.
     #[arg(long)]
     retry: bool,
@@ -58,6 +63,14 @@ pub fn run(args: BatchArgs) -> Result<Outcome> {
         Some(text) => text.parse()?,
     };
     let manifest = Manifest::read(&args.manifest, reserved())?;
+    if args.warm_start && !manifest.columns.iter().any(|c| c == "robot") {
+        return Err(
+            InputError::new("--warm-start has to know which campaigns are of one robot")
+                .file(&args.manifest)
+                .remedy("add a column robot that names it")
+                .into(),
+        );
+    }
     let steps = Steps::new(args.steps);
     let folder = BatchFolder::begin(&args.out)?;
     let begun = Instant::now();
@@ -68,15 +81,20 @@ pub fn run(args: BatchArgs) -> Result<Outcome> {
     let progress = Progress::new("campaigns", mine.len());
     let mut skipped = 0;
     let mut work: Vec<(&ManifestEntry, Record)> = Vec::new();
+    // Of each robot. Within a shard, which is done line by line: a run that was broken off goes on from the same.
+    let mut last: HashMap<String, WarmStart> = HashMap::new();
     for entry in mine {
-        let fingerprint = fingerprint(&entry.dir, &steps);
+        let robot = manifest.cell(entry, "robot").filter(|_| args.warm_start);
+        let start = robot.and_then(|robot| last.get(robot));
+        let fingerprint = fingerprint(&entry.dir, &steps, start);
         let kept = folder.kept(&entry.campaign, &fingerprint);
         let kept = kept.filter(|record| !(args.retry && failure(record).is_some()));
         skipped += usize::from(kept.is_some());
         let record = match kept {
             Some(record) => record,
-            None => folder.keep(&examine(entry, &steps, &fingerprint))?,
+            None => folder.keep(&examine(entry, &steps, start, &fingerprint))?,
         };
+        last.extend(robot.map(str::to_string).zip(WarmStart::of(&record)));
         work.push((entry, record));
         progress.step();
     }

@@ -18,15 +18,136 @@ enum Column {
     Frequency { factor: f64 },
     Re(String),
     Im(String),
-    Magnitude(String),
-    PhaseDeg(String),
-    PhaseRad(String),
+    Magnitude(String, Scale),
+    Phase(String, Angle),
     Coherence(String),
     Unknown,
 }
 
-/// Reads a column name such as `frequency_hz`, `re(1X/1Y)`, `im`, `phase_deg`.
+/// How a column of magnitudes counts, as far as its heading says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Scale {
+    Unsaid,
+    Linear,
+    /// 20 log10 of the value over this reference.
+    Decibel {
+        reference: f64,
+    },
+}
+
+/// What a column of phases counts in, as far as its heading says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Angle {
+    Unsaid,
+    Degrees,
+    Radians,
+}
+
+impl Angle {
+    fn named(label: &str) -> Option<Angle> {
+        match label.trim().trim_end_matches('.').to_lowercase().as_str() {
+            "deg" | "degree" | "degrees" | "°" => Some(Angle::Degrees),
+            "rad" | "radian" | "radians" => Some(Angle::Radians),
+            _ => None,
+        }
+    }
+}
+
+/// `dB`, `dB re 1 m/N`, `dB (m/s²)/N`: the reference, and the unit where there is one.
+fn decibel(label: &str) -> Option<(f64, &str)> {
+    let label = label.trim();
+    let rest = label
+        .get(..2)
+        .filter(|start| start.eq_ignore_ascii_case("db"))
+        .map(|_| label[2..].trim_start())?;
+    let rest = ["rel.", "rel", "ref.", "ref", "re:", "re"]
+        .iter()
+        .find_map(|word| {
+            rest.strip_prefix(word)
+                .filter(|r| !r.starts_with(char::is_alphabetic))
+        })
+        .unwrap_or(rest)
+        .trim_start_matches([' ', ':']);
+    let end = rest.find([' ', '(', '[']).unwrap_or(rest.len());
+    match rest[..end].parse::<f64>() {
+        Ok(reference) if reference.is_finite() && reference > 0.0 => Some((reference, rest[end..].trim())),
+        _ => Some((1.0, rest)),
+    }
+}
+
+/// The unit at the end of a column's name and the name without it: `Magnitude (dB)`, `Real [(m/s²)/N]`. Round brackets may
+/// hold anything (the name of the FRF, mostly), so they count only where they hold a unit.
+fn unit_behind(name: &str) -> (&str, Option<&str>) {
+    let name = name.trim();
+    let open = match name.chars().last() {
+        Some(']') => name.find('['),
+        Some(')') => opening_bracket(name),
+        _ => None,
+    };
+    let Some(open) = open else { return (name, None) };
+    let (bare, unit) = (name[..open].trim_end(), name[open + 1..name.len() - 1].trim());
+    let known = || {
+        decibel(unit).is_some()
+            || Angle::named(unit).is_some()
+            || units::parse(unit).is_some_and(|u| u.dimension.frf().is_some())
+    };
+    if !bare.is_empty() && (name.ends_with(']') || known()) {
+        (bare, Some(unit))
+    } else {
+        (name, None)
+    }
+}
+
+/// Where the round bracket opens that the last one closes.
+fn opening_bracket(name: &str) -> Option<usize> {
+    let mut depth = 0;
+    for (at, c) in name.char_indices().rev() {
+        match c {
+            ')' => depth += 1,
+            '(' => depth -= 1,
+            _ => (),
+        }
+        if depth == 0 {
+            return Some(at);
+        }
+    }
+    None
+}
+
+/// Reads a column name such as `frequency_hz`, `re(1X/1Y)`, `im`, `phase_deg`, `Magnitude (dB)`.
 fn column(name: &str) -> Column {
+    let (bare, unit) = unit_behind(name);
+    let read = column_without_unit(bare);
+    let read = if unit.is_some() && read == Column::Unknown {
+        column_without_unit(name)
+    } else {
+        read
+    };
+    in_unit(read, unit)
+}
+
+/// The column, with what its unit says of it.
+fn in_unit(column: Column, unit: Option<&str>) -> Column {
+    let Some(unit) = unit.filter(|u| !u.is_empty()) else {
+        return column;
+    };
+    match column {
+        Column::Frequency { .. } => Column::Frequency {
+            factor: units::frequency_factor(unit).unwrap_or(1.0),
+        },
+        Column::Magnitude(of, Scale::Unsaid) => {
+            let linear = units::parse_named(unit).map_or(Scale::Unsaid, |_| Scale::Linear);
+            Column::Magnitude(
+                of,
+                decibel(unit).map_or(linear, |(reference, _)| Scale::Decibel { reference }),
+            )
+        }
+        Column::Phase(of, Angle::Unsaid) => Column::Phase(of, Angle::named(unit).unwrap_or(Angle::Unsaid)),
+        other => other,
+    }
+}
+
+fn column_without_unit(name: &str) -> Column {
     let lower = name.trim().to_lowercase();
     let (head, inside) = match (lower.find('('), lower.rfind(')')) {
         (Some(open), Some(close)) if open < close => {
@@ -35,49 +156,46 @@ fn column(name: &str) -> Column {
         _ => (lower.as_str(), ""),
     };
     let of = inside.to_owned();
+    let db = Scale::Decibel { reference: 1.0 };
     match head {
         "re" | "real" | "re_h" => Column::Re(of),
         "im" | "imag" | "imaginary" | "im_h" => Column::Im(of),
-        "mag" | "magnitude" | "abs" | "amplitude" => Column::Magnitude(of),
-        "phase_deg" | "phase [deg]" | "phase[deg]" => Column::PhaseDeg(of),
-        "phase" if inside == "deg" || inside == "°" => Column::PhaseDeg(String::new()),
-        "phase_rad" | "phase [rad]" | "phase[rad]" => Column::PhaseRad(of),
-        "phase" if inside == "rad" => Column::PhaseRad(String::new()),
+        "mag" | "magnitude" | "abs" | "amplitude" => Column::Magnitude(of, Scale::Unsaid),
+        "mag_db" | "magnitude_db" | "amplitude_db" | "db" => Column::Magnitude(of, db),
+        "phase_deg" => Column::Phase(of, Angle::Degrees),
+        "phase_rad" => Column::Phase(of, Angle::Radians),
+        "phase" | "phase angle" => Column::Phase(of, Angle::Unsaid),
         "coherence" | "coh" | "gamma2" => Column::Coherence(of),
         "f" | "freq" | "frq" | "freq." | "frequency" | "frequency_hz" | "freq_hz" | "f_hz" | "hz"
         | "frequenz" => Column::Frequency {
             factor: units::frequency_factor(inside).unwrap_or(1.0),
         },
-        _ => match head.split_once('[') {
-            Some(("f" | "freq" | "frequency" | "freq " | "frequency " | "f ", unit)) => Column::Frequency {
-                factor: units::frequency_factor(unit.trim_end_matches(']')).unwrap_or(1.0),
-            },
-            Some((base, _))
-                if ["re", "real", "im", "imag", "imaginary", "mag", "magnitude"].contains(&base.trim()) =>
-            {
-                column(base)
-            }
-            _ => part_behind_name(name).unwrap_or(Column::Unknown),
-        },
+        _ => part_behind_name(name).unwrap_or(Column::Unknown),
     }
 }
 
 /// `amp_real`, `H1_2_imag`, `1X/1X re`, `Signal 2 (Imag.)`: the part stands behind the name of the FRF.
 fn part_behind_name(name: &str) -> Option<Column> {
     let name = name.trim();
+    let (name, unit) = ["_deg", "_rad", "_db", "_dB"]
+        .iter()
+        .find_map(|unit| Some((name.strip_suffix(unit)?, Some(&unit[1..]))))
+        .unwrap_or((name, None));
     let (of, part) = name.rsplit_once(['_', ' '])?;
     let part = part.to_lowercase();
-    let part = match part.trim_matches(|c: char| "()[].".contains(c)) {
-        "re" | "real" => Column::Re,
-        "im" | "imag" | "imaginary" => Column::Im,
-        "mag" | "magnitude" => Column::Magnitude,
-        "coh" | "coherence" => Column::Coherence,
-        _ => return None,
-    };
     // These name no FRF but the value itself.
     let of = of.trim();
     let bare = ["amp", "amplitude", "frf", "h", "value", "y"].contains(&of.to_lowercase().as_str());
-    Some(part(if bare { String::new() } else { of.to_owned() }))
+    let of = if bare { String::new() } else { of.to_owned() };
+    let part = match part.trim_matches(|c: char| "()[].".contains(c)) {
+        "re" | "real" => Column::Re(of),
+        "im" | "imag" | "imaginary" => Column::Im(of),
+        "mag" | "magnitude" => Column::Magnitude(of, Scale::Unsaid),
+        "phase" => Column::Phase(of, Angle::Unsaid),
+        "coh" | "coherence" => Column::Coherence(of),
+        _ => return None,
+    };
+    Some(in_unit(part, unit))
 }
 
 /// The names line of a SignalCalc export (Data Physics), put together: its signals (`H1,2`) stand above the parts (`Real`,
@@ -168,21 +286,19 @@ fn testlab_dof(id: &str) -> Option<String> {
     dof.parse::<Dof>().ok().map(|dof| dof.to_string())
 }
 
-/// What a column's unit (under its name, or in its brackets) says of the FRF: quantity and factor to SI. `(m/s2)(N)`, as
-/// SignalCalc writes it, is a ratio.
+/// A column's unit as the file writes it: under its name, or in brackets behind it.
+fn unit_label(header: &Header, at: usize) -> Option<String> {
+    let in_brackets = || unit_behind(header.names.get(at)?).1.map(str::to_owned);
+    let below = header.units.get(at).filter(|u| !u.is_empty());
+    below.cloned().or_else(in_brackets)
+}
+
+/// What a column's unit says of the FRF: quantity and factor to SI. `(m/s2)(N)`, as SignalCalc writes it, is a ratio.
 fn quantity_of_unit(header: &Header, at: usize) -> Option<(Quantity, f64)> {
-    let name = header.names.get(at)?;
-    let in_brackets = name
-        .split_once('[')
-        .map(|(_, u)| u.trim_end_matches(']').to_owned());
-    let label = header
-        .units
-        .get(at)
-        .cloned()
-        .filter(|u| !u.is_empty())
-        .or(in_brackets)?;
+    let label = unit_label(header, at)?;
+    let label = decibel(&label).map_or(label.as_str(), |(_, unit)| unit);
     let of = |label: &str| units::parse_named(label).and_then(|u| Some((u.dimension.frf()?, u.factor)));
-    of(&label).or_else(|| of(&label.replacen(")(", ")/(", 1)))
+    of(label).or_else(|| of(&label.replacen(")(", ")/(", 1)))
 }
 
 /// Response and reference that the lines above the table say: `Response: 3Z`, `Reference DOF,1X`, `DOFs: 3Z:1X`.
@@ -212,7 +328,7 @@ pub(crate) fn is_frf_table(header: &Header) -> bool {
     matches!(columns.first(), Some(Column::Frequency { .. }))
         && columns
             .iter()
-            .any(|c| matches!(c, Column::Re(_) | Column::Magnitude(_)))
+            .any(|c| matches!(c, Column::Re(_) | Column::Magnitude(..)))
 }
 
 /// True where three columns of numbers stand alone, or under a heading that speaks of frequency.
@@ -239,8 +355,8 @@ struct Parts {
     name: String,
     re: Option<usize>,
     im: Option<usize>,
-    magnitude: Option<usize>,
-    phase: Option<(usize, f64)>,
+    magnitude: Option<(usize, Scale)>,
+    phase: Option<(usize, Angle)>,
     coherence: Option<usize>,
 }
 
@@ -254,7 +370,17 @@ pub(crate) fn read_table(
         .data_line
         .saturating_sub(1 + usize::from(!header.units.is_empty()))
         .max(1);
-    let columns: Vec<Column> = header.names.iter().map(|n| column(n)).collect();
+    let below = |at: usize| header.units.get(at).map(String::as_str);
+    let columns: Vec<Column> = header
+        .names
+        .iter()
+        .enumerate()
+        .map(|(at, name)| match column(name) {
+            // The factor of the frequency comes from its heading, as ever.
+            frequency @ Column::Frequency { .. } => frequency,
+            other => in_unit(other, below(at)),
+        })
+        .collect();
     let Some(Column::Frequency { factor }) = columns.first().cloned() else {
         return Err(InputError::new("the first column is not the frequency").line(names_line));
     };
@@ -262,14 +388,14 @@ pub(crate) fn read_table(
     let mut index: HashMap<&str, usize> = HashMap::new();
     for (at, column) in columns.iter().enumerate().skip(1) {
         let name = match column {
-            Column::Re(n) | Column::Im(n) | Column::Magnitude(n) => n,
-            Column::PhaseDeg(n) | Column::PhaseRad(n) | Column::Coherence(n) => n,
+            Column::Re(n) | Column::Im(n) | Column::Magnitude(n, _) => n,
+            Column::Phase(n, _) | Column::Coherence(n) => n,
             Column::Frequency { .. } | Column::Unknown => {
                 return Err(
                     InputError::new(format!("column {:?} is not part of an FRF", header.names[at]))
                         .line(names_line)
                         .remedy(
-                            "use frequency_hz, then re(1X/1X),im(1X/1X) or magnitude,phase_deg for each FRF",
+                            "use frequency_hz, then re(1X/1X),im(1X/1X) or magnitude,phase_deg for each FRF (magnitude_db: in dB)",
                         ),
                 );
             }
@@ -290,9 +416,8 @@ pub(crate) fn read_table(
         let twice = match column {
             Column::Re(_) => part.re.replace(at).is_some(),
             Column::Im(_) => part.im.replace(at).is_some(),
-            Column::Magnitude(_) => part.magnitude.replace(at).is_some(),
-            Column::PhaseDeg(_) => part.phase.replace((at, std::f64::consts::PI / 180.0)).is_some(),
-            Column::PhaseRad(_) => part.phase.replace((at, 1.0)).is_some(),
+            Column::Magnitude(_, scale) => part.magnitude.replace((at, *scale)).is_some(),
+            Column::Phase(_, angle) => part.phase.replace((at, *angle)).is_some(),
             _ => part.coherence.replace(at).is_some(),
         };
         if twice {
@@ -309,9 +434,16 @@ pub(crate) fn read_table(
         let value: Vec<Complex64> = match (part.re, part.im, part.magnitude, part.phase) {
             // Magnitude and phase beside them say the same.
             (Some(re), Some(im), ..) => pair(re, im).map(|(re, im)| Complex64::new(*re, *im)).collect(),
-            (None | Some(_), None, Some(magnitude), Some((phase, radians))) => pair(magnitude, phase)
-                .map(|(m, p)| Complex64::from_polar(*m, p * radians))
-                .collect(),
+            (None | Some(_), None, Some((magnitude, scale)), Some((phase, angle))) => {
+                let radians = radians_of(&table.columns[phase], angle, &part.name, notes)
+                    .map_err(|e| e.line(names_line))?;
+                let linear = linear_of(&table.columns[magnitude], scale, &part.name, notes);
+                linear
+                    .iter()
+                    .zip(radians)
+                    .map(|(m, p)| Complex64::from_polar(*m, p))
+                    .collect()
+            }
             _ => {
                 let whose = if part.name.is_empty() {
                     String::new()
@@ -334,7 +466,7 @@ pub(crate) fn read_table(
         };
         let unit = part
             .re
-            .or(part.magnitude)
+            .or(part.magnitude.map(|(at, _)| at))
             .and_then(|at| quantity_of_unit(header, at));
         let factor = unit.map_or(1.0, |u| u.1);
         if (factor - 1.0).abs() > 1e-12 {
@@ -359,6 +491,62 @@ pub(crate) fn read_table(
         )?);
     }
     Ok(frfs)
+}
+
+/// Magnitudes as they are, from decibels where the heading says so, or where they fall below zero, which no magnitude does.
+fn linear_of(magnitude: &[f64], scale: Scale, name: &str, notes: &mut Notes) -> Vec<f64> {
+    let below_zero = || magnitude.iter().any(|m| *m < 0.0);
+    let reference = match scale {
+        Scale::Decibel { reference } => reference,
+        Scale::Unsaid if below_zero() => {
+            notes.about(name, "magnitudes below zero: taken as dB (20 log10), reference 1");
+            1.0
+        }
+        Scale::Unsaid | Scale::Linear => return magnitude.to_vec(),
+    };
+    magnitude
+        .iter()
+        .map(|db| reference * 10_f64.powf(db / 20.0))
+        .collect()
+}
+
+/// Phases in radians. Where the heading says no unit, the values do: radians stay within one turn, or, where they were
+/// unwrapped, within half a turn from line to line.
+fn radians_of(phase: &[f64], angle: Angle, name: &str, notes: &mut Notes) -> Result<Vec<f64>, InputError> {
+    /// One turn, and what rounding adds.
+    const TURN: f64 = std::f64::consts::TAU * 1.02;
+    /// Over fifty modes would have to pass for radians to go so far.
+    const HALF_A_TURN_IN_DEGREES: f64 = 170.0;
+    let finite: Vec<f64> = phase.iter().copied().filter(|p| p.is_finite()).collect();
+    let (least, most) = finite
+        .iter()
+        .fold((f64::MAX, f64::MIN), |(a, b), p| (a.min(*p), b.max(*p)));
+    let range = most - least;
+    let jumps = finite.windows(2).any(|w| (w[1] - w[0]).abs() > TURN / 2.0);
+    let degrees = match angle {
+        Angle::Degrees => true,
+        Angle::Radians => false,
+        Angle::Unsaid if range <= TURN => {
+            notes.about(name, "unit of the phase not said: radians, by its values");
+            false
+        }
+        Angle::Unsaid if jumps || range >= HALF_A_TURN_IN_DEGREES => {
+            notes.about(name, "unit of the phase not said: degrees, by its values");
+            true
+        }
+        Angle::Unsaid => {
+            return Err(InputError::new(format!(
+                "the phase goes from {least:.4} to {most:.4}: degrees, or radians that were unwrapped"
+            ))
+            .remedy("name the column phase_deg or phase_rad"));
+        }
+    };
+    let factor = if degrees {
+        std::f64::consts::PI / 180.0
+    } else {
+        1.0
+    };
+    Ok(phase.iter().map(|p| p * factor).collect())
 }
 
 /// `1X/1Y` → response and reference.

@@ -54,6 +54,8 @@ const MORE_THAN_NOISE: f64 = 2.0;
 const MOST_TAKEN_AWAY: f64 = 0.5;
 /// One more pole that is damped this many times as much as its neighbour is no mode there but a shape of the residual.
 const MOST_DAMPED: f64 = 5.0;
+/// A peak that rises by less than this part of its height is a ripple.
+const RIPPLE: f64 = 0.5;
 /// Modes nearer to each other than this many sums of their half-widths overlap.
 const OVERLAP_WIDTHS: f64 = 4.0;
 /// A bias of the damping below this part of it is not worth a word.
@@ -177,6 +179,16 @@ fn analyse(
         }
         same
     });
+    let (modes, undetermined): (Vec<FrfMode>, Vec<FrfMode>) = std::mem::take(&mut result.modes)
+        .into_iter()
+        .partition(|mode| match what_is_open(mode, &curve, &peaks) {
+            Some(why) => {
+                refused.push(format!("{:.2} Hz ({why})", mode.best().frequency_hz));
+                false
+            }
+            None => true,
+        });
+    (result.modes, result.undetermined) = (modes, undetermined);
     if !refused.is_empty() {
         result
             .remarks
@@ -184,6 +196,23 @@ fn analyse(
     }
     quality_remarks(&result.modes, &mut result.remarks);
     Ok(result)
+}
+
+/// What the lines leave open of a mode, all that is known of its errors put together, where that is too much to call it one.
+fn what_is_open(mode: &FrfMode, curve: &Curve, peaks: &[FrfPeak]) -> Option<&'static str> {
+    let best = mode.best();
+    let distance = |p: &FrfPeak| (curve.frequency_hz[p.index] - best.frequency_hz).abs();
+    let peak = peaks.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+    let half_width_hz = best.damping_ratio * best.frequency_hz;
+    let placed_hz = half_width_hz.max(0.5 * curve.spacing_hz(peak.index));
+    if best.frequency_std_hz.is_some_and(|std| std > placed_hz) {
+        return Some("its lines do not determine its frequency");
+    }
+    // A resonance narrower than a line rises out of what is around it; noise and hum are ripples on it.
+    let unknown_width = best
+        .damping_std
+        .is_some_and(|std| std > MAX_RELATIVE_STD * best.damping_ratio);
+    (unknown_width && peak.rise < RIPPLE).then_some("a ripple whose width its lines do not determine")
 }
 
 /// A peak with the first estimate of its pole.
@@ -516,10 +545,11 @@ fn recommended(
     let reason = match disturbance {
         Some(cause) => {
             let off = match (contradicted, &biases[..]) {
-                (true, []) => "the others are far off".to_string(),
-                (_, biases) => format!("it puts the damping of {} off", biases.join(", of ")),
+                (true, []) => "; the others are far off".to_string(),
+                (false, []) => String::new(),
+                (_, biases) => format!("; it puts the damping of {} off", biases.join(", of ")),
             };
-            format!("{} here: only the local fit has that in it; {off}", cause.words())
+            format!("{} here: only the local fit has that in it{off}", cause.words())
         }
         None if contradicted => {
             "the other methods contradict it, and it has the neighbours and a residual in it".into()

@@ -346,3 +346,57 @@ fn a_very_broad_mode_is_no_trouble() {
         assert!(found.modes.iter().all(|m| m.best().frequency_hz > 0.0));
     }
 }
+
+/// Where the force of a hammer fades, noise comes as ripples of a line: peaks above the noise of the whole FRF, but no modes.
+#[test]
+fn ripples_of_a_line_are_no_modes() {
+    let modes = [
+        SyntheticMode::new(180.0, 0.009, 1.0),
+        SyntheticMode::new(1010.0, 0.009, 1.0),
+    ];
+    let (f, mut h) = Synthetic::new(5.0, 3200.0, 1.0, &modes)
+        .with_noise(0.0, 1e-3, 7)
+        .frf();
+    let ripples = [1890.0, 1943.0, 2080.0, 2148.0, 2680.0, 2911.0];
+    for (k, at) in ripples.iter().enumerate() {
+        let line = f.iter().position(|f| f == at).unwrap();
+        h[line] *= Complex64::from_polar(1.03, 0.01 * k as f64);
+    }
+    let found = analyse_frf(&f, &h, &Settings::default()).unwrap();
+    let at: Vec<f64> = found
+        .modes
+        .iter()
+        .map(|m| m.best().frequency_hz.round())
+        .collect();
+    assert_eq!(at, [180.0, 1010.0], "{:?}", found.remarks);
+    assert!(!found.undetermined.is_empty(), "{:?}", found.remarks);
+    for peak in &found.undetermined {
+        let frequency_hz = peak.best().frequency_hz;
+        assert!(
+            ripples.iter().any(|f| (f - frequency_hz).abs() < 1.0),
+            "{frequency_hz} Hz"
+        );
+        let named = format!("{frequency_hz:.2} Hz (a ripple whose width its lines do not determine)");
+        assert!(
+            found.remarks.iter().any(|r| r.contains(&named)),
+            "{:?}",
+            found.remarks
+        );
+    }
+}
+
+/// It rises out of what is around it: a mode, though its damping is not known.
+#[test]
+fn a_resonance_narrower_than_a_line_is_no_ripple() {
+    let modes = [
+        SyntheticMode::new(180.0, 0.009, 1.0),
+        SyntheticMode::new(410.0, 1e-6, 1e-3),
+    ];
+    let found = analyse(Synthetic::new(5.0, 800.0, 1.0, &modes).with_noise(0.0, 1e-3, 7));
+    let at: Vec<f64> = found
+        .modes
+        .iter()
+        .map(|m| m.best().frequency_hz.round())
+        .collect();
+    assert_eq!(at, [180.0, 410.0], "{:?} {:?}", found.undetermined, found.remarks);
+}

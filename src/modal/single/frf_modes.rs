@@ -108,10 +108,20 @@ impl FrfMode {
 pub struct FrfModes {
     /// Ascending in frequency.
     pub modes: Vec<FrfMode>,
+    /// Peaks whose lines determine no mode: a ripple of a line or two, a pole that could be anywhere. Other FRFs of the set may
+    /// say what they are; the remarks name them. Ascending in frequency.
+    pub undetermined: Vec<FrfMode>,
     /// The FRF was recorded with the sign convention e^{−iωt} and was turned before the analysis.
     pub conjugated: bool,
     /// What changes the result.
     pub warnings: Vec<String>,
     /// What is usual and worth knowing: peaks that are no modes, coarse lines, methods that disagree.
     pub remarks: Vec<String>,
+}
+
+impl FrfModes {
+    /// The modes and the peaks that may be some: what an analysis together with other FRFs begins with.
+    pub(crate) fn peaks(&self) -> impl Iterator<Item = &FrfMode> {
+        self.modes.iter().chain(&self.undetermined)
+    }
 }

@@ -25,6 +25,8 @@ pub(crate) struct FrfPeak {
     pub index: usize,
     /// Prominence over the noise's standard deviation.
     pub significance: f64,
+    /// Prominence over height: nearly 1 for a peak that stands alone, little for a ripple on a flank.
+    pub rise: f64,
     /// Range in which the curve stays above half of the prominence (inclusive).
     pub from: usize,
     pub to: usize,
@@ -113,6 +115,7 @@ fn prominent(height: &[f64], noise_std: &[f64], noise_gain: f64, margin: usize) 
         peaks.push(FrfPeak {
             index: k,
             significance,
+            rise: prominence / height[k],
             from,
             to,
         });

@@ -286,7 +286,7 @@ fn scatter(solution: &ml_fit::Solution, j: usize, noise: [f64; 2]) -> [Otherwise
 fn disagreement(members: &[&SetMember], pole: Pole, std: [f64; 2]) -> [f64; 2] {
     let width_hz = pole.damping_ratio * pole.frequency_hz;
     let mut most = [0.0f64; 2];
-    for mode in members.iter().flat_map(|m| &m.modes.modes) {
+    for mode in members.iter().flat_map(|m| m.modes.peaks()) {
         let own = mode.best();
         let line_hz = 2.0 * own.damping_ratio * own.frequency_hz / mode.lines_in_half_power_band;
         let apart = [

@@ -238,6 +238,54 @@ fn rounded_figures_are_no_mode() {
     }
 }
 
+/// One FRF over the whole band, whose beginning is drift, huge as a displacement, that no poles describe: it must not decide what is a
+/// mode elsewhere (all six had gone out, one after the other).
+#[test]
+fn drift_at_the_beginning_of_the_band_costs_no_mode_elsewhere() {
+    let modes = [
+        (22.0, 0.012, 0.004),
+        (139.0, 0.009, 0.06),
+        (387.0, 0.004, 0.5),
+        (600.0, 0.002, 0.05),
+        (755.0, 0.0036, 0.6),
+        (930.0, 0.007, 0.3),
+    ];
+    let of_modes = modes.map(|(f, z, a)| SyntheticMode::new(f, z, a));
+    for (seed, drift) in (1..=3).flat_map(|seed| [(seed, 0.03), (seed, 0.3)]) {
+        let (f, mut h) = Synthetic::new(0.3125, 1000.0, 0.3125, &of_modes)
+            .with_noise(0.0, 2e-3, seed)
+            .frf();
+        let mut random = ChaCha8Rng::seed_from_u64(100 + seed);
+        let mut gauss = || {
+            let radius = (-2.0 * (1.0 - random.random::<f64>()).ln()).sqrt();
+            Complex64::from_polar(radius, TAU * random.random::<f64>())
+        };
+        let white: Vec<Complex64> = (0..f.len() + 8).map(|_| gauss()).collect();
+        for (k, (f, h)) in f.iter().zip(&mut h).enumerate() {
+            let smooth: Complex64 = white[k..k + 9].iter().sum();
+            *h += drift / 3.0 * smooth * (-f / 30.0).exp() / (TAU * f).powi(2);
+        }
+        let settings = Settings::default();
+        let single = analyse_frf(&f, &h, &settings).unwrap();
+        let member = SetMember {
+            frequency_hz: &f,
+            receptance_m_per_n: &h,
+            modes: &single,
+            dofs: None,
+        };
+        let found = global(&[member], &settings).unwrap();
+        // Those that stand far out of it.
+        for (frequency_hz, zeta, _) in [modes[2], modes[4], modes[5]] {
+            let there = |m: &GlobalMode| (m.frequency_hz - frequency_hz).abs() < zeta * frequency_hz;
+            assert!(
+                found.modes.iter().any(there),
+                "seed {seed}, drift {drift}: no mode at {frequency_hz} Hz: {:?}",
+                found.rejected
+            );
+        }
+    }
+}
+
 #[test]
 fn coloured_error_makes_no_modes_and_the_standard_deviations_cover_it() {
     let mut squares = [0.0; 2];

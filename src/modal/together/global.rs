@@ -113,7 +113,7 @@ fn prepare(
 ) -> Result<(Vec<Data>, Vec<usize>)> {
     // An FRF in which no mode says which way it turns goes with the others.
     let [mut turned, mut straight] = [0, 0];
-    for frf in frfs.iter().filter(|f| !f.modes.modes.is_empty()) {
+    for frf in frfs.iter().filter(|f| f.modes.peaks().next().is_some()) {
         *if frf.modes.conjugated {
             &mut turned
         } else {
@@ -132,7 +132,7 @@ fn prepare(
         if curve.len() < MIN_LINES || curve.mobility.iter().all(|y| *y == Complex64::ZERO) {
             continue;
         }
-        let conjugated = if frf.modes.modes.is_empty() {
+        let conjugated = if frf.modes.peaks().next().is_none() {
             turned > straight
         } else {
             frf.modes.conjugated
@@ -177,7 +177,7 @@ fn band(data: &[Data]) -> Option<[f64; 2]> {
 fn single_peaks(members: &[&SetMember]) -> Vec<Pole> {
     let mut all: Vec<(f64, Pole)> = members
         .iter()
-        .flat_map(|m| &m.modes.modes)
+        .flat_map(|m| m.modes.peaks())
         .map(|mode| {
             let best = mode.best();
             let pole = Pole {

@@ -10,6 +10,9 @@ use crate::signal::noise_law::{self, Departure};
 
 /// A stretch of the band left with this many times the noise power is badly described.
 const MISFIT: f64 = 2.0;
+/// A few FRFs left with this many times the noise power over the whole band are so because of a stretch that no poles describe: by
+/// the level of the whole no mode elsewhere would be determined.
+const DECIDED_BY_A_STRETCH: f64 = 10.0;
 /// Lines of a stretch: enough that a mode overlooked in it still stands out.
 const BLOCK: usize = 48;
 
@@ -128,10 +131,6 @@ pub(crate) fn renew(data: &mut [Data], groups: &[Group]) {
             };
         }
     }
-    // In a few FRFs alone a mode overlooked would hide in its own misfit.
-    if data.len() < SET {
-        return;
-    }
     let finest = data.iter().max_by_key(|d| d.frequency_hz.len());
     let lines_hz = finest.map_or_else(Vec::new, |d| d.frequency_hz.clone());
     if lines_hz.is_empty() {
@@ -147,6 +146,11 @@ pub(crate) fn renew(data: &mut [Data], groups: &[Group]) {
                 *lines += 1.0;
             }
         }
+    }
+    // In a few FRFs alone a mode overlooked would hide in its own misfit.
+    let (sum, lines) = left.iter().fold((0.0, 0.0), |(s, n), l| (s + l.0, n + l.1));
+    if data.len() < SET && sum < DECIDED_BY_A_STRETCH * lines {
+        return;
     }
     let excess = lasting_excess(&left);
     for d in data.iter_mut() {

@@ -13,7 +13,7 @@ use crate::{Error, InputError, Result};
 /// Columns that stand first: of the manifest, or else of `campaign.toml`.
 const FIRST: [&str; 3] = ["campaign", "robot", "date"];
 /// Columns of what every row has.
-const RESULTS: [&str; 17] = [
+const RESULTS: [&str; 18] = [
     "line",
     "command",
     "domain",
@@ -30,8 +30,11 @@ const RESULTS: [&str; 17] = [
     "effect",
     "site",
     "confidence",
+    STARTED_FROM,
     "setup",
 ];
+/// The campaign whose calibration this one started from. Tables of earlier versions have it not.
+const STARTED_FROM: &str = "started_from";
 /// Those of them that are numbers; quantities are, too.
 #[cfg(feature = "parquet")]
 const NUMBERS: [&str; 6] = ["line", "seconds", "nrms", "noise", "held_out_nrms", "confidence"];
@@ -132,7 +135,7 @@ impl BatchTable {
         if let Some(lacking) = FIRST
             .iter()
             .chain(&RESULTS)
-            .find(|c| !columns.iter().any(|n| n == *c))
+            .find(|c| **c != STARTED_FROM && !columns.iter().any(|n| n == *c))
         {
             return Err(broken(format!(
                 "not a table of a batch: there is no column {lacking}"
@@ -270,6 +273,7 @@ fn cell(column: &str, entry: &ManifestEntry, record: &Record, side: &SideResult)
         "effect" => said(&found.effect),
         "site" => said(&found.site),
         "confidence" => text(found.confidence),
+        STARTED_FROM => said(&record.started_from),
         "setup" => found.setup.join("\n"),
         _ => String::new(),
     }
@@ -362,6 +366,7 @@ mod tests {
             fingerprint: "f".into(),
             version: "1".into(),
             command: "calibrate,diagnose".into(),
+            started_from: None,
             robot: Some("irb6640".into()),
             date: Some("2026-11-01".into()),
             sides: vec![

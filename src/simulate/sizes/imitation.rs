@@ -6,12 +6,13 @@ use serde::Serialize;
 use crate::Result;
 use crate::effects::Registry;
 use crate::effects::{DataSummary, Instance, Structure};
+use crate::identify::first_size::linear_size;
 use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
 use crate::identify::{FrfData, StructureModel, levenberg_marquardt};
 use crate::simulate::sizes::visibility::misfit;
 
 /// The effect of the library that leaves least of what a foreign effect does, found by refits from the effect's starting
-/// points. Where little is left, `unknown` is not the only honest verdict.
+/// points and from the size that linear least squares give. Where little is left, `unknown` is not the only honest verdict.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Imitation {
     /// `effect@site`; `None`: no effect helps.
@@ -106,9 +107,15 @@ fn refit(
         max_iterations: 30,
         relative_decrease: 1e-4,
     };
+    let usual = ranked.into_iter().take(STARTS).map(|(_, start)| start);
+    // What is faint lies far from usual sizes, and a fit from those need not get there.
+    let faint = match own.is_empty() {
+        true => None,
+        false => linear_size(&problem, model, theta).map(|size| size.theta),
+    };
     let mut least = f64::INFINITY;
-    for (_, start) in ranked.iter().take(STARTS) {
-        let fit = levenberg_marquardt::minimise(&problem, start, &model.bounds(), stopping)?;
+    for start in usual.chain(faint) {
+        let fit = levenberg_marquardt::minimise(&problem, &start, &model.bounds(), stopping)?;
         least = least.min(misfit(model, &fit.theta, data)?);
     }
     Ok(least)

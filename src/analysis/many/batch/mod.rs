@@ -19,7 +19,8 @@ use crate::cutting::{CfcOptions, ForceGroup};
 use crate::discrepancy::setup::{SetupCheck, SetupFinding};
 use crate::discrepancy::{Diagnosis, DiagnosisVerdict};
 use crate::identify::frfs::structure_study::held_out_postures;
-use crate::identify::{Estimate, Options};
+use crate::identify::{Estimate, Options, StructureCase};
+use crate::parameter::Parameter;
 use crate::revision::folder_fingerprint;
 use crate::{Error, InputError, Result};
 
@@ -156,6 +157,9 @@ pub struct Record {
     pub version: String,
     /// `calibrate,diagnose`.
     pub command: String,
+    /// The campaign whose calibration this one started from, as the manifest names it.
+    #[serde(default)]
+    pub started_from: Option<String>,
     /// What `campaign.toml` says, for a manifest that does not.
     pub robot: Option<String>,
     /// Date of the measurements by `campaign.toml`, likewise.
@@ -164,13 +168,66 @@ pub struct Record {
     pub sides: Vec<SideResult>,
 }
 
-/// Contents of `campaign.toml`, of the revisions and of all files that it names, the steps, and the program's version.
-pub fn fingerprint(dir: &Path, steps: &Steps) -> String {
-    folder_fingerprint(dir, &["batch", VERSION, &steps.name()])
+/// Where the calibration of a campaign's structure starts: what another campaign of the same robot gave.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WarmStart {
+    /// That campaign, as the manifest names it.
+    pub campaign: String,
+    /// Its calibrated parameters, named as in the table.
+    quantities: Vec<BatchQuantity>,
+}
+
+impl WarmStart {
+    /// The calibration of a record; `None` where there is none of the structure, or it did not converge.
+    pub fn of(record: &Record) -> Option<Self> {
+        let structure = record.sides.iter().find(|s| s.domain == STRUCTURE)?;
+        (structure.findings.converged == Some(true)).then(|| WarmStart {
+            campaign: record.campaign.clone(),
+            quantities: structure.findings.quantities.clone(),
+        })
+    }
+
+    /// Name and values, for a fingerprint: numbers as they read back.
+    fn text(&self) -> String {
+        let values = self
+            .quantities
+            .iter()
+            .map(|q| format!(" {}={:?}", q.name, q.value));
+        std::iter::once(self.campaign.clone()).chain(values).collect()
+    }
+
+    /// The case, fitted from here; by name, so that a parameter that the other campaign had not starts at its nominal value. A case
+    /// that has a start of its own, of a revision, keeps it.
+    fn begin(&self, case: StructureCase) -> StructureCase {
+        if case.model.start().is_some() {
+            return case;
+        }
+        let start = |parameter: &Parameter| {
+            let name = with_unit(&parameter.name, parameter.unit);
+            let known = self.quantities.iter().find(|q| q.name == name);
+            let known = known.and_then(|q| q.value).map(|value| parameter.internal(value));
+            known
+                .filter(|theta| theta.is_finite())
+                .unwrap_or(parameter.internal(parameter.nominal))
+        };
+        let theta = case.model.parameters.iter().map(start).collect();
+        case.starting_from(theta)
+    }
+}
+
+/// Contents of `campaign.toml`, of the revisions and of all files that it names, the steps, the program's version, and what
+/// the calibration starts from.
+pub fn fingerprint(dir: &Path, steps: &Steps, start: Option<&WarmStart>) -> String {
+    let start = start.map(WarmStart::text);
+    let mut about = vec!["batch", VERSION];
+    let steps = steps.name();
+    about.push(&steps);
+    about.extend(start.as_deref());
+    folder_fingerprint(dir, &about)
 }
 
 /// Works on a campaign; nothing is written into its folder. What cannot be done is told in the record.
-pub fn examine(entry: &ManifestEntry, steps: &Steps, fingerprint: &str) -> Record {
+pub fn examine(entry: &ManifestEntry, steps: &Steps, start: Option<&WarmStart>, fingerprint: &str) -> Record {
     let begun = Instant::now();
     let loaded = guarded(|| {
         let campaign = Campaign::load(&entry.dir)?;
@@ -182,6 +239,7 @@ pub fn examine(entry: &ManifestEntry, steps: &Steps, fingerprint: &str) -> Recor
         fingerprint: fingerprint.to_string(),
         version: VERSION.to_string(),
         command: steps.name(),
+        started_from: None,
         robot: None,
         date: None,
         sides: Vec::new(),
@@ -192,7 +250,10 @@ pub fn examine(entry: &ManifestEntry, steps: &Steps, fingerprint: &str) -> Recor
             record.date = campaign.date.clone();
             for (domain, work) in sides {
                 let begun = Instant::now();
-                let found = guarded(|| work(&campaign, steps));
+                let found = guarded(|| work(&campaign, steps, start));
+                if domain == STRUCTURE {
+                    record.started_from = start.map(|s| s.campaign.clone());
+                }
                 record.sides.push(side(domain, found, begun));
             }
         }
@@ -228,7 +289,10 @@ fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
     })
 }
 
-type Work = fn(&Campaign, &Steps) -> Result<BatchFindings>;
+/// Name of the side of the FRFs.
+const STRUCTURE: &str = "structure";
+
+type Work = fn(&Campaign, &Steps, Option<&WarmStart>) -> Result<BatchFindings>;
 
 /// The sides that the campaign holds and the steps are about.
 ///
@@ -238,7 +302,7 @@ fn sides(campaign: &Campaign, steps: &Steps) -> Result<Vec<(&'static str, Work)>
     let mut sides: Vec<(&'static str, Work)> = Vec::new();
     // Coefficients are all that `cfc` is about.
     if !campaign.frfs.is_empty() && steps.0 != [BatchStep::Cfc] {
-        sides.push(("structure", structure));
+        sides.push((STRUCTURE, structure));
     }
     if !campaign.cuts.is_empty() {
         sides.push(("cutting", cutting));
@@ -265,8 +329,13 @@ fn sides(campaign: &Campaign, steps: &Steps) -> Result<Vec<(&'static str, Work)>
         .into())
 }
 
-fn structure(campaign: &Campaign, steps: &Steps) -> Result<BatchFindings> {
-    let analysis = StructureAnalysis::run(campaign, Options::default())?;
+fn structure(campaign: &Campaign, steps: &Steps, start: Option<&WarmStart>) -> Result<BatchFindings> {
+    let case = StructureCase::load(campaign)?;
+    let case = match start {
+        Some(start) => start.begin(case),
+        None => case,
+    };
+    let analysis = StructureAnalysis::of_case(case, Options::default())?;
     let (case, calibration) = (&analysis.case, &analysis.calibration);
     let mut found = BatchFindings {
         nrms: finite(analysis.after.totals.nrms),
@@ -288,7 +357,7 @@ fn structure(campaign: &Campaign, steps: &Steps) -> Result<BatchFindings> {
     Ok(found)
 }
 
-fn cutting(campaign: &Campaign, steps: &Steps) -> Result<BatchFindings> {
+fn cutting(campaign: &Campaign, steps: &Steps, _: Option<&WarmStart>) -> Result<BatchFindings> {
     let campaign = &Workbench::new(campaign);
     let mut found = BatchFindings::default();
     if steps.has(BatchStep::Calibrate) || steps.has(BatchStep::Cfc) {

@@ -13,6 +13,7 @@ mod v5;
 mod variable;
 mod write;
 
+use variable::Labels;
 pub(crate) use variable::Variable;
 pub use write::{MatArray, mat5_bytes};
 
@@ -22,51 +23,50 @@ pub(crate) fn looks_like_v5(bytes: &[u8]) -> bool {
 
 /// An HDF5 file with MATLAB's block before it, or bare.
 pub(crate) fn looks_like_v73(bytes: &[u8]) -> bool {
-    crate::ingest::formats::mat::hdf5::looks_like(bytes)
+    hdf5::looks_like(bytes)
 }
 
 pub(crate) fn looks_like_v4(bytes: &[u8]) -> bool {
-    crate::ingest::formats::mat::v4::looks_like(bytes)
+    v4::looks_like(bytes)
 }
 
-pub(crate) fn read_v4(
-    bytes: &[u8],
-    rate_hz: Option<f64>,
-    budget: &mut Budget,
-    notes: &mut Notes,
-) -> Result<Contents, InputError> {
-    let variables = crate::ingest::formats::mat::v4::read(bytes, budget, notes)?;
-    interpret::contents(with_rate(variables, rate_hz), &[], budget, notes)
-}
-
-pub(crate) fn read_v5(
-    bytes: &[u8],
-    rate_hz: Option<f64>,
-    budget: &mut Budget,
-    notes: &mut Notes,
-) -> Result<Contents, InputError> {
-    let (variables, labels) = crate::ingest::formats::mat::v5::read(bytes, budget, notes)?;
-    interpret::contents(with_rate(variables, rate_hz), &labels, budget, notes)
-}
-
-pub(crate) fn read_v73(
-    bytes: &[u8],
-    rate_hz: Option<f64>,
-    budget: &mut Budget,
-    notes: &mut Notes,
-) -> Result<Contents, InputError> {
-    let variables = crate::ingest::formats::mat::hdf5::read(bytes, budget, notes)?;
-    interpret::contents(with_rate(variables, rate_hz), &[], budget, notes)
-}
-
-/// Named arrays of another format, taken as those of a MAT-file.
-pub(crate) fn of_arrays(
+/// Named arrays, and labels of their rows and columns where the format has such.
+pub(crate) struct NamedArrays {
     variables: Vec<Variable>,
-    rate_hz: Option<f64>,
-    budget: &mut Budget,
-    notes: &mut Notes,
-) -> Result<Contents, InputError> {
-    interpret::contents(with_rate(variables, rate_hz), &[], budget, notes)
+    labels: Vec<Labels>,
+}
+
+impl From<Vec<Variable>> for NamedArrays {
+    fn from(variables: Vec<Variable>) -> Self {
+        NamedArrays {
+            variables,
+            labels: Vec::new(),
+        }
+    }
+}
+
+impl NamedArrays {
+    pub(crate) fn of_v4(bytes: &[u8], budget: &mut Budget, notes: &mut Notes) -> Result<Self, InputError> {
+        v4::read(bytes, budget, notes).map(NamedArrays::from)
+    }
+
+    pub(crate) fn of_v5(bytes: &[u8], budget: &mut Budget, notes: &mut Notes) -> Result<Self, InputError> {
+        v5::read(bytes, budget, notes).map(|(variables, labels)| NamedArrays { variables, labels })
+    }
+
+    pub(crate) fn of_v73(bytes: &[u8], budget: &mut Budget, notes: &mut Notes) -> Result<Self, InputError> {
+        hdf5::read(bytes, budget, notes).map(NamedArrays::from)
+    }
+
+    /// What the arrays hold. `rate_hz`: of the samples, if the campaign says it.
+    pub(crate) fn contents(
+        self,
+        rate_hz: Option<f64>,
+        budget: &mut Budget,
+        notes: &mut Notes,
+    ) -> Result<Contents, InputError> {
+        interpret::contents(with_rate(self.variables, rate_hz), &self.labels, budget, notes)
+    }
 }
 
 /// A rate that the campaign says stands beside the arrays as if the file had it.

@@ -21,6 +21,7 @@ use crate::modal::scaling::{DrivingPoint, check_driving_point};
 use crate::report::sections::modal_section::{
     coherence, mac, modes, reconstruction, reconstruction_of, stabilisation, tracked,
 };
+use crate::revision;
 
 /// Warnings shown; the command tells all.
 const MOST_WARNINGS: usize = 12;
@@ -105,9 +106,14 @@ pub fn page(analysis: &ModalAnalysis, extras: &Extras, title: &str) -> Page {
             ));
         }
     }
+    let made = revision::now().replace('T', " ").replace('Z', " UTC");
     Page {
         title: title.into(),
         subtitle: "Modes of measured FRFs".into(),
+        origin: vec![
+            ("made".into(), made),
+            ("with Lobestone".into(), env!("CARGO_PKG_VERSION").into()),
+        ],
         sections,
         ..Page::default()
     }

@@ -269,6 +269,19 @@ mod tests {
     }
 
     #[test]
+    fn an_error_in_brackets_counts_in_the_last_digit() {
+        for (value, error, text) in [
+            (47.26702, 0.00086, "47.2670(9)"),
+            (2.9631, 0.0101, "2.963(10)"),
+            (88.58, 0.12, "88.58(12)"),
+            (120.0, 4.0, "120 ± 4"),
+            (7.1234, f64::NAN, "7.1234"),
+        ] {
+            assert_eq!(concise(value, error), text);
+        }
+    }
+
+    #[test]
     fn percentages_keep_three_digits() {
         assert_eq!(percent(0.1234), "12.3\u{a0}%");
         assert_eq!(percent(0.00021), "0.021\u{a0}%");

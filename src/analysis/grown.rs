@@ -49,15 +49,10 @@ pub fn with_revision<D: Modelled>(
         model = model.with_effect(instance, known);
     }
     // By name: a tolerance that campaign.toml got since brings parameters that the revision did not have.
-    let start = model
-        .parameters
-        .iter()
-        .map(|parameter| {
-            let recorded = revision.parameters.iter().find(|r| r.name == parameter.name);
-            let value = recorded.map_or(parameter.nominal, |r| r.value);
-            // Into the range, or at an effect's vanishing limit: `with_start` sees to it.
-            parameter.internal(value)
-        })
-        .collect();
+    // Into the range, or at an effect's vanishing limit: `with_start` sees to it.
+    let start = model.theta_of(|parameter| {
+        let recorded = revision.parameters.iter().find(|r| r.name == parameter.name);
+        recorded.map(|r| r.value)
+    });
     Ok(model.with_start(start))
 }

@@ -141,9 +141,17 @@ impl<D: Modelled> Model<D> {
             .map_or(self.parameters.len(), |added| added.parameters.start)
     }
 
+    /// A point on the solver's scale: what is known of a parameter (natural units), else its nominal value.
+    pub fn theta_of(&self, known: impl Fn(&Parameter) -> Option<f64>) -> Vec<f64> {
+        let parameters = self.parameters.iter();
+        parameters
+            .map(|p| p.internal(known(p).unwrap_or(p.nominal)))
+            .collect()
+    }
+
     /// Nominal values on the solver's scale.
     pub fn nominal_theta(&self) -> Vec<f64> {
-        self.parameters.iter().map(|p| p.internal(p.nominal)).collect()
+        self.theta_of(|_| None)
     }
 
     /// Values of the effect's own parameters at which it is not there, solver's scale.

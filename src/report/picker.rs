@@ -3,10 +3,10 @@
 use std::fmt::Write as _;
 
 use super::number::decimals;
-use super::words::setting;
 use super::{Block, Drawing};
 use crate::analysis::modes::modal::SetModes;
 use crate::modal::stabilisation::Stability;
+use crate::report::figure::sheet::axis::FigureAxis;
 
 const WIDTH: f64 = 1200.0;
 const HEIGHT: f64 = 520.0;
@@ -14,21 +14,6 @@ const HEIGHT: f64 = 520.0;
 const FRAME: [f64; 4] = [60.0, 16.0, 1184.0, 470.0];
 /// Poles drawn at most; the least stable are left out first.
 const MOST_POLES: usize = 6000;
-
-/// About `count` round numbers between two ends.
-fn round_between(low: f64, high: f64, count: f64) -> Vec<f64> {
-    let least = ((high - low) / count).max(1e-6);
-    let power = 10f64.powf(least.log10().floor());
-    let steps = [1.0, 2.0, 5.0, 10.0].map(|m| m * power);
-    let step = steps.into_iter().find(|s| *s >= least).unwrap_or(10.0 * power);
-    let (first, last) = ((low / step).ceil() as i64, (high / step).floor() as i64);
-    // Divided by a whole number where the step is a fraction: 0.6, not 0.6000000000000001.
-    let at = |k: i64| match step < 1.0 {
-        true => k as f64 / (1.0 / step).round(),
-        false => k as f64 * step,
-    };
-    (first..=last).map(at).collect()
-}
 
 /// `None` without poles. The script is part of the drawing and touches nothing outside it.
 pub fn picker(set: &SetModes, command: &str) -> Option<Block> {
@@ -63,28 +48,31 @@ pub fn picker(set: &SetModes, command: &str) -> Option<Block> {
         bottom - top
     );
     // Writing to a String cannot fail.
-    for f in round_between(low, high, 8.0) {
+    let across = FigureAxis::linear("Frequency (Hz)", (low, high), 8);
+    for tick in &across.ticks {
         let _ = write!(
             svg,
             "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" font-size=\"14\" fill=\"#1c1e21\">{}</text>",
-            x(f),
+            x(tick.at),
             bottom + 20.0,
-            setting(f)
+            tick.label
         );
     }
-    for order in round_between(0.0, highest, 5.0) {
+    for tick in FigureAxis::linear("", (0.0, highest), 5).ticks {
         let _ = write!(
             svg,
-            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\" font-size=\"14\" fill=\"#1c1e21\">{order}</text>",
+            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\" font-size=\"14\" fill=\"#1c1e21\">{}</text>",
             left - 8.0,
-            y(order) + 5.0
+            y(tick.at) + 5.0,
+            tick.label
         );
     }
     let _ = write!(
         svg,
-        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" font-size=\"14\" fill=\"#1c1e21\">Frequency (Hz); upwards: model order</text>",
+        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" font-size=\"14\" fill=\"#1c1e21\">{}; upwards: model order</text>",
         0.5 * (left + right),
-        bottom + 42.0
+        bottom + 42.0,
+        across.label
     );
     for mode in &set.global.modes {
         let at = x(mode.frequency_hz);
@@ -133,19 +121,4 @@ pub fn picker(set: &SetModes, command: &str) -> Option<Block> {
                   order below; light blue: and damping; blue: and shape. Dotted: modes taken."
             .into(),
     }))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::round_between;
-
-    #[test]
-    fn marks_are_round() {
-        assert_eq!(
-            round_between(0.0, 1316.0, 8.0),
-            [0.0, 200.0, 400.0, 600.0, 800.0, 1000.0, 1200.0]
-        );
-        assert_eq!(round_between(0.1, 0.75, 8.0), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]);
-        assert_eq!(round_between(0.0, 83.2, 5.0), [0.0, 20.0, 40.0, 60.0, 80.0]);
-    }
 }

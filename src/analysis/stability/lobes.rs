@@ -372,6 +372,9 @@ impl CutForce {
     }
 }
 
+/// How a warning begins that tells the speeds at which a drill may whirl.
+pub(crate) const MAY_WHIRL: &str = "the drill may whirl";
+
 /// The speeds at which a drill may whirl at a posture, in words.
 fn where_it_may_whirl(case: &LobeCase) -> Option<String> {
     let speeds: Vec<String> = case
@@ -391,7 +394,7 @@ fn where_it_may_whirl(case: &LobeCase) -> Option<String> {
         .collect();
     (!speeds.is_empty()).then(|| {
         format!(
-            "the drill may whirl{} and leave a hole that is not round at and up to a tenth above {}: take another speed or a pilot hole",
+            "{MAY_WHIRL}{} and leave a hole that is not round at and up to a tenth above {}: take another speed or a pilot hole",
             case.at_posture(),
             speeds.join(", ")
         )

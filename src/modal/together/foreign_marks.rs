@@ -20,6 +20,25 @@ const SEVEN: [(f64, f64); 7] = [
     (410.0, 0.007),
 ];
 
+/// A complex normal number with E|e|² = 1 (Box–Muller).
+fn gauss(random: &mut ChaCha8Rng) -> Complex64 {
+    let radius = (-(1.0 - random.random::<f64>()).ln()).sqrt();
+    Complex64::from_polar(radius, TAU * random.random::<f64>())
+}
+
+/// The common fit of an FRF that is a set of its own.
+fn alone(f: &[f64], h: &[Complex64]) -> GlobalModes {
+    let settings = Settings::default();
+    let single = analyse_frf(f, h, &settings).unwrap();
+    let member = SetMember {
+        frequency_hz: f,
+        receptance_m_per_n: h,
+        modes: &single,
+        dofs: None,
+    };
+    global(&[member], &settings).unwrap()
+}
+
 /// What is measured, and what is wrong with it.
 #[derive(Clone)]
 struct Test {
@@ -91,10 +110,7 @@ impl Test {
                             .sum()
                     })
                     .collect();
-                let mut gauss = || {
-                    let radius = (-(1.0 - random.random::<f64>()).ln()).sqrt();
-                    Complex64::from_polar(radius, TAU * random.random::<f64>())
-                };
+                let mut gauss = || gauss(&mut random);
                 let kernel: Vec<f64> = (-48..=48)
                     .map(|k| (-0.5 * (f64::from(k) / 12.0).powi(2)).exp())
                     .collect();
@@ -220,15 +236,7 @@ fn rounded_figures_are_no_mode() {
             .iter()
             .map(|h| Complex64::new(rounded(h.re), rounded(h.im)))
             .collect();
-        let settings = Settings::default();
-        let single = analyse_frf(&f, &h, &settings).unwrap();
-        let member = SetMember {
-            frequency_hz: &f,
-            receptance_m_per_n: &h,
-            modes: &single,
-            dofs: None,
-        };
-        let found = global(&[member], &settings).unwrap();
+        let found = alone(&f, &h);
         let at: Vec<f64> = found.modes.iter().map(|m| m.frequency_hz).collect();
         assert_eq!(at.len(), 2, "{figures} figures: {at:?}");
         assert!(
@@ -256,24 +264,14 @@ fn drift_at_the_beginning_of_the_band_costs_no_mode_elsewhere() {
             .with_noise(0.0, 2e-3, seed)
             .frf();
         let mut random = ChaCha8Rng::seed_from_u64(100 + seed);
-        let mut gauss = || {
-            let radius = (-2.0 * (1.0 - random.random::<f64>()).ln()).sqrt();
-            Complex64::from_polar(radius, TAU * random.random::<f64>())
-        };
-        let white: Vec<Complex64> = (0..f.len() + 8).map(|_| gauss()).collect();
+        let white: Vec<Complex64> = (0..f.len() + 8)
+            .map(|_| 2f64.sqrt() * gauss(&mut random))
+            .collect();
         for (k, (f, h)) in f.iter().zip(&mut h).enumerate() {
             let smooth: Complex64 = white[k..k + 9].iter().sum();
             *h += drift / 3.0 * smooth * (-f / 30.0).exp() / (TAU * f).powi(2);
         }
-        let settings = Settings::default();
-        let single = analyse_frf(&f, &h, &settings).unwrap();
-        let member = SetMember {
-            frequency_hz: &f,
-            receptance_m_per_n: &h,
-            modes: &single,
-            dofs: None,
-        };
-        let found = global(&[member], &settings).unwrap();
+        let found = alone(&f, &h);
         // Those that stand far out of it.
         for (frequency_hz, zeta, _) in [modes[2], modes[4], modes[5]] {
             let there = |m: &GlobalMode| (m.frequency_hz - frequency_hz).abs() < zeta * frequency_hz;

@@ -42,30 +42,16 @@ impl LobesFigure {
         } else {
             470.0
         };
+        let speeds = match self.speeds() {
+            Some((from, to)) if to > from => json!({ "range": [number(from), number(to)] }),
+            _ => json!({}),
+        };
         Plot {
             title: self.title.clone(),
             height_px: height + 120.0,
             data: traces.0,
-            layout: stacked(with(axis("Spindle speed (rpm)"), self.speeds()), axes),
+            layout: stacked(with(axis("Spindle speed (rpm)"), speeds), axes),
             ..Plot::default()
-        }
-    }
-}
-
-impl LobesFigure {
-    /// The speeds that were looked at fill the frame: beyond them white would look like stable.
-    fn speeds(&self) -> Value {
-        let curves = self.panels.iter().flat_map(|p| &p.curves);
-        let signs = self.panels.iter().flat_map(|p| &p.markers);
-        let speeds = || {
-            let of_curves = curves.clone().flat_map(|c| c.spindle_rpm.iter().copied());
-            of_curves
-                .chain(signs.clone().map(|m| m.spindle_rpm))
-                .filter(|n| n.is_finite())
-        };
-        match (speeds().reduce(f64::min), speeds().reduce(f64::max)) {
-            (Some(from), Some(to)) if to > from => json!({ "range": [number(from), number(to)] }),
-            _ => json!({}),
         }
     }
 }

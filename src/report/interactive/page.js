@@ -160,11 +160,15 @@ const parsed = new Promise((done) => document.addEventListener("DOMContentLoaded
     }
   }
 
-  const inSpace = (() => {
-    const context = document.createElement("canvas").getContext("webgl");
-    context?.getExtension("WEBGL_lose_context")?.loseContext();
-    return !!context;
-  })();
+  let webgl;
+  const inSpace = () => {
+    if (webgl === undefined) {
+      const context = document.createElement("canvas").getContext("webgl");
+      context?.getExtension("WEBGL_lose_context")?.loseContext();
+      webgl = !!context;
+    }
+    return webgl;
+  };
   const isSpatial = (plot) => "scene" in plot.layout || !!plot.choice?.plots.some((p) => "scene" in p.plot.layout);
 
   /** Whether an element is not within a part that is folded up. */
@@ -176,7 +180,7 @@ const parsed = new Promise((done) => document.addEventListener("DOMContentLoaded
   const draw = async (figure, plot, explorer) => {
     const heading = figure.querySelector(".heading");
     const div = figure.querySelector(".plot");
-    if (!inSpace && isSpatial(plot)) {
+    if (isSpatial(plot) && !inSpace()) {
       // No figure that turns without WebGL: the image stays.
       figure.classList.add("still");
       return;

@@ -1,5 +1,6 @@
 //! Stability lobes.
 
+use crate::analysis::stability::lobes::MAY_WHIRL;
 use crate::analysis::{LobeAnalysis, LobeCase, LobeFindings, StructureFindings};
 use crate::campaign::{LobeSource, Process};
 use crate::lobes::outcome::{Outcomes, Verdict};
@@ -125,9 +126,6 @@ pub fn section(findings: &LobeFindings, structure: Option<&StructureFindings>) -
         blocks,
     }
 }
-
-/// How the warnings of `lobes` begin that the table of [`whirling`] tells.
-const MAY_WHIRL: &str = "the drill may whirl";
 
 /// The speeds at which the drill may whirl, posture by posture, folded up.
 fn whirling(cases: &[LobeCase]) -> Option<Block> {

@@ -152,7 +152,6 @@ mod tests {
             fingerprint: "f1".into(),
             version: "1".into(),
             command: "calibrate".into(),
-            started_from: None,
             robot: None,
             date: None,
             sides: Vec::new(),

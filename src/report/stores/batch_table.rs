@@ -273,7 +273,7 @@ fn cell(column: &str, entry: &ManifestEntry, record: &Record, side: &SideResult)
         "effect" => said(&found.effect),
         "site" => said(&found.site),
         "confidence" => text(found.confidence),
-        STARTED_FROM => said(&record.started_from),
+        STARTED_FROM => said(&found.started_from),
         "setup" => found.setup.join("\n"),
         _ => String::new(),
     }
@@ -366,7 +366,6 @@ mod tests {
             fingerprint: "f".into(),
             version: "1".into(),
             command: "calibrate,diagnose".into(),
-            started_from: None,
             robot: Some("irb6640".into()),
             date: Some("2026-11-01".into()),
             sides: vec![

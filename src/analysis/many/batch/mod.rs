@@ -20,7 +20,6 @@ use crate::discrepancy::setup::{SetupCheck, SetupFinding};
 use crate::discrepancy::{Diagnosis, DiagnosisVerdict};
 use crate::identify::frfs::structure_study::held_out_postures;
 use crate::identify::{Estimate, Options, StructureCase};
-use crate::parameter::Parameter;
 use crate::revision::folder_fingerprint;
 use crate::{Error, InputError, Result};
 
@@ -124,6 +123,9 @@ pub struct SideResult {
 /// Nothing where it was not asked for.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct BatchFindings {
+    /// The campaign whose calibration this one started from, as the manifest names it.
+    #[serde(default)]
+    pub started_from: Option<String>,
     /// Error of the fit, a ratio.
     pub nrms: Option<f64>,
     /// nrms that the noise alone makes.
@@ -157,9 +159,6 @@ pub struct Record {
     pub version: String,
     /// `calibrate,diagnose`.
     pub command: String,
-    /// The campaign whose calibration this one started from, as the manifest names it.
-    #[serde(default)]
-    pub started_from: Option<String>,
     /// What `campaign.toml` says, for a manifest that does not.
     pub robot: Option<String>,
     /// Date of the measurements by `campaign.toml`, likewise.
@@ -196,21 +195,13 @@ impl WarmStart {
         std::iter::once(self.campaign.clone()).chain(values).collect()
     }
 
-    /// The case, fitted from here; by name, so that a parameter that the other campaign had not starts at its nominal value. A case
-    /// that has a start of its own, of a revision, keeps it.
+    /// The case, fitted from here; by name, so that a parameter that the other campaign had not starts at its nominal value.
     fn begin(&self, case: StructureCase) -> StructureCase {
-        if case.model.start().is_some() {
-            return case;
-        }
-        let start = |parameter: &Parameter| {
+        let theta = case.model.theta_of(|parameter| {
             let name = with_unit(&parameter.name, parameter.unit);
-            let known = self.quantities.iter().find(|q| q.name == name);
-            let known = known.and_then(|q| q.value).map(|value| parameter.internal(value));
-            known
-                .filter(|theta| theta.is_finite())
-                .unwrap_or(parameter.internal(parameter.nominal))
-        };
-        let theta = case.model.parameters.iter().map(start).collect();
+            let known = self.quantities.iter().find(|q| q.name == name)?;
+            known.value.filter(|v| parameter.internal(*v).is_finite())
+        });
         case.starting_from(theta)
     }
 }
@@ -239,7 +230,6 @@ pub fn examine(entry: &ManifestEntry, steps: &Steps, start: Option<&WarmStart>, 
         fingerprint: fingerprint.to_string(),
         version: VERSION.to_string(),
         command: steps.name(),
-        started_from: None,
         robot: None,
         date: None,
         sides: Vec::new(),
@@ -251,9 +241,6 @@ pub fn examine(entry: &ManifestEntry, steps: &Steps, start: Option<&WarmStart>, 
             for (domain, work) in sides {
                 let begun = Instant::now();
                 let found = guarded(|| work(&campaign, steps, start));
-                if domain == STRUCTURE {
-                    record.started_from = start.map(|s| s.campaign.clone());
-                }
                 record.sides.push(side(domain, found, begun));
             }
         }
@@ -331,6 +318,8 @@ fn sides(campaign: &Campaign, steps: &Steps) -> Result<Vec<(&'static str, Work)>
 
 fn structure(campaign: &Campaign, steps: &Steps, start: Option<&WarmStart>) -> Result<BatchFindings> {
     let case = StructureCase::load(campaign)?;
+    // A revision has a start of its own.
+    let start = start.filter(|_| case.model.start().is_none());
     let case = match start {
         Some(start) => start.begin(case),
         None => case,
@@ -338,6 +327,7 @@ fn structure(campaign: &Campaign, steps: &Steps, start: Option<&WarmStart>) -> R
     let analysis = StructureAnalysis::of_case(case, Options::default())?;
     let (case, calibration) = (&analysis.case, &analysis.calibration);
     let mut found = BatchFindings {
+        started_from: start.map(|s| s.campaign.clone()),
         nrms: finite(analysis.after.totals.nrms),
         noise: finite(analysis.after.totals.noise_floor_nrms),
         converged: Some(calibration.converged()),

@@ -199,14 +199,19 @@ impl LobesFigure {
         panels.fold(0.0, f64::max)
     }
 
+    /// The speeds that were looked at, 1/min: the frame ends there, as beyond them white would look like stable.
+    pub(crate) fn speeds(&self) -> Option<(f64, f64)> {
+        let curves = self.panels.iter().flat_map(|p| &p.curves);
+        let markers = self.panels.iter().flat_map(LobePanel::usable_markers);
+        let everywhere = curves.flat_map(|c| c.spindle_rpm.iter().copied());
+        extent(everywhere.chain(markers.map(|m| m.spindle_rpm)))
+    }
+
     /// # Errors
     /// No curve or marker with a finite depth.
     pub fn png(&self) -> Result<Vec<u8>> {
         let panels = || self.panels.iter().filter_map(|p| Some((p, p.deepest()?)));
-        let curves = self.panels.iter().flat_map(|p| &p.curves);
-        let markers = self.panels.iter().flat_map(LobePanel::usable_markers);
-        let everywhere = curves.flat_map(|c| c.spindle_rpm.iter().copied());
-        let speeds = extent(everywhere.chain(markers.map(|m| m.spindle_rpm)));
+        let speeds = self.speeds();
         let count = panels().count();
         let (Some(speeds), true) = (speeds, count > 0) else {
             return Err(nothing_to_draw(&self.title, "no curve has a finite depth limit"));

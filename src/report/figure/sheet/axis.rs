@@ -251,6 +251,17 @@ mod tests {
     }
 
     #[test]
+    fn marks_are_round() {
+        let labels = |low, high, count| {
+            let ticks = FigureAxis::linear("", (low, high), count).ticks;
+            ticks.into_iter().map(|t| t.label).collect::<Vec<_>>().join(" ")
+        };
+        assert_eq!(labels(0.0, 1316.0, 8), "0 200 400 600 800 1000 1200");
+        assert_eq!(labels(0.1, 0.75, 8), "0.1 0.2 0.3 0.4 0.5 0.6 0.7");
+        assert_eq!(labels(0.0, 83.2, 5), "0 20 40 60 80");
+    }
+
+    #[test]
     fn log_ticks_fit_the_span() {
         assert_eq!(
             labels(&FigureAxis::log("", (2e-8, 3e-5))),

@@ -378,7 +378,7 @@ function otherEffect(side, effects) {
 }
 
 // The report in its frame has no origin: where its reader is and what is unfolded it tells, and is told again after it was drawn anew.
-let reportPlace = { section: null, down: 0, unfolded: [] };
+let reportPlace = { above: [], scrolled: 0, unfolded: [] };
 window.addEventListener("message", (event) => {
   if (event.source === $("frame").contentWindow && event.data?.lobestonePlace) reportPlace = event.data.lobestonePlace;
 });

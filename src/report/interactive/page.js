@@ -342,31 +342,54 @@ const parsed = new Promise((done) => document.addEventListener("DOMContentLoaded
   console.error(error);
 });
 
-// In the page of `lobestone serve`: where the reader is, for the next drawing of the report, in which sections may have grown: the section
-// at the top of the window, how far into it (px), and what is unfolded. Told only once the reader is there again: a page that was just
-// read has folds of its own.
+// In the page of `lobestone serve`: where the reader is, for the next drawing of the report, in which parts may have grown or be gone: the
+// last sections and folds that begin above the window, nearest first, and how far above (px), how far the page is scrolled (px), and what is
+// unfolded. Told only once the reader is there again: a page that was just read has folds of its own.
 if (window.parent !== window) {
+  const root = document.documentElement;
   // Nothing is seen before the reader is there again: else the top of the page would flash.
-  const seen = (yes) => (document.documentElement.style.visibility = yes ? "" : "hidden");
+  const seen = (yes) => (root.style.visibility = yes ? "" : "hidden");
   seen(false);
   setTimeout(() => seen(true), 3000);
-  const name = (fold) => `${fold.closest("[id]")?.id ?? ""}: ${fold.querySelector(":scope > summary")?.textContent ?? ""}`;
   const folds = () => [...document.querySelectorAll("details")];
-  const topOf = (section) => section?.getBoundingClientRect().top ?? -window.scrollY;
+  const foldName = (fold) => `${fold.closest("[id]")?.id ?? ""}: ${fold.querySelector(":scope > summary")?.textContent ?? ""}`;
+  const parts = () => [...document.querySelectorAll("section[id], details")];
+  const name = (part) => (part.matches("details") ? foldName(part) : part.id);
+  const folded = (part) => part.parentElement.closest("details:not([open])") !== null;
+  const topOf = (part) => part.getBoundingClientRect().top;
   const tell = () => {
-    const passed = [...document.querySelectorAll("section[id]")].filter((section) => topOf(section) < 1);
-    const section = passed.at(-1);
-    const unfolded = folds().filter((fold) => fold.open).map(name);
-    window.parent.postMessage({ lobestonePlace: { section: section?.id ?? null, down: -topOf(section), unfolded } }, "*");
+    const above = parts().filter((part) => !folded(part) && topOf(part) < 1).slice(-5).reverse();
+    const lobestonePlace = {
+      above: above.map((part) => ({ name: name(part), by: -topOf(part) })),
+      scrolled: window.scrollY,
+      unfolded: folds().filter((fold) => fold.open).map(foldName),
+    };
+    window.parent.postMessage({ lobestonePlace }, "*");
   };
   window.addEventListener("message", (event) => {
     const place = event.data?.lobestonePlace;
-    if (event.source !== window.parent || !Number.isFinite(place?.down) || !Array.isArray(place.unfolded)) return;
-    for (const fold of folds()) if (place.unfolded.includes(name(fold))) fold.open = true;
-    const section = place.section === null ? null : document.getElementById(place.section);
-    window.scrollBy({ top: topOf(section) + place.down, behavior: "instant" });
+    if (event.source !== window.parent || !Array.isArray(place?.above) || !Array.isArray(place.unfolded)) return;
+    for (const fold of folds()) if (place.unfolded.includes(foldName(fold))) fold.open = true;
+    const there = place.above.map(({ name: n, by }) => ({ part: parts().find((part) => name(part) === n), by })).find(({ part }) => part);
+    // Figures above are still to be drawn, and are not as high as their images: until the reader scrolls, what was at the top stays there.
+    let [settling, expected] = [true, 0];
+    const settle = () => {
+      const top = there ? window.scrollY + topOf(there.part) + there.by : place.scrolled;
+      window.scrollTo({ top, behavior: "instant" });
+      expected = window.scrollY;
+    };
+    const scrolled = () => {
+      if (settling && Math.abs(window.scrollY - expected) >= 1) {
+        settling = false;
+        root.style.overflowAnchor = "";
+      }
+      tell();
+    };
+    root.style.overflowAnchor = "none";
+    settle();
+    new ResizeObserver(() => (settling ? settle() : tell())).observe(document.body);
     seen(true);
-    window.addEventListener("scroll", tell, { passive: true });
+    window.addEventListener("scroll", scrolled, { passive: true });
     document.addEventListener("toggle", tell, true);
   });
 }

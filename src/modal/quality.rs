@@ -251,6 +251,8 @@ pub(super) struct SetFindings {
     pub moving: bool,
     /// Modes that there may be besides.
     pub doubts: usize,
+    /// Modes that the FRFs by themselves put elsewhere than the common fit, Hz.
+    pub elsewhere_hz: Vec<f64>,
     pub converged: bool,
 }
 
@@ -313,6 +315,17 @@ pub(super) fn judge_set(found: &SetFindings) -> SetQuality {
         note(
             QualityGrade::Doubtful,
             "there may be one more mode close to another".into(),
+        );
+    }
+    if !found.elsewhere_hz.is_empty() {
+        let places: Vec<String> = found.elsewhere_hz.iter().map(|f| format!("{f:.2}")).collect();
+        note(
+            QualityGrade::Doubtful,
+            format!(
+                "the common fit has {} Hz elsewhere than the FRFs by themselves, which were taken: it lacks something there (a \
+                 narrower --band may help)",
+                places.join(", ")
+            ),
         );
     }
     if !found.converged {

@@ -2,6 +2,9 @@
 
 use super::stabilisation::Tolerances;
 
+/// So many FRFs are a set, whose modes are those that its FRFs show together: one seen by a single FRF must stand out far.
+pub(crate) const SET: usize = 4;
+
 /// What to look at.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Settings {

@@ -1,11 +1,12 @@
 //! One FRF in the maximum-likelihood fit for given poles: the columns of its basis, and the linear parameters.
 
 use faer::linalg::matmul::matmul;
+use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2, Vector2};
 use num_complex::Complex64;
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 
 use crate::modal::single::local_fit::Pole;
 
@@ -153,14 +154,58 @@ pub(crate) fn centre_hz(frfs: &[NoisyFrf]) -> f64 {
 
 /// Every column times the weights, for as many columns as both hold.
 pub(crate) fn weigh(out: &mut [f64], columns: &[f64], weight: &[f64]) {
-    let rows = weight.len();
-    Arch::new().dispatch(|| {
-        for (out, column) in out.chunks_exact_mut(rows).zip(columns.chunks_exact(rows)) {
-            for ((out, value), w) in out.iter_mut().zip(column).zip(weight) {
+    Arch::new().dispatch(Weigh { out, columns, weight });
+}
+
+/// [`weigh`] in the widest vectors of the processor. (A closure is compiled for the plainest one where it is not inlined.)
+struct Weigh<'a> {
+    out: &'a mut [f64],
+    columns: &'a [f64],
+    weight: &'a [f64],
+}
+
+impl WithSimd for Weigh<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let rows = self.weight.len();
+        for (out, column) in self
+            .out
+            .chunks_exact_mut(rows)
+            .zip(self.columns.chunks_exact(rows))
+        {
+            for ((out, value), w) in out.iter_mut().zip(column).zip(self.weight) {
                 *out = value * w;
             }
         }
-    });
+    }
+}
+
+/// Weighted slopes by the poles from the columns of [`PoleColumns::slopes`], with the numerators a + ibr of each pole in pairs.
+struct WeighSlopes<'a> {
+    out: &'a mut [f64],
+    slopes: &'a [f64],
+    numerators: &'a [f64],
+    weight: &'a [f64],
+}
+
+impl WithSimd for WeighSlopes<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let rows = self.weight.len();
+        let pairs = self.slopes.chunks_exact(2 * rows);
+        for (parameter, (out, pair)) in self.out.chunks_exact_mut(rows).zip(pairs).enumerate() {
+            let j = 2 * (parameter / 2);
+            let (a, b) = (self.numerators[j], self.numerators[j + 1]);
+            let (with_a, with_b) = pair.split_at(rows);
+            for (((out, p), q), w) in out.iter_mut().zip(with_a).zip(with_b).zip(self.weight) {
+                *out = (a * p + b * q) * w;
+            }
+        }
+    }
 }
 
 /// L⁻¹ `columns`, in place. (Much faster than nalgebra's for several columns.)
@@ -178,6 +223,25 @@ pub(crate) fn product(out: &mut DMatrix<f64>, left: &[f64], right: &[f64], rows:
     let right = MatRef::from_column_major_slice(right, rows, n);
     let out = MatMut::from_column_major_slice_mut(out.as_mut_slice(), m, n);
     matmul(out, Accum::Replace, left.transpose(), right, 1.0, Par::Seq);
+}
+
+/// The lower triangle of `out` = columnsᵀ columns, which have `rows` values.
+fn squared(out: &mut DMatrix<f64>, columns: &[f64], rows: usize) {
+    let n = out.ncols();
+    let columns = MatRef::from_column_major_slice(columns, rows, n);
+    let out = MatMut::from_column_major_slice_mut(out.as_mut_slice(), n, n);
+    let (lower, all) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+    triangular::matmul(
+        out,
+        lower,
+        Accum::Replace,
+        columns.transpose(),
+        all,
+        columns,
+        all,
+        1.0,
+        Par::Seq,
+    );
 }
 
 /// The linear parameters of one FRF for given poles. The normal equations square the condition number: what they leave
@@ -200,7 +264,7 @@ pub(crate) struct SolvedFrf {
     pub own: Vec<(Matrix2<f64>, Vector2<f64>)>,
 }
 
-/// Factor of the first `columns` of a Gram matrix, of columns of unit length, and 1/length of each. From column `held` on
+/// Factor of the first `columns` of a Gram matrix (its lower triangle), of columns of unit length, and 1/length of each. From column `held` on
 /// they are those of poles that are not moved and of the residual terms.
 pub(crate) fn unit_cholesky(
     gram: &DMatrix<f64>,
@@ -212,7 +276,12 @@ pub(crate) fn unit_cholesky(
     if scale.iter().any(|s| !(s.is_finite() && *s > 0.0)) {
         return None;
     }
-    let mut unit = DMatrix::from_fn(columns, columns, |i, j| gram[(i, j)] * scale[i] * scale[j]);
+    let mut unit = DMatrix::zeros(columns, columns);
+    for j in 0..columns {
+        for i in j..columns {
+            unit[(i, j)] = gram[(i, j)] * scale[i] * scale[j];
+        }
+    }
     // Lines near 0 Hz make the lower residual terms all alike, and two poles close together look the same from afar: hold
     // back the part of them that rounding would decide.
     for term in held..columns {
@@ -238,9 +307,12 @@ impl Solved {
         weigh(filled, &axis.columns, weight);
         filled[rows * columns..].copy_from_slice(target);
         let mut gram = DMatrix::zeros(columns + 1, columns + 1);
-        product(&mut gram, filled, filled, rows);
+        squared(&mut gram, filled, rows);
         let (cholesky, scale) = unit_cholesky(&gram, columns, axis.moving_columns())?;
-        let projected = gram.view((0, columns), (columns, 1)).component_mul(&scale);
+        let projected = gram
+            .view((columns, 0), (1, columns))
+            .transpose()
+            .component_mul(&scale);
         let x = cholesky.solve(&projected);
         let unscaled = x.component_mul(&scale);
         let (basis, residual) = filled.split_at_mut(rows * columns);
@@ -320,19 +392,11 @@ pub(crate) fn linearise_one(
     let parameters = axis.slopes.len() / (2 * rows);
     let (mut linear, columns) = Solved::new(weight, target, axis, parameters, buffer)?;
     let slopes = &mut buffer[rows * (columns + 1)..];
-    Arch::new().dispatch(|| {
-        let pairs = axis.slopes.chunks_exact(2 * rows);
-        for (parameter, (out, pair)) in slopes.chunks_exact_mut(rows).zip(pairs).enumerate() {
-            let j = 2 * (parameter / 2);
-            let (a, b) = (
-                linear.x[j] * linear.scale[j],
-                linear.x[j + 1] * linear.scale[j + 1],
-            );
-            let (with_a, with_b) = pair.split_at(rows);
-            for (((out, p), q), w) in out.iter_mut().zip(with_a).zip(with_b).zip(weight) {
-                *out = (a * p + b * q) * w;
-            }
-        }
+    Arch::new().dispatch(WeighSlopes {
+        out: slopes,
+        slopes: &axis.slopes,
+        numerators: linear.x.component_mul(&linear.scale).as_slice(),
+        weight,
     });
     // Basis, residual and slopes, each with residual and slopes.
     let mut all = DMatrix::zeros(columns + 1 + parameters, 1 + parameters);

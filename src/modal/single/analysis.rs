@@ -6,7 +6,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use crate::Result;
-use crate::modal::settings::Settings;
+use crate::modal::settings::{SET, Settings};
 use crate::modal::single::curve::{Curve, MIN_LINES};
 use crate::modal::single::frf_modes::{Disturbance, FrfMode, FrfModes, Method, ModeEstimate};
 use crate::modal::single::local_fit::{self, LocalSolution, Pole, Problem, ROUGHLY_SETTLED, SETTLED};
@@ -19,6 +19,8 @@ use crate::modal::single::{circle_fit, half_power};
 const WINDOWS_HALF_WIDTHS: [f64; 3] = [8.0, 5.0, 3.0];
 /// More FRFs than this are fitted singly in one window each, with fewer neighbours: their modes are those of the set.
 const MANY_FRFS: usize = 12;
+/// A [`SET`] is fitted that way, too, where its FRFs have more lines than this together.
+const MANY_LINES: usize = 60_000;
 /// A window is wide enough where its inner lines are left with at least this share of the power of all.
 const NOISE_SHARE: f64 = 0.8;
 /// Lines on either side of a peak that take part at least.
@@ -67,7 +69,8 @@ const SAME_WIDTHS: f64 = 0.1;
 /// Fewer lines than this inside the half-power band are worth a warning.
 const FINE_LINES: f64 = 3.0;
 
-/// Finds the modes of each of many FRFs: [`analyse_frf`], with less effort on each where there are more than twelve.
+/// Finds the modes of each of many FRFs: [`analyse_frf`], with less effort on each where there are more than twelve, or more
+/// than 60,000 lines in at least four.
 ///
 /// # Errors
 /// As [`analyse_frf`].
@@ -76,7 +79,9 @@ where
     F: AsRef<[f64]> + Sync,
     H: AsRef<[Complex64]> + Sync,
 {
-    let effort = if frfs.len() > MANY_FRFS { BRIEF } else { FULL };
+    let lines = || frfs.iter().map(|(f, _)| f.as_ref().len()).sum::<usize>();
+    let many = frfs.len() > MANY_FRFS || (frfs.len() >= SET && lines() > MANY_LINES);
+    let effort = if many { BRIEF } else { FULL };
     frfs.par_iter()
         .map(|(f, h)| analyse(f.as_ref(), h.as_ref(), settings, effort))
         .collect()

@@ -12,3 +12,4 @@ pub(crate) mod local_fit;
 pub(crate) mod marks;
 pub(crate) mod method_bias;
 pub(crate) mod peaks;
+pub(crate) mod split_columns;

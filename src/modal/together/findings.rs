@@ -7,12 +7,14 @@ use num_complex::Complex64;
 use crate::modal::max_likelihood::joint_fit::{self, Change, Data, Group};
 use crate::modal::max_likelihood::ml_fit;
 use crate::modal::quality::{self, Power};
+use crate::modal::settings::SET;
 use crate::modal::shape;
 use crate::modal::single::local_fit::Pole;
 use crate::modal::stabilisation::{Candidate, Stabilisation};
 use crate::modal::together::global_modes::{GlobalMode, GlobalModes, RejectedMode};
+use crate::modal::together::own_places;
 use crate::modal::together::reconstruction::reconstruction;
-use crate::modal::together::set_member::{SET, SetMember};
+use crate::modal::together::set_member::SetMember;
 use crate::modal::together::verify::{self, Otherwise};
 
 /// In a set a mode seen by one FRF alone must stand out this far (squared size over uncertainty).
@@ -54,6 +56,7 @@ pub(crate) fn collect(
         .flat_map(|g| g.solution.poles.iter().copied())
         .collect();
     let (mut scatters, mut moving) = (Vec::new(), 0);
+    let mut elsewhere_hz = Vec::new();
     let parts = verify::parts_of_others(fitted, groups);
     for (g, group) in groups.iter().enumerate() {
         let solution = &group.solution;
@@ -147,6 +150,22 @@ pub(crate) fn collect(
                         .max(scatter[1].std * pole.damping_ratio)
                         .hypot(BETWEEN * apart[1]);
                 }
+            }
+            let common = Pole {
+                frequency_hz,
+                damping_ratio,
+            };
+            if let Some(own) =
+                own_places::elsewhere(members, common, [frequency_std_hz, damping_std], &others)
+            {
+                (frequency_hz, damping_ratio) = (own.pole.frequency_hz, own.pole.damping_ratio);
+                let apart = [
+                    frequency_hz - common.frequency_hz,
+                    damping_ratio - common.damping_ratio,
+                ];
+                frequency_std_hz = (small_set * own.std[0]).hypot(BETWEEN * apart[0]);
+                damping_std = (small_set * own.std[1]).hypot(BETWEEN * apart[1]);
+                elsewhere_hz.push(frequency_hz);
             }
             if lines_in_half_power_band < LEAKAGE_BELOW_LINES {
                 damping_std = damping_std.hypot(LEAKAGE_LINES * line_hz / (2.0 * pole.frequency_hz));
@@ -259,6 +278,7 @@ pub(crate) fn collect(
             frequency_scatter: (!scatters.is_empty()).then(|| crate::signal::median(&scatters)),
             moving: moving > 0 && 2 * moving >= scatters.len(),
             doubts,
+            elsewhere_hz,
             converged: groups.iter().all(|g| g.solution.converged),
         };
         result.quality = quality::judge_set(&found);

@@ -8,6 +8,7 @@ pub(crate) mod global;
 pub(crate) mod global_marks;
 pub(crate) mod global_modes;
 pub(crate) mod lscf;
+pub(crate) mod own_places;
 pub(crate) mod reconstruction;
 pub(crate) mod select;
 pub(crate) mod set_member;

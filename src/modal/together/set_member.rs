@@ -4,9 +4,6 @@ use num_complex::Complex64;
 
 use crate::modal::single::frf_modes::FrfModes;
 
-/// In sets of at least this many FRFs a mode seen by one of them alone must stand out far.
-pub(crate) const SET: usize = 4;
-
 /// One FRF of a set, with what was found in it.
 #[derive(Clone, Copy)]
 pub struct SetMember<'a> {

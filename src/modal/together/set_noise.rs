@@ -4,7 +4,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use crate::modal::max_likelihood::joint_fit::{Data, Group};
-use crate::modal::together::set_member::SET;
+use crate::modal::settings::SET;
 use crate::signal::frf_noise;
 use crate::signal::noise_law::{self, Departure};
 

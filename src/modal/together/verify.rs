@@ -7,10 +7,10 @@ use num_complex::Complex64;
 
 use crate::modal::max_likelihood::joint_fit::{self, Data, Group, PoleSearch};
 use crate::modal::max_likelihood::ml_fit::{self, Solution};
+use crate::modal::settings::SET;
 use crate::modal::shape;
 use crate::modal::single::local_fit::Pole;
 use crate::modal::together::global_modes::RejectedMode;
-use crate::modal::together::set_member::SET;
 use crate::modal::together::set_noise;
 
 /// Fits after poles were taken out, at most.
@@ -511,7 +511,7 @@ pub(crate) fn own_poles(data: &[Data], pole: Pole, others: &[Pole]) -> Option<Ve
 /// Mean of what each FRF says (value, standard deviation), and its standard deviation from how they scatter about it. Each
 /// counts by its own uncertainty and by how far all of them lie apart beyond that (random effects: DerSimonian & Laird
 /// 1986): one that hardly shows the mode does not decide.
-fn mean_over_frfs<T>(own: &[T], of: impl Fn(&T) -> (f64, f64)) -> (f64, f64) {
+pub(super) fn mean_over_frfs<T>(own: &[T], of: impl Fn(&T) -> (f64, f64)) -> (f64, f64) {
     let values: Vec<(f64, f64)> = own.iter().map(of).collect();
     let median =
         |of: &dyn Fn(&(f64, f64)) -> f64| crate::signal::median(&values.iter().map(of).collect::<Vec<f64>>());

@@ -1,0 +1,148 @@
+//! Where the FRFs by themselves put a mode. A common fit of a whole band describes hundreds of lines that are no mode's, and what
+//! it lacks far away can move a mode; the fit of each FRF around its own peak knows nothing of that.
+
+use crate::modal::settings::SET;
+use crate::modal::single::local_fit::Pole;
+use crate::modal::together::set_member::SetMember;
+use crate::modal::together::verify::mean_over_frfs;
+
+/// A neighbour nearer than so many sums of the half-widths may stand in the same peak …
+const ISOLATED_WIDTHS: f64 = 3.0;
+/// … unless it is so many times as wide: it is the ground on which the peak stands.
+const GROUND: f64 = 5.0;
+/// An FRF that knows its own place only to this share of the half-width does not take part.
+const KNOWN_WIDTHS: f64 = 0.3;
+/// Damping ratios of one mode are within this factor of each other.
+const SAME_DAMPING: f64 = 2.0;
+/// Two fits of the same lines contradict each other from so many standard deviations on, and from this share of the half-width.
+const APART: f64 = 4.0;
+const APART_WIDTHS: f64 = 0.1;
+
+/// A mode as the FRFs have it by themselves: means over them.
+#[derive(Debug)]
+pub(super) struct OwnPlace {
+    pub pole: Pole,
+    /// Standard deviations of frequency (Hz) and damping ratio, from how the FRFs scatter.
+    pub std: [f64; 2],
+}
+
+/// Where the FRFs put a mode by themselves, if that is elsewhere than the `common` pole (`std`: its standard deviations of
+/// frequency, Hz, and damping ratio). `None` where it is not, where fewer than half of them (and four) tell, or where one of
+/// the `others` stands so near that a single FRF may take two modes for one.
+pub(super) fn elsewhere(
+    members: &[&SetMember],
+    common: Pole,
+    std: [f64; 2],
+    others: &[Pole],
+) -> Option<OwnPlace> {
+    let width_hz = |p: &Pole| p.damping_ratio * p.frequency_hz;
+    let own_width_hz = width_hz(&common);
+    let shares_the_peak = |p: &Pole| {
+        width_hz(p) < GROUND * own_width_hz
+            && (p.frequency_hz - common.frequency_hz).abs() < ISOLATED_WIDTHS * (width_hz(p) + own_width_hz)
+    };
+    if others.iter().any(shares_the_peak) {
+        return None;
+    }
+    let own: Vec<(Pole, [f64; 2])> = members
+        .iter()
+        .filter_map(|member| {
+            let nearest = member.modes.modes.iter().map(|mode| mode.best()).min_by(|a, b| {
+                let away = |frequency_hz: f64| (frequency_hz - common.frequency_hz).abs();
+                away(a.frequency_hz).total_cmp(&away(b.frequency_hz))
+            })?;
+            let pole = Pole {
+                frequency_hz: nearest.frequency_hz,
+                damping_ratio: nearest.damping_ratio,
+            };
+            let std = [nearest.frequency_std_hz?, nearest.damping_std?];
+            let same = (pole.frequency_hz - common.frequency_hz).abs() < own_width_hz
+                && (SAME_DAMPING.recip()..SAME_DAMPING)
+                    .contains(&(pole.damping_ratio / common.damping_ratio));
+            (same && std[0] < KNOWN_WIDTHS * own_width_hz).then_some((pole, std))
+        })
+        .collect();
+    if own.len() < SET || 2 * own.len() < members.len() {
+        return None;
+    }
+    let (frequency_hz, frequency_std_hz) = mean_over_frfs(&own, |(p, std)| (p.frequency_hz, std[0]));
+    let (damping_ratio, damping_std) = mean_over_frfs(&own, |(p, std)| (p.damping_ratio, std[1]));
+    let apart = |difference: f64, stds: [f64; 2], width: f64| {
+        difference.abs() > (APART * stds[0].hypot(stds[1])).max(APART_WIDTHS * width)
+    };
+    let contradicts = apart(
+        frequency_hz - common.frequency_hz,
+        [frequency_std_hz, std[0]],
+        own_width_hz,
+    ) || apart(
+        damping_ratio - common.damping_ratio,
+        [damping_std, std[1]],
+        common.damping_ratio,
+    );
+    contradicts.then_some(OwnPlace {
+        pole: Pole {
+            frequency_hz,
+            damping_ratio,
+        },
+        std: [frequency_std_hz, damping_std],
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::modal::settings::Settings;
+    use crate::modal::single::analysis::analyse_frf;
+    use crate::modal::synthetic::{Synthetic, SyntheticMode};
+
+    #[test]
+    fn frfs_that_agree_by_themselves_outvote_a_common_pole_that_left_them() {
+        let frfs: Vec<_> = [1.0, -0.6, 0.8, 0.5, -0.9, 0.7]
+            .iter()
+            .enumerate()
+            .map(|(k, constant)| {
+                Synthetic::new(60.0, 140.0, 0.1, &[SyntheticMode::new(100.0, 0.006, *constant)])
+                    .with_noise(0.0, 0.01, k as u64)
+                    .frf()
+            })
+            .collect();
+        let modes: Vec<_> = frfs
+            .iter()
+            .map(|(f, h)| analyse_frf(f, h, &Settings::default()).unwrap())
+            .collect();
+        let members: Vec<SetMember> = frfs
+            .iter()
+            .zip(&modes)
+            .map(|((frequency_hz, receptance_m_per_n), modes)| SetMember {
+                frequency_hz,
+                receptance_m_per_n,
+                modes,
+                dofs: None,
+            })
+            .collect();
+        let members: Vec<&SetMember> = members.iter().collect();
+        let pole = |frequency_hz, damping_ratio| Pole {
+            frequency_hz,
+            damping_ratio,
+        };
+        let std = [0.02, 1e-4];
+        assert!(elsewhere(&members, pole(100.0, 0.006), std, &[]).is_none());
+        for left in [pole(99.8, 0.006), pole(100.0, 0.0045)] {
+            let own = elsewhere(&members, left, std, &[]).unwrap();
+            assert!(
+                (own.pole.frequency_hz - 100.0).abs() < 3.0 * own.std[0].max(1e-3),
+                "{own:?}"
+            );
+            assert!(
+                (own.pole.damping_ratio - 0.006).abs() < 3.0 * own.std[1].max(1e-5),
+                "{own:?}"
+            );
+        }
+        // Uncertain enough to allow for it; one more mode in the peak; the ground under it; too few FRFs.
+        let left = pole(99.8, 0.006);
+        assert!(elsewhere(&members, left, [0.1, 1e-3], &[]).is_none());
+        assert!(elsewhere(&members, left, std, &[pole(101.5, 0.006)]).is_none());
+        assert!(elsewhere(&members, left, std, &[pole(95.0, 0.15)]).is_some());
+        assert!(elsewhere(&members[..3], left, std, &[]).is_none());
+    }
+}

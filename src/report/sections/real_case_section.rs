@@ -1,8 +1,9 @@
 //! The loop on the thesis' own tables: which effect they propose, and how far to trust it.
 
 use crate::report::figure::{ResonanceFigure, ResonanceRow};
-use crate::report::number::{decimals, format_si};
+use crate::report::number::{decimals, format_si, significant};
 use crate::report::parts::{figure, paragraph};
+use crate::report::words::{at_place, parameter};
 use crate::report::{Block, ReportTable, TableColumn};
 use crate::thesis::RealCase;
 use crate::thesis::real_case::{CONFIGURATIONS, Explanation};
@@ -45,7 +46,7 @@ fn resonance_figure(case: &RealCase) -> Block {
     let drawing = ResonanceFigure {
         title: title.into(),
         before_label: "modes, rigid links tuned to all resonances".into(),
-        after_label: format!("modes with {}", best_name(case)),
+        after_label: format!("modes with {}", at_place(best_name(case))),
         rows: rows.collect(),
         bands_hz: bands.collect(),
     };
@@ -60,7 +61,7 @@ fn explanations(case: &RealCase) -> Block {
             .parameters
             .iter()
             .map(|p| {
-                let name = p.name.rsplit('.').next().unwrap_or_default();
+                let name = parameter(&p.name);
                 let unit = if p.unit == "1" { "" } else { p.unit };
                 format!("{name} {}", format_si(p.value, unit, 3))
             })
@@ -72,9 +73,9 @@ fn explanations(case: &RealCase) -> Block {
             .collect();
         let [low, high] = e.static_ratio;
         vec![
-            e.name.clone(),
+            at_place(&e.name),
             decimals(e.delta_bic, 1),
-            format!("{:.0e}", e.p_value),
+            significant(e.p_value, 2),
             decimals(e.reduced_chi2, 1),
             decimals(e.held_out_chi2, 0),
             format!("{} of {}", e.met, case.resonances.len()),
@@ -97,7 +98,7 @@ fn explanations(case: &RealCase) -> Block {
     let mut notes: Vec<String> = case
         .not_tried
         .iter()
-        .map(|(effect, reason)| format!("Not tried: {effect} ({reason})."))
+        .map(|(effect, reason)| format!("Not tried: {} ({reason}).", at_place(effect)))
         .collect();
     notes.dedup();
     Block::Table(ReportTable {

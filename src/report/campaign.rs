@@ -10,11 +10,11 @@ use crate::analysis::{CampaignFindings, DiagnosisFindings, StructureFindings, Wo
 use crate::campaign::Campaign;
 use crate::discrepancy::setup::{SetupCheck, SetupFinding};
 use crate::identify::StructureCase;
+use crate::report::parts::made;
 use crate::report::sections::{
     cutting_section, diagnosis_section, error_map_section, history_section, lobes_section, modal_section,
     structure_section, thesis_section, waveform_section,
 };
-use crate::report::parts::made;
 use crate::revision::Side;
 use crate::thesis::ThesisFindings;
 

@@ -46,7 +46,7 @@ pub fn page(fleet: &Fleet, title: &str, [rows, failed]: [usize; 2], remarks: &[S
 
 /// The worst first.
 fn overview(fleet: &Fleet, remarks: &[String]) -> ReportSection {
-    let columns = ["robot", "side", "look at it", "last campaign", "missing"].map(TableColumn::text);
+    let columns = ["robot", "side", "news", "last campaign", "missing"].map(TableColumn::text);
     let numbers = ["confidence", "error", "noise", "farthest, σ", "campaigns"].map(TableColumn::number);
     let rows = fleet.robots.iter().map(|robot| {
         let last = robot.last();
@@ -143,7 +143,7 @@ fn attention(attention: Attention) -> &'static str {
     match attention {
         Attention::None => "nothing new",
         Attention::Known => "known verdict",
-        Attention::Files => "files",
+        Attention::Files => "files or setup",
         Attention::Moved => "a value moved",
         Attention::NewVerdict => "new verdict",
     }

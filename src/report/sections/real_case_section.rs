@@ -1,5 +1,6 @@
 //! The loop on the thesis' own tables: which effect they propose, and how far to trust it.
 
+use crate::identify::Estimate;
 use crate::report::figure::{ResonanceFigure, ResonanceRow};
 use crate::report::number::{decimals, format_si, significant};
 use crate::report::parts::{figure, paragraph};
@@ -17,7 +18,7 @@ pub fn blocks(case: &RealCase) -> Vec<Block> {
         case.resonances.len()
     ))];
     blocks.push(resonance_figure(case));
-    blocks.push(explanations(case));
+    blocks.extend(explanations(case));
     blocks.extend(case.answer().into_iter().map(paragraph));
     blocks.push(paragraph(format!("Caveats. {}", case.caveats().join(" "))));
     blocks
@@ -55,17 +56,8 @@ fn resonance_figure(case: &RealCase) -> Block {
     figure("thesis-resonances", title, caption, drawing.png())
 }
 
-fn explanations(case: &RealCase) -> Block {
+fn explanations(case: &RealCase) -> [Block; 2] {
     let row = |e: &Explanation| {
-        let parameters: Vec<String> = e
-            .parameters
-            .iter()
-            .map(|p| {
-                let name = parameter(&p.name);
-                let unit = if p.unit == "1" { "" } else { p.unit };
-                format!("{name} {}", format_si(p.value, unit, 3))
-            })
-            .collect();
         let bands: Vec<String> = e
             .bands
             .iter()
@@ -82,12 +74,16 @@ fn explanations(case: &RealCase) -> Block {
             bands.join("; "),
             format!("{} to {}", decimals(low, 2), decimals(high, 2)),
             decimals(e.weight, 2),
-            format!(
-                "{}{}",
-                parameters.join(", "),
-                if e.at_bound { " (at its bound)" } else { "" }
-            ),
         ]
+    };
+    let sizes = |e: &Explanation| {
+        let one = |p: &Estimate| {
+            let unit = if p.unit == "1" { "" } else { p.unit };
+            format!("{} {}", parameter(&p.name), format_si(p.value, unit, 3))
+        };
+        let sizes: Vec<String> = e.parameters.iter().map(one).collect();
+        let bound = if e.at_bound { " (at its bound)" } else { "" };
+        vec![at_place(&e.name), format!("{}{bound}", sizes.join(", "))]
     };
     let bands: Vec<String> = case
         .baseline
@@ -101,7 +97,7 @@ fn explanations(case: &RealCase) -> Block {
         .map(|(effect, reason)| format!("Not tried: {} ({reason}).", at_place(effect)))
         .collect();
     notes.dedup();
-    Block::Table(ReportTable {
+    let judged = Block::Table(ReportTable {
         caption: "Explanations of the tables, best first after the rigid links".into(),
         columns: vec![
             TableColumn::text("explanation"),
@@ -113,12 +109,18 @@ fn explanations(case: &RealCase) -> Block {
             TableColumn::number(format!("of those at {}", bands.join("; "))),
             TableColumn::number("static stiffness, model / measured"),
             TableColumn::number("weight"),
-            TableColumn::text("parameters"),
         ],
         rows: std::iter::once(&case.baseline)
             .chain(&case.candidates)
             .map(row)
             .collect(),
         notes,
-    })
+    });
+    let fitted = Block::Table(ReportTable {
+        caption: "How big each would have to be".into(),
+        columns: vec![TableColumn::text("explanation"), TableColumn::text("best fit")],
+        rows: case.candidates.iter().map(sizes).collect(),
+        notes: Vec::new(),
+    });
+    [judged, fitted]
 }

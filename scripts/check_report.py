@@ -4,7 +4,8 @@
     python3 scripts/check_report.py report.html [--shots FOLDER] [--browser chromium]
 
 Fails where the page logs an error or loads anything, where a figure is empty, where a button for another model changes
-neither curve nor stated error, where a cell of an error map does not lead to an FRF (mouse, keyboard), or where paper lacks the figures.
+neither curve nor stated error, where a cell of an error map does not lead to an FRF (mouse, keyboard), where poles cannot be picked by
+keyboard, or where paper lacks the figures.
 What was found is printed as JSON. Only the standard library is used; the browser is spoken to over its debugging pipe
 (https://chromedevtools.github.io/devtools-protocol/).
 """
@@ -199,6 +200,18 @@ FAULTS = """[...document.querySelectorAll('.js-plotly-plot')].flatMap((div) => {
 })"""
 
 
+# From top to bottom, at each stop until what is in the window is drawn.
+THROUGH = """(async () => {
+  const inWindow = ({ top, bottom, height }) => height > 0 && top < innerHeight && bottom > 0;
+  const blank = (div) => !div.matches('.js-plotly-plot') && inWindow(div.getBoundingClientRect());
+  for (let top = 0; top < document.documentElement.scrollHeight; top += 0.8 * innerHeight) {
+    scrollTo({ top, behavior: 'instant' });
+    for (let k = 0; k < 200 && [...document.querySelectorAll('.plot')].some(blank); k++) await new Promise((done) => setTimeout(done, 50));
+  }
+  scrollTo({ top: 0, behavior: 'instant' });
+})()"""
+
+
 def check(condition, what):
     if not condition:
         raise SystemExit(f"the report fails: {what}")
@@ -207,8 +220,9 @@ def check(condition, what):
 def use(browser, page, shots):
     browser.send("Page.navigate", url=page.resolve().as_uri())
     browser.wait_for("document.documentElement?.dataset.ready === 'true'")
-    # What is folded up is drawn when it is opened.
+    # What is folded up is drawn when it is opened, and what is further down when the reader comes near.
     browser.run("document.querySelectorAll('details').forEach((fold) => { fold.open = true; })")
+    browser.run(THROUGH)
     browser.wait_for("document.querySelectorAll('.js-plotly-plot').length === document.querySelectorAll('.plot').length")
     browser.wait_for("document.documentElement?.dataset.ready === 'true'")
     found = {
@@ -230,6 +244,8 @@ def use(browser, page, shots):
                 browser.element_shot(shots / f"{kind}-{k:02}.png", selector, k)
     if found["models"]:
         found |= use_explorer(browser, shots)
+    if browser.run("document.querySelector('.picker') !== null"):
+        found["picked"] = pick(browser)
     complaints, loaded = browser.complaints(), browser.loaded()
     check(not complaints, f"the page logged {complaints}")
     check(not loaded, f"the page loaded {loaded}")
@@ -279,9 +295,7 @@ def use_explorer(browser, shots):
     check(after["frf"] != before["frf"] and after["y"] != before["y"], "a click on a cell of the error map shows no other FRF")
     # The same without a mouse: arrow keys choose a cell, which is told, and Enter leads to the FRF.
     browser.run("document.querySelector('[data-plot]:has(.models) .plot').focus()")
-    for key in ("ArrowDown", "ArrowRight", "Enter"):
-        for kind in ("rawKeyDown", "keyUp"):
-            browser.send("Input.dispatchKeyEvent", type=kind, key=key, code=key)
+    press(browser, "ArrowDown", "ArrowRight", "Enter")
     told = browser.run("document.querySelector('[data-plot]:has(.models) .told').textContent")
     check(": " in told, f"arrow keys choose no cell of the error map: {told!r}")
     check(browser.run("document.activeElement.name") == "posture", "Enter on a cell of the error map leads nowhere")
@@ -313,6 +327,26 @@ def use_explorer(browser, shots):
     )
     check(other is None or other[1].startswith(f"Posture {other[0]},"), f"the list of postures does not choose: {other}")
     return {"errors_percent": errors, "frf_after_click": int(after["frf"])}
+
+
+def press(browser, *keys):
+    for key in keys:
+        for kind in ("rawKeyDown", "keyUp"):
+            browser.send("Input.dispatchKeyEvent", type=kind, key=key, code=key)
+
+
+def pick(browser):
+    """Two poles of the first stabilisation diagram, picked by keyboard, one of them put back."""
+    browser.run("document.querySelector('.picker').focus()")
+    picked = "document.querySelector('.picked').textContent"
+    press(browser, "ArrowRight", "Enter", "ArrowLeft", "Enter")
+    both = browser.run(picked)
+    press(browser, "Enter")
+    one = browser.run(picked)
+    check((both.count("--pole"), one.count("--pole")) == (2, 1), f"poles picked by keyboard: {both!r}, then {one!r}")
+    told = browser.run("document.querySelector('.pointed').textContent")
+    check(" Hz, " in told and told.endswith("not picked"), f"the pole is not told: {told!r}")
+    return one
 
 
 def on_paper(browser, shots):

@@ -10,11 +10,12 @@ use crate::analysis::{CampaignFindings, DiagnosisFindings, StructureFindings, Wo
 use crate::campaign::Campaign;
 use crate::discrepancy::setup::{SetupCheck, SetupFinding};
 use crate::identify::StructureCase;
+use crate::report::parts::made;
 use crate::report::sections::{
     cutting_section, diagnosis_section, error_map_section, history_section, lobes_section, modal_section,
     structure_section, thesis_section, waveform_section,
 };
-use crate::revision::{self, Side};
+use crate::revision::Side;
 use crate::thesis::ThesisFindings;
 
 /// Folder of the tables next to the page.
@@ -71,9 +72,7 @@ fn origin(campaign: &Workbench) -> Vec<(String, String)> {
     let mut origin = Vec::new();
     origin.extend(campaign.date.clone().map(|date| entry("measured", date)));
     origin.extend(campaign.operator.clone().map(|who| entry("by", who)));
-    let made = revision::now().replace('T', " ").replace('Z', " UTC");
-    origin.push(entry("made", made));
-    origin.push(entry("with Lobestone", env!("CARGO_PKG_VERSION").to_string()));
+    origin.extend(made());
     for (there, name, domain) in [
         (!campaign.frfs.is_empty(), "FRF data", Side::Structure),
         (!campaign.cuts.is_empty(), "force data", Side::Cutting),

@@ -1,13 +1,12 @@
 //! The page about a fleet: who is to be looked at, and every quantity over time with its limits.
 
 use super::figure::{ControlChartFigure, ControlPanel, ControlPoint, MOST_PANELS};
-use super::number::{percent, significant, with_error};
-use super::parts::{figure, paragraph};
-use super::words::count;
+use super::number::{decimals, percent, significant, with_error};
+use super::parts::{figure, made, paragraph};
+use super::words::{at_place, count, quantity};
 use super::{Block, Page, ReportSection, ReportTable, TableColumn};
 use crate::analysis::many::control_chart::{Basis, ControlChart};
 use crate::analysis::many::fleet::{Attention, Fleet, Night, RobotHistory};
-use crate::revision;
 
 /// Robots whose charts are drawn; the table has all.
 const DRAWN: usize = 40;
@@ -22,11 +21,6 @@ pub const ABOUT_LIMITS: &str = "Limits: individuals chart (Shewhart 1931; NIST/S
 
 /// The page; `rows` campaigns were read, of which `failed` could not be worked on.
 pub fn page(fleet: &Fleet, title: &str, [rows, failed]: [usize; 2], remarks: &[String]) -> Page {
-    let made = revision::now().replace('T', " ").replace('Z', " UTC");
-    let origin = [
-        ("made", made),
-        ("with Lobestone", env!("CARGO_PKG_VERSION").to_string()),
-    ];
     let mut sections = vec![overview(fleet, remarks)];
     sections.extend(fleet.robots.iter().take(DRAWN).map(of_robot));
     let asking = fleet
@@ -42,7 +36,7 @@ pub fn page(fleet: &Fleet, title: &str, [rows, failed]: [usize; 2], remarks: &[S
             count(fleet.robots.len(), "robot", "robots"),
             asking
         ),
-        origin: origin.map(|(name, value)| (name.to_string(), value)).to_vec(),
+        origin: made(),
         open_sections: Some(1 + asking.min(DRAWN)),
         sections,
         without_scripts: true,
@@ -52,7 +46,7 @@ pub fn page(fleet: &Fleet, title: &str, [rows, failed]: [usize; 2], remarks: &[S
 
 /// The worst first.
 fn overview(fleet: &Fleet, remarks: &[String]) -> ReportSection {
-    let columns = ["robot", "side", "look at it", "last campaign", "missing"].map(TableColumn::text);
+    let columns = ["robot", "side", "news", "last campaign", "missing"].map(TableColumn::text);
     let numbers = ["confidence", "error", "noise", "farthest, σ", "campaigns"].map(TableColumn::number);
     let rows = fleet.robots.iter().map(|robot| {
         let last = robot.last();
@@ -61,9 +55,9 @@ fn overview(fleet: &Fleet, remarks: &[String]) -> ReportSection {
         vec![
             robot.robot.clone(),
             robot.domain.clone(),
-            robot.attention.name().to_string(),
+            attention(robot.attention).to_string(),
             last.map_or(String::new(), when),
-            verdict.map_or("–".into(), |v| v.words()),
+            verdict.map_or("–".into(), |v| at_place(&v.words())),
             verdict
                 .and_then(|v| v.confidence)
                 .map_or("–".into(), |c| format!("{:.0} %", 100.0 * c)),
@@ -103,14 +97,18 @@ fn farthest(robot: &RobotHistory) -> String {
 }
 
 fn of_robot(robot: &RobotHistory) -> ReportSection {
-    let mut blocks: Vec<Block> = robot.reasons.iter().map(paragraph).collect();
+    let mut blocks: Vec<Block> = robot
+        .reasons
+        .iter()
+        .map(|r| paragraph(reason(robot, r)))
+        .collect();
     let nights: Vec<&Night> = robot.nights.iter().filter(|n| n.error.is_none()).collect();
     let names: Vec<String> = nights.iter().map(|n| when(n)).collect();
     let drawn = robot.charts.iter().filter(|c| c.points.len() > 1);
     let drawn: Vec<&ControlChart> = drawn.collect();
     for (i, charts) in drawn.chunks(MOST_PANELS).enumerate() {
         let panels = charts.iter().map(|chart| ControlPanel {
-            label: chart.name.clone(),
+            label: quantity(&chart.name),
             points: nights.iter().map(|n| point(chart, n)).collect(),
             limits: chart.limits.map(|l| [l.centre, l.lower, l.upper]),
         });
@@ -131,9 +129,47 @@ fn of_robot(robot: &RobotHistory) -> ReportSection {
     blocks.push(campaigns(robot));
     ReportSection {
         id: format!("{}-{}", robot.robot, robot.domain),
-        title: format!("{} ({}): {}", robot.robot, robot.domain, robot.attention.name()),
+        title: match robot.domain.as_str() {
+            "" => format!("{}: {}", robot.robot, attention(robot.attention)),
+            domain => format!("{} ({domain}): {}", robot.robot, attention(robot.attention)),
+        },
         lead: String::new(),
         blocks,
+    }
+}
+
+/// Why to look at a robot, in words.
+fn attention(attention: Attention) -> &'static str {
+    match attention {
+        Attention::None => "nothing new",
+        Attention::Known => "known verdict",
+        Attention::Files => "files or setup",
+        Attention::Moved => "a value moved",
+        Attention::NewVerdict => "new verdict",
+    }
+}
+
+/// A reason without the keys in it.
+fn reason(robot: &RobotHistory, text: &str) -> String {
+    if let Some(chart) = robot
+        .charts
+        .iter()
+        .find(|c| text.starts_with(&format!("{} is ", c.name)))
+    {
+        return text.replacen(&chart.name, &quantity(&chart.name), 1);
+    }
+    let verdicts = robot.nights.iter().filter_map(|n| n.verdict.as_ref());
+    verdicts.fold(text.to_string(), |text, v| {
+        text.replace(&v.words(), &at_place(&v.words()))
+    })
+}
+
+/// One decimal and its sign; zero has none.
+fn signed(value: f64) -> String {
+    let text = decimals(value, 1);
+    match value > 0.0 && text != "0.0" {
+        true => format!("+{text}"),
+        false => text,
     }
 }
 
@@ -154,9 +190,9 @@ fn quantities(robot: &RobotHistory) -> Option<Block> {
         .filter_map(|chart| {
             let last = chart.points.last()?;
             let limits = chart.limits;
-            let sigmas = |s: Option<f64>| s.map_or("–".into(), |s| format!("{s:+.1}"));
+            let sigmas = |s: Option<f64>| s.map_or("–".into(), signed);
             Some(vec![
-                chart.name.clone(),
+                quantity(&chart.name),
                 last.std_error
                     .map_or_else(|| significant(last.value, 4), |e| with_error(last.value, e)),
                 limits.map_or("–".into(), |l| significant(l.lower, 4)),
@@ -202,7 +238,10 @@ fn campaigns(robot: &RobotHistory) -> Block {
         vec![
             night.campaign.clone(),
             night.date.clone().unwrap_or_default(),
-            night.verdict.as_ref().map_or("–".into(), |v| v.words()),
+            night
+                .verdict
+                .as_ref()
+                .map_or("–".into(), |v| at_place(&v.words())),
             night.error.clone().unwrap_or_default(),
             night.nrms.map_or("–".into(), percent),
             night.noise.map_or("–".into(), percent),
@@ -224,6 +263,30 @@ fn campaigns(robot: &RobotHistory) -> Block {
 mod tests {
     use super::*;
     use crate::analysis::many::fleet::FleetRow;
+
+    #[test]
+    fn what_people_read_has_no_keys_and_true_signs() {
+        assert_eq!(
+            [0.04, -0.04, 1.26, -1.26].map(signed),
+            ["0.0", "0.0", "+1.3", "−1.3"]
+        );
+        let rows = (1..=8).map(|day| FleetRow {
+            campaign: format!("nights/{day}"),
+            robot: "cell7".into(),
+            date: Some(format!("2026-11-{day:02}")),
+            domain: "structure".into(),
+            quantities: vec![(
+                "joint-2.stiffness_nm_per_rad".into(),
+                if day == 8 { 50.0 } else { f64::from(100 + day % 2) },
+                Some(0.1),
+            )],
+            ..FleetRow::default()
+        });
+        let page = page(&Fleet::new(rows.collect()), "nights", [8, 0], &[]);
+        let html = page.html().unwrap();
+        assert!(html.contains("joint 2: stiffness (N·m&#x2f;rad) is out of its limits (−"));
+        assert!(!html.contains("nm_per_rad") && html.contains("cell7 (structure): a value moved"));
+    }
 
     #[test]
     fn names_out_of_a_manifest_are_shown_and_not_obeyed() {

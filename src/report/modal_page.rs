@@ -1,15 +1,16 @@
 //! The modal analyst's report: modes of FRFs without any robot.
 
 use std::collections::BTreeSet;
+use std::path::Path;
 
 use num_complex::Complex64;
 
 use super::figure::{CellFormat, CompassFigure, HeatMap, IndicatorFigure, WirePicture, WireShapesFigure};
 use super::number::{decimals, with_error};
-use super::parts::figure;
+use super::parts::{figure, made};
 use super::picker::picker;
 use super::words::count;
-use super::{Block, Drawing, Page, ReportSection, ReportTable, TableColumn};
+use super::{Block, Drawing, Fold, Page, ReportSection, ReportTable, TableColumn};
 use crate::analysis::ModalAnalysis;
 use crate::analysis::modes::modal::SetModes;
 use crate::analysis::modes::modal_export::scaled_modes;
@@ -21,12 +22,12 @@ use crate::modal::scaling::{DrivingPoint, check_driving_point};
 use crate::report::sections::modal_section::{
     coherence, mac, modes, reconstruction, reconstruction_of, stabilisation, tracked,
 };
-use crate::revision;
 
 /// Warnings shown; the command tells all.
 const MOST_WARNINGS: usize = 12;
 /// Rejected poles, shapes, FRFs shown.
 const MOST_REJECTED: usize = 40;
+const MOST_INPUTS: usize = 3;
 const MOST_SHAPES: usize = 18;
 /// References of which the indicator functions are drawn.
 const MOST_REFERENCES: usize = 6;
@@ -39,11 +40,15 @@ pub struct Extras<'a> {
     pub geometry: Option<&'a Geometry>,
     /// By set; `None` where nothing was compared.
     pub comparisons: Vec<Option<ShapeComparison>>,
+    /// Files or campaign folder as they were given, and the fingerprint of what is in them.
+    pub inputs: Vec<String>,
+    pub fingerprint: Option<String>,
     /// The command line that made the page, without the poles to take.
     pub command: String,
 }
 
 pub fn page(analysis: &ModalAnalysis, extras: &Extras, title: &str) -> Page {
+    let analysis = &with_short_names(analysis.clone());
     let mut sections = vec![overview(analysis)];
     for (k, set) in analysis.sets.iter().enumerate() {
         let number = match analysis.sets.len() {
@@ -106,17 +111,51 @@ pub fn page(analysis: &ModalAnalysis, extras: &Extras, title: &str) -> Page {
             ));
         }
     }
-    let made = revision::now().replace('T', " ").replace('Z', " UTC");
+    let mut origin = made();
+    origin.extend(given(&extras.inputs).map(|inputs| ("of".into(), inputs)));
+    origin.extend(extras.fingerprint.clone().map(|hash| ("FRF data".into(), hash)));
     Page {
         title: title.into(),
         subtitle: "Modes of measured FRFs".into(),
-        origin: vec![
-            ("made".into(), made),
-            ("with Lobestone".into(), env!("CARGO_PKG_VERSION").into()),
-        ],
+        origin,
         sections,
         ..Page::default()
     }
+}
+
+/// The files that a page is of, few enough for its header.
+fn given(inputs: &[String]) -> Option<String> {
+    let more = inputs.len().saturating_sub(MOST_INPUTS);
+    let mut shown = inputs[..inputs.len() - more].join(", ");
+    if more > 0 {
+        shown += &format!(" and {more} more");
+    }
+    (!inputs.is_empty()).then_some(shown)
+}
+
+/// Sets are called after whole paths: on the page the name of the file is enough, where no two files share it. Of a page
+/// with one set every warning is of that set.
+fn with_short_names(mut analysis: ModalAnalysis) -> ModalAnalysis {
+    let short = |set: &SetModes| {
+        let name = Path::new(&set.set).file_name();
+        name.map_or_else(|| set.set.clone(), |n| n.to_string_lossy().into_owned())
+    };
+    let names: BTreeSet<String> = analysis.sets.iter().map(short).collect();
+    let alone = analysis.sets.len() == 1;
+    if names.len() < analysis.sets.len() {
+        return analysis;
+    }
+    for set in &mut analysis.sets {
+        let name = short(set);
+        for warning in &mut analysis.warnings {
+            *warning = match warning.strip_prefix(&format!("{}: ", set.set)) {
+                Some(of_the_set) if alone => of_the_set.to_string(),
+                _ => warning.replace(&set.set, &name),
+            };
+        }
+        set.set = name;
+    }
+    analysis
 }
 
 fn overview(analysis: &ModalAnalysis) -> ReportSection {
@@ -124,6 +163,10 @@ fn overview(analysis: &ModalAnalysis) -> ReportSection {
     if let Some(Block::Table(table)) = blocks.first_mut() {
         table.caption = "Modes, all FRFs of a set together".into();
         table.columns[0] = TableColumn::text("set");
+        if analysis.sets.len() == 1 {
+            table.columns.remove(0);
+            table.rows.iter_mut().for_each(|row| drop(row.remove(0)));
+        }
     }
     if analysis.sets.len() > 1 {
         blocks.extend(tracked(analysis));
@@ -162,8 +205,8 @@ fn rejected(set: &SetModes) -> Option<Block> {
         ]
     });
     let more = rejected.len().saturating_sub(MOST_REJECTED);
-    Some(Block::Table(ReportTable {
-        caption: "Poles that are no modes, or that these FRFs do not prove".into(),
+    let table = Block::Table(ReportTable {
+        caption: String::new(),
         columns: vec![
             TableColumn::number("frequency (Hz)"),
             TableColumn::number("damping ratio (%)"),
@@ -175,6 +218,14 @@ fn rejected(set: &SetModes) -> Option<Block> {
         } else {
             vec![]
         },
+    });
+    Some(Block::Fold(Fold {
+        title: format!(
+            "{} that are no modes, or that these FRFs do not prove",
+            count(rejected.len(), "pole", "poles")
+        ),
+        blocks: vec![table],
+        open: false,
     }))
 }
 

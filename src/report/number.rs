@@ -63,8 +63,8 @@ pub fn percent(ratio: f64) -> String {
 ///
 /// Units that bear no prefix (none, degrees, percent, `kg`, anything already prefixed by the lab) keep their number.
 pub fn format_si(value: f64, unit: &str, digits: usize) -> String {
-    let (scaled, prefix) = match value.is_finite() && takes_prefix(unit) {
-        true => si_prefix(value, digits),
+    let (scaled, prefix) = match value.is_finite() {
+        true => prefixed(value, unit, digits),
         false => (value, ""),
     };
     join(&significant(scaled, digits), &format!("{prefix}{unit}"))
@@ -79,11 +79,13 @@ pub fn plus_minus(value: f64, std_error: f64, unit: &str) -> String {
     if !std_error.is_finite() || std_error <= 0.0 {
         return format_si(value, unit, 4);
     }
-    let size = value.abs().max(std_error);
-    let (scaled, prefix) = match takes_prefix(unit) {
-        true => si_prefix(size, 4),
-        false => (size, ""),
+    // Of what will stand there: −980 ± 700 ns is rounded to hundreds, which are tenths of µs.
+    let size = {
+        let size = value.abs().max(std_error);
+        let rounded = (size / last_place(std_error)).round() * last_place(std_error);
+        if rounded.is_normal() { rounded } else { size }
     };
+    let (scaled, prefix) = prefixed(size, unit, 4);
     let (value, error) = (value * (scaled / size), std_error * (scaled / size));
     join(&with_error(value, error), &format!("{prefix}{unit}"))
 }
@@ -130,10 +132,19 @@ pub fn concise(value: f64, error: f64) -> String {
     }
 }
 
-fn rounded(value: f64, error: f64) -> String {
+/// Decimal places that an error leaves a value, negative for tens and hundreds.
+fn places(error: f64) -> i32 {
     let order = error.log10().floor() as i32;
     let two_digits = error / 10f64.powi(order) < 3.55;
-    let places = if two_digits { 1 - order } else { -order };
+    if two_digits { 1 - order } else { -order }
+}
+
+fn last_place(error: f64) -> f64 {
+    10f64.powi(-places(error))
+}
+
+fn rounded(value: f64, error: f64) -> String {
+    let places = places(error);
     // Tens and hundreds are rounded, too.
     let step = 10f64.powi((-places).max(0));
     let text = |v: f64| decimals((v / step).round() * step, 0);
@@ -152,6 +163,16 @@ fn join(number: &str, unit: &str) -> String {
         "" => number.to_owned(),
         // A no-break space keeps number and unit on one line.
         _ => format!("{number}\u{a0}{unit}"),
+    }
+}
+
+/// The value in the unit with the prefix that suits it.
+fn prefixed(value: f64, unit: &str, digits: usize) -> (f64, &'static str) {
+    match takes_prefix(unit) {
+        // Nobody counts in kiloseconds.
+        true if unit == "s" && value.abs() >= 1.0 => (value, ""),
+        true => si_prefix(value, digits),
+        false => (value, ""),
     }
 }
 
@@ -253,6 +274,9 @@ mod tests {
         assert_eq!(plus_minus(f64::NAN, 1.0, "kg"), MISSING);
         assert_eq!(plus_minus(0.0, 2.0, "N"), "0.0 ± 2.0\u{a0}N");
         assert_eq!(plus_minus(47.26702, 0.00086, "Hz"), "47.2670 ± 0.0009\u{a0}Hz");
+        assert_eq!(plus_minus(-9.8e-7, 7e-7, "s"), "−1.0 ± 0.7\u{a0}µs");
+        assert_eq!(plus_minus(-9.8e-7, 1e-8, "s"), "−980 ± 10\u{a0}ns");
+        assert_eq!(plus_minus(9e10, 14e10, "s"), "(0.9 ± 1.4)·10¹¹\u{a0}s");
         assert_eq!(with_error(2.458e-4, 4e-2), "0.00 ± 0.04");
         assert_eq!(with_error(929.782, 0.59), "929.8 ± 0.6");
         assert_eq!(with_error(929.782, 5.9), "930 ± 6");

@@ -366,14 +366,29 @@ fn with_code(text: &str) -> String {
     let parts: Vec<&str> = escaped.split('`').collect();
     // An odd backtick is none of ours.
     if parts.len().is_multiple_of(2) {
-        return escaped;
+        return with_minus(&escaped);
     }
     let mut html = String::with_capacity(escaped.len() + 13 * parts.len());
     for (k, part) in parts.into_iter().enumerate() {
         match k % 2 {
-            0 => html += part,
+            0 => html += &with_minus(part),
             _ => html += &format!("<code>{part}</code>"),
         }
+    }
+    html
+}
+
+/// A true minus sign where a hyphen stands before a number; texts that a terminal shows as well have a hyphen.
+fn with_minus(text: &str) -> String {
+    let mut html = String::with_capacity(text.len());
+    let mut before = ' ';
+    let mut letters = text.chars().peekable();
+    while let Some(letter) = letters.next() {
+        let number = letter == '-'
+            && (before.is_whitespace() || before == '(')
+            && letters.peek().is_some_and(char::is_ascii_digit);
+        html.push(if number { '−' } else { letter });
+        before = letter;
     }
     html
 }

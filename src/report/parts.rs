@@ -2,6 +2,7 @@
 
 use super::{Block, Figure, OnScreen, ReportSection};
 use crate::Result;
+use crate::revision;
 
 /// A figure, or a warning in its place that says why there is none.
 pub fn figure(
@@ -24,6 +25,13 @@ pub fn figure(
 
 pub fn paragraph(text: impl Into<String>) -> Block {
     Block::Paragraph(text.into())
+}
+
+/// When and with what a page is made, for its header.
+pub fn made() -> Vec<(String, String)> {
+    let now = revision::now().replace('T', " ").replace('Z', " UTC");
+    let version = env!("CARGO_PKG_VERSION").to_string();
+    vec![("made".into(), now), ("with Lobestone".into(), version)]
 }
 
 /// The section of a part that failed.

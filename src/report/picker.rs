@@ -1,6 +1,8 @@
-//! The stabilisation diagram to pick poles from by mouse: the list picked stands below as the command that repeats it.
+//! The stabilisation diagram to pick poles from by mouse or keyboard: what is picked stands below as the command that repeats it.
 
 use std::fmt::Write as _;
+
+use minijinja::HtmlEscape;
 
 use super::number::decimals;
 use super::{Block, Drawing};
@@ -8,12 +10,13 @@ use crate::analysis::modes::modal::SetModes;
 use crate::modal::stabilisation::Stability;
 use crate::report::figure::sheet::axis::FigureAxis;
 
-const WIDTH: f64 = 1200.0;
-const HEIGHT: f64 = 520.0;
+const WIDTH: f64 = 1000.0;
+const HEIGHT: f64 = 480.0;
 /// Left, top, right, bottom of the plotting area.
-const FRAME: [f64; 4] = [60.0, 16.0, 1184.0, 470.0];
+const FRAME: [f64; 4] = [56.0, 16.0, 984.0, 430.0];
 /// Poles drawn at most; the least stable are left out first.
 const MOST_POLES: usize = 6000;
+const SCRIPT: &str = include_str!("picker.js");
 
 /// `None` without poles. The script is part of the drawing and touches nothing outside it.
 pub fn picker(set: &SetModes, command: &str) -> Option<Block> {
@@ -40,10 +43,12 @@ pub fn picker(set: &SetModes, command: &str) -> Option<Block> {
     let x = |f: f64| left + (f - low) / (high - low).max(1e-9) * (right - left);
     let y = |order: f64| bottom - order / highest * (bottom - top);
     let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" class=\"picker\" \
-         aria-label=\"Poles to pick\"><style>.picker circle{{cursor:pointer}}.picker circle:hover{{stroke:#1c1e21;stroke-width:2}}\
-         .picker circle.taken{{fill:#ba2822;r:7px}}</style>\
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" tabindex=\"0\" role=\"application\" class=\"picker\" \
+         data-command=\"{}\" aria-label=\"Poles over frequency and model order. Arrow keys choose a pole, Enter picks it.\">\
+         <style>.picker circle{{cursor:pointer}}.picker circle:hover{{stroke:#1c1e21;stroke-width:2}}\
+         .picker circle.taken{{fill:#ba2822;r:7px}}.picker circle.at{{stroke:#1c1e21;stroke-width:3;r:9px}}</style>\
          <rect x=\"{left}\" y=\"{top}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#3c4046\"/>",
+        HtmlEscape(command),
         right - left,
         bottom - top
     );
@@ -101,24 +106,46 @@ pub fn picker(set: &SetModes, command: &str) -> Option<Block> {
             pole.order
         );
     }
-    // No character of the command may end the script or the text of the page.
-    let quoted = serde_json::to_string(command)
-        .unwrap_or_default()
-        .replace('<', "\\u003c");
     let _ = write!(
         svg,
-        "</svg><p><b>Picked:</b> <code class=\"picked\">nothing yet: click poles</code></p><script>(function(){{\
-         var box=document.currentScript.parentNode,out=box.querySelector('.picked'),base={quoted};\
-         box.querySelector('svg').addEventListener('click',function(e){{var c=e.target;if(c.tagName!=='circle')return;\
-         c.classList.toggle('taken');var p=[].slice.call(box.querySelectorAll('circle.taken')).map(function(n){{\
-         return [+n.dataset.f,+n.dataset.z]}}).sort(function(a,b){{return a[0]-b[0]}});\
-         out.textContent=p.length?base+p.map(function(q){{return ' --pole '+q[0]+':'+q[1]}}).join(''):'nothing yet: click poles'}})\
-         }})()</script>"
+        "</svg><p><b>Picked:</b> <code class=\"picked\">nothing yet</code></p><p class=\"pointed\" aria-live=\"polite\"></p>\
+         <script>{SCRIPT}</script>"
     );
     Some(Block::Drawing(Drawing {
         svg,
-        caption: "Click poles to pick them, again to put them back. White: new at its order; orange: same frequency as at the \
-                  order below; light blue: and damping; blue: and shape. Dotted: modes taken."
+        caption: "Click poles to pick them, again to put them back (by keyboard: arrow keys and Enter). White: new at its order; \
+                  orange: same frequency as at the order below; light blue: and damping; blue: and shape. Dotted: modes taken."
             .into(),
     }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::ModalAnalysis;
+    use crate::analysis::modes::mode_set::FrfInput;
+    use crate::modal::Settings;
+    use num_complex::Complex64;
+
+    #[test]
+    fn it_answers_to_the_keyboard_and_no_command_ends_it() {
+        let frequency_hz: Vec<f64> = (0..400).map(|k| 4.0 + 0.05 * f64::from(k)).collect();
+        let receptance = |f: &f64| 1e-6 / Complex64::new(1.0 - (f / 12.0).powi(2), 0.06 * f / 12.0);
+        let input = FrfInput {
+            name: "1Z/1Z".into(),
+            set: "p1".into(),
+            dofs: None,
+            receptance_m_per_n: frequency_hz.iter().map(receptance).collect(),
+            frequency_hz,
+            coherence: None,
+            added_decay_per_s: 0.0,
+        };
+        let found = ModalAnalysis::of(vec![input], Vec::new(), &Settings::default()).unwrap();
+        let Some(Block::Drawing(drawing)) = picker(&found.sets[0], "lobestone modal '</script>\"<b>'") else {
+            panic!("no poles");
+        };
+        assert!(drawing.svg.contains("tabindex=\"0\"") && drawing.svg.contains("keydown"));
+        assert_eq!(drawing.svg.matches("</script>").count(), 1);
+        assert!(!drawing.svg.contains("<b>'"));
+    }
 }

@@ -11,10 +11,10 @@ use super::number::{format_si, significant};
 use crate::report::figure::sheet::axis::{FigureAxis, extent, positive_extent};
 
 /// Size of the drawing in its own units; the page scales it.
-const WIDTH: f64 = 620.0;
-const HEIGHT: f64 = 300.0;
+const WIDTH: f64 = 480.0;
+const HEIGHT: f64 = 244.0;
 /// Room left, right, above and below the frame.
-const MARGINS: [f64; 4] = [82.0, 12.0, 10.0, 40.0];
+const MARGINS: [f64; 4] = [90.0, 12.0, 10.0, 40.0];
 /// Columns that a curve is thinned to: each keeps its lowest and highest value.
 const COLUMNS: usize = 300;
 /// Decades that a log axis shows at most below the largest value.

@@ -48,17 +48,19 @@ fn named<D: Domain>(instance: &Instance<D>) -> Named {
 
 /// `mass 5.9 ± 0.3 kg, frequency 31.2 ± 0.1 Hz`.
 pub fn sizes(parameters: &[Estimate]) -> String {
-    let one = |p: &Estimate| {
-        let unit = if p.unit == "1" { "" } else { p.unit };
-        let name = words::parameter(&p.name);
-        let stuck = if p.at_bound { " (end of its range)" } else { "" };
-        format!("{name} {}{stuck}", plus_minus(p.value, p.std_error, unit))
-    };
-    let mut shown: Vec<String> = parameters.iter().take(SIZES).map(one).collect();
+    let mut shown: Vec<String> = parameters.iter().take(SIZES).map(size).collect();
     if parameters.len() > SIZES {
         shown.push(format!("{} more", parameters.len() - SIZES));
     }
     shown.join(", ")
+}
+
+/// `mass 5.9 ± 0.3 kg`.
+pub fn size(p: &Estimate) -> String {
+    let unit = if p.unit == "1" { "" } else { p.unit };
+    let name = words::parameter(&p.name);
+    let stuck = if p.at_bound { " (end of its range)" } else { "" };
+    format!("{name} {}{stuck}", plus_minus(p.value, p.std_error, unit))
 }
 
 /// Headline, explanation, facts and check of a verdict.

@@ -19,28 +19,28 @@ pub fn place(site: Site) -> Option<String> {
     }
 }
 
-/// Endings of keys that are units, longest first where one ends in another.
-const UNITS: [&str; 20] = [
-    "_nms_per_rad",
-    "_um_per_n",
-    "_nm_per_rad",
-    "_n_per_mm2",
-    "_n_per_mm",
-    "_ns_per_m",
-    "_n_per_m",
-    "_kg_m2",
-    "_kg",
-    "_hz",
-    "_mm",
-    "_um",
-    "_deg",
-    "_rad",
-    "_pa",
-    "_ms",
-    "_us",
-    "_s",
-    "_n",
-    "_m",
+/// Endings of keys that are units, longest first where one ends in another, and the units.
+const UNITS: [(&str, &str); 20] = [
+    ("_nms_per_rad", "N·m·s/rad"),
+    ("_um_per_n", "µm/N"),
+    ("_nm_per_rad", "N·m/rad"),
+    ("_n_per_mm2", "N/mm²"),
+    ("_n_per_mm", "N/mm"),
+    ("_ns_per_m", "N·s/m"),
+    ("_n_per_m", "N/m"),
+    ("_kg_m2", "kg·m²"),
+    ("_kg", "kg"),
+    ("_hz", "Hz"),
+    ("_mm", "mm"),
+    ("_um", "µm"),
+    ("_deg", "°"),
+    ("_rad", "rad"),
+    ("_pa", "Pa"),
+    ("_ms", "ms"),
+    ("_us", "µs"),
+    ("_s", "s"),
+    ("_n", "N"),
+    ("_m", "m"),
 ];
 
 /// Keys that are no words.
@@ -75,7 +75,7 @@ pub fn parameter(key: &str) -> String {
     };
     let bare = UNITS
         .iter()
-        .find_map(|unit| last.strip_suffix(unit))
+        .find_map(|(ending, _)| last.strip_suffix(ending))
         .unwrap_or(last);
     let index = of_which(bare, index);
     let named = NAMES.iter().find(|(name, _)| *name == bare);
@@ -95,13 +95,31 @@ pub fn parameter(key: &str) -> String {
 /// A parameter's key in words, with what it is a parameter of: `joint-1.stiffness` → `joint 1: stiffness`.
 pub fn parameter_of(key: &str) -> String {
     match key.rsplit_once('.') {
-        Some((owner, _)) => {
-            let (effect, place) = owner.split_once('@').unwrap_or((owner, ""));
-            let comma = if place.is_empty() { "" } else { ", " };
-            let owner = format!("{effect}{comma}{place}").replace('-', " ");
-            format!("{owner}: {}", parameter(key))
-        }
+        Some((owner, _)) => format!("{}: {}", at_place(owner), parameter(key)),
         None => parameter(key),
+    }
+}
+
+/// An effect with its place: `local-resonator@link-3` → `local resonator, link 3`.
+pub fn at_place(label: &str) -> String {
+    label.replace('-', " ").replace('@', ", ")
+}
+
+/// What a column of tables of many campaigns is, with its unit: `joint-1.stiffness_nm_per_rad` →
+/// `joint 1: stiffness (N·m/rad)`, `milling.Ti-6Al-4V.ktc_n_per_mm2` → `milling, Ti-6Al-4V: Ktc (N/mm²)`.
+pub fn quantity(key: &str) -> String {
+    if key == "nrms" {
+        return "error (ratio)".into();
+    }
+    let (owner, last) = key.rsplit_once('.').unwrap_or(("", key));
+    let words = match owner.split_once('.') {
+        Some((process, material)) => format!("{process}, {material}: {}", parameter(last)),
+        None => parameter_of(key),
+    };
+    let bare = last.split('[').next().unwrap_or(last);
+    match UNITS.iter().find(|(ending, _)| bare.ends_with(ending)) {
+        Some((_, unit)) => format!("{words} ({unit})"),
+        None => words,
     }
 }
 
@@ -230,6 +248,22 @@ mod tests {
         ] {
             assert_eq!(parameter_of(key), words, "{key}");
         }
+        for (key, words) in [
+            ("joint-1.stiffness_nm_per_rad", "joint 1: stiffness (N·m/rad)"),
+            (
+                "milling.Ti-6Al-4V.ktc_n_per_mm2",
+                "milling, Ti-6Al-4V: Ktc (N/mm²)",
+            ),
+            (
+                "dynamometer-resonance.frequency_hz[1]",
+                "dynamometer resonance: frequency of Fy (Hz)",
+            ),
+            ("damping-ratio", "damping ratio"),
+            ("nrms", "error (ratio)"),
+        ] {
+            assert_eq!(quantity(key), words, "{key}");
+        }
+        assert_eq!(at_place("local-resonator@link-3"), "local resonator, link 3");
     }
 
     #[test]

@@ -123,6 +123,18 @@ pub fn fingerprint(campaign: &Campaign, side: Side) -> Result<String> {
     }
 }
 
+/// Fingerprint of the content of files, in the order given; what they are called does not matter.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn files_fingerprint(files: &[impl AsRef<Path>]) -> Result<String> {
+    let mut hash = Fnv::new();
+    for file in files {
+        hash.file(file.as_ref())?;
+    }
+    Ok(hash.text())
+}
+
 /// Fingerprint of a campaign's folder as it lies on the disk, and of `options`: the text of `campaign.toml`, the revisions,
 /// and every file that it names, under its name. A campaign that cannot be loaded has one, too: a file that is not there
 /// counts as such, so that it makes a difference when it comes.

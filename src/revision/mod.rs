@@ -17,7 +17,8 @@ pub use crate::identify::model_history::{
 pub use clock::now;
 pub use evidence::{keep, recall};
 pub use fingerprint::{
-    cutting_fingerprint, fingerprint, folder_fingerprint, structure_fingerprint, text_fingerprint,
+    cutting_fingerprint, files_fingerprint, fingerprint, folder_fingerprint, structure_fingerprint,
+    text_fingerprint,
 };
 pub use folder::log_file;
 pub use lock::hold;

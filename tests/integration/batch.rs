@@ -326,7 +326,7 @@ fn a_fleet_over_nights() {
     assert_eq!(outside, [[false; 7].as_slice(), &[true]].concat());
     let html = std::fs::read_to_string(json["html"].as_str().unwrap()).unwrap();
     assert!(
-        html.contains("joint-2.stiffness_nm_per_rad is out of its limits"),
+        html.contains("joint 2: stiffness (N·m&#x2f;rad) is out of its limits"),
         "no reason on the page"
     );
     for image in json["images"].as_array().unwrap() {

@@ -10,6 +10,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::report::{assert_self_contained, json_of};
+use crate::support::blind;
 
 /// What breaks out of attributes, of scripts and of JSON, and what plotly.js would take for markup.
 const HOSTILE: &str = "p1</script><script>alert(1)</script>\"'<b>&amp;%{x}";
@@ -174,7 +175,17 @@ fn an_interactive_report_holds_every_frf_and_every_state_of_the_model() {
         }
     }
 
-    in_a_browser(&path);
+    if let Some(used) = in_a_browser(&path) {
+        assert!(used["figures"].as_u64().unwrap() >= 8, "{used}");
+        assert_eq!(used["models"], 3);
+        let errors: Vec<f64> = used["errors_percent"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|e| e.as_f64().unwrap())
+            .collect();
+        assert!(errors[0] > errors[1] && errors[1] > 5.0 * errors[2], "{errors:?}");
+    }
 }
 
 #[test]
@@ -191,7 +202,7 @@ fn a_static_report_has_no_scripts_and_the_same_images() {
 
 /// Uses the page as a reader would (`scripts/check_report.py`). Without a browser this says so and checks nothing, unless
 /// LOBESTONE_BROWSER_TEST says that there is one.
-fn in_a_browser(page: &Path) {
+fn in_a_browser(page: &Path) -> Option<Value> {
     let found = |name: &str| {
         Command::new(name)
             .arg("--version")
@@ -204,20 +215,28 @@ fn in_a_browser(page: &Path) {
             "LOBESTONE_BROWSER_TEST is set, but chromium or python3 is missing"
         );
         eprintln!("skipped: no chromium or no python3, so the report was not opened in a browser");
-        return;
+        return None;
     }
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/check_report.py");
     let output = Command::new("python3").arg(script).arg(page).output().unwrap();
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{stderr}");
-    let used: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert!(used["figures"].as_u64().unwrap() >= 8, "{used}");
-    assert_eq!(used["models"], 3);
-    let errors: Vec<f64> = used["errors_percent"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|e| e.as_f64().unwrap())
-        .collect();
-    assert!(errors[0] > errors[1] && errors[1] > 5.0 * errors[2], "{errors:?}");
+    Some(serde_json::from_slice(&output.stdout).unwrap())
+}
+
+#[test]
+fn poles_are_picked_without_a_mouse_and_files_are_named_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = blind("frf-9000").join("frf/p1.uff");
+    let [file, out] = [file.as_path(), folder.path()].map(|p| p.to_str().unwrap());
+    let json = json_of(&["modal", file, "--report", out, "--json"]);
+    let path = PathBuf::from(json["report"]["html"].as_str().unwrap());
+    let html = std::fs::read_to_string(&path).unwrap();
+    // In the header, and in the command that repeats the analysis.
+    let times = html.matches(&file.replace('/', "&#x2f;")).count();
+    assert_eq!(times, 2);
+    assert!(html.contains("FRF data"), "a fingerprint of the file");
+    if let Some(used) = in_a_browser(&path) {
+        assert!(used["picked"].as_str().unwrap().contains(" --pole "), "{used}");
+    }
 }

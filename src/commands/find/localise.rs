@@ -8,6 +8,7 @@ use crate::discrepancy::localise::{BestForm, Localisation, LocalisedPlace, local
 use crate::effects::drawn;
 use crate::identify::{Options, StructureCase};
 use crate::report::figure::DrawnCurveFigure;
+use crate::report::verdict_card::size;
 
 #[derive(clap::Args)]
 pub struct LocaliseArgs {
@@ -89,7 +90,9 @@ fn figure(place: &LocalisedPlace) -> DrawnCurveFigure {
             let of = |f: &f64| drawn::dynamic_stiffness(place.spot, b.form, &values, *f);
             frequency_hz.iter().map(of).collect()
         }),
-        form_label: best.map_or(String::new(), |b| format!("fitted: {}", b.form.label())),
+        form_label: best.map_or(String::new(), |b| {
+            format!("fitted: {}", b.form.label().replace('-', " "))
+        }),
         frequency_hz,
     }
 }
@@ -171,7 +174,9 @@ fn describe(case: &StructureCase, found: &Localisation, most: usize) -> String {
                 p.spot.label(),
                 number(p.left, 4),
                 number(p.consistency, 3),
-                p.best.as_ref().map_or("–".into(), |b| b.form.label().to_string()),
+                p.best
+                    .as_ref()
+                    .map_or("–".into(), |b| b.form.label().replace('-', " ")),
                 p.best.as_ref().map_or(String::new(), values),
                 p.tied_with.join(", "),
             ]
@@ -186,11 +191,7 @@ fn describe(case: &StructureCase, found: &Localisation, most: usize) -> String {
 }
 
 fn values(best: &BestForm) -> String {
-    let one = |e: &crate::identify::Estimate| {
-        let key = e.name.rsplit('.').next().unwrap_or(&e.name);
-        format!("{key} {} ± {}", number(e.value, 4), number(e.std_error, 2))
-    };
-    best.parameters.iter().map(one).collect::<Vec<_>>().join(", ")
+    best.parameters.iter().map(size).collect::<Vec<_>>().join(", ")
 }
 
 /// What the data draw, as a sentence without its end.

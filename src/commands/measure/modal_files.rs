@@ -8,10 +8,12 @@ use serde_json::{Value, json};
 use crate::analysis::ModalAnalysis;
 use crate::analysis::modes::modal_export::{export, scaled_modes};
 use crate::analysis::modes::shape_comparison::{ShapeComparison, compare};
+use crate::campaign::Campaign;
 use crate::commands::next_step::word;
 use crate::commands::text::table;
 use crate::ingest::read_geometry;
 use crate::report::modal_page::{self, Extras, driving_points};
+use crate::revision::{Side, files_fingerprint, fingerprint};
 use crate::{InputError, Result};
 
 /// Folders and files of the request.
@@ -95,7 +97,14 @@ pub fn write(files: &Files, analysis: &ModalAnalysis, json: &mut Value, said: &m
         json["exported"] = json!(written);
     }
     if let Some(folder) = files.report {
+        let fingerprint = match files.inputs {
+            [dir] if dir.is_dir() => Campaign::load(dir).and_then(|c| fingerprint(&c, Side::Structure)),
+            inputs => files_fingerprint(inputs),
+        };
         let extras = Extras {
+            inputs: files.inputs.iter().map(|p| p.display().to_string()).collect(),
+            // The page is worth having without it.
+            fingerprint: fingerprint.ok(),
             geometry: geometry.as_ref(),
             comparisons,
             command: files.command(),

@@ -305,7 +305,10 @@ const parsed = new Promise((done) => document.addEventListener("DOMContentLoaded
     const { top, bottom } = element.getBoundingClientRect();
     return Math.max(top - window.innerHeight, -bottom, 0);
   };
-  const due = ({ element, explorer }) => isOpen(element) && (element.dataset.explorer === undefined || !explorer.drawn);
+  /** How far ahead of the reader figures are drawn: drawing all of a long page at once would keep it from answering for seconds. */
+  const near = (part) => away(part) < 1.5 * window.innerHeight;
+  const due = (part) =>
+    isOpen(part.element) && near(part) && (part.element.dataset.explorer === undefined || !part.explorer.drawn);
   // What the reader sees comes first.
   const next = () => [...waiting].filter(due).sort((a, b) => away(a) - away(b))[0];
   const drawOpen = async () => {
@@ -334,7 +337,18 @@ const parsed = new Promise((done) => document.addEventListener("DOMContentLoaded
     }, 400);
   });
   let drawing = drawOpen();
-  document.addEventListener("toggle", () => (drawing = drawing.then(drawOpen)), true);
+  const goOn = () => (drawing = drawing.then(drawOpen));
+  document.addEventListener("toggle", goOn, true);
+  // Not on every pixel scrolled.
+  let pausing = 0;
+  const moved = () => {
+    pausing ||= setTimeout(() => {
+      pausing = 0;
+      goOn();
+    }, 100);
+  };
+  window.addEventListener("scroll", moved, { passive: true });
+  window.addEventListener("resize", moved);
   await drawing;
   document.documentElement.dataset.ready = "true";
 })().catch((error) => {

@@ -1,8 +1,10 @@
 //! The loop on the thesis' own tables: which effect they propose, and how far to trust it.
 
+use crate::identify::Estimate;
 use crate::report::figure::{ResonanceFigure, ResonanceRow};
-use crate::report::number::{decimals, format_si};
+use crate::report::number::{decimals, format_si, significant};
 use crate::report::parts::{figure, paragraph};
+use crate::report::words::{at_place, parameter};
 use crate::report::{Block, ReportTable, TableColumn};
 use crate::thesis::RealCase;
 use crate::thesis::real_case::{CONFIGURATIONS, Explanation};
@@ -16,7 +18,7 @@ pub fn blocks(case: &RealCase) -> Vec<Block> {
         case.resonances.len()
     ))];
     blocks.push(resonance_figure(case));
-    blocks.push(explanations(case));
+    blocks.extend(explanations(case));
     blocks.extend(case.answer().into_iter().map(paragraph));
     blocks.push(paragraph(format!("Caveats. {}", case.caveats().join(" "))));
     blocks
@@ -45,7 +47,7 @@ fn resonance_figure(case: &RealCase) -> Block {
     let drawing = ResonanceFigure {
         title: title.into(),
         before_label: "modes, rigid links tuned to all resonances".into(),
-        after_label: format!("modes with {}", best_name(case)),
+        after_label: format!("modes with {}", at_place(best_name(case))),
         rows: rows.collect(),
         bands_hz: bands.collect(),
     };
@@ -54,17 +56,8 @@ fn resonance_figure(case: &RealCase) -> Block {
     figure("thesis-resonances", title, caption, drawing.png())
 }
 
-fn explanations(case: &RealCase) -> Block {
+fn explanations(case: &RealCase) -> [Block; 2] {
     let row = |e: &Explanation| {
-        let parameters: Vec<String> = e
-            .parameters
-            .iter()
-            .map(|p| {
-                let name = p.name.rsplit('.').next().unwrap_or_default();
-                let unit = if p.unit == "1" { "" } else { p.unit };
-                format!("{name} {}", format_si(p.value, unit, 3))
-            })
-            .collect();
         let bands: Vec<String> = e
             .bands
             .iter()
@@ -72,21 +65,25 @@ fn explanations(case: &RealCase) -> Block {
             .collect();
         let [low, high] = e.static_ratio;
         vec![
-            e.name.clone(),
+            at_place(&e.name),
             decimals(e.delta_bic, 1),
-            format!("{:.0e}", e.p_value),
+            significant(e.p_value, 2),
             decimals(e.reduced_chi2, 1),
             decimals(e.held_out_chi2, 0),
             format!("{} of {}", e.met, case.resonances.len()),
             bands.join("; "),
             format!("{} to {}", decimals(low, 2), decimals(high, 2)),
             decimals(e.weight, 2),
-            format!(
-                "{}{}",
-                parameters.join(", "),
-                if e.at_bound { " (at its bound)" } else { "" }
-            ),
         ]
+    };
+    let sizes = |e: &Explanation| {
+        let one = |p: &Estimate| {
+            let unit = if p.unit == "1" { "" } else { p.unit };
+            format!("{} {}", parameter(&p.name), format_si(p.value, unit, 3))
+        };
+        let sizes: Vec<String> = e.parameters.iter().map(one).collect();
+        let bound = if e.at_bound { " (at its bound)" } else { "" };
+        vec![at_place(&e.name), format!("{}{bound}", sizes.join(", "))]
     };
     let bands: Vec<String> = case
         .baseline
@@ -97,10 +94,10 @@ fn explanations(case: &RealCase) -> Block {
     let mut notes: Vec<String> = case
         .not_tried
         .iter()
-        .map(|(effect, reason)| format!("Not tried: {effect} ({reason})."))
+        .map(|(effect, reason)| format!("Not tried: {} ({reason}).", at_place(effect)))
         .collect();
     notes.dedup();
-    Block::Table(ReportTable {
+    let judged = Block::Table(ReportTable {
         caption: "Explanations of the tables, best first after the rigid links".into(),
         columns: vec![
             TableColumn::text("explanation"),
@@ -112,12 +109,18 @@ fn explanations(case: &RealCase) -> Block {
             TableColumn::number(format!("of those at {}", bands.join("; "))),
             TableColumn::number("static stiffness, model / measured"),
             TableColumn::number("weight"),
-            TableColumn::text("parameters"),
         ],
         rows: std::iter::once(&case.baseline)
             .chain(&case.candidates)
             .map(row)
             .collect(),
         notes,
-    })
+    });
+    let fitted = Block::Table(ReportTable {
+        caption: "How big each would have to be".into(),
+        columns: vec![TableColumn::text("explanation"), TableColumn::text("best fit")],
+        rows: case.candidates.iter().map(sizes).collect(),
+        notes: Vec::new(),
+    });
+    [judged, fitted]
 }

@@ -3,9 +3,9 @@
 use crate::lobes::Peak;
 use crate::report::figure::{BarSeries, SideBySide};
 use crate::report::number::{decimals, format_si, percent, significant};
-use crate::report::parts::{figure, paragraph};
+use crate::report::parts::{figure, made, paragraph};
 use crate::report::sections::{real_case_section, thesis_cutting};
-use crate::report::words::listed;
+use crate::report::words::{listed, parameter_of};
 use crate::report::{Block, Page, ReportSection, ReportTable, TableColumn};
 use crate::thesis::findings::Range;
 use crate::thesis::{CaseStudy, ComparedRow, FITTED_CONFIGURATIONS, LobeTips, ThesisFindings};
@@ -15,6 +15,7 @@ pub fn page(findings: &ThesisFindings) -> Page {
     Page {
         title: "The source thesis put right".into(),
         subtitle: "ABB IRB 6640: published model, measurement and this model side by side".into(),
+        origin: made(),
         sections: vec![section(findings)],
         ..Page::default()
     }
@@ -286,7 +287,7 @@ fn parameter_table(findings: &ThesisFindings) -> Block {
     let rows = findings.study.parameters.iter().map(|p| {
         let unit = if p.unit == "1" { "" } else { p.unit };
         vec![
-            p.name.clone(),
+            parameter_of(&p.name),
             format_si(p.initial, unit, 4),
             crate::report::number::plus_minus(p.value, p.std_error, unit),
         ]

@@ -5,6 +5,7 @@ use serde_json::{Map, Value, json};
 use crate::Result;
 use crate::lobes::workspace::PlaceStatus;
 use crate::report::figure::{CellFormat, HeatMap};
+use crate::report::number::decimals;
 use crate::statistics::quantile_of_sorted;
 
 /// Shares of the usable places at which quantities are told.
@@ -168,7 +169,7 @@ pub fn picture(
         return Ok(None);
     }
     let axis_name = |axis: usize| ["x", "y", "z"][axis];
-    let text = |values: &[f64]| values.iter().map(|v| format!("{v:.3}")).collect::<Vec<_>>();
+    let text = |values: &[f64]| values.iter().map(|v| decimals(*v, 3)).collect::<Vec<_>>();
     let mut row_names = text(rows);
     row_names.reverse();
     let rest: String = [0, 1, 2]

@@ -248,7 +248,6 @@ fn stated_errors_hold_the_truth() {
 }
 
 #[test]
-#[ignore = "takes minutes"]
 fn stated_errors_hold_the_truth_in_thousands() {
     errors_are_honest(400, 0.02);
 }

@@ -206,8 +206,11 @@ fn the_thesis_put_right() {
     // The whole page, but for the pixels and the hour.
     let words = |folder: &Path| {
         let page = read(&folder.join("report.html"));
-        let today_only = |line: &&str| line.contains("<img") || line.contains("<span>made ");
-        let lines: Vec<&str> = page.lines().filter(|l| !today_only(l)).collect();
+        let (before, made) = page
+            .split_once("<span>made ")
+            .expect("the page says when it was made");
+        let page = format!("{before}{}", made.split_once(" UTC</span>").unwrap().1);
+        let lines: Vec<&str> = page.lines().filter(|l| !l.contains("<img")).collect();
         lines.join("\n")
     };
     let today = sample.copies[0].path().join("page");

@@ -264,8 +264,8 @@ pub(crate) struct SolvedFrf {
     pub own: Vec<(Matrix2<f64>, Vector2<f64>)>,
 }
 
-/// Factor of the first `columns` of a Gram matrix (its lower triangle), of columns of unit length, and 1/length of each. From column `held` on
-/// they are those of poles that are not moved and of the residual terms.
+/// Factor of the first `columns` of a Gram matrix (its lower triangle), of columns of unit length, and 1/length of each. From
+/// column `held` on they are those of poles that are not moved and of the residual terms.
 pub(crate) fn unit_cholesky(
     gram: &DMatrix<f64>,
     columns: usize,

@@ -139,16 +139,13 @@ pub(crate) fn collect(
                 moving += usize::from(moves.significant);
                 if moves.significant {
                     (frequency_hz, damping_ratio) = (moves.pole.frequency_hz, moves.pole.damping_ratio);
-                    let apart = [
-                        frequency_hz - pole.frequency_hz,
-                        damping_ratio - pole.damping_ratio,
-                    ];
+                    let between = between(moves.pole, *pole);
                     frequency_std_hz = (small_set * moves.std[0])
                         .max(scatter[0].std * pole.frequency_hz)
-                        .hypot(BETWEEN * apart[0]);
+                        .hypot(between[0]);
                     damping_std = (small_set * moves.std[1])
                         .max(scatter[1].std * pole.damping_ratio)
-                        .hypot(BETWEEN * apart[1]);
+                        .hypot(between[1]);
                 }
             }
             let common = Pole {
@@ -159,12 +156,9 @@ pub(crate) fn collect(
                 own_places::elsewhere(members, common, [frequency_std_hz, damping_std], &others)
             {
                 (frequency_hz, damping_ratio) = (own.pole.frequency_hz, own.pole.damping_ratio);
-                let apart = [
-                    frequency_hz - common.frequency_hz,
-                    damping_ratio - common.damping_ratio,
-                ];
-                frequency_std_hz = (small_set * own.std[0]).hypot(BETWEEN * apart[0]);
-                damping_std = (small_set * own.std[1]).hypot(BETWEEN * apart[1]);
+                let between = between(own.pole, common);
+                frequency_std_hz = (small_set * own.std[0]).hypot(between[0]);
+                damping_std = (small_set * own.std[1]).hypot(between[1]);
                 elsewhere_hz.push(frequency_hz);
             }
             if lines_in_half_power_band < LEAKAGE_BELOW_LINES {
@@ -283,6 +277,11 @@ pub(crate) fn collect(
         };
         result.quality = quality::judge_set(&found);
     }
+}
+
+/// What two answers leave open of a mode (frequency, Hz; damping ratio).
+fn between(a: Pole, b: Pole) -> [f64; 2] {
+    [a.frequency_hz - b.frequency_hz, a.damping_ratio - b.damping_ratio].map(|apart| BETWEEN * apart)
 }
 
 /// How the FRFs scatter about a common pole (frequency, damping ratio), where that is beyond `noise` (relative): the model

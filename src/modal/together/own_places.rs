@@ -4,7 +4,7 @@
 use crate::modal::settings::SET;
 use crate::modal::single::local_fit::Pole;
 use crate::modal::together::set_member::SetMember;
-use crate::modal::together::verify::mean_over_frfs;
+use crate::modal::together::verify::mean_pole;
 
 /// A neighbour nearer than so many sums of the half-widths may stand in the same peak …
 const ISOLATED_WIDTHS: f64 = 3.0;
@@ -65,27 +65,20 @@ pub(super) fn elsewhere(
     if own.len() < SET || 2 * own.len() < members.len() {
         return None;
     }
-    let (frequency_hz, frequency_std_hz) = mean_over_frfs(&own, |(p, std)| (p.frequency_hz, std[0]));
-    let (damping_ratio, damping_std) = mean_over_frfs(&own, |(p, std)| (p.damping_ratio, std[1]));
+    let (pole, own_std) = mean_pole(&own);
     let apart = |difference: f64, stds: [f64; 2], width: f64| {
         difference.abs() > (APART * stds[0].hypot(stds[1])).max(APART_WIDTHS * width)
     };
     let contradicts = apart(
-        frequency_hz - common.frequency_hz,
-        [frequency_std_hz, std[0]],
+        pole.frequency_hz - common.frequency_hz,
+        [own_std[0], std[0]],
         own_width_hz,
     ) || apart(
-        damping_ratio - common.damping_ratio,
-        [damping_std, std[1]],
+        pole.damping_ratio - common.damping_ratio,
+        [own_std[1], std[1]],
         common.damping_ratio,
     );
-    contradicts.then_some(OwnPlace {
-        pole: Pole {
-            frequency_hz,
-            damping_ratio,
-        },
-        std: [frequency_std_hz, damping_std],
-    })
+    contradicts.then_some(OwnPlace { pole, std: own_std })
 }
 
 #[cfg(test)]

@@ -511,7 +511,7 @@ pub(crate) fn own_poles(data: &[Data], pole: Pole, others: &[Pole]) -> Option<Ve
 /// Mean of what each FRF says (value, standard deviation), and its standard deviation from how they scatter about it. Each
 /// counts by its own uncertainty and by how far all of them lie apart beyond that (random effects: DerSimonian & Laird
 /// 1986): one that hardly shows the mode does not decide.
-pub(super) fn mean_over_frfs<T>(own: &[T], of: impl Fn(&T) -> (f64, f64)) -> (f64, f64) {
+fn mean_over_frfs<T>(own: &[T], of: impl Fn(&T) -> (f64, f64)) -> (f64, f64) {
     let values: Vec<(f64, f64)> = own.iter().map(of).collect();
     let median =
         |of: &dyn Fn(&(f64, f64)) -> f64| crate::signal::median(&values.iter().map(of).collect::<Vec<f64>>());
@@ -531,6 +531,17 @@ pub(super) fn mean_over_frfs<T>(own: &[T], of: impl Fn(&T) -> (f64, f64)) -> (f6
         .map(|(value, std)| ((value - mean) / (std * std + between)).powi(2))
         .sum();
     (mean, (scatter * count / (count - 1.0)).sqrt() / total)
+}
+
+/// [`mean_over_frfs`] of poles with the standard deviations of their frequencies (Hz) and damping ratios.
+pub(super) fn mean_pole(own: &[(Pole, [f64; 2])]) -> (Pole, [f64; 2]) {
+    let (frequency_hz, frequency_std_hz) = mean_over_frfs(own, |(p, std)| (p.frequency_hz, std[0]));
+    let (damping_ratio, damping_std) = mean_over_frfs(own, |(p, std)| (p.damping_ratio, std[1]));
+    let pole = Pole {
+        frequency_hz,
+        damping_ratio,
+    };
+    (pole, [frequency_std_hz, damping_std])
 }
 
 /// [`Solution::own_step`] of each FRF that tells, standard deviations for noise as large as the fit leaves.
@@ -644,16 +655,12 @@ pub(crate) fn moves(
     let spread = 1.4826 * median(&|o| (o.0.frequency_hz - middle).abs());
     let uncertain = median(&|o| o.1[0]);
     let scatter = (spread * spread - uncertain * uncertain).max(0.0).sqrt() / middle;
-    let (frequency_hz, frequency_std_hz) = mean_over_frfs(&own, |o| (o.0.frequency_hz, o.1[0]));
-    let (damping_ratio, damping_std) = mean_over_frfs(&own, |o| (o.0.damping_ratio, o.1[1]));
+    let (mean, std) = mean_pole(&own);
     Some(Moves {
         scatter,
         significant: spread > BEYOND * uncertain && scatter > OF_WIDTH * pole.damping_ratio,
-        pole: Pole {
-            frequency_hz,
-            damping_ratio,
-        },
-        std: [frequency_std_hz, damping_std],
+        pole: mean,
+        std,
     })
 }
 

@@ -306,7 +306,8 @@ pub fn inspected(files: &[(&Path, &'static str)]) -> String {
     if !has("frf") && !has("force") {
         let words: Vec<String> = paths.iter().map(|p| word(p)).collect();
         return format!(
-            "if this is a tap test (hammer and sensor), run `lobestone modal {}`",
+            "if this is a tap test (hammer and sensor), run `lobestone modal {}`; with --output-only if no force was recorded \
+             (idling, cutting)",
             words.join(" ")
         );
     }

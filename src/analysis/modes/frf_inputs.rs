@@ -174,7 +174,10 @@ fn hammer<'a>(record: &'a TimeRecord, path: &Path) -> Result<&'a Channel> {
                     names.join(", ")
                 ))
                 .file(path)
-                .remedy("give the hammer's channel the unit N, or call it force; cutting forces go to `lobestone cfc`")
+                .remedy(
+                    "give the hammer's channel the unit N, or call it force; cutting forces go to `lobestone cfc`, motion without any \
+                     force (idling, cutting) to `lobestone modal --output-only`",
+                )
                 .into()),
             }
         }

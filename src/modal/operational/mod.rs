@@ -17,6 +17,7 @@ use crate::{InputError, Result};
 
 mod chains;
 mod correlation;
+mod event;
 mod harmonics;
 mod mode;
 mod record;
@@ -66,8 +67,8 @@ pub struct OperationalModes {
 /// Modes from responses alone.
 ///
 /// # Errors
-/// Channels of different length or with values that are not finite, a channel without any motion, a record too short,
-/// a band outside what was sampled.
+/// Channels of different length or with values that are not finite, a channel without any motion, a record too short or whose motion
+/// is one brief event, a band outside what was sampled.
 pub fn operational_modes(
     record: &OperationalRecord,
     settings: &OperationalSettings,
@@ -91,6 +92,19 @@ pub fn operational_modes(
         sample_rate_hz: rate_hz,
         ..OperationalModes::default()
     };
+    if let Some(event) = event::one_event(&channels) {
+        let seconds = channels.first().map_or(0, Vec::len) as f64 / rate_hz;
+        return Err(InputError::new(format!(
+            "the motion is one event: nearly all of it lies between {:.2} and {:.2} s of {seconds:.2} s (a release, a drop, a single hit)",
+            event[0] * seconds,
+            event[1] * seconds
+        ))
+        .remedy(
+            "modes from responses alone need motion that lasts: leave the quiet part out of the file if the machine ran only then; for \
+             a hit, record the hammer's force as well and run `lobestone modal` without --output-only",
+        )
+        .into());
+    }
     result.harmonics = harmonics::take_out(&mut channels, rate_hz, band_hz, settings.spindle_rpm);
     let scale: Vec<f64> = channels.iter().map(|c| rms(c)).collect();
     if let Some(still) = scale.iter().position(|s| !(*s > 0.0)) {

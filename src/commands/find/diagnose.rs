@@ -417,7 +417,8 @@ fn rest<D: Modelled>(d: &Diagnosis<D>, next_measurement: &NextMeasurement) -> St
         })
         .collect();
     for c in d.candidates.iter().take(SHOWN) {
-        if let Some(why) = &c.not_credible {
+        // Of what is not there no size need be told.
+        if let Some(why) = c.not_credible.as_ref().filter(|_| !c.vanished) {
             text += &wrapped(&format!("Not {}: {why}.", c.label()), "  ");
         }
     }

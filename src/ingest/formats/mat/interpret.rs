@@ -188,7 +188,7 @@ fn tables(
         notes.about(&variable.name, format!("its first column is taken as {what}"));
     }
     for (variable, axis, values) in coherences {
-        attach(variable, axis, &values, variables, contents, notes);
+        attach(variable, "", axis, &values, variables, contents, notes);
     }
     Ok(())
 }
@@ -358,7 +358,7 @@ fn frequency_functions(
     notes: &mut Notes,
 ) -> Result<(), InputError> {
     let axes = frequency_axes(variables, used, budget, notes)?;
-    let mut coherences: Vec<(&Variable, Vec<usize>, &Axis)> = Vec::new();
+    let mut coherences: Vec<(&Variable, String, Vec<usize>, &Axis)> = Vec::new();
     for axis in &axes {
         for k in 0..variables.len() {
             let variable = &variables[k];
@@ -385,7 +385,7 @@ fn frequency_functions(
                             record(variable, format!("{}{suffix}", variable.name), &axis.hz, value());
                         contents.frfs.extend(checks::tidy_frf(record, notes)?);
                     }
-                    Kind::Coherence => coherences.push((variable, at, axis)),
+                    Kind::Coherence => coherences.push((variable, suffix, at, axis)),
                     Kind::Other(kind) => contents.others.push(OtherRecord {
                         kind,
                         name: format!("{}{suffix}", variable.name),
@@ -399,9 +399,9 @@ fn frequency_functions(
             }
         }
     }
-    for (variable, at, axis) in coherences {
+    for (variable, suffix, at, axis) in coherences {
         let values: Vec<f64> = at.iter().map(|&i| variable.re[i]).collect();
-        attach(variable, &axis.hz, &values, variables, contents, notes);
+        attach(variable, &suffix, &axis.hz, &values, variables, contents, notes);
     }
     let finite =
         |o: &OtherRecord| o.value.iter().all(|v| v.is_finite()) && o.abscissa.iter().all(|v| v.is_finite());
@@ -415,9 +415,11 @@ fn frequency_functions(
     Ok(())
 }
 
-/// A coherence goes to the FRF with the same name but for that word (`H1_2` and `C1_2`), or to the only one there is.
+/// A coherence goes to the FRF with the same name but for that word (`H1_2` and `C1_2`), to the only one there is, or, where one array
+/// of FRFs is as large as that of the coherences, to the same row or column (`suffix`) of it.
 fn attach(
     variable: &Variable,
+    suffix: &str,
     axis_hz: &[f64],
     values: &[f64],
     variables: &[Variable],
@@ -428,10 +430,17 @@ fn attach(
     let bare: Vec<String> = variable.words().into_iter().filter(word).collect();
     let digits = |v: &Variable| v.is_analyser_name().then(|| v.own_name()[1..].to_owned());
     let only = contents.frfs.len() == 1;
+    let mut as_large = variables
+        .iter()
+        .filter(|v| matches!(kind(v), Kind::Frf) && v.size == variable.size);
+    let beside = as_large
+        .next()
+        .filter(|_| as_large.next().is_none() && !suffix.is_empty())
+        .map(|v| format!("{}{suffix}", v.name));
     let frf = contents.frfs.iter_mut().find(|frf| {
         let source = variables.iter().find(|v| v.name == frf.name);
         let same = |s: &Variable| s.words() == bare || digits(s).is_some() && digits(s) == digits(variable);
-        frf.coherence.is_none() && (only || source.is_some_and(same))
+        frf.coherence.is_none() && (only || source.is_some_and(same) || beside.as_ref() == Some(&frf.name))
     });
     match frf {
         Some(frf) => {

@@ -45,6 +45,30 @@ fn frfs_are_complex_arrays_along_the_frequencies_and_find_their_coherence() {
 }
 
 #[test]
+fn an_array_of_coherences_goes_to_the_array_of_frfs_that_is_as_large() {
+    let mut frf = real("frf", &[6, 2], count(12));
+    frf.im = Some(vec![0.5; 12]);
+    let values = [vec![0.9; 6], vec![0.4; 6]].concat();
+    let cohe = real("cohe", &[6, 2], values);
+    let freq = real("freq", &[6, 1], count(6));
+    let (one, warnings) = found(vec![freq.clone(), frf.clone(), cohe.clone()]);
+    assert_eq!(one.frfs[0].coherence.as_deref(), Some(&[0.9; 6][..]));
+    assert_eq!(one.frfs[1].coherence.as_deref(), Some(&[0.4; 6][..]));
+    assert!(!warnings.iter().any(|w| w.contains("cohe")), "{warnings:?}");
+    // Of two arrays that are as large, neither.
+    let other = Variable {
+        name: "other".into(),
+        ..frf.clone()
+    };
+    let (two, warnings) = found(vec![freq, frf, other, cohe]);
+    assert!(two.frfs.iter().all(|f| f.coherence.is_none()));
+    assert!(
+        warnings.iter().any(|w| w.contains("belongs to no FRF")),
+        "{warnings:?}"
+    );
+}
+
+#[test]
 fn signals_are_real_arrays_along_the_times_or_at_a_rate() {
     let t: Vec<f64> = count(8).iter().map(|k| f64::from((0.1 * k) as f32)).collect();
     let all = vec![

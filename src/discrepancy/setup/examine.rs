@@ -14,6 +14,7 @@ use super::reading::{FileReading, model_read};
 use super::score::Linearised;
 use super::{mistakes, readings, slips};
 use crate::Result;
+use crate::data::Point;
 use crate::identify::frfs::calibrate::{Options, calibrate};
 use crate::identify::frfs::frf_data::FrfData;
 use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
@@ -55,6 +56,8 @@ const READ: usize = 6;
 const PLAIN_READING: f64 = 0.1;
 /// Relative standard deviation of the noise's variance as the lines of FRFs against one another show it.
 const NOISE_KNOWN_TO: f64 = 0.05;
+/// Relative difference of χ² below which two readings of one kind do the same to the data.
+const SAME_CHANGE: f64 = 1e-6;
 /// Trials that are fitted to all data.
 const REFINED: usize = 3;
 
@@ -82,10 +85,27 @@ struct Trial<'a> {
 }
 
 impl Trial<'_> {
+    /// Mistakes of the same sort that are looked at; 0 for those with a size, of which each group is one.
+    fn tried(&self) -> f64 {
+        match &self.cause {
+            Cause::Size(..) => 0.0,
+            Cause::Read(reading) => reading.tried(),
+        }
+    }
+
     /// χ² with what a parameter has to pay for.
     fn price(&self, values: usize) -> f64 {
         self.chi2 + self.parameters as f64 * (values as f64).ln()
     }
+}
+
+/// Two names for one reading of the data.
+fn same_change(a: &Trial, b: &Trial, data: &FrfData, points: &[Point]) -> bool {
+    let (Cause::Read(one), Cause::Read(other)) = (&a.cause, &b.cause) else {
+        return false;
+    };
+    (a.chi2 - b.chi2).abs() <= SAME_CHANGE * a.chi2.min(b.chi2)
+        && one.finding(data, points).kind == other.finding(data, points).kind
 }
 
 /// Tries the mistakes on `model` at `theta`, its optimum on `data`. `beyond_slips`: what small errors take there, where that is
@@ -116,7 +136,21 @@ pub fn examine(
     let read = proposed(model, &thin, theta)?;
     trials.extend(read_trials(model, &thin, theta, &read, base)?);
     trials.retain(|t| 2.0 * base - t.chi2 > LEAST_GAIN);
-    trials.sort_by(|a, b| a.price(values).total_cmp(&b.price(values)));
+    trials.sort_by(|a, b| {
+        let by_price = a.price(values).total_cmp(&b.price(values));
+        by_price.then(a.tried().total_cmp(&b.tried()))
+    });
+    // Two readings that do the same to the data (sensor or hammer of the other polarity) take one place: that of the simpler one.
+    let mut different: Vec<Trial> = Vec::with_capacity(trials.len());
+    for trial in trials {
+        if !different
+            .iter()
+            .any(|other| same_change(other, &trial, &thin, &model.points))
+        {
+            different.push(trial);
+        }
+    }
+    let trials = different;
     let full_base = 2.0 * cost(model, data, theta)?;
     check.reduced_chi2 = full_base / (2 * data.value_count()) as f64;
     let tried: Vec<TriedMistake> = trials

@@ -4,7 +4,7 @@ use num_complex::Complex64;
 
 use super::diagnosis::rival;
 use super::side::CampaignSide;
-use super::structure::study_of;
+use super::structure::{measured_start, study_of};
 use super::workbench::Workbench;
 use crate::Result;
 use crate::campaign::Campaign;
@@ -68,9 +68,8 @@ impl CampaignSide for Structure {
     fn setup(case: &StructureCase, diagnosis: &Diagnosis<Structure>) -> Result<SetupCheck> {
         let baseline = &diagnosis.baseline;
         let slips = baseline.rest.beyond_slips.as_ref();
-        examine(&case.model, &case.data, &baseline.theta, slips, || {
-            rival(diagnosis, |_| true)
-        })
+        let (measured, rival) = (|| measured_start(case), || rival(diagnosis, |_| true));
+        examine(&case.model, &case.data, &baseline.theta, slips, measured, rival)
     }
 
     /// Kept where one place explains more than chance.

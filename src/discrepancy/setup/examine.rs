@@ -56,6 +56,10 @@ const READ: usize = 6;
 const PLAIN_READING: f64 = 0.1;
 /// Relative standard deviation of the noise's variance as the lines of FRFs against one another show it.
 const NOISE_KNOWN_TO: f64 = 0.05;
+/// Share of χ² below which a reading has explained nearly all …
+const NEARLY_ALL: f64 = 0.1;
+/// … and χ² per value from which on more than noise is left.
+const LEFT_OVER: f64 = 1.1;
 /// Relative difference of χ² below which two readings of one kind do the same to the data.
 const SAME_CHANGE: f64 = 1e-6;
 /// Trials that are fitted to all data.
@@ -109,7 +113,8 @@ fn same_change(a: &Trial, b: &Trial, data: &FrfData, points: &[Point]) -> bool {
 }
 
 /// Tries the mistakes on `model` at `theta`, its optimum on `data`. `beyond_slips`: what small errors take there, where that is
-/// known already. `rival` is asked for only where something is found.
+/// known already. `measured` (a starting point of the model that the measured modes give, solver's scale) and `rival` are asked for only
+/// where they are needed.
 ///
 /// # Errors
 /// A model without a response.
@@ -118,6 +123,7 @@ pub fn examine(
     data: &FrfData,
     theta: &[f64],
     beyond_slips: Option<&BeyondSlips>,
+    measured: impl FnOnce() -> Option<Vec<f64>>,
     rival: impl FnOnce() -> Option<Rival>,
 ) -> Result<SetupCheck> {
     let mut check = SetupCheck {
@@ -134,7 +140,11 @@ pub fn examine(
     let all = mistakes::all(model, &thin);
     let mut trials = sized(&here, &all)?;
     let read = proposed(model, &thin, theta)?;
-    trials.extend(read_trials(model, &thin, theta, &read, base)?);
+    let starts = Starts {
+        theta,
+        measured: if read.is_empty() { None } else { measured() },
+    };
+    trials.extend(read_trials(model, &thin, &starts, &read, base)?);
     trials.retain(|t| 2.0 * base - t.chi2 > LEAST_GAIN);
     trials.sort_by(|a, b| {
         let by_price = a.price(values).total_cmp(&b.price(values));
@@ -158,7 +168,7 @@ pub fn examine(
         .take(REFINED)
         .collect::<Vec<_>>()
         .par_iter()
-        .filter_map(|t| refined(model, data, t).ok())
+        .filter_map(|t| refined(model, data, t, &starts, full_base).ok())
         .collect();
     let rivals = || Rivals {
         library: rival(),
@@ -268,11 +278,19 @@ fn proposed(model: &StructureModel, thin: &FrfData, theta: &[f64]) -> Result<Vec
     readings::proposed(model, thin, &[theta, &nominal], READ)
 }
 
-/// Readings with the baseline fitted anew, from where it stood and from the nominal values.
+/// Where fits of readings begin, besides the nominal values.
+struct Starts<'a> {
+    /// Where the model stood.
+    theta: &'a [f64],
+    /// Where the measured modes put it: most readings leave those where they are.
+    measured: Option<Vec<f64>>,
+}
+
+/// Readings with the baseline fitted anew, from where it stood, from the nominal values and from the measured modes.
 fn read_trials<'a>(
     model: &StructureModel,
     thin: &FrfData,
-    theta: &[f64],
+    starts: &Starts,
     read: &'a [readings::Proposed],
     base: f64,
 ) -> Result<Vec<Trial<'a>>> {
@@ -282,7 +300,7 @@ fn read_trials<'a>(
             let reading = proposed.reading.as_ref();
             let data = reading.corrected(thin);
             let read = model_read(model, reading);
-            let near = minimise(&problem(&read, &data), theta, &read.bounds(), ROUGH).ok()?;
+            let near = minimise(&problem(&read, &data), starts.theta, &read.bounds(), ROUGH).ok()?;
             let mut best = (near.cost, near.theta);
             // Where the baseline was led astray its old place is no start.
             let far = near.cost > 1.5 * data.value_count() as f64;
@@ -291,7 +309,7 @@ fn read_trials<'a>(
                     extra_starts: 0,
                     ..Options::default()
                 };
-                if let Ok(fresh) = calibrate(&read, &data, None, options) {
+                if let Ok(fresh) = calibrate(&read, &data, starts.measured.as_deref(), options) {
                     let cost = cost(&read, &data, &fresh.theta).ok()?;
                     if cost < best.0 {
                         best = (cost, fresh.theta);
@@ -309,17 +327,31 @@ fn read_trials<'a>(
     Ok(trials.into_iter().flatten().collect())
 }
 
-/// A trial on all data.
-fn refined(model: &StructureModel, data: &FrfData, trial: &Trial) -> Result<TriedMistake> {
+/// A trial on all data. `base`: χ² of the model as it stands there.
+fn refined(
+    model: &StructureModel,
+    data: &FrfData,
+    trial: &Trial,
+    starts: &Starts,
+    base: f64,
+) -> Result<TriedMistake> {
     let freedom = 2.0 * data.value_count() as f64;
     match &trial.cause {
         Cause::Read(reading) => {
             let corrected = reading.corrected(data);
             let read = model_read(model, *reading);
             let fit = minimise(&problem(&read, &corrected), &trial.theta, &read.bounds(), FINE)?;
+            let mut chi2 = 2.0 * fit.cost;
+            // What explains nearly all and leaves more than noise may stand beside its optimum: it is sought as the model's was.
+            if chi2 < NEARLY_ALL * base && chi2 > LEFT_OVER * freedom {
+                let measured = starts.measured.as_deref();
+                if let Ok(fresh) = calibrate(&read, &corrected, measured, Options::default()) {
+                    chi2 = chi2.min(2.0 * cost(&read, &corrected, &fresh.theta)?);
+                }
+            }
             Ok(TriedMistake {
                 finding: reading.finding(data, &model.points),
-                chi2: 2.0 * fit.cost,
+                chi2,
                 parameters: 0,
                 tried: reading.tried(),
                 at_bound: false,

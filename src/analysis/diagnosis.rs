@@ -76,7 +76,7 @@ impl<D: CampaignSide> Findings<D> {
     pub fn of(campaign: &Campaign, case: Case<D>, options: Options) -> Result<Self> {
         let study = D::study(&case, options);
         let mut diagnosis = diagnose(&study, &case.model)?;
-        let setup = D::setup(&case, &diagnosis)?;
+        let setup = D::setup(&case, &study, &diagnosis)?;
         heed_setup(&mut diagnosis, &setup);
         let now = D::view(&case, &case.model, &diagnosis.baseline.theta)?;
         let lead = match is_unnamed(&diagnosis, &setup) {

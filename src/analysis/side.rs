@@ -57,7 +57,7 @@ pub trait CampaignSide: Modelled {
     ///
     /// # Errors
     /// A model that does not respond.
-    fn setup(case: &Case<Self>, diagnosis: &Diagnosis<Self>) -> Result<SetupCheck>;
+    fn setup(case: &Case<Self>, study: &Self::Study, diagnosis: &Diagnosis<Self>) -> Result<SetupCheck>;
 
     /// Where what has no name sits and what it does; `None` where nothing can be said of it.
     ///

@@ -113,29 +113,23 @@ impl StructureAnalysis {
     /// A model without a response.
     pub fn setup_check(&self) -> Result<SetupCheck> {
         let (model, data, theta) = (&self.case.model, &self.case.data, &self.calibration.theta);
-        let measured = || self.start.as_ref().map(|s| s.theta.clone());
-        examine(model, data, theta, None, measured, || {
-            library_rival(model, data, theta)
-        })
+        let measured = self.start.as_ref().map(|s| s.theta.as_slice());
+        let rival = || library_rival(model, data, theta);
+        examine(model, data, theta, None, measured, rival)
     }
 }
 
 /// The case as the loop works on it, with the same starting points as [`StructureAnalysis`] has: one model of one set of
 /// data has one optimum, whichever command asks for it.
 pub fn study_of(case: &StructureCase, options: Options) -> StructureStudy {
-    let study = case.study(options).with_measured(measured_start(case));
-    study.with_slips(absorb_slips)
-}
-
-/// The starting point that the measured modes give, solver's scale; `None` where a revision gave one, or there are no modes.
-pub fn measured_start(case: &StructureCase) -> Option<Vec<f64>> {
     let modal = match case.model.start() {
         Some(_) => None,
         None => modes_to_start_from(case),
     };
     // Modes that lead nowhere are no reason to give up.
     let start = modal.and_then(|modal| start_of_modes(case, &modal).ok().flatten());
-    start.map(|s| s.theta)
+    let study = case.study(options).with_measured(start.map(|s| s.theta));
+    study.with_slips(absorb_slips)
 }
 
 /// FRFs of a posture that show the modes well enough to start from.

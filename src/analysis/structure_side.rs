@@ -4,7 +4,7 @@ use num_complex::Complex64;
 
 use super::diagnosis::rival;
 use super::side::CampaignSide;
-use super::structure::{measured_start, study_of};
+use super::structure::study_of;
 use super::workbench::Workbench;
 use crate::Result;
 use crate::campaign::Campaign;
@@ -65,11 +65,17 @@ impl CampaignSide for Structure {
         Explained::new(&case.data, &case.model.points, &now.predicted, &with.predicted)
     }
 
-    fn setup(case: &StructureCase, diagnosis: &Diagnosis<Structure>) -> Result<SetupCheck> {
+    fn setup(
+        case: &StructureCase,
+        study: &StructureStudy,
+        diagnosis: &Diagnosis<Structure>,
+    ) -> Result<SetupCheck> {
         let baseline = &diagnosis.baseline;
         let slips = baseline.rest.beyond_slips.as_ref();
-        let (measured, rival) = (|| measured_start(case), || rival(diagnosis, |_| true));
-        examine(&case.model, &case.data, &baseline.theta, slips, measured, rival)
+        let (model, data, theta) = (&case.model, &case.data, &baseline.theta);
+        examine(model, data, theta, slips, study.measured(), || {
+            rival(diagnosis, |_| true)
+        })
     }
 
     /// Kept where one place explains more than chance.

@@ -63,7 +63,11 @@ impl CampaignSide for Cutting {
     fn explained(_case: &CuttingCase, _now: &CuttingView, _with: &CuttingView) {}
 
     /// With effects in the model what they took up may be what is wrong: nothing is sought then.
-    fn setup(case: &CuttingCase, diagnosis: &Diagnosis<Cutting>) -> Result<SetupCheck> {
+    fn setup(
+        case: &CuttingCase,
+        _study: &CuttingStudy,
+        diagnosis: &Diagnosis<Cutting>,
+    ) -> Result<SetupCheck> {
         match case.model.effects().is_empty() {
             true => examine_cutting(&case.data, || rival(diagnosis, is_possible)),
             false => Ok(SetupCheck::default()),

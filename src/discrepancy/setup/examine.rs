@@ -11,10 +11,9 @@ use super::fit::JointProblem;
 use super::group::FrfGroup;
 use super::mistake::{Estimated, Mistake};
 use super::reading::{FileReading, model_read};
-use super::score::Linearised;
+use super::score::{Linearised, Score};
 use super::{mistakes, readings, slips};
 use crate::Result;
-use crate::data::Point;
 use crate::identify::frfs::calibrate::{Options, calibrate};
 use crate::identify::frfs::frf_data::FrfData;
 use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
@@ -48,8 +47,10 @@ const THIN_VALUES: usize = 4000;
 const MOST_VALUES: usize = 240_000;
 /// Decrease of χ² below which nothing is followed.
 const LEAST_GAIN: f64 = 30.0;
-/// Mistakes with a size that are fitted to the end on few lines.
+/// Mistakes with a size that are fitted to the end on few lines, from where the model stands …
 const FITTED: usize = 6;
+/// … and from other places, where it may have been led astray: there the model is no optimum, and the order of promises a rough one.
+const FITTED_ELSEWHERE: usize = 24;
 /// Readings that are fitted, for each starting point of the model.
 const READ: usize = 6;
 /// Share of all disagreement from which on a reading is fitted from the nominal values, too.
@@ -60,8 +61,6 @@ const NOISE_KNOWN_TO: f64 = 0.05;
 const NEARLY_ALL: f64 = 0.1;
 /// … and χ² per value from which on more than noise is left.
 const LEFT_OVER: f64 = 1.1;
-/// Relative difference of χ² below which two readings of one kind do the same to the data.
-const SAME_CHANGE: f64 = 1e-6;
 /// Trials that are fitted to all data.
 const REFINED: usize = 3;
 
@@ -89,32 +88,15 @@ struct Trial<'a> {
 }
 
 impl Trial<'_> {
-    /// Mistakes of the same sort that are looked at; 0 for those with a size, of which each group is one.
-    fn tried(&self) -> f64 {
-        match &self.cause {
-            Cause::Size(..) => 0.0,
-            Cause::Read(reading) => reading.tried(),
-        }
-    }
-
     /// χ² with what a parameter has to pay for.
     fn price(&self, values: usize) -> f64 {
         self.chi2 + self.parameters as f64 * (values as f64).ln()
     }
 }
 
-/// Two names for one reading of the data.
-fn same_change(a: &Trial, b: &Trial, data: &FrfData, points: &[Point]) -> bool {
-    let (Cause::Read(one), Cause::Read(other)) = (&a.cause, &b.cause) else {
-        return false;
-    };
-    (a.chi2 - b.chi2).abs() <= SAME_CHANGE * a.chi2.min(b.chi2)
-        && one.finding(data, points).kind == other.finding(data, points).kind
-}
-
 /// Tries the mistakes on `model` at `theta`, its optimum on `data`. `beyond_slips`: what small errors take there, where that is
-/// known already. `measured` (a starting point of the model that the measured modes give, solver's scale) and `rival` are asked for only
-/// where they are needed.
+/// known already. `measured`: a starting point of the model that the measured modes give, solver's scale. `rival` is asked for only where
+/// something is found.
 ///
 /// # Errors
 /// A model without a response.
@@ -123,7 +105,7 @@ pub fn examine(
     data: &FrfData,
     theta: &[f64],
     beyond_slips: Option<&BeyondSlips>,
-    measured: impl FnOnce() -> Option<Vec<f64>>,
+    measured: Option<&[f64]>,
     rival: impl FnOnce() -> Option<Rival>,
 ) -> Result<SetupCheck> {
     let mut check = SetupCheck {
@@ -134,33 +116,19 @@ pub fn examine(
     let data = &*enough(whole);
     let share = data.value_count() as f64 / whole.value_count() as f64;
     let thin = thinned(data);
-    let here = Linearised::new(model, &thin, theta)?;
     let values = 2 * thin.value_count();
     let base = cost(model, &thin, theta)?;
     let all = mistakes::all(model, &thin);
-    let mut trials = sized(&here, &all)?;
-    let read = proposed(model, &thin, theta)?;
-    let starts = Starts {
-        theta,
-        measured: if read.is_empty() { None } else { measured() },
+    let nominal = model.nominal_theta();
+    let elsewhere: Vec<&[f64]> = match led_astray(base, &thin) {
+        true => [Some(&*nominal), measured].into_iter().flatten().collect(),
+        false => Vec::new(),
     };
-    trials.extend(read_trials(model, &thin, &starts, &read, base)?);
+    let mut trials = sized(model, &thin, theta, &elsewhere, &all)?;
+    let read = proposed(model, &thin, theta)?;
+    trials.extend(read_trials(model, &thin, theta, measured, &read, base)?);
     trials.retain(|t| 2.0 * base - t.chi2 > LEAST_GAIN);
-    trials.sort_by(|a, b| {
-        let by_price = a.price(values).total_cmp(&b.price(values));
-        by_price.then(a.tried().total_cmp(&b.tried()))
-    });
-    // Two readings that do the same to the data (sensor or hammer of the other polarity) take one place: that of the simpler one.
-    let mut different: Vec<Trial> = Vec::with_capacity(trials.len());
-    for trial in trials {
-        if !different
-            .iter()
-            .any(|other| same_change(other, &trial, &thin, &model.points))
-        {
-            different.push(trial);
-        }
-    }
-    let trials = different;
+    trials.sort_by(|a, b| a.price(values).total_cmp(&b.price(values)));
     let full_base = 2.0 * cost(model, data, theta)?;
     check.reduced_chi2 = full_base / (2 * data.value_count()) as f64;
     let tried: Vec<TriedMistake> = trials
@@ -168,7 +136,7 @@ pub fn examine(
         .take(REFINED)
         .collect::<Vec<_>>()
         .par_iter()
-        .filter_map(|t| refined(model, data, t, &starts, full_base).ok())
+        .filter_map(|t| refined(model, data, t, measured, full_base).ok())
         .collect();
     let rivals = || Rivals {
         library: rival(),
@@ -232,45 +200,76 @@ fn problem<'a>(model: &'a StructureModel, data: &'a FrfData) -> FrfProblem<'a> {
     }
 }
 
-/// The mistakes with a size that promise most, fitted on few lines.
-fn sized<'a>(here: &Linearised<'a>, all: &'a [Box<dyn Mistake>]) -> Result<Vec<Trial<'a>>> {
-    let mut scored = Vec::new();
-    for mistake in all {
-        let parameters = mistake.sizes().len() as f64;
-        let mut scores = here.scores(mistake.as_ref())?;
-        scores.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        // The two most promising groups of each.
-        scored.extend(
-            scores
-                .into_iter()
-                .take(2)
-                .map(|s| (mistake.as_ref(), s.gain - 8.0 * parameters, s)),
-        );
+/// Whether `cost` is so large that a mistake may have led the model's parameters away from theirs.
+fn led_astray(cost: f64, data: &FrfData) -> bool {
+    cost > 1.5 * data.value_count() as f64
+}
+
+/// The mistakes with a size that promise most at `theta` and `elsewhere`, fitted on few lines from there.
+fn sized<'a>(
+    model: &StructureModel,
+    thin: &FrfData,
+    theta: &[f64],
+    elsewhere: &[&[f64]],
+    all: &'a [Box<dyn Mistake>],
+) -> Result<Vec<Trial<'a>>> {
+    let mut promising = most_promising(model, thin, theta, all, FITTED)?;
+    for start in elsewhere {
+        promising.extend(most_promising(model, thin, start, all, FITTED_ELSEWHERE)?);
     }
-    scored.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let promising = scored.into_iter().filter(|s| s.1 > LEAST_GAIN).take(FITTED);
-    let fits: Vec<Option<Trial>> = promising
-        .collect::<Vec<_>>()
+    let fits: Vec<Option<((usize, FrfGroup), Trial)>> = promising
         .into_par_iter()
-        .map(|(mistake, _, score)| {
+        .map(|(start, index, score)| {
+            let mistake = all[index].as_ref();
             let joint = JointProblem {
-                model: here.model,
-                data: here.data,
+                model,
+                data: thin,
                 mistake,
                 group: score.group,
             };
-            let fit = joint.fit(here.theta, &score.values, ROUGH).ok()?;
+            let fit = joint.fit(start, &score.values, ROUGH).ok()?;
             let (values, _) = joint.values(&fit, 1.0)?;
             let (chi2, parameters) = (2.0 * fit.cost, values.len());
-            Some(Trial {
+            let trial = Trial {
                 cause: Cause::Size(mistake, score.group, values),
-                theta: fit.theta[..here.theta.len()].to_vec(),
+                theta: fit.theta[..theta.len()].to_vec(),
                 chi2,
                 parameters,
-            })
+            };
+            Some(((index, score.group), trial))
         })
         .collect();
-    Ok(fits.into_iter().flatten().collect())
+    let mut best: Vec<((usize, FrfGroup), Trial)> = Vec::new();
+    for (which, trial) in fits.into_iter().flatten() {
+        match best.iter_mut().find(|(known, _)| *known == which) {
+            Some((_, known)) if known.chi2 <= trial.chi2 => (),
+            Some((_, known)) => *known = trial,
+            None => best.push((which, trial)),
+        }
+    }
+    Ok(best.into_iter().map(|(_, trial)| trial).collect())
+}
+
+/// Start, index of a mistake and its linear estimate there: the `most` mistakes with the greatest promise, on at most two groups of FRFs
+/// each.
+fn most_promising<'t>(
+    model: &StructureModel,
+    thin: &FrfData,
+    start: &'t [f64],
+    all: &[Box<dyn Mistake>],
+    most: usize,
+) -> Result<Vec<(&'t [f64], usize, Score)>> {
+    let here = Linearised::new(model, thin, start)?;
+    let mut scored = Vec::new();
+    for (index, mistake) in all.iter().enumerate() {
+        let price = 8.0 * mistake.sizes().len() as f64;
+        let mut scores = here.scores(mistake.as_ref())?;
+        scores.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        scored.extend(scores.into_iter().take(2).map(|s| (s.gain - price, index, s)));
+    }
+    scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let promising = scored.into_iter().filter(|s| s.0 > LEAST_GAIN).take(most);
+    Ok(promising.map(|(_, index, score)| (start, index, score)).collect())
 }
 
 fn proposed(model: &StructureModel, thin: &FrfData, theta: &[f64]) -> Result<Vec<readings::Proposed>> {
@@ -278,19 +277,13 @@ fn proposed(model: &StructureModel, thin: &FrfData, theta: &[f64]) -> Result<Vec
     readings::proposed(model, thin, &[theta, &nominal], READ)
 }
 
-/// Where fits of readings begin, besides the nominal values.
-struct Starts<'a> {
-    /// Where the model stood.
-    theta: &'a [f64],
-    /// Where the measured modes put it: most readings leave those where they are.
-    measured: Option<Vec<f64>>,
-}
-
-/// Readings with the baseline fitted anew, from where it stood, from the nominal values and from the measured modes.
+/// Readings with the baseline fitted anew, from where it stood, from the nominal values and from where the measured modes put it: most
+/// readings leave those where they are.
 fn read_trials<'a>(
     model: &StructureModel,
     thin: &FrfData,
-    starts: &Starts,
+    theta: &[f64],
+    measured: Option<&[f64]>,
     read: &'a [readings::Proposed],
     base: f64,
 ) -> Result<Vec<Trial<'a>>> {
@@ -300,16 +293,15 @@ fn read_trials<'a>(
             let reading = proposed.reading.as_ref();
             let data = reading.corrected(thin);
             let read = model_read(model, reading);
-            let near = minimise(&problem(&read, &data), starts.theta, &read.bounds(), ROUGH).ok()?;
+            let near = minimise(&problem(&read, &data), theta, &read.bounds(), ROUGH).ok()?;
             let mut best = (near.cost, near.theta);
             // Where the baseline was led astray its old place is no start.
-            let far = near.cost > 1.5 * data.value_count() as f64;
-            if far && (near.cost < base || proposed.gain > PLAIN_READING) {
+            if led_astray(near.cost, &data) && (near.cost < base || proposed.gain > PLAIN_READING) {
                 let options = Options {
                     extra_starts: 0,
                     ..Options::default()
                 };
-                if let Ok(fresh) = calibrate(&read, &data, starts.measured.as_deref(), options) {
+                if let Ok(fresh) = calibrate(&read, &data, measured, options) {
                     let cost = cost(&read, &data, &fresh.theta).ok()?;
                     if cost < best.0 {
                         best = (cost, fresh.theta);
@@ -332,7 +324,7 @@ fn refined(
     model: &StructureModel,
     data: &FrfData,
     trial: &Trial,
-    starts: &Starts,
+    measured: Option<&[f64]>,
     base: f64,
 ) -> Result<TriedMistake> {
     let freedom = 2.0 * data.value_count() as f64;
@@ -344,7 +336,6 @@ fn refined(
             let mut chi2 = 2.0 * fit.cost;
             // What explains nearly all and leaves more than noise may stand beside its optimum: it is sought as the model's was.
             if chi2 < NEARLY_ALL * base && chi2 > LEFT_OVER * freedom {
-                let measured = starts.measured.as_deref();
                 if let Ok(fresh) = calibrate(&read, &corrected, measured, Options::default()) {
                     chi2 = chi2.min(2.0 * cost(&read, &corrected, &fresh.theta)?);
                 }

@@ -35,9 +35,6 @@ pub struct Score {
     pub values: Vec<f64>,
 }
 
-/// Shares of its own information that a parameter gets besides, the first with which all of them are determined: rounding takes more
-/// of what hardly determines them the worse the model fits.
-const RIDGES: [f64; 3] = [1e-12, 1e-9, 1e-6];
 /// Steps of differences, in units of a parameter's prior standard deviation or usual size.
 const STEP: f64 = 1e-4;
 
@@ -137,18 +134,11 @@ impl<'a> Linearised<'a> {
                 information[(i, i)] += curvature;
                 gradient[i] += slope;
             }
+            // A parameter that this data does not see at all stays where it is.
+            information[(i, i)] += 1e-12 * (1.0 + information[(i, i)]);
         }
-        // Parameters that this data does not see, or sees together only, stay where they are.
-        let diagonal = information.diagonal();
-        let information = RIDGES
-            .into_iter()
-            .find_map(|ridge| {
-                let mut firm = information.clone();
-                for i in 0..n {
-                    firm[(i, i)] += ridge * (1.0 + diagonal[i]);
-                }
-                firm.cholesky()
-            })
+        let information = information
+            .cholesky()
             .ok_or_else(|| crate::Error::computation("the data do not determine the parameters"))?;
         let mut start = 0;
         let ranges = data.frfs().map(|(_, frf)| {

@@ -64,7 +64,7 @@ pub fn absorb(
     let found: Vec<Vec<Complex64>> = curves.iter().map(|c| c.rest.clone()).collect();
     let before = energy(&found);
     // What is left at zero as the slopes have it, from the last point that was tried.
-    let mut origin = found.clone();
+    let mut origin = found;
     let mut best: Option<AfterSlips> = None;
     for _ in 0..STEPS {
         let (sizes, care) = system.solve(&origin)?;
@@ -87,9 +87,10 @@ pub fn absorb(
             break;
         }
     }
-    // Where the model is far off the slopes ask for errors so large that nothing answers any more: small ones take nothing there.
+    // Where the model is far off the slopes ask for errors so large that nothing answers any more: small ones take nothing there, and the
+    // origin is still what was found.
     Ok(best.unwrap_or(AfterSlips {
-        rest: found,
+        rest: origin,
         price: 0.0,
         unlikely: 0.0,
         evidence: 0.0,

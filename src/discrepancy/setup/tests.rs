@@ -118,7 +118,7 @@ fn check(model: &StructureModel, data: &FrfData) -> SetupCheck {
         stride: 1,
     };
     let fit = minimise(&problem, &truth(model), &model.bounds(), Stopping::default()).unwrap();
-    examine(model, data, &fit.theta, None, || None, || None).unwrap()
+    examine(model, data, &fit.theta, None, None, || None).unwrap()
 }
 
 #[test]

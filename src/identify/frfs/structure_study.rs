@@ -76,6 +76,11 @@ impl StructureStudy {
         }
     }
 
+    /// Where the measured modes put the model, solver's scale; `None` where they are not known.
+    pub fn measured(&self) -> Option<&[f64]> {
+        self.measured.as_deref()
+    }
+
     /// The same study, whose model is calibrated also from `start` (such as [`crate::identify::frfs::modal_start`] gives).
     pub fn with_measured(self, start: Option<Vec<f64>>) -> Self {
         StructureStudy {
@@ -234,7 +239,7 @@ impl Study for StructureStudy {
     }
 
     fn calibrate(&self, model: &StructureModel) -> Result<Calibration> {
-        calibrate(model, &self.data, self.measured.as_deref(), self.options)
+        calibrate(model, &self.data, self.measured(), self.options)
     }
 }
 

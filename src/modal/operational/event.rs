@@ -21,7 +21,7 @@ pub(super) fn one_event(channels: &[Vec<f64>]) -> Option<[f64; 2]> {
         let of_stretches: Vec<f64> = channel
             .chunks_exact(length)
             .take(STRETCHES)
-            .map(variance)
+            .map(squares_about_mean)
             .collect();
         let whole: f64 = of_stretches.iter().sum();
         if whole > 0.0 {
@@ -47,7 +47,7 @@ pub(super) fn one_event(channels: &[Vec<f64>]) -> Option<[f64; 2]> {
     Some([share(*loud.first()?), share(loud.last()? + 1)])
 }
 
-fn variance(values: &[f64]) -> f64 {
+fn squares_about_mean(values: &[f64]) -> f64 {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     values.iter().map(|v| (v - mean).powi(2)).sum()
 }

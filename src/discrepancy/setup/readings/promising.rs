@@ -10,6 +10,8 @@ use crate::identify::frfs::frf_data::FrfData;
 /// Share of all disagreement that a reading must take away to be worth a fit: what is wrong in one file of many leaves
 /// the others in agreement.
 const WORTH_A_FIT: f64 = 0.03;
+/// Relative difference of the gains of two readings of one kind that do the same: rounding.
+const SAME_CHANGE: f64 = 1e-9;
 
 /// Readings that bring the model at any of `thetas` nearer to the data, most promising first.
 ///
@@ -22,11 +24,13 @@ pub fn proposed(
     most: usize,
 ) -> Result<Vec<Proposed>> {
     let mut all: Vec<Proposed> = Vec::new();
+    let kind = |p: &Proposed| p.reading.finding(data, &model.points).kind;
     for theta in thetas {
         let table = DistanceTable::new(model, data, theta)?;
         let mut here: Vec<Proposed> = Vec::new();
-        here.extend(axes::proposed(&table, data));
+        // Before the axes, which have names for a sign as well.
         here.extend(channel_sign::proposed(&table, data));
+        here.extend(axes::proposed(&table, data));
         here.extend(phase_conjugated::proposed(&table, data));
         here.extend(quantity::proposed(&table, data));
         here.extend(point_frame::proposed(&table, model, data, theta)?);
@@ -37,6 +41,10 @@ pub fn proposed(
         }
         here.retain(|p| p.gain > WORTH_A_FIT);
         here.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        // What brings the model as near under two names (sensor or hammer of the other polarity) does the same to the data.
+        here.dedup_by(|other, one| {
+            one.gain - other.gain <= SAME_CHANGE * one.gain && kind(one) == kind(other)
+        });
         here.truncate(most);
         all.extend(here);
     }

@@ -188,7 +188,7 @@ fn heed_setup<D: Modelled>(diagnosis: &mut Diagnosis<D>, setup: &SetupCheck) {
         }
         diagnosis.verdict = DiagnosisVerdict::Unknown;
         diagnosis.effect = None;
-        diagnosis.companion = None;
+        diagnosis.companions.clear();
         diagnosis.indistinguishable.clear();
         diagnosis.confidence = finding.confidence;
     }

@@ -7,7 +7,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::candidate::{BaselineFit, EffectCandidate};
 use super::diagnosis::Diagnosis;
-use super::verdict::{self, DiagnosisVerdict};
+use super::verdict::{self, DiagnosisVerdict, EffectSet};
 use crate::Result;
 use crate::effects::Site;
 use crate::identify::first_size::linear_size;
@@ -54,6 +54,11 @@ const PAIRS_REFINED: usize = 2;
 const PAIRS_BUDGET_S: f64 = 4.0;
 const LOOK_EVALUATIONS: f64 = 20.0;
 const FEWEST_PAIRS: usize = 12;
+/// Pairs to which a third effect is added, and effects that are tried as the third.
+const THREE_LEADERS: usize = 2;
+const THIRDS: usize = 12;
+/// Share of what stands above the noise that three effects must take for their fit to be tried harder.
+const NEARLY_ALL: f64 = 0.9;
 
 const REFINE: Stopping = Stopping {
     max_iterations: 25,
@@ -95,6 +100,18 @@ fn put_among<D: Modelled>(refined: &mut Vec<Tried<D>>, found: impl IntoIterator<
         }
     }
     refined.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
+}
+
+/// Several effects fitted together.
+struct Together<S: Study> {
+    /// Each with the number of its parameters, in their order.
+    parts: Vec<(InstanceOf<S>, usize)>,
+    model: ModelOf<S>,
+    theta: Vec<f64>,
+    /// On all data.
+    cost: f64,
+    /// No size at the end of its range, none that cannot be. What is missing still may drive sizes there.
+    possible: bool,
 }
 
 struct Engine<'a, S: Study> {
@@ -277,24 +294,24 @@ impl<'a, S: Study> Engine<'a, S> {
         let winner = credible.iter().position(|c| *c);
         self.excuse(&mut baseline, winner.map(|w| &mut candidates[w]))?;
         let mut pairs = None;
-        let pair = match winner {
+        let set = match winner {
             Some(w)
                 if verdict::leaves_room(&candidates[w], &baseline)
                     && candidates[w].share_above_noise(&baseline) > PAIR_SHARE =>
             {
-                let (best, counts) = self.best_pair(&candidates, &credible, &evidence)?;
+                let (best, counts) = self.best_set(&candidates, &credible, &evidence)?;
                 pairs = Some(counts);
                 best
             }
             _ => None,
         };
-        let mut decision = verdict::decide(&candidates, &credible, &baseline, pair, evidence.scale);
+        let mut decision = verdict::decide(&candidates, &credible, &baseline, set, evidence.scale);
         let too_little_data = self.too_little_data();
         if too_little_data.is_some() {
             decision = verdict::Decision {
                 verdict: DiagnosisVerdict::Unknown,
                 effect: None,
-                companion: None,
+                companions: Vec::new(),
                 best_guess: None,
                 confidence: NO_CONFIDENCE,
                 indistinguishable: Vec::new(),
@@ -307,7 +324,7 @@ impl<'a, S: Study> Engine<'a, S> {
             best_guess: decision.best_guess,
             confidence: decision.confidence,
             indistinguishable: decision.indistinguishable,
-            companion: decision.companion,
+            companions: decision.companions,
             candidates,
             baseline,
             not_tried: self.not_tried,
@@ -569,106 +586,190 @@ impl<'a, S: Study> Engine<'a, S> {
         })
     }
 
-    /// The pair of effects that explains most.
-    fn best_pair(
+    /// The effects that explain most together: the best pair, and where every pair leaves more than noise of what is plain, the best three.
+    fn best_set(
         &self,
         candidates: &[CandidateOf<S>],
         credible: &[bool],
         evidence: &Evidence,
-    ) -> Result<(Option<verdict::EffectPair>, [usize; 2])> {
-        let study = self.study;
+    ) -> Result<(Option<EffectSet>, [usize; 2])> {
         let mut counts = [0, 0];
-        let standing = |instance: &InstanceOf<S>| {
-            let label = self.label(instance);
-            candidates.iter().position(|c| c.label() == label)
-        };
-        let leaders: Vec<usize> = (0..candidates.len())
-            .filter(|i| credible[*i])
-            .take(PAIR_LEADERS)
+        let mut best: Option<EffectSet> = None;
+        let answers = |best: &Option<EffectSet>| best.as_ref().is_some_and(|b| b.odds_against() < 1.0);
+        let leaders = candidates
+            .iter()
+            .zip(credible)
+            .filter(|(_, credible)| **credible)
+            .map(|(c, _)| c)
+            .take(PAIR_LEADERS);
+        let leaders: Vec<Together<S>> = leaders
+            .map(|c| Together {
+                parts: vec![(c.instance, c.parameters.len())],
+                model: c.model.clone(),
+                theta: c.theta.clone(),
+                cost: f64::INFINITY,
+                possible: true,
+            })
             .collect();
-        let progress = Progress::new("trying pairs of effects", leaders.len() * self.instances.len());
-        let mut best: Option<verdict::EffectPair> = None;
-        for first in leaders {
-            let leader = &candidates[first];
-            let bases = [leader.theta.clone()];
-            let hints = study.hints(&leader.model, &leader.theta)?;
-            let mut seconds: Vec<&InstanceOf<S>> = self
-                .instances
-                .iter()
-                .filter(|s| self.label(s) != leader.label())
-                .collect();
+        let labels: Vec<String> = candidates.iter().map(EffectCandidate::label).collect();
+        let mut pairs: Vec<(Together<S>, Vec<String>)> = Vec::new();
+        for leader in &leaders {
             // Those that explain most alone come first, should the budget not reach to the end.
-            seconds.sort_by_key(|s| standing(s).unwrap_or(candidates.len()));
-            let look_s = LOOK_EVALUATIONS * study.work_s(&leader.model, Extent::Glance);
-            let affordable = (PAIRS_BUDGET_S / look_s.max(1e-9)) as usize;
-            counts[1] += seconds.len();
-            seconds.truncate(affordable.max(FEWEST_PAIRS));
-            counts[0] += seconds.len();
-            let mut pairs: Vec<TriedOf<S>> = seconds
-                .par_iter()
-                .filter_map(|second| {
-                    let pair = try_effect(study, &leader.model, second, &bases, &hints, Effort::Look);
-                    progress.step();
-                    pair
-                })
-                .collect();
-            pairs.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
-            pairs.truncate(PAIRS_SETTLED);
-            let follow = |pairs: Vec<TriedOf<S>>, view: View| -> Result<Vec<TriedOf<S>>> {
-                let mut settled: Vec<TriedOf<S>> = pairs
-                    .into_par_iter()
-                    .map(|pair| {
-                        let fit = self.minimise(&pair.model, view, &pair.fit.theta, REFINE)?;
-                        Ok(Tried { fit, ..pair })
-                    })
-                    .collect::<Result<_>>()?;
-                settled.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
-                Ok(settled)
-            };
-            let mut near = follow(pairs, View::COARSE)?;
-            near.truncate(PAIRS_REFINED);
-            let settled = follow(near, View::FULL)?;
-            for pair in settled.iter().filter(|p| p.fit.at_bound.is_empty()) {
-                let reduced_chi2 = self.reduced_chi2(pair);
-                if self.is_impossible(pair, leader)? {
-                    continue;
-                }
-                if best.as_ref().is_none_or(|b| reduced_chi2 < b.reduced_chi2) {
-                    let label = self.label(&pair.instance);
-                    // The stronger of the two alone is named first.
-                    let other = candidates.iter().position(|c| c.label() == label);
-                    let (stronger, other) = match other {
-                        Some(other) if other < first && credible[other] => (other, leader.label()),
-                        _ => (first, label),
-                    };
-                    let mut rest = study.rest(&pair.model, &pair.fit.theta)?;
-                    rest.beyond_slips = self.beyond_slips(&rest, &pair.model, &pair.fit.theta)?;
-                    best = Some(verdict::EffectPair {
-                        stronger,
-                        other,
-                        gain: evidence.base_chi2 - 2.0 * pair.fit.cost,
-                        reduced_chi2,
-                        rest,
-                    });
-                }
+            let (found, promising) = self.with_another(leader, &labels, usize::MAX, &mut counts)?;
+            for pair in found {
+                self.keep_better(&mut best, &pair, (candidates, credible), evidence)?;
+                pairs.push((pair, promising.clone()));
             }
-            // Two effects that leave only noise are the answer; other leaders cannot do better.
-            if best.as_ref().is_some_and(|b| b.odds_against() < 1.0) {
-                break;
+            // Effects that leave only noise are the answer; other leaders cannot do better.
+            if answers(&best) {
+                return Ok((best, counts));
             }
+        }
+        pairs.sort_by(|a, b| a.0.cost.total_cmp(&b.0.cost));
+        let plain = evidence.base_chi2 > FAINT * self.freedom(self.model, Extent::Full);
+        let mut threes = Vec::new();
+        for (pair, promising) in pairs.iter().take(if plain { THREE_LEADERS } else { 0 }) {
+            let (found, _) = self.with_another(pair, promising, THIRDS, &mut [0, 0])?;
+            for three in found {
+                self.keep_better(&mut best, &three, (candidates, credible), evidence)?;
+                threes.push(three);
+            }
+            if answers(&best) {
+                return Ok((best, counts));
+            }
+        }
+        // So many parameters at once may have stopped on their way: what explains nearly all is fitted as the model was.
+        threes.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        let above = evidence.base_chi2 - self.freedom(self.model, Extent::Full);
+        if let Some(three) = threes
+            .first()
+            .filter(|three| evidence.base_chi2 - 2.0 * three.cost > NEARLY_ALL * above)
+        {
+            let model = three.model.with_start(three.theta.clone());
+            let fresh = self.study.calibrate(&model)?;
+            let fit = self.minimise(&model, View::FULL, &fresh.theta, REFINE)?;
+            let fresh = self.together(three.parts.clone(), model, fit)?;
+            self.keep_better(&mut best, &fresh, (candidates, credible), evidence)?;
         }
         Ok((best, counts))
     }
 
-    /// Whether one of a pair, fitted with `leader` and then its own effect, is of a size that is not possible.
-    fn is_impossible(&self, pair: &TriedOf<S>, leader: &CandidateOf<S>) -> Result<bool> {
+    /// `leader` with each other effect, in the order of `labels` and at most so many: the best of them fitted to all data,
+    /// best first, and the labels of all by what they promise. `counts`: how many were tried, of how many.
+    #[allow(clippy::type_complexity)]
+    fn with_another(
+        &self,
+        leader: &Together<S>,
+        labels: &[String],
+        most: usize,
+        counts: &mut [usize; 2],
+    ) -> Result<(Vec<Together<S>>, Vec<String>)> {
         let study = self.study;
-        let all = estimates(&pair.model.parameters, &pair.fit, 1.0)?;
-        let first = self.base_count..self.base_count + leader.parameters.len();
-        let second = first.end..all.len();
-        let impossible = |instance, own: std::ops::Range<usize>| {
-            study.impossible(&pair.model, instance, &all[own]).is_some()
+        let bases = [leader.theta.clone()];
+        let hints = study.hints(&leader.model, &leader.theta)?;
+        let taken: Vec<String> = leader.parts.iter().map(|(i, _)| self.label(i)).collect();
+        let standing = |instance: &InstanceOf<S>| {
+            let label = self.label(instance);
+            labels.iter().position(|l| *l == label).unwrap_or(labels.len())
         };
-        Ok(impossible(&leader.instance, first) || impossible(&pair.instance, second))
+        let mut others: Vec<&InstanceOf<S>> = self
+            .instances
+            .iter()
+            .filter(|i| !taken.contains(&self.label(i)))
+            .collect();
+        others.sort_by_key(|i| standing(i));
+        let look_s = LOOK_EVALUATIONS * study.work_s(&leader.model, Extent::Glance);
+        let affordable = (PAIRS_BUDGET_S / look_s.max(1e-9)) as usize;
+        counts[1] += others.len();
+        others.truncate(affordable.max(FEWEST_PAIRS).min(most));
+        counts[0] += others.len();
+        let progress = Progress::new("trying several effects together", others.len());
+        let mut tried: Vec<TriedOf<S>> = others
+            .par_iter()
+            .filter_map(|other| {
+                let tried = try_effect(study, &leader.model, other, &bases, &hints, Effort::Look);
+                progress.step();
+                tried
+            })
+            .collect();
+        tried.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
+        let promising = tried.iter().map(|t| self.label(&t.instance)).collect();
+        tried.truncate(PAIRS_SETTLED);
+        let follow = |tried: Vec<TriedOf<S>>, view: View| -> Result<Vec<TriedOf<S>>> {
+            let mut settled: Vec<TriedOf<S>> = tried
+                .into_par_iter()
+                .map(|t| {
+                    let fit = self.minimise(&t.model, view, &t.fit.theta, REFINE)?;
+                    Ok(Tried { fit, ..t })
+                })
+                .collect::<Result<_>>()?;
+            settled.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
+            Ok(settled)
+        };
+        let mut near = follow(tried, View::COARSE)?;
+        near.truncate(PAIRS_REFINED);
+        let mut found = Vec::new();
+        for t in follow(near, View::FULL)? {
+            let first = leader.model.parameters.len();
+            let mut parts = leader.parts.clone();
+            parts.push((t.instance, t.model.parameters.len() - first));
+            found.push(self.together(parts, t.model, t.fit)?);
+        }
+        Ok((found, promising))
+    }
+
+    /// Puts a set of effects in the place of `best` where it leaves less.
+    fn keep_better(
+        &self,
+        best: &mut Option<EffectSet>,
+        together: &Together<S>,
+        (candidates, credible): (&[CandidateOf<S>], &[bool]),
+        evidence: &Evidence,
+    ) -> Result<()> {
+        let reduced_chi2 = 2.0 * together.cost / self.freedom(&together.model, Extent::Full);
+        if !together.possible || best.as_ref().is_some_and(|b| b.reduced_chi2 <= reduced_chi2) {
+            return Ok(());
+        }
+        let mut labels: Vec<String> = together.parts.iter().map(|(i, _)| self.label(i)).collect();
+        // The strongest of them alone is named first.
+        let place = |label: &String| candidates.iter().position(|c| c.label() == *label);
+        let standing = labels.iter().map(place);
+        let strongest = standing.flatten().filter(|i| credible[*i]).min();
+        let Some(strongest) = strongest else { return Ok(()) };
+        labels.retain(|label| *label != candidates[strongest].label());
+        let mut rest = self.study.rest(&together.model, &together.theta)?;
+        rest.beyond_slips = self.beyond_slips(&rest, &together.model, &together.theta)?;
+        *best = Some(EffectSet {
+            strongest,
+            others: labels,
+            parameters: together.parts.iter().map(|(_, count)| count).sum(),
+            gain: evidence.base_chi2 - 2.0 * together.cost,
+            reduced_chi2,
+            rest,
+        });
+        Ok(())
+    }
+
+    /// Several effects fitted to all data.
+    fn together(
+        &self,
+        parts: Vec<(InstanceOf<S>, usize)>,
+        model: ModelOf<S>,
+        fit: Fit,
+    ) -> Result<Together<S>> {
+        let all = estimates(&model.parameters, &fit, 1.0)?;
+        let mut start = self.base_count;
+        let impossible = parts.iter().any(|(instance, count)| {
+            let own = start..start + count;
+            start = own.end;
+            self.study.impossible(&model, instance, &all[own]).is_some()
+        });
+        Ok(Together {
+            possible: fit.at_bound.is_empty() && !impossible,
+            parts,
+            model,
+            theta: fit.theta,
+            cost: fit.cost,
+        })
     }
 }

@@ -21,8 +21,8 @@ pub struct Diagnosis<D: Modelled> {
     pub candidates: Vec<EffectCandidate<D>>,
     /// `effect@site` of rivals that this data cannot tell from the verdict.
     pub indistinguishable: Vec<String>,
-    /// The second effect, where two together explain what one alone does not.
-    pub companion: Option<String>,
+    /// The other effects, where several together explain what one alone does not.
+    pub companions: Vec<String>,
     /// The model as it stands.
     pub baseline: BaselineFit,
     /// Effects that this data cannot show, with the reason.
@@ -36,6 +36,15 @@ impl<D: Modelled> Diagnosis<D> {
     /// The candidate that is missing; `None` where the verdict names none.
     pub fn winner(&self) -> Option<&EffectCandidate<D>> {
         self.effect.map(|w| &self.candidates[w])
+    }
+
+    /// `A second effect is likely besides: payload`; `None` where one effect explains all.
+    pub fn besides_in_words(&self) -> Option<String> {
+        match self.companions.as_slice() {
+            [] => None,
+            [one] => Some(format!("A second effect is likely besides: {one}")),
+            more => Some(format!("Further effects are likely besides: {}", more.join(", "))),
+        }
     }
 
     /// What the best of the library makes of the data where the verdict is unknown.

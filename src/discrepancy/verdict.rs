@@ -94,25 +94,27 @@ pub fn is_convincing(p_value: f64, delta_bic: f64) -> bool {
     p_value < SIGNIFICANT_P && delta_bic < -STRONG_BIC
 }
 
-/// Two effects that explain the data together.
+/// Effects that explain the data together.
 #[derive(Debug, Clone)]
-pub struct EffectPair {
-    /// Index among the candidates of the one that explains more alone.
-    pub stronger: usize,
-    /// The other one's label.
-    pub other: String,
-    /// χ² that both together take away.
+pub struct EffectSet {
+    /// Index among the candidates of the one that explains most alone.
+    pub strongest: usize,
+    /// Labels of the others.
+    pub others: Vec<String>,
+    /// Their parameters.
+    pub parameters: usize,
+    /// χ² that they take away together.
     pub gain: f64,
-    /// Weighted misfit per degree of freedom that both together leave.
+    /// Weighted misfit per degree of freedom that they leave together.
     pub reduced_chi2: f64,
-    /// What both leave.
+    /// What they leave.
     pub rest: Rest,
 }
 
-impl EffectPair {
-    /// Odds that something else is behind what both explain.
+impl EffectSet {
+    /// Odds that something else is behind what they explain.
     pub fn odds_against(&self) -> f64 {
-        something_else::odds_of_pair(self.gain, &self.rest)
+        something_else::odds_of_set(self.gain, &self.rest, 1 + self.others.len())
     }
 }
 
@@ -125,8 +127,8 @@ pub struct Decision {
     pub effect: Option<usize>,
     /// The best of the library where the verdict is unknown.
     pub best_guess: Option<usize>,
-    /// The second effect, where two together explain what one alone does not.
-    pub companion: Option<String>,
+    /// The other effects, where several together explain what one alone does not.
+    pub companions: Vec<String>,
     /// Probability that the verdict is right.
     pub confidence: f64,
     /// `effect@site` of rivals that this data cannot tell from the verdict.
@@ -160,36 +162,46 @@ pub fn leaves_room<D: Modelled>(c: &EffectCandidate<D>, baseline: &BaselineFit) 
     leaves_structure(c) && odds_against(c, baseline) > SETTLED
 }
 
-/// `pair`: the best pair of effects, where one was sought.
+/// `set`: the best of several effects together, where that was sought.
 pub fn decide<D: Modelled>(
     candidates: &[EffectCandidate<D>],
     credible: &[bool],
     baseline: &BaselineFit,
-    pair: Option<EffectPair>,
+    set: Option<EffectSet>,
     scale: f64,
 ) -> Decision {
     let mut decision = Decision {
         verdict: DiagnosisVerdict::None,
         effect: None,
         best_guess: None,
-        companion: None,
+        companions: Vec::new(),
         confidence: 0.0,
         indistinguishable: Vec::new(),
     };
     let first = credible.iter().position(|c| *c);
-    let excused = first.map_or(1.0, |w| weight_of_slips_alone(&candidates[w], baseline));
+    let set = set.filter(|set| {
+        let alone = first.map_or(1.0, |w| odds_against(&candidates[w], baseline));
+        set.odds_against() < alone.min(1.0)
+    });
+    let excused = match (&set, first) {
+        (Some(set), _) => weight_of_slips_alone(set.gain, Some(&set.rest), set.parameters, baseline),
+        (None, Some(w)) => {
+            let c = &candidates[w];
+            weight_of_slips_alone(c.gain, c.rest.as_ref(), c.parameters.len(), baseline)
+        }
+        (None, None) => 1.0,
+    };
     let Some(w) = first.filter(|_| excused < 0.5) else {
         decide_without_candidate(&mut decision, candidates, baseline);
         return decision;
     };
     let winner = &candidates[w];
-    let alone = odds_against(winner, baseline);
-    let (odds_else, named) = match pair {
-        Some(pair) if pair.odds_against() < alone.min(1.0) => {
-            decision.companion = Some(pair.other.clone());
-            (pair.odds_against(), pair.stronger)
+    let (odds_else, named) = match &set {
+        Some(set) => {
+            decision.companions.clone_from(&set.others);
+            (set.odds_against(), set.strongest)
         }
-        _ => (alone, w),
+        None => (odds_against(winner, baseline), w),
     };
     let reference = winner.delta_bic;
     let weight = |c: &EffectCandidate<D>| evidence_weight(c.delta_bic - reference).min(1.0);
@@ -216,7 +228,7 @@ pub fn decide<D: Modelled>(
             .collect();
     } else {
         decision.verdict = DiagnosisVerdict::Unknown;
-        decision.companion = None;
+        decision.companions.clear();
         decision.best_guess = Some(w);
         decision.confidence = 1.0 / (1.0 + (1.0 + beaten) / odds_else);
     }
@@ -235,19 +247,21 @@ fn odds_against<D: Modelled>(c: &EffectCandidate<D>, baseline: &BaselineFit) -> 
     }
 }
 
-/// Weight of the small errors of the setup alone against the same with a candidate: 1 where they need it not. Zero where such
-/// errors are not in question.
-fn weight_of_slips_alone<D: Modelled>(c: &EffectCandidate<D>, baseline: &BaselineFit) -> f64 {
+/// Weight of the small errors of the setup alone against the same with effects of so many `parameters` that take `gain` of χ² away
+/// and leave `rest`: 1 where they need them not. Zero where such errors are not in question.
+fn weight_of_slips_alone(gain: f64, rest: Option<&Rest>, parameters: usize, baseline: &BaselineFit) -> f64 {
     let compared = || {
-        let (alone, with) = (
-            baseline.rest.beyond_slips.as_ref()?,
-            c.rest.as_ref()?.beyond_slips.as_ref()?,
-        );
-        let more = c.gain + 2.0 * (with.evidence - alone.evidence);
-        Some(more - alone.known_to - with.known_to)
+        let alone = baseline.rest.beyond_slips.as_ref()?;
+        // Where the effects leave noise no such errors were sought.
+        let (evidence, known_to) = match (rest?, &rest?.beyond_slips) {
+            (_, Some(with)) => (with.evidence, with.known_to),
+            (rest, None) if !rest.is_significant() => (0.0, 0.0),
+            _ => return None,
+        };
+        Some(gain + 2.0 * (evidence - alone.evidence) - alone.known_to - known_to)
     };
-    compared().map_or(0.0, |gain| {
-        evidence_weight(gain - gain_by_chance(c.parameters.len())).min(1.0)
+    compared().map_or(0.0, |more| {
+        evidence_weight(more - gain_by_chance(parameters)).min(1.0)
     })
 }
 

@@ -2,15 +2,16 @@
 //! displacement that the model has (a link against the ground, a joint's turning), `series` adds one that it takes for
 //! stiff (a bearing, the base, the motor's side of a gear). They are added on request, not tried by `diagnose`.
 
-use nalgebra::{DMatrix, Vector6};
+use nalgebra::{DMatrix, Vector3, Vector6};
 use num_complex::Complex64;
 
+use super::spot::AXES;
 use super::{Background, Spot};
 use crate::data::RobotSpec;
 use crate::effects::structural::branch;
 use crate::effects::structural::{DataSummary, PostureSetting, Structure};
 use crate::effects::{At, Effect, Instance, Known, NEGLIGIBLE, Site};
-use crate::parameter::Parameter;
+use crate::parameter::{Parameter, Prior};
 use crate::robot::{Attachment, AttachmentLaw, Branch as HungMass, Chain, Dual, Element, Grip, Role};
 
 /// A law of force over displacement.
@@ -32,6 +33,8 @@ pub enum DrawnForm {
     LossFactor,
     /// A spring in series with a damper.
     Maxwell,
+    /// A spring and a damper along a direction of their own, near an axis.
+    ObliqueSpringDamper,
     /// Series only: a spring with an inertia on it (the motor's rotor on its servo).
     RotorOnSpring,
 }
@@ -48,6 +51,7 @@ impl DrawnForm {
             DrawnForm::TwoResonators => "two-resonators",
             DrawnForm::LossFactor => "loss-factor",
             DrawnForm::Maxwell => "maxwell",
+            DrawnForm::ObliqueSpringDamper => "oblique-spring-damper",
             DrawnForm::RotorOnSpring => "rotor-on-spring",
         }
     }
@@ -61,6 +65,22 @@ const AT_POINT: [DrawnForm; 6] = [
     DrawnForm::TwoResonators,
     DrawnForm::LossFactor,
 ];
+/// What has a mass of its own does not stay with the base axes where the link turns.
+const TO_GROUND: [DrawnForm; 4] = [
+    DrawnForm::Spring,
+    DrawnForm::SpringDamper,
+    DrawnForm::LossFactor,
+    DrawnForm::ObliqueSpringDamper,
+];
+const AT_TOOL: [DrawnForm; 7] = [
+    DrawnForm::Spring,
+    DrawnForm::SpringDamper,
+    DrawnForm::Mass,
+    DrawnForm::Resonator,
+    DrawnForm::TwoResonators,
+    DrawnForm::LossFactor,
+    DrawnForm::ObliqueSpringDamper,
+];
 /// A spring in parallel with a joint's stiffness is more of the same.
 const AT_JOINT: [DrawnForm; 3] = [DrawnForm::Damper, DrawnForm::LossFactor, DrawnForm::Maxwell];
 const IN_SERIES: [DrawnForm; 3] = [DrawnForm::Spring, DrawnForm::SpringDamper, DrawnForm::LossFactor];
@@ -70,14 +90,16 @@ const IN_DRIVE: [DrawnForm; 2] = [DrawnForm::SpringDamper, DrawnForm::RotorOnSpr
 pub fn forms(spot: Spot) -> &'static [DrawnForm] {
     match spot {
         Spot::Joint(_) => &AT_JOINT,
-        Spot::LinkAxis(..) | Spot::ToolGround(_) => &AT_POINT,
+        Spot::LinkAxis(..) => &AT_POINT,
+        Spot::ToolGround(_) => &AT_TOOL,
+        Spot::LinkGround(..) => &TO_GROUND,
         Spot::Base(_) | Spot::Bearing(..) => &IN_SERIES,
         Spot::Drive(_) => &IN_DRIVE,
     }
 }
 
 /// All forms, in the order of their variants: one list for all spots, so that a variant means one form everywhere.
-const FORMS: [DrawnForm; 9] = [
+const FORMS: [DrawnForm; 10] = [
     DrawnForm::Spring,
     DrawnForm::Damper,
     DrawnForm::SpringDamper,
@@ -87,6 +109,7 @@ const FORMS: [DrawnForm; 9] = [
     DrawnForm::LossFactor,
     DrawnForm::Maxwell,
     DrawnForm::RotorOnSpring,
+    DrawnForm::ObliqueSpringDamper,
 ];
 
 /// Acts on a displacement that the model has.
@@ -130,6 +153,10 @@ pub fn dynamic_stiffness(spot: Spot, form: DrawnForm, values: &[f64], frequency_
         DrawnForm::Spring => complex(values[0], 0.0),
         DrawnForm::Damper => complex(0.0, omega * values[0]),
         DrawnForm::SpringDamper => complex(values[0], omega * values[1]),
+        // Along the axis, from which the direction leans away.
+        DrawnForm::ObliqueSpringDamper => {
+            complex(values[0], omega * values[1]) / (1.0 + values[2].powi(2) + values[3].powi(2))
+        }
         DrawnForm::Mass => complex(-omega * omega * values[0], 0.0),
         DrawnForm::Resonator | DrawnForm::TwoResonators => values.chunks_exact(3).map(resonator).sum(),
         DrawnForm::LossFactor if matches!(spot, Spot::Joint(_)) => complex(0.0, values[0]),
@@ -166,6 +193,13 @@ fn parameters(site: Site, variant: usize, data: &DataSummary) -> Vec<Parameter> 
         DrawnForm::Spring => vec![stiffness(usual)],
         DrawnForm::Damper => vec![damping],
         DrawnForm::SpringDamper => vec![stiffness(usual), damping],
+        DrawnForm::ObliqueSpringDamper => {
+            let leans = oblique_axes(spot).map(|axis| {
+                let prior = Prior { mean: 0.0, std: 1.0 };
+                Parameter::linear(format!("lean_{}", AXES[axis]), "1", 0.0, prior, [-4.0, 4.0])
+            });
+            [stiffness(usual), damping].into_iter().chain(leans).collect()
+        }
         DrawnForm::Mass => vec![free("mass_kg", "kg", 3.0, [1e-3, 1e3])],
         DrawnForm::Resonator => resonator(),
         DrawnForm::TwoResonators => {
@@ -189,6 +223,23 @@ fn parameters(site: Site, variant: usize, data: &DataSummary) -> Vec<Parameter> 
     }
 }
 
+/// The axes towards which the direction of an oblique spring leans, and by how much: 1 is half-way.
+fn oblique_axes(spot: Spot) -> [usize; 2] {
+    let along = match spot {
+        Spot::LinkAxis(_, axis) | Spot::LinkGround(_, axis) | Spot::ToolGround(axis) => axis,
+        _ => 0,
+    };
+    [(along + 1) % 3, (along + 2) % 3]
+}
+
+/// Starts of an oblique spring and damper of this size: along the axis, and leaning.
+pub fn leaning(spring_and_damper: &[f64; 2]) -> Vec<Vec<f64>> {
+    let [k, c] = *spring_and_damper;
+    [[0.0, 0.0], [0.7, 0.0], [-0.7, 0.0], [0.0, 0.7], [0.0, -0.7]]
+        .map(|[a, b]| vec![k, c, a, b])
+        .to_vec()
+}
+
 fn starts(site: Site, variant: usize, data: &DataSummary, peaks_hz: &[f64]) -> Vec<Vec<f64>> {
     let Site::At(spot) = site else {
         return Vec::new();
@@ -202,6 +253,7 @@ fn starts(site: Site, variant: usize, data: &DataSummary, peaks_hz: &[f64]) -> V
         DrawnForm::Spring => scale.iter().map(|k| vec![*k]).collect(),
         DrawnForm::Damper => [10.0, 100.0, 1e4].map(|c| vec![c]).to_vec(),
         DrawnForm::SpringDamper => scale.iter().map(|k| vec![*k, 1e-3 * k]).collect(),
+        DrawnForm::ObliqueSpringDamper => leaning(&[1e5, 1e2]),
         DrawnForm::Mass => [0.2, 1.0, 10.0, 50.0].map(|m| vec![m]).to_vec(),
         DrawnForm::Resonator => branch::starts(data, peaks_hz, 5.0),
         DrawnForm::TwoResonators => {
@@ -249,6 +301,41 @@ fn attach(chain: &mut Chain, grip: &Grip, law: AttachmentLaw, size: &Dual) {
         law,
         size: size.clone(),
     });
+}
+
+/// A spring and a damper along d, |d| = 1, at the point of `grip`. Grips have constant directions, so k d dᵀ is made of six springs:
+/// k dᵢ dⱼ (eᵢ eⱼᵀ + eⱼ eᵢᵀ) = k dᵢ dⱼ [(eᵢ + eⱼ)(eᵢ + eⱼ)ᵀ − eᵢ eᵢᵀ − eⱼ eⱼᵀ]; single ones may be negative, their sum is not.
+fn attach_oblique(chain: &mut Chain, spot: Spot, grip: &Grip, values: &[Dual]) {
+    let Some((point, place, _)) = grip.point else {
+        return;
+    };
+    let [first, second] = oblique_axes(spot);
+    let one = Dual::constant(1.0);
+    let square = &(&(&values[2] * &values[2]) + &(&values[3] * &values[3])) + &one;
+    let mut component = [one.clone(), one.clone(), one];
+    component[first] = values[2].clone();
+    component[second] = values[3].clone();
+    let unit = |axis: usize| Vector3::from_fn(|i, _| if i == axis { 1.0 } else { 0.0 });
+    for (law, size) in [
+        (AttachmentLaw::Spring, &values[0]),
+        (AttachmentLaw::Damper, &values[1]),
+    ] {
+        let size = size * &square.recip();
+        let product = |i: usize, j: usize| &size * &(&component[i] * &component[j]);
+        let mut add = |direction: Vector3<f64>, size: &Dual| {
+            let grip = Grip {
+                coordinates: Vec::new(),
+                point: Some((point, place, direction)),
+            };
+            attach(chain, &grip, law, size);
+        };
+        for i in 0..3 {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            let others = &product(i, j) + &product(i, k);
+            add(unit(i), &(&product(i, i) + &others.scale(-1.0)));
+            add((unit(i) + unit(j)).normalize(), &product(i, j).scale(2.0));
+        }
+    }
 }
 
 impl Effect<Structure> for DrawnBranch {
@@ -322,6 +409,7 @@ impl Effect<Structure> for DrawnBranch {
                 attach(chain, &grip, AttachmentLaw::Spring, &values[0]);
                 attach(chain, &grip, AttachmentLaw::Damper, &values[1]);
             }
+            DrawnForm::ObliqueSpringDamper => attach_oblique(chain, spot, &grip, values),
             DrawnForm::Mass => attach(chain, &grip, AttachmentLaw::Inertia, &values[0]),
             DrawnForm::LossFactor if matches!(spot, Spot::Joint(_)) => {
                 attach(chain, &grip, AttachmentLaw::Hysteresis, &values[0]);

@@ -12,6 +12,9 @@ pub enum Spot {
     Joint(usize),
     /// The middle of a link (1-based) along an axis (0 to 2) of its frame, against the ground.
     LinkAxis(usize, usize),
+    /// The middle of a link (1-based) along a base axis, against the ground: what hangs between arm and hall does not turn with
+    /// the link.
+    LinkGround(usize, usize),
     /// The tool point along a base axis, against the ground.
     ToolGround(usize),
     /// A motion of the base that the model takes for fixed: x, y, z, then rotations about them.
@@ -23,16 +26,17 @@ pub enum Spot {
     Drive(usize),
 }
 
-const AXES: [&str; 3] = ["x", "y", "z"];
+pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 const BASE: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 const BEARING: [&str; 5] = ["tx", "ty", "tz", "rx", "ry"];
 
 impl Spot {
-    /// `joint-2`, `link-5.z`, `tool-ground.z`, `base.rx`, `bearing-3.ty`, `drive-2`.
+    /// `joint-2`, `link-5.z`, `link-3-ground.x`, `tool-ground.z`, `base.rx`, `bearing-3.ty`, `drive-2`.
     pub fn label(self) -> String {
         match self {
             Spot::Joint(i) => format!("joint-{i}"),
             Spot::LinkAxis(i, axis) => format!("link-{i}.{}", AXES[axis]),
+            Spot::LinkGround(i, axis) => format!("link-{i}-ground.{}", AXES[axis]),
             Spot::ToolGround(axis) => format!("tool-ground.{}", AXES[axis]),
             Spot::Base(k) => format!("base.{}", BASE[k]),
             Spot::Bearing(i, k) => format!("bearing-{i}.{}", BEARING[k]),
@@ -45,6 +49,7 @@ impl Spot {
         match self {
             Spot::Joint(i) => format!("in parallel with the stiffness of joint {i}"),
             Spot::LinkAxis(i, axis) => format!("on link {i} along {}", AXES[axis]),
+            Spot::LinkGround(i, axis) => format!("between link {i} and ground along base {}", AXES[axis]),
             Spot::ToolGround(axis) => format!("between tool and ground along base {}", AXES[axis]),
             Spot::Base(k) => format!("under the base ({})", BASE[k]),
             Spot::Bearing(i, k) => format!("in the bearing of joint {i} ({})", BEARING[k]),
@@ -56,7 +61,25 @@ impl Spot {
     pub fn parallel(robot: &RobotSpec) -> Vec<Spot> {
         let joints = (1..=robot.joints.len()).map(Spot::Joint);
         let links = (1..=robot.links.len()).flat_map(|i| (0..3).map(move |axis| Spot::LinkAxis(i, axis)));
-        joints.chain(links).chain((0..3).map(Spot::ToolGround)).collect()
+        // The last link is next to the tool.
+        let grounds = (1..robot.links.len()).flat_map(|i| (0..3).map(move |axis| Spot::LinkGround(i, axis)));
+        joints
+            .chain(links)
+            .chain(grounds)
+            .chain((0..3).map(Spot::ToolGround))
+            .collect()
+    }
+
+    /// Whether `other` is another displacement of the same place.
+    pub fn shares_place_with(self, other: Spot) -> bool {
+        self != other
+            && match (self, other) {
+                (Spot::LinkAxis(i, _), Spot::LinkAxis(j, _))
+                | (Spot::LinkGround(i, _), Spot::LinkGround(j, _))
+                | (Spot::Bearing(i, _), Spot::Bearing(j, _)) => i == j,
+                (Spot::ToolGround(_), Spot::ToolGround(_)) | (Spot::Base(_), Spot::Base(_)) => true,
+                _ => false,
+            }
     }
 
     /// A displacement that the model does not have is added there.
@@ -71,7 +94,7 @@ impl Spot {
     pub fn is_angle(self) -> bool {
         match self {
             Spot::Joint(_) | Spot::Drive(_) => true,
-            Spot::LinkAxis(..) | Spot::ToolGround(_) => false,
+            Spot::LinkAxis(..) | Spot::LinkGround(..) | Spot::ToolGround(_) => false,
             Spot::Base(k) | Spot::Bearing(_, k) => k >= 3,
         }
     }
@@ -101,13 +124,16 @@ impl Spot {
     /// Point, place on the chain and unit vector (base axes) of a parallel spot that is no joint.
     pub fn point(self, kinematics: &Kinematics) -> Option<(Point3<f64>, Place, Vector3<f64>)> {
         let unit = |axis: usize| Vector3::from_fn(|i, _| if i == axis { 1.0 } else { 0.0 });
+        let middle = |link: usize| {
+            let (start, end) = kinematics.link_ends(link);
+            nalgebra::center(&start, &end)
+        };
         match self {
             Spot::LinkAxis(i, axis) => {
-                let (start, end) = kinematics.link_ends(i);
-                let middle = nalgebra::center(&start, &end);
                 let direction = kinematics.frames[i].rotation * unit(axis);
-                Some((middle, Place::new(i, Slot::Body), direction))
+                Some((middle(i), Place::new(i, Slot::Body), direction))
             }
+            Spot::LinkGround(i, axis) => Some((middle(i), Place::new(i, Slot::Body), unit(axis))),
             Spot::ToolGround(axis) => {
                 let place = Place::new(kinematics.joint_count(), Slot::End);
                 Some((kinematics.tcp(), place, unit(axis)))

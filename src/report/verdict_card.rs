@@ -110,11 +110,14 @@ fn answer<D: Modelled>(
             format!("{}: these data fit both", listed(&rivals)),
         ));
     }
-    if let Some(companion) = &d.companion {
-        card.facts.push((
-            "Likely besides",
-            format!("a second effect: {}", label_in_words(companion)),
-        ));
+    if !d.companions.is_empty() {
+        let others: Vec<String> = d.companions.iter().map(label_in_words).collect();
+        let count = match others.len() {
+            1 => "a second effect",
+            _ => "two more effects",
+        };
+        card.facts
+            .push(("Likely besides", format!("{count}: {}", listed(&others))));
     }
     card
 }
@@ -146,16 +149,37 @@ fn unknown<D: Modelled>(card: &mut VerdictCard, d: &Diagnosis<D>, lead: Option<&
     card.explanation = "What is left is real, but no effect that this program knows explains it.".into();
     card.headline = match drawn {
         Some((place, best)) => {
+            let second = best.second.as_ref().map_or(String::new(), |second| {
+                format!(
+                    ", and a {} {}",
+                    second.form.label().replace('-', " "),
+                    second.spot.words()
+                )
+            });
             card.explanation += &format!(
-                " Without a name for it, the data still draw what it does and where: a {} {}.",
+                " Without a name for it, the data still draw what it does and where: a {} {}{second}.",
                 best.form.label().replace('-', " "),
                 place.spot.words()
             );
-            card.facts.push(("How big", sizes(&best.parameters)));
+            let all = best.second.iter().flat_map(|second| &second.parameters);
+            let all: Vec<Estimate> = best.parameters.iter().chain(all).cloned().collect();
+            card.facts.push(("How big", sizes(&all)));
             if !place.tied_with.is_empty() {
                 card.facts.push(("Or at", listed(&place.tied_with)));
             }
-            format!("Something unknown {}", place.spot.words())
+            match lead
+                .filter(|found| found.is_partial())
+                .and_then(Localisation::explained_share)
+            {
+                Some(share) => {
+                    card.explanation += &format!(
+                        " That explains {:.0} % of what stands above the noise: it is not all, or not the place.",
+                        100.0 * share
+                    );
+                    "Something is missing that has no name here".into()
+                }
+                None => format!("Something unknown {}", place.spot.words()),
+            }
         }
         None => "Something is missing that has no name here".into(),
     };

@@ -78,7 +78,8 @@ fn outcome<D: CampaignSide>(guide: Guide<'_>, findings: &Findings<D>, own: Value
         "confidence": d.confidence,
         "too_little_data": d.too_little_data,
         "pairs": d.pairs.map(|[tried, of]| json!({ "tried": tried, "of": of })),
-        "companion": d.companion,
+        "companion": d.companions.first(),
+        "companions": d.companions,
         "best_guess": d.best_guess.map(|i| d.candidates[i].label()),
         "explained_share": explained_share(d).map(|[share, _]| share),
         "explained_share_std_error": explained_share(d).map(|[_, std]| std),
@@ -229,7 +230,7 @@ fn spoken_of<D: Modelled>(d: &Diagnosis<D>) -> Option<&EffectCandidate<D>> {
 /// Share of what stands above the noise that the verdict's effect (or the best guess) explains, and its standard deviation.
 fn explained_share<D: Modelled>(d: &Diagnosis<D>) -> Option<[f64; 2]> {
     spoken_of(d)
-        .filter(|_| d.companion.is_none())
+        .filter(|_| d.companions.is_empty())
         .and_then(EffectCandidate::explained_share)
 }
 
@@ -376,8 +377,8 @@ fn answer<D: Modelled>(d: &Diagnosis<D>) -> String {
 /// Rivals, candidates and what to do next.
 fn rest<D: Modelled>(d: &Diagnosis<D>, next_measurement: &NextMeasurement) -> String {
     let mut text = String::new();
-    if let Some(companion) = &d.companion {
-        text += &format!("  A second effect is likely besides: {companion}\n");
+    if let Some(besides) = d.besides_in_words() {
+        text += &format!("  {besides}\n");
     }
     if !d.indistinguishable.is_empty() {
         text += &format!(
@@ -392,7 +393,9 @@ fn rest<D: Modelled>(d: &Diagnosis<D>, next_measurement: &NextMeasurement) -> St
             );
         }
         Some([_, of]) if d.verdict == DiagnosisVerdict::Unknown && of > 0 => {
-            text += &format!("  Nor does any of {of} pairs of effects with the best of them\n");
+            text += &format!(
+                "  Nor does any of {of} pairs of effects with the best of them, nor three that promised most\n"
+            );
         }
         _ => {}
     }

@@ -5,7 +5,9 @@ use crate::campaign::Campaign;
 use crate::commands::text::{Emphasis, number, percent, table, warnings};
 use crate::commands::{CampaignArg, Outcome};
 use crate::discrepancy::localise::{BestForm, Localisation, LocalisedPlace, localise};
-use crate::effects::drawn;
+use crate::effects::Spot;
+use crate::effects::drawn::{self, DrawnForm};
+use crate::identify::frfs::calibrate::Estimate;
 use crate::identify::{Options, StructureCase};
 use crate::report::figure::DrawnCurveFigure;
 use crate::report::verdict_card::size;
@@ -33,8 +35,11 @@ pub fn run(args: LocaliseArgs) -> Result<Outcome> {
     let best = found.places.first();
     let next = match best.and_then(|p| p.best.as_ref()) {
         Some(form) if found.significant => {
+            let then = form.second.as_ref().map_or(String::new(), |second| {
+                format!(", then `lobestone add {dir} {}`", second.instance.label())
+            });
             format!(
-                "run `lobestone add {dir} {}` to put it into the model",
+                "run `lobestone add {dir} {}` to put it into the model{then}",
                 form.instance.label()
             )
         }
@@ -64,6 +69,7 @@ fn document(case: &StructureCase, found: &Localisation) -> Value {
         "revision": case.revision(),
         "effects": case.effects(),
         "significant": found.significant,
+        "explained_share": found.explained_share(),
         "places": found.places.iter().map(place).collect::<Vec<_>>(),
         "curve": curve,
         "baseline": {
@@ -106,14 +112,20 @@ fn unit(place: &LocalisedPlace) -> &'static str {
     if place.spot.is_angle() { "N·m/rad" } else { "N/m" }
 }
 
-/// One place for the document.
-pub fn place(p: &LocalisedPlace) -> Value {
+/// Values and standard errors by the parameters' own names.
+fn by_name(estimates: &[Estimate]) -> (Map<String, Value>, Map<String, Value>) {
     let (mut parameters, mut errors) = (Map::new(), Map::new());
-    for estimate in p.best.iter().flat_map(|b| &b.parameters) {
+    for estimate in estimates {
         let key = estimate.name.rsplit('.').next().unwrap_or(&estimate.name);
         parameters.insert(key.to_string(), json!(estimate.value));
         errors.insert(key.to_string(), json!(estimate.std_error));
     }
+    (parameters, errors)
+}
+
+/// One place for the document.
+pub fn place(p: &LocalisedPlace) -> Value {
+    let (parameters, errors) = by_name(p.best.as_ref().map_or(&[], |b| &b.parameters));
     json!({
         "place": p.spot.label(),
         "add": p.best.as_ref().map(|b| b.instance.label()),
@@ -127,6 +139,16 @@ pub fn place(p: &LocalisedPlace) -> Value {
         "delta_bic": p.best.as_ref().map(|b| b.delta_bic),
         "p_value": p.best.as_ref().map(|b| b.p_value),
         "tied_with": p.tied_with,
+        "second": p.best.as_ref().and_then(|b| b.second.as_ref()).map(|second| {
+            let (parameters, errors) = by_name(&second.parameters);
+            json!({
+                "place": second.spot.label(),
+                "add": second.instance.label(),
+                "form": second.form.label(),
+                "parameters": parameters,
+                "errors": errors,
+            })
+        }),
     })
 }
 
@@ -135,10 +157,9 @@ fn describe(case: &StructureCase, found: &Localisation, most: usize) -> String {
     if let Some((p, best)) = found.places.first().and_then(|p| Some((p, p.best.as_ref()?))) {
         text += &match found.significant {
             true => format!(
-                "{}: {} {}\n",
+                "{}: {}\n",
                 Emphasis::Strong.on("The data draw"),
-                form_in_words(best),
-                p.spot.words()
+                drawn_in_words(p, best)
             ),
             false => format!(
                 "{}: no place explains more than chance\n",
@@ -149,6 +170,15 @@ fn describe(case: &StructureCase, found: &Localisation, most: usize) -> String {
             text += &format!(
                 "tied with {}: this data cannot tell them apart\n",
                 p.tied_with.join(", ")
+            );
+        }
+        if let Some(share) = found
+            .explained_share()
+            .filter(|_| found.significant && found.is_partial())
+        {
+            text += &format!(
+                "that explains {} of what stands above the noise: it is not all, or not the place\n",
+                percent(share)
             );
         }
         text += &format!(
@@ -191,7 +221,16 @@ fn describe(case: &StructureCase, found: &Localisation, most: usize) -> String {
 }
 
 fn values(best: &BestForm) -> String {
-    best.parameters.iter().map(size).collect::<Vec<_>>().join(", ")
+    let all = best.parameters.iter().map(size).collect::<Vec<_>>().join(", ");
+    match &best.second {
+        Some(second) => format!(
+            "{all}; {}: {} {}",
+            second.spot.label(),
+            second.form.label().replace('-', " "),
+            second.parameters.iter().map(size).collect::<Vec<_>>().join(", ")
+        ),
+        None => all,
+    }
 }
 
 /// What the data draw, as a sentence without its end.
@@ -202,15 +241,33 @@ pub fn in_words(found: &Localisation) -> String {
         |(p, best)| {
             let before = found.baseline.reduced_chi2;
             format!(
-                "the data draw {} {}, which leaves {:.2} times the noise variance of {before:.2}",
-                form_in_words(best),
-                p.spot.words(),
-                p.left
+                "the data draw {}, which leaves {:.2} times the noise variance of {before:.2}{}",
+                drawn_in_words(p, best),
+                p.left,
+                match found.is_partial() {
+                    true => ": not all, or not the place",
+                    false => "",
+                }
             )
         },
     )
 }
 
-fn form_in_words(best: &BestForm) -> String {
-    format!("a {} ({})", best.form.label().replace('-', " "), values(best))
+fn drawn_in_words(place: &LocalisedPlace, best: &BestForm) -> String {
+    let form = |form: DrawnForm, parameters: &[Estimate], spot: Spot| {
+        format!(
+            "a {} ({}) {}",
+            form.label().replace('-', " "),
+            parameters.iter().map(size).collect::<Vec<_>>().join(", "),
+            spot.words()
+        )
+    };
+    let first = form(best.form, &best.parameters, place.spot);
+    match &best.second {
+        Some(second) => format!(
+            "{first}, and {}",
+            form(second.form, &second.parameters, second.spot)
+        ),
+        None => first,
+    }
 }

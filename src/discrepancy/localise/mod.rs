@@ -3,8 +3,8 @@
 //!
 //! Every place is screened by projection ([`screen`]): its unknown is taken out of residual and sensitivities line by
 //! line, and what is left says how good the place is. The best places are then refitted with each simple form as part of
-//! the model itself, the model's own parameters with them, and judged by BIC; the leaders have to predict postures that
-//! were left out.
+//! the model itself, the model's own parameters with them, and judged by BIC; where one displacement of a place leaves more
+//! than noise, a second of the same place is tried with it. The leaders have to predict postures that were left out.
 
 pub mod screen;
 #[cfg(test)]
@@ -18,8 +18,9 @@ use crate::Result;
 use crate::effects::drawn::{self, DrawnForm};
 use crate::effects::{Instance, Spot};
 use crate::identify::frfs::calibrate::{Calibration, Estimate, estimates};
+use crate::identify::frfs::frf_data::FrfData;
 use crate::identify::frfs::spot_response::{SpotResponses, free_spots};
-use crate::identify::levenberg_marquardt::{Stopping, minimise};
+use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
 use crate::identify::study::{Effort, Extent, HeldOut, Study, Tried, View, held_out};
 use crate::identify::{StructureModel, StructureStudy};
 use screen::{CurvePoint, Screened};
@@ -67,6 +68,8 @@ pub struct BestForm {
     pub theta: Vec<f64>,
     /// The form's own parameters.
     pub parameters: Vec<Estimate>,
+    /// What else acts there, where one displacement is not enough.
+    pub second: Option<SecondForm>,
     /// Misfit Σ|r|²/σ² and priors.
     pub cost: f64,
     /// BIC less that of the model without it: below zero the form pays for its parameters.
@@ -77,6 +80,19 @@ pub struct BestForm {
     pub at_bound: bool,
     /// On postures left out of the fit.
     pub held_out: Option<HeldOut>,
+}
+
+/// A form at another displacement of the same place, fitted with the first.
+#[derive(Debug, Clone)]
+pub struct SecondForm {
+    /// Where it is.
+    pub spot: Spot,
+    /// The form there, as an effect.
+    pub instance: Instance<Structure>,
+    /// The law.
+    pub form: DrawnForm,
+    /// The form's own parameters.
+    pub parameters: Vec<Estimate>,
 }
 
 /// What the data draw.
@@ -92,12 +108,40 @@ pub struct Localisation {
     pub baseline_held_out: Option<HeldOut>,
 }
 
+/// Share of what stands above the noise from which on a place is taken for the one.
+const EXPLAINS: f64 = 0.8;
+
+impl Localisation {
+    /// Share of what stands above the noise that the best place explains, 0..1; `None` where nothing stands above it.
+    pub fn explained_share(&self) -> Option<f64> {
+        let above = self.baseline.reduced_chi2 - 1.0;
+        let left = self.places.first()?.left - 1.0;
+        (above > 0.0).then(|| (1.0 - left / above).clamp(0.0, 1.0))
+    }
+
+    /// Whether the best place leaves so much that it may be the wrong one, or not the only one.
+    pub fn is_partial(&self) -> bool {
+        self.places.first().is_some_and(|p| p.left > LEFT_OVER)
+            && self.explained_share().is_some_and(|share| share < EXPLAINS)
+    }
+}
+
 /// Places that are refitted with a form.
-const FITTED: usize = 8;
+const FITTED: usize = 10;
+/// Places at which a second displacement is tried, and displacements that are tried there.
+const SECOND: [usize; 2] = [4, 2];
+/// Squares per value of the model as it stands from which on two displacements may have something to explain, …
+const SECOND_FROM: f64 = 1.02;
+/// … more than noise is left, …
+const LEFT_OVER: f64 = 1.1;
+/// … and from which on what is missing may have led the model's parameters away from theirs.
+const ASTRAY: f64 = 1.5;
 /// Places whose best form is fitted to all data.
 const SETTLED: usize = 4;
 /// Lines of all postures together that the screen looks at.
 const SCREENED_LINES: usize = 3000;
+/// Forms of a place that are fitted to all data at most.
+const CANDIDATES: usize = 3;
 /// Places within this of the best one's 2 ln L are tied with it.
 const TIED: f64 = 12.0;
 
@@ -131,37 +175,57 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
         &model.bounds(),
         REFINE,
     )?;
+    let values = study.real_values(Extent::Coarse) as f64;
+    let starts = Starts::new(study, model, theta, 2.0 * coarse_base.cost > ASTRAY * values);
     let tried: Vec<(usize, Vec<Tried<Structure>>)> = leaders(&screened)
         .into_par_iter()
-        .map(|i| (i, fit_forms(study, model, theta, &screened[i])))
+        .map(|i| (i, fit_forms(study, model, &starts, &screened[i])))
         .collect();
-    let values = study.real_values(Extent::Coarse) as f64;
     let base_count = model.parameters.len();
     let bic = |t: &Tried<Structure>| {
         2.0 * (t.fit.cost - coarse_base.cost) + (t.fit.theta.len() - base_count) as f64 * values.ln()
     };
+    // A form whose size ran to the end of its range stands for another.
+    let order = |t: &Tried<Structure>| (at_bound(&t.fit, base_count), bic(t));
     let mut fitted: Vec<(usize, Vec<Tried<Structure>>)> = tried
         .into_iter()
         .filter(|(_, forms)| !forms.is_empty())
         .map(|(i, mut forms)| {
-            forms.sort_by(|a, b| bic(a).total_cmp(&bic(b)));
+            forms.sort_by(|a, b| compare(order(a), order(b)));
             (i, forms)
         })
         .collect();
     fitted.sort_by(|a, b| bic(&a.1[0]).total_cmp(&bic(&b.1[0])));
     let tests: usize =
         fitted.iter().map(|(_, forms)| forms.len()).sum::<usize>().max(1) * spots.len() / FITTED;
+    let pairs: Vec<Option<Pair>> = fitted
+        .par_iter()
+        .enumerate()
+        .map(|(rank, (i, forms))| {
+            if rank >= SECOND[0] || 2.0 * coarse_base.cost <= SECOND_FROM * values {
+                return None;
+            }
+            let pair = second_form(study, &thinned, forms, &screened[*i], base_count)?;
+            (order(&pair.tried) < order(&forms[0])).then_some(pair)
+        })
+        .collect();
+    let mut fitted: Vec<Fitted> = fitted
+        .into_iter()
+        .zip(pairs)
+        .map(|((place, forms), pair)| Fitted { place, forms, pair })
+        .collect();
+    fitted.sort_by(|a, b| bic(a.best()).total_cmp(&bic(b.best())));
 
     let base_cost = minimise(&study.problem(model, View::FULL), theta, &model.bounds(), REFINE)?.cost;
     let mut settled: Vec<LocalisedPlace> = fitted
         .par_iter()
         .take(SETTLED)
-        .map(|(i, forms)| {
-            let best = settle(study, &forms[0], base_cost, base_count, tests)?;
+        .map(|fitted| {
+            let best = settled_form(study, fitted, base_cost, base_count, tests)?;
             let count = study.data.value_count() as f64;
             Ok(LocalisedPlace {
                 left: best.cost / (count - 0.5 * best.theta.len() as f64).max(1.0),
-                ..place(&screened[*i], forms, &bic, Some(best))
+                ..place(&screened[fitted.place], &fitted.forms, &bic, Some(best))
             })
         })
         .collect::<Result<_>>()?;
@@ -179,7 +243,7 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
         }
     }
     let others = fitted.iter().skip(SETTLED);
-    let fitted_only = others.map(|(i, forms)| place(&screened[*i], forms, &bic, None));
+    let fitted_only = others.map(|f| place(&screened[f.place], &f.forms, &bic, None));
     let mut places = settled.clone();
     places.extend(fitted_only);
     let known: Vec<Spot> = places.iter().map(|p| p.spot).collect();
@@ -252,21 +316,123 @@ fn place(
     }
 }
 
+/// What was fitted at a place.
+struct Fitted {
+    /// Index of the screened place.
+    place: usize,
+    /// Each form alone, best first.
+    forms: Vec<Tried<Structure>>,
+    /// Where that explains more.
+    pair: Option<Pair>,
+}
+
+impl Fitted {
+    fn best(&self) -> &Tried<Structure> {
+        self.pair.as_ref().map_or(&self.forms[0], |pair| &pair.tried)
+    }
+}
+
+/// Two forms at two displacements of one place.
+struct Pair {
+    first: Instance<Structure>,
+    /// Parameters of the model with the first.
+    first_count: usize,
+    second: Spot,
+    /// The second, with the first in the model.
+    tried: Tried<Structure>,
+}
+
+/// From where the model's parameters are fitted.
+struct Starts {
+    theta: Vec<f64>,
+    /// Further points: where what is missing may have led `theta` away, the nominal values and what the measured modes say.
+    elsewhere: Vec<Vec<f64>>,
+}
+
+impl Starts {
+    fn new(study: &StructureStudy, model: &StructureModel, theta: &[f64], astray: bool) -> Self {
+        let measured = study.measured().filter(|m| m.len() == theta.len());
+        let elsewhere = [Some(model.nominal_theta()), measured.map(<[f64]>::to_vec)];
+        Starts {
+            theta: theta.to_vec(),
+            elsewhere: match astray {
+                true => elsewhere.into_iter().flatten().collect(),
+                false => Vec::new(),
+            },
+        }
+    }
+}
+
+fn at_bound(fit: &Fit, base_count: usize) -> bool {
+    (base_count..fit.theta.len()).any(|i| fit.at_bound.contains(&i))
+}
+
+fn compare(a: (bool, f64), b: (bool, f64)) -> std::cmp::Ordering {
+    a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+}
+
+/// A second form beside the best of `forms`, at the displacement of the same place that promises most with the first in the model.
+fn second_form(
+    study: &StructureStudy,
+    thinned: &FrfData,
+    forms: &[Tried<Structure>],
+    screened: &Screened,
+    base_count: usize,
+) -> Option<Pair> {
+    // Two resonators at one displacement may have stood for one at each of two.
+    let law = |t: &Tried<Structure>| drawn::form_of(t.instance.variant);
+    let first = match law(&forms[0]) {
+        DrawnForm::TwoResonators => forms.iter().find(|t| law(t) == DrawnForm::Resonator)?,
+        _ => &forms[0],
+    };
+    let (model, theta) = (&first.model, &first.fit.theta);
+    let spots: Vec<Spot> = free_spots(model)
+        .into_iter()
+        .filter(|spot| spot.shares_place_with(screened.spot))
+        .collect();
+    let responses = SpotResponses::new(model, theta, thinned, &spots).ok()?;
+    let mut promising = screen::screen(&responses, &model.parameters, theta);
+    promising.sort_by(|a, b| a.left_free.total_cmp(&b.left_free));
+    let starts = Starts {
+        theta: theta.clone(),
+        elsewhere: Vec::new(),
+    };
+    let pairs = promising.iter().take(SECOND[1]).flat_map(|second| {
+        let tried = fit_forms(study, model, &starts, second);
+        tried.into_iter().map(|tried| Pair {
+            first: first.instance,
+            first_count: theta.len(),
+            second: second.spot,
+            tried,
+        })
+    });
+    let values = study.real_values(Extent::Coarse) as f64;
+    let price = |p: &Pair| 2.0 * p.tried.fit.cost + p.tried.fit.theta.len() as f64 * values.ln();
+    let order = |p: &Pair| (at_bound(&p.tried.fit, base_count), price(p));
+    pairs.min_by(|a, b| compare(order(a), order(b)))
+}
+
 /// Each form of a place fitted on the coarse view, started from the drawn curve.
 fn fit_forms(
     study: &StructureStudy,
     model: &StructureModel,
-    theta: &[f64],
+    from: &Starts,
     screened: &Screened,
 ) -> Vec<Tried<Structure>> {
     let bounds = model.bounds();
-    let moved: Vec<f64> = theta
+    let moved: Vec<f64> = from
+        .theta
         .iter()
         .zip(&screened.step)
         .zip(&bounds)
         .map(|((t, d), b)| (t + d.clamp(-1.0, 1.0)).clamp(b[0], b[1]))
         .collect();
-    let bases = [theta.to_vec(), moved];
+    let mut bases = vec![from.theta.clone(), moved];
+    bases.extend(from.elsewhere.iter().cloned());
+    let effort = match from.elsewhere.is_empty() {
+        true => Effort::Direct,
+        false => Effort::Staged,
+    };
     drawn::forms(screened.spot)
         .par_iter()
         .filter_map(|form| {
@@ -284,8 +450,7 @@ fn fit_forms(
                         .collect()
                 })
                 .collect();
-            let fit =
-                crate::identify::study::screen(study, &extended, &bases, &starts, Effort::Direct).ok()?;
+            let fit = crate::identify::study::screen(study, &extended, &bases, &starts, effort).ok()?;
             Some(Tried {
                 instance,
                 model: extended,
@@ -335,19 +500,58 @@ fn starting_values(form: DrawnForm, screened: &Screened) -> Vec<Vec<f64>> {
             pairs
         }
         DrawnForm::Maxwell => vec![vec![spring.abs(), spring.abs() / 100.0]],
-        DrawnForm::RotorOnSpring => vec![vec![spring.abs(), damper, mass.abs()]],
+        DrawnForm::ObliqueSpringDamper => drawn::leaning(&[spring.abs(), damper.abs()]),
+        // Re z = k − ω² J by least squares.
+        DrawnForm::RotorOnSpring => {
+            let determinant = weight * fourth - square * square;
+            let rotor = (inertia * weight + square * re) / determinant;
+            let stiff = (re + rotor * square) / weight;
+            [
+                vec![spring.abs(), damper, mass.abs()],
+                vec![stiff.abs(), damper.abs(), rotor.abs()],
+            ]
+            .to_vec()
+        }
     }
 }
 
-/// A form fitted to all data and tested on postures left out.
-fn settle(
+/// The best form of a place fitted to all data. One whose size runs to the end of its range there stands for another: then the next.
+fn settled_form(
     study: &StructureStudy,
-    tried: &Tried<Structure>,
+    fitted: &Fitted,
     base_cost: f64,
     base_count: usize,
     tests: usize,
 ) -> Result<BestForm> {
-    let Tried { instance, model, fit } = tried;
+    let alone = fitted.forms.iter().map(|tried| (tried, None));
+    let candidates = fitted
+        .pair
+        .iter()
+        .map(|pair| (&pair.tried, Some(pair)))
+        .chain(alone)
+        .take(CANDIDATES);
+    let mut first = None;
+    for (tried, pair) in candidates {
+        let best = settle(study, tried, pair, base_cost, base_count, tests)?;
+        if !best.at_bound {
+            return Ok(best);
+        }
+        first.get_or_insert(best);
+    }
+    first.ok_or_else(|| crate::Error::computation("no form was fitted"))
+}
+
+/// A form, or two at one place, fitted to all data and tested on postures left out.
+fn settle(
+    study: &StructureStudy,
+    tried: &Tried<Structure>,
+    pair: Option<&Pair>,
+    base_cost: f64,
+    base_count: usize,
+    tests: usize,
+) -> Result<BestForm> {
+    let Tried { model, fit, .. } = tried;
+    let instance = pair.map_or(tried.instance, |pair| pair.first);
     let fit = minimise(
         &study.problem(model, View::FULL),
         &fit.theta,
@@ -363,14 +567,21 @@ fn settle(
     let gain = (2.0 * (base_cost - fit.cost) * share / reduced.max(1.0)).max(0.0);
     let single = ChiSquared::new(extra).map_or(1.0, |d| d.sf(gain));
     let all = estimates(&model.parameters, &fit, reduced)?;
+    let first_end = pair.map_or(all.len(), |pair| pair.first_count);
     Ok(BestForm {
-        instance: *instance,
+        instance,
         form: drawn::form_of(instance.variant),
-        parameters: all[base_count..].to_vec(),
+        parameters: all[base_count..first_end].to_vec(),
+        second: pair.map(|pair| SecondForm {
+            spot: pair.second,
+            instance: pair.tried.instance,
+            form: drawn::form_of(pair.tried.instance.variant),
+            parameters: all[first_end..].to_vec(),
+        }),
         cost: fit.cost,
         delta_bic: extra * (share * values).ln() - gain,
         p_value: (single * tests as f64).min(1.0),
-        at_bound: (base_count..fit.theta.len()).any(|i| fit.at_bound.contains(&i)),
+        at_bound: at_bound(&fit, base_count),
         held_out: held_out(study, model, &fit.theta, Extent::Coarse, REFIT_WITHOUT_FOLD)?,
         theta: fit.theta,
         model: model.clone(),

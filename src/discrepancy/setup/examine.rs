@@ -335,10 +335,11 @@ fn refined(
             let fit = minimise(&problem(&read, &corrected), &trial.theta, &read.bounds(), FINE)?;
             let mut chi2 = 2.0 * fit.cost;
             // What explains nearly all and leaves more than noise may stand beside its optimum: it is sought as the model's was.
-            if chi2 < NEARLY_ALL * base && chi2 > LEFT_OVER * freedom {
-                if let Ok(fresh) = calibrate(&read, &corrected, measured, Options::default()) {
-                    chi2 = chi2.min(2.0 * cost(&read, &corrected, &fresh.theta)?);
-                }
+            if chi2 < NEARLY_ALL * base
+                && chi2 > LEFT_OVER * freedom
+                && let Ok(fresh) = calibrate(&read, &corrected, measured, Options::default())
+            {
+                chi2 = chi2.min(2.0 * cost(&read, &corrected, &fresh.theta)?);
             }
             Ok(TriedMistake {
                 finding: reading.finding(data, &model.points),

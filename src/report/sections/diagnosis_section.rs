@@ -65,8 +65,8 @@ pub(crate) fn verdict_text<D: Modelled>(d: &Diagnosis<D>, data: &str) -> String 
     if let Some(guess) = d.best_guess_in_words() {
         text += &format!(" {guess}");
     }
-    if let Some(companion) = &d.companion {
-        text += &format!(" A second effect is likely besides: {companion}.");
+    if let Some(besides) = d.besides_in_words() {
+        text += &format!(" {besides}.");
     }
     text
 }

@@ -28,22 +28,44 @@ pub(super) enum Opened {
 /// A time table of more than [`PIECE`] bytes.
 pub(super) struct LongRecord {
     path: PathBuf,
-    file: File,
     bytes: u64,
-    /// Of what was read of it so far.
-    digest: Digest,
-    piece: usize,
+    text: Text,
     format: Format,
     why: String,
     pieces: Pieces,
-    /// Text read and not yet made numbers; its first line.
-    text: Vec<u8>,
+    /// Of the text that comes next.
     line: usize,
     at_end: bool,
     /// Bytes of text for each sample, from the first piece.
     bytes_per_sample: f64,
     notes: Notes,
     progress: Progress,
+}
+
+/// A file's text, a piece at a time.
+struct Text {
+    file: File,
+    piece: usize,
+    /// Read and not yet made numbers.
+    read: Vec<u8>,
+    /// Nothing comes behind what is read.
+    is_last: bool,
+    /// Of what was read so far.
+    digest: Digest,
+}
+
+impl Text {
+    /// Reads on until there is a whole piece.
+    fn fill(&mut self) -> std::io::Result<()> {
+        let kept = self.read.len();
+        let missing = self.piece.saturating_sub(kept);
+        let read = (&mut self.file)
+            .take(missing as u64)
+            .read_to_end(&mut self.read)?;
+        self.is_last = read < missing;
+        self.digest.extend(&self.read[kept..]);
+        Ok(())
+    }
 }
 
 /// What a file is and what looks wrong with its time records, without their samples where there are very many.
@@ -114,16 +136,21 @@ fn open_by(path: &Path, piece: usize) -> Result<Opened> {
     {
         let (format, why, pieces, notes) = long;
         let line = pieces.header.data_line;
+        let mut text = Text {
+            file,
+            piece,
+            read: head,
+            is_last: false,
+            digest: head_digest,
+        };
+        text.fill().map_err(refused)?;
         return Ok(Opened::Long(Box::new(LongRecord {
             path: path.to_path_buf(),
-            file,
             bytes,
-            digest: head_digest,
-            piece,
+            text,
             format,
             why,
             pieces,
-            text: head,
             line,
             at_end: false,
             bytes_per_sample: 0.0,
@@ -188,32 +215,29 @@ impl LongRecord {
         if self.at_end {
             return Ok(None);
         }
-        let refused = |e| Error::io(&self.path, e);
-        let kept = self.text.len();
-        let missing = self.piece.saturating_sub(kept);
-        let read = (&mut self.file).take(missing as u64).read_to_end(&mut self.text);
-        self.at_end = read.map_err(refused)? < missing;
-        self.digest.extend(&self.text[kept..]);
-        let end = match memchr::memrchr(b'\n', &self.text) {
-            Some(at) if !self.at_end => at + 1,
-            _ => self.text.len(),
+        let text = &mut self.text;
+        self.at_end = text.is_last;
+        let end = match memchr::memrchr(b'\n', &text.read) {
+            Some(at) if !text.is_last => at + 1,
+            _ => text.read.len(),
         };
-        let text = &self.text[..end];
         let fail = |e: crate::InputError| Error::from(e.file(&self.path));
-        let mut columns = std::mem::take(&mut self.pieces.spare);
-        columns.iter_mut().for_each(Vec::clear);
-        self.pieces
+        let (pieces, notes) = (&mut self.pieces, &mut self.notes);
+        let mut columns = std::mem::take(&mut pieces.spare);
+        let lines = pieces
             .header
-            .append_rows(text, self.line, self.at_end, &mut self.notes, &mut columns)
+            .read_rows_into(&text.read[..end], self.line, text.is_last, notes, &mut columns)
             .map_err(fail)?;
-        let table = Table { columns };
-        let record = self
-            .pieces
-            .next(table, self.line, &mut self.notes)
-            .map_err(fail)?;
+        text.read.drain(..end);
+        // The numbers are looked at one after the other, while the disk gives what comes next.
+        let (record, filled) = rayon::join(
+            || pieces.next(Table { columns }, self.line, notes),
+            || if text.is_last { Ok(()) } else { text.fill() },
+        );
+        let record = record.map_err(fail)?;
+        filled.map_err(|e| Error::io(&self.path, e))?;
         self.bytes_per_sample = end as f64 / record.len().max(1) as f64;
-        self.line += memchr::memchr_iter(b'\n', text).count();
-        self.text.drain(..end);
+        self.line += lines;
         self.progress.step();
         if self.at_end {
             self.pieces.finish(&mut self.notes);
@@ -245,7 +269,8 @@ impl LongRecord {
                 .filled
                 .extend(piece.filled.iter().map(|r| r.start + at..r.end + at));
             for (channel, more) in record.channels.iter_mut().zip(piece.channels) {
-                channel.samples.extend(more.samples);
+                channel.samples.extend_from_slice(&more.samples);
+                self.pieces.spare.push(more.samples);
             }
         }
         Ok(self.file_with(whole.into_iter().collect()))
@@ -261,7 +286,7 @@ impl LongRecord {
                 ..Contents::default()
             },
             warnings: self.notes.into_warnings(),
-            digest: self.digest,
+            digest: self.text.digest,
         }
     }
 }

@@ -122,8 +122,9 @@ impl QualityCheck {
         };
         match &mut self.thinned {
             Some(whole) => {
-                for (kept, channel) in whole.channels.iter_mut().zip(channels) {
-                    kept.samples.extend(thin(channel));
+                let more: Vec<Vec<f64>> = channels.par_iter().map(thin).collect();
+                for (kept, more) in whole.channels.iter_mut().zip(more) {
+                    kept.samples.extend(more);
                 }
             }
             None => {

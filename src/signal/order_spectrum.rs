@@ -72,8 +72,9 @@ pub fn order_spectrum(
             *c += power;
         }
     }
+    // In the place of the values: long records are many times longer than all that comes of them.
     let mut rest: Vec<f64> = value
-        .iter()
+        .into_iter()
         .enumerate()
         .map(|(i, v)| {
             let turn = phase(i).conj();
@@ -88,7 +89,9 @@ pub fn order_spectrum(
     let transform = RealFftPlanner::<f64>::new().plan_fft_forward(count);
     let mut spectrum = transform.make_output_vec();
     transform.process(&mut rest, &mut spectrum).ok()?;
+    drop(rest);
     let rest: Vec<f64> = spectrum.iter().map(|c| c.norm() / count as f64).collect();
+    drop(spectrum);
     let line_hz = sample_rate_hz / count as f64;
 
     let lines_per_order = revolutions * count as f64 / length;

@@ -99,7 +99,7 @@ impl Pieces {
         let time_at = time_column(header);
         if let Some(at) = time_at {
             let factor = time_factor(header, at);
-            table.columns[at].iter_mut().for_each(|t| *t *= factor);
+            scale(&mut table.columns[at], factor);
             let seconds = &table.columns[at];
             let again = match self.time_unit {
                 Some(again) => again,
@@ -110,7 +110,7 @@ impl Pieces {
                 }
             };
             self.time_unit = Some(again);
-            table.columns[at].iter_mut().for_each(|t| *t *= again);
+            scale(&mut table.columns[at], again);
         }
         let rows = table.columns.iter().map(Vec::len).max().unwrap_or(0);
         if self.clock.is_none() && rows < 2 {
@@ -224,6 +224,13 @@ impl Pieces {
     }
 }
 
+/// Seconds, as most times are printed, are left alone.
+fn scale(times: &mut [f64], factor: f64) {
+    if factor != 1.0 {
+        times.iter_mut().for_each(|t| *t *= factor);
+    }
+}
+
 fn time_factor(header: &Header, at: usize) -> f64 {
     let unit = column_unit(header, at).filter(|u| u.dimension == Dimension::TIME);
     unit.map_or(1.0, |u| u.factor)
@@ -237,7 +244,7 @@ fn no_time(header: &Header) -> InputError {
 
 fn check_numbers(table: &Table, header: &Header, first_line: usize) -> Result<(), InputError> {
     for (i, column) in table.columns.iter().enumerate() {
-        if let Some(row) = column.iter().position(|v| !v.is_finite()) {
+        if let Some(row) = checks::first_that_is_not(column, f64::is_finite) {
             let name = header
                 .names
                 .get(i)

@@ -74,52 +74,97 @@ pub fn scan(bytes: &[u8], start: usize, decimal: u8) -> Option<(f64, usize)> {
 }
 
 /// Reads the plain number that starts at `start`: a sign, up to seven digits, the decimal sign and up to seven more, as
-/// recorders print samples. Eight digits are read at a time, without a branch for each. `None` for all else (exponents, words,
+/// recorders print samples. Eight bytes are read at a time, without a branch for each. `None` for all else (exponents, words,
 /// more digits, less than eight bytes to the end of the data), which [`scan`] reads; the values of both are the same.
 #[inline]
 pub fn scan_plain(bytes: &[u8], start: usize, decimal: u8) -> Option<(f64, usize)> {
     let negative = *bytes.get(start)? == b'-';
-    let whole_at = start + usize::from(negative);
-    let (whole, whole_digits) = digits(bytes, whole_at)?;
-    let mut at = whole_at + whole_digits;
-    let (mut mantissa, mut fraction_digits) = (whole, 0);
-    if *bytes.get(at)? == decimal {
-        let fraction;
-        (fraction, fraction_digits) = digits(bytes, at + 1)?;
-        // At most 14 digits: exact in `f64`, as is the power.
-        mantissa = whole * POWERS[fraction_digits] + fraction;
-        at += 1 + fraction_digits;
-    }
-    if whole_digits + fraction_digits == 0 || matches!(bytes.get(at)?, b'e' | b'E' | b'd' | b'D' | b'#') {
+    let at = start + usize::from(negative);
+    let (mantissa, fraction_digits, length) = match short(word(bytes, at)?, decimal) {
+        Some(short) if short.2 < 8 || !bytes.get(at + 8)?.is_ascii_digit() => short,
+        _ => long(bytes, at, decimal)?,
+    };
+    let end = at + length;
+    if matches!(bytes.get(end)?, b'e' | b'E' | b'd' | b'D' | b'#') {
         return None;
     }
-    let value = mantissa as f64 / EXACT_POWERS[fraction_digits];
-    Some((if negative { -value } else { value }, at))
+    let value = mantissa as f64 / *EXACT_POWERS.get(fraction_digits)?;
+    // By its bit: signs change at random in noise, and a branch would be guessed wrongly half the time.
+    let sign = u64::from(negative) << 63;
+    Some((f64::from_bits(value.to_bits() ^ sign), end))
 }
 
-const POWERS: [u64; 8] = [1, 10, 100, 1000, 10_000, 100_000, 1_000_000, 10_000_000];
+const EACH: u64 = 0x0101_0101_0101_0101;
+
+/// Eight bytes, the first the lowest; what was a digit is 0 to 9.
+#[inline]
+fn word(bytes: &[u8], at: usize) -> Option<u64> {
+    Some(u64::from_le_bytes(*bytes.get(at..)?.first_chunk::<8>()?) ^ (u64::from(b'0') * EACH))
+}
+
+/// The top bit of each byte that is no digit. Adding 118 reaches it from 10 on; bytes above 127 have it set already. A carry
+/// out of such a byte spoils what is said of bytes behind it, but not of the first two that are none where the first is ASCII.
+#[inline]
+fn others(word: u64) -> u64 {
+    (word.wrapping_add(118 * EACH) | word) & (0x80 * EACH)
+}
+
+/// The number that eight digits are, by joining neighbours through multiplication (Lemire 2018, "Quickly parsing eight digits").
+#[inline]
+fn joined(word: u64) -> i64 {
+    let pairs = (word.wrapping_mul(10) + (word >> 8)) & 0x00FF_00FF_00FF_00FF;
+    let fours = (pairs.wrapping_mul(100) + (pairs >> 16)) & 0x0000_FFFF_0000_FFFF;
+    ((fours.wrapping_mul(10_000) + (fours >> 32)) & 0xFFFF_FFFF) as i64
+}
+
+/// Mantissa, digits behind the decimal sign and length of a number that, decimal sign included, is not longer than the word, as
+/// most samples are: the sign is taken out, and the digits on both sides of it are read at once. With a length of eight it may
+/// go on behind the word.
+#[inline]
+fn short(word: u64, decimal: u8) -> Option<(i64, usize, usize)> {
+    let first = others(word);
+    if first == 0 {
+        return None;
+    }
+    let second = first & (first - 1);
+    let (point, end) = (first.trailing_zeros() / 8, second.trailing_zeros() / 8);
+    let is_decimal = (word >> (8 * point)) as u8 == decimal ^ b'0';
+    // The decimal sign alone is no number.
+    if !is_decimal || end < 2 {
+        return None;
+    }
+    let whole = (1 << (8 * point)) - 1;
+    let digits = (word & whole) | ((word >> 8) & !whole);
+    let mantissa = joined(digits << (8 * (9 - end)));
+    Some((mantissa, (end - point - 1) as usize, end as usize))
+}
+
+/// As [`short`], where whole part and fraction have a word each, or there is no fraction.
+#[inline]
+fn long(bytes: &[u8], at: usize, decimal: u8) -> Option<(i64, usize, usize)> {
+    let (whole, whole_digits) = digits(bytes, at)?;
+    if *bytes.get(at + whole_digits)? != decimal {
+        return (whole_digits > 0).then_some((whole, 0, whole_digits));
+    }
+    let (fraction, fraction_digits) = digits(bytes, at + whole_digits + 1)?;
+    // At most 14 digits: exact in `f64`, as is the power.
+    let mantissa = whole * POWERS[fraction_digits] + fraction;
+    let length = whole_digits + 1 + fraction_digits;
+    (length > 1).then_some((mantissa, fraction_digits, length))
+}
+
+const POWERS: [i64; 8] = [1, 10, 100, 1000, 10_000, 100_000, 1_000_000, 10_000_000];
 
 /// The digits that begin at `at` and how many they are; `None` for eight or more.
-///
-/// Eight bytes as one word: what is no digit is found by carries into the top bit of its byte, neighbours are joined by
-/// multiplication (Lemire 2018, "Quickly parsing eight digits"; here with fewer digits moved up behind zeros).
 #[inline]
-fn digits(bytes: &[u8], at: usize) -> Option<(u64, usize)> {
-    const EACH: u64 = 0x0101_0101_0101_0101;
-    let word = u64::from_le_bytes(*bytes.get(at..)?.first_chunk::<8>()?) ^ (u64::from(b'0') * EACH);
-    // A digit is now 0 to 9: adding 118 reaches the top bit from 10 on; bytes above 127 have it set already. A carry out of
-    // a byte spoils only bytes behind the first that is no digit.
-    let others = (word.wrapping_add(118 * EACH) | word) & (0x80 * EACH);
-    let count = (others.trailing_zeros() / 8) as usize;
+fn digits(bytes: &[u8], at: usize) -> Option<(i64, usize)> {
+    let word = word(bytes, at)?;
+    let count = (others(word).trailing_zeros() / 8) as usize;
     if count == 8 {
         return None;
     }
-    // Two shifts: by 64 at once there would be no result for no digits.
-    let word = (word << (8 * (7 - count))) << 8;
-    let pairs = (word.wrapping_mul(10) + (word >> 8)) & 0x00FF_00FF_00FF_00FF;
-    let fours = (pairs.wrapping_mul(100) + (pairs >> 16)) & 0x0000_FFFF_0000_FFFF;
-    let all = (fours.wrapping_mul(10_000) + (fours >> 32)) & 0xFFFF_FFFF;
-    Some((all, count))
+    // Fewer digits are moved up behind zeros. Two shifts: by 64 at once there would be no result for no digits.
+    Some((joined((word << (8 * (7 - count))) << 8), count))
 }
 
 /// A whole field, blanks around it allowed; `None` where it is not one number.

@@ -189,31 +189,43 @@ impl Header {
         notes: &mut Notes,
     ) -> Result<Table, InputError> {
         let mut columns = Vec::new();
-        self.append_rows(data, first_line, is_last, notes, &mut columns)?;
+        self.read_rows_into(data, first_line, is_last, notes, &mut columns)?;
         Ok(Table { columns })
     }
 
-    /// As [`Header::read_rows`]; puts the rows behind those that are in `columns`, whose memory is used again.
+    /// As [`Header::read_rows`]; writes over what is in `columns`, whose memory is used again. Gives the line ends in `data`.
     ///
     /// # Errors
     /// As [`Header::read`].
-    pub fn append_rows(
+    pub fn read_rows_into(
         &self,
         data: &[u8],
         first_line: usize,
         is_last: bool,
         notes: &mut Notes,
         columns: &mut Vec<Vec<f64>>,
-    ) -> Result<(), InputError> {
+    ) -> Result<usize, InputError> {
         columns.resize_with(self.columns, Vec::new);
-        let before = columns.first().map_or(0, Vec::len);
         let texts = split_at_lines(data);
+        let line_ends: Vec<usize> = texts
+            .par_iter()
+            .map(|text| memchr::memchr_iter(b'\n', text).count())
+            .collect();
         // Each part gets a stretch of the columns of its own; where rows are blank it stays longer than what is written.
-        let room: Vec<usize> = texts.par_iter().map(|text| self.rows_at_most(text)).collect();
+        let room: Vec<usize> = texts
+            .iter()
+            .zip(&line_ends)
+            .map(|(text, ends)| self.rows_at_most(text, *ends))
+            .collect();
+        let all_room = room.iter().sum();
         for column in columns.iter_mut() {
-            column.resize(before + room.iter().sum::<usize>(), 0.0);
+            // New memory is zero as it comes from the system; nobody has to write that.
+            if column.is_empty() {
+                *column = vec![0.0; all_room];
+            }
+            column.resize(all_room, 0.0);
         }
-        let mut rests: Vec<&mut [f64]> = columns.iter_mut().map(|c| &mut c[before..]).collect();
+        let mut rests: Vec<&mut [f64]> = columns.iter_mut().map(Vec::as_mut_slice).collect();
         let mut stretches = Vec::with_capacity(texts.len());
         for rows in &room {
             let stretch: Vec<&mut [f64]> = rests
@@ -227,7 +239,7 @@ impl Header {
             .zip(stretches)
             .map(|(text, mut stretch)| self.read_part(text, &mut stretch))
             .collect();
-        let (mut rows, mut from, mut line) = (before, before, first_line);
+        let (mut rows, mut from, mut line) = (0, 0, first_line);
         let mut bad_row = None;
         for (k, (part, room)) in parts.iter().zip(&room).enumerate() {
             if rows < from {
@@ -251,20 +263,20 @@ impl Header {
         if let Some(error) = bad_row {
             return Err(error);
         }
-        if is_last && rows - before.min(rows) > 3 && ends_within_a_number(data, self.decimal) {
+        if is_last && rows > 3 && ends_within_a_number(data, self.decimal) {
             columns.iter_mut().for_each(|c| c.truncate(c.len() - 1));
             notes.file(
                 "the file ends without a line end, its last number has fewer digits than those above: cut off, the last row \
                  is left out",
             );
         }
-        Ok(())
+        Ok(line_ends.iter().sum())
     }
 
     /// Rows that a text can hold: one a line, and a byte for each column. What a header announces cannot claim memory.
-    fn rows_at_most(&self, text: &[u8]) -> usize {
-        let lines = memchr::memchr_iter(b'\n', text).count() + 1;
-        lines.min(text.len() / self.columns.max(1) + 1)
+    fn rows_at_most(&self, text: &[u8], line_ends: usize) -> usize {
+        let unfinished = text.last().is_some_and(|b| *b != b'\n');
+        (line_ends + usize::from(unfinished)).min(text.len() / self.columns.max(1) + 1)
     }
 
     fn read_part(&self, data: &[u8], columns: &mut [&mut [f64]]) -> Part {

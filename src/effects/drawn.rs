@@ -560,3 +560,43 @@ impl Effect<Structure> for Series {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::Baseline;
+    use crate::robot::RobotModel;
+    use crate::robot::fixture::{TAP_POSTURES, irb6640};
+
+    /// The six springs of an oblique one together are k d dᵀ, and they lose or add nothing across d.
+    #[test]
+    fn an_oblique_spring_acts_along_its_direction_only() {
+        let robot = RobotModel::new(irb6640());
+        let kinematics = robot.kinematics(&TAP_POSTURES[0]).unwrap();
+        let bare = robot.chain(&kinematics, &Baseline::nominal(&robot.spec));
+        let spot = Spot::LinkGround(4, 1);
+        let mut chain = bare.clone();
+        let setting = PostureSetting {
+            robot: &robot,
+            kinematics: &kinematics,
+            conditions: Default::default(),
+        };
+        let (k, c, towards_z, towards_x) = (4e4, 300.0, 0.5, -0.3);
+        let values = [k, c, towards_z, towards_x].map(Dual::constant);
+        let at = At {
+            site: Site::At(spot),
+            variant: FORMS
+                .iter()
+                .position(|f| *f == DrawnForm::ObliqueSpringDamper)
+                .unwrap(),
+        };
+        DrawnBranch.apply(at, &values, &setting, &mut chain);
+        let (point, place, _) = spot.point(&kinematics).unwrap();
+        let direction = Vector3::new(towards_x, 1.0, towards_z).normalize();
+        let row = bare.output_row(point, place, false, &direction);
+        let expected = k * &row * row.transpose();
+        let added = chain.system(0).stiffness - bare.system(0).stiffness;
+        let size = expected.norm();
+        assert!(size > 0.0 && (added - expected).norm() < 1e-9 * size);
+    }
+}

@@ -450,12 +450,12 @@ fn report(name: &str, dir: &Path) {
     match lobestone::discrepancy::diagnose(&study, &base) {
         Ok(d) => {
             println!(
-                "   VERDICT {:?} {} confidence {:.2}, indistinguishable {:?}, companion {:?}, {:.2} s",
+                "   VERDICT {:?} {} confidence {:.2}, indistinguishable {:?}, companions {:?}, {:.2} s",
                 d.verdict,
                 d.winner().map_or("-".into(), |c| c.label()),
                 d.confidence,
                 d.indistinguishable,
-                d.companion,
+                d.companions,
                 clock.elapsed().as_secs_f64()
             );
             for c in d.candidates.iter().take(3) {

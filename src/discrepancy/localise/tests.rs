@@ -97,14 +97,21 @@ fn measured(truth: &StructureModel, own: &[f64], seed: u64) -> FrfData {
     data
 }
 
-fn found(hidden: Option<(Spot, DrawnForm, &[f64])>, seed: u64) -> Localisation {
+type Hidden<'a> = (Spot, DrawnForm, &'a [f64]);
+
+fn found(hidden: Option<Hidden>, seed: u64) -> Localisation {
+    found_of(hidden.as_slice(), seed)
+}
+
+fn found_of(hidden: &[Hidden], seed: u64) -> Localisation {
     let bare = model();
     let data = measured(&bare, &[], seed);
-    let truth = hidden.map_or(bare.clone(), |(spot, form, _)| {
-        bare.with_effect(drawn::instance(spot, form), &bare.known(&data.summary()))
+    let truth = hidden.iter().fold(bare.clone(), |model, (spot, form, _)| {
+        let known = model.known(&data.summary());
+        model.with_effect(drawn::instance(*spot, *form), &known)
     });
-    let data = measured(&truth, hidden.map_or(&[], |h| h.2), seed);
-    let study = StructureStudy::new(data, Options::default());
+    let own: Vec<f64> = hidden.iter().flat_map(|h| h.2).copied().collect();
+    let study = StructureStudy::new(measured(&truth, &own, seed), Options::default());
     localise(&study, &bare).unwrap()
 }
 
@@ -172,6 +179,54 @@ fn a_tilting_bearing_is_drawn_in_series() {
     let place = found.places.iter().find(|p| p.spot == spot).unwrap();
     let stiffness = &place.best.as_ref().unwrap().parameters[0];
     assert!((stiffness.value / 2e6 - 1.0).abs() < 0.15, "{stiffness:?}");
+}
+
+/// A part that swings along two axes of a link, with another frequency along each.
+#[test]
+fn two_displacements_of_one_place_are_found_together() {
+    let (first, second) = (Spot::LinkAxis(4, 2), Spot::LinkAxis(4, 0));
+    let truth = [[7.0, 13.4, 0.036], [7.0, 19.8, 0.031]];
+    let hidden = [
+        (first, DrawnForm::Resonator, &truth[0][..]),
+        (second, DrawnForm::Resonator, &truth[1][..]),
+    ];
+    let found = found_of(&hidden, 14);
+    let place = &found.places[0];
+    let best = place.best.as_ref().unwrap();
+    let other = best.second.as_ref().expect("two displacements");
+    assert!(found.significant && !found.is_partial() && place.left < 1.1);
+    assert!(found.explained_share().unwrap() > 0.95);
+    for (spot, truth) in [first, second].into_iter().zip(truth) {
+        let parameters = if place.spot == spot {
+            &best.parameters
+        } else {
+            &other.parameters
+        };
+        assert!([place.spot, other.spot].contains(&spot));
+        for (estimate, truth) in parameters.iter().zip(truth) {
+            assert!(
+                (estimate.value / truth - 1.0).abs() < 0.15,
+                "{spot:?} {estimate:?}"
+            );
+        }
+    }
+}
+
+/// What hangs between arm and hall pulls along no axis of either.
+#[test]
+fn a_hose_is_a_spring_to_the_ground_along_a_direction_of_its_own() {
+    let spot = Spot::LinkGround(4, 0);
+    let truth = [4e4, 300.0, 0.5, -0.3];
+    let found = found(Some((spot, DrawnForm::ObliqueSpringDamper, &truth)), 15);
+    assert!(
+        found.significant && found.places[0].left < 1.1,
+        "{:?}",
+        found.places[0].spot
+    );
+    assert!(first_or_tied(&found, spot), "{:?}", found.places[0].spot);
+    let place = found.places.iter().find(|p| p.spot == spot).unwrap();
+    let stiffness = &place.best.as_ref().unwrap().parameters[0];
+    assert!((stiffness.value / truth[0] - 1.0).abs() < 0.15, "{stiffness:?}");
 }
 
 #[test]

@@ -23,20 +23,27 @@ pub struct FrfReading {
     pub taps: TapSettings,
 }
 
-/// FRFs of one file: as they stand there, or from the hits of a raw record.
-pub(crate) fn read(
-    path: &Path,
-    reading: &FrfReading,
-    hits: &mut Vec<(String, Vec<Hit>)>,
-    warnings: &mut Vec<String>,
-) -> Result<Vec<FrfInput>> {
+/// What reading says besides the FRFs.
+#[derive(Debug, Default)]
+pub(crate) struct Told {
+    /// By file, of raw records.
+    pub hits: Vec<(String, Vec<Hit>)>,
+    /// What was assumed or left out.
+    pub warnings: Vec<String>,
+    /// Raw records without a good hit: they are left out, and told among the warnings.
+    pub refused: Vec<Error>,
+}
+
+/// FRFs of one file: as they stand there, or from the hits of a raw record (none where no hit is good).
+pub(crate) fn read(path: &Path, reading: &FrfReading, told: &mut Told) -> Result<Vec<FrfInput>> {
     let set = path.display().to_string();
     let file = ingest::read_file(path)?;
-    warnings.extend(file.warnings.iter().map(|w| format!("{set}: {w}")));
+    told.warnings
+        .extend(file.warnings.iter().map(|w| format!("{set}: {w}")));
     if !file.contents.frfs.is_empty() {
         let unsaid = file.contents.frfs.iter().filter(|r| r.quantity.is_none()).count();
         if unsaid > 0 {
-            warnings.push(format!(
+            told.warnings.push(format!(
                 "{set}: the file does not say what its {unsaid} FRFs are; taken as {} (another: --quantity)",
                 units::frf_unit(reading.unsaid)
             ));
@@ -63,7 +70,7 @@ pub(crate) fn read(
     }
     let mut inputs = Vec::new();
     for alike in file.contents.times.chunk_by(TimeRecord::same_channels) {
-        inputs.extend(from_segments(&set, path, alike, &reading.taps, hits, warnings)?);
+        inputs.extend(from_segments(&set, path, alike, &reading.taps, told)?);
     }
     Ok(inputs)
 }
@@ -75,36 +82,36 @@ fn from_segments(
     path: &Path,
     segments: &[TimeRecord],
     taps: &TapSettings,
-    hits: &mut Vec<(String, Vec<Hit>)>,
-    warnings: &mut Vec<String>,
+    told: &mut Told,
 ) -> Result<Vec<FrfInput>> {
     let [first, others @ ..] = segments else {
         return Ok(Vec::new());
     };
     if others.is_empty() {
-        return Ok(from_taps(set, path, first, taps, hits, warnings)?.frfs);
+        return Ok(from_taps(set, path, first, taps, told)?.frfs);
     }
     let mut whole = first.clone();
     others.iter().for_each(|segment| whole.append(segment));
-    let (mut their_hits, mut their_warnings) = (Vec::new(), Vec::new());
-    let together = from_taps(set, path, &whole, taps, &mut their_hits, &mut their_warnings)?;
+    let mut theirs = Told::default();
+    let together = from_taps(set, path, &whole, taps, &mut theirs)?;
     if !together.contradictory {
-        warnings.push(format!(
+        told.warnings.push(format!(
             "{set}: {} records with the same channels: their hits are averaged",
             segments.len()
         ));
-        warnings.extend(their_warnings);
-        hits.extend(their_hits);
+        told.warnings.extend(theirs.warnings);
+        told.hits.extend(theirs.hits);
+        told.refused.extend(theirs.refused);
         return Ok(together.frfs);
     }
-    warnings.push(format!(
+    told.warnings.push(format!(
         "{set}: {} records with the same channels, whose hits contradict each other (other points or directions, or noise \
          as large as the response): FRFs of each record alone",
         segments.len()
     ));
     let mut inputs = Vec::new();
     for (k, segment) in segments.iter().enumerate() {
-        let alone = from_taps(set, path, segment, taps, hits, warnings)?.frfs;
+        let alone = from_taps(set, path, segment, taps, told)?.frfs;
         inputs.extend(alone.into_iter().map(|input| FrfInput {
             name: format!("{} record {}", input.name, k + 1),
             ..input
@@ -189,8 +196,7 @@ fn from_taps(
     path: &Path,
     record: &TimeRecord,
     taps: &TapSettings,
-    hits: &mut Vec<(String, Vec<Hit>)>,
-    warnings: &mut Vec<String>,
+    told: &mut Told,
 ) -> Result<FromTaps> {
     let hammer = hammer(record, path)?;
     let sensors: Vec<(&Channel, Quantity)> = record
@@ -200,7 +206,7 @@ fn from_taps(
         .filter_map(|c| {
             let motion = units::parse(&c.file_unit).and_then(|u| u.dimension.motion());
             if motion.is_none() {
-                warnings.push(format!(
+                told.warnings.push(format!(
                     "{set}: channel {} ({}) is no displacement, velocity or acceleration: left out",
                     c.name, c.file_unit
                 ));
@@ -220,12 +226,21 @@ fn from_taps(
         force_n: &hammer.samples,
         responses: &responses,
     };
-    let found = modal::impact_test(&tap, taps).map_err(|e| match e {
-        Error::Input(e) => (*e).file(path).into(),
-        other => other,
-    })?;
-    warnings.extend(found.warnings.iter().map(|w| format!("{set}: {w}")));
-    hits.push((set.to_owned(), found.hits));
+    let found = match modal::impact_test(&tap, taps) {
+        Ok(found) => found,
+        Err(Error::Input(why)) => {
+            told.warnings.push(format!("{set}: left out: {}", why.problem));
+            told.refused.push((*why).file(path).into());
+            return Ok(FromTaps {
+                frfs: Vec::new(),
+                contradictory: false,
+            });
+        }
+        Err(other) => return Err(other),
+    };
+    told.warnings
+        .extend(found.warnings.iter().map(|w| format!("{set}: {w}")));
+    told.hits.push((set.to_owned(), found.hits));
     let frfs = sensors
         .iter()
         .enumerate()
@@ -248,6 +263,52 @@ fn from_taps(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A record of one hit, or of none, with these names.
+    fn record(names: &str, hit_n: f64) -> tempfile::NamedTempFile {
+        let mut text = format!("{names}\n");
+        for k in 0..4000 {
+            let t = (f64::from(k) - 100.0) / 2000.0;
+            let (force, motion) = match k {
+                100..104 => (hit_n, 0.0),
+                _ if t > 0.0 => (0.0, hit_n * (-20.0 * t).exp() * (300.0 * t).sin()),
+                _ => (0.0, 0.0),
+            };
+            let noise = 1e-3 * f64::from(k * k % 7 - 3);
+            text += &format!(
+                "{:.4},{:.5},{:.5}\n",
+                f64::from(k) / 2000.0,
+                force + noise,
+                motion + noise
+            );
+        }
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        file
+    }
+
+    #[test]
+    fn a_record_without_a_good_hit_is_left_out() {
+        let names = "time_s,force_n,acc_m_per_s2";
+        let (bad, good) = (record(names, 0.0), record(names, 10.0));
+        let of = |files: &[&Path]| {
+            let (reading, settings) = (FrfReading::default(), modal::Settings::default());
+            crate::analysis::modes::modal::ModalAnalysis::of_files(files, true, &reading, &settings)
+        };
+        let found = of(&[bad.path(), good.path()]).unwrap();
+        assert_eq!((found.sets[0].frfs.len(), found.hits.len()), (1, 1));
+        let told = format!("{}: left out: no hit found", bad.path().display());
+        assert!(
+            found.warnings.iter().any(|w| w.starts_with(&told)),
+            "{:?}",
+            found.warnings
+        );
+        let error = of(&[bad.path(), bad.path()]).unwrap_err().to_string();
+        assert!(
+            error.contains("no hit found") && error.contains("remedy"),
+            "{error}"
+        );
+    }
 
     #[test]
     fn accelerance_and_mobility_become_receptance() {

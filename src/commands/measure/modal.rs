@@ -176,6 +176,7 @@ pub fn run(args: ModalArgs) -> Result<Outcome> {
             EstimatorArg::Hv => Estimator::Hv,
         },
         block_s: args.block_s,
+        ..TapSettings::default()
     };
     let campaign = args.paths.iter().any(|p| p.is_dir());
     if args.output_only {

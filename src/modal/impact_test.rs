@@ -177,6 +177,16 @@ pub fn impact_test(record: &TapRecord, settings: &TapSettings) -> Result<TapFrfs
         ));
     }
     let lines = excited_lines(&good);
+    let last_hz = lines.saturating_sub(1) as f64 * resolution_hz;
+    if let Some([_, to]) = settings.band_hz
+        && to > last_hz + resolution_hz
+        && lines < good[0].force.len()
+    {
+        warnings.push(format!(
+            "the hammer excites up to {last_hz:.0} Hz (above, its force is more than 20 dB down): lines above are not used, of a \
+             band that goes to {to:.0} Hz"
+        ));
+    }
     let (mut frf, mut coherence) = (Vec::new(), Vec::new());
     for response in 0..record.responses.len() {
         let (h, gamma2) = average(&good, response, lines, settings.estimator);
@@ -568,6 +578,28 @@ mod tests {
             assert!(told.contains("double hit: a second one of 10 %"), "{told:?}");
             assert_eq!(left_out(&found).len(), 1);
         }
+    }
+
+    #[test]
+    fn a_band_beyond_the_hammer_is_told() {
+        let bench = bench(0.03, &[(1.0, 300.0), (5.0, 250.0), (9.1, 320.0)], 13.0);
+        let told = |band| {
+            let found = frfs_in(&bench, Some(band)).unwrap();
+            let warnings = found.warnings.into_iter();
+            (
+                *found.frequency_hz.last().unwrap(),
+                warnings
+                    .filter(|w| w.contains("excites up to"))
+                    .collect::<Vec<_>>(),
+            )
+        };
+        let (last_hz, beyond) = told([5.0, 900.0]);
+        assert!(last_hz < 500.0, "{last_hz}");
+        assert!(
+            beyond.len() == 1 && beyond[0].contains(&format!("up to {last_hz:.0} Hz")),
+            "{beyond:?}"
+        );
+        assert!(told([5.0, 100.0]).1.is_empty());
     }
 
     /// Frequency and damping of the mode, window taken out.

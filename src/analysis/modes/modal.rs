@@ -90,11 +90,13 @@ impl ModalAnalysis {
         reading: &FrfReading,
         settings: &Settings,
     ) -> Result<Self> {
+        let mut reading = *reading;
+        reading.taps.band_hz = reading.taps.band_hz.or(settings.band_hz);
         let mut inputs = Vec::new();
         let mut told = Told::default();
         for file in files {
             let before = told.hits.len();
-            let mut of_file = read(file.as_ref(), reading, &mut told)?;
+            let mut of_file = read(file.as_ref(), &reading, &mut told)?;
             // A raw record has its window from here, not from the analyser.
             if reading.added_decay_per_s > 0.0 && told.hits.len() == before {
                 let decay = reading.added_decay_per_s;

@@ -158,13 +158,8 @@ fn receptance(frequency_hz: &[f64], value: &[Complex64], quantity: Option<Quanti
 /// The hammer's channel: the only one in newtons, or else the only one that is called so.
 fn hammer<'a>(record: &'a TimeRecord, path: &Path) -> Result<&'a Channel> {
     let in_newtons =
-        |c: &&Channel| units::parse(&c.file_unit).is_some_and(|u| u.dimension == Dimension::FORCE);
-    let called = |c: &&Channel| {
-        let name = c.name.to_lowercase();
-        ["hammer", "force", "impact", "kladivo", "kraft"]
-            .iter()
-            .any(|w| name.contains(w))
-    };
+        |c: &&Channel| units::parse_named(&c.file_unit).is_some_and(|u| u.dimension == Dimension::FORCE);
+    let called = |c: &&Channel| ingest::is_called_hammer(&c.name);
     let by = |test: &dyn Fn(&&Channel) -> bool| -> Vec<&'a Channel> {
         record.channels.iter().filter(|c| test(c)).collect()
     };
@@ -199,26 +194,48 @@ fn from_taps(
     told: &mut Told,
 ) -> Result<FromTaps> {
     let hammer = hammer(record, path)?;
-    let sensors: Vec<(&Channel, Quantity)> = record
-        .channels
-        .iter()
-        .filter(|c| !std::ptr::eq(*c, hammer))
-        .filter_map(|c| {
-            let motion = units::parse(&c.file_unit).and_then(|u| u.dimension.motion());
-            if motion.is_none() {
-                told.warnings.push(format!(
-                    "{set}: channel {} ({}) is no displacement, velocity or acceleration: left out",
-                    c.name, c.file_unit
-                ));
-            }
-            Some((c, motion?))
-        })
-        .collect();
+    if units::is_blank(&hammer.file_unit) {
+        told.warnings.push(format!(
+            "{set}: the hammer's channel {} has no unit: taken for newtons",
+            hammer.name
+        ));
+    }
+    let mut sensors: Vec<(&Channel, Quantity)> = Vec::new();
+    for c in record.channels.iter().filter(|c| !std::ptr::eq(*c, hammer)) {
+        let motion = units::parse_named(&c.file_unit).and_then(|u| u.dimension.motion());
+        let acceleration = units::is_blank(&c.file_unit) && ingest::is_called_acceleration(&c.name);
+        let quantity = motion.or(acceleration.then_some(Quantity::Accelerance));
+        sensors.extend(quantity.map(|q| (c, q)));
+        if acceleration {
+            told.warnings.push(format!(
+                "{set}: channel {} has no unit: taken for m/s² (another: name it {}_g)",
+                c.name, c.name
+            ));
+        } else if motion.is_none() {
+            told.warnings.push(format!(
+                "{set}: channel {} ({}) is no displacement, velocity or acceleration: left out",
+                c.name, c.file_unit
+            ));
+        }
+    }
     if sensors.is_empty() {
-        return Err(InputError::new("a tap record without a response channel")
-            .file(path)
-            .remedy("give the sensors' channels a unit: m/s² or g, m/s, m or µm")
-            .into());
+        let others: Vec<&str> = record
+            .channels
+            .iter()
+            .filter(|c| !std::ptr::eq(*c, hammer))
+            .map(|c| c.name.as_str())
+            .collect();
+        return Err(InputError::new(format!(
+            "a tap record without a response channel (hammer {}, others: {})",
+            hammer.name,
+            if others.is_empty() { "none".into() } else { others.join(", ") }
+        ))
+        .file(path)
+        .remedy(
+            "give the sensors' channels a unit, where the file has no place for it at the end of their name: acc_m_per_s2, acc_g, \
+             \"Acc [m/s²]\", vel_m_per_s, disp_um; a channel called acc… without a unit is taken for m/s²",
+        )
+        .into());
     }
     let responses: Vec<&[f64]> = sensors.iter().map(|(c, _)| c.samples.as_slice()).collect();
     let tap = TapRecord {
@@ -306,6 +323,33 @@ mod tests {
         let error = of(&[bad.path(), bad.path()]).unwrap_err().to_string();
         assert!(
             error.contains("no hit found") && error.contains("remedy"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn sensors_are_known_by_their_unit_or_called_acc() {
+        let of = |names: &str| {
+            let mut told = Told::default();
+            let file = record(names, 10.0);
+            let found = read(file.path(), &FrfReading::default(), &mut told);
+            (found.map(|f| f.len()), told.warnings.join("\n"))
+        };
+        for names in ["time,force_n,acc_m_per_s2", "time,force [N],tool acc_g"] {
+            let (count, told) = of(names);
+            assert_eq!(
+                (count.unwrap(), told.contains("taken for")),
+                (1, false),
+                "{names}: {told}"
+            );
+        }
+        let (count, told) = of("time,force,Acc 1");
+        assert_eq!(count.unwrap(), 1);
+        assert!(told.contains("force has no unit: taken for newtons"), "{told}");
+        assert!(told.contains("Acc 1 has no unit: taken for m/s²"), "{told}");
+        let error = of("time,force,x").0.unwrap_err().to_string();
+        assert!(
+            error.contains("others: x") && error.contains("acc_m_per_s2"),
             "{error}"
         );
     }

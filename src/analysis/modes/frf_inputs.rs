@@ -21,6 +21,8 @@ pub struct FrfReading {
     pub added_decay_per_s: f64,
     /// How FRFs are made of the hits of a raw record.
     pub taps: TapSettings,
+    /// Sampling rate of raw records that say neither times nor a rate, Hz.
+    pub rate_hz: Option<f64>,
 }
 
 /// What reading says besides the FRFs.
@@ -37,7 +39,10 @@ pub(crate) struct Told {
 /// FRFs of one file: as they stand there, or from the hits of a raw record (none where no hit is good).
 pub(crate) fn read(path: &Path, reading: &FrfReading, told: &mut Told) -> Result<Vec<FrfInput>> {
     let set = path.display().to_string();
-    let file = ingest::read_file(path)?;
+    let file = match reading.rate_hz {
+        Some(rate_hz) => ingest::read_file_at(path, rate_hz)?,
+        None => ingest::read_file(path)?,
+    };
     told.warnings
         .extend(file.warnings.iter().map(|w| format!("{set}: {w}")));
     if !file.contents.frfs.is_empty() {
@@ -352,6 +357,39 @@ mod tests {
             error.contains("others: x") && error.contains("acc_m_per_s2"),
             "{error}"
         );
+    }
+
+    #[test]
+    fn a_tap_test_without_times_needs_a_rate() {
+        let whole = record("time_s,force_n,acc_m_per_s2", 10.0);
+        let text = std::fs::read_to_string(whole.path()).unwrap();
+        let rows = text
+            .lines()
+            .map(|l| l.split_once(',').unwrap().1.to_owned() + "\n");
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), rows.collect::<String>()).unwrap();
+        let of = |rate_hz| {
+            let reading = FrfReading {
+                rate_hz,
+                ..FrfReading::default()
+            };
+            read(file.path(), &reading, &mut Told::default())
+        };
+        let error = of(None).unwrap_err().to_string();
+        assert!(
+            error.contains("without a time base") && error.contains("--rate"),
+            "{error}"
+        );
+        let (with, own) = (of(Some(2000.0)).unwrap(), {
+            read(whole.path(), &FrfReading::default(), &mut Told::default()).unwrap()
+        });
+        let apart = with[0]
+            .frequency_hz
+            .iter()
+            .zip(&own[0].frequency_hz)
+            .map(|(a, b)| (a - b).abs());
+        assert!(apart.fold(0.0, f64::max) < 1e-6);
+        assert_eq!(with[0].receptance_m_per_n.len(), own[0].receptance_m_per_n.len());
     }
 
     #[test]

@@ -47,7 +47,8 @@ pub(crate) fn contents(
         ))
         .remedy(
             "name the axis f (Hz) or t (s); FRFs are complex arrays with a dimension as long as f, signals real ones \
-             with a dimension as long as t; forces without a time axis: give rate_hz in a [[channel]] of campaign.toml",
+             with a dimension as long as t; without a time axis: `lobestone modal FILE --rate HZ` for a tap test, rate_hz in a \
+             [[channel]] of campaign.toml for cutting forces",
         ));
     }
     let left: Vec<&Variable> = variables

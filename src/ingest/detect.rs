@@ -119,7 +119,9 @@ pub(super) fn detect(bytes: &[u8], is_dwd_named: bool) -> Result<(Detected, Form
     }
     if force::is_time_table(&header) {
         let dynoware = header.lines.iter().any(|l| l.contains("DynoWare"))
-            || header.entry(&["sampling rate"]).is_some() && !header.units.is_empty();
+            || header.entry(&["sampling rate"]).is_some()
+                && !header.units.is_empty()
+                && !header.is_labelled();
         let (format, what) = if dynoware {
             (Format::DynoWare, "DynoWare-like header lines")
         } else {

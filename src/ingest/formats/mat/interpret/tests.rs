@@ -210,6 +210,27 @@ fn the_list_of_channels_gives_the_units() {
     assert_eq!((unsaid.frfs[0].quantity, unsaid.frfs[0].value[3].re), (None, 2.0));
 }
 
+/// Beside FRFs a signal that no sensor gives is left out; alone it is an error.
+#[test]
+fn a_damaged_signal_beside_frfs_is_left_out() {
+    let axis: Vec<f64> = (0..8).map(|k| 1e-3 * f64::from(k)).collect();
+    let mut values = vec![1.0; 8];
+    values[5] = 7e38;
+    let signal = real("Z1_4", &[8, 2], [axis, values].concat());
+    let mut frf = real("H1_2", &[8, 2], [count(8), vec![2.0; 8]].concat());
+    frf.im = Some([vec![0.0; 8], vec![1.0; 8]].concat());
+    let (held, told) = found(vec![frf, signal.clone()]);
+    assert_eq!((held.frfs.len(), held.times.len()), (1, 0));
+    assert!(
+        told.iter()
+            .any(|w| w.contains("Z1_4: 7e38 in sample 6") && w.contains("left out")),
+        "{told:?}"
+    );
+    let mut notes = Notes::default();
+    let error = contents(vec![signal], &[], &mut Budget::for_file(0), &mut notes).unwrap_err();
+    assert!(error.problem.contains("Z1_4"), "{error}");
+}
+
 /// Names carry units here as in CSV.
 #[test]
 fn names_of_signals_give_their_units() {

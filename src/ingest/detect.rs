@@ -161,8 +161,8 @@ pub(super) fn detect(bytes: &[u8], is_dwd_named: bool) -> Result<(Detected, Form
     Err(InputError::new(problem)
         .line(header.data_line.saturating_sub(1).max(1))
         .remedy(
-            "put a line of column names on top: frequency_hz,re,im or time_s,fx_n,fy_n,fz_n; forces without a time column: give \
-             rate_hz in a [[channel]] of campaign.toml",
+            "put a line of column names on top: frequency_hz,re,im for an FRF, time_s,force_n,acc_m_per_s2 for a tap test, \
+             time_s,fx_n,fy_n,fz_n for cutting forces (without a time column: rate_hz in a [[channel]] of campaign.toml)",
         ))
 }
 

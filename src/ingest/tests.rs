@@ -711,6 +711,21 @@ fn names_of_channels_above_their_units_line() {
 }
 
 #[test]
+fn hints_for_numbers_without_names_speak_of_tap_tests_too() {
+    let rows: String = (0..40)
+        .map(|i| format!("{}\t{}\n", 0.00025 * f64::from(i), i * i % 13))
+        .collect();
+    let told = problem(&rows);
+    assert!(told.contains("without names"), "{told}");
+    let error = read_memory(rows.as_bytes()).unwrap_err();
+    let remedy = error.remedy.unwrap_or_default();
+    assert!(
+        remedy.contains("time_s,force_n,acc_m_per_s2 for a tap test"),
+        "{remedy}"
+    );
+}
+
+#[test]
 fn of_several_cycles_the_first_is_read_and_it_is_told() {
     let rows = "0.000\t1.0\t2.0\n0.001\t1.5\t2.0\n0.002\t1.0\t2.5\n0.003\t1.0\t2.0\n";
     let text = format!(

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use super::contents::Digest;
+use super::contents::{Contents, Digest, Format, MeasurementFile};
 use super::decode::read_bytes_at;
 use super::read::{self, TimeFile, no_such, read_file};
 use super::text::{Notes, without_byte_order_mark};
@@ -129,7 +129,9 @@ pub fn read_time_with(path: &Path, rules: &[ChannelRule]) -> Result<TimeFile> {
     let (mut times, mut warnings, digest) = match read_file(path) {
         Ok(file) if !file.contents.times.is_empty() => (file.contents.times, file.warnings, file.digest),
         other => {
-            match with_rate(path, rules)?.map_or_else(|| plain_table(path, rules), |found| Ok(Some(found)))? {
+            match with_rate(path, rules)?
+                .map_or_else(|| plain_table(path, rules), |(_, found)| Ok(Some(found)))?
+            {
                 Some(found) => found,
                 None => match other {
                     Ok(file) => {
@@ -169,6 +171,51 @@ pub fn read_time_with(path: &Path, rules: &[ChannelRule]) -> Result<TimeFile> {
     warnings.extend(apply(&mut record, &forces).map_err(|e| Error::from(e.file(path)))?);
     Ok(TimeFile {
         record,
+        warnings,
+        digest,
+    })
+}
+
+/// As [`read_file`]; a table of text or a file of arrays that says neither times nor a rate was sampled at `rate_hz`.
+///
+/// # Errors
+/// Those of [`read_file`].
+pub fn read_file_at(path: &Path, rate_hz: f64) -> Result<MeasurementFile> {
+    let error = match read_file(path) {
+        Ok(mut file) => {
+            let own = file.contents.times.first().map(|t| t.sample_rate_hz);
+            if let Some(own) = own.filter(|own| (own / rate_hz - 1.0).abs() > 1e-3) {
+                let own = units::figures(own, 6);
+                file.warnings.push(format!(
+                    "the file itself says {own} Hz: that is taken, not the {rate_hz} Hz asked for"
+                ));
+            }
+            return Ok(file);
+        }
+        Err(error) => error,
+    };
+    let only_rate = [ChannelRule {
+        measures: Measures::Force(ChannelRole::Other),
+        source: Source::Column(1),
+        unit: None,
+        gain: Gain::None,
+        offset: 0.0,
+        is_reversed: false,
+        rate_hz: Some(rate_hz),
+    }];
+    let (format, found) = match with_rate(path, &only_rate)? {
+        Some((format, found)) => (format, Some(found)),
+        None => (Format::TimeCsv, plain_table(path, &only_rate)?),
+    };
+    let (times, warnings, digest) = found.ok_or(error)?;
+    Ok(MeasurementFile {
+        path: path.to_owned(),
+        format,
+        why: "signals without times, and a sampling rate that was given".into(),
+        contents: Contents {
+            times,
+            ..Contents::default()
+        },
         warnings,
         digest,
     })
@@ -318,7 +365,7 @@ fn apply(record: &mut TimeRecord, rules: &[&ChannelRule]) -> std::result::Result
 type PlainTable = (Vec<TimeRecord>, Vec<String>, Digest);
 
 /// A binary file that holds signals and no rate, with the rate that a rule gives.
-fn with_rate(path: &Path, rules: &[ChannelRule]) -> Result<Option<PlainTable>> {
+fn with_rate(path: &Path, rules: &[ChannelRule]) -> Result<Option<(Format, PlainTable)>> {
     let Some(rate) = rules.iter().find_map(|r| r.rate_hz) else {
         return Ok(None);
     };
@@ -328,9 +375,13 @@ fn with_rate(path: &Path, rules: &[ChannelRule]) -> Result<Option<PlainTable>> {
         return Ok(None);
     }
     let mut notes = Notes::default();
-    let (_, _, contents) =
+    let (format, _, contents) =
         read_bytes_at(&bytes, false, Some(rate), &mut notes).map_err(|e| Error::from(e.file(path)))?;
-    Ok((!contents.times.is_empty()).then(|| (contents.times, notes.into_warnings(), Digest::of(&bytes))))
+    if contents.times.is_empty() {
+        return Ok(None);
+    }
+    let found = (contents.times, notes.into_warnings(), Digest::of(&bytes));
+    Ok(Some((format, found)))
 }
 
 /// The forces of a file that says neither times nor a sampling rate: what each is (`fx`) and how its channel is called; empty

@@ -10,6 +10,7 @@ use crate::ingest::formats::lvm;
 use crate::ingest::formats::mat;
 use crate::ingest::formats::numpy;
 use crate::ingest::formats::uff;
+use crate::ingest::tables::channel_names::{is_called_acceleration, is_called_hammer};
 use crate::ingest::tables::table::Header;
 
 /// What was decided, and what the reader needs to know of it.
@@ -118,7 +119,9 @@ pub(super) fn detect(bytes: &[u8], is_dwd_named: bool) -> Result<(Detected, Form
     }
     if force::is_time_table(&header) {
         let dynoware = header.lines.iter().any(|l| l.contains("DynoWare"))
-            || header.entry(&["sampling rate"]).is_some() && !header.units.is_empty();
+            || header.entry(&["sampling rate"]).is_some()
+                && !header.units.is_empty()
+                && !header.is_labelled();
         let (format, what) = if dynoware {
             (Format::DynoWare, "DynoWare-like header lines")
         } else {
@@ -142,12 +145,24 @@ pub(super) fn detect(bytes: &[u8], is_dwd_named: bool) -> Result<(Detected, Form
             .line(header.data_line.max(1))
             .remedy(remedy));
     }
+    let names = &header.names;
+    if names.iter().any(|n| is_called_hammer(n)) && names.iter().any(|n| is_called_acceleration(n)) {
+        return Err(InputError::new(format!(
+            "a tap test without a time base: columns {}, and neither times nor a sampling rate",
+            abbreviated(names)
+        ))
+        .line(header.data_line.saturating_sub(1).max(1))
+        .remedy(
+            "say how fast it was sampled: `lobestone modal FILE --rate 48000`, or a line `Sampling rate [Hz]:,48000` above the \
+             names, or a column time_s",
+        ));
+    }
     let problem = format!("columns of unknown meaning ({})", abbreviated(&header.names));
     Err(InputError::new(problem)
         .line(header.data_line.saturating_sub(1).max(1))
         .remedy(
-            "put a line of column names on top: frequency_hz,re,im or time_s,fx_n,fy_n,fz_n; forces without a time column: give \
-             rate_hz in a [[channel]] of campaign.toml",
+            "put a line of column names on top: frequency_hz,re,im for an FRF, time_s,force_n,acc_m_per_s2 for a tap test, \
+             time_s,fx_n,fy_n,fz_n for cutting forces (without a time column: rate_hz in a [[channel]] of campaign.toml)",
         ))
 }
 

@@ -23,7 +23,8 @@ pub mod units;
 
 pub use crate::data::{Axis, Channel, ChannelRole, Dof, FrfRecord, Quantity, TimeRecord};
 pub use channel_rule::{
-    ChannelRule, Gain, Measures, Source, read_time_with, timeless_forces, unit_of_charge_or_other,
+    ChannelRule, Gain, Measures, Source, read_file_at, read_time_with, timeless_forces,
+    unit_of_charge_or_other,
 };
 pub use contents::{Contents, Digest, Format, MeasurementFile, OtherRecord};
 pub use formats::columns::{
@@ -40,6 +41,7 @@ pub use long::{Survey, survey};
 pub use preview::{PlainColumn, SIGNALS, plain_columns, taken_for};
 pub use quality::quality_warnings;
 pub use read::{TimeFile, read_file, read_frf_file, read_frfs, read_memory, read_time};
+pub(crate) use tables::channel_names::{is_called_acceleration, is_called_hammer};
 pub use text::shown;
 
 /// The first sheet of a workbook (xlsx) as tab separated text; `None` for all else.

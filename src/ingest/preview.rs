@@ -138,8 +138,9 @@ pub(super) fn preview(bytes: &[u8], header: &Header) -> (String, String) {
         seen.join("; ")
     );
     let remedy = format!(
-        "put a line of column names on top (frequency_hz,re,im or time_s,fx_n,fy_n,fz_n), or, for forces, say in campaign.toml \
-         what they are (`lobestone init` writes and asks it), such as{lines}"
+        "put a line of column names on top (frequency_hz,re,im for an FRF; time_s,force_n,acc_m_per_s2 for a tap test; \
+         time_s,fx_n,fy_n,fz_n for cutting forces), or, for cutting forces, say in campaign.toml what they are (`lobestone init` \
+         writes and asks it), such as{lines}"
     );
     (what, remedy)
 }

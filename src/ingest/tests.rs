@@ -688,6 +688,43 @@ fn records_are_read_as_other_recorders_write_them() {
     }
 }
 
+/// Kyowa's PCD-400A says in the first field of each line above the numbers what the line holds.
+#[test]
+fn names_of_channels_above_their_units_line() {
+    let head = |name: &str| {
+        format!(
+            "ID No.,PCD-400A,\nSampling Rate(Hz),50,\nCH Name,{name}\nCH No.,CH6,CH8\nRange,5000,5\nOffset,854.5598,-15.97561\n\
+             Unit,cm/s2,V\n"
+        )
+    };
+    let rows: String = (0..20)
+        .map(|i| format!("{},{},-0.5\n", 0.02 * f64::from(i), 11 + i))
+        .collect();
+    for (name, names) in [(",", ["CH6", "CH8"]), ("table,hammer", ["table", "hammer"])] {
+        let (format, contents, _) = read(head(name) + &rows);
+        assert_eq!(format, Format::TimeCsv);
+        let record = &contents.times[0];
+        let found: Vec<&str> = record.channels.iter().map(|c| c.name.as_str()).collect();
+        assert_eq!((found.as_slice(), record.sample_rate_hz), (&names[..], 50.0));
+        assert!((record.channels[0].samples[1] - 0.12).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn hints_for_numbers_without_names_speak_of_tap_tests_too() {
+    let rows: String = (0..40)
+        .map(|i| format!("{}\t{}\n", 0.00025 * f64::from(i), i * i % 13))
+        .collect();
+    let told = problem(&rows);
+    assert!(told.contains("without names"), "{told}");
+    let error = read_memory(rows.as_bytes()).unwrap_err();
+    let remedy = error.remedy.unwrap_or_default();
+    assert!(
+        remedy.contains("time_s,force_n,acc_m_per_s2 for a tap test"),
+        "{remedy}"
+    );
+}
+
 #[test]
 fn of_several_cycles_the_first_is_read_and_it_is_told() {
     let rows = "0.000\t1.0\t2.0\n0.001\t1.5\t2.0\n0.002\t1.0\t2.5\n0.003\t1.0\t2.0\n";

@@ -118,9 +118,11 @@ pub fn parse(label: &str) -> Option<Unit> {
     (reader.at == characters.len() && unit.factor.is_finite() && unit.factor > 0.0).then_some(unit)
 }
 
-/// As [`parse`], and for labels that are names with a unit at their end: `acc_m_s2`, `acc_m/s2`, `force_n`.
+/// As [`parse`], and for labels that are names with a unit at their end: `acc_m_s2`, `acc_m/s2`, `force_n`; and for such an end
+/// alone: `mm_s2`.
 pub fn parse_named(label: &str) -> Option<Unit> {
-    parse(label).or_else(|| {
+    let end_alone = || label.contains('_').then(|| parse_suffix(label)).flatten();
+    parse(label).or_else(end_alone).or_else(|| {
         label
             .match_indices('_')
             .find_map(|(at, _)| parse_suffix(&label[at + 1..]))

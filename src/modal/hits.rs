@@ -5,12 +5,22 @@ use crate::statistics::quantile;
 
 /// Samples of the force above this many standard deviations of its noise may belong to a hit …
 const ABOVE_NOISE: f64 = 10.0;
-/// … and above this part of the hardest hit.
-const OF_HARDEST: f64 = 0.05;
+/// … and above this part of the peak.
+const OF_PEAK: f64 = 0.05;
 /// A pulse this hard, relative to the hardest, begins a hit of its own.
 const OWN_HIT: f64 = 0.3;
 /// Two crossings of the threshold closer than this are one contact.
 const CONTACT_S: f64 = 0.002;
+/// The force of a hit is over when it has stayed this long, s, …
+const QUIET_S: f64 = 0.01;
+/// … and this many times as long as the contact …
+const QUIET_CONTACTS: f64 = 2.0;
+/// … within this many standard deviations of its noise, …
+const WITHIN_NOISE: f64 = 5.0;
+/// … or this part of the peak, where a record has no noise. A hammer that leaves the surface still pushes a little.
+const RESOLUTION: f64 = 1e-3;
+/// A tail longer than this many times the quiet that is waited for is no contact: the sensor's discharge, or its drift.
+const LONGEST_TAIL: usize = 5;
 /// Part of the block before the hit.
 const PRE_TRIGGER: f64 = 0.02;
 /// Equal samples in a row at the extreme of a channel.
@@ -35,6 +45,12 @@ pub struct Hit {
     /// Samples of the contact: first, last (from the beginning of the record).
     #[serde(skip)]
     pub contact: [usize; 2],
+    /// Last sample at which force is looked for (from the beginning of the record).
+    #[serde(skip)]
+    pub force_until: usize,
+    /// A second pulse up to there, in words: it belongs to the force.
+    #[serde(skip)]
+    pub second: Option<String>,
 }
 
 /// All hits of a record.
@@ -54,12 +70,31 @@ struct Pulse {
     peak_n: f64,
 }
 
+impl Pulse {
+    /// The same in a record that began so many samples earlier.
+    fn later_by(self, samples: usize) -> Pulse {
+        Pulse {
+            first: self.first + samples,
+            last: self.last + samples,
+            peak_at: self.peak_at + samples,
+            ..self
+        }
+    }
+}
+
 /// Finds the hits in the force (N, baseline taken out, hits positive) and judges each by force and responses.
 /// `block_s`: length of a block; from the distance of the hits where `None`.
 pub(super) fn find(force_n: &[f64], responses: &[&[f64]], sample_rate_hz: f64, block_s: Option<f64>) -> Hits {
-    let pulses = pulses(force_n, sample_rate_hz);
-    let hardest = pulses.iter().map(|p| p.peak_n).fold(0.0, f64::max);
-    let strong: Vec<&Pulse> = pulses.iter().filter(|p| p.peak_n >= OWN_HIT * hardest).collect();
+    let hardest = force_n.iter().copied().fold(0.0, f64::max);
+    let size: Vec<f64> = force_n.iter().map(|f| f.abs()).collect();
+    // Most of a record is no hit: the median of the size is that of the noise.
+    let noise_n = 1.4826 * median(&size);
+    let threshold = |peak_n: f64| (ABOVE_NOISE * noise_n).max(OF_PEAK * peak_n);
+    // A weak pulse is no hit of its own; within a block it may spoil the hit before (below).
+    let strong: Vec<Pulse> = pulses(force_n, threshold(hardest), sample_rate_hz)
+        .into_iter()
+        .filter(|p| p.peak_n >= OWN_HIT * hardest)
+        .collect();
     let Some(first) = strong.first() else {
         return Hits::default();
     };
@@ -88,21 +123,33 @@ pub(super) fn find(force_n: &[f64], responses: &[&[f64]], sample_rate_hz: f64, b
     let pre = ((PRE_TRIGGER * block as f64) as usize).max(4);
     let mut hits: Vec<Hit> = Vec::new();
     let mut free_from = 0;
-    for pulse in &pulses {
-        // A weak pulse is no hit of its own; within a block it spoils the hit before (below).
-        if pulse.first < free_from || pulse.peak_n < OWN_HIT * hardest {
+    for rough in &strong {
+        if rough.first < free_from {
             continue;
         }
-        let from = pulse.first.saturating_sub(pre);
+        let from = rough.first.saturating_sub(pre);
         free_from = from + block;
+        let to = free_from.min(force_n.len());
+        // Each hit by its own peak: what is said of it does not depend on the others.
+        let own = pulses(&force_n[from..to], threshold(rough.peak_n), sample_rate_hz);
+        let own: Vec<Pulse> = own.into_iter().map(|p| p.later_by(from)).collect();
+        let Some(pulse) = own.iter().find(|p| p.last >= rough.peak_at) else {
+            continue;
+        };
+        let force_until = force_until(&force_n[..to], pulse, noise_n, sample_rate_hz);
+        let second = own.iter().find(|p| p.first > pulse.last);
+        let within = second.filter(|p| p.first <= force_until);
         let mut hit = Hit {
             time_s: pulse.peak_at as f64 / sample_rate_hz,
             peak_n: pulse.peak_n,
             left_out: None,
             from,
             contact: [pulse.first, pulse.last],
+            force_until,
+            second: within.map(|second| second_hit(pulse, second, sample_rate_hz)),
         };
-        hit.left_out = fault(&hit, pulse, &pulses, force_n, responses, block, sample_rate_hz);
+        let outside = own.iter().find(|p| p.first > force_until);
+        hit.left_out = fault(&hit, pulse, outside, force_n, responses, block, sample_rate_hz);
         hits.push(hit);
     }
     Hits { hits, block }
@@ -111,7 +158,7 @@ pub(super) fn find(force_n: &[f64], responses: &[&[f64]], sample_rate_hz: f64, b
 fn fault(
     hit: &Hit,
     pulse: &Pulse,
-    pulses: &[Pulse],
+    outside: Option<&Pulse>,
     force_n: &[f64],
     responses: &[&[f64]],
     block: usize,
@@ -127,12 +174,8 @@ fn fault(
         ));
     }
     let to = to.min(force_n.len());
-    if let Some(second) = pulses.iter().find(|p| p.first > pulse.last && p.first < to) {
-        return Some(format!(
-            "double hit: a second one of {:.0} % after {:.1} ms",
-            100.0 * second.peak_n / pulse.peak_n,
-            1e3 * (second.peak_at - pulse.peak_at) as f64 / sample_rate_hz
-        ));
+    if let Some(second) = outside {
+        return Some(second_hit(pulse, second, sample_rate_hz));
     }
     if clipped(&force_n[pulse.first..=pulse.last.min(force_n.len() - 1)]) {
         return Some(format!("the force is clipped at {:.0} N", pulse.peak_n));
@@ -152,15 +195,34 @@ fn fault(
     None
 }
 
-fn pulses(force_n: &[f64], sample_rate_hz: f64) -> Vec<Pulse> {
-    let hardest = force_n.iter().copied().fold(0.0, f64::max);
-    let size: Vec<f64> = force_n.iter().map(|f| f.abs()).collect();
-    // Most of a record is no hit: the median of the size is that of the noise.
-    let noise = 1.4826 * median(&size);
-    let threshold = (ABOVE_NOISE * noise).max(OF_HARDEST * hardest);
-    if !(hardest > threshold) {
-        return Vec::new();
+fn second_hit(first: &Pulse, second: &Pulse, sample_rate_hz: f64) -> String {
+    format!(
+        "double hit: a second one of {:.0} % after {:.1} ms",
+        100.0 * second.peak_n / first.peak_n,
+        1e3 * (second.peak_at - first.peak_at) as f64 / sample_rate_hz
+    )
+}
+
+/// Last sample of the quiet after the pulse. A tail of a few per cent that lasts ten contacts is a tenth of the impulse.
+fn force_until(force_n: &[f64], pulse: &Pulse, noise_n: f64, sample_rate_hz: f64) -> usize {
+    let contact = (pulse.last - pulse.first + 1) as f64;
+    let quiet = (QUIET_S * sample_rate_hz).max(QUIET_CONTACTS * contact).ceil() as usize;
+    let level = (WITHIN_NOISE * noise_n).max(RESOLUTION * pulse.peak_n);
+    let mut last = pulse.last;
+    let tail = force_n.iter().enumerate().skip(pulse.last + 1);
+    for (k, f) in tail.take(LONGEST_TAIL * quiet) {
+        if k > last + quiet {
+            break;
+        }
+        if f.abs() > level {
+            last = k;
+        }
     }
+    last + quiet
+}
+
+/// Stretches of the force above `threshold`, N.
+fn pulses(force_n: &[f64], threshold: f64, sample_rate_hz: f64) -> Vec<Pulse> {
     let contact = (CONTACT_S * sample_rate_hz).ceil() as usize;
     let mut found: Vec<Pulse> = Vec::new();
     for (k, &f) in force_n.iter().enumerate().filter(|(_, f)| **f > threshold) {

@@ -1,6 +1,6 @@
 //! FRFs from raw tap tests: hits are found and judged, windowed, averaged.
 //!
-//! A force window leaves only the contact; where the response has not died out at the end of the block, the same
+//! A force window leaves only what the hammer did until the force stays within its noise; where the response has not died out at the end of the block, the same
 //! exponential window on force and response ends it. Multiplying both by e^(−t/τ) shifts every pole by −1/τ
 //! (McConnell & Varoto 2008, ch. 5), so the damping that it adds is known: ζ_true = ζ_fit − 1/(τ ω).
 
@@ -18,6 +18,8 @@ const END_LEVEL: f64 = 0.01;
 const DIED_OUT: f64 = 0.02;
 /// Force power below this part of its largest excites nothing.
 const EXCITED: f64 = 0.01;
+/// Where a double hit leaves less than this part of the force's power, its spectrum has a hole.
+const HOLE: f64 = 0.01;
 /// A hit whose misfit to the others' FRF is this many times the usual one, and this large, is inconsistent.
 const INCONSISTENT: [f64; 2] = [6.0, 0.05];
 /// Where the usual misfit (share of the response's power) is this large, no hit says anything about another.
@@ -54,6 +56,8 @@ pub struct TapSettings {
     pub estimator: Estimator,
     /// Length of a block; from the distance of the hits where `None`.
     pub block_s: Option<f64>,
+    /// What the FRFs are needed for: from, to in Hz; all that the hammer excites where `None`.
+    pub band_hz: Option<[f64; 2]>,
 }
 
 /// FRFs of one record.
@@ -118,7 +122,15 @@ pub fn impact_test(record: &TapRecord, settings: &TapSettings) -> Result<TapFrfs
     }
     let sign = if -low > high { -1.0 } else { 1.0 };
     let decay_per_s = added_decay(record, &found);
-    let blocks = spectra(record, &force, sign, &found, decay_per_s);
+    let resolution_hz = record.sample_rate_hz / found.block as f64;
+    let mut blocks = spectra(record, &force, sign, &found, decay_per_s);
+    blocks.retain(|block| {
+        let hit = &mut found.hits[block.hit];
+        let Some(second) = &hit.second else { return true };
+        let hole = hole_hz(&block.force, resolution_hz, settings.band_hz);
+        hit.left_out = hole.map(|f| format!("{second} leaves a hole in the force's spectrum at {f:.0} Hz"));
+        hole.is_none()
+    });
     let (kept, contradictory) = consistent(&blocks, &mut found.hits);
     if contradictory {
         warnings.push(
@@ -165,7 +177,16 @@ pub fn impact_test(record: &TapRecord, settings: &TapSettings) -> Result<TapFrfs
         ));
     }
     let lines = excited_lines(&good);
-    let resolution_hz = record.sample_rate_hz / found.block as f64;
+    let last_hz = lines.saturating_sub(1) as f64 * resolution_hz;
+    if let Some([_, to]) = settings.band_hz
+        && to > last_hz + resolution_hz
+        && lines < good[0].force.len()
+    {
+        warnings.push(format!(
+            "the hammer excites up to {last_hz:.0} Hz (above, its force is more than 20 dB down): lines above are not used, of a \
+             band that goes to {to:.0} Hz"
+        ));
+    }
     let (mut frf, mut coherence) = (Vec::new(), Vec::new());
     for response in 0..record.responses.len() {
         let (h, gamma2) = average(&good, response, lines, settings.estimator);
@@ -234,14 +255,15 @@ fn spectra(record: &TapRecord, force: &[f64], sign: f64, found: &hits::Hits, dec
         .map(|(index, hit)| {
             let origin = hit.contact[0] - hit.from;
             let fade = |k: usize| (-decay_per_s * (k as f64 - origin as f64).max(0.0) / rate).exp();
-            // The contact and as much again on either side, with a raised-cosine edge.
+            // As much again as the contact before it, and after it until the force is over; with raised-cosine edges.
             let margin = (hit.contact[1] - hit.contact[0] + 1).max(4);
-            let (open, close) = (hit.contact[0].saturating_sub(margin), hit.contact[1] + margin);
-            let edge = margin as f64;
+            let (open, close) = (hit.contact[0].saturating_sub(margin), hit.force_until);
+            let fall = (0.5 * (close - hit.contact[1]) as f64).max(1.0);
             let windowed = (0..found.block).map(|k| {
                 let at = hit.from + k;
-                let outside = open.saturating_sub(at).max(at.saturating_sub(close)) as f64;
-                let window = 0.5 * (1.0 + (std::f64::consts::PI * (outside / edge).min(1.0)).cos());
+                let before = open.saturating_sub(at) as f64 / margin as f64;
+                let after = at.saturating_sub(close) as f64 / fall;
+                let window = 0.5 * (1.0 + (std::f64::consts::PI * before.max(after).min(1.0)).cos());
                 force.get(at).map_or(0.0, |f| sign * f * window * fade(k))
             });
             let force = transform(windowed.collect());
@@ -325,6 +347,25 @@ fn consistent(blocks: &[Block], hits: &mut [Hit]) -> (Vec<usize>, bool) {
     (kept, false)
 }
 
+/// The lowest line within the band where the force has much less power than above, between lines that it excites.
+fn hole_hz(force: &[Complex64], resolution_hz: f64, band_hz: Option<[f64; 2]>) -> Option<f64> {
+    let [from, to] = band_hz.unwrap_or([0.0, f64::INFINITY]);
+    let power: Vec<f64> = force.iter().map(|f| f.norm_sqr()).collect();
+    let excited = EXCITED * power.iter().copied().fold(0.0, f64::max);
+    let lowest = power.iter().position(|p| *p >= excited)?;
+    let (mut level, mut hole) = (0.0, None);
+    for (k, &power) in power.iter().enumerate().skip(lowest).rev() {
+        let line_hz = k as f64 * resolution_hz;
+        if power < HOLE * level && (from..=to).contains(&line_hz) {
+            hole = Some(line_hz);
+        }
+        if power >= excited {
+            level = power.max(level);
+        }
+    }
+    hole
+}
+
 /// Lines from 0 Hz that the hammer excites.
 fn excited_lines(blocks: &[&Block]) -> usize {
     let count = blocks.first().map_or(0, |b| b.force.len());
@@ -404,8 +445,13 @@ mod tests {
         acceleration: Vec<f64>,
     }
 
-    /// Half-sine hits of 4 ms on a mass on a spring: exact acceleration by its impulse response, and noise.
+    /// Half-sine hits of 4 ms on a mass on a spring, and noise.
     fn bench(zeta: f64, hits: &[(f64, f64)], length_s: f64) -> Bench {
+        answer(zeta, struck(hits, length_s))
+    }
+
+    /// Force of hits (time in s, peak in N).
+    fn struck(hits: &[(f64, f64)], length_s: f64) -> Vec<f64> {
         let n = (length_s * RATE_HZ) as usize;
         let mut force = vec![0.0; n];
         for &(at_s, peak_n) in hits {
@@ -414,9 +460,14 @@ mod tests {
                 force[from + k] += peak_n * (std::f64::consts::PI * (k as f64 + 0.5) / 8.0).sin();
             }
         }
+        force
+    }
+
+    /// Exact acceleration by the impulse response, and noise.
+    fn answer(zeta: f64, mut force: Vec<f64>) -> Bench {
         let (w0, dt) = (std::f64::consts::TAU * F0_HZ, 1.0 / RATE_HZ);
         let (mut x, mut v) = (0.0f64, 0.0f64);
-        let mut acceleration = Vec::with_capacity(n);
+        let mut acceleration = Vec::with_capacity(force.len());
         // Many small steps: the error of the integration is far below the marks.
         const STEPS: usize = 40;
         for f in &force {
@@ -437,12 +488,118 @@ mod tests {
     }
 
     fn frfs(bench: &Bench) -> Result<TapFrfs> {
+        frfs_in(bench, None)
+    }
+
+    fn frfs_in(bench: &Bench, band_hz: Option<[f64; 2]>) -> Result<TapFrfs> {
         let record = TapRecord {
             sample_rate_hz: RATE_HZ,
             force_n: &bench.force,
             responses: &[&bench.acceleration],
         };
-        impact_test(&record, &TapSettings::default())
+        let settings = TapSettings {
+            band_hz,
+            ..TapSettings::default()
+        };
+        impact_test(&record, &settings)
+    }
+
+    /// Largest relative error of the accelerance's size between `from` and `to` Hz. (The force is held over a sample, which
+    /// is half a sample's delay.)
+    fn error(found: &TapFrfs, zeta: f64, from: f64, to: f64) -> f64 {
+        let lines = found.frequency_hz.iter().zip(&found.frf[0]);
+        let inside = lines.filter(|(f, _)| (from..=to).contains(*f));
+        let errors = inside.map(|(f, h)| {
+            let (r, m) = (f / F0_HZ, MASS_KG);
+            let exact = -r * r / (m * Complex64::new(1.0 - r * r, 2.0 * zeta * r));
+            (h.norm() / exact.norm() - 1.0).abs()
+        });
+        errors.fold(0.0, f64::max)
+    }
+
+    fn left_out(found: &TapFrfs) -> Vec<String> {
+        found.hits.iter().filter_map(|h| h.left_out.clone()).collect()
+    }
+
+    #[test]
+    fn force_after_the_contact_counts() {
+        // The hammer still pushes with 4 % for 20 ms: an eighth of the impulse.
+        let mut force = struck(&[(1.0, 300.0), (5.0, 250.0), (9.0, 320.0)], 13.0);
+        for (at_s, peak_n) in [(1.0, 300.0), (5.0, 250.0), (9.0, 320.0)] {
+            let from = (at_s * RATE_HZ) as usize + 8;
+            force[from..from + 40]
+                .iter_mut()
+                .for_each(|f| *f += 0.04 * peak_n);
+        }
+        let found = frfs(&answer(0.03, force)).unwrap();
+        assert_eq!(left_out(&found), [""; 0]);
+        let error = error(&found, 0.03, 8.0, 40.0);
+        assert!(error < 0.02, "{error}");
+    }
+
+    #[test]
+    fn a_second_touch_is_a_part_of_the_force_unless_it_leaves_holes() {
+        let hits = |second: f64| [(1.0, 300.0), (1.012, second), (5.0, 300.0), (9.0, 280.0)];
+        let soft = frfs(&bench(0.03, &hits(60.0), 13.0)).unwrap();
+        assert_eq!(left_out(&soft), [""; 0]);
+        assert!(error(&soft, 0.03, 8.0, 40.0) < 0.02);
+        // As hard, 12 ms later: no force around 1/(2·12 ms) = 41.7 Hz.
+        let hard = bench(0.03, &hits(300.0), 13.0);
+        let told = left_out(&frfs(&hard).unwrap());
+        assert_eq!(told.len(), 1, "{told:?}");
+        // The peak lies between two samples.
+        assert!(
+            told[0].starts_with("double hit: a second one of 100 % after 12."),
+            "{told:?}"
+        );
+        let (_, at) = told[0].split_once("a hole in the force's spectrum at ").unwrap();
+        let at_hz: f64 = at.trim_end_matches(" Hz").parse().unwrap();
+        assert!((37.0..42.0).contains(&at_hz), "{told:?}");
+        // Where nobody looks a hole does no harm.
+        assert_eq!(left_out(&frfs_in(&hard, Some([5.0, 30.0])).unwrap()), [""; 0]);
+    }
+
+    #[test]
+    fn a_hit_is_judged_by_its_own_peak() {
+        // 10 % of the soft hit, 3 % of the hard one.
+        let alone = frfs(&bench(
+            0.03,
+            &[(1.0, 100.0), (1.06, 10.0), (5.0, 100.0), (9.0, 100.0)],
+            13.0,
+        ));
+        let beside_hard = frfs(&bench(
+            0.03,
+            &[(1.0, 100.0), (1.06, 10.0), (5.0, 300.0), (9.0, 300.0)],
+            13.0,
+        ));
+        for found in [alone, beside_hard] {
+            let found = found.unwrap();
+            let told = found.hits[0].left_out.clone().unwrap_or_default();
+            assert!(told.contains("double hit: a second one of 10 %"), "{told:?}");
+            assert_eq!(left_out(&found).len(), 1);
+        }
+    }
+
+    #[test]
+    fn a_band_beyond_the_hammer_is_told() {
+        let bench = bench(0.03, &[(1.0, 300.0), (5.0, 250.0), (9.1, 320.0)], 13.0);
+        let told = |band| {
+            let found = frfs_in(&bench, Some(band)).unwrap();
+            let warnings = found.warnings.into_iter();
+            (
+                *found.frequency_hz.last().unwrap(),
+                warnings
+                    .filter(|w| w.contains("excites up to"))
+                    .collect::<Vec<_>>(),
+            )
+        };
+        let (last_hz, beyond) = told([5.0, 900.0]);
+        assert!(last_hz < 500.0, "{last_hz}");
+        assert!(
+            beyond.len() == 1 && beyond[0].contains(&format!("up to {last_hz:.0} Hz")),
+            "{beyond:?}"
+        );
+        assert!(told([5.0, 100.0]).1.is_empty());
     }
 
     /// Frequency and damping of the mode, window taken out.

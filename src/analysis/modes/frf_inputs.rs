@@ -21,22 +21,34 @@ pub struct FrfReading {
     pub added_decay_per_s: f64,
     /// How FRFs are made of the hits of a raw record.
     pub taps: TapSettings,
+    /// Sampling rate of raw records that say neither times nor a rate, Hz.
+    pub rate_hz: Option<f64>,
 }
 
-/// FRFs of one file: as they stand there, or from the hits of a raw record.
-pub(crate) fn read(
-    path: &Path,
-    reading: &FrfReading,
-    hits: &mut Vec<(String, Vec<Hit>)>,
-    warnings: &mut Vec<String>,
-) -> Result<Vec<FrfInput>> {
+/// What reading says besides the FRFs.
+#[derive(Debug, Default)]
+pub(crate) struct Told {
+    /// By file, of raw records.
+    pub hits: Vec<(String, Vec<Hit>)>,
+    /// What was assumed or left out.
+    pub warnings: Vec<String>,
+    /// Raw records without a good hit: they are left out, and told among the warnings.
+    pub refused: Vec<Error>,
+}
+
+/// FRFs of one file: as they stand there, or from the hits of a raw record (none where no hit is good).
+pub(crate) fn read(path: &Path, reading: &FrfReading, told: &mut Told) -> Result<Vec<FrfInput>> {
     let set = path.display().to_string();
-    let file = ingest::read_file(path)?;
-    warnings.extend(file.warnings.iter().map(|w| format!("{set}: {w}")));
+    let file = match reading.rate_hz {
+        Some(rate_hz) => ingest::read_file_at(path, rate_hz)?,
+        None => ingest::read_file(path)?,
+    };
+    told.warnings
+        .extend(file.warnings.iter().map(|w| format!("{set}: {w}")));
     if !file.contents.frfs.is_empty() {
         let unsaid = file.contents.frfs.iter().filter(|r| r.quantity.is_none()).count();
         if unsaid > 0 {
-            warnings.push(format!(
+            told.warnings.push(format!(
                 "{set}: the file does not say what its {unsaid} FRFs are; taken as {} (another: --quantity)",
                 units::frf_unit(reading.unsaid)
             ));
@@ -63,7 +75,7 @@ pub(crate) fn read(
     }
     let mut inputs = Vec::new();
     for alike in file.contents.times.chunk_by(TimeRecord::same_channels) {
-        inputs.extend(from_segments(&set, path, alike, &reading.taps, hits, warnings)?);
+        inputs.extend(from_segments(&set, path, alike, &reading.taps, told)?);
     }
     Ok(inputs)
 }
@@ -75,36 +87,36 @@ fn from_segments(
     path: &Path,
     segments: &[TimeRecord],
     taps: &TapSettings,
-    hits: &mut Vec<(String, Vec<Hit>)>,
-    warnings: &mut Vec<String>,
+    told: &mut Told,
 ) -> Result<Vec<FrfInput>> {
     let [first, others @ ..] = segments else {
         return Ok(Vec::new());
     };
     if others.is_empty() {
-        return Ok(from_taps(set, path, first, taps, hits, warnings)?.frfs);
+        return Ok(from_taps(set, path, first, taps, told)?.frfs);
     }
     let mut whole = first.clone();
     others.iter().for_each(|segment| whole.append(segment));
-    let (mut their_hits, mut their_warnings) = (Vec::new(), Vec::new());
-    let together = from_taps(set, path, &whole, taps, &mut their_hits, &mut their_warnings)?;
+    let mut theirs = Told::default();
+    let together = from_taps(set, path, &whole, taps, &mut theirs)?;
     if !together.contradictory {
-        warnings.push(format!(
+        told.warnings.push(format!(
             "{set}: {} records with the same channels: their hits are averaged",
             segments.len()
         ));
-        warnings.extend(their_warnings);
-        hits.extend(their_hits);
+        told.warnings.extend(theirs.warnings);
+        told.hits.extend(theirs.hits);
+        told.refused.extend(theirs.refused);
         return Ok(together.frfs);
     }
-    warnings.push(format!(
+    told.warnings.push(format!(
         "{set}: {} records with the same channels, whose hits contradict each other (other points or directions, or noise \
          as large as the response): FRFs of each record alone",
         segments.len()
     ));
     let mut inputs = Vec::new();
     for (k, segment) in segments.iter().enumerate() {
-        let alone = from_taps(set, path, segment, taps, hits, warnings)?.frfs;
+        let alone = from_taps(set, path, segment, taps, told)?.frfs;
         inputs.extend(alone.into_iter().map(|input| FrfInput {
             name: format!("{} record {}", input.name, k + 1),
             ..input
@@ -151,13 +163,8 @@ fn receptance(frequency_hz: &[f64], value: &[Complex64], quantity: Option<Quanti
 /// The hammer's channel: the only one in newtons, or else the only one that is called so.
 fn hammer<'a>(record: &'a TimeRecord, path: &Path) -> Result<&'a Channel> {
     let in_newtons =
-        |c: &&Channel| units::parse(&c.file_unit).is_some_and(|u| u.dimension == Dimension::FORCE);
-    let called = |c: &&Channel| {
-        let name = c.name.to_lowercase();
-        ["hammer", "force", "impact", "kladivo", "kraft"]
-            .iter()
-            .any(|w| name.contains(w))
-    };
+        |c: &&Channel| units::parse_named(&c.file_unit).is_some_and(|u| u.dimension == Dimension::FORCE);
+    let called = |c: &&Channel| ingest::is_called_hammer(&c.name);
     let by = |test: &dyn Fn(&&Channel) -> bool| -> Vec<&'a Channel> {
         record.channels.iter().filter(|c| test(c)).collect()
     };
@@ -189,30 +196,51 @@ fn from_taps(
     path: &Path,
     record: &TimeRecord,
     taps: &TapSettings,
-    hits: &mut Vec<(String, Vec<Hit>)>,
-    warnings: &mut Vec<String>,
+    told: &mut Told,
 ) -> Result<FromTaps> {
     let hammer = hammer(record, path)?;
-    let sensors: Vec<(&Channel, Quantity)> = record
-        .channels
-        .iter()
-        .filter(|c| !std::ptr::eq(*c, hammer))
-        .filter_map(|c| {
-            let motion = units::parse(&c.file_unit).and_then(|u| u.dimension.motion());
-            if motion.is_none() {
-                warnings.push(format!(
-                    "{set}: channel {} ({}) is no displacement, velocity or acceleration: left out",
-                    c.name, c.file_unit
-                ));
-            }
-            Some((c, motion?))
-        })
-        .collect();
+    if units::is_blank(&hammer.file_unit) {
+        told.warnings.push(format!(
+            "{set}: the hammer's channel {} has no unit: taken for newtons",
+            hammer.name
+        ));
+    }
+    let mut sensors: Vec<(&Channel, Quantity)> = Vec::new();
+    for c in record.channels.iter().filter(|c| !std::ptr::eq(*c, hammer)) {
+        let motion = units::parse_named(&c.file_unit).and_then(|u| u.dimension.motion());
+        let acceleration = units::is_blank(&c.file_unit) && ingest::is_called_acceleration(&c.name);
+        let quantity = motion.or(acceleration.then_some(Quantity::Accelerance));
+        sensors.extend(quantity.map(|q| (c, q)));
+        if acceleration {
+            told.warnings.push(format!(
+                "{set}: channel {} has no unit: taken for m/s² (another: name it {}_g)",
+                c.name, c.name
+            ));
+        } else if motion.is_none() {
+            told.warnings.push(format!(
+                "{set}: channel {} ({}) is no displacement, velocity or acceleration: left out",
+                c.name, c.file_unit
+            ));
+        }
+    }
     if sensors.is_empty() {
-        return Err(InputError::new("a tap record without a response channel")
-            .file(path)
-            .remedy("give the sensors' channels a unit: m/s² or g, m/s, m or µm")
-            .into());
+        let others: Vec<&str> = record
+            .channels
+            .iter()
+            .filter(|c| !std::ptr::eq(*c, hammer))
+            .map(|c| c.name.as_str())
+            .collect();
+        return Err(InputError::new(format!(
+            "a tap record without a response channel (hammer {}, others: {})",
+            hammer.name,
+            if others.is_empty() { "none".into() } else { others.join(", ") }
+        ))
+        .file(path)
+        .remedy(
+            "give the sensors' channels a unit, where the file has no place for it at the end of their name: acc_m_per_s2, acc_g, \
+             \"Acc [m/s²]\", vel_m_per_s, disp_um; a channel called acc… without a unit is taken for m/s²",
+        )
+        .into());
     }
     let responses: Vec<&[f64]> = sensors.iter().map(|(c, _)| c.samples.as_slice()).collect();
     let tap = TapRecord {
@@ -220,12 +248,21 @@ fn from_taps(
         force_n: &hammer.samples,
         responses: &responses,
     };
-    let found = modal::impact_test(&tap, taps).map_err(|e| match e {
-        Error::Input(e) => (*e).file(path).into(),
-        other => other,
-    })?;
-    warnings.extend(found.warnings.iter().map(|w| format!("{set}: {w}")));
-    hits.push((set.to_owned(), found.hits));
+    let found = match modal::impact_test(&tap, taps) {
+        Ok(found) => found,
+        Err(Error::Input(why)) => {
+            told.warnings.push(format!("{set}: left out: {}", why.problem));
+            told.refused.push((*why).file(path).into());
+            return Ok(FromTaps {
+                frfs: Vec::new(),
+                contradictory: false,
+            });
+        }
+        Err(other) => return Err(other),
+    };
+    told.warnings
+        .extend(found.warnings.iter().map(|w| format!("{set}: {w}")));
+    told.hits.push((set.to_owned(), found.hits));
     let frfs = sensors
         .iter()
         .enumerate()
@@ -248,6 +285,112 @@ fn from_taps(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A record of one hit, or of none, with these names.
+    fn record(names: &str, hit_n: f64) -> tempfile::NamedTempFile {
+        let mut text = format!("{names}\n");
+        for k in 0..4000 {
+            let t = (f64::from(k) - 100.0) / 2000.0;
+            let (force, motion) = match k {
+                100..104 => (hit_n, 0.0),
+                _ if t > 0.0 => (0.0, hit_n * (-20.0 * t).exp() * (300.0 * t).sin()),
+                _ => (0.0, 0.0),
+            };
+            let noise = 1e-3 * f64::from(k * k % 7 - 3);
+            text += &format!(
+                "{:.4},{:.5},{:.5}\n",
+                f64::from(k) / 2000.0,
+                force + noise,
+                motion + noise
+            );
+        }
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        file
+    }
+
+    #[test]
+    fn a_record_without_a_good_hit_is_left_out() {
+        let names = "time_s,force_n,acc_m_per_s2";
+        let (bad, good) = (record(names, 0.0), record(names, 10.0));
+        let of = |files: &[&Path]| {
+            let (reading, settings) = (FrfReading::default(), modal::Settings::default());
+            crate::analysis::modes::modal::ModalAnalysis::of_files(files, true, &reading, &settings)
+        };
+        let found = of(&[bad.path(), good.path()]).unwrap();
+        assert_eq!((found.sets[0].frfs.len(), found.hits.len()), (1, 1));
+        let told = format!("{}: left out: no hit found", bad.path().display());
+        assert!(
+            found.warnings.iter().any(|w| w.starts_with(&told)),
+            "{:?}",
+            found.warnings
+        );
+        let error = of(&[bad.path(), bad.path()]).unwrap_err().to_string();
+        assert!(
+            error.contains("no hit found") && error.contains("remedy"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn sensors_are_known_by_their_unit_or_called_acc() {
+        let of = |names: &str| {
+            let mut told = Told::default();
+            let file = record(names, 10.0);
+            let found = read(file.path(), &FrfReading::default(), &mut told);
+            (found.map(|f| f.len()), told.warnings.join("\n"))
+        };
+        for names in ["time,force_n,acc_m_per_s2", "time,force [N],tool acc_g"] {
+            let (count, told) = of(names);
+            assert_eq!(
+                (count.unwrap(), told.contains("taken for")),
+                (1, false),
+                "{names}: {told}"
+            );
+        }
+        let (count, told) = of("time,force,Acc 1");
+        assert_eq!(count.unwrap(), 1);
+        assert!(told.contains("force has no unit: taken for newtons"), "{told}");
+        assert!(told.contains("Acc 1 has no unit: taken for m/s²"), "{told}");
+        let error = of("time,force,x").0.unwrap_err().to_string();
+        assert!(
+            error.contains("others: x") && error.contains("acc_m_per_s2"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn a_tap_test_without_times_needs_a_rate() {
+        let whole = record("time_s,force_n,acc_m_per_s2", 10.0);
+        let text = std::fs::read_to_string(whole.path()).unwrap();
+        let rows = text
+            .lines()
+            .map(|l| l.split_once(',').unwrap().1.to_owned() + "\n");
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), rows.collect::<String>()).unwrap();
+        let of = |rate_hz| {
+            let reading = FrfReading {
+                rate_hz,
+                ..FrfReading::default()
+            };
+            read(file.path(), &reading, &mut Told::default())
+        };
+        let error = of(None).unwrap_err().to_string();
+        assert!(
+            error.contains("without a time base") && error.contains("--rate"),
+            "{error}"
+        );
+        let (with, own) = (of(Some(2000.0)).unwrap(), {
+            read(whole.path(), &FrfReading::default(), &mut Told::default()).unwrap()
+        });
+        let apart = with[0]
+            .frequency_hz
+            .iter()
+            .zip(&own[0].frequency_hz)
+            .map(|(a, b)| (a - b).abs());
+        assert!(apart.fold(0.0, f64::max) < 1e-6);
+        assert_eq!(with[0].receptance_m_per_n.len(), own[0].receptance_m_per_n.len());
+    }
 
     #[test]
     fn accelerance_and_mobility_become_receptance() {

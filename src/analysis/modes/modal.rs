@@ -7,7 +7,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 pub use crate::analysis::modes::frf_inputs::FrfReading;
-use crate::analysis::modes::frf_inputs::read;
+use crate::analysis::modes::frf_inputs::{Told, read};
 pub use crate::analysis::modes::mode_set::{AnalysedFrf, FrfInput, SetModes};
 use crate::analysis::modes::mode_set::{analyse_set, dofs_of_frfs, set_warnings};
 use crate::analysis::workbench::Workbench;
@@ -83,31 +83,36 @@ impl ModalAnalysis {
     /// FRF files and raw tap tests: one set a file, or all files as one set (FRFs exported one by one).
     ///
     /// # Errors
-    /// A file that cannot be read or holds neither FRFs nor hits.
+    /// A file that cannot be read or holds neither FRFs nor hits; no good hit in any of them.
     pub fn of_files(
         files: &[impl AsRef<Path>],
         together: bool,
         reading: &FrfReading,
         settings: &Settings,
     ) -> Result<Self> {
+        let mut reading = *reading;
+        reading.taps.band_hz = reading.taps.band_hz.or(settings.band_hz);
         let mut inputs = Vec::new();
-        let mut warnings = Vec::new();
-        let mut hits = Vec::new();
+        let mut told = Told::default();
         for file in files {
-            let before = hits.len();
-            let mut of_file = read(file.as_ref(), reading, &mut hits, &mut warnings)?;
+            let before = told.hits.len();
+            let mut of_file = read(file.as_ref(), &reading, &mut told)?;
             // A raw record has its window from here, not from the analyser.
-            if reading.added_decay_per_s > 0.0 && hits.len() == before {
+            if reading.added_decay_per_s > 0.0 && told.hits.len() == before {
                 let decay = reading.added_decay_per_s;
                 of_file.iter_mut().for_each(|i| i.added_decay_per_s = decay);
             }
             inputs.extend(of_file);
         }
-        if together {
-            join(&mut inputs, &mut warnings);
+        let refused = told.refused.into_iter().next();
+        if let (true, Some(error)) = (inputs.is_empty(), refused) {
+            return Err(error);
         }
-        let mut analysis = Self::of(inputs, warnings, settings)?;
-        analysis.hits = hits;
+        if together {
+            join(&mut inputs, &mut told.warnings);
+        }
+        let mut analysis = Self::of(inputs, told.warnings, settings)?;
+        analysis.hits = told.hits;
         Ok(analysis)
     }
 

@@ -48,8 +48,11 @@ pub struct ModalArgs {
     /// Tap tests: length of a block, s (from the distance of the hits where left out).
     #[arg(long, value_name = "S", value_parser = seconds)]
     block_s: Option<f64>,
+    /// Tap tests without a time column: sampling rate, Hz.
+    #[arg(long, value_name = "HZ", value_parser = positive)]
+    rate: Option<f64>,
     /// The files are records of responses without forces (idling, cutting): modes from them alone.
-    #[arg(long, conflicts_with_all = ["together", "each", "block_s"])]
+    #[arg(long, conflicts_with_all = ["together", "each", "block_s", "rate"])]
     output_only: bool,
     /// Write a report of its own into this folder (HTML and PNG).
     #[arg(long, value_name = "DIR", conflicts_with = "output_only")]
@@ -176,6 +179,7 @@ pub fn run(args: ModalArgs) -> Result<Outcome> {
             EstimatorArg::Hv => Estimator::Hv,
         },
         block_s: args.block_s,
+        ..TapSettings::default()
     };
     let campaign = args.paths.iter().any(|p| p.is_dir());
     if args.output_only {
@@ -207,6 +211,7 @@ pub fn run(args: ModalArgs) -> Result<Outcome> {
                 unsaid: args.quantity,
                 added_decay_per_s: args.window_tau.map_or(0.0, |tau| 1.0 / tau),
                 taps,
+                rate_hz: args.rate,
             };
             let analysis = ModalAnalysis::of_files(files, args.together, &reading, &settings)?;
             let paths: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
@@ -240,6 +245,7 @@ impl ModalArgs {
             together: self.together,
             band_hz: self.band,
             window_tau_s: self.window_tau,
+            rate_hz: self.rate,
         }
     }
 }

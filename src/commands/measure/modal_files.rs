@@ -26,6 +26,7 @@ pub struct Files<'a> {
     pub together: bool,
     pub band_hz: Option<[f64; 2]>,
     pub window_tau_s: Option<f64>,
+    pub rate_hz: Option<f64>,
 }
 
 impl Files<'_> {
@@ -41,6 +42,9 @@ impl Files<'_> {
         }
         if let Some([low, high]) = self.band_hz {
             let _ = write!(line, " --band {low}:{high}");
+        }
+        if let Some(rate) = self.rate_hz {
+            let _ = write!(line, " --rate {rate}");
         }
         if let Some(tau) = self.window_tau_s {
             let _ = write!(line, " --window-tau {tau}");

@@ -3,7 +3,7 @@
 use crate::InputError;
 use crate::data::{Channel, ChannelRole, TimeRecord};
 use crate::ingest::checks;
-use crate::ingest::tables::channel_names::{self, role_of, split_unit};
+use crate::ingest::tables::channel_names::{self, role_of, split_unit, unit_label};
 use crate::ingest::tables::clock;
 use crate::ingest::tables::number;
 use crate::ingest::tables::table::{Header, Table};
@@ -378,15 +378,7 @@ fn channel(
     let unit = column_unit(header, at);
     let role = role_of(&name, unit);
     let label = header.units.get(at).cloned();
-    let file_unit = label.unwrap_or_else(|| {
-        let (_, unit) = split_unit(&name);
-        let in_brackets = name
-            .split_once(['[', '('])
-            .map(|(_, u)| u.trim_end_matches([']', ')']).to_owned());
-        in_brackets
-            .or_else(|| unit.and_then(|u| suffix_label(&name, u)))
-            .unwrap_or_default()
-    });
+    let file_unit = label.unwrap_or_else(|| unit_label(&name));
     match unit {
         Some(unit) => {
             if (unit.factor - 1.0).abs() > 1e-12 {
@@ -410,14 +402,6 @@ fn channel(
         role,
         samples,
     })
-}
-
-/// The unit of `fx_n` as people write it.
-fn suffix_label(name: &str, unit: Unit) -> Option<String> {
-    match unit.dimension.describe() {
-        Some((_, si)) if (unit.factor - 1.0).abs() < 1e-12 => Some(si.to_owned()),
-        _ => name.split_once('_').map(|(_, suffix)| suffix.to_owned()),
-    }
 }
 
 /// Resolution of the printed time: a unit in the last place, in the coarsest of the first, middle and last stretches of rows.

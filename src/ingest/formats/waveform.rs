@@ -3,7 +3,7 @@
 use crate::InputError;
 use crate::data::{Channel, ChannelRole, TimeRecord};
 use crate::ingest::checks;
-use crate::ingest::tables::channel_names::{role_of, unit_in_name};
+use crate::ingest::tables::channel_names::{role_of, unit_in_name, unit_label};
 use crate::ingest::text::Notes;
 use crate::ingest::units::{self, Dimension};
 
@@ -32,6 +32,11 @@ pub(crate) fn channel(
     let factor = unit.map_or(1.0, |u| u.factor);
     samples.iter_mut().for_each(|v| *v *= factor);
     checks::plausible_samples(&name, &samples)?;
+    let file_unit = if units::is_blank(&file_unit) {
+        unit_label(&name)
+    } else {
+        file_unit
+    };
     Ok(Channel {
         name,
         file_unit,

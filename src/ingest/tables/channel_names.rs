@@ -94,7 +94,12 @@ pub(crate) fn split_unit(name: &str) -> (&str, Option<Unit>) {
         if let Some((base, rest)) = name.split_once(open)
             && let Some((unit, _)) = rest.split_once(close)
         {
-            return (base.trim(), units::parse(unit));
+            // `acc_(m_s2)`, as names of variables have it.
+            let understood = units::parse(unit).or_else(|| {
+                let is_suffix = unit.contains('_');
+                is_suffix.then(|| units::parse_suffix(unit)).flatten()
+            });
+            return (base.trim(), understood);
         }
     }
     for (at, _) in name.match_indices('_') {
@@ -114,6 +119,38 @@ pub(crate) fn split_unit(name: &str) -> (&str, Option<Unit>) {
 /// The unit that a channel's name gives: `fx_n`, `Fx [N]`.
 pub(crate) fn unit_in_name(name: &str) -> Option<Unit> {
     split_unit(name).1
+}
+
+/// The unit that a channel's name gives, as people write it: `m/s²` for `acc_m_per_s2`, `g` for `Acc [g]`; blank where it
+/// gives none.
+pub(crate) fn unit_label(name: &str) -> String {
+    let unit = unit_in_name(name);
+    if let Some((_, label)) = name.split_once(['[', '(']) {
+        let label = label.trim_end_matches([']', ')']);
+        if unit.is_none() || units::parse_named(label).is_some() {
+            return label.to_owned();
+        }
+    }
+    match unit.and_then(|u| Some((u.factor, u.dimension.describe()?.1))) {
+        Some((factor, si)) if (factor - 1.0).abs() < 1e-12 => si.to_owned(),
+        _ if unit.is_some() => name
+            .split_once('_')
+            .map_or_else(String::new, |(_, suffix)| suffix.to_owned()),
+        _ => String::new(),
+    }
+}
+
+/// Is it called as the hammer of a tap test is?
+pub(crate) fn is_called_hammer(name: &str) -> bool {
+    let name = name.to_lowercase();
+    ["hammer", "force", "impact", "kladivo", "kraft"]
+        .iter()
+        .any(|w| name.contains(w))
+}
+
+/// Is it called as an accelerometer is? `acc`, `Acc 1`, `tool_acceleration`.
+pub(crate) fn is_called_acceleration(name: &str) -> bool {
+    words(name).iter().any(|w| w.starts_with("acc"))
 }
 
 /// Words of a name in small letters, those of `DynoFx` and `CH1Fx` too.

@@ -85,6 +85,9 @@ impl Header {
             && line.len() == names.len()
         {
             units = line;
+        } else if let Some(labelled) = labelled_names(&above, delimiter, &names) {
+            units = std::mem::replace(&mut names, labelled);
+            units[0] = "s".into();
         } else if below.is_empty() && is_units(&names) && above.len() > 1 {
             let candidate = split_names(&above[above.len() - 2], delimiter);
             if candidate.len() == names.len() {
@@ -130,6 +133,15 @@ impl Header {
             columns,
             data_at,
             data_line,
+        })
+    }
+
+    /// Do the lines above the numbers say what they are in their first field (Kyowa)?
+    pub fn is_labelled(&self) -> bool {
+        let mut rows = self.lines.iter().map(|l| split_names(l, self.delimiter));
+        rows.any(|row| {
+            row.first()
+                .is_some_and(|f| f.eq_ignore_ascii_case(CHANNEL_NUMBER))
         })
     }
 
@@ -563,6 +575,26 @@ fn names_line(above: &[String], delimiter: Delimiter, fields: usize) -> Option<u
     let at = from + above[from..].iter().rposition(is_names)?;
     // The last line, or the last but one above units: as ever.
     (at + 2 < above.len() || at + 2 == above.len() && !is_unit_line(above.last()?, delimiter)).then_some(at)
+}
+
+/// First fields of the lines above the numbers, in small letters, as Kyowa's recorders (PCD-400A) write them.
+const CHANNEL_NAME: &str = "ch name";
+const CHANNEL_NUMBER: &str = "ch no.";
+
+/// Names of the columns above a last line (`units`) that begins with `Unit`, where each line says in its first field what it
+/// holds: the line `CH Name`, `CH No.` where that is blank. The first column is the time.
+fn labelled_names(above: &[String], delimiter: Delimiter, units: &[String]) -> Option<Vec<String>> {
+    if !units.first()?.eq_ignore_ascii_case("unit") {
+        return None;
+    }
+    let line = |label: &str| {
+        let rows = above.iter().map(|l| split_names(l, delimiter));
+        let mut named = rows.filter(|r| r.len() == units.len() && r[0].eq_ignore_ascii_case(label));
+        named.find(|r| r[1..].iter().all(|name| !name.is_empty()))
+    };
+    let mut names = line(CHANNEL_NAME).or_else(|| line(CHANNEL_NUMBER))?;
+    names[0] = "time".into();
+    Some(names)
 }
 
 fn is_unit_line(line: &str, delimiter: Delimiter) -> bool {

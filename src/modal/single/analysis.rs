@@ -208,6 +208,10 @@ fn what_is_open(mode: &FrfMode, curve: &Curve, peaks: &[FrfPeak]) -> Option<&'st
     let best = mode.best();
     let distance = |p: &FrfPeak| (curve.frequency_hz[p.index] - best.frequency_hz).abs();
     let peak = peaks.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+    let lines = [curve.frequency_hz.first()?, curve.frequency_hz.last()?];
+    if !(lines[0]..=lines[1]).contains(&&best.frequency_hz) {
+        return Some("beyond the measured lines");
+    }
     let half_width_hz = best.damping_ratio * best.frequency_hz;
     let placed_hz = half_width_hz.max(0.5 * curve.spacing_hz(peak.index));
     if best.frequency_std_hz.is_some_and(|std| std > placed_hz) {

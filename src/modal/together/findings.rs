@@ -58,6 +58,11 @@ pub(crate) fn collect(
     let (mut scatters, mut moving) = (Vec::new(), 0);
     let mut elsewhere_hz = Vec::new();
     let parts = verify::parts_of_others(fitted, groups);
+    let lines_hz = || data.iter().flat_map(|d| d.frequency_hz.iter().copied());
+    let (first_hz, last_hz) = (
+        lines_hz().fold(f64::INFINITY, f64::min),
+        lines_hz().fold(0.0, f64::max),
+    );
     for (g, group) in groups.iter().enumerate() {
         let solution = &group.solution;
         if let Some(doubt) = &group.doubt {
@@ -160,6 +165,14 @@ pub(crate) fn collect(
                 frequency_std_hz = (small_set * own.std[0]).hypot(between[0]);
                 damping_std = (small_set * own.std[1]).hypot(between[1]);
                 elsewhere_hz.push(frequency_hz);
+            }
+            if !(first_hz..=last_hz).contains(&frequency_hz) {
+                result.rejected.push(RejectedMode {
+                    frequency_hz,
+                    damping_ratio,
+                    reason: "beyond the measured lines, where nothing holds it".into(),
+                });
+                continue;
             }
             if lines_in_half_power_band < LEAKAGE_BELOW_LINES {
                 damping_std = damping_std.hypot(LEAKAGE_LINES * line_hz / (2.0 * pole.frequency_hz));

@@ -309,6 +309,17 @@ mod tests {
             .collect()
     }
 
+    #[test]
+    fn no_mode_beyond_the_lines() {
+        let frfs = set(&[(20.0, 0.02), (60.3, 0.01)], &vec![vec![1.0, 1.0]; 5], 1e-3);
+        let found = global_of(&frfs);
+        let at: Vec<f64> = found.modes.iter().map(|m| m.frequency_hz).collect();
+        assert!(at.len() == 1 && (at[0] - 20.0).abs() < 0.1, "{at:?}");
+        let (f, h) = &frfs[0];
+        let alone = analyse_frf(f, h, &Settings::default()).unwrap().modes;
+        assert!(alone.iter().all(|m| m.best().frequency_hz <= 60.0));
+    }
+
     fn global_of(frfs: &[(Vec<f64>, Vec<Complex64>)]) -> GlobalModes {
         let settings = Settings::default();
         let modes: Vec<FrfModes> = frfs

@@ -36,10 +36,26 @@ pub(crate) fn contents(
     let mut used = vec![false; variables.len()];
     let mut contents = Contents::default();
     join_parts(&mut variables, notes);
-    tables(&variables, labels, &mut used, &mut contents, budget, notes)?;
+    let mut damaged = None;
+    tables(
+        &variables,
+        labels,
+        &mut used,
+        &mut contents,
+        &mut damaged,
+        budget,
+        notes,
+    )?;
     frequency_functions(&variables, &mut used, &mut contents, budget, notes)?;
-    let mut times = time_signals(&variables, &mut used, budget, notes)?;
+    let mut times = time_signals(&variables, &mut used, &mut damaged, budget, notes)?;
     contents.times.append(&mut times);
+    // Beside FRFs a damaged signal is a thing by the way; where the signals are the measurement, it is not.
+    if let Some(error) = damaged {
+        if contents.frfs.is_empty() {
+            return Err(error);
+        }
+        notes.file(format!("{}: signal left out", error.problem));
+    }
     if contents.frfs.is_empty() && contents.times.is_empty() && contents.others.is_empty() {
         return Err(InputError::new(format!(
             "arrays in which no FRF and no time signal is recognised ({})",
@@ -47,7 +63,8 @@ pub(crate) fn contents(
         ))
         .remedy(
             "name the axis f (Hz) or t (s); FRFs are complex arrays with a dimension as long as f, signals real ones \
-             with a dimension as long as t; forces without a time axis: give rate_hz in a [[channel]] of campaign.toml",
+             with a dimension as long as t; without a time axis: `lobestone modal FILE --rate HZ` for a tap test, rate_hz in a \
+             [[channel]] of campaign.toml for cutting forces",
         ));
     }
     let left: Vec<&Variable> = variables
@@ -103,6 +120,7 @@ fn tables(
     labels: &[Labels],
     used: &mut [bool],
     contents: &mut Contents,
+    damaged: &mut Option<InputError>,
     budget: &mut Budget,
     notes: &mut Notes,
 ) -> Result<(), InputError> {
@@ -173,8 +191,12 @@ fn tables(
                 for c in 1..columns {
                     let name = format!("{}{}", variable.name, suffix(c));
                     let unit = channel_unit(variable, variables, labels);
-                    let channel = waveform::channel(name, unit, column(c).to_vec(), notes)?;
-                    waveform::put(&mut contents.times, rate, axis[0], channel)?;
+                    match waveform::channel(name, unit, column(c).to_vec(), notes) {
+                        Ok(channel) => waveform::put(&mut contents.times, rate, axis[0], channel)?,
+                        Err(error) => {
+                            damaged.get_or_insert(error);
+                        }
+                    }
                 }
             }
             _ => continue,
@@ -502,6 +524,7 @@ fn complex(variable: &Variable, at: usize) -> Complex64 {
 fn time_signals(
     variables: &[Variable],
     used: &mut [bool],
+    damaged: &mut Option<InputError>,
     budget: &mut Budget,
     notes: &mut Notes,
 ) -> Result<Vec<TimeRecord>, InputError> {
@@ -587,8 +610,12 @@ fn time_signals(
                     samples = clock::resample(times, &samples, grid);
                 }
                 let name = format!("{}{suffix}", variable.name);
-                let channel = waveform::channel(name, String::new(), samples, notes)?;
-                waveform::put(&mut records, rate, start_s, channel)?;
+                match waveform::channel(name, String::new(), samples, notes) {
+                    Ok(channel) => waveform::put(&mut records, rate, start_s, channel)?,
+                    Err(error) => {
+                        damaged.get_or_insert(error);
+                    }
+                }
             }
         }
     }

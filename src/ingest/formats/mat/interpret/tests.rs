@@ -209,3 +209,50 @@ fn the_list_of_channels_gives_the_units() {
     let unsaid = read(&[]);
     assert_eq!((unsaid.frfs[0].quantity, unsaid.frfs[0].value[3].re), (None, 2.0));
 }
+
+/// Beside FRFs a signal that no sensor gives is left out; alone it is an error.
+#[test]
+fn a_damaged_signal_beside_frfs_is_left_out() {
+    let axis: Vec<f64> = (0..8).map(|k| 1e-3 * f64::from(k)).collect();
+    let mut values = vec![1.0; 8];
+    values[5] = 7e38;
+    let signal = real("Z1_4", &[8, 2], [axis, values].concat());
+    let mut frf = real("H1_2", &[8, 2], [count(8), vec![2.0; 8]].concat());
+    frf.im = Some([vec![0.0; 8], vec![1.0; 8]].concat());
+    let (held, told) = found(vec![frf, signal.clone()]);
+    assert_eq!((held.frfs.len(), held.times.len()), (1, 0));
+    assert!(
+        told.iter()
+            .any(|w| w.contains("Z1_4: 7e38 in sample 6") && w.contains("left out")),
+        "{told:?}"
+    );
+    let mut notes = Notes::default();
+    let error = contents(vec![signal], &[], &mut Budget::for_file(0), &mut notes).unwrap_err();
+    assert!(error.problem.contains("Z1_4"), "{error}");
+}
+
+/// Names carry units here as in CSV.
+#[test]
+fn names_of_signals_give_their_units() {
+    let (found, _) = found(vec![
+        real("t", &[8, 1], (0..8).map(|k| 1e-3 * f64::from(k)).collect()),
+        real("force_n", &[8, 1], count(8)),
+        real("acc_g", &[8, 1], count(8)),
+        real("ACC_(mm_s2)", &[8, 1], count(8)),
+        real("x", &[8, 1], count(8)),
+    ]);
+    let labels: Vec<&str> = found.times[0]
+        .channels
+        .iter()
+        .map(|c| c.file_unit.as_str())
+        .collect();
+    assert_eq!(labels[..2], ["N", "g"]);
+    let last: Vec<f64> = found.times[0].channels.iter().map(|c| c.samples[7]).collect();
+    assert!(
+        (last[1] - 7.0 * 9.80665).abs() < 1e-9 && (last[2] - 7e-3).abs() < 1e-12,
+        "{last:?}"
+    );
+    let motion = |label: &str| units::parse_named(label).and_then(|u| u.dimension.motion());
+    assert_eq!(motion(labels[2]), Some(Quantity::Accelerance), "{labels:?}");
+    assert_eq!(labels[3], "");
+}

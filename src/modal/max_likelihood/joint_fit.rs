@@ -111,6 +111,17 @@ impl Data {
             spread_hz: &self.spread_hz[from..to],
         })
     }
+
+    /// Do its lines reach a frequency?
+    pub fn reaches(&self, frequency_hz: f64) -> bool {
+        reach(&self.frequency_hz, frequency_hz)
+    }
+}
+
+/// Do lines (ascending, Hz) reach a frequency?
+fn reach(lines_hz: &[f64], frequency_hz: f64) -> bool {
+    let ends = lines_hz.first().zip(lines_hz.last());
+    ends.is_some_and(|(first, last)| (*first..=*last).contains(&frequency_hz))
 }
 
 /// Refines all candidates (ascending in frequency). The poles of a group that cannot be fitted go out; `None` where none

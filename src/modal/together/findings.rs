@@ -10,7 +10,7 @@ use crate::modal::quality::{self, Power};
 use crate::modal::settings::SET;
 use crate::modal::shape;
 use crate::modal::single::local_fit::Pole;
-use crate::modal::stabilisation::{Candidate, Stabilisation};
+use crate::modal::stabilisation::{Candidate, MAX_DAMPING, Stabilisation};
 use crate::modal::together::global_modes::{GlobalMode, GlobalModes, RejectedMode};
 use crate::modal::together::own_places;
 use crate::modal::together::reconstruction::reconstruction;
@@ -84,6 +84,10 @@ pub(crate) fn collect(
             .max(1.0)
             .sqrt();
         for (j, pole) in solution.poles.iter().enumerate() {
+            if let Some(reason) = impossible(data, pole) {
+                result.rejected.push(RejectedMode::new(pole, reason));
+                continue;
+            }
             if parts.contains(&(g, j)) {
                 result.rejected.push(RejectedMode {
                     frequency_hz: pole.frequency_hz,
@@ -277,6 +281,20 @@ pub(crate) fn collect(
         };
         result.quality = quality::judge_set(&found);
     }
+}
+
+/// Why a pole cannot be a mode of these lines: it stands for what the model lacks.
+fn impossible(data: &[Data], pole: &Pole) -> Option<String> {
+    if !data.iter().any(|d| d.reaches(pole.frequency_hz)) {
+        return Some("outside the lines that were measured: what lies beyond the band".into());
+    }
+    (pole.damping_ratio >= MAX_DAMPING).then(|| {
+        format!(
+            "a damping ratio of {:.0} % is beyond what a mode can have ({:.0} %): what the other modes leave unexplained",
+            100.0 * pole.damping_ratio,
+            100.0 * MAX_DAMPING
+        )
+    })
 }
 
 /// What two answers leave open of a mode (frequency, Hz; damping ratio).
@@ -501,5 +519,33 @@ pub(crate) fn coarse_lines(data: &[Data], result: &mut GlobalModes) {
             "fewer than {FINE_LINES:.0} lines in the half-power band: {}",
             coarse.join("; ")
         ));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pole_beyond_the_lines_or_damped_beyond_measure_is_no_mode() {
+        let data = |first_hz: f64, last_hz: f64| Data {
+            frequency_hz: vec![first_hz, 0.5 * (first_hz + last_hz), last_hz],
+            receptance: vec![Complex64::ONE; 3],
+            sigma: vec![1.0; 3],
+            spread_hz: vec![0.0; 3],
+            count: vec![1.0; 3],
+        };
+        // One FRF that reaches it is enough.
+        let set = [data(1.0, 40.0), data(2.0, 200.0)];
+        let of = |frequency_hz, damping_ratio| {
+            let pole = Pole {
+                frequency_hz,
+                damping_ratio,
+            };
+            impossible(&set, &pole)
+        };
+        assert_eq!(of(120.0, 0.2), None);
+        assert!(of(514.0, 0.02).unwrap().contains("outside the lines"));
+        assert!(of(46.5, 0.9).unwrap().contains("90 %"));
     }
 }

@@ -461,6 +461,35 @@ mod tests {
         assert!((found.modes[0].damping_ratio - 0.03).abs() < 4.0 * found.modes[0].damping_std);
     }
 
+    /// A record that ends at the hammer's last line, among others that go on.
+    #[test]
+    fn an_frf_whose_band_ends_early_says_what_it_knows_and_keeps_nothing_from_the_others() {
+        let modes: Vec<(f64, f64)> = (0..16).map(|k| (6.0 + 3.3 * f64::from(k), 0.01)).collect();
+        let constants: Vec<Vec<f64>> = (0..6)
+            .map(|k| (0..16).map(|m| ((3 * k + 5 * m + 1) as f64).sin()).collect())
+            .collect();
+        let mut frfs = set(&modes, &constants, 0.01);
+        let lines = frfs[2].0.partition_point(|f| *f < 22.0);
+        frfs[2].0.truncate(lines);
+        frfs[2].1.truncate(lines);
+        let found = global_of(&frfs);
+        assert_eq!(
+            found.modes.len(),
+            modes.len(),
+            "{:?} {:?}",
+            found.modes,
+            found.rejected
+        );
+        for (mode, (f, _)) in found.modes.iter().zip(&modes) {
+            assert!((mode.frequency_hz - f).abs() < 0.02, "{mode:?} for {f} Hz");
+            assert_eq!(mode.constants[2].is_some(), *f < 21.8, "{mode:?}");
+            assert!(mode.constants[3].is_some());
+            assert!(mode.complexity.unwrap().mpc > 0.9, "{mode:?}");
+        }
+        let of_short = found.reconstructions[2].as_ref().unwrap();
+        assert!(of_short.error_nrms < 0.1, "{}", of_short.error_nrms);
+    }
+
     /// As a beam hung in threads: widths far below the lines' distance. What is known is said, the damping is uncertain.
     #[test]
     fn modes_far_narrower_than_a_line_are_kept_where_all_frfs_show_them() {

@@ -247,7 +247,7 @@ fn against(candidate: &Candidate) -> Option<String> {
     } = candidate;
     let j = *j;
     let pole = solution.poles[j];
-    let frfs = solution.frfs.len();
+    let frfs = solution.taking_part();
     let (seen_in, best) = joint_fit::seen_in(solution, j);
     let wanted = ((SHARE_OF_FRFS * frfs as f64).ceil() as usize).max(2);
     if frfs >= SET && seen_in < wanted && best < FAR {
@@ -301,7 +301,7 @@ struct Local {
     measured: f64,
     /// Of what is left, the part that goes on from line to line.
     coloured: f64,
-    /// Its half-power band reaches beyond the lines.
+    /// Its half-power band reaches beyond the lines of every FRF.
     one_sided: bool,
 }
 
@@ -313,7 +313,7 @@ impl Local {
             mode: 0.0,
             measured: 0.0,
             coloured: 0.0,
-            one_sided: false,
+            one_sided: true,
         };
         for ((d, found), residue) in data.iter().zip(&group.solution.frfs).zip(residues) {
             let from = d.frequency_hz.partition_point(|&f| f < group.window_hz[0]);
@@ -325,10 +325,9 @@ impl Local {
                 ..d.frequency_hz
                     .partition_point(|&f| f <= pole.frequency_hz + half_hz);
             let half_power_hz = pole.damping_ratio * pole.frequency_hz;
-            let ends = d.frequency_hz.first().zip(d.frequency_hz.last());
-            local.one_sided |= ends.is_some_and(|(first, last)| {
-                pole.frequency_hz - half_power_hz < *first || pole.frequency_hz + half_power_hz > *last
-            });
+            local.one_sided &= ![-1.0, 1.0]
+                .iter()
+                .all(|side| d.reaches(pole.frequency_hz + side * half_power_hz));
             let mut before: Option<Complex64> = None;
             for k in lines {
                 let Some(residual) = k.checked_sub(from).and_then(|k| found.residual.get(k)) else {
@@ -452,7 +451,7 @@ fn moving(data: &[Data], solution: &Solution, strong: usize, weak: usize) -> Opt
         .collect();
     let single = own_poles(data, pair[0], &others)?;
     let window = around(pair[0]);
-    let frfs: Vec<_> = data.iter().map(|d| d.window(window)).collect::<Option<_>>()?;
+    let frfs: Vec<_> = data.iter().map(|d| d.window(window)).collect();
     let near = near(&others, window);
     let together = ml_fit::fit(&frfs, &pair, &near, ml_fit::SETTLED)?;
     let misfit: f64 = single
@@ -503,7 +502,7 @@ pub(crate) fn own_poles(data: &[Data], pole: Pole, others: &[Pole]) -> Option<Ve
     let near = near(others, window);
     let found: Vec<Option<Solution>> = data
         .par_iter()
-        .map(|d| ml_fit::fit(&[d.window(window)?], &[pole], &near, ml_fit::SETTLED))
+        .map(|d| ml_fit::fit(&[d.window(window)], &[pole], &near, ml_fit::SETTLED))
         .collect();
     found.iter().any(|s| s.is_some()).then_some(found)
 }

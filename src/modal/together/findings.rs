@@ -279,6 +279,7 @@ pub(crate) fn collect(
             moving: moving > 0 && 2 * moving >= scatters.len(),
             doubts,
             elsewhere_hz,
+            missed_hz: own_places::missed(members, &result.modes),
             converged: groups.iter().all(|g| g.solution.converged),
         };
         result.quality = quality::judge_set(&found);

@@ -490,6 +490,32 @@ mod tests {
         assert!(of_short.error_nrms < 0.1, "{}", of_short.error_nrms);
     }
 
+    /// FRFs with a little leakage (each line with a share of its neighbours), each with its modes a third of a half-width aside.
+    #[test]
+    fn a_mode_that_moves_between_three_frfs_stays_one_mode() {
+        let shifts = [0.009, 0.0, -0.011];
+        let constants = [[1.0, 0.8, -0.5], [0.7, -0.6, 0.9], [-0.9, 0.4, 0.8]];
+        let frfs: Vec<_> = shifts
+            .iter()
+            .zip(&constants)
+            .enumerate()
+            .map(|(k, (shift, row))| {
+                let modes = [(47.0, 7e-4), (50.0, 7e-4), (54.0, 7e-4)].map(|(f, zeta)| (f + shift, zeta));
+                let modes = SyntheticMode::row(&modes, row);
+                let (f, h) = Synthetic::new(44.0, 58.0, 0.02, &modes)
+                    .with_noise(0.0, 0.005, k as u64)
+                    .frf();
+                let leaked = h.windows(3).map(|h| 0.15 * h[0] + 0.7 * h[1] + 0.15 * h[2]);
+                (f[1..f.len() - 1].to_vec(), leaked.collect())
+            })
+            .collect();
+        let found = global_of(&frfs);
+        assert_eq!(found.modes.len(), 3, "{:?} {:?}", found.modes, found.rejected);
+        for (mode, f) in found.modes.iter().zip([47.0, 50.0, 54.0]) {
+            assert!((mode.frequency_hz - f).abs() < 0.012, "{mode:?}");
+        }
+    }
+
     /// As a beam hung in threads: widths far below the lines' distance. What is known is said, the damping is uncertain.
     #[test]
     fn modes_far_narrower_than_a_line_are_kept_where_all_frfs_show_them() {

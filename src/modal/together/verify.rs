@@ -58,6 +58,11 @@ const COARSE_LINES: f64 = 1.2;
 const SAME: f64 = 0.2;
 /// Residues of a common phase: what a mode next to another one keeps.
 const IN_PHASE: f64 = 0.7;
+/// Where neither phases nor shapes can tell (few FRFs), two poles are two modes if they leave so many times less
+/// than one pole that each FRF has at a place of its own …
+const CLEARLY: f64 = 20.0;
+/// … as long as they are nearer than this share of the sum of their half-widths, or than a line: what a moving pole may look like.
+const HARD_TO_TELL: f64 = 0.5;
 /// Shapes that repeat …
 const SAME_SHAPE: f64 = 0.9;
 /// … and that do where two poles are at the same place.
@@ -389,7 +394,8 @@ fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2], common: bool
         true => (CLOSE * width).max(LEAKS_LINES * line_hz),
         false => CLOSE * width,
     };
-    if b.frequency_hz - a.frequency_hz > reach {
+    let apart_hz = b.frequency_hz - a.frequency_hz;
+    if apart_hz > reach {
         return None;
     }
     let residues = both.map(|j| solution.known_constants(j));
@@ -403,20 +409,24 @@ fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2], common: bool
         (both[1], both[0])
     };
     let beside = solution.poles[strong].frequency_hz;
-    if let Some(merged) = moving(data, solution, strong, weak) {
+    let enough = solution.taking_part() >= ENOUGH_FRFS;
+    // Leakage and what else one pole lacks gives two poles an edge that more FRFs would see through.
+    let hard_to_tell = !enough && apart_hz < (HARD_TO_TELL * width).max(line_hz);
+    let most = if hard_to_tell { CLEARLY } else { 1.0 };
+    let moving = moving(data, solution, strong, weak);
+    if let Some(moving) = moving.as_ref().filter(|m| m.leaves <= most) {
         return Some(ClosePair {
             strong,
             weak,
-            merged: Some(merged),
+            merged: Some(moving.pole),
             reason: format!(
                 "one mode with {beside:.2} Hz, whose frequency moves from FRF to FRF: mass of the sensor, temperature"
             ),
         });
     }
     let out_of_phase = |r: &Vec<Complex64>| shape::complexity(r).is_some_and(|c| c.mpc < IN_PHASE);
-    let enough = residues[0].len() >= ENOUGH_FRFS;
-    let leaks = width < COARSE_LINES * line_hz && b.frequency_hz - a.frequency_hz < reach;
-    let same_place = b.frequency_hz - a.frequency_hz < SAME * width || leaks;
+    let leaks = width < COARSE_LINES * line_hz && apart_hz < reach;
+    let same_place = apart_hz < SAME * width || leaks;
     // Two modes as near as that have common phases both, if the others of the set have.
     let cancel = enough
         && (same_place && residues.iter().any(out_of_phase) || common && residues.iter().all(out_of_phase));
@@ -438,9 +448,16 @@ fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2], common: bool
     })
 }
 
-/// Does one mode that each FRF has at a place of its own describe the FRFs better than two common ones? Both have as many
-/// parameters. Its mean then.
-fn moving(data: &[Data], solution: &Solution, strong: usize, weak: usize) -> Option<Pole> {
+/// One mode that each FRF has at a place of its own, instead of two common ones; it has about as many parameters.
+struct Moving {
+    /// Its median over the FRFs.
+    pole: Pole,
+    /// What it leaves of the FRFs (misfit) over what the two common poles leave.
+    leaves: f64,
+}
+
+/// `None` where a fit fails, or for a single FRF.
+fn moving(data: &[Data], solution: &Solution, strong: usize, weak: usize) -> Option<Moving> {
     if data.len() < 2 {
         return None;
     }
@@ -456,16 +473,18 @@ fn moving(data: &[Data], solution: &Solution, strong: usize, weak: usize) -> Opt
     let together = ml_fit::fit(&frfs, &pair, &near, ml_fit::SETTLED)?;
     let misfit: f64 = single
         .iter()
-        .map(|s| s.as_ref().map_or(f64::INFINITY, |s| s.misfit))
+        .zip(&together.frfs)
+        .filter(|(_, of_pair)| of_pair.took_part())
+        .map(|(s, _)| s.as_ref().map_or(f64::INFINITY, |s| s.misfit))
         .sum();
-    if misfit > together.misfit {
-        return None;
-    }
     let poles: Vec<Pole> = single.iter().flatten().map(|s| s.poles[0]).collect();
     let median = |of: fn(&Pole) -> f64| crate::signal::median(&poles.iter().map(of).collect::<Vec<_>>());
-    Some(Pole {
-        frequency_hz: median(|p| p.frequency_hz),
-        damping_ratio: median(|p| p.damping_ratio),
+    Some(Moving {
+        pole: Pole {
+            frequency_hz: median(|p| p.frequency_hz),
+            damping_ratio: median(|p| p.damping_ratio),
+        },
+        leaves: misfit / together.misfit,
     })
 }
 

@@ -516,6 +516,41 @@ mod tests {
         }
     }
 
+    /// Five taps at one place: every mode has the same shape, so that it cannot tell two modes from one.
+    #[test]
+    fn two_close_modes_are_told_apart_from_frfs_of_one_place() {
+        let modes = [
+            (10.0, 0.01),
+            (20.0, 0.007),
+            (20.1, 0.006),
+            (31.0, 0.01),
+            (45.0, 0.008),
+        ];
+        let frfs: Vec<_> = (0..5)
+            .map(|k| {
+                let row = [1.0, 0.8, 1.1, -0.9, 1.2].map(|c| c * (1.0 + 0.01 * k as f64));
+                let modes = SyntheticMode::row(&modes, &row);
+                Synthetic::new(3.0, 60.0, 0.05, &modes)
+                    .with_noise(0.0, 0.005, k as u64)
+                    .frf()
+            })
+            .collect();
+        let found = global_of(&frfs);
+        assert_eq!(
+            found.modes.len(),
+            modes.len(),
+            "{:?} {:?}",
+            found.modes,
+            found.rejected
+        );
+        for (mode, (f, _)) in found.modes.iter().zip(modes) {
+            assert!(
+                (mode.frequency_hz - f).abs() < 4.0 * mode.frequency_std_hz.max(1e-3),
+                "{mode:?} for {f} Hz"
+            );
+        }
+    }
+
     /// As a beam hung in threads: widths far below the lines' distance. What is known is said, the damping is uncertain.
     #[test]
     fn modes_far_narrower_than_a_line_are_kept_where_all_frfs_show_them() {

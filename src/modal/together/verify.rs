@@ -58,7 +58,7 @@ const COARSE_LINES: f64 = 1.2;
 const SAME: f64 = 0.2;
 /// Residues of a common phase: what a mode next to another one keeps.
 const IN_PHASE: f64 = 0.7;
-/// Where neither phases nor shapes can tell (few FRFs), two poles are two modes if they leave so many times less
+/// Where neither phases nor shapes can tell (few FRFs, or all at one place), two poles are two modes if they leave so many times less
 /// than one pole that each FRF has at a place of its own …
 const CLEARLY: f64 = 20.0;
 /// … as long as they are nearer than this share of the sum of their half-widths, or than a line: what a moving pole may look like.
@@ -78,9 +78,9 @@ pub(crate) fn verified(
     for _ in 0..MAX_ROUNDS {
         let mut kept: Vec<Pole> = Vec::new();
         let mut out = false;
-        let common = common_phase(&data, &groups);
+        let (common, one_place) = (common_phase(&data, &groups), one_place(&data, &groups));
         for group in &groups {
-            let pairs = close_pairs(&data, group, common);
+            let pairs = close_pairs(&data, group, common, one_place);
             let poles = &group.solution.poles;
             let mut doubtful: Vec<(usize, f64, String)> = Vec::new();
             let mut leaves: Vec<Option<String>> = vec![None; poles.len()];
@@ -200,6 +200,24 @@ fn common_phase(data: &[Data], groups: &[Group]) -> bool {
         .collect();
     let in_phase = all.iter().filter(|mpc| **mpc > ALIKE_PHASE).count();
     in_phase >= OTHERS && A_GOOD_PART * in_phase >= all.len()
+}
+
+/// Whether modes that stand well apart have one shape all the same: FRFs of one place, whose shapes tell no mode from another.
+fn one_place(data: &[Data], groups: &[Group]) -> bool {
+    let all: Vec<Candidate> = groups
+        .iter()
+        .flat_map(|group| (0..group.solution.poles.len()).map(move |j| Candidate::new(data, group, j)))
+        .filter(Candidate::dominates)
+        .collect();
+    let pole = |candidate: &Candidate| candidate.solution.poles[candidate.pole];
+    let likeness: Vec<f64> = all
+        .iter()
+        .enumerate()
+        .flat_map(|(k, a)| all[..k].iter().map(move |b| (a, b)))
+        .filter(|(a, b)| !neighbours(data, pole(a), pole(b)))
+        .map(|(a, b)| shape::mac(&a.known, &b.known))
+        .collect();
+    likeness.len() >= OTHERS && crate::signal::median(&likeness) > SAME_SHAPE
 }
 
 /// The poles, by group and number, that have phases by chance next to a stronger one, or that others cancel, in a set whose modes have
@@ -362,8 +380,8 @@ struct ClosePair {
 }
 
 /// The pairs of a group that are one mode: because its frequency moves from FRF to FRF, or because the shapes repeat. No
-/// pole is in two of them. `common`: the modes of the set have common phases.
-fn close_pairs(data: &[Data], group: &Group, common: bool) -> Vec<ClosePair> {
+/// pole is in two of them. `common`: the modes of the set have common phases; `one_place`: and shapes that tell nothing.
+fn close_pairs(data: &[Data], group: &Group, common: bool, one_place: bool) -> Vec<ClosePair> {
     let solution = &group.solution;
     let mut order: Vec<usize> = (0..solution.poles.len()).collect();
     order.sort_by(|&a, &b| {
@@ -374,7 +392,7 @@ fn close_pairs(data: &[Data], group: &Group, common: bool) -> Vec<ClosePair> {
     let mut found = Vec::new();
     let mut k = 1;
     while k < order.len() {
-        match close_pair(data, solution, [order[k - 1], order[k]], common) {
+        match close_pair(data, solution, [order[k - 1], order[k]], common, one_place) {
             Some(pair) => {
                 found.push(pair);
                 k += 2;
@@ -385,7 +403,13 @@ fn close_pairs(data: &[Data], group: &Group, common: bool) -> Vec<ClosePair> {
     found
 }
 
-fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2], common: bool) -> Option<ClosePair> {
+fn close_pair(
+    data: &[Data],
+    solution: &Solution,
+    both: [usize; 2],
+    common: bool,
+    one_place: bool,
+) -> Option<ClosePair> {
     let [a, b] = both.map(|j| solution.poles[j]);
     let width = a.damping_ratio * a.frequency_hz + b.damping_ratio * b.frequency_hz;
     let line_hz = joint_fit::line_hz(data, a.frequency_hz);
@@ -439,7 +463,8 @@ fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2], common: bool
         });
     }
     let alike = if same_place { ALIKE_SHAPE } else { SAME_SHAPE };
-    let repeats = enough && shape::mac(&residues[0], &residues[1]) > alike;
+    let clearly_two = one_place && moving.is_some_and(|m| m.leaves > CLEARLY);
+    let repeats = enough && !clearly_two && shape::mac(&residues[0], &residues[1]) > alike;
     repeats.then(|| ClosePair {
         strong,
         weak,

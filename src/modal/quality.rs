@@ -253,6 +253,8 @@ pub(super) struct SetFindings {
     pub doubts: usize,
     /// Modes that the FRFs by themselves put elsewhere than the common fit, Hz.
     pub elsewhere_hz: Vec<f64>,
+    /// Clear peaks of most FRFs that are not among the modes, Hz.
+    pub missed_hz: Vec<f64>,
     pub converged: bool,
 }
 
@@ -324,6 +326,16 @@ pub(super) fn judge_set(found: &SetFindings) -> SetQuality {
             format!(
                 "the common fit has {} Hz elsewhere than the FRFs by themselves, which were taken: it lacks something there (a \
                  narrower --band may help)",
+                places.join(", ")
+            ),
+        );
+    }
+    if !found.missed_hz.is_empty() {
+        let places: Vec<String> = found.missed_hz.iter().map(|f| format!("{f:.2}")).collect();
+        note(
+            QualityGrade::Doubtful,
+            format!(
+                "clear peaks that the FRFs have by themselves are not among the common modes: {} Hz (a narrower --band may help)",
                 places.join(", ")
             ),
         );

@@ -113,6 +113,7 @@ pub(crate) fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Setting
         })
         .collect();
     let mut global = modal::global(&members, settings)?;
+    global.warnings.extend(shorter_bands(&inputs, settings.band_hz));
     if !sines.is_empty() {
         let told: Vec<String> = sines
             .iter()
@@ -199,6 +200,31 @@ pub(crate) fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Setting
         global,
         verdict,
         why,
+    })
+}
+
+/// The FRFs whose lines end well before those of the others, within the band that is looked at (Hz), in words.
+fn shorter_bands(inputs: &[FrfInput], band_hz: Option<[f64; 2]>) -> Option<String> {
+    /// Less of the longest band than this is worth a warning.
+    const WELL_BEFORE: f64 = 0.9;
+    const MOST_NAMES: usize = 4;
+    let end = band_hz.map_or(f64::INFINITY, |[_, to]| to);
+    let last_hz = |input: &FrfInput| input.frequency_hz.last().map_or(0.0, |f| f.min(end));
+    let longest_hz = inputs.iter().map(last_hz).fold(0.0, f64::max);
+    let shorter: Vec<String> = inputs
+        .iter()
+        .filter(|input| last_hz(input) < WELL_BEFORE * longest_hz)
+        .map(|input| format!("{} ({:.1} Hz)", input.name, last_hz(input)))
+        .collect();
+    let more = match shorter.len().saturating_sub(MOST_NAMES) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    (!shorter.is_empty()).then(|| {
+        format!(
+            "lines that end before those of the other FRFs ({longest_hz:.1} Hz) say nothing of the modes beyond: {}{more}",
+            shorter[..shorter.len().min(MOST_NAMES)].join(", ")
+        )
     })
 }
 
@@ -303,4 +329,32 @@ fn delays(set: &SetModes) -> Vec<(String, Option<Delay>)> {
         (name.clone(), delay::delay(&modes))
     })
     .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frfs_with_a_shorter_band_are_named() {
+        let input = |name: &str, last_hz: f64| FrfInput {
+            name: name.into(),
+            set: "set".into(),
+            dofs: None,
+            frequency_hz: vec![1.0, last_hz],
+            receptance_m_per_n: vec![Complex64::ONE; 2],
+            coherence: None,
+            added_decay_per_s: 0.0,
+        };
+        let mut inputs = vec![input("a", 200.0), input("b", 195.0), input("c", 40.0)];
+        let said = shorter_bands(&inputs, None).unwrap();
+        assert!(
+            said.contains("(200.0 Hz)") && said.ends_with("beyond: c (40.0 Hz)"),
+            "{said}"
+        );
+        // What is not looked at may be missing.
+        assert_eq!(shorter_bands(&inputs, Some([0.0, 42.0])), None);
+        inputs.extend((0..6).map(|k| input(&format!("d{k}"), 100.0)));
+        assert!(shorter_bands(&inputs, None).unwrap().ends_with("and 3 more"));
+    }
 }

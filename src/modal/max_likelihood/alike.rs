@@ -97,7 +97,7 @@ impl Alike {
     fn basis(&self, axis: &PoleColumns) -> Option<Basis> {
         let columns = self.weighted(&axis.columns);
         let gram = transposed_product(&columns, &columns, axis.rows);
-        let (cholesky, scale) = ml_linear::unit_cholesky(&gram, gram.ncols(), axis.moving_columns())?;
+        let (cholesky, scale) = ml_linear::unit_cholesky(&gram, &axis.held)?;
         Some(Basis {
             columns,
             rows: axis.rows,

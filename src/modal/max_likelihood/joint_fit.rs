@@ -101,16 +101,28 @@ pub(crate) struct Data {
 }
 
 impl Data {
-    pub fn window(&self, [low, high]: [f64; 2]) -> Option<NoisyFrf<'_>> {
+    /// Its lines from `low` to below `high`, Hz; none where its band does not reach there.
+    pub fn window(&self, [low, high]: [f64; 2]) -> NoisyFrf<'_> {
         let from = self.frequency_hz.partition_point(|&f| f < low);
-        let to = self.frequency_hz.partition_point(|&f| f < high);
-        (to > from).then(|| NoisyFrf {
+        let to = self.frequency_hz.partition_point(|&f| f < high).max(from);
+        NoisyFrf {
             frequency_hz: &self.frequency_hz[from..to],
             receptance: &self.receptance[from..to],
             sigma: &self.sigma[from..to],
             spread_hz: &self.spread_hz[from..to],
-        })
+        }
     }
+
+    /// Do its lines reach a frequency?
+    pub fn reaches(&self, frequency_hz: f64) -> bool {
+        reach(&self.frequency_hz, frequency_hz)
+    }
+}
+
+/// Do lines (ascending, Hz) reach a frequency?
+fn reach(lines_hz: &[f64], frequency_hz: f64) -> bool {
+    let ends = lines_hz.first().zip(lines_hz.last());
+    ends.is_some_and(|(first, last)| (*first..=*last).contains(&frequency_hz))
 }
 
 /// Refines all candidates (ascending in frequency). The poles of a group that cannot be fitted go out; `None` where none
@@ -143,27 +155,24 @@ pub(crate) fn refine(
             .copied()
             .collect();
         let window_hz = [low, high];
-        let frfs: Option<Vec<NoisyFrf>> = data.iter().map(|d| d.window(window_hz)).collect();
         before = after;
-        let Some((mut fit, mut solution)) = frfs.and_then(|frfs| {
-            let mut fit = PoleGroup {
-                frfs,
-                fixed,
-                search,
-                chance: 1.0,
-            };
-            // Poles that the lines do not tell apart (one mode that moves from FRF to FRF can have split) are too many.
-            let solution = fit
-                .fit(group)
-                .or_else(|| MERGED.into_iter().find_map(|share| fit.fit(&apart(group, share))))?;
-            if search != PoleSearch::Roughly && !solution.poles.is_empty() {
-                fit.chance = fit.by_chance(&solution);
-            }
-            Some((fit, solution))
-        }) else {
+        let mut fit = PoleGroup {
+            frfs: data.iter().map(|d| d.window(window_hz)).collect(),
+            fixed,
+            search,
+            chance: 1.0,
+        };
+        // Poles that the lines do not tell apart (one mode that moves from FRF to FRF can have split) are too many.
+        let Some(mut solution) = fit
+            .fit(group)
+            .or_else(|| MERGED.into_iter().find_map(|share| fit.fit(&apart(group, share))))
+        else {
             changes.extend(group.iter().map(|pole| Change::NotDetermined(*pole)));
             continue;
         };
+        if search != PoleSearch::Roughly && !solution.poles.is_empty() {
+            fit.chance = fit.by_chance(&solution);
+        }
         let mut doubt = None;
         if search >= PoleSearch::Pairs {
             solution = fit.without_needless(solution, changes);
@@ -249,13 +258,11 @@ pub(crate) fn worth(data: &[Data], held: &[Pole], candidates: &[Pole]) -> Option
         if inside.is_empty() {
             continue;
         }
-        let Some(frfs) = data
+        let frfs: Vec<NoisyFrf> = data
             .iter()
             .map(|d| d.window(window_hz))
-            .collect::<Option<Vec<_>>>()
-        else {
-            continue;
-        };
+            .filter(|frf| frf.takes_part(near.len()))
+            .collect();
         let damping: Vec<f64> = inside.iter().map(|&k| candidates[k].damping_ratio).collect();
         let mut trials: Vec<Pole> = inside.iter().map(|&k| candidates[k]).collect();
         trials.extend(anywhere(&frfs, crate::signal::median(&damping)));
@@ -278,11 +285,11 @@ pub(crate) fn worth(data: &[Data], held: &[Pole], candidates: &[Pole]) -> Option
 fn anywhere(frfs: &[NoisyFrf], damping: f64) -> Vec<Pole> {
     let first = frfs
         .iter()
-        .map(|c| c.frequency_hz[0])
+        .filter_map(|c| c.frequency_hz.first().copied())
         .fold(f64::INFINITY, f64::min);
     let last = frfs
         .iter()
-        .map(|c| c.frequency_hz[c.frequency_hz.len() - 1])
+        .filter_map(|c| c.frequency_hz.last().copied())
         .fold(0.0, f64::max);
     let at = |k: usize| first + (last - first) * (k as f64 + 0.5) / TRIALS as f64;
     WIDER
@@ -341,13 +348,13 @@ impl PoleGroup<'_> {
 
     fn beyond_chance(&self, solution: &Solution, sigma: f64, looked: f64) -> f64 {
         let level = solution.misfit / solution.degrees_of_freedom as f64;
-        enough(self.frfs.len(), level.max(self.chance), sigma, looked)
+        enough(solution.taking_part(), level.max(self.chance), sigma, looked)
     }
 
     fn by_chance(&self, solution: &Solution) -> f64 {
         let held: Vec<Pole> = solution.poles.iter().chain(&self.fixed).copied().collect();
         let trials = anywhere(&self.frfs, usual_damping(solution));
-        ml_fit::explained_by(&self.frfs, &held, &trials).map_or(1.0, |e| chance(&e, self.frfs.len()))
+        ml_fit::explained_by(&self.frfs, &held, &trials).map_or(1.0, |e| chance(&e, solution.taking_part()))
     }
 
     fn line_hz(&self, frequency_hz: f64) -> f64 {
@@ -359,11 +366,12 @@ impl PoleGroup<'_> {
 
     /// May this pole be a mode of the band?
     pub(super) fn possible(&self, pole: Pole) -> bool {
-        let inside = self.frfs.iter().any(|c| {
-            c.frequency_hz[0] <= pole.frequency_hz
-                && c.frequency_hz[c.frequency_hz.len() - 1] >= pole.frequency_hz
-        });
-        inside && pole.damping_ratio < MAX_DAMPING
+        self.reached(pole) && pole.damping_ratio < MAX_DAMPING
+    }
+
+    /// Do the lines of any FRF reach this pole?
+    fn reached(&self, pole: Pole) -> bool {
+        self.frfs.iter().any(|c| reach(c.frequency_hz, pole.frequency_hz))
     }
 
     /// Do the lines determine this pole?
@@ -406,19 +414,16 @@ impl PoleGroup<'_> {
     /// Does one more pole explain more than chance does?
     fn doubt(&self, solution: &Solution, more: &Solution) -> Option<Doubt> {
         let pole = *more.poles.last()?;
-        let inside = self.frfs.iter().any(|c| {
-            c.frequency_hz[0] <= pole.frequency_hz
-                && c.frequency_hz[c.frequency_hz.len() - 1] >= pole.frequency_hz
-        });
         let fall = solution.misfit - more.misfit;
         // Residues of no common phase are an error of the model.
         let residues: Vec<Complex64> = (0..self.frfs.len())
+            .filter(|&m| more.frfs[m].took_part())
             .map(|m| more.constant(m, more.poles.len() - 1).0)
             .collect();
         if residues.len() > 4 && shape::complexity(&residues).is_some_and(|c| c.mpc < 0.5) {
             return None;
         }
-        if !inside
+        if !self.reached(pole)
             || pole.damping_ratio > MAX_DAMPING
             || fall < self.beyond_chance(more, DOUBT_SIGMA, DOUBT_LOOKED)
         {
@@ -478,7 +483,7 @@ impl PoleGroup<'_> {
             rest.extend(lines.map(|((f, s), r)| (*f, (r / s).norm_sqr() - 1.0)));
         }
         rest.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let near = 5 * self.frfs.len();
+        let near = 5 * solution.taking_part();
         if rest.len() < 2 * near {
             return None;
         }

@@ -60,10 +60,15 @@ impl Solution {
         (self.misfit / self.degrees_of_freedom as f64).max(1.0).sqrt()
     }
 
+    /// Number of FRFs that took part: whose bands reach into the window.
+    pub fn taking_part(&self) -> usize {
+        self.frfs.iter().filter(|f| f.took_part()).count()
+    }
+
     /// Relative standard deviations of frequency and damping ratio from how the FRFs scatter about the common pole, whatever
     /// their noise is (Liang & Zeger 1986, one cluster an FRF); zero for a single FRF.
     pub fn scatter_std(&self, mode: usize) -> [f64; 2] {
-        let count = self.influence.len() as f64;
+        let count = self.taking_part() as f64;
         if count < 2.0 {
             return [0.0; 2];
         }
@@ -81,7 +86,7 @@ impl Solution {
         /// An FRF that knows nearly all says nothing about its own scatter.
         const LEAST_SEEN: f64 = 0.2;
         const LEAST_FREEDOM: f64 = 1.5;
-        if self.influence.len() < 2 {
+        if self.taking_part() < 2 {
             return ([0.0; 2], 1.0);
         }
         let total: Matrix2<f64> = self.frfs.iter().map(|f| f.own[mode].0).sum();
@@ -259,20 +264,39 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// Refines the poles `start`; `fixed` poles take part with residues of their own but are not moved. `settled`: fall of
-/// the misfit that is worth no further step ([`SETTLED`], or more where only the misfit is asked for). `None` where the
-/// lines do not determine the poles.
+/// Refines the poles `start`; `fixed` poles take part with residues of their own but are not moved. FRFs whose bands end before
+/// have nothing to say ([`NoisyFrf::takes_part`]). `settled`: fall of the misfit that is worth no further step ([`SETTLED`], or more
+/// where only the misfit is asked for). `None` where the lines do not determine the poles.
 pub(crate) fn fit(frfs: &[NoisyFrf], start: &[Pole], fixed: &[Pole], settled: f64) -> Option<Solution> {
     let parameters = 2 * start.len();
-    let linear = 2 * (start.len() + fixed.len()) + RESIDUAL_TERMS;
-    let equations: usize = frfs.iter().map(|c| 2 * c.frequency_hz.len()).sum();
+    let poles = start.len() + fixed.len();
+    let (numbers, part) = taking_part(frfs, poles);
+    let equations: usize = part.iter().map(|c| 2 * c.frequency_hz.len()).sum();
     let degrees_of_freedom = equations
-        .checked_sub(parameters + linear * frfs.len())
+        .checked_sub(parameters + (2 * poles + RESIDUAL_TERMS) * part.len())
         .filter(|&free| free > 0)?;
-    if frfs.iter().any(|c| 2 * c.frequency_hz.len() <= linear) {
-        return None;
+    let found = fit_prepared(&Prepared::new(&part), start, fixed, settled, degrees_of_freedom)?;
+    let mut all = Solution {
+        frfs: frfs
+            .iter()
+            .map(|_| FrfSolution::nothing(poles, start.len()))
+            .collect(),
+        influence: vec![DVector::zeros(parameters); frfs.len()],
+        ..found
+    };
+    for (m, (frf, influence)) in numbers
+        .into_iter()
+        .zip(found.frfs.into_iter().zip(found.influence))
+    {
+        (all.frfs[m], all.influence[m]) = (frf, influence);
     }
-    fit_prepared(&Prepared::new(frfs), start, fixed, settled, degrees_of_freedom)
+    Some(all)
+}
+
+/// The FRFs with enough lines for so many poles, and which they are.
+fn taking_part<'a>(frfs: &[NoisyFrf<'a>], poles: usize) -> (Vec<usize>, Vec<NoisyFrf<'a>>) {
+    let with_lines = frfs.iter().enumerate().filter(|(_, frf)| frf.takes_part(poles));
+    with_lines.map(|(m, frf)| (m, frf.clone())).unzip()
 }
 
 fn fit_prepared(
@@ -379,7 +403,8 @@ fn students_t_over_normal(freedom: f64) -> f64 {
 /// Misfit that each of the `trials` would explain in addition to the poles of a solution, these and the trial held where they
 /// are: twice the log-likelihood ratio, exact in the residues. `None` where the lines do not determine those.
 pub(crate) fn explained_by(frfs: &[NoisyFrf], held: &[Pole], trials: &[Pole]) -> Option<Vec<f64>> {
-    let prepared = Prepared::new(frfs);
+    let (_, part) = taking_part(frfs, held.len());
+    let prepared = Prepared::new(&part);
     let held_axes = prepared.axes(&[], held);
     let trial_axes = prepared.axes(&[], trials);
     if let Some(alike) = &prepared.alike {

@@ -26,6 +26,14 @@ pub(crate) struct NoisyFrf<'a> {
     pub spread_hz: &'a [f64],
 }
 
+impl NoisyFrf<'_> {
+    /// Has it enough lines for the residues of so many poles and the residual terms? One that has not, because its band ends
+    /// before or within the window, takes no part in a fit.
+    pub fn takes_part(&self, poles: usize) -> bool {
+        2 * self.frequency_hz.len() > 2 * poles + RESIDUAL_TERMS
+    }
+}
+
 /// What the fit found for one FRF.
 pub(crate) struct FrfSolution {
     /// a₁, b₁, a₂, b₂, …, of the fixed poles too, then the residual terms.
@@ -42,6 +50,25 @@ pub(crate) struct FrfSolution {
     pub own: Vec<(Matrix2<f64>, Vector2<f64>)>,
 }
 
+impl FrfSolution {
+    /// Of an FRF that takes no part in a fit of `moving` poles and others: no residues, and nothing known of any pole.
+    pub fn nothing(poles: usize, moving: usize) -> FrfSolution {
+        let linear = 2 * poles + RESIDUAL_TERMS;
+        FrfSolution {
+            linear: DVector::zeros(linear),
+            residual: Vec::new(),
+            pair_covariance: vec![Matrix2::zeros(); moving],
+            linear_by_poles: DMatrix::zeros(linear, 2 * moving),
+            leverage: 0.0,
+            own: vec![(Matrix2::zeros(), Vector2::zeros()); moving],
+        }
+    }
+
+    pub fn took_part(&self) -> bool {
+        !self.residual.is_empty()
+    }
+}
+
 /// √2/σ, twice for each line.
 pub(crate) fn weights(sigma: &[f64]) -> Vec<f64> {
     let of_line = sigma.iter().map(|s| std::f64::consts::SQRT_2 / s);
@@ -56,14 +83,11 @@ pub(crate) struct PoleColumns {
     /// By moving pole, for numerators a + ibr: ∂/∂ln f₀ = a p + b ir(p − g) and ∂/∂ln ζ = a q + b irq,
     /// with p = −g²(2r² − 2iζr), q = −2iζr g², in the order p, ir(p − g), q, irq.
     pub slopes: Vec<f64>,
+    /// By column: of a pole that is not moved, of one that these lines do not reach, or a residual term.
+    pub held: Vec<bool>,
 }
 
 impl PoleColumns {
-    /// Columns of the poles that move, the first ones.
-    pub fn moving_columns(&self) -> usize {
-        self.slopes.len() / (2 * self.rows)
-    }
-
     pub fn new(
         frequency_hz: &[f64],
         spread_hz: &[f64],
@@ -116,10 +140,19 @@ impl PoleColumns {
                 }
             }
         }
+        let reached = |pole: &Pole| {
+            let ends = frequency_hz.first().zip(frequency_hz.last());
+            ends.is_some_and(|(first, last)| (*first..=*last).contains(&pole.frequency_hz))
+        };
+        let mut held = vec![true; 2 * modes + RESIDUAL_TERMS];
+        for (j, pole) in moving.iter().enumerate() {
+            held[2 * j..2 * j + 2].fill(!reached(pole));
+        }
         PoleColumns {
             rows,
             columns,
             slopes,
+            held,
         }
     }
 }
@@ -264,13 +297,13 @@ pub(crate) struct SolvedFrf {
     pub own: Vec<(Matrix2<f64>, Vector2<f64>)>,
 }
 
-/// Factor of the first `columns` of a Gram matrix (its lower triangle), of columns of unit length, and 1/length of each. From
-/// column `held` on they are those of poles that are not moved and of the residual terms.
+/// Factor of the first columns of a Gram matrix (its lower triangle), of columns of unit length, and 1/length of each. `held`: see
+/// [`PoleColumns::held`], one for each of these columns.
 pub(crate) fn unit_cholesky(
     gram: &DMatrix<f64>,
-    columns: usize,
-    held: usize,
+    held: &[bool],
 ) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
+    let columns = held.len();
     // Unit columns: the Gram matrix is then as well scaled as it can be.
     let scale = DVector::from_fn(columns, |j, _| gram[(j, j)].sqrt().recip());
     if scale.iter().any(|s| !(s.is_finite() && *s > 0.0)) {
@@ -282,10 +315,10 @@ pub(crate) fn unit_cholesky(
             unit[(i, j)] = gram[(i, j)] * scale[i] * scale[j];
         }
     }
-    // Lines near 0 Hz make the lower residual terms all alike, and two poles close together look the same from afar: hold
-    // back the part of them that rounding would decide.
-    for term in held..columns {
-        unit[(term, term)] += ROUNDING;
+    // Lines near 0 Hz make the lower residual terms all alike, and poles close together look the same from afar: hold back the
+    // part of them that rounding would decide.
+    for (column, _) in held.iter().enumerate().filter(|(_, held)| **held) {
+        unit[(column, column)] += ROUNDING;
     }
     Some((unit.cholesky()?, scale))
 }
@@ -308,7 +341,7 @@ impl Solved {
         filled[rows * columns..].copy_from_slice(target);
         let mut gram = DMatrix::zeros(columns + 1, columns + 1);
         squared(&mut gram, filled, rows);
-        let (cholesky, scale) = unit_cholesky(&gram, columns, axis.moving_columns())?;
+        let (cholesky, scale) = unit_cholesky(&gram, &axis.held)?;
         let projected = gram
             .view((columns, 0), (1, columns))
             .transpose()

@@ -10,7 +10,7 @@ use crate::modal::quality::{self, Power};
 use crate::modal::settings::SET;
 use crate::modal::shape;
 use crate::modal::single::local_fit::Pole;
-use crate::modal::stabilisation::{Candidate, Stabilisation};
+use crate::modal::stabilisation::{Candidate, MAX_DAMPING, Stabilisation};
 use crate::modal::together::global_modes::{GlobalMode, GlobalModes, RejectedMode};
 use crate::modal::together::own_places;
 use crate::modal::together::reconstruction::reconstruction;
@@ -65,6 +65,7 @@ pub(crate) fn collect(
     );
     for (g, group) in groups.iter().enumerate() {
         let solution = &group.solution;
+        let frfs = solution.taking_part();
         if let Some(doubt) = &group.doubt {
             result.warnings.push(format!(
                 "there may be one more mode at {:.2} Hz: the FRFs hardly tell it from its neighbour, whose standard \
@@ -89,29 +90,29 @@ pub(crate) fn collect(
             .max(1.0)
             .sqrt();
         for (j, pole) in solution.poles.iter().enumerate() {
+            if let Some(reason) = impossible(data, pole) {
+                result.rejected.push(RejectedMode::new(pole, reason));
+                continue;
+            }
             if parts.contains(&(g, j)) {
-                result.rejected.push(RejectedMode {
-                    frequency_hz: pole.frequency_hz,
-                    damping_ratio: pole.damping_ratio,
-                    reason: "its FRFs have no common phase where those of the other modes have: a part of its neighbours, which move \
-                             or bend"
-                        .into(),
-                });
+                result.rejected.push(RejectedMode::new(
+                    pole,
+                    "its FRFs have no common phase where those of the other modes have: a part of its neighbours, which move or bend",
+                ));
                 continue;
             }
             let (found_in, best) = joint_fit::seen_in(solution, j);
-            if found_in == 0 || (data.len() >= SET && found_in < 2 && best < FAR) {
-                result.rejected.push(RejectedMode {
-                    frequency_hz: pole.frequency_hz,
-                    damping_ratio: pole.damping_ratio,
-                    reason: "hardly above the noise, in one FRF or none".into(),
-                });
+            if found_in == 0 || (frfs >= SET && found_in < 2 && best < FAR) {
+                result.rejected.push(RejectedMode::new(
+                    pole,
+                    "hardly above the noise, in one FRF or none",
+                ));
                 hardly_seen.push(format!("{:.2}", pole.frequency_hz));
                 continue;
             }
             let shift = group.doubt.as_ref().map_or([0.0; 2], |d| d.shifts[j]);
-            let few = data.len() < SET;
-            let small_set = 1.0 + 1.5 / (data.len().max(2) - 1) as f64;
+            let few = frfs < SET;
+            let small_set = 1.0 + 1.5 / (frfs.max(2) - 1) as f64;
             let noise = [
                 level * solution.frequency_std_hz(j) / pole.frequency_hz,
                 level * solution.damping_std(j) / pole.damping_ratio,
@@ -128,8 +129,18 @@ pub(crate) fn collect(
                     .hypot(scatter[k].change),
             });
             let mut frequency_std_hz = (relative[0] * pole.frequency_hz).hypot(shift[0]);
+            // An FRF whose band ends before the mode knows nothing of it.
+            let known: Vec<Option<Complex64>> = (0..data.len())
+                .map(|m| {
+                    let reached = solution.frfs[m].took_part() && data[m].reaches(pole.frequency_hz);
+                    reached.then(|| {
+                        let (value, std) = solution.constant(m, j);
+                        shape::as_known(value, std)
+                    })
+                })
+                .collect();
             let mut constants = vec![None; count];
-            for m in 0..data.len() {
+            for m in (0..data.len()).filter(|&m| known[m].is_some()) {
                 let (value, std) = solution.constant(m, j);
                 constants[of_member[m]] = Some((value, level * std));
             }
@@ -177,36 +188,32 @@ pub(crate) fn collect(
             if lines_in_half_power_band < LEAKAGE_BELOW_LINES {
                 damping_std = damping_std.hypot(LEAKAGE_LINES * line_hz / (2.0 * pole.frequency_hz));
             }
-            if data.len() < SET {
+            if few {
                 let apart = disagreement(members, *pole, [frequency_std_hz, damping_std]);
                 frequency_std_hz = frequency_std_hz.hypot(apart[0]);
                 damping_std = damping_std.hypot(apart[1]);
             }
-            let known = solution.known_constants(j);
-            let collinear = shape::complexity(&known).is_none_or(|c| c.mpc > IN_PHASE);
+            let phases: Vec<Complex64> = known.iter().flatten().copied().collect();
+            let collinear = shape::complexity(&phases).is_none_or(|c| c.mpc > IN_PHASE);
             let width_hz = (pole.damping_ratio * pole.frequency_hz).max(line_hz);
             if !collinear && frequency_std_hz > UNPLACED * width_hz.hypot(shift[0]) {
-                result.rejected.push(RejectedMode {
-                    frequency_hz: pole.frequency_hz,
-                    damping_ratio: pole.damping_ratio,
-                    reason: format!(
-                        "the FRFs know its frequency to ±{frequency_std_hz:.2} Hz only, and have no common phase"
-                    ),
-                });
+                result.rejected.push(RejectedMode::new(
+                    pole,
+                    format!("the FRFs know its frequency to ±{frequency_std_hz:.2} Hz only, and have no common phase"),
+                ));
                 continue;
             }
             // … in most of them; a disturbance has phases of its own.
-            let in_phase = collinear && 2 * found_in > data.len() && found_in > 2;
+            let in_phase = collinear && 2 * found_in > frfs && found_in > 2;
             if damping_std >= pole.damping_ratio && group.doubt.is_none() && !in_phase {
-                result.rejected.push(RejectedMode {
-                    frequency_hz: pole.frequency_hz,
-                    damping_ratio: pole.damping_ratio,
-                    reason: "a line whose width the FRFs do not determine".into(),
-                });
+                result.rejected.push(RejectedMode::new(
+                    pole,
+                    "a line whose width the FRFs do not determine",
+                ));
                 without_width.push(format!("{:.2}", pole.frequency_hz));
                 continue;
             }
-            let shape = shape_of(solution, j, members);
+            let shape = shape_of(&known, members);
             result.modes.push(GlobalMode {
                 frequency_hz,
                 damping_ratio,
@@ -256,8 +263,7 @@ pub(crate) fn collect(
         .map(|m| {
             m.constants
                 .iter()
-                .flatten()
-                .map(|(value, std)| shape::as_known(*value, *std))
+                .map(|c| c.map_or(Complex64::ZERO, |(value, std)| shape::as_known(value, std)))
                 .collect()
         })
         .collect();
@@ -286,10 +292,25 @@ pub(crate) fn collect(
             moving: moving > 0 && 2 * moving >= scatters.len(),
             doubts,
             elsewhere_hz,
+            missed_hz: own_places::missed(members, &result.modes),
             converged: groups.iter().all(|g| g.solution.converged),
         };
         result.quality = quality::judge_set(&found);
     }
+}
+
+/// Why a pole cannot be a mode of these lines: it stands for what the model lacks.
+fn impossible(data: &[Data], pole: &Pole) -> Option<String> {
+    if !data.iter().any(|d| d.reaches(pole.frequency_hz)) {
+        return Some("outside the lines that were measured: what lies beyond the band".into());
+    }
+    (pole.damping_ratio >= MAX_DAMPING).then(|| {
+        format!(
+            "a damping ratio of {:.0} % is beyond what a mode can have ({:.0} %): what the other modes leave unexplained",
+            100.0 * pole.damping_ratio,
+            100.0 * MAX_DAMPING
+        )
+    })
 }
 
 /// What two answers leave open of a mode (frequency, Hz; damping ratio).
@@ -351,14 +372,16 @@ fn around(modes: &[GlobalMode]) -> [f64; 2] {
     }
 }
 
-/// Shape by response (or by FRF where degrees of freedom are not known), largest component 1.
-fn shape_of(solution: &ml_fit::Solution, mode: usize, members: &[&SetMember]) -> Vec<(usize, Complex64)> {
-    let known = solution.known_constants(mode);
-    let constant = |m: usize| known[m];
-    let dofs: Option<Vec<[usize; 2]>> = members.iter().map(|m| m.dofs).collect();
+/// Shape by response (or by FRF where degrees of freedom are not known), largest component 1, from what each FRF knows of it.
+fn shape_of(known: &[Option<Complex64>], members: &[&SetMember]) -> Vec<(usize, Complex64)> {
+    let (of_frf, constants): (Vec<usize>, Vec<Complex64>) = known
+        .iter()
+        .enumerate()
+        .filter_map(|(m, constant)| Some((m, (*constant)?)))
+        .unzip();
+    let dofs: Option<Vec<[usize; 2]>> = of_frf.iter().map(|&m| members[m].dofs).collect();
     let Some(dofs) = dofs else {
-        let all: Vec<Complex64> = (0..members.len()).map(constant).collect();
-        return shape::normalised(&all).into_iter().enumerate().collect();
+        return of_frf.into_iter().zip(shape::normalised(&constants)).collect();
     };
     let unique = |side: usize| {
         let mut ids: Vec<usize> = dofs.iter().map(|d| d[side]).collect();
@@ -375,13 +398,13 @@ fn shape_of(solution: &ml_fit::Solution, mode: usize, members: &[&SetMember]) ->
     let (ids, others) = (unique(side), unique(other));
     let mut matrix = DMatrix::zeros(ids.len(), others.len());
     let mut filled = 0;
-    for (m, dof) in dofs.iter().enumerate() {
+    for (dof, constant) in dofs.iter().zip(constants) {
         let at = (
             ids.iter().position(|i| *i == dof[side]),
             others.iter().position(|i| *i == dof[other]),
         );
         if let (Some(i), Some(j)) = at {
-            matrix[(i, j)] = constant(m);
+            matrix[(i, j)] = constant;
             filled += 1;
         }
     }
@@ -514,5 +537,33 @@ pub(crate) fn coarse_lines(data: &[Data], result: &mut GlobalModes) {
             "fewer than {FINE_LINES:.0} lines in the half-power band: {}",
             coarse.join("; ")
         ));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pole_beyond_the_lines_or_damped_beyond_measure_is_no_mode() {
+        let data = |first_hz: f64, last_hz: f64| Data {
+            frequency_hz: vec![first_hz, 0.5 * (first_hz + last_hz), last_hz],
+            receptance: vec![Complex64::ONE; 3],
+            sigma: vec![1.0; 3],
+            spread_hz: vec![0.0; 3],
+            count: vec![1.0; 3],
+        };
+        // One FRF that reaches it is enough.
+        let set = [data(1.0, 40.0), data(2.0, 200.0)];
+        let of = |frequency_hz, damping_ratio| {
+            let pole = Pole {
+                frequency_hz,
+                damping_ratio,
+            };
+            impossible(&set, &pole)
+        };
+        assert_eq!(of(120.0, 0.2), None);
+        assert!(of(514.0, 0.02).unwrap().contains("outside the lines"));
+        assert!(of(46.5, 0.9).unwrap().contains("90 %"));
     }
 }

@@ -472,6 +472,96 @@ mod tests {
         assert!((found.modes[0].damping_ratio - 0.03).abs() < 4.0 * found.modes[0].damping_std);
     }
 
+    /// A record that ends at the hammer's last line, among others that go on.
+    #[test]
+    fn an_frf_whose_band_ends_early_says_what_it_knows_and_keeps_nothing_from_the_others() {
+        let modes: Vec<(f64, f64)> = (0..16).map(|k| (6.0 + 3.3 * f64::from(k), 0.01)).collect();
+        let constants: Vec<Vec<f64>> = (0..6)
+            .map(|k| (0..16).map(|m| ((3 * k + 5 * m + 1) as f64).sin()).collect())
+            .collect();
+        let mut frfs = set(&modes, &constants, 0.01);
+        let lines = frfs[2].0.partition_point(|f| *f < 22.0);
+        frfs[2].0.truncate(lines);
+        frfs[2].1.truncate(lines);
+        let found = global_of(&frfs);
+        assert_eq!(
+            found.modes.len(),
+            modes.len(),
+            "{:?} {:?}",
+            found.modes,
+            found.rejected
+        );
+        for (mode, (f, _)) in found.modes.iter().zip(&modes) {
+            assert!((mode.frequency_hz - f).abs() < 0.02, "{mode:?} for {f} Hz");
+            assert_eq!(mode.constants[2].is_some(), *f < 21.8, "{mode:?}");
+            assert!(mode.constants[3].is_some());
+            assert!(mode.complexity.unwrap().mpc > 0.9, "{mode:?}");
+        }
+        let of_short = found.reconstructions[2].as_ref().unwrap();
+        assert!(of_short.error_nrms < 0.1, "{}", of_short.error_nrms);
+    }
+
+    /// FRFs with a little leakage (each line with a share of its neighbours), each with its modes a third of a half-width aside.
+    #[test]
+    fn a_mode_that_moves_between_three_frfs_stays_one_mode() {
+        let shifts = [0.009, 0.0, -0.011];
+        let constants = [[1.0, 0.8, -0.5], [0.7, -0.6, 0.9], [-0.9, 0.4, 0.8]];
+        let frfs: Vec<_> = shifts
+            .iter()
+            .zip(&constants)
+            .enumerate()
+            .map(|(k, (shift, row))| {
+                let modes = [(47.0, 7e-4), (50.0, 7e-4), (54.0, 7e-4)].map(|(f, zeta)| (f + shift, zeta));
+                let modes = SyntheticMode::row(&modes, row);
+                let (f, h) = Synthetic::new(44.0, 58.0, 0.02, &modes)
+                    .with_noise(0.0, 0.005, k as u64)
+                    .frf();
+                let leaked = h.windows(3).map(|h| 0.15 * h[0] + 0.7 * h[1] + 0.15 * h[2]);
+                (f[1..f.len() - 1].to_vec(), leaked.collect())
+            })
+            .collect();
+        let found = global_of(&frfs);
+        assert_eq!(found.modes.len(), 3, "{:?} {:?}", found.modes, found.rejected);
+        for (mode, f) in found.modes.iter().zip([47.0, 50.0, 54.0]) {
+            assert!((mode.frequency_hz - f).abs() < 0.012, "{mode:?}");
+        }
+    }
+
+    /// Five taps at one place: every mode has the same shape, so that it cannot tell two modes from one.
+    #[test]
+    fn two_close_modes_are_told_apart_from_frfs_of_one_place() {
+        let modes = [
+            (10.0, 0.01),
+            (20.0, 0.007),
+            (20.1, 0.006),
+            (31.0, 0.01),
+            (45.0, 0.008),
+        ];
+        let frfs: Vec<_> = (0..5)
+            .map(|k| {
+                let row = [1.0, 0.8, 1.1, -0.9, 1.2].map(|c| c * (1.0 + 0.01 * k as f64));
+                let modes = SyntheticMode::row(&modes, &row);
+                Synthetic::new(3.0, 60.0, 0.05, &modes)
+                    .with_noise(0.0, 0.005, k as u64)
+                    .frf()
+            })
+            .collect();
+        let found = global_of(&frfs);
+        assert_eq!(
+            found.modes.len(),
+            modes.len(),
+            "{:?} {:?}",
+            found.modes,
+            found.rejected
+        );
+        for (mode, (f, _)) in found.modes.iter().zip(modes) {
+            assert!(
+                (mode.frequency_hz - f).abs() < 4.0 * mode.frequency_std_hz.max(1e-3),
+                "{mode:?} for {f} Hz"
+            );
+        }
+    }
+
     /// As a beam hung in threads: widths far below the lines' distance. What is known is said, the damping is uncertain.
     #[test]
     fn modes_far_narrower_than_a_line_are_kept_where_all_frfs_show_them() {

@@ -6,6 +6,7 @@ use serde::Serialize;
 use crate::modal::quality::SetQuality;
 use crate::modal::shape::Complexity;
 use crate::modal::sine_lines::SineLine;
+use crate::modal::single::local_fit::Pole;
 use crate::modal::stabilisation::Stabilisation;
 use crate::modal::together::reconstruction::Reconstruction;
 
@@ -44,6 +45,16 @@ pub struct RejectedMode {
     pub damping_ratio: f64,
     /// In plain words.
     pub reason: String,
+}
+
+impl RejectedMode {
+    pub(crate) fn new(pole: &Pole, reason: impl Into<String>) -> RejectedMode {
+        RejectedMode {
+            frequency_hz: pole.frequency_hz,
+            damping_ratio: pole.damping_ratio,
+            reason: reason.into(),
+        }
+    }
 }
 
 /// All modes of a set of FRFs.

@@ -2,7 +2,9 @@
 //! it lacks far away can move a mode; the fit of each FRF around its own peak knows nothing of that.
 
 use crate::modal::settings::SET;
+use crate::modal::single::frf_modes::FrfMode;
 use crate::modal::single::local_fit::Pole;
+use crate::modal::together::global_modes::GlobalMode;
 use crate::modal::together::set_member::SetMember;
 use crate::modal::together::verify::mean_pole;
 
@@ -17,6 +19,8 @@ const SAME_DAMPING: f64 = 2.0;
 /// Two fits of the same lines contradict each other from so many standard deviations on, and from this share of the half-width.
 const APART: f64 = 4.0;
 const APART_WIDTHS: f64 = 0.1;
+/// A peak at least this share as high as the highest of its FRF must not be missing.
+const HIGH: f64 = 0.1;
 
 /// A mode as the FRFs have it by themselves: means over them.
 #[derive(Debug)]
@@ -81,6 +85,66 @@ pub(super) fn elsewhere(
     contradicts.then_some(OwnPlace { pole, std: own_std })
 }
 
+/// Peaks that most of the FRFs know well by themselves, that are among the highest of each (as mobility), and that no common mode
+/// accounts for, Hz.
+pub(super) fn missed(members: &[&SetMember], found: &[GlobalMode]) -> Vec<f64> {
+    struct Place {
+        frequency_hz: f64,
+        /// Half-width, or a line where that is more, Hz.
+        width_hz: f64,
+        frfs: usize,
+    }
+    let mut places: Vec<Place> = Vec::new();
+    for member in members {
+        let known = |mode: &&FrfMode| {
+            let own = mode.best();
+            let width_hz = own.damping_ratio * own.frequency_hz;
+            own.frequency_std_hz.is_some_and(|s| s < KNOWN_WIDTHS * width_hz)
+                && own
+                    .damping_std
+                    .is_some_and(|s| s < KNOWN_WIDTHS * own.damping_ratio)
+        };
+        let height = |mode: &FrfMode| {
+            let own = mode.best();
+            own.modal_constant
+                .map_or(0.0, |c| c.norm() / (own.damping_ratio * own.frequency_hz))
+        };
+        let highest = member.modes.modes.iter().map(height).fold(0.0, f64::max);
+        let high = |mode: &&FrfMode| height(mode) >= HIGH * highest;
+        for mode in member.modes.modes.iter().filter(known).filter(high) {
+            let own = mode.best();
+            let half_width_hz = own.damping_ratio * own.frequency_hz;
+            let width_hz = half_width_hz * (2.0 / mode.lines_in_half_power_band).max(1.0);
+            let same = |p: &&mut Place| (p.frequency_hz - own.frequency_hz).abs() < p.width_hz + width_hz;
+            match places.iter_mut().find(same) {
+                Some(place) => place.frfs += 1,
+                None => places.push(Place {
+                    frequency_hz: own.frequency_hz,
+                    width_hz,
+                    frfs: 1,
+                }),
+            }
+        }
+    }
+    let mut missed: Vec<f64> = places
+        .iter()
+        .filter(|place| {
+            let reaching = members.iter().filter(|m| {
+                let ends = m.frequency_hz.first().zip(m.frequency_hz.last());
+                ends.is_some_and(|(first, last)| (*first..=*last).contains(&place.frequency_hz))
+            });
+            let accounts = |mode: &GlobalMode| {
+                let width_hz = mode.damping_ratio * mode.frequency_hz + mode.frequency_std_hz;
+                (mode.frequency_hz - place.frequency_hz).abs() < place.width_hz + width_hz
+            };
+            2 * place.frfs > reaching.count() && !found.iter().any(accounts)
+        })
+        .map(|place| place.frequency_hz)
+        .collect();
+    missed.sort_by(f64::total_cmp);
+    missed
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -137,5 +201,24 @@ mod tests {
         assert!(elsewhere(&members, left, std, &[pole(101.5, 0.006)]).is_none());
         assert!(elsewhere(&members, left, std, &[pole(95.0, 0.15)]).is_some());
         assert!(elsewhere(&members[..3], left, std, &[]).is_none());
+        // Not among the common modes: missed, unless one of these is at the place.
+        let missing = missed(&members, &[]);
+        assert!(
+            missing.len() == 1 && (missing[0] - 100.0).abs() < 0.05,
+            "{missing:?}"
+        );
+        let found = |frequency_hz| GlobalMode {
+            frequency_hz,
+            damping_ratio: 0.006,
+            frequency_std_hz: 0.01,
+            damping_std: 1e-4,
+            found_in: 6,
+            lines_in_half_power_band: 12.0,
+            complexity: None,
+            shape: Vec::new(),
+            constants: Vec::new(),
+        };
+        assert!(missed(&members, &[found(100.1)]).is_empty());
+        assert_eq!(missed(&members, &[found(103.0)]).len(), 1);
     }
 }

@@ -30,7 +30,7 @@ pub(crate) fn reconstruction(d: &Data, groups: &[Group], m: usize, band_hz: [f64
         fitted_m_per_n: Vec::with_capacity(d.frequency_hz.len()),
     };
     let mut total = 0.0;
-    for group in groups {
+    for group in groups.iter().filter(|g| g.solution.frfs[m].took_part()) {
         let from = d.frequency_hz.partition_point(|&f| f < group.window_hz[0]);
         let to = d.frequency_hz.partition_point(|&f| f < group.window_hz[1]);
         let fitted = group.solution.fitted(m, &d.frequency_hz[from..to]);

@@ -6,6 +6,7 @@
 //! neither a level nor a colour (in radar: detection with a constant rate of false alarms).
 
 use crate::modal::max_likelihood::joint_fit::{self, Data, PoleSearch};
+use crate::modal::settings::SET;
 use crate::modal::single::local_fit::Pole;
 use crate::modal::together::set_noise;
 
@@ -15,7 +16,10 @@ const MAX_ROUNDS: usize = 30;
 const UNASKED: usize = 3;
 /// A candidate that stayed over so many orders is no accident …
 const LONG_CHAIN: usize = 6;
-/// … and is tried for this part of what others must explain: while close neighbours are missing, poles anywhere explain
+/// … one that stayed over so many in a few FRFs comes in unasked: the modes above the strongest are so small there, and so many, that
+/// while they are missing a pole anywhere explains as much as one of them …
+const CERTAIN_CHAIN: usize = 20;
+/// … the others are tried for this part of what others must explain: while close neighbours are missing, poles anywhere explain
 /// much too.
 const FIRM: f64 = 0.4;
 /// A batch holds what explains at least this share of its best …
@@ -44,6 +48,12 @@ pub(crate) fn choose(data: &[Data], candidates: &[Start]) -> Vec<Pole> {
     // The strongest come in, and what they leave is looked at, before the noise is taken from that: while strong modes are
     // missing, they would hide in it. Later it tells what the model cannot describe from what is missing.
     let mut data = data.to_vec();
+    // Many FRFs hold what is no mode (drift, the floor's own) over as many orders, and do not need it.
+    let few = data.len() < SET;
+    let mut certain: Vec<bool> = candidates
+        .iter()
+        .map(|c| few && c.orders >= CERTAIN_CHAIN)
+        .collect();
     let mut firm: Vec<bool> = candidates.iter().map(|c| c.orders >= LONG_CHAIN).collect();
     let mut left: Vec<Pole> = candidates.iter().map(|c| c.pole).collect();
     let mut taken: Vec<Pole> = Vec::new();
@@ -57,7 +67,7 @@ pub(crate) fn choose(data: &[Data], candidates: &[Start]) -> Vec<Pole> {
             *worth /= FIRM;
         }
         let wanted = if round < UNASKED { 0.0 } else { 1.0 };
-        let batch = batch(&left, &worth, wanted);
+        let batch = batch(&left, &worth, &certain, wanted);
         if batch.is_empty() {
             break;
         }
@@ -66,6 +76,7 @@ pub(crate) fn choose(data: &[Data], candidates: &[Start]) -> Vec<Pole> {
         for k in batch.into_iter().rev() {
             left.remove(k);
             firm.remove(k);
+            certain.remove(k);
         }
         chosen.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
         let Some(groups) = joint_fit::refine(&even, &chosen, PoleSearch::Roughly, &mut Vec::new()) else {
@@ -96,11 +107,11 @@ fn near(a: &Pole, b: &Pole) -> bool {
     (a.frequency_hz - b.frequency_hz).abs() < width(a) + width(b)
 }
 
-/// Ascending indices of those that come in together.
-fn batch(left: &[Pole], worth: &[f64], wanted: f64) -> Vec<usize> {
+/// Ascending indices of those that come in together: the best, and those that are `certain`.
+fn batch(left: &[Pole], worth: &[f64], certain: &[bool], wanted: f64) -> Vec<usize> {
     let best = worth.iter().copied().fold(0.0, f64::max);
     let mut order: Vec<usize> = (0..left.len())
-        .filter(|&k| worth[k] > wanted && worth[k] >= BATCH * best && worth[k] > 0.0)
+        .filter(|&k| worth[k] > 0.0 && (certain[k] || worth[k] > wanted && worth[k] >= BATCH * best))
         .collect();
     order.sort_by(|&a, &b| worth[b].total_cmp(&worth[a]));
     let width = |p: &Pole| p.damping_ratio * p.frequency_hz;
@@ -116,4 +127,24 @@ fn batch(left: &[Pole], worth: &[f64], wanted: f64) -> Vec<usize> {
     }
     taken.sort_unstable();
     taken
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_stayed_over_many_orders_comes_in_however_little_it_explains_next_to_the_strongest() {
+        let poles = [10.0, 10.05, 40.0, 80.0, 80.1].map(|frequency_hz| Pole {
+            frequency_hz,
+            damping_ratio: 0.01,
+        });
+        let worth = [1000.0, 900.0, 0.5, 0.4, 0.3];
+        let certain = [false, false, false, true, true];
+        // In one half-width of another the better one alone, whatever it is.
+        assert_eq!(batch(&poles, &worth, &certain, 0.0), [0, 3]);
+        assert_eq!(batch(&poles, &worth, &[false; 5], 0.0), [0]);
+        assert_eq!(batch(&poles[2..], &worth[2..], &[false; 3], 1.0), [0; 0]);
+        assert_eq!(batch(&poles[2..], &worth[2..], &certain[2..], 1.0), [1]);
+    }
 }

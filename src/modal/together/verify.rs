@@ -58,6 +58,11 @@ const COARSE_LINES: f64 = 1.2;
 const SAME: f64 = 0.2;
 /// Residues of a common phase: what a mode next to another one keeps.
 const IN_PHASE: f64 = 0.7;
+/// Where neither phases nor shapes can tell (few FRFs, or all at one place), two poles are two modes if they leave so many times less
+/// than one pole that each FRF has at a place of its own …
+const CLEARLY: f64 = 20.0;
+/// … as long as they are nearer than this share of the sum of their half-widths, or than a line: what a moving pole may look like.
+const HARD_TO_TELL: f64 = 0.5;
 /// Shapes that repeat …
 const SAME_SHAPE: f64 = 0.9;
 /// … and that do where two poles are at the same place.
@@ -73,9 +78,9 @@ pub(crate) fn verified(
     for _ in 0..MAX_ROUNDS {
         let mut kept: Vec<Pole> = Vec::new();
         let mut out = false;
-        let common = common_phase(&data, &groups);
+        let (common, one_place) = (common_phase(&data, &groups), one_place(&data, &groups));
         for group in &groups {
-            let pairs = close_pairs(&data, group, common);
+            let pairs = close_pairs(&data, group, common, one_place);
             let poles = &group.solution.poles;
             let mut doubtful: Vec<(usize, f64, String)> = Vec::new();
             let mut leaves: Vec<Option<String>> = vec![None; poles.len()];
@@ -197,6 +202,24 @@ fn common_phase(data: &[Data], groups: &[Group]) -> bool {
     in_phase >= OTHERS && A_GOOD_PART * in_phase >= all.len()
 }
 
+/// Whether modes that stand well apart have one shape all the same: FRFs of one place, whose shapes tell no mode from another.
+fn one_place(data: &[Data], groups: &[Group]) -> bool {
+    let all: Vec<Candidate> = groups
+        .iter()
+        .flat_map(|group| (0..group.solution.poles.len()).map(move |j| Candidate::new(data, group, j)))
+        .filter(Candidate::dominates)
+        .collect();
+    let pole = |candidate: &Candidate| candidate.solution.poles[candidate.pole];
+    let likeness: Vec<f64> = all
+        .iter()
+        .enumerate()
+        .flat_map(|(k, a)| all[..k].iter().map(move |b| (a, b)))
+        .filter(|(a, b)| !neighbours(data, pole(a), pole(b)))
+        .map(|(a, b)| shape::mac(&a.known, &b.known))
+        .collect();
+    likeness.len() >= OTHERS && crate::signal::median(&likeness) > SAME_SHAPE
+}
+
 /// The poles, by group and number, that have phases by chance next to a stronger one, or that others cancel, in a set whose modes have
 /// common phases: parts of those which the model of one mode does not hold. They stay in the fit: what they stand for would do harm to
 /// the others.
@@ -247,7 +270,7 @@ fn against(candidate: &Candidate) -> Option<String> {
     } = candidate;
     let j = *j;
     let pole = solution.poles[j];
-    let frfs = solution.frfs.len();
+    let frfs = solution.taking_part();
     let (seen_in, best) = joint_fit::seen_in(solution, j);
     let wanted = ((SHARE_OF_FRFS * frfs as f64).ceil() as usize).max(2);
     if frfs >= SET && seen_in < wanted && best < FAR {
@@ -301,7 +324,7 @@ struct Local {
     measured: f64,
     /// Of what is left, the part that goes on from line to line.
     coloured: f64,
-    /// Its half-power band reaches beyond the lines.
+    /// Its half-power band reaches beyond the lines of every FRF.
     one_sided: bool,
 }
 
@@ -313,7 +336,7 @@ impl Local {
             mode: 0.0,
             measured: 0.0,
             coloured: 0.0,
-            one_sided: false,
+            one_sided: true,
         };
         for ((d, found), residue) in data.iter().zip(&group.solution.frfs).zip(residues) {
             let from = d.frequency_hz.partition_point(|&f| f < group.window_hz[0]);
@@ -325,10 +348,9 @@ impl Local {
                 ..d.frequency_hz
                     .partition_point(|&f| f <= pole.frequency_hz + half_hz);
             let half_power_hz = pole.damping_ratio * pole.frequency_hz;
-            let ends = d.frequency_hz.first().zip(d.frequency_hz.last());
-            local.one_sided |= ends.is_some_and(|(first, last)| {
-                pole.frequency_hz - half_power_hz < *first || pole.frequency_hz + half_power_hz > *last
-            });
+            local.one_sided &= ![-1.0, 1.0]
+                .iter()
+                .all(|side| d.reaches(pole.frequency_hz + side * half_power_hz));
             let mut before: Option<Complex64> = None;
             for k in lines {
                 let Some(residual) = k.checked_sub(from).and_then(|k| found.residual.get(k)) else {
@@ -358,8 +380,8 @@ struct ClosePair {
 }
 
 /// The pairs of a group that are one mode: because its frequency moves from FRF to FRF, or because the shapes repeat. No
-/// pole is in two of them. `common`: the modes of the set have common phases.
-fn close_pairs(data: &[Data], group: &Group, common: bool) -> Vec<ClosePair> {
+/// pole is in two of them. `common`: the modes of the set have common phases; `one_place`: and shapes that tell nothing.
+fn close_pairs(data: &[Data], group: &Group, common: bool, one_place: bool) -> Vec<ClosePair> {
     let solution = &group.solution;
     let mut order: Vec<usize> = (0..solution.poles.len()).collect();
     order.sort_by(|&a, &b| {
@@ -370,7 +392,7 @@ fn close_pairs(data: &[Data], group: &Group, common: bool) -> Vec<ClosePair> {
     let mut found = Vec::new();
     let mut k = 1;
     while k < order.len() {
-        match close_pair(data, solution, [order[k - 1], order[k]], common) {
+        match close_pair(data, solution, [order[k - 1], order[k]], common, one_place) {
             Some(pair) => {
                 found.push(pair);
                 k += 2;
@@ -381,7 +403,13 @@ fn close_pairs(data: &[Data], group: &Group, common: bool) -> Vec<ClosePair> {
     found
 }
 
-fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2], common: bool) -> Option<ClosePair> {
+fn close_pair(
+    data: &[Data],
+    solution: &Solution,
+    both: [usize; 2],
+    common: bool,
+    one_place: bool,
+) -> Option<ClosePair> {
     let [a, b] = both.map(|j| solution.poles[j]);
     let width = a.damping_ratio * a.frequency_hz + b.damping_ratio * b.frequency_hz;
     let line_hz = joint_fit::line_hz(data, a.frequency_hz);
@@ -390,7 +418,8 @@ fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2], common: bool
         true => (CLOSE * width).max(LEAKS_LINES * line_hz),
         false => CLOSE * width,
     };
-    if b.frequency_hz - a.frequency_hz > reach {
+    let apart_hz = b.frequency_hz - a.frequency_hz;
+    if apart_hz > reach {
         return None;
     }
     let residues = both.map(|j| solution.known_constants(j));
@@ -404,20 +433,24 @@ fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2], common: bool
         (both[1], both[0])
     };
     let beside = solution.poles[strong].frequency_hz;
-    if let Some(merged) = moving(data, solution, strong, weak) {
+    let enough = solution.taking_part() >= ENOUGH_FRFS;
+    // Leakage and what else one pole lacks gives two poles an edge that more FRFs would see through.
+    let hard_to_tell = !enough && apart_hz < (HARD_TO_TELL * width).max(line_hz);
+    let most = if hard_to_tell { CLEARLY } else { 1.0 };
+    let moving = moving(data, solution, strong, weak);
+    if let Some(moving) = moving.as_ref().filter(|m| m.leaves <= most) {
         return Some(ClosePair {
             strong,
             weak,
-            merged: Some(merged),
+            merged: Some(moving.pole),
             reason: format!(
                 "one mode with {beside:.2} Hz, whose frequency moves from FRF to FRF: mass of the sensor, temperature"
             ),
         });
     }
     let out_of_phase = |r: &Vec<Complex64>| shape::complexity(r).is_some_and(|c| c.mpc < IN_PHASE);
-    let enough = residues[0].len() >= ENOUGH_FRFS;
-    let leaks = width < COARSE_LINES * line_hz && b.frequency_hz - a.frequency_hz < reach;
-    let same_place = b.frequency_hz - a.frequency_hz < SAME * width || leaks;
+    let leaks = width < COARSE_LINES * line_hz && apart_hz < reach;
+    let same_place = apart_hz < SAME * width || leaks;
     // Two modes as near as that have common phases both, if the others of the set have.
     let cancel = enough
         && (same_place && residues.iter().any(out_of_phase) || common && residues.iter().all(out_of_phase));
@@ -430,7 +463,8 @@ fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2], common: bool
         });
     }
     let alike = if same_place { ALIKE_SHAPE } else { SAME_SHAPE };
-    let repeats = enough && shape::mac(&residues[0], &residues[1]) > alike;
+    let clearly_two = one_place && moving.is_some_and(|m| m.leaves > CLEARLY);
+    let repeats = enough && !clearly_two && shape::mac(&residues[0], &residues[1]) > alike;
     repeats.then(|| ClosePair {
         strong,
         weak,
@@ -439,9 +473,16 @@ fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2], common: bool
     })
 }
 
-/// Does one mode that each FRF has at a place of its own describe the FRFs better than two common ones? Both have as many
-/// parameters. Its mean then.
-fn moving(data: &[Data], solution: &Solution, strong: usize, weak: usize) -> Option<Pole> {
+/// One mode that each FRF has at a place of its own, instead of two common ones; it has about as many parameters.
+struct Moving {
+    /// Its median over the FRFs.
+    pole: Pole,
+    /// What it leaves of the FRFs (misfit) over what the two common poles leave.
+    leaves: f64,
+}
+
+/// `None` where a fit fails, or for a single FRF.
+fn moving(data: &[Data], solution: &Solution, strong: usize, weak: usize) -> Option<Moving> {
     if data.len() < 2 {
         return None;
     }
@@ -452,21 +493,23 @@ fn moving(data: &[Data], solution: &Solution, strong: usize, weak: usize) -> Opt
         .collect();
     let single = own_poles(data, pair[0], &others)?;
     let window = around(pair[0]);
-    let frfs: Vec<_> = data.iter().map(|d| d.window(window)).collect::<Option<_>>()?;
+    let frfs: Vec<_> = data.iter().map(|d| d.window(window)).collect();
     let near = near(&others, window);
     let together = ml_fit::fit(&frfs, &pair, &near, ml_fit::SETTLED)?;
     let misfit: f64 = single
         .iter()
-        .map(|s| s.as_ref().map_or(f64::INFINITY, |s| s.misfit))
+        .zip(&together.frfs)
+        .filter(|(_, of_pair)| of_pair.took_part())
+        .map(|(s, _)| s.as_ref().map_or(f64::INFINITY, |s| s.misfit))
         .sum();
-    if misfit > together.misfit {
-        return None;
-    }
     let poles: Vec<Pole> = single.iter().flatten().map(|s| s.poles[0]).collect();
     let median = |of: fn(&Pole) -> f64| crate::signal::median(&poles.iter().map(of).collect::<Vec<_>>());
-    Some(Pole {
-        frequency_hz: median(|p| p.frequency_hz),
-        damping_ratio: median(|p| p.damping_ratio),
+    Some(Moving {
+        pole: Pole {
+            frequency_hz: median(|p| p.frequency_hz),
+            damping_ratio: median(|p| p.damping_ratio),
+        },
+        leaves: misfit / together.misfit,
     })
 }
 
@@ -503,7 +546,7 @@ pub(crate) fn own_poles(data: &[Data], pole: Pole, others: &[Pole]) -> Option<Ve
     let near = near(others, window);
     let found: Vec<Option<Solution>> = data
         .par_iter()
-        .map(|d| ml_fit::fit(&[d.window(window)?], &[pole], &near, ml_fit::SETTLED))
+        .map(|d| ml_fit::fit(&[d.window(window)], &[pole], &near, ml_fit::SETTLED))
         .collect();
     found.iter().any(|s| s.is_some()).then_some(found)
 }

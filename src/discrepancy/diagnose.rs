@@ -46,17 +46,35 @@ const SHARED: usize = 6;
 const PAIR_LEADERS: usize = 2;
 /// Share of the excess misfit that one effect of a pair must explain alone: where none does, the search is hopeless.
 const PAIR_SHARE: f64 = 0.3;
-/// Pairs that are followed to their end on the coarse view, and those of them on all data.
-const PAIRS_SETTLED: usize = 4;
-const PAIRS_REFINED: usize = 2;
 /// Processor time that looks at pairs may take, s (see [`Study::work_s`]), the evaluations with derivatives of one look, and
 /// the pairs that are looked at in any case.
 const PAIRS_BUDGET_S: f64 = 4.0;
 const LOOK_EVALUATIONS: f64 = 20.0;
 const FEWEST_PAIRS: usize = 12;
-/// Pairs to which a third effect is added, and effects that are tried as the third.
+/// Pairs to which a third effect is added.
 const THREE_LEADERS: usize = 2;
-const THIRDS: usize = 12;
+
+/// How many effects are tried besides others.
+#[derive(Clone, Copy)]
+struct Search {
+    looked_at: usize,
+    /// Followed to their end on the coarse view, …
+    settled: usize,
+    /// … and of those on all data.
+    refined: usize,
+}
+
+const PAIRS: Search = Search {
+    looked_at: usize::MAX,
+    settled: 4,
+    refined: 2,
+};
+const THREES: Search = Search {
+    looked_at: 12,
+    settled: 2,
+    refined: 1,
+};
+
 /// Share of what stands above the noise that three effects must take for their fit to be tried harder.
 const NEARLY_ALL: f64 = 0.9;
 
@@ -615,7 +633,7 @@ impl<'a, S: Study> Engine<'a, S> {
         let mut pairs: Vec<(Together<S>, Vec<String>)> = Vec::new();
         for leader in &leaders {
             // Those that explain most alone come first, should the budget not reach to the end.
-            let (found, promising) = self.with_another(leader, &labels, usize::MAX, &mut counts)?;
+            let (found, promising) = self.with_another(leader, &labels, PAIRS, &mut counts)?;
             for pair in found {
                 self.keep_better(&mut best, &pair, (candidates, credible), evidence)?;
                 pairs.push((pair, promising.clone()));
@@ -629,7 +647,7 @@ impl<'a, S: Study> Engine<'a, S> {
         let plain = evidence.base_chi2 > FAINT * self.freedom(self.model, Extent::Full);
         let mut threes = Vec::new();
         for (pair, promising) in pairs.iter().take(if plain { THREE_LEADERS } else { 0 }) {
-            let (found, _) = self.with_another(pair, promising, THIRDS, &mut [0, 0])?;
+            let (found, _) = self.with_another(pair, promising, THREES, &mut [0, 0])?;
             for three in found {
                 self.keep_better(&mut best, &three, (candidates, credible), evidence)?;
                 threes.push(three);
@@ -638,12 +656,14 @@ impl<'a, S: Study> Engine<'a, S> {
                 return Ok((best, counts));
             }
         }
-        // So many parameters at once may have stopped on their way: what explains nearly all is fitted as the model was.
+        // So many parameters at once may have stopped on their way: what explains nearly all is fitted as the model was, where that
+        // does not take long.
         threes.sort_by(|a, b| a.cost.total_cmp(&b.cost));
         let above = evidence.base_chi2 - self.freedom(self.model, Extent::Full);
         if let Some(three) = threes
             .first()
             .filter(|three| evidence.base_chi2 - 2.0 * three.cost > NEARLY_ALL * above)
+            .filter(|three| self.looks_affordable(&three.model) >= FEWEST_PAIRS)
         {
             let model = three.model.with_start(three.theta.clone());
             let fresh = self.study.calibrate(&model)?;
@@ -654,14 +674,14 @@ impl<'a, S: Study> Engine<'a, S> {
         Ok((best, counts))
     }
 
-    /// `leader` with each other effect, in the order of `labels` and at most so many: the best of them fitted to all data,
+    /// `leader` with each other effect, in the order of `labels`: the best of them fitted to all data,
     /// best first, and the labels of all by what they promise. `counts`: how many were tried, of how many.
     #[allow(clippy::type_complexity)]
     fn with_another(
         &self,
         leader: &Together<S>,
         labels: &[String],
-        most: usize,
+        effort: Search,
         counts: &mut [usize; 2],
     ) -> Result<(Vec<Together<S>>, Vec<String>)> {
         let study = self.study;
@@ -678,10 +698,9 @@ impl<'a, S: Study> Engine<'a, S> {
             .filter(|i| !taken.contains(&self.label(i)))
             .collect();
         others.sort_by_key(|i| standing(i));
-        let look_s = LOOK_EVALUATIONS * study.work_s(&leader.model, Extent::Glance);
-        let affordable = (PAIRS_BUDGET_S / look_s.max(1e-9)) as usize;
+        let affordable = self.looks_affordable(&leader.model);
         counts[1] += others.len();
-        others.truncate(affordable.max(FEWEST_PAIRS).min(most));
+        others.truncate(affordable.max(FEWEST_PAIRS).min(effort.looked_at));
         counts[0] += others.len();
         let progress = Progress::new("trying several effects together", others.len());
         let mut tried: Vec<TriedOf<S>> = others
@@ -694,7 +713,7 @@ impl<'a, S: Study> Engine<'a, S> {
             .collect();
         tried.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
         let promising = tried.iter().map(|t| self.label(&t.instance)).collect();
-        tried.truncate(PAIRS_SETTLED);
+        tried.truncate(effort.settled);
         let follow = |tried: Vec<TriedOf<S>>, view: View| -> Result<Vec<TriedOf<S>>> {
             let mut settled: Vec<TriedOf<S>> = tried
                 .into_par_iter()
@@ -707,7 +726,7 @@ impl<'a, S: Study> Engine<'a, S> {
             Ok(settled)
         };
         let mut near = follow(tried, View::COARSE)?;
-        near.truncate(PAIRS_REFINED);
+        near.truncate(effort.refined);
         let mut found = Vec::new();
         for t in follow(near, View::FULL)? {
             let first = leader.model.parameters.len();
@@ -748,6 +767,12 @@ impl<'a, S: Study> Engine<'a, S> {
             rest,
         });
         Ok(())
+    }
+
+    /// Looks at further effects of `model` that fit into the budget.
+    fn looks_affordable(&self, model: &ModelOf<S>) -> usize {
+        let look_s = LOOK_EVALUATIONS * self.study.work_s(model, Extent::Glance);
+        (PAIRS_BUDGET_S / look_s.max(1e-9)) as usize
     }
 
     /// Several effects fitted to all data.

@@ -4,7 +4,8 @@
     localise_marks.py [--count 4] [--first-seed 1] [--kinds soft-servo,…] [--share 0.3] [--lobestone target/release/lobestone] [--keep DIR]
 
 For each kind of `simulate --unknown` whose place is known, `--count` campaigns: whether the first place (or one it is tied with) is
-the right one, how far the form's parameters are from the truth, and what `add` leaves of the noise. `none` campaigns: whether a
+the right one, how far the form's parameters are from the truth (where truth and form have any in common), and how many times the
+noise is left. `none` campaigns: whether a
 place is called significant. Explicit seeds; nothing but lobestone and Python.
 """
 
@@ -88,7 +89,7 @@ def main():
     a = a.parse_args()
     work = pathlib.Path(a.keep or tempfile.mkdtemp())
     work.mkdir(parents=True, exist_ok=True)
-    total = right = fine = low = none = silent = 0
+    total = right = compared = fine = low = none = silent = 0
     for kind in a.kinds.split(","):
         for seed in range(a.first_seed, a.first_seed + a.count):
             folder = work / f"{kind}-{seed}"
@@ -120,7 +121,8 @@ def main():
             worst = max((abs(f / t - 1) for _, t, f in off), default=None)
             total += 1
             right += hit
-            fine += worst is None or worst < 0.15
+            compared += worst is not None
+            fine += worst is not None and worst < 0.15
             low += bool(first["left"] and first["left"] <= 1.1)
             print(
                 f"{kind} {seed}: {'right' if hit else 'WRONG'}{'' if answer['significant'] else ' (not significant)'} "
@@ -129,7 +131,8 @@ def main():
                 f"{'–' if worst is None else f'{100 * worst:.0f} %'}, {seconds:.1f} s",
                 flush=True,
             )
-    print(f"place {right} of {total}, parameters within 15 % {fine}, left at most 1.1 {low}; none: silent {silent} of {none}")
+    print(f"place {right} of {total}, parameters within 15 % {fine} of {compared}, left at most 1.1 {low}; none: silent {silent} of {none}")
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -625,7 +625,7 @@ impl<'a, S: Study> Engine<'a, S> {
                 parts: vec![(c.instance, c.parameters.len())],
                 model: c.model.clone(),
                 theta: c.theta.clone(),
-                cost: f64::INFINITY,
+                cost: 0.5 * (evidence.base_chi2 - c.gain),
                 possible: true,
             })
             .collect();

@@ -253,10 +253,11 @@ fn weight_of_slips_alone(gain: f64, rest: Option<&Rest>, parameters: usize, base
     let compared = || {
         let alone = baseline.rest.beyond_slips.as_ref()?;
         // Where the effects leave noise no such errors were sought.
-        let (evidence, known_to) = match (rest?, &rest?.beyond_slips) {
-            (_, Some(with)) => (with.evidence, with.known_to),
-            (rest, None) if !rest.is_significant() => (0.0, 0.0),
-            _ => return None,
+        let rest = rest?;
+        let (evidence, known_to) = match &rest.beyond_slips {
+            Some(with) => (with.evidence, with.known_to),
+            None if !rest.is_significant() => (0.0, 0.0),
+            None => return None,
         };
         Some(gain + 2.0 * (evidence - alone.evidence) - alone.known_to - known_to)
     };

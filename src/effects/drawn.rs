@@ -55,47 +55,45 @@ impl DrawnForm {
             DrawnForm::RotorOnSpring => "rotor-on-spring",
         }
     }
+
+    /// In a sentence: `a spring damper`.
+    pub fn words(self) -> &'static str {
+        match self {
+            DrawnForm::Spring => "a spring",
+            DrawnForm::Damper => "a damper",
+            DrawnForm::SpringDamper => "a spring damper",
+            DrawnForm::Mass => "a mass",
+            DrawnForm::Resonator => "a resonator",
+            DrawnForm::TwoResonators => "two resonators",
+            DrawnForm::LossFactor => "a loss factor",
+            DrawnForm::Maxwell => "a Maxwell element",
+            DrawnForm::ObliqueSpringDamper => "an oblique spring damper",
+            DrawnForm::RotorOnSpring => "a rotor on a spring",
+        }
+    }
+
+    fn suits(self, spot: Spot) -> bool {
+        let is_joint = matches!(spot, Spot::Joint(_));
+        let is_drive = matches!(spot, Spot::Drive(_));
+        match self {
+            // In parallel with a joint's stiffness it is more of the same.
+            DrawnForm::Spring => !is_joint && !is_drive,
+            DrawnForm::SpringDamper => !is_joint,
+            DrawnForm::LossFactor => !is_drive,
+            DrawnForm::Damper | DrawnForm::Maxwell => is_joint,
+            // What has a mass of its own does not stay with the base axes where a link turns.
+            DrawnForm::Mass | DrawnForm::Resonator | DrawnForm::TwoResonators => {
+                matches!(spot, Spot::LinkAxis(..) | Spot::ToolGround(_))
+            }
+            DrawnForm::ObliqueSpringDamper => matches!(spot, Spot::LinkGround(..) | Spot::ToolGround(_)),
+            DrawnForm::RotorOnSpring => is_drive,
+        }
+    }
 }
 
-const AT_POINT: [DrawnForm; 6] = [
-    DrawnForm::Spring,
-    DrawnForm::SpringDamper,
-    DrawnForm::Mass,
-    DrawnForm::Resonator,
-    DrawnForm::TwoResonators,
-    DrawnForm::LossFactor,
-];
-/// What has a mass of its own does not stay with the base axes where the link turns.
-const TO_GROUND: [DrawnForm; 4] = [
-    DrawnForm::Spring,
-    DrawnForm::SpringDamper,
-    DrawnForm::LossFactor,
-    DrawnForm::ObliqueSpringDamper,
-];
-const AT_TOOL: [DrawnForm; 7] = [
-    DrawnForm::Spring,
-    DrawnForm::SpringDamper,
-    DrawnForm::Mass,
-    DrawnForm::Resonator,
-    DrawnForm::TwoResonators,
-    DrawnForm::LossFactor,
-    DrawnForm::ObliqueSpringDamper,
-];
-/// A spring in parallel with a joint's stiffness is more of the same.
-const AT_JOINT: [DrawnForm; 3] = [DrawnForm::Damper, DrawnForm::LossFactor, DrawnForm::Maxwell];
-const IN_SERIES: [DrawnForm; 3] = [DrawnForm::Spring, DrawnForm::SpringDamper, DrawnForm::LossFactor];
-const IN_DRIVE: [DrawnForm; 2] = [DrawnForm::SpringDamper, DrawnForm::RotorOnSpring];
-
 /// Forms that a spot can have, in the order of their variants.
-pub fn forms(spot: Spot) -> &'static [DrawnForm] {
-    match spot {
-        Spot::Joint(_) => &AT_JOINT,
-        Spot::LinkAxis(..) => &AT_POINT,
-        Spot::ToolGround(_) => &AT_TOOL,
-        Spot::LinkGround(..) => &TO_GROUND,
-        Spot::Base(_) | Spot::Bearing(..) => &IN_SERIES,
-        Spot::Drive(_) => &IN_DRIVE,
-    }
+pub fn forms(spot: Spot) -> Vec<DrawnForm> {
+    FORMS.into_iter().filter(|form| form.suits(spot)).collect()
 }
 
 /// All forms, in the order of their variants: one list for all spots, so that a variant means one form everywhere.
@@ -122,15 +120,19 @@ pub fn instance(spot: Spot, form: DrawnForm) -> Instance<Structure> {
     Instance {
         effect: if spot.is_series() { &Series } else { &DrawnBranch },
         site: Site::At(spot),
-        variant: FORMS.iter().position(|f| *f == form).unwrap_or(0),
+        variant: number(form),
     }
 }
 
 /// The forms that a site can have, by number.
 fn variants(site: Site) -> Vec<usize> {
     let Site::At(spot) = site else { return Vec::new() };
-    let number = |form| FORMS.iter().position(|f| f == form);
-    forms(spot).iter().filter_map(number).collect()
+    forms(spot).into_iter().map(number).collect()
+}
+
+/// The variant that a form is.
+fn number(form: DrawnForm) -> usize {
+    FORMS.iter().position(|f| *f == form).unwrap_or(0)
 }
 
 /// DrawnForm of an instance of [`DrawnBranch`] or [`Series`].
@@ -226,7 +228,7 @@ fn parameters(site: Site, variant: usize, data: &DataSummary) -> Vec<Parameter> 
 /// The axes towards which the direction of an oblique spring leans, and by how much: 1 is half-way.
 fn oblique_axes(spot: Spot) -> [usize; 2] {
     let along = match spot {
-        Spot::LinkAxis(_, axis) | Spot::LinkGround(_, axis) | Spot::ToolGround(axis) => axis,
+        Spot::LinkGround(_, axis) | Spot::ToolGround(axis) => axis,
         _ => 0,
     };
     [(along + 1) % 3, (along + 2) % 3]
@@ -585,10 +587,7 @@ mod tests {
         let values = [k, c, towards_z, towards_x].map(Dual::constant);
         let at = At {
             site: Site::At(spot),
-            variant: FORMS
-                .iter()
-                .position(|f| *f == DrawnForm::ObliqueSpringDamper)
-                .unwrap(),
+            variant: number(DrawnForm::ObliqueSpringDamper),
         };
         DrawnBranch.apply(at, &values, &setting, &mut chain);
         let (point, place, _) = spot.point(&kinematics).unwrap();

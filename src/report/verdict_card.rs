@@ -114,7 +114,7 @@ fn answer<D: Modelled>(
         let others: Vec<String> = d.companions.iter().map(label_in_words).collect();
         let count = match others.len() {
             1 => "a second effect",
-            _ => "two more effects",
+            _ => "further effects",
         };
         card.facts
             .push(("Likely besides", format!("{count}: {}", listed(&others))));
@@ -149,28 +149,16 @@ fn unknown<D: Modelled>(card: &mut VerdictCard, d: &Diagnosis<D>, lead: Option<&
     card.explanation = "What is left is real, but no effect that this program knows explains it.".into();
     card.headline = match drawn {
         Some((place, best)) => {
-            let second = best.second.as_ref().map_or(String::new(), |second| {
-                format!(
-                    ", and a {} {}",
-                    second.form.label().replace('-', " "),
-                    second.spot.words()
-                )
-            });
             card.explanation += &format!(
-                " Without a name for it, the data still draw what it does and where: a {} {}{second}.",
-                best.form.label().replace('-', " "),
-                place.spot.words()
+                " Without a name for it, the data still draw what it does and where: {}.",
+                best.in_words(|_| String::new())
             );
-            let all = best.second.iter().flat_map(|second| &second.parameters);
-            let all: Vec<Estimate> = best.parameters.iter().chain(all).cloned().collect();
+            let all: Vec<Estimate> = best.parts().flat_map(|p| p.parameters.clone()).collect();
             card.facts.push(("How big", sizes(&all)));
             if !place.tied_with.is_empty() {
                 card.facts.push(("Or at", listed(&place.tied_with)));
             }
-            match lead
-                .filter(|found| found.is_partial())
-                .and_then(Localisation::explained_share)
-            {
+            match lead.and_then(Localisation::partial_share) {
                 Some(share) => {
                     card.explanation += &format!(
                         " That explains {:.0} % of what stands above the noise: it is not all, or not the place.",
@@ -296,7 +284,7 @@ pub fn structure(
                     Some(best) => format!(
                         "look at what the data draw: `lobestone localise {dir}`; to put it into the model: `lobestone add \
                          {dir} {}`",
-                        best.instance.label()
+                        best.first.instance.label()
                     ),
                     None => format!("{}", found.next_measurement),
                 },

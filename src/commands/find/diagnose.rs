@@ -393,9 +393,7 @@ fn rest<D: Modelled>(d: &Diagnosis<D>, next_measurement: &NextMeasurement) -> St
             );
         }
         Some([_, of]) if d.verdict == DiagnosisVerdict::Unknown && of > 0 => {
-            text += &format!(
-                "  Nor does any of {of} pairs of effects with the best of them, nor three that promised most\n"
-            );
+            text += &format!("  Nor does any of {of} pairs of effects with the best of them\n");
         }
         _ => {}
     }

@@ -4,9 +4,8 @@ use crate::Result;
 use crate::campaign::Campaign;
 use crate::commands::text::{Emphasis, number, percent, table, warnings};
 use crate::commands::{CampaignArg, Outcome};
-use crate::discrepancy::localise::{BestForm, Localisation, LocalisedPlace, localise};
-use crate::effects::Spot;
-use crate::effects::drawn::{self, DrawnForm};
+use crate::discrepancy::localise::{BestForm, DrawnPart, Localisation, LocalisedPlace, localise};
+use crate::effects::drawn;
 use crate::identify::frfs::calibrate::Estimate;
 use crate::identify::{Options, StructureCase};
 use crate::report::figure::DrawnCurveFigure;
@@ -40,7 +39,7 @@ pub fn run(args: LocaliseArgs) -> Result<Outcome> {
             });
             format!(
                 "run `lobestone add {dir} {}` to put it into the model{then}",
-                form.instance.label()
+                form.first.instance.label()
             )
         }
         _ => format!("nothing to add here; `lobestone compare {dir}` shows where the model fails"),
@@ -84,7 +83,7 @@ fn figure(place: &LocalisedPlace) -> DrawnCurveFigure {
     let best = place.best.as_ref();
     let values: Vec<f64> = best
         .iter()
-        .flat_map(|b| b.parameters.iter().map(|p| p.value))
+        .flat_map(|b| b.first.parameters.iter().map(|p| p.value))
         .collect();
     let frequency_hz: Vec<f64> = place.curve.iter().map(|c| c.frequency_hz).collect();
     DrawnCurveFigure {
@@ -93,11 +92,11 @@ fn figure(place: &LocalisedPlace) -> DrawnCurveFigure {
         stiffness: place.curve.iter().map(|c| c.stiffness).collect(),
         std: place.curve.iter().map(|c| c.std).collect(),
         form: best.map_or_else(Vec::new, |b| {
-            let of = |f: &f64| drawn::dynamic_stiffness(place.spot, b.form, &values, *f);
+            let of = |f: &f64| drawn::dynamic_stiffness(place.spot, b.first.form(), &values, *f);
             frequency_hz.iter().map(of).collect()
         }),
         form_label: best.map_or(String::new(), |b| {
-            format!("fitted: {}", b.form.label().replace('-', " "))
+            format!("fitted: {}", b.first.form().label().replace('-', " "))
         }),
         frequency_hz,
     }
@@ -125,14 +124,14 @@ fn by_name(estimates: &[Estimate]) -> (Map<String, Value>, Map<String, Value>) {
 
 /// One place for the document.
 pub fn place(p: &LocalisedPlace) -> Value {
-    let (parameters, errors) = by_name(p.best.as_ref().map_or(&[], |b| &b.parameters));
+    let (parameters, errors) = by_name(p.best.as_ref().map_or(&[], |b| &b.first.parameters));
     json!({
         "place": p.spot.label(),
-        "add": p.best.as_ref().map(|b| b.instance.label()),
+        "add": p.best.as_ref().map(|b| b.first.instance.label()),
         "left": p.left,
         "consistency": p.consistency,
         "held_out_nrms": p.best.as_ref().and_then(|b| b.held_out.as_ref().map(|h| h.nrms())),
-        "form": p.best.as_ref().map(|b| b.form.label()),
+        "form": p.best.as_ref().map(|b| b.first.form().label()),
         "forms": p.forms.iter().map(|f| json!({ "form": f.form.label(), "delta_bic": f.delta_bic })).collect::<Vec<_>>(),
         "parameters": parameters,
         "errors": errors,
@@ -144,7 +143,7 @@ pub fn place(p: &LocalisedPlace) -> Value {
             json!({
                 "place": second.spot.label(),
                 "add": second.instance.label(),
-                "form": second.form.label(),
+                "form": second.form().label(),
                 "parameters": parameters,
                 "errors": errors,
             })
@@ -159,7 +158,7 @@ fn describe(case: &StructureCase, found: &Localisation, most: usize) -> String {
             true => format!(
                 "{}: {}\n",
                 Emphasis::Strong.on("The data draw"),
-                drawn_in_words(p, best)
+                drawn_in_words(best)
             ),
             false => format!(
                 "{}: no place explains more than chance\n",
@@ -172,10 +171,7 @@ fn describe(case: &StructureCase, found: &Localisation, most: usize) -> String {
                 p.tied_with.join(", ")
             );
         }
-        if let Some(share) = found
-            .explained_share()
-            .filter(|_| found.significant && found.is_partial())
-        {
+        if let Some(share) = found.partial_share().filter(|_| found.significant) {
             text += &format!(
                 "that explains {} of what stands above the noise: it is not all, or not the place\n",
                 percent(share)
@@ -206,8 +202,8 @@ fn describe(case: &StructureCase, found: &Localisation, most: usize) -> String {
                 number(p.consistency, 3),
                 p.best
                     .as_ref()
-                    .map_or("–".into(), |b| b.form.label().replace('-', " ")),
-                p.best.as_ref().map_or(String::new(), values),
+                    .map_or("–".into(), |b| b.first.form().label().replace('-', " ")),
+                p.best.as_ref().map_or(String::new(), all_values),
                 p.tied_with.join(", "),
             ]
         })
@@ -220,17 +216,21 @@ fn describe(case: &StructureCase, found: &Localisation, most: usize) -> String {
     text + &warnings(&case.warnings)
 }
 
-fn values(best: &BestForm) -> String {
-    let all = best.parameters.iter().map(size).collect::<Vec<_>>().join(", ");
-    match &best.second {
-        Some(second) => format!(
-            "{all}; {}: {} {}",
-            second.spot.label(),
-            second.form.label().replace('-', " "),
-            second.parameters.iter().map(size).collect::<Vec<_>>().join(", ")
-        ),
-        None => all,
-    }
+fn values(part: &DrawnPart) -> String {
+    part.parameters.iter().map(size).collect::<Vec<_>>().join(", ")
+}
+
+/// Values of the form of a place, and what acts there besides.
+fn all_values(best: &BestForm) -> String {
+    let besides = best.second.iter().map(|part| {
+        format!(
+            "; {}: {} {}",
+            part.spot.label(),
+            part.form().words(),
+            values(part)
+        )
+    });
+    values(&best.first) + &besides.collect::<String>()
 }
 
 /// What the data draw, as a sentence without its end.
@@ -242,32 +242,17 @@ pub fn in_words(found: &Localisation) -> String {
             let before = found.baseline.reduced_chi2;
             format!(
                 "the data draw {}, which leaves {:.2} times the noise variance of {before:.2}{}",
-                drawn_in_words(p, best),
+                drawn_in_words(best),
                 p.left,
-                match found.is_partial() {
-                    true => ": not all, or not the place",
-                    false => "",
+                match found.partial_share() {
+                    Some(_) => ": not all, or not the place",
+                    None => "",
                 }
             )
         },
     )
 }
 
-fn drawn_in_words(place: &LocalisedPlace, best: &BestForm) -> String {
-    let form = |form: DrawnForm, parameters: &[Estimate], spot: Spot| {
-        format!(
-            "a {} ({}) {}",
-            form.label().replace('-', " "),
-            parameters.iter().map(size).collect::<Vec<_>>().join(", "),
-            spot.words()
-        )
-    };
-    let first = form(best.form, &best.parameters, place.spot);
-    match &best.second {
-        Some(second) => format!(
-            "{first}, and {}",
-            form(second.form, &second.parameters, second.spot)
-        ),
-        None => first,
-    }
+fn drawn_in_words(best: &BestForm) -> String {
+    best.in_words(|part| format!(" ({})", values(part)))
 }

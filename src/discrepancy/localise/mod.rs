@@ -20,6 +20,7 @@ use crate::effects::{Instance, Spot};
 use crate::identify::frfs::calibrate::{Calibration, Estimate, estimates};
 use crate::identify::frfs::frf_data::FrfData;
 use crate::identify::frfs::spot_response::{SpotResponses, free_spots};
+use crate::identify::frfs::structure_study::{led_astray, starts_elsewhere};
 use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
 use crate::identify::study::{Effort, Extent, HeldOut, Study, Tried, View, held_out};
 use crate::identify::{StructureModel, StructureStudy};
@@ -55,21 +56,35 @@ pub struct LocalisedPlace {
     pub tied_with: Vec<String>,
 }
 
-/// The best form of a place, fitted to all data.
+/// A form at one displacement, fitted.
+#[derive(Debug, Clone)]
+pub struct DrawnPart {
+    /// Where it is.
+    pub spot: Spot,
+    /// The form there, as an effect.
+    pub instance: Instance<Structure>,
+    /// Its own parameters.
+    pub parameters: Vec<Estimate>,
+}
+
+impl DrawnPart {
+    /// The law.
+    pub fn form(&self) -> DrawnForm {
+        drawn::form_of(self.instance.variant)
+    }
+}
+
+/// What explains most at a place, fitted to all data.
 #[derive(Debug, Clone)]
 pub struct BestForm {
-    /// The form at its place, as an effect.
-    pub instance: Instance<Structure>,
-    /// The law.
-    pub form: DrawnForm,
+    /// What acts there.
+    pub first: DrawnPart,
+    /// What acts along another displacement of the same place, where one is not enough; fitted with the first.
+    pub second: Option<DrawnPart>,
     /// The model with it.
     pub model: StructureModel,
     /// Where its fit stands, solver's scale.
     pub theta: Vec<f64>,
-    /// The form's own parameters.
-    pub parameters: Vec<Estimate>,
-    /// What else acts there, where one displacement is not enough.
-    pub second: Option<SecondForm>,
     /// Misfit Σ|r|²/σ² and priors.
     pub cost: f64,
     /// BIC less that of the model without it: below zero the form pays for its parameters.
@@ -82,17 +97,17 @@ pub struct BestForm {
     pub held_out: Option<HeldOut>,
 }
 
-/// A form at another displacement of the same place, fitted with the first.
-#[derive(Debug, Clone)]
-pub struct SecondForm {
-    /// Where it is.
-    pub spot: Spot,
-    /// The form there, as an effect.
-    pub instance: Instance<Structure>,
-    /// The law.
-    pub form: DrawnForm,
-    /// The form's own parameters.
-    pub parameters: Vec<Estimate>,
+impl BestForm {
+    /// One part or two.
+    pub fn parts(&self) -> impl Iterator<Item = &DrawnPart> {
+        std::iter::once(&self.first).chain(&self.second)
+    }
+
+    /// `a resonator on link 5 along z`; `of_part` stands behind each form.
+    pub fn in_words(&self, of_part: impl Fn(&DrawnPart) -> String) -> String {
+        let part = |p: &DrawnPart| format!("{}{} {}", p.form().words(), of_part(p), p.spot.words());
+        self.parts().map(part).collect::<Vec<_>>().join(", and ")
+    }
 }
 
 /// What the data draw.
@@ -119,10 +134,11 @@ impl Localisation {
         (above > 0.0).then(|| (1.0 - left / above).clamp(0.0, 1.0))
     }
 
-    /// Whether the best place leaves so much that it may be the wrong one, or not the only one.
-    pub fn is_partial(&self) -> bool {
-        self.places.first().is_some_and(|p| p.left > LEFT_OVER)
-            && self.explained_share().is_some_and(|share| share < EXPLAINS)
+    /// That share, where the best place leaves so much that it may be the wrong one, or not the only one.
+    pub fn partial_share(&self) -> Option<f64> {
+        let is_partial = self.places.first()?.left > LEFT_OVER;
+        self.explained_share()
+            .filter(|share| is_partial && *share < EXPLAINS)
     }
 }
 
@@ -130,12 +146,10 @@ impl Localisation {
 const FITTED: usize = 10;
 /// Places at which a second displacement is tried, and displacements that are tried there.
 const SECOND: [usize; 2] = [4, 2];
-/// Squares per value of the model as it stands from which on two displacements may have something to explain, …
+/// Squares per value of the model as it stands from which on two displacements may have something to explain …
 const SECOND_FROM: f64 = 1.02;
-/// … more than noise is left, …
+/// … and from which on more than noise is left.
 const LEFT_OVER: f64 = 1.1;
-/// … and from which on what is missing may have led the model's parameters away from theirs.
-const ASTRAY: f64 = 1.5;
 /// Places whose best form is fitted to all data.
 const SETTLED: usize = 4;
 /// Lines of all postures together that the screen looks at.
@@ -176,7 +190,7 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
         REFINE,
     )?;
     let values = study.real_values(Extent::Coarse) as f64;
-    let starts = Starts::new(study, model, theta, 2.0 * coarse_base.cost > ASTRAY * values);
+    let starts = Starts::new(study, model, theta, led_astray(coarse_base.cost, values));
     let tried: Vec<(usize, Vec<Tried<Structure>>)> = leaders(&screened)
         .into_par_iter()
         .map(|i| (i, fit_forms(study, model, &starts, &screened[i])))
@@ -185,13 +199,12 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
     let bic = |t: &Tried<Structure>| {
         2.0 * (t.fit.cost - coarse_base.cost) + (t.fit.theta.len() - base_count) as f64 * values.ln()
     };
-    // A form whose size ran to the end of its range stands for another.
-    let order = |t: &Tried<Structure>| (at_bound(&t.fit, base_count), bic(t));
+    let better = |a: &Tried<Structure>, b: &Tried<Structure>| by_bound_then_bic(a, b, base_count, values);
     let mut fitted: Vec<(usize, Vec<Tried<Structure>>)> = tried
         .into_iter()
         .filter(|(_, forms)| !forms.is_empty())
         .map(|(i, mut forms)| {
-            forms.sort_by(|a, b| compare(order(a), order(b)));
+            forms.sort_by(better);
             (i, forms)
         })
         .collect();
@@ -206,7 +219,7 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
                 return None;
             }
             let pair = second_form(study, &thinned, forms, &screened[*i], base_count)?;
-            (order(&pair.tried) < order(&forms[0])).then_some(pair)
+            better(&pair.tried, &forms[0]).is_lt().then_some(pair)
         })
         .collect();
     let mut fitted: Vec<Fitted> = fitted
@@ -216,12 +229,16 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
         .collect();
     fitted.sort_by(|a, b| bic(a.best()).total_cmp(&bic(b.best())));
 
-    let base_cost = minimise(&study.problem(model, View::FULL), theta, &model.bounds(), REFINE)?.cost;
+    let without = Without {
+        cost: minimise(&study.problem(model, View::FULL), theta, &model.bounds(), REFINE)?.cost,
+        count: base_count,
+        tests,
+    };
     let mut settled: Vec<LocalisedPlace> = fitted
         .par_iter()
         .take(SETTLED)
         .map(|fitted| {
-            let best = settled_form(study, fitted, base_cost, base_count, tests)?;
+            let best = settled_form(study, screened[fitted.place].spot, fitted, &without)?;
             let count = study.data.value_count() as f64;
             Ok(LocalisedPlace {
                 left: best.cost / (count - 0.5 * best.theta.len() as f64).max(1.0),
@@ -351,12 +368,10 @@ struct Starts {
 
 impl Starts {
     fn new(study: &StructureStudy, model: &StructureModel, theta: &[f64], astray: bool) -> Self {
-        let measured = study.measured().filter(|m| m.len() == theta.len());
-        let elsewhere = [Some(model.nominal_theta()), measured.map(<[f64]>::to_vec)];
         Starts {
             theta: theta.to_vec(),
             elsewhere: match astray {
-                true => elsewhere.into_iter().flatten().collect(),
+                true => starts_elsewhere(model, study.measured()),
                 false => Vec::new(),
             },
         }
@@ -367,8 +382,16 @@ fn at_bound(fit: &Fit, base_count: usize) -> bool {
     (base_count..fit.theta.len()).any(|i| fit.at_bound.contains(&i))
 }
 
-fn compare(a: (bool, f64), b: (bool, f64)) -> std::cmp::Ordering {
-    a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+/// Order of fits on the coarse view, of so many real values: a form whose size ran to the end of its range stands for another.
+fn by_bound_then_bic(
+    a: &Tried<Structure>,
+    b: &Tried<Structure>,
+    base_count: usize,
+    values: f64,
+) -> std::cmp::Ordering {
+    let bic = |t: &Tried<Structure>| 2.0 * t.fit.cost + t.fit.theta.len() as f64 * values.ln();
+    let bound = |t: &Tried<Structure>| at_bound(&t.fit, base_count);
+    bound(a).cmp(&bound(b)).then(bic(a).total_cmp(&bic(b)))
 }
 
 /// A second form beside the best of `forms`, at the displacement of the same place that promises most with the first in the model.
@@ -407,9 +430,7 @@ fn second_form(
         })
     });
     let values = study.real_values(Extent::Coarse) as f64;
-    let price = |p: &Pair| 2.0 * p.tried.fit.cost + p.tried.fit.theta.len() as f64 * values.ln();
-    let order = |p: &Pair| (at_bound(&p.tried.fit, base_count), price(p));
-    pairs.min_by(|a, b| compare(order(a), order(b)))
+    pairs.min_by(|a, b| by_bound_then_bic(&a.tried, &b.tried, base_count, values))
 }
 
 /// Each form of a place fitted on the coarse view, started from the drawn curve.
@@ -434,13 +455,13 @@ fn fit_forms(
         false => Effort::Staged,
     };
     drawn::forms(screened.spot)
-        .par_iter()
+        .into_par_iter()
         .filter_map(|form| {
-            let instance = drawn::instance(screened.spot, *form);
+            let instance = drawn::instance(screened.spot, form);
             let extended = study.extend(model, &instance);
             let own = &extended.parameters[model.parameters.len()..];
             let proposed = instance.effect.starts(instance.at(), &study.known(model), &[]);
-            let starts: Vec<Vec<f64>> = starting_values(*form, screened)
+            let starts: Vec<Vec<f64>> = starting_values(form, screened)
                 .into_iter()
                 .chain(proposed.into_iter().take(4))
                 .map(|start| {
@@ -515,72 +536,69 @@ fn starting_values(form: DrawnForm, screened: &Screened) -> Vec<Vec<f64>> {
     }
 }
 
-/// The best form of a place fitted to all data. One whose size runs to the end of its range there stands for another: then the next.
-fn settled_form(
-    study: &StructureStudy,
-    fitted: &Fitted,
-    base_cost: f64,
-    base_count: usize,
+/// What the forms of all places are held against.
+struct Without {
+    /// On all data, of the model without any.
+    cost: f64,
+    /// Its parameters.
+    count: usize,
+    /// Forms and places that were tried.
     tests: usize,
-) -> Result<BestForm> {
-    let alone = fitted.forms.iter().map(|tried| (tried, None));
-    let candidates = fitted
-        .pair
-        .iter()
-        .map(|pair| (&pair.tried, Some(pair)))
-        .chain(alone)
-        .take(CANDIDATES);
-    let mut first = None;
-    for (tried, pair) in candidates {
-        let best = settle(study, tried, pair, base_cost, base_count, tests)?;
-        if !best.at_bound {
-            return Ok(best);
-        }
-        first.get_or_insert(best);
-    }
-    first.ok_or_else(|| crate::Error::computation("no form was fitted"))
 }
 
-/// A form, or two at one place, fitted to all data and tested on postures left out.
+/// The best form of a place fitted to all data. One whose size runs to the end of its range there stands for another: then the next.
+fn settled_form(study: &StructureStudy, spot: Spot, fitted: &Fitted, without: &Without) -> Result<BestForm> {
+    let alone = fitted.forms.iter().map(|tried| (tried, None));
+    let pair = fitted.pair.iter().map(|pair| (&pair.tried, Some(pair)));
+    let mut first = None;
+    for (tried, pair) in pair.chain(alone).take(CANDIDATES) {
+        let problem = study.problem(&tried.model, View::FULL);
+        let fit = minimise(&problem, &tried.fit.theta, &tried.model.bounds(), REFINE)?;
+        if !at_bound(&fit, without.count) {
+            return settle(study, spot, (tried, pair), fit, without);
+        }
+        first.get_or_insert((tried, pair, fit));
+    }
+    let (tried, pair, fit) = first.ok_or_else(|| crate::Error::computation("no form was fitted"))?;
+    settle(study, spot, (tried, pair), fit, without)
+}
+
+/// A form at `spot`, or two at its place, at the `fit` to all data: judged, and tested on postures left out.
 fn settle(
     study: &StructureStudy,
-    tried: &Tried<Structure>,
-    pair: Option<&Pair>,
-    base_cost: f64,
-    base_count: usize,
-    tests: usize,
+    spot: Spot,
+    (tried, pair): (&Tried<Structure>, Option<&Pair>),
+    fit: Fit,
+    without: &Without,
 ) -> Result<BestForm> {
-    let Tried { model, fit, .. } = tried;
-    let instance = pair.map_or(tried.instance, |pair| pair.first);
-    let fit = minimise(
-        &study.problem(model, View::FULL),
-        &fit.theta,
-        &model.bounds(),
-        REFINE,
-    )?;
+    let (model, base_count) = (&tried.model, without.count);
     let values = study.real_values(Extent::Full) as f64;
     let extra = (fit.theta.len() - base_count) as f64;
     let reduced = 2.0 * fit.cost / (values - fit.theta.len() as f64).max(1.0);
     let residual = study.residual(model, &fit.theta)?;
     // What is left scales what counts as chance, and neighbours that move together count once.
     let share = residual.independent_share.min(1.0);
-    let gain = (2.0 * (base_cost - fit.cost) * share / reduced.max(1.0)).max(0.0);
+    let gain = (2.0 * (without.cost - fit.cost) * share / reduced.max(1.0)).max(0.0);
     let single = ChiSquared::new(extra).map_or(1.0, |d| d.sf(gain));
     let all = estimates(&model.parameters, &fit, reduced)?;
-    let first_end = pair.map_or(all.len(), |pair| pair.first_count);
-    Ok(BestForm {
+    let part = |spot, instance, own: std::ops::Range<usize>| DrawnPart {
+        spot,
         instance,
-        form: drawn::form_of(instance.variant),
-        parameters: all[base_count..first_end].to_vec(),
-        second: pair.map(|pair| SecondForm {
-            spot: pair.second,
-            instance: pair.tried.instance,
-            form: drawn::form_of(pair.tried.instance.variant),
-            parameters: all[first_end..].to_vec(),
-        }),
+        parameters: all[own].to_vec(),
+    };
+    let (first, second) = match pair {
+        Some(pair) => (
+            part(spot, pair.first, base_count..pair.first_count),
+            Some(part(pair.second, tried.instance, pair.first_count..all.len())),
+        ),
+        None => (part(spot, tried.instance, base_count..all.len()), None),
+    };
+    Ok(BestForm {
+        first,
+        second,
         cost: fit.cost,
         delta_bic: extra * (share * values).ln() - gain,
-        p_value: (single * tests as f64).min(1.0),
+        p_value: (single * without.tests as f64).min(1.0),
         at_bound: at_bound(&fit, base_count),
         held_out: held_out(study, model, &fit.theta, Extent::Coarse, REFIT_WITHOUT_FOLD)?,
         theta: fit.theta,

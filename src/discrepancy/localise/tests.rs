@@ -129,8 +129,8 @@ fn a_resonator_on_link_5_is_found_and_weighed() {
     assert!(first_or_tied(&found, spot), "{:?}", found.places[0].spot);
     let place = found.places.iter().find(|p| p.spot == spot).unwrap();
     let best = place.best.as_ref().unwrap();
-    assert_eq!(best.form, DrawnForm::Resonator);
-    for (estimate, truth) in best.parameters.iter().zip(truth) {
+    assert_eq!(best.first.form(), DrawnForm::Resonator);
+    for (estimate, truth) in best.first.parameters.iter().zip(truth) {
         assert!((estimate.value / truth - 1.0).abs() < 0.15, "{estimate:?}");
         assert!(
             (estimate.value - truth).abs() < 4.0 * estimate.std_error,
@@ -150,7 +150,7 @@ fn a_clamp_at_the_tool_is_a_spring_to_the_ground() {
         found.places[0].spot
     );
     let place = found.places.iter().find(|p| p.spot == spot).unwrap();
-    let stiffness = &place.best.as_ref().unwrap().parameters[0];
+    let stiffness = &place.best.as_ref().unwrap().first.parameters[0];
     assert!((stiffness.value / 3e5 - 1.0).abs() < 0.05, "{stiffness:?}");
     // The drawn curve says the same without any form.
     let inside: Vec<f64> = place
@@ -177,7 +177,7 @@ fn a_tilting_bearing_is_drawn_in_series() {
         found.places[0].spot
     );
     let place = found.places.iter().find(|p| p.spot == spot).unwrap();
-    let stiffness = &place.best.as_ref().unwrap().parameters[0];
+    let stiffness = &place.best.as_ref().unwrap().first.parameters[0];
     assert!((stiffness.value / 2e6 - 1.0).abs() < 0.15, "{stiffness:?}");
 }
 
@@ -194,11 +194,11 @@ fn two_displacements_of_one_place_are_found_together() {
     let place = &found.places[0];
     let best = place.best.as_ref().unwrap();
     let other = best.second.as_ref().expect("two displacements");
-    assert!(found.significant && !found.is_partial() && place.left < 1.1);
+    assert!(found.significant && found.partial_share().is_none() && place.left < 1.1);
     assert!(found.explained_share().unwrap() > 0.95);
     for (spot, truth) in [first, second].into_iter().zip(truth) {
         let parameters = if place.spot == spot {
-            &best.parameters
+            &best.first.parameters
         } else {
             &other.parameters
         };
@@ -225,7 +225,7 @@ fn a_hose_is_a_spring_to_the_ground_along_a_direction_of_its_own() {
     );
     assert!(first_or_tied(&found, spot), "{:?}", found.places[0].spot);
     let place = found.places.iter().find(|p| p.spot == spot).unwrap();
-    let stiffness = &place.best.as_ref().unwrap().parameters[0];
+    let stiffness = &place.best.as_ref().unwrap().first.parameters[0];
     assert!((stiffness.value / truth[0] - 1.0).abs() < 0.15, "{stiffness:?}");
 }
 

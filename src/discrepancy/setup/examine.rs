@@ -17,7 +17,7 @@ use crate::Result;
 use crate::identify::frfs::calibrate::{Options, calibrate};
 use crate::identify::frfs::frf_data::FrfData;
 use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
-use crate::identify::frfs::structure_study::small_errors;
+use crate::identify::frfs::structure_study::{led_astray, small_errors, starts_elsewhere};
 use crate::identify::levenberg_marquardt::{Stopping, minimise};
 use crate::identify::rest::BeyondSlips;
 use crate::identify::study::{Study, View, try_effects};
@@ -119,9 +119,8 @@ pub fn examine(
     let values = 2 * thin.value_count();
     let base = cost(model, &thin, theta)?;
     let all = mistakes::all(model, &thin);
-    let nominal = model.nominal_theta();
-    let elsewhere: Vec<&[f64]> = match led_astray(base, &thin) {
-        true => [Some(&*nominal), measured].into_iter().flatten().collect(),
+    let elsewhere = match led_astray(base, values as f64) {
+        true => starts_elsewhere(model, measured),
         false => Vec::new(),
     };
     let mut trials = sized(model, &thin, theta, &elsewhere, &all)?;
@@ -200,17 +199,12 @@ fn problem<'a>(model: &'a StructureModel, data: &'a FrfData) -> FrfProblem<'a> {
     }
 }
 
-/// Whether `cost` is so large that a mistake may have led the model's parameters away from theirs.
-fn led_astray(cost: f64, data: &FrfData) -> bool {
-    cost > 1.5 * data.value_count() as f64
-}
-
 /// The mistakes with a size that promise most at `theta` and `elsewhere`, fitted on few lines from there.
 fn sized<'a>(
     model: &StructureModel,
     thin: &FrfData,
     theta: &[f64],
-    elsewhere: &[&[f64]],
+    elsewhere: &[Vec<f64>],
     all: &'a [Box<dyn Mistake>],
 ) -> Result<Vec<Trial<'a>>> {
     let mut promising = most_promising(model, thin, theta, all, FITTED)?;
@@ -296,7 +290,9 @@ fn read_trials<'a>(
             let near = minimise(&problem(&read, &data), theta, &read.bounds(), ROUGH).ok()?;
             let mut best = (near.cost, near.theta);
             // Where the baseline was led astray its old place is no start.
-            if led_astray(near.cost, &data) && (near.cost < base || proposed.gain > PLAIN_READING) {
+            if led_astray(near.cost, 2.0 * data.value_count() as f64)
+                && (near.cost < base || proposed.gain > PLAIN_READING)
+            {
                 let options = Options {
                     extra_starts: 0,
                     ..Options::default()

@@ -436,8 +436,8 @@ mod tests {
             Spot::Drive(2),
         ];
         let drawn = drawn.into_iter().flat_map(|spot| {
-            let forms = effects::drawn::forms(spot).iter();
-            forms.map(move |form| effects::drawn::instance(spot, *form))
+            let forms = effects::drawn::forms(spot).into_iter();
+            forms.map(move |form| effects::drawn::instance(spot, form))
         });
         for instance in Registry::structure()
             .instances(&bare.robot.spec)

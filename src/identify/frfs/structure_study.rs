@@ -262,6 +262,21 @@ pub fn held_out_postures(model: &StructureModel, data: &FrfData, theta: &[f64]) 
     held_out(&study, model, theta, Extent::Full, stopping)
 }
 
+/// Whether a misfit (half of Σ r²/σ², of so many real values) is so large that what is missing may have led the model's parameters
+/// away from theirs.
+pub fn led_astray(cost: f64, real_values: f64) -> bool {
+    const ASTRAY: f64 = 1.5;
+    2.0 * cost > ASTRAY * real_values
+}
+
+/// From where to fit besides, then (solver's scale): the nominal values, and where the `measured` modes put the model.
+pub fn starts_elsewhere(model: &StructureModel, measured: Option<&[f64]>) -> Vec<Vec<f64>> {
+    let nominal = model.nominal_theta();
+    let measured = measured.filter(|m| m.len() == nominal.len());
+    let measured = measured.map(<[f64]>::to_vec);
+    std::iter::once(nominal).chain(measured).collect()
+}
+
 /// Neighbouring lines over which the residual's correlation is summed.
 const CORRELATION_LAGS: usize = 40;
 

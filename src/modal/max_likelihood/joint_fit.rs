@@ -6,6 +6,7 @@ use num_complex::Complex64;
 use crate::modal::max_likelihood::ml_fit::{self, Solution};
 use crate::modal::max_likelihood::ml_linear::NoisyFrf;
 use crate::modal::shape;
+use crate::modal::single::curve::reach;
 use crate::modal::single::local_fit::Pole;
 use crate::modal::stabilisation::MAX_DAMPING;
 
@@ -117,12 +118,6 @@ impl Data {
     pub fn reaches(&self, frequency_hz: f64) -> bool {
         reach(&self.frequency_hz, frequency_hz)
     }
-}
-
-/// Do lines (ascending, Hz) reach a frequency?
-fn reach(lines_hz: &[f64], frequency_hz: f64) -> bool {
-    let ends = lines_hz.first().zip(lines_hz.last());
-    ends.is_some_and(|(first, last)| (*first..=*last).contains(&frequency_hz))
 }
 
 /// Refines all candidates (ascending in frequency). The poles of a group that cannot be fitted go out; `None` where none

@@ -8,6 +8,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2, Vector2};
 use num_complex::Complex64;
 use pulp::{Arch, Simd, WithSimd};
 
+use crate::modal::single::curve::reach;
 use crate::modal::single::local_fit::Pole;
 
 /// Lower residual terms, then upper ones.
@@ -140,13 +141,9 @@ impl PoleColumns {
                 }
             }
         }
-        let reached = |pole: &Pole| {
-            let ends = frequency_hz.first().zip(frequency_hz.last());
-            ends.is_some_and(|(first, last)| (*first..=*last).contains(&pole.frequency_hz))
-        };
         let mut held = vec![true; 2 * modes + RESIDUAL_TERMS];
         for (j, pole) in moving.iter().enumerate() {
-            held[2 * j..2 * j + 2].fill(!reached(pole));
+            held[2 * j..2 * j + 2].fill(!reach(frequency_hz, pole.frequency_hz));
         }
         PoleColumns {
             rows,

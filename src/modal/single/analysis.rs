@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::Result;
 use crate::modal::settings::{SET, Settings};
-use crate::modal::single::curve::{Curve, MIN_LINES};
+use crate::modal::single::curve::{Curve, MIN_LINES, reach};
 use crate::modal::single::frf_modes::{Disturbance, FrfMode, FrfModes, Method, ModeEstimate};
 use crate::modal::single::local_fit::{self, LocalSolution, Pole, Problem, ROUGHLY_SETTLED, SETTLED};
 use crate::modal::single::method_bias::{FittedCurves, MethodBias};
@@ -208,8 +208,7 @@ fn what_is_open(mode: &FrfMode, curve: &Curve, peaks: &[FrfPeak]) -> Option<&'st
     let best = mode.best();
     let distance = |p: &FrfPeak| (curve.frequency_hz[p.index] - best.frequency_hz).abs();
     let peak = peaks.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-    let lines = [curve.frequency_hz.first()?, curve.frequency_hz.last()?];
-    if !(lines[0]..=lines[1]).contains(&&best.frequency_hz) {
+    if !reach(&curve.frequency_hz, best.frequency_hz) {
         return Some("beyond the measured lines");
     }
     let half_width_hz = best.damping_ratio * best.frequency_hz;

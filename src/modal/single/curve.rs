@@ -12,6 +12,12 @@ use crate::{InputError, Result};
 /// Fewest usable lines from which anything is said.
 pub(crate) const MIN_LINES: usize = 8;
 
+/// Do lines (ascending, Hz) reach a frequency?
+pub(crate) fn reach(lines_hz: &[f64], frequency_hz: f64) -> bool {
+    let ends = lines_hz.first().zip(lines_hz.last());
+    ends.is_some_and(|(first, last)| (*first..=*last).contains(&frequency_hz))
+}
+
 /// Mobility of one FRF.
 #[derive(Debug, Clone)]
 pub(crate) struct Curve {

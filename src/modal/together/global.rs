@@ -320,6 +320,13 @@ mod tests {
         assert!(alone.iter().all(|m| m.best().frequency_hz <= 60.0));
     }
 
+    /// As [`global_of`], of FRFs with so many modes.
+    fn global_with(frfs: &[(Vec<f64>, Vec<Complex64>)], count: usize) -> GlobalModes {
+        let found = global_of(frfs);
+        assert_eq!(found.modes.len(), count, "{:?} {:?}", found.modes, found.rejected);
+        found
+    }
+
     fn global_of(frfs: &[(Vec<f64>, Vec<Complex64>)]) -> GlobalModes {
         let settings = Settings::default();
         let modes: Vec<FrfModes> = frfs
@@ -483,14 +490,7 @@ mod tests {
         let lines = frfs[2].0.partition_point(|f| *f < 22.0);
         frfs[2].0.truncate(lines);
         frfs[2].1.truncate(lines);
-        let found = global_of(&frfs);
-        assert_eq!(
-            found.modes.len(),
-            modes.len(),
-            "{:?} {:?}",
-            found.modes,
-            found.rejected
-        );
+        let found = global_with(&frfs, modes.len());
         for (mode, (f, _)) in found.modes.iter().zip(&modes) {
             assert!((mode.frequency_hz - f).abs() < 0.02, "{mode:?} for {f} Hz");
             assert_eq!(mode.constants[2].is_some(), *f < 21.8, "{mode:?}");
@@ -520,8 +520,7 @@ mod tests {
                 (f[1..f.len() - 1].to_vec(), leaked.collect())
             })
             .collect();
-        let found = global_of(&frfs);
-        assert_eq!(found.modes.len(), 3, "{:?} {:?}", found.modes, found.rejected);
+        let found = global_with(&frfs, 3);
         for (mode, f) in found.modes.iter().zip([47.0, 50.0, 54.0]) {
             assert!((mode.frequency_hz - f).abs() < 0.012, "{mode:?}");
         }
@@ -546,14 +545,7 @@ mod tests {
                     .frf()
             })
             .collect();
-        let found = global_of(&frfs);
-        assert_eq!(
-            found.modes.len(),
-            modes.len(),
-            "{:?} {:?}",
-            found.modes,
-            found.rejected
-        );
+        let found = global_with(&frfs, modes.len());
         for (mode, (f, _)) in found.modes.iter().zip(modes) {
             assert!(
                 (mode.frequency_hz - f).abs() < 4.0 * mode.frequency_std_hz.max(1e-3),
@@ -576,8 +568,7 @@ mod tests {
                     .frf()
             })
             .collect();
-        let found = global_of(&frfs);
-        assert_eq!(found.modes.len(), 3, "{:?} {:?}", found.modes, found.rejected);
+        let found = global_with(&frfs, 3);
         for (found, (f, zeta)) in found.modes.iter().zip(modes) {
             assert!(
                 (found.frequency_hz - f).abs() < 4.0 * found.frequency_std_hz,

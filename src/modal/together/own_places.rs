@@ -2,6 +2,7 @@
 //! it lacks far away can move a mode; the fit of each FRF around its own peak knows nothing of that.
 
 use crate::modal::settings::SET;
+use crate::modal::single::curve::reach;
 use crate::modal::single::frf_modes::FrfMode;
 use crate::modal::single::local_fit::Pole;
 use crate::modal::together::global_modes::GlobalMode;
@@ -129,10 +130,9 @@ pub(super) fn missed(members: &[&SetMember], found: &[GlobalMode]) -> Vec<f64> {
     let mut missed: Vec<f64> = places
         .iter()
         .filter(|place| {
-            let reaching = members.iter().filter(|m| {
-                let ends = m.frequency_hz.first().zip(m.frequency_hz.last());
-                ends.is_some_and(|(first, last)| (*first..=*last).contains(&place.frequency_hz))
-            });
+            let reaching = members
+                .iter()
+                .filter(|m| reach(m.frequency_hz, place.frequency_hz));
             let accounts = |mode: &GlobalMode| {
                 let width_hz = mode.damping_ratio * mode.frequency_hz + mode.frequency_std_hz;
                 (mode.frequency_hz - place.frequency_hz).abs() < place.width_hz + width_hz

@@ -46,6 +46,14 @@ pub(crate) struct Solution {
     centre_hz: f64,
 }
 
+/// A standard deviation from a scatter, relative, and the factor by which twice that holds 95 % for as many parts as there
+/// are in effect (Student's t with 1/Σh² − 1 degrees of freedom).
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Jackknife {
+    pub std: f64,
+    pub few: f64,
+}
+
 impl Solution {
     pub fn frequency_std_hz(&self, mode: usize) -> f64 {
         self.covariance[(2 * mode, 2 * mode)].max(0.0).sqrt() * self.poles[mode].frequency_hz
@@ -80,34 +88,59 @@ impl Solution {
 
     /// As [`Self::scatter_std`], as large as a few FRFs make it that say most of a mode: each left out in turn (an FRF that
     /// makes the share h of what is known pulls the pole so far that only 1 − h of its pull is seen; Bell & McCaffrey 2002).
-    /// With it the factor by which twice that holds 95 % for as many FRFs as there are in effect (Student's t with
-    /// 1/Σh² − 1 degrees of freedom).
-    pub fn jackknife_std(&self, mode: usize) -> ([f64; 2], f64) {
-        /// An FRF that knows nearly all says nothing about its own scatter.
+    /// FRFs that follow one another share errors (one hit, one mounting of the sensor, one hour of the day), so that blocks of
+    /// 1, 2, 4 … are left out (Künsch 1989), and the largest counts. Of (ln f, ln ζ).
+    pub fn jackknife(&self, mode: usize) -> [Jackknife; 2] {
+        /// Fewer blocks say little about a scatter.
+        const LEAST_BLOCKS: usize = 8;
+        let with_all: Matrix2<f64> = self.frfs.iter().map(|f| f.own[mode].0).sum();
+        let part: Vec<usize> = (0..self.frfs.len())
+            .filter(|&m| self.frfs[m].took_part())
+            .collect();
+        let inverse = match with_all.try_inverse() {
+            Some(inverse) if part.len() > 1 => inverse,
+            _ => return self.scatter_std(mode).map(|std| Jackknife { std, few: 1.0 }),
+        };
+        let lengths = std::iter::successors(Some(1), |length| Some(2 * length))
+            .take_while(|&length| length == 1 || part.len() >= LEAST_BLOCKS * length);
+        let mut most = [Jackknife::default(); 2];
+        for length in lengths {
+            let blocks = self.leave_out(mode, part.chunks(length), &inverse);
+            for (most, of_blocks) in most.iter_mut().zip(blocks) {
+                if of_blocks.few * of_blocks.std > most.few * most.std {
+                    *most = of_blocks;
+                }
+            }
+        }
+        most
+    }
+
+    /// The jackknife over `blocks` of FRFs; `inverse` of what all know of the pole.
+    fn leave_out<'a>(
+        &self,
+        mode: usize,
+        blocks: impl Iterator<Item = &'a [usize]>,
+        inverse: &Matrix2<f64>,
+    ) -> [Jackknife; 2] {
+        /// A block that knows nearly all says nothing about its own scatter.
         const LEAST_SEEN: f64 = 0.2;
         const LEAST_FREEDOM: f64 = 1.5;
-        if self.taking_part() < 2 {
-            return ([0.0; 2], 1.0);
+        let mut squares = [0.0; 2];
+        let mut shares = 0.0;
+        for block in blocks {
+            let known: Matrix2<f64> = block.iter().map(|&m| self.frfs[m].own[mode].0).sum();
+            let share = 0.5 * (inverse * known).trace();
+            shares += share * share;
+            for (k, square) in squares.iter_mut().enumerate() {
+                let pull: f64 = block.iter().map(|&m| self.influence[m][2 * mode + k]).sum();
+                *square += (pull / (1.0 - share).max(LEAST_SEEN)).powi(2);
+            }
         }
-        let total: Matrix2<f64> = self.frfs.iter().map(|f| f.own[mode].0).sum();
-        let Some(inverse) = total.try_inverse() else {
-            return (self.scatter_std(mode), 1.0);
-        };
-        let share: Vec<f64> = self
-            .frfs
-            .iter()
-            .map(|f| 0.5 * (inverse * f.own[mode].0).trace())
-            .collect();
-        let in_effect = 1.0 / share.iter().map(|h| h * h).sum::<f64>();
-        let few = students_t_over_normal((in_effect - 1.0).max(LEAST_FREEDOM));
-        let std = [0, 1].map(|k| {
-            let squares = self.influence.iter().zip(&share);
-            let sum: f64 = squares
-                .map(|(i, h)| (i[2 * mode + k] / (1.0 - h).max(LEAST_SEEN)).powi(2))
-                .sum();
-            sum.sqrt()
-        });
-        (std, few)
+        let few = students_t_over_normal((1.0 / shares - 1.0).max(LEAST_FREEDOM));
+        squares.map(|square: f64| Jackknife {
+            std: square.sqrt(),
+            few,
+        })
     }
 
     /// Where an FRF alone would have a pole, the others held, to the first order: change of (ln f, ln ζ), and the standard
@@ -561,6 +594,47 @@ mod tests {
                 max_relative = 0.035
             );
         }
+    }
+
+    /// 64 FRFs of one mode, whose frequency moves with every FRF or with every eight: the same scatter from FRF to FRF, but an
+    /// eighth of the places. Errors of the mean are σ/√64 and σ/√8.
+    #[test]
+    fn frfs_that_share_an_error_count_as_one() {
+        let stds = [1, 8].map(|shared| {
+            let curves: Vec<(Vec<f64>, Vec<Complex64>)> = (0..64)
+                .map(|m| {
+                    let turn = (m / shared) as f64;
+                    let moved = 20.0 * (1.0 + 1e-3 * (2.4 * turn).sin());
+                    Synthetic::new(18.0, 22.0, 0.02, &[SyntheticMode::new(moved, 0.01, 1.0)])
+                        .with_noise(0.0, 0.005, m as u64)
+                        .frf()
+                })
+                .collect();
+            let sigma: Vec<Vec<f64>> = curves
+                .iter()
+                .map(|(_, h)| h.iter().map(|h| 0.005 * h.norm()).collect())
+                .collect();
+            let spread = vec![0.0; curves[0].0.len()];
+            let frfs: Vec<NoisyFrf> = curves
+                .iter()
+                .zip(&sigma)
+                .map(|((f, h), sigma)| NoisyFrf {
+                    frequency_hz: f,
+                    receptance: h,
+                    sigma,
+                    spread_hz: &spread,
+                })
+                .collect();
+            let start = Pole {
+                frequency_hz: 20.0,
+                damping_ratio: 0.01,
+            };
+            let found = fit(&frfs, &[start], &[], SETTLED).unwrap();
+            found.jackknife(0)[0].std
+        });
+        let scatter = 1e-3 / std::f64::consts::SQRT_2;
+        approx::assert_relative_eq!(stds[0], scatter / 8.0, max_relative = 0.3);
+        approx::assert_relative_eq!(stds[1], scatter / 8.0_f64.sqrt(), max_relative = 0.3);
     }
 
     /// FRFs with noises that differ by a factor only are fitted with one basis for all: the same poles, residues, deviations.

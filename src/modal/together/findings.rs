@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 use crate::modal::max_likelihood::joint_fit::{self, Change, Data, Group};
-use crate::modal::max_likelihood::ml_fit;
+use crate::modal::max_likelihood::ml_fit::{self, Jackknife};
 use crate::modal::quality::{self, Power};
 use crate::modal::settings::SET;
 use crate::modal::shape;
@@ -203,6 +203,16 @@ pub(crate) fn collect(
                 ));
                 continue;
             }
+            let without_place = frequency_std_hz > width_hz.hypot(shift[0]);
+            if without_place && damping_std > pole.damping_ratio.hypot(shift[1]) {
+                result.rejected.push(RejectedMode::new(
+                    pole,
+                    format!(
+                        "the FRFs know neither its frequency (±{frequency_std_hz:.2} Hz) nor its damping"
+                    ),
+                ));
+                continue;
+            }
             // … in most of them; a disturbance has phases of its own.
             let in_phase = collinear && 2 * found_in > frfs && found_in > 2;
             if damping_std >= pole.damping_ratio && group.doubt.is_none() && !in_phase {
@@ -321,15 +331,18 @@ fn between(a: Pole, b: Pole) -> [f64; 2] {
 /// How the FRFs scatter about a common pole (frequency, damping ratio), where that is beyond `noise` (relative): the model
 /// lacks something then. Nothing where it is not: the noise tells the same more exactly.
 fn scatter(solution: &ml_fit::Solution, j: usize, noise: [f64; 2]) -> [Otherwise; 2] {
-    let (std, few) = solution.jackknife_std(j);
+    let left_out = solution.jackknife(j);
     let otherwise = verify::otherwise(solution, j).unwrap_or_default();
     // A few FRFs scatter much by chance.
-    [0, 1].map(|k| match std[k] > BEYOND_NOISE * few * noise[k] {
-        true => Otherwise {
-            change: otherwise[k].change,
-            std: (few * std[k]).max(otherwise[k].std),
-        },
-        false => Otherwise::default(),
+    [0, 1].map(|k| {
+        let Jackknife { std, few } = left_out[k];
+        match std > BEYOND_NOISE * few * noise[k] {
+            true => Otherwise {
+                change: otherwise[k].change,
+                std: (few * std).max(otherwise[k].std),
+            },
+            false => Otherwise::default(),
+        }
     })
 }
 

@@ -52,16 +52,19 @@ pub(super) fn elsewhere(
     let own: Vec<(Pole, [f64; 2])> = members
         .iter()
         .filter_map(|member| {
-            let nearest = member.modes.modes.iter().map(|mode| mode.best()).min_by(|a, b| {
-                let away = |frequency_hz: f64| (frequency_hz - common.frequency_hz).abs();
-                away(a.frequency_hz).total_cmp(&away(b.frequency_hz))
+            let nearest_mode = member.modes.modes.iter().min_by(|a, b| {
+                let away = |mode: &FrfMode| (mode.best().frequency_hz - common.frequency_hz).abs();
+                away(a).total_cmp(&away(b))
             })?;
+            let nearest = nearest_mode.best();
             let pole = Pole {
                 frequency_hz: nearest.frequency_hz,
                 damping_ratio: nearest.damping_ratio,
             };
             let std = [nearest.frequency_std_hz?, nearest.damping_std?];
-            let same = (pole.frequency_hz - common.frequency_hz).abs() < own_width_hz
+            // Between two lines a fit that does not know its place may be anywhere.
+            let reach_hz = own_width_hz * (2.0 / nearest_mode.lines_in_half_power_band).max(1.0);
+            let same = (pole.frequency_hz - common.frequency_hz).abs() < reach_hz
                 && (SAME_DAMPING.recip()..SAME_DAMPING)
                     .contains(&(pole.damping_ratio / common.damping_ratio));
             (same && std[0] < KNOWN_WIDTHS * own_width_hz).then_some((pole, std))
@@ -201,6 +204,38 @@ mod tests {
         assert!(elsewhere(&members, left, std, &[pole(101.5, 0.006)]).is_none());
         assert!(elsewhere(&members, left, std, &[pole(95.0, 0.15)]).is_some());
         assert!(elsewhere(&members[..3], left, std, &[]).is_none());
+        // Where a line is as wide as the mode, a fit that lost its hold goes to the next line.
+        let coarse: Vec<_> = [1.0, -0.6, 0.8, 0.5, -0.9, 0.7]
+            .iter()
+            .enumerate()
+            .map(|(k, constant)| {
+                Synthetic::new(60.0, 140.0, 1.0, &[SyntheticMode::new(100.2, 0.005, *constant)])
+                    .with_noise(0.0, 0.005, k as u64)
+                    .frf()
+            })
+            .collect();
+        let modes: Vec<_> = coarse
+            .iter()
+            .map(|(f, h)| analyse_frf(f, h, &Settings::default()).unwrap())
+            .collect();
+        let on_coarse: Vec<SetMember> = coarse
+            .iter()
+            .zip(&modes)
+            .map(|((frequency_hz, receptance_m_per_n), modes)| SetMember {
+                frequency_hz,
+                receptance_m_per_n,
+                modes,
+                dofs: None,
+            })
+            .collect();
+        let own = elsewhere(
+            &on_coarse.iter().collect::<Vec<_>>(),
+            pole(100.9, 0.005),
+            std,
+            &[],
+        )
+        .unwrap();
+        assert!((own.pole.frequency_hz - 100.2).abs() < 0.05, "{own:?}");
         // Not among the common modes: missed, unless one of these is at the place.
         let missing = missed(&members, &[]);
         assert!(

@@ -2,7 +2,7 @@
 //! displacement that the model has (a link against the ground, a joint's turning), `series` adds one that it takes for
 //! stiff (a bearing, the base, the motor's side of a gear). They are added on request, not tried by `diagnose`.
 
-use nalgebra::{DMatrix, Vector3, Vector6};
+use nalgebra::{DMatrix, Point3, Vector3, Vector6};
 use num_complex::Complex64;
 
 use super::spot::AXES;
@@ -12,7 +12,9 @@ use crate::effects::structural::branch;
 use crate::effects::structural::{DataSummary, PostureSetting, Structure};
 use crate::effects::{At, Effect, Instance, Known, NEGLIGIBLE, Site};
 use crate::parameter::{Parameter, Prior};
-use crate::robot::{Attachment, AttachmentLaw, Branch as HungMass, Chain, Dual, Element, Grip, Role};
+use crate::robot::{
+    Attachment, AttachmentLaw, Branch as HungMass, Chain, Dual, Element, Grip, Place, Role, Slot,
+};
 
 /// A law of force over displacement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,6 +39,8 @@ pub enum DrawnForm {
     ObliqueSpringDamper,
     /// Series only: a spring with an inertia on it (the motor's rotor on its servo).
     RotorOnSpring,
+    /// Under the base only: what the robot stands on, a mass on a spring along a direction of its own, near an axis.
+    FloorMode,
 }
 
 impl DrawnForm {
@@ -53,6 +57,7 @@ impl DrawnForm {
             DrawnForm::Maxwell => "maxwell",
             DrawnForm::ObliqueSpringDamper => "oblique-spring-damper",
             DrawnForm::RotorOnSpring => "rotor-on-spring",
+            DrawnForm::FloorMode => "floor-mode",
         }
     }
 
@@ -69,6 +74,7 @@ impl DrawnForm {
             DrawnForm::Maxwell => "a Maxwell element",
             DrawnForm::ObliqueSpringDamper => "an oblique spring damper",
             DrawnForm::RotorOnSpring => "a rotor on a spring",
+            DrawnForm::FloorMode => "a floor mode",
         }
     }
 
@@ -87,6 +93,7 @@ impl DrawnForm {
             }
             DrawnForm::ObliqueSpringDamper => matches!(spot, Spot::LinkGround(..) | Spot::ToolGround(_)),
             DrawnForm::RotorOnSpring => is_drive,
+            DrawnForm::FloorMode => matches!(spot, Spot::Base(0..=2)),
         }
     }
 }
@@ -97,7 +104,7 @@ pub fn forms(spot: Spot) -> Vec<DrawnForm> {
 }
 
 /// All forms, in the order of their variants: one list for all spots, so that a variant means one form everywhere.
-const FORMS: [DrawnForm; 10] = [
+const FORMS: [DrawnForm; 11] = [
     DrawnForm::Spring,
     DrawnForm::Damper,
     DrawnForm::SpringDamper,
@@ -108,6 +115,7 @@ const FORMS: [DrawnForm; 10] = [
     DrawnForm::Maxwell,
     DrawnForm::RotorOnSpring,
     DrawnForm::ObliqueSpringDamper,
+    DrawnForm::FloorMode,
 ];
 
 /// Acts on a displacement that the model has.
@@ -168,6 +176,15 @@ pub fn dynamic_stiffness(spot: Spot, form: DrawnForm, values: &[f64], frequency_
             values[0] * damper / (values[0] + damper)
         }
         DrawnForm::RotorOnSpring => complex(values[0] - omega * omega * values[2], omega * values[1]),
+        // Pushed along the axis it gives way along its own direction only.
+        DrawnForm::FloorMode => {
+            let natural = std::f64::consts::TAU * values[1];
+            let own = complex(
+                natural * natural - omega * omega,
+                2.0 * values[2] * natural * omega,
+            );
+            own * values[0] * (1.0 + values[3].powi(2) + values[4].powi(2))
+        }
     }
 }
 
@@ -195,13 +212,10 @@ fn parameters(site: Site, variant: usize, data: &DataSummary) -> Vec<Parameter> 
         DrawnForm::Spring => vec![stiffness(usual)],
         DrawnForm::Damper => vec![damping],
         DrawnForm::SpringDamper => vec![stiffness(usual), damping],
-        DrawnForm::ObliqueSpringDamper => {
-            let leans = oblique_axes(spot).map(|axis| {
-                let prior = Prior { mean: 0.0, std: 1.0 };
-                Parameter::linear(format!("lean_{}", AXES[axis]), "1", 0.0, prior, [-4.0, 4.0])
-            });
-            [stiffness(usual), damping].into_iter().chain(leans).collect()
-        }
+        DrawnForm::ObliqueSpringDamper => [stiffness(usual), damping]
+            .into_iter()
+            .chain(leans(spot))
+            .collect(),
         DrawnForm::Mass => vec![free("mass_kg", "kg", 3.0, [1e-3, 1e3])],
         DrawnForm::Resonator => resonator(),
         DrawnForm::TwoResonators => {
@@ -222,23 +236,35 @@ fn parameters(site: Site, variant: usize, data: &DataSummary) -> Vec<Parameter> 
             damping,
             free("inertia_kg_m2", "kg·m²", 20.0, [1e-3, 1e4]),
         ],
+        DrawnForm::FloorMode => {
+            let mut resonator = branch::parameters(data, 5.0, 20.0);
+            resonator[0] = free("mass_kg", "kg", 2e3, [1.0, 1e7]);
+            resonator.into_iter().chain(leans(spot)).collect()
+        }
     }
 }
 
-/// The axes towards which the direction of an oblique spring leans, and by how much: 1 is half-way.
+/// How far a direction near the axis of a spot leans towards the other two axes.
+fn leans(spot: Spot) -> [Parameter; 2] {
+    oblique_axes(spot).map(|axis| {
+        let prior = Prior { mean: 0.0, std: 1.0 };
+        Parameter::linear(format!("lean_{}", AXES[axis]), "1", 0.0, prior, [-4.0, 4.0])
+    })
+}
+
+/// The axes towards which the direction of an oblique spring leans: by 1 is half-way.
 fn oblique_axes(spot: Spot) -> [usize; 2] {
     let along = match spot {
-        Spot::LinkGround(_, axis) | Spot::ToolGround(axis) => axis,
+        Spot::LinkGround(_, axis) | Spot::ToolGround(axis) | Spot::Base(axis) => axis,
         _ => 0,
     };
     [(along + 1) % 3, (along + 2) % 3]
 }
 
-/// Starts of an oblique spring and damper of this size: along the axis, and leaning.
-pub fn leaning(spring_and_damper: &[f64; 2]) -> Vec<Vec<f64>> {
-    let [k, c] = *spring_and_damper;
+/// Starts of an oblique form of these sizes: along the axis, and leaning.
+pub fn leaning(sizes: &[f64]) -> Vec<Vec<f64>> {
     [[0.0, 0.0], [0.7, 0.0], [-0.7, 0.0], [0.0, 0.7], [0.0, -0.7]]
-        .map(|[a, b]| vec![k, c, a, b])
+        .map(|leans| [sizes, &leans].concat())
         .to_vec()
 }
 
@@ -275,6 +301,9 @@ fn starts(site: Site, variant: usize, data: &DataSummary, peaks_hz: &[f64]) -> V
             .iter()
             .flat_map(|k| [5.0, 60.0].map(|inertia| vec![*k, 1e-3 * k, inertia]))
             .collect(),
+        DrawnForm::FloorMode => [12.0, 18.0, 27.0, 40.0]
+            .map(|frequency_hz| vec![2e3, frequency_hz, 0.03, 0.0, 0.0])
+            .to_vec(),
     }
 }
 
@@ -305,38 +334,77 @@ fn attach(chain: &mut Chain, grip: &Grip, law: AttachmentLaw, size: &Dual) {
     });
 }
 
-/// A spring and a damper along d, |d| = 1, at the point of `grip`. Grips have constant directions, so k d dᵀ is made of six springs:
-/// k dᵢ dⱼ (eᵢ eⱼᵀ + eⱼ eᵢᵀ) = k dᵢ dⱼ [(eᵢ + eⱼ)(eᵢ + eⱼ)ᵀ − eᵢ eᵢᵀ − eⱼ eⱼᵀ]; single ones may be negative, their sum is not.
-fn attach_oblique(chain: &mut Chain, spot: Spot, grip: &Grip, values: &[Dual]) {
-    let Some((point, place, _)) = grip.point else {
-        return;
-    };
+/// The direction near the axis of `spot` that leans so far: its components in base axes, not normalised, and the square of its
+/// length.
+fn leaning_direction(spot: Spot, leans: &[Dual]) -> ([Dual; 3], Dual) {
     let [first, second] = oblique_axes(spot);
     let one = Dual::constant(1.0);
-    let square = &(&(&values[2] * &values[2]) + &(&values[3] * &values[3])) + &one;
+    let square = &(&(&leans[0] * &leans[0]) + &(&leans[1] * &leans[1])) + &one;
     let mut component = [one.clone(), one.clone(), one];
-    component[first] = values[2].clone();
-    component[second] = values[3].clone();
+    component[first] = leans[0].clone();
+    component[second] = leans[1].clone();
+    (component, square)
+}
+
+/// k d dᵀ between the displacements along three axes, where `size` is k and `components` are those of d, of any length. Grips
+/// have constant directions, so it is made of six springs: k dᵢ dⱼ (eᵢ eⱼᵀ + eⱼ eᵢᵀ) = k dᵢ dⱼ [(eᵢ + eⱼ)(eᵢ + eⱼ)ᵀ − eᵢ eᵢᵀ − eⱼ eⱼᵀ];
+/// single ones may be negative, their sum is not. `grip`: what holds a unit vector.
+fn attach_oblique(
+    chain: &mut Chain,
+    grip: impl Fn(Vector3<f64>) -> Grip,
+    law: AttachmentLaw,
+    size: &Dual,
+    components: &[Dual; 3],
+) {
     let unit = |axis: usize| Vector3::from_fn(|i, _| if i == axis { 1.0 } else { 0.0 });
-    for (law, size) in [
-        (AttachmentLaw::Spring, &values[0]),
-        (AttachmentLaw::Damper, &values[1]),
-    ] {
-        let size = size * &square.recip();
-        let product = |i: usize, j: usize| &size * &(&component[i] * &component[j]);
-        let mut add = |direction: Vector3<f64>, size: &Dual| {
-            let grip = Grip {
-                coordinates: Vec::new(),
-                point: Some((point, place, direction)),
-            };
-            attach(chain, &grip, law, size);
-        };
-        for i in 0..3 {
-            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-            let others = &product(i, j) + &product(i, k);
-            add(unit(i), &(&product(i, i) + &others.scale(-1.0)));
-            add((unit(i) + unit(j)).normalize(), &product(i, j).scale(2.0));
-        }
+    let product = |i: usize, j: usize| size * &(&components[i] * &components[j]);
+    for i in 0..3 {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        let others = &product(i, j) + &product(i, k);
+        attach(
+            chain,
+            &grip(unit(i)),
+            law,
+            &(&product(i, i) + &others.scale(-1.0)),
+        );
+        let between = grip((unit(i) + unit(j)).normalize());
+        attach(chain, &between, law, &product(i, j).scale(2.0));
+    }
+}
+
+/// What the robot stands on gives way along one direction: three displacements of the base, stiff but for that direction.
+fn attach_floor(chain: &mut Chain, spot: Spot, values: &[Dual]) {
+    /// Across the direction, N/m: a thousand times what carries robots.
+    const STIFF: f64 = 1e12;
+    let first = chain.elements.len();
+    for axis in 0..3 {
+        let twist = Vector6::from_fn(|k, _| if k == axis { 1.0 } else { 0.0 });
+        chain.elements.push(Element {
+            role: Role::Base,
+            place: Place::new(0, Slot::Joint),
+            at: Point3::origin(),
+            directions: vec![twist],
+            shape: DMatrix::identity(1, 1),
+            stiffness: Dual::constant(STIFF),
+            damping: Some(Dual::constant(0.0)),
+        });
+    }
+    let grip = |direction: Vector3<f64>| Grip {
+        coordinates: (0..3)
+            .filter(|&axis| direction[axis] != 0.0)
+            .map(|axis| (first + axis, direction[axis]))
+            .collect(),
+        point: None,
+    };
+    let (stiffness, damping) = branch::spring_and_damper(values);
+    let (components, square) = leaning_direction(spot, &values[3..]);
+    let along = |size: &Dual| size * &square.recip();
+    let softer = &stiffness + &Dual::constant(-STIFF);
+    attach_oblique(chain, grip, AttachmentLaw::Spring, &along(&softer), &components);
+    attach_oblique(chain, grip, AttachmentLaw::Damper, &along(&damping), &components);
+    for axis in 0..3 {
+        let unit = Vector3::from_fn(|i, _| if i == axis { 1.0 } else { 0.0 });
+        attach(chain, &grip(unit), AttachmentLaw::Inertia, &values[0]);
     }
 }
 
@@ -411,7 +479,22 @@ impl Effect<Structure> for DrawnBranch {
                 attach(chain, &grip, AttachmentLaw::Spring, &values[0]);
                 attach(chain, &grip, AttachmentLaw::Damper, &values[1]);
             }
-            DrawnForm::ObliqueSpringDamper => attach_oblique(chain, spot, &grip, values),
+            DrawnForm::ObliqueSpringDamper => {
+                let Some((point, place, _)) = grip.point else {
+                    return;
+                };
+                let held = |direction| Grip {
+                    coordinates: Vec::new(),
+                    point: Some((point, place, direction)),
+                };
+                let (components, square) = leaning_direction(spot, &values[2..]);
+                for (law, size) in [
+                    (AttachmentLaw::Spring, &values[0]),
+                    (AttachmentLaw::Damper, &values[1]),
+                ] {
+                    attach_oblique(chain, held, law, &(size * &square.recip()), &components);
+                }
+            }
             DrawnForm::Mass => attach(chain, &grip, AttachmentLaw::Inertia, &values[0]),
             DrawnForm::LossFactor if matches!(spot, Spot::Joint(_)) => {
                 attach(chain, &grip, AttachmentLaw::Hysteresis, &values[0]);
@@ -469,7 +552,7 @@ impl Effect<Structure> for DrawnBranch {
                 attach(chain, &spring, AttachmentLaw::Spring, &values[0]);
                 attach(chain, &damper, AttachmentLaw::Damper, &values[1]);
             }
-            DrawnForm::RotorOnSpring => (),
+            DrawnForm::RotorOnSpring | DrawnForm::FloorMode => (),
         }
     }
 }
@@ -526,6 +609,9 @@ impl Effect<Structure> for Series {
 
     fn apply(&self, At { site, variant }: At, values: &[Dual], setting: &PostureSetting, chain: &mut Chain) {
         let Site::At(spot) = site else { return };
+        if form_of(variant) == DrawnForm::FloorMode {
+            return attach_floor(chain, spot, values);
+        }
         let Some((place, at, twist)) = spot.twist(setting.kinematics) else {
             return;
         };
@@ -597,5 +683,53 @@ mod tests {
         let added = chain.system(0).stiffness - bare.system(0).stiffness;
         let size = expected.norm();
         assert!(size > 0.0 && (added - expected).norm() < 1e-9 * size);
+    }
+
+    /// Under a steady force the floor gives way along its direction only, by F/k; and its mass moves with the base.
+    #[test]
+    fn a_floor_mode_gives_way_along_its_direction_only() {
+        let robot = RobotModel::new(irb6640());
+        let kinematics = robot.kinematics(&TAP_POSTURES[0]).unwrap();
+        let bare = robot.chain(&kinematics, &Baseline::nominal(&robot.spec));
+        let mut chain = bare.clone();
+        let setting = PostureSetting {
+            robot: &robot,
+            kinematics: &kinematics,
+            conditions: Default::default(),
+        };
+        let (mass_kg, frequency_hz, towards_y, towards_z) = (1500.0, 20.0, 0.6, -0.4);
+        let values = [mass_kg, frequency_hz, 0.03, towards_y, towards_z].map(Dual::constant);
+        let at = At {
+            site: Site::At(Spot::Base(0)),
+            variant: number(DrawnForm::FloorMode),
+        };
+        Series.apply(at, &values, &setting, &mut chain);
+        let direction = Vector3::new(1.0, towards_y, towards_z).normalize();
+        let stiffness = mass_kg * (std::f64::consts::TAU * frequency_hz).powi(2);
+        let place = Place::new(kinematics.joint_count(), Slot::End);
+        let compliance = |chain: &Chain, force: &Vector3<f64>| {
+            let row = chain.output_row(kinematics.tcp(), place, false, force);
+            let held = chain.system(0).stiffness.cholesky().unwrap();
+            row.dot(&held.solve(&row))
+        };
+        for force in [
+            Vector3::x(),
+            Vector3::y(),
+            Vector3::new(1.0, -1.0, 1.0).normalize(),
+        ] {
+            let more = compliance(&chain, &force) - compliance(&bare, &force);
+            let expected = direction.dot(&force).powi(2) / stiffness;
+            assert!((more - expected).abs() < 1e-3 / stiffness, "{more} {expected}");
+        }
+        let light = {
+            let mut values = values.clone();
+            (values[0], values[1]) = (Dual::constant(0.25 * mass_kg), Dual::constant(2.0 * frequency_hz));
+            let mut chain = bare.clone();
+            Series.apply(at, &values, &setting, &mut chain);
+            chain
+        };
+        let difference = chain.system(0).mass - light.system(0).mass;
+        assert!((difference.trace() - 3.0 * 0.75 * mass_kg).abs() < 1e-6 * mass_kg);
+        assert!((chain.system(0).stiffness - light.system(0).stiffness).norm() < 1e-3 * stiffness);
     }
 }

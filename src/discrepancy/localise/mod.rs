@@ -11,6 +11,8 @@ pub mod screen;
 mod tests;
 
 use crate::effects::Structure;
+use std::borrow::Cow;
+
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -142,8 +144,12 @@ impl Localisation {
     }
 }
 
-/// Places that are refitted with a form.
+/// Places that are refitted with a form, …
 const FITTED: usize = 10;
+/// … and such as promise most at each other starting point.
+const FITTED_ELSEWHERE: usize = 5;
+/// Places whose curves leave the same to so many parts are one place to these data.
+const SAME_LEFT: f64 = 1e-6;
 /// Places at which a second displacement is tried, and displacements that are tried there.
 const SECOND: [usize; 2] = [4, 2];
 /// Squares per value of the model as it stands from which on two displacements may have something to explain …
@@ -191,9 +197,28 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
     )?;
     let values = study.real_values(Extent::Coarse) as f64;
     let starts = Starts::new(study, model, theta, led_astray(coarse_base.cost, values));
-    let tried: Vec<(usize, Vec<Tried<Structure>>)> = leaders(&screened)
-        .into_par_iter()
-        .map(|i| (i, fit_forms(study, model, &starts, &screened[i])))
+    let ties = ties(&screened);
+    let mut chosen: Vec<(usize, Cow<Screened>, Starts)> = leaders(&screened, &ties, FITTED)
+        .into_iter()
+        .map(|i| (i, Cow::Borrowed(&screened[i]), starts.clone()))
+        .collect();
+    // Where the model is far off, what is linear there says little: the nominal values may be nearer.
+    for (k, at) in starts.elsewhere.iter().enumerate() {
+        let responses = SpotResponses::new(model, at, &thinned, &spots)?;
+        let there = screen::screen(&responses, &model.parameters, at);
+        for s in leaders(&there, &self::ties(&there), FITTED_ELSEWHERE) {
+            let place = screened.iter().position(|known| known.spot == there[s].spot);
+            let Some(place) = place.map(|i| ties[i]) else {
+                continue;
+            };
+            if chosen.iter().all(|(known, ..)| *known != place) {
+                chosen.push((place, Cow::Owned(there[s].clone()), starts.from_there(k)));
+            }
+        }
+    }
+    let tried: Vec<(usize, Vec<Tried<Structure>>)> = chosen
+        .par_iter()
+        .map(|(i, screened, starts)| (*i, fit_forms(study, model, starts, screened)))
         .collect();
     let base_count = model.parameters.len();
     let bic = |t: &Tried<Structure>| {
@@ -210,7 +235,7 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
         .collect();
     fitted.sort_by(|a, b| bic(&a.1[0]).total_cmp(&bic(&b.1[0])));
     let tests: usize =
-        fitted.iter().map(|(_, forms)| forms.len()).sum::<usize>().max(1) * spots.len() / FITTED;
+        fitted.iter().map(|(_, forms)| forms.len()).sum::<usize>().max(1) * spots.len() / chosen.len().max(1);
     let pairs: Vec<Option<Pair>> = fitted
         .par_iter()
         .enumerate()
@@ -218,7 +243,14 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
             if rank >= SECOND[0] || 2.0 * coarse_base.cost <= SECOND_FROM * values {
                 return None;
             }
-            let pair = second_form(study, &thinned, forms, &screened[*i], base_count)?;
+            let pair = second_form(
+                study,
+                &thinned,
+                forms,
+                &screened[*i],
+                base_count,
+                &starts.elsewhere,
+            )?;
             better(&pair.tried, &forms[0]).is_lt().then_some(pair)
         })
         .collect();
@@ -246,7 +278,8 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
             })
         })
         .collect::<Result<_>>()?;
-    settled.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
+    let bound = |p: &LocalisedPlace| p.best.as_ref().is_some_and(|b| b.at_bound);
+    settled.sort_by(|a, b| bound(a).cmp(&bound(b)).then(rank(a).total_cmp(&rank(b))));
     let scale = settled.first().map_or(1.0, |best| best.left.max(1.0));
     let leader = settled.first().map(rank);
     for i in 0..settled.len() {
@@ -270,6 +303,14 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
             .filter(|s| !known.contains(&s.spot))
             .map(|s| place(s, &[], &bic, None)),
     );
+    for place in &mut places {
+        let own = screened.iter().position(|s| s.spot == place.spot);
+        let same = |(i, s): &(usize, &Screened)| {
+            s.spot != place.spot && own.is_some_and(|own| ties[*i] == ties[own])
+        };
+        let tied = screened.iter().enumerate().filter(same);
+        place.tied_with.extend(tied.map(|(_, s)| s.spot.label()));
+    }
     let baseline_held_out = held_out(study, model, theta, Extent::Coarse, REFIT_WITHOUT_FOLD)?;
     let significant = settled.first().and_then(|p| p.best.as_ref()).is_some_and(|best| {
         let predicts = match (&best.held_out, &baseline_held_out) {
@@ -286,15 +327,28 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
     })
 }
 
-/// Order of the settled places: BIC on all data.
+/// Order of the settled places, those whose form ran to the end of its range last: BIC on all data.
 fn rank(place: &LocalisedPlace) -> f64 {
     place.best.as_ref().map_or(f64::INFINITY, |b| b.delta_bic)
 }
 
-/// The best of the screen by either measure.
-fn leaders(screened: &[Screened]) -> Vec<usize> {
+/// By place, the first that leaves the same by both measures: kinematics makes them one (the base and the bearing of joint 1).
+fn ties(screened: &[Screened]) -> Vec<usize> {
+    let same = |a: f64, b: f64| (a - b).abs() <= SAME_LEFT * b;
+    let is_tied = |a: &Screened, b: &Screened| {
+        a.spot.is_series() == b.spot.is_series()
+            && same(a.left_free, b.left_free)
+            && same(a.left_common, b.left_common)
+    };
+    let first = |s: &Screened| screened.iter().position(|other| is_tied(s, other));
+    let own = screened.iter().enumerate();
+    own.map(|(i, s)| first(s).unwrap_or(i)).collect()
+}
+
+/// The best `count` of the screen by either measure, one of each that are tied.
+fn leaders(screened: &[Screened], ties: &[usize], count: usize) -> Vec<usize> {
     let best_by = |score: fn(&Screened) -> f64| {
-        let mut order: Vec<usize> = (0..screened.len()).collect();
+        let mut order: Vec<usize> = (0..screened.len()).filter(|&i| ties[i] == i).collect();
         order.sort_by(|a, b| score(&screened[*a]).total_cmp(&score(&screened[*b])));
         order
     };
@@ -302,7 +356,7 @@ fn leaders(screened: &[Screened]) -> Vec<usize> {
     let mut chosen = Vec::new();
     for (a, b) in free.into_iter().zip(common) {
         for i in [a, b] {
-            if !chosen.contains(&i) && chosen.len() < FITTED {
+            if !chosen.contains(&i) && chosen.len() < count {
                 chosen.push(i);
             }
         }
@@ -360,6 +414,7 @@ struct Pair {
 }
 
 /// From where the model's parameters are fitted.
+#[derive(Clone)]
 struct Starts {
     theta: Vec<f64>,
     /// Further points: where what is missing may have led `theta` away, the nominal values and what the measured modes say.
@@ -367,6 +422,13 @@ struct Starts {
 }
 
 impl Starts {
+    /// The same points, that of number `k` elsewhere first.
+    fn from_there(&self, k: usize) -> Self {
+        let mut elsewhere = self.elsewhere.clone();
+        let theta = std::mem::replace(&mut elsewhere[k], self.theta.clone());
+        Starts { theta, elsewhere }
+    }
+
     fn new(study: &StructureStudy, model: &StructureModel, theta: &[f64], astray: bool) -> Self {
         Starts {
             theta: theta.to_vec(),
@@ -394,17 +456,21 @@ fn by_bound_then_bic(
     bound(a).cmp(&bound(b)).then(bic(a).total_cmp(&bic(b)))
 }
 
-/// A second form beside the best of `forms`, at the displacement of the same place that promises most with the first in the model.
+/// A second form beside the best of `forms`, at the displacement of the same place that promises most with the first in the model;
+/// fitted from `elsewhere`, too, points of the model without either.
 fn second_form(
     study: &StructureStudy,
     thinned: &FrfData,
     forms: &[Tried<Structure>],
     screened: &Screened,
     base_count: usize,
+    elsewhere: &[Vec<f64>],
 ) -> Option<Pair> {
     // Two resonators at one displacement may have stood for one at each of two.
     let law = |t: &Tried<Structure>| drawn::form_of(t.instance.variant);
     let first = match law(&forms[0]) {
+        // It has its direction in all three already.
+        DrawnForm::ObliqueSpringDamper => return None,
         DrawnForm::TwoResonators => forms.iter().find(|t| law(t) == DrawnForm::Resonator)?,
         _ => &forms[0],
     };
@@ -416,9 +482,10 @@ fn second_form(
     let responses = SpotResponses::new(model, theta, thinned, &spots).ok()?;
     let mut promising = screen::screen(&responses, &model.parameters, theta);
     promising.sort_by(|a, b| a.left_free.total_cmp(&b.left_free));
+    let own = &theta[base_count..];
     let starts = Starts {
         theta: theta.clone(),
-        elsewhere: Vec::new(),
+        elsewhere: elsewhere.iter().map(|at| [at, own].concat()).collect(),
     };
     let pairs = promising.iter().take(SECOND[1]).flat_map(|second| {
         let tried = fit_forms(study, model, &starts, second);
@@ -501,6 +568,9 @@ fn starting_values(form: DrawnForm, screened: &Screened) -> Vec<Vec<f64>> {
     }
     let (spring, damper, mass) = (re / weight, along / square, inertia / fourth);
     let loss = im / weight;
+    // Re z = k − ω² m by least squares.
+    let rotor = (inertia * weight + square * re) / (weight * fourth - square * square);
+    let stiff = (re + rotor * square) / weight;
     match form {
         DrawnForm::Spring => vec![vec![spring]],
         DrawnForm::Damper => vec![vec![damper]],
@@ -522,16 +592,14 @@ fn starting_values(form: DrawnForm, screened: &Screened) -> Vec<Vec<f64>> {
         }
         DrawnForm::Maxwell => vec![vec![spring.abs(), spring.abs() / 100.0]],
         DrawnForm::ObliqueSpringDamper => drawn::leaning(&[spring.abs(), damper.abs()]),
-        // Re z = k − ω² J by least squares.
-        DrawnForm::RotorOnSpring => {
-            let determinant = weight * fourth - square * square;
-            let rotor = (inertia * weight + square * re) / determinant;
-            let stiff = (re + rotor * square) / weight;
-            [
-                vec![spring.abs(), damper, mass.abs()],
-                vec![stiff.abs(), damper.abs(), rotor.abs()],
-            ]
-            .to_vec()
+        DrawnForm::RotorOnSpring => vec![
+            vec![spring.abs(), damper, mass.abs()],
+            vec![stiff.abs(), damper.abs(), rotor.abs()],
+        ],
+        DrawnForm::FloorMode => {
+            let natural = (stiff / rotor).abs().sqrt();
+            let ratio = damper.abs() / (2.0 * rotor.abs() * natural);
+            drawn::leaning(&[rotor.abs(), natural / std::f64::consts::TAU, ratio])
         }
     }
 }

@@ -432,6 +432,7 @@ mod tests {
             Spot::ToolGround(0),
             Spot::Joint(2),
             Spot::Base(3),
+            Spot::Base(1),
             Spot::Bearing(3, 1),
             Spot::Drive(2),
         ];

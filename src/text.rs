@@ -12,6 +12,15 @@ pub fn figures(value: f64, count: i32) -> String {
     format!("{value:.decimals$}")
 }
 
+/// The probability of a chance finding, in a sentence: `p = 0.03`, `p < 0.0001`. What is smaller tells a reader nothing more.
+pub fn chance(p: f64) -> String {
+    const LEAST: f64 = 1e-4;
+    match p < LEAST {
+        true => format!("p < {LEAST}"),
+        false => format!("p = {p:.*}", if p < 0.01 { 4 } else { 2 }),
+    }
+}
+
 /// Text as XML holds it, also within quotes; control characters, which it cannot hold, are left out.
 pub fn xml_escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
@@ -118,6 +127,13 @@ mod tests {
         assert_eq!(shown("Fx [N]\tµm²"), "Fx [N]\tµm²");
         assert_eq!(shown("\u{1b}[31mFx\u{9b}2J\u{7}"), "\\u{1b}[31mFx\\u{9b}2J\\u{7}");
         assert_eq!(shown("a\u{202e}b\u{200b}"), "a\\u{202e}b\\u{200b}");
+    }
+
+    #[test]
+    fn a_chance_has_no_more_digits_than_it_is_known_to() {
+        assert_eq!(chance(0.6249), "p = 0.62");
+        assert_eq!(chance(0.00321), "p = 0.0032");
+        assert_eq!(chance(3.2e-9), "p < 0.0001");
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use super::real_case::{BandCheck, Explanation, RealCase, WIDENED};
 use crate::discrepancy::DiagnosisVerdict;
 use crate::discrepancy::verdict::is_convincing;
+use crate::text::chance;
 
 /// A joint whose stiffness the fit moved by more than this factor is worth a word.
 const MOVED: f64 = 1.5;
@@ -71,12 +72,12 @@ impl RealCase {
             rivals => format!("The tables do not tell it from {}.", rivals.join(", ")),
         };
         format!(
-            "Proposed first is {}; the evidence is {strength}: BIC {:+.1}, p = {:.1e} corrected for the number of effects \
+            "Proposed first is {}; the evidence is {strength}: BIC {:+.1}, {} corrected for the number of effects \
              tried, and on configurations left out of the fit the misfit {held_out} ({:.0} against {:.0}). What it says: {} \
              Its weight among all explanations is {:.2}, that of no effect at all {:.2}. {rivals}",
             best.name,
             best.delta_bic,
-            best.p_value,
+            chance(best.p_value),
             best.held_out_chi2,
             self.baseline.held_out_chi2,
             best.explanation,
@@ -182,11 +183,11 @@ impl RealCase {
         };
         format!(
             "With frequencies {WIDENED:.0} times less certain the loop says {verdict} (confidence {:.2}) with {} first, BIC \
-             {:+.1}, p = {:.1e}, {:.1} times the variance: {}.",
+             {:+.1}, {}, {:.1} times the variance: {}.",
             w.confidence,
             w.best,
             w.delta_bic,
-            w.p_value,
+            chance(w.p_value),
             w.reduced_chi2,
             if same {
                 "the same answer"

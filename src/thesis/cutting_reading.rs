@@ -4,6 +4,7 @@ use super::cutting_tables::{
     ACETAL_NAME, CAST, CoefficientDifference, CoefficientRow, CuttingTables, PRINTED, TableTrend,
 };
 use crate::cutting::{ChangeReading, MILLING_COEFFICIENTS};
+use crate::text::chance;
 
 /// A paired difference less likely than this by chance is called one, after Bonferroni over the six coefficients.
 const FALSE_ALARM: f64 = 0.05;
@@ -57,7 +58,7 @@ impl CuttingTables {
         let one = |t: &&TableTrend| {
             let slope = t.per_doubling.map_or(0.0, |k| k.value);
             format!(
-                "{} {} {} by {:.1} {} per doubling of speed (p = {:.4})",
+                "{} {} {} by {:.1} {} per doubling of speed ({})",
                 t.coefficient,
                 if t.speeds == "all" {
                     "over all speeds".to_string()
@@ -67,7 +68,7 @@ impl CuttingTables {
                 if slope > 0.0 { "rises" } else { "falls" },
                 slope.abs(),
                 t.unit,
-                t.p_value.unwrap_or(1.0)
+                chance(t.p_value.unwrap_or(1.0))
             )
         };
         let by_material: Vec<String> = [ACETAL_NAME, CAST, PRINTED]
@@ -126,14 +127,14 @@ impl CuttingTables {
         let is_found = |d: &&CoefficientDifference| d.p_value * count <= FALSE_ALARM;
         let one = |d: &CoefficientDifference| {
             format!(
-                "{} {:.0} against {:.0} {} (difference {:.1} ± {:.1}, p = {:.4})",
+                "{} {:.0} against {:.0} {} (difference {:.1} ± {:.1}, {})",
                 d.coefficient,
                 d.printed_mean,
                 d.cast_mean,
                 d.unit,
                 d.difference.value,
                 d.difference.std_error.unwrap_or(f64::NAN),
-                d.p_value
+                chance(d.p_value)
             )
         };
         let found: Vec<String> = self.differences.iter().filter(is_found).map(one).collect();

@@ -15,6 +15,7 @@ use crate::identify::Modelled;
 use crate::identify::Options;
 use crate::identify::frfs::structure_study::residual_peaks;
 use crate::identify::rest::Rest;
+use crate::text::chance;
 
 pub fn run(args: SideArgs) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
@@ -148,9 +149,9 @@ fn trends_in_words(trends: &[Trend]) -> String {
         let axis = trend.axis.map_or(String::new(), |a| format!(" of {}", a.label()));
         text += &wrapped(
             &format!(
-                "The rest{axis} follows {} (p = {:.1e} after {} tests): {}",
+                "The rest{axis} follows {} ({} after {} tests): {}",
                 trend.against.words(),
-                trend.p_value,
+                chance(trend.p_value),
                 trend.tests,
                 trend.course()
             ),

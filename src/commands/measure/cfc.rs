@@ -244,20 +244,12 @@ fn kienzle_table(groups: &[(&ForceGroup, &KienzleFit)], pooled: &ForceGroup, of_
 fn reading(change: &CoefficientChange) -> String {
     let chance = change
         .p_value
-        .map_or(String::new(), |p| format!(" (p {})", p_text(p)));
+        .map_or(String::new(), |p| format!(" ({})", crate::text::chance(p)));
     match change.reading {
         ChangeReading::Rises => format!("higher{chance}"),
         ChangeReading::Falls => format!("lower{chance}"),
         ChangeReading::None => format!("no more than chance{chance}"),
         ChangeReading::NotDetermined => "these cuts cannot tell".into(),
-    }
-}
-
-fn p_text(p: f64) -> String {
-    if p < 1e-4 {
-        "below 0.0001".into()
-    } else {
-        format!("= {p:.*}", if p < 0.01 { 4 } else { 2 })
     }
 }
 

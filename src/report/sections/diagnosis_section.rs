@@ -13,7 +13,7 @@ use crate::report::figure::{BarSeries, FrfCurve, FrfFigure, NoiseLevel, SideBySi
 use crate::report::number::{decimals, percent, plus_minus, significant};
 use crate::report::parts::{figure, paragraph};
 use crate::report::sections::error_map_section::times_noise_map;
-use crate::report::words::{frf_name, listed};
+use crate::report::words::{at_place, frf_name, listed};
 use crate::report::{Block, ReportSection, ReportTable, TableColumn, words};
 
 pub const ID: &str = "missing-physics";
@@ -161,8 +161,8 @@ fn by_reason(not_tried: &[(String, String)]) -> Vec<String> {
     let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
     for (effect, why) in not_tried {
         match reasons.iter_mut().find(|(known, _)| *known == why) {
-            Some((_, effects)) => effects.push(effect.clone()),
-            None => reasons.push((why, vec![effect.clone()])),
+            Some((_, effects)) => effects.push(at_place(effect)),
+            None => reasons.push((why, vec![at_place(effect)])),
         }
     }
     let said = reasons
@@ -421,7 +421,7 @@ mod tests {
         assert_eq!(
             by_reason(&tried),
             [
-                "damping@joint-1 and damping@joint-2 (one force level)",
+                "damping, joint 1 and damping, joint 2 (one force level)",
                 "payload (no tool)"
             ]
         );

@@ -15,6 +15,7 @@ use crate::report::sections::diagnosis_section::{
 use crate::report::sections::error_map_section::{LEAST_TOP, TIMES_NOISE};
 use crate::report::words::{listed, parameter_of, setting};
 use crate::report::{Block, ReportSection, ReportTable, TableColumn};
+use crate::text::chance;
 
 pub const ID: &str = "missing-physics-cutting";
 pub const TITLE: &str = "Which physics the force model lacks";
@@ -233,16 +234,17 @@ fn trend(findings: &CuttingFindings) -> Option<Block> {
     };
     let caption = match first.is_significant() {
         true => format!(
-            "Of {} quantities tested the rest follows this one most surely (p = {:.1e} after {} tests): {}. Usually {}.",
+            "Of {} quantities tested the rest follows this one most surely ({} after {} tests): {}. Usually {}.",
             first.tests,
-            first.p_value,
+            chance(first.p_value),
             first.tests,
             first.course(),
             first.usual_cause
         ),
         false => format!(
-            "Of {} quantities tested the rest follows none by more than chance; this one comes closest (p = {:.2}).",
-            first.tests, first.p_value
+            "Of {} quantities tested the rest follows none by more than chance; this one comes closest ({}).",
+            first.tests,
+            chance(first.p_value)
         ),
     };
     let alt = format!("Record less model against {words}");

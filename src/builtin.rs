@@ -1,6 +1,9 @@
 //! Campaigns that come inside the program (`datasets/campaigns/`, see the README there): what `demo` works on.
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
+
+use flate2::read::DeflateDecoder;
 
 use crate::{Error, Result};
 
@@ -8,8 +11,8 @@ use crate::{Error, Result};
 pub struct BuiltinCampaign {
     /// Name of its folder.
     pub name: &'static str,
-    /// Path within the folder, content.
-    pub files: &'static [(&'static str, &'static [u8])],
+    /// Path within the folder, content as `build.rs` packs it.
+    files: &'static [(&'static str, &'static [u8])],
 }
 
 macro_rules! campaign {
@@ -18,7 +21,7 @@ macro_rules! campaign {
             name: $name,
             files: &[$((
                 $file,
-                include_bytes!(concat!("../datasets/campaigns/", $name, "/", $file)),
+                include_bytes!(concat!(env!("OUT_DIR"), "/", $name, "/", $file)),
             )),+],
         }
     };
@@ -46,12 +49,39 @@ impl BuiltinCampaign {
     /// What the file system refuses, naming the file.
     pub fn write(&self, parent: &Path) -> Result<PathBuf> {
         let folder = parent.join(self.name);
-        for (name, content) in self.files {
+        for (name, packed) in self.files {
             let path = folder.join(name);
+            let mut content = Vec::new();
+            DeflateDecoder::new(*packed)
+                .read_to_end(&mut content)
+                .map_err(|e| Error::io(&path, e))?;
             let below = path.parent().unwrap_or(&folder);
             std::fs::create_dir_all(below).map_err(|e| Error::io(below, e))?;
-            crate::files::write_atomically(&path, content)?;
+            crate::files::write_atomically(&path, &content)?;
         }
         Ok(folder)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_the_campaign_of_the_repository() {
+        let folder = tempfile::tempdir().unwrap();
+        let campaigns = Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/campaigns");
+        for campaign in [FIRST_CELL, SECOND_CELL] {
+            let written = campaign.write(folder.path()).unwrap();
+            for (name, _) in campaign.files {
+                let source = campaigns.join(campaign.name).join(name);
+                assert_eq!(
+                    std::fs::read(written.join(name)).unwrap(),
+                    std::fs::read(&source).unwrap(),
+                    "{}",
+                    source.display()
+                );
+            }
+        }
     }
 }

@@ -35,6 +35,12 @@ def joint(t):
     return [t["site"], t["site"].replace("joint", "drive")]
 
 
+def hose(t):
+    # The lab hangs it on the far end of a link. The axes of joints 4, 5 and 6 meet: the end of link 4 is where link 5 turns.
+    links = [t["site"]] + ["link-5"] * (t["site"] == "link-4")
+    return [f"{link}-ground.{axis(t['parameters']['direction'])}" for link in links]
+
+
 KINDS = {
     "two-resonators": resonator,
     "resonator-elsewhere": resonator,
@@ -42,7 +48,7 @@ KINDS = {
     "soft-servo": joint,
     "bearing-radial": lambda t: [f"{t['site'].replace('joint', 'bearing')}.t{a}" for a in "xy"],
     "clamp-to-table": lambda t: [f"tool-ground.{axis(t['parameters']['direction'])}"],
-    "hose-to-ground": lambda t: [f"{t['site']}-ground.{axis(t['parameters']['direction'])}"],
+    "hose-to-ground": hose,
     "floor-mode": lambda t: [f"base.{axis(t['parameters']['direction'])}"],
     "base-sliding": lambda t: ["base.x", "base.y", "bearing-1.tx", "bearing-1.ty"],
     "none": lambda t: [],

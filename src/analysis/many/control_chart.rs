@@ -78,7 +78,13 @@ impl ControlChart {
     /// A chart of `points`, whose `outside` is filled in.
     pub fn new(name: String, mut points: Vec<ChartPoint>) -> Self {
         let earlier = &points[..points.len().saturating_sub(1)];
-        let limits = limits(earlier);
+        let limits = limits(earlier).map(|limits| match is_never_negative(&name) {
+            true => Limits {
+                lower: limits.lower.max(0.0),
+                ..limits
+            },
+            false => limits,
+        });
         let last = points.last();
         let last_sigmas = limits.zip(last).map(|(limits, last)| {
             let third = (limits.upper - limits.centre) / WIDTH;
@@ -106,6 +112,13 @@ impl ControlChart {
     pub fn is_out(&self) -> bool {
         self.points.last().is_some_and(|p| p.outside)
     }
+}
+
+/// Whether a quantity of this name cannot be below zero, and a limit there would say nothing.
+fn is_never_negative(name: &str) -> bool {
+    const POSITIVE: [&str; 6] = ["nrms", "stiffness", "damping", "mass", "compliance", "frequency"];
+    let quantity = name.rsplit('.').next().unwrap_or(name);
+    POSITIVE.iter().any(|word| quantity.contains(word))
 }
 
 fn change(before: &ChartPoint, last: &ChartPoint) -> Option<f64> {
@@ -220,5 +233,23 @@ mod tests {
         assert!(chart(&[1.0, 1.1, 0.9, 1.0], None).limits.is_none());
         assert!(chart(&[1.0; 9], None).limits.is_none());
         assert!(chart(&[1.0; 9], Some(0.1)).limits.is_some());
+    }
+
+    #[test]
+    fn what_cannot_be_negative_has_no_limit_below_zero() {
+        let chart = |name: &str| {
+            let points = [1.0, 4.0, 0.5, 5.0, 2.0].iter().map(|&value| ChartPoint {
+                campaign: "c".into(),
+                date: None,
+                value,
+                std_error: None,
+                outside: false,
+            });
+            ControlChart::new(name.into(), points.collect())
+        };
+        let angle = chart("sensor.about_z_deg").limits.unwrap();
+        let stiffness = chart("joint-1.stiffness_nm_per_rad").limits.unwrap();
+        assert!(angle.lower < 0.0);
+        assert_eq!((stiffness.lower, stiffness.upper), (0.0, angle.upper));
     }
 }

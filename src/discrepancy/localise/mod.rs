@@ -419,6 +419,8 @@ struct Starts {
     theta: Vec<f64>,
     /// Further points: where what is missing may have led `theta` away, the nominal values and what the measured modes say.
     elsewhere: Vec<Vec<f64>>,
+    /// What another displacement of the place has, N/m: a bearing is often as stiff one way as the other.
+    stiffness: Option<f64>,
 }
 
 impl Starts {
@@ -426,7 +428,11 @@ impl Starts {
     fn from_there(&self, k: usize) -> Self {
         let mut elsewhere = self.elsewhere.clone();
         let theta = std::mem::replace(&mut elsewhere[k], self.theta.clone());
-        Starts { theta, elsewhere }
+        Starts {
+            theta,
+            elsewhere,
+            ..self.clone()
+        }
     }
 
     fn new(study: &StructureStudy, model: &StructureModel, theta: &[f64], astray: bool) -> Self {
@@ -436,6 +442,7 @@ impl Starts {
                 true => starts_elsewhere(model, study.measured()),
                 false => Vec::new(),
             },
+            stiffness: None,
         }
     }
 }
@@ -486,6 +493,7 @@ fn second_form(
     let starts = Starts {
         theta: theta.clone(),
         elsewhere: elsewhere.iter().map(|at| [at, own].concat()).collect(),
+        stiffness: first_stiffness(first, base_count),
     };
     let pairs = promising.iter().take(SECOND[1]).flat_map(|second| {
         let tried = fit_forms(study, model, &starts, second);
@@ -498,6 +506,13 @@ fn second_form(
     });
     let values = study.real_values(Extent::Coarse) as f64;
     pairs.min_by(|a, b| by_bound_then_bic(&a.tried, &b.tried, base_count, values))
+}
+
+/// The stiffness of a form that is a spring or has one, N/m.
+fn first_stiffness(first: &Tried<Structure>, base_count: usize) -> Option<f64> {
+    let parameter = first.model.parameters.get(base_count)?;
+    let is_stiffness = parameter.name.ends_with("stiffness_n_per_m");
+    is_stiffness.then(|| parameter.natural(first.fit.theta[base_count]))
 }
 
 /// Each form of a place fitted on the coarse view, started from the drawn curve.
@@ -528,8 +543,18 @@ fn fit_forms(
             let extended = study.extend(model, &instance);
             let own = &extended.parameters[model.parameters.len()..];
             let proposed = instance.effect.starts(instance.at(), &study.known(model), &[]);
+            let alike = from
+                .stiffness
+                .filter(|_| !screened.spot.is_angle())
+                .and_then(|k| match form {
+                    DrawnForm::Spring => Some(vec![k]),
+                    DrawnForm::SpringDamper => Some(vec![k, 1e-3 * k]),
+                    DrawnForm::LossFactor => Some(vec![k, 0.05]),
+                    _ => None,
+                });
             let starts: Vec<Vec<f64>> = starting_values(form, screened)
                 .into_iter()
+                .chain(alike)
                 .chain(proposed.into_iter().take(4))
                 .map(|start| {
                     own.iter()

@@ -200,3 +200,22 @@ impl MaterialComparison {
             .collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_correlation_is_that_of_the_textbook() {
+        // Deviations from the means (−4, −1, 5)/3 and (−5, 1, 4)/3: 39 of √(42 · 42).
+        let found = correlation(&[(1.0, 1.0), (2.0, 3.0), (4.0, 4.0)]).unwrap();
+        approx::assert_relative_eq!(found, 39.0 / 42.0, max_relative = 1e-12);
+        let falling = correlation(&[(1.0, 8.0), (2.0, 6.0), (3.0, 4.0)]).unwrap();
+        approx::assert_relative_eq!(falling, -1.0, max_relative = 1e-12);
+        assert_eq!(
+            correlation(&[(0.0, 1.0), (1.0, 0.0), (2.0, 1.0)]).map(|c| c.abs() < 1e-12),
+            Some(true)
+        );
+        assert_eq!(correlation(&[(1.0, 1.0), (1.0, 2.0)]), None);
+    }
+}

@@ -97,3 +97,56 @@ impl Effect<Structure> for LoadDependentStiffness {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::fixture::{TAP_POSTURES, irb6640};
+    use crate::robot::{Baseline, RobotModel};
+
+    /// The torque of gravity is the slope of the potential energy over the joint's angle, which knows no lever arms.
+    #[test]
+    fn joints_stiffen_with_the_torque_that_carries_the_arm() {
+        const H_DEG: f64 = 1e-3;
+        let robot = RobotModel::new(irb6640());
+        let beta = 0.1;
+        for posture in TAP_POSTURES.iter().take(3) {
+            let chain_at = |angles: &[f64]| {
+                let kinematics = robot.kinematics(angles).unwrap();
+                let chain = robot.chain(&kinematics, &Baseline::nominal(&robot.spec));
+                (kinematics, chain)
+            };
+            let energy = |angles: &[f64]| -> f64 {
+                let bodies = chain_at(angles).1.bodies;
+                let lifted = bodies.iter().map(|b| b.scale.value * b.mass_kg * b.com.z);
+                GRAVITY_M_PER_S2 * lifted.sum::<f64>()
+            };
+            let (kinematics, bare) = chain_at(posture);
+            let mut chain = bare.clone();
+            let setting = PostureSetting {
+                robot: &robot,
+                kinematics: &kinematics,
+                conditions: Default::default(),
+            };
+            let at = At {
+                site: Site::Everywhere,
+                variant: 0,
+            };
+            LoadDependentStiffness.apply(at, &[Dual::constant(beta)], &setting, &mut chain);
+            for joint in 1..=robot.joint_count() {
+                let [mut less, mut more] = [posture.to_vec(), posture.to_vec()];
+                (less[joint - 1], more[joint - 1]) = (posture[joint - 1] - H_DEG, posture[joint - 1] + H_DEG);
+                let torque_knm = (energy(&more) - energy(&less)) / (2.0 * H_DEG.to_radians()) * 1e-3;
+                let of = |chain: &Chain| {
+                    let own = chain.elements.iter().find(|e| e.role == Role::Joint(joint));
+                    own.unwrap().stiffness.value
+                };
+                approx::assert_relative_eq!(
+                    of(&chain) / of(&bare),
+                    1.0 + beta * torque_knm.abs(),
+                    max_relative = 1e-6
+                );
+            }
+        }
+    }
+}

@@ -207,3 +207,37 @@ fn centre(strength: &[f64], peak: usize) -> f64 {
     }
     if sum > 0.0 { moment / sum } else { peak as f64 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_centre_of_a_peak_is_that_of_its_power() {
+        let mut strength = vec![0.0; 20];
+        (strength[9], strength[10], strength[11]) = (1.0, 4.0, 3.0);
+        approx::assert_relative_eq!(
+            centre(&strength, 10),
+            (9.0 + 40.0 + 33.0) / 8.0,
+            max_relative = 1e-12
+        );
+        // What lies farther off does not count, and an end of the spectrum is no trouble.
+        strength[10 + SPREAD + 1] = 100.0;
+        approx::assert_relative_eq!(centre(&strength, 10), 82.0 / 8.0, max_relative = 1e-12);
+        strength[10 + SPREAD] = 8.0;
+        approx::assert_relative_eq!(
+            centre(&strength, 10),
+            (82.0 + 8.0 * (10 + SPREAD) as f64) / 16.0,
+            max_relative = 1e-12
+        );
+        assert_eq!(centre(&[2.0, 0.0, 0.0], 0), 0.0);
+        assert_eq!(centre(&[0.0; 5], 3), 3.0);
+    }
+
+    #[test]
+    fn the_distance_from_the_next_multiple_has_no_sign() {
+        approx::assert_relative_eq!(beside(52.0, 25.0), 2.0, max_relative = 1e-12);
+        approx::assert_relative_eq!(beside(48.0, 25.0), 2.0, max_relative = 1e-12);
+        approx::assert_relative_eq!(beside(62.5, 25.0), 12.5, max_relative = 1e-12);
+    }
+}

@@ -416,6 +416,14 @@ fn turn_torque(cuts: &mut [CutData]) {
     }
 }
 
+/// How far a cut is between the first and the last of the sequence: 0 to 1.
+fn progress(own: i64, [first, last]: [i64; 2]) -> f64 {
+    match last > first {
+        true => (own - first) as f64 / (last - first) as f64,
+        false => 0.0,
+    }
+}
+
 /// Where each cut stands in the sequence and in the range of speeds.
 fn place_in_sequence(cuts: &mut [CutData]) {
     let orders: Vec<i64> = cuts.iter().filter_map(|c| c.order).collect();
@@ -423,11 +431,7 @@ fn place_in_sequence(cuts: &mut [CutData]) {
     let [slow, fast] = speed_range(cuts);
     for cut in cuts {
         if let (Some(first), Some(last), Some(own)) = (first, last, cut.order) {
-            cut.setting.progress = if last > first {
-                (own - first) as f64 / (last - first) as f64
-            } else {
-                0.0
-            };
+            cut.setting.progress = progress(own, [first, last]);
         }
         cut.setting.speed_ratio = cut.cutting_speed_m_per_min / (slow * fast).sqrt();
     }
@@ -516,5 +520,16 @@ fn summary(process: Process, teeth: usize, cuts: &[CutData]) -> CuttingSummary {
         vibration_hz: (!lines.is_empty()).then(|| crate::signal::median(&lines)),
         longest_record_s: cuts.iter().map(length).fold(0.0, f64::max),
         cutting_scale_n_per_mm2: 1000.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn progress_runs_from_the_first_cut_to_the_last() {
+        assert_eq!([3, 5, 9].map(|own| progress(own, [3, 9])), [0.0, 1.0 / 3.0, 1.0]);
+        assert_eq!(progress(4, [4, 4]), 0.0);
     }
 }

@@ -532,3 +532,28 @@ fn line_amplitudes(
         }
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The second harmonic of 25 Hz through a dynamometer of 100 Hz: r = 1/2, G = 1 / (3/4 + iζ). Means pass as they are.
+    #[test]
+    fn a_dynamometer_amplifies_by_its_second_order_response() {
+        let mut forces = Forces::zero(5, 2);
+        forces.value[0] = vec![7.0, 0.0, 0.0, 3.0, -2.0];
+        let zeta = 0.1;
+        let frequency = Dual::variable(100.0, 0, 2);
+        let damping = Dual::variable(zeta, 1, 2);
+        let own = || [frequency.clone(), damping.clone()];
+        forces.filter(&[own(), own(), own()], 25.0);
+        let expected = Complex64::new(3.0, -2.0) / Complex64::new(0.75, zeta);
+        approx::assert_relative_eq!(forces.value[0][0], 7.0);
+        approx::assert_relative_eq!(forces.value[0][3], expected.re, max_relative = 1e-12);
+        approx::assert_relative_eq!(forces.value[0][4], expected.im, max_relative = 1e-12);
+        // ∂G/∂ζ = −G² i 2r
+        let slope = -expected / Complex64::new(0.75, zeta) * Complex64::i();
+        approx::assert_relative_eq!(forces.slope[1][0][3], slope.re, max_relative = 1e-12);
+        approx::assert_relative_eq!(forces.slope[1][0][4], slope.im, max_relative = 1e-12);
+    }
+}

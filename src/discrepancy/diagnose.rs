@@ -51,8 +51,9 @@ const PAIR_SHARE: f64 = 0.3;
 const PAIRS_BUDGET_S: f64 = 4.0;
 const LOOK_EVALUATIONS: f64 = 20.0;
 const FEWEST_PAIRS: usize = 12;
-/// Pairs to which a third effect is added.
+/// Pairs to which a third effect is added, where they leave so many standard deviations of χ² above noise.
 const THREE_LEADERS: usize = 2;
+const PLAIN_SIGMAS: f64 = 5.0;
 
 /// How many effects are tried besides others.
 #[derive(Clone, Copy)]
@@ -644,10 +645,23 @@ impl<'a, S: Study> Engine<'a, S> {
             }
         }
         pairs.sort_by(|a, b| a.0.cost.total_cmp(&b.0.cost));
-        let plain = evidence.base_chi2 > FAINT * self.freedom(self.model, Extent::Full);
+        // Both leaders may have ended at the same two.
+        let mut known: Vec<Vec<String>> = Vec::new();
+        pairs.retain(|(pair, _)| {
+            let mut own = self.labels(&pair.parts);
+            own.sort();
+            let new = !known.contains(&own);
+            known.push(own);
+            new
+        });
+        let plain = pairs.first().is_some_and(|(pair, _)| {
+            let freedom = self.freedom(&pair.model, Extent::Full);
+            2.0 * pair.cost - freedom > PLAIN_SIGMAS * (2.0 * freedom).sqrt()
+        });
         let mut threes = Vec::new();
         for (pair, promising) in pairs.iter().take(if plain { THREE_LEADERS } else { 0 }) {
-            let (found, _) = self.with_another(pair, promising, THREES, &mut [0, 0])?;
+            let order = self.by_linear_gain(pair, promising);
+            let (found, _) = self.with_another(pair, &order, THREES, &mut [0, 0])?;
             for three in found {
                 self.keep_better(&mut best, &three, (candidates, credible), evidence)?;
                 threes.push(three);
@@ -674,6 +688,36 @@ impl<'a, S: Study> Engine<'a, S> {
         Ok((best, counts))
     }
 
+    /// Labels of further effects: by turns the one that would gain most beside `leader`, were the response linear in its size, and
+    /// the next of `promising`.
+    fn by_linear_gain(&self, leader: &Together<S>, promising: &[String]) -> Vec<String> {
+        let taken = self.labels(&leader.parts);
+        let mut gains: Vec<(f64, String)> = self
+            .instances
+            .par_iter()
+            .filter(|instance| !taken.contains(&self.label(instance)))
+            .filter_map(|instance| {
+                let model = self.study.extend(&leader.model, instance);
+                let problem = self.study.problem(&model, View::COARSE);
+                let size = linear_size(&problem, &model, &leader.theta)?;
+                Some((size.gain, self.label(instance)))
+            })
+            .collect();
+        gains.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut order: Vec<String> = Vec::new();
+        for k in 0..gains.len().max(promising.len()) {
+            for label in [gains.get(k).map(|(_, label)| label), promising.get(k)]
+                .into_iter()
+                .flatten()
+            {
+                if !order.contains(label) {
+                    order.push(label.clone());
+                }
+            }
+        }
+        order
+    }
+
     /// `leader` with each other effect, in the order of `labels`: the best of them fitted to all data,
     /// best first, and the labels of all by what they promise. `counts`: how many were tried, of how many.
     #[allow(clippy::type_complexity)]
@@ -687,7 +731,7 @@ impl<'a, S: Study> Engine<'a, S> {
         let study = self.study;
         let bases = [leader.theta.clone()];
         let hints = study.hints(&leader.model, &leader.theta)?;
-        let taken: Vec<String> = leader.parts.iter().map(|(i, _)| self.label(i)).collect();
+        let taken = self.labels(&leader.parts);
         let standing = |instance: &InstanceOf<S>| {
             let label = self.label(instance);
             labels.iter().position(|l| *l == label).unwrap_or(labels.len())
@@ -749,7 +793,7 @@ impl<'a, S: Study> Engine<'a, S> {
         if !together.possible || best.as_ref().is_some_and(|b| b.reduced_chi2 <= reduced_chi2) {
             return Ok(());
         }
-        let mut labels: Vec<String> = together.parts.iter().map(|(i, _)| self.label(i)).collect();
+        let mut labels = self.labels(&together.parts);
         // The strongest of them alone is named first.
         let place = |label: &String| candidates.iter().position(|c| c.label() == *label);
         let standing = labels.iter().map(place);
@@ -767,6 +811,10 @@ impl<'a, S: Study> Engine<'a, S> {
             rest,
         });
         Ok(())
+    }
+
+    fn labels(&self, parts: &[(InstanceOf<S>, usize)]) -> Vec<String> {
+        parts.iter().map(|(instance, _)| self.label(instance)).collect()
     }
 
     /// Looks at further effects of `model` that fit into the budget.

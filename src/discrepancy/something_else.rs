@@ -17,8 +17,10 @@ const VISIBLE_ERRORS: f64 = 0.15;
 const BESIDES_PLACES: f64 = 0.5;
 /// Prior odds of an effect of the library against something else.
 const LIBRARY_ODDS: f64 = 2.0;
-/// A pair of effects is one of many that were tried, and two effects at once are rarer than one; three again.
-const ANOTHER_ODDS: f64 = 0.1;
+/// A pair of effects is one of many that were tried, and two effects at once are rarer than one. Where there are two, a third is
+/// no great surprise.
+const SECOND_ODDS: f64 = 0.1;
+const FURTHER_ODDS: f64 = 0.3;
 
 /// Odds that something else is behind an effect which takes `gain` of χ² away and leaves `rest`.
 pub fn odds(gain: f64, rest: &Rest) -> f64 {
@@ -27,7 +29,11 @@ pub fn odds(gain: f64, rest: &Rest) -> f64 {
 
 /// The same for `count` effects together.
 pub fn odds_of_set(gain: f64, rest: &Rest, count: usize) -> f64 {
-    odds(gain, rest) / ANOTHER_ODDS.powi(count.saturating_sub(1) as i32)
+    let prior = match count {
+        0 | 1 => 1.0,
+        _ => SECOND_ODDS * FURTHER_ODDS.powi(count as i32 - 2),
+    };
+    odds(gain, rest) / prior
 }
 
 /// ln of the Bayes factor of "the effect is there" against "it stands in for something else". The tests look at the same
@@ -234,7 +240,7 @@ mod tests {
         // One that a good setup leaves anyway is not, if the effect is far larger.
         assert!(odds(2e5, &rest(400.0, 50.0)) < 0.2);
         let of = |count| odds_of_set(5e3, &rest(0.0, 50.0), count);
-        assert!(of(1) == odds(5e3, &rest(0.0, 50.0)) && of(2) > 5.0 * of(1) && of(3) > 5.0 * of(2));
+        assert!(of(1) == odds(5e3, &rest(0.0, 50.0)) && of(2) > 5.0 * of(1) && of(3) > 3.0 * of(2));
     }
 
     #[test]

@@ -179,10 +179,9 @@ pub fn decide<D: Modelled>(
         indistinguishable: Vec::new(),
     };
     let first = credible.iter().position(|c| *c);
-    let set = set.filter(|set| {
-        let alone = first.map_or(1.0, |w| odds_against(&candidates[w], baseline));
-        set.odds_against() < alone.min(1.0)
-    });
+    let alone = |w: usize| odds_against(&candidates[w], baseline);
+    let odds_of_set = set.as_ref().map_or(f64::INFINITY, EffectSet::odds_against);
+    let set = set.filter(|_| odds_of_set < first.map_or(1.0, alone).min(1.0));
     let excused = match (&set, first) {
         (Some(set), _) => weight_of_slips_alone(set.gain, Some(&set.rest), set.parameters, baseline),
         (None, Some(w)) => {
@@ -199,9 +198,9 @@ pub fn decide<D: Modelled>(
     let (odds_else, named) = match &set {
         Some(set) => {
             decision.companions.clone_from(&set.others);
-            (set.odds_against(), set.strongest)
+            (odds_of_set, set.strongest)
         }
-        None => (odds_against(winner, baseline), w),
+        None => (alone(w), w),
     };
     let reference = winner.delta_bic;
     let weight = |c: &EffectCandidate<D>| evidence_weight(c.delta_bic - reference).min(1.0);
@@ -230,7 +229,8 @@ pub fn decide<D: Modelled>(
         decision.verdict = DiagnosisVerdict::Unknown;
         decision.companions.clear();
         decision.best_guess = Some(w);
-        decision.confidence = 1.0 / (1.0 + (1.0 + beaten) / odds_else);
+        // Several effects that nearly answer it speak against something else as well.
+        decision.confidence = 1.0 / (1.0 + (1.0 + beaten) / odds_else.min(odds_of_set));
     }
     decision.confidence = decision.confidence.clamp(LEAST_SURE, MOST_SURE);
     decision

@@ -17,7 +17,10 @@ pub fn chance(p: f64) -> String {
     const LEAST: f64 = 1e-4;
     match p < LEAST {
         true => format!("p < {LEAST}"),
-        false => format!("p = {p:.*}", if p < 0.01 { 4 } else { 2 }),
+        false => format!(
+            "p = {p:.*}",
+            [4, 3, 2][usize::from(p >= 0.01) + usize::from(p >= 0.1)]
+        ),
     }
 }
 
@@ -132,6 +135,7 @@ mod tests {
     #[test]
     fn a_chance_has_no_more_digits_than_it_is_known_to() {
         assert_eq!(chance(0.6249), "p = 0.62");
+        assert_eq!(chance(0.0499), "p = 0.050");
         assert_eq!(chance(0.00321), "p = 0.0032");
         assert_eq!(chance(3.2e-9), "p < 0.0001");
     }

@@ -137,3 +137,34 @@ fn scatter_of_mean(series: &[f64]) -> f64 {
     let rho = (lagged / (n - 1.0) / variance).clamp(0.0, 0.9);
     (variance / n * (1.0 + rho) / (1.0 - rho)).sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+
+    /// White: σ/√n. First-order autoregressive with ρ: √((1 + ρ)/(1 − ρ)) times that (Bayley and Hammersley 1946).
+    #[test]
+    fn the_scatter_of_a_mean_grows_with_what_neighbours_share() {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let white: Vec<f64> = (0..20_000)
+            .map(|_| (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0)
+            .collect();
+        let n = white.len() as f64;
+        approx::assert_relative_eq!(scatter_of_mean(&white), 1.0 / n.sqrt(), max_relative = 0.05);
+        let rho = 0.6f64;
+        let mut last = 0.0;
+        let alike: Vec<f64> = white
+            .iter()
+            .map(|w| {
+                last = rho * last + (1.0 - rho * rho).sqrt() * w;
+                last
+            })
+            .collect();
+        let expected = ((1.0 + rho) / (1.0 - rho) / n).sqrt();
+        approx::assert_relative_eq!(scatter_of_mean(&alike), expected, max_relative = 0.08);
+        assert_eq!(scatter_of_mean(&[2.0, 2.0, 2.0]), 0.0);
+        approx::assert_relative_eq!(turn_std(&[1.0, 3.0]).unwrap(), 2f64.sqrt(), max_relative = 1e-12);
+        assert_eq!(turn_std(&[1.0]), None);
+    }
+}

@@ -212,7 +212,7 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
                 continue;
             };
             if chosen.iter().all(|(known, ..)| *known != place) {
-                chosen.push((place, Cow::Owned(there[s].clone()), starts.from_there(k)));
+                chosen.push((place, Cow::Owned(there[s].clone()), starts.beginning_at(k)));
             }
         }
     }
@@ -425,7 +425,7 @@ struct Starts {
 
 impl Starts {
     /// The same points, that of number `k` elsewhere first.
-    fn from_there(&self, k: usize) -> Self {
+    fn beginning_at(&self, k: usize) -> Self {
         let mut elsewhere = self.elsewhere.clone();
         let theta = std::mem::replace(&mut elsewhere[k], self.theta.clone());
         Starts {

@@ -152,3 +152,23 @@ pub(crate) fn lines_in_mean(spectrum: &OrderSpectrum, rate: f64, length_s: f64) 
         })
         .sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+
+    /// Neighbours of white noise differ by √2 σ; a slope of a fiftieth of σ a sample hides nothing.
+    #[test]
+    fn the_noise_of_air_is_known_whatever_drifts_below_it() {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+        let samples: Vec<f64> = (0..40_000)
+            .map(|i| {
+                let normal = (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
+                3.0 * normal + 0.06 * f64::from(i)
+            })
+            .collect();
+        approx::assert_relative_eq!(sample_std(&samples), 3.0, max_relative = 0.02);
+        assert_eq!(sample_std(&[1.0]), 0.0);
+    }
+}

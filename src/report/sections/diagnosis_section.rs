@@ -156,19 +156,36 @@ pub(crate) fn not_tried<D: Modelled>(d: &Diagnosis<D>) -> Option<Block> {
     (!reasons.is_empty()).then(|| paragraph(format!("Not tried: {}.", reasons.join("; "))))
 }
 
-/// `a and b (why)`: what shares a reason, which sites of one effect often do, stands together.
+/// `a at joint 1 and joint 2, b (why)`: what shares a reason, which sites of one effect often do, stands together.
 fn by_reason(not_tried: &[(String, String)]) -> Vec<String> {
-    let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
-    for (effect, why) in not_tried {
-        match reasons.iter_mut().find(|(known, _)| *known == why) {
-            Some((_, effects)) => effects.push(at_place(effect)),
-            None => reasons.push((why, vec![at_place(effect)])),
-        }
+    let mut reasons: Vec<(&str, Vec<(&str, Vec<String>)>)> = Vec::new();
+    for (label, why) in not_tried {
+        let (effect, site) = match label.split_once('@') {
+            Some((effect, site)) => (effect, Some(at_place(site))),
+            None => (label.as_str(), None),
+        };
+        let of_reason = group(&mut reasons, why);
+        group(of_reason, effect).extend(site);
     }
-    let said = reasons
-        .iter()
-        .map(|(why, effects)| format!("{} ({why})", listed(effects)));
+    let one = |(effect, sites): &(&str, Vec<String>)| match sites.is_empty() {
+        true => at_place(effect),
+        false => format!("{} at {}", at_place(effect), listed(sites)),
+    };
+    let said = reasons.iter().map(|(why, effects)| {
+        let effects: Vec<String> = effects.iter().map(one).collect();
+        format!("{} ({why})", effects.join(", "))
+    });
     said.collect()
+}
+
+/// What stands under `key`, begun where there is nothing yet.
+fn group<'a, 'k, T>(groups: &'a mut Vec<(&'k str, Vec<T>)>, key: &'k str) -> &'a mut Vec<T> {
+    let known = groups.iter().position(|(own, _)| *own == key);
+    let at = known.unwrap_or_else(|| {
+        groups.push((key, Vec::new()));
+        groups.len() - 1
+    });
+    &mut groups[at].1
 }
 
 /// Error with each candidate; `folds`: what was left out in turn.
@@ -421,7 +438,7 @@ mod tests {
         assert_eq!(
             by_reason(&tried),
             [
-                "damping, joint 1 and damping, joint 2 (one force level)",
+                "damping at joint 1 and joint 2 (one force level)",
                 "payload (no tool)"
             ]
         );

@@ -34,6 +34,7 @@ from pathlib import Path
 import tree_sitter_rust
 from tree_sitter import Language, Parser
 
+MODULE = "mutants"
 ROOMS = ["cutting", "discrepancy", "effects", "identify", "modal"]
 ARITHMETIC = {"+": "add", "-": "sub", "*": "mul", "/": "div"}
 OTHER = {"+": "-", "-": "+", "*": "/", "/": "*"}
@@ -266,7 +267,7 @@ def write(copy, origin, changes):
         out.append(source[at:].decode())
         target.write_text("".join(out))
     write.touched |= set(by_path)
-    (copy / "src/mutants.rs").write_text(SUPPORT.replace("@COUNT@", str(count + 1)))
+    (copy / "src" / f"{MODULE}.rs").write_text(SUPPORT.replace("@COUNT@", str(count + 1)))
     return count
 
 
@@ -443,7 +444,7 @@ def report(work, done, unreached, built):
     lines += [f"| {room} | {tried} | {left} |" for room, (tried, left) in sorted(rooms.items())]
     lines += ["", "Survivors:", ""] + sorted(f"- {d['key']}" for d in done.values() if d["killed"] is None)
     lines += ["", "Reached by no test:", ""] + sorted(f"- {k}" for k in unreached)
-    (work / "mutants.md").write_text("\n".join(lines) + "\n")
+    (work / f"{MODULE}.md").write_text("\n".join(lines) + "\n")
     print("\n".join(lines[: 4 + len(rooms)]))
 
 

@@ -158,7 +158,7 @@ pub(crate) fn not_tried<D: Modelled>(d: &Diagnosis<D>) -> Option<Block> {
 
 /// `a at joint 1 and joint 2, b (why)`: what shares a reason, which sites of one effect often do, stands together.
 fn by_reason(not_tried: &[(String, String)]) -> Vec<String> {
-    let mut reasons: Vec<(&str, Vec<(&str, Vec<String>)>)> = Vec::new();
+    let mut reasons: Groups<Grouped<String>> = Vec::new();
     for (label, why) in not_tried {
         let (effect, site) = match label.split_once('@') {
             Some((effect, site)) => (effect, Some(at_place(site))),
@@ -167,7 +167,7 @@ fn by_reason(not_tried: &[(String, String)]) -> Vec<String> {
         let of_reason = group(&mut reasons, why);
         group(of_reason, effect).extend(site);
     }
-    let one = |(effect, sites): &(&str, Vec<String>)| match sites.is_empty() {
+    let one = |(effect, sites): &Grouped<String>| match sites.is_empty() {
         true => at_place(effect),
         false => format!("{} at {}", at_place(effect), listed(sites)),
     };
@@ -178,8 +178,12 @@ fn by_reason(not_tried: &[(String, String)]) -> Vec<String> {
     said.collect()
 }
 
+/// What stands under one name.
+type Grouped<'k, T> = (&'k str, Vec<T>);
+type Groups<'k, T> = Vec<Grouped<'k, T>>;
+
 /// What stands under `key`, begun where there is nothing yet.
-fn group<'a, 'k, T>(groups: &'a mut Vec<(&'k str, Vec<T>)>, key: &'k str) -> &'a mut Vec<T> {
+fn group<'a, 'k, T>(groups: &'a mut Groups<'k, T>, key: &'k str) -> &'a mut Vec<T> {
     let known = groups.iter().position(|(own, _)| *own == key);
     let at = known.unwrap_or_else(|| {
         groups.push((key, Vec::new()));

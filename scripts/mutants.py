@@ -245,12 +245,13 @@ def number(changes):
     return count
 
 
-def write(copy, origin, changes):
+def write(copy, origin, paths, changes):
+    """Puts `changes` into the copy; `paths`: all files that ever had one."""
     by_path = {}
     count = number(changes)
     for change in changes:
         by_path.setdefault(change.path, []).append(change)
-    for path in {c.path for c in changes} | write.touched:
+    for path in paths:
         target = copy / path.relative_to(origin)
         source = path.read_bytes()
         edits = []
@@ -266,12 +267,8 @@ def write(copy, origin, changes):
             at = max(at, end)
         out.append(source[at:].decode())
         target.write_text("".join(out))
-    write.touched |= set(by_path)
     (copy / "src" / f"{MODULE}.rs").write_text(SUPPORT.replace("@COUNT@", str(count + 1)))
     return count
-
-
-write.touched = set()
 
 
 def cargo(copy, arguments, target):
@@ -281,36 +278,43 @@ def cargo(copy, arguments, target):
     return run.returncode, [json.loads(line) for line in run.stdout.splitlines() if line.startswith("{")], run.stderr
 
 
+def errors_of(messages):
+    told = [m["message"] for m in messages if m.get("reason") == "compiler-message"]
+    return [m for m in told if m["level"] == "error"]
+
+
+def rendered(errors):
+    return "\n".join(e["rendered"] for e in errors)[:4000]
+
+
+def places_of(message):
+    """File and line of all that a message of rustc points at."""
+    for s in message["spans"]:
+        yield from ((s["file_name"], line) for line in range(s["line_start"], s["line_end"] + 1))
+    for child in message["children"]:
+        yield from places_of(child)
+
+
 def build(copy, origin, changes, target):
     """Takes out what rustc refuses until it refuses nothing; the path of the test program."""
+    paths = {c.path for c in changes}
     while True:
-        write(copy, origin, changes)
+        write(copy, origin, paths, changes)
         code, messages, stderr = cargo(copy, ["check", "--lib"], target)
-        refused = set()
-        for m in messages:
-            if m.get("reason") == "compiler-message" and m["message"]["level"] == "error":
-                def spans(message):
-                    for s in message["spans"]:
-                        yield s
-                    for c in message["children"]:
-                        yield from spans(c)
-                for s in spans(m["message"]):
-                    for line in range(s["line_start"], s["line_end"] + 1):
-                        refused.add((s["file_name"], line))
         if code == 0:
             break
+        errors = errors_of(messages)
+        refused = {place for e in errors for place in places_of(e)}
         kept = [c for c in changes if not lines_of(c, origin) & refused]
         print(f"  {len(changes) - len(kept)} refused", flush=True)
         if len(kept) == len(changes):
-            sys.exit("rustc refuses something else:\n" + "\n".join(m["message"]["rendered"] for m in messages
-                     if m.get("reason") == "compiler-message" and m["message"]["level"] == "error")[:4000] + stderr[-2000:])
+            sys.exit("rustc refuses something else:\n" + rendered(errors) + stderr[-2000:])
         changes = kept
     code, messages, stderr = cargo(copy, ["test", "--lib", "--no-run"], target)
     programs = [m["executable"] for m in messages if m.get("reason") == "compiler-artifact" and m.get("executable")
                 and m["target"]["name"] == "lobestone" and m["profile"]["test"]]
     if code or not programs:
-        errors = [m["message"]["rendered"] for m in messages if m.get("reason") == "compiler-message" and m["message"]["level"] == "error"]
-        sys.exit("the tests do not build:\n" + "\n".join(errors)[:4000] + stderr[-2000:])
+        sys.exit("the tests do not build:\n" + rendered(errors_of(messages)) + stderr[-2000:])
     return changes, programs[0]
 
 
@@ -341,14 +345,14 @@ def main():
     parser.add_argument("--budget", type=float, default=10.0, help="seconds of tests a change is given: longer lists are cut")
     parser.add_argument("--target", type=Path, help="cargo's target folder")
     args = parser.parse_args()
-    origin = Path(__file__).resolve().parent.parent if (Path(__file__).resolve().parent.parent / "Cargo.toml").exists() else Path.cwd()
-    copy = args.work / "copy"
+    # Two copies: what was written since must not move the numbers when a run goes on. One has the changes in it.
+    origin, copy = args.work / "origin", args.work / "copy"
     target = args.target or args.work / "target"
     args.work.mkdir(parents=True, exist_ok=True)
     language = Parser(Language(tree_sitter_rust.language()))
-    shutil.copytree(origin, copy, dirs_exist_ok=True, ignore=shutil.ignore_patterns("target", ".git", "lobestone-demo"))
-    lib = (copy / "src/lib.rs").read_text()
-    (copy / "src/lib.rs").write_text(lib + "\npub mod mutants;\n")
+    if not origin.exists():
+        ignored = shutil.ignore_patterns("target", ".git", "lobestone-demo")
+        shutil.copytree(Path(__file__).resolve().parent.parent, origin, ignore=ignored)
     names = constants(origin / "src")
     changes = []
     for room in args.only.split(","):
@@ -356,15 +360,19 @@ def main():
             if not re.search(r"tests?\.rs$|/tests/|marks\.rs$|fixtures|samples", str(path)):
                 changes += changes_of(path, language, names)
     print(f"{len(changes)} places", flush=True)
-    program, listed_path = args.work / "tests", args.work / "kept.json"
+    program, kept_path = args.work / "tests", args.work / "kept.json"
+    name_of = lambda c: f"{c.path.relative_to(origin)}: {c.pieces}"
     if program.exists():
-        kept = set(json.loads(listed_path.read_text()))
-        changes = [c for c in changes if f"{c.path}:{c.line}:{c.pieces}" in kept]
+        kept = set(json.loads(kept_path.read_text()))
+        changes = [c for c in changes if name_of(c) in kept]
         number(changes)
     else:
+        shutil.copytree(origin, copy, dirs_exist_ok=True)
+        with open(copy / "src/lib.rs", "a") as lib:
+            lib.write("\npub mod mutants;\n")
         changes, built = build(copy, origin, changes, target)
         shutil.copy(built, program)
-        listed_path.write_text(json.dumps([f"{c.path}:{c.line}:{c.pieces}" for c in changes]))
+        kept_path.write_text(json.dumps([name_of(c) for c in changes]))
     program = str(program)
     numbered = [(c.ids + k, c, f"{c.key} {('twice', 'half')[k]}" if c.key else c.what) for c in changes for k in range(c.numbers)]
     print(f"{len(numbered)} changes built", flush=True)
@@ -377,7 +385,7 @@ def main():
 
     def look(k_test):
         k, test = k_test
-        trace = args.work / f"trace-{k % 1000}-{k}"
+        trace = args.work / f"trace-{k}"
         code, took = run_test(program, copy, test, 600.0, MUTANT_TRACE=str(trace))
         ids = {int(t) for t in trace.read_text().split()} if trace.exists() else set()
         trace.unlink(missing_ok=True)

@@ -21,6 +21,12 @@ pub fn quantile_of_sorted(sorted: &[f64], share: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
+/// For tests: a number that is near enough to standard normal, the sum of twelve uniform ones less six.
+#[cfg(test)]
+pub(crate) fn nearly_normal(random: &mut impl rand::Rng) -> f64 {
+    (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -15,12 +15,11 @@ pub fn figures(value: f64, count: i32) -> String {
 /// The probability of a chance finding, in a sentence: `p = 0.03`, `p < 0.0001`. What is smaller tells a reader nothing more.
 pub fn chance(p: f64) -> String {
     const LEAST: f64 = 1e-4;
-    match p < LEAST {
-        true => format!("p < {LEAST}"),
-        false => format!(
-            "p = {p:.*}",
-            [4, 3, 2][usize::from(p >= 0.01) + usize::from(p >= 0.1)]
-        ),
+    match p {
+        p if p < LEAST => format!("p < {LEAST}"),
+        p if p < 0.01 => format!("p = {p:.4}"),
+        p if p < 0.1 => format!("p = {p:.3}"),
+        p => format!("p = {p:.2}"),
     }
 }
 

@@ -664,11 +664,7 @@ mod tests {
         let bare = robot.chain(&kinematics, &Baseline::nominal(&robot.spec));
         let spot = Spot::LinkGround(4, 1);
         let mut chain = bare.clone();
-        let setting = PostureSetting {
-            robot: &robot,
-            kinematics: &kinematics,
-            conditions: Default::default(),
-        };
+        let setting = PostureSetting::of_tests(&robot, &kinematics);
         let (k, c, towards_z, towards_x) = (4e4, 300.0, 0.5, -0.3);
         let values = [k, c, towards_z, towards_x].map(Dual::constant);
         let at = At {
@@ -692,11 +688,7 @@ mod tests {
         let kinematics = robot.kinematics(&TAP_POSTURES[0]).unwrap();
         let bare = robot.chain(&kinematics, &Baseline::nominal(&robot.spec));
         let mut chain = bare.clone();
-        let setting = PostureSetting {
-            robot: &robot,
-            kinematics: &kinematics,
-            conditions: Default::default(),
-        };
+        let setting = PostureSetting::of_tests(&robot, &kinematics);
         let (mass_kg, frequency_hz, towards_y, towards_z) = (1500.0, 20.0, 0.6, -0.4);
         let values = [mass_kg, frequency_hz, 0.03, towards_y, towards_z].map(Dual::constant);
         let at = At {

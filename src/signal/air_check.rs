@@ -142,7 +142,7 @@ fn stands_off(channels: &[&[f64]], air: &Range<usize>, core: &Range<usize>, turn
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::{Rng, SeedableRng};
+    use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
     const TURN: f64 = 60.3;
@@ -154,7 +154,7 @@ mod tests {
             .map(|i| {
                 let angle = std::f64::consts::TAU * i as f64 / TURN;
                 let pulse = angle.sin().max(0.0).powi(2) + second * (-angle.sin()).max(0.0).powi(2);
-                let gauss: f64 = (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
+                let gauss: f64 = crate::statistics::nearly_normal(&mut rng);
                 5.0 + 200.0 * force(i as f64 / TURN) * pulse + noise * gauss
             })
             .collect()

@@ -273,7 +273,7 @@ fn exponential(points: &[(f64, f64)]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::{Rng, SeedableRng};
+    use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
     const RATE: f64 = 1000.0;
@@ -284,7 +284,7 @@ mod tests {
             .map(|i| {
                 let t = i as f64 / RATE;
                 let cut = if (1.0..2.5).contains(&t) { 200.0 } else { 0.0 };
-                let gauss: f64 = (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
+                let gauss: f64 = crate::statistics::nearly_normal(&mut rng);
                 12.0 + 3.0 * t + bend(t) + cut + noise * gauss
             })
             .collect()

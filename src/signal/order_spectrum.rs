@@ -221,7 +221,7 @@ pub fn line_amplitude(samples: &[f64], sample_rate_hz: f64, hz: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::{Rng, SeedableRng};
+    use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
     #[test]
@@ -233,7 +233,7 @@ mod tests {
             let samples: Vec<f64> = (0..6000)
                 .map(|i| {
                     let theta = TAU * i as f64 / per_turn;
-                    let gauss: f64 = (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
+                    let gauss: f64 = crate::statistics::nearly_normal(&mut random);
                     let x = i as f64 / 6000.0;
                     80.0 * x + 40.0 * x * x + 300.0 * (4.0 * theta).cos() - 20.0 * (17.0 * theta).sin()
                         + sigma * gauss
@@ -261,7 +261,7 @@ mod tests {
             let mut squares = Vec::new();
             for _ in 0..60 {
                 let samples: Vec<f64> = (0..(turns as f64 * 137.3) as usize + 1)
-                    .map(|_| (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0)
+                    .map(|_| crate::statistics::nearly_normal(&mut random))
                     .collect();
                 let s = order_spectrum(&samples, 5000.0, 137.3, 48).unwrap();
                 squares.extend(

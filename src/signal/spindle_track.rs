@@ -444,7 +444,7 @@ impl SpindleTrack {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::{Rng, SeedableRng};
+    use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
     const PER_TURN: f64 = 97.3;
@@ -459,7 +459,7 @@ mod tests {
         for i in 0..n {
             for (c, channel) in channels.iter_mut().enumerate() {
                 let of = |order: f64, size: f64| size * (order * angle + order * order + c as f64).cos();
-                let error: f64 = (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
+                let error: f64 = crate::statistics::nearly_normal(&mut random);
                 let drift = 0.001 * i as f64;
                 channel.push(150.0 + of(1.0, 8.0) + of(4.0, 60.0) + of(8.0, 20.0) + noise * error + drift);
             }

@@ -282,7 +282,7 @@ mod tests {
                     } else {
                         1.0
                     };
-                    let gauss: f64 = (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
+                    let gauss: f64 = crate::statistics::nearly_normal(rng);
                     engaged * (level + m.ripple * (TAU * 80.0 * t).sin())
                         + m.drift * t
                         + 3.0 * (TAU * 50.0 * t).sin()

@@ -323,11 +323,7 @@ mod tests {
         }
         let mut chain = model.chain(&kinematics, &baseline);
         if let Some(values) = viscoelastic {
-            let setting = PostureSetting {
-                robot: &model,
-                kinematics: &kinematics,
-                conditions: Default::default(),
-            };
+            let setting = PostureSetting::of_tests(&model, &kinematics);
             let values = values.map(Dual::constant);
             ViscoelasticJoints.apply(At::EVERYWHERE, &values, &setting, &mut chain);
         }

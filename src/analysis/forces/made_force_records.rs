@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 use std::path::Path;
 
-use rand::{Rng, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 pub const RATE: f64 = 4000.0;
@@ -122,7 +122,7 @@ pub fn write_campaign_of(
             };
             let _ = write!(text, "{t:.5}");
             for (axis, force) in forces.iter().enumerate() {
-                let noise: f64 = (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
+                let noise: f64 = crate::statistics::nearly_normal(&mut random);
                 let value = force + 3.0 * noise + more(c, axis, t, angle, cutting);
                 let _ = write!(text, ",{value:.3}");
             }

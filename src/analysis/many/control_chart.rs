@@ -176,6 +176,10 @@ mod tests {
     use super::*;
 
     fn chart(values: &[f64], std_error: Option<f64>) -> ControlChart {
+        chart_of("k", values, std_error)
+    }
+
+    fn chart_of(name: &str, values: &[f64], std_error: Option<f64>) -> ControlChart {
         let points = values.iter().enumerate().map(|(i, value)| ChartPoint {
             campaign: format!("c{i}"),
             date: None,
@@ -183,7 +187,7 @@ mod tests {
             std_error,
             outside: false,
         });
-        ControlChart::new("k".into(), points.collect())
+        ControlChart::new(name.into(), points.collect())
     }
 
     /// The example of the NIST handbook (6.3.2.2): ten flow rates, mean 50.81, mean moving range 1.8778, limits 45.82 and 55.80.
@@ -237,18 +241,9 @@ mod tests {
 
     #[test]
     fn what_cannot_be_negative_has_no_limit_below_zero() {
-        let chart = |name: &str| {
-            let points = [1.0, 4.0, 0.5, 5.0, 2.0].iter().map(|&value| ChartPoint {
-                campaign: "c".into(),
-                date: None,
-                value,
-                std_error: None,
-                outside: false,
-            });
-            ControlChart::new(name.into(), points.collect())
-        };
-        let angle = chart("sensor.about_z_deg").limits.unwrap();
-        let stiffness = chart("joint-1.stiffness_nm_per_rad").limits.unwrap();
+        let limits = |name| chart_of(name, &[1.0, 4.0, 0.5, 5.0, 2.0], None).limits.unwrap();
+        let angle = limits("sensor.about_z_deg");
+        let stiffness = limits("joint-1.stiffness_nm_per_rad");
         assert!(angle.lower < 0.0);
         assert_eq!((stiffness.lower, stiffness.upper), (0.0, angle.upper));
     }

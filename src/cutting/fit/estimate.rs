@@ -344,7 +344,7 @@ mod tests {
 
     fn normal(seed: u64, n: usize) -> Vec<f64> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let mut one = || (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
+        let mut one = || crate::statistics::nearly_normal(&mut random);
         (0..n).map(|_| one()).collect()
     }
 

@@ -141,14 +141,14 @@ fn scatter_of_mean(series: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::{Rng, SeedableRng};
+    use rand::SeedableRng;
 
     /// White: σ/√n. First-order autoregressive with ρ: √((1 + ρ)/(1 − ρ)) times that (Bayley and Hammersley 1946).
     #[test]
     fn the_scatter_of_a_mean_grows_with_what_neighbours_share() {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(3);
         let white: Vec<f64> = (0..20_000)
-            .map(|_| (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0)
+            .map(|_| crate::statistics::nearly_normal(&mut random))
             .collect();
         let n = white.len() as f64;
         approx::assert_relative_eq!(scatter_of_mean(&white), 1.0 / n.sqrt(), max_relative = 0.05);

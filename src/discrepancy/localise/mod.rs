@@ -10,15 +10,12 @@ pub mod screen;
 #[cfg(test)]
 mod tests;
 
-use crate::effects::Structure;
-use std::borrow::Cow;
-
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::Result;
 use crate::effects::drawn::{self, DrawnForm};
-use crate::effects::{Instance, Spot};
+use crate::effects::{Instance, Spot, Structure};
 use crate::identify::frfs::calibrate::{Calibration, Estimate, estimates};
 use crate::identify::frfs::frf_data::FrfData;
 use crate::identify::frfs::spot_response::{SpotResponses, free_spots};
@@ -184,8 +181,7 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
     let spots = free_spots(model);
     let lines: usize = study.data.blocks.iter().map(|b| b.frequency_hz.len()).sum();
     let thinned = study.data.thinned(lines.div_ceil(SCREENED_LINES).max(1), 1);
-    let responses = SpotResponses::new(model, theta, &thinned, &spots)?;
-    let mut screened = screen::screen(&responses, &model.parameters, theta);
+    let mut screened = screen_at(model, theta, &thinned, &spots)?;
     let score = |s: &Screened| s.left_free.min(s.left_common);
     screened.sort_by(|a, b| score(a).total_cmp(&score(b)));
 
@@ -198,21 +194,24 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
     let values = study.real_values(Extent::Coarse) as f64;
     let starts = Starts::new(study, model, theta, led_astray(coarse_base.cost, values));
     let ties = ties(&screened);
-    let mut chosen: Vec<(usize, Cow<Screened>, Starts)> = leaders(&screened, &ties, FITTED)
+    let mut chosen: Vec<(usize, &Screened, Starts)> = leaders(&screened, &ties, FITTED)
         .into_iter()
-        .map(|i| (i, Cow::Borrowed(&screened[i]), starts.clone()))
+        .map(|i| (i, &screened[i], starts.clone()))
         .collect();
     // Where the model is far off, what is linear there says little: the nominal values may be nearer.
-    for (k, at) in starts.elsewhere.iter().enumerate() {
-        let responses = SpotResponses::new(model, at, &thinned, &spots)?;
-        let there = screen::screen(&responses, &model.parameters, at);
-        for s in leaders(&there, &self::ties(&there), FITTED_ELSEWHERE) {
+    let elsewhere: Vec<Vec<Screened>> = starts
+        .elsewhere
+        .iter()
+        .map(|at| screen_at(model, at, &thinned, &spots))
+        .collect::<Result<_>>()?;
+    for (k, there) in elsewhere.iter().enumerate() {
+        for s in leaders(there, &self::ties(there), FITTED_ELSEWHERE) {
             let place = screened.iter().position(|known| known.spot == there[s].spot);
             let Some(place) = place.map(|i| ties[i]) else {
                 continue;
             };
             if chosen.iter().all(|(known, ..)| *known != place) {
-                chosen.push((place, Cow::Owned(there[s].clone()), starts.beginning_at(k)));
+                chosen.push((place, &there[s], starts.beginning_at(k)));
             }
         }
     }
@@ -247,7 +246,7 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
                 study,
                 &thinned,
                 forms,
-                &screened[*i],
+                screened[*i].spot,
                 base_count,
                 &starts.elsewhere,
             )?;
@@ -325,6 +324,12 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
         baseline,
         baseline_held_out,
     })
+}
+
+/// Every one of `spots` without a law, at a point of the model (solver's scale).
+fn screen_at(model: &StructureModel, theta: &[f64], data: &FrfData, spots: &[Spot]) -> Result<Vec<Screened>> {
+    let responses = SpotResponses::new(model, theta, data, spots)?;
+    Ok(screen::screen(&responses, &model.parameters, theta))
 }
 
 /// Order of the settled places, those whose form ran to the end of its range last: BIC on all data.
@@ -469,7 +474,7 @@ fn second_form(
     study: &StructureStudy,
     thinned: &FrfData,
     forms: &[Tried<Structure>],
-    screened: &Screened,
+    spot: Spot,
     base_count: usize,
     elsewhere: &[Vec<f64>],
 ) -> Option<Pair> {
@@ -484,10 +489,9 @@ fn second_form(
     let (model, theta) = (&first.model, &first.fit.theta);
     let spots: Vec<Spot> = free_spots(model)
         .into_iter()
-        .filter(|spot| spot.shares_place_with(screened.spot))
+        .filter(|other| other.shares_place_with(spot))
         .collect();
-    let responses = SpotResponses::new(model, theta, thinned, &spots).ok()?;
-    let mut promising = screen::screen(&responses, &model.parameters, theta);
+    let mut promising = screen_at(model, theta, thinned, &spots).ok()?;
     promising.sort_by(|a, b| a.left_free.total_cmp(&b.left_free));
     let own = &theta[base_count..];
     let starts = Starts {

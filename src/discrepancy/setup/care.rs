@@ -180,7 +180,7 @@ fn cost(log: f64) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::{Rng, SeedableRng};
+    use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
     const KINDS: usize = 6;
@@ -205,7 +205,7 @@ mod tests {
     /// Errors with these factors, each seen with noise of its own.
     fn laboratory(factors: [f64; KINDS], seed: u64) -> Care {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let mut normal = || (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
+        let mut normal = || crate::statistics::nearly_normal(&mut random);
         let kinds: Vec<usize> = (0..KINDS * EACH).map(|i| i / EACH).collect();
         let gradient = DVector::from_fn(KINDS * EACH, |i, _| {
             PLAIN * (PLAIN * factors[i / EACH] * normal() + normal())

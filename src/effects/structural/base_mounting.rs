@@ -109,11 +109,7 @@ mod tests {
                 let mut chain = model.chain(&kinematics, &Baseline::nominal(&model.spec));
                 let tool = |chain: &Chain| chain.compliance(kinematics.tcp(), model.flange_place()).unwrap();
                 let before = tool(&chain);
-                let setting = PostureSetting {
-                    robot: &model,
-                    kinematics: &kinematics,
-                    conditions: Default::default(),
-                };
+                let setting = PostureSetting::of_tests(&model, &kinematics);
                 let at = At {
                     site: Site::Everywhere,
                     variant,

@@ -267,11 +267,7 @@ mod tests {
         baseline.damping_ratio = Dual::constant(0.0);
         let mut chain = model.chain(&kinematics, &baseline);
         if let Some(values) = contact {
-            let setting = PostureSetting {
-                robot: &model,
-                kinematics: &kinematics,
-                conditions: Default::default(),
-            };
+            let setting = PostureSetting::of_tests(&model, &kinematics);
             let at = At {
                 site: Site::Tool,
                 variant: usize::from(values.len() == 4),

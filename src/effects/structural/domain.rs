@@ -33,6 +33,18 @@ pub struct PostureSetting<'a> {
     pub conditions: Conditions,
 }
 
+#[cfg(test)]
+impl<'a> PostureSetting<'a> {
+    /// Under no conditions of its own.
+    pub(crate) fn of_tests(robot: &'a RobotModel, kinematics: &'a Kinematics) -> Self {
+        PostureSetting {
+            robot,
+            kinematics,
+            conditions: Conditions::default(),
+        }
+    }
+}
+
 /// Conditions under which a block of FRFs was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Conditions {

@@ -123,11 +123,7 @@ mod tests {
             };
             let (kinematics, bare) = chain_at(posture);
             let mut chain = bare.clone();
-            let setting = PostureSetting {
-                robot: &robot,
-                kinematics: &kinematics,
-                conditions: Default::default(),
-            };
+            let setting = PostureSetting::of_tests(&robot, &kinematics);
             let at = At {
                 site: Site::Everywhere,
                 variant: 0,

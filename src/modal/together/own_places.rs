@@ -63,7 +63,7 @@ pub(super) fn elsewhere(
             };
             let std = [nearest.frequency_std_hz?, nearest.damping_std?];
             // Between two lines a fit that does not know its place may be anywhere.
-            let reach_hz = own_width_hz * (2.0 / nearest_mode.lines_in_half_power_band).max(1.0);
+            let reach_hz = width_or_line_hz(nearest_mode, own_width_hz);
             let same = (pole.frequency_hz - common.frequency_hz).abs() < reach_hz
                 && (SAME_DAMPING.recip()..SAME_DAMPING)
                     .contains(&(pole.damping_ratio / common.damping_ratio));
@@ -87,6 +87,11 @@ pub(super) fn elsewhere(
         common.damping_ratio,
     );
     contradicts.then_some(OwnPlace { pole, std: own_std })
+}
+
+/// A half-width, or a line of the FRF of `mode` where that is more, Hz.
+fn width_or_line_hz(mode: &FrfMode, half_width_hz: f64) -> f64 {
+    half_width_hz * (2.0 / mode.lines_in_half_power_band).max(1.0)
 }
 
 /// Peaks that most of the FRFs know well by themselves, that are among the highest of each (as mobility), and that no common mode
@@ -118,7 +123,7 @@ pub(super) fn missed(members: &[&SetMember], found: &[GlobalMode]) -> Vec<f64> {
         for mode in member.modes.modes.iter().filter(known).filter(high) {
             let own = mode.best();
             let half_width_hz = own.damping_ratio * own.frequency_hz;
-            let width_hz = half_width_hz * (2.0 / mode.lines_in_half_power_band).max(1.0);
+            let width_hz = width_or_line_hz(mode, half_width_hz);
             let same = |p: &&mut Place| (p.frequency_hz - own.frequency_hz).abs() < p.width_hz + width_hz;
             match places.iter_mut().find(same) {
                 Some(place) => place.frfs += 1,
@@ -150,36 +155,51 @@ pub(super) fn missed(members: &[&SetMember], found: &[GlobalMode]) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
+    use num_complex::Complex64;
+
     use super::*;
     use crate::modal::settings::Settings;
     use crate::modal::single::analysis::analyse_frf;
+    use crate::modal::single::frf_modes::FrfModes;
     use crate::modal::synthetic::{Synthetic, SyntheticMode};
 
-    #[test]
-    fn frfs_that_agree_by_themselves_outvote_a_common_pole_that_left_them() {
-        let frfs: Vec<_> = [1.0, -0.6, 0.8, 0.5, -0.9, 0.7]
+    type Curves = Vec<(Vec<f64>, Vec<Complex64>)>;
+
+    /// Six FRFs of one mode on lines `step_hz` apart, with noise in proportion to them, and what each says by itself.
+    fn set(step_hz: f64, noise: f64, mode: SyntheticMode) -> (Curves, Vec<FrfModes>) {
+        let frfs: Curves = [1.0, -0.6, 0.8, 0.5, -0.9, 0.7]
             .iter()
             .enumerate()
             .map(|(k, constant)| {
-                Synthetic::new(60.0, 140.0, 0.1, &[SyntheticMode::new(100.0, 0.006, *constant)])
-                    .with_noise(0.0, 0.01, k as u64)
+                let own = SyntheticMode {
+                    constant: *constant,
+                    ..mode
+                };
+                Synthetic::new(60.0, 140.0, step_hz, &[own])
+                    .with_noise(0.0, noise, k as u64)
                     .frf()
             })
             .collect();
-        let modes: Vec<_> = frfs
-            .iter()
-            .map(|(f, h)| analyse_frf(f, h, &Settings::default()).unwrap())
-            .collect();
-        let members: Vec<SetMember> = frfs
-            .iter()
-            .zip(&modes)
-            .map(|((frequency_hz, receptance_m_per_n), modes)| SetMember {
-                frequency_hz,
-                receptance_m_per_n,
-                modes,
-                dofs: None,
-            })
-            .collect();
+        let alone = |(f, h): &(Vec<f64>, Vec<Complex64>)| analyse_frf(f, h, &Settings::default()).unwrap();
+        let modes = frfs.iter().map(alone).collect();
+        (frfs, modes)
+    }
+
+    fn members<'a>(frfs: &'a Curves, modes: &'a [FrfModes]) -> Vec<SetMember<'a>> {
+        let each = frfs.iter().zip(modes);
+        each.map(|((frequency_hz, receptance_m_per_n), modes)| SetMember {
+            frequency_hz,
+            receptance_m_per_n,
+            modes,
+            dofs: None,
+        })
+        .collect()
+    }
+
+    #[test]
+    fn frfs_that_agree_by_themselves_outvote_a_common_pole_that_left_them() {
+        let (frfs, modes) = set(0.1, 0.01, SyntheticMode::new(100.0, 0.006, 1.0));
+        let members = members(&frfs, &modes);
         let members: Vec<&SetMember> = members.iter().collect();
         let pole = |frequency_hz, damping_ratio| Pole {
             frequency_hz,
@@ -205,29 +225,8 @@ mod tests {
         assert!(elsewhere(&members, left, std, &[pole(95.0, 0.15)]).is_some());
         assert!(elsewhere(&members[..3], left, std, &[]).is_none());
         // Where a line is as wide as the mode, a fit that lost its hold goes to the next line.
-        let coarse: Vec<_> = [1.0, -0.6, 0.8, 0.5, -0.9, 0.7]
-            .iter()
-            .enumerate()
-            .map(|(k, constant)| {
-                Synthetic::new(60.0, 140.0, 1.0, &[SyntheticMode::new(100.2, 0.005, *constant)])
-                    .with_noise(0.0, 0.005, k as u64)
-                    .frf()
-            })
-            .collect();
-        let modes: Vec<_> = coarse
-            .iter()
-            .map(|(f, h)| analyse_frf(f, h, &Settings::default()).unwrap())
-            .collect();
-        let on_coarse: Vec<SetMember> = coarse
-            .iter()
-            .zip(&modes)
-            .map(|((frequency_hz, receptance_m_per_n), modes)| SetMember {
-                frequency_hz,
-                receptance_m_per_n,
-                modes,
-                dofs: None,
-            })
-            .collect();
+        let (coarse, modes) = set(1.0, 0.005, SyntheticMode::new(100.2, 0.005, 1.0));
+        let on_coarse = self::members(&coarse, &modes);
         let own = elsewhere(
             &on_coarse.iter().collect::<Vec<_>>(),
             pole(100.9, 0.005),

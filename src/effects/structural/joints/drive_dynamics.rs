@@ -163,11 +163,7 @@ mod tests {
         baseline.joint_stiffness_nm_per_rad[0] = Dual::constant(stiffness);
         let mut chain = model.chain(&kinematics, &baseline);
         if let Some(values) = drive {
-            let setting = PostureSetting {
-                robot: &model,
-                kinematics: &kinematics,
-                conditions: Default::default(),
-            };
+            let setting = PostureSetting::of_tests(&model, &kinematics);
             let at = At {
                 site: Site::Joint(1),
                 variant: 0,

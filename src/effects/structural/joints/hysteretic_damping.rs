@@ -166,11 +166,7 @@ mod tests {
                 along * along / (stretched - omega * omega * modes.inverse_omega2[k])
             })
             .sum();
-        let setting = PostureSetting {
-            robot: &model,
-            kinematics: &kinematics,
-            conditions: Default::default(),
-        };
+        let setting = PostureSetting::of_tests(&model, &kinematics);
         let at = At {
             site: Site::Everywhere,
             variant,

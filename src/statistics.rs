@@ -4,19 +4,39 @@
 /// Fan 1996, type 7). What is not a number is left out; what is unlimited counts as infinite. `None` where nothing is left, or
 /// where the answer is infinite.
 pub fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64> {
-    let mut sorted: Vec<f64> = values.into_iter().filter(|v| !v.is_nan()).collect();
-    sorted.sort_by(f64::total_cmp);
-    quantile_of_sorted(&sorted, share)
+    let mut values: Vec<f64> = values.into_iter().filter(|v| !v.is_nan()).collect();
+    let place = place(values.len(), share)?;
+    // Only the two that count are put in their order: the cost is linear.
+    let (_, low, above) = values.select_nth_unstable_by(place.floor() as usize, f64::total_cmp);
+    let low = *low;
+    let high = match place.fract() {
+        0.0 => low,
+        _ => above.iter().copied().min_by(f64::total_cmp)?,
+    };
+    between(low, high, place.fract())
 }
 
 /// As [`quantile`], of values that ascend and are numbers.
 pub fn quantile_of_sorted(sorted: &[f64], share: f64) -> Option<f64> {
-    let place = share.clamp(0.0, 1.0) * sorted.len().checked_sub(1)? as f64;
-    let (low, high) = (sorted[place.floor() as usize], sorted[place.ceil() as usize]);
+    let place = place(sorted.len(), share)?;
+    between(
+        sorted[place.floor() as usize],
+        sorted[place.ceil() as usize],
+        place.fract(),
+    )
+}
+
+/// Place of the quantile among `count` values in their order, from 0; `None` where there is none.
+fn place(count: usize, share: f64) -> Option<f64> {
+    Some(share.clamp(0.0, 1.0) * count.checked_sub(1)? as f64)
+}
+
+/// What lies at `part` of the way; `None` where it is infinite.
+fn between(low: f64, high: f64, part: f64) -> Option<f64> {
     let value = if low == high {
         low
     } else {
-        low + (high - low) * place.fract()
+        low + (high - low) * part
     };
     value.is_finite().then_some(value)
 }
@@ -40,5 +60,14 @@ mod tests {
         assert_eq!(quantile([1.0, infinite, 1.0, 1.0], 0.05), Some(1.0));
         assert_eq!(quantile([], 0.5), None);
         assert_eq!(quantile([f64::NAN], 0.5), None);
+        let many: Vec<f64> = (0..101).map(|k| ((k * 37) % 101) as f64).collect();
+        let mut sorted = many.clone();
+        sorted.sort_by(f64::total_cmp);
+        for share in [0.0, 0.013, 0.25, 0.5, 0.777, 1.0] {
+            assert_eq!(
+                quantile(many.iter().copied(), share),
+                quantile_of_sorted(&sorted, share)
+            );
+        }
     }
 }

@@ -9,6 +9,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
+use pulp::{Arch, Simd, WithSimd};
 use realfft::RealFftPlanner;
 
 use super::blocks::median;
@@ -57,35 +58,24 @@ pub fn order_spectrum(
     let count = (length.ceil() as usize).min(samples.len());
     // The last sample counts as far as the revolution reaches into it.
     let last = (length - (count as f64 - 1.0)).clamp(0.0, 1.0);
-    let weight = |i: usize| if i + 1 == count { last } else { 1.0 };
     let trend = Trend::new(&samples[..count], revolutions as usize, samples_per_revolution);
     let value: Vec<f64> = (0..count).map(|i| samples[i] - trend.at(i)).collect();
 
-    let mut coefficient = vec![Complex64::ZERO; orders];
-    let step = TAU / samples_per_revolution;
-    let phase = |i: usize| Complex64::from_polar(1.0, -step * (i as f64 % samples_per_revolution));
-    for (i, v) in value.iter().enumerate() {
-        let turn = phase(i);
-        let mut power = Complex64::from(v * weight(i) / length);
-        for c in &mut coefficient {
-            power *= turn;
-            *c += power;
-        }
-    }
+    let turn = Turn::new(samples_per_revolution);
+    let coefficient = Arch::new().dispatch(Project {
+        value: &value,
+        last,
+        length,
+        turn: &turn,
+        orders,
+    });
     // In the place of the values: long records are many times longer than all that comes of them.
-    let mut rest: Vec<f64> = value
-        .into_iter()
-        .enumerate()
-        .map(|(i, v)| {
-            let turn = phase(i).conj();
-            // Horner from the highest order.
-            let sum = coefficient
-                .iter()
-                .rev()
-                .fold(Complex64::ZERO, |s, c| (s + c) * turn);
-            v - 2.0 * sum.re
-        })
-        .collect();
+    let mut rest = value;
+    Arch::new().dispatch(TakeAway {
+        value: &mut rest,
+        coefficient: &coefficient,
+        turn: &turn,
+    });
     let transform = RealFftPlanner::<f64>::new().plan_fft_forward(count);
     let mut spectrum = transform.make_output_vec();
     transform.process(&mut rest, &mut spectrum).ok()?;
@@ -137,6 +127,120 @@ pub fn order_spectrum(
         rest,
         line_hz,
     })
+}
+
+/// Samples that are multiplied side by side: enough independent products for the widest vectors to be busy.
+const LANES: usize = 32;
+
+/// One number of each of the samples side by side.
+type Lanes = [f64; LANES];
+
+/// e^(−iθ) at the samples of a rotation.
+struct Turn {
+    samples_per_revolution: f64,
+    /// cos and −sin from the first of the samples side by side.
+    ahead: [Lanes; 2],
+}
+
+impl Turn {
+    fn new(samples_per_revolution: f64) -> Turn {
+        let step = TAU / samples_per_revolution;
+        Turn {
+            samples_per_revolution,
+            ahead: [
+                std::array::from_fn(|k| (step * k as f64).cos()),
+                std::array::from_fn(|k| -(step * k as f64).sin()),
+            ],
+        }
+    }
+
+    /// Real and imaginary part at sample `first` and those after it.
+    #[inline(always)]
+    fn at(&self, first: usize) -> [Lanes; 2] {
+        let angle = TAU * (first as f64 / self.samples_per_revolution).fract();
+        let (sine, cosine) = angle.sin_cos();
+        let [re, im] = &self.ahead;
+        [
+            std::array::from_fn(|k| cosine * re[k] + sine * im[k]),
+            std::array::from_fn(|k| cosine * im[k] - sine * re[k]),
+        ]
+    }
+}
+
+/// Σ x e^(−inθ) over all samples, divided by `length`, for the orders from 1 on; the last sample counts as `last` says.
+/// (A type of its own: a closure is compiled for the plainest processor where it is not inlined.)
+struct Project<'a> {
+    value: &'a [f64],
+    last: f64,
+    length: f64,
+    turn: &'a Turn,
+    orders: usize,
+}
+
+impl WithSimd for Project<'_> {
+    type Output = Vec<Complex64>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Vec<Complex64> {
+        // Of every eighth sample.
+        let mut sum = vec![[[0.0; 8]; 2]; self.orders];
+        let end = self.value.len();
+        for (block, value) in self.value.chunks(LANES).enumerate() {
+            let first = block * LANES;
+            let mut re = [0.0; LANES];
+            re[..value.len()].copy_from_slice(value);
+            if first + value.len() == end {
+                re[value.len() - 1] *= self.last;
+            }
+            let mut im = [0.0; LANES];
+            let [cosine, sine] = self.turn.at(first);
+            for sum in &mut sum {
+                for k in 0..LANES {
+                    let (a, b) = (re[k], im[k]);
+                    re[k] = a * cosine[k] - b * sine[k];
+                    im[k] = a * sine[k] + b * cosine[k];
+                }
+                for k in 0..LANES {
+                    sum[0][k % 8] += re[k];
+                    sum[1][k % 8] += im[k];
+                }
+            }
+        }
+        let total = |part: [f64; 8]| part.iter().sum::<f64>() / self.length;
+        sum.into_iter()
+            .map(|[re, im]| Complex64::new(total(re), total(im)))
+            .collect()
+    }
+}
+
+/// Takes 2 Re Σ c e^(inθ) off every sample.
+struct TakeAway<'a> {
+    value: &'a mut [f64],
+    coefficient: &'a [Complex64],
+    turn: &'a Turn,
+}
+
+impl WithSimd for TakeAway<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for (block, value) in self.value.chunks_mut(LANES).enumerate() {
+            let [cosine, sine] = self.turn.at(block * LANES);
+            let (mut re, mut im) = ([0.0; LANES], [0.0; LANES]);
+            // Horner from the highest order.
+            for c in self.coefficient.iter().rev() {
+                for k in 0..LANES {
+                    let (a, b) = (re[k] + c.re, im[k] + c.im);
+                    re[k] = a * cosine[k] + b * sine[k];
+                    im[k] = b * cosine[k] - a * sine[k];
+                }
+            }
+            for (value, re) in value.iter_mut().zip(re) {
+                *value -= 2.0 * re;
+            }
+        }
+    }
 }
 
 /// What the median of `count` mean squares of `freedom` normal values each is to be multiplied with, to be the variance by which
@@ -204,13 +308,20 @@ pub fn line_amplitude(samples: &[f64], sample_rate_hz: f64, hz: f64) -> f64 {
     }
     let index = || (0..n).map(|i| i as f64);
     let (mean, slope, centre) = super::blocks::line(index(), samples.iter().copied());
+    let (window_turn, line_turn) = (Turn::new(n as f64), Turn::new(sample_rate_hz / hz));
+    let half_a_sample = Complex64::from_polar(1.0, -TAU * 0.5 / n as f64);
     let (mut sum, mut window, mut square) = (Complex64::ZERO, 0.0, 0.0);
-    for (i, v) in samples.iter().enumerate() {
-        let hann = 0.5 - 0.5 * (TAU * (i as f64 + 0.5) / n as f64).cos();
-        let value = v - mean - slope * (i as f64 - centre);
-        sum += Complex64::from_polar(hann * value, -TAU * hz * i as f64 / sample_rate_hz);
-        window += hann;
-        square += value * value;
+    for (block, samples) in samples.chunks(LANES).enumerate() {
+        let first = block * LANES;
+        let (hann, line) = (window_turn.at(first), line_turn.at(first));
+        for (k, v) in samples.iter().enumerate() {
+            let cosine = hann[0][k] * half_a_sample.re - hann[1][k] * half_a_sample.im;
+            let hann = 0.5 - 0.5 * cosine;
+            let value = v - mean - slope * ((first + k) as f64 - centre);
+            sum += Complex64::new(line[0][k], line[1][k]) * (hann * value);
+            window += hann;
+            square += value * value;
+        }
     }
     let power = 4.0 * sum.norm_sqr() / (window * window);
     // Hann-windowed white noise: E|2S/W|² = 4 σ² Σw²/W² = 6 σ²/n.

@@ -249,14 +249,20 @@ fn fit_profile(phase: &[f64]) -> Option<Profile> {
     let n = turns as f64;
     let most = 2 + (turns / TURNS_PER_COSINE).min(MOST_COSINES);
     let value = DVector::from_column_slice(phase);
+    let mut all = DMatrix::from_element(turns, most + 1, 1.0);
+    for k in 0..turns {
+        for (j, b) in basis(most, place(k as f64, turns)).into_iter().enumerate() {
+            all[(k, j + 1)] = b;
+        }
+    }
+    let (gram, with_value) = (all.tr_mul(&all), all.tr_mul(&value));
     let solve = |count: usize| -> Option<(f64, DVector<f64>, DMatrix<f64>)> {
-        let a = DMatrix::from_fn(turns, count + 1, |k, j| match j {
-            0 => 1.0,
-            _ => basis(count, place(k as f64, turns))[j - 1],
-        });
-        let normal = (a.transpose() * &a).try_inverse()?;
-        let x = &normal * (a.transpose() * &value);
-        let rest = (&value - &a * &x).norm_squared();
+        let normal = gram
+            .view((0, 0), (count + 1, count + 1))
+            .into_owned()
+            .try_inverse()?;
+        let x = &normal * with_value.rows(0, count + 1);
+        let rest = (&value - all.columns(0, count + 1) * &x).norm_squared();
         Some((rest, x, normal))
     };
     let tried: Vec<(f64, usize)> = (1..=most)

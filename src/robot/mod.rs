@@ -19,6 +19,7 @@ pub mod pose_compensation;
 pub mod posture_report;
 mod published_postures;
 pub mod rigid;
+mod small_systems;
 pub mod static_deflection;
 pub mod urdf;
 

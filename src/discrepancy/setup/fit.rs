@@ -1,5 +1,7 @@
 //! A mistake's size and the model's parameters fitted together.
 
+use faer::linalg::matmul::matmul;
+use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
 
 use super::group::FrfGroup;
@@ -106,17 +108,19 @@ impl LeastSquares for JointProblem<'_> {
             }
             columns.push(slope);
         }
-        let n = columns.len();
+        let (rows, n) = (residual.len(), columns.len());
+        let columns = columns.concat();
+        let columns = MatRef::from_column_major_slice(&columns, rows, n);
+        let residuals = MatRef::from_column_major_slice(&residual, rows, 1);
         let mut cost = 0.5 * dot(&residual, &residual);
-        let mut gradient = DVector::from_fn(n, |i, _| dot(&columns[i], &residual));
+        let mut gradient = DVector::zeros(n);
         let mut hessian = DMatrix::zeros(n, n);
-        for i in 0..n {
-            for j in 0..=i {
-                let sum = dot(&columns[i], &columns[j]);
-                hessian[(i, j)] = sum;
-                hessian[(j, i)] = sum;
-            }
-        }
+        let product = |target: &mut [f64], right: MatRef<f64>| {
+            let target = MatMut::from_column_major_slice_mut(target, n, right.ncols());
+            matmul(target, Accum::Replace, columns.transpose(), right, 1.0, Par::Seq);
+        };
+        product(gradient.as_mut_slice(), residuals);
+        product(hessian.as_mut_slice(), columns);
         self.priors(all, |i, [value, slope, curvature]| {
             cost += value;
             gradient[i] += slope;

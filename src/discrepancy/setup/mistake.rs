@@ -57,6 +57,17 @@ impl Estimated<'_> {
     }
 }
 
+/// Where an FRF's structure is pushed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PushedAt {
+    /// At the reference point, along its axis.
+    AlongHit,
+    /// At the reference point, along all axes.
+    AtHit,
+    /// At reference and response point, along all axes.
+    AtBothPoints,
+}
+
 /// What a mistake of given sizes does to the files. Its vanishing is `values` = 0.
 pub trait Distortion: Sync + Send {
     /// The posture in truth, where campaign.toml gives `kinematics`.
@@ -72,6 +83,11 @@ pub trait Distortion: Sync + Send {
     /// Rate of an exponential window that was not taken out, 1/s.
     fn decay_per_s(&self, _values: &[f64]) -> f64 {
         0.0
+    }
+
+    /// The forces whose responses [`Self::shown`] asks for.
+    fn forces(&self) -> PushedAt {
+        PushedAt::AtHit
     }
 
     /// What the file holds at `omega` (rad/s), m/N.

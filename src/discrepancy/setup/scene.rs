@@ -4,14 +4,13 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::group::FrfGroup;
-use super::mistake::Distortion;
+use super::mistake::{Distortion, PushedAt};
 use super::truth::Truth;
 use crate::Result;
 use crate::data::Axis;
 use crate::identify::StructureModel;
 use crate::identify::frfs::frf_data::{FrfBlock, FrfData};
 use crate::robot::FrfBasis;
-use crate::robot::frf::Response;
 
 /// A mistake of a given size in some of the files.
 #[derive(Clone, Copy)]
@@ -34,15 +33,29 @@ pub fn predict(model: &StructureModel, theta: &[f64], data: &FrfData, made: Opti
             let (with, without): (Vec<usize>, Vec<usize>) =
                 (0..block.frfs.len()).partition(|k| concerned(*k));
             let mut curves = vec![Vec::new(); block.frfs.len()];
-            pass(model, theta, block, None, &without, |k, _, truth| {
-                let frf = &block.frfs[k];
-                curves[k].push(truth.recorded(frf, truth.between(frf.response.axis, frf.reference.axis)));
-            })?;
-            if let Some(m) = made {
-                pass(model, theta, block, made, &with, |k, omega, truth| {
+            pass(
+                model,
+                theta,
+                block,
+                None,
+                (&without, PushedAt::AlongHit),
+                |k, _, truth| {
                     let frf = &block.frfs[k];
-                    curves[k].push(truth.recorded(frf, m.mistake.shown(m.values, omega, truth, frf)));
-                })?;
+                    curves[k].push(truth.recorded(frf, truth.between(frf.response.axis, frf.reference.axis)));
+                },
+            )?;
+            if let Some(m) = made {
+                pass(
+                    model,
+                    theta,
+                    block,
+                    made,
+                    (&with, m.mistake.forces()),
+                    |k, omega, truth| {
+                        let frf = &block.frfs[k];
+                        curves[k].push(truth.recorded(frf, m.mistake.shown(m.values, omega, truth, frf)));
+                    },
+                )?;
             }
             Ok(curves)
         })
@@ -60,14 +73,21 @@ pub fn predict_all_axes(model: &StructureModel, theta: &[f64], data: &FrfData) -
             let mut curves: [[Curves; 3]; 3] =
                 std::array::from_fn(|_| std::array::from_fn(|_| vec![Vec::new(); block.frfs.len()]));
             let members: Vec<usize> = (0..block.frfs.len()).collect();
-            pass(model, theta, block, None, &members, |k, _, truth| {
-                for a in Axis::ALL {
-                    for b in Axis::ALL {
-                        let value = truth.recorded(&block.frfs[k], truth.between(a, b));
-                        curves[a.index()][b.index()][k].push(value);
+            pass(
+                model,
+                theta,
+                block,
+                None,
+                (&members, PushedAt::AtHit),
+                |k, _, truth| {
+                    for a in Axis::ALL {
+                        for b in Axis::ALL {
+                            let value = truth.recorded(&block.frfs[k], truth.between(a, b));
+                            curves[a.index()][b.index()][k].push(value);
+                        }
                     }
-                }
-            })?;
+                },
+            )?;
             Ok(curves)
         })
         .collect::<Result<_>>()?;
@@ -82,13 +102,14 @@ pub fn predict_all_axes(model: &StructureModel, theta: &[f64], data: &FrfData) -
     Ok(all)
 }
 
-/// Sets the model up once for `members` of a block, all with `made` or all without, and shows each line of each.
+/// Sets the model up once for `members` of a block, all with `made` or all without, and shows each line of each, solved for
+/// `forces`.
 fn pass(
     model: &StructureModel,
     theta: &[f64],
     block: &FrfBlock,
     made: Option<Made>,
-    members: &[usize],
+    (members, forces): (&[usize], PushedAt),
     mut show: impl FnMut(usize, f64, &Truth),
 ) -> Result<()> {
     if members.is_empty() {
@@ -128,27 +149,36 @@ fn pass(
             ]
         })
         .collect();
+    let hits = members.iter().zip(&firsts).map(|(&k, first)| (k, first));
+    let mut pushed: Vec<usize> = hits
+        .flat_map(|(k, [response, reference])| {
+            let axis = block.frfs[k].reference.axis.index();
+            match forces {
+                PushedAt::AlongHit => vec![reference + axis],
+                PushedAt::AtHit => (*reference..reference + 3).collect(),
+                PushedAt::AtBothPoints => (*reference..reference + 3)
+                    .chain(*response..response + 3)
+                    .collect(),
+            }
+        })
+        .collect();
+    pushed.sort_unstable();
+    pushed.dedup();
     let decay = made.map_or(0.0, |m| m.mistake.decay_per_s(m.values));
-    let mut response = Response::default();
-    for f in &block.frequency_hz {
-        let omega = std::f64::consts::TAU * f;
-        if decay == 0.0 {
-            basis.solve(omega, &mut response)?;
-        } else {
-            basis.solve_decaying(omega, decay, &mut response)?;
-        }
+    let rates: Vec<Complex64> = block.rates().into_iter().map(|s| s + decay).collect();
+    basis.solve_lines(&rates, &pushed, |line, response| {
         for (&k, first) in members.iter().zip(&firsts) {
             let truth = Truth {
                 basis: &basis,
-                response: &response,
+                response,
                 filter: &filter,
                 first: *first,
-                rate: Complex64::new(decay, omega),
+                rate: rates[line],
             };
-            show(k, omega, &truth);
+            show(k, rates[line].im, &truth);
         }
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 /// (predicted − measured) √2/σ as real numbers, FRF by FRF: each has unit variance where only noise is left.

@@ -36,7 +36,10 @@ impl Channels {
 
     /// e^{−iωτ} with the sign of the FRF's axes.
     fn factor(&self, omega: f64, frf: &FrfDatum) -> Complex64 {
-        Complex64::from_polar(frf.sign, -omega * self.delay_s.value)
+        match self.delay_s.value == 0.0 {
+            true => frf.sign.into(),
+            false => Complex64::from_polar(frf.sign, -omega * self.delay_s.value),
+        }
     }
 
     /// What the file shows at `omega`, m/N.

@@ -1,5 +1,6 @@
 //! Measured FRFs arranged for fitting: grouped by what the model has to be set up for once.
 
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use num_complex::Complex64;
@@ -56,6 +57,16 @@ pub struct FrfBlock {
 }
 
 impl FrfBlock {
+    /// iω of each line, rad/s.
+    pub fn rates(&self) -> Vec<Complex64> {
+        (0..self.frequency_hz.len()).map(|line| self.rate(line)).collect()
+    }
+
+    /// iω of a line, rad/s.
+    pub fn rate(&self, line: usize) -> Complex64 {
+        Complex64::new(0.0, TAU * self.frequency_hz[line])
+    }
+
     /// The outputs that are hit, as indices into them, ascending.
     pub fn inputs(&self) -> Vec<usize> {
         let mut inputs: Vec<usize> = self.frfs.iter().map(|f| f.input).collect();

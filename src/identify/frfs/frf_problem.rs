@@ -1,5 +1,6 @@
 //! The misfit of a structural model to measured FRFs, and what it leaves of them.
 
+use std::f64::consts::TAU;
 use std::ops::Range;
 
 use faer::linalg::matmul::matmul;
@@ -14,7 +15,7 @@ use crate::identify::frfs::structure::StructureModel;
 use crate::identify::levenberg_marquardt::{LeastSquares, Linearisation};
 use crate::identify::rest::RestCurve;
 use crate::robot::FrfBasis;
-use crate::robot::frf::{Response, Slopes};
+use crate::robot::frf::Slopes;
 use crate::{Result, stop};
 
 /// What is compared.
@@ -175,9 +176,13 @@ impl FrfProblem<'_> {
     ) -> Result<Partial> {
         stop::point();
         let mut partial = Partial::zero(count);
-        let mut response = Response::default();
         let mut slopes = Slopes::of_inputs(block.inputs());
         let mut slope = vec![Complex64::ZERO; count];
+        // Slopes need the response to a force along every output.
+        let pushed: Vec<usize> = match count {
+            0 => slopes.inputs.clone(),
+            _ => (0..basis.output_count()).collect(),
+        };
         // Residuals of one line and their derivatives, column by column: real parts, then imaginary parts.
         let rows = match self.misfit {
             Misfit::Complex => 2 * block.frfs.len(),
@@ -185,23 +190,25 @@ impl FrfProblem<'_> {
         };
         let mut residual = vec![0.0; rows];
         let mut jacobian = vec![0.0; rows * count];
-        let lines = lines.map(|k| k * self.stride);
-        for line in lines.take_while(|l| *l < block.frequency_hz.len()) {
-            let omega = std::f64::consts::TAU * block.frequency_hz[line];
+        let lines: Vec<usize> = lines
+            .map(|k| k * self.stride)
+            .take_while(|l| *l < block.frequency_hz.len())
+            .collect();
+        let rates: Vec<Complex64> = lines.iter().map(|l| block.rate(*l)).collect();
+        basis.solve_lines(&rates, &pushed, |k, response| {
+            let line = lines[k];
+            let omega = rates[k].im;
             if count > 0 {
-                basis.solve(omega, &mut response)?;
-                basis.slopes(&response, &mut slopes);
-            } else {
-                basis.solve_along(omega, slopes.inputs.iter().copied(), &mut response)?;
+                basis.slopes(response, &mut slopes);
             }
             for (k, frf) in block.frfs.iter().enumerate() {
-                let model = channels.measured(omega, frf, basis, &response);
+                let model = channels.measured(omega, frf, basis, response);
                 let measured = frf.receptance[line];
                 let std = frf.noise_std[line];
                 if count > 0 {
                     let i = slopes.inputs.iter().position(|x| *x == frf.input).unwrap_or(0);
                     let true_slope = |p: usize, out: usize| slopes.at(p, i, out);
-                    channels.slopes(omega, frf, model, (basis, &response), true_slope, &mut slope);
+                    channels.slopes(omega, frf, model, (basis, response), true_slope, &mut slope);
                 }
                 match self.misfit {
                     Misfit::Complex => {
@@ -234,7 +241,8 @@ impl FrfProblem<'_> {
                 }
             }
             partial.push(&residual, &jacobian);
-        }
+            Ok(())
+        })?;
         Ok(partial)
     }
 }
@@ -278,27 +286,28 @@ impl StructureModel {
                 let mut curves: Vec<RestCurve> = block.frfs.iter().map(empty).collect();
                 let basis = self.basis(theta, block, true)?;
                 let mut slopes = Slopes::of_inputs(block.inputs());
-                let mut response = Response::default();
                 let mut slope = vec![Complex64::ZERO; theta.len()];
-                for (line, f) in block.frequency_hz.iter().enumerate() {
-                    let omega = std::f64::consts::TAU * f;
-                    basis.solve(omega, &mut response)?;
-                    basis.slopes(&response, &mut slopes);
+                let pushed: Vec<usize> = (0..basis.output_count()).collect();
+                basis.solve_lines(&block.rates(), &pushed, |line, response| {
+                    let f = block.frequency_hz[line];
+                    let omega = TAU * f;
+                    basis.slopes(response, &mut slopes);
                     for (frf, curve) in block.frfs.iter().zip(&mut curves) {
-                        let model = channels.measured(omega, frf, &basis, &response);
+                        let model = channels.measured(omega, frf, &basis, response);
                         let i = slopes.inputs.iter().position(|x| *x == frf.input).unwrap_or(0);
                         let true_slope = |p: usize, out: usize| slopes.at(p, i, out);
-                        channels.slopes(omega, frf, model, (&basis, &response), true_slope, &mut slope);
+                        channels.slopes(omega, frf, model, (&basis, response), true_slope, &mut slope);
                         let weight = 1.0 / frf.noise_std[line];
                         curve.rest.push((model - frf.receptance[line]) * weight);
                         for (column, s) in curve.slopes.iter_mut().zip(&slope) {
                             column.push(s * weight);
                         }
-                        for (column, factor) in curve.own.iter_mut().zip([1.0, *f]) {
+                        for (column, factor) in curve.own.iter_mut().zip([1.0, f]) {
                             column.push(model * (weight * factor));
                         }
                     }
-                }
+                    Ok(())
+                })?;
                 Ok(curves)
             })
             .collect::<Result<_>>()?;

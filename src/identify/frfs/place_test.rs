@@ -19,7 +19,6 @@ use crate::Result;
 use crate::effects::Spot;
 use crate::identify::rest::{LIKE_A_PLACE, RestCurve, RestTest};
 use crate::identify::rest_patterns::{colour, turn};
-use crate::robot::frf::Response;
 
 /// Bands of lines with a g of their own, and lines that each must have at every posture.
 const BANDS: usize = 16;
@@ -178,21 +177,21 @@ fn of_block(
         on_rest: [Complex64::ZERO; TURNS],
     };
     let mut all = vec![empty; spots.len() * bands];
-    let mut response = Response::default();
     let mut reach = Vec::new();
     // The slopes of one line together.
     let mut slopes = vec![Complex64::ZERO; block.frfs.len() * count];
-    for (line, f) in block.frequency_hz.iter().enumerate() {
-        let omega = std::f64::consts::TAU * f;
-        let band = edges.partition_point(|edge| edge <= f);
-        places.basis.solve(omega, &mut response)?;
+    let rates = block.rates();
+    let pushed: Vec<usize> = (0..places.basis.output_count()).collect();
+    places.basis.solve_lines(&rates, &pushed, |line, response| {
+        let omega = rates[line].im;
+        let band = edges.partition_point(|edge| *edge <= block.frequency_hz[line]);
         for (own, curve) in slopes.chunks_exact_mut(count).zip(curves) {
             own.iter_mut()
                 .zip(&curve.slopes)
                 .for_each(|(s, column)| *s = column[line]);
         }
         for s in 0..spots.len() {
-            places.reach(omega, &response, s, &mut reach);
+            places.reach(omega, response, s, &mut reach);
             let sums = &mut all[s * bands + band];
             let mut on_rest = Complex64::ZERO;
             let frfs = block.frfs.iter().zip(curves).zip(slopes.chunks_exact(count));
@@ -208,7 +207,8 @@ fn of_block(
                 *sum += on_rest * turn(turned, line);
             }
         }
-    }
+        Ok(())
+    })?;
     Ok(all)
 }
 

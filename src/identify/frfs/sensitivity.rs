@@ -8,7 +8,7 @@ use crate::Result;
 use crate::identify::frfs::channels::Channels;
 use crate::identify::frfs::frf_data::{FrfBlock, FrfData};
 use crate::identify::frfs::structure::StructureModel;
-use crate::robot::frf::{Response, Slopes};
+use crate::robot::frf::Slopes;
 
 /// One FRF as a model predicts it, with its derivatives.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,7 +55,6 @@ impl StructureModel {
         let channels = Channels::new(&self.filter(theta, true));
         let lines = block.frequency_hz.len();
         let mut slopes = Slopes::of_inputs(block.inputs());
-        let mut response = Response::default();
         let mut slope = vec![Complex64::ZERO; theta.len()];
         let mut predicted: Vec<PredictedFrf> = block
             .frfs
@@ -65,19 +64,21 @@ impl StructureModel {
                 slopes: Vec::with_capacity(lines * theta.len()),
             })
             .collect();
-        for f in &block.frequency_hz {
-            let omega = std::f64::consts::TAU * f;
-            basis.solve(omega, &mut response)?;
-            basis.slopes(&response, &mut slopes);
+        let rates = block.rates();
+        let pushed: Vec<usize> = (0..basis.output_count()).collect();
+        basis.solve_lines(&rates, &pushed, |line, response| {
+            let omega = rates[line].im;
+            basis.slopes(response, &mut slopes);
             for (frf, predicted) in block.frfs.iter().zip(&mut predicted) {
-                let value = channels.measured(omega, frf, &basis, &response);
+                let value = channels.measured(omega, frf, &basis, response);
                 let input = slopes.inputs.iter().position(|x| *x == frf.input).unwrap_or(0);
                 let of_truth = |p: usize, out: usize| slopes.at(p, input, out);
-                channels.slopes(omega, frf, value, (&basis, &response), of_truth, &mut slope);
+                channels.slopes(omega, frf, value, (&basis, response), of_truth, &mut slope);
                 predicted.receptance.push(value);
                 predicted.slopes.extend_from_slice(&slope);
             }
-        }
+            Ok(())
+        })?;
         Ok(predicted)
     }
 }

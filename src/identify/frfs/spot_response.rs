@@ -124,21 +124,22 @@ impl SpotResponses {
         let channels = Channels::new(&model.filter(theta, true));
 
         let mut slopes = Slopes::of_inputs(block.inputs());
-        let (mut sloped, mut response) = (Response::default(), Response::default());
+        let mut response = Response::default();
+        let rates = block.rates();
+        let pushed: Vec<usize> = (0..with_slopes.output_count()).collect();
         let mut reach = Vec::new();
         let mut slope = vec![Complex64::ZERO; count];
         let frfs = block.frfs.len();
         let mut residual = vec![Complex64::ZERO; frfs];
         let mut jacobian = vec![Complex64::ZERO; frfs * count];
         let mut part = Self::empty(spots, count);
-        for (line, f) in block.frequency_hz.iter().enumerate() {
-            let omega = std::f64::consts::TAU * f;
-            with_slopes.solve(omega, &mut sloped)?;
-            with_slopes.slopes(&sloped, &mut slopes);
+        with_slopes.solve_lines(&rates, &pushed, |line, sloped| {
+            let omega = rates[line].im;
+            with_slopes.slopes(sloped, &mut slopes);
             places.basis.solve(omega, &mut response)?;
             for (k, frf) in block.frfs.iter().enumerate() {
                 let weight = 1.0 / frf.noise_std[line];
-                let modelled = channels.measured(omega, frf, &with_slopes, &sloped);
+                let modelled = channels.measured(omega, frf, &with_slopes, sloped);
                 residual[k] = (frf.receptance[line] - modelled) * weight;
                 let i = slopes.inputs.iter().position(|x| *x == frf.input).unwrap_or(0);
                 let true_slope = |p: usize, out: usize| slopes.at(p, i, out);
@@ -146,7 +147,7 @@ impl SpotResponses {
                     omega,
                     frf,
                     modelled,
-                    (&with_slopes, &sloped),
+                    (&with_slopes, sloped),
                     true_slope,
                     &mut slope,
                 );
@@ -165,7 +166,7 @@ impl SpotResponses {
                 }
             }
             part.values += frfs;
-            part.lines.push((*f, index));
+            part.lines.push((block.frequency_hz[line], index));
             for s in 0..spots.len() {
                 let own = places.reach(omega, &response, s, &mut reach);
                 let mut at = SpotLine {
@@ -187,7 +188,8 @@ impl SpotResponses {
                 }
                 part.at.push(at);
             }
-        }
+            Ok(())
+        })?;
         part.information.fill_upper_triangle_with_lower_triangle();
         Ok(part)
     }

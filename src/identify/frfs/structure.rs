@@ -12,7 +12,7 @@ use crate::identify::frfs::channels::Channels;
 use crate::identify::frfs::frf_data::{FrfBlock, FrfData};
 use crate::identify::model::{Model, Modelled};
 use crate::parameter::{Parameter, Prior, Scale};
-use crate::robot::frf::{Response, RowSlopes};
+use crate::robot::frf::RowSlopes;
 use crate::robot::model::NOMINAL_DAMPING_RATIO;
 use crate::robot::{Baseline, Chain, Dual, FileNumber, FrfBasis, Kinematics, RobotModel, System};
 use crate::{Result, stop};
@@ -399,15 +399,14 @@ impl StructureModel {
                 let basis = self.basis(theta, block, false)?;
                 let channels = Channels::new(&filter);
                 let inputs = block.inputs();
-                let mut response = Response::default();
                 let mut columns = vec![Vec::with_capacity(block.frequency_hz.len()); block.frfs.len()];
-                for f in &block.frequency_hz {
-                    let omega = std::f64::consts::TAU * f;
-                    basis.solve_along(omega, inputs.iter().copied(), &mut response)?;
+                let rates = block.rates();
+                basis.solve_lines(&rates, &inputs, |line, response| {
                     for (frf, column) in block.frfs.iter().zip(&mut columns) {
-                        column.push(channels.measured(omega, frf, &basis, &response));
+                        column.push(channels.measured(rates[line].im, frf, &basis, response));
                     }
-                }
+                    Ok(())
+                })?;
                 Ok(columns)
             })
             .collect::<Result<_>>()?;

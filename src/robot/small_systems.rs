@@ -1,0 +1,250 @@
+//! Small complex systems, solved so often that a library's blocking and memory would take longer than the arithmetic; those of
+//! a frequency alone, or of four frequencies side by side.
+
+use num_complex::Complex64;
+use pulp::{Arch, Simd, WithSimd};
+
+/// Solves A X = B by elimination with partial pivoting; A (n × n) is destroyed, B becomes X, both column by column. A
+/// singular A leaves values that are not finite.
+pub(super) fn solve_in_place(n: usize, a: &mut [Complex64], b: &mut [Complex64]) {
+    // Six joints with a few branches or dampers: with the size known beforehand the compiler unrolls the loops.
+    match n {
+        6 => eliminate(6, a, b),
+        7 => eliminate(7, a, b),
+        8 => eliminate(8, a, b),
+        9 => eliminate(9, a, b),
+        12 => eliminate(12, a, b),
+        _ => eliminate(n, a, b),
+    }
+}
+
+#[inline(always)]
+fn eliminate(n: usize, a: &mut [Complex64], b: &mut [Complex64]) {
+    for k in 0..n {
+        let size = |i: usize| a[i + n * k].l1_norm();
+        let pivot = (k + 1..n).fold(k, |best, i| if size(i) > size(best) { i } else { best });
+        if pivot != k {
+            (k..n).for_each(|j| a.swap(k + n * j, pivot + n * j));
+            b.chunks_exact_mut(n).for_each(|column| column.swap(k, pivot));
+        }
+        let inverse = a[k + n * k].inv();
+        let (left, right) = a.split_at_mut(n * (k + 1));
+        let factors = &mut left[n * k + k + 1..];
+        factors.iter_mut().for_each(|f| *f *= inverse);
+        for column in right.chunks_exact_mut(n).chain(b.chunks_exact_mut(n)) {
+            let top = column[k];
+            for (x, f) in column[k + 1..].iter_mut().zip(factors.iter()) {
+                *x -= f * top;
+            }
+        }
+        left[n * k + k] = inverse;
+    }
+    for column in b.chunks_exact_mut(n) {
+        for k in (0..n).rev() {
+            let value = column[k] * a[k + n * k];
+            column[k] = value;
+            for (x, f) in column[..k].iter_mut().zip(&a[n * k..]) {
+                *x -= f * value;
+            }
+        }
+    }
+}
+
+/// Systems solved side by side: as many numbers as a vector of AVX2 holds.
+pub(super) const LANES: usize = 4;
+
+/// A complex number of each of the systems.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Lanes {
+    pub(super) re: [f64; LANES],
+    pub(super) im: [f64; LANES],
+}
+
+impl Lanes {
+    /// The same in all.
+    pub(super) fn splat(value: f64) -> Self {
+        Lanes {
+            re: [value; LANES],
+            im: [0.0; LANES],
+        }
+    }
+
+    /// That of the system `lane`.
+    pub(super) fn get(&self, lane: usize) -> Complex64 {
+        Complex64::new(self.re[lane], self.im[lane])
+    }
+
+    #[inline(always)]
+    fn times(&self, other: &Lanes) -> Lanes {
+        let (a, b) = (self, other);
+        Lanes {
+            re: std::array::from_fn(|l| a.re[l] * b.re[l] - a.im[l] * b.im[l]),
+            im: std::array::from_fn(|l| a.re[l] * b.im[l] + a.im[l] * b.re[l]),
+        }
+    }
+
+    #[inline(always)]
+    fn subtract(&mut self, other: &Lanes) {
+        for l in 0..LANES {
+            self.re[l] -= other.re[l];
+            self.im[l] -= other.im[l];
+        }
+    }
+
+    #[inline(always)]
+    fn inverse(&self) -> Lanes {
+        let square: [f64; LANES] = std::array::from_fn(|l| self.re[l] * self.re[l] + self.im[l] * self.im[l]);
+        Lanes {
+            re: std::array::from_fn(|l| self.re[l] / square[l]),
+            im: std::array::from_fn(|l| -self.im[l] / square[l]),
+        }
+    }
+
+    #[inline(always)]
+    fn size(&self) -> [f64; LANES] {
+        std::array::from_fn(|l| self.re[l].abs() + self.im[l].abs())
+    }
+}
+
+/// As [`solve_in_place`], of [`LANES`] systems with pivots in common. False where no row would do as pivot in all of them; what is
+/// in `a` and `b` then is of no use.
+pub(super) fn solve_side_by_side(n: usize, a: &mut [Lanes], b: &mut [Lanes]) -> bool {
+    Arch::new().dispatch(SideBySide { n, a, b })
+}
+
+/// A pivot is at least this part of the largest number in its column: what rounding adds stays small.
+const LEAST_PIVOT: f64 = 0.25;
+
+/// (A type of its own: a closure is compiled for the plainest processor where it is not inlined.)
+struct SideBySide<'a> {
+    n: usize,
+    a: &'a mut [Lanes],
+    b: &'a mut [Lanes],
+}
+
+impl WithSimd for SideBySide<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> bool {
+        let SideBySide { n, a, b } = self;
+        for k in 0..n {
+            let mut largest = [0.0f64; LANES];
+            for entry in &a[n * k + k..n * (k + 1)] {
+                let size = entry.size();
+                for l in 0..LANES {
+                    largest[l] = largest[l].max(size[l]);
+                }
+            }
+            // Also false of what is not a number.
+            let will_do = |entry: &Lanes| {
+                let size = entry.size();
+                (0..LANES).all(|l| size[l] >= LEAST_PIVOT * largest[l] && size[l] > 0.0)
+            };
+            let Some(pivot) = (k..n).find(|i| will_do(&a[i + n * k])) else {
+                return false;
+            };
+            if pivot != k {
+                (k..n).for_each(|j| a.swap(k + n * j, pivot + n * j));
+                b.chunks_exact_mut(n).for_each(|column| column.swap(k, pivot));
+            }
+            let inverse = a[k + n * k].inverse();
+            let (left, right) = a.split_at_mut(n * (k + 1));
+            let factors = &mut left[n * k + k + 1..];
+            factors.iter_mut().for_each(|f| *f = f.times(&inverse));
+            for column in right.chunks_exact_mut(n).chain(b.chunks_exact_mut(n)) {
+                let top = column[k];
+                for (x, f) in column[k + 1..].iter_mut().zip(factors.iter()) {
+                    x.subtract(&f.times(&top));
+                }
+            }
+            left[n * k + k] = inverse;
+        }
+        for column in b.chunks_exact_mut(n) {
+            for k in (0..n).rev() {
+                let value = column[k].times(&a[k + n * k]);
+                column[k] = value;
+                for (x, f) in column[..k].iter_mut().zip(&a[n * k..]) {
+                    x.subtract(&f.times(&value));
+                }
+            }
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of system `lane`. The first pivot of the first one is zero: rows must be exchanged.
+    fn entry(lane: usize, i: usize, j: usize) -> Complex64 {
+        if (i, j) == (0, 0) {
+            Complex64::ZERO
+        } else {
+            Complex64::new(
+                1.0 / (1.0 + (i * i + 2 * j) as f64),
+                (i as f64 - 0.3 * j as f64 + 0.01 * lane as f64).sin(),
+            )
+        }
+    }
+
+    fn x(j: usize, c: usize) -> Complex64 {
+        Complex64::new(j as f64 - 1.5, c as f64 + 0.5)
+    }
+
+    fn system(lane: usize, n: usize, m: usize) -> (Vec<Complex64>, Vec<Complex64>) {
+        let a = (0..n * n).map(|k| entry(lane, k % n, k / n)).collect();
+        let row = |i: usize, c: usize| (0..n).map(|j| entry(lane, i, j) * x(j, c)).sum();
+        (a, (0..n * m).map(|k| row(k % n, k / n)).collect())
+    }
+
+    #[test]
+    fn small_systems_are_solved() {
+        let (n, m) = (5, 2);
+        let (mut a, mut b) = system(0, n, m);
+        solve_in_place(n, &mut a, &mut b);
+        for (k, value) in b.iter().enumerate() {
+            assert!((value - x(k % n, k / n)).norm() < 1e-11, "{value}");
+        }
+        let mut singular = vec![Complex64::ZERO; 4];
+        let mut right = vec![Complex64::new(1.0, 0.0); 2];
+        solve_in_place(2, &mut singular, &mut right);
+        assert!(right.iter().any(|v| !v.is_finite()));
+    }
+
+    fn beside(systems: [&[Complex64]; LANES]) -> Vec<Lanes> {
+        let of = |k: usize| Lanes {
+            re: std::array::from_fn(|l| systems[l][k].re),
+            im: std::array::from_fn(|l| systems[l][k].im),
+        };
+        (0..systems[0].len()).map(of).collect()
+    }
+
+    #[test]
+    fn systems_side_by_side_are_solved() {
+        let (n, m) = (5, 2);
+        let systems: [_; LANES] = std::array::from_fn(|lane| system(lane, n, m));
+        let mut a = beside(systems.each_ref().map(|s| s.0.as_slice()));
+        let mut b = beside(systems.each_ref().map(|s| s.1.as_slice()));
+        assert!(solve_side_by_side(n, &mut a, &mut b));
+        for (k, value) in b.iter().enumerate() {
+            for lane in 0..LANES {
+                assert!((value.get(lane) - x(k % n, k / n)).norm() < 1e-11, "{value:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_has_no_pivot_in_common_is_said() {
+        // Two systems whose rows stand the other way round.
+        let (one, zero) = (Complex64::ONE, Complex64::ZERO);
+        let (straight, crossed) = ([one, zero, zero, one], [zero, one, one, zero]);
+        let mut a = beside([&straight, &crossed, &straight, &crossed]);
+        let mut b = beside([&[one, one]; LANES]);
+        assert!(!solve_side_by_side(2, &mut a, &mut b));
+        let not_a_number = [Complex64::new(f64::NAN, 0.0); 4];
+        let mut a = beside([&straight, &straight, &straight, &not_a_number]);
+        assert!(!solve_side_by_side(2, &mut a, &mut b));
+    }
+}

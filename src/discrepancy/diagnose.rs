@@ -58,9 +58,12 @@ const PLAIN_SIGMAS: f64 = 5.0;
 /// How many effects are tried besides others.
 #[derive(Clone, Copy)]
 struct Search {
+    /// Effects, each with all its discrete choices.
     looked_at: usize,
     /// Followed to their end on the coarse view, …
     settled: usize,
+    /// … besides those that would gain most were the response linear in their sizes, …
+    linear: usize,
     /// … and of those on all data.
     refined: usize,
 }
@@ -68,11 +71,13 @@ struct Search {
 const PAIRS: Search = Search {
     looked_at: usize::MAX,
     settled: 4,
+    linear: 2,
     refined: 2,
 };
 const THREES: Search = Search {
-    looked_at: 12,
+    looked_at: 16,
     settled: 2,
+    linear: 2,
     refined: 1,
 };
 
@@ -131,6 +136,15 @@ struct Together<S: Study> {
     cost: f64,
     /// No size at the end of its range, none that cannot be. What is missing still may drive sizes there.
     possible: bool,
+}
+
+/// A further effect at the size that it would have were the response linear in it.
+struct Linear<S: Study> {
+    instance: InstanceOf<S>,
+    model: ModelOf<S>,
+    theta: Vec<f64>,
+    /// By how much χ² would fall on the coarse view.
+    gain: f64,
 }
 
 struct Engine<'a, S: Study> {
@@ -313,12 +327,21 @@ impl<'a, S: Study> Engine<'a, S> {
         let winner = credible.iter().position(|c| *c);
         self.excuse(&mut baseline, winner.map(|w| &mut candidates[w]))?;
         let mut pairs = None;
-        let set = match winner {
+        // What explains more than the winner, were its size possible, may be possible beside another.
+        let leading: Vec<bool> = candidates
+            .iter()
+            .enumerate()
+            .map(|(i, c)| match winner {
+                Some(w) if i >= w => credible[i],
+                _ => verdict::driven_too_far(c, &baseline, evidence.scale),
+            })
+            .collect();
+        let set = match leading.iter().position(|leads| *leads) {
             Some(w)
                 if verdict::leaves_room(&candidates[w], &baseline)
                     && candidates[w].share_above_noise(&baseline) > PAIR_SHARE =>
             {
-                let (best, counts) = self.best_set(&candidates, &credible, &evidence)?;
+                let (best, counts) = self.best_set(&candidates, &leading, &evidence)?;
                 pairs = Some(counts);
                 best
             }
@@ -605,11 +628,12 @@ impl<'a, S: Study> Engine<'a, S> {
         })
     }
 
-    /// The effects that explain most together: the best pair, and where every pair leaves more than noise of what is plain, the best three.
+    /// The effects that explain most together: the best pair with one that leads, and where every pair leaves more than noise of what
+    /// is plain, the best three.
     fn best_set(
         &self,
         candidates: &[CandidateOf<S>],
-        credible: &[bool],
+        leading: &[bool],
         evidence: &Evidence,
     ) -> Result<(Option<EffectSet>, [usize; 2])> {
         let mut counts = [0, 0];
@@ -617,8 +641,8 @@ impl<'a, S: Study> Engine<'a, S> {
         let answers = |best: &Option<EffectSet>| best.as_ref().is_some_and(|b| b.odds_against() < 1.0);
         let leaders = candidates
             .iter()
-            .zip(credible)
-            .filter(|(_, credible)| **credible)
+            .zip(leading)
+            .filter(|(_, leads)| **leads)
             .map(|(c, _)| c)
             .take(PAIR_LEADERS);
         let leaders: Vec<Together<S>> = leaders
@@ -634,9 +658,10 @@ impl<'a, S: Study> Engine<'a, S> {
         let mut pairs: Vec<(Together<S>, Vec<String>)> = Vec::new();
         for leader in &leaders {
             // Those that explain most alone come first, should the budget not reach to the end.
-            let (found, promising) = self.with_another(leader, &labels, PAIRS, &mut counts)?;
+            let linear = self.by_linear_gain(leader);
+            let (found, promising) = self.with_another(leader, &labels, linear, PAIRS, &mut counts)?;
             for pair in found {
-                self.keep_better(&mut best, &pair, (candidates, credible), evidence)?;
+                self.keep_better(&mut best, &pair, (candidates, leading), evidence)?;
                 pairs.push((pair, promising.clone()));
             }
             // Effects that leave only noise are the answer; other leaders cannot do better.
@@ -660,10 +685,11 @@ impl<'a, S: Study> Engine<'a, S> {
         });
         let mut threes = Vec::new();
         for (pair, promising) in pairs.iter().take(if plain { THREE_LEADERS } else { 0 }) {
-            let order = self.by_linear_gain(pair, promising);
-            let (found, _) = self.with_another(pair, &order, THREES, &mut [0, 0])?;
+            let linear = self.by_linear_gain(pair);
+            let order = self.by_turns(&linear, promising);
+            let (found, _) = self.with_another(pair, &order, linear, THREES, &mut [0, 0])?;
             for three in found {
-                self.keep_better(&mut best, &three, (candidates, credible), evidence)?;
+                self.keep_better(&mut best, &three, (candidates, leading), evidence)?;
                 threes.push(three);
             }
             if answers(&best) {
@@ -683,33 +709,43 @@ impl<'a, S: Study> Engine<'a, S> {
             let fresh = self.study.calibrate(&model)?;
             let fit = self.minimise(&model, View::FULL, &fresh.theta, REFINE)?;
             let fresh = self.together(three.parts.clone(), model, fit)?;
-            self.keep_better(&mut best, &fresh, (candidates, credible), evidence)?;
+            self.keep_better(&mut best, &fresh, (candidates, leading), evidence)?;
         }
         Ok((best, counts))
     }
 
-    /// Labels of further effects: by turns the one that would gain most beside `leader`, were the response linear in its size, and
-    /// the next of `promising`.
-    fn by_linear_gain(&self, leader: &Together<S>, promising: &[String]) -> Vec<String> {
+    /// Effects besides those of `leader` at the sizes that they would have were the response linear in them, most gain first.
+    fn by_linear_gain(&self, leader: &Together<S>) -> Vec<Linear<S>> {
+        let study = self.study;
         let taken = self.labels(&leader.parts);
-        let mut gains: Vec<(f64, String)> = self
+        // More than there is is not to be had.
+        let cost = study.problem(&leader.model, View::COARSE).cost(&leader.theta);
+        let most = 2.0 * cost.unwrap_or(f64::INFINITY);
+        let mut gains: Vec<Linear<S>> = self
             .instances
             .par_iter()
             .filter(|instance| !taken.contains(&self.label(instance)))
             .filter_map(|instance| {
-                let model = self.study.extend(&leader.model, instance);
-                let problem = self.study.problem(&model, View::COARSE);
-                let size = linear_size(&problem, &model, &leader.theta)?;
-                Some((size.gain, self.label(instance)))
+                let model = study.extend(&leader.model, instance);
+                let size = linear_size(&study.problem(&model, View::COARSE), &model, &leader.theta)?;
+                (size.gain < most).then_some(Linear {
+                    instance: *instance,
+                    model,
+                    theta: size.theta,
+                    gain: size.gain,
+                })
             })
             .collect();
-        gains.sort_by(|a, b| b.0.total_cmp(&a.0));
+        gains.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        gains
+    }
+
+    /// Labels of further effects: by turns the next of `linear` and of `promising`.
+    fn by_turns(&self, linear: &[Linear<S>], promising: &[String]) -> Vec<String> {
+        let gains: Vec<String> = linear.iter().map(|l| self.label(&l.instance)).collect();
         let mut order: Vec<String> = Vec::new();
         for k in 0..gains.len().max(promising.len()) {
-            for label in [gains.get(k).map(|(_, label)| label), promising.get(k)]
-                .into_iter()
-                .flatten()
-            {
+            for label in gains.get(k).into_iter().chain(promising.get(k)) {
                 if !order.contains(label) {
                     order.push(label.clone());
                 }
@@ -718,13 +754,14 @@ impl<'a, S: Study> Engine<'a, S> {
         order
     }
 
-    /// `leader` with each other effect, in the order of `labels`: the best of them fitted to all data,
+    /// `leader` with each other effect, in the order of `labels`: the best of them and of `linear` fitted to all data,
     /// best first, and the labels of all by what they promise. `counts`: how many were tried, of how many.
     #[allow(clippy::type_complexity)]
     fn with_another(
         &self,
         leader: &Together<S>,
         labels: &[String],
+        linear: Vec<Linear<S>>,
         effort: Search,
         counts: &mut [usize; 2],
     ) -> Result<(Vec<Together<S>>, Vec<String>)> {
@@ -744,7 +781,8 @@ impl<'a, S: Study> Engine<'a, S> {
         others.sort_by_key(|i| standing(i));
         let affordable = self.looks_affordable(&leader.model);
         counts[1] += others.len();
-        others.truncate(affordable.max(FEWEST_PAIRS).min(effort.looked_at));
+        others.truncate(affordable.max(FEWEST_PAIRS));
+        others.retain(|i| standing(i) < effort.looked_at);
         counts[0] += others.len();
         let progress = Progress::new("trying several effects together", others.len());
         let mut tried: Vec<TriedOf<S>> = others
@@ -758,6 +796,23 @@ impl<'a, S: Study> Engine<'a, S> {
         tried.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
         let promising = tried.iter().map(|t| self.label(&t.instance)).collect();
         tried.truncate(effort.settled);
+        // A look may be too short for what is faint beside the leader.
+        let missed = linear.into_iter();
+        let missed = missed.filter(|linear| tried.iter().all(|t| t.instance != linear.instance));
+        let missed: Vec<TriedOf<S>> = missed
+            .take(effort.linear)
+            .filter_map(|linear| {
+                let fit = self
+                    .minimise(&linear.model, View::COARSE, &linear.theta, REFIT_BRIEFLY)
+                    .ok()?;
+                Some(Tried {
+                    instance: linear.instance,
+                    model: linear.model,
+                    fit,
+                })
+            })
+            .collect();
+        tried.extend(missed);
         let follow = |tried: Vec<TriedOf<S>>, view: View| -> Result<Vec<TriedOf<S>>> {
             let mut settled: Vec<TriedOf<S>> = tried
                 .into_par_iter()
@@ -786,7 +841,7 @@ impl<'a, S: Study> Engine<'a, S> {
         &self,
         best: &mut Option<EffectSet>,
         together: &Together<S>,
-        (candidates, credible): (&[CandidateOf<S>], &[bool]),
+        (candidates, leading): (&[CandidateOf<S>], &[bool]),
         evidence: &Evidence,
     ) -> Result<()> {
         let reduced_chi2 = 2.0 * together.cost / self.freedom(&together.model, Extent::Full);
@@ -797,7 +852,7 @@ impl<'a, S: Study> Engine<'a, S> {
         // The strongest of them alone is named first.
         let place = |label: &String| candidates.iter().position(|c| c.label() == *label);
         let standing = labels.iter().map(place);
-        let strongest = standing.flatten().filter(|i| credible[*i]).min();
+        let strongest = standing.flatten().filter(|i| leading[*i]).min();
         let Some(strongest) = strongest else { return Ok(()) };
         labels.retain(|label| *label != candidates[strongest].label());
         let mut rest = self.study.rest(&together.model, &together.theta)?;

@@ -52,11 +52,21 @@ pub fn significant<D: Modelled>(c: &EffectCandidate<D>) -> bool {
 /// Whether a candidate is significant, of a possible size, and improves the prediction of folds left out. `chance`: what
 /// differences of χ² are divided by before they are held against noise.
 pub fn credible<D: Modelled>(c: &EffectCandidate<D>, baseline: &BaselineFit, chance: f64) -> bool {
-    let improves = match (&c.held_out, &baseline.held_out) {
+    improves_prediction(c, baseline, chance) && c.not_credible.is_none() && significant(c)
+}
+
+/// Whether a candidate explains what no chance does, but has gone to a size at the end of its range, or to one that cannot be: what
+/// is missing besides it may have driven it there.
+pub fn driven_too_far<D: Modelled>(c: &EffectCandidate<D>, baseline: &BaselineFit, chance: f64) -> bool {
+    let too_far = c.at_bound || c.not_credible.is_some();
+    too_far && c.refined && is_convincing(c.p_value, c.delta_bic) && improves_prediction(c, baseline, chance)
+}
+
+fn improves_prediction<D: Modelled>(c: &EffectCandidate<D>, baseline: &BaselineFit, chance: f64) -> bool {
+    match (&c.held_out, &baseline.held_out) {
         (Some(with), Some(without)) => is_progress(without, with, c.parameters.len(), chance),
         _ => true,
-    };
-    improves && c.not_credible.is_none() && significant(c)
+    }
 }
 
 /// Chance that an effect which is not there would be called progress.
@@ -182,6 +192,11 @@ pub fn decide<D: Modelled>(
     let alone = |w: usize| odds_against(&candidates[w], baseline);
     let odds_of_set = set.as_ref().map_or(f64::INFINITY, EffectSet::odds_against);
     let set = set.filter(|_| odds_of_set < first.map_or(1.0, alone).min(1.0));
+    // Effects that are credible together only.
+    let first = match &set {
+        Some(set) if !credible[set.strongest] => Some(set.strongest),
+        _ => first,
+    };
     let excused = match (&set, first) {
         (Some(set), _) => weight_of_slips_alone(set.gain, Some(&set.rest), set.parameters, baseline),
         (None, Some(w)) => {

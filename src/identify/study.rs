@@ -4,7 +4,7 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::first_size::faintest;
+use super::first_size::{faintest, linear_size};
 use super::levenberg_marquardt::{Fit, LeastSquares, Stopping, minimise, one_step};
 use super::model::{Model, Modelled};
 use super::rest::{BeyondSlips, Rest};
@@ -275,7 +275,7 @@ const SETTLE: Stopping = Stopping {
 
 /// Fits the effect added last to `model` on the coarse view, without being trapped by where the fit without it stood.
 /// `bases`: points for the parameters in front of the effect's; `own`: points for its own; both on the solver's scale.
-pub fn screen<S: Study>(
+fn screen<S: Study>(
     study: &S,
     model: &ModelOf<S>,
     bases: &[Vec<f64>],
@@ -289,8 +289,13 @@ pub fn screen<S: Study>(
     settle(study, model, &fits)
 }
 
-/// The first steps of [`screen`]: where short fits from the most promising starting points lead, best first; at least one.
-fn look<S: Study>(
+/// The first steps of the fit of the effect added last to `model` (see [`Looked`]): where short fits from the most promising
+/// starting points lead, best first; at least one. `bases`: points for the parameters in front of the effect's; `own`: points for
+/// its own; both on the solver's scale.
+///
+/// # Errors
+/// No starting point at which the model can be set up.
+pub fn look<S: Study>(
     study: &S,
     model: &ModelOf<S>,
     bases: &[Vec<f64>],
@@ -328,9 +333,14 @@ fn look<S: Study>(
         Ok(fit) => fits.push(fit),
         Err(error) => failure = Some(error),
     };
+    // Few steps lead nowhere from near where a faint effect vanishes, and at its usual size the parameters in front have not made room
+    // for it yet.
+    let of_linear_size = bases.iter().filter(|_| effort == Effort::Look);
+    let of_linear_size = of_linear_size.filter_map(|base| Some(linear_size(&likelihood, model, base)?.theta));
     let mut starts: Vec<(f64, Vec<f64>)> = bases
         .iter()
         .flat_map(|base| own.iter().map(move |own| [base.as_slice(), own].concat()))
+        .chain(of_linear_size)
         .map(|start| (likelihood.cost(&start).unwrap_or(f64::INFINITY), start))
         .collect();
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -486,8 +496,39 @@ pub fn try_effect<S: Study>(
     })
 }
 
+/// An effect after the first steps of its fit on the coarse view.
+pub struct Looked<D: Modelled> {
+    /// The effect with its place and discrete choice.
+    pub instance: Instance<D>,
+    /// The model with it.
+    pub model: Model<D>,
+    /// Where short fits led, best first; at least one (see [`look`]).
+    pub fits: Vec<Fit>,
+}
+
 /// Times the lowest misfit from which on a candidate is out of the race: it is not followed to its end.
 const OUT_OF_RACE: f64 = 10.0;
+
+/// Follows each to its end on the coarse view; those out of the race after the first steps stay where these ended. In the order
+/// given; `None` where the fit failed.
+pub fn race<S: Study>(study: &S, looked: Vec<Looked<S::Domain>>) -> Vec<Option<Tried<S::Domain>>> {
+    let lowest = looked
+        .iter()
+        .map(|l| l.fits[0].cost)
+        .fold(f64::INFINITY, f64::min);
+    let followed = looked.into_par_iter().map(|mut looked| {
+        let fit = match looked.fits[0].cost <= OUT_OF_RACE * lowest {
+            true => settle(study, &looked.model, &looked.fits).ok()?,
+            false => looked.fits.swap_remove(0),
+        };
+        Some(Tried {
+            instance: looked.instance,
+            model: looked.model,
+            fit,
+        })
+    });
+    followed.collect()
+}
 
 /// Effects on promise that are followed, at most.
 const PROMISES: usize = 4;
@@ -542,8 +583,7 @@ pub fn try_effects<'i, S: Study>(
     done: impl Fn() + Sync,
 ) -> Vec<Tried<S::Domain>> {
     let before = model.parameters.len();
-    type Looked<'i, S> = Vec<(&'i InstanceOf<S>, ModelOf<S>, Vec<Fit>)>;
-    let look_at = |instances: Vec<&'i InstanceOf<S>>| -> Looked<'i, S> {
+    let look_at = |instances: Vec<&'i InstanceOf<S>>| -> Vec<Looked<S::Domain>> {
         instances
             .into_par_iter()
             .filter_map(|instance| {
@@ -551,40 +591,34 @@ pub fn try_effects<'i, S: Study>(
                 let own = own_starts(study, &extended, before, instance, hints);
                 let looks = look(study, &extended, bases, &own, Effort::Staged);
                 done();
-                Some((instance, extended, looks.ok()?))
+                Some(Looked {
+                    instance: *instance,
+                    model: extended,
+                    fits: looks.ok()?,
+                })
             })
             .collect()
     };
     let (on_promise, always): (Vec<_>, Vec<_>) = instances.iter().partition(|i| i.effect.on_promise());
     let mut looks = look_at(always);
-    let at_a_glance = |(_, model, looks): &(&InstanceOf<S>, ModelOf<S>, Vec<Fit>)| {
+    let at_a_glance = |looked: &Looked<S::Domain>| {
         let glance = View {
             extent: Extent::Glance,
             ..View::COARSE
         };
-        let cost = study.problem(model, glance).cost(&looks[0].theta);
+        let cost = study.problem(&looked.model, glance).cost(&looked.fits[0].theta);
         cost.unwrap_or(f64::INFINITY)
     };
-    let leading = looks.iter().min_by(|a, b| a.2[0].cost.total_cmp(&b.2[0].cost));
+    let leading = looks
+        .iter()
+        .min_by(|a, b| a.fits[0].cost.total_cmp(&b.fits[0].cost));
     let best = leading.map_or(f64::INFINITY, at_a_glance);
     let promising = promising(study, model, &on_promise, bases, hints, best);
     for _ in promising.len()..on_promise.len() {
         done();
     }
     looks.extend(look_at(promising));
-    let lowest = looks.iter().map(|l| l.2[0].cost).fold(f64::INFINITY, f64::min);
-    looks
-        .into_par_iter()
-        .filter_map(|(instance, model, mut looks)| {
-            let fit = if looks[0].cost <= OUT_OF_RACE * lowest {
-                settle(study, &model, &looks).ok()?
-            } else {
-                looks.swap_remove(0)
-            };
-            let instance = *instance;
-            Some(Tried { instance, model, fit })
-        })
-        .collect()
+    race(study, looks).into_iter().flatten().collect()
 }
 
 /// Candidates that [`try_again`] follows.

@@ -10,6 +10,8 @@ pub mod screen;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeMap;
+
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -21,7 +23,7 @@ use crate::identify::frfs::frf_data::FrfData;
 use crate::identify::frfs::spot_response::{SpotResponses, free_spots};
 use crate::identify::frfs::structure_study::{led_astray, starts_elsewhere};
 use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
-use crate::identify::study::{Effort, Extent, HeldOut, Study, Tried, View, held_out};
+use crate::identify::study::{Effort, Extent, HeldOut, Looked, Study, Tried, View, held_out, look, race};
 use crate::identify::{StructureModel, StructureStudy};
 use screen::{CurvePoint, Screened};
 
@@ -215,16 +217,24 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
             }
         }
     }
-    let tried: Vec<(usize, Vec<Tried<Structure>>)> = chosen
+    let looked: Vec<(usize, Looked<Structure>)> = chosen
         .par_iter()
-        .map(|(i, screened, starts)| (*i, fit_forms(study, model, starts, screened)))
+        .flat_map_iter(|(i, screened, starts)| {
+            let forms = look_at_forms(study, model, starts, screened);
+            forms.into_iter().map(|form| (*i, form))
+        })
         .collect();
     let base_count = model.parameters.len();
     let bic = |t: &Tried<Structure>| {
         2.0 * (t.fit.cost - coarse_base.cost) + (t.fit.theta.len() - base_count) as f64 * values.ln()
     };
     let better = |a: &Tried<Structure>, b: &Tried<Structure>| by_bound_then_bic(a, b, base_count, values);
-    let mut fitted: Vec<(usize, Vec<Tried<Structure>>)> = tried
+    let (own, looked): (Vec<usize>, Vec<Looked<Structure>>) = looked.into_iter().unzip();
+    let mut by_place: BTreeMap<usize, Vec<Tried<Structure>>> = BTreeMap::new();
+    for (place, tried) in own.into_iter().zip(race(study, looked)) {
+        by_place.entry(place).or_default().extend(tried);
+    }
+    let mut fitted: Vec<(usize, Vec<Tried<Structure>>)> = by_place
         .into_iter()
         .filter(|(_, forms)| !forms.is_empty())
         .map(|(i, mut forms)| {
@@ -499,15 +509,22 @@ fn second_form(
         elsewhere: elsewhere.iter().map(|at| [at, own].concat()).collect(),
         stiffness: first_stiffness(first, base_count),
     };
-    let pairs = promising.iter().take(SECOND[1]).flat_map(|second| {
-        let tried = fit_forms(study, model, &starts, second);
-        tried.into_iter().map(|tried| Pair {
-            first: first.instance,
-            first_count: theta.len(),
-            second: second.spot,
-            tried,
-        })
+    let looked = promising.iter().take(SECOND[1]).flat_map(|second| {
+        let forms = look_at_forms(study, model, &starts, second);
+        forms.into_iter().map(|form| (second.spot, form))
     });
+    let (spots, looked): (Vec<Spot>, Vec<Looked<Structure>>) = looked.unzip();
+    let pairs = spots
+        .into_iter()
+        .zip(race(study, looked))
+        .filter_map(|(second, tried)| {
+            Some(Pair {
+                first: first.instance,
+                first_count: theta.len(),
+                second,
+                tried: tried?,
+            })
+        });
     let values = study.real_values(Extent::Coarse) as f64;
     pairs.min_by(|a, b| by_bound_then_bic(&a.tried, &b.tried, base_count, values))
 }
@@ -519,13 +536,13 @@ fn first_stiffness(first: &Tried<Structure>, base_count: usize) -> Option<f64> {
     is_stiffness.then(|| parameter.natural(first.fit.theta[base_count]))
 }
 
-/// Each form of a place fitted on the coarse view, started from the drawn curve.
-fn fit_forms(
+/// The first steps of the fit of each form of a place, started from the drawn curve.
+fn look_at_forms(
     study: &StructureStudy,
     model: &StructureModel,
     from: &Starts,
     screened: &Screened,
-) -> Vec<Tried<Structure>> {
+) -> Vec<Looked<Structure>> {
     let bounds = model.bounds();
     let moved: Vec<f64> = from
         .theta
@@ -567,11 +584,11 @@ fn fit_forms(
                         .collect()
                 })
                 .collect();
-            let fit = crate::identify::study::screen(study, &extended, &bases, &starts, effort).ok()?;
-            Some(Tried {
+            let fits = look(study, &extended, &bases, &starts, effort).ok()?;
+            Some(Looked {
                 instance,
                 model: extended,
-                fit,
+                fits,
             })
         })
         .collect()

@@ -311,7 +311,7 @@ pub fn refine(model: &StructureModel, data: &FrfData, start: &[f64]) -> Result<F
     )
 }
 
-/// About so many complex values of the data, spread over lines, references and postures.
+/// About so many complex values of the data, spread over lines, references, postures and levels of the hammer.
 pub(crate) fn sketch(data: &FrfData, values: usize) -> FrfData {
     let lines = data.blocks.iter().map(|b| b.frequency_hz.len()).min();
     let lines = lines.unwrap_or(0).max(1);
@@ -326,10 +326,19 @@ pub(crate) fn sketch(data: &FrfData, values: usize) -> FrfData {
     let fewer_lines = data.thinned(stride, 1);
     let fewer_references = fewer_lines.thinned(1, share(&fewer_lines).min(3));
     let every = share(&fewer_references);
+    let blocks = fewer_references.blocks.iter().enumerate();
     FrfData {
-        blocks: fewer_references.blocks.iter().step_by(every).cloned().collect(),
+        blocks: blocks
+            .filter(|(i, _)| is_kept(*i, every))
+            .map(|(_, block)| block.clone())
+            .collect(),
         ..fewer_references
     }
+}
+
+/// Of `every` so many blocks one, at another place each time: where two levels of the hammer take turns, both stay.
+fn is_kept(i: usize, every: usize) -> bool {
+    i % every == (i / every) % every
 }
 
 /// Common factors on the joint stiffnesses that are tried: a robot file may be off by as much as its parameters' range.
@@ -599,4 +608,23 @@ fn scattered_about(parameters: &[Parameter], centre: &[f64], count: usize, seed:
             parameters.iter().zip(centre).map(draw).collect()
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_kept;
+
+    /// Blocks of a strong and a soft hit by turns, two a posture: a sketch of every second one had strong hits only.
+    #[test]
+    fn a_sketch_keeps_both_levels_of_the_hammer() {
+        for every in 2..=4 {
+            let kept: Vec<usize> = (0..24).filter(|i| is_kept(*i, every)).collect();
+            assert_eq!(kept.len(), 24 / every, "{every}");
+            let strong = kept.iter().filter(|i| *i % 2 == 0).count();
+            assert!(
+                (kept.len() / 3..=2 * kept.len() / 3 + 1).contains(&strong),
+                "{every}: {kept:?}"
+            );
+        }
+    }
 }

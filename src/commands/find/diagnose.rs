@@ -418,9 +418,10 @@ fn rest<D: Modelled>(d: &Diagnosis<D>, next_measurement: &NextMeasurement) -> St
             ]
         })
         .collect();
-    for c in d.candidates.iter().take(SHOWN) {
-        // Of what is not there no size need be told.
-        if let Some(why) = c.not_credible.as_ref().filter(|_| !c.vanished) {
+    for (i, c) in d.candidates.iter().take(SHOWN).enumerate() {
+        // Of what is not there no size need be told; what is missing with others went too far alone.
+        let is_named = d.effect == Some(i) || d.companions.contains(&c.label());
+        if let Some(why) = c.not_credible.as_ref().filter(|_| !c.vanished && !is_named) {
             text += &wrapped(&format!("Not {}: {why}.", c.label()), "  ");
         }
     }

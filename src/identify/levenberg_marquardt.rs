@@ -6,6 +6,8 @@
 
 use argmin::core::{Error as ArgminError, Executor, IterState, KV, Problem, Solver, State};
 use argmin::core::{TerminationReason, TerminationStatus};
+use faer::linalg::matmul::matmul;
+use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
 
 use crate::{Error, Result};
@@ -19,6 +21,41 @@ pub struct Linearisation {
     pub gradient: DVector<f64>,
     /// Its second derivatives without those of the residuals.
     pub hessian: DMatrix<f64>,
+}
+
+impl Linearisation {
+    /// Of no residuals; so many parameters.
+    pub fn zero(count: usize) -> Self {
+        Linearisation {
+            cost: 0.0,
+            gradient: DVector::zeros(count),
+            hessian: DMatrix::zeros(count, count),
+        }
+    }
+
+    /// Adds the sums over other residuals.
+    pub fn add(&mut self, other: &Linearisation) {
+        self.cost += other.cost;
+        self.gradient += &other.gradient;
+        self.hessian += &other.hessian;
+    }
+
+    /// Adds residuals with their derivatives (residuals × parameters, column by column).
+    pub fn push(&mut self, residual: &[f64], jacobian: &[f64]) {
+        self.cost += 0.5 * residual.iter().map(|r| r * r).sum::<f64>();
+        let count = self.gradient.len();
+        if count == 0 {
+            return;
+        }
+        let jacobian = MatRef::from_column_major_slice(jacobian, residual.len(), count);
+        let residual = MatRef::from_column_major_slice(residual, residual.len(), 1);
+        let add = |target: &mut [f64], columns: usize, right: MatRef<f64>| {
+            let target = MatMut::from_column_major_slice_mut(target, count, columns);
+            matmul(target, Accum::Add, jacobian.transpose(), right, 1.0, Par::Seq);
+        };
+        add(self.gradient.as_mut_slice(), 1, residual);
+        add(self.hessian.as_mut_slice(), count, jacobian);
+    }
 }
 
 /// A nonlinear least-squares problem, priors included.

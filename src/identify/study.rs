@@ -335,8 +335,12 @@ pub fn look<S: Study>(
     };
     // Few steps lead nowhere from near where a faint effect vanishes, and at its usual size the parameters in front have not made room
     // for it yet.
-    let of_linear_size = bases.iter().filter(|_| effort == Effort::Look);
-    let of_linear_size = of_linear_size.filter_map(|base| Some(linear_size(&likelihood, model, base)?.theta));
+    let of_linear_size = match effort {
+        Effort::Look => bases,
+        Effort::Direct | Effort::Staged => &[],
+    }
+    .iter()
+    .filter_map(|base| Some(linear_size(&likelihood, model, base)?.theta));
     let mut starts: Vec<(f64, Vec<f64>)> = bases
         .iter()
         .flat_map(|base| own.iter().map(move |own| [base.as_slice(), own].concat()))

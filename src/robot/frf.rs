@@ -99,6 +99,11 @@ pub struct Response {
 }
 
 impl Response {
+    /// Angular frequency that it was solved at, rad/s.
+    pub fn omega(&self) -> f64 {
+        self.omega
+    }
+
     /// Of the force along output `input`, which must have been solved for.
     fn column(&self, n: usize, input: usize) -> &[Complex64] {
         let place = self.place[input].expect("a force that was solved for");
@@ -371,22 +376,14 @@ impl FrfBasis {
         self.rows.ncols()
     }
 
-    /// Solves for forces along all outputs at `omega` (rad/s). Fails only where an undamped system is hit at resonance.
-    pub fn solve(&self, omega: f64, response: &mut Response) -> Result<()> {
-        self.solve_along(omega, 0..self.output_count(), response)
+    /// All outputs, as [`Self::solve_lines`] takes them; [`Self::slopes`] needs the response to a force along each.
+    pub fn outputs(&self) -> Vec<usize> {
+        (0..self.output_count()).collect()
     }
 
-    /// Solves for forces along the outputs `inputs` only, at `omega` (rad/s): enough for receptances, not for slopes.
-    ///
-    /// # Errors
-    /// As [`Self::solve`].
-    fn solve_along(
-        &self,
-        omega: f64,
-        inputs: impl IntoIterator<Item = usize>,
-        response: &mut Response,
-    ) -> Result<()> {
-        self.solve_at_rate(Complex64::new(0.0, omega), inputs, response)
+    /// Solves for forces along all outputs at `omega` (rad/s). Fails only where an undamped system is hit at resonance.
+    pub fn solve(&self, omega: f64, response: &mut Response) -> Result<()> {
+        self.solve_at_rate(Complex64::new(0.0, omega), 0..self.output_count(), response)
     }
 
     /// Solves for forces along the outputs `inputs` that grow like exp(st), `rate` s in rad/s.

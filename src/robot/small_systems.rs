@@ -1,6 +1,8 @@
 //! Small complex systems, solved so often that a library's blocking and memory would take longer than the arithmetic; those of
 //! a frequency alone, or of four frequencies side by side.
 
+use std::ops::{Mul, SubAssign};
+
 use num_complex::Complex64;
 use pulp::{Arch, Simd, WithSimd};
 
@@ -9,32 +11,47 @@ use pulp::{Arch, Simd, WithSimd};
 pub(super) fn solve_in_place(n: usize, a: &mut [Complex64], b: &mut [Complex64]) {
     // Six joints with a few branches or dampers: with the size known beforehand the compiler unrolls the loops.
     match n {
-        6 => eliminate(6, a, b),
-        7 => eliminate(7, a, b),
-        8 => eliminate(8, a, b),
-        9 => eliminate(9, a, b),
-        12 => eliminate(12, a, b),
-        _ => eliminate(n, a, b),
-    }
+        6 => eliminate(6, a, b, partial_pivot, Complex64::inv),
+        7 => eliminate(7, a, b, partial_pivot, Complex64::inv),
+        8 => eliminate(8, a, b, partial_pivot, Complex64::inv),
+        9 => eliminate(9, a, b, partial_pivot, Complex64::inv),
+        12 => eliminate(12, a, b, partial_pivot, Complex64::inv),
+        _ => eliminate(n, a, b, partial_pivot, Complex64::inv),
+    };
 }
 
+/// The one with the largest number in its column.
 #[inline(always)]
-fn eliminate(n: usize, a: &mut [Complex64], b: &mut [Complex64]) {
+fn partial_pivot(column: &[Complex64]) -> Option<usize> {
+    let size = |i: usize| column[i].l1_norm();
+    Some((1..column.len()).fold(0, |best, i| if size(i) > size(best) { i } else { best }))
+}
+
+/// Elimination and substitution. `pivot` chooses among the entries of a column from the diagonal on; false where none would do.
+#[inline(always)]
+fn eliminate<T: Copy + Mul<Output = T> + SubAssign>(
+    n: usize,
+    a: &mut [T],
+    b: &mut [T],
+    pivot: impl Fn(&[T]) -> Option<usize>,
+    inverse: impl Fn(&T) -> T,
+) -> bool {
     for k in 0..n {
-        let size = |i: usize| a[i + n * k].l1_norm();
-        let pivot = (k + 1..n).fold(k, |best, i| if size(i) > size(best) { i } else { best });
-        if pivot != k {
-            (k..n).for_each(|j| a.swap(k + n * j, pivot + n * j));
-            b.chunks_exact_mut(n).for_each(|column| column.swap(k, pivot));
+        let Some(below) = pivot(&a[n * k + k..n * (k + 1)]) else {
+            return false;
+        };
+        if below > 0 {
+            (k..n).for_each(|j| a.swap(k + n * j, k + below + n * j));
+            b.chunks_exact_mut(n).for_each(|column| column.swap(k, k + below));
         }
-        let inverse = a[k + n * k].inv();
+        let inverse = inverse(&a[k + n * k]);
         let (left, right) = a.split_at_mut(n * (k + 1));
         let factors = &mut left[n * k + k + 1..];
-        factors.iter_mut().for_each(|f| *f *= inverse);
+        factors.iter_mut().for_each(|f| *f = *f * inverse);
         for column in right.chunks_exact_mut(n).chain(b.chunks_exact_mut(n)) {
             let top = column[k];
             for (x, f) in column[k + 1..].iter_mut().zip(factors.iter()) {
-                *x -= f * top;
+                *x -= *f * top;
             }
         }
         left[n * k + k] = inverse;
@@ -44,10 +61,11 @@ fn eliminate(n: usize, a: &mut [Complex64], b: &mut [Complex64]) {
             let value = column[k] * a[k + n * k];
             column[k] = value;
             for (x, f) in column[..k].iter_mut().zip(&a[n * k..]) {
-                *x -= f * value;
+                *x -= *f * value;
             }
         }
     }
+    true
 }
 
 /// Systems solved side by side: as many numbers as a vector of AVX2 holds.
@@ -75,23 +93,6 @@ impl Lanes {
     }
 
     #[inline(always)]
-    fn times(&self, other: &Lanes) -> Lanes {
-        let (a, b) = (self, other);
-        Lanes {
-            re: std::array::from_fn(|l| a.re[l] * b.re[l] - a.im[l] * b.im[l]),
-            im: std::array::from_fn(|l| a.re[l] * b.im[l] + a.im[l] * b.re[l]),
-        }
-    }
-
-    #[inline(always)]
-    fn subtract(&mut self, other: &Lanes) {
-        for l in 0..LANES {
-            self.re[l] -= other.re[l];
-            self.im[l] -= other.im[l];
-        }
-    }
-
-    #[inline(always)]
     fn inverse(&self) -> Lanes {
         let square: [f64; LANES] = std::array::from_fn(|l| self.re[l] * self.re[l] + self.im[l] * self.im[l]);
         Lanes {
@@ -106,6 +107,29 @@ impl Lanes {
     }
 }
 
+impl Mul for Lanes {
+    type Output = Lanes;
+
+    #[inline(always)]
+    fn mul(self, other: Lanes) -> Lanes {
+        let (a, b) = (self, other);
+        Lanes {
+            re: std::array::from_fn(|l| a.re[l] * b.re[l] - a.im[l] * b.im[l]),
+            im: std::array::from_fn(|l| a.re[l] * b.im[l] + a.im[l] * b.re[l]),
+        }
+    }
+}
+
+impl SubAssign for Lanes {
+    #[inline(always)]
+    fn sub_assign(&mut self, other: Lanes) {
+        for l in 0..LANES {
+            self.re[l] -= other.re[l];
+            self.im[l] -= other.im[l];
+        }
+    }
+}
+
 /// As [`solve_in_place`], of [`LANES`] systems with pivots in common. False where no row would do as pivot in all of them; what is
 /// in `a` and `b` then is of no use.
 pub(super) fn solve_side_by_side(n: usize, a: &mut [Lanes], b: &mut [Lanes]) -> bool {
@@ -114,6 +138,22 @@ pub(super) fn solve_side_by_side(n: usize, a: &mut [Lanes], b: &mut [Lanes]) -> 
 
 /// A pivot is at least this part of the largest number in its column: what rounding adds stays small.
 const LEAST_PIVOT: f64 = 0.25;
+
+/// The first that will do in all systems; `None` where none will, or where something is no number.
+#[inline(always)]
+fn pivot_in_common(column: &[Lanes]) -> Option<usize> {
+    let mut largest = [0.0f64; LANES];
+    for entry in column {
+        let size = entry.size();
+        for l in 0..LANES {
+            largest[l] = largest[l].max(size[l]);
+        }
+    }
+    column.iter().position(|entry| {
+        let size = entry.size();
+        (0..LANES).all(|l| size[l] >= LEAST_PIVOT * largest[l] && size[l] > 0.0)
+    })
+}
 
 /// (A type of its own: a closure is compiled for the plainest processor where it is not inlined.)
 struct SideBySide<'a> {
@@ -127,49 +167,7 @@ impl WithSimd for SideBySide<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> bool {
-        let SideBySide { n, a, b } = self;
-        for k in 0..n {
-            let mut largest = [0.0f64; LANES];
-            for entry in &a[n * k + k..n * (k + 1)] {
-                let size = entry.size();
-                for l in 0..LANES {
-                    largest[l] = largest[l].max(size[l]);
-                }
-            }
-            // Also false of what is not a number.
-            let will_do = |entry: &Lanes| {
-                let size = entry.size();
-                (0..LANES).all(|l| size[l] >= LEAST_PIVOT * largest[l] && size[l] > 0.0)
-            };
-            let Some(pivot) = (k..n).find(|i| will_do(&a[i + n * k])) else {
-                return false;
-            };
-            if pivot != k {
-                (k..n).for_each(|j| a.swap(k + n * j, pivot + n * j));
-                b.chunks_exact_mut(n).for_each(|column| column.swap(k, pivot));
-            }
-            let inverse = a[k + n * k].inverse();
-            let (left, right) = a.split_at_mut(n * (k + 1));
-            let factors = &mut left[n * k + k + 1..];
-            factors.iter_mut().for_each(|f| *f = f.times(&inverse));
-            for column in right.chunks_exact_mut(n).chain(b.chunks_exact_mut(n)) {
-                let top = column[k];
-                for (x, f) in column[k + 1..].iter_mut().zip(factors.iter()) {
-                    x.subtract(&f.times(&top));
-                }
-            }
-            left[n * k + k] = inverse;
-        }
-        for column in b.chunks_exact_mut(n) {
-            for k in (0..n).rev() {
-                let value = column[k].times(&a[k + n * k]);
-                column[k] = value;
-                for (x, f) in column[..k].iter_mut().zip(&a[n * k..]) {
-                    x.subtract(&f.times(&value));
-                }
-            }
-        }
-        true
+        eliminate(self.n, self.a, self.b, pivot_in_common, Lanes::inverse)
     }
 }
 

@@ -1,8 +1,6 @@
 //! A mistake's size and the model's parameters fitted together.
 
-use faer::linalg::matmul::matmul;
-use faer::{Accum, MatMut, MatRef, Par};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use super::group::FrfGroup;
 use super::mistake::Mistake;
@@ -108,28 +106,13 @@ impl LeastSquares for JointProblem<'_> {
             }
             columns.push(slope);
         }
-        let (rows, n) = (residual.len(), columns.len());
-        let columns = columns.concat();
-        let columns = MatRef::from_column_major_slice(&columns, rows, n);
-        let residuals = MatRef::from_column_major_slice(&residual, rows, 1);
-        let mut cost = 0.5 * dot(&residual, &residual);
-        let mut gradient = DVector::zeros(n);
-        let mut hessian = DMatrix::zeros(n, n);
-        let product = |target: &mut [f64], right: MatRef<f64>| {
-            let target = MatMut::from_column_major_slice_mut(target, n, right.ncols());
-            matmul(target, Accum::Replace, columns.transpose(), right, 1.0, Par::Seq);
-        };
-        product(gradient.as_mut_slice(), residuals);
-        product(hessian.as_mut_slice(), columns);
+        let mut sums = Linearisation::zero(columns.len());
+        sums.push(&residual, &columns.concat());
         self.priors(all, |i, [value, slope, curvature]| {
-            cost += value;
-            gradient[i] += slope;
-            hessian[(i, i)] += curvature;
+            sums.cost += value;
+            sums.gradient[i] += slope;
+            sums.hessian[(i, i)] += curvature;
         });
-        Ok(Linearisation {
-            cost,
-            gradient,
-            hessian,
-        })
+        Ok(sums)
     }
 }

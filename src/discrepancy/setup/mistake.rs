@@ -59,7 +59,7 @@ impl Estimated<'_> {
 
 /// Where an FRF's structure is pushed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PushedAt {
+pub enum Pushed {
     /// At the reference point, along its axis.
     AlongHit,
     /// At the reference point, along all axes.
@@ -86,8 +86,8 @@ pub trait Distortion: Sync + Send {
     }
 
     /// The forces whose responses [`Self::shown`] asks for.
-    fn forces(&self) -> PushedAt {
-        PushedAt::AtHit
+    fn forces(&self) -> Pushed {
+        Pushed::AtHit
     }
 
     /// What the file holds at `omega` (rad/s), m/N.

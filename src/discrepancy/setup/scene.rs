@@ -4,7 +4,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::group::FrfGroup;
-use super::mistake::{Distortion, PushedAt};
+use super::mistake::{Distortion, Pushed};
 use super::truth::Truth;
 use crate::Result;
 use crate::data::Axis;
@@ -38,7 +38,7 @@ pub fn predict(model: &StructureModel, theta: &[f64], data: &FrfData, made: Opti
                 theta,
                 block,
                 None,
-                (&without, PushedAt::AlongHit),
+                (&without, Pushed::AlongHit),
                 |k, _, truth| {
                     let frf = &block.frfs[k];
                     curves[k].push(truth.recorded(frf, truth.between(frf.response.axis, frf.reference.axis)));
@@ -78,7 +78,7 @@ pub fn predict_all_axes(model: &StructureModel, theta: &[f64], data: &FrfData) -
                 theta,
                 block,
                 None,
-                (&members, PushedAt::AtHit),
+                (&members, Pushed::AtHit),
                 |k, _, truth| {
                     for a in Axis::ALL {
                         for b in Axis::ALL {
@@ -109,7 +109,7 @@ fn pass(
     theta: &[f64],
     block: &FrfBlock,
     made: Option<Made>,
-    (members, forces): (&[usize], PushedAt),
+    (members, forces): (&[usize], Pushed),
     mut show: impl FnMut(usize, f64, &Truth),
 ) -> Result<()> {
     if members.is_empty() {
@@ -154,9 +154,9 @@ fn pass(
         .flat_map(|(k, [response, reference])| {
             let axis = block.frfs[k].reference.axis.index();
             match forces {
-                PushedAt::AlongHit => vec![reference + axis],
-                PushedAt::AtHit => (*reference..reference + 3).collect(),
-                PushedAt::AtBothPoints => (*reference..reference + 3)
+                Pushed::AlongHit => vec![reference + axis],
+                Pushed::AtHit => (*reference..reference + 3).collect(),
+                Pushed::AtBothPoints => (*reference..reference + 3)
                     .chain(*response..response + 3)
                     .collect(),
             }

@@ -33,11 +33,7 @@ impl Truth<'_> {
 
     /// With the sign of the file's axes and the delay of the channel.
     pub(super) fn recorded(&self, frf: &FrfDatum, shown: Complex64) -> Complex64 {
-        let delay_s = self.filter.delay_s.value;
-        match delay_s == 0.0 {
-            true => shown * frf.sign,
-            false => shown * Complex64::from_polar(frf.sign, -self.rate.im * delay_s),
-        }
+        shown * self.filter.factor(self.rate.im, frf.sign)
     }
 
     /// Between the axes of the response point itself.

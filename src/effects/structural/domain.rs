@@ -1,5 +1,7 @@
 //! The structure of a robot as a [`Domain`]: effects change its chain of compliant elements, or the response channels.
 
+use num_complex::Complex64;
+
 use crate::data::RobotSpec;
 use crate::effects::{Domain, Known};
 use crate::robot::{Chain, Dual, Kinematics, RobotModel};
@@ -64,6 +66,14 @@ pub struct ChannelFilter {
 }
 
 impl ChannelFilter {
+    /// e^(−iωτ) with the sign of an FRF's axes, at `omega` (rad/s).
+    pub fn factor(&self, omega: f64, sign: f64) -> Complex64 {
+        match self.delay_s.value == 0.0 {
+            true => sign.into(),
+            false => Complex64::from_polar(sign, -omega * self.delay_s.value),
+        }
+    }
+
     /// Channels that show what is there.
     pub fn faithful() -> Self {
         ChannelFilter {

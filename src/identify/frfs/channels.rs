@@ -10,7 +10,7 @@ use crate::robot::{Dual, FrfBasis};
 /// The channel filter arranged for evaluation: per measured axis the true axes that it is made of.
 pub(crate) struct Channels {
     terms: [Vec<(usize, Dual)>; 3],
-    delay_s: Dual,
+    filter: ChannelFilter,
     /// The channels show what is there: nothing to be mixed or delayed.
     faithful: bool,
 }
@@ -29,16 +29,8 @@ impl Channels {
             && (0..3).all(|i| terms[i].len() == 1 && terms[i][0].0 == i && terms[i][0].1 == one);
         Channels {
             terms,
-            delay_s: filter.delay_s.clone(),
+            filter: filter.clone(),
             faithful,
-        }
-    }
-
-    /// e^{−iωτ} with the sign of the FRF's axes.
-    fn factor(&self, omega: f64, frf: &FrfDatum) -> Complex64 {
-        match self.delay_s.value == 0.0 {
-            true => frf.sign.into(),
-            false => Complex64::from_polar(frf.sign, -omega * self.delay_s.value),
         }
     }
 
@@ -63,7 +55,7 @@ impl Channels {
             .iter()
             .map(|(j, weight)| motion(frf.response_outputs[*j]) * weight.value)
             .sum();
-        self.factor(omega, frf) * sum
+        self.filter.factor(omega, frf.sign) * sum
     }
 
     /// Derivatives of [`Self::measured`] (given as `measured`) into `slope`, one a parameter. `slopes`: those of the true
@@ -85,14 +77,14 @@ impl Channels {
             return;
         }
         let terms = &self.terms[frf.response.axis.index()];
-        let factor = self.factor(omega, frf);
+        let factor = self.filter.factor(omega, frf.sign);
         for (p, s) in slope.iter_mut().enumerate() {
             *s = terms
                 .iter()
                 .map(|(j, weight)| true_slope(p, frf.response_outputs[*j]) * weight.value)
                 .sum::<Complex64>()
                 * factor;
-            let late = self.delay_s.derivative(p);
+            let late = self.filter.delay_s.derivative(p);
             if late != 0.0 {
                 *s -= Complex64::new(0.0, omega * late) * measured;
             }

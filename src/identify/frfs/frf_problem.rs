@@ -1,11 +1,7 @@
 //! The misfit of a structural model to measured FRFs, and what it leaves of them.
 
-use std::f64::consts::TAU;
 use std::ops::Range;
 
-use faer::linalg::matmul::matmul;
-use faer::{Accum, MatMut, MatRef, Par};
-use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use rayon::prelude::*;
 
@@ -45,56 +41,6 @@ pub struct FrfProblem<'a> {
 /// Lines one task works on: a fixed size, so that sums do not depend on the number of threads.
 const CHUNK: usize = 64;
 
-/// Sums over the residuals of a chunk of lines.
-struct Partial {
-    cost: f64,
-    gradient: DVector<f64>,
-    hessian: DMatrix<f64>,
-}
-
-impl Partial {
-    fn zero(count: usize) -> Self {
-        Partial {
-            cost: 0.0,
-            gradient: DVector::zeros(count),
-            hessian: DMatrix::zeros(count, count),
-        }
-    }
-
-    fn add(&mut self, other: &Partial) {
-        self.cost += other.cost;
-        self.gradient += &other.gradient;
-        self.hessian += &other.hessian;
-    }
-
-    /// Adds residuals with their derivatives (residuals × parameters, column by column).
-    fn push(&mut self, residual: &[f64], jacobian: &[f64]) {
-        self.cost += 0.5 * residual.iter().map(|r| r * r).sum::<f64>();
-        let count = self.gradient.len();
-        if count == 0 {
-            return;
-        }
-        let jacobian = MatRef::from_column_major_slice(jacobian, residual.len(), count);
-        let residual = MatRef::from_column_major_slice(residual, residual.len(), 1);
-        let add = |target: &mut [f64], columns: usize, right: MatRef<f64>| {
-            let target = MatMut::from_column_major_slice_mut(target, count, columns);
-            matmul(target, Accum::Add, jacobian.transpose(), right, 1.0, Par::Seq);
-        };
-        add(self.gradient.as_mut_slice(), 1, residual);
-        add(self.hessian.as_mut_slice(), count, jacobian);
-    }
-}
-
-impl From<Partial> for Linearisation {
-    fn from(sums: Partial) -> Self {
-        Linearisation {
-            cost: sums.cost,
-            gradient: sums.gradient,
-            hessian: sums.hessian,
-        }
-    }
-}
-
 impl FrfProblem<'_> {
     /// Sums by block of the data and chunk of its lines, block by block; priors are left out. `size`: lines of a chunk, of a
     /// block of so many lines.
@@ -103,7 +49,7 @@ impl FrfProblem<'_> {
         theta: &[f64],
         with_derivatives: bool,
         size: impl Fn(usize) -> usize,
-    ) -> Result<Vec<(usize, usize, Partial)>> {
+    ) -> Result<Vec<(usize, usize, Linearisation)>> {
         let count = if with_derivatives { theta.len() } else { 0 };
         let bases: Vec<FrfBasis> = self
             .data
@@ -143,13 +89,11 @@ impl FrfProblem<'_> {
         stretches: usize,
     ) -> Result<Vec<(usize, usize, Linearisation)>> {
         let size = |lines: usize| lines.div_ceil(stretches.max(1));
-        let partials = self.partials(theta, true, size)?.into_iter();
-        let linearised = |(block, stretch, sums): (usize, usize, Partial)| (block, stretch, sums.into());
-        Ok(partials.map(linearised).collect())
+        self.partials(theta, true, size)
     }
 
-    fn evaluate(&self, theta: &[f64], with_derivatives: bool) -> Result<Partial> {
-        let mut total = Partial::zero(if with_derivatives { theta.len() } else { 0 });
+    fn evaluate(&self, theta: &[f64], with_derivatives: bool) -> Result<Linearisation> {
+        let mut total = Linearisation::zero(if with_derivatives { theta.len() } else { 0 });
         for (_, _, part) in &self.partials(theta, with_derivatives, |_| CHUNK)? {
             total.add(part);
         }
@@ -173,15 +117,14 @@ impl FrfProblem<'_> {
         block: &FrfBlock,
         lines: Range<usize>,
         count: usize,
-    ) -> Result<Partial> {
+    ) -> Result<Linearisation> {
         stop::point();
-        let mut partial = Partial::zero(count);
+        let mut sums = Linearisation::zero(count);
         let mut slopes = Slopes::of_inputs(block.inputs());
         let mut slope = vec![Complex64::ZERO; count];
-        // Slopes need the response to a force along every output.
-        let pushed: Vec<usize> = match count {
+        let pushed = match count {
             0 => slopes.inputs.clone(),
-            _ => (0..basis.output_count()).collect(),
+            _ => basis.outputs(),
         };
         // Residuals of one line and their derivatives, column by column: real parts, then imaginary parts.
         let rows = match self.misfit {
@@ -197,7 +140,7 @@ impl FrfProblem<'_> {
         let rates: Vec<Complex64> = lines.iter().map(|l| block.rate(*l)).collect();
         basis.solve_lines(&rates, &pushed, |k, response| {
             let line = lines[k];
-            let omega = rates[k].im;
+            let omega = response.omega();
             if count > 0 {
                 basis.slopes(response, &mut slopes);
             }
@@ -240,10 +183,10 @@ impl FrfProblem<'_> {
                     }
                 }
             }
-            partial.push(&residual, &jacobian);
+            sums.push(&residual, &jacobian);
             Ok(())
         })?;
-        Ok(partial)
+        Ok(sums)
     }
 }
 
@@ -253,7 +196,7 @@ impl LeastSquares for FrfProblem<'_> {
     }
 
     fn linearise(&self, theta: &[f64]) -> Result<Linearisation> {
-        Ok(self.evaluate(theta, true)?.into())
+        self.evaluate(theta, true)
     }
 }
 
@@ -287,10 +230,9 @@ impl StructureModel {
                 let basis = self.basis(theta, block, true)?;
                 let mut slopes = Slopes::of_inputs(block.inputs());
                 let mut slope = vec![Complex64::ZERO; theta.len()];
-                let pushed: Vec<usize> = (0..basis.output_count()).collect();
-                basis.solve_lines(&block.rates(), &pushed, |line, response| {
+                basis.solve_lines(&block.rates(), &basis.outputs(), |line, response| {
                     let f = block.frequency_hz[line];
-                    let omega = TAU * f;
+                    let omega = response.omega();
                     basis.slopes(response, &mut slopes);
                     for (frf, curve) in block.frfs.iter().zip(&mut curves) {
                         let model = channels.measured(omega, frf, &basis, response);

@@ -5,7 +5,7 @@
 //! posture, and the stiffnesses fitted to them under their priors. Matched by frequency alone a mode may be taken for its
 //! neighbour where stiffnesses are off by a third in opposite directions: a start is one of several, never the answer.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use serde::Serialize;
 
 use crate::Result;
@@ -259,11 +259,7 @@ impl LeastSquares for Frequencies<'_> {
 impl Frequencies<'_> {
     fn sum(&self, theta: &[f64], with_derivatives: bool) -> Result<Linearisation> {
         let count = theta.len();
-        let mut sum = Linearisation {
-            cost: 0.0,
-            gradient: DVector::zeros(count),
-            hessian: DMatrix::zeros(count, count),
-        };
+        let mut sum = Linearisation::zero(count);
         for (apart, ln_frequency_slope) in self.residuals(theta, with_derivatives)? {
             let residual = apart / FREQUENCY_LOG_STD;
             sum.cost += 0.5 * residual * residual;

@@ -180,10 +180,9 @@ fn of_block(
     let mut reach = Vec::new();
     // The slopes of one line together.
     let mut slopes = vec![Complex64::ZERO; block.frfs.len() * count];
-    let rates = block.rates();
-    let pushed: Vec<usize> = (0..places.basis.output_count()).collect();
-    places.basis.solve_lines(&rates, &pushed, |line, response| {
-        let omega = rates[line].im;
+    let basis = &places.basis;
+    basis.solve_lines(&block.rates(), &basis.outputs(), |line, response| {
+        let omega = response.omega();
         let band = edges.partition_point(|edge| *edge <= block.frequency_hz[line]);
         for (own, curve) in slopes.chunks_exact_mut(count).zip(curves) {
             own.iter_mut()

@@ -64,10 +64,8 @@ impl StructureModel {
                 slopes: Vec::with_capacity(lines * theta.len()),
             })
             .collect();
-        let rates = block.rates();
-        let pushed: Vec<usize> = (0..basis.output_count()).collect();
-        basis.solve_lines(&rates, &pushed, |line, response| {
-            let omega = rates[line].im;
+        basis.solve_lines(&block.rates(), &basis.outputs(), |_, response| {
+            let omega = response.omega();
             basis.slopes(response, &mut slopes);
             for (frf, predicted) in block.frfs.iter().zip(&mut predicted) {
                 let value = channels.measured(omega, frf, &basis, response);

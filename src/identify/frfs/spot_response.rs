@@ -125,16 +125,14 @@ impl SpotResponses {
 
         let mut slopes = Slopes::of_inputs(block.inputs());
         let mut response = Response::default();
-        let rates = block.rates();
-        let pushed: Vec<usize> = (0..with_slopes.output_count()).collect();
         let mut reach = Vec::new();
         let mut slope = vec![Complex64::ZERO; count];
         let frfs = block.frfs.len();
         let mut residual = vec![Complex64::ZERO; frfs];
         let mut jacobian = vec![Complex64::ZERO; frfs * count];
         let mut part = Self::empty(spots, count);
-        with_slopes.solve_lines(&rates, &pushed, |line, sloped| {
-            let omega = rates[line].im;
+        with_slopes.solve_lines(&block.rates(), &with_slopes.outputs(), |line, sloped| {
+            let omega = sloped.omega();
             with_slopes.slopes(sloped, &mut slopes);
             places.basis.solve(omega, &mut response)?;
             for (k, frf) in block.frfs.iter().enumerate() {

@@ -398,12 +398,10 @@ impl StructureModel {
             .map(|block| {
                 let basis = self.basis(theta, block, false)?;
                 let channels = Channels::new(&filter);
-                let inputs = block.inputs();
                 let mut columns = vec![Vec::with_capacity(block.frequency_hz.len()); block.frfs.len()];
-                let rates = block.rates();
-                basis.solve_lines(&rates, &inputs, |line, response| {
+                basis.solve_lines(&block.rates(), &block.inputs(), |_, response| {
                     for (frf, column) in block.frfs.iter().zip(&mut columns) {
-                        column.push(channels.measured(rates[line].im, frf, &basis, response));
+                        column.push(channels.measured(response.omega(), frf, &basis, response));
                     }
                     Ok(())
                 })?;

@@ -1,7 +1,7 @@
 //! Calibration where only a table of the strongest modes was measured: frequency, damping and peak real receptance of
 //! the dominant mode in each axis, posture by posture.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 use crate::Result;
 use crate::data::Axis;
@@ -84,11 +84,7 @@ impl LeastSquares for Table<'_> {
 
     fn linearise(&self, theta: &[f64]) -> Result<Linearisation> {
         let count = theta.len();
-        let mut sum = Linearisation {
-            cost: 0.0,
-            gradient: DVector::zeros(count),
-            hessian: DMatrix::zeros(count, count),
-        };
+        let mut sum = Linearisation::zero(count);
         let mut push = |residual: f64, slope: DVector<f64>| {
             sum.cost += 0.5 * residual * residual;
             sum.gradient += &slope * residual;

@@ -6,7 +6,7 @@
 //! 1/d²ᵖ summed, a smooth minimum, so that modes may exchange their roles while the fit moves. A mode of the model that
 //! nobody measured costs nothing: such tables name what was published, not all there is.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use rayon::prelude::*;
 
 use crate::Result;
@@ -289,11 +289,7 @@ pub struct ResonanceProblem<'a> {
 impl ResonanceProblem<'_> {
     fn evaluate(&self, theta: &[f64], with_derivatives: bool) -> Result<Linearisation> {
         let count = theta.len();
-        let mut sum = Linearisation {
-            cost: 0.0,
-            gradient: DVector::zeros(count),
-            hessian: DMatrix::zeros(count, count),
-        };
+        let mut sum = Linearisation::zero(count);
         let (widening, absent) = match self.view.measure {
             Measure::Likelihood => (1.0, ABSENT),
             Measure::Rough => (ROUGH, ROUGH * ABSENT),

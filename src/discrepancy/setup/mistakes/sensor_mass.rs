@@ -3,7 +3,7 @@ use num_complex::Complex64;
 
 use super::super::finding::{SetupFinding, with_error};
 use super::super::group::FrfGroup;
-use super::super::mistake::{Distortion, Estimated, Mistake, MistakeSize, PushedAt};
+use super::super::mistake::{Distortion, Estimated, Mistake, MistakeSize, Pushed};
 use super::super::truth::Truth;
 use crate::identify::frfs::frf_data::{FrfData, FrfDatum};
 
@@ -11,8 +11,8 @@ use crate::identify::frfs::frf_data::{FrfData, FrfDatum};
 pub struct SensorMass;
 
 impl Distortion for SensorMass {
-    fn forces(&self) -> PushedAt {
-        PushedAt::AtBothPoints
+    fn forces(&self) -> Pushed {
+        Pushed::AtBothPoints
     }
 
     fn shown(&self, values: &[f64], _omega: f64, truth: &Truth, frf: &FrfDatum) -> Complex64 {

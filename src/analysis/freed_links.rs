@@ -57,7 +57,7 @@ impl FreedLinks {
             .into());
         }
         let before = StructureAnalysis::of_case(case, options)?;
-        let free = |only| before.case.freeing(campaign, &Freed { groups, only });
+        let free = |only: Option<&[String]>| before.case.freeing(campaign, &Freed { groups, only });
         let every = from_where_it_stood(free(None)?, &before.calibration, options)?;
         let parameters = &every.case.model.parameters;
         let known = |name: &str| before.calibration.parameters.iter().any(|p| p.name == name);
@@ -65,14 +65,35 @@ impl FreedLinks {
             .filter(|i| !known(&parameters[*i].name))
             .collect();
         let undetermined = Undetermined::new(parameters, &every.calibration)?;
-        let departing: Vec<String> = departures(parameters, &every.calibration, &new)
-            .into_iter()
-            .map(|i| parameters[i].name.clone())
-            .collect();
+        let departing_of = |fit: &StructureAnalysis, among: &[usize]| -> Vec<String> {
+            let parameters = &fit.case.model.parameters;
+            departures(parameters, &fit.calibration, among)
+                .into_iter()
+                .map(|i| parameters[i].name.clone())
+                .collect()
+        };
+        let mut departing = departing_of(&every, &new);
         // What the campaign frees itself stays free.
-        let before_parameters = before.calibration.parameters.iter().map(|p| p.name.clone());
-        let kept: Vec<String> = before_parameters.chain(departing.clone()).collect();
-        let after = from_where_it_stood(free(Some(&kept))?, &every.calibration, options)?;
+        let before_names = || before.calibration.parameters.iter().map(|p| p.name.clone());
+        let fitted_with = |departing: &[String], start: &Calibration| {
+            let kept: Vec<String> = before_names().chain(departing.iter().cloned()).collect();
+            from_where_it_stood(free(Some(&kept))?, start, options)
+        };
+        let mut after = fitted_with(&departing, &every.calibration)?;
+        // The choice was made on the quadratic form of a fit with everything free; what agrees with the file once the others are
+        // back at their values has nothing to depart from.
+        loop {
+            let parameters = &after.case.model.parameters;
+            let among: Vec<usize> = (0..parameters.len())
+                .filter(|i| departing.contains(&parameters[*i].name))
+                .collect();
+            let still = departing_of(&after, &among);
+            if still.len() == departing.len() {
+                break;
+            }
+            departing = still;
+            after = fitted_with(&departing, &after.calibration)?;
+        }
         let error = |analysis: &StructureAnalysis| {
             let case = &analysis.case;
             let study = case.study(options);

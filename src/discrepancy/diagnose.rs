@@ -250,12 +250,9 @@ impl<'a, S: Study> Engine<'a, S> {
         let (study, model) = (self.study, self.model);
         let (coarse_base, base, tried) = self.on_one_baseline()?;
         let mut refined = self.refine(&tried)?;
-        if let Some(best) = refined
-            .first_mut()
-            .filter(|b| !verdict::is_noise(self.reduced_chi2(b)))
-            && let Some(fit) = rescue(study, model, best, &self.hints, REFINE)?
-        {
-            best.fit = fit;
+        let base_reduced = 2.0 * base.cost / self.freedom(model, Extent::Full);
+        if let Some(best) = refined.first_mut() {
+            self.try_harder(best, base_reduced)?;
         }
         if refined
             .first()
@@ -264,7 +261,6 @@ impl<'a, S: Study> Engine<'a, S> {
             self.begin_at_possible_sizes(&tried, &mut refined)?;
         }
 
-        let base_reduced = 2.0 * base.cost / self.freedom(model, Extent::Full);
         if base_reduced < FAINT {
             self.begin_at_linear_sizes(&tried, &coarse_base, &base, &mut refined)?;
         }
@@ -528,6 +524,31 @@ impl<'a, S: Study> Engine<'a, S> {
         Ok(refined)
     }
 
+    /// From the starting points that the model itself is fitted from, and from `theta`.
+    fn fitted_as_the_model(&self, model: &ModelOf<S>, theta: &[f64]) -> Result<Fit> {
+        let calibration = self.study.calibrate(&model.with_start(theta.to_vec()))?;
+        self.minimise(model, View::FULL, &calibration.theta, REFINE)
+    }
+
+    /// What explains most and leaves more than noise may be stuck away from its best fit.
+    fn try_harder(&self, best: &mut TriedOf<S>, base_reduced: f64) -> Result<()> {
+        let is_noise = |t: &TriedOf<S>| verdict::is_noise(self.reduced_chi2(t));
+        if is_noise(best) {
+            return Ok(());
+        }
+        if let Some(fit) = rescue(self.study, self.model, best, &self.hints, REFINE)? {
+            best.fit = fit;
+        }
+        let share = (base_reduced - self.reduced_chi2(best)) / (base_reduced - 1.0);
+        if !is_noise(best) && share > PAIR_SHARE {
+            let fit = self.fitted_as_the_model(&best.model, &best.fit.theta)?;
+            if fit.cost < best.fit.cost {
+                best.fit = fit;
+            }
+        }
+        Ok(())
+    }
+
     /// Where nothing explains the data: effects of the whole structure that have ended at sizes which cannot be, from possible ones. What
     /// comes to lie before others is put among the leaders.
     fn begin_at_possible_sizes(&self, tried: &[TriedOf<S>], refined: &mut Vec<TriedOf<S>>) -> Result<()> {
@@ -705,10 +726,8 @@ impl<'a, S: Study> Engine<'a, S> {
             .filter(|three| evidence.base_chi2 - 2.0 * three.cost > NEARLY_ALL * above)
             .filter(|three| self.looks_affordable(&three.model) >= FEWEST_PAIRS)
         {
-            let model = three.model.with_start(three.theta.clone());
-            let fresh = self.study.calibrate(&model)?;
-            let fit = self.minimise(&model, View::FULL, &fresh.theta, REFINE)?;
-            let fresh = self.together(three.parts.clone(), model, fit)?;
+            let fit = self.fitted_as_the_model(&three.model, &three.theta)?;
+            let fresh = self.together(three.parts.clone(), three.model.clone(), fit)?;
             self.keep_better(&mut best, &fresh, (candidates, leading), evidence)?;
         }
         Ok((best, counts))

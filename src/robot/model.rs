@@ -401,12 +401,16 @@ mod tests {
         for with_branch in [false, true] {
             let basis = build(&theta, with_branch);
             let omega = std::f64::consts::TAU * 13.0;
-            let mut response = crate::robot::frf::Response::default();
-            basis.solve(omega, &mut response).unwrap();
-            let mut slopes = crate::robot::frf::Slopes::of_inputs(vec![2, 0]);
-            basis.slopes(&response, &mut slopes);
-            for p in 0..count {
-                let slopes = [0, 1, 2].map(|out| slopes.at(p, 1, out));
+            let mut found = Vec::new();
+            let rate = num_complex::Complex64::new(0.0, omega);
+            basis
+                .solve_lines_with_slopes(&[rate], &[2, 0], |_, _, slopes| {
+                    let of_first = slopes.along(0);
+                    found.extend((0..count).map(|p| [0, 1, 2].map(|out| of_first(p, out))));
+                    Ok(())
+                })
+                .unwrap();
+            for (p, slopes) in found.iter().enumerate() {
                 let h = 1e-6 * theta[p].abs();
                 let shifted = |sign: f64| {
                     let mut t = theta.clone();

@@ -11,7 +11,7 @@ use crate::identify::frfs::structure::StructureModel;
 use crate::identify::levenberg_marquardt::{LeastSquares, Linearisation};
 use crate::identify::rest::RestCurve;
 use crate::robot::FrfBasis;
-use crate::robot::frf::Slopes;
+use crate::robot::frf::{Response, Slopes};
 use crate::{Result, stop};
 
 /// What is compared.
@@ -120,12 +120,7 @@ impl FrfProblem<'_> {
     ) -> Result<Linearisation> {
         stop::point();
         let mut sums = Linearisation::zero(count);
-        let mut slopes = Slopes::of_inputs(block.inputs());
         let mut slope = vec![Complex64::ZERO; count];
-        let pushed = match count {
-            0 => slopes.inputs.clone(),
-            _ => basis.outputs(),
-        };
         // Residuals of one line and their derivatives, column by column: real parts, then imaginary parts.
         let rows = match self.misfit {
             Misfit::Complex => 2 * block.frfs.len(),
@@ -138,19 +133,15 @@ impl FrfProblem<'_> {
             .take_while(|l| *l < block.frequency_hz.len())
             .collect();
         let rates: Vec<Complex64> = lines.iter().map(|l| block.rate(*l)).collect();
-        basis.solve_lines(&rates, &pushed, |k, response| {
+        let mut add = |k: usize, response: &Response, slopes: Option<&Slopes>| {
             let line = lines[k];
             let omega = response.omega();
-            if count > 0 {
-                basis.slopes(response, &mut slopes);
-            }
             for (k, frf) in block.frfs.iter().enumerate() {
                 let model = channels.measured(omega, frf, basis, response);
                 let measured = frf.receptance[line];
                 let std = frf.noise_std[line];
-                if count > 0 {
-                    let i = slopes.inputs.iter().position(|x| *x == frf.input).unwrap_or(0);
-                    let true_slope = |p: usize, out: usize| slopes.at(p, i, out);
+                if let Some(slopes) = slopes {
+                    let true_slope = slopes.along(frf.input);
                     channels.slopes(omega, frf, model, (basis, response), true_slope, &mut slope);
                 }
                 match self.misfit {
@@ -185,7 +176,14 @@ impl FrfProblem<'_> {
             }
             sums.push(&residual, &jacobian);
             Ok(())
-        })?;
+        };
+        let inputs = block.inputs();
+        match count {
+            0 => basis.solve_lines(&rates, &inputs, |k, response| add(k, response, None))?,
+            _ => basis.solve_lines_with_slopes(&rates, &inputs, |k, response, slopes| {
+                add(k, response, Some(slopes))
+            })?,
+        }
         Ok(sums)
     }
 }
@@ -228,28 +226,29 @@ impl StructureModel {
                 };
                 let mut curves: Vec<RestCurve> = block.frfs.iter().map(empty).collect();
                 let basis = self.basis(theta, block, true)?;
-                let mut slopes = Slopes::of_inputs(block.inputs());
                 let mut slope = vec![Complex64::ZERO; theta.len()];
-                basis.solve_lines(&block.rates(), &basis.outputs(), |line, response| {
-                    let f = block.frequency_hz[line];
-                    let omega = response.omega();
-                    basis.slopes(response, &mut slopes);
-                    for (frf, curve) in block.frfs.iter().zip(&mut curves) {
-                        let model = channels.measured(omega, frf, &basis, response);
-                        let i = slopes.inputs.iter().position(|x| *x == frf.input).unwrap_or(0);
-                        let true_slope = |p: usize, out: usize| slopes.at(p, i, out);
-                        channels.slopes(omega, frf, model, (&basis, response), true_slope, &mut slope);
-                        let weight = 1.0 / frf.noise_std[line];
-                        curve.rest.push((model - frf.receptance[line]) * weight);
-                        for (column, s) in curve.slopes.iter_mut().zip(&slope) {
-                            column.push(s * weight);
+                basis.solve_lines_with_slopes(
+                    &block.rates(),
+                    &block.inputs(),
+                    |line, response, slopes| {
+                        let f = block.frequency_hz[line];
+                        let omega = response.omega();
+                        for (frf, curve) in block.frfs.iter().zip(&mut curves) {
+                            let model = channels.measured(omega, frf, &basis, response);
+                            let true_slope = slopes.along(frf.input);
+                            channels.slopes(omega, frf, model, (&basis, response), true_slope, &mut slope);
+                            let weight = 1.0 / frf.noise_std[line];
+                            curve.rest.push((model - frf.receptance[line]) * weight);
+                            for (column, s) in curve.slopes.iter_mut().zip(&slope) {
+                                column.push(s * weight);
+                            }
+                            for (column, factor) in curve.own.iter_mut().zip([1.0, f]) {
+                                column.push(model * (weight * factor));
+                            }
                         }
-                        for (column, factor) in curve.own.iter_mut().zip([1.0, f]) {
-                            column.push(model * (weight * factor));
-                        }
-                    }
-                    Ok(())
-                })?;
+                        Ok(())
+                    },
+                )?;
                 Ok(curves)
             })
             .collect::<Result<_>>()?;

@@ -8,7 +8,6 @@ use crate::Result;
 use crate::identify::frfs::channels::Channels;
 use crate::identify::frfs::frf_data::{FrfBlock, FrfData};
 use crate::identify::frfs::structure::StructureModel;
-use crate::robot::frf::Slopes;
 
 /// One FRF as a model predicts it, with its derivatives.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,7 +53,6 @@ impl StructureModel {
         let basis = self.basis(theta, block, true)?;
         let channels = Channels::new(&self.filter(theta, true));
         let lines = block.frequency_hz.len();
-        let mut slopes = Slopes::of_inputs(block.inputs());
         let mut slope = vec![Complex64::ZERO; theta.len()];
         let mut predicted: Vec<PredictedFrf> = block
             .frfs
@@ -64,13 +62,11 @@ impl StructureModel {
                 slopes: Vec::with_capacity(lines * theta.len()),
             })
             .collect();
-        basis.solve_lines(&block.rates(), &basis.outputs(), |_, response| {
+        basis.solve_lines_with_slopes(&block.rates(), &block.inputs(), |_, response, slopes| {
             let omega = response.omega();
-            basis.slopes(response, &mut slopes);
             for (frf, predicted) in block.frfs.iter().zip(&mut predicted) {
                 let value = channels.measured(omega, frf, &basis, response);
-                let input = slopes.inputs.iter().position(|x| *x == frf.input).unwrap_or(0);
-                let of_truth = |p: usize, out: usize| slopes.at(p, input, out);
+                let of_truth = slopes.along(frf.input);
                 channels.slopes(omega, frf, value, (&basis, response), of_truth, &mut slope);
                 predicted.receptance.push(value);
                 predicted.slopes.extend_from_slice(&slope);

@@ -17,7 +17,7 @@ use crate::effects::Spot;
 use crate::identify::frfs::channels::Channels;
 use crate::identify::frfs::frf_data::{FrfBlock, FrfData};
 use crate::identify::frfs::structure::StructureModel;
-use crate::robot::frf::{Response, Slopes};
+use crate::robot::frf::Response;
 use crate::robot::{Dual, Element, FrfBasis, Role};
 
 /// Spots that are not taken by a drawn part of the model.
@@ -123,7 +123,6 @@ impl SpotResponses {
         let places = SpotBasis::new(model, theta, block, spots)?;
         let channels = Channels::new(&model.filter(theta, true));
 
-        let mut slopes = Slopes::of_inputs(block.inputs());
         let mut response = Response::default();
         let mut reach = Vec::new();
         let mut slope = vec![Complex64::ZERO; count];
@@ -131,22 +130,19 @@ impl SpotResponses {
         let mut residual = vec![Complex64::ZERO; frfs];
         let mut jacobian = vec![Complex64::ZERO; frfs * count];
         let mut part = Self::empty(spots, count);
-        with_slopes.solve_lines(&block.rates(), &with_slopes.outputs(), |line, sloped| {
+        with_slopes.solve_lines_with_slopes(&block.rates(), &block.inputs(), |line, sloped, slopes| {
             let omega = sloped.omega();
-            with_slopes.slopes(sloped, &mut slopes);
             places.basis.solve(omega, &mut response)?;
             for (k, frf) in block.frfs.iter().enumerate() {
                 let weight = 1.0 / frf.noise_std[line];
                 let modelled = channels.measured(omega, frf, &with_slopes, sloped);
                 residual[k] = (frf.receptance[line] - modelled) * weight;
-                let i = slopes.inputs.iter().position(|x| *x == frf.input).unwrap_or(0);
-                let true_slope = |p: usize, out: usize| slopes.at(p, i, out);
                 channels.slopes(
                     omega,
                     frf,
                     modelled,
                     (&with_slopes, sloped),
-                    true_slope,
+                    slopes.along(frf.input),
                     &mut slope,
                 );
                 for (p, s) in slope.iter().enumerate() {

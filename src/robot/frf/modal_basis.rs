@@ -3,7 +3,7 @@
 use faer::Mat;
 use nalgebra::DMatrix;
 
-use super::chain::System;
+use crate::robot::chain::System;
 use crate::{Error, Result};
 
 /// Modes of the chain without its branches: K-normalised shapes.

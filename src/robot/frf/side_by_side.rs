@@ -1,7 +1,7 @@
 //! Small complex systems, solved so often that a library's blocking and memory would take longer than the arithmetic; those of
 //! a frequency alone, or of four frequencies side by side.
 
-use std::ops::{Mul, SubAssign};
+use std::ops::{AddAssign, Mul, SubAssign};
 
 use num_complex::Complex64;
 use pulp::{Arch, Simd, WithSimd};
@@ -87,13 +87,45 @@ impl Lanes {
         }
     }
 
+    /// One each.
+    pub(super) fn of(values: [Complex64; LANES]) -> Self {
+        Lanes {
+            re: values.map(|v| v.re),
+            im: values.map(|v| v.im),
+        }
+    }
+
+    /// Times a real number.
+    #[inline(always)]
+    pub(super) fn times(self, factor: f64) -> Self {
+        Lanes {
+            re: self.re.map(|v| v * factor),
+            im: self.im.map(|v| v * factor),
+        }
+    }
+
+    /// More by a real number.
+    #[inline(always)]
+    pub(super) fn plus(self, more: f64) -> Self {
+        Lanes {
+            re: self.re.map(|v| v + more),
+            im: self.im,
+        }
+    }
+
+    /// Takes the place of the system `lane`.
+    pub(super) fn set(&mut self, lane: usize, value: Complex64) {
+        self.re[lane] = value.re;
+        self.im[lane] = value.im;
+    }
+
     /// That of the system `lane`.
     pub(super) fn get(&self, lane: usize) -> Complex64 {
         Complex64::new(self.re[lane], self.im[lane])
     }
 
     #[inline(always)]
-    fn inverse(&self) -> Lanes {
+    pub(super) fn inverse(&self) -> Lanes {
         let square: [f64; LANES] = std::array::from_fn(|l| self.re[l] * self.re[l] + self.im[l] * self.im[l]);
         Lanes {
             re: std::array::from_fn(|l| self.re[l] / square[l]),
@@ -118,6 +150,48 @@ impl Mul for Lanes {
             im: std::array::from_fn(|l| a.re[l] * b.im[l] + a.im[l] * b.re[l]),
         }
     }
+}
+
+impl AddAssign for Lanes {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Lanes) {
+        for l in 0..LANES {
+            self.re[l] += other.re[l];
+            self.im[l] += other.im[l];
+        }
+    }
+}
+
+/// Σ aᵢ bᵢ with each of three vectors b.
+#[inline(always)]
+pub(super) fn dots<S: Simd>(simd: S, a: &[Lanes], b: [&[Lanes]; 3]) -> [Lanes; 3] {
+    let b = b.map(|b| &b[..a.len()]);
+    let mut sums = [Lanes::default(); 3];
+    if S::F64_LANES != LANES {
+        for (i, a) in a.iter().enumerate() {
+            sums.iter_mut().zip(&b).for_each(|(sum, b)| *sum += *a * b[i]);
+        }
+        return sums;
+    }
+    // By hand: the compiler keeps these sums in memory.
+    let vector = |values: &[f64; LANES]| S::as_simd_f64s(values).0[0];
+    let (mut re, mut im) = ([simd.splat_f64s(0.0); 3], [simd.splat_f64s(0.0); 3]);
+    for (i, a) in a.iter().enumerate() {
+        let (a_re, a_im) = (vector(&a.re), vector(&a.im));
+        let minus = simd.neg_f64s(a_im);
+        for k in 0..3 {
+            let (b_re, b_im) = (vector(&b[k][i].re), vector(&b[k][i].im));
+            re[k] = simd.mul_add_e_f64s(a_re, b_re, re[k]);
+            re[k] = simd.mul_add_e_f64s(minus, b_im, re[k]);
+            im[k] = simd.mul_add_e_f64s(a_re, b_im, im[k]);
+            im[k] = simd.mul_add_e_f64s(a_im, b_re, im[k]);
+        }
+    }
+    for (k, sum) in sums.iter_mut().enumerate() {
+        S::as_mut_simd_f64s(&mut sum.re).0[0] = re[k];
+        S::as_mut_simd_f64s(&mut sum.im).0[0] = im[k];
+    }
+    sums
 }
 
 impl SubAssign for Lanes {

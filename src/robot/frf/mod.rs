@@ -1,0 +1,433 @@
+//! Natural frequencies, mode shapes and frequency response of a chain, with exact derivatives.
+//!
+//! The eigenproblem is M x = μ K x with K positive definite, μ = ω⁻²: massless coordinates (beam halves without a body)
+//! give μ = 0 and stay in the basis as pure static compliance. With xᵀ K x = 1 the dynamic stiffness of a chain with
+//! modal damping is diagonal, 1 + 2iζω√μ − ω²μ, and H = Σ (r_out·x)(r_in·x)/(…): the modal sum including all residual
+//! compliance. Branches and viscous dampers couple the modes; then the small complex system is solved as it stands.
+
+mod derivatives;
+mod modal_basis;
+mod side_by_side;
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+
+use super::chain::System;
+use crate::{Error, Result};
+use derivatives::Derivatives;
+pub use derivatives::{RowSlopes, Slopes};
+pub use modal_basis::{ModalBasis, natural_frequencies_hz};
+use side_by_side::{LANES, Lanes, solve_in_place, solve_side_by_side};
+
+/// A system in its modal basis, ready to give receptances between chosen outputs at any frequency.
+#[derive(Debug, Clone)]
+pub struct FrfBasis {
+    /// Coordinates that move with mass: vibrating modes of the chain, then branches.
+    n: usize,
+    /// Outputs in the basis, one column an output: n × outputs.
+    rows: DMatrix<f64>,
+    /// Static compliance of the massless combinations of coordinates between the outputs, m/N. They have neither
+    /// inertia nor modal damping, so that leaving them out of the dynamics is exact.
+    massless: Option<DMatrix<f64>>,
+    dynamics: Dynamics,
+    derivatives: Derivatives,
+}
+
+#[derive(Debug, Clone)]
+enum Dynamics {
+    /// Uncoupled modes: μ and damping coefficient 2ζ√μ.
+    Diagonal { mu: Vec<f64>, damping: Vec<f64> },
+    /// Coupled: mass and damping in the basis; the stiffness is the identity plus i times what is hysteretic.
+    Full {
+        mass: DMatrix<f64>,
+        damping: DMatrix<f64>,
+        hysteretic: DMatrix<f64>,
+    },
+}
+
+/// Responses to forces along outputs at one frequency: Z⁻¹ rᵀ in the basis, n a force, column by column.
+#[derive(Debug, Clone, Default)]
+pub struct Response {
+    omega: f64,
+    columns: Vec<Complex64>,
+    /// Which column belongs to the force along an output.
+    place: Vec<Option<usize>>,
+    dynamic: Vec<Complex64>,
+}
+
+impl Response {
+    /// Angular frequency that it was solved at, rad/s.
+    pub fn omega(&self) -> f64 {
+        self.omega
+    }
+
+    /// Of the force along output `input`, which must have been solved for.
+    fn column(&self, n: usize, input: usize) -> &[Complex64] {
+        let place = self.place[input].expect("a force that was solved for");
+        &self.columns[n * place..n * (place + 1)]
+    }
+}
+
+/// Lines solved side by side, with the room to work them out again for the next.
+#[derive(Default)]
+struct SideBySide {
+    /// As those of [`Response`].
+    columns: Vec<Lanes>,
+    dynamic: Vec<Lanes>,
+    /// Room for [`show_only`](Self::show_only).
+    shown_columns: Vec<Lanes>,
+    /// One of them.
+    response: Response,
+}
+
+impl SideBySide {
+    /// Leaves out what belongs to other forces than those along `inputs`; those along all of the outputs are there.
+    fn show_only(&mut self, n: usize, inputs: &[usize]) {
+        self.response.place.fill(None);
+        for (place, input) in inputs.iter().enumerate() {
+            self.response.place[*input] = Some(place);
+        }
+        self.shown_columns.clear();
+        for input in inputs {
+            self.shown_columns
+                .extend_from_slice(&self.columns[n * input..n * (input + 1)]);
+        }
+        std::mem::swap(&mut self.columns, &mut self.shown_columns);
+    }
+
+    /// The line `lane`, which was solved at `rate`.
+    fn shown(&mut self, lane: usize, rate: &Complex64) -> &Response {
+        self.response.omega = rate.im;
+        self.response.columns.clear();
+        self.response
+            .columns
+            .extend(self.columns.iter().map(|x| x.get(lane)));
+        &self.response
+    }
+}
+
+/// The last group may be smaller: its last line fills the rest.
+fn filled(rates: &[Complex64]) -> [Complex64; LANES] {
+    std::array::from_fn(|lane| rates[lane.min(rates.len() - 1)])
+}
+
+fn finite(mut values: impl Iterator<Item = Complex64>, rate: Complex64) -> Result<()> {
+    if values.all(|v| v.is_finite()) {
+        return Ok(());
+    }
+    Err(Error::computation(format!(
+        "the model has no finite response at {:.3} Hz: it is undamped at a resonance",
+        rate.im / std::f64::consts::TAU
+    )))
+}
+
+impl FrfBasis {
+    /// `outputs`: rows of displacement per coordinate (from [`super::Chain::output_row`]).
+    ///
+    /// # Errors
+    /// A stiffness that is not positive definite.
+    pub fn new(system: &System, outputs: &[DVector<f64>]) -> Result<Self> {
+        Self::with_moved_outputs(system, outputs, &[])
+    }
+
+    /// As [`new`](Self::new), where parameters move the outputs as well: `row_slopes` says how.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn with_moved_outputs(
+        system: &System,
+        outputs: &[DVector<f64>],
+        row_slopes: &[RowSlopes],
+    ) -> Result<Self> {
+        let n = system.stiffness.nrows();
+        let chain = system.chain_count;
+        let modes = ModalBasis::new(
+            &system.stiffness.view((0, 0), (chain, chain)).into_owned(),
+            &system.chain_mass,
+        )?;
+        // Modes come with the lowest frequency first, so the massless ones stand last. Dampers in the elements damp them:
+        // then they stay. Branches do not touch them: their masses are held fast to the chain where its modes are worked
+        // out, so that a massless mode does not move them.
+        let branches = n - chain;
+        let coupled = branches > 0 || system.viscous.is_some() || system.hysteretic.is_some();
+        let damped = |viscous: &DMatrix<f64>| viscous.view((0, 0), (chain, chain)).iter().any(|c| *c != 0.0);
+        let moving = if system.viscous.as_ref().is_some_and(damped) || system.hysteretic.is_some() {
+            chain
+        } else {
+            modes.inverse_omega2.iter().filter(|mu| **mu > 0.0).count()
+        };
+        let total = n;
+        let n = moving + branches;
+        let mut basis = DMatrix::zeros(total, n);
+        basis
+            .view_mut((0, 0), (chain, moving))
+            .copy_from(&modes.shapes.columns(0, moving));
+        for i in 0..branches {
+            let k = system.stiffness[(chain + i, chain + i)];
+            if !(k > 0.0) {
+                return Err(Error::computation("a branch has no stiffness"));
+            }
+            basis[(chain + i, moving + i)] = 1.0 / k.sqrt();
+        }
+        let mut still = DMatrix::zeros(total, chain - moving);
+        still
+            .view_mut((0, 0), (chain, chain - moving))
+            .copy_from(&modes.shapes.columns(moving, chain - moving));
+        let mut rows = DMatrix::zeros(n, outputs.len());
+        let mut still_rows = DMatrix::zeros(chain - moving, outputs.len());
+        for (j, output) in outputs.iter().enumerate() {
+            rows.set_column(j, &(basis.transpose() * output));
+            still_rows.set_column(j, &(still.transpose() * output));
+        }
+        let massless = (moving < chain).then(|| still_rows.transpose() * &still_rows);
+        let zeta = system.modal_damping_ratio.value;
+        let root: Vec<f64> = modes.inverse_omega2[..moving]
+            .iter()
+            .map(|mu| mu.sqrt())
+            .collect();
+        let dynamics = if !coupled {
+            Dynamics::Diagonal {
+                mu: modes.inverse_omega2[..moving].to_vec(),
+                damping: root.iter().map(|s| 2.0 * zeta * s).collect(),
+            }
+        } else {
+            let mass = basis.transpose() * &system.mass * &basis;
+            let mut damping = match &system.viscous {
+                Some(viscous) => basis.transpose() * viscous * &basis,
+                None => DMatrix::zeros(n, n),
+            };
+            for (i, s) in root.iter().enumerate() {
+                damping[(i, i)] += 2.0 * zeta * s;
+            }
+            let hysteretic = match &system.hysteretic {
+                Some(hysteretic) => basis.transpose() * hysteretic * &basis,
+                None => DMatrix::zeros(n, n),
+            };
+            Dynamics::Full {
+                mass,
+                damping,
+                hysteretic,
+            }
+        };
+
+        let derivatives = derivatives::Projection {
+            system,
+            moving_shapes: modes.shapes.columns(0, moving),
+            root: &root,
+            basis: &basis,
+            still: &still,
+            rows: &rows,
+            still_rows: &still_rows,
+        }
+        .derivatives(row_slopes);
+        Ok(FrfBasis {
+            n,
+            rows,
+            massless,
+            dynamics,
+            derivatives,
+        })
+    }
+
+    /// Number of outputs, which are the inputs, too.
+    pub fn output_count(&self) -> usize {
+        self.rows.ncols()
+    }
+
+    /// All outputs, as [`Self::solve_lines`] takes them; [`Self::slopes`] needs the response to a force along each.
+    pub fn outputs(&self) -> Vec<usize> {
+        (0..self.output_count()).collect()
+    }
+
+    /// Solves for forces along all outputs at `omega` (rad/s). Fails only where an undamped system is hit at resonance.
+    pub fn solve(&self, omega: f64, response: &mut Response) -> Result<()> {
+        self.solve_at_rate(Complex64::new(0.0, omega), 0..self.output_count(), response)
+    }
+
+    /// Solves for forces along the outputs `inputs` that grow like exp(st), `rate` s in rad/s.
+    fn solve_at_rate(
+        &self,
+        rate: Complex64,
+        inputs: impl IntoIterator<Item = usize>,
+        response: &mut Response,
+    ) -> Result<()> {
+        let n = self.n;
+        let square = rate * rate;
+        response.omega = rate.im;
+        response.columns.clear();
+        response.place.clear();
+        response.place.resize(self.output_count(), None);
+        let rows = |input: usize| &self.rows.as_slice()[n * input..n * (input + 1)];
+        for (place, input) in inputs.into_iter().enumerate() {
+            response.place[input] = Some(place);
+            let forces = rows(input).iter().map(|r| Complex64::new(*r, 0.0));
+            response.columns.extend(forces);
+        }
+        match &self.dynamics {
+            Dynamics::Diagonal { mu, damping } => {
+                for column in response.columns.chunks_exact_mut(n.max(1)) {
+                    for (x, (mu, damping)) in column.iter_mut().zip(mu.iter().zip(damping)) {
+                        *x /= 1.0 + square * mu + rate * damping;
+                    }
+                }
+            }
+            Dynamics::Full {
+                mass,
+                damping,
+                hysteretic,
+            } => {
+                response.dynamic.clear();
+                let entries = mass.iter().zip(damping).zip(hysteretic);
+                response
+                    .dynamic
+                    .extend(entries.map(|((m, c), h)| square * m + rate * c + Complex64::new(0.0, *h)));
+                // The stiffness is the identity.
+                for diagonal in response.dynamic.iter_mut().step_by(n + 1) {
+                    diagonal.re += 1.0;
+                }
+                solve_in_place(n, &mut response.dynamic, &mut response.columns);
+            }
+        }
+        finite(response.columns.iter().copied(), rate)
+    }
+
+    /// Solves line after line for forces along the outputs `inputs` that grow like exp(st), s being `rates` (rad/s), and shows
+    /// each to `visit` with its number. Faster than line by line: some are solved side by side.
+    ///
+    /// # Errors
+    /// As [`Self::solve`]; those of `visit`.
+    pub fn solve_lines(
+        &self,
+        rates: &[Complex64],
+        inputs: &[usize],
+        mut visit: impl FnMut(usize, &Response) -> Result<()>,
+    ) -> Result<()> {
+        let mut room = SideBySide::default();
+        for (group, rates) in rates.chunks(LANES).enumerate() {
+            self.solve_group(rates, inputs, &mut room)?;
+            for (lane, rate) in rates.iter().enumerate() {
+                visit(LANES * group + lane, room.shown(lane, rate))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// As [`Self::solve_lines`] for forces along all outputs, with the derivatives of the receptances for those along `inputs`.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn solve_lines_with_slopes(
+        &self,
+        rates: &[Complex64],
+        inputs: &[usize],
+        mut visit: impl FnMut(usize, &Response, &Slopes) -> Result<()>,
+    ) -> Result<()> {
+        let (mut room, mut slopes) = (SideBySide::default(), Slopes::of_inputs(inputs));
+        let all = self.outputs();
+        for (group, rates) in rates.chunks(LANES).enumerate() {
+            self.solve_group(rates, &all, &mut room)?;
+            self.derivatives.at(filled(rates), &room.columns, &mut slopes);
+            // Forces along all outputs are solved for; those along the inputs are shown.
+            room.show_only(self.n, inputs);
+            for (lane, rate) in rates.iter().enumerate() {
+                slopes.lane = lane;
+                visit(LANES * group + lane, room.shown(lane, rate), &slopes)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Up to [`LANES`] rates together.
+    fn solve_group(&self, rates: &[Complex64], inputs: &[usize], room: &mut SideBySide) -> Result<()> {
+        let n = self.n;
+        let rate = filled(rates);
+        let square = rate.map(|s| s * s);
+        room.response.place.clear();
+        room.response.place.resize(self.output_count(), None);
+        room.columns.clear();
+        for (place, &input) in inputs.iter().enumerate() {
+            room.response.place[input] = Some(place);
+            let rows = &self.rows.as_slice()[n * input..n * (input + 1)];
+            room.columns.extend(rows.iter().map(|r| Lanes::splat(*r)));
+        }
+        match &self.dynamics {
+            Dynamics::Diagonal { mu, damping } => {
+                let (rate, square) = (Lanes::of(rate), Lanes::of(square));
+                room.dynamic.clear();
+                let modes = mu.iter().zip(damping).map(|(mu, c)| {
+                    let mut z = square.times(*mu).plus(1.0);
+                    z += rate.times(*c);
+                    z.inverse()
+                });
+                room.dynamic.extend(modes);
+                for column in room.columns.chunks_exact_mut(n.max(1)) {
+                    for (x, inverse) in column.iter_mut().zip(&room.dynamic) {
+                        *x = *x * *inverse;
+                    }
+                }
+            }
+            Dynamics::Full {
+                mass,
+                damping,
+                hysteretic,
+            } => {
+                room.dynamic.clear();
+                let entries = mass.iter().zip(damping).zip(hysteretic);
+                room.dynamic.extend(entries.map(|((m, c), h)| Lanes {
+                    re: std::array::from_fn(|l| square[l].re * m + rate[l].re * c),
+                    im: std::array::from_fn(|l| square[l].im * m + rate[l].im * c + h),
+                }));
+                // The stiffness is the identity.
+                for diagonal in room.dynamic.iter_mut().step_by(n + 1) {
+                    diagonal.re.iter_mut().for_each(|re| *re += 1.0);
+                }
+                if !solve_side_by_side(n, &mut room.dynamic, &mut room.columns) {
+                    self.solve_one_by_one(&rate, inputs, room)?;
+                }
+            }
+        }
+        for (lane, rate) in rates.iter().enumerate() {
+            finite(room.columns.iter().map(|x| x.get(lane)), *rate)?;
+        }
+        Ok(())
+    }
+
+    /// Where no pivots do for all of them.
+    fn solve_one_by_one(&self, rates: &[Complex64], inputs: &[usize], room: &mut SideBySide) -> Result<()> {
+        for (lane, rate) in rates.iter().enumerate() {
+            self.solve_at_rate(*rate, inputs.iter().copied(), &mut room.response)?;
+            for (x, value) in room.columns.iter_mut().zip(&room.response.columns) {
+                x.set(lane, *value);
+            }
+        }
+        Ok(())
+    }
+
+    /// Receptance of output `out` per force along output `input`, m/N, at the frequency last solved; for one of the two it must
+    /// have been solved (Maxwell 1864: the matrices are symmetric).
+    pub fn receptance(&self, response: &Response, out: usize, input: usize) -> Complex64 {
+        let (force, seen) = if response.place[input].is_some() {
+            (input, out)
+        } else {
+            (out, input)
+        };
+        let column = response.column(self.n, force);
+        let row = &self.rows.as_slice()[seen * self.n..(seen + 1) * self.n];
+        // Two sums, so that additions need not wait for each other.
+        let mut sums = [Complex64::ZERO; 2];
+        for (row, column) in row.chunks(2).zip(column.chunks(2)) {
+            for ((r, u), sum) in row.iter().zip(column).zip(&mut sums) {
+                *sum += u * *r;
+            }
+        }
+        let moving = sums[0] + sums[1];
+        moving + self.massless.as_ref().map_or(0.0, |m| m[(out, input)])
+    }
+
+    /// Receptance at `omega` in one call, m/N.
+    pub fn receptance_at(&self, omega: f64, out: usize, input: usize) -> Result<Complex64> {
+        let mut response = Response::default();
+        self.solve(omega, &mut response)?;
+        Ok(self.receptance(&response, out, input))
+    }
+}

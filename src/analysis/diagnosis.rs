@@ -80,7 +80,7 @@ impl<D: CampaignSide> Findings<D> {
         heed_setup(&mut diagnosis, &setup);
         let now = D::view(&case, &case.model, &diagnosis.baseline.theta)?;
         let lead = match is_unnamed(&diagnosis, &setup) {
-            true => D::lead(&case, &study, &now)?,
+            true => D::lead(&case, campaign, &study, &diagnosis, &now)?,
             false => None,
         };
         let leading = leading_candidate(&diagnosis)

@@ -60,40 +60,14 @@ impl FreedLinks {
         let free = |only: Option<&[String]>| before.case.freeing(campaign, &Freed { groups, only });
         let every = from_where_it_stood(free(None)?, &before.calibration, options)?;
         let parameters = &every.case.model.parameters;
-        let known = |name: &str| before.calibration.parameters.iter().any(|p| p.name == name);
-        let new: Vec<usize> = (0..parameters.len())
-            .filter(|i| !known(&parameters[*i].name))
-            .collect();
         let undetermined = Undetermined::new(parameters, &every.calibration)?;
-        let departing_of = |fit: &StructureAnalysis, among: &[usize]| -> Vec<String> {
-            let parameters = &fit.case.model.parameters;
-            departures(parameters, &fit.calibration, among)
-                .into_iter()
-                .map(|i| parameters[i].name.clone())
-                .collect()
-        };
-        let mut departing = departing_of(&every, &new);
         // What the campaign frees itself stays free.
-        let before_names = || before.calibration.parameters.iter().map(|p| p.name.clone());
-        let fitted_with = |departing: &[String], start: &Calibration| {
-            let kept: Vec<String> = before_names().chain(departing.iter().cloned()).collect();
-            from_where_it_stood(free(Some(&kept))?, start, options)
-        };
-        let mut after = fitted_with(&departing, &every.calibration)?;
-        // The choice was made on the quadratic form of a fit with everything free; what agrees with the file once the others are
-        // back at their values has nothing to depart from.
-        loop {
-            let parameters = &after.case.model.parameters;
-            let among: Vec<usize> = (0..parameters.len())
-                .filter(|i| departing.contains(&parameters[*i].name))
-                .collect();
-            let still = departing_of(&after, &among);
-            if still.len() == departing.len() {
-                break;
-            }
-            departing = still;
-            after = fitted_with(&departing, &after.calibration)?;
-        }
+        let (departing, after) = fitted_departing(
+            &before.calibration,
+            &every,
+            |fit| (&fit.case.model.parameters, &fit.calibration),
+            |kept, fit| from_where_it_stood(free(Some(kept))?, &fit.calibration, options),
+        )?;
         let error = |analysis: &StructureAnalysis| {
             let case = &analysis.case;
             let study = case.study(options);
@@ -107,13 +81,48 @@ impl FreedLinks {
         Ok(FreedLinks {
             groups: groups.to_vec(),
             progress: held_out.as_ref().map(better),
-            freed: new.len(),
+            freed: parameters.len() - before.calibration.parameters.len(),
             undetermined,
             departing,
             held_out,
             before,
             after,
         })
+    }
+}
+
+/// Of the parameters that are free in the fit `every` and not in `before`, the names of those that must differ from the robot file, and
+/// the fit with them alone. `of`: a fit's parameters and their values; `refit`: a fit with the parameters named, from an earlier one.
+pub(super) fn fitted_departing<F>(
+    before: &Calibration,
+    every: &F,
+    of: impl Fn(&F) -> (&[Parameter], &Calibration),
+    refit: impl Fn(&[String], &F) -> Result<F>,
+) -> Result<(Vec<String>, F)> {
+    let known: Vec<&String> = before.parameters.iter().map(|p| &p.name).collect();
+    let departing = |fit: &F| -> Vec<String> {
+        let (parameters, calibration) = of(fit);
+        let new: Vec<usize> = (0..parameters.len())
+            .filter(|i| !known.contains(&&parameters[*i].name))
+            .collect();
+        let found = departures(parameters, calibration, &new).into_iter();
+        found.map(|i| parameters[i].name.clone()).collect()
+    };
+    let with = |names: &[String], start: &F| {
+        let kept: Vec<String> = known.iter().copied().chain(names).cloned().collect();
+        refit(&kept, start)
+    };
+    let mut names = departing(every);
+    let mut fit = with(&names, every)?;
+    // The choice was made on the quadratic form of a fit with everything free; what agrees with the file once the others are back at
+    // their values has nothing to depart from.
+    loop {
+        let still = departing(&fit);
+        if still.len() == names.len() {
+            return Ok((names, fit));
+        }
+        fit = with(&still, &fit)?;
+        names = still;
     }
 }
 

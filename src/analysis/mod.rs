@@ -19,6 +19,7 @@ pub mod structure;
 pub mod structure_case;
 pub mod structure_side;
 pub mod workbench;
+pub mod wrong_links;
 
 pub use addition::Addition;
 pub use campaign::{CampaignFindings, LobeFindings, PostureFindings, StructureFindings};
@@ -35,5 +36,6 @@ pub use stability::lobes::{LobeAnalysis, LobeCase, LobesBefore};
 pub use stability::redundancy::{HoleWeighing, RedundancyAnalysis};
 pub use stability::sweep::{Sweep, SweepRequest, SweepRow};
 pub use structure::StructureAnalysis;
-pub use structure_side::FrfView;
+pub use structure_side::{FrfView, StructureLead};
 pub use workbench::Workbench;
+pub use wrong_links::WrongLinks;

@@ -63,7 +63,13 @@ pub trait CampaignSide: Modelled {
     ///
     /// # Errors
     /// A fit that fails.
-    fn lead(case: &Case<Self>, study: &Self::Study, now: &Self::View) -> Result<Option<Self::Lead>>;
+    fn lead(
+        case: &Case<Self>,
+        campaign: &Campaign,
+        study: &Self::Study,
+        diagnosis: &Diagnosis<Self>,
+        now: &Self::View,
+    ) -> Result<Option<Self::Lead>>;
 
     /// The measurement that would tell most.
     ///

@@ -6,6 +6,7 @@ use super::diagnosis::rival;
 use super::side::CampaignSide;
 use super::structure::study_of;
 use super::workbench::Workbench;
+use super::wrong_links::WrongLinks;
 use crate::Result;
 use crate::campaign::Campaign;
 use crate::discrepancy::comparison::compare::ErrorTotals;
@@ -25,12 +26,20 @@ pub struct FrfView {
     pub comparison: FrfComparison,
 }
 
+/// What is known of a rest that no effect explains; one of both at least.
+pub struct StructureLead {
+    /// Where it sits and what it does there, if one place explains more than chance.
+    pub place: Option<Localisation>,
+    /// Numbers of the robot file that explain it.
+    pub links: Option<WrongLinks>,
+}
+
 impl CampaignSide for Structure {
     const SIDE: Side = Side::Structure;
     const FOLDS: &'static str = "postures";
     type View = FrfView;
     type Explained = Explained;
-    type Lead = Localisation;
+    type Lead = StructureLead;
     type Study = StructureStudy;
 
     fn registry() -> Registry<Structure> {
@@ -78,9 +87,18 @@ impl CampaignSide for Structure {
         })
     }
 
-    /// Kept where one place explains more than chance.
-    fn lead(case: &StructureCase, study: &StructureStudy, _now: &FrfView) -> Result<Option<Localisation>> {
-        Ok(Some(localise(study, &case.model)?).filter(|found| found.significant))
+    fn lead(
+        case: &StructureCase,
+        campaign: &Campaign,
+        study: &StructureStudy,
+        diagnosis: &Diagnosis<Structure>,
+        _now: &FrfView,
+    ) -> Result<Option<StructureLead>> {
+        let found = StructureLead {
+            place: Some(localise(study, &case.model)?).filter(|found| found.significant),
+            links: WrongLinks::seek(campaign, case, study, diagnosis)?,
+        };
+        Ok((found.place.is_some() || found.links.is_some()).then_some(found))
     }
 
     fn next(

@@ -163,6 +163,14 @@ impl<'a> Guide<'a> {
         }
     }
 
+    /// After `diagnose`, where numbers of the robot file explain what no effect does.
+    pub fn wrong_links(&self) -> String {
+        format!(
+            "run `lobestone calibrate {} --free links` for the links that fit, and compare them with what the robot is",
+            word(&self.campaign.dir)
+        )
+    }
+
     /// After `add`.
     pub fn added(&self, progress: Option<bool>, reduced_chi2: f64, error: &ErrorTotals) -> String {
         match progress {

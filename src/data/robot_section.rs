@@ -51,6 +51,12 @@ impl LinkGroup {
         LinkGroup::Walls,
     ];
 
+    /// Those that a model has whose links bend, or do not.
+    pub fn of_model(bends: bool) -> Vec<LinkGroup> {
+        let all = LinkGroup::ALL.into_iter();
+        all.filter(|g| bends || *g != LinkGroup::Walls).collect()
+    }
+
     /// The key of `[robot]` that frees the group for good.
     pub const fn key(self) -> &'static str {
         match self {

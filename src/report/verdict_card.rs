@@ -1,11 +1,11 @@
 //! The cards of a campaign: what its diagnosis says, put into the words of a [`VerdictCard`].
 
 use super::card::{BeforeAfter, ErrorBar, Tone, VerdictCard};
-use super::number::{percent, plus_minus, significant};
+use super::number::{format_si, percent, plus_minus, significant};
 use super::picture::Picture;
 use super::words::{self, frf_name, listed};
 use crate::analysis::diagnosis::Leading;
-use crate::analysis::{CuttingFindings, DiagnosisFindings, StructureFindings};
+use crate::analysis::{CuttingFindings, DiagnosisFindings, StructureFindings, StructureLead, WrongLinks};
 use crate::campaign::{Campaign, Process};
 use crate::discrepancy::candidate::BaselineFit;
 use crate::discrepancy::localise::Localisation;
@@ -68,7 +68,7 @@ fn answer<D: Modelled>(
     d: &Diagnosis<D>,
     added: &[String],
     data: &str,
-    lead: Option<&Localisation>,
+    lead: Option<&StructureLead>,
 ) -> VerdictCard {
     let mut card = VerdictCard::default();
     let label_in_words = |label: &String| {
@@ -98,7 +98,12 @@ fn answer<D: Modelled>(
             card.headline = "No verdict: too few data for one".into();
             card.explanation = sentence(d.too_little_data.as_deref().unwrap_or_default());
         }
-        _ => unknown(&mut card, d, lead),
+        _ => {
+            unknown(&mut card, d, lead.and_then(|l| l.place.as_ref()));
+            if let Some(links) = lead.and_then(|l| l.links.as_ref()) {
+                robot_file_first(&mut card, links);
+            }
+        }
     }
     if d.too_little_data.is_none() {
         card.facts.push(("How sure", words::confidence(d.confidence)));
@@ -179,6 +184,27 @@ fn unknown<D: Modelled>(card: &mut VerdictCard, d: &Diagnosis<D>, lead: Option<&
             .push(("Best guess", words.replacen(&guess.label(), &of.title, 1)));
         card.check = Some(format!("Of the best guess ({}): {}", of.title, of.lab_check));
     }
+}
+
+/// Numbers of the robot file that explain what no effect does stand before what the data draw.
+fn robot_file_first(card: &mut VerdictCard, links: &WrongLinks) {
+    card.headline = "The robot file may be wrong: other links explain what is left".into();
+    card.explanation = format!(
+        "No effect that this program knows explains what is left, but links other than in the robot file do: with them {:.2} times \
+         the noise's variance is left.",
+        links.reduced_chi2
+    );
+    let numbers = links.departing.iter().map(|p| {
+        let unit = if p.unit == "1" { "" } else { p.unit };
+        let file = format_si(p.initial, unit, 4);
+        let fitted = plus_minus(p.value, p.std_error, unit);
+        format!("{} {fitted} (file: {file})", p.name)
+    });
+    card.facts
+        .retain(|(name, _)| *name != "How big" && *name != "Or at");
+    card.facts
+        .insert(0, ("Links", listed(&numbers.collect::<Vec<_>>())));
+    card.check = Some("Compare these numbers with a drawing, a CAD model or the maker's data.".into());
 }
 
 /// The first letter large, a full stop at the end.
@@ -280,7 +306,17 @@ pub fn structure(
                     winner.label()
                 ),
                 (DiagnosisVerdict::None, ..) => use_it(campaign),
-                (_, _, Some(lead)) => match lead.places.first().and_then(|p| p.best.as_ref()) {
+                (_, _, Some(StructureLead { links: Some(_), .. })) => format!(
+                    "see which links fit: `lobestone calibrate {dir} --free links`; where the robot is so, give the campaign a robot \
+                     file of its own with them"
+                ),
+                (
+                    _,
+                    _,
+                    Some(StructureLead {
+                        place: Some(lead), ..
+                    }),
+                ) => match lead.places.first().and_then(|p| p.best.as_ref()) {
                     Some(best) => format!(
                         "look at what the data draw: `lobestone localise {dir}`; to put it into the model: `lobestone add \
                          {dir} {}`",

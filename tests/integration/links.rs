@@ -60,6 +60,40 @@ fn inertia_and_length_are_found() {
     assert!(number("held_out_nrms_after") < 0.5 * number("held_out_nrms_before"));
 }
 
+/// Links that are not those of the file are no effect: `diagnose` says which numbers explain what is left, and what to run next.
+#[test]
+fn diagnose_says_that_the_robot_file_is_wrong() {
+    let (_dir, name) = campaign();
+    let found = document(&["diagnose", &name]);
+    assert_eq!(found["verdict"], "unknown");
+    let wrong = &found["wrong_links"];
+    let departing = wrong["departing"].as_array().unwrap();
+    let of = |name: &str| departing.iter().find(|p| p["name"] == name);
+    for (name, truth, within) in [
+        ("link-4.inertia-x", 60.0, 3.0),
+        ("link-4.inertia-y", 60.0, 3.0),
+        ("joint-4.d", 1.1654, 1e-3),
+    ] {
+        let fitted = of(name).unwrap_or_else(|| panic!("{name}: {wrong}"))["value"].as_f64();
+        assert!((fitted.unwrap() - truth).abs() < within, "{name} {fitted:?}");
+    }
+    // Each is off by what no error of the fit brings.
+    for p in departing {
+        let number = |key: &str| p[key].as_f64().unwrap();
+        assert!(
+            (number("value") - number("initial")).abs() > 3.0 * number("std_error"),
+            "{p}"
+        );
+    }
+    assert!(wrong["explained_share"].as_f64().unwrap() > 0.99);
+    let run = lobestone(&["diagnose", &name]);
+    assert!(
+        run.stdout.contains("robot file may be wrong") && run.stdout.contains("--free links"),
+        "{}",
+        run.stdout
+    );
+}
+
 /// The keys of `[robot]` do what `--free` does.
 #[test]
 fn tolerances_in_the_campaign_free_for_good() {

@@ -74,7 +74,13 @@ impl CampaignSide for Cutting {
         }
     }
 
-    fn lead(case: &CuttingCase, _study: &CuttingStudy, now: &CuttingView) -> Result<Option<CuttingLead>> {
+    fn lead(
+        case: &CuttingCase,
+        _campaign: &Campaign,
+        _study: &CuttingStudy,
+        _diagnosis: &Diagnosis<Cutting>,
+        now: &CuttingView,
+    ) -> Result<Option<CuttingLead>> {
         Ok(cutting_lead(&case.data, &now.fits))
     }
 

@@ -47,10 +47,7 @@ enum Free {
 impl Free {
     fn groups(self, bends: bool) -> Vec<LinkGroup> {
         match self {
-            Free::Links => LinkGroup::ALL
-                .into_iter()
-                .filter(|g| bends || *g != LinkGroup::Walls)
-                .collect(),
+            Free::Links => LinkGroup::of_model(bends),
             Free::Masses => vec![LinkGroup::Masses],
             Free::Inertias => vec![LinkGroup::Inertias],
             Free::Centres => vec![LinkGroup::Centres],

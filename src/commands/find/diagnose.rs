@@ -1,7 +1,7 @@
 use serde_json::{Map, Value, json};
 
 use crate::Result;
-use crate::analysis::{CampaignSide, CuttingFindings, DiagnosisFindings, Findings, Workbench};
+use crate::analysis::{CampaignSide, CuttingFindings, DiagnosisFindings, Findings, Workbench, WrongLinks};
 use crate::campaign::Campaign;
 use crate::commands::find::localise;
 use crate::commands::next_step::Guide;
@@ -15,6 +15,7 @@ use crate::identify::Modelled;
 use crate::identify::Options;
 use crate::identify::frfs::structure_study::residual_peaks;
 use crate::identify::rest::Rest;
+use crate::report::number::{format_si, plus_minus};
 use crate::text::chance;
 
 pub fn run(args: SideArgs) -> Result<Outcome> {
@@ -43,7 +44,7 @@ pub fn cutting(campaign: &Campaign, findings: &CuttingFindings) -> Outcome {
         "lead": findings.lead,
     });
     let told = findings.lead.as_ref().map_or(String::new(), lines_in_words);
-    outcome(Guide::cutting(campaign), findings, own, &told)
+    outcome(Guide::cutting(campaign), findings, own, &told, None)
 }
 
 /// What was found out about the FRFs.
@@ -53,14 +54,28 @@ pub fn structure(campaign: &Campaign, findings: &DiagnosisFindings) -> Outcome {
         "explains": explains(findings),
         "residual_peaks_hz": peaks.iter().map(|p| p.frequency_hz).collect::<Vec<_>>(),
         "residual_peaks": peaks,
-        "lead": findings.lead.as_ref().map(lead),
+        "lead": findings.lead.as_ref().and_then(|l| l.place.as_ref()).map(lead),
+        "wrong_links": wrong_links(findings),
     });
     let told = crate::commands::find::compare::dominant(peaks) + &where_it_shows(findings);
-    outcome(Guide::structure(campaign), findings, own, &told)
+    let guide = Guide::structure(campaign);
+    let instead = wrong_links(findings).map(|_| guide.wrong_links());
+    outcome(guide, findings, own, &told, instead)
 }
 
-/// What both sides say alike; `own`: keys of this side alone, `told`: its own words.
-fn outcome<D: CampaignSide>(guide: Guide<'_>, findings: &Findings<D>, own: Value, told: &str) -> Outcome {
+fn wrong_links(findings: &DiagnosisFindings) -> Option<&WrongLinks> {
+    findings.lead.as_ref()?.links.as_ref()
+}
+
+/// What both sides say alike; `own`: keys of this side alone, `told`: its own words, `instead`: a next step that is better than a
+/// further measurement.
+fn outcome<D: CampaignSide>(
+    guide: Guide<'_>,
+    findings: &Findings<D>,
+    own: Value,
+    told: &str,
+    instead: Option<String>,
+) -> Outcome {
     let Findings {
         case,
         diagnosis: d,
@@ -104,7 +119,8 @@ fn outcome<D: CampaignSide>(guide: Guide<'_>, findings: &Findings<D>, own: Value
         + &rest(d, next_measurement)
         + &warnings(&case.warnings);
     let winner = d.winner().map(EffectCandidate::label);
-    let next = guide.diagnosed(d.verdict, winner.as_deref(), &next_measurement.what);
+    let next =
+        instead.unwrap_or_else(|| guide.diagnosed(d.verdict, winner.as_deref(), &next_measurement.what));
     Outcome::new(json, text, Some(next))
 }
 
@@ -298,7 +314,10 @@ fn where_it_shows(findings: &DiagnosisFindings) -> String {
         };
         text += &wrapped(&leading.explained.sentence(&who), "  ");
     }
-    if let Some(found) = &findings.lead {
+    if let Some(found) = wrong_links(findings) {
+        text += &wrapped(&wrong_links_in_words(found), "  ");
+    }
+    if let Some(found) = findings.lead.as_ref().and_then(|l| l.place.as_ref()) {
         text += &wrapped(
             &format!(
                 "A lead: {}. `lobestone localise` draws it.",
@@ -308,6 +327,23 @@ fn where_it_shows(findings: &DiagnosisFindings) -> String {
         );
     }
     text
+}
+
+fn wrong_links_in_words(found: &WrongLinks) -> String {
+    let numbers = found.departing.iter().map(|p| {
+        format!(
+            "{} {} instead of {}",
+            p.name,
+            plus_minus(p.value, p.std_error, p.unit),
+            format_si(p.initial, p.unit, 4)
+        )
+    });
+    format!(
+        "The robot file may be wrong: with {} the model leaves {:.2} times the noise variance. Compare these numbers with a drawing or \
+         the maker's data; `lobestone calibrate --free links` fits them.",
+        numbers.collect::<Vec<_>>().join(", "),
+        found.reduced_chi2
+    )
 }
 
 /// The best place of what the data draw.

@@ -6,6 +6,7 @@
 //! compliance. Branches and viscous dampers couple the modes; then the small complex system is solved as it stands.
 
 mod derivatives;
+mod dynamics;
 mod modal_basis;
 mod side_by_side;
 
@@ -16,8 +17,9 @@ use super::chain::System;
 use crate::{Error, Result};
 use derivatives::Derivatives;
 pub use derivatives::{RowSlopes, Slopes};
+use dynamics::{Dynamics, Modes, Room};
 pub use modal_basis::{ModalBasis, natural_frequencies_hz};
-use side_by_side::{LANES, Lanes, solve_in_place, solve_side_by_side};
+use side_by_side::{LANES, Lanes};
 
 /// A system in its modal basis, ready to give receptances between chosen outputs at any frequency.
 #[derive(Debug, Clone)]
@@ -33,18 +35,6 @@ pub struct FrfBasis {
     derivatives: Derivatives,
 }
 
-#[derive(Debug, Clone)]
-enum Dynamics {
-    /// Uncoupled modes: μ and damping coefficient 2ζ√μ.
-    Diagonal { mu: Vec<f64>, damping: Vec<f64> },
-    /// Coupled: mass and damping in the basis; the stiffness is the identity plus i times what is hysteretic.
-    Full {
-        mass: DMatrix<f64>,
-        damping: DMatrix<f64>,
-        hysteretic: DMatrix<f64>,
-    },
-}
-
 /// Responses to forces along outputs at one frequency: Z⁻¹ rᵀ in the basis, n a force, column by column.
 #[derive(Debug, Clone, Default)]
 pub struct Response {
@@ -52,7 +42,6 @@ pub struct Response {
     columns: Vec<Complex64>,
     /// Which column belongs to the force along an output.
     place: Vec<Option<usize>>,
-    dynamic: Vec<Complex64>,
 }
 
 impl Response {
@@ -73,7 +62,7 @@ impl Response {
 struct SideBySide {
     /// As those of [`Response`].
     columns: Vec<Lanes>,
-    dynamic: Vec<Lanes>,
+    room: Room,
     /// Room for [`show_only`](Self::show_only).
     shown_columns: Vec<Lanes>,
     /// One of them.
@@ -185,29 +174,26 @@ impl FrfBasis {
             .iter()
             .map(|mu| mu.sqrt())
             .collect();
+        let own = Modes {
+            mu: modes.inverse_omega2[..moving].to_vec(),
+            damping: root.iter().map(|s| 2.0 * zeta * s).collect(),
+        };
         let dynamics = if !coupled {
-            Dynamics::Diagonal {
-                mu: modes.inverse_omega2[..moving].to_vec(),
-                damping: root.iter().map(|s| 2.0 * zeta * s).collect(),
-            }
+            Dynamics::Diagonal(own)
         } else {
             let mass = basis.transpose() * &system.mass * &basis;
             let mut damping = match &system.viscous {
                 Some(viscous) => basis.transpose() * viscous * &basis,
                 None => DMatrix::zeros(n, n),
             };
-            for (i, s) in root.iter().enumerate() {
-                damping[(i, i)] += 2.0 * zeta * s;
+            for (i, c) in own.damping.iter().enumerate() {
+                damping[(i, i)] += c;
             }
             let hysteretic = match &system.hysteretic {
                 Some(hysteretic) => basis.transpose() * hysteretic * &basis,
                 None => DMatrix::zeros(n, n),
             };
-            Dynamics::Full {
-                mass,
-                damping,
-                hysteretic,
-            }
+            Dynamics::coupled(own, mass, damping, hysteretic)
         };
 
         let derivatives = derivatives::Projection {
@@ -252,7 +238,6 @@ impl FrfBasis {
         response: &mut Response,
     ) -> Result<()> {
         let n = self.n;
-        let square = rate * rate;
         response.omega = rate.im;
         response.columns.clear();
         response.place.clear();
@@ -263,31 +248,7 @@ impl FrfBasis {
             let forces = rows(input).iter().map(|r| Complex64::new(*r, 0.0));
             response.columns.extend(forces);
         }
-        match &self.dynamics {
-            Dynamics::Diagonal { mu, damping } => {
-                for column in response.columns.chunks_exact_mut(n.max(1)) {
-                    for (x, (mu, damping)) in column.iter_mut().zip(mu.iter().zip(damping)) {
-                        *x /= 1.0 + square * mu + rate * damping;
-                    }
-                }
-            }
-            Dynamics::Full {
-                mass,
-                damping,
-                hysteretic,
-            } => {
-                response.dynamic.clear();
-                let entries = mass.iter().zip(damping).zip(hysteretic);
-                response
-                    .dynamic
-                    .extend(entries.map(|((m, c), h)| square * m + rate * c + Complex64::new(0.0, *h)));
-                // The stiffness is the identity.
-                for diagonal in response.dynamic.iter_mut().step_by(n + 1) {
-                    diagonal.re += 1.0;
-                }
-                solve_in_place(n, &mut response.dynamic, &mut response.columns);
-            }
-        }
+        self.dynamics.solve_one(rate, &mut response.columns);
         finite(response.columns.iter().copied(), rate)
     }
 
@@ -341,7 +302,6 @@ impl FrfBasis {
     fn solve_group(&self, rates: &[Complex64], inputs: &[usize], room: &mut SideBySide) -> Result<()> {
         let n = self.n;
         let rate = filled(rates);
-        let square = rate.map(|s| s * s);
         room.response.place.clear();
         room.response.place.resize(self.output_count(), None);
         room.columns.clear();
@@ -350,41 +310,8 @@ impl FrfBasis {
             let rows = &self.rows.as_slice()[n * input..n * (input + 1)];
             room.columns.extend(rows.iter().map(|r| Lanes::splat(*r)));
         }
-        match &self.dynamics {
-            Dynamics::Diagonal { mu, damping } => {
-                let (rate, square) = (Lanes::of(rate), Lanes::of(square));
-                room.dynamic.clear();
-                let modes = mu.iter().zip(damping).map(|(mu, c)| {
-                    let mut z = square.times(*mu).plus(1.0);
-                    z += rate.times(*c);
-                    z.inverse()
-                });
-                room.dynamic.extend(modes);
-                for column in room.columns.chunks_exact_mut(n.max(1)) {
-                    for (x, inverse) in column.iter_mut().zip(&room.dynamic) {
-                        *x = *x * *inverse;
-                    }
-                }
-            }
-            Dynamics::Full {
-                mass,
-                damping,
-                hysteretic,
-            } => {
-                room.dynamic.clear();
-                let entries = mass.iter().zip(damping).zip(hysteretic);
-                room.dynamic.extend(entries.map(|((m, c), h)| Lanes {
-                    re: std::array::from_fn(|l| square[l].re * m + rate[l].re * c),
-                    im: std::array::from_fn(|l| square[l].im * m + rate[l].im * c + h),
-                }));
-                // The stiffness is the identity.
-                for diagonal in room.dynamic.iter_mut().step_by(n + 1) {
-                    diagonal.re.iter_mut().for_each(|re| *re += 1.0);
-                }
-                if !solve_side_by_side(n, &mut room.dynamic, &mut room.columns) {
-                    self.solve_one_by_one(&rate, inputs, room)?;
-                }
-            }
+        if !self.dynamics.solve(rate, &mut room.columns, &mut room.room) {
+            self.solve_one_by_one(&rate, inputs, room)?;
         }
         for (lane, rate) in rates.iter().enumerate() {
             finite(room.columns.iter().map(|x| x.get(lane)), *rate)?;

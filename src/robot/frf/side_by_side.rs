@@ -210,6 +210,12 @@ pub(super) fn solve_side_by_side(n: usize, a: &mut [Lanes], b: &mut [Lanes]) -> 
     Arch::new().dispatch(SideBySide { n, a, b })
 }
 
+/// As [`solve_side_by_side`], for code that is compiled for the processor already.
+#[inline(always)]
+pub(super) fn eliminate_side_by_side(n: usize, a: &mut [Lanes], b: &mut [Lanes]) -> bool {
+    eliminate(n, a, b, pivot_in_common, Lanes::inverse)
+}
+
 /// A pivot is at least this part of the largest number in its column: what rounding adds stays small.
 const LEAST_PIVOT: f64 = 0.25;
 
@@ -241,7 +247,7 @@ impl WithSimd for SideBySide<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> bool {
-        eliminate(self.n, self.a, self.b, pivot_in_common, Lanes::inverse)
+        eliminate_side_by_side(self.n, self.a, self.b)
     }
 }
 

@@ -1,0 +1,121 @@
+//! Whether the robot file's links are not those of the robot: asked where no effect explains what is left.
+
+use serde::Serialize;
+
+use super::freed_links::fitted_departing;
+use super::structure_case::Freed;
+use crate::Result;
+use crate::campaign::{Campaign, LinkGroup};
+use crate::discrepancy::verdict::is_noise;
+use crate::discrepancy::{Diagnosis, EffectCandidate};
+use crate::effects::Structure;
+use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
+use crate::identify::study::{Extent, Study, View};
+use crate::identify::{Calibration, Estimate, StructureCase, StructureModel, StructureStudy};
+
+/// Numbers of the robot file that the data contradict, and that explain what no effect does.
+#[derive(Debug, Clone, Serialize)]
+pub struct WrongLinks {
+    /// As fitted; the robot file's as `initial`.
+    pub departing: Vec<Estimate>,
+    /// Weighted misfit per value that is left with them.
+    pub reduced_chi2: f64,
+    /// Share of what stands above the noise that they explain, 0..1.
+    pub explained_share: f64,
+}
+
+/// Share of what stands above the noise in a glance at the data that all numbers together must explain to be followed, …
+const PROMISING: f64 = 0.5;
+/// … and in all data those that must differ, to be told.
+const TELLING: f64 = 0.9;
+
+const LOOK: Stopping = Stopping {
+    max_iterations: 8,
+    relative_decrease: 1e-3,
+};
+const SETTLE: Stopping = Stopping {
+    max_iterations: 25,
+    relative_decrease: 1e-6,
+};
+
+impl WrongLinks {
+    /// Sought from where the diagnosis left the model as it stands; `None` where such numbers do not explain what is left, or no
+    /// better than an effect.
+    ///
+    /// # Errors
+    /// A model that cannot be set up, and a fit that fails.
+    pub fn seek(
+        campaign: &Campaign,
+        case: &StructureCase,
+        study: &StructureStudy,
+        diagnosis: &Diagnosis<Structure>,
+    ) -> Result<Option<Self>> {
+        let groups: Vec<LinkGroup> = LinkGroup::of_model(case.bends());
+        let free = |only: Option<&[String]>| -> Result<StructureModel> {
+            let groups = &groups;
+            Ok(case.freeing(campaign, &Freed { groups, only })?.model)
+        };
+        let every = free(None)?;
+        let before = &diagnosis.baseline.calibration;
+        if every.parameters.len() == before.parameters.len() {
+            return Ok(None);
+        }
+        let fit = |model: &StructureModel, extent: Extent, start: &[f64], stopping| {
+            let view = View { extent, ..View::FULL };
+            minimise(&study.problem(model, view), start, &model.bounds(), stopping)
+        };
+        let start = by_name(&every, &before.parameters);
+        let with = fit(&every, Extent::Glance, &start, LOOK)?;
+        let without = fit(&case.model, Extent::Glance, &before.theta, LOOK)?;
+        let above_noise = without.cost - 0.5 * study.real_values(Extent::Glance) as f64;
+        if above_noise <= 0.0 || without.cost - with.cost < PROMISING * above_noise {
+            return Ok(None);
+        }
+        let calibrated = |model: StructureModel, fit: Fit, extent| {
+            let found = Calibration::of_fit(&model.parameters, fit, study.real_values(extent))?;
+            Ok::<_, crate::Error>((model, found))
+        };
+        let near = fit(&every, Extent::Coarse, &with.theta, SETTLE)?;
+        let every = calibrated(every, near, Extent::Coarse)?;
+        let (names, (_, after)) = fitted_departing(
+            before,
+            &every,
+            |(model, found)| (&model.parameters, found),
+            |kept, (_, found)| {
+                let model = free(Some(kept))?;
+                let start = by_name(&model, &found.parameters);
+                let fit = fit(&model, Extent::Full, &start, SETTLE)?;
+                calibrated(model, fit, Extent::Full)
+            },
+        )?;
+        let base = diagnosis.baseline.reduced_chi2;
+        let share = (base - after.reduced_chi2) / (base - 1.0).max(f64::MIN_POSITIVE);
+        let possible = |c: &&EffectCandidate<Structure>| c.refined && !c.at_bound && c.not_credible.is_none();
+        let effects = diagnosis.candidates.iter().filter(possible);
+        let best = effects.map(|c| c.reduced_chi2).fold(base, f64::min);
+        let told = !names.is_empty()
+            && after.reduced_chi2 < best
+            && (share > TELLING || is_noise(after.reduced_chi2) && !is_noise(base));
+        Ok(told.then(|| WrongLinks {
+            departing: after
+                .parameters
+                .iter()
+                .filter(|p| names.contains(&p.name))
+                .cloned()
+                .collect(),
+            reduced_chi2: after.reduced_chi2,
+            explained_share: share.clamp(0.0, 1.0),
+        }))
+    }
+}
+
+/// Starting point of `model` (solver's scale): the `known` values, the robot file's of the others.
+fn by_name(model: &StructureModel, known: &[Estimate]) -> Vec<f64> {
+    let parameters = model.parameters.iter();
+    parameters
+        .map(|p| {
+            let known = known.iter().find(|k| k.name == p.name);
+            p.internal(known.map_or(p.nominal, |k| k.value))
+        })
+        .collect()
+}

@@ -96,6 +96,7 @@ def runs(work):
         ["diagnose", plain],
         ["diagnose", payload],
         ["diagnose", milling],
+        ["diagnose", copy("links", ROOT / "tests/data/links/both")],
         ["localise", payload],
         ["plan", plain],
         ["plan", payload],

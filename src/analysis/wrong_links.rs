@@ -9,7 +9,7 @@ use crate::campaign::{Campaign, LinkGroup};
 use crate::discrepancy::verdict::is_noise;
 use crate::discrepancy::{Diagnosis, EffectCandidate};
 use crate::effects::Structure;
-use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
+use crate::identify::levenberg_marquardt::{Fit, LeastSquares, Linearisation, Stopping, minimise};
 use crate::identify::study::{Extent, Study, View};
 use crate::identify::{Calibration, Estimate, StructureCase, StructureModel, StructureStudy};
 
@@ -65,10 +65,20 @@ impl WrongLinks {
             minimise(&study.problem(model, view), start, &model.bounds(), stopping)
         };
         let start = by_name(&every, &before.parameters);
+        let glance = View {
+            extent: Extent::Glance,
+            ..View::FULL
+        };
+        let above_noise = study.problem(&case.model, glance).cost(&before.theta)?
+            - 0.5 * study.real_values(Extent::Glance) as f64;
+        // What one step of Gauss and Newton promises is soon known, and mostly enough.
+        let promised = one_step_gain(&study.problem(&every, glance).linearise(&start)?);
+        if above_noise <= 0.0 || promised < PROMISING * above_noise {
+            return Ok(None);
+        }
         let with = fit(&every, Extent::Glance, &start, LOOK)?;
         let without = fit(&case.model, Extent::Glance, &before.theta, LOOK)?;
-        let above_noise = without.cost - 0.5 * study.real_values(Extent::Glance) as f64;
-        if above_noise <= 0.0 || without.cost - with.cost < PROMISING * above_noise {
+        if without.cost - with.cost < PROMISING * above_noise {
             return Ok(None);
         }
         let calibrated = |model: StructureModel, fit: Fit, extent| {
@@ -107,6 +117,12 @@ impl WrongLinks {
             explained_share: share.clamp(0.0, 1.0),
         }))
     }
+}
+
+/// By how much the misfit would fall were the response linear in the parameters.
+fn one_step_gain(here: &Linearisation) -> f64 {
+    let step = here.hessian.clone().cholesky();
+    step.map_or(0.0, |h| 0.5 * here.gradient.dot(&h.solve(&here.gradient)))
 }
 
 /// Starting point of `model` (solver's scale): the `known` values, the robot file's of the others.

@@ -17,7 +17,7 @@ pub(super) enum Dynamics {
         damping: DMatrix<f64>,
         hysteretic: DMatrix<f64>,
         /// Where few combinations of coordinates couple the modes.
-        border: Option<Border>,
+        border: Option<Box<Border>>,
     },
 }
 
@@ -64,7 +64,7 @@ impl Dynamics {
         hysteretic: DMatrix<f64>,
     ) -> Self {
         Dynamics::Coupled {
-            border: Border::new(modes, &mass, &damping, &hysteretic),
+            border: Border::new(modes, &mass, &damping, &hysteretic).map(Box::new),
             mass,
             damping,
             hysteretic,
@@ -172,8 +172,10 @@ impl Border {
         damping: &DMatrix<f64>,
         hysteretic: &DMatrix<f64>,
     ) -> Option<Self> {
+        /// Modes up to which the bookkeeping takes as long as it saves.
+        const FEW: usize = 10;
         let (m, n) = (modes.mu.len(), mass.nrows());
-        let worth = |columns: usize| 2 * columns <= m;
+        let worth = |columns: usize| m > FEW && 2 * columns <= m;
         if !worth(n - m) {
             return None;
         }

@@ -220,7 +220,7 @@ impl FrfBasis {
         self.rows.ncols()
     }
 
-    /// All outputs, as [`Self::solve_lines`] takes them; [`Self::slopes`] needs the response to a force along each.
+    /// All outputs, as [`Self::solve_lines`] takes them.
     pub fn outputs(&self) -> Vec<usize> {
         (0..self.output_count()).collect()
     }
@@ -341,11 +341,12 @@ impl FrfBasis {
         let column = response.column(self.n, force);
         let row = &self.rows.as_slice()[seen * self.n..(seen + 1) * self.n];
         // Two sums, so that additions need not wait for each other.
-        let mut sums = [Complex64::ZERO; 2];
-        for (row, column) in row.chunks(2).zip(column.chunks(2)) {
-            for ((r, u), sum) in row.iter().zip(column).zip(&mut sums) {
-                *sum += u * *r;
-            }
+        let (rows, columns) = (row.chunks_exact(2), column.chunks_exact(2));
+        let rest = rows.remainder().iter().zip(columns.remainder());
+        let mut sums: [Complex64; 2] = [rest.map(|(r, u)| u * *r).sum(), Complex64::ZERO];
+        for (r, u) in rows.zip(columns) {
+            sums[0] += u[0] * r[0];
+            sums[1] += u[1] * r[1];
         }
         let moving = sums[0] + sums[1];
         moving + self.massless.as_ref().map_or(0.0, |m| m[(out, input)])

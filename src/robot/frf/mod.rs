@@ -6,7 +6,7 @@
 //! compliance. Branches and viscous dampers couple the modes; then the small complex system is solved as it stands.
 
 mod derivatives;
-mod dynamics;
+mod dynamic_stiffness;
 mod modal_basis;
 mod side_by_side;
 
@@ -17,7 +17,7 @@ use super::chain::System;
 use crate::{Error, Result};
 use derivatives::Derivatives;
 pub use derivatives::{RowSlopes, Slopes};
-use dynamics::{Dynamics, Modes, Room};
+use dynamic_stiffness::{DynamicStiffness, Modes, Room};
 pub use modal_basis::{ModalBasis, natural_frequencies_hz};
 use side_by_side::{LANES, Lanes};
 
@@ -31,7 +31,7 @@ pub struct FrfBasis {
     /// Static compliance of the massless combinations of coordinates between the outputs, m/N. They have neither
     /// inertia nor modal damping, so that leaving them out of the dynamics is exact.
     massless: Option<DMatrix<f64>>,
-    dynamics: Dynamics,
+    dynamics: DynamicStiffness,
     derivatives: Derivatives,
 }
 
@@ -179,7 +179,7 @@ impl FrfBasis {
             damping: root.iter().map(|s| 2.0 * zeta * s).collect(),
         };
         let dynamics = if !coupled {
-            Dynamics::Diagonal(own)
+            DynamicStiffness::Diagonal(own)
         } else {
             let mass = basis.transpose() * &system.mass * &basis;
             let mut damping = match &system.viscous {
@@ -193,7 +193,7 @@ impl FrfBasis {
                 Some(hysteretic) => basis.transpose() * hysteretic * &basis,
                 None => DMatrix::zeros(n, n),
             };
-            Dynamics::coupled(own, mass, damping, hysteretic)
+            DynamicStiffness::coupled(own, mass, damping, hysteretic)
         };
 
         let derivatives = derivatives::Projection {

@@ -8,7 +8,7 @@ use pulp::{Arch, Simd, WithSimd};
 use super::side_by_side::{LANES, Lanes, eliminate_side_by_side, solve_in_place, solve_side_by_side};
 
 #[derive(Debug, Clone)]
-pub(super) enum Dynamics {
+pub(super) enum DynamicStiffness {
     /// Uncoupled modes.
     Diagonal(Modes),
     /// Coupled modes: mass and damping in the basis; the stiffness is the identity plus i times what is hysteretic.
@@ -55,7 +55,7 @@ pub(super) struct Room {
     columns: Vec<Lanes>,
 }
 
-impl Dynamics {
+impl DynamicStiffness {
     /// `mass`, `damping` and `hysteretic` in the basis, of which `modes` come first. `damping` holds that of the modes.
     pub(super) fn coupled(
         modes: Modes,
@@ -63,7 +63,7 @@ impl Dynamics {
         damping: DMatrix<f64>,
         hysteretic: DMatrix<f64>,
     ) -> Self {
-        Dynamics::Coupled {
+        DynamicStiffness::Coupled {
             border: Border::new(modes, &mass, &damping, &hysteretic).map(Box::new),
             mass,
             damping,
@@ -76,7 +76,7 @@ impl Dynamics {
     pub(super) fn solve(&self, rates: [Complex64; LANES], columns: &mut [Lanes], room: &mut Room) -> bool {
         let (rate, square) = (Lanes::of(rates), Lanes::of(rates.map(|s| s * s)));
         match self {
-            Dynamics::Diagonal(modes) => {
+            DynamicStiffness::Diagonal(modes) => {
                 modes.inverse(rate, square, &mut room.dynamic);
                 for column in columns.chunks_exact_mut(modes.mu.len().max(1)) {
                     for (x, inverse) in column.iter_mut().zip(&room.dynamic) {
@@ -85,7 +85,7 @@ impl Dynamics {
                 }
                 true
             }
-            Dynamics::Coupled {
+            DynamicStiffness::Coupled {
                 border: Some(border), ..
             } => Arch::new().dispatch(Bordered {
                 border,
@@ -94,7 +94,7 @@ impl Dynamics {
                 columns,
                 room,
             }),
-            Dynamics::Coupled {
+            DynamicStiffness::Coupled {
                 mass,
                 damping,
                 hysteretic,
@@ -118,14 +118,14 @@ impl Dynamics {
     pub(super) fn solve_one(&self, rate: Complex64, columns: &mut [Complex64]) {
         let square = rate * rate;
         match self {
-            Dynamics::Diagonal(Modes { mu, damping }) => {
+            DynamicStiffness::Diagonal(Modes { mu, damping }) => {
                 for column in columns.chunks_exact_mut(mu.len().max(1)) {
                     for (x, (mu, damping)) in column.iter_mut().zip(mu.iter().zip(damping)) {
                         *x /= 1.0 + square * mu + rate * damping;
                     }
                 }
             }
-            Dynamics::Coupled {
+            DynamicStiffness::Coupled {
                 mass,
                 damping,
                 hysteretic,
@@ -359,7 +359,7 @@ mod tests {
     fn the_border_is_eliminated_exactly() {
         let (m, b) = (12, 2);
         let n = m + b;
-        let wave = |i: usize, j: usize| ((3 * i + 5 * j) as f64 * 0.37).sin();
+        let wave = |i: usize, j: usize| (((j + 2) * (i + 1)) as f64 * 0.37).sin();
         let modes = Modes {
             mu: (0..m).map(|i| 1e-4 / (1 + i * i) as f64).collect(),
             damping: (0..m).map(|i| 6e-4 / (1 + i) as f64).collect(),
@@ -384,8 +384,8 @@ mod tests {
             mass[(m + k, m + k)] = 5e-5 * (1 + k) as f64;
             damping[(m + k, m + k)] = 2e-4;
         }
-        let whole = Dynamics::coupled(modes.clone(), mass, damping, hysteretic);
-        let Dynamics::Coupled {
+        let whole = DynamicStiffness::coupled(modes.clone(), mass, damping, hysteretic);
+        let DynamicStiffness::Coupled {
             border: Some(border), ..
         } = &whole
         else {
@@ -407,7 +407,7 @@ mod tests {
         }
         // On an undamped mode's own resonance nothing can be eliminated.
         let mut undamped = whole.clone();
-        if let Dynamics::Coupled {
+        if let DynamicStiffness::Coupled {
             border: Some(border), ..
         } = &mut undamped
         {

@@ -26,8 +26,8 @@ pub struct WrongLinks {
 
 /// Share of what stands above the noise in a glance at the data that all numbers together must explain to be followed, …
 const PROMISING: f64 = 0.5;
-/// … and in all data those that must differ, to be told.
-const TELLING: f64 = 0.9;
+/// Numbers that must differ, at most, to be told: more of them imitate much that is not of the links.
+const FEW: usize = 8;
 
 const LOOK: Stopping = Stopping {
     max_iterations: 8,
@@ -103,9 +103,10 @@ impl WrongLinks {
         let possible = |c: &&EffectCandidate<Structure>| c.refined && !c.at_bound && c.not_credible.is_none();
         let effects = diagnosis.candidates.iter().filter(possible);
         let best = effects.map(|c| c.reduced_chi2).fold(base, f64::min);
-        let told = !names.is_empty()
+        let told = (1..=FEW).contains(&names.len())
             && after.reduced_chi2 < best
-            && (share > TELLING || is_noise(after.reduced_chi2) && !is_noise(base));
+            && is_noise(after.reduced_chi2)
+            && !is_noise(base);
         Ok(told.then(|| WrongLinks {
             departing: after
                 .parameters

@@ -24,7 +24,7 @@ pub struct WrongLinks {
     pub explained_share: f64,
 }
 
-/// Share of what stands above the noise in a glance at the data that all numbers together must explain to be followed, …
+/// Share of what stands above the noise in a glance at the data that all numbers together must explain to be followed.
 const PROMISING: f64 = 0.5;
 /// Numbers that must differ, at most, to be told: more of them imitate much that is not of the links.
 const FEW: usize = 8;

@@ -7,7 +7,7 @@ use crate::discrepancy::verdict::is_progress;
 use crate::identify::departures::departures;
 use crate::identify::levenberg_marquardt::Stopping;
 use crate::identify::study::{Extent, held_out};
-use crate::identify::{Calibration, HeldOut, Options, Parameter, StructureCase, Undetermined};
+use crate::identify::{Calibration, Estimate, HeldOut, Options, Parameter, StructureCase, Undetermined};
 use crate::{InputError, Result};
 
 /// What freeing groups of link parameters does.
@@ -132,8 +132,16 @@ fn from_where_it_stood(
     earlier: &Calibration,
     options: Options,
 ) -> Result<StructureAnalysis> {
-    let known = |name: &str| earlier.parameters.iter().find(|p| p.name == name);
-    let of = |p: &Parameter| p.internal(known(&p.name).map_or(p.nominal, |e| e.value));
-    let start = case.model.parameters.iter().map(of).collect();
+    let start = by_name(&case.model.parameters, &earlier.parameters);
     StructureAnalysis::of(case.starting_from(start), None, options)
+}
+
+/// Starting point (solver's scale) of a model with these `parameters`: the values that are `known` by name, the robot file's of the
+/// others.
+pub(super) fn by_name(parameters: &[Parameter], known: &[Estimate]) -> Vec<f64> {
+    let value = |p: &Parameter| {
+        let known = known.iter().find(|k| k.name == p.name);
+        p.internal(known.map_or(p.nominal, |k| k.value))
+    };
+    parameters.iter().map(value).collect()
 }

@@ -2,14 +2,15 @@
 
 use serde::Serialize;
 
-use super::freed_links::fitted_departing;
+use super::freed_links::{by_name, fitted_departing};
 use super::structure_case::Freed;
 use crate::Result;
 use crate::campaign::{Campaign, LinkGroup};
+use crate::discrepancy::candidate::share_taken;
 use crate::discrepancy::verdict::is_noise;
 use crate::discrepancy::{Diagnosis, EffectCandidate};
 use crate::effects::Structure;
-use crate::identify::levenberg_marquardt::{Fit, LeastSquares, Linearisation, Stopping, minimise};
+use crate::identify::levenberg_marquardt::{Fit, LeastSquares, Stopping, minimise};
 use crate::identify::study::{Extent, Study, View};
 use crate::identify::{Calibration, Estimate, StructureCase, StructureModel, StructureStudy};
 
@@ -60,24 +61,22 @@ impl WrongLinks {
         if every.parameters.len() == before.parameters.len() {
             return Ok(None);
         }
-        let fit = |model: &StructureModel, extent: Extent, start: &[f64], stopping| {
-            let view = View { extent, ..View::FULL };
+        let fit = |model: &StructureModel, view: View, start: &[f64], stopping| {
             minimise(&study.problem(model, view), start, &model.bounds(), stopping)
         };
-        let start = by_name(&every, &before.parameters);
-        let glance = View {
-            extent: Extent::Glance,
-            ..View::FULL
-        };
-        let above_noise = study.problem(&case.model, glance).cost(&before.theta)?
+        let start = by_name(&every.parameters, &before.parameters);
+        let above_noise = study.problem(&case.model, View::GLANCE).cost(&before.theta)?
             - 0.5 * study.real_values(Extent::Glance) as f64;
         // What one step of Gauss and Newton promises is soon known, and mostly enough.
-        let promised = one_step_gain(&study.problem(&every, glance).linearise(&start)?);
+        let here = study.problem(&every, View::GLANCE).linearise(&start)?;
+        let promised = here
+            .newton_step()
+            .map_or(0.0, |step| -0.5 * here.gradient.dot(&step));
         if above_noise <= 0.0 || promised < PROMISING * above_noise {
             return Ok(None);
         }
-        let with = fit(&every, Extent::Glance, &start, LOOK)?;
-        let without = fit(&case.model, Extent::Glance, &before.theta, LOOK)?;
+        let with = fit(&every, View::GLANCE, &start, LOOK)?;
+        let without = fit(&case.model, View::GLANCE, &before.theta, LOOK)?;
         if without.cost - with.cost < PROMISING * above_noise {
             return Ok(None);
         }
@@ -85,7 +84,7 @@ impl WrongLinks {
             let found = Calibration::of_fit(&model.parameters, fit, study.real_values(extent))?;
             Ok::<_, crate::Error>((model, found))
         };
-        let near = fit(&every, Extent::Coarse, &with.theta, SETTLE)?;
+        let near = fit(&every, View::COARSE, &with.theta, SETTLE)?;
         let every = calibrated(every, near, Extent::Coarse)?;
         let (names, (_, after)) = fitted_departing(
             before,
@@ -93,13 +92,12 @@ impl WrongLinks {
             |(model, found)| (&model.parameters, found),
             |kept, (_, found)| {
                 let model = free(Some(kept))?;
-                let start = by_name(&model, &found.parameters);
-                let fit = fit(&model, Extent::Full, &start, SETTLE)?;
+                let start = by_name(&model.parameters, &found.parameters);
+                let fit = fit(&model, View::FULL, &start, SETTLE)?;
                 calibrated(model, fit, Extent::Full)
             },
         )?;
         let base = diagnosis.baseline.reduced_chi2;
-        let share = (base - after.reduced_chi2) / (base - 1.0).max(f64::MIN_POSITIVE);
         let possible = |c: &&EffectCandidate<Structure>| c.refined && !c.at_bound && c.not_credible.is_none();
         let effects = diagnosis.candidates.iter().filter(possible);
         let best = effects.map(|c| c.reduced_chi2).fold(base, f64::min);
@@ -115,24 +113,7 @@ impl WrongLinks {
                 .cloned()
                 .collect(),
             reduced_chi2: after.reduced_chi2,
-            explained_share: share.clamp(0.0, 1.0),
+            explained_share: share_taken(base, after.reduced_chi2).clamp(0.0, 1.0),
         }))
     }
-}
-
-/// By how much the misfit would fall were the response linear in the parameters.
-fn one_step_gain(here: &Linearisation) -> f64 {
-    let step = here.hessian.clone().cholesky();
-    step.map_or(0.0, |h| 0.5 * here.gradient.dot(&h.solve(&here.gradient)))
-}
-
-/// Starting point of `model` (solver's scale): the `known` values, the robot file's of the others.
-fn by_name(model: &StructureModel, known: &[Estimate]) -> Vec<f64> {
-    let parameters = model.parameters.iter();
-    parameters
-        .map(|p| {
-            let known = known.iter().find(|k| k.name == p.name);
-            p.internal(known.map_or(p.nominal, |k| k.value))
-        })
-        .collect()
 }

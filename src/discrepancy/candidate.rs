@@ -75,8 +75,13 @@ impl<D: Modelled> EffectCandidate<D> {
 
     /// Share of the misfit above noise that the effect takes away, by the size of the misfit alone.
     pub fn share_explained(&self, baseline: &BaselineFit) -> f64 {
-        (baseline.reduced_chi2 - self.reduced_chi2) / (baseline.reduced_chi2 - 1.0).max(1e-9)
+        share_taken(baseline.reduced_chi2, self.reduced_chi2)
     }
+}
+
+/// Share of the misfit above noise that a further part of a model takes away, of misfits per degree of freedom without and with it.
+pub fn share_taken(without: f64, with: f64) -> f64 {
+    (without - with) / (without - 1.0).max(1e-9)
 }
 
 /// The model as it stands.

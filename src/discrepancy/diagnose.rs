@@ -5,7 +5,7 @@
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::candidate::{BaselineFit, EffectCandidate};
+use super::candidate::{BaselineFit, EffectCandidate, share_taken};
 use super::diagnosis::Diagnosis;
 use super::verdict::{self, DiagnosisVerdict, EffectSet};
 use crate::Result;
@@ -539,8 +539,7 @@ impl<'a, S: Study> Engine<'a, S> {
         if let Some(fit) = rescue(self.study, self.model, best, &self.hints, REFINE)? {
             best.fit = fit;
         }
-        let share = (base_reduced - self.reduced_chi2(best)) / (base_reduced - 1.0);
-        if !is_noise(best) && share > PAIR_SHARE {
+        if !is_noise(best) && share_taken(base_reduced, self.reduced_chi2(best)) > PAIR_SHARE {
             let fit = self.fitted_as_the_model(&best.model, &best.fit.theta)?;
             if fit.cost < best.fit.cost {
                 best.fit = fit;

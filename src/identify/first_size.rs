@@ -2,8 +2,6 @@
 //! anything and its prior pulls harder than the data: a fit that begins there stays there. The size itself enters the response
 //! nearly linearly there, so one step of Gauss and Newton in the size, without the prior, tells how large the effect is.
 
-use nalgebra::{DMatrix, DVector};
-
 use super::levenberg_marquardt::LeastSquares;
 use super::model::{Model, Modelled};
 use crate::parameter::{Parameter, Scale};
@@ -51,7 +49,7 @@ pub fn linear_size<D: Modelled, P: LeastSquares>(
             here.hessian[(i, i)] -= curvature;
         }
     }
-    let step = scaled_step(&here.hessian, &here.gradient)?;
+    let step = here.newton_step()?;
     let mut size = start.clone();
     let mut asked_for = false;
     for (i, parameter) in model.parameters.iter().enumerate() {
@@ -70,25 +68,4 @@ pub fn linear_size<D: Modelled, P: LeastSquares>(
     // The parameters in front stand at their best: what the step gains, the effect gains.
     let gain = -here.gradient.dot(&step);
     (asked_for && size.iter().all(|t| t.is_finite())).then_some(LinearSize { theta: size, gain })
-}
-
-/// −H⁻¹g with the columns scaled to a unit diagonal; parameters that change nothing stay.
-fn scaled_step(hessian: &DMatrix<f64>, gradient: &DVector<f64>) -> Option<DVector<f64>> {
-    /// Against directions that the data do not tell apart.
-    const RIDGE: f64 = 1e-9;
-    let scale = hessian.diagonal().map(|h| {
-        if h > f64::MIN_POSITIVE {
-            h.sqrt().recip()
-        } else {
-            0.0
-        }
-    });
-    let mut scaled = DMatrix::from_fn(hessian.nrows(), hessian.ncols(), |i, j| {
-        scale[i] * hessian[(i, j)] * scale[j]
-    });
-    for i in 0..scaled.nrows() {
-        scaled[(i, i)] = 1.0 + RIDGE;
-    }
-    let step = scaled.cholesky()?.solve(&-gradient.component_mul(&scale));
-    Some(step.component_mul(&scale))
 }

@@ -40,6 +40,39 @@ impl Linearisation {
         self.hessian += &other.hessian;
     }
 
+    /// Adds ½r² of one residual that depends on parameter `i` alone, as [`half_square`](crate::parameter::Prior::half_square) of a
+    /// prior gives it; of a sum without derivatives its value alone.
+    pub fn add_half_square(&mut self, i: usize, [value, slope, curvature]: [f64; 3]) {
+        self.cost += value;
+        if i < self.gradient.len() {
+            self.gradient[i] += slope;
+            self.hessian[(i, i)] += curvature;
+        }
+    }
+
+    /// The step of Gauss and Newton, −H⁻¹g, with the columns scaled to a unit diagonal; parameters that change nothing stay. `None`
+    /// where a direction is not determined at all.
+    pub fn newton_step(&self) -> Option<DVector<f64>> {
+        /// Against directions that the data do not tell apart.
+        const RIDGE: f64 = 1e-9;
+        let hessian = &self.hessian;
+        let scale = hessian.diagonal().map(|h| {
+            if h > f64::MIN_POSITIVE {
+                h.sqrt().recip()
+            } else {
+                0.0
+            }
+        });
+        let mut scaled = DMatrix::from_fn(hessian.nrows(), hessian.ncols(), |i, j| {
+            scale[i] * hessian[(i, j)] * scale[j]
+        });
+        for i in 0..scaled.nrows() {
+            scaled[(i, i)] = 1.0 + RIDGE;
+        }
+        let step = scaled.cholesky()?.solve(&-self.gradient.component_mul(&scale));
+        Some(step.component_mul(&scale))
+    }
+
     /// Adds residuals with their derivatives (residuals × parameters, column by column).
     pub fn push(&mut self, residual: &[f64], jacobian: &[f64]) {
         self.cost += 0.5 * residual.iter().map(|r| r * r).sum::<f64>();

@@ -50,6 +50,11 @@ impl View {
         measure: Measure::Likelihood,
         left_out: None,
     };
+    /// Hardly more than shows the strong effects, by likelihood.
+    pub const GLANCE: View = View {
+        extent: Extent::Glance,
+        ..View::COARSE
+    };
     /// All data, by likelihood.
     pub const FULL: View = View {
         extent: Extent::Full,
@@ -317,8 +322,8 @@ pub fn look<S: Study>(
     let rough = study.problem(
         model,
         View {
-            extent: Extent::Glance,
-            ..view(Measure::Rough)
+            measure: Measure::Rough,
+            ..View::GLANCE
         },
     );
     let lowest = |problem: &S::Problem<'_>, base: &[f64]| -> Option<(f64, Vec<f64>)> {
@@ -549,11 +554,7 @@ fn promising<'i, S: Study>(
     hints: &[f64],
     best: f64,
 ) -> Vec<&'i InstanceOf<S>> {
-    let glance = View {
-        extent: Extent::Glance,
-        ..View::COARSE
-    };
-    let problem = study.problem(model, glance);
+    let problem = study.problem(model, View::GLANCE);
     // Fitted to the glance like the effects: else each of them would be credited with what that alone takes away.
     let bounds = model.bounds();
     let fits = bases
@@ -606,11 +607,9 @@ pub fn try_effects<'i, S: Study>(
     let (on_promise, always): (Vec<_>, Vec<_>) = instances.iter().partition(|i| i.effect.on_promise());
     let mut looks = look_at(always);
     let at_a_glance = |looked: &Looked<S::Domain>| {
-        let glance = View {
-            extent: Extent::Glance,
-            ..View::COARSE
-        };
-        let cost = study.problem(&looked.model, glance).cost(&looked.fits[0].theta);
+        let cost = study
+            .problem(&looked.model, View::GLANCE)
+            .cost(&looked.fits[0].theta);
         cost.unwrap_or(f64::INFINITY)
     };
     let leading = looks
@@ -640,15 +639,11 @@ pub fn try_again<S: Study>(
     done: impl Fn() + Sync,
 ) -> Vec<Tried<S::Domain>> {
     let bases = [base.to_vec()];
-    let glance = View {
-        extent: Extent::Glance,
-        ..View::COARSE
-    };
     let looked: Vec<f64> = tried
         .par_iter()
         .map(|t| {
             let before = study
-                .problem(&t.model, glance)
+                .problem(&t.model, View::GLANCE)
                 .cost(&t.fit.theta)
                 .unwrap_or(f64::INFINITY);
             let now = try_effect(study, model, &t.instance, &bases, hints, Effort::Look);
@@ -694,9 +689,8 @@ pub fn from_possible_size<S: Study>(
     let model = &tried.model;
     let bounds = model.bounds();
     let view = |measure| View {
-        extent: Extent::Glance,
         measure,
-        ..View::COARSE
+        ..View::GLANCE
     };
     let (rough, likelihood) = (
         study.problem(model, view(Measure::Rough)),

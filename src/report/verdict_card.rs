@@ -63,6 +63,13 @@ pub fn size(p: &Estimate) -> String {
     format!("{name} {}{stuck}", plus_minus(p.value, p.std_error, unit))
 }
 
+/// `link-4.inertia-x 60.02 ± 0.04 kg·m² instead of 31.28 kg·m²`.
+pub fn departure(p: &Estimate) -> String {
+    let unit = if p.unit == "1" { "" } else { p.unit };
+    let fitted = plus_minus(p.value, p.std_error, unit);
+    format!("{} {fitted} instead of {}", p.name, format_si(p.initial, unit, 4))
+}
+
 /// Headline, explanation, facts and check of a verdict.
 fn answer<D: Modelled>(
     d: &Diagnosis<D>,
@@ -194,16 +201,15 @@ fn robot_file_first(card: &mut VerdictCard, links: &WrongLinks) {
          the noise's variance is left.",
         links.reduced_chi2
     );
-    let numbers = links.departing.iter().map(|p| {
-        let unit = if p.unit == "1" { "" } else { p.unit };
-        let file = format_si(p.initial, unit, 4);
-        let fitted = plus_minus(p.value, p.std_error, unit);
-        format!("{} {fitted} (file: {file})", p.name)
-    });
     card.facts
         .retain(|(name, _)| *name != "How big" && *name != "Or at");
-    card.facts
-        .insert(0, ("Links", listed(&numbers.collect::<Vec<_>>())));
+    card.facts.insert(
+        0,
+        (
+            "Links",
+            listed(&links.departing.iter().map(departure).collect::<Vec<_>>()),
+        ),
+    );
     card.check = Some("Compare these numbers with a drawing, a CAD model or the maker's data.".into());
 }
 

@@ -31,7 +31,6 @@ pub use kinematics::ik_solution::IkSolution;
 pub use kinematics::inverse::{IkReference, InverseKinematics};
 pub use kinematics::numeric_inverse::NumericInverse;
 pub use kinematics::spherical_wrist::SphericalWrist;
-
 pub use model::{Baseline, RobotModel};
 pub use pose_compensation::CompensatedPose;
 pub use posture_report::PostureReport;

@@ -13,7 +13,6 @@ use crate::identify::FrfData;
 use crate::identify::StructureModel;
 use crate::identify::frfs::frf_data::FrfBlock;
 use crate::ingest::Axis;
-use crate::robot::frf::Response;
 use crate::robot::{Chain, FrfBasis, Kinematics, ModalBasis, System};
 use crate::{Error, Result};
 
@@ -250,8 +249,7 @@ impl Dynamics {
     fn between(&self, omega: f64, pairs: &[(usize, usize)]) -> Result<Vec<Complex64>> {
         match self {
             Dynamics::Modal(basis) => {
-                let mut response = Response::default();
-                basis.solve(omega, &mut response)?;
+                let response = basis.solve(omega)?;
                 let pairs = pairs.iter();
                 Ok(pairs
                     .map(|(out, into)| basis.receptance(&response, *out, *into))

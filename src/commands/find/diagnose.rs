@@ -15,7 +15,7 @@ use crate::identify::Modelled;
 use crate::identify::Options;
 use crate::identify::frfs::structure_study::residual_peaks;
 use crate::identify::rest::Rest;
-use crate::report::number::{format_si, plus_minus};
+use crate::report::verdict_card::departure;
 use crate::text::chance;
 
 pub fn run(args: SideArgs) -> Result<Outcome> {
@@ -330,18 +330,15 @@ fn where_it_shows(findings: &DiagnosisFindings) -> String {
 }
 
 fn wrong_links_in_words(found: &WrongLinks) -> String {
-    let numbers = found.departing.iter().map(|p| {
-        format!(
-            "{} {} instead of {}",
-            p.name,
-            plus_minus(p.value, p.std_error, p.unit),
-            format_si(p.initial, p.unit, 4)
-        )
-    });
     format!(
         "The robot file may be wrong: with {} the model leaves {:.2} times the noise variance. Compare these numbers with a drawing or \
          the maker's data; `lobestone calibrate --free links` fits them.",
-        numbers.collect::<Vec<_>>().join(", "),
+        found
+            .departing
+            .iter()
+            .map(departure)
+            .collect::<Vec<_>>()
+            .join(", "),
         found.reduced_chi2
     )
 }

@@ -6,7 +6,6 @@ use crate::Result;
 use crate::data::Axis;
 use crate::effects::Conditions;
 use crate::identify::StructureModel;
-use crate::robot::frf::Response;
 use crate::robot::{FrfBasis, Kinematics, Place, Slot};
 
 /// A posture at which one could measure, and the lines that are looked at there.
@@ -71,11 +70,9 @@ pub fn greatest_difference(
         );
         // Outputs: tool, then the far end of each link; three axes each. Hit at the tool, in three axes.
         let mut sums = vec![(0.0, 0.0); 3 * outputs];
-        let (mut ra, mut rb) = (Response::default(), Response::default());
         for f in &lookout.frequency_hz {
             let omega = std::f64::consts::TAU * f;
-            first.solve(omega, &mut ra)?;
-            second.solve(omega, &mut rb)?;
+            let (ra, rb) = (first.solve(omega)?, second.solve(omega)?);
             for (i, (difference, size)) in sums.iter_mut().enumerate() {
                 let (out, input) = (i / 3, i % 3);
                 let ha = first.receptance(&ra, out, input);

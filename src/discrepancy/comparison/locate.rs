@@ -15,7 +15,6 @@ use crate::Result;
 use crate::data::{Axis, Point};
 use crate::identify::frfs::frf_data::{FrfBlock, FrfDatum};
 use crate::identify::{FrfData, StructureModel};
-use crate::robot::frf::Response;
 use crate::robot::{Dual, Element, FrfBasis, Place, Role, Slot};
 
 /// A joint or body and what it could explain.
@@ -311,7 +310,6 @@ fn weighted(
         true => None,
         false => Some(probe(model, theta, block, axes)?),
     };
-    let mut response = Response::default();
     let mut lines = Vec::with_capacity(block.frequency_hz.len());
     for (k, f) in block.frequency_hz.iter().enumerate() {
         let weight: Vec<f64> = block
@@ -330,7 +328,7 @@ fn weighted(
             patterns: Vec::new(),
         };
         if let Some(basis) = &probe {
-            basis.solve(std::f64::consts::TAU * f, &mut response)?;
+            let response = basis.solve(std::f64::consts::TAU * f)?;
             let first = block.outputs.len();
             // [axis][output]: what a unit there moves.
             let reach: Vec<Vec<Complex64>> = (0..axes.len())

@@ -108,11 +108,7 @@ impl LeastSquares for JointProblem<'_> {
         }
         let mut sums = Linearisation::zero(columns.len());
         sums.push(&residual, &columns.concat());
-        self.priors(all, |i, [value, slope, curvature]| {
-            sums.cost += value;
-            sums.gradient[i] += slope;
-            sums.hessian[(i, i)] += curvature;
-        });
+        self.priors(all, |i, half_square| sums.add_half_square(i, half_square));
         Ok(sums)
     }
 }

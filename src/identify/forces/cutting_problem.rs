@@ -4,7 +4,7 @@
 
 use std::f64::consts::{SQRT_2, TAU};
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
@@ -57,9 +57,8 @@ pub struct ChannelFit {
 
 /// Sums over residuals.
 struct Sums {
-    cost: f64,
-    gradient: DVector<f64>,
-    hessian: DMatrix<f64>,
+    /// Of the Hessian the lower triangle.
+    at: Linearisation,
     /// Of the placement with itself and with each parameter.
     placement: f64,
     coupling: DVector<f64>,
@@ -68,9 +67,7 @@ struct Sums {
 impl Sums {
     fn zero(count: usize) -> Self {
         Sums {
-            cost: 0.0,
-            gradient: DVector::zeros(count),
-            hessian: DMatrix::zeros(count, count),
+            at: Linearisation::zero(count),
             placement: 0.0,
             coupling: DVector::zeros(count),
         }
@@ -78,16 +75,16 @@ impl Sums {
 
     /// Adds residuals with their derivatives (one row a parameter) and that by the placement.
     fn push(&mut self, residual: &[f64], slopes: &[Vec<f64>], placement: &[f64]) {
-        self.cost += 0.5 * dot(residual, residual);
+        self.at.cost += 0.5 * dot(residual, residual);
         if slopes.is_empty() {
             return;
         }
         self.placement += dot(placement, placement);
         for (i, a) in slopes.iter().enumerate() {
-            self.gradient[i] += dot(a, residual);
+            self.at.gradient[i] += dot(a, residual);
             self.coupling[i] += dot(a, placement);
             for (j, b) in slopes.iter().enumerate().take(i + 1) {
-                self.hessian[(i, j)] += dot(a, b);
+                self.at.hessian[(i, j)] += dot(a, b);
             }
         }
     }
@@ -95,10 +92,10 @@ impl Sums {
     /// Takes the placement out: it is at its optimum, so only the curvature changes (Schur complement).
     fn eliminate_placement(&mut self) {
         if self.placement > 0.0 {
-            let n = self.gradient.len();
+            let n = self.at.gradient.len();
             for i in 0..n {
                 for j in 0..=i {
-                    self.hessian[(i, j)] -= self.coupling[i] * self.coupling[j] / self.placement;
+                    self.at.hessian[(i, j)] -= self.coupling[i] * self.coupling[j] / self.placement;
                 }
             }
         }
@@ -183,7 +180,7 @@ impl CuttingProblem<'_> {
             sums.push(&residual, &slopes, &by_placement);
             if physics.transient_s.is_some() {
                 // A free amplitude fits noise too: it costs what a parameter costs in BIC, over the levels it is fitted to.
-                sums.cost += 0.5 * (level.len().max(1) as f64).ln();
+                sums.at.cost += 0.5 * (level.len().max(1) as f64).ln();
             }
             fit.channels[i] = Some(ChannelFit {
                 orders,
@@ -193,7 +190,7 @@ impl CuttingProblem<'_> {
             });
         }
         push_vibration(&mut sums, cut, &physics, lines_off_comb.as_ref(), count);
-        fit.chi2 = 2.0 * sums.cost;
+        fit.chi2 = 2.0 * sums.at.cost;
         if derivatives {
             sums.eliminate_placement();
         }
@@ -206,38 +203,27 @@ impl CuttingProblem<'_> {
             .cuts
             .par_iter()
             .map(|cut| {
-                let mut sums = self.evaluate(cut, theta, true)?.0;
-                sums.hessian.fill_upper_triangle_with_lower_triangle();
-                Ok(Linearisation {
-                    cost: sums.cost,
-                    gradient: sums.gradient,
-                    hessian: sums.hessian,
-                })
+                let mut at = self.evaluate(cut, theta, true)?.0.at;
+                at.hessian.fill_upper_triangle_with_lower_triangle();
+                Ok(at)
             })
             .collect()
     }
 
-    fn total(&self, theta: &[f64], derivatives: bool) -> Result<Sums> {
+    fn total(&self, theta: &[f64], derivatives: bool) -> Result<Linearisation> {
         let parts: Vec<Sums> = self
             .data
             .cuts
             .par_iter()
             .map(|cut| Ok(self.evaluate(cut, theta, derivatives)?.0))
             .collect::<Result<_>>()?;
-        let mut total = Sums::zero(if derivatives { theta.len() } else { 0 });
+        let mut total = Linearisation::zero(if derivatives { theta.len() } else { 0 });
         for part in &parts {
-            total.cost += part.cost;
-            total.gradient += &part.gradient;
-            total.hessian += &part.hessian;
+            total.add(&part.at);
         }
         for (i, (parameter, t)) in self.model.parameters.iter().zip(theta).enumerate() {
             if let Some(prior) = parameter.prior {
-                let [cost, slope, curvature] = prior.half_square(*t);
-                total.cost += cost;
-                if derivatives {
-                    total.gradient[i] += slope;
-                    total.hessian[(i, i)] += curvature;
-                }
+                total.add_half_square(i, prior.half_square(*t));
             }
         }
         total.hessian.fill_upper_triangle_with_lower_triangle();
@@ -251,12 +237,7 @@ impl LeastSquares for CuttingProblem<'_> {
     }
 
     fn linearise(&self, theta: &[f64]) -> Result<Linearisation> {
-        let total = self.total(theta, true)?;
-        Ok(Linearisation {
-            cost: total.cost,
-            gradient: total.gradient,
-            hessian: total.hessian,
-        })
+        self.total(theta, true)
     }
 }
 

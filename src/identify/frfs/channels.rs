@@ -34,15 +34,11 @@ impl Channels {
         }
     }
 
-    /// What the file shows at `omega`, m/N.
-    pub(crate) fn measured(
-        &self,
-        omega: f64,
-        frf: &FrfDatum,
-        basis: &FrfBasis,
-        response: &Response,
-    ) -> Complex64 {
-        self.mixed(omega, frf, |out| basis.receptance(response, out, frf.input))
+    /// What the file shows at the frequency of `response`, m/N.
+    pub(crate) fn measured(&self, frf: &FrfDatum, basis: &FrfBasis, response: &Response) -> Complex64 {
+        self.mixed(response.omega(), frf, |out| {
+            basis.receptance(response, out, frf.input)
+        })
     }
 
     /// What the response channel of `frf` shows of a motion, given for each output.
@@ -62,7 +58,6 @@ impl Channels {
     /// receptances for this FRF's input, parameters × outputs.
     pub(crate) fn slopes(
         &self,
-        omega: f64,
         frf: &FrfDatum,
         measured: Complex64,
         (basis, response): (&FrfBasis, &Response),
@@ -77,6 +72,7 @@ impl Channels {
             return;
         }
         let terms = &self.terms[frf.response.axis.index()];
+        let omega = response.omega();
         let factor = self.filter.factor(omega, frf.sign);
         for (p, s) in slope.iter_mut().enumerate() {
             *s = terms

@@ -99,12 +99,7 @@ impl FrfProblem<'_> {
         }
         for (i, (parameter, t)) in self.model.parameters.iter().zip(theta).enumerate() {
             if let Some(prior) = parameter.prior {
-                let [cost, slope, curvature] = prior.half_square(*t);
-                total.cost += cost;
-                if with_derivatives {
-                    total.gradient[i] += slope;
-                    total.hessian[(i, i)] += curvature;
-                }
+                total.add_half_square(i, prior.half_square(*t));
             }
         }
         Ok(total)
@@ -135,14 +130,13 @@ impl FrfProblem<'_> {
         let rates: Vec<Complex64> = lines.iter().map(|l| block.rate(*l)).collect();
         let mut add = |k: usize, response: &Response, slopes: Option<&Slopes>| {
             let line = lines[k];
-            let omega = response.omega();
             for (k, frf) in block.frfs.iter().enumerate() {
-                let model = channels.measured(omega, frf, basis, response);
+                let model = channels.measured(frf, basis, response);
                 let measured = frf.receptance[line];
                 let std = frf.noise_std[line];
                 if let Some(slopes) = slopes {
                     let true_slope = slopes.along(frf.input);
-                    channels.slopes(omega, frf, model, (basis, response), true_slope, &mut slope);
+                    channels.slopes(frf, model, (basis, response), true_slope, &mut slope);
                 }
                 match self.misfit {
                     Misfit::Complex => {
@@ -232,11 +226,10 @@ impl StructureModel {
                     &block.inputs(),
                     |line, response, slopes| {
                         let f = block.frequency_hz[line];
-                        let omega = response.omega();
                         for (frf, curve) in block.frfs.iter().zip(&mut curves) {
-                            let model = channels.measured(omega, frf, &basis, response);
+                            let model = channels.measured(frf, &basis, response);
                             let true_slope = slopes.along(frf.input);
-                            channels.slopes(omega, frf, model, (&basis, response), true_slope, &mut slope);
+                            channels.slopes(frf, model, (&basis, response), true_slope, &mut slope);
                             let weight = 1.0 / frf.noise_std[line];
                             curve.rest.push((model - frf.receptance[line]) * weight);
                             for (column, s) in curve.slopes.iter_mut().zip(&slope) {

@@ -273,10 +273,7 @@ impl Frequencies<'_> {
         for (i, (parameter, t)) in self.model.parameters.iter().zip(theta).enumerate() {
             // Frequencies say nothing of the damping: it stays at the median of the measured ones.
             if let Some(prior) = parameter.prior.filter(|_| i != damping) {
-                let [cost, slope, curvature] = prior.half_square(*t);
-                sum.cost += cost;
-                sum.gradient[i] += slope;
-                sum.hessian[(i, i)] += curvature;
+                sum.add_half_square(i, prior.half_square(*t));
             }
         }
         sum.hessian[(damping, damping)] += 1.0;

@@ -63,11 +63,10 @@ impl StructureModel {
             })
             .collect();
         basis.solve_lines_with_slopes(&block.rates(), &block.inputs(), |_, response, slopes| {
-            let omega = response.omega();
             for (frf, predicted) in block.frfs.iter().zip(&mut predicted) {
-                let value = channels.measured(omega, frf, &basis, response);
+                let value = channels.measured(frf, &basis, response);
                 let of_truth = slopes.along(frf.input);
-                channels.slopes(omega, frf, value, (&basis, response), of_truth, &mut slope);
+                channels.slopes(frf, value, (&basis, response), of_truth, &mut slope);
                 predicted.receptance.push(value);
                 predicted.slopes.extend_from_slice(&slope);
             }

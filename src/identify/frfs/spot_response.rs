@@ -123,7 +123,6 @@ impl SpotResponses {
         let places = SpotBasis::new(model, theta, block, spots)?;
         let channels = Channels::new(&model.filter(theta, true));
 
-        let mut response = Response::default();
         let mut reach = Vec::new();
         let mut slope = vec![Complex64::ZERO; count];
         let frfs = block.frfs.len();
@@ -132,13 +131,12 @@ impl SpotResponses {
         let mut part = Self::empty(spots, count);
         with_slopes.solve_lines_with_slopes(&block.rates(), &block.inputs(), |line, sloped, slopes| {
             let omega = sloped.omega();
-            places.basis.solve(omega, &mut response)?;
+            let response = places.basis.solve(omega)?;
             for (k, frf) in block.frfs.iter().enumerate() {
                 let weight = 1.0 / frf.noise_std[line];
-                let modelled = channels.measured(omega, frf, &with_slopes, sloped);
+                let modelled = channels.measured(frf, &with_slopes, sloped);
                 residual[k] = (frf.receptance[line] - modelled) * weight;
                 channels.slopes(
-                    omega,
                     frf,
                     modelled,
                     (&with_slopes, sloped),

@@ -401,7 +401,7 @@ impl StructureModel {
                 let mut columns = vec![Vec::with_capacity(block.frequency_hz.len()); block.frfs.len()];
                 basis.solve_lines(&block.rates(), &block.inputs(), |_, response| {
                     for (frf, column) in block.frfs.iter().zip(&mut columns) {
-                        column.push(channels.measured(response.omega(), frf, &basis, response));
+                        column.push(channels.measured(frf, &basis, response));
                     }
                     Ok(())
                 })?;

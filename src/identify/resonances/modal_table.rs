@@ -101,10 +101,7 @@ impl LeastSquares for Table<'_> {
         }
         for (i, (parameter, t)) in self.model.parameters.iter().zip(theta).enumerate() {
             if let Some(prior) = parameter.prior {
-                let [cost, slope, curvature] = prior.half_square(*t);
-                sum.cost += cost;
-                sum.gradient[i] += slope;
-                sum.hessian[(i, i)] += curvature;
+                sum.add_half_square(i, prior.half_square(*t));
             }
         }
         Ok(sum)

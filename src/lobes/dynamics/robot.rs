@@ -7,7 +7,7 @@ use num_complex::Complex64;
 
 use crate::lobes::dynamics::frf::{ModalFrf, Mode, Receptance, ToolPointFrf, band_around, resonance_grid};
 use crate::lobes::milling::state_space::StateSpace;
-use crate::robot::frf::{Response, natural_frequencies_hz};
+use crate::robot::frf::natural_frequencies_hz;
 use crate::robot::{Chain, FrfBasis, Kinematics, ModalBasis, RobotModel, System};
 use crate::{Error, Result};
 
@@ -111,11 +111,10 @@ impl RobotFrf {
 
 impl ToolPointFrf for RobotFrf {
     fn receptance(&self, frequency_hz: f64) -> Receptance {
-        let mut response = Response::default();
         // Only an undamped system at its resonance has no response; no depth is safe there.
-        if self.basis.solve(TAU * frequency_hz, &mut response).is_err() {
+        let Ok(response) = self.basis.solve(TAU * frequency_hz) else {
             return [[Complex64::new(0.0, -f64::MAX.sqrt()); 2]; 2];
-        }
+        };
         [0, 1].map(|out| [0, 1].map(|input| self.basis.receptance(&response, out, input)))
     }
 

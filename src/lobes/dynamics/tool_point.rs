@@ -15,7 +15,7 @@ use crate::lobes::dynamics::frf::{ModalFrf, Receptance, ToolPointFrf, band_aroun
 use crate::lobes::dynamics::robot::lobe_axes;
 use crate::lobes::dynamics::sampled::SampledFrf;
 use crate::lobes::dynamics::tool_beam::{Receptance6, ToolBeam};
-use crate::robot::frf::{Response, natural_frequencies_hz};
+use crate::robot::frf::natural_frequencies_hz;
 use crate::robot::{Chain, FrfBasis, Kinematics, RobotModel};
 use crate::{Error, Result};
 
@@ -74,10 +74,9 @@ impl RobotHolder {
 
 impl Holder for RobotHolder {
     fn receptance(&self, frequency_hz: f64) -> Receptance6 {
-        let mut response = Response::default();
-        if self.basis.solve(TAU * frequency_hz, &mut response).is_err() {
+        let Ok(response) = self.basis.solve(TAU * frequency_hz) else {
             return Receptance6::identity() * Complex64::new(0.0, -f64::MAX.sqrt());
-        }
+        };
         Receptance6::from_fn(|out, input| self.basis.receptance(&response, out, input))
     }
 

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 use pulp::{Arch, Simd, WithSimd};
 
-use super::side_by_side::{LANES, Lanes, eliminate_side_by_side, solve_in_place, solve_side_by_side};
+use super::side_by_side::{LANES, Lanes, dot, eliminate_side_by_side, solve_in_place, solve_side_by_side};
 
 #[derive(Debug, Clone)]
 pub(super) enum DynamicStiffness {
@@ -53,6 +53,7 @@ pub(super) struct Room {
     small: Vec<Lanes>,
     right: Vec<Lanes>,
     columns: Vec<Lanes>,
+    weighed: Vec<Lanes>,
 }
 
 impl DynamicStiffness {
@@ -256,6 +257,7 @@ impl WithSimd for Bordered<'_> {
             small,
             right,
             columns: border_columns,
+            weighed,
         } = room;
         modes.inverse(rate, square, inverse);
         let too_large = |x: &Lanes| (0..LANES).any(|l| !(x.get(l).l1_norm() < AT_RESONANCE.recip()));
@@ -272,11 +274,6 @@ impl WithSimd for Bordered<'_> {
             border_columns.push(border_columns[k] * inverse[k % m]);
         }
         let (g, solved) = border_columns.split_at(m * q);
-        let dot = |a: &[Lanes], x: &[Lanes]| {
-            let mut sum = Lanes::default();
-            a.iter().zip(x).for_each(|(a, x)| sum += *a * *x);
-            sum
-        };
         // W times what the dampers see, in its place: entries from b on.
         let weigh = |seen: &mut [Lanes], room: &mut Vec<Lanes>| {
             room.clear();
@@ -304,7 +301,6 @@ impl WithSimd for Bordered<'_> {
             }
         }
         // (E − Bᵀ D⁻¹ B) x − Bᵀ D⁻¹ Q y = f_b − Bᵀ D⁻¹ f and W Qᵀ D⁻¹ B x + (1 + W Qᵀ D⁻¹ Q) y = W Qᵀ D⁻¹ f.
-        let mut weighed = Vec::with_capacity(r);
         for (j, column) in small.chunks_exact_mut(q.max(1)).enumerate() {
             for (i, x) in column[..b].iter_mut().enumerate() {
                 let mut own = Lanes::default();
@@ -315,7 +311,7 @@ impl WithSimd for Bordered<'_> {
                 own -= *x;
                 *x = own;
             }
-            weigh(column, &mut weighed);
+            weigh(column, weighed);
             if j >= b {
                 column[j] = column[j].plus(1.0);
             }
@@ -326,7 +322,7 @@ impl WithSimd for Bordered<'_> {
                 own -= *x;
                 *x = own;
             }
-            weigh(seen, &mut weighed);
+            weigh(seen, weighed);
         }
         if !eliminate_side_by_side(q, small, right) {
             return false;

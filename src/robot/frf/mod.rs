@@ -3,7 +3,7 @@
 //! The eigenproblem is M x = μ K x with K positive definite, μ = ω⁻²: massless coordinates (beam halves without a body)
 //! give μ = 0 and stay in the basis as pure static compliance. With xᵀ K x = 1 the dynamic stiffness of a chain with
 //! modal damping is diagonal, 1 + 2iζω√μ − ω²μ, and H = Σ (r_out·x)(r_in·x)/(…): the modal sum including all residual
-//! compliance. Branches and viscous dampers couple the modes; then the small complex system is solved as it stands.
+//! compliance. Branches and dampers couple the modes; then a complex system is solved, as small as they are few.
 
 mod derivatives;
 mod dynamic_stiffness;
@@ -63,34 +63,32 @@ struct SideBySide {
     /// As those of [`Response`].
     columns: Vec<Lanes>,
     room: Room,
-    /// Room for [`show_only`](Self::show_only).
-    shown_columns: Vec<Lanes>,
-    /// One of them.
+    /// Where the forces that are shown stand among the columns.
+    shown: Vec<usize>,
+    /// One of the lines.
     response: Response,
 }
 
 impl SideBySide {
-    /// Leaves out what belongs to other forces than those along `inputs`; those along all of the outputs are there.
-    fn show_only(&mut self, n: usize, inputs: &[usize]) {
-        self.response.place.fill(None);
-        for (place, input) in inputs.iter().enumerate() {
-            self.response.place[*input] = Some(place);
+    /// Of the forces along the outputs `solved` those along `shown` are shown.
+    fn new(outputs: usize, solved: &[usize], shown: &[usize]) -> Self {
+        let mut room = SideBySide::default();
+        room.response.place.resize(outputs, None);
+        for output in shown {
+            room.response.place[*output] = Some(room.shown.len());
+            room.shown.extend(solved.iter().position(|s| s == output));
         }
-        self.shown_columns.clear();
-        for input in inputs {
-            self.shown_columns
-                .extend_from_slice(&self.columns[n * input..n * (input + 1)]);
-        }
-        std::mem::swap(&mut self.columns, &mut self.shown_columns);
+        room
     }
 
-    /// The line `lane`, which was solved at `rate`.
-    fn shown(&mut self, lane: usize, rate: &Complex64) -> &Response {
+    /// The line `lane`, which was solved at `rate`; `n` numbers a force.
+    fn line(&mut self, n: usize, lane: usize, rate: &Complex64) -> &Response {
         self.response.omega = rate.im;
         self.response.columns.clear();
-        self.response
-            .columns
-            .extend(self.columns.iter().map(|x| x.get(lane)));
+        for place in &self.shown {
+            let column = &self.columns[n * place..n * (place + 1)];
+            self.response.columns.extend(column.iter().map(|x| x.get(lane)));
+        }
         &self.response
     }
 }
@@ -225,31 +223,30 @@ impl FrfBasis {
         (0..self.output_count()).collect()
     }
 
-    /// Solves for forces along all outputs at `omega` (rad/s). Fails only where an undamped system is hit at resonance.
-    pub fn solve(&self, omega: f64, response: &mut Response) -> Result<()> {
-        self.solve_at_rate(Complex64::new(0.0, omega), 0..self.output_count(), response)
+    /// Output `output` in the basis, n numbers.
+    fn row(&self, output: usize) -> &[f64] {
+        &self.rows.as_slice()[self.n * output..self.n * (output + 1)]
     }
 
-    /// Solves for forces along the outputs `inputs` that grow like exp(st), `rate` s in rad/s.
-    fn solve_at_rate(
-        &self,
-        rate: Complex64,
-        inputs: impl IntoIterator<Item = usize>,
-        response: &mut Response,
-    ) -> Result<()> {
-        let n = self.n;
-        response.omega = rate.im;
-        response.columns.clear();
-        response.place.clear();
-        response.place.resize(self.output_count(), None);
-        let rows = |input: usize| &self.rows.as_slice()[n * input..n * (input + 1)];
-        for (place, input) in inputs.into_iter().enumerate() {
-            response.place[input] = Some(place);
-            let forces = rows(input).iter().map(|r| Complex64::new(*r, 0.0));
-            response.columns.extend(forces);
-        }
-        self.dynamics.solve_one(rate, &mut response.columns);
-        finite(response.columns.iter().copied(), rate)
+    /// Responses to forces along the outputs `inputs` that grow like exp(st), `rate` s in rad/s, n a force.
+    fn solved_at(&self, rate: Complex64, inputs: &[usize]) -> Vec<Complex64> {
+        let rows = inputs.iter().flat_map(|input| self.row(*input));
+        let mut columns: Vec<Complex64> = rows.map(|r| Complex64::new(*r, 0.0)).collect();
+        self.dynamics.solve_one(rate, &mut columns);
+        columns
+    }
+
+    /// Solves for forces along all outputs at `omega` (rad/s). Fails only where an undamped system is hit at resonance.
+    pub fn solve(&self, omega: f64) -> Result<Response> {
+        let rate = Complex64::new(0.0, omega);
+        let outputs = self.outputs();
+        let columns = self.solved_at(rate, &outputs);
+        finite(columns.iter().copied(), rate)?;
+        Ok(Response {
+            omega,
+            columns,
+            place: outputs.into_iter().map(Some).collect(),
+        })
     }
 
     /// Solves line after line for forces along the outputs `inputs` that grow like exp(st), s being `rates` (rad/s), and shows
@@ -263,11 +260,11 @@ impl FrfBasis {
         inputs: &[usize],
         mut visit: impl FnMut(usize, &Response) -> Result<()>,
     ) -> Result<()> {
-        let mut room = SideBySide::default();
+        let mut room = SideBySide::new(self.output_count(), inputs, inputs);
         for (group, rates) in rates.chunks(LANES).enumerate() {
             self.solve_group(rates, inputs, &mut room)?;
             for (lane, rate) in rates.iter().enumerate() {
-                visit(LANES * group + lane, room.shown(lane, rate))?;
+                visit(LANES * group + lane, room.line(self.n, lane, rate))?;
             }
         }
         Ok(())
@@ -283,16 +280,15 @@ impl FrfBasis {
         inputs: &[usize],
         mut visit: impl FnMut(usize, &Response, &Slopes) -> Result<()>,
     ) -> Result<()> {
-        let (mut room, mut slopes) = (SideBySide::default(), Slopes::of_inputs(inputs));
         let all = self.outputs();
+        let mut room = SideBySide::new(all.len(), &all, inputs);
+        let mut slopes = Slopes::of_inputs(inputs);
         for (group, rates) in rates.chunks(LANES).enumerate() {
             self.solve_group(rates, &all, &mut room)?;
             self.derivatives.at(filled(rates), &room.columns, &mut slopes);
-            // Forces along all outputs are solved for; those along the inputs are shown.
-            room.show_only(self.n, inputs);
             for (lane, rate) in rates.iter().enumerate() {
                 slopes.lane = lane;
-                visit(LANES * group + lane, room.shown(lane, rate), &slopes)?;
+                visit(LANES * group + lane, room.line(self.n, lane, rate), &slopes)?;
             }
         }
         Ok(())
@@ -300,32 +296,22 @@ impl FrfBasis {
 
     /// Up to [`LANES`] rates together.
     fn solve_group(&self, rates: &[Complex64], inputs: &[usize], room: &mut SideBySide) -> Result<()> {
-        let n = self.n;
-        let rate = filled(rates);
-        room.response.place.clear();
-        room.response.place.resize(self.output_count(), None);
+        let all = filled(rates);
         room.columns.clear();
-        for (place, &input) in inputs.iter().enumerate() {
-            room.response.place[input] = Some(place);
-            let rows = &self.rows.as_slice()[n * input..n * (input + 1)];
-            room.columns.extend(rows.iter().map(|r| Lanes::splat(*r)));
+        for input in inputs {
+            room.columns
+                .extend(self.row(*input).iter().map(|r| Lanes::splat(*r)));
         }
-        if !self.dynamics.solve(rate, &mut room.columns, &mut room.room) {
-            self.solve_one_by_one(&rate, inputs, room)?;
+        if !self.dynamics.solve(all, &mut room.columns, &mut room.room) {
+            // No pivots do for all of them.
+            for (lane, rate) in all.iter().enumerate() {
+                let own = self.solved_at(*rate, inputs);
+                let columns = room.columns.iter_mut().zip(own);
+                columns.for_each(|(x, value)| x.set(lane, value));
+            }
         }
         for (lane, rate) in rates.iter().enumerate() {
             finite(room.columns.iter().map(|x| x.get(lane)), *rate)?;
-        }
-        Ok(())
-    }
-
-    /// Where no pivots do for all of them.
-    fn solve_one_by_one(&self, rates: &[Complex64], inputs: &[usize], room: &mut SideBySide) -> Result<()> {
-        for (lane, rate) in rates.iter().enumerate() {
-            self.solve_at_rate(*rate, inputs.iter().copied(), &mut room.response)?;
-            for (x, value) in room.columns.iter_mut().zip(&room.response.columns) {
-                x.set(lane, *value);
-            }
         }
         Ok(())
     }
@@ -339,7 +325,7 @@ impl FrfBasis {
             (out, input)
         };
         let column = response.column(self.n, force);
-        let row = &self.rows.as_slice()[seen * self.n..(seen + 1) * self.n];
+        let row = self.row(seen);
         // Two sums, so that additions need not wait for each other.
         let (rows, columns) = (row.chunks_exact(2), column.chunks_exact(2));
         let rest = rows.remainder().iter().zip(columns.remainder());
@@ -354,8 +340,6 @@ impl FrfBasis {
 
     /// Receptance at `omega` in one call, m/N.
     pub fn receptance_at(&self, omega: f64, out: usize, input: usize) -> Result<Complex64> {
-        let mut response = Response::default();
-        self.solve(omega, &mut response)?;
-        Ok(self.receptance(&response, out, input))
+        Ok(self.receptance(&self.solve(omega)?, out, input))
     }
 }

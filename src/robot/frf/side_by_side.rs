@@ -162,16 +162,20 @@ impl AddAssign for Lanes {
     }
 }
 
+/// Σ aᵢ bᵢ.
+#[inline(always)]
+pub(super) fn dot(a: &[Lanes], b: &[Lanes]) -> Lanes {
+    let mut sum = Lanes::default();
+    a.iter().zip(b).for_each(|(a, b)| sum += *a * *b);
+    sum
+}
+
 /// Σ aᵢ bᵢ with each of three vectors b.
 #[inline(always)]
 pub(super) fn dots<S: Simd>(simd: S, a: &[Lanes], b: [&[Lanes]; 3]) -> [Lanes; 3] {
     let b = b.map(|b| &b[..a.len()]);
-    let mut sums = [Lanes::default(); 3];
     if S::F64_LANES != LANES {
-        for (i, a) in a.iter().enumerate() {
-            sums.iter_mut().zip(&b).for_each(|(sum, b)| *sum += *a * b[i]);
-        }
-        return sums;
+        return b.map(|b| dot(a, b));
     }
     // By hand: the compiler keeps these sums in memory.
     let vector = |values: &[f64; LANES]| S::as_simd_f64s(values).0[0];
@@ -187,6 +191,7 @@ pub(super) fn dots<S: Simd>(simd: S, a: &[Lanes], b: [&[Lanes]; 3]) -> [Lanes; 3
             im[k] = simd.mul_add_e_f64s(a_im, b_re, im[k]);
         }
     }
+    let mut sums = [Lanes::default(); 3];
     for (k, sum) in sums.iter_mut().enumerate() {
         S::as_mut_simd_f64s(&mut sum.re).0[0] = re[k];
         S::as_mut_simd_f64s(&mut sum.im).0[0] = im[k];

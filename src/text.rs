@@ -12,6 +12,15 @@ pub fn figures(value: f64, count: i32) -> String {
     format!("{value:.decimals$}")
 }
 
+/// `a`, `a and b`, `a, b and c`.
+pub fn listed(items: &[String]) -> String {
+    match items {
+        [] => String::new(),
+        [one] => one.clone(),
+        [most @ .., last] => format!("{} and {last}", most.join(", ")),
+    }
+}
+
 /// The probability of a chance finding, in a sentence: `p = 0.03`, `p < 0.0001`. What is smaller tells a reader nothing more.
 pub fn chance(p: f64) -> String {
     const LEAST: f64 = 1e-4;
@@ -129,6 +138,12 @@ mod tests {
         assert_eq!(shown("Fx [N]\tµm²"), "Fx [N]\tµm²");
         assert_eq!(shown("\u{1b}[31mFx\u{9b}2J\u{7}"), "\\u{1b}[31mFx\\u{9b}2J\\u{7}");
         assert_eq!(shown("a\u{202e}b\u{200b}"), "a\\u{202e}b\\u{200b}");
+    }
+
+    #[test]
+    fn lists_read_as_people_write_them() {
+        let of = |n: usize| listed(&["a", "b", "c"].map(String::from)[..n]);
+        assert_eq!([of(0), of(1), of(2), of(3)], ["", "a", "a and b", "a, b and c"]);
     }
 
     #[test]

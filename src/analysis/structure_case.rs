@@ -82,7 +82,9 @@ impl StructureCase {
         let baseline = structure_model(campaign)?;
         let log = campaign.revisions()?;
         let revisions: Vec<Revision> = log.revisions(Side::Structure).cloned().collect();
-        let (set, mut warnings) = campaign.load_frfs()?;
+        let (set, noticed) = campaign.load_frfs()?;
+        let mut warnings = Vec::from_iter(campaign.guesses.of_robot_told());
+        warnings.extend(noticed);
         warnings.extend(baseline.robot.spec.guesses_told());
         let data = frf_data(campaign, &baseline.robot, set)?;
         let mut settled = false;

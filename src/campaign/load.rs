@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::guesses::Guesses;
 use super::lobes_section;
 use super::schema::*;
 use super::shared_keys::posture_ref;
@@ -36,7 +37,7 @@ impl Campaign {
         if !file.is_file() {
             return Err(no_campaign(dir, &file).into());
         }
-        Document::read(&file)?.parse(&TOP, |top| read(dir, top, paths::inside))
+        of_document(dir, &Document::read(&file)?, paths::inside)
     }
 
     /// As [`load`](Self::load), of a campaign that is still to be measured: files that it names may be missing.
@@ -48,7 +49,7 @@ impl Campaign {
         if !file.is_file() {
             return Err(no_campaign(dir, &file).into());
         }
-        Document::read(&file)?.parse(&TOP, |top| read(dir, top, paths::planned))
+        of_document(dir, &Document::read(&file)?, paths::planned)
     }
 
     /// As [`load`](Self::load), of a text that is not written yet.
@@ -56,7 +57,11 @@ impl Campaign {
     /// # Errors
     /// As [`load`](Self::load).
     pub fn from_text(dir: &Path, text: &str) -> Result<Campaign> {
-        Document::from_text(&campaign_file(dir), text).parse(&TOP, |top| read(dir, top, paths::inside))
+        of_document(
+            dir,
+            &Document::from_text(&campaign_file(dir), text),
+            paths::inside,
+        )
     }
 }
 
@@ -79,6 +84,14 @@ fn no_campaign(dir: &Path, file: &Path) -> InputError {
 
 /// How the name of a file becomes a path: [`paths::inside`] or [`paths::planned`].
 type Find = fn(&Path, &str) -> std::result::Result<PathBuf, Box<InputError>>;
+
+fn of_document(dir: &Path, document: &Document, find: Find) -> Result<Campaign> {
+    let campaign = document.parse(&TOP, |top| read(dir, top, find))?;
+    Ok(Campaign {
+        guesses: Guesses::of_text(document.text()),
+        ..campaign
+    })
+}
 
 fn read(dir: &Path, top: &Section<'_>, find: Find) -> Result<Campaign> {
     schema(top)?;
@@ -118,6 +131,7 @@ fn read(dir: &Path, top: &Section<'_>, find: Find) -> Result<Campaign> {
         material,
         orthogonal: orthogonal(top)?,
         plan: plan(top)?,
+        guesses: Guesses::default(),
     })
 }
 

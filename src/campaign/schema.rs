@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::guesses::Guesses;
 use crate::data::{
     Contact, Cut, Dof, LobesSection, OrthogonalSection, Point, Posture, Quantity, RobotSection, Tool,
 };
@@ -44,6 +45,8 @@ pub struct Campaign {
     pub orthogonal: Option<OrthogonalSection>,
     /// What is to be measured next; without a `[plan]` the usual.
     pub plan: PlanSection,
+    /// What the file itself calls guessed.
+    pub guesses: Guesses,
 }
 
 /// A channel of the force files of all cuts, or of one.

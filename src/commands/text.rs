@@ -131,6 +131,15 @@ pub fn setup_lines(findings: &[SetupFinding]) -> String {
     }
 }
 
+/// What is to be known of the files before anything else is believed: likely mistakes, then what was guessed and noticed.
+pub fn files_first(findings: &[SetupFinding], noticed: &[String]) -> String {
+    let noticed = match warnings(noticed) {
+        none if none.is_empty() => none,
+        some => some + "\n",
+    };
+    setup_lines(findings) + &noticed
+}
+
 /// Characters of the longest bar.
 const BAR_LENGTH: usize = 20;
 /// Eighths of a character, from one to seven.

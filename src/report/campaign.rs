@@ -16,6 +16,7 @@ use crate::report::sections::{
     structure_section, thesis_section, waveform_section,
 };
 use crate::revision::Side;
+use crate::text::listed;
 use crate::thesis::ThesisFindings;
 
 /// Folder of the tables next to the page.
@@ -241,7 +242,7 @@ fn contents(findings: &CampaignFindings) -> String {
     if parts.is_empty() {
         parts.push("a model alone, nothing measured".into());
     }
-    super::words::listed(&parts)
+    listed(&parts)
 }
 
 /// Every part that the campaign holds, in the order of the story.
@@ -292,6 +293,8 @@ fn summary(findings: &CampaignFindings) -> ReportSection {
         .iter()
         .map(|f| Block::Warning(format!("Setup: {}", f.sentence())));
     let mut blocks: Vec<Block> = mistakes.collect();
+    let of_files = noticed_of_files(findings);
+    blocks.extend(of_files.iter().map(|w| Block::Warning(format!("Files: {w}"))));
     blocks.extend(
         findings
             .structure()
@@ -320,13 +323,25 @@ fn summary(findings: &CampaignFindings) -> ReportSection {
         .into_iter()
         .map(|e| Block::Warning(format!("A part is missing from this report. {e}")));
     blocks.extend(lost);
-    blocks.extend(warnings(findings).into_iter().map(Block::Warning));
+    let of_fits = warnings(findings).into_iter().filter(|w| !of_files.contains(w));
+    blocks.extend(of_fits.map(Block::Warning));
     ReportSection {
         id: "summary".into(),
         title: "Summary".into(),
         blocks,
         ..ReportSection::default()
     }
+}
+
+/// What was guessed and noticed of the files: whoever reads on should know it first.
+fn noticed_of_files(findings: &CampaignFindings) -> Vec<String> {
+    let of_frfs = findings
+        .structure()
+        .map_or(&[][..], |s| &s.analysis.case.warnings);
+    let of_cuts = findings
+        .cutting()
+        .and_then(|_| findings.campaign.guesses.of_cutting_told());
+    of_frfs.iter().cloned().chain(of_cuts).collect()
 }
 
 /// What was noticed while reading and fitting; the sections on modes and lobes bear their own.

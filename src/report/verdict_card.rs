@@ -3,7 +3,7 @@
 use super::card::{BeforeAfter, ErrorBar, Tone, VerdictCard};
 use super::number::{format_si, percent, plus_minus, significant};
 use super::picture::Picture;
-use super::words::{self, frf_name, listed};
+use super::words::{self, frf_name};
 use crate::analysis::diagnosis::Leading;
 use crate::analysis::{CuttingFindings, DiagnosisFindings, StructureFindings, StructureLead, WrongLinks};
 use crate::campaign::{Campaign, Process};
@@ -16,6 +16,7 @@ use crate::effects::{Domain, Instance};
 use crate::identify::Modelled;
 use crate::identify::forces::cutting_waves::courses;
 use crate::identify::{CutFit, Estimate};
+use crate::text::listed;
 
 const ROBOT: &str = "Robot against FRFs";
 const FORCES: &str = "Cutting forces";

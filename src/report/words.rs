@@ -173,15 +173,6 @@ pub fn count(number: usize, one: &str, many: &str) -> String {
     }
 }
 
-/// `a`, `a and b`, `a, b and c`.
-pub fn listed(items: &[String]) -> String {
-    match items {
-        [] => String::new(),
-        [one] => one.clone(),
-        [most @ .., last] => format!("{} and {last}", most.join(", ")),
-    }
-}
-
 /// A setting as somebody wrote it: `1160`, `0.05`.
 pub fn setting(value: f64) -> String {
     if value.is_finite() && value.abs() < 1e9 {
@@ -281,17 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn lists_read_as_people_write_them() {
-        let items = |n: usize| {
-            ["a", "b", "c"][..n]
-                .iter()
-                .map(|s| s.to_string())
-                .collect::<Vec<_>>()
-        };
-        assert_eq!(listed(&items(0)), "");
-        assert_eq!(listed(&items(1)), "a");
-        assert_eq!(listed(&items(2)), "a and b");
-        assert_eq!(listed(&items(3)), "a, b and c");
+    fn one_and_many_are_told_apart() {
         assert_eq!(count(1, "cut", "cuts"), "1 cut");
         assert_eq!(count(0, "cut", "cuts"), "0 cuts");
     }

@@ -57,7 +57,8 @@ impl CuttingCase {
             );
         };
         let mut data = CuttingData::on(campaign, process)?;
-        let mut warnings = data.warnings.clone();
+        let mut warnings = Vec::from_iter(campaign.guesses.of_cutting_told());
+        warnings.extend(data.warnings.iter().cloned());
         if let Some((main, others)) = materials(campaign, &data) {
             warnings.push(format!(
                 "the cuts of {others} are not compared: one material at a time, here {main}, of which most cuts are"

@@ -1,5 +1,6 @@
 //! One line of the file to be, and how what a person types becomes TOML.
 
+use crate::campaign::guesses::MARK;
 use crate::text::quoted;
 
 /// What a value looks like.
@@ -121,7 +122,7 @@ impl Entry {
         let note = self
             .guessed
             .as_ref()
-            .map_or(String::new(), |why| format!("  # guessed: {why}"));
+            .map_or(String::new(), |why| format!("  {MARK}{why}"));
         let lines = self
             .value
             .iter()

@@ -5,7 +5,7 @@ use crate::analysis::modes::mode_comparison::{ModePair, compare_modes, measured_
 use crate::analysis::{CuttingAnalysis, ExpertView, StructureAnalysis};
 use crate::campaign::Campaign;
 use crate::commands::next_step::Guide;
-use crate::commands::text::{Emphasis, error_bar, number, percent, setup_lines, table, warnings, wrapped};
+use crate::commands::text::{Emphasis, error_bar, files_first, number, percent, table, wrapped};
 use crate::commands::{Outcome, SideArgs, by_domain};
 use crate::discrepancy::comparison::compare::{ErrorMap, GroupError};
 use crate::discrepancy::comparison::compare_cutting::HarmonicError;
@@ -46,7 +46,7 @@ fn cutting(campaign: &Campaign) -> Result<Outcome> {
     });
     let next =
         Guide::cutting(campaign).compared(analysis.calibration.reduced_chi2, &c.totals, c.mostly.clone());
-    let text = setup_lines(&setup.findings) + &describe_cutting(&analysis);
+    let text = files_first(&setup.findings, &analysis.warnings) + &describe_cutting(&analysis);
     Ok(Outcome::new(json, text, Some(next)))
 }
 
@@ -96,7 +96,7 @@ fn describe_cutting(analysis: &CuttingAnalysis) -> String {
             table(&["order", "nrms", "noise"], &rows)
         );
     }
-    text + &warnings(&analysis.warnings)
+    text
 }
 
 fn structure(campaign: &Campaign) -> Result<Outcome> {
@@ -157,12 +157,11 @@ fn structure(campaign: &Campaign) -> Result<Outcome> {
         &comparison.totals,
         comparison.mostly.as_ref().map(DominantRegion::words),
     );
-    let text = setup_lines(&setup.findings)
+    let text = files_first(&setup.findings, &notes)
         + &format!("model: {}\n", case.model_description())
         + &stands_out(&expert)
         + &describe(comparison, held_out, &peaks)
-        + &mode_table(&modes.pairs)
-        + &warnings(&notes);
+        + &mode_table(&modes.pairs);
     Ok(Outcome::new(json, text, Some(next)))
 }
 

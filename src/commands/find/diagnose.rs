@@ -5,7 +5,7 @@ use crate::analysis::{CampaignSide, CuttingFindings, DiagnosisFindings, Findings
 use crate::campaign::Campaign;
 use crate::commands::find::localise;
 use crate::commands::next_step::Guide;
-use crate::commands::text::{Emphasis, number, percent, setup_lines, table, warnings, wrapped};
+use crate::commands::text::{Emphasis, files_first, number, percent, table, wrapped};
 use crate::commands::{Outcome, SideArgs, by_domain};
 use crate::discrepancy::candidate::BaselineFit;
 use crate::discrepancy::comparison::explained::{Explained, NamedPart};
@@ -111,13 +111,12 @@ fn outcome<D: CampaignSide>(
     if let (Some(all), Value::Object(own)) = (json.as_object_mut(), own) {
         all.extend(own);
     }
-    let text = setup_lines(&setup.findings)
+    let text = files_first(&setup.findings, &case.warnings)
         + &format!("model: {}\n", case.model_description())
         + &as_it_stands(&d.baseline, noise_floor_nrms)
         + &answer(d)
         + told
-        + &rest(d, next_measurement)
-        + &warnings(&case.warnings);
+        + &rest(d, next_measurement);
     let winner = d.winner().map(EffectCandidate::label);
     let next =
         instead.unwrap_or_else(|| guide.diagnosed(d.verdict, winner.as_deref(), &next_measurement.what));

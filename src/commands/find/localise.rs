@@ -2,7 +2,7 @@ use serde_json::{Map, Value, json};
 
 use crate::Result;
 use crate::campaign::Campaign;
-use crate::commands::text::{Emphasis, number, percent, table, warnings};
+use crate::commands::text::{Emphasis, files_first, number, percent, table};
 use crate::commands::{CampaignArg, Outcome};
 use crate::discrepancy::localise::{BestForm, DrawnPart, Localisation, LocalisedPlace, localise};
 use crate::effects::drawn;
@@ -46,7 +46,7 @@ pub fn run(args: LocaliseArgs) -> Result<Outcome> {
     };
     Ok(Outcome::new(
         document(&case, &found),
-        describe(&case, &found, args.places),
+        files_first(&[], &case.warnings) + &describe(&case, &found, args.places),
         Some(next),
     ))
 }
@@ -213,7 +213,7 @@ fn describe(case: &StructureCase, found: &Localisation, most: usize) -> String {
         &rows,
     );
     text += "left: misfit over noise, 1 is noise; scatter: of the drawn stiffness over postures, 1 if it is the same everywhere\n";
-    text + &warnings(&case.warnings)
+    text
 }
 
 fn values(part: &DrawnPart) -> String {

@@ -8,7 +8,7 @@ use crate::analysis::forces::force_records::{cutting_trials, identify_forces};
 use crate::analysis::workbench::Workbench;
 use crate::campaign::Campaign;
 use crate::commands::next_step::Guide;
-use crate::commands::text::{Emphasis, setup_lines};
+use crate::commands::text::files_first;
 use crate::commands::{CampaignArg, Outcome};
 use crate::cutting::kienzle;
 use crate::cutting::{
@@ -39,6 +39,7 @@ pub fn run(args: CfcArgs) -> Result<Outcome> {
     let bench = Workbench::new(&campaign);
     let mut result = identify_forces(&bench, options)?;
     let (waveforms, warnings, setup) = waveform_groups(&bench, &result);
+    result.warnings.splice(0..0, campaign.guesses.of_cutting_told());
     result.warnings.extend(warnings);
     let trials = cutting_trials(&campaign)?;
     let power_laws = PowerLaws {
@@ -49,7 +50,7 @@ pub fn run(args: CfcArgs) -> Result<Outcome> {
     document["setup"] = json!(setup);
     Ok(Outcome::new(
         document,
-        setup_lines(&setup) + &text(&campaign, &result, &power_laws),
+        files_first(&setup, &result.warnings) + &text(&campaign, &result, &power_laws),
         Some(Guide::cutting(&campaign).coefficients()),
     ))
 }
@@ -157,14 +158,6 @@ fn text(campaign: &Campaign, result: &CfcResult, power_laws: &PowerLaws) -> Stri
     }
     if let Some(prediction) = &result.prediction {
         let _ = writeln!(out, "{}", prediction_table(prediction));
-    }
-    if result.warnings.is_empty() {
-        out.push_str("No warnings.\n");
-    } else {
-        let _ = writeln!(out, "{}", Emphasis::Doubtful.on("Warnings"));
-        for warning in &result.warnings {
-            let _ = writeln!(out, "  - {}", warning.replace('\n', "\n    "));
-        }
     }
     out
 }

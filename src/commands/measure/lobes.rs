@@ -416,6 +416,7 @@ mod tests {
             channels: Vec::new(),
             orthogonal: None,
             plan: Default::default(),
+            guesses: Default::default(),
             contacts: Vec::new(),
         }
     }

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::discrepancy::comparison::error_sums::Sums;
+use crate::text::listed;
 
 /// What "most" is: the fewest groups that hold this share together.
 const MOST: f64 = 0.6;
@@ -147,14 +148,6 @@ pub(crate) fn of_cuts(cells: &[(String, String, usize, Sums)], has_orders: bool)
         some => format!("in cuts {}", listed(some)),
     });
     Some(parts.join(", "))
-}
-
-/// `a`, `a and b`, `a, b and c`.
-fn listed(items: &[String]) -> String {
-    match items {
-        [most @ .., last] if !most.is_empty() => format!("{} and {last}", most.join(", ")),
-        _ => items.join(""),
-    }
 }
 
 /// First and last index of the shortest run that holds most of the sum; of several the fullest.

@@ -11,8 +11,9 @@ use crate::report::figure::{
 use crate::report::interactive::Plot;
 use crate::report::number::{decimals, percent, significant, with_error};
 use crate::report::parts::figure;
-use crate::report::words::{count, listed, setting};
+use crate::report::words::{count, setting};
 use crate::report::{Block, ReportSection, ReportTable, TableColumn};
+use crate::text::listed;
 
 pub fn summary(result: &CfcResult) -> String {
     let mut text = String::new();

@@ -13,8 +13,9 @@ use crate::report::figure::{BarSeries, FrfCurve, FrfFigure, NoiseLevel, SideBySi
 use crate::report::number::{decimals, percent, plus_minus, significant};
 use crate::report::parts::{figure, paragraph};
 use crate::report::sections::error_map_section::times_noise_map;
-use crate::report::words::{at_place, frf_name, listed};
+use crate::report::words::{at_place, frf_name};
 use crate::report::{Block, ReportSection, ReportTable, TableColumn, words};
+use crate::text::listed;
 
 pub const ID: &str = "missing-physics";
 pub const TITLE: &str = "Which physics is missing";

@@ -9,9 +9,10 @@ use crate::report::figure::{self, FrfCurve, FrfFigure, HistoryFigure, NoiseLevel
 use crate::report::number::{percent, plus_minus, significant};
 use crate::report::parts::{figure, paragraph};
 use crate::report::sections::error_map_section::times_noise_map;
-use crate::report::words::{frf_name, listed};
+use crate::report::words::frf_name;
 use crate::report::{Block, Fold, ReportSection, ReportTable, TableColumn, words};
 use crate::revision::{Evidence, Revision};
+use crate::text::listed;
 
 /// Candidates of a diagnosis shown.
 const LISTED: usize = 8;

@@ -10,8 +10,9 @@ use crate::report::number::{decimals, percent, plus_minus, significant};
 use crate::report::parts::{figure, paragraph};
 use crate::report::sections::history_section::Stage;
 use crate::report::sections::{error_map_section, history_section};
-use crate::report::words::{count, frf_name, listed, parameter_of};
+use crate::report::words::{count, frf_name, parameter_of};
 use crate::report::{Block, OnScreen, ReportSection, ReportTable, TableColumn};
+use crate::text::listed;
 
 /// FRFs shown as figures: the worst and the best.
 const WORST_SHOWN: usize = 3;

@@ -5,8 +5,9 @@ use crate::report::figure::{BarSeries, SideBySide};
 use crate::report::number::{decimals, format_si, percent, significant};
 use crate::report::parts::{figure, made, paragraph};
 use crate::report::sections::{real_case_section, thesis_cutting};
-use crate::report::words::{listed, parameter_of};
+use crate::report::words::parameter_of;
 use crate::report::{Block, Page, ReportSection, ReportTable, TableColumn};
+use crate::text::listed;
 use crate::thesis::findings::Range;
 use crate::thesis::{CaseStudy, ComparedRow, FITTED_CONFIGURATIONS, LobeTips, ThesisFindings};
 

@@ -13,9 +13,10 @@ use crate::report::sections::diagnosis_section::{
     advice, candidate_chart, candidate_table, how_it_shows, not_tried, verdict_text,
 };
 use crate::report::sections::error_map_section::{LEAST_TOP, TIMES_NOISE};
-use crate::report::words::{listed, parameter_of, setting};
+use crate::report::words::{parameter_of, setting};
 use crate::report::{Block, ReportSection, ReportTable, TableColumn};
 use crate::text::chance;
+use crate::text::listed;
 
 pub const ID: &str = "missing-physics-cutting";
 pub const TITLE: &str = "Which physics the force model lacks";

@@ -19,7 +19,7 @@ mod picture;
 pub(crate) mod sections;
 pub(crate) mod stores;
 pub(crate) mod verdict_card;
-mod words;
+pub(crate) mod words;
 
 pub(crate) use block::{Block, Drawing, Figure, Fold, OnScreen, ReportSection, ReportTable, TableColumn};
 pub(crate) use card::VerdictCard;

@@ -161,6 +161,8 @@ fn rounded(value: f64, error: f64) -> String {
 fn join(number: &str, unit: &str) -> String {
     match unit {
         "" => number.to_owned(),
+        // As people write it; documents for programs say deg.
+        "deg" => format!("{number}\u{a0}°"),
         // A no-break space keeps number and unit on one line.
         _ => format!("{number}\u{a0}{unit}"),
     }

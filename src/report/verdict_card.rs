@@ -711,7 +711,7 @@ mod tests {
             assert_eq!(card.explanation.contains("Missing: payload"), keeps);
             assert_eq!(card.check.is_some(), keeps);
             assert!(
-                card.facts[0].1.contains("0.234 ± 0.012\u{a0}deg"),
+                card.facts[0].1.contains("0.234 ± 0.012\u{a0}°"),
                 "{:?}",
                 card.facts
             );

@@ -4,10 +4,12 @@ use crate::Result;
 use crate::analysis::{FreedLinks, StructureAnalysis};
 use crate::campaign::{Campaign, LinkGroup};
 use crate::commands::next_step::Guide;
-use crate::commands::text::{Emphasis, number, percent, setup_lines, table, warnings};
+use crate::commands::text::{Emphasis, files_first, percent, table};
 use crate::commands::{CampaignArg, Outcome};
 use crate::discrepancy::comparison::place::DominantRegion;
 use crate::identify::{Calibration, Options, Scale, StructureCase, StructureModel, Undetermined};
+use crate::report::number::{format_si, plus_minus};
+use crate::report::words::parameter_of;
 
 #[derive(clap::Args)]
 pub struct CalibrateArgs {
@@ -124,7 +126,7 @@ pub fn run(args: CalibrateArgs) -> Result<Outcome> {
         "setup": setup.findings,
         "warnings": notes,
     });
-    let mut text = setup_lines(&setup.findings) + &format!("model: {}\n\n", case.model_description());
+    let mut text = files_first(&setup.findings, notes) + &format!("model: {}\n\n", case.model_description());
     text += &describe_parameters(&case.model, calibration);
     if let Some(start) = start {
         text += &format!(
@@ -159,7 +161,6 @@ pub fn run(args: CalibrateArgs) -> Result<Outcome> {
     for sentence in undetermined.in_words() {
         text += &format!("{sentence}\n");
     }
-    text += &warnings(notes);
     let next = Guide::structure(&campaign).calibrated(
         calibration.converged(),
         args.starts,
@@ -212,37 +213,29 @@ pub fn describe_parameters(model: &StructureModel, calibration: &Calibration) ->
         .enumerate()
         .map(|(i, p)| {
             let of_robot = i < model.baseline_parameter_count();
+            let unit = if p.unit == "1" { "" } else { p.unit };
             let (initial, change) = match (of_robot, model.parameters[i].scale, p.unit) {
                 // A coordinate has no natural zero that a share could be taken of.
                 (true, Scale::Linear, "m") => (
-                    number(p.initial, 4),
+                    format_si(p.initial, unit, 4),
                     format!("{:+.2} mm", 1e3 * (p.value - p.initial)),
                 ),
                 (true, ..) => (
-                    number(p.initial, 4),
+                    format_si(p.initial, unit, 4),
                     format!("{:+.1} %", 100.0 * (p.value / p.initial - 1.0)),
                 ),
                 _ => ("–".into(), "–".into()),
             };
             vec![
-                p.name.clone(),
+                parameter_of(&p.name),
                 initial,
-                number(p.value, 5),
-                number(p.std_error, 2),
-                p.unit.to_string(),
+                plus_minus(p.value, p.std_error, unit),
                 change,
             ]
         })
         .collect();
     table(
-        &[
-            "parameter",
-            "robot file",
-            "fitted",
-            "± std error",
-            "unit",
-            "change",
-        ],
+        &["parameter", "robot file", "fitted ± standard error", "change"],
         &rows,
     )
 }

@@ -5,12 +5,14 @@ use crate::analysis::{Addition, CampaignSide};
 use crate::campaign::Campaign;
 use crate::commands::find::calibrate::describe_parameters;
 use crate::commands::next_step::Guide;
-use crate::commands::text::{Emphasis, number, percent, table, warnings, wrapped};
+use crate::commands::text::{Emphasis, files_first, percent, table, wrapped};
 use crate::commands::{CampaignArg, Outcome};
 use crate::discrepancy::extension::{Extension, Fitted};
 use crate::effects::{Cutting, Registry, Structure};
 use crate::identify::Modelled;
 use crate::identify::{Calibration, Options};
+use crate::report::number::plus_minus;
+use crate::report::words::parameter_of;
 use crate::revision::RevisionLog;
 
 #[derive(clap::Args)]
@@ -86,15 +88,11 @@ fn describe_estimates(calibration: &Calibration) -> String {
         .parameters
         .iter()
         .map(|p| {
-            vec![
-                p.name.clone(),
-                number(p.value, 5),
-                number(p.std_error, 2),
-                p.unit.to_string(),
-            ]
+            let unit = if p.unit == "1" { "" } else { p.unit };
+            vec![parameter_of(&p.name), plus_minus(p.value, p.std_error, unit)]
         })
         .collect();
-    table(&["parameter", "fitted", "± std error", "unit"], &rows)
+    table(&["parameter", "fitted ± standard error"], &rows)
 }
 
 fn side<D: Modelled>(fitted: &Fitted<D>) -> Value {
@@ -125,7 +123,8 @@ fn describe<D: CampaignSide>(addition: &Addition<D>, parameters: &str) -> String
         progress,
         vanished,
     } = extension;
-    let mut text = format!(
+    let mut text = files_first(&[], notes);
+    text += &format!(
         "revision {revision}: + {}\n{}\n",
         Emphasis::Strong.on(instance.title()),
         wrapped(instance.effect.explanation(), "  ")
@@ -145,7 +144,6 @@ fn describe<D: CampaignSide>(addition: &Addition<D>, parameters: &str) -> String
             D::FOLDS
         );
     }
-    text += &warnings(notes);
     if *vanished {
         text += &format!(
             "{}: the best fit with it is the fit without it, so that its parameters mean nothing.\n",

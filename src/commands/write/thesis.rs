@@ -7,7 +7,9 @@ use crate::commands::Outcome;
 use crate::commands::text::{number, percent, table};
 use crate::cutting::{KnownValue, MILLING_COEFFICIENTS};
 use crate::lobes::Peak;
+use crate::report::number::{format_si, plus_minus};
 use crate::report::sections::thesis_section;
+use crate::report::words::{parameter, parameter_of};
 use crate::thesis::real_case::Explanation;
 use crate::thesis::{CaseStudy, ComparedRow, CuttingTables, LobeTips, RealCase, ThesisFindings};
 
@@ -105,8 +107,8 @@ fn real_case(case: &RealCase) -> String {
             .parameters
             .iter()
             .map(|p| {
-                let name = p.name.rsplit('.').next().unwrap_or_default();
-                format!("{name} {}", number(p.value, 3))
+                let unit = if p.unit == "1" { "" } else { p.unit };
+                format!("{} {}", parameter(&p.name), format_si(p.value, unit, 3))
             })
             .collect();
         let bands: Vec<String> = e
@@ -183,19 +185,18 @@ fn describe(study: &CaseStudy) -> String {
         .parameters
         .iter()
         .map(|p| {
+            let unit = if p.unit == "1" { "" } else { p.unit };
             vec![
-                p.name.clone(),
-                number(p.initial, 4),
-                number(p.value, 4),
-                number(p.std_error, 2),
-                p.unit.to_string(),
+                parameter_of(&p.name),
+                format_si(p.initial, unit, 4),
+                plus_minus(p.value, p.std_error, unit),
             ]
         })
         .collect();
     text += &format!(
         "\n{}",
         table(
-            &["parameter", "robot file", "fitted", "± std error", "unit"],
+            &["parameter", "robot file", "fitted ± standard error"],
             &parameters
         )
     );

@@ -180,7 +180,7 @@ mod tests {
             assert!((a - b).abs() < 1e-6, "{:?}", back.joints_deg());
         }
         let grid = WorkspaceGrid::new(
-            [span("0.5:3.5:7"), span("-1.0:1.0:3"), span("0.2:1.4:3")],
+            [span("0.5:3.5:0.5"), span("-1.0:1.0:1.0"), span("0.2:1.4:0.6")],
             &[[0.0, 0.0, -1.0], [1.0, 0.2, -0.3], (-here.tool_axis()).into()],
             60.0,
         )

@@ -34,7 +34,7 @@ impl Span {
             return Err(InputError::new(format!(
                 "{count} value(s) from {from_m} to {to_m} m are no part of a grid"
             ))
-            .remedy("write FROM:TO:COUNT in metres, such as 1.2:2.0:9, or one value, such as 1.2")
+            .remedy("write FROM:TO:STEP in metres, such as 1.2:2.0:0.1, or one value, such as 1.2")
             .into());
         }
         Ok(Span { from_m, to_m, count })
@@ -59,7 +59,15 @@ impl Span {
     }
 }
 
-/// `FROM:TO:COUNT` or one value, in m.
+/// How many steps make the length; `None` where that is no whole number of them.
+fn steps(length: f64, step: f64) -> Option<usize> {
+    let steps = length / step;
+    let whole = steps.round();
+    let fits = (1.0..1e9).contains(&whole) && (steps - whole).abs() < 1e-6 * whole;
+    fits.then_some(whole as usize)
+}
+
+/// `FROM:TO:STEP` or one value, in m.
 impl FromStr for Span {
     type Err = Error;
 
@@ -68,15 +76,15 @@ impl FromStr for Span {
         let number = |part: &str| part.trim().parse::<f64>().ok();
         let read = match parts[..] {
             [value] => number(value).map(|v| (v, v, 1)),
-            [from, to, count] => number(from)
+            [from, to, step] => number(from)
                 .zip(number(to))
-                .zip(count.trim().parse::<usize>().ok())
-                .map(|((from, to), count)| (from, to, count)),
+                .zip(number(step))
+                .and_then(|((from, to), step)| Some((from, to, 1 + steps(to - from, step)?))),
             _ => None,
         };
         let (from_m, to_m, count) = read.ok_or_else(|| {
             InputError::new(format!("{text:?} is no part of a grid"))
-                .remedy("write FROM:TO:COUNT in metres, such as 1.2:2.0:9, or one value, such as 1.2")
+                .remedy("write FROM:TO:STEP in metres, such as 1.2:2.0:0.1, or one value, such as 1.2")
         })?;
         Span::new(from_m, to_m, count)
     }
@@ -201,23 +209,34 @@ mod tests {
     }
 
     fn grid() -> WorkspaceGrid {
-        let spans = [span("1.0:2.0:3"), span("-0.5"), span("0.5:1.0:2")];
+        let spans = [span("1.0:2.0:0.5"), span("-0.5"), span("0.5:1.0:0.5")];
         WorkspaceGrid::new(spans, &[[0.0, 0.0, -2.0], [1.0, 0.0, 0.0]], 100.0).unwrap()
     }
 
     #[test]
     fn spans_are_read_and_slips_refused() {
-        let s = span("1.2:2.0:5");
+        let s = span("1.2:2.0:0.2");
         assert_eq!((s.at_m(0), s.at_m(4)), (1.2, 2.0));
         assert!((s.at_m(2) - 1.6).abs() < 1e-15);
         assert_eq!(span(" 1.5 ").count, 1);
         for slip in [
-            "", "1:2", "2:1:3", "1:1:3", "1:2:0", "1:2:1", "nan", "1:inf:3", "1:2:2:2", "1:2:-3",
+            "",
+            "1:2",
+            "2:1:0.1",
+            "1:1:0.1",
+            "1:2:0",
+            "1:2:0.3",
+            "1:2:13",
+            "nan",
+            "1:inf:3",
+            "1:2:2:2",
+            "1:2:-1",
+            "0:1:1e-300",
         ] {
             let message = slip.parse::<Span>().unwrap_err().to_string();
-            assert!(message.contains("FROM:TO:COUNT"), "{slip}: {message}");
+            assert!(message.contains("FROM:TO:STEP"), "{slip}: {message}");
         }
-        let spans = [span("0:1:1000"), span("0:1:1000"), span("0:1:1000")];
+        let spans = [span("0:1:0.001"), span("0:1:0.001"), span("0:1:0.001")];
         assert!(WorkspaceGrid::new(spans, &[[0.0, 0.0, -1.0]], 90.0).is_err());
         let one = [span("1"), span("1"), span("1")];
         assert!(WorkspaceGrid::new(one, &[[0.0; 3]], 90.0).is_err());

@@ -25,15 +25,15 @@ pub struct SweepArgs {
     /// Where the map is written: sweep.json, shards/, and merged sweep.parquet, summary.json and pictures.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// x of the tool point in the robot's base frame, m: FROM:TO:COUNT, or one value [default: 11 values, 0.6 m on either
+    /// x of the tool point in the robot's base frame, m: FROM:TO:STEP, or one value [default: 11 values, 0.6 m on either
     /// side of the posture's tool point].
-    #[arg(long, value_name = "SPAN", allow_hyphen_values = true)]
+    #[arg(long, value_name = "FROM:TO:STEP", allow_hyphen_values = true)]
     x_m: Option<Span>,
     /// y, likewise.
-    #[arg(long, value_name = "SPAN", allow_hyphen_values = true)]
+    #[arg(long, value_name = "FROM:TO:STEP", allow_hyphen_values = true)]
     y_m: Option<Span>,
     /// z, likewise [default: 5 values, 0.3 m on either side].
-    #[arg(long, value_name = "SPAN", allow_hyphen_values = true)]
+    #[arg(long, value_name = "FROM:TO:STEP", allow_hyphen_values = true)]
     z_m: Option<Span>,
     /// Along the tool, from the spindle to the workpiece; may be repeated [default: as at the posture].
     #[arg(long, value_name = "X,Y,Z", value_parser = direction, allow_hyphen_values = true)]

@@ -28,7 +28,7 @@ enum QuantityArg {
     after_help = "The folder stays blind: what was hidden stands in DIR.truth.json next to it, not in it. The data \
                         come from the same model that the fits use.\n\nExamples:\n  lobestone simulate --out cell1\n  \
                         lobestone simulate --out cell2 --effect payload:mass_kg=25 --seed 3\n  lobestone simulate --out \
-                        cell3 --kind dirty --effect joint-transverse-compliance@joint-3 --visibility 20\n  lobestone \
+                        cell3 --kind dirty --visibility 20 \\\n    --effect joint-transverse-compliance@joint-3\n  lobestone \
                         simulate --out cell4 --unknown\n  lobestone simulate --out cell5 --random --seed 5\n  lobestone simulate --out cell6 \
                         --effect tooth-radii:short_mm=0.03"
 )]
@@ -113,8 +113,8 @@ pub struct SimulateArgs {
     #[arg(long, value_enum)]
     points: Option<FrfLayout>,
     /// First and last spectral line, Hz.
-    #[arg(long, value_name = "FROM,TO", value_delimiter = ',', num_args = 1..=2)]
-    band: Option<Vec<f64>>,
+    #[arg(long, value_name = "FROM:TO", value_parser = crate::commands::range::band)]
+    band: Option<[f64; 2]>,
     /// Spacing of the spectral lines.
     #[arg(long, value_name = "HZ")]
     lines_hz: Option<f64>,
@@ -219,15 +219,7 @@ fn scenario(args: &SimulateArgs) -> Result<StructureScenario> {
         (None, Some(0.0)) => 0.0,
         _ => scenario.noise_floor_m_per_n,
     };
-    if let Some(band) = &args.band {
-        let [from, to] = band[..] else {
-            return Err(InputError::new("needs two numbers")
-                .key("--band")
-                .remedy("give first and last line, such as 3,90")
-                .into());
-        };
-        scenario.band_hz = [from, to];
-    }
+    scenario.band_hz = args.band.unwrap_or(scenario.band_hz);
     scenario.noise_relative = args.noise.unwrap_or(scenario.noise_relative);
     scenario.postures.count = args.postures.unwrap_or(scenario.postures.count);
     scenario.postures.spread_deg = args.spread_deg.unwrap_or(scenario.postures.spread_deg);

@@ -12,8 +12,13 @@ use crate::commands::many::{batch, fleet};
 use crate::commands::measure::{cfc, lobes, modal, sweep};
 use crate::commands::write::{export, report, schema, shell, simulate, thesis};
 
-/// The commands in groups, with an example each.
-const GROUPS: &str = "\
+/// The commands in groups, with an example each. Part of the template, whose lines are left as they are: an example that is
+/// broken in two cannot be pasted.
+const TEMPLATE: &str = "\
+{about}
+
+{usage-heading} {usage}
+
 Begin
   demo         The whole story on built-in campaigns             lobestone demo
   inspect      What measurement files are                        lobestone inspect cell7/frf
@@ -47,15 +52,16 @@ Many campaigns
 Write and try out
   report       HTML and PNG report of a campaign                 lobestone report cell7
   export       FRFs, modes, lobes, records for other programs    lobestone export cell7 --out numbers
-  simulate     A virtual lab with chosen (or random) physics     lobestone simulate lab --random 7
+  simulate     A virtual lab with chosen (or random) physics     lobestone simulate --out lab --random
   thesis       The source thesis put right                       lobestone thesis
   schema       The form of campaign.toml, for editors            lobestone schema campaign
   completions  Completions for your shell                        lobestone completions bash
   man          The manual page                                   lobestone man
-";
 
-const TEMPLATE: &str = "{about}\n\n{usage-heading} {usage}\n\n{after-help}\n\nOptions:\n{options}\n\n\
-    `lobestone COMMAND --help` says more of a command.";
+Options:
+{options}
+
+`lobestone COMMAND --help` says more of a command.";
 
 /// When colours are used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -68,7 +74,7 @@ pub(super) enum ColorChoice {
 
 /// The program's command line, as clap reads it.
 #[derive(Parser)]
-#[command(name = "lobestone", version, about, long_about = None, help_template = TEMPLATE, after_help = GROUPS)]
+#[command(name = "lobestone", version, about, long_about = None, help_template = TEMPLATE)]
 pub struct Cli {
     /// Print one JSON document on stdout and nothing else there.
     #[arg(long, global = true)]
@@ -186,5 +192,45 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Schema(args) => schema::run(args),
         Command::Completions(args) => shell::completions(args, Cli::command()),
         Command::Man(args) => shell::man(args, Cli::command()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every command that a help text shows, lines that go on put together.
+    fn examples() -> Vec<String> {
+        let help = |c: &clap::Command| c.get_after_help().map(ToString::to_string).unwrap_or_default();
+        let mut lines = Vec::new();
+        for text in Cli::command().get_subcommands().map(help) {
+            let shown: Vec<&str> = text.lines().filter(|l| l.starts_with("  ")).collect();
+            for line in &shown {
+                assert!(
+                    line.chars().count() <= 80,
+                    "broken in two on a terminal of 80 columns: {line}"
+                );
+            }
+            lines.extend(shown.join("\n").replace("\\\n", "").lines().map(String::from));
+        }
+        let of_groups = TEMPLATE.lines().filter(|l| l.starts_with("  "));
+        lines.extend(of_groups.filter_map(|l| Some(l[l.find("lobestone ")?..].to_string())));
+        lines.retain(|l| l.trim_start().starts_with("lobestone "));
+        lines
+    }
+
+    #[test]
+    fn examples_can_be_pasted() {
+        let examples = examples();
+        assert!(examples.len() > 40, "{examples:?}");
+        for example in examples {
+            let command = example.split(['#', '|', '>']).next().unwrap_or_default();
+            let read = Cli::try_parse_from(command.split_whitespace());
+            assert!(
+                read.is_ok(),
+                "{example}: {}",
+                read.err().map(|e| e.to_string()).unwrap_or_default()
+            );
+        }
     }
 }

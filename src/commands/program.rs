@@ -16,9 +16,12 @@ pub fn program<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(said) => {
-            // Help and version come this way, too. A closed pipe is no failure of ours.
-            let _ = said.print();
-            return u8::try_from(said.exit_code()).unwrap_or(2);
+            // Help and version come this way, too.
+            let status = u8::try_from(said.exit_code()).unwrap_or(2);
+            return match lost(said.print(), "help").filter(|_| !said.use_stderr()) {
+                Some(error) => fail(&error),
+                None => status,
+            };
         }
     };
     match cli.color {
@@ -34,23 +37,25 @@ pub fn program<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>
                 true => print_json(&outcome.json),
                 false => print_text(&outcome.text),
             };
-            match printed {
-                // A closed pipe (`lobestone … | head`) is no failure of ours.
-                Err(e) if e.kind() != ErrorKind::BrokenPipe => {
-                    Some(format!("stdout: cannot be written ({e}); what was found is lost"))
-                }
-                _ => outcome.failed.map(|error| error.to_string()),
-            }
+            lost(printed, "what was found").or(outcome.failed.map(|error| error.to_string()))
         }
         Err(error) => Some(error.to_string()),
     };
     match failed {
         None => 0,
-        Some(error) => {
-            anstream::eprintln!("{} {}", error_label(), shown(&error));
-            1
-        }
+        Some(error) => fail(&error),
     }
+}
+
+/// What to say of a failed write of `what`. A closed pipe (`lobestone … | head`) is no failure of ours.
+fn lost(printed: std::io::Result<()>, what: &str) -> Option<String> {
+    let error = printed.err().filter(|e| e.kind() != ErrorKind::BrokenPipe)?;
+    Some(format!("stdout: cannot be written ({error}); {what} is lost"))
+}
+
+fn fail(error: &str) -> u8 {
+    anstream::eprintln!("{} {}", error_label(), shown(error));
+    1
 }
 
 /// Colours go to a terminal only, and not where NO_COLOR is set, unless somebody asked for them.

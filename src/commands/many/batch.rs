@@ -22,10 +22,10 @@ use crate::{InputError, Result};
 #[command(
     after_help = "MANIFEST is a CSV table with a column campaign (folders, from the manifest's own), and as you have them robot, \
                   date and others that are carried along.\n\n\
-                  Examples:\n  lobestone batch nights.csv --out results                    # everything, one after the other\n  \
-                  lobestone batch nights.csv --out results --shard 3/20       # one of twenty parts\n  \
-                  lobestone batch nights.csv --out results --shard slurm      # the part of a task of a Slurm array\n  \
-                  lobestone fleet results                                     # all parts: who is to be looked at\n\
+                  Examples:\n  lobestone batch nights.csv --out results                 # everything\n  \
+                  lobestone batch nights.csv --out results --shard 3/20    # one of twenty parts\n  \
+                  lobestone batch nights.csv --out results --shard slurm   # of a Slurm array\n  \
+                  lobestone fleet results                                  # who is to be looked at\n\
                   What is done is not done again, unless a file, the steps or the program changed. The campaign folders stay as \
                   they are.\nscripts/batch holds a Slurm array script and a Snakemake workflow."
 )]

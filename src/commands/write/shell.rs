@@ -11,7 +11,7 @@ use crate::{Error, Result};
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  lobestone completions bash > ~/.local/share/bash-completion/completions/lobestone\n  \
+    after_help = "Examples:\n  lobestone completions bash \\\n    > ~/.local/share/bash-completion/completions/lobestone\n  \
                         lobestone completions zsh > ~/.zfunc/_lobestone\n  \
                         lobestone completions fish > ~/.config/fish/completions/lobestone.fish\n  \
                         lobestone completions powershell >> $PROFILE"

@@ -48,17 +48,26 @@ pub fn figures(analysis: &LobeAnalysis, file: &str, prefix: &str) -> Vec<Block> 
     let each = if detailed { PANELS } else { CURVES };
     let parts = analysis.cases.chunks(each).count();
     let chunks = analysis.cases.chunks(each).enumerate();
+    let frames = |cases: &[LobeCase]| LobesFigure {
+        panels: match detailed {
+            true => cases
+                .iter()
+                .map(|case| panel(analysis, std::slice::from_ref(case), detailed))
+                .collect(),
+            false => vec![panel(analysis, cases, detailed)],
+        },
+        ..LobesFigure::default()
+    };
+    // One scale in all parts, too: which posture bears more must be seen.
+    let caps = analysis.cases.chunks(each).map(|cases| frames(cases).cap());
+    let depth_cap_mm = (parts > 1).then(|| caps.fold(0.0, f64::max));
     chunks
         .map(|(part, cases)| {
-            let panels = match detailed {
-                true => cases.iter().map(|case| panel(analysis, std::slice::from_ref(case), detailed)).collect(),
-                false => vec![panel(analysis, cases, detailed)],
-            };
             let number = if parts > 1 { format!(", part {}", part + 1) } else { String::new() };
             let drawing = LobesFigure {
                 title: format!("Stability lobes, {prefix}{}{number}", process(analysis)),
-                panels,
-                depth_cap_mm: None,
+                depth_cap_mm,
+                ..frames(cases)
             };
             let name = if parts > 1 { format!("{file}-{}", part + 1) } else { file.to_string() };
             let mut caption = format!("Depth limit over spindle speed, {}; ", source(analysis));

@@ -534,6 +534,10 @@ pub fn cutting(campaign: &Campaign, files: &[SetupFinding], found: &CuttingFindi
     let mut card = answer(d, &added, "force records", None);
     card.id = "verdict-cutting";
     card.side = FORCES;
+    if let (DiagnosisVerdict::Effect, Some(place)) = (d.verdict, &found.now.comparison.mostly) {
+        card.facts
+            .insert(0, ("Where it shows", place.trim_start_matches("at ").into()));
+    }
     if let Some(first) = found.lead.as_ref().and_then(|l| l.lines.first()) {
         card.facts.insert(
             0,

@@ -231,7 +231,7 @@ const parsed = new Promise((done) => document.addEventListener("DOMContentLoaded
     div.tabIndex = 0;
     div.setAttribute("role", "application");
     const does = lead ? "Arrow keys choose a cell, Enter shows its FRF." : "Arrow keys choose a cell.";
-    div.setAttribute("aria-label", `${div.getAttribute("aria-label")} ${does}`);
+    div.setAttribute("aria-label", `${div.getAttribute("aria-label")}. ${does}`);
     const plain = (html) => new DOMParser().parseFromString(html, "text/html").body.textContent;
     const show = () => {
       const { xaxis = "x", yaxis = "y", text } = div.data[at.table];

@@ -21,8 +21,8 @@ use crate::{Error, InputError, Result};
                   concluded from a name carries a comment. On a terminal the rest is asked for.\n\nExamples:\n  \
                   lobestone init cell7 --robot irb6640 --posture p1=135,-2,53,83,30,-117 \\\n    \
                   --posture p2=135,20,26,30,80,-150\n  \
-                  lobestone init trial --process milling --diameter-mm 16 --teeth 6 --helix-deg 42 \\\n    \
-                  --immersion slot --cut-list cuts.csv"
+                  lobestone init trial --process milling --diameter-mm 16 --teeth 6 \\\n    \
+                  --helix-deg 42 --immersion slot --cut-list cuts.csv"
 )]
 pub struct InitArgs {
     /// The folder with the measurement files; campaign.toml is written there.

@@ -25,7 +25,7 @@ use crate::{InputError, Result};
                   Examples:\n  lobestone batch nights.csv --out results                 # everything\n  \
                   lobestone batch nights.csv --out results --shard 3/20    # one of twenty parts\n  \
                   lobestone batch nights.csv --out results --shard slurm   # of a Slurm array\n  \
-                  lobestone fleet results                                  # who is to be looked at\n\
+                  lobestone fleet results                                  # the worst first\n\
                   What is done is not done again, unless a file, the steps or the program changed. The campaign folders stay as \
                   they are.\nscripts/batch holds a Slurm array script and a Snakemake workflow."
 )]

@@ -46,13 +46,13 @@ Measure and cut
   sweep        Limits and stiffness over the workspace           lobestone sweep cell7 --out map
 
 Many campaigns
-  batch        Calibrate and diagnose a list of campaigns        lobestone batch nights.csv --out results
+  batch        Calibrate and diagnose a list of campaigns        lobestone batch list.csv --out all
   fleet        Robots over time, the worst first                 lobestone fleet results
 
 Write and try out
   report       HTML and PNG report of a campaign                 lobestone report cell7
-  export       FRFs, modes, lobes, records for other programs    lobestone export cell7 --out numbers
-  simulate     A virtual lab with chosen (or random) physics     lobestone simulate --out lab --random
+  export       FRFs, modes, lobes, records for other programs    lobestone export cell7 --out data
+  simulate     A virtual lab with chosen (or random) physics     lobestone simulate --out lab
   thesis       The source thesis put right                       lobestone thesis
   schema       The form of campaign.toml, for editors            lobestone schema campaign
   completions  Completions for your shell                        lobestone completions bash

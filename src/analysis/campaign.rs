@@ -12,7 +12,7 @@ use crate::analysis::forces::force_records::identify_forces;
 use crate::analysis::modes::stick_shapes::{self, StickShape};
 use crate::campaign::{Campaign, LobeSource};
 use crate::cutting::{CfcOptions, CfcResult};
-use crate::discrepancy::setup::SetupFinding;
+use crate::discrepancy::setup::{SetupCheck, SetupFinding};
 use crate::identify::frfs::structure_study::held_out_postures;
 use crate::identify::{Options, StructureModel};
 use crate::revision::{Revision, Side};
@@ -43,8 +43,8 @@ pub struct CampaignFindings<'a> {
     pub cutting_revisions: Vec<Revision>,
     /// Stability lobes.
     pub lobes: Option<Result<LobeFindings>>,
-    /// Wrong files and other mistakes of the setup that are likely, of both sides.
-    pub setup: Vec<SetupFinding>,
+    /// Wrong files and other mistakes of the setup, of the sides that a model could be fitted to.
+    pub setup: Vec<Result<SetupCheck>>,
 }
 
 /// Model against FRFs.
@@ -104,7 +104,7 @@ impl<'a> CampaignFindings<'a> {
         let findings = CampaignFindings {
             campaign,
             cutting_revisions: log.revisions(Side::Cutting).cloned().collect(),
-            setup: likely_mistakes(bench, (&structure, &diagnosis), (&cutting, &cutting_diagnosis)),
+            setup: setup_checks(bench, (&structure, &diagnosis), (&cutting, &cutting_diagnosis)),
             postures,
             diagnosis,
             structure,
@@ -146,7 +146,14 @@ impl<'a> CampaignFindings<'a> {
 
     /// What failed and why, each message once.
     pub fn errors(&self) -> Vec<String> {
-        self.messages(|_| true)
+        let mut messages = self.messages(|_| true);
+        let unchecked = self.setup.iter().filter_map(|check| check.as_ref().err());
+        for message in unchecked.map(|e| format!("the files were not looked at for mistakes of the setup: {e}")) {
+            if !messages.iter().any(|m| message.ends_with(m.as_str())) {
+                messages.push(message);
+            }
+        }
+        messages
     }
 
     /// What failed because a file does not say what it should or cannot be read, each message once.
@@ -176,6 +183,12 @@ impl<'a> CampaignFindings<'a> {
             }
         }
         messages
+    }
+
+    /// Wrong files and other mistakes of the setup that are likely, of both sides.
+    pub fn likely_mistakes(&self) -> impl Iterator<Item = &SetupFinding> {
+        let checks = self.setup.iter().filter_map(|check| check.as_ref().ok());
+        checks.flat_map(|check| &check.findings).filter(|f| f.is_likely())
     }
 
     /// The structural part where it succeeded.
@@ -209,30 +222,26 @@ impl<'a> CampaignFindings<'a> {
     }
 }
 
-/// From the diagnoses where they were made; a check that cannot be made finds nothing.
-fn likely_mistakes(
+/// From the diagnoses where they were made.
+fn setup_checks(
     campaign: &Workbench,
     (structure, diagnosis): (
         &Option<Result<StructureFindings>>,
         &Option<Result<DiagnosisFindings>>,
     ),
     (cutting, cutting_diagnosis): (&Option<Result<CfcResult>>, &Option<Result<CuttingFindings>>),
-) -> Vec<SetupFinding> {
+) -> Vec<Result<SetupCheck>> {
     let of_structure = match (diagnosis, structure) {
-        (Some(Ok(d)), _) => Some(d.setup.clone()),
-        (_, Some(Ok(s))) => s.analysis.setup_check().ok(),
+        (Some(Ok(d)), _) => Some(Ok(d.setup.clone())),
+        (_, Some(Ok(s))) => Some(s.analysis.setup_check()),
         _ => None,
     };
     let of_cutting = match (cutting_diagnosis, cutting) {
-        (Some(Ok(d)), _) => Some(d.setup.clone()),
-        (_, Some(Ok(_))) => CuttingAnalysis::on(campaign).and_then(|c| c.setup_check()).ok(),
+        (Some(Ok(d)), _) => Some(Ok(d.setup.clone())),
+        (_, Some(Ok(_))) => Some(CuttingAnalysis::on(campaign).and_then(|c| c.setup_check())),
         _ => None,
     };
-    let all = of_structure
-        .into_iter()
-        .chain(of_cutting)
-        .flat_map(|check| check.findings);
-    all.filter(SetupFinding::is_likely).collect()
+    of_structure.into_iter().chain(of_cutting).collect()
 }
 
 impl StructureFindings {

@@ -93,7 +93,7 @@ fn cards(findings: &CampaignFindings) -> Vec<VerdictCard> {
         all.filter(|f| f.is_likely()).cloned().collect()
     };
     // Without diagnoses nobody knows which side a mistake belongs to: it stands on the first card.
-    let mut left = findings.setup.clone();
+    let mut left: Vec<SetupFinding> = findings.likely_mistakes().cloned().collect();
     let mut of_side = |check: Option<&SetupCheck>| match check {
         Some(check) => {
             let own = own(Some(check));
@@ -289,8 +289,7 @@ fn parts(findings: &CampaignFindings) -> Vec<ReportSection> {
 
 fn summary(findings: &CampaignFindings) -> ReportSection {
     let mistakes = findings
-        .setup
-        .iter()
+        .likely_mistakes()
         .map(|f| Block::Warning(format!("Setup: {}", f.sentence())));
     let mut blocks: Vec<Block> = mistakes.collect();
     let of_files = noticed_of_files(findings);

@@ -140,6 +140,12 @@ pub fn files_first(findings: &[SetupFinding], noticed: &[String]) -> String {
     setup_lines(findings) + &noticed
 }
 
+/// Those of `warnings` that were not told before.
+pub fn warnings_but(all: &[String], told: &[String]) -> String {
+    let left: Vec<String> = all.iter().filter(|w| !told.contains(w)).cloned().collect();
+    warnings(&left)
+}
+
 /// Characters of the longest bar.
 const BAR_LENGTH: usize = 20;
 /// Eighths of a character, from one to seven.

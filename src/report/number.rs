@@ -178,7 +178,8 @@ fn prefixed(value: f64, unit: &str, digits: usize) -> (f64, &'static str) {
     }
 }
 
-/// Whether a prefix may be put before the unit: only SI units the toolkit itself writes.
+/// Whether a prefix may be put before the unit: only SI units the toolkit itself writes. Coefficients of cutting are in N/mm² and N/mm
+/// wherever they are printed.
 fn takes_prefix(unit: &str) -> bool {
     ["N", "m", "Pa", "Hz", "s", "W", "J"]
         .iter()
@@ -186,7 +187,8 @@ fn takes_prefix(unit: &str) -> bool {
             // "m" is the metre, "mm" is not; "N·m/rad" and "m/N" are fine. A power of the unit is not:
             // 10⁶ m² is no "Mm²".
             Some(rest) => {
-                !rest.starts_with(|c: char| c.is_alphanumeric() || c == '²' || c == '³' || c == '^')
+                let is_more = |c: char| c.is_alphanumeric() || c == '²' || c == '³' || c == '^';
+                !rest.starts_with(is_more) && !rest.contains("/mm")
             }
             None => false,
         })
@@ -270,7 +272,7 @@ mod tests {
             plus_minus(1.23456e6, 2.1e3, "N·m/rad"),
             "1.2346 ± 0.0021\u{a0}MN·m/rad"
         );
-        assert_eq!(plus_minus(-1014.23, 12.3, "N/mm²"), "−1.014 ± 0.012\u{a0}kN/mm²");
+        assert_eq!(plus_minus(-1014.23, 12.3, "N/mm²"), "−1014 ± 12\u{a0}N/mm²");
         assert_eq!(plus_minus(0.02, 0.3, ""), "0.02 ± 0.30");
         assert_eq!(plus_minus(5.0, f64::NAN, "kg"), "5.000\u{a0}kg");
         assert_eq!(plus_minus(f64::NAN, 1.0, "kg"), MISSING);

@@ -64,11 +64,12 @@ pub fn size(p: &Estimate) -> String {
     format!("{name} {}{stuck}", plus_minus(p.value, p.std_error, unit))
 }
 
-/// `link-4.inertia-x 60.02 ± 0.04 kg·m² instead of 31.28 kg·m²`.
+/// `link 4: moment of inertia about x 60.02 ± 0.04 kg·m² instead of 31.28 kg·m²`.
 pub fn departure(p: &Estimate) -> String {
     let unit = if p.unit == "1" { "" } else { p.unit };
     let fitted = plus_minus(p.value, p.std_error, unit);
-    format!("{} {fitted} instead of {}", p.name, format_si(p.initial, unit, 4))
+    let name = words::parameter_of(&p.name);
+    format!("{name} {fitted} instead of {}", format_si(p.initial, unit, 4))
 }
 
 /// Headline, explanation, facts and check of a verdict.

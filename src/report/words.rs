@@ -44,7 +44,7 @@ const UNITS: [(&str, &str); 20] = [
 ];
 
 /// Keys that are no words.
-const NAMES: [(&str, &str); 18] = [
+const NAMES: [(&str, &str); 27] = [
     ("zeta", "damping ratio"),
     ("c", "damping"),
     ("young", "Young's modulus"),
@@ -63,6 +63,15 @@ const NAMES: [(&str, &str); 18] = [
     ("k_margin", "friction force of the margin"),
     ("amplitude_per_feed", "amplitude over feed"),
     ("matrix", "leak"),
+    ("d", "offset d"),
+    ("a", "length a"),
+    ("wall", "wall thickness"),
+    ("inertia-x", "moment of inertia about x"),
+    ("inertia-y", "moment of inertia about y"),
+    ("inertia-z", "moment of inertia about z"),
+    ("com-x", "centre of mass, x"),
+    ("com-y", "centre of mass, y"),
+    ("com-z", "centre of mass, z"),
 ];
 
 /// A parameter's key in words: `joint-transverse-compliance@joint-2.transverse_nm_per_rad` → `stiffness across the axis`.
@@ -236,6 +245,8 @@ mod tests {
                 "local-resonator@link-3.frequency_hz",
                 "local resonator, link 3: frequency",
             ),
+            ("link-4.inertia-x", "link 4: moment of inertia about x"),
+            ("joint-4.d", "joint 4: offset d"),
         ] {
             assert_eq!(parameter_of(key), words, "{key}");
         }

@@ -4,7 +4,7 @@ use crate::Result;
 use crate::analysis::{FreedLinks, StructureAnalysis};
 use crate::campaign::{Campaign, LinkGroup};
 use crate::commands::next_step::Guide;
-use crate::commands::text::{Emphasis, files_first, percent, table};
+use crate::commands::text::{Emphasis, files_first, percent, table, warnings_but};
 use crate::commands::{CampaignArg, Outcome};
 use crate::discrepancy::comparison::place::DominantRegion;
 use crate::identify::{Calibration, Options, Scale, StructureCase, StructureModel, Undetermined};
@@ -126,7 +126,7 @@ pub fn run(args: CalibrateArgs) -> Result<Outcome> {
         "setup": setup.findings,
         "warnings": notes,
     });
-    let mut text = files_first(&setup.findings, notes) + &format!("model: {}\n\n", case.model_description());
+    let mut text = files_first(&setup.findings, &case.warnings) + &format!("model: {}\n\n", case.model_description());
     text += &describe_parameters(&case.model, calibration);
     if let Some(start) = start {
         text += &format!(
@@ -161,6 +161,7 @@ pub fn run(args: CalibrateArgs) -> Result<Outcome> {
     for sentence in undetermined.in_words() {
         text += &format!("{sentence}\n");
     }
+    text += &warnings_but(notes, &case.warnings);
     let next = Guide::structure(&campaign).calibrated(
         calibration.converged(),
         args.starts,

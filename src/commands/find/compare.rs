@@ -5,7 +5,7 @@ use crate::analysis::modes::mode_comparison::{ModePair, compare_modes, measured_
 use crate::analysis::{CuttingAnalysis, ExpertView, StructureAnalysis};
 use crate::campaign::Campaign;
 use crate::commands::next_step::Guide;
-use crate::commands::text::{Emphasis, error_bar, files_first, number, percent, table, wrapped};
+use crate::commands::text::{Emphasis, error_bar, files_first, number, percent, table, warnings_but, wrapped};
 use crate::commands::{Outcome, SideArgs, by_domain};
 use crate::discrepancy::comparison::compare::{ErrorMap, GroupError};
 use crate::discrepancy::comparison::compare_cutting::HarmonicError;
@@ -157,11 +157,12 @@ fn structure(campaign: &Campaign) -> Result<Outcome> {
         &comparison.totals,
         comparison.mostly.as_ref().map(DominantRegion::words),
     );
-    let text = files_first(&setup.findings, &notes)
+    let text = files_first(&setup.findings, &case.warnings)
         + &format!("model: {}\n", case.model_description())
         + &stands_out(&expert)
         + &describe(comparison, held_out, &peaks)
-        + &mode_table(&modes.pairs);
+        + &mode_table(&modes.pairs)
+        + &warnings_but(&notes, &case.warnings);
     Ok(Outcome::new(json, text, Some(next)))
 }
 

@@ -126,7 +126,8 @@ pub fn run(args: CalibrateArgs) -> Result<Outcome> {
         "setup": setup.findings,
         "warnings": notes,
     });
-    let mut text = files_first(&setup.findings, &case.warnings) + &format!("model: {}\n\n", case.model_description());
+    let mut text =
+        files_first(&setup.findings, &case.warnings) + &format!("model: {}\n\n", case.model_description());
     text += &describe_parameters(&case.model, calibration);
     if let Some(start) = start {
         text += &format!(

@@ -5,7 +5,9 @@ use crate::analysis::modes::mode_comparison::{ModePair, compare_modes, measured_
 use crate::analysis::{CuttingAnalysis, ExpertView, StructureAnalysis};
 use crate::campaign::Campaign;
 use crate::commands::next_step::Guide;
-use crate::commands::text::{Emphasis, error_bar, files_first, number, percent, table, warnings_but, wrapped};
+use crate::commands::text::{
+    Emphasis, error_bar, files_first, number, percent, table, warnings_but, wrapped,
+};
 use crate::commands::{Outcome, SideArgs, by_domain};
 use crate::discrepancy::comparison::compare::{ErrorMap, GroupError};
 use crate::discrepancy::comparison::compare_cutting::HarmonicError;

@@ -72,6 +72,14 @@ impl Guesses {
         self.told(true)
     }
 
+    /// Both, for what rests on robot and cuts.
+    pub fn all_told(&self) -> Vec<String> {
+        self.of_robot_told()
+            .into_iter()
+            .chain(self.of_cutting_told())
+            .collect()
+    }
+
     fn told(&self, cutting: bool) -> Option<String> {
         let own = self
             .0

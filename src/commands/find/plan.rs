@@ -2,7 +2,7 @@ use serde_json::{Map, Value, json};
 
 use crate::analysis::planning::{PlanFindings, PlanRequest};
 use crate::campaign::Campaign;
-use crate::commands::text::{number, percent, table, warnings, wrapped};
+use crate::commands::text::{files_first, number, percent, table, warnings, wrapped};
 use crate::commands::{CampaignArg, Outcome, next_step};
 use crate::discrepancy::outlook::plan::{PlanOutlook, PlannedEffect, SEEN_SIGMAS};
 use crate::ingest::Dof;
@@ -57,7 +57,9 @@ pub fn run(args: PlanArgs) -> Result<Outcome> {
     let next = next_step::planned(&campaign.dir, plan.additions.first().map(|a| a.what.as_str()));
     Ok(Outcome::new(
         json,
-        describe(&findings) + &warnings(&findings.warnings),
+        files_first(&[], campaign.guesses.of_robot_told().as_slice())
+            + &describe(&findings)
+            + &warnings(&findings.warnings),
         Some(next),
     ))
 }

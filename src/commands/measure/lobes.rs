@@ -7,7 +7,7 @@ use crate::analysis::{LobeAnalysis, RedundancyAnalysis};
 use crate::campaign::{Campaign, LobeMethod, Process};
 use crate::commands::measure::{drill, hole, lobe_tool};
 use crate::commands::next_step::Guide;
-use crate::commands::text::{number, table, warnings};
+use crate::commands::text::{files_first, number, table, warnings};
 use crate::commands::{CampaignArg, Outcome};
 use crate::lobes::outcome::Outcomes;
 use crate::lobes::redundancy::AngleStatus;
@@ -29,7 +29,7 @@ fn outcome(campaign: &Campaign) -> Result<Outcome> {
     let analysis = LobeAnalysis::run(campaign)?;
     Ok(Outcome::new(
         document(&analysis),
-        text(&analysis),
+        files_first(&[], &campaign.guesses.all_told()) + &text(&analysis),
         Some(Guide::structure(campaign).lobes()),
     ))
 }

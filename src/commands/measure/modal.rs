@@ -13,7 +13,7 @@ use crate::campaign::Campaign;
 use crate::commands::Outcome;
 use crate::commands::measure::modal_files::Files;
 use crate::commands::next_step::{self, Guide};
-use crate::commands::text::{Emphasis, said_once, table};
+use crate::commands::text::{Emphasis, files_first, said_once, table};
 use crate::data::Quantity;
 use crate::modal::chosen::Choice;
 use crate::modal::operational::OperationalSettings;
@@ -192,12 +192,12 @@ pub fn run(args: ModalArgs) -> Result<Outcome> {
                 .into(),
         );
     }
-    let (mut analysis, next) = match args.paths.as_slice() {
+    let (mut analysis, next, guessed) = match args.paths.as_slice() {
         [dir] if campaign => {
             let campaign = Campaign::load(dir)?;
             let analysis = ModalAnalysis::of_campaign(&campaign, &settings)?;
             let next = Guide::structure(&campaign).modes(analysis.mode_count());
-            (analysis, next)
+            (analysis, next, campaign.guesses.of_robot_told())
         }
         _ if campaign => {
             return Err(
@@ -216,7 +216,7 @@ pub fn run(args: ModalArgs) -> Result<Outcome> {
             let analysis = ModalAnalysis::of_files(files, args.together, &reading, &settings)?;
             let paths: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
             let next = next_step::modes_of_files(&paths, analysis.mode_count());
-            (analysis, next)
+            (analysis, next, None)
         }
     };
     if let Some(method) = args.method {
@@ -228,7 +228,7 @@ pub fn run(args: ModalArgs) -> Result<Outcome> {
         modes: args.modes,
     })?;
     let mut json = document(&analysis, campaign);
-    let mut said = text(&analysis, args.each);
+    let mut said = files_first(&[], guessed.as_slice()) + &text(&analysis, args.each);
     crate::commands::measure::modal_files::write(&args.files(), &analysis, &mut json, &mut said)?;
     Ok(Outcome::new(json, said, Some(next)))
 }

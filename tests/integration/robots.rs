@@ -379,9 +379,9 @@ fn lobes_hole_and_sweep_run_on_both_arms() {
 
         let campaign = Campaign::load(folder.path()).unwrap();
         let tcp = numbers(&home["postures"][0]["tcp_m"]);
-        let span = |i: usize| Some(format!("{}:{}:0.1", tcp[i] - 0.05, tcp[i] + 0.05).parse().unwrap());
+        let around = |i: usize| format!("{}:{}:0.1", tcp[i] - 0.05, tcp[i] + 0.05);
         let request = SweepRequest {
-            spans_m: [span(0), span(1), span(2)],
+            spans_m: [0, 1, 2].map(|i| around(i).parse().ok()),
             angle_step_deg: Some(180.0),
             ..SweepRequest::default()
         };

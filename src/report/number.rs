@@ -160,7 +160,8 @@ fn rounded(value: f64, error: f64) -> String {
 
 fn join(number: &str, unit: &str) -> String {
     match unit {
-        "" => number.to_owned(),
+        // A bare number, whose unit is 1 in documents for programs.
+        "" | "1" => number.to_owned(),
         // As people write it; documents for programs say deg.
         "deg" => format!("{number}\u{a0}°"),
         // A no-break space keeps number and unit on one line.

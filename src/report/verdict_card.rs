@@ -58,18 +58,16 @@ pub fn sizes(parameters: &[Estimate]) -> String {
 
 /// `mass 5.9 ± 0.3 kg`.
 pub fn size(p: &Estimate) -> String {
-    let unit = if p.unit == "1" { "" } else { p.unit };
     let name = words::parameter(&p.name);
     let stuck = if p.at_bound { " (end of its range)" } else { "" };
-    format!("{name} {}{stuck}", plus_minus(p.value, p.std_error, unit))
+    format!("{name} {}{stuck}", plus_minus(p.value, p.std_error, p.unit))
 }
 
 /// `link 4: moment of inertia about x 60.02 ± 0.04 kg·m² instead of 31.28 kg·m²`.
 pub fn departure(p: &Estimate) -> String {
-    let unit = if p.unit == "1" { "" } else { p.unit };
-    let fitted = plus_minus(p.value, p.std_error, unit);
+    let fitted = plus_minus(p.value, p.std_error, p.unit);
     let name = words::parameter_of(&p.name);
-    format!("{name} {fitted} instead of {}", format_si(p.initial, unit, 4))
+    format!("{name} {fitted} instead of {}", format_si(p.initial, p.unit, 4))
 }
 
 /// Headline, explanation, facts and check of a verdict.
@@ -246,14 +244,9 @@ fn files_first(card: &mut VerdictCard, findings: &[&SetupFinding]) {
     let mut facts = Vec::new();
     for finding in findings {
         let size = match (finding.value, finding.std_error) {
-            (Some(value), error) => format!(
-                "{}. ",
-                plus_minus(
-                    value,
-                    error.unwrap_or(f64::NAN),
-                    if finding.unit == "1" { "" } else { finding.unit }
-                )
-            ),
+            (Some(value), error) => {
+                format!("{}. ", plus_minus(value, error.unwrap_or(f64::NAN), finding.unit))
+            }
             (None, _) => String::new(),
         };
         facts.push((

@@ -215,15 +215,14 @@ pub fn describe_parameters(model: &StructureModel, calibration: &Calibration) ->
         .enumerate()
         .map(|(i, p)| {
             let of_robot = i < model.baseline_parameter_count();
-            let unit = if p.unit == "1" { "" } else { p.unit };
             let (initial, change) = match (of_robot, model.parameters[i].scale, p.unit) {
                 // A coordinate has no natural zero that a share could be taken of.
                 (true, Scale::Linear, "m") => (
-                    format_si(p.initial, unit, 4),
+                    format_si(p.initial, p.unit, 4),
                     format!("{:+.2} mm", 1e3 * (p.value - p.initial)),
                 ),
                 (true, ..) => (
-                    format_si(p.initial, unit, 4),
+                    format_si(p.initial, p.unit, 4),
                     format!("{:+.1} %", 100.0 * (p.value / p.initial - 1.0)),
                 ),
                 _ => ("–".into(), "–".into()),
@@ -231,7 +230,7 @@ pub fn describe_parameters(model: &StructureModel, calibration: &Calibration) ->
             vec![
                 parameter_of(&p.name),
                 initial,
-                plus_minus(p.value, p.std_error, unit),
+                plus_minus(p.value, p.std_error, p.unit),
                 change,
             ]
         })

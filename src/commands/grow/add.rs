@@ -87,10 +87,7 @@ fn describe_estimates(calibration: &Calibration) -> String {
     let rows: Vec<Vec<String>> = calibration
         .parameters
         .iter()
-        .map(|p| {
-            let unit = if p.unit == "1" { "" } else { p.unit };
-            vec![parameter_of(&p.name), plus_minus(p.value, p.std_error, unit)]
-        })
+        .map(|p| vec![parameter_of(&p.name), plus_minus(p.value, p.std_error, p.unit)])
         .collect();
     table(&["parameter", "fitted ± standard error"], &rows)
 }

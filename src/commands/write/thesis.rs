@@ -106,10 +106,7 @@ fn real_case(case: &RealCase) -> String {
         let parameters: Vec<String> = e
             .parameters
             .iter()
-            .map(|p| {
-                let unit = if p.unit == "1" { "" } else { p.unit };
-                format!("{} {}", parameter(&p.name), format_si(p.value, unit, 3))
-            })
+            .map(|p| format!("{} {}", parameter(&p.name), format_si(p.value, p.unit, 3)))
             .collect();
         let bands: Vec<String> = e
             .bands
@@ -185,11 +182,10 @@ fn describe(study: &CaseStudy) -> String {
         .parameters
         .iter()
         .map(|p| {
-            let unit = if p.unit == "1" { "" } else { p.unit };
             vec![
                 parameter_of(&p.name),
-                format_si(p.initial, unit, 4),
-                plus_minus(p.value, p.std_error, unit),
+                format_si(p.initial, p.unit, 4),
+                plus_minus(p.value, p.std_error, p.unit),
             ]
         })
         .collect();

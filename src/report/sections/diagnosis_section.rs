@@ -253,11 +253,10 @@ pub(crate) fn candidate_table<D: Modelled>(d: &Diagnosis<D>) -> Block {
             .parameters
             .iter()
             .map(|p| {
-                let unit = if p.unit == "1" { "" } else { p.unit };
                 format!(
                     "{} {}",
                     words::parameter(&p.name),
-                    plus_minus(p.value, p.std_error, unit)
+                    plus_minus(p.value, p.std_error, p.unit)
                 )
             })
             .collect();

@@ -181,8 +181,7 @@ fn sizes(revision: &Revision) -> Option<Block> {
     });
     let pairs: Vec<(String, String)> = own
         .map(|p| {
-            let unit = if p.unit == "1" { "" } else { &p.unit };
-            let value = plus_minus(p.value, p.std_error.unwrap_or(f64::NAN), unit);
+            let value = plus_minus(p.value, p.std_error.unwrap_or(f64::NAN), &p.unit);
             (words::parameter(&p.name), value)
         })
         .collect();

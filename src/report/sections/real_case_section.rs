@@ -77,10 +77,7 @@ fn explanations(case: &RealCase) -> [Block; 2] {
         ]
     };
     let sizes = |e: &Explanation| {
-        let one = |p: &Estimate| {
-            let unit = if p.unit == "1" { "" } else { p.unit };
-            format!("{} {}", parameter(&p.name), format_si(p.value, unit, 3))
-        };
+        let one = |p: &Estimate| format!("{} {}", parameter(&p.name), format_si(p.value, p.unit, 3));
         let sizes: Vec<String> = e.parameters.iter().map(one).collect();
         let bound = if e.at_bound { " (at its bound)" } else { "" };
         vec![at_place(&e.name), format!("{}{bound}", sizes.join(", "))]

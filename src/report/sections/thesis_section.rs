@@ -286,11 +286,10 @@ fn static_table(findings: &ThesisFindings) -> Block {
 
 fn parameter_table(findings: &ThesisFindings) -> Block {
     let rows = findings.study.parameters.iter().map(|p| {
-        let unit = if p.unit == "1" { "" } else { p.unit };
         vec![
             parameter_of(&p.name),
-            format_si(p.initial, unit, 4),
-            crate::report::number::plus_minus(p.value, p.std_error, unit),
+            format_si(p.initial, p.unit, 4),
+            crate::report::number::plus_minus(p.value, p.std_error, p.unit),
         ]
     });
     Block::Table(ReportTable {

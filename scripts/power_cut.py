@@ -12,14 +12,14 @@ def need(holds, what):
         sys.exit(f"FAILED: {what}")
 
 
-def processes_of_session(session):
-    """Ids and command lines of the processes of a session, from /proc."""
+def processes(of_session=None):
+    """Ids and command lines of all processes, or of those of a session, from /proc."""
     found = {}
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
             # Behind the name in brackets: state, parent, group, session.
             fields = stat.read_text().rpartition(")")[2].split()
-            if int(fields[3]) == session and fields[0] != "Z":
+            if of_session in (None, int(fields[3])) and fields[0] != "Z":
                 found[int(stat.parent.name)] = (stat.parent / "cmdline").read_bytes().split(b"\0")
         except OSError:
             continue
@@ -38,7 +38,7 @@ def kill_all_of(run):
     """Kills a process that leads a session with all that is in it, as a power cut would."""
     deadline = time.monotonic() + 10
     # Again until none is left: one may just have been starting another.
-    while left := processes_of_session(run.pid):
+    while left := processes(run.pid):
         for process in left:
             kill(process)
         run.poll()

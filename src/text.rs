@@ -2,6 +2,7 @@
 //! have meant.
 
 use std::borrow::Cow;
+use std::path::Path;
 
 /// A number for people, with so many figures that count and no exponent: `18.30`, `0.01265`, `29930`.
 pub fn figures(value: f64, count: i32) -> String {
@@ -18,6 +19,21 @@ pub fn listed(items: &[String]) -> String {
         [] => String::new(),
         [one] => one.clone(),
         [most @ .., last] => format!("{} and {last}", most.join(", ")),
+    }
+}
+
+/// A path as one word of a command line.
+pub fn shell_word(path: &Path) -> String {
+    let text = path.display().to_string();
+    let plain = |c: char| c.is_alphanumeric() || "/\\._-+:,@%~=".contains(c);
+    let quoted = match text.chars().all(plain) && !text.is_empty() {
+        true => text,
+        false if text.contains('\'') => format!("\"{text}\""),
+        false => format!("'{text}'"),
+    };
+    match quoted.starts_with('-') {
+        true => format!("./{quoted}"),
+        false => quoted,
     }
 }
 
@@ -163,6 +179,19 @@ mod tests {
         assert_eq!(closest("feed_per_tooth", keys), Some("feed_per_tooth_mm"));
         assert_eq!(closest("operator", keys), None);
         assert_eq!(closest(&"x".repeat(100_000), keys), None);
+    }
+
+    #[test]
+    fn a_path_is_one_word() {
+        for (path, expected) in [
+            ("cell7", "cell7"),
+            ("/tmp/my cell", "'/tmp/my cell'"),
+            ("it's", "\"it's\""),
+            ("-x", "./-x"),
+            ("", "''"),
+        ] {
+            assert_eq!(shell_word(Path::new(path)), expected);
+        }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 """Kill the workers of a batch again and again, and compare what they leave with a batch that was never interrupted.
 
-    python3 scripts/batch/test_resume.py [--engine array,snakemake,dask,ray] [--campaigns 200] [--lobestone PROGRAM]
+    python3 scripts/batch/test_resume.py [--engine array,snakemake,dask,ray,slurm,snakemake-slurm] [--campaigns 200] [--lobestone PROGRAM]
 
 Makes many tiny campaigns (one of ten broken) and works on them in one go. Then, with each engine, the same again: some rounds in
 which single workers are killed (SIGKILL) while the engine runs, until the engine with all its workers is killed, too, as a power
@@ -9,11 +9,13 @@ itself. Fails unless every result that was there before a kill is left as it was
 same, cell by cell but for the column `seconds`, as that of the uninterrupted run, and the campaign folders are as they were.
 
 `array` runs scripts/batch/array.sbatch as Slurm would, two tasks at a time, and hands it in again until no task fails; the others
-are the recipes of this folder, and need what these need. Python 3.10 or newer; Linux.
+are the recipes of this folder, and need what these need. `slurm` hands the array to a real Slurm whose nodes are this machine (their processes
+are killed here), `snakemake-slurm` has Snakemake do so. Python 3.10 or newer; Linux.
 """
 
 import argparse
 import csv
+import getpass
 import hashlib
 import random
 import re
@@ -28,7 +30,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 sys.path.insert(0, str(ROOT / "scripts"))
-from power_cut import kill, kill_all_of, need, processes_of_session  # noqa: E402
+from power_cut import kill, kill_all_of, need, processes  # noqa: E402
 
 # What runs at the same time.
 JOBS = 2
@@ -94,28 +96,47 @@ class Engine:
         # A task that fails is no reason to leave the others; all are handed in again.
         one = f"LOBESTONE={shlex.quote(lobestone)} {tasks} SLURM_ARRAY_TASK_ID=$0 bash {shlex.join(task)} || exit 1"
         array = f"until seq 1 {shards} | xargs -P {JOBS} -n 1 bash -c {shlex.quote(one)}; do :; done"
+        batch = ["sbatch", "--quiet", "--wait", f"--array=1-{shards}", "--cpus-per-task=1", "--chdir", str(folder), *task]
+        slurm = f"export LOBESTONE={shlex.quote(lobestone)}; until {shlex.join(batch)}; do :; done"
+        fleet = shlex.join([lobestone, "fleet", str(out)])
+        config = [f"manifest={manifest}", f"out={out}", f"shards={shards}", f"do={steps}", f"lobestone={lobestone}"]
+        snakemake = [
+            wanted.snakemake, "--snakefile", str(HERE / "Snakefile"), "--directory", str(folder), "--retries", "5", "--config", *config,
+        ]
+        # Without a data base of accounts there is no sacct.
+        on_slurm = ["--profile", str(HERE / "slurm-profile"), "--slurm-status-command", "squeue", "--slurm-no-account"]
         self.command = {
-            "array": ["bash", "-c", f"{array}; {shlex.join([lobestone, 'fleet', str(out)])}"],
-            "snakemake": [
-                wanted.snakemake, "--snakefile", str(HERE / "Snakefile"), "--directory", str(folder), "--cores", str(JOBS),
-                "--retries", "5", "--config", f"manifest={manifest}", f"out={out}", f"shards={shards}", f"do={steps}",
-                f"lobestone={lobestone}",
-            ],
+            "array": ["bash", "-c", f"{array}; {fleet}"],
+            "slurm": ["bash", "-c", f"{slurm}; {fleet}"],
+            "snakemake": [*snakemake, "--cores", str(JOBS)],
+            "snakemake-slurm": [*snakemake, *on_slurm],
             "dask": [python, str(HERE / "dask_batch.py"), *recipe],
             "ray": [python, str(HERE / "ray_batch.py"), *recipe],
         }[name]  # fmt: skip
 
     def start(self, log):
-        if self.again and self.name == "snakemake":
+        of_snakemake = self.name.startswith("snakemake")
+        if self.again and of_snakemake:
             subprocess.run([*self.command, "--unlock"], check=True, stdout=log, stderr=log)
-        command = self.command + (["--rerun-incomplete"] if self.again and self.name == "snakemake" else [])
+        command = self.command + (["--rerun-incomplete"] if self.again and of_snakemake else [])
         self.again = True
         return subprocess.Popen(command, start_new_session=True, stdout=log, stderr=log)
+
+    def cut(self, run):
+        """The engine and all that it has started, as if the power went."""
+        kill_all_of(run)
+        if self.name.endswith("slurm"):
+            # Its tasks are Slurm's.
+            for process in self.workers(run):
+                kill(process)
+            subprocess.run(["scancel", "--user", getpass.getuser()], check=True)
+            while subprocess.run(["squeue", "--noheader"], check=True, capture_output=True).stdout.strip():
+                time.sleep(0.1)
 
     def workers(self, run):
         """The program at work on a shard, and what runs it where an engine has processes for that."""
         of_program = [self.lobestone.encode(), b"--quiet"]
-        all_of_it = processes_of_session(run.pid)
+        all_of_it = processes(None if self.name.endswith("slurm") else run.pid)
         of_engine = {
             "dask": lambda words: any(b"spawn_main" in word for word in words),
             "ray": lambda words: words[0].startswith(b"ray::shard"),
@@ -150,7 +171,7 @@ def killed_and_resumed(engine, out, wanted, dice):
                 kill(dice.choice(workers))
                 killed, last = killed + 1, time.monotonic()
         time.sleep(dice.uniform(0, 0.3))
-        kill_all_of(run)
+        engine.cut(run)
         now = results_in(out)
         redone = [name for name, when in there.items() if now.get(name) != when]
         need(halved.issuperset(redone), f"results that were there were written again: {set(redone) - halved}")
@@ -183,7 +204,7 @@ def killed_and_resumed(engine, out, wanted, dice):
 def main():
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("--lobestone", default=str(ROOT / "target/release/lobestone"))
-    arguments.add_argument("--engine", default="array", help="array, snakemake, dask or ray; several with commas")
+    arguments.add_argument("--engine", default="array", help="array, snakemake, dask, ray, slurm or snakemake-slurm; several with commas")
     # The one next to this Python, where there is one.
     beside = Path(sys.executable).with_name("snakemake")
     arguments.add_argument("--snakemake", default=str(beside) if beside.exists() else "snakemake")

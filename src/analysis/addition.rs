@@ -9,6 +9,7 @@ use crate::effects::{self, Structure};
 use crate::identify::model_history::recorded_effects;
 use crate::identify::{Case, Options};
 use crate::revision::{self, RecordedParameter, Revision, RevisionLog};
+use crate::text::shell_word;
 use crate::{InputError, Result};
 
 /// What adding an effect did.
@@ -21,7 +22,9 @@ pub struct Addition<D: CampaignSide = Structure> {
     pub totals: ErrorTotals,
     /// `effect@site` of all that is in the model now.
     pub effects: Vec<String>,
-    /// What was noticed while reading and fitting.
+    /// What was noticed while reading.
+    pub noticed: Vec<String>,
+    /// What is to be known of the fit.
     pub warnings: Vec<String>,
 }
 
@@ -100,7 +103,7 @@ impl<D: CampaignSide> Addition<D> {
                 .remedy(format!(
                     "the model is: {}; see what else is missing with `lobestone diagnose {}`",
                     case.model_description(),
-                    campaign.dir.display()
+                    shell_word(&campaign.dir)
                 ))
                 .into());
         }
@@ -119,8 +122,7 @@ impl<D: CampaignSide> Addition<D> {
             ..entry.revision(after, extension.progress)
         };
         let revision = log.append(without, with)?;
-        let mut warnings = case.warnings.clone();
-        warnings.extend(D::warnings(&after.calibration));
+        let mut warnings = D::warnings(&after.calibration);
         if extension.progress.is_none() {
             warnings.extend(D::one_fold());
         }
@@ -128,6 +130,7 @@ impl<D: CampaignSide> Addition<D> {
             revision,
             totals,
             effects: after.model.effect_labels(),
+            noticed: case.warnings,
             warnings,
             extension,
         })

@@ -148,9 +148,7 @@ impl<'a> CampaignFindings<'a> {
     pub fn errors(&self) -> Vec<String> {
         let mut messages = self.messages(|_| true);
         let unchecked = self.setup.iter().filter_map(|check| check.as_ref().err());
-        for message in
-            unchecked.map(|e| format!("the files were not looked at for mistakes of the setup: {e}"))
-        {
+        for message in unchecked.map(SetupCheck::failed) {
             if !messages.iter().any(|m| message.ends_with(m.as_str())) {
                 messages.push(message);
             }

@@ -8,6 +8,7 @@ use crate::identify::departures::departures;
 use crate::identify::levenberg_marquardt::Stopping;
 use crate::identify::study::{Extent, held_out};
 use crate::identify::{Calibration, Estimate, HeldOut, Options, Parameter, StructureCase, Undetermined};
+use crate::text::shell_word;
 use crate::{InputError, Result};
 
 /// What freeing groups of link parameters does.
@@ -52,7 +53,7 @@ impl FreedLinks {
             )
             .remedy(format!(
                 "let them bend first: `lobestone add {} link-flexibility`",
-                campaign.dir.display()
+                shell_word(&campaign.dir)
             ))
             .into());
         }

@@ -8,6 +8,7 @@ use crate::discrepancy::DiagnosisVerdict;
 use crate::discrepancy::comparison::compare::ErrorTotals;
 use crate::discrepancy::verdict::is_noise;
 use crate::revision::{Revision, Side};
+use crate::text::shell_word;
 
 /// A campaign and the side of it that a command looked at.
 #[derive(Clone, Copy)]
@@ -33,7 +34,7 @@ impl<'a> Guide<'a> {
 
     /// `lobestone COMMAND DIR`.
     fn run(&self, command: &str) -> String {
-        format!("`lobestone {command} {}`", word(&self.campaign.dir))
+        format!("`lobestone {command} {}`", shell_word(&self.campaign.dir))
     }
 
     /// As [`run`](Self::run), with the side where the campaign has both.
@@ -44,7 +45,7 @@ impl<'a> Guide<'a> {
             Side::Structure => " --domain structure",
             Side::Cutting => " --domain cutting",
         };
-        format!("`lobestone {command} {}{side}`", word(&self.campaign.dir))
+        format!("`lobestone {command} {}{side}`", shell_word(&self.campaign.dir))
     }
 
     /// What a model that fits is good for.
@@ -83,7 +84,7 @@ impl<'a> Guide<'a> {
         if !converged && is_noise(reduced_chi2) {
             return format!(
                 "the fit did not converge: run `lobestone calibrate {} --starts {}`",
-                word(&self.campaign.dir),
+                shell_word(&self.campaign.dir),
                 (4 * starts).max(8)
             );
         }
@@ -145,7 +146,7 @@ impl<'a> Guide<'a> {
         match (verdict, winner) {
             (DiagnosisVerdict::Effect, Some(label)) => format!(
                 "{label} is missing: run `lobestone add {} {label}` (what it is: `lobestone explain {}`)",
-                word(&self.campaign.dir),
+                shell_word(&self.campaign.dir),
                 effect_of(label)
             ),
             (DiagnosisVerdict::None, _) => format!("nothing is missing: {}", self.use_it()),
@@ -167,7 +168,7 @@ impl<'a> Guide<'a> {
     pub fn wrong_links(&self) -> String {
         format!(
             "run `lobestone calibrate {} --free links` for the links that fit, and compare them with what the robot is",
-            word(&self.campaign.dir)
+            shell_word(&self.campaign.dir)
         )
     }
 
@@ -252,7 +253,7 @@ impl<'a> Guide<'a> {
             .campaign
             .frfs
             .first()
-            .map(|f| word(&f.file))
+            .map(|f| shell_word(&f.file))
             .unwrap_or_default();
         format!("no mode was found: run `lobestone inspect {first}` to see what the files are like")
     }
@@ -279,7 +280,7 @@ impl<'a> Guide<'a> {
         match missing {
             Some(label) => format!(
                 "{open}; {label} is missing: run `lobestone add {} {label}`",
-                word(&self.campaign.dir)
+                shell_word(&self.campaign.dir)
             ),
             None => open,
         }
@@ -294,15 +295,15 @@ pub fn modes_of_files(files: &[&Path], modes: usize) -> String {
     match (modes, folder_of(files)) {
         (0, _) => format!(
             "no mode was found: run `lobestone inspect {}` to see what the file is like",
-            word(first)
+            shell_word(first)
         ),
         (_, Folder::Campaign(dir)) => format!(
             "run `lobestone calibrate {}` to tune the campaign's model to its FRFs",
-            word(&dir)
+            shell_word(&dir)
         ),
         (_, Folder::Plain(dir)) => format!(
             "run `lobestone init {}` to make a campaign of these files, to compare a robot's model with",
-            word(&dir)
+            shell_word(&dir)
         ),
     }
 }
@@ -312,7 +313,7 @@ pub fn inspected(files: &[(&Path, &'static str)]) -> String {
     let paths: Vec<&Path> = files.iter().map(|(p, _)| *p).collect();
     let has = |kind| files.iter().any(|(_, k)| *k == kind);
     if !has("frf") && !has("force") {
-        let words: Vec<String> = paths.iter().map(|p| word(p)).collect();
+        let words: Vec<String> = paths.iter().map(|p| shell_word(p)).collect();
         return format!(
             "if this is a tap test (hammer and sensor), run `lobestone modal {}`; with --output-only if no force was recorded \
              (idling, cutting)",
@@ -321,12 +322,18 @@ pub fn inspected(files: &[(&Path, &'static str)]) -> String {
     }
     match folder_of(&paths) {
         Folder::Campaign(dir) if has("frf") => {
-            format!("run `lobestone compare {}` to see how its model fits", word(&dir))
+            format!(
+                "run `lobestone compare {}` to see how its model fits",
+                shell_word(&dir)
+            )
         }
-        Folder::Campaign(dir) => format!("run `lobestone cfc {}` for the cutting coefficients", word(&dir)),
+        Folder::Campaign(dir) => format!(
+            "run `lobestone cfc {}` for the cutting coefficients",
+            shell_word(&dir)
+        ),
         Folder::Plain(dir) => format!(
             "run `lobestone init {}` to make a campaign of the folder",
-            word(&dir)
+            shell_word(&dir)
         ),
     }
 }
@@ -335,7 +342,7 @@ pub fn inspected(files: &[(&Path, &'static str)]) -> String {
 pub fn simulated(dir: &Path, truth: &Path) -> String {
     format!(
         "run `lobestone diagnose {}`, then look at what was hidden: {}",
-        word(dir),
+        shell_word(dir),
         truth.display()
     )
 }
@@ -348,7 +355,7 @@ pub fn planned(dir: &Path, addition: Option<&str>) -> String {
     };
     format!(
         "{measure}, list the files in campaign.toml, and run `lobestone calibrate {}`",
-        word(dir)
+        shell_word(dir)
     )
 }
 
@@ -363,17 +370,23 @@ pub enum Measured {
 /// After `init`.
 pub fn begun(dir: &Path, to_fill_in: usize, measured: Measured) -> String {
     match (to_fill_in, measured) {
-        (0, Measured::Frfs) => format!("run `lobestone compare {}` to see how the model fits", word(dir)),
+        (0, Measured::Frfs) => format!(
+            "run `lobestone compare {}` to see how the model fits",
+            shell_word(dir)
+        ),
         (0, Measured::Nothing) => format!(
             "add [[posture]] tables (or --posture ID=DEG,… with --force), then `lobestone model {dir}`, and `lobestone plan {dir}` for \
              what to measure",
-            dir = word(dir)
+            dir = shell_word(dir)
         ),
-        (0, Measured::Forces) => format!("run `lobestone cfc {}` for the cutting coefficients", word(dir)),
+        (0, Measured::Forces) => format!(
+            "run `lobestone cfc {}` for the cutting coefficients",
+            shell_word(dir)
+        ),
         (n, _) => format!(
             "fill in what is missing ({n}): edit {}, or give the flags and run `lobestone init {} --force` again",
             campaign_file(dir).display(),
-            word(dir)
+            shell_word(dir)
         ),
     }
 }
@@ -411,37 +424,9 @@ fn effect_of(label: &str) -> &str {
     label.split('@').next().unwrap_or(label)
 }
 
-/// A path as one word of a command line.
-pub fn word(path: &Path) -> String {
-    let text = path.display().to_string();
-    let plain = |c: char| c.is_alphanumeric() || "/\\._-+:,@%~=".contains(c);
-    let quoted = match text.chars().all(plain) && !text.is_empty() {
-        true => text,
-        false if text.contains('\'') => format!("\"{text}\""),
-        false => format!("'{text}'"),
-    };
-    match quoted.starts_with('-') {
-        true => format!("./{quoted}"),
-        false => quoted,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_path_is_one_word() {
-        for (path, expected) in [
-            ("cell7", "cell7"),
-            ("/tmp/my cell", "'/tmp/my cell'"),
-            ("it's", "\"it's\""),
-            ("-x", "./-x"),
-            ("", "''"),
-        ] {
-            assert_eq!(word(Path::new(path)), expected);
-        }
-    }
 
     #[test]
     fn files_belong_to_the_campaign_around_them() {

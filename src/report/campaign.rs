@@ -119,13 +119,7 @@ fn cards(findings: &CampaignFindings) -> Vec<VerdictCard> {
             found,
         ));
     } else if let Some(result) = findings.cutting() {
-        let summary = cutting_section::summary(result);
-        cards.push(verdict_card::coefficients(
-            campaign,
-            summary,
-            &of_side(None),
-            &result.warnings,
-        ));
+        cards.push(verdict_card::coefficients(campaign, result, &of_side(None)));
     }
     cards
 }

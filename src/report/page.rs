@@ -372,6 +372,8 @@ fn with_code(text: &str) -> String {
     for (k, part) in parts.into_iter().enumerate() {
         match k % 2 {
             0 => html += &with_minus(part),
+            // The page of `serve` says what to press instead.
+            _ if part.starts_with("lobestone ") => html += &format!("<code class=\"command\">{part}</code>"),
             _ => html += &format!("<code>{part}</code>"),
         }
     }
@@ -430,7 +432,7 @@ mod tests {
     fn what_stands_between_backticks_is_code_and_everything_is_escaped() {
         assert_eq!(
             with_code("run `lobestone add <DIR>` & see"),
-            "run <code>lobestone add &lt;DIR&gt;</code> &amp; see"
+            "run <code class=\"command\">lobestone add &lt;DIR&gt;</code> &amp; see"
         );
         assert_eq!(with_code("a ` alone <b>"), "a ` alone &lt;b&gt;");
         assert_eq!(with_code("plain"), "plain");

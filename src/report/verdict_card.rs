@@ -3,10 +3,12 @@
 use super::card::{BeforeAfter, ErrorBar, Tone, VerdictCard};
 use super::number::{format_si, percent, plus_minus, significant};
 use super::picture::Picture;
+use super::sections::cutting_section;
 use super::words::{self, frf_name};
 use crate::analysis::diagnosis::Leading;
 use crate::analysis::{CuttingFindings, DiagnosisFindings, StructureFindings, StructureLead, WrongLinks};
 use crate::campaign::{Campaign, Process};
+use crate::cutting::CfcResult;
 use crate::discrepancy::candidate::BaselineFit;
 use crate::discrepancy::localise::Localisation;
 use crate::discrepancy::setup::SetupFinding;
@@ -16,7 +18,7 @@ use crate::effects::{Domain, Instance};
 use crate::identify::Modelled;
 use crate::identify::forces::cutting_waves::courses;
 use crate::identify::{CutFit, Estimate};
-use crate::text::listed;
+use crate::text::{listed, shell_word};
 
 const ROBOT: &str = "Robot against FRFs";
 const FORCES: &str = "Cutting forces";
@@ -286,7 +288,7 @@ pub fn structure(
         .iter()
         .map(|a| named(&a.instance).title)
         .collect();
-    let dir = campaign.dir.display();
+    let dir = shell_word(&campaign.dir);
     let mut card = match (diagnosis, structure) {
         (Some(found), _) => {
             let d = &found.diagnosis;
@@ -329,7 +331,7 @@ pub fn structure(
             };
             card
         }
-        (None, Some(s)) => not_asked(s.analysis.calibration.reduced_chi2, &added, &dir.to_string()),
+        (None, Some(s)) => not_asked(s.analysis.calibration.reduced_chi2, &added, &dir),
         (None, None) => return None,
     };
     card.next = sentence(&card.next);
@@ -394,9 +396,9 @@ fn not_asked(reduced_chi2: f64, added: &[String], dir: &str) -> VerdictCard {
 }
 
 fn use_it(campaign: &Campaign) -> String {
-    let dir = campaign.dir.display();
+    let dir = shell_word(&campaign.dir);
     match campaign.lobes {
-        Some(_) => format!("use the model: `lobestone lobes {dir}` gives the stable depths of cut"),
+        Some(_) => format!("use the model; for the stable depths of cut: `lobestone lobes {dir}`"),
         None => "use the model; with a [lobes] table in campaign.toml there are stability lobes, too".into(),
     }
 }
@@ -547,7 +549,7 @@ pub fn cutting(campaign: &Campaign, files: &[SetupFinding], found: &CuttingFindi
             ),
         );
     }
-    let dir = campaign.dir.display();
+    let dir = shell_word(&campaign.dir);
     card.next = match (d.verdict, d.winner()) {
         (DiagnosisVerdict::Effect, Some(winner)) if d.indistinguishable.is_empty() => format!(
             "make the check, then add it and fit everything anew: `lobestone add {dir} {}`",
@@ -653,23 +655,22 @@ fn force(found: &CuttingFindings) -> Option<BeforeAfter> {
 }
 
 /// Where nothing was compared with a model of the robot: what was found of the cutting forces, or of nothing.
-pub fn coefficients(
-    campaign: &Campaign,
-    summary: String,
-    files: &[SetupFinding],
-    remarks: &[String],
-) -> VerdictCard {
+pub fn coefficients(campaign: &Campaign, result: &CfcResult, files: &[SetupFinding]) -> VerdictCard {
+    let (tone, what) = match cutting_section::misses_more_than_noise(result) {
+        true => (Tone::Open, "the force model misses more than noise"),
+        false => (Tone::Clean, "what the force model may lack was not looked for"),
+    };
     let mut card = VerdictCard {
         id: "verdict-cutting",
         side: FORCES,
-        tone: Tone::Clean,
-        headline: "Coefficients found; what the force model may lack was not looked for".into(),
-        explanation: summary,
+        tone,
+        headline: format!("Coefficients found; {what}"),
+        explanation: cutting_section::summary(result),
         next: format!(
             "Learn what is missing: `lobestone diagnose {}`.",
-            campaign.dir.display()
+            shell_word(&campaign.dir)
         ),
-        remarks: remarks.to_vec(),
+        remarks: result.warnings.clone(),
         ..VerdictCard::default()
     };
     files_first(&mut card, &files.iter().collect::<Vec<_>>());

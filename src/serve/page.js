@@ -322,6 +322,7 @@ function diagnosisNodes(side, effects, folds) {
   verdict.append(make("p", {}, make("strong", {}, "Most telling further measurement: "), d.next_measurement.what));
   const nodes = [make("h3", {}, "What is missing"), verdict];
   for (const warning of d.warnings ?? []) nodes.push(make("div", { class: "warning" }, warning));
+  if (d.lead?.add) nodes.push(drawnNode(side, d.lead));
   if (!d.candidates.length) return nodes;
   const row = (c) => {
     const label = c.site ? `${c.effect}@${c.site}` : c.effect;
@@ -344,6 +345,17 @@ function diagnosisNodes(side, effects, folds) {
     nodes.push(make("details", { "data-key": `${side.side}-more` },
       make("summary", {}, `${d.candidates.length - SHOWN} more`), table(d.candidates.slice(SHOWN))));
   return nodes;
+}
+
+/** What the data draw where no effect of the library explains them. */
+function drawnNode(side, lead) {
+  const one = ({ place, form, add }) => make("li", {}, `${form} at ${place} `,
+    button("Add", `${side.side}-add-${add}`, { do: "add", side: side.side, head: side.head, effect: add },
+      { hint: `Add ${add} to the model and fit everything again` }));
+  const rest = lead.left === null ? "" : ` With it ${lead.left.toFixed(2)} times the variance of the noise is left.`;
+  return make("div", {}, make("h3", {}, "What the data draw"),
+    make("p", {}, `It has no name here, but where it acts and how can be put into the model.${rest}`),
+    make("ul", { class: "drawn" }, ...[lead, lead.second].filter((l) => l?.add).map(one)));
 }
 
 function explanation(effect, key) {

@@ -60,6 +60,11 @@ def story(driver, url, pictures):
         raise Failed(f"the verdict is: {verdict}")
     driver.until("the end of the diagnosis", IDLE)
     in_report(driver, "return document.body.innerText.includes('Which physics is missing')")
+    # Who has buttons is told to press them, not what to type.
+    in_report(driver, f"return document.body.innerText.includes('press Add beside {EFFECT}')")
+    typed = in_report(driver, "return [[...document.querySelectorAll('code.command')].map((code) => code.textContent)]")[0]
+    if typed:
+        raise Failed(f"the report in its frame says what to type: {typed}")
     driver.picture(pictures, "3-diagnosed")
     # The reader goes down to a part that is folded up and unfolds it.
     in_report(driver, f"""const fold = {FOLD};

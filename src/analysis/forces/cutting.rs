@@ -26,7 +26,9 @@ pub struct CuttingAnalysis {
     pub comparison: CuttingComparison,
     /// nrms on cuts that were left out of the fit.
     pub held_out_nrms: Option<f64>,
-    /// What was noticed while reading and fitting.
+    /// What was noticed while reading.
+    pub noticed: Vec<String>,
+    /// What is to be known of the fit.
     pub warnings: Vec<String>,
 }
 
@@ -45,19 +47,20 @@ impl CuttingAnalysis {
         let CuttingCase {
             model,
             data,
-            mut warnings,
+            warnings: noticed,
             ..
         } = CuttingCase::on(campaign)?;
         let calibration = calibrate_cutting(&model, &data)?;
         let comparison = cutting_comparison(&model, &data, &calibration.theta)?;
         let held_out_nrms = held_out_cuts(&model, &data, &calibration.theta)?.map(|h| h.nrms());
-        warnings.extend(warnings_of(&calibration));
+        let warnings = warnings_of(&calibration);
         Ok(CuttingAnalysis {
             data,
             model,
             calibration,
             comparison,
             held_out_nrms,
+            noticed,
             warnings,
         })
     }
@@ -113,19 +116,21 @@ pub fn waveform_groups(
     campaign: &Workbench,
     result: &CfcResult,
 ) -> (Vec<Value>, Vec<String>, Vec<SetupFinding>) {
-    let loaded: Vec<(Process, Option<CuttingData>)> = processes(&campaign.cuts)
+    let loaded: Vec<(Process, Result<CuttingData>)> = processes(&campaign.cuts)
         .into_iter()
-        .map(|p| (p, CuttingData::on(campaign, p).ok()))
+        .map(|p| (p, CuttingData::on(campaign, p)))
         .collect();
-    let warnings = loaded
-        .iter()
-        .filter_map(|(_, data)| wrong_channels(data.as_ref()?, &result.pooled))
-        .collect();
-    // A check that cannot be made finds nothing.
-    let checks = loaded
-        .iter()
-        .filter_map(|(_, data)| examine_cutting(data.as_ref()?, || None).ok());
-    let setup = checks.flat_map(|check| check.findings).collect();
+    let (mut warnings, mut setup) = (Vec::new(), Vec::new());
+    for (_, data) in &loaded {
+        let checked = data.as_ref().map_err(SetupCheck::failed).and_then(|data| {
+            warnings.extend(wrong_channels(data, &result.pooled));
+            examine_cutting(data, || None).map_err(|e| SetupCheck::failed(&e))
+        });
+        match checked {
+            Ok(check) => setup.extend(check.findings),
+            Err(untold) => warnings.push(untold),
+        }
+    }
     let groups = result
         .groups
         .iter()
@@ -133,7 +138,7 @@ pub fn waveform_groups(
             let data = loaded
                 .iter()
                 .find(|(p, _)| *p == group.process)
-                .and_then(|(_, d)| d.as_ref());
+                .and_then(|(_, d)| d.as_ref().ok());
             data.and_then(|data| waveform_group(data, group).ok())
                 .unwrap_or(Value::Null)
         })

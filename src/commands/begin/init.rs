@@ -5,12 +5,13 @@ use std::path::PathBuf;
 
 use serde_json::json;
 
-use crate::analysis::setup::likely_mistakes;
+use crate::analysis::setup::setup_checks;
 use crate::campaign::draft::{self, Answers, Draft, Missing, Scan};
 use crate::campaign::{Campaign, campaign_file};
 use crate::commands::begin::init_robot::{MadeRobot, RobotArgs};
 use crate::commands::text::{Emphasis, setup_lines, table, warnings};
 use crate::commands::{Outcome, next_step};
+use crate::discrepancy::setup::{SetupCheck, SetupFinding};
 use crate::ingest::SIGNALS;
 use crate::{Error, InputError, Result};
 
@@ -277,10 +278,18 @@ fn begin(args: &InitArgs, made: Option<&MadeRobot>, as_json: bool) -> Result<Out
     }
     let missing = draft.missing();
     let file = draft.write(dir, args.force)?;
-    let setup = match missing.is_empty() {
-        true => Campaign::load(dir).map_or_else(|_| Vec::new(), |c| likely_mistakes(&c)),
+    let (mut setup, mut notes) = (Vec::new(), Vec::new());
+    let checks = match missing.is_empty() {
+        true => Campaign::load(dir).map_or_else(|e| vec![Err(e)], |c| setup_checks(&c)),
         false => Vec::new(),
     };
+    for check in checks {
+        match check {
+            Ok(check) => setup.extend(check.findings.into_iter().filter(SetupFinding::is_likely)),
+            Err(e) => notes.push(SetupCheck::failed(&e)),
+        }
+    }
+    notes.extend(passed_over);
 
     let guesses = draft.guesses();
     let json = json!({
@@ -293,6 +302,7 @@ fn begin(args: &InitArgs, made: Option<&MadeRobot>, as_json: bool) -> Result<Out
         "missing": missing,
         "guessed": guesses,
         "setup": setup,
+        "warnings": notes,
         "robot": made.map(MadeRobot::document),
         "not_used": scan.not_used.iter().map(|(file, why)| json!({ "file": file, "why": why })).collect::<Vec<_>>(),
     });
@@ -305,7 +315,7 @@ fn begin(args: &InitArgs, made: Option<&MadeRobot>, as_json: bool) -> Result<Out
     let robot = made.map(MadeRobot::told).unwrap_or_default();
     Ok(Outcome::new(
         json,
-        setup_lines(&setup) + &describe(&file, &scan, &draft, &missing, list, &passed_over) + &robot,
+        setup_lines(&setup) + &describe(&file, &scan, &draft, &missing, list, &notes) + &robot,
         Some(next),
     ))
 }
@@ -347,7 +357,7 @@ fn describe(
     draft: &Draft,
     missing: &[Missing],
     cut_list: Option<&PathBuf>,
-    passed_over: &[String],
+    notes: &[String],
 ) -> String {
     let mut text = format!(
         "{}: {} FRF files, {} force records\n",
@@ -406,12 +416,12 @@ fn describe(
             text += "  (a list of cuts, CSV with a column \"file\" and these keys, is read with --cut-list FILE)\n";
         }
     }
-    if !scan.not_used.is_empty() || !passed_over.is_empty() {
+    if !scan.not_used.is_empty() || !notes.is_empty() {
         let notes: Vec<String> = scan
             .not_used
             .iter()
             .map(|(file, why)| format!("not used: {file}: {why}"))
-            .chain(passed_over.iter().cloned())
+            .chain(notes.iter().cloned())
             .collect();
         text += &format!("\n{}", warnings(&notes));
     }

@@ -6,7 +6,7 @@ use crate::analysis::{CuttingAnalysis, ExpertView, StructureAnalysis};
 use crate::campaign::Campaign;
 use crate::commands::next_step::Guide;
 use crate::commands::text::{
-    Emphasis, error_bar, files_first, number, percent, table, warnings_but, wrapped,
+    Emphasis, error_bar, files_first, number, percent, table, warnings, warnings_but, wrapped,
 };
 use crate::commands::{Outcome, SideArgs, by_domain};
 use crate::discrepancy::comparison::compare::{ErrorMap, GroupError};
@@ -44,11 +44,13 @@ fn cutting(campaign: &Campaign) -> Result<Outcome> {
         "setup": setup.findings,
         "converged": analysis.calibration.converged(),
         "not_converged_because": analysis.calibration.ending.reason(),
-        "warnings": analysis.warnings,
+        "warnings": analysis.noticed.iter().chain(&analysis.warnings).collect::<Vec<_>>(),
     });
     let next =
         Guide::cutting(campaign).compared(analysis.calibration.reduced_chi2, &c.totals, c.mostly.clone());
-    let text = files_first(&setup.findings, &analysis.warnings) + &describe_cutting(&analysis);
+    let text = files_first(&setup.findings, &analysis.noticed)
+        + &describe_cutting(&analysis)
+        + &warnings(&analysis.warnings);
     Ok(Outcome::new(json, text, Some(next)))
 }
 

@@ -5,11 +5,11 @@ use crate::campaign::Campaign;
 use crate::commands::text::{Emphasis, files_first, number, percent, table};
 use crate::commands::{CampaignArg, Outcome};
 use crate::discrepancy::localise::{BestForm, DrawnPart, Localisation, LocalisedPlace, localise};
-use crate::effects::drawn;
 use crate::identify::frfs::calibrate::Estimate;
 use crate::identify::{Options, StructureCase};
 use crate::report::figure::DrawnCurveFigure;
 use crate::report::verdict_card::size;
+use crate::text::shell_word;
 
 #[derive(clap::Args)]
 pub struct LocaliseArgs {
@@ -27,9 +27,9 @@ pub fn run(args: LocaliseArgs) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
     let case = StructureCase::load(&campaign)?;
     let found = localise(&case.study(Options::default()), &case.model)?;
-    let dir = campaign.dir.display();
+    let dir = shell_word(&campaign.dir);
     if let (Some(file), Some(place)) = (&args.figure, found.places.first()) {
-        crate::files::write_atomically(file, &figure(place).png()?)?;
+        crate::files::write_atomically(file, &DrawnCurveFigure::of(place).png()?)?;
     }
     let best = found.places.first();
     let next = match best.and_then(|p| p.best.as_ref()) {
@@ -56,7 +56,7 @@ fn document(case: &StructureCase, found: &Localisation) -> Value {
     let curve = best.map(|p| {
         json!({
             "place": p.spot.label(),
-            "unit": unit(p),
+            "unit": p.stiffness_unit(),
             "frequency_hz": p.curve.iter().map(|c| c.frequency_hz).collect::<Vec<_>>(),
             "re": p.curve.iter().map(|c| finite(c.stiffness.re)).collect::<Vec<_>>(),
             "im": p.curve.iter().map(|c| finite(c.stiffness.im)).collect::<Vec<_>>(),
@@ -79,36 +79,9 @@ fn document(case: &StructureCase, found: &Localisation) -> Value {
     })
 }
 
-fn figure(place: &LocalisedPlace) -> DrawnCurveFigure {
-    let best = place.best.as_ref();
-    let values: Vec<f64> = best
-        .iter()
-        .flat_map(|b| b.first.parameters.iter().map(|p| p.value))
-        .collect();
-    let frequency_hz: Vec<f64> = place.curve.iter().map(|c| c.frequency_hz).collect();
-    DrawnCurveFigure {
-        title: format!("Dynamic stiffness that the data draw {}", place.spot.words()),
-        unit: unit(place).to_string(),
-        stiffness: place.curve.iter().map(|c| c.stiffness).collect(),
-        std: place.curve.iter().map(|c| c.std).collect(),
-        form: best.map_or_else(Vec::new, |b| {
-            let of = |f: &f64| drawn::dynamic_stiffness(place.spot, b.first.form(), &values, *f);
-            frequency_hz.iter().map(of).collect()
-        }),
-        form_label: best.map_or(String::new(), |b| {
-            format!("fitted: {}", b.first.form().label().replace('-', " "))
-        }),
-        frequency_hz,
-    }
-}
-
 /// JSON has no infinity: null where a line says nothing.
 fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
-}
-
-fn unit(place: &LocalisedPlace) -> &'static str {
-    if place.spot.is_angle() { "N·m/rad" } else { "N/m" }
 }
 
 /// Values and standard errors by the parameters' own names.

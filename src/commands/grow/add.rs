@@ -5,7 +5,7 @@ use crate::analysis::{Addition, CampaignSide};
 use crate::campaign::Campaign;
 use crate::commands::find::calibrate::describe_parameters;
 use crate::commands::next_step::Guide;
-use crate::commands::text::{Emphasis, files_first, percent, table, wrapped};
+use crate::commands::text::{Emphasis, files_first, percent, table, warnings, wrapped};
 use crate::commands::{CampaignArg, Outcome};
 use crate::discrepancy::extension::{Extension, Fitted};
 use crate::effects::{Cutting, Registry, Structure};
@@ -79,7 +79,7 @@ fn document<D: CampaignSide>(addition: &Addition<D>) -> Value {
         "before": side(before),
         "after": side(after),
         "progress": progress,
-        "warnings": addition.warnings,
+        "warnings": addition.noticed.iter().chain(&addition.warnings).collect::<Vec<_>>(),
     })
 }
 
@@ -110,7 +110,8 @@ fn describe<D: CampaignSide>(addition: &Addition<D>, parameters: &str) -> String
         revision,
         extension,
         totals,
-        warnings: notes,
+        noticed,
+        warnings: of_fit,
         ..
     } = addition;
     let Extension {
@@ -120,7 +121,7 @@ fn describe<D: CampaignSide>(addition: &Addition<D>, parameters: &str) -> String
         progress,
         vanished,
     } = extension;
-    let mut text = files_first(&[], notes);
+    let mut text = files_first(&[], noticed);
     text += &format!(
         "revision {revision}: + {}\n{}\n",
         Emphasis::Strong.on(instance.title()),
@@ -155,5 +156,5 @@ fn describe<D: CampaignSide>(addition: &Addition<D>, parameters: &str) -> String
             D::FOLDS
         );
     }
-    text
+    text + &warnings(of_fit)
 }

@@ -6,6 +6,7 @@ use crate::commands::next_step::Guide;
 use crate::commands::text::{Emphasis, error_bar, percent, table, warnings};
 use crate::commands::{Outcome, SideArgs, side};
 use crate::revision::{self, Revision, RevisionLog, fingerprint};
+use crate::text::shell_word;
 
 pub fn run(args: SideArgs) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
@@ -18,7 +19,7 @@ pub fn of(campaign: &Campaign, side: revision::Side) -> Result<Outcome> {
     let log = RevisionLog::load(&campaign.dir)?;
     let revisions: Vec<&Revision> = log.revisions(side).collect();
     let undone: Vec<&Revision> = log.undone(side).collect();
-    let dir = campaign.dir.display();
+    let dir = shell_word(&campaign.dir);
     let guide = Guide { campaign, side };
     let Some(current) = revisions.last() else {
         return Ok(Outcome::new(

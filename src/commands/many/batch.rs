@@ -11,11 +11,11 @@ use crate::analysis::many::batch::{
     BatchStep, Manifest, ManifestEntry, Record, Status, Steps, WarmStart, examine, fingerprint,
 };
 use crate::commands::Outcome;
-use crate::commands::next_step::word;
 use crate::commands::text::{Emphasis, number, wrapped};
 use crate::progress::Progress;
 use crate::report::stores::batch_folder::BatchFolder;
 use crate::report::stores::batch_table::{BatchTable, reserved};
+use crate::text::shell_word;
 use crate::{InputError, Result};
 
 #[derive(clap::Args)]
@@ -133,7 +133,7 @@ pub fn run(args: BatchArgs) -> Result<Outcome> {
     for table in &tables {
         text += &format!("  {}\n", table.display());
     }
-    let fleet = format!("`lobestone fleet {}`", word(&args.out));
+    let fleet = format!("`lobestone fleet {}`", shell_word(&args.out));
     let next = match shard.of {
         1 => format!("run {fleet}"),
         _ => format!("when every shard is there, run {fleet}"),

@@ -9,11 +9,11 @@ use crate::analysis::ModalAnalysis;
 use crate::analysis::modes::modal_export::{export, scaled_modes};
 use crate::analysis::modes::shape_comparison::{ShapeComparison, compare};
 use crate::campaign::Campaign;
-use crate::commands::next_step::word;
 use crate::commands::text::table;
 use crate::ingest::read_geometry;
 use crate::report::modal_page::{self, Extras, driving_points};
 use crate::revision::{Side, files_fingerprint, fingerprint};
+use crate::text::shell_word;
 use crate::{InputError, Result};
 
 /// Folders and files of the request.
@@ -35,7 +35,7 @@ impl Files<'_> {
         let mut line = "lobestone modal".to_owned();
         // Writing to a String cannot fail.
         for path in self.inputs {
-            let _ = write!(line, " {}", word(path));
+            let _ = write!(line, " {}", shell_word(path));
         }
         if self.together {
             line += " --together";
@@ -55,7 +55,7 @@ impl Files<'_> {
             ("report", self.report),
         ] {
             if let Some(path) = path {
-                let _ = write!(line, " --{option} {}", word(path));
+                let _ = write!(line, " --{option} {}", shell_word(path));
             }
         }
         line

@@ -95,7 +95,6 @@ mod with_tables {
     use crate::analysis::{Shard, Sweep, SweepRequest};
     use crate::campaign::Campaign;
     use crate::commands::measure::sweep::SweepArgs;
-    use crate::commands::next_step::word;
     use crate::commands::outcome::Outcome;
     use crate::commands::text::{number, warnings};
     use crate::files::write_atomically;
@@ -103,6 +102,7 @@ mod with_tables {
     use crate::report::figure::CellFormat;
     use crate::report::stores::sweep_folder::SweepFolder;
     use crate::report::stores::sweep_summary;
+    use crate::text::shell_word;
     use crate::{Error, InputError, Result};
 
     /// Quantity, label, name of the picture.
@@ -152,7 +152,7 @@ mod with_tables {
         let folder = SweepFolder::begin(out, &sweep.settings, shard.of, count)?;
         let places = shard.places(count);
         let name = format!("shard {} of {}", shard.number, shard.of);
-        let merge = format!("lobestone sweep --merge --out {}", word(out));
+        let merge = format!("lobestone sweep --merge --out {}", shell_word(out));
         let mut json = json!({
             "shard": shard.number,
             "shards": shard.of,

@@ -57,6 +57,13 @@ pub struct LocalisedPlace {
     pub tied_with: Vec<String>,
 }
 
+impl LocalisedPlace {
+    /// N/m, or N·m/rad where it turns.
+    pub fn stiffness_unit(&self) -> &'static str {
+        if self.spot.is_angle() { "N·m/rad" } else { "N/m" }
+    }
+}
+
 /// A form at one displacement, fitted.
 #[derive(Debug, Clone)]
 pub struct DrawnPart {

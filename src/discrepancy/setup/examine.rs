@@ -13,7 +13,6 @@ use super::mistake::{Estimated, Mistake};
 use super::reading::{FileReading, model_read};
 use super::score::{Linearised, Score};
 use super::{mistakes, readings, slips};
-use crate::Result;
 use crate::identify::frfs::calibrate::{Options, calibrate};
 use crate::identify::frfs::frf_data::FrfData;
 use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
@@ -22,6 +21,7 @@ use crate::identify::levenberg_marquardt::{Stopping, minimise};
 use crate::identify::rest::BeyondSlips;
 use crate::identify::study::{Study, View, try_effects};
 use crate::identify::{StructureModel, StructureStudy};
+use crate::{Error, Result};
 
 /// What was found.
 #[derive(Debug, Clone, Default)]
@@ -35,6 +35,11 @@ pub struct SetupCheck {
 }
 
 impl SetupCheck {
+    /// What is told where a check failed: it is not one that found nothing.
+    pub fn failed(error: &Error) -> String {
+        format!("the files were not looked at for mistakes of the setup: {error}")
+    }
+
     /// The finding that is believed, if one is.
     pub fn likely(&self) -> Option<&SetupFinding> {
         self.findings.first().filter(|f| f.is_likely())
@@ -356,7 +361,7 @@ fn refined(
             let scale = (2.0 * fit.cost / freedom).max(1.0);
             let (values, errors) = joint
                 .values(&fit, scale)
-                .ok_or_else(|| crate::Error::computation("the size of the mistake is not determined"))?;
+                .ok_or_else(|| Error::computation("the size of the mistake is not determined"))?;
             let estimated = Estimated {
                 group: *group,
                 values: &values,

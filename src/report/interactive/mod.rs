@@ -5,6 +5,7 @@
 //! what no figure here uses (`scripts/plotly_bundle.py`); `page.js` unpacks both and holds what little joins them: choosing an FRF, choosing a model.
 //! Printed, and where scripts are off, the page shows the static figures.
 
+mod drawn_curve;
 mod explorer;
 mod force_record;
 mod frf;

@@ -380,9 +380,30 @@ if (window.parent !== window) {
     };
     window.parent.postMessage({ lobestonePlace }, "*");
   };
+  // There the reader has buttons and this page, no terminal.
+  const pressed = {
+    add: (words) => ["press ", bold("Add"), ` beside ${words.at(-1)}`],
+    diagnose: () => ["press ", bold("Diagnose")],
+    lobes: () => seenIn("lobes"),
+    cfc: () => seenIn("records"),
+    localise: () => seenIn("missing-physics"),
+  };
+  const bold = (text) => Object.assign(document.createElement("strong"), { textContent: text });
+  const seenIn = (id) => {
+    const title = document.querySelector(`section#${id} h2`)?.textContent.replace(/^\d+\. /, "");
+    return title && ["see ", Object.assign(document.createElement("a"), { href: `#${id}`, textContent: title })];
+  };
+  const noTerminal = () => {
+    for (const code of document.querySelectorAll("code.command")) {
+      const [, command, ...words] = code.textContent.trim().split(/\s+/);
+      const instead = pressed[command]?.(words);
+      if (instead) code.replaceWith(...instead);
+    }
+  };
   window.addEventListener("message", (event) => {
     const place = event.data?.lobestonePlace;
     if (event.source !== window.parent || !Array.isArray(place?.above) || !Array.isArray(place.unfolded)) return;
+    noTerminal();
     for (const fold of folds()) if (place.unfolded.includes(foldName(fold))) fold.open = true;
     const there = place.above.map(({ name: n, by }) => ({ part: parts().find((part) => name(part) === n), by })).find(({ part }) => part);
     // Figures above are still to be drawn, and are not as high as their images: until the reader scrolls, what was at the top stays there.

@@ -114,6 +114,15 @@ fn misfits(group: &ForceGroup) -> Vec<Misfit> {
         .collect()
 }
 
+/// Standard errors from which on an average force that the model misses is no chance: about one of a million is that far off.
+const NO_CHANCE_SIGMAS: f64 = 5.0;
+
+/// Whether the coefficients leave more of the average forces than noise.
+pub fn misses_more_than_noise(result: &CfcResult) -> bool {
+    let mut all = result.pooled.iter().flat_map(misfits);
+    all.any(|m| m.sigmas.abs() > NO_CHANCE_SIGMAS)
+}
+
 fn worst(group: &ForceGroup) -> Option<Misfit> {
     misfits(group)
         .into_iter()

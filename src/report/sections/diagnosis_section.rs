@@ -9,13 +9,13 @@ use crate::discrepancy::comparison::explained::Part;
 use crate::discrepancy::{Diagnosis, DiagnosisVerdict, EffectCandidate, NextMeasurement};
 use crate::effects::Structure;
 use crate::identify::Modelled;
-use crate::report::figure::{BarSeries, FrfCurve, FrfFigure, NoiseLevel, SideBySide};
+use crate::report::figure::{BarSeries, DrawnCurveFigure, FrfCurve, FrfFigure, NoiseLevel, SideBySide};
 use crate::report::number::{decimals, percent, plus_minus, significant};
 use crate::report::parts::{figure, paragraph};
 use crate::report::sections::error_map_section::times_noise_map;
 use crate::report::words::{at_place, frf_name};
 use crate::report::{Block, ReportSection, ReportTable, TableColumn, words};
-use crate::text::listed;
+use crate::text::{listed, shell_word};
 
 pub const ID: &str = "missing-physics";
 pub const TITLE: &str = "Which physics is missing";
@@ -77,6 +77,7 @@ pub fn section(campaign: &Campaign, findings: &DiagnosisFindings) -> ReportSecti
     let d = &findings.diagnosis;
     let mut blocks = vec![paragraph(summary(findings))];
     blocks.extend(how_it_shows(d));
+    blocks.extend(what_the_data_draw(findings));
     if let (Some(leading), Some(candidate)) = (&findings.leading, findings.leader()) {
         let who = match d.verdict {
             DiagnosisVerdict::Unknown => format!("The best candidate, {},", candidate.instance.title()),
@@ -119,6 +120,21 @@ pub fn section(campaign: &Campaign, findings: &DiagnosisFindings) -> ReportSecti
     }
 }
 
+/// Where no effect of the library explains what is left.
+fn what_the_data_draw(findings: &DiagnosisFindings) -> Option<Block> {
+    let found = findings.lead.as_ref()?.place.as_ref()?;
+    let place = found.places.first()?;
+    let drawing = DrawnCurveFigure::of(place);
+    let caption = format!(
+        "What a part of its own that acts {} would have to be, line by line, for the model to agree with the FRFs, and the simple \
+         form that comes nearest. A spring is level in the real part, a damper rises in the imaginary part, a mass falls in the real \
+         part, a resonator has a peak. It leaves {:.2} times the variance of the noise.",
+        place.spot.words(),
+        place.left
+    );
+    Some(figure("drawn-stiffness", &drawing.title.clone(), caption, drawing.png()).with_plot(drawing.plot()))
+}
+
 /// The fingerprint of the effect that is missing.
 pub(crate) fn how_it_shows<D: Modelled>(d: &Diagnosis<D>) -> Option<Block> {
     let effect = d.winner()?.instance.effect;
@@ -141,10 +157,9 @@ pub(crate) fn advice<D: Modelled>(
     }
     blocks.push(paragraph(format!("Next measurement: {next_measurement}.")));
     if let Some(winner) = d.winner() {
-        blocks.push(paragraph("To add it to the model and fit everything anew:"));
-        blocks.push(Block::Pre(format!(
-            "lobestone add {} {}",
-            campaign.dir.display(),
+        blocks.push(paragraph(format!(
+            "To add it to the model and fit everything anew: `lobestone add {} {}`.",
+            shell_word(&campaign.dir),
             winner.label()
         )));
     }

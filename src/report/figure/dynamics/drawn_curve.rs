@@ -3,6 +3,8 @@
 use num_complex::Complex64;
 
 use crate::Result;
+use crate::discrepancy::localise::LocalisedPlace;
+use crate::effects::drawn;
 use crate::report::figure::sheet::axis::{FigureAxis, extent, usable};
 use crate::report::figure::sheet::canvas::{Color, Marker, Stroke, WIDTH, nothing_to_draw, paint};
 use crate::report::figure::sheet::panel::{FigureHeader, Panel, Swatch};
@@ -26,34 +28,73 @@ pub struct DrawnCurveFigure {
 
 const PALE: Color = Color(198, 216, 232);
 
+/// Name of a part of a complex stiffness, and how to take it.
+type StiffnessPart = (&'static str, fn(Complex64) -> f64);
+
+/// What is drawn, topmost first.
+pub(crate) const PARTS: [StiffnessPart; 2] = [("real part", |z| z.re), ("imaginary part", |z| z.im)];
+
 impl DrawnCurveFigure {
+    /// What the data draw at `place`, with its best form where it has one.
+    pub fn of(place: &LocalisedPlace) -> Self {
+        let best = place.best.as_ref();
+        let values: Vec<f64> = best
+            .iter()
+            .flat_map(|b| b.first.parameters.iter().map(|p| p.value))
+            .collect();
+        let frequency_hz: Vec<f64> = place.curve.iter().map(|c| c.frequency_hz).collect();
+        DrawnCurveFigure {
+            title: format!("Dynamic stiffness that the data draw {}", place.spot.words()),
+            unit: place.stiffness_unit().to_string(),
+            stiffness: place.curve.iter().map(|c| c.stiffness).collect(),
+            std: place.curve.iter().map(|c| c.std).collect(),
+            form: best.map_or_else(Vec::new, |b| {
+                let of = |f: &f64| drawn::dynamic_stiffness(place.spot, b.first.form(), &values, *f);
+                frequency_hz.iter().map(of).collect()
+            }),
+            form_label: best.map_or(String::new(), |b| {
+                format!("fitted: {}", b.first.form().label().replace('-', " "))
+            }),
+            frequency_hz,
+        }
+    }
+
+    /// Indices of the lines that say something.
+    pub(crate) fn lines(&self) -> Vec<usize> {
+        let known = |k: &usize| self.stiffness[*k].is_finite() && self.std[*k].is_finite();
+        (0..self.frequency_hz.len()).filter(known).collect()
+    }
+
+    /// Standard deviation of one part at a line: half of the complex variance is in each.
+    pub(crate) fn std_of_part(&self, line: usize) -> f64 {
+        self.std[line] / std::f64::consts::SQRT_2
+    }
+
+    /// Least and largest value of a part that must be seen. Lines that say little must not press the others flat: those with the
+    /// smaller half of the errors set the scale.
+    pub(crate) fn range(&self, part: fn(Complex64) -> f64) -> (f64, f64) {
+        let lines = self.lines();
+        let middle =
+            quantile(lines.iter().map(|k| self.std[*k]).filter(|s| usable(*s)), 0.5).unwrap_or(f64::INFINITY);
+        let sure = lines.iter().filter(|k| self.std[**k] <= middle);
+        let values = sure
+            .map(|k| part(self.stiffness[*k]))
+            .chain(self.form.iter().map(|z| part(*z)))
+            .chain([0.0]);
+        extent(values).unwrap_or((-1.0, 1.0))
+    }
+
     /// # Errors
     /// No line with a finite value.
     pub fn png(&self) -> Result<Vec<u8>> {
-        let known = |k: &usize| self.stiffness[*k].is_finite() && self.std[*k].is_finite();
-        let lines: Vec<usize> = (0..self.frequency_hz.len()).filter(known).collect();
+        let lines = self.lines();
         let Some(frequencies) = extent(self.frequency_hz.iter().copied()).filter(|_| !lines.is_empty())
         else {
             return Err(nothing_to_draw(&self.title, "no line with a finite value"));
         };
-        // Lines that say little must not press the others flat: those with the smaller half of the errors set the scale.
-        let middle =
-            quantile(lines.iter().map(|k| self.std[*k]).filter(|s| usable(*s)), 0.5).unwrap_or(f64::INFINITY);
-        let parts = ["real part", "imaginary part"];
-        let part = |name: &str, z: Complex64| if name == parts[0] { z.re } else { z.im };
-        let axes: Vec<FigureAxis> = parts
-            .iter()
-            .map(|name| {
-                let part = |z| part(name, z);
-                let sure = lines.iter().filter(|k| self.std[**k] <= middle);
-                let values = sure
-                    .map(|k| part(self.stiffness[*k]))
-                    .chain(self.form.iter().map(|z| part(*z)))
-                    .chain([0.0]);
-                let range = extent(values).unwrap_or((-1.0, 1.0));
-                FigureAxis::padded(&format!("{name} ({})", self.unit), range, 0.15, 6)
-            })
-            .collect();
+        let axis =
+            |(name, part)| FigureAxis::padded(&format!("{name} ({})", self.unit), self.range(part), 0.15, 6);
+        let axes: Vec<FigureAxis> = PARTS.into_iter().map(axis).collect();
         let x = FigureAxis::linear("Frequency (Hz)", frequencies, 10);
         let left = Panel::left_margin(&axes.iter().collect::<Vec<_>>());
         let right = f64::from(WIDTH) - Panel::RIGHT_MARGIN;
@@ -73,12 +114,10 @@ impl DrawnCurveFigure {
         let bottom = panels.last().map_or(0.0, |p| p.bottom) + Panel::BOTTOM_MARGIN;
         paint(WIDTH, bottom as u32, |canvas| {
             header.draw(canvas);
-            for (panel, name) in panels.iter().zip(parts) {
-                let part = |z| part(name, z);
+            for (panel, (_, part)) in panels.iter().zip(PARTS) {
                 panel.grid(canvas);
                 for &k in &lines {
-                    // Half of the complex variance is in each part.
-                    let half = self.std[k] / std::f64::consts::SQRT_2;
+                    let half = self.std_of_part(k);
                     let value = part(self.stiffness[k]);
                     let x = panel.x_at(self.frequency_hz[k]);
                     let ends = (panel.y_at(value - half), panel.y_at(value + half));

@@ -10,6 +10,7 @@ use super::wrong_links::WrongLinks;
 use crate::Result;
 use crate::campaign::Campaign;
 use crate::discrepancy::comparison::compare::ErrorTotals;
+use crate::discrepancy::joint_trends::{JointTrends, joint_trends};
 use crate::discrepancy::localise::{Localisation, localise};
 use crate::discrepancy::outlook::next_measurement;
 use crate::discrepancy::setup::{SetupCheck, examine};
@@ -26,12 +27,14 @@ pub struct FrfView {
     pub comparison: FrfComparison,
 }
 
-/// What is known of a rest that no effect explains; one of both at least.
+/// What is known of a rest that no effect explains.
 pub struct StructureLead {
     /// Where it sits and what it does there, if one place explains more than chance.
     pub place: Option<Localisation>,
     /// Numbers of the robot file that explain it.
     pub links: Option<WrongLinks>,
+    /// Joint stiffness and damping as each posture alone wants them, and what they follow.
+    pub joints: JointTrends,
 }
 
 impl CampaignSide for Structure {
@@ -97,8 +100,9 @@ impl CampaignSide for Structure {
         let found = StructureLead {
             place: Some(localise(study, &case.model)?).filter(|found| found.significant),
             links: WrongLinks::seek(campaign, case, study, diagnosis)?,
+            joints: joint_trends(study, &case.model, &diagnosis.baseline.theta, &campaign.postures)?,
         };
-        Ok((found.place.is_some() || found.links.is_some()).then_some(found))
+        Ok(Some(found))
     }
 
     fn next(

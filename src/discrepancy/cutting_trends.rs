@@ -3,9 +3,10 @@
 
 use num_complex::Complex64;
 use serde::Serialize;
-use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::cutting::ForceAxis;
+use crate::discrepancy::trend::{SIGNIFICANT, TrendPoint, digits, test};
 use crate::identify::CutFit;
 use crate::identify::CuttingData;
 use crate::identify::forces::cutting_data::{CutData, CutKind};
@@ -75,17 +76,6 @@ impl Against {
     }
 }
 
-/// One value of the rest.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct TrendPoint {
-    /// In the abscissa's unit.
-    pub x: f64,
-    /// Record less model, in the trend's unit.
-    pub rest: f64,
-    /// Standard deviation that the noise gives it.
-    pub std: f64,
-}
-
 /// The rest against one quantity.
 #[derive(Debug, Clone, Serialize)]
 pub struct Trend {
@@ -110,8 +100,6 @@ pub struct Trend {
     pub axis: Option<ForceAxis>,
 }
 
-/// Below this a trend is no chance.
-pub const SIGNIFICANT: f64 = 0.01;
 /// Points that are shown of many.
 const SHOWN: usize = 8;
 /// Points over the pitch of the teeth.
@@ -151,15 +139,6 @@ impl Trend {
         });
         format!("the record is {}", words.collect::<Vec<_>>().join(", "))
     }
-}
-
-fn digits(value: f64) -> String {
-    let decimals = if value == 0.0 {
-        0
-    } else {
-        (1 - value.abs().log10().floor() as i32).clamp(0, 6) as usize
-    };
-    format!("{value:.decimals$}")
 }
 
 /// What the model, fitted as `fits` (in the order of the cuts), leaves of the records, against all that the data can tell: what is no chance
@@ -252,51 +231,21 @@ fn in_time(data: &CuttingData, fits: &[CutFit]) -> Vec<TrendPoint> {
     points
 }
 
-/// Whether a parabola (a line, where there are two abscissae) explains more of the points than chance: the F test of nested models,
-/// with the noise or the scatter about the parabola, whichever is larger. `None` where there are too few points.
+/// The points against one quantity: whether a parabola (a line, where there are two abscissae) explains more of them than chance.
+/// `None` where there are too few.
 fn along(against: Against, points: Vec<TrendPoint>) -> Option<Trend> {
-    let points: Vec<TrendPoint> = points
-        .into_iter()
-        .filter(|p| p.x.is_finite() && p.rest.is_finite() && p.std > 0.0)
-        .collect();
-    let low = points.iter().map(|p| p.x).fold(f64::INFINITY, f64::min);
-    let high = points.iter().map(|p| p.x).fold(f64::NEG_INFINITY, f64::max);
-    let span = high - low;
-    if points.is_empty() || span <= 1e-6 * high.abs() {
-        return None;
-    }
-    let place = |x: f64| 2.0 * (x - low) / span - 1.0;
-    let has_middle = points.iter().any(|p| place(p.x).abs() < 0.98);
-    let degree = if has_middle { 2 } else { 1 };
-    let left = points.len().checked_sub(degree + 1).filter(|n| *n >= 2)? as f64;
-    let without = misfit(&points, 0, &place)?;
-    let with = misfit(&points, degree, &place)?;
-    let scale = (with / left).max(1.0);
-    let ratio = ((without - with) / degree as f64 / scale).max(0.0);
-    let p_value = FisherSnedecor::new(degree as f64, left).ok()?.sf(ratio);
+    let found = test(points, 2)?;
     Some(Trend {
         against,
         x_unit: against.unit(),
         unit: "1",
-        p_value,
-        explained: without - with,
+        p_value: found.p_value,
+        explained: found.explained,
         tests: 1,
         usual_cause: against.usual_cause(),
-        points: means(&points, low, span),
+        points: means(&found.points, found.low, found.span),
         axis: None,
     })
-}
-
-/// Σ r²/σ² about the polynomial of this degree that fits best.
-fn misfit(points: &[TrendPoint], degree: usize, place: &dyn Fn(f64) -> f64) -> Option<f64> {
-    use nalgebra::{DMatrix, DVector};
-    let basis = DMatrix::from_fn(points.len(), degree + 1, |i, k| {
-        place(points[i].x).powi(k as i32) / points[i].std
-    });
-    let values = DVector::from_fn(points.len(), |i, _| points[i].rest / points[i].std);
-    let normal = basis.transpose() * &basis;
-    let solution = normal.cholesky()?.solve(&(basis.transpose() * &values));
-    Some((values - basis * solution).norm_squared())
 }
 
 /// Weighted means at the abscissae, or over stretches of them where there are many.

@@ -7,12 +7,14 @@ pub mod cutting_trends;
 pub mod diagnose;
 pub mod diagnosis;
 pub mod extension;
+pub mod joint_trends;
 pub mod localise;
 pub mod outlook;
 #[cfg(test)]
 mod resonance_tests;
 pub mod setup;
 pub mod something_else;
+pub mod trend;
 pub mod verdict;
 
 pub use candidate::EffectCandidate;
@@ -20,8 +22,9 @@ pub use comparison::compare::{Band, FrfComparison, FrfError};
 pub use comparison::compare_cutting::{CutError, CuttingComparison};
 pub use comparison::explained::Explained;
 pub use cutting_lead::{CuttingLead, LineGroup, LineKind, cutting_lead};
-pub use cutting_trends::{Against, Trend, TrendPoint, cutting_trends};
+pub use cutting_trends::{Against, Trend, cutting_trends};
 pub use diagnose::diagnose;
 pub use diagnosis::Diagnosis;
 pub use outlook::next_measurement::NextMeasurement;
+pub use trend::TrendPoint;
 pub use verdict::DiagnosisVerdict;

@@ -112,6 +112,9 @@ fn answer<D: Modelled>(
             if let Some(links) = lead.and_then(|l| l.links.as_ref()) {
                 robot_file_first(&mut card, links);
             }
+            let joints = lead.map_or(Vec::new(), |l| l.joints.followed());
+            let told = joints.iter().take(JOINTS_TOLD).map(|t| words::joint_trend(t));
+            card.facts.extend(told.map(|text| ("Joint by joint", text)));
         }
     }
     if d.too_little_data.is_none() {
@@ -135,6 +138,9 @@ fn answer<D: Modelled>(
     }
     card
 }
+
+/// Joints that a card names of those that follow something.
+const JOINTS_TOLD: usize = 2;
 
 fn nothing(card: &mut VerdictCard, baseline: &BaselineFit, added: &[String], data: &str) {
     let more = if added.is_empty() { "" } else { " more" };

@@ -1,7 +1,10 @@
 //! What people call things that have a key: effects, places, parameters, how sure a verdict is.
 
 use super::number::significant;
+use crate::discrepancy::TrendPoint;
+use crate::discrepancy::joint_trends::{JointAgainst, JointTrend};
 use crate::effects::Site;
+use crate::text::chance;
 
 /// `local-resonator` → `local resonator`.
 pub fn effect(id: &str) -> String {
@@ -112,6 +115,31 @@ pub fn parameter_of(key: &str) -> String {
 /// An effect with its place: `local-resonator@link-3` → `local resonator, link 3`.
 pub fn at_place(label: &str) -> String {
     label.replace('-', " ").replace('@', ", ")
+}
+
+/// What a joint follows from posture to posture, and how it goes: `joint 2: stiffness follows the torque of gravity (p < 0.0001 after 26
+/// tests), from −4.1 % at 120 N·m to +3 % at 2100 N·m; usually …`.
+pub fn joint_trend(trend: &JointTrend) -> String {
+    let end = |p: &TrendPoint| {
+        let x = format!("{} {}", significant(p.x, 3), trend.x_unit);
+        let place = match trend.against {
+            JointAgainst::Order => format!("place {}", significant(p.x, 3)),
+            _ => x.trim_end().to_string(),
+        };
+        format!("{:+.2} % at {place}", 100.0 * p.rest.exp_m1()).replace('-', "−")
+    };
+    let ends = match trend.points.as_slice() {
+        [first, .., last] => format!(", from {} to {}", end(first), end(last)),
+        _ => String::new(),
+    };
+    format!(
+        "{} follows {} ({} after {} tests){ends}; usually {}",
+        parameter_of(&trend.parameter),
+        trend.against.words(),
+        chance(trend.p_value),
+        trend.tests,
+        trend.usual_cause
+    )
 }
 
 /// What a column of tables of many campaigns is, with its unit: `joint-1.stiffness_nm_per_rad` →

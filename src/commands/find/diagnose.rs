@@ -9,6 +9,7 @@ use crate::commands::text::{Emphasis, files_first, number, percent, table, wrapp
 use crate::commands::{Outcome, SideArgs, by_domain};
 use crate::discrepancy::candidate::BaselineFit;
 use crate::discrepancy::comparison::explained::{Explained, NamedPart};
+use crate::discrepancy::joint_trends::JointTrends;
 use crate::discrepancy::localise::Localisation;
 use crate::discrepancy::{CuttingLead, Diagnosis, DiagnosisVerdict, EffectCandidate, NextMeasurement, Trend};
 use crate::identify::Modelled;
@@ -16,6 +17,7 @@ use crate::identify::Options;
 use crate::identify::frfs::structure_study::residual_peaks;
 use crate::identify::rest::Rest;
 use crate::report::verdict_card::departure;
+use crate::report::words;
 use crate::text::chance;
 
 pub fn run(args: SideArgs) -> Result<Outcome> {
@@ -56,8 +58,12 @@ pub fn structure(campaign: &Campaign, findings: &DiagnosisFindings) -> Outcome {
         "residual_peaks": peaks,
         "lead": findings.lead.as_ref().and_then(|l| l.place.as_ref()).map(lead),
         "wrong_links": wrong_links(findings),
+        "joint_trends": joint_trends(findings).map_or(&[][..], |j| j.trends.as_slice()),
+        "joint_courses": joint_trends(findings).map_or(&[][..], |j| j.courses.as_slice()),
     });
-    let told = crate::commands::find::compare::dominant(peaks) + &where_it_shows(findings);
+    let told = joint_trends(findings).map_or(String::new(), joints_in_words)
+        + &crate::commands::find::compare::dominant(peaks)
+        + &where_it_shows(findings);
     let guide = Guide::structure(campaign);
     let instead = wrong_links(findings).map(|_| guide.wrong_links());
     outcome(guide, findings, own, &told, instead)
@@ -65,6 +71,33 @@ pub fn structure(campaign: &Campaign, findings: &DiagnosisFindings) -> Outcome {
 
 fn wrong_links(findings: &DiagnosisFindings) -> Option<&WrongLinks> {
     findings.lead.as_ref()?.links.as_ref()
+}
+
+fn joint_trends(findings: &DiagnosisFindings) -> Option<&JointTrends> {
+    findings.lead.as_ref().map(|lead| &lead.joints)
+}
+
+/// What the joints follow from posture to posture.
+fn joints_in_words(joints: &JointTrends) -> String {
+    let Some(first) = joints.trends.first() else {
+        return String::new();
+    };
+    let mut text = String::new();
+    for trend in joints.followed() {
+        text += &wrapped(&words::joint_trend(trend), "  ");
+    }
+    if text.is_empty() {
+        text = wrapped(
+            &format!(
+                "Refitted posture by posture, no joint's stiffness or damping follows the order of measurement, the hammer's level, the \
+                 joint's angle or gravity's torque by more than chance ({} tests, the least {}).",
+                first.tests,
+                chance(first.p_value)
+            ),
+            "  ",
+        );
+    }
+    text
 }
 
 /// What both sides say alike; `own`: keys of this side alone, `told`: its own words, `instead`: a next step that is better than a

@@ -8,7 +8,7 @@
 
 pub mod screen;
 #[cfg(test)]
-mod tests;
+pub(in crate::discrepancy) mod tests;
 
 use std::collections::BTreeMap;
 

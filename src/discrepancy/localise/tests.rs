@@ -12,7 +12,7 @@ use crate::identify::{FrfData, Options};
 use crate::robot::RobotModel;
 use crate::robot::fixture::{TAP_POSTURES, irb6640};
 
-fn model() -> StructureModel {
+pub(in crate::discrepancy) fn model() -> StructureModel {
     let section = RobotSection {
         model: "irb6640".into(),
         mass_tolerance: None,
@@ -43,6 +43,16 @@ fn measured(truth: &StructureModel, own: &[f64], seed: u64) -> FrfData {
     {
         *t = p.internal(*value);
     }
+    measured_at(truth, &TAP_POSTURES, |_| theta.clone(), &mut random)
+}
+
+/// The same of any postures, each with parameters of its own (solver's scale).
+pub(in crate::discrepancy) fn measured_at(
+    truth: &StructureModel,
+    postures: &[[f64; 6]],
+    theta: impl Fn(usize) -> Vec<f64>,
+    random: &mut ChaCha8Rng,
+) -> FrfData {
     let dof = |point, axis| MeasuredDof {
         point,
         axis,
@@ -50,7 +60,7 @@ fn measured(truth: &StructureModel, own: &[f64], seed: u64) -> FrfData {
     };
     let outputs: Vec<(usize, Axis)> = (0..2).flat_map(|p| Axis::ALL.map(|a| (p, a))).collect();
     let frequency_hz: Vec<f64> = (0..200).map(|i| 4.0 + 0.3 * f64::from(i)).collect();
-    let blocks = TAP_POSTURES.iter().enumerate().map(|(posture, q)| {
+    let blocks = postures.iter().enumerate().map(|(posture, q)| {
         let pairs =
             (0..2usize).flat_map(|p| (0..3usize).flat_map(move |a| (0..3usize).map(move |i| (p, a, i))));
         let frfs = pairs
@@ -78,10 +88,15 @@ fn measured(truth: &StructureModel, own: &[f64], seed: u64) -> FrfData {
     });
     let mut data = FrfData {
         blocks: blocks.map(Arc::new).collect(),
-        posture_ids: ["a", "b", "c", "d"].map(String::from).to_vec(),
+        posture_ids: (1..=postures.len()).map(|p| format!("p{p}")).collect(),
     };
-    let mut exact = truth.predict(&theta, &data).unwrap().into_iter();
     for block in &mut data.blocks {
+        let alone = FrfData {
+            blocks: vec![block.clone()],
+            posture_ids: data.posture_ids.clone(),
+        };
+        let mut exact = truth.predict(&theta(block.posture), &alone).unwrap().into_iter();
+        drop(alone);
         for frf in &mut Arc::get_mut(block).unwrap().frfs {
             let clean = exact.next().unwrap();
             let rms = (clean.iter().map(|h| h.norm_sqr()).sum::<f64>() / clean.len() as f64).sqrt();

@@ -92,11 +92,20 @@ impl FrfProblem<'_> {
         self.partials(theta, true, size)
     }
 
-    fn evaluate(&self, theta: &[f64], with_derivatives: bool) -> Result<Linearisation> {
+    /// Half the sum of squares at `theta` (solver's scale), with its derivatives if they are wanted; priors are left out.
+    ///
+    /// # Errors
+    /// A model that cannot be set up at `theta`.
+    pub fn of_data(&self, theta: &[f64], with_derivatives: bool) -> Result<Linearisation> {
         let mut total = Linearisation::zero(if with_derivatives { theta.len() } else { 0 });
         for (_, _, part) in &self.partials(theta, with_derivatives, |_| CHUNK)? {
             total.add(part);
         }
+        Ok(total)
+    }
+
+    fn evaluate(&self, theta: &[f64], with_derivatives: bool) -> Result<Linearisation> {
+        let mut total = self.of_data(theta, with_derivatives)?;
         for (i, (parameter, t)) in self.model.parameters.iter().zip(theta).enumerate() {
             if let Some(prior) = parameter.prior {
                 total.add_half_square(i, prior.half_square(*t));

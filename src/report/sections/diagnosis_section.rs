@@ -9,13 +9,15 @@ use crate::discrepancy::comparison::explained::Part;
 use crate::discrepancy::{Diagnosis, DiagnosisVerdict, EffectCandidate, NextMeasurement};
 use crate::effects::Structure;
 use crate::identify::Modelled;
-use crate::report::figure::{BarSeries, DrawnCurveFigure, FrfCurve, FrfFigure, NoiseLevel, SideBySide};
+use crate::report::figure::{
+    BarSeries, DrawnCurveFigure, FrfCurve, FrfFigure, NoiseLevel, SideBySide, TrendFigure,
+};
 use crate::report::number::{decimals, percent, plus_minus, significant};
 use crate::report::parts::{figure, paragraph};
 use crate::report::sections::error_map_section::times_noise_map;
 use crate::report::words::{at_place, frf_name};
 use crate::report::{Block, ReportSection, ReportTable, TableColumn, words};
-use crate::text::{listed, shell_word};
+use crate::text::{chance, listed, shell_word};
 
 pub const ID: &str = "missing-physics";
 pub const TITLE: &str = "Which physics is missing";
@@ -78,6 +80,7 @@ pub fn section(campaign: &Campaign, findings: &DiagnosisFindings) -> ReportSecti
     let mut blocks = vec![paragraph(summary(findings))];
     blocks.extend(how_it_shows(d));
     blocks.extend(what_the_data_draw(findings));
+    blocks.extend(joint_by_joint(findings));
     if let (Some(leading), Some(candidate)) = (&findings.leading, findings.leader()) {
         let who = match d.verdict {
             DiagnosisVerdict::Unknown => format!("The best candidate, {},", candidate.instance.title()),
@@ -133,6 +136,44 @@ fn what_the_data_draw(findings: &DiagnosisFindings) -> Option<Block> {
         place.left
     );
     Some(figure("drawn-stiffness", &drawing.title.clone(), caption, drawing.png()).with_plot(drawing.plot()))
+}
+
+/// What the joints follow from posture to posture: the surest of the trends.
+fn joint_by_joint(findings: &DiagnosisFindings) -> Option<Block> {
+    let joints = &findings.lead.as_ref()?.joints;
+    let first = joints.trends.first()?;
+    let name = words::parameter_of(&first.parameter);
+    let against = first.against.words();
+    let drawing = TrendFigure {
+        title: format!("{name} against {against}, posture by posture"),
+        x_label: match first.x_unit {
+            "" => "Place of the posture".to_string(),
+            unit => format!("{} ({unit})", against.trim_start_matches("the ")),
+        },
+        y_label: "Change (%)".into(),
+        points: first
+            .points
+            .iter()
+            .map(|p| [p.x, 100.0 * p.rest.exp_m1(), 100.0 * p.std * p.rest.exp()])
+            .collect(),
+    };
+    let refitted = "Stiffness and damping of the joints were fitted again to each posture by itself (each tied to its value for all postures, \
+                    which is the zero here)";
+    let followed = joints.followed();
+    let caption = match followed.is_empty() {
+        false => {
+            let told: Vec<String> = followed.iter().map(|t| words::joint_trend(t)).collect();
+            format!("{refitted}. {}.", told.join(". "))
+        }
+        true => format!(
+            "{refitted} and held against the order of measurement, the hammer's level, the joint's angle and gravity's torque: none is \
+             followed by more than chance ({} tests); this one comes closest ({}).",
+            first.tests,
+            chance(first.p_value)
+        ),
+    };
+    let alt = drawing.title.clone();
+    Some(figure("joint-by-joint", &alt, caption, drawing.png()))
 }
 
 /// The fingerprint of the effect that is missing.

@@ -176,16 +176,25 @@ pub fn impact_test(record: &TapRecord, settings: &TapSettings) -> Result<TapFrfs
             decay_per_s
         ));
     }
-    let lines = excited_lines(&good);
-    let last_hz = lines.saturating_sub(1) as f64 * resolution_hz;
-    if let Some([_, to]) = settings.band_hz
-        && to > last_hz + resolution_hz
-        && lines < good[0].force.len()
-    {
-        warnings.push(format!(
-            "the hammer excites up to {last_hz:.0} Hz (above, its force is more than 20 dB down): lines above are not used, of a \
-             band that goes to {to:.0} Hz"
-        ));
+    let (excited, all) = (excited_lines(&good), good[0].force.len());
+    let excited_hz = excited.saturating_sub(1) as f64 * resolution_hz;
+    // Who asks for more has it.
+    let wanted = settings
+        .band_hz
+        .map_or(0, |[_, to]| (to / resolution_hz) as usize + 1);
+    let lines = excited.max(wanted.min(all));
+    let unused = settings
+        .band_hz
+        .is_none_or(|[_, to]| to > excited_hz + resolution_hz);
+    if excited < all && unused {
+        let above =
+            format!("the hammer excites up to {excited_hz:.0} Hz: above, its force is more than 20 dB down");
+        warnings.push(match settings.band_hz {
+            Some([_, to]) => {
+                format!("{above}, and lines to {to:.0} Hz are used as the band wants it: noise counts for more there")
+            }
+            None => format!("{above}, and lines are not used (a band that reaches further takes them)"),
+        });
     }
     let (mut frf, mut coherence) = (Vec::new(), Vec::new());
     for response in 0..record.responses.len() {
@@ -584,7 +593,7 @@ mod tests {
     fn a_band_beyond_the_hammer_is_told() {
         let bench = bench(0.03, &[(1.0, 300.0), (5.0, 250.0), (9.1, 320.0)], 13.0);
         let told = |band| {
-            let found = frfs_in(&bench, Some(band)).unwrap();
+            let found = frfs_in(&bench, band).unwrap();
             let warnings = found.warnings.into_iter();
             (
                 *found.frequency_hz.last().unwrap(),
@@ -593,13 +602,19 @@ mod tests {
                     .collect::<Vec<_>>(),
             )
         };
-        let (last_hz, beyond) = told([5.0, 900.0]);
+        let (last_hz, beyond) = told(Some([5.0, 900.0]));
+        assert!((last_hz - 900.0).abs() < 1.0, "{last_hz}");
+        assert!(
+            beyond.len() == 1 && beyond[0].contains("lines to 900 Hz are used"),
+            "{beyond:?}"
+        );
+        let (last_hz, beyond) = told(None);
         assert!(last_hz < 500.0, "{last_hz}");
         assert!(
             beyond.len() == 1 && beyond[0].contains(&format!("up to {last_hz:.0} Hz")),
             "{beyond:?}"
         );
-        assert!(told([5.0, 100.0]).1.is_empty());
+        assert!(told(Some([5.0, 100.0])).1.is_empty());
     }
 
     /// Frequency and damping of the mode, window taken out.

@@ -307,7 +307,11 @@ pub(crate) fn set_warnings(set: &SetModes) -> Vec<String> {
             .take(4)
             .map(|f| format!("{} ({})", f.input.name, f.quality.reasons.join(", ")))
             .collect();
-        lines.push(format!("{}: {}: {}", set.set, set.why, worst.join("; ")));
+        let mut line = format!("{}: {}: {}", set.set, set.verdict, set.why);
+        if !worst.is_empty() {
+            line += &format!(": {}", worst.join("; "));
+        }
+        lines.push(line);
     }
     lines
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::ingest::units;
-use crate::ingest::{self, Channel, TimeRecord};
+use crate::ingest::{self, Channel, Quantity, TimeRecord};
 use crate::modal::operational::{
     OperationalModes, OperationalRecord, OperationalSettings, operational_modes,
 };
@@ -24,16 +24,26 @@ pub struct OperationalSet {
     pub warnings: Vec<String>,
 }
 
-/// Modes of every file.
+/// Modes of every file. `rate_hz`: sampling rate of records that say neither times nor a rate.
 ///
 /// # Errors
 /// A file that cannot be read, holds no responses, or too few samples of them.
-pub fn of_files(files: &[impl AsRef<Path>], settings: &OperationalSettings) -> Result<Vec<OperationalSet>> {
-    files.iter().map(|f| of_file(f.as_ref(), settings)).collect()
+pub fn of_files(
+    files: &[impl AsRef<Path>],
+    rate_hz: Option<f64>,
+    settings: &OperationalSettings,
+) -> Result<Vec<OperationalSet>> {
+    files
+        .iter()
+        .map(|f| of_file(f.as_ref(), rate_hz, settings))
+        .collect()
 }
 
-fn of_file(path: &Path, settings: &OperationalSettings) -> Result<OperationalSet> {
-    let file = ingest::read_file(path)?;
+fn of_file(path: &Path, rate_hz: Option<f64>, settings: &OperationalSettings) -> Result<OperationalSet> {
+    let file = match rate_hz {
+        Some(rate_hz) => ingest::read_file_at(path, rate_hz)?,
+        None => ingest::read_file(path)?,
+    };
     let mut warnings = file.warnings;
     // Of several records the longest: correlations must not reach over the seam.
     let record = file.contents.times.iter().max_by_key(|r| r.len());
@@ -63,6 +73,7 @@ fn of_file(path: &Path, settings: &OperationalSettings) -> Result<OperationalSet
     let responses = OperationalRecord {
         sample_rate_hz: record.sample_rate_hz,
         channels: &samples,
+        differentiations: &differentiations(&moving),
     };
     let modes = operational_modes(&responses, settings).map_err(|e| match e {
         Error::Input(e) => (*e).file(path).into(),
@@ -76,6 +87,24 @@ fn of_file(path: &Path, settings: &OperationalSettings) -> Result<OperationalSet
         modes,
         warnings,
     })
+}
+
+/// How often each channel has to be differentiated in time to be what the one is that is differentiated most (displacement, velocity,
+/// acceleration); nothing where a unit is not known.
+fn differentiations(channels: &[&Channel]) -> Vec<u8> {
+    let derivative = |c: &&Channel| {
+        let motion = units::parse(&c.file_unit)?.dimension.motion()?;
+        Some(match motion {
+            Quantity::Receptance => 0,
+            Quantity::Mobility => 1,
+            Quantity::Accelerance => 2,
+        })
+    };
+    let Some(found) = channels.iter().map(derivative).collect::<Option<Vec<u8>>>() else {
+        return Vec::new();
+    };
+    let highest = found.iter().copied().max().unwrap_or(0);
+    found.iter().map(|derivative| highest - derivative).collect()
 }
 
 /// Channels in a unit of motion; where none has one, all that are no force and no moment. A channel that rests is left

@@ -48,11 +48,11 @@ pub struct ModalArgs {
     /// Tap tests: length of a block, s (from the distance of the hits where left out).
     #[arg(long, value_name = "S", value_parser = seconds)]
     block_s: Option<f64>,
-    /// Tap tests without a time column: sampling rate, Hz.
+    /// Records without a time column (tap tests, responses alone): sampling rate, Hz.
     #[arg(long, value_name = "HZ", value_parser = positive)]
     rate: Option<f64>,
     /// The files are records of responses without forces (idling, cutting): modes from them alone.
-    #[arg(long, conflicts_with_all = ["together", "each", "block_s", "rate"])]
+    #[arg(long, conflicts_with_all = ["together", "each", "block_s"])]
     output_only: bool,
     /// Write a report of its own into this folder (HTML and PNG).
     #[arg(long, value_name = "DIR", conflicts_with = "output_only")]
@@ -261,7 +261,7 @@ fn output_only(args: &ModalArgs, folder: bool) -> Result<Outcome> {
         max_order: args.order.map(|n| n as usize),
         spindle_rpm: args.spindle,
     };
-    let sets = operational::of_files(&args.paths, &settings)?;
+    let sets = operational::of_files(&args.paths, args.rate, &settings)?;
     let found = sets.iter().map(|s| s.modes.modes.len()).sum();
     let paths: Vec<&Path> = args.paths.iter().map(PathBuf::as_path).collect();
     Ok(Outcome::new(

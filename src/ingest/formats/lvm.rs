@@ -10,6 +10,7 @@ use crate::ingest::formats::waveform;
 use crate::ingest::tables::clock::{self, Grid, Stamps};
 use crate::ingest::tables::number;
 use crate::ingest::text::{Lines, Notes, decode};
+use crate::text::figures;
 
 const END_OF_HEADER: &str = "***End_of_Header***";
 const FIRST_LINE: &str = "LabVIEW Measurement";
@@ -122,6 +123,12 @@ fn layout(lines: &mut Lines) -> Result<Layout, InputError> {
     .remedy("save it again: the file is cut off"))
 }
 
+/// Names without `X_Value` before them, as some programs write where there are no times: nothing, then text.
+fn is_heading(fields: &[String], layout: &Layout) -> bool {
+    let is_text = |f: &String| !f.is_empty() && number::field(f.as_bytes(), layout.decimal).is_none();
+    fields[0].is_empty() && fields.get(1).is_some_and(is_text)
+}
+
 /// Header, names and rows of the next segment; `None` at the end of the file.
 fn next_segment(
     lines: &mut Lines,
@@ -177,7 +184,9 @@ fn next_segment(
             rows += 1;
         } else if key == END_OF_HEADER {
             *entries = std::mem::take(&mut fresh);
-        } else if key == "X_Value" {
+        } else if key == "X_Value"
+            || in_header && is_heading(&fields, layout) && fresh.is_empty() && !entries.is_empty()
+        {
             *names = fields;
             in_header = false;
         } else if in_header {
@@ -258,7 +267,11 @@ fn of_segment(segment: Segment, layout: &Layout, notes: &mut Notes) -> Result<Ve
         if let Some(declared) = declared.filter(|d| (step / d - 1.0).abs() > 1e-3) {
             notes.about(
                 &name,
-                format!("the header says steps of {declared} s, the time column {step:.6} s: the time column is taken"),
+                format!(
+                    "the header says steps of {} s, the time column {} s: the time column is taken",
+                    figures(declared, 6),
+                    figures(step, 6)
+                ),
             );
         }
         let samples = match (axis.uneven, &times) {
@@ -388,6 +401,8 @@ mod tests {
         assert_two_channels(&records(&file("\t", ".", "No", &none)));
         assert_two_channels(&records(&file(",", ".", "No", &none)));
         assert_two_channels(&records(&file("\t", ",", "No", &none.replace('.', ","))));
+        // Some programs leave out the word before the names.
+        assert_two_channels(&records(&file("\t", ".", "No", &none.replace("X_Value", ""))));
         let one = format!("{HEADER}0\t1.5\t10\n0.001\t2\t20\n0.002\t3.0\t30\n");
         assert_two_channels(&records(&file("\t", ".", "One", &one)));
         let header = HEADER

@@ -127,7 +127,10 @@ pub(crate) fn unit_label(name: &str) -> String {
     let unit = unit_in_name(name);
     if let Some((_, label)) = name.split_once(['[', '(']) {
         let label = label.trim_end_matches([']', ')']);
-        if unit.is_none() || units::parse_named(label).is_some() {
+        // `x(1,:)` is a part of an array.
+        let says_something =
+            unit.is_none() && label.contains(|c: char| c.is_alphabetic() || "%°".contains(c));
+        if says_something || units::parse_named(label).is_some() {
             return label.to_owned();
         }
     }

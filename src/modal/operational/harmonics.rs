@@ -22,6 +22,10 @@ const AROUND: usize = 12;
 const FALSE_ALARM: f64 = 1e-3;
 /// Hann's neighbouring lines are correlated: so many of them are worth one independent one.
 const CORRELATED: f64 = 1.5;
+/// What a sine of slowly changing size and phase leaves of its lines is at most this share of them (of random motion whose band is a line
+/// wide 2 % are below, half are above 16 %), or so many times the level around.
+const WIDER: f64 = 0.02;
+const BY_CHANCE: f64 = 1.5;
 /// Rounds of finding and taking out: a strong line hides weak ones next to it.
 const ROUNDS: usize = 3;
 /// Mean fourth power of the envelope over its squared mean square: 2 for random motion, 1 for a sine.
@@ -148,8 +152,14 @@ fn lines(channels: &[Vec<f64>], rate_hz: f64, band_hz: [f64; 2]) -> Vec<Harmonic
                 best = (power / around, c);
             }
         }
-        if best.0 > threshold {
-            let spectrum = &spectra[best.1];
+        let spectrum = &spectra[best.1];
+        // A mode that is hardly wider than a line stands above its neighbours as well.
+        let noise = (2 * OWN + 1) as f64 * spectrum[k].norm_sqr() / best.0.max(f64::MIN_POSITIVE);
+        let as_narrow = || {
+            let [whole, left] = beside_a_sine(spectrum, k);
+            left < (WIDER * whole).max(BY_CHANCE * noise)
+        };
+        if best.0 > threshold && as_narrow() {
             found.push(Harmonic {
                 frequency_hz: (k as f64 + between(spectrum, k)) * step_hz,
                 over_noise: best.0,
@@ -159,6 +169,40 @@ fn lines(channels: &[Vec<f64>], rate_hz: f64, band_hz: [f64; 2]) -> Vec<Harmonic
         }
     }
     found
+}
+
+/// Power in the lines of a peak, and what a sine of slowly changing size and phase leaves of it.
+fn beside_a_sine(spectrum: &[Complex64], k: usize) -> [f64; 2] {
+    // Hann's lines of a sine d lines away, seen from the middle of the record: 1 at 0, ½ at ±1.
+    let lobe = |d: f64| match (d.abs() < 1e-9, (d.abs() - 1.0).abs() < 1e-6) {
+        (true, _) => 1.0,
+        (_, true) => 0.5,
+        _ => (PI * d).sin() / (PI * d * (1.0 - d * d)),
+    };
+    let slope = |d: f64| (lobe(d + 1e-3) - lobe(d - 1e-3)) / 2e-3;
+    let at = k as f64 + between(spectrum, k);
+    let lines = k - OWN..=k + OWN;
+    let seen: Vec<Complex64> = lines
+        .clone()
+        .map(|i| if i % 2 == 0 { spectrum[i] } else { -spectrum[i] })
+        .collect();
+    let rows: Vec<nalgebra::Vector2<f64>> = lines
+        .map(|i| i as f64 - at)
+        .map(|d| nalgebra::Vector2::new(lobe(d), slope(d)))
+        .collect();
+    let whole = seen.iter().map(|z| z.norm_sqr()).sum();
+    let normal: nalgebra::Matrix2<f64> = rows.iter().map(|row| row * row.transpose()).sum();
+    let Some(factor) = normal.cholesky() else {
+        return [whole, whole];
+    };
+    let fitted = |part: fn(&Complex64) -> f64| {
+        factor.solve(&rows.iter().zip(&seen).map(|(row, z)| row * part(z)).sum())
+    };
+    let (re, im) = (fitted(|z| z.re), fitted(|z| z.im));
+    let rest = |(row, z): (&nalgebra::Vector2<f64>, &Complex64)| {
+        (z - Complex64::new(row.dot(&re), row.dot(&im))).norm_sqr()
+    };
+    [whole, rows.iter().zip(&seen).map(rest).sum()]
 }
 
 /// Place of a sine's peak between lines, −½ … ½, from the two largest lines under Hann's window: for δ lines from the
@@ -338,6 +382,39 @@ mod tests {
             })
             .sum();
         assert!(found <= 1, "{found} lines in 60 records");
+    }
+
+    /// Random motion of a mode whose half-power band is two lines of the record wide is no line; a sine of the same height is.
+    #[test]
+    fn a_mode_as_narrow_as_two_lines_is_no_rotating_part() {
+        let (rate_hz, f_hz, count) = (20.0, 1.43, 4096);
+        // A sample's decay where 2ζf is two lines.
+        let decay = TAU / count as f64;
+        let (mut modes, mut sines) = (0, 0);
+        for seed in 0..40 {
+            let (drive, ground) = (noise(3 * count, 100 + seed), noise(count, 300 + seed));
+            let turn = Complex64::from_polar((-decay).exp(), TAU * f_hz / rate_hz);
+            let mut state = Complex64::ZERO;
+            let ringing: Vec<f64> = drive
+                .iter()
+                .map(|x| {
+                    state = turn * state + x;
+                    state.re
+                })
+                .collect();
+            let ringing = &ringing[2 * count..];
+            let size = (ringing.iter().map(|x| x * x).sum::<f64>() / count as f64).sqrt();
+            let found = |own: &dyn Fn(usize) -> f64| {
+                let mut channels = [(0..count).map(|k| own(k) + 0.05 * size * ground[k]).collect()];
+                !take_out(&mut channels, rate_hz, [0.5, 5.0], None).is_empty()
+            };
+            modes += usize::from(found(&|k| ringing[k]));
+            sines += usize::from(found(&|k| {
+                std::f64::consts::SQRT_2 * size * (TAU * f_hz * k as f64 / rate_hz).sin()
+            }));
+        }
+        assert_eq!(sines, 40);
+        assert!(modes <= 6, "{modes} of 40");
     }
 
     #[test]

@@ -120,7 +120,10 @@ pub fn operational_modes(
     result.segments = plan.segments;
     result.longest_lag_s = plan.lags() as f64 / rate_hz;
     let correlations = correlation::of_segments(&channels, &plan);
-    let orders = subspace::orders(&correlations, &plan, rate_hz, band_hz)?;
+    let mut orders = subspace::orders(&correlations, &plan, rate_hz, band_hz)?;
+    for pole in orders.iter_mut().flat_map(|order| &mut order.poles) {
+        pole.differentiate(record.differentiations);
+    }
     let chains = chains::follow(&orders, &mut result.poles);
     let (modes, rejected) = chains::choose(&chains, plan.orders().len(), channels.len());
     let spectra = harmonics::Spectra::new(&channels, rate_hz);

@@ -7,4 +7,7 @@ pub struct OperationalRecord<'a> {
     pub sample_rate_hz: f64,
     /// By channel, its samples.
     pub channels: &'a [&'a [f64]],
+    /// How often each channel has to be differentiated in time to be what the shapes are of (a velocity once, where others are
+    /// accelerations); empty: all are alike.
+    pub differentiations: &'a [u8],
 }

@@ -98,6 +98,7 @@ mod tests {
             let record = OperationalRecord {
                 sample_rate_hz: rate,
                 channels: &[&samples],
+                differentiations: &[],
             };
             // Thinned to 100 Hz.
             let (channels, new) = thinned(&record, 40.0);

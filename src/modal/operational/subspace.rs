@@ -28,6 +28,18 @@ pub(super) struct SubspacePole {
     pub shape: Vec<Complex64>,
 }
 
+impl SubspacePole {
+    /// Makes the shape that of the channels differentiated in time so often: a mode is e^{st}, so each time is a factor s.
+    pub fn differentiate(&mut self, times: &[u8]) {
+        let natural = TAU * self.frequency_hz;
+        let damped = (1.0 - self.damping_ratio.powi(2)).max(0.0).sqrt();
+        let s = natural * Complex64::new(-self.damping_ratio, damped);
+        for (z, times) in self.shape.iter_mut().zip(times) {
+            *z *= s.powu(u32::from(*times));
+        }
+    }
+}
+
 /// Poles of one order, ascending in frequency.
 #[derive(Debug, Clone)]
 pub(super) struct OrderPoles {

@@ -89,6 +89,7 @@ fn analyse(channels: &[Vec<f64>], settings: &OperationalSettings) -> Operational
     let record = OperationalRecord {
         sample_rate_hz: RATE_HZ,
         channels: &channels,
+        differentiations: &[],
     };
     operational_modes(&record, settings).unwrap()
 }
@@ -260,8 +261,28 @@ fn bad_records_are_errors_that_say_so() {
         let record = OperationalRecord {
             sample_rate_hz: 100.0,
             channels,
+            differentiations: &[],
         };
         let error = operational_modes(&record, &OperationalSettings::default()).unwrap_err();
         assert!(error.to_string().contains(expected), "{error}");
+    }
+}
+
+/// A velocity beside accelerations: the shape is of one standing wave all the same.
+#[test]
+fn velocities_beside_accelerations_have_one_phase_with_them() {
+    let shape = [1.0, -0.7, 0.4, 0.9].map(Complex64::from);
+    let s = std::f64::consts::TAU * 5.0 * Complex64::new(-0.02, (1.0f64 - 0.02 * 0.02).sqrt());
+    let mut pole = subspace::SubspacePole {
+        frequency_hz: 5.0,
+        damping_ratio: 0.02,
+        frequency_std_hz: 0.0,
+        damping_std: 0.0,
+        // As recorded: two accelerations, a velocity, a displacement.
+        shape: vec![shape[0], shape[1], shape[2] / s, shape[3] / (s * s)],
+    };
+    pole.differentiate(&[0, 0, 1, 2]);
+    for (z, truth) in pole.shape.iter().zip(shape) {
+        assert!((z - truth).norm() < 1e-12, "{z}");
     }
 }

@@ -21,7 +21,7 @@ const SAME_DAMPING: f64 = 2.0;
 const APART: f64 = 4.0;
 const APART_WIDTHS: f64 = 0.1;
 /// A peak at least this share as high as the highest of its FRF must not be missing.
-const HIGH: f64 = 0.1;
+const HIGH: f64 = 0.02;
 
 /// A mode as the FRFs have it by themselves: means over them.
 #[derive(Debug)]

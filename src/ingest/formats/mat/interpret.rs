@@ -10,6 +10,7 @@ use crate::InputError;
 use crate::data::{FrfRecord, Quantity, TimeRecord};
 use crate::ingest::budget::Budget;
 use crate::ingest::contents::{Contents, OtherRecord};
+use crate::ingest::formats::mat::testlab;
 use crate::ingest::formats::mat::variable::{Labels, MIN_AXIS, Variable};
 use crate::ingest::formats::waveform;
 use crate::ingest::tables::clock::{self, Grid, Stamps};
@@ -37,6 +38,7 @@ pub(crate) fn contents(
     let mut contents = Contents::default();
     join_parts(&mut variables, notes);
     let mut damaged = None;
+    testlab::functions(&variables, labels, &mut used, &mut contents, budget, notes)?;
     tables(
         &variables,
         labels,
@@ -306,7 +308,7 @@ fn frequency_axes(
         });
     }
     let steps: Vec<usize> = (0..variables.len())
-        .filter(|k| variables[*k].is_frequency_step())
+        .filter(|k| !used[*k] && variables[*k].is_frequency_step())
         .collect();
     for k in steps {
         let (Some(step), root) = (variables[k].scalar().filter(|s| *s > 0.0), variables[k].root()) else {

@@ -8,6 +8,7 @@ use crate::ingest::text::Notes;
 
 mod hdf5;
 mod interpret;
+mod testlab;
 mod v4;
 mod v5;
 mod variable;

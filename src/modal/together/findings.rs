@@ -28,6 +28,8 @@ const FINE_LINES: f64 = 3.0;
 const UNCERTAIN: f64 = 0.02;
 /// What poles anywhere explain scatters by about this without any model error.
 const BY_CHANCE: f64 = 1.5;
+/// What a few FRFs know to so many half-widths (or lines) only has no place.
+const NOWHERE: f64 = 3.0;
 /// A frequency that is uncertain by more than this share of the half-width is not given.
 const UNPLACED: f64 = 0.3;
 /// A line whose width is not known is a mode where the residues of its FRFs have a common phase (collinearity) …
@@ -204,6 +206,14 @@ pub(crate) fn collect(
                 continue;
             }
             let without_place = frequency_std_hz > width_hz.hypot(shift[0]);
+            // Where it may be anywhere, a damping that is known means nothing.
+            if few && frequency_std_hz > NOWHERE * width_hz.hypot(shift[0]) {
+                result.rejected.push(RejectedMode::new(
+                    pole,
+                    format!("its place is known to ±{frequency_std_hz:.2} Hz only"),
+                ));
+                continue;
+            }
             if without_place && damping_std > pole.damping_ratio.hypot(shift[1]) {
                 result.rejected.push(RejectedMode::new(
                     pole,

@@ -67,6 +67,27 @@ impl JointAgainst {
         }
     }
 
+    /// Ten minutes in the laboratory that tell whether it is so.
+    pub fn lab_check(self) -> &'static str {
+        match self {
+            JointAgainst::Order => {
+                "Hit the first posture once more now: if its peaks stand where the last postures have them, it is the time that counts, and not \
+                 the posture. Warm the robot up for an hour and repeat."
+            }
+            JointAgainst::ForceLevel => {
+                "In one posture, hit the same point with half and with twice the force: the peaks that this joint makes move or change in width."
+            }
+            JointAgainst::Angle => {
+                "Turn this joint alone by 10° one way and the other and hit again: its peaks move as the figure says. Take cables and hoses off \
+                 it, or release its brake, and repeat."
+            }
+            JointAgainst::GravityTorque => {
+                "In one posture, hang a weight of some kilograms on the tool so that gravity pulls more at this joint, and hit again: beside what \
+                 the mass does, its peaks rise where a preload or backlash is the cause."
+            }
+        }
+    }
+
     /// Degree of what is sought in so many points: an angle may act in both directions from somewhere between, the others go one way.
     fn degree(self, points: usize) -> usize {
         match self {

@@ -115,6 +115,15 @@ fn answer<D: Modelled>(
             let joints = lead.map_or(Vec::new(), |l| l.joints.followed());
             let told = joints.iter().take(JOINTS_TOLD).map(|t| words::joint_trend(t));
             card.facts.extend(told.map(|text| ("Joint by joint", text)));
+            let place = lead.and_then(|l| l.place.as_ref());
+            let placed = place.is_some_and(|found| found.partial_share().is_none());
+            let files = lead.is_some_and(|l| l.links.is_some());
+            if let Some(first) = joints.first().filter(|_| !placed && !files) {
+                card.headline = format!(
+                    "{} is not the same at all postures",
+                    sentence_begin(&first.parameter)
+                );
+            }
         }
     }
     if d.too_little_data.is_none() {
@@ -137,6 +146,16 @@ fn answer<D: Modelled>(
             .push(("Likely besides", format!("{count}: {}", listed(&others))));
     }
     card
+}
+
+/// `joint-2.stiffness` → `Stiffness of joint 2`.
+fn sentence_begin(parameter: &str) -> String {
+    let name = words::parameter(parameter);
+    let capital = name[..1].to_uppercase() + &name[1..];
+    match parameter.rsplit_once('.') {
+        Some((owner, _)) => format!("{capital} of {}", words::at_place(owner)),
+        None => capital,
+    }
 }
 
 /// Joints that a card names of those that follow something.

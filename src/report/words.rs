@@ -123,7 +123,7 @@ pub fn joint_trend(trend: &JointTrend) -> String {
     let end = |p: &TrendPoint| {
         let x = format!("{} {}", significant(p.x, 3), trend.x_unit);
         let place = match trend.against {
-            JointAgainst::Order => format!("place {}", significant(p.x, 3)),
+            JointAgainst::Order => format!("place {:.0}", p.x),
             _ => x.trim_end().to_string(),
         };
         format!("{:+.2} % at {place}", 100.0 * p.rest.exp_m1()).replace('-', "−")

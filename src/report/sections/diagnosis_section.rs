@@ -6,6 +6,7 @@ use crate::analysis::DiagnosisFindings;
 use crate::analysis::diagnosis::Leading;
 use crate::campaign::Campaign;
 use crate::discrepancy::comparison::explained::Part;
+use crate::discrepancy::joint_trends::JointTrend;
 use crate::discrepancy::{Diagnosis, DiagnosisVerdict, EffectCandidate, NextMeasurement};
 use crate::effects::Structure;
 use crate::identify::Modelled;
@@ -138,42 +139,62 @@ fn what_the_data_draw(findings: &DiagnosisFindings) -> Option<Block> {
     Some(figure("drawn-stiffness", &drawing.title.clone(), caption, drawing.png()).with_plot(drawing.plot()))
 }
 
-/// What the joints follow from posture to posture: the surest of the trends.
-fn joint_by_joint(findings: &DiagnosisFindings) -> Option<Block> {
-    let joints = &findings.lead.as_ref()?.joints;
-    let first = joints.trends.first()?;
-    let name = words::parameter_of(&first.parameter);
-    let against = first.against.words();
+/// Joints drawn of those that follow something.
+const JOINTS_DRAWN: usize = 3;
+
+/// What the joints follow from posture to posture, the surest first.
+fn joint_by_joint(findings: &DiagnosisFindings) -> Vec<Block> {
+    let Some(joints) = findings.lead.as_ref().map(|lead| &lead.joints) else {
+        return Vec::new();
+    };
+    let Some(first) = joints.trends.first() else {
+        return Vec::new();
+    };
+    let followed = joints.followed();
+    let mut told = "Stiffness and damping of the joints were fitted again to each posture by itself, each tied to its value for all \
+                    postures, and held against the order of measurement, the hammer's level, the joint's angle and gravity's torque"
+        .to_string();
+    told += &match followed.is_empty() {
+        true => format!(
+            ": none is followed by more than chance ({} tests, the least {}).",
+            first.tests,
+            chance(first.p_value)
+        ),
+        false => format!(" ({} tests).", first.tests),
+    };
+    let drawn = followed.iter().take(JOINTS_DRAWN).enumerate();
+    std::iter::once(paragraph(told))
+        .chain(drawn.map(|(rank, trend)| joint_figure(rank, trend)))
+        .collect()
+}
+
+fn joint_figure(rank: usize, trend: &JointTrend) -> Block {
+    let against = trend.against.words();
+    let capital = |text: &str| text[..1].to_uppercase() + &text[1..];
     let drawing = TrendFigure {
-        title: format!("{name} against {against}, posture by posture"),
-        x_label: match first.x_unit {
-            "" => "Place of the posture".to_string(),
-            unit => format!("{} ({unit})", against.trim_start_matches("the ")),
+        title: capital(&format!(
+            "{} against {against}",
+            words::parameter_of(&trend.parameter)
+        )),
+        x_label: match trend.x_unit {
+            "" => "Place of the posture in the campaign".to_string(),
+            unit => format!("{} ({unit})", capital(against.trim_start_matches("the "))),
         },
         y_label: "Change (%)".into(),
-        points: first
+        of: ["fitted to one posture", "fitted to all"],
+        points: trend
             .points
             .iter()
             .map(|p| [p.x, 100.0 * p.rest.exp_m1(), 100.0 * p.std * p.rest.exp()])
             .collect(),
     };
-    let refitted = "Stiffness and damping of the joints were fitted again to each posture by itself (each tied to its value for all postures, \
-                    which is the zero here)";
-    let followed = joints.followed();
-    let caption = match followed.is_empty() {
-        false => {
-            let told: Vec<String> = followed.iter().map(|t| words::joint_trend(t)).collect();
-            format!("{refitted}. {}.", told.join(". "))
-        }
-        true => format!(
-            "{refitted} and held against the order of measurement, the hammer's level, the joint's angle and gravity's torque: none is \
-             followed by more than chance ({} tests); this one comes closest ({}).",
-            first.tests,
-            chance(first.p_value)
-        ),
-    };
-    let alt = drawing.title.clone();
-    Some(figure("joint-by-joint", &alt, caption, drawing.png()))
+    let caption = format!("{}.", capital(&words::joint_trend(trend)));
+    figure(
+        format!("joint-by-joint-{}", rank + 1),
+        &drawing.title.clone(),
+        caption,
+        drawing.png(),
+    )
 }
 
 /// The fingerprint of the effect that is missing.

@@ -227,6 +227,7 @@ fn trend(findings: &CuttingFindings) -> Option<Block> {
         title: format!("What the force model leaves, against {words}"),
         x_label,
         y_label: format!("{of} ({unit})"),
+        of: ["record less model", "no difference"],
         points: first
             .points
             .iter()

@@ -13,6 +13,8 @@ pub struct TrendFigure {
     /// With their units.
     pub x_label: String,
     pub y_label: String,
+    /// What the points are, without what their bars are, and what zero is.
+    pub of: [&'static str; 2],
     /// x, value, standard error.
     pub points: Vec<[f64; 3]>,
 }
@@ -42,9 +44,9 @@ impl TrendFigure {
         let legend = [
             (
                 Swatch::Sign(Marker::Disc, SIGN, style::BLUE),
-                "record less model ± standard error of the noise".to_string(),
+                format!("{} ± standard error of the noise", self.of[0]),
             ),
-            (Swatch::Line(style::LEVEL), "no difference".to_string()),
+            (Swatch::Line(style::LEVEL), self.of[1].to_string()),
         ];
         let header = FigureHeader::new(&self.title, &legend, left, right);
         let panels = Panel::stack(&x, vec![y], [left, right], header.bottom() + 14.0, HEIGHT, 0.0);
@@ -75,6 +77,7 @@ mod tests {
             title: "The rest against the feed".into(),
             x_label: "Feed (mm)".into(),
             y_label: "Rest (%)".into(),
+            of: ["record less model", "no difference"],
             points: vec![[0.05, 4.0, 0.5], [0.1, -1.0, 0.4], [0.15, f64::NAN, 0.4]],
         };
         assert!(figure.png().unwrap().starts_with(b"\x89PNG"));

@@ -114,7 +114,7 @@ fn answer<D: Modelled>(
             }
             let joints = lead.map_or(Vec::new(), |l| l.joints.followed());
             let told = joints.iter().take(JOINTS_TOLD).map(|t| words::joint_trend(t));
-            card.facts.extend(told.map(|text| ("Joint by joint", text)));
+            card.facts.splice(0..0, told.map(|text| ("Joint by joint", text)));
             let place = lead.and_then(|l| l.place.as_ref());
             let placed = place.is_some_and(|found| found.partial_share().is_none());
             let files = lead.is_some_and(|l| l.links.is_some());
@@ -123,6 +123,7 @@ fn answer<D: Modelled>(
                     "{} is not the same at all postures",
                     sentence_begin(&first.parameter)
                 );
+                card.check = Some(first.against.lab_check().into());
             }
         }
     }
